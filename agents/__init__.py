@@ -1,0 +1,1 @@
+"""The UAV process: routing core, autopilot, traffic and mission of one node."""

@@ -1,0 +1,1 @@
+"""The link emulator: decides who hears whom. Frames are bytes to it."""

@@ -1,0 +1,97 @@
+"""From a TOML file and `KEY=VALUE` overrides to a frozen `Scenario`. Every mistake is reported at once.
+
+A message names the file, the key, the value and the bound, because the reader has only that line.
+"""
+
+import difflib
+import tomllib
+from collections.abc import Iterable, Mapping
+from pathlib import Path
+from typing import Any
+
+from pydantic import BaseModel, ValidationError
+
+from fanet_mw.errors import ConfigError
+from fanet_mw.scenario import Scenario
+
+
+def load(path: Path, overrides: Iterable[str] = ()) -> Scenario:
+    """Read one scenario file; raises ConfigError with all mistakes of the file and the overrides."""
+    try:
+        text = path.read_text(encoding="utf-8")
+    except (OSError, UnicodeDecodeError) as error:
+        raise ConfigError(f"{path}: cannot be read: {getattr(error, 'strerror', None) or error}") from error
+    return parse(text, source=str(path), name=path.stem, overrides=overrides)
+
+
+def parse(text: str, *, source: str, name: str, overrides: Iterable[str] = ()) -> Scenario:
+    """Build a scenario from TOML text; `source` is what messages call it, `name` its name unless it has its own."""
+    try:
+        tree: dict[str, Any] = tomllib.loads(text)
+    except tomllib.TOMLDecodeError as error:
+        raise ConfigError(f"{source}: not valid TOML: {error}") from error
+    tree.setdefault("name", name)
+    for override in overrides:
+        _apply(tree, override)
+    return build(tree, source=source)
+
+
+def build(tree: Mapping[str, Any], *, source: str = "scenario") -> Scenario:
+    """Validate a tree of plain values."""
+    try:
+        return Scenario.model_validate(tree)
+    except ValidationError as error:
+        lines = [_sentence(dict(item)) for item in error.errors()]
+        raise ConfigError("\n".join(f"{source}: {text}" for text in dict.fromkeys(lines))) from error
+
+
+def _apply(tree: dict[str, Any], override: str) -> None:
+    """Set one dotted key; the value is TOML, or else taken as a string."""
+    key, equals, text = override.partition("=")
+    key = key.strip()
+    if not equals or not key:
+        raise ConfigError(f"--set {override!r}: must be KEY=VALUE, for example nodes.count=10")
+    *path, last = key.split(".")
+    table = tree
+    for part in path:
+        inner = table.setdefault(part, {})
+        if not isinstance(inner, dict):
+            raise ConfigError(f"--set {override!r}: {part!r} is a value, not a table")
+        table = inner
+    table[last] = _value(text.strip())
+
+
+def _value(text: str) -> Any:
+    try:
+        return tomllib.loads(f"value = {text}")["value"]
+    except tomllib.TOMLDecodeError:
+        return text
+
+
+def _sentence(item: dict[str, Any]) -> str:
+    """One mistake as `key = value: bound`."""
+    path = [str(part) for part in item["loc"] if not _is_branch(str(part))]
+    key = ".".join(path)
+    if item["type"] == "extra_forbidden":
+        return f"{key}: unknown key{_suggestion(path)}"
+    message = str(item["msg"]).removeprefix("Value error, ")
+    if item["type"] == "value_error":
+        return message
+    return f"{key} = {item['input']!r}: {message[0].lower()}{message[1:]}"
+
+
+def _is_branch(part: str) -> bool:
+    """Pydantic names the member of a union in the location; people did not write it."""
+    return "[" in part or part in {"int", "float", "constrained-int", "literal"}
+
+
+def _suggestion(path: list[str]) -> str:
+    model: type[BaseModel] = Scenario
+    for part in path[:-1]:
+        field = model.model_fields.get(part)
+        if field is None or not (isinstance(field.annotation, type) and issubclass(field.annotation, BaseModel)):
+            return ""
+        model = field.annotation
+    close = difflib.get_close_matches(path[-1], model.model_fields, n=1)
+    known = ", ".join(sorted(model.model_fields))
+    return f"; did you mean {close[0]}?" if close else f"; known keys: {known}"

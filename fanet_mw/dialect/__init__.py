@@ -1,0 +1,1 @@
+"""Our MAVLink dialect: fanet.xml and the module generated from it."""

@@ -1,0 +1,1 @@
+"""The sans-IO core: no clock, no socket, no thread."""

@@ -1,0 +1,1 @@
+"""Radios: what a node transmits through."""

@@ -1,0 +1,1 @@
+"""Baseline protocols behind the contract of the core."""

@@ -1,0 +1,289 @@
+"""The scenario: one frozen model of everything a run depends on. Keys are people's units, with the unit in the key.
+
+A key is a contract with users: renaming one breaks their files and sweeps. Derived values are properties, in `int` ns.
+"""
+
+import math
+from collections.abc import Sequence
+from typing import Annotated, Final, Literal, Self
+
+from pydantic import AfterValidator, BaseModel, ConfigDict, Field, model_validator
+
+from fanet_mw.units import MAX_NODES, MS, NodeId, seconds_to_ns
+
+Positive = Annotated[float, Field(gt=0, allow_inf_nan=False)]
+NonNegative = Annotated[float, Field(ge=0, allow_inf_nan=False)]
+Finite = Annotated[float, Field(allow_inf_nan=False)]
+
+
+def _known_rate(mbps: float) -> float:
+    if mbps not in DSSS_RATES_MBPS:
+        raise ValueError(f"rate {mbps:g} Mb/s must be one of {', '.join(f'{rate:g}' for rate in DSSS_RATES_MBPS)}")
+    return mbps
+
+
+DSSS_RATES_MBPS: Final = (1.0, 2.0, 5.5, 11.0)
+Rate = Annotated[float, AfterValidator(_known_rate)]
+Id = Annotated[int, Field(ge=1, le=MAX_NODES)]
+
+
+class Section(BaseModel):
+    """The base of every table of a scenario file."""
+
+    model_config = ConfigDict(frozen=True, extra="forbid", validate_default=True)
+
+
+class Nodes(Section):
+    """How many nodes there are and where they start. Node ids run from 1; node 1 is the leader."""
+
+    count: Annotated[int, Field(ge=1, le=MAX_NODES)] = 45
+    layout: Literal["grid", "disc", "line", "explicit"] = "grid"
+    spacing_m: Positive = 200.0
+    radius_m: Positive = 100.0
+    columns: Annotated[int, Field(ge=1)] | None = None
+    """Grid columns; by default the widest near-square factorisation in the manner of 9 x 5."""
+    altitude_m: NonNegative = 50.0
+    positions_m: tuple[tuple[Finite, Finite, Finite], ...] = ()
+    """Layout `explicit`: one [east, north, up] per node."""
+
+    @model_validator(mode="after")
+    def _explicit_has_positions(self) -> Self:
+        if self.layout == "explicit" and len(self.positions_m) != self.count:
+            raise ValueError(
+                f"nodes.positions_m has {len(self.positions_m)} entries; "
+                f'layout = "explicit" needs nodes.count = {self.count}'
+            )
+        return self
+
+
+class Traffic(Section):
+    """The application load: who sends how much, how often, to whom."""
+
+    payload_bytes: Annotated[int, Field(ge=64, le=2304)] = 1024
+    """UDP payload on the air, our routing header included."""
+    interval_s: Positive = 1.0
+    arrivals: Literal["cbr", "poisson", "saturated", "none"] = "cbr"
+    sources: Literal["all"] | Annotated[int, Field(ge=0)] | tuple[Id, ...] = "all"
+    """A number of sources (drawn by seed among the nodes that are neither leader nor destination), a list of node
+    ids, or every node but the destination."""
+    destination: Literal["all"] | Id = "all"
+    targets: tuple[Id, ...] = ()
+    """Nodes at which delivery counts when the destination is `all`; empty: every other node."""
+
+
+class Routing(Section):
+    """The protocol above the radio."""
+
+    protocol: Literal["direct", "flooding", "clustered"] = "clustered"
+    jitter_ms: NonNegative = 10.0
+    """A relay waits U(0, jitter) after a reception."""
+    hop_limit: Annotated[int, Field(ge=1, le=255)] = 32
+    queue_frames: Annotated[int, Field(ge=1)] = 512
+    """Bound of a node's own queue; the least important packet is evicted, with a reason."""
+    lifetime_s: Positive = 30.0
+    """A packet older than this is dropped where it waits."""
+    hello_interval_s: Positive = 1.0
+    """Position beacon and hello, one hop."""
+
+    @property
+    def jitter_ns(self) -> int:
+        return round(self.jitter_ms * MS)
+
+
+class Clusters(Section):
+    """The paper's protocol: k clusters, one slot each per flooding period."""
+
+    count: Annotated[int, Field(ge=1, le=1024)] = 4
+    flooding_period_s: Positive = 5.0
+    guard_ms: NonNegative = 2.0
+    """The silent end of a slot."""
+    release_gap_ms: NonNegative = 2.0
+    """The least time between two packets that a head releases in its slot."""
+    pacing: Literal["burst", "spread"] = "spread"
+    """`burst` releases at `release_gap_ms`; `spread` divides the slot evenly among the queued packets."""
+    relay: Literal["all", "none"] = "all"
+
+    @property
+    def period_ns(self) -> int:
+        return seconds_to_ns(self.flooding_period_s)
+
+    @property
+    def slot_ns(self) -> int:
+        """Length of one slot, guard included."""
+        return self.period_ns // self.count
+
+
+class Radio(Section):
+    """The radio, its MAC and the channel. Defaults are the reference set-up: 802.11b, DSSS 11 Mb/s, long preamble."""
+
+    channel: Literal["range", "log_distance"] = "range"
+    range_m: Positive = 250.0
+    """`range`: decode and carrier-sense limit; frames are equally strong within it, silent beyond."""
+    rate_mbps: Rate = 11.0
+    ack_rate_mbps: Rate = 11.0
+    preamble: Literal["long", "short"] = "long"
+    tx_power_dbm: Finite = 30.0
+    exponent: Annotated[float, Field(gt=0, le=10)] = 3.0
+    """`log_distance`: path loss exponent."""
+    reference_loss_db: Finite = 40.05
+    """`log_distance`: path loss at 1 m."""
+    sensitivity_dbm: Finite = -82.0
+    """`log_distance`: decode and carrier-sense limit; weaker frames only interfere."""
+    interference_floor_dbm: Finite = -101.0
+    preamble_snr_db: Finite = 4.0
+    noise_figure_db: NonNegative = 7.0
+    access: Literal["standard", "ns3"] = "standard"
+    """`standard`: a station that finds the medium busy draws a backoff (IEEE 802.11); `ns3`: as ns-3 does it."""
+    cw_min: Annotated[int, Field(ge=1, le=1023)] = 31
+    cw_max: Annotated[int, Field(ge=1, le=32767)] = 1023
+    max_attempts: Annotated[int, Field(ge=1, le=255)] = 7
+    queue_frames: Annotated[int, Field(ge=1, le=100_000)] = 500
+    lifetime_ms: Positive = 500.0
+    max_frame_bytes: Annotated[int, Field(ge=64, le=2304)] = 2304
+    lead_ms: NonNegative = 20.0
+    """How long before its instant a node announces a transmission to the radio."""
+    late_limit: Annotated[float, Field(ge=0, le=1)] = 0.01
+    """The share of late frames above which a real-time run is invalid."""
+
+    @model_validator(mode="after")
+    def _window_grows(self) -> Self:
+        if self.cw_max < self.cw_min:
+            raise ValueError(f"radio.cw_max = {self.cw_max} must be >= radio.cw_min = {self.cw_min}")
+        return self
+
+    @property
+    def lead_ns(self) -> int:
+        return round(self.lead_ms * MS)
+
+
+class Mobility(Section):
+    """What a UAV does when the mission asks nothing of it."""
+
+    model: Literal["static", "formation", "random_waypoint"] = "static"
+    """`formation` sweeps the area keeping the layout; `random_waypoint` is the statistical model, without pause."""
+    speed_m_s: NonNegative = 7.5
+
+
+class World(Section):
+    """The engine that moves the bodies, and the area they move in."""
+
+    engine: Literal["pybullet", "kinematic"] = "kinematic"
+    area_m: Positive = 2500.0
+    """Side of the square area, centred at the origin."""
+    tick_ms: Positive = 100.0
+    """Period at which poses are published."""
+    physics_hz: Annotated[int, Field(ge=10, le=2000)] = 240
+    gps_hz: Positive = 5.0
+    gps_sigma_m: NonNegative = 1.5
+
+    @property
+    def tick_ns(self) -> int:
+        return round(self.tick_ms * MS)
+
+
+class Mission(Section):
+    """Search and rescue: survivors, the sensor that finds their phones, and the rule that moves the UAVs."""
+
+    survivors: Annotated[int, Field(ge=0, le=10_000)] = 0
+    reports_to_approach: Annotated[int, Field(ge=1)] = 3
+    """A UAV approaches when this many different nodes have reported the same survivor (paper, 4.1)."""
+    report_interval_s: Positive = 5.0
+    """How often a UAV repeats its report of a survivor it still hears."""
+    scan_interval_s: Positive = 1.0
+    phone_power_dbm: Finite = 15.0
+    phone_exponent: Positive = 3.0
+    detection_dbm: Finite = -90.0
+    shadowing_db: NonNegative = 4.0
+    approach_speed_m_s: Positive = 10.0
+    arrival_m: Positive = 30.0
+    dwell_s: NonNegative = 10.0
+    """How long a UAV stays with a survivor before it turns to the next one it knows of."""
+
+
+class Scenario(Section):
+    """One file; one execution of it with one seed is a run."""
+
+    name: Annotated[str, Field(pattern=r"^[A-Za-z0-9_-]{1,64}$")] = "unnamed"
+    description: str = ""
+    duration_s: Positive = 100.0
+    warmup_s: NonNegative = 0.0
+    """Application traffic begins here; nothing before it is measured."""
+    drain_s: NonNegative = 0.0
+    """Application traffic ends this long before the end, so that what is under way can arrive."""
+    seed: Annotated[int, Field(ge=0, lt=2**63)] = 1
+    time_scale: Annotated[float, Field(gt=0, le=100)] = 1.0
+    """Real time only: swarm seconds per wall second."""
+    nodes: Nodes = Nodes()
+    traffic: Traffic = Traffic()
+    routing: Routing = Routing()
+    clusters: Clusters = Clusters()
+    radio: Radio = Radio()
+    mobility: Mobility = Mobility()
+    world: World = World()
+    mission: Mission = Mission()
+
+    @model_validator(mode="after")
+    def _parts_agree(self) -> Self:
+        problems = list(_disagreements(self))
+        if problems:
+            raise ValueError("; ".join(problems))
+        return self
+
+    @property
+    def duration_ns(self) -> int:
+        return seconds_to_ns(self.duration_s)
+
+    @property
+    def traffic_window_ns(self) -> tuple[int, int]:
+        """Application packets are generated, and measured, in [start, end)."""
+        return seconds_to_ns(self.warmup_s), seconds_to_ns(self.duration_s - self.drain_s)
+
+    @property
+    def node_ids(self) -> range:
+        return range(1, self.nodes.count + 1)
+
+    @property
+    def leader(self) -> NodeId:
+        return NodeId(1)
+
+
+def _disagreements(scenario: Scenario) -> Sequence[str]:
+    """What each table allows alone but the scenario as a whole does not."""
+    found = []
+    count = scenario.nodes.count
+    if scenario.warmup_s + scenario.drain_s >= scenario.duration_s:
+        found.append(
+            f"warmup_s + drain_s = {scenario.warmup_s + scenario.drain_s:g} "
+            f"must be < duration_s = {scenario.duration_s:g}"
+        )
+    traffic = scenario.traffic
+    if traffic.destination != "all" and traffic.destination > count:
+        found.append(f"traffic.destination = {traffic.destination} must be <= nodes.count = {count}")
+    if isinstance(traffic.sources, int) and traffic.sources > count:
+        found.append(f"traffic.sources = {traffic.sources} must be <= nodes.count = {count}")
+    for key, ids in (("sources", traffic.sources), ("targets", traffic.targets)):
+        if isinstance(ids, tuple) and any(i > count for i in ids):
+            found.append(f"traffic.{key} = {list(ids)} must be node ids <= nodes.count = {count}")
+    if traffic.payload_bytes > scenario.radio.max_frame_bytes:
+        found.append(
+            f"traffic.payload_bytes = {traffic.payload_bytes} must be "
+            f"<= radio.max_frame_bytes = {scenario.radio.max_frame_bytes}"
+        )
+    if scenario.routing.protocol == "clustered":
+        clusters = scenario.clusters
+        if clusters.count >= max(2, count):
+            found.append(f"clusters.count = {clusters.count} must be < nodes.count = {count}")
+        if clusters.guard_ms * MS >= clusters.slot_ns:
+            found.append(
+                f"clusters.guard_ms = {clusters.guard_ms:g} must be < the slot, flooding_period_s / count = "
+                f"{clusters.slot_ns / MS:g} ms"
+            )
+    return found
+
+
+def grid_columns(count: int) -> int:
+    """Columns of the default grid: the factorisation nearest to 9:5, else the square root rounded up."""
+    wanted = math.sqrt(count * 9 / 5)
+    divisors = [d for d in range(1, count + 1) if count % d == 0 and d * d >= count]
+    best = min(divisors, key=lambda d: abs(d - wanted))
+    return best if best <= 2 * wanted else math.ceil(wanted)

@@ -1,0 +1,258 @@
+"""Zenoh topics of a swarm, and the bytes of the messages on them. The only place that knows either.
+
+    fanet/<swarm>/radio/<id>/tx          TxRequest              node -> medium
+    fanet/<swarm>/radio/<id>/rx          Reception | TxStatus   medium -> node
+    fanet/<swarm>/world/pose             Poses
+    fanet/<swarm>/world/<id>/setpoint    Setpoint               UAV -> world
+    fanet/<swarm>/world/<id>/sensor/gps  Gps
+    fanet/<swarm>/world/<id>/sensor/wifi WifiScan
+    fanet/<swarm>/mavlink/<id>           MavlinkTap
+    fanet/<swarm>/trace/<id>             TraceBatch             <id> is the actor's name
+    fanet/<swarm>/report/<id>            Report                 <id> is the actor's name
+    fanet/<swarm>/clock                  Clock
+
+One put on the bus carries a batch: each message is one kind byte, a 32-bit length and its body, little endian.
+Decoding is total: any bytes give messages or MalformedFrameError, nothing else.
+"""
+
+import struct
+from array import array
+from collections.abc import Callable, Iterable
+from typing import Any, Final
+
+from fanet_mw import trace
+from fanet_mw.errors import MalformedFrameError
+from fanet_mw.messages import (
+    Clock,
+    ClockState,
+    Gps,
+    MavlinkTap,
+    Message,
+    Poses,
+    Reception,
+    Report,
+    Setpoint,
+    TraceBatch,
+    TxOutcome,
+    TxRequest,
+    TxStatus,
+    WifiScan,
+)
+from fanet_mw.units import Enu, NodeId
+
+ROOT: Final = "fanet"
+
+
+class Topics:
+    """The key expressions of one swarm."""
+
+    def __init__(self, swarm: str) -> None:
+        self._base = f"{ROOT}/{swarm}"
+        self.pose = f"{self._base}/world/pose"
+        self.clock = f"{self._base}/clock"
+        self.all_tx = self.radio_tx("*")
+        self.all_setpoints = f"{self._base}/world/*/setpoint"
+        self.all_traces = f"{self._base}/trace/*"
+        self.all_reports = f"{self._base}/report/*"
+        self.all_alive = f"{self._base}/alive/*"
+
+    def radio_tx(self, node: int | str) -> str:
+        return f"{self._base}/radio/{node}/tx"
+
+    def radio_rx(self, node: int | str) -> str:
+        return f"{self._base}/radio/{node}/rx"
+
+    def setpoint(self, node: int) -> str:
+        return f"{self._base}/world/{node}/setpoint"
+
+    def sensor(self, node: int, kind: str) -> str:
+        return f"{self._base}/world/{node}/sensor/{kind}"
+
+    def sensors(self, node: int) -> str:
+        return f"{self._base}/world/{node}/sensor/*"
+
+    def mavlink(self, node: int) -> str:
+        return f"{self._base}/mavlink/{node}"
+
+    def trace(self, name: str) -> str:
+        return f"{self._base}/trace/{name}"
+
+    def report(self, name: str) -> str:
+        return f"{self._base}/report/{name}"
+
+    def alive(self, name: str) -> str:
+        """Liveliness token of an actor's host."""
+        return f"{self._base}/alive/{name}"
+
+
+def node_of(topic: str) -> int:
+    """The node id in a `radio/<id>/..` or `world/<id>/..` topic; 0 when there is none."""
+    parts = topic.split("/")
+    return int(parts[3]) if len(parts) > 3 and parts[3].isascii() and parts[3].isdigit() else 0
+
+
+# --- bodies: one encoder and one decoder per message type, beside each other -------------------------------------
+
+_TX = struct.Struct("<IqHB")
+_RX = struct.Struct("<Hqf")
+_STATUS = struct.Struct("<IBqB")
+_SETPOINT = struct.Struct("<q4d")
+_GPS = struct.Struct("<q6d")
+_SCAN = struct.Struct("<qH")
+_HEARD = struct.Struct("<If")
+_POSES = struct.Struct("<qI")
+_CLOCK = struct.Struct("<qdB")
+_INSTANT = struct.Struct("<q")
+
+
+def _encode_tx(m: TxRequest) -> bytes:
+    return _TX.pack(m.seq & 0xFFFF_FFFF, m.start_ns, m.dst, m.wants_status) + m.frame
+
+
+def _decode_tx(body: bytes) -> TxRequest:
+    seq, start_ns, dst, wants_status = _TX.unpack_from(body)
+    return TxRequest(seq, start_ns, body[_TX.size :], NodeId(dst), bool(wants_status))
+
+
+def _encode_rx(m: Reception) -> bytes:
+    return _RX.pack(m.src, m.end_ns, m.rssi_dbm) + m.frame
+
+
+def _decode_rx(body: bytes) -> Reception:
+    src, end_ns, rssi_dbm = _RX.unpack_from(body)
+    return Reception(body[_RX.size :], NodeId(src), end_ns, rssi_dbm)
+
+
+def _encode_status(m: TxStatus) -> bytes:
+    return _STATUS.pack(m.seq & 0xFFFF_FFFF, m.outcome, m.end_ns, m.attempts)
+
+
+def _decode_status(body: bytes) -> TxStatus:
+    seq, outcome, end_ns, attempts = _STATUS.unpack(body)
+    return TxStatus(seq, TxOutcome(outcome), end_ns, attempts)
+
+
+def _encode_poses(m: Poses) -> bytes:
+    return _POSES.pack(m.t_ns, len(m.ids)) + m.ids.tobytes() + m.states.tobytes()
+
+
+def _decode_poses(body: bytes) -> Poses:
+    t_ns, count = _POSES.unpack_from(body)
+    ids, states = array("H"), array("d")
+    split = _POSES.size + 2 * count
+    if len(body) != split + 48 * count:
+        raise ValueError("length")
+    ids.frombytes(body[_POSES.size : split])
+    states.frombytes(body[split:])
+    return Poses(t_ns, ids, states)
+
+
+def _encode_setpoint(m: Setpoint) -> bytes:
+    return _SETPOINT.pack(m.t_ns, *m.position, m.speed_m_s)
+
+
+def _decode_setpoint(body: bytes) -> Setpoint:
+    t_ns, east, north, up, speed_m_s = _SETPOINT.unpack(body)
+    return Setpoint(t_ns, Enu(east, north, up), speed_m_s)
+
+
+def _encode_gps(m: Gps) -> bytes:
+    return _GPS.pack(m.t_ns, *m.position, *m.velocity)
+
+
+def _decode_gps(body: bytes) -> Gps:
+    t_ns, *values = _GPS.unpack(body)
+    return Gps(t_ns, Enu(*values[:3]), Enu(*values[3:]))
+
+
+def _encode_scan(m: WifiScan) -> bytes:
+    return _SCAN.pack(m.t_ns, len(m.heard)) + b"".join(_HEARD.pack(*item) for item in m.heard)
+
+
+def _decode_scan(body: bytes) -> WifiScan:
+    t_ns, count = _SCAN.unpack_from(body)
+    rest = body[_SCAN.size :]
+    if len(rest) != count * _HEARD.size:
+        raise ValueError("length")
+    return WifiScan(t_ns, tuple((survivor, rssi) for survivor, rssi in _HEARD.iter_unpack(rest)))
+
+
+def _encode_tap(m: MavlinkTap) -> bytes:
+    return _INSTANT.pack(m.t_ns) + m.data
+
+
+def _decode_tap(body: bytes) -> MavlinkTap:
+    return MavlinkTap(_INSTANT.unpack_from(body)[0], body[_INSTANT.size :])
+
+
+def _encode_trace(m: TraceBatch) -> bytes:
+    return "\n".join(trace.line(record) for record in m.records).encode()
+
+
+def _decode_trace(body: bytes) -> TraceBatch:
+    return TraceBatch(tuple(trace.parse(text) for text in body.decode().splitlines()))
+
+
+def _encode_clock(m: Clock) -> bytes:
+    return _CLOCK.pack(m.epoch_unix_ns, m.time_scale, m.state)
+
+
+def _decode_clock(body: bytes) -> Clock:
+    epoch_unix_ns, time_scale, state = _CLOCK.unpack(body)
+    if not 0 < time_scale <= 100:
+        raise ValueError("time_scale")
+    return Clock(epoch_unix_ns, time_scale, ClockState(state))
+
+
+def _encode_report(m: Report) -> bytes:
+    return _INSTANT.pack(m.t_ns) + f"{m.name}\n{m.json}".encode()
+
+
+def _decode_report(body: bytes) -> Report:
+    name, _, text = body[_INSTANT.size :].decode().partition("\n")
+    return Report(name, _INSTANT.unpack_from(body)[0], text)
+
+
+_CODECS: Final[dict[int, tuple[type[Any], Callable[[Any], bytes], Callable[[bytes], Message]]]] = {
+    1: (TxRequest, _encode_tx, _decode_tx),
+    2: (Reception, _encode_rx, _decode_rx),
+    3: (TxStatus, _encode_status, _decode_status),
+    4: (Poses, _encode_poses, _decode_poses),
+    5: (Setpoint, _encode_setpoint, _decode_setpoint),
+    6: (Gps, _encode_gps, _decode_gps),
+    7: (WifiScan, _encode_scan, _decode_scan),
+    8: (MavlinkTap, _encode_tap, _decode_tap),
+    9: (TraceBatch, _encode_trace, _decode_trace),
+    10: (Clock, _encode_clock, _decode_clock),
+    11: (Report, _encode_report, _decode_report),
+}
+_CODE_OF: Final = {kind: (code, encode) for code, (kind, encode, _) in _CODECS.items()}
+_ITEM: Final = struct.Struct("<BI")
+
+
+def encode(messages: Iterable[Message]) -> bytes:
+    """The bytes of one put that carries these messages, in order."""
+    parts = []
+    for message in messages:
+        code, encoder = _CODE_OF[type(message)]
+        body = encoder(message)
+        parts.append(_ITEM.pack(code, len(body)))
+        parts.append(body)
+    return b"".join(parts)
+
+
+def decode(data: bytes) -> list[Message]:
+    """The messages of one put; raises MalformedFrameError for anything `encode` could not have made."""
+    messages = []
+    at = 0
+    try:
+        while at < len(data):
+            code, length = _ITEM.unpack_from(data, at)
+            at += _ITEM.size
+            if at + length > len(data):
+                raise ValueError("length beyond the end")
+            messages.append(_CODECS[code][2](data[at : at + length]))
+            at += length
+    except (struct.error, ValueError, KeyError, OverflowError) as error:
+        raise MalformedFrameError(f"bus message malformed at byte {at}: {error}") from error
+    return messages

@@ -1,0 +1,34 @@
+"""Units and identities. Instants and durations are `int` nanoseconds; positions are ENU metres."""
+
+import math
+from typing import Final, NamedTuple, NewType
+
+US: Final = 1_000
+MS: Final = 1_000_000
+S: Final = 1_000_000_000
+
+NodeId = NewType("NodeId", int)
+
+MAX_NODES: Final = 65_534
+BROADCAST: Final = NodeId(0xFFFF)
+"""The destination that means every station in range (radio) or every node (routing)."""
+
+
+class Enu(NamedTuple):
+    """A vector in east, north, up; metres, or metres per second for a velocity."""
+
+    east: float
+    north: float
+    up: float
+
+    def minus(self, other: "Enu") -> "Enu":
+        return Enu(self.east - other.east, self.north - other.north, self.up - other.up)
+
+    def norm(self) -> float:
+        """Euclidean length [m or m/s]."""
+        return math.hypot(self.east, self.north, self.up)
+
+
+def seconds_to_ns(seconds: float) -> int:
+    """Convert people's seconds to the integer nanoseconds used everywhere inside."""
+    return round(seconds * S)

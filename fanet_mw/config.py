@@ -61,7 +61,7 @@ def _apply(tree: dict[str, Any], override: str) -> None:
     table[last] = _value(text.strip())
 
 
-def _value(text: str) -> Any:
+def _value(text: str) -> object:
     try:
         return tomllib.loads(f"value = {text}")["value"]
     except tomllib.TOMLDecodeError:

@@ -82,8 +82,8 @@ class Routing(Section):
     """Bound of a node's own queue; the least important packet is evicted, with a reason."""
     lifetime_s: Positive = 30.0
     """A packet older than this is dropped where it waits."""
-    hello_interval_s: Positive = 1.0
-    """Position beacon and hello, one hop."""
+    hello_interval_s: NonNegative = 1.0
+    """Position beacon and hello, one hop; 0 sends none (`clustered` needs them)."""
 
     @property
     def jitter_ns(self) -> int:

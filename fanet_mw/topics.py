@@ -71,7 +71,7 @@ class Topics:
     def sensors(self, node: int) -> str:
         return f"{self._base}/world/{node}/sensor/*"
 
-    def mavlink(self, node: int) -> str:
+    def mavlink(self, node: int | str) -> str:
         return f"{self._base}/mavlink/{node}"
 
     def trace(self, name: str) -> str:

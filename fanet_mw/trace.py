@@ -67,8 +67,9 @@ class Approaching(NamedTuple):
     node: int
     survivor: int
     reporters: int
-    error_m: float
-    """Distance of the estimated position from the true one; negative when the truth is unknown."""
+    east_m: float
+    """Where the UAV believes the survivor to be."""
+    north_m: float
 
 
 class Arrived(NamedTuple):

@@ -1,1 +1,20 @@
-"""Baseline protocols behind the contract of the core."""
+"""Routing protocols behind the contract of the core, by the name a scenario gives."""
+
+from collections.abc import Mapping
+from typing import Final
+
+from fanet_mw.protocol.clustered import Clustered
+from fanet_mw.protocol.contract import Port, RoutingProtocol
+from fanet_mw.routing.direct import Direct
+from fanet_mw.routing.flooding import Flooding
+
+PROTOCOLS: Final[Mapping[str, type[RoutingProtocol]]] = {
+    "direct": Direct,
+    "flooding": Flooding,
+    "clustered": Clustered,
+}
+
+
+def make_protocol(port: Port) -> RoutingProtocol:
+    """The protocol that the port's scenario names."""
+    return PROTOCOLS[port.scenario.routing.protocol](port)

@@ -1,0 +1,133 @@
+"""Search and rescue at one UAV: detect -> report -> on reports of one survivor by enough nodes, approach.
+
+The rule is the paper's (4.1): reports by three or more different nodes change the course. Sans-IO: scans, reports and
+positions go in; survivor reports to send, setpoints and trace records come out.
+"""
+
+import math
+from typing import Final, NamedTuple
+
+from fanet_mw.wire import Survivor
+
+from agents.localization import Sighting, estimate
+from fanet_mw.scenario import Mission as MissionConfig
+from fanet_mw.trace import Approaching, Arrived, Detected, Record
+from fanet_mw.units import Enu, NodeId, S
+
+_RING_M: Final = 20.0
+"""UAVs hold on a ring about the survivor, each at an angle of its own, so that they see it from several sides."""
+_GOLDEN_ANGLE: Final = math.pi * (3 - math.sqrt(5))
+_MOVED_M: Final = 10.0
+"""A better estimate changes the setpoint only when it moved this far."""
+HOME: Final = 0.0
+"""The speed of a setpoint that sends a UAV back to its formation."""
+
+
+class Course(NamedTuple):
+    """Fly there; a speed of 0 means back to the formation."""
+
+    position: Enu
+    speed_m_s: float
+
+
+class Mission:
+    """One UAV's knowledge of survivors, and what it makes of it."""
+
+    def __init__(self, node: NodeId, config: MissionConfig, *, altitude_m: float) -> None:
+        self._node = node
+        self._config = config
+        self._altitude_m = altitude_m
+        self.records: list[Record] = []
+        self.reports: list[Survivor] = []
+        self.course: Course | None = None
+        """A new course to fly, for the host to take; None when the old one holds."""
+        self._heard: dict[int, int] = {}
+        self._sightings: dict[int, dict[int, Sighting]] = {}
+        self._visited: set[int] = set()
+        self._target: int | None = None
+        self._target_at = Enu(0, 0, 0)
+        self._dwell_until_ns: int | None = None
+
+    # --- what comes in --------------------------------------------------------------------------------------------
+
+    def scan(self, heard: tuple[tuple[int, float], ...], *, position: Enu, now_ns: int) -> None:
+        """Our own receiver hears phones: report each, again only after the report interval."""
+        for survivor, rssi_dbm in heard:
+            last_ns = self._heard.get(survivor)
+            if last_ns is None:
+                self.records.append(Detected(now_ns, self._node, survivor, round(rssi_dbm, 2)))
+            if last_ns is None or now_ns - last_ns >= self._config.report_interval_s * S:
+                self._heard[survivor] = now_ns
+                self.reports.append(Survivor(now_ns // 1000, survivor, self._node, position, rssi_dbm))
+
+    def reported(self, report: Survivor, *, position: Enu, now_ns: int) -> None:
+        """The network delivered another node's report."""
+        sightings = self._sightings.setdefault(report.survivor, {})
+        known = sightings.get(report.reporter)
+        if known is None or report.rssi_dbm > known.rssi_dbm:  # the strongest is the nearest and the least shadowed
+            sightings[report.reporter] = Sighting(report.position, report.rssi_dbm)
+        if self._target is None:
+            self._choose(position, now_ns)
+        elif self._target == report.survivor:
+            self._refine()
+
+    def moved(self, position: Enu, *, now_ns: int) -> None:
+        """A position fix: arrived yet? stayed long enough?"""
+        if self._target is None:
+            return
+        if self._dwell_until_ns is None:
+            east, north = position.east - self._target_at.east, position.north - self._target_at.north
+            if math.hypot(east, north) <= self._config.arrival_m + _RING_M:
+                self._dwell_until_ns = now_ns + round(self._config.dwell_s * S)
+                self.records.append(Arrived(now_ns, self._node, self._target))
+        elif now_ns >= self._dwell_until_ns:
+            self._visited.add(self._target)
+            self._target = self._dwell_until_ns = None
+            self._choose(position, now_ns)
+            if self._target is None:
+                self.course = Course(position, HOME)
+
+    # --- decisions ------------------------------------------------------------------------------------------------
+
+    def _choose(self, position: Enu, now_ns: int) -> None:
+        """Take the nearest survivor that enough different nodes have reported and that we have not visited."""
+        candidates = [
+            (self._place(survivor), survivor)
+            for survivor in sorted(self._sightings)
+            if survivor not in self._visited and len(self._sightings[survivor]) >= self._config.reports_to_approach
+        ]
+        if not candidates:
+            return
+        self._target_at, self._target = min(
+            candidates, key=lambda c: (math.hypot(c[0].east - position.east, c[0].north - position.north), c[1])
+        )
+        reporters = len(self._sightings[self._target])
+        self.records.append(Approaching(now_ns, self._node, self._target, reporters, *_rounded(self._target_at)))
+        self.course = Course(self._hold_point(), self._config.approach_speed_m_s)
+
+    def _refine(self) -> None:
+        assert self._target is not None, "only a target can be refined"
+        better = self._place(self._target)
+        if self._dwell_until_ns is None and better.minus(self._target_at).norm() > _MOVED_M:
+            self._target_at = better
+            self.course = Course(self._hold_point(), self._config.approach_speed_m_s)
+
+    def _place(self, survivor: int) -> Enu:
+        sightings = self._sightings[survivor]
+        return estimate(
+            [sightings[reporter] for reporter in sorted(sightings)],
+            phone_power_dbm=self._config.phone_power_dbm,
+            exponent=self._config.phone_exponent,
+        )
+
+    def _hold_point(self) -> Enu:
+        angle = self._node * _GOLDEN_ANGLE
+        return Enu(
+            self._target_at.east + _RING_M * math.cos(angle),
+            self._target_at.north + _RING_M * math.sin(angle),
+            self._altitude_m,
+        )
+
+
+def _rounded(at: Enu) -> tuple[float, float]:
+    return round(at.east, 2), round(at.north, 2)

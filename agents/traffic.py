@@ -1,0 +1,85 @@
+"""The application load of one node: when its next packet is born, and of what size. Announced a lead ahead.
+
+Birth instants are whole microseconds, because that is what the header carries.
+"""
+
+from collections.abc import Sequence
+from random import Random
+from typing import Final
+
+from fanet_mw.rng import stream
+from fanet_mw.scenario import Scenario
+from fanet_mw.units import US, NodeId, S
+
+SATURATION_DEPTH: Final = 2
+"""Packets a saturated source keeps outstanding at its radio: one in service, one behind it. More would only age there."""
+
+
+def sources_of(scenario: Scenario) -> Sequence[int]:
+    """Ids of the nodes that generate application traffic, ascending."""
+    traffic = scenario.traffic
+    eligible = [node for node in scenario.node_ids if node != traffic.destination]
+    if traffic.arrivals == "none":
+        return []
+    if traffic.sources == "all":
+        return eligible
+    if isinstance(traffic.sources, tuple):
+        return sorted(set(traffic.sources))
+    members = [node for node in eligible if node != scenario.leader]
+    if traffic.sources >= len(eligible):
+        return eligible
+    if traffic.sources > len(members):
+        members = eligible
+    return sorted(stream(scenario.seed, "sources").sample(members, traffic.sources))
+
+
+def targets_of(scenario: Scenario, source: int) -> Sequence[int]:
+    """Ids of the nodes at which a packet of `source` is meant to arrive."""
+    traffic = scenario.traffic
+    if traffic.destination != "all":
+        return [traffic.destination]
+    wanted = traffic.targets or scenario.node_ids
+    return [node for node in wanted if node != source]
+
+
+class Traffic:
+    """The arrivals of one source."""
+
+    def __init__(self, scenario: Scenario, node: NodeId) -> None:
+        self._kind = scenario.traffic.arrivals
+        self._interval_ns = max(US, round(scenario.traffic.interval_s * S))
+        start_ns, self._end_ns = scenario.traffic_window_ns
+        self._random: Random = stream(scenario.seed, "traffic", node)
+        self._next_ns: int | None = None
+        if node in sources_of(scenario):
+            self._next_ns = start_ns + self._first_gap_ns()
+
+    @property
+    def saturated(self) -> bool:
+        return self._kind == "saturated"
+
+    def _first_gap_ns(self) -> int:
+        """A CBR source starts at a random phase of its interval; a saturated one at once."""
+        if self._kind == "cbr":
+            return int(self._random.random() * self._interval_ns) // US * US
+        return 0 if self.saturated else self._poisson_ns()
+
+    def _poisson_ns(self) -> int:
+        return round(self._random.expovariate(1 / self._interval_ns)) // US * US
+
+    def next_ns(self) -> int | None:
+        """When the next packet is born; None when there will be none (or, saturated, none by itself)."""
+        if self._next_ns is None or self._next_ns >= self._end_ns:
+            return None
+        return self._next_ns
+
+    def advance(self) -> None:
+        """The packet of `next_ns` was sent."""
+        assert self._next_ns is not None, "only a source that has a next packet can send it"
+        if self.saturated:
+            self._next_ns = None  # from here on, one packet for each that ends
+        else:
+            self._next_ns += self._interval_ns if self._kind == "cbr" else self._poisson_ns()
+
+    def open_at(self, now_ns: int) -> bool:
+        return now_ns < self._end_ns

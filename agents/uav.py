@@ -1,0 +1,175 @@
+"""The UAV as an actor: node, autopilot, traffic and mission of one id, wired to topics.
+
+Inputs are receptions, transmit statuses and sensor readings; outputs are transmit requests, setpoints and a MAVLink
+tap. Everything that decides is in the parts; this file only says what goes where.
+"""
+
+from collections.abc import Mapping
+from typing import Any, Final
+
+from agents.autopilot import Autopilot
+from agents.mission import Mission
+from agents.traffic import SATURATION_DEPTH, Traffic
+from fanet_mw import wire
+from fanet_mw.actor import Actor
+from fanet_mw.errors import DropReason, MalformedFrameError
+from fanet_mw.messages import Gps, MavlinkTap, Message, Reception, Setpoint, TxStatus, WifiScan
+from fanet_mw.protocol.node import Delivery, Node
+from fanet_mw.rng import stream
+from fanet_mw.routing import make_protocol
+from fanet_mw.scenario import Scenario
+from fanet_mw.topics import Topics
+from fanet_mw.units import BROADCAST, US, Enu, NodeId, seconds_to_ns
+
+_HELLO_JITTER: Final = 0.1
+"""A hello varies by this share of its interval, so that neighbors in step do not stay so (RFC 3626, 3.4)."""
+
+
+class Uav(Actor):
+    """One UAV."""
+
+    def __init__(self, scenario: Scenario, node: NodeId, swarm: str, *, position: Enu) -> None:
+        topics = Topics(swarm)
+        super().__init__(f"agent-{node}", (topics.radio_rx(node), topics.sensors(node)))
+        self._id = node
+        self._tx_topic = topics.radio_tx(node)
+        self._setpoint_topic = topics.setpoint(node)
+        self._tap_topic = topics.mavlink(node)
+        self._lead_ns = scenario.radio.lead_ns
+        self._destination = BROADCAST if scenario.traffic.destination == "all" else NodeId(scenario.traffic.destination)
+        self._filler = wire.filler(scenario.traffic.payload_bytes - wire.HEADER_BYTES)
+        self._node = Node(node, scenario, make_protocol, position=position)
+        self._traffic = Traffic(scenario, node)
+        self._autopilot = Autopilot(node, position=position)
+        self._mission = Mission(node, scenario.mission, altitude_m=scenario.nodes.altitude_m)
+        self._hello_ns = seconds_to_ns(scenario.routing.hello_interval_s)
+        self._hello_random = stream(scenario.seed, "hello", node).random
+        self._next_hello_ns: int | None = None
+        self._generated = 0
+        self._malformed = 0
+
+    # --- the actor contract ---------------------------------------------------------------------------------------
+
+    def start(self, now_ns: int) -> None:
+        if self._hello_ns:
+            self._next_hello_ns = now_ns + self._lead_ns + int(self._hello_random() * self._hello_ns)
+        self._node.start(now_ns)
+        self._settle(now_ns)
+
+    def receive(self, topic: str, message: Message, now_ns: int) -> None:
+        kind = type(message)
+        if kind is Reception:
+            self._node.hear(message, now_ns=now_ns)  # type: ignore[arg-type]  # narrowed by identity: the hot path
+        elif isinstance(message, TxStatus):
+            self._node.status(message, now_ns=now_ns)
+            if self._traffic.saturated and self._traffic.open_at(now_ns):
+                self._send_traffic(now_ns + self._lead_ns, now_ns)
+        elif isinstance(message, Gps):
+            self._autopilot.fix(message)
+            self._node.position = message.position
+            self._mission.moved(message.position, now_ns=now_ns)
+        elif isinstance(message, WifiScan):
+            self._mission.scan(message.heard, position=self._autopilot.position, now_ns=now_ns)
+        else:
+            self._malformed += 1
+        self._settle(now_ns)
+
+    def wake(self, now_ns: int) -> None:
+        self._node.wake(now_ns)
+        due_ns = self._traffic.next_ns()
+        while due_ns is not None and due_ns - self._lead_ns <= now_ns:
+            for _ in range(SATURATION_DEPTH if self._traffic.saturated else 1):
+                self._send_traffic(max(due_ns, now_ns), now_ns)
+            self._traffic.advance()
+            due_ns = self._traffic.next_ns()
+        self._say_hello(now_ns)
+        telemetry = self._autopilot.telemetry(now_ns)
+        if telemetry:
+            self._tap(b"".join(telemetry), now_ns)
+        self._settle(now_ns)
+
+    def next_wake_ns(self) -> int | None:
+        traffic_ns = self._traffic.next_ns()
+        wanted = [
+            self._node.next_wake_ns(),
+            None if traffic_ns is None else traffic_ns - self._lead_ns,
+            None if self._next_hello_ns is None else self._next_hello_ns - self._lead_ns,
+            self._autopilot.next_due_ns(),
+        ]
+        return min((t for t in wanted if t is not None), default=None)
+
+    def report(self) -> Mapping[str, Any]:
+        own = {"kind": "agent", "node": self._id, "generated": self._generated, "bus_malformed": self._malformed}
+        return own | dict(self._node.report())
+
+    # --- the application ------------------------------------------------------------------------------------------
+
+    def _send_traffic(self, due_ns: int, now_ns: int) -> None:
+        self._generated += 1
+        self._node.send(
+            self._filler,
+            destination=self._destination,
+            priority=wire.PRIORITY_BULK,
+            app="traffic",
+            due_ns=due_ns // US * US,
+            now_ns=now_ns,
+        )
+
+    def _say_hello(self, now_ns: int) -> None:
+        if self._next_hello_ns is None or self._next_hello_ns - self._lead_ns > now_ns:
+            return
+        self._node.say_hello(self._autopilot.beacon_frames(), start_ns=max(self._next_hello_ns, now_ns), now_ns=now_ns)
+        vary = 1 + _HELLO_JITTER * (2 * self._hello_random() - 1)
+        self._next_hello_ns += int(self._hello_ns * vary)
+
+    def _deliver(self, delivery: Delivery, now_ns: int) -> None:
+        """Bulk was only to be carried; survivor reports are for the mission and for whoever inspects us."""
+        if delivery.header.priority != wire.PRIORITY_REPORT:
+            return
+        try:
+            report = wire.Survivor.decode_frame(delivery.frame)
+        except MalformedFrameError:
+            self._node.dropped[DropReason.MALFORMED] += 1
+            return
+        self._mission.reported(report, position=self._autopilot.position, now_ns=now_ns)
+        self._tap(delivery.frame, now_ns)
+
+    def _tap(self, data: bytes, now_ns: int) -> None:
+        self.outbox.append((self._tap_topic, MavlinkTap(now_ns, data)))
+
+    # --- after every input ----------------------------------------------------------------------------------------
+
+    def _settle(self, now_ns: int) -> None:
+        """Bring what the parts put out to where it goes, until none has anything more."""
+        node, mission = self._node, self._mission
+        if node.deliveries:
+            deliveries, node.deliveries = node.deliveries, []
+            for delivery in deliveries:
+                self._deliver(delivery, now_ns)
+        if mission.reports:
+            self._report(now_ns)
+        if mission.course is not None:
+            course, mission.course = mission.course, None
+            self.outbox.append((self._setpoint_topic, Setpoint(now_ns, course.position, course.speed_m_s)))
+        if mission.records:
+            self.records += mission.records
+            mission.records.clear()
+        if node.requests:
+            topic = self._tx_topic
+            self.outbox += [(topic, request) for request in node.requests]
+            node.requests.clear()
+        if node.records:
+            self.records += node.records
+            node.records.clear()
+
+    def _report(self, now_ns: int) -> None:
+        reports, self._mission.reports = self._mission.reports, []
+        for report in reports:
+            self._node.send(
+                report.encode_frame(self._id),
+                destination=BROADCAST,
+                priority=wire.PRIORITY_REPORT,
+                app="report",
+                due_ns=(now_ns + self._lead_ns) // US * US,
+                now_ns=now_ns,
+            )

@@ -1,0 +1,222 @@
+"""The paper's protocol (3.3): edge nodes unicast to their head; heads queue and flood in their own slots only.
+
+A packet has two phases, told apart by the header's flags: TO_HEAD, carried as acknowledged unicast along the gradient
+to a head, and FLOOD, released by the head in its slot and relayed once by every node. Membership comes over the air:
+nodes join by a flooded JOIN, the leader answers with a flooded SCHEDULE.
+"""
+
+from collections.abc import Mapping
+from typing import Final
+
+from fanet_mw.errors import DropReason
+from fanet_mw.messages import Reception, TxOutcome, TxStatus
+from fanet_mw.protocol import seen
+from fanet_mw.protocol.contract import Port, RoutingProtocol
+from fanet_mw.protocol.gradient import UNREACHABLE, Gradient
+from fanet_mw.protocol.leader import Leader
+from fanet_mw.protocol.membership import Membership
+from fanet_mw.protocol.neighbors import Neighbor, Neighbors
+from fanet_mw.protocol.release import Release
+from fanet_mw.protocol.txqueue import Packet, TxQueue
+from fanet_mw.units import BROADCAST, MS, US, NodeId, S, seconds_to_ns
+from fanet_mw.wire import FLAG_FLOOD, FLAG_TO_HEAD, Beacon, Join, Kind, Schedule
+
+_HELLO_LIFETIMES: Final = 3.5
+"""A neighbor is gone after this many silent hello intervals (OLSR's NEIGHB_HOLD_TIME is 3, RFC 3626 18.3)."""
+_UNICAST_TRIES: Final = 3
+"""Parents tried for one packet at one node; below each the MAC makes its own attempts."""
+_JOIN_WINDOW_NS: Final = 1500 * MS
+_REJOIN_NS: Final = 5 * S
+_CONTROL_JITTER_NS: Final = 50 * MS
+
+
+class Clustered(RoutingProtocol):
+    """Clustered, time-divided flooding at one node."""
+
+    def __init__(self, port: Port) -> None:
+        super().__init__(port)
+        scenario = port.scenario
+        self._random = port.stream("clustered").random
+        self._lead_ns = scenario.radio.lead_ns
+        self._jitter_ns = scenario.routing.jitter_ns
+        self._lifetime_us = round(scenario.routing.lifetime_s * 1_000_000)
+        self._relays = scenario.clusters.relay == "all"
+        hello_ns = seconds_to_ns(scenario.routing.hello_interval_s)
+        self._neighbors = Neighbors(lifetime_ns=int(_HELLO_LIFETIMES * hello_ns))
+        self._gradient = Gradient(node=port.node, neighbors=self._neighbors, hello_ns=hello_ns)
+        self._membership = Membership(port.node)
+        self._release = Release(
+            TxQueue(capacity=scenario.routing.queue_frames), scenario.clusters, lead_ns=self._lead_ns
+        )
+        self._homeless = TxQueue(capacity=scenario.routing.queue_frames)
+        self._unicasts: dict[int, tuple[Packet, NodeId, int]] = {}
+        self._leader = (
+            Leader(node=port.node, clusters=scenario.clusters.count, period_ns=scenario.clusters.period_ns)
+            if port.node == scenario.leader
+            else None
+        )
+        self._join_ns: int | None = None
+
+    # --- the application's packets --------------------------------------------------------------------------------
+
+    def start(self, now_ns: int) -> None:
+        if self._leader is None:
+            self._join_ns = now_ns + 200 * MS + int(self._random() * _JOIN_WINDOW_NS)
+
+    def originate(self, packet: Packet, *, due_ns: int, now_ns: int) -> None:
+        self._forward(packet, start_ns=due_ns, now_ns=now_ns, tries=0)
+
+    def _forward(self, packet: Packet, *, start_ns: int, now_ns: int, tries: int) -> None:
+        """Bring a packet one step nearer to a head, or queue it if we are one, or keep it until there is a way."""
+        if self._membership.is_head:
+            self._enqueue(packet, now_ns=now_ns)
+            return
+        route = self._gradient.route(now_ns=now_ns)
+        if route is None:
+            self._hold(packet, now_ns=now_ns)
+            return
+        self._port.mark(packet, seen.CARRIED)
+        own = packet.header.origin == self._port.node
+        stamp = self._port.stamped if own else self._port.forwarded
+        frame = stamp(packet, flags=FLAG_TO_HEAD)
+        seq = self._port.transmit(frame, route.parent, start_ns=start_ns, wants_status=True)
+        self._unicasts[seq] = (packet, route.parent, tries + 1)
+
+    def _hold(self, packet: Packet, *, now_ns: int) -> None:
+        evicted = self._homeless.push(packet)
+        if evicted is not None:
+            self._port.drop(DropReason.QUEUE_FULL, evicted, now_ns=now_ns)
+
+    def _enqueue(self, packet: Packet, *, now_ns: int) -> None:
+        evicted = self._release.push(packet, self._membership, now_ns=now_ns)
+        if evicted is not None:
+            self._port.drop(DropReason.QUEUE_FULL, evicted, now_ns=now_ns)
+
+    # --- what the air brings --------------------------------------------------------------------------------------
+
+    def receive(self, packet: Packet, reception: Reception, *, now_ns: int) -> None:
+        flags = packet.header.flags
+        if flags & FLAG_FLOOD:
+            self._consume_control(packet, now_ns=now_ns)
+            self._relay(packet, now_ns=now_ns)
+        elif flags & FLAG_TO_HEAD:
+            if packet.header.hop_limit <= 1:
+                self._port.drop(DropReason.HOP_LIMIT, packet, now_ns=now_ns)
+            else:
+                self._forward(packet, start_ns=now_ns + self._lead_ns, now_ns=now_ns, tries=0)
+
+    def _relay(self, packet: Packet, *, now_ns: int) -> None:
+        control = packet.header.kind in (Kind.JOIN, Kind.SCHEDULE)
+        if not (self._relays or control) or packet.header.destination == self._port.node:
+            return
+        if packet.header.hop_limit <= 1:
+            self._port.drop(DropReason.HOP_LIMIT, packet, now_ns=now_ns)
+            return
+        jitter_ns = _CONTROL_JITTER_NS if control else self._jitter_ns
+        start_ns = now_ns + self._lead_ns + int(self._random() * jitter_ns)
+        self._port.transmit(self._port.forwarded(packet, flags=FLAG_FLOOD), BROADCAST, start_ns=start_ns)
+
+    def _consume_control(self, packet: Packet, *, now_ns: int) -> None:
+        """Joins are the leader's, schedules everybody's. Malformed ones raise and are counted by the node."""
+        if packet.header.kind is Kind.JOIN and self._leader is not None:
+            join = Join.decode_frame(packet.frame)
+            self._leader.joined(NodeId(join.node), join.position, now_ns=now_ns)
+        elif packet.header.kind is Kind.SCHEDULE:
+            self._obey(Schedule.decode_frame(packet.frame), now_ns=now_ns)
+
+    def _obey(self, schedule: Schedule, *, now_ns: int) -> None:
+        changed = self._membership.learn(schedule, guard_ns=round(self._port.scenario.clusters.guard_ms * MS))
+        if self._membership.assigned:
+            self._join_ns = None
+        if changed is None:
+            return
+        self._gradient.join(self._membership.head, now_ns=now_ns)
+        self._port.record(changed.at(now_ns))
+        if self._membership.is_head:
+            self._release.arm(self._membership, now_ns=now_ns)
+            for packet in self._homeless.drain():
+                self._enqueue(packet, now_ns=now_ns)
+        else:
+            for packet in self._release.drain():
+                self._forward(packet, start_ns=now_ns + self._lead_ns, now_ns=now_ns, tries=0)
+
+    def hello_inner(self, *, now_ns: int) -> bytes:
+        self._gradient.advance(now_ns)
+        route = self._gradient.route(now_ns=now_ns)
+        return Beacon(
+            node=self._port.node,
+            head=route.head if route else 0,
+            head_seq=route.head_seq if route else 0,
+            cluster=self._membership.cluster,
+            epoch=self._membership.epoch,
+            role=self._membership.role,
+            hops_to_head=route.hops if route else UNREACHABLE,
+            slot=self._membership.slot,
+        ).encode_frame(self._port.node)
+
+    def hello(self, packet: Packet, reception: Reception, *, now_ns: int) -> None:
+        neighbor = Neighbor(reception.src, now_ns, reception.rssi_dbm, Beacon.decode_frame(packet.frame))
+        self._neighbors.heard(neighbor)
+        self._gradient.hear(neighbor, now_ns=now_ns)
+        if len(self._homeless) and self._gradient.route(now_ns=now_ns) is not None:
+            for held in self._homeless.drain():
+                self._forward(held, start_ns=now_ns + self._lead_ns, now_ns=now_ns, tries=0)
+
+    def status(self, status: TxStatus, *, now_ns: int) -> None:
+        entry = self._unicasts.pop(status.seq, None)
+        if entry is None or status.outcome is TxOutcome.ACKED:
+            return
+        packet, parent, tries = entry
+        if status.outcome is TxOutcome.RETRY_LIMIT:
+            self._gradient.lose(parent)
+        if tries >= _UNICAST_TRIES:
+            self._port.drop(DropReason.RETRY_LIMIT, packet, now_ns=now_ns)
+        else:
+            self._forward(packet, start_ns=now_ns + self._lead_ns, now_ns=now_ns, tries=tries)
+
+    # --- time -----------------------------------------------------------------------------------------------------
+
+    def next_wake_ns(self) -> int | None:
+        leader_ns = self._leader.next_wake_ns() if self._leader else None
+        return min((t for t in (self._join_ns, leader_ns, self._release.next_wake_ns()) if t is not None), default=None)
+
+    def wake(self, now_ns: int) -> None:
+        if self._join_ns is not None and now_ns >= self._join_ns:
+            self._join(now_ns)
+        if self._leader is not None:
+            for part in self._leader.wake(now_ns):
+                self._obey(part, now_ns=now_ns)
+                self._flood_control(Kind.SCHEDULE, part.encode_frame(self._port.node), now_ns=now_ns)
+        horizon_us = now_ns // US - self._lifetime_us
+        for packet in self._release.expire(before_us=horizon_us):
+            self._port.drop(DropReason.EXPIRED, packet, now_ns=now_ns)
+        for packet, start_ns in self._release.due(self._membership, now_ns=now_ns):
+            self._port.mark(packet, seen.FLOODED)
+            own = packet.header.origin == self._port.node
+            stamp = self._port.stamped if own else self._port.forwarded
+            self._port.transmit(stamp(packet, flags=FLAG_FLOOD), BROADCAST, start_ns=start_ns)
+
+    def _join(self, now_ns: int) -> None:
+        self._join_ns = now_ns + _REJOIN_NS + int(self._random() * _JOIN_WINDOW_NS)
+        join = Join(self._port.node, self._port.position)
+        self._flood_control(Kind.JOIN, join.encode_frame(self._port.node), now_ns=now_ns)
+
+    def _flood_control(self, kind: Kind, inner: bytes, *, now_ns: int) -> None:
+        packet = self._port.announce(
+            kind, inner, now_ns=now_ns, flags=FLAG_FLOOD, hop_limit=self._port.scenario.routing.hop_limit
+        )
+        self._port.transmit(packet.frame, BROADCAST, start_ns=now_ns + self._lead_ns)
+
+    # --- for people -----------------------------------------------------------------------------------------------
+
+    def waiting(self) -> int:
+        return len(self._homeless) + len(self._release) + len(self._unicasts)
+
+    def report(self) -> Mapping[str, object]:
+        return {
+            "role": self._membership.role.name.lower(),
+            "cluster": self._membership.cluster,
+            "head": self._membership.head,
+            "epoch": self._membership.epoch,
+            "waiting": self.waiting(),
+        }

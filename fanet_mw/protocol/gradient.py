@@ -1,0 +1,95 @@
+"""The way to a head: hop counts grow from each head outwards, carried by hellos, kept fresh by the head's sequence.
+
+As in DSDV, a route carries the head's own sequence number: newer beats shorter, equal needs fewer hops, so an old
+route can never be chosen through a node that depends on it. A node whose own cluster has no way to its head joins the
+way of a neighbor to another head: the packet reaches some head rather than none.
+"""
+
+from typing import Final, NamedTuple
+
+from fanet_mw.protocol.neighbors import Neighbor, Neighbors
+from fanet_mw.units import NodeId
+
+UNREACHABLE: Final = 255
+_NO_HEAD: Final = NodeId(0)
+_STALE: Final = 4
+"""A route is given up when the head's sequence has not advanced for this many hello intervals."""
+
+
+class Route(NamedTuple):
+    """The next hop towards a head; at the head itself the next hop is the head and hops is 0."""
+
+    head: NodeId
+    head_seq: int
+    hops: int
+    parent: NodeId
+    fresh_ns: int
+    """When the head's sequence last advanced."""
+
+
+def newer(a: int, b: int) -> bool:
+    """Whether 16-bit sequence `a` comes after `b` (RFC 1982 serial numbers)."""
+    return 0 < ((a - b) & 0xFFFF) < 0x8000
+
+
+class Gradient:
+    """One node's route to a head."""
+
+    def __init__(self, *, node: NodeId, neighbors: Neighbors, hello_ns: int) -> None:
+        self._node = node
+        self._neighbors = neighbors
+        self._stale_ns = _STALE * hello_ns
+        self._own_head = _NO_HEAD
+        self._seq = 0
+        self._route: Route | None = None
+
+    def join(self, head: NodeId, *, now_ns: int) -> None:
+        """The schedule gave us this head (perhaps ourselves); any route to another one is only second best now."""
+        if head == self._own_head:
+            return
+        self._own_head = head
+        self._route = Route(head, self._seq, 0, self._node, now_ns) if head == self._node else None
+
+    def advance(self, now_ns: int) -> None:
+        """A head's next sequence number, once per hello."""
+        if self._own_head == self._node:
+            self._seq = (self._seq + 1) & 0xFFFF
+            self._route = Route(self._node, self._seq, 0, self._node, now_ns)
+
+    def hear(self, neighbor: Neighbor, *, now_ns: int) -> None:
+        """A hello may bring a better route."""
+        beacon = neighbor.beacon
+        if self._own_head in (self._node, _NO_HEAD):
+            return
+        route = self.route(now_ns=now_ns)
+        if beacon.hops_to_head >= UNREACHABLE - 1 or beacon.head == _NO_HEAD:
+            if route is not None and route.parent == neighbor.node:
+                self._route = None
+            return
+        offered = Route(NodeId(beacon.head), beacon.head_seq, beacon.hops_to_head + 1, neighbor.node, now_ns)
+        if route is None or self._better(offered, route):
+            if route is not None and offered[:2] == route[:2]:
+                offered = offered._replace(fresh_ns=route.fresh_ns)  # the same news by a shorter way is not fresher
+            self._route = offered
+
+    def _better(self, offered: Route, route: Route) -> bool:
+        if offered.head != route.head:
+            return offered.head == self._own_head
+        if newer(offered.head_seq, route.head_seq):
+            # The parent may just not have said it yet: one step newer by a longer way is no reason to turn.
+            one_step = (offered.head_seq - route.head_seq) & 0xFFFF == 1
+            return offered.parent == route.parent or offered.hops <= route.hops or not one_step
+        return offered.head_seq == route.head_seq and offered.hops < route.hops
+
+    def lose(self, neighbor: NodeId) -> None:
+        """The link to a neighbor failed."""
+        self._neighbors.forget(neighbor)
+        if self._route is not None and self._route.parent == neighbor:
+            self._route = None
+
+    def route(self, *, now_ns: int) -> Route | None:
+        """The current route, unless its news has gone stale."""
+        route = self._route
+        if route is not None and route.parent != self._node and route.fresh_ns + self._stale_ns < now_ns:
+            self._route = route = None
+        return route

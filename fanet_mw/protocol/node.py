@@ -1,0 +1,217 @@
+"""The sans-IO core of one node: feed receptions, statuses and instants; drain requests, deliveries and records.
+
+    reception -> header at fixed offsets -> handled before in this phase? -> full header -> deliver -> protocol
+
+What comes off the air never raises here: it is counted by reason. The node owns its identity, sequence numbers,
+duplicate suppression and headers; the routing protocol behind it decides what happens next.
+"""
+
+from collections import Counter
+from collections.abc import Callable, Mapping
+from random import Random
+from typing import Final, NamedTuple
+
+from fanet_mw import wire
+from fanet_mw.errors import DropReason, LocalProtocolError, MalformedFrameError
+from fanet_mw.messages import Reception, TxRequest, TxStatus
+from fanet_mw.protocol import seen
+from fanet_mw.protocol.contract import RoutingProtocol
+from fanet_mw.protocol.txqueue import Packet
+from fanet_mw.rng import stream
+from fanet_mw.scenario import Scenario
+from fanet_mw.trace import Delivered, Dropped, Generated, Record
+from fanet_mw.units import BROADCAST, US, Enu, NodeId
+from fanet_mw.wire import Header, Kind
+
+_PHASE: Final = {0: seen.DELIVERED, wire.FLAG_FLOOD: seen.FLOODED, wire.FLAG_TO_HEAD: seen.CARRIED}
+"""Which bit says that a packet was handled, by the phase flags of the frame that brought it."""
+
+
+class Delivery(NamedTuple):
+    """A packet for the application of this node."""
+
+    header: Header
+    frame: bytes
+    end_ns: int
+
+
+class Node:
+    """One protocol instance."""
+
+    def __init__(
+        self, node: NodeId, scenario: Scenario, make_protocol: Callable[["Node"], RoutingProtocol], *, position: Enu
+    ) -> None:
+        self.node = node
+        self.scenario = scenario
+        self.position = position
+        self.requests: list[TxRequest] = []
+        self.deliveries: list[Delivery] = []
+        self.records: list[Record] = []
+        self.frames_sent = 0
+        self.receptions = 0
+        self.dropped: Counter[str] = Counter()
+        self._packet_seq = 0
+        self._lifetime_ns = round(scenario.routing.lifetime_s * 1_000_000_000)
+        self._seen = seen.Seen()
+        self._protocol = make_protocol(self)
+
+    # --- from the host's side -------------------------------------------------------------------------------------
+
+    def start(self, now_ns: int) -> None:
+        self._protocol.start(now_ns)
+
+    def send(self, inner: bytes, *, destination: NodeId, priority: int, app: str, due_ns: int, now_ns: int) -> int:
+        """Send an application payload (whole MAVLink frames); returns the packet's sequence number.
+
+        The packet exists from `due_ns` on, at most one lead ahead of `now_ns`. Raises LocalProtocolError when the
+        frame would exceed `radio.max_frame_bytes`.
+        """
+        packet = self._packet(
+            Kind.DATA,
+            inner,
+            destination=destination,
+            priority=priority,
+            flags=self._protocol.origin_flags,
+            hop_limit=self.scenario.routing.hop_limit,
+            born_ns=due_ns,
+        )
+        self.records.append(Generated(due_ns, self.node, packet.header.seq, app, len(packet.frame)))
+        self._protocol.originate(packet, due_ns=due_ns, now_ns=now_ns)
+        return packet.header.seq
+
+    def say_hello(self, inner: bytes, *, start_ns: int, now_ns: int) -> None:
+        """Broadcast our hello one hop: position frames of the application, then what the protocol adds."""
+        packet = self._packet(
+            Kind.HELLO,
+            inner + self._protocol.hello_inner(now_ns=now_ns),
+            destination=BROADCAST,
+            priority=wire.PRIORITY_CONTROL,
+            flags=0,
+            hop_limit=1,
+            born_ns=start_ns,
+        )
+        self.transmit(packet.frame, BROADCAST, start_ns=start_ns)
+
+    def hear(self, reception: Reception, *, now_ns: int) -> None:
+        """One reception, from anyone."""
+        self.receptions += 1
+        frame = reception.frame
+        peeked = wire.peek(frame)
+        if peeked is None:
+            self.dropped[DropReason.MALFORMED] += 1
+            return
+        origin, seq, flags = peeked
+        phase = _PHASE.get(flags & wire.PHASE_MASK)
+        key = (origin << 32) | seq
+        bits = self._seen.bits(key)
+        if phase is None or bits & phase:
+            self.dropped[DropReason.MALFORMED if phase is None else DropReason.DUPLICATE] += 1
+            return
+        try:
+            self._first_copy(Packet(wire.decode_header(frame), frame), reception, key, bits, phase, now_ns)
+        except MalformedFrameError:
+            self.dropped[DropReason.MALFORMED] += 1
+
+    def _first_copy(self, packet: Packet, reception: Reception, key: int, bits: int, phase: int, now_ns: int) -> None:
+        header = packet.header
+        self._seen.mark(key, phase)
+        if header.kind is Kind.HELLO:
+            self._protocol.hello(packet, reception, now_ns=now_ns)
+            return
+        age_ns = reception.end_ns - header.origin_us * US
+        if age_ns > self._lifetime_ns:
+            self.drop(DropReason.EXPIRED, packet, now_ns=now_ns)
+            return
+        if header.kind is Kind.DATA and not bits & seen.DELIVERED and header.destination in (self.node, BROADCAST):
+            self._seen.mark(key, seen.DELIVERED)
+            self.deliveries.append(Delivery(header, packet.frame, reception.end_ns))
+            self.records.append(
+                Delivered(reception.end_ns, self.node, header.origin, header.seq, age_ns, header.hops + 1)
+            )
+        self._protocol.receive(packet, reception, now_ns=now_ns)
+
+    def status(self, status: TxStatus, *, now_ns: int) -> None:
+        self._protocol.status(status, now_ns=now_ns)
+
+    def wake(self, now_ns: int) -> None:
+        self._protocol.wake(now_ns)
+
+    def next_wake_ns(self) -> int | None:
+        return self._protocol.next_wake_ns()
+
+    def report(self) -> Mapping[str, object]:
+        """JSON-able counters and the protocol's state."""
+        return {
+            "frames_sent": self.frames_sent,
+            "receptions": self.receptions,
+            "dropped": {reason: self.dropped[reason] for reason in sorted(self.dropped)},
+            **self._protocol.report(),
+        }
+
+    # --- the port of the protocol (fanet_mw.protocol.contract.Port) -----------------------------------------------
+
+    def transmit(self, frame: bytes, dst: NodeId, *, start_ns: int, wants_status: bool = False) -> int:
+        seq = self.frames_sent
+        self.frames_sent = seq + 1
+        self.requests.append(TxRequest(seq, start_ns, frame, dst, wants_status))
+        return seq
+
+    def announce(self, kind: Kind, inner: bytes, *, now_ns: int, flags: int, hop_limit: int) -> Packet:
+        return self._packet(
+            kind,
+            inner,
+            destination=BROADCAST,
+            priority=wire.PRIORITY_CONTROL,
+            flags=flags,
+            hop_limit=hop_limit,
+            born_ns=now_ns,
+        )
+
+    def stamped(self, packet: Packet, *, flags: int) -> bytes:
+        header = packet.header
+        return wire.rewrite(packet.frame, prev_hop=self.node, hop_limit=header.hop_limit, hops=header.hops, flags=flags)
+
+    def forwarded(self, packet: Packet, *, flags: int) -> bytes:
+        header = packet.header
+        return wire.rewrite(
+            packet.frame, prev_hop=self.node, hop_limit=header.hop_limit - 1, hops=header.hops + 1, flags=flags
+        )
+
+    def drop(self, reason: DropReason, packet: Packet, *, now_ns: int) -> None:
+        self.dropped[reason] += 1
+        self.records.append(Dropped(now_ns, self.node, reason, packet.header.origin, packet.header.seq))
+
+    def mark(self, packet: Packet, bits: int) -> None:
+        self._seen.mark(seen.key_of(origin=packet.header.origin, seq=packet.header.seq), bits)
+
+    def record(self, record: Record) -> None:
+        self.records.append(record)
+
+    def stream(self, use: str) -> Random:
+        return stream(self.scenario.seed, use, self.node)
+
+    # --- inside ---------------------------------------------------------------------------------------------------
+
+    def _packet(
+        self, kind: Kind, inner: bytes, *, destination: NodeId, priority: int, flags: int, hop_limit: int, born_ns: int
+    ) -> Packet:
+        size = wire.HEADER_BYTES + len(inner)
+        bound = self.scenario.radio.max_frame_bytes
+        if size > bound:
+            raise LocalProtocolError(f"frame of {size} bytes must be <= radio.max_frame_bytes = {bound}")
+        header = Header(
+            origin_us=born_ns // US,
+            seq=self._packet_seq,
+            origin=self.node,
+            destination=destination,
+            prev_hop=self.node,
+            kind=kind,
+            hop_limit=hop_limit,
+            hops=0,
+            priority=priority,
+            flags=flags,
+        )
+        self._packet_seq += 1
+        packet = Packet(header, header.encode() + inner)
+        self.mark(packet, seen.DELIVERED | _PHASE[flags & wire.PHASE_MASK])
+        return packet

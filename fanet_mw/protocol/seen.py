@@ -1,0 +1,37 @@
+"""What a node has already handled of each packet, as bits by (origin, sequence). Bounded: two generations of keys.
+
+A key is forgotten after at least `capacity` newer ones, so a packet comes back as new only if its duplicates are
+older than that; the packet lifetime ends it long before.
+"""
+
+from typing import Final
+
+DELIVERED: Final = 1
+"""Handed to the application of this node, or originated by it."""
+FLOODED: Final = 2
+"""Heard (or sent) in its flooding phase: relayed at most once."""
+CARRIED: Final = 4
+"""Forwarded as unicast towards a head: carried at most once, so that no unicast loop survives."""
+
+
+def key_of(*, origin: int, seq: int) -> int:
+    return (origin << 32) | seq
+
+
+class Seen:
+    """Bits per packet key."""
+
+    def __init__(self, capacity: int = 32_768) -> None:
+        self._capacity = capacity
+        self._young: dict[int, int] = {}
+        self._old: dict[int, int] = {}
+
+    def bits(self, key: int) -> int:
+        """What is known of this packet; 0 for a new one."""
+        found = self._young.get(key)
+        return self._old.get(key, 0) if found is None else found
+
+    def mark(self, key: int, bits: int) -> None:
+        if len(self._young) >= self._capacity:
+            self._old, self._young = self._young, {}
+        self._young[key] = self.bits(key) | bits

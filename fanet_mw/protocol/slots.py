@@ -1,0 +1,52 @@
+"""Superframe geometry: which instant belongs to which slot. Pure functions of time.
+
+start      start+period
+|  slot 0  |  slot 1  | ... |  slot n-1  |  slot 0 ...
+|<-usable->g|          each slot ends with a silent guard time
+"""
+
+from typing import NamedTuple
+
+from fanet_mw.errors import LocalProtocolError
+
+
+class Slot(NamedTuple):
+    """One occurrence of a slot: transmissions may start in [start, end)."""
+
+    start_ns: int
+    end_ns: int
+
+
+class Superframe(NamedTuple):
+    """A repeating frame of equal slots."""
+
+    origin_ns: int
+    period_ns: int
+    slot_ns: int
+    guard_ns: int
+
+    def check(self) -> None:
+        """Raise LocalProtocolError when the geometry is impossible."""
+        if not 0 < self.slot_ns <= self.period_ns:
+            raise LocalProtocolError(f"slot_ns = {self.slot_ns} must be in (0, period_ns = {self.period_ns}]")
+        if not 0 <= self.guard_ns < self.slot_ns:
+            raise LocalProtocolError(f"guard_ns = {self.guard_ns} must be in [0, slot_ns = {self.slot_ns})")
+
+    @property
+    def slots(self) -> int:
+        return self.period_ns // self.slot_ns
+
+    def occurrence(self, slot: int, *, not_before_ns: int) -> Slot:
+        """The current occurrence of `slot` if `not_before_ns` falls into its usable part, else the next one."""
+        offset_ns = self.origin_ns + slot * self.slot_ns
+        usable_ns = self.slot_ns - self.guard_ns
+        turns = (not_before_ns - offset_ns) // self.period_ns
+        start_ns = offset_ns + turns * self.period_ns
+        if not_before_ns >= start_ns + usable_ns:
+            start_ns += self.period_ns
+        return Slot(start_ns, start_ns + usable_ns)
+
+    def owner(self, t_ns: int) -> int | None:
+        """The slot whose usable part contains an instant; None within a guard time or the unslotted rest."""
+        turns, rest = divmod((t_ns - self.origin_ns) % self.period_ns, self.slot_ns)
+        return turns if turns < self.slots and rest < self.slot_ns - self.guard_ns else None

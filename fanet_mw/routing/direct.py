@@ -1,0 +1,17 @@
+"""No routing: one transmission, to the destination or to whoever is in range. What the MAC alone can do."""
+
+from fanet_mw.messages import Reception
+from fanet_mw.protocol.contract import RoutingProtocol
+from fanet_mw.protocol.txqueue import Packet
+from fanet_mw.units import NodeId
+
+
+class Direct(RoutingProtocol):
+    """Sends its own packets once and relays nothing."""
+
+    def originate(self, packet: Packet, *, due_ns: int, now_ns: int) -> None:
+        saturated = self._port.scenario.traffic.arrivals == "saturated"
+        self._port.transmit(packet.frame, NodeId(packet.header.destination), start_ns=due_ns, wants_status=saturated)
+
+    def receive(self, packet: Packet, reception: Reception, *, now_ns: int) -> None:
+        pass  # delivered by the node, or not for it

@@ -1,0 +1,35 @@
+"""Plain flooding: every node re-broadcasts each new packet once, after a random jitter (paper, Figure 9)."""
+
+from typing import ClassVar
+
+from fanet_mw.errors import DropReason
+from fanet_mw.messages import Reception
+from fanet_mw.protocol.contract import Port, RoutingProtocol
+from fanet_mw.protocol.txqueue import Packet
+from fanet_mw.units import BROADCAST
+from fanet_mw.wire import FLAG_FLOOD
+
+
+class Flooding(RoutingProtocol):
+    """Relay at reception + lead + U(0, jitter); duplicates were suppressed by the node."""
+
+    origin_flags: ClassVar[int] = FLAG_FLOOD
+
+    def __init__(self, port: Port) -> None:
+        super().__init__(port)
+        scenario = port.scenario
+        self._lead_ns = scenario.radio.lead_ns
+        self._jitter_ns = scenario.routing.jitter_ns
+        self._random = port.stream("jitter").random
+
+    def originate(self, packet: Packet, *, due_ns: int, now_ns: int) -> None:
+        self._port.transmit(packet.frame, BROADCAST, start_ns=due_ns)
+
+    def receive(self, packet: Packet, reception: Reception, *, now_ns: int) -> None:
+        if packet.header.destination == self._port.node:
+            return  # it has arrived
+        if packet.header.hop_limit <= 1:
+            self._port.drop(DropReason.HOP_LIMIT, packet, now_ns=now_ns)
+            return
+        start_ns = now_ns + self._lead_ns + int(self._random() * self._jitter_ns)
+        self._port.transmit(self._port.forwarded(packet, flags=FLAG_FLOOD), BROADCAST, start_ns=start_ns)

@@ -1,0 +1,277 @@
+"""The `fanet` command. Parsing, progress and exit codes; everything it does is a function elsewhere."""
+
+import asyncio
+import json
+import sys
+from collections.abc import Callable, Iterator
+from contextlib import contextmanager
+from dataclasses import dataclass
+from pathlib import Path
+from typing import Annotated, Any
+
+from cyclopts import App, Parameter
+from rich.console import Console
+from rich.progress import BarColumn, Progress, TextColumn, TimeElapsedColumn
+from rich.table import Table
+
+from fanet_mw import __version__
+from fanet_mw.errors import FanetError
+from fanet_mw.scenario import Scenario
+from fanet_mw.units import NodeId
+from sim import catalog, report
+from sim.outcome import Outcome
+
+app = App(
+    name="fanet",
+    help="Middleware for swarms of UAVs, and the network emulator it is developed and proven on.",
+    version=__version__,
+)
+_err = Console(stderr=True)
+
+
+@Parameter(name="*")
+@dataclass(frozen=True)
+class Choice:
+    """What to run: a scenario and what to change in it."""
+
+    set: Annotated[
+        tuple[str, ...], Parameter(name="--set", negative="", help="Change one scenario key, KEY=VALUE.")
+    ] = ()
+    """Repeatable, for example --set nodes.count=20 --set radio.channel=log_distance."""
+    seed: int | None = None
+    """Seed of every random stream of the run."""
+    duration: float | None = None
+    """Simulated seconds to run [s]."""
+
+    def scenario(self, name: str) -> Scenario:
+        """The scenario with these changes."""
+        overrides = list(self.set)
+        if self.seed is not None:
+            overrides.append(f"seed={self.seed}")
+        if self.duration is not None:
+            overrides.append(f"duration_s={self.duration}")
+        return catalog.find(name, overrides)
+
+
+@Parameter(name="*")
+@dataclass(frozen=True)
+class Output:
+    """Where the result goes."""
+
+    out: Path | None = None
+    """Folder for scenario.toml, summary.json, reports.json, trace.jsonl and mavlink.tlog."""
+    json: Annotated[bool, Parameter(negative="")] = False
+    """Print the summary as JSON, and nothing else, on standard output."""
+
+
+@Parameter(name="*")
+@dataclass(frozen=True)
+class Join:
+    """How a single service finds its swarm."""
+
+    connect: str = "tcp/127.0.0.1:7447"
+    """Zenoh endpoint of the swarm's router."""
+    swarm: str | None = None
+    """Name of the swarm; by default the scenario's name."""
+
+
+@app.command
+def simulate(scenario: str, *, choice: Choice = Choice(), output: Output = Output()) -> int:
+    """Run a scenario in virtual time: deterministic, as fast as it goes.
+
+    Parameters
+    ----------
+    scenario
+        A shipped scenario's name (see `fanet scenarios`) or a .toml file.
+
+    """
+    from sim.run import simulate as run
+
+    chosen = choice.scenario(scenario)
+    with _progress(chosen, quiet=output.json) as tell:
+        outcome = run(chosen, on_progress=tell)
+    return _finish(outcome, output)
+
+
+@app.command
+def launch(
+    scenario: str,
+    *,
+    choice: Choice = Choice(),
+    output: Output = Output(),
+    respawn: Annotated[bool, Parameter(negative="")] = False,
+    listen: str | None = None,
+    connect: str | None = None,
+    swarm: str | None = None,
+) -> int:
+    """Run a scenario in real time: one process per UAV, the link emulator and the world, over Zenoh.
+
+    Parameters
+    ----------
+    scenario
+        A shipped scenario's name (see `fanet scenarios`) or a .toml file.
+    respawn
+        Start a process again when it dies.
+    listen
+        Zenoh endpoint to serve on, for example tcp/127.0.0.1:7447; by default a free port of the loopback interface.
+    connect
+        Zenoh endpoint of an existing router to use instead of serving one.
+    swarm
+        Name of the swarm on the bus; by default the scenario's name.
+
+    """
+    from sim.swarm import launch as run
+
+    chosen = choice.scenario(scenario)
+    with _progress(chosen, quiet=output.json) as tell:
+        outcome = asyncio.run(
+            run(
+                chosen,
+                swarm=swarm or chosen.name,
+                listen=listen,
+                connect=connect,
+                respawn=respawn,
+                on_progress=tell,
+                on_event=lambda text: _err.print(text, highlight=False),
+            )
+        )
+    return _finish(outcome, output)
+
+
+@app.command
+def scenarios(*, json_: Annotated[bool, Parameter(name="--json", negative="")] = False) -> int:
+    """List the shipped scenarios.
+
+    Parameters
+    ----------
+    json_
+        Print JSON instead of a table.
+
+    """
+    entries = catalog.shipped()
+    if json_:
+        sys.stdout.write(json.dumps([{"name": e.name, "description": e.description} for e in entries], indent=2) + "\n")
+        return 0
+    table = Table("scenario", "what it is", box=None, header_style="bold", padding=(0, 2, 0, 0))
+    for entry in entries:
+        table.add_row(entry.name, entry.description)
+    Console().print(table)
+    return 0
+
+
+@app.command
+def router(
+    scenario: str, *, choice: Choice = Choice(), listen: str = "tcp/127.0.0.1:7447", swarm: str | None = None
+) -> int:
+    """Serve the bus and keep the swarm clock, for services that are started one by one.
+
+    Parameters
+    ----------
+    scenario
+        The scenario that the services will run: it says which of them to wait for.
+    listen
+        Zenoh endpoint to serve on.
+    swarm
+        Name of the swarm on the bus; by default the scenario's name.
+
+    """
+    from sim.swarm import serve
+
+    chosen = choice.scenario(scenario)
+    asyncio.run(serve(chosen, swarm=swarm or chosen.name, listen=listen, on_event=lambda text: _err.print(text)))
+    return 0
+
+
+@app.command
+def emulator(scenario: str, *, choice: Choice = Choice(), join: Join = Join()) -> int:
+    """Run the link emulator alone, against a router.
+
+    Parameters
+    ----------
+    scenario
+        The scenario of the swarm.
+
+    """
+    from emulator.__main__ import run
+
+    chosen = choice.scenario(scenario)
+    return run(chosen, swarm=join.swarm or chosen.name, endpoint=join.connect)
+
+
+@app.command
+def world(scenario: str, *, choice: Choice = Choice(), join: Join = Join()) -> int:
+    """Run the world alone, against a router.
+
+    Parameters
+    ----------
+    scenario
+        The scenario of the swarm.
+
+    """
+    from sim.world_main import run
+
+    chosen = choice.scenario(scenario)
+    return run(chosen, swarm=join.swarm or chosen.name, endpoint=join.connect)
+
+
+@app.command
+def agent(scenario: str, *, id: int, choice: Choice = Choice(), join: Join = Join()) -> int:  # noqa: A002
+    """Run one UAV alone, against a router.
+
+    Parameters
+    ----------
+    scenario
+        The scenario of the swarm.
+    id
+        Node id, from 1 to nodes.count.
+
+    """
+    from agents.__main__ import run
+
+    chosen = choice.scenario(scenario)
+    if id not in chosen.node_ids:
+        raise FanetError(f"--id {id}: must be in [1, nodes.count = {chosen.nodes.count}]")
+    return run(chosen, node=NodeId(id), swarm=join.swarm or chosen.name, endpoint=join.connect)
+
+
+@contextmanager
+def _progress(scenario: Scenario, *, quiet: bool) -> Iterator[Callable[[float], None]]:
+    """A bar of simulated seconds on standard error, only when a person watches."""
+    if quiet or not _err.is_terminal:
+        yield lambda _seconds: None
+        return
+    columns = (TextColumn("{task.description}"), BarColumn(), TextColumn("{task.completed:.0f}/{task.total:.0f} s"))
+    with Progress(*columns, TimeElapsedColumn(), console=_err, transient=True) as progress:
+        task = progress.add_task(scenario.name, total=scenario.duration_s)
+        yield lambda seconds: progress.update(task, completed=seconds)
+
+
+def _finish(outcome: Outcome, output: Output) -> int:
+    """Write and show the result; 0 only when it may be used."""
+    from sim.results import finish
+
+    summary: dict[str, Any] = finish(outcome, out=output.out)
+    if output.json:
+        sys.stdout.write(json.dumps(summary, indent=2) + "\n")
+    else:
+        console = Console()
+        report.show(summary, console)
+        if output.out is not None:
+            console.print(f"written to {output.out}")
+    return 0 if summary["lateness"]["valid"] and summary["frames"]["closes"] and not summary["aborted"] else 1
+
+
+def main() -> None:
+    """The console script."""
+    try:
+        code = app(result_action="return_value")
+    except FanetError as error:
+        _err.print(f"[bold red]fanet:[/] {error}", highlight=False, soft_wrap=True)
+        sys.exit(2)
+    except KeyboardInterrupt:
+        sys.exit(130)
+    sys.exit(code if isinstance(code, int) else 0)
+
+
+if __name__ == "__main__":
+    main()

@@ -1,0 +1,29 @@
+"""What a run leaves behind, whichever host ran it: records, reports and how long it took. Input of metrics and files."""
+
+from collections.abc import Mapping
+from dataclasses import dataclass, field
+from typing import Any, Literal
+
+from fanet_mw.scenario import Scenario
+from fanet_mw.trace import Record
+
+
+@dataclass(slots=True)
+class Outcome:
+    """One finished (or cut short) run."""
+
+    scenario: Scenario
+    mode: Literal["virtual", "realtime"]
+    wall_s: float
+    records: list[Record]
+    """In the order in which they happened: by instant, and within one instant as they were made (virtual) or by node."""
+    reports: Mapping[str, Mapping[str, Any]]
+    """The last report of each actor, by its name."""
+    taps: list[tuple[int, bytes]] = field(default_factory=list)
+    """(instant ns, MAVLink bytes) for the `.tlog`."""
+    ended: list[tuple[str, int]] = field(default_factory=list)
+    """(name, exit code) of processes that died before their time."""
+    aborted: str | None = None
+    """Why the run is partial; None when it ran to its end."""
+    ready_s: float = 0.0
+    """Real time: until all processes were up."""

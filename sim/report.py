@@ -1,0 +1,99 @@
+"""A summary as a person wants to read it: what was asked, what the network did, what the mission got from it."""
+
+from collections.abc import Iterator, Mapping
+from typing import Any
+
+from rich.console import Console
+from rich.table import Table
+
+
+def show(summary: Mapping[str, Any], console: Console) -> None:
+    """Print a summary."""
+    mode = "virtual time" if summary["mode"] == "virtual" else "real processes"
+    pace = summary["duration_s"] / summary["wall_s"] if summary["wall_s"] else 0.0
+    console.print(
+        f"\n[bold]{summary['scenario']}[/], {summary['nodes']} nodes, seed {summary['seed']}, {mode}: "
+        f"{summary['duration_s']:g} s in {summary['wall_s']:.1f} s ({pace:.1f} x real time)"
+    )
+    table = Table(show_header=False, box=None, pad_edge=False, padding=(0, 2, 0, 0))
+    table.add_column(style="bold")
+    table.add_column()
+    for name, text in _rows(summary):
+        table.add_row(name, text)
+    console.print(table)
+    for warning in _warnings(summary):
+        console.print(f"[bold red]{warning}[/]")
+
+
+def _rows(summary: Mapping[str, Any]) -> Iterator[tuple[str, str]]:
+    yield from _network_rows(summary)
+    mission = summary["mission"]
+    if mission["survivors"]:
+        yield from _mission_rows(mission)
+    yield "trace", summary["trace_sha256"][:16]
+
+
+def _network_rows(summary: Mapping[str, Any]) -> Iterator[tuple[str, str]]:
+    yield "traffic", _traffic(summary)
+    if summary["reports"]["generated"]:
+        yield "survivor reports", _traffic(summary["reports"])
+    worst = summary.get("worst_nodes") or []
+    if worst and worst[0]["pdr"] < 0.999:
+        yield "worst receivers", ", ".join(f"node {item['node']} {item['pdr']:.1%}" for item in worst[:3])
+    air = summary["air"]
+    if air:
+        pdr = "-" if air["pdr"] is None else f"{air['pdr']:.1%}"
+        yield "air", f"{pdr} of copies received, busy {air['busy']:.1%}, {air['throughput_mbps']:.3f} Mb/s"
+    frames = summary["frames"]
+    drops = ", ".join(f"{reason} {count}" for reason, count in frames["dropped"].items()) or "none"
+    balance = "closes" if frames["closes"] else "DOES NOT CLOSE"
+    yield (
+        "frames",
+        f"{frames['sent']} sent = {frames['delivered']} delivered + {sum(frames['dropped'].values())} dropped "
+        f"+ {frames['in_flight']} in flight ({balance}; drops: {drops})",
+    )
+    late = summary["lateness"]
+    if summary["mode"] == "realtime":
+        yield (
+            "lateness",
+            f"{late['late_frames']} of {late['frames']} frames late ({late['share']:.2%}, limit {late['limit']:.1%}), "
+            f"worst {late['max_ms']:.1f} ms: {'valid' if late['valid'] else 'NOT VALID'}",
+        )
+
+
+def _traffic(part: Mapping[str, Any]) -> str:
+    pdr = "-" if part["pdr"] is None else f"{part['pdr']:.1%}"
+    delay = part["delay_ms"]
+    times = (
+        ""
+        if delay["p50"] is None
+        else (f", delay p50 {delay['p50']:.0f} ms, p95 {delay['p95']:.0f} ms, max {delay['max']:.0f} ms")
+    )
+    return f"{pdr} delivered ({part['generated']} packets, {part['delivered']} deliveries){times}"
+
+
+def _mission_rows(mission: Mapping[str, Any]) -> Iterator[tuple[str, str]]:
+    yield (
+        "survivors",
+        f"{mission['detected']} of {mission['survivors']} detected, {mission['approached']} approached, "
+        f"{mission['reached']} reached",
+    )
+    times = mission["time_to_approach_s"]
+    if times:
+        middle = times[len(times) // 2]
+        yield "approach", f"{len(times)} UAVs, first after {times[0]:.1f} s, half after {middle:.1f} s"
+    if mission["localization_error_m"] is not None:
+        yield "localization", f"median error {mission['localization_error_m']:.0f} m"
+    yield "collisions", str(mission["collisions"])
+
+
+def _warnings(summary: Mapping[str, Any]) -> Iterator[str]:
+    if summary["aborted"]:
+        yield f"Partial result: {summary['aborted']}"
+    for item in summary["processes"]["ended"]:
+        yield f"{item['name']} ended before its time, exit code {item['exit_code']}"
+    if not summary["lateness"]["valid"] and not summary["aborted"]:
+        yield (
+            "This machine could not hold real time: the result is not valid. "
+            "Lower the load, raise radio.lead_ms, or slow the swarm clock with --set time_scale=0.5"
+        )

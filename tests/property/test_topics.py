@@ -1,0 +1,91 @@
+"""Messages on the bus: what goes in comes out, and garbage never gets further than one error."""
+
+from array import array
+from contextlib import suppress
+
+from hypothesis import given
+from hypothesis import strategies as st
+
+from fanet_mw import topics
+from fanet_mw.errors import MalformedFrameError
+from fanet_mw.messages import (
+    Clock,
+    ClockState,
+    Gps,
+    MavlinkTap,
+    Message,
+    Poses,
+    Reception,
+    Report,
+    Setpoint,
+    TraceBatch,
+    TxOutcome,
+    TxRequest,
+    TxStatus,
+    WifiScan,
+)
+from fanet_mw.trace import Delivered, Detected, Generated
+from fanet_mw.units import Enu, NodeId
+
+instants = st.integers(-(2**63), 2**63 - 1)
+u32 = st.integers(0, 2**32 - 1)
+nodes = st.integers(0, 0xFFFF).map(NodeId)
+doubles = st.floats(allow_nan=False)
+singles = st.floats(allow_nan=False, width=32)
+vectors = st.builds(Enu, doubles, doubles, doubles)
+words = st.text(st.characters(codec="utf-8", exclude_characters="\n\r"), max_size=20)
+
+
+@st.composite
+def poses(draw: st.DrawFn) -> Poses:
+    ids = draw(st.lists(st.integers(1, 0xFFFF), max_size=5))
+    states = draw(st.lists(doubles, min_size=6 * len(ids), max_size=6 * len(ids)))
+    return Poses(draw(instants), array("H", ids), array("d", states))
+
+
+records = st.one_of(
+    st.builds(Delivered, *[instants] * 6),
+    st.builds(Generated, instants, nodes, u32, words, u32),
+    st.builds(Detected, instants, nodes, u32, doubles),
+)
+messages: st.SearchStrategy[Message] = st.one_of(
+    st.builds(TxRequest, u32, instants, st.binary(max_size=50), nodes, st.booleans()),
+    st.builds(Reception, st.binary(max_size=50), nodes, instants, singles),
+    st.builds(TxStatus, u32, st.sampled_from(TxOutcome), instants, st.integers(0, 255)),
+    poses(),
+    st.builds(Setpoint, instants, vectors, doubles),
+    st.builds(Gps, instants, vectors, vectors),
+    st.builds(WifiScan, instants, st.lists(st.tuples(u32, singles), max_size=5).map(tuple)),
+    st.builds(MavlinkTap, instants, st.binary(max_size=50)),
+    st.builds(TraceBatch, st.lists(records, max_size=5).map(tuple)),
+    st.builds(Clock, instants, st.floats(0.01, 100), st.sampled_from(ClockState)),
+    st.builds(Report, words, instants, st.text(st.characters(codec="utf-8"), max_size=50)),
+)
+
+
+@given(st.lists(messages, max_size=6))
+def test_a_batch_is_decoded_as_it_was_encoded(batch: list[Message]) -> None:
+    assert topics.decode(topics.encode(batch)) == batch
+
+
+@given(st.binary(max_size=200))
+def test_garbage_is_one_error_or_messages(data: bytes) -> None:
+    with suppress(MalformedFrameError):
+        topics.decode(data)
+
+
+@given(st.lists(messages, min_size=1, max_size=3), st.data())
+def test_a_changed_byte_is_one_error_or_other_messages(batch: list[Message], data: st.DataObject) -> None:
+    mutated = bytearray(topics.encode(batch))
+    at = data.draw(st.integers(0, len(mutated) - 1))
+    mutated[at] ^= data.draw(st.integers(1, 255))
+    with suppress(MalformedFrameError):
+        topics.decode(bytes(mutated))
+
+
+def test_the_node_of_a_topic_is_its_fourth_part() -> None:
+    names = topics.Topics("swarm")
+    assert topics.node_of(names.radio_tx(17)) == 17
+    assert topics.node_of(names.setpoint(4)) == 4
+    assert topics.node_of(names.pose) == 0
+    assert topics.node_of("fanet/swarm/radio/²/tx") == 0

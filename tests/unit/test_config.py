@@ -1,0 +1,86 @@
+"""Scenario files: every mistake at once, by file, key, value and bound."""
+
+from pathlib import Path
+
+import pytest
+
+from fanet_mw import config
+from fanet_mw.errors import ConfigError
+from fanet_mw.scenario import Scenario, grid_columns
+from sim import catalog
+
+
+def refusal(text: str, *overrides: str) -> str:
+    with pytest.raises(ConfigError) as caught:
+        config.parse(text, source="a.toml", name="a", overrides=overrides)
+    return str(caught.value)
+
+
+def test_three_mistakes_are_reported_at_once_with_file_key_value_and_bound() -> None:
+    message = refusal('duration_s = -1\n[nodes]\ncuont = 4\nlayout = "hexagon"\n')
+    lines = message.splitlines()
+    assert len(lines) == 3
+    assert all(line.startswith("a.toml: ") for line in lines)
+    assert "duration_s = -1: input should be greater than 0" in message
+    assert "nodes.cuont: unknown key; did you mean count?" in message
+    assert "nodes.layout = 'hexagon'" in message
+    assert "'disc'" in message
+
+
+def test_what_tables_disagree_about_is_reported_with_both_keys() -> None:
+    message = refusal("[nodes]\ncount = 5\n[clusters]\ncount = 9\n[traffic]\ndestination = 7\n")
+    assert "clusters.count = 9 must be < nodes.count = 5" in message
+    assert "traffic.destination = 7 must be <= nodes.count = 5" in message
+
+
+def test_a_guard_longer_than_its_slot_is_refused() -> None:
+    assert "guard_ms = 2000" in refusal("[clusters]\nguard_ms = 2000\nflooding_period_s = 5\ncount = 4\n")
+
+
+def test_an_unknown_rate_names_the_known_ones() -> None:
+    assert "must be one of 1, 2, 5.5, 11" in refusal("[radio]\nrate_mbps = 3\n")
+
+
+def test_broken_toml_names_file_and_line() -> None:
+    assert "a.toml: not valid TOML" in refusal("[nodes\ncount=3")
+
+
+@pytest.mark.parametrize("override", ["nodes.count", "=3", "seed.x=1"])
+def test_an_override_that_is_none_is_refused_with_its_text(override: str) -> None:
+    assert repr(override) in refusal("seed = 1", override)
+
+
+def test_overrides_take_toml_values_and_plain_words() -> None:
+    scenario = config.parse(
+        "", source="a", name="a", overrides=["nodes.count=10", "routing.protocol=flooding", "traffic.sources=[1, 2]"]
+    )
+    assert scenario.nodes.count == 10
+    assert scenario.routing.protocol == "flooding"
+    assert scenario.traffic.sources == (1, 2)
+
+
+def test_a_file_that_is_missing_is_named() -> None:
+    with pytest.raises(ConfigError, match=r"nowhere\.toml: cannot be read"):
+        config.load(Path("nowhere.toml"))
+
+
+def test_an_unknown_scenario_suggests_the_nearest_shipped_one() -> None:
+    with pytest.raises(ConfigError, match="did you mean rescue"):
+        catalog.find("recsue")
+
+
+@pytest.mark.parametrize("entry", catalog.shipped(), ids=lambda entry: entry.name)
+def test_every_shipped_scenario_is_valid_and_describes_itself(entry: catalog.Entry) -> None:
+    scenario = catalog.find(entry.name)
+    assert scenario.name == entry.name
+    assert scenario.description
+
+
+def test_a_resolved_scenario_is_read_back_as_itself() -> None:
+    scenario = catalog.find("rescue")
+    assert Scenario.model_validate(scenario.model_dump(mode="json")) == scenario
+
+
+@pytest.mark.parametrize(("count", "columns"), [(45, 9), (9, 3), (100, 10), (1, 1), (7, 7), (47, 10)])
+def test_the_default_grid_is_near_nine_by_five(count: int, columns: int) -> None:
+    assert grid_columns(count) == columns

@@ -1,0 +1,28 @@
+"""Duplicate suppression memory."""
+
+from fanet_mw.protocol import seen
+
+
+def test_phases_of_one_packet_are_remembered_apart() -> None:
+    memory = seen.Seen()
+    key = seen.key_of(origin=3, seq=9)
+    memory.mark(key, seen.CARRIED)
+    assert memory.bits(key) & seen.CARRIED
+    assert not memory.bits(key) & seen.FLOODED
+    memory.mark(key, seen.FLOODED)
+    assert memory.bits(key) == seen.CARRIED | seen.FLOODED
+
+
+def test_the_last_capacity_packets_are_known_and_memory_stays_bounded() -> None:
+    memory = seen.Seen(capacity=100)
+    for seq in range(10_000):
+        memory.mark(seen.key_of(origin=1, seq=seq), seen.DELIVERED)
+    assert all(memory.bits(seen.key_of(origin=1, seq=seq)) for seq in range(9_900, 10_000))
+    assert memory.bits(seen.key_of(origin=1, seq=0)) == 0
+    assert len(memory._young) + len(memory._old) <= 200
+
+
+def test_origins_do_not_share_sequences() -> None:
+    memory = seen.Seen()
+    memory.mark(seen.key_of(origin=1, seq=5), seen.DELIVERED)
+    assert memory.bits(seen.key_of(origin=2, seq=5)) == 0

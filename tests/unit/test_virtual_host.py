@@ -1,0 +1,92 @@
+"""Virtual time: order, ties and determinism."""
+
+import pytest
+
+from fanet_mw.actor import Actor
+from fanet_mw.errors import LocalProtocolError
+from fanet_mw.hosts.virtual import VirtualHost, matches
+from fanet_mw.messages import MavlinkTap, Message
+from fanet_mw.units import MS
+
+
+class Script(Actor):
+    """Wakes at given instants and says so; logs all it hears."""
+
+    def __init__(self, name: str, wakes_ns: list[int], *, hears: tuple[str, ...] = (), says: str = "t/x") -> None:
+        super().__init__(name, hears)
+        self._wakes_ns = sorted(wakes_ns)
+        self._says = says
+        self.log: list[tuple[int, str]] = []
+
+    def start(self, now_ns: int) -> None:
+        self.log.append((now_ns, "start"))
+
+    def receive(self, topic: str, message: Message, now_ns: int) -> None:
+        assert isinstance(message, MavlinkTap)
+        self.log.append((now_ns, message.data.decode()))
+
+    def wake(self, now_ns: int) -> None:
+        self.log.append((now_ns, "wake"))
+        self._wakes_ns = [t for t in self._wakes_ns if t > now_ns]
+        self.outbox.append((self._says, MavlinkTap(now_ns, self.name.encode())))
+
+    def next_wake_ns(self) -> int | None:
+        return self._wakes_ns[0] if self._wakes_ns else None
+
+
+def test_a_message_is_received_at_the_instant_it_is_put_and_before_time_moves_on() -> None:
+    speaker = Script("speaker", [5 * MS])
+    listener = Script("listener", [5 * MS], hears=("t/*",))
+    host = VirtualHost([speaker, listener])
+    host.start()
+    host.run(10 * MS)
+    assert listener.log == [(0, "start"), (5 * MS, "speaker"), (5 * MS, "wake"), (5 * MS, "listener")]
+
+
+def test_ties_go_by_the_order_in_which_wakes_were_asked_for() -> None:
+    ear = Script("ear", [], hears=("t/x",))
+    host = VirtualHost([ear, *(Script(f"s{i}", [MS]) for i in range(5))])
+    host.start()
+    host.run(MS)
+    assert [name for _, name in ear.log[1:]] == ["s0", "s1", "s2", "s3", "s4"]
+
+
+def test_running_in_steps_is_running_at_once() -> None:
+    def log(steps: list[int]) -> list[tuple[int, str]]:
+        ear = Script("ear", [], hears=("t/*",))
+        host = VirtualHost(
+            [ear, Script("a", [k * 3 * MS for k in range(20)]), Script("b", [k * 2 * MS for k in range(30)])]
+        )
+        host.start()
+        for until_ns in steps:
+            host.run(until_ns)
+        return ear.log
+
+    assert log([60 * MS]) == log([k * MS for k in range(61)])
+
+
+def test_a_wake_asked_for_in_the_past_comes_at_once() -> None:
+    late = Script("late", [-7])
+    host = VirtualHost([late])
+    host.start()
+    host.run(MS)
+    assert late.log == [(0, "start"), (0, "wake")]
+
+
+def test_an_actor_that_never_lets_time_move_is_named() -> None:
+    class Stuck(Script):
+        def next_wake_ns(self) -> int | None:
+            return 0
+
+    host = VirtualHost([Stuck("culprit", [])])
+    host.start()
+    with pytest.raises(LocalProtocolError, match="culprit"):
+        host.run(MS)
+
+
+@pytest.mark.parametrize(
+    ("expression", "topic", "covered"),
+    [("a/*/c", "a/b/c", True), ("a/*/c", "a/b/b/c", False), ("a/b", "a/b", True), ("a/*", "a", False)],
+)
+def test_a_star_stands_for_exactly_one_chunk(expression: str, topic: str, covered: bool) -> None:
+    assert matches(expression, topic) is covered

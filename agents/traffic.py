@@ -12,7 +12,7 @@ from fanet_mw.scenario import Scenario
 from fanet_mw.units import US, NodeId, S
 
 SATURATION_DEPTH: Final = 2
-"""Packets a saturated source keeps outstanding at its radio: one in service, one behind it. More would only age there."""
+"""Packets a saturated source keeps outstanding at its radio: one in service, one behind it."""
 
 
 def sources_of(scenario: Scenario) -> Sequence[int]:

@@ -76,7 +76,7 @@ def _packets(outcome: Outcome) -> dict[str, dict[str, Any]]:
             elif app == "traffic" and record.node in targets[record.origin]:
                 delays[app].append(record.delay_ns)
                 received[record.node] += 1
-    result = {
+    result: dict[str, dict[str, Any]] = {
         app: {
             "generated": generated[app],
             "delivered": len(delays[app]),

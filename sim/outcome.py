@@ -1,4 +1,4 @@
-"""What a run leaves behind, whichever host ran it: records, reports and how long it took. Input of metrics and files."""
+"""What a run leaves behind, whichever host ran it. The input of metrics and files."""
 
 from collections.abc import Mapping
 from dataclasses import dataclass, field
@@ -16,7 +16,7 @@ class Outcome:
     mode: Literal["virtual", "realtime"]
     wall_s: float
     records: list[Record]
-    """In the order in which they happened: by instant, and within one instant as they were made (virtual) or by node."""
+    """By instant; within one instant as they were made (virtual) or by node (real time)."""
     reports: Mapping[str, Mapping[str, Any]]
     """The last report of each actor, by its name."""
     taps: list[tuple[int, bytes]] = field(default_factory=list)

@@ -118,10 +118,10 @@ class Clustered(RoutingProtocol):
 
     def _consume_control(self, packet: Packet, *, now_ns: int) -> None:
         """Joins are the leader's, schedules everybody's. Malformed ones raise and are counted by the node."""
-        if packet.header.kind is Kind.JOIN and self._leader is not None:
+        if packet.header.kind == Kind.JOIN and self._leader is not None:
             join = Join.decode_frame(packet.frame)
             self._leader.joined(NodeId(join.node), join.position, now_ns=now_ns)
-        elif packet.header.kind is Kind.SCHEDULE:
+        elif packet.header.kind == Kind.SCHEDULE:
             self._obey(Schedule.decode_frame(packet.frame), now_ns=now_ns)
 
     def _obey(self, schedule: Schedule, *, now_ns: int) -> None:

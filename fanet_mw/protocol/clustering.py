@@ -18,7 +18,7 @@ class Cluster(NamedTuple):
 
 
 def balanced(positions: Mapping[NodeId, Enu], *, count: int) -> list[Cluster]:
-    """Divide the nodes into `count` clusters (fewer when there are fewer nodes), in order of their west-south corner."""
+    """Divide the nodes into `count` clusters (fewer when there are fewer nodes), from south-west to north-east."""
     nodes = sorted(positions)
     count = min(count, len(nodes))
     return [_with_head(part, positions) for part in _split(nodes, positions, count)] if count else []

@@ -8,7 +8,7 @@ from typing import Final
 
 from fanet_mw.protocol.clustering import balanced
 from fanet_mw.units import MS, US, Enu, NodeId
-from fanet_mw.wire import Member, Schedule
+from fanet_mw.wire import CAPACITY, Member, Schedule
 
 SETTLE_NS: Final = 700 * MS
 """Quiet time after the last join before the clusters are computed."""
@@ -42,7 +42,7 @@ class Leader:
         """The schedule parts to announce now."""
         if self._due_ns is None or now_ns < self._due_ns:
             return []
-        known = sum(part.count for part in self._parts)
+        known = sum(len(part.members) for part in self._parts)
         if known != len(self._positions):
             self._assign()
         self._due_ns = now_ns + self._period_ns
@@ -56,7 +56,7 @@ class Leader:
             for index, cluster in enumerate(clusters)
             for node in cluster.members
         ]
-        chunks = [members[at : at + Schedule.CAPACITY] for at in range(0, len(members), Schedule.CAPACITY)]
+        chunks = [members[at : at + CAPACITY] for at in range(0, len(members), CAPACITY)]
         self._parts = [
             Schedule(
                 start_us=self._origin_ns // US,

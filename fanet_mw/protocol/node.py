@@ -115,14 +115,14 @@ class Node:
     def _first_copy(self, packet: Packet, reception: Reception, key: int, bits: int, phase: int, now_ns: int) -> None:
         header = packet.header
         self._seen.mark(key, phase)
-        if header.kind is Kind.HELLO:
+        if header.kind == Kind.HELLO:
             self._protocol.hello(packet, reception, now_ns=now_ns)
             return
         age_ns = reception.end_ns - header.origin_us * US
         if age_ns > self._lifetime_ns:
             self.drop(DropReason.EXPIRED, packet, now_ns=now_ns)
             return
-        if header.kind is Kind.DATA and not bits & seen.DELIVERED and header.destination in (self.node, BROADCAST):
+        if header.kind == Kind.DATA and not bits & seen.DELIVERED and header.destination in (self.node, BROADCAST):
             self._seen.mark(key, seen.DELIVERED)
             self.deliveries.append(Delivery(header, packet.frame, reception.end_ns))
             self.records.append(

@@ -1,0 +1,131 @@
+"""The medium's books: every request, every copy, every late frame. What is counted here is never counted elsewhere."""
+
+from collections import Counter
+from typing import Any, Final
+
+import numpy as np
+
+from emulator import state as s
+from fanet_mw.errors import DropReason
+from fanet_mw.messages import TxOutcome
+from fanet_mw.units import MS, S
+
+_REASON_OF: Final = {
+    TxOutcome.RETRY_LIMIT: DropReason.RETRY_LIMIT,
+    TxOutcome.QUEUE_FULL: DropReason.MAC_QUEUE_FULL,
+    TxOutcome.LIFETIME: DropReason.MAC_LIFETIME,
+}
+_LATENESS_STEPS: Final = (0.1, 0.2, 0.5, 1, 2, 5, 10, 20, 50, 100, 200, 500, 1000)
+"""Upper edges of the lateness histogram [ms]; percentiles are given as the edge they fall under."""
+
+
+class Accounts:
+    """Counters at request level, and what the kernel counted at copy level."""
+
+    def __init__(self) -> None:
+        self.sent = 0
+        self.delivered = 0
+        self.delivered_bytes = 0
+        self.dropped: Counter[str] = Counter()
+        self.refused: Counter[str] = Counter()
+        """Hostile or misdirected input, by kind; none of it became a frame."""
+        self.handed: Counter[int] = Counter()
+        self.late_frames = 0
+        self._max_late_ns = 0
+        self._lateness = [0] * (len(_LATENESS_STEPS) + 1)
+        self._baseline = np.zeros(s.GLOBALS, np.int64)
+        self._busy_baseline_ns = 0
+        self._bytes_baseline = 0
+        self._measured_from_ns = 0
+
+    def drop(self, reason: DropReason) -> None:
+        self.dropped[reason] += 1
+
+    def late(self, by_ns: int) -> None:
+        """A request came `by_ns` after the instant it asked for."""
+        self.late_frames += 1
+        self._max_late_ns = max(self._max_late_ns, by_ns)
+        late_ms = by_ns / MS
+        index = next((i for i, edge in enumerate(_LATENESS_STEPS) if late_ms <= edge), len(_LATENESS_STEPS))
+        self._lateness[index] += 1
+
+    def ended(self, frame: list[int], *, broadcast: bool, size: int, failed: TxOutcome | None) -> None:
+        """Nothing refers to a frame any more: settle it. `frame` is its column of the kernel's table."""
+        if frame[s.RECEIVED]:
+            self.delivered += 1
+            self.delivered_bytes += size
+        elif failed is not None and not (failed is TxOutcome.RETRY_LIMIT and not frame[s.TARGETS]):
+            self.drop(_REASON_OF[failed])
+        elif broadcast and frame[s.TARGETS]:
+            self.drop(self._dominant(frame))
+        else:
+            self.drop(DropReason.NO_RECEIVER)
+
+    @staticmethod
+    def _dominant(frame: list[int]) -> DropReason:
+        """Why most copies of a broadcast were lost."""
+        causes = (
+            (frame[s.LOST_COLLISION], DropReason.COLLISION),
+            (frame[s.LOST_HALF_DUPLEX], DropReason.HALF_DUPLEX),
+            (frame[s.LOST_WEAK], DropReason.WEAK_SIGNAL),
+        )
+        return max(causes, key=lambda cause: cause[0])[1]
+
+    def measure_from(self, g: s.Ints, *, busy_ns: int, now_ns: int) -> None:
+        """Air statistics begin here: the warm-up is over."""
+        self._baseline = g.copy()
+        self._busy_baseline_ns = busy_ns
+        self._bytes_baseline = self.delivered_bytes
+        self._measured_from_ns = now_ns
+
+    def air(self, g: s.Ints, *, busy_ns: int, now_ns: int, stations: int) -> dict[str, float | None]:
+        """Air statistics since `measure_from`."""
+        d = (g - self._baseline).tolist()
+        span_ns = max(1, now_ns - self._measured_from_ns)
+        landed = d[s.RECEIVED_COPIES] + d[s.COLLISION_COPIES] + d[s.HALF_DUPLEX_COPIES] + d[s.WEAK_COPIES]
+        payload_bits = 8 * (self.delivered_bytes - self._bytes_baseline)
+        return {
+            "pdr": _ratio(d[s.RECEIVED_COPIES], landed),
+            "busy": round((busy_ns - self._busy_baseline_ns) / (span_ns * stations), 6),
+            "mean_retries": _ratio(d[s.RETRIES], d[s.UNICASTS_ENDED]),
+            "attempt_failure": _ratio(d[s.ATTEMPTS_FAILED], d[s.ATTEMPTS_MADE]),
+            "throughput_mbps": round(payload_bits / (span_ns / S) / 1e6, 6),
+        }
+
+    def copies(self, g: s.Ints) -> dict[str, Any]:
+        """The ledger at receivers: copies put on the air in range, and what became of them."""
+        lost = {
+            DropReason.COLLISION: int(g[s.COLLISION_COPIES]),
+            DropReason.HALF_DUPLEX: int(g[s.HALF_DUPLEX_COPIES]),
+            DropReason.WEAK_SIGNAL: int(g[s.WEAK_COPIES]),
+        }
+        return {
+            "on_air": int(g[s.ON_AIR_COPIES]),
+            "received": int(g[s.RECEIVED_COPIES]),
+            "lost": {reason.value: count for reason, count in lost.items() if count},
+        }
+
+    def lateness(self) -> dict[str, float]:
+        """Over all requests; a request in time is late by 0."""
+        return {
+            "late_frames": self.late_frames,
+            "frames": self.sent,
+            "p50_ms": self._percentile(0.5),
+            "p99_ms": self._percentile(0.99),
+            "max_ms": round(self._max_late_ns / MS, 3),
+        }
+
+    def _percentile(self, share: float) -> float:
+        wanted = share * self.sent
+        seen = self.sent - self.late_frames
+        if seen >= wanted:
+            return 0.0
+        for index, count in enumerate(self._lateness):
+            seen += count
+            if seen >= wanted and index < len(_LATENESS_STEPS):
+                return float(_LATENESS_STEPS[index])
+        return round(self._max_late_ns / MS, 3)
+
+
+def _ratio(part: int, whole: int) -> float | None:
+    return round(part / whole, 6) if whole else None

@@ -1,0 +1,121 @@
+"""The kernel's arrays and the calls into it. Stations and frame slots; bytes, topics and nodes are the medium's."""
+
+from functools import lru_cache
+
+import numpy as np
+import numpy.typing as npt
+
+from emulator import kernel
+from emulator import state as s
+from emulator.airtime import DETECT_NS, DIFS_NS, OVERHEAD_BYTES, SIFS_NS, SLOT_NS, Timing, frame_ns, lifetime_ns
+from emulator.error_rate import log_success_per_bit
+from emulator.propagation import Links, milliwatt, noise_mw
+from fanet_mw.rng import stream_seed
+from fanet_mw.scenario import Radio
+
+_GENERATOR_RANGE = 2_147_483_646
+
+
+@lru_cache(maxsize=8)
+def _error_table(rate_mbps: float) -> npt.NDArray[np.float64]:
+    """PLCP header at 1 Mb/s, then the payload's rate."""
+    return np.stack([log_success_per_bit(1), log_success_per_bit(rate_mbps)])
+
+
+class Air:
+    """The state of the channel and of all MACs."""
+
+    def __init__(self, radio: Radio, *, stations: int, seed: int) -> None:
+        self._radio = radio
+        self._stations = stations
+        timing = Timing.of(radio)
+        self.g = np.zeros(s.GLOBALS, np.int64)
+        self._p = np.zeros(s.PARAMETERS, np.int64)
+        self._p[:] = (
+            SLOT_NS, SIFS_NS, DIFS_NS, timing.eifs_extra_ns, timing.ack_ns, timing.ack_timeout_ns, timing.header_ns,
+            DETECT_NS, radio.cw_min, radio.cw_max, radio.max_attempts, radio.queue_frames, lifetime_ns(radio),
+            radio.access == "standard", radio.access == "ns3", radio.channel != "range",
+        )  # fmt: skip
+        self._pf = np.array([noise_mw(radio), milliwatt(radio.preamble_snr_db), 1e-3, radio.rate_mbps * 1e-3])
+        self.st = np.zeros((s.STATION_ROWS, stations), np.int64)
+        for row, value in (
+            (s.SCHEDULED, -1), (s.CW, radio.cw_min), (s.TX_FRAME, -1), (s.LOCK, -1), (s.WAITING, -1), (s.ACK_TO, -1),
+            (s.HEAD, -1), (s.TAIL, -1), (s.BUSY_SINCE, -1), (s.IDLE_FROM, -DIFS_NS),
+        ):  # fmt: skip
+            self.st[row] = value
+        self.st[s.RANDOM] = [stream_seed(seed, "backoff", i + 1) % _GENERATOR_RANGE + 1 for i in range(stations)]
+        self._sf = np.zeros((s.STATION_REALS, stations), np.float64)
+        self.fr = np.zeros((s.FRAME_ROWS, 1024), np.int64)
+        self._hs = np.zeros((8 * stations + 2 * 1024 + 64, 5), np.int64)
+        self._out = np.zeros((2 * radio.queue_frames + 1024, s.OUT_COLUMNS), np.int64)
+        self._err = _error_table(radio.rate_mbps) if radio.channel != "range" else np.zeros((2, 1))
+        self._airtime: dict[int, int] = {}
+        nowhere = Links(np.full((stations, 3), np.inf), radio, spare=0)
+        self._lk, self._lp, self._ptr = nowhere.ints, nowhere.reals, nowhere.ptr
+        self._hr = np.zeros((64, 5), np.int64)
+
+    def place(self, at: npt.NDArray[np.float64]) -> None:
+        """New positions [m], one row per station; frames under way are carried over."""
+        spare = int(self._lk[s.UNDERWAY].sum())
+        links = Links(np.ascontiguousarray(at), self._radio, spare=spare)
+        room = 4 * (links.ints.shape[1] + self._stations) + 64
+        if self._hr.shape[0] < room + self.g[s.HR_N]:
+            self._hr = np.concatenate([self._hr, np.zeros((room, 5), np.int64)])
+        if spare:
+            kernel.relink(
+                self._hr, self.g, self._lk, self._lp, self._ptr, self.st[s.LOCK], links.ints, links.reals, links.ptr
+            )
+        self._lk, self._lp, self._ptr = links.ints, links.reals, links.ptr
+
+    def neighbors(self, station: int) -> int:
+        """How many stations hear this one."""
+        return int(self._lk[s.AUDIBLE, self._ptr[station] : self._ptr[station + 1]].sum())
+
+    def slots(self) -> int:
+        """Frame slots there are."""
+        return int(self.fr.shape[1])
+
+    def grow(self) -> None:
+        """Twice as many frame slots."""
+        more = self.slots()
+        self.fr = np.concatenate([self.fr, np.zeros_like(self.fr)], axis=1)
+        self._hs = np.concatenate([self._hs, np.zeros((2 * more, 5), np.int64)])
+
+    def submit(self, slot: int, *, src: int, dst: int, size: int, start_ns: int) -> None:
+        """A frame of `size` bytes (UDP payload) will enter its station's queue at `start_ns`."""
+        airtime = self._airtime.get(size)
+        if airtime is None:
+            radio = self._radio
+            airtime = self._airtime[size] = frame_ns(
+                size + OVERHEAD_BYTES, rate_mbps=radio.rate_mbps, short=radio.preamble == "short"
+            )
+        if self.g[s.HS_N] + 2 * kernel.MARGIN > self._hs.shape[0]:
+            self._hs = np.concatenate([self._hs, np.zeros_like(self._hs)])
+        kernel.submit(self.g, self.fr, self._hs, slot, src, dst, airtime, start_ns)
+
+    def advance(self, until_ns: int) -> list[list[int]]:
+        """Let time pass; returns the output rows (`emulator.state.OUT_*`) in order."""
+        rows: list[list[int]] = []
+        while True:
+            finished = kernel.advance(
+                self.g, self._p, self._pf, self.st, self._sf, self.fr, self._lk, self._lp, self._ptr, self._hs,
+                self._hr, self._out, self._err, until_ns,
+            )  # fmt: skip
+            count = self.g[s.OUT_N]
+            if count:
+                rows += self._out[:count].tolist()
+                self.g[s.OUT_N] = 0
+            if finished:
+                return rows
+            if not count:
+                self._hs = np.concatenate([self._hs, np.zeros_like(self._hs)])
+
+    def next_output_ns(self) -> int | None:
+        """A lower bound of the next instant at which `advance` has something to return."""
+        bound = kernel.next_output(self.g, self._p, self._hs, self._hr)
+        return None if bound == kernel.NEVER else int(bound)
+
+    def busy_ns(self, now_ns: int) -> int:
+        """Time in which the PHY was not idle, summed over stations."""
+        since = self.st[s.BUSY_SINCE]
+        return int(self.st[s.BUSY_NS].sum() + np.where(since >= 0, now_ns - since, 0).sum())

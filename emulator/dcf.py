@@ -1,0 +1,382 @@
+"""The MAC of a station: the distributed coordination function (IEEE 802.11-2020, 10.3), functions over state rows.
+
+    queue -> access (DIFS or EIFS, backoff with freezing) -> frame -> ACK or timeout -> next attempt or done
+
+Backoff slots count from BASE while the medium is idle; when it turns busy, the slots that have passed are taken off
+and the rest waits. A pending access is one event; it is stale when SCHEDULED has another instant.
+"""
+
+from emulator.heap import push
+from emulator.jit import jit
+from emulator.state import (
+    ACCESS,
+    ACK,
+    ACK_NS,
+    ACK_TIMEOUT,
+    ACK_TIMEOUT_NS,
+    ACK_TO,
+    AIRTIME,
+    ATTEMPTS,
+    ATTEMPTS_FAILED,
+    ATTEMPTS_MADE,
+    AUDIBLE,
+    BAD_UNTIL,
+    BASE,
+    BO,
+    BORN,
+    BUSY_NS,
+    BUSY_SINCE,
+    CS,
+    CW,
+    CW_MAX,
+    CW_MIN,
+    DATA,
+    DELAY,
+    DETECT_NS,
+    DIFS_NS,
+    DONE_ACKED,
+    DONE_EXPIRED,
+    DONE_FULL,
+    DONE_RETRY,
+    DONE_SENT,
+    DRAW_WHEN_INTERRUPTED,
+    DST,
+    ENDED,
+    EVERYONE,
+    FATE,
+    FATE_HALF_DUPLEX,
+    FATE_OPEN,
+    FRESH,
+    HEAD,
+    HR_N,
+    HS_N,
+    IDLE_FROM,
+    LIFETIME_NS,
+    LINK_DST,
+    LINK_FRAME,
+    LINK_KIND,
+    LINK_POWER,
+    LOCK,
+    MAX_ATTEMPTS,
+    NAV,
+    NEXT,
+    NOTHING,
+    ON_AIR,
+    ON_AIR_COPIES,
+    OPEN,
+    OUT_DONE,
+    OUT_FREE,
+    OUT_N,
+    OUTCOME,
+    QLEN,
+    QUEUE_LIMIT,
+    RANDOM,
+    RESUME_FROM,
+    RETRIES,
+    RX_DETECT,
+    RX_END,
+    RX_START,
+    SCHEDULED,
+    SLOT_NS,
+    SRC,
+    TAIL,
+    TARGETS,
+    TX_DONE,
+    TX_END,
+    TX_FRAME,
+    TX_KIND,
+    UNDERWAY,
+    UNICASTS_ENDED,
+    WAIT_DIFS_FIRST,
+    WAITING,
+    Ints,
+    Reals,
+)
+
+NEVER = 1 << 62
+_MODULUS = 2_147_483_647
+
+
+@jit
+def uniform(st: Ints, s: int) -> int:
+    """The next value of a station's generator, in [1, 2^31 - 2] (Park and Miller, CACM 31(10), 1988)."""
+    x = st[RANDOM, s] * 48271 % _MODULUS
+    st[RANDOM, s] = x
+    return int(x)
+
+
+@jit
+def draw(st: Ints, s: int) -> None:
+    """A new backoff from [0, CW]."""
+    st[BO, s] = uniform(st, s) * (st[CW, s] + 1) // _MODULUS
+
+
+@jit
+def put(g: Ints, out: Ints, kind: int, frame: int, station: int, t: int, value: int, attempts: int) -> None:
+    """An output row; the kernel's loop keeps room for what one event can make."""
+    n = g[OUT_N]
+    g[OUT_N] = n + 1
+    out[n, 0], out[n, 1], out[n, 2], out[n, 3], out[n, 4], out[n, 5] = kind, frame, station, t, value, attempts
+
+
+@jit
+def release(g: Ints, fr: Ints, out: Ints, f: int, t: int) -> None:
+    """One thing less that refers to a frame."""
+    fr[OPEN, f] -= 1
+    if fr[OPEN, f] == 0:
+        put(g, out, OUT_FREE, f, fr[SRC, f], t, 0, 0)
+
+
+@jit
+def done(g: Ints, fr: Ints, out: Ints, f: int, outcome: int, t: int) -> None:
+    """The MAC is through with a frame."""
+    fr[OUTCOME, f] = outcome
+    fr[ENDED, f] = t
+    if fr[DST, f] != EVERYONE and fr[ATTEMPTS, f] > 0:
+        g[UNICASTS_ENDED] += 1
+        g[RETRIES] += fr[ATTEMPTS, f] - 1
+    put(g, out, OUT_DONE, f, fr[SRC, f], t, outcome, fr[ATTEMPTS, f])
+    release(g, fr, out, f, t)
+
+
+@jit
+def take_head(st: Ints, fr: Ints, s: int) -> None:
+    """Remove the first frame of the queue."""
+    st[HEAD, s] = fr[NEXT, st[HEAD, s]]
+    if st[HEAD, s] < 0:
+        st[TAIL, s] = -1
+    st[QLEN, s] -= 1
+
+
+@jit
+def expire(g: Ints, p: Ints, st: Ints, fr: Ints, out: Ints, s: int, t: int) -> None:
+    """Drop what has waited in the queue beyond its lifetime; a frame whose ACK is awaited is not in question."""
+    while st[HEAD, s] >= 0 and st[WAITING, s] < 0 and t - fr[BORN, st[HEAD, s]] >= p[LIFETIME_NS]:
+        f = st[HEAD, s]
+        take_head(st, fr, s)
+        st[CW, s] = p[CW_MIN]
+        done(g, fr, out, f, DONE_EXPIRED, t)
+
+
+@jit
+def access_from(p: Ints, st: Ints, s: int) -> int:
+    """From when backoff slots count, if the medium stays idle."""
+    return int(max(st[IDLE_FROM, s], st[BAD_UNTIL, s], st[RESUME_FROM, s], st[NAV, s]) + p[DIFS_NS])
+
+
+@jit
+def arm(g: Ints, p: Ints, st: Ints, hs: Ints, s: int) -> None:
+    """The medium is idle at a station: start counting, and plan its access if it has a frame."""
+    if st[CS, s] > 0 or st[TX_KIND, s] != NOTHING or st[WAITING, s] >= 0 or st[ACK_TO, s] >= 0:
+        return
+    st[BASE, s] = access_from(p, st, s)
+    if st[HEAD, s] >= 0:
+        t = st[BASE, s] + st[BO, s] * p[SLOT_NS]
+        st[SCHEDULED, s] = t
+        push(hs, g, HS_N, t, ACCESS, s, 0)
+
+
+@jit
+def on_busy(p: Ints, st: Ints, s: int, t: int) -> None:
+    """The medium turns busy at a station: freeze the backoff."""
+    if st[BUSY_SINCE, s] < 0:
+        st[BUSY_SINCE, s] = t
+    if t > st[BASE, s]:
+        st[BO, s] = max(0, st[BO, s] - (t - st[BASE, s]) // p[SLOT_NS])
+    st[BASE, s] = NEVER
+    if st[SCHEDULED, s] >= 0:
+        st[SCHEDULED, s] = -1
+        if st[FRESH, s] == 1 and p[DRAW_WHEN_INTERRUPTED] == 1:
+            draw(st, s)
+            st[FRESH, s] = 0
+
+
+@jit
+def on_idle(g: Ints, p: Ints, st: Ints, hs: Ints, s: int, t: int) -> None:
+    """The medium turns idle at a station."""
+    if st[BUSY_SINCE, s] >= 0:
+        st[BUSY_NS, s] += t - st[BUSY_SINCE, s]
+        st[BUSY_SINCE, s] = -1
+    st[IDLE_FROM, s] = t
+    arm(g, p, st, hs, s)
+
+
+@jit
+def arrive(g: Ints, p: Ints, st: Ints, fr: Ints, hs: Ints, out: Ints, f: int, t: int) -> None:
+    """A frame enters the MAC queue of its station."""
+    s = fr[SRC, f]
+    if st[QLEN, s] >= p[QUEUE_LIMIT]:
+        expire(g, p, st, fr, out, s, t)
+    if st[QLEN, s] >= p[QUEUE_LIMIT]:
+        done(g, fr, out, f, DONE_FULL, t)
+        return
+    fr[NEXT, f] = -1
+    st[QLEN, s] += 1
+    if st[HEAD, s] >= 0:
+        fr[NEXT, st[TAIL, s]] = f
+        st[TAIL, s] = f
+        return
+    st[HEAD, s] = f
+    st[TAIL, s] = f
+    request(g, p, st, hs, s, t)
+
+
+@jit
+def request(g: Ints, p: Ints, st: Ints, hs: Ints, s: int, t: int) -> None:
+    """The first frame of an empty queue asks for the medium (802.11-2020, 10.3.4.2: at once after DIFS of idle)."""
+    if st[TX_KIND, s] == DATA or st[WAITING, s] >= 0:
+        return  # the post-backoff of our own frame is still to be drawn
+    if st[CS, s] > 0 or st[TX_KIND, s] == ACK or st[ACK_TO, s] >= 0 or st[NAV, s] > t:
+        if st[BO, s] == 0:
+            draw(st, s)
+        st[FRESH, s] = 0
+        if st[CS, s] == 0:
+            arm(g, p, st, hs, s)
+        return
+    left = st[BO, s]
+    if t > st[BASE, s]:
+        left = max(0, left - (t - st[BASE, s]) // p[SLOT_NS])
+    if left == 0:
+        st[BO, s] = 0
+        st[FRESH, s] = 1
+        start = access_from(p, st, s)
+        if p[WAIT_DIFS_FIRST] == 1:
+            st[BASE, s] = max(start, t + p[DIFS_NS])
+        elif start <= t:
+            st[BASE, s] = t
+        else:  # idle, but not yet for DIFS: a backoff is due
+            draw(st, s)
+            st[FRESH, s] = 0
+            st[BASE, s] = start
+    else:
+        st[FRESH, s] = 0
+    at = st[BASE, s] + st[BO, s] * p[SLOT_NS]
+    st[SCHEDULED, s] = at
+    push(hs, g, HS_N, at, ACCESS, s, 0)
+
+
+@jit
+def access(
+    g: Ints, p: Ints, st: Ints, fr: Ints, lk: Ints, lp: Reals, ptr: Ints, hs: Ints, hr: Ints, out: Ints, s: int, t: int
+) -> None:
+    """The backoff has run out: transmit the first frame that is still alive."""
+    if st[SCHEDULED, s] != t:
+        return  # frozen or planned anew since
+    st[SCHEDULED, s] = -1
+    st[BO, s] = 0
+    st[FRESH, s] = 0
+    st[BASE, s] = t
+    expire(g, p, st, fr, out, s, t)
+    f = st[HEAD, s]
+    if f < 0:
+        return
+    fr[ATTEMPTS, f] += 1
+    targets = 0
+    for link in range(ptr[s], ptr[s + 1]):
+        if lk[AUDIBLE, link] == 1 and (fr[DST, f] == EVERYONE or fr[DST, f] == lk[LINK_DST, link]):
+            targets += 1
+    fr[TARGETS, f] = targets
+    g[ON_AIR_COPIES] += targets
+    if fr[DST, f] != EVERYONE:
+        g[ATTEMPTS_MADE] += 1
+    begin_tx(g, p, st, fr, lk, lp, ptr, hr, s, f, DATA, t)
+
+
+@jit
+def begin_tx(
+    g: Ints, p: Ints, st: Ints, fr: Ints, lk: Ints, lp: Reals, ptr: Ints, hr: Ints, s: int, f: int, kind: int, t: int
+) -> None:
+    """A station starts to transmit; whatever it was receiving is lost."""
+    if st[LOCK, s] >= 0:
+        lk[FATE, st[LOCK, s]] = FATE_HALF_DUPLEX
+        st[LOCK, s] = -1
+    on_busy(p, st, s, t)
+    airtime = fr[AIRTIME, f] if kind == DATA else p[ACK_NS]
+    st[TX_KIND, s] = kind
+    st[TX_FRAME, s] = f
+    st[TX_END, s] = t + airtime
+    push(hr, g, HR_N, t + airtime, TX_DONE, s, 0)
+    for link in range(ptr[s], ptr[s + 1]):
+        lp[ON_AIR, link] = lp[LINK_POWER, link]
+        lk[FATE, link] = FATE_OPEN
+        lk[LINK_FRAME, link] = f
+        lk[LINK_KIND, link] = kind
+        lk[UNDERWAY, link] = 1
+        fr[OPEN, f] += 1
+        begin = t + lk[DELAY, link]
+        push(hr, g, HR_N, begin, RX_START, link, 0)
+        push(hr, g, HR_N, begin + p[DETECT_NS], RX_DETECT, link, 0)
+        push(hr, g, HR_N, begin + airtime, RX_END, link, 0)
+
+
+@jit
+def tx_done(g: Ints, p: Ints, st: Ints, fr: Ints, hs: Ints, out: Ints, s: int, t: int) -> None:
+    """The last bit has left the antenna."""
+    kind, f = st[TX_KIND, s], st[TX_FRAME, s]
+    st[TX_KIND, s] = NOTHING
+    if kind == DATA:
+        if fr[DST, f] == EVERYONE:
+            take_head(st, fr, s)
+            draw(st, s)
+            done(g, fr, out, f, DONE_SENT, t)
+        else:
+            st[WAITING, s] = f
+            push(hs, g, HS_N, t + p[ACK_TIMEOUT_NS], ACK_TIMEOUT, s, f)
+    if st[CS, s] == 0:
+        on_idle(g, p, st, hs, s, t)
+
+
+@jit
+def acknowledged(g: Ints, p: Ints, st: Ints, fr: Ints, out: Ints, s: int, t: int) -> None:
+    """The ACK a station waited for."""
+    f = st[WAITING, s]
+    st[WAITING, s] = -1
+    st[CW, s] = p[CW_MIN]
+    take_head(st, fr, s)
+    draw(st, s)
+    done(g, fr, out, f, DONE_ACKED, t)
+
+
+@jit
+def ack_timeout(g: Ints, p: Ints, st: Ints, fr: Ints, hs: Ints, out: Ints, s: int, f: int, t: int) -> None:
+    """No ACK: another attempt with a doubled window, or the end of it (802.11-2020, 10.3.4.4)."""
+    if st[WAITING, s] != f:
+        return
+    st[WAITING, s] = -1
+    st[RESUME_FROM, s] = t
+    g[ATTEMPTS_FAILED] += 1
+    if fr[ATTEMPTS, f] >= p[MAX_ATTEMPTS]:
+        st[CW, s] = p[CW_MIN]
+        take_head(st, fr, s)
+        done(g, fr, out, f, DONE_RETRY, t)
+    else:
+        st[CW, s] = min(2 * st[CW, s] + 1, p[CW_MAX])
+    draw(st, s)
+    arm(g, p, st, hs, s)
+
+
+@jit
+def send_ack(
+    g: Ints,
+    p: Ints,
+    st: Ints,
+    fr: Ints,
+    lk: Ints,
+    lp: Reals,
+    ptr: Ints,
+    hs: Ints,
+    hr: Ints,
+    out: Ints,
+    s: int,
+    f: int,
+    t: int,
+) -> None:
+    """SIFS after a unicast frame for us: acknowledge, whatever the medium does."""
+    st[ACK_TO, s] = -1
+    if st[TX_KIND, s] == NOTHING:
+        begin_tx(g, p, st, fr, lk, lp, ptr, hr, s, f, ACK, t)
+        release(g, fr, out, f, t)
+        return
+    release(g, fr, out, f, t)
+    if st[CS, s] == 0:
+        arm(g, p, st, hs, s)

@@ -1,0 +1,183 @@
+"""The event loop of the emulated air: two heaps merged in (t, seq) order until an instant. Sans-IO, integer ns.
+
+`advance` is one call for any number of internal events. It returns early only when its output rows or a heap run
+short of room; the caller drains, makes room and calls again.
+"""
+
+from emulator.dcf import NEVER, access, ack_timeout, arrive, send_ack, tx_done
+from emulator.heap import pop, push
+from emulator.jit import jit
+from emulator.phy import rx_detect, rx_end, rx_start
+from emulator.state import (
+    ACCESS,
+    ACK_TIMEOUT,
+    AIRTIME,
+    ARRIVE,
+    BORN,
+    DST,
+    FRAME_ROWS,
+    HEADER_NS,
+    HR_N,
+    HS_N,
+    LINK_ROWS,
+    NEXT,
+    NOW,
+    OPEN,
+    OUT_N,
+    QUEUE_LIMIT,
+    RX_DETECT,
+    RX_END,
+    RX_START,
+    SCHEDULED,
+    SEND_ACK,
+    SRC,
+    TX_DONE,
+    UNDERWAY,
+    Ints,
+    Reals,
+)
+
+MARGIN = 16
+"""Rows that one event may need in the start heap."""
+
+
+@jit
+def submit(g: Ints, fr: Ints, hs: Ints, f: int, src: int, dst: int, airtime: int, t: int) -> None:
+    """A frame will enter its station's MAC queue at `t`."""
+    for row in range(FRAME_ROWS):
+        fr[row, f] = 0
+    fr[SRC, f] = src
+    fr[DST, f] = dst
+    fr[AIRTIME, f] = airtime
+    fr[BORN, f] = t
+    fr[NEXT, f] = -1
+    fr[OPEN, f] = 1
+    push(hs, g, HS_N, t, ARRIVE, f, 0)
+
+
+@jit
+def purge(g: Ints, st: Ints, hs: Ints) -> None:
+    """Take stale access events out of the start heap."""
+    n = g[HS_N]
+    g[HS_N] = 0
+    for i in range(n):
+        kind, a = hs[i, 2], hs[i, 3]
+        if kind == ACCESS and st[SCHEDULED, a] != hs[i, 0]:
+            continue
+        j = g[HS_N]  # keep (t, seq): the order among equals must not change
+        g[HS_N] = j + 1
+        t, seq, b = hs[i, 0], hs[i, 1], hs[i, 4]
+        while j > 0:
+            up = (j - 1) >> 1
+            if hs[up, 0] < t or (hs[up, 0] == t and hs[up, 1] < seq):
+                break
+            for column in range(5):
+                hs[j, column] = hs[up, column]
+            j = up
+        hs[j, 0], hs[j, 1], hs[j, 2], hs[j, 3], hs[j, 4] = t, seq, kind, a, b
+
+
+@jit
+def advance(  # noqa: C901  (one dispatch; splitting it would only move the branches)
+    g: Ints, p: Ints, pf: Reals, st: Ints, sf: Reals, fr: Ints, lk: Ints, lp: Reals, ptr: Ints, hs: Ints, hr: Ints, out: Ints,
+    err: Reals, until: int,
+) -> bool:  # fmt: skip
+    """Process every event up to and including `until`. False: no room, drain and call again."""
+    room = out.shape[0] - 2 * p[QUEUE_LIMIT] - 8  # one event may expire a whole queue
+    while True:
+        if g[OUT_N] >= room:
+            return False
+        if g[HS_N] + MARGIN > hs.shape[0]:
+            purge(g, st, hs)
+            if g[HS_N] + MARGIN > hs.shape[0]:
+                return False
+        starts = hs[0, 0] if g[HS_N] > 0 else NEVER
+        ends = hr[0, 0] if g[HR_N] > 0 else NEVER
+        if starts > until and ends > until:
+            g[NOW] = until
+            return True
+        if starts < ends or (starts == ends and hs[0, 1] < hr[0, 1]):
+            kind, a, b = hs[0, 2], hs[0, 3], hs[0, 4]
+            pop(hs, g, HS_N)
+            if kind == ACCESS:
+                access(g, p, st, fr, lk, lp, ptr, hs, hr, out, a, starts)
+            elif kind == ARRIVE:
+                arrive(g, p, st, fr, hs, out, a, starts)
+            elif kind == SEND_ACK:
+                send_ack(g, p, st, fr, lk, lp, ptr, hs, hr, out, a, b, starts)
+            elif kind == ACK_TIMEOUT:
+                ack_timeout(g, p, st, fr, hs, out, a, b, starts)
+        else:
+            kind, a = hr[0, 2], hr[0, 3]
+            pop(hr, g, HR_N)
+            if kind == RX_START:
+                rx_start(p, pf, st, sf, lk, lp, err, a, ends)
+            elif kind == RX_DETECT:
+                rx_detect(p, pf, st, sf, lk, lp, a, ends)
+            elif kind == RX_END:
+                rx_end(g, p, pf, st, sf, fr, lk, lp, hs, out, err, a, ends)
+            elif kind == TX_DONE:
+                tx_done(g, p, st, fr, hs, out, a, ends)
+
+
+@jit
+def next_output(g: Ints, p: Ints, hs: Ints, hr: Ints) -> int:
+    """A lower bound of the instant of the next output row; NEVER when nothing is under way.
+
+    Only what is on the air can end, and only what starts can be on the air: the earliest end of a frame, or the
+    earliest start plus the time its preamble alone takes.
+    """
+    bound = NEVER
+    for i in range(g[HR_N]):
+        if hr[i, 0] < bound and (hr[i, 2] == RX_END or hr[i, 2] == TX_DONE):
+            bound = int(hr[i, 0])
+    if g[HS_N] > 0:
+        starts = hs[0, 0] if hs[0, 2] == ACK_TIMEOUT else hs[0, 0] + p[HEADER_NS]
+        bound = int(min(bound, starts))
+    return bound
+
+
+@jit
+def relink(  # noqa: C901  (one pass over what is under way)
+    hr: Ints, g: Ints, lk: Ints, lp: Reals, ptr: Ints, lock: Ints, new_lk: Ints, new_lp: Reals, new_ptr: Ints
+) -> int:  # fmt: skip
+    """Carry what is under way on the old links over to the new ones.
+
+    `new_lk` has room for every old link behind its `new_ptr[-1]` links: a frame that was under way on a link which is
+    gone ends on an orphan there. Returns how many links are in use. `lock` is the LOCK row of the stations.
+    """
+    used = new_ptr[new_ptr.shape[0] - 1]
+    for old in range(lk.shape[1]):
+        if lk[UNDERWAY, old] == 0:
+            continue
+        src, dst = lk[0, old], lk[1, old]
+        target = -1
+        if src >= 0:
+            for link in range(new_ptr[src], new_ptr[src + 1]):
+                if new_lk[1, link] == dst and new_lk[UNDERWAY, link] == 0:
+                    target = link
+                    break
+        if target < 0:
+            target = used
+            used += 1
+            for row in range(LINK_ROWS):
+                new_lk[row, target] = lk[row, old]
+        else:
+            for row in range(4, LINK_ROWS):
+                new_lk[row, target] = lk[row, old]
+        new_lp[1, target] = lp[1, old]
+        for i in range(g[HR_N]):
+            if hr[i, 2] != TX_DONE and hr[i, 3] == old and hr[i, 4] == 0:
+                hr[i, 3] = target
+                hr[i, 4] = 1  # moved: do not move it again
+        if lock[dst] == old:
+            lock[dst] = -2 - target
+    for i in range(g[HR_N]):
+        hr[i, 4] = 0
+    for s in range(lock.shape[0]):
+        if lock[s] < -1:
+            lock[s] = -2 - lock[s]
+    return int(used)
+
+
+__all__ = ["NEVER", "advance", "next_output", "purge", "relink", "submit"]

@@ -1,0 +1,209 @@
+"""The link emulator as an actor: transmit requests and poses in, receptions and transmit statuses out.
+
+Frames are bytes here, stations are node ids minus one. Requests are announced ahead and wait for their instant in the
+kernel; what arrives too late is counted, and dropped when it is later than anyone could have meant.
+"""
+
+from collections.abc import Mapping
+from typing import Any, Final
+
+import numpy as np
+
+from emulator import state as s
+from emulator.accounts import Accounts
+from emulator.air import Air
+from fanet_mw.actor import Actor
+from fanet_mw.errors import DropReason
+from fanet_mw.messages import Message, Poses, Reception, TxOutcome, TxRequest, TxStatus
+from fanet_mw.scenario import Scenario
+from fanet_mw.topics import Topics, node_of
+from fanet_mw.units import BROADCAST, MS, NodeId, seconds_to_ns
+
+TOO_LATE_NS: Final = 50 * MS
+"""A request later than this is dropped: its slot is long another's."""
+_SEQ_MASK: Final = 0xFFFF_FFFF
+_HORIZON_NS: Final = 60_000 * MS
+"""A request for an instant further ahead than this is refused: nobody plans so far, and it would only take room."""
+
+
+class Medium(Actor):
+    """The air between the nodes of one swarm."""
+
+    def __init__(self, scenario: Scenario, swarm: str) -> None:
+        topics = Topics(swarm)
+        super().__init__("emulator", (topics.all_tx, topics.pose))
+        self._scenario = scenario
+        self._count = scenario.nodes.count
+        self._rx_topics = [topics.radio_rx(node) for node in scenario.node_ids]
+        self._station_of: dict[str, int] = {}
+        self._air = Air(scenario.radio, stations=self._count, seed=scenario.seed)
+        self._accounts = Accounts()
+        self._requests: list[TxRequest | None] = [None] * self._air.slots()
+        self._free = list(range(self._air.slots() - 1, -1, -1))
+        self._next_seq: list[int | None] = [None] * self._count
+        self._failed: dict[int, TxOutcome] = {}
+        self._warm_ns: int | None = seconds_to_ns(scenario.warmup_s)
+        self._wake_ns: int | None = None
+        self._stale = True
+        self._now_ns = 0
+
+    # --- the actor contract ---------------------------------------------------------------------------------------
+
+    def start(self, now_ns: int) -> None:
+        self._pass_time(now_ns)
+
+    def receive(self, topic: str, message: Message, now_ns: int) -> None:
+        if type(message) is TxRequest:
+            station = self._station_of.get(topic)
+            if station is None:
+                station = self._station_of[topic] = node_of(topic) - 1
+            self._request(station, message, now_ns)
+        elif isinstance(message, Poses):
+            self._pass_time(now_ns)
+            self._place(message)
+        else:
+            self._accounts.refused["message_type"] += 1
+
+    def wake(self, now_ns: int) -> None:
+        self._pass_time(now_ns)
+
+    def next_wake_ns(self) -> int | None:
+        if self._stale:
+            self._stale = False
+            self._wake_ns = self._air.next_output_ns()
+        if self._warm_ns is None:
+            return self._wake_ns
+        return self._warm_ns if self._wake_ns is None else min(self._warm_ns, self._wake_ns)
+
+    def stop(self, now_ns: int) -> None:
+        self._pass_time(now_ns)
+
+    def report(self) -> Mapping[str, Any]:
+        accounts, g = self._accounts, self._air.g
+        return {
+            "kind": "emulator",
+            "frames": {
+                "sent": accounts.sent,
+                "delivered": accounts.delivered,
+                "in_flight": len(self._requests) - len(self._free),
+                "dropped": {reason: accounts.dropped[reason] for reason in sorted(accounts.dropped)},
+            },
+            "copies": accounts.copies(g),
+            "air": accounts.air(g, busy_ns=self._air.busy_ns(self._now_ns), now_ns=self._now_ns, stations=self._count),
+            "late": accounts.lateness(),
+            "refused": dict(sorted(accounts.refused.items())),
+            "handed": dict(sorted(accounts.handed.items())),
+        }
+
+    # --- requests -------------------------------------------------------------------------------------------------
+
+    def _request(self, station: int, request: TxRequest, now_ns: int) -> None:
+        """Take in one request; whatever is wrong with it is counted, never raised."""
+        accounts = self._accounts
+        if not 0 <= station < self._count:
+            accounts.refused["unknown_station"] += 1
+            return
+        self._check_sequence(station, request.seq)
+        accounts.sent += 1
+        dst = request.dst
+        size = len(request.frame)
+        if dst != BROADCAST and not 1 <= dst <= self._count:
+            self._refuse(station, request, DropReason.NO_RECEIVER, now_ns)
+            return
+        if not 0 < size <= self._scenario.radio.max_frame_bytes or request.start_ns > now_ns + _HORIZON_NS:
+            self._refuse(station, request, DropReason.TOO_LARGE if size else DropReason.MALFORMED, now_ns)
+            return
+        late_ns = now_ns - request.start_ns
+        if late_ns > 0:
+            accounts.late(late_ns)
+            if late_ns > TOO_LATE_NS:
+                self._refuse(station, request, DropReason.LATE, now_ns)
+                return
+        if not self._free:
+            self._make_room()
+        slot = self._free.pop()
+        self._requests[slot] = request
+        start_ns = max(request.start_ns, now_ns, self._now_ns)
+        self._air.submit(
+            slot, src=station, dst=s.EVERYONE if dst == BROADCAST else dst - 1, size=size, start_ns=start_ns
+        )
+        self._stale = True
+
+    def _check_sequence(self, station: int, seq: int) -> None:
+        """A gap is requests that the bus lost: they were sent, and they are dropped."""
+        expected = self._next_seq[station]
+        self._next_seq[station] = (seq + 1) & _SEQ_MASK
+        if expected is None or seq == expected or seq == 0:  # 0: the node has started again
+            return
+        gap = (seq - expected) & _SEQ_MASK
+        if gap < 1 << 16:
+            self._accounts.sent += gap
+            self._accounts.dropped[DropReason.BUS] += gap
+
+    def _refuse(self, station: int, request: TxRequest, reason: DropReason, now_ns: int) -> None:
+        self._accounts.drop(reason)
+        if request.wants_status:
+            status = TxStatus(request.seq, TxOutcome.LATE, now_ns, 0)
+            self.outbox.append((self._rx_topics[station], status))
+
+    def _make_room(self) -> None:
+        before = self._air.slots()
+        self._air.grow()
+        self._requests += [None] * before
+        self._free = list(range(2 * before - 1, before - 1, -1))
+
+    # --- time -----------------------------------------------------------------------------------------------------
+
+    def _pass_time(self, now_ns: int) -> None:
+        """Advance the air to `now_ns` and hand out what came of it."""
+        if self._warm_ns is not None and now_ns >= self._warm_ns:
+            self._hand_out(self._air.advance(self._warm_ns))
+            self._accounts.measure_from(self._air.g, busy_ns=self._air.busy_ns(self._warm_ns), now_ns=self._warm_ns)
+            self._warm_ns = None
+        self._hand_out(self._air.advance(now_ns))
+        self._now_ns = max(self._now_ns, now_ns)
+        self._stale = True
+
+    def _hand_out(self, rows: list[list[int]]) -> None:
+        outbox, requests, handed = self.outbox, self._requests, self._accounts.handed
+        for kind, slot, station, t_ns, value, attempts in rows:
+            request = requests[slot]
+            assert request is not None, "the kernel speaks only of frames it was given"
+            if kind == s.OUT_RECEPTION:
+                handed[station + 1] += 1
+                src = NodeId(int(self._air.fr[s.SRC, slot]) + 1)
+                reception = Reception(request.frame, src, t_ns, value / 1000)
+                outbox.append((self._rx_topics[station], reception))
+            elif kind == s.OUT_DONE:
+                outcome = TxOutcome(value)
+                if value > s.DONE_ACKED:
+                    self._failed[slot] = outcome
+                if request.wants_status:
+                    outbox.append((self._rx_topics[station], TxStatus(request.seq, outcome, t_ns, attempts)))
+            else:
+                self._settle(slot, request)
+
+    def _settle(self, slot: int, request: TxRequest) -> None:
+        """Nothing refers to the slot any more."""
+        self._accounts.ended(
+            self._air.fr[:, slot].tolist(),
+            broadcast=request.dst == BROADCAST,
+            size=len(request.frame),
+            failed=self._failed.pop(slot, None),
+        )
+        self._requests[slot] = None
+        self._free.append(slot)
+
+    # --- positions ------------------------------------------------------------------------------------------------
+
+    def _place(self, poses: Poses) -> None:
+        ids = np.frombuffer(poses.ids, np.uint16).astype(np.int64)
+        states = np.frombuffer(poses.states, np.float64).reshape(-1, 6)
+        known = (ids >= 1) & (ids <= self._count)
+        if len(ids) != len(states) or not known.all() or not np.isfinite(states[:, :3]).all():
+            self._accounts.refused["poses"] += 1
+            return
+        at = np.full((self._count, 3), np.inf)
+        at[ids - 1] = states[:, :3]
+        self._air.place(at)
+        self._stale = True

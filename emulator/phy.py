@@ -1,0 +1,219 @@
+"""What a station's receiver makes of overlapping frames: detection, interference, success; as functions over rows.
+
+    frame begins -> detected after 4 us if nothing drowns it -> received while interference allows -> decoded or lost
+
+A frame is sensed from its detection on. A receiver stays with the frame it detected first: no capture of a later one.
+With INTERFERENCE = 0 any overlap destroys; with 1 the loss of each segment follows from its SINR.
+"""
+
+import math
+
+from emulator.dcf import acknowledged, on_busy, on_idle, put, release, uniform
+from emulator.heap import push
+from emulator.jit import jit
+from emulator.state import (
+    ACK,
+    ACK_NS,
+    ACK_TO,
+    AUDIBLE,
+    BAD_UNTIL,
+    COLLISION_COPIES,
+    CS,
+    DATA,
+    DETECT_NS,
+    DETECT_RATIO,
+    DST,
+    EIFS_EXTRA_NS,
+    EVERYONE,
+    FATE,
+    FATE_COLLISION,
+    FATE_HALF_DUPLEX,
+    FATE_WEAK,
+    HALF_DUPLEX_COPIES,
+    HEADER_BITS_PER_NS,
+    HEADER_NS,
+    HS_N,
+    INTERFERENCE,
+    LINK_DST,
+    LINK_FRAME,
+    LINK_KIND,
+    LINK_SRC,
+    LOCK,
+    LOCK_FROM,
+    LOCK_HEADER_END,
+    LOG_OK,
+    LOST_COLLISION,
+    LOST_HALF_DUPLEX,
+    LOST_WEAK,
+    NAV,
+    NOISE_MW,
+    NOTHING,
+    NSIG,
+    ON_AIR,
+    OPEN,
+    OUT_RECEPTION,
+    OVERLAPPED,
+    PAYLOAD_BITS_PER_NS,
+    POWER,
+    RECEIVED,
+    RECEIVED_COPIES,
+    SEND_ACK,
+    SIFS_NS,
+    TX_KIND,
+    UNDERWAY,
+    WAITING,
+    WEAK_COPIES,
+    Ints,
+    Reals,
+)
+
+ERROR_FLOOR_DB = -20.0
+ERROR_STEPS_PER_DB = 20.0
+_MODULUS = 2_147_483_647.0
+
+
+@jit
+def close_segment(p: Ints, pf: Reals, st: Ints, sf: Reals, lp: Reals, err: Reals, r: int, t: int) -> None:
+    """Account for the part of the locked frame since the last change of interference."""
+    begin = st[LOCK_FROM, r]
+    st[LOCK_FROM, r] = t
+    if p[INTERFERENCE] == 0 or t <= begin:
+        return
+    wanted = lp[ON_AIR, st[LOCK, r]]
+    sinr_db = 10.0 * math.log10(wanted / (max(0.0, sf[POWER, r] - wanted) + pf[NOISE_MW]))
+    at = int((sinr_db - ERROR_FLOOR_DB) * ERROR_STEPS_PER_DB)
+    at = max(0, min(err.shape[1] - 1, at))
+    header_ns = max(0, min(t, st[LOCK_HEADER_END, r]) - begin)
+    sf[LOG_OK, r] += header_ns * pf[HEADER_BITS_PER_NS] * err[0, at]
+    sf[LOG_OK, r] += (t - begin - header_ns) * pf[PAYLOAD_BITS_PER_NS] * err[1, at]
+
+
+@jit
+def rx_start(p: Ints, pf: Reals, st: Ints, sf: Reals, lk: Ints, lp: Reals, err: Reals, link: int, t: int) -> None:
+    """The first bit of a frame reaches a station."""
+    r = lk[LINK_DST, link]
+    if st[LOCK, r] >= 0:
+        close_segment(p, pf, st, sf, lp, err, r, t)
+        st[OVERLAPPED, r] = 1
+    st[NSIG, r] += 1
+    sf[POWER, r] += lp[ON_AIR, link]
+
+
+@jit
+def rx_detect(p: Ints, pf: Reals, st: Ints, sf: Reals, lk: Ints, lp: Reals, link: int, t: int) -> None:
+    """The preamble has been there long enough to be found, and the energy to be sensed."""
+    r = lk[LINK_DST, link]
+    audible = lk[AUDIBLE, link] == 1
+    if audible:
+        st[CS, r] += 1
+        if st[CS, r] == 1 and st[TX_KIND, r] == NOTHING:
+            on_busy(p, st, r, t)
+    wanted = lp[ON_AIR, link]
+    if p[INTERFERENCE] == 0:
+        clear = st[NSIG, r] == 1
+    else:
+        clear = wanted >= pf[DETECT_RATIO] * (max(0.0, sf[POWER, r] - wanted) + pf[NOISE_MW])
+    if st[TX_KIND, r] != NOTHING:
+        lk[FATE, link] = FATE_HALF_DUPLEX
+    elif not audible:
+        lk[FATE, link] = FATE_WEAK
+    elif st[LOCK, r] >= 0 or not clear:
+        lk[FATE, link] = FATE_COLLISION if st[NSIG, r] > 1 else FATE_WEAK
+    else:
+        st[LOCK, r] = link
+        st[LOCK_FROM, r] = t
+        st[LOCK_HEADER_END, r] = t - p[DETECT_NS] + p[HEADER_NS]
+        st[OVERLAPPED, r] = 1 if st[NSIG, r] > 1 else 0
+        sf[LOG_OK, r] = 0.0
+
+
+@jit
+def survived(p: Ints, st: Ints, sf: Reals, r: int) -> bool:
+    """Whether the locked frame came through whole."""
+    if p[INTERFERENCE] == 0:
+        return bool(st[OVERLAPPED, r] == 0)
+    if sf[LOG_OK, r] > -1e-9:
+        return True
+    return bool(uniform(st, r) / _MODULUS < math.exp(sf[LOG_OK, r]))
+
+
+@jit
+def rx_end(
+    g: Ints,
+    p: Ints,
+    pf: Reals,
+    st: Ints,
+    sf: Reals,
+    fr: Ints,
+    lk: Ints,
+    lp: Reals,
+    hs: Ints,
+    out: Ints,
+    err: Reals,
+    link: int,
+    t: int,
+) -> None:
+    """The last bit of a frame reaches a station."""
+    r = lk[LINK_DST, link]
+    whole = False
+    if st[LOCK, r] >= 0:
+        close_segment(p, pf, st, sf, lp, err, r, t)
+    if st[LOCK, r] == link:
+        st[LOCK, r] = -1
+        whole = survived(p, st, sf, r)
+        if whole:
+            st[BAD_UNTIL, r] = 0
+        else:
+            lk[FATE, link] = FATE_COLLISION if st[OVERLAPPED, r] == 1 else FATE_WEAK
+            st[BAD_UNTIL, r] = t + p[EIFS_EXTRA_NS]
+    st[NSIG, r] -= 1
+    sf[POWER, r] = 0.0 if st[NSIG, r] == 0 else sf[POWER, r] - lp[ON_AIR, link]
+    lk[UNDERWAY, link] = 0
+    if lk[LINK_KIND, link] == DATA:
+        data_end(g, p, st, fr, lk, lp, hs, out, link, whole, t)
+    elif whole and lk[LINK_KIND, link] == ACK and st[WAITING, r] == lk[LINK_FRAME, link]:
+        acknowledged(g, p, st, fr, out, r, t)
+    if lk[AUDIBLE, link] == 1:
+        st[CS, r] -= 1
+        if st[CS, r] == 0 and st[TX_KIND, r] == NOTHING:
+            on_idle(g, p, st, hs, r, t)
+    release(g, fr, out, lk[LINK_FRAME, link], t)
+
+
+@jit
+def data_end(
+    g: Ints, p: Ints, st: Ints, fr: Ints, lk: Ints, lp: Reals, hs: Ints, out: Ints, link: int, whole: bool, t: int
+) -> None:
+    """A data frame has ended at a station: hand it up, acknowledge it, or count why not."""
+    r, f = lk[LINK_DST, link], lk[LINK_FRAME, link]
+    ours = fr[DST, f] == EVERYONE or fr[DST, f] == r
+    if whole and not ours:
+        st[NAV, r] = max(st[NAV, r], t + p[SIFS_NS] + p[ACK_NS])
+    if not ours or lk[AUDIBLE, link] == 0:
+        return
+    if not whole:
+        lost(g, fr, lk[FATE, link], f)
+        return
+    g[RECEIVED_COPIES] += 1
+    if fr[DST, f] == EVERYONE or fr[RECEIVED, f] == 0:
+        fr[RECEIVED, f] += 1
+        millidbm = int(10_000.0 * math.log10(lp[ON_AIR, link]))
+        put(g, out, OUT_RECEPTION, f, r, t, millidbm, 0)
+    if fr[DST, f] == r:
+        st[ACK_TO, r] = lk[LINK_SRC, link]
+        push(hs, g, HS_N, t + p[SIFS_NS], SEND_ACK, r, f)
+        fr[OPEN, f] += 1  # the ACK to come refers to it
+
+
+@jit
+def lost(g: Ints, fr: Ints, fate: int, f: int) -> None:
+    """One copy less."""
+    if fate == FATE_HALF_DUPLEX:
+        g[HALF_DUPLEX_COPIES] += 1
+        fr[LOST_HALF_DUPLEX, f] += 1
+    elif fate == FATE_COLLISION:
+        g[COLLISION_COPIES] += 1
+        fr[LOST_COLLISION, f] += 1
+    else:
+        g[WEAK_COPIES] += 1
+        fr[LOST_WEAK, f] += 1

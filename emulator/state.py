@@ -1,0 +1,138 @@
+"""The kernel's state: rows of a few arrays, because a call with few arguments is a cheap call.
+
+    st  int64   [station rows, stations]      sf  float64 [station rows, stations]
+    fr  int64   [frame rows, frame slots]
+    lk  int64   [link rows, links]            lp  float64 [link rows, links]      ptr int64 [stations + 1]
+    hs, hr int64 [capacity, 5]                heaps of (t_ns, seq, kind, a, b): what may start a frame; receptions
+    g   int64   [globals]                     p int64, pf float64: parameters     out int64 [capacity, 6]
+
+Instants are swarm ns. A link is one direction of a pair of stations; the links of one transmitter are adjacent
+(compressed rows, `ptr`). A station transmits one frame at a time, so a link carries at most one.
+"""
+
+from typing import Final
+
+import numpy as np
+import numpy.typing as npt
+
+Ints = npt.NDArray[np.int64]
+Reals = npt.NDArray[np.float64]
+
+# --- stations (st) ------------------------------------------------------------------------------------------------
+(
+    BO,  # backoff slots left
+    BASE,  # instant from which they count, while the medium is idle
+    SCHEDULED,  # instant of the pending access, -1 none; an access event of another instant is stale
+    CW,  # contention window
+    FRESH,  # 1: the frame waiting for access has drawn no backoff (immediate access)
+    TX_FRAME,  # frame slot on the air, -1 none
+    TX_KIND,  # NOTHING, DATA, ACK
+    TX_END,
+    CS,  # signals sensed
+    NSIG,  # signals present, sensed or not
+    LOCK,  # link being received, -1 none
+    LOCK_FROM,  # start of the current interference segment
+    LOCK_HEADER_END,  # end of the PLCP preamble and header of the locked frame
+    OVERLAPPED,  # 1: another signal overlapped the locked frame
+    IDLE_FROM,  # when the medium last became idle
+    BAD_UNTIL,  # end of the EIFS extension after a failed reception
+    RESUME_FROM,  # end of an ACK timeout: access counts from here
+    NAV,  # virtual carrier sense: reserved until
+    WAITING,  # frame slot whose ACK is awaited, -1 none
+    ACK_TO,  # station to acknowledge, -1 none
+    HEAD,  # frame slot at the head of the MAC queue, -1 none
+    TAIL,
+    QLEN,
+    BUSY_SINCE,  # -1 idle
+    BUSY_NS,  # busy time so far
+    RANDOM,  # state of the station's generator
+    STATION_ROWS,
+) = range(27)
+NOTHING: Final = 0
+DATA: Final = 1
+ACK: Final = 2
+
+# --- stations (sf) ------------------------------------------------------------------------------------------------
+POWER, LOG_OK, STATION_REALS = range(3)
+"""POWER: sum of the signals present [mW]. LOG_OK: log of the probability that the locked frame is still whole."""
+
+# --- frames (fr) --------------------------------------------------------------------------------------------------
+(
+    SRC,
+    DST,  # station, or EVERYONE
+    AIRTIME,
+    BORN,  # when it entered (or will enter) the MAC queue
+    NEXT,  # next in the queue, -1 none
+    ATTEMPTS,
+    RECEIVED,  # copies received, duplicates of a unicast not counted
+    OPEN,  # receptions still under way, plus 1 while the MAC holds the frame
+    OUTCOME,
+    ENDED,  # when the MAC was done with it
+    LOST_COLLISION,
+    LOST_HALF_DUPLEX,
+    LOST_WEAK,
+    TARGETS,  # copies in range at the last attempt
+    FRAME_ROWS,
+) = range(15)
+EVERYONE: Final = -1
+
+# --- links (lk, lp) -----------------------------------------------------------------------------------------------
+LINK_SRC, LINK_DST, DELAY, AUDIBLE, FATE, LINK_FRAME, LINK_KIND, UNDERWAY, LINK_ROWS = range(9)
+"""AUDIBLE: strong enough to sense and decode; others only interfere. FATE: of the frame now on
+the link. LINK_FRAME, LINK_KIND: what it is (of an ACK: the frame it acknowledges). UNDERWAY: 1 until its end."""
+LINK_POWER, ON_AIR, LINK_REALS = range(3)
+"""LINK_POWER: received power [mW]. ON_AIR: that of the frame now on the link, as it was at its start."""
+
+FATE_OPEN, FATE_COLLISION, FATE_HALF_DUPLEX, FATE_WEAK = range(4)
+
+# --- events -------------------------------------------------------------------------------------------------------
+ARRIVE, ACCESS, SEND_ACK, ACK_TIMEOUT, TX_DONE, RX_START, RX_DETECT, RX_END = range(8)
+
+# --- outputs (out): kind, frame, station, t_ns, rssi in 1/1000 dBm, attempts ------------------------------------------
+OUT_RECEPTION, OUT_DONE, OUT_FREE, OUT_COLUMNS = 0, 1, 2, 6
+"""A copy was decoded; the MAC is done with a frame (a = outcome); nothing refers to the slot any more."""
+
+DONE_SENT, DONE_ACKED, DONE_RETRY, DONE_FULL, DONE_EXPIRED = range(5)
+"""Outcomes; the values of `messages.TxOutcome`."""
+
+# --- globals (g) --------------------------------------------------------------------------------------------------
+(
+    NOW,
+    SEQ,
+    HS_N,
+    HR_N,
+    OUT_N,
+    ON_AIR_COPIES,
+    RECEIVED_COPIES,
+    COLLISION_COPIES,
+    HALF_DUPLEX_COPIES,
+    WEAK_COPIES,
+    ATTEMPTS_MADE,
+    ATTEMPTS_FAILED,
+    UNICASTS_ENDED,
+    RETRIES,
+    MEASURED_FROM,
+    GLOBALS,
+) = range(16)
+
+# --- parameters (p, pf) -------------------------------------------------------------------------------------------
+(
+    SLOT_NS,
+    SIFS_NS,
+    DIFS_NS,
+    EIFS_EXTRA_NS,  # EIFS - DIFS
+    ACK_NS,
+    ACK_TIMEOUT_NS,
+    HEADER_NS,  # PLCP preamble and header
+    DETECT_NS,
+    CW_MIN,
+    CW_MAX,
+    MAX_ATTEMPTS,
+    QUEUE_LIMIT,
+    LIFETIME_NS,
+    DRAW_WHEN_INTERRUPTED,  # 1: IEEE 802.11; 0: as ns-3
+    WAIT_DIFS_FIRST,  # 1: as ns-3, a frame waits one DIFS after it is queued
+    INTERFERENCE,  # 0: any overlap destroys; 1: SINR and error rate
+    PARAMETERS,
+) = range(17)
+NOISE_MW, DETECT_RATIO, HEADER_BITS_PER_NS, PAYLOAD_BITS_PER_NS, REALS = range(5)

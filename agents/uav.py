@@ -40,7 +40,7 @@ class Uav(Actor):
         self._filler = wire.filler(scenario.traffic.payload_bytes - wire.HEADER_BYTES)
         self._node = Node(node, scenario, make_protocol, position=position)
         self._traffic = Traffic(scenario, node)
-        self._autopilot = Autopilot(node, position=position)
+        self._autopilot = Autopilot(node, position=position, telemetry_hz=scenario.nodes.telemetry_hz)
         self._mission = Mission(node, scenario.mission, altitude_m=scenario.nodes.altitude_m)
         self._hello_ns = seconds_to_ns(scenario.routing.hello_interval_s)
         self._hello_random = stream(scenario.seed, "hello", node).random
@@ -85,7 +85,7 @@ class Uav(Actor):
         self._say_hello(now_ns)
         telemetry = self._autopilot.telemetry(now_ns)
         if telemetry:
-            self._tap(b"".join(telemetry), now_ns)
+            self._tap(telemetry, now_ns)
         self._settle(now_ns)
 
     def next_wake_ns(self) -> int | None:
@@ -118,7 +118,9 @@ class Uav(Actor):
     def _say_hello(self, now_ns: int) -> None:
         if self._next_hello_ns is None or self._next_hello_ns - self._lead_ns > now_ns:
             return
-        self._node.say_hello(self._autopilot.beacon_frames(), start_ns=max(self._next_hello_ns, now_ns), now_ns=now_ns)
+        self._node.say_hello(
+            self._autopilot.beacon_frames(now_ns), start_ns=max(self._next_hello_ns, now_ns), now_ns=now_ns
+        )
         vary = 1 + _HELLO_JITTER * (2 * self._hello_random() - 1)
         self._next_hello_ns += int(self._hello_ns * vary)
 

@@ -43,6 +43,8 @@ class Nodes(Section):
     columns: Annotated[int, Field(ge=1)] | None = None
     """Grid columns; by default the widest near-square factorisation in the manner of 9 x 5."""
     altitude_m: NonNegative = 50.0
+    telemetry_hz: NonNegative = 1.0
+    """Native MAVLink telemetry of each node on its tap; 0 sends none."""
     positions_m: tuple[tuple[Finite, Finite, Finite], ...] = ()
     """Layout `explicit`: one [east, north, up] per node."""
 

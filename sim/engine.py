@@ -1,0 +1,39 @@
+"""The contract of a world engine: velocities wanted go in, time passes, positions come out. ENU metres, numpy rows.
+
+Row i is node i + 1. The same calls give the same numbers. Engines know nothing of missions, sensors or topics.
+"""
+
+from abc import ABC, abstractmethod
+
+import numpy as np
+import numpy.typing as npt
+
+Rows = npt.NDArray[np.float64]
+"""float64 [nodes, 3]."""
+
+
+class Engine(ABC):
+    """Moves bodies."""
+
+    name: str
+
+    @abstractmethod
+    def reset(self, positions: Rows) -> None:
+        """Put every body at rest at its position."""
+
+    @abstractmethod
+    def advance(self, dt_s: float, wanted_m_s: Rows) -> None:
+        """Let `dt_s` pass while every body tries to fly at its wanted velocity."""
+
+    @abstractmethod
+    def positions(self) -> Rows: ...
+
+    @abstractmethod
+    def velocities(self) -> Rows: ...
+
+    @abstractmethod
+    def contacts(self) -> list[tuple[int, int]]:
+        """Pairs of nodes (smaller id first; the ground is 0) that began to touch since the last call."""
+
+    def close(self) -> None:  # noqa: B027  (only physics holds anything)
+        """Give back what the engine holds."""

@@ -79,8 +79,8 @@ def purge(g: Ints, st: Ints, hs: Ints) -> None:
 
 @jit
 def advance(  # noqa: C901  (one dispatch; splitting it would only move the branches)
-    g: Ints, p: Ints, pf: Reals, st: Ints, sf: Reals, fr: Ints, lk: Ints, lp: Reals, ptr: Ints, hs: Ints, hr: Ints, out: Ints,
-    err: Reals, until: int,
+    g: Ints, p: Ints, pf: Reals, st: Ints, sf: Reals, fr: Ints, lk: Ints, lp: Reals, ptr: Ints, hs: Ints, hr: Ints,
+    out: Ints, err: Reals, until: int,
 ) -> bool:  # fmt: skip
     """Process every event up to and including `until`. False: no room, drain and call again."""
     room = out.shape[0] - 2 * p[QUEUE_LIMIT] - 8  # one event may expire a whole queue

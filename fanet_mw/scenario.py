@@ -103,7 +103,9 @@ class Clusters(Section):
     """The least time between two packets that a head releases in its slot."""
     pacing: Literal["burst", "spread"] = "spread"
     """`burst` releases at `release_gap_ms`; `spread` divides the slot evenly among the queued packets."""
-    relay: Literal["all", "none"] = "all"
+    relay: Literal["all", "gossip"] = "all"
+    """Who relays a flooded packet once: every node, or each with probability min(1, gossip_degree / neighbors)."""
+    gossip_degree: Positive = 6.0
 
     @property
     def period_ns(self) -> int:

@@ -19,6 +19,7 @@ from fanet_mw.errors import FanetError
 from fanet_mw.scenario import Scenario
 from fanet_mw.units import NodeId
 from sim import catalog, report
+from sim.layout import positions
 from sim.outcome import Outcome
 
 app = App(
@@ -231,7 +232,8 @@ def agent(scenario: str, *, id: int, choice: Choice = Choice(), join: Join = Joi
     chosen = choice.scenario(scenario)
     if id not in chosen.node_ids:
         raise FanetError(f"--id {id}: must be in [1, nodes.count = {chosen.nodes.count}]")
-    return run(chosen, node=NodeId(id), swarm=join.swarm or chosen.name, endpoint=join.connect)
+    start = positions(chosen)[id - 1]
+    return run(chosen, node=NodeId(id), swarm=join.swarm or chosen.name, endpoint=join.connect, position=start)
 
 
 @contextmanager

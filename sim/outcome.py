@@ -25,5 +25,7 @@ class Outcome:
     """(name, exit code) of processes that died before their time."""
     aborted: str | None = None
     """Why the run is partial; None when it ran to its end."""
+    epoch_unix_ns: int = 0
+    """Real time: unix time of swarm instant 0."""
     ready_s: float = 0.0
     """Real time: until all processes were up."""

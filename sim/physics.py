@@ -63,8 +63,8 @@ class Physics(Engine):
         ]
         for body in self._bodies:
             pybullet.changeDynamics(
-                body, -1, linearDamping=0, angularDamping=0.9, activationState=pybullet.ACTIVATION_STATE_DISABLE_SLEEPING,
-                physicsClientId=client,
+                body, -1, linearDamping=0, angularDamping=0.9,
+                activationState=pybullet.ACTIVATION_STATE_DISABLE_SLEEPING, physicsClientId=client,
             )  # fmt: skip
         self._node_of = {ground: 0} | {body: i + 1 for i, body in enumerate(self._bodies)}
         self._at = positions.copy()

@@ -39,4 +39,4 @@ def _write(outcome: Outcome, summary: dict[str, Any], data: bytes, out: Path) ->
     (out / "summary.json").write_text(json.dumps(summary, indent=2) + "\n", encoding="utf-8")
     (out / "reports.json").write_text(json.dumps(dict(outcome.reports), indent=2) + "\n", encoding="utf-8")
     (out / "trace.jsonl").write_bytes(data)
-    tlog.write(out / "mavlink.tlog", outcome.taps)
+    tlog.write(out / "mavlink.tlog", outcome.taps, epoch_us=outcome.epoch_unix_ns // 1000)

@@ -73,7 +73,11 @@ class World(Actor):
 
     def receive(self, topic: str, message: Message, now_ns: int) -> None:
         node = node_of(topic)
-        if not isinstance(message, Setpoint) or not 1 <= node <= self._count or not np.isfinite([*message.position, message.speed_m_s]).all():
+        if (
+            not isinstance(message, Setpoint)
+            or not 1 <= node <= self._count
+            or not np.isfinite([*message.position, message.speed_m_s]).all()
+        ):
             self._malformed += 1
         else:
             if self._guidance.still:  # time stood still until now

@@ -5,6 +5,7 @@ to a head, and FLOOD, released by the head in its slot and relayed once by every
 nodes join by a flooded JOIN, the leader answers with a flooded SCHEDULE.
 """
 
+import math
 from collections.abc import Mapping
 from typing import Final
 
@@ -40,7 +41,7 @@ class Clustered(RoutingProtocol):
         self._lead_ns = scenario.radio.lead_ns
         self._jitter_ns = scenario.routing.jitter_ns
         self._lifetime_us = round(scenario.routing.lifetime_s * 1_000_000)
-        self._relays = scenario.clusters.relay == "all"
+        self._gossip_degree = scenario.clusters.gossip_degree if scenario.clusters.relay == "gossip" else math.inf
         hello_ns = seconds_to_ns(scenario.routing.hello_interval_s)
         self._neighbors = Neighbors(lifetime_ns=int(_HELLO_LIFETIMES * hello_ns))
         self._gradient = Gradient(node=port.node, neighbors=self._neighbors, hello_ns=hello_ns)
@@ -107,7 +108,9 @@ class Clustered(RoutingProtocol):
 
     def _relay(self, packet: Packet, *, now_ns: int) -> None:
         control = packet.header.kind in (Kind.JOIN, Kind.SCHEDULE)
-        if not (self._relays or control) or packet.header.destination == self._port.node:
+        if packet.header.destination == self._port.node:
+            return
+        if not control and self._gossip_degree < math.inf and self._stays_silent(now_ns):
             return
         if packet.header.hop_limit <= 1:
             self._port.drop(DropReason.HOP_LIMIT, packet, now_ns=now_ns)
@@ -115,6 +118,11 @@ class Clustered(RoutingProtocol):
         jitter_ns = _CONTROL_JITTER_NS if control else self._jitter_ns
         start_ns = now_ns + self._lead_ns + int(self._random() * jitter_ns)
         self._port.transmit(self._port.forwarded(packet, flags=FLAG_FLOOD), BROADCAST, start_ns=start_ns)
+
+    def _stays_silent(self, now_ns: int) -> bool:
+        """Gossip by density (after GOSSIP1, Haas, Halpern and Li, ToN 14(3), 2006): in a crowd a few relays do."""
+        neighbors = len(self._neighbors.alive(now_ns=now_ns))
+        return self._random() * neighbors > self._gossip_degree
 
     def _consume_control(self, packet: Packet, *, now_ns: int) -> None:
         """Joins are the leader's, schedules everybody's. Malformed ones raise and are counted by the node."""

@@ -1,8 +1,8 @@
 """The way to a head: hop counts grow from each head outwards, carried by hellos, kept fresh by the head's sequence.
 
 As in DSDV, a route carries the head's own sequence number: newer beats shorter, equal needs fewer hops, so an old
-route can never be chosen through a node that depends on it. A node whose own cluster has no way to its head joins the
-way of a neighbor to another head: the packet reaches some head rather than none.
+route can never be chosen through a node that depends on it. A node without a head (the leader), or whose own cluster
+has no way to it, joins the way of a neighbor to another head: the packet reaches some head rather than none.
 """
 
 from typing import Final, NamedTuple
@@ -59,8 +59,8 @@ class Gradient:
     def hear(self, neighbor: Neighbor, *, now_ns: int) -> None:
         """A hello may bring a better route."""
         beacon = neighbor.beacon
-        if self._own_head in (self._node, _NO_HEAD):
-            return
+        if self._own_head == self._node:
+            return  # we are one
         route = self.route(now_ns=now_ns)
         if beacon.hops_to_head >= UNREACHABLE - 1 or beacon.head == _NO_HEAD:
             if route is not None and route.parent == neighbor.node:

@@ -27,6 +27,10 @@ _PHASE: Final = {0: seen.DELIVERED, wire.FLAG_FLOOD: seen.FLOODED, wire.FLAG_TO_
 """Which bit says that a packet was handled, by the phase flags of the frame that brought it."""
 
 
+_RESTART_STEP_NS: Final = 100 * US
+"""A node sends fewer packets than one per 0.1 ms, so a later start begins beyond all earlier sequence numbers."""
+
+
 class Delivery(NamedTuple):
     """A packet for the application of this node."""
 
@@ -58,6 +62,8 @@ class Node:
     # --- from the host's side -------------------------------------------------------------------------------------
 
     def start(self, now_ns: int) -> None:
+        """The node is up; one that starts again later must not reuse the names of its earlier packets."""
+        self._packet_seq = now_ns // _RESTART_STEP_NS & 0xFFFF_FFFF
         self._protocol.start(now_ns)
 
     def send(self, inner: bytes, *, destination: NodeId, priority: int, app: str, due_ns: int, now_ns: int) -> int:

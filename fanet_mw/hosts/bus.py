@@ -1,0 +1,135 @@
+"""One Zenoh session, with the settings a swarm needs, as a context manager that always closes it.
+
+Scouting is off: who connects to whom is said, never discovered. Frames, poses and sensor readings are best effort and
+dropped under congestion (late is worse than lost, and gaps are counted); traces and reports are reliable.
+"""
+
+import json
+from collections.abc import Callable
+from types import TracebackType
+from typing import Any, Final, Self
+
+import zenoh
+
+from fanet_mw.errors import BusError
+
+CONNECT_TIMEOUT_MS: Final = 2500
+OnSample = Callable[[str, bytes], None]
+"""(topic, payload); called on a thread of Zenoh's."""
+
+
+def _config(*, mode: str, listen: str | None, connect: str | None) -> zenoh.Config:
+    config = zenoh.Config()
+    settings: dict[str, object] = {
+        "mode": mode,
+        "scouting/multicast/enabled": False,
+        "scouting/gossip/enabled": False,
+        "listen/endpoints": [listen] if listen else [],
+        "listen/exit_on_failure": True,
+        "connect/endpoints": [connect] if connect else [],
+        "connect/exit_on_failure": True,
+        "connect/timeout_ms": CONNECT_TIMEOUT_MS,
+    }
+    for key, value in settings.items():
+        config.insert_json5(key, json.dumps(value))
+    return config
+
+
+class Bus:
+    """A session of one process: a client of a router, or the router itself."""
+
+    def __init__(self, session: zenoh.Session) -> None:
+        self._session = session
+        self._publishers: dict[str, Any] = {}
+
+    @classmethod
+    def serve(cls, endpoint: str) -> Self:
+        """Be the router; raises BusError when the endpoint cannot be listened on."""
+        try:
+            return cls(zenoh.open(_config(mode="router", listen=endpoint, connect=None)))
+        except zenoh.ZError as error:
+            why = "it is already in use" if "in use" in str(error) else _first_sentence(error)
+            raise BusError(f"cannot serve on {endpoint}: {why}") from error
+
+    @classmethod
+    def join(cls, endpoint: str) -> Self:
+        """Connect to a router; raises BusError when none answers."""
+        try:
+            return cls(zenoh.open(_config(mode="client", listen=None, connect=endpoint)))
+        except zenoh.ZError as error:
+            why = "no answer" if "onnect" in str(error) else _first_sentence(error)
+            raise BusError(
+                f"no Zenoh router at {endpoint} ({why} within {CONNECT_TIMEOUT_MS / 1000:g} s); "
+                f"start one with `fanet router` or `fanet launch --listen {endpoint}`"
+            ) from error
+
+    def __enter__(self) -> Self:
+        return self
+
+    def __exit__(
+        self, kind: type[BaseException] | None, error: BaseException | None, trace: TracebackType | None
+    ) -> None:
+        self.close()
+
+    def close(self) -> None:
+        """End the session; a process that does not would hang at its exit."""
+        self._publishers.clear()
+        if not self._session.is_closed():
+            self._session.close()  # type: ignore[no-untyped-call]  # zenoh's stub lacks it
+
+    def subscribe(self, expression: str, on_sample: OnSample) -> None:
+        """Hear a key expression for the life of the session."""
+        self._session.declare_subscriber(
+            expression, lambda sample: on_sample(str(sample.key_expr), sample.payload.to_bytes())
+        )
+
+    def put(self, topic: str, payload: bytes, *, reliable: bool = False) -> None:
+        """Publish; a session that has been closed or has lost its router drops it."""
+        publisher = self._publishers.get(topic)
+        if publisher is None:
+            control = zenoh.CongestionControl.BLOCK if reliable else zenoh.CongestionControl.DROP
+            publisher = self._publishers[topic] = self._session.declare_publisher(
+                topic, congestion_control=control, express=not reliable
+            )
+        publisher.put(payload)
+
+    def announce(self, topic: str) -> None:
+        """A liveliness token: others see it until this session ends, however it ends."""
+        self._tokens = [*getattr(self, "_tokens", []), self._session.liveliness().declare_token(topic)]
+
+    def watch(self, expression: str, on_change: Callable[[str, bool], None]) -> None:
+        """Hear of liveliness tokens, those already there included: (topic, alive)."""
+        self._session.liveliness().declare_subscriber(
+            expression,
+            lambda sample: on_change(str(sample.key_expr), sample.kind == zenoh.SampleKind.PUT),
+            history=True,
+        )
+
+    def answer(self, topic: str, reply: Callable[[], bytes | None]) -> None:
+        """Answer queries for a topic with what `reply` gives; None stays silent."""
+
+        def on_query(query: zenoh.Query) -> None:
+            payload = reply()
+            if payload is not None:
+                query.reply(topic, payload)
+
+        self._session.declare_queryable(topic, on_query)
+
+    def ask(self, topic: str, on_sample: OnSample) -> None:
+        """Query a topic; answers come as samples."""
+
+        def on_reply(reply: zenoh.Reply) -> None:
+            if reply.ok is not None:
+                on_sample(topic, reply.ok.payload.to_bytes())
+
+        self._session.get(topic, on_reply, timeout=2.0)
+
+    def connected(self) -> bool:
+        """Whether a router is there (always, for the router itself)."""
+        return not self._session.is_closed() and bool(
+            self._session.info.routers_zid() or self._session.info.peers_zid()
+        )
+
+
+def _first_sentence(error: Exception) -> str:
+    return str(error).split(" at /", 1)[0].split("\n", 1)[0]

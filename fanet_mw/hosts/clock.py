@@ -1,0 +1,132 @@
+"""The swarm clock of a real-time run: swarm instant = (unix - epoch) x scale, on the monotonic clock.
+
+Unix time is read once per process and carried on by the monotonic clock, so that a step of the system's clock does not
+move the swarm's. On one machine all processes agree to microseconds; across machines as well as their clocks do.
+"""
+
+import asyncio
+import time
+from collections.abc import Iterable
+from typing import Final
+
+from fanet_mw import topics
+from fanet_mw.errors import BusError, MalformedFrameError
+from fanet_mw.hosts.bus import Bus
+from fanet_mw.messages import Clock, ClockState
+from fanet_mw.topics import Topics
+from fanet_mw.units import MS, S
+
+_START_DELAY_NS: Final = 300 * MS
+"""From the moment all are there until swarm instant 0."""
+_ASK_EVERY_S: Final = 0.5
+
+
+class SwarmClock:
+    """Reads swarm instants."""
+
+    def __init__(self, clock: Clock) -> None:
+        epoch_mono_ns = clock.epoch_unix_ns - (time.time_ns() - time.monotonic_ns())
+        self._epoch_mono_ns = epoch_mono_ns
+        self._scale = clock.time_scale
+
+    def now_ns(self) -> int:
+        """The swarm instant; negative before the start."""
+        elapsed_ns = time.monotonic_ns() - self._epoch_mono_ns
+        return elapsed_ns if self._scale == 1 else round(elapsed_ns * self._scale)
+
+    def wait_s(self, instant_ns: int) -> float:
+        """Wall seconds until a swarm instant; negative when it has passed."""
+        return (instant_ns - self.now_ns()) / self._scale / S
+
+
+class ClockKeeper:
+    """Starts the clock when all are there, answers whoever comes later, and stops it."""
+
+    def __init__(self, bus: Bus, names: Topics, *, time_scale: float, expected: Iterable[str]) -> None:
+        self._bus = bus
+        self._names = names
+        self._time_scale = time_scale
+        self._missing = {names.alive(name): name for name in expected}
+        self._all_there = asyncio.Event()
+        self.clock: Clock | None = None
+        loop = asyncio.get_running_loop()
+        bus.answer(names.clock, self._current)
+
+        def on_change(topic: str, alive: bool) -> None:
+            loop.call_soon_threadsafe(self._seen, topic, alive)
+
+        bus.watch(names.all_alive, on_change)
+
+    def _current(self) -> bytes | None:
+        return topics.encode([self.clock]) if self.clock else None
+
+    def _seen(self, topic: str, alive: bool) -> None:
+        if alive:
+            self._missing.pop(topic, None)
+        if not self._missing:
+            self._all_there.set()
+
+    def missing(self) -> list[str]:
+        """Who is not there yet."""
+        return sorted(self._missing.values())
+
+    async def start(self, *, timeout_s: float) -> Clock:
+        """Wait for everyone, then start; raises BusError naming who did not come."""
+        try:
+            await asyncio.wait_for(self._all_there.wait(), timeout_s)
+        except TimeoutError:
+            names = self.missing()
+            some = ", ".join(names[:5]) + (f" and {len(names) - 5} more" if len(names) > 5 else "")
+            raise BusError(f"{len(names)} of the swarm did not come up within {timeout_s:g} s: {some}") from None
+        epoch_ns = time.time_ns() + _START_DELAY_NS
+        self._publish(Clock(epoch_ns, self._time_scale, ClockState.RUNNING))
+        assert self.clock is not None, "just published"
+        return self.clock
+
+    def stop(self) -> None:
+        """Everyone ends at once."""
+        epoch_ns = self.clock.epoch_unix_ns if self.clock else 0
+        self._publish(Clock(epoch_ns, self._time_scale, ClockState.STOPPED))
+
+    def _publish(self, clock: Clock) -> None:
+        self.clock = clock
+        self._bus.put(self._names.clock, topics.encode([clock]), reliable=True)
+
+
+class ClockListener:
+    """Hears the swarm clock, on the loop's thread."""
+
+    def __init__(self, bus: Bus, names: Topics) -> None:
+        self._bus = bus
+        self._names = names
+        self._loop = asyncio.get_running_loop()
+        self._running: asyncio.Future[Clock] = self._loop.create_future()
+        self.stopped = asyncio.Event()
+        bus.subscribe(names.clock, self._from_thread)
+
+    def _from_thread(self, _topic: str, payload: bytes) -> None:
+        if not self._loop.is_closed():
+            self._loop.call_soon_threadsafe(self._heard, payload)
+
+    def _heard(self, payload: bytes) -> None:
+        try:
+            messages = topics.decode(payload)
+        except MalformedFrameError:
+            return
+        for message in messages:
+            if isinstance(message, Clock):
+                if message.state is ClockState.STOPPED:
+                    self.stopped.set()
+                if not self._running.done():
+                    self._running.set_result(message)
+
+    async def running(self, *, timeout_s: float) -> SwarmClock:
+        """The clock, once it has started; raises BusError when nobody starts it."""
+        waited_s = 0.0
+        while waited_s < timeout_s:
+            self._bus.ask(self._names.clock, self._from_thread)
+            try:
+                return SwarmClock(await asyncio.wait_for(asyncio.shield(self._running), _ASK_EVERY_S))
+            except TimeoutError:
+                waited_s += _ASK_EVERY_S
+        raise BusError(f"nobody started the swarm clock on {self._names.clock} within {timeout_s:g} s")

@@ -1,0 +1,206 @@
+"""Real time: one actor on asyncio over Zenoh, under the same contract as in virtual time.
+
+    Zenoh's thread -> deque -> one wake-up of the loop drains it -> actor -> outbox, one put per topic and wake-up
+
+The host never wakes an actor early. How late it wakes it is measured and reported; the lateness of frames, which is
+what matters, is the medium's to count.
+"""
+
+import asyncio
+import gc
+import json
+import resource
+from collections import deque
+from pathlib import Path
+from typing import Any, Final
+
+from fanet_mw import topics
+from fanet_mw.actor import Actor
+from fanet_mw.errors import BusError, MalformedFrameError
+from fanet_mw.hosts.bus import Bus
+from fanet_mw.hosts.clock import ClockListener, SwarmClock
+from fanet_mw.hosts.lateness import Histogram
+from fanet_mw.messages import Message, Report, TraceBatch
+from fanet_mw.topics import Topics
+from fanet_mw.trace import Record
+
+_REPORT_EVERY_S: Final = 1.0
+_LOST_AFTER_S: Final = 2.0
+"""A router that has been away for this long is taken to be gone."""
+
+
+class RealtimeHost:
+    """Runs one actor until its swarm time is over."""
+
+    def __init__(self, actor: Actor, bus: Bus, names: Topics) -> None:
+        self._actor = actor
+        self._bus = bus
+        self._names = names
+        self._loop = asyncio.get_running_loop()
+        self._inbox: deque[tuple[str, bytes]] = deque()
+        self._drain_asked = False
+        self._clock: SwarmClock | None = None
+        self._timer: asyncio.TimerHandle | None = None
+        self._timer_ns: int | None = None
+        self._records: list[Record] = []
+        self._lateness = Histogram()
+        self._malformed = 0
+        self._puts = 0
+        self._samples = 0
+
+    async def run(self, *, until_ns: int, clock_timeout_s: float) -> None:
+        """Declare, announce, wait for the clock, run, report. Raises BusError when the bus fails."""
+        for expression in self._actor.subscriptions:
+            self._bus.subscribe(expression, self._from_thread)
+        listener = ClockListener(self._bus, self._names)
+        self._bus.announce(self._names.alive(self._actor.name))
+        self._clock = await listener.running(timeout_s=clock_timeout_s)
+        await self._sleep_until(0)
+        gc.collect()
+        gc.freeze()  # what start-up made stays: no reason to look at it again in the middle of a slot
+        self._actor.start(self._now_ns())
+        self._settle()
+        self._drain()
+        try:
+            await self._watch(until_ns, listener)
+        finally:
+            self._finish(until_ns)
+
+    async def _sleep_until(self, instant_ns: int) -> None:
+        assert self._clock is not None, "the clock is running"
+        wait_s = self._clock.wait_s(instant_ns)
+        if wait_s > 0:
+            await asyncio.sleep(wait_s)
+
+    async def _watch(self, until_ns: int, listener: ClockListener) -> None:
+        """Report now and then, until the time is over, the clock is stopped or the router is gone."""
+        assert self._clock is not None, "the clock is running"
+        lost_s = 0.0
+        while (left_s := self._clock.wait_s(until_ns)) > 0:
+            pause_s = min(left_s, _REPORT_EVERY_S)
+            try:
+                await asyncio.wait_for(listener.stopped.wait(), pause_s)
+                return
+            except TimeoutError:
+                pass
+            lost_s = 0.0 if self._bus.connected() else lost_s + pause_s
+            if lost_s >= _LOST_AFTER_S:
+                raise BusError(f"{self._actor.name}: the router is gone")
+            self._publish_records()
+            self._publish_report(final=False)
+
+    def _finish(self, until_ns: int) -> None:
+        if self._timer is not None:
+            self._timer.cancel()
+        now_ns = min(self._now_ns(), until_ns)
+        self._actor.stop(max(now_ns, 0))
+        self._settle(rearm=False)
+        self._publish_records()
+        self._publish_report(final=True)
+
+    # --- in -------------------------------------------------------------------------------------------------------
+
+    def _from_thread(self, topic: str, payload: bytes) -> None:
+        """On Zenoh's thread: many samples, one wake-up."""
+        self._inbox.append((topic, payload))
+        if not self._drain_asked and not self._loop.is_closed():
+            self._drain_asked = True
+            self._loop.call_soon_threadsafe(self._drain)
+
+    def _drain(self) -> None:
+        self._drain_asked = False
+        if self._clock is None or self._now_ns() < 0:
+            return  # kept until the start
+        inbox, actor = self._inbox, self._actor
+        while inbox:
+            topic, payload = inbox.popleft()
+            self._samples += 1
+            try:
+                messages = topics.decode(payload)
+            except MalformedFrameError:
+                self._malformed += 1
+                continue
+            for message in messages:
+                actor.receive(topic, message, self._now_ns())
+        self._settle()
+
+    # --- time -----------------------------------------------------------------------------------------------------
+
+    def _now_ns(self) -> int:
+        assert self._clock is not None, "the clock is running"
+        return self._clock.now_ns()
+
+    def _arm(self) -> None:
+        wake_ns = self._actor.next_wake_ns()
+        if wake_ns == self._timer_ns:
+            return
+        if self._timer is not None:
+            self._timer.cancel()
+        self._timer_ns = wake_ns
+        assert self._clock is not None, "the clock is running"
+        self._timer = None if wake_ns is None else self._loop.call_later(self._clock.wait_s(wake_ns), self._wake)
+
+    def _wake(self) -> None:
+        due_ns, now_ns = self._timer_ns, self._now_ns()
+        self._timer = self._timer_ns = None
+        if due_ns is not None and now_ns >= due_ns:  # else the loop's clock is a little fast: come again
+            self._lateness.add(now_ns - due_ns)
+            self._actor.wake(now_ns)
+        self._settle()
+
+    # --- out ------------------------------------------------------------------------------------------------------
+
+    def _settle(self, *, rearm: bool = True) -> None:
+        """Publish what the actor has put out, one put per topic, and arm its next wake-up."""
+        actor = self._actor
+        if actor.outbox:
+            by_topic: dict[str, list[Message]] = {}
+            for topic, message in actor.outbox:
+                by_topic.setdefault(topic, []).append(message)
+            actor.outbox.clear()
+            for topic, messages in by_topic.items():
+                self._bus.put(topic, topics.encode(messages))
+            self._puts += len(by_topic)
+        if actor.records:
+            self._records += actor.records
+            actor.records.clear()
+        if rearm:
+            self._arm()
+
+    def _publish_records(self) -> None:
+        if self._records:
+            batch = TraceBatch(tuple(self._records))
+            self._records.clear()
+            self._bus.put(self._names.trace(self._actor.name), topics.encode([batch]), reliable=True)
+
+    def _publish_report(self, *, final: bool) -> None:
+        content = {**self._actor.report(), "final": final, "host": self._figures()}
+        report = Report(self._actor.name, self._now_ns(), json.dumps(content))
+        self._bus.put(self._names.report(self._actor.name), topics.encode([report]), reliable=True)
+
+    def _figures(self) -> dict[str, Any]:
+        usage = resource.getrusage(resource.RUSAGE_SELF)
+        return {
+            "wake_lateness_ms": self._lateness.summary(),
+            "cpu_s": round(usage.ru_utime + usage.ru_stime, 3),
+            "uss_mb": uss_mb(),
+            "malformed": self._malformed,
+            "puts": self._puts,
+            "samples": self._samples,
+        }
+
+
+def uss_mb() -> float | None:
+    """Memory that this process shares with no other [MB]; None where /proc does not say."""
+    try:
+        text = Path("/proc/self/smaps_rollup").read_text(encoding="ascii")
+    except OSError:
+        return None
+    private = [line.split()[1] for line in text.splitlines() if line.startswith("Private_")]
+    return round(sum(int(kb) for kb in private) / 1024, 2)
+
+
+async def run_actor(actor: Actor, *, swarm: str, endpoint: str, until_ns: int, clock_timeout_s: float = 60.0) -> None:
+    """Join a router, run one actor, leave. Raises BusError."""
+    with Bus.join(endpoint) as bus:
+        await RealtimeHost(actor, bus, Topics(swarm)).run(until_ns=until_ns, clock_timeout_s=clock_timeout_s)

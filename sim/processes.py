@@ -1,0 +1,97 @@
+"""The processes of a swarm: forked from one warmed-up server, watched, ended without leaving any behind.
+
+Children ignore Ctrl-C (the launcher decides), and die with their parent whatever kills it.
+"""
+
+import asyncio
+import ctypes
+import multiprocessing
+import signal
+import sys
+from collections.abc import Callable, Mapping
+from multiprocessing.context import ForkServerContext, ForkServerProcess
+from typing import Any, Final
+
+from fanet_mw.errors import FanetError
+
+_PRELOAD: Final = ["agents.__main__", "emulator.__main__", "sim.world_main"]
+_PR_SET_PDEATHSIG: Final = 1
+Entry = Callable[..., int]
+
+
+def _child(entry: Entry, arguments: Mapping[str, Any]) -> None:
+    """What a child does first and last; runs in the child."""
+    signal.signal(signal.SIGINT, signal.SIG_IGN)
+    if sys.platform == "linux":
+        ctypes.CDLL(None).prctl(_PR_SET_PDEATHSIG, signal.SIGKILL)
+    try:
+        code = entry(**arguments)
+    except FanetError as error:
+        sys.stderr.write(f"{error}\n")
+        code = 3
+    sys.exit(code)
+
+
+def describe(exit_code: int) -> str:
+    """An exit code in words: a signal by its name."""
+    return f"signal {signal.Signals(-exit_code).name}" if exit_code < 0 else f"exit code {exit_code}"
+
+
+class Processes:
+    """Named children, each started again on request."""
+
+    def __init__(self, on_end: Callable[[str, int], None]) -> None:
+        self._context: ForkServerContext = multiprocessing.get_context("forkserver")
+        self._context.set_forkserver_preload(_PRELOAD)
+        self._on_end = on_end
+        self._loop = asyncio.get_running_loop()
+        self._running: dict[str, ForkServerProcess] = {}
+        self._recipes: dict[str, tuple[Entry, Mapping[str, Any]]] = {}
+        self._empty = asyncio.Event()
+
+    def start(self, name: str, entry: Entry, arguments: Mapping[str, Any]) -> None:
+        """Start a child; `entry(**arguments)` must be importable and picklable."""
+        self._recipes[name] = entry, arguments
+        process = self._context.Process(target=_child, args=(entry, arguments), name=name)
+        process.start()
+        self._running[name] = process
+        self._empty.clear()
+        self._loop.add_reader(process.sentinel, self._ended, name)
+
+    def restart(self, name: str) -> None:
+        """Start a child that has ended once more, as it was started before."""
+        self.start(name, *self._recipes[name])
+
+    def pid(self, name: str) -> int:
+        pid = self._running[name].pid
+        assert pid is not None, "a running child has a pid"
+        return pid
+
+    def names(self) -> list[str]:
+        return list(self._running)
+
+    def _ended(self, name: str) -> None:
+        process = self._running.pop(name)
+        self._loop.remove_reader(process.sentinel)
+        process.join()
+        code = process.exitcode or 0
+        process.close()
+        if not self._running:
+            self._empty.set()
+        self._on_end(name, code)
+
+    async def wait(self, timeout_s: float) -> bool:
+        """Until every child has ended by itself; False when some had not in time."""
+        try:
+            await asyncio.wait_for(self._empty.wait(), timeout_s)
+        except TimeoutError:
+            return False
+        return True
+
+    async def end_all(self) -> None:
+        """Ask, then insist. Nothing is left running."""
+        for send, patience_s in (("terminate", 2.0), ("kill", 5.0)):
+            for process in list(self._running.values()):
+                getattr(process, send)()
+            if not self._running or await self.wait(patience_s):
+                return

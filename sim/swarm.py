@@ -1,0 +1,251 @@
+"""A swarm as real processes: router and clock here, the emulator, the world and every UAV in a process of its own.
+
+    start all -> wait until all are up -> start the clock -> collect traces, reports and taps -> all end -> outcome
+
+A UAV that dies is reported and the others carry on; without the emulator or the world there is no run, so their end
+ends it (or, with `respawn`, any of them is started again and finds its place by the clock).
+"""
+
+import asyncio
+import json
+import signal
+import socket
+import time
+from collections.abc import Callable
+from typing import Any, Final
+
+from agents.__main__ import run as run_agent
+from emulator.__main__ import run as run_emulator
+from fanet_mw import topics
+from fanet_mw.errors import BusError, MalformedFrameError
+from fanet_mw.hosts.bus import Bus
+from fanet_mw.hosts.clock import ClockKeeper, SwarmClock
+from fanet_mw.messages import MavlinkTap, Message, Report, TraceBatch
+from fanet_mw.scenario import Scenario
+from fanet_mw.topics import Topics
+from fanet_mw.trace import ProcessEnded, Record, kind_of
+from fanet_mw.units import NodeId, S
+from sim.layout import positions
+from sim.outcome import Outcome
+from sim.processes import Processes, describe
+from sim.world_main import run as run_world
+
+READY_TIMEOUT_S: Final = 60.0
+_GRACE_S: Final = 5.0
+"""After the end of the swarm's time, for last reports."""
+_MAX_RESPAWNS: Final = 5
+"""Of one name: a process that cannot live is not started for ever."""
+_PROGRESS_S: Final = 0.25
+Tell = Callable[[str], None]
+
+
+def free_endpoint() -> str:
+    """A TCP port of the loopback interface that is free now."""
+    with socket.socket() as probe:
+        probe.bind(("127.0.0.1", 0))
+        return f"tcp/127.0.0.1:{probe.getsockname()[1]}"
+
+
+def expected_names(scenario: Scenario) -> list[str]:
+    """Names of all actors of a swarm."""
+    return ["emulator", "world", *(f"agent-{node}" for node in scenario.node_ids)]
+
+
+class Collector:
+    """Takes what the swarm publishes about itself. Payloads are kept as they come and decoded when the run is over."""
+
+    def __init__(self, bus: Bus, names: Topics) -> None:
+        self._traces: list[bytes] = []
+        self._reports: dict[str, bytes] = {}
+        self._taps: list[bytes] = []
+        bus.subscribe(names.all_traces, lambda _, payload: self._traces.append(payload))
+        bus.subscribe(names.all_reports, self._reports.__setitem__)
+        bus.subscribe(names.mavlink("*"), lambda _, payload: self._taps.append(payload))
+
+    def records(self) -> list[Record]:
+        """All trace records, by instant, node and kind."""
+        batches = [message for message in _decoded(self._traces) if isinstance(message, TraceBatch)]
+        records = [record for batch in batches for record in batch.records]
+        return sorted(records, key=lambda record: (record.t_ns, record.node, kind_of(record)))
+
+    def reports(self) -> dict[str, dict[str, Any]]:
+        """The last report of each actor."""
+        reports = [message for message in _decoded(list(self._reports.values())) if isinstance(message, Report)]
+        return {report.name: json.loads(report.json) for report in sorted(reports, key=lambda report: report.name)}
+
+    def taps(self) -> list[tuple[int, bytes]]:
+        taps = [(m.t_ns, m.data) for m in _decoded(self._taps) if isinstance(m, MavlinkTap)]
+        return sorted(taps, key=lambda tap: tap[0])
+
+
+def _decoded(payloads: list[bytes]) -> list[Message]:
+    messages: list[Message] = []
+    for payload in payloads:
+        try:
+            messages += topics.decode(payload)
+        except MalformedFrameError:
+            continue  # not from one of ours
+    return messages
+
+
+class Swarm:
+    """One run in real time."""
+
+    def __init__(self, scenario: Scenario, bus: Bus, *, swarm: str, endpoint: str, respawn: bool, tell: Tell) -> None:
+        names = Topics(swarm)
+        self._scenario = scenario
+        self._swarm = swarm
+        self._endpoint = endpoint
+        self._respawn = respawn
+        self._tell = tell
+        self._collector = Collector(bus, names)
+        self._keeper = ClockKeeper(bus, names, time_scale=scenario.time_scale, expected=expected_names(scenario))
+        self.processes = Processes(self._process_ended)
+        self._clock: SwarmClock | None = None
+        self._over = asyncio.Event()
+        self._aborted: str | None = None
+        self._ended: list[tuple[str, int]] = []
+        self._obituaries: list[Record] = []
+        self._respawns: dict[str, int] = {}
+
+    async def run(self, on_progress: Callable[[float], None]) -> Outcome:
+        """Start, run, collect. Whatever happens, no process is left."""
+        began = time.monotonic()
+        try:
+            self._start_all()
+            ready_s = await self._start_clock(began)
+            run_began = time.monotonic()
+            await self._follow(on_progress)
+            wall_s = time.monotonic() - run_began
+            await self._wind_up()
+        finally:
+            self._over.set()
+            await self.processes.end_all()
+        return Outcome(
+            scenario=self._scenario,
+            mode="realtime",
+            wall_s=wall_s,
+            records=sorted([*self._collector.records(), *self._obituaries], key=lambda r: (r.t_ns, r.node, kind_of(r))),
+            reports=self._collector.reports(),
+            taps=self._collector.taps(),
+            ended=self._ended,
+            aborted=self._aborted,
+            ready_s=ready_s,
+            epoch_unix_ns=self._keeper.clock.epoch_unix_ns if self._keeper.clock else 0,
+        )
+
+    def abort(self, why: str) -> None:
+        """End the run early; what has been collected becomes a partial result."""
+        if self._aborted is None and not self._over.is_set():
+            self._aborted = why
+            self._tell(why)
+        self._over.set()
+
+    def _start_all(self) -> None:
+        common = {"scenario": self._scenario, "swarm": self._swarm, "endpoint": self._endpoint}
+        self.processes.start("emulator", run_emulator, common)
+        self.processes.start("world", run_world, common)
+        for node, position in zip(self._scenario.node_ids, positions(self._scenario), strict=True):
+            self.processes.start(f"agent-{node}", run_agent, {**common, "node": NodeId(node), "position": position})
+
+    async def _start_clock(self, began: float) -> float:
+        """Wait for everyone; returns how long that took [s]."""
+        start = asyncio.ensure_future(self._keeper.start(timeout_s=READY_TIMEOUT_S))
+        over = asyncio.ensure_future(self._over.wait())
+        await asyncio.wait([start, over], return_when=asyncio.FIRST_COMPLETED)
+        over.cancel()
+        if not start.done():
+            start.cancel()
+            raise BusError(self._aborted or "ended before the swarm was up")
+        self._clock = SwarmClock(start.result())
+        ready_s = time.monotonic() - began
+        self._tell(f"{len(self.processes.names())} processes up after {ready_s:.1f} s")
+        return ready_s
+
+    async def _follow(self, on_progress: Callable[[float], None]) -> None:
+        """Until the swarm's time is over or the run is aborted."""
+        assert self._clock is not None, "the clock was started"
+        while self._clock.wait_s(self._scenario.duration_ns) > 0 and not self._over.is_set():
+            on_progress(max(0.0, self._clock.now_ns() / S))
+            try:
+                await asyncio.wait_for(self._over.wait(), _PROGRESS_S)
+            except TimeoutError:
+                continue
+
+    async def _wind_up(self) -> None:
+        """Everyone stops by the clock, or is told to; last reports come in."""
+        self._over.set()
+        if self._aborted is not None:
+            self._keeper.stop()
+        if not await self.processes.wait(_GRACE_S):
+            late = self.processes.names()
+            self._keeper.stop()
+            if not await self.processes.wait(_GRACE_S / 2):
+                self._tell(f"{len(late)} processes did not end by themselves: {', '.join(late[:5])}")
+
+    def _process_ended(self, name: str, exit_code: int) -> None:
+        if self._over.is_set() or (exit_code == 0 and self._time_is_over()):
+            return
+        now_ns = max(0, self._clock.now_ns()) if self._clock else 0
+        self._ended.append((name, exit_code))
+        node = int(name.removeprefix("agent-")) if name.startswith("agent-") else 0
+        self._obituaries.append(ProcessEnded(now_ns, node, name, exit_code))
+        what = f"{name} ended with {describe(exit_code)} at {now_ns / S:.1f} s"
+        self._respawns[name] = self._respawns.get(name, 0) + 1
+        if self._respawn and self._respawns[name] <= _MAX_RESPAWNS:
+            self._tell(f"{what}; started again")
+            self.processes.restart(name)
+        elif node and self._clock is not None:
+            self._tell(f"{what}; the others carry on")
+        else:
+            self.abort(f"{what}; the run cannot go on without it")
+
+    def _time_is_over(self) -> bool:
+        return self._clock is not None and self._clock.wait_s(self._scenario.duration_ns) <= 0.05
+
+
+def _bus(listen: str | None, connect: str | None) -> tuple[Bus, str]:
+    """The session of the launcher, and the endpoint its children connect to."""
+    if connect is not None:
+        return Bus.join(connect), connect
+    endpoint = listen or free_endpoint()
+    return Bus.serve(endpoint), endpoint
+
+
+async def launch(
+    scenario: Scenario,
+    *,
+    swarm: str,
+    listen: str | None = None,
+    connect: str | None = None,
+    respawn: bool = False,
+    on_progress: Callable[[float], None] = lambda _: None,
+    on_event: Tell = lambda _: None,
+    on_started: Callable[[Swarm], None] = lambda _: None,
+) -> Outcome:
+    """Run a scenario as real processes. `on_started` is handed the swarm while it runs, for tests and tools.
+
+    Raises BusError when the bus cannot be had or the swarm does not come up.
+    """
+    bus, endpoint = _bus(listen, connect)
+    with bus:
+        run = Swarm(scenario, bus, swarm=swarm, endpoint=endpoint, respawn=respawn, tell=on_event)
+        loop = asyncio.get_running_loop()
+        for number in (signal.SIGINT, signal.SIGTERM):
+            loop.add_signal_handler(number, run.abort, f"interrupted by {number.name}")
+        on_started(run)
+        try:
+            return await run.run(on_progress)
+        finally:
+            for number in (signal.SIGINT, signal.SIGTERM):
+                loop.remove_signal_handler(number)
+
+
+async def serve(scenario: Scenario, *, swarm: str, listen: str, on_event: Tell) -> None:
+    """Be the router and keep the clock for services started one by one, until the scenario is over."""
+    with Bus.serve(listen) as bus:
+        keeper = ClockKeeper(bus, Topics(swarm), time_scale=scenario.time_scale, expected=expected_names(scenario))
+        on_event(f"serving {listen}, waiting for {len(keeper.missing())} services of swarm {swarm}")
+        clock = SwarmClock(await keeper.start(timeout_s=3600))
+        on_event("all are there: the clock runs")
+        await asyncio.sleep(clock.wait_s(scenario.duration_ns) + 1)

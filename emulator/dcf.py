@@ -132,9 +132,8 @@ def done(g: Ints, fr: Ints, out: Ints, f: int, outcome: int, t: int) -> None:
     """The MAC is through with a frame."""
     fr[OUTCOME, f] = outcome
     fr[ENDED, f] = t
-    if fr[DST, f] != EVERYONE and fr[ATTEMPTS, f] > 0:
+    if outcome == DONE_ACKED or outcome == DONE_RETRY:
         g[UNICASTS_ENDED] += 1
-        g[RETRIES] += fr[ATTEMPTS, f] - 1
     put(g, out, OUT_DONE, f, fr[SRC, f], t, outcome, fr[ATTEMPTS, f])
     release(g, fr, out, f, t)
 
@@ -150,12 +149,23 @@ def take_head(st: Ints, fr: Ints, s: int) -> None:
 
 @jit
 def expire(g: Ints, p: Ints, st: Ints, fr: Ints, out: Ints, s: int, t: int) -> None:
-    """Drop what has waited in the queue beyond its lifetime; a frame whose ACK is awaited is not in question."""
-    while st[HEAD, s] >= 0 and st[WAITING, s] < 0 and t - fr[BORN, st[HEAD, s]] >= p[LIFETIME_NS]:
+    """Drop what has waited in the queue beyond its lifetime; the contention window is no business of a lifetime.
+
+    The first frame is not in question while it is on the air or its ACK is awaited.
+    """
+    kept = st[HEAD, s] if st[TX_KIND, s] == DATA or st[WAITING, s] >= 0 else -1
+    if kept >= 0:
+        take_head(st, fr, s)
+    while st[HEAD, s] >= 0 and t - fr[BORN, st[HEAD, s]] >= p[LIFETIME_NS]:
         f = st[HEAD, s]
         take_head(st, fr, s)
-        st[CW, s] = p[CW_MIN]
         done(g, fr, out, f, DONE_EXPIRED, t)
+    if kept >= 0:
+        fr[NEXT, kept] = st[HEAD, s]
+        st[HEAD, s] = kept
+        if st[TAIL, s] < 0:
+            st[TAIL, s] = kept
+        st[QLEN, s] += 1
 
 
 @jit
@@ -350,6 +360,7 @@ def ack_timeout(g: Ints, p: Ints, st: Ints, fr: Ints, hs: Ints, out: Ints, s: in
         take_head(st, fr, s)
         done(g, fr, out, f, DONE_RETRY, t)
     else:
+        g[RETRIES] += 1
         st[CW, s] = min(2 * st[CW, s] + 1, p[CW_MAX])
     draw(st, s)
     arm(g, p, st, hs, s)

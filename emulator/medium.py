@@ -70,10 +70,16 @@ class Medium(Actor):
     def next_wake_ns(self) -> int | None:
         if self._stale:
             self._stale = False
-            self._wake_ns = self._air.next_output_ns()
+            self._wake_ns = self._next_handover_ns()
         if self._warm_ns is None:
             return self._wake_ns
         return self._warm_ns if self._wake_ns is None else min(self._warm_ns, self._wake_ns)
+
+    def _next_handover_ns(self) -> int | None:
+        bound_ns, every_ns = self._air.next_output_ns(), self._scenario.radio.handover_ns
+        if bound_ns is None or not every_ns:
+            return bound_ns
+        return -(-bound_ns // every_ns) * every_ns
 
     def stop(self, now_ns: int) -> None:
         self._pass_time(now_ns)

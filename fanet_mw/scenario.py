@@ -103,9 +103,12 @@ class Clusters(Section):
     """The least time between two packets that a head releases in its slot."""
     pacing: Literal["burst", "spread"] = "spread"
     """`burst` releases at `release_gap_ms`; `spread` divides the slot evenly among the queued packets."""
-    relay: Literal["all", "gossip"] = "all"
-    """Who relays a flooded packet once: every node, or each with probability min(1, gossip_degree / neighbors)."""
+    relay: Literal["all", "gossip", "counter"] = "all"
+    """Who relays a flooded packet: every node; each with probability min(1, gossip_degree / neighbors); or each that
+    has heard fewer than `counter` copies after U(0, assess_ms)."""
     gossip_degree: Positive = 6.0
+    counter: Annotated[int, Field(ge=2)] = 3
+    assess_ms: NonNegative = 100.0
 
     @property
     def period_ns(self) -> int:
@@ -146,6 +149,9 @@ class Radio(Section):
     max_frame_bytes: Annotated[int, Field(ge=64, le=2304)] = 2304
     lead_ms: NonNegative = 20.0
     """How long before its instant a node announces a transmission to the radio."""
+    handover_ms: NonNegative = 0.0
+    """Receptions are handed to nodes at multiples of this, as a driver with interrupt coalescing does; 0: at once.
+    Fewer, larger wake-ups let more processes live on one machine; instants on the air stay exact."""
     late_limit: Annotated[float, Field(ge=0, le=1)] = 0.01
     """The share of late frames above which a real-time run is invalid."""
 
@@ -158,6 +164,10 @@ class Radio(Section):
     @property
     def lead_ns(self) -> int:
         return round(self.lead_ms * MS)
+
+    @property
+    def handover_ns(self) -> int:
+        return round(self.handover_ms * MS)
 
 
 class Mobility(Section):

@@ -40,6 +40,7 @@ class RealtimeHost:
         self._inbox: deque[tuple[str, bytes]] = deque()
         self._drain_asked = False
         self._clock: SwarmClock | None = None
+        self._running = False
         self._timer: asyncio.TimerHandle | None = None
         self._timer_ns: int | None = None
         self._records: list[Record] = []
@@ -56,8 +57,8 @@ class RealtimeHost:
         self._bus.announce(self._names.alive(self._actor.name))
         self._clock = await listener.running(timeout_s=clock_timeout_s)
         await self._sleep_until(0)
-        gc.collect()
-        gc.freeze()  # what start-up made stays: no reason to look at it again in the middle of a slot
+        gc.freeze()  # what start-up made stays: the collector need not look at it again in the middle of a slot
+        self._running = True
         self._actor.start(self._now_ns())
         self._settle()
         self._drain()
@@ -90,6 +91,7 @@ class RealtimeHost:
             self._publish_report(final=False)
 
     def _finish(self, until_ns: int) -> None:
+        self._running = False
         if self._timer is not None:
             self._timer.cancel()
         now_ns = min(self._now_ns(), until_ns)
@@ -109,8 +111,8 @@ class RealtimeHost:
 
     def _drain(self) -> None:
         self._drain_asked = False
-        if self._clock is None or self._now_ns() < 0:
-            return  # kept until the start
+        if not self._running:
+            return  # kept until the start, or come after the end
         inbox, actor = self._inbox, self._actor
         while inbox:
             topic, payload = inbox.popleft()

@@ -5,7 +5,6 @@ to a head, and FLOOD, released by the head in its slot and relayed once by every
 nodes join by a flooded JOIN, the leader answers with a flooded SCHEDULE.
 """
 
-import math
 from collections.abc import Mapping
 from typing import Final
 
@@ -17,6 +16,7 @@ from fanet_mw.protocol.gradient import UNREACHABLE, Gradient
 from fanet_mw.protocol.leader import Leader
 from fanet_mw.protocol.membership import Membership
 from fanet_mw.protocol.neighbors import Neighbor, Neighbors
+from fanet_mw.protocol.relay import Relay
 from fanet_mw.protocol.release import Release
 from fanet_mw.protocol.txqueue import Packet, TxQueue
 from fanet_mw.units import BROADCAST, MS, US, NodeId, S, seconds_to_ns
@@ -41,7 +41,7 @@ class Clustered(RoutingProtocol):
         self._lead_ns = scenario.radio.lead_ns
         self._jitter_ns = scenario.routing.jitter_ns
         self._lifetime_us = round(scenario.routing.lifetime_s * 1_000_000)
-        self._gossip_degree = scenario.clusters.gossip_degree if scenario.clusters.relay == "gossip" else math.inf
+        self._relay = Relay(scenario.clusters, self._random)
         hello_ns = seconds_to_ns(scenario.routing.hello_interval_s)
         self._neighbors = Neighbors(lifetime_ns=int(_HELLO_LIFETIMES * hello_ns))
         self._gradient = Gradient(node=port.node, neighbors=self._neighbors, hello_ns=hello_ns)
@@ -99,30 +99,30 @@ class Clustered(RoutingProtocol):
         flags = packet.header.flags
         if flags & FLAG_FLOOD:
             self._consume_control(packet, now_ns=now_ns)
-            self._relay(packet, now_ns=now_ns)
+            self._flood_on(packet, now_ns=now_ns)
         elif flags & FLAG_TO_HEAD:
             if packet.header.hop_limit <= 1:
                 self._port.drop(DropReason.HOP_LIMIT, packet, now_ns=now_ns)
             else:
                 self._forward(packet, start_ns=now_ns + self._lead_ns, now_ns=now_ns, tries=0)
 
-    def _relay(self, packet: Packet, *, now_ns: int) -> None:
-        control = packet.header.kind in (Kind.JOIN, Kind.SCHEDULE)
+    def _flood_on(self, packet: Packet, *, now_ns: int) -> None:
+        """Relay a flooded packet, now or after assessment; control packets at once and by everyone."""
         if packet.header.destination == self._port.node:
-            return
-        if not control and self._gossip_degree < math.inf and self._stays_silent(now_ns):
             return
         if packet.header.hop_limit <= 1:
             self._port.drop(DropReason.HOP_LIMIT, packet, now_ns=now_ns)
-            return
-        jitter_ns = _CONTROL_JITTER_NS if control else self._jitter_ns
+        elif packet.header.kind in (Kind.JOIN, Kind.SCHEDULE):
+            self._transmit_relay(packet, _CONTROL_JITTER_NS, now_ns=now_ns)
+        elif self._relay.first_copy(packet, neighbors=self._neighbors.count(now_ns=now_ns), now_ns=now_ns):
+            self._transmit_relay(packet, self._jitter_ns, now_ns=now_ns)
+
+    def _transmit_relay(self, packet: Packet, jitter_ns: int, *, now_ns: int) -> None:
         start_ns = now_ns + self._lead_ns + int(self._random() * jitter_ns)
         self._port.transmit(self._port.forwarded(packet, flags=FLAG_FLOOD), BROADCAST, start_ns=start_ns)
 
-    def _stays_silent(self, now_ns: int) -> bool:
-        """Gossip by density (after GOSSIP1, Haas, Halpern and Li, ToN 14(3), 2006): in a crowd a few relays do."""
-        neighbors = len(self._neighbors.alive(now_ns=now_ns))
-        return self._random() * neighbors > self._gossip_degree
+    def overheard(self, key: int) -> None:
+        self._relay.another_copy(key)
 
     def _consume_control(self, packet: Packet, *, now_ns: int) -> None:
         """Joins are the leader's, schedules everybody's. Malformed ones raise and are counted by the node."""
@@ -195,6 +195,8 @@ class Clustered(RoutingProtocol):
             for part in self._leader.wake(now_ns):
                 self._obey(part, now_ns=now_ns)
                 self._flood_control(Kind.SCHEDULE, part.encode_frame(self._port.node), now_ns=now_ns)
+        for packet in self._relay.decided(now_ns=now_ns):
+            self._transmit_relay(packet, 0, now_ns=now_ns)
         horizon_us = now_ns // US - self._lifetime_us
         for packet in self._release.expire(before_us=horizon_us):
             self._port.drop(DropReason.EXPIRED, packet, now_ns=now_ns)
@@ -218,7 +220,7 @@ class Clustered(RoutingProtocol):
     # --- for people -----------------------------------------------------------------------------------------------
 
     def waiting(self) -> int:
-        return len(self._homeless) + len(self._release) + len(self._unicasts)
+        return len(self._homeless) + len(self._release) + len(self._unicasts) + len(self._relay)
 
     def report(self) -> Mapping[str, object]:
         return {

@@ -29,6 +29,11 @@ class Neighbors:
         """The link failed: do not wait for the lifetime to run out."""
         self._by_id.pop(node, None)
 
+    def count(self, *, now_ns: int) -> int:
+        """How many are not yet expired."""
+        horizon_ns = now_ns - self._lifetime_ns
+        return sum(1 for neighbor in self._by_id.values() if neighbor.heard_ns >= horizon_ns)
+
     def alive(self, *, now_ns: int) -> list[Neighbor]:
         """Neighbors not yet expired, by id."""
         horizon_ns = now_ns - self._lifetime_ns

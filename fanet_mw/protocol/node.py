@@ -112,6 +112,8 @@ class Node:
         bits = self._seen.bits(key)
         if phase is None or bits & phase:
             self.dropped[DropReason.MALFORMED if phase is None else DropReason.DUPLICATE] += 1
+            if phase is not None:
+                self._protocol.overheard(key)
             return
         try:
             self._first_copy(Packet(wire.decode_header(frame), frame), reception, key, bits, phase, now_ns)

@@ -56,7 +56,9 @@ from emulator.state import (
     LINK_FRAME,
     LINK_KIND,
     LINK_POWER,
+    LINK_SRC,
     LOCK,
+    LOCK_HEADER_END,
     MAX_ATTEMPTS,
     NAV,
     NEXT,
@@ -348,9 +350,17 @@ def acknowledged(g: Ints, p: Ints, st: Ints, fr: Ints, out: Ints, s: int, t: int
 
 
 @jit
-def ack_timeout(g: Ints, p: Ints, st: Ints, fr: Ints, hs: Ints, out: Ints, s: int, f: int, t: int) -> None:
-    """No ACK: another attempt with a doubled window, or the end of it (802.11-2020, 10.3.4.4)."""
+def ack_timeout(g: Ints, p: Ints, st: Ints, fr: Ints, lk: Ints, hs: Ints, out: Ints, s: int, f: int, t: int) -> None:
+    """No ACK: another attempt with a doubled window, or the end of it (802.11-2020, 10.3.4.4).
+
+    A frame whose header has been received by now may be the ACK: its end decides (10.3.2.11).
+    """
     if st[WAITING, s] != f:
+        return
+    link = st[LOCK, s]
+    if link >= 0 and st[LOCK_HEADER_END, s] <= t:
+        end = st[TX_END, lk[LINK_SRC, link]] + lk[DELAY, link]
+        push(hs, g, HS_N, end + 1, ACK_TIMEOUT, s, f)
         return
     st[WAITING, s] = -1
     st[RESUME_FROM, s] = t

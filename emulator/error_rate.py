@@ -50,10 +50,13 @@ def _dqpsk(per_bit: Reals) -> Reals:
 
 
 def _cck_symbol_success(symbol_snr: float, bits: int) -> float:
-    """One symbol right: CCK 11 is two independent quadrature decisions of biorthogonal sets, 5.5 one of them."""
+    """One symbol right: CCK 11 is two independent quadrature decisions of biorthogonal sets, 5.5 one of them.
+
+    Es/N0 is over both quadratures; a decision sees the energy of one, and of half a symbol at 11 Mb/s.
+    """
     if bits == 8:
-        return _biorthogonal_success(symbol_snr / 2, 16) ** 2
-    return _biorthogonal_success(symbol_snr, 16)
+        return _biorthogonal_success(symbol_snr / 4, 16) ** 2
+    return _biorthogonal_success(symbol_snr / 2, 16)
 
 
 def _biorthogonal_success(snr: float, signals: int) -> float:

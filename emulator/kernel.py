@@ -106,7 +106,7 @@ def advance(  # noqa: C901  (one dispatch; splitting it would only move the bran
             elif kind == SEND_ACK:
                 send_ack(g, p, st, fr, lk, lp, ptr, hs, hr, out, a, b, starts)
             elif kind == ACK_TIMEOUT:
-                ack_timeout(g, p, st, fr, hs, out, a, b, starts)
+                ack_timeout(g, p, st, fr, lk, hs, out, a, b, starts)
         else:
             kind, a = hr[0, 2], hr[0, 3]
             pop(hr, g, HR_N)

@@ -26,6 +26,9 @@ def _config(*, mode: str, listen: str | None, connect: str | None) -> zenoh.Conf
         "scouting/gossip/enabled": False,
         "listen/endpoints": [listen] if listen else [],
         "listen/exit_on_failure": True,
+        # Some seconds after its opening each session would map and zero 16 MB of shared memory, all at the same time:
+        # 45 of them stall two cores for half a second in the middle of a run. Frames are far too small to gain by it.
+        "transport/shared_memory/enabled": False,
         "connect/endpoints": [connect] if connect else [],
         "connect/exit_on_failure": True,
         "connect/timeout_ms": CONNECT_TIMEOUT_MS,

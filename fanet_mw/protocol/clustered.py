@@ -26,9 +26,10 @@ _HELLO_LIFETIMES: Final = 3.5
 """A neighbor is gone after this many silent hello intervals (OLSR's NEIGHB_HOLD_TIME is 3, RFC 3626 18.3)."""
 _UNICAST_TRIES: Final = 3
 """Parents tried for one packet at one node; below each the MAC makes its own attempts."""
-_JOIN_WINDOW_NS: Final = 1500 * MS
+_JOIN_WINDOW_NS: Final = 3 * S
+"""Joins are floods: spread, so that a swarm that starts together does not drown in them."""
 _REJOIN_NS: Final = 5 * S
-_CONTROL_JITTER_NS: Final = 50 * MS
+_CONTROL_JITTER_NS: Final = 100 * MS
 
 
 class Clustered(RoutingProtocol):
@@ -62,7 +63,7 @@ class Clustered(RoutingProtocol):
 
     def start(self, now_ns: int) -> None:
         if self._leader is None:
-            self._join_ns = now_ns + 200 * MS + int(self._random() * _JOIN_WINDOW_NS)
+            self._join_ns = now_ns + 500 * MS + int(self._random() * _JOIN_WINDOW_NS)
 
     def originate(self, packet: Packet, *, due_ns: int, now_ns: int) -> None:
         self._forward(packet, start_ns=due_ns, now_ns=now_ns, tries=0)

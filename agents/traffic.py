@@ -3,16 +3,13 @@
 Birth instants are whole microseconds, because that is what the header carries.
 """
 
+import math
 from collections.abc import Sequence
 from random import Random
-from typing import Final
 
 from fanet_mw.rng import stream
 from fanet_mw.scenario import Scenario
 from fanet_mw.units import US, NodeId, S
-
-SATURATION_DEPTH: Final = 2
-"""Packets a saturated source keeps outstanding at its radio: one in service, one behind it."""
 
 
 def sources_of(scenario: Scenario) -> Sequence[int]:
@@ -47,12 +44,18 @@ class Traffic:
 
     def __init__(self, scenario: Scenario, node: NodeId) -> None:
         self._kind = scenario.traffic.arrivals
+        self._lead_ms = math.ceil(scenario.radio.lead_ms)
         self._interval_ns = max(US, round(scenario.traffic.interval_s * S))
         start_ns, self._end_ns = scenario.traffic_window_ns
         self._random: Random = stream(scenario.seed, "traffic", node)
         self._next_ns: int | None = None
         if node in sources_of(scenario):
             self._next_ns = start_ns + self._first_gap_ns()
+
+    @property
+    def depth(self) -> int:
+        """Packets a saturated source keeps outstanding: one in service, and what is served within two leads."""
+        return 1 + 2 * self._lead_ms
 
     @property
     def saturated(self) -> bool:

@@ -9,7 +9,7 @@ from typing import Any, Final
 
 from agents.autopilot import Autopilot
 from agents.mission import Mission
-from agents.traffic import SATURATION_DEPTH, Traffic
+from agents.traffic import Traffic
 from fanet_mw import wire
 from fanet_mw.actor import Actor
 from fanet_mw.errors import DropReason, MalformedFrameError
@@ -78,7 +78,7 @@ class Uav(Actor):
         self._node.wake(now_ns)
         due_ns = self._traffic.next_ns()
         while due_ns is not None and due_ns - self._lead_ns <= now_ns:
-            for _ in range(SATURATION_DEPTH if self._traffic.saturated else 1):
+            for _ in range(self._traffic.depth if self._traffic.saturated else 1):
                 self._send_traffic(max(due_ns, now_ns), now_ns)
             self._traffic.advance()
             due_ns = self._traffic.next_ns()

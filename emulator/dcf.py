@@ -26,12 +26,15 @@ from emulator.state import (
     BORN,
     BUSY_NS,
     BUSY_SINCE,
+    COLLIDED,
     CS,
     CW,
     CW_MAX,
     CW_MIN,
     DATA,
+    DEAF,
     DELAY,
+    DELIVERED,
     DETECT_NS,
     DIFS_NS,
     DONE_ACKED,
@@ -41,16 +44,18 @@ from emulator.state import (
     DONE_SENT,
     DRAW_WHEN_INTERRUPTED,
     DST,
-    ENDED,
     EVERYONE,
+    EXPIRED,
     FATE,
     FATE_HALF_DUPLEX,
     FATE_OPEN,
     FRESH,
+    GIVEN_UP,
     HEAD,
     HR_N,
     HS_N,
     IDLE_FROM,
+    LAST_END,
     LIFETIME_NS,
     LINK_DST,
     LINK_FRAME,
@@ -59,12 +64,19 @@ from emulator.state import (
     LINK_SRC,
     LOCK,
     LOCK_HEADER_END,
+    LOST_COLLISION,
+    LOST_HALF_DUPLEX,
+    LOST_WEAK,
     MAX_ATTEMPTS,
     NAV,
     NEXT,
+    NO_RECEIVER,
+    NO_ROOM,
     NOTHING,
     ON_AIR,
     ON_AIR_COPIES,
+    ON_AIR_LIST,
+    ON_AIR_N,
     OPEN,
     OUT_DONE,
     OUT_FREE,
@@ -73,6 +85,8 @@ from emulator.state import (
     QLEN,
     QUEUE_LIMIT,
     RANDOM,
+    REACH_NS,
+    RECEIVED,
     RESUME_FROM,
     RETRIES,
     RX_DETECT,
@@ -91,6 +105,8 @@ from emulator.state import (
     UNICASTS_ENDED,
     WAIT_DIFS_FIRST,
     WAITING,
+    WANTS_STATUS,
+    WEAK,
     Ints,
     Reals,
 )
@@ -126,17 +142,37 @@ def release(g: Ints, fr: Ints, out: Ints, f: int, t: int) -> None:
     """One thing less that refers to a frame."""
     fr[OPEN, f] -= 1
     if fr[OPEN, f] == 0:
-        put(g, out, OUT_FREE, f, fr[SRC, f], t, 0, 0)
+        put(g, out, OUT_FREE, f, fr[SRC, f], t, verdict(fr, f), 0)
+
+
+@jit
+def verdict(fr: Ints, f: int) -> int:
+    """How a frame ended; of a broadcast that nobody got, why most copies were lost."""
+    outcome = fr[OUTCOME, f]
+    if fr[RECEIVED, f] > 0:
+        return DELIVERED
+    if outcome == DONE_FULL:
+        return NO_ROOM
+    if outcome == DONE_EXPIRED:
+        return EXPIRED
+    if fr[TARGETS, f] == 0:
+        return NO_RECEIVER
+    if outcome == DONE_RETRY:
+        return GIVEN_UP
+    most = max(fr[LOST_COLLISION, f], fr[LOST_HALF_DUPLEX, f], fr[LOST_WEAK, f])
+    if most == fr[LOST_COLLISION, f]:
+        return COLLIDED
+    return DEAF if most == fr[LOST_HALF_DUPLEX, f] else WEAK
 
 
 @jit
 def done(g: Ints, fr: Ints, out: Ints, f: int, outcome: int, t: int) -> None:
     """The MAC is through with a frame."""
     fr[OUTCOME, f] = outcome
-    fr[ENDED, f] = t
-    if outcome == DONE_ACKED or outcome == DONE_RETRY:
+    if outcome in (DONE_ACKED, DONE_RETRY):
         g[UNICASTS_ENDED] += 1
-    put(g, out, OUT_DONE, f, fr[SRC, f], t, outcome, fr[ATTEMPTS, f])
+    if fr[WANTS_STATUS, f] == 1:
+        put(g, out, OUT_DONE, f, fr[SRC, f], t, outcome, fr[ATTEMPTS, f])
     release(g, fr, out, f, t)
 
 
@@ -307,6 +343,8 @@ def begin_tx(
     st[TX_KIND, s] = kind
     st[TX_FRAME, s] = f
     st[TX_END, s] = t + airtime
+    st[ON_AIR_LIST, g[ON_AIR_N]] = s
+    g[ON_AIR_N] += 1
     push(hr, g, HR_N, t + airtime, TX_DONE, s, 0)
     for link in range(ptr[s], ptr[s + 1]):
         lp[ON_AIR, link] = lp[LINK_POWER, link]
@@ -322,10 +360,23 @@ def begin_tx(
 
 
 @jit
+def leave_air(g: Ints, st: Ints, s: int, t: int) -> None:
+    """Take a station off the list of those that transmit."""
+    last = g[ON_AIR_N] - 1
+    g[ON_AIR_N] = last
+    g[LAST_END] = t + g[REACH_NS]
+    for i in range(last):
+        if st[ON_AIR_LIST, i] == s:
+            st[ON_AIR_LIST, i] = st[ON_AIR_LIST, last]
+            return
+
+
+@jit
 def tx_done(g: Ints, p: Ints, st: Ints, fr: Ints, hs: Ints, out: Ints, s: int, t: int) -> None:
     """The last bit has left the antenna."""
     kind, f = st[TX_KIND, s], st[TX_FRAME, s]
     st[TX_KIND, s] = NOTHING
+    leave_air(g, st, s, t)
     if kind == DATA:
         if fr[DST, f] == EVERYONE:
             take_head(st, fr, s)

@@ -1,10 +1,15 @@
 """numba when it is installed, the same source uncompiled otherwise (slow: for debugging and coverage).
 
 FANET_NO_NUMBA=1 in the environment leaves functions uncompiled. Read here, once, and nowhere else.
+
+numba keeps machine code per function and looks only at that function's own file: after a change to `dcf.py` it would
+go on running the old code inlined into `kernel.py`. So the cache has a directory per state of the whole package.
 """
 
+import hashlib
 import os
 from collections.abc import Callable
+from pathlib import Path
 from typing import Any, TypeVar, cast
 
 F = TypeVar("F", bound=Callable[..., Any])
@@ -14,6 +19,14 @@ def _identity(function: F) -> F:
     return function
 
 
+def _fingerprint(folder: Path) -> str:
+    """What all sources of a package say, in short."""
+    digest = hashlib.sha256()
+    for path in sorted(folder.glob("*.py")):
+        digest.update(path.read_bytes())
+    return digest.hexdigest()[:16]
+
+
 def _decorator() -> Callable[[F], F]:
     if os.environ.get("FANET_NO_NUMBA"):
         return _identity
@@ -21,7 +34,18 @@ def _decorator() -> Callable[[F], F]:
         import numba
     except ImportError:
         return _identity
-    return cast("Callable[[F], F]", numba.njit(cache=True))
+    folder = Path(__file__).parent
+    everyone = numba.config.CACHE_DIR
+    ours = str(Path(everyone or folder / "__pycache__") / f"kernel-{_fingerprint(folder)}")
+
+    def compiled(function: F) -> F:
+        numba.config.CACHE_DIR = ours  # read when a function is decorated, and by others too: put it back
+        try:
+            return cast("F", numba.njit(cache=True)(function))
+        finally:
+            numba.config.CACHE_DIR = everyone
+
+    return compiled
 
 
 jit = _decorator()

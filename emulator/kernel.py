@@ -10,21 +10,28 @@ from emulator.jit import jit
 from emulator.phy import rx_detect, rx_end, rx_start
 from emulator.state import (
     ACCESS,
+    ACK_NS,
     ACK_TIMEOUT,
     AIRTIME,
     ARRIVE,
     BORN,
+    DIFS_NS,
     DST,
     FRAME_ROWS,
-    HEADER_NS,
+    HEAD,
     HR_N,
     HS_N,
+    LAST_END,
+    LIFETIME_NS,
     LINK_ROWS,
     NEXT,
     NOW,
+    ON_AIR_LIST,
+    ON_AIR_N,
     OPEN,
     OUT_N,
     QUEUE_LIMIT,
+    REACH_NS,
     RX_DETECT,
     RX_END,
     RX_START,
@@ -32,17 +39,23 @@ from emulator.state import (
     SEND_ACK,
     SRC,
     TX_DONE,
+    TX_END,
     UNDERWAY,
+    WAIT_DIFS_FIRST,
+    WAITING,
+    WANTS_STATUS,
     Ints,
     Reals,
 )
 
 MARGIN = 16
 """Rows that one event may need in the start heap."""
+_FEW = 128
+"""Planned starts that are worth looking at one by one."""
 
 
 @jit
-def submit(g: Ints, fr: Ints, hs: Ints, f: int, src: int, dst: int, airtime: int, t: int) -> None:
+def submit(g: Ints, fr: Ints, hs: Ints, f: int, src: int, dst: int, airtime: int, t: int, wants_status: int) -> None:
     """A frame will enter its station's MAC queue at `t`."""
     for row in range(FRAME_ROWS):
         fr[row, f] = 0
@@ -52,6 +65,7 @@ def submit(g: Ints, fr: Ints, hs: Ints, f: int, src: int, dst: int, airtime: int
     fr[BORN, f] = t
     fr[NEXT, f] = -1
     fr[OPEN, f] = 1
+    fr[WANTS_STATUS, f] = wants_status
     push(hs, g, HS_N, t, ARRIVE, f, 0)
 
 
@@ -78,24 +92,60 @@ def purge(g: Ints, st: Ints, hs: Ints) -> None:
 
 
 @jit
+def next_output(g: Ints, p: Ints, st: Ints, fr: Ints, hs: Ints) -> int:
+    """A lower bound of the instant of the next reception or ACK; NEVER when nothing is under way.
+
+    Frames on the air end when they end at their last receiver; others cannot end before they can start, plus their
+    airtime. The bound of a start is exact while few are planned and else the earliest event's. That a frame has
+    expired is told with the next output, which is within one airtime of its access.
+    """
+    bound = NEVER
+    for i in range(g[ON_AIR_N]):
+        bound = min(bound, st[TX_END, st[ON_AIR_LIST, i]] + g[REACH_NS])
+    if g[LAST_END] > g[NOW]:
+        bound = min(bound, g[LAST_END])
+    if g[HS_N] > _FEW:
+        return int(min(bound, max(hs[0, 0], g[NOW] + 1)))
+    for i in range(g[HS_N]):
+        if hs[i, 0] < bound:
+            bound = min(bound, earliest_end(p, st, fr, hs[i, 0], hs[i, 2], hs[i, 3], hs[i, 4]))
+    return int(bound)
+
+
+@jit
+def earliest_end(p: Ints, st: Ints, fr: Ints, t: int, kind: int, a: int, b: int) -> int:
+    """When the frame that an event may start can have ended at the earliest."""
+    if kind == ARRIVE:
+        return int(t + fr[AIRTIME, a] + (p[DIFS_NS] if p[WAIT_DIFS_FIRST] == 1 else 0))
+    if kind == SEND_ACK:
+        return int(t + p[ACK_NS])
+    if kind == ACK_TIMEOUT:
+        return int(t) if st[WAITING, a] == b else NEVER
+    if st[SCHEDULED, a] != t or st[HEAD, a] < 0:
+        return NEVER
+    f = st[HEAD, a]
+    return int(t) if t - fr[BORN, f] >= p[LIFETIME_NS] else int(t + fr[AIRTIME, f])
+
+
+@jit
 def advance(  # noqa: C901  (one dispatch; splitting it would only move the branches)
     g: Ints, p: Ints, pf: Reals, st: Ints, sf: Reals, fr: Ints, lk: Ints, lp: Reals, ptr: Ints, hs: Ints, hr: Ints,
     out: Ints, err: Reals, until: int,
-) -> bool:  # fmt: skip
-    """Process every event up to and including `until`. False: no room, drain and call again."""
+) -> int:  # fmt: skip
+    """Process every event up to and including `until`; returns `next_output`. -1: no room, drain and call again."""
     room = out.shape[0] - 2 * p[QUEUE_LIMIT] - 8  # one event may expire a whole queue
     while True:
         if g[OUT_N] >= room:
-            return False
+            return -1
         if g[HS_N] + MARGIN > hs.shape[0]:
             purge(g, st, hs)
             if g[HS_N] + MARGIN > hs.shape[0]:
-                return False
+                return -1
         starts = hs[0, 0] if g[HS_N] > 0 else NEVER
         ends = hr[0, 0] if g[HR_N] > 0 else NEVER
         if starts > until and ends > until:
             g[NOW] = until
-            return True
+            return next_output(g, p, st, fr, hs)
         if starts < ends or (starts == ends and hs[0, 1] < hr[0, 1]):
             kind, a, b = hs[0, 2], hs[0, 3], hs[0, 4]
             pop(hs, g, HS_N)
@@ -118,23 +168,6 @@ def advance(  # noqa: C901  (one dispatch; splitting it would only move the bran
                 rx_end(g, p, pf, st, sf, fr, lk, lp, hs, out, err, a, ends)
             elif kind == TX_DONE:
                 tx_done(g, p, st, fr, hs, out, a, ends)
-
-
-@jit
-def next_output(g: Ints, p: Ints, hs: Ints, hr: Ints) -> int:
-    """A lower bound of the instant of the next output row; NEVER when nothing is under way.
-
-    Only what is on the air can end, and only what starts can be on the air: the earliest end of a frame, or the
-    earliest start plus the time its preamble alone takes.
-    """
-    bound = NEVER
-    for i in range(g[HR_N]):
-        if hr[i, 0] < bound and (hr[i, 2] == RX_END or hr[i, 2] == TX_DONE):
-            bound = int(hr[i, 0])
-    if g[HS_N] > 0:
-        starts = hs[0, 0] if hs[0, 2] == ACK_TIMEOUT else hs[0, 0] + p[HEADER_NS]
-        bound = int(min(bound, starts))
-    return bound
 
 
 @jit

@@ -116,8 +116,11 @@ class Medium(Actor):
         if dst != BROADCAST and not 1 <= dst <= self._count:
             self._refuse(station, request, DropReason.NO_RECEIVER, now_ns)
             return
-        if not 0 < size <= self._scenario.radio.max_frame_bytes or request.start_ns > now_ns + _HORIZON_NS:
-            self._refuse(station, request, DropReason.TOO_LARGE if size else DropReason.MALFORMED, now_ns)
+        if size > self._scenario.radio.max_frame_bytes:
+            self._refuse(station, request, DropReason.TOO_LARGE, now_ns)
+            return
+        if not size or not -_HORIZON_NS < request.start_ns - now_ns < _HORIZON_NS:
+            self._refuse(station, request, DropReason.MALFORMED, now_ns)
             return
         late_ns = now_ns - request.start_ns
         if late_ns > 0:

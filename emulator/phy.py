@@ -30,6 +30,7 @@ from emulator.state import (
     FATE_HALF_DUPLEX,
     FATE_WEAK,
     HALF_DUPLEX_COPIES,
+    HANDED,
     HEADER_BITS_PER_NS,
     HEADER_NS,
     HS_N,
@@ -197,6 +198,7 @@ def data_end(
     g[RECEIVED_COPIES] += 1
     if fr[DST, f] == EVERYONE or fr[RECEIVED, f] == 0:
         fr[RECEIVED, f] += 1
+        st[HANDED, r] += 1
         millidbm = int(10_000.0 * math.log10(lp[ON_AIR, link]))
         put(g, out, OUT_RECEPTION, f, r, t, millidbm, 0)
     if fr[DST, f] == r:

@@ -46,8 +46,10 @@ Reals = npt.NDArray[np.float64]
     BUSY_SINCE,  # -1 idle
     BUSY_NS,  # busy time so far
     RANDOM,  # state of the station's generator
+    HANDED,  # receptions handed to the station
+    ON_AIR_LIST,  # not by station: the first ON_AIR_N entries name the stations that transmit
     STATION_ROWS,
-) = range(27)
+) = range(29)
 NOTHING: Final = 0
 DATA: Final = 1
 ACK: Final = 2
@@ -67,11 +69,11 @@ POWER, LOG_OK, STATION_REALS = range(3)
     RECEIVED,  # copies received, duplicates of a unicast not counted
     OPEN,  # receptions still under way, plus 1 while the MAC holds the frame
     OUTCOME,
-    ENDED,  # when the MAC was done with it
     LOST_COLLISION,
     LOST_HALF_DUPLEX,
     LOST_WEAK,
     TARGETS,  # copies in range at the last attempt
+    WANTS_STATUS,
     FRAME_ROWS,
 ) = range(15)
 EVERYONE: Final = -1
@@ -90,10 +92,14 @@ ARRIVE, ACCESS, SEND_ACK, ACK_TIMEOUT, TX_DONE, RX_START, RX_DETECT, RX_END = ra
 
 # --- outputs (out): kind, frame, station, t_ns, rssi in 1/1000 dBm, attempts ------------------------------------------
 OUT_RECEPTION, OUT_DONE, OUT_FREE, OUT_COLUMNS = 0, 1, 2, 6
-"""A copy was decoded; the MAC is done with a frame (a = outcome); nothing refers to the slot any more."""
+"""A copy was decoded; the MAC is done with a frame that wants a status (value: outcome); nothing refers to the slot
+any more (value: verdict)."""
 
 DONE_SENT, DONE_ACKED, DONE_RETRY, DONE_FULL, DONE_EXPIRED = range(5)
 """Outcomes; the values of `messages.TxOutcome`."""
+
+DELIVERED, NO_RECEIVER, COLLIDED, DEAF, WEAK, GIVEN_UP, NO_ROOM, EXPIRED = range(8)
+"""Verdicts: how a frame ended for its receivers."""
 
 # --- globals (g) --------------------------------------------------------------------------------------------------
 (
@@ -111,9 +117,11 @@ DONE_SENT, DONE_ACKED, DONE_RETRY, DONE_FULL, DONE_EXPIRED = range(5)
     ATTEMPTS_FAILED,
     UNICASTS_ENDED,
     RETRIES,
-    MEASURED_FROM,
+    ON_AIR_N,  # stations transmitting
+    LAST_END,  # when the last frame to leave its antenna has ended at its last receiver
+    REACH_NS,  # longest delay of an audible link
     GLOBALS,
-) = range(16)
+) = range(18)
 
 # --- parameters (p, pf) -------------------------------------------------------------------------------------------
 (

@@ -36,7 +36,7 @@ def summarize(outcome: Outcome, *, trace_sha256: str) -> dict[str, Any]:
         **packets["traffic"],
         "reports": packets["report"],
         "frames": _ledger(outcome, emulator),
-        "copies": emulator.get("copies", {}),
+        "copies": _copies(outcome, emulator),
         "air": emulator.get("air", {}),
         "lateness": _lateness(outcome, emulator),
         "mission": _mission(outcome),
@@ -135,6 +135,15 @@ def _ledger(outcome: Outcome, emulator: Mapping[str, Any]) -> dict[str, Any]:
         "dropped": dropped,
         "closes": sent == counted["delivered"] + in_flight + sum(dropped.values()),
     }
+
+
+def _copies(outcome: Outcome, emulator: Mapping[str, Any]) -> dict[str, Any]:
+    """The ledger at receivers, and how many of the copies handed to the bus the nodes have heard."""
+    if not emulator:
+        return {}
+    agents = [report for report in outcome.reports.values() if report.get("kind") == "agent"]
+    heard = sum(report["receptions"] for report in agents)
+    return {**emulator["copies"], "handed": sum(emulator["handed"].values()), "heard": heard}
 
 
 def _lateness(outcome: Outcome, emulator: Mapping[str, Any]) -> dict[str, Any]:

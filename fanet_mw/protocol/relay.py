@@ -64,5 +64,3 @@ class Relay:
             _, key = heapq.heappop(self._due)
             relays.append(self._pending.pop(key)[1])
         return relays
-
-

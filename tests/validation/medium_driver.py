@@ -13,7 +13,6 @@ from fanet_mw.rng import stream
 from fanet_mw.topics import Topics
 from fanet_mw.units import BROADCAST, NodeId, seconds_to_ns
 
-FRAME = bytes(1024)
 Place = tuple[float, float]
 
 
@@ -49,15 +48,18 @@ def contention(
     interval_s: float,
     sources: Sequence[int],
     arrivals: str = "cbr",
-    dst: NodeId = BROADCAST,
+    dst: NodeId | None = BROADCAST,
+    size: int = 1024,
     duration_s: float = 10.0,
+    drain_s: float = 0.0,
     seed: int = 1,
     warmup_s: float = 0.0,
     **radio: Any,
 ) -> dict[str, Any]:
-    """Every source (a node id) sends 1024 bytes to `dst` at `interval_s`, in random phase or as a Poisson process.
+    """Every source (a node id) sends `size` bytes to `dst` at `interval_s`, in random phase or as a Poisson process.
 
-    The report, with `pdr_generated`: unique receptions over requests times targets.
+    `dst` None: to the next node. The last request is `drain_s` before the end. Returns the report, with
+    `pdr_generated`: unique receptions over requests times targets.
     """
     air = medium(len(places), duration_s=duration_s, seed=seed, warmup_s=warmup_s, **radio)
     topics = Topics("v")
@@ -74,18 +76,20 @@ def contention(
     heapq.heapify(due)
     seq = dict.fromkeys(sources, 0)
     topic_of = {n: topics.radio_tx(n) for n in sources}
-    end_ns = seconds_to_ns(duration_s)
+    dst_of = {n: NodeId(n % len(places) + 1) if dst is None else dst for n in sources}
+    frame = bytes(size)
+    last_ns, end_ns = seconds_to_ns(duration_s - drain_s), seconds_to_ns(duration_s)
     receptions = 0
     while True:
         wake_ns = air.next_wake_ns()
-        t_ns, node = due[0]
+        t_ns, node = due[0] if due[0][0] < last_ns else (end_ns, 0)
         if min(t_ns, end_ns if wake_ns is None else wake_ns) >= end_ns:
             break
         if wake_ns is not None and wake_ns <= t_ns:
             air.wake(wake_ns)
         else:
             heapq.heapreplace(due, (t_ns + gap_ns(), node))
-            air.receive(topic_of[node], TxRequest(seq[node], t_ns, FRAME, dst, wants_status=False), t_ns)
+            air.receive(topic_of[node], TxRequest(seq[node], t_ns, frame, dst_of[node], wants_status=False), t_ns)
             seq[node] += 1
         receptions += sum(1 for _, message in air.outbox if type(message) is Reception)
         air.outbox.clear()

@@ -1,1 +1,0 @@
-"""Radios: what a node transmits through."""

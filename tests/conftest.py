@@ -1,0 +1,33 @@
+"""Fixtures shared by all tests."""
+
+from collections.abc import Callable
+from typing import Any
+
+import pytest
+from hypothesis import settings
+
+from fanet_mw import config
+from fanet_mw.scenario import Scenario
+
+settings.register_profile("default", deadline=None)  # first calls compile; timing belongs in benchmarks
+settings.load_profile("default")
+
+MakeScenario = Callable[..., Scenario]
+
+
+@pytest.fixture
+def make_scenario() -> MakeScenario:
+    """Build a scenario from dotted keys: `make_scenario(**{"nodes.count": 3})`. Small and quiet by default."""
+
+    def make(**keys: Any) -> Scenario:
+        tree: dict[str, Any] = {}
+        defaults = {"clusters.count": 1, "nodes.telemetry_hz": 0, "duration_s": 10}
+        for key, value in {**defaults, **keys}.items():
+            *path, last = key.split(".")
+            table = tree
+            for part in path:
+                table = table.setdefault(part, {})
+            table[last] = value
+        return config.build(tree)
+
+    return make

@@ -1,0 +1,134 @@
+"""Whole swarms in virtual time: every layer is the real one."""
+
+from collections.abc import Callable
+from typing import Any
+
+import pytest
+
+from fanet_mw import wire
+from fanet_mw.scenario import Scenario
+from fanet_mw.trace import Approaching, Delivered, Generated, RoleChanged
+from fanet_mw.units import MS, S
+from sim import catalog
+from sim.outcome import Outcome
+from sim.results import finish
+from sim.run import simulate
+
+MakeScenario = Callable[..., Scenario]
+
+
+def summary_of(scenario: Scenario) -> dict[str, Any]:
+    return finish(simulate(scenario), out=None)
+
+
+@pytest.fixture(scope="module")
+def quick() -> Outcome:
+    return simulate(catalog.find("quick"))
+
+
+@pytest.mark.parametrize("name", [entry.name for entry in catalog.shipped()])
+def test_the_ledger_closes_and_copies_add_up_in_every_shipped_scenario(name: str) -> None:
+    summary = summary_of(catalog.find(name, ["duration_s=8", "warmup_s=0", "drain_s=1"]))
+    frames, copies = summary["frames"], summary["copies"]
+    assert frames["sent"] > 0
+    assert frames["closes"]
+    assert copies["handed"] == copies["heard"]
+    settled = copies["received"] + sum(copies["lost"].values())
+    assert settled <= copies["on_air"] <= settled + 44 * 44, "only what is on the air at the end is open"
+
+
+def test_the_same_seed_gives_the_same_trace_and_another_seed_another(quick: Outcome) -> None:
+    first = finish(quick, out=None)["trace_sha256"]
+    assert summary_of(catalog.find("quick"))["trace_sha256"] == first
+    assert summary_of(catalog.find("quick", ["seed=2"]))["trace_sha256"] != first
+
+
+def test_nodes_join_and_the_leader_makes_balanced_clusters(quick: Outcome) -> None:
+    roles = {record.node: record for record in quick.records if isinstance(record, RoleChanged)}
+    heads = {node for node, record in roles.items() if record.role == "head"}
+    assert sorted(roles) == list(range(2, 10)), "all but the leader are in a cluster"
+    assert len(heads) == 2
+    assert all(record.head in heads for record in roles.values())
+
+
+def test_every_source_reaches_every_other_node(quick: Outcome) -> None:
+    traffic = {(r.node, r.seq) for r in quick.records if isinstance(r, Generated) and r.app == "traffic"}
+    reached = {(r.origin, r.node) for r in quick.records if isinstance(r, Delivered) and (r.origin, r.seq) in traffic}
+    assert reached == {(a, b) for a in range(1, 10) for b in range(1, 10) if a != b}
+
+
+def test_nothing_is_delivered_twice_or_to_its_origin(quick: Outcome) -> None:
+    deliveries = [(r.node, r.origin, r.seq) for r in quick.records if isinstance(r, Delivered)]
+    assert len(deliveries) == len(set(deliveries))
+    assert all(node != origin for node, origin, _ in deliveries)
+
+
+def test_a_uav_approaches_only_after_reports_of_enough_different_nodes(quick: Outcome) -> None:
+    approaches = [record for record in quick.records if isinstance(record, Approaching)]
+    assert approaches, "the scenario has survivors in range"
+    assert all(record.reporters >= 3 for record in approaches)
+    reports = {(r.node, r.seq) for r in quick.records if isinstance(r, Generated) and r.app == "report"}
+    for approach in approaches:
+        origins = {
+            r.origin
+            for r in quick.records
+            if isinstance(r, Delivered)
+            and r.node == approach.node
+            and (r.origin, r.seq) in reports
+            and r.t_ns <= approach.t_ns
+        }
+        assert len(origins) >= 3
+
+
+def test_what_the_network_delivers_changes_the_flight() -> None:
+    """The same swarm on a radio that reaches nobody: survivors are detected, nobody approaches."""
+    deaf = summary_of(catalog.find("quick", ["radio.range_m=1"]))
+    assert deaf["mission"]["detected"] > 0
+    assert deaf["mission"]["uavs_approaching"] == 0
+    assert deaf["frames"]["closes"]
+
+
+def test_floods_leave_their_head_only_in_its_slot(make_scenario: MakeScenario) -> None:
+    from fanet_mw.hosts.virtual import VirtualHost
+    from fanet_mw.messages import TxRequest
+    from fanet_mw.topics import Topics, node_of
+    from sim.run import actors_of
+
+    scenario = catalog.find("quick", ["mission.survivors=0", "duration_s=15"])
+    sent: list[tuple[int, TxRequest]] = []
+
+    def hear(topic: str, message: object) -> None:
+        if isinstance(message, TxRequest):
+            sent.append((node_of(topic), message))
+
+    actors = actors_of(scenario, "slots")
+    records: list[Any] = []
+    host = VirtualHost(actors, on_records=records.extend, listeners=[(Topics("slots").all_tx, hear)])
+    host.start()
+    host.run(scenario.duration_ns)
+    host.stop()
+    cluster_of = {r.node: r.cluster for r in records if isinstance(r, RoleChanged) and r.role == "head"}
+    releases = 0
+    seen: set[tuple[int, int]] = set()
+    for node, request in sent:
+        header = wire.decode_header(request.frame)
+        flooded = header.flags & wire.FLAG_FLOOD and header.kind == wire.Kind.DATA
+        if not flooded or (header.origin, header.seq) in seen:
+            continue  # relays come after the head's own release
+        seen.add((header.origin, header.seq))
+        phase_ns = request.start_ns % (1 * S) - cluster_of[node] * 500 * MS
+        assert 0 <= phase_ns < 500 * MS - 2 * MS
+        releases += 1
+    assert releases > 50
+
+
+def test_a_simulation_of_a_thousand_nodes_closes_its_ledger(make_scenario: MakeScenario) -> None:
+    scenario = make_scenario(
+        **{
+            "nodes.count": 1000, "routing.protocol": "flooding", "routing.hello_interval_s": 0, "radio.lead_ms": 0,
+            "routing.hop_limit": 100, "traffic.sources": 1, "duration_s": 3, "drain_s": 1,
+        }
+    )  # fmt: skip
+    summary = summary_of(scenario)
+    assert summary["frames"]["closes"]
+    assert summary["pdr"] > 0.9

@@ -1,0 +1,222 @@
+"""The air, computed by hand to the microsecond: DSSS 11 Mb/s, long preamble, 1024 B payload = 984 us, ACK 203 us."""
+
+from array import array
+from collections.abc import Callable
+from typing import NamedTuple
+
+import pytest
+
+from emulator.airtime import frame_ns
+from emulator.medium import Medium
+from fanet_mw.messages import Message, Poses, Reception, TxOutcome, TxRequest, TxStatus
+from fanet_mw.scenario import Scenario
+from fanet_mw.topics import Topics, node_of
+from fanet_mw.units import BROADCAST, MS, US, NodeId
+
+FRAME_NS, ACK_NS, DIFS_NS, SIFS_NS, SLOT_NS = 984 * US, 203 * US, 50 * US, 10 * US, 20 * US
+PAYLOAD = bytes(1024)
+NAMES = Topics("test")
+
+
+class Heard(NamedTuple):
+    """One output of the medium."""
+
+    node: int
+    message: Message
+
+
+class Air:
+    """A medium, hand-driven."""
+
+    def __init__(self, scenario: Scenario, places_m: list[float]) -> None:
+        self.medium = Medium(scenario, "test")
+        self.medium.start(0)
+        self.place(places_m, 0)
+        self._seq = [0] * (len(places_m) + 1)
+
+    def place(self, places_m: list[float], t_ns: int) -> None:
+        ids = array("H", range(1, len(places_m) + 1))
+        states = array("d", [value for east in places_m for value in (east, 0.0, 50.0, 0.0, 0.0, 0.0)])
+        self.medium.receive(NAMES.pose, Poses(t_ns, ids, states), t_ns)
+
+    def send(self, src: int, at_ns: int, *, dst: int = BROADCAST, now_ns: int = 0, payload: bytes = PAYLOAD) -> None:
+        request = TxRequest(self._seq[src], at_ns, payload, NodeId(dst), wants_status=True)
+        self._seq[src] += 1
+        self.medium.receive(NAMES.radio_tx(src), request, now_ns)
+
+    def run(self, until_ns: int = 1000 * MS) -> list[Heard]:
+        heard = []
+        while (wake_ns := self.medium.next_wake_ns()) is not None and wake_ns <= until_ns:
+            self.medium.wake(wake_ns)
+            heard += [Heard(node_of(topic), message) for topic, message in self.medium.outbox]
+            self.medium.outbox.clear()
+        self.medium.stop(until_ns)
+        return heard + [Heard(node_of(topic), message) for topic, message in self.medium.outbox]
+
+
+def receptions(heard: list[Heard]) -> list[tuple[int, int, int]]:
+    """(receiver, transmitter, end)."""
+    return [(h.node, h.message.src, h.message.end_ns) for h in heard if isinstance(h.message, Reception)]
+
+
+def statuses(heard: list[Heard]) -> list[tuple[int, TxOutcome, int, int]]:
+    """(sender, outcome, end, attempts)."""
+    found = [(h.node, h.message) for h in heard if isinstance(h.message, TxStatus)]
+    return [(node, message.outcome, message.end_ns, message.attempts) for node, message in found]
+
+
+MakeScenario = Callable[..., Scenario]
+
+
+@pytest.fixture(params=["ns3", "standard"])
+def access(request: pytest.FixtureRequest) -> str:
+    return str(request.param)
+
+
+def test_airtimes_are_the_standards() -> None:
+    assert frame_ns(1088, rate_mbps=11, short=False) == FRAME_NS
+    assert frame_ns(14, rate_mbps=11, short=False) == ACK_NS
+    assert frame_ns(14, rate_mbps=1, short=False) == (192 + 112) * US
+    assert frame_ns(1088, rate_mbps=5.5, short=True) == (96 + 1583) * US
+    assert frame_ns(100, rate_mbps=1, short=True) == (192 + 800) * US, "1 Mb/s knows no short preamble"
+
+
+def test_a_lone_broadcast_waits_one_difs_as_ns3_has_it(make_scenario: MakeScenario) -> None:
+    air = Air(make_scenario(**{"nodes.count": 2, "radio.access": "ns3"}), [0, 200])
+    air.send(1, 1 * MS)
+    assert receptions(air.run()) == [(2, 1, 1 * MS + DIFS_NS + FRAME_NS + 667)]
+
+
+def test_a_lone_broadcast_on_a_long_idle_medium_goes_at_once_as_the_standard_has_it(
+    make_scenario: MakeScenario,
+) -> None:
+    air = Air(make_scenario(**{"nodes.count": 2}), [0, 200])
+    air.send(1, 1 * MS)
+    assert receptions(air.run()) == [(2, 1, 1 * MS + FRAME_NS + 667)]
+
+
+def test_unicast_is_acknowledged_after_sifs(make_scenario: MakeScenario) -> None:
+    air = Air(make_scenario(**{"nodes.count": 2}), [0, 150])
+    air.send(1, 1 * MS, dst=2)
+    heard = air.run()
+    there_ns = 1 * MS + FRAME_NS + 500
+    assert receptions(heard) == [(2, 1, there_ns)]
+    assert statuses(heard) == [(1, TxOutcome.ACKED, there_ns + SIFS_NS + ACK_NS + 500, 1)]
+
+
+def test_unicast_to_a_station_out_of_range_is_given_up_after_seven_attempts(make_scenario: MakeScenario) -> None:
+    air = Air(make_scenario(**{"nodes.count": 2}), [0, 400])
+    air.send(1, 1 * MS, dst=2)
+    ((node, outcome, _, attempts),) = statuses(air.run())
+    assert (node, outcome, attempts) == (1, TxOutcome.RETRY_LIMIT, 7)
+    assert air.medium.report()["frames"]["dropped"] == {"no_receiver": 1}
+
+
+def test_a_frame_queued_during_anothers_difs_collides_as_ns3_has_it(make_scenario: MakeScenario) -> None:
+    air = Air(make_scenario(**{"nodes.count": 3, "radio.access": "ns3"}), [0, 100, 200])
+    air.send(1, 1 * MS)
+    air.send(3, 1 * MS + 2 * US)
+    assert receptions(air.run()) == []
+    report = air.medium.report()
+    assert report["frames"]["dropped"] == {"collision": 2}
+    assert report["copies"] == {"on_air": 4, "received": 0, "lost": {"collision": 2, "half_duplex": 2}}
+
+
+def test_a_frame_queued_while_the_medium_is_busy_waits_for_it_difs_and_its_backoff(
+    make_scenario: MakeScenario, access: str
+) -> None:
+    air = Air(make_scenario(**{"nodes.count": 2, "radio.access": access}), [0, 150])
+    air.send(1, 1 * MS)
+    air.send(2, 1 * MS + 300 * US)
+    first, second = receptions(air.run())
+    backoff_ns = second[2] - first[2] - DIFS_NS - FRAME_NS - 500
+    assert backoff_ns % SLOT_NS == 0
+    assert 0 <= backoff_ns <= 31 * SLOT_NS
+
+
+def test_a_backoff_freezes_while_the_medium_is_busy(make_scenario: MakeScenario) -> None:
+    """Three stations queue while a fourth transmits: later backoffs go on where they stood, none starts anew."""
+    air = Air(make_scenario(**{"nodes.count": 4, "seed": 3}), [0, 1, 2, 3])
+    air.send(1, 1 * MS)
+    for node in (2, 3, 4):
+        air.send(node, 1 * MS + 300 * US)
+    ends = [end for receiver, _, end in receptions(air.run()) if receiver == 1]
+    first_end = 1 * MS + FRAME_NS
+    gaps = [later - earlier - FRAME_NS - DIFS_NS for earlier, later in zip([first_end, *ends], ends, strict=False)]
+    assert sum(gaps) <= 31 * SLOT_NS + 100, "all counted the same idle slots"
+    assert all(gap >= -100 for gap in gaps)
+
+
+def test_hidden_terminals_collide_in_the_middle_and_do_not_hear_each_other(make_scenario: MakeScenario) -> None:
+    air = Air(make_scenario(**{"nodes.count": 3}), [0, 200, 400])
+    air.send(1, 1 * MS)
+    air.send(3, 1 * MS + 500 * US)
+    assert receptions(air.run()) == []
+
+
+def test_a_colliding_pair_backs_off_and_both_arrive(make_scenario: MakeScenario) -> None:
+    air = Air(make_scenario(**{"nodes.count": 3}), [0, 200, 400])
+    air.send(1, 1 * MS, dst=2)
+    air.send(3, 1 * MS, dst=2)
+    heard = air.run()
+    assert sorted(outcome for _, outcome, _, _ in statuses(heard)) == [TxOutcome.ACKED] * 2
+    assert sorted((receiver, src) for receiver, src, _ in receptions(heard)) == [(2, 1), (2, 3)]
+    assert max(attempts for *_, attempts in statuses(heard)) > 1
+
+
+def test_a_station_that_moves_out_of_range_in_mid_frame_still_gets_that_frame_and_not_the_next(
+    make_scenario: MakeScenario,
+) -> None:
+    air = Air(make_scenario(**{"nodes.count": 2}), [0, 200])
+    air.send(1, 1 * MS)
+    air.place([0, 900], 1 * MS + 500 * US)
+    air.send(1, 5 * MS, now_ns=2 * MS)
+    assert receptions(air.run()) == [(2, 1, 1 * MS + FRAME_NS + 667)]
+
+
+def test_the_queue_limit_and_the_lifetime_drop_with_their_reasons(make_scenario: MakeScenario) -> None:
+    air = Air(make_scenario(**{"nodes.count": 2, "radio.queue_frames": 5, "radio.lifetime_ms": 3}), [0, 100])
+    for _ in range(8):
+        air.send(1, 1 * MS)
+    dropped = air.run() and air.medium.report()["frames"]["dropped"]
+    assert dropped["mac_queue_full"] == 3
+    assert dropped["mac_lifetime"] >= 2
+
+
+def test_late_requests_are_counted_and_very_late_ones_dropped(make_scenario: MakeScenario) -> None:
+    air = Air(make_scenario(**{"nodes.count": 2}), [0, 100])
+    air.send(1, 8 * MS, now_ns=10 * MS)
+    air.send(1, 10 * MS, now_ns=70 * MS)
+    heard = air.run()
+    report = air.medium.report()
+    assert report["late"]["late_frames"] == 2
+    assert report["frames"]["dropped"] == {"late": 1}
+    assert [outcome for _, outcome, _, _ in statuses(heard)] == [TxOutcome.LATE, TxOutcome.SENT]
+
+
+def test_hostile_requests_are_counted_and_never_raised(make_scenario: MakeScenario) -> None:
+    air = Air(make_scenario(**{"nodes.count": 2}), [0, 100])
+    air.send(1, 1 * MS, dst=77)
+    air.send(1, 1 * MS, payload=bytes(5000))
+    air.send(1, 1 * MS, payload=b"")
+    air.send(1, 2**62)
+    request = TxRequest(0, 0, PAYLOAD, BROADCAST, wants_status=False)
+    for topic in (NAMES.radio_tx(9), NAMES.radio_tx("x"), "nonsense", NAMES.radio_tx(0)):
+        air.medium.receive(topic, request, 0)
+    air.medium.receive(NAMES.pose, Poses(0, array("H", [1, 2]), array("d", [0.0] * 6)), 0)
+    air.medium.receive(NAMES.pose, Poses(0, array("H", [1]), array("d", [float("nan")] * 6)), 0)
+    air.medium.receive(NAMES.radio_tx(1), TxStatus(0, TxOutcome.SENT, 0, 0), 0)
+    assert receptions(air.run()) == []
+    report = air.medium.report()
+    assert report["frames"]["dropped"] == {"malformed": 2, "no_receiver": 1, "too_large": 1}
+    assert report["refused"] == {"message_type": 1, "poses": 2, "unknown_station": 4}
+
+
+def test_a_gap_in_a_nodes_sequence_is_frames_that_the_bus_lost(make_scenario: MakeScenario) -> None:
+    air = Air(make_scenario(**{"nodes.count": 2}), [0, 100])
+    air.send(1, 1 * MS)
+    air._seq[1] += 3
+    air.send(1, 3 * MS)
+    air.run()
+    frames = air.medium.report()["frames"]
+    assert frames == {"sent": 5, "delivered": 2, "in_flight": 0, "dropped": {"bus": 3}}

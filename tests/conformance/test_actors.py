@@ -1,0 +1,110 @@
+"""The actor contract, run against every actor of a swarm: hostile input is counted, time only goes on."""
+
+from array import array
+from collections.abc import Callable
+
+import pytest
+from hypothesis import HealthCheck, given, settings
+from hypothesis import strategies as st
+
+from agents.uav import Uav
+from emulator.medium import Medium
+from fanet_mw import wire
+from fanet_mw.actor import Actor
+from fanet_mw.messages import (
+    Gps,
+    MavlinkTap,
+    Message,
+    Poses,
+    Reception,
+    Setpoint,
+    TxOutcome,
+    TxRequest,
+    TxStatus,
+    WifiScan,
+)
+from fanet_mw.scenario import Scenario
+from fanet_mw.topics import Topics
+from fanet_mw.units import MS, Enu, NodeId
+from sim import catalog
+from sim.world import World
+
+NAMES = Topics("contract")
+SCENARIO = catalog.find("quick", ["world.engine=kinematic"])
+MAKERS: list[Callable[[Scenario], Actor]] = [
+    lambda scenario: Uav(scenario, NodeId(1), "contract", position=Enu(0, 0, 50)),
+    lambda scenario: Uav(scenario, NodeId(2), "contract", position=Enu(0, 0, 50)),
+    lambda scenario: Medium(scenario, "contract"),
+    lambda scenario: World(scenario, "contract"),
+]
+
+anything = st.floats(allow_nan=True, allow_infinity=True)
+vectors = st.builds(Enu, anything, anything, anything)
+instants = st.integers(-(2**62), 2**62)
+MEMBERS = (wire.Member(2, 0, is_head=True), wire.Member(3, 0, is_head=False))
+HEADER = wire.Header(5, 1, 3, 0xFFFF, 3, 0, 32, 0, 3, 1).encode()
+frames = st.one_of(
+    st.binary(max_size=60),
+    st.binary(max_size=60).map(lambda tail: HEADER + tail),
+    st.builds(
+        lambda seq, kind, flags, priority, tail: (
+            wire.Header(5, seq, 3, 0xFFFF, 3, kind, 32, 0, priority, flags).encode() + tail
+        ),
+        st.integers(0, 50), st.integers(0, 4), st.integers(0, 3), st.integers(0, 3),
+        st.one_of(
+            st.binary(max_size=30),
+            st.just(wire.Join(3, Enu(1, 2, 3)).encode_frame(3)),
+            st.just(wire.Survivor(1, 1, 3, Enu(1, 2, 3), -60.0).encode_frame(3)),
+            st.builds(
+                lambda slot, period: wire.Schedule(
+                    0, max(slot, period), slot, 1, 1, 2, 0, 1, MEMBERS
+                ).encode_frame(1),
+                st.integers(1, 2**31), st.integers(1, 2**31),
+            ),
+        ),
+    ),
+)  # fmt: skip
+hostile: st.SearchStrategy[Message] = st.one_of(
+    st.builds(Reception, frames, st.integers(0, 0xFFFF).map(NodeId), instants, anything),
+    st.builds(TxStatus, st.integers(0, 99), st.sampled_from(TxOutcome), instants, st.integers(0, 255)),
+    st.builds(
+        TxRequest, st.integers(0, 2**32 - 1), instants, frames, st.integers(0, 0xFFFF).map(NodeId), st.booleans()
+    ),
+    st.builds(Setpoint, instants, vectors, anything),
+    st.builds(WifiScan, instants, st.just(((1, -50.0),))),
+    st.builds(
+        lambda ids, states: Poses(0, array("H", ids), array("d", states)),
+        st.lists(st.integers(0, 12), max_size=4), st.lists(anything, max_size=24),
+    ),
+    st.builds(MavlinkTap, instants, st.binary(max_size=9)),
+    st.builds(Gps, instants, st.just(Enu(1, 2, 3)), st.just(Enu(0, 0, 0))),
+)  # fmt: skip
+topics = st.sampled_from(
+    [NAMES.radio_tx(1), NAMES.radio_tx(77), NAMES.radio_rx(1), NAMES.pose, NAMES.setpoint(2), NAMES.setpoint(99),
+     NAMES.sensor(1, "gps"), "nonsense", ""]
+)  # fmt: skip
+
+
+@pytest.mark.parametrize("make", MAKERS, ids=["leader", "member", "medium", "world"])
+@settings(max_examples=60, suppress_health_check=[HealthCheck.too_slow])
+@given(script=st.lists(st.tuples(topics, hostile, st.integers(0, 300 * MS)), max_size=25))
+def test_any_messages_on_any_topics_never_raise_and_the_actor_lives_on(
+    make: Callable[[Scenario], Actor], script: list[tuple[str, Message, int]]
+) -> None:
+    actor = make(SCENARIO)
+    now_ns = 0
+    actor.start(now_ns)
+    for topic, message, pause_ns in script:
+        actor.receive(topic, message, now_ns)
+        until_ns = now_ns + pause_ns
+        turns = 0
+        while (wake_ns := actor.next_wake_ns()) is not None and wake_ns <= until_ns:
+            now_ns = max(now_ns, wake_ns)
+            actor.wake(now_ns)
+            turns += 1
+            assert turns < 10_000, "an actor that lets no time pass"
+        now_ns = until_ns
+        actor.outbox.clear()
+        actor.records.clear()
+    actor.stop(now_ns)
+    assert actor.report()["kind"] in ("agent", "emulator", "world")

@@ -1,0 +1,196 @@
+"""Real processes over real Zenoh: short, bounded, and nothing left behind."""
+
+import asyncio
+import json
+import os
+import signal
+import socket
+import subprocess
+import sys
+import time
+from collections.abc import Iterator
+from pathlib import Path
+from typing import Any
+
+import pytest
+
+from fanet_mw import tlog
+from fanet_mw.errors import BusError
+from fanet_mw.scenario import Scenario
+from fanet_mw.trace import ProcessEnded
+from sim import catalog
+from sim.outcome import Outcome
+from sim.results import finish
+from sim.swarm import Swarm, launch
+
+FAST = ["duration_s=6", "warmup_s=3", "drain_s=1", "clusters.flooding_period_s=0.5"]
+
+
+def scenario(*overrides: str) -> Scenario:
+    return catalog.find("quick", [*FAST, *overrides])
+
+
+def run(chosen: Scenario, *, at_s: float | None = None, act: Any = None, **options: Any) -> tuple[Outcome, list[str]]:
+    """Launch; when `at_s` wall seconds after the start of the run have passed, do `act(swarm)`."""
+    events: list[str] = []
+
+    def started(swarm: Swarm) -> None:
+        async def later() -> None:
+            while swarm._clock is None or swarm._clock.now_ns() < at_s * 1e9:
+                await asyncio.sleep(0.02)
+            act(swarm)
+
+        if act is not None:
+            swarm.task = asyncio.ensure_future(later())  # type: ignore[attr-defined]  # kept from the collector
+
+    outcome = asyncio.run(launch(chosen, swarm="test", on_event=events.append, on_started=started, **options))
+    return outcome, events
+
+
+def kill(name: str) -> Any:
+    return lambda swarm: os.kill(swarm.processes.pid(name), signal.SIGKILL)
+
+
+@pytest.fixture(autouse=True)
+def _nothing_left_behind() -> Iterator[None]:
+    yield
+    mine = subprocess.run(["ps", "-eo", "pid,ppid,stat,args"], capture_output=True, text=True, check=True).stdout
+    left = [line for line in mine.splitlines() if "_child" in line and " Z" not in line]
+    assert left == []
+
+
+def test_a_swarm_of_processes_delivers_and_accounts_for_every_frame(tmp_path: Path) -> None:
+    outcome, _ = run(scenario())
+    summary = finish(outcome, out=tmp_path / "out")
+    assert summary["mode"] == "realtime"
+    assert summary["frames"]["closes"]
+    assert summary["frames"]["sent"] > 100
+    assert summary["pdr"] > 0.5
+    assert summary["lateness"]["frames"] >= summary["frames"]["sent"] - summary["frames"]["in_flight"]
+    assert {report["host"]["malformed"] for report in outcome.reports.values()} == {0}
+    assert json.loads((tmp_path / "out/summary.json").read_text())["trace_sha256"] == summary["trace_sha256"]
+    frames = list(tlog.read(tmp_path / "out/mavlink.tlog"))
+    assert len(frames) > 50
+
+
+def test_a_killed_agent_is_named_and_the_others_carry_on() -> None:
+    outcome, events = run(scenario(), at_s=3.5, act=kill("agent-4"))
+    assert outcome.aborted is None
+    assert outcome.ended == [("agent-4", -signal.SIGKILL)]
+    assert any("agent-4 ended with signal SIGKILL" in event for event in events)
+    assert [record.name for record in outcome.records if isinstance(record, ProcessEnded)] == ["agent-4"]
+    summary = finish(outcome, out=None)
+    assert summary["frames"]["closes"]
+    assert outcome.reports["agent-5"]["final"]
+
+
+def test_a_killed_agent_is_started_again_with_respawn_and_takes_part() -> None:
+    outcome, events = run(scenario("duration_s=9"), at_s=3.5, act=kill("agent-4"), respawn=True)
+    assert outcome.aborted is None
+    assert any("agent-4" in event and "started again" in event for event in events)
+    report = outcome.reports["agent-4"]
+    assert report["final"]
+    assert report["role"] != "isolated", "it has learned its place from the schedule"
+
+
+def test_without_the_emulator_the_run_ends_within_three_seconds_with_a_partial_result() -> None:
+    killed: list[float] = []
+
+    def act(swarm: Swarm) -> None:
+        killed.append(time.monotonic())
+        kill("emulator")(swarm)
+
+    outcome, events = run(scenario("duration_s=60"), at_s=3.5, act=act)
+    assert time.monotonic() - killed[0] < 5
+    assert outcome.aborted is not None
+    assert "emulator ended with signal SIGKILL" in outcome.aborted
+    assert outcome.aborted in events
+    assert not finish(outcome, out=None)["lateness"]["valid"]
+
+
+def test_the_emulator_is_started_again_with_respawn_and_frames_flow_again() -> None:
+    outcome, _ = run(scenario("duration_s=10"), at_s=3.2, act=kill("emulator"), respawn=True)
+    assert outcome.aborted is None
+    assert outcome.reports["emulator"]["frames"]["delivered"] > 50
+    assert finish(outcome, out=None)["frames"]["closes"]
+
+
+def command(*arguments: str) -> list[str]:
+    return [sys.executable, "-m", "sim.cli", *arguments]
+
+
+def test_ctrl_c_ends_everything_cleanly_with_a_partial_result() -> None:
+    process = subprocess.Popen(command("launch", "quick", "--json"), stdout=subprocess.PIPE, stderr=subprocess.PIPE)
+    assert process.stderr is not None
+    for line in process.stderr:
+        if b"processes up" in line:
+            break
+    time.sleep(1.5)
+    process.send_signal(signal.SIGINT)
+    out, err = process.communicate(timeout=15)
+    assert process.returncode == 1
+    assert b"interrupted by SIGINT" in err
+    assert b"Traceback" not in err
+    assert json.loads(out)["aborted"] == "interrupted by SIGINT"
+
+
+def refused(*arguments: str) -> str:
+    """What a command that cannot work says; it must be one message, quickly, without a traceback."""
+    done = subprocess.run(command(*arguments), capture_output=True, text=True, timeout=15, check=False)
+    assert done.returncode != 0
+    assert "Traceback" not in done.stderr
+    return " ".join(done.stderr.split())
+
+
+def test_a_port_in_use_is_one_message() -> None:
+    with socket.socket() as holder:
+        holder.bind(("127.0.0.1", 0))
+        holder.listen()
+        endpoint = f"tcp/127.0.0.1:{holder.getsockname()[1]}"
+        assert f"cannot serve on {endpoint}: it is already in use" in refused("launch", "quick", "--listen", endpoint)
+
+
+@pytest.mark.parametrize("service", [["emulator"], ["world"], ["agent", "--id", "3"], ["launch"]])
+def test_no_router_is_one_message_that_names_the_endpoint(service: list[str]) -> None:
+    message = refused(service[0], "quick", *service[1:], "--connect", "tcp/127.0.0.1:1")
+    assert "no Zenoh router at tcp/127.0.0.1:1" in message
+
+
+def test_an_unknown_scenario_and_a_bad_one_are_one_message_each(tmp_path: Path) -> None:
+    assert "unknown scenario 'recsue'; did you mean rescue?" in refused("simulate", "recsue")
+    bad = tmp_path / "bad.toml"
+    bad.write_text('duration_s = -1\n[nodes]\ncuont = 4\nlayout = "hexagon"\n')
+    message = refused("launch", str(bad))
+    assert "duration_s = -1" in message
+    assert "nodes.cuont: unknown key; did you mean count?" in message
+    assert "nodes.layout = 'hexagon'" in message
+
+
+def test_services_started_one_by_one_make_a_swarm() -> None:
+    with socket.socket() as probe:
+        probe.bind(("127.0.0.1", 0))
+        endpoint = f"tcp/127.0.0.1:{probe.getsockname()[1]}"
+    small = ["--set", "nodes.count=3", "--set", "clusters.count=1", "--duration", "4", "--set", "warmup_s=0",
+             "--set", "drain_s=0"]  # fmt: skip
+    router = subprocess.Popen(command("router", "quick", "--listen", endpoint, *small), stderr=subprocess.PIPE)
+    assert router.stderr is not None
+    assert b"serving" in router.stderr.readline()
+    services = [["emulator", "quick"], ["world", "quick"], *(["agent", "quick", "--id", str(i)] for i in (1, 2, 3))]
+    children = [
+        subprocess.Popen([*command(*service), "--connect", endpoint, *small], stderr=subprocess.PIPE)
+        for service in services
+    ]
+    for child in children:
+        _, err = child.communicate(timeout=60)
+        assert child.returncode == 0, err.decode()
+    router.communicate(timeout=15)
+    assert router.returncode == 0
+
+
+def test_a_swarm_that_does_not_come_up_names_who_is_missing(monkeypatch: pytest.MonkeyPatch) -> None:
+    from sim import swarm as module
+
+    monkeypatch.setattr(module, "READY_TIMEOUT_S", 1.0)
+    monkeypatch.setattr(module, "expected_names", lambda _: ["emulator", "nobody"])
+    with pytest.raises(BusError, match="nobody"):
+        run(scenario())

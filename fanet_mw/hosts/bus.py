@@ -29,6 +29,9 @@ def _config(*, mode: str, listen: str | None, connect: str | None) -> zenoh.Conf
         # Some seconds after its opening each session would map and zero 16 MB of shared memory, all at the same time:
         # 45 of them stall two cores for half a second in the middle of a run. Frames are far too small to gain by it.
         "transport/shared_memory/enabled": False,
+        # One wake-up of the medium is one put per UAV, all at once: room for such a burst, and time to write it out.
+        "transport/link/tx/queue/size/data": 16,
+        "transport/link/tx/queue/congestion_control/drop/wait_before_drop": 5000,
         "connect/endpoints": [connect] if connect else [],
         "connect/exit_on_failure": True,
         "connect/timeout_ms": CONNECT_TIMEOUT_MS,

@@ -7,13 +7,16 @@ import numpy as np
 
 from emulator import state as s
 from fanet_mw.errors import DropReason
-from fanet_mw.messages import TxOutcome
 from fanet_mw.units import MS, S
 
 _REASON_OF: Final = {
-    TxOutcome.RETRY_LIMIT: DropReason.RETRY_LIMIT,
-    TxOutcome.QUEUE_FULL: DropReason.MAC_QUEUE_FULL,
-    TxOutcome.LIFETIME: DropReason.MAC_LIFETIME,
+    s.NO_RECEIVER: DropReason.NO_RECEIVER,
+    s.COLLIDED: DropReason.COLLISION,
+    s.DEAF: DropReason.HALF_DUPLEX,
+    s.WEAK: DropReason.WEAK_SIGNAL,
+    s.GIVEN_UP: DropReason.RETRY_LIMIT,
+    s.NO_ROOM: DropReason.MAC_QUEUE_FULL,
+    s.EXPIRED: DropReason.MAC_LIFETIME,
 }
 _LATENESS_STEPS: Final = (0.1, 0.2, 0.5, 1, 2, 5, 10, 20, 50, 100, 200, 500, 1000)
 """Upper edges of the lateness histogram [ms]; percentiles are given as the edge they fall under."""
@@ -29,7 +32,6 @@ class Accounts:
         self.dropped: Counter[str] = Counter()
         self.refused: Counter[str] = Counter()
         """Hostile or misdirected input, by kind; none of it became a frame."""
-        self.handed: Counter[int] = Counter()
         self.late_frames = 0
         self._max_late_ns = 0
         self._lateness = [0] * (len(_LATENESS_STEPS) + 1)
@@ -49,27 +51,13 @@ class Accounts:
         index = next((i for i, edge in enumerate(_LATENESS_STEPS) if late_ms <= edge), len(_LATENESS_STEPS))
         self._lateness[index] += 1
 
-    def ended(self, frame: list[int], *, broadcast: bool, size: int, failed: TxOutcome | None) -> None:
-        """Nothing refers to a frame any more: settle it. `frame` is its column of the kernel's table."""
-        if frame[s.RECEIVED]:
+    def ended(self, verdict: int, *, size: int) -> None:
+        """Nothing refers to a frame of `size` bytes any more: settle it."""
+        if verdict == s.DELIVERED:
             self.delivered += 1
             self.delivered_bytes += size
-        elif failed is not None and not (failed is TxOutcome.RETRY_LIMIT and not frame[s.TARGETS]):
-            self.drop(_REASON_OF[failed])
-        elif broadcast and frame[s.TARGETS]:
-            self.drop(self._dominant(frame))
         else:
-            self.drop(DropReason.NO_RECEIVER)
-
-    @staticmethod
-    def _dominant(frame: list[int]) -> DropReason:
-        """Why most copies of a broadcast were lost."""
-        causes = (
-            (frame[s.LOST_COLLISION], DropReason.COLLISION),
-            (frame[s.LOST_HALF_DUPLEX], DropReason.HALF_DUPLEX),
-            (frame[s.LOST_WEAK], DropReason.WEAK_SIGNAL),
-        )
-        return max(causes, key=lambda cause: cause[0])[1]
+            self.dropped[_REASON_OF[verdict]] += 1
 
     def measure_from(self, g: s.Ints, *, busy_ns: int, now_ns: int) -> None:
         """Air statistics begin here: the warm-up is over."""

@@ -53,11 +53,19 @@ class Air:
         nowhere = Links(np.full((stations, 3), np.inf), radio, spare=0)
         self._lk, self._lp, self._ptr = nowhere.ints, nowhere.reals, nowhere.ptr
         self._hr = np.zeros((64, 5), np.int64)
+        self._at = np.full((stations, 3), np.inf)
+        self.next_output_ns = kernel.NEVER
+        """A lower bound of the next instant at which `advance` has something to return; NEVER: nothing is planned."""
+        self._gather()
 
     def place(self, at: npt.NDArray[np.float64]) -> None:
         """New positions [m], one row per station; frames under way are carried over."""
+        if np.array_equal(at, self._at):
+            return
+        self._at = at
         spare = int(self._lk[s.UNDERWAY].sum())
         links = Links(np.ascontiguousarray(at), self._radio, spare=spare)
+        self.g[s.REACH_NS] = max(self.g[s.REACH_NS] if spare else 0, links.longest_ns)
         room = 4 * (links.ints.shape[1] + self._stations) + 64
         if self._hr.shape[0] < room + self.g[s.HR_N]:
             self._hr = np.concatenate([self._hr, np.zeros((room, 5), np.int64)])
@@ -66,6 +74,8 @@ class Air:
                 self._hr, self.g, self._lk, self._lp, self._ptr, self.st[s.LOCK], links.ints, links.reals, links.ptr
             )
         self._lk, self._lp, self._ptr = links.ints, links.reals, links.ptr
+        self._gather()
+        self.next_output_ns = int(kernel.next_output(self.g, self._p, self.st, self.fr, self._hs))
 
     def neighbors(self, station: int) -> int:
         """How many stations hear this one."""
@@ -79,9 +89,9 @@ class Air:
         """Twice as many frame slots."""
         more = self.slots()
         self.fr = np.concatenate([self.fr, np.zeros_like(self.fr)], axis=1)
-        self._hs = np.concatenate([self._hs, np.zeros((2 * more, 5), np.int64)])
+        self._more_starts(2 * more)
 
-    def submit(self, slot: int, *, src: int, dst: int, size: int, start_ns: int) -> None:
+    def submit(self, slot: int, *, src: int, dst: int, size: int, start_ns: int, wants_status: bool) -> None:
         """A frame of `size` bytes (UDP payload) will enter its station's queue at `start_ns`."""
         airtime = self._airtime.get(size)
         if airtime is None:
@@ -90,30 +100,38 @@ class Air:
                 size + OVERHEAD_BYTES, rate_mbps=radio.rate_mbps, short=radio.preamble == "short"
             )
         if self.g[s.HS_N] + 2 * kernel.MARGIN > self._hs.shape[0]:
-            self._hs = np.concatenate([self._hs, np.zeros_like(self._hs)])
-        kernel.submit(self.g, self.fr, self._hs, slot, src, dst, airtime, start_ns)
+            self._more_starts(len(self._hs))
+        self.next_output_ns = kernel.submit(
+            self.g, self._p, self.fr, self._hs, slot, src, dst, airtime, start_ns, int(wants_status),
+            self.next_output_ns,
+        )  # fmt: skip
 
     def advance(self, until_ns: int) -> list[list[int]]:
         """Let time pass; returns the output rows (`emulator.state.OUT_*`) in order."""
         rows: list[list[int]] = []
         while True:
-            finished = kernel.advance(
-                self.g, self._p, self._pf, self.st, self._sf, self.fr, self._lk, self._lp, self._ptr, self._hs,
-                self._hr, self._out, self._err, until_ns,
-            )  # fmt: skip
+            bound_ns = kernel.advance(*self._arrays, until_ns)
             count = self.g[s.OUT_N]
             if count:
                 rows += self._out[:count].tolist()
                 self.g[s.OUT_N] = 0
-            if finished:
+            if bound_ns >= 0:
+                self.next_output_ns = bound_ns
                 return rows
             if not count:
-                self._hs = np.concatenate([self._hs, np.zeros_like(self._hs)])
+                self._more_starts(len(self._hs))
 
-    def next_output_ns(self) -> int | None:
-        """A lower bound of the next instant at which `advance` has something to return."""
-        bound = kernel.next_output(self.g, self._p, self._hs, self._hr)
-        return None if bound == kernel.NEVER else int(bound)
+    def _more_starts(self, rows: int) -> None:
+        """Room for `rows` more planned starts."""
+        self._hs = np.concatenate([self._hs, np.zeros((rows, 5), np.int64)])
+        self._gather()
+
+    def _gather(self) -> None:
+        """The arguments of `kernel.advance`, in order; to be renewed when an array is replaced."""
+        self._arrays = (
+            self.g, self._p, self._pf, self.st, self._sf, self.fr, self._lk, self._lp, self._ptr, self._hs, self._hr,
+            self._out, self._err,
+        )  # fmt: skip
 
     def busy_ns(self, now_ns: int) -> int:
         """Time in which the PHY was not idle, summed over stations."""

@@ -93,6 +93,7 @@ from emulator.state import (
     RX_END,
     RX_START,
     SCHEDULED,
+    SENSED,
     SLOT_NS,
     SRC,
     TAIL,
@@ -348,6 +349,7 @@ def begin_tx(
     push(hr, g, HR_N, t + airtime, TX_DONE, s, 0)
     for link in range(ptr[s], ptr[s + 1]):
         lp[ON_AIR, link] = lp[LINK_POWER, link]
+        lk[SENSED, link] = lk[AUDIBLE, link]
         lk[FATE, link] = FATE_OPEN
         lk[LINK_FRAME, link] = f
         lk[LINK_KIND, link] = kind

@@ -3,7 +3,7 @@
 FANET_NO_NUMBA=1 in the environment leaves functions uncompiled. Read here, once, and nowhere else.
 
 numba keeps machine code per function and looks only at that function's own file: after a change to `dcf.py` it would
-go on running the old code inlined into `kernel.py`. So the cache has a directory per state of the whole package.
+go on running the old code inlined into `kernel.py`. So the cache has a directory per state of all compiled sources.
 """
 
 import hashlib
@@ -20,10 +20,12 @@ def _identity(function: F) -> F:
 
 
 def _fingerprint(folder: Path) -> str:
-    """What all sources of a package say, in short."""
+    """What the sources with compiled functions say, and the constants they use, in short."""
     digest = hashlib.sha256()
     for path in sorted(folder.glob("*.py")):
-        digest.update(path.read_bytes())
+        source = path.read_bytes()
+        if b"import jit\n" in source or path.name == "state.py":
+            digest.update(source)
     return digest.hexdigest()[:16]
 
 

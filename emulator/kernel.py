@@ -19,6 +19,7 @@ from emulator.state import (
     DST,
     FRAME_ROWS,
     HEAD,
+    HEADER_NS,
     HR_N,
     HS_N,
     LAST_END,
@@ -37,6 +38,7 @@ from emulator.state import (
     RX_START,
     SCHEDULED,
     SEND_ACK,
+    SENSED,
     SRC,
     TX_DONE,
     TX_END,
@@ -55,8 +57,11 @@ _FEW = 128
 
 
 @jit
-def submit(g: Ints, fr: Ints, hs: Ints, f: int, src: int, dst: int, airtime: int, t: int, wants_status: int) -> None:
-    """A frame will enter its station's MAC queue at `t`."""
+def submit(
+    g: Ints, p: Ints, fr: Ints, hs: Ints, f: int, src: int, dst: int, airtime: int, t: int, wants_status: int,
+    bound: int,
+) -> int:  # fmt: skip
+    """A frame will enter its station's MAC queue at `t`; returns the bound of the next output, from that before."""
     for row in range(FRAME_ROWS):
         fr[row, f] = 0
     fr[SRC, f] = src
@@ -67,6 +72,7 @@ def submit(g: Ints, fr: Ints, hs: Ints, f: int, src: int, dst: int, airtime: int
     fr[OPEN, f] = 1
     fr[WANTS_STATUS, f] = wants_status
     push(hs, g, HS_N, t, ARRIVE, f, 0)
+    return int(min(bound, t + airtime + (p[DIFS_NS] if p[WAIT_DIFS_FIRST] == 1 else 0)))
 
 
 @jit
@@ -96,8 +102,8 @@ def next_output(g: Ints, p: Ints, st: Ints, fr: Ints, hs: Ints) -> int:
     """A lower bound of the instant of the next reception or ACK; NEVER when nothing is under way.
 
     Frames on the air end when they end at their last receiver; others cannot end before they can start, plus their
-    airtime. The bound of a start is exact while few are planned and else the earliest event's. That a frame has
-    expired is told with the next output, which is within one airtime of its access.
+    airtime: looked at one by one while few are planned, else that of a bare header. Then a status of failure may be
+    told a header late.
     """
     bound = NEVER
     for i in range(g[ON_AIR_N]):
@@ -105,7 +111,7 @@ def next_output(g: Ints, p: Ints, st: Ints, fr: Ints, hs: Ints) -> int:
     if g[LAST_END] > g[NOW]:
         bound = min(bound, g[LAST_END])
     if g[HS_N] > _FEW:
-        return int(min(bound, max(hs[0, 0], g[NOW] + 1)))
+        return int(min(bound, hs[0, 0] + p[HEADER_NS]))
     for i in range(g[HS_N]):
         if hs[i, 0] < bound:
             bound = min(bound, earliest_end(p, st, fr, hs[i, 0], hs[i, 2], hs[i, 3], hs[i, 4]))
@@ -196,7 +202,7 @@ def relink(  # noqa: C901  (one pass over what is under way)
             for row in range(LINK_ROWS):
                 new_lk[row, target] = lk[row, old]
         else:
-            for row in range(4, LINK_ROWS):
+            for row in range(SENSED, LINK_ROWS):
                 new_lk[row, target] = lk[row, old]
         new_lp[1, target] = lp[1, old]
         for i in range(g[HR_N]):

@@ -12,6 +12,7 @@ import numpy as np
 from emulator import state as s
 from emulator.accounts import Accounts
 from emulator.air import Air
+from emulator.dcf import NEVER
 from fanet_mw.actor import Actor
 from fanet_mw.errors import DropReason
 from fanet_mw.messages import Message, Poses, Reception, TxOutcome, TxRequest, TxStatus
@@ -21,6 +22,7 @@ from fanet_mw.units import BROADCAST, MS, NodeId, seconds_to_ns
 
 TOO_LATE_NS: Final = 50 * MS
 """A request later than this is dropped: its slot is long another's."""
+_new: Final = tuple.__new__
 _SEQ_MASK: Final = 0xFFFF_FFFF
 _HORIZON_NS: Final = 60_000 * MS
 """A request for an instant further ahead than this is refused: nobody plans so far, and it would only take room."""
@@ -32,16 +34,19 @@ class Medium(Actor):
     def __init__(self, scenario: Scenario, swarm: str) -> None:
         topics = Topics(swarm)
         super().__init__("emulator", (topics.all_tx, topics.pose))
-        self._scenario = scenario
+        self._max_bytes = scenario.radio.max_frame_bytes
         self._count = scenario.nodes.count
         self._rx_topics = [topics.radio_rx(node) for node in scenario.node_ids]
         self._station_of: dict[str, int] = {}
         self._air = Air(scenario.radio, stations=self._count, seed=scenario.seed)
         self._accounts = Accounts()
         self._requests: list[TxRequest | None] = [None] * self._air.slots()
+        self._ids = [NodeId(node) for node in scenario.node_ids]
+        self._sources = [self._ids[0]] * self._air.slots()
+        """Sender of the request in each slot."""
         self._free = list(range(self._air.slots() - 1, -1, -1))
         self._next_seq: list[int | None] = [None] * self._count
-        self._failed: dict[int, TxOutcome] = {}
+        self._handover_ns = scenario.radio.handover_ns
         self._warm_ns: int | None = seconds_to_ns(scenario.warmup_s)
         self._wake_ns: int | None = None
         self._stale = True
@@ -76,10 +81,10 @@ class Medium(Actor):
         return self._warm_ns if self._wake_ns is None else min(self._warm_ns, self._wake_ns)
 
     def _next_handover_ns(self) -> int | None:
-        bound_ns, every_ns = self._air.next_output_ns(), self._scenario.radio.handover_ns
-        if bound_ns is None or not every_ns:
-            return bound_ns
-        return -(-bound_ns // every_ns) * every_ns
+        bound_ns, every_ns = self._air.next_output_ns, self._handover_ns
+        if bound_ns == NEVER:
+            return None
+        return -(-bound_ns // every_ns) * every_ns if every_ns else bound_ns
 
     def stop(self, now_ns: int) -> None:
         self._pass_time(now_ns)
@@ -98,7 +103,7 @@ class Medium(Actor):
             "air": accounts.air(g, busy_ns=self._air.busy_ns(self._now_ns), now_ns=self._now_ns, stations=self._count),
             "late": accounts.lateness(),
             "refused": dict(sorted(accounts.refused.items())),
-            "handed": dict(sorted(accounts.handed.items())),
+            "handed": {i + 1: count for i, count in enumerate(self._air.st[s.HANDED].tolist()) if count},
         }
 
     # --- requests -------------------------------------------------------------------------------------------------
@@ -109,14 +114,16 @@ class Medium(Actor):
         if not 0 <= station < self._count:
             accounts.refused["unknown_station"] += 1
             return
-        self._check_sequence(station, request.seq)
+        if request.seq != self._next_seq[station]:
+            self._count_gap(station, request.seq)
+        self._next_seq[station] = (request.seq + 1) & _SEQ_MASK
         accounts.sent += 1
         dst = request.dst
         size = len(request.frame)
         if dst != BROADCAST and not 1 <= dst <= self._count:
             self._refuse(station, request, DropReason.NO_RECEIVER, now_ns)
             return
-        if size > self._scenario.radio.max_frame_bytes:
+        if size > self._max_bytes:
             self._refuse(station, request, DropReason.TOO_LARGE, now_ns)
             return
         if not size or not -_HORIZON_NS < request.start_ns - now_ns < _HORIZON_NS:
@@ -132,17 +139,18 @@ class Medium(Actor):
             self._make_room()
         slot = self._free.pop()
         self._requests[slot] = request
+        self._sources[slot] = self._ids[station]
         start_ns = max(request.start_ns, now_ns, self._now_ns)
         self._air.submit(
-            slot, src=station, dst=s.EVERYONE if dst == BROADCAST else dst - 1, size=size, start_ns=start_ns
-        )
+            slot, src=station, dst=s.EVERYONE if dst == BROADCAST else dst - 1, size=size, start_ns=start_ns,
+            wants_status=request.wants_status,
+        )  # fmt: skip
         self._stale = True
 
-    def _check_sequence(self, station: int, seq: int) -> None:
+    def _count_gap(self, station: int, seq: int) -> None:
         """A gap is requests that the bus lost: they were sent, and they are dropped."""
         expected = self._next_seq[station]
-        self._next_seq[station] = (seq + 1) & _SEQ_MASK
-        if expected is None or seq == expected or seq == 0:  # 0: the node has started again
+        if expected is None or seq == 0:  # 0: the node has started again
             return
         gap = (seq - expected) & _SEQ_MASK
         if gap < 1 << 16:
@@ -159,6 +167,7 @@ class Medium(Actor):
         before = self._air.slots()
         self._air.grow()
         self._requests += [None] * before
+        self._sources += [self._ids[0]] * before
         self._free = list(range(2 * before - 1, before - 1, -1))
 
     # --- time -----------------------------------------------------------------------------------------------------
@@ -166,7 +175,7 @@ class Medium(Actor):
     def _pass_time(self, now_ns: int) -> None:
         """Advance the air to `now_ns` and hand out what came of it."""
         if self._warm_ns is not None and now_ns >= self._warm_ns:
-            self._hand_out(self._air.advance(self._warm_ns))
+            self._hand_out(self._air.advance(max(self._warm_ns, self._now_ns)))
             self._accounts.measure_from(self._air.g, busy_ns=self._air.busy_ns(self._warm_ns), now_ns=self._warm_ns)
             self._warm_ns = None
         self._hand_out(self._air.advance(now_ns))
@@ -174,42 +183,31 @@ class Medium(Actor):
         self._stale = True
 
     def _hand_out(self, rows: list[list[int]]) -> None:
-        outbox, requests, handed = self.outbox, self._requests, self._accounts.handed
+        outbox, requests, sources, rx_topics = self.outbox, self._requests, self._sources, self._rx_topics
         for kind, slot, station, t_ns, value, attempts in rows:
             request = requests[slot]
             assert request is not None, "the kernel speaks only of frames it was given"
             if kind == s.OUT_RECEPTION:
-                handed[station + 1] += 1
-                src = NodeId(int(self._air.fr[s.SRC, slot]) + 1)
-                reception = Reception(request.frame, src, t_ns, value / 1000)
-                outbox.append((self._rx_topics[station], reception))
-            elif kind == s.OUT_DONE:
-                outcome = TxOutcome(value)
-                if value > s.DONE_ACKED:
-                    self._failed[slot] = outcome
-                if request.wants_status:
-                    outbox.append((self._rx_topics[station], TxStatus(request.seq, outcome, t_ns, attempts)))
+                # as Reception(...), which takes three times as long
+                reception = _new(Reception, (request.frame, sources[slot], t_ns, value / 1000))
+                outbox.append((rx_topics[station], reception))
+            elif kind == s.OUT_FREE:
+                self._accounts.ended(value, size=len(request.frame))
+                requests[slot] = None
+                self._free.append(slot)
             else:
-                self._settle(slot, request)
-
-    def _settle(self, slot: int, request: TxRequest) -> None:
-        """Nothing refers to the slot any more."""
-        self._accounts.ended(
-            self._air.fr[:, slot].tolist(),
-            broadcast=request.dst == BROADCAST,
-            size=len(request.frame),
-            failed=self._failed.pop(slot, None),
-        )
-        self._requests[slot] = None
-        self._free.append(slot)
+                outbox.append((rx_topics[station], TxStatus(request.seq, TxOutcome(value), t_ns, attempts)))
 
     # --- positions ------------------------------------------------------------------------------------------------
 
     def _place(self, poses: Poses) -> None:
         ids = np.frombuffer(poses.ids, np.uint16).astype(np.int64)
+        if len(poses.states) != 6 * len(ids):
+            self._accounts.refused["poses"] += 1
+            return
         states = np.frombuffer(poses.states, np.float64).reshape(-1, 6)
         known = (ids >= 1) & (ids <= self._count)
-        if len(ids) != len(states) or not known.all() or not np.isfinite(states[:, :3]).all():
+        if not known.all() or not np.isfinite(states[:, :3]).all():
             self._accounts.refused["poses"] += 1
             return
         at = np.full((self._count, 3), np.inf)

@@ -15,7 +15,6 @@ from emulator.state import (
     ACK,
     ACK_NS,
     ACK_TO,
-    AUDIBLE,
     BAD_UNTIL,
     COLLISION_COPIES,
     CS,
@@ -59,6 +58,7 @@ from emulator.state import (
     RECEIVED,
     RECEIVED_COPIES,
     SEND_ACK,
+    SENSED,
     SIFS_NS,
     TX_KIND,
     UNDERWAY,
@@ -104,7 +104,7 @@ def rx_start(p: Ints, pf: Reals, st: Ints, sf: Reals, lk: Ints, lp: Reals, err: 
 def rx_detect(p: Ints, pf: Reals, st: Ints, sf: Reals, lk: Ints, lp: Reals, link: int, t: int) -> None:
     """The preamble has been there long enough to be found, and the energy to be sensed."""
     r = lk[LINK_DST, link]
-    audible = lk[AUDIBLE, link] == 1
+    audible = lk[SENSED, link] == 1
     if audible:
         st[CS, r] += 1
         if st[CS, r] == 1 and st[TX_KIND, r] == NOTHING:
@@ -174,7 +174,7 @@ def rx_end(
         data_end(g, p, st, fr, lk, lp, hs, out, link, whole, t)
     elif whole and lk[LINK_KIND, link] == ACK and st[WAITING, r] == lk[LINK_FRAME, link]:
         acknowledged(g, p, st, fr, out, r, t)
-    if lk[AUDIBLE, link] == 1:
+    if lk[SENSED, link] == 1:
         st[CS, r] -= 1
         if st[CS, r] == 0 and st[TX_KIND, r] == NOTHING:
             on_idle(g, p, st, hs, r, t)
@@ -190,7 +190,7 @@ def data_end(
     ours = fr[DST, f] == EVERYONE or fr[DST, f] == r
     if whole and not ours:
         st[NAV, r] = max(st[NAV, r], t + p[SIFS_NS] + p[ACK_NS])
-    if not ours or lk[AUDIBLE, link] == 0:
+    if not ours or lk[SENSED, link] == 0:
         return
     if not whole:
         lost(g, fr, lk[FATE, link], f)

@@ -79,9 +79,10 @@ POWER, LOG_OK, STATION_REALS = range(3)
 EVERYONE: Final = -1
 
 # --- links (lk, lp) -----------------------------------------------------------------------------------------------
-LINK_SRC, LINK_DST, DELAY, AUDIBLE, FATE, LINK_FRAME, LINK_KIND, UNDERWAY, LINK_ROWS = range(9)
-"""AUDIBLE: strong enough to sense and decode; others only interfere. FATE: of the frame now on
-the link. LINK_FRAME, LINK_KIND: what it is (of an ACK: the frame it acknowledges). UNDERWAY: 1 until its end."""
+LINK_SRC, LINK_DST, DELAY, AUDIBLE, SENSED, FATE, LINK_FRAME, LINK_KIND, UNDERWAY, LINK_ROWS = range(10)
+"""AUDIBLE: strong enough to sense and decode; others only interfere. SENSED, FATE: of the frame now on
+the link; SENSED is AUDIBLE as it was at its start. LINK_FRAME, LINK_KIND: what it is (of an ACK: the frame it
+acknowledges). UNDERWAY: 1 until its end."""
 LINK_POWER, ON_AIR, LINK_REALS = range(3)
 """LINK_POWER: received power [mW]. ON_AIR: that of the frame now on the link, as it was at its start."""
 

@@ -17,9 +17,13 @@ from sim.engine import Rows
 
 _GAIN: Final = 0.8
 """Position loop [1/s]."""
-_CLEAR_M: Final = 10.0
-"""UAVs nearer than this are pushed apart."""
-_PUSH_M_S: Final = 6.0
+_CLEAR_M: Final = 4.0
+"""The distance that UAVs keep; within twice of it they are pushed apart."""
+_SEE_M: Final = 50.0
+_BRAKE_M_S2: Final = 2.5
+"""Half of what an engine can do: the other half is for its lag."""
+_PUSH_M_S: Final = 4.0
+_ROUNDS: Final = 4
 FLOOR_M: Final = 5.0
 """No setpoint is flown below this height."""
 
@@ -154,19 +158,26 @@ class Guidance:
 
 
 def _keep_clear(wish: Rows, at: Rows) -> Rows:
-    """Add a push away from near others, stronger the nearer; take out what would close in on them."""
+    """Slow down towards others so that both can still stop in time, and push away from those that are too near.
+
+    Two that brake at `_BRAKE_M_S2` from v each need v^2 / _BRAKE_M_S2 between them: hence the cap on closing speed.
+    """
     apart = at[:, None] - at[None]
     distance = np.sqrt((apart**2).sum(axis=2))
     np.fill_diagonal(distance, math.inf)
-    near = distance < _CLEAR_M
-    if not near.any():
+    near = distance < _SEE_M
+    rows = np.flatnonzero(near.any(axis=1))
+    if not len(rows):
         return wish
-    for i in np.flatnonzero(near.any(axis=1)):
-        for j in np.flatnonzero(near[i]):
-            gap = distance[i, j]
-            away = apart[i, j] / gap if gap > 1e-6 else np.array([math.cos(i), math.sin(i), 0.0])
-            closing = float(wish[i] @ away)
-            if closing < 0:
-                wish[i] -= closing * away
-            wish[i] += _PUSH_M_S * (1 - gap / _CLEAR_M) * away
+    gap = np.where(near[np.ix_(rows, rows)], distance[np.ix_(rows, rows)], math.inf)
+    away = apart[np.ix_(rows, rows)] / np.maximum(distance[np.ix_(rows, rows)], 1e-6)[..., None]
+    cap = np.sqrt(_BRAKE_M_S2 * np.maximum(0.0, gap - _CLEAR_M))
+    push = np.maximum(0.0, 1 - gap / (2 * _CLEAR_M))
+    own = wish[rows] + _PUSH_M_S * (push[..., None] * away).sum(axis=1)
+    every = np.arange(len(rows))
+    for _ in range(_ROUNDS):  # the worst neighbor first; a correction for one may close in on another
+        excess = -np.einsum("ik,ijk->ij", own, away) - cap
+        worst = excess.argmax(axis=1)
+        own += np.maximum(0.0, excess[every, worst])[:, None] * away[every, worst]
+    wish[rows] = own
     return wish

@@ -24,11 +24,12 @@ class Kinematic(Engine):
         self._at = np.zeros((0, 3))
         self._velocity = np.zeros((0, 3))
         self._touching: frozenset[tuple[int, int]] = frozenset()
+        self._new: list[tuple[int, int]] = []
 
     def reset(self, positions: Rows) -> None:
         self._at = positions.copy()
         self._velocity = np.zeros_like(positions)
-        self._touching = frozenset()
+        self._touching, self._new = frozenset(), []
 
     def advance(self, dt_s: float, wanted_m_s: Rows) -> None:
         change = wanted_m_s - self._velocity
@@ -41,6 +42,7 @@ class Kinematic(Engine):
         below = self._at[:, 2] < 0
         self._at[below, 2] = 0.0
         self._velocity[below] = 0.0
+        self._notice_contacts()
 
     def positions(self) -> Rows:
         return self._at
@@ -49,11 +51,14 @@ class Kinematic(Engine):
         return self._velocity
 
     def contacts(self) -> list[tuple[int, int]]:
+        new, self._new = self._new, []
+        return new
+
+    def _notice_contacts(self) -> None:
         now = {(0, int(i) + 1) for i in np.flatnonzero(self._at[:, 2] <= RADIUS_M)}
         if len(self._at) <= _CROWD:
             apart = np.linalg.norm(self._at[:, None] - self._at[None], axis=2)
             first, second = np.nonzero(np.triu(apart < 2 * RADIUS_M, k=1))
             now |= {(int(a) + 1, int(b) + 1) for a, b in zip(first, second, strict=True)}
-        new = sorted(now - self._touching)
+        self._new += sorted(now - self._touching)
         self._touching = frozenset(now)
-        return new

@@ -26,6 +26,8 @@ class Release:
         self._lead_ns = lead_ns
         self._slot: Slot | None = None
         self._gap_ns = self._least_gap_ns
+        self._free_ns = 0
+        """One gap after the last release: nothing leaves before, though the queue was empty meanwhile."""
         self._next_ns: int | None = None
         """The instant of the next release; None while nothing is queued or we own no slot."""
 
@@ -52,9 +54,7 @@ class Release:
         if membership.superframe is None or not len(self._queue):
             self._next_ns = None
             return
-        earliest_ns = now_ns + self._lead_ns
-        if self._next_ns is not None:
-            earliest_ns = max(earliest_ns, self._next_ns)
+        earliest_ns = max(now_ns + self._lead_ns, self._free_ns)
         slot = membership.superframe.occurrence(membership.slot, not_before_ns=earliest_ns)
         if slot != self._slot:
             self._slot = slot
@@ -77,7 +77,7 @@ class Release:
             if self._slot is not None and self._next_ns == self._slot.start_ns:
                 self._gap_ns = self._gap_for(self._slot)  # the queue as it is when the slot opens
             released.append((self._queue.pop(), self._next_ns))
-            self._next_ns += self._gap_ns
+            self._free_ns = self._next_ns + self._gap_ns
             self.arm(membership, now_ns=now_ns)
         if not len(self._queue):
             self._next_ns = None

@@ -1,0 +1,86 @@
+"""The way to a head."""
+
+from fanet_mw.protocol.gradient import UNREACHABLE, Gradient, newer
+from fanet_mw.protocol.neighbors import Neighbor, Neighbors
+from fanet_mw.units import NodeId, S
+from fanet_mw.wire import Beacon
+
+ME, HEAD, OTHER = NodeId(1), NodeId(10), NodeId(20)
+
+
+def gradient() -> Gradient:
+    found = Gradient(node=ME, neighbors=Neighbors(lifetime_ns=4 * S), hello_ns=S)
+    found.join(HEAD, now_ns=0)
+    return found
+
+
+def hello(node: int, hops: int, *, head: int = HEAD, seq: int = 5) -> Neighbor:
+    return Neighbor(NodeId(node), 0, -60.0, Beacon(node, head, seq, 0, 1, 0, 1, hops))
+
+
+def parent(found: Gradient, now_ns: int = 0) -> int | None:
+    route = found.route(now_ns=now_ns)
+    return route.parent if route else None
+
+
+def test_fewer_hops_win_at_the_same_sequence() -> None:
+    found = gradient()
+    found.hear(hello(2, 3), now_ns=0)
+    found.hear(hello(3, 1), now_ns=0)
+    found.hear(hello(4, 2), now_ns=0)
+    assert parent(found) == 3
+
+
+def test_an_older_sequence_never_wins_however_short() -> None:
+    found = gradient()
+    found.hear(hello(2, 3, seq=5), now_ns=0)
+    found.hear(hello(3, 0, seq=4), now_ns=0)
+    assert parent(found) == 2
+
+
+def test_the_own_head_is_preferred_and_another_is_better_than_none() -> None:
+    found = gradient()
+    found.hear(hello(2, 0, head=OTHER), now_ns=0)
+    assert parent(found) == 2
+    found.hear(hello(3, 4), now_ns=0)
+    assert parent(found) == 3
+    found.hear(hello(2, 0, head=OTHER, seq=99), now_ns=0)
+    assert parent(found) == 3
+
+
+def test_a_route_dies_when_its_head_is_silent_for_four_hellos() -> None:
+    found = gradient()
+    found.hear(hello(2, 1), now_ns=0)
+    found.hear(hello(2, 1), now_ns=3 * S)
+    assert parent(found, 4 * S) == 2
+    assert parent(found, 4 * S + 1) is None, "hellos that bring no newer sequence keep nothing alive"
+
+
+def test_a_parent_that_loses_its_way_is_given_up() -> None:
+    found = gradient()
+    found.hear(hello(2, 1), now_ns=0)
+    found.hear(hello(2, UNREACHABLE), now_ns=S)
+    assert parent(found, S) is None
+
+
+def test_a_failed_link_is_given_up_at_once() -> None:
+    found = gradient()
+    found.hear(hello(2, 1), now_ns=0)
+    found.lose(NodeId(2))
+    assert parent(found) is None
+
+
+def test_a_head_is_its_own_way_and_counts_its_sequence() -> None:
+    found = gradient()
+    found.join(ME, now_ns=0)
+    found.hear(hello(2, 1), now_ns=0)
+    found.advance(S)
+    route = found.route(now_ns=S)
+    assert route is not None
+    assert (route.head, route.hops, route.head_seq) == (ME, 0, 1)
+
+
+def test_sequences_wrap() -> None:
+    assert newer(0, 0xFFFF)
+    assert not newer(0xFFFF, 0)
+    assert not newer(7, 7)

@@ -1,0 +1,64 @@
+"""The mission of one UAV, as timelines."""
+
+from agents.localization import Sighting
+from agents.mission import HOME, Mission
+from fanet_mw.scenario import Mission as Config
+from fanet_mw.trace import Approaching, Arrived, Detected
+from fanet_mw.units import Enu, NodeId, S
+from fanet_mw.wire import Survivor
+
+HERE = Enu(0, 0, 50)
+CONFIG = Config(survivors=9, reports_to_approach=3, report_interval_s=5, dwell_s=10, arrival_m=30)
+
+
+def report(survivor: int, reporter: int, east: float, north: float = 0.0, rssi_dbm: float = -80.0) -> Survivor:
+    return Survivor(0, survivor, reporter, Enu(east, north, 50), rssi_dbm)
+
+
+def mission() -> Mission:
+    return Mission(NodeId(1), CONFIG, altitude_m=50)
+
+
+def test_a_phone_is_detected_once_and_reported_again_only_after_the_interval() -> None:
+    uav = mission()
+    for second in range(7):
+        uav.scan(((4, -70.0),), position=HERE, now_ns=second * S)
+    assert [r for r in uav.records if isinstance(r, Detected)] == [Detected(0, 1, 4, -70.0)]
+    assert [r.t_us for r in uav.reports] == [0, 5_000_000]
+
+
+def test_two_reporters_are_not_enough_and_one_who_repeats_itself_counts_once() -> None:
+    uav = mission()
+    for reporter in (2, 3, 3, 2, 3):
+        uav.reported(report(4, reporter, 100), position=HERE, now_ns=S)
+    assert uav.course is None
+
+
+def test_the_third_reporter_changes_the_course() -> None:
+    uav = mission()
+    for reporter, east in ((2, 200), (3, 250), (5, 300)):
+        uav.reported(report(4, reporter, east), position=HERE, now_ns=S)
+    assert uav.course is not None
+    assert uav.course.speed_m_s == CONFIG.approach_speed_m_s
+    (record,) = [r for r in uav.records if isinstance(r, Approaching)]
+    assert (record.survivor, record.reporters) == (4, 3)
+
+
+def test_of_two_known_survivors_the_nearer_one_is_approached_then_the_other_then_home() -> None:
+    uav = mission()
+    for survivor, east in ((7, 900), (4, 100)):
+        for reporter in (2, 3, 5):
+            uav._sightings.setdefault(survivor, {})[reporter] = Sighting(Enu(east + reporter, 0, 50), -80.0)
+    uav.reported(report(4, 5, 105), position=HERE, now_ns=S)
+    order = []
+    now_ns, at = S, HERE
+    for _ in range(2):
+        order.append(uav._target)
+        at = uav._target_at
+        uav.moved(at, now_ns=now_ns)
+        now_ns += 11 * S
+        uav.moved(at, now_ns=now_ns)
+    assert order == [4, 7]
+    assert [r.survivor for r in uav.records if isinstance(r, Arrived)] == [4, 7]
+    assert uav.course is not None
+    assert uav.course.speed_m_s == HOME

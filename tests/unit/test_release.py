@@ -1,0 +1,75 @@
+"""A head's queue: nothing leaves it outside its slot, nothing leaves it unnamed."""
+
+from itertools import pairwise
+
+from hypothesis import given
+from hypothesis import strategies as st
+
+from fanet_mw.protocol.membership import Membership
+from fanet_mw.protocol.release import Release
+from fanet_mw.protocol.txqueue import Packet, TxQueue
+from fanet_mw.scenario import Clusters
+from fanet_mw.units import MS, NodeId, S
+from fanet_mw.wire import Header, Member, Schedule
+
+LEAD_NS = 20 * MS
+
+
+def member_of(cluster: int, *, period_us: int = 1_000_000, clusters: int = 4) -> Membership:
+    membership = Membership(NodeId(5))
+    members = (Member(5, cluster, is_head=True),)
+    schedule = Schedule(0, period_us, period_us // clusters, 1, 1, clusters, 0, 1, members)
+    membership.learn(schedule, guard_ns=2 * MS)
+    return membership
+
+
+def packet(seq: int, priority: int = 3, born_us: int = 0) -> Packet:
+    return Packet(Header(born_us, seq, 9, 0xFFFF, 9, 0, 32, 0, priority, 0), b"frame")
+
+
+@given(
+    arrivals_ms=st.lists(st.integers(0, 3000), max_size=30).map(sorted),
+    cluster=st.integers(0, 3),
+    pacing=st.sampled_from(["burst", "spread"]),
+)
+def test_every_packet_leaves_once_in_its_own_slot_at_least_a_gap_apart(
+    arrivals_ms: list[int], cluster: int, pacing: str
+) -> None:
+    clusters = Clusters(pacing=pacing, flooding_period_s=1)
+    release, membership = Release(TxQueue(capacity=100), clusters, lead_ns=LEAD_NS), member_of(cluster)
+    out: list[tuple[Packet, int]] = []
+
+    def run(until_ns: int) -> None:
+        while (wake_ns := release.next_wake_ns()) is not None and wake_ns <= until_ns:
+            out.extend(release.due(membership, now_ns=max(wake_ns, 0)))
+
+    for seq, at_ms in enumerate(arrivals_ms):
+        run(at_ms * MS)
+        assert release.push(packet(seq), membership, now_ns=at_ms * MS) is None
+    run(60 * S)
+    assert sorted(p.header.seq for p, _ in out) == list(range(len(arrivals_ms)))
+    starts = [start for _, start in out]
+    for p, start in out:
+        assert start >= arrivals_ms[p.header.seq] * MS + LEAD_NS
+        assert cluster * 250 * MS <= start % S < (cluster + 1) * 250 * MS - 2 * MS
+    assert all(b - a >= 2 * MS for a, b in pairwise(starts))
+
+
+def test_the_most_urgent_goes_first_and_the_least_important_is_evicted() -> None:
+    queue = TxQueue(capacity=3)
+    assert queue.push(packet(0, priority=3)) is None
+    assert queue.push(packet(1, priority=2)) is None
+    assert queue.push(packet(2, priority=0)) is None
+    evicted = queue.push(packet(3, priority=2))
+    assert evicted is not None
+    assert evicted.header.seq == 0
+    assert queue.push(packet(4, priority=3)) == packet(4, priority=3), "it was the least important itself"
+    assert [queue.pop().header.seq for _ in range(3)] == [2, 1, 3]
+
+
+def test_expired_packets_are_taken_out_and_named() -> None:
+    queue = TxQueue(capacity=9)
+    for seq in range(4):
+        queue.push(packet(seq, born_us=seq * 1000))
+    assert [p.header.seq for p in queue.expire(before_us=2000)] == [0, 1]
+    assert len(queue) == 2

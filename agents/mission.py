@@ -7,12 +7,11 @@ positions go in; survivor reports to send, setpoints and trace records come out.
 import math
 from typing import Final, NamedTuple
 
-from fanet_mw.wire import Survivor
-
 from agents.localization import Sighting, estimate
 from fanet_mw.scenario import Mission as MissionConfig
 from fanet_mw.trace import Approaching, Arrived, Detected, Record
 from fanet_mw.units import Enu, NodeId, S
+from fanet_mw.wire import Survivor
 
 _RING_M: Final = 20.0
 """UAVs hold on a ring about the survivor, each at an angle of its own, so that they see it from several sides."""

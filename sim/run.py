@@ -3,9 +3,8 @@
 import time
 from collections.abc import Callable
 
-from emulator.medium import Medium
-
 from agents.uav import Uav
+from emulator.medium import Medium
 from fanet_mw.actor import Actor
 from fanet_mw.hosts.virtual import VirtualHost
 from fanet_mw.messages import MavlinkTap, Message

@@ -102,7 +102,7 @@ class Air:
         if self.g[s.HS_N] + 2 * kernel.MARGIN > self._hs.shape[0]:
             self._more_starts(len(self._hs))
         self.next_output_ns = kernel.submit(
-            self.g, self._p, self.fr, self._hs, slot, src, dst, airtime, start_ns, int(wants_status),
+            self.g, self._p, self.st, self.fr, self._hs, slot, src, dst, airtime, start_ns, int(wants_status),
             self.next_output_ns,
         )  # fmt: skip
 

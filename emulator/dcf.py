@@ -226,12 +226,19 @@ def arm(g: Ints, p: Ints, st: Ints, hs: Ints, s: int) -> None:
 
 
 @jit
+def slots_left(p: Ints, st: Ints, s: int, t: int) -> int:
+    """Backoff slots left at `t`, if the medium has been idle until then."""
+    if t <= st[BASE, s]:
+        return int(st[BO, s])
+    return int(max(0, st[BO, s] - (t - st[BASE, s]) // p[SLOT_NS]))
+
+
+@jit
 def on_busy(p: Ints, st: Ints, s: int, t: int) -> None:
     """The medium turns busy at a station: freeze the backoff."""
     if st[BUSY_SINCE, s] < 0:
         st[BUSY_SINCE, s] = t
-    if t > st[BASE, s]:
-        st[BO, s] = max(0, st[BO, s] - (t - st[BASE, s]) // p[SLOT_NS])
+    st[BO, s] = slots_left(p, st, s, t)
     st[BASE, s] = NEVER
     if st[SCHEDULED, s] >= 0:
         st[SCHEDULED, s] = -1
@@ -282,10 +289,7 @@ def request(g: Ints, p: Ints, st: Ints, hs: Ints, s: int, t: int) -> None:
         if st[CS, s] == 0:
             arm(g, p, st, hs, s)
         return
-    left = st[BO, s]
-    if t > st[BASE, s]:
-        left = max(0, left - (t - st[BASE, s]) // p[SLOT_NS])
-    if left == 0:
+    if slots_left(p, st, s, t) == 0:
         st[BO, s] = 0
         st[FRESH, s] = 1
         start = access_from(p, st, s)

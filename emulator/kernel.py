@@ -4,7 +4,7 @@
 short of room; the caller drains, makes room and calls again.
 """
 
-from emulator.dcf import NEVER, access, ack_timeout, arrive, send_ack, tx_done
+from emulator.dcf import NEVER, access, ack_timeout, arrive, send_ack, slots_left, tx_done
 from emulator.heap import pop, push
 from emulator.jit import jit
 from emulator.phy import rx_detect, rx_end, rx_start
@@ -26,6 +26,7 @@ from emulator.state import (
     LIFETIME_NS,
     LINK_ROWS,
     NEXT,
+    NOTHING,
     NOW,
     ON_AIR_LIST,
     ON_AIR_N,
@@ -42,6 +43,7 @@ from emulator.state import (
     SRC,
     TX_DONE,
     TX_END,
+    TX_KIND,
     UNDERWAY,
     WAIT_DIFS_FIRST,
     WAITING,
@@ -58,8 +60,8 @@ _FEW = 128
 
 @jit
 def submit(
-    g: Ints, p: Ints, fr: Ints, hs: Ints, f: int, src: int, dst: int, airtime: int, t: int, wants_status: int,
-    bound: int,
+    g: Ints, p: Ints, st: Ints, fr: Ints, hs: Ints, f: int, src: int, dst: int, airtime: int, t: int,
+    wants_status: int, bound: int,
 ) -> int:  # fmt: skip
     """A frame will enter its station's MAC queue at `t`; returns the bound of the next output, from that before."""
     for row in range(FRAME_ROWS):
@@ -72,7 +74,15 @@ def submit(
     fr[OPEN, f] = 1
     fr[WANTS_STATUS, f] = wants_status
     push(hs, g, HS_N, t, ARRIVE, f, 0)
-    return int(min(bound, t + airtime + (p[DIFS_NS] if p[WAIT_DIFS_FIRST] == 1 else 0)))
+    return int(min(bound, t + airtime + first_wait(p, st, src, t)))
+
+
+@jit
+def first_wait(p: Ints, st: Ints, s: int, t: int) -> int:
+    """How long at least a frame that is queued at `t` waits, unless a frame of another station ends before."""
+    if p[WAIT_DIFS_FIRST] == 0 or st[HEAD, s] >= 0 or st[TX_KIND, s] != NOTHING:
+        return 0
+    return int(p[DIFS_NS]) if slots_left(p, st, s, t) == 0 else 0
 
 
 @jit
@@ -122,7 +132,7 @@ def next_output(g: Ints, p: Ints, st: Ints, fr: Ints, hs: Ints) -> int:
 def earliest_end(p: Ints, st: Ints, fr: Ints, t: int, kind: int, a: int, b: int) -> int:
     """When the frame that an event may start can have ended at the earliest."""
     if kind == ARRIVE:
-        return int(t + fr[AIRTIME, a] + (p[DIFS_NS] if p[WAIT_DIFS_FIRST] == 1 else 0))
+        return int(t + fr[AIRTIME, a] + first_wait(p, st, fr[SRC, a], t))
     if kind == SEND_ACK:
         return int(t + p[ACK_NS])
     if kind == ACK_TIMEOUT:

@@ -1,15 +1,45 @@
-"""What a flight controller says of itself: the last fix, and telemetry frames at their rates. Sans-IO."""
+"""What a flight controller says of itself: the last fix, and telemetry frames at their rates. Sans-IO.
+
+Position and velocity are the receiver's. Attitude is inferred: a multirotor leans so that thrust and gravity add up to
+its acceleration, and faces where it flies. The battery is a clock: full at the epoch, empty after `ENDURANCE_NS`.
+"""
 
 import math
+from collections.abc import Callable
+from dataclasses import dataclass
+from typing import Final
 
-from fanet_mw.mavlink import Encoder
+from fanet_mw.mavlink import AUTOPILOT_COMPONENT, Attitude, Battery, Encoder
 from fanet_mw.messages import Gps
 from fanet_mw.units import Enu, NodeId, S
 
-_GRAVITY = 9.81
-_STILL = Enu(0.0, 0.0, 0.0)
-_ENDURANCE_NS = 25 * 60 * S
-"""A small multirotor's flight time; the battery is taken to empty evenly over it."""
+GRAVITY_M_S2: Final = 9.80665
+MAX_TILT: Final = math.radians(35)
+"""The usual lean limit of a multirotor's position controller; a jump in the velocity's noise is no acrobatics."""
+TURNING_M_S: Final = 0.5
+"""Slower than this, the course is noise and the heading is kept."""
+ENDURANCE_NS: Final = 25 * 60 * S
+"""A small multirotor's flight time."""
+
+_STILL: Final = Enu(0.0, 0.0, 0.0)
+_CELLS: Final = 4
+_FULL_V: Final = 4.2
+_EMPTY_V: Final = 3.5
+_CAPACITY_MAH: Final = 5000
+
+# A stream never comes more often than this; `telemetry_hz` bounds each of them too, and sets the position's.
+_EVERY_NS: Final = 1 * S
+_SELDOM_NS: Final = 5 * S
+_RARELY_NS: Final = 10 * S
+
+
+@dataclass
+class _Stream:
+    """One message, its interval and when it is due next."""
+
+    encode: Callable[[int], bytes]
+    interval_ns: int
+    due_ns: int
 
 
 class Autopilot:
@@ -18,41 +48,92 @@ class Autopilot:
     def __init__(self, node: NodeId, *, position: Enu, telemetry_hz: float) -> None:
         self.position = position
         self.velocity = _STILL
+        self._home = position
         self._acceleration = _STILL
-        self._fix_ns = 0
-        self._encoder = Encoder(node)
-        self._interval_ns = round(S / telemetry_hz) if telemetry_hz else 0
-        self._due_ns: int | None = node * 7_919_000 % self._interval_ns if self._interval_ns else None
-        """Nodes are out of step by their id, so that taps do not come in bursts."""
+        self._yaw: float | None = None
+        """Unknown until it has flown; north would also cost a hello its length, as MAVLink drops trailing zeros."""
+        self._fix_ns: int | None = None
+        self._encoder = Encoder(node, component=AUTOPILOT_COMPONENT)
+        self._streams = self._plan(node, telemetry_hz) if telemetry_hz else []
+
+    def _plan(self, node: NodeId, telemetry_hz: float) -> list[_Stream]:
+        """In order of sending. Nodes are out of step by their id, so that the bus sees no bursts; streams are not."""
+        encoder = self._encoder
+        base_ns = max(1, round(S / telemetry_hz))
+        due_ns = node * 7_919_000 % base_ns
+        wanted: list[tuple[int, Callable[[int], bytes]]] = [
+            (_EVERY_NS, lambda _: encoder.heartbeat()),
+            (0, self._global_position),
+            (_EVERY_NS, lambda now_ns: encoder.attitude(self.attitude, now_ns=now_ns)),
+            (_EVERY_NS, self._gps_raw),
+            (_EVERY_NS, lambda _: encoder.extended_sys_state()),
+            (_SELDOM_NS, lambda now_ns: encoder.sys_status(_battery(now_ns))),
+            (_RARELY_NS, lambda now_ns: encoder.battery_status(_battery(now_ns))),
+            (_RARELY_NS, lambda _: encoder.home_position(self._home)),
+        ]
+        return [_Stream(encode, max(interval_ns, base_ns), due_ns) for interval_ns, encode in wanted]
+
+    # --- in -------------------------------------------------------------------------------------------------------
 
     def fix(self, gps: Gps) -> None:
-        """A position fix; the acceleration is what changed the velocity since the last one."""
-        elapsed_s = (gps.t_ns - self._fix_ns) / S
-        if elapsed_s > 0:
+        """A position fix; the acceleration is what changed the velocity since the last one. Older ones are ignored."""
+        if self._fix_ns is not None:
+            if gps.t_ns <= self._fix_ns:
+                return
+            per_s = S / (gps.t_ns - self._fix_ns)
             change = gps.velocity.minus(self.velocity)
-            self._acceleration = Enu(*(component / elapsed_s for component in change))
+            self._acceleration = Enu(change.east * per_s, change.north * per_s, change.up * per_s)
         self.position, self.velocity, self._fix_ns = gps.position, gps.velocity, gps.t_ns
+        if math.hypot(gps.velocity.east, gps.velocity.north) >= TURNING_M_S:
+            self._yaw = math.atan2(gps.velocity.east, gps.velocity.north)
+
+    # --- out ------------------------------------------------------------------------------------------------------
+
+    @property
+    def attitude(self) -> Attitude:
+        """How it must lean to accelerate as it does, facing where it flies."""
+        east, north, up = self._acceleration
+        yaw = self._yaw or 0.0
+        forward = east * math.sin(yaw) + north * math.cos(yaw)
+        right = east * math.cos(yaw) - north * math.sin(yaw)
+        thrust_up = max(GRAVITY_M_S2 + up, 0.1 * GRAVITY_M_S2)  # propellers push one way only
+        wanted, most = math.hypot(forward, right), thrust_up * math.tan(MAX_TILT)
+        if wanted > most:
+            forward, right = forward * most / wanted, right * most / wanted
+        pitch = math.atan2(-forward, thrust_up)
+        roll = math.atan2(right, math.hypot(forward, thrust_up))
+        return Attitude(roll, pitch, yaw)
 
     def next_due_ns(self) -> int | None:
         """When telemetry is due; None when there is none."""
-        return self._due_ns
+        return min((stream.due_ns for stream in self._streams), default=None)
 
     def telemetry(self, now_ns: int) -> bytes:
-        """The frames that are due now."""
-        if self._due_ns is None or now_ns < self._due_ns:
-            return b""
-        self._due_ns += self._interval_ns
-        pitch = math.atan2(-self._acceleration.north, _GRAVITY)
-        roll = math.atan2(self._acceleration.east, _GRAVITY)
-        yaw = math.atan2(self.velocity.east, self.velocity.north)
-        battery = max(0, 100 - 100 * now_ns // _ENDURANCE_NS)
-        return (
-            self.beacon_frames(now_ns)
-            + self._encoder.attitude(roll=roll, pitch=pitch, yaw=yaw, now_ns=now_ns)
-            + self._encoder.sys_status(battery_percent=battery, load=0.0)
-        )
+        """The frames that are due now, one of each stream however late: stale telemetry is of no use."""
+        due = [stream for stream in self._streams if stream.due_ns <= now_ns]
+        for stream in due:
+            stream.due_ns += ((now_ns - stream.due_ns) // stream.interval_ns + 1) * stream.interval_ns
+        return b"".join(stream.encode(now_ns) for stream in due)
 
     def beacon_frames(self, now_ns: int) -> bytes:
         """The inner frames of a position beacon."""
-        position = self._encoder.global_position(self.position, self.velocity, now_ns=now_ns)
-        return self._encoder.heartbeat() + position
+        return self._encoder.heartbeat() + self._global_position(now_ns)
+
+    def _global_position(self, now_ns: int) -> bytes:
+        return self._encoder.global_position(self.position, self.velocity, yaw=self._yaw, now_ns=now_ns)
+
+    def _gps_raw(self, now_ns: int) -> bytes:
+        fix_ns = now_ns if self._fix_ns is None else self._fix_ns
+        return self._encoder.gps_raw(self.position, self.velocity, has_fix=self._fix_ns is not None, fix_ns=fix_ns)
+
+
+def _battery(now_ns: int) -> Battery:
+    """Drained evenly; the voltage falls with the charge."""
+    left = max(0.0, 1 - now_ns / ENDURANCE_NS)
+    return Battery(
+        cells_v=(_EMPTY_V + (_FULL_V - _EMPTY_V) * left,) * _CELLS,
+        current_a=_CAPACITY_MAH / 1000 * 3600 * S / ENDURANCE_NS,
+        consumed_mah=round(_CAPACITY_MAH * (1 - left)),
+        remaining_percent=math.ceil(100 * left),
+        remaining_s=math.ceil(left * ENDURANCE_NS / S),
+    )

@@ -37,7 +37,7 @@ class Uav(Actor):
         self._tap_topic = topics.mavlink(node)
         self._lead_ns = scenario.radio.lead_ns
         self._destination = BROADCAST if scenario.traffic.destination == "all" else NodeId(scenario.traffic.destination)
-        self._filler = wire.filler(scenario.traffic.payload_bytes - wire.HEADER_BYTES)
+        self._filler = wire.filler(scenario.traffic.payload_bytes - wire.HEADER_BYTES, node=node)
         self._node = Node(node, scenario, make_protocol, position=position)
         self._traffic = Traffic(scenario, node)
         self._autopilot = Autopilot(node, position=position, telemetry_hz=scenario.nodes.telemetry_hz)

@@ -1,29 +1,45 @@
 """Native MAVLink messages, and the only place that knows NED and geodetic coordinates. The border to pymavlink.
 
-Inside, positions are ENU metres of the swarm's frame, a tangent plane at `ORIGIN`. Outside, GLOBAL_POSITION_INT has
-WGS84 degrees x 1e7 and velocities north, east, down in cm/s. `mavutil` is not imported: it loads every dialect.
+Inside, positions are ENU metres in the plane that touches the WGS84 ellipsoid at an origin. Outside are degrees x 1e7,
+millimetres of height, and velocities north, east, down in cm/s. Conversions go through the earth-centered frame and are
+exact; what a message rounds is under 1 cm. `mavutil` is not imported: it loads every dialect.
+
+Not modeled: geoid height (altitudes are over the ellipsoid) and the turn of the axes with distance (velocities and
+headings are the origin's north and east: 0.1 degrees off at 10 km).
 """
 
 import math
+from functools import lru_cache
 from typing import Any, Final, NamedTuple
 
 from pymavlink.dialects.v20 import common
 
 from fanet_mw.dialect import fanet
-from fanet_mw.errors import MalformedFrameError
-from fanet_mw.units import MS, Enu, NodeId
-from fanet_mw.wire import COMPONENT, system_id
+from fanet_mw.errors import LocalProtocolError, MalformedFrameError
+from fanet_mw.units import MS, US, Enu, NodeId
+from fanet_mw.wire import COMPONENT, frames, system_id
 
 common.mavlink_map.update(fanet.mavlink_map)  # one parser for both dialects
+
+AUTOPILOT_COMPONENT: Final = 1
+"""MAV_COMP_ID_AUTOPILOT1: who the telemetry is from. Ground stations take no other component for a vehicle."""
 
 _A: Final = 6_378_137.0
 """WGS84 semi-major axis [m]."""
 _E2: Final = 6.694_379_990_14e-3
 """WGS84 first eccentricity squared."""
+_B: Final = _A * math.sqrt(1 - _E2)
+_EP2: Final = _E2 / (1 - _E2)
+"""Second eccentricity squared."""
+
+_UNKNOWN_U16: Final = 0xFFFF
+_UNKNOWN_I16: Final = 0x7FFF
+_GPS_NO_FIX: Final = 1
+_GPS_3D_FIX: Final = 3
 
 
 class Geodetic(NamedTuple):
-    """WGS84 latitude and longitude [degrees], altitude above the origin's [m]."""
+    """WGS84 latitude and longitude [degrees], height over the ellipsoid [m]."""
 
     lat_deg: float
     lon_deg: float
@@ -34,99 +50,253 @@ ORIGIN: Final = Geodetic(37.5665, 126.978, 0.0)
 """Where the swarm's frame touches the earth unless told otherwise."""
 
 
-def _radii(lat_deg: float) -> tuple[float, float]:
-    """Meridian radius and radius of the parallel [m] at a latitude."""
-    sine = math.sin(math.radians(lat_deg))
-    w = math.sqrt(1 - _E2 * sine * sine)
-    return _A * (1 - _E2) / w**3, _A / w * math.cos(math.radians(lat_deg))
+# --- coordinates --------------------------------------------------------------------------------------------------
+
+
+class _Plane(NamedTuple):
+    """An origin in the earth-centered frame, and the sines and cosines that turn into its east, north, up."""
+
+    x: float
+    y: float
+    z: float
+    sin_lat: float
+    cos_lat: float
+    sin_lon: float
+    cos_lon: float
+
+
+def _earth_centered(place: Geodetic) -> _Plane:
+    lat, lon = math.radians(place.lat_deg), math.radians(place.lon_deg)
+    sin_lat, cos_lat, sin_lon, cos_lon = math.sin(lat), math.cos(lat), math.sin(lon), math.cos(lon)
+    normal = _A / math.sqrt(1 - _E2 * sin_lat * sin_lat)
+    across = (normal + place.alt_m) * cos_lat
+    z = (normal * (1 - _E2) + place.alt_m) * sin_lat
+    return _Plane(across * cos_lon, across * sin_lon, z, sin_lat, cos_lat, sin_lon, cos_lon)
+
+
+@lru_cache(maxsize=8)
+def _plane(origin: Geodetic) -> _Plane:
+    if not (abs(origin.lat_deg) <= 90 and abs(origin.lon_deg) <= 180 and math.isfinite(origin.alt_m)):
+        raise LocalProtocolError(f"origin = {origin} must be within 90 and 180 degrees, and its height finite")
+    return _earth_centered(origin)
 
 
 def to_geodetic(position: Enu, origin: Geodetic = ORIGIN) -> Geodetic:
-    """Tangent-plane approximation: exact to a centimetre in round trips, to metres in truth within 10 km."""
-    meridian, parallel = _radii(origin.lat_deg)
-    return Geodetic(
-        origin.lat_deg + math.degrees(position.north / meridian),
-        origin.lon_deg + math.degrees(position.east / parallel),
-        origin.alt_m + position.up,
-    )
+    """Where on earth a point of the swarm's frame is."""
+    o = _plane(origin)
+    outward = o.cos_lat * position.up - o.sin_lat * position.north
+    x = o.x + o.cos_lon * outward - o.sin_lon * position.east
+    y = o.y + o.sin_lon * outward + o.cos_lon * position.east
+    z = o.z + o.cos_lat * position.north + o.sin_lat * position.up
+    across = math.hypot(x, y)
+    theta = math.atan2(z * _A, across * _B)  # Bowring (1976): one step is exact to a micrometre near the ground
+    lat = math.atan2(z + _EP2 * _B * math.sin(theta) ** 3, across - _E2 * _A * math.cos(theta) ** 3)
+    sin_lat = math.sin(lat)
+    alt_m = across * math.cos(lat) + z * sin_lat - _A * math.sqrt(1 - _E2 * sin_lat * sin_lat)
+    return Geodetic(math.degrees(lat), math.degrees(math.atan2(y, x)), alt_m)
 
 
 def to_enu(place: Geodetic, origin: Geodetic = ORIGIN) -> Enu:
     """The inverse of `to_geodetic`."""
-    meridian, parallel = _radii(origin.lat_deg)
+    o, p = _plane(origin), _earth_centered(place)
+    dx, dy, dz = p.x - o.x, p.y - o.y, p.z - o.z
+    outward = o.cos_lon * dx + o.sin_lon * dy
     return Enu(
-        math.radians(place.lon_deg - origin.lon_deg) * parallel,
-        math.radians(place.lat_deg - origin.lat_deg) * meridian,
-        place.alt_m - origin.alt_m,
+        o.cos_lon * dy - o.sin_lon * dx,
+        o.cos_lat * dz - o.sin_lat * outward,
+        o.cos_lat * outward + o.sin_lat * dz,
     )
 
 
-class Encoder:
-    """Native messages of one node, as MAVLink 2 frames with its own sequence."""
+class Ned(NamedTuple):
+    """A vector in north, east, down; metres, or metres per second."""
 
-    def __init__(self, node: NodeId) -> None:
-        self._mav = common.MAVLink(None, srcSystem=system_id(node), srcComponent=COMPONENT)
+    north: float
+    east: float
+    down: float
+
+
+def to_ned(vector: Enu) -> Ned:
+    return Ned(vector.north, vector.east, -vector.up)
+
+
+def from_ned(vector: Ned) -> Enu:
+    return Enu(vector.east, vector.north, -vector.down)
+
+
+def _place_ints(place: Geodetic) -> tuple[int, int, int]:
+    """Latitude and longitude [degrees x 1e7], altitude [mm]."""
+    return round(place.lat_deg * 1e7), round(place.lon_deg * 1e7), round(place.alt_m * 1000)
+
+
+def _velocity_ints(velocity: Enu) -> tuple[int, int, int]:
+    """North, east, down [cm/s]."""
+    north, east, down = (max(-0x8000, min(0x7FFF, round(100 * part))) for part in to_ned(velocity))
+    return north, east, down
+
+
+def _centidegrees(angle_rad: float | None) -> int:
+    """A course in [0, 36000); 65535 when there is none."""
+    return _UNKNOWN_U16 if angle_rad is None else round(math.degrees(angle_rad) * 100) % 36000
+
+
+# --- messages -----------------------------------------------------------------------------------------------------
+
+
+class Attitude(NamedTuple):
+    """Rotations from north, east, down to forward, right, down [rad]; yaw is clockwise from north."""
+
+    roll: float
+    pitch: float
+    yaw: float
+
+
+class Battery(NamedTuple):
+    """A battery's state."""
+
+    cells_v: tuple[float, ...]
+    current_a: float
+    consumed_mah: int
+    remaining_percent: int
+    remaining_s: int
+
+
+class Encoder:
+    """Native messages of one node, as MAVLink 2 frames with their own sequence."""
+
+    def __init__(self, node: NodeId, *, component: int = COMPONENT, origin: Geodetic = ORIGIN) -> None:
+        self._mav = common.MAVLink(None, srcSystem=system_id(node), srcComponent=component)
+        self._origin = origin
 
     def _pack(self, message: Any) -> bytes:  # noqa: ANN401  (pymavlink has no types)
         data = bytes(message.pack(self._mav))
-        self._mav.seq = (self._mav.seq + 1) % 256
+        self._mav.seq = (self._mav.seq + 1) % 256  # `pack` leaves it to `send`, which wants a file
         return data
 
     def heartbeat(self) -> bytes:
+        """Armed, flying by itself. `GENERIC`, because INVALID would say that this is no flight controller."""
+        mode = common.MAV_MODE_FLAG_SAFETY_ARMED | common.MAV_MODE_FLAG_AUTO_ENABLED
         return self._pack(
             common.MAVLink_heartbeat_message(
-                common.MAV_TYPE_QUADROTOR,
-                common.MAV_AUTOPILOT_INVALID,
-                common.MAV_MODE_FLAG_SAFETY_ARMED | common.MAV_MODE_FLAG_AUTO_ENABLED,
-                0,
-                common.MAV_STATE_ACTIVE,
-                3,
+                common.MAV_TYPE_QUADROTOR, common.MAV_AUTOPILOT_GENERIC, mode, 0, common.MAV_STATE_ACTIVE, 3
             )
         )
 
-    def global_position(self, position: Enu, velocity: Enu, *, now_ns: int, origin: Geodetic = ORIGIN) -> bytes:
-        place = to_geodetic(position, origin)
-        heading = math.degrees(math.atan2(velocity.east, velocity.north)) % 360
+    def global_position(self, position: Enu, velocity: Enu, *, yaw: float | None, now_ns: int) -> bytes:
+        """GLOBAL_POSITION_INT; the relative altitude is over the origin's."""
+        place = to_geodetic(position, self._origin)
+        lat, lon, alt_mm = _place_ints(place)
+        relative_mm = round((place.alt_m - self._origin.alt_m) * 1000)
+        velocities = _velocity_ints(velocity)
         return self._pack(
             common.MAVLink_global_position_int_message(
-                now_ns // MS & 0xFFFF_FFFF,
-                round(place.lat_deg * 1e7),
-                round(place.lon_deg * 1e7),
-                round(place.alt_m * 1000),
-                round(position.up * 1000),
-                _int16(velocity.north * 100),
-                _int16(velocity.east * 100),
-                _int16(-velocity.up * 100),
-                round(heading * 100) % 36000,
+                _boot_ms(now_ns), lat, lon, alt_mm, relative_mm, *velocities, _centidegrees(yaw)
             )
         )
 
-    def attitude(self, *, roll: float, pitch: float, yaw: float, now_ns: int) -> bytes:
-        """Angles in radians, rates left at zero."""
-        return self._pack(common.MAVLink_attitude_message(now_ns // MS & 0xFFFF_FFFF, roll, pitch, yaw, 0.0, 0.0, 0.0))
+    def gps_raw(self, position: Enu, velocity: Enu, *, has_fix: bool, fix_ns: int) -> bytes:
+        """GPS_RAW_INT: what the receiver said last."""
+        ground_m_s = math.hypot(velocity.east, velocity.north)
+        course = math.atan2(velocity.east, velocity.north) if ground_m_s else None
+        return self._pack(
+            common.MAVLink_gps_raw_int_message(
+                max(0, fix_ns // US),
+                _GPS_3D_FIX if has_fix else _GPS_NO_FIX,
+                *_place_ints(to_geodetic(position, self._origin)),
+                _UNKNOWN_U16,
+                _UNKNOWN_U16,
+                min(round(100 * ground_m_s), _UNKNOWN_U16 - 1),
+                _centidegrees(course),
+                255,
+            )
+        )
 
-    def sys_status(self, *, battery_percent: int, load: float) -> bytes:
-        """`load` is the share of the link's drops in [0, 1]."""
-        voltage_mv = 14_000 + 28 * battery_percent
+    def attitude(self, attitude: Attitude, *, now_ns: int) -> bytes:
+        """ATTITUDE; the rates are zero, nothing here knows them."""
+        return self._pack(common.MAVLink_attitude_message(_boot_ms(now_ns), *attitude, 0.0, 0.0, 0.0))
+
+    def sys_status(self, battery: Battery) -> bytes:
+        """SYS_STATUS: the battery, and the sensors that are there, on and well: GPS alone."""
+        gps = common.MAV_SYS_STATUS_SENSOR_GPS
         return self._pack(
             common.MAVLink_sys_status_message(
-                0, 0, 0, 0, voltage_mv, -1, battery_percent, round(1e4 * load), 0, 0, 0, 0, 0
+                gps,
+                gps,
+                gps,
+                0,
+                round(1000 * math.fsum(battery.cells_v)),
+                round(100 * battery.current_a),
+                battery.remaining_percent,
+                *(0,) * 6,
             )
         )
 
+    def battery_status(self, battery: Battery) -> bytes:
+        """BATTERY_STATUS of the one battery."""
+        millivolts = [round(1000 * volts) for volts in battery.cells_v]
+        return self._pack(
+            common.MAVLink_battery_status_message(
+                0,
+                common.MAV_BATTERY_FUNCTION_ALL,
+                common.MAV_BATTERY_TYPE_LIPO,
+                _UNKNOWN_I16,
+                millivolts + [_UNKNOWN_U16] * (10 - len(millivolts)),
+                round(100 * battery.current_a),
+                battery.consumed_mah,
+                -1,
+                battery.remaining_percent,
+                battery.remaining_s,
+            )
+        )
 
-def _int16(value: float) -> int:
-    return max(-32768, min(32767, round(value)))
+    def home_position(self, position: Enu) -> bytes:
+        """HOME_POSITION: where the node started, on level ground facing north; to be approached from straight above."""
+        ned = to_ned(position)
+        level = (1.0, 0.0, 0.0, 0.0)
+        lat, lon, alt_mm = _place_ints(to_geodetic(position, self._origin))
+        return self._pack(common.MAVLink_home_position_message(lat, lon, alt_mm, *ned, level, 0.0, 0.0, 0.0))
+
+    def extended_sys_state(self) -> bytes:
+        """EXTENDED_SYS_STATE: in the air, and no VTOL."""
+        return self._pack(
+            common.MAVLink_extended_sys_state_message(common.MAV_VTOL_STATE_UNDEFINED, common.MAV_LANDED_STATE_IN_AIR)
+        )
+
+
+def _boot_ms(now_ns: int) -> int:
+    """MAVLink's 32 bits of milliseconds since boot: since the swarm's epoch; they wrap after 49 days."""
+    return now_ns // MS & 0xFFFF_FFFF
+
+
+# --- decoding -----------------------------------------------------------------------------------------------------
 
 
 def decode(data: bytes) -> list[Any]:
-    """Every message in some bytes, native or ours; raises MalformedFrameError when they are not whole frames."""
+    """Every message in some bytes, native or ours; raises MalformedFrameError when they are not whole MAVLink 2 frames.
+
+    Signatures are not verified: pymavlink's check refuses the reordering that flooding always has. A message whose
+    definition neither dialect has comes as UNKNOWN_<id>, its CRC unchecked.
+    """
     parser = common.MAVLink(None)
-    parser.robust_parsing = False
     try:
-        messages = parser.parse_buffer(bytearray(data)) or []
-    except (common.MAVError, ValueError, IndexError) as error:
+        return [parser.decode(bytearray(frame)) for frame in frames(data)]
+    except (common.MAVError, ValueError, TypeError) as error:
         raise MalformedFrameError(f"not MAVLink: {error}") from error
-    if parser.buf_len() > 0:
-        raise MalformedFrameError(f"{parser.buf_len()} bytes left over")
-    return list(messages)
+
+
+class Kinematics(NamedTuple):
+    """What a GLOBAL_POSITION_INT says, in the swarm's frame."""
+
+    position: Enu
+    velocity: Enu
+    yaw: float | None
+    """[rad], clockwise from north."""
+    t_ms: int
+
+
+def kinematics(message: Any, origin: Geodetic = ORIGIN) -> Kinematics:  # noqa: ANN401  (pymavlink has no types)
+    """Read a decoded GLOBAL_POSITION_INT."""
+    place = Geodetic(message.lat / 1e7, message.lon / 1e7, message.alt / 1000)
+    velocity = from_ned(Ned(message.vx / 100, message.vy / 100, message.vz / 100))
+    yaw = None if message.hdg == _UNKNOWN_U16 else math.radians(message.hdg / 100)
+    return Kinematics(to_enu(place, origin), velocity, yaw, message.time_boot_ms)

@@ -1,48 +1,50 @@
-"""The telemetry log of MAVProxy, QGroundControl and Mission Planner: 8-byte big-endian microseconds, then one frame."""
+"""The telemetry log of MAVProxy, QGroundControl and Mission Planner: 8-byte big-endian microseconds, then one frame.
+
+Only MAVLink 2 frames: what a swarm of ours writes. Instants are unix time by the format's custom.
+"""
 
 import struct
 from collections.abc import Iterable, Iterator
 from pathlib import Path
-from typing import Final
+from typing import BinaryIO, Final
 
 from fanet_mw.errors import MalformedFrameError
 from fanet_mw.units import US
+from fanet_mw.wire import frames
 
 _STAMP: Final = struct.Struct(">Q")
-_OVERHEAD: Final = 12
+_LONGEST: Final = _STAMP.size + 10 + 255 + 2 + 13
 
 
-def frames(data: bytes) -> Iterator[bytes]:
-    """Each MAVLink 2 frame of a run of frames; raises MalformedFrameError at a broken one."""
-    at = 0
-    while at < len(data):
-        if len(data) - at < _OVERHEAD or data[at] != 0xFD:
-            raise MalformedFrameError(f"no MAVLink 2 frame at byte {at}")
-        end = at + _OVERHEAD + data[at + 1] + (13 if data[at + 2] & 1 else 0)
-        if end > len(data):
-            raise MalformedFrameError(f"frame at byte {at} ends beyond the end")
-        yield data[at:end]
-        at = end
+def append(file: BinaryIO, data: bytes, *, t_us: int) -> int:
+    """Append each frame of a run of frames under one stamp; returns how many. Raises before it writes a broken one."""
+    stamp = _STAMP.pack(t_us)
+    whole = list(frames(data))
+    for frame in whole:
+        file.write(stamp + frame)
+    return len(whole)
 
 
 def write(path: Path, taps: Iterable[tuple[int, bytes]], *, epoch_us: int = 0) -> None:
     """Write (instant ns, frames) pairs; `epoch_us` is the unix time of swarm instant 0."""
     with path.open("wb") as file:
         for t_ns, data in taps:
-            stamp = _STAMP.pack(epoch_us + t_ns // US)
-            for frame in frames(data):
-                file.write(stamp + frame)
+            append(file, data, t_us=epoch_us + t_ns // US)
 
 
 def read(path: Path) -> Iterator[tuple[int, bytes]]:
-    """(microseconds, frame) pairs."""
-    data = path.read_bytes()
-    at = 0
-    while at < len(data):
-        if len(data) - at < _STAMP.size + _OVERHEAD:
-            raise MalformedFrameError(f"{path}: cut off at byte {at}")
-        (t_us,) = _STAMP.unpack_from(data, at)
-        at += _STAMP.size
-        frame = next(frames(data[at : at + _OVERHEAD + data[at + 1] + (13 if data[at + 2] & 1 else 0)]))
-        yield t_us, frame
-        at += len(frame)
+    """(microseconds, frame) pairs, one at a time; raises MalformedFrameError where the file is cut off or broken."""
+    with path.open("rb") as file:
+        at = 0
+        rest = b""
+        while rest := rest + file.read(_LONGEST - len(rest)):
+            if len(rest) <= _STAMP.size:
+                raise MalformedFrameError(f"{path}: cut off at byte {at}")
+            (t_us,) = _STAMP.unpack_from(rest)
+            try:
+                frame = next(frames(rest, start=_STAMP.size))
+            except MalformedFrameError as error:
+                raise MalformedFrameError(f"{path}: record at byte {at}: {error}") from error
+            yield t_us, frame
+            at += _STAMP.size + len(frame)
+            rest = rest[_STAMP.size + len(frame) :]

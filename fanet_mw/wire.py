@@ -13,9 +13,9 @@ from typing import Any, Final, NamedTuple, Self
 
 from fastcrc.crc16 import mcrf4xx
 
-from fanet_mw.errors import MalformedFrameError
+from fanet_mw.errors import LocalProtocolError, MalformedFrameError
 from fanet_mw.rng import stream
-from fanet_mw.units import Enu
+from fanet_mw.units import US, Enu
 
 MAGIC: Final = 0xFD
 """MAVLink 2 start of frame."""
@@ -35,10 +35,15 @@ PRIORITY_SAFETY: Final = 1
 PRIORITY_REPORT: Final = 2
 PRIORITY_BULK: Final = 3
 
-_OVERHEAD: Final = 12
+OVERHEAD: Final = 12
 """Bytes of a MAVLink 2 frame around its payload: 10 before, 2 of CRC after."""
 _PREFIX: Final = struct.Struct("<BBBBBBBHB")
 _CRC: Final = struct.Struct("<H")
+_SIGNED: Final = 1
+"""The only incompatibility flag MAVLink 2 defines; a frame with another one must not be read."""
+_SIGNATURE: Final = 13
+LATEST_US: Final = (1 << 63) // US - 1
+"""The latest instant a message may name: in nanoseconds it still fits the 64 bits of the bus and of the kernel."""
 
 
 class Kind(IntEnum):
@@ -80,29 +85,31 @@ def _frame(spec: Spec, payload: bytes, *, node: int, seq: int = 0) -> bytes:
     return head + payload + _CRC.pack(crc)
 
 
-def _payload(spec: Spec, frame: bytes) -> tuple[Any, ...]:
-    """The unpacked fields of the single frame `frame`; raises MalformedFrameError."""
-    size = spec.layout.size
-    if len(frame) != size + _OVERHEAD or frame[0] != MAGIC or frame[1] != size or frame[2]:
-        raise MalformedFrameError(f"{len(frame)} bytes are no message {spec.msgid}")
-    if frame[7] | frame[8] << 8 | frame[9] << 16 != spec.msgid:
-        raise MalformedFrameError(f"not message {spec.msgid}")
-    if mcrf4xx(frame[1:-2] + bytes((spec.crc_extra,))) != frame[-2] | frame[-1] << 8:
-        raise MalformedFrameError(f"CRC of message {spec.msgid}")
-    return spec.layout.unpack_from(frame, 10)
+def _message_id(frame: bytes, at: int = 0) -> int:
+    return frame[at + 7] | frame[at + 8] << 8 | frame[at + 9] << 16
 
 
 # --- the routing header -------------------------------------------------------------------------------------------
 
 ROUTE: Final = Spec(53000, 34, struct.Struct("<QIHHHBBBBBB"))
-HEADER_BYTES: Final = ROUTE.layout.size + _OVERHEAD
+HEADER_BYTES: Final = ROUTE.layout.size + OVERHEAD
 _ROUTE_MARK: Final = bytes((MAGIC, ROUTE.layout.size, 0))
 _ROUTE_ID: Final = ROUTE.msgid.to_bytes(3, "little")
-_PEEK: Final = struct.Struct("<IH")
-_PEEK_AT: Final = 10 + 8
-_FLAGS_AT: Final = 10 + 22
+_ROUTE_BEFORE: Final = (MAGIC, ROUTE.layout.size, 0, 0)
+_ROUTE_SENDER: Final = (COMPONENT, ROUTE.msgid & 0xFFFF, ROUTE.msgid >> 16)
 _EXTRA: Final = bytes((ROUTE.crc_extra,))
 _ANY_NODE: Final = 0xFFFF
+
+# Whole headers, MAVLink's ten bytes included: one call of struct is most of what a header costs.
+_PACKED: Final = struct.Struct("<BBBBBBBHB" + ROUTE.layout.format[1:])
+_CHECKED: Final = struct.Struct("<10x" + ROUTE.layout.format[1:] + "H")
+_PEEK: Final = struct.Struct("<3s4x3s8xIH8xB3x")
+_BODY_END: Final = HEADER_BYTES - 2
+_SYSTEM_AT: Final = 5
+_PREV_HOP_AT: Final = 26
+_KIND_AT: Final = 28
+_FLAGS_AT: Final = 32
+_HOP: Final = struct.Struct("<HBBB")
 
 
 class Header(NamedTuple):
@@ -120,15 +127,9 @@ class Header(NamedTuple):
     flags: int
 
     def encode(self) -> bytes:
-        return _route_frame(ROUTE.layout.pack(*self, VERSION), prev_hop=self.prev_hop, seq=self.seq)
-
-
-def _route_frame(payload: bytes, *, prev_hop: int, seq: int) -> bytes:
-    """The transmitter of this hop is the MAVLink sender; the MAVLink sequence is the packet's, low byte."""
-    head = _PREFIX.pack(
-        MAGIC, len(payload), 0, 0, seq & 0xFF, system_id(prev_hop), COMPONENT, ROUTE.msgid & 0xFFFF, ROUTE.msgid >> 16
-    )
-    return head + payload + _CRC.pack(mcrf4xx(head[1:] + payload + _EXTRA))
+        """The MAVLink sender is the transmitter of this hop; the MAVLink sequence is the packet's, low byte."""
+        body = _PACKED.pack(*_ROUTE_BEFORE, self.seq & 0xFF, system_id(self.prev_hop), *_ROUTE_SENDER, *self, VERSION)
+        return body + _CRC.pack(mcrf4xx(body[1:] + _EXTRA))
 
 
 def peek(frame: bytes) -> tuple[int, int, int] | None:
@@ -136,62 +137,86 @@ def peek(frame: bytes) -> tuple[int, int, int] | None:
 
     Enough to recognize a duplicate; whoever goes on must `decode_header`.
     """
-    if len(frame) < HEADER_BYTES or frame[:3] != _ROUTE_MARK or frame[7:10] != _ROUTE_ID:
+    if len(frame) < HEADER_BYTES:
         return None
-    seq, origin = _PEEK.unpack_from(frame, _PEEK_AT)
-    return origin, seq, frame[_FLAGS_AT]
+    mark, message, seq, origin, flags = _PEEK.unpack_from(frame)
+    return (origin, seq, flags) if mark == _ROUTE_MARK and message == _ROUTE_ID else None
 
 
 def decode_header(frame: bytes) -> Header:
     """The routing header of a frame; raises MalformedFrameError."""
-    if peek(frame) is None:
+    if frame[:3] != _ROUTE_MARK or frame[7:10] != _ROUTE_ID or len(frame) < HEADER_BYTES:
         raise MalformedFrameError("no routing header")
-    if mcrf4xx(frame[1 : HEADER_BYTES - 2] + _EXTRA) != frame[HEADER_BYTES - 2] | frame[HEADER_BYTES - 1] << 8:
+    *fields, version, crc = _CHECKED.unpack_from(frame)
+    if mcrf4xx(frame[1:_BODY_END] + _EXTRA) != crc:
         raise MalformedFrameError("CRC of the routing header")
-    *fields, version = ROUTE.layout.unpack_from(frame, 10)
-    header = Header(*fields)
-    if version != VERSION or header.kind > Kind.TIME or header.origin in (0, _ANY_NODE) or header.prev_hop == 0:
+    header = Header._make(fields)
+    if (
+        version != VERSION
+        or header.kind > Kind.TIME
+        or header.origin_us > LATEST_US
+        or header.origin in (0, _ANY_NODE)
+        or header.prev_hop in (0, _ANY_NODE)
+        or not header.destination
+    ):
         raise MalformedFrameError(f"routing header {header}, version {version}")
     return header
 
 
 def rewrite(frame: bytes, *, prev_hop: int, hop_limit: int, hops: int, flags: int) -> bytes:
     """The frame for its next hop: a new header, the inner frames byte for byte. The frame must have been decoded."""
-    header = Header(*ROUTE.layout.unpack_from(frame, 10)[:-1])
-    header = header._replace(prev_hop=prev_hop, hop_limit=hop_limit, hops=hops, flags=flags)
-    return header.encode() + frame[HEADER_BYTES:]
+    body = bytearray(frame[:_BODY_END])
+    body[_SYSTEM_AT] = system_id(prev_hop)
+    _HOP.pack_into(body, _PREV_HOP_AT, prev_hop, frame[_KIND_AT], hop_limit, hops)
+    body[_FLAGS_AT] = flags
+    return b"".join((body, _CRC.pack(mcrf4xx(bytes(body[1:]) + _EXTRA)), frame[HEADER_BYTES:]))
 
 
 # --- inner frames -------------------------------------------------------------------------------------------------
 
 
+def frames(data: bytes, *, start: int = 0) -> Iterator[bytes]:
+    """Each MAVLink 2 frame of a run of frames, by lengths alone; raises MalformedFrameError at a broken one."""
+    at = start
+    while at < len(data):
+        if len(data) - at < OVERHEAD or data[at] != MAGIC or data[at + 2] & ~_SIGNED:
+            raise MalformedFrameError(f"no MAVLink 2 frame at byte {at}")
+        end = at + OVERHEAD + data[at + 1] + (_SIGNATURE if data[at + 2] else 0)
+        if end > len(data):
+            raise MalformedFrameError(f"frame at byte {at} ends beyond the end")
+        yield data[at:end]
+        at = end
+
+
 def inner_frames(frame: bytes) -> Iterator[tuple[int, bytes]]:
     """(message id, whole MAVLink frame) of each inner frame, in order; raises MalformedFrameError at a broken one.
 
-    Checks lengths only: the CRC needs the message's definition, which its decoder has.
+    The CRC is checked of our own messages only: MAVLink's needs the message's definition.
     """
-    at = HEADER_BYTES
-    while at < len(frame):
-        if len(frame) - at < _OVERHEAD or frame[at] != MAGIC:
-            raise MalformedFrameError(f"no MAVLink 2 frame at byte {at}")
-        end = at + _OVERHEAD + frame[at + 1] + (13 if frame[at + 2] & 1 else 0)  # a signature is 13 bytes
-        if end > len(frame):
-            raise MalformedFrameError(f"frame at byte {at} ends beyond the end")
-        yield frame[at + 7] | frame[at + 8] << 8 | frame[at + 9] << 16, frame[at:end]
-        at = end
+    for inner in frames(frame, start=HEADER_BYTES):
+        msgid = _message_id(inner)
+        spec = _OURS.get(msgid)
+        if spec is not None:
+            end = OVERHEAD + inner[1]
+            crc = mcrf4xx(inner[1 : end - 2] + bytes((spec.crc_extra,)))
+            if crc != inner[end - 2] | inner[end - 1] << 8:
+                raise MalformedFrameError(f"CRC of message {msgid}")
+        yield msgid, inner
 
 
 def _inner(spec: Spec, frame: bytes) -> tuple[Any, ...]:
     """The fields of the first inner frame that is this message; raises MalformedFrameError."""
     for msgid, inner in inner_frames(frame):
         if msgid == spec.msgid:
-            return _payload(spec, inner)
+            if inner[1] != spec.layout.size:
+                raise MalformedFrameError(f"message {msgid} of {inner[1]} bytes, not {spec.layout.size}")
+            return spec.layout.unpack_from(inner, 10)
     raise MalformedFrameError(f"no message {spec.msgid} in the frame")
 
 
-def _check(version: int, node: int) -> None:
-    if version != VERSION or not 0 < node < _ANY_NODE:
-        raise MalformedFrameError(f"version {version}, node {node}")
+def _check(version: int, node: int, *, t_us: int = 0) -> None:
+    if version != VERSION or not 0 < node < _ANY_NODE or t_us > LATEST_US:
+        raise MalformedFrameError(f"version {version}, node {node}, instant {t_us} us")
 
 
 class Beacon(NamedTuple):
@@ -214,6 +239,8 @@ class Beacon(NamedTuple):
         *fields, version = _inner(BEACON, frame)
         beacon = cls(*fields)
         _check(version, beacon.node)
+        if beacon.role > Role.HEAD or beacon.head == _ANY_NODE:
+            raise MalformedFrameError(f"beacon of role {beacon.role}, head {beacon.head}")
         return beacon
 
 
@@ -242,6 +269,10 @@ class Schedule(NamedTuple):
     members: tuple[Member, ...]
 
     def encode_frame(self, node: int) -> bytes:
+        if len(self.members) > CAPACITY or self.clusters > _HEAD_BIT:
+            raise LocalProtocolError(
+                f"schedule of {len(self.members)} entries, {self.clusters} clusters: must be <= {CAPACITY}, {_HEAD_BIT}"
+            )
         unused = (0,) * (CAPACITY - len(self.members))
         return _frame(
             SCHEDULE,
@@ -264,7 +295,7 @@ class Schedule(NamedTuple):
         fields = _inner(SCHEDULE, frame)
         part, parts, count, version = fields[-4:]
         nodes, assigned = fields[6 : 6 + CAPACITY], fields[6 + CAPACITY : 6 + 2 * CAPACITY]
-        if count > CAPACITY or part >= parts:
+        if not 0 < count <= CAPACITY or part >= parts:
             raise MalformedFrameError(f"schedule part {part} of {parts} with {count} entries")
         members = tuple(
             Member(node, entry & ~_HEAD_BIT, bool(entry & _HEAD_BIT))
@@ -272,9 +303,11 @@ class Schedule(NamedTuple):
         )
         start_us, period_us, slot_us, epoch, leader, clusters = fields[:6]
         schedule = cls(start_us, period_us, slot_us, epoch, leader, clusters, part, parts, members)
-        _check(version, schedule.leader)
-        if not 0 < schedule.slot_us <= schedule.period_us or not schedule.epoch:
-            raise MalformedFrameError(f"schedule epoch {schedule.epoch}, slot {schedule.slot_us} us")
+        _check(version, schedule.leader, t_us=start_us)
+        if not 0 < slot_us * clusters <= period_us or not epoch:
+            raise MalformedFrameError(f"schedule {epoch}: {clusters} slots of {slot_us} us in {period_us} us")
+        if not all(0 < member.node < _ANY_NODE and member.cluster < clusters for member in members):
+            raise MalformedFrameError(f"schedule {epoch}: an entry that is no node, or none of {clusters} clusters")
         return schedule
 
 
@@ -310,7 +343,7 @@ class Survivor(NamedTuple):
     @classmethod
     def decode_frame(cls, frame: bytes) -> Self:
         t_us, survivor, east, north, up, rssi_dbm, reporter, version = _inner(SURVIVOR, frame)
-        _check(version, reporter)
+        _check(version, reporter, t_us=t_us)
         if not math.isfinite(rssi_dbm):
             raise MalformedFrameError(f"rssi {rssi_dbm}")
         return cls(t_us, survivor, reporter, _finite(east, north, up), rssi_dbm)
@@ -332,7 +365,7 @@ class TimeBeacon(NamedTuple):
     def decode_frame(cls, frame: bytes) -> Self:
         *fields, version = _inner(TIME, frame)
         beacon = cls(*fields)
-        _check(version, beacon.node)
+        _check(version, beacon.node, t_us=beacon.t_us)
         return beacon
 
 
@@ -349,6 +382,7 @@ CHUNK: Final = Spec(53004, 155, struct.Struct("<HBB240B"))
 TIME: Final = Spec(53005, 192, struct.Struct("<QIHHBB"))
 JOIN: Final = Spec(53006, 50, struct.Struct("<fffHB"))
 SPECS: Final = (ROUTE, BEACON, SCHEDULE, SURVIVOR, CHUNK, TIME, JOIN)
+_OURS: Final = {spec.msgid: spec for spec in SPECS}
 CAPACITY: Final = 56
 """Entries of one schedule part."""
 
@@ -356,32 +390,33 @@ CAPACITY: Final = 56
 
 _CHUNK_HEAD: Final = struct.Struct("<HBB")
 _CHUNK_DATA: Final = 240
-_LEAST_CHUNK: Final = _OVERHEAD + _CHUNK_HEAD.size + 1
+_LEAST_CHUNK: Final = OVERHEAD + _CHUNK_HEAD.size + 1
+_WHOLE_CHUNK: Final = OVERHEAD + _CHUNK_HEAD.size + _CHUNK_DATA
+_MOST: Final = 255 * _WHOLE_CHUNK
 
 
-@lru_cache(maxsize=64)
-def filler(size: int) -> bytes:
+@lru_cache(maxsize=256)
+def filler(size: int, *, node: int = 1) -> bytes:
     """Inner FANET_CHUNK frames of exactly `size` bytes: application data whose content does not matter.
 
     `size` is 0 or at least 17, one frame with one byte of data. The bytes are fixed, pseudo-random and never zero, so
-    that nothing is truncated and nothing depends on a run.
+    that nothing is truncated and nothing depends on a run. `node` is who they say they are from.
     """
     if size == 0:
         return b""
-    if size < _LEAST_CHUNK:
-        raise ValueError(f"filler of {size} bytes: must be 0 or >= {_LEAST_CHUNK}")
-    whole = _LEAST_CHUNK - 1 + _CHUNK_DATA
-    lengths = [whole] * (size // whole)
-    rest = size % whole
-    if rest and rest < _LEAST_CHUNK:  # too short for a frame of its own: the one before gives some bytes
+    if not _LEAST_CHUNK <= size <= _MOST:
+        raise LocalProtocolError(f"filler size = {size} must be 0 or in [{_LEAST_CHUNK}, {_MOST}]")
+    lengths = [_WHOLE_CHUNK] * (size // _WHOLE_CHUNK)
+    rest = size % _WHOLE_CHUNK
+    if 0 < rest < _LEAST_CHUNK:  # too short for a frame of its own: the one before gives some bytes
         lengths[-1] -= _LEAST_CHUNK - rest
         rest = _LEAST_CHUNK
     if rest:
         lengths.append(rest)
     random = stream(0, "filler", size)
-    frames = []
+    chunks = []
     for index, length in enumerate(lengths):
-        data = bytes(random.randint(1, 255) for _ in range(length - _LEAST_CHUNK + 1))
+        data = random.randbytes(length - _LEAST_CHUNK + 1).replace(b"\x00", b"\x01")
         payload = _CHUNK_HEAD.pack(len(data), index, len(lengths)) + data
-        frames.append(_frame(CHUNK, payload, node=1, seq=index))
-    return b"".join(frames)
+        chunks.append(_frame(CHUNK, payload, node=node, seq=index))
+    return b"".join(chunks)

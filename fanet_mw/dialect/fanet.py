@@ -563,8 +563,9 @@ setattr(MAVLink_fanet_survivor_message, "name", mavlink_msg_deprecated_name_prop
 
 class MAVLink_fanet_chunk_message(MAVLink_message):
     """
-    A piece of application data. The last message of a frame may be
-    truncated as MAVLink 2 does.
+    A piece of application data; the only message that is not of one
+    length: a piece shorter than 240 bytes is truncated as MAVLink 2
+    does.
     """
 
     id = MAVLINK_MSG_ID_FANET_CHUNK
@@ -1245,8 +1246,9 @@ class MAVLink(object):
 
     def fanet_chunk_encode(self, length: int, index: int, count: int, data: Sequence[int]) -> MAVLink_fanet_chunk_message:
         """
-        A piece of application data. The last message of a frame may be
-        truncated as MAVLink 2 does.
+        A piece of application data; the only message that is not of one
+        length: a piece shorter than 240 bytes is truncated as MAVLink
+        2 does.
 
         length                    : How many bytes of data are used. [bytes] (type:uint16_t)
         index                     : This piece, from 0. (type:uint8_t)
@@ -1258,8 +1260,9 @@ class MAVLink(object):
 
     def fanet_chunk_send(self, length: int, index: int, count: int, data: Sequence[int], force_mavlink1: bool = False) -> None:
         """
-        A piece of application data. The last message of a frame may be
-        truncated as MAVLink 2 does.
+        A piece of application data; the only message that is not of one
+        length: a piece shorter than 240 bytes is truncated as MAVLink
+        2 does.
 
         length                    : How many bytes of data are used. [bytes] (type:uint16_t)
         index                     : This piece, from 0. (type:uint8_t)

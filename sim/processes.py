@@ -13,6 +13,7 @@ from multiprocessing.context import ForkServerContext, ForkServerProcess
 from typing import Any, Final
 
 from fanet_mw.errors import FanetError
+from fanet_mw.hosts.service import BUS_EXIT_CODE
 
 _PRELOAD: Final = ["agents.__main__", "emulator.__main__", "sim.world_main"]
 _PR_SET_PDEATHSIG: Final = 1
@@ -28,7 +29,7 @@ def _child(entry: Entry, arguments: Mapping[str, Any]) -> None:
         code = entry(**arguments)
     except FanetError as error:
         sys.stderr.write(f"{error}\n")
-        code = 3
+        code = BUS_EXIT_CODE
     sys.exit(code)
 
 

@@ -33,6 +33,8 @@ from sim.world_main import run as run_world
 READY_TIMEOUT_S: Final = 60.0
 _GRACE_S: Final = 5.0
 """After the end of the swarm's time, for last reports."""
+_STOP_HEARD_S: Final = 0.3
+"""Between telling services to stop and closing the bus they hear it on."""
 _MAX_RESPAWNS: Final = 5
 """Of one name: a process that cannot live is not started for ever."""
 _PROGRESS_S: Final = 0.25
@@ -71,9 +73,11 @@ class Collector:
     def reports(self) -> dict[str, dict[str, Any]]:
         """The last report of each actor."""
         reports = [message for message in _decoded(list(self._reports.values())) if isinstance(message, Report)]
-        return {report.name: json.loads(report.json) for report in sorted(reports, key=lambda report: report.name)}
+        parsed = {report.name: _json(report.json) for report in sorted(reports, key=lambda report: report.name)}
+        return {name: content for name, content in parsed.items() if isinstance(content, dict)}
 
     def taps(self) -> list[tuple[int, bytes]]:
+        """What UAVs told inspectors, by instant."""
         taps = [(m.t_ns, m.data) for m in _decoded(self._taps) if isinstance(m, MavlinkTap)]
         return sorted(taps, key=lambda tap: tap[0])
 
@@ -86,6 +90,14 @@ def _decoded(payloads: list[bytes]) -> list[Message]:
         except MalformedFrameError:
             continue  # not from one of ours
     return messages
+
+
+def _json(text: str) -> object:
+    try:
+        content: object = json.loads(text)
+    except ValueError:
+        return None  # not from one of ours
+    return content
 
 
 class Swarm:
@@ -103,6 +115,7 @@ class Swarm:
         self.processes = Processes(self._process_ended)
         self._clock: SwarmClock | None = None
         self._over = asyncio.Event()
+        self._ending = False
         self._aborted: str | None = None
         self._ended: list[tuple[str, int]] = []
         self._obituaries: list[Record] = []
@@ -120,6 +133,7 @@ class Swarm:
             await self._wind_up()
         finally:
             self._over.set()
+            self._ending = True
             await self.processes.end_all()
         return Outcome(
             scenario=self._scenario,
@@ -184,13 +198,16 @@ class Swarm:
                 self._tell(f"{len(late)} processes did not end by themselves: {', '.join(late[:5])}")
 
     def _process_ended(self, name: str, exit_code: int) -> None:
-        if self._over.is_set() or (exit_code == 0 and self._time_is_over()):
+        if self._ending or (exit_code == 0 and (self._over.is_set() or self._time_is_over())):
             return
         now_ns = max(0, self._clock.now_ns()) if self._clock else 0
         self._ended.append((name, exit_code))
         node = int(name.removeprefix("agent-")) if name.startswith("agent-") else 0
         self._obituaries.append(ProcessEnded(now_ns, node, name, exit_code))
         what = f"{name} ended with {describe(exit_code)} at {now_ns / S:.1f} s"
+        if self._over.is_set():
+            self._tell(f"{what}, while the swarm was ending")
+            return
         self._respawns[name] = self._respawns.get(name, 0) + 1
         if self._respawn and self._respawns[name] <= _MAX_RESPAWNS:
             self._tell(f"{what}; started again")
@@ -248,4 +265,8 @@ async def serve(scenario: Scenario, *, swarm: str, listen: str, on_event: Tell) 
         on_event(f"serving {listen}, waiting for {len(keeper.missing())} services of swarm {swarm}")
         clock = SwarmClock(await keeper.start(timeout_s=3600))
         on_event("all are there: the clock runs")
-        await asyncio.sleep(clock.wait_s(scenario.duration_ns) + 1)
+        try:
+            await asyncio.sleep(clock.wait_s(scenario.duration_ns) + 1)
+        finally:  # interrupted or not: nobody keeps running on a bus that ends
+            keeper.stop()
+            time.sleep(_STOP_HEARD_S)  # noqa: ASYNC251  (nothing else runs here, and a cancelled task cannot await)

@@ -1,7 +1,9 @@
-"""The world as a process: `fanet world`, which has all the flags."""
+"""The world as a process: `python -m sim.world_main SCENARIO.toml`, or `fanet world`."""
 
 import asyncio
+import sys
 
+from fanet_mw.hosts import service
 from fanet_mw.hosts.realtime import run_actor
 from fanet_mw.scenario import Scenario
 from sim.world import World
@@ -12,3 +14,13 @@ def run(scenario: Scenario, *, swarm: str, endpoint: str) -> int:
     world = World(scenario, swarm)
     asyncio.run(run_actor(world, swarm=swarm, endpoint=endpoint, until_ns=scenario.duration_ns))
     return 0
+
+
+def main() -> int:
+    """Parse the command line and run; returns the exit code."""
+    given = service.parser("sim.world_main", "Run the world against a router.").parse_args()
+    return service.serve(given, lambda scenario, swarm, endpoint: run(scenario, swarm=swarm, endpoint=endpoint))
+
+
+if __name__ == "__main__":
+    sys.exit(main())

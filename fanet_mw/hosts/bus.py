@@ -4,7 +4,9 @@ Scouting is off: who connects to whom is said, never discovered. Frames, poses a
 dropped under congestion (late is worse than lost, and gaps are counted); traces and reports are reliable.
 """
 
+import contextlib
 import json
+import time
 from collections.abc import Callable
 from types import TracebackType
 from typing import Any, Final, Self
@@ -14,6 +16,8 @@ import zenoh
 from fanet_mw.errors import BusError
 
 CONNECT_TIMEOUT_MS: Final = 2500
+LOST_AFTER_S: Final = 2.0
+"""A router that has been away for this long is taken to be gone. Zenoh reconnects by itself to one that comes back."""
 OnSample = Callable[[str, bytes], None]
 """(topic, payload); called on a thread of Zenoh's."""
 
@@ -44,15 +48,18 @@ def _config(*, mode: str, listen: str | None, connect: str | None) -> zenoh.Conf
 class Bus:
     """A session of one process: a client of a router, or the router itself."""
 
-    def __init__(self, session: zenoh.Session) -> None:
+    def __init__(self, session: zenoh.Session, endpoint: str) -> None:
         self._session = session
+        self._endpoint = endpoint
         self._publishers: dict[str, Any] = {}
+        self._tokens: list[Any] = []
+        self._away_since_s: float | None = None
 
     @classmethod
     def serve(cls, endpoint: str) -> Self:
         """Be the router; raises BusError when the endpoint cannot be listened on."""
         try:
-            return cls(zenoh.open(_config(mode="router", listen=endpoint, connect=None)))
+            return cls(zenoh.open(_config(mode="router", listen=endpoint, connect=None)), endpoint)
         except zenoh.ZError as error:
             why = "it is already in use" if "in use" in str(error) else _first_sentence(error)
             raise BusError(f"cannot serve on {endpoint}: {why}") from error
@@ -61,7 +68,7 @@ class Bus:
     def join(cls, endpoint: str) -> Self:
         """Connect to a router; raises BusError when none answers."""
         try:
-            return cls(zenoh.open(_config(mode="client", listen=None, connect=endpoint)))
+            return cls(zenoh.open(_config(mode="client", listen=None, connect=endpoint)), endpoint)
         except zenoh.ZError as error:
             why = "no answer" if "onnect" in str(error) else _first_sentence(error)
             raise BusError(
@@ -80,7 +87,9 @@ class Bus:
     def close(self) -> None:
         """End the session; a process that does not would hang at its exit."""
         self._publishers.clear()
-        if not self._session.is_closed():
+        if self._session.is_closed():
+            return
+        with contextlib.suppress(zenoh.ZError):  # a router that is frozen cannot be said goodbye to
             self._session.close()  # type: ignore[no-untyped-call]  # zenoh's stub lacks it
 
     def subscribe(self, expression: str, on_sample: OnSample) -> None:
@@ -90,10 +99,12 @@ class Bus:
         )
 
     def put(self, topic: str, payload: bytes, *, reliable: bool = False) -> None:
-        """Publish; a session that has been closed or has lost its router drops it."""
+        """Publish; without a router it is dropped (see `check`). Raises BusError on a session that was closed."""
         publisher = self._publishers.get(topic)
         if publisher is None:
             control = zenoh.CongestionControl.BLOCK if reliable else zenoh.CongestionControl.DROP
+            if self._session.is_closed():
+                raise BusError(f"cannot put on {topic}: the session with {self._endpoint} is closed")
             publisher = self._publishers[topic] = self._session.declare_publisher(
                 topic, congestion_control=control, express=not reliable
             )
@@ -101,7 +112,7 @@ class Bus:
 
     def announce(self, topic: str) -> None:
         """A liveliness token: others see it until this session ends, however it ends."""
-        self._tokens = [*getattr(self, "_tokens", []), self._session.liveliness().declare_token(topic)]
+        self._tokens.append(self._session.liveliness().declare_token(topic))
 
     def watch(self, expression: str, on_change: Callable[[str, bool], None]) -> None:
         """Hear of liveliness tokens, those already there included: (topic, alive)."""
@@ -131,10 +142,19 @@ class Bus:
         self._session.get(topic, on_reply, timeout=2.0)
 
     def connected(self) -> bool:
-        """Whether a router is there (always, for the router itself)."""
-        return not self._session.is_closed() and bool(
-            self._session.info.routers_zid() or self._session.info.peers_zid()
-        )
+        """Whether a client has its router."""
+        return not self._session.is_closed() and bool(self._session.info.routers_zid())
+
+    def check(self) -> None:
+        """To be asked now and then by a client; raises BusError once the router has been away for LOST_AFTER_S."""
+        if self.connected():
+            self._away_since_s = None
+            return
+        now_s = time.monotonic()
+        if self._away_since_s is None:
+            self._away_since_s = now_s
+        if now_s - self._away_since_s >= LOST_AFTER_S:
+            raise BusError(f"the Zenoh router at {self._endpoint} is gone")
 
 
 def _first_sentence(error: Exception) -> str:

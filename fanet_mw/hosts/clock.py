@@ -48,6 +48,8 @@ class ClockKeeper:
         self._time_scale = time_scale
         self._missing = {names.alive(name): name for name in expected}
         self._all_there = asyncio.Event()
+        if not self._missing:
+            self._all_there.set()
         self.clock: Clock | None = None
         loop = asyncio.get_running_loop()
         bus.answer(names.clock, self._current)
@@ -121,7 +123,7 @@ class ClockListener:
                     self._running.set_result(message)
 
     async def running(self, *, timeout_s: float) -> SwarmClock:
-        """The clock, once it has started; raises BusError when nobody starts it."""
+        """The clock, once it has started; raises BusError when nobody starts it or the router goes."""
         waited_s = 0.0
         while waited_s < timeout_s:
             self._bus.ask(self._names.clock, self._from_thread)
@@ -129,4 +131,5 @@ class ClockListener:
                 return SwarmClock(await asyncio.wait_for(asyncio.shield(self._running), _ASK_EVERY_S))
             except TimeoutError:
                 waited_s += _ASK_EVERY_S
+                self._bus.check()
         raise BusError(f"nobody started the swarm clock on {self._names.clock} within {timeout_s:g} s")

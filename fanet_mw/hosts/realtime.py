@@ -3,7 +3,7 @@
     Zenoh's thread -> deque -> one wake-up of the loop drains it -> actor -> outbox, one put per topic and wake-up
 
 The host never wakes an actor early. How late it wakes it is measured and reported; the lateness of frames, which is
-what matters, is the medium's to count.
+what matters, is the medium's to count. An actor that raises ends its host, and with it the process.
 """
 
 import asyncio
@@ -11,12 +11,13 @@ import gc
 import json
 import resource
 from collections import deque
+from collections.abc import Callable
 from pathlib import Path
 from typing import Any, Final
 
 from fanet_mw import topics
 from fanet_mw.actor import Actor
-from fanet_mw.errors import BusError, MalformedFrameError
+from fanet_mw.errors import MalformedFrameError
 from fanet_mw.hosts.bus import Bus
 from fanet_mw.hosts.clock import ClockListener, SwarmClock
 from fanet_mw.hosts.lateness import Histogram
@@ -24,9 +25,9 @@ from fanet_mw.messages import Message, Report, TraceBatch
 from fanet_mw.topics import Topics
 from fanet_mw.trace import Record
 
-_REPORT_EVERY_S: Final = 1.0
-_LOST_AFTER_S: Final = 2.0
-"""A router that has been away for this long is taken to be gone."""
+_LOOK_EVERY_S: Final = 0.5
+"""How often records are published and the router is looked for: what a killed process may lose."""
+_LOOKS_PER_REPORT: Final = 2
 
 
 class RealtimeHost:
@@ -39,6 +40,7 @@ class RealtimeHost:
         self._loop = asyncio.get_running_loop()
         self._inbox: deque[tuple[str, bytes]] = deque()
         self._drain_asked = False
+        self._failure: asyncio.Future[None] = self._loop.create_future()
         self._clock: SwarmClock | None = None
         self._running = False
         self._timer: asyncio.TimerHandle | None = None
@@ -50,7 +52,7 @@ class RealtimeHost:
         self._samples = 0
 
     async def run(self, *, until_ns: int, clock_timeout_s: float) -> None:
-        """Declare, announce, wait for the clock, run, report. Raises BusError when the bus fails."""
+        """Declare, announce, wait for the clock, run, report. Raises BusError, and whatever the actor raises."""
         for expression in self._actor.subscriptions:
             self._bus.subscribe(expression, self._from_thread)
         listener = ClockListener(self._bus, self._names)
@@ -59,13 +61,16 @@ class RealtimeHost:
         await self._sleep_until(0)
         gc.freeze()  # what start-up made stays: the collector need not look at it again in the middle of a slot
         self._running = True
-        self._actor.start(self._now_ns())
-        self._settle()
-        self._drain()
         try:
+            self._actor.start(self._now_ns())
+            self._settle()
+            self._drain()
             await self._watch(until_ns, listener)
-        finally:
-            self._finish(until_ns)
+        except BaseException:
+            self._halt()
+            self._publish_records()  # what led to it
+            raise
+        self._finish(until_ns)
 
     async def _sleep_until(self, instant_ns: int) -> None:
         assert self._clock is not None, "the clock is running"
@@ -76,24 +81,36 @@ class RealtimeHost:
     async def _watch(self, until_ns: int, listener: ClockListener) -> None:
         """Report now and then, until the time is over, the clock is stopped or the router is gone."""
         assert self._clock is not None, "the clock is running"
-        lost_s = 0.0
-        while (left_s := self._clock.wait_s(until_ns)) > 0:
-            pause_s = min(left_s, _REPORT_EVERY_S)
-            try:
-                await asyncio.wait_for(listener.stopped.wait(), pause_s)
-                return
-            except TimeoutError:
-                pass
-            lost_s = 0.0 if self._bus.connected() else lost_s + pause_s
-            if lost_s >= _LOST_AFTER_S:
-                raise BusError(f"{self._actor.name}: the router is gone")
-            self._publish_records()
-            self._publish_report(final=False)
+        stopped = asyncio.ensure_future(listener.stopped.wait())
+        looks = 0
+        try:
+            while (left_s := self._clock.wait_s(until_ns)) > 0:
+                await asyncio.wait(
+                    (stopped, self._failure), timeout=min(left_s, _LOOK_EVERY_S), return_when=asyncio.FIRST_COMPLETED
+                )
+                if self._failure.done():
+                    break
+                if stopped.done():
+                    return
+                self._bus.check()
+                self._publish_records()
+                looks += 1
+                if looks % _LOOKS_PER_REPORT == 0:
+                    self._publish_report(final=False)
+        finally:
+            stopped.cancel()
+        if self._failure.done():
+            self._failure.result()
 
-    def _finish(self, until_ns: int) -> None:
+    def _halt(self) -> None:
+        """No more calls of the actor from the loop."""
         self._running = False
         if self._timer is not None:
             self._timer.cancel()
+            self._timer = None
+
+    def _finish(self, until_ns: int) -> None:
+        self._halt()
         now_ns = min(self._now_ns(), until_ns)
         self._actor.stop(max(now_ns, 0))
         self._settle(rearm=False)
@@ -111,8 +128,19 @@ class RealtimeHost:
 
     def _drain(self) -> None:
         self._drain_asked = False
-        if not self._running:
-            return  # kept until the start, or come after the end
+        if self._running:  # else kept until the start, or come after the end
+            self._guard(self._take_inbox)
+
+    def _guard(self, step: Callable[[], None]) -> None:
+        """The loop would log what a callback raises and go on, with an actor that nothing ever wakes again."""
+        try:
+            step()
+        except Exception as error:  # noqa: BLE001  (the outermost call of the actor: `_watch` raises it)
+            self._halt()
+            if not self._failure.done():
+                self._failure.set_exception(error)
+
+    def _take_inbox(self) -> None:
         inbox, actor = self._inbox, self._actor
         while inbox:
             topic, payload = inbox.popleft()
@@ -143,6 +171,9 @@ class RealtimeHost:
         self._timer = None if wake_ns is None else self._loop.call_later(self._clock.wait_s(wake_ns), self._wake)
 
     def _wake(self) -> None:
+        self._guard(self._wake_actor)
+
+    def _wake_actor(self) -> None:
         due_ns, now_ns = self._timer_ns, self._now_ns()
         self._timer = self._timer_ns = None
         if due_ns is not None and now_ns >= due_ns:  # else the loop's clock is a little fast: come again
@@ -176,16 +207,16 @@ class RealtimeHost:
             self._bus.put(self._names.trace(self._actor.name), topics.encode([batch]), reliable=True)
 
     def _publish_report(self, *, final: bool) -> None:
-        content = {**self._actor.report(), "final": final, "host": self._figures()}
+        content = {**self._actor.report(), "final": final, "host": self._figures(final=final)}
         report = Report(self._actor.name, self._now_ns(), json.dumps(content))
         self._bus.put(self._names.report(self._actor.name), topics.encode([report]), reliable=True)
 
-    def _figures(self) -> dict[str, Any]:
+    def _figures(self, *, final: bool) -> dict[str, Any]:
         usage = resource.getrusage(resource.RUSAGE_SELF)
         return {
             "wake_lateness_ms": self._lateness.summary(),
             "cpu_s": round(usage.ru_utime + usage.ru_stime, 3),
-            "uss_mb": uss_mb(),
+            "uss_mb": uss_mb() if final else None,  # asking holds up the process for more than a millisecond
             "malformed": self._malformed,
             "puts": self._puts,
             "samples": self._samples,

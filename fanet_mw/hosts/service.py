@@ -1,0 +1,40 @@
+"""The command line of a service that is started by itself: `python -m agents rescue.toml --id 3 --connect ENDPOINT`.
+
+Standard library only, for machines that carry one UAV and not the whole of `fanet`. Exit codes: 0 the swarm's time is
+over or its clock was stopped, 2 the request was wrong, 3 the bus could not be had or was lost.
+"""
+
+import argparse
+import sys
+from collections.abc import Callable
+from pathlib import Path
+from typing import Final
+
+from fanet_mw import config
+from fanet_mw.errors import ConfigError, FanetError
+from fanet_mw.scenario import Scenario
+
+BUS_EXIT_CODE: Final = 3
+_DEFAULT_ENDPOINT: Final = "tcp/127.0.0.1:7447"
+
+
+def parser(program: str, description: str) -> argparse.ArgumentParser:
+    """What every service asks for; a service adds its own."""
+    flags = argparse.ArgumentParser(prog=f"python -m {program}", description=description)
+    flags.add_argument("scenario", type=Path, help="scenario file, the same for all services of a swarm")
+    flags.add_argument("--connect", default=_DEFAULT_ENDPOINT, help="Zenoh endpoint of the router (%(default)s)")
+    flags.add_argument("--swarm", help="name of the swarm; by default the scenario's")
+    flags.add_argument("--set", action="append", default=[], metavar="KEY=VALUE", help="change one scenario key")
+    return flags
+
+
+def serve(given: argparse.Namespace, run: Callable[[Scenario, str, str], int]) -> int:
+    """Load the scenario and `run(scenario, swarm, endpoint)`; a foreseen error is one message and an exit code."""
+    try:
+        scenario = config.load(given.scenario, given.set)
+        return run(scenario, given.swarm or scenario.name, given.connect)
+    except FanetError as error:
+        sys.stderr.write(f"{error}\n")
+        return 2 if isinstance(error, ConfigError) else BUS_EXIT_CODE
+    except KeyboardInterrupt:
+        return 130

@@ -1,0 +1,265 @@
+"""What the real-time host adds to the contract: clock, loss of the router, crashes, lateness. Real sessions, short."""
+
+import asyncio
+import json
+import math
+import os
+import signal
+import subprocess
+import sys
+import time
+from collections.abc import Iterator
+
+import pytest
+from hypothesis import given
+from hypothesis import strategies as st
+
+from fanet_mw import topics
+from fanet_mw.actor import Actor
+from fanet_mw.errors import BusError
+from fanet_mw.hosts.bus import Bus
+from fanet_mw.hosts.clock import ClockKeeper, ClockListener, SwarmClock
+from fanet_mw.hosts.lateness import Histogram
+from fanet_mw.hosts.realtime import run_actor
+from fanet_mw.messages import Clock, ClockState, MavlinkTap, Message, Report, TraceBatch
+from fanet_mw.topics import Topics
+from fanet_mw.trace import ProcessEnded
+from fanet_mw.units import MS, S
+from sim.swarm import free_endpoint
+
+NAMES = Topics("host")
+ROUTER = """
+import sys, time
+from fanet_mw.hosts.bus import Bus
+with Bus.serve(sys.argv[1]):
+    print("up", flush=True)
+    time.sleep(60)
+"""
+
+
+class Ticker(Actor):
+    """Wakes every 20 ms, records that it did, and says three things on one topic."""
+
+    def __init__(self, name: str = "ticker", hears: tuple[str, ...] = ()) -> None:
+        super().__init__(name, hears)
+        self.next_ns = 0
+        self.wakes = 0
+        self.heard: list[Message] = []
+        self.stopped_ns: int | None = None
+
+    def start(self, now_ns: int) -> None:
+        self.next_ns = now_ns
+
+    def receive(self, topic: str, message: Message, now_ns: int) -> None:
+        self.heard.append(message)
+
+    def wake(self, now_ns: int) -> None:
+        self.wakes += 1
+        self.next_ns = now_ns + 20 * MS
+        self.records.append(ProcessEnded(now_ns, 0, self.name, self.wakes))
+        self.outbox += [(NAMES.mavlink(7), MavlinkTap(now_ns, b"said"))] * 3
+
+    def next_wake_ns(self) -> int | None:
+        return self.next_ns
+
+    def stop(self, now_ns: int) -> None:
+        self.stopped_ns = now_ns
+
+
+class Fails(Ticker):
+    """Raises at its third wake-up."""
+
+    def wake(self, now_ns: int) -> None:
+        super().wake(now_ns)
+        if self.wakes == 3:
+            raise RuntimeError("third wake-up")
+
+
+class FailsOnMessage(Ticker):
+    """Raises at the first message."""
+
+    def receive(self, topic: str, message: Message, now_ns: int) -> None:
+        raise RuntimeError("first message")
+
+
+class Observer:
+    """What a launcher would collect."""
+
+    def __init__(self, bus: Bus) -> None:
+        self.puts: list[tuple[str, list[Message]]] = []
+        for expression in (NAMES.all_traces, NAMES.all_reports, NAMES.mavlink("*")):
+            bus.subscribe(expression, lambda topic, payload: self.puts.append((topic, topics.decode(payload))))
+
+    def reports(self) -> list[dict[str, object]]:
+        return [json.loads(m.json) for _, messages in self.puts for m in messages if isinstance(m, Report)]
+
+    def codes(self) -> list[int]:
+        batches = [m for _, messages in self.puts for m in messages if isinstance(m, TraceBatch)]
+        return [record.exit_code for batch in batches for record in batch.records if isinstance(record, ProcessEnded)]
+
+
+async def run(actor: Actor, *, until_ns: int, stop_after_s: float | None = None, say: bytes = b"") -> Observer:
+    """One actor against a router of its own; `say` is put on its first subscription while it runs."""
+    endpoint = free_endpoint()
+    with Bus.serve(endpoint) as bus:
+        observer = Observer(bus)
+        keeper = ClockKeeper(bus, NAMES, time_scale=1.0, expected=[actor.name])
+        host = asyncio.create_task(run_actor(actor, swarm="host", endpoint=endpoint, until_ns=until_ns))
+        clock = SwarmClock(await keeper.start(timeout_s=5))
+        await asyncio.sleep(clock.wait_s(50 * MS))
+        if say:
+            bus.put(actor.subscriptions[0], say)
+        if stop_after_s is not None:
+            await asyncio.sleep(stop_after_s)
+            keeper.stop()
+        try:
+            await host
+        except RuntimeError:
+            await asyncio.sleep(0.1)  # what it still published arrives
+            actor.heard.append(observer)  # type: ignore[attr-defined]  # the test looks at it
+            raise
+        await asyncio.sleep(0.1)
+        return observer
+
+
+# --- running ----------------------------------------------------------------------------------------------------------
+
+
+async def test_one_wake_up_is_one_put_per_topic_and_every_record_arrives_once() -> None:
+    actor = Ticker()
+    observer = await run(actor, until_ns=1400 * MS)
+    said = [messages for topic, messages in observer.puts if topic == NAMES.mavlink(7)]
+    assert actor.wakes > 10
+    assert len(said) == actor.wakes
+    assert {len(messages) for messages in said} == {3}
+    assert observer.codes() == list(range(1, actor.wakes + 1))
+    *earlier, last = observer.reports()
+    assert [report["final"] for report in earlier] == [False]
+    assert last["final"] is True
+    host = last["host"]
+    assert isinstance(host, dict)
+    assert host["puts"] == actor.wakes
+    assert host["wake_lateness_ms"]["count"] == actor.wakes
+    assert host["uss_mb"] > 1
+
+
+async def test_a_stopped_clock_ends_the_actor_early_and_settles_it() -> None:
+    actor = Ticker()
+    began = time.monotonic()
+    observer = await run(actor, until_ns=60 * S, stop_after_s=0.3)
+    assert time.monotonic() - began < 5
+    assert actor.stopped_ns is not None
+    assert 0.3 * S < actor.stopped_ns < 3 * S
+    assert observer.reports()[-1]["final"] is True
+
+
+async def test_what_is_no_message_is_counted_and_changes_nothing() -> None:
+    actor = Ticker(hears=(NAMES.pose,))
+    observer = await run(actor, until_ns=400 * MS, say=b"\xff\x00 garbage")
+    host = observer.reports()[-1]["host"]
+    assert isinstance(host, dict)
+    assert host["malformed"] == 1
+    assert actor.heard == []
+
+
+@pytest.mark.parametrize("actor", [Fails(), FailsOnMessage(hears=(NAMES.pose,))], ids=["wake", "receive"])
+async def test_an_actor_that_raises_ends_its_host_at_once_and_its_records_survive_it(actor: Ticker) -> None:
+    began = time.monotonic()
+    message = topics.encode([MavlinkTap(0, b"")])
+    with pytest.raises(RuntimeError, match=r"third wake-up|first message"):
+        await run(actor, until_ns=60 * S, say=message if actor.subscriptions else b"")
+    assert time.monotonic() - began < 5
+    observer = actor.heard[-1]
+    assert isinstance(observer, Observer)
+    assert observer.codes()[:2] == [1, 2]
+    assert actor.stopped_ns is None, "what broke is not asked to settle"
+    woken = actor.wakes
+    await asyncio.sleep(0.1)
+    assert actor.wakes == woken
+
+
+# --- the router -------------------------------------------------------------------------------------------------------
+
+
+@pytest.fixture
+def router() -> Iterator[tuple[str, subprocess.Popen[bytes]]]:
+    """A router in a process of its own, which a test may kill."""
+    endpoint = free_endpoint()
+    process = subprocess.Popen([sys.executable, "-c", ROUTER, endpoint], stdout=subprocess.PIPE)
+    assert process.stdout is not None
+    assert process.stdout.readline() == b"up\n"
+    yield endpoint, process
+    process.kill()
+    process.communicate()
+
+
+@pytest.mark.parametrize("started", [True, False], ids=["running", "waiting for the clock"])
+async def test_a_host_whose_router_dies_ends_within_three_seconds(
+    router: tuple[str, subprocess.Popen[bytes]], *, started: bool
+) -> None:
+    endpoint, process = router
+    with Bus.join(endpoint) as bus:
+        keeper = ClockKeeper(bus, NAMES, time_scale=1.0, expected=["ticker"])
+        host = asyncio.create_task(run_actor(Ticker(), swarm="host", endpoint=endpoint, until_ns=60 * S))
+        if started:
+            await keeper.start(timeout_s=5)
+        await asyncio.sleep(0.6)
+        os.kill(process.pid, signal.SIGKILL)
+        began = time.monotonic()
+        with pytest.raises(BusError, match=f"router at {endpoint} is gone"):
+            await asyncio.wait_for(host, 10)
+        assert time.monotonic() - began < 3.5
+
+
+# --- the clock --------------------------------------------------------------------------------------------------------
+
+
+def test_a_step_of_the_systems_clock_does_not_move_the_swarm_clock(monkeypatch: pytest.MonkeyPatch) -> None:
+    clock = SwarmClock(Clock(time.time_ns(), 1.0, ClockState.RUNNING))
+    monkeypatch.setattr(time, "time_ns", lambda: 0)
+    before_ns = clock.now_ns()
+    time.sleep(0.01)
+    assert 10 * MS <= clock.now_ns() - before_ns < 2 * S
+
+
+@pytest.mark.parametrize("scale", [0.25, 1.0, 4.0])
+def test_a_scaled_clock_runs_and_waits_by_its_scale(scale: float) -> None:
+    clock = SwarmClock(Clock(time.time_ns() - 10 * S, scale, ClockState.RUNNING))
+    now_ns = clock.now_ns()
+    assert 10 * S * scale <= now_ns < 12 * S * scale
+    assert clock.wait_s(now_ns + 8 * S) == pytest.approx(8 / scale, abs=0.5)
+
+
+async def test_whoever_comes_late_gets_the_clock_that_runs() -> None:
+    endpoint = free_endpoint()
+    with Bus.serve(endpoint) as bus:
+        keeper = ClockKeeper(bus, NAMES, time_scale=2.0, expected=[])
+        first = SwarmClock(await keeper.start(timeout_s=1))
+        await asyncio.sleep(0.4)
+        with Bus.join(endpoint) as late:
+            clock = await ClockListener(late, NAMES).running(timeout_s=5)
+        assert abs(clock.now_ns() - first.now_ns()) < 5 * MS
+        assert clock.now_ns() > 0
+
+
+async def test_a_swarm_that_is_not_complete_is_not_started_and_names_who_is_missing() -> None:
+    endpoint = free_endpoint()
+    with Bus.serve(endpoint) as bus, Bus.join(endpoint) as one:
+        keeper = ClockKeeper(bus, NAMES, time_scale=1.0, expected=["agent-1", "agent-2", "world"])
+        one.announce(NAMES.alive("agent-1"))
+        with pytest.raises(BusError, match=r"2 of the swarm did not come up within 0\.5 s: agent-2, world"):
+            await keeper.start(timeout_s=0.5)
+        assert keeper.clock is None
+
+
+# --- lateness ---------------------------------------------------------------------------------------------------------
+
+
+@given(st.lists(st.integers(0, 10 * S), min_size=1), st.floats(0.01, 1))
+def test_a_percentile_is_never_too_low_and_at_most_a_tenth_too_high(durations: list[int], share: float) -> None:
+    histogram = Histogram()
+    for duration in durations:
+        histogram.add(duration)
+    true_ns = sorted(durations)[math.ceil(share * len(durations)) - 1]
+    assert true_ns - 1 <= histogram.percentile_ns(share) <= max(1000, true_ns * 1.101 + 1)
+    assert histogram.max_ns == max(durations)

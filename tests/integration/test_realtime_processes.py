@@ -1,0 +1,203 @@
+"""Children of a launcher: whatever kills whom, it is told by name and nothing is left running."""
+
+import asyncio
+import os
+import signal
+import subprocess
+import sys
+import time
+import uuid
+from collections.abc import Callable, Iterator
+from pathlib import Path
+
+import pytest
+
+from fanet_mw.errors import BusError
+from sim.processes import Processes
+from sim.swarm import free_endpoint
+
+MARK = "FANET_TEST_MARK"
+SMALL = "nodes = {count = 2}\nclusters = {count = 1}\nduration_s = %s\nwarmup_s = 0\ndrain_s = 0\n"
+
+
+def marked(mark: str) -> list[int]:
+    """Live processes that were started with this mark in their environment, by whomever."""
+    found = []
+    for folder in Path("/proc").iterdir():
+        if not folder.name.isdigit() or int(folder.name) == os.getpid():
+            continue
+        try:
+            if f"{MARK}={mark}".encode() in (folder / "environ").read_bytes():
+                found.append(int(folder.name))
+        except OSError:
+            continue  # ended meanwhile
+    return sorted(found)
+
+
+def exists(pid: int) -> bool:
+    return Path(f"/proc/{pid}").exists()
+
+
+def eventually(condition: Callable[[], bool], *, within_s: float) -> bool:
+    end_s = time.monotonic() + within_s
+    while time.monotonic() < end_s:
+        if condition():
+            return True
+        time.sleep(0.05)
+    return condition()
+
+
+@pytest.fixture
+def mark() -> Iterator[str]:
+    """Marks whatever a test starts as a command; none of it may outlive the test."""
+    mark = uuid.uuid4().hex
+    yield mark
+    left = marked(mark)
+    for pid in left:
+        os.kill(pid, signal.SIGKILL)
+    assert left == []
+
+
+def start(mark: str, *arguments: str, stderr: int = subprocess.PIPE) -> subprocess.Popen[str]:
+    return subprocess.Popen(
+        [sys.executable, "-m", *arguments], text=True, stderr=stderr, stdout=subprocess.DEVNULL,
+        env={**os.environ, MARK: mark},
+    )  # fmt: skip
+
+
+def said(process: subprocess.Popen[str], words: str) -> None:
+    """Wait until a command has said this."""
+    assert process.stderr is not None
+    lines = []
+    for line in process.stderr:
+        lines.append(line)
+        if words in line:
+            return
+    pytest.fail(f"{words!r} was never said: {lines}")
+
+
+# --- Processes --------------------------------------------------------------------------------------------------------
+
+
+def sleeper(*, seconds: float) -> int:
+    time.sleep(seconds)
+    return 0
+
+
+def deaf() -> int:
+    """Ends by nothing but SIGKILL."""
+    signal.signal(signal.SIGTERM, signal.SIG_IGN)
+    time.sleep(60)
+    return 0
+
+
+def crash() -> int:
+    raise RuntimeError("on purpose")
+
+
+def lose_the_bus() -> int:
+    raise BusError("the router is gone")
+
+
+async def test_every_end_is_told_with_its_name_and_exit_code() -> None:
+    ended: dict[str, int] = {}
+    processes = Processes(ended.__setitem__)
+    processes.start("good", sleeper, {"seconds": 0.1})
+    processes.start("bad", crash, {})
+    processes.start("busless", lose_the_bus, {})
+    processes.start("victim", sleeper, {"seconds": 60})
+    os.kill(processes.pid("victim"), signal.SIGKILL)
+    assert await processes.wait(10)
+    assert ended == {"good": 0, "bad": 1, "busless": 3, "victim": -signal.SIGKILL}
+    assert processes.names() == []
+
+
+async def test_a_child_that_ignores_ctrl_c_and_terminate_is_killed_in_the_end() -> None:
+    ended: dict[str, int] = {}
+    processes = Processes(ended.__setitem__)
+    processes.start("deaf", deaf, {})
+    processes.start("sleeper", sleeper, {"seconds": 60})
+    pids = [processes.pid("deaf"), processes.pid("sleeper")]
+    await asyncio.sleep(0.5)
+    for pid in pids:
+        os.kill(pid, signal.SIGINT)
+    await asyncio.sleep(0.2)
+    assert ended == {}, "Ctrl-C is the launcher's to hear"
+    began = time.monotonic()
+    await processes.end_all()
+    assert ended == {"sleeper": -signal.SIGTERM, "deaf": -signal.SIGKILL}
+    assert time.monotonic() - began < 5
+    assert [pid for pid in pids if exists(pid)] == []
+
+
+async def test_a_restarted_child_is_the_same_with_a_new_pid() -> None:
+    ended: list[tuple[str, int]] = []
+    processes = Processes(lambda name, code: ended.append((name, code)))
+    processes.start("child", sleeper, {"seconds": 60})
+    first = processes.pid("child")
+    os.kill(first, signal.SIGKILL)
+    assert await processes.wait(5)
+    processes.restart("child")
+    assert processes.pid("child") != first
+    await processes.end_all()
+    assert ended == [("child", -signal.SIGKILL), ("child", -signal.SIGTERM)]
+
+
+# --- commands ---------------------------------------------------------------------------------------------------------
+
+
+def test_a_launcher_that_is_killed_takes_all_its_processes_with_it(mark: str, tmp_path: Path) -> None:
+    path = tmp_path / "small.toml"
+    path.write_text(SMALL % 60)
+    launcher = start(mark, "sim.cli", "launch", str(path))
+    said(launcher, "processes up")
+    assert len(marked(mark)) >= 2 + 2 + 1 + 1  # agents, emulator and world, the fork server, the launcher
+    launcher.kill()
+    launcher.communicate()
+    assert eventually(lambda: marked(mark) == [], within_s=4), "children notice that their parent is gone"
+
+
+def test_a_router_that_is_interrupted_stops_the_services_it_kept_time_for(mark: str, tmp_path: Path) -> None:
+    path, endpoint = tmp_path / "small.toml", free_endpoint()
+    path.write_text(SMALL % 60)
+    router = start(mark, "sim.cli", "router", str(path), "--listen", endpoint)
+    said(router, "serving")
+    common = (str(path), "--connect", endpoint)
+    services = [
+        start(mark, "emulator", *common),
+        start(mark, "sim.world_main", *common),
+        *(start(mark, "agents", *common, "--id", str(node)) for node in (1, 2)),
+    ]
+    said(router, "the clock runs")
+    time.sleep(1)
+    assert [service.poll() for service in services] == [None] * 4
+    router.send_signal(signal.SIGINT)
+    for service in services:
+        _, err = service.communicate(timeout=8)
+        assert service.returncode == 0, err
+    router.communicate(timeout=8)
+    assert router.returncode == 130
+
+
+def test_services_of_a_router_that_is_killed_end_with_a_message_and_exit_code_3(mark: str, tmp_path: Path) -> None:
+    path, endpoint = tmp_path / "small.toml", free_endpoint()
+    path.write_text(SMALL % 60)
+    router = start(mark, "sim.cli", "router", str(path), "--listen", endpoint)
+    said(router, "serving")
+    agent = start(mark, "agents", str(path), "--connect", endpoint, "--id", "2")
+    time.sleep(1)
+    assert agent.poll() is None
+    router.kill()
+    router.communicate()
+    _, err = agent.communicate(timeout=6)
+    assert agent.returncode == 3
+    assert err.splitlines() == [f"the Zenoh router at {endpoint} is gone"]
+
+
+def test_a_wrong_request_to_a_service_is_one_message_and_exit_code_2(mark: str, tmp_path: Path) -> None:
+    path = tmp_path / "small.toml"
+    path.write_text(SMALL % 60)
+    agent = start(mark, "agents", str(path), "--id", "9")
+    _, err = agent.communicate(timeout=10)
+    assert agent.returncode == 2
+    assert err == "--id 9: must be in [1, nodes.count = 2]\n"

@@ -45,6 +45,8 @@ class Uav(Actor):
         self._hello_ns = seconds_to_ns(scenario.routing.hello_interval_s)
         self._hello_random = stream(scenario.seed, "hello", node).random
         self._next_hello_ns: int | None = None
+        self._own_wake_ns: int | None = None
+        """When traffic, hello or telemetry is due; changes at a wake-up only."""
         self._generated = 0
         self._malformed = 0
 
@@ -55,6 +57,7 @@ class Uav(Actor):
             self._next_hello_ns = now_ns + self._lead_ns + int(self._hello_random() * self._hello_ns)
         self._node.start(now_ns)
         self._settle(now_ns)
+        self._own_wake_ns = self._next_own_ns()
 
     def receive(self, topic: str, message: Message, now_ns: int) -> None:
         kind = type(message)
@@ -87,11 +90,15 @@ class Uav(Actor):
         if telemetry:
             self._tap(telemetry, now_ns)
         self._settle(now_ns)
+        self._own_wake_ns = self._next_own_ns()
 
     def next_wake_ns(self) -> int | None:
+        own_ns, node_ns = self._own_wake_ns, self._node.next_wake_ns()
+        return own_ns if node_ns is None or (own_ns is not None and own_ns < node_ns) else node_ns
+
+    def _next_own_ns(self) -> int | None:
         traffic_ns = self._traffic.next_ns()
         wanted = [
-            self._node.next_wake_ns(),
             None if traffic_ns is None else traffic_ns - self._lead_ns,
             None if self._next_hello_ns is None else self._next_hello_ns - self._lead_ns,
             self._autopilot.next_due_ns(),

@@ -109,6 +109,8 @@ class Clusters(Section):
     gossip_degree: Positive = 6.0
     counter: Annotated[int, Field(ge=2)] = 3
     assess_ms: NonNegative = 100.0
+    repair_s: NonNegative = 0.0
+    """Hellos say what a node holds; neighbors send again what it lacks and is younger than this; 0: no repair."""
 
     @property
     def period_ns(self) -> int:

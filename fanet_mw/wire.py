@@ -77,7 +77,8 @@ class Spec(NamedTuple):
     layout: struct.Struct
 
 
-def _frame(spec: Spec, payload: bytes, *, node: int, seq: int = 0) -> bytes:
+def encode_inner(spec: Spec, payload: bytes, *, node: int, seq: int = 0) -> bytes:
+    """A MAVLink 2 frame of one of our messages."""
     head = _PREFIX.pack(
         MAGIC, len(payload), 0, 0, seq & 0xFF, system_id(node), COMPONENT, spec.msgid & 0xFFFF, spec.msgid >> 16
     )
@@ -204,14 +205,23 @@ def inner_frames(frame: bytes) -> Iterator[tuple[int, bytes]]:
         yield msgid, inner
 
 
-def _inner(spec: Spec, frame: bytes) -> tuple[Any, ...]:
-    """The fields of the first inner frame that is this message; raises MalformedFrameError."""
+def decode_every(spec: Spec, frame: bytes) -> list[tuple[Any, ...]]:
+    """The fields of each inner frame that is this message; raises MalformedFrameError."""
+    found = []
     for msgid, inner in inner_frames(frame):
         if msgid == spec.msgid:
             if inner[1] != spec.layout.size:
                 raise MalformedFrameError(f"message {msgid} of {inner[1]} bytes, not {spec.layout.size}")
-            return spec.layout.unpack_from(inner, 10)
-    raise MalformedFrameError(f"no message {spec.msgid} in the frame")
+            found.append(spec.layout.unpack_from(inner, 10))
+    return found
+
+
+def _inner(spec: Spec, frame: bytes) -> tuple[Any, ...]:
+    """The fields of the first inner frame that is this message; raises MalformedFrameError."""
+    found = decode_every(spec, frame)
+    if not found:
+        raise MalformedFrameError(f"no message {spec.msgid} in the frame")
+    return found[0]
 
 
 def _check(version: int, node: int, *, t_us: int = 0) -> None:
@@ -232,7 +242,7 @@ class Beacon(NamedTuple):
     hops_to_head: int
 
     def encode_frame(self, node: int) -> bytes:
-        return _frame(BEACON, BEACON.layout.pack(*self, VERSION), node=node)
+        return encode_inner(BEACON, BEACON.layout.pack(*self, VERSION), node=node)
 
     @classmethod
     def decode_frame(cls, frame: bytes) -> Self:
@@ -274,7 +284,7 @@ class Schedule(NamedTuple):
                 f"schedule of {len(self.members)} entries, {self.clusters} clusters: must be <= {CAPACITY}, {_HEAD_BIT}"
             )
         unused = (0,) * (CAPACITY - len(self.members))
-        return _frame(
+        return encode_inner(
             SCHEDULE,
             SCHEDULE.layout.pack(
                 *self[:6],
@@ -318,7 +328,7 @@ class Join(NamedTuple):
     position: Enu
 
     def encode_frame(self, node: int) -> bytes:
-        return _frame(JOIN, JOIN.layout.pack(*self.position, self.node, VERSION), node=node)
+        return encode_inner(JOIN, JOIN.layout.pack(*self.position, self.node, VERSION), node=node)
 
     @classmethod
     def decode_frame(cls, frame: bytes) -> Self:
@@ -338,7 +348,7 @@ class Survivor(NamedTuple):
 
     def encode_frame(self, node: int) -> bytes:
         payload = SURVIVOR.layout.pack(self.t_us, self.survivor, *self.position, self.rssi_dbm, self.reporter, VERSION)
-        return _frame(SURVIVOR, payload, node=node)
+        return encode_inner(SURVIVOR, payload, node=node)
 
     @classmethod
     def decode_frame(cls, frame: bytes) -> Self:
@@ -359,7 +369,7 @@ class TimeBeacon(NamedTuple):
     hops: int
 
     def encode_frame(self, node: int) -> bytes:
-        return _frame(TIME, TIME.layout.pack(*self, VERSION), node=node)
+        return encode_inner(TIME, TIME.layout.pack(*self, VERSION), node=node)
 
     @classmethod
     def decode_frame(cls, frame: bytes) -> Self:
@@ -381,7 +391,8 @@ SURVIVOR: Final = Spec(53003, 240, struct.Struct("<QIffffHB"))
 CHUNK: Final = Spec(53004, 155, struct.Struct("<HBB240B"))
 TIME: Final = Spec(53005, 192, struct.Struct("<QIHHBB"))
 JOIN: Final = Spec(53006, 50, struct.Struct("<fffHB"))
-SPECS: Final = (ROUTE, BEACON, SCHEDULE, SURVIVOR, CHUNK, TIME, JOIN)
+DIGEST: Final = Spec(53007, 37, struct.Struct("<24I24I24HBBB"))
+SPECS: Final = (ROUTE, BEACON, SCHEDULE, SURVIVOR, CHUNK, TIME, JOIN, DIGEST)
 _OURS: Final = {spec.msgid: spec for spec in SPECS}
 CAPACITY: Final = 56
 """Entries of one schedule part."""
@@ -418,5 +429,5 @@ def filler(size: int, *, node: int = 1) -> bytes:
     for index, length in enumerate(lengths):
         data = random.randbytes(length - _LEAST_CHUNK + 1).replace(b"\x00", b"\x01")
         payload = _CHUNK_HEAD.pack(len(data), index, len(lengths)) + data
-        chunks.append(_frame(CHUNK, payload, node=node, seq=index))
+        chunks.append(encode_inner(CHUNK, payload, node=node, seq=index))
     return b"".join(chunks)

@@ -368,6 +368,7 @@ MAVLINK_MSG_ID_FANET_SURVIVOR = 53003
 MAVLINK_MSG_ID_FANET_CHUNK = 53004
 MAVLINK_MSG_ID_FANET_TIME = 53005
 MAVLINK_MSG_ID_FANET_JOIN = 53006
+MAVLINK_MSG_ID_FANET_DIGEST = 53007
 
 
 class MAVLink_fanet_route_message(MAVLink_message):
@@ -690,6 +691,51 @@ class MAVLink_fanet_join_message(MAVLink_message):
 setattr(MAVLink_fanet_join_message, "name", mavlink_msg_deprecated_name_property())
 
 
+class MAVLink_fanet_digest_message(MAVLink_message):
+    """
+    Which recent packets the sender of a hello holds, so that its
+    neighbors can repair what it missed. Long ones come in several
+    messages.
+    """
+
+    id = MAVLINK_MSG_ID_FANET_DIGEST
+    msgname = "FANET_DIGEST"
+    fieldnames = ["newest", "held", "origins", "count", "complete", "version"]
+    ordered_fieldnames = ["newest", "held", "origins", "count", "complete", "version"]
+    fieldtypes = ["uint32_t", "uint32_t", "uint16_t", "uint8_t", "uint8_t", "uint8_t"]
+    fielddisplays_by_name: Dict[str, str] = {}
+    fieldenums_by_name: Dict[str, str] = {}
+    fieldunits_by_name: Dict[str, str] = {}
+    native_format = bytearray(b"<IIHBBB")
+    orders = [0, 1, 2, 3, 4, 5]
+    lengths = [24, 24, 24, 1, 1, 1]
+    array_lengths = [24, 24, 24, 0, 0, 0]
+    crc_extra = 37
+    unpacker = struct.Struct("<24I24I24HBBB")
+    instance_field = None
+    instance_offset = -1
+
+    def __init__(self, newest: Sequence[int], held: Sequence[int], origins: Sequence[int], count: int, complete: int, version: int):
+        MAVLink_message.__init__(self, MAVLink_fanet_digest_message.id, MAVLink_fanet_digest_message.msgname)
+        self._fieldnames = MAVLink_fanet_digest_message.fieldnames
+        self._instance_field = MAVLink_fanet_digest_message.instance_field
+        self._instance_offset = MAVLink_fanet_digest_message.instance_offset
+        self.newest = newest
+        self.held = held
+        self.origins = origins
+        self.count = count
+        self.complete = complete
+        self.version = version
+
+    def pack(self, mav: "MAVLink", force_mavlink1: bool = False) -> bytes:
+        return self._pack(mav, self.crc_extra, self.unpacker.pack(self.newest[0], self.newest[1], self.newest[2], self.newest[3], self.newest[4], self.newest[5], self.newest[6], self.newest[7], self.newest[8], self.newest[9], self.newest[10], self.newest[11], self.newest[12], self.newest[13], self.newest[14], self.newest[15], self.newest[16], self.newest[17], self.newest[18], self.newest[19], self.newest[20], self.newest[21], self.newest[22], self.newest[23], self.held[0], self.held[1], self.held[2], self.held[3], self.held[4], self.held[5], self.held[6], self.held[7], self.held[8], self.held[9], self.held[10], self.held[11], self.held[12], self.held[13], self.held[14], self.held[15], self.held[16], self.held[17], self.held[18], self.held[19], self.held[20], self.held[21], self.held[22], self.held[23], self.origins[0], self.origins[1], self.origins[2], self.origins[3], self.origins[4], self.origins[5], self.origins[6], self.origins[7], self.origins[8], self.origins[9], self.origins[10], self.origins[11], self.origins[12], self.origins[13], self.origins[14], self.origins[15], self.origins[16], self.origins[17], self.origins[18], self.origins[19], self.origins[20], self.origins[21], self.origins[22], self.origins[23], self.count, self.complete, self.version), force_mavlink1=force_mavlink1)
+
+
+# Define name on the class for backwards compatibility (it is now msgname).
+# Done with setattr to hide the class variable from mypy.
+setattr(MAVLink_fanet_digest_message, "name", mavlink_msg_deprecated_name_property())
+
+
 mavlink_map: Dict[int, Type[MAVLink_message]] = {
     MAVLINK_MSG_ID_FANET_ROUTE: MAVLink_fanet_route_message,
     MAVLINK_MSG_ID_FANET_BEACON: MAVLink_fanet_beacon_message,
@@ -698,6 +744,7 @@ mavlink_map: Dict[int, Type[MAVLink_message]] = {
     MAVLINK_MSG_ID_FANET_CHUNK: MAVLink_fanet_chunk_message,
     MAVLINK_MSG_ID_FANET_TIME: MAVLink_fanet_time_message,
     MAVLINK_MSG_ID_FANET_JOIN: MAVLink_fanet_join_message,
+    MAVLINK_MSG_ID_FANET_DIGEST: MAVLink_fanet_digest_message,
 }
 
 
@@ -1327,3 +1374,35 @@ class MAVLink(object):
 
         """
         self.send(self.fanet_join_encode(east, north, up, node, version), force_mavlink1=force_mavlink1)
+
+    def fanet_digest_encode(self, newest: Sequence[int], held: Sequence[int], origins: Sequence[int], count: int, complete: int, version: int) -> MAVLink_fanet_digest_message:
+        """
+        Which recent packets the sender of a hello holds, so that its
+        neighbors can repair what it missed. Long ones come in several
+        messages.
+
+        newest                    : Highest sequence number held of each origin. (type:uint32_t)
+        held                      : Bit i: newest - 1 - i is held too. (type:uint32_t)
+        origins                   : Node ids. (type:uint16_t)
+        count                     : How many entries of this message are used. (type:uint8_t)
+        complete                  : 1: an origin that is in no digest of this hello is one of which nothing is held. (type:uint8_t)
+        version                   : 1. (type:uint8_t)
+
+        """
+        return MAVLink_fanet_digest_message(newest, held, origins, count, complete, version)
+
+    def fanet_digest_send(self, newest: Sequence[int], held: Sequence[int], origins: Sequence[int], count: int, complete: int, version: int, force_mavlink1: bool = False) -> None:
+        """
+        Which recent packets the sender of a hello holds, so that its
+        neighbors can repair what it missed. Long ones come in several
+        messages.
+
+        newest                    : Highest sequence number held of each origin. (type:uint32_t)
+        held                      : Bit i: newest - 1 - i is held too. (type:uint32_t)
+        origins                   : Node ids. (type:uint16_t)
+        count                     : How many entries of this message are used. (type:uint8_t)
+        complete                  : 1: an origin that is in no digest of this hello is one of which nothing is held. (type:uint8_t)
+        version                   : 1. (type:uint8_t)
+
+        """
+        self.send(self.fanet_digest_encode(newest, held, origins, count, complete, version), force_mavlink1=force_mavlink1)

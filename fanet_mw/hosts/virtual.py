@@ -51,7 +51,8 @@ class VirtualHost:
         """Start every actor, in order, at instant 0."""
         for index, actor in enumerate(self._actors):
             actor.start(self.now_ns)
-            self._settle(index)
+            self._take(index)
+            self._arm(index)
         self._flush()
 
     def run(self, until_ns: int) -> None:
@@ -68,7 +69,8 @@ class VirtualHost:
             else:
                 self._watch(index)
             actors[index].wake(self.now_ns)
-            self._settle(index)
+            self._take(index)
+            self._arm(index)
             self._flush()
         self.now_ns = max(self.now_ns, until_ns)
 
@@ -76,7 +78,7 @@ class VirtualHost:
         """Stop every actor, in order, and hand over what it still had to say."""
         for index, actor in enumerate(self._actors):
             actor.stop(self.now_ns)
-            self._settle(index)
+            self._take(index)
         self._flush()
 
     def _watch(self, index: int) -> None:
@@ -88,8 +90,8 @@ class VirtualHost:
                 f"{self._actors[index].name} asked to be woken {_STALL_LIMIT} times at {self.now_ns / S} s"
             )
 
-    def _settle(self, index: int) -> None:
-        """Take what an actor has put out and arm its next wake-up."""
+    def _take(self, index: int) -> None:
+        """Take what an actor has put out."""
         actor = self._actors[index]
         if actor.outbox:
             self._queue.extend(actor.outbox)
@@ -98,7 +100,10 @@ class VirtualHost:
             if self._on_records is not None:
                 self._on_records(actor.records)
             actor.records.clear()
-        wake_ns = actor.next_wake_ns()
+
+    def _arm(self, index: int) -> None:
+        """Plan an actor's next wake-up."""
+        wake_ns = self._actors[index].next_wake_ns()
         if wake_ns is not None and wake_ns < self.now_ns:
             wake_ns = self.now_ns
         if wake_ns != self._armed[index]:
@@ -108,7 +113,9 @@ class VirtualHost:
                 heapq.heappush(self._heap, (wake_ns, self._seq, index))
 
     def _flush(self) -> None:
+        """Deliver all messages of this instant, in order; then plan the wake-ups of whoever heard any."""
         queue, routes = self._queue, self._routes
+        heard: dict[int, None] = {}  # in order, each once
         while queue:
             topic, message = queue.popleft()
             route = routes.get(topic)
@@ -116,9 +123,12 @@ class VirtualHost:
                 route = routes[topic] = self._resolve(topic)
             for index in route[0]:
                 self._actors[index].receive(topic, message, self.now_ns)
-                self._settle(index)
+                self._take(index)
+                heard[index] = None
             for listener in route[1]:
                 listener(topic, message)
+        for index in heard:
+            self._arm(index)
 
     def _resolve(self, topic: str) -> tuple[list[int], list[Listener]]:
         hearing = [

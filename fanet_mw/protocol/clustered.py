@@ -8,6 +8,7 @@ nodes join by a flooded JOIN, the leader answers with a flooded SCHEDULE.
 from collections.abc import Mapping
 from typing import Final
 
+from fanet_mw.digest import Digest
 from fanet_mw.errors import DropReason
 from fanet_mw.messages import Reception, TxOutcome, TxStatus
 from fanet_mw.protocol import seen
@@ -18,6 +19,7 @@ from fanet_mw.protocol.membership import Membership
 from fanet_mw.protocol.neighbors import Neighbor, Neighbors
 from fanet_mw.protocol.relay import Relay
 from fanet_mw.protocol.release import Release
+from fanet_mw.protocol.repair import Repair
 from fanet_mw.protocol.txqueue import Packet, TxQueue
 from fanet_mw.units import BROADCAST, MS, US, NodeId, S, seconds_to_ns
 from fanet_mw.wire import FLAG_FLOOD, FLAG_TO_HEAD, Beacon, Join, Kind, Schedule
@@ -30,6 +32,10 @@ _JOIN_WINDOW_NS: Final = 3 * S
 """Joins are floods: spread, so that a swarm that starts together does not drown in them."""
 _REJOIN_NS: Final = 5 * S
 _CONTROL_JITTER_NS: Final = 100 * MS
+_UPLINK_NS: Final = 1 * S
+"""A packet should be flooded at most one flooding period and this after it was generated; else it may be repaired."""
+_STORE_PACKETS: Final = 4096
+"""Packets kept for repair; 4 MB at 1024 B."""
 
 
 class Clustered(RoutingProtocol):
@@ -57,6 +63,12 @@ class Clustered(RoutingProtocol):
             if port.node == scenario.leader
             else None
         )
+        self._expect_ns = scenario.clusters.period_ns + _UPLINK_NS
+        self._repair = Repair(
+            window_ns=seconds_to_ns(scenario.clusters.repair_s),
+            capacity=_STORE_PACKETS,
+            random=port.stream("repair").random,
+        ) if scenario.clusters.repair_s else None  # fmt: skip
         self._join_ns: int | None = None
 
     # --- the application's packets --------------------------------------------------------------------------------
@@ -66,7 +78,13 @@ class Clustered(RoutingProtocol):
             self._join_ns = now_ns + 500 * MS + int(self._random() * _JOIN_WINDOW_NS)
 
     def originate(self, packet: Packet, *, due_ns: int, now_ns: int) -> None:
+        self._keep(packet, flooded=False, now_ns=due_ns)
         self._forward(packet, start_ns=due_ns, now_ns=now_ns, tries=0)
+
+    def _keep(self, packet: Packet, *, flooded: bool, now_ns: int) -> None:
+        """Be able to repair this packet, if it is for everyone."""
+        if self._repair and packet.header.kind == Kind.DATA and packet.header.destination == BROADCAST:
+            self._repair.hold(packet, flooded=flooded, expect_ns=now_ns + self._expect_ns, now_ns=now_ns)
 
     def _forward(self, packet: Packet, *, start_ns: int, now_ns: int, tries: int) -> None:
         """Bring a packet one step nearer to a head, or queue it if we are one, or keep it until there is a way."""
@@ -98,6 +116,7 @@ class Clustered(RoutingProtocol):
 
     def receive(self, packet: Packet, reception: Reception, *, now_ns: int) -> None:
         flags = packet.header.flags
+        self._keep(packet, flooded=bool(flags & FLAG_FLOOD), now_ns=now_ns)
         if flags & FLAG_FLOOD:
             self._consume_control(packet, now_ns=now_ns)
             self._flood_on(packet, now_ns=now_ns)
@@ -122,8 +141,10 @@ class Clustered(RoutingProtocol):
         start_ns = now_ns + self._lead_ns + int(self._random() * jitter_ns)
         self._port.transmit(self._port.forwarded(packet, flags=FLAG_FLOOD), BROADCAST, start_ns=start_ns)
 
-    def overheard(self, key: int) -> None:
+    def overheard(self, key: int, *, now_ns: int) -> None:
         self._relay.another_copy(key)
+        if self._repair:
+            self._repair.overheard(key, now_ns=now_ns)
 
     def _consume_control(self, packet: Packet, *, now_ns: int) -> None:
         """Joins are the leader's, schedules everybody's. Malformed ones raise and are counted by the node."""
@@ -152,7 +173,7 @@ class Clustered(RoutingProtocol):
     def hello_inner(self, *, now_ns: int) -> bytes:
         self._gradient.advance(now_ns)
         route = self._gradient.route(now_ns=now_ns)
-        return Beacon(
+        beacon = Beacon(
             node=self._port.node,
             head=route.head if route else 0,
             head_seq=route.head_seq if route else 0,
@@ -162,11 +183,15 @@ class Clustered(RoutingProtocol):
             hops_to_head=route.hops if route else UNREACHABLE,
             slot=self._membership.slot,
         ).encode_frame(self._port.node)
+        return beacon + self._repair.digest(now_ns=now_ns).encode_frames(self._port.node) if self._repair else beacon
 
     def hello(self, packet: Packet, reception: Reception, *, now_ns: int) -> None:
         neighbor = Neighbor(reception.src, now_ns, reception.rssi_dbm, Beacon.decode_frame(packet.frame))
         self._neighbors.heard(neighbor)
         self._gradient.hear(neighbor, now_ns=now_ns)
+        digest = Digest.decode_frames(packet.frame) if self._repair else None
+        if self._repair and digest:
+            self._repair.compare(digest, now_ns=now_ns)
         if len(self._homeless) and self._gradient.route(now_ns=now_ns) is not None:
             for held in self._homeless.drain():
                 self._forward(held, start_ns=now_ns + self._lead_ns, now_ns=now_ns, tries=0)
@@ -187,7 +212,9 @@ class Clustered(RoutingProtocol):
 
     def next_wake_ns(self) -> int | None:
         leader_ns = self._leader.next_wake_ns() if self._leader else None
-        return min((t for t in (self._join_ns, leader_ns, self._release.next_wake_ns()) if t is not None), default=None)
+        repair_ns = self._repair.next_wake_ns() if self._repair else None
+        wanted = (self._join_ns, leader_ns, self._release.next_wake_ns(), self._relay.next_wake_ns(), repair_ns)
+        return min((t for t in wanted if t is not None), default=None)
 
     def wake(self, now_ns: int) -> None:
         if self._join_ns is not None and now_ns >= self._join_ns:
@@ -198,14 +225,29 @@ class Clustered(RoutingProtocol):
                 self._flood_control(Kind.SCHEDULE, part.encode_frame(self._port.node), now_ns=now_ns)
         for packet in self._relay.decided(now_ns=now_ns):
             self._transmit_relay(packet, 0, now_ns=now_ns)
+        for packet in self._repair.due(now_ns=now_ns) if self._repair else ():
+            self._flood_again(packet, now_ns=now_ns)
         horizon_us = now_ns // US - self._lifetime_us
         for packet in self._release.expire(before_us=horizon_us):
             self._port.drop(DropReason.EXPIRED, packet, now_ns=now_ns)
         for packet, start_ns in self._release.due(self._membership, now_ns=now_ns):
             self._port.mark(packet, seen.FLOODED)
+            self._keep(packet, flooded=True, now_ns=start_ns)
             own = packet.header.origin == self._port.node
             stamp = self._port.stamped if own else self._port.forwarded
             self._port.transmit(stamp(packet, flags=FLAG_FLOOD), BROADCAST, start_ns=start_ns)
+
+    def _flood_again(self, packet: Packet, *, now_ns: int) -> None:
+        """A neighbor lacks this packet."""
+        self._port.mark(packet, seen.FLOODED)
+        own = packet.header.origin == self._port.node
+        if own:
+            frame = self._port.stamped(packet, flags=FLAG_FLOOD)
+        elif packet.header.hop_limit > 1:
+            frame = self._port.forwarded(packet, flags=FLAG_FLOOD)
+        else:
+            return  # as far as it may go; it has been delivered here
+        self._port.transmit(frame, BROADCAST, start_ns=now_ns + self._lead_ns)
 
     def _join(self, now_ns: int) -> None:
         self._join_ns = now_ns + _REJOIN_NS + int(self._random() * _JOIN_WINDOW_NS)
@@ -230,4 +272,5 @@ class Clustered(RoutingProtocol):
             "head": self._membership.head,
             "epoch": self._membership.epoch,
             "waiting": self.waiting(),
+            "repaired": self._repair.repaired if self._repair else 0,
         }

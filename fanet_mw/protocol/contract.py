@@ -75,7 +75,7 @@ class RoutingProtocol(ABC):
     def hello(self, packet: Packet, reception: Reception, *, now_ns: int) -> None:  # noqa: B027
         """A neighbor's hello."""
 
-    def overheard(self, key: int) -> None:  # noqa: B027
+    def overheard(self, key: int, *, now_ns: int) -> None:  # noqa: B027
         """Another copy, in the same phase, of a packet that was handled before (`seen.key_of`)."""
 
     def status(self, status: TxStatus, *, now_ns: int) -> None:  # noqa: B027

@@ -27,6 +27,8 @@ _PHASE: Final = {0: seen.DELIVERED, wire.FLAG_FLOOD: seen.FLOODED, wire.FLAG_TO_
 """Which bit says that a packet was handled, by the phase flags of the frame that brought it."""
 
 
+_CONTROL: Final = 0x8000_0000
+"""Control packets are numbered apart, from here on: then data packets have no gaps, and what is missing shows."""
 _RESTART_STEP_NS: Final = 100 * US
 """A node sends fewer packets than one per 0.1 ms, so a later start begins beyond all earlier sequence numbers."""
 
@@ -54,7 +56,7 @@ class Node:
         self.frames_sent = 0
         self.receptions = 0
         self.dropped: Counter[str] = Counter()
-        self._packet_seq = 0
+        self._next_seq = {False: 0, True: _CONTROL}
         self._lifetime_ns = round(scenario.routing.lifetime_s * 1_000_000_000)
         self._seen = seen.Seen()
         self._protocol = make_protocol(self)
@@ -63,7 +65,8 @@ class Node:
 
     def start(self, now_ns: int) -> None:
         """The node is up; one that starts again later must not reuse the names of its earlier packets."""
-        self._packet_seq = now_ns // _RESTART_STEP_NS & 0xFFFF_FFFF
+        first = now_ns // _RESTART_STEP_NS % _CONTROL
+        self._next_seq = {False: first, True: _CONTROL + first}
         self._protocol.start(now_ns)
 
     def send(self, inner: bytes, *, destination: NodeId, priority: int, app: str, due_ns: int, now_ns: int) -> int:
@@ -113,7 +116,7 @@ class Node:
         if phase is None or bits & phase:
             self.dropped[DropReason.MALFORMED if phase is None else DropReason.DUPLICATE] += 1
             if phase is not None:
-                self._protocol.overheard(key)
+                self._protocol.overheard(key, now_ns=now_ns)
             return
         try:
             self._first_copy(Packet(wire.decode_header(frame), frame), reception, key, bits, phase, now_ns)
@@ -207,9 +210,12 @@ class Node:
         bound = self.scenario.radio.max_frame_bytes
         if size > bound:
             raise LocalProtocolError(f"frame of {size} bytes must be <= radio.max_frame_bytes = {bound}")
+        control = kind is not Kind.DATA
+        seq = self._next_seq[control]
+        self._next_seq[control] = seq + 1
         header = Header(
             origin_us=born_ns // US,
-            seq=self._packet_seq,
+            seq=seq,
             origin=self.node,
             destination=destination,
             prev_hop=self.node,
@@ -219,7 +225,6 @@ class Node:
             priority=priority,
             flags=flags,
         )
-        self._packet_seq += 1
         packet = Packet(header, header.encode() + inner)
         self.mark(packet, seen.DELIVERED | _PHASE[flags & wire.PHASE_MASK])
         return packet

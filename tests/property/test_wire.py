@@ -185,7 +185,7 @@ def test_a_right_crc_around_any_payload_gives_a_value_that_can_be_encoded_or_one
 ) -> None:
     spec = FORMATS[kind]
     payload = data.draw(st.binary(min_size=spec.layout.size - 1, max_size=spec.layout.size - 1)) + b"\x01"
-    frame = wire._frame(spec, payload, node=1)
+    frame = wire.encode_inner(spec, payload, node=1)
     with suppress(MalformedFrameError):
         value = kind.decode_frame(HEADER + frame)
         assert kind.decode_frame(HEADER + value.encode_frame(1)) == value
@@ -196,7 +196,7 @@ def test_a_right_crc_around_any_header_gives_a_header_that_encodes_to_the_same_o
     kind = bytes((payload[18] % 5,))
     payload = payload[:18] + kind + payload[19:] + bytes((wire.VERSION,))
     _, seq, _, _, prev_hop, *_ = wire.ROUTE.layout.unpack(payload)
-    frame = wire._frame(wire.ROUTE, payload, node=prev_hop, seq=seq)
+    frame = wire.encode_inner(wire.ROUTE, payload, node=prev_hop, seq=seq)
     with suppress(MalformedFrameError):
         assert wire.decode_header(frame).encode() == frame
 
@@ -261,7 +261,7 @@ def test_a_signed_inner_frame_is_passed_whole_with_its_signature() -> None:
 def test_a_message_of_another_length_is_malformed_although_its_crc_is_right(size: int) -> None:
     payload = (wire.JOIN.layout.pack(1, 2, 3, 3, wire.VERSION) + b"\x01")[:size]
     with pytest.raises(MalformedFrameError, match=f"{size} bytes"):
-        Join.decode_frame(HEADER + wire._frame(wire.JOIN, payload, node=3))
+        Join.decode_frame(HEADER + wire.encode_inner(wire.JOIN, payload, node=3))
 
 
 BEACON = Beacon(node=3, head=4, head_seq=5, cluster=6, epoch=7, slot=8, role=2, hops_to_head=1)

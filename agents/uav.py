@@ -55,6 +55,7 @@ class Uav(Actor):
     def start(self, now_ns: int) -> None:
         if self._hello_ns:
             self._next_hello_ns = now_ns + self._lead_ns + int(self._hello_random() * self._hello_ns)
+        self._node.records = self._mission.records = self.records
         self._node.start(now_ns)
         self._settle(now_ns)
         self._own_wake_ns = self._next_own_ns()
@@ -160,16 +161,11 @@ class Uav(Actor):
         if mission.course is not None:
             course, mission.course = mission.course, None
             self.outbox.append((self._setpoint_topic, Setpoint(now_ns, course.position, course.speed_m_s)))
-        if mission.records:
-            self.records += mission.records
-            mission.records.clear()
         if node.requests:
-            topic = self._tx_topic
-            self.outbox += [(topic, request) for request in node.requests]
+            outbox, topic = self.outbox, self._tx_topic
+            for request in node.requests:
+                outbox.append((topic, request))
             node.requests.clear()
-        if node.records:
-            self.records += node.records
-            node.records.clear()
 
     def _report(self, now_ns: int) -> None:
         reports, self._mission.reports = self._mission.reports, []

@@ -8,7 +8,7 @@ An actor never sleeps, reads a clock, opens a socket or starts a thread. A host 
     stop(now)   once, last; then `report()` says how it went
 
 After every call the host takes all of `outbox` and `records` and asks `next_wake_ns()` again. Instants never decrease.
-Both lists belong to the host between calls; the actor only appends to them during a call.
+Both lists belong to the host, which may put its own in place before `start`; the actor only appends, during a call.
 """
 
 from abc import ABC, abstractmethod

@@ -133,6 +133,12 @@ class Header(NamedTuple):
         return body + _CRC.pack(mcrf4xx(body[1:] + _EXTRA))
 
 
+_HEADER_FIELDS: Final = len(Header._fields)
+_LAST_KIND: Final = int(max(Kind))
+_new: Final = tuple.__new__
+"""Makes a named tuple three times as fast as its class does; for what is made once per frame."""
+
+
 def peek(frame: bytes) -> tuple[int, int, int] | None:
     """(origin, seq, flags) at their fixed offsets, unchecked; None when these bytes cannot begin with our header.
 
@@ -148,17 +154,18 @@ def decode_header(frame: bytes) -> Header:
     """The routing header of a frame; raises MalformedFrameError."""
     if frame[:3] != _ROUTE_MARK or frame[7:10] != _ROUTE_ID or len(frame) < HEADER_BYTES:
         raise MalformedFrameError("no routing header")
-    *fields, version, crc = _CHECKED.unpack_from(frame)
-    if mcrf4xx(frame[1:_BODY_END] + _EXTRA) != crc:
+    fields = _CHECKED.unpack_from(frame)
+    if mcrf4xx(frame[1:_BODY_END] + _EXTRA) != fields[-1]:
         raise MalformedFrameError("CRC of the routing header")
-    header = Header._make(fields)
+    origin_us, _, origin, destination, prev_hop, kind, *_, version, _ = fields
+    header = _new(Header, fields[:_HEADER_FIELDS])
     if (
         version != VERSION
-        or header.kind > Kind.TIME
-        or header.origin_us > LATEST_US
-        or header.origin in (0, _ANY_NODE)
-        or header.prev_hop in (0, _ANY_NODE)
-        or not header.destination
+        or kind > _LAST_KIND
+        or origin_us > LATEST_US
+        or not 0 < origin < _ANY_NODE
+        or not 0 < prev_hop < _ANY_NODE
+        or not destination
     ):
         raise MalformedFrameError(f"routing header {header}, version {version}")
     return header

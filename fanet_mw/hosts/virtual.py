@@ -5,7 +5,6 @@ order in which they were asked for. Nothing here depends on a clock, a hash or a
 """
 
 import heapq
-from collections import deque
 from collections.abc import Callable, Iterable, Sequence
 from typing import Final
 
@@ -16,6 +15,7 @@ from fanet_mw.trace import Record
 from fanet_mw.units import S
 
 Listener = Callable[[str, Message], None]
+Receive = Callable[[str, Message, int], None]
 _STALL_LIMIT: Final = 100_000
 """Wake-ups of one actor at one instant, above which it is taken to be stuck."""
 
@@ -43,15 +43,17 @@ class VirtualHost:
         self._heap: list[tuple[int, int, int]] = []
         self._seq = 0
         self._armed: list[int | None] = [None] * len(self._actors)
-        self._queue: deque[tuple[str, Message]] = deque()
-        self._routes: dict[str, tuple[list[int], list[Listener]]] = {}
+        self._queue: list[tuple[str, Message]] = []
+        self._records: list[Record] = []
+        for actor in self._actors:  # all append to the same lists, so that nothing needs to be gathered
+            actor.outbox, actor.records = self._queue, self._records
+        self._routes: dict[str, tuple[list[tuple[int, Receive]], list[Listener]]] = {}
         self._stall = (-1, 0)
 
     def start(self) -> None:
         """Start every actor, in order, at instant 0."""
         for index, actor in enumerate(self._actors):
             actor.start(self.now_ns)
-            self._take(index)
             self._arm(index)
         self._flush()
 
@@ -69,16 +71,14 @@ class VirtualHost:
             else:
                 self._watch(index)
             actors[index].wake(self.now_ns)
-            self._take(index)
             self._arm(index)
             self._flush()
         self.now_ns = max(self.now_ns, until_ns)
 
     def stop(self) -> None:
         """Stop every actor, in order, and hand over what it still had to say."""
-        for index, actor in enumerate(self._actors):
+        for actor in self._actors:
             actor.stop(self.now_ns)
-            self._take(index)
         self._flush()
 
     def _watch(self, index: int) -> None:
@@ -89,17 +89,6 @@ class VirtualHost:
             raise LocalProtocolError(
                 f"{self._actors[index].name} asked to be woken {_STALL_LIMIT} times at {self.now_ns / S} s"
             )
-
-    def _take(self, index: int) -> None:
-        """Take what an actor has put out."""
-        actor = self._actors[index]
-        if actor.outbox:
-            self._queue.extend(actor.outbox)
-            actor.outbox.clear()
-        if actor.records:
-            if self._on_records is not None:
-                self._on_records(actor.records)
-            actor.records.clear()
 
     def _arm(self, index: int) -> None:
         """Plan an actor's next wake-up."""
@@ -114,25 +103,28 @@ class VirtualHost:
 
     def _flush(self) -> None:
         """Deliver all messages of this instant, in order; then plan the wake-ups of whoever heard any."""
-        queue, routes = self._queue, self._routes
+        queue, routes, now_ns = self._queue, self._routes, self.now_ns
         heard: dict[int, None] = {}  # in order, each once
-        while queue:
-            topic, message = queue.popleft()
+        for topic, message in queue:  # it grows meanwhile
             route = routes.get(topic)
             if route is None:
                 route = routes[topic] = self._resolve(topic)
-            for index in route[0]:
-                self._actors[index].receive(topic, message, self.now_ns)
-                self._take(index)
+            for index, receive in route[0]:
+                receive(topic, message, now_ns)
                 heard[index] = None
             for listener in route[1]:
                 listener(topic, message)
+        queue.clear()
         for index in heard:
             self._arm(index)
+        if self._records:
+            if self._on_records is not None:
+                self._on_records(self._records)
+            self._records.clear()
 
-    def _resolve(self, topic: str) -> tuple[list[int], list[Listener]]:
-        hearing = [
-            index
+    def _resolve(self, topic: str) -> tuple[list[tuple[int, Receive]], list[Listener]]:
+        hearing: list[tuple[int, Receive]] = [
+            (index, actor.receive)
             for index, actor in enumerate(self._actors)
             if any(matches(expression, topic) for expression in actor.subscriptions)
         ]

@@ -27,6 +27,9 @@ _PHASE: Final = {0: seen.DELIVERED, wire.FLAG_FLOOD: seen.FLOODED, wire.FLAG_TO_
 """Which bit says that a packet was handled, by the phase flags of the frame that brought it."""
 
 
+_DATA: Final = int(Kind.DATA)
+_HELLO: Final = int(Kind.HELLO)
+_new: Final = tuple.__new__  # for what is made once per frame
 _CONTROL: Final = 0x8000_0000
 """Control packets are numbered apart, from here on: then data packets have no gaps, and what is missing shows."""
 _RESTART_STEP_NS: Final = 100 * US
@@ -56,6 +59,7 @@ class Node:
         self.frames_sent = 0
         self.receptions = 0
         self.dropped: Counter[str] = Counter()
+        self._duplicates = 0
         self._next_seq = {False: 0, True: _CONTROL}
         self._lifetime_ns = round(scenario.routing.lifetime_s * 1_000_000_000)
         self._seen = seen.Seen()
@@ -113,31 +117,36 @@ class Node:
         phase = _PHASE.get(flags & wire.PHASE_MASK)
         key = (origin << 32) | seq
         bits = self._seen.bits(key)
-        if phase is None or bits & phase:
-            self.dropped[DropReason.MALFORMED if phase is None else DropReason.DUPLICATE] += 1
-            if phase is not None:
-                self._protocol.overheard(key, now_ns=now_ns)
+        if phase is None:
+            self.dropped[DropReason.MALFORMED] += 1
+            return
+        if bits & phase:
+            self._duplicates += 1
+            self._protocol.overheard(key, now_ns=now_ns)
             return
         try:
-            self._first_copy(Packet(wire.decode_header(frame), frame), reception, key, bits, phase, now_ns)
+            packet = _new(Packet, (wire.decode_header(frame), frame))
+            self._first_copy(packet, reception, key, bits, bits | phase, now_ns)
         except MalformedFrameError:
             self.dropped[DropReason.MALFORMED] += 1
 
-    def _first_copy(self, packet: Packet, reception: Reception, key: int, bits: int, phase: int, now_ns: int) -> None:
+    def _first_copy(self, packet: Packet, reception: Reception, key: int, before: int, bits: int, now_ns: int) -> None:
+        """`before` and `bits`: what is known of it without and with this copy."""
         header = packet.header
-        self._seen.mark(key, phase)
-        if header.kind == Kind.HELLO:
+        self._seen.put(key, bits)
+        if header.kind == _HELLO:
             self._protocol.hello(packet, reception, now_ns=now_ns)
             return
-        age_ns = reception.end_ns - header.origin_us * US
+        end_ns = reception.end_ns
+        age_ns = end_ns - header.origin_us * US
         if age_ns > self._lifetime_ns:
             self.drop(DropReason.EXPIRED, packet, now_ns=now_ns)
             return
-        if header.kind == Kind.DATA and not bits & seen.DELIVERED and header.destination in (self.node, BROADCAST):
-            self._seen.mark(key, seen.DELIVERED)
-            self.deliveries.append(Delivery(header, packet.frame, reception.end_ns))
+        if header.kind == _DATA and not before & seen.DELIVERED and header.destination in (BROADCAST, self.node):
+            self._seen.put(key, bits | seen.DELIVERED)
+            self.deliveries.append(_new(Delivery, (header, packet.frame, end_ns)))
             self.records.append(
-                Delivered(reception.end_ns, self.node, header.origin, header.seq, age_ns, header.hops + 1)
+                _new(Delivered, (end_ns, self.node, header.origin, header.seq, age_ns, header.hops + 1))
             )
         self._protocol.receive(packet, reception, now_ns=now_ns)
 
@@ -155,16 +164,20 @@ class Node:
         return {
             "frames_sent": self.frames_sent,
             "receptions": self.receptions,
-            "dropped": {reason: self.dropped[reason] for reason in sorted(self.dropped)},
+            "dropped": self._drops(),
             **self._protocol.report(),
         }
+
+    def _drops(self) -> dict[str, int]:
+        dropped = self.dropped + Counter({DropReason.DUPLICATE: self._duplicates})
+        return {reason: dropped[reason] for reason in sorted(dropped)}
 
     # --- the port of the protocol (fanet_mw.protocol.contract.Port) -----------------------------------------------
 
     def transmit(self, frame: bytes, dst: NodeId, *, start_ns: int, wants_status: bool = False) -> int:
         seq = self.frames_sent
         self.frames_sent = seq + 1
-        self.requests.append(TxRequest(seq, start_ns, frame, dst, wants_status))
+        self.requests.append(_new(TxRequest, (seq, start_ns, frame, dst, wants_status)))
         return seq
 
     def announce(self, kind: Kind, inner: bytes, *, now_ns: int, flags: int, hop_limit: int) -> Packet:

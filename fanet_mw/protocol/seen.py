@@ -31,6 +31,12 @@ class Seen:
         found = self._young.get(key)
         return self._old.get(key, 0) if found is None else found
 
+    def put(self, key: int, bits: int) -> None:
+        """Set what is known of a packet; `mark` for a caller that has just asked for `bits`."""
+        if len(self._young) >= self._capacity:
+            self._old, self._young = self._young, {}
+        self._young[key] = bits
+
     def mark(self, key: int, bits: int) -> None:
         if len(self._young) >= self._capacity:
             self._old, self._young = self._young, {}

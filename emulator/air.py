@@ -70,6 +70,7 @@ class Air:
         if self._hr.shape[0] < room + self.g[s.HR_N]:
             self._hr = np.concatenate([self._hr, np.zeros((room, 5), np.int64)])
         if spare:
+            kernel.scatter(self.g, self._p, self._lk, self._hr)
             kernel.relink(
                 self._hr, self.g, self._lk, self._lp, self._ptr, self.st[s.LOCK], links.ints, links.reals, links.ptr
             )

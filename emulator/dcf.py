@@ -16,12 +16,16 @@ from emulator.state import (
     ACK_TIMEOUT_NS,
     ACK_TO,
     AIRTIME,
+    ALL_DETECT,
+    ALL_END,
+    ALL_START,
     ATTEMPTS,
     ATTEMPTS_FAILED,
     ATTEMPTS_MADE,
     AUDIBLE,
     BAD_UNTIL,
     BASE,
+    BEGINS,
     BO,
     BORN,
     BUSY_NS,
@@ -44,6 +48,7 @@ from emulator.state import (
     DONE_SENT,
     DRAW_WHEN_INTERRUPTED,
     DST,
+    ENDS,
     EVERYONE,
     EXPIRED,
     FATE,
@@ -89,9 +94,6 @@ from emulator.state import (
     RECEIVED,
     RESUME_FROM,
     RETRIES,
-    RX_DETECT,
-    RX_END,
-    RX_START,
     SCHEDULED,
     SENSED,
     SLOT_NS,
@@ -351,18 +353,21 @@ def begin_tx(
     st[ON_AIR_LIST, g[ON_AIR_N]] = s
     g[ON_AIR_N] += 1
     push(hr, g, HR_N, t + airtime, TX_DONE, s, 0)
-    for link in range(ptr[s], ptr[s + 1]):
+    first, last = ptr[s], ptr[s + 1]
+    for link in range(first, last):
         lp[ON_AIR, link] = lp[LINK_POWER, link]
         lk[SENSED, link] = lk[AUDIBLE, link]
         lk[FATE, link] = FATE_OPEN
         lk[LINK_FRAME, link] = f
         lk[LINK_KIND, link] = kind
         lk[UNDERWAY, link] = 1
-        fr[OPEN, f] += 1
-        begin = t + lk[DELAY, link]
-        push(hr, g, HR_N, begin, RX_START, link, 0)
-        push(hr, g, HR_N, begin + p[DETECT_NS], RX_DETECT, link, 0)
-        push(hr, g, HR_N, begin + airtime, RX_END, link, 0)
+        lk[BEGINS, link] = t + lk[DELAY, link]
+        lk[ENDS, link] = lk[BEGINS, link] + airtime
+    if first < last:
+        fr[OPEN, f] += last - first
+        push(hr, g, HR_N, lk[BEGINS, first], ALL_START, first, last)
+        push(hr, g, HR_N, lk[BEGINS, first] + p[DETECT_NS], ALL_DETECT, first, last)
+        push(hr, g, HR_N, lk[ENDS, first], ALL_END, first, last)
 
 
 @jit

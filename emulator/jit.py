@@ -43,7 +43,7 @@ def _decorator() -> Callable[[F], F]:
     def compiled(function: F) -> F:
         numba.config.CACHE_DIR = ours  # read when a function is decorated, and by others too: put it back
         try:
-            return cast("F", numba.njit(cache=True)(function))
+            return cast("F", numba.njit(cache=True, error_model="numpy")(function))
         finally:
             numba.config.CACHE_DIR = everyone
 

@@ -13,10 +13,16 @@ from emulator.state import (
     ACK_NS,
     ACK_TIMEOUT,
     AIRTIME,
+    ALL_DETECT,
+    ALL_END,
+    ALL_START,
     ARRIVE,
+    BEGINS,
     BORN,
+    DETECT_NS,
     DIFS_NS,
     DST,
+    ENDS,
     FRAME_ROWS,
     HEAD,
     HEADER_NS,
@@ -54,6 +60,8 @@ from emulator.state import (
 
 MARGIN = 16
 """Rows that one event may need in the start heap."""
+AT_ONCE = 4
+"""Receivers that one event handles; each may plan two starts, and all of them must find room."""
 _FEW = 128
 """Planned starts that are worth looking at one by one."""
 
@@ -174,7 +182,7 @@ def advance(  # noqa: C901  (one dispatch; splitting it would only move the bran
             elif kind == ACK_TIMEOUT:
                 ack_timeout(g, p, st, fr, lk, hs, out, a, b, starts)
         else:
-            kind, a = hr[0, 2], hr[0, 3]
+            kind, a, b = hr[0, 2], hr[0, 3], hr[0, 4]
             pop(hr, g, HR_N)
             if kind == RX_START:
                 rx_start(p, pf, st, sf, lk, lp, err, a, ends)
@@ -184,6 +192,51 @@ def advance(  # noqa: C901  (one dispatch; splitting it would only move the bran
                 rx_end(g, p, pf, st, sf, fr, lk, lp, hs, out, err, a, ends)
             elif kind == TX_DONE:
                 tx_done(g, p, st, fr, hs, out, a, ends)
+            else:
+                spread(g, p, pf, st, sf, fr, lk, lp, hs, hr, out, err, kind, a, b, ends)
+
+
+@jit
+def spread(
+    g: Ints, p: Ints, pf: Reals, st: Ints, sf: Reals, fr: Ints, lk: Ints, lp: Reals, hs: Ints, hr: Ints, out: Ints,
+    err: Reals, kind: int, link: int, end: int, t: int,
+) -> None:  # fmt: skip
+    """One moment of a frame at its receivers, `link` to `end` - 1: at those it reaches now, then at the next ones."""
+    until = min(end, link + AT_ONCE)
+    while link < until and moment(p, lk, kind, link) == t:
+        if kind == ALL_START:
+            rx_start(p, pf, st, sf, lk, lp, err, link, t)
+        elif kind == ALL_DETECT:
+            rx_detect(p, pf, st, sf, lk, lp, link, t)
+        else:
+            rx_end(g, p, pf, st, sf, fr, lk, lp, hs, out, err, link, t)
+        link += 1
+    if link < end:
+        push(hr, g, HR_N, moment(p, lk, kind, link), kind, link, end)
+
+
+@jit
+def moment(p: Ints, lk: Ints, kind: int, link: int) -> int:
+    """When the frame on a link begins, is detected or ends at its receiver."""
+    if kind == ALL_END:
+        return int(lk[ENDS, link])
+    return int(lk[BEGINS, link] + (p[DETECT_NS] if kind == ALL_DETECT else 0))
+
+
+@jit
+def scatter(g: Ints, p: Ints, lk: Ints, hr: Ints) -> None:
+    """Replace each event on many links by one on each: the links are about to change."""
+    i = 0
+    while i < g[HR_N]:
+        kind, first, end = hr[i, 2], hr[i, 3], hr[i, 4]
+        if kind < ALL_START:
+            i += 1
+            continue
+        single = kind - ALL_START + RX_START
+        hr[i, 2], hr[i, 4] = single, 0
+        for link in range(first + 1, end):
+            push(hr, g, HR_N, moment(p, lk, kind, link), single, link, 0)
+        i = 0  # rows have moved
 
 
 @jit
@@ -229,4 +282,4 @@ def relink(  # noqa: C901  (one pass over what is under way)
     return int(used)
 
 
-__all__ = ["NEVER", "advance", "next_output", "purge", "relink", "submit"]
+__all__ = ["NEVER", "advance", "next_output", "purge", "relink", "scatter", "submit"]

@@ -112,6 +112,8 @@ class Links:
 
     def __init__(self, at: npt.NDArray[np.float64], radio: Radio, *, spare: int) -> None:
         found, distance = neighbors(at, reach_m(radio))
+        nearest_first = np.lexsort((found[:, 1], distance, found[:, 0]))
+        found, distance = found[nearest_first], distance[nearest_first]
         count = len(found)
         power_dbm = received_dbm(distance, radio)
         self.count = count

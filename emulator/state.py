@@ -79,17 +79,18 @@ POWER, LOG_OK, STATION_REALS = range(3)
 EVERYONE: Final = -1
 
 # --- links (lk, lp) -----------------------------------------------------------------------------------------------
-LINK_SRC, LINK_DST, DELAY, AUDIBLE, SENSED, FATE, LINK_FRAME, LINK_KIND, UNDERWAY, LINK_ROWS = range(10)
+LINK_SRC, LINK_DST, DELAY, AUDIBLE, SENSED, FATE, LINK_FRAME, LINK_KIND, UNDERWAY, BEGINS, ENDS, LINK_ROWS = range(12)
 """AUDIBLE: strong enough to sense and decode; others only interfere. SENSED, FATE: of the frame now on
 the link; SENSED is AUDIBLE as it was at its start. LINK_FRAME, LINK_KIND: what it is (of an ACK: the frame it
-acknowledges). UNDERWAY: 1 until its end."""
+acknowledges). UNDERWAY: 1 until its end. BEGINS, ENDS: its first and last bit at the receiver."""
 LINK_POWER, ON_AIR, LINK_REALS = range(3)
 """LINK_POWER: received power [mW]. ON_AIR: that of the frame now on the link, as it was at its start."""
 
 FATE_OPEN, FATE_COLLISION, FATE_HALF_DUPLEX, FATE_WEAK = range(4)
 
 # --- events -------------------------------------------------------------------------------------------------------
-ARRIVE, ACCESS, SEND_ACK, ACK_TIMEOUT, TX_DONE, RX_START, RX_DETECT, RX_END = range(8)
+ARRIVE, ACCESS, SEND_ACK, ACK_TIMEOUT, TX_DONE, RX_START, RX_DETECT, RX_END, ALL_START, ALL_DETECT, ALL_END = range(11)
+"""ALL_*: the same on the links a .. b - 1 of one transmitter, nearest receiver first, from link to link."""
 
 # --- outputs (out): kind, frame, station, t_ns, rssi in 1/1000 dBm, attempts ------------------------------------------
 OUT_RECEPTION, OUT_DONE, OUT_FREE, OUT_COLUMNS = 0, 1, 2, 6

@@ -10,6 +10,7 @@ from typing import NamedTuple
 
 import pytest
 from medium_driver import contention, disc
+from reference import bianchi
 
 from fanet_mw.units import NodeId
 
@@ -179,28 +180,6 @@ def test_saturation_throughput_is_that_of_ns3s_published_bianchi_validation(
     )["air"]  # fmt: skip
     ours = [air["throughput_mbps"] * 1500 / 1472]
     compare(table, f"Bianchi 1500 B n={count}: Mb/s", ours, Reference(mbps), relative=0.015)
-
-
-def bianchi(count: int, *, success_us: float, collision_us: float, payload_bytes: int) -> tuple[float, float]:
-    """Saturation throughput [Mb/s] and failure probability of an attempt (Bianchi, JSAC 18(3), 2000; 7 attempts).
-
-    W = 32, five doublings; a frame leaves after the seventh failure.
-    """
-    windows = [min(32 << stage, 1024) for stage in range(7)]
-
-    def tau(failure: float) -> float:
-        weights = [failure**stage for stage in range(7)]
-        return sum(weights) / sum(w * (window + 1) / 2 for w, window in zip(weights, windows, strict=True))
-
-    low, high = 0.0, 1.0
-    for _ in range(60):
-        failure = (low + high) / 2
-        low, high = (failure, high) if 1 - (1 - tau(failure)) ** (count - 1) > failure else (low, failure)
-    attempt = tau(failure)
-    idle = (1 - attempt) ** count
-    success = count * attempt * (1 - attempt) ** (count - 1)
-    slot_us = idle * 20 + success * success_us + (1 - idle - success) * collision_us
-    return success * 8 * payload_bytes / slot_us, failure
 
 
 @pytest.mark.parametrize("count", [3, 10, 25])

@@ -32,6 +32,8 @@ class Accounts:
         self.dropped: Counter[str] = Counter()
         self.refused: Counter[str] = Counter()
         """Hostile or misdirected input, by kind; none of it became a frame."""
+        self.poses = 0
+        """Sets of positions taken in."""
         self.late_frames = 0
         self._max_late_ns = 0
         self._lateness = [0] * (len(_LATENESS_STEPS) + 1)

@@ -17,13 +17,15 @@ from fanet_mw.actor import Actor
 from fanet_mw.errors import DropReason
 from fanet_mw.messages import Message, Poses, Reception, TxOutcome, TxRequest, TxStatus
 from fanet_mw.scenario import Scenario
-from fanet_mw.topics import Topics, node_of
+from fanet_mw.topics import Topics
 from fanet_mw.units import BROADCAST, MS, NodeId, seconds_to_ns
 
 TOO_LATE_NS: Final = 50 * MS
 """A request later than this is dropped: its slot is long another's."""
 _new: Final = tuple.__new__
 _SEQ_MASK: Final = 0xFFFF_FFFF
+_FARTHEST_M: Final = 1e7
+"""Of a coordinate; positions beyond are no swarm's, and would overflow the cells in which neighbors are looked for."""
 _HORIZON_NS: Final = 60_000 * MS
 """A request for an instant further ahead than this is refused: nobody plans so far, and it would only take room."""
 
@@ -37,7 +39,7 @@ class Medium(Actor):
         self._max_bytes = scenario.radio.max_frame_bytes
         self._count = scenario.nodes.count
         self._rx_topics = [topics.radio_rx(node) for node in scenario.node_ids]
-        self._station_of: dict[str, int] = {}
+        self._station_of = {topics.radio_tx(node): node - 1 for node in scenario.node_ids}
         self._air = Air(scenario.radio, stations=self._count, seed=scenario.seed)
         self._accounts = Accounts()
         self._requests: list[TxRequest | None] = [None] * self._air.slots()
@@ -61,8 +63,9 @@ class Medium(Actor):
         if type(message) is TxRequest:
             station = self._station_of.get(topic)
             if station is None:
-                station = self._station_of[topic] = node_of(topic) - 1
-            self._request(station, message, now_ns)
+                self._accounts.refused["unknown_station"] += 1
+            else:
+                self._request(station, message, now_ns)
         elif isinstance(message, Poses):
             self._pass_time(now_ns)
             self._place(message)
@@ -102,6 +105,7 @@ class Medium(Actor):
             "copies": accounts.copies(g),
             "air": accounts.air(g, busy_ns=self._air.busy_ns(self._now_ns), now_ns=self._now_ns, stations=self._count),
             "late": accounts.lateness(),
+            "poses": accounts.poses,
             "refused": dict(sorted(accounts.refused.items())),
             "handed": {i + 1: count for i, count in enumerate(self._air.st[s.HANDED].tolist()) if count},
         }
@@ -111,9 +115,6 @@ class Medium(Actor):
     def _request(self, station: int, request: TxRequest, now_ns: int) -> None:
         """Take in one request; whatever is wrong with it is counted, never raised."""
         accounts = self._accounts
-        if not 0 <= station < self._count:
-            accounts.refused["unknown_station"] += 1
-            return
         if request.seq != self._next_seq[station]:
             self._count_gap(station, request.seq)
         self._next_seq[station] = (request.seq + 1) & _SEQ_MASK
@@ -207,9 +208,10 @@ class Medium(Actor):
             return
         states = np.frombuffer(poses.states, np.float64).reshape(-1, 6)
         known = (ids >= 1) & (ids <= self._count)
-        if not known.all() or not np.isfinite(states[:, :3]).all():
+        if not known.all() or not (np.abs(states[:, :3]) <= _FARTHEST_M).all():  # false for what is not a number
             self._accounts.refused["poses"] += 1
             return
+        self._accounts.poses += 1
         at = np.full((self._count, 3), np.inf)
         at[ids - 1] = states[:, :3]
         self._air.place(at)

@@ -88,7 +88,8 @@ class Topics:
 def node_of(topic: str) -> int:
     """The node id in a `radio/<id>/..` or `world/<id>/..` topic; 0 when there is none."""
     parts = topic.split("/")
-    return int(parts[3]) if len(parts) > 3 and parts[3].isascii() and parts[3].isdigit() else 0
+    text = parts[3] if len(parts) > 3 else ""
+    return int(text) if len(text) <= 5 and text.isascii() and text.isdigit() else 0  # ids have five digits at most
 
 
 # --- bodies: one encoder and one decoder per message type, beside each other -------------------------------------
@@ -253,6 +254,6 @@ def decode(data: bytes) -> list[Message]:
                 raise ValueError("length beyond the end")
             messages.append(_CODECS[code][2](data[at : at + length]))
             at += length
-    except (struct.error, ValueError, KeyError, OverflowError) as error:
+    except (struct.error, ValueError, KeyError, OverflowError, RecursionError) as error:
         raise MalformedFrameError(f"bus message malformed at byte {at}: {error}") from error
     return messages

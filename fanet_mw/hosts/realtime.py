@@ -1,6 +1,6 @@
 """Real time: one actor on asyncio over Zenoh, under the same contract as in virtual time.
 
-    Zenoh's thread -> deque -> one wake-up of the loop drains it -> actor -> outbox, one put per topic and wake-up
+    Zenoh's thread -> inbox -> wake-ups of the loop drain it -> actor -> outbox, one put per topic and wake-up
 
 The host never wakes an actor early. How late it wakes it is measured and reported; the lateness of frames, which is
 what matters, is the medium's to count. An actor that raises ends its host, and with it the process.
@@ -10,16 +10,15 @@ import asyncio
 import gc
 import json
 import resource
-from collections import deque
 from collections.abc import Callable
 from pathlib import Path
 from typing import Any, Final
 
 from fanet_mw import topics
 from fanet_mw.actor import Actor
-from fanet_mw.errors import MalformedFrameError
 from fanet_mw.hosts.bus import Bus
 from fanet_mw.hosts.clock import ClockListener, SwarmClock
+from fanet_mw.hosts.inbox import Inbox
 from fanet_mw.hosts.lateness import Histogram
 from fanet_mw.messages import Message, Report, TraceBatch
 from fanet_mw.topics import Topics
@@ -38,7 +37,7 @@ class RealtimeHost:
         self._bus = bus
         self._names = names
         self._loop = asyncio.get_running_loop()
-        self._inbox: deque[tuple[str, bytes]] = deque()
+        self._inbox = Inbox()
         self._drain_asked = False
         self._failure: asyncio.Future[None] = self._loop.create_future()
         self._clock: SwarmClock | None = None
@@ -47,9 +46,7 @@ class RealtimeHost:
         self._timer_ns: int | None = None
         self._records: list[Record] = []
         self._lateness = Histogram()
-        self._malformed = 0
         self._puts = 0
-        self._samples = 0
 
     async def run(self, *, until_ns: int, clock_timeout_s: float) -> None:
         """Declare, announce, wait for the clock, run, report. Raises BusError, and whatever the actor raises."""
@@ -121,7 +118,7 @@ class RealtimeHost:
 
     def _from_thread(self, topic: str, payload: bytes) -> None:
         """On Zenoh's thread: many samples, one wake-up."""
-        self._inbox.append((topic, payload))
+        self._inbox.offer(topic, payload)
         if not self._drain_asked and not self._loop.is_closed():
             self._drain_asked = True
             self._loop.call_soon_threadsafe(self._drain)
@@ -141,18 +138,12 @@ class RealtimeHost:
                 self._failure.set_exception(error)
 
     def _take_inbox(self) -> None:
-        inbox, actor = self._inbox, self._actor
-        while inbox:
-            topic, payload = inbox.popleft()
-            self._samples += 1
-            try:
-                messages = topics.decode(payload)
-            except MalformedFrameError:
-                self._malformed += 1
-                continue
-            for message in messages:
-                actor.receive(topic, message, self._now_ns())
+        actor = self._actor
+        more = self._inbox.deliver(lambda topic, message: actor.receive(topic, message, self._now_ns()))
         self._settle()
+        if more and not self._drain_asked:  # timers, the clock and reports have their turn before the rest
+            self._drain_asked = True
+            self._loop.call_soon(self._drain)
 
     # --- time -----------------------------------------------------------------------------------------------------
 
@@ -217,9 +208,8 @@ class RealtimeHost:
             "wake_lateness_ms": self._lateness.summary(),
             "cpu_s": round(usage.ru_utime + usage.ru_stime, 3),
             "uss_mb": uss_mb() if final else None,  # asking holds up the process for more than a millisecond
-            "malformed": self._malformed,
             "puts": self._puts,
-            "samples": self._samples,
+            **self._inbox.figures(),
         }
 
 

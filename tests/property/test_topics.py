@@ -3,6 +3,7 @@
 from array import array
 from contextlib import suppress
 
+import pytest
 from hypothesis import given
 from hypothesis import strategies as st
 
@@ -89,3 +90,10 @@ def test_the_node_of_a_topic_is_its_fourth_part() -> None:
     assert topics.node_of(names.setpoint(4)) == 4
     assert topics.node_of(names.pose) == 0
     assert topics.node_of("fanet/swarm/radio/²/tx") == 0
+    assert topics.node_of(names.radio_tx("9" * 5000)) == 0, "Python refuses to read so long a number"
+
+
+def test_a_trace_nested_deeper_than_a_parser_goes_is_malformed() -> None:
+    body = b"[" * 200_000
+    with pytest.raises(MalformedFrameError):
+        topics.decode(bytes([9]) + len(body).to_bytes(4, "little") + body)

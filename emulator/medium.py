@@ -13,9 +13,11 @@ from emulator import state as s
 from emulator.accounts import Accounts
 from emulator.air import Air
 from emulator.dcf import NEVER
+from emulator.faults import Faults
 from fanet_mw.actor import Actor
 from fanet_mw.errors import DropReason
 from fanet_mw.messages import Message, Poses, Reception, TxOutcome, TxRequest, TxStatus
+from fanet_mw.radio_control import Cut, Degrade, Jam, Restore
 from fanet_mw.scenario import Scenario
 from fanet_mw.topics import Topics
 from fanet_mw.units import BROADCAST, MS, NodeId, seconds_to_ns
@@ -35,12 +37,13 @@ class Medium(Actor):
 
     def __init__(self, scenario: Scenario, swarm: str) -> None:
         topics = Topics(swarm)
-        super().__init__("emulator", (topics.all_tx, topics.pose))
+        super().__init__("emulator", (topics.all_tx, topics.pose, topics.radio_control))
         self._max_bytes = scenario.radio.max_frame_bytes
         self._count = scenario.nodes.count
         self._rx_topics = [topics.radio_rx(node) for node in scenario.node_ids]
         self._station_of = {topics.radio_tx(node): node - 1 for node in scenario.node_ids}
-        self._air = Air(scenario.radio, stations=self._count, seed=scenario.seed)
+        self._faults = Faults(scenario.radio, stations=self._count, planned=scenario.planned_faults)
+        self._air = Air(scenario.radio, stations=self._count, seed=scenario.seed, faults=self._faults)
         self._accounts = Accounts()
         self._requests: list[TxRequest | None] = [None] * self._air.slots()
         self._ids = [NodeId(node) for node in scenario.node_ids]
@@ -50,9 +53,11 @@ class Medium(Actor):
         self._next_seq: list[int | None] = [None] * self._count
         self._handover_ns = scenario.radio.handover_ns
         self._warm_ns: int | None = seconds_to_ns(scenario.warmup_s)
+        self._due_ns = self._next_turn_ns()
         self._wake_ns: int | None = None
         self._stale = True
         self._now_ns = 0
+        self._control_topic = topics.radio_control
 
     # --- the actor contract ---------------------------------------------------------------------------------------
 
@@ -69,6 +74,11 @@ class Medium(Actor):
         elif isinstance(message, Poses):
             self._pass_time(now_ns)
             self._place(message)
+        elif topic == self._control_topic and isinstance(message, Degrade | Jam | Cut | Restore):
+            self._pass_time(now_ns)
+            why = self._faults.obey(message, self._now_ns)
+            self._accounts.controls += why is None
+            self._change(why)
         else:
             self._accounts.refused["message_type"] += 1
 
@@ -79,9 +89,9 @@ class Medium(Actor):
         if self._stale:
             self._stale = False
             self._wake_ns = self._next_handover_ns()
-        if self._warm_ns is None:
+        if self._due_ns is None:
             return self._wake_ns
-        return self._warm_ns if self._wake_ns is None else min(self._warm_ns, self._wake_ns)
+        return self._due_ns if self._wake_ns is None else min(self._due_ns, self._wake_ns)
 
     def _next_handover_ns(self) -> int | None:
         bound_ns, every_ns = self._air.next_output_ns, self._handover_ns
@@ -106,6 +116,7 @@ class Medium(Actor):
             "air": accounts.air(g, busy_ns=self._air.busy_ns(self._now_ns), now_ns=self._now_ns, stations=self._count),
             "late": accounts.lateness(),
             "poses": accounts.poses,
+            "controls": accounts.controls,
             "refused": dict(sorted(accounts.refused.items())),
             "handed": {i + 1: count for i, count in enumerate(self._air.st[s.HANDED].tolist()) if count},
         }
@@ -175,13 +186,38 @@ class Medium(Actor):
 
     def _pass_time(self, now_ns: int) -> None:
         """Advance the air to `now_ns` and hand out what came of it."""
-        if self._warm_ns is not None and now_ns >= self._warm_ns:
-            self._hand_out(self._air.advance(max(self._warm_ns, self._now_ns)))
-            self._accounts.measure_from(self._air.g, busy_ns=self._air.busy_ns(self._warm_ns), now_ns=self._warm_ns)
-            self._warm_ns = None
+        while self._due_ns is not None and self._due_ns <= now_ns:
+            self._turn(self._due_ns)
         self._hand_out(self._air.advance(now_ns))
         self._now_ns = max(self._now_ns, now_ns)
         self._stale = True
+
+    def _turn(self, due_ns: int) -> None:
+        """Everything before this instant has happened: the warm-up ends, faults begin and end."""
+        self._hand_out(self._air.advance(max(due_ns, self._now_ns)))
+        self._now_ns = max(self._now_ns, due_ns)
+        if self._warm_ns is not None and self._warm_ns <= due_ns:
+            self._accounts.measure_from(self._air.g, busy_ns=self._air.busy_ns(self._now_ns), now_ns=self._now_ns)
+            self._warm_ns = None
+        fault_ns = self._faults.next_ns()
+        if fault_ns is not None and fault_ns <= due_ns:
+            self._change(*self._faults.pass_time(due_ns))
+        self._due_ns = self._next_turn_ns()
+
+    def _next_turn_ns(self) -> int | None:
+        return min((t for t in (self._warm_ns, self._faults.next_ns()) if t is not None), default=None)
+
+    def _change(self, *refused: str | None) -> None:
+        """Faults may have changed; those that could not be are counted by what was wrong."""
+        for why in refused:
+            if why is not None:
+                self._accounts.refused[why] += 1
+        if self._faults.records:
+            self.records += self._faults.records
+            self._faults.records.clear()
+            self._air.relink()
+            self._due_ns = self._next_turn_ns()
+            self._stale = True
 
     def _hand_out(self, rows: list[list[int]]) -> None:
         outbox, requests, sources, rx_topics = self.outbox, self._requests, self._sources, self._rx_topics

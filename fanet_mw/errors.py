@@ -55,7 +55,11 @@ class DropReason(StrEnum):
     LATE = "late"
     """The transmit request reached the medium after the instant it asked for, beyond the bound."""
     STATION_DOWN = "station_down"
-    """The station died or was cut off while the frame was queued."""
+    """The sender or the receiver was cut off."""
+    DEGRADED = "degraded"
+    """Lost to a fault on the link (`[[faults]]`, `fanet air degrade`)."""
+    JAMMED = "jammed"
+    """Lost to noise from a jammer (`[[faults]]`, `fanet air jam`)."""
     BUS = "bus"
     """Put on the bus and never seen by the other side (a gap in the sequence)."""
     # the node

@@ -19,6 +19,7 @@ from fanet_mw.errors import FanetError
 from fanet_mw.scenario import Scenario
 from fanet_mw.units import NodeId
 from sim import catalog, report
+from sim.air_cli import app as air_app
 from sim.layout import positions
 from sim.outcome import Outcome
 
@@ -27,6 +28,7 @@ app = App(
     help="Middleware for swarms of UAVs, and the network emulator it is developed and proven on.",
     version=__version__,
 )
+app.command(air_app)
 _err = Console(stderr=True)
 
 

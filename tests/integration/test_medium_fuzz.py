@@ -25,9 +25,10 @@ from fanet_mw.messages import (
     TxRequest,
     TxStatus,
 )
+from fanet_mw.radio_control import Control, Cut, Degrade, Jam, Restore
 from fanet_mw.topics import Topics
 from fanet_mw.trace import ProcessEnded
-from fanet_mw.units import BROADCAST, MS, NodeId
+from fanet_mw.units import BROADCAST, MS, Enu, NodeId
 from sim import catalog
 
 NAMES = Topics("fuzz")
@@ -54,8 +55,12 @@ class Fuzz:
         while True:
             self.now_ns += rng.randrange(4 * MS)
             node = rng.randrange(1, 10)
-            topic = NAMES.radio_tx(node) if rng.random() < 0.9 else rng.choice(STRANGE_TOPICS)
-            yield topic, self._payload(node)
+            dice = rng.random()
+            if dice < 0.05:
+                data = topics.encode([self._control()])
+                yield NAMES.radio_control, data if dice < 0.03 else self._mutated(data)
+            else:
+                yield NAMES.radio_tx(node) if dice < 0.9 else rng.choice(STRANGE_TOPICS), self._payload(node)
 
     def _payload(self, node: int) -> bytes:
         rng = self._random
@@ -95,6 +100,19 @@ class Fuzz:
         scale = rng.choice((0.0, 100.0, 300.0, 1e6, 1e7, 1e9, 1e300, float("inf"), float("nan")))
         ids = array("H", [rng.randrange(0, 12) if rng.random() < 0.02 else i for i in range(1, 10)])
         return Poses(self.now_ns, ids, array("d", [scale * rng.uniform(-1, 1) for _ in range(54)]))
+
+    def _control(self) -> Control:
+        rng = self._random
+        label, for_ns = rng.choice(("a", "b", "c", "", "x" * 99)), rng.choice((0, 50 * MS, 50 * MS, -1, 2**62))
+        a, b = NodeId(rng.randrange(11)), NodeId(rng.randrange(11))
+        share, size = rng.choice((0.0, 0.5, 1.0, 1e300, float("nan"))), rng.choice((0.0, 3.0, 200.0, float("inf")))
+        kinds: list[Control] = [
+            Degrade(label, a, b, rng.random() < 0.5, size, share, for_ns),
+            Jam(label, Enu(0.0, 0.0, share), rng.choice((200.0, size)), rng.choice((-90.0, size)), for_ns),
+            Cut(label, a, for_ns),
+            Restore(label),
+        ]
+        return rng.choice(kinds)
 
     def _mutated(self, data: bytes) -> bytes:
         rng, changed = self._random, bytearray(data)
@@ -141,9 +159,10 @@ def test_every_one_of_so_many_hostile_puts_is_counted_once(count: int) -> None:
     assert figures["samples"] == count == inbox.taken + figures["malformed"]
     frames, refused = report["frames"], report["refused"]
     gaps = frames["dropped"].pop("bus")
-    assert given == frames["sent"] - gaps + report["poses"] + sum(refused.values())
+    assert given == frames["sent"] - gaps + report["poses"] + report["controls"] + sum(refused.values())
     assert frames["sent"] - gaps == frames["delivered"] + frames["in_flight"] + sum(frames["dropped"].values())
     assert handed == sum(report["handed"].values())
-    reached = {"collision", "late", "malformed", "no_receiver", "too_large"}
+    reached = {"collision", "late", "malformed", "no_receiver", "too_large", "jammed", "degraded"}
     assert reached <= set(frames["dropped"]), "the input gets into every corner"
-    assert min(frames["delivered"], report["poses"], gaps, figures["malformed"], *refused.values()) > count // 10_000
+    least = min(frames["delivered"], report["poses"], report["controls"], gaps, *refused.values())
+    assert least > count // 10_000

@@ -25,6 +25,7 @@ from fanet_mw.messages import (
     TxStatus,
     WifiScan,
 )
+from fanet_mw.radio_control import Cut, Degrade, Jam, Restore
 from fanet_mw.trace import Delivered, Detected, Generated
 from fanet_mw.units import Enu, NodeId
 
@@ -60,6 +61,10 @@ messages: st.SearchStrategy[Message] = st.one_of(
     st.builds(MavlinkTap, instants, st.binary(max_size=50)),
     st.builds(TraceBatch, st.lists(records, max_size=5).map(tuple)),
     st.builds(Clock, instants, st.floats(0.01, 100), st.sampled_from(ClockState)),
+    st.builds(Degrade, words, nodes, nodes, st.booleans(), doubles, doubles, instants),
+    st.builds(Jam, words, vectors, doubles, doubles, instants),
+    st.builds(Cut, words, nodes, instants),
+    st.builds(Restore, words),
     st.builds(Report, words, instants, st.text(st.characters(codec="utf-8"), max_size=50)),
 )
 

@@ -14,6 +14,7 @@ from emulator.accounts import Accounts
 from emulator.air import Air
 from emulator.dcf import NEVER
 from emulator.faults import Faults
+from emulator.pcap import Capture
 from fanet_mw.actor import Actor
 from fanet_mw.errors import DropReason
 from fanet_mw.messages import Message, Poses, Reception, TxOutcome, TxRequest, TxStatus
@@ -35,7 +36,7 @@ _HORIZON_NS: Final = 60_000 * MS
 class Medium(Actor):
     """The air between the nodes of one swarm."""
 
-    def __init__(self, scenario: Scenario, swarm: str) -> None:
+    def __init__(self, scenario: Scenario, swarm: str, *, capture: Capture | None = None) -> None:
         topics = Topics(swarm)
         super().__init__("emulator", (topics.all_tx, topics.pose, topics.radio_control))
         self._max_bytes = scenario.radio.max_frame_bytes
@@ -43,7 +44,10 @@ class Medium(Actor):
         self._rx_topics = [topics.radio_rx(node) for node in scenario.node_ids]
         self._station_of = {topics.radio_tx(node): node - 1 for node in scenario.node_ids}
         self._faults = Faults(scenario.radio, stations=self._count, planned=scenario.planned_faults)
-        self._air = Air(scenario.radio, stations=self._count, seed=scenario.seed, faults=self._faults)
+        self._capture = capture
+        self._air = Air(
+            scenario.radio, stations=self._count, seed=scenario.seed, faults=self._faults, capture=capture is not None
+        )
         self._accounts = Accounts()
         self._requests: list[TxRequest | None] = [None] * self._air.slots()
         self._ids = [NodeId(node) for node in scenario.node_ids]
@@ -220,6 +224,8 @@ class Medium(Actor):
             self._stale = True
 
     def _hand_out(self, rows: list[list[int]]) -> None:
+        if self._capture is not None:
+            rows = self._record(rows, self._capture)
         outbox, requests, sources, rx_topics = self.outbox, self._requests, self._sources, self._rx_topics
         for kind, slot, station, t_ns, value, attempts in rows:
             request = requests[slot]
@@ -234,6 +240,19 @@ class Medium(Actor):
                 self._free.append(slot)
             else:
                 outbox.append((rx_topics[station], TxStatus(request.seq, TxOutcome(value), t_ns, attempts)))
+
+    def _record(self, rows: list[list[int]], capture: Capture) -> list[list[int]]:
+        """Tell the capture what it wants to know; returns the rows that are for the nodes."""
+        for kind, slot, station, t_ns, value, attempts in rows:
+            request, node, src = self._requests[slot], station + 1, self._sources[slot]
+            assert request is not None, "the kernel speaks only of frames it was given"
+            if kind == s.OUT_START and value == s.DATA:
+                capture.transmitted(t_ns, node, request.dst, request.seq, request.frame, attempts)
+            elif kind == s.OUT_START:
+                capture.acknowledged(t_ns, node, src)
+            elif kind == s.OUT_RECEPTION:
+                capture.received(t_ns, node, src, request.dst, request.seq, request.frame, value / 1000)
+        return [row for row in rows if row[0] != s.OUT_START]
 
     # --- positions ------------------------------------------------------------------------------------------------
 

@@ -11,7 +11,7 @@ import json
 import signal
 import socket
 import time
-from collections.abc import Callable
+from collections.abc import Callable, Mapping
 from typing import Any, Final
 
 from agents.__main__ import run as run_agent
@@ -105,6 +105,8 @@ class Swarm:
 
     def __init__(self, scenario: Scenario, bus: Bus, *, swarm: str, endpoint: str, respawn: bool, tell: Tell) -> None:
         names = Topics(swarm)
+        self.emulator_options: dict[str, Any] = {}
+        """More arguments of the emulator's process."""
         self._scenario = scenario
         self._swarm = swarm
         self._endpoint = endpoint
@@ -157,7 +159,7 @@ class Swarm:
 
     def _start_all(self) -> None:
         common = {"scenario": self._scenario, "swarm": self._swarm, "endpoint": self._endpoint}
-        self.processes.start("emulator", run_emulator, common)
+        self.processes.start("emulator", run_emulator, {**common, **self.emulator_options})
         self.processes.start("world", run_world, common)
         for node, position in zip(self._scenario.node_ids, positions(self._scenario), strict=True):
             self.processes.start(f"agent-{node}", run_agent, {**common, "node": NodeId(node), "position": position})
@@ -236,6 +238,7 @@ async def launch(
     listen: str | None = None,
     connect: str | None = None,
     respawn: bool = False,
+    emulator_options: Mapping[str, Any] | None = None,
     on_progress: Callable[[float], None] = lambda _: None,
     on_event: Tell = lambda _: None,
     on_started: Callable[[Swarm], None] = lambda _: None,
@@ -247,6 +250,7 @@ async def launch(
     bus, endpoint = _bus(listen, connect)
     with bus:
         run = Swarm(scenario, bus, swarm=swarm, endpoint=endpoint, respawn=respawn, tell=on_event)
+        run.emulator_options.update(emulator_options or {})
         loop = asyncio.get_running_loop()
         for number in (signal.SIGINT, signal.SIGTERM):
             loop.add_signal_handler(number, run.abort, f"interrupted by {number.name}")

@@ -48,13 +48,19 @@ class RealtimeHost:
         self._lateness = Histogram()
         self._puts = 0
 
-    async def run(self, *, until_ns: int, clock_timeout_s: float) -> None:
-        """Declare, announce, wait for the clock, run, report. Raises BusError, and whatever the actor raises."""
+    async def run(
+        self, *, until_ns: int, clock_timeout_s: float, on_epoch: Callable[[int], None] = lambda _: None
+    ) -> None:
+        """Declare, announce, wait for the clock, run, report. Raises BusError, and whatever the actor raises.
+
+        `on_epoch` is told the unix time of swarm instant 0 [ns] before the actor starts.
+        """
         for expression in self._actor.subscriptions:
             self._bus.subscribe(expression, self._from_thread)
         listener = ClockListener(self._bus, self._names)
         self._bus.announce(self._names.alive(self._actor.name))
         self._clock = await listener.running(timeout_s=clock_timeout_s)
+        on_epoch(self._clock.epoch_unix_ns)
         await self._sleep_until(0)
         gc.freeze()  # what start-up made stays: the collector need not look at it again in the middle of a slot
         self._running = True
@@ -223,7 +229,16 @@ def uss_mb() -> float | None:
     return round(sum(int(kb) for kb in private) / 1024, 2)
 
 
-async def run_actor(actor: Actor, *, swarm: str, endpoint: str, until_ns: int, clock_timeout_s: float = 60.0) -> None:
+async def run_actor(
+    actor: Actor,
+    *,
+    swarm: str,
+    endpoint: str,
+    until_ns: int,
+    clock_timeout_s: float = 60.0,
+    on_epoch: Callable[[int], None] = lambda _: None,
+) -> None:
     """Join a router, run one actor, leave. Raises BusError."""
     with Bus.join(endpoint) as bus:
-        await RealtimeHost(actor, bus, Topics(swarm)).run(until_ns=until_ns, clock_timeout_s=clock_timeout_s)
+        host = RealtimeHost(actor, bus, Topics(swarm))
+        await host.run(until_ns=until_ns, clock_timeout_s=clock_timeout_s, on_epoch=on_epoch)

@@ -10,7 +10,9 @@ from emulator import state as s
 from emulator.airtime import DETECT_NS, DIFS_NS, OVERHEAD_BYTES, SIFS_NS, SLOT_NS, Timing, frame_ns, lifetime_ns
 from emulator.error_rate import log_success_per_bit
 from emulator.faults import Faults
+from emulator.link_book import LinkBook
 from emulator.propagation import Links, milliwatt, noise_mw
+from fanet_mw.link_stats import LinkStats
 from fanet_mw.rng import stream_seed
 from fanet_mw.scenario import Radio
 
@@ -30,6 +32,7 @@ class Air:
         self._radio = radio
         self._stations = stations
         self._faults = faults
+        self._book = LinkBook(stations)
         timing = Timing.of(radio)
         self.g = np.zeros(s.GLOBALS, np.int64)
         self._p = np.zeros(s.PARAMETERS, np.int64)
@@ -72,6 +75,7 @@ class Air:
     def relink(self) -> None:
         """Make the links anew: stations have moved, or faults have changed."""
         at = self._at
+        self._book.take(self._lk)
         spare = int(self._lk[s.UNDERWAY].sum())
         links = Links(np.ascontiguousarray(at), self._radio, spare=spare)
         self._sf[s.NOISE] = self._faults.shape(links, at)
@@ -87,6 +91,11 @@ class Air:
         self._lk, self._lp, self._ptr = links.ints, links.reals, links.ptr
         self._gather()
         self.next_output_ns = int(kernel.next_output(self.g, self._p, self.st, self.fr, self._hs))
+
+    def links(self, now_ns: int) -> LinkStats | None:
+        """What the links carried since this was last asked; None when it was nothing."""
+        self._book.take(self._lk)
+        return self._book.close(now_ns)
 
     def neighbors(self, station: int) -> int:
         """How many stations hear this one."""

@@ -21,7 +21,7 @@ from fanet_mw.messages import Message, Poses, Reception, TxOutcome, TxRequest, T
 from fanet_mw.radio_control import Cut, Degrade, Jam, Restore
 from fanet_mw.scenario import Scenario
 from fanet_mw.topics import Topics
-from fanet_mw.units import BROADCAST, MS, NodeId, seconds_to_ns
+from fanet_mw.units import BROADCAST, MS, NodeId, S, seconds_to_ns
 
 TOO_LATE_NS: Final = 50 * MS
 """A request later than this is dropped: its slot is long another's."""
@@ -57,6 +57,9 @@ class Medium(Actor):
         self._next_seq: list[int | None] = [None] * self._count
         self._handover_ns = scenario.radio.handover_ns
         self._warm_ns: int | None = seconds_to_ns(scenario.warmup_s)
+        self._links_topic = topics.radio_links
+        self._links_ns: int | None = None
+        """When links are reported next; None while the air is silent."""
         self._due_ns = self._next_turn_ns()
         self._wake_ns: int | None = None
         self._stale = True
@@ -105,6 +108,7 @@ class Medium(Actor):
 
     def stop(self, now_ns: int) -> None:
         self._pass_time(now_ns)
+        self._report_links(self._now_ns)
 
     def report(self) -> Mapping[str, Any]:
         accounts, g = self._accounts, self._air.g
@@ -161,6 +165,9 @@ class Medium(Actor):
             slot, src=station, dst=s.EVERYONE if dst == BROADCAST else dst - 1, size=size, start_ns=start_ns,
             wants_status=request.wants_status,
         )  # fmt: skip
+        if self._links_ns is None:
+            self._links_ns = (self._now_ns // S + 1) * S
+            self._due_ns = self._next_turn_ns()
         self._stale = True
 
     def _count_gap(self, station: int, seq: int) -> None:
@@ -197,7 +204,7 @@ class Medium(Actor):
         self._stale = True
 
     def _turn(self, due_ns: int) -> None:
-        """Everything before this instant has happened: the warm-up ends, faults begin and end."""
+        """Everything before this instant has happened: the warm-up ends, faults begin and end, links are reported."""
         self._hand_out(self._air.advance(max(due_ns, self._now_ns)))
         self._now_ns = max(self._now_ns, due_ns)
         if self._warm_ns is not None and self._warm_ns <= due_ns:
@@ -206,10 +213,21 @@ class Medium(Actor):
         fault_ns = self._faults.next_ns()
         if fault_ns is not None and fault_ns <= due_ns:
             self._change(*self._faults.pass_time(due_ns))
+        if self._links_ns is not None and self._links_ns <= due_ns:
+            silent = not self._report_links(due_ns) and len(self._free) == len(self._requests)
+            self._links_ns = None if silent else (due_ns // S + 1) * S
         self._due_ns = self._next_turn_ns()
 
     def _next_turn_ns(self) -> int | None:
-        return min((t for t in (self._warm_ns, self._faults.next_ns()) if t is not None), default=None)
+        wanted = (self._warm_ns, self._faults.next_ns(), self._links_ns)
+        return min((t for t in wanted if t is not None), default=None)
+
+    def _report_links(self, now_ns: int) -> bool:
+        """Tell what the links carried; returns whether it was anything."""
+        stats = self._air.links(now_ns)
+        if stats is not None:
+            self.outbox.append((self._links_topic, stats))
+        return stats is not None
 
     def _change(self, *refused: str | None) -> None:
         """Faults may have changed; those that could not be are counted by what was wrong."""

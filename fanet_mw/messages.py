@@ -11,6 +11,7 @@ from dataclasses import dataclass
 from enum import IntEnum
 from typing import NamedTuple
 
+from fanet_mw.link_stats import LinkStats
 from fanet_mw.radio_control import Cut, Degrade, Jam, Restore
 from fanet_mw.trace import Record
 from fanet_mw.units import Enu, NodeId
@@ -150,4 +151,5 @@ Message = (
     | Jam
     | Cut
     | Restore
+    | LinkStats
 )

@@ -3,6 +3,7 @@
     fanet/<swarm>/radio/<id>/tx          TxRequest              node -> medium
     fanet/<swarm>/radio/<id>/rx          Reception | TxStatus   medium -> node
     fanet/<swarm>/radio/control          Degrade | Jam | Cut | Restore   anyone -> medium
+    fanet/<swarm>/radio/links            LinkStats              medium -> whoever looks
     fanet/<swarm>/world/pose             Poses
     fanet/<swarm>/world/<id>/setpoint    Setpoint               UAV -> world
     fanet/<swarm>/world/<id>/sensor/gps  Gps
@@ -23,6 +24,7 @@ from typing import Any, Final
 
 from fanet_mw import trace
 from fanet_mw.errors import MalformedFrameError
+from fanet_mw.link_stats import COUNTS, LinkStats
 from fanet_mw.messages import (
     Clock,
     ClockState,
@@ -54,6 +56,7 @@ class Topics:
         self.clock = f"{self._base}/clock"
         self.all_tx = self.radio_tx("*")
         self.radio_control = f"{self._base}/radio/control"
+        self.radio_links = f"{self._base}/radio/links"
         self.all_setpoints = f"{self._base}/world/*/setpoint"
         self.all_traces = f"{self._base}/trace/*"
         self.all_reports = f"{self._base}/report/*"
@@ -110,6 +113,7 @@ _INSTANT = struct.Struct("<q")
 _DEGRADE = struct.Struct("<HHBddq")
 _JAM = struct.Struct("<5dq")
 _CUT = struct.Struct("<Hq")
+_LINKS = struct.Struct("<qqI")
 
 
 def _encode_tx(m: TxRequest) -> bytes:
@@ -256,6 +260,25 @@ def _decode_restore(body: bytes) -> Restore:
     return Restore(body.decode())
 
 
+def _encode_links(m: LinkStats) -> bytes:
+    head = _LINKS.pack(m.t_ns, m.span_ns, len(m.rssi_sums_mdbm))
+    return head + m.ends.tobytes() + m.counts.tobytes() + m.rssi_sums_mdbm.tobytes()
+
+
+def _decode_links(body: bytes) -> LinkStats:
+    t_ns, span_ns, links = _LINKS.unpack_from(body)
+    ends, counts, sums = array("H"), array("I"), array("q")
+    a = _LINKS.size
+    b = a + 4 * links
+    c = b + 4 * COUNTS * links
+    if len(body) != c + 8 * links:
+        raise ValueError("length")
+    ends.frombytes(body[a:b])
+    counts.frombytes(body[b:c])
+    sums.frombytes(body[c:])
+    return LinkStats(t_ns, span_ns, ends, counts, sums)
+
+
 _CODECS: Final[dict[int, tuple[type[Any], Callable[[Any], bytes], Callable[[bytes], Message]]]] = {
     1: (TxRequest, _encode_tx, _decode_tx),
     2: (Reception, _encode_rx, _decode_rx),
@@ -272,6 +295,7 @@ _CODECS: Final[dict[int, tuple[type[Any], Callable[[Any], bytes], Callable[[byte
     13: (Jam, _encode_jam, _decode_jam),
     14: (Cut, _encode_cut, _decode_cut),
     15: (Restore, _encode_restore, _decode_restore),
+    16: (LinkStats, _encode_links, _decode_links),
 }
 _CODE_OF: Final = {kind: (code, encode) for code, (kind, encode, _) in _CODECS.items()}
 _ITEM: Final = struct.Struct("<BI")

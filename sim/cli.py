@@ -12,6 +12,7 @@ from pathlib import Path
 from typing import Annotated, Any
 
 from cyclopts import App, Parameter
+from cyclopts.validators import Number
 from rich.console import Console
 from rich.progress import BarColumn, Progress, TextColumn, TimeElapsedColumn
 from rich.table import Table
@@ -65,7 +66,7 @@ class Output:
     """Where the result goes."""
 
     out: Path | None = None
-    """Folder for scenario.toml, summary.json, reports.json, trace.jsonl and mavlink.tlog."""
+    """Folder for scenario.toml, summary.json, reports.json, links.json, trace.jsonl and mavlink.tlog."""
     json: Annotated[bool, Parameter(negative="")] = False
     """Print the summary as JSON, and nothing else, on standard output."""
     pcap: Annotated[bool, Parameter(negative="")] = False
@@ -276,6 +277,33 @@ def agent(scenario: str, *, id: int, choice: Choice = Choice(), join: Join = Joi
         raise FanetError(f"--id {id}: must be in [1, nodes.count = {chosen.nodes.count}]")
     start = positions(chosen)[id - 1]
     return run(chosen, node=NodeId(id), swarm=join.swarm or chosen.name, endpoint=join.connect, position=start)
+
+
+@app.command
+def links(
+    *,
+    connect: str = "tcp/127.0.0.1:7447",
+    swarm: str | None = None,
+    node: int | None = None,
+    reports: Annotated[int | None, Parameter(validator=Number(gte=1))] = None,
+) -> int:
+    """Show the links of a swarm that runs, the busiest first, renewed every second.
+
+    Parameters
+    ----------
+    connect
+        Zenoh endpoint of the swarm's router.
+    swarm
+        Name of the swarm; by default the only one on that router.
+    node
+        Only links from and to this node.
+    reports
+        End after so many; by default when interrupted.
+
+    """
+    from sim.links_cli import watch
+
+    return watch(connect, swarm, node=node, reports=reports, console=Console())
 
 
 @app.command

@@ -10,12 +10,14 @@ from emulator.medium import Medium
 from emulator.pcap import Capture
 from fanet_mw.actor import Actor
 from fanet_mw.hosts.virtual import VirtualHost
+from fanet_mw.link_stats import LinkStats
 from fanet_mw.messages import MavlinkTap, Message
 from fanet_mw.scenario import Scenario
 from fanet_mw.topics import Topics
 from fanet_mw.trace import Record
 from fanet_mw.units import NodeId, S
 from sim.layout import positions
+from sim.links import LinkTotals
 from sim.outcome import Outcome
 from sim.world import World
 
@@ -39,8 +41,16 @@ def simulate(
         if isinstance(message, MavlinkTap):
             taps.append((message.t_ns, message.data))
 
+    links = LinkTotals()
+
+    def add_links(_: str, message: Message) -> None:
+        if isinstance(message, LinkStats):
+            links.add(message)
+
     actors = actors_of(scenario, swarm, capture=capture)
-    host = VirtualHost(actors, on_records=records.extend, listeners=[(Topics(swarm).mavlink("*"), tap)])
+    names = Topics(swarm)
+    listeners = [(names.mavlink("*"), tap), (names.radio_links, add_links)]
+    host = VirtualHost(actors, on_records=records.extend, listeners=listeners)
     began = time.perf_counter()
     with _no_collector():
         _run(host, scenario, on_progress)
@@ -51,6 +61,7 @@ def simulate(
         records=records,
         reports={actor.name: actor.report() for actor in actors},
         taps=taps,
+        links=links,
     )
 
 

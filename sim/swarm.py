@@ -20,12 +20,14 @@ from fanet_mw import topics
 from fanet_mw.errors import BusError, MalformedFrameError
 from fanet_mw.hosts.bus import Bus
 from fanet_mw.hosts.clock import ClockKeeper, SwarmClock
+from fanet_mw.link_stats import LinkStats
 from fanet_mw.messages import MavlinkTap, Message, Report, TraceBatch
 from fanet_mw.scenario import Scenario
 from fanet_mw.topics import Topics
 from fanet_mw.trace import ProcessEnded, Record, kind_of
 from fanet_mw.units import NodeId, S
 from sim.layout import positions
+from sim.links import LinkTotals
 from sim.outcome import Outcome
 from sim.processes import Processes, describe
 from sim.world_main import run as run_world
@@ -63,6 +65,8 @@ class Collector:
         bus.subscribe(names.all_traces, lambda _, payload: self._traces.append(payload))
         bus.subscribe(names.all_reports, self._reports.__setitem__)
         bus.subscribe(names.mavlink("*"), lambda _, payload: self._taps.append(payload))
+        self._links: list[bytes] = []
+        bus.subscribe(names.radio_links, lambda _, payload: self._links.append(payload))
 
     def records(self) -> list[Record]:
         """All trace records, by instant, node and kind."""
@@ -75,6 +79,14 @@ class Collector:
         reports = [message for message in _decoded(list(self._reports.values())) if isinstance(message, Report)]
         parsed = {report.name: _json(report.json) for report in sorted(reports, key=lambda report: report.name)}
         return {name: content for name, content in parsed.items() if isinstance(content, dict)}
+
+    def links(self) -> LinkTotals:
+        """What each link carried."""
+        totals = LinkTotals()
+        for message in _decoded(self._links):
+            if isinstance(message, LinkStats):
+                totals.add(message)
+        return totals
 
     def taps(self) -> list[tuple[int, bytes]]:
         """What UAVs told inspectors, by instant."""
@@ -144,6 +156,7 @@ class Swarm:
             records=sorted([*self._collector.records(), *self._obituaries], key=lambda r: (r.t_ns, r.node, kind_of(r))),
             reports=self._collector.reports(),
             taps=self._collector.taps(),
+            links=self._collector.links(),
             ended=self._ended,
             aborted=self._aborted,
             ready_s=ready_s,

@@ -3,6 +3,8 @@
 import asyncio
 import contextlib
 import json
+import re
+from array import array
 from collections.abc import AsyncIterator
 
 import pytest
@@ -11,12 +13,12 @@ from emulator.medium import Medium
 from fanet_mw import topics
 from fanet_mw.errors import FanetError
 from fanet_mw.hosts.bus import Bus
-from fanet_mw.hosts.clock import ClockKeeper
+from fanet_mw.hosts.clock import ClockKeeper, SwarmClock
 from fanet_mw.hosts.realtime import run_actor
-from fanet_mw.messages import Report
+from fanet_mw.messages import Poses, Report, TxRequest
 from fanet_mw.radio_control import Control, Cut, Restore
 from fanet_mw.topics import Topics
-from fanet_mw.units import NodeId, S
+from fanet_mw.units import BROADCAST, MS, NodeId, S
 from sim import air, catalog
 from sim.cli import app
 from sim.results import finish
@@ -25,17 +27,17 @@ from sim.swarm import free_endpoint
 
 
 @contextlib.asynccontextmanager
-async def emulator(swarm: str, reports: list[bytes]) -> AsyncIterator[str]:
-    """An emulator of nine nodes; yields the endpoint of its router and stops it at the end."""
+async def emulator(swarm: str, reports: list[bytes]) -> AsyncIterator[tuple[str, SwarmClock]]:
+    """An emulator of nine nodes; yields the endpoint of its router and the clock; stops it at the end."""
     endpoint = free_endpoint()
     scenario = catalog.find("quick")
     with Bus.serve(endpoint) as bus:
         bus.subscribe(Topics(swarm).report("emulator"), lambda _, payload: reports.append(payload))
         keeper = ClockKeeper(bus, Topics(swarm), time_scale=1.0, expected=["emulator"])
         host = asyncio.create_task(run_actor(Medium(scenario, swarm), swarm=swarm, endpoint=endpoint, until_ns=60 * S))
-        await keeper.start(timeout_s=10)
+        clock = SwarmClock(await keeper.start(timeout_s=10))
         try:
-            yield endpoint
+            yield endpoint, clock
         finally:
             keeper.stop()
             await host
@@ -49,7 +51,7 @@ async def command(*tokens: str) -> int:
 
 async def test_a_node_is_cut_off_and_restored_by_command(capsys: pytest.CaptureFixture[str]) -> None:
     reports: list[bytes] = []
-    async with emulator("air-test", reports) as endpoint:
+    async with emulator("air-test", reports) as (endpoint, _):
         assert await command("air", "cut", "3", "--connect", endpoint) == 0
         assert await command("air", "degrade", "1", "2", "--loss-share", "0.5", "--connect", endpoint) == 0
         assert await command("air", "jam", "0", "0", "100", "--for", "0.2", "--connect", endpoint) == 0
@@ -67,7 +69,7 @@ async def test_a_node_is_cut_off_and_restored_by_command(capsys: pytest.CaptureF
 async def test_what_the_emulator_refuses_is_said_and_counted(control: Control, monkeypatch: pytest.MonkeyPatch) -> None:
     monkeypatch.setattr(air, "CONFIRM_TIMEOUT_S", 1.2)
     reports: list[bytes] = []
-    async with emulator("air-test", reports) as endpoint:
+    async with emulator("air-test", reports) as (endpoint, _):
         with pytest.raises(FanetError, match=r"did not confirm within 1\.2 s: refused"):
             await asyncio.to_thread(air.change, endpoint, None, control)
     (last,) = topics.decode(reports[-1])
@@ -99,3 +101,25 @@ def test_a_scenarios_faults_are_the_same_in_every_run_of_a_seed() -> None:
     assert first["frames"]["closes"]
     assert {"station_down", "jammed", "degraded"} <= set(first["copies"]["lost"])
     assert first["worst_nodes"][0]["pdr"] < calm["worst_nodes"][0]["pdr"] - 0.2
+
+
+async def test_links_are_shown_as_they_are_told(capsys: pytest.CaptureFixture[str]) -> None:
+    """Node 1 is heard by node 2, not by node 3; garbage on the topic is passed over."""
+    names = Topics("air-test")
+    states = array("d", [v for east in (0, 100, 1000) for v in (east, 0.0, 50.0, 0.0, 0.0, 0.0)])
+    async with emulator("air-test", []) as (endpoint, clock):
+        with Bus.join(endpoint) as bus:
+            shown = asyncio.create_task(command("links", "--connect", endpoint, "--reports", "2", "--node", "2"))
+            seq = 0
+            while not shown.done():
+                poses = Poses(0, array("H", [1, 2, 3]), states)
+                request = TxRequest(seq, clock.now_ns() + 10 * MS, bytes(100), BROADCAST, wants_status=False)
+                bus.put(names.pose, topics.encode([poses]))
+                bus.put(names.radio_tx(1), topics.encode([request]))
+                bus.put(names.radio_links, b"garbage")
+                seq += 1
+                await asyncio.sleep(0.05)
+            assert await shown == 0
+    out = capsys.readouterr().out
+    assert re.search(r"air-test at \d+ s: 1 links in 1 s", out)
+    assert re.search(r"\b1 +2 +\d+ +100% +30\.0", out)

@@ -9,6 +9,7 @@ from hypothesis import strategies as st
 
 from fanet_mw import topics
 from fanet_mw.errors import MalformedFrameError
+from fanet_mw.link_stats import COUNTS, LinkStats
 from fanet_mw.messages import (
     Clock,
     ClockState,
@@ -45,6 +46,10 @@ def poses(draw: st.DrawFn) -> Poses:
     return Poses(draw(instants), array("H", ids), array("d", states))
 
 
+def numbers(code: str, values: st.SearchStrategy[int], count: int) -> "st.SearchStrategy[array[int]]":
+    return st.lists(values, min_size=count, max_size=count).map(lambda found: array(code, found))
+
+
 records = st.one_of(
     st.builds(Delivered, *[instants] * 6),
     st.builds(Generated, instants, nodes, u32, words, u32),
@@ -65,6 +70,16 @@ messages: st.SearchStrategy[Message] = st.one_of(
     st.builds(Jam, words, vectors, doubles, doubles, instants),
     st.builds(Cut, words, nodes, instants),
     st.builds(Restore, words),
+    st.integers(0, 4).flatmap(
+        lambda n: st.builds(
+            LinkStats,
+            instants,
+            instants,
+            numbers("H", nodes, 2 * n),
+            numbers("I", u32, COUNTS * n),
+            numbers("q", instants, n),
+        )
+    ),
     st.builds(Report, words, instants, st.text(st.characters(codec="utf-8"), max_size=50)),
 )
 

@@ -9,6 +9,7 @@ from collections.abc import AsyncIterator
 
 import pytest
 
+from emulator.compile import warm_up
 from emulator.medium import Medium
 from fanet_mw import topics
 from fanet_mw.errors import FanetError
@@ -27,15 +28,19 @@ from sim.swarm import free_endpoint
 
 
 @contextlib.asynccontextmanager
-async def emulator(swarm: str, reports: list[bytes]) -> AsyncIterator[tuple[str, SwarmClock]]:
+async def emulator(
+    swarm: str, reports: list[bytes], *, time_scale: float = 1.0
+) -> AsyncIterator[tuple[str, SwarmClock]]:
     """An emulator of nine nodes; yields the endpoint of its router and the clock; stops it at the end."""
     endpoint = free_endpoint()
     scenario = catalog.find("quick")
+    warm_up()
     with Bus.serve(endpoint) as bus:
         bus.subscribe(Topics(swarm).report("emulator"), lambda _, payload: reports.append(payload))
-        keeper = ClockKeeper(bus, Topics(swarm), time_scale=1.0, expected=["emulator"])
+        keeper = ClockKeeper(bus, Topics(swarm), time_scale=time_scale, expected=["emulator"])
         host = asyncio.create_task(run_actor(Medium(scenario, swarm), swarm=swarm, endpoint=endpoint, until_ns=60 * S))
         clock = SwarmClock(await keeper.start(timeout_s=10))
+        await asyncio.sleep(clock.wait_s(10 * MS))
         try:
             yield endpoint, clock
         finally:

@@ -25,8 +25,12 @@ from fanet_mw.units import BROADCAST, MS, NodeId, S, seconds_to_ns
 
 TOO_LATE_NS: Final = 50 * MS
 """A request later than this is dropped: its slot is long another's."""
+ANNOUNCED: Final = 1024
+"""Requests of one node that may wait for their instant, beyond what its MAC queue holds."""
 _new: Final = tuple.__new__
 _SEQ_MASK: Final = 0xFFFF_FFFF
+_LONGEST_GAP: Final = 1 << 20
+"""Requests; a longer one is no loss but nonsense."""
 _FARTHEST_M: Final = 1e7
 """Of a coordinate; positions beyond are no swarm's, and would overflow the cells in which neighbors are looked for."""
 _HORIZON_NS: Final = 60_000 * MS
@@ -54,6 +58,9 @@ class Medium(Actor):
         self._sources = [self._ids[0]] * self._air.slots()
         """Sender of the request in each slot."""
         self._free = list(range(self._air.slots() - 1, -1, -1))
+        self._held = [0] * self._count
+        """Requests of each station that have not ended."""
+        self._most_held = scenario.radio.queue_frames + ANNOUNCED
         self._next_seq: list[int | None] = [None] * self._count
         self._handover_ns = scenario.radio.handover_ns
         self._warm_ns: int | None = seconds_to_ns(scenario.warmup_s)
@@ -155,6 +162,10 @@ class Medium(Actor):
             if late_ns > TOO_LATE_NS:
                 self._refuse(station, request, DropReason.LATE, now_ns)
                 return
+        if self._held[station] >= self._most_held:
+            self._refuse(station, request, DropReason.BACKLOG, now_ns)
+            return
+        self._held[station] += 1
         if not self._free:
             self._make_room()
         slot = self._free.pop()
@@ -176,14 +187,15 @@ class Medium(Actor):
         if expected is None or seq == 0:  # 0: the node has started again
             return
         gap = (seq - expected) & _SEQ_MASK
-        if gap < 1 << 16:
+        if gap < _LONGEST_GAP:
             self._accounts.sent += gap
             self._accounts.dropped[DropReason.BUS] += gap
 
     def _refuse(self, station: int, request: TxRequest, reason: DropReason, now_ns: int) -> None:
         self._accounts.drop(reason)
         if request.wants_status:
-            status = TxStatus(request.seq, TxOutcome.LATE, now_ns, 0)
+            outcome = TxOutcome.QUEUE_FULL if reason is DropReason.BACKLOG else TxOutcome.LATE
+            status = TxStatus(request.seq, outcome, now_ns, 0)
             self.outbox.append((self._rx_topics[station], status))
 
     def _make_room(self) -> None:
@@ -255,6 +267,7 @@ class Medium(Actor):
             elif kind == s.OUT_FREE:
                 self._accounts.ended(value, size=len(request.frame))
                 requests[slot] = None
+                self._held[sources[slot] - 1] -= 1
                 self._free.append(slot)
             else:
                 outbox.append((rx_topics[station], TxStatus(request.seq, TxOutcome(value), t_ns, attempts)))

@@ -60,6 +60,8 @@ class DropReason(StrEnum):
     """Lost to a fault on the link (`[[faults]]`, `fanet air degrade`)."""
     JAMMED = "jammed"
     """Lost to noise from a jammer (`[[faults]]`, `fanet air jam`)."""
+    BACKLOG = "backlog"
+    """Announced while the medium already held as many requests of that node as it takes."""
     BUS = "bus"
     """Put on the bus and never seen by the other side (a gap in the sequence)."""
     # the node

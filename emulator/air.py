@@ -9,7 +9,10 @@ from emulator import kernel
 from emulator import state as s
 from emulator.airtime import DETECT_NS, DIFS_NS, OVERHEAD_BYTES, SIFS_NS, SLOT_NS, Timing, frame_ns, lifetime_ns
 from emulator.error_rate import log_success_per_bit
+from emulator.faults import Faults
+from emulator.link_book import LinkBook
 from emulator.propagation import Links, milliwatt, noise_mw
+from fanet_mw.link_stats import LinkStats
 from fanet_mw.rng import stream_seed
 from fanet_mw.scenario import Radio
 
@@ -25,9 +28,11 @@ def _error_table(rate_mbps: float) -> npt.NDArray[np.float64]:
 class Air:
     """The state of the channel and of all MACs."""
 
-    def __init__(self, radio: Radio, *, stations: int, seed: int) -> None:
+    def __init__(self, radio: Radio, *, stations: int, seed: int, faults: Faults, capture: bool = False) -> None:
         self._radio = radio
         self._stations = stations
+        self._faults = faults
+        self._book = LinkBook(stations)
         timing = Timing.of(radio)
         self.g = np.zeros(s.GLOBALS, np.int64)
         self._p = np.zeros(s.PARAMETERS, np.int64)
@@ -35,8 +40,9 @@ class Air:
             SLOT_NS, SIFS_NS, DIFS_NS, timing.eifs_extra_ns, timing.ack_ns, timing.ack_timeout_ns, timing.header_ns,
             DETECT_NS, radio.cw_min, radio.cw_max, radio.max_attempts, radio.queue_frames, lifetime_ns(radio),
             radio.access == "standard", radio.access == "ns3", radio.channel != "range",
+            capture,
         )  # fmt: skip
-        self._pf = np.array([noise_mw(radio), milliwatt(radio.preamble_snr_db), 1e-3, radio.rate_mbps * 1e-3])
+        self._pf = np.array([milliwatt(radio.preamble_snr_db), 1e-3, radio.rate_mbps * 1e-3])
         self.st = np.zeros((s.STATION_ROWS, stations), np.int64)
         for row, value in (
             (s.SCHEDULED, -1), (s.CW, radio.cw_min), (s.TX_FRAME, -1), (s.LOCK, -1), (s.WAITING, -1), (s.ACK_TO, -1),
@@ -45,6 +51,7 @@ class Air:
             self.st[row] = value
         self.st[s.RANDOM] = [stream_seed(seed, "backoff", i + 1) % _GENERATOR_RANGE + 1 for i in range(stations)]
         self._sf = np.zeros((s.STATION_REALS, stations), np.float64)
+        self._sf[s.NOISE] = noise_mw(radio)
         self.fr = np.zeros((s.FRAME_ROWS, 1024), np.int64)
         self._hs = np.zeros((8 * stations + 2 * 1024 + 64, 5), np.int64)
         self._out = np.zeros((2 * radio.queue_frames + 1024, s.OUT_COLUMNS), np.int64)
@@ -63,8 +70,15 @@ class Air:
         if np.array_equal(at, self._at):
             return
         self._at = at
+        self.relink()
+
+    def relink(self) -> None:
+        """Make the links anew: stations have moved, or faults have changed."""
+        at = self._at
+        self._book.take(self._lk)
         spare = int(self._lk[s.UNDERWAY].sum())
         links = Links(np.ascontiguousarray(at), self._radio, spare=spare)
+        self._sf[s.NOISE] = self._faults.shape(links, at)
         self.g[s.REACH_NS] = max(self.g[s.REACH_NS] if spare else 0, links.longest_ns)
         room = 4 * (links.ints.shape[1] + self._stations) + 64
         if self._hr.shape[0] < room + self.g[s.HR_N]:
@@ -77,6 +91,11 @@ class Air:
         self._lk, self._lp, self._ptr = links.ints, links.reals, links.ptr
         self._gather()
         self.next_output_ns = int(kernel.next_output(self.g, self._p, self.st, self.fr, self._hs))
+
+    def links(self, now_ns: int) -> LinkStats | None:
+        """What the links carried since this was last asked; None when it was nothing."""
+        self._book.take(self._lk)
+        return self._book.close(now_ns)
 
     def neighbors(self, station: int) -> int:
         """How many stations hear this one."""

@@ -8,7 +8,7 @@ With INTERFERENCE = 0 any overlap destroys; with 1 the loss of each segment foll
 
 import math
 
-from emulator.dcf import acknowledged, on_busy, on_idle, put, release, uniform
+from emulator.dcf import acknowledged, lost, on_busy, on_idle, put, release, uniform
 from emulator.heap import push
 from emulator.jit import jit
 from emulator.state import (
@@ -16,7 +16,6 @@ from emulator.state import (
     ACK_NS,
     ACK_TO,
     BAD_UNTIL,
-    COLLISION_COPIES,
     CS,
     DATA,
     DETECT_NS,
@@ -27,8 +26,9 @@ from emulator.state import (
     FATE,
     FATE_COLLISION,
     FATE_HALF_DUPLEX,
+    FATE_OPEN,
     FATE_WEAK,
-    HALF_DUPLEX_COPIES,
+    FAULT,
     HANDED,
     HEADER_BITS_PER_NS,
     HEADER_NS,
@@ -42,11 +42,9 @@ from emulator.state import (
     LOCK_FROM,
     LOCK_HEADER_END,
     LOG_OK,
-    LOST_COLLISION,
-    LOST_HALF_DUPLEX,
-    LOST_WEAK,
+    N_RECEIVED,
     NAV,
-    NOISE_MW,
+    NOISE,
     NOTHING,
     NSIG,
     ON_AIR,
@@ -57,13 +55,14 @@ from emulator.state import (
     POWER,
     RECEIVED,
     RECEIVED_COPIES,
+    RSSI_SUM,
     SEND_ACK,
     SENSED,
     SIFS_NS,
+    SPARED,
     TX_KIND,
     UNDERWAY,
     WAITING,
-    WEAK_COPIES,
     Ints,
     Reals,
 )
@@ -81,7 +80,7 @@ def close_segment(p: Ints, pf: Reals, st: Ints, sf: Reals, lp: Reals, err: Reals
     if p[INTERFERENCE] == 0 or t <= begin:
         return
     wanted = lp[ON_AIR, st[LOCK, r]]
-    sinr_db = 10.0 * math.log10(wanted / (max(0.0, sf[POWER, r] - wanted) + pf[NOISE_MW]))
+    sinr_db = 10.0 * math.log10(wanted / (max(0.0, sf[POWER, r] - wanted) + sf[NOISE, r]))
     at = int((sinr_db - ERROR_FLOOR_DB) * ERROR_STEPS_PER_DB)
     at = max(0, min(err.shape[1] - 1, at))
     header_ns = max(0, min(t, st[LOCK_HEADER_END, r]) - begin)
@@ -113,7 +112,7 @@ def rx_detect(p: Ints, pf: Reals, st: Ints, sf: Reals, lk: Ints, lp: Reals, link
     if p[INTERFERENCE] == 0:
         clear = st[NSIG, r] == 1
     else:
-        clear = wanted >= pf[DETECT_RATIO] * (max(0.0, sf[POWER, r] - wanted) + pf[NOISE_MW])
+        clear = wanted >= pf[DETECT_RATIO] * (max(0.0, sf[POWER, r] - wanted) + sf[NOISE, r])
     if st[TX_KIND, r] != NOTHING:
         lk[FATE, link] = FATE_HALF_DUPLEX
     elif not audible:
@@ -136,6 +135,13 @@ def survived(p: Ints, st: Ints, sf: Reals, r: int) -> bool:
     if sf[LOG_OK, r] > -1e-9:
         return True
     return bool(uniform(st, r) / _MODULUS < math.exp(sf[LOG_OK, r]))
+
+
+@jit
+def spared(st: Ints, lp: Reals, r: int, link: int) -> bool:
+    """Whether the fault on a link lets a frame through that was otherwise received."""
+    share = lp[SPARED, link]
+    return bool(share >= 1.0 or (share > 0.0 and uniform(st, r) / _MODULUS < share))
 
 
 @jit
@@ -162,11 +168,12 @@ def rx_end(
     if st[LOCK, r] == link:
         st[LOCK, r] = -1
         whole = survived(p, st, sf, r)
-        if whole:
-            st[BAD_UNTIL, r] = 0
-        else:
+        if not whole:
             lk[FATE, link] = FATE_COLLISION if st[OVERLAPPED, r] == 1 else FATE_WEAK
-            st[BAD_UNTIL, r] = t + p[EIFS_EXTRA_NS]
+        elif lk[FAULT, link] != 0 and not spared(st, lp, r, link):
+            whole = False
+            lk[FATE, link] = lk[FAULT, link]
+        st[BAD_UNTIL, r] = 0 if whole else t + p[EIFS_EXTRA_NS]
     st[NSIG, r] -= 1
     sf[POWER, r] = 0.0 if st[NSIG, r] == 0 else sf[POWER, r] - lp[ON_AIR, link]
     lk[UNDERWAY, link] = 0
@@ -193,29 +200,20 @@ def data_end(
     if not ours or lk[SENSED, link] == 0:
         return
     if not whole:
-        lost(g, fr, lk[FATE, link], f)
+        fate = lk[FATE, link]
+        if fate in (FATE_WEAK, FATE_OPEN):
+            fate = lk[FAULT, link] if lk[FAULT, link] != 0 else FATE_WEAK
+        lost(g, fr, lk, fate, link, f)
         return
+    millidbm = int(10_000.0 * math.log10(lp[ON_AIR, link]))
     g[RECEIVED_COPIES] += 1
+    lk[N_RECEIVED, link] += 1
+    lk[RSSI_SUM, link] += millidbm
     if fr[DST, f] == EVERYONE or fr[RECEIVED, f] == 0:
         fr[RECEIVED, f] += 1
         st[HANDED, r] += 1
-        millidbm = int(10_000.0 * math.log10(lp[ON_AIR, link]))
         put(g, out, OUT_RECEPTION, f, r, t, millidbm, 0)
     if fr[DST, f] == r:
         st[ACK_TO, r] = lk[LINK_SRC, link]
         push(hs, g, HS_N, t + p[SIFS_NS], SEND_ACK, r, f)
         fr[OPEN, f] += 1  # the ACK to come refers to it
-
-
-@jit
-def lost(g: Ints, fr: Ints, fate: int, f: int) -> None:
-    """One copy less."""
-    if fate == FATE_HALF_DUPLEX:
-        g[HALF_DUPLEX_COPIES] += 1
-        fr[LOST_HALF_DUPLEX, f] += 1
-    elif fate == FATE_COLLISION:
-        g[COLLISION_COPIES] += 1
-        fr[LOST_COLLISION, f] += 1
-    else:
-        g[WEAK_COPIES] += 1
-        fr[LOST_WEAK, f] += 1

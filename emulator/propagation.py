@@ -12,7 +12,7 @@ import numpy as np
 import numpy.typing as npt
 
 from emulator.jit import jit
-from emulator.state import AUDIBLE, DELAY, LINK_DST, LINK_POWER, LINK_REALS, LINK_ROWS, LINK_SRC, Ints, Reals
+from emulator.state import AUDIBLE, DELAY, LINK_DST, LINK_POWER, LINK_REALS, LINK_ROWS, LINK_SRC, SPARED, Ints, Reals
 from fanet_mw.scenario import Radio
 
 SPEED_OF_LIGHT_M_S: Final = 299_792_458.0
@@ -127,4 +127,14 @@ class Links:
         self.longest_ns = int((self.ints[DELAY] * self.ints[AUDIBLE]).max())
         """Delay of the longest audible link."""
         self.reals[LINK_POWER, :count] = np.power(10.0, power_dbm / 10)
+        self.reals[SPARED, :count] = 1.0
         self.ptr = np.searchsorted(found[:, 0], np.arange(len(at) + 1)).astype(np.int64)
+
+    def dead_last(self) -> None:
+        """Links without power come last of their transmitter's; else the order stays: nearest first."""
+        used = slice(self.count)
+        dead = self.reals[LINK_POWER, used] == 0.0
+        if dead.any():
+            order = np.lexsort((dead, self.ints[LINK_SRC, used]))  # stable
+            self.ints[:, used] = self.ints[:, used][:, order]
+            self.reals[:, used] = self.reals[:, used][:, order]

@@ -7,13 +7,12 @@ import math
 from collections.abc import Sequence
 from typing import Annotated, Final, Literal, Self
 
-from pydantic import AfterValidator, BaseModel, ConfigDict, Field, model_validator
+from pydantic import AfterValidator, Field, model_validator
 
+from fanet_mw.fault_sections import AnyFault
+from fanet_mw.radio_control import Control, Degrade, Restore, nodes_of
+from fanet_mw.sections import Finite, Id, NonNegative, Positive, Section
 from fanet_mw.units import MAX_NODES, MS, NodeId, seconds_to_ns
-
-Positive = Annotated[float, Field(gt=0, allow_inf_nan=False)]
-NonNegative = Annotated[float, Field(ge=0, allow_inf_nan=False)]
-Finite = Annotated[float, Field(allow_inf_nan=False)]
 
 
 def _known_rate(mbps: float) -> float:
@@ -24,13 +23,6 @@ def _known_rate(mbps: float) -> float:
 
 DSSS_RATES_MBPS: Final = (1.0, 2.0, 5.5, 11.0)
 Rate = Annotated[float, AfterValidator(_known_rate)]
-Id = Annotated[int, Field(ge=1, le=MAX_NODES)]
-
-
-class Section(BaseModel):
-    """The base of every table of a scenario file."""
-
-    model_config = ConfigDict(frozen=True, extra="forbid", validate_default=True)
 
 
 class Nodes(Section):
@@ -237,6 +229,8 @@ class Scenario(Section):
     mobility: Mobility = Mobility()
     world: World = World()
     mission: Mission = Mission()
+    faults: tuple[AnyFault, ...] = ()
+    """What happens to the air, and when; by message too (`fanet air`)."""
 
     @model_validator(mode="after")
     def _parts_agree(self) -> Self:
@@ -253,6 +247,11 @@ class Scenario(Section):
     def traffic_window_ns(self) -> tuple[int, int]:
         """Application packets are generated, and measured, in [start, end)."""
         return seconds_to_ns(self.warmup_s), seconds_to_ns(self.duration_s - self.drain_s)
+
+    @property
+    def planned_faults(self) -> list[tuple[int, Control]]:
+        """(instant ns, what happens), in the order of the file."""
+        return [(seconds_to_ns(fault.at_s), fault.control()) for fault in self.faults]
 
     @property
     def node_ids(self) -> range:
@@ -285,6 +284,7 @@ def _disagreements(scenario: Scenario) -> Sequence[str]:
             f"traffic.payload_bytes = {traffic.payload_bytes} must be "
             f"<= radio.max_frame_bytes = {scenario.radio.max_frame_bytes}"
         )
+    found += _impossible_faults(scenario)
     if scenario.routing.protocol == "clustered":
         clusters = scenario.clusters
         if clusters.count >= max(2, count):
@@ -294,6 +294,19 @@ def _disagreements(scenario: Scenario) -> Sequence[str]:
                 f"clusters.guard_ms = {clusters.guard_ms:g} must be < the slot, flooding_period_s / count = "
                 f"{clusters.slot_ns / MS:g} ms"
             )
+    return found
+
+
+def _impossible_faults(scenario: Scenario) -> Sequence[str]:
+    """Faults of nodes that there are not, and links that are none."""
+    found = []
+    count = scenario.nodes.count
+    for index, (_, control) in enumerate(scenario.planned_faults):
+        unknown = [] if isinstance(control, Restore) else [node for node in nodes_of(control) if node > count]
+        if unknown:
+            found.append(f"faults.{index} names node {unknown[0]}, which must be <= nodes.count = {count}")
+        if isinstance(control, Degrade) and control.src == control.dst:
+            found.append(f"faults.{index}: src = dst = {control.src} is no link")
     return found
 
 

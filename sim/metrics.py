@@ -32,6 +32,7 @@ def summarize(outcome: Outcome, *, trace_sha256: str) -> dict[str, Any]:
         "mode": outcome.mode,
         "nodes": scenario.nodes.count,
         "duration_s": scenario.duration_s,
+        "time_scale": scenario.time_scale if outcome.mode == "realtime" else None,
         "wall_s": round(outcome.wall_s, 3),
         **packets["traffic"],
         "reports": packets["report"],

@@ -51,12 +51,15 @@ def shortest_relays(adjacency: Adjacency, root: NodeId) -> tuple[NodeId, ...]:
 
 
 def broadcast_schedule(
-    adjacency: Adjacency, root: NodeId, relays: Collection[NodeId], *, prune: bool = True
+    adjacency: Adjacency, root: NodeId, relays: Collection[NodeId], *, prune: bool = True, hop_subslots: int = 1
 ) -> BroadcastSchedule:
     """The schedule of a flood from `root` through `relays`, for all that root and relays reach.
 
+    A relay sends `hop_subslots` after its source at the earliest: what it needs to receive and announce.
     Raises LocalProtocolError when the root is no node. Relays that the flood does not reach get no turn.
     """
+    if hop_subslots < 1:
+        raise LocalProtocolError(f"hop_subslots = {hop_subslots} must be >= 1")
     if root not in adjacency:
         raise LocalProtocolError(f"root = {root} must be a node of the adjacency")
     sending = frozenset(relays) | {root}
@@ -68,12 +71,28 @@ def broadcast_schedule(
     reached = {root, *adjacency[root]}
     for node in _order(hops, adjacency, reached, prune=prune):
         source = min((turns[n] for n in tree[node] if n in turns), key=lambda turn: (turn.subslot, turn.node))
-        subslot = source.subslot + 1
+        subslot = source.subslot + hop_subslots
         while any(user in rivals[node] for user in users.get(subslot, ())):
             subslot += 1
         turns[node] = Turn(subslot, node, source.node)
         users.setdefault(subslot, []).append(node)
     return BroadcastSchedule(tuple(sorted(turns.values())), max(users) + 1)
+
+
+def pipeline_spacing(schedule: BroadcastSchedule, adjacency: Adjacency) -> int:
+    """How many sub-slots apart floods of one schedule can follow each other without meeting; at least 1.
+
+    With floods every d sub-slots, all turns of one residue modulo d are on the air together; none of them may be within
+    two hops of another.
+    """
+    rivals = {node: frozenset(near) for node, near in two_hop(adjacency).items()}
+    for spacing in range(1, schedule.subslots):
+        users: dict[int, list[NodeId]] = {}
+        for turn in schedule.turns:
+            users.setdefault(turn.subslot % spacing, []).append(turn.node)
+        if not any(b in rivals[a] for group in users.values() for i, a in enumerate(group) for b in group[i + 1 :]):
+            return spacing
+    return schedule.subslots
 
 
 def _order(hops: dict[NodeId, int], adjacency: Adjacency, reached: set[NodeId], *, prune: bool) -> list[NodeId]:

@@ -6,7 +6,7 @@ from hypothesis import strategies as st
 from test_slots_with_reuse import graphs
 
 from fanet_mw.errors import LocalProtocolError
-from fanet_mw.protocol.broadcast_schedule import broadcast_schedule, shortest_relays
+from fanet_mw.protocol.broadcast_schedule import broadcast_schedule, pipeline_spacing, shortest_relays
 from fanet_mw.protocol.connected_dominating_set import guha_khuller, wu_li
 from fanet_mw.protocol.multipoint_relays import WILL_ALWAYS, WILL_NEVER, multipoint_relays
 from fanet_mw.protocol.topology import components, levels, symmetric, two_hop, within_range
@@ -159,6 +159,33 @@ def same_subslot(schedule):
     return [
         (a.node, b.node) for a in schedule.turns for b in schedule.turns if a.node < b.node and a.subslot == b.subslot
     ]
+
+
+@settings(max_examples=150)
+@given(graphs(), st.data())
+def test_floods_at_the_pipeline_spacing_never_meet_and_closer_ones_do(adjacency, data) -> None:
+    root = data.draw(st.sampled_from(sorted(adjacency)))
+    gap = data.draw(st.integers(1, 4))
+    schedule = broadcast_schedule(adjacency, root, wu_li(adjacency), hop_subslots=gap)
+    at = {turn.node: turn.subslot for turn in schedule.turns}
+    assert all(turn.node == root or turn.subslot >= at[turn.source] + gap for turn in schedule.turns)
+    spacing = pipeline_spacing(schedule, adjacency)
+    assert floods_meet(schedule, adjacency, spacing) is None
+    if spacing > 1:
+        assert floods_meet(schedule, adjacency, spacing - 1) is not None
+
+
+def floods_meet(schedule, adjacency, spacing):
+    """A node that hears two floods at once, or one while it sends."""
+    sending = {}
+    for flood in range(schedule.subslots // spacing + 2):
+        for turn in schedule.turns:
+            sending.setdefault(turn.subslot + flood * spacing, []).append(turn.node)
+    for senders in sending.values():
+        for node in adjacency:
+            if sum(1 for n in senders if n == node or n in adjacency[node]) > 1:
+                return node
+    return None
 
 
 def test_on_a_line_relays_three_apart_share_a_sub_slot_only_when_both_have_the_packet() -> None:

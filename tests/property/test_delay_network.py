@@ -135,21 +135,33 @@ def test_a_flow_that_always_comes_last_stays_within_any_order(server, flow, cros
     rng = stream(seed, "phases")
     slot = Slot(*server, start_ns=rng.randrange(server.period_ns))
     ours, others = trace(flow, rng), trace(cross, rng, packets=80)
-    assert worst_when_last(slot, ours, others) <= bound.delay_ns
+    assert worst_by_priority(slot, ours, others)[0] <= bound.delay_ns
 
 
-def worst_when_last(slot: Slot, ours: list[int], others: list[int]) -> int:
-    """Strict priority of `others`, decided whenever a frame can start."""
-    t, worst = 0, 0
-    while ours:
-        t = earliest_start(slot, max(t, min(ours[0], others[0] if others else ours[0])))
-        if others and others[0] <= t:
-            others = others[1:]
-        else:
-            worst = max(worst, t + slot.airtime_ns - ours[0])
-            ours = ours[1:]
+@settings(max_examples=300)
+@given(servers(), periodics(10), periodics(3), st.integers(0, 10**6))
+def test_an_urgent_flow_keeps_its_bound_when_others_overload_the_slot(server, flow, bulk, seed) -> None:
+    bound = delay_any_order(flow, Total(()), server, blocking=1)
+    if isinstance(bound, Refused):
+        assert flow.rate * server.period_ns >= server.frames
+        return
+    rng = stream(seed, "phases")
+    slot = Slot(*server, start_ns=rng.randrange(server.period_ns))
+    urgent, others = trace(flow, rng), trace(bulk, rng, packets=200)
+    assert worst_by_priority(slot, others, urgent)[1] <= bound.delay_ns
+
+
+def worst_by_priority(slot: Slot, ours: list[int], urgent: list[int]) -> tuple[int, int]:
+    """The worst delays when `urgent` goes first, decided whenever a frame can start: (ours, urgent)."""
+    t, worst = 0, [0, 0]
+    waiting = [ours, urgent]
+    while any(waiting):
+        t = earliest_start(slot, max(t, min(queue[0] for queue in waiting if queue)))
+        first = 1 if waiting[1] and waiting[1][0] <= t else 0
+        worst[first] = max(worst[first], t + slot.airtime_ns - waiting[first][0])
+        waiting[first] = waiting[first][1:]
         t += slot.airtime_ns
-    return worst
+    return worst[0], worst[1]
 
 
 @st.composite

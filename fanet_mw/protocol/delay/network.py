@@ -33,7 +33,7 @@ def refusal(arrivals: Arrivals, server: SlotServer) -> Refused | None:
         return Refused(f"airtime {server.airtime_ns} ns > slot {server.slot_ns} ns: no frame ever fits")
     if load(arrivals, server) > 1:
         return Refused(
-            f"unstable: {server.frames} frames fit a slot every {server.period_ns} ns, "
+            f"unstable: {server.frames} frames fit a slot every {server.period_ns / 1e6:g} ms, "
             f"{float(arrivals.rate * server.period_ns):.3f} arrive"
         )
     return None
@@ -62,8 +62,11 @@ def backlog(arrivals: Arrivals, server: SlotServer) -> int | Refused:
     return max(q - server.served(span_ns) for q, span_ns in enumerate(examined, start=1))
 
 
-def delay_any_order(flow: Periodic, cross: Arrivals, server: SlotServer) -> Outcome:
+def delay_any_order(flow: Periodic, cross: Arrivals, server: SlotServer, *, blocking: int = 0) -> Outcome:
     """The worst delay of `flow`'s packets when the head may send `cross` first as it likes (priorities, any order).
+
+    With priorities, `cross` is what is as urgent or more, and `blocking` the frames of the longest less urgent packet:
+    one may have begun just before, and whole frames are not taken back.
 
     Blind multiplexing: the slot is a strict service curve, so what the cross traffic leaves is one for the flow (Le
     Boudec & Thiran, theorem 6.2.1): the q-th packet is through at the first w with w >= completion(q + cross(w)).
@@ -74,13 +77,13 @@ def delay_any_order(flow: Periodic, cross: Arrivals, server: SlotServer) -> Outc
     server.check()
     if not server.frames or both * server.period_ns >= server.frames:
         return Refused(
-            f"unstable or full: {server.frames} frames fit a slot every {server.period_ns} ns, "
+            f"unstable or full: {server.frames} frames fit a slot every {server.period_ns / 1e6:g} ms, "
             f"{float(both * server.period_ns):.3f} arrive; any order needs less than a full slot"
         )
     before = _Counter(cross)
     for q, span_ns in enumerate(flow.spans(), start=1):
-        w_ns = server.completion_ns(q)
-        while w_ns < (through_ns := server.completion_ns(q + before.within(w_ns))):
+        w_ns = server.completion_ns(q + blocking)
+        while w_ns < (through_ns := server.completion_ns(q + blocking + before.within(w_ns))):
             w_ns = through_ns
         worst_ns = max(worst_ns, w_ns - span_ns)
         if w_ns <= max(0, q * flow.interval_ns - flow.jitter_ns):

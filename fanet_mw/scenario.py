@@ -95,9 +95,16 @@ class Clusters(Section):
     """The least time between two packets that a head releases in its slot."""
     pacing: Literal["burst", "spread"] = "spread"
     """`burst` releases at `release_gap_ms`; `spread` divides the slot evenly among the queued packets."""
-    relay: Literal["all", "gossip", "counter"] = "all"
-    """Who relays a flooded packet: every node; each with probability min(1, gossip_degree / neighbors); or each that
-    has heard fewer than `counter` copies after U(0, assess_ms)."""
+    relay: Literal["all", "gossip", "counter", "scheduled"] = "all"
+    """Who relays a flooded packet: every node; each with probability min(1, gossip_degree / neighbors); each that has
+    heard fewer than `counter` copies after U(0, assess_ms); or those that a collision-free timetable names, each in a
+    turn of its own."""
+    contention_ms: NonNegative = 40.0
+    """`scheduled`: the beginning of each period, for all that has no turn: hellos, joins, unicasts to heads."""
+    link_m: NonNegative = 0.0
+    """`scheduled`: nodes no farther apart are taken to hear each other; 0: `radio.range_m`."""
+    interference_m: NonNegative = 0.0
+    """`scheduled`: nodes no farther apart may disturb each other; 0: `radio.range_m` for `range`, else twice that."""
     gossip_degree: Positive = 6.0
     counter: Annotated[int, Field(ge=2)] = 3
     assess_ms: NonNegative = 100.0

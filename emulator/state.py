@@ -107,8 +107,8 @@ EVERYONE: Final = -1
     LINK_ROWS,
 ) = range(21)
 LINK_POWER, ON_AIR, SPARED, LINK_REALS = range(4)
-"""LINK_POWER: received power [mW], 0: the link carries nothing, and comes last of its transmitter's. ON_AIR: that of the
-frame now on the link, as it was at its start. SPARED: the share of frames that the link's FAULT lets through."""
+"""LINK_POWER: received power [mW], 0: the link carries nothing, and comes last of its transmitter's. ON_AIR: that of
+the frame now on the link, as it was at its start. SPARED: the share of frames that the link's FAULT lets through."""
 
 FATE_OPEN, FATE_COLLISION, FATE_HALF_DUPLEX, FATE_WEAK, FATE_DEGRADED, FATE_JAMMED, FATE_CUT = range(7)
 """Counts by fate lie side by side in this order: g from RECEIVED_COPIES, fr from LOST_COLLISION, lk from N_RECEIVED."""

@@ -15,6 +15,7 @@ import numpy as np
 from agents.traffic import targets_of
 from fanet_mw.trace import Approaching, Arrived, Collided, Delivered, Detected, Generated
 from fanet_mw.units import MS, S
+from sim.bounds import against_bounds
 from sim.outcome import Outcome
 from sim.survivors import place
 
@@ -40,6 +41,7 @@ def summarize(outcome: Outcome, *, trace_sha256: str) -> dict[str, Any]:
         "copies": _copies(outcome, emulator),
         "air": emulator.get("air", {}),
         "lateness": _lateness(outcome, emulator),
+        "bound": against_bounds(outcome),
         "mission": _mission(outcome),
         "processes": {
             "ready_s": round(outcome.ready_s, 3),

@@ -56,6 +56,8 @@ class Scheduled(Clustered):
         self._schedules: dict[int, tuple[Schedule, Places]] = {}
         self._planned_epoch = 0
         self._missed = 0
+        self._steady_ns: int | None = None
+        """Since when the bound of the newest plan holds: no packet from before it is waiting."""
 
     # --- the timetable --------------------------------------------------------------------------------------------
 
@@ -98,6 +100,7 @@ class Scheduled(Clustered):
         if table is None:
             return  # not even one packet of each head fits a superframe; `fanet plan` says so before take-off
         self._plans = [*self._plans[-1:], _own_plan(self._port.node, max(now_ns, schedule.start_us * US), turns, table)]
+        self._steady_ns = None
         self._roots.follow([(plan.valid_ns, plan.turns, plan.roots) for plan in self._plans], now_ns=now_ns)
         for packet in [*self._release.drain(), *self._homeless.drain()]:
             self._forward(packet, start_ns=now_ns + self._lead_ns, now_ns=now_ns, tries=0)
@@ -120,6 +123,8 @@ class Scheduled(Clustered):
         if len(packet.frame) > self._turn_bytes:
             self._port.drop(DropReason.TOO_LARGE, packet, now_ns=now_ns)
             return
+        if self._steady_ns is None and not len(self._roots) and now_ns >= self._plans[-1].valid_ns:
+            self._steady_ns = packet.header.origin_us * US
         evicted = self._roots.push(packet, now_ns=now_ns)
         if evicted is not None:
             self._port.drop(DropReason.QUEUE_FULL, evicted, now_ns=now_ns)
@@ -205,6 +210,8 @@ class Scheduled(Clustered):
         alone = scenario.clusters.count >= scenario.nodes.count - 1  # else packets of members share our turns
         if plan is None or not plan.roots or not alone or plan.table.uncovered[self._port.node]:
             return None
+        if self._steady_ns is None:
+            return None
         interval_ns = seconds_to_ns(scenario.traffic.interval_s)
         return plan.turns.worst_ns(plan.roots, span=plan.table.spans[self._port.node], interval_ns=interval_ns)
 
@@ -214,7 +221,8 @@ class Scheduled(Clustered):
             **super().report(),
             "missed_turns": self._missed,
             "bound_ms": None if bound_ns is None else bound_ns / MS,
-            "bound_from_ms": self._plans[-1].valid_ns / MS if self._plans else None,
+            "bound_from_ms": None if self._steady_ns is None else self._steady_ns / MS,
+            "planned": bool(self._plans),
         }
 
 
@@ -233,7 +241,7 @@ def _geometry(scenario: Scenario, schedule: Schedule, turn: int) -> Turns:
 def _fit(
     scenario: Scenario, places: tuple[tuple[NodeId, Enu], ...], load: Mapping[NodeId, int], turns: Turns
 ) -> Timetable | None:
-    """A table for the whole load; if the turns do not suffice, for as much of it as they do."""
+    """A table for a little more than the load, so that a backlog drains; for less, if the turns do not suffice."""
     clusters, radio = scenario.clusters, scenario.radio
     wait_ns = radio.lead_ns + radio.handover_ns
     geometry = Geometry(
@@ -245,17 +253,13 @@ def _fit(
     per_member = turns.period_ns / seconds_to_ns(scenario.traffic.interval_s)
     share = 1.0
     while turns.per_frame:
-        wanted = {root: max(1, _whole(members * per_member * share)) for root, members in load.items()}
+        wanted = {root: int(members * per_member * share) + 1 for root, members in load.items()}
         roots = tuple(root for root, packets in sorted(wanted.items()) for _ in range(packets))
         table = timetable(places, roots, geometry)
         if table is not None or all(packets == 1 for packets in wanted.values()):
             return table
         share *= _FEWER
     return None
-
-
-def _whole(packets: float) -> int:
-    return -int(-packets // 1)
 
 
 def _own_plan(node: NodeId, valid_ns: int, turns: Turns, table: Timetable) -> Plan:

@@ -120,6 +120,34 @@ def simulate(scenario: str, *, choice: Choice = Choice(), output: Output = Outpu
 
 
 @app.command
+def plan(
+    scenario: str,
+    *,
+    choice: Choice = Choice(),
+    deadline: float | None = None,
+    search: bool = True,
+    json: Annotated[bool, Parameter(negative="")] = False,
+) -> int:
+    """Say before take-off whether a clustered scenario is feasible and what it guarantees; exit code 1: it is not.
+
+    Parameters
+    ----------
+    scenario
+        A shipped scenario's name (see `fanet scenarios`) or a .toml file.
+    deadline
+        Every packet must be with everyone within this time [s].
+    search
+        Look for the cheapest change when it is not feasible.
+    json
+        Print the plan as JSON.
+
+    """
+    from sim.plan_cli import show
+
+    return show(choice.scenario(scenario), deadline=deadline, search=search, as_json=json)
+
+
+@app.command
 def launch(
     scenario: str,
     *,

@@ -49,8 +49,8 @@ class Scheduled(Clustered):
         scenario = port.scenario
         self._lifetime_ns = seconds_to_ns(scenario.routing.lifetime_s)
         self._window_random = port.stream("window").random
-        self._turn_ns = turn_ns(scenario, payload_bytes=_largest(scenario))
-        self._turn_bytes = _largest(scenario)
+        self._turn_ns = turn_ns(scenario, payload_bytes=largest_frame(scenario))
+        self._turn_bytes = largest_frame(scenario)
         self._roots = RootRelease(TxQueue(capacity=scenario.routing.queue_frames), lead_ns=self._lead_ns)
         self._plans: list[Plan] = []
         self._schedules: dict[int, tuple[Schedule, Places]] = {}
@@ -96,7 +96,7 @@ class Scheduled(Clustered):
         scenario = self._port.scenario
         turns = _geometry(scenario, schedule, self._turn_ns)
         load = {heads[cluster]: members[cluster] for cluster in sorted(heads)} | {NodeId(schedule.leader): 0}
-        table = _fit(scenario, tuple(sorted(at.items())), load, turns)
+        table = fit(scenario, tuple(sorted(at.items())), load, turns)
         if table is None:
             return  # not even one packet of each head fits a superframe; `fanet plan` says so before take-off
         self._plans = [*self._plans[-1:], _own_plan(self._port.node, max(now_ns, schedule.start_us * US), turns, table)]
@@ -226,7 +226,7 @@ class Scheduled(Clustered):
         }
 
 
-def _largest(scenario: Scenario) -> int:
+def largest_frame(scenario: Scenario) -> int:
     """The largest frame a turn must hold: the application's, or a schedule part with its places."""
     members = min(scenario.nodes.count, 56)
     return max(scenario.traffic.payload_bytes, HEADER_BYTES + 262 + 189 * -(-members // 28))
@@ -238,18 +238,23 @@ def _geometry(scenario: Scenario, schedule: Schedule, turn: int) -> Turns:
     return Turns(schedule.start_us * US, period_ns, contention_ns, turn, max(0, period_ns - contention_ns) // turn)
 
 
-def _fit(
-    scenario: Scenario, places: tuple[tuple[NodeId, Enu], ...], load: Mapping[NodeId, int], turns: Turns
-) -> Timetable | None:
-    """A table for a little more than the load, so that a backlog drains; for less, if the turns do not suffice."""
+def links(scenario: Scenario, turns: Turns) -> Geometry:
+    """What a timetable of this scenario is computed for."""
     clusters, radio = scenario.clusters, scenario.radio
     wait_ns = radio.lead_ns + radio.handover_ns
-    geometry = Geometry(
+    return Geometry(
         link_m=clusters.link_m or radio.range_m,
         interference_m=clusters.interference_m or radio.range_m * (1 if radio.channel == "range" else 2),
         turns=turns.per_frame,
         hop_turns=1 + -(-wait_ns // turns.turn_ns),
     )
+
+
+def fit(
+    scenario: Scenario, places: tuple[tuple[NodeId, Enu], ...], load: Mapping[NodeId, int], turns: Turns
+) -> Timetable | None:
+    """A table for a little more than the load, so that a backlog drains; for less, if the turns do not suffice."""
+    geometry = links(scenario, turns)
     per_member = turns.period_ns / seconds_to_ns(scenario.traffic.interval_s)
     share = 1.0
     while turns.per_frame:

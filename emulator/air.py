@@ -7,8 +7,8 @@ import numpy.typing as npt
 
 from emulator import kernel
 from emulator import state as s
-from emulator.airtime import DETECT_NS, DIFS_NS, OVERHEAD_BYTES, SIFS_NS, SLOT_NS, Timing, frame_ns, lifetime_ns
-from emulator.error_rate import log_success_per_bit
+from emulator.airtime import DETECT_NS, OVERHEAD_BYTES, Timing, airtime_ns, lifetime_ns
+from emulator.error_rate import header_rates, log_success_per_bit
 from emulator.propagation import Links, milliwatt, noise_mw
 from fanet_mw.rng import stream_seed
 from fanet_mw.scenario import Radio
@@ -17,9 +17,9 @@ _GENERATOR_RANGE = 2_147_483_646
 
 
 @lru_cache(maxsize=8)
-def _error_table(rate_mbps: float) -> npt.NDArray[np.float64]:
-    """PLCP header at 1 Mb/s, then the payload's rate."""
-    return np.stack([log_success_per_bit(1), log_success_per_bit(rate_mbps)])
+def _error_table(rate_mbps: float, ack_rate_mbps: float) -> npt.NDArray[np.float64]:
+    """PLCP header, data, ACK (`emulator.state.LOCK_RATE`)."""
+    return np.stack([log_success_per_bit(rate) for rate in (header_rates(rate_mbps)[0], rate_mbps, ack_rate_mbps)])
 
 
 class Air:
@@ -32,15 +32,24 @@ class Air:
         self.g = np.zeros(s.GLOBALS, np.int64)
         self._p = np.zeros(s.PARAMETERS, np.int64)
         self._p[:] = (
-            SLOT_NS, SIFS_NS, DIFS_NS, timing.eifs_extra_ns, timing.ack_ns, timing.ack_timeout_ns, timing.header_ns,
-            DETECT_NS, radio.cw_min, radio.cw_max, radio.max_attempts, radio.queue_frames, lifetime_ns(radio),
-            radio.access == "standard", radio.access == "ns3", radio.channel != "range",
+            timing.slot_ns, timing.sifs_ns, timing.difs_ns, timing.eifs_extra_ns, timing.ack_ns,
+            timing.ack_timeout_ns, timing.header_ns, DETECT_NS, radio.cw_min, radio.cw_max, radio.max_attempts,
+            radio.queue_frames, lifetime_ns(radio),
+            radio.access == "standard", radio.access == "ns3", radio.channel != "range", timing.extension_ns,
         )  # fmt: skip
-        self._pf = np.array([noise_mw(radio), milliwatt(radio.preamble_snr_db), 1e-3, radio.rate_mbps * 1e-3])
+        self._pf = np.array(
+            [
+                noise_mw(radio),
+                milliwatt(radio.preamble_snr_db),
+                header_rates(radio.rate_mbps)[1],
+                radio.rate_mbps * 1e-3,
+                radio.ack_rate_mbps * 1e-3,
+            ]
+        )
         self.st = np.zeros((s.STATION_ROWS, stations), np.int64)
         for row, value in (
             (s.SCHEDULED, -1), (s.CW, radio.cw_min), (s.TX_FRAME, -1), (s.LOCK, -1), (s.WAITING, -1), (s.ACK_TO, -1),
-            (s.HEAD, -1), (s.TAIL, -1), (s.BUSY_SINCE, -1), (s.IDLE_FROM, -DIFS_NS),
+            (s.HEAD, -1), (s.TAIL, -1), (s.BUSY_SINCE, -1), (s.IDLE_FROM, -timing.difs_ns),
         ):  # fmt: skip
             self.st[row] = value
         self.st[s.RANDOM] = [stream_seed(seed, "backoff", i + 1) % _GENERATOR_RANGE + 1 for i in range(stations)]
@@ -48,7 +57,7 @@ class Air:
         self.fr = np.zeros((s.FRAME_ROWS, 1024), np.int64)
         self._hs = np.zeros((8 * stations + 2 * 1024 + 64, 5), np.int64)
         self._out = np.zeros((2 * radio.queue_frames + 1024, s.OUT_COLUMNS), np.int64)
-        self._err = _error_table(radio.rate_mbps) if radio.channel != "range" else np.zeros((2, 1))
+        self._err = _error_table(radio.rate_mbps, radio.ack_rate_mbps) if radio.channel != "range" else np.zeros((3, 1))
         self._airtime: dict[int, int] = {}
         nowhere = Links(np.full((stations, 3), np.inf), radio, spare=0)
         self._lk, self._lp, self._ptr = nowhere.ints, nowhere.reals, nowhere.ptr
@@ -97,9 +106,7 @@ class Air:
         airtime = self._airtime.get(size)
         if airtime is None:
             radio = self._radio
-            airtime = self._airtime[size] = frame_ns(
-                size + OVERHEAD_BYTES, rate_mbps=radio.rate_mbps, short=radio.preamble == "short"
-            )
+            airtime = self._airtime[size] = airtime_ns(size + OVERHEAD_BYTES, radio, rate_mbps=radio.rate_mbps)
         if self.g[s.HS_N] + 2 * kernel.MARGIN > self._hs.shape[0]:
             self._more_starts(len(self._hs))
         self.next_output_ns = kernel.submit(

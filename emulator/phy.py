@@ -8,7 +8,7 @@ With INTERFERENCE = 0 any overlap destroys; with 1 the loss of each segment foll
 
 import math
 
-from emulator.dcf import acknowledged, on_busy, on_idle, put, release, uniform
+from emulator.dcf import NEVER, acknowledged, on_busy, on_idle, put, release, uniform
 from emulator.heap import push
 from emulator.jit import jit
 from emulator.state import (
@@ -19,11 +19,13 @@ from emulator.state import (
     COLLISION_COPIES,
     CS,
     DATA,
+    DELAY,
     DETECT_NS,
     DETECT_RATIO,
     DST,
     EIFS_EXTRA_NS,
     EVERYONE,
+    EXTENSION_NS,
     FATE,
     FATE_COLLISION,
     FATE_HALF_DUPLEX,
@@ -39,8 +41,10 @@ from emulator.state import (
     LINK_KIND,
     LINK_SRC,
     LOCK,
+    LOCK_DATA_END,
     LOCK_FROM,
     LOCK_HEADER_END,
+    LOCK_RATE,
     LOG_OK,
     LOST_COLLISION,
     LOST_HALF_DUPLEX,
@@ -53,13 +57,13 @@ from emulator.state import (
     OPEN,
     OUT_RECEPTION,
     OVERLAPPED,
-    PAYLOAD_BITS_PER_NS,
     POWER,
     RECEIVED,
     RECEIVED_COPIES,
     SEND_ACK,
     SENSED,
     SIFS_NS,
+    TX_END,
     TX_KIND,
     UNDERWAY,
     WAITING,
@@ -84,9 +88,11 @@ def close_segment(p: Ints, pf: Reals, st: Ints, sf: Reals, lp: Reals, err: Reals
     sinr_db = 10.0 * math.log10(wanted / (max(0.0, sf[POWER, r] - wanted) + pf[NOISE_MW]))
     at = int((sinr_db - ERROR_FLOOR_DB) * ERROR_STEPS_PER_DB)
     at = max(0, min(err.shape[1] - 1, at))
-    header_ns = max(0, min(t, st[LOCK_HEADER_END, r]) - begin)
+    until = min(t, st[LOCK_DATA_END, r])
+    header_ns = max(0, min(until, st[LOCK_HEADER_END, r]) - begin)
     sf[LOG_OK, r] += header_ns * pf[HEADER_BITS_PER_NS] * err[0, at]
-    sf[LOG_OK, r] += (t - begin - header_ns) * pf[PAYLOAD_BITS_PER_NS] * err[1, at]
+    rate = st[LOCK_RATE, r]
+    sf[LOG_OK, r] += max(0, until - begin - header_ns) * pf[HEADER_BITS_PER_NS + rate] * err[rate, at]
 
 
 @jit
@@ -124,6 +130,10 @@ def rx_detect(p: Ints, pf: Reals, st: Ints, sf: Reals, lk: Ints, lp: Reals, link
         st[LOCK, r] = link
         st[LOCK_FROM, r] = t
         st[LOCK_HEADER_END, r] = t - p[DETECT_NS] + p[HEADER_NS]
+        st[LOCK_RATE, r] = 2 if lk[LINK_KIND, link] == ACK else 1
+        st[LOCK_DATA_END, r] = NEVER
+        if p[EXTENSION_NS] > 0:
+            st[LOCK_DATA_END, r] = st[TX_END, lk[LINK_SRC, link]] + lk[DELAY, link] - p[EXTENSION_NS]
         st[OVERLAPPED, r] = 1 if st[NSIG, r] > 1 else 0
         sf[LOG_OK, r] = 0.0
 

@@ -13,12 +13,12 @@ import numpy.typing as npt
 
 from emulator.jit import jit
 from emulator.state import AUDIBLE, DELAY, LINK_DST, LINK_POWER, LINK_REALS, LINK_ROWS, LINK_SRC, Ints, Reals
-from fanet_mw.scenario import Radio
+from fanet_mw.scenario_radio import Radio, is_ofdm
 
 SPEED_OF_LIGHT_M_S: Final = 299_792_458.0
 THERMAL_DBM_PER_HZ: Final = -174.0
-BANDWIDTH_HZ: Final = 22e6
-"""DSSS channel width."""
+DSSS_BANDWIDTH_HZ: Final = 22e6
+OFDM_BANDWIDTH_HZ: Final = 20e6
 
 
 def milliwatt(dbm: float) -> float:
@@ -27,7 +27,8 @@ def milliwatt(dbm: float) -> float:
 
 def noise_mw(radio: Radio) -> float:
     """Thermal noise in the channel plus the receiver's noise figure."""
-    return milliwatt(THERMAL_DBM_PER_HZ + 10 * math.log10(BANDWIDTH_HZ) + radio.noise_figure_db)
+    bandwidth_hz = OFDM_BANDWIDTH_HZ if is_ofdm(radio.rate_mbps) else DSSS_BANDWIDTH_HZ
+    return milliwatt(THERMAL_DBM_PER_HZ + 10 * math.log10(bandwidth_hz) + radio.noise_figure_db)
 
 
 def reach_m(radio: Radio) -> float:

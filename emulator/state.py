@@ -33,6 +33,8 @@ Reals = npt.NDArray[np.float64]
     LOCK,  # link being received, -1 none
     LOCK_FROM,  # start of the current interference segment
     LOCK_HEADER_END,  # end of the PLCP preamble and header of the locked frame
+    LOCK_DATA_END,  # from then on only signal extension, which carries no bits; NEVER without
+    LOCK_RATE,  # 1: the locked frame is data, 2: an ACK; rows of `err`, and offsets into pf
     OVERLAPPED,  # 1: another signal overlapped the locked frame
     IDLE_FROM,  # when the medium last became idle
     BAD_UNTIL,  # end of the EIFS extension after a failed reception
@@ -49,7 +51,7 @@ Reals = npt.NDArray[np.float64]
     HANDED,  # receptions handed to the station
     ON_AIR_LIST,  # not by station: the first ON_AIR_N entries name the stations that transmit
     STATION_ROWS,
-) = range(29)
+) = range(31)
 NOTHING: Final = 0
 DATA: Final = 1
 ACK: Final = 2
@@ -143,6 +145,7 @@ DELIVERED, NO_RECEIVER, COLLIDED, DEAF, WEAK, GIVEN_UP, NO_ROOM, EXPIRED = range
     DRAW_WHEN_INTERRUPTED,  # 1: IEEE 802.11; 0: as ns-3
     WAIT_DIFS_FIRST,  # 1: as ns-3, a frame waits one DIFS after it is queued
     INTERFERENCE,  # 0: any overlap destroys; 1: SINR and error rate
+    EXTENSION_NS,  # signal extension at the end of each frame (OFDM at 2.4 GHz)
     PARAMETERS,
-) = range(17)
-NOISE_MW, DETECT_RATIO, HEADER_BITS_PER_NS, PAYLOAD_BITS_PER_NS, REALS = range(5)
+) = range(18)
+NOISE_MW, DETECT_RATIO, HEADER_BITS_PER_NS, PAYLOAD_BITS_PER_NS, ACK_BITS_PER_NS, REALS = range(6)

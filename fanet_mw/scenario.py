@@ -5,32 +5,15 @@ A key is a contract with users: renaming one breaks their files and sweeps. Deri
 
 import math
 from collections.abc import Sequence
-from typing import Annotated, Final, Literal, Self
+from typing import Annotated, Literal, Self
 
-from pydantic import AfterValidator, BaseModel, ConfigDict, Field, model_validator
+from pydantic import Field, model_validator
 
+from fanet_mw.scenario_base import Finite, NonNegative, Positive, Section
+from fanet_mw.scenario_radio import Radio
 from fanet_mw.units import MAX_NODES, MS, NodeId, seconds_to_ns
 
-Positive = Annotated[float, Field(gt=0, allow_inf_nan=False)]
-NonNegative = Annotated[float, Field(ge=0, allow_inf_nan=False)]
-Finite = Annotated[float, Field(allow_inf_nan=False)]
-
-
-def _known_rate(mbps: float) -> float:
-    if mbps not in DSSS_RATES_MBPS:
-        raise ValueError(f"rate {mbps:g} Mb/s must be one of {', '.join(f'{rate:g}' for rate in DSSS_RATES_MBPS)}")
-    return mbps
-
-
-DSSS_RATES_MBPS: Final = (1.0, 2.0, 5.5, 11.0)
-Rate = Annotated[float, AfterValidator(_known_rate)]
 Id = Annotated[int, Field(ge=1, le=MAX_NODES)]
-
-
-class Section(BaseModel):
-    """The base of every table of a scenario file."""
-
-    model_config = ConfigDict(frozen=True, extra="forbid", validate_default=True)
 
 
 class Nodes(Section):
@@ -120,56 +103,6 @@ class Clusters(Section):
     def slot_ns(self) -> int:
         """Length of one slot, guard included."""
         return self.period_ns // self.count
-
-
-class Radio(Section):
-    """The radio, its MAC and the channel. Defaults are the reference set-up: 802.11b, DSSS 11 Mb/s, long preamble."""
-
-    channel: Literal["range", "log_distance"] = "range"
-    range_m: Positive = 250.0
-    """`range`: decode and carrier-sense limit; frames are equally strong within it, silent beyond."""
-    rate_mbps: Rate = 11.0
-    ack_rate_mbps: Rate = 11.0
-    preamble: Literal["long", "short"] = "long"
-    tx_power_dbm: Finite = 30.0
-    exponent: Annotated[float, Field(gt=0, le=10)] = 3.0
-    """`log_distance`: path loss exponent."""
-    reference_loss_db: Finite = 40.05
-    """`log_distance`: path loss at 1 m."""
-    sensitivity_dbm: Finite = -82.0
-    """`log_distance`: decode and carrier-sense limit; weaker frames only interfere."""
-    interference_floor_dbm: Finite = -101.0
-    preamble_snr_db: Finite = 4.0
-    noise_figure_db: NonNegative = 7.0
-    access: Literal["standard", "ns3"] = "standard"
-    """`standard`: a station that finds the medium busy draws a backoff (IEEE 802.11); `ns3`: as ns-3 does it."""
-    cw_min: Annotated[int, Field(ge=1, le=1023)] = 31
-    cw_max: Annotated[int, Field(ge=1, le=32767)] = 1023
-    max_attempts: Annotated[int, Field(ge=1, le=255)] = 7
-    queue_frames: Annotated[int, Field(ge=1, le=100_000)] = 500
-    lifetime_ms: Positive = 500.0
-    max_frame_bytes: Annotated[int, Field(ge=64, le=2304)] = 2304
-    lead_ms: NonNegative = 20.0
-    """How long before its instant a node announces a transmission to the radio."""
-    handover_ms: NonNegative = 0.0
-    """Receptions are handed to nodes at multiples of this, as a driver with interrupt coalescing does; 0: at once.
-    Fewer, larger wake-ups let more processes live on one machine; instants on the air stay exact."""
-    late_limit: Annotated[float, Field(ge=0, le=1)] = 0.01
-    """The share of late frames above which a real-time run is invalid."""
-
-    @model_validator(mode="after")
-    def _window_grows(self) -> Self:
-        if self.cw_max < self.cw_min:
-            raise ValueError(f"radio.cw_max = {self.cw_max} must be >= radio.cw_min = {self.cw_min}")
-        return self
-
-    @property
-    def lead_ns(self) -> int:
-        return round(self.lead_ms * MS)
-
-    @property
-    def handover_ns(self) -> int:
-        return round(self.handover_ms * MS)
 
 
 class Mobility(Section):
@@ -303,3 +236,9 @@ def grid_columns(count: int) -> int:
     divisors = [d for d in range(1, count + 1) if count % d == 0 and d * d >= count]
     best = min(divisors, key=lambda d: abs(d - wanted))
     return best if best <= 2 * wanted else math.ceil(wanted)
+
+
+__all__ = [
+    "Clusters", "Finite", "Mission", "Mobility", "Nodes", "NonNegative", "Positive", "Radio", "Routing", "Scenario",
+    "Section", "Traffic", "World", "grid_columns",
+]  # fmt: skip

@@ -7,7 +7,7 @@ resolved scenario names every value it ran with.
 from collections.abc import Iterator, Mapping
 from typing import Annotated, Any, Final, Literal, Self
 
-from pydantic import AfterValidator, Field, model_validator
+from pydantic import Field, model_validator
 
 from fanet_mw.scenario_base import Finite, NonNegative, Positive, Section
 from fanet_mw.units import MS
@@ -24,16 +24,6 @@ def is_ofdm(rate_mbps: float) -> bool:
     return rate_mbps in OFDM_RATES_MBPS
 
 
-def _known_rate(mbps: float) -> float:
-    known = sorted(RATES_MBPS["g"])
-    if mbps not in known:
-        raise ValueError(f"rate {mbps:g} Mb/s must be one of {', '.join(f'{rate:g}' for rate in known)}")
-    return mbps
-
-
-Rate = Annotated[float, AfterValidator(_known_rate)]
-
-
 class Radio(Section):
     """The radio, its MAC and the channel. Defaults are the reference set-up: 802.11b, DSSS 11 Mb/s, long preamble."""
 
@@ -42,9 +32,9 @@ class Radio(Section):
     """`range`: decode and carrier-sense limit; frames are equally strong within it, silent beyond."""
     standard: Literal["b", "g", "a"] = "b"
     """`b`: DSSS; `g`: DSSS or OFDM at 2.4 GHz; `a`: OFDM at 5 GHz. Fixes the rates, the slot, SIFS and their kin."""
-    rate_mbps: Rate = 11.0
+    rate_mbps: Positive = 11.0
     """By default 11 (`b`) or 54 (`g`, `a`)."""
-    ack_rate_mbps: Rate = 11.0
+    ack_rate_mbps: Positive = 11.0
     """By default 11 (`b`), else the highest mandatory rate that is not above `rate_mbps` (6, 12, 24; or DSSS)."""
     preamble: Literal["long", "short"] = "long"
     """DSSS only."""

@@ -36,6 +36,7 @@ class Air:
             timing.ack_timeout_ns, timing.header_ns, DETECT_NS, radio.cw_min, radio.cw_max, radio.max_attempts,
             radio.queue_frames, lifetime_ns(radio),
             radio.access == "standard", radio.access == "ns3", radio.channel != "range", timing.extension_ns,
+            radio.capture,
         )  # fmt: skip
         self._pf = np.array(
             [
@@ -44,6 +45,7 @@ class Air:
                 header_rates(radio.rate_mbps)[1],
                 radio.rate_mbps * 1e-3,
                 radio.ack_rate_mbps * 1e-3,
+                milliwatt(radio.capture_db),
             ]
         )
         self.st = np.zeros((s.STATION_ROWS, stations), np.int64)

@@ -2,7 +2,8 @@
 
     frame begins -> detected after 4 us if nothing drowns it -> received while interference allows -> decoded or lost
 
-A frame is sensed from its detection on. A receiver stays with the frame it detected first: no capture of a later one.
+A frame is sensed from its detection on. A receiver stays with the frame it detected first, unless CAPTURE = 1 and a
+later one, whose preamble stands out of everything else, is CAPTURE_RATIO times as strong: then the first is lost.
 With INTERFERENCE = 0 any overlap destroys; with 1 the loss of each segment follows from its SINR.
 """
 
@@ -16,6 +17,8 @@ from emulator.state import (
     ACK_NS,
     ACK_TO,
     BAD_UNTIL,
+    CAPTURE,
+    CAPTURE_RATIO,
     COLLISION_COPIES,
     CS,
     DATA,
@@ -124,9 +127,11 @@ def rx_detect(p: Ints, pf: Reals, st: Ints, sf: Reals, lk: Ints, lp: Reals, link
         lk[FATE, link] = FATE_HALF_DUPLEX
     elif not audible:
         lk[FATE, link] = FATE_WEAK
-    elif st[LOCK, r] >= 0 or not clear:
+    elif not clear or (st[LOCK, r] >= 0 and not captures(p, pf, st, lp, r, wanted)):
         lk[FATE, link] = FATE_COLLISION if st[NSIG, r] > 1 else FATE_WEAK
     else:
+        if st[LOCK, r] >= 0:
+            lk[FATE, st[LOCK, r]] = FATE_COLLISION
         st[LOCK, r] = link
         st[LOCK_FROM, r] = t
         st[LOCK_HEADER_END, r] = t - p[DETECT_NS] + p[HEADER_NS]
@@ -136,6 +141,12 @@ def rx_detect(p: Ints, pf: Reals, st: Ints, sf: Reals, lk: Ints, lp: Reals, link
             st[LOCK_DATA_END, r] = st[TX_END, lk[LINK_SRC, link]] + lk[DELAY, link] - p[EXTENSION_NS]
         st[OVERLAPPED, r] = 1 if st[NSIG, r] > 1 else 0
         sf[LOG_OK, r] = 0.0
+
+
+@jit
+def captures(p: Ints, pf: Reals, st: Ints, lp: Reals, r: int, wanted: float) -> bool:
+    """Whether a later frame takes a receiver away from the frame it is locked on (message in message)."""
+    return bool(p[CAPTURE] == 1 and wanted >= pf[CAPTURE_RATIO] * lp[ON_AIR, st[LOCK, r]])
 
 
 @jit

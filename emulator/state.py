@@ -146,6 +146,7 @@ DELIVERED, NO_RECEIVER, COLLIDED, DEAF, WEAK, GIVEN_UP, NO_ROOM, EXPIRED = range
     WAIT_DIFS_FIRST,  # 1: as ns-3, a frame waits one DIFS after it is queued
     INTERFERENCE,  # 0: any overlap destroys; 1: SINR and error rate
     EXTENSION_NS,  # signal extension at the end of each frame (OFDM at 2.4 GHz)
+    CAPTURE,  # 1: a later frame that is CAPTURE_RATIO times as strong as the locked one takes the receiver
     PARAMETERS,
-) = range(18)
-NOISE_MW, DETECT_RATIO, HEADER_BITS_PER_NS, PAYLOAD_BITS_PER_NS, ACK_BITS_PER_NS, REALS = range(6)
+) = range(19)
+NOISE_MW, DETECT_RATIO, HEADER_BITS_PER_NS, PAYLOAD_BITS_PER_NS, ACK_BITS_PER_NS, CAPTURE_RATIO, REALS = range(7)

@@ -50,6 +50,9 @@ class Radio(Section):
     interference_floor_dbm: Finite = -101.0
     preamble_snr_db: Finite = 4.0
     noise_figure_db: NonNegative = 7.0
+    capture: bool = False
+    """Whether a later frame that is `capture_db` stronger than the one being received takes the receiver over."""
+    capture_db: NonNegative = 10.0
     access: Literal["standard", "ns3"] = "standard"
     """`standard`: a station that finds the medium busy draws a backoff (IEEE 802.11); `ns3`: as ns-3 does it."""
     cw_min: Annotated[int, Field(ge=1, le=1023)] = 31
@@ -119,5 +122,7 @@ def _disagreements(radio: Radio) -> Iterator[str]:
             f"radio.ack_rate_mbps = {radio.ack_rate_mbps:g} must be of the modulation (DSSS or OFDM) of "
             f"radio.rate_mbps = {radio.rate_mbps:g}"
         )
+    if radio.channel == "range" and radio.capture:
+        yield 'radio.capture needs a channel with powers: with radio.channel = "range" all frames are equally strong'
     if radio.slot == "short" and radio.standard == "b":
         yield 'radio.slot = "short" needs radio.standard = "g" or "a"'

@@ -10,6 +10,7 @@ from emulator import state as s
 from emulator.airtime import DETECT_NS, OVERHEAD_BYTES, Timing, airtime_ns, lifetime_ns
 from emulator.error_rate import header_rates, log_success_per_bit
 from emulator.propagation import Links, milliwatt, noise_mw
+from emulator.shadowing import Shadowing
 from fanet_mw.rng import stream_seed
 from fanet_mw.scenario import Radio
 
@@ -61,6 +62,7 @@ class Air:
         self._out = np.zeros((2 * radio.queue_frames + 1024, s.OUT_COLUMNS), np.int64)
         self._err = _error_table(radio.rate_mbps, radio.ack_rate_mbps) if radio.channel != "range" else np.zeros((3, 1))
         self._airtime: dict[int, int] = {}
+        self._shadowing = Shadowing(radio, seed=seed) if radio.shadowing_db else None
         nowhere = Links(np.full((stations, 3), np.inf), radio, spare=0)
         self._lk, self._lp, self._ptr = nowhere.ints, nowhere.reals, nowhere.ptr
         self._hr = np.zeros((64, 5), np.int64)
@@ -75,7 +77,7 @@ class Air:
             return
         self._at = at
         spare = int(self._lk[s.UNDERWAY].sum())
-        links = Links(np.ascontiguousarray(at), self._radio, spare=spare)
+        links = Links(np.ascontiguousarray(at), self._radio, spare=spare, shadowing=self._shadowing)
         self.g[s.REACH_NS] = max(self.g[s.REACH_NS] if spare else 0, links.longest_ns)
         room = 4 * (links.ints.shape[1] + self._stations) + 64
         if self._hr.shape[0] < room + self.g[s.HR_N]:

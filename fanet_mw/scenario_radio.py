@@ -27,7 +27,8 @@ def is_ofdm(rate_mbps: float) -> bool:
 class Radio(Section):
     """The radio, its MAC and the channel. Defaults are the reference set-up: 802.11b, DSSS 11 Mb/s, long preamble."""
 
-    channel: Literal["range", "log_distance"] = "range"
+    channel: Literal["range", "log_distance", "friis", "two_ray", "air_to_air", "air_to_ground", "uma_av"] = "range"
+    """See docs/emulator.md for equations, sources and ranges of validity."""
     range_m: Positive = 250.0
     """`range`: decode and carrier-sense limit; frames are equally strong within it, silent beyond."""
     standard: Literal["b", "g", "a"] = "b"
@@ -45,9 +46,23 @@ class Radio(Section):
     """`log_distance`: path loss exponent."""
     reference_loss_db: Finite = 40.05
     """`log_distance`: path loss at 1 m."""
+    frequency_mhz: Annotated[float, Field(ge=100, le=100_000)] = 2437.0
+    """All channels but `range` and `log_distance`. By default 2437 (channel 6), and 5180 (channel 36) with `a`."""
+    environment: Literal["suburban", "urban", "dense_urban", "highrise"] = "suburban"
+    """`air_to_ground`: what stands around the node on the ground."""
+    airborne_m: NonNegative = 10.0
+    """`air_to_ground` and `uma_av`: two nodes at or above this height see each other as `air_to_air`. By default 10,
+    and 26 with `uma_av`, whose ground antenna is at 25 m."""
+    shadowing_db: Annotated[float, Field(ge=0, le=30)] = 0.0
+    """Standard deviation of log-normal shadowing; 0: none."""
+    shadowing_corr_m: Positive = 50.0
+    """Distance over which its correlation falls to 1/e."""
+    obstruction_loss_db: NonNegative = 20.0
+    """What a link loses when the world says that something stands in its way; with `range` it is cut."""
     sensitivity_dbm: Finite = -82.0
-    """`log_distance`: decode and carrier-sense limit; weaker frames only interfere."""
+    """All channels but `range`: decode and carrier-sense limit; weaker frames only interfere."""
     interference_floor_dbm: Finite = -101.0
+    """All channels but `range`: weaker frames are nothing. In free space it is reached after tens of kilometres."""
     preamble_snr_db: Finite = 4.0
     noise_figure_db: NonNegative = 7.0
     capture: bool = False
@@ -92,9 +107,13 @@ class Radio(Section):
 
 
 def _with_standard_defaults(given: Mapping[str, Any]) -> dict[str, Any]:
-    """Fill in what `radio.standard` and the rate imply and the file does not say; wrong values are left for later."""
+    """Fill in what the standard, the rate and the channel imply and the file does not say; wrong values stay."""
     keys = dict(given)
     standard = keys.get("standard", "b")
+    if standard == "a":
+        keys.setdefault("frequency_mhz", 5180.0)
+    if keys.get("channel") == "uma_av":
+        keys.setdefault("airborne_m", 26.0)
     if standard in ("g", "a"):
         keys.setdefault("rate_mbps", 54.0)
     rate = keys.get("rate_mbps", 11.0)
@@ -122,7 +141,9 @@ def _disagreements(radio: Radio) -> Iterator[str]:
             f"radio.ack_rate_mbps = {radio.ack_rate_mbps:g} must be of the modulation (DSSS or OFDM) of "
             f"radio.rate_mbps = {radio.rate_mbps:g}"
         )
-    if radio.channel == "range" and radio.capture:
-        yield 'radio.capture needs a channel with powers: with radio.channel = "range" all frames are equally strong'
+    if radio.channel == "range":
+        for key, used in (("capture", radio.capture), ("shadowing_db", radio.shadowing_db > 0)):
+            if used:
+                yield f'radio.{key} needs a channel with powers: with radio.channel = "range" all are equally strong'
     if radio.slot == "short" and radio.standard == "b":
         yield 'radio.slot = "short" needs radio.standard = "g" or "a"'

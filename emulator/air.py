@@ -9,6 +9,7 @@ from emulator import kernel
 from emulator import state as s
 from emulator.airtime import DETECT_NS, OVERHEAD_BYTES, Timing, airtime_ns, lifetime_ns
 from emulator.error_rate import header_rates, log_success_per_bit
+from emulator.fading import law_of, seeds
 from emulator.propagation import Links, milliwatt, noise_mw
 from emulator.shadowing import Shadowing
 from fanet_mw.rng import stream_seed
@@ -30,6 +31,7 @@ class Air:
         self._radio = radio
         self._stations = stations
         timing = Timing.of(radio)
+        fading, shape = law_of(radio)
         self.g = np.zeros(s.GLOBALS, np.int64)
         self._p = np.zeros(s.PARAMETERS, np.int64)
         self._p[:] = (
@@ -37,7 +39,7 @@ class Air:
             timing.ack_timeout_ns, timing.header_ns, DETECT_NS, radio.cw_min, radio.cw_max, radio.max_attempts,
             radio.queue_frames, lifetime_ns(radio),
             radio.access == "standard", radio.access == "ns3", radio.channel != "range", timing.extension_ns,
-            radio.capture,
+            radio.capture, fading,
         )  # fmt: skip
         self._pf = np.array(
             [
@@ -47,6 +49,8 @@ class Air:
                 radio.rate_mbps * 1e-3,
                 radio.ack_rate_mbps * 1e-3,
                 milliwatt(radio.capture_db),
+                milliwatt(radio.sensitivity_dbm),
+                shape,
             ]
         )
         self.st = np.zeros((s.STATION_ROWS, stations), np.int64)
@@ -56,6 +60,9 @@ class Air:
         ):  # fmt: skip
             self.st[row] = value
         self.st[s.RANDOM] = [stream_seed(seed, "backoff", i + 1) % _GENERATOR_RANGE + 1 for i in range(stations)]
+        self.st[s.FADE_A], self.st[s.FADE_B] = np.array(
+            [seeds(stream_seed(seed, "fading", i + 1)) for i in range(stations)], np.int64
+        ).T
         self._sf = np.zeros((s.STATION_REALS, stations), np.float64)
         self.fr = np.zeros((s.FRAME_ROWS, 1024), np.int64)
         self._hs = np.zeros((8 * stations + 2 * 1024 + 64, 5), np.int64)

@@ -6,6 +6,7 @@ Backoff slots count from BASE while the medium is idle; when it turns busy, the 
 and the rest waits. A pending access is one event; it is stale when SCHEDULED has another instant.
 """
 
+from emulator.fading import gain
 from emulator.heap import push
 from emulator.jit import jit
 from emulator.state import (
@@ -31,6 +32,7 @@ from emulator.state import (
     BUSY_NS,
     BUSY_SINCE,
     COLLIDED,
+    COPY,
     CS,
     CW,
     CW_MAX,
@@ -51,6 +53,7 @@ from emulator.state import (
     ENDS,
     EVERYONE,
     EXPIRED,
+    FADING,
     FATE,
     FATE_HALF_DUPLEX,
     FATE_OPEN,
@@ -96,6 +99,7 @@ from emulator.state import (
     RETRIES,
     SCHEDULED,
     SENSED,
+    SENSITIVITY_MW,
     SLOT_NS,
     SRC,
     TAIL,
@@ -312,7 +316,19 @@ def request(g: Ints, p: Ints, st: Ints, hs: Ints, s: int, t: int) -> None:
 
 @jit
 def access(
-    g: Ints, p: Ints, st: Ints, fr: Ints, lk: Ints, lp: Reals, ptr: Ints, hs: Ints, hr: Ints, out: Ints, s: int, t: int
+    g: Ints,
+    p: Ints,
+    pf: Reals,
+    st: Ints,
+    fr: Ints,
+    lk: Ints,
+    lp: Reals,
+    ptr: Ints,
+    hs: Ints,
+    hr: Ints,
+    out: Ints,
+    s: int,
+    t: int,
 ) -> None:
     """The backoff has run out: transmit the first frame that is still alive."""
     if st[SCHEDULED, s] != t:
@@ -326,20 +342,32 @@ def access(
     if f < 0:
         return
     fr[ATTEMPTS, f] += 1
+    begin_tx(g, p, pf, st, fr, lk, lp, ptr, hr, s, f, DATA, t)
     targets = 0
     for link in range(ptr[s], ptr[s + 1]):
-        if lk[AUDIBLE, link] == 1 and (fr[DST, f] == EVERYONE or fr[DST, f] == lk[LINK_DST, link]):
+        if lk[COPY, link] == 1 and (fr[DST, f] == EVERYONE or fr[DST, f] == lk[LINK_DST, link]):
             targets += 1
     fr[TARGETS, f] = targets
     g[ON_AIR_COPIES] += targets
     if fr[DST, f] != EVERYONE:
         g[ATTEMPTS_MADE] += 1
-    begin_tx(g, p, st, fr, lk, lp, ptr, hr, s, f, DATA, t)
 
 
 @jit
 def begin_tx(
-    g: Ints, p: Ints, st: Ints, fr: Ints, lk: Ints, lp: Reals, ptr: Ints, hr: Ints, s: int, f: int, kind: int, t: int
+    g: Ints,
+    p: Ints,
+    pf: Reals,
+    st: Ints,
+    fr: Ints,
+    lk: Ints,
+    lp: Reals,
+    ptr: Ints,
+    hr: Ints,
+    s: int,
+    f: int,
+    kind: int,
+    t: int,
 ) -> None:
     """A station starts to transmit; whatever it was receiving is lost."""
     if st[LOCK, s] >= 0:
@@ -357,6 +385,11 @@ def begin_tx(
     for link in range(first, last):
         lp[ON_AIR, link] = lp[LINK_POWER, link]
         lk[SENSED, link] = lk[AUDIBLE, link]
+        lk[COPY, link] = lk[AUDIBLE, link]
+        if p[FADING] != 0:
+            lp[ON_AIR, link] *= gain(p, pf, st, s)
+            lk[SENSED, link] = 1 if lp[ON_AIR, link] >= pf[SENSITIVITY_MW] else 0
+            lk[COPY, link] = max(lk[AUDIBLE, link], lk[SENSED, link])
         lk[FATE, link] = FATE_OPEN
         lk[LINK_FRAME, link] = f
         lk[LINK_KIND, link] = kind
@@ -442,6 +475,7 @@ def ack_timeout(g: Ints, p: Ints, st: Ints, fr: Ints, lk: Ints, hs: Ints, out: I
 def send_ack(
     g: Ints,
     p: Ints,
+    pf: Reals,
     st: Ints,
     fr: Ints,
     lk: Ints,
@@ -457,7 +491,7 @@ def send_ack(
     """SIFS after a unicast frame for us: acknowledge, whatever the medium does."""
     st[ACK_TO, s] = -1
     if st[TX_KIND, s] == NOTHING:
-        begin_tx(g, p, st, fr, lk, lp, ptr, hr, s, f, ACK, t)
+        begin_tx(g, p, pf, st, fr, lk, lp, ptr, hr, s, f, ACK, t)
         release(g, fr, out, f, t)
         return
     release(g, fr, out, f, t)

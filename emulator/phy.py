@@ -20,6 +20,7 @@ from emulator.state import (
     CAPTURE,
     CAPTURE_RATIO,
     COLLISION_COPIES,
+    COPY,
     CS,
     DATA,
     DELAY,
@@ -211,7 +212,7 @@ def data_end(
     ours = fr[DST, f] == EVERYONE or fr[DST, f] == r
     if whole and not ours:
         st[NAV, r] = max(st[NAV, r], t + p[SIFS_NS] + p[ACK_NS])
-    if not ours or lk[SENSED, link] == 0:
+    if not ours or lk[COPY, link] == 0:
         return
     if not whole:
         lost(g, fr, lk[FATE, link], f)

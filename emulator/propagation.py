@@ -123,8 +123,8 @@ class Links:
         self.ints[DELAY, :count] = np.rint(distance / SPEED_OF_LIGHT_M_S * 1e9)
         audible = power_dbm >= radio.sensitivity_dbm if radio.channel != "range" else np.ones(count, bool)
         self.ints[AUDIBLE, :count] = audible
-        self.longest_ns = int((self.ints[DELAY] * self.ints[AUDIBLE]).max())
-        """Delay of the longest audible link."""
+        self.longest_ns = int((self.ints[DELAY] * (self.ints[AUDIBLE] if radio.fading == "none" else 1)).max())
+        """Delay of the longest link that can be received: an audible one, or any that fading may lift."""
         self.reals[LINK_POWER, :count] = np.power(10.0, power_dbm / 10)
         self.ptr = np.searchsorted(found[:, 0], np.arange(stations + 1)).astype(np.int64)
 

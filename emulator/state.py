@@ -49,9 +49,11 @@ Reals = npt.NDArray[np.float64]
     BUSY_NS,  # busy time so far
     RANDOM,  # state of the station's generator
     HANDED,  # receptions handed to the station
+    FADE_A,  # state of the generator for the fading of what the station transmits
+    FADE_B,
     ON_AIR_LIST,  # not by station: the first ON_AIR_N entries name the stations that transmit
     STATION_ROWS,
-) = range(31)
+) = range(33)
 NOTHING: Final = 0
 DATA: Final = 1
 ACK: Final = 2
@@ -81,9 +83,12 @@ POWER, LOG_OK, STATION_REALS = range(3)
 EVERYONE: Final = -1
 
 # --- links (lk, lp) -----------------------------------------------------------------------------------------------
-LINK_SRC, LINK_DST, DELAY, AUDIBLE, SENSED, FATE, LINK_FRAME, LINK_KIND, UNDERWAY, BEGINS, ENDS, LINK_ROWS = range(12)
+(
+    LINK_SRC, LINK_DST, DELAY, AUDIBLE, SENSED, COPY, FATE, LINK_FRAME, LINK_KIND, UNDERWAY, BEGINS, ENDS, LINK_ROWS,
+) = range(13)  # fmt: skip
 """AUDIBLE: strong enough to sense and decode; others only interfere. SENSED, FATE: of the frame now on
-the link; SENSED is AUDIBLE as it was at its start. LINK_FRAME, LINK_KIND: what it is (of an ACK: the frame it
+the link; SENSED is AUDIBLE as it was at its start, or as fading has it. COPY: 1 when the frame counts as a copy for
+this receiver: audible on average, or lifted by fading. LINK_FRAME, LINK_KIND: what it is (of an ACK: the frame it
 acknowledges). UNDERWAY: 1 until its end. BEGINS, ENDS: its first and last bit at the receiver."""
 LINK_POWER, ON_AIR, LINK_REALS = range(3)
 """LINK_POWER: received power [mW]. ON_AIR: that of the frame now on the link, as it was at its start."""
@@ -147,6 +152,17 @@ DELIVERED, NO_RECEIVER, COLLIDED, DEAF, WEAK, GIVEN_UP, NO_ROOM, EXPIRED = range
     INTERFERENCE,  # 0: any overlap destroys; 1: SINR and error rate
     EXTENSION_NS,  # signal extension at the end of each frame (OFDM at 2.4 GHz)
     CAPTURE,  # 1: a later frame that is CAPTURE_RATIO times as strong as the locked one takes the receiver
+    FADING,  # 0 none, else the law: see fading.py
     PARAMETERS,
-) = range(19)
-NOISE_MW, DETECT_RATIO, HEADER_BITS_PER_NS, PAYLOAD_BITS_PER_NS, ACK_BITS_PER_NS, CAPTURE_RATIO, REALS = range(7)
+) = range(20)
+(
+    NOISE_MW,
+    DETECT_RATIO,
+    HEADER_BITS_PER_NS,
+    PAYLOAD_BITS_PER_NS,
+    ACK_BITS_PER_NS,
+    CAPTURE_RATIO,
+    SENSITIVITY_MW,
+    FADING_SHAPE,  # m, or K as a ratio
+    REALS,
+) = range(9)

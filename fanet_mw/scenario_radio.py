@@ -57,6 +57,12 @@ class Radio(Section):
     """Standard deviation of log-normal shadowing; 0: none."""
     shadowing_corr_m: Positive = 50.0
     """Distance over which its correlation falls to 1/e."""
+    fading: Literal["none", "nakagami", "rician"] = "none"
+    """Small-scale fading: a power gain of mean 1 per frame and receiver."""
+    nakagami_m: Annotated[float, Field(ge=0.5, le=1000)] = 3.0
+    """`nakagami`: 1 is Rayleigh; more is steadier."""
+    rician_k_db: Annotated[float, Field(ge=-20, le=40)] = 10.0
+    """`rician`: power of the line of sight over that of all scattered paths."""
     obstruction_loss_db: NonNegative = 20.0
     """What a link loses when the world says that something stands in its way; with `range` it is cut."""
     sensitivity_dbm: Finite = -82.0
@@ -142,7 +148,11 @@ def _disagreements(radio: Radio) -> Iterator[str]:
             f"radio.rate_mbps = {radio.rate_mbps:g}"
         )
     if radio.channel == "range":
-        for key, used in (("capture", radio.capture), ("shadowing_db", radio.shadowing_db > 0)):
+        for key, used in (
+            ("capture", radio.capture),
+            ("shadowing_db", radio.shadowing_db > 0),
+            ("fading", radio.fading != "none"),
+        ):
             if used:
                 yield f'radio.{key} needs a channel with powers: with radio.channel = "range" all are equally strong'
     if radio.slot == "short" and radio.standard == "b":

@@ -6,8 +6,10 @@ from typing import Any
 import numpy as np
 import pytest
 
+from emulator import fading, state
 from emulator.shadowing import Shadowing
 from fanet_mw import config
+from fanet_mw.rng import stream_seed
 from fanet_mw.scenario import Radio
 
 FAR_M = 5000.0
@@ -65,3 +67,59 @@ def test_close_ends_have_the_same_standard_deviation() -> None:
         found = np.column_stack([np.arange(200), np.arange(200, 400)])
         drawn.append(Shadowing(keys, seed=seed).loss_db(at, found, np.full(200, 10.0)))
     assert np.concatenate(drawn).std() == pytest.approx(6.0, rel=0.05)
+
+
+DRAWS = 20_000
+
+
+def gains(**keys: Any) -> Any:
+    """Power gains of one transmitter, as the kernel draws them."""
+    law, shape = fading.law_of(radio(**keys))
+    p, pf = np.zeros(state.PARAMETERS, np.int64), np.zeros(state.REALS)
+    p[state.FADING], pf[state.FADING_SHAPE] = law, shape
+    rows = np.zeros((state.STATION_ROWS, 1), np.int64)
+    rows[[state.FADE_A, state.FADE_B], 0] = fading.seeds(stream_seed(3, "fading", 1))
+    return np.array([fading.gain(p, pf, rows, 0) for _ in range(DRAWS)])
+
+
+def gamma_share(shape: int, x: Any) -> Any:
+    """P(gamma of integer shape and scale 1 <= x)."""
+    return 1 - np.exp(-x) * sum(x**k / math.factorial(k) for k in range(shape))
+
+
+def kolmogorov_smirnov(drawn: Any, share: Any) -> float:
+    """Greatest distance between the drawn distribution and the law, which is `share` at each of `drawn`, ascending."""
+    steps = np.arange(len(drawn) + 1) / len(drawn)
+    return float(max((steps[1:] - share).max(), (share - steps[:-1]).max()))
+
+
+ONE_PERCENT: float = 1.628 / math.sqrt(DRAWS)
+"""Kolmogorov-Smirnov distance that a right law exceeds in one of a hundred samples."""
+
+
+@pytest.mark.parametrize("m", [0.5, 1, 3, 8])
+def test_nakagami_power_is_gamma_distributed_with_mean_one(m: float) -> None:
+    drawn = np.sort(gains(fading="nakagami", nakagami_m=m))
+    assert drawn.mean() == pytest.approx(1.0, abs=4 / math.sqrt(m * DRAWS))
+    assert drawn.var() == pytest.approx(1 / m, rel=0.08)
+    normal_squared = np.array([math.erf(math.sqrt(x / 2)) for x in drawn])
+    share = normal_squared if m == 0.5 else gamma_share(int(m), m * drawn)
+    assert kolmogorov_smirnov(drawn, share) < ONE_PERCENT
+
+
+@pytest.mark.parametrize("k_db", [-20, 3, 10, 15])
+def test_rician_power_is_noncentral_chi_square_distributed_with_mean_one(k_db: float) -> None:
+    """As a Poisson mixture of gamma distributions: sum over j of P(j; K) P(gamma(j + 1) <= (K + 1) x)."""
+    k = math.pow(10, k_db / 10)
+    drawn = np.sort(gains(fading="rician", rician_k_db=k_db))
+    assert drawn.mean() == pytest.approx(1.0, abs=4 * math.sqrt((1 + 2 * k) / (1 + k) ** 2 / DRAWS))
+    assert drawn.var() == pytest.approx((1 + 2 * k) / (1 + k) ** 2, rel=0.05)
+    x = (k + 1) * drawn
+    term, below, share = np.exp(-x), np.exp(-x), np.zeros(DRAWS)
+    weight = math.exp(-k)
+    for j in range(160):
+        share += weight * (1 - below)
+        term = term * x / (j + 1)
+        below = below + term
+        weight *= k / (j + 1)
+    assert kolmogorov_smirnov(drawn, share) < ONE_PERCENT

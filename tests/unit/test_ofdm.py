@@ -36,6 +36,15 @@ def test_a_unicast_exchange_at_5_ghz_takes_its_frame_sifs_and_ack(make_scenario:
     assert statuses(heard) == [(1, TxOutcome.ACKED, 1 * MS + (184 + 16 + 28) * US + 1000, 1)]
 
 
+def test_a_sender_that_comes_closer_while_its_ack_arrives_still_waits_for_its_end(make_scenario: MakeScenario) -> None:
+    """ACK at 6 Mb/s: 44 us, timeout after 45. By the new distance it has ended 2 us before its last bit arrives."""
+    keys = {"radio.standard": "a", "radio.ack_rate_mbps": 6, "radio.range_m": 700}
+    air = Air(make_scenario(**{"nodes.count": 2, **keys}), [0, 599.6])
+    air.send(1, 1 * MS, dst=2)
+    air.place([0, 10], 1 * MS + (184 + 42) * US)
+    assert statuses(air.run()) == [(1, TxOutcome.ACKED, 1 * MS + (184 + 16 + 44 + 4) * US, 1)]
+
+
 def test_at_2_4_ghz_each_frame_is_followed_by_6_us_of_signal_extension(make_scenario: MakeScenario) -> None:
     air = Air(make_scenario(**{"nodes.count": 2, "radio.standard": "g"}), [0, 150])
     air.send(1, 1 * MS, dst=2)

@@ -69,7 +69,6 @@ from emulator.state import (
     LINK_FRAME,
     LINK_KIND,
     LINK_POWER,
-    LINK_SRC,
     LOCK,
     LOCK_HEADER_END,
     LOST_COLLISION,
@@ -454,9 +453,7 @@ def ack_timeout(g: Ints, p: Ints, st: Ints, fr: Ints, lk: Ints, hs: Ints, out: I
         return
     link = st[LOCK, s]
     if link >= 0 and st[LOCK_HEADER_END, s] <= t:
-        end = st[TX_END, lk[LINK_SRC, link]] + lk[DELAY, link]
-        soon = t + 1000  # a link that has become shorter since: by its new delay the frame has ended, and it has not
-        push(hs, g, HS_N, end + 1 if end >= t else soon, ACK_TIMEOUT, s, f)
+        push(hs, g, HS_N, lk[ENDS, link] + 1, ACK_TIMEOUT, s, f)
         return
     st[WAITING, s] = -1
     st[RESUME_FROM, s] = t

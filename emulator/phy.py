@@ -23,11 +23,11 @@ from emulator.state import (
     COPY,
     CS,
     DATA,
-    DELAY,
     DETECT_NS,
     DETECT_RATIO,
     DST,
     EIFS_EXTRA_NS,
+    ENDS,
     EVERYONE,
     EXTENSION_NS,
     FATE,
@@ -67,7 +67,6 @@ from emulator.state import (
     SEND_ACK,
     SENSED,
     SIFS_NS,
-    TX_END,
     TX_KIND,
     UNDERWAY,
     WAITING,
@@ -139,7 +138,7 @@ def rx_detect(p: Ints, pf: Reals, st: Ints, sf: Reals, lk: Ints, lp: Reals, link
         st[LOCK_RATE, r] = 2 if lk[LINK_KIND, link] == ACK else 1
         st[LOCK_DATA_END, r] = NEVER
         if p[EXTENSION_NS] > 0:
-            st[LOCK_DATA_END, r] = st[TX_END, lk[LINK_SRC, link]] + lk[DELAY, link] - p[EXTENSION_NS]
+            st[LOCK_DATA_END, r] = lk[ENDS, link] - p[EXTENSION_NS]
         st[OVERLAPPED, r] = 1 if st[NSIG, r] > 1 else 0
         sf[LOG_OK, r] = 0.0
 

@@ -10,7 +10,7 @@ from emulator import state as s
 from emulator.airtime import DETECT_NS, OVERHEAD_BYTES, Timing, airtime_ns, lifetime_ns
 from emulator.error_rate import header_rates, log_success_per_bit
 from emulator.fading import law_of, seeds
-from emulator.propagation import Links, milliwatt, noise_mw
+from emulator.propagation import Links, milliwatt, noise_mw, pair_codes
 from emulator.shadowing import Shadowing
 from fanet_mw.rng import stream_seed
 from fanet_mw.scenario import Radio
@@ -74,17 +74,29 @@ class Air:
         self._lk, self._lp, self._ptr = nowhere.ints, nowhere.reals, nowhere.ptr
         self._hr = np.zeros((64, 5), np.int64)
         self._at = np.full((stations, 3), np.inf)
+        self._blocked = np.zeros(0, np.int64)
+        self._seen_anew = False
+        """Whether the obstructions have changed since the links were made."""
         self.next_output_ns = kernel.NEVER
         """A lower bound of the next instant at which `advance` has something to return; NEVER: nothing is planned."""
         self._gather()
 
+    def obstruct(self, pairs: npt.NDArray[np.int64]) -> None:
+        """Something stands between these pairs of stations [n, 2], and no others, from the next `place` on."""
+        blocked = np.unique(pair_codes(pairs, self._stations))
+        self._seen_anew = self._seen_anew or not np.array_equal(blocked, self._blocked)
+        self._blocked = blocked
+
     def place(self, at: npt.NDArray[np.float64]) -> None:
         """New positions [m], one row per station; frames under way are carried over."""
-        if np.array_equal(at, self._at):
+        if np.array_equal(at, self._at) and not self._seen_anew:
             return
+        self._seen_anew = False
         self._at = at
         spare = int(self._lk[s.UNDERWAY].sum())
-        links = Links(np.ascontiguousarray(at), self._radio, spare=spare, shadowing=self._shadowing)
+        links = Links(
+            np.ascontiguousarray(at), self._radio, spare=spare, shadowing=self._shadowing, blocked=self._blocked
+        )
         self.g[s.REACH_NS] = max(self.g[s.REACH_NS] if spare else 0, links.longest_ns)
         room = 4 * (links.ints.shape[1] + self._stations) + 64
         if self._hr.shape[0] < room + self.g[s.HR_N]:

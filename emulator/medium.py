@@ -15,7 +15,7 @@ from emulator.air import Air
 from emulator.dcf import NEVER
 from fanet_mw.actor import Actor
 from fanet_mw.errors import DropReason
-from fanet_mw.messages import Message, Poses, Reception, TxOutcome, TxRequest, TxStatus
+from fanet_mw.messages import Message, Obstructions, Poses, Reception, TxOutcome, TxRequest, TxStatus
 from fanet_mw.scenario import Scenario
 from fanet_mw.topics import Topics, node_of
 from fanet_mw.units import BROADCAST, MS, NodeId, seconds_to_ns
@@ -33,7 +33,7 @@ class Medium(Actor):
 
     def __init__(self, scenario: Scenario, swarm: str) -> None:
         topics = Topics(swarm)
-        super().__init__("emulator", (topics.all_tx, topics.pose))
+        super().__init__("emulator", (topics.all_tx, topics.pose, topics.obstruction))
         self._max_bytes = scenario.radio.max_frame_bytes
         self._count = scenario.nodes.count
         self._rx_topics = [topics.radio_rx(node) for node in scenario.node_ids]
@@ -66,6 +66,8 @@ class Medium(Actor):
         elif isinstance(message, Poses):
             self._pass_time(now_ns)
             self._place(message)
+        elif isinstance(message, Obstructions):
+            self._obstruct(message)
         else:
             self._accounts.refused["message_type"] += 1
 
@@ -199,6 +201,14 @@ class Medium(Actor):
                 outbox.append((rx_topics[station], TxStatus(request.seq, TxOutcome(value), t_ns, attempts)))
 
     # --- positions ------------------------------------------------------------------------------------------------
+
+    def _obstruct(self, obstructions: Obstructions) -> None:
+        """What stands between nodes counts from the next poses on: they were taken at the same instant."""
+        pairs = np.frombuffer(obstructions.pairs, np.uint16).astype(np.int64)
+        if len(pairs) % 2 or (len(pairs) and not 1 <= pairs.min() <= pairs.max() <= self._count):
+            self._accounts.refused["obstructions"] += 1
+            return
+        self._air.obstruct(pairs.reshape(-1, 2) - 1)
 
     def _place(self, poses: Poses) -> None:
         ids = np.frombuffer(poses.ids, np.uint16).astype(np.int64)

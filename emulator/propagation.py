@@ -103,7 +103,9 @@ class Links:
         power_dbm = received_dbm(distance, at[found[:, 0]], at[found[:, 1]], radio)
         if shadowing is not None:
             power_dbm = power_dbm - shadowing.loss_db(at, found, distance)
-        hidden = np.zeros(len(found), bool) if blocked is None else np.isin(pair_codes(found, len(at)), blocked)
+        hidden = np.zeros(len(found), bool)
+        if blocked is not None and len(blocked):
+            hidden = np.isin(pair_codes(found, len(at)), blocked)
         if radio.channel == "range":
             heard = ~hidden
         else:
@@ -131,4 +133,4 @@ class Links:
 
 def pair_codes(found: Ints, stations: int) -> Ints:
     """One number per pair [n, 2] of stations, the same for both directions."""
-    return np.asarray(found.min(axis=1) * stations + found.max(axis=1), dtype=np.int64)
+    return np.asarray(np.minimum(*found.T) * stations + np.maximum(*found.T), dtype=np.int64)

@@ -113,6 +113,9 @@ class Mobility(Section):
     speed_m_s: NonNegative = 7.5
 
 
+Building = tuple[Finite, Finite, Positive, Positive, Positive]
+
+
 class World(Section):
     """The engine that moves the bodies, and the area they move in."""
 
@@ -122,8 +125,33 @@ class World(Section):
     tick_ms: Positive = 100.0
     """Period at which poses are published."""
     physics_hz: Annotated[int, Field(ge=10, le=2000)] = 240
+    buildings: Annotated[int, Field(ge=0, le=10_000)] | tuple[Building, ...] = 0
+    """A number of boxes at seeded places, or each as [east, north, width, depth, height] in metres: its middle, its
+    extent to the east and to the north, and its roof above the ground. UAVs collide with them, radio is obstructed."""
+    building_size_m: tuple[Positive, Positive] = (15.0, 40.0)
+    """Least and greatest width and depth of a seeded building."""
+    building_height_m: tuple[Positive, Positive] = (8.0, 30.0)
+    terrain_m: Annotated[float, Field(ge=0, le=1000)] = 0.0
+    """Height of the highest hill above the plain at 0; 0: no hills."""
+    terrain_scale_m: Positive = 400.0
+    """Distance from hill to hill."""
     gps_hz: Positive = 5.0
     gps_sigma_m: NonNegative = 1.5
+
+    @model_validator(mode="after")
+    def _obstacles_agree(self) -> Self:
+        if self.has_obstacles and self.engine != "pybullet":
+            raise ValueError('world.buildings and world.terrain_m need world.engine = "pybullet"')
+        for key in ("building_size_m", "building_height_m"):
+            least, greatest = getattr(self, key)
+            if least > greatest:
+                raise ValueError(f"world.{key} = [{least:g}, {greatest:g}] must be [least, greatest]")
+        return self
+
+    @property
+    def has_obstacles(self) -> bool:
+        """Whether anything but a plain can stand between two nodes."""
+        return bool(self.buildings) or self.terrain_m > 0
 
     @property
     def tick_ns(self) -> int:

@@ -3,6 +3,7 @@
     fanet/<swarm>/radio/<id>/tx          TxRequest              node -> medium
     fanet/<swarm>/radio/<id>/rx          Reception | TxStatus   medium -> node
     fanet/<swarm>/world/pose             Poses
+    fanet/<swarm>/world/obstruction      Obstructions
     fanet/<swarm>/world/<id>/setpoint    Setpoint               UAV -> world
     fanet/<swarm>/world/<id>/sensor/gps  Gps
     fanet/<swarm>/world/<id>/sensor/wifi WifiScan
@@ -28,6 +29,7 @@ from fanet_mw.messages import (
     Gps,
     MavlinkTap,
     Message,
+    Obstructions,
     Poses,
     Reception,
     Report,
@@ -49,6 +51,7 @@ class Topics:
     def __init__(self, swarm: str) -> None:
         self._base = f"{ROOT}/{swarm}"
         self.pose = f"{self._base}/world/pose"
+        self.obstruction = f"{self._base}/world/obstruction"
         self.clock = f"{self._base}/clock"
         self.all_tx = self.radio_tx("*")
         self.all_setpoints = f"{self._base}/world/*/setpoint"
@@ -101,6 +104,7 @@ _GPS = struct.Struct("<q6d")
 _SCAN = struct.Struct("<qH")
 _HEARD = struct.Struct("<If")
 _POSES = struct.Struct("<qI")
+_OBSTRUCTIONS = struct.Struct("<qI")
 _CLOCK = struct.Struct("<qdB")
 _INSTANT = struct.Struct("<q")
 
@@ -145,6 +149,19 @@ def _decode_poses(body: bytes) -> Poses:
     ids.frombytes(body[_POSES.size : split])
     states.frombytes(body[split:])
     return Poses(t_ns, ids, states)
+
+
+def _encode_obstructions(m: Obstructions) -> bytes:
+    return _OBSTRUCTIONS.pack(m.t_ns, len(m.pairs)) + m.pairs.tobytes()
+
+
+def _decode_obstructions(body: bytes) -> Obstructions:
+    t_ns, count = _OBSTRUCTIONS.unpack_from(body)
+    pairs = array("H")
+    if len(body) != _OBSTRUCTIONS.size + 2 * count or count % 2:
+        raise ValueError("length")
+    pairs.frombytes(body[_OBSTRUCTIONS.size :])
+    return Obstructions(t_ns, pairs)
 
 
 def _encode_setpoint(m: Setpoint) -> bytes:
@@ -225,6 +242,7 @@ _CODECS: Final[dict[int, tuple[type[Any], Callable[[Any], bytes], Callable[[byte
     9: (TraceBatch, _encode_trace, _decode_trace),
     10: (Clock, _encode_clock, _decode_clock),
     11: (Report, _encode_report, _decode_report),
+    12: (Obstructions, _encode_obstructions, _decode_obstructions),
 }
 _CODE_OF: Final = {kind: (code, encode) for code, (kind, encode, _) in _CODECS.items()}
 _ITEM: Final = struct.Struct("<BI")

@@ -46,10 +46,10 @@ def noise_mw(radio: Radio) -> float:
 
 
 def reach_m(radio: Radio) -> float:
-    """Beyond this distance a station does not even interfere, by the most favorable law and 3 sigma of shadowing."""
+    """Beyond this distance a station does not even interfere, by the most favorable law and 2 sigma of shadowing."""
     if radio.channel == "range":
         return radio.range_m
-    budget_db = radio.tx_power_dbm - radio.interference_floor_dbm + 3 * radio.shadowing_db
+    budget_db = radio.tx_power_dbm - radio.interference_floor_dbm + 2 * radio.shadowing_db
     at_1_m = float(friis_db(np.ones(1), frequency_mhz=radio.frequency_mhz)[0])
     laws = {
         "log_distance": [(radio.reference_loss_db, radio.exponent)],
@@ -98,8 +98,6 @@ class Links:
     ) -> None:
         """`blocked`: codes, see `pair_codes`, of the pairs between which something stands, ascending."""
         found, distance = neighbors(at, reach_m(radio))
-        nearest_first = np.lexsort((found[:, 1], distance, found[:, 0]))
-        found, distance = found[nearest_first], distance[nearest_first]
         power_dbm = received_dbm(distance, at[found[:, 0]], at[found[:, 1]], radio)
         if shadowing is not None:
             power_dbm = power_dbm - shadowing.loss_db(at, found, distance)
@@ -113,6 +111,8 @@ class Links:
             heard = power_dbm >= radio.interference_floor_dbm - _ROUNDING_DB
         if not heard.all():
             found, distance, power_dbm = found[heard], distance[heard], power_dbm[heard]
+        nearest_first = np.lexsort((found[:, 1], distance, found[:, 0]))
+        found, distance, power_dbm = found[nearest_first], distance[nearest_first], power_dbm[nearest_first]
         self._fill(found, distance, power_dbm, radio, stations=len(at), spare=spare)
 
     def _fill(self, found: Ints, distance: Reals, power_dbm: Reals, radio: Radio, *, stations: int, spare: int) -> None:

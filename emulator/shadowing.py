@@ -12,7 +12,6 @@ from the law by about 1 / sqrt(2 N).
 """
 
 import math
-from typing import Final
 
 import numpy as np
 
@@ -21,7 +20,19 @@ from emulator.state import Ints, Reals
 from fanet_mw.rng import stream_seed
 from fanet_mw.scenario_radio import Radio
 
-WAVES: Final = 128
+WAVES = 128  # a multiple of 4
+
+
+@jit
+def one_way(cos_k: Reals, sin_k: Reals, cos_l: Reals, sin_l: Reals) -> float:
+    """Sum of cos(k + l) over the waves, in four sums side by side: the processor adds them at once."""
+    s0, s1, s2, s3 = 0.0, 0.0, 0.0, 0.0
+    for n in range(0, WAVES, 4):
+        s0 += cos_k[n] * cos_l[n] - sin_k[n] * sin_l[n]
+        s1 += cos_k[n + 1] * cos_l[n + 1] - sin_k[n + 1] * sin_l[n + 1]
+        s2 += cos_k[n + 2] * cos_l[n + 2] - sin_k[n + 2] * sin_l[n + 2]
+        s3 += cos_k[n + 3] * cos_l[n + 3] - sin_k[n + 3] * sin_l[n + 3]
+    return (s0 + s1) + (s2 + s3)
 
 
 @jit
@@ -29,11 +40,7 @@ def superpose(found: Ints, cos_k: Reals, sin_k: Reals, cos_l: Reals, sin_l: Real
     """Sum of the waves over each pair, both ways round, so that the sum of (a, b) is that of (b, a) to the last bit."""
     for link in range(found.shape[0]):
         a, b = found[link, 0], found[link, 1]
-        there, back = 0.0, 0.0
-        for n in range(cos_k.shape[1]):
-            there += cos_k[a, n] * cos_l[b, n] - sin_k[a, n] * sin_l[b, n]
-            back += cos_k[b, n] * cos_l[a, n] - sin_k[b, n] * sin_l[a, n]
-        total[link] = there + back
+        total[link] = one_way(cos_k[a], sin_k[a], cos_l[b], sin_l[b]) + one_way(cos_k[b], sin_k[b], cos_l[a], sin_l[a])
 
 
 class Shadowing:

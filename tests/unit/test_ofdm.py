@@ -63,6 +63,22 @@ def test_the_next_frame_waits_difs_and_whole_slots_of_9_us(make_scenario: MakeSc
     assert 0 <= backoff_ns <= 15 * 9 * US
 
 
+@pytest.mark.parametrize(("last_us", "received"), [(5, [1]), (15, [])])
+def test_what_overlaps_the_signal_extension_alone_spoils_nothing(
+    make_scenario: MakeScenario, last_us: int, received: list[int]
+) -> None:
+    """Nodes 1 and 3 do not hear each other; node 3's frame begins in the last microseconds of node 1's, 12 dB stronger.
+
+    At 6 Mb/s the extension is the last 6 us of 1476 + 6; the last 2 of them carry no bit of the padding either.
+    """
+    keys = {"radio.standard": "g", "radio.rate_mbps": 6, "radio.channel": "log_distance"}
+    air = Air(make_scenario(**{"nodes.count": 3, "radio.sensitivity_dbm": -79.5, **keys}), [-150, 0, 60])
+    frame_ns = (20 + 4 * 364 + 6) * US  # 22 + 8 x 1088 bits in symbols of 24
+    air.send(1, 1 * MS)
+    air.send(3, 1 * MS + frame_ns - last_us * US)
+    assert [src for node, src, _ in receptions(air.run()) if node == 2] == received
+
+
 @pytest.mark.parametrize(
     ("keys", "slot_us", "sifs_us", "difs_us", "eifs_us"),
     [

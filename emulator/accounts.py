@@ -17,6 +17,9 @@ _REASON_OF: Final = {
     s.GIVEN_UP: DropReason.RETRY_LIMIT,
     s.NO_ROOM: DropReason.MAC_QUEUE_FULL,
     s.EXPIRED: DropReason.MAC_LIFETIME,
+    s.DEGRADED: DropReason.DEGRADED,
+    s.JAMMED: DropReason.JAMMED,
+    s.CUT_OFF: DropReason.STATION_DOWN,
 }
 _LATENESS_STEPS: Final = (0.1, 0.2, 0.5, 1, 2, 5, 10, 20, 50, 100, 200, 500, 1000)
 """Upper edges of the lateness histogram [ms]; percentiles are given as the edge they fall under."""
@@ -32,6 +35,10 @@ class Accounts:
         self.dropped: Counter[str] = Counter()
         self.refused: Counter[str] = Counter()
         """Hostile or misdirected input, by kind; none of it became a frame."""
+        self.poses = 0
+        """Sets of positions taken in."""
+        self.controls = 0
+        """Changes of the air that were obeyed."""
         self.late_frames = 0
         self._max_late_ns = 0
         self._lateness = [0] * (len(_LATENESS_STEPS) + 1)
@@ -70,7 +77,7 @@ class Accounts:
         """Air statistics since `measure_from`."""
         d = (g - self._baseline).tolist()
         span_ns = max(1, now_ns - self._measured_from_ns)
-        landed = d[s.RECEIVED_COPIES] + d[s.COLLISION_COPIES] + d[s.HALF_DUPLEX_COPIES] + d[s.WEAK_COPIES]
+        landed = sum(d[s.RECEIVED_COPIES : s.CUT_COPIES + 1])
         payload_bits = 8 * (self.delivered_bytes - self._bytes_baseline)
         return {
             "pdr": _ratio(d[s.RECEIVED_COPIES], landed),
@@ -86,6 +93,9 @@ class Accounts:
             DropReason.COLLISION: int(g[s.COLLISION_COPIES]),
             DropReason.HALF_DUPLEX: int(g[s.HALF_DUPLEX_COPIES]),
             DropReason.WEAK_SIGNAL: int(g[s.WEAK_COPIES]),
+            DropReason.DEGRADED: int(g[s.DEGRADED_COPIES]),
+            DropReason.JAMMED: int(g[s.JAMMED_COPIES]),
+            DropReason.STATION_DOWN: int(g[s.CUT_COPIES]),
         }
         return {
             "on_air": int(g[s.ON_AIR_COPIES]),

@@ -10,8 +10,11 @@ from emulator import state as s
 from emulator.airtime import DETECT_NS, OVERHEAD_BYTES, Timing, airtime_ns, lifetime_ns
 from emulator.error_rate import header_rates, log_success_per_bit
 from emulator.fading import law_of, seeds
+from emulator.faults import Faults
+from emulator.link_book import LinkBook
 from emulator.propagation import Links, milliwatt, noise_mw, pair_codes
 from emulator.shadowing import Shadowing
+from fanet_mw.link_stats import LinkStats
 from fanet_mw.rng import stream_seed
 from fanet_mw.scenario import Radio
 
@@ -27,9 +30,11 @@ def _error_table(rate_mbps: float, ack_rate_mbps: float) -> npt.NDArray[np.float
 class Air:
     """The state of the channel and of all MACs."""
 
-    def __init__(self, radio: Radio, *, stations: int, seed: int) -> None:
+    def __init__(self, radio: Radio, *, stations: int, seed: int, faults: Faults, capture: bool = False) -> None:
         self._radio = radio
         self._stations = stations
+        self._faults = faults
+        self._book = LinkBook(stations)
         timing = Timing.of(radio)
         fading, shape = law_of(radio)
         self.g = np.zeros(s.GLOBALS, np.int64)
@@ -38,12 +43,11 @@ class Air:
             timing.slot_ns, timing.sifs_ns, timing.difs_ns, timing.eifs_extra_ns, timing.ack_ns,
             timing.ack_timeout_ns, timing.header_ns, DETECT_NS, radio.cw_min, radio.cw_max, radio.max_attempts,
             radio.queue_frames, lifetime_ns(radio),
-            radio.access == "standard", radio.access == "ns3", radio.channel != "range", timing.extension_ns,
-            radio.capture, fading,
+            radio.access == "standard", radio.access == "ns3", radio.channel != "range", capture,
+            timing.extension_ns, radio.capture, fading,
         )  # fmt: skip
         self._pf = np.array(
             [
-                noise_mw(radio),
                 milliwatt(radio.preamble_snr_db),
                 header_rates(radio.rate_mbps)[1],
                 radio.rate_mbps * 1e-3,
@@ -64,6 +68,7 @@ class Air:
             [seeds(stream_seed(seed, "fading", i + 1)) for i in range(stations)], np.int64
         ).T
         self._sf = np.zeros((s.STATION_REALS, stations), np.float64)
+        self._sf[s.NOISE] = noise_mw(radio)
         self.fr = np.zeros((s.FRAME_ROWS, 1024), np.int64)
         self._hs = np.zeros((8 * stations + 2 * 1024 + 64, 5), np.int64)
         self._out = np.zeros((2 * radio.queue_frames + 1024, s.OUT_COLUMNS), np.int64)
@@ -93,10 +98,17 @@ class Air:
             return
         self._seen_anew = False
         self._at = at
+        self.relink()
+
+    def relink(self) -> None:
+        """Make the links anew: stations have moved, or faults have changed."""
+        at = self._at
+        self._book.take(self._lk)
         spare = int(self._lk[s.UNDERWAY].sum())
         links = Links(
             np.ascontiguousarray(at), self._radio, spare=spare, shadowing=self._shadowing, blocked=self._blocked
         )
+        self._sf[s.NOISE] = self._faults.shape(links, at)
         self.g[s.REACH_NS] = max(self.g[s.REACH_NS] if spare else 0, links.longest_ns)
         room = 4 * (links.ints.shape[1] + self._stations) + 64
         if self._hr.shape[0] < room + self.g[s.HR_N]:
@@ -109,6 +121,11 @@ class Air:
         self._lk, self._lp, self._ptr = links.ints, links.reals, links.ptr
         self._gather()
         self.next_output_ns = int(kernel.next_output(self.g, self._p, self.st, self.fr, self._hs))
+
+    def links(self, now_ns: int) -> LinkStats | None:
+        """What the links carried since this was last asked; None when it was nothing."""
+        self._book.take(self._lk)
+        return self._book.close(now_ns)
 
     def neighbors(self, station: int) -> int:
         """How many stations hear this one."""

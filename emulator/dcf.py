@@ -31,14 +31,17 @@ from emulator.state import (
     BORN,
     BUSY_NS,
     BUSY_SINCE,
+    CAPTURE,
     COLLIDED,
     COPY,
     CS,
+    CUT_OFF,
     CW,
     CW_MAX,
     CW_MIN,
     DATA,
     DEAF,
+    DEGRADED,
     DELAY,
     DELIVERED,
     DETECT_NS,
@@ -57,12 +60,14 @@ from emulator.state import (
     FATE,
     FATE_HALF_DUPLEX,
     FATE_OPEN,
+    FAULT,
     FRESH,
     GIVEN_UP,
     HEAD,
     HR_N,
     HS_N,
     IDLE_FROM,
+    JAMMED,
     LAST_END,
     LIFETIME_NS,
     LINK_DST,
@@ -72,9 +77,13 @@ from emulator.state import (
     LOCK,
     LOCK_HEADER_END,
     LOST_COLLISION,
+    LOST_CUT,
+    LOST_DEGRADED,
     LOST_HALF_DUPLEX,
+    LOST_JAMMED,
     LOST_WEAK,
     MAX_ATTEMPTS,
+    N_RECEIVED,
     NAV,
     NEXT,
     NO_RECEIVER,
@@ -88,12 +97,14 @@ from emulator.state import (
     OUT_DONE,
     OUT_FREE,
     OUT_N,
+    OUT_START,
     OUTCOME,
     QLEN,
     QUEUE_LIMIT,
     RANDOM,
     REACH_NS,
     RECEIVED,
+    RECEIVED_COPIES,
     RESUME_FROM,
     RETRIES,
     SCHEDULED,
@@ -155,17 +166,22 @@ def release(g: Ints, fr: Ints, out: Ints, f: int, t: int) -> None:
 def verdict(fr: Ints, f: int) -> int:
     """How a frame ended; of a broadcast that nobody got, why most copies were lost."""
     outcome = fr[OUTCOME, f]
+    most = max(fr[LOST_COLLISION, f], fr[LOST_HALF_DUPLEX, f], fr[LOST_WEAK, f])
     if fr[RECEIVED, f] > 0:
         return DELIVERED
     if outcome == DONE_FULL:
         return NO_ROOM
     if outcome == DONE_EXPIRED:
         return EXPIRED
+    faults = max(fr[LOST_DEGRADED, f], fr[LOST_JAMMED, f], fr[LOST_CUT, f])
+    if faults > 0 and faults >= most:
+        if faults == fr[LOST_CUT, f]:
+            return CUT_OFF
+        return JAMMED if faults == fr[LOST_JAMMED, f] else DEGRADED
     if fr[TARGETS, f] == 0:
         return NO_RECEIVER
     if outcome == DONE_RETRY:
         return GIVEN_UP
-    most = max(fr[LOST_COLLISION, f], fr[LOST_HALF_DUPLEX, f], fr[LOST_WEAK, f])
     if most == fr[LOST_COLLISION, f]:
         return COLLIDED
     return DEAF if most == fr[LOST_HALF_DUPLEX, f] else WEAK
@@ -344,12 +360,26 @@ def access(
     begin_tx(g, p, pf, st, fr, lk, lp, ptr, hr, s, f, DATA, t)
     targets = 0
     for link in range(ptr[s], ptr[s + 1]):
-        if lk[COPY, link] == 1 and (fr[DST, f] == EVERYONE or fr[DST, f] == lk[LINK_DST, link]):
-            targets += 1
+        if fr[DST, f] == EVERYONE or fr[DST, f] == lk[LINK_DST, link]:
+            if lp[LINK_POWER, link] > 0.0 and lk[COPY, link] == 1:
+                targets += 1
+            elif lk[FAULT, link] != 0:
+                g[ON_AIR_COPIES] += 1
+                lost(g, fr, lk, lk[FAULT, link], link, f)
     fr[TARGETS, f] = targets
     g[ON_AIR_COPIES] += targets
     if fr[DST, f] != EVERYONE:
         g[ATTEMPTS_MADE] += 1
+    if p[CAPTURE] == 1:
+        put(g, out, OUT_START, f, s, t, DATA, fr[ATTEMPTS, f])
+
+
+@jit
+def lost(g: Ints, fr: Ints, lk: Ints, fate: int, link: int, f: int) -> None:
+    """One copy less."""
+    g[RECEIVED_COPIES + fate] += 1
+    fr[LOST_COLLISION - 1 + fate, f] += 1
+    lk[N_RECEIVED + fate, link] += 1
 
 
 @jit
@@ -381,6 +411,8 @@ def begin_tx(
     g[ON_AIR_N] += 1
     push(hr, g, HR_N, t + airtime, TX_DONE, s, 0)
     first, last = ptr[s], ptr[s + 1]
+    while last > first and lp[LINK_POWER, last - 1] == 0.0:
+        last -= 1  # cut off
     for link in range(first, last):
         lp[ON_AIR, link] = lp[LINK_POWER, link]
         lk[SENSED, link] = lk[AUDIBLE, link]
@@ -489,6 +521,8 @@ def send_ack(
     """SIFS after a unicast frame for us: acknowledge, whatever the medium does."""
     st[ACK_TO, s] = -1
     if st[TX_KIND, s] == NOTHING:
+        if p[CAPTURE] == 1:
+            put(g, out, OUT_START, f, s, t, ACK, 0)
         begin_tx(g, p, pf, st, fr, lk, lp, ptr, hr, s, f, ACK, t)
         release(g, fr, out, f, t)
         return

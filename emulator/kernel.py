@@ -268,6 +268,7 @@ def relink(  # noqa: C901  (one pass over what is under way)
             for row in range(SENSED, LINK_ROWS):
                 new_lk[row, target] = lk[row, old]
         new_lp[1, target] = lp[1, old]
+        new_lp[2, target] = lp[2, old] if target >= new_ptr[new_ptr.shape[0] - 1] else new_lp[2, target]
         for i in range(g[HR_N]):
             if hr[i, 2] != TX_DONE and hr[i, 3] == old and hr[i, 4] == 0:
                 hr[i, 3] = target

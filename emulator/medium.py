@@ -13,17 +13,26 @@ from emulator import state as s
 from emulator.accounts import Accounts
 from emulator.air import Air
 from emulator.dcf import NEVER
+from emulator.faults import Faults
+from emulator.pcap import Capture
 from fanet_mw.actor import Actor
 from fanet_mw.errors import DropReason
 from fanet_mw.messages import Message, Obstructions, Poses, Reception, TxOutcome, TxRequest, TxStatus
+from fanet_mw.radio_control import Cut, Degrade, Jam, Restore
 from fanet_mw.scenario import Scenario
-from fanet_mw.topics import Topics, node_of
-from fanet_mw.units import BROADCAST, MS, NodeId, seconds_to_ns
+from fanet_mw.topics import Topics
+from fanet_mw.units import BROADCAST, MS, NodeId, S, seconds_to_ns
 
 TOO_LATE_NS: Final = 50 * MS
 """A request later than this is dropped: its slot is long another's."""
+ANNOUNCED: Final = 1024
+"""Requests of one node that may wait for their instant, beyond what its MAC queue holds."""
 _new: Final = tuple.__new__
 _SEQ_MASK: Final = 0xFFFF_FFFF
+_LONGEST_GAP: Final = 1 << 20
+"""Requests; a longer one is no loss but nonsense."""
+_FARTHEST_M: Final = 1e7
+"""Of a coordinate; positions beyond are no swarm's, and would overflow the cells in which neighbors are looked for."""
 _HORIZON_NS: Final = 60_000 * MS
 """A request for an instant further ahead than this is refused: nobody plans so far, and it would only take room."""
 
@@ -31,26 +40,38 @@ _HORIZON_NS: Final = 60_000 * MS
 class Medium(Actor):
     """The air between the nodes of one swarm."""
 
-    def __init__(self, scenario: Scenario, swarm: str) -> None:
+    def __init__(self, scenario: Scenario, swarm: str, *, capture: Capture | None = None) -> None:
         topics = Topics(swarm)
-        super().__init__("emulator", (topics.all_tx, topics.pose, topics.obstruction))
+        super().__init__("emulator", (topics.all_tx, topics.pose, topics.obstruction, topics.radio_control))
         self._max_bytes = scenario.radio.max_frame_bytes
         self._count = scenario.nodes.count
         self._rx_topics = [topics.radio_rx(node) for node in scenario.node_ids]
-        self._station_of: dict[str, int] = {}
-        self._air = Air(scenario.radio, stations=self._count, seed=scenario.seed)
+        self._station_of = {topics.radio_tx(node): node - 1 for node in scenario.node_ids}
+        self._faults = Faults(scenario.radio, stations=self._count, planned=scenario.planned_faults)
+        self._capture = capture
+        self._air = Air(
+            scenario.radio, stations=self._count, seed=scenario.seed, faults=self._faults, capture=capture is not None
+        )
         self._accounts = Accounts()
         self._requests: list[TxRequest | None] = [None] * self._air.slots()
         self._ids = [NodeId(node) for node in scenario.node_ids]
         self._sources = [self._ids[0]] * self._air.slots()
         """Sender of the request in each slot."""
         self._free = list(range(self._air.slots() - 1, -1, -1))
+        self._held = [0] * self._count
+        """Requests of each station that have not ended."""
+        self._most_held = scenario.radio.queue_frames + ANNOUNCED
         self._next_seq: list[int | None] = [None] * self._count
         self._handover_ns = scenario.radio.handover_ns
         self._warm_ns: int | None = seconds_to_ns(scenario.warmup_s)
+        self._links_topic = topics.radio_links
+        self._links_ns: int | None = None
+        """When links are reported next; None while the air is silent."""
+        self._due_ns = self._next_turn_ns()
         self._wake_ns: int | None = None
         self._stale = True
         self._now_ns = 0
+        self._control_topic = topics.radio_control
 
     # --- the actor contract ---------------------------------------------------------------------------------------
 
@@ -61,13 +82,19 @@ class Medium(Actor):
         if type(message) is TxRequest:
             station = self._station_of.get(topic)
             if station is None:
-                station = self._station_of[topic] = node_of(topic) - 1
-            self._request(station, message, now_ns)
+                self._accounts.refused["unknown_station"] += 1
+            else:
+                self._request(station, message, now_ns)
         elif isinstance(message, Poses):
             self._pass_time(now_ns)
             self._place(message)
         elif isinstance(message, Obstructions):
             self._obstruct(message)
+        elif topic == self._control_topic and isinstance(message, Degrade | Jam | Cut | Restore):
+            self._pass_time(now_ns)
+            why = self._faults.obey(message, self._now_ns)
+            self._accounts.controls += why is None
+            self._change(why)
         else:
             self._accounts.refused["message_type"] += 1
 
@@ -78,9 +105,9 @@ class Medium(Actor):
         if self._stale:
             self._stale = False
             self._wake_ns = self._next_handover_ns()
-        if self._warm_ns is None:
+        if self._due_ns is None:
             return self._wake_ns
-        return self._warm_ns if self._wake_ns is None else min(self._warm_ns, self._wake_ns)
+        return self._due_ns if self._wake_ns is None else min(self._due_ns, self._wake_ns)
 
     def _next_handover_ns(self) -> int | None:
         bound_ns, every_ns = self._air.next_output_ns, self._handover_ns
@@ -90,6 +117,7 @@ class Medium(Actor):
 
     def stop(self, now_ns: int) -> None:
         self._pass_time(now_ns)
+        self._report_links(self._now_ns)
 
     def report(self) -> Mapping[str, Any]:
         accounts, g = self._accounts, self._air.g
@@ -104,6 +132,8 @@ class Medium(Actor):
             "copies": accounts.copies(g),
             "air": accounts.air(g, busy_ns=self._air.busy_ns(self._now_ns), now_ns=self._now_ns, stations=self._count),
             "late": accounts.lateness(),
+            "poses": accounts.poses,
+            "controls": accounts.controls,
             "refused": dict(sorted(accounts.refused.items())),
             "handed": {i + 1: count for i, count in enumerate(self._air.st[s.HANDED].tolist()) if count},
         }
@@ -113,9 +143,6 @@ class Medium(Actor):
     def _request(self, station: int, request: TxRequest, now_ns: int) -> None:
         """Take in one request; whatever is wrong with it is counted, never raised."""
         accounts = self._accounts
-        if not 0 <= station < self._count:
-            accounts.refused["unknown_station"] += 1
-            return
         if request.seq != self._next_seq[station]:
             self._count_gap(station, request.seq)
         self._next_seq[station] = (request.seq + 1) & _SEQ_MASK
@@ -137,6 +164,10 @@ class Medium(Actor):
             if late_ns > TOO_LATE_NS:
                 self._refuse(station, request, DropReason.LATE, now_ns)
                 return
+        if self._held[station] >= self._most_held:
+            self._refuse(station, request, DropReason.BACKLOG, now_ns)
+            return
+        self._held[station] += 1
         if not self._free:
             self._make_room()
         slot = self._free.pop()
@@ -147,6 +178,9 @@ class Medium(Actor):
             slot, src=station, dst=s.EVERYONE if dst == BROADCAST else dst - 1, size=size, start_ns=start_ns,
             wants_status=request.wants_status,
         )  # fmt: skip
+        if self._links_ns is None:
+            self._links_ns = (self._now_ns // S + 1) * S
+            self._due_ns = self._next_turn_ns()
         self._stale = True
 
     def _count_gap(self, station: int, seq: int) -> None:
@@ -155,14 +189,15 @@ class Medium(Actor):
         if expected is None or seq == 0:  # 0: the node has started again
             return
         gap = (seq - expected) & _SEQ_MASK
-        if gap < 1 << 16:
+        if gap < _LONGEST_GAP:
             self._accounts.sent += gap
             self._accounts.dropped[DropReason.BUS] += gap
 
     def _refuse(self, station: int, request: TxRequest, reason: DropReason, now_ns: int) -> None:
         self._accounts.drop(reason)
         if request.wants_status:
-            status = TxStatus(request.seq, TxOutcome.LATE, now_ns, 0)
+            outcome = TxOutcome.QUEUE_FULL if reason is DropReason.BACKLOG else TxOutcome.LATE
+            status = TxStatus(request.seq, outcome, now_ns, 0)
             self.outbox.append((self._rx_topics[station], status))
 
     def _make_room(self) -> None:
@@ -176,15 +211,53 @@ class Medium(Actor):
 
     def _pass_time(self, now_ns: int) -> None:
         """Advance the air to `now_ns` and hand out what came of it."""
-        if self._warm_ns is not None and now_ns >= self._warm_ns:
-            self._hand_out(self._air.advance(max(self._warm_ns, self._now_ns)))
-            self._accounts.measure_from(self._air.g, busy_ns=self._air.busy_ns(self._warm_ns), now_ns=self._warm_ns)
-            self._warm_ns = None
+        while self._due_ns is not None and self._due_ns <= now_ns:
+            self._turn(self._due_ns)
         self._hand_out(self._air.advance(now_ns))
         self._now_ns = max(self._now_ns, now_ns)
         self._stale = True
 
+    def _turn(self, due_ns: int) -> None:
+        """Everything before this instant has happened: the warm-up ends, faults begin and end, links are reported."""
+        self._hand_out(self._air.advance(max(due_ns, self._now_ns)))
+        self._now_ns = max(self._now_ns, due_ns)
+        if self._warm_ns is not None and self._warm_ns <= due_ns:
+            self._accounts.measure_from(self._air.g, busy_ns=self._air.busy_ns(self._now_ns), now_ns=self._now_ns)
+            self._warm_ns = None
+        fault_ns = self._faults.next_ns()
+        if fault_ns is not None and fault_ns <= due_ns:
+            self._change(*self._faults.pass_time(due_ns))
+        if self._links_ns is not None and self._links_ns <= due_ns:
+            silent = not self._report_links(due_ns) and len(self._free) == len(self._requests)
+            self._links_ns = None if silent else (due_ns // S + 1) * S
+        self._due_ns = self._next_turn_ns()
+
+    def _next_turn_ns(self) -> int | None:
+        wanted = (self._warm_ns, self._faults.next_ns(), self._links_ns)
+        return min((t for t in wanted if t is not None), default=None)
+
+    def _report_links(self, now_ns: int) -> bool:
+        """Tell what the links carried; returns whether it was anything."""
+        stats = self._air.links(now_ns)
+        if stats is not None:
+            self.outbox.append((self._links_topic, stats))
+        return stats is not None
+
+    def _change(self, *refused: str | None) -> None:
+        """Faults may have changed; those that could not be are counted by what was wrong."""
+        for why in refused:
+            if why is not None:
+                self._accounts.refused[why] += 1
+        if self._faults.records:
+            self.records += self._faults.records
+            self._faults.records.clear()
+            self._air.relink()
+            self._due_ns = self._next_turn_ns()
+            self._stale = True
+
     def _hand_out(self, rows: list[list[int]]) -> None:
+        if self._capture is not None:
+            rows = self._record(rows, self._capture)
         outbox, requests, sources, rx_topics = self.outbox, self._requests, self._sources, self._rx_topics
         for kind, slot, station, t_ns, value, attempts in rows:
             request = requests[slot]
@@ -196,9 +269,23 @@ class Medium(Actor):
             elif kind == s.OUT_FREE:
                 self._accounts.ended(value, size=len(request.frame))
                 requests[slot] = None
+                self._held[sources[slot] - 1] -= 1
                 self._free.append(slot)
             else:
                 outbox.append((rx_topics[station], TxStatus(request.seq, TxOutcome(value), t_ns, attempts)))
+
+    def _record(self, rows: list[list[int]], capture: Capture) -> list[list[int]]:
+        """Tell the capture what it wants to know; returns the rows that are for the nodes."""
+        for kind, slot, station, t_ns, value, attempts in rows:
+            request, node, src = self._requests[slot], station + 1, self._sources[slot]
+            assert request is not None, "the kernel speaks only of frames it was given"
+            if kind == s.OUT_START and value == s.DATA:
+                capture.transmitted(t_ns, node, request.dst, request.seq, request.frame, attempts)
+            elif kind == s.OUT_START:
+                capture.acknowledged(t_ns, node, src)
+            elif kind == s.OUT_RECEPTION:
+                capture.received(t_ns, node, src, request.dst, request.seq, request.frame, value / 1000)
+        return [row for row in rows if row[0] != s.OUT_START]
 
     # --- positions ------------------------------------------------------------------------------------------------
 
@@ -217,9 +304,10 @@ class Medium(Actor):
             return
         states = np.frombuffer(poses.states, np.float64).reshape(-1, 6)
         known = (ids >= 1) & (ids <= self._count)
-        if not known.all() or not np.isfinite(states[:, :3]).all():
+        if not known.all() or not (np.abs(states[:, :3]) <= _FARTHEST_M).all():  # false for what is not a number
             self._accounts.refused["poses"] += 1
             return
+        self._accounts.poses += 1
         at = np.full((self._count, 3), np.inf)
         at[ids - 1] = states[:, :3]
         self._air.place(at)

@@ -2,14 +2,14 @@
 
     frame begins -> detected after 4 us if nothing drowns it -> received while interference allows -> decoded or lost
 
-A frame is sensed from its detection on. A receiver stays with the frame it detected first, unless CAPTURE = 1 and a
-later one, whose preamble stands out of everything else, is CAPTURE_RATIO times as strong: then the first is lost.
+A frame is sensed from its detection on. A receiver stays with the frame it detected first, unless TAKE_OVER = 1 and
+a later one, whose preamble stands out of everything else, is TAKE_OVER_RATIO times as strong: then the first is lost.
 With INTERFERENCE = 0 any overlap destroys; with 1 the loss of each segment follows from its SINR.
 """
 
 import math
 
-from emulator.dcf import NEVER, acknowledged, on_busy, on_idle, put, release, uniform
+from emulator.dcf import NEVER, acknowledged, lost, on_busy, on_idle, put, release, uniform
 from emulator.heap import push
 from emulator.jit import jit
 from emulator.state import (
@@ -17,9 +17,6 @@ from emulator.state import (
     ACK_NS,
     ACK_TO,
     BAD_UNTIL,
-    CAPTURE,
-    CAPTURE_RATIO,
-    COLLISION_COPIES,
     COPY,
     CS,
     DATA,
@@ -33,8 +30,9 @@ from emulator.state import (
     FATE,
     FATE_COLLISION,
     FATE_HALF_DUPLEX,
+    FATE_OPEN,
     FATE_WEAK,
-    HALF_DUPLEX_COPIES,
+    FAULT,
     HANDED,
     HEADER_BITS_PER_NS,
     HEADER_NS,
@@ -50,11 +48,9 @@ from emulator.state import (
     LOCK_HEADER_END,
     LOCK_RATE,
     LOG_OK,
-    LOST_COLLISION,
-    LOST_HALF_DUPLEX,
-    LOST_WEAK,
+    N_RECEIVED,
     NAV,
-    NOISE_MW,
+    NOISE,
     NOTHING,
     NSIG,
     ON_AIR,
@@ -64,13 +60,16 @@ from emulator.state import (
     POWER,
     RECEIVED,
     RECEIVED_COPIES,
+    RSSI_SUM,
     SEND_ACK,
     SENSED,
     SIFS_NS,
+    SPARED,
+    TAKE_OVER,
+    TAKE_OVER_RATIO,
     TX_KIND,
     UNDERWAY,
     WAITING,
-    WEAK_COPIES,
     Ints,
     Reals,
 )
@@ -88,7 +87,7 @@ def close_segment(p: Ints, pf: Reals, st: Ints, sf: Reals, lp: Reals, err: Reals
     if p[INTERFERENCE] == 0 or t <= begin:
         return
     wanted = lp[ON_AIR, st[LOCK, r]]
-    sinr_db = 10.0 * math.log10(wanted / (max(0.0, sf[POWER, r] - wanted) + pf[NOISE_MW]))
+    sinr_db = 10.0 * math.log10(wanted / (max(0.0, sf[POWER, r] - wanted) + sf[NOISE, r]))
     at = int((sinr_db - ERROR_FLOOR_DB) * ERROR_STEPS_PER_DB)
     at = max(0, min(err.shape[1] - 1, at))
     until = min(t, st[LOCK_DATA_END, r])
@@ -122,7 +121,7 @@ def rx_detect(p: Ints, pf: Reals, st: Ints, sf: Reals, lk: Ints, lp: Reals, link
     if p[INTERFERENCE] == 0:
         clear = st[NSIG, r] == 1
     else:
-        clear = wanted >= pf[DETECT_RATIO] * (max(0.0, sf[POWER, r] - wanted) + pf[NOISE_MW])
+        clear = wanted >= pf[DETECT_RATIO] * (max(0.0, sf[POWER, r] - wanted) + sf[NOISE, r])
     if st[TX_KIND, r] != NOTHING:
         lk[FATE, link] = FATE_HALF_DUPLEX
     elif not audible:
@@ -146,7 +145,7 @@ def rx_detect(p: Ints, pf: Reals, st: Ints, sf: Reals, lk: Ints, lp: Reals, link
 @jit
 def captures(p: Ints, pf: Reals, st: Ints, lp: Reals, r: int, wanted: float) -> bool:
     """Whether a later frame takes a receiver away from the frame it is locked on (message in message)."""
-    return bool(p[CAPTURE] == 1 and wanted >= pf[CAPTURE_RATIO] * lp[ON_AIR, st[LOCK, r]])
+    return bool(p[TAKE_OVER] == 1 and wanted >= pf[TAKE_OVER_RATIO] * lp[ON_AIR, st[LOCK, r]])
 
 
 @jit
@@ -157,6 +156,13 @@ def survived(p: Ints, st: Ints, sf: Reals, r: int) -> bool:
     if sf[LOG_OK, r] > -1e-9:
         return True
     return bool(uniform(st, r) / _MODULUS < math.exp(sf[LOG_OK, r]))
+
+
+@jit
+def spared(st: Ints, lp: Reals, r: int, link: int) -> bool:
+    """Whether the fault on a link lets a frame through that was otherwise received."""
+    share = lp[SPARED, link]
+    return bool(share >= 1.0 or (share > 0.0 and uniform(st, r) / _MODULUS < share))
 
 
 @jit
@@ -183,11 +189,12 @@ def rx_end(
     if st[LOCK, r] == link:
         st[LOCK, r] = -1
         whole = survived(p, st, sf, r)
-        if whole:
-            st[BAD_UNTIL, r] = 0
-        else:
+        if not whole:
             lk[FATE, link] = FATE_COLLISION if st[OVERLAPPED, r] == 1 else FATE_WEAK
-            st[BAD_UNTIL, r] = t + p[EIFS_EXTRA_NS]
+        elif lk[FAULT, link] != 0 and not spared(st, lp, r, link):
+            whole = False
+            lk[FATE, link] = lk[FAULT, link]
+        st[BAD_UNTIL, r] = 0 if whole else t + p[EIFS_EXTRA_NS]
     st[NSIG, r] -= 1
     sf[POWER, r] = 0.0 if st[NSIG, r] == 0 else sf[POWER, r] - lp[ON_AIR, link]
     lk[UNDERWAY, link] = 0
@@ -214,29 +221,20 @@ def data_end(
     if not ours or lk[COPY, link] == 0:
         return
     if not whole:
-        lost(g, fr, lk[FATE, link], f)
+        fate = lk[FATE, link]
+        if fate in (FATE_WEAK, FATE_OPEN):
+            fate = lk[FAULT, link] if lk[FAULT, link] != 0 else FATE_WEAK
+        lost(g, fr, lk, fate, link, f)
         return
+    millidbm = int(10_000.0 * math.log10(lp[ON_AIR, link]))
     g[RECEIVED_COPIES] += 1
+    lk[N_RECEIVED, link] += 1
+    lk[RSSI_SUM, link] += millidbm
     if fr[DST, f] == EVERYONE or fr[RECEIVED, f] == 0:
         fr[RECEIVED, f] += 1
         st[HANDED, r] += 1
-        millidbm = int(10_000.0 * math.log10(lp[ON_AIR, link]))
         put(g, out, OUT_RECEPTION, f, r, t, millidbm, 0)
     if fr[DST, f] == r:
         st[ACK_TO, r] = lk[LINK_SRC, link]
         push(hs, g, HS_N, t + p[SIFS_NS], SEND_ACK, r, f)
         fr[OPEN, f] += 1  # the ACK to come refers to it
-
-
-@jit
-def lost(g: Ints, fr: Ints, fate: int, f: int) -> None:
-    """One copy less."""
-    if fate == FATE_HALF_DUPLEX:
-        g[HALF_DUPLEX_COPIES] += 1
-        fr[LOST_HALF_DUPLEX, f] += 1
-    elif fate == FATE_COLLISION:
-        g[COLLISION_COPIES] += 1
-        fr[LOST_COLLISION, f] += 1
-    else:
-        g[WEAK_COPIES] += 1
-        fr[LOST_WEAK, f] += 1

@@ -25,7 +25,7 @@ from emulator.path_loss import (
 )
 from emulator.shadowing import Shadowing
 from emulator.spatial import neighbors
-from emulator.state import AUDIBLE, DELAY, LINK_DST, LINK_POWER, LINK_REALS, LINK_ROWS, LINK_SRC, Ints, Reals
+from emulator.state import AUDIBLE, DELAY, LINK_DST, LINK_POWER, LINK_REALS, LINK_ROWS, LINK_SRC, SPARED, Ints, Reals
 from fanet_mw.scenario_radio import Radio, is_ofdm
 
 THERMAL_DBM_PER_HZ: Final = -174.0
@@ -128,7 +128,17 @@ class Links:
         self.longest_ns = int((self.ints[DELAY] * (self.ints[AUDIBLE] if radio.fading == "none" else 1)).max())
         """Delay of the longest link that can be received: an audible one, or any that fading may lift."""
         self.reals[LINK_POWER, :count] = np.power(10.0, power_dbm / 10)
+        self.reals[SPARED, :count] = 1.0
         self.ptr = np.searchsorted(found[:, 0], np.arange(stations + 1)).astype(np.int64)
+
+    def dead_last(self) -> None:
+        """Links without power come last of their transmitter's; else the order stays: nearest first."""
+        used = slice(self.count)
+        dead = self.reals[LINK_POWER, used] == 0.0
+        if dead.any():
+            order = np.lexsort((dead, self.ints[LINK_SRC, used]))  # stable
+            self.ints[:, used] = self.ints[:, used][:, order]
+            self.reals[:, used] = self.reals[:, used][:, order]
 
 
 def pair_codes(found: Ints, stations: int) -> Ints:

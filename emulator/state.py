@@ -59,8 +59,9 @@ DATA: Final = 1
 ACK: Final = 2
 
 # --- stations (sf) ------------------------------------------------------------------------------------------------
-POWER, LOG_OK, STATION_REALS = range(3)
-"""POWER: sum of the signals present [mW]. LOG_OK: log of the probability that the locked frame is still whole."""
+POWER, LOG_OK, NOISE, STATION_REALS = range(4)
+"""POWER: sum of the signals present [mW]. LOG_OK: log of the probability that the locked frame is still whole. NOISE:
+what the receiver hears besides [mW]."""
 
 # --- frames (fr) --------------------------------------------------------------------------------------------------
 (
@@ -76,38 +77,60 @@ POWER, LOG_OK, STATION_REALS = range(3)
     LOST_COLLISION,
     LOST_HALF_DUPLEX,
     LOST_WEAK,
+    LOST_DEGRADED,
+    LOST_JAMMED,
+    LOST_CUT,
     TARGETS,  # copies in range at the last attempt
     WANTS_STATUS,
     FRAME_ROWS,
-) = range(15)
+) = range(18)
 EVERYONE: Final = -1
 
 # --- links (lk, lp) -----------------------------------------------------------------------------------------------
 (
-    LINK_SRC, LINK_DST, DELAY, AUDIBLE, SENSED, COPY, FATE, LINK_FRAME, LINK_KIND, UNDERWAY, BEGINS, ENDS, LINK_ROWS,
-) = range(13)  # fmt: skip
-"""AUDIBLE: strong enough to sense and decode; others only interfere. SENSED, FATE: of the frame now on
-the link; SENSED is AUDIBLE as it was at its start, or as fading has it. COPY: 1 when the frame counts as a copy for
-this receiver: audible on average, or lifted by fading. LINK_FRAME, LINK_KIND: what it is (of an ACK: the frame it
-acknowledges). UNDERWAY: 1 until its end. BEGINS, ENDS: its first and last bit at the receiver."""
-LINK_POWER, ON_AIR, LINK_REALS = range(3)
-"""LINK_POWER: received power [mW]. ON_AIR: that of the frame now on the link, as it was at its start."""
+    LINK_SRC,
+    LINK_DST,
+    DELAY,
+    AUDIBLE,  # 1: strong enough to sense and decode; others only interfere
+    FAULT,  # FATE_DEGRADED, FATE_JAMMED or FATE_CUT while a fault lies on a link that were audible without it, else 0
+    RSSI_SUM,  # of the copies received [1/1000 dBm]; this and the counts are since the links were made
+    N_RECEIVED,  # copies received; then, by fate, copies lost
+    N_COLLISION,
+    N_HALF_DUPLEX,
+    N_WEAK,
+    N_DEGRADED,
+    N_JAMMED,
+    N_CUT,
+    SENSED,  # AUDIBLE at the start of the frame now on the link, or as fading has it; rows from here on are of it
+    COPY,  # 1: the frame counts as a copy for this receiver: audible on average, or lifted by fading
+    FATE,
+    LINK_FRAME,  # of an ACK: the frame it acknowledges
+    LINK_KIND,
+    UNDERWAY,  # 1 until its end
+    BEGINS,  # its first bit at the receiver
+    ENDS,  # its last
+    LINK_ROWS,
+) = range(22)
+LINK_POWER, ON_AIR, SPARED, LINK_REALS = range(4)
+"""LINK_POWER: received power [mW], 0: the link carries nothing, and comes last of its transmitter's. ON_AIR: that of
+the frame now on the link, as it was at its start. SPARED: the share of frames that the link's FAULT lets through."""
 
-FATE_OPEN, FATE_COLLISION, FATE_HALF_DUPLEX, FATE_WEAK = range(4)
+FATE_OPEN, FATE_COLLISION, FATE_HALF_DUPLEX, FATE_WEAK, FATE_DEGRADED, FATE_JAMMED, FATE_CUT = range(7)
+"""Counts by fate lie side by side in this order: g from RECEIVED_COPIES, fr from LOST_COLLISION, lk from N_RECEIVED."""
 
 # --- events -------------------------------------------------------------------------------------------------------
 ARRIVE, ACCESS, SEND_ACK, ACK_TIMEOUT, TX_DONE, RX_START, RX_DETECT, RX_END, ALL_START, ALL_DETECT, ALL_END = range(11)
 """ALL_*: the same on the links a .. b - 1 of one transmitter, nearest receiver first, from link to link."""
 
 # --- outputs (out): kind, frame, station, t_ns, rssi in 1/1000 dBm, attempts ------------------------------------------
-OUT_RECEPTION, OUT_DONE, OUT_FREE, OUT_COLUMNS = 0, 1, 2, 6
+OUT_RECEPTION, OUT_DONE, OUT_FREE, OUT_START, OUT_COLUMNS = 0, 1, 2, 3, 6
 """A copy was decoded; the MAC is done with a frame that wants a status (value: outcome); nothing refers to the slot
-any more (value: verdict)."""
+any more (value: verdict); with CAPTURE, a station starts to transmit (value: DATA or ACK)."""
 
 DONE_SENT, DONE_ACKED, DONE_RETRY, DONE_FULL, DONE_EXPIRED = range(5)
 """Outcomes; the values of `messages.TxOutcome`."""
 
-DELIVERED, NO_RECEIVER, COLLIDED, DEAF, WEAK, GIVEN_UP, NO_ROOM, EXPIRED = range(8)
+DELIVERED, NO_RECEIVER, COLLIDED, DEAF, WEAK, GIVEN_UP, NO_ROOM, EXPIRED, DEGRADED, JAMMED, CUT_OFF = range(11)
 """Verdicts: how a frame ended for its receivers."""
 
 # --- globals (g) --------------------------------------------------------------------------------------------------
@@ -122,6 +145,9 @@ DELIVERED, NO_RECEIVER, COLLIDED, DEAF, WEAK, GIVEN_UP, NO_ROOM, EXPIRED = range
     COLLISION_COPIES,
     HALF_DUPLEX_COPIES,
     WEAK_COPIES,
+    DEGRADED_COPIES,
+    JAMMED_COPIES,
+    CUT_COPIES,
     ATTEMPTS_MADE,
     ATTEMPTS_FAILED,
     UNICASTS_ENDED,
@@ -130,7 +156,7 @@ DELIVERED, NO_RECEIVER, COLLIDED, DEAF, WEAK, GIVEN_UP, NO_ROOM, EXPIRED = range
     LAST_END,  # when the last frame to leave its antenna has ended at its last receiver
     REACH_NS,  # longest delay of an audible link
     GLOBALS,
-) = range(18)
+) = range(21)
 
 # --- parameters (p, pf) -------------------------------------------------------------------------------------------
 (
@@ -150,19 +176,19 @@ DELIVERED, NO_RECEIVER, COLLIDED, DEAF, WEAK, GIVEN_UP, NO_ROOM, EXPIRED = range
     DRAW_WHEN_INTERRUPTED,  # 1: IEEE 802.11; 0: as ns-3
     WAIT_DIFS_FIRST,  # 1: as ns-3, a frame waits one DIFS after it is queued
     INTERFERENCE,  # 0: any overlap destroys; 1: SINR and error rate
+    CAPTURE,  # 1: report every start of a transmission
     EXTENSION_NS,  # signal extension at the end of each frame (OFDM at 2.4 GHz)
-    CAPTURE,  # 1: a later frame that is CAPTURE_RATIO times as strong as the locked one takes the receiver
+    TAKE_OVER,  # 1: a later frame that is TAKE_OVER_RATIO times as strong as the locked one takes the receiver
     FADING,  # 0 none, else the law: see fading.py
     PARAMETERS,
-) = range(20)
+) = range(21)
 (
-    NOISE_MW,
     DETECT_RATIO,
     HEADER_BITS_PER_NS,
     PAYLOAD_BITS_PER_NS,
     ACK_BITS_PER_NS,
-    CAPTURE_RATIO,
+    TAKE_OVER_RATIO,
     SENSITIVITY_MW,
     FADING_SHAPE,  # m, or K as a ratio
     REALS,
-) = range(9)
+) = range(8)

@@ -11,6 +11,8 @@ from dataclasses import dataclass
 from enum import IntEnum
 from typing import NamedTuple
 
+from fanet_mw.link_stats import LinkStats
+from fanet_mw.radio_control import Cut, Degrade, Jam, Restore
 from fanet_mw.trace import Record
 from fanet_mw.units import Enu, NodeId
 
@@ -154,4 +156,9 @@ Message = (
     | TraceBatch
     | Clock
     | Report
+    | Degrade
+    | Jam
+    | Cut
+    | Restore
+    | LinkStats
 )

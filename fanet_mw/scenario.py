@@ -9,11 +9,11 @@ from typing import Annotated, Literal, Self
 
 from pydantic import Field, model_validator
 
-from fanet_mw.scenario_base import Finite, NonNegative, Positive, Section
+from fanet_mw.fault_sections import AnyFault
+from fanet_mw.radio_control import Control, Degrade, Restore, nodes_of
 from fanet_mw.scenario_radio import Radio
+from fanet_mw.sections import Finite, Id, NonNegative, Positive, Section
 from fanet_mw.units import MAX_NODES, MS, NodeId, seconds_to_ns
-
-Id = Annotated[int, Field(ge=1, le=MAX_NODES)]
 
 
 class Nodes(Section):
@@ -86,9 +86,16 @@ class Clusters(Section):
     """The least time between two packets that a head releases in its slot."""
     pacing: Literal["burst", "spread"] = "spread"
     """`burst` releases at `release_gap_ms`; `spread` divides the slot evenly among the queued packets."""
-    relay: Literal["all", "gossip", "counter"] = "all"
-    """Who relays a flooded packet: every node; each with probability min(1, gossip_degree / neighbors); or each that
-    has heard fewer than `counter` copies after U(0, assess_ms)."""
+    relay: Literal["all", "gossip", "counter", "scheduled"] = "all"
+    """Who relays a flooded packet: every node; each with probability min(1, gossip_degree / neighbors); each that has
+    heard fewer than `counter` copies after U(0, assess_ms); or those that a collision-free timetable names, each in a
+    turn of its own."""
+    contention_ms: NonNegative = 40.0
+    """`scheduled`: the beginning of each period, for all that has no turn: hellos, joins, unicasts to heads."""
+    link_m: NonNegative = 0.0
+    """`scheduled`: nodes no farther apart are taken to hear each other; 0: `radio.range_m`."""
+    interference_m: NonNegative = 0.0
+    """`scheduled`: nodes no farther apart may disturb each other; 0: `radio.range_m` for `range`, else twice that."""
     gossip_degree: Positive = 6.0
     counter: Annotated[int, Field(ge=2)] = 3
     assess_ms: NonNegative = 100.0
@@ -198,6 +205,8 @@ class Scenario(Section):
     mobility: Mobility = Mobility()
     world: World = World()
     mission: Mission = Mission()
+    faults: tuple[AnyFault, ...] = ()
+    """What happens to the air, and when; by message too (`fanet air`)."""
 
     @model_validator(mode="after")
     def _parts_agree(self) -> Self:
@@ -214,6 +223,11 @@ class Scenario(Section):
     def traffic_window_ns(self) -> tuple[int, int]:
         """Application packets are generated, and measured, in [start, end)."""
         return seconds_to_ns(self.warmup_s), seconds_to_ns(self.duration_s - self.drain_s)
+
+    @property
+    def planned_faults(self) -> list[tuple[int, Control]]:
+        """(instant ns, what happens), in the order of the file."""
+        return [(seconds_to_ns(fault.at_s), fault.control()) for fault in self.faults]
 
     @property
     def node_ids(self) -> range:
@@ -246,6 +260,7 @@ def _disagreements(scenario: Scenario) -> Sequence[str]:
             f"traffic.payload_bytes = {traffic.payload_bytes} must be "
             f"<= radio.max_frame_bytes = {scenario.radio.max_frame_bytes}"
         )
+    found += _impossible_faults(scenario)
     if scenario.routing.protocol == "clustered":
         clusters = scenario.clusters
         if clusters.count >= max(2, count):
@@ -255,6 +270,19 @@ def _disagreements(scenario: Scenario) -> Sequence[str]:
                 f"clusters.guard_ms = {clusters.guard_ms:g} must be < the slot, flooding_period_s / count = "
                 f"{clusters.slot_ns / MS:g} ms"
             )
+    return found
+
+
+def _impossible_faults(scenario: Scenario) -> Sequence[str]:
+    """Faults of nodes that there are not, and links that are none."""
+    found = []
+    count = scenario.nodes.count
+    for index, (_, control) in enumerate(scenario.planned_faults):
+        unknown = [] if isinstance(control, Restore) else [node for node in nodes_of(control) if node > count]
+        if unknown:
+            found.append(f"faults.{index} names node {unknown[0]}, which must be <= nodes.count = {count}")
+        if isinstance(control, Degrade) and control.src == control.dst:
+            found.append(f"faults.{index}: src = dst = {control.src} is no link")
     return found
 
 

@@ -9,7 +9,7 @@ from typing import Annotated, Any, Final, Literal, Self
 
 from pydantic import Field, model_validator
 
-from fanet_mw.scenario_base import Finite, NonNegative, Positive, Section
+from fanet_mw.sections import Finite, NonNegative, Positive, Section
 from fanet_mw.units import MS
 
 DSSS_RATES_MBPS: Final = (1.0, 2.0, 5.5, 11.0)
@@ -46,8 +46,8 @@ class Radio(Section):
     """`log_distance`: path loss exponent."""
     reference_loss_db: Finite = 40.05
     """`log_distance`: path loss at 1 m."""
-    frequency_mhz: Annotated[float, Field(ge=100, le=100_000)] = 2437.0
-    """All channels but `range` and `log_distance`. By default 2437 (channel 6), and 5180 (channel 36) with `a`."""
+    frequency_mhz: Annotated[float, Field(ge=100, le=100_000)] = 2412.0
+    """All channels but `range` and `log_distance`. By default 2412 (channel 1), and 5180 (channel 36) with `a`."""
     environment: Literal["suburban", "urban", "dense_urban", "highrise"] = "suburban"
     """`air_to_ground`: what stands around the node on the ground."""
     airborne_m: NonNegative = 10.0

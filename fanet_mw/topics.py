@@ -2,6 +2,8 @@
 
     fanet/<swarm>/radio/<id>/tx          TxRequest              node -> medium
     fanet/<swarm>/radio/<id>/rx          Reception | TxStatus   medium -> node
+    fanet/<swarm>/radio/control          Degrade | Jam | Cut | Restore   anyone -> medium
+    fanet/<swarm>/radio/links            LinkStats              medium -> whoever looks
     fanet/<swarm>/world/pose             Poses
     fanet/<swarm>/world/obstruction      Obstructions
     fanet/<swarm>/world/<id>/setpoint    Setpoint               UAV -> world
@@ -23,6 +25,7 @@ from typing import Any, Final
 
 from fanet_mw import trace
 from fanet_mw.errors import MalformedFrameError
+from fanet_mw.link_stats import COUNTS, LinkStats
 from fanet_mw.messages import (
     Clock,
     ClockState,
@@ -40,6 +43,7 @@ from fanet_mw.messages import (
     TxStatus,
     WifiScan,
 )
+from fanet_mw.radio_control import Cut, Degrade, Jam, Restore
 from fanet_mw.units import Enu, NodeId
 
 ROOT: Final = "fanet"
@@ -54,6 +58,8 @@ class Topics:
         self.obstruction = f"{self._base}/world/obstruction"
         self.clock = f"{self._base}/clock"
         self.all_tx = self.radio_tx("*")
+        self.radio_control = f"{self._base}/radio/control"
+        self.radio_links = f"{self._base}/radio/links"
         self.all_setpoints = f"{self._base}/world/*/setpoint"
         self.all_traces = f"{self._base}/trace/*"
         self.all_reports = f"{self._base}/report/*"
@@ -91,7 +97,8 @@ class Topics:
 def node_of(topic: str) -> int:
     """The node id in a `radio/<id>/..` or `world/<id>/..` topic; 0 when there is none."""
     parts = topic.split("/")
-    return int(parts[3]) if len(parts) > 3 and parts[3].isascii() and parts[3].isdigit() else 0
+    text = parts[3] if len(parts) > 3 else ""
+    return int(text) if len(text) <= 5 and text.isascii() and text.isdigit() else 0  # ids have five digits at most
 
 
 # --- bodies: one encoder and one decoder per message type, beside each other -------------------------------------
@@ -107,6 +114,10 @@ _POSES = struct.Struct("<qI")
 _OBSTRUCTIONS = struct.Struct("<qI")
 _CLOCK = struct.Struct("<qdB")
 _INSTANT = struct.Struct("<q")
+_DEGRADE = struct.Struct("<HHBddq")
+_JAM = struct.Struct("<5dq")
+_CUT = struct.Struct("<Hq")
+_LINKS = struct.Struct("<qqI")
 
 
 def _encode_tx(m: TxRequest) -> bytes:
@@ -230,6 +241,61 @@ def _decode_report(body: bytes) -> Report:
     return Report(name, _INSTANT.unpack_from(body)[0], text)
 
 
+def _encode_degrade(m: Degrade) -> bytes:
+    return _DEGRADE.pack(m.src, m.dst, m.both, m.loss_db, m.loss_share, m.for_ns) + m.label.encode()
+
+
+def _decode_degrade(body: bytes) -> Degrade:
+    src, dst, both, loss_db, loss_share, for_ns = _DEGRADE.unpack_from(body)
+    label = body[_DEGRADE.size :].decode()
+    return Degrade(label, NodeId(src), NodeId(dst), bool(both), loss_db, loss_share, for_ns)
+
+
+def _encode_jam(m: Jam) -> bytes:
+    return _JAM.pack(*m.center, m.radius_m, m.noise_dbm, m.for_ns) + m.label.encode()
+
+
+def _decode_jam(body: bytes) -> Jam:
+    east, north, up, radius_m, noise_dbm, for_ns = _JAM.unpack_from(body)
+    return Jam(body[_JAM.size :].decode(), Enu(east, north, up), radius_m, noise_dbm, for_ns)
+
+
+def _encode_cut(m: Cut) -> bytes:
+    return _CUT.pack(m.node, m.for_ns) + m.label.encode()
+
+
+def _decode_cut(body: bytes) -> Cut:
+    node, for_ns = _CUT.unpack_from(body)
+    return Cut(body[_CUT.size :].decode(), NodeId(node), for_ns)
+
+
+def _encode_restore(m: Restore) -> bytes:
+    return m.label.encode()
+
+
+def _decode_restore(body: bytes) -> Restore:
+    return Restore(body.decode())
+
+
+def _encode_links(m: LinkStats) -> bytes:
+    head = _LINKS.pack(m.t_ns, m.span_ns, len(m.rssi_sums_mdbm))
+    return head + m.ends.tobytes() + m.counts.tobytes() + m.rssi_sums_mdbm.tobytes()
+
+
+def _decode_links(body: bytes) -> LinkStats:
+    t_ns, span_ns, links = _LINKS.unpack_from(body)
+    ends, counts, sums = array("H"), array("I"), array("q")
+    a = _LINKS.size
+    b = a + 4 * links
+    c = b + 4 * COUNTS * links
+    if len(body) != c + 8 * links:
+        raise ValueError("length")
+    ends.frombytes(body[a:b])
+    counts.frombytes(body[b:c])
+    sums.frombytes(body[c:])
+    return LinkStats(t_ns, span_ns, ends, counts, sums)
+
+
 _CODECS: Final[dict[int, tuple[type[Any], Callable[[Any], bytes], Callable[[bytes], Message]]]] = {
     1: (TxRequest, _encode_tx, _decode_tx),
     2: (Reception, _encode_rx, _decode_rx),
@@ -242,7 +308,12 @@ _CODECS: Final[dict[int, tuple[type[Any], Callable[[Any], bytes], Callable[[byte
     9: (TraceBatch, _encode_trace, _decode_trace),
     10: (Clock, _encode_clock, _decode_clock),
     11: (Report, _encode_report, _decode_report),
-    12: (Obstructions, _encode_obstructions, _decode_obstructions),
+    12: (Degrade, _encode_degrade, _decode_degrade),
+    13: (Jam, _encode_jam, _decode_jam),
+    14: (Cut, _encode_cut, _decode_cut),
+    15: (Restore, _encode_restore, _decode_restore),
+    16: (LinkStats, _encode_links, _decode_links),
+    17: (Obstructions, _encode_obstructions, _decode_obstructions),
 }
 _CODE_OF: Final = {kind: (code, encode) for code, (kind, encode, _) in _CODECS.items()}
 _ITEM: Final = struct.Struct("<BI")
@@ -271,6 +342,6 @@ def decode(data: bytes) -> list[Message]:
                 raise ValueError("length beyond the end")
             messages.append(_CODECS[code][2](data[at : at + length]))
             at += length
-    except (struct.error, ValueError, KeyError, OverflowError) as error:
+    except (struct.error, ValueError, KeyError, OverflowError, RecursionError) as error:
         raise MalformedFrameError(f"bus message malformed at byte {at}: {error}") from error
     return messages

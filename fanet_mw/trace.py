@@ -97,7 +97,29 @@ class ProcessEnded(NamedTuple):
     exit_code: int
 
 
-Record = Generated | Delivered | Dropped | RoleChanged | Detected | Approaching | Arrived | Collided | ProcessEnded
+class RadioFault(NamedTuple):
+    """A fault began (`active`) or ended on the air; node and other: the cut node, or the ends of the link; else 0."""
+
+    t_ns: int
+    node: int
+    other: int
+    kind: str
+    label: str
+    active: bool
+
+
+Record = (
+    Generated
+    | Delivered
+    | Dropped
+    | RoleChanged
+    | Detected
+    | Approaching
+    | Arrived
+    | Collided
+    | ProcessEnded
+    | RadioFault
+)
 
 _KINDS: Final[dict[str, type[Any]]] = {
     "generated": Generated,
@@ -109,6 +131,7 @@ _KINDS: Final[dict[str, type[Any]]] = {
     "arrived": Arrived,
     "collided": Collided,
     "process_ended": ProcessEnded,
+    "radio_fault": RadioFault,
 }
 _NAMES: Final[dict[type[Any], str]] = {kind: name for name, kind in _KINDS.items()}
 
@@ -137,5 +160,5 @@ def parse(text: str) -> Record:
 
 __all__ = [
     "Approaching", "Arrived", "Collided", "Delivered", "Detected", "DropReason", "Dropped", "Generated",
-    "ProcessEnded", "Record", "RoleChanged", "kind_of", "line", "parse",
+    "ProcessEnded", "RadioFault", "Record", "RoleChanged", "kind_of", "line", "parse",
 ]  # fmt: skip

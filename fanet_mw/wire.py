@@ -399,7 +399,8 @@ CHUNK: Final = Spec(53004, 155, struct.Struct("<HBB240B"))
 TIME: Final = Spec(53005, 192, struct.Struct("<QIHHBB"))
 JOIN: Final = Spec(53006, 50, struct.Struct("<fffHB"))
 DIGEST: Final = Spec(53007, 37, struct.Struct("<24I24I24HBBB"))
-SPECS: Final = (ROUTE, BEACON, SCHEDULE, SURVIVOR, CHUNK, TIME, JOIN, DIGEST)
+PLACES: Final = Spec(53008, 1, struct.Struct("<28h28h28hhhhBBB"))
+SPECS: Final = (ROUTE, BEACON, SCHEDULE, SURVIVOR, CHUNK, TIME, JOIN, DIGEST, PLACES)
 _OURS: Final = {spec.msgid: spec for spec in SPECS}
 CAPACITY: Final = 56
 """Entries of one schedule part."""

@@ -1,24 +1,29 @@
 """The `fanet` command. Parsing, progress and exit codes; everything it does is a function elsewhere."""
 
 import asyncio
+import gzip
 import json
 import sys
 from collections.abc import Callable, Iterator
 from contextlib import contextmanager
 from dataclasses import dataclass
+from importlib.resources import files
 from pathlib import Path
 from typing import Annotated, Any
 
 from cyclopts import App, Parameter
+from cyclopts.validators import Number
 from rich.console import Console
 from rich.progress import BarColumn, Progress, TextColumn, TimeElapsedColumn
 from rich.table import Table
 
+from emulator.capture_file import NAME, CaptureFile
 from fanet_mw import __version__
-from fanet_mw.errors import FanetError
+from fanet_mw.errors import ConfigError, FanetError
 from fanet_mw.scenario import Scenario
 from fanet_mw.units import NodeId
 from sim import catalog, report
+from sim.air_cli import app as air_app
 from sim.layout import positions
 from sim.outcome import Outcome
 
@@ -27,6 +32,7 @@ app = App(
     help="Middleware for swarms of UAVs, and the network emulator it is developed and proven on.",
     version=__version__,
 )
+app.command(air_app)
 _err = Console(stderr=True)
 
 
@@ -60,9 +66,23 @@ class Output:
     """Where the result goes."""
 
     out: Path | None = None
-    """Folder for scenario.toml, summary.json, reports.json, trace.jsonl and mavlink.tlog."""
+    """Folder for scenario.toml, summary.json, reports.json, links.json, trace.jsonl and mavlink.tlog."""
     json: Annotated[bool, Parameter(negative="")] = False
     """Print the summary as JSON, and nothing else, on standard output."""
+    pcap: Annotated[bool, Parameter(negative="")] = False
+    """Write every transmission to air.pcap in that folder, for Wireshark."""
+    pcap_receptions: Annotated[bool, Parameter(negative="")] = False
+    """Write every reception too, with its RSSI."""
+
+    def capture_path(self) -> Path | None:
+        """Where the capture goes, if one is wanted; earlier ones there are removed."""
+        if not (self.pcap or self.pcap_receptions):
+            return None
+        if self.out is None:
+            raise ConfigError("--pcap: needs --out DIR, the folder that air.pcap goes to")
+        for earlier in self.out.glob("air*.pcap"):
+            earlier.unlink()
+        return self.out / NAME
 
 
 @Parameter(name="*")
@@ -89,8 +109,13 @@ def simulate(scenario: str, *, choice: Choice = Choice(), output: Output = Outpu
     from sim.run import simulate as run
 
     chosen = choice.scenario(scenario)
+    path = output.capture_path()
     with _progress(chosen, quiet=output.json) as tell:
-        outcome = run(chosen, on_progress=tell)
+        if path is None:
+            outcome = run(chosen, on_progress=tell)
+        else:
+            with CaptureFile(path, chosen.radio, receptions=output.pcap_receptions) as file:
+                outcome = run(chosen, on_progress=tell, capture=file.pcap)
     return _finish(outcome, output)
 
 
@@ -132,6 +157,7 @@ def launch(
                 listen=listen,
                 connect=connect,
                 respawn=respawn,
+                emulator_options={"pcap": output.capture_path(), "receptions": output.pcap_receptions},
                 on_progress=tell,
                 on_event=lambda text: _err.print(text, highlight=False),
             )
@@ -184,19 +210,36 @@ def router(
 
 
 @app.command
-def emulator(scenario: str, *, choice: Choice = Choice(), join: Join = Join()) -> int:
+def emulator(
+    scenario: str,
+    *,
+    choice: Choice = Choice(),
+    join: Join = Join(),
+    pcap: Path | None = None,
+    pcap_receptions: Annotated[bool, Parameter(negative="")] = False,
+) -> int:
     """Run the link emulator alone, against a router.
 
     Parameters
     ----------
     scenario
         The scenario of the swarm.
+    pcap
+        Capture file for every transmission, for Wireshark; if there is one already, the new one gets a number.
+    pcap_receptions
+        Write every reception too, with its RSSI.
 
     """
     from emulator.__main__ import run
 
     chosen = choice.scenario(scenario)
-    return run(chosen, swarm=join.swarm or chosen.name, endpoint=join.connect)
+    return run(
+        chosen,
+        swarm=join.swarm or chosen.name,
+        endpoint=join.connect,
+        pcap=pcap,
+        receptions=pcap_receptions,
+    )
 
 
 @app.command
@@ -234,6 +277,53 @@ def agent(scenario: str, *, id: int, choice: Choice = Choice(), join: Join = Joi
         raise FanetError(f"--id {id}: must be in [1, nodes.count = {chosen.nodes.count}]")
     start = positions(chosen)[id - 1]
     return run(chosen, node=NodeId(id), swarm=join.swarm or chosen.name, endpoint=join.connect, position=start)
+
+
+@app.command
+def links(
+    *,
+    connect: str = "tcp/127.0.0.1:7447",
+    swarm: str | None = None,
+    node: int | None = None,
+    reports: Annotated[int | None, Parameter(validator=Number(gte=1))] = None,
+) -> int:
+    """Show the links of a swarm that runs, the busiest first, renewed every second.
+
+    Parameters
+    ----------
+    connect
+        Zenoh endpoint of the swarm's router.
+    swarm
+        Name of the swarm; by default the only one on that router.
+    node
+        Only links from and to this node.
+    reports
+        End after so many; by default when interrupted.
+
+    """
+    from sim.links_cli import watch
+
+    return watch(connect, swarm, node=node, reports=reports, console=Console())
+
+
+@app.command
+def dissector(folder: Path) -> int:
+    """Install Wireshark's dissector for MAVLink with our messages: writes mavlink.lua.
+
+    Parameters
+    ----------
+    folder
+        Wireshark's folder of personal Lua plugins: see Help, About Wireshark, Folders.
+
+    """
+    path = folder / "mavlink.lua"
+    try:
+        folder.mkdir(parents=True, exist_ok=True)
+        path.write_bytes(gzip.decompress(files("emulator.wireshark").joinpath("mavlink.lua.gz").read_bytes()))
+    except OSError as error:
+        raise ConfigError(f"{path}: cannot be written: {error.strerror}") from error
+    Console().print(f"written to {path}; restart Wireshark", highlight=False, soft_wrap=True)
+    return 0
 
 
 @contextmanager

@@ -15,6 +15,7 @@ import numpy as np
 from agents.traffic import targets_of
 from fanet_mw.trace import Approaching, Arrived, Collided, Delivered, Detected, Generated
 from fanet_mw.units import MS, S
+from sim.bounds import against_bounds
 from sim.outcome import Outcome
 from sim.survivors import place
 
@@ -32,6 +33,7 @@ def summarize(outcome: Outcome, *, trace_sha256: str) -> dict[str, Any]:
         "mode": outcome.mode,
         "nodes": scenario.nodes.count,
         "duration_s": scenario.duration_s,
+        "time_scale": scenario.time_scale if outcome.mode == "realtime" else None,
         "wall_s": round(outcome.wall_s, 3),
         **packets["traffic"],
         "reports": packets["report"],
@@ -39,6 +41,7 @@ def summarize(outcome: Outcome, *, trace_sha256: str) -> dict[str, Any]:
         "copies": _copies(outcome, emulator),
         "air": emulator.get("air", {}),
         "lateness": _lateness(outcome, emulator),
+        "bound": against_bounds(outcome),
         "mission": _mission(outcome),
         "processes": {
             "ready_s": round(outcome.ready_s, 3),

@@ -6,6 +6,7 @@ from typing import Any, Literal
 
 from fanet_mw.scenario import Scenario
 from fanet_mw.trace import Record
+from sim.links import LinkTotals
 
 
 @dataclass(slots=True)
@@ -21,6 +22,8 @@ class Outcome:
     """The last report of each actor, by its name."""
     taps: list[tuple[int, bytes]] = field(default_factory=list)
     """(instant ns, MAVLink bytes) for the `.tlog`."""
+    links: LinkTotals = field(default_factory=LinkTotals)
+    """What each link carried."""
     ended: list[tuple[str, int]] = field(default_factory=list)
     """(name, exit code) of processes that died before their time."""
     aborted: str | None = None

@@ -10,6 +10,8 @@ from rich.table import Table
 def show(summary: Mapping[str, Any], console: Console) -> None:
     """Print a summary."""
     mode = "virtual time" if summary["mode"] == "virtual" else "real processes"
+    if summary["time_scale"] not in (None, 1):
+        mode += f", swarm clock at {summary['time_scale']:g}"
     pace = summary["duration_s"] / summary["wall_s"] if summary["wall_s"] else 0.0
     console.print(
         f"\n[bold]{summary['scenario']}[/], {summary['nodes']} nodes, seed {summary['seed']}, {mode}: "

@@ -11,6 +11,7 @@ import tomli_w
 from fanet_mw import tlog, trace
 from fanet_mw.errors import ConfigError
 from fanet_mw.trace import Record
+from sim.links import described
 from sim.metrics import summarize
 from sim.outcome import Outcome
 
@@ -38,5 +39,7 @@ def _write(outcome: Outcome, summary: dict[str, Any], data: bytes, out: Path) ->
     (out / "scenario.toml").write_text(tomli_w.dumps(resolved), encoding="utf-8")
     (out / "summary.json").write_text(json.dumps(summary, indent=2) + "\n", encoding="utf-8")
     (out / "reports.json").write_text(json.dumps(dict(outcome.reports), indent=2) + "\n", encoding="utf-8")
+    links = ",\n".join(json.dumps(row) for row in described(outcome.links.rows()))  # a line per link
+    (out / "links.json").write_text(f"[\n{links}\n]\n", encoding="utf-8")
     (out / "trace.jsonl").write_bytes(data)
     tlog.write(out / "mavlink.tlog", outcome.taps, epoch_us=outcome.epoch_unix_ns // 1000)

@@ -7,26 +7,31 @@ from contextlib import contextmanager
 
 from agents.uav import Uav
 from emulator.medium import Medium
+from emulator.pcap import Capture
 from fanet_mw.actor import Actor
 from fanet_mw.hosts.virtual import VirtualHost
+from fanet_mw.link_stats import LinkStats
 from fanet_mw.messages import MavlinkTap, Message
 from fanet_mw.scenario import Scenario
 from fanet_mw.topics import Topics
 from fanet_mw.trace import Record
 from fanet_mw.units import NodeId, S
 from sim.layout import positions
+from sim.links import LinkTotals
 from sim.outcome import Outcome
 from sim.world import World
 
 
-def actors_of(scenario: Scenario, swarm: str) -> list[Actor]:
+def actors_of(scenario: Scenario, swarm: str, *, capture: Capture | None = None) -> list[Actor]:
     """Every actor of a swarm: the world first, so that poses stand before anyone transmits."""
     starts = positions(scenario)
     uavs = [Uav(scenario, NodeId(node), swarm, position=starts[node - 1]) for node in scenario.node_ids]
-    return [World(scenario, swarm), Medium(scenario, swarm), *uavs]
+    return [World(scenario, swarm), Medium(scenario, swarm, capture=capture), *uavs]
 
 
-def simulate(scenario: Scenario, *, on_progress: Callable[[float], None] | None = None) -> Outcome:
+def simulate(
+    scenario: Scenario, *, on_progress: Callable[[float], None] | None = None, capture: Capture | None = None
+) -> Outcome:
     """Run a scenario to its end; `on_progress` is told the simulated seconds that have passed."""
     swarm = scenario.name
     records: list[Record] = []
@@ -36,8 +41,16 @@ def simulate(scenario: Scenario, *, on_progress: Callable[[float], None] | None 
         if isinstance(message, MavlinkTap):
             taps.append((message.t_ns, message.data))
 
-    actors = actors_of(scenario, swarm)
-    host = VirtualHost(actors, on_records=records.extend, listeners=[(Topics(swarm).mavlink("*"), tap)])
+    links = LinkTotals()
+
+    def add_links(_: str, message: Message) -> None:
+        if isinstance(message, LinkStats):
+            links.add(message)
+
+    actors = actors_of(scenario, swarm, capture=capture)
+    names = Topics(swarm)
+    listeners = [(names.mavlink("*"), tap), (names.radio_links, add_links)]
+    host = VirtualHost(actors, on_records=records.extend, listeners=listeners)
     began = time.perf_counter()
     with _no_collector():
         _run(host, scenario, on_progress)
@@ -48,6 +61,7 @@ def simulate(scenario: Scenario, *, on_progress: Callable[[float], None] | None 
         records=records,
         reports={actor.name: actor.report() for actor in actors},
         taps=taps,
+        links=links,
     )
 
 

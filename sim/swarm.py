@@ -11,7 +11,7 @@ import json
 import signal
 import socket
 import time
-from collections.abc import Callable
+from collections.abc import Callable, Mapping
 from typing import Any, Final
 
 from agents.__main__ import run as run_agent
@@ -20,12 +20,14 @@ from fanet_mw import topics
 from fanet_mw.errors import BusError, MalformedFrameError
 from fanet_mw.hosts.bus import Bus
 from fanet_mw.hosts.clock import ClockKeeper, SwarmClock
+from fanet_mw.link_stats import LinkStats
 from fanet_mw.messages import MavlinkTap, Message, Report, TraceBatch
 from fanet_mw.scenario import Scenario
 from fanet_mw.topics import Topics
 from fanet_mw.trace import ProcessEnded, Record, kind_of
 from fanet_mw.units import NodeId, S
 from sim.layout import positions
+from sim.links import LinkTotals
 from sim.outcome import Outcome
 from sim.processes import Processes, describe
 from sim.world_main import run as run_world
@@ -63,6 +65,8 @@ class Collector:
         bus.subscribe(names.all_traces, lambda _, payload: self._traces.append(payload))
         bus.subscribe(names.all_reports, self._reports.__setitem__)
         bus.subscribe(names.mavlink("*"), lambda _, payload: self._taps.append(payload))
+        self._links: list[bytes] = []
+        bus.subscribe(names.radio_links, lambda _, payload: self._links.append(payload))
 
     def records(self) -> list[Record]:
         """All trace records, by instant, node and kind."""
@@ -75,6 +79,14 @@ class Collector:
         reports = [message for message in _decoded(list(self._reports.values())) if isinstance(message, Report)]
         parsed = {report.name: _json(report.json) for report in sorted(reports, key=lambda report: report.name)}
         return {name: content for name, content in parsed.items() if isinstance(content, dict)}
+
+    def links(self) -> LinkTotals:
+        """What each link carried."""
+        totals = LinkTotals()
+        for message in _decoded(self._links):
+            if isinstance(message, LinkStats):
+                totals.add(message)
+        return totals
 
     def taps(self) -> list[tuple[int, bytes]]:
         """What UAVs told inspectors, by instant."""
@@ -105,6 +117,8 @@ class Swarm:
 
     def __init__(self, scenario: Scenario, bus: Bus, *, swarm: str, endpoint: str, respawn: bool, tell: Tell) -> None:
         names = Topics(swarm)
+        self.emulator_options: dict[str, Any] = {}
+        """More arguments of the emulator's process."""
         self._scenario = scenario
         self._swarm = swarm
         self._endpoint = endpoint
@@ -142,6 +156,7 @@ class Swarm:
             records=sorted([*self._collector.records(), *self._obituaries], key=lambda r: (r.t_ns, r.node, kind_of(r))),
             reports=self._collector.reports(),
             taps=self._collector.taps(),
+            links=self._collector.links(),
             ended=self._ended,
             aborted=self._aborted,
             ready_s=ready_s,
@@ -157,7 +172,7 @@ class Swarm:
 
     def _start_all(self) -> None:
         common = {"scenario": self._scenario, "swarm": self._swarm, "endpoint": self._endpoint}
-        self.processes.start("emulator", run_emulator, common)
+        self.processes.start("emulator", run_emulator, {**common, **self.emulator_options})
         self.processes.start("world", run_world, common)
         for node, position in zip(self._scenario.node_ids, positions(self._scenario), strict=True):
             self.processes.start(f"agent-{node}", run_agent, {**common, "node": NodeId(node), "position": position})
@@ -236,6 +251,7 @@ async def launch(
     listen: str | None = None,
     connect: str | None = None,
     respawn: bool = False,
+    emulator_options: Mapping[str, Any] | None = None,
     on_progress: Callable[[float], None] = lambda _: None,
     on_event: Tell = lambda _: None,
     on_started: Callable[[Swarm], None] = lambda _: None,
@@ -247,6 +263,7 @@ async def launch(
     bus, endpoint = _bus(listen, connect)
     with bus:
         run = Swarm(scenario, bus, swarm=swarm, endpoint=endpoint, respawn=respawn, tell=on_event)
+        run.emulator_options.update(emulator_options or {})
         loop = asyncio.get_running_loop()
         for number in (signal.SIGINT, signal.SIGTERM):
             loop.add_signal_handler(number, run.abort, f"interrupted by {number.name}")

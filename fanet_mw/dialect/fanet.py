@@ -369,6 +369,7 @@ MAVLINK_MSG_ID_FANET_CHUNK = 53004
 MAVLINK_MSG_ID_FANET_TIME = 53005
 MAVLINK_MSG_ID_FANET_JOIN = 53006
 MAVLINK_MSG_ID_FANET_DIGEST = 53007
+MAVLINK_MSG_ID_FANET_PLACES = 53008
 
 
 class MAVLink_fanet_route_message(MAVLink_message):
@@ -736,6 +737,53 @@ class MAVLink_fanet_digest_message(MAVLink_message):
 setattr(MAVLink_fanet_digest_message, "name", mavlink_msg_deprecated_name_property())
 
 
+class MAVLink_fanet_places_message(MAVLink_message):
+    """
+    Where the members of the schedule part in the same packet are, for
+    those who compute the timetable of floods from it.
+    """
+
+    id = MAVLINK_MSG_ID_FANET_PLACES
+    msgname = "FANET_PLACES"
+    fieldnames = ["east", "north", "up", "leader_east", "leader_north", "leader_up", "first", "count", "version"]
+    ordered_fieldnames = ["east", "north", "up", "leader_east", "leader_north", "leader_up", "first", "count", "version"]
+    fieldtypes = ["int16_t", "int16_t", "int16_t", "int16_t", "int16_t", "int16_t", "uint8_t", "uint8_t", "uint8_t"]
+    fielddisplays_by_name: Dict[str, str] = {}
+    fieldenums_by_name: Dict[str, str] = {}
+    fieldunits_by_name: Dict[str, str] = {"east": "m", "north": "m", "up": "m", "leader_east": "m", "leader_north": "m", "leader_up": "m"}
+    native_format = bytearray(b"<hhhhhhBBB")
+    orders = [0, 1, 2, 3, 4, 5, 6, 7, 8]
+    lengths = [28, 28, 28, 1, 1, 1, 1, 1, 1]
+    array_lengths = [28, 28, 28, 0, 0, 0, 0, 0, 0]
+    crc_extra = 1
+    unpacker = struct.Struct("<28h28h28hhhhBBB")
+    instance_field = None
+    instance_offset = -1
+
+    def __init__(self, east: Sequence[int], north: Sequence[int], up: Sequence[int], leader_east: int, leader_north: int, leader_up: int, first: int, count: int, version: int):
+        MAVLink_message.__init__(self, MAVLink_fanet_places_message.id, MAVLink_fanet_places_message.msgname)
+        self._fieldnames = MAVLink_fanet_places_message.fieldnames
+        self._instance_field = MAVLink_fanet_places_message.instance_field
+        self._instance_offset = MAVLink_fanet_places_message.instance_offset
+        self.east = east
+        self.north = north
+        self.up = up
+        self.leader_east = leader_east
+        self.leader_north = leader_north
+        self.leader_up = leader_up
+        self.first = first
+        self.count = count
+        self.version = version
+
+    def pack(self, mav: "MAVLink", force_mavlink1: bool = False) -> bytes:
+        return self._pack(mav, self.crc_extra, self.unpacker.pack(self.east[0], self.east[1], self.east[2], self.east[3], self.east[4], self.east[5], self.east[6], self.east[7], self.east[8], self.east[9], self.east[10], self.east[11], self.east[12], self.east[13], self.east[14], self.east[15], self.east[16], self.east[17], self.east[18], self.east[19], self.east[20], self.east[21], self.east[22], self.east[23], self.east[24], self.east[25], self.east[26], self.east[27], self.north[0], self.north[1], self.north[2], self.north[3], self.north[4], self.north[5], self.north[6], self.north[7], self.north[8], self.north[9], self.north[10], self.north[11], self.north[12], self.north[13], self.north[14], self.north[15], self.north[16], self.north[17], self.north[18], self.north[19], self.north[20], self.north[21], self.north[22], self.north[23], self.north[24], self.north[25], self.north[26], self.north[27], self.up[0], self.up[1], self.up[2], self.up[3], self.up[4], self.up[5], self.up[6], self.up[7], self.up[8], self.up[9], self.up[10], self.up[11], self.up[12], self.up[13], self.up[14], self.up[15], self.up[16], self.up[17], self.up[18], self.up[19], self.up[20], self.up[21], self.up[22], self.up[23], self.up[24], self.up[25], self.up[26], self.up[27], self.leader_east, self.leader_north, self.leader_up, self.first, self.count, self.version), force_mavlink1=force_mavlink1)
+
+
+# Define name on the class for backwards compatibility (it is now msgname).
+# Done with setattr to hide the class variable from mypy.
+setattr(MAVLink_fanet_places_message, "name", mavlink_msg_deprecated_name_property())
+
+
 mavlink_map: Dict[int, Type[MAVLink_message]] = {
     MAVLINK_MSG_ID_FANET_ROUTE: MAVLink_fanet_route_message,
     MAVLINK_MSG_ID_FANET_BEACON: MAVLink_fanet_beacon_message,
@@ -745,6 +793,7 @@ mavlink_map: Dict[int, Type[MAVLink_message]] = {
     MAVLINK_MSG_ID_FANET_TIME: MAVLink_fanet_time_message,
     MAVLINK_MSG_ID_FANET_JOIN: MAVLink_fanet_join_message,
     MAVLINK_MSG_ID_FANET_DIGEST: MAVLink_fanet_digest_message,
+    MAVLINK_MSG_ID_FANET_PLACES: MAVLink_fanet_places_message,
 }
 
 
@@ -1406,3 +1455,39 @@ class MAVLink(object):
 
         """
         self.send(self.fanet_digest_encode(newest, held, origins, count, complete, version), force_mavlink1=force_mavlink1)
+
+    def fanet_places_encode(self, east: Sequence[int], north: Sequence[int], up: Sequence[int], leader_east: int, leader_north: int, leader_up: int, first: int, count: int, version: int) -> MAVLink_fanet_places_message:
+        """
+        Where the members of the schedule part in the same packet are, for
+        those who compute the timetable of floods from it.
+
+        east                      : Of each member. [m] (type:int16_t)
+        north                     : Of each member. [m] (type:int16_t)
+        up                        : Of each member. [m] (type:int16_t)
+        leader_east               : Of the leader, who is in no cluster. [m] (type:int16_t)
+        leader_north              : Of the leader. [m] (type:int16_t)
+        leader_up                 : Of the leader. [m] (type:int16_t)
+        first                     : Entry i belongs to this member of the part, plus i. (type:uint8_t)
+        count                     : How many entries are used. (type:uint8_t)
+        version                   : 1. (type:uint8_t)
+
+        """
+        return MAVLink_fanet_places_message(east, north, up, leader_east, leader_north, leader_up, first, count, version)
+
+    def fanet_places_send(self, east: Sequence[int], north: Sequence[int], up: Sequence[int], leader_east: int, leader_north: int, leader_up: int, first: int, count: int, version: int, force_mavlink1: bool = False) -> None:
+        """
+        Where the members of the schedule part in the same packet are, for
+        those who compute the timetable of floods from it.
+
+        east                      : Of each member. [m] (type:int16_t)
+        north                     : Of each member. [m] (type:int16_t)
+        up                        : Of each member. [m] (type:int16_t)
+        leader_east               : Of the leader, who is in no cluster. [m] (type:int16_t)
+        leader_north              : Of the leader. [m] (type:int16_t)
+        leader_up                 : Of the leader. [m] (type:int16_t)
+        first                     : Entry i belongs to this member of the part, plus i. (type:uint8_t)
+        count                     : How many entries are used. (type:uint8_t)
+        version                   : 1. (type:uint8_t)
+
+        """
+        self.send(self.fanet_places_encode(east, north, up, leader_east, leader_north, leader_up, first, count, version), force_mavlink1=force_mavlink1)

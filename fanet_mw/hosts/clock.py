@@ -26,6 +26,8 @@ class SwarmClock:
 
     def __init__(self, clock: Clock) -> None:
         epoch_mono_ns = clock.epoch_unix_ns - (time.time_ns() - time.monotonic_ns())
+        self.epoch_unix_ns = clock.epoch_unix_ns
+        """Unix time of swarm instant 0."""
         self._epoch_mono_ns = epoch_mono_ns
         self._scale = clock.time_scale
 

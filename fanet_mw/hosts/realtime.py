@@ -1,6 +1,6 @@
 """Real time: one actor on asyncio over Zenoh, under the same contract as in virtual time.
 
-    Zenoh's thread -> deque -> one wake-up of the loop drains it -> actor -> outbox, one put per topic and wake-up
+    Zenoh's thread -> inbox -> wake-ups of the loop drain it -> actor -> outbox, one put per topic and wake-up
 
 The host never wakes an actor early. How late it wakes it is measured and reported; the lateness of frames, which is
 what matters, is the medium's to count. An actor that raises ends its host, and with it the process.
@@ -10,16 +10,15 @@ import asyncio
 import gc
 import json
 import resource
-from collections import deque
 from collections.abc import Callable
 from pathlib import Path
 from typing import Any, Final
 
 from fanet_mw import topics
 from fanet_mw.actor import Actor
-from fanet_mw.errors import MalformedFrameError
 from fanet_mw.hosts.bus import Bus
 from fanet_mw.hosts.clock import ClockListener, SwarmClock
+from fanet_mw.hosts.inbox import Inbox
 from fanet_mw.hosts.lateness import Histogram
 from fanet_mw.messages import Message, Report, TraceBatch
 from fanet_mw.topics import Topics
@@ -38,7 +37,7 @@ class RealtimeHost:
         self._bus = bus
         self._names = names
         self._loop = asyncio.get_running_loop()
-        self._inbox: deque[tuple[str, bytes]] = deque()
+        self._inbox = Inbox()
         self._drain_asked = False
         self._failure: asyncio.Future[None] = self._loop.create_future()
         self._clock: SwarmClock | None = None
@@ -47,17 +46,21 @@ class RealtimeHost:
         self._timer_ns: int | None = None
         self._records: list[Record] = []
         self._lateness = Histogram()
-        self._malformed = 0
         self._puts = 0
-        self._samples = 0
 
-    async def run(self, *, until_ns: int, clock_timeout_s: float) -> None:
-        """Declare, announce, wait for the clock, run, report. Raises BusError, and whatever the actor raises."""
+    async def run(
+        self, *, until_ns: int, clock_timeout_s: float, on_epoch: Callable[[int], None] = lambda _: None
+    ) -> None:
+        """Declare, announce, wait for the clock, run, report. Raises BusError, and whatever the actor raises.
+
+        `on_epoch` is told the unix time of swarm instant 0 [ns] before the actor starts.
+        """
         for expression in self._actor.subscriptions:
             self._bus.subscribe(expression, self._from_thread)
         listener = ClockListener(self._bus, self._names)
         self._bus.announce(self._names.alive(self._actor.name))
         self._clock = await listener.running(timeout_s=clock_timeout_s)
+        on_epoch(self._clock.epoch_unix_ns)
         await self._sleep_until(0)
         gc.freeze()  # what start-up made stays: the collector need not look at it again in the middle of a slot
         self._running = True
@@ -121,7 +124,7 @@ class RealtimeHost:
 
     def _from_thread(self, topic: str, payload: bytes) -> None:
         """On Zenoh's thread: many samples, one wake-up."""
-        self._inbox.append((topic, payload))
+        self._inbox.offer(topic, payload)
         if not self._drain_asked and not self._loop.is_closed():
             self._drain_asked = True
             self._loop.call_soon_threadsafe(self._drain)
@@ -141,18 +144,12 @@ class RealtimeHost:
                 self._failure.set_exception(error)
 
     def _take_inbox(self) -> None:
-        inbox, actor = self._inbox, self._actor
-        while inbox:
-            topic, payload = inbox.popleft()
-            self._samples += 1
-            try:
-                messages = topics.decode(payload)
-            except MalformedFrameError:
-                self._malformed += 1
-                continue
-            for message in messages:
-                actor.receive(topic, message, self._now_ns())
+        actor = self._actor
+        more = self._inbox.deliver(lambda topic, message: actor.receive(topic, message, self._now_ns()))
         self._settle()
+        if more and not self._drain_asked:  # timers, the clock and reports have their turn before the rest
+            self._drain_asked = True
+            self._loop.call_soon(self._drain)
 
     # --- time -----------------------------------------------------------------------------------------------------
 
@@ -217,9 +214,8 @@ class RealtimeHost:
             "wake_lateness_ms": self._lateness.summary(),
             "cpu_s": round(usage.ru_utime + usage.ru_stime, 3),
             "uss_mb": uss_mb() if final else None,  # asking holds up the process for more than a millisecond
-            "malformed": self._malformed,
             "puts": self._puts,
-            "samples": self._samples,
+            **self._inbox.figures(),
         }
 
 
@@ -233,7 +229,16 @@ def uss_mb() -> float | None:
     return round(sum(int(kb) for kb in private) / 1024, 2)
 
 
-async def run_actor(actor: Actor, *, swarm: str, endpoint: str, until_ns: int, clock_timeout_s: float = 60.0) -> None:
+async def run_actor(
+    actor: Actor,
+    *,
+    swarm: str,
+    endpoint: str,
+    until_ns: int,
+    clock_timeout_s: float = 60.0,
+    on_epoch: Callable[[int], None] = lambda _: None,
+) -> None:
     """Join a router, run one actor, leave. Raises BusError."""
     with Bus.join(endpoint) as bus:
-        await RealtimeHost(actor, bus, Topics(swarm)).run(until_ns=until_ns, clock_timeout_s=clock_timeout_s)
+        host = RealtimeHost(actor, bus, Topics(swarm))
+        await host.run(until_ns=until_ns, clock_timeout_s=clock_timeout_s, on_epoch=on_epoch)

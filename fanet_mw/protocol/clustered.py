@@ -119,14 +119,14 @@ class Clustered(RoutingProtocol):
         self._keep(packet, flooded=bool(flags & FLAG_FLOOD), now_ns=now_ns)
         if flags & FLAG_FLOOD:
             self._consume_control(packet, now_ns=now_ns)
-            self._flood_on(packet, now_ns=now_ns)
+            self._flood_on(packet, reception, now_ns=now_ns)
         elif flags & FLAG_TO_HEAD:
             if packet.header.hop_limit <= 1:
                 self._port.drop(DropReason.HOP_LIMIT, packet, now_ns=now_ns)
             else:
                 self._forward(packet, start_ns=now_ns + self._lead_ns, now_ns=now_ns, tries=0)
 
-    def _flood_on(self, packet: Packet, *, now_ns: int) -> None:
+    def _flood_on(self, packet: Packet, reception: Reception, *, now_ns: int) -> None:
         """Relay a flooded packet, now or after assessment; control packets at once and by everyone."""
         if packet.header.destination == self._port.node:
             return
@@ -138,8 +138,12 @@ class Clustered(RoutingProtocol):
             self._transmit_relay(packet, self._jitter_ns, now_ns=now_ns)
 
     def _transmit_relay(self, packet: Packet, jitter_ns: int, *, now_ns: int) -> None:
-        start_ns = now_ns + self._lead_ns + int(self._random() * jitter_ns)
+        start_ns = self._start_ns(now_ns=now_ns, jitter_ns=jitter_ns)
         self._port.transmit(self._port.forwarded(packet, flags=FLAG_FLOOD), BROADCAST, start_ns=start_ns)
+
+    def _start_ns(self, *, now_ns: int, jitter_ns: int) -> int:
+        """When a frame may go that is ready now."""
+        return now_ns + self._lead_ns + int(self._random() * jitter_ns)
 
     def overheard(self, key: int, *, now_ns: int) -> None:
         self._relay.another_copy(key)
@@ -152,7 +156,15 @@ class Clustered(RoutingProtocol):
             join = Join.decode_frame(packet.frame)
             self._leader.joined(NodeId(join.node), join.position, now_ns=now_ns)
         elif packet.header.kind == Kind.SCHEDULE:
-            self._obey(Schedule.decode_frame(packet.frame), now_ns=now_ns)
+            self._learn(packet.frame, now_ns=now_ns)
+
+    def _learn(self, frame: bytes, *, now_ns: int) -> None:
+        """An announcement of the leader's, or our own."""
+        self._obey(Schedule.decode_frame(frame), now_ns=now_ns)
+
+    def _announcement(self, part: Schedule) -> bytes:
+        """The inner frames of a schedule packet."""
+        return part.encode_frame(self._port.node)
 
     def _obey(self, schedule: Schedule, *, now_ns: int) -> None:
         changed = self._membership.learn(schedule, guard_ns=round(self._port.scenario.clusters.guard_ms * MS))
@@ -221,8 +233,8 @@ class Clustered(RoutingProtocol):
             self._join(now_ns)
         if self._leader is not None:
             for part in self._leader.wake(now_ns):
-                self._obey(part, now_ns=now_ns)
-                self._flood_control(Kind.SCHEDULE, part.encode_frame(self._port.node), now_ns=now_ns)
+                packet = self._flood_control(Kind.SCHEDULE, self._announcement(part), now_ns=now_ns)
+                self._learn(packet.frame, now_ns=now_ns)
         for packet in self._relay.decided(now_ns=now_ns):
             self._transmit_relay(packet, 0, now_ns=now_ns)
         for packet in self._repair.due(now_ns=now_ns) if self._repair else ():
@@ -231,11 +243,15 @@ class Clustered(RoutingProtocol):
         for packet in self._release.expire(before_us=horizon_us):
             self._port.drop(DropReason.EXPIRED, packet, now_ns=now_ns)
         for packet, start_ns in self._release.due(self._membership, now_ns=now_ns):
-            self._port.mark(packet, seen.FLOODED)
-            self._keep(packet, flooded=True, now_ns=start_ns)
-            own = packet.header.origin == self._port.node
-            stamp = self._port.stamped if own else self._port.forwarded
-            self._port.transmit(stamp(packet, flags=FLAG_FLOOD), BROADCAST, start_ns=start_ns)
+            self._flood(packet, start_ns=start_ns)
+
+    def _flood(self, packet: Packet, *, start_ns: int) -> None:
+        """The flood of a packet begins here."""
+        self._port.mark(packet, seen.FLOODED)
+        self._keep(packet, flooded=True, now_ns=start_ns)
+        own = packet.header.origin == self._port.node
+        stamp = self._port.stamped if own else self._port.forwarded
+        self._port.transmit(stamp(packet, flags=FLAG_FLOOD), BROADCAST, start_ns=start_ns)
 
     def _flood_again(self, packet: Packet, *, now_ns: int) -> None:
         """A neighbor lacks this packet."""
@@ -247,18 +263,19 @@ class Clustered(RoutingProtocol):
             frame = self._port.forwarded(packet, flags=FLAG_FLOOD)
         else:
             return  # as far as it may go; it has been delivered here
-        self._port.transmit(frame, BROADCAST, start_ns=now_ns + self._lead_ns)
+        self._port.transmit(frame, BROADCAST, start_ns=self._start_ns(now_ns=now_ns, jitter_ns=0))
 
     def _join(self, now_ns: int) -> None:
         self._join_ns = now_ns + _REJOIN_NS + int(self._random() * _JOIN_WINDOW_NS)
         join = Join(self._port.node, self._port.position)
         self._flood_control(Kind.JOIN, join.encode_frame(self._port.node), now_ns=now_ns)
 
-    def _flood_control(self, kind: Kind, inner: bytes, *, now_ns: int) -> None:
+    def _flood_control(self, kind: Kind, inner: bytes, *, now_ns: int) -> Packet:
         packet = self._port.announce(
             kind, inner, now_ns=now_ns, flags=FLAG_FLOOD, hop_limit=self._port.scenario.routing.hop_limit
         )
-        self._port.transmit(packet.frame, BROADCAST, start_ns=now_ns + self._lead_ns)
+        self._port.transmit(packet.frame, BROADCAST, start_ns=self._start_ns(now_ns=now_ns, jitter_ns=0))
+        return packet
 
     # --- for people -----------------------------------------------------------------------------------------------
 

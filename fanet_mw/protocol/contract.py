@@ -72,6 +72,10 @@ class RoutingProtocol(ABC):
         """What this protocol adds to the node's hello."""
         return b""
 
+    def hello_start_ns(self, start_ns: int) -> int:
+        """When a hello may go that is due at `start_ns`."""
+        return start_ns
+
     def hello(self, packet: Packet, reception: Reception, *, now_ns: int) -> None:  # noqa: B027
         """A neighbor's hello."""
 

@@ -12,16 +12,17 @@ from fanet_mw.wire import CAPACITY, Member, Schedule
 
 SETTLE_NS: Final = 700 * MS
 """Quiet time after the last join before the clusters are computed."""
+_HEARD_NS: Final = 1500 * MS
+"""An announcement has reached everyone after this."""
 
 
 class Leader:
     """Computes schedules out of joins."""
 
-    def __init__(self, *, node: NodeId, clusters: int, period_ns: int, origin_ns: int = 0) -> None:
+    def __init__(self, *, node: NodeId, clusters: int, period_ns: int) -> None:
         self._node = node
         self._clusters = clusters
         self._period_ns = period_ns
-        self._origin_ns = origin_ns
         self._positions: dict[NodeId, Enu] = {}
         self._epoch = 0
         self._due_ns: int | None = None
@@ -44,11 +45,13 @@ class Leader:
             return []
         known = sum(len(part.members) for part in self._parts)
         if known != len(self._positions):
-            self._assign()
+            self._assign(now_ns)
         self._due_ns = now_ns + self._period_ns
         return self._parts
 
-    def _assign(self) -> None:
+    def _assign(self, now_ns: int) -> None:
+        """A new epoch; its superframes begin when all should have heard of it."""
+        start_ns = (now_ns + _HEARD_NS) // self._period_ns * self._period_ns + self._period_ns
         clusters = balanced(self._positions, count=self._clusters)
         self._epoch = (self._epoch + 1) & 0xFFFF
         members = [
@@ -59,7 +62,7 @@ class Leader:
         chunks = [members[at : at + CAPACITY] for at in range(0, len(members), CAPACITY)]
         self._parts = [
             Schedule(
-                start_us=self._origin_ns // US,
+                start_us=start_ns // US,
                 period_us=self._period_ns // US,
                 slot_us=self._period_ns // len(clusters) // US,
                 epoch=self._epoch,
@@ -71,6 +74,10 @@ class Leader:
             )
             for part, chunk in enumerate(chunks)
         ]
+
+    def position(self, node: int) -> Enu:
+        """Where a member last said to be."""
+        return self._positions[NodeId(node)]
 
     @property
     def nodes_known(self) -> int:

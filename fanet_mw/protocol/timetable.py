@@ -161,7 +161,7 @@ class _Plan:
         hears = self._swarm.hears
         relays: list[tuple[int, int | None]] = [(root, None)]
         reached = 1 << root | hears[root]
-        level = {row: root for row in _rows(hears[root])}
+        level = dict.fromkeys(_rows(hears[root]), root)
         while level:
             following: dict[int, int] = {}
             while True:

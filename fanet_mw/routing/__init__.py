@@ -5,6 +5,7 @@ from typing import Final
 
 from fanet_mw.protocol.clustered import Clustered
 from fanet_mw.protocol.contract import Port, RoutingProtocol
+from fanet_mw.protocol.scheduled import Scheduled
 from fanet_mw.routing.direct import Direct
 from fanet_mw.routing.flooding import Flooding
 
@@ -17,4 +18,7 @@ PROTOCOLS: Final[Mapping[str, type[RoutingProtocol]]] = {
 
 def make_protocol(port: Port) -> RoutingProtocol:
     """The protocol that the port's scenario names."""
-    return PROTOCOLS[port.scenario.routing.protocol](port)
+    name = port.scenario.routing.protocol
+    if name == "clustered" and port.scenario.clusters.relay == "scheduled":
+        return Scheduled(port)
+    return PROTOCOLS[name](port)

@@ -3,11 +3,13 @@
 from array import array
 from contextlib import suppress
 
+import pytest
 from hypothesis import given
 from hypothesis import strategies as st
 
 from fanet_mw import topics
 from fanet_mw.errors import MalformedFrameError
+from fanet_mw.link_stats import COUNTS, LinkStats
 from fanet_mw.messages import (
     Clock,
     ClockState,
@@ -25,6 +27,7 @@ from fanet_mw.messages import (
     TxStatus,
     WifiScan,
 )
+from fanet_mw.radio_control import Cut, Degrade, Jam, Restore
 from fanet_mw.trace import Delivered, Detected, Generated
 from fanet_mw.units import Enu, NodeId
 
@@ -42,6 +45,10 @@ def poses(draw: st.DrawFn) -> Poses:
     ids = draw(st.lists(st.integers(1, 0xFFFF), max_size=5))
     states = draw(st.lists(doubles, min_size=6 * len(ids), max_size=6 * len(ids)))
     return Poses(draw(instants), array("H", ids), array("d", states))
+
+
+def numbers(code: str, values: st.SearchStrategy[int], count: int) -> "st.SearchStrategy[array[int]]":
+    return st.lists(values, min_size=count, max_size=count).map(lambda found: array(code, found))
 
 
 records = st.one_of(
@@ -65,6 +72,20 @@ messages: st.SearchStrategy[Message] = st.one_of(
     st.builds(MavlinkTap, instants, st.binary(max_size=50)),
     st.builds(TraceBatch, st.lists(records, max_size=5).map(tuple)),
     st.builds(Clock, instants, st.floats(0.01, 100), st.sampled_from(ClockState)),
+    st.builds(Degrade, words, nodes, nodes, st.booleans(), doubles, doubles, instants),
+    st.builds(Jam, words, vectors, doubles, doubles, instants),
+    st.builds(Cut, words, nodes, instants),
+    st.builds(Restore, words),
+    st.integers(0, 4).flatmap(
+        lambda n: st.builds(
+            LinkStats,
+            instants,
+            instants,
+            numbers("H", nodes, 2 * n),
+            numbers("I", u32, COUNTS * n),
+            numbers("q", instants, n),
+        )
+    ),
     st.builds(Report, words, instants, st.text(st.characters(codec="utf-8"), max_size=50)),
 )
 
@@ -95,3 +116,10 @@ def test_the_node_of_a_topic_is_its_fourth_part() -> None:
     assert topics.node_of(names.setpoint(4)) == 4
     assert topics.node_of(names.pose) == 0
     assert topics.node_of("fanet/swarm/radio/²/tx") == 0
+    assert topics.node_of(names.radio_tx("9" * 5000)) == 0, "Python refuses to read so long a number"
+
+
+def test_a_trace_nested_deeper_than_a_parser_goes_is_malformed() -> None:
+    body = b"[" * 200_000
+    with pytest.raises(MalformedFrameError):
+        topics.decode(bytes([9]) + len(body).to_bytes(4, "little") + body)

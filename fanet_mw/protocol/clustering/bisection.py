@@ -7,14 +7,8 @@ and ids. The paper gives k; its own way of choosing members is not stated.
 from collections.abc import Mapping
 from typing import NamedTuple
 
+from fanet_mw.protocol.clustering.contract import Cluster, Promise, Swarm
 from fanet_mw.units import Enu, NodeId
-
-
-class Cluster(NamedTuple):
-    """One cluster: its head is one of its members."""
-
-    head: NodeId
-    members: tuple[NodeId, ...]
 
 
 def balanced(positions: Mapping[NodeId, Enu], *, count: int) -> list[Cluster]:
@@ -22,6 +16,19 @@ def balanced(positions: Mapping[NodeId, Enu], *, count: int) -> list[Cluster]:
     nodes = sorted(positions)
     count = min(count, len(nodes))
     return [_with_head(part, positions) for part in _split(nodes, positions, count)] if count else []
+
+
+class Balanced(NamedTuple):
+    """`balanced` behind the contract: it sees positions only, so a member may be out of its head's range."""
+
+    clusters: int
+
+    @property
+    def promise(self) -> Promise:
+        return Promise(dominating=False, independent=False)
+
+    def divide(self, swarm: Swarm) -> list[Cluster]:
+        return balanced(swarm.positions, count=self.clusters)
 
 
 def _split(nodes: list[NodeId], positions: Mapping[NodeId, Enu], count: int) -> list[list[NodeId]]:

@@ -1,0 +1,63 @@
+"""The file of a capture: opened and written here, for the entry points; the medium only knows `Capture`.
+
+A disk that fails ends the capture and not the run: it is said once, and the file keeps what it had.
+"""
+
+import contextlib
+import sys
+from pathlib import Path
+from types import TracebackType
+from typing import BinaryIO, Final, Self
+
+from emulator.pcap import Pcap
+from fanet_mw.errors import ConfigError
+from fanet_mw.scenario import Radio
+
+NAME: Final = "air.pcap"
+_BUFFER: Final = 1 << 18
+
+
+def unused(path: Path) -> Path:
+    """`path`, or with a number when there is one: an emulator that is started again keeps what the last one saw."""
+    number = 1
+    found = path
+    while found.exists():
+        number += 1
+        found = path.with_stem(f"{path.stem}-{number}")
+    return found
+
+
+class CaptureFile:
+    """A `Pcap` on a file; raises ConfigError when that cannot be opened."""
+
+    def __init__(self, path: Path, radio: Radio, *, receptions: bool = False) -> None:
+        try:
+            path.parent.mkdir(parents=True, exist_ok=True)
+            self._file: BinaryIO | None = path.open("wb", buffering=_BUFFER)
+        except OSError as error:
+            raise ConfigError(f"--pcap: {path}: cannot be written: {error.strerror}") from error
+        self._path = path
+        self.pcap = Pcap(self._write, radio, receptions=receptions)
+
+    def _write(self, data: bytes) -> None:
+        if self._file is None:
+            return
+        try:
+            self._file.write(data)
+        except OSError as error:
+            with contextlib.suppress(OSError):
+                self._file.close()
+            self._file = None
+            sys.stderr.write(f"{self._path}: the capture ends here: {error.strerror}\n")
+
+    def __enter__(self) -> Self:
+        return self
+
+    def __exit__(
+        self, kind: type[BaseException] | None, error: BaseException | None, trace: TracebackType | None
+    ) -> None:
+        if self._file is not None:
+            try:
+                self._file.close()
+            except OSError as why:
+                sys.stderr.write(f"{self._path}: the end of the capture is lost: {why.strerror}\n")

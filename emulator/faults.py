@@ -1,0 +1,170 @@
+"""Faults that lie on the air now, and those still to come: they change links and noise, nothing else.
+
+    degraded   power x 10^(-loss_db / 10); below the sensitivity the link is gone; a share of what is received is lost
+    jammed     the noise at receivers inside is higher, or nothing is received there; a jammer is not sensed (the clear
+               channel assessment of 802.11-2020, 16.3.8.5, mode 2 looks for signals, not for energy)
+    cut        no power to or from the node
+
+A link that is audible without its faults is marked with the gravest of them, so that what it loses as weak is counted
+under it. Frames under way keep the power they started with. Does not model: jammers that move, or react.
+"""
+
+import heapq
+import math
+from collections.abc import Iterable
+from typing import Final, NamedTuple
+
+import numpy as np
+import numpy.typing as npt
+
+from emulator import state as s
+from emulator.propagation import Links, milliwatt, noise_mw
+from fanet_mw.radio_control import Control, Cut, Degrade, Fault, Jam, Restore, wrong
+from fanet_mw.scenario import Radio
+from fanet_mw.trace import RadioFault
+
+MAX_FAULTS: Final = 1024
+"""At a time; more are refused."""
+_KINDS: Final = {Degrade: "degrade", Jam: "jam", Cut: "cut"}
+
+
+class _Standing(NamedTuple):
+    """A fault that lies on the air; `number` tells it from an earlier one of its label."""
+
+    fault: Fault
+    number: int
+
+
+class Faults:
+    """What is wrong with the air, by label."""
+
+    def __init__(self, radio: Radio, *, stations: int, planned: Iterable[tuple[int, Control]] = ()) -> None:
+        self._radio = radio
+        self._stations = stations
+        self._standing: dict[str, _Standing] = {}
+        self._number = 0
+        self._agenda: list[tuple[int, int, Control | None, str, int]] = []
+        """(instant, order, what begins, or: label and number of what ends), a heap."""
+        for at_ns, control in planned:
+            self._push(at_ns, control)
+        self.records: list[RadioFault] = []
+
+    def cut_off(self) -> frozenset[int]:
+        """Stations whose radio is off."""
+        return frozenset(item.fault.node - 1 for item in self._standing.values() if isinstance(item.fault, Cut))
+
+    def next_ns(self) -> int | None:
+        """When the next fault begins or ends by itself."""
+        return self._agenda[0][0] if self._agenda else None
+
+    def pass_time(self, now_ns: int) -> list[str]:
+        """Begin and end what is due by `now_ns`; returns the kinds of what was refused."""
+        refused = []
+        while self._agenda and self._agenda[0][0] <= now_ns:
+            at_ns, _, control, label, number = heapq.heappop(self._agenda)
+            if control is not None:
+                why = self.obey(control, at_ns)
+                refused += [why] if why else []
+            elif label in self._standing and self._standing[label].number == number:
+                self._end(label, at_ns)
+        return refused
+
+    def obey(self, control: Control, now_ns: int) -> str | None:
+        """Begin or end something now; returns why not, None when it was done."""
+        if isinstance(control, Restore):
+            if control.label and control.label not in self._standing:
+                return "fault_unknown_label"
+            for label in [control.label] if control.label else list(self._standing):
+                self._end(label, now_ns)
+            return None
+        why = wrong(control, count=self._stations)
+        if why is None and len(self._standing) >= MAX_FAULTS and control.label not in self._standing:
+            why = "fault_limit"
+        if why is None:
+            if control.label in self._standing:
+                self._end(control.label, now_ns)
+            self._begin(control, now_ns)
+        return why
+
+    def _begin(self, fault: Fault, now_ns: int) -> None:
+        self._number += 1
+        self._standing[fault.label] = _Standing(fault, self._number)
+        if fault.for_ns:
+            self._push(now_ns + fault.for_ns, None, fault.label, self._number)
+        self._note(fault, now_ns, active=True)
+
+    def _end(self, label: str, now_ns: int) -> None:
+        self._note(self._standing.pop(label).fault, now_ns, active=False)
+
+    def _push(self, at_ns: int, control: Control | None, label: str = "", number: int = 0) -> None:
+        heapq.heappush(self._agenda, (at_ns, self._number_of_entry(), control, label, number))
+
+    def _number_of_entry(self) -> int:
+        self._number += 1
+        return self._number
+
+    def _note(self, fault: Fault, now_ns: int, *, active: bool) -> None:
+        node = fault.node if isinstance(fault, Cut) else fault.src if isinstance(fault, Degrade) else 0
+        other = fault.dst if isinstance(fault, Degrade) else 0
+        self.records.append(RadioFault(now_ns, node, other, _KINDS[type(fault)], fault.label, active))
+
+    # --- what they do to the air ----------------------------------------------------------------------------------
+
+    def shape(self, links: Links, at: npt.NDArray[np.float64]) -> npt.NDArray[np.float64]:
+        """Change the links of stations `at` [m, n x 3]; returns the noise at each station [mW]."""
+        noise = np.full(self._stations, noise_mw(self._radio))
+        faults = [item.fault for item in self._standing.values()]
+        for fault in faults:
+            if isinstance(fault, Degrade):
+                self._degrade(links, fault.src - 1, fault.dst - 1, fault)
+                if fault.both:
+                    self._degrade(links, fault.dst - 1, fault.src - 1, fault)
+        for fault in faults:
+            if isinstance(fault, Jam):
+                noise += self._jam(links, at, fault)
+        cut = self.cut_off()
+        if cut:
+            self._cut(links, sorted(cut))
+        if faults:
+            links.dead_last()
+        return noise
+
+    def _degrade(self, links: Links, src: int, dst: int, fault: Degrade) -> None:
+        first, end = links.ptr[src], links.ptr[src + 1]
+        found = np.flatnonzero(links.ints[s.LINK_DST, first:end] == dst)
+        if not len(found):
+            return  # out of reach
+        link = int(first + found[0])
+        power_mw = links.reals[s.LINK_POWER, link] * milliwatt(-fault.loss_db)
+        if not links.ints[s.AUDIBLE, link]:
+            links.reals[s.LINK_POWER, link] = power_mw
+            return
+        audible = fault.loss_db == 0 or power_mw >= milliwatt(self._radio.sensitivity_dbm)
+        links.ints[s.AUDIBLE, link] = audible
+        links.ints[s.FAULT, link] = s.FATE_DEGRADED
+        links.reals[s.SPARED, link] *= 1 - fault.loss_share
+        unheard = not audible and self._radio.channel == "range"  # where whatever arrives at all destroys
+        links.reals[s.LINK_POWER, link] = 0.0 if unheard else power_mw
+
+    def _jam(self, links: Links, at: npt.NDArray[np.float64], fault: Jam) -> npt.NDArray[np.float64]:
+        """Returns what is added to the noise at each station [mW]."""
+        with np.errstate(invalid="ignore"):  # stations of unknown position are far away
+            inside = np.hypot(at[:, 0] - fault.center.east, at[:, 1] - fault.center.north) <= fault.radius_m
+        count = links.count
+        hit = inside[links.ints[s.LINK_DST, :count]] & (links.ints[s.AUDIBLE, :count] == 1)
+        links.ints[s.FAULT, :count][hit] = s.FATE_JAMMED
+        if fault.noise_dbm == math.inf or self._radio.channel == "range":
+            links.reals[s.SPARED, :count][hit] = 0.0
+            return np.zeros(self._stations)
+        return np.where(inside, milliwatt(fault.noise_dbm), 0.0)
+
+    def _cut(self, links: Links, cut: list[int]) -> None:
+        off = np.zeros(self._stations, bool)
+        off[cut] = True
+        count = links.count
+        hit = off[links.ints[s.LINK_SRC, :count]] | off[links.ints[s.LINK_DST, :count]]
+        heard = hit & ((links.ints[s.AUDIBLE, :count] == 1) | (links.ints[s.FAULT, :count] != 0))
+        links.ints[s.FAULT, :count][heard] = s.FATE_CUT
+        links.ints[s.AUDIBLE, :count][hit] = 0
+        links.reals[s.LINK_POWER, :count][hit] = 0.0
+        links.reals[s.SPARED, :count][hit] = 0.0

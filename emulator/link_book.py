@@ -1,0 +1,54 @@
+"""Counts of links across their remaking: the kernel counts on the links it has, poses make new ones ten times a second.
+
+`take` moves the counts of an array of links into the book and leaves zeros; `close` sums what was taken since the last
+time. Both are a few vector operations, whatever the number of frames.
+"""
+
+from array import array
+
+import numpy as np
+
+from emulator import state as s
+from emulator.state import Ints
+from fanet_mw.link_stats import COUNTS, LinkStats
+
+_ROWS = slice(s.RSSI_SUM, s.N_CUT + 1)
+"""RSSI sum, then COUNTS."""
+
+
+class LinkBook:
+    """What links have carried since the last report."""
+
+    def __init__(self, stations: int) -> None:
+        self._stations = stations
+        self._keys: list[Ints] = []
+        self._counts: list[Ints] = []
+        self._since_ns = 0
+
+    def take(self, lk: Ints) -> None:
+        """Move the counts of these links here."""
+        used = np.flatnonzero(lk[s.N_RECEIVED : s.N_CUT + 1].any(axis=0))
+        if len(used):
+            self._keys.append(lk[s.LINK_SRC, used] * self._stations + lk[s.LINK_DST, used])
+            self._counts.append(lk[_ROWS, used])
+            lk[_ROWS, used] = 0
+
+    def close(self, now_ns: int) -> LinkStats | None:
+        """The sums since the last report; None when nothing was carried."""
+        if not self._keys:
+            return None
+        since_ns, self._since_ns = self._since_ns, now_ns
+        keys, place = np.unique(np.concatenate(self._keys), return_inverse=True)
+        sums = np.zeros((len(keys), 1 + COUNTS), np.int64)
+        np.add.at(sums, place.reshape(-1), np.concatenate(self._counts, axis=1).T)
+        self._keys.clear()
+        self._counts.clear()
+        ends = np.stack([keys // self._stations + 1, keys % self._stations + 1], axis=1).astype(np.uint16)
+        counts = np.minimum(sums[:, 1:], 0xFFFF_FFFF).astype(np.uint32)
+        return LinkStats(
+            now_ns,
+            now_ns - since_ns,
+            array("H", ends.tobytes()),
+            array("I", counts.tobytes()),
+            array("q", np.ascontiguousarray(sums[:, 0]).tobytes()),
+        )

@@ -1,0 +1,1 @@
+"""What Wireshark needs to read a capture: the dissector that scripts/generate_dissector.py makes."""

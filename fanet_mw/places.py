@@ -1,0 +1,57 @@
+"""FANET_PLACES: where the members of a schedule part are, in whole meters, so that all compute the same timetable.
+
+It follows its FANET_SCHEDULE in the same packet; entry i belongs to member `first + i` of that part.
+"""
+
+from collections.abc import Sequence
+from typing import Final, NamedTuple, Self
+
+from fanet_mw.errors import MalformedFrameError
+from fanet_mw.units import Enu
+from fanet_mw.wire import PLACES, VERSION, decode_every, encode_inner
+
+CAPACITY: Final = 28
+"""Entries of one message: two of them hold what one schedule part does."""
+_MOST_M: Final = 32767
+
+
+def rounded(place: Enu) -> Enu:
+    """As it arrives: whole meters, within 32 km of the origin."""
+    east, north, up = (float(max(-_MOST_M, min(_MOST_M, round(part)))) for part in place)
+    return Enu(east, north, up)
+
+
+class Places(NamedTuple):
+    """The places of one schedule part, and of the leader, who is in no cluster."""
+
+    members: tuple[Enu, ...]
+    leader: Enu
+
+    def encode_frames(self, node: int) -> bytes:
+        """One message per `CAPACITY` members."""
+        starts = range(0, len(self.members), CAPACITY)
+        return b"".join(
+            encode_inner(PLACES, self._payload(at, self.members[at : at + CAPACITY]), node=node) for at in starts
+        )
+
+    def _payload(self, first: int, chunk: Sequence[Enu]) -> bytes:
+        axes = [[int(part) for part in axis] for axis in zip(*map(rounded, chunk), strict=True)]
+        unused = [0] * (CAPACITY - len(chunk))
+        flat = [value for axis in axes for value in axis + unused]
+        leader = [int(part) for part in rounded(self.leader)]
+        return PLACES.layout.pack(*flat, *leader, first, len(chunk), VERSION)
+
+    @classmethod
+    def decode_frames(cls, frame: bytes) -> Self:
+        """All places in a packet; raises MalformedFrameError when they are none, or not in order."""
+        found: list[Enu] = []
+        leader: Enu | None = None
+        for *values, first, count, version in decode_every(PLACES, frame):
+            if version != VERSION or not 0 < count <= CAPACITY or first != len(found):
+                raise MalformedFrameError(f"places of version {version}: {count} from {first} on, after {len(found)}")
+            east, north, up = (values[at : at + count] for at in (0, CAPACITY, 2 * CAPACITY))
+            found += map(Enu, map(float, east), map(float, north), map(float, up))
+            leader = Enu(*map(float, values[3 * CAPACITY :]))
+        if leader is None:
+            raise MalformedFrameError("no places in the frame")
+        return cls(tuple(found), leader)

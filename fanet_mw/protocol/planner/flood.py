@@ -1,0 +1,98 @@
+"""What one flood costs: how long until all have it, and how soon the next may follow.
+
+Scheduled: both follow from the broadcast schedule, in sub-slots of one airtime and a turnaround; a relay needs the
+radio's handover and lead between hearing and sending. Proven, as long as no frame is lost.
+
+Contended: around the busiest node every relay within two hops takes its turn on one channel, airtime + DIFS + the mean
+backoff each; floods closer than that pile up. The duration is that per hop, with jitter, handover and lead. An
+estimate: CSMA/CA bounds neither.
+"""
+
+from typing import Final, NamedTuple
+
+from fanet_mw.protocol.broadcast_schedule import broadcast_schedule, pipeline_spacing, shortest_relays
+from fanet_mw.protocol.delay import Dcf, airtime_ns
+from fanet_mw.protocol.planner.design import Relays
+from fanet_mw.protocol.topology import Adjacency, levels, two_hop
+from fanet_mw.scenario import Radio, Scenario
+from fanet_mw.units import MS, US, NodeId
+
+_TURNAROUND_NS: Final = 100 * US
+"""Between two sub-slots: propagation over some kilometers, detection, and microseconds of clock error."""
+
+
+class FloodCost(NamedTuple):
+    """`duration_ns` from the head's first bit to the last node's; `spacing_ns` to the next flood; frames sent."""
+
+    duration_ns: int
+    spacing_ns: int
+    transmissions: int
+    proven: bool
+
+
+def plcp_ns(radio: Radio) -> int:
+    return (96 if radio.preamble == "short" else 192) * US
+
+
+def frame_ns(radio: Radio, payload_bytes: int) -> int:
+    return airtime_ns(payload_bytes, rate_mbps=radio.rate_mbps, plcp_ns=plcp_ns(radio))
+
+
+def dcf_of(radio: Radio) -> Dcf:
+    """The MAC's constants under this radio."""
+    ack_ns = plcp_ns(radio) + -(-8 * 14 * 1000 // round(radio.ack_rate_mbps * 1000)) * US
+    timeout_ns = Dcf().sifs_ns + Dcf().slot_ns + plcp_ns(radio)
+    return Dcf(
+        ack_ns=ack_ns,
+        ack_timeout_ns=timeout_ns,
+        cw_min=radio.cw_min,
+        cw_max=radio.cw_max,
+        attempts=radio.max_attempts,
+    )
+
+
+def flood_cost(
+    scenario: Scenario, adjacency: Adjacency, root: NodeId, *, payload_bytes: int, relays: Relays
+) -> FloodCost:
+    """The cost of one flood of such a packet from this head, to all it can reach."""
+    if relays == "scheduled":
+        return _scheduled(scenario.radio, adjacency, root, frame_ns(scenario.radio, payload_bytes))
+    return _contended(scenario, adjacency, root, frame_ns(scenario.radio, payload_bytes))
+
+
+def _scheduled(radio: Radio, adjacency: Adjacency, root: NodeId, frame: int) -> FloodCost:
+    subslot_ns = frame + _TURNAROUND_NS
+    wait_ns = radio.handover_ns + radio.lead_ns
+    hop = max(1, -(-(frame + wait_ns) // subslot_ns))
+    schedule = broadcast_schedule(adjacency, root, shortest_relays(adjacency, root), hop_subslots=hop)
+    spacing = pipeline_spacing(schedule, adjacency)
+    return FloodCost(schedule.subslots * subslot_ns, spacing * subslot_ns, len(schedule.turns), proven=True)
+
+
+def _contended(scenario: Scenario, adjacency: Adjacency, root: NodeId, frame: int) -> FloodCost:
+    clusters, radio = scenario.clusters, scenario.radio
+    hops = levels(adjacency, root)
+    dcf = dcf_of(radio)
+    difs_ns = dcf.sifs_ns + 2 * dcf.slot_ns
+    per_frame_ns = frame + difs_ns + dcf.cw_min * dcf.slot_ns // 2
+    sharing = max(1 + sum(1 for n in near if n in hops) for node, near in two_hop(adjacency).items() if node in hops)
+    local_ns = round(sharing * relay_share(scenario, adjacency) * per_frame_ns)
+    wait_ns = clusters.assess_ms * MS if clusters.relay == "counter" else 0
+    per_hop_ns = round(scenario.routing.jitter_ns + wait_ns + radio.handover_ns + radio.lead_ns + local_ns)
+    transmissions = 1 + round((len(hops) - 1) * relay_share(scenario, adjacency))
+    spacing_ns = max(local_ns, round(clusters.release_gap_ms * MS))
+    return FloodCost(max(1, max(hops.values())) * per_hop_ns, spacing_ns, transmissions, proven=False)
+
+
+def relay_share(scenario: Scenario, adjacency: Adjacency) -> float:
+    """The part of the nodes that relays a flood: all; or about `gossip_degree`, or `counter`, of each neighborhood.
+
+    For `counter` twice the threshold of each neighborhood relays at most, as those out of range of each other do not
+    hear each other's copies.
+    """
+    clusters = scenario.clusters
+    neighbors = sum(len(near) for near in adjacency.values()) / max(1, len(adjacency))
+    if clusters.relay == "all" or neighbors == 0:
+        return 1.0
+    wanted = clusters.gossip_degree if clusters.relay == "gossip" else 2.0 * clusters.counter
+    return min(1.0, wanted / neighbors)

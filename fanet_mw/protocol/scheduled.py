@@ -1,0 +1,271 @@
+"""The clustered protocol with collision-free floods: heads let packets out, and relays pass them on, in turns.
+
+    join -> schedule with places -> everyone computes the same timetable -> from its first superframe on, turns
+
+A node that hears a packet in a turn knows from the turn and the sender whose flood it is, and so its own turn. What is
+heard outside of any turn is not relayed. Until a timetable is in force, and for whatever is no data, the rules of
+`clustered` hold; then all but floods of data contend in the window at the beginning of each superframe.
+"""
+
+from collections.abc import Mapping
+from typing import Final, NamedTuple
+
+from fanet_mw.errors import DropReason
+from fanet_mw.messages import Reception
+from fanet_mw.places import Places, rounded
+from fanet_mw.protocol.clustered import Clustered
+from fanet_mw.protocol.contract import Port
+from fanet_mw.protocol.root_release import RootRelease
+from fanet_mw.protocol.timetable import Geometry, Timetable, timetable
+from fanet_mw.protocol.turns import Turns, turn_ns
+from fanet_mw.protocol.txqueue import Packet, TxQueue
+from fanet_mw.scenario import Scenario
+from fanet_mw.units import BROADCAST, MS, US, Enu, NodeId, seconds_to_ns
+from fanet_mw.wire import FLAG_FLOOD, HEADER_BYTES, Kind, Schedule
+
+_FEWER: Final = 0.85
+"""When the turns do not suffice for the load, try this much of it, and so on."""
+
+
+class Plan(NamedTuple):
+    """A timetable in force from an instant on."""
+
+    valid_ns: int
+    turns: Turns
+    table: Timetable
+    mine: Mapping[tuple[NodeId, int], int]
+    """Our turn for each (root, instance)."""
+    heard: Mapping[tuple[int, NodeId], tuple[int, NodeId, int]]
+    """(turn, sender) -> (offset, root, instance)."""
+    roots: tuple[int, ...]
+    """The turns in which we let packets out."""
+
+
+class Scheduled(Clustered):
+    """Clustered, time-divided flooding without contention, at one node."""
+
+    def __init__(self, port: Port) -> None:
+        super().__init__(port)
+        scenario = port.scenario
+        self._lifetime_ns = seconds_to_ns(scenario.routing.lifetime_s)
+        self._window_random = port.stream("window").random
+        self._turn_ns = turn_ns(scenario, payload_bytes=_largest(scenario))
+        self._turn_bytes = _largest(scenario)
+        self._roots = RootRelease(TxQueue(capacity=scenario.routing.queue_frames), lead_ns=self._lead_ns)
+        self._plans: list[Plan] = []
+        self._schedules: dict[int, tuple[Schedule, Places]] = {}
+        self._planned_epoch = 0
+        self._missed = 0
+
+    # --- the timetable --------------------------------------------------------------------------------------------
+
+    def _announcement(self, part: Schedule) -> bytes:
+        assert self._leader is not None, "only the leader announces"
+        places = Places(
+            tuple(rounded(self._leader.position(member.node)) for member in part.members), rounded(self._port.position)
+        )
+        return super()._announcement(part) + places.encode_frames(self._port.node)
+
+    def _learn(self, frame: bytes, *, now_ns: int) -> None:
+        """Besides the schedule take in the places, and plan when all of an epoch have come."""
+        schedule, places = Schedule.decode_frame(frame), Places.decode_frames(frame)
+        super()._learn(frame, now_ns=now_ns)
+        if schedule.epoch != self._membership.epoch or len(places.members) != len(schedule.members):
+            return
+        if any(known.epoch != schedule.epoch for known, _ in self._schedules.values()):
+            self._schedules.clear()
+        self._schedules[schedule.part] = schedule, places
+        if len(self._schedules) == schedule.parts and schedule.epoch != self._planned_epoch:
+            self._planned_epoch = schedule.epoch
+            self._plan(now_ns)
+
+    def _plan(self, now_ns: int) -> None:
+        parts = [self._schedules[part] for part in sorted(self._schedules)]
+        schedule, places = parts[0]
+        at: dict[NodeId, Enu] = {NodeId(schedule.leader): places.leader}
+        members: dict[int, int] = {}
+        heads: dict[int, NodeId] = {}
+        for part, where in parts:
+            for member, place in zip(part.members, where.members, strict=True):
+                at[NodeId(member.node)] = place
+                members[member.cluster] = members.get(member.cluster, 0) + 1
+                if member.is_head:
+                    heads[member.cluster] = NodeId(member.node)
+        scenario = self._port.scenario
+        turns = _geometry(scenario, schedule, self._turn_ns)
+        load = {heads[cluster]: members[cluster] for cluster in sorted(heads)} | {NodeId(schedule.leader): 0}
+        table = _fit(scenario, tuple(sorted(at.items())), load, turns)
+        if table is None:
+            return  # not even one packet of each head fits a superframe; `fanet plan` says so before take-off
+        self._plans = [*self._plans[-1:], _own_plan(self._port.node, max(now_ns, schedule.start_us * US), turns, table)]
+        self._roots.follow([(plan.valid_ns, plan.turns, plan.roots) for plan in self._plans], now_ns=now_ns)
+        for packet in [*self._release.drain(), *self._homeless.drain()]:
+            self._forward(packet, start_ns=now_ns + self._lead_ns, now_ns=now_ns, tries=0)
+
+    def _plan_at(self, t_ns: int) -> Plan | None:
+        for plan in reversed(self._plans):
+            if plan.valid_ns <= t_ns:
+                return plan
+        return None
+
+    # --- letting out ----------------------------------------------------------------------------------------------
+
+    def _forward(self, packet: Packet, *, start_ns: int, now_ns: int, tries: int) -> None:
+        if self._plans and self._plans[-1].roots:
+            self._let_out(packet, now_ns=now_ns)
+        else:
+            super()._forward(packet, start_ns=self._contending_ns(start_ns), now_ns=now_ns, tries=tries)
+
+    def _let_out(self, packet: Packet, *, now_ns: int) -> None:
+        if len(packet.frame) > self._turn_bytes:
+            self._port.drop(DropReason.TOO_LARGE, packet, now_ns=now_ns)
+            return
+        evicted = self._roots.push(packet, now_ns=now_ns)
+        if evicted is not None:
+            self._port.drop(DropReason.QUEUE_FULL, evicted, now_ns=now_ns)
+
+    def _enqueue(self, packet: Packet, *, now_ns: int) -> None:
+        self._forward(packet, start_ns=now_ns, now_ns=now_ns, tries=0) if self._plans else super()._enqueue(
+            packet, now_ns=now_ns
+        )
+
+    def _flood_control(self, kind: Kind, inner: bytes, *, now_ns: int) -> Packet:
+        if not self._plans or not self._plans[-1].roots:
+            return super()._flood_control(kind, inner, now_ns=now_ns)
+        packet = self._port.announce(
+            kind, inner, now_ns=now_ns, flags=FLAG_FLOOD, hop_limit=self._port.scenario.routing.hop_limit
+        )
+        self._let_out(packet, now_ns=now_ns)
+        return packet
+
+    # --- passing on -----------------------------------------------------------------------------------------------
+
+    def _flood_on(self, packet: Packet, reception: Reception, *, now_ns: int) -> None:
+        plan = self._plan_at(reception.end_ns)
+        if plan is None:
+            super()._flood_on(packet, reception, now_ns=now_ns)
+            return
+        turn = plan.turns.turn_at(reception.end_ns)
+        heard = None if turn is None else plan.heard.get((turn, reception.src))
+        if heard is None:
+            if packet.header.kind != Kind.DATA:
+                super()._flood_on(packet, reception, now_ns=now_ns)
+            return
+        self._in_turn(packet, plan, heard, reception, now_ns)
+
+    def _in_turn(
+        self, packet: Packet, plan: Plan, heard: tuple[int, NodeId, int], reception: Reception, now_ns: int
+    ) -> None:
+        """Relay in our turn of this flood, if we have one and it is still to come."""
+        offset, root, instance = heard
+        own = plan.mine.get((root, instance))
+        if own is None or packet.header.hop_limit <= 1:
+            return
+        frame_ns = plan.turns.frame_start_ns(reception.end_ns) - offset // plan.turns.per_frame * plan.turns.period_ns
+        start_ns = plan.turns.start_ns(own, frame_start_ns=frame_ns)
+        if start_ns < now_ns + self._lead_ns:
+            self._missed += 1
+            return
+        self._port.transmit(self._port.forwarded(packet, flags=FLAG_FLOOD), BROADCAST, start_ns=start_ns)
+
+    # --- contending -----------------------------------------------------------------------------------------------
+
+    def _contending_ns(self, start_ns: int) -> int:
+        plan = self._plan_at(start_ns)
+        return start_ns if plan is None else plan.turns.contending_ns(start_ns, self._window_random)
+
+    def _start_ns(self, *, now_ns: int, jitter_ns: int) -> int:
+        return self._contending_ns(super()._start_ns(now_ns=now_ns, jitter_ns=jitter_ns))
+
+    def hello_start_ns(self, start_ns: int) -> int:
+        return self._contending_ns(start_ns)
+
+    # --- time -----------------------------------------------------------------------------------------------------
+
+    def next_wake_ns(self) -> int | None:
+        own_ns, roots_ns = super().next_wake_ns(), self._roots.next_wake_ns()
+        return roots_ns if own_ns is None or (roots_ns is not None and roots_ns < own_ns) else own_ns
+
+    def wake(self, now_ns: int) -> None:
+        super().wake(now_ns)
+        for packet in self._roots.expire(before_us=(now_ns - self._lifetime_ns) // US):
+            self._port.drop(DropReason.EXPIRED, packet, now_ns=now_ns)
+        for packet, start_ns in self._roots.due(now_ns=now_ns):
+            self._flood(packet, start_ns=start_ns)
+
+    # --- for people -----------------------------------------------------------------------------------------------
+
+    def waiting(self) -> int:
+        return super().waiting() + len(self._roots)
+
+    def bound_ns(self) -> int | None:
+        """The longest that a packet of our own may take to everyone, from generation; None: no bound."""
+        plan = self._plans[-1] if self._plans else None
+        scenario = self._port.scenario
+        alone = scenario.clusters.count >= scenario.nodes.count - 1  # else packets of members share our turns
+        if plan is None or not plan.roots or not alone or plan.table.uncovered[self._port.node]:
+            return None
+        interval_ns = seconds_to_ns(scenario.traffic.interval_s)
+        return plan.turns.worst_ns(plan.roots, span=plan.table.spans[self._port.node], interval_ns=interval_ns)
+
+    def report(self) -> Mapping[str, object]:
+        bound_ns = self.bound_ns()
+        return {
+            **super().report(),
+            "missed_turns": self._missed,
+            "bound_ms": None if bound_ns is None else bound_ns / MS,
+            "bound_from_ms": self._plans[-1].valid_ns / MS if self._plans else None,
+        }
+
+
+def _largest(scenario: Scenario) -> int:
+    """The largest frame a turn must hold: the application's, or a schedule part with its places."""
+    members = min(scenario.nodes.count, 56)
+    return max(scenario.traffic.payload_bytes, HEADER_BYTES + 262 + 189 * -(-members // 28))
+
+
+def _geometry(scenario: Scenario, schedule: Schedule, turn: int) -> Turns:
+    period_ns = schedule.period_us * US
+    contention_ns = round(scenario.clusters.contention_ms * MS)
+    return Turns(schedule.start_us * US, period_ns, contention_ns, turn, max(0, period_ns - contention_ns) // turn)
+
+
+def _fit(
+    scenario: Scenario, places: tuple[tuple[NodeId, Enu], ...], load: Mapping[NodeId, int], turns: Turns
+) -> Timetable | None:
+    """A table for the whole load; if the turns do not suffice, for as much of it as they do."""
+    clusters, radio = scenario.clusters, scenario.radio
+    wait_ns = radio.lead_ns + radio.handover_ns
+    geometry = Geometry(
+        link_m=clusters.link_m or radio.range_m,
+        interference_m=clusters.interference_m or radio.range_m * (1 if radio.channel == "range" else 2),
+        turns=turns.per_frame,
+        hop_turns=1 + -(-wait_ns // turns.turn_ns),
+    )
+    per_member = turns.period_ns / seconds_to_ns(scenario.traffic.interval_s)
+    share = 1.0
+    while turns.per_frame:
+        wanted = {root: max(1, _whole(members * per_member * share)) for root, members in load.items()}
+        roots = tuple(root for root, packets in sorted(wanted.items()) for _ in range(packets))
+        table = timetable(places, roots, geometry)
+        if table is not None or all(packets == 1 for packets in wanted.values()):
+            return table
+        share *= _FEWER
+    return None
+
+
+def _whole(packets: float) -> int:
+    return -int(-packets // 1)
+
+
+def _own_plan(node: NodeId, valid_ns: int, turns: Turns, table: Timetable) -> Plan:
+    return Plan(
+        valid_ns=valid_ns,
+        turns=turns,
+        table=table,
+        mine={(turn.root, turn.instance): turn.offset for turn in table.turns if turn.node == node != turn.root},
+        heard={
+            (turn.offset % turns.per_frame, turn.node): (turn.offset, turn.root, turn.instance) for turn in table.turns
+        },
+        roots=tuple(sorted(turn.offset for turn in table.turns if turn.node == turn.root == node)),
+    )

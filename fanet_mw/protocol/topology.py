@@ -1,0 +1,86 @@
+"""Who hears whom, as plain values: nodes to their neighbors in order of id. Pure functions.
+
+Everything built on it (clusters, slots, relays) counts only links that work both ways; `symmetric` makes it so. What is
+not modelled: link quality. A link is there or not.
+"""
+
+from collections.abc import Collection, Iterable, Mapping
+from typing import Final
+
+from fanet_mw.units import Enu, NodeId
+
+Adjacency = Mapping[NodeId, tuple[NodeId, ...]]
+"""Every node is a key; its neighbors are ascending, without itself, and each has it as a neighbor too."""
+
+_MIN_CELL_M: Final = 1e-3
+
+
+def symmetric(heard: Mapping[NodeId, Collection[NodeId]]) -> dict[NodeId, tuple[NodeId, ...]]:
+    """Keep the links on which both ends hear each other; nodes that only others name are dropped."""
+    nodes = sorted(heard)
+    sets = {node: frozenset(heard[node]) for node in nodes}
+    return {
+        node: tuple(other for other in sorted(sets[node]) if other != node and other in sets and node in sets[other])
+        for node in nodes
+    }
+
+
+def within_range(positions: Mapping[NodeId, Enu], *, range_m: float) -> dict[NodeId, tuple[NodeId, ...]]:
+    """The neighbors of a disk model: everyone no farther than `range_m` in three dimensions."""
+    cell_m = max(range_m, _MIN_CELL_M)
+    cells: dict[tuple[int, int], list[NodeId]] = {}
+    place = {node: (int(at.east // cell_m), int(at.north // cell_m)) for node, at in positions.items()}
+    for node in sorted(positions):
+        cells.setdefault(place[node], []).append(node)
+
+    def near(node: NodeId) -> Iterable[NodeId]:
+        east, north = place[node]
+        for x in (east - 1, east, east + 1):
+            for y in (north - 1, north, north + 1):
+                yield from cells.get((x, y), ())
+
+    return {
+        node: tuple(
+            sorted(n for n in near(node) if n != node and positions[n].minus(positions[node]).norm() <= range_m)
+        )
+        for node in sorted(positions)
+    }
+
+
+def two_hop(adjacency: Adjacency) -> dict[NodeId, tuple[NodeId, ...]]:
+    """Everyone within two hops of each node: those that share its slot's air, at it or at a common neighbor."""
+    found = {}
+    for node in sorted(adjacency):
+        reach = set(adjacency[node])
+        for neighbor in adjacency[node]:
+            reach.update(adjacency[neighbor])
+        reach.discard(node)
+        found[node] = tuple(sorted(reach))
+    return found
+
+
+def levels(adjacency: Adjacency, root: NodeId) -> dict[NodeId, int]:
+    """Hops from the root, breadth first; nodes that cannot be reached are missing."""
+    hops = {root: 0}
+    frontier = [root]
+    while frontier:
+        following = []
+        for node in frontier:
+            for neighbor in adjacency[node]:
+                if neighbor not in hops:
+                    hops[neighbor] = hops[node] + 1
+                    following.append(neighbor)
+        frontier = following
+    return hops
+
+
+def components(adjacency: Adjacency) -> list[tuple[NodeId, ...]]:
+    """The parts of a swarm that cannot hear each other over any number of hops, by their lowest ids."""
+    done: set[NodeId] = set()
+    found = []
+    for node in sorted(adjacency):
+        if node not in done:
+            part = tuple(sorted(levels(adjacency, node)))
+            done.update(part)
+            found.append(part)
+    return found

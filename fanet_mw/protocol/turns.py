@@ -1,0 +1,93 @@
+"""Superframe geometry of collision-free floods: a contention window, then equal turns. Pure functions of time.
+
+    origin                                            origin + period
+    | contention window | turn 0 | turn 1 | ... | rest | contention window | ...
+
+A turn holds one frame, the DIFS before it and the longest backoff that an earlier frame may have left behind, so that
+it starts at the beginning of its turn on any 802.11 MAC. Everything else (hellos, joins, unicasts to a head, repairs)
+contends in the window.
+"""
+
+from collections.abc import Callable, Sequence
+from typing import Final, NamedTuple
+
+from fanet_mw.protocol.delay import Dcf, airtime_ns
+from fanet_mw.scenario import Scenario
+from fanet_mw.units import MS, US
+
+_SLACK_NS: Final = 50 * US
+"""Propagation over 6 km, detection, and microseconds of clock error."""
+_TAIL_NS: Final = 5 * MS
+"""The end of the contention window in which nothing new starts: what contends must be over when the turns begin."""
+_SHORT_PLCP_NS: Final = 96 * US
+
+
+class Turns(NamedTuple):
+    """The geometry."""
+
+    origin_ns: int
+    period_ns: int
+    contention_ns: int
+    turn_ns: int
+    per_frame: int
+
+    def frame_start_ns(self, t_ns: int) -> int:
+        """The beginning of the superframe in which an instant lies."""
+        return t_ns - (t_ns - self.origin_ns) % self.period_ns
+
+    def start_ns(self, offset: int, *, frame_start_ns: int) -> int:
+        """When the `offset`-th turn from a superframe's beginning starts; offsets may reach into later ones."""
+        later, turn = divmod(offset, self.per_frame)
+        return frame_start_ns + later * self.period_ns + self.contention_ns + turn * self.turn_ns
+
+    def turn_at(self, t_ns: int) -> int | None:
+        """The turn to which an instant belongs; None in the contention window and in the rest."""
+        phase_ns = (t_ns - self.origin_ns) % self.period_ns - self.contention_ns
+        turn = phase_ns // self.turn_ns
+        return turn if phase_ns >= 0 and turn < self.per_frame else None
+
+    def next_start_ns(self, offsets: Sequence[int], *, not_before_ns: int) -> int:
+        """The first of the given turns (ascending, of every superframe) that starts at or after an instant."""
+        frame_ns = self.frame_start_ns(not_before_ns)
+        for frame_start_ns in (frame_ns, frame_ns + self.period_ns):
+            for offset in offsets:
+                start_ns = self.start_ns(offset, frame_start_ns=frame_start_ns)
+                if start_ns >= not_before_ns:
+                    return start_ns
+        raise AssertionError("offsets are turns of one superframe, so one of the next lies ahead")
+
+    def contending_ns(self, start_ns: int, random: Callable[[], float]) -> int:
+        """When a frame that is due at `start_ns` may contend: then, or at a random instant of the next window."""
+        open_ns = max(1, self.contention_ns - _TAIL_NS)
+        frame_ns = self.frame_start_ns(start_ns)
+        if start_ns - frame_ns < open_ns:
+            return start_ns
+        return frame_ns + self.period_ns + int(random() * open_ns)
+
+    def worst_ns(self, roots: Sequence[int], *, span: int, interval_ns: int) -> int | None:
+        """Sound bound of the delay, generation to everyone, of packets that come every `interval_ns` at their root.
+
+        The q-th packet of a busy period that begins just after a root turn is let out in the q-th one after it; `span`
+        turns later all have it. Over all q of the busy period and all turns after which it may begin (Davis et al.,
+        2007). None when more packets come than are let out. Holds while the swarm stays as it was when the table was
+        made, no frame is lost, and nothing of higher priority uses the same root.
+        """
+        if len(roots) * interval_ns < self.period_ns:
+            return None
+        starts = [self.start_ns(offset, frame_start_ns=0) for offset in roots]
+        horizon = [later * self.period_ns + start for later in range(3) for start in starts]
+        worst = 0
+        for begin in range(len(starts)):
+            for q in range(1, len(starts) + 1):
+                wait_ns = horizon[begin + q] - horizon[begin] - (q - 1) * interval_ns
+                worst = max(worst, wait_ns)
+        return worst + span * self.turn_ns
+
+
+def turn_ns(scenario: Scenario, *, payload_bytes: int) -> int:
+    """How long a turn must be for frames of this size."""
+    radio = scenario.radio
+    dcf = Dcf()
+    plcp_ns = _SHORT_PLCP_NS if radio.preamble == "short" else 192 * US
+    frame_ns = airtime_ns(payload_bytes, rate_mbps=radio.rate_mbps, plcp_ns=plcp_ns)
+    return frame_ns + dcf.sifs_ns + (2 + radio.cw_min) * dcf.slot_ns + _SLACK_NS

@@ -1,0 +1,49 @@
+"""Plans against whole swarms in virtual time: `python tests/benchmarks/plan_against_runs.py [SECONDS]`.
+
+45 static UAVs on the reference grid, one 1024 B packet per interval from each, relays by contention. The greatest
+delay of any delivery must stay below the bound of a feasible plan; losses are no part of it.
+"""
+
+import sys
+
+from fanet_mw import config
+from fanet_mw.protocol.delay import Bounded
+from fanet_mw.protocol.planner import Plan, plan
+from fanet_mw.trace import Delivered
+from fanet_mw.units import NodeId, S
+from sim.layout import positions
+from sim.results import finish
+from sim.run import simulate
+
+CASES = ((2.0, 4, 5.0), (1.0, 4, 5.0), (1.0, 8, 2.0), (1.0, 22, 1.0), (0.5, 4, 5.0))
+"""Interval [s], clusters, flooding period [s]."""
+
+
+def main(seconds: float) -> None:
+    print("interval clusters period  plan           used %  bound s  greatest delay s  PDR")
+    for interval_s, clusters, period_s in CASES:
+        scenario = config.build(
+            {
+                "duration_s": seconds,
+                "warmup_s": 8,
+                "drain_s": 22,
+                "nodes": {"count": 45, "telemetry_hz": 0},
+                "clusters": {"count": clusters, "flooding_period_s": period_s},
+                "traffic": {"payload_bytes": 1024, "interval_s": interval_s},
+                "radio": {"lead_ms": 5},
+            }
+        )
+        found = plan(scenario, {NodeId(i + 1): at for i, at in enumerate(positions(scenario))}, search=False)
+        assert isinstance(found, Plan)
+        outcome = simulate(scenario)
+        pdr = finish(outcome, out=None)["pdr"]
+        worst = max(record.delay_ns for record in outcome.records if isinstance(record, Delivered)) / S
+        bound = found.classes[0].bound
+        said = f"{bound.delay_ns / S:7.2f}" if isinstance(bound, Bounded) else "      -"
+        used = 100 * found.bottleneck.utilization if found.bottleneck else 0
+        verdict = "feasible" if found.feasible else "not feasible"
+        print(f"{interval_s:8} {clusters:8} {period_s:6}  {verdict:14} {used:6.0f}  {said}  {worst:16.2f}  {pdr:.3f}")
+
+
+if __name__ == "__main__":
+    main(float(sys.argv[1]) if len(sys.argv) > 1 else 60)

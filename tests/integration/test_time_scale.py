@@ -1,0 +1,70 @@
+"""A swarm too large for real time runs on a slow swarm clock: everything scales with it, and nothing else changes."""
+
+import asyncio
+import json
+import struct
+import time
+from pathlib import Path
+
+import pytest
+from test_air_control import emulator
+
+from fanet_mw import topics
+from fanet_mw.hosts.bus import Bus
+from fanet_mw.messages import Report, TxRequest
+from fanet_mw.topics import Topics
+from fanet_mw.trace import Generated
+from fanet_mw.units import BROADCAST, MS, S
+from sim import catalog
+from sim.results import finish
+from sim.run import simulate
+from sim.swarm import launch
+
+
+@pytest.mark.parametrize(("time_scale", "late"), [(1.0, True), (0.25, False)])
+async def test_a_lead_is_swarm_time_so_that_a_slow_clock_gives_slow_processes_more_of_it(
+    time_scale: float, *, late: bool
+) -> None:
+    """Requests announced 30 ms ahead reach the medium 60 ms of wall time later."""
+    reports: list[bytes] = []
+    names = Topics("scaled")
+    async with emulator("scaled", reports, time_scale=time_scale) as (endpoint, clock):
+        with Bus.join(endpoint) as bus:
+            for seq in range(10):
+                start_ns = clock.now_ns() + 30 * MS
+                await asyncio.sleep(0.06)
+                request = TxRequest(seq, start_ns, b"frame", BROADCAST, wants_status=False)
+                bus.put(names.radio_tx(1), topics.encode([request]))
+            await asyncio.sleep(0.2)
+    (last,) = topics.decode(reports[-1])
+    assert isinstance(last, Report)
+    found = json.loads(last.json)["late"]
+    assert found["frames"] == 10
+    if late:
+        assert found["late_frames"] == 10
+        assert 25 < found["max_ms"] < 1000
+    else:  # 15 ms of swarm time after they were announced; one or two may meet a busy machine
+        assert found["late_frames"] <= 2
+
+
+@pytest.mark.parametrize("time_scale", [0.5, 2.0])
+async def test_a_swarm_of_processes_lives_by_its_clock(tmp_path: Path, time_scale: float) -> None:
+    changes = ["nodes.count=4", "clusters.count=1", "mission.survivors=0", "world.engine=kinematic", "duration_s=5"]
+    changes += ["warmup_s=3", "drain_s=0.5", "traffic.interval_s=0.25", "radio.lead_ms=40", f"time_scale={time_scale}"]
+    scenario = catalog.find("quick", changes)
+    pcap = tmp_path / "air.pcap"
+    began_ns = time.time_ns()
+    outcome = await launch(scenario, swarm="scaled", emulator_options={"pcap": pcap, "receptions": False})
+    summary, virtual = finish(outcome, out=tmp_path), finish(simulate(scenario), out=None)
+    assert summary["time_scale"] == time_scale
+    assert 5 / time_scale <= summary["wall_s"] < 5 / time_scale + 2
+    assert summary["frames"]["closes"]
+    assert summary["aborted"] is None
+    assert summary["generated"] == virtual["generated"], "as much happens in a swarm second as ever"
+    assert summary["pdr"] > 0.9
+    generated = [record.t_ns for record in outcome.records if isinstance(record, Generated)]
+    assert 3 * S <= min(generated) < max(generated) < 4.5 * S
+    host = outcome.reports["agent-1"]["host"]
+    assert host["overflowed"] == host["malformed"] == 0
+    seconds, _ = struct.unpack_from("<II", pcap.read_bytes(), 24)
+    assert began_ns // S <= seconds <= began_ns // S + 60, "stamped with the epoch"

@@ -1,0 +1,224 @@
+"""The planner: no simulated head exceeds its delays, problems are named, and the change it proposes does help."""
+
+import pytest
+from hypothesis import given, settings
+from hypothesis import strategies as st
+
+from fanet_mw.protocol.delay import Bounded, Refused
+from fanet_mw.protocol.planner import Design, Plan, Site, demands, describe, evaluate, plan
+from fanet_mw.protocol.planner.access import ways
+from fanet_mw.protocol.planner.demand import TrafficClass
+from fanet_mw.protocol.planner.flood import FloodCost, flood_cost
+from fanet_mw.protocol.planner.head import Share, slot_delays, work_ns
+from fanet_mw.protocol.planner.search import _candidates
+from fanet_mw.protocol.topology import within_range
+from fanet_mw.rng import stream
+from fanet_mw.units import MS, Enu, NodeId, S
+from sim.layout import positions
+
+# --- one head against exact simulation ---
+
+
+def simulate(shares, arrivals, *, usable, period, start):
+    """Floods of several lengths, the most urgent first, whole floods in the slot: worst delays, most waiting."""
+    queues = [list(at) for at in arrivals]
+    t, worst, waiting = 0, [0] * len(shares), 0
+    while any(queues):
+        t = max(t, min(queue[0] for queue in queues if queue))
+        while True:
+            ready = [i for i, queue in enumerate(queues) if queue and queue[0] <= t]
+            waiting = max(waiting, sum(1 for queue in queues for at in queue if at <= t))
+            length = shares[ready[0]].flood.spacing_ns
+            begin = start + (t - start) // period * period
+            if t <= begin + usable - length:
+                break
+            t = begin + period
+        index = ready[0]
+        t += length
+        worst[index] = max(worst[index], t - queues[index].pop(0))
+        waiting = max(waiting, 1 + sum(1 for queue in queues for at in queue if at < t))
+    return worst, waiting
+
+
+@st.composite
+def heads(draw):
+    classes = draw(st.integers(1, 3))
+    shares = [
+        Share(draw(st.integers(0, 3)), draw(st.integers(60, 400)), cost(draw(st.integers(1, 9))))
+        for _ in range(classes)
+    ]
+    usable = draw(st.integers(5, 60))
+    return shares, usable, draw(st.integers(usable, 3 * usable)), draw(st.integers(0, 200))
+
+
+def cost(spacing: int, duration: int | None = None) -> FloodCost:
+    return FloodCost(duration or spacing, spacing, 1, proven=True)
+
+
+@settings(max_examples=600)
+@given(heads(), st.integers(0, 10**6))
+def test_no_head_takes_longer_or_holds_more_than_its_plan(head, seed) -> None:
+    shares, usable, period, jitter = head
+    bounds, waiting = slot_delays(shares, usable_ns=usable, period_ns=period, jitter_ns=jitter)
+    rng = stream(seed, "head")
+    arrivals = []
+    for share in shares:
+        at = []
+        for _ in range(share.sources):
+            phase, calm = rng.randrange(share.interval_ns), rng.randrange(25)
+            at += [phase + n * share.interval_ns + (jitter if n < calm else 0) for n in range(25)]
+        arrivals.append(sorted(at))
+    if max(s.flood.spacing_ns for s in shares if s.sources) > usable if any(arrivals) else True:
+        return
+    seen, most = simulate(shares, arrivals, usable=usable, period=period, start=rng.randrange(period))
+    for bound, worst in zip(bounds, seen, strict=True):
+        assert isinstance(bound, Refused) or worst <= bound.delay_ns
+    assert waiting is None or most <= waiting
+
+
+def test_the_urgent_are_bounded_though_the_bulk_overloads_the_slot() -> None:
+    shares = [Share(2, 10_000, cost(10)), Share(50, 100, cost(20))]
+    bounds, waiting = slot_delays(shares, usable_ns=200, period_ns=1000, jitter_ns=0)
+    assert isinstance(bounds[0], Bounded)
+    assert isinstance(bounds[1], Refused)
+    assert waiting is None
+
+
+def test_a_flood_adds_what_it_runs_beyond_its_spacing() -> None:
+    short, _ = slot_delays([Share(1, 1000, cost(10))], usable_ns=100, period_ns=1000, jitter_ns=0)
+    long, _ = slot_delays([Share(1, 1000, cost(10, 75))], usable_ns=100, period_ns=1000, jitter_ns=0)
+    assert short == [Bounded(1000 - 100 + 2 * 10)]
+    assert long == [Bounded(1000 - 100 + 2 * 10 + 65)]
+
+
+def test_work_is_what_all_floods_of_a_period_take() -> None:
+    shares = [Share(3, 500, cost(10)), Share(2, 1000, cost(7))]
+    assert work_ns(shares, period_ns=2000) == 3 * 4 * 10 + 2 * 2 * 7
+
+
+# --- plans of scenarios ---
+
+
+@pytest.fixture
+def planned(make_scenario):
+    def build(relays="contended", **keys):
+        scenario = make_scenario(**{"nodes.count": 45, "clusters.count": 4, "clusters.flooding_period_s": 5, **keys})
+        return plan(scenario, placed(scenario), relays=relays)
+
+    return build
+
+
+def placed(scenario) -> dict[NodeId, Enu]:
+    return {NodeId(i + 1): at for i, at in enumerate(positions(scenario))}
+
+
+def test_the_reference_grid_at_one_packet_a_second_is_feasible_and_at_ten_is_not(planned) -> None:
+    assert planned(**{"traffic.interval_s": 1.0}).feasible
+    busy = planned(**{"traffic.interval_s": 0.1})
+    assert not busy.feasible
+    assert any("head 22" in problem for problem in busy.problems)
+    assert busy.bottleneck.utilization > 5
+
+
+def test_load_that_does_not_fit_has_to_go_and_no_step_less_would_do(planned, make_scenario) -> None:
+    busy = planned(**{"traffic.interval_s": 0.1})
+    (key,) = busy.change.keys
+    interval = float(key.split()[2])
+    assert planned(**{"traffic.interval_s": interval}).feasible
+    assert not planned(**{"traffic.interval_s": interval * 0.69}).feasible
+
+
+@pytest.mark.parametrize("keys", [{"clusters.count": 22, "clusters.flooding_period_s": 1}, {"clusters.count": 44}])
+def test_the_proposed_change_is_feasible_and_none_of_fewer_keys_is(planned, make_scenario, keys) -> None:
+    found = planned(relays="scheduled", **{"traffic.interval_s": 1.0, **keys})
+    assert not found.feasible
+    scenario = make_scenario(**{"nodes.count": 45, "clusters.count": 4, "clusters.flooding_period_s": 5, **keys})
+    site, classes = Site(scenario, placed(scenario)), demands(scenario)
+    assert evaluate(site, classes, found.change.design).feasible
+    cheaper = [
+        c
+        for c in _candidates(found.design, 45)
+        if found.design.distance(c) < found.design.distance(found.change.design)
+    ]
+    assert cheaper
+    assert not any(evaluate(site, classes, candidate).feasible for candidate in cheaper)
+
+
+def test_slots_by_load_fill_no_more_than_the_period(make_scenario) -> None:
+    scenario = make_scenario(**{"nodes.count": 45, "clusters.count": 4, "clusters.flooding_period_s": 5})
+    site, classes = Site(scenario, placed(scenario)), demands(scenario)
+    by_load = evaluate(site, classes, Design(4, 5 * S, 2 * MS, slots="by_load"))
+    assert sum(cluster.slot_ns for cluster in by_load.clusters) <= 5 * S
+    equal = evaluate(site, classes, Design(4, 5 * S, 2 * MS))
+    assert by_load.bottleneck.utilization <= equal.bottleneck.utilization
+
+
+def test_a_lifetime_shorter_than_the_bound_is_a_problem(planned) -> None:
+    found = planned(**{"routing.lifetime_s": 3})
+    assert any("routing.lifetime_s = 3" in problem for problem in found.problems)
+
+
+def test_a_queue_that_would_overflow_is_a_problem(planned) -> None:
+    found = planned(**{"routing.queue_frames": 20})
+    assert any("routing.queue_frames = 20" in problem for problem in found.problems)
+
+
+@pytest.mark.parametrize("arrivals", ["saturated", "poisson"])
+def test_traffic_without_a_least_interval_is_refused(planned, arrivals) -> None:
+    found = planned(**{"traffic.arrivals": arrivals})
+    assert isinstance(found, Refused)
+    assert arrivals in describe(found)
+
+
+def test_no_traffic_is_feasible(planned) -> None:
+    assert planned(**{"traffic.arrivals": "none"}).feasible
+
+
+def test_nodes_that_no_head_can_reach_are_named(make_scenario) -> None:
+    scenario = make_scenario(**{"nodes.count": 5, "nodes.layout": "line", "clusters.count": 1})
+    places = placed(scenario)
+    places[NodeId(5)] = Enu(9000.0, 0.0, 50.0)
+    found = plan(scenario, places)
+    assert isinstance(found, Plan)
+    assert "1 nodes can reach no head: 5" in describe(found)
+
+
+def test_light_traffic_has_a_proven_way_to_the_head_and_heavy_an_assumed_one(make_scenario) -> None:
+    keys = {"nodes.count": 5, "nodes.layout": "line", "clusters.flooding_period_s": 5}
+    light = make_scenario(**{**keys, "traffic.interval_s": 10, "radio.max_attempts": 3})
+    found = plan(light, placed(light), relays="scheduled")
+    assert isinstance(found.access, Bounded)
+    assert not any("assumed" in note for note in found.notes)
+    heavy = make_scenario(**{**keys, "traffic.interval_s": 0.05})
+    assert any("assumed" in note for note in plan(heavy, placed(heavy)).notes)
+
+
+def test_the_text_says_verdict_bounds_bottleneck_and_change(planned) -> None:
+    text = describe(planned(**{"traffic.interval_s": 0.1, "mission.survivors": 4}))
+    for words in (
+        "not feasible: 4 clusters",
+        "report, 45 sources: at most",
+        "bottleneck: the slot of head",
+        "cheapest",
+    ):
+        assert words in text
+    assert "equations (1)-(4) say" in text
+    assert text == describe(planned(**{"traffic.interval_s": 0.1, "mission.survivors": 4}))
+
+
+def test_every_packet_goes_through_all_nodes_between_it_and_its_head() -> None:
+    line = within_range({NodeId(n): Enu(200.0 * n, 0, 0) for n in range(1, 6)}, range_m=250)
+    one = TrafficClass("application", 100, S, tuple(NodeId(n) for n in (1, 2, 5)))
+    found = ways(line, dict.fromkeys(line, NodeId(3)), [one])
+    assert found.hops == {1: 2, 2: 1, 3: 0, 4: 1, 5: 2}
+    assert {n: row[0] for n, row in found.through.items()} == {1: 1, 2: 2, 3: 0, 4: 1, 5: 1}
+
+
+def test_a_scheduled_flood_leaves_each_relay_time_to_hear_and_announce(make_scenario) -> None:
+    quick = make_scenario(**{"nodes.count": 5, "nodes.layout": "line", "radio.lead_ms": 0})
+    slow = make_scenario(**{"nodes.count": 5, "nodes.layout": "line", "radio.lead_ms": 40, "radio.handover_ms": 10})
+    line = within_range(placed(quick), range_m=250)
+    costs = [flood_cost(s, line, NodeId(1), payload_bytes=1024, relays="scheduled") for s in (quick, slow)]
+    assert costs[0].duration_ns < 6 * MS
+    assert 3 * 50 * MS < costs[1].duration_ns < 3 * 53 * MS
+    assert all(c.proven for c in costs)

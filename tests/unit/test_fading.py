@@ -12,8 +12,10 @@ from test_emulator_kernel import Output, medium, run
 
 from fanet_mw.errors import ConfigError
 from fanet_mw.messages import Reception, TxStatus
+from fanet_mw.radio_control import Cut, Degrade, Jam
 from fanet_mw.scenario import Scenario
-from fanet_mw.units import MS
+from fanet_mw.topics import Topics
+from fanet_mw.units import MS, Enu, NodeId
 
 MakeScenario = Callable[..., Scenario]
 LAWS = {
@@ -101,3 +103,22 @@ def test_the_same_seed_fades_alike_however_often_time_is_told() -> None:
 def test_fading_without_powers_is_refused(make_scenario: MakeScenario) -> None:
     with pytest.raises(ConfigError, match=r"radio\.fading needs a channel with powers"):
         make_scenario(**{"radio.fading": "rician"})
+
+
+@settings(max_examples=40)
+@given(st.integers(0, 10_000), st.booleans())
+def test_books_close_when_faults_lie_on_links_that_fade(seed: int, capture: bool) -> None:
+    count = 6
+    air = medium(count, **{**FULL, "capture": capture})
+    for control in (
+        Degrade("d", NodeId(1), NodeId(2), both=True, loss_db=12.0, loss_share=0.4),
+        Jam("j", Enu(100.0, 100.0, 0.0), 200.0, -80.0),
+        Cut("c", NodeId(3), 10 * MS),
+    ):
+        air.receive(Topics("k").radio_control, control, 0)
+    run(air, seed, count=count, frames=100)
+    report = air.report()
+    copies = report["copies"]
+    assert report["refused"] == {}
+    assert report["frames"]["in_flight"] == 0
+    assert copies["on_air"] == copies["received"] + sum(copies["lost"].values())

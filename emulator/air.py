@@ -7,11 +7,13 @@ import numpy.typing as npt
 
 from emulator import kernel
 from emulator import state as s
-from emulator.airtime import DETECT_NS, DIFS_NS, OVERHEAD_BYTES, SIFS_NS, SLOT_NS, Timing, frame_ns, lifetime_ns
-from emulator.error_rate import log_success_per_bit
+from emulator.airtime import DETECT_NS, OVERHEAD_BYTES, Timing, airtime_ns, lifetime_ns
+from emulator.error_rate import header_rates, log_success_per_bit
+from emulator.fading import law_of, seeds
 from emulator.faults import Faults
 from emulator.link_book import LinkBook
-from emulator.propagation import Links, milliwatt, noise_mw
+from emulator.propagation import Links, milliwatt, noise_mw, pair_codes
+from emulator.shadowing import Shadowing
 from fanet_mw.link_stats import LinkStats
 from fanet_mw.rng import stream_seed
 from fanet_mw.scenario import Radio
@@ -20,9 +22,9 @@ _GENERATOR_RANGE = 2_147_483_646
 
 
 @lru_cache(maxsize=8)
-def _error_table(rate_mbps: float) -> npt.NDArray[np.float64]:
-    """PLCP header at 1 Mb/s, then the payload's rate."""
-    return np.stack([log_success_per_bit(1), log_success_per_bit(rate_mbps)])
+def _error_table(rate_mbps: float, ack_rate_mbps: float) -> npt.NDArray[np.float64]:
+    """PLCP header, data, ACK (`emulator.state.LOCK_RATE`)."""
+    return np.stack([log_success_per_bit(rate) for rate in (header_rates(rate_mbps)[0], rate_mbps, ack_rate_mbps)])
 
 
 class Air:
@@ -34,41 +36,67 @@ class Air:
         self._faults = faults
         self._book = LinkBook(stations)
         timing = Timing.of(radio)
+        fading, shape = law_of(radio)
         self.g = np.zeros(s.GLOBALS, np.int64)
         self._p = np.zeros(s.PARAMETERS, np.int64)
         self._p[:] = (
-            SLOT_NS, SIFS_NS, DIFS_NS, timing.eifs_extra_ns, timing.ack_ns, timing.ack_timeout_ns, timing.header_ns,
-            DETECT_NS, radio.cw_min, radio.cw_max, radio.max_attempts, radio.queue_frames, lifetime_ns(radio),
-            radio.access == "standard", radio.access == "ns3", radio.channel != "range",
-            capture,
+            timing.slot_ns, timing.sifs_ns, timing.difs_ns, timing.eifs_extra_ns, timing.ack_ns,
+            timing.ack_timeout_ns, timing.header_ns, DETECT_NS, radio.cw_min, radio.cw_max, radio.max_attempts,
+            radio.queue_frames, lifetime_ns(radio),
+            radio.access == "standard", radio.access == "ns3", radio.channel != "range", capture,
+            timing.extension_ns, radio.capture, fading,
         )  # fmt: skip
-        self._pf = np.array([milliwatt(radio.preamble_snr_db), 1e-3, radio.rate_mbps * 1e-3])
+        self._pf = np.array(
+            [
+                milliwatt(radio.preamble_snr_db),
+                header_rates(radio.rate_mbps)[1],
+                radio.rate_mbps * 1e-3,
+                radio.ack_rate_mbps * 1e-3,
+                milliwatt(radio.capture_db),
+                milliwatt(radio.sensitivity_dbm),
+                shape,
+            ]
+        )
         self.st = np.zeros((s.STATION_ROWS, stations), np.int64)
         for row, value in (
             (s.SCHEDULED, -1), (s.CW, radio.cw_min), (s.TX_FRAME, -1), (s.LOCK, -1), (s.WAITING, -1), (s.ACK_TO, -1),
-            (s.HEAD, -1), (s.TAIL, -1), (s.BUSY_SINCE, -1), (s.IDLE_FROM, -DIFS_NS),
+            (s.HEAD, -1), (s.TAIL, -1), (s.BUSY_SINCE, -1), (s.IDLE_FROM, -timing.difs_ns),
         ):  # fmt: skip
             self.st[row] = value
         self.st[s.RANDOM] = [stream_seed(seed, "backoff", i + 1) % _GENERATOR_RANGE + 1 for i in range(stations)]
+        self.st[s.FADE_A], self.st[s.FADE_B] = np.array(
+            [seeds(stream_seed(seed, "fading", i + 1)) for i in range(stations)], np.int64
+        ).T
         self._sf = np.zeros((s.STATION_REALS, stations), np.float64)
         self._sf[s.NOISE] = noise_mw(radio)
         self.fr = np.zeros((s.FRAME_ROWS, 1024), np.int64)
         self._hs = np.zeros((8 * stations + 2 * 1024 + 64, 5), np.int64)
         self._out = np.zeros((2 * radio.queue_frames + 1024, s.OUT_COLUMNS), np.int64)
-        self._err = _error_table(radio.rate_mbps) if radio.channel != "range" else np.zeros((2, 1))
+        self._err = _error_table(radio.rate_mbps, radio.ack_rate_mbps) if radio.channel != "range" else np.zeros((3, 1))
         self._airtime: dict[int, int] = {}
+        self._shadowing = Shadowing(radio, seed=seed) if radio.shadowing_db else None
         nowhere = Links(np.full((stations, 3), np.inf), radio, spare=0)
         self._lk, self._lp, self._ptr = nowhere.ints, nowhere.reals, nowhere.ptr
         self._hr = np.zeros((64, 5), np.int64)
         self._at = np.full((stations, 3), np.inf)
+        self._blocked = np.zeros(0, np.int64)
+        self._seen_anew = False
+        """Whether the obstructions have changed since the links were made."""
         self.next_output_ns = kernel.NEVER
         """A lower bound of the next instant at which `advance` has something to return; NEVER: nothing is planned."""
         self._gather()
 
+    def obstruct(self, pairs: npt.NDArray[np.int64]) -> None:
+        """Something stands between these pairs of stations [n, 2], and no others, from the next `place` on."""
+        blocked = np.unique(pair_codes(pairs, self._stations))
+        self._seen_anew = self._seen_anew or not np.array_equal(blocked, self._blocked)
+        self._blocked = blocked
+
     def place(self, at: npt.NDArray[np.float64]) -> None:
         """New positions [m], one row per station; frames under way are carried over."""
-        if np.array_equal(at, self._at):
+        if np.array_equal(at, self._at) and not self._seen_anew:
             return
+        self._seen_anew = False
         self._at = at
         self.relink()
 
@@ -77,7 +105,9 @@ class Air:
         at = self._at
         self._book.take(self._lk)
         spare = int(self._lk[s.UNDERWAY].sum())
-        links = Links(np.ascontiguousarray(at), self._radio, spare=spare)
+        links = Links(
+            np.ascontiguousarray(at), self._radio, spare=spare, shadowing=self._shadowing, blocked=self._blocked
+        )
         self._sf[s.NOISE] = self._faults.shape(links, at)
         self.g[s.REACH_NS] = max(self.g[s.REACH_NS] if spare else 0, links.longest_ns)
         room = 4 * (links.ints.shape[1] + self._stations) + 64
@@ -116,9 +146,7 @@ class Air:
         airtime = self._airtime.get(size)
         if airtime is None:
             radio = self._radio
-            airtime = self._airtime[size] = frame_ns(
-                size + OVERHEAD_BYTES, rate_mbps=radio.rate_mbps, short=radio.preamble == "short"
-            )
+            airtime = self._airtime[size] = airtime_ns(size + OVERHEAD_BYTES, radio, rate_mbps=radio.rate_mbps)
         if self.g[s.HS_N] + 2 * kernel.MARGIN > self._hs.shape[0]:
             self._more_starts(len(self._hs))
         self.next_output_ns = kernel.submit(

@@ -1,19 +1,27 @@
-"""How long things take: IEEE 802.11-2020 clause 15 (DSSS, 1 and 2 Mb/s) and clause 16 (HR/DSSS, 5.5 and 11 Mb/s)."""
+"""How long things take, by standard: `b` (DSSS, HR/DSSS), `g` (the same, and OFDM at 2.4 GHz), `a` (OFDM at 5 GHz).
+
+    DSSS   PLCP preamble and header + payload bits / rate, rounded up to 1 us
+    OFDM   preamble 16 us + SIGNAL 4 us + 4 us per symbol of (SERVICE 16 + payload + tail 6) bits, + 6 us at 2.4 GHz
+
+Clauses are of IEEE 802.11-2020: 15 and 16 (DSSS), 17 (OFDM), 18 (ERP). Not modeled: protection of OFDM frames
+from stations that only know DSSS, 5 and 10 MHz channels, QoS access categories.
+"""
 
 import math
 from typing import Final, NamedTuple
 
-from fanet_mw.scenario import Radio
+from fanet_mw.scenario_radio import Radio, is_ofdm
 from fanet_mw.units import MS, US
 
 OVERHEAD_BYTES: Final = 8 + 20 + 8 + 24 + 4
 """UDP + IPv4 + LLC/SNAP + MAC header + FCS: what surrounds our frame, which is the UDP payload."""
 ACK_BYTES: Final = 14
-SLOT_NS: Final = 20 * US  # table 15-5 (aSlotTime)
-SIFS_NS: Final = 10 * US  # table 15-5 (aSIFSTime)
-DIFS_NS: Final = SIFS_NS + 2 * SLOT_NS  # 10.3.7
 DETECT_NS: Final = 4 * US
 """From the first bit at a station until the preamble is found and the medium sensed busy (as ns-3 has it)."""
+OFDM_HEADER_NS: Final = 20 * US  # 17.3.2.4 and table 17-5: two training fields of 8 us, SIGNAL of 4 us
+SYMBOL_NS: Final = 4 * US  # table 17-5 (T_SYM)
+SIGNAL_EXTENSION_NS: Final = 6 * US  # table 18-5 (aSignalExtension), ERP-OFDM only
+_SERVICE_AND_TAIL_BITS: Final = 16 + 6  # 17.3.5.2, 17.3.5.3
 
 
 def plcp_ns(*, short: bool) -> int:
@@ -29,24 +37,56 @@ def frame_ns(size: int, *, rate_mbps: float, short: bool) -> int:
     return plcp_ns(short=short and rate_mbps > 1) + math.ceil(8 * size / rate_mbps - 1e-9) * US
 
 
+def ofdm_frame_ns(size: int, *, rate_mbps: float, extension_ns: int = 0) -> int:
+    """Airtime of a MAC frame of `size` bytes at an OFDM rate (17.4.3, equation 17-29; with the extension, 18.5.3)."""
+    bits_per_symbol = round(rate_mbps * SYMBOL_NS / US)
+    return OFDM_HEADER_NS + -(-(_SERVICE_AND_TAIL_BITS + 8 * size) // bits_per_symbol) * SYMBOL_NS + extension_ns
+
+
 class Timing(NamedTuple):
     """Everything the DCF needs, in ns."""
 
+    slot_ns: int
+    sifs_ns: int
+    difs_ns: int
     ack_ns: int
     ack_timeout_ns: int
     eifs_extra_ns: int
     header_ns: int
+    extension_ns: int
+    """The end of a frame in which nothing is transmitted but the medium counts as busy."""
 
     @classmethod
     def of(cls, radio: Radio) -> "Timing":
+        """The values that the scenario's standard, rates and preamble give."""
         short = radio.preamble == "short"
-        header_ns = plcp_ns(short=short)
+        ofdm = is_ofdm(radio.rate_mbps)
+        extension_ns = SIGNAL_EXTENSION_NS if ofdm and radio.standard == "g" else 0
+        sifs_ns = 16 * US if radio.standard == "a" else 10 * US  # tables 17-21, 15-5, 18-5 (aSIFSTime)
+        slot_ns = 9 * US if radio.standard == "a" or radio.slot == "short" else 20 * US  # the same (aSlotTime)
+        header_ns = OFDM_HEADER_NS if ofdm else plcp_ns(short=short)
+        if radio.standard == "a":
+            lowest_ack_ns = ofdm_frame_ns(ACK_BYTES, rate_mbps=6)
+        else:
+            lowest_ack_ns = frame_ns(ACK_BYTES, rate_mbps=1, short=False)
         return cls(
-            ack_ns=frame_ns(ACK_BYTES, rate_mbps=radio.ack_rate_mbps, short=short),
-            ack_timeout_ns=SIFS_NS + SLOT_NS + header_ns,  # 10.3.2.11: ACKTimeout interval
-            eifs_extra_ns=SIFS_NS + frame_ns(ACK_BYTES, rate_mbps=1, short=False),  # 10.3.7: EIFS - DIFS
+            slot_ns=slot_ns,
+            sifs_ns=sifs_ns,
+            difs_ns=sifs_ns + 2 * slot_ns,  # 10.3.7
+            ack_ns=airtime_ns(ACK_BYTES, radio, rate_mbps=radio.ack_rate_mbps),
+            ack_timeout_ns=sifs_ns + slot_ns + header_ns,  # 10.3.2.11: ACKTimeout interval
+            eifs_extra_ns=sifs_ns + lowest_ack_ns,  # 10.3.7: EIFS - DIFS, an ACK at the lowest mandatory rate
             header_ns=header_ns,
+            extension_ns=extension_ns,
         )
+
+
+def airtime_ns(size: int, radio: Radio, *, rate_mbps: float) -> int:
+    """Airtime of a MAC frame of `size` bytes, FCS included, at one of the rates of the scenario's standard."""
+    if is_ofdm(rate_mbps):
+        extension_ns = SIGNAL_EXTENSION_NS if radio.standard == "g" else 0
+        return ofdm_frame_ns(size, rate_mbps=rate_mbps, extension_ns=extension_ns)
+    return frame_ns(size, rate_mbps=rate_mbps, short=radio.preamble == "short")
 
 
 def lifetime_ns(radio: Radio) -> int:

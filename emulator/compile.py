@@ -1,6 +1,7 @@
 """Compile the kernel, once: `python -m emulator.compile`. numba keeps the result in its cache."""
 
 from array import array
+from collections.abc import Mapping
 
 from emulator.jit import COMPILED
 from emulator.medium import Medium
@@ -11,8 +12,15 @@ from fanet_mw.units import BROADCAST, MS, NodeId
 
 
 def warm_up() -> bool:
-    """Run every kernel function once; returns whether they are machine code."""
-    scenario = config.build({"nodes": {"count": 2}, "clusters": {"count": 1}})
+    """Run every compiled function once, the optional ones too; returns whether they are machine code."""
+    _run({})
+    _run({"channel": "friis", "shadowing_db": 1.0, "fading": "rician", "capture": True})
+    return COMPILED
+
+
+def _run(radio: Mapping[str, object]) -> None:
+    """Two stations, a few frames, poses in the middle of one."""
+    scenario = config.build({"nodes": {"count": 2}, "clusters": {"count": 1}, "radio": radio})
     topics = Topics("warm-up")
     medium = Medium(scenario, "warm-up")
     medium.start(0)
@@ -26,7 +34,6 @@ def warm_up() -> bool:
     medium.receive(topics.pose, poses(MS, 120.0), MS)
     medium.next_wake_ns()
     medium.stop(20 * MS)
-    return COMPILED
 
 
 if __name__ == "__main__":

@@ -6,6 +6,7 @@ Backoff slots count from BASE while the medium is idle; when it turns busy, the 
 and the rest waits. A pending access is one event; it is stale when SCHEDULED has another instant.
 """
 
+from emulator.fading import gain
 from emulator.heap import push
 from emulator.jit import jit
 from emulator.state import (
@@ -32,6 +33,7 @@ from emulator.state import (
     BUSY_SINCE,
     CAPTURE,
     COLLIDED,
+    COPY,
     CS,
     CUT_OFF,
     CW,
@@ -54,6 +56,7 @@ from emulator.state import (
     ENDS,
     EVERYONE,
     EXPIRED,
+    FADING,
     FATE,
     FATE_HALF_DUPLEX,
     FATE_OPEN,
@@ -71,7 +74,6 @@ from emulator.state import (
     LINK_FRAME,
     LINK_KIND,
     LINK_POWER,
-    LINK_SRC,
     LOCK,
     LOCK_HEADER_END,
     LOST_COLLISION,
@@ -107,6 +109,7 @@ from emulator.state import (
     RETRIES,
     SCHEDULED,
     SENSED,
+    SENSITIVITY_MW,
     SLOT_NS,
     SRC,
     TAIL,
@@ -328,7 +331,19 @@ def request(g: Ints, p: Ints, st: Ints, hs: Ints, s: int, t: int) -> None:
 
 @jit
 def access(
-    g: Ints, p: Ints, st: Ints, fr: Ints, lk: Ints, lp: Reals, ptr: Ints, hs: Ints, hr: Ints, out: Ints, s: int, t: int
+    g: Ints,
+    p: Ints,
+    pf: Reals,
+    st: Ints,
+    fr: Ints,
+    lk: Ints,
+    lp: Reals,
+    ptr: Ints,
+    hs: Ints,
+    hr: Ints,
+    out: Ints,
+    s: int,
+    t: int,
 ) -> None:
     """The backoff has run out: transmit the first frame that is still alive."""
     if st[SCHEDULED, s] != t:
@@ -342,10 +357,11 @@ def access(
     if f < 0:
         return
     fr[ATTEMPTS, f] += 1
+    begin_tx(g, p, pf, st, fr, lk, lp, ptr, hr, s, f, DATA, t)
     targets = 0
     for link in range(ptr[s], ptr[s + 1]):
         if fr[DST, f] == EVERYONE or fr[DST, f] == lk[LINK_DST, link]:
-            if lk[AUDIBLE, link] == 1:
+            if lp[LINK_POWER, link] > 0.0 and lk[COPY, link] == 1:
                 targets += 1
             elif lk[FAULT, link] != 0:
                 g[ON_AIR_COPIES] += 1
@@ -356,7 +372,6 @@ def access(
         g[ATTEMPTS_MADE] += 1
     if p[CAPTURE] == 1:
         put(g, out, OUT_START, f, s, t, DATA, fr[ATTEMPTS, f])
-    begin_tx(g, p, st, fr, lk, lp, ptr, hr, s, f, DATA, t)
 
 
 @jit
@@ -369,7 +384,19 @@ def lost(g: Ints, fr: Ints, lk: Ints, fate: int, link: int, f: int) -> None:
 
 @jit
 def begin_tx(
-    g: Ints, p: Ints, st: Ints, fr: Ints, lk: Ints, lp: Reals, ptr: Ints, hr: Ints, s: int, f: int, kind: int, t: int
+    g: Ints,
+    p: Ints,
+    pf: Reals,
+    st: Ints,
+    fr: Ints,
+    lk: Ints,
+    lp: Reals,
+    ptr: Ints,
+    hr: Ints,
+    s: int,
+    f: int,
+    kind: int,
+    t: int,
 ) -> None:
     """A station starts to transmit; whatever it was receiving is lost."""
     if st[LOCK, s] >= 0:
@@ -389,6 +416,11 @@ def begin_tx(
     for link in range(first, last):
         lp[ON_AIR, link] = lp[LINK_POWER, link]
         lk[SENSED, link] = lk[AUDIBLE, link]
+        lk[COPY, link] = lk[AUDIBLE, link]
+        if p[FADING] != 0:
+            lp[ON_AIR, link] *= gain(p, pf, st, s)
+            lk[SENSED, link] = 1 if lp[ON_AIR, link] >= pf[SENSITIVITY_MW] else 0
+            lk[COPY, link] = max(lk[AUDIBLE, link], lk[SENSED, link])
         lk[FATE, link] = FATE_OPEN
         lk[LINK_FRAME, link] = f
         lk[LINK_KIND, link] = kind
@@ -453,8 +485,7 @@ def ack_timeout(g: Ints, p: Ints, st: Ints, fr: Ints, lk: Ints, hs: Ints, out: I
         return
     link = st[LOCK, s]
     if link >= 0 and st[LOCK_HEADER_END, s] <= t:
-        end = st[TX_END, lk[LINK_SRC, link]] + lk[DELAY, link]
-        push(hs, g, HS_N, end + 1, ACK_TIMEOUT, s, f)
+        push(hs, g, HS_N, lk[ENDS, link] + 1, ACK_TIMEOUT, s, f)
         return
     st[WAITING, s] = -1
     st[RESUME_FROM, s] = t
@@ -474,6 +505,7 @@ def ack_timeout(g: Ints, p: Ints, st: Ints, fr: Ints, lk: Ints, hs: Ints, out: I
 def send_ack(
     g: Ints,
     p: Ints,
+    pf: Reals,
     st: Ints,
     fr: Ints,
     lk: Ints,
@@ -491,7 +523,7 @@ def send_ack(
     if st[TX_KIND, s] == NOTHING:
         if p[CAPTURE] == 1:
             put(g, out, OUT_START, f, s, t, ACK, 0)
-        begin_tx(g, p, st, fr, lk, lp, ptr, hr, s, f, ACK, t)
+        begin_tx(g, p, pf, st, fr, lk, lp, ptr, hr, s, f, ACK, t)
         release(g, fr, out, f, t)
         return
     release(g, fr, out, f, t)

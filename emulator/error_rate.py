@@ -1,4 +1,4 @@
-"""The share of bits that noise and interference spoil, by modulation: DSSS DBPSK and DQPSK, CCK 5.5 and 11 Mb/s.
+"""The share of bits that noise and interference spoil: DSSS DBPSK and DQPSK, CCK 5.5 and 11 Mb/s; OFDM is next door.
 
 DBPSK     1/2 exp(-Eb/N0)                                               Proakis, Digital Communications, 4th ed., 5.2.8
 DQPSK     (1+sqrt2)/sqrt(8 pi sqrt2 x) exp(-(2-sqrt2) x), x = Eb/N0        (tight approximation of the same section)
@@ -13,10 +13,12 @@ from typing import Final
 import numpy as np
 import numpy.typing as npt
 
+from emulator.ofdm_error_rate import bit_error
 from emulator.phy import ERROR_FLOOR_DB, ERROR_STEPS_PER_DB
-from emulator.propagation import BANDWIDTH_HZ
+from emulator.propagation import DSSS_BANDWIDTH_HZ
+from fanet_mw.scenario_radio import is_ofdm
 
-_TOP_DB: Final = 25.0
+_TOP_DB: Final = 35.0
 _SYMBOLS_PER_S: Final = 1.375e6
 """CCK symbols: 11 Mchip/s, 8 chips each."""
 
@@ -27,14 +29,24 @@ def log_success_per_bit(rate_mbps: float) -> Reals:
     """ln(1 - bit error rate) at each step of the SINR axis."""
     sinr_db = np.arange(ERROR_FLOOR_DB, _TOP_DB, 1 / ERROR_STEPS_PER_DB)
     sinr = np.power(10.0, sinr_db / 10)
+    if is_ofdm(rate_mbps):
+        return np.asarray(np.log(np.maximum(1.0 - bit_error(sinr, rate_mbps), 1e-300)), dtype=np.float64)
     if rate_mbps == 1:
-        return _from_bit_error(0.5 * np.exp(-sinr * BANDWIDTH_HZ / 1e6))
+        return _from_bit_error(0.5 * np.exp(-sinr * DSSS_BANDWIDTH_HZ / 1e6))
     if rate_mbps == 2:
-        return _from_bit_error(_dqpsk(sinr * BANDWIDTH_HZ / 2e6))
+        return _from_bit_error(_dqpsk(sinr * DSSS_BANDWIDTH_HZ / 2e6))
     bits = 4 if rate_mbps == 5.5 else 8
-    symbol_snr = sinr * BANDWIDTH_HZ / _SYMBOLS_PER_S
+    symbol_snr = sinr * DSSS_BANDWIDTH_HZ / _SYMBOLS_PER_S
     success = np.array([_cck_symbol_success(float(snr), bits) for snr in symbol_snr])
     return np.asarray(np.log(np.maximum(success, 1e-300)) / bits, dtype=np.float64)
+
+
+def header_rates(rate_mbps: float) -> tuple[float, float]:
+    """What protects the header of a frame: the rate [Mb/s] of its modulation, and its mean bits per ns.
+
+    DSSS: preamble and header are sent at 1 Mb/s. OFDM: 24 bits of SIGNAL at 6 Mb/s follow 16 us of training.
+    """
+    return (6.0, 24 / 20_000) if is_ofdm(rate_mbps) else (1.0, 1e-3)
 
 
 def _from_bit_error(rate: Reals) -> Reals:

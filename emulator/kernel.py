@@ -174,11 +174,11 @@ def advance(  # noqa: C901  (one dispatch; splitting it would only move the bran
             kind, a, b = hs[0, 2], hs[0, 3], hs[0, 4]
             pop(hs, g, HS_N)
             if kind == ACCESS:
-                access(g, p, st, fr, lk, lp, ptr, hs, hr, out, a, starts)
+                access(g, p, pf, st, fr, lk, lp, ptr, hs, hr, out, a, starts)
             elif kind == ARRIVE:
                 arrive(g, p, st, fr, hs, out, a, starts)
             elif kind == SEND_ACK:
-                send_ack(g, p, st, fr, lk, lp, ptr, hs, hr, out, a, b, starts)
+                send_ack(g, p, pf, st, fr, lk, lp, ptr, hs, hr, out, a, b, starts)
             elif kind == ACK_TIMEOUT:
                 ack_timeout(g, p, st, fr, lk, hs, out, a, b, starts)
         else:

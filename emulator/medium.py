@@ -17,7 +17,7 @@ from emulator.faults import Faults
 from emulator.pcap import Capture
 from fanet_mw.actor import Actor
 from fanet_mw.errors import DropReason
-from fanet_mw.messages import Message, Poses, Reception, TxOutcome, TxRequest, TxStatus
+from fanet_mw.messages import Message, Obstructions, Poses, Reception, TxOutcome, TxRequest, TxStatus
 from fanet_mw.radio_control import Cut, Degrade, Jam, Restore
 from fanet_mw.scenario import Scenario
 from fanet_mw.topics import Topics
@@ -42,7 +42,7 @@ class Medium(Actor):
 
     def __init__(self, scenario: Scenario, swarm: str, *, capture: Capture | None = None) -> None:
         topics = Topics(swarm)
-        super().__init__("emulator", (topics.all_tx, topics.pose, topics.radio_control))
+        super().__init__("emulator", (topics.all_tx, topics.pose, topics.obstruction, topics.radio_control))
         self._max_bytes = scenario.radio.max_frame_bytes
         self._count = scenario.nodes.count
         self._rx_topics = [topics.radio_rx(node) for node in scenario.node_ids]
@@ -88,6 +88,8 @@ class Medium(Actor):
         elif isinstance(message, Poses):
             self._pass_time(now_ns)
             self._place(message)
+        elif isinstance(message, Obstructions):
+            self._obstruct(message)
         elif topic == self._control_topic and isinstance(message, Degrade | Jam | Cut | Restore):
             self._pass_time(now_ns)
             why = self._faults.obey(message, self._now_ns)
@@ -286,6 +288,14 @@ class Medium(Actor):
         return [row for row in rows if row[0] != s.OUT_START]
 
     # --- positions ------------------------------------------------------------------------------------------------
+
+    def _obstruct(self, obstructions: Obstructions) -> None:
+        """What stands between nodes counts from the next poses on: they were taken at the same instant."""
+        pairs = np.frombuffer(obstructions.pairs, np.uint16).astype(np.int64)
+        if len(pairs) % 2 or (len(pairs) and not 1 <= pairs.min() <= pairs.max() <= self._count):
+            self._accounts.refused["obstructions"] += 1
+            return
+        self._air.obstruct(pairs.reshape(-1, 2) - 1)
 
     def _place(self, poses: Poses) -> None:
         ids = np.frombuffer(poses.ids, np.uint16).astype(np.int64)

@@ -18,8 +18,8 @@ from collections.abc import Callable
 from typing import Final, Protocol
 from zlib import crc32
 
-from emulator.airtime import SIFS_NS, Timing
-from fanet_mw.scenario import Radio
+from emulator.airtime import Timing
+from fanet_mw.scenario_radio import Radio, is_ofdm
 from fanet_mw.units import BROADCAST, US, S
 
 PORT: Final = 14550
@@ -31,9 +31,11 @@ _SENT: Final = 1 << 1 | 1 << 2 | 1 << 3 | 1 << 10 | 1 << 17
 """Radiotap fields of a transmission: flags, rate, channel, transmit power, data retries."""
 _HEARD: Final = 1 << 1 | 1 << 2 | 1 << 3 | 1 << 5 | 1 << 11
 """Of a reception: flags, rate, channel, antenna signal, antenna (the receiver's id, modulo 256)."""
-_CHANNEL_MHZ: Final = 2412
-_CHANNEL_FLAGS: Final = 0x00A0
-"""2 GHz, CCK."""
+_CCK: Final = 0x0020
+_OFDM: Final = 0x0040
+_2_GHZ: Final = 0x0080
+_5_GHZ: Final = 0x0100
+"""Radiotap channel flags."""
 _RETRY: Final = 0x08
 _MAC_PREFIX: Final = b"\x02\xfaNE"
 _EVERYONE: Final = b"\xff" * 6
@@ -87,18 +89,22 @@ class Pcap:
         self._write = write
         self._receptions = receptions
         short = _FLAG_SHORT_PREAMBLE if radio.preamble == "short" else 0
-        self._data_flags = _FLAG_FCS | (short if radio.rate_mbps > 1 else 0)
-        self._ack_flags = _FLAG_FCS | (short if radio.ack_rate_mbps > 1 else 0)
+        ofdm = is_ofdm(radio.rate_mbps)
+        self._data_flags = _FLAG_FCS | (short if radio.rate_mbps > 1 and not ofdm else 0)
+        self._ack_flags = _FLAG_FCS | (short if radio.ack_rate_mbps > 1 and not ofdm else 0)
+        band = _5_GHZ if radio.standard == "a" else _2_GHZ
+        self._channel = min(0xFFFF, round(radio.frequency_mhz)), band | (_OFDM if ofdm else _CCK)
         self._rate = round(2 * radio.rate_mbps)  # in 500 kb/s
         self._ack_rate = round(2 * radio.ack_rate_mbps)
         self._power_dbm = max(-128, min(127, round(radio.tx_power_dbm)))
-        self._duration_us = -(-(SIFS_NS + Timing.of(radio).ack_ns) // US)
+        timing = Timing.of(radio)
+        self._duration_us = -(-(timing.sifs_ns + timing.ack_ns) // US)
         write(_FILE.pack(MAGIC, 2, 4, 0, 0, 65535, LINK_TYPE))
 
     def transmitted(self, t_ns: int, src: int, dst: int, seq: int, frame: bytes, attempt: int) -> None:
         """A data frame leaves an antenna, for the `attempt`-th time (from 1)."""
         tap = _RADIOTAP.pack(
-            0, 0, _RADIOTAP.size, _SENT, self._data_flags, self._rate, _CHANNEL_MHZ, _CHANNEL_FLAGS,
+            0, 0, _RADIOTAP.size, _SENT, self._data_flags, self._rate, *self._channel,
             self._power_dbm, min(255, attempt - 1),
         )  # fmt: skip
         self._put(t_ns, tap, self._data(src, dst, seq, frame, retry=attempt > 1))
@@ -112,8 +118,7 @@ class Pcap:
             _SENT,
             self._ack_flags,
             self._ack_rate,
-            _CHANNEL_MHZ,
-            _CHANNEL_FLAGS,
+            *self._channel,
             self._power_dbm,
             0,
         )
@@ -124,7 +129,7 @@ class Pcap:
         if not self._receptions:
             return
         tap = _RADIOTAP.pack(
-            0, 0, _RADIOTAP.size, _HEARD, self._data_flags, self._rate, _CHANNEL_MHZ, _CHANNEL_FLAGS,
+            0, 0, _RADIOTAP.size, _HEARD, self._data_flags, self._rate, *self._channel,
             max(-128, min(127, round(rssi_dbm))), station & 0xFF,
         )  # fmt: skip
         self._put(t_ns, tap, self._data(src, dst, seq, frame, retry=False))

@@ -2,13 +2,14 @@
 
     frame begins -> detected after 4 us if nothing drowns it -> received while interference allows -> decoded or lost
 
-A frame is sensed from its detection on. A receiver stays with the frame it detected first: no capture of a later one.
+A frame is sensed from its detection on. A receiver stays with the frame it detected first, unless TAKE_OVER = 1 and
+a later one, whose preamble stands out of everything else, is TAKE_OVER_RATIO times as strong: then the first is lost.
 With INTERFERENCE = 0 any overlap destroys; with 1 the loss of each segment follows from its SINR.
 """
 
 import math
 
-from emulator.dcf import acknowledged, lost, on_busy, on_idle, put, release, uniform
+from emulator.dcf import NEVER, acknowledged, lost, on_busy, on_idle, put, release, uniform
 from emulator.heap import push
 from emulator.jit import jit
 from emulator.state import (
@@ -16,13 +17,16 @@ from emulator.state import (
     ACK_NS,
     ACK_TO,
     BAD_UNTIL,
+    COPY,
     CS,
     DATA,
     DETECT_NS,
     DETECT_RATIO,
     DST,
     EIFS_EXTRA_NS,
+    ENDS,
     EVERYONE,
+    EXTENSION_NS,
     FATE,
     FATE_COLLISION,
     FATE_HALF_DUPLEX,
@@ -39,8 +43,10 @@ from emulator.state import (
     LINK_KIND,
     LINK_SRC,
     LOCK,
+    LOCK_DATA_END,
     LOCK_FROM,
     LOCK_HEADER_END,
+    LOCK_RATE,
     LOG_OK,
     N_RECEIVED,
     NAV,
@@ -51,7 +57,6 @@ from emulator.state import (
     OPEN,
     OUT_RECEPTION,
     OVERLAPPED,
-    PAYLOAD_BITS_PER_NS,
     POWER,
     RECEIVED,
     RECEIVED_COPIES,
@@ -60,6 +65,8 @@ from emulator.state import (
     SENSED,
     SIFS_NS,
     SPARED,
+    TAKE_OVER,
+    TAKE_OVER_RATIO,
     TX_KIND,
     UNDERWAY,
     WAITING,
@@ -83,9 +90,11 @@ def close_segment(p: Ints, pf: Reals, st: Ints, sf: Reals, lp: Reals, err: Reals
     sinr_db = 10.0 * math.log10(wanted / (max(0.0, sf[POWER, r] - wanted) + sf[NOISE, r]))
     at = int((sinr_db - ERROR_FLOOR_DB) * ERROR_STEPS_PER_DB)
     at = max(0, min(err.shape[1] - 1, at))
-    header_ns = max(0, min(t, st[LOCK_HEADER_END, r]) - begin)
+    until = min(t, st[LOCK_DATA_END, r])
+    header_ns = max(0, min(until, st[LOCK_HEADER_END, r]) - begin)
     sf[LOG_OK, r] += header_ns * pf[HEADER_BITS_PER_NS] * err[0, at]
-    sf[LOG_OK, r] += (t - begin - header_ns) * pf[PAYLOAD_BITS_PER_NS] * err[1, at]
+    rate = st[LOCK_RATE, r]
+    sf[LOG_OK, r] += max(0, until - begin - header_ns) * pf[HEADER_BITS_PER_NS + rate] * err[rate, at]
 
 
 @jit
@@ -117,14 +126,26 @@ def rx_detect(p: Ints, pf: Reals, st: Ints, sf: Reals, lk: Ints, lp: Reals, link
         lk[FATE, link] = FATE_HALF_DUPLEX
     elif not audible:
         lk[FATE, link] = FATE_WEAK
-    elif st[LOCK, r] >= 0 or not clear:
+    elif not clear or (st[LOCK, r] >= 0 and not captures(p, pf, st, lp, r, wanted)):
         lk[FATE, link] = FATE_COLLISION if st[NSIG, r] > 1 else FATE_WEAK
     else:
+        if st[LOCK, r] >= 0:
+            lk[FATE, st[LOCK, r]] = FATE_COLLISION
         st[LOCK, r] = link
         st[LOCK_FROM, r] = t
         st[LOCK_HEADER_END, r] = t - p[DETECT_NS] + p[HEADER_NS]
+        st[LOCK_RATE, r] = 2 if lk[LINK_KIND, link] == ACK else 1
+        st[LOCK_DATA_END, r] = NEVER
+        if p[EXTENSION_NS] > 0:
+            st[LOCK_DATA_END, r] = lk[ENDS, link] - p[EXTENSION_NS]
         st[OVERLAPPED, r] = 1 if st[NSIG, r] > 1 else 0
         sf[LOG_OK, r] = 0.0
+
+
+@jit
+def captures(p: Ints, pf: Reals, st: Ints, lp: Reals, r: int, wanted: float) -> bool:
+    """Whether a later frame takes a receiver away from the frame it is locked on (message in message)."""
+    return bool(p[TAKE_OVER] == 1 and wanted >= pf[TAKE_OVER_RATIO] * lp[ON_AIR, st[LOCK, r]])
 
 
 @jit
@@ -197,7 +218,7 @@ def data_end(
     ours = fr[DST, f] == EVERYONE or fr[DST, f] == r
     if whole and not ours:
         st[NAV, r] = max(st[NAV, r], t + p[SIFS_NS] + p[ACK_NS])
-    if not ours or lk[SENSED, link] == 0:
+    if not ours or lk[COPY, link] == 0:
         return
     if not whole:
         fate = lk[FATE, link]

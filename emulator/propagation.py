@@ -1,24 +1,38 @@
-"""Received power over distance, and the links it makes. Distances in metres, powers in dBm and mW.
+"""Links: who hears whom how strongly, from positions. Distances in metres, powers in dBm and mW.
 
-`range`         every frame within `range_m` is received at the transmit power, nothing beyond (ns-3's range model)
-`log_distance`  P - L(1 m) - 10 n log10(d); audible from the sensitivity up, interfering from the floor up
-Neither models: terrain, buildings, antenna patterns, fading, Doppler.
+    path loss of the channel (`path_loss.py`) -> shadowing (`shadowing.py`) -> obstruction -> links above the floor
+
+`range` is no law of physics: every frame within `range_m` is received at the transmit power, nothing beyond (ns-3's
+range model), and nothing through an obstruction. Fading is drawn per frame, in the kernel (`fading.py`). Not modeled:
+antenna patterns, Doppler, interference of links below `interference_floor_dbm`.
 """
 
 import math
 from typing import Final
 
 import numpy as np
-import numpy.typing as npt
 
-from emulator.jit import jit
+from emulator.path_loss import (
+    AIR_TO_AIR_EXPONENT,
+    ENVIRONMENTS,
+    SPEED_OF_LIGHT_M_S,
+    air_to_air_db,
+    air_to_ground_db,
+    friis_db,
+    log_distance_db,
+    two_ray_db,
+    uma_av_db,
+)
+from emulator.shadowing import Shadowing
+from emulator.spatial import neighbors
 from emulator.state import AUDIBLE, DELAY, LINK_DST, LINK_POWER, LINK_REALS, LINK_ROWS, LINK_SRC, SPARED, Ints, Reals
-from fanet_mw.scenario import Radio
+from fanet_mw.scenario_radio import Radio, is_ofdm
 
-SPEED_OF_LIGHT_M_S: Final = 299_792_458.0
 THERMAL_DBM_PER_HZ: Final = -174.0
-BANDWIDTH_HZ: Final = 22e6
-"""DSSS channel width."""
+DSSS_BANDWIDTH_HZ: Final = 22e6
+OFDM_BANDWIDTH_HZ: Final = 20e6
+_ROUNDING_DB: Final = 1e-9
+"""So that a link at the very reach is not lost to rounding."""
 
 
 def milliwatt(dbm: float) -> float:
@@ -27,95 +41,82 @@ def milliwatt(dbm: float) -> float:
 
 def noise_mw(radio: Radio) -> float:
     """Thermal noise in the channel plus the receiver's noise figure."""
-    return milliwatt(THERMAL_DBM_PER_HZ + 10 * math.log10(BANDWIDTH_HZ) + radio.noise_figure_db)
+    bandwidth_hz = OFDM_BANDWIDTH_HZ if is_ofdm(radio.rate_mbps) else DSSS_BANDWIDTH_HZ
+    return milliwatt(THERMAL_DBM_PER_HZ + 10 * math.log10(bandwidth_hz) + radio.noise_figure_db)
 
 
 def reach_m(radio: Radio) -> float:
-    """Beyond this distance a station does not even interfere."""
+    """Beyond this distance a station does not even interfere, by the most favorable law and 2 sigma of shadowing."""
     if radio.channel == "range":
         return radio.range_m
-    budget_db = radio.tx_power_dbm - radio.reference_loss_db - radio.interference_floor_dbm
-    return math.pow(10.0, budget_db / (10 * radio.exponent))
+    budget_db = radio.tx_power_dbm - radio.interference_floor_dbm + 2 * radio.shadowing_db
+    at_1_m = float(friis_db(np.ones(1), frequency_mhz=radio.frequency_mhz)[0])
+    laws = {
+        "log_distance": [(radio.reference_loss_db, radio.exponent)],
+        "friis": [(at_1_m, 2.0)],
+        "two_ray": [(at_1_m, 2.0)],
+        "air_to_air": [(at_1_m, AIR_TO_AIR_EXPONENT)],
+        "air_to_ground": [(at_1_m, 2.0)],
+        "uma_av": [(28.0 + 20 * math.log10(radio.frequency_mhz / 1000), 2.2), (at_1_m, AIR_TO_AIR_EXPONENT)],
+    }[radio.channel]
+    return max(1.0, *(math.pow(10.0, (budget_db - at_1_m) / (10 * exponent)) for at_1_m, exponent in laws))
 
 
-def received_dbm(distance_m: npt.NDArray[np.float64], radio: Radio) -> npt.NDArray[np.float64]:
-    """Power at each distance; the law holds from 1 m on."""
+def received_dbm(distance_m: Reals, from_m: Reals, to_m: Reals, radio: Radio) -> Reals:
+    """Mean power of each link, without shadowing; `from_m` and `to_m` are its ends [n, 3], heights above the ground."""
     if radio.channel == "range":
         return np.full_like(distance_m, radio.tx_power_dbm)
-    loss_db = radio.reference_loss_db + 10 * radio.exponent * np.log10(np.maximum(distance_m, 1.0))
-    return np.asarray(radio.tx_power_dbm - loss_db, dtype=np.float64)
+    return np.asarray(radio.tx_power_dbm - _loss_db(distance_m, from_m, to_m, radio), dtype=np.float64)
 
 
-@jit
-def pairs(
-    at: Reals, reach: float, column: Ints, keys: Ints, order: Ints, rows: int, found: Ints, distance: Reals
-) -> int:
-    """Ordered pairs of stations within reach, by source then destination; returns how many there are.
-
-    `order` lists the stations by cell, `keys` the cells in that order: a neighbor is in the same cell or in one of
-    eight around it, and three cells of one column are adjacent. Fills `found` (int64 [n, 2]) and `distance` as far as
-    they go: with too little room, call again with more.
-    """
-    n = 0
-    for a in range(at.shape[0]):
-        first = n
-        for side in range(-1, 2):
-            cell = column[a] + side * rows
-            i = np.searchsorted(keys, cell - 1)
-            while i < keys.shape[0] and keys[i] <= cell + 1:
-                b = order[i]
-                i += 1
-                dx, dy, dz = at[a, 0] - at[b, 0], at[a, 1] - at[b, 1], at[a, 2] - at[b, 2]
-                square = dx * dx + dy * dy + dz * dz
-                if a == b or not square <= reach * reach:
-                    continue
-                if n >= found.shape[0]:
-                    n += 1
-                    continue
-                j = n
-                while j > first and found[j - 1, 1] > b:  # in order of ids, whatever the cells
-                    found[j, 1] = found[j - 1, 1]
-                    distance[j] = distance[j - 1]
-                    j -= 1
-                found[n, 0] = a
-                found[j, 1] = b
-                distance[j] = math.sqrt(square)
-                n += 1
-    return n
-
-
-def neighbors(at: npt.NDArray[np.float64], reach: float) -> tuple[Ints, Reals]:
-    """Ordered pairs of stations within reach [n, 2], by source then destination, and their distances [m].
-
-    Stations of unknown position (not finite) have no neighbors.
-    """
-    known = np.flatnonzero(np.isfinite(at).all(axis=1))
-    if not len(known):
-        return np.zeros((0, 2), np.int64), np.zeros(0, np.float64)
-    here = np.ascontiguousarray(at[known])
-    east, north = np.floor((here[:, :2] - here[:, :2].min(axis=0)) / reach).astype(np.int64).T
-    rows = int(north.max()) + 3  # one empty cell on either side: columns do not touch
-    cell = east * rows + north
-    order = np.argsort(cell, kind="stable")
-    room = 32 * len(here)
-    while True:
-        found = np.zeros((room, 2), np.int64)
-        distance = np.zeros(room, np.float64)
-        count = int(pairs(here, reach, cell, cell[order], order, rows, found, distance))
-        if count <= room:
-            return known[found[:count]], distance[:count]
-        room = count
+def _loss_db(distance_m: Reals, from_m: Reals, to_m: Reals, radio: Radio) -> Reals:
+    mhz = radio.frequency_mhz
+    if radio.channel == "log_distance":
+        return log_distance_db(distance_m, reference_db=radio.reference_loss_db, exponent=radio.exponent)
+    if radio.channel == "friis":
+        return friis_db(distance_m, frequency_mhz=mhz)
+    if radio.channel == "two_ray":
+        return two_ray_db(distance_m, from_m[:, 2], to_m[:, 2], frequency_mhz=mhz)
+    in_the_air = air_to_air_db(distance_m, frequency_mhz=mhz)
+    if radio.channel == "air_to_air":
+        return in_the_air
+    low, high = np.minimum(from_m[:, 2], to_m[:, 2]), np.maximum(from_m[:, 2], to_m[:, 2])
+    if radio.channel == "air_to_ground":
+        environment = ENVIRONMENTS[radio.environment]
+        to_ground = air_to_ground_db(distance_m, high - low, environment, frequency_mhz=mhz)
+    else:
+        along_m = np.hypot(*(from_m - to_m)[:, :2].T)
+        to_ground = uma_av_db(distance_m, along_m, high, frequency_mhz=mhz)
+    return np.where(low >= radio.airborne_m, in_the_air, to_ground)
 
 
 class Links:
     """All links of one set of positions, as the kernel's arrays, with room for `spare` more."""
 
-    def __init__(self, at: npt.NDArray[np.float64], radio: Radio, *, spare: int) -> None:
+    def __init__(
+        self, at: Reals, radio: Radio, *, spare: int, shadowing: Shadowing | None = None, blocked: Ints | None = None
+    ) -> None:
+        """`blocked`: codes, see `pair_codes`, of the pairs between which something stands, ascending."""
         found, distance = neighbors(at, reach_m(radio))
+        power_dbm = received_dbm(distance, at[found[:, 0]], at[found[:, 1]], radio)
+        if shadowing is not None:
+            power_dbm = power_dbm - shadowing.loss_db(at, found, distance)
+        hidden = np.zeros(len(found), bool)
+        if blocked is not None and len(blocked):
+            hidden = np.isin(pair_codes(found, len(at)), blocked)
+        if radio.channel == "range":
+            heard = ~hidden
+        else:
+            power_dbm = power_dbm - radio.obstruction_loss_db * hidden
+            heard = power_dbm >= radio.interference_floor_dbm - _ROUNDING_DB
+        if not heard.all():
+            found, distance, power_dbm = found[heard], distance[heard], power_dbm[heard]
         nearest_first = np.lexsort((found[:, 1], distance, found[:, 0]))
-        found, distance = found[nearest_first], distance[nearest_first]
+        found, distance, power_dbm = found[nearest_first], distance[nearest_first], power_dbm[nearest_first]
+        self._fill(found, distance, power_dbm, radio, stations=len(at), spare=spare)
+
+    def _fill(self, found: Ints, distance: Reals, power_dbm: Reals, radio: Radio, *, stations: int, spare: int) -> None:
         count = len(found)
-        power_dbm = received_dbm(distance, radio)
         self.count = count
         self.ints = np.zeros((LINK_ROWS, count + spare + 1), np.int64)  # never empty: numba indexes it
         self.reals = np.zeros((LINK_REALS, count + spare + 1), np.float64)
@@ -124,11 +125,11 @@ class Links:
         self.ints[DELAY, :count] = np.rint(distance / SPEED_OF_LIGHT_M_S * 1e9)
         audible = power_dbm >= radio.sensitivity_dbm if radio.channel != "range" else np.ones(count, bool)
         self.ints[AUDIBLE, :count] = audible
-        self.longest_ns = int((self.ints[DELAY] * self.ints[AUDIBLE]).max())
-        """Delay of the longest audible link."""
+        self.longest_ns = int((self.ints[DELAY] * (self.ints[AUDIBLE] if radio.fading == "none" else 1)).max())
+        """Delay of the longest link that can be received: an audible one, or any that fading may lift."""
         self.reals[LINK_POWER, :count] = np.power(10.0, power_dbm / 10)
         self.reals[SPARED, :count] = 1.0
-        self.ptr = np.searchsorted(found[:, 0], np.arange(len(at) + 1)).astype(np.int64)
+        self.ptr = np.searchsorted(found[:, 0], np.arange(stations + 1)).astype(np.int64)
 
     def dead_last(self) -> None:
         """Links without power come last of their transmitter's; else the order stays: nearest first."""
@@ -138,3 +139,8 @@ class Links:
             order = np.lexsort((dead, self.ints[LINK_SRC, used]))  # stable
             self.ints[:, used] = self.ints[:, used][:, order]
             self.reals[:, used] = self.reals[:, used][:, order]
+
+
+def pair_codes(found: Ints, stations: int) -> Ints:
+    """One number per pair [n, 2] of stations, the same for both directions."""
+    return np.asarray(np.minimum(*found.T) * stations + np.maximum(*found.T), dtype=np.int64)

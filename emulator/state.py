@@ -33,6 +33,8 @@ Reals = npt.NDArray[np.float64]
     LOCK,  # link being received, -1 none
     LOCK_FROM,  # start of the current interference segment
     LOCK_HEADER_END,  # end of the PLCP preamble and header of the locked frame
+    LOCK_DATA_END,  # from then on only signal extension, which carries no bits; NEVER without
+    LOCK_RATE,  # 1: the locked frame is data, 2: an ACK; rows of `err`, and offsets into pf
     OVERLAPPED,  # 1: another signal overlapped the locked frame
     IDLE_FROM,  # when the medium last became idle
     BAD_UNTIL,  # end of the EIFS extension after a failed reception
@@ -47,9 +49,11 @@ Reals = npt.NDArray[np.float64]
     BUSY_NS,  # busy time so far
     RANDOM,  # state of the station's generator
     HANDED,  # receptions handed to the station
+    FADE_A,  # state of the generator for the fading of what the station transmits
+    FADE_B,
     ON_AIR_LIST,  # not by station: the first ON_AIR_N entries name the stations that transmit
     STATION_ROWS,
-) = range(29)
+) = range(33)
 NOTHING: Final = 0
 DATA: Final = 1
 ACK: Final = 2
@@ -97,7 +101,8 @@ EVERYONE: Final = -1
     N_DEGRADED,
     N_JAMMED,
     N_CUT,
-    SENSED,  # AUDIBLE as it was at the start of the frame now on the link; rows from here on are of that frame
+    SENSED,  # AUDIBLE at the start of the frame now on the link, or as fading has it; rows from here on are of it
+    COPY,  # 1: the frame counts as a copy for this receiver: audible on average, or lifted by fading
     FATE,
     LINK_FRAME,  # of an ACK: the frame it acknowledges
     LINK_KIND,
@@ -105,7 +110,7 @@ EVERYONE: Final = -1
     BEGINS,  # its first bit at the receiver
     ENDS,  # its last
     LINK_ROWS,
-) = range(21)
+) = range(22)
 LINK_POWER, ON_AIR, SPARED, LINK_REALS = range(4)
 """LINK_POWER: received power [mW], 0: the link carries nothing, and comes last of its transmitter's. ON_AIR: that of
 the frame now on the link, as it was at its start. SPARED: the share of frames that the link's FAULT lets through."""
@@ -172,6 +177,18 @@ DELIVERED, NO_RECEIVER, COLLIDED, DEAF, WEAK, GIVEN_UP, NO_ROOM, EXPIRED, DEGRAD
     WAIT_DIFS_FIRST,  # 1: as ns-3, a frame waits one DIFS after it is queued
     INTERFERENCE,  # 0: any overlap destroys; 1: SINR and error rate
     CAPTURE,  # 1: report every start of a transmission
+    EXTENSION_NS,  # signal extension at the end of each frame (OFDM at 2.4 GHz)
+    TAKE_OVER,  # 1: a later frame that is TAKE_OVER_RATIO times as strong as the locked one takes the receiver
+    FADING,  # 0 none, else the law: see fading.py
     PARAMETERS,
-) = range(18)
-DETECT_RATIO, HEADER_BITS_PER_NS, PAYLOAD_BITS_PER_NS, REALS = range(4)
+) = range(21)
+(
+    DETECT_RATIO,
+    HEADER_BITS_PER_NS,
+    PAYLOAD_BITS_PER_NS,
+    ACK_BITS_PER_NS,
+    TAKE_OVER_RATIO,
+    SENSITIVITY_MW,
+    FADING_SHAPE,  # m, or K as a ratio
+    REALS,
+) = range(8)

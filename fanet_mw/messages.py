@@ -74,6 +74,14 @@ class Poses(NamedTuple):
     """`array('d')`, six per node: east, north, up [m], then the velocity [m/s]; row order of `ids`."""
 
 
+class Obstructions(NamedTuple):
+    """World -> medium: the pairs of nodes between which something solid stands at one instant, and no others."""
+
+    t_ns: int
+    pairs: array[int]
+    """`array('H')`, two node ids per pair, the smaller first, ascending."""
+
+
 class Setpoint(NamedTuple):
     """UAV -> world: fly to `position` at no more than `speed_m_s`, and hold there."""
 
@@ -140,6 +148,7 @@ Message = (
     | Reception
     | TxStatus
     | Poses
+    | Obstructions
     | Setpoint
     | Gps
     | WifiScan

@@ -5,24 +5,15 @@ A key is a contract with users: renaming one breaks their files and sweeps. Deri
 
 import math
 from collections.abc import Sequence
-from typing import Annotated, Final, Literal, Self
+from typing import Annotated, Literal, Self
 
-from pydantic import AfterValidator, Field, model_validator
+from pydantic import Field, model_validator
 
 from fanet_mw.fault_sections import AnyFault
 from fanet_mw.radio_control import Control, Degrade, Restore, nodes_of
+from fanet_mw.scenario_radio import Radio
 from fanet_mw.sections import Finite, Id, NonNegative, Positive, Section
 from fanet_mw.units import MAX_NODES, MS, NodeId, seconds_to_ns
-
-
-def _known_rate(mbps: float) -> float:
-    if mbps not in DSSS_RATES_MBPS:
-        raise ValueError(f"rate {mbps:g} Mb/s must be one of {', '.join(f'{rate:g}' for rate in DSSS_RATES_MBPS)}")
-    return mbps
-
-
-DSSS_RATES_MBPS: Final = (1.0, 2.0, 5.5, 11.0)
-Rate = Annotated[float, AfterValidator(_known_rate)]
 
 
 class Nodes(Section):
@@ -121,62 +112,15 @@ class Clusters(Section):
         return self.period_ns // self.count
 
 
-class Radio(Section):
-    """The radio, its MAC and the channel. Defaults are the reference set-up: 802.11b, DSSS 11 Mb/s, long preamble."""
-
-    channel: Literal["range", "log_distance"] = "range"
-    range_m: Positive = 250.0
-    """`range`: decode and carrier-sense limit; frames are equally strong within it, silent beyond."""
-    rate_mbps: Rate = 11.0
-    ack_rate_mbps: Rate = 11.0
-    preamble: Literal["long", "short"] = "long"
-    tx_power_dbm: Finite = 30.0
-    exponent: Annotated[float, Field(gt=0, le=10)] = 3.0
-    """`log_distance`: path loss exponent."""
-    reference_loss_db: Finite = 40.05
-    """`log_distance`: path loss at 1 m."""
-    sensitivity_dbm: Finite = -82.0
-    """`log_distance`: decode and carrier-sense limit; weaker frames only interfere."""
-    interference_floor_dbm: Finite = -101.0
-    preamble_snr_db: Finite = 4.0
-    noise_figure_db: NonNegative = 7.0
-    access: Literal["standard", "ns3"] = "standard"
-    """`standard`: a station that finds the medium busy draws a backoff (IEEE 802.11); `ns3`: as ns-3 does it."""
-    cw_min: Annotated[int, Field(ge=1, le=1023)] = 31
-    cw_max: Annotated[int, Field(ge=1, le=32767)] = 1023
-    max_attempts: Annotated[int, Field(ge=1, le=255)] = 7
-    queue_frames: Annotated[int, Field(ge=1, le=100_000)] = 500
-    lifetime_ms: Positive = 500.0
-    max_frame_bytes: Annotated[int, Field(ge=64, le=2304)] = 2304
-    lead_ms: NonNegative = 20.0
-    """How long before its instant a node announces a transmission to the radio."""
-    handover_ms: NonNegative = 0.0
-    """Receptions are handed to nodes at multiples of this, as a driver with interrupt coalescing does; 0: at once.
-    Fewer, larger wake-ups let more processes live on one machine; instants on the air stay exact."""
-    late_limit: Annotated[float, Field(ge=0, le=1)] = 0.01
-    """The share of late frames above which a real-time run is invalid."""
-
-    @model_validator(mode="after")
-    def _window_grows(self) -> Self:
-        if self.cw_max < self.cw_min:
-            raise ValueError(f"radio.cw_max = {self.cw_max} must be >= radio.cw_min = {self.cw_min}")
-        return self
-
-    @property
-    def lead_ns(self) -> int:
-        return round(self.lead_ms * MS)
-
-    @property
-    def handover_ns(self) -> int:
-        return round(self.handover_ms * MS)
-
-
 class Mobility(Section):
     """What a UAV does when the mission asks nothing of it."""
 
     model: Literal["static", "formation", "random_waypoint"] = "static"
     """`formation` sweeps the area keeping the layout; `random_waypoint` is the statistical model, without pause."""
     speed_m_s: NonNegative = 7.5
+
+
+Building = tuple[Finite, Finite, Positive, Positive, Positive]
 
 
 class World(Section):
@@ -188,8 +132,33 @@ class World(Section):
     tick_ms: Positive = 100.0
     """Period at which poses are published."""
     physics_hz: Annotated[int, Field(ge=10, le=2000)] = 240
+    buildings: Annotated[int, Field(ge=0, le=10_000)] | tuple[Building, ...] = 0
+    """A number of boxes at seeded places, or each as [east, north, width, depth, height] in metres: its middle, its
+    extent to the east and to the north, and its roof above the ground. UAVs collide with them, radio is obstructed."""
+    building_size_m: tuple[Positive, Positive] = (15.0, 40.0)
+    """Least and greatest width and depth of a seeded building."""
+    building_height_m: tuple[Positive, Positive] = (8.0, 30.0)
+    terrain_m: Annotated[float, Field(ge=0, le=1000)] = 0.0
+    """Height of the highest hill above the plain at 0; 0: no hills."""
+    terrain_scale_m: Positive = 400.0
+    """Distance from hill to hill."""
     gps_hz: Positive = 5.0
     gps_sigma_m: NonNegative = 1.5
+
+    @model_validator(mode="after")
+    def _obstacles_agree(self) -> Self:
+        if self.has_obstacles and self.engine != "pybullet":
+            raise ValueError('world.buildings and world.terrain_m need world.engine = "pybullet"')
+        for key in ("building_size_m", "building_height_m"):
+            least, greatest = getattr(self, key)
+            if least > greatest:
+                raise ValueError(f"world.{key} = [{least:g}, {greatest:g}] must be [least, greatest]")
+        return self
+
+    @property
+    def has_obstacles(self) -> bool:
+        """Whether anything but a plain can stand between two nodes."""
+        return bool(self.buildings) or self.terrain_m > 0
 
     @property
     def tick_ns(self) -> int:
@@ -323,3 +292,9 @@ def grid_columns(count: int) -> int:
     divisors = [d for d in range(1, count + 1) if count % d == 0 and d * d >= count]
     best = min(divisors, key=lambda d: abs(d - wanted))
     return best if best <= 2 * wanted else math.ceil(wanted)
+
+
+__all__ = [
+    "Clusters", "Finite", "Mission", "Mobility", "Nodes", "NonNegative", "Positive", "Radio", "Routing", "Scenario",
+    "Section", "Traffic", "World", "grid_columns",
+]  # fmt: skip

@@ -5,6 +5,7 @@
     fanet/<swarm>/radio/control          Degrade | Jam | Cut | Restore   anyone -> medium
     fanet/<swarm>/radio/links            LinkStats              medium -> whoever looks
     fanet/<swarm>/world/pose             Poses
+    fanet/<swarm>/world/obstruction      Obstructions
     fanet/<swarm>/world/<id>/setpoint    Setpoint               UAV -> world
     fanet/<swarm>/world/<id>/sensor/gps  Gps
     fanet/<swarm>/world/<id>/sensor/wifi WifiScan
@@ -31,6 +32,7 @@ from fanet_mw.messages import (
     Gps,
     MavlinkTap,
     Message,
+    Obstructions,
     Poses,
     Reception,
     Report,
@@ -53,6 +55,7 @@ class Topics:
     def __init__(self, swarm: str) -> None:
         self._base = f"{ROOT}/{swarm}"
         self.pose = f"{self._base}/world/pose"
+        self.obstruction = f"{self._base}/world/obstruction"
         self.clock = f"{self._base}/clock"
         self.all_tx = self.radio_tx("*")
         self.radio_control = f"{self._base}/radio/control"
@@ -108,6 +111,7 @@ _GPS = struct.Struct("<q6d")
 _SCAN = struct.Struct("<qH")
 _HEARD = struct.Struct("<If")
 _POSES = struct.Struct("<qI")
+_OBSTRUCTIONS = struct.Struct("<qI")
 _CLOCK = struct.Struct("<qdB")
 _INSTANT = struct.Struct("<q")
 _DEGRADE = struct.Struct("<HHBddq")
@@ -156,6 +160,19 @@ def _decode_poses(body: bytes) -> Poses:
     ids.frombytes(body[_POSES.size : split])
     states.frombytes(body[split:])
     return Poses(t_ns, ids, states)
+
+
+def _encode_obstructions(m: Obstructions) -> bytes:
+    return _OBSTRUCTIONS.pack(m.t_ns, len(m.pairs)) + m.pairs.tobytes()
+
+
+def _decode_obstructions(body: bytes) -> Obstructions:
+    t_ns, count = _OBSTRUCTIONS.unpack_from(body)
+    pairs = array("H")
+    if len(body) != _OBSTRUCTIONS.size + 2 * count or count % 2:
+        raise ValueError("length")
+    pairs.frombytes(body[_OBSTRUCTIONS.size :])
+    return Obstructions(t_ns, pairs)
 
 
 def _encode_setpoint(m: Setpoint) -> bytes:
@@ -296,6 +313,7 @@ _CODECS: Final[dict[int, tuple[type[Any], Callable[[Any], bytes], Callable[[byte
     14: (Cut, _encode_cut, _decode_cut),
     15: (Restore, _encode_restore, _decode_restore),
     16: (LinkStats, _encode_links, _decode_links),
+    17: (Obstructions, _encode_obstructions, _decode_obstructions),
 }
 _CODE_OF: Final = {kind: (code, encode) for code, (kind, encode, _) in _CODECS.items()}
 _ITEM: Final = struct.Struct("<BI")

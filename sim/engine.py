@@ -10,6 +10,7 @@ import numpy.typing as npt
 
 Rows = npt.NDArray[np.float64]
 """float64 [nodes, 3]."""
+Flags = npt.NDArray[np.bool_]
 
 
 class Engine(ABC):
@@ -33,7 +34,11 @@ class Engine(ABC):
 
     @abstractmethod
     def contacts(self) -> list[tuple[int, int]]:
-        """Pairs of nodes (smaller id first; the ground is 0) that began to touch since the last call."""
+        """Pairs of nodes that began to touch since the last call, smaller id first; the ground and obstacles are 0."""
+
+    def blocked(self, first: Rows, second: Rows) -> Flags:
+        """Whether an obstacle stands between each `first` and `second` [n, 3]; bodies and the plain do not count."""
+        return np.zeros(len(first), bool)
 
     def close(self) -> None:  # noqa: B027  (only physics holds anything)
         """Give back what the engine holds."""

@@ -13,7 +13,8 @@ from typing import Final
 import numpy as np
 import pybullet
 
-from sim.engine import Engine, Rows
+from sim.engine import Engine, Flags, Rows
+from sim.obstacles import Hills, Obstacles
 
 MASS_KG: Final = 1.5
 ARM_M: Final = 0.25
@@ -26,6 +27,9 @@ _DRAG_N_S_M: Final = 0.25
 _GAIN: Final = 2.5
 """Velocity loop [1/s]."""
 _CONTROL_HZ: Final = 60
+_OBSTACLE_GROUP: Final = 64
+"""Collision group of hills and buildings: they meet bodies, not the plain nor each other; rays ask for them alone."""
+_BODY_GROUP: Final = 1
 
 
 class Physics(Engine):
@@ -33,9 +37,10 @@ class Physics(Engine):
 
     name = "pybullet"
 
-    def __init__(self, *, physics_hz: int) -> None:
+    def __init__(self, *, physics_hz: int, obstacles: Obstacles | None = None) -> None:
         self._client = pybullet.connect(pybullet.DIRECT)
         self._substeps = max(1, round(physics_hz / _CONTROL_HZ))
+        self._obstacles = obstacles
         self._left_s = 0.0
         self._bodies: list[int] = []
         self._node_of: dict[int, int] = {}
@@ -66,10 +71,49 @@ class Physics(Engine):
                 body, -1, linearDamping=0, angularDamping=0.9,
                 activationState=pybullet.ACTIVATION_STATE_DISABLE_SLEEPING, physicsClientId=client,
             )  # fmt: skip
-        self._node_of = {ground: 0} | {body: i + 1 for i, body in enumerate(self._bodies)}
+        solid = [ground, *self._build()]
+        self._node_of = dict.fromkeys(solid, 0) | {body: i + 1 for i, body in enumerate(self._bodies)}
         self._at = positions.copy()
         self._velocity = np.zeros_like(positions)
         self._touching, self._new, self._left_s = frozenset(), [], 0.0
+
+    def _build(self) -> list[int]:
+        """Put hills and buildings where they belong; returns their bodies."""
+        if self._obstacles is None:
+            return []
+        client, bodies = self._client, []
+        for box in self._obstacles.boxes:
+            half = [box.width / 2, box.depth / 2, box.roof / 2]
+            shape = pybullet.createCollisionShape(pybullet.GEOM_BOX, halfExtents=half, physicsClientId=client)
+            middle = [box.east, box.north, box.roof / 2]
+            bodies.append(pybullet.createMultiBody(0, shape, basePosition=middle, physicsClientId=client))
+        if self._obstacles.hills:
+            bodies.append(self._raise_hills(self._obstacles.hills))
+        for body in bodies:
+            pybullet.setCollisionFilterGroupMask(body, -1, _OBSTACLE_GROUP, _BODY_GROUP, physicsClientId=client)
+        return bodies
+
+    def _raise_hills(self, hills: Hills) -> int:
+        """A height field; pybullet centers it between its lowest and its highest point."""
+        side = hills.heights.shape[0]
+        shape = pybullet.createCollisionShape(
+            pybullet.GEOM_HEIGHTFIELD, meshScale=[hills.cell_m, hills.cell_m, 1.0],
+            heightfieldData=hills.heights.ravel().tolist(), numHeightfieldRows=side, numHeightfieldColumns=side,
+            physicsClientId=self._client,
+        )  # fmt: skip
+        middle = float(hills.heights.max() + hills.heights.min()) / 2
+        return int(pybullet.createMultiBody(0, shape, basePosition=[0, 0, middle], physicsClientId=self._client))
+
+    def blocked(self, first: Rows, second: Rows) -> Flags:
+        most = pybullet.MAX_RAY_INTERSECTION_BATCH_SIZE - 1
+        hits: list[bool] = []
+        for i in range(0, len(first), most):
+            rays = pybullet.rayTestBatch(
+                first[i : i + most].tolist(), second[i : i + most].tolist(), collisionFilterMask=_OBSTACLE_GROUP,
+                physicsClientId=self._client,
+            )  # fmt: skip
+            hits += [ray[0] >= 0 for ray in rays]
+        return np.array(hits, bool)
 
     def advance(self, dt_s: float, wanted_m_s: Rows) -> None:
         self._left_s += dt_s
@@ -105,7 +149,8 @@ class Physics(Engine):
         touching = set()
         for point in points:
             pair = sorted((self._node_of[point[1]], self._node_of[point[2]]))
-            touching.add((pair[0], pair[1]))
+            if pair[0] != pair[1]:  # obstacles rest on the ground
+                touching.add((pair[0], pair[1]))
         self._new += sorted(touching - self._touching)
         self._touching = frozenset(touching)
 

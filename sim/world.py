@@ -1,12 +1,12 @@
 """The world as an actor: setpoints in, poses and sensor readings out, once per tick.
 
 t = 0            poses and fixes, so that links stand before anyone transmits
-every tick       guidance -> engine -> poses -> sensors that are due
+every tick       guidance -> engine -> obstructions, when anything can obstruct -> poses -> sensors that are due
 """
 
 from array import array
 from collections.abc import Mapping
-from typing import Any, Final
+from typing import TYPE_CHECKING, Any, Final
 
 import numpy as np
 
@@ -21,7 +21,11 @@ from sim.engine import Engine
 from sim.guidance import Guidance
 from sim.kinematic import Kinematic
 from sim.layout import positions
+from sim.obstacles import Obstacles, obstacles
 from sim.survivors import PhoneSensor
+
+if TYPE_CHECKING:
+    from sim.sight import Sight
 
 _STILL_NS: Final = S
 """How often a world in which nothing moves says so."""
@@ -29,13 +33,20 @@ _CONTROL_S: Final = 0.05
 """Guidance runs at least this often within a tick."""
 
 
-def make_engine(scenario: Scenario) -> Engine:
-    """The engine that the scenario names."""
+def make_engine(scenario: Scenario, solid: Obstacles | None = None) -> Engine:
+    """The engine that the scenario names, with what stands in its world."""
     if scenario.world.engine == "kinematic":
         return Kinematic()
     from sim.physics import Physics
 
-    return Physics(physics_hz=scenario.world.physics_hz)
+    return Physics(physics_hz=scenario.world.physics_hz, obstacles=solid)
+
+
+def _sight(scenario: Scenario, engine: Engine, solid: Obstacles) -> "Sight":
+    """Imported when wanted: it brings the emulator's geometry, and numba with it."""
+    from sim.sight import Sight
+
+    return Sight(scenario, engine, top_m=solid.top_m)
 
 
 class World(Actor):
@@ -47,12 +58,15 @@ class World(Actor):
         self._scenario = scenario
         self._count = scenario.nodes.count
         self._pose_topic = topics.pose
+        self._obstruction_topic = topics.obstruction
         self._gps_topics = [topics.sensor(node, "gps") for node in scenario.node_ids]
         self._wifi_topics = [topics.sensor(node, "wifi") for node in scenario.node_ids]
         self._ids = array("H", scenario.node_ids)
         starts = np.array(positions(scenario), dtype=np.float64)
-        self._engine = make_engine(scenario)
+        solid = obstacles(scenario, starts) if scenario.world.has_obstacles else None
+        self._engine = make_engine(scenario, solid)
         self._engine.reset(starts)
+        self._sight = _sight(scenario, self._engine, solid) if solid else None
         self._guidance = Guidance(starts, scenario)
         self._phones = PhoneSensor(scenario)
         self._noise = np.random.Generator(np.random.PCG64(stream_seed(scenario.seed, "gps")))
@@ -135,6 +149,8 @@ class World(Actor):
     def _publish(self, now_ns: int, before_ns: int) -> None:
         """Poses, and the sensors whose instant lies in (before, now]."""
         at, velocity = self._engine.positions(), self._engine.velocities()
+        if self._sight is not None:  # before the poses, which bring it into force
+            self.outbox.append((self._obstruction_topic, self._sight.obstructions(at, now_ns)))
         states = array("d", np.hstack([at, velocity]).astype(np.float64).tobytes())
         self.outbox.append((self._pose_topic, Poses(now_ns, self._ids, states)))
         if self._scenario.nodes.telemetry_hz and _due(now_ns, before_ns, self._gps_ns, 0):

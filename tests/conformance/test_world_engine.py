@@ -10,13 +10,20 @@ from sim import catalog
 from sim.engine import Engine, Rows
 from sim.guidance import Guidance
 from sim.kinematic import Kinematic
+from sim.obstacles import Box, Obstacles
 from sim.physics import Physics
 from sim.survivors import PhoneSensor, place
 
+FAR_AWAY = Obstacles(hills=None, boxes=(Box(400, 400, 30, 30, 60),))
 
-@pytest.fixture(params=["kinematic", "pybullet"])
+
+@pytest.fixture(params=["kinematic", "pybullet", "pybullet with a building"])
 def engine(request: pytest.FixtureRequest) -> Iterator[Engine]:
-    made: Engine = Kinematic() if request.param == "kinematic" else Physics(physics_hz=240)
+    made: Engine
+    if request.param == "kinematic":
+        made = Kinematic()
+    else:
+        made = Physics(physics_hz=240, obstacles=FAR_AWAY if "building" in request.param else None)
     yield made
     made.close()
 

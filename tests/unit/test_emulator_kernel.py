@@ -18,7 +18,7 @@ from emulator import jit, state
 from emulator.error_rate import log_success_per_bit
 from emulator.medium import Medium
 from emulator.phy import ERROR_FLOOR_DB, ERROR_STEPS_PER_DB
-from emulator.propagation import neighbors
+from emulator.spatial import neighbors
 from fanet_mw import config
 from fanet_mw.messages import Poses, Reception, TxOutcome, TxRequest, TxStatus
 from fanet_mw.rng import stream

@@ -1,0 +1,124 @@
+"""Fading in the air: mean power kept, the same run for the same seed, copies counted, books closed."""
+
+import math
+from collections.abc import Callable
+
+import numpy as np
+import pytest
+from hand_driven import Air, receptions
+from hypothesis import given, settings
+from hypothesis import strategies as st
+from test_emulator_kernel import Output, medium, run
+
+from fanet_mw.errors import ConfigError
+from fanet_mw.messages import Reception, TxStatus
+from fanet_mw.radio_control import Cut, Degrade, Jam
+from fanet_mw.scenario import Scenario
+from fanet_mw.topics import Topics
+from fanet_mw.units import MS, Enu, NodeId
+
+MakeScenario = Callable[..., Scenario]
+LAWS = {
+    "rayleigh": {"radio.fading": "nakagami", "radio.nakagami_m": 1},
+    "nakagami": {"radio.fading": "nakagami", "radio.nakagami_m": 3},
+    "half": {"radio.fading": "nakagami", "radio.nakagami_m": 0.5},
+    "rician": {"radio.fading": "rician", "radio.rician_k_db": 6},
+}
+FRAMES = 3000
+
+
+def powers_dbm(scenario: Scenario, *, distance_m: float) -> list[float]:
+    """RSSI of what node 2 received of FRAMES small frames."""
+    air = Air(scenario, [0, distance_m])
+    for i in range(FRAMES):
+        air.send(1, (1 + i) * MS, now_ns=i * MS, payload=bytes(64))
+        air.medium.wake((1 + i) * MS)
+    heard = air.run(10_000 * MS)
+    return [h.message.rssi_dbm for h in heard if isinstance(h.message, Reception)]
+
+
+@pytest.mark.parametrize("law", LAWS)
+def test_the_mean_power_of_a_strong_link_is_that_without_fading(make_scenario: MakeScenario, law: str) -> None:
+    """10 m in free space: -30 dBm, 52 dB above the sensitivity, so that hardly a fade is missed."""
+    base = {"nodes.count": 2, "radio.channel": "friis"}
+    still = powers_dbm(make_scenario(**base), distance_m=10)
+    assert len(still) == FRAMES
+    assert min(still) == max(still)
+    faded = powers_dbm(make_scenario(**base, **LAWS[law]), distance_m=10)
+    assert len(faded) > 0.99 * FRAMES
+    mean_mw = np.mean([math.pow(10, dbm / 10) for dbm in faded])
+    assert 10 * math.log10(mean_mw) == pytest.approx(still[0], abs=0.25)
+    assert max(faded) - min(faded) > 10
+
+
+def test_at_the_sensitivity_fading_loses_some_frames_and_saves_others(make_scenario: MakeScenario) -> None:
+    """Rayleigh: a link whose mean is at the sensitivity is heard with probability 1 / e."""
+    base = {"nodes.count": 2, "radio.channel": "friis", "radio.sensitivity_dbm": -80, **LAWS["rayleigh"]}
+    at_the_limit_m = 10 ** ((30 + 80 - 40.095) / 20)
+    for factor in (0.999, 1.001):  # just audible on average, and just not
+        air = Air(make_scenario(**base), [0, factor * at_the_limit_m])
+        for i in range(FRAMES):
+            air.send(1, (1 + i) * MS, now_ns=i * MS, payload=bytes(64))
+            air.medium.wake((1 + i) * MS)
+        heard = receptions(air.run(10_000 * MS))
+        assert len(heard) / FRAMES == pytest.approx(1 / math.e, abs=0.03)
+        copies = air.medium.report()["copies"]
+        on_air = FRAMES if factor < 1 else len(heard)
+        assert copies["on_air"] == on_air
+        assert copies["lost"].get("weak_signal", 0) == on_air - len(heard)
+
+
+FULL = {
+    "channel": "friis", "frequency_mhz": 5180, "tx_power_dbm": 12, "interference_floor_dbm": -96, "shadowing_db": 5,
+    "fading": "rician", "rician_k_db": 3, "capture": True, "standard": "a", "rate_mbps": 12,
+}  # fmt: skip
+
+
+@settings(max_examples=150)
+@given(st.integers(0, 10_000), st.integers(2, 12), st.sampled_from(["rician", "nakagami"]), st.booleans())
+def test_all_books_close_with_everything_on(seed: int, count: int, fading: str, ofdm: bool) -> None:
+    keys = {**FULL, "fading": fading}
+    if not ofdm:
+        keys = {**keys, "standard": "b", "rate_mbps": 11}
+    air = medium(count, **keys, queue_frames=6, lifetime_ms=40)
+    outputs = run(air, seed, count=count, frames=120)
+    report = air.report()
+    frames, copies = report["frames"], report["copies"]
+    assert frames["in_flight"] == 0
+    assert frames["delivered"] + sum(frames["dropped"].values()) == frames["sent"] == 120
+    assert copies["on_air"] == copies["received"] + sum(copies["lost"].values())
+    assert sum(isinstance(message, TxStatus) for _, message in outputs) == 120
+
+
+def everything(extra_wakes: int = 0) -> list[Output]:
+    found = run(medium(9, **FULL), 7, count=9, frames=150, extra_wakes=extra_wakes)
+    return sorted(found, key=lambda output: (output[1].end_ns, output[0], isinstance(output[1], Reception)))
+
+
+def test_the_same_seed_fades_alike_however_often_time_is_told() -> None:
+    assert any(isinstance(message, Reception) for _, message in everything())
+    assert everything() == everything(extra_wakes=200)
+
+
+def test_fading_without_powers_is_refused(make_scenario: MakeScenario) -> None:
+    with pytest.raises(ConfigError, match=r"radio\.fading needs a channel with powers"):
+        make_scenario(**{"radio.fading": "rician"})
+
+
+@settings(max_examples=40)
+@given(st.integers(0, 10_000), st.booleans())
+def test_books_close_when_faults_lie_on_links_that_fade(seed: int, capture: bool) -> None:
+    count = 6
+    air = medium(count, **{**FULL, "capture": capture})
+    for control in (
+        Degrade("d", NodeId(1), NodeId(2), both=True, loss_db=12.0, loss_share=0.4),
+        Jam("j", Enu(100.0, 100.0, 0.0), 200.0, -80.0),
+        Cut("c", NodeId(3), 10 * MS),
+    ):
+        air.receive(Topics("k").radio_control, control, 0)
+    run(air, seed, count=count, frames=100)
+    report = air.report()
+    copies = report["copies"]
+    assert report["refused"] == {}
+    assert report["frames"]["in_flight"] == 0
+    assert copies["on_air"] == copies["received"] + sum(copies["lost"].values())

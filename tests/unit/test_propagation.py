@@ -1,0 +1,162 @@
+"""Path loss in closed form, and the links that follow: reach, obstruction, symmetry."""
+
+import math
+from collections.abc import Callable
+from typing import Any
+
+import numpy as np
+import pytest
+from hypothesis import given, settings
+from hypothesis import strategies as st
+
+from emulator.path_loss import (
+    ENVIRONMENTS,
+    air_to_ground_db,
+    crossover_m,
+    friis_db,
+    sight_probability,
+    two_ray_db,
+    uma_av_db,
+    uma_av_sight_probability,
+)
+from emulator.propagation import Links, pair_codes, reach_m
+from emulator.shadowing import Shadowing
+from emulator.state import AUDIBLE, LINK_DST, LINK_POWER, LINK_SRC
+from fanet_mw import config
+from fanet_mw.errors import ConfigError
+from fanet_mw.scenario import Radio, Scenario
+
+MakeScenario = Callable[..., Scenario]
+CHANNELS = ("log_distance", "friis", "two_ray", "air_to_air", "air_to_ground", "uma_av")
+
+
+def only(value: Any) -> float:
+    return float(np.asarray(value).reshape(-1)[0])
+
+
+def one(value: float) -> Any:
+    return np.array([value])
+
+
+def radio(**keys: Any) -> Radio:
+    return config.build({"clusters": {"count": 1}, "radio": keys}).radio
+
+
+@pytest.mark.parametrize(
+    ("distance_m", "mhz", "db"), [(1, 2400, 40.05), (100, 2437, 80.18), (1000, 2437, 100.18), (1000, 5180, 106.73)]
+)  # 32.45 + 20 log10(km) + 20 log10(MHz)
+def test_free_space_loses_what_friis_says(distance_m: float, mhz: float, db: float) -> None:
+    assert only(friis_db(one(distance_m), frequency_mhz=mhz)) == pytest.approx(db, abs=0.01)
+
+
+def test_two_rays_fall_by_40_db_a_decade_beyond_the_crossover_and_are_free_space_before() -> None:
+    """Antennas at 2 m and 1.5 m, 2437 MHz: crossover at 4 pi 3 / 0.12302 = 306.5 m."""
+    heights = {"height_a_m": one(2.0), "height_b_m": one(1.5), "frequency_mhz": 2437.0}
+    assert only(crossover_m(**heights)) == pytest.approx(306.46, abs=0.05)
+
+    def loss(distance_m: float) -> float:
+        return only(two_ray_db(one(distance_m), **heights))
+
+    assert loss(300) == only(friis_db(one(300.0), frequency_mhz=2437.0))
+    assert loss(1000) == pytest.approx(120 - 20 * math.log10(3), abs=1e-9)
+    assert loss(10_000) - loss(1000) == pytest.approx(40, abs=1e-9)
+    assert loss(306.46 + 0.01) - loss(306.46 - 0.01) == pytest.approx(0, abs=0.01), "the two laws meet"
+
+
+@pytest.mark.parametrize(
+    ("environment", "elevation_deg", "probability"),
+    [("suburban", 20, 0.99273), ("urban", 30, 0.73098), ("dense_urban", 45, 0.75577), ("highrise", 90, 0.84778)],
+)  # 1 / (1 + a exp(-b (elevation - a))), by hand
+def test_the_chance_of_sight_rises_with_the_elevation(
+    environment: str, elevation_deg: float, probability: float
+) -> None:
+    found = only(sight_probability(one(elevation_deg), ENVIRONMENTS[environment]))
+    assert found == pytest.approx(probability, abs=2e-5)
+
+
+def test_air_to_ground_is_free_space_plus_the_mean_excess() -> None:
+    """Urban, 100 m up at 30 degrees: 200 m, P = 0.73098, excess 0.73098 x 1 + 0.26902 x 20 = 6.111 dB."""
+    found = only(air_to_ground_db(one(200.0), one(100.0), ENVIRONMENTS["urban"], frequency_mhz=2000.0))
+    assert found == pytest.approx(84.489 + 6.111, abs=0.002)
+
+
+def test_uma_av_is_the_mean_of_its_two_losses() -> None:
+    """2 GHz, 100 m up, 1000 m away: P = 0.22 + e^(-1000 / 4800) 0.78 = 0.8533; LoS 100.02 dB, NLoS 116.96 dB."""
+    assert only(uma_av_sight_probability(one(1000.0), one(100.0))) == pytest.approx(0.85332, abs=1e-5)
+    found = only(uma_av_db(one(1000.0), one(1000.0), one(100.0), frequency_mhz=2000.0))
+    assert found == pytest.approx(0.85332 * 100.0206 + 0.14668 * 116.9625, abs=0.01)
+    assert only(uma_av_sight_probability(one(4000.0), one(150.0))) == 1.0
+
+
+def links_of(at: list[list[float]], keys: Radio, **more: Any) -> dict[tuple[int, int], float]:
+    """Mean power [dBm] of each link."""
+    links = Links(np.array(at, dtype=np.float64), keys, spare=0, **more)
+    ends = links.ints[[LINK_SRC, LINK_DST], : links.count].T.tolist()
+    return {(a, b): 10 * math.log10(mw) for (a, b), mw in zip(ends, links.reals[LINK_POWER].tolist(), strict=False)}
+
+
+def test_two_uavs_are_air_to_air_and_a_station_on_the_ground_is_not() -> None:
+    keys = radio(channel="air_to_ground", environment="urban", frequency_mhz=2000)
+    found = links_of([[0, 0, 50], [0, 0, 250], [0, 0, 1]], keys)
+    at_1_m = 20 * math.log10(4 * math.pi * 2e9 / 299_792_458)
+    assert found[0, 1] == pytest.approx(30 - at_1_m - 20.5 * math.log10(200))
+    assert found[0, 2] == pytest.approx(30 - at_1_m - 20 * math.log10(49) - 1.0, abs=0.01), "overhead: seen"
+
+
+@settings(max_examples=60)
+@given(st.integers(0, 10_000), st.sampled_from(CHANNELS), st.sampled_from([0.0, 6.0]))
+def test_every_link_is_symmetric_above_the_floor_and_none_above_it_is_missing(
+    seed: int, channel: str, shadowing_db: float
+) -> None:
+    keys = radio(channel=channel, tx_power_dbm=0, interference_floor_dbm=-85, shadowing_db=shadowing_db)
+    random = np.random.Generator(np.random.PCG64(seed))
+    side = 2 * reach_m(keys)
+    at = random.uniform([0, 0, 0], [side, side, 120], (20, 3))
+    shadowing = Shadowing(keys, seed=seed) if shadowing_db else None
+    found = links_of(at.tolist(), keys, shadowing=shadowing)
+    assert {(b, a): power for (a, b), power in found.items()} == found
+    assert all(power >= -85 - 1e-6 for power in found.values())
+    everyone = links_of(
+        at.tolist(), radio(**{**keys.model_dump(), "interference_floor_dbm": -300}), shadowing=shadowing
+    )
+    strong = {pair for pair, power in everyone.items() if power >= -85 + 1e-6}
+    missing = strong - set(found)
+    two_sigma_more = radio(channel=channel, tx_power_dbm=2 * shadowing_db, interference_floor_dbm=-85)
+    farthest_m = reach_m(two_sigma_more) * (1 - 1e-9)
+    assert all(math.dist(at[i], at[j]) >= farthest_m for i, j in missing), "beyond two sigma nobody looks"
+    assert not missing or shadowing_db
+
+
+def test_shadowing_follows_the_places_and_nothing_else(make_scenario: MakeScenario) -> None:
+    keys = radio(channel="friis", shadowing_db=6, interference_floor_dbm=-95)
+    at = [[0, 0, 50], [300, 0, 50], [0, 400, 50]]
+    first = links_of(at, keys, shadowing=Shadowing(keys, seed=1))
+    field = Shadowing(keys, seed=1)
+    links_of([[9, 9, 9], [99, 99, 99], [999, 999, 99]], keys, shadowing=field)
+    assert links_of(at, keys, shadowing=field) == first, "whatever came before"
+    assert links_of(at, keys, shadowing=Shadowing(keys, seed=2)) != first
+
+
+def test_an_obstruction_costs_its_loss_and_cuts_a_link_of_the_range_channel() -> None:
+    at = [[0, 0, 50], [100, 0, 50], [0, 100, 50]]
+    blocked = pair_codes(np.array([[1, 0]]), 3)
+    keys = radio(channel="friis", obstruction_loss_db=25)
+    clear, behind = links_of(at, keys), links_of(at, keys, blocked=blocked)
+    assert {pair: clear[pair] - behind[pair] for pair in clear} == pytest.approx(
+        {(0, 1): 25, (1, 0): 25, (0, 2): 0, (2, 0): 0, (1, 2): 0, (2, 1): 0}
+    )
+    assert set(links_of(at, radio(), blocked=blocked)) == {(0, 2), (2, 0), (1, 2), (2, 1)}
+
+
+def test_beyond_the_sensitivity_a_link_only_interferes() -> None:
+    keys = radio(channel="friis", sensitivity_dbm=-60, interference_floor_dbm=-90)
+    links = Links(np.array([[0.0, 0, 50], [500, 0, 50]]), keys, spare=0)
+    assert links.count == 2
+    assert not links.ints[AUDIBLE].any()
+
+
+def test_defaults_follow_the_channel_and_the_standard() -> None:
+    assert radio(channel="uma_av").airborne_m == 26
+    assert radio(channel="friis", standard="a").frequency_mhz == 5180
+    with pytest.raises(ConfigError, match="shadowing_db needs a channel with powers"):
+        radio(shadowing_db=4)

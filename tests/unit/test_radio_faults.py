@@ -149,6 +149,24 @@ def test_where_all_frames_are_equally_strong_a_link_is_gone_below_the_sensitivit
     assert lost(air) == ({} if got else {"degraded": 1})
 
 
+def test_a_link_that_is_gone_does_not_disturb_though_farther_receivers_hear(make_scenario: MakeScenario) -> None:
+    """1 and 4 do not sense each other. At 2 only 4's frame is on the air, at 3 both are."""
+    air = Air(make_scenario(**{"nodes.count": 4}), [0, 100, 200, 300])
+    control(air, degrade(1, 2, db=200))
+    air.send(1, 1 * MS)
+    air.send(4, 1 * MS + 300 * US)
+    assert [(receiver, src) for receiver, src, _ in receptions(air.run())] == [(2, 4)]
+    assert lost(air) == {"collision": 2, "degraded": 1}
+
+
+def test_a_degraded_link_that_breaks_in_mid_frame_loses_no_more_than_its_share(make_scenario: MakeScenario) -> None:
+    air = Air(make_scenario(**{"nodes.count": 2}), [0, 200])
+    control(air, degrade(1, 2, share=0.001))
+    air.send(1, 1 * MS)
+    air.place([0, 900], 1 * MS + 500 * US)
+    assert receptions(air.run()) == [(2, 1, 1 * MS + FRAME_NS + 667)]
+
+
 # --- a jammed area ------------------------------------------------------------------------------------------------
 
 

@@ -269,6 +269,20 @@ def test_a_capture_that_cannot_be_opened_is_one_sentence_and_a_full_disk_ends_it
     assert capsys.readouterr().err.count("the capture ends here: No space left on device") == 1
 
 
+def test_what_was_captured_a_second_ago_can_be_read_while_the_run_goes_on(
+    tmp_path: Path, make_scenario: MakeScenario
+) -> None:
+    path = tmp_path / "air.pcap"
+    with CaptureFile(path, make_scenario().radio) as file:
+        for t_ns in (0, 400 * MS, 999 * MS):
+            file.pcap.transmitted(t_ns, 1, BROADCAST, 0, PAYLOAD, 1)
+        assert not path.read_bytes(), "gathered"
+        for t_ns in (1001 * MS, 1002 * MS):
+            file.pcap.transmitted(t_ns, 1, BROADCAST, 0, PAYLOAD, 1)
+        assert [record.t_ns // MS for record in read(path.read_bytes())] == [0, 400, 999, 1001]
+    assert len(list(read(path.read_bytes()))) == 5
+
+
 def test_an_emulator_that_starts_again_keeps_the_capture_of_the_last_one(tmp_path: Path) -> None:
     for name in ("air.pcap", "air-2.pcap", "air-3.pcap"):
         path = unused(tmp_path / "air.pcap")

@@ -49,7 +49,8 @@ class Air:
             (s.HEAD, -1), (s.TAIL, -1), (s.BUSY_SINCE, -1), (s.IDLE_FROM, -DIFS_NS),
         ):  # fmt: skip
             self.st[row] = value
-        self.st[s.RANDOM] = [stream_seed(seed, "backoff", i + 1) % _GENERATOR_RANGE + 1 for i in range(stations)]
+        for row, use in ((s.RANDOM, "backoff"), (s.FAULT_RANDOM, "fault")):
+            self.st[row] = [stream_seed(seed, use, i + 1) % _GENERATOR_RANGE + 1 for i in range(stations)]
         self._sf = np.zeros((s.STATION_REALS, stations), np.float64)
         self._sf[s.NOISE] = noise_mw(radio)
         self.fr = np.zeros((s.FRAME_ROWS, 1024), np.int64)

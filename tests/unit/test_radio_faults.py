@@ -276,6 +276,23 @@ def test_a_fault_that_cannot_be_is_one_sentence(fault: dict[str, object], said: 
         config.build({"nodes": {"count": 9}, "faults": [fault]})
 
 
+@pytest.mark.parametrize("channel", ["range", "log_distance"])
+def test_a_fault_that_takes_nothing_changes_nothing(make_scenario: MakeScenario, channel: str) -> None:
+    """Its dice are its own: backoffs and bit errors fall as without it."""
+
+    def outcome(*faults: Control) -> list[object]:
+        air = Air(make_scenario(**{"nodes.count": 5, "radio.channel": channel}), [0, 60, 120, 180, 240])
+        control(air, *faults)
+        for i in range(200):
+            air.send(1 + i % 5, i * 400 * US, dst=BROADCAST if i % 3 else 1 + (i + 1) % 5)
+        heard = air.run()
+        assert len(receptions(heard)) > 100
+        return [*receptions(heard), *statuses(heard)]
+
+    faint = Degrade("d", NodeId(1), NodeId(2), True, 0.0, 1e-12)  # noqa: FBT003
+    assert outcome(faint, jam(9000, 5), cut(3), Restore("c")) == outcome()
+
+
 # --- the books ----------------------------------------------------------------------------------------------------
 
 

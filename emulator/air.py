@@ -32,7 +32,7 @@ class Air:
         self._radio = radio
         self._stations = stations
         self._faults = faults
-        self._book = LinkBook(stations)
+        self.book = LinkBook(stations)
         timing = Timing.of(radio)
         self.g = np.zeros(s.GLOBALS, np.int64)
         self._p = np.zeros(s.PARAMETERS, np.int64)
@@ -76,7 +76,7 @@ class Air:
     def relink(self) -> None:
         """Make the links anew: stations have moved, or faults have changed."""
         at = self._at
-        self._book.take(self._lk)
+        self.book.take(self._lk)
         spare = int(self._lk[s.UNDERWAY].sum())
         links = Links(np.ascontiguousarray(at), self._radio, spare=spare)
         self._sf[s.NOISE] = self._faults.shape(links, at)
@@ -95,8 +95,8 @@ class Air:
 
     def links(self, now_ns: int) -> LinkStats | None:
         """What the links carried since this was last asked; None when it was nothing."""
-        self._book.take(self._lk)
-        return self._book.close(now_ns)
+        self.book.take(self._lk)
+        return self.book.close(now_ns)
 
     def neighbors(self, station: int) -> int:
         """How many stations hear this one."""

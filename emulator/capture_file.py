@@ -4,6 +4,7 @@ A disk that fails ends the capture and not the run: it is said once, and the fil
 """
 
 import contextlib
+import re
 import sys
 from pathlib import Path
 from types import TracebackType
@@ -25,6 +26,13 @@ def unused(path: Path) -> Path:
         number += 1
         found = path.with_stem(f"{path.stem}-{number}")
     return found
+
+
+def forget(path: Path) -> None:
+    """Remove the captures of an earlier run: `path`, and those with a number."""
+    for found in sorted(path.parent.glob(f"{path.stem}*{path.suffix}")):
+        if re.fullmatch(rf"{re.escape(path.stem)}(-\d+)?", found.stem):
+            found.unlink()
 
 
 class CaptureFile:

@@ -249,10 +249,12 @@ def test_the_command_writes_a_capture_beside_the_result(tmp_path: Path, capsys: 
     short = ("--set", "duration_s=6", "--set", "drain_s=0.5", "--json")
     command = ["simulate", "quick", *short, "--pcap", "--out", str(tmp_path)]
     (tmp_path / "air-2.pcap").write_bytes(b"of an earlier run")
+    (tmp_path / "airport.pcap").write_bytes(b"of somebody else")
     assert app(command, result_action="return_value") == 0
     summary = json.loads(capsys.readouterr().out)
     assert len(list(read((tmp_path / "air.pcap").read_bytes()))) >= summary["frames"]["delivered"] > 100
     assert not (tmp_path / "air-2.pcap").exists()
+    assert (tmp_path / "airport.pcap").exists()
     with pytest.raises(ConfigError, match="--pcap: needs --out DIR"):
         app(["simulate", "quick", "--pcap"], result_action="return_value")
 

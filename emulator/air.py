@@ -49,10 +49,10 @@ class Air:
             (s.HEAD, -1), (s.TAIL, -1), (s.BUSY_SINCE, -1), (s.IDLE_FROM, -DIFS_NS),
         ):  # fmt: skip
             self.st[row] = value
-        for row, use in ((s.RANDOM, "backoff"), (s.FAULT_RANDOM, "fault")):
-            self.st[row] = [stream_seed(seed, use, i + 1) % _GENERATOR_RANGE + 1 for i in range(stations)]
+        self.st[s.RANDOM] = [stream_seed(seed, "backoff", i + 1) % _GENERATOR_RANGE + 1 for i in range(stations)]
         self._sf = np.zeros((s.STATION_REALS, stations), np.float64)
         self._sf[s.NOISE] = noise_mw(radio)
+        self.st[s.FAULT_RANDOM] = [stream_seed(seed, "fault", i + 1) % _GENERATOR_RANGE + 1 for i in range(stations)]
         self.fr = np.zeros((s.FRAME_ROWS, 1024), np.int64)
         self._hs = np.zeros((8 * stations + 2 * 1024 + 64, 5), np.int64)
         self._out = np.zeros((2 * radio.queue_frames + 1024, s.OUT_COLUMNS), np.int64)

@@ -17,7 +17,7 @@ from rich.console import Console
 from rich.progress import BarColumn, Progress, TextColumn, TimeElapsedColumn
 from rich.table import Table
 
-from emulator.capture_file import NAME, CaptureFile
+from emulator.capture_file import NAME, CaptureFile, forget
 from fanet_mw import __version__
 from fanet_mw.errors import ConfigError, FanetError
 from fanet_mw.scenario import Scenario
@@ -80,8 +80,7 @@ class Output:
             return None
         if self.out is None:
             raise ConfigError("--pcap: needs --out DIR, the folder that air.pcap goes to")
-        for earlier in self.out.glob("air*.pcap"):
-            earlier.unlink()
+        forget(self.out / NAME)
         return self.out / NAME
 
 

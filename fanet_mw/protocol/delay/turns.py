@@ -11,13 +11,14 @@ Every turn takes one packet of any length that fits, so there is nothing to fill
 urgent packet takes the next turn it is announced for.
 """
 
+from dataclasses import dataclass, field
 from fractions import Fraction
-from typing import NamedTuple
 
 from fanet_mw.errors import LocalProtocolError
 
 
-class TurnServer(NamedTuple):
+@dataclass(frozen=True)
+class TurnServer:
     """The service of one head's turns; stands in for `SlotServer` in all bounds of a queue."""
 
     airtime_ns: int
@@ -25,6 +26,14 @@ class TurnServer(NamedTuple):
     starts_ns: tuple[int, ...]
     """Ascending, within one period."""
     lead_ns: int = 0
+    _apart_ns: tuple[int, ...] = field(init=False, repr=False, compare=False)
+    """The greatest distance of two turns with n - 1 between, for n below the turns of a period."""
+
+    def __post_init__(self) -> None:
+        k, starts = self.frames, self.starts_ns
+        longer = (*starts, *(start + self.period_ns for start in starts))
+        apart = tuple(max((longer[i + n] - starts[i] for i in range(k)), default=0) for n in range(k))
+        object.__setattr__(self, "_apart_ns", apart)
 
     def check(self) -> None:
         """Raise LocalProtocolError unless the turns ascend within the period, at least one airtime apart."""
@@ -51,9 +60,7 @@ class TurnServer(NamedTuple):
     def completion_ns(self, n: int) -> int:
         """The longest time from the beginning of a busy period until `n` packets are through."""
         periods, rest = divmod(n, self.frames)
-        k, starts = self.frames, self.starts_ns
-        apart = max(starts[(i + rest) % k] + (i + rest) // k * self.period_ns - starts[i] for i in range(k))
-        return self.lead_ns + periods * self.period_ns + apart + self.airtime_ns
+        return self.lead_ns + periods * self.period_ns + self._apart_ns[rest] + self.airtime_ns
 
     def served(self, window_ns: int) -> int:
         """The packets that are certainly through after `window_ns` of a busy period."""

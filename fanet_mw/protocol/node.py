@@ -180,11 +180,13 @@ class Node:
         self.requests.append(_new(TxRequest, (seq, start_ns, frame, dst, wants_status)))
         return seq
 
-    def announce(self, kind: Kind, inner: bytes, *, now_ns: int, flags: int, hop_limit: int) -> Packet:
+    def announce(
+        self, kind: Kind, inner: bytes, *, now_ns: int, flags: int, hop_limit: int, destination: NodeId = BROADCAST
+    ) -> Packet:
         return self._packet(
             kind,
             inner,
-            destination=BROADCAST,
+            destination=destination,
             priority=wire.PRIORITY_CONTROL,
             flags=flags,
             hop_limit=hop_limit,
@@ -207,6 +209,9 @@ class Node:
 
     def mark(self, packet: Packet, bits: int) -> None:
         self._seen.mark(seen.key_of(origin=packet.header.origin, seq=packet.header.seq), bits)
+
+    def forget(self, packet: Packet) -> None:
+        self._seen.forget(seen.key_of(origin=packet.header.origin, seq=packet.header.seq))
 
     def record(self, record: Record) -> None:
         self.records.append(record)

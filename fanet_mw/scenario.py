@@ -68,7 +68,7 @@ class Traffic(Section):
 class Routing(Section):
     """The protocol above the radio."""
 
-    protocol: Literal["direct", "flooding", "clustered"] = "clustered"
+    protocol: Literal["direct", "flooding", "clustered", "aodv"] = "clustered"
     jitter_ms: NonNegative = 10.0
     """A relay waits U(0, jitter) after a reception."""
     hop_limit: Annotated[int, Field(ge=1, le=255)] = 32
@@ -262,6 +262,11 @@ class Scenario(Section):
         return NodeId(1)
 
 
+_RIVALS: Final = ("aodv",)
+_RIVAL_FRAME_BYTES: Final = 256
+"""Control messages of a fixed length must fit one frame; longer ones are divided."""
+
+
 def _disagreements(scenario: Scenario) -> Sequence[str]:
     """What each table allows alone but the scenario as a whole does not."""
     found = []
@@ -285,6 +290,11 @@ def _disagreements(scenario: Scenario) -> Sequence[str]:
             f"<= radio.max_frame_bytes = {scenario.radio.max_frame_bytes}"
         )
     found += _impossible_faults(scenario)
+    if scenario.routing.protocol in _RIVALS and scenario.radio.max_frame_bytes < _RIVAL_FRAME_BYTES:
+        found.append(
+            f"radio.max_frame_bytes = {scenario.radio.max_frame_bytes} must be >= {_RIVAL_FRAME_BYTES} for "
+            f"routing.protocol = {scenario.routing.protocol}"
+        )
     if scenario.routing.protocol == "clustered":
         clusters = scenario.clusters
         if clusters.count >= max(2, count):

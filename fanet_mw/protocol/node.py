@@ -32,6 +32,8 @@ _HELLO: Final = int(Kind.HELLO)
 _new: Final = tuple.__new__  # for what is made once per frame
 _CONTROL: Final = 0x8000_0000
 """Control packets are numbered apart, from here on: then data packets have no gaps, and what is missing shows."""
+_MOST_HOPS: Final = 255
+"""What the hop count of the header can say."""
 _RESTART_STEP_NS: Final = 100 * US
 """A node sends fewer packets than one per 0.1 ms, so a later start begins beyond all earlier sequence numbers."""
 
@@ -200,7 +202,11 @@ class Node:
     def forwarded(self, packet: Packet, *, flags: int) -> bytes:
         header = packet.header
         return wire.rewrite(
-            packet.frame, prev_hop=self.node, hop_limit=header.hop_limit - 1, hops=header.hops + 1, flags=flags
+            packet.frame,
+            prev_hop=self.node,
+            hop_limit=header.hop_limit - 1,
+            hops=min(header.hops + 1, _MOST_HOPS),  # a hostile frame may come with all of them
+            flags=flags,
         )
 
     def drop(self, reason: DropReason, packet: Packet, *, now_ns: int) -> None:

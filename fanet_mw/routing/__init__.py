@@ -5,6 +5,7 @@ from typing import Final
 
 from fanet_mw.protocol.clustered import Clustered
 from fanet_mw.protocol.contract import Port, RoutingProtocol
+from fanet_mw.routing.aodv import Aodv
 from fanet_mw.routing.direct import Direct
 from fanet_mw.routing.flooding import Flooding
 
@@ -12,6 +13,7 @@ PROTOCOLS: Final[Mapping[str, type[RoutingProtocol]]] = {
     "direct": Direct,
     "flooding": Flooding,
     "clustered": Clustered,
+    "aodv": Aodv,
 }
 
 

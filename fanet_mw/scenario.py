@@ -68,7 +68,7 @@ class Traffic(Section):
 class Routing(Section):
     """The protocol above the radio."""
 
-    protocol: Literal["direct", "flooding", "clustered", "aodv"] = "clustered"
+    protocol: Literal["direct", "flooding", "clustered", "aodv", "olsr"] = "clustered"
     jitter_ms: NonNegative = 10.0
     """A relay waits U(0, jitter) after a reception."""
     hop_limit: Annotated[int, Field(ge=1, le=255)] = 32
@@ -262,7 +262,7 @@ class Scenario(Section):
         return NodeId(1)
 
 
-_RIVALS: Final = ("aodv",)
+_RIVALS: Final = ("aodv", "olsr")
 _RIVAL_FRAME_BYTES: Final = 256
 """Control messages of a fixed length must fit one frame; longer ones are divided."""
 

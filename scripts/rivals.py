@@ -3,7 +3,7 @@
 `conn` is an upper bound of the PDR: the share of (node, second) of the measured window in which a node has a multi-hop
 path of `radio.range_m` links to the leader, on the ideal track of the mobility model.
 
-    python scripts/rivals.py --protocols aodv olsr --speeds 0 10 20 --seeds 1 2 3
+    PYTHONPATH=. python scripts/rivals.py --protocols aodv olsr --speeds 0 10 20 --seeds 1 2 3
 """
 
 import argparse

@@ -8,12 +8,14 @@ from fanet_mw.protocol.contract import Port, RoutingProtocol
 from fanet_mw.routing.aodv import Aodv
 from fanet_mw.routing.direct import Direct
 from fanet_mw.routing.flooding import Flooding
+from fanet_mw.routing.olsr import Olsr
 
 PROTOCOLS: Final[Mapping[str, type[RoutingProtocol]]] = {
     "direct": Direct,
     "flooding": Flooding,
     "clustered": Clustered,
     "aodv": Aodv,
+    "olsr": Olsr,
 }
 
 

@@ -87,6 +87,10 @@ class Reader:
         while self._at < len(self._body):
             yield self.take(layout)
 
+    @property
+    def at_end(self) -> bool:
+        return self._at == len(self._body)
+
     def finish(self) -> None:
         if self._at != len(self._body):
             raise MalformedFrameError(f"{len(self._body) - self._at} bytes of control too many")

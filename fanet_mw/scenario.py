@@ -68,7 +68,9 @@ class Traffic(Section):
 class Routing(Section):
     """The protocol above the radio."""
 
-    protocol: Literal["direct", "flooding", "clustered", "aodv", "olsr"] = "clustered"
+    protocol: Literal["direct", "flooding", "clustered", "aodv", "olsr", "dsdv", "gossip", "counter", "geographic"] = (
+        "clustered"
+    )
     jitter_ms: NonNegative = 10.0
     """A relay waits U(0, jitter) after a reception."""
     hop_limit: Annotated[int, Field(ge=1, le=255)] = 32
@@ -78,6 +80,14 @@ class Routing(Section):
     """A packet older than this is dropped where it waits."""
     hello_interval_s: NonNegative = 1.0
     """Position beacon and hello, one hop; 0 sends none (`clustered` needs them)."""
+    gossip_p: Annotated[float, Field(ge=0, le=1)] = 0.65
+    """Protocol `gossip`: probability with which a node relays a flooded packet."""
+    gossip_k: Annotated[int, Field(ge=0, le=255)] = 1
+    """Protocol `gossip`: within so many hops of the origin everyone relays."""
+    counter: Annotated[int, Field(ge=2)] = 3
+    """Protocol `counter`: a node that has heard so many copies does not relay."""
+    assess_ms: NonNegative = 20.0
+    """Protocol `counter`: copies are counted for U(0, assess_ms)."""
 
     @property
     def jitter_ns(self) -> int:
@@ -262,7 +272,7 @@ class Scenario(Section):
         return NodeId(1)
 
 
-_RIVALS: Final = ("aodv", "olsr")
+_RIVALS: Final = ("aodv", "olsr", "dsdv", "geographic")
 _RIVAL_FRAME_BYTES: Final = 256
 """Control messages of a fixed length must fit one frame; longer ones are divided."""
 

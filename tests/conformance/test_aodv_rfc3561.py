@@ -148,9 +148,13 @@ def test_6_2_a_newer_number_replaces_a_shorter_route_and_an_older_one_never_does
 
 def test_6_2_data_keeps_a_route_and_its_silence_lets_it_expire(bench: MakeBench) -> None:
     found = bench(3)
+    found.send(1, 3)
+    found.advance(1 * S)
+    asked = len(requests(found))
     for _ in range(15):
         found.send(1, 3)
         found.advance(1 * S)
+    assert len(requests(found)) == asked, "kept beyond the lifetime it was given"
     assert active(found, 2, 3) == (3, 1)
     assert active(found, 3, 1) == (2, 2)
     found.advance(p.ACTIVE_ROUTE_TIMEOUT_NS + p.MY_ROUTE_TIMEOUT_NS)

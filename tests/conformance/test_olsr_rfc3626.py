@@ -214,6 +214,10 @@ def test_8_3_1_the_only_way_to_a_node_is_a_relay_and_what_it_covers_needs_no_oth
     assert relays({2: {10, 11}, 3: {11}, 4: {11}}) == [2]
 
 
+def test_8_3_1_the_only_ways_are_chosen_before_the_neighbor_that_reaches_most() -> None:
+    assert relays({2: {10, 11, 12, 13}, 3: {10, 11, 14}, 4: {12, 13, 15}}) == [3, 4]
+
+
 def test_8_3_1_the_neighbor_that_reaches_most_is_preferred() -> None:
     assert relays({2: {10, 11}, 3: {10, 11, 12}, 4: {12}}) == [3]
 

@@ -34,7 +34,7 @@ class Air:
         self._radio = radio
         self._stations = stations
         self._faults = faults
-        self._book = LinkBook(stations)
+        self.book = LinkBook(stations)
         timing = Timing.of(radio)
         fading, shape = law_of(radio)
         self.g = np.zeros(s.GLOBALS, np.int64)
@@ -69,6 +69,7 @@ class Air:
         ).T
         self._sf = np.zeros((s.STATION_REALS, stations), np.float64)
         self._sf[s.NOISE] = noise_mw(radio)
+        self.st[s.FAULT_RANDOM] = [stream_seed(seed, "fault", i + 1) % _GENERATOR_RANGE + 1 for i in range(stations)]
         self.fr = np.zeros((s.FRAME_ROWS, 1024), np.int64)
         self._hs = np.zeros((8 * stations + 2 * 1024 + 64, 5), np.int64)
         self._out = np.zeros((2 * radio.queue_frames + 1024, s.OUT_COLUMNS), np.int64)
@@ -103,7 +104,7 @@ class Air:
     def relink(self) -> None:
         """Make the links anew: stations have moved, or faults have changed."""
         at = self._at
-        self._book.take(self._lk)
+        self.book.take(self._lk)
         spare = int(self._lk[s.UNDERWAY].sum())
         links = Links(
             np.ascontiguousarray(at), self._radio, spare=spare, shadowing=self._shadowing, blocked=self._blocked
@@ -124,8 +125,8 @@ class Air:
 
     def links(self, now_ns: int) -> LinkStats | None:
         """What the links carried since this was last asked; None when it was nothing."""
-        self._book.take(self._lk)
-        return self._book.close(now_ns)
+        self.book.take(self._lk)
+        return self.book.close(now_ns)
 
     def neighbors(self, station: int) -> int:
         """How many stations hear this one."""

@@ -4,6 +4,7 @@ A disk that fails ends the capture and not the run: it is said once, and the fil
 """
 
 import contextlib
+import re
 import sys
 from pathlib import Path
 from types import TracebackType
@@ -27,6 +28,13 @@ def unused(path: Path) -> Path:
     return found
 
 
+def forget(path: Path) -> None:
+    """Remove the captures of an earlier run: `path`, and those with a number."""
+    for found in sorted(path.parent.glob(f"{path.stem}*{path.suffix}")):
+        if re.fullmatch(rf"{re.escape(path.stem)}(-\d+)?", found.stem):
+            found.unlink()
+
+
 class CaptureFile:
     """A `Pcap` on a file; raises ConfigError when that cannot be opened."""
 
@@ -37,18 +45,28 @@ class CaptureFile:
         except OSError as error:
             raise ConfigError(f"--pcap: {path}: cannot be written: {error.strerror}") from error
         self._path = path
-        self.pcap = Pcap(self._write, radio, receptions=receptions)
+        self.pcap = Pcap(self._write, radio, receptions=receptions, flush=self._flush)
 
     def _write(self, data: bytes) -> None:
-        if self._file is None:
-            return
-        try:
-            self._file.write(data)
-        except OSError as error:
-            with contextlib.suppress(OSError):
-                self._file.close()
-            self._file = None
-            sys.stderr.write(f"{self._path}: the capture ends here: {error.strerror}\n")
+        if self._file is not None:
+            try:
+                self._file.write(data)
+            except OSError as error:
+                self._give_up(error)
+
+    def _flush(self) -> None:
+        if self._file is not None:
+            try:
+                self._file.flush()
+            except OSError as error:
+                self._give_up(error)
+
+    def _give_up(self, error: OSError) -> None:
+        assert self._file is not None, "it was written to"
+        with contextlib.suppress(OSError):
+            self._file.close()
+        self._file = None
+        sys.stderr.write(f"{self._path}: the capture ends here: {error.strerror}\n")
 
     def __enter__(self) -> Self:
         return self

@@ -25,6 +25,10 @@ class LinkBook:
         self._counts: list[Ints] = []
         self._since_ns = 0
 
+    def begin(self, now_ns: int) -> None:
+        """The first report covers the time from now on."""
+        self._since_ns = now_ns
+
     def take(self, lk: Ints) -> None:
         """Move the counts of these links here."""
         used = np.flatnonzero(lk[s.N_RECEIVED : s.N_CUT + 1].any(axis=0))

@@ -77,6 +77,7 @@ class Medium(Actor):
 
     def start(self, now_ns: int) -> None:
         self._pass_time(now_ns)
+        self._air.book.begin(now_ns)
 
     def receive(self, topic: str, message: Message, now_ns: int) -> None:
         if type(message) is TxRequest:

@@ -83,8 +83,18 @@ def checksum(data: bytes) -> int:
 class Pcap:
     """Writes a capture; `epoch_unix_ns` may be set until the first record is written."""
 
-    def __init__(self, write: Callable[[bytes], object], radio: Radio, *, receptions: bool = False) -> None:
+    def __init__(
+        self,
+        write: Callable[[bytes], object],
+        radio: Radio,
+        *,
+        receptions: bool = False,
+        flush: Callable[[], object] = lambda: None,
+    ) -> None:
+        """`flush` is called once a second of swarm time, between records: what was written can be looked at."""
         self.epoch_unix_ns = 0
+        self._flush = flush
+        self._flush_ns = S
         self.records = 0
         self._write = write
         self._receptions = receptions
@@ -139,6 +149,9 @@ class Pcap:
         size = len(tap) + len(frame) + _FCS.size
         self._write(_RECORD.pack(seconds, rest_ns, size, size) + tap + frame + _FCS.pack(crc32(frame)))
         self.records += 1
+        if t_ns >= self._flush_ns:
+            self._flush_ns = (t_ns // S + 1) * S
+            self._flush()
 
     def _data(self, src: int, dst: int, seq: int, frame: bytes, *, retry: bool) -> bytes:
         """An 802.11 data frame without its FCS."""

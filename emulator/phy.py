@@ -33,6 +33,7 @@ from emulator.state import (
     FATE_OPEN,
     FATE_WEAK,
     FAULT,
+    FAULT_RANDOM,
     HANDED,
     HEADER_BITS_PER_NS,
     HEADER_NS,
@@ -162,7 +163,11 @@ def survived(p: Ints, st: Ints, sf: Reals, r: int) -> bool:
 def spared(st: Ints, lp: Reals, r: int, link: int) -> bool:
     """Whether the fault on a link lets a frame through that was otherwise received."""
     share = lp[SPARED, link]
-    return bool(share >= 1.0 or (share > 0.0 and uniform(st, r) / _MODULUS < share))
+    if share >= 1.0 or share <= 0.0:
+        return bool(share >= 1.0)
+    x = st[FAULT_RANDOM, r] * 48271 % 2_147_483_647  # as `uniform`, of a stream of its own
+    st[FAULT_RANDOM, r] = x
+    return bool(x / _MODULUS < share)
 
 
 @jit

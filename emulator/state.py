@@ -48,12 +48,13 @@ Reals = npt.NDArray[np.float64]
     BUSY_SINCE,  # -1 idle
     BUSY_NS,  # busy time so far
     RANDOM,  # state of the station's generator
+    FAULT_RANDOM,  # of the one that says which frames a fault takes
     HANDED,  # receptions handed to the station
     FADE_A,  # state of the generator for the fading of what the station transmits
     FADE_B,
     ON_AIR_LIST,  # not by station: the first ON_AIR_N entries name the stations that transmit
     STATION_ROWS,
-) = range(33)
+) = range(34)
 NOTHING: Final = 0
 DATA: Final = 1
 ACK: Final = 2

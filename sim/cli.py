@@ -17,7 +17,7 @@ from rich.console import Console
 from rich.progress import BarColumn, Progress, TextColumn, TimeElapsedColumn
 from rich.table import Table
 
-from emulator.capture_file import NAME, CaptureFile
+from emulator.capture_file import NAME, CaptureFile, forget
 from fanet_mw import __version__
 from fanet_mw.errors import ConfigError, FanetError
 from fanet_mw.scenario import Scenario
@@ -80,8 +80,7 @@ class Output:
             return None
         if self.out is None:
             raise ConfigError("--pcap: needs --out DIR, the folder that air.pcap goes to")
-        for earlier in self.out.glob("air*.pcap"):
-            earlier.unlink()
+        forget(self.out / NAME)
         return self.out / NAME
 
 
@@ -117,6 +116,34 @@ def simulate(scenario: str, *, choice: Choice = Choice(), output: Output = Outpu
             with CaptureFile(path, chosen.radio, receptions=output.pcap_receptions) as file:
                 outcome = run(chosen, on_progress=tell, capture=file.pcap)
     return _finish(outcome, output)
+
+
+@app.command
+def plan(
+    scenario: str,
+    *,
+    choice: Choice = Choice(),
+    deadline: float | None = None,
+    search: bool = True,
+    json: Annotated[bool, Parameter(negative="")] = False,
+) -> int:
+    """Say before take-off whether a clustered scenario is feasible and what it guarantees; exit code 1: it is not.
+
+    Parameters
+    ----------
+    scenario
+        A shipped scenario's name (see `fanet scenarios`) or a .toml file.
+    deadline
+        Every packet must be with everyone within this time [s].
+    search
+        Look for the cheapest change when it is not feasible.
+    json
+        Print the plan as JSON.
+
+    """
+    from sim.plan_cli import show
+
+    return show(choice.scenario(scenario), deadline=deadline, search=search, as_json=json)
 
 
 @app.command

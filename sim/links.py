@@ -3,31 +3,35 @@
 from collections.abc import Iterable
 from typing import Any
 
+import numpy as np
+
 from fanet_mw.link_stats import COUNTS, LOSSES, LinkRow, LinkStats
 from fanet_mw.units import NodeId
 
 
 class LinkTotals:
-    """Sums per directed link."""
+    """Sums per directed link; reports are kept as they come and summed when asked for."""
 
     def __init__(self) -> None:
-        self._sums: dict[tuple[int, int], list[int]] = {}
-        self.t_ns = 0
-        """Instant of the last report."""
+        self._reports: list[LinkStats] = []
 
     def add(self, stats: LinkStats) -> None:
         """Take in one report."""
-        self.t_ns = max(self.t_ns, stats.t_ns)
-        for row in stats.rows():
-            sums = self._sums.setdefault((row.src, row.dst), [0] * (1 + COUNTS))
-            for i, value in enumerate((row.rssi_sum_mdbm, row.received, *row.lost)):
-                sums[i] += value
+        self._reports.append(stats)
 
     def rows(self) -> list[LinkRow]:
         """All links, by source and destination."""
+        if not self._reports:
+            return []
+        ends = np.concatenate([np.frombuffer(report.ends, np.uint16) for report in self._reports])
+        counts = np.concatenate([np.frombuffer(report.counts, np.uint32) for report in self._reports])
+        rssi = np.concatenate([np.frombuffer(report.rssi_sums_mdbm, np.int64) for report in self._reports])
+        links, place = np.unique(ends.reshape(-1, 2), axis=0, return_inverse=True)
+        sums = np.zeros((len(links), 1 + COUNTS), np.int64)
+        np.add.at(sums, place.reshape(-1), np.column_stack([rssi, counts.reshape(-1, COUNTS).astype(np.int64)]))
         return [
             LinkRow(NodeId(src), NodeId(dst), received, tuple(lost), rssi_sum)
-            for (src, dst), (rssi_sum, received, *lost) in sorted(self._sums.items())
+            for (src, dst), (rssi_sum, received, *lost) in zip(links.tolist(), sums.tolist(), strict=True)
         ]
 
 

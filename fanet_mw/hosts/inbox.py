@@ -37,7 +37,8 @@ class Inbox:
         self._gone: dict[str, int] = {}
         """Puts taken out so far by topic; what `_offered` has more than that waits."""
         self.samples = 0
-        self.overflowed = 0
+        self.inbox_full = 0
+        self.share_full = 0
         self.taken = 0
         self.malformed = 0
 
@@ -47,8 +48,11 @@ class Inbox:
         offered = self._offered
         key = topic if topic in offered or len(offered) < _MAX_TOPICS else ""
         before = offered.get(key, 0)
-        if len(self._waiting) >= self._bound or before - self._gone.get(key, 0) >= self._share:
-            self.overflowed += 1
+        if len(self._waiting) >= self._bound:
+            self.inbox_full += 1
+            return
+        if before - self._gone.get(key, 0) >= self._share:
+            self.share_full += 1
             return
         offered[key] = before + 1
         self._waiting.append((topic, payload))
@@ -72,6 +76,11 @@ class Inbox:
                 receive(topic, message)
         return bool(waiting)
 
+    @property
+    def overflowed(self) -> int:
+        """Puts dropped here, for either reason."""
+        return self.inbox_full + self.share_full
+
     def figures(self) -> dict[str, int]:
         """Counters for a report."""
         return {
@@ -79,5 +88,6 @@ class Inbox:
             "taken": self.taken,
             "malformed": self.malformed,
             "overflowed": self.overflowed,
+            "share_full": self.share_full,
             "waiting": len(self._waiting),
         }

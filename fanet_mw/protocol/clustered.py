@@ -30,7 +30,7 @@ _UNICAST_TRIES: Final = 3
 """Parents tried for one packet at one node; below each the MAC makes its own attempts."""
 _JOIN_WINDOW_NS: Final = 3 * S
 """Joins are floods: spread, so that a swarm that starts together does not drown in them."""
-_REJOIN_NS: Final = 5 * S
+_REJOIN_NS: Final = 2 * S
 _CONTROL_JITTER_NS: Final = 100 * MS
 _UPLINK_NS: Final = 1 * S
 """A packet should be flooded at most one flooding period and this after it was generated; else it may be repaired."""

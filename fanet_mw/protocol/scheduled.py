@@ -49,13 +49,15 @@ class Scheduled(Clustered):
         scenario = port.scenario
         self._lifetime_ns = seconds_to_ns(scenario.routing.lifetime_s)
         self._window_random = port.stream("window").random
-        self._turn_ns = turn_ns(scenario, payload_bytes=_largest(scenario))
-        self._turn_bytes = _largest(scenario)
+        self._turn_ns = turn_ns(scenario, payload_bytes=largest_frame(scenario))
+        self._turn_bytes = largest_frame(scenario)
         self._roots = RootRelease(TxQueue(capacity=scenario.routing.queue_frames), lead_ns=self._lead_ns)
         self._plans: list[Plan] = []
         self._schedules: dict[int, tuple[Schedule, Places]] = {}
         self._planned_epoch = 0
         self._missed = 0
+        self._steady_ns: int | None = None
+        """Since when the bound of the newest plan holds: no packet from before it is waiting."""
 
     # --- the timetable --------------------------------------------------------------------------------------------
 
@@ -94,10 +96,11 @@ class Scheduled(Clustered):
         scenario = self._port.scenario
         turns = _geometry(scenario, schedule, self._turn_ns)
         load = {heads[cluster]: members[cluster] for cluster in sorted(heads)} | {NodeId(schedule.leader): 0}
-        table = _fit(scenario, tuple(sorted(at.items())), load, turns)
+        table = fit(scenario, tuple(sorted(at.items())), load, turns)
         if table is None:
             return  # not even one packet of each head fits a superframe; `fanet plan` says so before take-off
         self._plans = [*self._plans[-1:], _own_plan(self._port.node, max(now_ns, schedule.start_us * US), turns, table)]
+        self._steady_ns = None
         self._roots.follow([(plan.valid_ns, plan.turns, plan.roots) for plan in self._plans], now_ns=now_ns)
         for packet in [*self._release.drain(), *self._homeless.drain()]:
             self._forward(packet, start_ns=now_ns + self._lead_ns, now_ns=now_ns, tries=0)
@@ -120,6 +123,8 @@ class Scheduled(Clustered):
         if len(packet.frame) > self._turn_bytes:
             self._port.drop(DropReason.TOO_LARGE, packet, now_ns=now_ns)
             return
+        if self._steady_ns is None and not len(self._roots) and now_ns >= self._plans[-1].valid_ns:
+            self._steady_ns = packet.header.origin_us * US
         evicted = self._roots.push(packet, now_ns=now_ns)
         if evicted is not None:
             self._port.drop(DropReason.QUEUE_FULL, evicted, now_ns=now_ns)
@@ -205,6 +210,8 @@ class Scheduled(Clustered):
         alone = scenario.clusters.count >= scenario.nodes.count - 1  # else packets of members share our turns
         if plan is None or not plan.roots or not alone or plan.table.uncovered[self._port.node]:
             return None
+        if self._steady_ns is None:
+            return None
         interval_ns = seconds_to_ns(scenario.traffic.interval_s)
         return plan.turns.worst_ns(plan.roots, span=plan.table.spans[self._port.node], interval_ns=interval_ns)
 
@@ -214,11 +221,12 @@ class Scheduled(Clustered):
             **super().report(),
             "missed_turns": self._missed,
             "bound_ms": None if bound_ns is None else bound_ns / MS,
-            "bound_from_ms": self._plans[-1].valid_ns / MS if self._plans else None,
+            "bound_from_ms": None if self._steady_ns is None else self._steady_ns / MS,
+            "planned": bool(self._plans),
         }
 
 
-def _largest(scenario: Scenario) -> int:
+def largest_frame(scenario: Scenario) -> int:
     """The largest frame a turn must hold: the application's, or a schedule part with its places."""
     members = min(scenario.nodes.count, 56)
     return max(scenario.traffic.payload_bytes, HEADER_BYTES + 262 + 189 * -(-members // 28))
@@ -230,32 +238,33 @@ def _geometry(scenario: Scenario, schedule: Schedule, turn: int) -> Turns:
     return Turns(schedule.start_us * US, period_ns, contention_ns, turn, max(0, period_ns - contention_ns) // turn)
 
 
-def _fit(
-    scenario: Scenario, places: tuple[tuple[NodeId, Enu], ...], load: Mapping[NodeId, int], turns: Turns
-) -> Timetable | None:
-    """A table for the whole load; if the turns do not suffice, for as much of it as they do."""
+def links(scenario: Scenario, turns: Turns) -> Geometry:
+    """What a timetable of this scenario is computed for."""
     clusters, radio = scenario.clusters, scenario.radio
     wait_ns = radio.lead_ns + radio.handover_ns
-    geometry = Geometry(
+    return Geometry(
         link_m=clusters.link_m or radio.range_m,
         interference_m=clusters.interference_m or radio.range_m * (1 if radio.channel == "range" else 2),
         turns=turns.per_frame,
         hop_turns=1 + -(-wait_ns // turns.turn_ns),
     )
+
+
+def fit(
+    scenario: Scenario, places: tuple[tuple[NodeId, Enu], ...], load: Mapping[NodeId, int], turns: Turns
+) -> Timetable | None:
+    """A table for a little more than the load, so that a backlog drains; for less, if the turns do not suffice."""
+    geometry = links(scenario, turns)
     per_member = turns.period_ns / seconds_to_ns(scenario.traffic.interval_s)
     share = 1.0
     while turns.per_frame:
-        wanted = {root: max(1, _whole(members * per_member * share)) for root, members in load.items()}
+        wanted = {root: int(members * per_member * share) + 1 for root, members in load.items()}
         roots = tuple(root for root, packets in sorted(wanted.items()) for _ in range(packets))
         table = timetable(places, roots, geometry)
         if table is not None or all(packets == 1 for packets in wanted.values()):
             return table
         share *= _FEWER
     return None
-
-
-def _whole(packets: float) -> int:
-    return -int(-packets // 1)
 
 
 def _own_plan(node: NodeId, valid_ns: int, turns: Turns, table: Timetable) -> Plan:

@@ -23,6 +23,7 @@ from fanet_mw.messages import (
     TxStatus,
     WifiScan,
 )
+from fanet_mw.radio_control import Cut, Degrade, Jam, Restore
 from fanet_mw.scenario import Scenario
 from fanet_mw.topics import Topics
 from fanet_mw.units import MS, Enu, NodeId
@@ -64,6 +65,8 @@ frames = st.one_of(
         ),
     ),
 )  # fmt: skip
+labels = st.sampled_from(["", "a", "b", "x" * 40])
+nodes = st.integers(0, 12).map(NodeId)
 hostile: st.SearchStrategy[Message] = st.one_of(
     st.builds(Reception, frames, st.integers(0, 0xFFFF).map(NodeId), instants, anything),
     st.builds(TxStatus, st.integers(0, 99), st.sampled_from(TxOutcome), instants, st.integers(0, 255)),
@@ -77,10 +80,15 @@ hostile: st.SearchStrategy[Message] = st.one_of(
         st.lists(st.integers(0, 12), max_size=4), st.lists(anything, max_size=24),
     ),
     st.builds(MavlinkTap, instants, st.binary(max_size=9)),
+    st.builds(Degrade, labels, nodes, nodes, st.booleans(), anything, anything, instants),
+    st.builds(Jam, labels, vectors, anything, anything, instants),
+    st.builds(Cut, labels, nodes, instants),
+    st.builds(Restore, labels),
     st.builds(Gps, instants, st.just(Enu(1, 2, 3)), st.just(Enu(0, 0, 0))),
 )  # fmt: skip
 topics = st.sampled_from(
-    [NAMES.radio_tx(1), NAMES.radio_tx(77), NAMES.radio_rx(1), NAMES.pose, NAMES.setpoint(2), NAMES.setpoint(99),
+    [NAMES.radio_control, NAMES.radio_control, NAMES.radio_tx(1), NAMES.radio_tx(77),
+     NAMES.radio_rx(1), NAMES.pose, NAMES.setpoint(2), NAMES.setpoint(99),
      NAMES.sensor(1, "gps"), "nonsense", ""]
 )  # fmt: skip
 

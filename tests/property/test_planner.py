@@ -11,6 +11,7 @@ from fanet_mw.protocol.planner.demand import TrafficClass
 from fanet_mw.protocol.planner.flood import FloodCost, flood_cost
 from fanet_mw.protocol.planner.head import Share, slot_delays, work_ns
 from fanet_mw.protocol.planner.search import _candidates
+from fanet_mw.protocol.timetable import Geometry, timetable
 from fanet_mw.protocol.topology import within_range
 from fanet_mw.rng import stream
 from fanet_mw.units import MS, Enu, NodeId, S
@@ -204,6 +205,58 @@ def test_the_text_says_verdict_bounds_bottleneck_and_change(planned) -> None:
         assert words in text
     assert "equations (1)-(4) say" in text
     assert text == describe(planned(**{"traffic.interval_s": 0.1, "mission.survivors": 4}))
+
+
+# --- timetables ---
+
+TIMETABLE = {"radio.lead_ms": 5, "clusters.guard_ms": 0.2, "traffic.interval_s": 1.0}
+
+
+def test_a_timetable_gives_each_head_the_turns_its_packets_need_and_spare_ones(make_scenario) -> None:
+    scenario = make_scenario(**{"nodes.count": 45, "clusters.count": 4, "clusters.flooding_period_s": 5, **TIMETABLE})
+    found = plan(scenario, placed(scenario), relays="timetable", contention_ns=S)
+    assert found.feasible
+    turn_ns = found.clusters[0].flood.spacing_ns
+    for cluster in found.clusters:
+        turns = cluster.slot_ns // turn_ns
+        assert cluster.packets <= turns <= 1.5 * cluster.packets + 1
+        assert turn_ns < cluster.flood.duration_ns < 5 * S
+    assert found.uplink_ns == 4 * S, "members may have to wait for the contention window"
+
+
+def test_a_packet_waits_for_a_turn_and_then_for_its_flood(make_scenario) -> None:
+    """One source: one turn per superframe, and a spare one. The bound is the greatest gap, the turn and the span."""
+    scenario = make_scenario(
+        **{"nodes.count": 5, "nodes.layout": "line", "clusters.flooding_period_s": 5, **TIMETABLE,
+           "traffic.interval_s": 5.0, "traffic.sources": [3]}
+    )  # fmt: skip
+    found = plan(scenario, placed(scenario), relays="timetable", contention_ns=S)
+    (cluster,) = [c for c in found.clusters if c.packets]
+    (bound,) = [c.from_head for c in found.classes]
+    turn_ns = cluster.flood.spacing_ns
+    first_ns, second_ns = S, S + _gap(scenario, cluster, turn_ns)
+    longest_gap_ns = max(second_ns - first_ns, 5 * S - (second_ns - first_ns))
+    wait_ns = longest_gap_ns + scenario.radio.lead_ns
+    assert bound == Bounded(wait_ns + cluster.flood.duration_ns)
+
+
+def _gap(scenario, cluster, turn_ns) -> int:
+    geometry = Geometry(250.0, 250.0, 4 * S // turn_ns, -(-(turn_ns + scenario.radio.lead_ns) // turn_ns))
+    places = tuple(sorted(placed(scenario).items()))
+    first, second = sorted(turn.offset for turn in timetable(places, (cluster.head,) * 2, geometry).roots())
+    return (second - first) * turn_ns
+
+
+def test_floods_that_do_not_fit_the_turns_are_the_one_problem_named(make_scenario) -> None:
+    scenario = make_scenario(
+        **{"nodes.count": 45, "clusters.count": 4, "clusters.flooding_period_s": 1, **TIMETABLE,
+           "traffic.interval_s": 0.1}
+    )  # fmt: skip
+    found = plan(scenario, placed(scenario), relays="timetable", contention_ns=S // 5)
+    (problem,) = found.problems
+    assert "do not fit" in problem
+    assert found.change.keys[0].startswith("traffic.interval_s")
+    assert "no slot" in describe(found)
 
 
 def test_every_packet_goes_through_all_nodes_between_it_and_its_head() -> None:

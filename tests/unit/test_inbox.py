@@ -50,6 +50,7 @@ def test_one_topic_that_floods_leaves_room_for_the_others() -> None:
     for _ in range(10 * BOUND):
         inbox.offer("flood", TAP)
     assert inbox.figures()["waiting"] == BOUND // 4
+    assert inbox.figures()["share_full"] == inbox.overflowed == 10 * BOUND - BOUND // 4
     for i in range(100):
         inbox.offer(f"calm-{i}", TAP)
     assert inbox.figures()["waiting"] == BOUND // 4 + 100
@@ -65,6 +66,10 @@ def test_more_topics_than_there_can_be_share_one_share() -> None:
     for i in range(60_000):
         inbox.offer(f"{i}", TAP)
     assert inbox.figures()["waiting"] == 8192 + 25_000
+    for i in range(100_000):
+        inbox.offer(f"{i % 8000}", TAP)
+    assert inbox.figures()["waiting"] == 100_000
+    assert inbox.inbox_full == 100_000 - (100_000 - 8192 - 25_000)
     assert len(inbox._offered) <= 8193
 
 

@@ -10,6 +10,7 @@ from pathlib import Path
 import pytest
 from test_medium_timelines import NAMES, PAYLOAD, Air
 
+from emulator.medium import Medium
 from fanet_mw.link_stats import LOSSES, LinkRow, LinkStats
 from fanet_mw.messages import Poses, Reception, TxRequest
 from fanet_mw.radio_control import Degrade
@@ -43,6 +44,24 @@ def test_each_second_with_traffic_is_told_once_with_the_links_that_carried_it(ma
         [(1, 2, 2, 2)], [(1, 2, 1, 1)], [(1, 2, 1, 1)],
     ]  # fmt: skip
     assert rows[0][0].rssi_dbm == pytest.approx(heard[0].rssi_dbm, abs=0.001)
+
+
+def test_an_emulator_that_starts_in_mid_run_knows_the_planned_faults_and_reports_from_then_on(
+    make_scenario: MakeScenario,
+) -> None:
+    faults = [{"at_s": 3, "kind": "cut", "node": 3}, {"at_s": 4, "kind": "cut", "node": 1, "for_s": 5}]
+    scenario = make_scenario(**{"nodes.count": 3, "duration_s": 100, "faults": faults})
+    air = Air(scenario, [0, 100, 200])
+    air.medium = Medium(scenario, "test")
+    air.medium.start(20 * S + 500 * MS)
+    air.place([0, 100, 200], 20 * S + 500 * MS)
+    air.send(1, 20 * S + 600 * MS, now_ns=20 * S + 500 * MS)
+    (told,), heard = stats(air, 30 * S)
+    assert (told.t_ns, told.span_ns) == (21 * S, 500 * MS)
+    assert [(row.src, row.dst, row.received, lost(row)) for row in told.rows()] == [
+        (1, 2, 1, {}), (1, 3, 0, {"station_down": 1}),
+    ]  # fmt: skip
+    assert len(heard) == 1
 
 
 def test_a_copy_that_is_lost_is_on_its_link_with_its_reason(make_scenario: MakeScenario) -> None:

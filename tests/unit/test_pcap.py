@@ -249,10 +249,12 @@ def test_the_command_writes_a_capture_beside_the_result(tmp_path: Path, capsys: 
     short = ("--set", "duration_s=6", "--set", "drain_s=0.5", "--json")
     command = ["simulate", "quick", *short, "--pcap", "--out", str(tmp_path)]
     (tmp_path / "air-2.pcap").write_bytes(b"of an earlier run")
+    (tmp_path / "airport.pcap").write_bytes(b"of somebody else")
     assert app(command, result_action="return_value") == 0
     summary = json.loads(capsys.readouterr().out)
     assert len(list(read((tmp_path / "air.pcap").read_bytes()))) >= summary["frames"]["delivered"] > 100
     assert not (tmp_path / "air-2.pcap").exists()
+    assert (tmp_path / "airport.pcap").exists()
     with pytest.raises(ConfigError, match="--pcap: needs --out DIR"):
         app(["simulate", "quick", "--pcap"], result_action="return_value")
 
@@ -267,6 +269,20 @@ def test_a_capture_that_cannot_be_opened_is_one_sentence_and_a_full_disk_ends_it
         for i in range(1000):
             file.pcap.transmitted(i, 1, BROADCAST, i, PAYLOAD, 1)
     assert capsys.readouterr().err.count("the capture ends here: No space left on device") == 1
+
+
+def test_what_was_captured_a_second_ago_can_be_read_while_the_run_goes_on(
+    tmp_path: Path, make_scenario: MakeScenario
+) -> None:
+    path = tmp_path / "air.pcap"
+    with CaptureFile(path, make_scenario().radio) as file:
+        for t_ns in (0, 400 * MS, 999 * MS):
+            file.pcap.transmitted(t_ns, 1, BROADCAST, 0, PAYLOAD, 1)
+        assert not path.read_bytes(), "gathered"
+        for t_ns in (1001 * MS, 1002 * MS):
+            file.pcap.transmitted(t_ns, 1, BROADCAST, 0, PAYLOAD, 1)
+        assert [record.t_ns // MS for record in read(path.read_bytes())] == [0, 400, 999, 1001]
+    assert len(list(read(path.read_bytes()))) == 5
 
 
 def test_an_emulator_that_starts_again_keeps_the_capture_of_the_last_one(tmp_path: Path) -> None:

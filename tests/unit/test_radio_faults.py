@@ -149,6 +149,24 @@ def test_where_all_frames_are_equally_strong_a_link_is_gone_below_the_sensitivit
     assert lost(air) == ({} if got else {"degraded": 1})
 
 
+def test_a_link_that_is_gone_does_not_disturb_though_farther_receivers_hear(make_scenario: MakeScenario) -> None:
+    """1 and 4 do not sense each other. At 2 only 4's frame is on the air, at 3 both are."""
+    air = Air(make_scenario(**{"nodes.count": 4}), [0, 100, 200, 300])
+    control(air, degrade(1, 2, db=200))
+    air.send(1, 1 * MS)
+    air.send(4, 1 * MS + 300 * US)
+    assert [(receiver, src) for receiver, src, _ in receptions(air.run())] == [(2, 4)]
+    assert lost(air) == {"collision": 2, "degraded": 1}
+
+
+def test_a_degraded_link_that_breaks_in_mid_frame_loses_no_more_than_its_share(make_scenario: MakeScenario) -> None:
+    air = Air(make_scenario(**{"nodes.count": 2}), [0, 200])
+    control(air, degrade(1, 2, share=0.001))
+    air.send(1, 1 * MS)
+    air.place([0, 900], 1 * MS + 500 * US)
+    assert receptions(air.run()) == [(2, 1, 1 * MS + FRAME_NS + 667)]
+
+
 # --- a jammed area ------------------------------------------------------------------------------------------------
 
 
@@ -256,6 +274,23 @@ def test_a_scenarios_faults_come_at_their_instants(make_scenario: MakeScenario) 
 def test_a_fault_that_cannot_be_is_one_sentence(fault: dict[str, object], said: str) -> None:
     with pytest.raises(ConfigError, match=said.replace(".", r"\.")):
         config.build({"nodes": {"count": 9}, "faults": [fault]})
+
+
+@pytest.mark.parametrize("channel", ["range", "log_distance"])
+def test_a_fault_that_takes_nothing_changes_nothing(make_scenario: MakeScenario, channel: str) -> None:
+    """Its dice are its own: backoffs and bit errors fall as without it."""
+
+    def outcome(*faults: Control) -> list[object]:
+        air = Air(make_scenario(**{"nodes.count": 5, "radio.channel": channel}), [0, 60, 120, 180, 240])
+        control(air, *faults)
+        for i in range(200):
+            air.send(1 + i % 5, i * 400 * US, dst=BROADCAST if i % 3 else 1 + (i + 1) % 5)
+        heard = air.run()
+        assert len(receptions(heard)) > 100
+        return [*receptions(heard), *statuses(heard)]
+
+    faint = Degrade("d", NodeId(1), NodeId(2), True, 0.0, 1e-12)  # noqa: FBT003
+    assert outcome(faint, jam(9000, 5), cut(3), Restore("c")) == outcome()
 
 
 # --- the books ----------------------------------------------------------------------------------------------------

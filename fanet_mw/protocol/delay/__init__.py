@@ -1,15 +1,17 @@
 """Worst-case delay: the paper's estimate, and bounds that hold. Pure functions of integer nanoseconds.
 
-`paper` is equations (1)-(4) to the letter, for comparison; `slot` is one head's slot; `arrivals` and `network` are the
-parts of network calculus that bound queues fed by bursts; `tandem` joins hops; `access` is the way to the head below.
+`paper` is equations (1)-(4) to the letter, for comparison; `slot` is one head's slot, `turns` single turns of a
+superframe; `arrivals` and `network` are the parts of network calculus that bound queues fed by bursts; `tandem` joins
+hops; `access` is the way to the head below.
 """
 
 from fanet_mw.protocol.delay.access import Contention, Dcf, access_bound, airtime_ns, guard_ns
 from fanet_mw.protocol.delay.arrivals import Arrivals, Limited, Periodic, Total, token_bucket
 from fanet_mw.protocol.delay.network import backlog, delay_any_order, delay_fifo
 from fanet_mw.protocol.delay.outcome import Bounded, Outcome, Refused
-from fanet_mw.protocol.delay.slot import SlotServer, single_slot_bound
+from fanet_mw.protocol.delay.slot import Server, SlotServer, single_slot_bound
 from fanet_mw.protocol.delay.tandem import Flow, Hop, ordered_tandem, path_bounds
+from fanet_mw.protocol.delay.turns import TurnServer
 
 __all__ = [
     "Arrivals",
@@ -22,8 +24,10 @@ __all__ = [
     "Outcome",
     "Periodic",
     "Refused",
+    "Server",
     "SlotServer",
     "Total",
+    "TurnServer",
     "access_bound",
     "airtime_ns",
     "backlog",

@@ -1,4 +1,4 @@
-"""Delay and backlog of one slot's queue: horizontal and vertical deviation of arrival and service curve.
+"""Delay and backlog of one head's queue: horizontal and vertical deviation of arrival and service curve.
 
 A busy period begins with a packet that finds the queue empty. Its q-th packet arrives span(q) later at the earliest and
 is through completion(q) later at the latest, so its delay is at most completion(q) - span(q) (Le Boudec & Thiran,
@@ -16,21 +16,21 @@ from typing import Final
 
 from fanet_mw.protocol.delay.arrivals import Arrivals, Periodic
 from fanet_mw.protocol.delay.outcome import Bounded, Outcome, Refused
-from fanet_mw.protocol.delay.slot import SlotServer
+from fanet_mw.protocol.delay.slot import Server
 
 _PACKETS_EXAMINED: Final = 100_000
 
 
-def load(arrivals: Arrivals, server: SlotServer) -> Fraction:
+def load(arrivals: Arrivals, server: Server) -> Fraction:
     """Packets that arrive in one period, over packets that its slot holds; stable up to 1."""
     return arrivals.rate * server.period_ns / server.frames
 
 
-def refusal(arrivals: Arrivals, server: SlotServer) -> Refused | None:
+def refusal(arrivals: Arrivals, server: Server) -> Refused | None:
     """Why there is no bound, or None."""
     server.check()
     if not server.frames:
-        return Refused(f"airtime {server.airtime_ns} ns > slot {server.slot_ns} ns: no frame ever fits")
+        return Refused(f"no frame ever fits {server}")
     if load(arrivals, server) > 1:
         return Refused(
             f"unstable: {server.frames} frames fit a slot every {server.period_ns / 1e6:g} ms, "
@@ -39,7 +39,7 @@ def refusal(arrivals: Arrivals, server: SlotServer) -> Refused | None:
     return None
 
 
-def delay_fifo(arrivals: Arrivals, server: SlotServer) -> Outcome:
+def delay_fifo(arrivals: Arrivals, server: Server) -> Outcome:
     """The worst delay [ns] of any packet of the aggregate, first come first served; arrival to end of airtime."""
     refused = refusal(arrivals, server)
     if refused is not None:
@@ -50,19 +50,18 @@ def delay_fifo(arrivals: Arrivals, server: SlotServer) -> Outcome:
     return Bounded(max(server.completion_ns(q) - span_ns for q, span_ns in enumerate(examined, start=1)))
 
 
-def backlog(arrivals: Arrivals, server: SlotServer) -> int | Refused:
+def backlog(arrivals: Arrivals, server: Server) -> int | Refused:
     """The most packets in the queue at once, the one on the air included: what the queue's bound must hold."""
     refused = refusal(arrivals, server)
     if refused is not None:
         return refused
     examined = _busy_period(arrivals, server)
     if examined is None:
-        latency_ns = _latency_ns(server)
-        return ceil(arrivals.burst + arrivals.rate * latency_ns)
+        return ceil(arrivals.burst + arrivals.rate * server.latency_ns)
     return max(q - server.served(span_ns) for q, span_ns in enumerate(examined, start=1))
 
 
-def delay_any_order(flow: Periodic, cross: Arrivals, server: SlotServer, *, blocking: int = 0) -> Outcome:
+def delay_any_order(flow: Periodic, cross: Arrivals, server: Server, *, blocking: int = 0) -> Outcome:
     """The worst delay of `flow`'s packets when the head may send `cross` first as it likes (priorities, any order).
 
     With priorities, `cross` is what is as urgent or more, and `blocking` the frames of the longest less urgent packet:
@@ -108,7 +107,7 @@ class _Counter:
         return self.seen
 
 
-def _busy_period(arrivals: Arrivals, server: SlotServer) -> list[int] | None:
+def _busy_period(arrivals: Arrivals, server: Server) -> list[int] | None:
     """The spans of the longest busy period, or until they repeat; None when that is too long to examine."""
     horizon_ns = _horizon_ns(arrivals, server)
     if horizon_ns is None and load(arrivals, server) == 1:
@@ -125,7 +124,7 @@ def _busy_period(arrivals: Arrivals, server: SlotServer) -> list[int] | None:
     return None
 
 
-def _horizon_ns(arrivals: Arrivals, server: SlotServer) -> int | None:
+def _horizon_ns(arrivals: Arrivals, server: Server) -> int | None:
     """Beyond this span completion and arrivals both repeat, and no new maximum comes."""
     pattern = arrivals.repeat()
     if pattern is None:
@@ -134,11 +133,6 @@ def _horizon_ns(arrivals: Arrivals, server: SlotServer) -> int | None:
     return onset_ns + 2 * lcm(length_ns, server.period_ns)
 
 
-def _latency_ns(server: SlotServer) -> Fraction:
-    """T of the rate-latency curve under the slot's: completion(n) <= T + n P/k, met by the first frame of a slot."""
-    return server.completion_ns(1) - Fraction(server.period_ns, server.frames)
-
-
-def _affine_ns(arrivals: Arrivals, server: SlotServer) -> int:
+def _affine_ns(arrivals: Arrivals, server: Server) -> int:
     """T + burst / R: token bucket against rate-latency server (Le Boudec & Thiran, 1.4.1)."""
-    return ceil(_latency_ns(server) + arrivals.burst * Fraction(server.period_ns, server.frames))
+    return ceil(server.latency_ns + arrivals.burst * Fraction(server.period_ns, server.frames))

@@ -14,10 +14,40 @@ than C start no later than if they all were C, so the largest airtime bounds a m
 the slot, loss, clock error (take the guard time off S).
 """
 
-from typing import NamedTuple
+from fractions import Fraction
+from typing import NamedTuple, Protocol
 
 from fanet_mw.errors import LocalProtocolError
 from fanet_mw.protocol.delay.outcome import Bounded, Outcome, Refused
+
+
+class Server(Protocol):
+    """What the bounds need to know of a head: how fast its queue empties in the worst case."""
+
+    @property
+    def frames(self) -> int:
+        """Frames per period."""
+        ...
+
+    @property
+    def period_ns(self) -> int: ...
+
+    @property
+    def latency_ns(self) -> Fraction:
+        """T of the rate-latency curve under the service: completion(n) <= T + n period / frames."""
+        ...
+
+    def check(self) -> None:
+        """Raise LocalProtocolError when the geometry is impossible."""
+        ...
+
+    def completion_ns(self, n: int) -> int:
+        """The longest time from the beginning of a busy period until `n` frames are through."""
+        ...
+
+    def served(self, window_ns: int) -> int:
+        """The frames that are certainly through after `window_ns` of a busy period."""
+        ...
 
 
 class SlotServer(NamedTuple):
@@ -39,6 +69,11 @@ class SlotServer(NamedTuple):
     def frames(self) -> int:
         """k, the whole frames of one slot."""
         return self.slot_ns // self.airtime_ns
+
+    @property
+    def latency_ns(self) -> Fraction:
+        """The first frame of a slot meets it: P >= k C makes the others less."""
+        return self.completion_ns(1) - Fraction(self.period_ns, self.frames)
 
     def completion_ns(self, n: int) -> int:
         """The longest time from the beginning of a busy period until `n` frames are through."""

@@ -68,9 +68,9 @@ def _tree(adjacency: Adjacency, roots: Sequence[NodeId]) -> dict[NodeId, NodeId]
 
 
 def access_outcome(
-    scenario: Scenario, adjacency: Adjacency, found: Ways, classes: Sequence[TrafficClass], *, spacing_ns: int
+    scenario: Scenario, adjacency: Adjacency, found: Ways, classes: Sequence[TrafficClass], *, spacing_ns: int | None
 ) -> Outcome:
-    """The longest time from any member to its head, all hops; `spacing_ns` is the least between two floods."""
+    """The longest time from any member to its head, all hops; `spacing_ns` is the least between two floods, if any."""
     if not classes or not any(found.hops.values()):
         return Bounded(0)
     most_hops = max(found.hops.values())
@@ -104,7 +104,7 @@ def _hop_ns(
     near: tuple[int, ...],
     own: tuple[int, ...],
     hops: int,
-    spacing_ns: int,
+    spacing_ns: int | None,
 ) -> int | None:
     """The least w that holds everything that can be sent before ours is through; None when it does not settle."""
     radio, dcf = scenario.radio, dcf_of(scenario.radio)
@@ -117,7 +117,8 @@ def _hop_ns(
     w_ns = 0
     for _ in range(_ROUNDS):
         wider_ns = stations * (w_ns // hello_every_ns + 1) * (frame_ns(radio, _HELLO_BYTES) + after_ns)
-        wider_ns += (stations + 1) * (w_ns // spacing_ns + 1) * (max(airtimes) + after_ns)
+        if spacing_ns is not None:
+            wider_ns += (stations + 1) * (w_ns // spacing_ns + 1) * (max(airtimes) + after_ns)
         for index, c in enumerate(classes):
             late_ns = (hops - 1) * (w_ns + radio.handover_ns)
             each = (w_ns + late_ns) // c.interval_ns + 1

@@ -17,8 +17,9 @@ from fanet_mw.protocol.delay import Bounded, Outcome, Refused, paper
 from fanet_mw.protocol.planner.access import Ways, access_outcome, ways
 from fanet_mw.protocol.planner.demand import TrafficClass
 from fanet_mw.protocol.planner.design import Design
-from fanet_mw.protocol.planner.flood import FloodCost, flood_cost
+from fanet_mw.protocol.planner.flood import FloodCost, flood_cost, frame_ns
 from fanet_mw.protocol.planner.head import ClusterPlan, Share, overhead_ns, slot_delays, work_ns
+from fanet_mw.protocol.planner.turns import Candidate, Superframe, judge, table_for
 from fanet_mw.protocol.topology import Adjacency, within_range
 from fanet_mw.scenario import Scenario
 from fanet_mw.units import Enu, NodeId, S, seconds_to_ns
@@ -97,21 +98,22 @@ def evaluate(site: Site, classes: Sequence[TrafficClass], design: Design) -> Pla
     found = ways(site.adjacency, head_of, classes)
     loads = _loads(heads, head_of, found, classes)
     shares = [_shares(site, head, load, classes, design) for head, load in zip(heads, loads, strict=True)]
-    spacing_ns = min((s.flood.spacing_ns for row in shares for s in row), default=S)
-    access = access_outcome(scenario, site.adjacency, found, classes, spacing_ns=spacing_ns)
-    uplink_ns = access.delay_ns if isinstance(access, Bounded) else _ASSUMED_UPLINK_NS
-    judged = tuple(
-        _cluster(
-            cluster.head,
-            members=len(cluster.members),
-            hops=max((found.hops.get(n, 0) for n in cluster.members), default=0),
-            slot_ns=slot_ns,
-            shares=row,
-            design=design,
-            jitter_ns=uplink_ns,
+    access = _access(site, found, classes, design, shares)
+    uplink_ns = access.delay_ns if isinstance(access, Bounded) else max(_ASSUMED_UPLINK_NS, _gap_ns(design))
+    candidates = [
+        Candidate(
+            cluster.head, len(cluster.members), max((found.hops.get(n, 0) for n in cluster.members), default=0), row
         )
-        for cluster, slot_ns, row in zip(clusters, _slots(design, shares), shares, strict=True)
-    )
+        for cluster, row in zip(clusters, shares, strict=True)
+    ]
+    unfit: tuple[str, ...] = ()
+    if design.relays == "timetable":
+        judged, unfit = _turned(site, candidates, classes, design, uplink_ns)
+    else:
+        judged = tuple(
+            _cluster(candidate, slot_ns=slot_ns, design=design, jitter_ns=uplink_ns)
+            for candidate, slot_ns in zip(candidates, _slots(design, shares), strict=True)
+        )
     summed = tuple(_class(index, c, judged, uplink_ns) for index, c in enumerate(classes))
     return Plan(
         design=design,
@@ -120,7 +122,7 @@ def evaluate(site: Site, classes: Sequence[TrafficClass], design: Design) -> Pla
         access=access,
         uplink_ns=uplink_ns,
         paper=_paper(judged, design),
-        problems=tuple(_problems(scenario, judged, summed)),
+        problems=unfit or tuple(_problems(scenario, judged, summed)),
         notes=tuple(_notes(access, judged, found, design, uplink_ns)),
     )
 
@@ -141,7 +143,11 @@ def _loads(
 def _shares(
     site: Site, head: NodeId, load: Sequence[int], classes: Sequence[TrafficClass], design: Design
 ) -> list[Share]:
-    """Sub-slots are as long as the longest packet needs, whatever flies in them."""
+    """Sub-slots and turns are as long as the longest packet needs, whatever flies in them."""
+    if design.relays == "timetable":
+        turn_ns = _superframe(site.scenario, classes, design).turn_ns
+        turn = FloodCost(turn_ns, turn_ns, 1, proven=True)
+        return [Share(n, c.interval_ns, turn) for n, c in zip(load, classes, strict=True)]
     longest = max((c.payload_bytes for c in classes), default=0)
     return [
         Share(n, c.interval_ns, site.flood(head, longest if design.relays == "scheduled" else c.payload_bytes, design))
@@ -170,30 +176,83 @@ def _slots(design: Design, shares: Sequence[Sequence[Share]]) -> list[int]:
     return [need + rest for need in needed] if rest >= 0 else [equal] * len(shares)
 
 
-def _cluster(
-    head: NodeId,
-    *,
-    members: int,
-    hops: int,
-    slot_ns: int,
-    shares: Sequence[Share],
-    design: Design,
-    jitter_ns: int,
-) -> ClusterPlan:
+def _gap_ns(design: Design) -> int:
+    """How long members may have to wait for the contention window."""
+    return design.period_ns - design.contention_ns if design.relays == "timetable" else 0
+
+
+def _access(
+    site: Site, found: Ways, classes: Sequence[TrafficClass], design: Design, shares: Sequence[Sequence[Share]]
+) -> Outcome:
+    """The way to the head. Under a timetable it shares no air with floods, but has to fit its window."""
+    if design.relays != "timetable":
+        spacing_ns = min((s.flood.spacing_ns for row in shares for s in row), default=S)
+        return access_outcome(site.scenario, site.adjacency, found, classes, spacing_ns=spacing_ns)
+    outcome = access_outcome(site.scenario, site.adjacency, found, classes, spacing_ns=None)
+    if isinstance(outcome, Refused):
+        return outcome
+    if outcome.delay_ns > design.contention_ns:
+        return Refused(
+            f"{outcome.delay_ns / 1e6:.0f} ms in the worst case, more than the contention window of "
+            f"{design.contention_ns / 1e6:.0f} ms"
+        )
+    return Bounded(outcome.delay_ns + _gap_ns(design))
+
+
+def _turned(
+    site: Site, candidates: Sequence[Candidate], classes: Sequence[TrafficClass], design: Design, jitter_ns: int
+) -> tuple[tuple[ClusterPlan, ...], tuple[str, ...]]:
+    """All heads under one timetable; when the turns do not suffice, each is refused with that, and it is said."""
+    superframe = _superframe(site.scenario, classes, design)
+    places = tuple((node, site.positions[node]) for node in sorted(site.positions))
+    table = table_for(site.scenario, places, candidates, superframe)
+    if not isinstance(table, Refused):
+        lead_ns = site.scenario.radio.lead_ns
+        judged = (judge(table, c, superframe, lead_ns=lead_ns, jitter_ns=jitter_ns) for c in candidates)
+        return tuple(judged), ()
+    return tuple(_refused(candidate, table, design) for candidate in candidates), (table.reason,)
+
+
+def _refused(candidate: Candidate, why: Refused, design: Design) -> ClusterPlan:
+    return ClusterPlan(
+        head=candidate.head,
+        members=candidate.members,
+        hops=candidate.hops,
+        slot_ns=0,
+        usable_ns=0,
+        work_ns=work_ns(candidate.shares, period_ns=design.period_ns),
+        packets=_packets(candidate.shares, design),
+        flood=_longest(candidate.shares),
+        delays=tuple(why if s.sources else Bounded(0) for s in candidate.shares),
+        backlog=None,
+    )
+
+
+def _superframe(scenario: Scenario, classes: Sequence[TrafficClass], design: Design) -> Superframe:
+    longest = max((c.payload_bytes for c in classes), default=scenario.traffic.payload_bytes)
+    return Superframe(design.period_ns, design.contention_ns, frame_ns(scenario.radio, longest) + design.guard_ns)
+
+
+def _cluster(candidate: Candidate, *, slot_ns: int, design: Design, jitter_ns: int) -> ClusterPlan:
+    shares = candidate.shares
     usable_ns = max(0, slot_ns - overhead_ns(_longest(shares), guard_ns=design.guard_ns))
     delays, waiting = slot_delays(shares, usable_ns=usable_ns, period_ns=design.period_ns, jitter_ns=jitter_ns)
     return ClusterPlan(
-        head=head,
-        members=members,
-        hops=hops,
+        head=candidate.head,
+        members=candidate.members,
+        hops=candidate.hops,
         slot_ns=slot_ns,
         usable_ns=usable_ns,
         work_ns=work_ns(shares, period_ns=design.period_ns),
-        packets=sum(s.sources * design.period_ns / s.interval_ns for s in shares),
+        packets=_packets(shares, design),
         flood=_longest(shares),
         delays=tuple(delays),
         backlog=waiting,
     )
+
+
+def _packets(shares: Sequence[Share], design: Design) -> float:
+    return sum(s.sources * design.period_ns / s.interval_ns for s in shares)
 
 
 def _class(index: int, c: TrafficClass, clusters: Sequence[ClusterPlan], uplink_ns: int) -> ClassPlan:
@@ -211,8 +270,10 @@ def _paper(clusters: Sequence[ClusterPlan], design: Design) -> Outcome:
     """Equations (3) and (4) of each cluster, its packets taken as evenly spaced; the greatest."""
     worst_ns = 0
     for cluster in clusters:
-        if not cluster.packets or not cluster.usable_ns:
+        if not cluster.packets:
             continue
+        if not cluster.usable_ns:
+            return Refused(f"head {cluster.head} has no slot")
         found = paper.cluster_estimate(
             airtime_ns=max(1, round(cluster.work_ns / cluster.packets)),
             slot_ns=cluster.usable_ns,

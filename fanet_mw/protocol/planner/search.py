@@ -10,7 +10,7 @@ from typing import Final
 
 from fanet_mw.protocol.delay import Refused
 from fanet_mw.protocol.planner.demand import TrafficClass, demands
-from fanet_mw.protocol.planner.design import Design, Relays
+from fanet_mw.protocol.planner.design import Design, Relays, Slots
 from fanet_mw.protocol.planner.feasibility import Change, Plan, Site, evaluate
 from fanet_mw.protocol.topology import Adjacency
 from fanet_mw.scenario import Scenario
@@ -18,6 +18,8 @@ from fanet_mw.units import Enu, NodeId, S
 
 _COUNTS: Final = (1, 2, 3, 4, 5, 6, 8, 11, 15, 22, 30, 44, 64)
 _PERIODS: Final = (0.1, 0.2, 0.4, 0.5, 0.7, 1.0, 1.4, 2.0, 3.0, 5.0, 10.0)
+_COARSE: Final = (0.2, 0.5, 1.0, 2.0)
+"""For a timetable, which takes a second to make: periods, and cluster counts."""
 _SLOWER: Final = (1.1, 1.25, 1.5, 2.0, 2.5, 3.0, 4.0, 5.0, 7.0, 10.0, 20.0, 50.0, 100.0)
 
 
@@ -28,18 +30,20 @@ def plan(
     adjacency: Adjacency | None = None,
     sources: Sequence[NodeId] | None = None,
     relays: Relays = "contended",
+    contention_ns: int = 0,
     search: bool = True,
 ) -> Plan | Refused:
     """Judge the scenario as it stands, and look for the cheapest change when it is not feasible.
 
-    `adjacency` is who hears whom, by default everyone within `radio.range_m`; `sources` are the nodes that send the
-    application's traffic. Refused when the traffic cannot be planned at all.
+    `adjacency` is who hears whom, by default everyone within `radio.range_m` (a timetable looks at positions only);
+    `sources` are the nodes that send the application's traffic; `contention_ns` is the window before a timetable's
+    turns. Refused when the traffic cannot be planned at all.
     """
     classes = demands(scenario, sources)
     if isinstance(classes, Refused):
         return classes
     site = Site(scenario, positions, adjacency)
-    design = Design.of(scenario, relays=relays)
+    design = Design.of(scenario, relays=relays, contention_ns=contention_ns)
     found = evaluate(site, classes, design)
     if found.feasible or not search:
         return found
@@ -55,16 +59,15 @@ def _cheapest(site: Site, classes: Sequence[TrafficClass], design: Design) -> Ch
 
 
 def _candidates(design: Design, nodes: int) -> Iterator[Design]:
-    counts = sorted({design.clusters, *(n for n in _COUNTS if n < max(2, nodes))})
-    periods = sorted({round(design.period_ns * factor) for factor in _PERIODS})
-    for clusters, period_ns, by_load, scheduled in product(counts, periods, (False, True), (False, True)):
-        candidate = Design(
-            clusters,
-            period_ns,
-            design.guard_ns,
-            slots="by_load" if by_load else "equal",
-            relays="scheduled" if scheduled else design.relays,
-        )
+    coarse = design.relays == "timetable"
+    several = [round(design.clusters * factor) for factor in _COARSE] if coarse else _COUNTS
+    counts = sorted({design.clusters, *(n for n in several if 1 <= n < max(2, nodes))})
+    periods = sorted({round(design.period_ns * factor) for factor in (_COARSE if coarse else _PERIODS)})
+    slots: tuple[Slots, ...] = ("equal",) if coarse else ("equal", "by_load")
+    relays: tuple[Relays, ...] = ("contended", "scheduled") if design.relays == "contended" else (design.relays,)
+    for clusters, period_ns, divided, relayed in product(counts, periods, slots, relays):
+        contention_ns = design.contention_ns * period_ns // design.period_ns
+        candidate = Design(clusters, period_ns, design.guard_ns, divided, relayed, contention_ns)
         if candidate != design and design.guard_ns < period_ns // clusters:
             yield candidate
 

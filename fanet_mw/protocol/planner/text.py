@@ -24,7 +24,7 @@ def _lines(found: Plan) -> Iterator[str]:
     yield "  head  members  hops  slot ms  flood ms  every ms  packets/period  used %  queue"
     yield from (_cluster(cluster) for cluster in found.clusters)
     bottleneck = found.bottleneck
-    if bottleneck is not None:
+    if bottleneck is not None and bottleneck.usable_ns:
         yield f"  bottleneck: the slot of head {bottleneck.head}, {100 * bottleneck.utilization:.0f} % used"
     if isinstance(found.access, Bounded):
         yield f"  way to the head: {_say(found.access)}"
@@ -45,9 +45,10 @@ def _classes(classes: Sequence[ClassPlan]) -> Iterator[str]:
 
 def _cluster(c: ClusterPlan) -> str:
     queue = "-" if c.backlog is None else str(c.backlog)
+    used = f"{100 * c.utilization:.0f}" if c.usable_ns else "-"
     return (
         f"  {c.head:4}  {c.members:7}  {c.hops:4}  {c.slot_ns / MS:7.1f}  {c.flood.duration_ns / MS:8.1f}  "
-        f"{c.flood.spacing_ns / MS:8.1f}  {c.packets:14.1f}  {100 * c.utilization:6.0f}  {queue:>5}"
+        f"{c.flood.spacing_ns / MS:8.1f}  {c.packets:14.1f}  {used:>6}  {queue:>5}"
     )
 
 

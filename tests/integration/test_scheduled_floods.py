@@ -1,0 +1,52 @@
+"""Whole swarms whose floods are scheduled: everything arrives, within the bound the nodes computed."""
+
+from typing import Any
+
+import pytest
+
+from sim import catalog
+from sim.results import finish
+from sim.run import simulate
+
+SHORT = ["duration_s=26", "warmup_s=12"]
+
+
+def summary_of(*settings: str) -> dict[str, Any]:
+    return finish(simulate(catalog.find("clusters", [*SHORT, *settings])), out=None)
+
+
+@pytest.mark.parametrize("period_s", [0.5, 1])
+def test_on_the_grid_every_packet_reaches_everyone_within_the_bound(period_s: float) -> None:
+    summary = summary_of(f"clusters.flooding_period_s={period_s}")
+    assert summary["pdr"] >= 0.999
+    bound = summary["bound"]
+    assert bound["violations"] == 0
+    assert bound["classes"]["traffic"]["deliveries"] > 15_000
+    assert 0.9 < bound["observed_max_ms"] / bound["worst_ms"] <= 1
+    assert summary["frames"]["closes"]
+
+
+def test_with_interference_beyond_the_range_too() -> None:
+    summary = summary_of("clusters.flooding_period_s=1", "radio.channel=log_distance")
+    assert summary["pdr"] >= 0.99
+    assert summary["bound"]["violations"] == 0
+
+
+def test_a_lead_costs_turns_but_no_packets() -> None:
+    """As in real time: a relay announces itself 20 ms ahead, so hops are 17 turns apart."""
+    summary = summary_of("clusters.flooding_period_s=1", "radio.lead_ms=20", "radio.handover_ms=2")
+    assert summary["pdr"] >= 0.99
+    assert summary["bound"]["violations"] == 0
+
+
+def test_more_than_fits_is_carried_as_far_as_it_fits_and_has_no_bound() -> None:
+    summary = summary_of("clusters.flooding_period_s=1", "traffic.interval_s=0.1")
+    assert summary["bound"] == {}
+    assert 0.2 < summary["pdr"] < 0.6
+    assert summary["frames"]["closes"]
+
+
+def test_heads_let_out_what_their_members_bring_them_in_the_contention_window() -> None:
+    summary = summary_of("clusters.count=8", "clusters.flooding_period_s=1", "clusters.contention_ms=150")
+    assert summary["pdr"] >= 0.95
+    assert summary["frames"]["closes"]

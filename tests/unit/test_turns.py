@@ -1,0 +1,70 @@
+"""The superframe of collision-free floods, by hand: a window of 40 ms, turns of 2 ms, 100 ms in all."""
+
+import pytest
+from hypothesis import given
+from hypothesis import strategies as st
+
+from fanet_mw.protocol.turns import Turns
+from fanet_mw.units import MS
+
+TURNS = Turns(origin_ns=7 * MS, period_ns=100 * MS, contention_ns=40 * MS, turn_ns=2 * MS, per_frame=29)
+
+
+@pytest.mark.parametrize(
+    ("at_ms", "turn"),
+    [(7, None), (46.999, None), (47, 0), (48.999, 0), (49, 1), (103, 28), (104.999, 28), (105, None), (147, 0)],
+)
+def test_an_instant_belongs_to_a_turn_or_to_none(at_ms: float, turn: int | None) -> None:
+    assert TURNS.turn_at(round(at_ms * MS)) == turn
+
+
+def test_offsets_reach_into_later_superframes() -> None:
+    assert TURNS.start_ns(0, frame_start_ns=7 * MS) == 47 * MS
+    assert TURNS.start_ns(28, frame_start_ns=7 * MS) == 103 * MS
+    assert TURNS.start_ns(29, frame_start_ns=7 * MS) == 147 * MS
+
+
+def test_the_next_of_some_turns_is_found_over_the_end_of_the_superframe() -> None:
+    assert TURNS.next_start_ns((3, 10), not_before_ns=0) == 53 * MS - 100 * MS + 100 * MS
+    assert TURNS.next_start_ns((3, 10), not_before_ns=53 * MS) == 53 * MS
+    assert TURNS.next_start_ns((3, 10), not_before_ns=53 * MS + 1) == 67 * MS
+    assert TURNS.next_start_ns((3, 10), not_before_ns=68 * MS) == 153 * MS
+
+
+def test_what_contends_waits_for_a_window_and_leaves_its_end_free() -> None:
+    assert TURNS.contending_ns(10 * MS, lambda: 0.5) == 10 * MS
+    assert TURNS.contending_ns(41 * MS, lambda: 0.5) == 41 * MS
+    assert TURNS.contending_ns(42 * MS, lambda: 0.5) == 107 * MS + round(0.5 * 35 * MS)
+    assert TURNS.contending_ns(90 * MS, lambda: 0.999) < 147 * MS - 5 * MS
+
+
+def exact_worst_ns(roots: tuple[int, ...], interval_ns: int, span: int) -> int:
+    """Every phase of a periodic source, in steps finer than anything in the geometry, first come first served."""
+    worst = 0
+    for phase_ns in range(1, TURNS.period_ns + interval_ns, 500_000):
+        free_ns = 0
+        for packet in range(60):
+            born_ns = phase_ns + packet * interval_ns
+            start_ns = TURNS.next_start_ns(roots, not_before_ns=max(born_ns, free_ns))
+            free_ns = start_ns + 1
+            worst = max(worst, start_ns + span * TURNS.turn_ns - born_ns)
+    return worst
+
+
+@given(st.sets(st.integers(0, 28), min_size=1, max_size=4), st.integers(20, 250), st.integers(1, 10))
+def test_the_bound_is_never_broken_and_nearly_reached(roots: set[int], interval_ms: int, span: int) -> None:
+    ordered, interval_ns = tuple(sorted(roots)), interval_ms * MS
+    bound_ns = TURNS.worst_ns(ordered, span=span, interval_ns=interval_ns)
+    if len(roots) * interval_ns < TURNS.period_ns:
+        assert bound_ns is None
+        return
+    assert bound_ns is not None
+    worst_ns = exact_worst_ns(ordered, interval_ns, span)
+    assert worst_ns <= bound_ns
+    if len(roots) == 1:
+        assert worst_ns >= bound_ns - 1 * MS
+
+
+def test_a_backlog_that_no_turn_drains_has_no_bound() -> None:
+    assert TURNS.worst_ns((3,), span=1, interval_ns=99 * MS) is None
+    assert TURNS.worst_ns((3,), span=1, interval_ns=100 * MS) is not None

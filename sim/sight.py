@@ -1,7 +1,8 @@
 """Line of sight between nodes: which pairs that could hear each other have something solid between them.
 
 Only pairs within the radio's reach are asked for, and only those of which one end is below the highest obstacle: above
-it nothing can stand in the way. Not modeled: diffraction over an edge, the Fresnel zone, how thick an obstacle is.
+it nothing can stand in the way. Not modeled: diffraction over an edge, the Fresnel zone, how thick an obstacle is;
+survivors' phones, which are heard through walls.
 """
 
 from array import array

@@ -276,6 +276,17 @@ def test_floods_that_do_not_fit_the_turns_are_the_one_problem_named(make_scenari
     assert "no slot" in describe(found)
 
 
+def test_of_many_heads_the_fullest_are_listed_and_the_others_counted() -> None:
+    scenario = catalog.find("clusters")
+    text = describe(plan(scenario, placed(scenario)))
+    assert "and 33 heads with no fuller slots" in text
+
+
+def test_repairs_are_said_to_come_later_than_any_bound(planned) -> None:
+    assert "repairs" in describe(planned(**{"clusters.repair_s": 10}))
+    assert "repairs" not in describe(planned())
+
+
 def test_every_packet_goes_through_all_nodes_between_it_and_its_head() -> None:
     line = within_range({NodeId(n): Enu(200.0 * n, 0, 0) for n in range(1, 6)}, range_m=250)
     one = TrafficClass("application", 100, S, tuple(NodeId(n) for n in (1, 2, 5)))

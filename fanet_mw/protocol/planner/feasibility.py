@@ -99,7 +99,7 @@ def evaluate(site: Site, classes: Sequence[TrafficClass], design: Design) -> Pla
     loads = _loads(heads, head_of, found, classes)
     shares = [_shares(site, head, load, classes, design) for head, load in zip(heads, loads, strict=True)]
     access = _access(site, found, classes, design, shares)
-    uplink_ns = access.delay_ns if isinstance(access, Bounded) else max(_ASSUMED_UPLINK_NS, design.period_ns)
+    uplink_ns = access.delay_ns if isinstance(access, Bounded) else _assumed_ns(design)
     candidates = [
         Candidate(
             cluster.head, len(cluster.members), max((found.hops.get(n, 0) for n in cluster.members), default=0), row
@@ -123,7 +123,7 @@ def evaluate(site: Site, classes: Sequence[TrafficClass], design: Design) -> Pla
         uplink_ns=uplink_ns,
         paper=_paper(judged, design),
         problems=unfit or tuple(_problems(scenario, judged, summed)),
-        notes=tuple(_notes(access, judged, found, design, uplink_ns)),
+        notes=(*_notes(access, judged, found, design, uplink_ns), *_repairs(scenario)),
     )
 
 
@@ -168,6 +168,11 @@ def _slots(design: Design, shares: Sequence[Sequence[Share]]) -> list[int]:
     ]
     rest = (design.period_ns - sum(needed)) // len(shares)
     return [need + rest for need in needed] if rest >= 0 else [equal] * len(shares)
+
+
+def _assumed_ns(design: Design) -> int:
+    """The way to the head where nothing bounds it; a timetable lets members contend only once per period."""
+    return max(_ASSUMED_UPLINK_NS, design.period_ns) if design.relays == "timetable" else _ASSUMED_UPLINK_NS
 
 
 def _access(
@@ -298,6 +303,11 @@ def _problems(scenario: Scenario, clusters: Sequence[ClusterPlan], classes: Sequ
                 f"{c.name}: takes up to {c.bound.delay_ns / S:.1f} s, "
                 f"routing.lifetime_s = {scenario.routing.lifetime_s:g}"
             )
+
+
+def _repairs(scenario: Scenario) -> Iterator[str]:
+    if scenario.clusters.repair_s > 0:
+        yield "repairs of lost packets come later than any bound here, and their load is not counted"
 
 
 def _notes(

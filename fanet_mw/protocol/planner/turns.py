@@ -1,16 +1,13 @@
 """Heads judged under a timetable: the turns that the running protocol will give them, and the bound of their gaps.
 
-The table is made as `scheduled` makes it: one turn per packet of the application and period for each head, one for the
-leader, fewer when they do not fit. Who knows the turns knows the longest wait; the flood's span comes on top, whatever
-other floods run through the swarm meanwhile.
+The table is the one that `scheduled` makes. Who knows the turns knows the longest wait; the flood's span comes on top,
+whatever other floods run through the swarm meanwhile.
 """
 
 from collections.abc import Mapping, Sequence
 from itertools import chain
-from math import ceil
-from typing import Final, NamedTuple
+from typing import NamedTuple
 
-from fanet_mw import wire
 from fanet_mw.protocol.delay import (
     Bounded,
     Outcome,
@@ -24,12 +21,11 @@ from fanet_mw.protocol.delay import (
 )
 from fanet_mw.protocol.planner.flood import FloodCost
 from fanet_mw.protocol.planner.head import ClusterPlan, Share
-from fanet_mw.protocol.timetable import Geometry, Timetable, timetable
-from fanet_mw.protocol.turns import turn_ns
+from fanet_mw.protocol.scheduled import fit, largest_frame
+from fanet_mw.protocol.timetable import Timetable
+from fanet_mw.protocol.turns import Turns, turn_ns
 from fanet_mw.scenario import Scenario
-from fanet_mw.units import MS, Enu, NodeId, seconds_to_ns
-
-_FEWER: Final = 0.85  # as `scheduled` does
+from fanet_mw.units import MS, Enu, NodeId
 
 
 class Superframe(NamedTuple):
@@ -55,10 +51,8 @@ class Candidate(NamedTuple):
 
 def superframe_of(scenario: Scenario, *, period_ns: int) -> Superframe:
     """The geometry of a scenario with this flooding period."""
-    members = min(scenario.nodes.count, 56)
-    schedule_bytes = wire.HEADER_BYTES + 262 + 189 * -(-members // 28)  # one part and its places, as in `scheduled`
-    longest = max(scenario.traffic.payload_bytes, schedule_bytes)
-    return Superframe(period_ns, round(scenario.clusters.contention_ms * MS), turn_ns(scenario, payload_bytes=longest))
+    turn = turn_ns(scenario, payload_bytes=largest_frame(scenario))
+    return Superframe(period_ns, round(scenario.clusters.contention_ms * MS), turn)
 
 
 def table_for(
@@ -68,24 +62,9 @@ def table_for(
     superframe: Superframe,
 ) -> Timetable | Refused:
     """The running protocol's timetable for heads with so many members; refused when one packet each does not fit."""
-    clusters, radio = scenario.clusters, scenario.radio
-    geometry = Geometry(
-        link_m=clusters.link_m or radio.range_m,
-        interference_m=clusters.interference_m or radio.range_m * (1 if radio.channel == "range" else 2),
-        turns=superframe.turns,
-        hop_turns=1 + -(-(radio.lead_ns + radio.handover_ns) // superframe.turn_ns),
-    )
-    per_member = superframe.period_ns / seconds_to_ns(scenario.traffic.interval_s)
-    share = 1.0
-    while superframe.turns:
-        wanted = {head: max(1, ceil(count * per_member * share)) for head, count in sorted(members.items())}
-        roots = tuple(head for head, packets in wanted.items() for _ in range(packets))
-        found = timetable(tuple(positions), roots, geometry)
-        if found is not None:
-            return found
-        if all(packets == 1 for packets in wanted.values()):
-            break
-        share *= _FEWER
+    found = fit(scenario, tuple(positions), members, Turns(0, *superframe, superframe.turns))
+    if found is not None:
+        return found
     return Refused(
         f"one packet of each of {len(members)} heads does not fit {superframe.turns} turns of "
         f"{superframe.turn_ns / 1e6:.2f} ms in {superframe.period_ns / 1e6:g} ms"

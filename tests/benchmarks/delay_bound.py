@@ -13,6 +13,7 @@ sys.path.append(str(Path(__file__).parents[1] / "property"))
 
 from slot_simulator import Slot, delays, network
 
+from fanet_mw.airtime import OVERHEAD_BYTES, frame_ns
 from fanet_mw.protocol.delay import (
     Bounded,
     Contention,
@@ -23,7 +24,6 @@ from fanet_mw.protocol.delay import (
     SlotServer,
     Total,
     access_bound,
-    airtime_ns,
     delay_fifo,
     paper,
     path_bounds,
@@ -144,7 +144,7 @@ def aggregates(cases: int) -> None:
 
 
 def access() -> None:
-    frame = airtime_ns(1024 + 100, rate_mbps=11)
+    frame = frame_ns(1024 + 100 + OVERHEAD_BYTES, rate_mbps=11, short=False)
     for stations in (1, 2, 5, 12, 23):
         for attempts in (3, 7):
             found = access_bound(Dcf(attempts=attempts), frame, Contention(stations, frame))

@@ -3,14 +3,15 @@
 import pytest
 from medium_driver import disc, medium, poses
 
-from fanet_mw.airtime import DETECT_NS, Timing, frame_ns
+from fanet_mw.airtime import DETECT_NS, OVERHEAD_BYTES, airtime_ns
 from fanet_mw.messages import TxOutcome, TxRequest, TxStatus
-from fanet_mw.protocol.delay import Bounded, Contention, Dcf, Refused, access_bound, airtime_ns
+from fanet_mw.protocol.delay import Bounded, Contention, Dcf, Refused, access_bound
 from fanet_mw.scenario import Radio
 from fanet_mw.topics import Topics
 from fanet_mw.units import MS, US, NodeId, S
 
 HEAD = NodeId(1)
+AIRTIME_NS = airtime_ns(1024 + OVERHEAD_BYTES, Radio(), rate_mbps=11)
 
 
 def outcomes(stations: int, *, seed: int, frames_each: int = 1, size: int = 1024, **radio: object) -> list[TxStatus]:
@@ -28,19 +29,15 @@ def outcomes(stations: int, *, seed: int, frames_each: int = 1, size: int = 1024
     return [message for _, message in air.outbox if type(message) is TxStatus]
 
 
-def test_the_constants_are_the_emulator_s() -> None:
-    timing, dcf = Timing.of(Radio()), Dcf()
-    assert (dcf.slot_ns, dcf.sifs_ns, dcf.ack_ns) == (timing.slot_ns, timing.sifs_ns, timing.ack_ns)
-    assert (dcf.ack_timeout_ns, dcf.eifs_ns) == (timing.ack_timeout_ns, timing.difs_ns + timing.eifs_extra_ns)
-    assert airtime_ns(1024, rate_mbps=11) == frame_ns(1024 + 64, rate_mbps=11, short=False)
-    assert dcf.slot_ns > DETECT_NS, "a backoff slot that is cut short costs at most itself"
+def test_the_defaults_are_those_of_the_reference_radio() -> None:
+    assert Dcf() == Dcf.of(Radio())
+    assert Dcf().slot_ns > DETECT_NS, "a backoff slot that is cut short costs at most itself"
 
 
 @pytest.mark.parametrize("access", ["standard", "ns3"])
 @pytest.mark.parametrize(("stations", "frames_each"), [(2, 1), (5, 3), (12, 1), (24, 2)])
 def test_no_unicast_takes_longer_than_its_bound(access: str, stations: int, frames_each: int) -> None:
-    airtime = airtime_ns(1024, rate_mbps=11)
-    bound = access_bound(Dcf(), airtime, Contention(stations, airtime, frames_each, own_frames=frames_each))
+    bound = access_bound(Dcf(), AIRTIME_NS, Contention(stations, AIRTIME_NS, frames_each, own_frames=frames_each))
     assert isinstance(bound, Bounded)
     worst = 0
     for seed in range(15):
@@ -61,8 +58,7 @@ def test_with_backoffs_of_fixed_size_the_bound_of_a_lone_station_is_near() -> No
     while (wake_ns := air.next_wake_ns()) is not None and wake_ns < 9 * S:
         air.wake(wake_ns)
     (status,) = [message for _, message in air.outbox if type(message) is TxStatus]
-    airtime = airtime_ns(1024, rate_mbps=11)
-    bound = access_bound(Dcf(cw_min=1, cw_max=1), airtime, Contention(1, airtime))
+    bound = access_bound(Dcf(cw_min=1, cw_max=1), AIRTIME_NS, Contention(1, AIRTIME_NS))
     assert isinstance(bound, Bounded)
     assert status.outcome is TxOutcome.RETRY_LIMIT
     assert 0 <= bound.delay_ns - (status.end_ns - S) <= (7 * (364 - 50 + 20) + 50) * US

@@ -5,7 +5,7 @@ superframe; `arrivals` and `network` are the parts of network calculus that boun
 hops; `access` is the way to the head below.
 """
 
-from fanet_mw.protocol.delay.access import Contention, Dcf, access_bound, airtime_ns, guard_ns
+from fanet_mw.protocol.delay.access import Contention, Dcf, access_bound, guard_ns
 from fanet_mw.protocol.delay.arrivals import Arrivals, Limited, Periodic, Total, token_bucket
 from fanet_mw.protocol.delay.network import backlog, delay_any_order, delay_fifo
 from fanet_mw.protocol.delay.outcome import Bounded, Outcome, Refused
@@ -29,7 +29,6 @@ __all__ = [
     "Total",
     "TurnServer",
     "access_bound",
-    "airtime_ns",
     "backlog",
     "delay_any_order",
     "delay_fifo",

@@ -21,13 +21,13 @@ It is far above what is seen: all backoffs would have to be the greatest at once
 from math import ceil
 from typing import Final, NamedTuple
 
+from fanet_mw.airtime import Timing
 from fanet_mw.errors import LocalProtocolError
 from fanet_mw.protocol.delay.outcome import Bounded, Outcome, Refused
+from fanet_mw.scenario_radio import Radio
 from fanet_mw.units import US
 
 _LIGHT_M_PER_S: Final = 299_792_458
-_OVERHEAD_BYTES: Final = 64
-"""UDP 8, IPv4 20, LLC/SNAP 8, MAC 24, FCS 4."""
 
 
 class Dcf(NamedTuple):
@@ -42,6 +42,21 @@ class Dcf(NamedTuple):
     cw_max: int = 1023
     attempts: int = 7
 
+    @classmethod
+    def of(cls, radio: Radio) -> "Dcf":
+        """The constants that a scenario's standard, rates and preamble give."""
+        timing = Timing.of(radio)
+        return cls(
+            slot_ns=timing.slot_ns,
+            sifs_ns=timing.sifs_ns,
+            eifs_ns=timing.difs_ns + timing.eifs_extra_ns,
+            ack_ns=timing.ack_ns,
+            ack_timeout_ns=timing.ack_timeout_ns,
+            cw_min=radio.cw_min,
+            cw_max=radio.cw_max,
+            attempts=radio.max_attempts,
+        )
+
     def window(self, attempt: int) -> int:
         """The contention window [slots] of an attempt, the first being 0 (10.3.3)."""
         return min(self.cw_max, ((self.cw_min + 1) << attempt) - 1)
@@ -54,11 +69,6 @@ class Contention(NamedTuple):
     airtime_ns: int
     frames_each: int = 1
     own_frames: int = 1
-
-
-def airtime_ns(payload_bytes: int, *, rate_mbps: float, plcp_ns: int = 192 * US) -> int:
-    """Airtime of a data frame with UDP, IPv4 and MAC headers, DSSS: rounded up to 1 us (16.3.4)."""
-    return plcp_ns + ceil(8 * (payload_bytes + _OVERHEAD_BYTES) / rate_mbps) * US
 
 
 def access_bound(dcf: Dcf, own_airtime_ns: int, others: Contention, *, window_ns: int | None = None) -> Outcome:

@@ -9,9 +9,9 @@ jitter, so each hop's bound feeds the next; if it grows beyond the flooding peri
 from collections.abc import Mapping, Sequence
 from typing import Final, NamedTuple
 
-from fanet_mw.protocol.delay import Bounded, Outcome, Refused
+from fanet_mw.protocol.delay import Bounded, Dcf, Outcome, Refused
 from fanet_mw.protocol.planner.demand import TrafficClass
-from fanet_mw.protocol.planner.flood import dcf_of, frame_ns
+from fanet_mw.protocol.planner.flood import frame_ns
 from fanet_mw.protocol.topology import Adjacency, two_hop
 from fanet_mw.scenario import Scenario
 from fanet_mw.units import NodeId, seconds_to_ns
@@ -107,7 +107,7 @@ def _hop_ns(
     spacing_ns: int | None,
 ) -> int | None:
     """The least w that holds everything that can be sent before ours is through; None when it does not settle."""
-    radio, dcf = scenario.radio, dcf_of(scenario.radio)
+    radio, dcf = scenario.radio, Dcf.of(scenario.radio)
     *packets, stations = near
     hello_every_ns = max(1, seconds_to_ns(scenario.routing.hello_interval_s) or scenario.duration_ns)
     airtimes = [frame_ns(radio, c.payload_bytes) for c in classes]

@@ -123,7 +123,7 @@ def evaluate(site: Site, classes: Sequence[TrafficClass], design: Design) -> Pla
         uplink_ns=uplink_ns,
         paper=_paper(judged, design),
         problems=unfit or tuple(_problems(scenario, judged, summed)),
-        notes=(*_notes(access, judged, found, design, uplink_ns), *_repairs(scenario)),
+        notes=(*_notes(access, judged, found, design, uplink_ns), *_left_out(scenario)),
     )
 
 
@@ -305,7 +305,9 @@ def _problems(scenario: Scenario, clusters: Sequence[ClusterPlan], classes: Sequ
             )
 
 
-def _repairs(scenario: Scenario) -> Iterator[str]:
+def _left_out(scenario: Scenario) -> Iterator[str]:
+    if scenario.radio.channel != "range":
+        yield "who hears whom is taken by distance, up to radio.range_m, whatever the channel does"
     if scenario.clusters.repair_s > 0:
         yield "repairs of lost packets come later than any bound here, and their load is not counted"
 

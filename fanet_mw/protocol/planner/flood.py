@@ -7,10 +7,11 @@ CSMA/CA bounds neither. Under a timetable both are exact; see `turns.py`.
 
 from typing import NamedTuple
 
-from fanet_mw.protocol.delay import Dcf, airtime_ns
+from fanet_mw.airtime import OVERHEAD_BYTES, airtime_ns
+from fanet_mw.protocol.delay import Dcf
 from fanet_mw.protocol.topology import Adjacency, levels, two_hop
 from fanet_mw.scenario import Radio, Scenario
-from fanet_mw.units import MS, US, NodeId
+from fanet_mw.units import MS, NodeId
 
 
 class FloodCost(NamedTuple):
@@ -22,25 +23,9 @@ class FloodCost(NamedTuple):
     proven: bool
 
 
-def plcp_ns(radio: Radio) -> int:
-    return (96 if radio.preamble == "short" else 192) * US
-
-
 def frame_ns(radio: Radio, payload_bytes: int) -> int:
-    return airtime_ns(payload_bytes, rate_mbps=radio.rate_mbps, plcp_ns=plcp_ns(radio))
-
-
-def dcf_of(radio: Radio) -> Dcf:
-    """The MAC's constants under this radio."""
-    ack_ns = plcp_ns(radio) + -(-8 * 14 * 1000 // round(radio.ack_rate_mbps * 1000)) * US
-    timeout_ns = Dcf().sifs_ns + Dcf().slot_ns + plcp_ns(radio)
-    return Dcf(
-        ack_ns=ack_ns,
-        ack_timeout_ns=timeout_ns,
-        cw_min=radio.cw_min,
-        cw_max=radio.cw_max,
-        attempts=radio.max_attempts,
-    )
+    """Airtime of a data frame with this UDP payload."""
+    return airtime_ns(payload_bytes + OVERHEAD_BYTES, radio, rate_mbps=radio.rate_mbps)
 
 
 def flood_cost(scenario: Scenario, adjacency: Adjacency, root: NodeId, *, payload_bytes: int) -> FloodCost:
@@ -48,7 +33,7 @@ def flood_cost(scenario: Scenario, adjacency: Adjacency, root: NodeId, *, payloa
     frame = frame_ns(scenario.radio, payload_bytes)
     clusters, radio = scenario.clusters, scenario.radio
     hops = levels(adjacency, root)
-    dcf = dcf_of(radio)
+    dcf = Dcf.of(radio)
     difs_ns = dcf.sifs_ns + 2 * dcf.slot_ns
     per_frame_ns = frame + difs_ns + dcf.cw_min * dcf.slot_ns // 2
     sharing = max(1 + sum(1 for n in near if n in hops) for node, near in two_hop(adjacency).items() if node in hops)

@@ -7,13 +7,13 @@ import numpy.typing as npt
 
 from emulator import kernel
 from emulator import state as s
-from emulator.airtime import DETECT_NS, OVERHEAD_BYTES, Timing, airtime_ns, lifetime_ns
 from emulator.error_rate import header_rates, log_success_per_bit
 from emulator.fading import law_of, seeds
 from emulator.faults import Faults
 from emulator.link_book import LinkBook
 from emulator.propagation import Links, milliwatt, noise_mw, pair_codes
 from emulator.shadowing import Shadowing
+from fanet_mw.airtime import DETECT_NS, OVERHEAD_BYTES, Timing, airtime_ns, lifetime_ns
 from fanet_mw.link_stats import LinkStats
 from fanet_mw.rng import stream_seed
 from fanet_mw.scenario import Radio

@@ -18,7 +18,7 @@ from collections.abc import Callable
 from typing import Final, Protocol
 from zlib import crc32
 
-from emulator.airtime import Timing
+from fanet_mw.airtime import Timing
 from fanet_mw.scenario_radio import Radio, is_ofdm
 from fanet_mw.units import BROADCAST, US, S
 

@@ -5,7 +5,7 @@ A key is a contract with users: renaming one breaks their files and sweeps. Deri
 
 import math
 from collections.abc import Sequence
-from typing import Annotated, Literal, Self
+from typing import Annotated, Final, Literal, Self
 
 from pydantic import Field, model_validator
 
@@ -59,7 +59,9 @@ class Traffic(Section):
 class Routing(Section):
     """The protocol above the radio."""
 
-    protocol: Literal["direct", "flooding", "clustered"] = "clustered"
+    protocol: Literal["direct", "flooding", "clustered", "aodv", "olsr", "dsdv", "gossip", "counter", "geographic"] = (
+        "clustered"
+    )
     jitter_ms: NonNegative = 10.0
     """A relay waits U(0, jitter) after a reception."""
     hop_limit: Annotated[int, Field(ge=1, le=255)] = 32
@@ -69,6 +71,14 @@ class Routing(Section):
     """A packet older than this is dropped where it waits."""
     hello_interval_s: NonNegative = 1.0
     """Position beacon and hello, one hop; 0 sends none (`clustered` needs them)."""
+    gossip_p: Annotated[float, Field(ge=0, le=1)] = 0.65
+    """Protocol `gossip`: probability with which a node relays a flooded packet."""
+    gossip_k: Annotated[int, Field(ge=0, le=255)] = 1
+    """Protocol `gossip`: within so many hops of the origin everyone relays."""
+    counter: Annotated[int, Field(ge=2)] = 3
+    """Protocol `counter`: a node that has heard so many copies does not relay."""
+    assess_ms: NonNegative = 20.0
+    """Protocol `counter`: copies are counted for U(0, assess_ms)."""
 
     @property
     def jitter_ns(self) -> int:
@@ -238,6 +248,11 @@ class Scenario(Section):
         return NodeId(1)
 
 
+_RIVALS: Final = ("aodv", "olsr", "dsdv", "geographic")
+_RIVAL_FRAME_BYTES: Final = 256
+"""Control messages of a fixed length must fit one frame; longer ones are divided."""
+
+
 def _disagreements(scenario: Scenario) -> Sequence[str]:
     """What each table allows alone but the scenario as a whole does not."""
     found = []
@@ -261,6 +276,11 @@ def _disagreements(scenario: Scenario) -> Sequence[str]:
             f"<= radio.max_frame_bytes = {scenario.radio.max_frame_bytes}"
         )
     found += _impossible_faults(scenario)
+    if scenario.routing.protocol in _RIVALS and scenario.radio.max_frame_bytes < _RIVAL_FRAME_BYTES:
+        found.append(
+            f"radio.max_frame_bytes = {scenario.radio.max_frame_bytes} must be >= {_RIVAL_FRAME_BYTES} for "
+            f"routing.protocol = {scenario.routing.protocol}"
+        )
     if scenario.routing.protocol == "clustered":
         clusters = scenario.clusters
         if clusters.count >= max(2, count):

@@ -54,6 +54,11 @@ class Kind(IntEnum):
     JOIN = 2
     SCHEDULE = 3
     TIME = 4
+    ROUTING = 8
+    """Control of a rival protocol (`fanet_mw.routing.control`)."""
+
+
+_KINDS: Final = frozenset(int(kind) for kind in Kind)
 
 
 class Role(IntEnum):
@@ -134,7 +139,6 @@ class Header(NamedTuple):
 
 
 _HEADER_FIELDS: Final = len(Header._fields)
-_LAST_KIND: Final = int(max(Kind))
 _new: Final = tuple.__new__
 """Makes a named tuple three times as fast as its class does; for what is made once per frame."""
 
@@ -161,7 +165,7 @@ def decode_header(frame: bytes) -> Header:
     header = _new(Header, fields[:_HEADER_FIELDS])
     if (
         version != VERSION
-        or kind > _LAST_KIND
+        or kind not in _KINDS
         or origin_us > LATEST_US
         or not 0 < origin < _ANY_NODE
         or not 0 < prev_hop < _ANY_NODE
@@ -400,7 +404,8 @@ TIME: Final = Spec(53005, 192, struct.Struct("<QIHHBB"))
 JOIN: Final = Spec(53006, 50, struct.Struct("<fffHB"))
 DIGEST: Final = Spec(53007, 37, struct.Struct("<24I24I24HBBB"))
 PLACES: Final = Spec(53008, 1, struct.Struct("<28h28h28hhhhBBB"))
-SPECS: Final = (ROUTE, BEACON, SCHEDULE, SURVIVOR, CHUNK, TIME, JOIN, DIGEST, PLACES)
+ROUTING: Final = Spec(53010, 255, struct.Struct("<BBBB240B"))
+SPECS: Final = (ROUTE, BEACON, SCHEDULE, SURVIVOR, CHUNK, TIME, JOIN, DIGEST, PLACES, ROUTING)
 _OURS: Final = {spec.msgid: spec for spec in SPECS}
 CAPACITY: Final = 56
 """Entries of one schedule part."""

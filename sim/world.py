@@ -70,6 +70,8 @@ class World(Actor):
         self._guidance = Guidance(starts, scenario)
         self._phones = PhoneSensor(scenario)
         self._noise = np.random.Generator(np.random.PCG64(stream_seed(scenario.seed, "gps")))
+        self._fixes = scenario.nodes.telemetry_hz > 0 or scenario.routing.protocol == "geographic"
+        """Whether anybody uses position fixes."""
         self._gps_ns = round(S / scenario.world.gps_hz)
         self._scan_ns = seconds_to_ns(scenario.mission.scan_interval_s)
         self._tick_ns: int | None = None
@@ -153,7 +155,7 @@ class World(Actor):
             self.outbox.append((self._obstruction_topic, self._sight.obstructions(at, now_ns)))
         states = array("d", np.hstack([at, velocity]).astype(np.float64).tobytes())
         self.outbox.append((self._pose_topic, Poses(now_ns, self._ids, states)))
-        if self._scenario.nodes.telemetry_hz and _due(now_ns, before_ns, self._gps_ns, 0):
+        if self._fixes and _due(now_ns, before_ns, self._gps_ns, 0):
             noisy = at + self._noise.normal(0.0, self._scenario.world.gps_sigma_m, at.shape)
             for row in range(self._count):
                 fix = Gps(now_ns, Enu(*noisy[row].tolist()), Enu(*velocity[row].tolist()))

@@ -370,6 +370,7 @@ MAVLINK_MSG_ID_FANET_TIME = 53005
 MAVLINK_MSG_ID_FANET_JOIN = 53006
 MAVLINK_MSG_ID_FANET_DIGEST = 53007
 MAVLINK_MSG_ID_FANET_PLACES = 53008
+MAVLINK_MSG_ID_FANET_ROUTING = 53010
 
 
 class MAVLink_fanet_route_message(MAVLink_message):
@@ -784,6 +785,50 @@ class MAVLink_fanet_places_message(MAVLink_message):
 setattr(MAVLink_fanet_places_message, "name", mavlink_msg_deprecated_name_property())
 
 
+class MAVLink_fanet_routing_message(MAVLink_message):
+    """
+    Control of a routing protocol other than ours (AODV, OLSR and
+    others), a piece of it; truncated after the byte that follows the
+    used data.
+    """
+
+    id = MAVLINK_MSG_ID_FANET_ROUTING
+    msgname = "FANET_ROUTING"
+    fieldnames = ["length", "type", "part", "parts", "data"]
+    ordered_fieldnames = ["length", "type", "part", "parts", "data"]
+    fieldtypes = ["uint8_t", "uint8_t", "uint8_t", "uint8_t", "uint8_t"]
+    fielddisplays_by_name: Dict[str, str] = {}
+    fieldenums_by_name: Dict[str, str] = {}
+    fieldunits_by_name: Dict[str, str] = {"length": "bytes"}
+    native_format = bytearray(b"<BBBBB")
+    orders = [0, 1, 2, 3, 4]
+    lengths = [1, 1, 1, 1, 240]
+    array_lengths = [0, 0, 0, 0, 240]
+    crc_extra = 255
+    unpacker = struct.Struct("<BBBB240B")
+    instance_field = None
+    instance_offset = -1
+
+    def __init__(self, length: int, type: int, part: int, parts: int, data: Sequence[int]):
+        MAVLink_message.__init__(self, MAVLink_fanet_routing_message.id, MAVLink_fanet_routing_message.msgname)
+        self._fieldnames = MAVLink_fanet_routing_message.fieldnames
+        self._instance_field = MAVLink_fanet_routing_message.instance_field
+        self._instance_offset = MAVLink_fanet_routing_message.instance_offset
+        self.length = length
+        self.type = type
+        self.part = part
+        self.parts = parts
+        self.data = data
+
+    def pack(self, mav: "MAVLink", force_mavlink1: bool = False) -> bytes:
+        return self._pack(mav, self.crc_extra, self.unpacker.pack(self.length, self.type, self.part, self.parts, self.data[0], self.data[1], self.data[2], self.data[3], self.data[4], self.data[5], self.data[6], self.data[7], self.data[8], self.data[9], self.data[10], self.data[11], self.data[12], self.data[13], self.data[14], self.data[15], self.data[16], self.data[17], self.data[18], self.data[19], self.data[20], self.data[21], self.data[22], self.data[23], self.data[24], self.data[25], self.data[26], self.data[27], self.data[28], self.data[29], self.data[30], self.data[31], self.data[32], self.data[33], self.data[34], self.data[35], self.data[36], self.data[37], self.data[38], self.data[39], self.data[40], self.data[41], self.data[42], self.data[43], self.data[44], self.data[45], self.data[46], self.data[47], self.data[48], self.data[49], self.data[50], self.data[51], self.data[52], self.data[53], self.data[54], self.data[55], self.data[56], self.data[57], self.data[58], self.data[59], self.data[60], self.data[61], self.data[62], self.data[63], self.data[64], self.data[65], self.data[66], self.data[67], self.data[68], self.data[69], self.data[70], self.data[71], self.data[72], self.data[73], self.data[74], self.data[75], self.data[76], self.data[77], self.data[78], self.data[79], self.data[80], self.data[81], self.data[82], self.data[83], self.data[84], self.data[85], self.data[86], self.data[87], self.data[88], self.data[89], self.data[90], self.data[91], self.data[92], self.data[93], self.data[94], self.data[95], self.data[96], self.data[97], self.data[98], self.data[99], self.data[100], self.data[101], self.data[102], self.data[103], self.data[104], self.data[105], self.data[106], self.data[107], self.data[108], self.data[109], self.data[110], self.data[111], self.data[112], self.data[113], self.data[114], self.data[115], self.data[116], self.data[117], self.data[118], self.data[119], self.data[120], self.data[121], self.data[122], self.data[123], self.data[124], self.data[125], self.data[126], self.data[127], self.data[128], self.data[129], self.data[130], self.data[131], self.data[132], self.data[133], self.data[134], self.data[135], self.data[136], self.data[137], self.data[138], self.data[139], self.data[140], self.data[141], self.data[142], self.data[143], self.data[144], self.data[145], self.data[146], self.data[147], self.data[148], self.data[149], self.data[150], self.data[151], self.data[152], self.data[153], self.data[154], self.data[155], self.data[156], self.data[157], self.data[158], self.data[159], self.data[160], self.data[161], self.data[162], self.data[163], self.data[164], self.data[165], self.data[166], self.data[167], self.data[168], self.data[169], self.data[170], self.data[171], self.data[172], self.data[173], self.data[174], self.data[175], self.data[176], self.data[177], self.data[178], self.data[179], self.data[180], self.data[181], self.data[182], self.data[183], self.data[184], self.data[185], self.data[186], self.data[187], self.data[188], self.data[189], self.data[190], self.data[191], self.data[192], self.data[193], self.data[194], self.data[195], self.data[196], self.data[197], self.data[198], self.data[199], self.data[200], self.data[201], self.data[202], self.data[203], self.data[204], self.data[205], self.data[206], self.data[207], self.data[208], self.data[209], self.data[210], self.data[211], self.data[212], self.data[213], self.data[214], self.data[215], self.data[216], self.data[217], self.data[218], self.data[219], self.data[220], self.data[221], self.data[222], self.data[223], self.data[224], self.data[225], self.data[226], self.data[227], self.data[228], self.data[229], self.data[230], self.data[231], self.data[232], self.data[233], self.data[234], self.data[235], self.data[236], self.data[237], self.data[238], self.data[239]), force_mavlink1=force_mavlink1)
+
+
+# Define name on the class for backwards compatibility (it is now msgname).
+# Done with setattr to hide the class variable from mypy.
+setattr(MAVLink_fanet_routing_message, "name", mavlink_msg_deprecated_name_property())
+
+
 mavlink_map: Dict[int, Type[MAVLink_message]] = {
     MAVLINK_MSG_ID_FANET_ROUTE: MAVLink_fanet_route_message,
     MAVLINK_MSG_ID_FANET_BEACON: MAVLink_fanet_beacon_message,
@@ -794,6 +839,7 @@ mavlink_map: Dict[int, Type[MAVLink_message]] = {
     MAVLINK_MSG_ID_FANET_JOIN: MAVLink_fanet_join_message,
     MAVLINK_MSG_ID_FANET_DIGEST: MAVLink_fanet_digest_message,
     MAVLINK_MSG_ID_FANET_PLACES: MAVLink_fanet_places_message,
+    MAVLINK_MSG_ID_FANET_ROUTING: MAVLink_fanet_routing_message,
 }
 
 
@@ -1200,7 +1246,7 @@ class MAVLink(object):
         origin                    : Node that generated the packet. (type:uint16_t)
         destination               : Node the packet is for; 65535: every node. (type:uint16_t)
         prev_hop                  : Node that transmits this frame. (type:uint16_t)
-        kind                      : 0 data, 1 hello, 2 join, 3 schedule, 4 time beacon. (type:uint8_t)
+        kind                      : 0 data, 1 hello, 2 join, 3 schedule, 4 time beacon, 8 routing. (type:uint8_t)
         hop_limit                 : Transmissions left, this one included. (type:uint8_t)
         hops                      : Transmissions before this one. (type:uint8_t)
         priority                  : 0 control, 1 safety, 2 survivor report, 3 bulk. (type:uint8_t)
@@ -1220,7 +1266,7 @@ class MAVLink(object):
         origin                    : Node that generated the packet. (type:uint16_t)
         destination               : Node the packet is for; 65535: every node. (type:uint16_t)
         prev_hop                  : Node that transmits this frame. (type:uint16_t)
-        kind                      : 0 data, 1 hello, 2 join, 3 schedule, 4 time beacon. (type:uint8_t)
+        kind                      : 0 data, 1 hello, 2 join, 3 schedule, 4 time beacon, 8 routing. (type:uint8_t)
         hop_limit                 : Transmissions left, this one included. (type:uint8_t)
         hops                      : Transmissions before this one. (type:uint8_t)
         priority                  : 0 control, 1 safety, 2 survivor report, 3 bulk. (type:uint8_t)
@@ -1491,3 +1537,33 @@ class MAVLink(object):
 
         """
         self.send(self.fanet_places_encode(east, north, up, leader_east, leader_north, leader_up, first, count, version), force_mavlink1=force_mavlink1)
+
+    def fanet_routing_encode(self, length: int, type: int, part: int, parts: int, data: Sequence[int]) -> MAVLink_fanet_routing_message:
+        """
+        Control of a routing protocol other than ours (AODV, OLSR and others),
+        a piece of it; truncated after the byte that follows the used
+        data.
+
+        length                    : How many bytes of data are used. [bytes] (type:uint8_t)
+        type                      : Which message: high four bits the protocol, low four bits its message type. (type:uint8_t)
+        part                      : This piece, from 0. (type:uint8_t)
+        parts                     : How many pieces there are, all in this frame. (type:uint8_t)
+        data                      : The bytes, then one byte of 1, the version. (type:uint8_t)
+
+        """
+        return MAVLink_fanet_routing_message(length, type, part, parts, data)
+
+    def fanet_routing_send(self, length: int, type: int, part: int, parts: int, data: Sequence[int], force_mavlink1: bool = False) -> None:
+        """
+        Control of a routing protocol other than ours (AODV, OLSR and others),
+        a piece of it; truncated after the byte that follows the used
+        data.
+
+        length                    : How many bytes of data are used. [bytes] (type:uint8_t)
+        type                      : Which message: high four bits the protocol, low four bits its message type. (type:uint8_t)
+        part                      : This piece, from 0. (type:uint8_t)
+        parts                     : How many pieces there are, all in this frame. (type:uint8_t)
+        data                      : The bytes, then one byte of 1, the version. (type:uint8_t)
+
+        """
+        self.send(self.fanet_routing_encode(length, type, part, parts, data), force_mavlink1=force_mavlink1)

@@ -14,7 +14,7 @@ from fanet_mw.messages import Reception, TxStatus
 from fanet_mw.protocol.txqueue import Packet
 from fanet_mw.scenario import Scenario
 from fanet_mw.trace import Record
-from fanet_mw.units import Enu, NodeId
+from fanet_mw.units import BROADCAST, Enu, NodeId
 from fanet_mw.wire import Kind
 
 
@@ -29,7 +29,9 @@ class Port(Protocol):
     def transmit(self, frame: bytes, dst: NodeId, *, start_ns: int, wants_status: bool = False) -> int:
         """Announce a transmission; returns the request's sequence number."""
 
-    def announce(self, kind: Kind, inner: bytes, *, now_ns: int, flags: int, hop_limit: int) -> Packet:
+    def announce(
+        self, kind: Kind, inner: bytes, *, now_ns: int, flags: int, hop_limit: int, destination: NodeId = BROADCAST
+    ) -> Packet:
         """Make a control packet of our own, next sequence number, marked as handled here."""
 
     def stamped(self, packet: Packet, *, flags: int) -> bytes:
@@ -42,6 +44,9 @@ class Port(Protocol):
 
     def mark(self, packet: Packet, bits: int) -> None:
         """Remember a phase (`seen.FLOODED` ...) of a packet as handled."""
+
+    def forget(self, packet: Packet) -> None:
+        """Treat a later copy of this packet as new: it was not ours to handle yet, or its custody has passed on."""
 
     def record(self, record: Record) -> None: ...
 

@@ -32,6 +32,8 @@ _HELLO: Final = int(Kind.HELLO)
 _new: Final = tuple.__new__  # for what is made once per frame
 _CONTROL: Final = 0x8000_0000
 """Control packets are numbered apart, from here on: then data packets have no gaps, and what is missing shows."""
+_MOST_HOPS: Final = 255
+"""What the hop count of the header can say."""
 _RESTART_STEP_NS: Final = 100 * US
 """A node sends fewer packets than one per 0.1 ms, so a later start begins beyond all earlier sequence numbers."""
 
@@ -181,11 +183,13 @@ class Node:
         self.requests.append(_new(TxRequest, (seq, start_ns, frame, dst, wants_status)))
         return seq
 
-    def announce(self, kind: Kind, inner: bytes, *, now_ns: int, flags: int, hop_limit: int) -> Packet:
+    def announce(
+        self, kind: Kind, inner: bytes, *, now_ns: int, flags: int, hop_limit: int, destination: NodeId = BROADCAST
+    ) -> Packet:
         return self._packet(
             kind,
             inner,
-            destination=BROADCAST,
+            destination=destination,
             priority=wire.PRIORITY_CONTROL,
             flags=flags,
             hop_limit=hop_limit,
@@ -199,7 +203,11 @@ class Node:
     def forwarded(self, packet: Packet, *, flags: int) -> bytes:
         header = packet.header
         return wire.rewrite(
-            packet.frame, prev_hop=self.node, hop_limit=header.hop_limit - 1, hops=header.hops + 1, flags=flags
+            packet.frame,
+            prev_hop=self.node,
+            hop_limit=header.hop_limit - 1,
+            hops=min(header.hops + 1, _MOST_HOPS),  # a hostile frame may come with all of them
+            flags=flags,
         )
 
     def drop(self, reason: DropReason, packet: Packet, *, now_ns: int) -> None:
@@ -208,6 +216,9 @@ class Node:
 
     def mark(self, packet: Packet, bits: int) -> None:
         self._seen.mark(seen.key_of(origin=packet.header.origin, seq=packet.header.seq), bits)
+
+    def forget(self, packet: Packet) -> None:
+        self._seen.forget(seen.key_of(origin=packet.header.origin, seq=packet.header.seq))
 
     def record(self, record: Record) -> None:
         self.records.append(record)

@@ -37,6 +37,11 @@ class Seen:
             self._old, self._young = self._young, {}
         self._young[key] = bits
 
+    def forget(self, key: int) -> None:
+        """As if this packet had never been heard."""
+        self._young.pop(key, None)
+        self._old.pop(key, None)
+
     def mark(self, key: int, bits: int) -> None:
         if len(self._young) >= self._capacity:
             self._old, self._young = self._young, {}

@@ -11,7 +11,7 @@ contends in the window.
 from collections.abc import Callable, Sequence
 from typing import Final, NamedTuple
 
-from fanet_mw.protocol.delay import Dcf, airtime_ns
+from fanet_mw.airtime import OVERHEAD_BYTES, Timing, airtime_ns
 from fanet_mw.scenario import Scenario
 from fanet_mw.units import MS, US
 
@@ -19,7 +19,6 @@ _SLACK_NS: Final = 50 * US
 """Propagation over 6 km, detection, and microseconds of clock error."""
 _TAIL_NS: Final = 5 * MS
 """The end of the contention window in which nothing new starts: what contends must be over when the turns begin."""
-_SHORT_PLCP_NS: Final = 96 * US
 
 
 class Turns(NamedTuple):
@@ -87,7 +86,6 @@ class Turns(NamedTuple):
 def turn_ns(scenario: Scenario, *, payload_bytes: int) -> int:
     """How long a turn must be for frames of this size."""
     radio = scenario.radio
-    dcf = Dcf()
-    plcp_ns = _SHORT_PLCP_NS if radio.preamble == "short" else 192 * US
-    frame_ns = airtime_ns(payload_bytes, rate_mbps=radio.rate_mbps, plcp_ns=plcp_ns)
-    return frame_ns + dcf.sifs_ns + (2 + radio.cw_min) * dcf.slot_ns + _SLACK_NS
+    timing = Timing.of(radio)
+    frame_ns = airtime_ns(payload_bytes + OVERHEAD_BYTES, radio, rate_mbps=radio.rate_mbps)
+    return frame_ns + timing.difs_ns + radio.cw_min * timing.slot_ns + _SLACK_NS

@@ -6,13 +6,24 @@ from typing import Final
 from fanet_mw.protocol.clustered import Clustered
 from fanet_mw.protocol.contract import Port, RoutingProtocol
 from fanet_mw.protocol.scheduled import Scheduled
+from fanet_mw.routing.aodv import Aodv
 from fanet_mw.routing.direct import Direct
+from fanet_mw.routing.dsdv import Dsdv
 from fanet_mw.routing.flooding import Flooding
+from fanet_mw.routing.geographic import Geographic
+from fanet_mw.routing.olsr import Olsr
+from fanet_mw.routing.storm import CounterBased, Gossip
 
 PROTOCOLS: Final[Mapping[str, type[RoutingProtocol]]] = {
     "direct": Direct,
     "flooding": Flooding,
     "clustered": Clustered,
+    "aodv": Aodv,
+    "olsr": Olsr,
+    "dsdv": Dsdv,
+    "gossip": Gossip,
+    "counter": CounterBased,
+    "geographic": Geographic,
 }
 
 

@@ -4,18 +4,25 @@ import pytest
 from hypothesis import given, settings
 from hypothesis import strategies as st
 
+from agents.traffic import sources_of
+from fanet_mw.protocol import scheduled
+from fanet_mw.protocol.clustering import balanced
 from fanet_mw.protocol.delay import Bounded, Refused
 from fanet_mw.protocol.planner import Design, Plan, Site, demands, describe, evaluate, plan
 from fanet_mw.protocol.planner.access import ways
 from fanet_mw.protocol.planner.demand import TrafficClass
-from fanet_mw.protocol.planner.flood import FloodCost, flood_cost
+from fanet_mw.protocol.planner.flood import FloodCost
 from fanet_mw.protocol.planner.head import Share, slot_delays, work_ns
 from fanet_mw.protocol.planner.search import _candidates
-from fanet_mw.protocol.timetable import Geometry, timetable
+from fanet_mw.protocol.planner.turns import superframe_of, table_for
 from fanet_mw.protocol.topology import within_range
+from fanet_mw.protocol.turns import Turns, turn_ns
 from fanet_mw.rng import stream
+from fanet_mw.trace import Delivered
 from fanet_mw.units import MS, Enu, NodeId, S
+from sim import catalog
 from sim.layout import positions
+from sim.run import simulate as simulate_swarm
 
 # --- one head against exact simulation ---
 
@@ -102,9 +109,9 @@ def test_work_is_what_all_floods_of_a_period_take() -> None:
 
 @pytest.fixture
 def planned(make_scenario):
-    def build(relays="contended", **keys):
+    def build(**keys):
         scenario = make_scenario(**{"nodes.count": 45, "clusters.count": 4, "clusters.flooding_period_s": 5, **keys})
-        return plan(scenario, placed(scenario), relays=relays)
+        return plan(scenario, placed(scenario))
 
     return build
 
@@ -129,18 +136,15 @@ def test_load_that_does_not_fit_has_to_go_and_no_step_less_would_do(planned, mak
     assert not planned(**{"traffic.interval_s": interval * 0.69}).feasible
 
 
-@pytest.mark.parametrize("keys", [{"clusters.count": 22, "clusters.flooding_period_s": 1}, {"clusters.count": 44}])
-def test_the_proposed_change_is_feasible_and_none_of_fewer_keys_is(planned, make_scenario, keys) -> None:
-    found = planned(relays="scheduled", **{"traffic.interval_s": 1.0, **keys})
+def test_the_proposed_change_is_feasible_and_none_of_fewer_keys_is(planned, make_scenario) -> None:
+    keys = {"clusters.count": 22, "clusters.flooding_period_s": 1, "clusters.contention_ms": 990}  # no room for turns
+    found = planned(**keys)
     assert not found.feasible
-    scenario = make_scenario(**{"nodes.count": 45, "clusters.count": 4, "clusters.flooding_period_s": 5, **keys})
+    scenario = make_scenario(**{"nodes.count": 45, **keys})
     site, classes = Site(scenario, placed(scenario)), demands(scenario)
-    assert evaluate(site, classes, found.change.design).feasible
-    cheaper = [
-        c
-        for c in _candidates(found.design, 45)
-        if found.design.distance(c) < found.design.distance(found.change.design)
-    ]
+    design = found.change.design
+    assert evaluate(site, classes, design).feasible
+    cheaper = [c for c in _candidates(found.design, 45) if found.design.distance(c) < found.design.distance(design)]
     assert cheaper
     assert not any(evaluate(site, classes, candidate).feasible for candidate in cheaper)
 
@@ -187,7 +191,7 @@ def test_nodes_that_no_head_can_reach_are_named(make_scenario) -> None:
 def test_light_traffic_has_a_proven_way_to_the_head_and_heavy_an_assumed_one(make_scenario) -> None:
     keys = {"nodes.count": 5, "nodes.layout": "line", "clusters.flooding_period_s": 5}
     light = make_scenario(**{**keys, "traffic.interval_s": 10, "radio.max_attempts": 3})
-    found = plan(light, placed(light), relays="scheduled")
+    found = plan(light, placed(light))
     assert isinstance(found.access, Bounded)
     assert not any("assumed" in note for note in found.notes)
     heavy = make_scenario(**{**keys, "traffic.interval_s": 0.05})
@@ -209,54 +213,78 @@ def test_the_text_says_verdict_bounds_bottleneck_and_change(planned) -> None:
 
 # --- timetables ---
 
-TIMETABLE = {"radio.lead_ms": 5, "clusters.guard_ms": 0.2, "traffic.interval_s": 1.0}
+TIMETABLE = {
+    "clusters.relay": "scheduled",
+    "clusters.flooding_period_s": 0.5,
+    "clusters.guard_ms": 1,
+    "radio.lead_ms": 0,
+    "radio.cw_min": 7,
+    "traffic.interval_s": 1.0,
+}
 
 
-def test_a_timetable_gives_each_head_the_turns_its_packets_need_and_spare_ones(make_scenario) -> None:
-    scenario = make_scenario(**{"nodes.count": 45, "clusters.count": 4, "clusters.flooding_period_s": 5, **TIMETABLE})
-    found = plan(scenario, placed(scenario), relays="timetable", contention_ns=S)
+@pytest.mark.parametrize("clusters", [2, 8, 44])
+def test_the_planned_timetable_is_the_one_the_protocol_makes(make_scenario, clusters) -> None:
+    scenario = make_scenario(**{"nodes.count": 45, **TIMETABLE, "clusters.count": clusters})
+    places = placed(scenario)
+    parts = balanced({n: at for n, at in places.items() if n != scenario.leader}, count=clusters)
+    load = {part.head: len(part.members) for part in parts} | {scenario.leader: 0}
+    superframe = superframe_of(scenario, period_ns=scenario.clusters.period_ns)
+    turns = Turns(0, *superframe, superframe.turns)
+    ordered = tuple(sorted(places.items()))
+    assert superframe.turn_ns == turn_ns(scenario, payload_bytes=scheduled._largest(scenario))
+    assert table_for(scenario, ordered, load, superframe) == scheduled._fit(scenario, ordered, load, turns)
+
+
+def test_where_every_node_is_a_head_the_bound_is_the_protocol_s_own(make_scenario) -> None:
+    scenario = make_scenario(**{"nodes.count": 45, **TIMETABLE, "clusters.count": 44})
+    found = plan(scenario, placed(scenario), sources=[NodeId(n) for n in range(2, 46)])
     assert found.feasible
-    turn_ns = found.clusters[0].flood.spacing_ns
-    for cluster in found.clusters:
-        turns = cluster.slot_ns // turn_ns
-        assert cluster.packets <= turns <= 1.5 * cluster.packets + 1
-        assert turn_ns < cluster.flood.duration_ns < 5 * S
-    assert found.uplink_ns == 4 * S, "members may have to wait for the contention window"
+    assert found.access == Bounded(0)
+    superframe = superframe_of(scenario, period_ns=scenario.clusters.period_ns)
+    turns = Turns(0, *superframe, superframe.turns)
+    load = {NodeId(n): 1 if n > 1 else 0 for n in range(1, 46)}
+    table = table_for(scenario, tuple(sorted(placed(scenario).items())), load, superframe)
+    own = {NodeId(n): tuple(turn.offset for turn in table.roots() if turn.node == n) for n in range(2, 46)}
+    bounds = [turns.worst_ns(own[n], span=table.spans[n], interval_ns=S) for n in own]
+    assert found.classes[0].bound == Bounded(max(bounds))
 
 
-def test_a_packet_waits_for_a_turn_and_then_for_its_flood(make_scenario) -> None:
-    """One source: one turn per superframe, and a spare one. The bound is the greatest gap, the turn and the span."""
-    scenario = make_scenario(
-        **{"nodes.count": 5, "nodes.layout": "line", "clusters.flooding_period_s": 5, **TIMETABLE,
-           "traffic.interval_s": 5.0, "traffic.sources": [3]}
-    )  # fmt: skip
-    found = plan(scenario, placed(scenario), relays="timetable", contention_ns=S)
-    (cluster,) = [c for c in found.clusters if c.packets]
-    (bound,) = [c.from_head for c in found.classes]
-    turn_ns = cluster.flood.spacing_ns
-    first_ns, second_ns = S, S + _gap(scenario, cluster, turn_ns)
-    longest_gap_ns = max(second_ns - first_ns, 5 * S - (second_ns - first_ns))
-    wait_ns = longest_gap_ns + scenario.radio.lead_ns
-    assert bound == Bounded(wait_ns + cluster.flood.duration_ns)
+def test_no_delivery_of_a_whole_swarm_is_later_than_the_plan() -> None:
+    scenario = catalog.find("clusters", ["duration_s=16"])
+    found = plan(scenario, placed(scenario), sources=[NodeId(n) for n in sources_of(scenario)])
+    delays = [record.delay_ns for record in simulate_swarm(scenario).records if isinstance(record, Delivered)]
+    assert len(delays) > 5000
+    assert 0.7 * found.classes[0].bound.delay_ns < max(delays) <= found.classes[0].bound.delay_ns
 
 
-def _gap(scenario, cluster, turn_ns) -> int:
-    geometry = Geometry(250.0, 250.0, 4 * S // turn_ns, -(-(turn_ns + scenario.radio.lead_ns) // turn_ns))
-    places = tuple(sorted(placed(scenario).items()))
-    first, second = sorted(turn.offset for turn in timetable(places, (cluster.head,) * 2, geometry).roots())
-    return (second - first) * turn_ns
+def test_members_of_a_cluster_may_have_to_wait_for_the_contention_window(make_scenario) -> None:
+    scenario = make_scenario(**{"nodes.count": 45, **TIMETABLE, "clusters.count": 8})
+    found = plan(scenario, placed(scenario))
+    assert isinstance(found.access, Refused)
+    assert "assumed" in found.notes[0]
 
 
 def test_floods_that_do_not_fit_the_turns_are_the_one_problem_named(make_scenario) -> None:
     scenario = make_scenario(
-        **{"nodes.count": 45, "clusters.count": 4, "clusters.flooding_period_s": 1, **TIMETABLE,
-           "traffic.interval_s": 0.1}
-    )  # fmt: skip
-    found = plan(scenario, placed(scenario), relays="timetable", contention_ns=S // 5)
+        **{"nodes.count": 45, **TIMETABLE, "clusters.count": 44, "clusters.flooding_period_s": 0.06}
+    )
+    found = plan(scenario, placed(scenario))
     (problem,) = found.problems
-    assert "do not fit" in problem
-    assert found.change.keys[0].startswith("traffic.interval_s")
+    assert "does not fit" in problem
+    assert found.change.keys
     assert "no slot" in describe(found)
+
+
+def test_of_many_heads_the_fullest_are_listed_and_the_others_counted() -> None:
+    scenario = catalog.find("clusters")
+    text = describe(plan(scenario, placed(scenario)))
+    assert "and 33 heads with no fuller slots" in text
+
+
+def test_repairs_are_said_to_come_later_than_any_bound(planned) -> None:
+    assert "repairs" in describe(planned(**{"clusters.repair_s": 10}))
+    assert "repairs" not in describe(planned())
 
 
 def test_every_packet_goes_through_all_nodes_between_it_and_its_head() -> None:
@@ -265,13 +293,3 @@ def test_every_packet_goes_through_all_nodes_between_it_and_its_head() -> None:
     found = ways(line, dict.fromkeys(line, NodeId(3)), [one])
     assert found.hops == {1: 2, 2: 1, 3: 0, 4: 1, 5: 2}
     assert {n: row[0] for n, row in found.through.items()} == {1: 1, 2: 2, 3: 0, 4: 1, 5: 1}
-
-
-def test_a_scheduled_flood_leaves_each_relay_time_to_hear_and_announce(make_scenario) -> None:
-    quick = make_scenario(**{"nodes.count": 5, "nodes.layout": "line", "radio.lead_ms": 0})
-    slow = make_scenario(**{"nodes.count": 5, "nodes.layout": "line", "radio.lead_ms": 40, "radio.handover_ms": 10})
-    line = within_range(placed(quick), range_m=250)
-    costs = [flood_cost(s, line, NodeId(1), payload_bytes=1024, relays="scheduled") for s in (quick, slow)]
-    assert costs[0].duration_ns < 6 * MS
-    assert 3 * 50 * MS < costs[1].duration_ns < 3 * 53 * MS
-    assert all(c.proven for c in costs)

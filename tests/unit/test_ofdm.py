@@ -7,9 +7,9 @@ import numpy as np
 import pytest
 from hand_driven import Air, receptions, statuses
 
-from emulator.airtime import Timing, ofdm_frame_ns
 from emulator.error_rate import log_success_per_bit
 from emulator.phy import ERROR_FLOOR_DB, ERROR_STEPS_PER_DB
+from fanet_mw.airtime import Timing, ofdm_frame_ns
 from fanet_mw.errors import ConfigError
 from fanet_mw.messages import TxOutcome
 from fanet_mw.scenario import Scenario

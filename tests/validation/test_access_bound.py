@@ -3,7 +3,7 @@
 import pytest
 from medium_driver import disc, medium, poses
 
-from emulator.airtime import DETECT_NS, DIFS_NS, SIFS_NS, SLOT_NS, Timing, frame_ns
+from fanet_mw.airtime import DETECT_NS, Timing, frame_ns
 from fanet_mw.messages import TxOutcome, TxRequest, TxStatus
 from fanet_mw.protocol.delay import Bounded, Contention, Dcf, Refused, access_bound, airtime_ns
 from fanet_mw.scenario import Radio
@@ -30,8 +30,8 @@ def outcomes(stations: int, *, seed: int, frames_each: int = 1, size: int = 1024
 
 def test_the_constants_are_the_emulator_s() -> None:
     timing, dcf = Timing.of(Radio()), Dcf()
-    assert (dcf.slot_ns, dcf.sifs_ns, dcf.ack_ns) == (SLOT_NS, SIFS_NS, timing.ack_ns)
-    assert (dcf.ack_timeout_ns, dcf.eifs_ns) == (timing.ack_timeout_ns, DIFS_NS + timing.eifs_extra_ns)
+    assert (dcf.slot_ns, dcf.sifs_ns, dcf.ack_ns) == (timing.slot_ns, timing.sifs_ns, timing.ack_ns)
+    assert (dcf.ack_timeout_ns, dcf.eifs_ns) == (timing.ack_timeout_ns, timing.difs_ns + timing.eifs_extra_ns)
     assert airtime_ns(1024, rate_mbps=11) == frame_ns(1024 + 64, rate_mbps=11, short=False)
     assert dcf.slot_ns > DETECT_NS, "a backoff slot that is cut short costs at most itself"
 

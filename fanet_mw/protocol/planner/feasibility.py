@@ -3,8 +3,8 @@
     source --access--> head's queue --slot--> flood --> last node
            uplink_ns          slot_delays        FloodCost.duration
 
-A head's slot holds floods one spacing apart: over at its end when they are scheduled, running on when they contend.
-Packets reach the head late by up to the uplink: its bound where there is one, else one second is assumed, and said so.
+A head's slot holds floods one spacing apart; under a timetable each of its turns holds one. Packets reach the head late
+by up to the uplink: its bound where there is one, else one second (or period) is assumed, and said so.
 
 Feasible: each slot is stable, every packet is through before its lifetime ends, and no queue overflows.
 """
@@ -12,14 +12,14 @@ Feasible: each slot is stable, every packet is through before its lifetime ends,
 from collections.abc import Iterator, Mapping, Sequence
 from typing import Final, NamedTuple
 
-from fanet_mw.protocol.clustering import balanced
+from fanet_mw.protocol.clustering import Cluster, balanced
 from fanet_mw.protocol.delay import Bounded, Outcome, Refused, paper
 from fanet_mw.protocol.planner.access import Ways, access_outcome, ways
 from fanet_mw.protocol.planner.demand import TrafficClass
 from fanet_mw.protocol.planner.design import Design
-from fanet_mw.protocol.planner.flood import FloodCost, flood_cost, frame_ns
-from fanet_mw.protocol.planner.head import ClusterPlan, Share, overhead_ns, slot_delays, work_ns
-from fanet_mw.protocol.planner.turns import Candidate, Superframe, judge, table_for
+from fanet_mw.protocol.planner.flood import FloodCost, flood_cost
+from fanet_mw.protocol.planner.head import ClusterPlan, Share, slot_delays, work_ns
+from fanet_mw.protocol.planner.turns import Candidate, judge, superframe_of, table_for
 from fanet_mw.protocol.topology import Adjacency, within_range
 from fanet_mw.scenario import Scenario
 from fanet_mw.units import Enu, NodeId, S, seconds_to_ns
@@ -77,14 +77,12 @@ class Site:
         self.scenario = scenario
         self.positions = positions
         self.adjacency = within_range(positions, range_m=scenario.radio.range_m) if adjacency is None else adjacency
-        self._floods: dict[tuple[NodeId, int, str], FloodCost] = {}
+        self._floods: dict[tuple[NodeId, int], FloodCost] = {}
 
-    def flood(self, head: NodeId, payload_bytes: int, design: Design) -> FloodCost:
-        key = head, payload_bytes, design.relays
+    def flood(self, head: NodeId, payload_bytes: int) -> FloodCost:
+        key = head, payload_bytes
         if key not in self._floods:
-            self._floods[key] = flood_cost(
-                self.scenario, self.adjacency, head, payload_bytes=payload_bytes, relays=design.relays
-            )
+            self._floods[key] = flood_cost(self.scenario, self.adjacency, head, payload_bytes=payload_bytes)
         return self._floods[key]
 
 
@@ -93,13 +91,15 @@ def evaluate(site: Site, classes: Sequence[TrafficClass], design: Design) -> Pla
     scenario = site.scenario
     others = {node: at for node, at in site.positions.items() if node != scenario.leader}
     clusters = balanced(others or site.positions, count=design.clusters)
+    if design.relays == "timetable" and others and scenario.leader in site.positions:
+        clusters.append(Cluster(scenario.leader, (scenario.leader,)))  # it has turns of its own
     head_of = {member: cluster.head for cluster in clusters for member in cluster.members}
     heads = [cluster.head for cluster in clusters]
     found = ways(site.adjacency, head_of, classes)
     loads = _loads(heads, head_of, found, classes)
     shares = [_shares(site, head, load, classes, design) for head, load in zip(heads, loads, strict=True)]
     access = _access(site, found, classes, design, shares)
-    uplink_ns = access.delay_ns if isinstance(access, Bounded) else max(_ASSUMED_UPLINK_NS, _gap_ns(design))
+    uplink_ns = access.delay_ns if isinstance(access, Bounded) else _assumed_ns(design)
     candidates = [
         Candidate(
             cluster.head, len(cluster.members), max((found.hops.get(n, 0) for n in cluster.members), default=0), row
@@ -108,7 +108,7 @@ def evaluate(site: Site, classes: Sequence[TrafficClass], design: Design) -> Pla
     ]
     unfit: tuple[str, ...] = ()
     if design.relays == "timetable":
-        judged, unfit = _turned(site, candidates, classes, design, uplink_ns)
+        judged, unfit = _turned(site, candidates, design, uplink_ns)
     else:
         judged = tuple(
             _cluster(candidate, slot_ns=slot_ns, design=design, jitter_ns=uplink_ns)
@@ -123,7 +123,7 @@ def evaluate(site: Site, classes: Sequence[TrafficClass], design: Design) -> Pla
         uplink_ns=uplink_ns,
         paper=_paper(judged, design),
         problems=unfit or tuple(_problems(scenario, judged, summed)),
-        notes=tuple(_notes(access, judged, found, design, uplink_ns)),
+        notes=(*_notes(access, judged, found, design, uplink_ns), *_repairs(scenario)),
     )
 
 
@@ -143,16 +143,12 @@ def _loads(
 def _shares(
     site: Site, head: NodeId, load: Sequence[int], classes: Sequence[TrafficClass], design: Design
 ) -> list[Share]:
-    """Sub-slots and turns are as long as the longest packet needs, whatever flies in them."""
+    """A turn is as long as the longest packet needs, whatever flies in it."""
     if design.relays == "timetable":
-        turn_ns = _superframe(site.scenario, classes, design).turn_ns
+        turn_ns = superframe_of(site.scenario, period_ns=design.period_ns).turn_ns
         turn = FloodCost(turn_ns, turn_ns, 1, proven=True)
         return [Share(n, c.interval_ns, turn) for n, c in zip(load, classes, strict=True)]
-    longest = max((c.payload_bytes for c in classes), default=0)
-    return [
-        Share(n, c.interval_ns, site.flood(head, longest if design.relays == "scheduled" else c.payload_bytes, design))
-        for n, c in zip(load, classes, strict=True)
-    ]
+    return [Share(n, c.interval_ns, site.flood(head, c.payload_bytes)) for n, c in zip(load, classes, strict=True)]
 
 
 def _longest(shares: Sequence[Share]) -> FloodCost:
@@ -167,18 +163,16 @@ def _slots(design: Design, shares: Sequence[Sequence[Share]]) -> list[int]:
     if design.slots == "equal":
         return [equal] * len(shares)
     needed = [
-        overhead_ns(_longest(row), guard_ns=design.guard_ns)
-        + work_ns(row, period_ns=design.period_ns)
-        + max((s.flood.spacing_ns for s in row), default=0)
+        design.guard_ns + work_ns(row, period_ns=design.period_ns) + max((s.flood.spacing_ns for s in row), default=0)
         for row in shares
     ]
     rest = (design.period_ns - sum(needed)) // len(shares)
     return [need + rest for need in needed] if rest >= 0 else [equal] * len(shares)
 
 
-def _gap_ns(design: Design) -> int:
-    """How long members may have to wait for the contention window."""
-    return design.period_ns - design.contention_ns if design.relays == "timetable" else 0
+def _assumed_ns(design: Design) -> int:
+    """The way to the head where nothing bounds it; a timetable lets members contend only once per period."""
+    return max(_ASSUMED_UPLINK_NS, design.period_ns) if design.relays == "timetable" else _ASSUMED_UPLINK_NS
 
 
 def _access(
@@ -189,23 +183,26 @@ def _access(
         spacing_ns = min((s.flood.spacing_ns for row in shares for s in row), default=S)
         return access_outcome(site.scenario, site.adjacency, found, classes, spacing_ns=spacing_ns)
     outcome = access_outcome(site.scenario, site.adjacency, found, classes, spacing_ns=None)
-    if isinstance(outcome, Refused):
+    if isinstance(outcome, Refused) or not any(found.hops.values()):
         return outcome
-    if outcome.delay_ns > design.contention_ns:
+    contention_ns = superframe_of(site.scenario, period_ns=design.period_ns).contention_ns
+    if outcome.delay_ns > contention_ns:
         return Refused(
             f"{outcome.delay_ns / 1e6:.0f} ms in the worst case, more than the contention window of "
-            f"{design.contention_ns / 1e6:.0f} ms"
+            f"{contention_ns / 1e6:g} ms"
         )
-    return Bounded(outcome.delay_ns + _gap_ns(design))
+    return Bounded(outcome.delay_ns + design.period_ns - contention_ns)
 
 
 def _turned(
-    site: Site, candidates: Sequence[Candidate], classes: Sequence[TrafficClass], design: Design, jitter_ns: int
+    site: Site, candidates: Sequence[Candidate], design: Design, jitter_ns: int
 ) -> tuple[tuple[ClusterPlan, ...], tuple[str, ...]]:
     """All heads under one timetable; when the turns do not suffice, each is refused with that, and it is said."""
-    superframe = _superframe(site.scenario, classes, design)
+    superframe = superframe_of(site.scenario, period_ns=design.period_ns)
     places = tuple((node, site.positions[node]) for node in sorted(site.positions))
-    table = table_for(site.scenario, places, candidates, superframe)
+    leader = site.scenario.leader
+    members = {c.head: 0 if c.head == leader else c.members for c in candidates}
+    table = table_for(site.scenario, places, members, superframe)
     if not isinstance(table, Refused):
         lead_ns = site.scenario.radio.lead_ns
         judged = (judge(table, c, superframe, lead_ns=lead_ns, jitter_ns=jitter_ns) for c in candidates)
@@ -228,14 +225,9 @@ def _refused(candidate: Candidate, why: Refused, design: Design) -> ClusterPlan:
     )
 
 
-def _superframe(scenario: Scenario, classes: Sequence[TrafficClass], design: Design) -> Superframe:
-    longest = max((c.payload_bytes for c in classes), default=scenario.traffic.payload_bytes)
-    return Superframe(design.period_ns, design.contention_ns, frame_ns(scenario.radio, longest) + design.guard_ns)
-
-
 def _cluster(candidate: Candidate, *, slot_ns: int, design: Design, jitter_ns: int) -> ClusterPlan:
     shares = candidate.shares
-    usable_ns = max(0, slot_ns - overhead_ns(_longest(shares), guard_ns=design.guard_ns))
+    usable_ns = max(0, slot_ns - design.guard_ns)
     delays, waiting = slot_delays(shares, usable_ns=usable_ns, period_ns=design.period_ns, jitter_ns=jitter_ns)
     return ClusterPlan(
         head=candidate.head,
@@ -313,6 +305,11 @@ def _problems(scenario: Scenario, clusters: Sequence[ClusterPlan], classes: Sequ
             )
 
 
+def _repairs(scenario: Scenario) -> Iterator[str]:
+    if scenario.clusters.repair_s > 0:
+        yield "repairs of lost packets come later than any bound here, and their load is not counted"
+
+
 def _notes(
     access: Outcome, clusters: Sequence[ClusterPlan], found: Ways, design: Design, uplink_ns: int
 ) -> Iterator[str]:
@@ -327,6 +324,6 @@ def _notes(
                 f"{design.guard_ns / 1e6:g} ms: floods of neighboring slots meet"
             )
     else:
-        yield "floods hold their bound as long as no frame is lost and unicasts stay out of the slots"
+        yield "floods hold their bound while no frame is lost and the nodes are where the timetable has them"
     if found.homeless:
         yield f"{len(found.homeless)} nodes can reach no head: {', '.join(map(str, found.homeless[:8]))}"

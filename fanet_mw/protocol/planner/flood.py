@@ -1,24 +1,16 @@
-"""What one flood costs: how long until all have it, and how soon the next may follow.
+"""What one flood costs where relays contend: how long until all have it, and how soon the next may follow.
 
-Scheduled: both follow from the broadcast schedule, in sub-slots of one airtime and a turnaround; a relay needs the
-radio's handover and lead between hearing and sending. Proven, as long as no frame is lost.
-
-Contended: around the busiest node every relay within two hops takes its turn on one channel, airtime + DIFS + the mean
-backoff each; floods closer than that pile up. The duration is that per hop, with jitter, handover and lead. An
-estimate: CSMA/CA bounds neither.
+Around the busiest node every relay within two hops takes its turn on one channel, airtime + DIFS + the mean backoff
+each; floods closer than that pile up. The duration is that per hop, with jitter, handover and lead. An estimate:
+CSMA/CA bounds neither. Under a timetable both are exact; see `turns.py`.
 """
 
-from typing import Final, NamedTuple
+from typing import NamedTuple
 
-from fanet_mw.protocol.broadcast_schedule import broadcast_schedule, pipeline_spacing, shortest_relays
 from fanet_mw.protocol.delay import Dcf, airtime_ns
-from fanet_mw.protocol.planner.design import Relays
 from fanet_mw.protocol.topology import Adjacency, levels, two_hop
 from fanet_mw.scenario import Radio, Scenario
 from fanet_mw.units import MS, US, NodeId
-
-_TURNAROUND_NS: Final = 100 * US
-"""Between two sub-slots: propagation over some kilometers, detection, and microseconds of clock error."""
 
 
 class FloodCost(NamedTuple):
@@ -51,25 +43,9 @@ def dcf_of(radio: Radio) -> Dcf:
     )
 
 
-def flood_cost(
-    scenario: Scenario, adjacency: Adjacency, root: NodeId, *, payload_bytes: int, relays: Relays
-) -> FloodCost:
+def flood_cost(scenario: Scenario, adjacency: Adjacency, root: NodeId, *, payload_bytes: int) -> FloodCost:
     """The cost of one flood of such a packet from this head, to all it can reach."""
-    if relays == "scheduled":
-        return _scheduled(scenario.radio, adjacency, root, frame_ns(scenario.radio, payload_bytes))
-    return _contended(scenario, adjacency, root, frame_ns(scenario.radio, payload_bytes))
-
-
-def _scheduled(radio: Radio, adjacency: Adjacency, root: NodeId, frame: int) -> FloodCost:
-    subslot_ns = frame + _TURNAROUND_NS
-    wait_ns = radio.handover_ns + radio.lead_ns
-    hop = max(1, -(-(frame + wait_ns) // subslot_ns))
-    schedule = broadcast_schedule(adjacency, root, shortest_relays(adjacency, root), hop_subslots=hop)
-    spacing = pipeline_spacing(schedule, adjacency)
-    return FloodCost(schedule.subslots * subslot_ns, spacing * subslot_ns, len(schedule.turns), proven=True)
-
-
-def _contended(scenario: Scenario, adjacency: Adjacency, root: NodeId, frame: int) -> FloodCost:
+    frame = frame_ns(scenario.radio, payload_bytes)
     clusters, radio = scenario.clusters, scenario.radio
     hops = levels(adjacency, root)
     dcf = dcf_of(radio)

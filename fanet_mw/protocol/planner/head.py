@@ -57,11 +57,6 @@ class ClusterPlan(NamedTuple):
         return self.work_ns / self.usable_ns if self.usable_ns > 0 else inf if self.work_ns else 0.0
 
 
-def overhead_ns(flood: FloodCost, *, guard_ns: int) -> int:
-    """What of a slot is no room for a next flood: the guard time, and the end of the last flood if it must be over."""
-    return guard_ns + (max(0, flood.duration_ns - flood.spacing_ns) if flood.proven else 0)
-
-
 def work_ns(shares: Sequence[Share], *, period_ns: int) -> int:
     """How much of one flooding period the floods take."""
     return ceil(sum(s.sources * s.flood.spacing_ns * period_ns / s.interval_ns for s in shares))

@@ -1,6 +1,6 @@
 """The cheapest change that makes a scenario feasible: fewest keys first, then the least change of their values.
 
-Searched: the cluster count, the flooding period, slots by load, relays in sub-slots. When none of them helps, the least
+Searched: the cluster count, the flooding period, slots by load, a timetable. When none of them helps, the least
 traffic interval (in steps) at which the design as it stands is feasible is named: load that does not fit has to go.
 """
 
@@ -10,7 +10,7 @@ from typing import Final
 
 from fanet_mw.protocol.delay import Refused
 from fanet_mw.protocol.planner.demand import TrafficClass, demands
-from fanet_mw.protocol.planner.design import Design, Relays, Slots
+from fanet_mw.protocol.planner.design import Design, Slots
 from fanet_mw.protocol.planner.feasibility import Change, Plan, Site, evaluate
 from fanet_mw.protocol.topology import Adjacency
 from fanet_mw.scenario import Scenario
@@ -29,21 +29,18 @@ def plan(
     *,
     adjacency: Adjacency | None = None,
     sources: Sequence[NodeId] | None = None,
-    relays: Relays = "contended",
-    contention_ns: int = 0,
     search: bool = True,
 ) -> Plan | Refused:
     """Judge the scenario as it stands, and look for the cheapest change when it is not feasible.
 
     `adjacency` is who hears whom, by default everyone within `radio.range_m` (a timetable looks at positions only);
-    `sources` are the nodes that send the application's traffic; `contention_ns` is the window before a timetable's
-    turns. Refused when the traffic cannot be planned at all.
+    `sources` are the nodes that send the application's traffic. Refused when the traffic cannot be planned at all.
     """
     classes = demands(scenario, sources)
     if isinstance(classes, Refused):
         return classes
     site = Site(scenario, positions, adjacency)
-    design = Design.of(scenario, relays=relays, contention_ns=contention_ns)
+    design = Design.of(scenario)
     found = evaluate(site, classes, design)
     if found.feasible or not search:
         return found
@@ -64,12 +61,12 @@ def _candidates(design: Design, nodes: int) -> Iterator[Design]:
     counts = sorted({design.clusters, *(n for n in several if 1 <= n < max(2, nodes))})
     periods = sorted({round(design.period_ns * factor) for factor in (_COARSE if coarse else _PERIODS)})
     slots: tuple[Slots, ...] = ("equal",) if coarse else ("equal", "by_load")
-    relays: tuple[Relays, ...] = ("contended", "scheduled") if design.relays == "contended" else (design.relays,)
-    for clusters, period_ns, divided, relayed in product(counts, periods, slots, relays):
-        contention_ns = design.contention_ns * period_ns // design.period_ns
-        candidate = Design(clusters, period_ns, design.guard_ns, divided, relayed, contention_ns)
+    for clusters, period_ns, divided in product(counts, periods, slots):
+        candidate = Design(clusters, period_ns, design.guard_ns, divided, design.relays)
         if candidate != design and design.guard_ns < period_ns // clusters:
             yield candidate
+    if not coarse:
+        yield design._replace(relays="timetable")
 
 
 def _differences(old: Design, new: Design) -> Iterator[str]:
@@ -80,7 +77,7 @@ def _differences(old: Design, new: Design) -> Iterator[str]:
     if new.slots != old.slots:
         yield "slots divided by load instead of equally"
     if new.relays != old.relays:
-        yield "relays in sub-slots instead of by contention"
+        yield 'clusters.relay = "scheduled"'
 
 
 def _lighter(site: Site, classes: Sequence[TrafficClass], design: Design) -> Change | None:

@@ -1,11 +1,15 @@
 """A plan in lines for people. Every figure has its unit; what is not proven says so."""
 
 from collections.abc import Iterator, Sequence
+from typing import Final
 
 from fanet_mw.protocol.delay import Bounded, Outcome, Refused
 from fanet_mw.protocol.planner.feasibility import ClassPlan, Plan
 from fanet_mw.protocol.planner.head import ClusterPlan
 from fanet_mw.units import MS, S
+
+_SHOWN: Final = 12
+"""Heads listed, the fullest first."""
 
 
 def describe(found: Plan | Refused) -> str:
@@ -22,7 +26,10 @@ def _lines(found: Plan) -> Iterator[str]:
     yield from (f"  problem: {problem}" for problem in found.problems)
     yield from _classes(found.classes)
     yield "  head  members  hops  slot ms  flood ms  every ms  packets/period  used %  queue"
-    yield from (_cluster(cluster) for cluster in found.clusters)
+    fullest = sorted(found.clusters, key=lambda c: (-c.utilization, c.head))
+    yield from (_cluster(cluster) for cluster in fullest[:_SHOWN])
+    if len(fullest) > _SHOWN:
+        yield f"  and {len(fullest) - _SHOWN} heads with no fuller slots"
     bottleneck = found.bottleneck
     if bottleneck is not None and bottleneck.usable_ns:
         yield f"  bottleneck: the slot of head {bottleneck.head}, {100 * bottleneck.utilization:.0f} % used"

@@ -1,15 +1,16 @@
-"""Heads judged under a timetable: each has as many turns per superframe as packets come, floods never meet.
+"""Heads judged under a timetable: the turns that the running protocol will give them, and the bound of their gaps.
 
-The turns begin after the contention window, in which members reach their heads. A turn is one airtime of the longest
-packet and the guard time. The flood of a turn lasts its span; floods of other turns run through the swarm meanwhile.
+The table is made as `scheduled` makes it: one turn per packet of the application and period for each head, one for the
+leader, fewer when they do not fit. Who knows the turns knows the longest wait; the flood's span comes on top, whatever
+other floods run through the swarm meanwhile.
 """
 
-from collections.abc import Sequence
-from fractions import Fraction
+from collections.abc import Mapping, Sequence
 from itertools import chain
 from math import ceil
 from typing import Final, NamedTuple
 
+from fanet_mw import wire
 from fanet_mw.protocol.delay import (
     Bounded,
     Outcome,
@@ -24,11 +25,11 @@ from fanet_mw.protocol.delay import (
 from fanet_mw.protocol.planner.flood import FloodCost
 from fanet_mw.protocol.planner.head import ClusterPlan, Share
 from fanet_mw.protocol.timetable import Geometry, Timetable, timetable
+from fanet_mw.protocol.turns import turn_ns
 from fanet_mw.scenario import Scenario
-from fanet_mw.units import Enu, NodeId
+from fanet_mw.units import MS, Enu, NodeId, seconds_to_ns
 
-_SPARE: Final = (Fraction(1, 2), Fraction(1, 4), Fraction(0))
-"""Turns beyond one per packet: bursts that wait for the contention window drain by them."""
+_FEWER: Final = 0.85  # as `scheduled` does
 
 
 class Superframe(NamedTuple):
@@ -40,7 +41,7 @@ class Superframe(NamedTuple):
 
     @property
     def turns(self) -> int:
-        return (self.period_ns - self.contention_ns) // self.turn_ns
+        return max(0, self.period_ns - self.contention_ns) // self.turn_ns
 
 
 class Candidate(NamedTuple):
@@ -52,42 +53,42 @@ class Candidate(NamedTuple):
     shares: Sequence[Share]
 
 
-def turns_needed(shares: Sequence[Share], *, period_ns: int, spare: Fraction) -> int:
-    """Turns per superframe: one per packet, and `spare` of that more, at least one more where priorities need slack."""
-    packets = sum(Fraction(s.sources * period_ns, s.interval_ns) for s in shares)
-    several = sum(1 for s in shares if s.sources) > 1
-    return max(ceil(packets * (1 + spare)), ceil(packets) + (1 if several and packets.denominator == 1 else 0))
+def superframe_of(scenario: Scenario, *, period_ns: int) -> Superframe:
+    """The geometry of a scenario with this flooding period."""
+    members = min(scenario.nodes.count, 56)
+    schedule_bytes = wire.HEADER_BYTES + 262 + 189 * -(-members // 28)  # one part and its places, as in `scheduled`
+    longest = max(scenario.traffic.payload_bytes, schedule_bytes)
+    return Superframe(period_ns, round(scenario.clusters.contention_ms * MS), turn_ns(scenario, payload_bytes=longest))
 
 
 def table_for(
     scenario: Scenario,
     positions: Sequence[tuple[NodeId, Enu]],
-    candidates: Sequence[Candidate],
+    members: Mapping[NodeId, int],
     superframe: Superframe,
 ) -> Timetable | Refused:
-    """The timetable with the turns that all heads need, and up to half as many spare; refused if nothing fits."""
-    radio = scenario.radio
-    if superframe.turns < 1:
-        return Refused(f"a turn of {superframe.turn_ns / 1e6:.1f} ms does not fit behind the contention window")
+    """The running protocol's timetable for heads with so many members; refused when one packet each does not fit."""
+    clusters, radio = scenario.clusters, scenario.radio
     geometry = Geometry(
-        link_m=radio.range_m,
-        interference_m=radio.range_m,
+        link_m=clusters.link_m or radio.range_m,
+        interference_m=clusters.interference_m or radio.range_m * (1 if radio.channel == "range" else 2),
         turns=superframe.turns,
-        hop_turns=ceil((superframe.turn_ns + radio.handover_ns + radio.lead_ns) / superframe.turn_ns),
+        hop_turns=1 + -(-(radio.lead_ns + radio.handover_ns) // superframe.turn_ns),
     )
-    roots: tuple[NodeId, ...] = ()
-    for spare in _SPARE:
-        roots = tuple(
-            candidate.head
-            for candidate in candidates
-            for _ in range(turns_needed(candidate.shares, period_ns=superframe.period_ns, spare=spare))
-        )
+    per_member = superframe.period_ns / seconds_to_ns(scenario.traffic.interval_s)
+    share = 1.0
+    while superframe.turns:
+        wanted = {head: max(1, ceil(count * per_member * share)) for head, count in sorted(members.items())}
+        roots = tuple(head for head, packets in wanted.items() for _ in range(packets))
         found = timetable(tuple(positions), roots, geometry)
         if found is not None:
             return found
+        if all(packets == 1 for packets in wanted.values()):
+            break
+        share *= _FEWER
     return Refused(
-        f"the floods of {len(roots)} packets per superframe do not fit {superframe.turns} turns of "
-        f"{superframe.turn_ns / 1e6:.2f} ms"
+        f"one packet of each of {len(members)} heads does not fit {superframe.turns} turns of "
+        f"{superframe.turn_ns / 1e6:.2f} ms in {superframe.period_ns / 1e6:g} ms"
     )
 
 

@@ -1,0 +1,384 @@
+"""AODV at one node (RFC 3561): routes are asked for when wanted, and told of when they break.
+
+    wanted  -> RREQ floods, ring by ring -> the destination, or who knows, answers RREP along the reverse way
+    used    -> the route, its reverse and both next hops live on
+    broken  -> (unicast not acknowledged, or hellos gone) -> RERR to the precursors
+
+Broadcast data is flooded, each node once after U(0, `routing.jitter_ms`), as are RREQs. Does not model: local repair
+(6.12, optional), multicast, gateways, RREP-ACK (the MAC acknowledges), the quiet time after a reboot (6.13).
+"""
+
+from collections.abc import Mapping
+from typing import ClassVar
+
+from fanet_mw.errors import DropReason, MalformedFrameError
+from fanet_mw.messages import Reception, TxOutcome
+from fanet_mw.protocol.contract import Port
+from fanet_mw.protocol.txqueue import Packet
+from fanet_mw.routing import control
+from fanet_mw.routing.aodv import parameters as p
+from fanet_mw.routing.aodv.discovery import Discovery, HeardRequests, RateLimit, Search
+from fanet_mw.routing.aodv.messages import (
+    DESTINATION_ONLY,
+    GRATUITOUS,
+    RERR,
+    RREP,
+    RREQ,
+    UNKNOWN_SEQUENCE,
+    RouteError,
+    RouteReply,
+    RouteRequest,
+    Unreachable,
+    most_unreachable,
+)
+from fanet_mw.routing.aodv.neighbors import Hellos
+from fanet_mw.routing.aodv.table import Route, Table
+from fanet_mw.routing.control import Family
+from fanet_mw.routing.routed import Routed
+from fanet_mw.routing.serial import following, later, newer
+from fanet_mw.routing.waiting import WaitingRoom
+from fanet_mw.units import BROADCAST, MS, NodeId, seconds_to_ns
+
+
+class Aodv(Routed):
+    """Ad hoc on-demand distance vector routing."""
+
+    family: ClassVar[Family] = Family.AODV
+
+    def __init__(self, port: Port) -> None:
+        super().__init__(port)
+        routing = port.scenario.routing
+        self._table = Table()
+        self._discovery = Discovery()
+        self._requests = HeardRequests()
+        self._hellos = Hellos()
+        self._room = WaitingRoom(capacity=routing.queue_frames, hold_ns=seconds_to_ns(routing.lifetime_s))
+        self._rreq_limit = RateLimit(p.RREQ_RATELIMIT)
+        self._rerr_limit = RateLimit(p.RERR_RATELIMIT)
+        self._blacklist: dict[NodeId, int] = {}
+        """Neighbors to which a RREP did not get through, and until when their RREQs are ignored (6.8)."""
+        self._most_unreachable = most_unreachable(control.capacity(port.scenario.radio.max_frame_bytes))
+        self._seq = 0
+        self._rreq_id = 0
+        self._hello_ns: int | None = None
+        self._broadcast_ns = -p.HELLO_INTERVAL_NS
+        """When we last sent a broadcast: it stands in for a hello (6.9)."""
+        self._in_use_until_ns = -1
+
+    def start(self, now_ns: int) -> None:
+        self._hello_ns = now_ns + int(self._random() * p.HELLO_INTERVAL_NS)
+
+    # --- data -----------------------------------------------------------------------------------------------------
+
+    def _outgoing(self, packet: Packet, *, start_ns: int, now_ns: int) -> None:
+        destination = NodeId(packet.header.destination)
+        route = self._table.active(destination, now_ns=now_ns)
+        if route is not None:
+            self._use(route, now_ns=now_ns)
+            self._send(packet, route.next_hop, start_ns=start_ns)
+            return
+        evicted = self._room.push(packet, now_ns=now_ns)
+        if evicted is not None:
+            self._port.drop(DropReason.QUEUE_FULL, evicted, now_ns=now_ns)
+        self._search(destination, now_ns=now_ns)
+
+    def _transit(self, packet: Packet, reception: Reception, *, start_ns: int, now_ns: int) -> None:
+        self._hellos.heard(reception.src, now_ns=now_ns)
+        destination = NodeId(packet.header.destination)
+        route = self._table.active(destination, now_ns=now_ns)
+        if route is None:
+            self._port.drop(DropReason.NO_ROUTE, packet, now_ns=now_ns)
+            self._deny(destination, reception.src, now_ns=now_ns)
+            return
+        self._use(route, now_ns=now_ns)
+        self._keep(packet.origin, reception.src, now_ns=now_ns)
+        self._send(packet, route.next_hop, start_ns=start_ns)
+
+    def _arrived(self, packet: Packet, reception: Reception, *, now_ns: int) -> None:
+        self._hellos.heard(reception.src, now_ns=now_ns)
+        self._keep(packet.origin, reception.src, now_ns=now_ns)
+
+    def _use(self, route: Route, *, now_ns: int) -> None:
+        """A data packet takes this route: it and the way to its next hop stay active (6.2)."""
+        self._keep(route.destination, route.next_hop, now_ns=now_ns)
+
+    def _keep(self, far: NodeId, near: NodeId, *, now_ns: int) -> None:
+        ends_ns = self._in_use_until_ns = now_ns + p.ACTIVE_ROUTE_TIMEOUT_NS
+        self._table.extend(self._table.active(far, now_ns=now_ns), ends_ns=ends_ns)
+        if near != far:
+            self._table.extend(self._table.active(near, now_ns=now_ns), ends_ns=ends_ns)
+
+    def _failed(self, packet: Packet, next_hop: NodeId, outcome: TxOutcome, *, now_ns: int) -> None:
+        super()._failed(packet, next_hop, outcome, now_ns=now_ns)
+        if outcome is TxOutcome.RETRY_LIMIT:
+            self._link_broke(next_hop, now_ns=now_ns)
+
+    # --- route discovery ------------------------------------------------------------------------------------------
+
+    def _search(self, destination: NodeId, *, now_ns: int) -> None:
+        if destination in self._discovery:
+            return
+        known = self._table.entry(destination, now_ns=now_ns)
+        search = self._discovery.begin(destination, last_hops=known.hops if known else None, now_ns=now_ns)
+        self._ask(search, now_ns=now_ns)
+
+    def _ask(self, search: Search, *, now_ns: int) -> None:
+        """Originate a RREQ (6.3), or wait until the rate limit allows it."""
+        free_ns = self._rreq_limit.free_ns(now_ns)
+        if free_ns > now_ns:
+            search.due_ns = free_ns
+            return
+        self._rreq_limit.count(now_ns)
+        self._seq = following(self._seq)
+        self._rreq_id = following(self._rreq_id)
+        known = self._table.entry(search.destination, now_ns=now_ns)
+        seq_known = known is not None and known.seq_valid
+        request = RouteRequest(
+            flags=GRATUITOUS | (0 if seq_known else UNKNOWN_SEQUENCE),
+            hop_count=0,
+            rreq_id=self._rreq_id,
+            destination=search.destination,
+            destination_seq=known.seq if known is not None and known.seq_valid else 0,
+            originator=self._port.node,
+            originator_seq=self._seq,
+        )
+        self._requests.is_new(self._port.node, self._rreq_id, now_ns=now_ns)
+        self._broadcast(RREQ, request.encode(), ttl=search.ttl, now_ns=now_ns)
+        search.sent(now_ns)
+
+    def _repeat(self, search: Search, *, now_ns: int) -> None:
+        """A search brought nothing in its time: wider, or give up (6.3)."""
+        if search.exhausted:
+            self._discovery.end(search.destination)
+            for packet in self._room.take(search.destination):
+                self._port.drop(DropReason.NO_ROUTE, packet, now_ns=now_ns)
+            return
+        if search.asked:
+            search.widen()
+        self._ask(search, now_ns=now_ns)
+
+    def _release(self, now_ns: int) -> None:
+        """Routes that were searched for may have come: send what waits for them."""
+        for destination in self._discovery.wanted():
+            route = self._table.active(destination, now_ns=now_ns)
+            if route is None:
+                continue
+            self._discovery.end(destination)
+            for packet in self._room.take(destination):
+                self._use(route, now_ns=now_ns)
+                self._send(packet, route.next_hop, start_ns=now_ns + self._lead_ns)
+
+    # --- control --------------------------------------------------------------------------------------------------
+
+    def _heard(self, number: int, body: bytes, packet: Packet, reception: Reception, *, now_ns: int) -> None:
+        previous = reception.src
+        if number == RREQ:
+            self._requested(RouteRequest.decode(body), packet.header.hop_limit, previous, now_ns=now_ns)
+        elif number == RREP:
+            reply = RouteReply.decode(body)
+            if reply.is_hello:
+                self._hello(reply, previous, now_ns=now_ns)
+            else:
+                self._replied(reply, packet.header.hop_limit, previous, now_ns=now_ns)
+        elif number == RERR:
+            self._denied(RouteError.decode(body), previous, now_ns=now_ns)
+        else:
+            raise MalformedFrameError(f"AODV message {number}")
+        self._hellos.heard(previous, now_ns=now_ns)
+        self._release(now_ns)
+
+    def _neighbor(self, node: NodeId, *, now_ns: int) -> None:
+        self._table.learn_neighbor(node, ends_ns=now_ns + p.ACTIVE_ROUTE_TIMEOUT_NS, now_ns=now_ns)
+
+    def _requested(self, request: RouteRequest, ttl: int, previous: NodeId, *, now_ns: int) -> None:
+        """6.5: reverse route; then an answer, or one ring further."""
+        if self._blacklist.get(previous, now_ns) > now_ns or request.originator == self._port.node:
+            return
+        self._neighbor(previous, now_ns=now_ns)
+        if not self._requests.is_new(request.originator, request.rreq_id, now_ns=now_ns):
+            return
+        hops = request.hop_count + 1
+        least_ns = now_ns + 2 * p.NET_TRAVERSAL_TIME_NS - 2 * hops * p.NODE_TRAVERSAL_TIME_NS
+        originator = NodeId(request.originator)
+        self._table.offer(
+            originator, seq=request.originator_seq, hops=hops, next_hop=previous, ends_ns=least_ns, now_ns=now_ns
+        )
+        self._table.extend(self._table.active(originator, now_ns=now_ns), ends_ns=least_ns)
+        if request.destination == self._port.node:
+            self._answer(request, now_ns=now_ns)
+            return
+        route = self._table.active(NodeId(request.destination), now_ns=now_ns)
+        if route is not None and self._may_answer_for(route, request):
+            if route.next_hop != previous:  # else the asker knows better than we do
+                self._answer_for(route, request, now_ns=now_ns)
+        elif ttl > 1:
+            self._pass_on(request, hops=hops, ttl=ttl - 1, now_ns=now_ns)
+
+    def _pass_on(self, request: RouteRequest, *, hops: int, ttl: int, now_ns: int) -> None:
+        known = self._table.entry(NodeId(request.destination), now_ns=now_ns)
+        flags, seq = request.flags, request.destination_seq
+        if known is not None and known.seq_valid:
+            seq = known.seq if flags & UNKNOWN_SEQUENCE else later(known.seq, seq)
+            flags &= ~UNKNOWN_SEQUENCE
+        onward = request._replace(flags=flags, hop_count=hops, destination_seq=seq)
+        self._broadcast(RREQ, onward.encode(), ttl=ttl, now_ns=now_ns)
+
+    def _may_answer_for(self, route: Route, request: RouteRequest) -> bool:
+        """6.6: an intermediate node answers with a route at least as new as asked for."""
+        if request.flags & DESTINATION_ONLY or not route.seq_valid:
+            return False
+        return bool(request.flags & UNKNOWN_SEQUENCE) or not newer(request.destination_seq, route.seq)
+
+    def _answer(self, request: RouteRequest, *, now_ns: int) -> None:
+        """6.6.1: we are the destination."""
+        if not request.flags & UNKNOWN_SEQUENCE:
+            self._seq = later(request.destination_seq, self._seq)
+        reply = RouteReply(0, self._port.node, self._seq, request.originator, p.MY_ROUTE_TIMEOUT_NS // MS)
+        self._send_reply(reply, NodeId(request.originator), now_ns=now_ns)
+
+    def _answer_for(self, route: Route, request: RouteRequest, *, now_ns: int) -> None:
+        """6.6.2: we know the way; 6.6.3: the destination learns of the asker too."""
+        reverse = self._table.active(NodeId(request.originator), now_ns=now_ns)
+        if reverse is None:
+            return  # it expired at once: hostile hop counts only
+        route.precursors[reverse.next_hop] = None
+        reverse.precursors[route.next_hop] = None
+        left_ms = (route.ends_ns - now_ns) // MS
+        reply = RouteReply(min(route.hops, 254), route.destination, route.seq, request.originator, left_ms)
+        self._send_reply(reply, reverse.destination, now_ns=now_ns)
+        if request.flags & GRATUITOUS:
+            left_ms = (reverse.ends_ns - now_ns) // MS
+            hops = min(reverse.hops, 254)
+            gratuitous = RouteReply(hops, request.originator, request.originator_seq, request.destination, left_ms)
+            self._send_reply(gratuitous, route.destination, now_ns=now_ns)
+
+    def _send_reply(self, reply: RouteReply, towards: NodeId, *, now_ns: int, ttl: int = p.NET_DIAMETER) -> None:
+        route = self._table.active(towards, now_ns=now_ns)
+        if route is not None:
+            self._keep(towards, route.next_hop, now_ns=now_ns)
+            self._say(RREP, reply.encode(), start_ns=now_ns + self._lead_ns, now_ns=now_ns, to=route.next_hop, ttl=ttl)
+
+    def _replied(self, reply: RouteReply, ttl: int, previous: NodeId, *, now_ns: int) -> None:
+        """6.7: a forward route; on towards who asked."""
+        self._neighbor(previous, now_ns=now_ns)
+        if reply.destination == self._port.node:
+            return  # a gratuitous one about us: somebody forged it
+        hops, destination = reply.hop_count + 1, NodeId(reply.destination)
+        ends_ns = now_ns + reply.lifetime_ms * MS
+        self._table.offer(
+            destination, seq=reply.destination_seq, hops=hops, next_hop=previous, ends_ns=ends_ns, now_ns=now_ns
+        )
+        originator = NodeId(reply.originator)
+        forward = self._table.active(destination, now_ns=now_ns)
+        if originator == self._port.node or forward is None or ttl <= 1:
+            return
+        reverse = self._table.active(originator, now_ns=now_ns)
+        if reverse is None:
+            return
+        forward.precursors[reverse.next_hop] = None
+        near = self._table.active(forward.next_hop, now_ns=now_ns)
+        if near is not None:
+            near.precursors[reverse.next_hop] = None
+        self._send_reply(reply._replace(hop_count=hops), originator, now_ns=now_ns, ttl=ttl - 1)
+
+    def _control_failed(self, next_hop: NodeId, outcome: TxOutcome, *, now_ns: int) -> None:
+        if outcome is TxOutcome.RETRY_LIMIT:
+            self._blacklist[next_hop] = now_ns + p.BLACKLIST_TIMEOUT_NS
+            self._link_broke(next_hop, now_ns=now_ns)
+
+    # --- hellos ---------------------------------------------------------------------------------------------------
+
+    def _hello(self, reply: RouteReply, previous: NodeId, *, now_ns: int) -> None:
+        if reply.destination != previous:
+            raise MalformedFrameError(f"hello of {reply.destination} from {previous}")
+        ends_ns = now_ns + p.NEIGHBOR_LIFETIME_NS
+        self._table.learn_neighbor(previous, ends_ns=ends_ns, now_ns=now_ns, seq=reply.destination_seq)
+        self._hellos.hello(previous, now_ns=now_ns)
+
+    def _say_hello(self, now_ns: int) -> None:
+        """6.9: only as part of an active route, and only if no other broadcast was sent meanwhile."""
+        assert self._hello_ns is not None, "only a node that was started says hello"
+        self._hello_ns = max(now_ns, self._hello_ns) + p.HELLO_INTERVAL_NS
+        if self._broadcast_ns + p.HELLO_INTERVAL_NS > now_ns:
+            self._hello_ns = self._broadcast_ns + p.HELLO_INTERVAL_NS
+        elif self._in_use_until_ns > now_ns:
+            node = self._port.node
+            hello = RouteReply(0, node, self._seq, node, p.NEIGHBOR_LIFETIME_NS // MS)
+            self._broadcast(RREP, hello.encode(), ttl=1, now_ns=now_ns)
+
+    # --- broken links ---------------------------------------------------------------------------------------------
+
+    def _link_broke(self, neighbor: NodeId, *, now_ns: int) -> None:
+        """6.11 (i): every active route over this neighbor ends; who used them is told."""
+        self._hellos.forget(neighbor)
+        broken = self._table.over(neighbor, now_ns=now_ns)
+        for route in broken:
+            self._table.invalidate(route, now_ns=now_ns)
+        self._tell(broken, now_ns=now_ns)
+
+    def _deny(self, destination: NodeId, asker: NodeId, *, now_ns: int) -> None:
+        """6.11 (ii): data came for which there is no route; the neighbor that sent it is the precursor."""
+        known = self._table.entry(destination, now_ns=now_ns)
+        seq = 0
+        if known is not None:
+            self._table.invalidate(known, now_ns=now_ns)
+            seq = known.seq
+        self._send_error([Unreachable(destination, seq)], asker, now_ns=now_ns)
+
+    def _denied(self, error: RouteError, previous: NodeId, *, now_ns: int) -> None:
+        """6.11 (iii): a neighbor lost ways that we use over it."""
+        broken = []
+        for destination, seq in error.unreachable:
+            route = self._table.active(NodeId(destination), now_ns=now_ns)
+            if route is not None and route.next_hop == previous:
+                self._table.invalidate(route, now_ns=now_ns, seq=seq)
+                broken.append(route)
+        self._tell(broken, now_ns=now_ns)
+
+    def _tell(self, broken: list[Route], *, now_ns: int) -> None:
+        """A RERR with what has precursors: unicast to a single one, else broadcast (6.11)."""
+        told = [route for route in broken if route.precursors]
+        precursors = sorted({node for route in told for node in route.precursors})
+        if told:
+            to = precursors[0] if len(precursors) == 1 else BROADCAST
+            self._send_error([Unreachable(route.destination, route.seq) for route in told], to, now_ns=now_ns)
+
+    def _send_error(self, unreachable: list[Unreachable], to: NodeId, *, now_ns: int) -> None:
+        if self._rerr_limit.free_ns(now_ns) > now_ns:
+            return
+        self._rerr_limit.count(now_ns)
+        body = RouteError(tuple(unreachable[: self._most_unreachable])).encode()
+        if to == BROADCAST:
+            self._broadcast(RERR, body, ttl=1, now_ns=now_ns)
+        else:
+            self._say(RERR, body, start_ns=now_ns + self._lead_ns, now_ns=now_ns, to=to)
+
+    def _broadcast(self, number: int, body: bytes, *, ttl: int, now_ns: int) -> None:
+        """Neighbors that heard the same must not answer at once: jitter before every broadcast."""
+        self._broadcast_ns = now_ns
+        self._say(number, body, start_ns=self._jittered(now_ns, self._jitter_ns), now_ns=now_ns, ttl=ttl)
+
+    # --- time -----------------------------------------------------------------------------------------------------
+
+    def next_wake_ns(self) -> int | None:
+        wanted = (self._hello_ns, self._discovery.next_ns(), self._hellos.next_ns(), self._room.next_end_ns())
+        return min((t_ns for t_ns in wanted if t_ns is not None), default=None)
+
+    def wake(self, now_ns: int) -> None:
+        for packet in self._room.expire(now_ns=now_ns):
+            self._port.drop(DropReason.EXPIRED, packet, now_ns=now_ns)
+        for neighbor in self._hellos.lost(now_ns):
+            self._link_broke(neighbor, now_ns=now_ns)
+        self._release(now_ns)
+        for search in self._discovery.due(now_ns):
+            self._repeat(search, now_ns=now_ns)
+        if self._hello_ns is not None and now_ns >= self._hello_ns:
+            self._say_hello(now_ns)
+
+    # --- for people -----------------------------------------------------------------------------------------------
+
+    def waiting(self) -> int:
+        return super().waiting() + len(self._room)
+
+    def report(self) -> Mapping[str, object]:
+        return {"control_sent": self.control_sent, "waiting": self.waiting(), "sequence": self._seq}

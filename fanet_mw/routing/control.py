@@ -1,0 +1,103 @@
+"""How rival protocols put their control messages on the air: pieces of FANET_ROUTING in a packet of kind ROUTING.
+
+A message is a type and bytes; the type's high half names the protocol, so that two protocols never read each other.
+All pieces of one message travel in one radio frame, so `capacity` bounds a message. Bodies are read by `Reader`, which
+turns any missing byte into MalformedFrameError.
+"""
+
+import struct
+from collections.abc import Iterator
+from enum import IntEnum
+from typing import Any, Final
+
+from fanet_mw import wire
+from fanet_mw.errors import MalformedFrameError
+from fanet_mw.wire import OVERHEAD, ROUTING, encode_inner
+
+_HEAD: Final = struct.Struct("<BBBB")
+_PIECE: Final = 239
+_AT: Final = OVERHEAD - 2
+"""Where the payload of a MAVLink 2 frame begins."""
+_END: Final = bytes((wire.VERSION,))
+
+
+class Family(IntEnum):
+    """The protocol in the high half of a type."""
+
+    AODV = 1
+    OLSR = 2
+    DSDV = 3
+    GEOGRAPHIC = 4
+
+
+def type_of(family: Family, number: int) -> int:
+    """The type byte of message `number` (0..15) of a protocol."""
+    return family << 4 | number
+
+
+def capacity(max_frame_bytes: int) -> int:
+    """Bytes of control that fit into one radio frame beside the headers."""
+    room = max_frame_bytes - wire.HEADER_BYTES
+    whole, rest = divmod(room, OVERHEAD + _HEAD.size + _PIECE + 1)
+    return whole * _PIECE + max(0, rest - OVERHEAD - _HEAD.size - 1)
+
+
+def encode(kind: int, body: bytes, *, node: int) -> bytes:
+    """The inner frames of one control message."""
+    pieces = [body[at : at + _PIECE] for at in range(0, len(body), _PIECE)] or [b""]
+    return b"".join(
+        encode_inner(ROUTING, _HEAD.pack(len(piece), kind, part, len(pieces)) + piece + _END, node=node, seq=part)
+        for part, piece in enumerate(pieces)
+    )
+
+
+def decode(frame: bytes) -> tuple[int, bytes]:
+    """(type, body) of the control message in a radio frame; raises MalformedFrameError."""
+    kind, body, expected, parts = -1, b"", 0, 1
+    for msgid, inner in wire.inner_frames(frame):
+        if msgid != ROUTING.msgid or inner[1] < _HEAD.size + 1:
+            raise MalformedFrameError(f"message {msgid} of {inner[1]} bytes in a control packet")
+        length, its_kind, part, parts = _HEAD.unpack_from(inner, _AT)
+        piece = inner[_AT + _HEAD.size : _AT + inner[1]]
+        if part != expected or kind not in (-1, its_kind) or len(piece) != length + 1 or piece[-1:] != _END:
+            raise MalformedFrameError(f"piece {part} of {parts}, type {its_kind}, {len(piece)} bytes")
+        kind, body, expected = its_kind, body + piece[:-1], expected + 1
+    if not expected or expected != parts:
+        raise MalformedFrameError(f"{expected} of {parts} pieces")
+    return kind, body
+
+
+class Reader:
+    """Reads a body from its beginning; asking for what is not there raises MalformedFrameError."""
+
+    def __init__(self, body: bytes) -> None:
+        self._body = body
+        self._at = 0
+
+    def take(self, layout: struct.Struct) -> tuple[Any, ...]:
+        end = self._at + layout.size
+        if end > len(self._body):
+            raise MalformedFrameError(f"control of {len(self._body)} bytes ends before byte {end}")
+        fields = layout.unpack_from(self._body, self._at)
+        self._at = end
+        return fields
+
+    def rest(self, layout: struct.Struct) -> Iterator[tuple[Any, ...]]:
+        """Every entry up to the end, which must be the end of an entry."""
+        while self._at < len(self._body):
+            yield self.take(layout)
+
+    @property
+    def at_end(self) -> bool:
+        return self._at == len(self._body)
+
+    def finish(self) -> None:
+        if self._at != len(self._body):
+            raise MalformedFrameError(f"{len(self._body) - self._at} bytes of control too many")
+
+
+def check_node(node: int) -> int:
+    """A node id off the air; raises MalformedFrameError at 0 and at the broadcast id."""
+    if not 0 < node < 0xFFFF:
+        raise MalformedFrameError(f"node id {node} in control")
+    return node

@@ -1,0 +1,124 @@
+"""DSDV at one node (Perkins and Bhagwat, SIGCOMM 1994): everyone tells its neighbors its distances, with numbers.
+
+    every 15 s  -> full dump, own number + 2
+    news        -> an incremental update within a second: new destinations and broken ways at once, another metric when
+                   it has settled
+    link breaks -> (unicast not acknowledged, or nothing heard for three periods) infinite metric, odd number
+
+As in ns-3 a packet without a route waits at its origin, an infinite metric counts only from our next hop, and periods
+are ns-3's. Broadcast data is flooded. Does not model: the base-station extension and layer-2 addresses (section 4).
+"""
+
+from collections.abc import Mapping
+from typing import ClassVar, Final
+
+from fanet_mw.errors import DropReason, MalformedFrameError
+from fanet_mw.messages import Reception, TxOutcome
+from fanet_mw.protocol.contract import Port
+from fanet_mw.protocol.txqueue import Packet
+from fanet_mw.routing import control
+from fanet_mw.routing.control import Family
+from fanet_mw.routing.dsdv.messages import FULL, INCREMENTAL, PER_ENTRY, Advertised, Update
+from fanet_mw.routing.dsdv.table import PERIODIC_UPDATE_NS, Table
+from fanet_mw.routing.routed import Routed
+from fanet_mw.routing.waiting import WaitingRoom
+from fanet_mw.units import NodeId, S, seconds_to_ns
+
+_GATHER_NS: Final = 1 * S
+"""News goes after U(0, this), with whatever else has come by then (as ns-3's triggered updates)."""
+
+
+class Dsdv(Routed):
+    """Destination-sequenced distance vector routing."""
+
+    family: ClassVar[Family] = Family.DSDV
+
+    def __init__(self, port: Port) -> None:
+        super().__init__(port)
+        routing = port.scenario.routing
+        self._table = Table(port.node)
+        self._room = WaitingRoom(capacity=routing.queue_frames, hold_ns=seconds_to_ns(routing.lifetime_s))
+        self._most = control.capacity(port.scenario.radio.max_frame_bytes) // PER_ENTRY
+        self._full_ns: int | None = None
+        self._news_ns: int | None = None
+
+    def start(self, now_ns: int) -> None:
+        self._full_ns = now_ns + int(self._random() * _GATHER_NS)
+
+    # --- data -------------------------------------------------------------------------------------------------------
+
+    def _outgoing(self, packet: Packet, *, start_ns: int, now_ns: int) -> None:
+        next_hop = self._table.next_hop(NodeId(packet.header.destination))
+        if next_hop is not None:
+            self._send(packet, next_hop, start_ns=start_ns)
+            return
+        evicted = self._room.push(packet, now_ns=now_ns)
+        if evicted is not None:
+            self._port.drop(DropReason.QUEUE_FULL, evicted, now_ns=now_ns)
+
+    def _transit(self, packet: Packet, reception: Reception, *, start_ns: int, now_ns: int) -> None:
+        next_hop = self._table.next_hop(NodeId(packet.header.destination))
+        if next_hop is None:
+            self._port.drop(DropReason.NO_ROUTE, packet, now_ns=now_ns)
+        else:
+            self._send(packet, next_hop, start_ns=start_ns)
+
+    def _failed(self, packet: Packet, next_hop: NodeId, outcome: TxOutcome, *, now_ns: int) -> None:
+        super()._failed(packet, next_hop, outcome, now_ns=now_ns)
+        if outcome is TxOutcome.RETRY_LIMIT and self._table.lose(next_hop, now_ns=now_ns):
+            self._plan(now_ns)
+
+    # --- control ----------------------------------------------------------------------------------------------------
+
+    def _heard(self, number: int, body: bytes, packet: Packet, reception: Reception, *, now_ns: int) -> None:
+        if number not in (FULL, INCREMENTAL):
+            raise MalformedFrameError(f"DSDV message {number}")
+        for told in Update.decode(body).routes:
+            self._table.hear(reception.src, told, now_ns=now_ns)
+        self._release(now_ns)
+        self._plan(now_ns)
+
+    def _release(self, now_ns: int) -> None:
+        for destination in self._room.destinations():
+            next_hop = self._table.next_hop(destination)
+            if next_hop is not None:
+                for packet in self._room.take(destination):
+                    self._send(packet, next_hop, start_ns=now_ns + self._lead_ns)
+
+    def _plan(self, now_ns: int) -> None:
+        """News is due: choose when to tell it, unless an update is planned that takes it along."""
+        due_ns = self._table.next_news_ns()
+        if due_ns is not None and (self._news_ns is None or self._news_ns > due_ns + _GATHER_NS):
+            self._news_ns = max(now_ns, due_ns) + int(self._random() * _GATHER_NS)
+
+    def _tell(self, number: int, routes: list[Advertised], *, now_ns: int) -> None:
+        for at in range(0, len(routes), self._most):
+            update = Update(tuple(routes[at : at + self._most]))
+            self._say(number, update.encode(), start_ns=self._jittered(now_ns, self._jitter_ns), now_ns=now_ns)
+
+    # --- time -------------------------------------------------------------------------------------------------------
+
+    def next_wake_ns(self) -> int | None:
+        wanted = (self._full_ns, self._news_ns, self._room.next_end_ns())
+        return min((t_ns for t_ns in wanted if t_ns is not None), default=None)
+
+    def wake(self, now_ns: int) -> None:
+        for packet in self._room.expire(now_ns=now_ns):
+            self._port.drop(DropReason.EXPIRED, packet, now_ns=now_ns)
+        if self._full_ns is not None and now_ns >= self._full_ns:
+            self._table.tidy(now_ns)
+            self._tell(FULL, self._table.full(), now_ns=now_ns)
+            self._full_ns += PERIODIC_UPDATE_NS
+            self._news_ns = None
+        elif self._news_ns is not None and now_ns >= self._news_ns:
+            self._tell(INCREMENTAL, self._table.news(now_ns), now_ns=now_ns)
+            self._news_ns = None
+        self._plan(now_ns)
+
+    # --- for people -------------------------------------------------------------------------------------------------
+
+    def waiting(self) -> int:
+        return super().waiting() + len(self._room)
+
+    def report(self) -> Mapping[str, object]:
+        return {"control_sent": self.control_sent, "waiting": self.waiting(), "routes": self._table.count()}

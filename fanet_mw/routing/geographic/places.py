@@ -1,0 +1,72 @@
+"""Where others are: neighbors by their beacons, anyone by the location service; and which neighbor is nearer."""
+
+from typing import Final
+
+from fanet_mw.routing.geographic.messages import MOST_FIXES, Fix
+from fanet_mw.units import Enu, NodeId, S
+
+HELLO_INTERVAL_NS: Final = 1 * S
+NEIGHBOR_LIFETIME_NS: Final = 5 * HELLO_INTERVAL_NS // 2
+"""Two beacons may be lost, a third not."""
+MIN_PROGRESS_M: Final = 10.0
+"""A neighbor that is nearer by less is not worth a hop; several times the error of a position fix."""
+_FUTURE_US: Final = 1_000_000
+"""A location from later than this is not believed: it would never be replaced."""
+
+
+class Places:
+    """What one node knows of where others are."""
+
+    def __init__(self) -> None:
+        self._neighbors: dict[NodeId, tuple[Enu, int]] = {}
+        """Position and until when it holds."""
+        self._fixes: dict[NodeId, Fix] = {}
+        self._used: dict[NodeId, None] = {}
+        """Destinations in the order of their last use."""
+
+    def heard(self, neighbor: NodeId, position: Enu, *, now_ns: int) -> None:
+        self._neighbors[neighbor] = position, now_ns + NEIGHBOR_LIFETIME_NS
+
+    def forget(self, neighbor: NodeId) -> None:
+        self._neighbors.pop(neighbor, None)
+
+    def learn(self, fix: Fix, *, now_us: int) -> None:
+        """A location; the latest is kept."""
+        node = NodeId(fix.node)
+        known = self._fixes.get(node)
+        if fix.t_us <= now_us + _FUTURE_US and (known is None or fix.t_us > known.t_us):
+            self._fixes[node] = fix
+
+    def fix(self, node: NodeId) -> Fix | None:
+        return self._fixes.get(node)
+
+    def use(self, destination: NodeId) -> None:
+        """The location of this destination is worth passing on."""
+        self._used.pop(destination, None)
+        self._used[destination] = None
+        while len(self._used) > MOST_FIXES:
+            del self._used[next(iter(self._used))]
+
+    def worth_telling(self) -> tuple[Fix, ...]:
+        return tuple(self._fixes[node] for node in self._used if node in self._fixes)
+
+    def next_hop(self, destination: NodeId, *, at: Enu, barred: NodeId, now_ns: int) -> NodeId | None:
+        """The destination if it is a neighbor, else the neighbor nearest to it, if that is nearer than `at`.
+
+        Never `barred`, who gave us the packet: two nodes that know different locations would play it back and forth.
+        """
+        if destination in self._neighbors and self._neighbors[destination][1] > now_ns:
+            return destination
+        fix = self._fixes.get(destination)
+        if fix is None:
+            return None
+        best, best_m = None, fix.position.minus(at).norm() - MIN_PROGRESS_M
+        for node in sorted(self._neighbors):
+            position, ends_ns = self._neighbors[node]
+            left_m = fix.position.minus(position).norm()
+            if ends_ns > now_ns and node != barred and left_m < best_m:
+                best, best_m = node, left_m
+        return best
+
+    def count(self, *, now_ns: int) -> int:
+        return sum(1 for _, ends_ns in self._neighbors.values() if ends_ns > now_ns)

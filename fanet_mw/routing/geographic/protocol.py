@@ -1,0 +1,168 @@
+"""Carry and forward by position, in the manner of VADD (Zhao and Cao, IEEE INFOCOM 2006), without its roads.
+
+    a neighbor nearer to the destination  -> hand the packet over (acknowledged), the nearest first
+    none                                  -> keep it and fly on; look again twice a second
+    handed over                           -> custody has passed: the same packet may come back later
+
+Location service: a destination that receives data floods its position every 5 s; who has a packet for a node of unknown
+or old location floods a query, which it answers; beacons (1 s, one hop) pass the locations in use on, so that whoever
+moves between partitions brings them along. A stale location is used until a newer one comes. Broadcast data is flooded.
+
+Does not model: VADD's delay estimates per road segment, intersections and its L-, D- and H- variants; motion of
+neighbors between beacons; recovery round voids other than by carrying (perimeter routing).
+"""
+
+from collections.abc import Mapping
+from typing import ClassVar, Final
+
+from fanet_mw.errors import DropReason, MalformedFrameError
+from fanet_mw.messages import Reception, TxOutcome
+from fanet_mw.protocol.contract import Port
+from fanet_mw.protocol.txqueue import Packet
+from fanet_mw.routing.control import Family
+from fanet_mw.routing.geographic.messages import BEACON, LOCATION, QUERY, Beacon, Fix, Location, Query
+from fanet_mw.routing.geographic.places import HELLO_INTERVAL_NS, Places
+from fanet_mw.routing.routed import Routed
+from fanet_mw.routing.waiting import WaitingRoom
+from fanet_mw.units import BROADCAST, MS, US, NodeId, S, seconds_to_ns
+
+LOCATION_INTERVAL_NS: Final = 5 * S
+LOCATION_AGE_NS: Final = 10 * S
+"""An older location is asked for again."""
+QUERY_INTERVAL_NS: Final = 5 * S
+"""Of one node for one destination."""
+LOOK_INTERVAL_NS: Final = 500 * MS
+
+
+class Geographic(Routed):
+    """Greedy forwarding by position, carrying where there is nobody nearer."""
+
+    family: ClassVar[Family] = Family.GEOGRAPHIC
+
+    def __init__(self, port: Port) -> None:
+        super().__init__(port)
+        routing = port.scenario.routing
+        self._places = Places()
+        self._room = WaitingRoom(capacity=routing.queue_frames, hold_ns=seconds_to_ns(routing.lifetime_s))
+        self._hops = routing.hop_limit
+        self._beacon_ns: int | None = None
+        self._look_ns: int | None = None
+        self._located_ns = -LOCATION_INTERVAL_NS
+        """When we last flooded our location."""
+        self._asked_ns: dict[NodeId, int] = {}
+
+    def start(self, now_ns: int) -> None:
+        self._beacon_ns = now_ns + int(self._random() * HELLO_INTERVAL_NS)
+
+    # --- data -------------------------------------------------------------------------------------------------------
+
+    def _outgoing(self, packet: Packet, *, start_ns: int, now_ns: int) -> None:
+        self._forward(packet, start_ns=start_ns, now_ns=now_ns)
+
+    def _transit(self, packet: Packet, reception: Reception, *, start_ns: int, now_ns: int) -> None:
+        self._forward(packet, start_ns=start_ns, now_ns=now_ns)
+
+    def _forward(self, packet: Packet, *, start_ns: int, now_ns: int) -> None:
+        destination = NodeId(packet.header.destination)
+        self._places.use(destination)
+        self._look_up(destination, now_ns=now_ns)
+        barred = NodeId(packet.header.prev_hop)
+        next_hop = self._places.next_hop(destination, at=self._port.position, barred=barred, now_ns=now_ns)
+        if next_hop is None:
+            self._carry(packet, now_ns=now_ns)
+        else:
+            self._send(packet, next_hop, start_ns=start_ns)
+
+    def _carry(self, packet: Packet, *, now_ns: int) -> None:
+        evicted = self._room.push(packet, now_ns=now_ns)
+        if evicted is not None:
+            self._port.drop(DropReason.QUEUE_FULL, evicted, now_ns=now_ns)
+        if self._look_ns is None:
+            self._look_ns = now_ns + LOOK_INTERVAL_NS
+
+    def _look(self, now_ns: int) -> None:
+        """Somebody nearer may have come. A packet older than its lifetime ends, however young its stay here."""
+        self._look_ns = None
+        for packet in self._room.expire(now_ns=now_ns):
+            self._port.drop(DropReason.EXPIRED, packet, now_ns=now_ns)
+        oldest_us = now_ns // US - round(self._port.scenario.routing.lifetime_s * 1_000_000)
+        for destination in self._room.destinations():
+            for packet in self._room.take(destination):
+                if packet.header.origin_us < oldest_us:
+                    self._port.drop(DropReason.EXPIRED, packet, now_ns=now_ns)
+                else:
+                    self._forward(packet, start_ns=now_ns + self._lead_ns, now_ns=now_ns)
+
+    def _failed(self, packet: Packet, next_hop: NodeId, outcome: TxOutcome, *, now_ns: int) -> None:
+        """Custody stays here: the neighbor is gone, or the MAC is full."""
+        if outcome is TxOutcome.RETRY_LIMIT:
+            self._places.forget(next_hop)
+        self._carry(packet, now_ns=now_ns)
+
+    def _acknowledged(self, packet: Packet, next_hop: NodeId) -> None:
+        self._port.forget(packet)
+
+    def _arrived(self, packet: Packet, reception: Reception, *, now_ns: int) -> None:
+        self._tell_location(now_ns=now_ns, every_ns=LOCATION_INTERVAL_NS)
+
+    # --- location service -------------------------------------------------------------------------------------------
+
+    def _look_up(self, destination: NodeId, *, now_ns: int) -> None:
+        """Ask for a location that is unknown or old, now and then."""
+        fix = self._places.fix(destination)
+        if fix is not None and fix.t_us * US + LOCATION_AGE_NS > now_ns:
+            return
+        if self._asked_ns.get(destination, -QUERY_INTERVAL_NS) + QUERY_INTERVAL_NS <= now_ns:
+            self._asked_ns[destination] = now_ns
+            self._flood_control(QUERY, Query(destination).encode(), now_ns=now_ns)
+
+    def _tell_location(self, *, now_ns: int, every_ns: int) -> None:
+        if self._located_ns + every_ns <= now_ns:
+            self._located_ns = now_ns
+            self._flood_control(LOCATION, Location(self._port.position).encode(), now_ns=now_ns)
+
+    def _flood_control(self, number: int, body: bytes, *, now_ns: int) -> None:
+        start_ns = self._jittered(now_ns, self._jitter_ns)
+        self._say(number, body, start_ns=start_ns, now_ns=now_ns, ttl=self._hops)
+
+    def _heard(self, number: int, body: bytes, packet: Packet, reception: Reception, *, now_ns: int) -> None:
+        if number == BEACON:
+            beacon = Beacon.decode(body)
+            self._places.heard(reception.src, beacon.position, now_ns=now_ns)
+            for fix in (Fix(reception.src, beacon.position, now_ns // US), *beacon.fixes):
+                self._places.learn(fix, now_us=now_ns // US)
+            return
+        if number == LOCATION:
+            fix = Fix(packet.origin, Location.decode(body).position, packet.header.origin_us)
+            self._places.learn(fix, now_us=now_ns // US)
+        elif number == QUERY:
+            if Query.decode(body).wanted == self._port.node:
+                self._tell_location(now_ns=now_ns, every_ns=S)
+                return
+        else:
+            raise MalformedFrameError(f"geographic message {number}")
+        if packet.header.hop_limit > 1 and packet.origin != self._port.node:
+            self.control_sent += 1
+            frame = self._port.forwarded(packet, flags=0)
+            self._port.transmit(frame, BROADCAST, start_ns=self._jittered(now_ns, self._jitter_ns))
+
+    # --- time -------------------------------------------------------------------------------------------------------
+
+    def next_wake_ns(self) -> int | None:
+        return min((t_ns for t_ns in (self._beacon_ns, self._look_ns) if t_ns is not None), default=None)
+
+    def wake(self, now_ns: int) -> None:
+        if self._beacon_ns is not None and now_ns >= self._beacon_ns:
+            beacon = Beacon(self._port.position, self._places.worth_telling())
+            self._say(BEACON, beacon.encode(), start_ns=self._jittered(now_ns, self._jitter_ns), now_ns=now_ns)
+            self._beacon_ns = max(now_ns, self._beacon_ns + HELLO_INTERVAL_NS)
+        if self._look_ns is not None and now_ns >= self._look_ns:
+            self._look(now_ns)
+
+    # --- for people -------------------------------------------------------------------------------------------------
+
+    def waiting(self) -> int:
+        return super().waiting() + len(self._room)
+
+    def report(self) -> Mapping[str, object]:
+        return {"control_sent": self.control_sent, "waiting": self.waiting(), "carried": len(self._room)}

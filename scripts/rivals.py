@@ -1,0 +1,88 @@
+"""The table of rivals in docs/protocol.md: scenario `rivals` per protocol, speed and seed, and what geometry allows.
+
+`conn` is an upper bound of the PDR: the share of (node, second) of the measured window in which a node has a multi-hop
+path of `radio.range_m` links to the leader, on the ideal track of the mobility model.
+
+    PYTHONPATH=. python scripts/rivals.py --protocols aodv olsr --speeds 0 10 20 --seeds 1 2 3
+"""
+
+import argparse
+import statistics
+import sys
+from collections.abc import Sequence
+from typing import Any
+
+import numpy as np
+
+from fanet_mw.scenario import Scenario
+from fanet_mw.units import S
+from sim import catalog
+from sim.engine import Rows
+from sim.guidance import Guidance
+from sim.layout import positions
+from sim.results import finish
+from sim.run import simulate
+
+
+def reached(at: Rows, range_m: float) -> int:
+    """How many nodes have a path to the first."""
+    linked = np.linalg.norm(at[:, None] - at[None], axis=2) <= range_m
+    known = np.zeros(len(at), dtype=bool)
+    known[0] = True
+    while True:
+        wider = linked[known].any(axis=0)
+        if (wider == known).all():
+            return int(known.sum()) - 1
+        known = wider
+
+
+def connectivity(scenario: Scenario) -> float:
+    """`conn` of one run."""
+    guidance = Guidance(np.array(positions(scenario), dtype=np.float64), scenario)
+    first_ns, end_ns = scenario.traffic_window_ns
+    seconds = range(first_ns // S, end_ns // S)
+    found = [reached(guidance.track(float(t_s)).places, scenario.radio.range_m) for t_s in seconds]
+    return sum(found) / (len(found) * (scenario.nodes.count - 1))
+
+
+def row(protocol: str, speed: float, seeds: Sequence[int], keys: Sequence[str]) -> str:
+    """One line of the table, over the seeds."""
+    summaries: list[dict[str, Any]] = []
+    bounds = []
+    for seed in seeds:
+        changed = [f"routing.protocol={protocol}", f"mobility.speed_m_s={speed:g}", f"seed={seed}", *keys]
+        scenario = catalog.find("rivals", changed)
+        outcome = simulate(scenario)
+        summaries.append(finish(outcome, out=None))
+        bounds.append(connectivity(scenario))
+    pdr = [float(summary["pdr"]) for summary in summaries]
+    delay = {name: statistics.mean(s["delay_ms"][name] or 0.0 for s in summaries) for name in ("mean", "p50", "p95")}
+    sent = statistics.mean(s["frames"]["sent"] / max(1, s["generated"]) for s in summaries)
+    wall = statistics.mean(s["wall_s"] for s in summaries)
+    spread = statistics.stdev(pdr) if len(pdr) > 1 else 0.0
+    closes = all(s["frames"]["closes"] for s in summaries)
+    return (
+        f"| {protocol} | {speed:g} | {statistics.mean(pdr):.3f} ({spread:.3f}) | {statistics.mean(bounds):.3f} "
+        f"| {delay['mean']:.1f} / {delay['p50']:.1f} / {delay['p95']:.1f} | {sent:.1f} | {wall:.1f} "
+        f"| {'yes' if closes else 'NO'} |"
+    )
+
+
+def main(arguments: Sequence[str]) -> int:
+    parser = argparse.ArgumentParser(description="Run the rivals and print their table.")
+    parser.add_argument("--protocols", nargs="+", default=["aodv", "olsr"])
+    parser.add_argument("--speeds", nargs="+", type=float, default=[0.0, 10.0, 20.0])
+    parser.add_argument("--seeds", nargs="+", type=int, default=[1, 2, 3])
+    parser.add_argument("--set", nargs="*", default=[], metavar="KEY=VALUE", help="further scenario keys")
+    chosen = parser.parse_args(arguments)
+    head = ("protocol", "m/s", "PDR (sd)", "conn", "delay ms mean / p50 / p95", "frames per packet", "wall s", "closes")
+    sys.stdout.write(f"| {' | '.join(head)} |\n|{'---|' * len(head)}\n")
+    for protocol in chosen.protocols:
+        for speed in chosen.speeds:
+            sys.stdout.write(row(protocol, speed, chosen.seeds, chosen.set) + "\n")
+            sys.stdout.flush()
+    return 0
+
+
+if __name__ == "__main__":
+    sys.exit(main(sys.argv[1:]))

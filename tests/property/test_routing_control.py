@@ -1,0 +1,63 @@
+"""Control messages of rival protocols on the air: what goes in comes out, garbage is one error."""
+
+import struct
+from contextlib import suppress
+
+import pytest
+from hypothesis import given
+from hypothesis import strategies as st
+
+from fanet_mw import wire
+from fanet_mw.dialect import fanet
+from fanet_mw.errors import MalformedFrameError
+from fanet_mw.routing import control
+
+HEADER = wire.Header(12, 1, 3, 0xFFFF, 3, wire.Kind.ROUTING, 1, 0, 0, 0).encode()
+BODY = bytes(range(256)) + bytes(44)
+
+
+@given(st.integers(0, 255), st.binary(max_size=2000), st.integers(1, 0xFFFE))
+def test_a_control_message_is_decoded_as_it_was_encoded(kind: int, body: bytes, node: int) -> None:
+    assert control.decode(HEADER + control.encode(kind, body, node=node)) == (kind, body)
+
+
+@given(st.binary(max_size=239))
+def test_pymavlink_reads_a_piece_and_its_length_on_the_air_is_known(body: bytes) -> None:
+    inner = control.encode(0x12, body, node=3)
+    assert len(inner) == 17 + len(body)
+    (theirs,) = fanet.MAVLink(None).parse_buffer(bytearray(inner))
+    assert (theirs.length, theirs.type, theirs.part, theirs.parts) == (len(body), 0x12, 0, 1)
+    assert bytes(theirs.data[: len(body) + 1]) == body + b"\x01"
+
+
+@pytest.mark.parametrize("bound", [64, 300, 2304])
+def test_the_capacity_of_a_frame_is_what_just_fits(bound: int) -> None:
+    most = control.capacity(bound)
+    assert wire.HEADER_BYTES + len(control.encode(1, bytes(most), node=1)) <= bound
+    assert wire.HEADER_BYTES + len(control.encode(1, bytes(most + 1), node=1)) > bound
+
+
+@given(st.binary(max_size=100))
+def test_garbage_is_one_error(data: bytes) -> None:
+    with suppress(MalformedFrameError):
+        control.decode(HEADER + data)
+
+
+def test_pieces_that_are_missing_repeated_or_of_two_types_are_malformed() -> None:
+    first, second = wire.frames(control.encode(5, BODY, node=1))
+    other = list(wire.frames(control.encode(6, BODY, node=1)))[1]
+    assert control.decode(HEADER + first + second) == (5, BODY)
+    for pieces in ((), (first,), (second,), (second, first), (first, first), (first, other), (first, second, second)):
+        with pytest.raises(MalformedFrameError):
+            control.decode(HEADER + b"".join(pieces))
+
+
+def test_a_reader_never_gives_bytes_that_are_not_there() -> None:
+    pair, single = struct.Struct("<HH"), struct.Struct("<H")
+    assert list(control.Reader(b"\x01\x00\x02\x00").rest(single)) == [(1,), (2,)]
+    with pytest.raises(MalformedFrameError):
+        control.Reader(b"\x01\x00\x02").take(pair)
+    with pytest.raises(MalformedFrameError):
+        list(control.Reader(b"\x01\x00\x02").rest(single))
+    with pytest.raises(MalformedFrameError):
+        control.Reader(b"\x01").finish()

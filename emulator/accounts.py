@@ -46,6 +46,7 @@ class Accounts:
         self._busy_baseline_ns = 0
         self._bytes_baseline = 0
         self._measured_from_ns = 0
+        self._end: tuple[s.Ints, int, int, int] | None = None
 
     def drop(self, reason: DropReason) -> None:
         self.dropped[reason] += 1
@@ -73,12 +74,17 @@ class Accounts:
         self._bytes_baseline = self.delivered_bytes
         self._measured_from_ns = now_ns
 
+    def measure_until(self, g: s.Ints, *, busy_ns: int, now_ns: int) -> None:
+        """Air statistics end here: what comes now only drains."""
+        self._end = g.copy(), busy_ns, self.delivered_bytes, now_ns
+
     def air(self, g: s.Ints, *, busy_ns: int, now_ns: int, stations: int) -> dict[str, float | None]:
-        """Air statistics since `measure_from`."""
+        """Air statistics from `measure_from` to `measure_until`, or until now."""
+        g, busy_ns, delivered_bytes, now_ns = self._end or (g, busy_ns, self.delivered_bytes, now_ns)
         d = (g - self._baseline).tolist()
         span_ns = max(1, now_ns - self._measured_from_ns)
         landed = sum(d[s.RECEIVED_COPIES : s.CUT_COPIES + 1])
-        payload_bits = 8 * (self.delivered_bytes - self._bytes_baseline)
+        payload_bits = 8 * (delivered_bytes - self._bytes_baseline)
         return {
             "pdr": _ratio(d[s.RECEIVED_COPIES], landed),
             "busy": round((busy_ns - self._busy_baseline_ns) / (span_ns * stations), 6),

@@ -13,10 +13,10 @@ from emulator.faults import Faults
 from emulator.link_book import LinkBook
 from emulator.propagation import Links, milliwatt, noise_mw, pair_codes
 from emulator.shadowing import Shadowing
-from fanet_mw.airtime import DETECT_NS, OVERHEAD_BYTES, Timing, airtime_ns, lifetime_ns
+from fanet_mw.airtime import DETECT_NS, OVERHEAD_BYTES, Timing, airtime_ns
 from fanet_mw.link_stats import LinkStats
 from fanet_mw.rng import stream_seed
-from fanet_mw.scenario import Radio
+from fanet_mw.scenario import Scenario
 
 _GENERATOR_RANGE = 2_147_483_646
 
@@ -30,7 +30,8 @@ def _error_table(rate_mbps: float, ack_rate_mbps: float) -> npt.NDArray[np.float
 class Air:
     """The state of the channel and of all MACs."""
 
-    def __init__(self, radio: Radio, *, stations: int, seed: int, faults: Faults, capture: bool = False) -> None:
+    def __init__(self, scenario: Scenario, *, stations: int, faults: Faults, capture: bool = False) -> None:
+        radio, seed, lifetime_ns = scenario.radio, scenario.seed, scenario.mac_lifetime_ns
         self._radio = radio
         self._stations = stations
         self._faults = faults
@@ -42,7 +43,7 @@ class Air:
         self._p[:] = (
             timing.slot_ns, timing.sifs_ns, timing.difs_ns, timing.eifs_extra_ns, timing.ack_ns,
             timing.ack_timeout_ns, timing.header_ns, DETECT_NS, radio.cw_min, radio.cw_max, radio.max_attempts,
-            radio.queue_frames, lifetime_ns(radio),
+            radio.queue_frames, lifetime_ns,
             radio.access == "standard", radio.access == "ns3", radio.channel != "range", capture,
             timing.extension_ns, radio.capture, fading,
         )  # fmt: skip

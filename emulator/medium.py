@@ -21,7 +21,7 @@ from fanet_mw.messages import Message, Obstructions, Poses, Reception, TxOutcome
 from fanet_mw.radio_control import Cut, Degrade, Jam, Restore
 from fanet_mw.scenario import Scenario
 from fanet_mw.topics import Topics
-from fanet_mw.units import BROADCAST, MS, NodeId, S, seconds_to_ns
+from fanet_mw.units import BROADCAST, MS, NodeId, S
 
 TOO_LATE_NS: Final = 50 * MS
 """A request later than this is dropped: its slot is long another's."""
@@ -49,9 +49,7 @@ class Medium(Actor):
         self._station_of = {topics.radio_tx(node): node - 1 for node in scenario.node_ids}
         self._faults = Faults(scenario.radio, stations=self._count, planned=scenario.planned_faults)
         self._capture = capture
-        self._air = Air(
-            scenario.radio, stations=self._count, seed=scenario.seed, faults=self._faults, capture=capture is not None
-        )
+        self._air = Air(scenario, stations=self._count, faults=self._faults, capture=capture is not None)
         self._accounts = Accounts()
         self._requests: list[TxRequest | None] = [None] * self._air.slots()
         self._ids = [NodeId(node) for node in scenario.node_ids]
@@ -63,7 +61,9 @@ class Medium(Actor):
         self._most_held = scenario.radio.queue_frames + ANNOUNCED
         self._next_seq: list[int | None] = [None] * self._count
         self._handover_ns = scenario.radio.handover_ns
-        self._warm_ns: int | None = seconds_to_ns(scenario.warmup_s)
+        start_ns, end_ns = scenario.traffic_window_ns
+        self._warm_ns: int | None = start_ns
+        self._cool_ns: int | None = end_ns
         self._links_topic = topics.radio_links
         self._links_ns: int | None = None
         """When links are reported next; None while the air is silent."""
@@ -225,6 +225,9 @@ class Medium(Actor):
         if self._warm_ns is not None and self._warm_ns <= due_ns:
             self._accounts.measure_from(self._air.g, busy_ns=self._air.busy_ns(self._now_ns), now_ns=self._now_ns)
             self._warm_ns = None
+        if self._cool_ns is not None and self._cool_ns <= due_ns:
+            self._accounts.measure_until(self._air.g, busy_ns=self._air.busy_ns(self._now_ns), now_ns=self._now_ns)
+            self._cool_ns = None
         fault_ns = self._faults.next_ns()
         if fault_ns is not None and fault_ns <= due_ns:
             self._change(*self._faults.pass_time(due_ns))
@@ -234,7 +237,7 @@ class Medium(Actor):
         self._due_ns = self._next_turn_ns()
 
     def _next_turn_ns(self) -> int | None:
-        wanted = (self._warm_ns, self._faults.next_ns(), self._links_ns)
+        wanted = (self._warm_ns, self._cool_ns, self._faults.next_ns(), self._links_ns)
         return min((t for t in wanted if t is not None), default=None)
 
     def _report_links(self, now_ns: int) -> bool:

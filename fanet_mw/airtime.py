@@ -11,7 +11,7 @@ import math
 from typing import Final, NamedTuple
 
 from fanet_mw.scenario_radio import Radio, is_ofdm
-from fanet_mw.units import MS, US
+from fanet_mw.units import US
 
 OVERHEAD_BYTES: Final = 8 + 20 + 8 + 24 + 4
 """UDP + IPv4 + LLC/SNAP + MAC header + FCS: what surrounds our frame, which is the UDP payload."""
@@ -87,7 +87,3 @@ def airtime_ns(size: int, radio: Radio, *, rate_mbps: float) -> int:
         extension_ns = SIGNAL_EXTENSION_NS if radio.standard == "g" else 0
         return ofdm_frame_ns(size, rate_mbps=rate_mbps, extension_ns=extension_ns)
     return frame_ns(size, rate_mbps=rate_mbps, short=radio.preamble == "short")
-
-
-def lifetime_ns(radio: Radio) -> int:
-    return round(radio.lifetime_ms * MS)

@@ -226,6 +226,12 @@ class Scenario(Section):
         return self
 
     @property
+    def mac_lifetime_ns(self) -> int:
+        """How long a frame may wait in the MAC queue (`radio.lifetime_ms`)."""
+        unset_ms = _FOREVER_MS if self.traffic.arrivals == "saturated" else _LIFETIME_MS
+        return round((self.radio.lifetime_ms or unset_ms) * MS)
+
+    @property
     def duration_ns(self) -> int:
         return seconds_to_ns(self.duration_s)
 
@@ -248,6 +254,8 @@ class Scenario(Section):
         return NodeId(1)
 
 
+_LIFETIME_MS: Final = 500.0
+_FOREVER_MS: Final = 1e6
 _RIVALS: Final = ("aodv", "olsr", "dsdv", "geographic")
 _RIVAL_FRAME_BYTES: Final = 256
 """Control messages of a fixed length must fit one frame; longer ones are divided."""

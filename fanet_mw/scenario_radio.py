@@ -81,7 +81,8 @@ class Radio(Section):
     cw_max: Annotated[int, Field(ge=1, le=32767)] = 1023
     max_attempts: Annotated[int, Field(ge=1, le=255)] = 7
     queue_frames: Annotated[int, Field(ge=1, le=100_000)] = 500
-    lifetime_ms: Positive = 500.0
+    lifetime_ms: Positive | None = None
+    """How long a frame may wait in the MAC queue; unset: 500 ms, or as long as it takes if arrivals are saturated."""
     max_frame_bytes: Annotated[int, Field(ge=64, le=2304)] = 2304
     lead_ms: NonNegative = 20.0
     """How long before its instant a node announces a transmission to the radio."""

@@ -1,14 +1,22 @@
 """One UAV as a process: `python -m agents SCENARIO.toml --id N`, or `fanet agent`. Needs neither numpy nor physics."""
 
 import asyncio
+import json
 import sys
+from collections.abc import Mapping
+from typing import Final, NamedTuple
 
 from agents.uav import Uav
 from fanet_mw.errors import ConfigError
 from fanet_mw.hosts import service
-from fanet_mw.hosts.realtime import run_actor
+from fanet_mw.hosts.realtime import RealtimeHost, run_actor
+from fanet_mw.radios.field_bus import FieldBus, joined
+from fanet_mw.radios.udp import PORT, UdpRadio
 from fanet_mw.scenario import Scenario
-from fanet_mw.units import Enu, NodeId
+from fanet_mw.topics import Topics
+from fanet_mw.units import Enu, NodeId, S
+
+_CLOCK_TIMEOUT_S: Final = 60.0
 
 
 def run(scenario: Scenario, *, node: NodeId, swarm: str, endpoint: str, position: Enu) -> int:
@@ -16,6 +24,43 @@ def run(scenario: Scenario, *, node: NodeId, swarm: str, endpoint: str, position
     uav = Uav(scenario, node, swarm, position=position)
     asyncio.run(run_actor(uav, swarm=swarm, endpoint=endpoint, until_ns=scenario.duration_ns))
     return 0
+
+
+class OnAir(NamedTuple):
+    """A real interface, and the unix time of swarm instant 0 for a UAV without a router [s]."""
+
+    address: str
+    broadcast: str
+    port: int
+    epoch_unix_s: float | None
+
+
+def fly(
+    scenario: Scenario, on_air: OnAir, *, node: NodeId, swarm: str, endpoint: str | None, position: Enu
+) -> Mapping[str, object]:
+    """Run one UAV on a real radio until the scenario is over; returns its report. Raises BusError."""
+    return asyncio.run(_fly(scenario, on_air, node, Topics(swarm), endpoint, position))
+
+
+async def _fly(
+    scenario: Scenario, on_air: OnAir, node: NodeId, names: Topics, endpoint: str | None, position: Enu
+) -> Mapping[str, object]:
+    epoch_unix_ns = None if on_air.epoch_unix_s is None else round(on_air.epoch_unix_s * S)
+    uav = Uav(scenario, node, names.swarm, position=position)
+    with joined(endpoint) as inner:
+        bus = FieldBus(names, node, inner=inner, epoch_unix_ns=epoch_unix_ns)
+        host = RealtimeHost(uav, bus, names)
+        radio = UdpRadio(
+            node, address=on_air.address, broadcast=on_air.broadcast, port=on_air.port,
+            max_frame_bytes=scenario.radio.max_frame_bytes, now_ns=host.now_ns, on_message=bus.heard,
+        )  # fmt: skip
+        bus.use(radio)
+        await radio.open()
+        try:
+            await host.run(until_ns=scenario.duration_ns, clock_timeout_s=_CLOCK_TIMEOUT_S)
+        finally:
+            radio.close()
+    return {**uav.report(), "radio": dict(sorted(radio.counts.items()))}
 
 
 def main() -> int:
@@ -26,12 +71,29 @@ def main() -> int:
         "--at", type=float, nargs=3, default=(0.0, 0.0, 0.0), metavar=("E", "N", "U"),
         help="where it starts, until its first fix: east, north and up [m]",
     )  # fmt: skip
+    flags.add_argument("--radio-address", help="send and hear frames on the interface with this address, not emulated")
+    flags.add_argument("--radio-broadcast", help="the broadcast address of that interface's network")
+    flags.add_argument("--radio-port", type=int, default=PORT, help="UDP port of the swarm (%(default)s)")
+    flags.add_argument("--epoch", type=float, help="unix time of swarm instant 0 [s]: no router, clocks by GPS or NTP")
     given = flags.parse_args()
 
     def start(scenario: Scenario, swarm: str, endpoint: str) -> int:
-        if given.id not in scenario.node_ids:
-            raise ConfigError(f"--id {given.id}: must be in [1, nodes.count = {scenario.nodes.count}]")
-        return run(scenario, node=NodeId(given.id), swarm=swarm, endpoint=endpoint, position=Enu(*given.at))
+        node, at = NodeId(given.id), Enu(*given.at)
+        if node not in scenario.node_ids:
+            raise ConfigError(f"--id {node}: must be in [1, nodes.count = {scenario.nodes.count}]")
+        if (given.radio_address is None) != (given.radio_broadcast is None):
+            raise ConfigError("--radio-address and --radio-broadcast: both or none")
+        if given.radio_address is None:
+            if given.epoch is not None:
+                raise ConfigError(
+                    f"--epoch {given.epoch:g}: needs --radio-address; the emulated radio is on the router"
+                )
+            return run(scenario, node=node, swarm=swarm, endpoint=endpoint, position=at)
+        on_air = OnAir(given.radio_address, given.radio_broadcast, given.radio_port, given.epoch)
+        router = None if given.epoch is not None else endpoint
+        report = fly(scenario, on_air, node=node, swarm=swarm, endpoint=router, position=at)
+        sys.stdout.write(json.dumps(report) + "\n")
+        return 0
 
     return service.serve(given, start)
 

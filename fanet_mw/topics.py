@@ -53,6 +53,7 @@ class Topics:
     """The key expressions of one swarm."""
 
     def __init__(self, swarm: str) -> None:
+        self.swarm = swarm
         self._base = f"{ROOT}/{swarm}"
         self.pose = f"{self._base}/world/pose"
         self.obstruction = f"{self._base}/world/obstruction"

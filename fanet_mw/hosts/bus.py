@@ -9,7 +9,7 @@ import json
 import time
 from collections.abc import Callable
 from types import TracebackType
-from typing import Any, Final, Self
+from typing import Any, Final, Protocol, Self
 
 import zenoh
 
@@ -20,6 +20,20 @@ LOST_AFTER_S: Final = 2.0
 """A router that has been away for this long is taken to be gone. Zenoh reconnects by itself to one that comes back."""
 OnSample = Callable[[str, bytes], None]
 """(topic, payload); called on a thread of Zenoh's."""
+
+
+class HostBus(Protocol):
+    """What a host needs of a bus: `Bus`, or one that keeps some topics to itself."""
+
+    def subscribe(self, expression: str, on_sample: OnSample) -> None: ...
+
+    def put(self, topic: str, payload: bytes, *, reliable: bool = False) -> None: ...
+
+    def announce(self, topic: str) -> None: ...
+
+    def ask(self, topic: str, on_sample: OnSample) -> None: ...
+
+    def check(self) -> None: ...
 
 
 def _config(*, mode: str, listen: str | None, connect: str | None) -> zenoh.Config:

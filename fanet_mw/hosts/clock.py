@@ -11,7 +11,7 @@ from typing import Final
 
 from fanet_mw import topics
 from fanet_mw.errors import BusError, MalformedFrameError
-from fanet_mw.hosts.bus import Bus
+from fanet_mw.hosts.bus import Bus, HostBus
 from fanet_mw.messages import Clock, ClockState
 from fanet_mw.topics import Topics
 from fanet_mw.units import MS, S
@@ -100,7 +100,7 @@ class ClockKeeper:
 class ClockListener:
     """Hears the swarm clock, on the loop's thread."""
 
-    def __init__(self, bus: Bus, names: Topics) -> None:
+    def __init__(self, bus: HostBus, names: Topics) -> None:
         self._bus = bus
         self._names = names
         self._loop = asyncio.get_running_loop()

@@ -16,7 +16,7 @@ from typing import Any, Final
 
 from fanet_mw import topics
 from fanet_mw.actor import Actor
-from fanet_mw.hosts.bus import Bus
+from fanet_mw.hosts.bus import Bus, HostBus
 from fanet_mw.hosts.clock import ClockListener, SwarmClock
 from fanet_mw.hosts.inbox import Inbox
 from fanet_mw.hosts.lateness import Histogram
@@ -32,7 +32,7 @@ _LOOKS_PER_REPORT: Final = 2
 class RealtimeHost:
     """Runs one actor until its swarm time is over."""
 
-    def __init__(self, actor: Actor, bus: Bus, names: Topics) -> None:
+    def __init__(self, actor: Actor, bus: HostBus, names: Topics) -> None:
         self._actor = actor
         self._bus = bus
         self._names = names
@@ -65,7 +65,7 @@ class RealtimeHost:
         gc.freeze()  # what start-up made stays: the collector need not look at it again in the middle of a slot
         self._running = True
         try:
-            self._actor.start(self._now_ns())
+            self._actor.start(self.now_ns())
             self._settle()
             self._drain()
             await self._watch(until_ns, listener)
@@ -114,7 +114,7 @@ class RealtimeHost:
 
     def _finish(self, until_ns: int) -> None:
         self._halt()
-        now_ns = min(self._now_ns(), until_ns)
+        now_ns = min(self.now_ns(), until_ns)
         self._actor.stop(max(now_ns, 0))
         self._settle(rearm=False)
         self._publish_records()
@@ -145,7 +145,7 @@ class RealtimeHost:
 
     def _take_inbox(self) -> None:
         actor = self._actor
-        more = self._inbox.deliver(lambda topic, message: actor.receive(topic, message, self._now_ns()))
+        more = self._inbox.deliver(lambda topic, message: actor.receive(topic, message, self.now_ns()))
         self._settle()
         if more and not self._drain_asked:  # timers, the clock and reports have their turn before the rest
             self._drain_asked = True
@@ -153,7 +153,8 @@ class RealtimeHost:
 
     # --- time -----------------------------------------------------------------------------------------------------
 
-    def _now_ns(self) -> int:
+    def now_ns(self) -> int:
+        """The swarm instant; only once the clock runs."""
         assert self._clock is not None, "the clock is running"
         return self._clock.now_ns()
 
@@ -171,7 +172,7 @@ class RealtimeHost:
         self._guard(self._wake_actor)
 
     def _wake_actor(self) -> None:
-        due_ns, now_ns = self._timer_ns, self._now_ns()
+        due_ns, now_ns = self._timer_ns, self.now_ns()
         self._timer = self._timer_ns = None
         if due_ns is not None and now_ns >= due_ns:  # else the loop's clock is a little fast: come again
             self._lateness.add(now_ns - due_ns)
@@ -205,7 +206,7 @@ class RealtimeHost:
 
     def _publish_report(self, *, final: bool) -> None:
         content = {**self._actor.report(), "final": final, "host": self._figures(final=final)}
-        report = Report(self._actor.name, self._now_ns(), json.dumps(content))
+        report = Report(self._actor.name, self.now_ns(), json.dumps(content))
         self._bus.put(self._names.report(self._actor.name), topics.encode([report]), reliable=True)
 
     def _figures(self, *, final: bool) -> dict[str, Any]:

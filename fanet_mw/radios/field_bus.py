@@ -1,0 +1,92 @@
+"""The bus of a UAV in the field: its own radio topics go to a real radio, the rest to Zenoh if there is a router.
+
+Without a router there is no world and no launcher: swarm time starts at an epoch that all were given, and traces,
+telemetry and reports stay with the node.
+"""
+
+import contextlib
+from collections.abc import Iterator
+from typing import Protocol
+
+from fanet_mw import topics
+from fanet_mw.hosts.bus import Bus, OnSample
+from fanet_mw.messages import Clock, ClockState, Message, Reception, TxRequest, TxStatus
+from fanet_mw.topics import Topics
+from fanet_mw.units import NodeId
+
+
+class Radio(Protocol):
+    """What a node needs of a radio."""
+
+    def request(self, request: TxRequest) -> None: ...
+
+
+class FieldBus:
+    """Looks like `Bus` to a host."""
+
+    def __init__(self, names: Topics, node: NodeId, *, inner: Bus | None, epoch_unix_ns: int | None) -> None:
+        self._tx_topic = names.radio_tx(node)
+        self._rx_topic = names.radio_rx(node)
+        self._clock_topic = names.clock
+        self._report_topic = names.report(f"agent-{node}")
+        self._inner = inner
+        self._clock = None if epoch_unix_ns is None else Clock(epoch_unix_ns, 1.0, ClockState.RUNNING)
+        self._on_rx: OnSample | None = None
+        self._radio: Radio | None = None
+        self.reports: list[bytes] = []
+        """What was reported when nobody could hear it: the last one."""
+
+    def use(self, radio: Radio) -> None:
+        self._radio = radio
+
+    def heard(self, message: Reception | TxStatus) -> None:
+        """The radio has something for the node."""
+        if self._on_rx is not None:
+            self._on_rx(self._rx_topic, topics.encode([message]))
+
+    # --- as `Bus` -------------------------------------------------------------------------------------------------
+
+    def subscribe(self, expression: str, on_sample: OnSample) -> None:
+        if expression == self._rx_topic:
+            self._on_rx = on_sample
+        elif self._inner is not None:
+            self._inner.subscribe(expression, on_sample)
+
+    def put(self, topic: str, payload: bytes, *, reliable: bool = False) -> None:
+        if topic == self._tx_topic:
+            for message in _decoded(payload):
+                if isinstance(message, TxRequest) and self._radio is not None:
+                    self._radio.request(message)
+        elif self._inner is not None:
+            self._inner.put(topic, payload, reliable=reliable)
+        elif topic == self._report_topic:
+            self.reports[:] = [payload]
+
+    def announce(self, topic: str) -> None:
+        if self._inner is not None:
+            self._inner.announce(topic)
+
+    def ask(self, topic: str, on_sample: OnSample) -> None:
+        if topic == self._clock_topic and self._clock is not None:
+            on_sample(topic, topics.encode([self._clock]))
+        elif self._inner is not None:
+            self._inner.ask(topic, on_sample)
+
+    def check(self) -> None:
+        if self._inner is not None:
+            self._inner.check()
+
+
+def _decoded(payload: bytes) -> list[Message]:
+    """Our own node's messages: what does not decode is a bug of ours, and raises."""
+    return list(topics.decode(payload))
+
+
+@contextlib.contextmanager
+def joined(endpoint: str | None) -> Iterator[Bus | None]:
+    """The router's session, if there is to be one."""
+    if endpoint is None:
+        yield None
+        return
+    with Bus.join(endpoint) as bus:
+        yield bus

@@ -1,0 +1,190 @@
+"""A radio on a real interface: frames as UDP datagrams, broadcast on its network, unicasts acknowledged.
+
+    request -> waits for its instant -> socket -> driver and air -> socket of the other -> reception
+
+The interface is an ad hoc (IBSS or mesh) Wi-Fi interface with an address of its own; the driver does CSMA/CA. A unicast
+is acknowledged by the other radio and repeated `ATTEMPTS` times, because no driver tells whether its own ACK came. What
+the air brings never raises: it is counted. Not known here: RSSI (a reception says 0), and the instant at which a frame
+really left; `end_ns` is when it was taken from the socket.
+"""
+
+import asyncio
+import socket
+from collections import Counter
+from collections.abc import Callable
+from typing import Any, Final
+
+from fanet_mw.errors import BusError, DropReason, MalformedFrameError
+from fanet_mw.messages import Reception, TxOutcome, TxRequest, TxStatus
+from fanet_mw.protocol.seen import Seen, key_of
+from fanet_mw.radios.datagram import Datagram, DatagramKind
+from fanet_mw.units import BROADCAST, NodeId, S
+
+PORT: Final = 14560
+ATTEMPTS: Final = 4
+_ACK_WAIT_S: Final = 0.03
+_RSSI_UNKNOWN_DBM: Final = 0.0
+_HEARD: Final = 1
+Address = tuple[str, int]
+
+
+class UdpRadio:
+    """One node's radio. `on_message` is told receptions and statuses, on the loop's thread."""
+
+    def __init__(
+        self,
+        node: NodeId,
+        *,
+        address: str,
+        broadcast: str,
+        max_frame_bytes: int,
+        now_ns: Callable[[], int],
+        on_message: Callable[[Reception | TxStatus], None],
+        port: int = PORT,
+    ) -> None:
+        self._node = node
+        self._address = (address, port)
+        self._broadcast = (broadcast, port)
+        self._max_frame_bytes = max_frame_bytes
+        self._now_ns = now_ns
+        self._on_message = on_message
+        self._loop = asyncio.get_running_loop()
+        self._addresses: dict[NodeId, Address] = {}
+        """Where each node was last heard from."""
+        self._waiting: dict[int, asyncio.Event] = {}
+        """Unicasts whose acknowledgment has not come, by sequence."""
+        self._tasks: set[asyncio.Task[None]] = set()
+        self._heard = Seen(capacity=8192)
+        self._transport: asyncio.DatagramTransport | None = None
+        self._listener: asyncio.DatagramTransport | None = None
+        self.counts: Counter[str] = Counter()
+
+    async def open(self) -> None:
+        """Bind to the address (for what is ours) and to the broadcast address; raises BusError."""
+        try:
+            self._transport = await self._bind(self._address)
+            self._listener = await self._bind(self._broadcast)
+        except OSError as error:
+            self.close()
+            raise BusError(f"cannot use {self._address[0]} and {self._broadcast[0]}: {error.strerror}") from error
+
+    async def _bind(self, address: Address) -> asyncio.DatagramTransport:
+        sock = socket.socket(socket.AF_INET, socket.SOCK_DGRAM)
+        try:
+            sock.setsockopt(socket.SOL_SOCKET, socket.SO_REUSEADDR, 1)  # several radios of one machine hear broadcasts
+            sock.setsockopt(socket.SOL_SOCKET, socket.SO_BROADCAST, 1)
+            sock.settimeout(0)
+            sock.bind(address)
+            transport, _ = await self._loop.create_datagram_endpoint(lambda: _Ear(self._take), sock=sock)
+        except BaseException:
+            sock.close()
+            raise
+        return transport
+
+    def close(self) -> None:
+        """No more sending, no more hearing."""
+        for task in self._tasks:
+            task.cancel()
+        for transport in (self._transport, self._listener):
+            if transport is not None:
+                transport.close()
+        self._transport = self._listener = None
+
+    # --- out ------------------------------------------------------------------------------------------------------
+
+    def request(self, request: TxRequest) -> None:
+        """Send a frame at its instant; at once, and counted, if that has passed."""
+        self.counts["sent"] += 1
+        if not 0 < len(request.frame) <= self._max_frame_bytes:
+            self._drop(DropReason.TOO_LARGE if request.frame else DropReason.MALFORMED, request)
+            return
+        wait_ns = request.start_ns - self._now_ns()
+        if wait_ns < 0:
+            self.counts["late"] += 1
+        self._loop.call_later(max(0, wait_ns) / S, self._transmit, request)
+
+    def _drop(self, reason: DropReason, request: TxRequest) -> None:
+        self.counts[reason] += 1
+        if request.wants_status:
+            self._on_message(TxStatus(request.seq, TxOutcome.LATE, self._now_ns(), 0))
+
+    def _transmit(self, request: TxRequest) -> None:
+        if request.dst == BROADCAST:
+            self._put(Datagram(DatagramKind.FRAME, self._node, BROADCAST, request.seq, request.frame), self._broadcast)
+            if request.wants_status:
+                self._on_message(TxStatus(request.seq, TxOutcome.SENT, self._now_ns(), 1))
+            return
+        task = self._loop.create_task(self._unicast(request))
+        self._tasks.add(task)
+        task.add_done_callback(self._tasks.discard)
+
+    async def _unicast(self, request: TxRequest) -> None:
+        """Repeat until it is acknowledged; to the broadcast address while the other was never heard."""
+        datagram = Datagram(DatagramKind.FRAME, self._node, request.dst, request.seq, request.frame)
+        acknowledged = self._waiting[request.seq] = asyncio.Event()
+        outcome, attempts = TxOutcome.RETRY_LIMIT, 0
+        try:
+            while attempts < ATTEMPTS:
+                attempts += 1
+                self._put(datagram, self._addresses.get(request.dst, self._broadcast))
+                try:
+                    await asyncio.wait_for(acknowledged.wait(), _ACK_WAIT_S)
+                except TimeoutError:
+                    continue
+                outcome = TxOutcome.ACKED
+                break
+        finally:
+            del self._waiting[request.seq]
+        if outcome is TxOutcome.RETRY_LIMIT:
+            self.counts[DropReason.RETRY_LIMIT] += 1
+        if request.wants_status:
+            self._on_message(TxStatus(request.seq, outcome, self._now_ns(), attempts))
+
+    def _put(self, datagram: Datagram, to: Address) -> None:
+        if self._transport is not None:
+            self._transport.sendto(datagram.encode(), to)
+            self.counts["datagrams"] += 1
+
+    # --- in -------------------------------------------------------------------------------------------------------
+
+    def _take(self, data: bytes, address: Address) -> None:
+        """One datagram, from anyone."""
+        try:
+            datagram = Datagram.decode(data)
+        except MalformedFrameError:
+            self.counts[DropReason.MALFORMED] += 1
+            return
+        if datagram.src == self._node:
+            return  # our own broadcast
+        self._addresses[datagram.src] = address
+        if datagram.dst not in (BROADCAST, self._node):
+            return
+        if datagram.kind is DatagramKind.ACK:
+            waiting = self._waiting.get(datagram.seq)
+            if waiting is not None:
+                waiting.set()
+            return
+        self._hear(datagram, address)
+
+    def _hear(self, datagram: Datagram, address: Address) -> None:
+        if datagram.dst == self._node:
+            self._put(Datagram(DatagramKind.ACK, self._node, datagram.src, datagram.seq), address)
+        key = key_of(origin=datagram.src, seq=datagram.seq)
+        if len(datagram.frame) > self._max_frame_bytes:
+            self.counts[DropReason.TOO_LARGE] += 1
+        elif self._heard.bits(key):
+            self.counts[DropReason.DUPLICATE] += 1
+        else:
+            self._heard.mark(key, _HEARD)
+            self.counts["received"] += 1
+            self._on_message(Reception(datagram.frame, datagram.src, self._now_ns(), _RSSI_UNKNOWN_DBM))
+
+
+class _Ear(asyncio.DatagramProtocol):
+    """Hands datagrams on; what the network says about earlier ones (nobody there) is no error of ours."""
+
+    def __init__(self, take: Callable[[bytes, Address], None]) -> None:
+        self._take = take
+
+    def datagram_received(self, data: bytes, addr: tuple[str | Any, int]) -> None:
+        self._take(data, (str(addr[0]), addr[1]))

@@ -1,0 +1,194 @@
+"""The radio contract, run against every radio: what a node may rely on, whatever is behind its topics.
+
+Three nodes in range of each other; the same requests go to the emulated medium in virtual time and to real sockets.
+"""
+
+import asyncio
+from collections.abc import Callable, Mapping
+
+import pytest
+
+from emulator.medium import Medium
+from fanet_mw import config
+from fanet_mw.actor import Actor
+from fanet_mw.hosts.virtual import VirtualHost
+from fanet_mw.messages import Message, Reception, TxOutcome, TxRequest, TxStatus
+from fanet_mw.radios.datagram import Datagram, DatagramKind
+from fanet_mw.radios.udp import UdpRadio
+from fanet_mw.topics import Topics, node_of
+from fanet_mw.units import BROADCAST, MS, NodeId
+from sim.world import World
+
+NODES = (NodeId(1), NodeId(2), NodeId(3))
+UNTIL_NS = 700 * MS
+Requests = list[tuple[int, TxRequest]]
+Heard = Mapping[int, list[Reception | TxStatus]]
+SCENARIO = config.build(
+    {
+        "name": "radios", "duration_s": 2, "clusters": {"count": 1},
+        "nodes": {"count": 3, "layout": "line", "spacing_m": 50, "telemetry_hz": 0},
+    }
+)  # fmt: skip
+
+
+class Asker(Actor):
+    """Makes all requests at once."""
+
+    def __init__(self, requests: Requests) -> None:
+        super().__init__("asker", ())
+        self._requests = requests
+
+    def start(self, now_ns: int) -> None:
+        self.outbox += [(Topics("radios").radio_tx(node), request) for node, request in self._requests]
+
+    def receive(self, topic: str, message: Message, now_ns: int) -> None:
+        raise AssertionError("it hears nothing")
+
+    def wake(self, now_ns: int) -> None:
+        raise AssertionError("it never wakes")
+
+    def next_wake_ns(self) -> int | None:
+        return None
+
+
+def emulated(requests: Requests) -> Heard:
+    names = Topics("radios")
+    heard: dict[int, list[Reception | TxStatus]] = {node: [] for node in NODES}
+
+    def note(topic: str, message: Message) -> None:
+        if isinstance(message, Reception | TxStatus):
+            heard[node_of(topic)].append(message)
+
+    actors = [World(SCENARIO, "radios"), Medium(SCENARIO, "radios"), Asker(requests)]
+    host = VirtualHost(actors, listeners=[(names.radio_rx("*"), note)])
+    host.start()
+    host.run(UNTIL_NS)
+    return heard
+
+
+def over_sockets(requests: Requests) -> Heard:
+    return asyncio.run(_over_sockets(requests))
+
+
+async def _over_sockets(requests: Requests) -> Heard:
+    loop = asyncio.get_running_loop()
+    began = loop.time()
+    heard: dict[int, list[Reception | TxStatus]] = {node: [] for node in NODES}
+    radios = {
+        node: UdpRadio(
+            node, address=f"127.7.0.{node}", broadcast="127.255.255.255", port=24560,
+            max_frame_bytes=SCENARIO.radio.max_frame_bytes, now_ns=lambda: round((loop.time() - began) * 1e9),
+            on_message=heard[node].append,
+        )
+        for node in NODES
+    }  # fmt: skip
+    try:
+        for radio in radios.values():
+            await radio.open()
+        began = loop.time()
+        for node, request in requests:
+            radios[NodeId(node)].request(request)
+        await asyncio.sleep(UNTIL_NS / 1e9)
+    finally:
+        for radio in radios.values():
+            radio.close()
+    return heard
+
+
+@pytest.fixture(params=[emulated, over_sockets], ids=["emulated", "udp"])
+def run(request: pytest.FixtureRequest) -> Callable[[Requests], Heard]:
+    made: Callable[[Requests], Heard] = request.param
+    return made
+
+
+def request_of(seq: int, *, at_ms: int, dst: NodeId = BROADCAST, size: int = 200, status: bool = False) -> TxRequest:
+    return TxRequest(seq, at_ms * MS, bytes([seq % 256]) * size, dst, status)
+
+
+def receptions(heard: Heard, node: int) -> list[Reception]:
+    return [message for message in heard[node] if isinstance(message, Reception)]
+
+
+def statuses(heard: Heard, node: int) -> list[TxStatus]:
+    return [message for message in heard[node] if isinstance(message, TxStatus)]
+
+
+def test_a_broadcast_reaches_everyone_else_unchanged_and_not_before_its_instant(
+    run: Callable[[Requests], Heard],
+) -> None:
+    heard = run([(1, request_of(0, at_ms=100, size=2304))])
+    assert receptions(heard, 1) == []
+    for node in (2, 3):
+        (reception,) = receptions(heard, node)
+        assert reception.frame == bytes(2304)
+        assert reception.src == 1
+        assert 100 * MS <= reception.end_ns <= 250 * MS
+
+
+def test_a_unicast_reaches_its_destination_alone_and_is_acknowledged(run: Callable[[Requests], Heard]) -> None:
+    heard = run([(1, request_of(0, at_ms=10)), (3, request_of(0, at_ms=200, dst=NodeId(1), status=True))])
+    assert [r.src for r in receptions(heard, 1)] == [3]
+    assert [r.src for r in receptions(heard, 2)] == [1]
+    (status,) = statuses(heard, 3)
+    assert (status.seq, status.outcome) == (0, TxOutcome.ACKED)
+    assert status.attempts >= 1
+
+
+def test_the_first_unicast_to_a_node_that_was_never_heard_arrives_too(run: Callable[[Requests], Heard]) -> None:
+    heard = run([(1, request_of(7, at_ms=20, dst=NodeId(2), status=True))])
+    assert len(receptions(heard, 2)) == 1
+    assert receptions(heard, 3) == []
+    assert [s.outcome for s in statuses(heard, 1)] == [TxOutcome.ACKED]
+
+
+def test_a_status_comes_only_when_asked_for_and_tells_that_a_broadcast_went_out(
+    run: Callable[[Requests], Heard],
+) -> None:
+    heard = run([(1, request_of(0, at_ms=10)), (1, request_of(1, at_ms=60, status=True))])
+    assert [(s.seq, s.outcome) for s in statuses(heard, 1)] == [(1, TxOutcome.SENT)]
+
+
+def test_requests_go_in_the_order_of_their_instants_each_once(run: Callable[[Requests], Heard]) -> None:
+    heard = run([(1, request_of(seq, at_ms=20 + 30 * (9 - seq))) for seq in range(10)])
+    assert [r.frame[0] for r in receptions(heard, 2)] == list(reversed(range(10)))
+
+
+def test_a_frame_that_is_too_large_is_told_and_not_sent(run: Callable[[Requests], Heard]) -> None:
+    heard = run([(1, request_of(0, at_ms=10, size=2305, status=True))])
+    assert receptions(heard, 2) == []
+    (status,) = statuses(heard, 1)
+    assert status.outcome not in (TxOutcome.SENT, TxOutcome.ACKED)
+
+
+# --- what only a real radio has ---------------------------------------------------------------------------------
+
+
+async def test_a_unicast_that_nobody_acknowledges_is_given_up_and_hostile_datagrams_are_counted() -> None:
+    told: list[Reception | TxStatus] = []
+    radio = UdpRadio(
+        NodeId(1), address="127.7.0.9", broadcast="127.255.255.255", port=24561, max_frame_bytes=300,
+        now_ns=lambda: 0, on_message=told.append,
+    )  # fmt: skip
+    await radio.open()
+    try:
+        radio.request(request_of(4, at_ms=0, dst=NodeId(2), status=True))
+        here = ("127.7.0.9", 24561)
+        good = Datagram(DatagramKind.FRAME, NodeId(3), BROADCAST, 1, b"x").encode()
+        for data in (
+            b"",
+            b"x",
+            good[:11],
+            b"XX" + good[2:],
+            good[:3] + b"\x07" + good[4:],
+            good + bytes(400),
+            good,
+            good,
+        ):
+            radio._take(data, here)
+        radio._take(Datagram(DatagramKind.ACK, NodeId(3), NodeId(1), 99).encode(), here)
+        await asyncio.sleep(0.3)
+    finally:
+        radio.close()
+    assert [m.frame for m in told if isinstance(m, Reception)] == [b"x"]
+    assert [m.outcome for m in told if isinstance(m, TxStatus)] == [TxOutcome.RETRY_LIMIT]
+    assert (radio.counts["malformed"], radio.counts["duplicate"], radio.counts["too_large"]) == (5, 1, 1)

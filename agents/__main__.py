@@ -1,6 +1,5 @@
 """One UAV as a process: `python -m agents SCENARIO.toml --id N`, or `fanet agent`. Needs neither numpy nor physics."""
 
-import asyncio
 import json
 import sys
 from collections.abc import Mapping
@@ -8,7 +7,7 @@ from typing import Final, NamedTuple
 
 from agents.uav import Uav
 from fanet_mw.errors import ConfigError
-from fanet_mw.hosts import service
+from fanet_mw.hosts import loop, service
 from fanet_mw.hosts.realtime import RealtimeHost, run_actor
 from fanet_mw.radios.field_bus import FieldBus, joined
 from fanet_mw.radios.udp import PORT, UdpRadio
@@ -22,7 +21,7 @@ _CLOCK_TIMEOUT_S: Final = 60.0
 def run(scenario: Scenario, *, node: NodeId, swarm: str, endpoint: str, position: Enu) -> int:
     """Run one UAV against a router until the scenario is over; raises BusError."""
     uav = Uav(scenario, node, swarm, position=position)
-    asyncio.run(run_actor(uav, swarm=swarm, endpoint=endpoint, until_ns=scenario.duration_ns))
+    loop.run(run_actor(uav, swarm=swarm, endpoint=endpoint, until_ns=scenario.duration_ns))
     return 0
 
 
@@ -39,7 +38,7 @@ def fly(
     scenario: Scenario, on_air: OnAir, *, node: NodeId, swarm: str, endpoint: str | None, position: Enu
 ) -> Mapping[str, object]:
     """Run one UAV on a real radio until the scenario is over; returns its report. Raises BusError."""
-    return asyncio.run(_fly(scenario, on_air, node, Topics(swarm), endpoint, position))
+    return loop.run(_fly(scenario, on_air, node, Topics(swarm), endpoint, position))
 
 
 async def _fly(

@@ -1,6 +1,5 @@
 """The link emulator as a process: `python -m emulator SCENARIO.toml`, or `fanet emulator`."""
 
-import asyncio
 import sys
 from collections.abc import Callable
 from pathlib import Path
@@ -8,7 +7,7 @@ from pathlib import Path
 from emulator.capture_file import CaptureFile, unused
 from emulator.compile import warm_up
 from emulator.medium import Medium
-from fanet_mw.hosts import service
+from fanet_mw.hosts import loop, service
 from fanet_mw.hosts.realtime import run_actor
 from fanet_mw.scenario import Scenario
 
@@ -39,7 +38,7 @@ def _live(
     on_epoch: Callable[[int], None] = lambda _: None,
 ) -> None:
     until_ns = scenario.duration_ns
-    asyncio.run(run_actor(medium, swarm=swarm, endpoint=endpoint, until_ns=until_ns, on_epoch=on_epoch))
+    loop.run(run_actor(medium, swarm=swarm, endpoint=endpoint, until_ns=until_ns, on_epoch=on_epoch))
 
 
 def main() -> int:

@@ -1,9 +1,8 @@
 """The world as a process: `python -m sim.world_main SCENARIO.toml`, or `fanet world`."""
 
-import asyncio
 import sys
 
-from fanet_mw.hosts import service
+from fanet_mw.hosts import loop, service
 from fanet_mw.hosts.realtime import run_actor
 from fanet_mw.scenario import Scenario
 from sim.world import World
@@ -12,7 +11,7 @@ from sim.world import World
 def run(scenario: Scenario, *, swarm: str, endpoint: str) -> int:
     """Run the world against a router until the scenario is over; raises BusError."""
     world = World(scenario, swarm)
-    asyncio.run(run_actor(world, swarm=swarm, endpoint=endpoint, until_ns=scenario.duration_ns))
+    loop.run(run_actor(world, swarm=swarm, endpoint=endpoint, until_ns=scenario.duration_ns))
     return 0
 
 

@@ -12,6 +12,19 @@ from fanet_mw.scenario import Scenario
 settings.register_profile("default", deadline=None)  # first calls compile; timing belongs in benchmarks
 settings.load_profile("default")
 
+_SERIAL = (
+    "test_realtime", "test_host_realtime", "test_hosts", "test_radios", "test_real_radio", "test_time_scale",
+    "test_back_pressure", "test_air_control",
+)  # fmt: skip
+"""Modules whose tests live in real time: beside others they would be late."""
+
+
+def pytest_collection_modifyitems(items: list[pytest.Item]) -> None:
+    for item in items:
+        if item.path.stem.startswith(_SERIAL):
+            item.add_marker(pytest.mark.serial)
+
+
 MakeScenario = Callable[..., Scenario]
 
 

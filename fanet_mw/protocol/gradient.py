@@ -14,6 +14,8 @@ UNREACHABLE: Final = 255
 _NO_HEAD: Final = NodeId(0)
 _STALE: Final = 4
 """A route is given up when the head's sequence has not advanced for this many hello intervals."""
+_FORGET: Final = 4
+"""After this many times as long nobody talks of a dead head any more: who does so then has started again, from 0."""
 
 
 class Route(NamedTuple):
@@ -42,6 +44,8 @@ class Gradient:
         self._own_head = _NO_HEAD
         self._seq = 0
         self._route: Route | None = None
+        self._news: dict[int, tuple[int, int]] = {}
+        """The newest sequence heard of each head, and when: who still talks of a dead one has no news."""
 
     def join(self, head: NodeId, *, now_ns: int) -> None:
         """The schedule gave us this head (perhaps ourselves); any route to another one is only second best now."""
@@ -66,11 +70,21 @@ class Gradient:
             if route is not None and route.parent == neighbor.node:
                 self._route = None
             return
-        offered = Route(NodeId(beacon.head), beacon.head_seq, beacon.hops_to_head + 1, neighbor.node, now_ns)
+        fresh_ns = self._heard(beacon.head, beacon.head_seq, now_ns)
+        if fresh_ns + self._stale_ns < now_ns:
+            return
+        offered = Route(NodeId(beacon.head), beacon.head_seq, beacon.hops_to_head + 1, neighbor.node, fresh_ns)
         if route is None or self._better(offered, route):
-            if route is not None and offered[:2] == route[:2]:
-                offered = offered._replace(fresh_ns=route.fresh_ns)  # the same news by a shorter way is not fresher
             self._route = offered
+
+    def _heard(self, head: int, seq: int, now_ns: int) -> int:
+        """Since when we know a head's sequence to be at least this; the same news by another way is not fresher."""
+        known = self._news.get(head)
+        forgotten = known is None or known[1] + _FORGET * self._stale_ns < now_ns
+        if known is None or forgotten or newer(seq, known[0]):
+            self._news[head] = seq, now_ns
+            return now_ns
+        return known[1]
 
     def _better(self, offered: Route, route: Route) -> bool:
         if offered.head != route.head:

@@ -3,6 +3,7 @@ arrive as in emulation. Needs the right to make namespaces; skipped, with the re
 """
 
 import asyncio
+import itertools
 import json
 import os
 import subprocess
@@ -50,6 +51,9 @@ reports_to_approach = 3
 """
 
 
+_COUNTER = itertools.count()
+
+
 def sh(*command: str) -> None:
     subprocess.run(command, check=True, capture_output=True, text=True)
 
@@ -57,7 +61,7 @@ def sh(*command: str) -> None:
 @pytest.fixture
 def network() -> Iterator[list[str]]:
     """Names of five namespaces, addresses 10.77.0.1-5, on a bridge at 10.77.0.254."""
-    tag = f"fn{os.getpid() % 10_000}"
+    tag = f"fn{os.getpid() % 1000}{next(_COUNTER)}"  # what is deleted lingers for a moment: no name twice
     names = [f"{tag}n{i}" for i in range(1, COUNT + 1)]
     bridge = f"{tag}b"
     try:

@@ -56,6 +56,25 @@ def test_a_route_dies_when_its_head_is_silent_for_four_hellos() -> None:
     assert parent(found, 4 * S + 1) is None, "hellos that bring no newer sequence keep nothing alive"
 
 
+def test_neighbors_that_still_talk_of_a_dead_head_do_not_keep_each_other_s_routes_alive() -> None:
+    found = gradient()
+    found.hear(hello(2, 1), now_ns=0)
+    for second in range(1, 12):
+        found.hear(hello(3, 2), now_ns=second * S)
+    assert parent(found, 5 * S) is None
+    found.hear(hello(4, 3, head=OTHER), now_ns=6 * S)
+    assert parent(found, 6 * S) == 4, "another head is better than none"
+
+
+def test_a_head_that_started_again_is_believed_once_the_old_news_is_forgotten() -> None:
+    found = gradient()
+    found.hear(hello(2, 1, seq=500), now_ns=0)
+    found.hear(hello(2, 1, seq=1), now_ns=10 * S)
+    assert parent(found, 10 * S) is None
+    found.hear(hello(2, 1, seq=2), now_ns=17 * S)
+    assert parent(found, 17 * S) == 2
+
+
 def test_a_parent_that_loses_its_way_is_given_up() -> None:
     found = gradient()
     found.hear(hello(2, 1), now_ns=0)

@@ -54,6 +54,13 @@ def _network_rows(summary: Mapping[str, Any]) -> Iterator[tuple[str, str]]:
         f"{frames['sent']} sent = {frames['delivered']} delivered + {sum(frames['dropped'].values())} dropped "
         f"+ {frames['in_flight']} in flight ({balance}; drops: {drops})",
     )
+    bound = summary["bound"]
+    if bound:
+        broken = f"broken {bound['violations']} times" if bound["violations"] else "never broken"
+        yield (
+            "bound",
+            f"{bound['worst_ms']:.0f} ms, computed in flight; worst seen {bound['observed_max_ms']:.0f} ms, {broken}",
+        )
     late = summary["lateness"]
     if summary["mode"] == "realtime":
         yield (

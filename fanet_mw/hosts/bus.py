@@ -119,8 +119,10 @@ class Bus:
             control = zenoh.CongestionControl.BLOCK if reliable else zenoh.CongestionControl.DROP
             if self._session.is_closed():
                 raise BusError(f"cannot put on {topic}: the session with {self._endpoint} is closed")
+            # Not express: under pressure Zenoh then packs many puts into one of its few send buffers. Express, a burst
+            # of small ones fills these at once, and the rest is dropped (0.4 % of the frames of 45 agents on 2 cores).
             publisher = self._publishers[topic] = self._session.declare_publisher(
-                topic, congestion_control=control, express=not reliable
+                topic, congestion_control=control, express=False
             )
         publisher.put(payload)
 

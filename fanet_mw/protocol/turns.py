@@ -66,21 +66,27 @@ class Turns(NamedTuple):
     def worst_ns(self, roots: Sequence[int], *, span: int, interval_ns: int) -> int | None:
         """Sound bound of the delay, generation to everyone, of packets that come every `interval_ns` at their root.
 
-        The q-th packet of a busy period that begins just after a root turn is let out in the q-th one after it; `span`
-        turns later all have it. Over all q of the busy period and all turns after which it may begin (Davis et al.,
-        2007). None when more packets come than are let out. Holds while the swarm stays as it was when the table was
-        made, no frame is lost, and nothing of higher priority uses the same root.
+        The q-th packet of a busy period that begins just after a root turn is let out in the q-th one after it, and
+        `flood_ns` later all have it. Over all q of the busy period and all turns after which it may begin (Davis et
+        al., 2007). None when more packets come than are let out. Holds while the swarm stays as it was when the table
+        was made, no frame is lost, and nothing of higher priority uses the same root.
         """
         if len(roots) * interval_ns < self.period_ns:
             return None
         starts = [self.start_ns(offset, frame_start_ns=0) for offset in roots]
+        floods = [self.flood_ns(offset, span=span) for offset in roots]
         horizon = [later * self.period_ns + start for later in range(3) for start in starts]
-        worst = 0
-        for begin in range(len(starts)):
-            for q in range(1, len(starts) + 1):
-                wait_ns = horizon[begin + q] - horizon[begin] - (q - 1) * interval_ns
-                worst = max(worst, wait_ns)
-        return worst + span * self.turn_ns
+        return max(
+            horizon[begin + q] - horizon[begin] - (q - 1) * interval_ns + floods[(begin + q) % len(starts)]
+            for begin in range(len(starts))
+            for q in range(1, len(starts) + 1)
+        )
+
+    def flood_ns(self, offset: int, *, span: int) -> int:
+        """How long a flood of `span` turns takes from the `offset`-th on, contention windows in between included."""
+        return (
+            self.start_ns(offset + span - 1, frame_start_ns=0) + self.turn_ns - self.start_ns(offset, frame_start_ns=0)
+        )
 
 
 def turn_ns(scenario: Scenario, *, payload_bytes: int) -> int:

@@ -38,6 +38,12 @@ def test_what_contends_waits_for_a_window_and_leaves_its_end_free() -> None:
     assert TURNS.contending_ns(90 * MS, lambda: 0.999) < 147 * MS - 5 * MS
 
 
+def test_a_flood_that_reaches_into_the_next_superframe_waits_for_its_contention_window() -> None:
+    assert TURNS.flood_ns(3, span=4) == 8 * MS
+    assert TURNS.flood_ns(27, span=2) == 4 * MS
+    assert TURNS.flood_ns(27, span=3) == 4 * MS + 42 * MS + 2 * MS
+
+
 def exact_worst_ns(roots: tuple[int, ...], interval_ns: int, span: int) -> int:
     """Every phase of a periodic source, in steps finer than anything in the geometry, first come first served."""
     worst = 0
@@ -47,8 +53,17 @@ def exact_worst_ns(roots: tuple[int, ...], interval_ns: int, span: int) -> int:
             born_ns = phase_ns + packet * interval_ns
             start_ns = TURNS.next_start_ns(roots, not_before_ns=max(born_ns, free_ns))
             free_ns = start_ns + 1
-            worst = max(worst, start_ns + span * TURNS.turn_ns - born_ns)
+            worst = max(worst, last_turn_ends_ns(start_ns, span) - born_ns)
     return worst
+
+
+def last_turn_ends_ns(start_ns: int, span: int) -> int:
+    """Turn after turn, over the contention windows."""
+    left, t_ns = span - 1, start_ns
+    while left:
+        t_ns += TURNS.turn_ns
+        left -= TURNS.turn_at(t_ns) is not None
+    return t_ns + TURNS.turn_ns
 
 
 @given(st.sets(st.integers(0, 28), min_size=1, max_size=4), st.integers(20, 250), st.integers(1, 10))

@@ -81,7 +81,10 @@ def judge(
         if turn.node == candidate.head
     )
     relays = sum(1 for turn in table.turns if turn.root == candidate.head and turn.instance == 0)
-    duration_ns = table.spans.get(candidate.head, 1) * superframe.turn_ns
+    geometry = Turns(0, *superframe, superframe.turns)
+    span = table.spans.get(candidate.head, 1)
+    offsets = [turn.offset for turn in table.roots() if turn.node == candidate.head]
+    duration_ns = max((geometry.flood_ns(offset, span=span) for offset in offsets), default=superframe.turn_ns)
     server = TurnServer(superframe.turn_ns, superframe.period_ns, tuple(starts_ns), lead_ns)
     delays, waiting = _queue(candidate.shares, server, duration_ns - superframe.turn_ns, jitter_ns)
     packets = sum(s.sources * superframe.period_ns / s.interval_ns for s in candidate.shares)

@@ -6,10 +6,10 @@ import json
 import sys
 from collections.abc import Callable, Iterator
 from contextlib import contextmanager
-from dataclasses import dataclass
+from dataclasses import dataclass, replace
 from importlib.resources import files
 from pathlib import Path
-from typing import Annotated, Any
+from typing import Annotated, Any, Final
 
 from cyclopts import App, Parameter
 from cyclopts.validators import Number
@@ -34,6 +34,8 @@ app = App(
 )
 app.command(air_app)
 _err = Console(stderr=True)
+_LEAD_MS: Final = 40
+"""What a scenario without a lead is given in real time: asyncio's timers and the bus are late by some milliseconds."""
 
 
 @Parameter(name="*")
@@ -58,6 +60,14 @@ class Choice:
         if self.duration is not None:
             overrides.append(f"duration_s={self.duration}")
         return catalog.find(name, overrides)
+
+    def realtime_scenario(self, name: str) -> Scenario:
+        """The same for real processes, which can announce nothing without a lead: where it is 0, one that they need."""
+        chosen = self.scenario(name)
+        if chosen.radio.lead_ms:
+            return chosen
+        _err.print(f"radio.lead_ms = 0 is for virtual time; {_LEAD_MS} here, --set radio.lead_ms to choose")
+        return replace(self, set=(*self.set, f"radio.lead_ms={_LEAD_MS}")).scenario(name)
 
 
 @Parameter(name="*")
@@ -175,7 +185,7 @@ def launch(
     """
     from sim.swarm import launch as run
 
-    chosen = choice.scenario(scenario)
+    chosen = choice.realtime_scenario(scenario)
     with _progress(chosen, quiet=output.json) as tell:
         outcome = asyncio.run(
             run(
@@ -231,7 +241,7 @@ def router(
     """
     from sim.swarm import serve
 
-    chosen = choice.scenario(scenario)
+    chosen = choice.realtime_scenario(scenario)
     asyncio.run(serve(chosen, swarm=swarm or chosen.name, listen=listen, on_event=lambda text: _err.print(text)))
     return 0
 
@@ -259,7 +269,7 @@ def emulator(
     """
     from emulator.__main__ import run
 
-    chosen = choice.scenario(scenario)
+    chosen = choice.realtime_scenario(scenario)
     return run(
         chosen,
         swarm=join.swarm or chosen.name,
@@ -281,7 +291,7 @@ def world(scenario: str, *, choice: Choice = Choice(), join: Join = Join()) -> i
     """
     from sim.world_main import run
 
-    chosen = choice.scenario(scenario)
+    chosen = choice.realtime_scenario(scenario)
     return run(chosen, swarm=join.swarm or chosen.name, endpoint=join.connect)
 
 
@@ -299,7 +309,7 @@ def agent(scenario: str, *, id: int, choice: Choice = Choice(), join: Join = Joi
     """
     from agents.__main__ import run
 
-    chosen = choice.scenario(scenario)
+    chosen = choice.realtime_scenario(scenario)
     if id not in chosen.node_ids:
         raise FanetError(f"--id {id}: must be in [1, nodes.count = {chosen.nodes.count}]")
     start = positions(chosen)[id - 1]

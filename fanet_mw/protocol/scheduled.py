@@ -168,7 +168,7 @@ class Scheduled(Clustered):
             return
         frame_ns = plan.turns.frame_start_ns(reception.end_ns) - offset // plan.turns.per_frame * plan.turns.period_ns
         start_ns = plan.turns.start_ns(own, frame_start_ns=frame_ns)
-        if start_ns < now_ns + self._lead_ns:
+        if start_ns < now_ns:  # a reception that came late has used up some of the lead, or all of it
             self._missed += 1
             return
         self._port.transmit(self._port.forwarded(packet, flags=FLAG_FLOOD), BROADCAST, start_ns=start_ns)

@@ -8,6 +8,7 @@ from collections.abc import Mapping, Sequence
 from typing import Any
 
 import numpy as np
+import numpy.typing as npt
 
 from fanet_mw.trace import ClockSampled, Delivered, Generated, Record
 from fanet_mw.units import US, S
@@ -53,7 +54,7 @@ def clock_errors(outcome: Outcome) -> dict[str, Any]:
     }
 
 
-def _quantiles(values: Any) -> dict[str, float]:
+def _quantiles(values: npt.NDArray[np.float64]) -> dict[str, float]:
     p50, p99 = np.percentile(values, (50, 99))
     return {"p50": round(float(p50), 3), "p99": round(float(p99), 3), "max": round(float(values.max()), 3)}
 

@@ -35,6 +35,8 @@ _SETTLED: Final = 8
 """Pairs after which a node with a lower id takes over from the reference."""
 _PROVEN: Final = 2
 """Pairs after which another reference is followed."""
+_HASTY: Final = 4
+"""Pairs of one neighbor that are closer than a hello interval by this are too many."""
 _STAMPS: Final = 4
 """Hellos of a neighbor of which we remember when they ended."""
 _NEIGHBORS: Final = 256
@@ -59,8 +61,8 @@ class Settings(NamedTuple):
 
     @property
     def hop_ns(self) -> int:
-        """What one hop may add to the error of a pair."""
-        return self.flight_ns + self.oscillator.stamp_ns
+        """What one hop may add to the error of a pair: half the flight is taken for granted, a stamp is cut twice."""
+        return self.flight_ns // 2 + self.oscillator.stamp_ns
 
 
 @dataclass(slots=True)
@@ -223,7 +225,7 @@ class TimeSync:
         ended_ns = neighbor.stamps.pop(beacon.hello, None)
         if ended_ns is None or self._is_stale(neighbor.advanced_ns, local_ns):
             return None
-        if neighbor.paired_ns is not None and ended_ns - neighbor.paired_ns < self._own.hello_ns // 2:
+        if neighbor.paired_ns is not None and ended_ns - neighbor.paired_ns < self._own.hello_ns // _HASTY:
             self.counts["hasty"] += 1  # whoever says more often has no more votes
             return None
         offset_ns = beacon.t_ns - ended_ns
@@ -231,7 +233,7 @@ class TimeSync:
             self.counts["implausible"] += 1
             return None
         neighbor.paired_ns = ended_ns
-        return Pair(ended_ns, offset_ns, beacon.error_ns + self._own.hop_ns)
+        return Pair(ended_ns, offset_ns + self._own.flight_ns // 2, beacon.error_ns + self._own.hop_ns)
 
     def _judge(self, neighbor: _Neighbor, beacon: TimeBeacon, pair: Pair, local_ns: int) -> None:
         if self.reference is None:

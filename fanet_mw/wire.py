@@ -381,6 +381,7 @@ class TimeBeacon(NamedTuple):
 
     t_ns: int
     error_ns: int
+    rate_ppb: int
     worst_ns: int
     hello: int
     round: int
@@ -413,7 +414,7 @@ BEACON: Final = Spec(53001, 138, struct.Struct("<HHHHHHBBB"))
 SCHEDULE: Final = Spec(53002, 158, struct.Struct("<QIIHHH56H56HBBBB"))
 SURVIVOR: Final = Spec(53003, 240, struct.Struct("<QIffffHB"))
 CHUNK: Final = Spec(53004, 155, struct.Struct("<HBB240B"))
-TIME: Final = Spec(53005, 181, struct.Struct("<QIIIHHHBBB"))
+TIME: Final = Spec(53005, 172, struct.Struct("<QIIIIHHHBBB"))
 JOIN: Final = Spec(53006, 50, struct.Struct("<fffHB"))
 DIGEST: Final = Spec(53007, 37, struct.Struct("<24I24I24HBBB"))
 PLACES: Final = Spec(53008, 1, struct.Struct("<28h28h28hhhhBBB"))

@@ -616,28 +616,29 @@ class MAVLink_fanet_time_message(MAVLink_message):
 
     id = MAVLINK_MSG_ID_FANET_TIME
     msgname = "FANET_TIME"
-    fieldnames = ["t_ns", "error_ns", "worst_ns", "hello", "round", "node", "reference", "worst_age_s", "hops", "version"]
-    ordered_fieldnames = ["t_ns", "error_ns", "worst_ns", "hello", "round", "node", "reference", "worst_age_s", "hops", "version"]
-    fieldtypes = ["uint64_t", "uint32_t", "uint32_t", "uint32_t", "uint16_t", "uint16_t", "uint16_t", "uint8_t", "uint8_t", "uint8_t"]
+    fieldnames = ["t_ns", "error_ns", "rate_ppb", "worst_ns", "hello", "round", "node", "reference", "worst_age_s", "hops", "version"]
+    ordered_fieldnames = ["t_ns", "error_ns", "rate_ppb", "worst_ns", "hello", "round", "node", "reference", "worst_age_s", "hops", "version"]
+    fieldtypes = ["uint64_t", "uint32_t", "uint32_t", "uint32_t", "uint32_t", "uint16_t", "uint16_t", "uint16_t", "uint8_t", "uint8_t", "uint8_t"]
     fielddisplays_by_name: Dict[str, str] = {}
     fieldenums_by_name: Dict[str, str] = {}
     fieldunits_by_name: Dict[str, str] = {"t_ns": "ns", "error_ns": "ns", "worst_ns": "ns", "worst_age_s": "s"}
-    native_format = bytearray(b"<QIIIHHHBBB")
-    orders = [0, 1, 2, 3, 4, 5, 6, 7, 8, 9]
-    lengths = [1, 1, 1, 1, 1, 1, 1, 1, 1, 1]
-    array_lengths = [0, 0, 0, 0, 0, 0, 0, 0, 0, 0]
-    crc_extra = 181
-    unpacker = struct.Struct("<QIIIHHHBBB")
+    native_format = bytearray(b"<QIIIIHHHBBB")
+    orders = [0, 1, 2, 3, 4, 5, 6, 7, 8, 9, 10]
+    lengths = [1, 1, 1, 1, 1, 1, 1, 1, 1, 1, 1]
+    array_lengths = [0, 0, 0, 0, 0, 0, 0, 0, 0, 0, 0]
+    crc_extra = 172
+    unpacker = struct.Struct("<QIIIIHHHBBB")
     instance_field = None
     instance_offset = -1
 
-    def __init__(self, t_ns: int, error_ns: int, worst_ns: int, hello: int, round: int, node: int, reference: int, worst_age_s: int, hops: int, version: int):
+    def __init__(self, t_ns: int, error_ns: int, rate_ppb: int, worst_ns: int, hello: int, round: int, node: int, reference: int, worst_age_s: int, hops: int, version: int):
         MAVLink_message.__init__(self, MAVLink_fanet_time_message.id, MAVLink_fanet_time_message.msgname)
         self._fieldnames = MAVLink_fanet_time_message.fieldnames
         self._instance_field = MAVLink_fanet_time_message.instance_field
         self._instance_offset = MAVLink_fanet_time_message.instance_offset
         self.t_ns = t_ns
         self.error_ns = error_ns
+        self.rate_ppb = rate_ppb
         self.worst_ns = worst_ns
         self.hello = hello
         self.round = round
@@ -648,7 +649,7 @@ class MAVLink_fanet_time_message(MAVLink_message):
         self.version = version
 
     def pack(self, mav: "MAVLink", force_mavlink1: bool = False) -> bytes:
-        return self._pack(mav, self.crc_extra, self.unpacker.pack(self.t_ns, self.error_ns, self.worst_ns, self.hello, self.round, self.node, self.reference, self.worst_age_s, self.hops, self.version), force_mavlink1=force_mavlink1)
+        return self._pack(mav, self.crc_extra, self.unpacker.pack(self.t_ns, self.error_ns, self.rate_ppb, self.worst_ns, self.hello, self.round, self.node, self.reference, self.worst_age_s, self.hops, self.version), force_mavlink1=force_mavlink1)
 
 
 # Define name on the class for backwards compatibility (it is now msgname).
@@ -1419,7 +1420,7 @@ class MAVLink(object):
         """
         self.send(self.fanet_chunk_encode(length, index, count, data), force_mavlink1=force_mavlink1)
 
-    def fanet_time_encode(self, t_ns: int, error_ns: int, worst_ns: int, hello: int, round: int, node: int, reference: int, worst_age_s: int, hops: int, version: int) -> MAVLink_fanet_time_message:
+    def fanet_time_encode(self, t_ns: int, error_ns: int, rate_ppb: int, worst_ns: int, hello: int, round: int, node: int, reference: int, worst_age_s: int, hops: int, version: int) -> MAVLink_fanet_time_message:
         """
         Time beacon, in a hello: the swarm time at which an earlier hello of
         the sender ended. Two steps, because only then is it known
@@ -1427,6 +1428,7 @@ class MAVLink(object):
 
         t_ns                      : Swarm time at the end of that hello, as the sender knows it. [ns] (type:uint64_t)
         error_ns                  : What the sender states as the bound of its error then. [ns] (type:uint32_t)
+        rate_ppb                  : What the sender states as the bound of the error of its rate, in parts per billion: how fast its error may grow. (type:uint32_t)
         worst_ns                  : The greatest such bound of any node that the sender has heard of. [ns] (type:uint32_t)
         hello                     : Sequence number of that hello. (type:uint32_t)
         round                     : The reference counts its own hellos; whoever follows it repeats what it heard last. (type:uint16_t)
@@ -1437,9 +1439,9 @@ class MAVLink(object):
         version                   : 1. (type:uint8_t)
 
         """
-        return MAVLink_fanet_time_message(t_ns, error_ns, worst_ns, hello, round, node, reference, worst_age_s, hops, version)
+        return MAVLink_fanet_time_message(t_ns, error_ns, rate_ppb, worst_ns, hello, round, node, reference, worst_age_s, hops, version)
 
-    def fanet_time_send(self, t_ns: int, error_ns: int, worst_ns: int, hello: int, round: int, node: int, reference: int, worst_age_s: int, hops: int, version: int, force_mavlink1: bool = False) -> None:
+    def fanet_time_send(self, t_ns: int, error_ns: int, rate_ppb: int, worst_ns: int, hello: int, round: int, node: int, reference: int, worst_age_s: int, hops: int, version: int, force_mavlink1: bool = False) -> None:
         """
         Time beacon, in a hello: the swarm time at which an earlier hello of
         the sender ended. Two steps, because only then is it known
@@ -1447,6 +1449,7 @@ class MAVLink(object):
 
         t_ns                      : Swarm time at the end of that hello, as the sender knows it. [ns] (type:uint64_t)
         error_ns                  : What the sender states as the bound of its error then. [ns] (type:uint32_t)
+        rate_ppb                  : What the sender states as the bound of the error of its rate, in parts per billion: how fast its error may grow. (type:uint32_t)
         worst_ns                  : The greatest such bound of any node that the sender has heard of. [ns] (type:uint32_t)
         hello                     : Sequence number of that hello. (type:uint32_t)
         round                     : The reference counts its own hellos; whoever follows it repeats what it heard last. (type:uint16_t)
@@ -1457,7 +1460,7 @@ class MAVLink(object):
         version                   : 1. (type:uint8_t)
 
         """
-        self.send(self.fanet_time_encode(t_ns, error_ns, worst_ns, hello, round, node, reference, worst_age_s, hops, version), force_mavlink1=force_mavlink1)
+        self.send(self.fanet_time_encode(t_ns, error_ns, rate_ppb, worst_ns, hello, round, node, reference, worst_age_s, hops, version), force_mavlink1=force_mavlink1)
 
     def fanet_join_encode(self, east: float, north: float, up: float, node: int, version: int) -> MAVLink_fanet_join_message:
         """

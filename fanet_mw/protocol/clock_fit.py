@@ -27,6 +27,8 @@ class Pair(NamedTuple):
     local_ns: int
     offset_ns: int
     error_ns: int
+    rate: float = 0.0
+    """How fast that error may have grown since, as whoever said it states (parts)."""
 
 
 class Oscillator(NamedTuple):
@@ -47,9 +49,12 @@ class Line(NamedTuple):
     offset_ns: int
     rate: float
     stated_ns: float
-    """What the pairs state as their error, by weight."""
+    """What the pairs state as their error, by weight; of the last one, if that is more."""
     offset_sd_ns: float
     rate_sd: float
+    last_ns: int = 0
+    stated_rate: float = 0.0
+    """What is stated of the rate they all follow: what may have grown since the last of them."""
 
     def offset_at(self, local_ns: int) -> int:
         return self.offset_ns + round((local_ns - self.at_ns) * self.rate)
@@ -67,10 +72,15 @@ class Line(NamedTuple):
         """The stated bound of the error at an instant."""
         far_ns = abs(local_ns - self.at_ns)
         drift_ns = min(oscillator.rate, _SIGMAS * self.rate_sd) * far_ns
+        drift_ns += min(oscillator.rate, self.stated_rate) * abs(local_ns - self.last_ns)
         wander_ns = (
             _SIGMAS * oscillator.wander * math.sqrt(2 / S) * math.pow(far_ns, 1.5)
         )  # of both clocks, a random walk
         return math.ceil(self.stated_ns + _SIGMAS * self.offset_sd_ns + drift_ns + wander_ns)
+
+    def rate_error(self, oscillator: Oscillator) -> float:
+        """The stated bound of the error of the rate (parts)."""
+        return min(oscillator.rate, self.stated_rate + _SIGMAS * self.rate_sd)
 
 
 EXACT: Final = Line(0, 0, 0.0, 0.0, 0.0, 0.0)
@@ -101,9 +111,11 @@ def fitted(pairs: list[Pair], oscillator: Oscillator) -> Line:
         at_ns=middle_ns,
         offset_ns=base_ns + round(mean_y),
         rate=rate,
-        stated_ns=stated_ns,
+        stated_ns=max(stated_ns, pairs[-1].error_ns),
         offset_sd_ns=sigma_ns / math.sqrt(effective),
         rate_sd=sigma_ns / math.sqrt(spread * effective) if spread > 0 else math.inf,
+        last_ns=at_ns,
+        stated_rate=pairs[-1].rate,
     )
 
 

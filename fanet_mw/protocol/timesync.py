@@ -43,6 +43,7 @@ _NEIGHBORS: Final = 256
 _WORST_NS: Final = 20 * MS
 """A greater error than this is a node that has no time yet, or nonsense: no guard is made for it."""
 _WORST_LIFE_NS: Final = 30 * S
+_PPB: Final = 1e9
 _U32: Final = 0xFFFF_FFFF
 
 
@@ -169,7 +170,10 @@ class TimeSync:
         self._learn_worst(error_ns, said_ns=local_ns)
         worst_ns, said_ns = self._worst
         age_s = min(255, math.ceil((local_ns - said_ns) / S))
-        return TimeBeacon(t_ns, error_ns, worst_ns, hello, self._round, self._own.node, self.reference, age_s, hops)
+        rate_ppb = 0 if hops == 0 else math.ceil(self.line.rate_error(self._own.oscillator) * _PPB)
+        return TimeBeacon(
+            t_ns, error_ns, rate_ppb, worst_ns, hello, self._round, self._own.node, self.reference, age_s, hops
+        )
 
     def pass_time(self, local_ns: int) -> None:
         """Become the reference, when there has been none for long enough, or when it is time to take over."""
@@ -182,7 +186,7 @@ class TimeSync:
 
     def _lead(self) -> None:
         """From now on swarm time is our line, without error."""
-        self._fit.settle(self.line._replace(stated_ns=0.0, offset_sd_ns=0.0, rate_sd=0.0))
+        self._fit.settle(self.line._replace(stated_ns=0.0, offset_sd_ns=0.0, rate_sd=0.0, stated_rate=0.0))
         self.reference, self.leading, self._rival = self._own.node, True, None
         self.counts["claimed"] += 1
 
@@ -221,6 +225,8 @@ class TimeSync:
             return None
         if beacon.reference != neighbor.reference or 0 < ((beacon.round - neighbor.round) & 0xFFFF) < 0x8000:
             neighbor.reference, neighbor.round, neighbor.advanced_ns = beacon.reference, beacon.round, local_ns
+            neighbor.hops = beacon.hops
+            self._news(neighbor, local_ns)
         neighbor.hops = beacon.hops
         ended_ns = neighbor.stamps.pop(beacon.hello, None)
         if ended_ns is None or self._is_stale(neighbor.advanced_ns, local_ns):
@@ -233,22 +239,28 @@ class TimeSync:
             self.counts["implausible"] += 1
             return None
         neighbor.paired_ns = ended_ns
-        return Pair(ended_ns, offset_ns + self._own.flight_ns // 2, beacon.error_ns + self._own.hop_ns)
+        return Pair(
+            ended_ns, offset_ns + self._own.flight_ns // 2, beacon.error_ns + self._own.hop_ns, beacon.rate_ppb / _PPB
+        )
 
     def _judge(self, neighbor: _Neighbor, beacon: TimeBeacon, pair: Pair, local_ns: int) -> None:
         if self.reference is None:
             self.reference = beacon.reference
+            self._news(neighbor, local_ns)
         if beacon.reference == self.reference:
             if not self.leading:
-                self._follow(neighbor, beacon, pair, local_ns)
+                self._follow(neighbor, pair, local_ns)
             self._learn_worst(beacon.worst_ns, said_ns=local_ns - beacon.worst_age_s * S)
         elif beacon.reference < self.reference or (not self.leading and self._is_stale(self._news_ns, local_ns)):
             self._consider(beacon.reference, pair, local_ns)
 
-    def _follow(self, neighbor: _Neighbor, beacon: TimeBeacon, pair: Pair, local_ns: int) -> None:
+    def _follow(self, neighbor: _Neighbor, pair: Pair, local_ns: int) -> None:
         """The word of a neighbor that follows the same reference."""
         steps = self._fit.steps
-        agrees = self._fit.line is None or self._fit.agrees(pair)
+        if self._fit.line is None:
+            self._fit.add(pair)  # the first word of anybody is better than none
+            return
+        agrees = self._fit.agrees(pair)
         if not agrees:
             neighbor.trusted = self._fit.add(pair)
             self.counts["outlier"] += not neighbor.trusted
@@ -256,16 +268,17 @@ class TimeSync:
             if not neighbor.trusted:
                 return
         neighbor.trusted = True
-        if neighbor.hops + 1 != self.hops(local_ns):
-            return
-        if agrees:
+        if neighbor.hops + 1 == self.hops(local_ns) and agrees:
             self._fit.add(pair)
-        self._news(beacon, local_ns)
 
-    def _news(self, beacon: TimeBeacon, local_ns: int) -> None:
-        self._round = beacon.round
-        self._news_ns = local_ns
-        self._arm(local_ns)
+    def _news(self, neighbor: _Neighbor, local_ns: int) -> None:
+        """The reference that we follow was alive a moment ago, as one says whose time we take."""
+        if self.leading or neighbor.reference != self.reference or not neighbor.trusted:
+            return
+        if neighbor.hops + 1 == self.hops(local_ns):
+            self._round = neighbor.round
+            self._news_ns = local_ns
+            self._arm(local_ns)
 
     def _learn_worst(self, value_ns: int, *, said_ns: int) -> None:
         value_ns = min(value_ns, _WORST_NS)

@@ -46,7 +46,7 @@ def schedules(draw: st.DrawFn) -> Schedule:
 joins = st.builds(Join, ids, positions)
 survivors = st.builds(Survivor, instants, u32, ids, positions, singles)
 instants_ns = st.integers(0, wire.LATEST_US * 1000 + 999)
-times = st.builds(TimeBeacon, instants_ns, u32, u32, u32, u16, ids, ids, u8, st.integers(1, 255)).map(
+times = st.builds(TimeBeacon, instants_ns, u32, u32, u32, u32, u16, ids, ids, u8, st.integers(1, 255)).map(
     lambda beacon: beacon._replace(hops=0) if beacon.reference == beacon.node else beacon
 )
 any_message = st.one_of(beacons, schedules(), joins, survivors, times)
@@ -112,20 +112,20 @@ def test_a_schedule_has_its_entries_in_two_parallel_arrays_in_pymavlink(schedule
 @given(u64, ids)
 def test_what_pymavlink_writes_within_our_bounds_is_read_by_us(t_ns: int, node: int) -> None:
     hops = 0 if node == 9 else 2
-    message = fanet.MAVLink_fanet_time_message(t_ns, 5, 6, 7, 8, node, 9, 3, hops, wire.VERSION)
+    message = fanet.MAVLink_fanet_time_message(t_ns, 5, 4, 6, 7, 8, node, 9, 3, hops, wire.VERSION)
     frame = HEADER + bytes(message.pack(fanet.MAVLink(None, srcSystem=3, srcComponent=191)))
     if t_ns // 1000 > wire.LATEST_US:
         with pytest.raises(MalformedFrameError):
             TimeBeacon.decode_frame(frame)
     else:
-        assert TimeBeacon.decode_frame(frame) == TimeBeacon(t_ns, 5, 6, 7, 8, node, 9, 3, hops)
+        assert TimeBeacon.decode_frame(frame) == TimeBeacon(t_ns, 5, 4, 6, 7, 8, node, 9, 3, hops)
 
 
 @pytest.mark.parametrize(("node", "reference", "hops"), [(3, 3, 1), (3, 4, 0), (3, 0, 1), (3, 0xFFFF, 1)])
 def test_time_of_no_reference_or_of_a_reference_at_no_distance_is_malformed(
     node: int, reference: int, hops: int
 ) -> None:
-    beacon = TimeBeacon(5, 0, 0, 1, 1, node, reference, 0, hops)
+    beacon = TimeBeacon(5, 0, 0, 0, 1, 1, node, reference, 0, hops)
     with pytest.raises(MalformedFrameError):
         TimeBeacon.decode_frame(HEADER + beacon.encode_frame(node))
 

@@ -104,7 +104,8 @@ def fitted(pairs: list[Pair], oscillator: Oscillator) -> Line:
     rate = max(-oscillator.rate, min(oscillator.rate, rate))
     residual = math.fsum(w * (y - rate * x) ** 2 for w, x, y in points) / whole
     free = count / (count - 2) if count > 2 else 1.0
-    sigma_ns = max(floor_ns, math.sqrt(residual * free), stated_ns / count**2)
+    sigma_ns = max(floor_ns, math.sqrt(residual * free))
+    slope_ns = max(sigma_ns, stated_ns / count**2)  # few pairs: what they state may be a slope too
     effective = whole * whole / math.fsum(w * w for w in weights)
     middle_ns = at_ns + round(mean_x)
     return Line(
@@ -113,7 +114,7 @@ def fitted(pairs: list[Pair], oscillator: Oscillator) -> Line:
         rate=rate,
         stated_ns=max(stated_ns, pairs[-1].error_ns),
         offset_sd_ns=sigma_ns / math.sqrt(effective),
-        rate_sd=sigma_ns / math.sqrt(spread * effective) if spread > 0 else math.inf,
+        rate_sd=slope_ns / math.sqrt(spread * effective) if spread > 0 else math.inf,
         last_ns=at_ns,
         stated_rate=pairs[-1].rate,
     )

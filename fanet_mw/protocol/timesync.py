@@ -42,7 +42,7 @@ _STAMPS: Final = 4
 _NEIGHBORS: Final = 256
 _WORST_NS: Final = 20 * MS
 """A greater error than this is a node that has no time yet, or nonsense: no guard is made for it."""
-_WORST_LIFE_NS: Final = 30 * S
+_WORST_LIFE_NS: Final = 20 * S
 _PPB: Final = 1e9
 _U32: Final = 0xFFFF_FFFF
 

@@ -175,3 +175,27 @@ def test_the_greatest_error_of_the_swarm_is_known_everywhere_and_forgotten_when_
     absurd = said(11 * S, 11)._replace(worst_ns=0xFFFF_FFFF)
     hear(sync, 1, 12, 12 * S, absurd)
     assert sync.worst_ns(13 * S) == 20 * MS, "no guard is made for more"
+
+
+def test_a_node_says_how_well_it_knows_its_rate_and_one_that_follows_it_counts_on_it() -> None:
+    sync = follower()
+    follow(sync, ahead_ns=0, hellos=2)
+    sync.hello_sent(1, ended_ns=2 * S)
+    young = sync.beacon(2 * S)
+    assert young is not None
+    assert young.rate_ppb == 40_000, "one pair: all that two clocks may run apart"
+    follow(sync, ahead_ns=0, hellos=20, first=3)
+    settled = sync.beacon(22 * S)
+    assert settled is not None
+    assert 0 < settled.rate_ppb < 500
+    grown_ns = []
+    for rate_ppb in (young.rate_ppb, settled.rate_ppb):
+        other = follower(3)
+        for hello in range(1, 12):
+            about = said((hello - 1) * S, hello - 1, node=2, hops=1)._replace(rate_ppb=rate_ppb)
+            hear(other, 2, hello, hello * S, about if hello > 1 else None)
+        later, now = other.error_ns(20 * S), other.error_ns(10 * S)
+        assert later is not None
+        assert now is not None
+        grown_ns.append(later - now)
+    assert grown_ns[0] > grown_ns[1] + 300 * US

@@ -5,7 +5,7 @@ import sys
 from collections.abc import Mapping
 from typing import Final, NamedTuple
 
-from agents.uav import Uav
+from agents.clocked import make_uav
 from fanet_mw.errors import ConfigError
 from fanet_mw.hosts import loop, service
 from fanet_mw.hosts.realtime import RealtimeHost, run_actor
@@ -20,7 +20,7 @@ _CLOCK_TIMEOUT_S: Final = 60.0
 
 def run(scenario: Scenario, *, node: NodeId, swarm: str, endpoint: str, position: Enu) -> int:
     """Run one UAV against a router until the scenario is over; raises BusError."""
-    uav = Uav(scenario, node, swarm, position=position)
+    uav = make_uav(scenario, node, swarm, position=position)
     loop.run(run_actor(uav, swarm=swarm, endpoint=endpoint, until_ns=scenario.duration_ns))
     return 0
 
@@ -45,7 +45,7 @@ async def _fly(
     scenario: Scenario, on_air: OnAir, node: NodeId, names: Topics, endpoint: str | None, position: Enu
 ) -> Mapping[str, object]:
     epoch_unix_ns = None if on_air.epoch_unix_s is None else round(on_air.epoch_unix_s * S)
-    uav = Uav(scenario, node, names.swarm, position=position)
+    uav = make_uav(scenario, node, names.swarm, position=position)
     with joined(endpoint) as inner:
         bus = FieldBus(names, node, inner=inner, epoch_unix_ns=epoch_unix_ns)
         host = RealtimeHost(uav, bus, names)

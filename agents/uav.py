@@ -106,6 +106,10 @@ class Uav(Actor):
         ]
         return min((t for t in wanted if t is not None), default=None)
 
+    def know_clock_error(self, error_ns: int) -> None:
+        """The greatest error of any clock in the swarm, as far as this node has heard; 0: they are exact."""
+        self._node.clock_error_ns = error_ns
+
     def report(self) -> Mapping[str, Any]:
         own = {"kind": "agent", "node": self._id, "generated": self._generated, "bus_malformed": self._malformed}
         return own | dict(self._node.report())

@@ -11,6 +11,7 @@ from pydantic import Field, model_validator
 
 from fanet_mw.fault_sections import AnyFault
 from fanet_mw.radio_control import Control, Degrade, Restore, nodes_of
+from fanet_mw.scenario_clock import Clock
 from fanet_mw.scenario_radio import Radio
 from fanet_mw.sections import Finite, Id, NonNegative, Positive, Section
 from fanet_mw.units import MAX_NODES, MS, NodeId, seconds_to_ns
@@ -90,8 +91,9 @@ class Clusters(Section):
 
     count: Annotated[int, Field(ge=1, le=1024)] = 4
     flooding_period_s: Positive = 5.0
-    guard_ms: NonNegative = 2.0
-    """The silent end of a slot."""
+    guard_ms: NonNegative | Literal["auto"] = 2.0
+    """The silent end of a slot; `auto`: as long as the greatest clock error in the swarm, the range and the largest
+    frame ask for."""
     release_gap_ms: NonNegative = 2.0
     """The least time between two packets that a head releases in its slot."""
     pacing: Literal["burst", "spread"] = "spread"
@@ -102,6 +104,9 @@ class Clusters(Section):
     turn of its own."""
     contention_ms: NonNegative = 40.0
     """`scheduled`: the beginning of each period, for all that has no turn: hellos, joins, unicasts to heads."""
+    turn_slack_us: NonNegative = 50.0
+    """`scheduled`: what a turn is longer than its frame: twice the bound of a clock's error, and some 20 us for flight
+    and detection."""
     link_m: NonNegative = 0.0
     """`scheduled`: nodes no farther apart are taken to hear each other; 0: `radio.range_m`."""
     interference_m: NonNegative = 0.0
@@ -213,6 +218,7 @@ class Scenario(Section):
     clusters: Clusters = Clusters()
     radio: Radio = Radio()
     mobility: Mobility = Mobility()
+    clock: Clock = Clock()
     world: World = World()
     mission: Mission = Mission()
     faults: tuple[AnyFault, ...] = ()
@@ -283,6 +289,8 @@ def _disagreements(scenario: Scenario) -> Sequence[str]:
             f"traffic.payload_bytes = {traffic.payload_bytes} must be "
             f"<= radio.max_frame_bytes = {scenario.radio.max_frame_bytes}"
         )
+    if scenario.clock.sync == "beacons" and not scenario.routing.hello_interval_s:
+        found.append('clock.sync = "beacons" needs hellos: routing.hello_interval_s > 0')
     found += _impossible_faults(scenario)
     if scenario.routing.protocol in _RIVALS and scenario.radio.max_frame_bytes < _RIVAL_FRAME_BYTES:
         found.append(
@@ -293,7 +301,7 @@ def _disagreements(scenario: Scenario) -> Sequence[str]:
         clusters = scenario.clusters
         if clusters.count >= max(2, count):
             found.append(f"clusters.count = {clusters.count} must be < nodes.count = {count}")
-        if clusters.guard_ms * MS >= clusters.slot_ns:
+        if clusters.guard_ms != "auto" and clusters.guard_ms * MS >= clusters.slot_ns:
             found.append(
                 f"clusters.guard_ms = {clusters.guard_ms:g} must be < the slot, flooding_period_s / count = "
                 f"{clusters.slot_ns / MS:g} ms"
@@ -323,6 +331,6 @@ def grid_columns(count: int) -> int:
 
 
 __all__ = [
-    "Clusters", "Finite", "Mission", "Mobility", "Nodes", "NonNegative", "Positive", "Radio", "Routing", "Scenario",
-    "Section", "Traffic", "World", "grid_columns",
+    "Clock", "Clusters", "Finite", "Mission", "Mobility", "Nodes", "NonNegative", "Positive", "Radio", "Routing",
+    "Scenario", "Section", "Traffic", "World", "grid_columns",
 ]  # fmt: skip

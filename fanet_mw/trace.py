@@ -97,6 +97,20 @@ class ProcessEnded(NamedTuple):
     exit_code: int
 
 
+class ClockSampled(NamedTuple):
+    """Where a node's swarm time stood at a true instant."""
+
+    t_ns: int
+    node: int
+    ahead_ns: int
+    """Swarm time as the node believes it, minus true time."""
+    bound_ns: int
+    """What the node states as the bound of its error against its reference; -1: it states none."""
+    reference: int
+    """The node whose clock it follows; 0: no node's."""
+    hops: int
+
+
 class RadioFault(NamedTuple):
     """A fault began (`active`) or ended on the air; node and other: the cut node, or the ends of the link; else 0."""
 
@@ -119,6 +133,7 @@ Record = (
     | Collided
     | ProcessEnded
     | RadioFault
+    | ClockSampled
 )
 
 _KINDS: Final[dict[str, type[Any]]] = {
@@ -132,6 +147,7 @@ _KINDS: Final[dict[str, type[Any]]] = {
     "collided": Collided,
     "process_ended": ProcessEnded,
     "radio_fault": RadioFault,
+    "clock_sampled": ClockSampled,
 }
 _NAMES: Final[dict[type[Any], str]] = {kind: name for name, kind in _KINDS.items()}
 
@@ -159,6 +175,6 @@ def parse(text: str) -> Record:
 
 
 __all__ = [
-    "Approaching", "Arrived", "Collided", "Delivered", "Detected", "DropReason", "Dropped", "Generated",
+    "Approaching", "Arrived", "ClockSampled", "Collided", "Delivered", "Detected", "DropReason", "Dropped", "Generated",
     "ProcessEnded", "RadioFault", "Record", "RoleChanged", "kind_of", "line", "parse",
 ]  # fmt: skip

@@ -154,6 +154,12 @@ def peek(frame: bytes) -> tuple[int, int, int] | None:
     return (origin, seq, flags) if mark == _ROUTE_MARK and message == _ROUTE_ID else None
 
 
+def peek_kind(frame: bytes) -> int | None:
+    """The kind of packet at its fixed offset, unchecked; None when these bytes cannot begin with our header."""
+    whole = len(frame) >= HEADER_BYTES and frame[:3] == _ROUTE_MARK and frame[7:10] == _ROUTE_ID
+    return frame[_KIND_AT] if whole else None
+
+
 def decode_header(frame: bytes) -> Header:
     """The routing header of a frame; raises MalformedFrameError."""
     if frame[:3] != _ROUTE_MARK or frame[7:10] != _ROUTE_ID or len(frame) < HEADER_BYTES:
@@ -371,12 +377,17 @@ class Survivor(NamedTuple):
 
 
 class TimeBeacon(NamedTuple):
-    """FANET_TIME: what the sender believes the swarm time to be."""
+    """FANET_TIME: the swarm time at which the sender's earlier hello `hello` ended; bounds in ns."""
 
-    t_us: int
-    error_us: int
+    t_ns: int
+    error_ns: int
+    rate_ppb: int
+    worst_ns: int
+    hello: int
+    round: int
     node: int
     reference: int
+    worst_age_s: int
     hops: int
 
     def encode_frame(self, node: int) -> bytes:
@@ -384,9 +395,12 @@ class TimeBeacon(NamedTuple):
 
     @classmethod
     def decode_frame(cls, frame: bytes) -> Self:
+        """Raises MalformedFrameError; a beacon of the reference itself, and none else, has no hops."""
         *fields, version = _inner(TIME, frame)
         beacon = cls(*fields)
-        _check(version, beacon.node, t_us=beacon.t_us)
+        _check(version, beacon.node, t_us=beacon.t_ns // US)
+        if not 0 < beacon.reference < _ANY_NODE or (beacon.reference == beacon.node) != (beacon.hops == 0):
+            raise MalformedFrameError(f"time of node {beacon.reference}, {beacon.hops} hops from {beacon.node}")
         return beacon
 
 
@@ -400,7 +414,7 @@ BEACON: Final = Spec(53001, 138, struct.Struct("<HHHHHHBBB"))
 SCHEDULE: Final = Spec(53002, 158, struct.Struct("<QIIHHH56H56HBBBB"))
 SURVIVOR: Final = Spec(53003, 240, struct.Struct("<QIffffHB"))
 CHUNK: Final = Spec(53004, 155, struct.Struct("<HBB240B"))
-TIME: Final = Spec(53005, 192, struct.Struct("<QIHHBB"))
+TIME: Final = Spec(53005, 172, struct.Struct("<QIIIIHHHBBB"))
 JOIN: Final = Spec(53006, 50, struct.Struct("<fffHB"))
 DIGEST: Final = Spec(53007, 37, struct.Struct("<24I24I24HBBB"))
 PLACES: Final = Spec(53008, 1, struct.Struct("<28h28h28hhhhBBB"))

@@ -16,6 +16,7 @@ from agents.traffic import targets_of
 from fanet_mw.trace import Approaching, Arrived, Collided, Delivered, Detected, Generated
 from fanet_mw.units import MS, S
 from sim.bounds import against_bounds
+from sim.clocks import clock_errors
 from sim.outcome import Outcome
 from sim.survivors import place
 
@@ -42,6 +43,7 @@ def summarize(outcome: Outcome, *, trace_sha256: str) -> dict[str, Any]:
         "air": emulator.get("air", {}),
         "lateness": _lateness(outcome, emulator),
         "bound": against_bounds(outcome),
+        "clock": clock_errors(outcome),
         "mission": _mission(outcome),
         "processes": {
             "ready_s": round(outcome.ready_s, 3),

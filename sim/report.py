@@ -61,6 +61,7 @@ def _network_rows(summary: Mapping[str, Any]) -> Iterator[tuple[str, str]]:
             "bound",
             f"{bound['worst_ms']:.0f} ms, computed in flight; worst seen {bound['observed_max_ms']:.0f} ms, {broken}",
         )
+    yield from _clock_rows(summary["clock"])
     late = summary["lateness"]
     if summary["mode"] == "realtime":
         yield (
@@ -68,6 +69,16 @@ def _network_rows(summary: Mapping[str, Any]) -> Iterator[tuple[str, str]]:
             f"{late['late_frames']} of {late['frames']} frames late ({late['share']:.2%}, limit {late['limit']:.1%}), "
             f"worst {late['max_ms']:.1f} ms: {'valid' if late['valid'] else 'NOT VALID'}",
         )
+
+
+def _clock_rows(clock: Mapping[str, Any]) -> Iterator[tuple[str, str]]:
+    error = clock.get("error_us", {})
+    if error.get("p50") is None:
+        return
+    stated = ""
+    if clock["bound_us"] is not None:
+        stated = f", stated at most {clock['bound_us']:.1f} us, exceeded {clock['beyond_bound']} times"
+    yield "clocks", f"off by p50 {error['p50']:.1f} us, p99 {error['p99']:.1f} us, max {error['max']:.1f} us{stated}"
 
 
 def _traffic(part: Mapping[str, Any]) -> str:

@@ -5,7 +5,7 @@ import time
 from collections.abc import Callable, Iterator
 from contextlib import contextmanager
 
-from agents.uav import Uav
+from agents.clocked import make_uav
 from emulator.medium import Medium
 from emulator.pcap import Capture
 from fanet_mw.actor import Actor
@@ -16,6 +16,7 @@ from fanet_mw.scenario import Scenario
 from fanet_mw.topics import Topics
 from fanet_mw.trace import Record
 from fanet_mw.units import NodeId, S
+from sim.clocks import true_delays
 from sim.layout import positions
 from sim.links import LinkTotals
 from sim.outcome import Outcome
@@ -25,7 +26,7 @@ from sim.world import World
 def actors_of(scenario: Scenario, swarm: str, *, capture: Capture | None = None) -> list[Actor]:
     """Every actor of a swarm: the world first, so that poses stand before anyone transmits."""
     starts = positions(scenario)
-    uavs = [Uav(scenario, NodeId(node), swarm, position=starts[node - 1]) for node in scenario.node_ids]
+    uavs = [make_uav(scenario, NodeId(node), swarm, position=starts[node - 1]) for node in scenario.node_ids]
     return [World(scenario, swarm), Medium(scenario, swarm, capture=capture), *uavs]
 
 
@@ -58,7 +59,7 @@ def simulate(
         scenario=scenario,
         mode="virtual",
         wall_s=time.perf_counter() - began,
-        records=records,
+        records=true_delays(records) if scenario.clock.modelled else records,
         reports={actor.name: actor.report() for actor in actors},
         taps=taps,
         links=links,

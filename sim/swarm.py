@@ -26,6 +26,7 @@ from fanet_mw.scenario import Scenario
 from fanet_mw.topics import Topics
 from fanet_mw.trace import ProcessEnded, Record, kind_of
 from fanet_mw.units import NodeId, S
+from sim.clocks import true_delays
 from sim.layout import positions
 from sim.links import LinkTotals
 from sim.outcome import Outcome
@@ -153,7 +154,7 @@ class Swarm:
             scenario=self._scenario,
             mode="realtime",
             wall_s=wall_s,
-            records=sorted([*self._collector.records(), *self._obituaries], key=lambda r: (r.t_ns, r.node, kind_of(r))),
+            records=self._records(),
             reports=self._collector.reports(),
             taps=self._collector.taps(),
             links=self._collector.links(),
@@ -162,6 +163,11 @@ class Swarm:
             ready_s=ready_s,
             epoch_unix_ns=self._keeper.clock.epoch_unix_ns if self._keeper.clock else 0,
         )
+
+    def _records(self) -> list[Record]:
+        records = [*self._collector.records(), *self._obituaries]
+        records = true_delays(records) if self._scenario.clock.modelled else records
+        return sorted(records, key=lambda r: (r.t_ns, r.node, kind_of(r)))
 
     def abort(self, why: str) -> None:
         """End the run early; what has been collected becomes a partial result."""

@@ -70,7 +70,9 @@ class World(Actor):
         self._guidance = Guidance(starts, scenario)
         self._phones = PhoneSensor(scenario)
         self._noise = np.random.Generator(np.random.PCG64(stream_seed(scenario.seed, "gps")))
-        self._fixes = scenario.nodes.telemetry_hz > 0 or scenario.routing.protocol == "geographic"
+        self._fixes = (
+            scenario.nodes.telemetry_hz > 0 or scenario.routing.protocol == "geographic" or scenario.clock.sync == "gps"
+        )
         """Whether anybody uses position fixes."""
         self._gps_ns = round(S / scenario.world.gps_hz)
         self._scan_ns = seconds_to_ns(scenario.mission.scan_interval_s)

@@ -609,41 +609,47 @@ setattr(MAVLink_fanet_chunk_message, "name", mavlink_msg_deprecated_name_propert
 
 class MAVLink_fanet_time_message(MAVLink_message):
     """
-    Time beacon: what the sender believes the swarm time to be at the
-    start of this frame.
+    Time beacon, in a hello: the swarm time at which an earlier hello
+    of the sender ended. Two steps, because only then is it known when
+    that hello left.
     """
 
     id = MAVLINK_MSG_ID_FANET_TIME
     msgname = "FANET_TIME"
-    fieldnames = ["t_us", "error_us", "node", "reference", "hops", "version"]
-    ordered_fieldnames = ["t_us", "error_us", "node", "reference", "hops", "version"]
-    fieldtypes = ["uint64_t", "uint32_t", "uint16_t", "uint16_t", "uint8_t", "uint8_t"]
+    fieldnames = ["t_ns", "error_ns", "rate_ppb", "worst_ns", "hello", "round", "node", "reference", "worst_age_s", "hops", "version"]
+    ordered_fieldnames = ["t_ns", "error_ns", "rate_ppb", "worst_ns", "hello", "round", "node", "reference", "worst_age_s", "hops", "version"]
+    fieldtypes = ["uint64_t", "uint32_t", "uint32_t", "uint32_t", "uint32_t", "uint16_t", "uint16_t", "uint16_t", "uint8_t", "uint8_t", "uint8_t"]
     fielddisplays_by_name: Dict[str, str] = {}
     fieldenums_by_name: Dict[str, str] = {}
-    fieldunits_by_name: Dict[str, str] = {"t_us": "us", "error_us": "us"}
-    native_format = bytearray(b"<QIHHBB")
-    orders = [0, 1, 2, 3, 4, 5]
-    lengths = [1, 1, 1, 1, 1, 1]
-    array_lengths = [0, 0, 0, 0, 0, 0]
-    crc_extra = 192
-    unpacker = struct.Struct("<QIHHBB")
+    fieldunits_by_name: Dict[str, str] = {"t_ns": "ns", "error_ns": "ns", "worst_ns": "ns", "worst_age_s": "s"}
+    native_format = bytearray(b"<QIIIIHHHBBB")
+    orders = [0, 1, 2, 3, 4, 5, 6, 7, 8, 9, 10]
+    lengths = [1, 1, 1, 1, 1, 1, 1, 1, 1, 1, 1]
+    array_lengths = [0, 0, 0, 0, 0, 0, 0, 0, 0, 0, 0]
+    crc_extra = 172
+    unpacker = struct.Struct("<QIIIIHHHBBB")
     instance_field = None
     instance_offset = -1
 
-    def __init__(self, t_us: int, error_us: int, node: int, reference: int, hops: int, version: int):
+    def __init__(self, t_ns: int, error_ns: int, rate_ppb: int, worst_ns: int, hello: int, round: int, node: int, reference: int, worst_age_s: int, hops: int, version: int):
         MAVLink_message.__init__(self, MAVLink_fanet_time_message.id, MAVLink_fanet_time_message.msgname)
         self._fieldnames = MAVLink_fanet_time_message.fieldnames
         self._instance_field = MAVLink_fanet_time_message.instance_field
         self._instance_offset = MAVLink_fanet_time_message.instance_offset
-        self.t_us = t_us
-        self.error_us = error_us
+        self.t_ns = t_ns
+        self.error_ns = error_ns
+        self.rate_ppb = rate_ppb
+        self.worst_ns = worst_ns
+        self.hello = hello
+        self.round = round
         self.node = node
         self.reference = reference
+        self.worst_age_s = worst_age_s
         self.hops = hops
         self.version = version
 
     def pack(self, mav: "MAVLink", force_mavlink1: bool = False) -> bytes:
-        return self._pack(mav, self.crc_extra, self.unpacker.pack(self.t_us, self.error_us, self.node, self.reference, self.hops, self.version), force_mavlink1=force_mavlink1)
+        return self._pack(mav, self.crc_extra, self.unpacker.pack(self.t_ns, self.error_ns, self.rate_ppb, self.worst_ns, self.hello, self.round, self.node, self.reference, self.worst_age_s, self.hops, self.version), force_mavlink1=force_mavlink1)
 
 
 # Define name on the class for backwards compatibility (it is now msgname).
@@ -1414,35 +1420,47 @@ class MAVLink(object):
         """
         self.send(self.fanet_chunk_encode(length, index, count, data), force_mavlink1=force_mavlink1)
 
-    def fanet_time_encode(self, t_us: int, error_us: int, node: int, reference: int, hops: int, version: int) -> MAVLink_fanet_time_message:
+    def fanet_time_encode(self, t_ns: int, error_ns: int, rate_ppb: int, worst_ns: int, hello: int, round: int, node: int, reference: int, worst_age_s: int, hops: int, version: int) -> MAVLink_fanet_time_message:
         """
-        Time beacon: what the sender believes the swarm time to be at the
-        start of this frame.
+        Time beacon, in a hello: the swarm time at which an earlier hello of
+        the sender ended. Two steps, because only then is it known
+        when that hello left.
 
-        t_us                      : Swarm time. [us] (type:uint64_t)
-        error_us                  : Bound of the sender's error. [us] (type:uint32_t)
+        t_ns                      : Swarm time at the end of that hello, as the sender knows it. [ns] (type:uint64_t)
+        error_ns                  : What the sender states as the bound of its error then. [ns] (type:uint32_t)
+        rate_ppb                  : What the sender states as the bound of the error of its rate, in parts per billion: how fast its error may grow. (type:uint32_t)
+        worst_ns                  : The greatest such bound of any node that the sender has heard of. [ns] (type:uint32_t)
+        hello                     : Sequence number of that hello. (type:uint32_t)
+        round                     : The reference counts its own hellos; whoever follows it repeats what it heard last. (type:uint16_t)
         node                      : The sender. (type:uint16_t)
         reference                 : The node whose clock it follows. (type:uint16_t)
+        worst_age_s               : How old that news of the greatest bound is. [s] (type:uint8_t)
         hops                      : Hops from the reference. (type:uint8_t)
         version                   : 1. (type:uint8_t)
 
         """
-        return MAVLink_fanet_time_message(t_us, error_us, node, reference, hops, version)
+        return MAVLink_fanet_time_message(t_ns, error_ns, rate_ppb, worst_ns, hello, round, node, reference, worst_age_s, hops, version)
 
-    def fanet_time_send(self, t_us: int, error_us: int, node: int, reference: int, hops: int, version: int, force_mavlink1: bool = False) -> None:
+    def fanet_time_send(self, t_ns: int, error_ns: int, rate_ppb: int, worst_ns: int, hello: int, round: int, node: int, reference: int, worst_age_s: int, hops: int, version: int, force_mavlink1: bool = False) -> None:
         """
-        Time beacon: what the sender believes the swarm time to be at the
-        start of this frame.
+        Time beacon, in a hello: the swarm time at which an earlier hello of
+        the sender ended. Two steps, because only then is it known
+        when that hello left.
 
-        t_us                      : Swarm time. [us] (type:uint64_t)
-        error_us                  : Bound of the sender's error. [us] (type:uint32_t)
+        t_ns                      : Swarm time at the end of that hello, as the sender knows it. [ns] (type:uint64_t)
+        error_ns                  : What the sender states as the bound of its error then. [ns] (type:uint32_t)
+        rate_ppb                  : What the sender states as the bound of the error of its rate, in parts per billion: how fast its error may grow. (type:uint32_t)
+        worst_ns                  : The greatest such bound of any node that the sender has heard of. [ns] (type:uint32_t)
+        hello                     : Sequence number of that hello. (type:uint32_t)
+        round                     : The reference counts its own hellos; whoever follows it repeats what it heard last. (type:uint16_t)
         node                      : The sender. (type:uint16_t)
         reference                 : The node whose clock it follows. (type:uint16_t)
+        worst_age_s               : How old that news of the greatest bound is. [s] (type:uint8_t)
         hops                      : Hops from the reference. (type:uint8_t)
         version                   : 1. (type:uint8_t)
 
         """
-        self.send(self.fanet_time_encode(t_us, error_us, node, reference, hops, version), force_mavlink1=force_mavlink1)
+        self.send(self.fanet_time_encode(t_ns, error_ns, rate_ppb, worst_ns, hello, round, node, reference, worst_age_s, hops, version), force_mavlink1=force_mavlink1)
 
     def fanet_join_encode(self, east: float, north: float, up: float, node: int, version: int) -> MAVLink_fanet_join_message:
         """

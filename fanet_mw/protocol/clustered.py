@@ -14,6 +14,7 @@ from fanet_mw.messages import Reception, TxOutcome, TxStatus
 from fanet_mw.protocol import seen
 from fanet_mw.protocol.contract import Port, RoutingProtocol
 from fanet_mw.protocol.gradient import UNREACHABLE, Gradient
+from fanet_mw.protocol.guard import slot_guard_ns
 from fanet_mw.protocol.leader import Leader
 from fanet_mw.protocol.membership import Membership
 from fanet_mw.protocol.neighbors import Neighbor, Neighbors
@@ -167,7 +168,7 @@ class Clustered(RoutingProtocol):
         return part.encode_frame(self._port.node)
 
     def _obey(self, schedule: Schedule, *, now_ns: int) -> None:
-        changed = self._membership.learn(schedule, guard_ns=round(self._port.scenario.clusters.guard_ms * MS))
+        changed = self._membership.learn(schedule, guard_ns=self._guard_ns())
         if self._membership.assigned:
             self._join_ns = None
         if changed is None:
@@ -181,6 +182,9 @@ class Clustered(RoutingProtocol):
         else:
             for packet in self._release.drain():
                 self._forward(packet, start_ns=now_ns + self._lead_ns, now_ns=now_ns, tries=0)
+
+    def _guard_ns(self) -> int:
+        return slot_guard_ns(self._port.scenario, clock_error_ns=self._port.clock_error_ns)
 
     def hello_inner(self, *, now_ns: int) -> bytes:
         self._gradient.advance(now_ns)

@@ -25,6 +25,8 @@ class Port(Protocol):
     scenario: Scenario
     position: Enu
     """Where the node last knew itself to be."""
+    clock_error_ns: int
+    """The greatest error of any clock in the swarm, as far as the node has heard; 0: they are exact."""
 
     def transmit(self, frame: bytes, dst: NodeId, *, start_ns: int, wants_status: bool = False) -> int:
         """Announce a transmission; returns the request's sequence number."""

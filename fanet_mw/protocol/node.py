@@ -55,6 +55,7 @@ class Node:
         self.node = node
         self.scenario = scenario
         self.position = position
+        self.clock_error_ns = 0
         self.requests: list[TxRequest] = []
         self.deliveries: list[Delivery] = []
         self.records: list[Record] = []

@@ -17,7 +17,7 @@ from fanet_mw.protocol.clustered import Clustered
 from fanet_mw.protocol.contract import Port
 from fanet_mw.protocol.root_release import RootRelease
 from fanet_mw.protocol.timetable import Geometry, Timetable, timetable
-from fanet_mw.protocol.turns import Turns, turn_ns
+from fanet_mw.protocol.turns import Turns, clocks_fit, turn_ns
 from fanet_mw.protocol.txqueue import Packet, TxQueue
 from fanet_mw.scenario import Scenario
 from fanet_mw.units import BROADCAST, MS, US, Enu, NodeId, seconds_to_ns
@@ -123,7 +123,7 @@ class Scheduled(Clustered):
         if len(packet.frame) > self._turn_bytes:
             self._port.drop(DropReason.TOO_LARGE, packet, now_ns=now_ns)
             return
-        if self._steady_ns is None and not len(self._roots) and now_ns >= self._plans[-1].valid_ns:
+        if self._steady_ns is None and not len(self._roots) and now_ns >= self._plans[-1].valid_ns and self._in_step():
             self._steady_ns = packet.header.origin_us * US
         evicted = self._roots.push(packet, now_ns=now_ns)
         if evicted is not None:
@@ -210,10 +210,14 @@ class Scheduled(Clustered):
         alone = scenario.clusters.count >= scenario.nodes.count - 1  # else packets of members share our turns
         if plan is None or not plan.roots or not alone or plan.table.uncovered[self._port.node]:
             return None
-        if self._steady_ns is None:
+        if self._steady_ns is None or not self._in_step():
             return None
         interval_ns = seconds_to_ns(scenario.traffic.interval_s)
         return plan.turns.worst_ns(plan.roots, span=plan.table.spans[self._port.node], interval_ns=interval_ns)
+
+    def _in_step(self) -> bool:
+        """Whether the turns' slack holds what is known of the swarm's clocks."""
+        return clocks_fit(self._port.scenario, clock_error_ns=self._port.clock_error_ns)
 
     def report(self) -> Mapping[str, object]:
         bound_ns = self.bound_ns()

@@ -15,8 +15,8 @@ from fanet_mw.airtime import OVERHEAD_BYTES, Timing, airtime_ns
 from fanet_mw.scenario import Scenario
 from fanet_mw.units import MS, US
 
-_SLACK_NS: Final = 50 * US
-"""Propagation over 6 km, detection, and microseconds of clock error."""
+_FLIGHT_NS: Final = 20 * US
+"""Propagation over 6 km; so much of the slack is not for clocks."""
 _TAIL_NS: Final = 5 * MS
 """The end of the contention window in which nothing new starts: what contends must be over when the turns begin."""
 
@@ -90,8 +90,14 @@ class Turns(NamedTuple):
 
 
 def turn_ns(scenario: Scenario, *, payload_bytes: int) -> int:
-    """How long a turn must be for frames of this size."""
+    """How long a turn must be for frames of this size; the slack is for flight, detection and clock errors."""
     radio = scenario.radio
+    slack_ns = round(scenario.clusters.turn_slack_us * US)
     timing = Timing.of(radio)
     frame_ns = airtime_ns(payload_bytes + OVERHEAD_BYTES, radio, rate_mbps=radio.rate_mbps)
-    return frame_ns + timing.difs_ns + radio.cw_min * timing.slot_ns + _SLACK_NS
+    return frame_ns + timing.difs_ns + radio.cw_min * timing.slot_ns + slack_ns
+
+
+def clocks_fit(scenario: Scenario, *, clock_error_ns: int) -> bool:
+    """Whether turns stay apart when no clock is farther than this from the swarm's; exact clocks always fit."""
+    return not clock_error_ns or 2 * clock_error_ns + _FLIGHT_NS <= round(scenario.clusters.turn_slack_us * US)

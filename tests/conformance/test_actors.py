@@ -7,6 +7,7 @@ import pytest
 from hypothesis import HealthCheck, given, settings
 from hypothesis import strategies as st
 
+from agents.clocked import ClockedUav
 from agents.uav import Uav
 from emulator.medium import Medium
 from fanet_mw import wire
@@ -24,7 +25,7 @@ from fanet_mw.messages import (
     WifiScan,
 )
 from fanet_mw.radio_control import Cut, Degrade, Jam, Restore
-from fanet_mw.scenario import Scenario
+from fanet_mw.scenario import Clock, Scenario
 from fanet_mw.topics import Topics
 from fanet_mw.units import MS, Enu, NodeId
 from sim import catalog
@@ -32,9 +33,19 @@ from sim.world import World
 
 NAMES = Topics("contract")
 SCENARIO = catalog.find("quick", ["world.engine=kinematic"])
+
+
+def clocked(scenario: Scenario, sync: str) -> Scenario:
+    """The same with clocks that are off."""
+    clock = Clock.model_validate({"sync": sync, "offset_ms": 700, "drift_ppm": 20, "wander_ppm": 0.1})
+    return scenario.model_copy(update={"clock": clock})
+
+
 MAKERS: list[Callable[[Scenario], Actor]] = [
     lambda scenario: Uav(scenario, NodeId(1), "contract", position=Enu(0, 0, 50)),
     lambda scenario: Uav(scenario, NodeId(2), "contract", position=Enu(0, 0, 50)),
+    lambda scenario: ClockedUav(clocked(scenario, "beacons"), NodeId(1), "contract", position=Enu(0, 0, 50)),
+    lambda scenario: ClockedUav(clocked(scenario, "gps"), NodeId(1), "contract", position=Enu(0, 0, 50)),
     lambda scenario: Medium(scenario, "contract"),
     lambda scenario: World(scenario, "contract"),
 ]
@@ -55,6 +66,10 @@ frames = st.one_of(
         st.one_of(
             st.binary(max_size=30),
             st.just(wire.Join(3, Enu(1, 2, 3)).encode_frame(3)),
+            st.builds(
+                lambda t_ns, hello: wire.TimeBeacon(t_ns, 5, 5, 5, hello, hello, 3, 1, 0, 1).encode_frame(3),
+                st.integers(0, 2**62), st.integers(0, 50),
+            ),
             st.just(wire.Survivor(1, 1, 3, Enu(1, 2, 3), -60.0).encode_frame(3)),
             st.builds(
                 lambda slot, period: wire.Schedule(
@@ -93,7 +108,7 @@ topics = st.sampled_from(
 )  # fmt: skip
 
 
-@pytest.mark.parametrize("make", MAKERS, ids=["leader", "member", "medium", "world"])
+@pytest.mark.parametrize("make", MAKERS, ids=["leader", "member", "beacons", "gps", "medium", "world"])
 @settings(max_examples=60, suppress_health_check=[HealthCheck.too_slow])
 @given(script=st.lists(st.tuples(topics, hostile, st.integers(0, 300 * MS)), max_size=25))
 def test_any_messages_on_any_topics_never_raise_and_the_actor_lives_on(

@@ -45,7 +45,10 @@ def schedules(draw: st.DrawFn) -> Schedule:
 
 joins = st.builds(Join, ids, positions)
 survivors = st.builds(Survivor, instants, u32, ids, positions, singles)
-times = st.builds(TimeBeacon, instants, u32, ids, u16, u8)
+instants_ns = st.integers(0, wire.LATEST_US * 1000 + 999)
+times = st.builds(TimeBeacon, instants_ns, u32, u32, u32, u32, u16, ids, ids, u8, st.integers(1, 255)).map(
+    lambda beacon: beacon._replace(hops=0) if beacon.reference == beacon.node else beacon
+)
 any_message = st.one_of(beacons, schedules(), joins, survivors, times)
 
 HEADER = Header(12, 1, 3, 0xFFFF, 3, 0, 32, 0, 3, 0).encode()
@@ -107,14 +110,24 @@ def test_a_schedule_has_its_entries_in_two_parallel_arrays_in_pymavlink(schedule
 
 
 @given(u64, ids)
-def test_what_pymavlink_writes_within_our_bounds_is_read_by_us(t_us: int, node: int) -> None:
-    message = fanet.MAVLink_fanet_time_message(t_us, 5, node, 9, 2, wire.VERSION)
+def test_what_pymavlink_writes_within_our_bounds_is_read_by_us(t_ns: int, node: int) -> None:
+    hops = 0 if node == 9 else 2
+    message = fanet.MAVLink_fanet_time_message(t_ns, 5, 4, 6, 7, 8, node, 9, 3, hops, wire.VERSION)
     frame = HEADER + bytes(message.pack(fanet.MAVLink(None, srcSystem=3, srcComponent=191)))
-    if t_us > wire.LATEST_US:
+    if t_ns // 1000 > wire.LATEST_US:
         with pytest.raises(MalformedFrameError):
             TimeBeacon.decode_frame(frame)
     else:
-        assert TimeBeacon.decode_frame(frame) == TimeBeacon(t_us, 5, node, 9, 2)
+        assert TimeBeacon.decode_frame(frame) == TimeBeacon(t_ns, 5, 4, 6, 7, 8, node, 9, 3, hops)
+
+
+@pytest.mark.parametrize(("node", "reference", "hops"), [(3, 3, 1), (3, 4, 0), (3, 0, 1), (3, 0xFFFF, 1)])
+def test_time_of_no_reference_or_of_a_reference_at_no_distance_is_malformed(
+    node: int, reference: int, hops: int
+) -> None:
+    beacon = TimeBeacon(5, 0, 0, 0, 1, 1, node, reference, 0, hops)
+    with pytest.raises(MalformedFrameError):
+        TimeBeacon.decode_frame(HEADER + beacon.encode_frame(node))
 
 
 @given(st.integers(64, 2304))

@@ -295,7 +295,7 @@ def test_an_emulator_that_starts_again_keeps_the_capture_of_the_last_one(tmp_pat
 @pytest.mark.skipif(shutil.which("tshark") is None, reason="tshark is not installed")
 def test_tshark_reads_it_without_complaint(tmp_path: Path) -> None:
     path = tmp_path / "air.pcap"
-    scenario = catalog.find("contention_unicast", ["duration_s=0.5", "nodes.count=3"])
+    scenario = catalog.find("contention_unicast", ["duration_s=0.5", "drain_s=0", "nodes.count=3"])
     with CaptureFile(path, scenario.radio, receptions=True) as file:
         simulate(scenario, capture=file.pcap)
     fields = ["frame.time_epoch", "wlan.fcs.status", "ip.checksum.status", "udp.checksum.status"]

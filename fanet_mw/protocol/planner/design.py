@@ -8,8 +8,8 @@ leader makes them, or `by_load`: each head gets what its cluster's packets need.
 import math
 from typing import Literal, NamedTuple
 
+from fanet_mw.protocol.guard import PLANNED_ERROR_NS, slot_guard_ns
 from fanet_mw.scenario import Scenario
-from fanet_mw.units import MS
 
 Relays = Literal["contended", "timetable"]
 Slots = Literal["equal", "by_load"]
@@ -29,7 +29,10 @@ class Design(NamedTuple):
         """The scenario as it stands."""
         clusters = scenario.clusters
         relays: Relays = "timetable" if clusters.relay == "scheduled" else "contended"
-        return cls(clusters.count, clusters.period_ns, round(clusters.guard_ms * MS), "equal", relays)
+        error_ns = PLANNED_ERROR_NS if scenario.clock.sync != "none" else 0
+        return cls(
+            clusters.count, clusters.period_ns, slot_guard_ns(scenario, clock_error_ns=error_ns), "equal", relays
+        )
 
     def distance(self, other: "Design") -> tuple[int, float]:
         """How far another design is: keys that differ, then the sum of their ratios in octaves."""

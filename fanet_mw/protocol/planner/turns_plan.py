@@ -10,6 +10,7 @@ from collections.abc import Iterator, Mapping
 from typing import Final, NamedTuple
 
 from fanet_mw.protocol.clustering import balanced
+from fanet_mw.protocol.planner.design import Design
 from fanet_mw.protocol.scheduled import fit, largest_frame, links
 from fanet_mw.protocol.timetable import Timetable, timetable
 from fanet_mw.protocol.turns import Turns, turn_ns
@@ -163,7 +164,7 @@ def _candidates(scenario: Scenario) -> Iterator[tuple[tuple[str, ...], Scenario]
                 "radio": radio.model_copy(update=_under("radio.", option)),
             }
         )
-        if other.clusters.guard_ms * MS < other.clusters.slot_ns:
+        if Design.of(other).guard_ns < other.clusters.slot_ns:
             yield tuple(f"{key}={value:g}" for key, value in option.items()), other
 
 

@@ -1,0 +1,207 @@
+"""A UAV that does not know the time: between it and its host every instant is translated.
+
+    host: true time  |  own clock (`local_clock`)  |  swarm time as this node believes it (`swarm_time`)  |  UAV
+
+The UAV lives in swarm time as it believes it; receptions and statuses reach it as its radio's own clock stamped them.
+Its requests leave in true time, and so do its trace records: delays are measured across nodes. Time beacons are added
+to hellos here, so that protocols know nothing of clocks. A clock that turns out to have been ahead stands still until
+swarm time has come up with it. Until a node has swarm time no schedule reaches it: it owns no slot and contends.
+"""
+
+from collections.abc import Mapping
+from typing import Any, Final
+
+from agents.local_clock import LocalClock
+from agents.swarm_time import BeaconTime, swarm_time
+from agents.uav import Uav
+from fanet_mw import wire
+from fanet_mw.actor import Actor
+from fanet_mw.messages import Gps, MavlinkTap, Message, Reception, Setpoint, TxOutcome, TxRequest, TxStatus, WifiScan
+from fanet_mw.scenario import Scenario
+from fanet_mw.topics import Topics
+from fanet_mw.trace import ClockSampled, Record
+from fanet_mw.units import US, Enu, NodeId, S
+from fanet_mw.wire import Kind
+
+_SAMPLE_NS: Final = S
+"""How often the true error is recorded."""
+_ROUNDING_NS: Final = 2 * US
+"""An instant that went to the host and came back may differ by this much; a wake-up within it is due."""
+_HELLOS: Final = 8
+"""Hellos whose status is awaited."""
+
+
+class ClockedUav(Actor):
+    """One UAV behind a clock of its own."""
+
+    def __init__(self, scenario: Scenario, node: NodeId, swarm: str, *, position: Enu) -> None:
+        self._uav = Uav(scenario, node, swarm, position=position)
+        super().__init__(self._uav.name, self._uav.subscriptions)
+        self._node = node
+        self._tx_topic = Topics(swarm).radio_tx(node)
+        self._clock = LocalClock(scenario.clock, seed=scenario.seed, node=node)
+        self._time = swarm_time(scenario, node)
+        self._stamp_ns = scenario.clock.stamp_ns
+        self._most_bytes = scenario.radio.max_frame_bytes
+        self._until_ns = scenario.duration_ns
+        self._shown_ns = 0
+        """Swarm time as the UAV was last told: it never goes back."""
+        self._sample_ns = 0
+        self._hellos: dict[int, int] = {}
+        """Which of our requests are hellos, and their numbers."""
+        self._withheld = 0
+        """Schedules that came before there was swarm time."""
+
+    # --- the actor contract ---------------------------------------------------------------------------------------
+
+    def start(self, now_ns: int) -> None:
+        self._uav.outbox, self._uav.records = [], []
+        self._sample_ns = -(-now_ns // _SAMPLE_NS) * _SAMPLE_NS
+        self._clock.pass_time(now_ns, until_ns=self._until_ns)
+        self._time.start(self._clock.local_ns(now_ns))
+        self._uav.start(self._now(now_ns))
+        self._hand_over(now_ns)
+
+    def receive(self, topic: str, message: Message, now_ns: int) -> None:
+        self._clock.pass_time(now_ns, until_ns=self._until_ns)
+        heard = self._translated(message, now_ns)
+        if heard is not None:
+            self._uav.receive(topic, heard, self._now(now_ns))
+        known = {heard.end_ns: message.end_ns} if isinstance(heard, Reception) else {}  # type: ignore[union-attr]
+        self._hand_over(now_ns, known)
+
+    def wake(self, now_ns: int) -> None:
+        self._clock.pass_time(now_ns, until_ns=self._until_ns)
+        self._time.pass_time(self._clock.local_ns(now_ns))
+        while self._sample_ns <= now_ns:
+            self._sample(self._sample_ns)
+            self._sample_ns += _SAMPLE_NS
+        wanted_ns, shown_ns = self._uav.next_wake_ns(), self._now(now_ns)
+        if wanted_ns is not None and wanted_ns <= shown_ns + _ROUNDING_NS:
+            self._shown_ns = max(shown_ns, wanted_ns)
+            self._uav.wake(self._shown_ns)
+        self._hand_over(now_ns)
+
+    def next_wake_ns(self) -> int | None:
+        wanted_ns = self._uav.next_wake_ns()
+        if wanted_ns is None:
+            return self._sample_ns
+        return min(self._sample_ns, self._true_ns(wanted_ns))
+
+    def stop(self, now_ns: int) -> None:
+        self._uav.stop(self._now(now_ns))
+        self._hand_over(now_ns)
+
+    def report(self) -> Mapping[str, Any]:
+        local_ns = self._clock.local_ns(self._sample_ns - _SAMPLE_NS)
+        bound_ns = self._time.error_ns(local_ns)
+        clock = {
+            "synced": self._time.synced,
+            "bound_us": None if bound_ns is None else bound_ns / US,
+            "worst_us": self._time.worst_ns(local_ns) / US,
+            "withheld": self._withheld,
+            **self._time.report(),
+        }
+        return {**self._uav.report(), "clock": clock}
+
+    # --- instants -------------------------------------------------------------------------------------------------
+
+    def _now(self, now_ns: int) -> int:
+        """Swarm time now, as the UAV is told."""
+        swarm_ns = self._time.line.swarm_ns(self._clock.local_ns(now_ns))
+        self._shown_ns = max(self._shown_ns, swarm_ns)
+        return self._shown_ns
+
+    def _true_ns(self, swarm_ns: int) -> int:
+        return self._clock.true_ns(self._time.line.local_ns(swarm_ns))
+
+    def _stamped_ns(self, true_ns: int) -> int:
+        """What the radio's clock shows at that instant."""
+        return self._clock.local_ns(true_ns) // self._stamp_ns * self._stamp_ns
+
+    # --- in -------------------------------------------------------------------------------------------------------
+
+    def _translated(self, message: Message, now_ns: int) -> Message | None:
+        """A message as the UAV is to have it; None: it is not to have it."""
+        if isinstance(message, Reception):
+            ended_ns = self._stamped_ns(message.end_ns)
+            kind = wire.peek_kind(message.frame)
+            if kind == Kind.HELLO and isinstance(self._time, BeaconTime):
+                self._time.heard(message.frame, ended_ns=ended_ns, local_ns=self._clock.local_ns(now_ns))
+            elif kind == Kind.SCHEDULE and not self._time.synced:
+                self._withheld += 1
+                return None
+            return message._replace(end_ns=self._time.line.swarm_ns(ended_ns))
+        if isinstance(message, TxStatus):
+            ended_ns = self._stamped_ns(message.end_ns)
+            hello = self._hellos.pop(message.seq, None)
+            if hello is None:
+                return message._replace(end_ns=self._time.line.swarm_ns(ended_ns))
+            if message.outcome is TxOutcome.SENT and isinstance(self._time, BeaconTime):
+                self._time.hello_sent(hello, ended_ns=ended_ns)
+            return None
+        if isinstance(message, Gps):
+            self._time.fix(self._stamped_ns(message.t_ns), message.t_ns)
+        if isinstance(message, Gps | WifiScan):
+            return message._replace(t_ns=self._time.line.swarm_ns(self._stamped_ns(message.t_ns)))
+        return message
+
+    # --- out ------------------------------------------------------------------------------------------------------
+
+    def _hand_over(self, now_ns: int, known: Mapping[int, int] | None = None) -> None:
+        """Bring out what the UAV has to say; `known`: the true instants of what it was told of."""
+        uav = self._uav
+        for topic, message in uav.outbox:
+            if type(message) is TxRequest:
+                self.outbox.append((topic, self._request(message, now_ns)))
+            elif isinstance(message, Setpoint | MavlinkTap):
+                self.outbox.append((topic, message._replace(t_ns=now_ns)))
+            else:
+                self.outbox.append((topic, message))
+        uav.outbox.clear()
+        if uav.records:
+            at = {self._shown_ns: now_ns, **(known or {})}
+            self.records += [self._recorded(record, at) for record in uav.records]
+            uav.records.clear()
+
+    def _recorded(self, record: Record, at: Mapping[int, int]) -> Record:
+        true_ns = at.get(record.t_ns)
+        return record._replace(t_ns=self._true_ns(record.t_ns) if true_ns is None else true_ns)
+
+    def _request(self, request: TxRequest, now_ns: int) -> TxRequest:
+        start_ns = self._true_ns(request.start_ns)
+        if 0 < now_ns - start_ns <= _ROUNDING_NS:
+            start_ns = now_ns
+        request = request._replace(start_ns=start_ns)
+        if isinstance(self._time, BeaconTime) and wire.peek_kind(request.frame) == Kind.HELLO:
+            return self._with_time(request, self._time, now_ns)
+        return request
+
+    def _with_time(self, request: TxRequest, time: BeaconTime, now_ns: int) -> TxRequest:
+        """A hello says when the one before it ended, and asks when it ends itself."""
+        seen = wire.peek(request.frame)
+        assert seen is not None, "our own frames begin with a header"
+        while len(self._hellos) >= _HELLOS:
+            del self._hellos[next(iter(self._hellos))]
+        self._hellos[request.seq] = seen[1]
+        frame = request.frame + time.beacon(self._node, self._clock.local_ns(now_ns))
+        if len(frame) > self._most_bytes:
+            frame = request.frame
+        return request._replace(frame=frame, wants_status=True)
+
+    def _sample(self, at_ns: int) -> None:
+        """Record the true error, and let the protocol know how wrong clocks may be."""
+        local_ns = self._clock.local_ns(at_ns)
+        bound_ns = self._time.error_ns(local_ns)
+        reference, hops = self._time.place(local_ns)
+        ahead_ns = self._time.line.swarm_ns(local_ns) - at_ns
+        self.records.append(
+            ClockSampled(at_ns, self._node, ahead_ns, -1 if bound_ns is None else bound_ns, reference, hops)
+        )
+        self._uav.know_clock_error(self._time.worst_ns(local_ns))
+
+
+def make_uav(scenario: Scenario, node: NodeId, swarm: str, *, position: Enu) -> Actor:
+    """A UAV as the scenario has it: with its host's clock, or with one of its own."""
+    kind = ClockedUav if scenario.clock.modelled else Uav
+    return kind(scenario, node, swarm, position=position)

@@ -1,0 +1,69 @@
+"""A UAV's oscillator: what its clock shows at a true instant, and the way back. Known to the run, not to the node.
+
+    local = true + offset + sum over seconds of rate x time,   the rate a bounded random walk, constant within a second
+
+Instants before the start and beyond the walk are carried on at the first and the last rate. Not modelled: temperature,
+voltage, aging, and jumps of the counter.
+"""
+
+from typing import Final, NamedTuple
+
+from fanet_mw.rng import stream
+from fanet_mw.scenario import Clock
+from fanet_mw.units import NodeId, S
+
+_PPM: Final = 1e-6
+_AHEAD_NS: Final = 60 * S
+"""The walk is known this far ahead: nothing is announced farther."""
+
+
+class _Second(NamedTuple):
+    """From this true instant on, the clock shows `local_ns` and runs fast by `rate`."""
+
+    true_ns: int
+    local_ns: int
+    rate: float
+
+
+class LocalClock:
+    """The clock of one node in one run."""
+
+    def __init__(self, clock: Clock, *, seed: int, node: NodeId) -> None:
+        random = stream(seed, "clock", node)
+        self._offset_ns = round(random.uniform(-clock.offset_ns, clock.offset_ns))
+        self._bound = clock.drift_ppm * _PPM
+        self._wander = clock.wander_ppm * _PPM
+        rate = random.uniform(-self._bound, self._bound)
+        self._random = random
+        self._walk = [_Second(0, self._offset_ns, rate)]
+
+    def pass_time(self, true_ns: int, *, until_ns: int) -> None:
+        """Know the walk for what may be asked from now on; it ends at `until_ns`."""
+        if not self._wander:
+            return
+        while self._walk[-1].true_ns < min(true_ns, until_ns) + _AHEAD_NS:
+            last = self._walk[-1]
+            rate = last.rate + self._random.gauss(0.0, self._wander)
+            rate = max(-self._bound, min(self._bound, rate))
+            self._walk.append(_Second(last.true_ns + S, _shown(last, last.true_ns + S), rate))
+
+    def local_ns(self, true_ns: int) -> int:
+        """What the clock shows at a true instant."""
+        index = max(0, min(len(self._walk) - 1, true_ns // S))
+        return _shown(self._walk[index], true_ns)
+
+    def true_ns(self, local_ns: int) -> int:
+        """When the clock shows that."""
+        index = max(0, min(len(self._walk) - 1, (local_ns - self._offset_ns) // S))
+        while index and self._walk[index].local_ns > local_ns:
+            index -= 1
+        while index + 1 < len(self._walk) and self._walk[index + 1].local_ns <= local_ns:
+            index += 1
+        part = self._walk[index]
+        elapsed_ns = local_ns - part.local_ns
+        return part.true_ns + elapsed_ns - round(elapsed_ns * (part.rate / (1 + part.rate)))
+
+
+def _shown(part: _Second, true_ns: int) -> int:
+    elapsed_ns = true_ns - part.true_ns
+    return part.local_ns + elapsed_ns + round(elapsed_ns * part.rate)

@@ -1,0 +1,182 @@
+"""How a UAV's clock is brought to swarm time: not at all, by time beacons, or by GPS. Own instants in, a line out.
+
+Not modelled of GPS: outages (a world that gives no fixes does), multipath, and errors that last from fix to fix.
+"""
+
+import math
+from abc import ABC, abstractmethod
+from collections.abc import Mapping
+from typing import Final
+
+from fanet_mw import wire
+from fanet_mw.errors import MalformedFrameError
+from fanet_mw.protocol.clock_fit import EXACT, ClockFit, Line, Oscillator, Pair
+from fanet_mw.protocol.timesync import Settings, TimeSync
+from fanet_mw.rng import stream
+from fanet_mw.scenario import Clock, Scenario
+from fanet_mw.units import NodeId, S, seconds_to_ns
+
+_SIGMAS: Final = 4
+_LIGHT_M_PER_S: Final = 299_792_458
+_PPM: Final = 1e-6
+
+
+class SwarmTime(ABC):
+    """The own clock taken for swarm time, until something better is known."""
+
+    says_time: bool = False
+    """Whether hellos carry it."""
+
+    @property
+    @abstractmethod
+    def line(self) -> Line: ...
+
+    @property
+    @abstractmethod
+    def synced(self) -> bool: ...
+
+    @abstractmethod
+    def error_ns(self, local_ns: int) -> int | None:
+        """The stated bound of the own error; None: there is none to state."""
+
+    def worst_ns(self, local_ns: int) -> int:
+        """The greatest error of any node, as far as it is known here."""
+        return self.error_ns(local_ns) or 0
+
+    def place(self, local_ns: int) -> tuple[int, int]:
+        """(the node whose clock is followed, hops to it); 0 and 0 when it is no node's."""
+        return 0, 0
+
+    def start(self, local_ns: int) -> None:  # noqa: B027
+        """The node is up."""
+
+    def pass_time(self, local_ns: int) -> None:  # noqa: B027
+        """It is later."""
+
+    def fix(self, local_ns: int, gps_ns: int) -> None:  # noqa: B027
+        """A position fix: true time at an own instant."""
+
+    def report(self) -> Mapping[str, object]:
+        """JSON-able state."""
+        return {}
+
+
+class OwnTime(SwarmTime):
+    """`clock.sync = "none"`: no agreement; whoever believes it believes every clock to be exact."""
+
+    line = EXACT
+    synced = True
+
+    def error_ns(self, local_ns: int) -> int | None:
+        return None
+
+
+class GpsTime(SwarmTime):
+    """`clock.sync = "gps"`: a line through the last fixes; between and after them it holds over."""
+
+    def __init__(self, clock: Clock, *, seed: int, node: NodeId) -> None:
+        self._sigma_ns = clock.gps_sigma_ns
+        self._gauss = stream(seed, "gps_time", node).gauss
+        self._oscillator = oscillator(clock, others=0)
+        self._fit = ClockFit(self._oscillator)
+
+    @property
+    def line(self) -> Line:
+        return self._fit.line or EXACT
+
+    @property
+    def synced(self) -> bool:
+        return self._fit.line is not None
+
+    def error_ns(self, local_ns: int) -> int | None:
+        return self.line.error_ns(local_ns, self._oscillator) if self.synced else None
+
+    def fix(self, local_ns: int, gps_ns: int) -> None:
+        said_ns = gps_ns + round(self._gauss(0.0, self._sigma_ns))
+        error_ns = math.ceil(_SIGMAS * self._sigma_ns) + self._oscillator.stamp_ns
+        self._fit.add(Pair(local_ns, said_ns - local_ns, error_ns))
+
+    def report(self) -> Mapping[str, object]:
+        return {"fixes": len(self._fit), "outlier": self._fit.outliers}
+
+
+class BeaconTime(SwarmTime):
+    """`clock.sync = "beacons"`: `TimeSync`, and what of it is in frames."""
+
+    says_time = True
+
+    def __init__(self, scenario: Scenario, node: NodeId) -> None:
+        clock, radio = scenario.clock, scenario.radio
+        self._sync = TimeSync(
+            Settings(
+                node=node,
+                leads=node == scenario.leader,
+                hello_ns=seconds_to_ns(scenario.routing.hello_interval_s),
+                oscillator=oscillator(clock, others=1),
+                flight_ns=math.ceil(radio.range_m / _LIGHT_M_PER_S * S),
+                limit_ns=clock.limit_ns,
+            )
+        )
+        self._malformed = 0
+
+    @property
+    def line(self) -> Line:
+        return self._sync.line
+
+    @property
+    def synced(self) -> bool:
+        return self._sync.synced
+
+    def error_ns(self, local_ns: int) -> int | None:
+        return self._sync.error_ns(local_ns)
+
+    def worst_ns(self, local_ns: int) -> int:
+        return self._sync.worst_ns(local_ns)
+
+    def place(self, local_ns: int) -> tuple[int, int]:
+        return self._sync.reference or 0, self._sync.hops(local_ns) or 0
+
+    def start(self, local_ns: int) -> None:
+        self._sync.start(local_ns)
+
+    def pass_time(self, local_ns: int) -> None:
+        self._sync.pass_time(local_ns)
+
+    def hello_sent(self, hello: int, *, ended_ns: int) -> None:
+        """A hello of ours has left, and ended then."""
+        self._sync.hello_sent(hello, ended_ns=ended_ns)
+
+    def beacon(self, node: NodeId, local_ns: int) -> bytes:
+        """What the next hello carries."""
+        beacon = self._sync.beacon(local_ns)
+        return b"" if beacon is None else beacon.encode_frame(node)
+
+    def heard(self, frame: bytes, *, ended_ns: int, local_ns: int) -> None:
+        """A neighbor's hello. Its sender is who its header names: the radio's word for it does not pass every bus."""
+        beacon = None
+        try:
+            header = wire.decode_header(frame)
+            if any(msgid == wire.TIME.msgid for msgid, _ in wire.inner_frames(frame)):
+                beacon = wire.TimeBeacon.decode_frame(frame)
+        except MalformedFrameError:
+            self._malformed += 1
+            return
+        self._sync.hear(NodeId(header.prev_hop), header.seq, beacon, ended_ns=ended_ns, local_ns=local_ns)
+
+    def report(self) -> Mapping[str, object]:
+        return {**self._sync.report(), "malformed": self._malformed}
+
+
+def oscillator(clock: Clock, *, others: int) -> Oscillator:
+    """What a data sheet says of the own clock, and of the one it follows when that drifts too."""
+    rate = (1 + others) * clock.drift_ppm * _PPM
+    return Oscillator(rate=rate, wander=clock.wander_ppm * _PPM, stamp_ns=clock.stamp_ns)
+
+
+def swarm_time(scenario: Scenario, node: NodeId) -> SwarmTime:
+    """As the scenario says."""
+    if scenario.clock.sync == "beacons":
+        return BeaconTime(scenario, node)
+    if scenario.clock.sync == "gps":
+        return GpsTime(scenario.clock, seed=scenario.seed, node=node)
+    return OwnTime()

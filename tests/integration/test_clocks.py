@@ -1,0 +1,139 @@
+"""Whole swarms whose clocks drift: agreed by beacons or GPS they keep in step, left alone they do not."""
+
+from functools import lru_cache
+from typing import Any
+
+import pytest
+
+from agents.clocked import ClockedUav, make_uav
+from agents.uav import Uav
+from fanet_mw.messages import Reception
+from fanet_mw.protocol.guard import slot_guard_ns
+from fanet_mw.protocol.turns import clocks_fit
+from fanet_mw.topics import Topics
+from fanet_mw.trace import Delivered, Generated
+from fanet_mw.units import MS, US, Enu, NodeId
+from sim import catalog
+from sim.outcome import Outcome
+from sim.results import finish, trace_bytes
+from sim.run import simulate
+from tests.conftest import MakeScenario
+
+GRID = [
+    "nodes.count=15", "traffic.sources=14", "clusters.count=14", "clusters.turn_slack_us=400", "duration_s=60",
+    "warmup_s=45", "clock.drift_ppm=20",
+]  # fmt: skip
+
+
+@lru_cache
+def outcome_of(*settings: str) -> Outcome:
+    return simulate(catalog.find("clusters", [*GRID, *settings]))
+
+
+def summary_of(*settings: str) -> dict[str, Any]:
+    return finish(outcome_of(*settings), out=None)
+
+
+@pytest.mark.parametrize("offset_ms", [50, 1000])
+def test_with_time_beacons_every_packet_arrives_within_the_bound(offset_ms: int) -> None:
+    summary = summary_of("clock.sync=beacons", f"clock.offset_ms={offset_ms}")
+    assert summary["pdr"] >= 0.999
+    assert summary["bound"]["violations"] == 0
+    assert summary["bound"]["classes"]["traffic"]["deliveries"] > 1000
+    clock = summary["clock"]
+    assert clock["synced_after_s"] < 12
+    assert clock["error_us"]["p99"] < 20
+    assert clock["beyond_bound"] == 0
+    assert summary["frames"]["closes"]
+
+
+def test_with_gps_too() -> None:
+    summary = summary_of("clock.sync=gps", "clock.offset_ms=50", "clock.gps_sigma_ns=1000")
+    assert summary["pdr"] >= 0.999
+    assert summary["bound"]["violations"] == 0
+    assert summary["clock"]["error_us"]["max"] < 5
+    assert summary["clock"]["beyond_bound"] == 0
+
+
+def test_clocks_that_only_drift_soon_collide_and_the_summary_says_how_wrong_they_were() -> None:
+    summary = summary_of("clock.sync=none", "clusters.turn_slack_us=50", "clock.offset_ms=5")
+    assert summary["pdr"] < 0.7
+    assert 1000 < summary["clock"]["error_us"]["max"] < 6000
+    assert summary["clock"]["synced_after_s"] is None
+
+
+def test_delays_in_the_trace_are_true_although_no_two_clocks_agree() -> None:
+    """Offsets of up to a second would make delays negative, or seconds long, if nodes measured them."""
+    outcome = outcome_of("clock.sync=none", "clusters.turn_slack_us=50", "clock.offset_ms=1000")
+    born = {(r.node, r.seq): r.t_ns for r in outcome.records if isinstance(r, Generated)}
+    delays = [r.delay_ns for r in outcome.records if isinstance(r, Delivered)]
+    assert len(delays) > 300
+    assert min(delays) > 0
+    assert all(r.delay_ns == r.t_ns - born[r.origin, r.seq] for r in outcome.records if isinstance(r, Delivered))
+
+
+def test_the_same_scenario_and_seed_give_the_same_trace() -> None:
+    settings = ("clock.sync=beacons", "clock.offset_ms=50", "clock.wander_ppm=0.05", "duration_s=10", "warmup_s=5")
+    scenario = catalog.find("clusters", [*GRID, *settings])
+    assert trace_bytes(simulate(scenario).records) == trace_bytes(simulate(scenario).records)
+
+
+def test_exact_clocks_put_nothing_between_a_uav_and_its_host(make_scenario: MakeScenario) -> None:
+    assert type(make_uav(make_scenario(), NodeId(1), "x", position=Enu(0, 0, 0))) is Uav
+    drifting = make_scenario(**{"clock.drift_ppm": 1})
+    assert type(make_uav(drifting, NodeId(1), "x", position=Enu(0, 0, 0))) is ClockedUav
+
+
+def test_before_it_has_swarm_time_no_schedule_reaches_a_node(make_scenario: MakeScenario) -> None:
+    """Every schedule that leaves a leader is handed to a node that has heard no beacon, as from the air."""
+    scenario = make_scenario(**{"nodes.count": 3, "clock.sync": "beacons", "clock.offset_ms": 50})
+    outcome = simulate(scenario)
+    assert outcome.reports["agent-3"]["role"] in ("head", "member")
+    deaf = ClockedUav(scenario, NodeId(3), "x", position=Enu(0, 0, 50))
+    deaf.start(0)
+    told = [m for m in heard_schedules(scenario) if m]
+    assert told
+    for reception in told:
+        deaf.receive(Topics("x").radio_rx(3), reception, reception.end_ns)
+    report = deaf.report()
+    assert report["role"] == "isolated"
+    assert report["clock"]["withheld"] == len(told)
+
+
+def heard_schedules(scenario: Any) -> list[Reception]:
+    """The schedules that node 3 hears in a run."""
+    from fanet_mw import wire
+    from fanet_mw.hosts.virtual import VirtualHost
+    from sim.run import actors_of
+
+    found: list[Reception] = []
+
+    def listen(_: str, message: object) -> None:
+        if isinstance(message, Reception) and wire.peek_kind(message.frame) == wire.Kind.SCHEDULE:
+            found.append(message)
+
+    host = VirtualHost(actors_of(scenario, "x"), listeners=[(Topics("x").radio_rx(3), listen)])
+    host.start()
+    host.run(scenario.duration_ns)
+    return found
+
+
+def test_a_guard_of_its_own_making_follows_the_worst_clock(make_scenario: MakeScenario) -> None:
+    given = make_scenario(**{"clusters.guard_ms": 3})
+    assert slot_guard_ns(given, clock_error_ns=9 * MS) == 3 * MS
+    auto = make_scenario(**{"clusters.guard_ms": "auto"})
+    exact_ns = slot_guard_ns(auto, clock_error_ns=0)
+    assert 900 * US < exact_ns < 1200 * US, "the last frame of 1024 bytes at 11 Mb/s"
+    assert slot_guard_ns(auto, clock_error_ns=100 * US) == exact_ns + 200 * US
+
+
+def test_the_slack_of_a_turn_holds_two_clock_errors_and_the_flight(make_scenario: MakeScenario) -> None:
+    scenario = make_scenario(**{"clusters.turn_slack_us": 200})
+    assert clocks_fit(scenario, clock_error_ns=90 * US)
+    assert not clocks_fit(scenario, clock_error_ns=91 * US)
+    assert clocks_fit(make_scenario(**{"clusters.turn_slack_us": 0}), clock_error_ns=0)
+
+
+def test_no_bound_is_stated_while_the_slack_does_not_hold_the_clocks() -> None:
+    summary = summary_of("clock.sync=beacons", "clock.offset_ms=50", "clusters.turn_slack_us=25")
+    assert summary["bound"] == {}

@@ -1,0 +1,201 @@
+"""Time beacons over hops, by timelines: two steps, election, a reference that comes back, and neighbors that lie."""
+
+from fanet_mw.protocol.clock_fit import Oscillator
+from fanet_mw.protocol.timesync import Settings, TimeSync
+from fanet_mw.scenario import Clock
+from fanet_mw.units import MS, US, NodeId, S
+from fanet_mw.wire import TimeBeacon
+from tests.property.time_network import Network, line
+
+LIMIT_NS = 5 * S
+CRYSTAL = Clock(sync="beacons", offset_ms=500, drift_ppm=20)
+
+
+def follower(node: int = 2, *, leads: bool = False) -> TimeSync:
+    sync = TimeSync(Settings(NodeId(node), leads, S, Oscillator(40e-6, 0.0, US), 834, LIMIT_NS))
+    sync.start(0)
+    return sync
+
+
+def said(t_ns: int, hello: int, *, node: int = 1, reference: int = 1, hops: int = 0, error_ns: int = 0) -> TimeBeacon:
+    return TimeBeacon(t_ns, error_ns, 0, 0, hello, hello, node, reference, 0, hops)
+
+
+def hear(sync: TimeSync, src: int, hello: int, ended_ns: int, beacon: TimeBeacon | None) -> None:
+    sync.hear(NodeId(src), hello, beacon, ended_ns=ended_ns, local_ns=ended_ns)
+
+
+def follow(sync: TimeSync, *, ahead_ns: int, hellos: int, src: int = 1, first: int = 1, **keys: int) -> None:
+    """`src` says hello once a second; its swarm time is ahead of our clock by this much."""
+    for hello in range(first, first + hellos):
+        earlier_ns = (hello - 1) * S
+        beacon = said(earlier_ns + ahead_ns, hello - 1, node=src, **keys) if hello > first else None
+        hear(sync, src, hello, hello * S, beacon)
+
+
+def test_a_hello_alone_tells_no_time_and_the_next_one_tells_that_of_the_first() -> None:
+    sync = follower()
+    hear(sync, 1, 7, 3 * S, None)
+    assert not sync.synced
+    hear(sync, 1, 8, 4 * S, said(3 * S + 25 * MS, 7))
+    assert sync.synced
+    assert abs(sync.line.swarm_ns(4 * S) - (4 * S + 25 * MS)) < US
+    assert (sync.reference, sync.hops(4 * S)) == (1, 1)
+
+
+def test_however_long_contention_defers_a_hello_the_time_is_exact() -> None:
+    """The beacon names when the first hello ended; when the second was made or ended does not matter."""
+    found = []
+    for deferred_ns in (0, 300 * MS):
+        sync = follower()
+        hear(sync, 1, 1, S + deferred_ns, None)
+        hear(sync, 1, 2, 2 * S + 7 * deferred_ns // 10, said(S + deferred_ns + 25 * MS, 1))
+        found.append(sync.line.offset_at(2 * S))
+    assert found[0] == found[1]
+
+
+def test_a_beacon_about_a_hello_that_was_lost_says_nothing() -> None:
+    sync = follower()
+    hear(sync, 1, 2, 2 * S, said(S, 1))
+    assert not sync.synced
+
+
+def test_the_leader_listens_and_then_takes_its_own_clock() -> None:
+    leader = follower(1, leads=True)
+    leader.hello_sent(1, ended_ns=2 * S)
+    assert leader.beacon(2 * S) is None
+    beacon = leader.beacon(3 * S)
+    assert beacon is not None
+    assert (beacon.t_ns, beacon.hello, beacon.hops, beacon.error_ns) == (2 * S, 1, 0, 0)
+
+
+def test_without_a_leader_the_lowest_id_becomes_the_reference() -> None:
+    links = {node: [n for n in neighbors if n != 1] for node, neighbors in line(5).items() if node != 1}
+    network = Network(links, CRYSTAL, seed=3)
+    network.run(45)
+    assert {member.sync.reference for member in network.members.values()} == {2}
+    assert network.worst_us(reference=2) < 20
+
+
+def test_when_the_reference_dies_another_carries_its_time_on_without_a_step() -> None:
+    network = Network(line(6), CRYSTAL, seed=5)
+    network.run(40)
+    steps = {node: member.sync.counts["step"] for node, member in network.members.items()}
+    network.members[1].alive = False
+    network.run(90)
+    assert {m.sync.reference for m in network.members.values() if m.alive} == {2}
+    assert {node: member.sync.counts["step"] for node, member in network.members.items()} == steps
+    assert network.worst_us(reference=2) < 20
+    drifted_us = abs(network.members[2].swarm_ns(90 * S) - network.members[1].swarm_ns(90 * S)) / US
+    assert drifted_us < 50, "the swarm's time is still that of node 1, as well as its rate was known"
+
+
+def test_a_reference_that_restarts_learns_the_time_and_leads_on() -> None:
+    network = Network(line(4), CRYSTAL, seed=6)
+    network.run(40)
+    before_ns = network.members[2].swarm_ns(40 * S) - 40 * S
+    again = network.members[1]
+    fresh = Network({1: [2]}, Clock(sync="beacons", offset_ms=900, drift_ppm=20), seed=77).members[1]
+    fresh.hello = again.hello
+    network.members[1] = fresh
+    fresh.sync.start(fresh.clock.local_ns(40 * S))
+    network.run(75)
+    assert fresh.sync.leading
+    assert abs(network.members[2].swarm_ns(75 * S) - 75 * S - before_ns) < 2 * MS, "not the restarted clock's second"
+    assert network.worst_us() < 30
+
+
+def test_two_swarms_that_meet_take_the_time_of_the_lower_reference() -> None:
+    links = {1: [2], 2: [1], 3: [4], 4: [3]}
+    network = Network(links, CRYSTAL, seed=8)
+    network.run(50)
+    assert network.members[4].sync.reference == 3
+    links[2].append(3)
+    links[3].append(2)
+    network.run(80)
+    assert {member.sync.reference for member in network.members.values()} == {1}
+    assert network.worst_us() < 20
+
+
+def test_a_time_farther_than_the_limit_is_counted_and_not_believed() -> None:
+    sync = follower()
+    follow(sync, ahead_ns=6 * S, hellos=20)
+    assert not sync.synced
+    assert sync.counts["implausible"] == 19
+    follow(sync, ahead_ns=1 << 60, hellos=3, first=30)
+    assert not sync.synced
+
+
+def test_one_liar_among_honest_neighbors_moves_nothing_whenever_it_begins() -> None:
+    for first in (1, 12):
+        sync = follower(5)
+        for hello in range(1, 40):
+            for src, ahead_ns in ((2, 30 * MS), (3, 30 * MS), (4, 2 * S)):
+                if src == 4 and hello < first:
+                    continue
+                beacon = said((hello - 1) * S + ahead_ns, hello - 1, node=src, hops=1) if hello > 1 else None
+                hear(sync, src, hello, hello * S, beacon)
+        assert abs(sync.line.swarm_ns(40 * S) - (40 * S + 30 * MS)) < 10 * US
+        assert sync.counts["outlier"] >= 20
+
+
+def test_a_liar_that_talks_ten_times_as_fast_has_no_more_votes() -> None:
+    sync = follower(5)
+    follow(sync, ahead_ns=30 * MS, hellos=6)
+    for hello in range(60, 120):
+        ended_ns = hello * S // 10
+        hear(sync, 4, hello, ended_ns, said(ended_ns - S // 10 + 2 * S, hello - 1, node=4, hops=1))
+    assert sync.counts["hasty"] > 30
+    follow(sync, ahead_ns=30 * MS, hellos=20, first=13)
+    assert abs(sync.line.swarm_ns(33 * S) - (33 * S + 30 * MS)) < 50 * US
+
+
+def test_a_beacon_in_anothers_name_is_counted() -> None:
+    sync = follower()
+    hear(sync, 1, 1, S, None)
+    hear(sync, 1, 2, 2 * S, said(S, 1, node=9, reference=1, hops=1))
+    assert not sync.synced
+    assert sync.counts["foreign"] == 1
+
+
+def test_neighbors_without_end_are_not_remembered_without_end() -> None:
+    sync = follower()
+    for src in range(3, 3000):
+        hear(sync, src, 1, src * MS, said(0, 0, node=src, hops=7))
+    assert len(sync._neighbors) == 256
+
+
+def test_the_greatest_error_of_the_swarm_is_known_everywhere_and_forgotten_when_it_is_old() -> None:
+    sync = follower()
+    follow(sync, ahead_ns=0, hellos=10)
+    far = said(10 * S, 10)._replace(worst_ns=3 * MS, worst_age_s=4)
+    hear(sync, 1, 11, 11 * S, far)
+    assert sync.worst_ns(12 * S) == 3 * MS
+    assert sync.worst_ns(11 * S + 17 * S) < MS
+    absurd = said(11 * S, 11)._replace(worst_ns=0xFFFF_FFFF)
+    hear(sync, 1, 12, 12 * S, absurd)
+    assert sync.worst_ns(13 * S) == 20 * MS, "no guard is made for more"
+
+
+def test_a_node_says_how_well_it_knows_its_rate_and_one_that_follows_it_counts_on_it() -> None:
+    sync = follower()
+    follow(sync, ahead_ns=0, hellos=2)
+    sync.hello_sent(1, ended_ns=2 * S)
+    young = sync.beacon(2 * S)
+    assert young is not None
+    assert young.rate_ppb == 40_000, "one pair: all that two clocks may run apart"
+    follow(sync, ahead_ns=0, hellos=20, first=3)
+    settled = sync.beacon(22 * S)
+    assert settled is not None
+    assert 0 < settled.rate_ppb < 500
+    grown_ns = []
+    for rate_ppb in (young.rate_ppb, settled.rate_ppb):
+        other = follower(3)
+        for hello in range(1, 12):
+            about = said((hello - 1) * S, hello - 1, node=2, hops=1)._replace(rate_ppb=rate_ppb)
+            hear(other, 2, hello, hello * S, about if hello > 1 else None)
+        later, now = other.error_ns(20 * S), other.error_ns(10 * S)
+        assert later is not None
+        assert now is not None
+        grown_ns.append(later - now)
+    assert grown_ns[0] > grown_ns[1] + 300 * US

@@ -232,8 +232,13 @@ class Scheduled(Clustered):
 
 def largest_frame(scenario: Scenario) -> int:
     """The largest frame a turn must hold: the application's, or a schedule part with its places."""
+    return max(scenario.traffic.payload_bytes, schedule_bytes(scenario))
+
+
+def schedule_bytes(scenario: Scenario) -> int:
+    """A schedule part with its places."""
     members = min(scenario.nodes.count, 56)
-    return max(scenario.traffic.payload_bytes, HEADER_BYTES + 262 + 189 * -(-members // 28))
+    return HEADER_BYTES + 262 + 189 * -(-members // 28)
 
 
 def _geometry(scenario: Scenario, schedule: Schedule, turn: int) -> Turns:

@@ -96,6 +96,8 @@ def _json(found: Plan) -> dict[str, Any]:
             }
             for c in found.clusters
         ],
+        "carried_per_s": found.carried_per_second,
+        "any_protocol_per_s": None if found.goodput is None else found.goodput.per_second,
         "bottleneck": None if bottleneck is None else bottleneck.head,
         "equation_4_ms": _ms(found.paper),
         "cut_off": list(found.cut_off),

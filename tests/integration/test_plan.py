@@ -30,7 +30,7 @@ def test_the_bound_that_is_planned_is_the_one_that_the_nodes_compute_in_flight(s
 def test_a_load_that_does_not_fit_is_told_with_the_one_that_does() -> None:
     text, plan, feasible = planned("traffic.interval_s=0.1")
     assert not feasible
-    assert "one packet per node every 0.5" in text
+    assert "one packet per source every 0.5" in text
     least_s = plan["superframe"]["least_interval_s"]
     assert planned(f"traffic.interval_s={least_s}")[2]
     assert not planned(f"traffic.interval_s={0.99 * least_s}")[2]

@@ -20,6 +20,7 @@ from fanet_mw.protocol.planner import parts
 from fanet_mw.protocol.planner.access import Ways, access_outcome, ways
 from fanet_mw.protocol.planner.demand import TrafficClass
 from fanet_mw.protocol.planner.flood import FloodCost, flood_cost
+from fanet_mw.protocol.planner.goodput_bound import Goodput, any_protocol
 from fanet_mw.protocol.planner.head import ClusterPlan, Share, slot_delays, work_ns
 from fanet_mw.protocol.planner.turns import Candidate, Superframe, judge, superframe_of, table_for
 from fanet_mw.protocol.topology import Adjacency, within_range
@@ -56,6 +57,8 @@ class Plan(NamedTuple):
     """None where relays contend."""
     cut_off: tuple[NodeId, ...]
     """Nodes that no flood of the leader's part of the swarm reaches."""
+    goodput: Goodput | None
+    """What no protocol can exceed; None: traffic is not for everyone, or the swarm is in parts."""
     deadline_ns: int | None
     problems: tuple[str, ...]
     """Why it is not feasible; none when it is."""
@@ -70,6 +73,21 @@ class Plan(NamedTuple):
     def proven(self) -> bool:
         """Whether the bounds hold, not only estimates of what CSMA/CA does."""
         return isinstance(self.access, Bounded) and all(cluster.flood.proven for cluster in self.clusters)
+
+    @property
+    def carried_per_second(self) -> float | None:
+        """Application packets per second, all sources together, that this configuration carries; None: unknown.
+
+        Exact for a timetable whose capacity was asked for; where relays contend, what would fill the fullest slot.
+        """
+        application = next((c for c in self.classes if c.name == "application"), None)
+        if application is None or not application.sources:
+            return None
+        if self.superframe is not None:
+            least_ns = self.superframe.least_interval_ns
+            return None if least_ns is None else application.sources * S / least_ns
+        used = self.bottleneck.utilization if self.bottleneck else 0.0
+        return application.sources * S / application.interval_ns / used if used else None
 
     @property
     def bottleneck(self) -> ClusterPlan | None:
@@ -157,10 +175,17 @@ def evaluate(site: Site, classes: Sequence[TrafficClass], *, deadline_ns: int | 
         paper=_paper(judged.clusters, scenario),
         superframe=judged.superframe,
         cut_off=judged.cut_off,
+        goodput=_goodput(site, classes),
         deadline_ns=deadline_ns,
         problems=judged.unfit or (*cut_off, *_problems(scenario, judged.clusters, summed, cut_off), *late),
         notes=(*_notes(access, judged.clusters, site, uplink_ns), *_left_out(scenario)),
     )
+
+
+def _goodput(site: Site, classes: Sequence[TrafficClass]) -> Goodput | None:
+    everyone = site.scenario.traffic.destination == "all"
+    sources = next((c.sources for c in classes if c.name == "application"), ())
+    return any_protocol(site.scenario, site.adjacency, sources) if everyone else None
 
 
 def _late(classes: Sequence[ClassPlan], deadline_ns: int) -> Iterator[str]:

@@ -17,7 +17,7 @@ from fanet_mw.protocol.planner.access import ways
 from fanet_mw.protocol.planner.demand import TrafficClass, demands
 from fanet_mw.protocol.planner.feasibility import Plan, Site, evaluate, members_of
 from fanet_mw.protocol.planner.flood import frame_ns
-from fanet_mw.protocol.planner.search import WINDOWS
+from fanet_mw.protocol.planner.search import WINDOWS, hopeless
 from fanet_mw.protocol.planner.variant import Variant, vary
 from fanet_mw.protocol.scheduled import schedule_bytes
 from fanet_mw.scenario import Scenario
@@ -57,7 +57,7 @@ def optimum(
     for settings in _families(scenario):
         for period_s in _periods(scenario, deadline_ns):
             variant = vary(scenario, {**settings, "clusters.flooding_period_s": period_s})
-            if variant is None:
+            if variant is None or hopeless(site.of(variant.scenario), sources):
                 continue
             tried += 1
             found = _judge(site.of(variant.scenario), sources, deadline_ns)

@@ -11,7 +11,8 @@ from typing import Final, NamedTuple
 from fanet_mw.protocol.delay import Refused
 from fanet_mw.protocol.planner.demand import demands
 from fanet_mw.protocol.planner.feasibility import Plan, Site, evaluate, members_of
-from fanet_mw.protocol.planner.turns import least_interval_ns
+from fanet_mw.protocol.planner.goodput_bound import in_turns
+from fanet_mw.protocol.planner.turns import least_interval_ns, superframe_of
 from fanet_mw.protocol.planner.variant import Value, Variant, vary
 from fanet_mw.protocol.topology import Adjacency
 from fanet_mw.scenario import Scenario
@@ -81,10 +82,22 @@ def cheapest_change(
         return None
     for group in (_changes(scenario), _lighter(scenario)):
         for variant in sorted(group, key=lambda v: v.size):
+            if hopeless(site.of(variant.scenario), sources):
+                continue
             found = _judge(site.of(variant.scenario), sources, deadline_ns)
             if isinstance(found, Plan) and found.feasible:
                 return Change(variant, found)
     return None
+
+
+def hopeless(site: Site, sources: Sequence[NodeId] | None) -> bool:
+    """Whether no timetable at all carries the load in this scenario's turns; saves making one."""
+    classes = demands(site.scenario, sources)
+    if not site.timetable or isinstance(classes, Refused) or site.scenario.traffic.destination != "all":
+        return False
+    turns = superframe_of(site.scenario)
+    limits = ((c.interval_ns, in_turns(turns, site.adjacency, c.sources)) for c in classes)
+    return any(most is not None and interval_ns < most.least_interval_ns for interval_ns, most in limits)
 
 
 def _changes(scenario: Scenario) -> Iterator[Variant]:

@@ -69,6 +69,7 @@ def _lines(found: Plan) -> Iterator[str]:
         yield item("to the head", "every source is one" if not found.access.delay_ns else _say(found.access))
     if found.superframe is not None:
         yield from _superframe(found.superframe)
+    yield from _capacity(found)
     bottleneck = found.bottleneck
     if bottleneck is not None and bottleneck.usable_ns:
         yield item("bottleneck", f"the slot of head {bottleneck.head}, {100 * bottleneck.utilization:.0f} % used")
@@ -102,9 +103,24 @@ def _superframe(superframe: Superframe) -> Iterator[str]:
     if superframe.used:
         share = 100 * superframe.used / turns.per_frame
         yield item("turns in use", f"{superframe.used} ({share:.0f} %) for {superframe.packets} packets a period")
-    if superframe.least_interval_ns is not None:
+
+
+def _capacity(found: Plan) -> Iterator[str]:
+    """What this configuration carries, against what no protocol can exceed."""
+    carried, most = found.carried_per_second, found.goodput
+    application = next((c for c in found.classes if c.name == "application"), None)
+    if carried is not None and application is not None:
+        about = "" if found.superframe else "about "
         yield item(
-            "capacity", f"one packet per node every {superframe.least_interval_ns / S:.3f} s, and not more often"
+            "capacity",
+            f"{about}one packet per source every {application.sources / carried:.3f} s ({carried:.0f} a second)",
+        )
+    if most is not None:
+        share = "" if carried is None else f"; this configuration: {100 * carried / most.per_second:.0f} % of that"
+        yield item(
+            "any protocol",
+            f"at most one packet per source every {most.least_interval_ns / S:.3f} s ({most.per_second:.0f} a second) "
+            f"can reach everyone{share}",
         )
 
 

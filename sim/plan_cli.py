@@ -41,7 +41,8 @@ def judge(
     if deadline_s is not None and not (math.isfinite(deadline_s) and deadline_s > 0):
         raise ConfigError(f"--deadline {deadline_s:g}: must be > 0 [s]")
     at = _places(scenario)
-    deadline_ns = None if deadline_s is None else seconds_to_ns(deadline_s)
+    wanted_s = scenario.traffic.deadline_s if deadline_s is None else deadline_s
+    deadline_ns = None if wanted_s is None else seconds_to_ns(wanted_s)
     sources = [NodeId(node) for node in sources_of(scenario)]
     found = plan(scenario, at, sources=sources, deadline_ns=deadline_ns)
     if isinstance(found, Refused):

@@ -14,18 +14,26 @@ from fanet_mw.protocol.delay import Bounded, Outcome, Refused
 from fanet_mw.protocol.planner import (
     Change,
     ClassPlan,
+    Loss,
     Optimum,
     Plan,
     cheapest_change,
     describe,
     describe_change,
+    describe_loss,
     describe_optimum,
+    loss,
     optimum,
     plan,
     with_capacity,
 )
+from fanet_mw.protocol.planner.turns import superframe_of
+from fanet_mw.protocol.scheduled import links
+from fanet_mw.protocol.timetable import Timetable
+from fanet_mw.protocol.topology import within_range
 from fanet_mw.scenario import Scenario
 from fanet_mw.units import MS, Enu, NodeId, S, seconds_to_ns
+from sim.frame_chance import chance_of
 from sim.layout import positions
 
 
@@ -49,6 +57,10 @@ def judge(
         return describe(found), {"feasible": False, "problems": [found.reason]}, False
     found = with_capacity(found, at)
     text, content = [describe(found)], _json(found)
+    if found.superframe is not None and found.superframe.table is not None and not found.cut_off:
+        missed = _loss(found, found.superframe.table, at)
+        text.append(describe_loss(missed))
+        content["loss"] = None if missed is None else missed._asdict()
     if change and not found.feasible:
         cheapest = cheapest_change(scenario, at, sources=sources, deadline_ns=deadline_ns)
         text.append(describe_change(cheapest, found))
@@ -64,6 +76,18 @@ def _places(scenario: Scenario) -> dict[NodeId, Enu]:
     """Where the nodes start; in whole metres, as the leader will tell them."""
     start = zip(scenario.node_ids, positions(scenario), strict=True)
     return {NodeId(node): rounded(place) if scenario.clusters.relay == "scheduled" else place for node, place in start}
+
+
+def _loss(found: Plan, table: Timetable, at: dict[NodeId, Enu]) -> Loss | None:
+    """Of what heads and leader let out; the way to a head is not in it."""
+    scenario = found.scenario
+    chance = chance_of(scenario, at)
+    if chance is None:
+        return None
+    turns = superframe_of(scenario)
+    geometry = links(scenario, turns)
+    adjacency = within_range(at, range_m=geometry.link_m)
+    return loss(table, adjacency, per_frame=turns.per_frame, hop_turns=geometry.hop_turns, chance=chance)
 
 
 def _json(found: Plan) -> dict[str, Any]:

@@ -7,15 +7,17 @@ make it feasible, `optimum` what would meet a deadline with the least airtime; `
 from fanet_mw.protocol.planner.demand import TrafficClass, demands
 from fanet_mw.protocol.planner.feasibility import ClassPlan, Plan, Site, evaluate
 from fanet_mw.protocol.planner.head import ClusterPlan
+from fanet_mw.protocol.planner.loss import Loss, loss
 from fanet_mw.protocol.planner.optimum import Optimum, optimum
 from fanet_mw.protocol.planner.search import Change, cheapest_change, plan, with_capacity
-from fanet_mw.protocol.planner.text import describe, describe_change, describe_optimum
+from fanet_mw.protocol.planner.text import describe, describe_change, describe_loss, describe_optimum
 from fanet_mw.protocol.planner.variant import Variant, vary
 
 __all__ = [
     "Change",
     "ClassPlan",
     "ClusterPlan",
+    "Loss",
     "Optimum",
     "Plan",
     "Site",
@@ -25,8 +27,10 @@ __all__ = [
     "demands",
     "describe",
     "describe_change",
+    "describe_loss",
     "describe_optimum",
     "evaluate",
+    "loss",
     "optimum",
     "plan",
     "vary",

@@ -250,9 +250,9 @@ def _in_turns(site: Site, candidates: Sequence[Candidate], jitter_ns: int) -> _J
     table = table_for(scenario, tuple(sorted(site.positions.items())), members)
     if isinstance(table, Refused):
         refused = tuple(_refused(candidate, table, scenario.clusters.period_ns) for candidate in candidates)
-        return _Judged(refused, (), Superframe(turns, 0, 0, {}), (table.reason,))
+        return _Judged(refused, (), Superframe(turns, 0, 0, None), (table.reason,))
     judged = tuple(judge(table, c, turns, lead_ns=scenario.radio.lead_ns, jitter_ns=jitter_ns) for c in candidates)
-    superframe = Superframe(turns, table.used, len(table.roots()), table.uncovered)
+    superframe = Superframe(turns, table.used, len(table.roots()), table)
     return _Judged(judged, parts.missed(table.uncovered, leader=scenario.leader), superframe)
 
 

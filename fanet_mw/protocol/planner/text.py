@@ -7,6 +7,7 @@ from typing import Final
 from fanet_mw.protocol.delay import Bounded, Outcome, Refused
 from fanet_mw.protocol.planner.feasibility import ClassPlan, Plan
 from fanet_mw.protocol.planner.head import ClusterPlan
+from fanet_mw.protocol.planner.loss import Loss
 from fanet_mw.protocol.planner.optimum import Optimum
 from fanet_mw.protocol.planner.search import Change
 from fanet_mw.protocol.planner.turns import Superframe
@@ -21,6 +22,19 @@ _LABEL: Final = 14
 def describe(found: Plan | Refused) -> str:
     """The plan as text, without a final newline."""
     return f"cannot be planned: {found.reason}" if isinstance(found, Refused) else "\n".join(_lines(found))
+
+
+def describe_loss(found: Loss | None) -> str:
+    """How likely a packet misses somebody."""
+    if found is None:
+        return item("loss", "no probability: shadowing, fading and obstacles spoil links for longer than a frame")
+    if not found.worst:
+        return item("loss", "none in this channel: every packet reaches everyone")
+    return item(
+        "loss",
+        f"a packet misses a node with probability {found.mean:.2g} at most on average, {found.worst:.2g} at worst "
+        f"(node {found.root} to node {found.node}), repairs not counted",
+    )
 
 
 def describe_change(change: Change | None, found: Plan) -> str:

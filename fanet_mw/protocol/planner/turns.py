@@ -49,7 +49,7 @@ class Superframe(NamedTuple):
     """Turns in which some node sends; 0: there is no table."""
     packets: int
     """Packets that the roots let out per superframe."""
-    uncovered: Mapping[NodeId, Sequence[NodeId]]
+    table: Timetable | None
     least_interval_ns: int | None = None
     """The traffic interval down to which everything arrives, when it was asked for."""
 

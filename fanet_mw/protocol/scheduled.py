@@ -23,7 +23,7 @@ from fanet_mw.protocol.turns import Turns, clocks_fit, turn_ns
 from fanet_mw.protocol.txqueue import Packet, TxQueue
 from fanet_mw.scenario import Scenario
 from fanet_mw.units import BROADCAST, MS, US, Enu, NodeId, seconds_to_ns
-from fanet_mw.wire import FLAG_FLOOD, HEADER_BYTES, PRIORITY_BULK, Kind, Schedule
+from fanet_mw.wire import CAPACITY, FLAG_FLOOD, HEADER_BYTES, PRIORITY_BULK, Kind, Schedule
 
 _FEWER: Final = 0.85
 """When the turns do not suffice for the load, try this much of it, and so on."""
@@ -63,7 +63,7 @@ class Scheduled(Clustered):
         self._interval_ns = seconds_to_ns(scenario.traffic.interval_s)
         self._admission = (
             None
-            if scenario.traffic.deadline_s is None
+            if scenario.traffic.deadline_s is None or (self._leader is not None and not leader_load(scenario))
             else Admission(
                 port.node, deadline_ns=seconds_to_ns(scenario.traffic.deadline_s), interval_ns=self._interval_ns
             )
@@ -105,7 +105,8 @@ class Scheduled(Clustered):
                     heads[member.cluster] = NodeId(member.node)
         scenario = self._port.scenario
         turns = _geometry(scenario, schedule, self._turn_ns)
-        load = {heads[cluster]: members[cluster] for cluster in sorted(heads)} | {NodeId(schedule.leader): 0}
+        load = {heads[cluster]: members[cluster] for cluster in sorted(heads)}
+        load[NodeId(schedule.leader)] = leader_load(scenario)
         table = fit(scenario, tuple(sorted(at.items())), load, turns)
         if table is None:
             self._admit(None, now_ns=now_ns)
@@ -132,6 +133,8 @@ class Scheduled(Clustered):
         alone = scenario.clusters.count >= scenario.nodes.count - 1  # else packets of members share our turns
         if plan is None or not plan.roots or not alone or plan.table.uncovered[self._port.node]:
             return None
+        if self._leader is not None:
+            return None  # schedules go before our own packets
         return Own(plan.turns, plan.roots, plan.table.spans[self._port.node])
 
     def _admit(self, own: Own | None, *, now_ns: int) -> None:
@@ -301,16 +304,40 @@ def fit(
     """A table for a little more than the load, so that a backlog drains; for just the load, or less, if turns lack."""
     geometry = links(scenario, turns)
     per_member = turns.period_ns / seconds_to_ns(scenario.traffic.interval_s)
-    wanted = {root: int(members * per_member) + 1 for root, members in load.items()}
+    control = {root: schedule_parts(scenario) if root == scenario.leader else 0 for root in load}
+    least = {root: max(1, control[root] + min(1, members)) for root, members in load.items()}
+    wanted = {
+        root: control[root] + (int(members * per_member) + 1 if members or not control[root] else 0)
+        for root, members in load.items()
+    }
     share = 1.0
     while turns.per_frame:
         roots = tuple(root for root, packets in sorted(wanted.items()) for _ in range(packets))
         table = timetable(places, roots, geometry)
-        if table is not None or all(packets == 1 for packets in wanted.values()):
+        if table is not None or wanted == least:
             return table
-        wanted = {root: max(1, math.ceil(members * per_member * share)) for root, members in load.items()}
+        wanted = {
+            root: max(least[root], control[root] + math.ceil(members * per_member * share))
+            for root, members in load.items()
+        }
         share *= _FEWER
     return None
+
+
+def leader_load(scenario: Scenario) -> int:
+    """The leader is in no cluster, but its own packets need turns too: 1 if the application may send from it."""
+    traffic = scenario.traffic
+    if traffic.arrivals == "none" or traffic.destination == scenario.leader:
+        return 0
+    if isinstance(traffic.sources, tuple):
+        return int(scenario.leader in traffic.sources)
+    others = scenario.nodes.count - 1 - (traffic.destination != "all")
+    return int(traffic.sources == "all" or traffic.sources > others)
+
+
+def schedule_parts(scenario: Scenario) -> int:
+    """Turns that the leader's schedules take of each superframe."""
+    return max(1, -(-(scenario.nodes.count - 1) // CAPACITY))
 
 
 def _own_plan(node: NodeId, valid_ns: int, turns: Turns, table: Timetable) -> Plan:

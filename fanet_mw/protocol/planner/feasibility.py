@@ -23,6 +23,7 @@ from fanet_mw.protocol.planner.flood import FloodCost, flood_cost
 from fanet_mw.protocol.planner.goodput_bound import Goodput, any_protocol
 from fanet_mw.protocol.planner.head import ClusterPlan, Share, slot_delays, work_ns
 from fanet_mw.protocol.planner.turns import Candidate, Superframe, judge, superframe_of, table_for
+from fanet_mw.protocol.scheduled import leader_load, schedule_parts
 from fanet_mw.protocol.topology import Adjacency, within_range
 from fanet_mw.scenario import Scenario
 from fanet_mw.units import MS, Enu, NodeId, S, seconds_to_ns
@@ -246,12 +247,15 @@ def _in_turns(site: Site, candidates: Sequence[Candidate], jitter_ns: int) -> _J
     """All heads under one timetable; when the turns do not suffice, each is refused with that, and it is said."""
     scenario = site.scenario
     turns = superframe_of(scenario)
-    members = {c.head: 0 if c.head == scenario.leader else c.members for c in candidates}
+    members = {c.head: leader_load(scenario) if c.head == scenario.leader else c.members for c in candidates}
     table = table_for(scenario, tuple(sorted(site.positions.items())), members)
     if isinstance(table, Refused):
         refused = tuple(_refused(candidate, table, scenario.clusters.period_ns) for candidate in candidates)
         return _Judged(refused, (), Superframe(turns, 0, 0, None), (table.reason,))
-    judged = tuple(judge(table, c, turns, lead_ns=scenario.radio.lead_ns, jitter_ns=jitter_ns) for c in candidates)
+    lead_ns, control = scenario.radio.lead_ns, {scenario.leader: schedule_parts(scenario)}
+    judged = tuple(
+        judge(table, c, turns, lead_ns=lead_ns, jitter_ns=jitter_ns, control=control.get(c.head, 0)) for c in candidates
+    )
     superframe = Superframe(turns, table.used, len(table.roots()), table)
     return _Judged(judged, parts.missed(table.uncovered, leader=scenario.leader), superframe)
 

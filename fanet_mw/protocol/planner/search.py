@@ -14,6 +14,7 @@ from fanet_mw.protocol.planner.feasibility import Plan, Site, evaluate, members_
 from fanet_mw.protocol.planner.goodput_bound import in_turns
 from fanet_mw.protocol.planner.turns import least_interval_ns, superframe_of
 from fanet_mw.protocol.planner.variant import Value, Variant, vary
+from fanet_mw.protocol.scheduled import leader_load
 from fanet_mw.protocol.topology import Adjacency
 from fanet_mw.scenario import Scenario
 from fanet_mw.units import Enu, NodeId
@@ -58,8 +59,8 @@ def with_capacity(found: Plan, positions: Mapping[NodeId, Enu]) -> Plan:
     """The same plan with the traffic interval down to which its timetable carries everything; takes a second."""
     if found.superframe is None or not found.superframe.used or found.cut_off:
         return found
-    leader = found.scenario.leader
-    members = {c.head: 0 if c.head == leader else len(c.members) for c in members_of(found.scenario, positions)}
+    leader, own = found.scenario.leader, leader_load(found.scenario)
+    members = {c.head: own if c.head == leader else len(c.members) for c in members_of(found.scenario, positions)}
     least = least_interval_ns(found.scenario, tuple(sorted(positions.items())), members)
     return found._replace(superframe=found.superframe._replace(least_interval_ns=least))
 

@@ -21,7 +21,7 @@ from fanet_mw.protocol.delay import (
 )
 from fanet_mw.protocol.planner.flood import FloodCost
 from fanet_mw.protocol.planner.head import ClusterPlan, Share
-from fanet_mw.protocol.scheduled import fit, largest_frame, links
+from fanet_mw.protocol.scheduled import fit, largest_frame, links, schedule_parts
 from fanet_mw.protocol.timetable import Timetable, timetable
 from fanet_mw.protocol.turns import Turns, turn_ns
 from fanet_mw.scenario import Scenario
@@ -84,7 +84,10 @@ def least_interval_ns(scenario: Scenario, places: Places, members: Mapping[NodeI
     enough = 2 * largest * turns.period_ns / seconds_to_ns(scenario.traffic.interval_s)
     best = 0
     for packets in range(1, turns.per_frame // len(members) * largest + 2):
-        roots = tuple(root for root, n in sorted(members.items()) for _ in range(packets if n else 1))
+        control = {scenario.leader: schedule_parts(scenario)}
+        roots = tuple(
+            root for root, n in sorted(members.items()) for _ in range(control.get(root, 0) + (packets if n else 0))
+        )
         if not turns.per_frame or timetable(places, roots, geometry) is None:
             break
         best = packets
@@ -93,8 +96,10 @@ def least_interval_ns(scenario: Scenario, places: Places, members: Mapping[NodeI
     return -(-turns.period_ns * largest // best) if best else None
 
 
-def judge(table: Timetable, candidate: Candidate, turns: Turns, *, lead_ns: int, jitter_ns: int) -> ClusterPlan:
-    """One head: its queue before its turns, then the span of the flood."""
+def judge(
+    table: Timetable, candidate: Candidate, turns: Turns, *, lead_ns: int, jitter_ns: int, control: int = 0
+) -> ClusterPlan:
+    """One head: its queue before its turns, then the span of the flood. `control`: more urgent packets per period."""
     starts_ns = sorted(
         turns.start_ns(turn.offset, frame_start_ns=0) for turn in table.roots() if turn.node == candidate.head
     )
@@ -103,8 +108,9 @@ def judge(table: Timetable, candidate: Candidate, turns: Turns, *, lead_ns: int,
     offsets = [turn.offset for turn in table.roots() if turn.node == candidate.head]
     duration_ns = max((turns.flood_ns(offset, span=span) for offset in offsets), default=turns.turn_ns)
     server = TurnServer(turns.turn_ns, turns.period_ns, tuple(starts_ns), lead_ns)
-    delays, waiting = _queue(candidate.shares, server, duration_ns - turns.turn_ns, jitter_ns)
+    delays, waiting = _queue(candidate.shares, server, duration_ns - turns.turn_ns, jitter_ns, control)
     packets = sum(s.sources * turns.period_ns / s.interval_ns for s in candidate.shares)
+    packets += control if packets else 0
     return ClusterPlan(
         head=candidate.head,
         members=candidate.members,
@@ -120,21 +126,22 @@ def judge(table: Timetable, candidate: Candidate, turns: Turns, *, lead_ns: int,
 
 
 def _queue(
-    shares: Sequence[Share], server: TurnServer, rest_ns: int, jitter_ns: int
+    shares: Sequence[Share], server: TurnServer, rest_ns: int, jitter_ns: int, control: int
 ) -> tuple[list[Outcome], int | None]:
     """Per class, most urgent first: the wait for a turn, the turn, and the rest of the flood; most packets waiting."""
     flows = [[Periodic(s.interval_ns, jitter_ns)] * s.sources for s in shares]
-    everything = Total(tuple(chain.from_iterable(flows)))
-    if not everything.parts:
+    if not any(flows):
         return [Bounded(0) for _ in shares], None
+    urgent = [Periodic(server.period_ns, 0)] * control
+    everything = Total((*urgent, *chain.from_iterable(flows)))
     server.check()
-    alone = sum(1 for row in flows if row) == 1
+    alone = not urgent and sum(1 for row in flows if row) == 1
     delays: list[Outcome] = []
     for index, row in enumerate(flows):
         if not row:
             delays.append(Bounded(0))
             continue
-        before = Total((*chain.from_iterable(flows[:index]), *row[1:]))
+        before = Total((*urgent, *chain.from_iterable(flows[:index]), *row[1:]))
         queue = delay_fifo(everything, server) if alone else delay_any_order(row[0], before, server)
         delays.append(queue if isinstance(queue, Refused) else Bounded(queue.delay_ns + rest_ns))
     waiting = backlog(everything, server)

@@ -76,3 +76,5 @@ class DropReason(StrEnum):
     NOT_FOR_US = "not_for_us"
     TOO_LARGE = "too_large"
     """Longer than the radio's maximum frame."""
+    ADMISSION = "admission"
+    """Came sooner than the node's bound allows if it is to meet `traffic.deadline_s`; refused at its origin."""

@@ -53,6 +53,9 @@ class Traffic(Section):
     """A number of sources (drawn by seed among the nodes that are neither leader nor destination), a list of node
     ids, or every node but the destination."""
     destination: Literal["all"] | Id = "all"
+    deadline_s: Positive | None = None
+    """`clusters.relay = "scheduled"`: nodes refuse packets that would break this, and record whether their bound meets
+    it; unset: every packet is taken."""
     targets: tuple[Id, ...] = ()
     """Nodes at which delivery counts when the destination is `all`; empty: every other node."""
 
@@ -291,6 +294,7 @@ def _disagreements(scenario: Scenario) -> Sequence[str]:
         )
     if scenario.clock.sync == "beacons" and not scenario.routing.hello_interval_s:
         found.append('clock.sync = "beacons" needs hellos: routing.hello_interval_s > 0')
+    found += _unkept_deadline(scenario)
     found += _impossible_faults(scenario)
     if scenario.routing.protocol in _RIVALS and scenario.radio.max_frame_bytes < _RIVAL_FRAME_BYTES:
         found.append(
@@ -307,6 +311,17 @@ def _disagreements(scenario: Scenario) -> Sequence[str]:
                 f"{clusters.slot_ns / MS:g} ms"
             )
     return found
+
+
+def _unkept_deadline(scenario: Scenario) -> Sequence[str]:
+    """A deadline that no node could hold a bound against."""
+    deadline_s = scenario.traffic.deadline_s
+    if deadline_s is None or (scenario.routing.protocol, scenario.clusters.relay) == ("clustered", "scheduled"):
+        return ()
+    return (
+        f"traffic.deadline_s = {deadline_s:g} needs a protocol with a bound: "
+        'routing.protocol = "clustered" and clusters.relay = "scheduled"',
+    )
 
 
 def _impossible_faults(scenario: Scenario) -> Sequence[str]:

@@ -122,6 +122,26 @@ class RadioFault(NamedTuple):
     active: bool
 
 
+class DeadlineMet(NamedTuple):
+    """The node's bound meets `traffic.deadline_s`, for packets at least `interval_ns` apart."""
+
+    t_ns: int
+    node: int
+    bound_ns: int
+    deadline_ns: int
+    interval_ns: int
+
+
+class DeadlineLost(NamedTuple):
+    """The node's bound no longer meets `traffic.deadline_s`, however rarely it sends; bound 0: it has none."""
+
+    t_ns: int
+    node: int
+    bound_ns: int
+    deadline_ns: int
+    interval_ns: int
+
+
 Record = (
     Generated
     | Delivered
@@ -134,6 +154,8 @@ Record = (
     | ProcessEnded
     | RadioFault
     | ClockSampled
+    | DeadlineMet
+    | DeadlineLost
 )
 
 _KINDS: Final[dict[str, type[Any]]] = {
@@ -148,6 +170,8 @@ _KINDS: Final[dict[str, type[Any]]] = {
     "process_ended": ProcessEnded,
     "radio_fault": RadioFault,
     "clock_sampled": ClockSampled,
+    "deadline_met": DeadlineMet,
+    "deadline_lost": DeadlineLost,
 }
 _NAMES: Final[dict[type[Any], str]] = {kind: name for name, kind in _KINDS.items()}
 
@@ -175,6 +199,7 @@ def parse(text: str) -> Record:
 
 
 __all__ = [
-    "Approaching", "Arrived", "ClockSampled", "Collided", "Delivered", "Detected", "DropReason", "Dropped", "Generated",
-    "ProcessEnded", "RadioFault", "Record", "RoleChanged", "kind_of", "line", "parse",
+    "Approaching", "Arrived", "ClockSampled", "Collided", "DeadlineLost", "DeadlineMet", "Delivered", "Detected",
+    "DropReason", "Dropped", "Generated", "ProcessEnded", "RadioFault", "Record", "RoleChanged", "kind_of", "line",
+    "parse",
 ]  # fmt: skip

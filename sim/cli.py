@@ -134,19 +134,21 @@ def plan(
     *,
     choice: Choice = Choice(),
     deadline: float | None = None,
-    search: bool = True,
+    search: Annotated[bool, Parameter(negative="")] = False,
     json: Annotated[bool, Parameter(negative="")] = False,
 ) -> int:
-    """Say before take-off whether a clustered scenario is feasible and what it guarantees; exit code 1: it is not.
+    """Say before take-off whether a clustered scenario is feasible, what it guarantees, and what would make it so.
+
+    Exit code 0: feasible; 1: not feasible; 2: the scenario or a flag is wrong.
 
     Parameters
     ----------
     scenario
         A shipped scenario's name (see `fanet scenarios`) or a .toml file.
     deadline
-        Every packet must be with everyone within this time [s].
+        Every packet must be with everyone within this time [s]; by default traffic.deadline_s, if that is set.
     search
-        Look for the cheapest change when it is not feasible.
+        Find the cluster count, flooding period and slots that meet the deadline with the least airtime per packet.
     json
         Print the plan as JSON.
 

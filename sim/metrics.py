@@ -13,7 +13,18 @@ from typing import Any, Final
 import numpy as np
 
 from agents.traffic import targets_of
-from fanet_mw.trace import Approaching, Arrived, Collided, Delivered, Detected, Generated
+from fanet_mw.errors import DropReason
+from fanet_mw.trace import (
+    Approaching,
+    Arrived,
+    Collided,
+    DeadlineLost,
+    DeadlineMet,
+    Delivered,
+    Detected,
+    Dropped,
+    Generated,
+)
 from fanet_mw.units import MS, S
 from sim.bounds import against_bounds
 from sim.clocks import clock_errors
@@ -44,6 +55,7 @@ def summarize(outcome: Outcome, *, trace_sha256: str) -> dict[str, Any]:
         "lateness": _lateness(outcome, emulator),
         "bound": against_bounds(outcome),
         "clock": clock_errors(outcome),
+        "admission": _admission(outcome),
         "mission": _mission(outcome),
         "processes": {
             "ready_s": round(outcome.ready_s, 3),
@@ -164,6 +176,23 @@ def _lateness(outcome: Outcome, emulator: Mapping[str, Any]) -> dict[str, Any]:
         "share": round(share, 6),
         "limit": outcome.scenario.radio.late_limit,
         "valid": outcome.mode == "virtual" or (share <= outcome.scenario.radio.late_limit and outcome.aborted is None),
+    }
+
+
+def _admission(outcome: Outcome) -> dict[str, Any]:
+    """What the nodes refused, and what they said of the deadline; empty without `traffic.deadline_s`."""
+    deadline_s = outcome.scenario.traffic.deadline_s
+    if deadline_s is None:
+        return {}
+    said = [record for record in outcome.records if isinstance(record, DeadlineMet | DeadlineLost)]
+    last = {record.node: isinstance(record, DeadlineMet) for record in said}
+    reasons = (record.reason for record in outcome.records if type(record) is Dropped)
+    return {
+        "deadline_ms": round(deadline_s * 1000, 3),
+        "refused": sum(reason == DropReason.ADMISSION for reason in reasons),
+        "lost": sum(isinstance(record, DeadlineLost) for record in said),
+        "met": sum(isinstance(record, DeadlineMet) for record in said),
+        "nodes_without": sum(not met for met in last.values()),
     }
 
 

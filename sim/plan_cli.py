@@ -1,50 +1,169 @@
-"""`fanet plan`: is a scenario feasible, before take-off? The planner is `fanet_mw.protocol.planner`."""
+"""`fanet plan`: is a scenario feasible, before take-off? The planner is `fanet_mw.protocol.planner`.
+
+Exit codes: 0 feasible, 1 not feasible, 2 the scenario or a flag is wrong (as with every command).
+"""
 
 import json
+import math
+from typing import Any
 
 from agents.traffic import sources_of
 from fanet_mw.errors import ConfigError
-from fanet_mw.protocol.delay import Bounded, Refused
-from fanet_mw.protocol.planner import Plan, describe, plan
-from fanet_mw.protocol.planner.turns_plan import describe_turns, plan_turns
+from fanet_mw.places import rounded
+from fanet_mw.protocol.delay import Bounded, Outcome, Refused
+from fanet_mw.protocol.planner import (
+    Change,
+    ClassPlan,
+    Loss,
+    Optimum,
+    Plan,
+    cheapest_change,
+    describe,
+    describe_change,
+    describe_loss,
+    describe_optimum,
+    loss,
+    optimum,
+    plan,
+    with_capacity,
+)
+from fanet_mw.protocol.planner.turns import superframe_of
+from fanet_mw.protocol.scheduled import links
+from fanet_mw.protocol.timetable import Timetable
+from fanet_mw.protocol.topology import within_range
 from fanet_mw.scenario import Scenario
-from fanet_mw.units import MS, NodeId, seconds_to_ns
+from fanet_mw.units import MS, Enu, NodeId, S, seconds_to_ns
+from sim.frame_chance import chance_of
 from sim.layout import positions
 
 
-def judge(scenario: Scenario, *, deadline_s: float | None, search: bool) -> tuple[str, dict[str, object], bool]:
-    """(text, JSON, feasible) of a scenario where its nodes start."""
+def judge(
+    scenario: Scenario, *, deadline_s: float | None = None, search: bool = False, change: bool = True
+) -> tuple[str, dict[str, Any], bool]:
+    """(text, JSON, feasible) of a scenario where its nodes start.
+
+    `change`: look for the cheapest change when it is not feasible; `search`: for what takes the least airtime.
+    """
     if scenario.routing.protocol != "clustered":
         raise ConfigError(f'routing.protocol = {scenario.routing.protocol}: only "clustered" can be planned')
-    at = {NodeId(node): place for node, place in zip(scenario.node_ids, positions(scenario), strict=True)}
-    deadline_ns = None if deadline_s is None else seconds_to_ns(deadline_s)
-    if scenario.clusters.relay == "scheduled":
-        turns = plan_turns(scenario, at, deadline_ns=deadline_ns, search=search)
-        return describe_turns(turns), turns._asdict() | {"feasible": turns.feasible}, turns.feasible
-    found = plan(scenario, at, sources=[NodeId(node) for node in sources_of(scenario)], search=search)
+    if deadline_s is not None and not (math.isfinite(deadline_s) and deadline_s > 0):
+        raise ConfigError(f"--deadline {deadline_s:g}: must be > 0 [s]")
+    at = _places(scenario)
+    wanted_s = scenario.traffic.deadline_s if deadline_s is None else deadline_s
+    deadline_ns = None if wanted_s is None else seconds_to_ns(wanted_s)
+    sources = [NodeId(node) for node in sources_of(scenario)]
+    found = plan(scenario, at, sources=sources, deadline_ns=deadline_ns)
     if isinstance(found, Refused):
-        return describe(found), {"feasible": False, "reason": found.reason}, False
-    return _with_deadline(found, deadline_ns)
+        return describe(found), {"feasible": False, "problems": [found.reason]}, False
+    found = with_capacity(found, at)
+    text, content = [describe(found)], _json(found)
+    if found.superframe is not None and found.superframe.table is not None and not found.cut_off:
+        missed = _loss(found, found.superframe.table, at)
+        text.append(describe_loss(missed))
+        content["loss"] = None if missed is None else missed._asdict()
+    if change and not found.feasible:
+        cheapest = cheapest_change(scenario, at, sources=sources, deadline_ns=deadline_ns)
+        text.append(describe_change(cheapest, found))
+        content["change"] = None if cheapest is None else _change_json(cheapest)
+    if search:
+        best = optimum(scenario, at, deadline_ns=deadline_ns, sources=sources)
+        text.append(describe_optimum(best, deadline_ns=deadline_ns))
+        content["search"] = None if best is None else _optimum_json(best)
+    return "\n".join(text), content, found.feasible
 
 
-def _with_deadline(found: Plan, deadline_ns: int | None) -> tuple[str, dict[str, object], bool]:
-    bounds = {c.name: c.bound.delay_ns / MS if isinstance(c.bound, Bounded) else None for c in found.classes}
-    text, feasible = describe(found), found.feasible
-    if deadline_ns is not None:
-        late = [name for name, bound_ms in sorted(bounds.items()) if bound_ms is None or bound_ms * MS > deadline_ns]
-        if late:
-            feasible = False
-            text += f"\n  deadline of {deadline_ns / MS:g} ms: not met by {', '.join(late)}"
-    return text, {"feasible": feasible, "bounds_ms": bounds, "problems": list(found.problems)}, feasible
+def _places(scenario: Scenario) -> dict[NodeId, Enu]:
+    """Where the nodes start; in whole metres, as the leader will tell them."""
+    start = zip(scenario.node_ids, positions(scenario), strict=True)
+    return {NodeId(node): rounded(place) if scenario.clusters.relay == "scheduled" else place for node, place in start}
 
 
-def show(
-    scenario: Scenario,
-    *,
-    deadline: float | None,
-    search: bool,
-    as_json: bool,
-) -> int:
+def _loss(found: Plan, table: Timetable, at: dict[NodeId, Enu]) -> Loss | None:
+    """Of what heads and leader let out; the way to a head is not in it."""
+    scenario = found.scenario
+    chance = chance_of(scenario, at)
+    if chance is None:
+        return None
+    turns = superframe_of(scenario)
+    geometry = links(scenario, turns)
+    adjacency = within_range(at, range_m=geometry.link_m)
+    return loss(table, adjacency, per_frame=turns.per_frame, hop_turns=geometry.hop_turns, chance=chance)
+
+
+def _json(found: Plan) -> dict[str, Any]:
+    superframe, bottleneck = found.superframe, found.bottleneck
+    return {
+        "scenario": found.scenario.name,
+        "feasible": found.feasible,
+        "proven": found.proven,
+        "deadline_ms": None if found.deadline_ns is None else found.deadline_ns / MS,
+        "classes": [_class_json(c, found.deadline_ns) for c in found.classes],
+        "to_head_ms": _ms(found.access),
+        "superframe": None if superframe is None else {
+            "period_ms": superframe.turns.period_ns / MS,
+            "contention_ms": superframe.turns.contention_ns / MS,
+            "turn_ms": superframe.turns.turn_ns / MS,
+            "turns": superframe.turns.per_frame,
+            "used": superframe.used,
+            "packets": superframe.packets,
+            "least_interval_s": None if superframe.least_interval_ns is None else superframe.least_interval_ns / S,
+        },
+        "slots": [
+            {
+                "head": c.head,
+                "members": c.members,
+                "hops": c.hops,
+                "slot_ms": c.slot_ns / MS,
+                "flood_ms": c.flood.duration_ns / MS,
+                "packets_per_period": c.packets,
+                "used": c.utilization if c.usable_ns else None,
+                "waiting": c.backlog,
+            }
+            for c in found.clusters
+        ],
+        "carried_per_s": found.carried_per_second,
+        "any_protocol_per_s": None if found.goodput is None else found.goodput.per_second,
+        "bottleneck": None if bottleneck is None else bottleneck.head,
+        "equation_4_ms": _ms(found.paper),
+        "cut_off": list(found.cut_off),
+        "problems": list(found.problems),
+        "notes": list(found.notes),
+    }  # fmt: skip
+
+
+def _class_json(c: ClassPlan, deadline_ns: int | None) -> dict[str, Any]:
+    return {
+        "name": c.name,
+        "sources": c.sources,
+        "interval_s": c.interval_ns / S,
+        "bound_ms": _ms(c.bound),
+        "from_head_ms": _ms(c.from_head),
+        "refused": c.bound.reason if isinstance(c.bound, Refused) else None,
+        "deadline_met": None if deadline_ns is None else c.meets(deadline_ns),
+    }
+
+
+def _change_json(change: Change) -> dict[str, Any]:
+    return {
+        "set": list(change.variant.arguments),
+        "classes": [_class_json(c, change.plan.deadline_ns) for c in change.plan.classes],
+    }
+
+
+def _optimum_json(best: Optimum) -> dict[str, Any]:
+    return {
+        "set": list(best.variant.arguments),
+        "airtime_per_packet_ms": best.airtime_ns / MS,
+        "relays_per_packet_ms": best.floods_ns / MS,
+        "classes": [_class_json(c, best.plan.deadline_ns) for c in best.plan.classes],
+    }
+
+
+def _ms(outcome: Outcome) -> float | None:
+    return outcome.delay_ns / MS if isinstance(outcome, Bounded) else None
+
+
+def show(scenario: Scenario, *, deadline: float | None, search: bool, as_json: bool) -> int:
     """Print the plan; 0: feasible, 1: not."""
     text, content, feasible = judge(scenario, deadline_s=deadline, search=search)
     print(json.dumps(content, indent=2) if as_json else text)

@@ -62,6 +62,13 @@ def _network_rows(summary: Mapping[str, Any]) -> Iterator[tuple[str, str]]:
             f"{bound['worst_ms']:.0f} ms, computed in flight; worst seen {bound['observed_max_ms']:.0f} ms, {broken}",
         )
     yield from _clock_rows(summary["clock"])
+    admission = summary["admission"]
+    if admission:
+        yield (
+            "deadline",
+            f"{admission['deadline_ms']:.0f} ms: {admission['refused']} packets refused; the bounds of "
+            f"{admission['nodes_without']} nodes do not meet it (lost {admission['lost']} times)",
+        )
     late = summary["lateness"]
     if summary["mode"] == "realtime":
         yield (

@@ -7,12 +7,14 @@ heard outside of any turn is not relayed. Until a timetable is in force, and for
 `clustered` hold; then all but floods of data contend in the window at the beginning of each superframe.
 """
 
+import math
 from collections.abc import Mapping
 from typing import Final, NamedTuple
 
 from fanet_mw.errors import DropReason
 from fanet_mw.messages import Reception
 from fanet_mw.places import Places, rounded
+from fanet_mw.protocol.admission import Admission, Own
 from fanet_mw.protocol.clustered import Clustered
 from fanet_mw.protocol.contract import Port
 from fanet_mw.protocol.root_release import RootRelease
@@ -21,7 +23,7 @@ from fanet_mw.protocol.turns import Turns, clocks_fit, turn_ns
 from fanet_mw.protocol.txqueue import Packet, TxQueue
 from fanet_mw.scenario import Scenario
 from fanet_mw.units import BROADCAST, MS, US, Enu, NodeId, seconds_to_ns
-from fanet_mw.wire import FLAG_FLOOD, HEADER_BYTES, Kind, Schedule
+from fanet_mw.wire import CAPACITY, FLAG_FLOOD, HEADER_BYTES, PRIORITY_BULK, Kind, Schedule
 
 _FEWER: Final = 0.85
 """When the turns do not suffice for the load, try this much of it, and so on."""
@@ -58,6 +60,14 @@ class Scheduled(Clustered):
         self._missed = 0
         self._steady_ns: int | None = None
         """Since when the bound of the newest plan holds: no packet from before it is waiting."""
+        self._interval_ns = seconds_to_ns(scenario.traffic.interval_s)
+        self._admission = (
+            None
+            if scenario.traffic.deadline_s is None or (self._leader is not None and not leader_load(scenario))
+            else Admission(
+                port.node, deadline_ns=seconds_to_ns(scenario.traffic.deadline_s), interval_ns=self._interval_ns
+            )
+        )
 
     # --- the timetable --------------------------------------------------------------------------------------------
 
@@ -95,12 +105,15 @@ class Scheduled(Clustered):
                     heads[member.cluster] = NodeId(member.node)
         scenario = self._port.scenario
         turns = _geometry(scenario, schedule, self._turn_ns)
-        load = {heads[cluster]: members[cluster] for cluster in sorted(heads)} | {NodeId(schedule.leader): 0}
+        load = {heads[cluster]: members[cluster] for cluster in sorted(heads)}
+        load[NodeId(schedule.leader)] = leader_load(scenario)
         table = fit(scenario, tuple(sorted(at.items())), load, turns)
         if table is None:
+            self._admit(None, now_ns=now_ns)
             return  # not even one packet of each head fits a superframe; `fanet plan` says so before take-off
         self._plans = [*self._plans[-1:], _own_plan(self._port.node, max(now_ns, schedule.start_us * US), turns, table)]
         self._steady_ns = None
+        self._admit(self._own(), now_ns=now_ns)
         self._roots.follow([(plan.valid_ns, plan.turns, plan.roots) for plan in self._plans], now_ns=now_ns)
         for packet in [*self._release.drain(), *self._homeless.drain()]:
             self._forward(packet, start_ns=now_ns + self._lead_ns, now_ns=now_ns, tries=0)
@@ -110,6 +123,32 @@ class Scheduled(Clustered):
             if plan.valid_ns <= t_ns:
                 return plan
         return None
+
+    # --- letting in -----------------------------------------------------------------------------------------------
+
+    def _own(self) -> Own | None:
+        """Our part of the newest plan, if it gives our packets a bound."""
+        plan = self._plans[-1] if self._plans else None
+        scenario = self._port.scenario
+        alone = scenario.clusters.count >= scenario.nodes.count - 1  # else packets of members share our turns
+        if plan is None or not plan.roots or not alone or plan.table.uncovered[self._port.node]:
+            return None
+        if self._leader is not None:
+            return None  # schedules go before our own packets
+        return Own(plan.turns, plan.roots, plan.table.spans[self._port.node])
+
+    def _admit(self, own: Own | None, *, now_ns: int) -> None:
+        """The timetable has changed, or there is none for the swarm as it is now."""
+        record = None if self._admission is None else self._admission.follow(own, now_ns=now_ns)
+        if record is not None:
+            self._port.record(record)
+
+    def originate(self, packet: Packet, *, due_ns: int, now_ns: int) -> None:
+        admission = self._admission if packet.header.priority == PRIORITY_BULK else None
+        if admission is not None and not admission.admits(due_ns):
+            self._port.drop(DropReason.ADMISSION, packet, now_ns=now_ns)
+            return
+        super().originate(packet, due_ns=due_ns, now_ns=now_ns)
 
     # --- letting out ----------------------------------------------------------------------------------------------
 
@@ -123,7 +162,11 @@ class Scheduled(Clustered):
         if len(packet.frame) > self._turn_bytes:
             self._port.drop(DropReason.TOO_LARGE, packet, now_ns=now_ns)
             return
-        if self._steady_ns is None and not len(self._roots) and now_ns >= self._plans[-1].valid_ns and self._in_step():
+        if packet.header.origin != self._port.node or packet.header.kind != Kind.DATA:
+            self._steady_ns = None  # a neighbor's that has no turns yet, or control: the bound is for our data alone
+        elif (
+            self._steady_ns is None and not len(self._roots) and now_ns >= self._plans[-1].valid_ns and self._in_step()
+        ):
             self._steady_ns = packet.header.origin_us * US
         evicted = self._roots.push(packet, now_ns=now_ns)
         if evicted is not None:
@@ -205,15 +248,11 @@ class Scheduled(Clustered):
 
     def bound_ns(self) -> int | None:
         """The longest that a packet of our own may take to everyone, from generation; None: no bound."""
-        plan = self._plans[-1] if self._plans else None
-        scenario = self._port.scenario
-        alone = scenario.clusters.count >= scenario.nodes.count - 1  # else packets of members share our turns
-        if plan is None or not plan.roots or not alone or plan.table.uncovered[self._port.node]:
+        own = self._own()
+        if own is None or self._steady_ns is None or not self._in_step():
             return None
-        if self._steady_ns is None or not self._in_step():
-            return None
-        interval_ns = seconds_to_ns(scenario.traffic.interval_s)
-        return plan.turns.worst_ns(plan.roots, span=plan.table.spans[self._port.node], interval_ns=interval_ns)
+        interval_ns = self._admission.interval_ns if self._admission else self._interval_ns
+        return own.turns.worst_ns(own.roots, span=own.span, interval_ns=interval_ns)
 
     def _in_step(self) -> bool:
         """Whether the turns' slack holds what is known of the swarm's clocks."""
@@ -232,8 +271,13 @@ class Scheduled(Clustered):
 
 def largest_frame(scenario: Scenario) -> int:
     """The largest frame a turn must hold: the application's, or a schedule part with its places."""
+    return max(scenario.traffic.payload_bytes, schedule_bytes(scenario))
+
+
+def schedule_bytes(scenario: Scenario) -> int:
+    """A schedule part with its places."""
     members = min(scenario.nodes.count, 56)
-    return max(scenario.traffic.payload_bytes, HEADER_BYTES + 262 + 189 * -(-members // 28))
+    return HEADER_BYTES + 262 + 189 * -(-members // 28)
 
 
 def _geometry(scenario: Scenario, schedule: Schedule, turn: int) -> Turns:
@@ -257,18 +301,43 @@ def links(scenario: Scenario, turns: Turns) -> Geometry:
 def fit(
     scenario: Scenario, places: tuple[tuple[NodeId, Enu], ...], load: Mapping[NodeId, int], turns: Turns
 ) -> Timetable | None:
-    """A table for a little more than the load, so that a backlog drains; for less, if the turns do not suffice."""
+    """A table for a little more than the load, so that a backlog drains; for just the load, or less, if turns lack."""
     geometry = links(scenario, turns)
     per_member = turns.period_ns / seconds_to_ns(scenario.traffic.interval_s)
+    control = {root: schedule_parts(scenario) if root == scenario.leader else 0 for root in load}
+    least = {root: max(1, control[root] + min(1, members)) for root, members in load.items()}
+    wanted = {
+        root: control[root] + (int(members * per_member) + 1 if members or not control[root] else 0)
+        for root, members in load.items()
+    }
     share = 1.0
     while turns.per_frame:
-        wanted = {root: int(members * per_member * share) + 1 for root, members in load.items()}
         roots = tuple(root for root, packets in sorted(wanted.items()) for _ in range(packets))
         table = timetable(places, roots, geometry)
-        if table is not None or all(packets == 1 for packets in wanted.values()):
+        if table is not None or wanted == least:
             return table
+        wanted = {
+            root: max(least[root], control[root] + math.ceil(members * per_member * share))
+            for root, members in load.items()
+        }
         share *= _FEWER
     return None
+
+
+def leader_load(scenario: Scenario) -> int:
+    """The leader is in no cluster, but its own packets need turns too: 1 if the application may send from it."""
+    traffic = scenario.traffic
+    if traffic.arrivals == "none" or traffic.destination == scenario.leader:
+        return 0
+    if isinstance(traffic.sources, tuple):
+        return int(scenario.leader in traffic.sources)
+    others = scenario.nodes.count - 1 - (traffic.destination != "all")
+    return int(traffic.sources == "all" or traffic.sources > others)
+
+
+def schedule_parts(scenario: Scenario) -> int:
+    """Turns that the leader's schedules take of each superframe."""
+    return max(1, -(-(scenario.nodes.count - 1) // CAPACITY))
 
 
 def _own_plan(node: NodeId, valid_ns: int, turns: Turns, table: Timetable) -> Plan:

@@ -73,14 +73,21 @@ class Turns(NamedTuple):
         """
         if len(roots) * interval_ns < self.period_ns:
             return None
+        return max(done_ns - later * interval_ns for later, done_ns in enumerate(self.done_ns(roots, span=span)))
+
+    def done_ns(self, roots: Sequence[int], *, span: int) -> list[int]:
+        """The longest time from just after one of the given turns until the q-th packet let out then is with everyone.
+
+        For q from 1 to the turns of a superframe.
+        """
         starts = [self.start_ns(offset, frame_start_ns=0) for offset in roots]
         floods = [self.flood_ns(offset, span=span) for offset in roots]
         horizon = [later * self.period_ns + start for later in range(3) for start in starts]
-        return max(
-            horizon[begin + q] - horizon[begin] - (q - 1) * interval_ns + floods[(begin + q) % len(starts)]
-            for begin in range(len(starts))
-            for q in range(1, len(starts) + 1)
-        )
+        count = len(starts)
+        return [
+            max(horizon[begin + q] - horizon[begin] + floods[(begin + q) % count] for begin in range(count))
+            for q in range(1, count + 1)
+        ]
 
     def flood_ns(self, offset: int, *, span: int) -> int:
         """How long a flood of `span` turns takes from the `offset`-th on, contention windows in between included."""

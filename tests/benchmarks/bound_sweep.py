@@ -13,8 +13,9 @@ from concurrent.futures import ProcessPoolExecutor
 from itertools import pairwise
 from typing import Any, NamedTuple
 
+from agents.traffic import sources_of
 from fanet_mw import config
-from fanet_mw.protocol.planner.turns_plan import plan_turns
+from fanet_mw.protocol.planner import Plan, plan
 from fanet_mw.protocol.topology import components, within_range
 from fanet_mw.trace import Delivered, Generated
 from fanet_mw.units import MS, Enu, NodeId, S
@@ -56,7 +57,8 @@ def swarm(seed: int) -> config.Scenario | None:
     rounded = {n: Enu(float(round(p.east)), float(round(p.north)), float(round(p.up))) for n, p in at.items()}
     if len(components(within_range(rounded, range_m=240))) > 1:
         return None
-    return scenario if plan_turns(scenario, rounded, search=False).feasible else None
+    found = plan(scenario, rounded, sources=[NodeId(n) for n in sources_of(scenario)])
+    return scenario if isinstance(found, Plan) and found.feasible else None
 
 
 def measure(seed: int) -> Result | None:

@@ -33,7 +33,7 @@ def main(seconds: float) -> None:
                 "radio": {"lead_ms": 5},
             }
         )
-        found = plan(scenario, {NodeId(i + 1): at for i, at in enumerate(positions(scenario))}, search=False)
+        found = plan(scenario, {NodeId(i + 1): at for i, at in enumerate(positions(scenario))})
         assert isinstance(found, Plan)
         outcome = simulate(scenario)
         pdr = finish(outcome, out=None)["pdr"]

@@ -13,8 +13,8 @@ from sim.results import finish
 from sim.run import simulate
 
 
-def planned(*settings: str, deadline_s: float | None = None, search: bool = False) -> tuple[str, dict[str, Any], bool]:
-    return judge(catalog.find("clusters", settings), deadline_s=deadline_s, search=search)
+def planned(*settings: str, deadline_s: float | None = None, **options: bool) -> tuple[str, dict[str, Any], bool]:
+    return judge(catalog.find("clusters", settings), deadline_s=deadline_s, **{"change": False, **options})
 
 
 @pytest.mark.parametrize("settings", [(), ("radio.lead_ms=10", "clusters.flooding_period_s=1")])
@@ -23,43 +23,71 @@ def test_the_bound_that_is_planned_is_the_one_that_the_nodes_compute_in_flight(s
     bound = finish(simulate(scenario), out=None)["bound"]
     _, plan, feasible = judge(scenario, deadline_s=None, search=False)
     assert feasible
-    assert plan["bound_ns"] / 1e6 == pytest.approx(bound["worst_ms"], abs=1e-3)
+    assert plan["proven"]
+    assert 0 <= plan["classes"][0]["bound_ms"] - bound["worst_ms"] < scenario.radio.lead_ms + 0.1
 
 
 def test_a_load_that_does_not_fit_is_told_with_the_one_that_does() -> None:
     text, plan, feasible = planned("traffic.interval_s=0.1")
     assert not feasible
-    assert "at most one every 0.5" in text
-    least_s = plan["least_interval_ns"] / 1e9
-    assert planned(f"traffic.interval_s={least_s + 0.001}")[2]
+    assert "one packet per source every 0.5" in text
+    least_s = plan["superframe"]["least_interval_s"]
+    assert planned(f"traffic.interval_s={least_s}")[2]
+    assert not planned(f"traffic.interval_s={0.99 * least_s}")[2]
 
 
-def test_the_change_that_it_proposes_makes_it_feasible() -> None:
-    _, plan, feasible = planned("radio.channel=log_distance", search=True)
+@pytest.mark.parametrize(
+    ("settings", "deadline_s"), [(("radio.channel=log_distance",), None), ((), 0.5), (("clusters.relay=all",), 0.5)]
+)
+def test_the_change_that_it_proposes_makes_it_feasible(settings: tuple[str, ...], deadline_s: float | None) -> None:
+    _, plan, feasible = planned(*settings, deadline_s=deadline_s, change=True)
     assert not feasible
-    assert planned("radio.channel=log_distance", *plan["change"])[2]
+    assert planned(*settings, *plan["change"]["set"], deadline_s=deadline_s)[2]
 
 
 def test_a_deadline_that_cannot_be_met_is_no_plan() -> None:
-    assert planned(deadline_s=0.6)[2]
-    text, _, feasible = planned(deadline_s=0.3)
+    text, plan, feasible = planned(deadline_s=0.6)
+    assert feasible
+    assert plan["classes"][0]["deadline_met"]
+    assert "deadline 0.6 s met" in text
+    text, plan, feasible = planned(deadline_s=0.3)
     assert not feasible
-    assert "worst delay is 528.2 ms, the deadline 300 ms" in text
+    assert not plan["classes"][0]["deadline_met"]
+    assert "takes up to 528.2 ms, the deadline is 300 ms" in text
 
 
-def test_a_swarm_in_parts_is_told() -> None:
-    text, _, feasible = planned("nodes.spacing_m=300")
+@pytest.mark.parametrize("relay", ["scheduled", "all"])
+def test_a_swarm_in_parts_is_told_with_who_is_out_of_reach(relay: str) -> None:
+    here, there = [[200 * i, 0, 50] for i in range(5)], [[200 * i, 2000, 50] for i in range(3)]
+    layout = ["nodes.count=8", "traffic.sources=7", 'nodes.layout="explicit"', f"nodes.positions_m={here + there}"]
+    text, plan, feasible = planned(*layout, "clusters.count=7", f"clusters.relay={relay}", change=True)
     assert not feasible
-    assert "the swarm is in parts" in text
+    assert plan["cut_off"] == [6, 7, 8]
+    assert plan["classes"][0]["bound_ms"] is None
+    assert "reaches nodes 6, 7, 8" in text
+    assert plan["change"] is None
+    assert "come nearer" in text
+
+
+def test_the_search_meets_its_deadline_and_every_delivery_of_the_swarm_does() -> None:
+    _, plan, _ = planned(deadline_s=0.5, search=True)
+    found = plan["search"]["set"]
+    scenario = catalog.find("clusters", [*found, "duration_s=24", "warmup_s=14"])
+    assert judge(scenario, deadline_s=0.5)[2]
+    summary = finish(simulate(scenario), out=None)
+    assert summary["pdr"] >= 0.99
+    assert summary["delay_ms"]["max"] <= 500
+    assert summary["bound"]["violations"] == 0
 
 
 @pytest.mark.parametrize(
     ("arguments", "code", "said"),
     [
         (("clusters", "--json"), 0, '"feasible": true'),
-        (("clusters", "--deadline", "0.3"), 1, "not feasible"),
-        (("rescue",), 0, "equations (1)-(4)"),
+        (("clusters", "--deadline", "0.5", "--json"), 1, '"clusters.flooding_period_s='),
+        (("rescue",), 0, "equation (4)"),
         (("flooding",), 2, 'only "clustered" can be planned'),
+        (("clusters", "--deadline", "-1"), 2, "must be > 0"),
     ],
 )
 def test_the_command_prints_its_verdict_and_ends_with_it(arguments: tuple[str, ...], code: int, said: str) -> None:
@@ -69,4 +97,4 @@ def test_the_command_prints_its_verdict_and_ends_with_it(arguments: tuple[str, .
     assert done.returncode == code, done.stderr
     assert said in done.stdout + done.stderr
     if "--json" in arguments:
-        assert json.loads(done.stdout)["turns"] == 375
+        assert json.loads(done.stdout)["superframe"]["turns"] == 375

@@ -57,3 +57,9 @@ def test_heads_let_out_what_their_members_bring_them_in_the_contention_window() 
     summary = summary_of("clusters.count=8", "clusters.flooding_period_s=1", "clusters.contention_ms=150")
     assert summary["pdr"] >= 0.95
     assert summary["frames"]["closes"]
+
+
+def test_the_leader_s_own_packets_get_out_beside_its_schedules() -> None:
+    summary = summary_of("clusters.flooding_period_s=1", "traffic.sources=all")
+    assert summary["pdr"] >= 0.999
+    assert summary["bound"]["violations"] == 0

@@ -1,25 +1,38 @@
 """Is a set of clusters with given slots feasible, what bounds each traffic class, and what would make it so?
 
-`plan` is the entry: a scenario and where the nodes are go in, a `Plan` comes out; `describe` puts it into lines.
+`plan` is the entry: a scenario and where the nodes are go in, a `Plan` comes out; `cheapest_change` says what would
+make it feasible, `optimum` what would meet a deadline with the least airtime; `describe` puts them into lines.
 """
 
 from fanet_mw.protocol.planner.demand import TrafficClass, demands
-from fanet_mw.protocol.planner.design import Design
-from fanet_mw.protocol.planner.feasibility import Change, ClassPlan, Plan, Site, evaluate
+from fanet_mw.protocol.planner.feasibility import ClassPlan, Plan, Site, evaluate
 from fanet_mw.protocol.planner.head import ClusterPlan
-from fanet_mw.protocol.planner.search import plan
-from fanet_mw.protocol.planner.text import describe
+from fanet_mw.protocol.planner.loss import Loss, loss
+from fanet_mw.protocol.planner.optimum import Optimum, optimum
+from fanet_mw.protocol.planner.search import Change, cheapest_change, plan, with_capacity
+from fanet_mw.protocol.planner.text import describe, describe_change, describe_loss, describe_optimum
+from fanet_mw.protocol.planner.variant import Variant, vary
 
 __all__ = [
     "Change",
     "ClassPlan",
     "ClusterPlan",
-    "Design",
+    "Loss",
+    "Optimum",
     "Plan",
     "Site",
     "TrafficClass",
+    "Variant",
+    "cheapest_change",
     "demands",
     "describe",
+    "describe_change",
+    "describe_loss",
+    "describe_optimum",
     "evaluate",
+    "loss",
+    "optimum",
     "plan",
+    "vary",
+    "with_capacity",
 ]

@@ -1,4 +1,4 @@
-"""One design judged: per cluster its slot's load, delay and backlog; per class a bound from source to last node.
+"""One scenario judged: per cluster its slot's load, delay and backlog; per class a bound from source to last node.
 
     source --access--> head's queue --slot--> flood --> last node
            uplink_ns          slot_delays        FloodCost.duration
@@ -6,7 +6,8 @@
 A head's slot holds floods one spacing apart; under a timetable each of its turns holds one. Packets reach the head late
 by up to the uplink: its bound where there is one, else one second (or period) is assumed, and said so.
 
-Feasible: each slot is stable, every packet is through before its lifetime ends, and no queue overflows.
+Feasible: each slot is stable, every packet is through before its lifetime and any deadline ends, no queue overflows,
+and a flood reaches everyone.
 """
 
 from collections.abc import Iterator, Mapping, Sequence
@@ -14,55 +15,80 @@ from typing import Final, NamedTuple
 
 from fanet_mw.protocol.clustering import Cluster, balanced
 from fanet_mw.protocol.delay import Bounded, Outcome, Refused, paper
+from fanet_mw.protocol.guard import PLANNED_ERROR_NS, slot_guard_ns
+from fanet_mw.protocol.planner import parts
 from fanet_mw.protocol.planner.access import Ways, access_outcome, ways
 from fanet_mw.protocol.planner.demand import TrafficClass
-from fanet_mw.protocol.planner.design import Design
 from fanet_mw.protocol.planner.flood import FloodCost, flood_cost
+from fanet_mw.protocol.planner.goodput_bound import Goodput, any_protocol
 from fanet_mw.protocol.planner.head import ClusterPlan, Share, slot_delays, work_ns
-from fanet_mw.protocol.planner.turns import Candidate, judge, superframe_of, table_for
+from fanet_mw.protocol.planner.turns import Candidate, Superframe, judge, superframe_of, table_for
+from fanet_mw.protocol.scheduled import leader_load, schedule_parts
 from fanet_mw.protocol.topology import Adjacency, within_range
 from fanet_mw.scenario import Scenario
-from fanet_mw.units import Enu, NodeId, S, seconds_to_ns
+from fanet_mw.units import MS, Enu, NodeId, S, seconds_to_ns
 
 _ASSUMED_UPLINK_NS: Final = 1 * S
 
 
 class ClassPlan(NamedTuple):
-    """A traffic class: its bound from the source to the last node it can reach, and from the head on."""
+    """A traffic class: its bound from the source to the last node, and from the head on."""
 
     name: str
     sources: int
+    interval_ns: int
     bound: Outcome
     from_head: Outcome
 
-
-class Change(NamedTuple):
-    """The cheapest change that makes a plan feasible: keys for people, and what the plan then promises."""
-
-    keys: tuple[str, ...]
-    design: Design
-    classes: tuple[ClassPlan, ...]
+    def meets(self, deadline_ns: int) -> bool:
+        return isinstance(self.bound, Bounded) and self.bound.delay_ns <= deadline_ns
 
 
 class Plan(NamedTuple):
-    """The verdict on a design."""
+    """The verdict on a scenario."""
 
-    design: Design
+    scenario: Scenario
     clusters: tuple[ClusterPlan, ...]
     classes: tuple[ClassPlan, ...]
     access: Outcome
     uplink_ns: int
     paper: Outcome
     """What equations (1)-(4) say of the fullest cluster: to compare with, not to rely on."""
+    superframe: Superframe | None
+    """None where relays contend."""
+    cut_off: tuple[NodeId, ...]
+    """Nodes that no flood of the leader's part of the swarm reaches."""
+    goodput: Goodput | None
+    """What no protocol can exceed; None: traffic is not for everyone, or the swarm is in parts."""
+    deadline_ns: int | None
     problems: tuple[str, ...]
     """Why it is not feasible; none when it is."""
     notes: tuple[str, ...]
     """What the bounds assume or cannot promise."""
-    change: Change | None = None
 
     @property
     def feasible(self) -> bool:
         return not self.problems
+
+    @property
+    def proven(self) -> bool:
+        """Whether the bounds hold, not only estimates of what CSMA/CA does."""
+        return isinstance(self.access, Bounded) and all(cluster.flood.proven for cluster in self.clusters)
+
+    @property
+    def carried_per_second(self) -> float | None:
+        """Application packets per second, all sources together, that this configuration carries; None: unknown.
+
+        Exact for a timetable whose capacity was asked for; where relays contend, what would fill the fullest slot.
+        """
+        application = next((c for c in self.classes if c.name == "application"), None)
+        if application is None or not application.sources:
+            return None
+        if self.superframe is not None:
+            least_ns = self.superframe.least_interval_ns
+            return None if least_ns is None else application.sources * S / least_ns
+        used = self.bottleneck.utilization if self.bottleneck else 0.0
+        return application.sources * S / application.interval_ns / used if used else None
 
     @property
     def bottleneck(self) -> ClusterPlan | None:
@@ -71,13 +97,29 @@ class Plan(NamedTuple):
 
 
 class Site:
-    """Where the nodes are; what depends on that alone is computed once and shared by all designs of a search."""
+    """A scenario and where its nodes are; what depends on positions alone is computed once for all variants."""
 
     def __init__(self, scenario: Scenario, positions: Mapping[NodeId, Enu], adjacency: Adjacency | None = None) -> None:
         self.scenario = scenario
         self.positions = positions
         self.adjacency = within_range(positions, range_m=scenario.radio.range_m) if adjacency is None else adjacency
         self._floods: dict[tuple[NodeId, int], FloodCost] = {}
+
+    def of(self, scenario: Scenario) -> "Site":
+        """The same nodes under another scenario; floods cost the same where the rules of relaying are the same."""
+        other = Site(scenario, self.positions, self.adjacency)
+        if scenario.clusters.relay == self.scenario.clusters.relay and scenario.radio == self.scenario.radio:
+            other._floods = self._floods
+        return other
+
+    @property
+    def timetable(self) -> bool:
+        return self.scenario.clusters.relay == "scheduled"
+
+    @property
+    def guard_ns(self) -> int:
+        error_ns = PLANNED_ERROR_NS if self.scenario.clock.sync != "none" else 0
+        return slot_guard_ns(self.scenario, clock_error_ns=error_ns)
 
     def flood(self, head: NodeId, payload_bytes: int) -> FloodCost:
         key = head, payload_bytes
@@ -86,45 +128,71 @@ class Site:
         return self._floods[key]
 
 
-def evaluate(site: Site, classes: Sequence[TrafficClass], design: Design) -> Plan:
-    """Judge one design. The leader is in no cluster, unless it is alone."""
+class _Judged(NamedTuple):
+    """The heads under one way to relay."""
+
+    clusters: tuple[ClusterPlan, ...]
+    cut_off: tuple[NodeId, ...]
+    superframe: Superframe | None = None
+    unfit: tuple[str, ...] = ()
+
+
+def members_of(scenario: Scenario, positions: Mapping[NodeId, Enu]) -> list[Cluster]:
+    """The clusters that the leader will make. It is in none, unless it is alone; under a timetable it has turns."""
+    others = {node: at for node, at in positions.items() if node != scenario.leader}
+    clusters = balanced(others or positions, count=scenario.clusters.count)
+    if scenario.clusters.relay == "scheduled" and others and scenario.leader in positions:
+        clusters.append(Cluster(scenario.leader, (scenario.leader,)))
+    return clusters
+
+
+def evaluate(site: Site, classes: Sequence[TrafficClass], *, deadline_ns: int | None = None) -> Plan:
+    """Judge one scenario."""
     scenario = site.scenario
-    others = {node: at for node, at in site.positions.items() if node != scenario.leader}
-    clusters = balanced(others or site.positions, count=design.clusters)
-    if design.relays == "timetable" and others and scenario.leader in site.positions:
-        clusters.append(Cluster(scenario.leader, (scenario.leader,)))  # it has turns of its own
+    clusters = members_of(scenario, site.positions)
     head_of = {member: cluster.head for cluster in clusters for member in cluster.members}
     heads = [cluster.head for cluster in clusters]
     found = ways(site.adjacency, head_of, classes)
     loads = _loads(heads, head_of, found, classes)
-    shares = [_shares(site, head, load, classes, design) for head, load in zip(heads, loads, strict=True)]
-    access = _access(site, found, classes, design, shares)
-    uplink_ns = access.delay_ns if isinstance(access, Bounded) else _assumed_ns(design)
+    shares = [_shares(site, head, load, classes) for head, load in zip(heads, loads, strict=True)]
+    access = _access(site, found, classes, shares)
+    uplink_ns = access.delay_ns if isinstance(access, Bounded) else _assumed_ns(site)
     candidates = [
         Candidate(
             cluster.head, len(cluster.members), max((found.hops.get(n, 0) for n in cluster.members), default=0), row
         )
         for cluster, row in zip(clusters, shares, strict=True)
     ]
-    unfit: tuple[str, ...] = ()
-    if design.relays == "timetable":
-        judged, unfit = _turned(site, candidates, design, uplink_ns)
-    else:
-        judged = tuple(
-            _cluster(candidate, slot_ns=slot_ns, design=design, jitter_ns=uplink_ns)
-            for candidate, slot_ns in zip(candidates, _slots(design, shares), strict=True)
-        )
+    judged = (_in_turns if site.timetable else _in_slots)(site, candidates, uplink_ns)
     summed = tuple(_class(index, c, judged, uplink_ns) for index, c in enumerate(classes))
+    late = () if judged.unfit or judged.cut_off or deadline_ns is None else tuple(_late(summed, deadline_ns))
+    cut_off = tuple(parts.problems(judged.cut_off))
     return Plan(
-        design=design,
-        clusters=judged,
+        scenario=scenario,
+        clusters=judged.clusters,
         classes=summed,
         access=access,
         uplink_ns=uplink_ns,
-        paper=_paper(judged, design),
-        problems=unfit or tuple(_problems(scenario, judged, summed)),
-        notes=(*_notes(access, judged, found, design, uplink_ns), *_left_out(scenario)),
+        paper=_paper(judged.clusters, scenario),
+        superframe=judged.superframe,
+        cut_off=judged.cut_off,
+        goodput=_goodput(site, classes),
+        deadline_ns=deadline_ns,
+        problems=judged.unfit or (*cut_off, *_problems(scenario, judged.clusters, summed, cut_off), *late),
+        notes=(*_notes(access, judged.clusters, site, uplink_ns), *_left_out(scenario)),
     )
+
+
+def _goodput(site: Site, classes: Sequence[TrafficClass]) -> Goodput | None:
+    everyone = site.scenario.traffic.destination == "all"
+    sources = next((c.sources for c in classes if c.name == "application"), ())
+    return any_protocol(site.scenario, site.adjacency, sources) if everyone else None
+
+
+def _late(classes: Sequence[ClassPlan], deadline_ns: int) -> Iterator[str]:
+    for c in classes:
+        if isinstance(c.bound, Bounded) and not c.meets(deadline_ns):
+            yield (f"{c.name}: takes up to {c.bound.delay_ns / MS:.1f} ms, the deadline is {deadline_ns / MS:g} ms")
 
 
 def _loads(
@@ -140,12 +208,10 @@ def _loads(
     return [rows[head] for head in heads]
 
 
-def _shares(
-    site: Site, head: NodeId, load: Sequence[int], classes: Sequence[TrafficClass], design: Design
-) -> list[Share]:
+def _shares(site: Site, head: NodeId, load: Sequence[int], classes: Sequence[TrafficClass]) -> list[Share]:
     """A turn is as long as the longest packet needs, whatever flies in it."""
-    if design.relays == "timetable":
-        turn_ns = superframe_of(site.scenario, period_ns=design.period_ns).turn_ns
+    if site.timetable:
+        turn_ns = superframe_of(site.scenario).turn_ns
         turn = FloodCost(turn_ns, turn_ns, 1, proven=True)
         return [Share(n, c.interval_ns, turn) for n, c in zip(load, classes, strict=True)]
     return [Share(n, c.interval_ns, site.flood(head, c.payload_bytes)) for n, c in zip(load, classes, strict=True)]
@@ -155,112 +221,110 @@ def _longest(shares: Sequence[Share]) -> FloodCost:
     return max((s.flood for s in shares), key=lambda f: f.duration_ns, default=FloodCost(0, 1, 0, proven=True))
 
 
-def _slots(design: Design, shares: Sequence[Sequence[Share]]) -> list[int]:
-    """Slot lengths, guard included. By load: what each needs, and the rest of the period in equal parts."""
-    if not shares:
-        return []
-    equal = design.period_ns // len(shares)
-    if design.slots == "equal":
-        return [equal] * len(shares)
-    needed = [
-        design.guard_ns + work_ns(row, period_ns=design.period_ns) + max((s.flood.spacing_ns for s in row), default=0)
-        for row in shares
-    ]
-    rest = (design.period_ns - sum(needed)) // len(shares)
-    return [need + rest for need in needed] if rest >= 0 else [equal] * len(shares)
-
-
-def _assumed_ns(design: Design) -> int:
+def _assumed_ns(site: Site) -> int:
     """The way to the head where nothing bounds it; a timetable lets members contend only once per period."""
-    return max(_ASSUMED_UPLINK_NS, design.period_ns) if design.relays == "timetable" else _ASSUMED_UPLINK_NS
+    return max(_ASSUMED_UPLINK_NS, site.scenario.clusters.period_ns) if site.timetable else _ASSUMED_UPLINK_NS
 
 
-def _access(
-    site: Site, found: Ways, classes: Sequence[TrafficClass], design: Design, shares: Sequence[Sequence[Share]]
-) -> Outcome:
+def _access(site: Site, found: Ways, classes: Sequence[TrafficClass], shares: Sequence[Sequence[Share]]) -> Outcome:
     """The way to the head. Under a timetable it shares no air with floods, but has to fit its window."""
-    if design.relays != "timetable":
+    if not site.timetable:
         spacing_ns = min((s.flood.spacing_ns for row in shares for s in row), default=S)
         return access_outcome(site.scenario, site.adjacency, found, classes, spacing_ns=spacing_ns)
     outcome = access_outcome(site.scenario, site.adjacency, found, classes, spacing_ns=None)
     if isinstance(outcome, Refused) or not any(found.hops.values()):
         return outcome
-    contention_ns = superframe_of(site.scenario, period_ns=design.period_ns).contention_ns
-    if outcome.delay_ns > contention_ns:
+    turns = superframe_of(site.scenario)
+    if outcome.delay_ns > turns.contention_ns:
         return Refused(
             f"{outcome.delay_ns / 1e6:.0f} ms in the worst case, more than the contention window of "
-            f"{contention_ns / 1e6:g} ms"
+            f"{turns.contention_ns / 1e6:g} ms"
         )
-    return Bounded(outcome.delay_ns + design.period_ns - contention_ns)
+    return Bounded(outcome.delay_ns + turns.period_ns - turns.contention_ns)
 
 
-def _turned(
-    site: Site, candidates: Sequence[Candidate], design: Design, jitter_ns: int
-) -> tuple[tuple[ClusterPlan, ...], tuple[str, ...]]:
+def _in_turns(site: Site, candidates: Sequence[Candidate], jitter_ns: int) -> _Judged:
     """All heads under one timetable; when the turns do not suffice, each is refused with that, and it is said."""
-    superframe = superframe_of(site.scenario, period_ns=design.period_ns)
-    places = tuple((node, site.positions[node]) for node in sorted(site.positions))
-    leader = site.scenario.leader
-    members = {c.head: 0 if c.head == leader else c.members for c in candidates}
-    table = table_for(site.scenario, places, members, superframe)
-    if not isinstance(table, Refused):
-        lead_ns = site.scenario.radio.lead_ns
-        judged = (judge(table, c, superframe, lead_ns=lead_ns, jitter_ns=jitter_ns) for c in candidates)
-        return tuple(judged), ()
-    return tuple(_refused(candidate, table, design) for candidate in candidates), (table.reason,)
+    scenario = site.scenario
+    turns = superframe_of(scenario)
+    members = {c.head: leader_load(scenario) if c.head == scenario.leader else c.members for c in candidates}
+    table = table_for(scenario, tuple(sorted(site.positions.items())), members)
+    if isinstance(table, Refused):
+        refused = tuple(_refused(candidate, table, scenario.clusters.period_ns) for candidate in candidates)
+        return _Judged(refused, (), Superframe(turns, 0, 0, None), (table.reason,))
+    lead_ns, control = scenario.radio.lead_ns, {scenario.leader: schedule_parts(scenario)}
+    judged = tuple(
+        judge(table, c, turns, lead_ns=lead_ns, jitter_ns=jitter_ns, control=control.get(c.head, 0)) for c in candidates
+    )
+    superframe = Superframe(turns, table.used, len(table.roots()), table)
+    return _Judged(judged, parts.missed(table.uncovered, leader=scenario.leader), superframe)
 
 
-def _refused(candidate: Candidate, why: Refused, design: Design) -> ClusterPlan:
+def _in_slots(site: Site, candidates: Sequence[Candidate], jitter_ns: int) -> _Judged:
+    """Equal slots, one head after the other, as the leader divides the period."""
+    period_ns = site.scenario.clusters.period_ns
+    slot_ns = period_ns // max(1, len(candidates))
+    judged = tuple(
+        _cluster(candidate, slot_ns=slot_ns, period_ns=period_ns, guard_ns=site.guard_ns, jitter_ns=jitter_ns)
+        for candidate in candidates
+    )
+    return _Judged(judged, parts.split(site.adjacency, leader=site.scenario.leader))
+
+
+def _refused(candidate: Candidate, why: Refused, period_ns: int) -> ClusterPlan:
     return ClusterPlan(
         head=candidate.head,
         members=candidate.members,
         hops=candidate.hops,
         slot_ns=0,
         usable_ns=0,
-        work_ns=work_ns(candidate.shares, period_ns=design.period_ns),
-        packets=_packets(candidate.shares, design),
+        work_ns=work_ns(candidate.shares, period_ns=period_ns),
+        packets=_packets(candidate.shares, period_ns),
         flood=_longest(candidate.shares),
         delays=tuple(why if s.sources else Bounded(0) for s in candidate.shares),
         backlog=None,
     )
 
 
-def _cluster(candidate: Candidate, *, slot_ns: int, design: Design, jitter_ns: int) -> ClusterPlan:
+def _cluster(candidate: Candidate, *, slot_ns: int, period_ns: int, guard_ns: int, jitter_ns: int) -> ClusterPlan:
     shares = candidate.shares
-    usable_ns = max(0, slot_ns - design.guard_ns)
-    delays, waiting = slot_delays(shares, usable_ns=usable_ns, period_ns=design.period_ns, jitter_ns=jitter_ns)
+    usable_ns = max(0, slot_ns - guard_ns)
+    delays, waiting = slot_delays(shares, usable_ns=usable_ns, period_ns=period_ns, jitter_ns=jitter_ns)
     return ClusterPlan(
         head=candidate.head,
         members=candidate.members,
         hops=candidate.hops,
         slot_ns=slot_ns,
         usable_ns=usable_ns,
-        work_ns=work_ns(shares, period_ns=design.period_ns),
-        packets=_packets(shares, design),
+        work_ns=work_ns(shares, period_ns=period_ns),
+        packets=_packets(shares, period_ns),
         flood=_longest(shares),
         delays=tuple(delays),
         backlog=waiting,
     )
 
 
-def _packets(shares: Sequence[Share], design: Design) -> float:
-    return sum(s.sources * design.period_ns / s.interval_ns for s in shares)
+def _packets(shares: Sequence[Share], period_ns: int) -> float:
+    return sum(s.sources * period_ns / s.interval_ns for s in shares)
 
 
-def _class(index: int, c: TrafficClass, clusters: Sequence[ClusterPlan], uplink_ns: int) -> ClassPlan:
+def _class(index: int, c: TrafficClass, judged: _Judged, uplink_ns: int) -> ClassPlan:
+    if judged.cut_off:
+        refused = Refused(f"{len(judged.cut_off)} nodes are out of reach")
+        return ClassPlan(c.name, len(c.sources), c.interval_ns, refused, refused)
     worst_ns = 0
-    for cluster in clusters:
+    for cluster in judged.clusters:
         outcome = cluster.delays[index]
         if isinstance(outcome, Refused):
-            refused = Refused(f"head {cluster.head}: {outcome.reason}")
-            return ClassPlan(c.name, len(c.sources), refused, refused)
+            refused = outcome if judged.unfit else Refused(f"head {cluster.head}: {outcome.reason}")
+            return ClassPlan(c.name, len(c.sources), c.interval_ns, refused, refused)
         worst_ns = max(worst_ns, outcome.delay_ns)
-    return ClassPlan(c.name, len(c.sources), Bounded(worst_ns + uplink_ns), Bounded(worst_ns))
+    return ClassPlan(c.name, len(c.sources), c.interval_ns, Bounded(worst_ns + uplink_ns), Bounded(worst_ns))
 
 
-def _paper(clusters: Sequence[ClusterPlan], design: Design) -> Outcome:
+def _paper(clusters: Sequence[ClusterPlan], scenario: Scenario) -> Outcome:
     """Equations (3) and (4) of each cluster, its packets taken as evenly spaced; the greatest."""
-    worst_ns = 0
+    worst_ns, period_ns = 0, scenario.clusters.period_ns
     for cluster in clusters:
         if not cluster.packets:
             continue
@@ -269,8 +333,8 @@ def _paper(clusters: Sequence[ClusterPlan], design: Design) -> Outcome:
         found = paper.cluster_estimate(
             airtime_ns=max(1, round(cluster.work_ns / cluster.packets)),
             slot_ns=cluster.usable_ns,
-            period_ns=design.period_ns,
-            interval_ns=max(1, round(design.period_ns / cluster.packets)),
+            period_ns=period_ns,
+            interval_ns=max(1, round(period_ns / cluster.packets)),
         )
         if isinstance(found, Refused):
             return found
@@ -278,16 +342,19 @@ def _paper(clusters: Sequence[ClusterPlan], design: Design) -> Outcome:
     return Bounded(worst_ns)
 
 
-def _problems(scenario: Scenario, clusters: Sequence[ClusterPlan], classes: Sequence[ClassPlan]) -> Iterator[str]:
-    full = False
+def _problems(
+    scenario: Scenario, clusters: Sequence[ClusterPlan], classes: Sequence[ClassPlan], cut_off: Sequence[str]
+) -> Iterator[str]:
+    full = sorted((c for c in clusters if c.utilization > 1), key=lambda c: (-c.utilization, c.head))
+    if full:
+        worst = full[0]
+        others = "" if len(full) == 1 else f"; {len(full) - 1} other slots are too full as well"
+        yield (
+            f"head {worst.head}: the {worst.packets:.1f} packets of a flooding period take "
+            f"{worst.work_ns / 1e6:.1f} ms, its slot of {worst.slot_ns / 1e6:.1f} ms has "
+            f"{worst.usable_ns / 1e6:.1f} ms for them{others}"
+        )
     for cluster in clusters:
-        if cluster.utilization > 1:
-            full = True
-            yield (
-                f"head {cluster.head}: the {cluster.packets:.1f} packets of a flooding period take "
-                f"{cluster.work_ns / 1e6:.0f} ms, its slot of {cluster.slot_ns / 1e6:.0f} ms has "
-                f"{cluster.usable_ns / 1e6:.0f} ms for them"
-            )
         if cluster.backlog is not None and cluster.backlog > scenario.routing.queue_frames:
             yield (
                 f"head {cluster.head}: up to {cluster.backlog} packets wait, "
@@ -296,7 +363,7 @@ def _problems(scenario: Scenario, clusters: Sequence[ClusterPlan], classes: Sequ
     lifetime_ns = seconds_to_ns(scenario.routing.lifetime_s)
     for c in classes:
         if isinstance(c.bound, Refused):
-            if not full:
+            if not full and not cut_off:
                 yield f"{c.name}: {c.bound.reason}"
         elif c.bound.delay_ns > lifetime_ns:
             yield (
@@ -312,20 +379,16 @@ def _left_out(scenario: Scenario) -> Iterator[str]:
         yield "repairs of lost packets come later than any bound here, and their load is not counted"
 
 
-def _notes(
-    access: Outcome, clusters: Sequence[ClusterPlan], found: Ways, design: Design, uplink_ns: int
-) -> Iterator[str]:
+def _notes(access: Outcome, clusters: Sequence[ClusterPlan], site: Site, uplink_ns: int) -> Iterator[str]:
     if isinstance(access, Refused):
         yield f"the way to the head is assumed to take at most {uplink_ns / S:g} s, not proven: {access.reason}"
     if any(not cluster.flood.proven for cluster in clusters):
         yield "floods are relayed by CSMA/CA: their duration and spacing are estimates, and losses are not counted"
         tail_ns = max(cluster.flood.duration_ns - cluster.flood.spacing_ns for cluster in clusters)
-        if tail_ns > design.guard_ns:
+        if tail_ns > site.guard_ns:
             yield (
                 f"a slot's last flood runs about {tail_ns / 1e6:.0f} ms into the next slot, the guard time is "
-                f"{design.guard_ns / 1e6:g} ms: floods of neighboring slots meet"
+                f"{site.guard_ns / 1e6:g} ms: floods of neighboring slots meet"
             )
     else:
         yield "floods hold their bound while no frame is lost and the nodes are where the timetable has them"
-    if found.homeless:
-        yield f"{len(found.homeless)} nodes can reach no head: {', '.join(map(str, found.homeless[:8]))}"

@@ -1,26 +1,37 @@
-"""The cheapest change that makes a scenario feasible: fewest keys first, then the least change of their values.
+"""Plan a scenario, and the cheapest change that makes it feasible: fewest keys first, then the least change of values.
 
-Searched: the cluster count, the flooding period, slots by load, a timetable. When none of them helps, the least
-traffic interval (in steps) at which the design as it stands is feasible is named: load that does not fit has to go.
+Searched: cluster count and flooding period; under a timetable the backoff that a turn has to hold (`radio.cw_min`) and
+every node a head; where relays contend, a timetable. Last, less application traffic: load that does not fit has to go.
 """
 
 from collections.abc import Iterator, Mapping, Sequence
 from itertools import product
-from typing import Final
+from typing import Final, NamedTuple
 
 from fanet_mw.protocol.delay import Refused
-from fanet_mw.protocol.planner.demand import TrafficClass, demands
-from fanet_mw.protocol.planner.design import Design, Slots
-from fanet_mw.protocol.planner.feasibility import Change, Plan, Site, evaluate
+from fanet_mw.protocol.planner.demand import demands
+from fanet_mw.protocol.planner.feasibility import Plan, Site, evaluate, members_of
+from fanet_mw.protocol.planner.goodput_bound import in_turns
+from fanet_mw.protocol.planner.turns import least_interval_ns, superframe_of
+from fanet_mw.protocol.planner.variant import Value, Variant, vary
+from fanet_mw.protocol.scheduled import leader_load
 from fanet_mw.protocol.topology import Adjacency
 from fanet_mw.scenario import Scenario
-from fanet_mw.units import Enu, NodeId, S
+from fanet_mw.units import Enu, NodeId
 
 _COUNTS: Final = (1, 2, 3, 4, 5, 6, 8, 11, 15, 22, 30, 44, 64)
 _PERIODS: Final = (0.1, 0.2, 0.4, 0.5, 0.7, 1.0, 1.4, 2.0, 3.0, 5.0, 10.0)
-_COARSE: Final = (0.2, 0.5, 1.0, 2.0)
-"""For a timetable, which takes a second to make: periods, and cluster counts."""
+"""Of the scenario's own period."""
+_TURN_PERIODS_S: Final = (0.1, 0.2, 0.25, 0.3, 0.4, 0.5, 0.7, 1.0, 2.0, 5.0)
+WINDOWS: Final = (31, 15, 7, 3, 1)
 _SLOWER: Final = (1.1, 1.25, 1.5, 2.0, 2.5, 3.0, 4.0, 5.0, 7.0, 10.0, 20.0, 50.0, 100.0)
+
+
+class Change(NamedTuple):
+    """The cheapest change that makes a plan feasible, and what the plan then is."""
+
+    variant: Variant
+    plan: Plan
 
 
 def plan(
@@ -29,66 +40,100 @@ def plan(
     *,
     adjacency: Adjacency | None = None,
     sources: Sequence[NodeId] | None = None,
-    search: bool = True,
+    deadline_ns: int | None = None,
 ) -> Plan | Refused:
-    """Judge the scenario as it stands, and look for the cheapest change when it is not feasible.
+    """Judge the scenario as it stands. Refused when its traffic cannot be planned at all.
 
     `adjacency` is who hears whom, by default everyone within `radio.range_m` (a timetable looks at positions only);
-    `sources` are the nodes that send the application's traffic. Refused when the traffic cannot be planned at all.
+    `sources` are the nodes that send the application's traffic; each class has to meet the deadline.
     """
-    classes = demands(scenario, sources)
-    if isinstance(classes, Refused):
-        return classes
-    site = Site(scenario, positions, adjacency)
-    design = Design.of(scenario)
-    found = evaluate(site, classes, design)
-    if found.feasible or not search:
+    return _judge(Site(scenario, positions, adjacency), sources, deadline_ns)
+
+
+def _judge(site: Site, sources: Sequence[NodeId] | None, deadline_ns: int | None) -> Plan | Refused:
+    classes = demands(site.scenario, sources)
+    return classes if isinstance(classes, Refused) else evaluate(site, classes, deadline_ns=deadline_ns)
+
+
+def with_capacity(found: Plan, positions: Mapping[NodeId, Enu]) -> Plan:
+    """The same plan with the traffic interval down to which its timetable carries everything; takes a second."""
+    if found.superframe is None or not found.superframe.used or found.cut_off:
         return found
-    return found._replace(change=_cheapest(site, classes, design) or _lighter(site, classes, design))
+    leader, own = found.scenario.leader, leader_load(found.scenario)
+    members = {c.head: own if c.head == leader else len(c.members) for c in members_of(found.scenario, positions)}
+    least = least_interval_ns(found.scenario, tuple(sorted(positions.items())), members)
+    return found._replace(superframe=found.superframe._replace(least_interval_ns=least))
 
 
-def _cheapest(site: Site, classes: Sequence[TrafficClass], design: Design) -> Change | None:
-    for candidate in sorted(_candidates(design, len(site.positions)), key=lambda c: (design.distance(c), c)):
-        found = evaluate(site, classes, candidate)
-        if found.feasible:
-            return Change(tuple(_differences(design, candidate)), candidate, found.classes)
+def cheapest_change(
+    scenario: Scenario,
+    positions: Mapping[NodeId, Enu],
+    *,
+    adjacency: Adjacency | None = None,
+    sources: Sequence[NodeId] | None = None,
+    deadline_ns: int | None = None,
+) -> Change | None:
+    """The least change after which `plan` is feasible; None when none of those searched is.
+
+    Nothing is searched for a swarm in parts: only nodes that come nearer help it.
+    """
+    site = Site(scenario, positions, adjacency)
+    found = _judge(site, sources, deadline_ns)
+    if isinstance(found, Plan) and found.cut_off:
+        return None
+    for group in (_changes(scenario), _lighter(scenario)):
+        for variant in sorted(group, key=lambda v: v.size):
+            if hopeless(site.of(variant.scenario), sources):
+                continue
+            found = _judge(site.of(variant.scenario), sources, deadline_ns)
+            if isinstance(found, Plan) and found.feasible:
+                return Change(variant, found)
     return None
 
 
-def _candidates(design: Design, nodes: int) -> Iterator[Design]:
-    coarse = design.relays == "timetable"
-    several = [round(design.clusters * factor) for factor in _COARSE] if coarse else _COUNTS
-    counts = sorted({design.clusters, *(n for n in several if 1 <= n < max(2, nodes))})
-    periods = sorted({round(design.period_ns * factor) for factor in (_COARSE if coarse else _PERIODS)})
-    slots: tuple[Slots, ...] = ("equal",) if coarse else ("equal", "by_load")
-    for clusters, period_ns, divided in product(counts, periods, slots):
-        candidate = Design(clusters, period_ns, design.guard_ns, divided, design.relays)
-        if candidate != design and design.guard_ns < period_ns // clusters:
-            yield candidate
-    if not coarse:
-        yield design._replace(relays="timetable")
+def hopeless(site: Site, sources: Sequence[NodeId] | None) -> bool:
+    """Whether no timetable at all carries the load in this scenario's turns; saves making one."""
+    classes = demands(site.scenario, sources)
+    if not site.timetable or isinstance(classes, Refused) or site.scenario.traffic.destination != "all":
+        return False
+    turns = superframe_of(site.scenario)
+    limits = ((c.interval_ns, in_turns(turns, site.adjacency, c.sources)) for c in classes)
+    return any(most is not None and interval_ns < most.least_interval_ns for interval_ns, most in limits)
 
 
-def _differences(old: Design, new: Design) -> Iterator[str]:
-    if new.clusters != old.clusters:
-        yield f"clusters.count = {new.clusters} (was {old.clusters})"
-    if new.period_ns != old.period_ns:
-        yield f"clusters.flooding_period_s = {new.period_ns / S:g} (was {old.period_ns / S:g})"
-    if new.slots != old.slots:
-        yield "slots divided by load instead of equally"
-    if new.relays != old.relays:
-        yield 'clusters.relay = "scheduled"'
+def _changes(scenario: Scenario) -> Iterator[Variant]:
+    options = _turn_options(scenario) if scenario.clusters.relay == "scheduled" else _slot_options(scenario)
+    for settings in options:
+        variant = vary(scenario, settings)
+        if variant is not None:
+            yield variant
 
 
-def _lighter(site: Site, classes: Sequence[TrafficClass], design: Design) -> Change | None:
-    """Less application traffic."""
+def _turn_options(scenario: Scenario) -> Iterator[dict[str, Value]]:
+    clusters, radio = scenario.clusters, scenario.radio
+    counts = dict.fromkeys((clusters.count, scenario.nodes.count - 1))
+    windows = dict.fromkeys((radio.cw_min, *(w for w in WINDOWS if w < radio.cw_min)))
+    periods = dict.fromkeys((clusters.flooding_period_s, *_TURN_PERIODS_S))
+    for count, window, period_s in product(counts, windows, periods):
+        yield {"clusters.count": count, "radio.cw_min": window, "clusters.flooding_period_s": period_s}
+
+
+def _slot_options(scenario: Scenario) -> Iterator[dict[str, Value]]:
+    clusters, nodes = scenario.clusters, scenario.nodes.count
+    counts = dict.fromkeys((clusters.count, *(n for n in _COUNTS if n < max(2, nodes))))
+    periods = dict.fromkeys(round(clusters.flooding_period_s * factor, 6) for factor in _PERIODS)
+    for count, period_s in product(counts, periods):
+        yield {"clusters.count": count, "clusters.flooding_period_s": period_s}
+    turned: dict[str, Value] = {"clusters.relay": "scheduled"}
+    yield turned
+    turned["clusters.count"] = nodes - 1
+    for period_s in dict.fromkeys((clusters.flooding_period_s, *_TURN_PERIODS_S)):
+        yield {**turned, "clusters.flooding_period_s": period_s}
+        yield {**turned, "clusters.flooding_period_s": period_s, "clusters.guard_ms": 0.5}
+
+
+def _lighter(scenario: Scenario) -> Iterator[Variant]:
     for factor in _SLOWER:
-        lighter = [
-            c._replace(interval_ns=round(c.interval_ns * factor)) if c.name == "application" else c for c in classes
-        ]
-        found = evaluate(site, lighter, design)
-        if found.feasible:
-            was = next(c.interval_ns for c in classes if c.name == "application")
-            key = f"traffic.interval_s = {was * factor / S:g} (was {was / S:g})"
-            return Change((key,), design, found.classes)
-    return None
+        variant = vary(scenario, {"traffic.interval_s": float(f"{scenario.traffic.interval_s * factor:.6g}")})
+        if variant is not None and scenario.traffic.arrivals == "cbr":
+            yield variant

@@ -6,7 +6,7 @@ whatever other floods run through the swarm meanwhile.
 
 from collections.abc import Mapping, Sequence
 from itertools import chain
-from typing import NamedTuple
+from typing import Final, NamedTuple
 
 from fanet_mw.protocol.delay import (
     Bounded,
@@ -21,23 +21,15 @@ from fanet_mw.protocol.delay import (
 )
 from fanet_mw.protocol.planner.flood import FloodCost
 from fanet_mw.protocol.planner.head import ClusterPlan, Share
-from fanet_mw.protocol.scheduled import fit, largest_frame
-from fanet_mw.protocol.timetable import Timetable
+from fanet_mw.protocol.scheduled import fit, largest_frame, links, schedule_parts
+from fanet_mw.protocol.timetable import Timetable, timetable
 from fanet_mw.protocol.turns import Turns, turn_ns
 from fanet_mw.scenario import Scenario
-from fanet_mw.units import MS, Enu, NodeId
+from fanet_mw.units import Enu, NodeId, seconds_to_ns
 
-
-class Superframe(NamedTuple):
-    """Contention window, then turns."""
-
-    period_ns: int
-    contention_ns: int
-    turn_ns: int
-
-    @property
-    def turns(self) -> int:
-        return max(0, self.period_ns - self.contention_ns) // self.turn_ns
+_MOST_TURNS: Final = 20_000
+Places = tuple[tuple[NodeId, Enu], ...]
+"""Where the nodes are, ascending."""
 
 
 class Candidate(NamedTuple):
@@ -49,75 +41,107 @@ class Candidate(NamedTuple):
     shares: Sequence[Share]
 
 
-def superframe_of(scenario: Scenario, *, period_ns: int) -> Superframe:
-    """The geometry of a scenario with this flooding period."""
+class Superframe(NamedTuple):
+    """The timetable of a plan: its geometry, and how full it is."""
+
+    turns: Turns
+    used: int
+    """Turns in which some node sends; 0: there is no table."""
+    packets: int
+    """Packets that the roots let out per superframe."""
+    table: Timetable | None
+    least_interval_ns: int | None = None
+    """The traffic interval down to which everything arrives, when it was asked for."""
+
+
+def superframe_of(scenario: Scenario) -> Turns:
+    """The geometry of a scenario."""
     turn = turn_ns(scenario, payload_bytes=largest_frame(scenario))
-    return Superframe(period_ns, round(scenario.clusters.contention_ms * MS), turn)
+    period_ns, contention_ns = scenario.clusters.period_ns, round(scenario.clusters.contention_ms * 1_000_000)
+    return Turns(0, period_ns, contention_ns, turn, max(0, period_ns - contention_ns) // turn)
 
 
-def table_for(
-    scenario: Scenario,
-    positions: Sequence[tuple[NodeId, Enu]],
-    members: Mapping[NodeId, int],
-    superframe: Superframe,
-) -> Timetable | Refused:
+def table_for(scenario: Scenario, places: Places, members: Mapping[NodeId, int]) -> Timetable | Refused:
     """The running protocol's timetable for heads with so many members; refused when one packet each does not fit."""
-    found = fit(scenario, tuple(positions), members, Turns(0, *superframe, superframe.turns))
+    turns = superframe_of(scenario)
+    found = fit(scenario, places, members, turns)
     if found is not None:
         return found
+    unlimited = Turns(0, turns.period_ns, 0, turns.turn_ns, _MOST_TURNS)
+    table = timetable(places, tuple(sorted(members)), links(scenario, unlimited))
+    needed = f"{table.used}" if table else f"more than {_MOST_TURNS}"
     return Refused(
-        f"one packet of each of {len(members)} heads does not fit {superframe.turns} turns of "
-        f"{superframe.turn_ns / 1e6:.2f} ms in {superframe.period_ns / 1e6:g} ms"
+        f"one packet of each of {len(members)} roots needs {needed} turns of {turns.turn_ns / 1e6:.3f} ms, "
+        f"a superframe has {turns.per_frame}"
     )
+
+
+def least_interval_ns(scenario: Scenario, places: Places, members: Mapping[NodeId, int]) -> int | None:
+    """The traffic interval down to which as many packets as come fit the turns; looked for up to twice the load."""
+    turns = superframe_of(scenario)
+    geometry = links(scenario, turns)
+    largest = max(members.values())
+    enough = 2 * largest * turns.period_ns / seconds_to_ns(scenario.traffic.interval_s)
+    best = 0
+    for packets in range(1, turns.per_frame // len(members) * largest + 2):
+        control = {scenario.leader: schedule_parts(scenario)}
+        roots = tuple(
+            root for root, n in sorted(members.items()) for _ in range(control.get(root, 0) + (packets if n else 0))
+        )
+        if not turns.per_frame or timetable(places, roots, geometry) is None:
+            break
+        best = packets
+        if packets > enough:
+            break
+    return -(-turns.period_ns * largest // best) if best else None
 
 
 def judge(
-    table: Timetable, candidate: Candidate, superframe: Superframe, *, lead_ns: int, jitter_ns: int
+    table: Timetable, candidate: Candidate, turns: Turns, *, lead_ns: int, jitter_ns: int, control: int = 0
 ) -> ClusterPlan:
-    """One head: its queue before its turns, then the span of the flood."""
+    """One head: its queue before its turns, then the span of the flood. `control`: more urgent packets per period."""
     starts_ns = sorted(
-        superframe.contention_ns + turn.offset * superframe.turn_ns
-        for turn in table.roots()
-        if turn.node == candidate.head
+        turns.start_ns(turn.offset, frame_start_ns=0) for turn in table.roots() if turn.node == candidate.head
     )
     relays = sum(1 for turn in table.turns if turn.root == candidate.head and turn.instance == 0)
-    geometry = Turns(0, *superframe, superframe.turns)
     span = table.spans.get(candidate.head, 1)
     offsets = [turn.offset for turn in table.roots() if turn.node == candidate.head]
-    duration_ns = max((geometry.flood_ns(offset, span=span) for offset in offsets), default=superframe.turn_ns)
-    server = TurnServer(superframe.turn_ns, superframe.period_ns, tuple(starts_ns), lead_ns)
-    delays, waiting = _queue(candidate.shares, server, duration_ns - superframe.turn_ns, jitter_ns)
-    packets = sum(s.sources * superframe.period_ns / s.interval_ns for s in candidate.shares)
+    duration_ns = max((turns.flood_ns(offset, span=span) for offset in offsets), default=turns.turn_ns)
+    server = TurnServer(turns.turn_ns, turns.period_ns, tuple(starts_ns), lead_ns)
+    delays, waiting = _queue(candidate.shares, server, duration_ns - turns.turn_ns, jitter_ns, control)
+    packets = sum(s.sources * turns.period_ns / s.interval_ns for s in candidate.shares)
+    packets += control if packets else 0
     return ClusterPlan(
         head=candidate.head,
         members=candidate.members,
         hops=candidate.hops,
-        slot_ns=len(starts_ns) * superframe.turn_ns,
-        usable_ns=len(starts_ns) * superframe.turn_ns,
-        work_ns=round(packets * superframe.turn_ns),
+        slot_ns=len(starts_ns) * turns.turn_ns,
+        usable_ns=len(starts_ns) * turns.turn_ns,
+        work_ns=round(packets * turns.turn_ns),
         packets=packets,
-        flood=FloodCost(duration_ns, superframe.turn_ns, relays, proven=True),
+        flood=FloodCost(duration_ns, turns.turn_ns, relays, proven=True),
         delays=tuple(delays),
         backlog=waiting,
     )
 
 
 def _queue(
-    shares: Sequence[Share], server: TurnServer, rest_ns: int, jitter_ns: int
+    shares: Sequence[Share], server: TurnServer, rest_ns: int, jitter_ns: int, control: int
 ) -> tuple[list[Outcome], int | None]:
     """Per class, most urgent first: the wait for a turn, the turn, and the rest of the flood; most packets waiting."""
     flows = [[Periodic(s.interval_ns, jitter_ns)] * s.sources for s in shares]
-    everything = Total(tuple(chain.from_iterable(flows)))
-    if not everything.parts:
+    if not any(flows):
         return [Bounded(0) for _ in shares], None
+    urgent = [Periodic(server.period_ns, 0)] * control
+    everything = Total((*urgent, *chain.from_iterable(flows)))
     server.check()
-    alone = sum(1 for row in flows if row) == 1
+    alone = not urgent and sum(1 for row in flows if row) == 1
     delays: list[Outcome] = []
     for index, row in enumerate(flows):
         if not row:
             delays.append(Bounded(0))
             continue
-        before = Total((*chain.from_iterable(flows[:index]), *row[1:]))
+        before = Total((*urgent, *chain.from_iterable(flows[:index]), *row[1:]))
         queue = delay_fifo(everything, server) if alone else delay_any_order(row[0], before, server)
         delays.append(queue if isinstance(queue, Refused) else Bounded(queue.delay_ns + rest_ns))
     waiting = backlog(everything, server)

@@ -1,0 +1,70 @@
+"""Whole swarms with a deadline: what is let in meets it; who cannot meet it any more says so."""
+
+from typing import Any
+
+import pytest
+
+from fanet_mw.config import build
+from fanet_mw.errors import ConfigError
+from fanet_mw.trace import DeadlineLost, DeadlineMet, Dropped
+from sim import catalog
+from sim.outcome import Outcome
+from sim.plan_cli import judge
+from sim.results import finish
+from sim.run import simulate
+
+LINE = ['nodes.layout="line"', "nodes.count=9", "clusters.count=8", "traffic.sources=8"]
+
+
+def bound_s(nodes: int) -> float:
+    settings = ['nodes.layout="line"', f"nodes.count={nodes}", f"clusters.count={nodes - 1}"]
+    plan = judge(catalog.find("clusters", [*settings, f"traffic.sources={nodes - 1}"]))[1]
+    found: float = plan["classes"][0]["bound_ms"] / 1000
+    return found
+
+
+def flown(*settings: str, faults: tuple[dict[str, Any], ...] = ()) -> tuple[Outcome, dict[str, Any]]:
+    scenario = catalog.find("clusters", [*LINE, *settings])
+    tree = scenario.model_dump(exclude_none=True) | {"faults": faults}
+    outcome = simulate(build(tree))
+    return outcome, finish(outcome, out=None)
+
+
+def test_load_beyond_the_admissible_rate_is_refused_and_the_rest_meets_the_deadline() -> None:
+    times = ["duration_s=30", "warmup_s=14", "clusters.flooding_period_s=0.2"]
+    fast = [*times, "traffic.interval_s=0.02", "radio.cw_min=1"]
+    outcome, free = flown(*fast)
+    assert free["delay_ms"]["max"] > 1000, "without a deadline the queues grow"
+    outcome, held = flown(*fast, "traffic.deadline_s=0.25")
+    assert held["delay_ms"]["max"] <= 250
+    assert held["bound"]["violations"] == 0
+    admission = held["admission"]
+    assert admission["refused"] == sum(r.reason == "admission" for r in outcome.records if isinstance(r, Dropped)) > 0
+    admitted = held["generated"] - admission["refused"]
+    assert held["delivered"] >= 0.98 * 8 * admitted
+    assert admission["met"] >= 8
+    assert admission["nodes_without"] == 0
+
+
+def test_a_node_that_joins_later_makes_the_way_too_long_for_the_deadline() -> None:
+    few, many = bound_s(8), bound_s(9)
+    assert few < many
+    cut = {"at_s": 0, "for_s": 9, "kind": "cut", "node": 9}
+    times = ["duration_s=26", "warmup_s=5", f"traffic.deadline_s={(few + many) / 2:.6f}"]
+    outcome, summary = flown(*times, faults=(cut,))
+    said = [r for r in outcome.records if isinstance(r, DeadlineMet | DeadlineLost)]
+    last = {r.node: r for r in said}
+    met = {r.node for r in said if isinstance(r, DeadlineMet) and r.t_ns < 9e9}
+    lost = [node for node in sorted(met) if isinstance(last[node], DeadlineLost)]
+    assert len(met) == 7
+    assert lost
+    for node in lost:
+        assert last[node].t_ns > 9e9
+        assert last[node].bound_ns + 1000 > last[node].deadline_ns
+    assert summary["admission"]["nodes_without"] > 0
+    assert summary["admission"]["deadline_ms"] == pytest.approx(500 * (few + many), abs=0.01)
+
+
+def test_a_deadline_needs_a_protocol_that_states_a_bound() -> None:
+    with pytest.raises(ConfigError, match="needs a protocol with a bound"):
+        catalog.find("clusters", ["traffic.deadline_s=1", "clusters.relay=all"])

@@ -1,0 +1,55 @@
+"""Admission: the shortest interval that meets a deadline, who is refused, and what is said when it is lost."""
+
+from hypothesis import given
+from hypothesis import strategies as st
+
+from fanet_mw.protocol.admission import Admission, Own, least_interval_ns
+from fanet_mw.protocol.turns import Turns
+from fanet_mw.trace import DeadlineLost, DeadlineMet
+from fanet_mw.units import MS, NodeId, S
+
+ME = NodeId(7)
+
+
+@st.composite
+def owns(draw) -> Own:
+    per_frame = draw(st.integers(4, 60))
+    turns = Turns(0, (40 + 2 * per_frame) * MS, 40 * MS, 2 * MS, per_frame)
+    roots = draw(st.sets(st.integers(0, per_frame - 1), min_size=1, max_size=6))
+    return Own(turns, tuple(sorted(roots)), draw(st.integers(1, per_frame)))
+
+
+@given(owns(), st.integers(1 * MS, 600 * MS))
+def test_the_least_interval_meets_the_deadline_and_nothing_shorter_does(own: Own, deadline_ns: int) -> None:
+    least = least_interval_ns(own, deadline_ns=deadline_ns)
+    if least is None:
+        assert own.turns.worst_ns(own.roots, span=own.span, interval_ns=10 * S) > deadline_ns
+        return
+    assert own.turns.worst_ns(own.roots, span=own.span, interval_ns=least) <= deadline_ns
+    shorter = own.turns.worst_ns(own.roots, span=own.span, interval_ns=least - 1)
+    assert shorter is None or shorter > deadline_ns
+
+
+def test_packets_that_come_too_soon_are_refused_and_do_not_count() -> None:
+    own = Own(Turns(0, 500 * MS, 40 * MS, 2 * MS, 230), (0,), 10)
+    admission = Admission(ME, deadline_ns=600 * MS, interval_ns=1 * S)
+    assert admission.admits(0), "until a timetable is in force everyone may send"
+    assert admission.follow(own, now_ns=0) == DeadlineMet(0, ME, 520 * MS, 600 * MS, 1 * S)
+    born = range(1000 * MS, 3001 * MS, 100 * MS)
+    assert [t for t in born if admission.admits(t)] == [1000 * MS, 1500 * MS, 2000 * MS, 2500 * MS, 3000 * MS]
+
+
+def test_a_deadline_is_lost_and_met_again_with_the_timetable_and_said_once_each() -> None:
+    near, far = (Own(Turns(0, 500 * MS, 40 * MS, 2 * MS, 230), (0,), span) for span in (10, 60))
+    admission = Admission(ME, deadline_ns=600 * MS, interval_ns=1 * S)
+    said = [admission.follow(own, now_ns=t) for t, own in enumerate((near, near, far, far, None, near))]
+    assert [type(record) for record in said if record] == [DeadlineMet, DeadlineLost, DeadlineMet]
+    assert [record.t_ns for record in said if record] == [0, 2, 5]
+    assert said[2].bound_ns == 620 * MS
+
+
+def test_where_no_rate_meets_the_deadline_what_the_turns_carry_is_let_in() -> None:
+    admission = Admission(ME, deadline_ns=100 * MS, interval_ns=1 * S)
+    lost = admission.follow(Own(Turns(0, 500 * MS, 40 * MS, 2 * MS, 230), (0, 100), 10), now_ns=0)
+    assert isinstance(lost, DeadlineLost)
+    assert [t for t in range(0, 1001 * MS, 50 * MS) if admission.admits(t)] == [0, 250 * MS, 500 * MS, 750 * MS, S]

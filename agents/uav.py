@@ -14,7 +14,8 @@ from fanet_mw import wire
 from fanet_mw.actor import Actor
 from fanet_mw.errors import DropReason, MalformedFrameError
 from fanet_mw.messages import Gps, MavlinkTap, Message, Reception, Setpoint, TxStatus, WifiScan
-from fanet_mw.protocol.node import Delivery, Node
+from fanet_mw.protocol.node import Node
+from fanet_mw.protocol.txqueue import Packet
 from fanet_mw.rng import stream
 from fanet_mw.routing import make_protocol
 from fanet_mw.scenario import Scenario
@@ -61,10 +62,13 @@ class Uav(Actor):
         self._own_wake_ns = self._next_own_ns()
 
     def receive(self, topic: str, message: Message, now_ns: int) -> None:
-        kind = type(message)
-        if kind is Reception:
-            self._node.hear(message, now_ns=now_ns)  # type: ignore[arg-type]  # narrowed by identity: the hot path
-        elif isinstance(message, TxStatus):
+        if type(message) is Reception:
+            node = self._node
+            node.hear(message, now_ns)
+            if node.requests or node.deliveries:  # else nothing came of it, as of most
+                self._settle(now_ns)
+            return
+        if isinstance(message, TxStatus):
             self._node.status(message, now_ns=now_ns)
             if self._traffic.saturated and self._traffic.open_at(now_ns):
                 self._send_traffic(now_ns + self._lead_ns, now_ns)
@@ -136,17 +140,15 @@ class Uav(Actor):
         vary = 1 + _HELLO_JITTER * (2 * self._hello_random() - 1)
         self._next_hello_ns += int(self._hello_ns * vary)
 
-    def _deliver(self, delivery: Delivery, now_ns: int) -> None:
-        """Bulk was only to be carried; survivor reports are for the mission and for whoever inspects us."""
-        if delivery.header.priority != wire.PRIORITY_REPORT:
-            return
+    def _deliver(self, packet: Packet, now_ns: int) -> None:
+        """Survivor reports are for the mission, and for whoever inspects us."""
         try:
-            report = wire.Survivor.decode_frame(delivery.frame)
+            report = wire.Survivor.decode_frame(packet.frame)
         except MalformedFrameError:
             self._node.dropped[DropReason.MALFORMED] += 1
             return
         self._mission.reported(report, position=self._autopilot.position, now_ns=now_ns)
-        self._tap(delivery.frame, now_ns)
+        self._tap(packet.frame, now_ns)
 
     def _tap(self, data: bytes, now_ns: int) -> None:
         self.outbox.append((self._tap_topic, MavlinkTap(now_ns, data)))
@@ -157,9 +159,10 @@ class Uav(Actor):
         """Bring what the parts put out to where it goes, until none has anything more."""
         node, mission = self._node, self._mission
         if node.deliveries:
-            deliveries, node.deliveries = node.deliveries, []
-            for delivery in deliveries:
-                self._deliver(delivery, now_ns)
+            for packet in node.deliveries:
+                if packet.header.priority == wire.PRIORITY_REPORT:  # bulk was only to be carried
+                    self._deliver(packet, now_ns)
+            node.deliveries.clear()
         if mission.reports:
             self._report(now_ns)
         if mission.course is not None:

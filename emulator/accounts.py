@@ -59,13 +59,9 @@ class Accounts:
         index = next((i for i, edge in enumerate(_LATENESS_STEPS) if late_ms <= edge), len(_LATENESS_STEPS))
         self._lateness[index] += 1
 
-    def ended(self, verdict: int, *, size: int) -> None:
-        """Nothing refers to a frame of `size` bytes any more: settle it."""
-        if verdict == s.DELIVERED:
-            self.delivered += 1
-            self.delivered_bytes += size
-        else:
-            self.dropped[_REASON_OF[verdict]] += 1
+    def lost(self, verdict: int) -> None:
+        """Nothing refers to a frame any more, and nobody got it."""
+        self.dropped[_REASON_OF[verdict]] += 1
 
     def measure_from(self, g: s.Ints, *, busy_ns: int, now_ns: int) -> None:
         """Air statistics begin here: the warm-up is over."""

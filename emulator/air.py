@@ -1,12 +1,15 @@
 """The kernel's arrays and the calls into it. Stations and frame slots; bytes, topics and nodes are the medium's."""
 
+import struct
 from functools import lru_cache
+from typing import Final
 
 import numpy as np
 import numpy.typing as npt
 
 from emulator import kernel
 from emulator import state as s
+from emulator.entry import Entry
 from emulator.error_rate import header_rates, log_success_per_bit
 from emulator.fading import law_of, seeds
 from emulator.faults import Faults
@@ -19,6 +22,10 @@ from fanet_mw.rng import stream_seed
 from fanet_mw.scenario import Scenario
 
 _GENERATOR_RANGE = 2_147_483_646
+_ROW: Final = struct.Struct("=6q")
+"""One row of `asked` or `out`."""
+_MOST_ASKED: Final = 256
+Rows = list[tuple[int, ...]]
 
 
 @lru_cache(maxsize=8)
@@ -73,7 +80,12 @@ class Air:
         self.st[s.FAULT_RANDOM] = [stream_seed(seed, "fault", i + 1) % _GENERATOR_RANGE + 1 for i in range(stations)]
         self.fr = np.zeros((s.FRAME_ROWS, 1024), np.int64)
         self._hs = np.zeros((8 * stations + 2 * 1024 + 64, 5), np.int64)
+        self._asked = np.zeros((_MOST_ASKED, s.ASKED_COLUMNS), np.int64)
         self._out = np.zeros((2 * radio.queue_frames + 1024, s.OUT_COLUMNS), np.int64)
+        # The same memory by the buffer protocol: at a few numbers a call, several times as fast as numpy's own access.
+        self._counts = self.g.data
+        self._asked_bytes = self._asked.data.cast("B")
+        self._out_bytes = self._out.data.cast("B")
         self._err = _error_table(radio.rate_mbps, radio.ack_rate_mbps) if radio.channel != "range" else np.zeros((3, 1))
         self._airtime: dict[int, int] = {}
         self._shadowing = Shadowing(radio, seed=seed) if radio.shadowing_db else None
@@ -105,6 +117,7 @@ class Air:
     def relink(self) -> None:
         """Make the links anew: stations have moved, or faults have changed."""
         at = self._at
+        self._take_in()
         self.book.take(self._lk)
         spare = int(self._lk[s.UNDERWAY].sum())
         links = Links(
@@ -143,28 +156,39 @@ class Air:
         self.fr = np.concatenate([self.fr, np.zeros_like(self.fr)], axis=1)
         self._more_starts(2 * more)
 
-    def submit(self, slot: int, *, src: int, dst: int, size: int, start_ns: int, wants_status: bool) -> None:
-        """A frame of `size` bytes (UDP payload) will enter its station's queue at `start_ns`."""
+    def submit(self, slot: int, src: int, dst: int, size: int, start_ns: int, wants_status: bool) -> None:
+        """A frame of `size` bytes (UDP payload) will enter its station's queue at `start_ns`.
+
+        The kernel is told by the next `advance`; at once only if the frame may be the next that ends.
+        """
         airtime = self._airtime.get(size)
         if airtime is None:
             radio = self._radio
             airtime = self._airtime[size] = airtime_ns(size + OVERHEAD_BYTES, radio, rate_mbps=radio.rate_mbps)
-        if self.g[s.HS_N] + 2 * kernel.MARGIN > self._hs.shape[0]:
-            self._more_starts(len(self._hs))
-        self.next_output_ns = kernel.submit(
-            self.g, self._p, self.st, self.fr, self._hs, slot, src, dst, airtime, start_ns, int(wants_status),
-            self.next_output_ns,
-        )  # fmt: skip
+        counts = self._counts
+        asked = counts[s.ASKED_N]
+        _ROW.pack_into(self._asked_bytes, asked * _ROW.size, slot, src, dst, airtime, start_ns, wants_status)
+        counts[s.ASKED_N] = asked + 1
+        if start_ns + airtime < self.next_output_ns or asked + 1 == _MOST_ASKED:
+            self._take_in()
 
-    def advance(self, until_ns: int) -> list[list[int]]:
+    def _take_in(self) -> None:
+        """Tell the kernel what was asked for."""
+        counts = self._counts
+        if counts[s.HS_N] + counts[s.ASKED_N] + 2 * kernel.MARGIN > len(self._hs):
+            self._more_starts(len(self._hs))
+        self.next_output_ns = kernel.take_in(
+            self.g, self._p, self.st, self.fr, self._hs, self._asked, self.next_output_ns
+        )
+
+    def advance(self, until_ns: int) -> Rows:
         """Let time pass; returns the output rows (`emulator.state.OUT_*`) in order."""
-        rows: list[list[int]] = []
+        rows: Rows = []
         while True:
-            bound_ns = kernel.advance(*self._arrays, until_ns)
-            count = self.g[s.OUT_N]
+            bound_ns = self._entry.advance(until_ns)
+            count = self._counts[s.OUT_N]
             if count:
-                rows += self._out[:count].tolist()
-                self.g[s.OUT_N] = 0
+                rows += _ROW.iter_unpack(self._out_bytes[: count * _ROW.size])
             if bound_ns >= 0:
                 self.next_output_ns = bound_ns
                 return rows
@@ -177,10 +201,10 @@ class Air:
         self._gather()
 
     def _gather(self) -> None:
-        """The arguments of `kernel.advance`, in order; to be renewed when an array is replaced."""
-        self._arrays = (
+        """The way into `kernel.advance`; to be renewed when an array is replaced."""
+        self._entry = Entry(
             self.g, self._p, self._pf, self.st, self._sf, self.fr, self._lk, self._lp, self._ptr, self._hs, self._hr,
-            self._out, self._err,
+            self._asked, self._out, self._err,
         )  # fmt: skip
 
     def busy_ns(self, now_ns: int) -> int:

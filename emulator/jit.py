@@ -4,6 +4,9 @@ FANET_NO_NUMBA=1 in the environment leaves functions uncompiled. Read here, once
 
 numba keeps machine code per function and looks only at that function's own file: after a change to `dcf.py` it would
 go on running the old code inlined into `kernel.py`. So the cache has a directory per state of all compiled sources.
+
+Functions that make no arrays, all but those of `entry.py`, are compiled without numba's counts of references to arrays
+(`_nrt`): these are atomic, a pair per array and call that is not inlined, and took half of the kernel's time.
 """
 
 import hashlib
@@ -20,16 +23,16 @@ def _identity(function: F) -> F:
 
 
 def _fingerprint(folder: Path) -> str:
-    """What the sources with compiled functions say, and the constants they use, in short."""
+    """What the sources with compiled functions say, the constants they use and how they are compiled, in short."""
     digest = hashlib.sha256()
     for path in sorted(folder.glob("*.py")):
         source = path.read_bytes()
-        if b"import jit\n" in source or path.name == "state.py":
+        if b"from emulator.jit import" in source or path.name in ("state.py", "jit.py"):
             digest.update(source)
     return digest.hexdigest()[:16]
 
 
-def _decorator() -> Callable[[F], F]:
+def _decorator(*, counted: bool) -> Callable[[F], F]:
     if os.environ.get("FANET_NO_NUMBA"):
         return _identity
     try:
@@ -43,13 +46,15 @@ def _decorator() -> Callable[[F], F]:
     def compiled(function: F) -> F:
         numba.config.CACHE_DIR = ours  # read when a function is decorated, and by others too: put it back
         try:
-            return cast("F", numba.njit(cache=True, error_model="numpy")(function))
+            return cast("F", numba.njit(cache=True, error_model="numpy", _nrt=counted)(function))
         finally:
             numba.config.CACHE_DIR = everyone
 
     return compiled
 
 
-jit = _decorator()
+jit = _decorator(counted=False)
+jit_views = _decorator(counted=True)
+"""For functions that make arrays of memory they are pointed to."""
 COMPILED = jit is not _identity
 """Whether the kernel is machine code."""

@@ -17,6 +17,7 @@ from emulator.state import (
     ALL_END,
     ALL_START,
     ARRIVE,
+    ASKED_N,
     BEGINS,
     BORN,
     DETECT_NS,
@@ -67,22 +68,23 @@ _FEW = 128
 
 
 @jit
-def submit(
-    g: Ints, p: Ints, st: Ints, fr: Ints, hs: Ints, f: int, src: int, dst: int, airtime: int, t: int,
-    wants_status: int, bound: int,
-) -> int:  # fmt: skip
-    """A frame will enter its station's MAC queue at `t`; returns the bound of the next output, from that before."""
-    for row in range(FRAME_ROWS):
-        fr[row, f] = 0
-    fr[SRC, f] = src
-    fr[DST, f] = dst
-    fr[AIRTIME, f] = airtime
-    fr[BORN, f] = t
-    fr[NEXT, f] = -1
-    fr[OPEN, f] = 1
-    fr[WANTS_STATUS, f] = wants_status
-    push(hs, g, HS_N, t, ARRIVE, f, 0)
-    return int(min(bound, t + airtime + first_wait(p, st, src, t)))
+def take_in(g: Ints, p: Ints, st: Ints, fr: Ints, hs: Ints, asked: Ints, bound: int) -> int:
+    """Plan the frames asked for; returns the bound of the next output, from that before. The start heap has room."""
+    for i in range(g[ASKED_N]):
+        f, src, airtime, t = asked[i, 0], asked[i, 1], asked[i, 3], asked[i, 4]
+        for row in range(FRAME_ROWS):
+            fr[row, f] = 0
+        fr[SRC, f] = src
+        fr[DST, f] = asked[i, 2]
+        fr[AIRTIME, f] = airtime
+        fr[BORN, f] = t
+        fr[NEXT, f] = -1
+        fr[OPEN, f] = 1
+        fr[WANTS_STATUS, f] = asked[i, 5]
+        push(hs, g, HS_N, t, ARRIVE, f, 0)
+        bound = min(bound, t + airtime + first_wait(p, st, src, t))
+    g[ASKED_N] = 0
+    return int(bound)
 
 
 @jit
@@ -154,9 +156,16 @@ def earliest_end(p: Ints, st: Ints, fr: Ints, t: int, kind: int, a: int, b: int)
 @jit
 def advance(  # noqa: C901  (one dispatch; splitting it would only move the branches)
     g: Ints, p: Ints, pf: Reals, st: Ints, sf: Reals, fr: Ints, lk: Ints, lp: Reals, ptr: Ints, hs: Ints, hr: Ints,
-    out: Ints, err: Reals, until: int,
+    asked: Ints, out: Ints, err: Reals, until: int,
 ) -> int:  # fmt: skip
-    """Process every event up to and including `until`; returns `next_output`. -1: no room, drain and call again."""
+    """Take in what was asked for, and process every event up to and including `until`; returns `next_output`.
+
+    `out` begins anew with every call. -1: there is no room; take what is in `out`, make some, and call again.
+    """
+    g[OUT_N] = 0
+    if g[HS_N] + g[ASKED_N] + MARGIN > hs.shape[0]:
+        return -1
+    take_in(g, p, st, fr, hs, asked, NEVER)
     room = out.shape[0] - 2 * p[QUEUE_LIMIT] - 8  # one event may expire a whole queue
     while True:
         if g[OUT_N] >= room:
@@ -283,4 +292,4 @@ def relink(  # noqa: C901  (one pass over what is under way)
     return int(used)
 
 
-__all__ = ["NEVER", "advance", "next_output", "purge", "relink", "scatter", "submit"]
+__all__ = ["NEVER", "advance", "next_output", "purge", "relink", "scatter", "take_in"]

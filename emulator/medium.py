@@ -11,7 +11,7 @@ import numpy as np
 
 from emulator import state as s
 from emulator.accounts import Accounts
-from emulator.air import Air
+from emulator.air import Air, Rows
 from emulator.dcf import NEVER
 from emulator.faults import Faults
 from emulator.pcap import Capture
@@ -68,15 +68,13 @@ class Medium(Actor):
         self._links_ns: int | None = None
         """When links are reported next; None while the air is silent."""
         self._due_ns = self._next_turn_ns()
-        self._wake_ns: int | None = None
-        self._stale = True
         self._now_ns = 0
         self._control_topic = topics.radio_control
 
     # --- the actor contract ---------------------------------------------------------------------------------------
 
     def start(self, now_ns: int) -> None:
-        self._pass_time(now_ns)
+        self.wake(now_ns)
         self._air.book.begin(now_ns)
 
     def receive(self, topic: str, message: Message, now_ns: int) -> None:
@@ -87,12 +85,12 @@ class Medium(Actor):
             else:
                 self._request(station, message, now_ns)
         elif isinstance(message, Poses):
-            self._pass_time(now_ns)
+            self.wake(now_ns)
             self._place(message)
         elif isinstance(message, Obstructions):
             self._obstruct(message)
         elif topic == self._control_topic and isinstance(message, Degrade | Jam | Cut | Restore):
-            self._pass_time(now_ns)
+            self.wake(now_ns)
             why = self._faults.obey(message, self._now_ns)
             self._accounts.controls += why is None
             self._change(why)
@@ -100,24 +98,25 @@ class Medium(Actor):
             self._accounts.refused["message_type"] += 1
 
     def wake(self, now_ns: int) -> None:
-        self._pass_time(now_ns)
+        """Advance the air to `now_ns` and hand out what came of it."""
+        while self._due_ns is not None and self._due_ns <= now_ns:
+            self._turn(self._due_ns)
+        rows = self._air.advance(now_ns)
+        if rows:
+            self._hand_out(rows)
+        if now_ns > self._now_ns:
+            self._now_ns = now_ns
 
     def next_wake_ns(self) -> int | None:
-        if self._stale:
-            self._stale = False
-            self._wake_ns = self._next_handover_ns()
-        if self._due_ns is None:
-            return self._wake_ns
-        return self._due_ns if self._wake_ns is None else min(self._due_ns, self._wake_ns)
-
-    def _next_handover_ns(self) -> int | None:
-        bound_ns, every_ns = self._air.next_output_ns, self._handover_ns
-        if bound_ns == NEVER:
-            return None
-        return -(-bound_ns // every_ns) * every_ns if every_ns else bound_ns
+        wake_ns, due_ns = self._air.next_output_ns, self._due_ns
+        if wake_ns == NEVER:
+            return due_ns
+        if self._handover_ns:
+            wake_ns = -(-wake_ns // self._handover_ns) * self._handover_ns
+        return wake_ns if due_ns is None or wake_ns < due_ns else due_ns
 
     def stop(self, now_ns: int) -> None:
-        self._pass_time(now_ns)
+        self.wake(now_ns)
         self._report_links(self._now_ns)
 
     def report(self) -> Mapping[str, Any]:
@@ -144,27 +143,28 @@ class Medium(Actor):
     def _request(self, station: int, request: TxRequest, now_ns: int) -> None:
         """Take in one request; whatever is wrong with it is counted, never raised."""
         accounts = self._accounts
-        if request.seq != self._next_seq[station]:
-            self._count_gap(station, request.seq)
-        self._next_seq[station] = (request.seq + 1) & _SEQ_MASK
+        seq, start_ns, frame, dst, wants_status = request
+        if seq != self._next_seq[station]:
+            self._count_gap(station, seq)
+        self._next_seq[station] = (seq + 1) & _SEQ_MASK
         accounts.sent += 1
-        dst = request.dst
-        size = len(request.frame)
+        size = len(frame)
         if dst != BROADCAST and not 1 <= dst <= self._count:
             self._refuse(station, request, DropReason.NO_RECEIVER, now_ns)
             return
         if size > self._max_bytes:
             self._refuse(station, request, DropReason.TOO_LARGE, now_ns)
             return
-        if not size or not -_HORIZON_NS < request.start_ns - now_ns < _HORIZON_NS:
+        if not size or not -_HORIZON_NS < start_ns - now_ns < _HORIZON_NS:
             self._refuse(station, request, DropReason.MALFORMED, now_ns)
             return
-        late_ns = now_ns - request.start_ns
-        if late_ns > 0:
+        if start_ns < now_ns:
+            late_ns = now_ns - start_ns
             accounts.late(late_ns)
             if late_ns > TOO_LATE_NS:
                 self._refuse(station, request, DropReason.LATE, now_ns)
                 return
+            start_ns = now_ns
         if self._held[station] >= self._most_held:
             self._refuse(station, request, DropReason.BACKLOG, now_ns)
             return
@@ -174,15 +174,13 @@ class Medium(Actor):
         slot = self._free.pop()
         self._requests[slot] = request
         self._sources[slot] = self._ids[station]
-        start_ns = max(request.start_ns, now_ns, self._now_ns)
-        self._air.submit(
-            slot, src=station, dst=s.EVERYONE if dst == BROADCAST else dst - 1, size=size, start_ns=start_ns,
-            wants_status=request.wants_status,
-        )  # fmt: skip
+        if start_ns < self._now_ns:
+            start_ns = self._now_ns
+        to = s.EVERYONE if dst == BROADCAST else dst - 1
+        self._air.submit(slot, station, to, size, start_ns, wants_status)
         if self._links_ns is None:
             self._links_ns = (self._now_ns // S + 1) * S
             self._due_ns = self._next_turn_ns()
-        self._stale = True
 
     def _count_gap(self, station: int, seq: int) -> None:
         """A gap is requests that the bus lost: they were sent, and they are dropped."""
@@ -209,14 +207,6 @@ class Medium(Actor):
         self._free = list(range(2 * before - 1, before - 1, -1))
 
     # --- time -----------------------------------------------------------------------------------------------------
-
-    def _pass_time(self, now_ns: int) -> None:
-        """Advance the air to `now_ns` and hand out what came of it."""
-        while self._due_ns is not None and self._due_ns <= now_ns:
-            self._turn(self._due_ns)
-        self._hand_out(self._air.advance(now_ns))
-        self._now_ns = max(self._now_ns, now_ns)
-        self._stale = True
 
     def _turn(self, due_ns: int) -> None:
         """Everything before this instant has happened: the warm-up ends, faults begin and end, links are reported."""
@@ -257,28 +247,31 @@ class Medium(Actor):
             self._faults.records.clear()
             self._air.relink()
             self._due_ns = self._next_turn_ns()
-            self._stale = True
 
-    def _hand_out(self, rows: list[list[int]]) -> None:
+    def _hand_out(self, rows: Rows) -> None:
         if self._capture is not None:
             rows = self._record(rows, self._capture)
-        outbox, requests, sources, rx_topics = self.outbox, self._requests, self._sources, self._rx_topics
+        accounts = self._accounts
+        append, requests, sources, rx_topics = self.outbox.append, self._requests, self._sources, self._rx_topics
         for kind, slot, station, t_ns, value, attempts in rows:
             request = requests[slot]
             assert request is not None, "the kernel speaks only of frames it was given"
             if kind == s.OUT_RECEPTION:
                 # as Reception(...), which takes three times as long
-                reception = _new(Reception, (request.frame, sources[slot], t_ns, value / 1000))
-                outbox.append((rx_topics[station], reception))
+                append((rx_topics[station], _new(Reception, (request.frame, sources[slot], t_ns, value / 1000))))
             elif kind == s.OUT_FREE:
-                self._accounts.ended(value, size=len(request.frame))
+                if value == s.DELIVERED:
+                    accounts.delivered += 1
+                    accounts.delivered_bytes += len(request.frame)
+                else:
+                    accounts.lost(value)
                 requests[slot] = None
-                self._held[sources[slot] - 1] -= 1
+                self._held[station] -= 1
                 self._free.append(slot)
             else:
-                outbox.append((rx_topics[station], TxStatus(request.seq, TxOutcome(value), t_ns, attempts)))
+                append((rx_topics[station], TxStatus(request.seq, TxOutcome(value), t_ns, attempts)))
 
-    def _record(self, rows: list[list[int]], capture: Capture) -> list[list[int]]:
+    def _record(self, rows: Rows, capture: Capture) -> Rows:
         """Tell the capture what it wants to know; returns the rows that are for the nodes."""
         for kind, slot, station, t_ns, value, attempts in rows:
             request, node, src = self._requests[slot], station + 1, self._sources[slot]
@@ -315,4 +308,3 @@ class Medium(Actor):
         at = np.full((self._count, 3), np.inf)
         at[ids - 1] = states[:, :3]
         self._air.place(at)
-        self._stale = True

@@ -4,7 +4,8 @@
     fr  int64   [frame rows, frame slots]
     lk  int64   [link rows, links]            lp  float64 [link rows, links]      ptr int64 [stations + 1]
     hs, hr int64 [capacity, 5]                heaps of (t_ns, seq, kind, a, b): what may start a frame; receptions
-    g   int64   [globals]                     p int64, pf float64: parameters     out int64 [capacity, 6]
+    g   int64   [globals]                     p int64, pf float64: parameters
+    asked, out int64 [capacity, 6]            what is handed to the kernel and what it hands back, by the next call
 
 Instants are swarm ns. A link is one direction of a pair of stations; the links of one transmitter are adjacent
 (compressed rows, `ptr`). A station transmits one frame at a time, so a link carries at most one.
@@ -123,6 +124,9 @@ FATE_OPEN, FATE_COLLISION, FATE_HALF_DUPLEX, FATE_WEAK, FATE_DEGRADED, FATE_JAMM
 ARRIVE, ACCESS, SEND_ACK, ACK_TIMEOUT, TX_DONE, RX_START, RX_DETECT, RX_END, ALL_START, ALL_DETECT, ALL_END = range(11)
 """ALL_*: the same on the links a .. b - 1 of one transmitter, nearest receiver first, from link to link."""
 
+# --- requests (asked): frame, source, destination, airtime, start, wants status ---------------------------------------
+ASKED_COLUMNS: Final = 6
+
 # --- outputs (out): kind, frame, station, t_ns, rssi in 1/1000 dBm, attempts ------------------------------------------
 OUT_RECEPTION, OUT_DONE, OUT_FREE, OUT_START, OUT_COLUMNS = 0, 1, 2, 3, 6
 """A copy was decoded; the MAC is done with a frame that wants a status (value: outcome); nothing refers to the slot
@@ -156,8 +160,9 @@ DELIVERED, NO_RECEIVER, COLLIDED, DEAF, WEAK, GIVEN_UP, NO_ROOM, EXPIRED, DEGRAD
     ON_AIR_N,  # stations transmitting
     LAST_END,  # when the last frame to leave its antenna has ended at its last receiver
     REACH_NS,  # longest delay of an audible link
+    ASKED_N,
     GLOBALS,
-) = range(21)
+) = range(22)
 
 # --- parameters (p, pf) -------------------------------------------------------------------------------------------
 (

@@ -7,8 +7,9 @@ An actor never sleeps, reads a clock, opens a socket or starts a thread. A host 
     wake(now)   at or after the instant that `next_wake_ns()` named, whichever host runs it
     stop(now)   once, last; then `report()` says how it went
 
-After every call the host takes all of `outbox` and `records` and asks `next_wake_ns()` again. Instants never decrease.
-Both lists belong to the host, which may put its own in place before `start`; the actor only appends, during a call.
+After every call, or after several at one instant, the host takes all of `outbox` and `records`, and asks
+`next_wake_ns()` again. Instants never decrease. Both lists belong to the host, which may put its own in place before
+`start`; the actor only appends, during a call.
 """
 
 from abc import ABC, abstractmethod

@@ -16,6 +16,8 @@ from fanet_mw.units import S
 
 Listener = Callable[[str, Message], None]
 Receive = Callable[[str, Message, int], None]
+_NOBODY: Final = -1
+"""In place of the index of an actor: a listener, which has no wake-ups."""
 _STALL_LIMIT: Final = 100_000
 """Wake-ups of one actor at one instant, above which it is taken to be stuck."""
 
@@ -24,6 +26,10 @@ def matches(expression: str, topic: str) -> bool:
     """Whether a key expression (with `*` for one chunk) covers a topic."""
     want, have = expression.split("/"), topic.split("/")
     return len(want) == len(have) and all(w in ("*", h) for w, h in zip(want, have, strict=True))
+
+
+def _deaf_to_time(listener: Listener) -> Receive:
+    return lambda topic, message, _: listener(topic, message)
 
 
 class VirtualHost:
@@ -39,27 +45,35 @@ class VirtualHost:
         self.now_ns = 0
         self._actors = list(actors)
         self._on_records = on_records
-        self._listeners = list(listeners)
         self._heap: list[tuple[int, int, int]] = []
         self._seq = 0
+        self._asks = [actor.next_wake_ns for actor in self._actors]
         self._armed: list[int | None] = [None] * len(self._actors)
         self._queue: list[tuple[str, Message]] = []
         self._records: list[Record] = []
         for actor in self._actors:  # all append to the same lists, so that nothing needs to be gathered
             actor.outbox, actor.records = self._queue, self._records
-        self._routes: dict[str, tuple[list[tuple[int, Receive]], list[Listener]]] = {}
-        self._stall = (-1, 0)
+        self._hearing: dict[str, list[tuple[int, str, int, Receive]]] = {}
+        """(order, key expression, index, receive) by what the expression begins with, up to its first `*`."""
+        for index, actor in enumerate(self._actors):
+            for expression in actor.subscriptions:
+                self._subscribe(expression, index, index, actor.receive)
+        for order, (expression, listener) in enumerate(listeners, start=len(self._actors)):
+            self._subscribe(expression, order, _NOBODY, _deaf_to_time(listener))
+        self._routes: dict[str, list[tuple[int, Receive]]] = {}
+        self._stall = (-1, -1, 0)
 
     def start(self) -> None:
         """Start every actor, in order, at instant 0."""
         for index, actor in enumerate(self._actors):
             actor.start(self.now_ns)
-            self._arm(index)
-        self._flush()
+            self._arm(index, actor.next_wake_ns())
+        self._flush({})
+        self._hand_over()
 
     def run(self, until_ns: int) -> None:
         """Run every event up to and including `until_ns`; may be called again with a later instant."""
-        heap, armed, actors = self._heap, self._armed, self._actors
+        heap, armed, wakes = self._heap, self._armed, [actor.wake for actor in self._actors]
         while heap and heap[0][0] <= until_ns:
             t_ns, _, index = heapq.heappop(heap)
             if armed[index] != t_ns:
@@ -67,32 +81,49 @@ class VirtualHost:
             armed[index] = None
             if t_ns > self.now_ns:
                 self.now_ns = t_ns
-                self._stall = (index, 0)
             else:
                 self._watch(index)
-            actors[index].wake(self.now_ns)
-            self._arm(index)
-            self._flush()
+            wakes[index](self.now_ns)
+            self._flush({index: None})
         self.now_ns = max(self.now_ns, until_ns)
+        self._hand_over()
 
     def stop(self) -> None:
         """Stop every actor, in order, and hand over what it still had to say."""
         for actor in self._actors:
             actor.stop(self.now_ns)
-        self._flush()
+        self._flush({})
+        self._hand_over()
 
     def _watch(self, index: int) -> None:
         """A wake-up that does not move time is allowed; an endless row of them is a bug of the actor."""
-        last, count = self._stall
-        self._stall = (index, count + 1 if last == index else 0)
-        if self._stall[1] > _STALL_LIMIT:
+        t_ns, last, count = self._stall
+        self._stall = (self.now_ns, index, count + 1 if (t_ns, last) == (self.now_ns, index) else 0)
+        if count > _STALL_LIMIT:
             raise LocalProtocolError(
                 f"{self._actors[index].name} asked to be woken {_STALL_LIMIT} times at {self.now_ns / S} s"
             )
 
-    def _arm(self, index: int) -> None:
+    def _flush(self, awake: dict[int, None]) -> None:
+        """Deliver all messages of this instant, in order; then plan the wake-ups of `awake` and of who heard any."""
+        queue, routes, now_ns = self._queue, self._routes, self.now_ns
+        for topic, message in queue:  # it grows meanwhile
+            route = routes.get(topic)
+            if route is None:
+                route = routes[topic] = self._resolve(topic)
+            for index, receive in route:
+                receive(topic, message, now_ns)
+                awake[index] = None  # in order, each once
+        queue.clear()
+        awake.pop(_NOBODY, None)
+        asks, armed = self._asks, self._armed
+        for index in awake:
+            wake_ns = asks[index]()
+            if wake_ns != armed[index]:
+                self._arm(index, wake_ns)
+
+    def _arm(self, index: int, wake_ns: int | None) -> None:
         """Plan an actor's next wake-up."""
-        wake_ns = self._actors[index].next_wake_ns()
         if wake_ns is not None and wake_ns < self.now_ns:
             wake_ns = self.now_ns
         if wake_ns != self._armed[index]:
@@ -101,31 +132,23 @@ class VirtualHost:
                 self._seq += 1
                 heapq.heappush(self._heap, (wake_ns, self._seq, index))
 
-    def _flush(self) -> None:
-        """Deliver all messages of this instant, in order; then plan the wake-ups of whoever heard any."""
-        queue, routes, now_ns = self._queue, self._routes, self.now_ns
-        heard: dict[int, None] = {}  # in order, each once
-        for topic, message in queue:  # it grows meanwhile
-            route = routes.get(topic)
-            if route is None:
-                route = routes[topic] = self._resolve(topic)
-            for index, receive in route[0]:
-                receive(topic, message, now_ns)
-                heard[index] = None
-            for listener in route[1]:
-                listener(topic, message)
-        queue.clear()
-        for index in heard:
-            self._arm(index)
-        if self._records:
-            if self._on_records is not None:
-                self._on_records(self._records)
-            self._records.clear()
+    def _hand_over(self) -> None:
+        """Tell what was recorded; once per call of the host, because a record says itself when it was."""
+        if self._on_records is not None:
+            self._on_records(self._records)
+        self._records.clear()
 
-    def _resolve(self, topic: str) -> tuple[list[tuple[int, Receive]], list[Listener]]:
-        hearing: list[tuple[int, Receive]] = [
-            (index, actor.receive)
-            for index, actor in enumerate(self._actors)
-            if any(matches(expression, topic) for expression in actor.subscriptions)
-        ]
-        return hearing, [listener for expression, listener in self._listeners if matches(expression, topic)]
+    def _subscribe(self, expression: str, order: int, index: int, receive: Receive) -> None:
+        """Actors hear a topic in their order, then listeners in theirs."""
+        beginning, star, _ = expression.partition("*")
+        self._hearing.setdefault(beginning if star else expression, []).append((order, expression, index, receive))
+
+    def _resolve(self, topic: str) -> list[tuple[int, Receive]]:
+        """Who hears a topic; the cost does not depend on how many there are who do not."""
+        found: dict[int, tuple[int, Receive]] = {}  # each once, whichever of its expressions it is
+        chunks = topic.split("/")
+        for beginning in (topic, *("/".join(chunks[:n]) + "/" for n in range(1, len(chunks))), ""):
+            for order, expression, index, receive in self._hearing.get(beginning, ()):
+                if matches(expression, topic):
+                    found[order] = index, receive
+        return [found[order] for order in sorted(found)]

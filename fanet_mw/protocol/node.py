@@ -9,12 +9,13 @@ duplicate suppression and headers; the routing protocol behind it decides what h
 from collections import Counter
 from collections.abc import Callable, Mapping
 from random import Random
-from typing import Final, NamedTuple
+from typing import Final
 
 from fanet_mw import wire
 from fanet_mw.errors import DropReason, LocalProtocolError, MalformedFrameError
 from fanet_mw.messages import Reception, TxRequest, TxStatus
-from fanet_mw.protocol import seen
+from fanet_mw.protocol import arrival, seen
+from fanet_mw.protocol.arrival import PHASES
 from fanet_mw.protocol.contract import RoutingProtocol
 from fanet_mw.protocol.txqueue import Packet
 from fanet_mw.rng import stream
@@ -22,10 +23,6 @@ from fanet_mw.scenario import Scenario
 from fanet_mw.trace import Delivered, Dropped, Generated, Record
 from fanet_mw.units import BROADCAST, US, Enu, NodeId
 from fanet_mw.wire import Header, Kind
-
-_PHASE: Final = {0: seen.DELIVERED, wire.FLAG_FLOOD: seen.FLOODED, wire.FLAG_TO_HEAD: seen.CARRIED}
-"""Which bit says that a packet was handled, by the phase flags of the frame that brought it."""
-
 
 _DATA: Final = int(Kind.DATA)
 _HELLO: Final = int(Kind.HELLO)
@@ -36,14 +33,6 @@ _MOST_HOPS: Final = 255
 """What the hop count of the header can say."""
 _RESTART_STEP_NS: Final = 100 * US
 """A node sends fewer packets than one per 0.1 ms, so a later start begins beyond all earlier sequence numbers."""
-
-
-class Delivery(NamedTuple):
-    """A packet for the application of this node."""
-
-    header: Header
-    frame: bytes
-    end_ns: int
 
 
 class Node:
@@ -57,7 +46,8 @@ class Node:
         self.position = position
         self.clock_error_ns = 0
         self.requests: list[TxRequest] = []
-        self.deliveries: list[Delivery] = []
+        self.deliveries: list[Packet] = []
+        """Packets for the application of this node."""
         self.records: list[Record] = []
         self.frames_sent = 0
         self.receptions = 0
@@ -65,8 +55,11 @@ class Node:
         self._duplicates = 0
         self._next_seq = {False: 0, True: _CONTROL}
         self._lifetime_ns = round(scenario.routing.lifetime_s * 1_000_000_000)
+        self._reader = arrival.shared
         self._seen = seen.Seen()
         self._protocol = make_protocol(self)
+        self.next_wake_ns = self._protocol.next_wake_ns
+        """The protocol's own method: every reception is followed by this question."""
 
     # --- from the host's side -------------------------------------------------------------------------------------
 
@@ -109,49 +102,39 @@ class Node:
         )
         self.transmit(packet.frame, BROADCAST, start_ns=start_ns)
 
-    def hear(self, reception: Reception, *, now_ns: int) -> None:
+    def hear(self, reception: Reception, now_ns: int) -> None:
         """One reception, from anyone."""
         self.receptions += 1
         frame = reception.frame
-        peeked = wire.peek(frame)
-        if peeked is None:
-            self.dropped[DropReason.MALFORMED] += 1
-            return
-        origin, seq, flags = peeked
-        phase = _PHASE.get(flags & wire.PHASE_MASK)
-        key = (origin << 32) | seq
-        bits = self._seen.bits(key)
-        if phase is None:
-            self.dropped[DropReason.MALFORMED] += 1
-            return
-        if bits & phase:
+        key, phase = self._reader.glance(frame)
+        known = self._seen.bits(key)
+        if known & phase:
             self._duplicates += 1
             self._protocol.overheard(key, now_ns=now_ns)
             return
         try:
-            packet = _new(Packet, (wire.decode_header(frame), frame))
-            self._first_copy(packet, reception, key, bits, bits | phase, now_ns)
+            self._first_copy(self._reader.packet(frame), reception, key, known, known | phase, now_ns)
         except MalformedFrameError:
             self.dropped[DropReason.MALFORMED] += 1
 
     def _first_copy(self, packet: Packet, reception: Reception, key: int, before: int, bits: int, now_ns: int) -> None:
-        """`before` and `bits`: what is known of it without and with this copy."""
-        header = packet.header
-        self._seen.put(key, bits)
-        if header.kind == _HELLO:
+        """`before` and `bits`: what is known of the packet without and with this copy."""
+        origin_us, seq, origin, destination, _, kind, _, hops, _, _ = packet.header
+        if kind == _HELLO:
+            self._seen.put(key, bits)
             self._protocol.hello(packet, reception, now_ns=now_ns)
             return
         end_ns = reception.end_ns
-        age_ns = end_ns - header.origin_us * US
+        age_ns = end_ns - origin_us * US
         if age_ns > self._lifetime_ns:
+            self._seen.put(key, bits)
             self.drop(DropReason.EXPIRED, packet, now_ns=now_ns)
             return
-        if header.kind == _DATA and not before & seen.DELIVERED and header.destination in (BROADCAST, self.node):
-            self._seen.put(key, bits | seen.DELIVERED)
-            self.deliveries.append(_new(Delivery, (header, packet.frame, end_ns)))
-            self.records.append(
-                _new(Delivered, (end_ns, self.node, header.origin, header.seq, age_ns, header.hops + 1))
-            )
+        if kind == _DATA and not before & seen.DELIVERED and destination in (BROADCAST, self.node):
+            bits |= seen.DELIVERED
+            self.deliveries.append(packet)
+            self.records.append(_new(Delivered, (end_ns, self.node, origin, seq, age_ns, hops + 1)))
+        self._seen.put(key, bits)
         self._protocol.receive(packet, reception, now_ns=now_ns)
 
     def status(self, status: TxStatus, *, now_ns: int) -> None:
@@ -159,9 +142,6 @@ class Node:
 
     def wake(self, now_ns: int) -> None:
         self._protocol.wake(now_ns)
-
-    def next_wake_ns(self) -> int | None:
-        return self._protocol.next_wake_ns()
 
     def report(self) -> Mapping[str, object]:
         """JSON-able counters and the protocol's state."""
@@ -199,17 +179,14 @@ class Node:
 
     def stamped(self, packet: Packet, *, flags: int) -> bytes:
         header = packet.header
-        return wire.rewrite(packet.frame, prev_hop=self.node, hop_limit=header.hop_limit, hops=header.hops, flags=flags)
+        return wire.rewrite(packet.frame, self.node, header.hop_limit, header.hops, flags)
 
     def forwarded(self, packet: Packet, *, flags: int) -> bytes:
         header = packet.header
-        return wire.rewrite(
-            packet.frame,
-            prev_hop=self.node,
-            hop_limit=header.hop_limit - 1,
-            hops=min(header.hops + 1, _MOST_HOPS),  # a hostile frame may come with all of them
-            flags=flags,
-        )
+        hops = header.hops
+        if hops < _MOST_HOPS:  # a hostile frame may come with all of them
+            hops += 1
+        return wire.rewrite(packet.frame, self.node, header.hop_limit - 1, hops, flags)
 
     def drop(self, reason: DropReason, packet: Packet, *, now_ns: int) -> None:
         self.dropped[reason] += 1
@@ -252,5 +229,5 @@ class Node:
             flags=flags,
         )
         packet = Packet(header, header.encode() + inner)
-        self.mark(packet, seen.DELIVERED | _PHASE[flags & wire.PHASE_MASK])
+        self.mark(packet, seen.DELIVERED | PHASES[flags & wire.PHASE_MASK])
         return packet

@@ -229,3 +229,18 @@ def test_a_full_queue_expires_what_waits_and_not_what_is_on_the_air() -> None:
     assert ended[0] is TxOutcome.SENT
     assert sorted(ended) == [0, 1, 2, 3]
     assert air.report()["frames"]["in_flight"] == 0
+
+
+def test_more_requests_of_one_instant_than_the_kernel_is_told_of_at_a_time_all_count() -> None:
+    count, each = 45, 20
+    air = medium(count, channel="range")
+    place(air, [(10.0 * node, 0.0) for node in range(count)], 0)
+    for node in range(1, count + 1):
+        for seq in range(each):
+            air.receive(NAMES.radio_tx(node), TxRequest(seq, 2000 * MS, bytes(100), BROADCAST, wants_status=True), 0)
+    outputs: list[Output] = []
+    drain(air, outputs, until_ns=5000 * MS)
+    ends = [message for _, message in outputs if isinstance(message, TxStatus)]
+    frames = air.report()["frames"]
+    assert frames["sent"] == len(ends) == count * each
+    assert frames["delivered"] + sum(frames["dropped"].values()) == count * each

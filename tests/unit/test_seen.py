@@ -1,6 +1,11 @@
 """Duplicate suppression memory."""
 
+from hypothesis import example, given
+from hypothesis import strategies as st
+
 from fanet_mw.protocol import seen
+
+packets = st.tuples(st.integers(0, 0xFFFF), st.integers(0, 0xFFFF_FFFF))
 
 
 def test_phases_of_one_packet_are_remembered_apart() -> None:
@@ -26,3 +31,14 @@ def test_origins_do_not_share_sequences() -> None:
     memory = seen.Seen()
     memory.mark(seen.key_of(origin=1, seq=5), seen.DELIVERED)
     assert memory.bits(seen.key_of(origin=2, seq=5)) == 0
+
+
+@given(one=packets, other=packets)
+@example(one=(1, 0xFFFF_FFFF), other=(2, 0))
+def test_no_two_packets_have_the_same_key(one: tuple[int, int], other: tuple[int, int]) -> None:
+    assert (seen.key_of(*one) == seen.key_of(*other)) == (one == other)
+
+
+def test_packets_of_all_origins_at_about_the_same_time_spread_over_a_dict() -> None:
+    slots = {seen.key_of(origin, seq) % 4096 for origin in range(1, 46) for seq in range(1000, 1010)}
+    assert len(slots) > 400, "450 keys; a dict looks for a number by its low bits"

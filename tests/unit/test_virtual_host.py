@@ -90,3 +90,21 @@ def test_an_actor_that_never_lets_time_move_is_named() -> None:
 )
 def test_a_star_stands_for_exactly_one_chunk(expression: str, topic: str, covered: bool) -> None:
     assert matches(expression, topic) is covered
+
+
+def test_actors_hear_in_their_order_and_then_listeners_whatever_their_expressions() -> None:
+    order: list[str] = []
+
+    class Noting(Script):
+        def receive(self, topic: str, message: Message, now_ns: int) -> None:
+            order.append(self.name)
+
+    first, second = Noting("first", [], hears=("*/b/c",)), Noting("second", [], hears=("a/b/c", "a/*/c", "a/b/*"))
+    others = [Noting(f"other {hears}", [], hears=(hears,)) for hears in ("a/b", "a/b/c/d", "a/*", "b/*/c", "*/*", "*")]
+    host = VirtualHost(
+        [*others, first, Script("speaker", [MS], says="a/b/c"), second],
+        listeners=[("a/*/*", lambda *_: order.append("listener")), ("a/b/d", lambda *_: order.append("deaf"))],
+    )
+    host.start()
+    host.run(MS)
+    assert order == ["first", "second", "listener"]

@@ -1,0 +1,60 @@
+"""What a node reads of a frame: the same for everyone who hears it, whatever was read before."""
+
+import pytest
+from hypothesis import given
+from hypothesis import strategies as st
+
+from fanet_mw import wire
+from fanet_mw.errors import MalformedFrameError
+from fanet_mw.protocol import seen
+from fanet_mw.protocol.arrival import Reader
+
+FLOODED = wire.Header(5, 7, 3, 0xFFFF, 3, 0, 32, 0, 3, wire.FLAG_FLOOD)
+
+
+def spoiled(frame: bytes, at: int) -> bytes:
+    return frame[:at] + bytes((frame[at] ^ 0x40,)) + frame[at + 1 :]
+
+
+FRAMES = [
+    FLOODED.encode(),
+    FLOODED._replace(origin=4).encode() + wire.filler(100),
+    FLOODED._replace(flags=0).encode(),
+    FLOODED._replace(flags=wire.FLAG_TO_HEAD).encode(),
+    FLOODED._replace(flags=wire.PHASE_MASK).encode(),
+    spoiled(FLOODED.encode(), 0),
+    spoiled(FLOODED.encode(), 12),
+    b"",
+]
+
+
+def what(reader: Reader, frame: bytes) -> object:
+    glance = reader.glance(frame)
+    try:
+        return glance, reader.packet(frame)
+    except MalformedFrameError as error:
+        return glance, str(error)
+
+
+@given(order=st.lists(st.sampled_from(FRAMES), max_size=12))
+def test_what_is_read_of_a_frame_does_not_depend_on_what_was_read_before(order: list[bytes]) -> None:
+    reader = Reader()
+    assert [what(reader, frame) for frame in order] == [what(Reader(), frame) for frame in order]
+
+
+def test_all_who_hear_one_frame_hold_one_packet() -> None:
+    reader, frame = Reader(), FLOODED.encode()
+    assert reader.glance(frame) == (seen.key_of(3, 7), seen.FLOODED)
+    first = reader.packet(frame)
+    reader.glance(frame)
+    assert reader.packet(frame) is first
+    assert first.header == FLOODED
+
+
+@pytest.mark.parametrize("frame", FRAMES[4:], ids=["two phases", "no header", "wrong CRC", "nothing"])
+def test_a_frame_without_a_packet_is_named_each_time(frame: bytes) -> None:
+    reader = Reader()
+    for _ in range(2):
+        reader.glance(frame)
+        with pytest.raises(MalformedFrameError):
+            reader.packet(frame)

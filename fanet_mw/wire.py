@@ -418,8 +418,9 @@ TIME: Final = Spec(53005, 172, struct.Struct("<QIIIIHHHBBB"))
 JOIN: Final = Spec(53006, 50, struct.Struct("<fffHB"))
 DIGEST: Final = Spec(53007, 37, struct.Struct("<24I24I24HBBB"))
 PLACES: Final = Spec(53008, 1, struct.Struct("<28h28h28hhhhBBB"))
+CLAIMS: Final = Spec(53009, 249, struct.Struct("<H16H16B16B16B16BBBBBBB"))
 ROUTING: Final = Spec(53010, 255, struct.Struct("<BBBB240B"))
-SPECS: Final = (ROUTE, BEACON, SCHEDULE, SURVIVOR, CHUNK, TIME, JOIN, DIGEST, PLACES, ROUTING)
+SPECS: Final = (ROUTE, BEACON, SCHEDULE, SURVIVOR, CHUNK, TIME, JOIN, DIGEST, PLACES, CLAIMS, ROUTING)
 _OURS: Final = {spec.msgid: spec for spec in SPECS}
 CAPACITY: Final = 56
 """Entries of one schedule part."""

@@ -101,15 +101,18 @@ class Clusters(Section):
     """The least time between two packets that a head releases in its slot."""
     pacing: Literal["burst", "spread"] = "spread"
     """`burst` releases at `release_gap_ms`; `spread` divides the slot evenly among the queued packets."""
-    relay: Literal["all", "gossip", "counter", "scheduled"] = "all"
+    relay: Literal["all", "gossip", "counter", "heads", "cds", "mpr", "scheduled", "claimed"] = "all"
     """Who relays a flooded packet: every node; each with probability min(1, gossip_degree / neighbors); each that has
-    heard fewer than `counter` copies after U(0, assess_ms); or those that a collision-free timetable names, each in a
-    turn of its own."""
+    heard fewer than `counter` copies after U(0, assess_ms); heads and who connects them; a connected dominating set;
+    multipoint relays; those that a collision-free timetable names, each in a turn of its own; or a connected
+    dominating set in slots that nodes agree on over the air."""
     contention_ms: NonNegative = 40.0
-    """`scheduled`: the beginning of each period, for all that has no turn: hellos, joins, unicasts to heads."""
+    """`scheduled`, `claimed`: the beginning of each period, for all that has no turn: hellos, joins, unicasts."""
     turn_slack_us: NonNegative = 50.0
-    """`scheduled`: what a turn is longer than its frame: twice the bound of a clock's error, and some 20 us for flight
+    """`scheduled`, `claimed`: what a turn is longer than its frame: twice the bound of a clock's error, and some 20 us for flight
     and detection."""
+    slots: Annotated[int, Field(ge=0, le=254)] = 0
+    """`claimed`: slots of a superframe; 0: as many as the neighborhood needs, a power of two."""
     link_m: NonNegative = 0.0
     """`scheduled`: nodes no farther apart are taken to hear each other; 0: `radio.range_m`."""
     interference_m: NonNegative = 0.0

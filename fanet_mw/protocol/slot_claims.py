@@ -16,8 +16,8 @@ its claim is known at two hops after two superframes, and its rivals then yield 
 power of two not below the crowd (a node and all within two hops of it) of anyone within two hops. Lengths may differ:
 slot a of A and slot b of B meet if a = b modulo the shorter length. A slot is always free for everyone: each of its
 n rivals takes 1/length <= 1/(n+1) of all turns, so together less than all. After Kanzaki et al., "Dynamic TDMA slot
-assignment in ad hoc networks" (AINA 2003). A crowd takes two superframes to be known, so the law gains four. Lengthening
-keeps a part of the turns, and so clashes with nobody; shortening waits until it has been possible for a while.
+assignment in ad hoc networks" (AINA 2003). A crowd takes two superframes to be known, so the law gains four.
+Lengthening keeps a part of the turns, and so clashes with nobody; shortening waits until it has been possible a while.
 """
 
 from collections.abc import Iterator

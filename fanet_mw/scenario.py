@@ -109,8 +109,8 @@ class Clusters(Section):
     contention_ms: NonNegative = 40.0
     """`scheduled`, `claimed`: the beginning of each period, for all that has no turn: hellos, joins, unicasts."""
     turn_slack_us: NonNegative = 50.0
-    """`scheduled`, `claimed`: what a turn is longer than its frame: twice the bound of a clock's error, and some 20 us for flight
-    and detection."""
+    """`scheduled`, `claimed`: what a turn is longer than its frame: twice the bound of a clock's error, and some 20 us
+    for flight and detection."""
     slots: Annotated[int, Field(ge=0, le=254)] = 0
     """`claimed`: slots of a superframe; 0: as many as the neighborhood needs, a power of two."""
     link_m: NonNegative = 0.0

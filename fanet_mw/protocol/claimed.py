@@ -121,6 +121,10 @@ class Claimed(Clustered):
         self._claims = self._new_claims(0)
         self._known_ns = 0
         self._hello_bytes = 0
+        self._claimed_ns: int | None = None
+        """When our claim last changed."""
+        self._news = False
+        """A hello said what we have not drawn with yet."""
 
     def _new_claims(self, now_ns: int) -> SlotClaims:
         slots = self._port.scenario.clusters.slots
@@ -175,9 +179,9 @@ class Claimed(Clustered):
 
     def hello_start_ns(self, start_ns: int) -> int:
         if self._hello_bytes <= self._turn_bytes and self._window_random() < 0.5:
-            turn_ns = self._queue.reserve(not_before_ns=start_ns)
-            if turn_ns is not None:
-                return turn_ns
+            own_ns = self._queue.reserve(not_before_ns=start_ns)
+            if own_ns is not None:
+                return own_ns
         return self._contending_ns(start_ns)
 
     def hello_inner(self, *, now_ns: int) -> bytes:
@@ -193,6 +197,8 @@ class Claimed(Clustered):
         claim = self._claims.step(now_ns).own
         before, length = self._own.share, slots or claim.length
         self._own.share = None if claim.slot is None else Share(claim.slot, length)
+        if self._own.share != before:
+            self._claimed_ns = now_ns
         if before is None and self._own.share is not None:
             self._gradient.join(self._port.node, now_ns=now_ns)
             for packet in self._homeless.drain():
@@ -203,6 +209,7 @@ class Claimed(Clustered):
                 self._forward(packet, start_ns=now_ns + self._lead_ns, now_ns=now_ns, tries=0)
         turns_per_s = len(self._own.claimed()) * S / self._own.turns.period_ns
         lots = self._load.lots(waiting=len(self._queue), turns_per_s=turns_per_s, now_ns=now_ns)
+        self._news = True  # somebody may have fallen silent
         self._draw(now_ns)
         return Standing(claim.slot, length, claim.crowd, lots)
 
@@ -214,19 +221,18 @@ class Claimed(Clustered):
         fixed = self._port.scenario.clusters.slots
         heard = tuple(_claim(h.node, h.standing, fixed) for h in claims.heard)
         self._claims.hear(Hello(_claim(claims.node, claims.own, fixed), heard), now_ns=now_ns)
-        if self._near.hear(claims, now_ns=now_ns):
-            self._draw(now_ns)
+        self._news |= self._near.hear(claims, now_ns=now_ns)
 
     def _draw(self, now_ns: int) -> None:
-        """Know again which turns nobody claims, and who draws for them."""
-        said = [
-            (node, standing)
-            for claims in self._near.alive(now_ns=now_ns)
-            for node, standing in ((claims.node, claims.own), *((h.node, h.standing) for h in claims.heard))
-        ]
-        shares = ((n, None if s.slot is None or not s.length else Share(s.slot, s.length)) for n, s in said)
-        rivals = ((n, s.lots) for n, s in said)
-        self._own.draws = draws(self._port.node, self._load.drawn(), shares, rivals)
+        """Know again which turns nobody claims, and who draws for them; only who draws needs to."""
+        lots = self._load.drawn()
+        if not lots:
+            self._own.draws = None
+        elif self._news or self._own.draws is None or self._own.draws.lots != lots:
+            self._news = False
+            said = self._near.standings(now_ns=now_ns)
+            shares = ((n, None if s.slot is None or not s.length else Share(s.slot, s.length)) for n, s in said)
+            self._own.draws = draws(self._port.node, lots, shares, ((n, s.lots) for n, s in said))
 
     # --- contending -----------------------------------------------------------------------------------------------
 
@@ -239,13 +245,15 @@ class Claimed(Clustered):
     # --- time -----------------------------------------------------------------------------------------------------
 
     def next_wake_ns(self) -> int | None:
-        own_ns, turn_ns = super().next_wake_ns(), self._queue.next_wake_ns()
-        return turn_ns if own_ns is None or (turn_ns is not None and turn_ns < own_ns) else own_ns
+        other_ns, own_ns = super().next_wake_ns(), self._queue.next_wake_ns()
+        return own_ns if other_ns is None or (own_ns is not None and own_ns < other_ns) else other_ns
 
     def wake(self, now_ns: int) -> None:
         super().wake(now_ns)
         for packet in self._queue.expire(before_us=(now_ns - self._lifetime_ns) // 1000):
             self._port.drop(DropReason.EXPIRED, packet, now_ns=now_ns)
+        if len(self._queue):
+            self._draw(now_ns)
         for packet, start_ns in self._queue.due(now_ns=now_ns):
             self._flood(packet, start_ns=start_ns)
 
@@ -268,6 +276,7 @@ class Claimed(Clustered):
             **super().report(),
             "slot": None if share is None else share.slot,
             "superframe": None if share is None else share.length,
+            "claimed_ms": None if self._claimed_ns is None else self._claimed_ns / MS,
             "clashes": self._claims.repairs,
             "lots": self._load.drawn(),
             "hop_ms": None if hop_ns is None else hop_ns / MS,

@@ -74,6 +74,13 @@ class Neighborhood:
         """Ranks have changed: ask again."""
         self._belongs = None
 
+    def standings(self, *, now_ns: int) -> list[tuple[NodeId, Standing]]:
+        """What is said of everyone within two hops: by itself, if it is a neighbor; by all that hear it, if not."""
+        alive = self.alive(now_ns=now_ns)
+        known = frozenset(claims.node for claims in alive) | {self._node}
+        others = [(h.node, h.standing) for claims in alive for h in claims.heard if h.node not in known]
+        return [(claims.node, claims.own) for claims in alive] + others
+
     def chosen_by(self, neighbor: NodeId) -> bool:
         """Whether that neighbor's last hello names us as one of its multipoint relays."""
         entry = self._entries.get(neighbor)

@@ -49,12 +49,14 @@ class Draws(NamedTuple):
 def draws(
     node: NodeId, lots: int, claims: Iterable[tuple[NodeId, Share | None]], rivals: Iterable[tuple[NodeId, int]]
 ) -> Draws:
-    """Each rival with the most lots that anyone says it has: to believe too many costs turns, too few a collision."""
+    """`claims` and `rivals` of all but the node itself. Each rival has the most lots that anyone says it has.
+
+    To believe that it has too many costs turns, too few a collision.
+    """
     most: dict[NodeId, int] = {}
     for rival, count in rivals:
-        if rival != node:
-            most[rival] = max(count, most.get(rival, 0))
-    taken = {share for rival, share in claims if share is not None and rival != node}
+        most[rival] = max(count, most.get(rival, 0))
+    taken = {share for _, share in claims if share is not None}
     return Draws(node, lots, tuple(sorted(taken)), tuple((n, most[n]) for n in sorted(most) if most[n]))
 
 

@@ -1,0 +1,42 @@
+"""Whole swarms in slots claimed over the air, and with chosen relays: everything arrives, by fewer frames."""
+
+from typing import Any
+
+import pytest
+
+from sim import catalog
+from sim.results import finish
+from sim.run import simulate
+
+SHORT = ["duration_s=22", "warmup_s=12"]
+
+
+def summary_of(*settings: str) -> dict[str, Any]:
+    return finish(simulate(catalog.find("clusters", [*SHORT, "clusters.flooding_period_s=1", *settings])), out=None)
+
+
+def test_on_the_grid_every_packet_reaches_everyone_within_a_fraction_of_a_period() -> None:
+    outcome = simulate(catalog.find("clusters", [*SHORT, "clusters.relay=claimed"]))
+    summary = finish(outcome, out=None)
+    assert summary["pdr"] >= 0.999
+    assert summary["delay_ms"]["p95"] < 300
+    assert summary["frames"]["closes"]
+    nodes = [report for report in outcome.reports.values() if report.get("kind") == "agent"]
+    assert all(report["superframe"] == 16 for report in nodes)
+    assert len({report["slot"] for report in nodes}) <= 12, "45 nodes share them"
+
+
+def test_a_dense_swarm_needs_few_relays_and_they_win_the_turns_they_need() -> None:
+    summary = summary_of("clusters.relay=claimed", "nodes.layout=disc", "nodes.radius_m=250")
+    assert summary["pdr"] >= 0.999
+    assert summary["frames"]["sent"] / summary["generated"] < 10
+    assert summary["frames"]["closes"]
+
+
+@pytest.mark.parametrize("rule", ["heads", "cds", "mpr"])
+def test_chosen_relays_reach_nearly_all_of_a_dense_swarm_by_half_the_frames(rule: str) -> None:
+    heads = ["clusters.count=8"] if rule == "heads" else []
+    few = summary_of(f"clusters.relay={rule}", "nodes.layout=disc", "nodes.radius_m=250", *heads)
+    assert few["pdr"] >= 0.95
+    assert few["frames"]["sent"] / few["generated"] < 22, "45 with `all`"
+    assert few["frames"]["closes"]

@@ -73,6 +73,10 @@ class Routing(Section):
     """Bound of a node's own queue; the least important packet is evicted, with a reason."""
     lifetime_s: Positive = 30.0
     """A packet older than this is dropped where it waits."""
+    safety_lifetime_s: NonNegative = 1.0
+    """The same for warnings (priority 1): a position that old warns of nothing; 0: as `lifetime_s`."""
+    report_lifetime_s: NonNegative = 0.0
+    """The same for survivor reports (priority 2); 0: as `lifetime_s`."""
     hello_interval_s: NonNegative = 1.0
     """Position beacon and hello, one hop; 0 sends none (`clustered` needs them)."""
     gossip_p: Annotated[float, Field(ge=0, le=1)] = 0.65
@@ -87,6 +91,11 @@ class Routing(Section):
     @property
     def jitter_ns(self) -> int:
         return round(self.jitter_ms * MS)
+
+    def lifetime_ns(self, priority: int) -> int:
+        """How long a packet of this priority (`wire.PRIORITY_...`) lives."""
+        own_s = {1: self.safety_lifetime_s, 2: self.report_lifetime_s}.get(priority, 0.0)
+        return seconds_to_ns(own_s or self.lifetime_s)
 
 
 class Clusters(Section):

@@ -33,7 +33,7 @@ from fanet_mw.protocol.own_turns import OwnTurns, Share, draws
 from fanet_mw.protocol.root_release import RootRelease
 from fanet_mw.protocol.slot_claims import Claim, Hello, SlotClaims
 from fanet_mw.protocol.turns import Turns, turn_ns
-from fanet_mw.protocol.txqueue import Packet, TxQueue
+from fanet_mw.protocol.txqueue import Packet, TxQueue, sooner_us
 from fanet_mw.scenario import Scenario
 from fanet_mw.units import MS, NodeId, S, seconds_to_ns
 from fanet_mw.wire import HEADER_BYTES, Kind
@@ -113,7 +113,11 @@ class Claimed(Clustered):
         self._window_random = port.stream("window").random
         self._turn_bytes = max(scenario.traffic.payload_bytes, _LEAST_FRAME)
         self._own = OwnTurns(geometry(scenario, self._turn_bytes))
-        self._queue = OwnRelease(TxQueue(capacity=scenario.routing.queue_frames), self._own, lead_ns=self._lead_ns)
+        self._queue = OwnRelease(
+            TxQueue(capacity=scenario.routing.queue_frames, sooner_us=sooner_us(scenario.routing)),
+            self._own,
+            lead_ns=self._lead_ns,
+        )
         self._near = Neighborhood(
             port.node, lifetime_ns=int(_LIFETIMES * self._hello_ns), rank=lambda _, standing: _rank(standing.slot)
         )

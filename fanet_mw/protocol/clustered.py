@@ -21,7 +21,7 @@ from fanet_mw.protocol.neighbors import Neighbor, Neighbors
 from fanet_mw.protocol.relay import Relay
 from fanet_mw.protocol.release import Release
 from fanet_mw.protocol.repair import Repair
-from fanet_mw.protocol.txqueue import Packet, TxQueue
+from fanet_mw.protocol.txqueue import Packet, TxQueue, sooner_us
 from fanet_mw.units import BROADCAST, MS, US, NodeId, S, seconds_to_ns
 from fanet_mw.wire import FLAG_FLOOD, FLAG_TO_HEAD, Beacon, Join, Kind, Schedule
 
@@ -55,9 +55,11 @@ class Clustered(RoutingProtocol):
         self._gradient = Gradient(node=port.node, neighbors=self._neighbors, hello_ns=hello_ns)
         self._membership = Membership(port.node)
         self._release = Release(
-            TxQueue(capacity=scenario.routing.queue_frames), scenario.clusters, lead_ns=self._lead_ns
+            TxQueue(capacity=scenario.routing.queue_frames, sooner_us=sooner_us(scenario.routing)),
+            scenario.clusters,
+            lead_ns=self._lead_ns,
         )
-        self._homeless = TxQueue(capacity=scenario.routing.queue_frames)
+        self._homeless = TxQueue(capacity=scenario.routing.queue_frames, sooner_us=sooner_us(scenario.routing))
         self._unicasts: dict[int, tuple[Packet, NodeId, int]] = {}
         self._leader = (
             Leader(node=port.node, clusters=scenario.clusters.count, period_ns=scenario.clusters.period_ns)

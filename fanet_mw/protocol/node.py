@@ -64,7 +64,8 @@ class Node:
         self.dropped: Counter[str] = Counter()
         self._duplicates = 0
         self._next_seq = {False: 0, True: _CONTROL}
-        self._lifetime_ns = round(scenario.routing.lifetime_s * 1_000_000_000)
+        self._lifetimes_ns = [scenario.routing.lifetime_ns(priority) for priority in range(256)]
+        """By priority, whatever the air says."""
         self._seen = seen.Seen()
         self._protocol = make_protocol(self)
 
@@ -143,7 +144,7 @@ class Node:
             return
         end_ns = reception.end_ns
         age_ns = end_ns - header.origin_us * US
-        if age_ns > self._lifetime_ns:
+        if age_ns > self._lifetimes_ns[header.priority]:
             self.drop(DropReason.EXPIRED, packet, now_ns=now_ns)
             return
         if header.kind == _DATA and not before & seen.DELIVERED and header.destination in (BROADCAST, self.node):

@@ -7,7 +7,7 @@ from collections import Counter
 from typing import Any
 
 import pytest
-from graph_radio import GraphRadio
+from claims_radio import GraphRadio
 from hypothesis import settings
 from hypothesis import strategies as st
 from hypothesis.stateful import RuleBasedStateMachine, invariant, precondition, rule
@@ -204,3 +204,16 @@ def test_urgent_packets_overtake_bulk_at_every_hop(line: GraphRadio) -> None:
     line.run(60 * MS)
     assert line.delivered[3, 2, urgent] == 1
     assert sum(line.delivered[3, 2, seq] for seq in bulk) < 10
+
+
+def test_a_warning_that_could_not_go_within_its_second_is_dropped_and_a_report_is_not(line: GraphRadio) -> None:
+    line.leave(4)
+    line.join(6)  # alone: it has no slot yet, and nobody to bring anything to
+    warning = line.send(6, priority=wire.PRIORITY_SAFETY)
+    report = line.send(6, priority=wire.PRIORITY_REPORT)
+    line.run(S)
+    line.link(6, 3)
+    line.run(8 * S)
+    assert line.delivered[3, 6, report] == 1
+    assert line.delivered[3, 6, warning] == 0
+    assert "expired" in {**dict(line.nodes[NodeId(3)].report()["dropped"]), **line.nodes[NodeId(6)].report()["dropped"]}

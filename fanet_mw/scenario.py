@@ -77,6 +77,9 @@ class Routing(Section):
     """The same for warnings (priority 1): a position that old warns of nothing; 0: as `lifetime_s`."""
     report_lifetime_s: NonNegative = 0.0
     """The same for survivor reports (priority 2); 0: as `lifetime_s`."""
+    aggregate: bool = False
+    """`clustered`, but not with `clusters.relay = "scheduled"`: packets that are released together share frames of up
+    to `radio.max_frame_bytes`, and so do their relays."""
     hello_interval_s: NonNegative = 1.0
     """Position beacon and hello, one hop; 0 sends none (`clustered` needs them)."""
     gossip_p: Annotated[float, Field(ge=0, le=1)] = 0.65

@@ -6,7 +6,7 @@ in the tests. Every decode is total: any bytes give a value or MalformedFrameErr
 
 import math
 import struct
-from collections.abc import Iterator
+from collections.abc import Iterator, Sequence
 from enum import IntEnum
 from functools import lru_cache
 from typing import Any, Final, NamedTuple, Self
@@ -29,6 +29,8 @@ FLAG_FLOOD: Final = 1
 FLAG_TO_HEAD: Final = 2
 """The packet is on its unicast way to a cluster head."""
 PHASE_MASK: Final = FLAG_FLOOD | FLAG_TO_HEAD
+FLAG_MORE: Final = 4
+"""Another packet, header first, follows in the same radio frame."""
 
 PRIORITY_CONTROL: Final = 0
 PRIORITY_SAFETY: Final = 1
@@ -188,6 +190,29 @@ def rewrite(frame: bytes, *, prev_hop: int, hop_limit: int, hops: int, flags: in
     _HOP.pack_into(body, _PREV_HOP_AT, prev_hop, frame[_KIND_AT], hop_limit, hops)
     body[_FLAGS_AT] = flags
     return b"".join((body, _CRC.pack(mcrf4xx(bytes(body[1:]) + _EXTRA)), frame[HEADER_BYTES:]))
+
+
+def bundle(packets: Sequence[bytes]) -> bytes:
+    """One radio frame out of several packets, each with its header; they must have been decoded."""
+    return b"".join((*(_with_more(packet) for packet in packets[:-1]), packets[-1]))
+
+
+def _with_more(packet: bytes) -> bytes:
+    body = bytearray(packet[:_BODY_END])
+    body[_FLAGS_AT] |= FLAG_MORE
+    return b"".join((body, _CRC.pack(mcrf4xx(bytes(body[1:]) + _EXTRA)), packet[HEADER_BYTES:]))
+
+
+def unbundle(frame: bytes) -> list[bytes]:
+    """The packets of a radio frame, each as it would come alone but for its flag; raises MalformedFrameError."""
+    starts, at = [], 0
+    for inner in frames(frame):
+        if _message_id(inner) == ROUTE.msgid:
+            starts.append(at)
+        at += len(inner)
+    if not starts or starts[0]:
+        raise MalformedFrameError("a bundle that does not begin with a routing header")
+    return [frame[begin:end] for begin, end in zip(starts, [*starts[1:], len(frame)], strict=True)]
 
 
 # --- inner frames -------------------------------------------------------------------------------------------------

@@ -1308,7 +1308,7 @@ class MAVLink(object):
         hop_limit                 : Transmissions left, this one included. (type:uint8_t)
         hops                      : Transmissions before this one. (type:uint8_t)
         priority                  : 0 control, 1 safety, 2 survivor report, 3 bulk. (type:uint8_t)
-        flags                     : Bit 0: flooding phase. Bit 1: unicast towards a cluster head. (type:uint8_t)
+        flags                     : Bit 0: flooding phase. Bit 1: unicast towards a cluster head. Bit 2: another packet follows in the frame. (type:uint8_t)
         version                   : 1. (type:uint8_t)
 
         """
@@ -1328,7 +1328,7 @@ class MAVLink(object):
         hop_limit                 : Transmissions left, this one included. (type:uint8_t)
         hops                      : Transmissions before this one. (type:uint8_t)
         priority                  : 0 control, 1 safety, 2 survivor report, 3 bulk. (type:uint8_t)
-        flags                     : Bit 0: flooding phase. Bit 1: unicast towards a cluster head. (type:uint8_t)
+        flags                     : Bit 0: flooding phase. Bit 1: unicast towards a cluster head. Bit 2: another packet follows in the frame. (type:uint8_t)
         version                   : 1. (type:uint8_t)
 
         """

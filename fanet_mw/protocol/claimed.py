@@ -112,6 +112,8 @@ class Claimed(Clustered):
         self._hello_ns = seconds_to_ns(scenario.routing.hello_interval_s)
         self._window_random = port.stream("window").random
         self._turn_bytes = max(scenario.traffic.payload_bytes, _LEAST_FRAME)
+        if scenario.routing.aggregate:
+            self._turn_bytes = max(self._turn_bytes, scenario.radio.max_frame_bytes)
         self._own = OwnTurns(geometry(scenario, self._turn_bytes))
         self._queue = OwnRelease(
             TxQueue(capacity=scenario.routing.queue_frames, sooner_us=sooner_us(scenario.routing)),
@@ -259,7 +261,7 @@ class Claimed(Clustered):
         if len(self._queue):
             self._draw(now_ns)
         for packet, start_ns in self._queue.due(now_ns=now_ns):
-            self._flood(packet, start_ns=start_ns)
+            self._flood_with(packet, self._queue.more(self._room(packet)), start_ns=start_ns)
 
     # --- for people -----------------------------------------------------------------------------------------------
 

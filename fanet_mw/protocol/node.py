@@ -67,6 +67,8 @@ class Node:
         self._lifetimes_ns = [scenario.routing.lifetime_ns(priority) for priority in range(256)]
         """By priority, whatever the air says."""
         self._seen = seen.Seen()
+        self._gathered: list[tuple[int, bytes]] | None = None
+        """While set: broadcasts that may share a frame, each with its instant."""
         self._protocol = make_protocol(self)
 
     # --- from the host's side -------------------------------------------------------------------------------------
@@ -113,11 +115,32 @@ class Node:
     def hear(self, reception: Reception, *, now_ns: int) -> None:
         """One reception, from anyone."""
         self.receptions += 1
-        frame = reception.frame
-        peeked = wire.peek(frame)
+        peeked = wire.peek(reception.frame)
         if peeked is None:
             self.dropped[DropReason.MALFORMED] += 1
+        elif peeked[2] & wire.FLAG_MORE:
+            self._hear_bundle(reception, now_ns=now_ns)
+        else:
+            self._hear_packet(reception, peeked, now_ns=now_ns)
+
+    def _hear_bundle(self, reception: Reception, *, now_ns: int) -> None:
+        """Several packets in one frame: each as if it had come alone; what they make us send goes together again."""
+        try:
+            packets = wire.unbundle(reception.frame)
+        except MalformedFrameError:
+            self.dropped[DropReason.MALFORMED] += 1
             return
+        self.gather()
+        for packet in packets:
+            peeked = wire.peek(packet)
+            if peeked is None:
+                self.dropped[DropReason.MALFORMED] += 1
+            else:
+                self._hear_packet(reception._replace(frame=packet), peeked, now_ns=now_ns)
+        self.send_gathered()
+
+    def _hear_packet(self, reception: Reception, peeked: tuple[int, int, int], *, now_ns: int) -> None:
+        frame = reception.frame
         origin, seq, flags = peeked
         phase = _PHASE.get(flags & wire.PHASE_MASK)
         key = (origin << 32) | seq
@@ -179,7 +202,28 @@ class Node:
 
     # --- the port of the protocol (fanet_mw.protocol.contract.Port) -----------------------------------------------
 
+    def gather(self) -> None:
+        self._gathered = []
+
+    def send_gathered(self) -> None:
+        """The first instant of each frame's packets is that of the frame."""
+        gathered, self._gathered = self._gathered or [], None
+        chunk: list[bytes] = []
+        first_ns, size, most = 0, 0, self.scenario.radio.max_frame_bytes
+        for start_ns, frame in gathered:
+            if chunk and size + len(frame) > most:
+                self.transmit(wire.bundle(chunk), BROADCAST, start_ns=first_ns)
+                chunk, size = [], 0
+            first_ns = min(first_ns, start_ns) if chunk else start_ns
+            chunk.append(frame)
+            size += len(frame)
+        if chunk:
+            self.transmit(wire.bundle(chunk), BROADCAST, start_ns=first_ns)
+
     def transmit(self, frame: bytes, dst: NodeId, *, start_ns: int, wants_status: bool = False) -> int:
+        if self._gathered is not None and dst == BROADCAST and not wants_status:
+            self._gathered.append((start_ns, frame))
+            return self.frames_sent
         seq = self.frames_sent
         self.frames_sent = seq + 1
         self.requests.append(_new(TxRequest, (seq, start_ns, frame, dst, wants_status)))

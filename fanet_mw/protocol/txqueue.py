@@ -56,6 +56,14 @@ class TxQueue:
         assert self._entries, "whoever pops has looked at the length"
         return self._entries.pop(0)[2]
 
+    def pop_fitting(self, size: int) -> list[Packet]:
+        """Take the most urgent packets, in order, as long as they fit into so many bytes together."""
+        taken = []
+        while self._entries and len(self._entries[0][2].frame) <= size:
+            taken.append(self.pop())
+            size -= len(taken[-1].frame)
+        return taken
+
     def expire(self, *, before_us: int) -> list[Packet]:
         """Take out every packet generated before an instant [swarm us], or that much later if its class is sooner."""
         stale: list[tuple[int, int, Packet]] = []

@@ -30,6 +30,7 @@ class GraphRadio:
         self.loss = 0.0
         self.nodes: dict[NodeId, Node] = {}
         self.links: dict[NodeId, set[NodeId]] = {}
+        self.frames = 0
         self.sent: list[tuple[int, NodeId, wire.Header]] = []
         self.delivered: Counter[tuple[int, int, int]] = Counter()
         self._random = stream(seed, "graph_radio").random
@@ -109,7 +110,10 @@ class GraphRadio:
         node.deliveries.clear()
 
     def _start(self, node: Node, request: TxRequest) -> None:
-        self.sent.append((self.now_ns, node.node, wire.decode_header(request.frame)))
+        self.frames += 1
+        assert len(request.frame) <= self.scenario.radio.max_frame_bytes
+        for packet in wire.unbundle(request.frame):
+            self.sent.append((self.now_ns, node.node, wire.decode_header(packet)))
         heard = [
             other
             for other in sorted(self.links.get(node.node, ()))

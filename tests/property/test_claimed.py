@@ -14,14 +14,16 @@ from hypothesis.stateful import RuleBasedStateMachine, invariant, precondition, 
 from test_slots_with_reuse import longest_chain
 
 from fanet_mw import config, wire
+from fanet_mw.messages import Reception
 from fanet_mw.protocol.claimed import Claimed
 from fanet_mw.protocol.topology import components, two_hop
 from fanet_mw.units import MS, NodeId, S
 from fanet_mw.wire import FLAG_FLOOD, FLAG_TO_HEAD, Kind
 
 
-def scenario_of(**clusters: Any) -> Any:
+def scenario_of(*, aggregate: bool = False, **clusters: Any) -> Any:
     tree = {
+        "routing": {"aggregate": aggregate},
         "nodes": {"count": 60},
         "clusters": {"relay": "claimed", "flooding_period_s": 0.5, **clusters},
         "radio": {"lead_ms": 0, "cw_min": 7},
@@ -60,9 +62,11 @@ def together(radio: GraphRadio, since_ns: int) -> list[tuple[int, int, int]]:
 class Swarm(RuleBasedStateMachine):
     """Joins, leaves, links that come and go, losses, packets; and calm times, after which all must be in order."""
 
+    aggregate = False
+
     def __init__(self) -> None:
         super().__init__()
-        self.radio = GraphRadio(scenario_of())
+        self.radio = GraphRadio(scenario_of(aggregate=self.aggregate))
         self.next_id = 1
         self.radio.join(self._id())
 
@@ -131,6 +135,14 @@ class Swarm(RuleBasedStateMachine):
         assert all(times == 1 for times in floods.values())
 
 
+class AggregatingSwarm(Swarm):
+    """The same, with several packets in a frame."""
+
+    aggregate = True
+
+
+TestAggregatingSwarm = AggregatingSwarm.TestCase
+TestAggregatingSwarm.settings = settings(max_examples=20, stateful_step_count=15, deadline=None)
 TestSwarm = Swarm.TestCase
 TestSwarm.settings = settings(max_examples=50, stateful_step_count=20, deadline=None)
 
@@ -217,3 +229,36 @@ def test_a_warning_that_could_not_go_within_its_second_is_dropped_and_a_report_i
     assert line.delivered[3, 6, report] == 1
     assert line.delivered[3, 6, warning] == 0
     assert "expired" in {**dict(line.nodes[NodeId(3)].report()["dropped"]), **line.nodes[NodeId(6)].report()["dropped"]}
+
+
+def test_small_packets_that_wait_together_share_a_frame_at_every_hop_and_are_delivered_once_each() -> None:
+    radio = GraphRadio(scenario_of(aggregate=True))
+    for node in range(1, 6):
+        radio.join(node, *([node - 1] if node > 1 else []))
+    radio.run(20 * S)
+    before = radio.frames
+    packets = [(1, radio.send(1)) for _ in range(10)] + [(5, radio.send(5)) for _ in range(10)]
+    radio.run(S // 2)
+    for source, seq in packets:
+        assert [radio.delivered[n, source, seq] for n in range(1, 6) if n != source] == [1] * 4
+    hellos = sum(1 for _, _, header in radio.sent[-60:] if header.kind == Kind.HELLO)
+    assert radio.frames - before - hellos <= 16, "20 packets of 4 transmissions each: 80 one by one"
+
+
+def test_a_bundle_of_which_a_part_is_known_brings_only_the_rest() -> None:
+    radio = GraphRadio(scenario_of(aggregate=True))
+    listener = radio.join(1)
+
+    def packet(seq: int, flags: int = FLAG_FLOOD) -> bytes:
+        header = wire.Header(0, seq, 9, 0xFFFF, 9, Kind.DATA, 32, 0, wire.PRIORITY_BULK, flags)
+        return header.encode() + wire.filler(40)
+
+    listener.hear(Reception(packet(1), NodeId(9), 5, -60.0), now_ns=5)
+    listener.hear(Reception(wire.bundle([packet(0), packet(1), packet(2)]), NodeId(9), 9, -60.0), now_ns=9)
+    assert [delivery.header.seq for delivery in listener.deliveries] == [1, 0, 2]
+    assert listener.receptions == 2
+    assert listener.report()["dropped"] == {"duplicate": 1}
+    broken = wire.bundle([packet(3), packet(4)])[:-5]
+    listener.hear(Reception(broken, NodeId(9), 12, -60.0), now_ns=12)
+    assert listener.report()["dropped"] == {"duplicate": 1, "malformed": 1}
+    assert len(listener.deliveries) == 3

@@ -101,3 +101,12 @@ def test_each_class_expires_by_its_own_lifetime() -> None:
 def test_a_class_without_a_lifetime_of_its_own_lives_as_long_as_the_others() -> None:
     routing = Routing(lifetime_s=10)
     assert [routing.lifetime_ns(p) // S for p in range(4)] == [10, 1, 10, 10]
+
+
+def test_what_fits_beside_the_first_is_taken_in_order_and_nothing_overtakes() -> None:
+    queue = TxQueue(capacity=9)
+    for seq, size in enumerate((10, 20, 40, 5)):
+        queue.push(packet(seq)._replace(frame=bytes(size)))
+    assert [p.header.seq for p in queue.pop_fitting(35)] == [0, 1]
+    assert [p.header.seq for p in queue.pop_fitting(35)] == []
+    assert [p.header.seq for p in queue.pop_fitting(45)] == [2, 3]

@@ -38,9 +38,9 @@ def test_a_dense_swarm_needs_few_relays_and_they_win_the_turns_they_need() -> No
 @pytest.mark.parametrize("rule", ["heads", "cds", "mpr"])
 def test_chosen_relays_reach_nearly_all_of_a_dense_swarm_by_half_the_frames(rule: str) -> None:
     heads = ["clusters.count=5"] if rule == "heads" else []
-    few = summary_of(f"clusters.relay={rule}", "traffic.interval_s=0.25", *DENSE, *heads)
-    assert few["pdr"] >= 0.95
-    assert few["frames"]["sent"] / few["generated"] < 15, "30 with `all`"
+    few = summary_of(f"clusters.relay={rule}", "traffic.interval_s=0.5", *DENSE, *heads)
+    assert few["pdr"] >= 0.93
+    assert few["frames"]["sent"] / few["generated"] < 20, "30 and more with `all`"
     assert few["frames"]["closes"]
 
 
@@ -52,3 +52,11 @@ def test_small_packets_share_frames_and_ten_times_as_many_arrive() -> None:
     assert summary["delay_ms"]["p95"] < 200
     assert summary["frames"]["sent"] / summary["generated"] < 22
     assert summary["frames"]["closes"]
+
+
+def test_heads_that_release_small_packets_together_need_half_the_frames() -> None:
+    small = ["traffic.payload_bytes=64", "traffic.interval_s=0.2", "clusters.count=8", "duration_s=14"]
+    one_by_one, together = (summary_of("clusters.relay=all", f"routing.aggregate={on}", *small) for on in (False, True))
+    assert together["frames"]["sent"] < one_by_one["frames"]["sent"] / 2
+    assert together["delay_ms"]["p50"] < one_by_one["delay_ms"]["p50"]
+    assert together["frames"]["closes"]

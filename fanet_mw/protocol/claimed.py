@@ -274,7 +274,8 @@ class Claimed(Clustered):
         if not claimed:
             return None
         starts = tuple(turns.start_ns(turn, frame_start_ns=0) for turn in claimed)
-        return TurnServer(turns.turn_ns, turns.period_ns, starts, self._lead_ns).completion_ns(2)
+        ahead_ns = self._lead_ns + self._port.scenario.radio.handover_ns
+        return TurnServer(turns.turn_ns, turns.period_ns, starts, ahead_ns).completion_ns(2)
 
     def report(self) -> Mapping[str, object]:
         share, hop_ns = self._own.share, self.hop_ns()

@@ -124,6 +124,7 @@ class Claimed(Clustered):
             port.node, lifetime_ns=int(_LIFETIMES * self._hello_ns), rank=lambda _, standing: _rank(standing.slot)
         )
         self._load = Load()
+        self._longest = 1 << (min(_LONGEST, max(1, self._own.turns.per_frame)).bit_length() - 1)
         self._claims = self._new_claims(0)
         self._known_ns = 0
         self._hello_bytes = 0
@@ -134,14 +135,13 @@ class Claimed(Clustered):
 
     def _new_claims(self, now_ns: int) -> SlotClaims:
         slots = self._port.scenario.clusters.slots
-        longest = 1 << (min(_LONGEST, max(1, self._own.turns.per_frame)).bit_length() - 1)
         return SlotClaims(
             self._port.node,
             now_ns=now_ns,
             listen_ns=_LISTEN * self._hello_ns,
             lifetime_ns=int(_LIFETIMES * self._hello_ns),
             slots=slots or None,
-            sized_to=None if slots else longest,
+            sized_to=None if slots else self._longest,
         )
 
     def start(self, now_ns: int) -> None:
@@ -224,10 +224,19 @@ class Claimed(Clustered):
         claims = Claims.decode_frames(packet.frame)
         if claims is None or claims.node != reception.src:
             return
-        fixed = self._port.scenario.clusters.slots
-        heard = tuple(_claim(h.node, h.standing, fixed) for h in claims.heard)
-        self._claims.hear(Hello(_claim(claims.node, claims.own, fixed), heard), now_ns=now_ns)
+        heard = tuple(self._claim(h.node, h.standing) for h in claims.heard)
+        self._claims.hear(Hello(self._claim(claims.node, claims.own), heard), now_ns=now_ns)
         self._news |= self._near.hear(claims, now_ns=now_ns)
+
+    def _claim(self, node: NodeId, standing: Standing) -> Claim:
+        """As `slot_claims` knows it. What no superframe of ours can hold is no claim: it came off the air."""
+        slot, length = standing.slot, standing.length
+        fixed = self._port.scenario.clusters.slots
+        if fixed:
+            return Claim(node, slot if length == fixed else None)
+        if length > self._longest or length & (length - 1):
+            return Claim(node, None, crowd=standing.crowd)
+        return Claim(node, slot, length=length, crowd=standing.crowd)
 
     def _draw(self, now_ns: int) -> None:
         """Know again which turns nobody claims, and who draws for them; only who draws needs to."""
@@ -293,13 +302,6 @@ class Claimed(Clustered):
 def _rank(slot: int | None) -> float:
     """Who holds a slot relays rather than who does not."""
     return 0.0 if slot is None else 1.0
-
-
-def _claim(node: NodeId, standing: Standing, fixed: int) -> Claim:
-    """As `slot_claims` knows it; superframes of a fixed length are all alike, and claims beyond it are none."""
-    if fixed:
-        return Claim(node, standing.slot if standing.length == fixed else None)
-    return Claim(node, standing.slot, length=standing.length, crowd=standing.crowd)
 
 
 def geometry(scenario: Scenario, frame_bytes: int) -> Turns:

@@ -14,6 +14,7 @@ from hypothesis.stateful import RuleBasedStateMachine, invariant, precondition, 
 from test_slots_with_reuse import longest_chain
 
 from fanet_mw import config, wire
+from fanet_mw.claims import Claims, Heard, Standing
 from fanet_mw.messages import Reception
 from fanet_mw.protocol.claimed import Claimed
 from fanet_mw.protocol.topology import components, two_hop
@@ -262,3 +263,22 @@ def test_a_bundle_of_which_a_part_is_known_brings_only_the_rest() -> None:
     listener.hear(Reception(broken, NodeId(9), 12, -60.0), now_ns=12)
     assert listener.report()["dropped"] == {"duplicate": 1, "malformed": 1}
     assert len(listener.deliveries) == 3
+
+
+@pytest.mark.parametrize("length", [3, 254, 255])
+def test_a_stranger_s_impossible_claim_neither_stops_us_nor_what_our_neighbors_say(
+    line: GraphRadio, length: int
+) -> None:
+    stranger = Claims(NodeId(40), Standing(0, length, 5), (Heard(NodeId(3), Standing(1, length), hears_us=True),))
+    for node in (2, 3):
+        hello = wire.Header(0, 1, 40, 0xFFFF, 40, Kind.HELLO, 1, 0, 0, 0).encode()
+        beacon = wire.Beacon(40, 0, 0, 0, 0, 0, 0, 255).encode_frame(40)
+        frame = hello + beacon + stranger.encode_frames()
+        line.nodes[NodeId(node)].hear(Reception(frame, NodeId(40), line.now_ns, -60.0), now_ns=line.now_ns)
+    before = {n: line.nodes[NodeId(n)].report()["slot"] for n in range(1, 6)}
+    line.run(3 * S)
+    assert {n: line.nodes[NodeId(n)].report()["slot"] for n in range(1, 6)} == before
+    assert not meetings(line)
+    seq = line.send(1)
+    line.run(S)
+    assert line.delivered[5, 1, seq] == 1

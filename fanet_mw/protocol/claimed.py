@@ -14,7 +14,7 @@ that is lost in it comes in a turn the next time.
 
 Bound: a packet that finds none before it leaves within `hop_ms` (report), each hop. There is no bound end to end when
 packets queue: how many come together at a relay depends on all sources and on the way here. Not modeled: interference
-from beyond two hops; clocks that disagree by more than 50 us.
+from beyond two hops; clocks that disagree by more than `clusters.turn_slack_us` allows (no bound is stated then).
 """
 
 from collections import deque
@@ -32,7 +32,7 @@ from fanet_mw.protocol.neighborhood import Neighborhood
 from fanet_mw.protocol.own_turns import OwnTurns, Share, draws
 from fanet_mw.protocol.root_release import RootRelease
 from fanet_mw.protocol.slot_claims import Claim, Hello, SlotClaims
-from fanet_mw.protocol.turns import Turns, turn_ns
+from fanet_mw.protocol.turns import Turns, clocks_fit, turn_ns
 from fanet_mw.protocol.txqueue import Packet, TxQueue, sooner_us
 from fanet_mw.scenario import Scenario
 from fanet_mw.units import MS, NodeId, S, seconds_to_ns
@@ -280,10 +280,11 @@ class Claimed(Clustered):
     def hop_ns(self) -> int | None:
         """The longest that a packet may take over this node when none is before it: one turn may go to a hello."""
         turns, claimed = self._own.turns, self._own.claimed()
-        if not claimed:
+        scenario = self._port.scenario
+        if not claimed or not clocks_fit(scenario, clock_error_ns=self._port.clock_error_ns):
             return None
         starts = tuple(turns.start_ns(turn, frame_start_ns=0) for turn in claimed)
-        ahead_ns = self._lead_ns + self._port.scenario.radio.handover_ns
+        ahead_ns = self._lead_ns + scenario.radio.handover_ns
         return TurnServer(turns.turn_ns, turns.period_ns, starts, ahead_ns).completion_ns(2)
 
     def report(self) -> Mapping[str, object]:

@@ -279,7 +279,7 @@ def test_relays_that_are_not_estimated_are_planned_as_if_all_relayed(rule: str) 
     def planned(relay: str) -> Plan:
         scenario = catalog.find("clusters", [f"clusters.relay={relay}", "traffic.interval_s=2", "clusters.count=8"])
         at = {NodeId(n): place for n, place in zip(scenario.node_ids, positions(scenario), strict=True)}
-        return plan(scenario, at, search=False)
+        return plan(scenario, at)
 
     assert [cluster.flood for cluster in planned(rule).clusters] == [c.flood for c in planned("all").clusters]
     assert ("slots are claimed" in describe(planned(rule))) is (rule == "claimed")

@@ -1,6 +1,7 @@
 """Named random streams: one stream per use, derived from text, so that no two uses share or shift draws."""
 
 from random import Random
+from typing import Final
 
 
 def stream(seed: int, *names: str | int) -> Random:
@@ -14,3 +15,17 @@ def stream(seed: int, *names: str | int) -> Random:
 def stream_seed(seed: int, *names: str | int) -> int:
     """Return a 63-bit seed for a named use, for generators that are not `random.Random` (numpy, numba)."""
     return stream(seed, *names).getrandbits(63)
+
+
+_MASK: Final = 0xFFFF_FFFF_FFFF_FFFF
+_STEP: Final = 0x9E37_79B9_7F4A_7C15  # splitmix64 (Steele, Lea and Flood, OOPSLA 2014)
+_FIRST: Final = 0xBF58_476D_1CE4_E5B9
+_SECOND: Final = 0x94D0_49BB_1331_11EB
+
+
+def lot(node: int, turn: int = 0, number: int = 0) -> int:
+    """64 bits that every node computes alike, for what a swarm decides by lot without a word: no stream, no seed."""
+    x = (node * _STEP + turn * _FIRST + number * _SECOND) & _MASK
+    x = (x ^ x >> 30) * _FIRST & _MASK
+    x = (x ^ x >> 27) * _SECOND & _MASK
+    return x ^ x >> 31

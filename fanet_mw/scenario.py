@@ -73,6 +73,13 @@ class Routing(Section):
     """Bound of a node's own queue; the least important packet is evicted, with a reason."""
     lifetime_s: Positive = 30.0
     """A packet older than this is dropped where it waits."""
+    safety_lifetime_s: NonNegative = 1.0
+    """The same for warnings (priority 1): a position that old warns of nothing; 0: as `lifetime_s`."""
+    report_lifetime_s: NonNegative = 0.0
+    """The same for survivor reports (priority 2); 0: as `lifetime_s`."""
+    aggregate: bool = False
+    """`clustered`, but not with `clusters.relay = "scheduled"`: packets that are released together share frames of up
+    to `radio.max_frame_bytes`, and so do their relays."""
     hello_interval_s: NonNegative = 1.0
     """Position beacon and hello, one hop; 0 sends none (`clustered` needs them)."""
     gossip_p: Annotated[float, Field(ge=0, le=1)] = 0.65
@@ -88,6 +95,11 @@ class Routing(Section):
     def jitter_ns(self) -> int:
         return round(self.jitter_ms * MS)
 
+    def lifetime_ns(self, priority: int) -> int:
+        """How long a packet of this priority (`wire.PRIORITY_...`) lives."""
+        own_s = {1: self.safety_lifetime_s, 2: self.report_lifetime_s}.get(priority, 0.0)
+        return seconds_to_ns(own_s or self.lifetime_s)
+
 
 class Clusters(Section):
     """The paper's protocol: k clusters, one slot each per flooding period."""
@@ -101,15 +113,18 @@ class Clusters(Section):
     """The least time between two packets that a head releases in its slot."""
     pacing: Literal["burst", "spread"] = "spread"
     """`burst` releases at `release_gap_ms`; `spread` divides the slot evenly among the queued packets."""
-    relay: Literal["all", "gossip", "counter", "scheduled"] = "all"
+    relay: Literal["all", "gossip", "counter", "heads", "cds", "mpr", "scheduled", "claimed"] = "all"
     """Who relays a flooded packet: every node; each with probability min(1, gossip_degree / neighbors); each that has
-    heard fewer than `counter` copies after U(0, assess_ms); or those that a collision-free timetable names, each in a
-    turn of its own."""
+    heard fewer than `counter` copies after U(0, assess_ms); heads and who connects them; a connected dominating set;
+    multipoint relays; those that a collision-free timetable names, each in a turn of its own; or a connected
+    dominating set in slots that nodes agree on over the air."""
     contention_ms: NonNegative = 40.0
-    """`scheduled`: the beginning of each period, for all that has no turn: hellos, joins, unicasts to heads."""
+    """`scheduled`, `claimed`: the beginning of each period, for all that has no turn: hellos, joins, unicasts."""
     turn_slack_us: NonNegative = 50.0
-    """`scheduled`: what a turn is longer than its frame: twice the bound of a clock's error, and some 20 us for flight
-    and detection."""
+    """`scheduled`, `claimed`: what a turn is longer than its frame: twice the bound of a clock's error, and some 20 us
+    for flight and detection."""
+    slots: Annotated[int, Field(ge=0, le=254)] = 0
+    """`claimed`: slots of a superframe; 0: as many as the neighborhood needs, a power of two."""
     link_m: NonNegative = 0.0
     """`scheduled`: nodes no farther apart are taken to hear each other; 0: `radio.range_m`."""
     interference_m: NonNegative = 0.0

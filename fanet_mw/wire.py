@@ -6,7 +6,7 @@ in the tests. Every decode is total: any bytes give a value or MalformedFrameErr
 
 import math
 import struct
-from collections.abc import Iterator
+from collections.abc import Iterator, Sequence
 from enum import IntEnum
 from functools import lru_cache
 from typing import Any, Final, NamedTuple, Self
@@ -29,6 +29,8 @@ FLAG_FLOOD: Final = 1
 FLAG_TO_HEAD: Final = 2
 """The packet is on its unicast way to a cluster head."""
 PHASE_MASK: Final = FLAG_FLOOD | FLAG_TO_HEAD
+FLAG_MORE: Final = 4
+"""Another packet, header first, follows in the same radio frame."""
 
 PRIORITY_CONTROL: Final = 0
 PRIORITY_SAFETY: Final = 1
@@ -115,6 +117,7 @@ _SYSTEM_AT: Final = 5
 _PREV_HOP_AT: Final = 26
 _KIND_AT: Final = 28
 _PRIORITY_AT: Final = 31
+_FLAGS_AT: Final = 32
 _REWRITTEN: Final = struct.Struct("<4sB20sH7B")
 """What the CRC of a header covers: the header without its first byte, then CRC_EXTRA."""
 _HEADER: Final = struct.Struct("<c33sH")
@@ -195,6 +198,34 @@ def rewrite(frame: bytes, prev_hop: int, hop_limit: int, hops: int, flags: int) 
         frame[_KIND_AT], hop_limit, hops, frame[_PRIORITY_AT], flags, VERSION, ROUTE.crc_extra,
     )  # fmt: skip
     return _HEADER.pack(_START, body, mcrf4xx(body)) + frame[HEADER_BYTES:]
+
+
+def bundle(packets: Sequence[bytes]) -> bytes:
+    """One radio frame out of several packets, each with its header; they must have been decoded."""
+    return b"".join((*(_with_more(packet) for packet in packets[:-1]), packets[-1]))
+
+
+def _with_more(packet: bytes) -> bytes:
+    body = bytearray(packet[:_BODY_END])
+    body[_FLAGS_AT] |= FLAG_MORE
+    return b"".join((body, _CRC.pack(mcrf4xx(bytes(body[1:]) + _EXTRA)), packet[HEADER_BYTES:]))
+
+
+def is_bundle(frame: bytes) -> bool:
+    """Whether another packet follows the first one, unchecked: `unbundle` says it for sure."""
+    return len(frame) >= HEADER_BYTES and bool(frame[_FLAGS_AT] & FLAG_MORE)
+
+
+def unbundle(frame: bytes) -> list[bytes]:
+    """The packets of a radio frame, each as it would come alone but for its flag; raises MalformedFrameError."""
+    starts, at = [], 0
+    for inner in frames(frame):
+        if _message_id(inner) == ROUTE.msgid:
+            starts.append(at)
+        at += len(inner)
+    if not starts or starts[0]:
+        raise MalformedFrameError("a bundle that does not begin with a routing header")
+    return [frame[begin:end] for begin, end in zip(starts, [*starts[1:], len(frame)], strict=True)]
 
 
 # --- inner frames -------------------------------------------------------------------------------------------------
@@ -425,8 +456,9 @@ TIME: Final = Spec(53005, 172, struct.Struct("<QIIIIHHHBBB"))
 JOIN: Final = Spec(53006, 50, struct.Struct("<fffHB"))
 DIGEST: Final = Spec(53007, 37, struct.Struct("<24I24I24HBBB"))
 PLACES: Final = Spec(53008, 1, struct.Struct("<28h28h28hhhhBBB"))
+CLAIMS: Final = Spec(53009, 249, struct.Struct("<H16H16B16B16B16BBBBBBB"))
 ROUTING: Final = Spec(53010, 255, struct.Struct("<BBBB240B"))
-SPECS: Final = (ROUTE, BEACON, SCHEDULE, SURVIVOR, CHUNK, TIME, JOIN, DIGEST, PLACES, ROUTING)
+SPECS: Final = (ROUTE, BEACON, SCHEDULE, SURVIVOR, CHUNK, TIME, JOIN, DIGEST, PLACES, CLAIMS, ROUTING)
 _OURS: Final = {spec.msgid: spec for spec in SPECS}
 CAPACITY: Final = 56
 """Entries of one schedule part."""

@@ -15,16 +15,26 @@ PHASES: Final = {0: seen.DELIVERED, wire.FLAG_FLOOD: seen.FLOODED, wire.FLAG_TO_
 """Which bit says that a packet was handled, by the phase flags of the frame that brought it."""
 _new: Final = tuple.__new__  # for what is made once per frame
 _NOTHING: Final = (0, 0)
+BUNDLE: Final = 1 << 30
+"""The phase of a frame with several packets in it: no node has ever handled that."""
+_SEVERAL: Final = (0, BUNDLE)
 
 
-def glance(frame: bytes) -> tuple[int, int]:
-    """`seen.key_of` the packet and the bit of its phase, unchecked; (0, 0) when there can be no packet in it."""
-    peeked = wire.peek(frame)
+def glance(packet: bytes) -> tuple[int, int]:
+    """`seen.key_of` a packet and the bit of its phase, unchecked; (0, 0) when there can be none in these bytes."""
+    peeked = wire.peek(packet)
     if peeked is None:
         return _NOTHING
     origin, seq, flags = peeked
     phase = PHASES.get(flags & wire.PHASE_MASK)
     return _NOTHING if phase is None else (seen.key_of(origin, seq), phase)
+
+
+def read(packet: bytes) -> Packet:
+    """The packet in these bytes; raises MalformedFrameError."""
+    if glance(packet) is _NOTHING:
+        raise MalformedFrameError("no routing header, or one of two phases")
+    return _new(Packet, (wire.decode_header(packet), packet))
 
 
 class Reader:
@@ -36,18 +46,17 @@ class Reader:
         self._packet: Packet | None = None
 
     def glance(self, frame: bytes) -> tuple[int, int]:
-        """`glance` at this frame."""
+        """`glance` at the packet of this frame; (0, BUNDLE) when it has several."""
         if frame is not self._frame:
-            self._frame, self._packet, self._glance = frame, None, glance(frame)
+            self._frame, self._packet = frame, None
+            self._glance = _SEVERAL if wire.is_bundle(frame) else glance(frame)
         return self._glance
 
     def packet(self, frame: bytes) -> Packet:
         """The packet in the frame of the last `glance`; raises MalformedFrameError."""
         assert frame is self._frame, "whoever wants the packet has glanced at its frame"
         if self._packet is None:
-            if self._glance is _NOTHING:
-                raise MalformedFrameError("no routing header, or one of two phases")
-            self._packet = _new(Packet, (wire.decode_header(frame), frame))
+            self._packet = read(frame)
         return self._packet
 
 

@@ -5,7 +5,7 @@ to a head, and FLOOD, released by the head in its slot and relayed once by every
 nodes join by a flooded JOIN, the leader answers with a flooded SCHEDULE.
 """
 
-from collections.abc import Mapping
+from collections.abc import Mapping, Sequence
 from typing import Final
 
 from fanet_mw.digest import Digest
@@ -21,7 +21,7 @@ from fanet_mw.protocol.neighbors import Neighbor, Neighbors
 from fanet_mw.protocol.relay import Relay
 from fanet_mw.protocol.release import Release
 from fanet_mw.protocol.repair import Repair
-from fanet_mw.protocol.txqueue import Packet, TxQueue
+from fanet_mw.protocol.txqueue import Packet, TxQueue, sooner_us
 from fanet_mw.units import BROADCAST, MS, US, NodeId, S, seconds_to_ns
 from fanet_mw.wire import FLAG_FLOOD, FLAG_TO_HEAD, Beacon, Join, Kind, Schedule
 
@@ -55,9 +55,11 @@ class Clustered(RoutingProtocol):
         self._gradient = Gradient(node=port.node, neighbors=self._neighbors, hello_ns=hello_ns)
         self._membership = Membership(port.node)
         self._release = Release(
-            TxQueue(capacity=scenario.routing.queue_frames), scenario.clusters, lead_ns=self._lead_ns
+            TxQueue(capacity=scenario.routing.queue_frames, sooner_us=sooner_us(scenario.routing)),
+            scenario.clusters,
+            lead_ns=self._lead_ns,
         )
-        self._homeless = TxQueue(capacity=scenario.routing.queue_frames)
+        self._homeless = TxQueue(capacity=scenario.routing.queue_frames, sooner_us=sooner_us(scenario.routing))
         self._unicasts: dict[int, tuple[Packet, NodeId, int]] = {}
         self._leader = (
             Leader(node=port.node, clusters=scenario.clusters.count, period_ns=scenario.clusters.period_ns)
@@ -247,7 +249,19 @@ class Clustered(RoutingProtocol):
         for packet in self._release.expire(before_us=horizon_us):
             self._port.drop(DropReason.EXPIRED, packet, now_ns=now_ns)
         for packet, start_ns in self._release.due(self._membership, now_ns=now_ns):
-            self._flood(packet, start_ns=start_ns)
+            self._flood_with(packet, self._release.more(self._room(packet)), start_ns=start_ns)
+
+    def _room(self, packet: Packet) -> int:
+        """What a frame with this packet has left for others [bytes]."""
+        scenario = self._port.scenario
+        return scenario.radio.max_frame_bytes - len(packet.frame) if scenario.routing.aggregate else 0
+
+    def _flood_with(self, packet: Packet, others: Sequence[Packet], *, start_ns: int) -> None:
+        """The floods of several packets begin here, in one frame."""
+        self._port.gather()
+        for each in (packet, *others):
+            self._flood(each, start_ns=start_ns)
+        self._port.send_gathered()
 
     def _flood(self, packet: Packet, *, start_ns: int) -> None:
         """The flood of a packet begins here."""

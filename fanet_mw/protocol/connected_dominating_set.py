@@ -10,6 +10,7 @@ from types import MappingProxyType
 from typing import Final
 
 from fanet_mw.protocol.topology import Adjacency, components
+from fanet_mw.rng import lot
 from fanet_mw.units import NodeId
 
 _EQUAL: Final[Mapping[NodeId, float]] = MappingProxyType({})
@@ -29,6 +30,35 @@ def wu_li(adjacency: Adjacency, *, priority: Mapping[NodeId, float] = _EQUAL) ->
         if not any(node in kept for node in part):
             kept.add(max(part, key=rank.__getitem__))  # everyone hears everyone: one is enough
     return tuple(sorted(kept))
+
+
+def dominates(node: NodeId, adjacency: Adjacency, *, priority: Mapping[NodeId, float] = _EQUAL) -> bool:
+    """Whether `node` belongs to the set, decided by itself: `adjacency` need hold the node and its neighbors only.
+
+    It does not when any two of its neighbors hear each other or have a way over nodes that are all stronger (coverage
+    condition I of Wu & Dai, "A generic distributed broadcast scheme in ad hoc wireless networks", ICDCS 2003), as
+    far as its two hops show. Prunes what rule k does, and more in thin swarms, where ways lead around the node. A hash
+    of the id breaks ties: in a swarm numbered row by row no node has stronger ones all around. Where everyone hears
+    everyone nobody belongs: whoever sends reaches all.
+    """
+    near = {n: frozenset(adjacency[n]) for n in (node, *adjacency[node])}
+    if _complete(adjacency[node], near):
+        return False
+    ours = _strength(node, priority)
+    known = frozenset().union(*near.values()) - {node}
+    stronger = {n for n in known if _strength(n, priority) > ours}
+    links = {
+        n: tuple(m for m in sorted(stronger) if m in near.get(n, ()) or n in near.get(m, ())) for n in sorted(stronger)
+    }
+    ways = [frozenset(part) for part in components(links)]
+    over = {n: frozenset(i for i, way in enumerate(ways) if n in way or near[n] & way) for n in adjacency[node]}
+    return not all(
+        b in near[a] or over[a] & over[b] for i, a in enumerate(adjacency[node]) for b in adjacency[node][i + 1 :]
+    )
+
+
+def _strength(node: NodeId, priority: Mapping[NodeId, float]) -> tuple[float, int, NodeId]:
+    return priority.get(node, 0.0), lot(node), node
 
 
 def _complete(nodes: tuple[NodeId, ...], near: Mapping[NodeId, frozenset[NodeId]]) -> bool:

@@ -31,6 +31,11 @@ class Port(Protocol):
     def transmit(self, frame: bytes, dst: NodeId, *, start_ns: int, wants_status: bool = False) -> int:
         """Announce a transmission; returns the request's sequence number."""
 
+    def gather(self) -> None:
+        """Hold broadcasts back until `send_gathered`, which sends as few frames as they fit."""
+
+    def send_gathered(self) -> None: ...
+
     def announce(
         self, kind: Kind, inner: bytes, *, now_ns: int, flags: int, hop_limit: int, destination: NodeId = BROADCAST
     ) -> Packet:

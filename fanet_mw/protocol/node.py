@@ -54,9 +54,12 @@ class Node:
         self.dropped: Counter[str] = Counter()
         self._duplicates = 0
         self._next_seq = {False: 0, True: _CONTROL}
-        self._lifetime_ns = round(scenario.routing.lifetime_s * 1_000_000_000)
+        self._lifetimes_ns = [scenario.routing.lifetime_ns(priority) for priority in range(256)]
+        """By priority, whatever the air says."""
         self._reader = arrival.shared
         self._seen = seen.Seen()
+        self._gathered: list[tuple[int, bytes]] | None = None
+        """While set: broadcasts that may share a frame, each with its instant."""
         self._protocol = make_protocol(self)
         self.next_wake_ns = self._protocol.next_wake_ns
         """The protocol's own method: every reception is followed by this question."""
@@ -111,22 +114,47 @@ class Node:
         if known & phase:
             self._duplicates += 1
             self._protocol.overheard(key, now_ns=now_ns)
-            return
+        elif phase == arrival.BUNDLE:
+            self._hear_bundle(reception, now_ns)
+        else:
+            self._hear_new(self._reader.packet, reception, key, known, phase, now_ns)
+
+    def _hear_bundle(self, reception: Reception, now_ns: int) -> None:
+        """Several packets in one frame: each as if it had come alone; what they make us send goes together again."""
         try:
-            self._first_copy(self._reader.packet(frame), reception, key, known, known | phase, now_ns)
+            packets = wire.unbundle(reception.frame)
+        except MalformedFrameError:
+            self.dropped[DropReason.MALFORMED] += 1
+            return
+        self.gather()
+        for frame in packets:
+            key, phase = arrival.glance(frame)
+            known = self._seen.bits(key)
+            if known & phase:
+                self._duplicates += 1
+                self._protocol.overheard(key, now_ns=now_ns)
+            else:
+                self._hear_new(arrival.read, reception._replace(frame=frame), key, known, phase, now_ns)
+        self.send_gathered()
+
+    def _hear_new(
+        self, read: Callable[[bytes], Packet], reception: Reception, key: int, known: int, phase: int, now_ns: int
+    ) -> None:
+        try:
+            self._first_copy(read(reception.frame), reception, key, known, known | phase, now_ns)
         except MalformedFrameError:
             self.dropped[DropReason.MALFORMED] += 1
 
     def _first_copy(self, packet: Packet, reception: Reception, key: int, before: int, bits: int, now_ns: int) -> None:
         """`before` and `bits`: what is known of the packet without and with this copy."""
-        origin_us, seq, origin, destination, _, kind, _, hops, _, _ = packet.header
+        origin_us, seq, origin, destination, _, kind, _, hops, priority, _ = packet.header
         if kind == _HELLO:
             self._seen.put(key, bits)
             self._protocol.hello(packet, reception, now_ns=now_ns)
             return
         end_ns = reception.end_ns
         age_ns = end_ns - origin_us * US
-        if age_ns > self._lifetime_ns:
+        if age_ns > self._lifetimes_ns[priority]:
             self._seen.put(key, bits)
             self.drop(DropReason.EXPIRED, packet, now_ns=now_ns)
             return
@@ -158,7 +186,28 @@ class Node:
 
     # --- the port of the protocol (fanet_mw.protocol.contract.Port) -----------------------------------------------
 
+    def gather(self) -> None:
+        self._gathered = []
+
+    def send_gathered(self) -> None:
+        """The first instant of each frame's packets is that of the frame."""
+        gathered, self._gathered = self._gathered or [], None
+        chunk: list[bytes] = []
+        first_ns, size, most = 0, 0, self.scenario.radio.max_frame_bytes
+        for start_ns, frame in gathered:
+            if chunk and size + len(frame) > most:
+                self.transmit(wire.bundle(chunk), BROADCAST, start_ns=first_ns)
+                chunk, size = [], 0
+            first_ns = min(first_ns, start_ns) if chunk else start_ns
+            chunk.append(frame)
+            size += len(frame)
+        if chunk:
+            self.transmit(wire.bundle(chunk), BROADCAST, start_ns=first_ns)
+
     def transmit(self, frame: bytes, dst: NodeId, *, start_ns: int, wants_status: bool = False) -> int:
+        if self._gathered is not None and dst == BROADCAST and not wants_status:
+            self._gathered.append((start_ns, frame))
+            return self.frames_sent
         seq = self.frames_sent
         self.frames_sent = seq + 1
         self.requests.append(_new(TxRequest, (seq, start_ns, frame, dst, wants_status)))

@@ -41,6 +41,10 @@ class Release:
             self.arm(membership, now_ns=now_ns)
         return evicted
 
+    def more(self, size: int) -> list[Packet]:
+        """Packets that fit into what a frame released now has left [bytes]."""
+        return self._queue.pop_fitting(size)
+
     def expire(self, *, before_us: int) -> list[Packet]:
         return self._queue.expire(before_us=before_us)
 

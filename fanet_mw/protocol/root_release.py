@@ -35,6 +35,10 @@ class RootRelease:
             self._arm(now_ns)
         return evicted
 
+    def more(self, size: int) -> list[Packet]:
+        """Packets that fit into what a frame released now has left [bytes]."""
+        return self._queue.pop_fitting(size)
+
     def expire(self, *, before_us: int) -> list[Packet]:
         return self._queue.expire(before_us=before_us)
 

@@ -20,7 +20,7 @@ from fanet_mw.protocol.contract import Port
 from fanet_mw.protocol.root_release import RootRelease
 from fanet_mw.protocol.timetable import Geometry, Timetable, timetable
 from fanet_mw.protocol.turns import Turns, clocks_fit, turn_ns
-from fanet_mw.protocol.txqueue import Packet, TxQueue
+from fanet_mw.protocol.txqueue import Packet, TxQueue, sooner_us
 from fanet_mw.scenario import Scenario
 from fanet_mw.units import BROADCAST, MS, US, Enu, NodeId, seconds_to_ns
 from fanet_mw.wire import CAPACITY, FLAG_FLOOD, HEADER_BYTES, PRIORITY_BULK, Kind, Schedule
@@ -53,7 +53,10 @@ class Scheduled(Clustered):
         self._window_random = port.stream("window").random
         self._turn_ns = turn_ns(scenario, payload_bytes=largest_frame(scenario))
         self._turn_bytes = largest_frame(scenario)
-        self._roots = RootRelease(TxQueue(capacity=scenario.routing.queue_frames), lead_ns=self._lead_ns)
+        self._roots = RootRelease(
+            TxQueue(capacity=scenario.routing.queue_frames, sooner_us=sooner_us(scenario.routing)),
+            lead_ns=self._lead_ns,
+        )
         self._plans: list[Plan] = []
         self._schedules: dict[int, tuple[Schedule, Places]] = {}
         self._planned_epoch = 0

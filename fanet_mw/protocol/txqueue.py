@@ -1,13 +1,19 @@
 """The bounded priority queue of a node. Nothing leaves it without being transmitted or named in a drop.
 
 Order: priority first (0 is the most urgent), then arrival. When full, the least important and youngest entry goes.
+Classes may expire sooner than the rest: what warns of a collision is worth nothing after a second.
 """
 
 from bisect import insort
-from typing import NamedTuple
+from collections.abc import Mapping
+from types import MappingProxyType
+from typing import Final, NamedTuple
 
-from fanet_mw.units import NodeId
-from fanet_mw.wire import Header
+from fanet_mw.scenario import Routing
+from fanet_mw.units import US, NodeId
+from fanet_mw.wire import PRIORITY_REPORT, PRIORITY_SAFETY, Header
+
+_ALIKE: Final[Mapping[int, int]] = MappingProxyType({})
 
 
 class Packet(NamedTuple):
@@ -21,11 +27,18 @@ class Packet(NamedTuple):
         return NodeId(self.header.origin)
 
 
+def sooner_us(routing: Routing) -> Mapping[int, int]:
+    """By priority, how much sooner than `routing.lifetime_s` a class expires."""
+    whole_ns = routing.lifetime_ns(-1)
+    return {p: (whole_ns - routing.lifetime_ns(p)) // US for p in (PRIORITY_SAFETY, PRIORITY_REPORT)}
+
+
 class TxQueue:
     """Packets waiting for a slot or a route."""
 
-    def __init__(self, *, capacity: int) -> None:
+    def __init__(self, *, capacity: int, sooner_us: Mapping[int, int] = _ALIKE) -> None:
         self._capacity = capacity
+        self._sooner_us = sooner_us
         self._entries: list[tuple[int, int, Packet]] = []
         self._order = 0
 
@@ -43,12 +56,23 @@ class TxQueue:
         assert self._entries, "whoever pops has looked at the length"
         return self._entries.pop(0)[2]
 
+    def pop_fitting(self, size: int) -> list[Packet]:
+        """Take the most urgent packets, in order, as long as they fit into so many bytes together."""
+        taken = []
+        while self._entries and len(self._entries[0][2].frame) <= size:
+            taken.append(self.pop())
+            size -= len(taken[-1].frame)
+        return taken
+
     def expire(self, *, before_us: int) -> list[Packet]:
-        """Take out every packet generated before an instant [swarm us]."""
-        stale = [entry[2] for entry in self._entries if entry[2].header.origin_us < before_us]
-        if stale:
-            self._entries = [entry for entry in self._entries if entry[2].header.origin_us >= before_us]
-        return stale
+        """Take out every packet generated before an instant [swarm us], or that much later if its class is sooner."""
+        stale: list[tuple[int, int, Packet]] = []
+        kept: list[tuple[int, int, Packet]] = []
+        for entry in self._entries:
+            late_us = before_us + self._sooner_us.get(entry[0], 0)
+            (stale if entry[2].header.origin_us < late_us else kept).append(entry)
+        self._entries = kept
+        return [entry[2] for entry in stale]
 
     def drain(self) -> list[Packet]:
         """Take everything, most urgent first."""

@@ -3,9 +3,11 @@
 from collections.abc import Mapping
 from typing import Final
 
+from fanet_mw.protocol.claimed import Claimed
 from fanet_mw.protocol.clustered import Clustered
 from fanet_mw.protocol.contract import Port, RoutingProtocol
 from fanet_mw.protocol.scheduled import Scheduled
+from fanet_mw.protocol.selective import Selective
 from fanet_mw.routing.aodv import Aodv
 from fanet_mw.routing.direct import Direct
 from fanet_mw.routing.dsdv import Dsdv
@@ -27,9 +29,19 @@ PROTOCOLS: Final[Mapping[str, type[RoutingProtocol]]] = {
 }
 
 
+RELAYS: Final[Mapping[str, type[Clustered]]] = {
+    "scheduled": Scheduled,
+    "claimed": Claimed,
+    "heads": Selective,
+    "cds": Selective,
+    "mpr": Selective,
+}
+"""Rules of `clusters.relay` that need more than `clustered` itself does."""
+
+
 def make_protocol(port: Port) -> RoutingProtocol:
     """The protocol that the port's scenario names."""
     name = port.scenario.routing.protocol
-    if name == "clustered" and port.scenario.clusters.relay == "scheduled":
-        return Scheduled(port)
+    if name == "clustered":
+        return RELAYS.get(port.scenario.clusters.relay, Clustered)(port)
     return PROTOCOLS[name](port)

@@ -272,3 +272,14 @@ def test_every_packet_goes_through_all_nodes_between_it_and_its_head() -> None:
     found = ways(line, dict.fromkeys(line, NodeId(3)), [one])
     assert found.hops == {1: 2, 2: 1, 3: 0, 4: 1, 5: 2}
     assert {n: row[0] for n, row in found.through.items()} == {1: 1, 2: 2, 3: 0, 4: 1, 5: 1}
+
+
+@pytest.mark.parametrize("rule", ["heads", "cds", "mpr", "claimed"])
+def test_relays_that_are_not_estimated_are_planned_as_if_all_relayed(rule: str) -> None:
+    def planned(relay: str) -> Plan:
+        scenario = catalog.find("clusters", [f"clusters.relay={relay}", "traffic.interval_s=2", "clusters.count=8"])
+        at = {NodeId(n): place for n, place in zip(scenario.node_ids, positions(scenario), strict=True)}
+        return plan(scenario, at)
+
+    assert [cluster.flood for cluster in planned(rule).clusters] == [c.flood for c in planned("all").clusters]
+    assert ("slots are claimed" in describe(planned(rule))) is (rule == "claimed")

@@ -7,7 +7,7 @@ from test_slots_with_reuse import graphs
 
 from fanet_mw.errors import LocalProtocolError
 from fanet_mw.protocol.broadcast_schedule import broadcast_schedule, pipeline_spacing, shortest_relays
-from fanet_mw.protocol.connected_dominating_set import guha_khuller, wu_li
+from fanet_mw.protocol.connected_dominating_set import dominates, guha_khuller, wu_li
 from fanet_mw.protocol.multipoint_relays import WILL_ALWAYS, WILL_NEVER, multipoint_relays
 from fanet_mw.protocol.topology import components, levels, symmetric, two_hop, within_range
 from fanet_mw.units import Enu, NodeId
@@ -208,3 +208,45 @@ def test_the_reference_grid_floods_in_fewer_sub_slots_than_nodes() -> None:
 def test_a_root_that_is_no_node_is_our_callers_mistake() -> None:
     with pytest.raises(LocalProtocolError, match="root = 9"):
         broadcast_schedule(line(3), NodeId(9), ())
+
+
+# --- each node for itself ---
+
+
+def two_hops_of(node, adjacency):
+    """What hellos tell: the node, its neighbors, and theirs."""
+    return {n: adjacency[n] for n in (node, *adjacency[node])}
+
+
+def reached(adjacency, source, relays):
+    """Who hears a flood of `source` that only `relays` pass on."""
+    heard, sending = {source}, [source]
+    while sending:
+        for n in adjacency[sending.pop()]:
+            if n not in heard:
+                heard.add(n)
+                if n in relays:
+                    sending.append(n)
+    return heard
+
+
+@settings(max_examples=300)
+@given(graphs(), st.booleans())
+def test_a_flood_reaches_everyone_over_those_who_find_that_they_dominate(adjacency, some_first) -> None:
+    priority = {n: float(n % 3) for n in adjacency} if some_first else {}
+    relays = {n for n in adjacency if dominates(n, two_hops_of(n, adjacency), priority=priority)}
+    for part in components(adjacency):
+        for source in part:
+            assert reached(adjacency, source, relays) == set(part)
+
+
+def test_of_a_line_all_but_the_ends_find_that_they_dominate_and_of_a_full_mesh_none() -> None:
+    assert [n for n in line(6) if dominates(n, line(6))] == [2, 3, 4, 5]
+    mesh = symmetric({NodeId(n): range(1, 6) for n in range(1, 6)})
+    assert not any(dominates(n, mesh) for n in mesh)
+
+
+def test_in_a_thin_grid_a_third_need_not_relay() -> None:
+    places = {NodeId(9 * y + x + 1): Enu(200.0 * x, 200.0 * y, 0) for x in range(9) for y in range(5)}
+    grid = within_range(places, range_m=250)
+    assert sum(dominates(n, two_hops_of(n, grid)) for n in grid) <= 31 < len(wu_li(grid))

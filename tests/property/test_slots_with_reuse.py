@@ -72,11 +72,14 @@ def test_dsatur_colors_a_plus_grid_near_the_optimum_of_five() -> None:
 class Air:
     """Superframes of all nodes: each steps once per superframe, in random order; hellos are lost at random."""
 
-    def __init__(self, adjacency, seed: int, *, loss: float = 0.0, slots: int | None = None) -> None:
+    def __init__(
+        self, adjacency, seed: int, *, loss: float = 0.0, slots: int | None = None, sized_to: int | None = None
+    ) -> None:
         self.adjacency = adjacency
         self.superframe = 0
         self._loss = loss
         self._slots = slots
+        self._sized_to = sized_to
         self._rng = stream(seed, "air")
         self.nodes: dict[NodeId, SlotClaims] = {}
         self.join(adjacency)
@@ -88,7 +91,7 @@ class Air:
             if node not in self.nodes:
                 self.nodes[node] = SlotClaims(
                     node, now_ns=self.superframe * S, listen_ns=LISTEN * S, lifetime_ns=int(3.5 * S),
-                    slots=self._slots, priority=priority,
+                    slots=self._slots, sized_to=self._sized_to, priority=priority,
                 )  # fmt: skip
 
     def run(self, superframes: int) -> None:
@@ -108,7 +111,13 @@ class Air:
 
     @property
     def settled(self) -> bool:
-        return None not in self.slots.values() and not clashes(self.slots, self.adjacency)
+        return None not in self.slots.values() and not self.meetings()
+
+    def meetings(self):
+        """Pairs within two hops that would send in one turn, whatever the lengths of their superframes."""
+        own = {n: c.own for n, c in self.nodes.items()}
+        rivals = two_hop(self.adjacency)
+        return [(a, b) for a in sorted(rivals) for b in rivals[a] if a < b and own[a].meets(own[b])]
 
 
 def longest_chain(adjacency) -> int:
@@ -169,6 +178,57 @@ def test_with_losses_claims_still_settle(loss: float) -> None:
             if air.settled:
                 break
         assert air.settled
+
+
+# --- superframes as long as the neighborhood is crowded ---
+
+
+@settings(max_examples=200)
+@given(graphs(), st.integers(0, 10**6))
+def test_sized_superframes_are_free_of_clashes_within_the_stated_superframes(adjacency, seed) -> None:
+    air = Air(adjacency, seed, sized_to=128)
+    air.run(LISTEN + 2 * longest_chain(adjacency) + 1 + 4)
+    assert air.settled
+    air.run(30)
+    assert air.settled
+    crowds = {n: 1 + len(rivals) for n, rivals in two_hop(adjacency).items()}
+    for node, claims in air.nodes.items():
+        least = max([crowds[node], *(crowds[r] for r in two_hop(adjacency)[node])])
+        assert claims.own.crowd == crowds[node]
+        assert least <= claims.own.length < 2 * least, "the next power of two, no longer"
+
+
+@settings(max_examples=150)
+@given(graphs(), graphs(most=10), st.integers(0, 10**6))
+def test_sized_superframes_follow_leaves_joins_and_moves(adjacency, others, seed) -> None:
+    air = Air(adjacency, seed, sized_to=128)
+    air.run(20)
+    air.join(others)
+    air.run(4 + LISTEN + 2 * longest_chain(others) + 1 + 4)
+    assert air.settled
+
+
+def test_a_node_that_lengthens_its_superframe_keeps_a_part_of_its_turns() -> None:
+    node = SlotClaims(NodeId(3), now_ns=0, listen_ns=0, lifetime_ns=100 * S, sized_to=64)
+    before = node.step(0).own
+    for n in range(10, 20):
+        node.hear(Hello(Claim(NodeId(n), None), ()), now_ns=0)
+    after = node.step(S).own
+    assert (before.length, after.length) == (1, 16)
+    assert after.slot is not None
+    assert before.slot == after.slot % before.length
+
+
+def test_two_claims_of_different_lengths_meet_where_the_shorter_repeats() -> None:
+    assert Claim(NodeId(1), 1, length=4).meets(Claim(NodeId(2), 13, length=16))
+    assert not Claim(NodeId(1), 1, length=4).meets(Claim(NodeId(2), 14, length=16))
+    assert not Claim(NodeId(1), None, length=4).meets(Claim(NodeId(2), 14, length=16))
+
+
+@pytest.mark.parametrize("keys", [{"sized_to": 12}, {"sized_to": 0}, {"sized_to": 8, "slots": 8}], ids=str)
+def test_a_longest_superframe_that_is_no_power_of_two_is_our_callers_mistake(keys) -> None:
+    with pytest.raises(LocalProtocolError, match="sized_to"):
+        SlotClaims(NodeId(1), now_ns=0, listen_ns=0, lifetime_ns=1, **keys)
 
 
 def test_of_two_rivals_the_lower_id_keeps_the_slot_unless_priority_says_otherwise() -> None:

@@ -326,3 +326,22 @@ def test_one_changed_bit_in_a_header_is_noticed(header: Header, data: st.DataObj
 
 def test_node_ids_beyond_the_system_ids_wrap_and_leave_the_ground_stations_free() -> None:
     assert [wire.system_id(node) for node in (1, 250, 251, 65534)] == [1, 250, 1, 34]
+
+
+@given(st.lists(st.tuples(headers, st.sampled_from([0, 17, 60, 300])), min_size=1, max_size=6))
+def test_a_bundle_is_taken_apart_into_what_it_was_made_of(parts: list[tuple[Header, int]]) -> None:
+    packets = [header._replace(flags=header.flags & 3).encode() + wire.filler(size) for header, size in parts]
+    apart = wire.unbundle(wire.bundle(packets))
+    assert len(apart) == len(packets)
+    for got, packet in zip(apart, packets, strict=True):
+        header = wire.decode_header(got)
+        assert header._replace(flags=header.flags & 3) == wire.decode_header(packet)
+        assert got[wire.HEADER_BYTES :] == packet[wire.HEADER_BYTES :]
+    more = [bool(wire.decode_header(got).flags & wire.FLAG_MORE) for got in apart]
+    assert more == [True] * (len(packets) - 1) + [False]
+
+
+@given(st.one_of(st.binary(max_size=120), st.binary(max_size=90).map(lambda tail: HEADER + tail)))
+def test_garbage_for_a_bundle_is_one_error(data: bytes) -> None:
+    with suppress(MalformedFrameError):
+        assert b"".join(wire.unbundle(data)) == data

@@ -7,10 +7,18 @@ from hypothesis import strategies as st
 
 from fanet_mw.protocol.membership import Membership
 from fanet_mw.protocol.release import Release
-from fanet_mw.protocol.txqueue import Packet, TxQueue
-from fanet_mw.scenario import Clusters
+from fanet_mw.protocol.txqueue import Packet, TxQueue, sooner_us
+from fanet_mw.scenario import Clusters, Routing
 from fanet_mw.units import MS, NodeId, S
-from fanet_mw.wire import Header, Member, Schedule
+from fanet_mw.wire import (
+    PRIORITY_BULK,
+    PRIORITY_CONTROL,
+    PRIORITY_REPORT,
+    PRIORITY_SAFETY,
+    Header,
+    Member,
+    Schedule,
+)  # fmt: skip
 
 LEAD_NS = 20 * MS
 
@@ -73,3 +81,32 @@ def test_expired_packets_are_taken_out_and_named() -> None:
         queue.push(packet(seq, born_us=seq * 1000))
     assert [p.header.seq for p in queue.expire(before_us=2000)] == [0, 1]
     assert len(queue) == 2
+
+
+def test_each_class_expires_by_its_own_lifetime() -> None:
+    routing = Routing(lifetime_s=10, safety_lifetime_s=1, report_lifetime_s=4)
+    queue = TxQueue(capacity=9, sooner_us=sooner_us(routing))
+    for priority in (PRIORITY_CONTROL, PRIORITY_SAFETY, PRIORITY_REPORT, PRIORITY_BULK):
+        queue.push(packet(priority, priority=priority, born_us=0))
+
+    def expired_at(now_us: int) -> list[int]:
+        return [p.header.seq for p in queue.expire(before_us=now_us - 10_000_000)]
+
+    assert expired_at(1_000_000) == []
+    assert expired_at(1_000_001) == [PRIORITY_SAFETY]
+    assert expired_at(4_000_001) == [PRIORITY_REPORT]
+    assert expired_at(10_000_001) == [PRIORITY_CONTROL, PRIORITY_BULK]
+
+
+def test_a_class_without_a_lifetime_of_its_own_lives_as_long_as_the_others() -> None:
+    routing = Routing(lifetime_s=10)
+    assert [routing.lifetime_ns(p) // S for p in range(4)] == [10, 1, 10, 10]
+
+
+def test_what_fits_beside_the_first_is_taken_in_order_and_nothing_overtakes() -> None:
+    queue = TxQueue(capacity=9)
+    for seq, size in enumerate((10, 20, 40, 5)):
+        queue.push(packet(seq)._replace(frame=bytes(size)))
+    assert [p.header.seq for p in queue.pop_fitting(35)] == [0, 1]
+    assert [p.header.seq for p in queue.pop_fitting(35)] == []
+    assert [p.header.seq for p in queue.pop_fitting(45)] == [2, 3]

@@ -375,6 +375,8 @@ def _problems(
 def _left_out(scenario: Scenario) -> Iterator[str]:
     if scenario.radio.channel != "range":
         yield "who hears whom is taken by distance, up to radio.range_m, whatever the channel does"
+    if scenario.clusters.relay == "claimed":
+        yield "slots are claimed in flight: this plan is of heads and contending relays, and says little of that"
     if scenario.clusters.repair_s > 0:
         yield "repairs of lost packets come later than any bound here, and their load is not counted"
 

@@ -48,12 +48,14 @@ def flood_cost(scenario: Scenario, adjacency: Adjacency, root: NodeId, *, payloa
 def relay_share(scenario: Scenario, adjacency: Adjacency) -> float:
     """The part of the nodes that relays a flood: all; or about `gossip_degree`, or `counter`, of each neighborhood.
 
+    `heads`, `cds`, `mpr` and `claimed` relay no more than all; how much less is not estimated.
+
     For `counter` twice the threshold of each neighborhood relays at most, as those out of range of each other do not
     hear each other's copies.
     """
     clusters = scenario.clusters
     neighbors = sum(len(near) for near in adjacency.values()) / max(1, len(adjacency))
-    if clusters.relay == "all" or neighbors == 0:
+    if clusters.relay not in ("gossip", "counter") or neighbors == 0:
         return 1.0
     wanted = clusters.gossip_degree if clusters.relay == "gossip" else 2.0 * clusters.counter
     return min(1.0, wanted / neighbors)

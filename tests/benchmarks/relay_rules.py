@@ -1,0 +1,70 @@
+"""Every rule of `clusters.relay` in whole swarms: `python tests/benchmarks/relay_rules.py [SECONDS]`.
+
+44 nodes send 1024 B a second each to everyone, every node a head; seeds 1 to 3. `grid`: 9 x 5, 200 m apart, range
+250 m; `dense`: 45 nodes at random on a disc of 250 m. Flooding period 1 s. First the superframes that claims need, in
+the running protocol, for more nodes at the density of the grid, with no traffic.
+"""
+
+import statistics
+import sys
+from collections import Counter
+
+from sim import catalog
+from sim.results import finish
+from sim.run import simulate
+
+RULES = {
+    "all": [], "gossip": ["clusters.gossip_degree=6"], "counter": ["clusters.counter=2"], "heads": [], "cds": [],
+    "mpr": [], "scheduled": [], "claimed": [], "claimed, 10 slots": ["clusters.slots=10"],
+}  # fmt: skip
+SWARMS = {"grid": [], "dense": ["nodes.layout=disc", "nodes.radius_m=250"]}
+FEWER = ["clusters.count=8"]
+"""With every node a head `heads` is `all`."""
+
+
+def relays(seconds: int) -> None:
+    print("swarm  rule               PDR     frames/packet  delay mean  p95     max [ms]")
+    for swarm, places in SWARMS.items():
+        for rule, keys in RULES.items():
+            if rule == "claimed, 10 slots" and swarm == "dense":
+                continue
+            chosen = [
+                f"clusters.relay={rule.split(',')[0]}", "clusters.flooding_period_s=1", f"duration_s={seconds}",
+                *places, *keys, *(FEWER if rule == "heads" else []),
+            ]  # fmt: skip
+            found = [
+                finish(simulate(catalog.find("clusters", [*chosen, f"seed={seed}"])), out=None) for seed in (1, 2, 3)
+            ]
+            pdr = " ".join(f"{s['pdr']:.4f}" for s in found)
+            sent = statistics.mean(s["frames"]["sent"] / s["generated"] for s in found)
+            delay = {k: statistics.mean(s["delay_ms"][k] for s in found) for k in ("mean", "p95", "max")}
+            print(
+                f"{swarm:6} {rule:18} {pdr} {sent:8.1f} {delay['mean']:12.0f} {delay['p95']:8.0f} {delay['max']:8.0f}",
+                flush=True,
+            )
+
+
+def superframes() -> None:
+    print("layout   UAVs  superframe (UAVs)   highest slot + 1  clashes settled after [s]  without a slot")
+    for layout in ("grid", "disc"):
+        for count in (45, 100, 200):
+            side = ["nodes.layout=disc", f"nodes.radius_m={112.8 * count**0.5:.0f}"] if layout == "disc" else []
+            keys = [
+                "clusters.relay=claimed", f"nodes.count={count}", f"clusters.count={count - 1}", "duration_s=20",
+                "traffic.arrivals=none", "traffic.sources=all", "clusters.guard_ms=0", *side,
+            ]  # fmt: skip
+            outcome = simulate(catalog.find("clusters", keys))
+            nodes = [report for report in outcome.reports.values() if report.get("kind") == "agent"]
+            lengths = Counter(report["superframe"] for report in nodes)
+            slots = [report["slot"] for report in nodes if report["slot"] is not None]
+            last_s = max(report["claimed_ms"] or 0 for report in nodes) / 1000
+            print(
+                f"{layout:7} {count:5}  {dict(sorted(lengths.items()))}  {max(slots) + 1:8} {last_s:12.1f} "
+                f"{count - len(slots):8}",
+                flush=True,
+            )
+
+
+if __name__ == "__main__":
+    superframes()
+    relays(int(sys.argv[1]) if len(sys.argv) > 1 else 60)

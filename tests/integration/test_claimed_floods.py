@@ -1,0 +1,62 @@
+"""Whole swarms in slots claimed over the air, and with chosen relays: everything arrives, by fewer frames."""
+
+from typing import Any
+
+import pytest
+
+from sim import catalog
+from sim.results import finish
+from sim.run import simulate
+
+SHORT = ["duration_s=17", "warmup_s=12", "drain_s=1"]
+
+DENSE = ["nodes.layout=disc", "nodes.radius_m=210", "nodes.count=30", "traffic.sources=29", "clusters.count=29"]
+
+
+def summary_of(*settings: str) -> dict[str, Any]:
+    return finish(simulate(catalog.find("clusters", [*SHORT, "clusters.flooding_period_s=1", *settings])), out=None)
+
+
+def test_on_the_grid_every_packet_reaches_everyone_within_a_fraction_of_a_period() -> None:
+    outcome = simulate(catalog.find("clusters", [*SHORT, "clusters.relay=claimed"]))
+    summary = finish(outcome, out=None)
+    assert summary["pdr"] >= 0.999
+    assert summary["delay_ms"]["p95"] < 300
+    assert summary["frames"]["closes"]
+    nodes = [report for report in outcome.reports.values() if report.get("kind") == "agent"]
+    assert all(report["superframe"] == 16 for report in nodes)
+    assert len({report["slot"] for report in nodes}) <= 12, "45 nodes share them"
+
+
+def test_a_dense_swarm_needs_few_relays_and_they_win_the_turns_they_need() -> None:
+    summary = summary_of("clusters.relay=claimed", *DENSE)
+    assert summary["pdr"] >= 0.999
+    assert summary["frames"]["sent"] / summary["generated"] < 10
+    assert summary["frames"]["closes"]
+
+
+@pytest.mark.parametrize("rule", ["heads", "cds", "mpr"])
+def test_chosen_relays_reach_nearly_all_of_a_dense_swarm_by_half_the_frames(rule: str) -> None:
+    heads = ["clusters.count=5"] if rule == "heads" else []
+    few = summary_of(f"clusters.relay={rule}", "traffic.interval_s=0.5", *DENSE, *heads)
+    assert few["pdr"] >= 0.93
+    assert few["frames"]["sent"] / few["generated"] < 20, "30 and more with `all`"
+    assert few["frames"]["closes"]
+
+
+def test_small_packets_share_frames_and_ten_times_as_many_arrive() -> None:
+    """440 packets of 64 B a second, each to 44 nodes; one by one half of them would not."""
+    small = ["traffic.payload_bytes=64", "traffic.interval_s=0.1", "radio.max_frame_bytes=1024", "duration_s=14"]
+    summary = summary_of("clusters.relay=claimed", "routing.aggregate=true", *small)
+    assert summary["pdr"] >= 0.999
+    assert summary["delay_ms"]["p95"] < 200
+    assert summary["frames"]["sent"] / summary["generated"] < 22
+    assert summary["frames"]["closes"]
+
+
+def test_heads_that_release_small_packets_together_need_half_the_frames() -> None:
+    small = ["traffic.payload_bytes=64", "traffic.interval_s=0.2", "clusters.count=8", "duration_s=14"]
+    one_by_one, together = (summary_of("clusters.relay=all", f"routing.aggregate={on}", *small) for on in (False, True))
+    assert together["frames"]["sent"] < one_by_one["frames"]["sent"] / 2
+    assert together["delay_ms"]["p50"] < one_by_one["delay_ms"]["p50"]
+    assert together["frames"]["closes"]

@@ -193,7 +193,8 @@ class Scheduled(Clustered):
             super()._enqueue(packet, now_ns=now_ns)
 
     def _flood_control(self, kind: Kind, inner: bytes, *, now_ns: int) -> Packet:
-        if not self._plans or not self._plans[-1].roots:
+        if kind is Kind.JOIN or not self._plans or not self._plans[-1].roots:
+            # Our turns are for what the bound is about; a join may contend.
             return super()._flood_control(kind, inner, now_ns=now_ns)
         packet = self._port.announce(
             kind, inner, now_ns=now_ns, flags=FLAG_FLOOD, hop_limit=self._port.scenario.routing.hop_limit

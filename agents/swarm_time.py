@@ -79,6 +79,8 @@ class GpsTime(SwarmTime):
         self._gauss = stream(seed, "gps_time", node).gauss
         self._oscillator = oscillator(clock, others=0)
         self._fit = ClockFit(self._oscillator)
+        self._limit_ns = clock.limit_ns
+        self._implausible = 0
 
     @property
     def line(self) -> Line:
@@ -92,12 +94,15 @@ class GpsTime(SwarmTime):
         return self.line.error_ns(local_ns, self._oscillator) if self.synced else None
 
     def fix(self, local_ns: int, gps_ns: int) -> None:
+        if abs(gps_ns - local_ns) > self._limit_ns:
+            self._implausible += 1
+            return
         said_ns = gps_ns + round(self._gauss(0.0, self._sigma_ns))
         error_ns = math.ceil(_SIGMAS * self._sigma_ns) + self._oscillator.stamp_ns
         self._fit.add(Pair(local_ns, said_ns - local_ns, error_ns))
 
     def report(self) -> Mapping[str, object]:
-        return {"fixes": len(self._fit), "outlier": self._fit.outliers}
+        return {"fixes": len(self._fit), "outlier": self._fit.outliers, "implausible": self._implausible}
 
 
 class BeaconTime(SwarmTime):

@@ -74,7 +74,7 @@ class Uav(Actor):
                 self._send_traffic(now_ns + self._lead_ns, now_ns)
         elif isinstance(message, Gps):
             self._autopilot.fix(message)
-            self._node.position = message.position
+            self._node.position, self._node.velocity = message.position, message.velocity
             self._mission.moved(message.position, now_ns=now_ns)
         elif isinstance(message, WifiScan):
             self._mission.scan(message.heard, position=self._autopilot.position, now_ns=now_ns)

@@ -132,6 +132,11 @@ class Clusters(Section):
     gossip_degree: Positive = 6.0
     counter: Annotated[int, Field(ge=2)] = 3
     assess_ms: NonNegative = 100.0
+    method: Literal["balanced", "lowest_id", "highest_degree", "wca", "lasting_degree", "affinity"] = "balanced"
+    """How the leader divides the swarm. All but `balanced` make as many clusters as the topology asks for, whatever
+    `count` says: every member hears its head."""
+    reassign_s: NonNegative = 10.0
+    """The leader makes new clusters for a swarm that has moved at most this often; 0: only when nodes come or go."""
     repair_s: NonNegative = 0.0
     """Hellos say what a node holds; neighbors send again what it lacks and is younger than this; 0: no repair."""
 

@@ -295,16 +295,21 @@ class Beacon(NamedTuple):
     slot: int
     role: int
     hops_to_head: int
+    term: int = 0
+    leader: int = 0
+    """Whom the sender follows, and since when that one leads; 0: nobody."""
 
     def encode_frame(self, node: int) -> bytes:
-        return encode_inner(BEACON, BEACON.layout.pack(*self, VERSION), node=node)
+        return encode_inner(
+            BEACON, BEACON.layout.pack(self.term, *self[:6], self.leader, *self[6:8], VERSION), node=node
+        )
 
     @classmethod
     def decode_frame(cls, frame: bytes) -> Self:
-        *fields, version = _inner(BEACON, frame)
-        beacon = cls(*fields)
+        term, of, head, seq, cluster, epoch, slot, leader, role, hops, version = _inner(BEACON, frame)
+        beacon = cls(of, head, seq, cluster, epoch, slot, role, hops, term, leader)
         _check(version, beacon.node)
-        if beacon.role > Role.HEAD or beacon.head == _ANY_NODE:
+        if beacon.role > Role.HEAD or _ANY_NODE in (beacon.head, beacon.leader):
             raise MalformedFrameError(f"beacon of role {beacon.role}, head {beacon.head}")
         return beacon
 
@@ -321,7 +326,7 @@ _HEAD_BIT: Final = 0x8000
 
 
 class Schedule(NamedTuple):
-    """FANET_SCHEDULE: one part of the leader's assignment."""
+    """FANET_SCHEDULE: one part of the leader's assignment; epoch 0 and no members: a call to join."""
 
     start_us: int
     period_us: int
@@ -332,6 +337,8 @@ class Schedule(NamedTuple):
     part: int
     parts: int
     members: tuple[Member, ...]
+    term: int = 0
+    """Swarm second in which the leader took office."""
 
     def encode_frame(self, node: int) -> bytes:
         if len(self.members) > CAPACITY or self.clusters > _HEAD_BIT:
@@ -342,7 +349,9 @@ class Schedule(NamedTuple):
         return encode_inner(
             SCHEDULE,
             SCHEDULE.layout.pack(
-                *self[:6],
+                *self[:3],
+                self.term,
+                *self[3:6],
                 *(m.node for m in self.members),
                 *unused,
                 *(m.cluster | (_HEAD_BIT if m.is_head else 0) for m in self.members),
@@ -359,18 +368,20 @@ class Schedule(NamedTuple):
     def decode_frame(cls, frame: bytes) -> Self:
         fields = _inner(SCHEDULE, frame)
         part, parts, count, version = fields[-4:]
-        nodes, assigned = fields[6 : 6 + CAPACITY], fields[6 + CAPACITY : 6 + 2 * CAPACITY]
-        if not 0 < count <= CAPACITY or part >= parts:
+        nodes, assigned = fields[7 : 7 + CAPACITY], fields[7 + CAPACITY : 7 + 2 * CAPACITY]
+        if count > CAPACITY or part >= parts:
             raise MalformedFrameError(f"schedule part {part} of {parts} with {count} entries")
         members = tuple(
             Member(node, entry & ~_HEAD_BIT, bool(entry & _HEAD_BIT))
             for node, entry in zip(nodes[:count], assigned[:count], strict=True)
         )
-        start_us, period_us, slot_us, epoch, leader, clusters = fields[:6]
-        schedule = cls(start_us, period_us, slot_us, epoch, leader, clusters, part, parts, members)
+        start_us, period_us, slot_us, term, epoch, leader, clusters = fields[:7]
+        schedule = cls(start_us, period_us, slot_us, epoch, leader, clusters, part, parts, members, term)
         _check(version, schedule.leader, t_us=start_us)
-        if not 0 < slot_us * clusters <= period_us or not epoch:
-            raise MalformedFrameError(f"schedule {epoch}: {clusters} slots of {slot_us} us in {period_us} us")
+        if not 0 < slot_us * clusters <= period_us or bool(epoch) != bool(members):
+            raise MalformedFrameError(
+                f"schedule {epoch}: {clusters} slots of {slot_us} us in {period_us} us, {count} entries"
+            )
         if not all(0 < member.node < _ANY_NODE and member.cluster < clusters for member in members):
             raise MalformedFrameError(f"schedule {epoch}: an entry that is no node, or none of {clusters} clusters")
         return schedule
@@ -381,15 +392,22 @@ class Join(NamedTuple):
 
     node: int
     position: Enu
+    velocity: Enu = Enu(0.0, 0.0, 0.0)
+    """[m/s]"""
+    instead_of: int = 0
+    """The silent head that the node stands in for; the node itself: a head that objects; 0: none."""
 
     def encode_frame(self, node: int) -> bytes:
-        return encode_inner(JOIN, JOIN.layout.pack(*self.position, self.node, VERSION), node=node)
+        payload = JOIN.layout.pack(*self.position, *self.velocity, self.node, self.instead_of, VERSION)
+        return encode_inner(JOIN, payload, node=node)
 
     @classmethod
     def decode_frame(cls, frame: bytes) -> Self:
-        east, north, up, node, version = _inner(JOIN, frame)
+        *numbers, node, instead_of, version = _inner(JOIN, frame)
         _check(version, node)
-        return cls(node, _finite(east, north, up))
+        if instead_of == _ANY_NODE:
+            raise MalformedFrameError(f"join of {node} instead of {instead_of}")
+        return cls(node, _finite(*numbers[:3]), _finite(*numbers[3:]), instead_of)
 
 
 class Survivor(NamedTuple):
@@ -448,12 +466,12 @@ def _finite(east: float, north: float, up: float) -> Enu:
     return Enu(east, north, up)
 
 
-BEACON: Final = Spec(53001, 138, struct.Struct("<HHHHHHBBB"))
-SCHEDULE: Final = Spec(53002, 158, struct.Struct("<QIIHHH56H56HBBBB"))
+BEACON: Final = Spec(53001, 43, struct.Struct("<IHHHHHHHBBB"))
+SCHEDULE: Final = Spec(53002, 88, struct.Struct("<QIIIHHH56H56HBBBB"))
 SURVIVOR: Final = Spec(53003, 240, struct.Struct("<QIffffHB"))
 CHUNK: Final = Spec(53004, 155, struct.Struct("<HBB240B"))
 TIME: Final = Spec(53005, 172, struct.Struct("<QIIIIHHHBBB"))
-JOIN: Final = Spec(53006, 50, struct.Struct("<fffHB"))
+JOIN: Final = Spec(53006, 221, struct.Struct("<ffffffHHB"))
 DIGEST: Final = Spec(53007, 37, struct.Struct("<24I24I24HBBB"))
 PLACES: Final = Spec(53008, 1, struct.Struct("<28h28h28hhhhBBB"))
 CLAIMS: Final = Spec(53009, 249, struct.Struct("<H16H16B16B16B16BBBBBBB"))

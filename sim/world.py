@@ -70,9 +70,7 @@ class World(Actor):
         self._guidance = Guidance(starts, scenario)
         self._phones = PhoneSensor(scenario)
         self._noise = np.random.Generator(np.random.PCG64(stream_seed(scenario.seed, "gps")))
-        self._fixes = (
-            scenario.nodes.telemetry_hz > 0 or scenario.routing.protocol == "geographic" or scenario.clock.sync == "gps"
-        )
+        self._fixes = scenario.nodes.telemetry_hz > 0 or scenario.clock.sync == "gps" or _routed_by_places(scenario)
         """Whether anybody uses position fixes."""
         self._gps_ns = round(S / scenario.world.gps_hz)
         self._scan_ns = seconds_to_ns(scenario.mission.scan_interval_s)
@@ -173,3 +171,9 @@ class World(Actor):
 def _due(now_ns: int, before_ns: int, period_ns: int, phase_ns: int) -> bool:
     """Whether an instant of a period (shifted by a phase) lies in (before, now]."""
     return (now_ns - phase_ns) // period_ns > (before_ns - phase_ns) // period_ns
+
+
+def _routed_by_places(scenario: Scenario) -> bool:
+    """Whether the protocol needs to know where its node has gone."""
+    moves = scenario.mobility.model != "static" or scenario.mission.survivors > 0
+    return scenario.routing.protocol == "geographic" or (scenario.routing.protocol == "clustered" and moves)

@@ -431,38 +431,40 @@ class MAVLink_fanet_beacon_message(MAVLink_message):
 
     id = MAVLINK_MSG_ID_FANET_BEACON
     msgname = "FANET_BEACON"
-    fieldnames = ["node", "head", "head_seq", "cluster", "epoch", "slot", "role", "hops_to_head", "version"]
-    ordered_fieldnames = ["node", "head", "head_seq", "cluster", "epoch", "slot", "role", "hops_to_head", "version"]
-    fieldtypes = ["uint16_t", "uint16_t", "uint16_t", "uint16_t", "uint16_t", "uint16_t", "uint8_t", "uint8_t", "uint8_t"]
+    fieldnames = ["term", "node", "head", "head_seq", "cluster", "epoch", "slot", "leader", "role", "hops_to_head", "version"]
+    ordered_fieldnames = ["term", "node", "head", "head_seq", "cluster", "epoch", "slot", "leader", "role", "hops_to_head", "version"]
+    fieldtypes = ["uint32_t", "uint16_t", "uint16_t", "uint16_t", "uint16_t", "uint16_t", "uint16_t", "uint16_t", "uint8_t", "uint8_t", "uint8_t"]
     fielddisplays_by_name: Dict[str, str] = {}
     fieldenums_by_name: Dict[str, str] = {}
-    fieldunits_by_name: Dict[str, str] = {}
-    native_format = bytearray(b"<HHHHHHBBB")
-    orders = [0, 1, 2, 3, 4, 5, 6, 7, 8]
-    lengths = [1, 1, 1, 1, 1, 1, 1, 1, 1]
-    array_lengths = [0, 0, 0, 0, 0, 0, 0, 0, 0]
-    crc_extra = 138
-    unpacker = struct.Struct("<HHHHHHBBB")
+    fieldunits_by_name: Dict[str, str] = {"term": "s"}
+    native_format = bytearray(b"<IHHHHHHHBBB")
+    orders = [0, 1, 2, 3, 4, 5, 6, 7, 8, 9, 10]
+    lengths = [1, 1, 1, 1, 1, 1, 1, 1, 1, 1, 1]
+    array_lengths = [0, 0, 0, 0, 0, 0, 0, 0, 0, 0, 0]
+    crc_extra = 43
+    unpacker = struct.Struct("<IHHHHHHHBBB")
     instance_field = None
     instance_offset = -1
 
-    def __init__(self, node: int, head: int, head_seq: int, cluster: int, epoch: int, slot: int, role: int, hops_to_head: int, version: int):
+    def __init__(self, term: int, node: int, head: int, head_seq: int, cluster: int, epoch: int, slot: int, leader: int, role: int, hops_to_head: int, version: int):
         MAVLink_message.__init__(self, MAVLink_fanet_beacon_message.id, MAVLink_fanet_beacon_message.msgname)
         self._fieldnames = MAVLink_fanet_beacon_message.fieldnames
         self._instance_field = MAVLink_fanet_beacon_message.instance_field
         self._instance_offset = MAVLink_fanet_beacon_message.instance_offset
+        self.term = term
         self.node = node
         self.head = head
         self.head_seq = head_seq
         self.cluster = cluster
         self.epoch = epoch
         self.slot = slot
+        self.leader = leader
         self.role = role
         self.hops_to_head = hops_to_head
         self.version = version
 
     def pack(self, mav: "MAVLink", force_mavlink1: bool = False) -> bytes:
-        return self._pack(mav, self.crc_extra, self.unpacker.pack(self.node, self.head, self.head_seq, self.cluster, self.epoch, self.slot, self.role, self.hops_to_head, self.version), force_mavlink1=force_mavlink1)
+        return self._pack(mav, self.crc_extra, self.unpacker.pack(self.term, self.node, self.head, self.head_seq, self.cluster, self.epoch, self.slot, self.leader, self.role, self.hops_to_head, self.version), force_mavlink1=force_mavlink1)
 
 
 # Define name on the class for backwards compatibility (it is now msgname).
@@ -474,26 +476,28 @@ class MAVLink_fanet_schedule_message(MAVLink_message):
     """
     The leader's assignment of nodes to clusters and of slots to
     clusters; head of cluster k owns slot k. Long ones come in parts.
+    Without entries it is a call: the leader has no assignment yet and
+    asks everyone to join.
     """
 
     id = MAVLINK_MSG_ID_FANET_SCHEDULE
     msgname = "FANET_SCHEDULE"
-    fieldnames = ["start_us", "period_us", "slot_us", "epoch", "leader", "clusters", "nodes", "assigned", "part", "parts", "count", "version"]
-    ordered_fieldnames = ["start_us", "period_us", "slot_us", "epoch", "leader", "clusters", "nodes", "assigned", "part", "parts", "count", "version"]
-    fieldtypes = ["uint64_t", "uint32_t", "uint32_t", "uint16_t", "uint16_t", "uint16_t", "uint16_t", "uint16_t", "uint8_t", "uint8_t", "uint8_t", "uint8_t"]
+    fieldnames = ["start_us", "period_us", "slot_us", "term", "epoch", "leader", "clusters", "nodes", "assigned", "part", "parts", "count", "version"]
+    ordered_fieldnames = ["start_us", "period_us", "slot_us", "term", "epoch", "leader", "clusters", "nodes", "assigned", "part", "parts", "count", "version"]
+    fieldtypes = ["uint64_t", "uint32_t", "uint32_t", "uint32_t", "uint16_t", "uint16_t", "uint16_t", "uint16_t", "uint16_t", "uint8_t", "uint8_t", "uint8_t", "uint8_t"]
     fielddisplays_by_name: Dict[str, str] = {}
     fieldenums_by_name: Dict[str, str] = {}
-    fieldunits_by_name: Dict[str, str] = {"start_us": "us", "period_us": "us", "slot_us": "us"}
-    native_format = bytearray(b"<QIIHHHHHBBBB")
-    orders = [0, 1, 2, 3, 4, 5, 6, 7, 8, 9, 10, 11]
-    lengths = [1, 1, 1, 1, 1, 1, 56, 56, 1, 1, 1, 1]
-    array_lengths = [0, 0, 0, 0, 0, 0, 56, 56, 0, 0, 0, 0]
-    crc_extra = 158
-    unpacker = struct.Struct("<QIIHHH56H56HBBBB")
+    fieldunits_by_name: Dict[str, str] = {"start_us": "us", "period_us": "us", "slot_us": "us", "term": "s"}
+    native_format = bytearray(b"<QIIIHHHHHBBBB")
+    orders = [0, 1, 2, 3, 4, 5, 6, 7, 8, 9, 10, 11, 12]
+    lengths = [1, 1, 1, 1, 1, 1, 1, 56, 56, 1, 1, 1, 1]
+    array_lengths = [0, 0, 0, 0, 0, 0, 0, 56, 56, 0, 0, 0, 0]
+    crc_extra = 88
+    unpacker = struct.Struct("<QIIIHHH56H56HBBBB")
     instance_field = None
     instance_offset = -1
 
-    def __init__(self, start_us: int, period_us: int, slot_us: int, epoch: int, leader: int, clusters: int, nodes: Sequence[int], assigned: Sequence[int], part: int, parts: int, count: int, version: int):
+    def __init__(self, start_us: int, period_us: int, slot_us: int, term: int, epoch: int, leader: int, clusters: int, nodes: Sequence[int], assigned: Sequence[int], part: int, parts: int, count: int, version: int):
         MAVLink_message.__init__(self, MAVLink_fanet_schedule_message.id, MAVLink_fanet_schedule_message.msgname)
         self._fieldnames = MAVLink_fanet_schedule_message.fieldnames
         self._instance_field = MAVLink_fanet_schedule_message.instance_field
@@ -501,6 +505,7 @@ class MAVLink_fanet_schedule_message(MAVLink_message):
         self.start_us = start_us
         self.period_us = period_us
         self.slot_us = slot_us
+        self.term = term
         self.epoch = epoch
         self.leader = leader
         self.clusters = clusters
@@ -512,7 +517,7 @@ class MAVLink_fanet_schedule_message(MAVLink_message):
         self.version = version
 
     def pack(self, mav: "MAVLink", force_mavlink1: bool = False) -> bytes:
-        return self._pack(mav, self.crc_extra, self.unpacker.pack(self.start_us, self.period_us, self.slot_us, self.epoch, self.leader, self.clusters, self.nodes[0], self.nodes[1], self.nodes[2], self.nodes[3], self.nodes[4], self.nodes[5], self.nodes[6], self.nodes[7], self.nodes[8], self.nodes[9], self.nodes[10], self.nodes[11], self.nodes[12], self.nodes[13], self.nodes[14], self.nodes[15], self.nodes[16], self.nodes[17], self.nodes[18], self.nodes[19], self.nodes[20], self.nodes[21], self.nodes[22], self.nodes[23], self.nodes[24], self.nodes[25], self.nodes[26], self.nodes[27], self.nodes[28], self.nodes[29], self.nodes[30], self.nodes[31], self.nodes[32], self.nodes[33], self.nodes[34], self.nodes[35], self.nodes[36], self.nodes[37], self.nodes[38], self.nodes[39], self.nodes[40], self.nodes[41], self.nodes[42], self.nodes[43], self.nodes[44], self.nodes[45], self.nodes[46], self.nodes[47], self.nodes[48], self.nodes[49], self.nodes[50], self.nodes[51], self.nodes[52], self.nodes[53], self.nodes[54], self.nodes[55], self.assigned[0], self.assigned[1], self.assigned[2], self.assigned[3], self.assigned[4], self.assigned[5], self.assigned[6], self.assigned[7], self.assigned[8], self.assigned[9], self.assigned[10], self.assigned[11], self.assigned[12], self.assigned[13], self.assigned[14], self.assigned[15], self.assigned[16], self.assigned[17], self.assigned[18], self.assigned[19], self.assigned[20], self.assigned[21], self.assigned[22], self.assigned[23], self.assigned[24], self.assigned[25], self.assigned[26], self.assigned[27], self.assigned[28], self.assigned[29], self.assigned[30], self.assigned[31], self.assigned[32], self.assigned[33], self.assigned[34], self.assigned[35], self.assigned[36], self.assigned[37], self.assigned[38], self.assigned[39], self.assigned[40], self.assigned[41], self.assigned[42], self.assigned[43], self.assigned[44], self.assigned[45], self.assigned[46], self.assigned[47], self.assigned[48], self.assigned[49], self.assigned[50], self.assigned[51], self.assigned[52], self.assigned[53], self.assigned[54], self.assigned[55], self.part, self.parts, self.count, self.version), force_mavlink1=force_mavlink1)
+        return self._pack(mav, self.crc_extra, self.unpacker.pack(self.start_us, self.period_us, self.slot_us, self.term, self.epoch, self.leader, self.clusters, self.nodes[0], self.nodes[1], self.nodes[2], self.nodes[3], self.nodes[4], self.nodes[5], self.nodes[6], self.nodes[7], self.nodes[8], self.nodes[9], self.nodes[10], self.nodes[11], self.nodes[12], self.nodes[13], self.nodes[14], self.nodes[15], self.nodes[16], self.nodes[17], self.nodes[18], self.nodes[19], self.nodes[20], self.nodes[21], self.nodes[22], self.nodes[23], self.nodes[24], self.nodes[25], self.nodes[26], self.nodes[27], self.nodes[28], self.nodes[29], self.nodes[30], self.nodes[31], self.nodes[32], self.nodes[33], self.nodes[34], self.nodes[35], self.nodes[36], self.nodes[37], self.nodes[38], self.nodes[39], self.nodes[40], self.nodes[41], self.nodes[42], self.nodes[43], self.nodes[44], self.nodes[45], self.nodes[46], self.nodes[47], self.nodes[48], self.nodes[49], self.nodes[50], self.nodes[51], self.nodes[52], self.nodes[53], self.nodes[54], self.nodes[55], self.assigned[0], self.assigned[1], self.assigned[2], self.assigned[3], self.assigned[4], self.assigned[5], self.assigned[6], self.assigned[7], self.assigned[8], self.assigned[9], self.assigned[10], self.assigned[11], self.assigned[12], self.assigned[13], self.assigned[14], self.assigned[15], self.assigned[16], self.assigned[17], self.assigned[18], self.assigned[19], self.assigned[20], self.assigned[21], self.assigned[22], self.assigned[23], self.assigned[24], self.assigned[25], self.assigned[26], self.assigned[27], self.assigned[28], self.assigned[29], self.assigned[30], self.assigned[31], self.assigned[32], self.assigned[33], self.assigned[34], self.assigned[35], self.assigned[36], self.assigned[37], self.assigned[38], self.assigned[39], self.assigned[40], self.assigned[41], self.assigned[42], self.assigned[43], self.assigned[44], self.assigned[45], self.assigned[46], self.assigned[47], self.assigned[48], self.assigned[49], self.assigned[50], self.assigned[51], self.assigned[52], self.assigned[53], self.assigned[54], self.assigned[55], self.part, self.parts, self.count, self.version), force_mavlink1=force_mavlink1)
 
 
 # Define name on the class for backwards compatibility (it is now msgname).
@@ -660,27 +665,28 @@ setattr(MAVLink_fanet_time_message, "name", mavlink_msg_deprecated_name_property
 
 class MAVLink_fanet_join_message(MAVLink_message):
     """
-    A node asks the leader for a place in a cluster.
+    A node asks the leader for a place in a cluster, says where it has
+    gone since, or that it stands in for a head that fell silent.
     """
 
     id = MAVLINK_MSG_ID_FANET_JOIN
     msgname = "FANET_JOIN"
-    fieldnames = ["east", "north", "up", "node", "version"]
-    ordered_fieldnames = ["east", "north", "up", "node", "version"]
-    fieldtypes = ["float", "float", "float", "uint16_t", "uint8_t"]
+    fieldnames = ["east", "north", "up", "east_speed", "north_speed", "up_speed", "node", "instead_of", "version"]
+    ordered_fieldnames = ["east", "north", "up", "east_speed", "north_speed", "up_speed", "node", "instead_of", "version"]
+    fieldtypes = ["float", "float", "float", "float", "float", "float", "uint16_t", "uint16_t", "uint8_t"]
     fielddisplays_by_name: Dict[str, str] = {}
     fieldenums_by_name: Dict[str, str] = {}
-    fieldunits_by_name: Dict[str, str] = {"east": "m", "north": "m", "up": "m"}
-    native_format = bytearray(b"<fffHB")
-    orders = [0, 1, 2, 3, 4]
-    lengths = [1, 1, 1, 1, 1]
-    array_lengths = [0, 0, 0, 0, 0]
-    crc_extra = 50
-    unpacker = struct.Struct("<fffHB")
+    fieldunits_by_name: Dict[str, str] = {"east": "m", "north": "m", "up": "m", "east_speed": "m/s", "north_speed": "m/s", "up_speed": "m/s"}
+    native_format = bytearray(b"<ffffffHHB")
+    orders = [0, 1, 2, 3, 4, 5, 6, 7, 8]
+    lengths = [1, 1, 1, 1, 1, 1, 1, 1, 1]
+    array_lengths = [0, 0, 0, 0, 0, 0, 0, 0, 0]
+    crc_extra = 221
+    unpacker = struct.Struct("<ffffffHHB")
     instance_field = None
     instance_offset = -1
 
-    def __init__(self, east: float, north: float, up: float, node: int, version: int):
+    def __init__(self, east: float, north: float, up: float, east_speed: float, north_speed: float, up_speed: float, node: int, instead_of: int, version: int):
         MAVLink_message.__init__(self, MAVLink_fanet_join_message.id, MAVLink_fanet_join_message.msgname)
         self._fieldnames = MAVLink_fanet_join_message.fieldnames
         self._instance_field = MAVLink_fanet_join_message.instance_field
@@ -688,11 +694,15 @@ class MAVLink_fanet_join_message(MAVLink_message):
         self.east = east
         self.north = north
         self.up = up
+        self.east_speed = east_speed
+        self.north_speed = north_speed
+        self.up_speed = up_speed
         self.node = node
+        self.instead_of = instead_of
         self.version = version
 
     def pack(self, mav: "MAVLink", force_mavlink1: bool = False) -> bytes:
-        return self._pack(mav, self.crc_extra, self.unpacker.pack(self.east, self.north, self.up, self.node, self.version), force_mavlink1=force_mavlink1)
+        return self._pack(mav, self.crc_extra, self.unpacker.pack(self.east, self.north, self.up, self.east_speed, self.north_speed, self.up_speed, self.node, self.instead_of, self.version), force_mavlink1=force_mavlink1)
 
 
 # Define name on the class for backwards compatibility (it is now msgname).
@@ -1334,54 +1344,61 @@ class MAVLink(object):
         """
         self.send(self.fanet_route_encode(origin_us, seq, origin, destination, prev_hop, kind, hop_limit, hops, priority, flags, version), force_mavlink1=force_mavlink1)
 
-    def fanet_beacon_encode(self, node: int, head: int, head_seq: int, cluster: int, epoch: int, slot: int, role: int, hops_to_head: int, version: int) -> MAVLink_fanet_beacon_message:
+    def fanet_beacon_encode(self, term: int, node: int, head: int, head_seq: int, cluster: int, epoch: int, slot: int, leader: int, role: int, hops_to_head: int, version: int) -> MAVLink_fanet_beacon_message:
         """
         The routing part of a hello: the sender's place in its cluster and its
         distance from a head.
 
+        term                      : Term of the leader the sender follows; see FANET_SCHEDULE. [s] (type:uint32_t)
         node                      : The sender. (type:uint16_t)
         head                      : The head its route leads to; 0: none. (type:uint16_t)
         head_seq                  : The head's own sequence number on that route. (type:uint16_t)
         cluster                   : The sender's cluster. (type:uint16_t)
         epoch                     : Epoch of the schedule the sender follows. (type:uint16_t)
         slot                      : The cluster's slot in the superframe. (type:uint16_t)
+        leader                    : The leader the sender follows; 0: none. (type:uint16_t)
         role                      : 0 isolated, 1 member, 2 head. (type:uint8_t)
         hops_to_head              : Hops to that head; 255: unreachable. (type:uint8_t)
         version                   : 1. (type:uint8_t)
 
         """
-        return MAVLink_fanet_beacon_message(node, head, head_seq, cluster, epoch, slot, role, hops_to_head, version)
+        return MAVLink_fanet_beacon_message(term, node, head, head_seq, cluster, epoch, slot, leader, role, hops_to_head, version)
 
-    def fanet_beacon_send(self, node: int, head: int, head_seq: int, cluster: int, epoch: int, slot: int, role: int, hops_to_head: int, version: int, force_mavlink1: bool = False) -> None:
+    def fanet_beacon_send(self, term: int, node: int, head: int, head_seq: int, cluster: int, epoch: int, slot: int, leader: int, role: int, hops_to_head: int, version: int, force_mavlink1: bool = False) -> None:
         """
         The routing part of a hello: the sender's place in its cluster and its
         distance from a head.
 
+        term                      : Term of the leader the sender follows; see FANET_SCHEDULE. [s] (type:uint32_t)
         node                      : The sender. (type:uint16_t)
         head                      : The head its route leads to; 0: none. (type:uint16_t)
         head_seq                  : The head's own sequence number on that route. (type:uint16_t)
         cluster                   : The sender's cluster. (type:uint16_t)
         epoch                     : Epoch of the schedule the sender follows. (type:uint16_t)
         slot                      : The cluster's slot in the superframe. (type:uint16_t)
+        leader                    : The leader the sender follows; 0: none. (type:uint16_t)
         role                      : 0 isolated, 1 member, 2 head. (type:uint8_t)
         hops_to_head              : Hops to that head; 255: unreachable. (type:uint8_t)
         version                   : 1. (type:uint8_t)
 
         """
-        self.send(self.fanet_beacon_encode(node, head, head_seq, cluster, epoch, slot, role, hops_to_head, version), force_mavlink1=force_mavlink1)
+        self.send(self.fanet_beacon_encode(term, node, head, head_seq, cluster, epoch, slot, leader, role, hops_to_head, version), force_mavlink1=force_mavlink1)
 
-    def fanet_schedule_encode(self, start_us: int, period_us: int, slot_us: int, epoch: int, leader: int, clusters: int, nodes: Sequence[int], assigned: Sequence[int], part: int, parts: int, count: int, version: int) -> MAVLink_fanet_schedule_message:
+    def fanet_schedule_encode(self, start_us: int, period_us: int, slot_us: int, term: int, epoch: int, leader: int, clusters: int, nodes: Sequence[int], assigned: Sequence[int], part: int, parts: int, count: int, version: int) -> MAVLink_fanet_schedule_message:
         """
         The leader's assignment of nodes to clusters and of slots to clusters;
         head of cluster k owns slot k. Long ones come in parts.
+        Without entries it is a call: the leader has no assignment yet
+        and asks everyone to join.
 
         start_us                  : An instant at which a superframe starts. [us] (type:uint64_t)
         period_us                 : Length of the superframe: the flooding period. [us] (type:uint32_t)
         slot_us                   : Length of one slot, guard included. [us] (type:uint32_t)
-        epoch                     : Number of this assignment; newer replaces older. (type:uint16_t)
+        term                      : Swarm second in which the leader took office. Of two leaders the one with the lower term stays, then the one with the lower id. [s] (type:uint32_t)
+        epoch                     : Number of this assignment; of one leader and term, newer replaces older. 0: a call. (type:uint16_t)
         leader                    : The node that made it. (type:uint16_t)
         clusters                  : How many clusters there are. (type:uint16_t)
-        nodes                     : Node ids. (type:uint16_t)
+        nodes                     : Node ids; of one cluster the head first, then those who stand in for it, in this order. (type:uint16_t)
         assigned                  : The cluster of each; bit 15: it is the head. (type:uint16_t)
         part                      : This part, from 0. (type:uint8_t)
         parts                     : How many parts the assignment has. (type:uint8_t)
@@ -1389,20 +1406,23 @@ class MAVLink(object):
         version                   : 1. (type:uint8_t)
 
         """
-        return MAVLink_fanet_schedule_message(start_us, period_us, slot_us, epoch, leader, clusters, nodes, assigned, part, parts, count, version)
+        return MAVLink_fanet_schedule_message(start_us, period_us, slot_us, term, epoch, leader, clusters, nodes, assigned, part, parts, count, version)
 
-    def fanet_schedule_send(self, start_us: int, period_us: int, slot_us: int, epoch: int, leader: int, clusters: int, nodes: Sequence[int], assigned: Sequence[int], part: int, parts: int, count: int, version: int, force_mavlink1: bool = False) -> None:
+    def fanet_schedule_send(self, start_us: int, period_us: int, slot_us: int, term: int, epoch: int, leader: int, clusters: int, nodes: Sequence[int], assigned: Sequence[int], part: int, parts: int, count: int, version: int, force_mavlink1: bool = False) -> None:
         """
         The leader's assignment of nodes to clusters and of slots to clusters;
         head of cluster k owns slot k. Long ones come in parts.
+        Without entries it is a call: the leader has no assignment yet
+        and asks everyone to join.
 
         start_us                  : An instant at which a superframe starts. [us] (type:uint64_t)
         period_us                 : Length of the superframe: the flooding period. [us] (type:uint32_t)
         slot_us                   : Length of one slot, guard included. [us] (type:uint32_t)
-        epoch                     : Number of this assignment; newer replaces older. (type:uint16_t)
+        term                      : Swarm second in which the leader took office. Of two leaders the one with the lower term stays, then the one with the lower id. [s] (type:uint32_t)
+        epoch                     : Number of this assignment; of one leader and term, newer replaces older. 0: a call. (type:uint16_t)
         leader                    : The node that made it. (type:uint16_t)
         clusters                  : How many clusters there are. (type:uint16_t)
-        nodes                     : Node ids. (type:uint16_t)
+        nodes                     : Node ids; of one cluster the head first, then those who stand in for it, in this order. (type:uint16_t)
         assigned                  : The cluster of each; bit 15: it is the head. (type:uint16_t)
         part                      : This part, from 0. (type:uint8_t)
         parts                     : How many parts the assignment has. (type:uint8_t)
@@ -1410,7 +1430,7 @@ class MAVLink(object):
         version                   : 1. (type:uint8_t)
 
         """
-        self.send(self.fanet_schedule_encode(start_us, period_us, slot_us, epoch, leader, clusters, nodes, assigned, part, parts, count, version), force_mavlink1=force_mavlink1)
+        self.send(self.fanet_schedule_encode(start_us, period_us, slot_us, term, epoch, leader, clusters, nodes, assigned, part, parts, count, version), force_mavlink1=force_mavlink1)
 
     def fanet_survivor_encode(self, t_us: int, survivor: int, east: float, north: float, up: float, rssi: float, reporter: int, version: int) -> MAVLink_fanet_survivor_message:
         """
@@ -1514,31 +1534,41 @@ class MAVLink(object):
         """
         self.send(self.fanet_time_encode(t_ns, error_ns, rate_ppb, worst_ns, hello, round, node, reference, worst_age_s, hops, version), force_mavlink1=force_mavlink1)
 
-    def fanet_join_encode(self, east: float, north: float, up: float, node: int, version: int) -> MAVLink_fanet_join_message:
+    def fanet_join_encode(self, east: float, north: float, up: float, east_speed: float, north_speed: float, up_speed: float, node: int, instead_of: int, version: int) -> MAVLink_fanet_join_message:
         """
-        A node asks the leader for a place in a cluster.
+        A node asks the leader for a place in a cluster, says where it has
+        gone since, or that it stands in for a head that fell silent.
 
         east                      : Where it is. [m] (type:float)
         north                     : Where it is. [m] (type:float)
         up                        : Where it is. [m] (type:float)
+        east_speed                : How fast it moves. [m/s] (type:float)
+        north_speed               : How fast it moves. [m/s] (type:float)
+        up_speed                  : How fast it moves. [m/s] (type:float)
         node                      : Which node. (type:uint16_t)
+        instead_of                : The silent head that the node stands in for; the node itself: a head that objects; 0: none. (type:uint16_t)
         version                   : 1. (type:uint8_t)
 
         """
-        return MAVLink_fanet_join_message(east, north, up, node, version)
+        return MAVLink_fanet_join_message(east, north, up, east_speed, north_speed, up_speed, node, instead_of, version)
 
-    def fanet_join_send(self, east: float, north: float, up: float, node: int, version: int, force_mavlink1: bool = False) -> None:
+    def fanet_join_send(self, east: float, north: float, up: float, east_speed: float, north_speed: float, up_speed: float, node: int, instead_of: int, version: int, force_mavlink1: bool = False) -> None:
         """
-        A node asks the leader for a place in a cluster.
+        A node asks the leader for a place in a cluster, says where it has
+        gone since, or that it stands in for a head that fell silent.
 
         east                      : Where it is. [m] (type:float)
         north                     : Where it is. [m] (type:float)
         up                        : Where it is. [m] (type:float)
+        east_speed                : How fast it moves. [m/s] (type:float)
+        north_speed               : How fast it moves. [m/s] (type:float)
+        up_speed                  : How fast it moves. [m/s] (type:float)
         node                      : Which node. (type:uint16_t)
+        instead_of                : The silent head that the node stands in for; the node itself: a head that objects; 0: none. (type:uint16_t)
         version                   : 1. (type:uint8_t)
 
         """
-        self.send(self.fanet_join_encode(east, north, up, node, version), force_mavlink1=force_mavlink1)
+        self.send(self.fanet_join_encode(east, north, up, east_speed, north_speed, up_speed, node, instead_of, version), force_mavlink1=force_mavlink1)
 
     def fanet_digest_encode(self, newest: Sequence[int], held: Sequence[int], origins: Sequence[int], count: int, complete: int, version: int) -> MAVLink_fanet_digest_message:
         """

@@ -18,7 +18,7 @@ from beyond two hops; clocks that disagree by more than `clusters.turn_slack_us`
 """
 
 from collections import deque
-from collections.abc import Mapping
+from collections.abc import Mapping, Sequence
 from math import ceil
 from typing import Final
 
@@ -32,6 +32,7 @@ from fanet_mw.protocol.neighborhood import Neighborhood
 from fanet_mw.protocol.own_turns import OwnTurns, Share, draws
 from fanet_mw.protocol.root_release import RootRelease
 from fanet_mw.protocol.slot_claims import Claim, Hello, SlotClaims
+from fanet_mw.protocol.states import Action
 from fanet_mw.protocol.turns import Turns, clocks_fit, turn_ns
 from fanet_mw.protocol.txqueue import Packet, TxQueue, sooner_us
 from fanet_mw.scenario import Scenario
@@ -148,6 +149,9 @@ class Claimed(Clustered):
         """No join: nobody assigns anything."""
         self._claims = self._new_claims(now_ns)
         self._known_ns = now_ns + _LISTEN * self._hello_ns
+
+    def _do(self, actions: Sequence[Action], now_ns: int) -> None:
+        """No clusters to keep alive either."""
 
     # --- letting out and passing on -------------------------------------------------------------------------------
 

@@ -2,26 +2,33 @@
 
 A packet has two phases, told apart by the header's flags: TO_HEAD, carried as acknowledged unicast along the gradient
 to a head, and FLOOD, released by the head in its slot and relayed once by every node. Membership comes over the air:
-nodes join by a flooded JOIN, the leader answers with a flooded SCHEDULE.
+nodes join by a flooded JOIN, the leader answers with a flooded SCHEDULE. What becomes of a node when heads and leaders
+die, and parts of the swarm meet, is decided in `upkeep.py`; this file carries it out.
 """
 
 from collections.abc import Mapping, Sequence
 from typing import Final
 
 from fanet_mw.digest import Digest
-from fanet_mw.errors import DropReason
+from fanet_mw.errors import DropReason, MalformedFrameError
 from fanet_mw.messages import Reception, TxOutcome, TxStatus
 from fanet_mw.protocol import seen
 from fanet_mw.protocol.contract import Port, RoutingProtocol
 from fanet_mw.protocol.gradient import UNREACHABLE, Gradient
 from fanet_mw.protocol.guard import slot_guard_ns
 from fanet_mw.protocol.leader import Leader
+from fanet_mw.protocol.lease import Authority, Lease
 from fanet_mw.protocol.membership import Membership
 from fanet_mw.protocol.neighbors import Neighbor, Neighbors
+from fanet_mw.protocol.refresh import Refresh
 from fanet_mw.protocol.relay import Relay
-from fanet_mw.protocol.release import Release
+from fanet_mw.protocol.release import Release, Tenure
 from fanet_mw.protocol.repair import Repair
+from fanet_mw.protocol.signs import Signs
+from fanet_mw.protocol.states import Action
 from fanet_mw.protocol.txqueue import Packet, TxQueue, sooner_us
+from fanet_mw.protocol.upkeep import Upkeep
+from fanet_mw.protocol.whereabouts import Motion, Whereabouts
 from fanet_mw.units import BROADCAST, MS, US, NodeId, S, seconds_to_ns
 from fanet_mw.wire import FLAG_FLOOD, FLAG_TO_HEAD, Beacon, Join, Kind, Schedule
 
@@ -32,6 +39,8 @@ _UNICAST_TRIES: Final = 3
 _JOIN_WINDOW_NS: Final = 3 * S
 """Joins are floods: spread, so that a swarm that starts together does not drown in them."""
 _REJOIN_NS: Final = 2 * S
+_UPDATE_NS: Final = 100 * MS
+"""Joins that only tell a new position are spread over this much per node: ten floods a second when all turn at once."""
 _CONTROL_JITTER_NS: Final = 100 * MS
 _UPLINK_NS: Final = 1 * S
 """A packet should be flooded at most one flooding period and this after it was generated; else it may be repaired."""
@@ -61,11 +70,15 @@ class Clustered(RoutingProtocol):
         )
         self._homeless = TxQueue(capacity=scenario.routing.queue_frames, sooner_us=sooner_us(scenario.routing))
         self._unicasts: dict[int, tuple[Packet, NodeId, int]] = {}
-        self._leader = (
-            Leader(node=port.node, clusters=scenario.clusters.count, period_ns=scenario.clusters.period_ns)
-            if port.node == scenario.leader
-            else None
-        )
+        self._leader: Leader | None = None
+        self._signs = Signs()
+        self._lease = Lease(port.node, period_ns=scenario.clusters.period_ns, signs=self._signs)
+        self._upkeep = Upkeep(
+            membership=self._membership, gradient=self._gradient, signs=self._signs, lease=self._lease,
+            node=port.node, hello_ns=hello_ns, takes_slot=scenario.clusters.relay != "scheduled",
+        )  # fmt: skip
+        self._refresh = Refresh(port.stream("refresh").random)
+        self._whereabouts = Whereabouts(range_m=scenario.clusters.link_m or scenario.radio.range_m)
         self._expect_ns = scenario.clusters.period_ns + _UPLINK_NS
         self._repair = Repair(
             window_ns=seconds_to_ns(scenario.clusters.repair_s),
@@ -73,15 +86,24 @@ class Clustered(RoutingProtocol):
             random=port.stream("repair").random,
         ) if scenario.clusters.repair_s else None  # fmt: skip
         self._join_ns: int | None = None
+        self._role = self._membership.standing
+        self._tenure: Tenure | None = None
+        """The slot that is ours, or was when we last were head."""
 
     # --- the application's packets --------------------------------------------------------------------------------
 
     def start(self, now_ns: int) -> None:
-        if self._leader is None:
+        leads = self._port.node == self._port.scenario.leader
+        self._upkeep.start(now_ns, leads=leads)
+        if leads:
+            self._lead(elected=False, now_ns=now_ns)
+        else:
             self._join_ns = now_ns + 500 * MS + int(self._random() * _JOIN_WINDOW_NS)
 
     def originate(self, packet: Packet, *, due_ns: int, now_ns: int) -> None:
         self._keep(packet, flooded=False, now_ns=due_ns)
+        if packet.header.destination == BROADCAST:
+            self._whereabouts.flooded(due_ns)
         self._forward(packet, start_ns=due_ns, now_ns=now_ns, tries=0)
 
     def _keep(self, packet: Packet, *, flooded: bool, now_ns: int) -> None:
@@ -111,7 +133,8 @@ class Clustered(RoutingProtocol):
             self._port.drop(DropReason.QUEUE_FULL, evicted, now_ns=now_ns)
 
     def _enqueue(self, packet: Packet, *, now_ns: int) -> None:
-        evicted = self._release.push(packet, self._membership, now_ns=now_ns)
+        assert self._tenure is not None, "who queues is head, or was"
+        evicted = self._release.push(packet, self._tenure, now_ns=now_ns)
         if evicted is not None:
             self._port.drop(DropReason.QUEUE_FULL, evicted, now_ns=now_ns)
 
@@ -119,9 +142,10 @@ class Clustered(RoutingProtocol):
 
     def receive(self, packet: Packet, reception: Reception, *, now_ns: int) -> None:
         flags = packet.header.flags
+        self._notice(packet.header.origin, packet.header.origin_us * US, now_ns)
         self._keep(packet, flooded=bool(flags & FLAG_FLOOD), now_ns=now_ns)
         if flags & FLAG_FLOOD:
-            self._consume_control(packet, now_ns=now_ns)
+            self._consume_control(packet, reception.src, now_ns=now_ns)
             self._flood_on(packet, reception, now_ns=now_ns)
         elif flags & FLAG_TO_HEAD:
             if packet.header.hop_limit <= 1:
@@ -135,10 +159,16 @@ class Clustered(RoutingProtocol):
             return
         if packet.header.hop_limit <= 1:
             self._port.drop(DropReason.HOP_LIMIT, packet, now_ns=now_ns)
-        elif packet.header.kind in (Kind.JOIN, Kind.SCHEDULE):
+        elif packet.header.kind in (Kind.JOIN, Kind.SCHEDULE) and not self._routine(packet):
             self._transmit_relay(packet, _CONTROL_JITTER_NS, now_ns=now_ns)
         elif self._relay.first_copy(packet, neighbors=self._neighbors.count(now_ns=now_ns), now_ns=now_ns):
             self._transmit_relay(packet, self._jitter_ns, now_ns=now_ns)
+
+    def _routine(self, packet: Packet) -> bool:
+        """A join of one who has a place: it tells where it is, and need not be relayed by everyone."""
+        if packet.header.kind != Kind.JOIN or not self._membership.lists(packet.header.origin):
+            return False
+        return not Join.decode_frame(packet.frame).instead_of
 
     def _transmit_relay(self, packet: Packet, jitter_ns: int, *, now_ns: int) -> None:
         start_ns = self._start_ns(now_ns=now_ns, jitter_ns=jitter_ns)
@@ -150,40 +180,104 @@ class Clustered(RoutingProtocol):
 
     def overheard(self, key: int, *, now_ns: int) -> None:
         self._relay.another_copy(key)
+        self._refresh.overheard(key, now_ns=now_ns)
         if self._repair:
             self._repair.overheard(key, now_ns=now_ns)
 
-    def _consume_control(self, packet: Packet, *, now_ns: int) -> None:
-        """Joins are the leader's, schedules everybody's. Malformed ones raise and are counted by the node."""
-        if packet.header.kind == Kind.JOIN and self._leader is not None:
-            join = Join.decode_frame(packet.frame)
-            self._leader.joined(NodeId(join.node), join.position, now_ns=now_ns)
-        elif packet.header.kind == Kind.SCHEDULE:
-            self._learn(packet.frame, now_ns=now_ns)
+    def _consume_control(self, packet: Packet, src: NodeId, *, now_ns: int) -> None:
+        """Joins and announcements of leaders. Malformed ones raise and are counted by the node."""
+        if packet.header.kind == Kind.JOIN:
+            join, born_ns = Join.decode_frame(packet.frame), min(packet.header.origin_us * US, now_ns)
+            if self._leader is not None:
+                self._leader.joined(join, born_ns=born_ns, now_ns=now_ns)
+            if join.instead_of:
+                self._do(self._upkeep.stands_in(join, born_ns=born_ns, now_ns=now_ns), now_ns)
+            if join.node == self._membership.head:
+                self._gradient.flooded(NodeId(join.node), parent=src, hops=packet.header.hops + 1, now_ns=now_ns)
+        elif packet.header.kind == Kind.SCHEDULE and packet.header.origin != self._port.node:
+            self._learn(packet, now_ns=now_ns)
 
-    def _learn(self, frame: bytes, *, now_ns: int) -> None:
-        """An announcement of the leader's, or our own."""
-        self._obey(Schedule.decode_frame(frame), now_ns=now_ns)
+    def _learn(self, packet: Packet, *, now_ns: int) -> None:
+        """An announcement of a leader, perhaps our own."""
+        schedule = Schedule.decode_frame(packet.frame)
+        if schedule.leader != packet.header.origin:
+            raise MalformedFrameError(f"schedule of {schedule.leader} by {packet.header.origin}")
+        actions = self._upkeep.announced(
+            schedule,
+            guard_ns=self._guard_ns(),
+            born_ns=min(packet.header.origin_us * US, now_ns),
+            now_ns=now_ns,
+        )
+        authority = Authority(schedule.term, schedule.leader)
+        if authority == self._lease.authority and schedule.epoch == self._epoch_followed:
+            self._refresh.keep(packet, schedule.part, authority, schedule.epoch, now_ns=now_ns)
+        self._do(actions, now_ns)
+        if self._membership.is_head:
+            self._own_slot()  # of another length, perhaps, or with another guard
 
     def _announcement(self, part: Schedule) -> bytes:
         """The inner frames of a schedule packet."""
         return part.encode_frame(self._port.node)
 
-    def _obey(self, schedule: Schedule, *, now_ns: int) -> None:
-        changed = self._membership.learn(schedule, guard_ns=self._guard_ns())
-        if self._membership.assigned:
-            self._join_ns = None
-        if changed is None:
-            return
-        self._gradient.join(self._membership.head, now_ns=now_ns)
-        self._port.record(changed.at(now_ns))
+    @property
+    def _epoch_followed(self) -> int:
+        """The newest epoch of the leader that we obey; 0: it has only called so far."""
+        version = self._membership.version
+        return version.epoch if version and version.authority == self._lease.authority else 0
+
+    # --- our part in the swarm ------------------------------------------------------------------------------------
+
+    def _notice(self, node: int, born_ns: int, now_ns: int) -> None:
+        """A node showed that it lives."""
+        actions = self._upkeep.lives(node, born_ns=min(born_ns, now_ns), now_ns=now_ns)
+        if actions:
+            self._do(actions, now_ns)
+
+    def _do(self, actions: Sequence[Action], now_ns: int) -> None:
+        """Carry out what the table asks for."""
+        for action in actions:
+            if action is Action.CALL:
+                self._lead(elected=True, now_ns=now_ns)
+            elif action in (Action.JOIN, Action.LEAVE, Action.STEP_DOWN):
+                self._leader = None
+                if self._join_ns is None:
+                    self._join_ns = now_ns + int(self._random() * _JOIN_WINDOW_NS)
+            elif action in (Action.TAKE_OVER, Action.OBJECT):
+                silent = self._upkeep.silent_head if action is Action.TAKE_OVER else self._port.node
+                self._join(now_ns, instead_of=silent)
+            elif self._upkeep.placed:
+                self._join_ns = None
+        if self._role != self._membership.standing:
+            self._role = self._membership.standing
+            self._change_role(now_ns)
+
+    def _change_role(self, now_ns: int) -> None:
+        """What is queued goes where the new role wants it."""
+        role = self._role
+        self._gradient.join(role.head, now_ns=now_ns)
+        self._port.record(role.at(now_ns, self._port.node))
         if self._membership.is_head:
-            self._release.arm(self._membership, now_ns=now_ns)
+            self._release.arm(self._own_slot(), now_ns=now_ns)
             for packet in self._homeless.drain():
                 self._enqueue(packet, now_ns=now_ns)
-        else:
-            for packet in self._release.drain():
-                self._forward(packet, start_ns=now_ns + self._lead_ns, now_ns=now_ns, tries=0)
+
+    def _own_slot(self) -> Tenure:
+        superframe = self._membership.superframe
+        assert superframe is not None, "a head has been named by a schedule"
+        self._tenure = Tenure(superframe, self._membership.slot)
+        return self._tenure
+
+    def _lead(self, *, elected: bool, now_ns: int) -> None:
+        authority = self._lease.authority
+        assert authority is not None, "who leads has taken office"
+        self._join_ns = None
+        self._leader = Leader(
+            authority, self._port.scenario, self._signs,
+            epoch=self._membership.epoch, elected=elected, now_ns=now_ns,
+        )  # fmt: skip
+
+    def _motion(self, now_ns: int) -> Motion:
+        return Motion(self._port.position, self._port.velocity, now_ns)
 
     def _guard_ns(self) -> int:
         return slot_guard_ns(self._port.scenario, clock_error_ns=self._port.clock_error_ns)
@@ -191,21 +285,33 @@ class Clustered(RoutingProtocol):
     def hello_inner(self, *, now_ns: int) -> bytes:
         self._gradient.advance(now_ns)
         route = self._gradient.route(now_ns=now_ns)
+        if (
+            self._join_ns is None
+            and self._leader is None
+            and self._whereabouts.outdated(self._port.position, now_ns=now_ns)
+        ):
+            self._join_ns = now_ns + int(self._random() * _UPDATE_NS * (1 + self._membership.nodes_listed))
+        term, leader = self._lease.authority if self._lease.valid(now_ns) and self._lease.authority else (0, 0)
         beacon = Beacon(
             node=self._port.node,
             head=route.head if route else 0,
             head_seq=route.head_seq if route else 0,
             cluster=self._membership.cluster,
-            epoch=self._membership.epoch,
+            epoch=self._epoch_followed,
             role=self._membership.role,
             hops_to_head=route.hops if route else UNREACHABLE,
             slot=self._membership.slot,
+            term=term,
+            leader=leader,
         ).encode_frame(self._port.node)
         return beacon + self._repair.digest(now_ns=now_ns).encode_frames(self._port.node) if self._repair else beacon
 
     def hello(self, packet: Packet, reception: Reception, *, now_ns: int) -> None:
         neighbor = Neighbor(reception.src, now_ns, reception.rssi_dbm, Beacon.decode_frame(packet.frame))
         self._neighbors.heard(neighbor)
+        self._notice(reception.src, packet.header.origin_us * US, now_ns)
+        if self._lease.valid(now_ns):
+            self._refresh.compare(neighbor.beacon, now_ns=now_ns)
         self._gradient.hear(neighbor, now_ns=now_ns)
         digest = Digest.decode_frames(packet.frame) if self._repair else None
         if self._repair and digest:
@@ -221,6 +327,7 @@ class Clustered(RoutingProtocol):
         packet, parent, tries = entry
         if status.outcome is TxOutcome.RETRY_LIMIT:
             self._gradient.lose(parent)
+            self._upkeep.given_up(parent, now_ns=now_ns)
         if tries >= _UNICAST_TRIES:
             self._port.drop(DropReason.RETRY_LIMIT, packet, now_ns=now_ns)
         else:
@@ -229,18 +336,23 @@ class Clustered(RoutingProtocol):
     # --- time -----------------------------------------------------------------------------------------------------
 
     def next_wake_ns(self) -> int | None:
-        leader_ns = self._leader.next_wake_ns() if self._leader else None
+        upkeep_ns = self._leader.next_wake_ns() if self._leader else self._upkeep.next_wake_ns()
         repair_ns = self._repair.next_wake_ns() if self._repair else None
-        wanted = (self._join_ns, leader_ns, self._release.next_wake_ns(), self._relay.next_wake_ns(), repair_ns)
+        wanted = (
+            self._join_ns, upkeep_ns, self._refresh.next_wake_ns(), self._release.next_wake_ns(),
+            self._relay.next_wake_ns(), repair_ns,
+        )  # fmt: skip
         return min((t for t in wanted if t is not None), default=None)
 
     def wake(self, now_ns: int) -> None:
+        self._do(self._upkeep.wake(now_ns), now_ns)
         if self._join_ns is not None and now_ns >= self._join_ns:
             self._join(now_ns)
-        if self._leader is not None:
-            for part in self._leader.wake(now_ns):
-                packet = self._flood_control(Kind.SCHEDULE, self._announcement(part), now_ns=now_ns)
-                self._learn(packet.frame, now_ns=now_ns)
+        for part in self._leader.wake(self._motion(now_ns), now_ns=now_ns) if self._leader else ():
+            packet = self._flood_control(Kind.SCHEDULE, self._announcement(part), now_ns=now_ns)
+            self._learn(packet, now_ns=now_ns)
+        for packet in self._refresh.due(now_ns=now_ns):
+            self._flood_again(packet, now_ns=now_ns)
         for packet in self._relay.decided(now_ns=now_ns):
             self._transmit_relay(packet, 0, now_ns=now_ns)
         for packet in self._repair.due(now_ns=now_ns) if self._repair else ():
@@ -248,7 +360,7 @@ class Clustered(RoutingProtocol):
         horizon_us = now_ns // US - self._lifetime_us
         for packet in self._release.expire(before_us=horizon_us):
             self._port.drop(DropReason.EXPIRED, packet, now_ns=now_ns)
-        for packet, start_ns in self._release.due(self._membership, now_ns=now_ns):
+        for packet, start_ns in self._release.due(self._tenure, now_ns=now_ns) if self._tenure else ():
             self._flood_with(packet, self._release.more(self._room(packet)), start_ns=start_ns)
 
     def _room(self, packet: Packet) -> int:
@@ -283,9 +395,13 @@ class Clustered(RoutingProtocol):
             return  # as far as it may go; it has been delivered here
         self._port.transmit(frame, BROADCAST, start_ns=self._start_ns(now_ns=now_ns, jitter_ns=0))
 
-    def _join(self, now_ns: int) -> None:
-        self._join_ns = now_ns + _REJOIN_NS + int(self._random() * _JOIN_WINDOW_NS)
-        join = Join(self._port.node, self._port.position)
+    def _join(self, now_ns: int, *, instead_of: int = 0) -> None:
+        """Tell everyone where we are, and the leader that we want a place if we have none."""
+        waits = not self._upkeep.placed and self._leader is None
+        self._join_ns = now_ns + _REJOIN_NS + int(self._random() * _JOIN_WINDOW_NS) if waits else None
+        motion = self._motion(now_ns)
+        self._whereabouts.told(motion)
+        join = Join(self._port.node, motion.position, motion.velocity, instead_of)
         self._flood_control(Kind.JOIN, join.encode_frame(self._port.node), now_ns=now_ns)
 
     def _flood_control(self, kind: Kind, inner: bytes, *, now_ns: int) -> Packet:
@@ -303,6 +419,9 @@ class Clustered(RoutingProtocol):
     def report(self) -> Mapping[str, object]:
         return {
             "role": self._membership.role.name.lower(),
+            "state": self._upkeep.state.value,
+            "leader": self._lease.authority.leader if self._lease.authority else 0,
+            "term": self._lease.authority.term if self._lease.authority else 0,
             "cluster": self._membership.cluster,
             "head": self._membership.head,
             "epoch": self._membership.epoch,

@@ -27,6 +27,8 @@ class Port(Protocol):
     """Where the node last knew itself to be."""
     clock_error_ns: int
     """The greatest error of any clock in the swarm, as far as the node has heard; 0: they are exact."""
+    velocity: Enu
+    """How fast it last knew itself to move [m/s]."""
 
     def transmit(self, frame: bytes, dst: NodeId, *, start_ns: int, wants_status: bool = False) -> int:
         """Announce a transmission; returns the request's sequence number."""

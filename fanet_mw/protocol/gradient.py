@@ -95,6 +95,17 @@ class Gradient:
             return offered.parent == route.parent or offered.hops <= route.hops or not one_step
         return offered.head_seq == route.head_seq and offered.hops < route.hops
 
+    def news_ns(self, head: NodeId) -> int | None:
+        """When this head's sequence last advanced in the hellos we hear; None: never."""
+        known = self._news.get(head)
+        return None if known is None else known[1]
+
+    def flooded(self, head: NodeId, *, parent: NodeId, hops: int, now_ns: int) -> None:
+        """A flood from our head came this way: the way back serves until hellos bring a route to it."""
+        route = self.route(now_ns=now_ns)
+        if head == self._own_head != self._node and (route is None or route.head != head):
+            self._route = Route(head, 0, hops, parent, now_ns)
+
     def lose(self, neighbor: NodeId) -> None:
         """The link to a neighbor failed."""
         self._neighbors.forget(neighbor)

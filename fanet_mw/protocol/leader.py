@@ -1,84 +1,185 @@
-"""The leader's part: collect positions from joins, divide the nodes into clusters, announce the schedule.
+"""The leader's part: know where everyone is from joins, divide the nodes into clusters, announce the schedule.
 
-Joins come in bursts, so an assignment waits until no join has come for a moment; it is announced again once per
-flooding period, for those who missed it. Each new assignment has a new epoch.
+    joins -> no more for a moment -> division -> schedule, once per flooding period
+    somebody is new or gone, or what stands has become too bad -> another epoch, at most one per `clusters.reassign_s`
+
+Joins come in bursts, so an assignment waits until no join has come for a moment. A leader that was elected knows nobody
+yet: it calls, and assigns when all had the time to answer. Positions are carried on by dead reckoning.
 """
 
-from typing import Final
+from collections.abc import Mapping, Sequence
+from types import MappingProxyType
+from typing import Final, NamedTuple
 
-from fanet_mw.protocol.clustering import balanced
-from fanet_mw.units import MS, US, Enu, NodeId
-from fanet_mw.wire import CAPACITY, Member, Schedule
+from fanet_mw.protocol.clustering import Cluster, Swarm, succession
+from fanet_mw.protocol.division import Division, drift
+from fanet_mw.protocol.lease import Authority
+from fanet_mw.protocol.signs import Signs
+from fanet_mw.protocol.topology import Adjacency, within_range
+from fanet_mw.protocol.whereabouts import LOST_NS, Motion
+from fanet_mw.scenario import Scenario
+from fanet_mw.units import MS, US, Enu, NodeId, S, seconds_to_ns
+from fanet_mw.wire import CAPACITY, Join, Member, Schedule
 
 SETTLE_NS: Final = 700 * MS
 """Quiet time after the last join before the clusters are computed."""
+OBJECTION_NS: Final = 2 * S
+"""A head that somebody stands in for has so long to show that it lives; meanwhile its cluster is served."""
+ANSWER_NS: Final = 3500 * MS
+"""Joins that answer a call have come after this: they are spread over 3 s."""
+_FIRST_CALL_NS: Final = 5 * S
+"""The first leader calls only if nobody has joined by then."""
 _HEARD_NS: Final = 1500 * MS
 """An announcement has reached everyone after this."""
+_DRIFT: Final = 0.03
+"""A timetable is made anew when more than this share of the links has changed."""
+
+
+class _StandIn(NamedTuple):
+    """Who serves a cluster in place of its silent head, and since when we know."""
+
+    node: NodeId
+    since_ns: int
+
+
+class _Assigned(NamedTuple):
+    """What stands."""
+
+    clusters: Sequence[Cluster] = ()
+    places: Mapping[NodeId, Enu] = MappingProxyType({})
+    links: Adjacency = MappingProxyType({})
+    start_ns: int = 0
+    parts: Sequence[Schedule] = ()
+
+    @property
+    def nodes(self) -> list[NodeId]:
+        return [node for cluster in self.clusters for node in cluster.members]
 
 
 class Leader:
     """Computes schedules out of joins."""
 
-    def __init__(self, *, node: NodeId, clusters: int, period_ns: int) -> None:
-        self._node = node
-        self._clusters = clusters
-        self._period_ns = period_ns
-        self._positions: dict[NodeId, Enu] = {}
-        self._epoch = 0
-        self._due_ns: int | None = None
-        self._parts: list[Schedule] = []
+    def __init__(
+        self, authority: Authority, scenario: Scenario, signs: Signs, *, epoch: int, elected: bool, now_ns: int
+    ) -> None:
+        clusters = scenario.clusters
+        self._authority = authority
+        self._signs = signs
+        self._period_ns = clusters.period_ns
+        self._reassign_ns = seconds_to_ns(clusters.reassign_s)
+        self._range_m = clusters.link_m or scenario.radio.range_m
+        self._by_links = clusters.relay == "scheduled"
+        self._division = Division(clusters.method, count=clusters.count, range_m=self._range_m)
+        self._epoch = epoch
+        self._motions: dict[NodeId, Motion] = {}
+        self._stand_ins: dict[NodeId, _StandIn] = {}
+        self._assigned = _Assigned()
+        self._due_ns = now_ns if elected else now_ns + _FIRST_CALL_NS
+        self._not_before_ns = now_ns + ANSWER_NS if elected else now_ns
 
-    def joined(self, node: NodeId, position: Enu, *, now_ns: int) -> None:
-        """A node said where it is. The leader itself is a member of no cluster (paper, 4.1)."""
-        if node == self._node:
+    def joined(self, join: Join, *, born_ns: int, now_ns: int) -> None:
+        """A node said where it is, or that it stands in. The leader itself is a member of no cluster (paper, 4.1)."""
+        node, silent = NodeId(join.node), NodeId(join.instead_of)
+        if node == self._authority.leader:
             return
-        if node not in self._positions:
-            self._due_ns = now_ns + SETTLE_NS
-        self._positions[node] = position
+        known = self._motions.get(node)
+        if known is not None and known.at_ns >= born_ns:
+            return
+        self._motions[node] = Motion(join.position, join.velocity, born_ns)
+        if known is None:
+            self._due_ns = max(now_ns + SETTLE_NS, self._not_before_ns)
+        if silent in self._motions and silent != node:
+            since_ns = self._stand_ins[silent].since_ns if silent in self._stand_ins else now_ns
+            self._stand_ins[silent] = _StandIn(node, since_ns)
+            self._due_ns = min(self._due_ns, max(since_ns + OBJECTION_NS, now_ns))
 
-    def next_wake_ns(self) -> int | None:
+    def next_wake_ns(self) -> int:
         return self._due_ns
 
-    def wake(self, now_ns: int) -> list[Schedule]:
-        """The schedule parts to announce now."""
-        if self._due_ns is None or now_ns < self._due_ns:
+    def wake(self, here: Motion, *, now_ns: int) -> Sequence[Schedule]:
+        """The schedule parts to announce now; `here`: the leader itself."""
+        if now_ns < self._due_ns:
             return []
-        known = sum(len(part.members) for part in self._parts)
-        if known != len(self._positions):
-            self._assign(now_ns)
+        self._forget(now_ns)
+        if self._motions and now_ns >= self._not_before_ns:
+            self._renew(here, now_ns)
         self._due_ns = now_ns + self._period_ns
-        return self._parts
+        if now_ns < self._not_before_ns:
+            self._due_ns = min(self._due_ns, self._not_before_ns)
+        return self._assigned.parts or [self._call(now_ns)]
 
-    def _assign(self, now_ns: int) -> None:
-        """A new epoch; its superframes begin when all should have heard of it."""
+    def _call(self, now_ns: int) -> Schedule:
+        """Nobody is assigned yet: who hears this joins."""
+        period_us = self._period_ns // US
+        term, leader = self._authority
+        return Schedule(now_ns // US, period_us, period_us, 0, leader, 1, 0, 1, (), term)
+
+    def _forget(self, now_ns: int) -> None:
+        """Nodes of which there was no sign for long, and heads that somebody stands in for, unless they live."""
+        for node in sorted(self._motions):
+            last_ns = max(self._signs.last_ns(node) or 0, self._motions[node].at_ns)
+            stand_in = self._stand_ins.get(node)
+            if stand_in is not None and last_ns > stand_in.since_ns:
+                del self._stand_ins[node]  # it objected
+                stand_in = None
+            if now_ns - last_ns > LOST_NS or (stand_in is not None and now_ns >= stand_in.since_ns + OBJECTION_NS):
+                del self._motions[node]
+
+    def _renew(self, here: Motion, now_ns: int) -> None:
+        """Another epoch, if there is a reason."""
+        before = self._assigned
+        changed = sorted(self._motions) != sorted(before.nodes)
+        rests = not self._reassign_ns or self._stand_ins or now_ns < before.start_ns + self._reassign_ns
+        if not changed and rests:
+            return
         start_ns = (now_ns + _HEARD_NS) // self._period_ns * self._period_ns + self._period_ns
-        clusters = balanced(self._positions, count=self._clusters)
-        self._epoch = (self._epoch + 1) & 0xFFFF
+        places = self._places(here, start_ns)
+        members = {node: place for node, place in places.items() if node != self._authority.leader}
+        swarm = Swarm(members, within_range(members, range_m=self._range_m), velocities=self._velocities())
+        stand_ins = {head: self._stand_ins[head].node for head in sorted(self._stand_ins)}
+        clusters = self._division.renew(before.clusters, swarm, stand_ins, now_ns=now_ns)
+        links = within_range(places, range_m=self._range_m)
+        same = [(c.head, sorted(c.members)) for c in clusters] == [(c.head, sorted(c.members)) for c in before.clusters]
+        if not changed and same and not (self._by_links and drift(before.links, links) > _DRIFT):
+            return
+        self._stand_ins = {head: who for head, who in self._stand_ins.items() if head in self._motions}
+        ordered = [Cluster(cluster.head, succession(cluster, swarm)) for cluster in clusters]
+        self._epoch = (self._epoch + 1) & 0xFFFF or 1
+        self._assigned = _Assigned(ordered, places, links, start_ns, self._parts(ordered, start_ns))
+
+    def _places(self, here: Motion, start_ns: int) -> dict[NodeId, Enu]:
+        """Where everyone will be in the middle of the time for which the assignment is made."""
+        t_ns = start_ns + self._reassign_ns // 2
+        motions = self._motions | {NodeId(self._authority.leader): here}
+        return {node: motions[node].position_at(t_ns) for node in sorted(motions)}
+
+    def _velocities(self) -> Mapping[NodeId, Enu]:
+        return {node: self._motions[node].velocity for node in sorted(self._motions)}
+
+    def _parts(self, clusters: list[Cluster], start_ns: int) -> list[Schedule]:
+        """The schedule; its superframes begin when all should have heard of it."""
         members = [
             Member(node, index, node == cluster.head)
             for index, cluster in enumerate(clusters)
             for node in cluster.members
         ]
         chunks = [members[at : at + CAPACITY] for at in range(0, len(members), CAPACITY)]
-        self._parts = [
+        return [
             Schedule(
                 start_us=start_ns // US,
                 period_us=self._period_ns // US,
                 slot_us=self._period_ns // len(clusters) // US,
                 epoch=self._epoch,
-                leader=self._node,
+                leader=self._authority.leader,
                 clusters=len(clusters),
                 part=part,
                 parts=len(chunks),
                 members=tuple(chunk),
+                term=self._authority.term,
             )
             for part, chunk in enumerate(chunks)
         ]
 
-    def position(self, node: int) -> Enu:
-        """Where a member last said to be."""
-        return self._positions[NodeId(node)]
-
-    @property
-    def nodes_known(self) -> int:
-        return len(self._positions)
+    def place(self, node: int) -> Enu:
+        """Where a member, or the leader itself, was taken to be for the assignment that is announced."""
+        return self._assigned.places[NodeId(node)]

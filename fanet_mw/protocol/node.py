@@ -45,6 +45,7 @@ class Node:
         self.scenario = scenario
         self.position = position
         self.clock_error_ns = 0
+        self.velocity = Enu(0.0, 0.0, 0.0)
         self.requests: list[TxRequest] = []
         self.deliveries: list[Packet] = []
         """Packets for the application of this node."""

@@ -42,6 +42,11 @@ class RootRelease:
     def expire(self, *, before_us: int) -> list[Packet]:
         return self._queue.expire(before_us=before_us)
 
+    def drain(self) -> list[Packet]:
+        """Give everything up: it goes another way."""
+        self._next_ns = None
+        return self._queue.drain()
+
     def next_wake_ns(self) -> int | None:
         return None if self._next_ns is None else self._next_ns - self._lead_ns
 

@@ -17,14 +17,18 @@ from fanet_mw.places import Places, rounded
 from fanet_mw.protocol.admission import Admission, Own
 from fanet_mw.protocol.clustered import Clustered
 from fanet_mw.protocol.contract import Port
+from fanet_mw.protocol.lease import Authority
+from fanet_mw.protocol.membership import Version
 from fanet_mw.protocol.root_release import RootRelease
 from fanet_mw.protocol.timetable import Geometry, Timetable, timetable
 from fanet_mw.protocol.turns import Turns, clocks_fit, turn_ns
 from fanet_mw.protocol.txqueue import Packet, TxQueue, sooner_us
 from fanet_mw.scenario import Scenario
 from fanet_mw.units import BROADCAST, MS, US, Enu, NodeId, seconds_to_ns
-from fanet_mw.wire import CAPACITY, FLAG_FLOOD, HEADER_BYTES, PRIORITY_BULK, Kind, Schedule
+from fanet_mw.wire import CAPACITY, FLAG_FLOOD, HEADER_BYTES, OVERHEAD, PLACES, PRIORITY_BULK, SCHEDULE, Kind, Schedule
 
+_SCHEDULE_BYTES: Final = SCHEDULE.layout.size + OVERHEAD
+_PLACES_BYTES: Final = PLACES.layout.size + OVERHEAD
 _FEWER: Final = 0.85
 """When the turns do not suffice for the load, try this much of it, and so on."""
 
@@ -59,7 +63,8 @@ class Scheduled(Clustered):
         )
         self._plans: list[Plan] = []
         self._schedules: dict[int, tuple[Schedule, Places]] = {}
-        self._planned_epoch = 0
+        self._version: Version | None = None
+        self._planned: Version | None = None
         self._missed = 0
         self._steady_ns: int | None = None
         """Since when the bound of the newest plan holds: no packet from before it is waiting."""
@@ -76,22 +81,27 @@ class Scheduled(Clustered):
 
     def _announcement(self, part: Schedule) -> bytes:
         assert self._leader is not None, "only the leader announces"
+        if not part.members:
+            return super()._announcement(part)
         places = Places(
-            tuple(rounded(self._leader.position(member.node)) for member in part.members), rounded(self._port.position)
+            tuple(rounded(self._leader.place(member.node)) for member in part.members),
+            rounded(self._leader.place(part.leader)),
         )
         return super()._announcement(part) + places.encode_frames(self._port.node)
 
-    def _learn(self, frame: bytes, *, now_ns: int) -> None:
+    def _learn(self, packet: Packet, *, now_ns: int) -> None:
         """Besides the schedule take in the places, and plan when all of an epoch have come."""
-        schedule, places = Schedule.decode_frame(frame), Places.decode_frames(frame)
-        super()._learn(frame, now_ns=now_ns)
-        if schedule.epoch != self._membership.epoch or len(places.members) != len(schedule.members):
+        schedule = Schedule.decode_frame(packet.frame)
+        places = Places.decode_frames(packet.frame) if schedule.members else None
+        super()._learn(packet, now_ns=now_ns)
+        version = Version(Authority(schedule.term, schedule.leader), schedule.epoch)
+        if version != self._membership.version or places is None or len(places.members) != len(schedule.members):
             return
-        if any(known.epoch != schedule.epoch for known, _ in self._schedules.values()):
-            self._schedules.clear()
+        if version != self._version:
+            self._version, self._schedules = version, {}
         self._schedules[schedule.part] = schedule, places
-        if len(self._schedules) == schedule.parts and schedule.epoch != self._planned_epoch:
-            self._planned_epoch = schedule.epoch
+        if len(self._schedules) == schedule.parts and self._planned != version:
+            self._planned = version
             self._plan(now_ns)
 
     def _plan(self, now_ns: int) -> None:
@@ -109,16 +119,20 @@ class Scheduled(Clustered):
         scenario = self._port.scenario
         turns = _geometry(scenario, schedule, self._turn_ns)
         load = {heads[cluster]: members[cluster] for cluster in sorted(heads)}
-        load[NodeId(schedule.leader)] = leader_load(scenario)
-        table = fit(scenario, tuple(sorted(at.items())), load, turns)
-        if table is None:
-            self._admit(None, now_ns=now_ns)
-            return  # not even one packet of each head fits a superframe; `fanet plan` says so before take-off
-        self._plans = [*self._plans[-1:], _own_plan(self._port.node, max(now_ns, schedule.start_us * US), turns, table)]
+        elected = schedule.leader != scenario.leader
+        load[NodeId(schedule.leader)] = 1 if elected else leader_load(scenario)
+        table = fit(scenario, tuple(sorted(at.items())), load, turns, leader=NodeId(schedule.leader))
         self._steady_ns = None
-        self._admit(self._own(), now_ns=now_ns)
+        if table is None:
+            self._plans = []  # not even one packet of each head fits a superframe; `fanet plan` says so before take-off
+            self._admit(None, now_ns=now_ns)
+        else:
+            valid_ns = max(now_ns, schedule.start_us * US)
+            self._plans = [*self._plans[-1:], _own_plan(self._port.node, valid_ns, turns, table)]
+            self._admit(self._own(), now_ns=now_ns)
         self._roots.follow([(plan.valid_ns, plan.turns, plan.roots) for plan in self._plans], now_ns=now_ns)
-        for packet in [*self._release.drain(), *self._homeless.drain()]:
+        stranded = [] if self._plans and self._plans[-1].roots else self._roots.drain()
+        for packet in [*stranded, *self._release.drain(), *self._homeless.drain()]:
             self._forward(packet, start_ns=now_ns + self._lead_ns, now_ns=now_ns, tries=0)
 
     def _plan_at(self, t_ns: int) -> Plan | None:
@@ -176,12 +190,14 @@ class Scheduled(Clustered):
             self._port.drop(DropReason.QUEUE_FULL, evicted, now_ns=now_ns)
 
     def _enqueue(self, packet: Packet, *, now_ns: int) -> None:
-        self._forward(packet, start_ns=now_ns, now_ns=now_ns, tries=0) if self._plans else super()._enqueue(
-            packet, now_ns=now_ns
-        )
+        if self._plans and self._plans[-1].roots:
+            self._let_out(packet, now_ns=now_ns)
+        else:  # the schedule has made us head, its timetable is still to come
+            super()._enqueue(packet, now_ns=now_ns)
 
     def _flood_control(self, kind: Kind, inner: bytes, *, now_ns: int) -> Packet:
-        if not self._plans or not self._plans[-1].roots:
+        if kind is Kind.JOIN or not self._plans or not self._plans[-1].roots:
+            # Our turns are for what the bound is about; a join may contend.
             return super()._flood_control(kind, inner, now_ns=now_ns)
         packet = self._port.announce(
             kind, inner, now_ns=now_ns, flags=FLAG_FLOOD, hop_limit=self._port.scenario.routing.hop_limit
@@ -280,7 +296,7 @@ def largest_frame(scenario: Scenario) -> int:
 def schedule_bytes(scenario: Scenario) -> int:
     """A schedule part with its places."""
     members = min(scenario.nodes.count, 56)
-    return HEADER_BYTES + 262 + 189 * -(-members // 28)
+    return HEADER_BYTES + _SCHEDULE_BYTES + _PLACES_BYTES * -(-members // 28)
 
 
 def _geometry(scenario: Scenario, schedule: Schedule, turn: int) -> Turns:
@@ -302,12 +318,17 @@ def links(scenario: Scenario, turns: Turns) -> Geometry:
 
 
 def fit(
-    scenario: Scenario, places: tuple[tuple[NodeId, Enu], ...], load: Mapping[NodeId, int], turns: Turns
+    scenario: Scenario,
+    places: tuple[tuple[NodeId, Enu], ...],
+    load: Mapping[NodeId, int],
+    turns: Turns,
+    *,
+    leader: NodeId | None = None,
 ) -> Timetable | None:
     """A table for a little more than the load, so that a backlog drains; for just the load, or less, if turns lack."""
     geometry = links(scenario, turns)
     per_member = turns.period_ns / seconds_to_ns(scenario.traffic.interval_s)
-    control = {root: schedule_parts(scenario) if root == scenario.leader else 0 for root in load}
+    control = {root: schedule_parts(scenario) if root == (leader or scenario.leader) else 0 for root in load}
     least = {root: max(1, control[root] + min(1, members)) for root, members in load.items()}
     wanted = {
         root: control[root] + (int(members * per_member) + 1 if members or not control[root] else 0)

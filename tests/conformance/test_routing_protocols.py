@@ -25,8 +25,9 @@ MULTIHOP = sorted(set(PROTOCOLS) - {"direct"})
 ROUTED = [name for name in MULTIHOP if name not in ("clustered", "flooding", "gossip", "counter")]
 """Those that send a unicast packet along one way."""
 
-LEAST = {"gossip": 0.8}
-"""What else than nearly all is enough: relays drawn by lot fail a packet now and then in a thin swarm."""
+LEAST = {"gossip": 0.8, "clustered": 0.87}
+"""What else than nearly all is enough: relays drawn by lot fail a packet now and then in a thin swarm, and floods from
+heads collide there: 0.90 to 1.00 over ten seeds, 0.96 on average, without repair."""
 
 
 def scenario_of(protocol: str, *, destination: int | str, moving: bool = False) -> Scenario:

@@ -43,7 +43,7 @@ def test_load_beyond_the_admissible_rate_is_refused_and_the_rest_meets_the_deadl
     admitted = held["generated"] - admission["refused"]
     assert held["delivered"] >= 0.98 * 8 * admitted
     assert admission["met"] >= 8
-    assert admission["nodes_without"] == 0
+    assert admission["nodes_without"] <= 1, "the leader at most: its schedules go before its packets"
 
 
 def test_a_node_that_joins_later_makes_the_way_too_long_for_the_deadline() -> None:

@@ -27,7 +27,10 @@ headers = st.builds(
     kind=st.sampled_from(wire.Kind).map(int),
     hop_limit=u8, hops=u8, priority=u8, flags=u8,
 )  # fmt: skip
-beacons = st.builds(Beacon, ids, st.integers(0, 0xFFFE), u16, u16, u16, u16, st.sampled_from(Role).map(int), u8)
+beacons = st.builds(
+    Beacon, ids, st.integers(0, 0xFFFE), u16, u16, u16, u16, st.sampled_from(Role).map(int), u8, u32,
+    st.integers(0, 0xFFFE),
+)  # fmt: skip
 
 
 @st.composite
@@ -36,14 +39,15 @@ def schedules(draw: st.DrawFn) -> Schedule:
     slot_us = draw(st.integers(1, (2**32 - 1) // clusters))
     parts = draw(st.integers(1, 255))
     entries = st.builds(Member, ids, st.integers(0, clusters - 1), st.booleans())
+    members = tuple(draw(st.lists(entries, max_size=wire.CAPACITY)))
     return Schedule(
         start_us=draw(instants), period_us=draw(st.integers(slot_us * clusters, 2**32 - 1)), slot_us=slot_us,
-        epoch=draw(st.integers(1, 0xFFFF)), leader=draw(ids), clusters=clusters, part=draw(st.integers(0, parts - 1)),
-        parts=parts, members=tuple(draw(st.lists(entries, min_size=1, max_size=wire.CAPACITY))),
+        epoch=draw(st.integers(1, 0xFFFF)) if members else 0, leader=draw(ids), clusters=clusters,
+        part=draw(st.integers(0, parts - 1)), parts=parts, members=members, term=draw(u32),
     )  # fmt: skip
 
 
-joins = st.builds(Join, ids, positions)
+joins = st.builds(Join, ids, positions, positions, st.integers(0, 0xFFFE))
 survivors = st.builds(Survivor, instants, u32, ids, positions, singles)
 instants_ns = st.integers(0, wire.LATEST_US * 1000 + 999)
 times = st.builds(TimeBeacon, instants_ns, u32, u32, u32, u32, u16, ids, ids, u8, st.integers(1, 255)).map(
@@ -93,6 +97,8 @@ def test_every_field_has_the_same_value_under_the_same_name_in_pymavlink(message
     ours = message._asdict()
     if "position" in ours:
         ours |= ours.pop("position")._asdict()
+    if "velocity" in ours:
+        ours |= {f"{axis}_speed": speed for axis, speed in ours.pop("velocity")._asdict().items()}
     if "rssi_dbm" in ours:
         ours["rssi"] = ours.pop("rssi_dbm")
     assert theirs.to_dict() == ours | {"mavpackettype": theirs.get_type(), "version": wire.VERSION}
@@ -105,7 +111,7 @@ def test_a_schedule_has_its_entries_in_two_parallel_arrays_in_pymavlink(schedule
     assert theirs.count == count
     assert theirs.nodes == [m.node for m in schedule.members] + [0] * (wire.CAPACITY - count)
     assert theirs.assigned[:count] == [m.cluster + 0x8000 * m.is_head for m in schedule.members]
-    for name in ("start_us", "period_us", "slot_us", "epoch", "leader", "clusters", "part", "parts"):
+    for name in ("start_us", "period_us", "slot_us", "epoch", "leader", "clusters", "part", "parts", "term"):
         assert getattr(theirs, name) == getattr(schedule, name)
 
 
@@ -270,9 +276,9 @@ def test_a_signed_inner_frame_is_passed_whole_with_its_signature() -> None:
     assert Join.decode_frame(HEADER + signed) == Join(3, Enu(1, 2, 3))
 
 
-@pytest.mark.parametrize("size", [14, 16])
+@pytest.mark.parametrize("size", [28, 30])
 def test_a_message_of_another_length_is_malformed_although_its_crc_is_right(size: int) -> None:
-    payload = (wire.JOIN.layout.pack(1, 2, 3, 3, wire.VERSION) + b"\x01")[:size]
+    payload = (wire.JOIN.layout.pack(1, 2, 3, 0, 0, 0, 3, 0, wire.VERSION) + b"\x01")[:size]
     with pytest.raises(MalformedFrameError, match=f"{size} bytes"):
         Join.decode_frame(HEADER + wire.encode_inner(wire.JOIN, payload, node=3))
 
@@ -280,7 +286,9 @@ def test_a_message_of_another_length_is_malformed_although_its_crc_is_right(size
 BEACON = Beacon(node=3, head=4, head_seq=5, cluster=6, epoch=7, slot=8, role=2, hops_to_head=1)
 
 
-@pytest.mark.parametrize("change", [{"role": 3}, {"node": 0}, {"node": 0xFFFF}, {"head": 0xFFFF}], ids=str)
+@pytest.mark.parametrize(
+    "change", [{"role": 3}, {"node": 0}, {"node": 0xFFFF}, {"head": 0xFFFF}, {"leader": 0xFFFF}], ids=str
+)
 def test_a_beacon_with_an_impossible_value_is_malformed(change: dict[str, int]) -> None:
     assert Beacon.decode_frame(HEADER + BEACON.encode_frame(3)) == BEACON
     with pytest.raises(MalformedFrameError):
@@ -291,6 +299,7 @@ def test_a_beacon_with_an_impossible_value_is_malformed(change: dict[str, int]) 
 def test_a_position_or_a_power_that_is_no_number_is_malformed(bad: float) -> None:
     for message in (
         Join(3, Enu(bad, 0, 0)), Join(3, Enu(0, bad, 0)), Join(3, Enu(0, 0, bad)),
+        Join(3, Enu(0, 0, 0), Enu(0, 0, bad)),
         Survivor(1, 2, 3, Enu(0, bad, 0), -70), Survivor(1, 2, 3, Enu(0, 0, 0), bad),
     ):  # fmt: skip
         with pytest.raises(MalformedFrameError):

@@ -5,30 +5,18 @@ from itertools import pairwise
 from hypothesis import given
 from hypothesis import strategies as st
 
-from fanet_mw.protocol.membership import Membership
-from fanet_mw.protocol.release import Release
+from fanet_mw.protocol.release import Release, Tenure
+from fanet_mw.protocol.slots import Superframe
 from fanet_mw.protocol.txqueue import Packet, TxQueue, sooner_us
 from fanet_mw.scenario import Clusters, Routing
-from fanet_mw.units import MS, NodeId, S
-from fanet_mw.wire import (
-    PRIORITY_BULK,
-    PRIORITY_CONTROL,
-    PRIORITY_REPORT,
-    PRIORITY_SAFETY,
-    Header,
-    Member,
-    Schedule,
-)  # fmt: skip
+from fanet_mw.units import MS, US, S
+from fanet_mw.wire import PRIORITY_BULK, PRIORITY_CONTROL, PRIORITY_REPORT, PRIORITY_SAFETY, Header
 
 LEAD_NS = 20 * MS
 
 
-def member_of(cluster: int, *, period_us: int = 1_000_000, clusters: int = 4) -> Membership:
-    membership = Membership(NodeId(5))
-    members = (Member(5, cluster, is_head=True),)
-    schedule = Schedule(0, period_us, period_us // clusters, 1, 1, clusters, 0, 1, members)
-    membership.learn(schedule, guard_ns=2 * MS)
-    return membership
+def member_of(cluster: int, *, period_us: int = 1_000_000, clusters: int = 4) -> Tenure:
+    return Tenure(Superframe(0, period_us * US, period_us // clusters * US, 2 * MS), cluster)
 
 
 def packet(seq: int, priority: int = 3, born_us: int = 0) -> Packet:

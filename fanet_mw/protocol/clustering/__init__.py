@@ -1,4 +1,4 @@
-"""Who leads whom. One contract (`Clustering`), several methods; `balanced` is the one the leader uses.
+"""Who leads whom. One contract (`Clustering`), several methods; the leader uses the one that `clusters.method` names.
 
 `bisection` needs positions only; `election` ranks nodes (lowest-ID, highest degree, WCA, MOBIC, lasting degree) and
 keeps heads; `affinity` lets neighbors vote; `maintenance` carries clusters on over time.
@@ -18,6 +18,7 @@ from fanet_mw.protocol.clustering.election import (
     by_degree,
     by_id,
     by_mobility,
+    succession,
 )
 from fanet_mw.protocol.clustering.maintenance import Maintenance
 from fanet_mw.protocol.clustering.mobility import aggregate_mobility_db2, link_lifetime_s
@@ -44,4 +45,5 @@ __all__ = [
     "by_mobility",
     "heads_of",
     "link_lifetime_s",
+    "succession",
 ]

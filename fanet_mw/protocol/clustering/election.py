@@ -131,6 +131,16 @@ def _gather(swarm: Swarm, heads: list[NodeId]) -> list[Cluster]:
     return [Cluster(head, tuple(sorted(members[head]))) for head in sorted(heads)]
 
 
+def succession(cluster: Cluster, swarm: Swarm) -> tuple[NodeId, ...]:
+    """The head, then who stands in for it: those who hear the head first, since they notice first that it is gone."""
+    near, inside = frozenset(swarm.adjacency[cluster.head]), frozenset(cluster.members)
+
+    def rank(node: NodeId) -> tuple[bool, int, NodeId]:
+        return node not in near, -sum(1 for n in swarm.adjacency[node] if n in inside), node
+
+    return (cluster.head, *sorted((node for node in cluster.members if node != cluster.head), key=rank))
+
+
 def backup_head(cluster: Cluster, swarm: Swarm, score: Score = by_id) -> NodeId | None:
     """Who takes over when the head dies: the member that hears most of the others; by score, then id, when equal."""
     others = [node for node in cluster.members if node != cluster.head]

@@ -1,0 +1,30 @@
+"""Signs of life: when each node last generated something that reached us. Any packet is one, whoever relayed it.
+
+A packet counts from the instant it was generated, not from its arrival: it may have waited for a slot while its origin
+died. Bounded by the number of nodes.
+"""
+
+from fanet_mw.units import NodeId
+
+
+class Signs:
+    """The latest sign of life of each node."""
+
+    def __init__(self) -> None:
+        self._born_ns: dict[int, int] = {}
+
+    def heard(self, node: int, *, born_ns: int) -> None:
+        """Something of this node came in that it generated at `born_ns`."""
+        if born_ns > self._born_ns.get(node, -1):
+            self._born_ns[node] = born_ns
+
+    def last_ns(self, node: int) -> int | None:
+        """When the node last showed that it lives; None: never."""
+        return self._born_ns.get(node)
+
+    def alive_below(self, node: int, *, since_ns: int) -> int:
+        """How many nodes with a lower id have shown a sign since."""
+        return sum(1 for other, born_ns in self._born_ns.items() if other < node and born_ns >= since_ns)
+
+    def forget(self, node: NodeId) -> None:
+        self._born_ns.pop(node, None)

@@ -1,0 +1,57 @@
+"""When a node tells the leader where it is: dead reckoning, as in IEEE 1278.1 (distributed interactive simulation).
+
+The leader carries the position last told on along the velocity last told. A node tells it anew when it is farther than
+a share of the radio range from where the leader must believe it to be, or when it has flooded nothing for so long that
+the leader might take it for dead. So a swarm that flies straight, or hovers, costs nothing.
+"""
+
+from typing import Final, NamedTuple
+
+from fanet_mw.units import Enu, S
+
+_SHARE: Final = 0.1
+"""Of the radio range."""
+_LEAST_NS: Final = 5 * S
+"""Between two tellings: each is a flood."""
+_QUIET_NS: Final = 20 * S
+LOST_NS: Final = 45 * S
+"""The leader forgets a node after this long without a sign: two tellings and a little."""
+
+
+class Motion(NamedTuple):
+    """Where a node was at an instant, and how fast it moved [m/s]."""
+
+    position: Enu
+    velocity: Enu
+    at_ns: int
+
+    def position_at(self, t_ns: int) -> Enu:
+        """Where it is at an instant if it flew on straight."""
+        seconds = (t_ns - self.at_ns) / S
+        here, v = self.position, self.velocity
+        return Enu(here.east + v.east * seconds, here.north + v.north * seconds, here.up + v.up * seconds)
+
+
+class Whereabouts:
+    """What the leader believes of one node, as that node knows it."""
+
+    def __init__(self, *, range_m: float) -> None:
+        self._off_m = _SHARE * range_m
+        self._told: Motion | None = None
+        self._flooded_ns = 0
+
+    def told(self, motion: Motion) -> None:
+        """A join carried this."""
+        self._told = motion
+        self._flooded_ns = motion.at_ns
+
+    def flooded(self, now_ns: int) -> None:
+        """A packet of ours goes to everyone: a sign of life."""
+        self._flooded_ns = now_ns
+
+    def outdated(self, position: Enu, *, now_ns: int) -> bool:
+        """Whether it is time to tell."""
+        if self._told is None or now_ns - self._told.at_ns < _LEAST_NS:
+            return False
+        off_m = position.minus(self._told.position_at(now_ns)).norm()
+        return off_m > self._off_m or now_ns - self._flooded_ns > _QUIET_NS

@@ -1,0 +1,61 @@
+"""Swarms that change their shape while the protocol runs."""
+
+from typing import Any, NamedTuple
+
+import pytest
+
+from fanet_mw import config
+from sim.results import finish
+from sim.run import simulate
+
+
+class Flight(NamedTuple):
+    """A thin swarm that moves."""
+
+    model: str
+    columns: int
+    speed_m_s: float
+    area_m: float
+    duration_s: float
+
+    def summary(self, **clusters: Any) -> tuple[dict[str, Any], int]:
+        """What came of it, and the last epoch."""
+        count = self.columns**2
+        tree = {
+            "duration_s": self.duration_s, "warmup_s": 10, "drain_s": 3,
+            "nodes": {"count": count, "spacing_m": 160, "columns": self.columns, "telemetry_hz": 0},
+            "clusters": {
+                "count": count - 1, "flooding_period_s": 1.0, "guard_ms": 1, "link_m": 200, "relay": "scheduled",
+                **clusters,
+            },
+            "traffic": {"payload_bytes": 256, "sources": tuple(range(2, count + 1))},
+            "radio": {"lead_ms": 0, "cw_min": 7},
+            "mobility": {"model": self.model, "speed_m_s": self.speed_m_s}, "world": {"area_m": self.area_m},
+        }  # fmt: skip
+        outcome = simulate(config.build(tree))
+        epochs = max(r["epoch"] for r in outcome.reports.values() if r.get("kind") == "agent")
+        return finish(outcome, out=None), epochs
+
+
+def test_a_formation_that_flies_straight_keeps_its_timetable_and_its_bound() -> None:
+    summary, epochs = Flight("formation", 4, 6, area_m=2500, duration_s=30).summary()
+    assert epochs <= 2, "the one it joined with, while it gathered speed"
+    assert summary["pdr"] > 0.99
+    assert summary["bound"]["violations"] == 0
+
+
+def test_heads_that_change_under_a_timetable_lose_no_account_of_a_frame() -> None:
+    flight = Flight("random_waypoint", 4, 6, area_m=600, duration_s=30)
+    summary, epochs = flight.summary(count=4, reassign_s=5, contention_ms=150)
+    assert epochs > 1
+    assert summary["frames"]["closes"]
+    assert summary["pdr"] > 0.5
+
+
+@pytest.mark.slow
+def test_new_timetables_bring_a_moving_swarm_what_the_first_one_would_lose() -> None:
+    flight = Flight("random_waypoint", 5, 5, area_m=800, duration_s=90)
+    once, first = flight.summary(reassign_s=0)
+    anew, last = flight.summary(reassign_s=10)
+    assert first < last <= first + 90 / 10
+    assert anew["pdr"] > once["pdr"] + 0.03

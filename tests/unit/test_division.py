@@ -1,0 +1,119 @@
+"""How the leader carries clusters on, and what nodes tell it."""
+
+from hypothesis import given
+from hypothesis import strategies as st
+
+from fanet_mw.protocol.clustering import Cluster, Swarm, heads_of
+from fanet_mw.protocol.division import Division, carried_on, cost, drift
+from fanet_mw.protocol.lease import Authority, Lease
+from fanet_mw.protocol.signs import Signs
+from fanet_mw.protocol.topology import within_range
+from fanet_mw.protocol.whereabouts import Motion, Whereabouts
+from fanet_mw.units import Enu, NodeId, S
+
+RANGE_M = 250.0
+
+
+def swarm_of(places: dict[int, float]) -> Swarm:
+    at = {NodeId(node): Enu(east, 0.0, 50.0) for node, east in places.items()}
+    return Swarm(at, within_range(at, range_m=RANGE_M))
+
+
+def names(*nodes: int) -> tuple[NodeId, ...]:
+    return tuple(map(NodeId, nodes))
+
+
+STANDING = [Cluster(NodeId(3), names(2, 3, 4)), Cluster(NodeId(6), names(5, 6, 7))]
+LINE = {node: 200.0 * node for node in range(2, 8)}
+
+
+def test_what_is_good_enough_stays() -> None:
+    division = Division("balanced", count=2, range_m=RANGE_M)
+    assert division.renew(STANDING, swarm_of(LINE), {}, now_ns=0) == STANDING
+
+
+def test_a_head_that_is_gone_is_followed_by_who_stands_in_for_it() -> None:
+    places = {node: east for node, east in LINE.items() if node != 3}
+    assert carried_on(STANDING, swarm_of(places), {NodeId(3): NodeId(4)})[0] == Cluster(NodeId(4), names(2, 4))
+
+
+def test_a_newcomer_goes_to_the_nearest_head() -> None:
+    kept = carried_on(STANDING, swarm_of({**LINE, 8: 1300.0}), {})
+    assert kept[1].members == names(5, 6, 7, 8)
+
+
+def test_clusters_that_have_mixed_are_made_anew_and_heads_keep_their_slots() -> None:
+    swarm = swarm_of({**LINE, 2: LINE[7], 7: LINE[2]})
+    clusters = Division("balanced", count=2, range_m=RANGE_M).renew(STANDING, swarm, {}, now_ns=0)
+    assert [cluster.head for cluster in clusters] == [3, 6]
+    assert [cluster.members for cluster in clusters] == [names(3, 4, 7), names(2, 5, 6)]
+
+
+@given(
+    st.dictionaries(st.integers(2, 20), st.floats(0, 2000), min_size=1),
+    st.dictionaries(st.integers(2, 20), st.floats(0, 2000), min_size=1),
+    st.sampled_from(["balanced", "lowest_id", "wca", "affinity"]),
+)
+def test_everyone_is_in_one_cluster_whatever_came_before(
+    before: dict[int, float], after: dict[int, float], method: str
+) -> None:
+    division = Division(method, count=3, range_m=RANGE_M)
+    first = division.renew([], swarm_of(before), {}, now_ns=0)
+    second = division.renew(first, swarm_of(after), {}, now_ns=S)
+    assert sorted(node for cluster in second for node in cluster.members) == sorted(after)
+    assert all(cluster.head in cluster.members for cluster in second)
+    assert len(set(heads_of(second))) == len(second)
+    if method == "balanced":
+        assert len(second) == min(3, len(after))
+
+
+def test_a_member_without_a_way_costs_as_much_as_there_are_nodes() -> None:
+    swarm = swarm_of({2: 0.0, 3: 200.0, 4: 5000.0})
+    assert cost([Cluster(NodeId(2), names(2, 3, 4))], swarm.adjacency, fair=3) == 1 + 3
+
+
+def test_a_swarm_that_moves_as_one_does_not_drift() -> None:
+    moved = {node: east + 999 for node, east in LINE.items()}
+    assert drift(swarm_of(LINE).adjacency, swarm_of(moved).adjacency) == 0
+    assert drift(swarm_of(LINE).adjacency, swarm_of({**LINE, 7: 5000.0}).adjacency) == 1 / 5
+
+
+# --- telling ------------------------------------------------------------------------------------------------------
+
+
+def test_who_flies_on_straight_tells_nothing_and_who_turns_does_once_it_is_off() -> None:
+    told = Whereabouts(range_m=250)
+    told.told(Motion(Enu(0, 0, 0), Enu(10, 0, 0), 0))
+    told.flooded(10 * S)
+    assert not told.outdated(Enu(100, 0, 0), now_ns=10 * S)
+    assert not told.outdated(Enu(100, 25, 0), now_ns=10 * S)
+    assert told.outdated(Enu(100, 26, 0), now_ns=10 * S)
+    assert not told.outdated(Enu(0, 99, 0), now_ns=4 * S), "at most every 5 s"
+
+
+def test_who_is_quiet_shows_that_it_lives() -> None:
+    told = Whereabouts(range_m=250)
+    told.told(Motion(Enu(0, 0, 0), Enu(0, 0, 0), 0))
+    assert not told.outdated(Enu(0, 0, 0), now_ns=20 * S)
+    assert told.outdated(Enu(0, 0, 0), now_ns=20 * S + 1)
+
+
+# --- whom to obey -------------------------------------------------------------------------------------------------
+
+authorities = st.builds(Authority, st.integers(0, 5), st.integers(1, 5))
+
+
+@given(st.lists(st.tuples(authorities, st.integers(0, 3)), min_size=1))
+def test_while_all_are_heard_the_senior_of_them_is_obeyed(heard: list[tuple[Authority, int]]) -> None:
+    lease = Lease(NodeId(9), period_ns=S, signs=Signs())
+    for authority, delay_s in heard:
+        lease.accept(authority, born_ns=10 * S - delay_s * S, now_ns=10 * S)
+    assert lease.authority == min(authority for authority, _ in heard)
+
+
+def test_old_news_of_a_leader_keep_nobody_obedient() -> None:
+    lease = Lease(NodeId(9), period_ns=S, signs=Signs())
+    assert lease.accept(Authority(0, 1), born_ns=10 * S, now_ns=10 * S)
+    assert not lease.accept(Authority(3, 2), born_ns=14 * S, now_ns=14 * S)
+    assert not lease.accept(Authority(0, 1), born_ns=9 * S, now_ns=15 * S)
+    assert lease.accept(Authority(3, 2), born_ns=15 * S, now_ns=15 * S)

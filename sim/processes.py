@@ -7,12 +7,13 @@ import asyncio
 import atexit
 import ctypes
 import multiprocessing
+import os
 import signal
 import sys
 from collections.abc import Callable, Mapping
 from multiprocessing import forkserver, resource_tracker
 from multiprocessing.context import ForkServerContext, ForkServerProcess
-from typing import Any, Final
+from typing import Any, Final, NamedTuple
 
 from fanet_mw.errors import FanetError
 from fanet_mw.hosts.service import BUS_EXIT_CODE
@@ -22,13 +23,22 @@ _PR_SET_PDEATHSIG: Final = 1
 Entry = Callable[..., int]
 
 
-def _child(entry: Entry, arguments: Mapping[str, Any]) -> None:
+class Recipe(NamedTuple):
+    """How to start a child: `entry(**arguments)`, with `nice` added to the launcher's niceness."""
+
+    entry: Entry
+    arguments: Mapping[str, Any]
+    nice: int
+
+
+def _child(recipe: Recipe) -> None:
     """What a child does first and last; runs in the child."""
     signal.signal(signal.SIGINT, signal.SIG_IGN)
     if sys.platform == "linux":
         ctypes.CDLL(None).prctl(_PR_SET_PDEATHSIG, signal.SIGKILL)
     try:
-        code = entry(**arguments)
+        os.nice(recipe.nice)
+        code = recipe.entry(**recipe.arguments)
     except FanetError as error:
         sys.stderr.write(f"{error}\n")
         code = BUS_EXIT_CODE
@@ -49,13 +59,13 @@ class Processes:
         self._on_end = on_end
         self._loop = asyncio.get_running_loop()
         self._running: dict[str, ForkServerProcess] = {}
-        self._recipes: dict[str, tuple[Entry, Mapping[str, Any]]] = {}
+        self._recipes: dict[str, Recipe] = {}
         self._empty = asyncio.Event()
 
-    def start(self, name: str, entry: Entry, arguments: Mapping[str, Any]) -> None:
-        """Start a child; `entry(**arguments)` must be importable and picklable."""
-        self._recipes[name] = entry, arguments
-        process = self._context.Process(target=_child, args=(entry, arguments), name=name)
+    def start(self, name: str, entry: Entry, arguments: Mapping[str, Any], *, nice: int = 0) -> None:
+        """Start a child; `entry(**arguments)` must be importable and picklable. A `nice` one lets others go first."""
+        recipe = self._recipes[name] = Recipe(entry, arguments, nice)
+        process = self._context.Process(target=_child, args=(recipe,), name=name)
         process.start()
         self._running[name] = process
         self._empty.clear()
@@ -63,7 +73,8 @@ class Processes:
 
     def restart(self, name: str) -> None:
         """Start a child that has ended once more, as it was started before."""
-        self.start(name, *self._recipes[name])
+        recipe = self._recipes[name]
+        self.start(name, recipe.entry, recipe.arguments, nice=recipe.nice)
 
     def pid(self, name: str) -> int:
         pid = self._running[name].pid

@@ -33,6 +33,8 @@ from sim.outcome import Outcome
 from sim.processes import Processes, describe
 from sim.world_main import run as run_world
 
+_AGENT_NICE: Final = 10
+"""All UAVs wait for the emulator, and each has its lead: it goes first when both cores are wanted."""
 READY_TIMEOUT_S: Final = 60.0
 _GRACE_S: Final = 5.0
 """After the end of the swarm's time, for last reports."""
@@ -181,7 +183,8 @@ class Swarm:
         self.processes.start("emulator", run_emulator, {**common, **self.emulator_options})
         self.processes.start("world", run_world, common)
         for node, position in zip(self._scenario.node_ids, positions(self._scenario), strict=True):
-            self.processes.start(f"agent-{node}", run_agent, {**common, "node": NodeId(node), "position": position})
+            arguments = {**common, "node": NodeId(node), "position": position}
+            self.processes.start(f"agent-{node}", run_agent, arguments, nice=_AGENT_NICE)
 
     async def _start_clock(self, began: float) -> float:
         """Wait for everyone; returns how long that took [s]."""

@@ -48,7 +48,7 @@ def swarm(seed: int) -> config.Scenario | None:
             "count": count - 1, "relay": "scheduled", "guard_ms": 0, "link_m": 240,
             "flooding_period_s": pick.choice([0.5, 1.0, 2.0, 4.0]),
         },
-        "radio": {"lead_ms": pick.choice([0, 0, 5]), "cw_min": pick.choice([1, 7, 31])},
+        "radio": {"lead_ms": pick.choice([0, 0, 5, 20, 40]), "cw_min": pick.choice([1, 7, 31])},
         "mobility": {"model": pick.choice(["static", "formation"])},
     }  # fmt: skip
     tree["radio"]["channel"] = pick.choice(["range", "log_distance"])

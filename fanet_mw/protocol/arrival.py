@@ -30,9 +30,9 @@ def glance(packet: bytes) -> tuple[int, int]:
     return _NOTHING if phase is None else (seen.key_of(origin, seq), phase)
 
 
-def read(packet: bytes) -> Packet:
-    """The packet in these bytes; raises MalformedFrameError."""
-    if glance(packet) is _NOTHING:
+def read(packet: bytes, phase: int) -> Packet:
+    """The packet in these bytes, whose phase `glance` has given; raises MalformedFrameError."""
+    if not phase:
         raise MalformedFrameError("no routing header, or one of two phases")
     return _new(Packet, (wire.decode_header(packet), packet))
 
@@ -56,7 +56,7 @@ class Reader:
         """The packet in the frame of the last `glance`; raises MalformedFrameError."""
         assert frame is self._frame, "whoever wants the packet has glanced at its frame"
         if self._packet is None:
-            self._packet = read(frame)
+            self._packet = read(frame, self._glance[1])
         return self._packet
 
 

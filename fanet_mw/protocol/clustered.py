@@ -179,7 +179,7 @@ class Clustered(RoutingProtocol):
         return now_ns + self._lead_ns + int(self._random() * jitter_ns)
 
     def overheard(self, key: int, *, now_ns: int) -> None:
-        self._relay.another_copy(key)
+        self._relay.assessment.another_copy(key)
         self._refresh.overheard(key, now_ns=now_ns)
         if self._repair:
             self._repair.overheard(key, now_ns=now_ns)
@@ -340,7 +340,7 @@ class Clustered(RoutingProtocol):
         repair_ns = self._repair.next_wake_ns() if self._repair else None
         wanted = (
             self._join_ns, upkeep_ns, self._refresh.next_wake_ns(), self._release.next_wake_ns(),
-            self._relay.next_wake_ns(), repair_ns,
+            self._relay.assessment.next_wake_ns(), repair_ns,
         )  # fmt: skip
         return min((t for t in wanted if t is not None), default=None)
 
@@ -353,7 +353,7 @@ class Clustered(RoutingProtocol):
             self._learn(packet, now_ns=now_ns)
         for packet in self._refresh.due(now_ns=now_ns):
             self._flood_again(packet, now_ns=now_ns)
-        for packet in self._relay.decided(now_ns=now_ns):
+        for packet in self._relay.assessment.decided(now_ns=now_ns):
             self._transmit_relay(packet, 0, now_ns=now_ns)
         for packet in self._repair.due(now_ns=now_ns) if self._repair else ():
             self._flood_again(packet, now_ns=now_ns)
@@ -414,7 +414,7 @@ class Clustered(RoutingProtocol):
     # --- for people -----------------------------------------------------------------------------------------------
 
     def waiting(self) -> int:
-        return len(self._homeless) + len(self._release) + len(self._unicasts) + len(self._relay)
+        return len(self._homeless) + len(self._release) + len(self._unicasts) + len(self._relay.assessment)
 
     def report(self) -> Mapping[str, object]:
         return {

@@ -8,6 +8,7 @@ duplicate suppression and headers; the routing protocol behind it decides what h
 
 from collections import Counter
 from collections.abc import Callable, Mapping
+from functools import partial
 from random import Random
 from typing import Final
 
@@ -135,7 +136,8 @@ class Node:
                 self._duplicates += 1
                 self._protocol.overheard(key, now_ns=now_ns)
             else:
-                self._hear_new(arrival.read, reception._replace(frame=frame), key, known, phase, now_ns)
+                read = partial(arrival.read, phase=phase)
+                self._hear_new(read, reception._replace(frame=frame), key, known, phase, now_ns)
         self.send_gathered()
 
     def _hear_new(

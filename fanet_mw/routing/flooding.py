@@ -1,5 +1,10 @@
-"""Plain flooding: every node re-broadcasts each new packet once, after a random jitter (paper, Figure 9)."""
+"""Plain flooding: every node re-broadcasts each new packet once, after a random jitter (paper, Figure 9).
 
+`Flood` is what all have in common that flood everything, unicast too: `flooding` here, `gossip` and `counter` in
+`storm`.
+"""
+
+from abc import abstractmethod
 from typing import ClassVar
 
 from fanet_mw.errors import DropReason
@@ -10,17 +15,17 @@ from fanet_mw.units import BROADCAST
 from fanet_mw.wire import FLAG_FLOOD
 
 
-class Flooding(RoutingProtocol):
-    """Relay at reception + lead + U(0, jitter); duplicates were suppressed by the node."""
+class Flood(RoutingProtocol):
+    """Everything goes out as a flood, and a first copy is a question; duplicates were suppressed by the node."""
 
     origin_flags: ClassVar[int] = FLAG_FLOOD
+    draws: ClassVar[str]
+    """Name of the random stream."""
 
     def __init__(self, port: Port) -> None:
         super().__init__(port)
-        scenario = port.scenario
-        self._lead_ns = scenario.radio.lead_ns
-        self._jitter_ns = scenario.routing.jitter_ns
-        self._random = port.stream("jitter").random
+        self._lead_ns = port.scenario.radio.lead_ns
+        self._random = port.stream(self.draws).random
 
     def originate(self, packet: Packet, *, due_ns: int, now_ns: int) -> None:
         self._port.transmit(packet.frame, BROADCAST, start_ns=due_ns)
@@ -31,5 +36,24 @@ class Flooding(RoutingProtocol):
         if packet.header.hop_limit <= 1:
             self._port.drop(DropReason.HOP_LIMIT, packet, now_ns=now_ns)
             return
-        start_ns = now_ns + self._lead_ns + int(self._random() * self._jitter_ns)
+        self._consider(packet, now_ns=now_ns)
+
+    @abstractmethod
+    def _consider(self, packet: Packet, *, now_ns: int) -> None:
+        """The first copy of a packet that may be relayed."""
+
+    def _relay(self, packet: Packet, *, start_ns: int) -> None:
         self._port.transmit(self._port.forwarded(packet, flags=FLAG_FLOOD), BROADCAST, start_ns=start_ns)
+
+
+class Flooding(Flood):
+    """Relay at reception + lead + U(0, jitter)."""
+
+    draws: ClassVar[str] = "jitter"
+
+    def __init__(self, port: Port) -> None:
+        super().__init__(port)
+        self._jitter_ns = port.scenario.routing.jitter_ns
+
+    def _consider(self, packet: Packet, *, now_ns: int) -> None:
+        self._relay(packet, start_ns=now_ns + self._lead_ns + int(self._random() * self._jitter_ns))

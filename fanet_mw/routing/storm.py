@@ -7,51 +7,20 @@ Probabilities and bounds are `routing.gossip_p`, `gossip_k`, `counter`, `assess_
 same paper (neighbor counts, second chances, zones), nor the distance- and location-based schemes of the other.
 """
 
-import heapq
-from abc import abstractmethod
 from collections.abc import Mapping
 from typing import ClassVar
 
-from fanet_mw.errors import DropReason
-from fanet_mw.messages import Reception
-from fanet_mw.protocol.contract import Port, RoutingProtocol
-from fanet_mw.protocol.seen import key_of
+from fanet_mw.protocol.assessment import Assessment
+from fanet_mw.protocol.contract import Port
 from fanet_mw.protocol.txqueue import Packet
-from fanet_mw.units import BROADCAST, MS
-from fanet_mw.wire import FLAG_FLOOD
+from fanet_mw.routing.flooding import Flood
+from fanet_mw.units import MS
 
 
-class _Storm(RoutingProtocol):
-    """What both share: everything goes out as a flood, and a first copy is a question."""
-
-    origin_flags: ClassVar[int] = FLAG_FLOOD
-
-    def __init__(self, port: Port) -> None:
-        super().__init__(port)
-        self._lead_ns = port.scenario.radio.lead_ns
-        self._random = port.stream("storm").random
-
-    def originate(self, packet: Packet, *, due_ns: int, now_ns: int) -> None:
-        self._port.transmit(packet.frame, BROADCAST, start_ns=due_ns)
-
-    def receive(self, packet: Packet, reception: Reception, *, now_ns: int) -> None:
-        if packet.header.destination == self._port.node:
-            return  # it has arrived
-        if packet.header.hop_limit <= 1:
-            self._port.drop(DropReason.HOP_LIMIT, packet, now_ns=now_ns)
-            return
-        self._consider(packet, now_ns=now_ns)
-
-    @abstractmethod
-    def _consider(self, packet: Packet, *, now_ns: int) -> None:
-        """The first copy of a packet that may be relayed."""
-
-    def _relay(self, packet: Packet, *, start_ns: int) -> None:
-        self._port.transmit(self._port.forwarded(packet, flags=FLAG_FLOOD), BROADCAST, start_ns=start_ns)
-
-
-class Gossip(_Storm):
+class Gossip(Flood):
     """Relay by lot."""
+
+    draws: ClassVar[str] = "storm"
 
     def __init__(self, port: Port) -> None:
         super().__init__(port)
@@ -65,43 +34,32 @@ class Gossip(_Storm):
             self._relay(packet, start_ns=now_ns + self._lead_ns + int(jitter * self._jitter_ns))
 
 
-class CounterBased(_Storm):
+class CounterBased(Flood):
     """Relay what few others relay."""
+
+    draws: ClassVar[str] = "storm"
 
     def __init__(self, port: Port) -> None:
         super().__init__(port)
         routing = port.scenario.routing
-        self._enough, self._assess_ns = routing.counter, round(routing.assess_ms * MS)
-        self._pending: dict[int, tuple[int, Packet]] = {}
-        """Copies heard and the packet, by key, of those under assessment."""
-        self._due: list[tuple[int, int]] = []
+        self._assess_ns = round(routing.assess_ms * MS)
+        self._assessment = Assessment(enough=routing.counter)
 
     def _consider(self, packet: Packet, *, now_ns: int) -> None:
-        key = key_of(origin=packet.header.origin, seq=packet.header.seq)
-        self._pending[key] = 1, packet
-        heapq.heappush(self._due, (now_ns + int(self._random() * self._assess_ns), key))
+        self._assessment.first_copy(packet, due_ns=now_ns + int(self._random() * self._assess_ns))
 
     def overheard(self, key: int, *, now_ns: int) -> None:
-        copies, packet = self._pending.get(key, (0, None))
-        if packet is None:
-            return
-        if copies + 1 >= self._enough:
-            del self._pending[key]
-        else:
-            self._pending[key] = copies + 1, packet
+        self._assessment.another_copy(key)
 
     def next_wake_ns(self) -> int | None:
-        while self._due and self._due[0][1] not in self._pending:
-            heapq.heappop(self._due)  # decided meanwhile
-        return self._due[0][0] if self._due else None
+        return self._assessment.next_wake_ns()
 
     def wake(self, now_ns: int) -> None:
-        while (due_ns := self.next_wake_ns()) is not None and due_ns <= now_ns:
-            _, key = heapq.heappop(self._due)
-            self._relay(self._pending.pop(key)[1], start_ns=now_ns + self._lead_ns)
+        for packet in self._assessment.decided(now_ns=now_ns):
+            self._relay(packet, start_ns=now_ns + self._lead_ns)
 
     def waiting(self) -> int:
-        return len(self._pending)
+        return len(self._assessment)
 
     def report(self) -> Mapping[str, object]:
         return {"waiting": self.waiting()}

@@ -88,12 +88,14 @@ def lone_transmitter(count: int, *, window: int = 32) -> float:
     return float((1 - 2 / (window + 1)) ** (count - 1))
 
 
-def bianchi(count: int, *, success_us: float, collision_us: float, payload_bytes: int) -> tuple[float, float]:
+def bianchi(
+    count: int, *, success_us: float, collision_us: float, payload_bytes: int, window: int = 32, slot_us: float = 20
+) -> tuple[float, float]:
     """Saturation throughput [Mb/s] and failure probability of an attempt (Bianchi, JSAC 18(3), 2000; 7 attempts).
 
-    W = 32, five doublings; a frame leaves after the seventh failure.
+    The window doubles up to 1024; a frame leaves after the seventh failure.
     """
-    windows = [min(32 << stage, 1024) for stage in range(7)]
+    windows = [min(window << stage, 1024) for stage in range(7)]
 
     def tau(failure: float) -> float:
         weights = [failure**stage for stage in range(7)]
@@ -106,8 +108,8 @@ def bianchi(count: int, *, success_us: float, collision_us: float, payload_bytes
     attempt = tau(failure)
     idle = (1 - attempt) ** count
     success = count * attempt * (1 - attempt) ** (count - 1)
-    slot_us = idle * 20 + success * success_us + (1 - idle - success) * collision_us
-    return success * 8 * payload_bytes / slot_us, failure
+    mean_us = idle * slot_us + success * success_us + (1 - idle - success) * collision_us
+    return success * 8 * payload_bytes / mean_us, failure
 
 
 # --- the tables ---------------------------------------------------------------------------------------------------

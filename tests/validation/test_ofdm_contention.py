@@ -7,6 +7,7 @@ from typing import Any
 
 import pytest
 from medium_driver import contention, disc
+from reference import bianchi
 
 from fanet_mw.units import NodeId
 
@@ -32,30 +33,13 @@ def test_one_sender_gets_the_channel_less_its_overhead(radio: dict[str, Any], cy
     assert air["mean_retries"] == 0
 
 
-def bianchi(count: int, *, slot_us: float, success_us: float, collision_us: float) -> tuple[float, float]:
-    """Throughput [Mb/s] of 1024 bytes, and the share of attempts that fail; W = 16, six doublings, 7 attempts."""
-    windows = [min(16 << stage, 1024) for stage in range(7)]
-
-    def attempt(failure: float) -> float:
-        weights = [failure**stage for stage in range(7)]
-        return sum(weights) / sum(w * (window + 1) / 2 for w, window in zip(weights, windows, strict=True))
-
-    low, high = 0.0, 1.0
-    for _ in range(60):
-        failure = (low + high) / 2
-        low, high = (failure, high) if 1 - (1 - attempt(failure)) ** (count - 1) > failure else (low, failure)
-    tau = attempt(failure)
-    idle = (1 - tau) ** count
-    success = count * tau * (1 - tau) ** (count - 1)
-    mean_us = idle * slot_us + success * success_us + (1 - idle - success) * collision_us
-    return success * 8 * 1024 / mean_us, failure
-
-
 @pytest.mark.parametrize("count", [3, 10, 25])
 def test_several_share_it_as_bianchi_says(count: int) -> None:
     """Fewer attempts fail than in the model, by 0.02: who has collided waits 45 us for the ACK, five slots that it does
     not know of, while the others already count down."""
-    mbps, failure = bianchi(count, slot_us=9, success_us=184 + 16 + 28 + 34, collision_us=184 + 34)
+    mbps, failure = bianchi(
+        count, success_us=184 + 16 + 28 + 34, collision_us=184 + 34, payload_bytes=1024, window=16, slot_us=9
+    )
     air = contention(
         disc(count, radius_m=20), interval_s=0.0003 * count, sources=range(1, count + 1), dst=None, duration_s=5,
         warmup_s=1, lifetime_ms=1e6, **A,

@@ -63,8 +63,9 @@ class Mission:
         """The network delivered another node's report."""
         sightings = self._sightings.setdefault(report.survivor, {})
         known = sightings.get(report.reporter)
-        if known is None or report.rssi_dbm > known.rssi_dbm:  # the strongest is the nearest and the least shadowed
-            sightings[report.reporter] = Sighting(report.position, report.rssi_dbm)
+        if known is not None and report.rssi_dbm <= known.rssi_dbm:
+            return  # the strongest is the nearest and the least shadowed
+        sightings[report.reporter] = Sighting(report.position, report.rssi_dbm)
         if self._target is None:
             self._choose(position, now_ns)
         elif self._target == report.survivor:
@@ -106,8 +107,10 @@ class Mission:
 
     def _refine(self) -> None:
         assert self._target is not None, "only a target can be refined"
+        if self._dwell_until_ns is not None:
+            return
         better = self._place(self._target)
-        if self._dwell_until_ns is None and better.minus(self._target_at).norm() > _MOVED_M:
+        if better.minus(self._target_at).norm() > _MOVED_M:
             self._target_at = better
             self.course = Course(self._hold_point(), self._config.approach_speed_m_s)
 

@@ -61,13 +61,12 @@ class Uav(Actor):
         self._settle(now_ns)
         self._own_wake_ns = self._next_own_ns()
 
-    def receive(self, topic: str, message: Message, now_ns: int) -> None:
+    def receive(self, topic: str, message: Message, now_ns: int) -> bool:
         if type(message) is Reception:
-            node = self._node
-            node.hear(message, now_ns)
-            if node.requests or node.deliveries:  # else nothing came of it, as of most
-                self._settle(now_ns)
-            return
+            if self._node.hear(message, now_ns):
+                return True  # nothing came of it, as of most
+            self._settle(now_ns)
+            return False
         if isinstance(message, TxStatus):
             self._node.status(message, now_ns=now_ns)
             if self._traffic.saturated and self._traffic.open_at(now_ns):
@@ -81,6 +80,7 @@ class Uav(Actor):
         else:
             self._malformed += 1
         self._settle(now_ns)
+        return False
 
     def wake(self, now_ns: int) -> None:
         self._node.wake(now_ns)

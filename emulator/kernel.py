@@ -82,7 +82,7 @@ def take_in(g: Ints, p: Ints, st: Ints, fr: Ints, hs: Ints, asked: Ints, bound: 
         fr[OPEN, f] = 1
         fr[WANTS_STATUS, f] = asked[i, 5]
         push(hs, g, HS_N, t, ARRIVE, f, 0)
-        bound = min(bound, t + airtime + first_wait(p, st, src, t))
+        bound = min(bound, t + airtime + first_wait(p, st, src, t) + g[REACH_NS])
     g[ASKED_N] = 0
     return int(bound)
 
@@ -134,23 +134,23 @@ def next_output(g: Ints, p: Ints, st: Ints, fr: Ints, hs: Ints) -> int:
         return int(min(bound, hs[0, 0] + p[HEADER_NS]))
     for i in range(g[HS_N]):
         if hs[i, 0] < bound:
-            bound = min(bound, earliest_end(p, st, fr, hs[i, 0], hs[i, 2], hs[i, 3], hs[i, 4]))
+            bound = min(bound, earliest_end(g, p, st, fr, hs[i, 0], hs[i, 2], hs[i, 3], hs[i, 4]))
     return int(bound)
 
 
 @jit
-def earliest_end(p: Ints, st: Ints, fr: Ints, t: int, kind: int, a: int, b: int) -> int:
-    """When the frame that an event may start can have ended at the earliest."""
+def earliest_end(g: Ints, p: Ints, st: Ints, fr: Ints, t: int, kind: int, a: int, b: int) -> int:
+    """When the frame that an event may start can have ended at its last receiver, at the earliest."""
     if kind == ARRIVE:
-        return int(t + fr[AIRTIME, a] + first_wait(p, st, fr[SRC, a], t))
+        return int(t + fr[AIRTIME, a] + first_wait(p, st, fr[SRC, a], t) + g[REACH_NS])
     if kind == SEND_ACK:
-        return int(t + p[ACK_NS])
+        return int(t + p[ACK_NS] + g[REACH_NS])
     if kind == ACK_TIMEOUT:
         return int(t) if st[WAITING, a] == b else NEVER
     if st[SCHEDULED, a] != t or st[HEAD, a] < 0:
         return NEVER
     f = st[HEAD, a]
-    return int(t) if t - fr[BORN, f] >= p[LIFETIME_NS] else int(t + fr[AIRTIME, f])
+    return int(t) if t - fr[BORN, f] >= p[LIFETIME_NS] else int(t + fr[AIRTIME, f] + g[REACH_NS])
 
 
 @jit

@@ -28,6 +28,7 @@ TOO_LATE_NS: Final = 50 * MS
 ANNOUNCED: Final = 1024
 """Requests of one node that may wait for their instant, beyond what its MAC queue holds."""
 _new: Final = tuple.__new__
+_RECEPTION, _FREE, _DELIVERED = s.OUT_RECEPTION, s.OUT_FREE, s.DELIVERED
 _SEQ_MASK: Final = 0xFFFF_FFFF
 _LONGEST_GAP: Final = 1 << 20
 """Requests; a longer one is no loss but nonsense."""
@@ -142,27 +143,17 @@ class Medium(Actor):
 
     def _request(self, station: int, request: TxRequest, now_ns: int) -> None:
         """Take in one request; whatever is wrong with it is counted, never raised."""
-        accounts = self._accounts
         seq, start_ns, frame, dst, wants_status = request
         if seq != self._next_seq[station]:
             self._count_gap(station, seq)
         self._next_seq[station] = (seq + 1) & _SEQ_MASK
-        accounts.sent += 1
+        self._accounts.sent += 1
         size = len(frame)
-        if dst != BROADCAST and not 1 <= dst <= self._count:
-            self._refuse(station, request, DropReason.NO_RECEIVER, now_ns)
+        if (dst != BROADCAST and not 1 <= dst <= self._count) or not 0 < size <= self._max_bytes:
+            self._refuse_shape(station, request, now_ns)
             return
-        if size > self._max_bytes:
-            self._refuse(station, request, DropReason.TOO_LARGE, now_ns)
-            return
-        if not size or not -_HORIZON_NS < start_ns - now_ns < _HORIZON_NS:
-            self._refuse(station, request, DropReason.MALFORMED, now_ns)
-            return
-        if start_ns < now_ns:
-            late_ns = now_ns - start_ns
-            accounts.late(late_ns)
-            if late_ns > TOO_LATE_NS:
-                self._refuse(station, request, DropReason.LATE, now_ns)
+        if not now_ns <= start_ns < now_ns + _HORIZON_NS:
+            if self._refuse_instant(station, request, now_ns):
                 return
             start_ns = now_ns
         if self._held[station] >= self._most_held:
@@ -176,11 +167,30 @@ class Medium(Actor):
         self._sources[slot] = self._ids[station]
         if start_ns < self._now_ns:
             start_ns = self._now_ns
-        to = s.EVERYONE if dst == BROADCAST else dst - 1
-        self._air.submit(slot, station, to, size, start_ns, wants_status)
+        self._air.submit(slot, station, s.EVERYONE if dst == BROADCAST else dst - 1, size, start_ns, wants_status)
         if self._links_ns is None:
             self._links_ns = (self._now_ns // S + 1) * S
             self._due_ns = self._next_turn_ns()
+
+    def _refuse_shape(self, station: int, request: TxRequest, now_ns: int) -> None:
+        """Nobody to send it to, or nothing that fits into a frame."""
+        size = len(request.frame)
+        if request.dst != BROADCAST and not 1 <= request.dst <= self._count:
+            reason = DropReason.NO_RECEIVER
+        else:
+            reason = DropReason.TOO_LARGE if size else DropReason.MALFORMED
+        self._refuse(station, request, reason, now_ns)
+
+    def _refuse_instant(self, station: int, request: TxRequest, now_ns: int) -> bool:
+        """An instant that nobody means is refused, and so is one too long ago; a late one is counted."""
+        late_ns = now_ns - request.start_ns
+        if not -_HORIZON_NS < late_ns < _HORIZON_NS:
+            self._refuse(station, request, DropReason.MALFORMED, now_ns)
+            return True
+        self._accounts.late(late_ns)
+        if late_ns > TOO_LATE_NS:
+            self._refuse(station, request, DropReason.LATE, now_ns)
+        return late_ns > TOO_LATE_NS
 
     def _count_gap(self, station: int, seq: int) -> None:
         """A gap is requests that the bus lost: they were sent, and they are dropped."""
@@ -256,11 +266,11 @@ class Medium(Actor):
         for kind, slot, station, t_ns, value, attempts in rows:
             request = requests[slot]
             assert request is not None, "the kernel speaks only of frames it was given"
-            if kind == s.OUT_RECEPTION:
+            if kind == _RECEPTION:
                 # as Reception(...), which takes three times as long
                 append((rx_topics[station], _new(Reception, (request.frame, sources[slot], t_ns, value / 1000))))
-            elif kind == s.OUT_FREE:
-                if value == s.DELIVERED:
+            elif kind == _FREE:
+                if value == _DELIVERED:
                     accounts.delivered += 1
                     accounts.delivered_bytes += len(request.frame)
                 else:

@@ -8,8 +8,8 @@ An actor never sleeps, reads a clock, opens a socket or starts a thread. A host 
     stop(now)   once, last; then `report()` says how it went
 
 After every call, or after several at one instant, the host takes all of `outbox` and `records`, and asks
-`next_wake_ns()` again. Instants never decrease. Both lists belong to the host, which may put its own in place before
-`start`; the actor only appends, during a call.
+`next_wake_ns()` again, unless `receive` has said that it need not. Instants never decrease. Both lists belong to the
+host, which may put its own in place before `start`; the actor only appends, during a call.
 """
 
 from abc import ABC, abstractmethod
@@ -39,7 +39,8 @@ class Actor(ABC):
     def start(self, now_ns: int) -> None: ...
 
     @abstractmethod
-    def receive(self, topic: str, message: Message, now_ns: int) -> None: ...
+    def receive(self, topic: str, message: Message, now_ns: int) -> bool | None:
+        """True: nothing has become due sooner than `next_wake_ns()` said last, and the host need not ask again."""
 
     @abstractmethod
     def wake(self, now_ns: int) -> None: ...

@@ -193,8 +193,9 @@ def decode_header(frame: bytes) -> Header:
 
 def rewrite(frame: bytes, prev_hop: int, hop_limit: int, hops: int, flags: int) -> bytes:
     """The frame for its next hop: a new header, the inner frames byte for byte. The frame must have been decoded."""
+    sender = (prev_hop - 1) % 250 + 1  # system_id, without the call
     body = _REWRITTEN.pack(
-        frame[1:_SYSTEM_AT], system_id(prev_hop), frame[_SYSTEM_AT + 1 : _PREV_HOP_AT], prev_hop,
+        frame[1:_SYSTEM_AT], sender, frame[_SYSTEM_AT + 1 : _PREV_HOP_AT], prev_hop,
         frame[_KIND_AT], hop_limit, hops, frame[_PRIORITY_AT], flags, VERSION, ROUTE.crc_extra,
     )  # fmt: skip
     return _HEADER.pack(_START, body, mcrf4xx(body)) + frame[HEADER_BYTES:]

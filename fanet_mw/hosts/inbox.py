@@ -57,7 +57,7 @@ class Inbox:
         offered[key] = before + 1
         self._waiting.append((topic, payload))
 
-    def deliver(self, receive: Callable[[str, Message], None], *, most: int = TURN) -> bool:
+    def deliver(self, receive: Callable[[str, Message], object], *, most: int = TURN) -> bool:
         """Hand the messages of at most `most` puts to `receive`, in order; returns whether puts still wait."""
         waiting, gone = self._waiting, self._gone
         for _ in range(most):

@@ -15,7 +15,9 @@ from fanet_mw.trace import Record
 from fanet_mw.units import S
 
 Listener = Callable[[str, Message], None]
-Receive = Callable[[str, Message, int], None]
+Receive = Callable[[str, Message, int], bool | None]
+Route = tuple[int, Receive, list[tuple[int, Receive]]]
+"""Index and `receive` of the first who hears a topic, and of the others: nearly every topic has one hearer."""
 _NOBODY: Final = -1
 """In place of the index of an actor: a listener, which has no wake-ups."""
 _STALL_LIMIT: Final = 100_000
@@ -29,7 +31,15 @@ def matches(expression: str, topic: str) -> bool:
 
 
 def _deaf_to_time(listener: Listener) -> Receive:
-    return lambda topic, message, _: listener(topic, message)
+    def hear(topic: str, message: Message, _: int) -> bool:
+        listener(topic, message)
+        return True
+
+    return hear
+
+
+def _deaf(_topic: str, _message: Message, _now_ns: int) -> bool:
+    return True
 
 
 class VirtualHost:
@@ -60,7 +70,7 @@ class VirtualHost:
                 self._subscribe(expression, index, index, actor.receive)
         for order, (expression, listener) in enumerate(listeners, start=len(self._actors)):
             self._subscribe(expression, order, _NOBODY, _deaf_to_time(listener))
-        self._routes: dict[str, list[tuple[int, Receive]]] = {}
+        self._routes: dict[str, Route] = {}
         self._stall = (-1, -1, 0)
 
     def start(self) -> None:
@@ -73,18 +83,19 @@ class VirtualHost:
 
     def run(self, until_ns: int) -> None:
         """Run every event up to and including `until_ns`; may be called again with a later instant."""
-        heap, armed, wakes = self._heap, self._armed, [actor.wake for actor in self._actors]
+        heap, armed, wakes, flush = self._heap, self._armed, [actor.wake for actor in self._actors], self._flush
+        pop, now_ns = heapq.heappop, self.now_ns
         while heap and heap[0][0] <= until_ns:
-            t_ns, _, index = heapq.heappop(heap)
+            t_ns, _, index = pop(heap)
             if armed[index] != t_ns:
                 continue  # re-armed since
             armed[index] = None
-            if t_ns > self.now_ns:
-                self.now_ns = t_ns
+            if t_ns > now_ns:
+                self.now_ns = now_ns = t_ns
             else:
                 self._watch(index)
-            wakes[index](self.now_ns)
-            self._flush({index: None})
+            wakes[index](now_ns)
+            flush({index: None})
         self.now_ns = max(self.now_ns, until_ns)
         self._hand_over()
 
@@ -108,14 +119,16 @@ class VirtualHost:
         """Deliver all messages of this instant, in order; then plan the wake-ups of `awake` and of who heard any."""
         queue, routes, now_ns = self._queue, self._routes, self.now_ns
         for topic, message in queue:  # it grows meanwhile
-            route = routes.get(topic)
-            if route is None:
-                route = routes[topic] = self._resolve(topic)
-            for index, receive in route:
-                receive(topic, message, now_ns)
+            try:
+                index, receive, others = routes[topic]
+            except KeyError:
+                index, receive, others = routes[topic] = self._resolve(topic)
+            if not receive(topic, message, now_ns):
                 awake[index] = None  # in order, each once
+            for index, receive in others:
+                if not receive(topic, message, now_ns):
+                    awake[index] = None
         queue.clear()
-        awake.pop(_NOBODY, None)
         asks, armed = self._asks, self._armed
         for index in awake:
             wake_ns = asks[index]()
@@ -143,7 +156,7 @@ class VirtualHost:
         beginning, star, _ = expression.partition("*")
         self._hearing.setdefault(beginning if star else expression, []).append((order, expression, index, receive))
 
-    def _resolve(self, topic: str) -> list[tuple[int, Receive]]:
+    def _resolve(self, topic: str) -> Route:
         """Who hears a topic; the cost does not depend on how many there are who do not."""
         found: dict[int, tuple[int, Receive]] = {}  # each once, whichever of its expressions it is
         chunks = topic.split("/")
@@ -151,4 +164,5 @@ class VirtualHost:
             for order, expression, index, receive in self._hearing.get(beginning, ()):
                 if matches(expression, topic):
                     found[order] = index, receive
-        return [found[order] for order in sorted(found)]
+        hearers = [found[order] for order in sorted(found)] or [(_NOBODY, _deaf)]
+        return (*hearers[0], hearers[1:])

@@ -4,7 +4,8 @@ A broadcast is one object of bytes to all who hear it in virtual time, and they 
 first of them has read serves the others. Nothing here depends on who reads. In real time every frame is read once.
 """
 
-from typing import Final
+from collections.abc import Callable
+from typing import Any, Final, TypeVar
 
 from fanet_mw import wire
 from fanet_mw.errors import MalformedFrameError
@@ -14,20 +15,17 @@ from fanet_mw.protocol.txqueue import Packet
 PHASES: Final = {0: seen.DELIVERED, wire.FLAG_FLOOD: seen.FLOODED, wire.FLAG_TO_HEAD: seen.CARRIED}
 """Which bit says that a packet was handled, by the phase flags of the frame that brought it."""
 _new: Final = tuple.__new__  # for what is made once per frame
-_NOTHING: Final = (0, 0)
 BUNDLE: Final = 1 << 30
 """The phase of a frame with several packets in it: no node has ever handled that."""
-_SEVERAL: Final = (0, BUNDLE)
 
 
 def glance(packet: bytes) -> tuple[int, int]:
-    """`seen.key_of` a packet and the bit of its phase, unchecked; (0, 0) when there can be none in these bytes."""
+    """`seen.key_of` a packet and the bit of its phase, unchecked; phase 0 when there can be none in these bytes."""
     peeked = wire.peek(packet)
     if peeked is None:
-        return _NOTHING
+        return 0, 0
     origin, seq, flags = peeked
-    phase = PHASES.get(flags & wire.PHASE_MASK)
-    return _NOTHING if phase is None else (seen.key_of(origin, seq), phase)
+    return seen.key_of(origin, seq), PHASES.get(flags & wire.PHASE_MASK, 0)
 
 
 def read(packet: bytes, phase: int) -> Packet:
@@ -41,24 +39,54 @@ class Reader:
     """Reads frames; what was read of the latest is at hand."""
 
     def __init__(self) -> None:
-        self._frame = b""
-        self._glance = _NOTHING
-        self._packet: Packet | None = None
+        self.frame = b""
+        self.key = 0
+        self.phase = 0
+        """What `glance` says of the packet in the frame; (0, BUNDLE) when it has several."""
+        self.packet: Packet | None = None
+        """The packet in the frame, once somebody has asked for it."""
 
-    def glance(self, frame: bytes) -> tuple[int, int]:
-        """`glance` at the packet of this frame; (0, BUNDLE) when it has several."""
-        if frame is not self._frame:
-            self._frame, self._packet = frame, None
-            self._glance = _SEVERAL if wire.is_bundle(frame) else glance(frame)
-        return self._glance
+    def look(self, frame: bytes) -> None:
+        """Take up another frame."""
+        self.frame, self.packet = frame, None
+        peeked = wire.peek(frame)
+        if peeked is None:
+            self.key = self.phase = 0
+            return
+        origin, seq, flags = peeked
+        if flags & wire.FLAG_MORE:
+            self.key, self.phase = 0, BUNDLE
+        else:
+            self.key, self.phase = seen.key_of(origin, seq), PHASES.get(flags & wire.PHASE_MASK, 0)
 
-    def packet(self, frame: bytes) -> Packet:
-        """The packet in the frame of the last `glance`; raises MalformedFrameError."""
-        assert frame is self._frame, "whoever wants the packet has glanced at its frame"
-        if self._packet is None:
-            self._packet = read(frame, self._glance[1])
-        return self._packet
+    def read(self) -> Packet:
+        """The packet in the frame; raises MalformedFrameError, each time."""
+        self.packet = read(self.frame, self.phase)
+        return self.packet
 
 
 shared: Final = Reader()
 """For all nodes of this process."""
+T = TypeVar("T")
+
+
+class Memo:
+    """What has been decoded of the latest packet that somebody asked about; values are immutable."""
+
+    def __init__(self) -> None:
+        self._packet: Packet | None = None
+        self._found: dict[Callable[[bytes], Any], Any] = {}
+
+    def of(self, packet: Packet, decode: Callable[[bytes], T]) -> T:
+        """What `decode` makes of the packet's bytes; raises what it raises, each time."""
+        if packet is not self._packet:
+            self._packet = packet
+            self._found.clear()
+        elif decode in self._found:
+            return self._found[decode]  # type: ignore[no-any-return]
+        found = self._found[decode] = decode(packet.frame)
+        return found
+
+
+decoded: Final = Memo().of
+"""For all nodes of this process: a hello that forty hear is decoded once."""

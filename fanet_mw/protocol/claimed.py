@@ -25,6 +25,7 @@ from typing import Final
 from fanet_mw.claims import MOST_LOTS, Claims, Standing
 from fanet_mw.errors import DropReason
 from fanet_mw.messages import Reception
+from fanet_mw.protocol.arrival import decoded
 from fanet_mw.protocol.clustered import Clustered
 from fanet_mw.protocol.contract import Port
 from fanet_mw.protocol.delay.turns import TurnServer
@@ -225,7 +226,7 @@ class Claimed(Clustered):
 
     def hello(self, packet: Packet, reception: Reception, *, now_ns: int) -> None:
         super().hello(packet, reception, now_ns=now_ns)
-        claims = Claims.decode_frames(packet.frame)
+        claims = decoded(packet, Claims.decode_frames)
         if claims is None or claims.node != reception.src:
             return
         heard = tuple(self._claim(h.node, h.standing) for h in claims.heard)

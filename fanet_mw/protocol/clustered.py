@@ -13,6 +13,7 @@ from fanet_mw.digest import Digest
 from fanet_mw.errors import DropReason, MalformedFrameError
 from fanet_mw.messages import Reception, TxOutcome, TxStatus
 from fanet_mw.protocol import seen
+from fanet_mw.protocol.arrival import decoded
 from fanet_mw.protocol.contract import Port, RoutingProtocol
 from fanet_mw.protocol.gradient import UNREACHABLE, Gradient
 from fanet_mw.protocol.guard import slot_guard_ns
@@ -161,14 +162,14 @@ class Clustered(RoutingProtocol):
             self._port.drop(DropReason.HOP_LIMIT, packet, now_ns=now_ns)
         elif packet.header.kind in (Kind.JOIN, Kind.SCHEDULE) and not self._routine(packet):
             self._transmit_relay(packet, _CONTROL_JITTER_NS, now_ns=now_ns)
-        elif self._relay.first_copy(packet, neighbors=self._neighbors.count(now_ns=now_ns), now_ns=now_ns):
+        elif self._relay.first_copy(packet, self._neighbors, now_ns=now_ns):
             self._transmit_relay(packet, self._jitter_ns, now_ns=now_ns)
 
     def _routine(self, packet: Packet) -> bool:
         """A join of one who has a place: it tells where it is, and need not be relayed by everyone."""
         if packet.header.kind != Kind.JOIN or not self._membership.lists(packet.header.origin):
             return False
-        return not Join.decode_frame(packet.frame).instead_of
+        return not decoded(packet, Join.decode_frame).instead_of
 
     def _transmit_relay(self, packet: Packet, jitter_ns: int, *, now_ns: int) -> None:
         start_ns = self._start_ns(now_ns=now_ns, jitter_ns=jitter_ns)
@@ -187,7 +188,7 @@ class Clustered(RoutingProtocol):
     def _consume_control(self, packet: Packet, src: NodeId, *, now_ns: int) -> None:
         """Joins and announcements of leaders. Malformed ones raise and are counted by the node."""
         if packet.header.kind == Kind.JOIN:
-            join, born_ns = Join.decode_frame(packet.frame), min(packet.header.origin_us * US, now_ns)
+            join, born_ns = decoded(packet, Join.decode_frame), min(packet.header.origin_us * US, now_ns)
             if self._leader is not None:
                 self._leader.joined(join, born_ns=born_ns, now_ns=now_ns)
             if join.instead_of:
@@ -199,7 +200,7 @@ class Clustered(RoutingProtocol):
 
     def _learn(self, packet: Packet, *, now_ns: int) -> None:
         """An announcement of a leader, perhaps our own."""
-        schedule = Schedule.decode_frame(packet.frame)
+        schedule = decoded(packet, Schedule.decode_frame)
         if schedule.leader != packet.header.origin:
             raise MalformedFrameError(f"schedule of {schedule.leader} by {packet.header.origin}")
         actions = self._upkeep.announced(
@@ -307,13 +308,13 @@ class Clustered(RoutingProtocol):
         return beacon + self._repair.digest(now_ns=now_ns).encode_frames(self._port.node) if self._repair else beacon
 
     def hello(self, packet: Packet, reception: Reception, *, now_ns: int) -> None:
-        neighbor = Neighbor(reception.src, now_ns, reception.rssi_dbm, Beacon.decode_frame(packet.frame))
+        neighbor = Neighbor(reception.src, now_ns, reception.rssi_dbm, decoded(packet, Beacon.decode_frame))
         self._neighbors.heard(neighbor)
         self._notice(reception.src, packet.header.origin_us * US, now_ns)
         if self._lease.valid(now_ns):
             self._refresh.compare(neighbor.beacon, now_ns=now_ns)
         self._gradient.hear(neighbor, now_ns=now_ns)
-        digest = Digest.decode_frames(packet.frame) if self._repair else None
+        digest = decoded(packet, Digest.decode_frames) if self._repair else None
         if self._repair and digest:
             self._repair.compare(digest, now_ns=now_ns)
         if len(self._homeless) and self._gradient.route(now_ns=now_ns) is not None:

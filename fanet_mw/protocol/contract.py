@@ -94,7 +94,10 @@ class RoutingProtocol(ABC):
         """A neighbor's hello."""
 
     def overheard(self, key: int, *, now_ns: int) -> None:  # noqa: B027
-        """Another copy, in the same phase, of a packet that was handled before (`seen.key_of`)."""
+        """Another copy, in the same phase, of a packet that was handled before (`seen.key_of`).
+
+        It may call off what is planned; nothing may become due sooner, because nobody asks again.
+        """
 
     def status(self, status: TxStatus, *, now_ns: int) -> None:  # noqa: B027
         """How a transmission ended that asked for it."""

@@ -8,7 +8,6 @@ duplicate suppression and headers; the routing protocol behind it decides what h
 
 from collections import Counter
 from collections.abc import Callable, Mapping
-from functools import partial
 from random import Random
 from typing import Final
 
@@ -64,7 +63,8 @@ class Node:
         """While set: broadcasts that may share a frame, each with its instant."""
         self._protocol = make_protocol(self)
         self.next_wake_ns = self._protocol.next_wake_ns
-        """The protocol's own method: every reception is followed by this question."""
+        """The protocol's own method: every wake-up is followed by this question."""
+        self._overheard = self._protocol.overheard
 
     # --- from the host's side -------------------------------------------------------------------------------------
 
@@ -107,19 +107,26 @@ class Node:
         )
         self.transmit(packet.frame, BROADCAST, start_ns=start_ns)
 
-    def hear(self, reception: Reception, now_ns: int) -> None:
-        """One reception, from anyone."""
+    def hear(self, reception: Reception, now_ns: int) -> bool:
+        """One reception, from anyone. True: a copy of what was handled before; nothing came of it."""
         self.receptions += 1
-        frame = reception.frame
-        key, phase = self._reader.glance(frame)
-        known = self._seen.bits(key)
+        frame, reader, handled = reception.frame, self._reader, self._seen
+        if frame is not reader.frame:
+            reader.look(frame)
+        key, phase = reader.key, reader.phase
+        known = handled.young.get(key) or handled.bits(key)
         if known & phase:
             self._duplicates += 1
-            self._protocol.overheard(key, now_ns=now_ns)
-        elif phase == arrival.BUNDLE:
+            self._overheard(key, now_ns=now_ns)
+            return True
+        if phase == arrival.BUNDLE:
             self._hear_bundle(reception, now_ns)
-        else:
-            self._hear_new(self._reader.packet, reception, key, known, phase, now_ns)
+            return False
+        try:
+            self._first_copy(reader.packet or reader.read(), reception, key, known, known | phase, now_ns)
+        except MalformedFrameError:
+            self.dropped[DropReason.MALFORMED] += 1
+        return False
 
     def _hear_bundle(self, reception: Reception, now_ns: int) -> None:
         """Several packets in one frame: each as if it had come alone; what they make us send goes together again."""
@@ -134,19 +141,14 @@ class Node:
             known = self._seen.bits(key)
             if known & phase:
                 self._duplicates += 1
-                self._protocol.overheard(key, now_ns=now_ns)
-            else:
-                read = partial(arrival.read, phase=phase)
-                self._hear_new(read, reception._replace(frame=frame), key, known, phase, now_ns)
+                self._overheard(key, now_ns=now_ns)
+                continue
+            try:
+                packet = arrival.read(frame, phase)
+                self._first_copy(packet, reception._replace(frame=frame), key, known, known | phase, now_ns)
+            except MalformedFrameError:
+                self.dropped[DropReason.MALFORMED] += 1
         self.send_gathered()
-
-    def _hear_new(
-        self, read: Callable[[bytes], Packet], reception: Reception, key: int, known: int, phase: int, now_ns: int
-    ) -> None:
-        try:
-            self._first_copy(read(reception.frame), reception, key, known, known | phase, now_ns)
-        except MalformedFrameError:
-            self.dropped[DropReason.MALFORMED] += 1
 
     def _first_copy(self, packet: Packet, reception: Reception, key: int, before: int, bits: int, now_ns: int) -> None:
         """`before` and `bits`: what is known of the packet without and with this copy."""

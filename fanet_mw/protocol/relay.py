@@ -10,6 +10,7 @@
 from collections.abc import Callable
 
 from fanet_mw.protocol.assessment import Assessment
+from fanet_mw.protocol.neighbors import Neighbors
 from fanet_mw.protocol.txqueue import Packet
 from fanet_mw.scenario import Clusters
 from fanet_mw.units import MS
@@ -26,10 +27,10 @@ class Relay:
         self.assessment = Assessment(enough=clusters.counter)
         """Of `counter`; empty with other rules."""
 
-    def first_copy(self, packet: Packet, *, neighbors: int, now_ns: int) -> bool:
+    def first_copy(self, packet: Packet, neighbors: Neighbors, *, now_ns: int) -> bool:
         """Take in a new packet; True: relay it now."""
         if self._rule == "gossip":
-            return self._random() * neighbors <= self._degree
+            return self._random() * neighbors.count(now_ns=now_ns) <= self._degree
         if self._rule == "counter":
             self.assessment.first_copy(packet, due_ns=now_ns + int(self._random() * self._assess_ns))
             return False

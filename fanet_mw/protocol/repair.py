@@ -9,6 +9,7 @@ origin behind, stays lost.
 """
 
 import heapq
+from collections import deque
 from collections.abc import Callable
 from itertools import islice
 from typing import Final, NamedTuple
@@ -47,7 +48,9 @@ class Repair:
         self._random = random
         self._holdings: dict[int, Holding] = {}
         self._store: dict[int, _Kept] = {}
-        """By key, oldest first."""
+        """By key."""
+        self._order: deque[int] = deque()
+        """Keys of the store, oldest first."""
         self._stored: dict[int, int] = {}
         """How many packets of each origin are in the store."""
         self._pending: dict[int, int] = {}
@@ -72,19 +75,20 @@ class Repair:
             self._store[key] = _Kept(packet, min(ripe_ns, known.ripe_ns))
             return
         self._store[key] = _Kept(packet, ripe_ns)
+        self._order.append(key)
         self._stored[header.origin] = self._stored.get(header.origin, 0) + 1
         self._forget(now_ns)
 
     def _forget(self, now_ns: int) -> None:
         """Drop what is too old to be repaired, and the oldest beyond the capacity."""
         horizon_us = (now_ns - self._window_ns) // US
-        while self._store:
-            key = next(iter(self._store))
-            kept = self._store[key]
-            if len(self._store) <= self._capacity and kept.packet.header.origin_us >= horizon_us:
+        order, store = self._order, self._store
+        while order:
+            header = store[order[0]].packet.header
+            if len(store) <= self._capacity and header.origin_us >= horizon_us:
                 return
-            del self._store[key]
-            origin = kept.packet.header.origin
+            del store[order.popleft()]
+            origin = header.origin
             self._stored[origin] -= 1
             if not self._stored[origin]:
                 del self._stored[origin]
@@ -104,12 +108,13 @@ class Repair:
 
     def compare(self, digest: Digest, *, now_ns: int) -> None:
         """Plan to send what the neighbor lacks."""
-        told = {holding.origin: holding for holding in digest.holdings}
+        told, held = {holding.origin: holding for holding in digest.holdings}, self._holdings
+        unlike = [origin for origin in self._stored if told.get(origin) != held[origin]]  # few: the rest is quick
         missing = (
             key_of(origin=origin, seq=seq)
-            for origin in self._stored
-            if (theirs := told.get(origin)) != self._holdings[origin] and (theirs is not None or digest.complete)
-            for seq in self._holdings[origin].beyond(theirs)
+            for origin in unlike
+            if digest.complete or origin in told
+            for seq in held[origin].beyond(told.get(origin))
         )
         for key in islice((key for key in missing if self._ripe(key, now_ns)), _PER_HELLO):
             self._plan(key, now_ns)

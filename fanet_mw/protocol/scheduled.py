@@ -15,6 +15,7 @@ from fanet_mw.errors import DropReason
 from fanet_mw.messages import Reception
 from fanet_mw.places import Places, rounded
 from fanet_mw.protocol.admission import Admission, Own
+from fanet_mw.protocol.arrival import decoded
 from fanet_mw.protocol.clustered import Clustered
 from fanet_mw.protocol.contract import Port
 from fanet_mw.protocol.lease import Authority
@@ -91,8 +92,8 @@ class Scheduled(Clustered):
 
     def _learn(self, packet: Packet, *, now_ns: int) -> None:
         """Besides the schedule take in the places, and plan when all of an epoch have come."""
-        schedule = Schedule.decode_frame(packet.frame)
-        places = Places.decode_frames(packet.frame) if schedule.members else None
+        schedule = decoded(packet, Schedule.decode_frame)
+        places = decoded(packet, Places.decode_frames) if schedule.members else None
         super()._learn(packet, now_ns=now_ns)
         version = Version(Authority(schedule.term, schedule.leader), schedule.epoch)
         if version != self._membership.version or places is None or len(places.members) != len(schedule.members):

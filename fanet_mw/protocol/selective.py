@@ -12,6 +12,7 @@ from typing import Final
 
 from fanet_mw.claims import Claims, Standing
 from fanet_mw.messages import Reception
+from fanet_mw.protocol.arrival import decoded
 from fanet_mw.protocol.clustered import Clustered
 from fanet_mw.protocol.contract import Port
 from fanet_mw.protocol.neighborhood import Neighborhood
@@ -50,11 +51,11 @@ class Selective(Clustered):
 
     def hello(self, packet: Packet, reception: Reception, *, now_ns: int) -> None:
         super().hello(packet, reception, now_ns=now_ns)
-        claims = Claims.decode_frames(packet.frame)
+        claims = decoded(packet, Claims.decode_frames)
         if claims is None or claims.node != reception.src:
             return
         self._near.hear(claims, now_ns=now_ns)
-        is_head = Beacon.decode_frame(packet.frame).role == Role.HEAD
+        is_head = decoded(packet, Beacon.decode_frame).role == Role.HEAD
         if self._heads.get(claims.node) is not is_head:
             self._heads[claims.node] = is_head
             self._near.forget_rank()

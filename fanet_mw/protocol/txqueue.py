@@ -66,6 +66,8 @@ class TxQueue:
 
     def expire(self, *, before_us: int) -> list[Packet]:
         """Take out every packet generated before an instant [swarm us], or that much later if its class is sooner."""
+        if not self._entries:
+            return []
         stale: list[tuple[int, int, Packet]] = []
         kept: list[tuple[int, int, Packet]] = []
         for entry in self._entries:

@@ -1,6 +1,5 @@
 """The mission of one UAV, as timelines."""
 
-from agents.localization import Sighting
 from agents.mission import HOME, Mission
 from fanet_mw.scenario import Mission as Config
 from fanet_mw.trace import Approaching, Arrived, Detected
@@ -46,19 +45,16 @@ def test_the_third_reporter_changes_the_course() -> None:
 
 def test_of_two_known_survivors_the_nearer_one_is_approached_then_the_other_then_home() -> None:
     uav = mission()
-    for survivor, east in ((7, 900), (4, 100)):
+    for survivor, east in ((2, 0), (7, 900), (4, 100)):  # 2 is approached at once, the others when it has been visited
         for reporter in (2, 3, 5):
-            uav._sightings.setdefault(survivor, {})[reporter] = Sighting(Enu(east + reporter, 0, 50), -80.0)
-    uav.reported(report(4, 5, 105), position=HERE, now_ns=S)
-    order = []
-    now_ns, at = S, HERE
-    for _ in range(2):
-        order.append(uav._target)
-        at = uav._target_at
+            uav.reported(report(survivor, reporter, east + reporter), position=HERE, now_ns=S)
+    now_ns = S
+    for _ in range(3):
+        approached = [r for r in uav.records if isinstance(r, Approaching)][-1]
+        at = Enu(approached.east_m, approached.north_m, 50)
         uav.moved(at, now_ns=now_ns)
         now_ns += 11 * S
         uav.moved(at, now_ns=now_ns)
-    assert order == [4, 7]
-    assert [r.survivor for r in uav.records if isinstance(r, Arrived)] == [4, 7]
+    assert [r.survivor for r in uav.records if isinstance(r, Arrived)] == [2, 4, 7]
     assert uav.course is not None
     assert uav.course.speed_m_s == HOME

@@ -24,6 +24,7 @@ from fanet_mw.scenario import Scenario
 _GENERATOR_RANGE = 2_147_483_646
 _ROW: Final = struct.Struct("=6q")
 """One row of `asked` or `out`."""
+_pack, _unpack, _ROW_BYTES = _ROW.pack_into, _ROW.iter_unpack, _ROW.size
 _MOST_ASKED: Final = 256
 Rows = list[tuple[int, ...]]
 
@@ -167,7 +168,7 @@ class Air:
             airtime = self._airtime[size] = airtime_ns(size + OVERHEAD_BYTES, radio, rate_mbps=radio.rate_mbps)
         counts = self._counts
         asked = counts[s.ASKED_N]
-        _ROW.pack_into(self._asked_bytes, asked * _ROW.size, slot, src, dst, airtime, start_ns, wants_status)
+        _pack(self._asked_bytes, asked * _ROW_BYTES, slot, src, dst, airtime, start_ns, wants_status)
         counts[s.ASKED_N] = asked + 1
         if start_ns + airtime < self.next_output_ns or asked + 1 == _MOST_ASKED:
             self._take_in()
@@ -188,7 +189,7 @@ class Air:
             bound_ns = self._entry.advance(until_ns)
             count = self._counts[s.OUT_N]
             if count:
-                rows += _ROW.iter_unpack(self._out_bytes[: count * _ROW.size])
+                rows += _unpack(self._out_bytes[: count * _ROW_BYTES])
             if bound_ns >= 0:
                 self.next_output_ns = bound_ns
                 return rows

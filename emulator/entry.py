@@ -7,7 +7,7 @@ is no table.
 
 from collections.abc import Callable
 from functools import partial
-from typing import Any, cast
+from typing import Any, Final, cast
 
 import numpy as np
 import numpy.typing as npt
@@ -16,6 +16,7 @@ from emulator.jit import COMPILED, jit_views
 from emulator.kernel import advance
 from emulator.state import Ints
 
+_ARRAYS: Final = 14
 Array = npt.NDArray[np.int64] | npt.NDArray[np.float64]
 
 
@@ -27,9 +28,10 @@ class Entry:
         self.advance: Callable[[int], int]
         """Until when, in; what `kernel.advance` returns, out."""
         if COMPILED:
+            assert len(arrays) == _ARRAYS, "as many as the kernel takes"
             assert all(a.flags.c_contiguous for a in arrays), "inside they are taken for whole rows"
-            table = np.array([(a.ctypes.data, a.shape[0], a.shape[-1]) for a in arrays], np.int64)
-            self.advance = partial(advance_at, table)
+            self._table = np.array([(a.ctypes.data, a.shape[0], a.shape[-1]) for a in arrays], np.int64)
+            self.advance = partial(advance_at, self._table.ctypes.data)
         else:
             self.advance = partial(cast("Callable[..., int]", advance), *arrays)
 
@@ -57,9 +59,10 @@ if COMPILED:
         return carray(pointer(table[i, 0], dtype), (table[i, 1], table[i, 2]))
 
     @jit_views
-    def advance_at(table: Ints, until: int) -> int:
-        """`kernel.advance`, its arrays from the table."""
+    def advance_at(address: int, until: int) -> int:
+        """`kernel.advance`, its arrays from the table at this address."""
         ints, reals = np.int64, np.float64
+        table = carray(pointer(address, ints), (_ARRAYS, 3))
         return advance(
             line(table, 0, ints), line(table, 1, ints), line(table, 2, reals), rows(table, 3, ints),
             rows(table, 4, reals), rows(table, 5, ints), rows(table, 6, ints), rows(table, 7, reals),

@@ -29,6 +29,7 @@ ANNOUNCED: Final = 1024
 """Requests of one node that may wait for their instant, beyond what its MAC queue holds."""
 _new: Final = tuple.__new__
 _RECEPTION, _FREE, _DELIVERED = s.OUT_RECEPTION, s.OUT_FREE, s.DELIVERED
+_NO_RECEPTION: Final = Reception(b"", NodeId(0), 0, 0.0)
 _SEQ_MASK: Final = 0xFFFF_FFFF
 _LONGEST_GAP: Final = 1 << 20
 """Requests; a longer one is no loss but nonsense."""
@@ -261,14 +262,15 @@ class Medium(Actor):
     def _hand_out(self, rows: Rows) -> None:
         if self._capture is not None:
             rows = self._record(rows, self._capture)
-        accounts = self._accounts
+        accounts, reception = self._accounts, _NO_RECEPTION
         append, requests, sources, rx_topics = self.outbox.append, self._requests, self._sources, self._rx_topics
         for kind, slot, station, t_ns, value, attempts in rows:
             request = requests[slot]
             assert request is not None, "the kernel speaks only of frames it was given"
             if kind == _RECEPTION:
-                # as Reception(...), which takes three times as long
-                append((rx_topics[station], _new(Reception, (request.frame, sources[slot], t_ns, value / 1000))))
+                if not attempts:  # as Reception(...), which takes three times as long
+                    reception = _new(Reception, (request.frame, sources[slot], t_ns, value / 1000))
+                append((rx_topics[station], reception))
             elif kind == _FREE:
                 if value == _DELIVERED:
                     accounts.delivered += 1

@@ -56,6 +56,7 @@ from emulator.state import (
     NSIG,
     ON_AIR,
     OPEN,
+    OUT_N,
     OUT_RECEPTION,
     OVERLAPPED,
     POWER,
@@ -215,6 +216,13 @@ def rx_end(
 
 
 @jit
+def repeats(g: Ints, out: Ints, f: int, t: int, millidbm: int) -> int:
+    """Whether the row before says the same of another station: then there is one message for both."""
+    n = g[OUT_N] - 1
+    return int(n >= 0 and out[n, 0] == OUT_RECEPTION and out[n, 1] == f and out[n, 3] == t and out[n, 4] == millidbm)
+
+
+@jit
 def data_end(
     g: Ints, p: Ints, st: Ints, fr: Ints, lk: Ints, lp: Reals, hs: Ints, out: Ints, link: int, whole: bool, t: int
 ) -> None:
@@ -238,7 +246,7 @@ def data_end(
     if fr[DST, f] == EVERYONE or fr[RECEIVED, f] == 0:
         fr[RECEIVED, f] += 1
         st[HANDED, r] += 1
-        put(g, out, OUT_RECEPTION, f, r, t, millidbm, 0)
+        put(g, out, OUT_RECEPTION, f, r, t, millidbm, repeats(g, out, f, t, millidbm))
     if fr[DST, f] == r:
         st[ACK_TO, r] = lk[LINK_SRC, link]
         push(hs, g, HS_N, t + p[SIFS_NS], SEND_ACK, r, f)

@@ -129,8 +129,9 @@ ASKED_COLUMNS: Final = 6
 
 # --- outputs (out): kind, frame, station, t_ns, rssi in 1/1000 dBm, attempts ------------------------------------------
 OUT_RECEPTION, OUT_DONE, OUT_FREE, OUT_START, OUT_COLUMNS = 0, 1, 2, 3, 6
-"""A copy was decoded; the MAC is done with a frame that wants a status (value: outcome); nothing refers to the slot
-any more (value: verdict); with CAPTURE, a station starts to transmit (value: DATA or ACK)."""
+"""A copy was decoded (attempts: 1 if the row before differs only in the station); the MAC is done with a frame that
+wants a status (value: outcome); nothing refers to the slot any more (value: verdict); with CAPTURE, a station starts to
+transmit (value: DATA or ACK)."""
 
 DONE_SENT, DONE_ACKED, DONE_RETRY, DONE_FULL, DONE_EXPIRED = range(5)
 """Outcomes; the values of `messages.TxOutcome`."""

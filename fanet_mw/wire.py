@@ -111,7 +111,6 @@ _ANY_NODE: Final = 0xFFFF
 # Whole headers, MAVLink's ten bytes included: one call of struct is most of what a header costs.
 _PACKED: Final = struct.Struct("<BBBBBBBHB" + ROUTE.layout.format[1:])
 _CHECKED: Final = struct.Struct("<3s4x3s" + ROUTE.layout.format[1:] + "H")
-_PEEK: Final = struct.Struct("<3s4x3s8xIH8xB3x")
 _BODY_END: Final = HEADER_BYTES - 2
 _SYSTEM_AT: Final = 5
 _PREV_HOP_AT: Final = 26
@@ -149,15 +148,25 @@ _new: Final = tuple.__new__
 """Makes a named tuple three times as fast as its class does; for what is made once per frame."""
 
 
-def peek(frame: bytes) -> tuple[int, int, int] | None:
-    """(origin, seq, flags) at their fixed offsets, unchecked; None when these bytes cannot begin with our header.
+Fields = tuple[bytes, bytes, int, int, int, int, int, int, int, int, int, int, int, int]
+"""What lies at the fixed offsets of a header, unchecked: two marks, the header, version, CRC."""
 
-    Enough to recognize a duplicate; whoever goes on must `decode_header`.
+
+def fields_of(frame: bytes) -> Fields | None:
+    """What lies where a header has its fields; None when these bytes cannot begin with our header.
+
+    Origin, sequence number and flags are enough to recognize a duplicate; whoever goes on needs `checked`.
     """
     if len(frame) < HEADER_BYTES:
         return None
-    mark, message, seq, origin, flags = _PEEK.unpack_from(frame)
-    return (origin, seq, flags) if mark == _ROUTE_MARK and message == _ROUTE_ID else None
+    fields: Fields = _CHECKED.unpack_from(frame)
+    return fields if fields[0] == _ROUTE_MARK and fields[1] == _ROUTE_ID else None
+
+
+def peek(frame: bytes) -> tuple[int, int, int] | None:
+    """(origin, seq, flags), unchecked; None when these bytes cannot begin with our header."""
+    fields = fields_of(frame)
+    return None if fields is None else (fields[4], fields[3], fields[11])
 
 
 def peek_kind(frame: bytes) -> int | None:
@@ -168,12 +177,16 @@ def peek_kind(frame: bytes) -> int | None:
 
 def decode_header(frame: bytes) -> Header:
     """The routing header of a frame; raises MalformedFrameError."""
-    if len(frame) < HEADER_BYTES:
+    fields = fields_of(frame)
+    if fields is None:
         raise MalformedFrameError("no routing header")
-    (mark, message, origin_us, seq, origin, destination, prev_hop, kind, hop_limit, hops, priority, flags,
-     version, crc) = _CHECKED.unpack_from(frame)  # fmt: skip
-    if mark != _ROUTE_MARK or message != _ROUTE_ID:
-        raise MalformedFrameError("no routing header")
+    return checked(frame, fields)
+
+
+def checked(frame: bytes, fields: Fields) -> Header:
+    """The routing header of a frame with these fields; raises MalformedFrameError."""
+    (_, _, origin_us, seq, origin, destination, prev_hop, kind, hop_limit, hops, priority, flags,
+     version, crc) = fields  # fmt: skip
     if mcrf4xx(frame[1:_BODY_END] + _EXTRA) != crc:
         raise MalformedFrameError("CRC of the routing header")
     header = _new(

@@ -45,15 +45,16 @@ class Reader:
         """What `glance` says of the packet in the frame; (0, BUNDLE) when it has several."""
         self.packet: Packet | None = None
         """The packet in the frame, once somebody has asked for it."""
+        self._fields: wire.Fields | None = None
 
     def look(self, frame: bytes) -> None:
         """Take up another frame."""
         self.frame, self.packet = frame, None
-        peeked = wire.peek(frame)
-        if peeked is None:
+        fields = self._fields = wire.fields_of(frame)
+        if fields is None:
             self.key = self.phase = 0
             return
-        origin, seq, flags = peeked
+        _, _, _, seq, origin, _, _, _, _, _, _, flags, _, _ = fields
         if flags & wire.FLAG_MORE:
             self.key, self.phase = 0, BUNDLE
         else:
@@ -61,8 +62,10 @@ class Reader:
 
     def read(self) -> Packet:
         """The packet in the frame; raises MalformedFrameError, each time."""
-        self.packet = read(self.frame, self.phase)
-        return self.packet
+        if self._fields is None or not self.phase:
+            raise MalformedFrameError("no routing header, or one of two phases")
+        packet = self.packet = _new(Packet, (wire.checked(self.frame, self._fields), self.frame))
+        return packet
 
 
 shared: Final = Reader()

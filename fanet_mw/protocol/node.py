@@ -64,7 +64,9 @@ class Node:
         self._protocol = make_protocol(self)
         self.next_wake_ns = self._protocol.next_wake_ns
         """The protocol's own method: every wake-up is followed by this question."""
-        self._overheard = self._protocol.overheard
+        protocol = self._protocol
+        self._overheard = None if type(protocol).overheard is RoutingProtocol.overheard else protocol.overheard
+        """None: this protocol does not care for copies, and most receptions are copies."""
 
     # --- from the host's side -------------------------------------------------------------------------------------
 
@@ -117,7 +119,8 @@ class Node:
         known = handled.young.get(key) or handled.bits(key)
         if known & phase:
             self._duplicates += 1
-            self._overheard(key, now_ns=now_ns)
+            if self._overheard is not None:
+                self._overheard(key, now_ns=now_ns)
             return True
         if phase == arrival.BUNDLE:
             self._hear_bundle(reception, now_ns)
@@ -141,7 +144,7 @@ class Node:
             known = self._seen.bits(key)
             if known & phase:
                 self._duplicates += 1
-                self._overheard(key, now_ns=now_ns)
+                self._protocol.overheard(key, now_ns=now_ns)
                 continue
             try:
                 packet = arrival.read(frame, phase)

@@ -3,7 +3,7 @@
 Each departure is a protocol with one rule changed to what ns-3's source does; `all` changes all of them. None of them
 is part of the product, and all may look inside it. The table is that of `scripts/rivals.py`.
 
-    PYTHONPATH=. python scripts/departures.py --seeds 1 2 3 4 5 6 7 8 9 10 --set routing.address_resolution=ns3
+    PYTHONPATH=. python scripts/departures.py --protocols aodv --speeds 0 --seeds 1 2 3 4
 """
 
 import argparse
@@ -24,7 +24,7 @@ from fanet_mw.routing.olsr import Olsr
 from fanet_mw.routing.olsr import parameters as olsr
 from fanet_mw.routing.serial import later
 from fanet_mw.units import BROADCAST, MS, NodeId
-from scripts.rivals import HEAD, row
+from scripts.rivals import COLUMNS, row
 
 
 class Hellos(Aodv):
@@ -181,7 +181,7 @@ def main(arguments: Sequence[str]) -> int:
     parser.add_argument("--seeds", nargs="+", type=int, default=[1, 2, 3])
     parser.add_argument("--set", nargs="*", default=[], metavar="KEY=VALUE", help="further scenario keys")
     chosen = parser.parse_args(arguments)
-    sys.stdout.write(f"| departure {HEAD}")
+    sys.stdout.write(f"| departure | {' | '.join(COLUMNS)} |\n|{'---|' * (len(COLUMNS) + 1)}\n")
     for protocol in chosen.protocols:
         for name, changed in DEPARTURES[protocol].items():
             if chosen.only and name not in chosen.only:

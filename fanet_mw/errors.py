@@ -73,6 +73,8 @@ class DropReason(StrEnum):
     EXPIRED = "expired"
     """Waited in the node beyond the packet's lifetime."""
     NO_ROUTE = "no_route"
+    UNRESOLVED = "unresolved"
+    """The address of its next hop was asked for in vain (`routing.address_resolution`)."""
     NOT_FOR_US = "not_for_us"
     TOO_LARGE = "too_large"
     """Longer than the radio's maximum frame."""

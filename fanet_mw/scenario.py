@@ -66,6 +66,9 @@ class Routing(Section):
     protocol: Literal["direct", "flooding", "clustered", "aodv", "olsr", "dsdv", "gossip", "counter", "geographic"] = (
         "clustered"
     )
+    address_resolution: Literal["none", "rfc826", "ns3"] = "none"
+    """`aodv`, `olsr`, `dsdv`, `geographic`: a node asks for a neighbor's address before its first unicast to it, as IP
+    does, by the rules of RFC 826 or by ns-3's. `none`: a node id is an address, and nobody needs to ask."""
     jitter_ms: NonNegative = 10.0
     """A relay waits U(0, jitter) after a reception."""
     hop_limit: Annotated[int, Field(ge=1, le=255)] = 32
@@ -316,11 +319,7 @@ def _disagreements(scenario: Scenario) -> Sequence[str]:
         found.append('clock.sync = "beacons" needs hellos: routing.hello_interval_s > 0')
     found += _unkept_deadline(scenario)
     found += _impossible_faults(scenario)
-    if scenario.routing.protocol in _RIVALS and scenario.radio.max_frame_bytes < _RIVAL_FRAME_BYTES:
-        found.append(
-            f"radio.max_frame_bytes = {scenario.radio.max_frame_bytes} must be >= {_RIVAL_FRAME_BYTES} for "
-            f"routing.protocol = {scenario.routing.protocol}"
-        )
+    found += _wrong_for_rivals(scenario)
     if scenario.routing.protocol == "clustered":
         clusters = scenario.clusters
         if clusters.count >= max(2, count):
@@ -330,6 +329,22 @@ def _disagreements(scenario: Scenario) -> Sequence[str]:
                 f"clusters.guard_ms = {clusters.guard_ms:g} must be < the slot, flooding_period_s / count = "
                 f"{clusters.slot_ns / MS:g} ms"
             )
+    return found
+
+
+def _wrong_for_rivals(scenario: Scenario) -> Sequence[str]:
+    """What a protocol that goes hop by hop needs, and what needs such a protocol."""
+    found = []
+    if scenario.routing.protocol in _RIVALS and scenario.radio.max_frame_bytes < _RIVAL_FRAME_BYTES:
+        found.append(
+            f"radio.max_frame_bytes = {scenario.radio.max_frame_bytes} must be >= {_RIVAL_FRAME_BYTES} for "
+            f"routing.protocol = {scenario.routing.protocol}"
+        )
+    if scenario.routing.address_resolution != "none" and scenario.routing.protocol not in _RIVALS:
+        found.append(
+            f"routing.address_resolution = {scenario.routing.address_resolution} needs routing.protocol to be one of "
+            f"{', '.join(_RIVALS)}, not {scenario.routing.protocol}"
+        )
     return found
 
 

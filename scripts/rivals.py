@@ -15,6 +15,7 @@ from typing import Any
 import numpy as np
 
 from fanet_mw.scenario import Scenario
+from fanet_mw.trace import Delivered
 from fanet_mw.units import S
 from sim import catalog
 from sim.engine import Rows
@@ -45,14 +46,20 @@ def connectivity(scenario: Scenario) -> float:
     return sum(found) / (len(found) * (scenario.nodes.count - 1))
 
 
+COLUMNS = ("protocol", "m/s", "PDR (sd)", "conn", "hops", "delay ms mean / p50 / p95", "sent", "wall s", "closes")
+"""`hops`: of delivered packets; `sent`: frames per packet generated; `wall`: of a run; `closes`: every frame's end."""
+
+
 def row(protocol: str, speed: float, seeds: Sequence[int], keys: Sequence[str]) -> str:
     """One line of the table, over the seeds."""
     summaries: list[dict[str, Any]] = []
     bounds = []
+    hops: list[float] = []
     for seed in seeds:
         changed = [f"routing.protocol={protocol}", f"mobility.speed_m_s={speed:g}", f"seed={seed}", *keys]
         scenario = catalog.find("rivals", changed)
         outcome = simulate(scenario)
+        hops += [record.hops for record in outcome.records if type(record) is Delivered]
         summaries.append(finish(outcome, out=None))
         bounds.append(connectivity(scenario))
     pdr = [float(summary["pdr"]) for summary in summaries]
@@ -63,8 +70,8 @@ def row(protocol: str, speed: float, seeds: Sequence[int], keys: Sequence[str]) 
     closes = all(s["frames"]["closes"] for s in summaries)
     return (
         f"| {protocol} | {speed:g} | {statistics.mean(pdr):.3f} ({spread:.3f}) | {statistics.mean(bounds):.3f} "
-        f"| {delay['mean']:.1f} / {delay['p50']:.1f} / {delay['p95']:.1f} | {sent:.1f} | {wall:.1f} "
-        f"| {'yes' if closes else 'NO'} |"
+        f"| {statistics.mean(hops or [0.0]):.2f} | {delay['mean']:.1f} / {delay['p50']:.1f} / {delay['p95']:.1f} "
+        f"| {sent:.1f} | {wall:.1f} | {'yes' if closes else 'NO'} |"
     )
 
 
@@ -75,8 +82,7 @@ def main(arguments: Sequence[str]) -> int:
     parser.add_argument("--seeds", nargs="+", type=int, default=[1, 2, 3])
     parser.add_argument("--set", nargs="*", default=[], metavar="KEY=VALUE", help="further scenario keys")
     chosen = parser.parse_args(arguments)
-    head = ("protocol", "m/s", "PDR (sd)", "conn", "delay ms mean / p50 / p95", "frames per packet", "wall s", "closes")
-    sys.stdout.write(f"| {' | '.join(head)} |\n|{'---|' * len(head)}\n")
+    sys.stdout.write(f"| {' | '.join(COLUMNS)} |\n|{'---|' * len(COLUMNS)}\n")
     for protocol in chosen.protocols:
         for speed in chosen.speeds:
             sys.stdout.write(row(protocol, speed, chosen.seeds, chosen.set) + "\n")

@@ -28,6 +28,8 @@ class Family(IntEnum):
     OLSR = 2
     DSDV = 3
     GEOGRAPHIC = 4
+    ADDRESS = 5
+    """Not a protocol of its own: address resolution, beside any of them (`fanet_mw.routing.resolution`)."""
 
 
 def type_of(family: Family, number: int) -> int:

@@ -4,9 +4,11 @@
     receive   -> control? its protocol : for us? done : broadcast? relay once : hop limit? drop : routes
     status    -> acknowledged? done : the protocol is told that the link failed, and names the drop
 
-Duplicates never come here: the node suppresses them, so no packet passes the same node twice.
+Duplicates never come here: the node suppresses them, so no packet passes the same node twice. With
+`routing.address_resolution` every unicast, control too, first waits for its next hop's address (`resolution`).
 """
 
+import struct
 from abc import abstractmethod
 from typing import ClassVar, Final
 
@@ -15,7 +17,8 @@ from fanet_mw.messages import Reception, TxOutcome, TxStatus
 from fanet_mw.protocol.contract import Port, RoutingProtocol
 from fanet_mw.protocol.txqueue import Packet
 from fanet_mw.routing import control
-from fanet_mw.routing.control import Family, type_of
+from fanet_mw.routing.control import Family, Reader, check_node, type_of
+from fanet_mw.routing.resolution import Knowledge, Outgoing, Resolver
 from fanet_mw.units import BROADCAST, NodeId
 from fanet_mw.wire import Kind
 
@@ -26,6 +29,11 @@ REASON_OF: Final = {
     TxOutcome.LATE: DropReason.LATE,
 }
 """Why a unicast that the MAC did not get through is gone."""
+
+ADDRESS_REQUEST: Final = 1
+ADDRESS_REPLY: Final = 2
+_TARGET: Final = struct.Struct("<H")
+"""RFC 826's target protocol address; the header's origin is the sender's, the MAC's addresses are the hardware's."""
 
 
 class Routed(RoutingProtocol):
@@ -42,6 +50,12 @@ class Routed(RoutingProtocol):
         """Data packets handed to the MAC and not yet acknowledged, by request number."""
         self._controls: dict[int, NodeId] = {}
         """Unicast control messages, likewise: to whom."""
+        rules = port.scenario.routing.address_resolution
+        self._addresses = (
+            Resolver(as_ns3=rules == "ns3", draw=port.stream("address").random, ask=self._ask_address)
+            if rules != "none"
+            else None
+        )
         self.control_sent = 0
 
     # --- what a protocol says -------------------------------------------------------------------------------------
@@ -85,6 +99,9 @@ class Routed(RoutingProtocol):
         header = packet.header
         if header.kind == Kind.ROUTING:
             kind, body = control.decode(packet.frame)
+            if kind >> 4 == Family.ADDRESS and self._addresses is not None:
+                self._address(self._addresses, kind & 0xF, body, packet, reception, now_ns=now_ns)
+                return
             if kind >> 4 != self.family:
                 raise MalformedFrameError(f"control of type {kind:#x} is not for {self.family.name}")
             self._heard(kind & 0xF, body, packet, reception, now_ns=now_ns)
@@ -110,21 +127,72 @@ class Routed(RoutingProtocol):
         elif hop is not None:
             self._control_failed(hop, status.outcome, now_ns=now_ns)
 
+    def next_wake_ns(self) -> int | None:
+        return None if self._addresses is None else self._addresses.next_ns()
+
+    def wake(self, now_ns: int) -> None:
+        if self._addresses is not None:
+            for out in self._addresses.expire(now_ns=now_ns):
+                self._unresolved(out, now_ns=now_ns)
+
     def waiting(self) -> int:
-        return len(self._unicasts)
+        return len(self._unicasts) + (0 if self._addresses is None else self._addresses.waiting())
 
     # --- what a protocol does -------------------------------------------------------------------------------------
 
     def _acknowledged(self, packet: Packet, next_hop: NodeId) -> None:
         """The next hop has the data packet."""
 
-    def _send(self, packet: Packet, next_hop: NodeId, *, start_ns: int) -> None:
+    def _send(self, packet: Packet, next_hop: NodeId, *, start_ns: int, now_ns: int) -> None:
         """Hand a data packet to the MAC for its next hop."""
         header = packet.header
         fresh = header.hops == 0 and header.origin == self._port.node
         frame = packet.frame if fresh else self._port.forwarded(packet, flags=0)
-        seq = self._port.transmit(frame, next_hop, start_ns=start_ns, wants_status=True)
-        self._unicasts[seq] = packet, next_hop
+        self._hand_over(Outgoing(packet, frame, next_hop, is_data=True), start_ns=start_ns, now_ns=now_ns)
+
+    def _hand_over(self, out: Outgoing, *, start_ns: int, now_ns: int) -> None:
+        """A unicast frame goes to the MAC, as soon as the address of its next hop is known."""
+        knowledge = Knowledge.KNOWN
+        if self._addresses is not None:
+            knowledge = self._addresses.knowledge(out.next_hop, now_ns=now_ns) or Knowledge.WAITING
+        if knowledge is Knowledge.KNOWN:
+            seq = self._port.transmit(out.frame, out.next_hop, start_ns=start_ns, wants_status=True)
+            if out.is_data:
+                self._unicasts[seq] = out.packet, out.next_hop
+            else:
+                self._controls[seq] = out.next_hop
+            return
+        assert self._addresses is not None, "only a node that resolves addresses lacks one"
+        if knowledge is Knowledge.DEAD:
+            self._unresolved(out, now_ns=now_ns)
+        elif (refused := self._addresses.hold(out, start_ns=start_ns, now_ns=now_ns)) is not None:
+            self._unresolved(refused, now_ns=now_ns)
+
+    def _unresolved(self, out: Outgoing, *, now_ns: int) -> None:
+        """A frame whose next hop has no known address is gone; the protocol is not told (in ns-3 neither)."""
+        self._port.drop(DropReason.UNRESOLVED, out.packet, now_ns=now_ns)
+
+    def _ask_address(self, neighbor: NodeId, start_ns: int, now_ns: int) -> None:
+        packet = self._control(type_of(Family.ADDRESS, ADDRESS_REQUEST), _TARGET.pack(neighbor), now_ns=now_ns)
+        self._port.transmit(packet.frame, BROADCAST, start_ns=start_ns)
+
+    def _address(
+        self, addresses: Resolver, number: int, body: bytes, packet: Packet, reception: Reception, *, now_ns: int
+    ) -> None:
+        """RFC 826, packet reception: learn, release what waited, then answer; straight back, without asking."""
+        reader = Reader(body)
+        target, sender = check_node(reader.take(_TARGET)[0]), reception.src
+        reader.finish()
+        if number not in (ADDRESS_REQUEST, ADDRESS_REPLY) or packet.origin != sender:
+            raise MalformedFrameError(f"address message {number} of {packet.origin} from {sender}")
+        ours = target == self._port.node
+        asks_us, answers_us = ours and number == ADDRESS_REQUEST, ours and number == ADDRESS_REPLY
+        for out in addresses.heard(sender, asks_us=asks_us, answers_us=answers_us, now_ns=now_ns):
+            self._hand_over(out, start_ns=now_ns + self._lead_ns, now_ns=now_ns)
+        if asks_us:
+            kind = type_of(Family.ADDRESS, ADDRESS_REPLY)
+            reply = self._control(kind, _TARGET.pack(sender), now_ns=now_ns, to=sender)
+            self._port.transmit(reply.frame, sender, start_ns=now_ns + self._lead_ns)
 
     def _flood(self, packet: Packet, reception: Reception, *, now_ns: int) -> None:
         if not self._relays(packet, reception, now_ns=now_ns):
@@ -139,18 +207,24 @@ class Routed(RoutingProtocol):
         self, number: int, body: bytes, *, start_ns: int, now_ns: int, to: NodeId = BROADCAST, ttl: int = 1
     ) -> None:
         """Announce a control message of our own, to one neighbor (acknowledged) or to all."""
-        packet = self._port.announce(
+        packet = self._control(type_of(self.family, number), body, now_ns=now_ns, to=to, ttl=ttl)
+        if to == BROADCAST:
+            self._port.transmit(packet.frame, to, start_ns=start_ns)
+        else:
+            out = Outgoing(packet, packet.frame, to, is_data=False)
+            self._hand_over(out, start_ns=start_ns, now_ns=now_ns)
+
+    def _control(self, kind: int, body: bytes, *, now_ns: int, to: NodeId = BROADCAST, ttl: int = 1) -> Packet:
+        """Make a control packet of our own."""
+        self.control_sent += 1
+        return self._port.announce(
             Kind.ROUTING,
-            control.encode(type_of(self.family, number), body, node=self._port.node),
+            control.encode(kind, body, node=self._port.node),
             now_ns=now_ns,
             flags=0,
             hop_limit=ttl,
             destination=to,
         )
-        self.control_sent += 1
-        seq = self._port.transmit(packet.frame, to, start_ns=start_ns, wants_status=to != BROADCAST)
-        if to != BROADCAST:
-            self._controls[seq] = to
 
     def _jittered(self, now_ns: int, most_ns: int) -> int:
         """The earliest instant to transmit, and a random time more."""

@@ -75,7 +75,7 @@ class Aodv(Routed):
         route = self._table.active(destination, now_ns=now_ns)
         if route is not None:
             self._use(route, now_ns=now_ns)
-            self._send(packet, route.next_hop, start_ns=start_ns)
+            self._send(packet, route.next_hop, start_ns=start_ns, now_ns=now_ns)
             return
         evicted = self._room.push(packet, now_ns=now_ns)
         if evicted is not None:
@@ -92,7 +92,7 @@ class Aodv(Routed):
             return
         self._use(route, now_ns=now_ns)
         self._keep(packet.origin, reception.src, now_ns=now_ns)
-        self._send(packet, route.next_hop, start_ns=start_ns)
+        self._send(packet, route.next_hop, start_ns=start_ns, now_ns=now_ns)
 
     def _arrived(self, packet: Packet, reception: Reception, *, now_ns: int) -> None:
         self._hellos.heard(reception.src, now_ns=now_ns)
@@ -166,7 +166,7 @@ class Aodv(Routed):
             self._discovery.end(destination)
             for packet in self._room.take(destination):
                 self._use(route, now_ns=now_ns)
-                self._send(packet, route.next_hop, start_ns=now_ns + self._lead_ns)
+                self._send(packet, route.next_hop, start_ns=now_ns + self._lead_ns, now_ns=now_ns)
 
     # --- control --------------------------------------------------------------------------------------------------
 
@@ -361,10 +361,17 @@ class Aodv(Routed):
     # --- time -----------------------------------------------------------------------------------------------------
 
     def next_wake_ns(self) -> int | None:
-        wanted = (self._hello_ns, self._discovery.next_ns(), self._hellos.next_ns(), self._room.next_end_ns())
+        wanted = (
+            self._hello_ns,
+            self._discovery.next_ns(),
+            self._hellos.next_ns(),
+            self._room.next_end_ns(),
+            super().next_wake_ns(),
+        )
         return min((t_ns for t_ns in wanted if t_ns is not None), default=None)
 
     def wake(self, now_ns: int) -> None:
+        super().wake(now_ns)
         for packet in self._room.expire(now_ns=now_ns):
             self._port.drop(DropReason.EXPIRED, packet, now_ns=now_ns)
         for neighbor in self._hellos.lost(now_ns):

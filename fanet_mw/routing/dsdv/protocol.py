@@ -50,7 +50,7 @@ class Dsdv(Routed):
     def _outgoing(self, packet: Packet, *, start_ns: int, now_ns: int) -> None:
         next_hop = self._table.next_hop(NodeId(packet.header.destination))
         if next_hop is not None:
-            self._send(packet, next_hop, start_ns=start_ns)
+            self._send(packet, next_hop, start_ns=start_ns, now_ns=now_ns)
             return
         evicted = self._room.push(packet, now_ns=now_ns)
         if evicted is not None:
@@ -61,7 +61,7 @@ class Dsdv(Routed):
         if next_hop is None:
             self._port.drop(DropReason.NO_ROUTE, packet, now_ns=now_ns)
         else:
-            self._send(packet, next_hop, start_ns=start_ns)
+            self._send(packet, next_hop, start_ns=start_ns, now_ns=now_ns)
 
     def _failed(self, packet: Packet, next_hop: NodeId, outcome: TxOutcome, *, now_ns: int) -> None:
         super()._failed(packet, next_hop, outcome, now_ns=now_ns)
@@ -83,7 +83,7 @@ class Dsdv(Routed):
             next_hop = self._table.next_hop(destination)
             if next_hop is not None:
                 for packet in self._room.take(destination):
-                    self._send(packet, next_hop, start_ns=now_ns + self._lead_ns)
+                    self._send(packet, next_hop, start_ns=now_ns + self._lead_ns, now_ns=now_ns)
 
     def _plan(self, now_ns: int) -> None:
         """News is due: choose when to tell it, unless an update is planned that takes it along."""
@@ -99,10 +99,11 @@ class Dsdv(Routed):
     # --- time -------------------------------------------------------------------------------------------------------
 
     def next_wake_ns(self) -> int | None:
-        wanted = (self._full_ns, self._news_ns, self._room.next_end_ns())
+        wanted = (self._full_ns, self._news_ns, self._room.next_end_ns(), super().next_wake_ns())
         return min((t_ns for t_ns in wanted if t_ns is not None), default=None)
 
     def wake(self, now_ns: int) -> None:
+        super().wake(now_ns)
         for packet in self._room.expire(now_ns=now_ns):
             self._port.drop(DropReason.EXPIRED, packet, now_ns=now_ns)
         if self._full_ns is not None and now_ns >= self._full_ns:

@@ -22,6 +22,7 @@ from fanet_mw.protocol.txqueue import Packet
 from fanet_mw.routing.control import Family
 from fanet_mw.routing.geographic.messages import BEACON, LOCATION, QUERY, Beacon, Fix, Location, Query
 from fanet_mw.routing.geographic.places import HELLO_INTERVAL_NS, Places
+from fanet_mw.routing.resolution import Outgoing
 from fanet_mw.routing.routed import Routed
 from fanet_mw.routing.waiting import WaitingRoom
 from fanet_mw.units import BROADCAST, MS, US, NodeId, S, seconds_to_ns
@@ -71,7 +72,7 @@ class Geographic(Routed):
         if next_hop is None:
             self._carry(packet, now_ns=now_ns)
         else:
-            self._send(packet, next_hop, start_ns=start_ns)
+            self._send(packet, next_hop, start_ns=start_ns, now_ns=now_ns)
 
     def _carry(self, packet: Packet, *, now_ns: int) -> None:
         evicted = self._room.push(packet, now_ns=now_ns)
@@ -98,6 +99,14 @@ class Geographic(Routed):
         if outcome is TxOutcome.RETRY_LIMIT:
             self._places.forget(next_hop)
         self._carry(packet, now_ns=now_ns)
+
+    def _unresolved(self, out: Outgoing, *, now_ns: int) -> None:
+        """Custody stays here: nobody of that address has answered."""
+        if out.is_data:
+            self._places.forget(out.next_hop)
+            self._carry(out.packet, now_ns=now_ns)
+        else:
+            super()._unresolved(out, now_ns=now_ns)
 
     def _acknowledged(self, packet: Packet, next_hop: NodeId) -> None:
         self._port.forget(packet)
@@ -149,9 +158,11 @@ class Geographic(Routed):
     # --- time -------------------------------------------------------------------------------------------------------
 
     def next_wake_ns(self) -> int | None:
-        return min((t_ns for t_ns in (self._beacon_ns, self._look_ns) if t_ns is not None), default=None)
+        wanted = (self._beacon_ns, self._look_ns, super().next_wake_ns())
+        return min((t_ns for t_ns in wanted if t_ns is not None), default=None)
 
     def wake(self, now_ns: int) -> None:
+        super().wake(now_ns)
         if self._beacon_ns is not None and now_ns >= self._beacon_ns:
             beacon = Beacon(self._port.position, self._places.worth_telling())
             self._say(BEACON, beacon.encode(), start_ns=self._jittered(now_ns, self._jitter_ns), now_ns=now_ns)

@@ -75,7 +75,7 @@ class Olsr(Routed):
         if route is None:
             self._port.drop(DropReason.NO_ROUTE, packet, now_ns=now_ns)
         else:
-            self._send(packet, route.next_hop, start_ns=start_ns)
+            self._send(packet, route.next_hop, start_ns=start_ns, now_ns=now_ns)
 
     def _transit(self, packet: Packet, reception: Reception, *, start_ns: int, now_ns: int) -> None:
         self._outgoing(packet, start_ns=start_ns, now_ns=now_ns)
@@ -164,9 +164,11 @@ class Olsr(Routed):
     def next_wake_ns(self) -> int | None:
         if self._hello_ns is None or self._tc_ns is None:
             return None
-        return min(self._hello_ns, self._tc_ns)
+        ours_ns, addresses_ns = min(self._hello_ns, self._tc_ns), super().next_wake_ns()
+        return ours_ns if addresses_ns is None else min(ours_ns, addresses_ns)
 
     def wake(self, now_ns: int) -> None:
+        super().wake(now_ns)
         if self._hello_ns is not None and now_ns >= self._hello_ns:
             self._state.tidy(now_ns)
             self._say_hello(now_ns)

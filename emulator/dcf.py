@@ -304,7 +304,8 @@ def request(g: Ints, p: Ints, st: Ints, hs: Ints, s: int, t: int) -> None:
     if st[TX_KIND, s] == DATA or st[WAITING, s] >= 0:
         return  # the post-backoff of our own frame is still to be drawn
     if st[CS, s] > 0 or st[TX_KIND, s] == ACK or st[ACK_TO, s] >= 0 or st[NAV, s] > t:
-        if st[BO, s] == 0:
+        before_ack = st[CS, s] == 0 and st[TX_KIND, s] != ACK and st[NAV, s] <= t  # to ns-3 the medium is idle
+        if st[BO, s] == 0 and not (before_ack and p[WAIT_DIFS_FIRST] == 1):
             draw(st, s)
         st[FRESH, s] = 0
         if st[CS, s] == 0:

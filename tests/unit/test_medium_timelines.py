@@ -51,6 +51,17 @@ def test_unicast_is_acknowledged_after_sifs(make_scenario: MakeScenario) -> None
     assert statuses(heard) == [(1, TxOutcome.ACKED, there_ns + SIFS_NS + ACK_NS + 500, 1)]
 
 
+@pytest.mark.parametrize("seed", [1, 2, 3])
+def test_a_relay_that_owes_an_ack_draws_no_backoff_as_ns3_has_it(make_scenario: MakeScenario, seed: int) -> None:
+    air = Air(make_scenario(**{"nodes.count": 2, "radio.access": "ns3", "seed": seed}), [0, 150])
+    air.send(1, 1 * MS, dst=2)
+    there_ns = 1 * MS + DIFS_NS + FRAME_NS + 500
+    air.run(until_ns=there_ns)
+    air.send(2, there_ns, now_ns=there_ns)
+    back_ns = there_ns + SIFS_NS + ACK_NS + DIFS_NS + FRAME_NS + 500
+    assert receptions(air.run()) == [(1, 2, back_ns)]
+
+
 def test_unicast_to_a_station_out_of_range_is_given_up_after_seven_attempts(make_scenario: MakeScenario) -> None:
     air = Air(make_scenario(**{"nodes.count": 2}), [0, 400])
     air.send(1, 1 * MS, dst=2)

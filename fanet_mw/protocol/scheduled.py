@@ -71,11 +71,16 @@ class Scheduled(Clustered):
         self._interval_ns = seconds_to_ns(scenario.traffic.interval_s)
         self._admission = (
             None
-            if scenario.traffic.deadline_s is None or (self._leader is not None and not leader_load(scenario))
+            if scenario.traffic.deadline_s is None or (port.node == scenario.leader and not leader_load(scenario))
             else Admission(
                 port.node, deadline_ns=seconds_to_ns(scenario.traffic.deadline_s), interval_ns=self._interval_ns
             )
         )
+
+    def start(self, now_ns: int) -> None:
+        super().start(now_ns)
+        if self._admission is not None:
+            self._admission.start(now_ns)
 
     # --- the timetable --------------------------------------------------------------------------------------------
 
@@ -251,10 +256,16 @@ class Scheduled(Clustered):
 
     def next_wake_ns(self) -> int | None:
         own_ns, roots_ns = super().next_wake_ns(), self._roots.next_wake_ns()
+        if self._admission is not None:
+            said_ns = self._admission.next_wake_ns()
+            own_ns = said_ns if own_ns is None or (said_ns is not None and said_ns < own_ns) else own_ns
         return roots_ns if own_ns is None or (roots_ns is not None and roots_ns < own_ns) else own_ns
 
     def wake(self, now_ns: int) -> None:
         super().wake(now_ns)
+        lost = self._admission.wake(now_ns) if self._admission else None
+        if lost is not None:
+            self._port.record(lost)
         for packet in self._roots.expire(before_us=(now_ns - self._lifetime_ns) // US):
             self._port.drop(DropReason.EXPIRED, packet, now_ns=now_ns)
         for packet, start_ns in self._roots.due(now_ns=now_ns):

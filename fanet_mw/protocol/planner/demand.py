@@ -9,7 +9,7 @@ from collections.abc import Sequence
 from typing import Final, NamedTuple
 
 from fanet_mw import wire
-from fanet_mw.protocol.delay import Refused
+from fanet_mw.protocol.delay import Bounded, Outcome, Refused
 from fanet_mw.scenario import Scenario
 from fanet_mw.units import NodeId, seconds_to_ns
 
@@ -30,6 +30,20 @@ class TrafficClass(NamedTuple):
     @property
     def per_second(self) -> float:
         return len(self.sources) * 1e9 / self.interval_ns
+
+
+class ClassPlan(NamedTuple):
+    """A traffic class: its bound from the source to the last node, and from the head on."""
+
+    name: str
+    sources: int
+    interval_ns: int
+    bound: Outcome
+    from_head: Outcome
+    priority: int = wire.PRIORITY_BULK
+
+    def meets(self, deadline_ns: int) -> bool:
+        return isinstance(self.bound, Bounded) and self.bound.delay_ns <= deadline_ns
 
 
 def demands(scenario: Scenario, sources: Sequence[NodeId] | None = None) -> list[TrafficClass] | Refused:

@@ -29,6 +29,8 @@ from fanet_mw.wire import CAPACITY, FLAG_FLOOD, HEADER_BYTES, OVERHEAD, PLACES, 
 
 _SCHEDULE_BYTES: Final = SCHEDULE.layout.size + OVERHEAD
 _PLACES_BYTES: Final = PLACES.layout.size + OVERHEAD
+_JITTER: Final = 0.25
+"""Of the contention window: the most that a relay waits there."""
 _FEWER: Final = 0.85
 """When the turns do not suffice for the load, try this much of it, and so on."""
 
@@ -200,8 +202,8 @@ class Scheduled(Clustered):
         else:  # the schedule has made us head, its timetable is still to come
             super()._enqueue(packet, now_ns=now_ns)
 
-    def _flood_control(self, kind: Kind, inner: bytes, *, now_ns: int) -> Packet:
-        if kind is Kind.JOIN or not self._plans or not self._plans[-1].roots:
+    def _flood_control(self, kind: Kind, inner: bytes, *, now_ns: int, urgent: bool = False) -> Packet:
+        if (kind is Kind.JOIN and not urgent) or not self._plans or not self._plans[-1].roots:
             # Our turns are for what the bound is about; a join may contend.
             return super()._flood_control(kind, inner, now_ns=now_ns)
         packet = self._port.announce(
@@ -247,7 +249,9 @@ class Scheduled(Clustered):
         return start_ns if plan is None else plan.turns.contending_ns(start_ns, self._window_random)
 
     def _start_ns(self, *, now_ns: int, jitter_ns: int) -> int:
-        return self._contending_ns(super()._start_ns(now_ns=now_ns, jitter_ns=jitter_ns))
+        # A flood whose relays wait for longer than the window lasts goes one hop a superframe.
+        most_ns = round(self._port.scenario.clusters.contention_ms * MS * _JITTER)
+        return self._contending_ns(super()._start_ns(now_ns=now_ns, jitter_ns=min(jitter_ns, most_ns)))
 
     def hello_start_ns(self, start_ns: int) -> int:
         return self._contending_ns(start_ns)

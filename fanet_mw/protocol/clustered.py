@@ -320,7 +320,7 @@ class Clustered(RoutingProtocol):
             return
         silence.said(silent, now_ns=now_ns)
         if self._leader is not None:
-            self._leader.suspect(silent, by=self._port.node, said_ns=now_ns, now_ns=now_ns)
+            self._leader.suspect(silent, self._port.node, self._motion(now_ns), now_ns=now_ns)
         self._join(now_ns, instead_of=silent)
 
     def hello(self, packet: Packet, reception: Reception, *, now_ns: int) -> None:

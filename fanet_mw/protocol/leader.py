@@ -25,6 +25,10 @@ SETTLE_NS: Final = 700 * MS
 """Quiet time after the last join before the clusters are computed."""
 OBJECTION_NS: Final = 2 * S
 """A head that somebody stands in for has so long to show that it lives; meanwhile its cluster is served."""
+_MISSED_NS: Final = 4 * S
+"""A node was silent for about this long when it is said."""
+_SURE: Final = 0.9
+"""Of the range of a link: places are good to a tenth of it."""
 _OBJECTION_PERIODS: Final = 4
 """And this long with a timetable: the word that it is silent waits for a contention window, its answer for a turn."""
 ANSWER_NS: Final = 3500 * MS
@@ -95,14 +99,21 @@ class Leader:
         if known is None:
             self._due_ns = max(now_ns + SETTLE_NS, self._not_before_ns)
         if silent != node:
-            self.suspect(silent, by=node, said_ns=born_ns, now_ns=now_ns)
+            self.suspect(silent, node, self._motions[node], now_ns=now_ns)
 
-    def suspect(self, silent: NodeId, *, by: NodeId, said_ns: int, now_ns: int) -> None:
-        """A node is said to be silent: it has a moment to object."""
-        if silent in self._motions:
-            known = self._stand_ins.get(silent, _StandIn(by, now_ns, said_ns))
+    def suspect(self, silent: NodeId, by: NodeId, there: Motion, *, now_ns: int) -> None:
+        """A node is said to be silent, by one who says where it is itself: it has a moment to object."""
+        if silent in self._motions and (not self._by_links or self._near(silent, there)):
+            known = self._stand_ins.get(silent, _StandIn(by, now_ns, there.at_ns))
             self._stand_ins[silent] = known._replace(node=by)
             self._due_ns = min(self._due_ns, max(known.since_ns + self._objection_ns, now_ns))
+
+    def _near(self, node: NodeId, there: Motion) -> bool:
+        """Whether the two should have heard each other all the while: who flew away is not silent, but elsewhere."""
+        known = self._motions[node]
+        instants = (there.at_ns - _MISSED_NS, there.at_ns)
+        apart = (known.position_at(t_ns).minus(there.position_at(t_ns)).norm() for t_ns in instants)
+        return max(apart) <= _SURE * self._range_m
 
     def next_wake_ns(self) -> int:
         return self._due_ns

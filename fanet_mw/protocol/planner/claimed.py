@@ -104,10 +104,10 @@ class Claimants:
         """Every node under a load."""
         claimed = {node: _turns(share, self.turns) for node, share in self._shares.items()}
         loads = self._loads(scenario, classes)
-        lots = {node: _lots(loads[node], len(claimed[node])) for node in loads}
+        said, drawn = self._lots(scenario, loads, claimed)
         nodes = []
         for node in sorted(loads):
-            rivals = lots[node] + sum(lots[n] for n in self._near[node])
+            lots = drawn[node] + sum(said[n] for n in self._near[node])
             share = self._shares[node]
             nodes.append(
                 NodeTurns(
@@ -116,18 +116,16 @@ class Claimants:
                     slot=None if share is None else share.slot,
                     superframe=0 if share is None else share.length,
                     claimed=len(claimed[node]),
-                    won=self._free[node] * lots[node] / rivals if lots[node] else 0.0,
-                    load=loads[node],
+                    won=self._free[node] * drawn[node] / lots if drawn[node] else 0.0,
+                    load=loads[node] + self._hellos(scenario),
                     hop_ns=None if share is None else self._hop_ns(share.length),
                 )
             )
         return Claims(self.turns, tuple(nodes), self._hops)
 
     def _loads(self, scenario: Scenario, classes: Sequence[TrafficClass]) -> dict[NodeId, float]:
-        """Turns per period that each node needs. With aggregation a turn takes as many packets as fit."""
+        """Turns per period that each node's packets need. With aggregation a turn takes as many as fit."""
         period_ns = self.turns.period_ns
-        hello_ns = seconds_to_ns(scenario.routing.hello_interval_s)
-        hellos = _HELLOS_IN_TURNS * period_ns / hello_ns if hello_ns else 0.0
         most = turn_bytes(scenario)
         each = [
             period_ns / c.interval_ns / (max(1, most // c.payload_bytes) if scenario.routing.aggregate else 1)
@@ -137,8 +135,28 @@ class Claimants:
         loads = {}
         for node in self._near:
             own = sum(one for one, c in zip(each, classes, strict=True) if node in c.sources)
-            loads[node] = hellos + (everything if self.relays[node] else own)
+            loads[node] = everything if self.relays[node] else own
         return loads
+
+    def _hellos(self, scenario: Scenario) -> float:
+        hello_ns = seconds_to_ns(scenario.routing.hello_interval_s)
+        return _HELLOS_IN_TURNS * self.turns.period_ns / hello_ns if hello_ns else 0.0
+
+    def _lots(
+        self, scenario: Scenario, loads: Mapping[NodeId, float], claimed: Mapping[NodeId, Sequence[int]]
+    ) -> tuple[dict[NodeId, float], dict[NodeId, int]]:
+        """What each node says on average, and what it draws with: the least of its last hellos (`claimed.Load`).
+
+        A hello interval holds a packet more or less; who now and then says that it draws costs the others turns.
+        """
+        periods = seconds_to_ns(scenario.routing.hello_interval_s) / self.turns.period_ns
+        said, drawn = {}, {}
+        for node, load in loads.items():
+            turns = len(claimed[node]) * periods
+            least, more = divmod(load * periods, 1)
+            drawn[node] = _lots(least, turns)
+            said[node] = (1 - more) * drawn[node] + more * _lots(least + 1, turns)
+        return said, drawn
 
     def _hop_ns(self, length: int) -> int | None:
         """As a node will report it, whichever slot of its superframe it gets: one turn may go to a hello."""
@@ -195,9 +213,9 @@ def _turns(share: Share | None, turns: Turns) -> tuple[int, ...]:
     return () if share is None else tuple(range(share.slot, turns.per_frame, share.length))
 
 
-def _lots(load: float, claimed: int) -> int:
-    """As `claimed.Load` has it, under a steady load."""
-    wanted = load / claimed if claimed else 0.0
+def _lots(packets: float, turns: float) -> int:
+    """As `claimed.Load` has it for the packets and the turns of a hello interval, when none wait."""
+    wanted = packets / turns if turns else 0.0
     return 0 if wanted < IDLE else min(MOST_LOTS, ceil(2 * wanted))
 
 

@@ -44,7 +44,7 @@ _LEAST_M_S: Final = 0.5
 _EVER_S: Final = 1e6
 
 
-class Warning(NamedTuple):  # noqa: A001  (Python's own is no part of this)
+class Alert(NamedTuple):
     """What we have to say of another UAV."""
 
     other: NodeId
@@ -81,7 +81,7 @@ class Lookout:
         self._repeat_ns = seconds_to_ns(mission.collision_repeat_s)
         self._lifetime_ns = round(_LIFETIME_HELLOS * scenario.routing.hello_interval_s * S)
         self.records: list[Record] = []
-        self.warnings: list[Warning] = []
+        self.warnings: list[Alert] = []
         self.course: Course | None = None
         """A new course to fly, for the host to take."""
         self._others: dict[NodeId, Motion] = {}
@@ -172,7 +172,7 @@ class Lookout:
         """Both would say the same: who has heard the other's warning need not repeat it yet."""
         if threat.said_ns is None or now_ns - threat.said_ns >= self._repeat_ns:
             threat.said_ns = now_ns
-            self.warnings.append(Warning(node, approach))
+            self.warnings.append(Alert(node, approach))
 
     def _is_over(self, node: NodeId, own: Motion) -> bool:
         other = self._others.get(node)

@@ -3,9 +3,9 @@
     no hello of it for 4 intervals, and nothing that it generated -> with our next hello a join that says so, unless
     another has said it -> it objects, and stays; or the leader makes a timetable without it
 
-A neighbor that flew away looks the same from here: then it objects. Nothing more is said of it until its hellos are
-heard again, so each contact that ends costs two floods at most; and none where packets of it still arrive. Hellos are
-out of step, so mostly one neighbor says it. Bounded by the number of nodes.
+A neighbor that flew away looks the same from here: then it objects, and nothing more is said of it until its hellos
+are heard again. Where its objection does not arrive it is said again every 10 s, for a minute; where packets of it
+still arrive, never. A word is a join, and a node floods one of those in 5 s at most. Bounded by the number of nodes.
 """
 
 from collections.abc import Callable

@@ -5,10 +5,12 @@ from hypothesis import given, settings
 from hypothesis import strategies as st
 
 from agents.traffic import sources_of
+from fanet_mw import wire
+from fanet_mw.mavlink import Encoder
 from fanet_mw.protocol.delay import Bounded, Refused
 from fanet_mw.protocol.planner import Plan, cheapest_change, describe, describe_change, plan
 from fanet_mw.protocol.planner.access import ways
-from fanet_mw.protocol.planner.demand import TrafficClass
+from fanet_mw.protocol.planner.demand import TrafficClass, demands
 from fanet_mw.protocol.planner.flood import FloodCost
 from fanet_mw.protocol.planner.head import Share, slot_delays, work_ns
 from fanet_mw.protocol.planner.search import _changes
@@ -295,4 +297,7 @@ def test_a_lifetime_is_that_of_the_class(planned) -> None:
 def test_warnings_are_a_class_of_their_own_that_expires_first(planned) -> None:
     found = planned(**{"mission.collision_horizon_s": 12, "mission.collision_distance_m": 15})
     assert [c.name for c in found.classes] == ["warning", "application"]
+    warning = demands(found.scenario)[0]
+    said = Encoder(NodeId(1)).collision(NodeId(2), closest_s=1.0, altitude_m=0.0, horizontal_m=0.0)
+    assert warning.payload_bytes == wire.HEADER_BYTES + len(said)
     assert any("warning" in p and "routing.safety_lifetime_s = 1" in p for p in found.problems)

@@ -1,8 +1,8 @@
-"""How long a dead relay cuts others off: `python tests/benchmarks/relay_failure.py [RUNS] [SECONDS]`.
+"""How long a dead relay cuts others off: `python tests/benchmarks/relay_failure.py [RUNS] [SECONDS] [SOURCES]`.
 
 Scenario `clusters` (9 x 5 grid, collision-free floods, every node a head). At 20 s the radio of a relay falls silent
 for good: in run k that of the k-th most used in the timetable. `cut off`: from then until the last packet was generated
-that missed a node alive; `missed`: copies among the others that never came. `false`: nodes called silent that live.
+that missed a node alive; `missed`: copies among the others that never came.
 """
 
 import statistics
@@ -51,10 +51,11 @@ def cut_off(scenario: Scenario, victim: NodeId) -> tuple[float, int, int]:
     return (last_ns - begin_ns) / S, sum(missing.values()), epochs[0]
 
 
-def main(runs: int, seconds: float) -> None:
+def main(runs: int, seconds: float, sources: int) -> None:
     found = []
     for run in range(runs):
-        scenario = catalog.find("clusters", [f"duration_s={KILLED_S + seconds}", f"seed={run + 1}"])
+        settings = [f"duration_s={KILLED_S + seconds}", f"seed={run + 1}", f"traffic.sources={sources}"]
+        scenario = catalog.find("clusters", settings)
         victims = most_used(scenario)
         victim = victims[run % len(victims)]
         found.append(cut_off(scenario, victim))
@@ -68,4 +69,5 @@ def main(runs: int, seconds: float) -> None:
 
 
 if __name__ == "__main__":
-    main(int(sys.argv[1]) if len(sys.argv) > 1 else 20, float(sys.argv[2]) if len(sys.argv) > 2 else 30)
+    RUNS, SECONDS, SOURCES, *_ = [*sys.argv[1:], *("20", "50", "10")[len(sys.argv) - 1 :]]
+    main(int(RUNS), float(SECONDS), int(SOURCES))

@@ -4,23 +4,27 @@ Inputs are receptions, transmit statuses and sensor readings; outputs are transm
 tap. Everything that decides is in the parts; this file only says what goes where.
 """
 
+import math
 from collections.abc import Mapping
 from typing import Any, Final
 
 from agents.autopilot import Autopilot
-from agents.mission import Mission
+from agents.lookout import Lookout
+from agents.mission import Course, Mission
 from agents.traffic import Traffic
-from fanet_mw import wire
+from fanet_mw import mavlink, wire
 from fanet_mw.actor import Actor
 from fanet_mw.errors import DropReason, MalformedFrameError
 from fanet_mw.messages import Gps, MavlinkTap, Message, Reception, Setpoint, TxStatus, WifiScan
 from fanet_mw.protocol.node import Node
 from fanet_mw.protocol.txqueue import Packet
+from fanet_mw.protocol.whereabouts import Motion
 from fanet_mw.rng import stream
 from fanet_mw.routing import make_protocol
 from fanet_mw.scenario import Scenario
 from fanet_mw.topics import Topics
-from fanet_mw.units import BROADCAST, US, Enu, NodeId, seconds_to_ns
+from fanet_mw.trace import Warned
+from fanet_mw.units import BROADCAST, MS, US, Enu, NodeId, seconds_to_ns
 
 _HELLO_JITTER: Final = 0.1
 """A hello varies by this share of its interval, so that neighbors in step do not stay so (RFC 3626, 3.4)."""
@@ -43,6 +47,8 @@ class Uav(Actor):
         self._traffic = Traffic(scenario, node)
         self._autopilot = Autopilot(node, position=position, telemetry_hz=scenario.nodes.telemetry_hz)
         self._mission = Mission(node, scenario.mission, altitude_m=scenario.nodes.altitude_m)
+        self._lookout = Lookout(scenario, node) if scenario.mission.collision_horizon_s else None
+        self._encoder = mavlink.Encoder(node)
         self._hello_ns = seconds_to_ns(scenario.routing.hello_interval_s)
         self._hello_random = stream(scenario.seed, "hello", node).random
         self._next_hello_ns: int | None = None
@@ -50,6 +56,8 @@ class Uav(Actor):
         """When traffic, hello or telemetry is due; changes at a wake-up only."""
         self._generated = 0
         self._malformed = 0
+        self._bad_positions = 0
+        """Hellos whose position is none, or not of now: of no use to the lookout."""
 
     # --- the actor contract ---------------------------------------------------------------------------------------
 
@@ -57,6 +65,8 @@ class Uav(Actor):
         if self._hello_ns:
             self._next_hello_ns = now_ns + self._lead_ns + int(self._hello_random() * self._hello_ns)
         self._node.records = self._mission.records = self.records
+        if self._lookout is not None:
+            self._lookout.records = self.records
         self._node.start(now_ns)
         self._settle(now_ns)
         self._own_wake_ns = self._next_own_ns()
@@ -64,7 +74,9 @@ class Uav(Actor):
     def receive(self, topic: str, message: Message, now_ns: int) -> bool:
         if type(message) is Reception:
             if self._node.hear(message, now_ns):
-                return True  # nothing came of it, as of most
+                return True  # a copy, and nothing came of it, as of most
+            if self._lookout is not None:
+                self._look(message.frame, now_ns)
             self._settle(now_ns)
             return False
         if isinstance(message, TxStatus):
@@ -75,6 +87,8 @@ class Uav(Actor):
             self._autopilot.fix(message)
             self._node.position, self._node.velocity = message.position, message.velocity
             self._mission.moved(message.position, now_ns=now_ns)
+            if self._lookout is not None:
+                self._lookout.moved(self._motion(now_ns))
         elif isinstance(message, WifiScan):
             self._mission.scan(message.heard, position=self._autopilot.position, now_ns=now_ns)
         else:
@@ -116,6 +130,8 @@ class Uav(Actor):
 
     def report(self) -> Mapping[str, Any]:
         own = {"kind": "agent", "node": self._id, "generated": self._generated, "bus_malformed": self._malformed}
+        if self._lookout is not None:
+            own["bad_positions"] = self._bad_positions
         return own | dict(self._node.report())
 
     # --- the application ------------------------------------------------------------------------------------------
@@ -150,6 +166,35 @@ class Uav(Actor):
         self._mission.reported(report, position=self._autopilot.position, now_ns=now_ns)
         self._tap(packet.frame, now_ns)
 
+    def _motion(self, now_ns: int) -> Motion:
+        return Motion(self._autopilot.position, self._autopilot.velocity, now_ns)
+
+    def _look(self, frame: bytes, now_ns: int) -> None:
+        """A neighbor's hello says where it flies."""
+        assert self._lookout is not None, "only who has a lookout looks"
+        if wire.peek_kind(frame) != wire.Kind.HELLO:
+            return
+        try:
+            origin = NodeId(wire.decode_header(frame).origin)
+            told = mavlink.kinematics_of(frame)
+        except MalformedFrameError:
+            self._bad_positions += 1
+            return
+        if not self._lookout.heard(origin, Motion(told.position, told.velocity, told.t_ms * MS), now_ns=now_ns):
+            self._bad_positions += 1
+
+    def _heed(self, packet: Packet, now_ns: int) -> None:
+        """A warning of another UAV, for us perhaps."""
+        try:
+            warning = mavlink.collision_of(packet.frame)
+        except MalformedFrameError:
+            self._node.dropped[DropReason.MALFORMED] += 1
+            return
+        if self._lookout is not None:
+            born_ns = min(packet.header.origin_us * US, now_ns)
+            self._lookout.warned(packet.origin, warning, self._motion(now_ns), born_ns=born_ns, now_ns=now_ns)
+        self._tap(packet.frame, now_ns)
+
     def _tap(self, data: bytes, now_ns: int) -> None:
         self.outbox.append((self._tap_topic, MavlinkTap(now_ns, data)))
 
@@ -162,17 +207,48 @@ class Uav(Actor):
             for packet in node.deliveries:
                 if packet.header.priority == wire.PRIORITY_REPORT:  # bulk was only to be carried
                     self._deliver(packet, now_ns)
+                elif packet.header.priority == wire.PRIORITY_SAFETY:
+                    self._heed(packet, now_ns)
             node.deliveries.clear()
         if mission.reports:
             self._report(now_ns)
         if mission.course is not None:
             course, mission.course = mission.course, None
-            self.outbox.append((self._setpoint_topic, Setpoint(now_ns, course.position, course.speed_m_s)))
+            if self._lookout is None or self._lookout.steered(course):
+                self._steer(course, now_ns)
+        if self._lookout is not None:
+            self._avoid(self._lookout, now_ns)
         if node.requests:
             outbox, topic = self.outbox, self._tx_topic
             for request in node.requests:
                 outbox.append((topic, request))
             node.requests.clear()
+
+    def _steer(self, course: Course, now_ns: int) -> None:
+        self.outbox.append((self._setpoint_topic, Setpoint(now_ns, course.position, course.speed_m_s)))
+
+    def _avoid(self, lookout: Lookout, now_ns: int) -> None:
+        """Warn, and fly, as the lookout wants it."""
+        warnings, lookout.warnings = lookout.warnings, []
+        for other, approach in warnings:
+            inner = self._encoder.collision(
+                other,
+                closest_s=approach.closest_s,
+                altitude_m=abs(approach.apart.up),
+                horizontal_m=math.hypot(approach.apart.east, approach.apart.north),
+            )
+            seq = self._node.send(
+                inner,
+                destination=BROADCAST,
+                priority=wire.PRIORITY_SAFETY,
+                app="warning",
+                due_ns=(now_ns + self._lead_ns) // US * US,
+                now_ns=now_ns,
+            )
+            self.records.append(Warned(now_ns, self._id, other, seq))
+        if lookout.course is not None:
+            course, lookout.course = lookout.course, None
+            self._steer(course, now_ns)
 
     def _report(self, now_ns: int) -> None:
         reports, self._mission.reports = self._mission.reports, []

@@ -16,8 +16,8 @@ from pymavlink.dialects.v20 import common
 
 from fanet_mw.dialect import fanet
 from fanet_mw.errors import LocalProtocolError, MalformedFrameError
-from fanet_mw.units import MS, US, Enu, NodeId
-from fanet_mw.wire import COMPONENT, frames, system_id
+from fanet_mw.units import MAX_NODES, MS, US, Enu, NodeId
+from fanet_mw.wire import COMPONENT, frames, inner_frames, system_id
 
 common.mavlink_map.update(fanet.mavlink_map)  # one parser for both dialects
 
@@ -262,6 +262,24 @@ class Encoder:
             common.MAVLink_extended_sys_state_message(common.MAV_VTOL_STATE_UNDEFINED, common.MAV_LANDED_STATE_IN_AIR)
         )
 
+    def collision(self, other: NodeId, *, closest_s: float, altitude_m: float, horizontal_m: float) -> bytes:
+        """COLLISION with another node: both know of it by positions over the air, and avoid by height.
+
+        The distances are those at the closest point of approach, `closest_s` from now. `id` is the node, which is its
+        MAVLink system up to 250.
+        """
+        return self._pack(
+            common.MAVLink_collision_message(
+                common.MAV_COLLISION_SRC_MAVLINK_GPS_GLOBAL_INT,
+                other,
+                common.MAV_COLLISION_ACTION_ASCEND_OR_DESCEND,
+                common.MAV_COLLISION_THREAT_LEVEL_HIGH,
+                closest_s,
+                altitude_m,
+                horizontal_m,
+            )
+        )
+
 
 def _boot_ms(now_ns: int) -> int:
     """MAVLink's 32 bits of milliseconds since boot: since the swarm's epoch; they wrap after 49 days."""
@@ -284,6 +302,14 @@ def decode(data: bytes) -> list[Any]:
         raise MalformedFrameError(f"not MAVLink: {error}") from error
 
 
+def _only(frame: bytes, message_id: int) -> Any:  # noqa: ANN401  (pymavlink has no types)
+    """The first inner frame of a radio frame that is this message, decoded; raises MalformedFrameError."""
+    for found, inner in inner_frames(frame):
+        if found == message_id:
+            return decode(inner)[0]
+    raise MalformedFrameError(f"no message {message_id} in the frame")
+
+
 class Kinematics(NamedTuple):
     """What a GLOBAL_POSITION_INT says, in the swarm's frame."""
 
@@ -300,3 +326,32 @@ def kinematics(message: Any, origin: Geodetic = ORIGIN) -> Kinematics:  # noqa: 
     velocity = from_ned(Ned(message.vx / 100, message.vy / 100, message.vz / 100))
     yaw = None if message.hdg == _UNKNOWN_U16 else math.radians(message.hdg / 100)
     return Kinematics(to_enu(place, origin), velocity, yaw, message.time_boot_ms)
+
+
+def kinematics_of(frame: bytes, origin: Geodetic = ORIGIN) -> Kinematics:
+    """What the GLOBAL_POSITION_INT in a radio frame says; raises MalformedFrameError."""
+    return kinematics(_only(frame, common.MAVLINK_MSG_ID_GLOBAL_POSITION_INT), origin)
+
+
+class Collision(NamedTuple):
+    """What a COLLISION says: with whom, when, and how far apart then."""
+
+    other: int
+    closest_s: float
+    altitude_m: float
+    horizontal_m: float
+
+
+def collision_of(frame: bytes) -> Collision:
+    """The COLLISION in a radio frame; raises MalformedFrameError, also for one that is none among nodes."""
+    message = _only(frame, common.MAVLINK_MSG_ID_COLLISION)
+    found = Collision(
+        message.id, message.time_to_minimum_delta, message.altitude_minimum_delta, message.horizontal_minimum_delta
+    )
+    if (
+        message.src != common.MAV_COLLISION_SRC_MAVLINK_GPS_GLOBAL_INT
+        or not 0 < found.other <= MAX_NODES
+        or not all(math.isfinite(value) and value >= 0 for value in found[1:])
+    ):
+        raise MalformedFrameError(f"collision from source {message.src}: {found}")
+    return found

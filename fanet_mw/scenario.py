@@ -4,7 +4,7 @@ A key is a contract with users: renaming one breaks their files and sweeps. Deri
 """
 
 import math
-from collections.abc import Sequence
+from collections.abc import Iterator, Sequence
 from typing import Annotated, Final, Literal, Self
 
 from pydantic import Field, model_validator
@@ -156,9 +156,12 @@ class Clusters(Section):
 class Mobility(Section):
     """What a UAV does when the mission asks nothing of it."""
 
-    model: Literal["static", "formation", "random_waypoint"] = "static"
-    """`formation` sweeps the area keeping the layout; `random_waypoint` is the statistical model, without pause."""
+    model: Literal["static", "formation", "random_waypoint", "crossing"] = "static"
+    """`formation` sweeps the area keeping the layout; `random_waypoint` is the statistical model, without pause;
+    `crossing` flies everyone through the middle of the area to the point opposite its start, and back."""
     speed_m_s: NonNegative = 7.5
+    see_m: NonNegative = 50.0
+    """UAVs nearer than this see each other without radio and keep clear; 0: they are blind."""
 
 
 Building = tuple[Finite, Finite, Positive, Positive, Positive]
@@ -223,6 +226,12 @@ class Mission(Section):
     arrival_m: Positive = 30.0
     dwell_s: NonNegative = 10.0
     """How long a UAV stays with a survivor before it turns to the next one it knows of."""
+    collision_distance_m: Annotated[float, Field(ge=0, le=1000)] = 0.0
+    """UAVs nearer to each other have lost separation, which the world counts; 0: nobody looks."""
+    collision_horizon_s: Annotated[float, Field(ge=0, le=120)] = 0.0
+    """A UAV that foresees a loss of separation within this time warns the other one, and both avoid; 0: no warnings."""
+    collision_repeat_s: Annotated[float, Field(gt=0, le=120)] = 1.0
+    """A warning is repeated at this interval until the closest point of approach."""
 
 
 class Scenario(Section):
@@ -318,6 +327,7 @@ def _disagreements(scenario: Scenario) -> Sequence[str]:
     if scenario.clock.sync == "beacons" and not scenario.routing.hello_interval_s:
         found.append('clock.sync = "beacons" needs hellos: routing.hello_interval_s > 0')
     found += _unkept_deadline(scenario)
+    found += _blind_warnings(scenario)
     found += _impossible_faults(scenario)
     found += _wrong_for_rivals(scenario)
     if scenario.routing.protocol == "clustered":
@@ -357,6 +367,23 @@ def _unkept_deadline(scenario: Scenario) -> Sequence[str]:
         f"traffic.deadline_s = {deadline_s:g} needs a protocol with a bound: "
         'routing.protocol = "clustered" and clusters.relay = "scheduled"',
     )
+
+
+def _blind_warnings(scenario: Scenario) -> Iterator[str]:
+    """Warnings of collisions without what they are computed from, or without room to avoid."""
+    mission = scenario.mission
+    if not mission.collision_horizon_s:
+        return
+    wanted = f"mission.collision_horizon_s = {mission.collision_horizon_s:g} needs"
+    if not mission.collision_distance_m:
+        yield f"{wanted} mission.collision_distance_m > 0"
+    if not scenario.routing.hello_interval_s:
+        yield f"{wanted} hellos: routing.hello_interval_s > 0"
+    if scenario.nodes.altitude_m <= 2 * mission.collision_distance_m:
+        yield (
+            f"{wanted} room below to avoid: nodes.altitude_m = {scenario.nodes.altitude_m:g} must be > "
+            f"2 x mission.collision_distance_m = {2 * mission.collision_distance_m:g}"
+        )
 
 
 def _impossible_faults(scenario: Scenario) -> Sequence[str]:

@@ -88,6 +88,37 @@ class Collided(NamedTuple):
     other: int
 
 
+class ConflictForeseen(NamedTuple):
+    """A UAV learned that it and another will be too near each other, if both fly on as they do."""
+
+    t_ns: int
+    node: int
+    other: int
+    closest_ms: int
+    """Time until the closest point of approach."""
+    distance_m: float
+    """Between the two, then."""
+    told: bool
+    """Learned from the other's warning, not foreseen itself."""
+
+
+class Warned(NamedTuple):
+    """A UAV warned of a collision with another; `seq` names the packet."""
+
+    t_ns: int
+    node: int
+    other: int
+    seq: int
+
+
+class ConflictOver(NamedTuple):
+    """A UAV took up its course again as far as this other one is concerned."""
+
+    t_ns: int
+    node: int
+    other: int
+
+
 class ProcessEnded(NamedTuple):
     """A process of the run died before its time."""
 
@@ -151,6 +182,9 @@ Record = (
     | Approaching
     | Arrived
     | Collided
+    | ConflictForeseen
+    | Warned
+    | ConflictOver
     | ProcessEnded
     | RadioFault
     | ClockSampled
@@ -167,6 +201,9 @@ _KINDS: Final[dict[str, type[Any]]] = {
     "approaching": Approaching,
     "arrived": Arrived,
     "collided": Collided,
+    "conflict_foreseen": ConflictForeseen,
+    "warned": Warned,
+    "conflict_over": ConflictOver,
     "process_ended": ProcessEnded,
     "radio_fault": RadioFault,
     "clock_sampled": ClockSampled,
@@ -199,7 +236,7 @@ def parse(text: str) -> Record:
 
 
 __all__ = [
-    "Approaching", "Arrived", "ClockSampled", "Collided", "DeadlineLost", "DeadlineMet", "Delivered", "Detected",
-    "DropReason", "Dropped", "Generated", "ProcessEnded", "RadioFault", "Record", "RoleChanged", "kind_of", "line",
-    "parse",
+    "Approaching", "Arrived", "ClockSampled", "Collided", "ConflictForeseen", "ConflictOver", "DeadlineLost",
+    "DeadlineMet", "Delivered", "Detected", "DropReason", "Dropped", "Generated", "ProcessEnded", "RadioFault",
+    "Record", "RoleChanged", "Warned", "kind_of", "line", "parse",
 ]  # fmt: skip

@@ -409,7 +409,7 @@ class Join(NamedTuple):
     velocity: Enu = Enu(0.0, 0.0, 0.0)
     """[m/s]"""
     instead_of: int = 0
-    """The silent head that the node stands in for; the node itself: a head that objects; 0: none."""
+    """A silent node, whom this one stands in for if it is its head; the node itself: one that objects; 0: none."""
 
     def encode_frame(self, node: int) -> bytes:
         payload = JOIN.layout.pack(*self.position, *self.velocity, self.node, self.instead_of, VERSION)

@@ -5,7 +5,6 @@ from dataclasses import dataclass
 from typing import Annotated
 
 from cyclopts import App, Parameter
-from rich.console import Console
 
 from fanet_mw.errors import ConfigError
 from fanet_mw.radio_control import (
@@ -22,6 +21,7 @@ from fanet_mw.radio_control import (
 )
 from fanet_mw.units import MAX_NODES, Enu, NodeId, S, seconds_to_ns
 from sim.air import change
+from sim.console import Console
 
 app = App(name="air", help="Change the air of a swarm that runs: degrade a link, jam an area, cut a node off, restore.")
 

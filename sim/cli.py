@@ -13,7 +13,6 @@ from typing import Annotated, Any, Final
 
 from cyclopts import App, Parameter
 from cyclopts.validators import Number
-from rich.console import Console
 from rich.progress import BarColumn, Progress, TextColumn, TimeElapsedColumn
 from rich.table import Table
 
@@ -24,6 +23,7 @@ from fanet_mw.scenario import Scenario
 from fanet_mw.units import NodeId
 from sim import catalog, report
 from sim.air_cli import app as air_app
+from sim.console import Console, nobody_reads
 from sim.layout import positions
 from sim.outcome import Outcome
 
@@ -31,6 +31,7 @@ app = App(
     name="fanet",
     help="Middleware for swarms of UAVs, and the network emulator it is developed and proven on.",
     version=__version__,
+    console=Console(),
 )
 app.command(air_app)
 _err = Console(stderr=True)
@@ -396,6 +397,9 @@ def main() -> None:
     """The console script."""
     try:
         code = app(result_action="return_value")
+        sys.stdout.flush()
+    except BrokenPipeError:
+        nobody_reads()
     except FanetError as error:
         _err.print(f"[bold red]fanet:[/] {error}", highlight=False, soft_wrap=True)
         sys.exit(2)

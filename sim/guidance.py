@@ -19,7 +19,6 @@ _GAIN: Final = 0.8
 """Position loop [1/s]."""
 _CLEAR_M: Final = 4.0
 """The distance that UAVs keep; within twice of it they are pushed apart."""
-_SEE_M: Final = 50.0
 _BRAKE_M_S2: Final = 2.5
 """Half of what an engine can do: the other half is for its lag."""
 _PUSH_M_S: Final = 4.0
@@ -108,16 +107,37 @@ class RandomWaypoint:
         return Track(self._from + way * share[:, None], velocities)
 
 
+class Crossing:
+    """Everyone flies straight through the middle to the point opposite its start, and back, again and again."""
+
+    def __init__(self, starts: Rows, scenario: Scenario) -> None:
+        self._starts = starts
+        self._speed = scenario.mobility.speed_m_s
+        self._length = 2 * np.linalg.norm(starts[:, :2], axis=1)
+        self._direction = np.zeros_like(starts)
+        self._direction[:, :2] = -starts[:, :2] / np.maximum(self._length / 2, 1e-9)[:, None]
+
+    def track(self, t_s: float) -> Track:
+        length = np.maximum(self._length, 1e-9)
+        legs, along = np.divmod(self._speed * t_s, length)
+        back = legs % 2 == 1
+        offset = np.where(back, length - along, along)
+        speed = np.where(self._length > 0, np.where(back, -self._speed, self._speed), 0.0)
+        return Track(self._starts + self._direction * offset[:, None], self._direction * speed[:, None])
+
+
 class Guidance:
     """The track of the mobility model, overridden per node by setpoints."""
 
     def __init__(self, starts: Rows, scenario: Scenario) -> None:
         self._starts = starts
         self._half = scenario.world.area_m / 2
+        self._see_m = scenario.mobility.see_m
         model = scenario.mobility.model
         self._model = (
             Formation(starts, scenario) if model == "formation"
             else RandomWaypoint(starts, scenario) if model == "random_waypoint"
+            else Crossing(starts, scenario) if model == "crossing"
             else None
         )  # fmt: skip
         self._setpoints: dict[int, tuple[Enu, float]] = {}
@@ -154,10 +174,10 @@ class Guidance:
         wish = feed + _GAIN * (places - at)
         speed = np.linalg.norm(wish, axis=1)
         wish *= np.minimum(1.0, limit / np.maximum(speed, 1e-9))[:, None]
-        return _keep_clear(wish, at) if len(at) > 1 else wish
+        return _keep_clear(wish, at, self._see_m) if len(at) > 1 and self._see_m else wish
 
 
-def _keep_clear(wish: Rows, at: Rows) -> Rows:
+def _keep_clear(wish: Rows, at: Rows, see_m: float) -> Rows:
     """Slow down towards others so that both can still stop in time, and push away from those that are too near.
 
     Two that brake at `_BRAKE_M_S2` from v each need v^2 / _BRAKE_M_S2 between them: hence the cap on closing speed.
@@ -165,7 +185,7 @@ def _keep_clear(wish: Rows, at: Rows) -> Rows:
     apart = at[:, None] - at[None]
     distance = np.sqrt((apart**2).sum(axis=2))
     np.fill_diagonal(distance, math.inf)
-    near = distance < _SEE_M
+    near = distance < see_m
     rows = np.flatnonzero(near.any(axis=1))
     if not len(rows):
         return wish

@@ -29,9 +29,10 @@ from fanet_mw.units import MS, S
 from sim.bounds import against_bounds
 from sim.clocks import clock_errors
 from sim.outcome import Outcome
+from sim.separation import separation
 from sim.survivors import place
 
-_APPS: Final = ("traffic", "report")
+_APPS: Final = ("traffic", "report", "warning")
 
 
 def summarize(outcome: Outcome, *, trace_sha256: str) -> dict[str, Any]:
@@ -49,6 +50,7 @@ def summarize(outcome: Outcome, *, trace_sha256: str) -> dict[str, Any]:
         "wall_s": round(outcome.wall_s, 3),
         **packets["traffic"],
         "reports": packets["report"],
+        "warnings": packets["warning"],
         "frames": _ledger(outcome, emulator),
         "copies": _copies(outcome, emulator),
         "air": emulator.get("air", {}),
@@ -57,6 +59,7 @@ def summarize(outcome: Outcome, *, trace_sha256: str) -> dict[str, Any]:
         "clock": clock_errors(outcome),
         "admission": _admission(outcome),
         "mission": _mission(outcome),
+        "separation": separation(outcome),
         "processes": {
             "ready_s": round(outcome.ready_s, 3),
             "ended": [{"name": name, "exit_code": code} for name, code in outcome.ended],
@@ -88,7 +91,7 @@ def _packets(outcome: Outcome) -> dict[str, dict[str, Any]]:
     for record in outcome.records:
         if type(record) is Delivered:
             app = app_of.get((record.origin, record.seq))
-            if app == "report":
+            if app == "report" or app == "warning":
                 delays[app].append(record.delay_ns)
             elif app == "traffic" and record.node in targets[record.origin]:
                 delays[app].append(record.delay_ns)

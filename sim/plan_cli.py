@@ -27,6 +27,7 @@ from fanet_mw.protocol.planner import (
     plan,
     with_capacity,
 )
+from fanet_mw.protocol.planner.claimed import Claims
 from fanet_mw.protocol.planner.turns import superframe_of
 from fanet_mw.protocol.scheduled import links
 from fanet_mw.protocol.timetable import Timetable
@@ -108,6 +109,7 @@ def _json(found: Plan) -> dict[str, Any]:
             "packets": superframe.packets,
             "least_interval_s": None if superframe.least_interval_ns is None else superframe.least_interval_ns / S,
         },
+        "claims": None if found.claims is None else _claims_json(found.claims),
         "slots": [
             {
                 "head": c.head,
@@ -129,6 +131,31 @@ def _json(found: Plan) -> dict[str, Any]:
         "problems": list(found.problems),
         "notes": list(found.notes),
     }  # fmt: skip
+
+
+def _claims_json(claims: Claims) -> dict[str, Any]:
+    return {
+        "period_ms": claims.turns.period_ns / MS,
+        "contention_ms": claims.turns.contention_ns / MS,
+        "turn_ms": claims.turns.turn_ns / MS,
+        "turns": claims.turns.per_frame,
+        "hops": claims.hops,
+        "hop_ms": None if claims.hop_ns is None else claims.hop_ns / MS,
+        "lone_ms": None if claims.lone_ns is None else claims.lone_ns / MS,
+        "least_interval_s": None if claims.least_interval_ns is None else claims.least_interval_ns / S,
+        "nodes": [
+            {
+                "node": node.node,
+                "relays": node.relays,
+                "superframe": node.superframe,
+                "claimed": node.claimed,
+                "by_lot": round(node.won, 3),
+                "needed": round(node.load, 3),
+                "used": round(node.utilization, 6) if node.claimed else None,
+            }
+            for node in claims.nodes
+        ],
+    }
 
 
 def _class_json(c: ClassPlan, deadline_ns: int | None) -> dict[str, Any]:

@@ -32,6 +32,7 @@ def _rows(summary: Mapping[str, Any]) -> Iterator[tuple[str, str]]:
     mission = summary["mission"]
     if mission["survivors"]:
         yield from _mission_rows(mission)
+    yield from _separation_rows(summary["separation"])
     yield "trace", summary["trace_sha256"][:16]
 
 
@@ -39,6 +40,8 @@ def _network_rows(summary: Mapping[str, Any]) -> Iterator[tuple[str, str]]:
     yield "traffic", _traffic(summary)
     if summary["reports"]["generated"]:
         yield "survivor reports", _traffic(summary["reports"])
+    if summary["warnings"]["generated"]:
+        yield "warnings", _traffic(summary["warnings"])
     worst = summary.get("worst_nodes") or []
     if worst and worst[0]["pdr"] < 0.999:
         yield "worst receivers", ", ".join(f"node {item['node']} {item['pdr']:.1%}" for item in worst[:3])
@@ -112,6 +115,17 @@ def _mission_rows(mission: Mapping[str, Any]) -> Iterator[tuple[str, str]]:
     if mission["localization_error_m"] is not None:
         yield "localization", f"median error {mission['localization_error_m']:.0f} m"
     yield "collisions", str(mission["collisions"])
+
+
+def _separation_rows(separation: Mapping[str, Any]) -> Iterator[tuple[str, str]]:
+    if not separation or separation["least_m"] is None:
+        return
+    yield "separation", f"least {separation['least_m']:.1f} m, lost {separation['losses']} times"
+    if separation["foreseen"]:
+        yield (
+            "conflicts",
+            f"foreseen {separation['foreseen']} times, {separation['told']} of them by the other UAV alone",
+        )
 
 
 def _warnings(summary: Mapping[str, Any]) -> Iterator[str]:

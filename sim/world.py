@@ -22,6 +22,7 @@ from sim.guidance import Guidance
 from sim.kinematic import Kinematic
 from sim.layout import positions
 from sim.obstacles import Obstacles, obstacles
+from sim.separation import Separation
 from sim.survivors import PhoneSensor
 
 if TYPE_CHECKING:
@@ -70,7 +71,12 @@ class World(Actor):
         self._guidance = Guidance(starts, scenario)
         self._phones = PhoneSensor(scenario)
         self._noise = np.random.Generator(np.random.PCG64(stream_seed(scenario.seed, "gps")))
-        self._fixes = scenario.nodes.telemetry_hz > 0 or scenario.clock.sync == "gps" or _routed_by_places(scenario)
+        self._fixes = (
+            scenario.nodes.telemetry_hz > 0
+            or scenario.clock.sync == "gps"
+            or scenario.mission.collision_horizon_s > 0
+            or _routed_by_places(scenario)
+        )
         """Whether anybody uses position fixes."""
         self._gps_ns = round(S / scenario.world.gps_hz)
         self._scan_ns = seconds_to_ns(scenario.mission.scan_interval_s)
@@ -78,6 +84,9 @@ class World(Actor):
         self._last_ns = 0
         self._ticks = 0
         self._collisions = 0
+        self._separation = (
+            Separation(scenario.mission.collision_distance_m) if scenario.mission.collision_distance_m else None
+        )
         self._malformed = 0
 
     # --- the actor contract ---------------------------------------------------------------------------------------
@@ -127,6 +136,7 @@ class World(Actor):
             "engine": self._engine.name,
             "ticks": self._ticks,
             "collisions": self._collisions,
+            "separation": {} if self._separation is None else self._separation.report(),
             "malformed": self._malformed,
         }
 
@@ -143,7 +153,10 @@ class World(Actor):
         steps = max(1, round(elapsed_s / _CONTROL_S))
         for step in range(steps):
             t_s = self._last_ns / S + step * elapsed_s / steps
-            engine.advance(elapsed_s / steps, self._guidance.wanted(t_s, engine.positions(), engine.velocities()))
+            before = engine.positions().copy()
+            engine.advance(elapsed_s / steps, self._guidance.wanted(t_s, before, engine.velocities()))
+            if self._separation is not None:
+                self._separation.watch(before, engine.positions())
         for first, second in engine.contacts():
             self._collisions += 1
             self.records.append(Collided(now_ns, second, first))

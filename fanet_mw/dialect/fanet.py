@@ -666,7 +666,8 @@ setattr(MAVLink_fanet_time_message, "name", mavlink_msg_deprecated_name_property
 class MAVLink_fanet_join_message(MAVLink_message):
     """
     A node asks the leader for a place in a cluster, says where it has
-    gone since, or that it stands in for a head that fell silent.
+    gone since, that it stands in for a head that fell silent, or,
+    with a timetable, that a neighbor did.
     """
 
     id = MAVLINK_MSG_ID_FANET_JOIN
@@ -1537,7 +1538,8 @@ class MAVLink(object):
     def fanet_join_encode(self, east: float, north: float, up: float, east_speed: float, north_speed: float, up_speed: float, node: int, instead_of: int, version: int) -> MAVLink_fanet_join_message:
         """
         A node asks the leader for a place in a cluster, says where it has
-        gone since, or that it stands in for a head that fell silent.
+        gone since, that it stands in for a head that fell silent, or,
+        with a timetable, that a neighbor did.
 
         east                      : Where it is. [m] (type:float)
         north                     : Where it is. [m] (type:float)
@@ -1546,7 +1548,7 @@ class MAVLink(object):
         north_speed               : How fast it moves. [m/s] (type:float)
         up_speed                  : How fast it moves. [m/s] (type:float)
         node                      : Which node. (type:uint16_t)
-        instead_of                : The silent head that the node stands in for; the node itself: a head that objects; 0: none. (type:uint16_t)
+        instead_of                : The silent node; whoever sends this stands in for it if it is the head of its cluster; the node itself: it objects; 0: none. (type:uint16_t)
         version                   : 1. (type:uint8_t)
 
         """
@@ -1555,7 +1557,8 @@ class MAVLink(object):
     def fanet_join_send(self, east: float, north: float, up: float, east_speed: float, north_speed: float, up_speed: float, node: int, instead_of: int, version: int, force_mavlink1: bool = False) -> None:
         """
         A node asks the leader for a place in a cluster, says where it has
-        gone since, or that it stands in for a head that fell silent.
+        gone since, that it stands in for a head that fell silent, or,
+        with a timetable, that a neighbor did.
 
         east                      : Where it is. [m] (type:float)
         north                     : Where it is. [m] (type:float)
@@ -1564,7 +1567,7 @@ class MAVLink(object):
         north_speed               : How fast it moves. [m/s] (type:float)
         up_speed                  : How fast it moves. [m/s] (type:float)
         node                      : Which node. (type:uint16_t)
-        instead_of                : The silent head that the node stands in for; the node itself: a head that objects; 0: none. (type:uint16_t)
+        instead_of                : The silent node; whoever sends this stands in for it if it is the head of its cluster; the node itself: it objects; 0: none. (type:uint16_t)
         version                   : 1. (type:uint8_t)
 
         """

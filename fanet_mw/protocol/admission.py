@@ -2,20 +2,25 @@
 
     timetable in force  ->  least interval at which the bound meets the deadline: packets that come sooner are refused
                         ->  none does, or there is no bound: DeadlineLost, once; later perhaps DeadlineMet
+    no bound yet        ->  nothing is said until there should be one: timetables of a swarm that is still joining have
+                            gaps, and say nothing of the one to come
 
 Packets that are let in are at least that interval apart, which is what the bound (`Turns.worst_ns`) assumes, so load
 that grows cannot break the deadline of those before it. Where no interval meets the deadline the application is told,
 and goes on at the rate that the turns carry: late is better than never. More urgent packets are not policed.
 """
 
-from typing import NamedTuple
+from typing import Final, NamedTuple
 
 from fanet_mw.protocol.turns import Turns
 from fanet_mw.trace import DeadlineLost, DeadlineMet
-from fanet_mw.units import US, NodeId
+from fanet_mw.units import US, NodeId, S
 
-_TOLERANCE_NS = 1 * US
+_TOLERANCE_NS: Final = 1 * US
 """Packets are generated at whole microseconds."""
+EXPECTED_NS: Final = 8 * S
+"""After its start a node should have a bound by then: joins take 3 s, their schedule another 2 s, and a join may be
+lost (`lease.py` waits as long for a leader)."""
 
 
 class Own(NamedTuple):
@@ -37,6 +42,22 @@ class Admission:
         self._met: bool | None = None
         self._least_ns = 0
         self._next_ns: int | None = None
+        self._expected_ns: int | None = None
+
+    def start(self, now_ns: int) -> None:
+        """The node is up; it has no bound yet."""
+        self._expected_ns = now_ns + EXPECTED_NS
+
+    def next_wake_ns(self) -> int | None:
+        """When it has to be said that there still is no bound; None: it has been said, or there was one."""
+        return self._expected_ns
+
+    def wake(self, now_ns: int) -> DeadlineLost | None:
+        """What is to be said now."""
+        if self._expected_ns is None or now_ns < self._expected_ns:
+            return None
+        self._expected_ns, self._met = None, False
+        return DeadlineLost(now_ns, self._node, 0, self._deadline_ns, self.interval_ns)
 
     @property
     def interval_ns(self) -> int:
@@ -48,6 +69,9 @@ class Admission:
         least_ns = None if own is None else least_interval_ns(own, deadline_ns=self._deadline_ns - _TOLERANCE_NS)
         self._least_ns = least_ns or (0 if own is None else carried_interval_ns(own))
         bound_ns = own and own.turns.worst_ns(own.roots, span=own.span, interval_ns=self.interval_ns)
+        if own is None and self._expected_ns is not None and now_ns < self._expected_ns:
+            return None  # it may still come
+        self._expected_ns = None
         before, self._met = self._met, least_ns is not None
         if self._met == before:
             return None

@@ -47,7 +47,7 @@ _LONGEST: Final = 128
 """Slots of the longest superframe; crowds beyond leave some without."""
 _SAID: Final = 3
 """Hellos after which everyone within two hops knows how many lots we have."""
-_IDLE: Final = 0.25
+IDLE: Final = 0.25
 """Who needs less than this share of its claimed turns draws no lots."""
 _LEAST_FRAME: Final = 256
 _POSITION_BYTES: Final = 61
@@ -96,7 +96,7 @@ class Load:
         turns = turns_per_s * (now_ns - self._since_ns) / S
         wanted = (self._pushed + waiting) / turns if turns > 0 else 0.0
         self._pushed, self._since_ns = 0, now_ns
-        self._said.append(0 if wanted < _IDLE else min(MOST_LOTS, ceil(2 * wanted)))
+        self._said.append(0 if wanted < IDLE else min(MOST_LOTS, ceil(2 * wanted)))
         return self._said[-1]
 
     def drawn(self) -> int:
@@ -113,9 +113,7 @@ class Claimed(Clustered):
         self._lifetime_ns = seconds_to_ns(scenario.routing.lifetime_s)
         self._hello_ns = seconds_to_ns(scenario.routing.hello_interval_s)
         self._window_random = port.stream("window").random
-        self._turn_bytes = max(scenario.traffic.payload_bytes, _LEAST_FRAME)
-        if scenario.routing.aggregate:
-            self._turn_bytes = max(self._turn_bytes, scenario.radio.max_frame_bytes)
+        self._turn_bytes = turn_bytes(scenario)
         self._own = OwnTurns(geometry(scenario, self._turn_bytes))
         self._queue = OwnRelease(
             TxQueue(capacity=scenario.routing.queue_frames, sooner_us=sooner_us(scenario.routing)),
@@ -126,7 +124,7 @@ class Claimed(Clustered):
             port.node, lifetime_ns=int(_LIFETIMES * self._hello_ns), rank=lambda _, standing: _rank(standing.slot)
         )
         self._load = Load()
-        self._longest = 1 << (min(_LONGEST, max(1, self._own.turns.per_frame)).bit_length() - 1)
+        self._longest = longest_superframe(self._own.turns)
         self._claims = self._new_claims(0)
         self._known_ns = 0
         self._hello_bytes = 0
@@ -308,6 +306,17 @@ class Claimed(Clustered):
 def _rank(slot: int | None) -> float:
     """Who holds a slot relays rather than who does not."""
     return 0.0 if slot is None else 1.0
+
+
+def turn_bytes(scenario: Scenario) -> int:
+    """The largest frame that a turn must hold."""
+    least = max(scenario.traffic.payload_bytes, _LEAST_FRAME)
+    return max(least, scenario.radio.max_frame_bytes) if scenario.routing.aggregate else least
+
+
+def longest_superframe(turns: Turns) -> int:
+    """Slots of the longest superframe: a power of two that fits a period."""
+    return 1 << (min(_LONGEST, max(1, turns.per_frame)).bit_length() - 1)
 
 
 def geometry(scenario: Scenario, frame_bytes: int) -> Turns:

@@ -26,6 +26,7 @@ from fanet_mw.protocol.relay import Relay
 from fanet_mw.protocol.release import Release, Tenure
 from fanet_mw.protocol.repair import Repair
 from fanet_mw.protocol.signs import Signs
+from fanet_mw.protocol.silence import Silence
 from fanet_mw.protocol.states import Action
 from fanet_mw.protocol.txqueue import Packet, TxQueue, sooner_us
 from fanet_mw.protocol.upkeep import Upkeep
@@ -78,6 +79,8 @@ class Clustered(RoutingProtocol):
             membership=self._membership, gradient=self._gradient, signs=self._signs, lease=self._lease,
             node=port.node, hello_ns=hello_ns, takes_slot=scenario.clusters.relay != "scheduled",
         )  # fmt: skip
+        by_places = scenario.clusters.relay == "scheduled"
+        self._silence = Silence(self._signs, hello_ns=hello_ns) if by_places else None
         self._refresh = Refresh(port.stream("refresh").random)
         self._whereabouts = Whereabouts(range_m=scenario.clusters.link_m or scenario.radio.range_m)
         self._expect_ns = scenario.clusters.period_ns + _UPLINK_NS
@@ -192,6 +195,8 @@ class Clustered(RoutingProtocol):
             if self._leader is not None:
                 self._leader.joined(join, born_ns=born_ns, now_ns=now_ns)
             if join.instead_of:
+                if self._silence is not None:
+                    self._silence.said(NodeId(join.instead_of), now_ns=now_ns)
                 self._do(self._upkeep.stands_in(join, born_ns=born_ns, now_ns=now_ns), now_ns)
             if join.node == self._membership.head:
                 self._gradient.flooded(NodeId(join.node), parent=src, hops=packet.header.hops + 1, now_ns=now_ns)
@@ -292,7 +297,9 @@ class Clustered(RoutingProtocol):
             and self._whereabouts.outdated(self._port.position, now_ns=now_ns)
         ):
             self._join_ns = now_ns + int(self._random() * _UPDATE_NS * (1 + self._membership.nodes_listed))
-        term, leader = self._lease.authority if self._lease.valid(now_ns) and self._lease.authority else (0, 0)
+        if self._silence is not None and self._whereabouts.may_tell(now_ns):
+            self._tell_silence(self._silence, now_ns)
+        term, leader = self._lease.authority if self._lease.fresh(now_ns) and self._lease.authority else (0, 0)
         beacon = Beacon(
             node=self._port.node,
             head=route.head if route else 0,
@@ -307,11 +314,23 @@ class Clustered(RoutingProtocol):
         ).encode_frame(self._port.node)
         return beacon + self._repair.digest(now_ns=now_ns).encode_frames(self._port.node) if self._repair else beacon
 
+    def _tell_silence(self, silence: Silence, now_ns: int) -> None:
+        """Let the leader know of a neighbor that has fallen silent; who lives will hear it too, and object."""
+        silent = silence.next_silent(self._membership.lists, now_ns=now_ns)
+        if silent is None:
+            return
+        silence.said(silent, now_ns=now_ns)
+        if self._leader is not None:
+            self._leader.suspect(silent, self._port.node, self._motion(now_ns), now_ns=now_ns)
+        self._join(now_ns, instead_of=silent)
+
     def hello(self, packet: Packet, reception: Reception, *, now_ns: int) -> None:
         neighbor = Neighbor(reception.src, now_ns, reception.rssi_dbm, decoded(packet, Beacon.decode_frame))
         self._neighbors.heard(neighbor)
+        if self._silence is not None:
+            self._silence.heard(reception.src, now_ns=now_ns)
         self._notice(reception.src, packet.header.origin_us * US, now_ns)
-        if self._lease.valid(now_ns):
+        if self._lease.fresh(now_ns):
             self._refresh.compare(neighbor.beacon, now_ns=now_ns)
         self._gradient.hear(neighbor, now_ns=now_ns)
         digest = decoded(packet, Digest.decode_frames) if self._repair else None
@@ -403,9 +422,11 @@ class Clustered(RoutingProtocol):
         motion = self._motion(now_ns)
         self._whereabouts.told(motion)
         join = Join(self._port.node, motion.position, motion.velocity, instead_of)
-        self._flood_control(Kind.JOIN, join.encode_frame(self._port.node), now_ns=now_ns)
+        objects = instead_of == self._port.node
+        self._flood_control(Kind.JOIN, join.encode_frame(self._port.node), now_ns=now_ns, urgent=objects)
 
-    def _flood_control(self, kind: Kind, inner: bytes, *, now_ns: int) -> Packet:
+    def _flood_control(self, kind: Kind, inner: bytes, *, now_ns: int, urgent: bool = False) -> Packet:
+        """Tell everyone; `urgent`: before data, where there are turns for it."""
         packet = self._port.announce(
             kind, inner, now_ns=now_ns, flags=FLAG_FLOOD, hop_limit=self._port.scenario.routing.hop_limit
         )

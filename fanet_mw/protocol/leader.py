@@ -25,6 +25,12 @@ SETTLE_NS: Final = 700 * MS
 """Quiet time after the last join before the clusters are computed."""
 OBJECTION_NS: Final = 2 * S
 """A head that somebody stands in for has so long to show that it lives; meanwhile its cluster is served."""
+_MISSED_NS: Final = 4 * S
+"""A node was silent for about this long when it is said."""
+_SURE: Final = 0.9
+"""Of the range of a link: places are good to a tenth of it."""
+_OBJECTION_PERIODS: Final = 4
+"""And this long with a timetable: the word that it is silent waits for a contention window, its answer for a turn."""
 ANSWER_NS: Final = 3500 * MS
 """Joins that answer a call have come after this: they are spread over 3 s."""
 _FIRST_CALL_NS: Final = 5 * S
@@ -36,10 +42,13 @@ _DRIFT: Final = 0.03
 
 
 class _StandIn(NamedTuple):
-    """Who serves a cluster in place of its silent head, and since when we know."""
+    """Who serves a cluster in place of its silent head, or only missed the node."""
 
     node: NodeId
     since_ns: int
+    """When we heard of it."""
+    said_ns: int
+    """When it was said: whoever generated something later lives."""
 
 
 class _Assigned(NamedTuple):
@@ -69,6 +78,7 @@ class Leader:
         self._reassign_ns = seconds_to_ns(clusters.reassign_s)
         self._range_m = clusters.link_m or scenario.radio.range_m
         self._by_links = clusters.relay == "scheduled"
+        self._objection_ns = max(OBJECTION_NS, _OBJECTION_PERIODS * clusters.period_ns if self._by_links else 0)
         self._division = Division(clusters.method, count=clusters.count, range_m=self._range_m)
         self._epoch = epoch
         self._motions: dict[NodeId, Motion] = {}
@@ -88,10 +98,22 @@ class Leader:
         self._motions[node] = Motion(join.position, join.velocity, born_ns)
         if known is None:
             self._due_ns = max(now_ns + SETTLE_NS, self._not_before_ns)
-        if silent in self._motions and silent != node:
-            since_ns = self._stand_ins[silent].since_ns if silent in self._stand_ins else now_ns
-            self._stand_ins[silent] = _StandIn(node, since_ns)
-            self._due_ns = min(self._due_ns, max(since_ns + OBJECTION_NS, now_ns))
+        if silent != node:
+            self.suspect(silent, node, self._motions[node], now_ns=now_ns)
+
+    def suspect(self, silent: NodeId, by: NodeId, there: Motion, *, now_ns: int) -> None:
+        """A node is said to be silent, by one who says where it is itself: it has a moment to object."""
+        if silent in self._motions and (not self._by_links or self._near(silent, there)):
+            known = self._stand_ins.get(silent, _StandIn(by, now_ns, there.at_ns))
+            self._stand_ins[silent] = known._replace(node=by)
+            self._due_ns = min(self._due_ns, max(known.since_ns + self._objection_ns, now_ns))
+
+    def _near(self, node: NodeId, there: Motion) -> bool:
+        """Whether the two should have heard each other all the while: who flew away is not silent, but elsewhere."""
+        known = self._motions[node]
+        instants = (there.at_ns - _MISSED_NS, there.at_ns)
+        apart = (known.position_at(t_ns).minus(there.position_at(t_ns)).norm() for t_ns in instants)
+        return max(apart) <= _SURE * self._range_m
 
     def next_wake_ns(self) -> int:
         return self._due_ns
@@ -119,10 +141,12 @@ class Leader:
         for node in sorted(self._motions):
             last_ns = max(self._signs.last_ns(node) or 0, self._motions[node].at_ns)
             stand_in = self._stand_ins.get(node)
-            if stand_in is not None and last_ns > stand_in.since_ns:
+            if stand_in is not None and last_ns > stand_in.said_ns:
                 del self._stand_ins[node]  # it objected
                 stand_in = None
-            if now_ns - last_ns > LOST_NS or (stand_in is not None and now_ns >= stand_in.since_ns + OBJECTION_NS):
+            if now_ns - last_ns > LOST_NS or (
+                stand_in is not None and now_ns >= stand_in.since_ns + self._objection_ns
+            ):
                 del self._motions[node]
 
     def _renew(self, here: Motion, now_ns: int) -> None:

@@ -53,6 +53,10 @@ class Lease:
         """Whether the leader has been heard of lately."""
         return self.authority is not None and now_ns <= self._until_ns
 
+    def fresh(self, now_ns: int) -> bool:
+        """Whether it was heard of so lately that nobody need worry: who cannot say so asks its neighbors, in time."""
+        return self.authority is not None and now_ns <= self._until_ns - self._silence_ns // 2
+
     def accept(self, authority: Authority, *, born_ns: int, now_ns: int) -> bool:
         """Whether to obey an announcement that was made at `born_ns`; if so, its authority holds from now on."""
         until_ns = born_ns + self._silence_ns

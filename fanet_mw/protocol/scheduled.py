@@ -30,6 +30,8 @@ from fanet_mw.wire import CAPACITY, FLAG_FLOOD, HEADER_BYTES, OVERHEAD, PLACES, 
 
 _SCHEDULE_BYTES: Final = SCHEDULE.layout.size + OVERHEAD
 _PLACES_BYTES: Final = PLACES.layout.size + OVERHEAD
+_JITTER: Final = 0.25
+"""Of the contention window: the most that a relay waits there."""
 _FEWER: Final = 0.85
 """When the turns do not suffice for the load, try this much of it, and so on."""
 
@@ -72,11 +74,16 @@ class Scheduled(Clustered):
         self._interval_ns = seconds_to_ns(scenario.traffic.interval_s)
         self._admission = (
             None
-            if scenario.traffic.deadline_s is None or (self._leader is not None and not leader_load(scenario))
+            if scenario.traffic.deadline_s is None or (port.node == scenario.leader and not leader_load(scenario))
             else Admission(
                 port.node, deadline_ns=seconds_to_ns(scenario.traffic.deadline_s), interval_ns=self._interval_ns
             )
         )
+
+    def start(self, now_ns: int) -> None:
+        super().start(now_ns)
+        if self._admission is not None:
+            self._admission.start(now_ns)
 
     # --- the timetable --------------------------------------------------------------------------------------------
 
@@ -196,8 +203,8 @@ class Scheduled(Clustered):
         else:  # the schedule has made us head, its timetable is still to come
             super()._enqueue(packet, now_ns=now_ns)
 
-    def _flood_control(self, kind: Kind, inner: bytes, *, now_ns: int) -> Packet:
-        if kind is Kind.JOIN or not self._plans or not self._plans[-1].roots:
+    def _flood_control(self, kind: Kind, inner: bytes, *, now_ns: int, urgent: bool = False) -> Packet:
+        if (kind is Kind.JOIN and not urgent) or not self._plans or not self._plans[-1].roots:
             # Our turns are for what the bound is about; a join may contend.
             return super()._flood_control(kind, inner, now_ns=now_ns)
         packet = self._port.announce(
@@ -243,7 +250,9 @@ class Scheduled(Clustered):
         return start_ns if plan is None else plan.turns.contending_ns(start_ns, self._window_random)
 
     def _start_ns(self, *, now_ns: int, jitter_ns: int) -> int:
-        return self._contending_ns(super()._start_ns(now_ns=now_ns, jitter_ns=jitter_ns))
+        # A flood whose relays wait for longer than the window lasts goes one hop a superframe.
+        most_ns = round(self._port.scenario.clusters.contention_ms * MS * _JITTER)
+        return self._contending_ns(super()._start_ns(now_ns=now_ns, jitter_ns=min(jitter_ns, most_ns)))
 
     def hello_start_ns(self, start_ns: int) -> int:
         return self._contending_ns(start_ns)
@@ -252,10 +261,16 @@ class Scheduled(Clustered):
 
     def next_wake_ns(self) -> int | None:
         own_ns, roots_ns = super().next_wake_ns(), self._roots.next_wake_ns()
+        if self._admission is not None:
+            said_ns = self._admission.next_wake_ns()
+            own_ns = said_ns if own_ns is None or (said_ns is not None and said_ns < own_ns) else own_ns
         return roots_ns if own_ns is None or (roots_ns is not None and roots_ns < own_ns) else own_ns
 
     def wake(self, now_ns: int) -> None:
         super().wake(now_ns)
+        lost = self._admission.wake(now_ns) if self._admission else None
+        if lost is not None:
+            self._port.record(lost)
         for packet in self._roots.expire(before_us=(now_ns - self._lifetime_ns) // US):
             self._port.drop(DropReason.EXPIRED, packet, now_ns=now_ns)
         for packet, start_ns in self._roots.due(now_ns=now_ns):

@@ -34,6 +34,7 @@ class Event(StrEnum):
     HEAD_SILENT = "head silent, its turn"
     HEAD_REPLACED = "another stands in for the head"
     HEAD_BACK = "the named head lives"
+    SAID_SILENT = "said to be silent"
 
 
 class Action(StrEnum):
@@ -71,12 +72,14 @@ TRANSITIONS: Final[Mapping[tuple[State, Event], Row]] = {
     (State.MEMBER, Event.HEAD_SILENT): Row(State.ACTING, Action.TAKE_OVER),
     (State.MEMBER, Event.HEAD_REPLACED): Row(State.MEMBER, Action.FOLLOW),
     (State.MEMBER, Event.HEAD_BACK): Row(State.MEMBER, Action.FOLLOW),
+    (State.MEMBER, Event.SAID_SILENT): Row(State.MEMBER, Action.OBJECT),
     (State.HEAD, Event.NAMED_MEMBER): Row(State.MEMBER, Action.FOLLOW),
     (State.HEAD, Event.NAMED_HEAD): Row(State.HEAD, Action.SERVE),
     (State.HEAD, Event.LEFT_OUT): Row(State.SEEKING, Action.LEAVE),
     (State.HEAD, Event.NEW_LEADER): Row(State.HEAD, Action.JOIN),
     (State.HEAD, Event.LEADER_SILENT): Row(State.LEADING, Action.CALL),
     (State.HEAD, Event.HEAD_REPLACED): Row(State.HEAD, Action.OBJECT),
+    (State.HEAD, Event.SAID_SILENT): Row(State.HEAD, Action.OBJECT),
     (State.ACTING, Event.NAMED_MEMBER): Row(State.MEMBER, Action.FOLLOW),
     (State.ACTING, Event.NAMED_HEAD): Row(State.HEAD, Action.SERVE),
     (State.ACTING, Event.LEFT_OUT): Row(State.SEEKING, Action.LEAVE),
@@ -85,6 +88,7 @@ TRANSITIONS: Final[Mapping[tuple[State, Event], Row]] = {
     (State.ACTING, Event.HEAD_SILENT): Row(State.ACTING, Action.TAKE_OVER),
     (State.ACTING, Event.HEAD_REPLACED): Row(State.MEMBER, Action.FOLLOW),
     (State.ACTING, Event.HEAD_BACK): Row(State.MEMBER, Action.FOLLOW),
+    (State.ACTING, Event.SAID_SILENT): Row(State.ACTING, Action.OBJECT),
     (State.LEADING, Event.LEFT_OUT): Row(State.LEADING, Action.RESIGN),
     (State.LEADING, Event.NEW_LEADER): Row(State.SEEKING, Action.STEP_DOWN),
 }

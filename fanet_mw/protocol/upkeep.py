@@ -14,7 +14,7 @@ from fanet_mw.protocol.lease import Authority, Lease
 from fanet_mw.protocol.membership import Membership
 from fanet_mw.protocol.signs import Signs
 from fanet_mw.protocol.states import Action, Event, State, step
-from fanet_mw.units import NodeId
+from fanet_mw.units import MS, NodeId
 from fanet_mw.wire import Join, Schedule
 
 _SILENT_HELLOS: Final = 4.0
@@ -22,6 +22,7 @@ _GIVEN_UP_HELLOS: Final = 2.0
 _TURN_HELLOS: Final = 0.5
 _AGAIN_HELLOS: Final = 2.0
 """Who stands in says so again at this interval, until a new schedule confirms it or the head objects."""
+_OBJECT_NS: Final = 500 * MS
 
 
 class Upkeep:
@@ -53,6 +54,7 @@ class Upkeep:
         """Since when we follow the head that we follow."""
         self._named = NodeId(0)
         self._given_up_ns = -1
+        self._object_ns = 0
         self._watch_ns: int | None = None
 
     def start(self, now_ns: int, *, leads: bool) -> None:
@@ -96,8 +98,10 @@ class Upkeep:
         return actions
 
     def stands_in(self, join: Join, *, born_ns: int, now_ns: int) -> list[Action]:
-        """A node says that it stands in for the head of a cluster."""
+        """A node says that it stands in for the head of a cluster; in a timetable, that some node is silent."""
         member = self._membership
+        if not self._takes_slot and (join.instead_of == self._node or join.instead_of != member.head):
+            return self._object(join, now_ns)
         rank, current = member.rank(join.node), member.rank(member.head)
         if not rank or current is None or self.state is State.LEADING or join.node == join.instead_of:
             return []  # of another cluster, or another epoch, or a head that objects
@@ -109,6 +113,14 @@ class Upkeep:
         if self._takes_slot:
             member.follow(NodeId(join.node))
         return [self._take(Event.HEAD_REPLACED, now_ns)]
+
+    def _object(self, join: Join, now_ns: int) -> list[Action]:
+        """Are we said to be silent? Said often, it is answered seldom: each answer is a flood."""
+        called = join.instead_of == self._node != join.node
+        if not called or now_ns < self._object_ns or self.state in (State.SEEKING, State.LEADING):
+            return []
+        self._object_ns = now_ns + _OBJECT_NS
+        return [self._take(Event.SAID_SILENT, now_ns)]
 
     def lives(self, node: int, *, born_ns: int, now_ns: int) -> list[Action]:
         """A sign of life."""

@@ -49,9 +49,13 @@ class Whereabouts:
         """A packet of ours goes to everyone: a sign of life."""
         self._flooded_ns = now_ns
 
+    def may_tell(self, now_ns: int) -> bool:
+        """Whether the last join is long enough ago for another."""
+        return self._told is None or now_ns - self._told.at_ns >= _LEAST_NS
+
     def outdated(self, position: Enu, *, now_ns: int) -> bool:
         """Whether it is time to tell."""
-        if self._told is None or now_ns - self._told.at_ns < _LEAST_NS:
+        if self._told is None or not self.may_tell(now_ns):
             return False
         off_m = position.minus(self._told.position_at(now_ns)).norm()
         return off_m > self._off_m or now_ns - self._flooded_ns > _QUIET_NS

@@ -5,10 +5,12 @@ from hypothesis import given, settings
 from hypothesis import strategies as st
 
 from agents.traffic import sources_of
+from fanet_mw import wire
+from fanet_mw.mavlink import Encoder
 from fanet_mw.protocol.delay import Bounded, Refused
 from fanet_mw.protocol.planner import Plan, cheapest_change, describe, describe_change, plan
 from fanet_mw.protocol.planner.access import ways
-from fanet_mw.protocol.planner.demand import TrafficClass
+from fanet_mw.protocol.planner.demand import TrafficClass, demands
 from fanet_mw.protocol.planner.flood import FloodCost
 from fanet_mw.protocol.planner.head import Share, slot_delays, work_ns
 from fanet_mw.protocol.planner.search import _changes
@@ -274,7 +276,7 @@ def test_every_packet_goes_through_all_nodes_between_it_and_its_head() -> None:
     assert {n: row[0] for n, row in found.through.items()} == {1: 1, 2: 2, 3: 0, 4: 1, 5: 1}
 
 
-@pytest.mark.parametrize("rule", ["heads", "cds", "mpr", "claimed"])
+@pytest.mark.parametrize("rule", ["heads", "cds", "mpr"])
 def test_relays_that_are_not_estimated_are_planned_as_if_all_relayed(rule: str) -> None:
     def planned(relay: str) -> Plan:
         scenario = catalog.find("clusters", [f"clusters.relay={relay}", "traffic.interval_s=2", "clusters.count=8"])
@@ -282,4 +284,20 @@ def test_relays_that_are_not_estimated_are_planned_as_if_all_relayed(rule: str) 
         return plan(scenario, at)
 
     assert [cluster.flood for cluster in planned(rule).clusters] == [c.flood for c in planned("all").clusters]
-    assert ("slots are claimed" in describe(planned(rule))) is (rule == "claimed")
+
+
+def test_a_lifetime_is_that_of_the_class(planned) -> None:
+    keys = {"mission.survivors": 4, "routing.report_lifetime_s": 4, "routing.lifetime_s": 30}
+    (problem,) = planned(**keys).problems
+    assert problem.startswith("report: takes up to")
+    assert "expires after routing.report_lifetime_s = 4" in problem
+    assert planned(**{**keys, "routing.report_lifetime_s": 0}).feasible
+
+
+def test_warnings_are_a_class_of_their_own_that_expires_first(planned) -> None:
+    found = planned(**{"mission.collision_horizon_s": 12, "mission.collision_distance_m": 15})
+    assert [c.name for c in found.classes] == ["warning", "application"]
+    warning = demands(found.scenario)[0]
+    said = Encoder(NodeId(1)).collision(NodeId(2), closest_s=1.0, altitude_m=0.0, horizontal_m=0.0)
+    assert warning.payload_bytes == wire.HEADER_BYTES + len(said)
+    assert any("warning" in p and "routing.safety_lifetime_s = 1" in p for p in found.problems)

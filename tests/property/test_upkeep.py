@@ -154,6 +154,45 @@ def test_with_the_other_methods_every_member_hears_its_head(method: str) -> None
         assert head == node or swarm.hear_each_other(NodeId(node), head)
 
 
+def timetabled() -> Swarm:
+    """Every node a head, the leader in the middle of a line: whoever dies between it and the others is a relay."""
+    return standing(relay="scheduled", count=NODES - 1)
+
+
+def listed(swarm: Swarm, node: int) -> bool:
+    return swarm.protocol(NodeId(1))._membership.lists(node)
+
+
+def joins(swarm: Swarm) -> set[tuple[int, int]]:
+    """(origin, sequence number) of all control floods but announcements, once each."""
+    return {(origin, seq) for _, origin, seq in swarm.relayed if seq >= 1 << 31}
+
+
+def test_a_dead_relay_leaves_the_timetable_as_soon_as_its_neighbors_miss_it() -> None:
+    swarm = timetabled()
+    swarm.relayed.clear()
+    swarm.kill(3)
+    swarm.advance(4 * S)
+    assert listed(swarm, 3)
+    swarm.advance(8 * S)
+    assert not listed(swarm, 3)
+    assert swarm.settled() == []
+    assert max(Counter(origin for origin, _ in joins(swarm)).values()) == 1, "nobody says it twice"
+
+
+def test_a_node_that_is_no_longer_heard_by_one_objects_and_keeps_its_place() -> None:
+    swarm = timetabled()
+    swarm.walls = {frozenset((NodeId(3), NodeId(2)))}
+    epoch = swarm.protocol(NodeId(1)).report()["epoch"]
+    swarm.relayed.clear()
+    swarm.advance(16 * S)
+    said = Counter(origin for origin, _ in joins(swarm))
+    assert {2, 3} & set(said), "one told of the other, who objected"
+    assert max(said.values()) <= 3, "its place told once, one word and one objection"
+    assert all(listed(swarm, node) for node in range(2, NODES + 1))
+    assert swarm.protocol(NodeId(1)).report()["epoch"] == epoch
+
+
 # --- the table ----------------------------------------------------------------------------------------------------
 
 
@@ -189,7 +228,7 @@ nodes = st.integers(1, NODES)
 class AnySwarm(RuleBasedStateMachine):
     """Joins, deaths, restarts, moves, walls and losses; then calm."""
 
-    @initialize(started=st.sets(nodes, min_size=2), relay=st.sampled_from(["all", "counter"]))
+    @initialize(started=st.sets(nodes, min_size=2), relay=st.sampled_from(["all", "counter", "scheduled"]))
     def begin(self, started: set[int], relay: str) -> None:
         self.swarm = Swarm(scenario(relay=relay, assess_ms=50), line())
         for node in sorted(started):

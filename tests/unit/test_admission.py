@@ -3,7 +3,7 @@
 from hypothesis import given
 from hypothesis import strategies as st
 
-from fanet_mw.protocol.admission import Admission, Own, least_interval_ns
+from fanet_mw.protocol.admission import EXPECTED_NS, Admission, Own, least_interval_ns
 from fanet_mw.protocol.turns import Turns
 from fanet_mw.trace import DeadlineLost, DeadlineMet
 from fanet_mw.units import MS, NodeId, S
@@ -53,3 +53,27 @@ def test_where_no_rate_meets_the_deadline_what_the_turns_carry_is_let_in() -> No
     lost = admission.follow(Own(Turns(0, 500 * MS, 40 * MS, 2 * MS, 230), (0, 100), 10), now_ns=0)
     assert isinstance(lost, DeadlineLost)
     assert [t for t in range(0, 1001 * MS, 50 * MS) if admission.admits(t)] == [0, 250 * MS, 500 * MS, 750 * MS, S]
+
+
+def test_before_there_should_be_a_bound_its_absence_is_not_said_and_then_once() -> None:
+    admission = Admission(ME, deadline_ns=600 * MS, interval_ns=1 * S)
+    admission.start(2 * S)
+    due_ns = 2 * S + EXPECTED_NS
+    assert admission.follow(None, now_ns=4 * S) is None
+    assert admission.next_wake_ns() == due_ns
+    assert admission.wake(due_ns - 1) is None
+    assert admission.wake(due_ns) == DeadlineLost(due_ns, ME, 0, 600 * MS, 1 * S)
+    assert admission.next_wake_ns() is None
+    assert admission.follow(None, now_ns=due_ns + S) is None
+    own = Own(Turns(0, 500 * MS, 40 * MS, 2 * MS, 230), (0,), 10)
+    assert isinstance(admission.follow(own, now_ns=due_ns + 2 * S), DeadlineMet)
+    assert isinstance(admission.follow(None, now_ns=due_ns + 3 * S), DeadlineLost)
+
+
+def test_who_had_a_bound_says_at_once_that_it_is_gone() -> None:
+    admission = Admission(ME, deadline_ns=600 * MS, interval_ns=1 * S)
+    admission.start(0)
+    own = Own(Turns(0, 500 * MS, 40 * MS, 2 * MS, 230), (0,), 10)
+    assert isinstance(admission.follow(own, now_ns=4 * S), DeadlineMet)
+    assert admission.next_wake_ns() is None
+    assert isinstance(admission.follow(None, now_ns=5 * S), DeadlineLost)

@@ -252,3 +252,39 @@ def test_pymavlinks_own_reader_reads_the_log(tmp_path: Path, monkeypatch: pytest
         assert log.sysid == 7  # it took us for a vehicle
     finally:
         log.close()
+
+
+# --- in radio frames ----------------------------------------------------------------------------------------------
+
+
+def in_a_frame(inner: bytes) -> bytes:
+    header = wire.Header(0, 1, 7, 0xFFFF, 7, wire.Kind.DATA, 9, 0, wire.PRIORITY_SAFETY, 0)
+    return header.encode() + inner
+
+
+@given(st.integers(1, 65_534), st.floats(0, 3600), st.floats(0, 1000), st.floats(0, 1000))
+def test_a_collision_is_read_back_as_it_was_said(other, closest_s, altitude_m, horizontal_m) -> None:
+    inner = Encoder(NODE).collision(
+        NodeId(other), closest_s=closest_s, altitude_m=altitude_m, horizontal_m=horizontal_m
+    )
+    found = mavlink.collision_of(in_a_frame(wire.filler(40) + inner))
+    assert found.other == other
+    assert found[1:] == pytest.approx((closest_s, altitude_m, horizontal_m), rel=1e-6, abs=1e-30)
+
+
+@pytest.mark.parametrize(
+    ("other", "values"),
+    [(0, (1.0, 1.0, 1.0)), (70_000, (1.0, 1.0, 1.0)), (3, (math.nan, 1.0, 1.0)), (3, (1.0, -1.0, 1.0))],
+)
+def test_a_collision_with_no_node_or_at_no_distance_is_malformed(other, values) -> None:
+    closest_s, altitude_m, horizontal_m = values
+    inner = Encoder(NODE).collision(other, closest_s=closest_s, altitude_m=altitude_m, horizontal_m=horizontal_m)
+    with pytest.raises(MalformedFrameError, match="collision from source 1"):
+        mavlink.collision_of(in_a_frame(inner))
+
+
+@given(st.binary(max_size=80))
+def test_whatever_follows_a_header_is_a_position_or_malformed(rest: bytes) -> None:
+    for read in (mavlink.kinematics_of, mavlink.collision_of):
+        with suppress(MalformedFrameError):
+            read(in_a_frame(rest))

@@ -4,8 +4,8 @@
 make it feasible, `optimum` what would meet a deadline with the least airtime; `describe` puts them into lines.
 """
 
-from fanet_mw.protocol.planner.demand import TrafficClass, demands
-from fanet_mw.protocol.planner.feasibility import ClassPlan, Plan, Site, evaluate
+from fanet_mw.protocol.planner.demand import ClassPlan, TrafficClass, demands
+from fanet_mw.protocol.planner.feasibility import Plan, Site, evaluate
 from fanet_mw.protocol.planner.head import ClusterPlan
 from fanet_mw.protocol.planner.loss import Loss, loss
 from fanet_mw.protocol.planner.optimum import Optimum, optimum

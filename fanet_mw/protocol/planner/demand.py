@@ -1,18 +1,20 @@
 """What the swarm wants to send: traffic classes out of a scenario.
 
-Each class is periodic per source. Survivor reports count one survivor heard by every UAV at a time: who hears two at
-once reports twice as often. Saturated sources have no period, Poisson arrivals no least interval: neither can be
-planned.
+Each class is periodic per source. Warnings count one conflict of every UAV at a time, survivor reports one survivor
+heard by every UAV: who hears two at once reports twice as often. Saturated sources have no period, Poisson arrivals no
+least interval: neither can be planned.
 """
 
 from collections.abc import Sequence
 from typing import Final, NamedTuple
 
 from fanet_mw import wire
-from fanet_mw.protocol.delay import Refused
+from fanet_mw.protocol.delay import Bounded, Outcome, Refused
 from fanet_mw.scenario import Scenario
 from fanet_mw.units import NodeId, seconds_to_ns
 
+_WARNING_BYTES: Final = wire.HEADER_BYTES + 19 + wire.OVERHEAD
+"""COLLISION has 19 bytes (common.xml)."""
 _REPORT_BYTES: Final = wire.HEADER_BYTES + wire.SURVIVOR.layout.size + wire.OVERHEAD
 
 
@@ -23,18 +25,36 @@ class TrafficClass(NamedTuple):
     payload_bytes: int
     interval_ns: int
     sources: tuple[NodeId, ...]
+    priority: int = wire.PRIORITY_BULK
 
     @property
     def per_second(self) -> float:
         return len(self.sources) * 1e9 / self.interval_ns
 
 
+class ClassPlan(NamedTuple):
+    """A traffic class: its bound from the source to the last node, and from the head on."""
+
+    name: str
+    sources: int
+    interval_ns: int
+    bound: Outcome
+    from_head: Outcome
+    priority: int = wire.PRIORITY_BULK
+
+    def meets(self, deadline_ns: int) -> bool:
+        return isinstance(self.bound, Bounded) and self.bound.delay_ns <= deadline_ns
+
+
 def demands(scenario: Scenario, sources: Sequence[NodeId] | None = None) -> list[TrafficClass] | Refused:
     """The classes, most urgent first. `sources` of the application traffic; by default every node that may be one."""
     found = []
+    if scenario.mission.collision_horizon_s:
+        interval_ns = seconds_to_ns(scenario.mission.collision_repeat_s)
+        found.append(TrafficClass("warning", _WARNING_BYTES, interval_ns, _all(scenario), wire.PRIORITY_SAFETY))
     if scenario.mission.survivors:
         interval_ns = seconds_to_ns(scenario.mission.report_interval_s)
-        found.append(TrafficClass("report", _REPORT_BYTES, interval_ns, _all(scenario)))
+        found.append(TrafficClass("report", _REPORT_BYTES, interval_ns, _all(scenario), wire.PRIORITY_REPORT))
     traffic = scenario.traffic
     if traffic.arrivals in ("saturated", "poisson"):
         return Refused(f'traffic.arrivals = "{traffic.arrivals}" has no least interval, so nothing bounds its delay')

@@ -10,15 +10,17 @@ Feasible: each slot is stable, every packet is through before its lifetime and a
 and a flood reaches everyone.
 """
 
-from collections.abc import Iterator, Mapping, Sequence
+from collections.abc import Mapping, Sequence
 from typing import Final, NamedTuple
 
+from fanet_mw.protocol.claimed import geometry, turn_bytes
 from fanet_mw.protocol.clustering import Cluster, balanced
 from fanet_mw.protocol.delay import Bounded, Outcome, Refused, paper
 from fanet_mw.protocol.guard import PLANNED_ERROR_NS, slot_guard_ns
-from fanet_mw.protocol.planner import parts
+from fanet_mw.protocol.planner import parts, verdict
 from fanet_mw.protocol.planner.access import Ways, access_outcome, ways
-from fanet_mw.protocol.planner.demand import TrafficClass
+from fanet_mw.protocol.planner.claimed import Claimants, Claims
+from fanet_mw.protocol.planner.demand import ClassPlan, TrafficClass
 from fanet_mw.protocol.planner.flood import FloodCost, flood_cost
 from fanet_mw.protocol.planner.goodput_bound import Goodput, any_protocol
 from fanet_mw.protocol.planner.head import ClusterPlan, Share, slot_delays, work_ns
@@ -26,22 +28,9 @@ from fanet_mw.protocol.planner.turns import Candidate, Superframe, judge, superf
 from fanet_mw.protocol.scheduled import leader_load, schedule_parts
 from fanet_mw.protocol.topology import Adjacency, within_range
 from fanet_mw.scenario import Scenario
-from fanet_mw.units import MS, Enu, NodeId, S, seconds_to_ns
+from fanet_mw.units import Enu, NodeId, S
 
 _ASSUMED_UPLINK_NS: Final = 1 * S
-
-
-class ClassPlan(NamedTuple):
-    """A traffic class: its bound from the source to the last node, and from the head on."""
-
-    name: str
-    sources: int
-    interval_ns: int
-    bound: Outcome
-    from_head: Outcome
-
-    def meets(self, deadline_ns: int) -> bool:
-        return isinstance(self.bound, Bounded) and self.bound.delay_ns <= deadline_ns
 
 
 class Plan(NamedTuple):
@@ -55,7 +44,9 @@ class Plan(NamedTuple):
     paper: Outcome
     """What equations (1)-(4) say of the fullest cluster: to compare with, not to rely on."""
     superframe: Superframe | None
-    """None where relays contend."""
+    """None without a timetable."""
+    claims: Claims | None
+    """Only with claimed slots; then `clusters` are the nodes."""
     cut_off: tuple[NodeId, ...]
     """Nodes that no flood of the leader's part of the swarm reaches."""
     goodput: Goodput | None
@@ -79,13 +70,15 @@ class Plan(NamedTuple):
     def carried_per_second(self) -> float | None:
         """Application packets per second, all sources together, that this configuration carries; None: unknown.
 
-        Exact for a timetable whose capacity was asked for; where relays contend, what would fill the fullest slot.
+        Exact for a timetable whose capacity was asked for; where relays contend, what would fill the fullest slot; in
+        claimed slots what fills the fullest node, on average.
         """
         application = next((c for c in self.classes if c.name == "application"), None)
         if application is None or not application.sources:
             return None
-        if self.superframe is not None:
-            least_ns = self.superframe.least_interval_ns
+        exact = self.superframe or self.claims
+        if exact is not None:
+            least_ns = exact.least_interval_ns
             return None if least_ns is None else application.sources * S / least_ns
         used = self.bottleneck.utilization if self.bottleneck else 0.0
         return application.sources * S / application.interval_ns / used if used else None
@@ -104,13 +97,23 @@ class Site:
         self.positions = positions
         self.adjacency = within_range(positions, range_m=scenario.radio.range_m) if adjacency is None else adjacency
         self._floods: dict[tuple[NodeId, int], FloodCost] = {}
+        self._claimants: dict[object, Claimants] = {}
 
     def of(self, scenario: Scenario) -> "Site":
         """The same nodes under another scenario; floods cost the same where the rules of relaying are the same."""
         other = Site(scenario, self.positions, self.adjacency)
         if scenario.clusters.relay == self.scenario.clusters.relay and scenario.radio == self.scenario.radio:
             other._floods = self._floods
+        other._claimants = self._claimants
         return other
+
+    def claimants(self) -> Claimants:
+        """Slots and relays where slots are claimed; they follow from positions and the geometry of turns."""
+        scenario = self.scenario
+        key = geometry(scenario, turn_bytes(scenario)), scenario.clusters.slots, scenario.radio
+        if key not in self._claimants:
+            self._claimants[key] = Claimants(scenario, self.adjacency)
+        return self._claimants[key]
 
     @property
     def timetable(self) -> bool:
@@ -165,7 +168,7 @@ def evaluate(site: Site, classes: Sequence[TrafficClass], *, deadline_ns: int | 
     ]
     judged = (_in_turns if site.timetable else _in_slots)(site, candidates, uplink_ns)
     summed = tuple(_class(index, c, judged, uplink_ns) for index, c in enumerate(classes))
-    late = () if judged.unfit or judged.cut_off or deadline_ns is None else tuple(_late(summed, deadline_ns))
+    late = () if judged.unfit or judged.cut_off or deadline_ns is None else tuple(verdict.late(summed, deadline_ns))
     cut_off = tuple(parts.problems(judged.cut_off))
     return Plan(
         scenario=scenario,
@@ -175,24 +178,22 @@ def evaluate(site: Site, classes: Sequence[TrafficClass], *, deadline_ns: int | 
         uplink_ns=uplink_ns,
         paper=_paper(judged.clusters, scenario),
         superframe=judged.superframe,
+        claims=None,
         cut_off=judged.cut_off,
-        goodput=_goodput(site, classes),
+        goodput=goodput(site, classes),
         deadline_ns=deadline_ns,
-        problems=judged.unfit or (*cut_off, *_problems(scenario, judged.clusters, summed, cut_off), *late),
-        notes=(*_notes(access, judged.clusters, site, uplink_ns), *_left_out(scenario)),
+        problems=judged.unfit or (*cut_off, *verdict.problems(scenario, judged.clusters, summed, cut_off), *late),
+        notes=(
+            *verdict.notes(access, judged.clusters, guard_ns=site.guard_ns, uplink_ns=uplink_ns),
+            *verdict.left_out(scenario),
+        ),
     )
 
 
-def _goodput(site: Site, classes: Sequence[TrafficClass]) -> Goodput | None:
+def goodput(site: Site, classes: Sequence[TrafficClass]) -> Goodput | None:
     everyone = site.scenario.traffic.destination == "all"
     sources = next((c.sources for c in classes if c.name == "application"), ())
     return any_protocol(site.scenario, site.adjacency, sources) if everyone else None
-
-
-def _late(classes: Sequence[ClassPlan], deadline_ns: int) -> Iterator[str]:
-    for c in classes:
-        if isinstance(c.bound, Bounded) and not c.meets(deadline_ns):
-            yield (f"{c.name}: takes up to {c.bound.delay_ns / MS:.1f} ms, the deadline is {deadline_ns / MS:g} ms")
 
 
 def _loads(
@@ -308,18 +309,22 @@ def _packets(shares: Sequence[Share], period_ns: int) -> float:
     return sum(s.sources * period_ns / s.interval_ns for s in shares)
 
 
+def _planned(c: TrafficClass, bound: Outcome, from_head: Outcome) -> ClassPlan:
+    return ClassPlan(c.name, len(c.sources), c.interval_ns, bound, from_head, c.priority)
+
+
 def _class(index: int, c: TrafficClass, judged: _Judged, uplink_ns: int) -> ClassPlan:
     if judged.cut_off:
         refused = Refused(f"{len(judged.cut_off)} nodes are out of reach")
-        return ClassPlan(c.name, len(c.sources), c.interval_ns, refused, refused)
+        return _planned(c, refused, refused)
     worst_ns = 0
     for cluster in judged.clusters:
         outcome = cluster.delays[index]
         if isinstance(outcome, Refused):
             refused = outcome if judged.unfit else Refused(f"head {cluster.head}: {outcome.reason}")
-            return ClassPlan(c.name, len(c.sources), c.interval_ns, refused, refused)
+            return _planned(c, refused, refused)
         worst_ns = max(worst_ns, outcome.delay_ns)
-    return ClassPlan(c.name, len(c.sources), c.interval_ns, Bounded(worst_ns + uplink_ns), Bounded(worst_ns))
+    return _planned(c, Bounded(worst_ns + uplink_ns), Bounded(worst_ns))
 
 
 def _paper(clusters: Sequence[ClusterPlan], scenario: Scenario) -> Outcome:
@@ -340,57 +345,3 @@ def _paper(clusters: Sequence[ClusterPlan], scenario: Scenario) -> Outcome:
             return found
         worst_ns = max(worst_ns, found.delay_ns)
     return Bounded(worst_ns)
-
-
-def _problems(
-    scenario: Scenario, clusters: Sequence[ClusterPlan], classes: Sequence[ClassPlan], cut_off: Sequence[str]
-) -> Iterator[str]:
-    full = sorted((c for c in clusters if c.utilization > 1), key=lambda c: (-c.utilization, c.head))
-    if full:
-        worst = full[0]
-        others = "" if len(full) == 1 else f"; {len(full) - 1} other slots are too full as well"
-        yield (
-            f"head {worst.head}: the {worst.packets:.1f} packets of a flooding period take "
-            f"{worst.work_ns / 1e6:.1f} ms, its slot of {worst.slot_ns / 1e6:.1f} ms has "
-            f"{worst.usable_ns / 1e6:.1f} ms for them{others}"
-        )
-    for cluster in clusters:
-        if cluster.backlog is not None and cluster.backlog > scenario.routing.queue_frames:
-            yield (
-                f"head {cluster.head}: up to {cluster.backlog} packets wait, "
-                f"routing.queue_frames = {scenario.routing.queue_frames}"
-            )
-    lifetime_ns = seconds_to_ns(scenario.routing.lifetime_s)
-    for c in classes:
-        if isinstance(c.bound, Refused):
-            if not full and not cut_off:
-                yield f"{c.name}: {c.bound.reason}"
-        elif c.bound.delay_ns > lifetime_ns:
-            yield (
-                f"{c.name}: takes up to {c.bound.delay_ns / S:.1f} s, "
-                f"routing.lifetime_s = {scenario.routing.lifetime_s:g}"
-            )
-
-
-def _left_out(scenario: Scenario) -> Iterator[str]:
-    if scenario.radio.channel != "range":
-        yield "who hears whom is taken by distance, up to radio.range_m, whatever the channel does"
-    if scenario.clusters.relay == "claimed":
-        yield "slots are claimed in flight: this plan is of heads and contending relays, and says little of that"
-    if scenario.clusters.repair_s > 0:
-        yield "repairs of lost packets come later than any bound here, and their load is not counted"
-
-
-def _notes(access: Outcome, clusters: Sequence[ClusterPlan], site: Site, uplink_ns: int) -> Iterator[str]:
-    if isinstance(access, Refused):
-        yield f"the way to the head is assumed to take at most {uplink_ns / S:g} s, not proven: {access.reason}"
-    if any(not cluster.flood.proven for cluster in clusters):
-        yield "floods are relayed by CSMA/CA: their duration and spacing are estimates, and losses are not counted"
-        tail_ns = max(cluster.flood.duration_ns - cluster.flood.spacing_ns for cluster in clusters)
-        if tail_ns > site.guard_ns:
-            yield (
-                f"a slot's last flood runs about {tail_ns / 1e6:.0f} ms into the next slot, the guard time is "
-                f"{site.guard_ns / 1e6:g} ms: floods of neighboring slots meet"
-            )
-    else:
-        yield "floods hold their bound while no frame is lost and the nodes are where the timetable has them"

@@ -1,7 +1,8 @@
 """Plan a scenario, and the cheapest change that makes it feasible: fewest keys first, then the least change of values.
 
 Searched: cluster count and flooding period; under a timetable the backoff that a turn has to hold (`radio.cw_min`) and
-every node a head; where relays contend, a timetable. Last, less application traffic: load that does not fit has to go.
+every node a head; where relays contend, a timetable; in claimed slots the backoff, how many slots, small packets
+together, or a timetable. Last, less application traffic: load that does not fit has to go.
 """
 
 from collections.abc import Iterator, Mapping, Sequence
@@ -12,6 +13,7 @@ from fanet_mw.protocol.delay import Refused
 from fanet_mw.protocol.planner.demand import demands
 from fanet_mw.protocol.planner.feasibility import Plan, Site, evaluate, members_of
 from fanet_mw.protocol.planner.goodput_bound import in_turns
+from fanet_mw.protocol.planner.in_claims import evaluate_claims
 from fanet_mw.protocol.planner.turns import least_interval_ns, superframe_of
 from fanet_mw.protocol.planner.variant import Value, Variant, vary
 from fanet_mw.protocol.scheduled import leader_load
@@ -23,6 +25,7 @@ _COUNTS: Final = (1, 2, 3, 4, 5, 6, 8, 11, 15, 22, 30, 44, 64)
 _PERIODS: Final = (0.1, 0.2, 0.4, 0.5, 0.7, 1.0, 1.4, 2.0, 3.0, 5.0, 10.0)
 """Of the scenario's own period."""
 _TURN_PERIODS_S: Final = (0.1, 0.2, 0.25, 0.3, 0.4, 0.5, 0.7, 1.0, 2.0, 5.0)
+_SLOTS: Final = (0, 6, 8, 10, 12, 14, 16, 20, 24, 32, 48, 64)
 WINDOWS: Final = (31, 15, 7, 3, 1)
 _SLOWER: Final = (1.1, 1.25, 1.5, 2.0, 2.5, 3.0, 4.0, 5.0, 7.0, 10.0, 20.0, 50.0, 100.0)
 
@@ -52,11 +55,14 @@ def plan(
 
 def _judge(site: Site, sources: Sequence[NodeId] | None, deadline_ns: int | None) -> Plan | Refused:
     classes = demands(site.scenario, sources)
-    return classes if isinstance(classes, Refused) else evaluate(site, classes, deadline_ns=deadline_ns)
+    if isinstance(classes, Refused):
+        return classes
+    judged = evaluate_claims if site.scenario.clusters.relay == "claimed" else evaluate
+    return judged(site, classes, deadline_ns=deadline_ns)
 
 
 def with_capacity(found: Plan, positions: Mapping[NodeId, Enu]) -> Plan:
-    """The same plan with the traffic interval down to which its timetable carries everything; takes a second."""
+    """The same plan with the traffic interval down to which its slots carry everything; takes a second."""
     if found.superframe is None or not found.superframe.used or found.cut_off:
         return found
     leader, own = found.scenario.leader, leader_load(found.scenario)
@@ -102,8 +108,8 @@ def hopeless(site: Site, sources: Sequence[NodeId] | None) -> bool:
 
 
 def _changes(scenario: Scenario) -> Iterator[Variant]:
-    options = _turn_options(scenario) if scenario.clusters.relay == "scheduled" else _slot_options(scenario)
-    for settings in options:
+    options = {"scheduled": _turn_options, "claimed": _claim_options}.get(scenario.clusters.relay, _slot_options)
+    for settings in options(scenario):
         variant = vary(scenario, settings)
         if variant is not None:
             yield variant
@@ -116,6 +122,14 @@ def _turn_options(scenario: Scenario) -> Iterator[dict[str, Value]]:
     periods = dict.fromkeys((clusters.flooding_period_s, *_TURN_PERIODS_S))
     for count, window, period_s in product(counts, windows, periods):
         yield {"clusters.count": count, "radio.cw_min": window, "clusters.flooding_period_s": period_s}
+
+
+def _claim_options(scenario: Scenario) -> Iterator[dict[str, Value]]:
+    windows = dict.fromkeys((scenario.radio.cw_min, *(w for w in WINDOWS if w < scenario.radio.cw_min)))
+    together = dict.fromkeys((scenario.routing.aggregate, True))
+    for window, slots, aggregate in product(windows, dict.fromkeys((scenario.clusters.slots, *_SLOTS)), together):
+        yield {"radio.cw_min": window, "clusters.slots": slots, "routing.aggregate": aggregate}
+    yield from ({"clusters.relay": "scheduled", **turned} for turned in _turn_options(scenario))
 
 
 def _slot_options(scenario: Scenario) -> Iterator[dict[str, Value]]:

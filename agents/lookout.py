@@ -1,0 +1,220 @@
+"""Collision warnings at one UAV: who is on a course of conflict, whom to tell, and how to fly until it is past.
+
+    own fixes, others' hellos -> closest point of approach too near, too soon -> warn it, change height
+    a warning that names us   -> the same, even if we do not hear the other one
+    far enough, sideways      -> the course as before
+
+Heights need no agreement, only the ids: for each other one a UAV goes one level up if its own id is the lower one, else
+one down. So two always part, of three in conflict with each other no two share a level, and a warning need not say
+which way its sender goes. A level is the distance to be kept. Sans-IO.
+
+Both fly on sideways as they did. Not modelled: turns that the other one has planned, and conflicts that the change of
+height itself causes until the next hello shows them.
+"""
+
+import math
+from dataclasses import dataclass
+from typing import Final, NamedTuple
+
+from agents.mission import HOME, Course
+from fanet_mw.approach import Approach, closest
+from fanet_mw.mavlink import Collision
+from fanet_mw.protocol.whereabouts import Motion
+from fanet_mw.scenario import Scenario
+from fanet_mw.trace import ConflictForeseen, ConflictOver, Record
+from fanet_mw.units import MS, Enu, NodeId, S, seconds_to_ns
+
+_LIFETIME_HELLOS: Final = 3.5
+"""What was heard of another UAV counts for so many hello intervals."""
+_FUTURE_NS: Final = S
+"""A position from further ahead is none: clocks agree better than that."""
+_CLEAR: Final = 1.5
+"""A conflict is over when the two will stay this much farther apart, sideways, than they must."""
+_PAST_NS: Final = 3 * S
+"""After the closest approach of a UAV that we were only told of."""
+_CLIMB_M_S: Final = 4.0
+"""A small multirotor's comfortable rate."""
+_LEVELS: Final = 2
+"""At most so many levels up or down: `nodes.altitude_m` has room for them."""
+_AHEAD_S: Final = 10.0
+"""How far ahead our setpoints lie: the farther, the less a fix's error turns the course that others hear of."""
+_SOON_S: Final = 2.0
+"""In which a height, or a goal, is approached when it is near."""
+_LEAST_M_S: Final = 0.5
+_EVER_S: Final = 1e6
+
+
+class Alert(NamedTuple):
+    """What we have to say of another UAV."""
+
+    other: NodeId
+    approach: Approach
+
+
+@dataclass
+class _Threat:
+    """One other UAV that we avoid."""
+
+    until_ns: int
+    """When it will be past, as far as is known without hearing it."""
+    said_ns: int | None = None
+    """When either of us last warned the other."""
+
+
+@dataclass
+class _Avoidance:
+    """What we were flying when it began."""
+
+    up_m: float
+    velocity: Enu
+
+
+class Lookout:
+    """One UAV's watch over the others."""
+
+    def __init__(self, scenario: Scenario, node: NodeId) -> None:
+        mission = scenario.mission
+        self._node = node
+        self._horizon_s = mission.collision_horizon_s
+        self._distance_m = mission.collision_distance_m
+        self._clear_m = _CLEAR * mission.collision_distance_m
+        self._repeat_ns = seconds_to_ns(mission.collision_repeat_s)
+        self._lifetime_ns = round(_LIFETIME_HELLOS * scenario.routing.hello_interval_s * S)
+        self.records: list[Record] = []
+        self.warnings: list[Alert] = []
+        self.course: Course | None = None
+        """A new course to fly, for the host to take."""
+        self._others: dict[NodeId, Motion] = {}
+        self._threats: dict[NodeId, _Threat] = {}
+        self._avoidance: _Avoidance | None = None
+        self._wanted: Course | None = None
+        """The mission's course; None: the formation's."""
+
+    # --- what comes in --------------------------------------------------------------------------------------------
+
+    def heard(self, node: NodeId, motion: Motion, *, now_ns: int) -> bool:
+        """A hello said where another UAV flies; False when that is too old to be of use, or of the future."""
+        if not now_ns - self._lifetime_ns <= motion.at_ns <= now_ns + _FUTURE_NS:
+            return False
+        self._others[node] = motion
+        return True
+
+    def warned(self, origin: NodeId, warning: Collision, own: Motion, *, born_ns: int, now_ns: int) -> None:
+        """Another UAV has warned of a collision; with us?"""
+        left_ns = born_ns + round(min(warning.closest_s, _EVER_S) * S) - now_ns
+        if warning.other != self._node or origin == self._node or left_ns > seconds_to_ns(self._horizon_s):
+            return
+        if warning.horizontal_m > self._clear_m:
+            return
+        threat = self._threats.get(origin)
+        if threat is None:
+            if left_ns <= 0:
+                return  # past before we were told
+            threat = self._avoid(origin, own, now_ns + left_ns)
+            distance_m = math.hypot(warning.altitude_m, warning.horizontal_m)
+            self._foreseen(origin, left_ns, distance_m, told=True, now_ns=now_ns)
+        threat.said_ns = max(born_ns, threat.said_ns or 0)
+        threat.until_ns = max(threat.until_ns, now_ns + left_ns)
+        self._fly(own)
+
+    def moved(self, own: Motion) -> None:
+        """A fix of our own: look at everyone."""
+        now_ns = own.at_ns
+        self._others = {n: m for n, m in self._others.items() if now_ns - m.at_ns <= self._lifetime_ns}
+        for node in sorted(self._others):
+            self._look(node, own)
+        for node in sorted(self._threats):
+            if self._is_over(node, own):
+                del self._threats[node]
+                self.records.append(ConflictOver(now_ns, self._node, node))
+        self._fly(own)
+
+    def steered(self, course: Course) -> bool:
+        """The mission has chosen a course; True when it may be flown now."""
+        self._wanted = None if course.speed_m_s == HOME else course
+        return self._avoidance is None
+
+    # --- conflicts ------------------------------------------------------------------------------------------------
+
+    def _look(self, node: NodeId, own: Motion) -> None:
+        """Is there a conflict, and is it time to say so?"""
+        now_ns = own.at_ns
+        threat = self._threats.get(node)
+        approach = min((self._approach(node, course) for course in self._courses(own)), key=lambda a: a.distance_m)
+        if threat is not None:  # by height it may be settled already
+            if 0 < approach.closest_s < self._horizon_s and approach.distance_m < self._clear_m:
+                threat.until_ns = now_ns + round(approach.closest_s * S)
+                self._say(node, threat, approach, now_ns)
+        elif approach.closest_s > 0 and approach.distance_m < self._distance_m:
+            left_ns = round(approach.closest_s * S)
+            threat = self._avoid(node, own, now_ns + left_ns)
+            self._foreseen(node, left_ns, approach.distance_m, told=False, now_ns=now_ns)
+            self._say(node, threat, approach, now_ns)
+
+    def _approach(self, node: NodeId, own: Motion) -> Approach:
+        other = self._others[node]
+        apart = other.position_at(own.at_ns).minus(own.position)
+        return closest(apart, other.velocity.minus(own.velocity), within_s=self._horizon_s)
+
+    def _courses(self, own: Motion) -> list[Motion]:
+        """Where we fly; while we avoid, level at the height that we have and at the one to which we shall return."""
+        if self._avoidance is None:
+            return [own]
+        level = own._replace(velocity=_level(own.velocity))
+        here = own.position
+        return [level, level._replace(position=Enu(here.east, here.north, self._avoidance.up_m))]
+
+    def _foreseen(self, node: NodeId, left_ns: int, distance_m: float, *, told: bool, now_ns: int) -> None:
+        record = ConflictForeseen(now_ns, self._node, node, round(left_ns / MS), round(distance_m, 2), told)
+        self.records.append(record)
+
+    def _say(self, node: NodeId, threat: _Threat, approach: Approach, now_ns: int) -> None:
+        """Both would say the same: who has heard the other's warning need not repeat it yet."""
+        if threat.said_ns is None or now_ns - threat.said_ns >= self._repeat_ns:
+            threat.said_ns = now_ns
+            self.warnings.append(Alert(node, approach))
+
+    def _is_over(self, node: NodeId, own: Motion) -> bool:
+        other = self._others.get(node)
+        if other is None:
+            return own.at_ns > self._threats[node].until_ns + _PAST_NS
+        sideways = _level(other.position_at(own.at_ns).minus(own.position))
+        approach = closest(sideways, _level(other.velocity.minus(own.velocity)), within_s=_EVER_S)
+        return approach.distance_m > self._clear_m
+
+    # --- avoiding -------------------------------------------------------------------------------------------------
+
+    def _avoid(self, node: NodeId, own: Motion, until_ns: int) -> _Threat:
+        if self._avoidance is None:
+            self._avoidance = _Avoidance(own.position.up, _level(own.velocity))
+        threat = self._threats[node] = _Threat(until_ns)
+        return threat
+
+    def _fly(self, own: Motion) -> None:
+        """The next setpoint: on as before, at the height that keeps us apart; or back to the course."""
+        before = self._avoidance
+        if before is None:
+            return
+        if not self._threats:
+            self._avoidance = None
+            self.course = self._wanted or Course(own.position, HOME)
+            return
+        levels = sum(1 if node > self._node else -1 for node in self._threats)
+        level_m = before.up_m + max(-_LEVELS, min(_LEVELS, levels)) * self._distance_m
+        climb_m_s = max(-_CLIMB_M_S, min(_CLIMB_M_S, (level_m - own.position.up) / _SOON_S))
+        velocity = (self._sideways(own.position) or before.velocity)._replace(up=climb_m_s)
+        ahead = Motion(own.position, velocity, 0).position_at(round(_AHEAD_S * S))
+        self.course = Course(ahead, max(_LEAST_M_S, velocity.norm()))
+
+    def _sideways(self, here: Enu) -> Enu | None:
+        """How to fly on towards the mission's goal; None without one."""
+        if self._wanted is None:
+            return None
+        way = _level(self._wanted.position.minus(here))
+        speed_m_s = min(self._wanted.speed_m_s, way.norm() / _SOON_S)
+        scale = speed_m_s / max(way.norm(), 1e-9)
+        return Enu(way.east * scale, way.north * scale, 0.0)
+
+
+def _level(vector: Enu) -> Enu:
+    return Enu(vector.east, vector.north, 0.0)

@@ -1,0 +1,51 @@
+"""Plans of claimed slots against whole swarms: `python tests/benchmarks/claimed_plans.py [SECONDS]`.
+
+Scenario `clusters` (grid 9 x 5, 44 sources of 1024 B) and the same on a disc of 250 m, with claimed slots, traffic from
+15 s on. `used`: what the plan says of the fullest node; a plan is feasible up to 100 %. PDR and delays as measured;
+`hop`: the greatest that a node reported, beside the plan's; 10 s are left for what still waits.
+"""
+
+import sys
+
+from agents.traffic import sources_of
+from fanet_mw.protocol.planner import Plan, plan
+from fanet_mw.units import NodeId
+from sim import catalog
+from sim.layout import positions
+from sim.results import finish
+from sim.run import simulate
+
+DISC = ("nodes.layout=disc", "nodes.radius_m=250")
+CASES: tuple[tuple[str, tuple[str, ...], tuple[float, ...]], ...] = (
+    ("grid", (), (1.0, 0.7, 0.6, 0.54, 0.5, 0.4)),
+    ("grid, 10 slots", ("clusters.slots=10",), (1.0, 0.55, 0.47, 0.4)),
+    ("disc", DISC, (1.0, 0.6, 0.45, 0.4, 0.3)),
+)
+
+
+def main(seconds: float) -> None:
+    print("| swarm | interval [s] | plan | used | PDR | delay p50 / p95 [ms] | hop, plan / greatest [ms] |")
+    for name, settings, intervals in CASES:
+        for interval_s in intervals:
+            times = [f"duration_s={seconds + 25}", "warmup_s=15", "drain_s=10", f"traffic.interval_s={interval_s}"]
+            scenario = catalog.find("clusters", ["clusters.relay=claimed", *settings, *times])
+            at = {NodeId(i + 1): place for i, place in enumerate(positions(scenario))}
+            found = plan(scenario, at, sources=[NodeId(node) for node in sources_of(scenario)])
+            assert isinstance(found, Plan)
+            assert found.claims is not None
+            outcome = simulate(scenario)
+            summary = finish(outcome, out=None)
+            hops = [r["hop_ms"] for r in outcome.reports.values() if r.get("hop_ms") is not None]
+            delay = summary["delay_ms"]
+            used = found.claims.fullest.utilization
+            planned_ms = (found.claims.hop_ns or 0) / 1e6
+            verdict = "feasible" if found.feasible else "not feasible"
+            print(
+                f"| {name} | {interval_s:g} | {verdict} | {100 * used:.0f} % | {summary['pdr']:.4f} "
+                f"| {delay['p50']:.0f} / {delay['p95']:.0f} | {planned_ms:.0f} / {max(hops):.0f} |",
+                flush=True,
+            )
+
+
+if __name__ == "__main__":
+    main(float(sys.argv[1]) if len(sys.argv) > 1 else 25)

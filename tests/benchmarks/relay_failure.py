@@ -1,0 +1,73 @@
+"""How long a dead relay cuts others off: `python tests/benchmarks/relay_failure.py [RUNS] [SECONDS] [SOURCES]`.
+
+Scenario `clusters` (9 x 5 grid, collision-free floods, every node a head). At 20 s the radio of a relay falls silent
+for good: in run k that of the k-th most used in the timetable. `cut off`: from then until the last packet was generated
+that missed a node alive; `missed`: copies among the others that never came.
+"""
+
+import statistics
+import sys
+from collections import Counter
+
+from agents.traffic import sources_of
+from fanet_mw.config import build
+from fanet_mw.protocol.planner.turns import table_for
+from fanet_mw.protocol.timetable import Timetable
+from fanet_mw.scenario import Scenario
+from fanet_mw.trace import Delivered, Generated
+from fanet_mw.units import NodeId, S
+from sim import catalog
+from sim.layout import positions
+from sim.run import simulate
+
+KILLED_S = 20
+
+
+def most_used(scenario: Scenario) -> list[NodeId]:
+    """Relays by how many floods they pass on, most first; the leader has a lease of its own."""
+    at = tuple((NodeId(n), place) for n, place in zip(scenario.node_ids, positions(scenario), strict=True))
+    table = table_for(scenario, at, dict.fromkeys((node for node, _ in at), 1))
+    assert isinstance(table, Timetable)
+    used = Counter(turn.node for turn in table.turns if turn.node not in (turn.root, scenario.leader))
+    return [node for node, _ in sorted(used.items(), key=lambda item: (-item[1], item[0]))]
+
+
+def cut_off(scenario: Scenario, victim: NodeId) -> tuple[float, int, int]:
+    """Seconds until the last loss, copies lost, epochs made after the death."""
+    fault = {"at_s": KILLED_S, "kind": "cut", "node": victim}
+    outcome = simulate(build(scenario.model_dump(exclude_none=True) | {"faults": [fault]}))
+    begin_ns, end_ns = KILLED_S * S, scenario.traffic_window_ns[1]
+    sources = set(sources_of(scenario)) - {victim}
+    born = {
+        (r.node, r.seq): r.t_ns
+        for r in outcome.records
+        if isinstance(r, Generated) and r.node in sources and begin_ns <= r.t_ns < end_ns
+    }
+    copies = Counter((r.origin, r.seq) for r in outcome.records if isinstance(r, Delivered) and r.node != victim)
+    others = scenario.nodes.count - 2
+    missing = {key: others - copies[key] for key in born if copies[key] < others}
+    last_ns = max((born[key] for key in missing), default=begin_ns)
+    epochs = [report["epoch"] for name, report in outcome.reports.items() if name == f"agent-{scenario.leader}"]
+    return (last_ns - begin_ns) / S, sum(missing.values()), epochs[0]
+
+
+def main(runs: int, seconds: float, sources: int) -> None:
+    found = []
+    for run in range(runs):
+        settings = [f"duration_s={KILLED_S + seconds}", f"seed={run + 1}", f"traffic.sources={sources}"]
+        scenario = catalog.find("clusters", settings)
+        victims = most_used(scenario)
+        victim = victims[run % len(victims)]
+        found.append(cut_off(scenario, victim))
+        print(
+            f"run {run + 1}: node {victim}, {found[-1][0]:.1f} s, {found[-1][1]} copies, epoch {found[-1][2]}",
+            flush=True,
+        )
+    times = [time_s for time_s, *_ in found]
+    print(f"{runs} runs: median {statistics.median(times):.1f} s, least {min(times):.1f}, worst {max(times):.1f}")
+    print(f"copies missed: mean {statistics.mean(lost for _, lost, _ in found):.0f}")
+
+
+if __name__ == "__main__":
+    RUNS, SECONDS, SOURCES, *_ = [*sys.argv[1:], *("20", "50", "10")[len(sys.argv) - 1 :]]
+    main(int(RUNS), float(SECONDS), int(SOURCES))

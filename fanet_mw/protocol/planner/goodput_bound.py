@@ -80,9 +80,9 @@ def any_protocol(scenario: Scenario, adjacency: Adjacency, sources: Collection[N
     return goodput_bound(adjacency, sources, send_ns=frame + Timing.of(scenario.radio).difs_ns, receive_ns=frame)
 
 
-def in_turns(turns: Turns, adjacency: Adjacency, sources: Collection[NodeId]) -> Goodput | None:
-    """The bound for any timetable of such turns, one frame each."""
+def in_turns(turns: Turns, adjacency: Adjacency, sources: Collection[NodeId], *, together: int = 1) -> Goodput | None:
+    """The bound for any timetable of such turns, each with one frame of so many packets."""
     if not turns.per_frame:
         return None
-    each_ns = turns.period_ns // turns.per_frame
+    each_ns = turns.period_ns // (turns.per_frame * together)
     return goodput_bound(adjacency, sources, send_ns=each_ns, receive_ns=each_ns)

@@ -51,7 +51,7 @@ def test_more_than_fits_is_carried_as_far_as_it_fits_and_has_no_bound() -> None:
         "nodes.count=9", "clusters.count=8", "traffic.sources=8", "traffic.interval_s=0.01", "duration_s=16"
     )
     assert summary["bound"] == {}
-    assert 0.2 < summary["pdr"] < 0.8
+    assert 0.2 < summary["pdr"] < 0.95
     assert summary["frames"]["closes"]
 
 

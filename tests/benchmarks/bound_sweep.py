@@ -74,11 +74,13 @@ def measure(seed: int) -> Result | None:
         r["node"]: (r["bound_from_ms"] * MS, r["bound_ms"] * MS) for r in outcome.reports.values() if r.get("bound_ms")
     }
     start_ns, end_ns = scenario.traffic_window_ns
-    settled_ns = max([start_ns, *(since for since, _ in bounds.values())])
     counted = {
         (r.node, r.seq)
         for r in outcome.records
-        if isinstance(r, Generated) and r.app == "traffic" and r.node in bounds and settled_ns <= r.t_ns < end_ns
+        if isinstance(r, Generated)
+        and r.app == "traffic"
+        and r.node in bounds
+        and max(start_ns, bounds[r.node][0]) <= r.t_ns < end_ns
     }
     delays = [
         (r.origin, r.delay_ns) for r in outcome.records if isinstance(r, Delivered) and (r.origin, r.seq) in counted

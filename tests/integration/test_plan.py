@@ -17,7 +17,7 @@ def planned(*settings: str, deadline_s: float | None = None, **options: bool) ->
     return judge(catalog.find("clusters", settings), deadline_s=deadline_s, **{"change": False, **options})
 
 
-@pytest.mark.parametrize("settings", [(), ("radio.lead_ms=10", "clusters.flooding_period_s=1")])
+@pytest.mark.parametrize("settings", [(), ("clusters.count=8",), ("radio.lead_ms=10", "clusters.flooding_period_s=1")])
 def test_the_bound_that_is_planned_is_the_one_that_the_nodes_compute_in_flight(settings: tuple[str, ...]) -> None:
     scenario = catalog.find("clusters", ["duration_s=20", "warmup_s=12", *settings])
     bound = finish(simulate(scenario), out=None)["bound"]

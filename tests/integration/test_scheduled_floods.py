@@ -63,6 +63,15 @@ def test_members_of_a_cluster_keep_a_bound_too(clusters: int) -> None:
     assert summary["bound"]["classes"]["traffic"]["deliveries"] > 15_000, "every member states one"
 
 
+def test_packets_share_frames_when_turns_are_scarce_and_keep_their_bound() -> None:
+    few = ("nodes.count=9", "clusters.count=8", "traffic.sources=8", "duration_s=16")
+    summary = summary_of(*few, "traffic.interval_s=0.025")
+    assert summary["pdr"] >= 0.999
+    assert summary["bound"]["violations"] == 0
+    assert summary["bound"]["classes"]["traffic"]["deliveries"] > 1000
+    assert summary["frames"]["sent"] < 3 * summary["generated"], "five transmissions for two packets"
+
+
 def test_where_turns_suffice_for_heads_only_members_bring_them_their_packets_in_the_contention_window() -> None:
     summary = summary_of("clusters.count=8", "clusters.flooding_period_s=0.15")
     assert summary["bound"] == {}

@@ -22,6 +22,7 @@ from fanet_mw.protocol.planner.demand import TrafficClass
 from fanet_mw.protocol.planner.flood import FloodCost, flood_cost
 from fanet_mw.protocol.planner.goodput_bound import Goodput, any_protocol
 from fanet_mw.protocol.planner.head import ClusterPlan, Share, slot_delays, work_ns
+from fanet_mw.protocol.planner.notes import assumed, left_out
 from fanet_mw.protocol.planner.turns import Candidate, Superframe, judge, superframe_of, table_for
 from fanet_mw.protocol.topology import Adjacency, within_range
 from fanet_mw.protocol.turn_plan import Fitted, schedule_parts
@@ -186,7 +187,7 @@ def evaluate(
         goodput=_goodput(site, classes),
         deadline_ns=deadline_ns,
         problems=judged.unfit or (*cut_off, *_problems(scenario, judged.clusters, summed, cut_off), *late),
-        notes=(*_notes(access, judged.clusters, site, uplink_ns), *_left_out(scenario)),
+        notes=(*assumed(access, judged.clusters, guard_ns=site.guard_ns, uplink_ns=uplink_ns), *left_out(scenario)),
     )
 
 
@@ -386,27 +387,3 @@ def _problems(
                 f"{c.name}: takes up to {c.bound.delay_ns / S:.1f} s, "
                 f"routing.lifetime_s = {scenario.routing.lifetime_s:g}"
             )
-
-
-def _left_out(scenario: Scenario) -> Iterator[str]:
-    if scenario.radio.channel != "range":
-        yield "who hears whom is taken by distance, up to radio.range_m, whatever the channel does"
-    if scenario.clusters.relay == "claimed":
-        yield "slots are claimed in flight: this plan is of heads and contending relays, and says little of that"
-    if scenario.clusters.repair_s > 0:
-        yield "repairs of lost packets come later than any bound here, and their load is not counted"
-
-
-def _notes(access: Outcome, clusters: Sequence[ClusterPlan], site: Site, uplink_ns: int) -> Iterator[str]:
-    if isinstance(access, Refused):
-        yield f"the way to the head is assumed to take at most {uplink_ns / S:g} s, not proven: {access.reason}"
-    if any(not cluster.flood.proven for cluster in clusters):
-        yield "floods are relayed by CSMA/CA: their duration and spacing are estimates, and losses are not counted"
-        tail_ns = max(cluster.flood.duration_ns - cluster.flood.spacing_ns for cluster in clusters)
-        if tail_ns > site.guard_ns:
-            yield (
-                f"a slot's last flood runs about {tail_ns / 1e6:.0f} ms into the next slot, the guard time is "
-                f"{site.guard_ns / 1e6:g} ms: floods of neighboring slots meet"
-            )
-    else:
-        yield "floods hold their bound while no frame is lost and the nodes are where the timetable has them"

@@ -81,8 +81,8 @@ class Routing(Section):
     report_lifetime_s: NonNegative = 0.0
     """The same for survivor reports (priority 2); 0: as `lifetime_s`."""
     aggregate: bool = False
-    """`clustered`, but not with `clusters.relay = "scheduled"`: packets that are released together share frames of up
-    to `radio.max_frame_bytes`, and so do their relays."""
+    """`clustered`: packets that are released together share frames of up to `radio.max_frame_bytes`, and so do their
+    relays. `clusters.relay = "scheduled"` decides that by the load instead."""
     hello_interval_s: NonNegative = 1.0
     """Position beacon and hello, one hop; 0 sends none (`clustered` needs them)."""
     gossip_p: Annotated[float, Field(ge=0, le=1)] = 0.65

@@ -25,7 +25,7 @@ def chance_of(scenario: Scenario, at: Mapping[NodeId, Enu]) -> Chance | None:
     if radio.fading != "none" or radio.shadowing_db > 0 or scenario.world.has_obstacles:
         return None
     if radio.channel == "range":
-        return lambda _sender, _receiver, _others: 1.0  # turns keep all that is heard apart
+        return lambda sender, receiver, others: _clear(at, receiver, (sender, *others), radio.range_m)
     header_rate, bits_per_ns = header_rates(radio.rate_mbps)
     tables = log_success_per_bit(header_rate), log_success_per_bit(radio.rate_mbps)
     bits = Timing.of(radio).header_ns * bits_per_ns, 8 * (scenario.traffic.payload_bytes + OVERHEAD_BYTES)
@@ -50,3 +50,9 @@ def chance_of(scenario: Scenario, at: Mapping[NodeId, Enu]) -> Chance | None:
         )
 
     return chance
+
+
+def _clear(at: Mapping[NodeId, Enu], receiver: NodeId, senders: tuple[NodeId, ...], range_m: float) -> float:
+    """Channel `range`: 1 if the receiver hears one sender only, and is none itself."""
+    heard = sum(at[receiver].minus(at[sender]).norm() <= range_m for sender in senders)
+    return float(heard == 1 and receiver not in senders)

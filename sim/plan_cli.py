@@ -28,10 +28,10 @@ from fanet_mw.protocol.planner import (
     with_capacity,
 )
 from fanet_mw.protocol.planner.claimed import Claims
-from fanet_mw.protocol.planner.turns import superframe_of
-from fanet_mw.protocol.scheduled import links
+from fanet_mw.protocol.planner.turns import Superframe
 from fanet_mw.protocol.timetable import Timetable
 from fanet_mw.protocol.topology import within_range
+from fanet_mw.protocol.turn_plan import links
 from fanet_mw.scenario import Scenario
 from fanet_mw.units import MS, Enu, NodeId, S, seconds_to_ns
 from sim.frame_chance import chance_of
@@ -59,7 +59,7 @@ def judge(
     found = with_capacity(found, at)
     text, content = [describe(found)], _json(found)
     if found.superframe is not None and found.superframe.table is not None and not found.cut_off:
-        missed = _loss(found, found.superframe.table, at)
+        missed = _loss(found.scenario, found.superframe, found.superframe.table, at)
         text.append(describe_loss(missed))
         content["loss"] = None if missed is None else missed._asdict()
     if change and not found.feasible:
@@ -79,13 +79,12 @@ def _places(scenario: Scenario) -> dict[NodeId, Enu]:
     return {NodeId(node): rounded(place) if scenario.clusters.relay == "scheduled" else place for node, place in start}
 
 
-def _loss(found: Plan, table: Timetable, at: dict[NodeId, Enu]) -> Loss | None:
-    """Of what heads and leader let out; the way to a head is not in it."""
-    scenario = found.scenario
+def _loss(scenario: Scenario, superframe: Superframe, table: Timetable, at: dict[NodeId, Enu]) -> Loss | None:
+    """Of what has turns; a way to a head that contends is not in it."""
     chance = chance_of(scenario, at)
     if chance is None:
         return None
-    turns = superframe_of(scenario)
+    turns = superframe.turns
     geometry = links(scenario, turns)
     adjacency = within_range(at, range_m=geometry.link_m)
     return loss(table, adjacency, per_frame=turns.per_frame, hop_turns=geometry.hop_turns, chance=chance)
@@ -107,6 +106,7 @@ def _json(found: Plan) -> dict[str, Any]:
             "turns": superframe.turns.per_frame,
             "used": superframe.used,
             "packets": superframe.packets,
+            "together": superframe.together,
             "least_interval_s": None if superframe.least_interval_ns is None else superframe.least_interval_ns / S,
         },
         "claims": None if found.claims is None else _claims_json(found.claims),

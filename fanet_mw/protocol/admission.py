@@ -29,6 +29,12 @@ class Own(NamedTuple):
     turns: Turns
     roots: tuple[int, ...]
     span: int
+    together: int = 1
+    """Packets that one of its turns lets out."""
+
+    def worst_ns(self, *, interval_ns: int) -> int | None:
+        """The bound of packets that come no more often; None: more come than are let out."""
+        return self.turns.worst_ns(self.roots, span=self.span, interval_ns=interval_ns, together=self.together)
 
 
 class Admission:
@@ -68,7 +74,7 @@ class Admission:
         """A timetable is in force; None: one without a bound for us. What it says of the deadline, if that is new."""
         least_ns = None if own is None else least_interval_ns(own, deadline_ns=self._deadline_ns - _TOLERANCE_NS)
         self._least_ns = least_ns or (0 if own is None else carried_interval_ns(own))
-        bound_ns = own and own.turns.worst_ns(own.roots, span=own.span, interval_ns=self.interval_ns)
+        bound_ns = own and own.worst_ns(interval_ns=self.interval_ns)
         if own is None and self._expected_ns is not None and now_ns < self._expected_ns:
             return None  # it may still come
         self._expected_ns = None
@@ -89,16 +95,16 @@ class Admission:
 
 def carried_interval_ns(own: Own) -> int:
     """The shortest interval at which no more packets come than are let out."""
-    return -(-own.turns.period_ns // len(own.roots))
+    return -(-own.turns.period_ns // (own.together * len(own.roots)))
 
 
 def least_interval_ns(own: Own, *, deadline_ns: int) -> int | None:
     """The shortest interval at which no packet takes longer than this to everyone; None: there is none.
 
-    The q-th packet of a busy period waits for q turns and has come q - 1 intervals later (`Turns.worst_ns`).
+    Of a busy period, what the q-th turn lets out has come (q - 1) `together` intervals later (`Turns.worst_ns`).
     """
     first_ns, *later_ns = own.turns.done_ns(own.roots, span=own.span)
     if first_ns > deadline_ns:
         return None
-    needed = (-(-(done_ns - deadline_ns) // count) for count, done_ns in enumerate(later_ns, start=1))
+    needed = (-(-(ns - deadline_ns) // (count * own.together)) for count, ns in enumerate(later_ns, start=1))
     return max(carried_interval_ns(own), *needed, 0)

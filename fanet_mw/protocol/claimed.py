@@ -58,14 +58,15 @@ _NO_HEAD: Final = NodeId(0)
 class OwnRelease(RootRelease):
     """What waits for our turns: own packets and relays, most urgent first."""
 
-    def __init__(self, queue: TxQueue, own: OwnTurns, *, lead_ns: int) -> None:
+    def __init__(self, queue: TxQueue, own: OwnTurns, *, lead_ns: int, frame_bytes: int) -> None:
         super().__init__(queue, lead_ns=lead_ns)
         self._own = own
+        self._next_bytes = frame_bytes
 
     def _start(self, earliest_ns: int) -> int | None:
         return self._own.next_start_ns(not_before_ns=earliest_ns)
 
-    def due(self, *, now_ns: int) -> list[tuple[Packet, int]]:
+    def due(self, *, now_ns: int) -> list[tuple[list[Packet], int]]:
         """Turns may have come and gone since the last look."""
         self._arm(now_ns)
         return super().due(now_ns=now_ns)
@@ -119,6 +120,7 @@ class Claimed(Clustered):
             TxQueue(capacity=scenario.routing.queue_frames, sooner_us=sooner_us(scenario.routing)),
             self._own,
             lead_ns=self._lead_ns,
+            frame_bytes=scenario.radio.max_frame_bytes if scenario.routing.aggregate else 0,
         )
         self._near = Neighborhood(
             port.node, lifetime_ns=int(_LIFETIMES * self._hello_ns), rank=lambda _, standing: _rank(standing.slot)
@@ -272,8 +274,8 @@ class Claimed(Clustered):
             self._port.drop(DropReason.EXPIRED, packet, now_ns=now_ns)
         if len(self._queue):
             self._draw(now_ns)
-        for packet, start_ns in self._queue.due(now_ns=now_ns):
-            self._flood_with(packet, self._queue.more(self._room(packet)), start_ns=start_ns)
+        for packets, start_ns in self._queue.due(now_ns=now_ns):
+            self._flood_together(packets, start_ns=start_ns)
 
     # --- for people -----------------------------------------------------------------------------------------------
 

@@ -381,18 +381,18 @@ class Clustered(RoutingProtocol):
         for packet in self._release.expire(before_us=horizon_us):
             self._port.drop(DropReason.EXPIRED, packet, now_ns=now_ns)
         for packet, start_ns in self._release.due(self._tenure, now_ns=now_ns) if self._tenure else ():
-            self._flood_with(packet, self._release.more(self._room(packet)), start_ns=start_ns)
+            self._flood_together([packet, *self._release.more(self._room(packet))], start_ns=start_ns)
 
     def _room(self, packet: Packet) -> int:
         """What a frame with this packet has left for others [bytes]."""
         scenario = self._port.scenario
         return scenario.radio.max_frame_bytes - len(packet.frame) if scenario.routing.aggregate else 0
 
-    def _flood_with(self, packet: Packet, others: Sequence[Packet], *, start_ns: int) -> None:
+    def _flood_together(self, packets: Sequence[Packet], *, start_ns: int) -> None:
         """The floods of several packets begin here, in one frame."""
         self._port.gather()
-        for each in (packet, *others):
-            self._flood(each, start_ns=start_ns)
+        for packet in packets:
+            self._flood(packet, start_ns=start_ns)
         self._port.send_gathered()
 
     def _flood(self, packet: Packet, *, start_ns: int) -> None:

@@ -1,12 +1,12 @@
-"""A root's queue and when it lets packets out: one in each of its turns, announced one lead ahead."""
+"""A root's queue and when it lets packets out: as many as a frame holds in each of its turns, one lead ahead."""
 
 from collections.abc import Sequence
 
 from fanet_mw.protocol.turns import Turns
 from fanet_mw.protocol.txqueue import Packet, TxQueue
 
-Following = tuple[int, Turns, tuple[int, ...]]
-"""In force from an instant on: the geometry, and which turns are ours."""
+Following = tuple[int, Turns, tuple[int, ...], int]
+"""In force from an instant on: the geometry, which turns are ours, and how many bytes go into one."""
 
 
 class RootRelease:
@@ -19,6 +19,7 @@ class RootRelease:
         self._free_ns = 0
         """Just after the last turn that was used."""
         self._next_ns: int | None = None
+        self._next_bytes = 0
 
     def __len__(self) -> int:
         return len(self._queue)
@@ -35,10 +36,6 @@ class RootRelease:
             self._arm(now_ns)
         return evicted
 
-    def more(self, size: int) -> list[Packet]:
-        """Packets that fit into what a frame released now has left [bytes]."""
-        return self._queue.pop_fitting(size)
-
     def expire(self, *, before_us: int) -> list[Packet]:
         return self._queue.expire(before_us=before_us)
 
@@ -50,11 +47,13 @@ class RootRelease:
     def next_wake_ns(self) -> int | None:
         return None if self._next_ns is None else self._next_ns - self._lead_ns
 
-    def due(self, *, now_ns: int) -> list[tuple[Packet, int]]:
-        """Packets to announce now, each with its instant."""
+    def due(self, *, now_ns: int) -> list[tuple[list[Packet], int]]:
+        """Packets to announce now, those of one frame together, with its instant."""
         released = []
         while self._next_ns is not None and self._next_ns - self._lead_ns <= now_ns and len(self._queue):
-            released.append((self._queue.pop(), self._next_ns))
+            first = self._queue.pop()
+            rest = self._queue.pop_fitting(self._next_bytes - len(first.frame))
+            released.append(([first, *rest], self._next_ns))
             self._free_ns = self._next_ns + 1
             self._arm(now_ns)
         if not len(self._queue):
@@ -67,11 +66,12 @@ class RootRelease:
 
     def _start(self, earliest_ns: int) -> int | None:
         """The first of our turns from an instant on, under whichever plan is in force then."""
-        for index, (valid_ns, turns, offsets) in enumerate(self._plans):
+        for index, (valid_ns, turns, offsets, size) in enumerate(self._plans):
             if not offsets:
                 continue
             start_ns = turns.next_start_ns(offsets, not_before_ns=max(earliest_ns, valid_ns))
             following = self._plans[index + 1][0] if index + 1 < len(self._plans) else None
             if following is None or start_ns < following:
+                self._next_bytes = size
                 return start_ns
         return None

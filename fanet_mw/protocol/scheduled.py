@@ -1,4 +1,4 @@
-"""The clustered protocol with collision-free floods: heads let packets out, and relays pass them on, in turns.
+"""The clustered protocol with collision-free floods: every packet goes to its head and on to everyone in turns.
 
     join -> schedule with places -> everyone computes the same timetable -> from its first superframe on, turns
 
@@ -7,9 +7,8 @@ heard outside of any turn is not relayed. Until a timetable is in force, and for
 `clustered` hold; then all but floods of data contend in the window at the beginning of each superframe.
 """
 
-import math
 from collections.abc import Mapping
-from typing import Final, NamedTuple
+from typing import Final
 
 from fanet_mw.errors import DropReason
 from fanet_mw.messages import Reception
@@ -21,33 +20,14 @@ from fanet_mw.protocol.contract import Port
 from fanet_mw.protocol.lease import Authority
 from fanet_mw.protocol.membership import Version
 from fanet_mw.protocol.root_release import RootRelease
-from fanet_mw.protocol.timetable import Geometry, Timetable, timetable
-from fanet_mw.protocol.turns import Turns, clocks_fit, turn_ns
+from fanet_mw.protocol.turn_plan import Plan, fit, leader_load
+from fanet_mw.protocol.turns import clocks_fit
 from fanet_mw.protocol.txqueue import Packet, TxQueue, sooner_us
-from fanet_mw.scenario import Scenario
 from fanet_mw.units import BROADCAST, MS, US, Enu, NodeId, seconds_to_ns
-from fanet_mw.wire import CAPACITY, FLAG_FLOOD, HEADER_BYTES, OVERHEAD, PLACES, PRIORITY_BULK, SCHEDULE, Kind, Schedule
+from fanet_mw.wire import FLAG_FLOOD, PRIORITY_BULK, Kind, Schedule
 
-_SCHEDULE_BYTES: Final = SCHEDULE.layout.size + OVERHEAD
-_PLACES_BYTES: Final = PLACES.layout.size + OVERHEAD
 _JITTER: Final = 0.25
 """Of the contention window: the most that a relay waits there."""
-_FEWER: Final = 0.85
-"""When the turns do not suffice for the load, try this much of it, and so on."""
-
-
-class Plan(NamedTuple):
-    """A timetable in force from an instant on."""
-
-    valid_ns: int
-    turns: Turns
-    table: Timetable
-    mine: Mapping[tuple[NodeId, int], int]
-    """Our turn for each (root, instance)."""
-    heard: Mapping[tuple[int, NodeId], tuple[int, NodeId, int]]
-    """(turn, sender) -> (offset, root, instance)."""
-    roots: tuple[int, ...]
-    """The turns in which we let packets out."""
 
 
 class Scheduled(Clustered):
@@ -58,8 +38,6 @@ class Scheduled(Clustered):
         scenario = port.scenario
         self._lifetime_ns = seconds_to_ns(scenario.routing.lifetime_s)
         self._window_random = port.stream("window").random
-        self._turn_ns = turn_ns(scenario, payload_bytes=largest_frame(scenario))
-        self._turn_bytes = largest_frame(scenario)
         self._roots = RootRelease(
             TxQueue(capacity=scenario.routing.queue_frames, sooner_us=sooner_us(scenario.routing)),
             lead_ns=self._lead_ns,
@@ -116,29 +94,33 @@ class Scheduled(Clustered):
         parts = [self._schedules[part] for part in sorted(self._schedules)]
         schedule, places = parts[0]
         at: dict[NodeId, Enu] = {NodeId(schedule.leader): places.leader}
-        members: dict[int, int] = {}
+        cluster_of: dict[NodeId, int] = {}
         heads: dict[int, NodeId] = {}
         for part, where in parts:
             for member, place in zip(part.members, where.members, strict=True):
                 at[NodeId(member.node)] = place
-                members[member.cluster] = members.get(member.cluster, 0) + 1
+                cluster_of[NodeId(member.node)] = member.cluster
                 if member.is_head:
                     heads[member.cluster] = NodeId(member.node)
-        scenario = self._port.scenario
-        turns = _geometry(scenario, schedule, self._turn_ns)
-        load = {heads[cluster]: members[cluster] for cluster in sorted(heads)}
-        elected = schedule.leader != scenario.leader
-        load[NodeId(schedule.leader)] = 1 if elected else leader_load(scenario)
-        table = fit(scenario, tuple(sorted(at.items())), load, turns, leader=NodeId(schedule.leader))
+        found = fit(
+            self._port.scenario,
+            tuple(sorted(at.items())),
+            {node: heads[cluster] for node, cluster in sorted(cluster_of.items())},
+            leader=NodeId(schedule.leader),
+            origin_ns=schedule.start_us * US,
+            period_ns=schedule.period_us * US,
+        )
         self._steady_ns = None
-        if table is None:
+        if found is None:
             self._plans = []  # not even one packet of each head fits a superframe; `fanet plan` says so before take-off
             self._admit(None, now_ns=now_ns)
         else:
             valid_ns = max(now_ns, schedule.start_us * US)
-            self._plans = [*self._plans[-1:], _own_plan(self._port.node, valid_ns, turns, table)]
+            self._plans = [*self._plans[-1:], Plan.of(self._port.node, valid_ns, found)]
             self._admit(self._own(), now_ns=now_ns)
-        self._roots.follow([(plan.valid_ns, plan.turns, plan.roots) for plan in self._plans], now_ns=now_ns)
+        self._roots.follow(
+            [(plan.valid_ns, plan.turns, plan.roots, plan.frame_bytes) for plan in self._plans], now_ns=now_ns
+        )
         stranded = [] if self._plans and self._plans[-1].roots else self._roots.drain()
         for packet in [*stranded, *self._release.drain(), *self._homeless.drain()]:
             self._forward(packet, start_ns=now_ns + self._lead_ns, now_ns=now_ns, tries=0)
@@ -154,13 +136,11 @@ class Scheduled(Clustered):
     def _own(self) -> Own | None:
         """Our part of the newest plan, if it gives our packets a bound."""
         plan = self._plans[-1] if self._plans else None
-        scenario = self._port.scenario
-        alone = scenario.clusters.count >= scenario.nodes.count - 1  # else packets of members share our turns
-        if plan is None or not plan.roots or not alone or plan.table.uncovered[self._port.node]:
+        if plan is None or not plan.roots or not plan.whole or plan.table.uncovered[self._port.node]:
             return None
         if self._leader is not None:
             return None  # schedules go before our own packets
-        return Own(plan.turns, plan.roots, plan.table.spans[self._port.node])
+        return Own(plan.turns, plan.roots, plan.table.spans[self._port.node], plan.together)
 
     def _admit(self, own: Own | None, *, now_ns: int) -> None:
         """The timetable has changed, or there is none for the swarm as it is now."""
@@ -184,7 +164,7 @@ class Scheduled(Clustered):
             super()._forward(packet, start_ns=self._contending_ns(start_ns), now_ns=now_ns, tries=tries)
 
     def _let_out(self, packet: Packet, *, now_ns: int) -> None:
-        if len(packet.frame) > self._turn_bytes:
+        if len(packet.frame) > self._plans[-1].frame_bytes:
             self._port.drop(DropReason.TOO_LARGE, packet, now_ns=now_ns)
             return
         if packet.header.origin != self._port.node or packet.header.kind != Kind.DATA:
@@ -273,8 +253,8 @@ class Scheduled(Clustered):
             self._port.record(lost)
         for packet in self._roots.expire(before_us=(now_ns - self._lifetime_ns) // US):
             self._port.drop(DropReason.EXPIRED, packet, now_ns=now_ns)
-        for packet, start_ns in self._roots.due(now_ns=now_ns):
-            self._flood(packet, start_ns=start_ns)
+        for packets, start_ns in self._roots.due(now_ns=now_ns):
+            self._flood_together(packets, start_ns=start_ns)
 
     # --- for people -----------------------------------------------------------------------------------------------
 
@@ -287,7 +267,7 @@ class Scheduled(Clustered):
         if own is None or self._steady_ns is None or not self._in_step():
             return None
         interval_ns = self._admission.interval_ns if self._admission else self._interval_ns
-        return own.turns.worst_ns(own.roots, span=own.span, interval_ns=interval_ns)
+        return own.worst_ns(interval_ns=interval_ns)
 
     def _in_step(self) -> bool:
         """Whether the turns' slack holds what is known of the swarm's clocks."""
@@ -302,92 +282,3 @@ class Scheduled(Clustered):
             "bound_from_ms": None if self._steady_ns is None else self._steady_ns / MS,
             "planned": bool(self._plans),
         }
-
-
-def largest_frame(scenario: Scenario) -> int:
-    """The largest frame a turn must hold: the application's, or a schedule part with its places."""
-    return max(scenario.traffic.payload_bytes, schedule_bytes(scenario))
-
-
-def schedule_bytes(scenario: Scenario) -> int:
-    """A schedule part with its places."""
-    members = min(scenario.nodes.count, 56)
-    return HEADER_BYTES + _SCHEDULE_BYTES + _PLACES_BYTES * -(-members // 28)
-
-
-def _geometry(scenario: Scenario, schedule: Schedule, turn: int) -> Turns:
-    period_ns = schedule.period_us * US
-    contention_ns = round(scenario.clusters.contention_ms * MS)
-    return Turns(schedule.start_us * US, period_ns, contention_ns, turn, max(0, period_ns - contention_ns) // turn)
-
-
-def links(scenario: Scenario, turns: Turns) -> Geometry:
-    """What a timetable of this scenario is computed for."""
-    clusters, radio = scenario.clusters, scenario.radio
-    wait_ns = radio.lead_ns + radio.handover_ns
-    return Geometry(
-        link_m=clusters.link_m or radio.range_m,
-        interference_m=clusters.interference_m or radio.range_m * (1 if radio.channel == "range" else 2),
-        turns=turns.per_frame,
-        hop_turns=1 + -(-wait_ns // turns.turn_ns),
-    )
-
-
-def fit(
-    scenario: Scenario,
-    places: tuple[tuple[NodeId, Enu], ...],
-    load: Mapping[NodeId, int],
-    turns: Turns,
-    *,
-    leader: NodeId | None = None,
-) -> Timetable | None:
-    """A table for a little more than the load, so that a backlog drains; for just the load, or less, if turns lack."""
-    geometry = links(scenario, turns)
-    per_member = turns.period_ns / seconds_to_ns(scenario.traffic.interval_s)
-    control = {root: schedule_parts(scenario) if root == (leader or scenario.leader) else 0 for root in load}
-    least = {root: max(1, control[root] + min(1, members)) for root, members in load.items()}
-    wanted = {
-        root: control[root] + (int(members * per_member) + 1 if members or not control[root] else 0)
-        for root, members in load.items()
-    }
-    share = 1.0
-    while turns.per_frame:
-        roots = tuple(root for root, packets in sorted(wanted.items()) for _ in range(packets))
-        table = timetable(places, roots, geometry)
-        if table is not None or wanted == least:
-            return table
-        wanted = {
-            root: max(least[root], control[root] + math.ceil(members * per_member * share))
-            for root, members in load.items()
-        }
-        share *= _FEWER
-    return None
-
-
-def leader_load(scenario: Scenario) -> int:
-    """The leader is in no cluster, but its own packets need turns too: 1 if the application may send from it."""
-    traffic = scenario.traffic
-    if traffic.arrivals == "none" or traffic.destination == scenario.leader:
-        return 0
-    if isinstance(traffic.sources, tuple):
-        return int(scenario.leader in traffic.sources)
-    others = scenario.nodes.count - 1 - (traffic.destination != "all")
-    return int(traffic.sources == "all" or traffic.sources > others)
-
-
-def schedule_parts(scenario: Scenario) -> int:
-    """Turns that the leader's schedules take of each superframe."""
-    return max(1, -(-(scenario.nodes.count - 1) // CAPACITY))
-
-
-def _own_plan(node: NodeId, valid_ns: int, turns: Turns, table: Timetable) -> Plan:
-    return Plan(
-        valid_ns=valid_ns,
-        turns=turns,
-        table=table,
-        mine={(turn.root, turn.instance): turn.offset for turn in table.turns if turn.node == node != turn.root},
-        heard={
-            (turn.offset % turns.per_frame, turn.node): (turn.offset, turn.root, turn.instance) for turn in table.turns
-        },
-        roots=tuple(sorted(turn.offset for turn in table.turns if turn.node == turn.root == node)),
-    )

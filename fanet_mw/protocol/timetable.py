@@ -1,35 +1,29 @@
 """Collision-free floods: which node sends whose packet in which turn of the superframe. A pure function of positions.
 
     superframe:  | contention window | turn 0 | turn 1 | ... | turn N-1 |
-    flood of h:    h in its root turn, then relays of a tree that covers everyone, each in a turn of its own
+    flood of h:    h in its root turn, then relays that reach everyone, each in a turn of its own, once
 
-Two nodes share a turn only if no receiver of one is within interference range of the other (the protocol model of
-Gupta and Kumar, 2000; for equal ranges: they are three hops apart). Floods follow each other through the swarm like
-waves, as in Djukic and Valaee (ToN 17(3), 2009): the order of turns along the tree lets a packet cross the whole swarm
-in one superframe. Every node computes the same table from the same positions; nothing else is agreed upon.
+Each frame is meant for some of its sender's neighbors: those that lack the packet. Two nodes share a turn only if they
+do not hear each other and none of the nodes that one is meant for is within interference range of the other (the
+protocol model of Gupta and Kumar, 2000). Who is meant by neither may be deaf in that turn; it does not send in the
+next one, because a station waits for EIFS after a frame that it could not decode (IEEE 802.11-2020, 10.3.7).
+
+The turns are filled one after the other (`packing.py`), so that floods follow each other through the swarm like waves.
+That a packet crosses the whole swarm in one superframe comes from the order of turns, as in Djukic and Valaee (ToN
+17(3), 2009). Every node computes the same table from the same positions; nothing else is agreed upon.
 
 Not modeled: links that positions do not tell (obstacles); use a shorter `link_m` for a margin.
 """
 
-import math
+from collections import Counter
 from collections.abc import Mapping, Sequence
 from functools import lru_cache
 from typing import NamedTuple
 
+from fanet_mw.protocol.packing import Effort, Flood, Geometry, Packing, Swarm
 from fanet_mw.units import Enu, NodeId
 
-
-class Geometry(NamedTuple):
-    """What a table is computed for."""
-
-    link_m: float
-    """Nodes no farther apart hear each other."""
-    interference_m: float
-    """A transmitter no farther from a receiver destroys what that receives."""
-    turns: int
-    """Turns of one superframe."""
-    hop_turns: int
-    """Turns from hearing a packet to the first in which it can be relayed (1: the next)."""
+PLAIN = Effort()
 
 
 class Turn(NamedTuple):
@@ -60,127 +54,78 @@ class Timetable(NamedTuple):
 
 @lru_cache(maxsize=16)
 def timetable(
-    positions: tuple[tuple[NodeId, Enu], ...], roots: tuple[NodeId, ...], geometry: Geometry
+    positions: tuple[tuple[NodeId, Enu], ...],
+    roots: tuple[NodeId, ...],
+    geometry: Geometry,
+    heads: tuple[tuple[NodeId, NodeId], ...] = (),
+    effort: Effort = PLAIN,
+    blocks: int = 1,
 ) -> Timetable | None:
-    """The table, None when the turns do not suffice. `roots`: one entry per packet and superframe, in any order.
+    """The table, None when the turns do not suffice. `roots`: one entry per packet and block, in any order.
 
-    `positions` [m] in ascending order of nodes.
+    `positions` [m] in ascending order of nodes. `heads`: (node, its head) of nodes that are none; the flood of such a
+    node goes to its head first, in turns on a shortest way, and on from there. The superframe is divided into so many
+    equal `blocks`, which saves time: one is computed, and floods that outlast it go on in the next.
     """
-    swarm = _Swarm(positions, geometry)
-    plan = _Plan(swarm, geometry)
-    for root in _by_place(roots, dict(positions)):
-        if not plan.flood(root):
-            return None
-    return plan.table()
+    whole, geometry = geometry.turns, geometry._replace(turns=geometry.turns // blocks)
+    if not geometry.turns:
+        return None
+    swarm = Swarm(positions, geometry)
+    head_of = dict(heads)
+    ordered = _in_order(roots, dict(positions))
+    floods = [Flood(swarm, swarm.row[root], swarm.way(root, head_of.get(root, root))) for root, _ in ordered]
+    if not Packing(swarm, geometry, effort).place(floods):
+        return None
+    block = [
+        Turn(offset, swarm.nodes[row], root, instance)
+        for flood, (root, instance) in zip(floods, ordered, strict=True)
+        for offset, row in flood.sent
+    ]
+    turns = _repeated(block, Counter(roots), geometry.turns, blocks, whole)
+    uncovered = {
+        root: swarm.names(swarm.everyone & ~flood.goal) for flood, (root, _) in zip(floods, ordered, strict=True)
+    }
+    return Timetable(turns, _spans(turns), uncovered, len({turn.offset % whole for turn in turns}))
 
 
-def _by_place(roots: Sequence[NodeId], positions: Mapping[NodeId, Enu]) -> list[NodeId]:
-    """Waves that start far from each other can be in the air together: roots by turns from the near and far side."""
-    ordered = sorted(roots, key=lambda node: (positions[node].east, positions[node].north, node))
+def _in_order(roots: Sequence[NodeId], positions: Mapping[NodeId, Enu]) -> list[tuple[NodeId, int]]:
+    """(root, instance) in the order in which they let packets out: those of one root evenly spread.
+
+    Waves that start far from each other can be in the air together: roots by turns from the near and the far side.
+    """
+    ordered = sorted(set(roots), key=lambda node: (positions[node].east, positions[node].north, node))
     half = (len(ordered) + 1) // 2
     near, far = ordered[:half], ordered[half:]
-    return [node for pair in zip(near, [*far, None], strict=False) for node in pair if node is not None]
+    mixed = [node for pair in zip(near, [*far, None], strict=False) for node in pair if node is not None]
+    count = dict.fromkeys(mixed, 0)
+    for root in roots:
+        count[root] += 1
+    entries = [
+        ((instance + rank / len(mixed)) / count[node], rank, node, instance)
+        for rank, node in enumerate(mixed)
+        for instance in range(count[node])
+    ]
+    return [(node, instance) for _, _, node, instance in sorted(entries)]
 
 
-class _Swarm:
-    """Who hears and who disturbs whom, as bit sets over row numbers."""
-
-    def __init__(self, positions: Sequence[tuple[NodeId, Enu]], geometry: Geometry) -> None:
-        self.nodes = [node for node, _ in positions]
-        self.row = {node: row for row, node in enumerate(self.nodes)}
-        at = [place for _, place in positions]
-        self.hears = [_within(at, row, geometry.link_m) for row in range(len(at))]
-        reach = max(geometry.interference_m, geometry.link_m)
-        disturbs = [_within(at, row, reach) for row in range(len(at))]
-        self.conflicts = [self._conflicts(row, disturbs) for row in range(len(at))]
-
-    def _conflicts(self, row: int, disturbs: Sequence[int]) -> int:
-        """Rows that cannot send while this one does: themselves, and whoever spoils a reception of either."""
-        found = 1 << row | disturbs[row]
-        for other in range(len(disturbs)):
-            if disturbs[row] & self.hears[other] or disturbs[other] & self.hears[row]:
-                found |= 1 << other
-        return found
+def _repeated(
+    block: Sequence[Turn], count: Mapping[NodeId, int], length: int, blocks: int, whole: int
+) -> tuple[Turn, ...]:
+    """The superframe of `whole` turns; what outlasts the last block goes on at the beginning of the next superframe."""
+    rest = whole - length * blocks
+    turns = [
+        turn._replace(offset=turn.offset + index * length, instance=turn.instance + index * count[turn.root])
+        for index in range(blocks)
+        for turn in block
+    ]
+    return tuple(sorted(turn._replace(offset=turn.offset + turn.offset // (length * blocks) * rest) for turn in turns))
 
 
-def _within(at: Sequence[Enu], row: int, reach_m: float) -> int:
-    here = at[row]
-    return sum(
-        1 << other
-        for other, there in enumerate(at)
-        if other != row and math.dist((here.east, here.north, here.up), (there.east, there.north, there.up)) <= reach_m
-    )
-
-
-class _Plan:
-    """Places one flood after the other."""
-
-    def __init__(self, swarm: _Swarm, geometry: Geometry) -> None:
-        self._swarm = swarm
-        self._geometry = geometry
-        self._sending = [0] * geometry.turns
-        """Who sends in each turn, as a bit set."""
-        self._turns: list[Turn] = []
-        self._spans: dict[NodeId, int] = {}
-        self._uncovered: dict[NodeId, tuple[NodeId, ...]] = {}
-        self._instances: dict[NodeId, int] = {}
-        self._from = 0
-
-    def flood(self, root: NodeId) -> bool:
-        """Find turns for a packet of `root` and all its relays; False when there are not enough."""
-        rows = self._tree(self._swarm.row[root])
-        instance = self._instances.get(root, 0)
-        starts: dict[int, int] = {}
-        for row, parent in rows:
-            earliest = self._from if parent is None else starts[parent] + self._geometry.hop_turns
-            offset = self._free(row, earliest)
-            if offset is None or (parent is None and offset >= self._geometry.turns):
-                return False
-            starts[row] = offset
-            self._sending[offset % self._geometry.turns] |= 1 << row
-            self._turns.append(Turn(offset, self._swarm.nodes[row], root, instance))
-        first = starts[rows[0][0]]
-        self._from = first
-        self._instances[root] = instance + 1
-        self._spans[root] = max(self._spans.get(root, 0), max(starts.values()) - first + 1)
-        return True
-
-    def _free(self, row: int, earliest: int) -> int | None:
-        """The first turn from `earliest` on, within one superframe, in which this row disturbs nobody."""
-        conflicts, turns, sending = self._swarm.conflicts[row], self._geometry.turns, self._sending
-        for offset in range(earliest, earliest + turns):
-            if not sending[offset % turns] & conflicts:
-                return offset
-        return None
-
-    def _tree(self, root: int) -> list[tuple[int, int | None]]:
-        """Relays that together reach everyone, level by level, each with the one it hears the packet from.
-
-        In each level those first that reach most of what is not reached yet (the greedy set cover of RFC 3626, 8.3.1).
-        """
-        hears = self._swarm.hears
-        relays: list[tuple[int, int | None]] = [(root, None)]
-        reached = 1 << root | hears[root]
-        level = dict.fromkeys(_rows(hears[root]), root)
-        while level:
-            following: dict[int, int] = {}
-            while True:
-                row = max(level, key=lambda r: ((hears[r] & ~reached).bit_count(), -r), default=None)
-                if row is None or not hears[row] & ~reached:
-                    break
-                following.update(dict.fromkeys(_rows(hears[row] & ~reached), row))
-                reached |= hears[row]
-                relays.append((row, level.pop(row)))
-            level = following
-        missing = ((1 << len(hears)) - 1) & ~reached
-        self._uncovered[self._swarm.nodes[root]] = tuple(self._swarm.nodes[row] for row in _rows(missing))
-        return relays
-
-    def table(self) -> Timetable:
-        used = sum(1 for sending in self._sending if sending)
-        return Timetable(tuple(sorted(self._turns)), dict(self._spans), dict(self._uncovered), used)
-
-
-def _rows(bits: int) -> list[int]:
-    """The rows of a bit set, ascending."""
-    return [row for row in range(bits.bit_length()) if bits >> row & 1]
+def _spans(turns: Sequence[Turn]) -> dict[NodeId, int]:
+    """Of turns in order: the longest of each root."""
+    begun: dict[tuple[NodeId, int], int] = {}
+    spans: dict[NodeId, int] = {}
+    for turn in turns:
+        first = begun.setdefault((turn.root, turn.instance), turn.offset)
+        spans[turn.root] = max(spans.get(turn.root, 0), turn.offset - first + 1)
+    return spans

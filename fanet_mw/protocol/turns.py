@@ -63,20 +63,23 @@ class Turns(NamedTuple):
             return start_ns
         return frame_ns + self.period_ns + int(random() * open_ns)
 
-    def worst_ns(self, roots: Sequence[int], *, span: int, interval_ns: int) -> int | None:
+    def worst_ns(self, roots: Sequence[int], *, span: int, interval_ns: int, together: int = 1) -> int | None:
         """Sound bound of the delay, generation to everyone, of packets that come every `interval_ns` at their root.
 
-        The q-th packet of a busy period that begins just after a root turn is let out in the q-th one after it, and
-        `flood_ns` later all have it. Over all q of the busy period and all turns after which it may begin (Davis et
-        al., 2007). None when more packets come than are let out. Holds while the swarm stays as it was when the table
-        was made, no frame is lost, and nothing of higher priority uses the same root.
+        A root turn lets out as many of them as wait, up to `together`. The q-th packet of a busy period that begins
+        just after a root turn is let out in the ceil(q / together)-th one after it: a turn that lets out fewer ends
+        the period. `flood_ns` later all have it. Over all q of the busy period and all turns after which it may begin
+        (Davis et al., 2007); of those let out together the first waits longest. None when more packets come than are
+        let out. Holds while the swarm stays as it was when the table was made, no frame is lost, and nothing of higher
+        priority uses the same root.
         """
-        if len(roots) * interval_ns < self.period_ns:
+        if together * len(roots) * interval_ns < self.period_ns:
             return None
-        return max(done_ns - later * interval_ns for later, done_ns in enumerate(self.done_ns(roots, span=span)))
+        done_ns = self.done_ns(roots, span=span)
+        return max(done - later * together * interval_ns for later, done in enumerate(done_ns))
 
     def done_ns(self, roots: Sequence[int], *, span: int) -> list[int]:
-        """The longest time from just after one of the given turns until the q-th packet let out then is with everyone.
+        """The longest time from just after one of the given turns until what the q-th after it lets out is everywhere.
 
         For q from 1 to the turns of a superframe.
         """

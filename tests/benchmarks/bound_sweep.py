@@ -1,7 +1,8 @@
-"""The delay bound of scheduled floods against whole swarms: `python tests/benchmarks/bound_sweep.py [DELIVERIES]`.
+"""The delay bound of scheduled floods against whole swarms: `bound_sweep.py [DELIVERIES [PROCESSES [MINUTES]]]`.
 
-Random swarms of 5 to 100 nodes, connected, over both channels, at rest or flying in formation, every node a head, loads
-that `fanet plan` calls feasible. Every delivery is held against the bound (b) that its origin computed in flight, and
+Random swarms of 5 to 100 nodes, connected, over both channels, at rest or flying in formation, every node a head or
+some, loads that `fanet plan` calls feasible. Every delivery is held against the bound (b) that its origin computed in
+flight, and
 against equation (4) of the paper (a): one flooding period, as every node's slot just holds its packets of a period.
 """
 
@@ -9,6 +10,7 @@ import math
 import os
 import random
 import sys
+import time
 from concurrent.futures import ProcessPoolExecutor
 from itertools import pairwise
 from typing import Any, NamedTuple
@@ -26,6 +28,7 @@ from sim.run import simulate
 class Result(NamedTuple):
     """One swarm."""
 
+    seed: int
     nodes: int
     deliveries: int
     missing: int
@@ -45,7 +48,8 @@ def swarm(seed: int) -> config.Scenario | None:
         },
         "traffic": {"interval_s": pick.choice([0.5, 1.0, 2.0]), "payload_bytes": pick.choice([256, 512, 1024])},
         "clusters": {
-            "count": count - 1, "relay": "scheduled", "guard_ms": 0, "link_m": 240,
+            "count": pick.choice([count - 1, max(1, count // pick.randint(2, 12))]),
+            "relay": "scheduled", "guard_ms": 0, "link_m": 240,
             "flooding_period_s": pick.choice([0.5, 1.0, 2.0, 4.0]),
         },
         "radio": {"lead_ms": pick.choice([0, 0, 5, 20, 40]), "cw_min": pick.choice([1, 7, 31])},
@@ -70,11 +74,13 @@ def measure(seed: int) -> Result | None:
         r["node"]: (r["bound_from_ms"] * MS, r["bound_ms"] * MS) for r in outcome.reports.values() if r.get("bound_ms")
     }
     start_ns, end_ns = scenario.traffic_window_ns
-    settled_ns = max([start_ns, *(since for since, _ in bounds.values())])
     counted = {
         (r.node, r.seq)
         for r in outcome.records
-        if isinstance(r, Generated) and r.app == "traffic" and r.node in bounds and settled_ns <= r.t_ns < end_ns
+        if isinstance(r, Generated)
+        and r.app == "traffic"
+        and r.node in bounds
+        and max(start_ns, bounds[r.node][0]) <= r.t_ns < end_ns
     }
     delays = [
         (r.origin, r.delay_ns) for r in outcome.records if isinstance(r, Delivered) and (r.origin, r.seq) in counted
@@ -82,6 +88,7 @@ def measure(seed: int) -> Result | None:
     if not delays:
         return None
     return Result(
+        seed=seed,
         nodes=scenario.nodes.count,
         deliveries=len(delays),
         missing=len(counted) * (scenario.nodes.count - 1) - len(delays),
@@ -91,15 +98,17 @@ def measure(seed: int) -> Result | None:
     )
 
 
-def main(wanted: int) -> None:
+def main(wanted: int, processes: int, minutes: float) -> None:
     found: list[Result] = []
-    total, seed, at_once = 0, 0, 16
-    with ProcessPoolExecutor(os.cpu_count()) as pool:
-        while total < wanted:
-            results = [result for result in pool.map(measure, range(seed, seed + at_once)) if result]
-            seed += at_once
+    total, seed, end_s = 0, 0, time.monotonic() + 60 * minutes
+    with ProcessPoolExecutor(processes) as pool:
+        while total < wanted and time.monotonic() < end_s:
+            results = [result for result in pool.map(measure, range(seed, seed + processes)) if result]
+            seed += processes
             found += results
             total += sum(result.deliveries for result in results)
+            for result in results:
+                print(*result, flush=True)
     sizes = [result.nodes for result in found]
     missing = sum(result.missing for result in found)
     paper, hit = sum(result.broken_paper for result in found), sum(result.broken_paper > 0 for result in found)
@@ -116,4 +125,7 @@ def main(wanted: int) -> None:
 
 
 if __name__ == "__main__":
-    main(int(float(sys.argv[1])) if len(sys.argv) > 1 else 10_000_000)
+    given = [float(argument) for argument in sys.argv[1:]]
+    main(
+        int(given[0]) if given else 10_000_000, int(given[1]) if given[1:] else os.cpu_count() or 1, *given[2:] or [1e6]
+    )

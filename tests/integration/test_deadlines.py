@@ -46,21 +46,23 @@ def test_load_beyond_the_admissible_rate_is_refused_and_the_rest_meets_the_deadl
     assert admission["nodes_without"] <= 1, "the leader at most: its schedules go before its packets"
 
 
-def test_a_node_that_joins_later_makes_the_way_too_long_for_the_deadline() -> None:
-    few, many = bound_s(8), bound_s(9)
+def test_nodes_that_join_later_make_the_way_too_long_for_the_deadline() -> None:
+    """Of nine in a line two come late: a packet of node 2 then has to go as far as one did in a line of eight."""
+    few, many = bound_s(7), bound_s(8)
     assert few < many
-    cut = {"at_s": 0, "for_s": 9, "kind": "cut", "node": 9}
+    cuts = tuple({"at_s": 0, "for_s": 9, "kind": "cut", "node": node} for node in (8, 9))
     times = ["duration_s=26", "warmup_s=5", f"traffic.deadline_s={(few + many) / 2:.6f}"]
-    outcome, summary = flown(*times, faults=(cut,))
+    outcome, summary = flown(*times, faults=cuts)
     said = [r for r in outcome.records if isinstance(r, DeadlineMet | DeadlineLost)]
     last = {r.node: r for r in said}
     met = {r.node for r in said if isinstance(r, DeadlineMet) and r.t_ns < 9e9}
     lost = [node for node in sorted(met) if isinstance(last[node], DeadlineLost)]
-    assert len(met) == 7
+    assert len(met) >= 5
     assert lost
     for node in lost:
         assert last[node].t_ns > 9e9
-        assert last[node].bound_ns + 1000 > last[node].deadline_ns
+        bound_ns = last[node].bound_ns  # 0 while only the farther one of the two has joined: there is none
+        assert bound_ns == 0 or bound_ns + 1000 > last[node].deadline_ns
     assert summary["admission"]["nodes_without"] > 0
     assert summary["admission"]["deadline_ms"] == pytest.approx(500 * (few + many), abs=0.01)
 

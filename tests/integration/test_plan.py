@@ -17,7 +17,7 @@ def planned(*settings: str, deadline_s: float | None = None, **options: bool) ->
     return judge(catalog.find("clusters", settings), deadline_s=deadline_s, **{"change": False, **options})
 
 
-@pytest.mark.parametrize("settings", [(), ("radio.lead_ms=10", "clusters.flooding_period_s=1")])
+@pytest.mark.parametrize("settings", [(), ("clusters.count=8",), ("radio.lead_ms=10", "clusters.flooding_period_s=1")])
 def test_the_bound_that_is_planned_is_the_one_that_the_nodes_compute_in_flight(settings: tuple[str, ...]) -> None:
     scenario = catalog.find("clusters", ["duration_s=20", "warmup_s=12", *settings])
     bound = finish(simulate(scenario), out=None)["bound"]
@@ -30,14 +30,14 @@ def test_the_bound_that_is_planned_is_the_one_that_the_nodes_compute_in_flight(s
 def test_a_load_that_does_not_fit_is_told_with_the_one_that_does() -> None:
     text, plan, feasible = planned("traffic.interval_s=0.1")
     assert not feasible
-    assert "one packet per source every 0.5" in text
+    assert "one packet per source every 0.1" in text
     least_s = plan["superframe"]["least_interval_s"]
     assert planned(f"traffic.interval_s={least_s}")[2]
     assert not planned(f"traffic.interval_s={0.99 * least_s}")[2]
 
 
 @pytest.mark.parametrize(
-    ("settings", "deadline_s"), [(("radio.channel=log_distance",), None), ((), 0.5), (("clusters.relay=all",), 0.5)]
+    ("settings", "deadline_s"), [(("clusters.flooding_period_s=0.1",), None), ((), 0.5), (("clusters.relay=all",), 0.5)]
 )
 def test_the_change_that_it_proposes_makes_it_feasible(settings: tuple[str, ...], deadline_s: float | None) -> None:
     _, plan, feasible = planned(*settings, deadline_s=deadline_s, change=True)
@@ -53,7 +53,7 @@ def test_a_deadline_that_cannot_be_met_is_no_plan() -> None:
     text, plan, feasible = planned(deadline_s=0.3)
     assert not feasible
     assert not plan["classes"][0]["deadline_met"]
-    assert "takes up to 528.2 ms, the deadline is 300 ms" in text
+    assert "takes up to 518.4 ms, the deadline is 300 ms" in text
 
 
 @pytest.mark.parametrize("relay", ["scheduled", "all"])

@@ -47,15 +47,35 @@ def test_floods_that_reach_into_the_next_superframe_keep_their_bound() -> None:
 
 
 def test_more_than_fits_is_carried_as_far_as_it_fits_and_has_no_bound() -> None:
-    summary = summary_of("clusters.flooding_period_s=1", "traffic.interval_s=0.1")
+    summary = summary_of(
+        "nodes.count=9", "clusters.count=8", "traffic.sources=8", "traffic.interval_s=0.01", "duration_s=16"
+    )
     assert summary["bound"] == {}
-    assert 0.2 < summary["pdr"] < 0.6
+    assert 0.2 < summary["pdr"] < 0.95
     assert summary["frames"]["closes"]
 
 
-def test_heads_let_out_what_their_members_bring_them_in_the_contention_window() -> None:
-    summary = summary_of("clusters.count=8", "clusters.flooding_period_s=1", "clusters.contention_ms=150")
-    assert summary["pdr"] >= 0.95
+@pytest.mark.parametrize("clusters", [4, 22])
+def test_members_of_a_cluster_keep_a_bound_too(clusters: int) -> None:
+    summary = summary_of(f"clusters.count={clusters}")
+    assert summary["pdr"] >= 0.999
+    assert summary["bound"]["violations"] == 0
+    assert summary["bound"]["classes"]["traffic"]["deliveries"] > 15_000, "every member states one"
+
+
+def test_packets_share_frames_when_turns_are_scarce_and_keep_their_bound() -> None:
+    few = ("nodes.count=9", "clusters.count=8", "traffic.sources=8", "duration_s=16")
+    summary = summary_of(*few, "traffic.interval_s=0.025")
+    assert summary["pdr"] >= 0.999
+    assert summary["bound"]["violations"] == 0
+    assert summary["bound"]["classes"]["traffic"]["deliveries"] > 1000
+    assert summary["frames"]["sent"] < 3 * summary["generated"], "five transmissions for two packets"
+
+
+def test_where_turns_suffice_for_heads_only_members_bring_them_their_packets_in_the_contention_window() -> None:
+    summary = summary_of("clusters.count=8", "clusters.flooding_period_s=0.15")
+    assert summary["bound"] == {}
+    assert summary["pdr"] > 0.9
     assert summary["frames"]["closes"]
 
 

@@ -6,8 +6,9 @@ import pytest
 from hypothesis import given, settings
 from hypothesis import strategies as st
 
+from fanet_mw.protocol.packing import Effort, Geometry
 from fanet_mw.protocol.planner.loss import loss
-from fanet_mw.protocol.timetable import Geometry, timetable
+from fanet_mw.protocol.timetable import timetable
 from fanet_mw.protocol.topology import components, within_range
 from fanet_mw.units import Enu, NodeId
 
@@ -60,13 +61,15 @@ def test_no_node_is_missed_more_often_than_stated(at, p) -> None:
 
 def test_who_sends_in_the_same_turn_counts_as_interference() -> None:
     places = swarm([(200 * i, 0) for i in range(7)])
-    table = timetable(tuple(sorted(places.items())), (NodeId(1), NodeId(7)), Geometry(250, 250, 100, 1))
+    table = timetable(
+        tuple(sorted(places.items())), (NodeId(1), NodeId(7)), Geometry(250, 250, 12, 1), (), Effort(pace=0.0)
+    )
     asked = set()
 
     def chance(_sender, _receiver, others) -> float:
         asked.add(others)
         return 1.0
 
-    found = loss(table, within_range(places, range_m=250), per_frame=100, hop_turns=1, chance=chance)
+    found = loss(table, within_range(places, range_m=250), per_frame=12, hop_turns=1, chance=chance)
     assert found.worst == 0
     assert any(others for others in asked)

@@ -14,7 +14,7 @@ from fanet_mw.protocol.planner.demand import TrafficClass, demands
 from fanet_mw.protocol.planner.flood import FloodCost
 from fanet_mw.protocol.planner.head import Share, slot_delays, work_ns
 from fanet_mw.protocol.planner.search import _changes
-from fanet_mw.protocol.planner.turns import superframe_of, table_for
+from fanet_mw.protocol.planner.turns import table_for
 from fanet_mw.protocol.topology import within_range
 from fanet_mw.rng import stream
 from fanet_mw.trace import Delivered
@@ -131,7 +131,7 @@ def test_the_reference_grid_at_one_packet_a_second_is_feasible_and_at_ten_is_not
 
 
 def test_load_that_does_not_fit_has_to_go_and_no_step_less_would_do(planned, make_scenario) -> None:
-    scenario = make_scenario(**{**GRID, "traffic.interval_s": 0.1})
+    scenario = make_scenario(**{**GRID, "traffic.interval_s": 0.05})
     change = cheapest_change(scenario, placed(scenario))
     ((key, interval),) = change.variant.settings
     assert key == "traffic.interval_s"
@@ -224,11 +224,10 @@ def test_where_every_node_is_a_head_the_bound_is_the_protocol_s_own(make_scenari
     found = plan(scenario, placed(scenario), sources=[NodeId(n) for n in range(2, 46)])
     assert found.feasible
     assert found.access == Bounded(0)
-    turns = superframe_of(scenario)
-    load = dict.fromkeys(map(NodeId, range(1, 46)), 1)  # the leader may send too
-    table = table_for(scenario, tuple(sorted(placed(scenario).items())), load)
-    own = {NodeId(n): tuple(turn.offset for turn in table.roots() if turn.node == n) for n in range(2, 46)}
-    bounds = [turns.worst_ns(own[n], span=table.spans[n], interval_ns=S) for n in own]
+    places = tuple(sorted(placed(scenario).items()))
+    table = table_for(scenario, places, {NodeId(n): NodeId(n) for n in range(2, 46)})
+    own = {NodeId(n): tuple(turn.offset for turn in table.table.roots() if turn.node == n) for n in range(2, 46)}
+    bounds = [table.turns.worst_ns(own[n], span=table.table.spans[n], interval_ns=S) for n in own]
     assert found.classes[0].bound == Bounded(max(bounds))
 
 
@@ -240,9 +239,20 @@ def test_no_delivery_of_a_whole_swarm_is_later_than_the_plan() -> None:
     assert 0.7 * found.classes[0].bound.delay_ns < max(delays) <= found.classes[0].bound.delay_ns
 
 
-def test_members_of_a_cluster_may_have_to_wait_for_the_contention_window(make_scenario) -> None:
+def test_members_of_a_cluster_have_turns_on_their_way_to_the_head(make_scenario) -> None:
     scenario = make_scenario(**{"nodes.count": 45, **TIMETABLE, "clusters.count": 8})
     found = plan(scenario, placed(scenario))
+    assert found.feasible
+    assert found.proven
+    assert found.access == Bounded(0)
+    assert len(found.clusters) == 45, "each node lets out its own packets"
+
+
+def test_members_contend_again_where_the_turns_suffice_for_heads_only(make_scenario) -> None:
+    settings = {"nodes.count": 45, **TIMETABLE, "clusters.count": 8, "clusters.flooding_period_s": 0.15}
+    scenario = make_scenario(**settings)
+    found = plan(scenario, placed(scenario))
+    assert len(found.clusters) == 9
     assert isinstance(found.access, Refused)
     assert "assumed" in found.notes[0]
 
@@ -253,7 +263,7 @@ def test_floods_that_do_not_fit_the_turns_are_the_one_problem_named(make_scenari
     )
     found = plan(scenario, placed(scenario))
     (problem,) = found.problems
-    assert "needs 229 turns" in problem
+    assert "one packet of each of 45 roots needs" in problem
     assert cheapest_change(scenario, placed(scenario)).plan.feasible
 
 

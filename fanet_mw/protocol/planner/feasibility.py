@@ -25,8 +25,8 @@ from fanet_mw.protocol.planner.flood import FloodCost, flood_cost
 from fanet_mw.protocol.planner.goodput_bound import Goodput, any_protocol
 from fanet_mw.protocol.planner.head import ClusterPlan, Share, slot_delays, work_ns
 from fanet_mw.protocol.planner.turns import Candidate, Superframe, judge, superframe_of, table_for
-from fanet_mw.protocol.scheduled import leader_load, schedule_parts
 from fanet_mw.protocol.topology import Adjacency, within_range
+from fanet_mw.protocol.turn_plan import Fitted, schedule_parts
 from fanet_mw.scenario import Scenario
 from fanet_mw.units import Enu, NodeId, S
 
@@ -149,10 +149,15 @@ def members_of(scenario: Scenario, positions: Mapping[NodeId, Enu]) -> list[Clus
     return clusters
 
 
-def evaluate(site: Site, classes: Sequence[TrafficClass], *, deadline_ns: int | None = None) -> Plan:
-    """Judge one scenario."""
+def evaluate(
+    site: Site, classes: Sequence[TrafficClass], *, deadline_ns: int | None = None, quick: bool = False
+) -> Plan:
+    """Judge one scenario. `quick`: a timetable for less than the load, or that takes seconds, is not looked for."""
     scenario = site.scenario
+    fitted = _fitted(site, quick=quick) if site.timetable else None
     clusters = members_of(scenario, site.positions)
+    if isinstance(fitted, Fitted) and fitted.whole:  # each node lets out its own; the way to its head is in its flood
+        clusters = [Cluster(node, (node,)) for node in sorted(site.positions)]
     head_of = {member: cluster.head for cluster in clusters for member in cluster.members}
     heads = [cluster.head for cluster in clusters]
     found = ways(site.adjacency, head_of, classes)
@@ -166,7 +171,9 @@ def evaluate(site: Site, classes: Sequence[TrafficClass], *, deadline_ns: int | 
         )
         for cluster, row in zip(clusters, shares, strict=True)
     ]
-    judged = (_in_turns if site.timetable else _in_slots)(site, candidates, uplink_ns)
+    judged = (
+        _in_slots(site, candidates, uplink_ns) if fitted is None else _in_turns(site, fitted, candidates, uplink_ns)
+    )
     summed = tuple(_class(index, c, judged, uplink_ns) for index, c in enumerate(classes))
     late = () if judged.unfit or judged.cut_off or deadline_ns is None else tuple(verdict.late(summed, deadline_ns))
     cut_off = tuple(parts.problems(judged.cut_off))
@@ -244,21 +251,30 @@ def _access(site: Site, found: Ways, classes: Sequence[TrafficClass], shares: Se
     return Bounded(outcome.delay_ns + turns.period_ns - turns.contention_ns)
 
 
-def _in_turns(site: Site, candidates: Sequence[Candidate], jitter_ns: int) -> _Judged:
-    """All heads under one timetable; when the turns do not suffice, each is refused with that, and it is said."""
+def heads_of(scenario: Scenario, positions: Mapping[NodeId, Enu]) -> dict[NodeId, NodeId]:
+    """The head of each node but the leader, as the leader will assign them."""
+    clusters = members_of(scenario, positions)
+    found = {member: cluster.head for cluster in clusters for member in cluster.members}
+    return {node: head for node, head in found.items() if node != scenario.leader}
+
+
+def _fitted(site: Site, *, quick: bool) -> Fitted | Refused:
+    places = tuple(sorted(site.positions.items()))
+    return table_for(site.scenario, places, heads_of(site.scenario, site.positions), quick=quick)
+
+
+def _in_turns(site: Site, found: Fitted | Refused, candidates: Sequence[Candidate], jitter_ns: int) -> _Judged:
+    """All roots under one timetable; when the turns do not suffice, each is refused with that, and it is said."""
     scenario = site.scenario
-    turns = superframe_of(scenario)
-    members = {c.head: leader_load(scenario) if c.head == scenario.leader else c.members for c in candidates}
-    table = table_for(scenario, tuple(sorted(site.positions.items())), members)
-    if isinstance(table, Refused):
-        refused = tuple(_refused(candidate, table, scenario.clusters.period_ns) for candidate in candidates)
-        return _Judged(refused, (), Superframe(turns, 0, 0, None), (table.reason,))
+    if isinstance(found, Refused):
+        refused = tuple(_refused(candidate, found, scenario.clusters.period_ns) for candidate in candidates)
+        return _Judged(refused, (), Superframe(superframe_of(scenario), 0, 0, None), (found.reason,))
     lead_ns, control = scenario.radio.lead_ns, {scenario.leader: schedule_parts(scenario)}
     judged = tuple(
-        judge(table, c, turns, lead_ns=lead_ns, jitter_ns=jitter_ns, control=control.get(c.head, 0)) for c in candidates
+        judge(found, c, lead_ns=lead_ns, jitter_ns=jitter_ns, control=control.get(c.head, 0)) for c in candidates
     )
-    superframe = Superframe(turns, table.used, len(table.roots()), table)
-    return _Judged(judged, parts.missed(table.uncovered, leader=scenario.leader), superframe)
+    superframe = Superframe(found.turns, found.table.used, len(found.table.roots()), found.table, found.together)
+    return _Judged(judged, parts.missed(found.table.uncovered, leader=scenario.leader), superframe)
 
 
 def _in_slots(site: Site, candidates: Sequence[Candidate], jitter_ns: int) -> _Judged:

@@ -16,8 +16,12 @@ all of its neighbors but the one it has the packet from: m is not below the leas
 The least of all these is the bound. It is not known to be reachable: nothing in it says that transmissions collide at
 any but the receiver that counts.
 
-Assumed: a frame carries one whole packet (no coding across packets, no aggregation), sources are equally busy,
-neighbors are those given. With fewer sources than all the rest need copies too, which is counted.
+A frame with k packets counts as k of 1/k of its time each, F and D alike: the longer frame has the smaller share of
+preamble and MAC header, so k as large as a frame permits bounds all. In (2) neighbors bring packets, however many in a
+frame; (1) is a sum of times. Neither changes.
+
+Assumed: frames carry whole packets (no coding across packets), sources are equally busy, neighbors are those given.
+With fewer sources than all the rest need copies too, which is counted.
 """
 
 from collections.abc import Collection
@@ -26,6 +30,7 @@ from typing import NamedTuple
 from fanet_mw.airtime import Timing
 from fanet_mw.protocol.planner.flood import frame_ns
 from fanet_mw.protocol.topology import Adjacency, components
+from fanet_mw.protocol.turn_plan import most_together
 from fanet_mw.protocol.turns import Turns
 from fanet_mw.scenario import Scenario
 from fanet_mw.units import NodeId, S
@@ -75,14 +80,16 @@ def fewest_transmissions(adjacency: Adjacency) -> int:
 
 
 def any_protocol(scenario: Scenario, adjacency: Adjacency, sources: Collection[NodeId]) -> Goodput | None:
-    """The bound for the application's packets, over the scenario's MAC."""
-    frame = frame_ns(scenario.radio, scenario.traffic.payload_bytes)
-    return goodput_bound(adjacency, sources, send_ns=frame + Timing.of(scenario.radio).difs_ns, receive_ns=frame)
+    """The bound for the application's packets, over the scenario's MAC, as many in a frame as it holds."""
+    together = most_together(scenario)
+    frame = frame_ns(scenario.radio, together * scenario.traffic.payload_bytes)
+    send_ns = (frame + Timing.of(scenario.radio).difs_ns) // together
+    return goodput_bound(adjacency, sources, send_ns=send_ns, receive_ns=frame // together)
 
 
-def in_turns(turns: Turns, adjacency: Adjacency, sources: Collection[NodeId]) -> Goodput | None:
-    """The bound for any timetable of such turns, one frame each."""
+def in_turns(turns: Turns, adjacency: Adjacency, sources: Collection[NodeId], *, together: int = 1) -> Goodput | None:
+    """The bound for any timetable of such turns, each with one frame of so many packets."""
     if not turns.per_frame:
         return None
-    each_ns = turns.period_ns // turns.per_frame
+    each_ns = turns.period_ns // (turns.per_frame * together)
     return goodput_bound(adjacency, sources, send_ns=each_ns, receive_ns=each_ns)

@@ -19,7 +19,7 @@ from fanet_mw.protocol.planner.feasibility import Plan, Site, evaluate, members_
 from fanet_mw.protocol.planner.flood import frame_ns
 from fanet_mw.protocol.planner.search import WINDOWS, hopeless
 from fanet_mw.protocol.planner.variant import Variant, vary
-from fanet_mw.protocol.scheduled import schedule_bytes
+from fanet_mw.protocol.turn_plan import schedule_bytes
 from fanet_mw.scenario import Scenario
 from fanet_mw.units import Enu, NodeId, S, seconds_to_ns
 
@@ -81,7 +81,7 @@ def _judge(
     classes = demands(site.scenario, sources)
     if isinstance(classes, Refused):
         return None
-    return evaluate(site, classes, deadline_ns=deadline_ns), classes
+    return evaluate(site, classes, deadline_ns=deadline_ns, quick=True), classes
 
 
 def _families(scenario: Scenario) -> Iterator[dict[str, float | int | str]]:
@@ -103,9 +103,10 @@ def _airtime_ns(plan: Plan, classes: Sequence[TrafficClass], site: Site) -> tupl
     """(per packet in all, of which floods): means over the packets of a second."""
     scenario = plan.scenario
     radio, timing = scenario.radio, Timing.of(scenario.radio)
-    head_of = {m: cluster.head for cluster in members_of(scenario, site.positions) for m in cluster.members}
-    hops = ways(site.adjacency, head_of, classes).hops
     relays = {c.head: c.flood.transmissions for c in plan.clusters}
+    head_of = {m: cluster.head for cluster in members_of(scenario, site.positions) for m in cluster.members}
+    head_of |= {node: node for node in head_of if node in relays}  # what lets out its own has its way in its flood
+    hops = ways(site.adjacency, head_of, classes).hops
     floods = uplinks = 0.0
     for c in classes:
         frame = frame_ns(radio, c.payload_bytes)

@@ -11,13 +11,12 @@ from typing import Final, NamedTuple
 
 from fanet_mw.protocol.delay import Refused
 from fanet_mw.protocol.planner.demand import demands
-from fanet_mw.protocol.planner.feasibility import Plan, Site, evaluate, members_of
+from fanet_mw.protocol.planner.feasibility import Plan, Site, evaluate, heads_of
 from fanet_mw.protocol.planner.goodput_bound import in_turns
 from fanet_mw.protocol.planner.in_claims import evaluate_claims
-from fanet_mw.protocol.planner.turns import least_interval_ns, superframe_of
 from fanet_mw.protocol.planner.variant import Value, Variant, vary
-from fanet_mw.protocol.scheduled import leader_load
 from fanet_mw.protocol.topology import Adjacency
+from fanet_mw.protocol.turn_plan import least_interval_ns, most_together, superframe
 from fanet_mw.scenario import Scenario
 from fanet_mw.units import Enu, NodeId
 
@@ -53,21 +52,22 @@ def plan(
     return _judge(Site(scenario, positions, adjacency), sources, deadline_ns)
 
 
-def _judge(site: Site, sources: Sequence[NodeId] | None, deadline_ns: int | None) -> Plan | Refused:
+def _judge(
+    site: Site, sources: Sequence[NodeId] | None, deadline_ns: int | None, *, quick: bool = False
+) -> Plan | Refused:
     classes = demands(site.scenario, sources)
     if isinstance(classes, Refused):
         return classes
-    judged = evaluate_claims if site.scenario.clusters.relay == "claimed" else evaluate
-    return judged(site, classes, deadline_ns=deadline_ns)
+    if site.scenario.clusters.relay == "claimed":
+        return evaluate_claims(site, classes, deadline_ns=deadline_ns)
+    return evaluate(site, classes, deadline_ns=deadline_ns, quick=quick)
 
 
 def with_capacity(found: Plan, positions: Mapping[NodeId, Enu]) -> Plan:
     """The same plan with the traffic interval down to which its slots carry everything; takes a second."""
     if found.superframe is None or not found.superframe.used or found.cut_off:
         return found
-    leader, own = found.scenario.leader, leader_load(found.scenario)
-    members = {c.head: own if c.head == leader else len(c.members) for c in members_of(found.scenario, positions)}
-    least = least_interval_ns(found.scenario, tuple(sorted(positions.items())), members)
+    least = least_interval_ns(found.scenario, tuple(sorted(positions.items())), heads_of(found.scenario, positions))
     return found._replace(superframe=found.superframe._replace(least_interval_ns=least))
 
 
@@ -91,7 +91,7 @@ def cheapest_change(
         for variant in sorted(group, key=lambda v: v.size):
             if hopeless(site.of(variant.scenario), sources):
                 continue
-            found = _judge(site.of(variant.scenario), sources, deadline_ns)
+            found = _judge(site.of(variant.scenario), sources, deadline_ns, quick=True)
             if isinstance(found, Plan) and found.feasible:
                 return Change(variant, found)
     return None
@@ -102,8 +102,9 @@ def hopeless(site: Site, sources: Sequence[NodeId] | None) -> bool:
     classes = demands(site.scenario, sources)
     if not site.timetable or isinstance(classes, Refused) or site.scenario.traffic.destination != "all":
         return False
-    turns = superframe_of(site.scenario)
-    limits = ((c.interval_ns, in_turns(turns, site.adjacency, c.sources)) for c in classes)
+    together = most_together(site.scenario)
+    turns = superframe(site.scenario, together=together)
+    limits = ((c.interval_ns, in_turns(turns, site.adjacency, c.sources, together=together)) for c in classes)
     return any(most is not None and interval_ns < most.least_interval_ns for interval_ns, most in limits)
 
 

@@ -125,7 +125,8 @@ def _superframe(superframe: Superframe) -> Iterator[str]:
     )
     if superframe.used:
         share = 100 * superframe.used / turns.per_frame
-        yield item("turns in use", f"{superframe.used} ({share:.0f} %) for {superframe.packets} packets a period")
+        floods = "packets" if superframe.together == 1 else f"frames of {superframe.together} packets"
+        yield item("turns in use", f"{superframe.used} ({share:.0f} %) for {superframe.packets} {floods} a period")
 
 
 def _claims(claims: Claims) -> Iterator[str]:

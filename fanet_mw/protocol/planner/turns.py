@@ -19,17 +19,16 @@ from fanet_mw.protocol.delay import (
     delay_any_order,
     delay_fifo,
 )
+from fanet_mw.protocol.packing import Effort
 from fanet_mw.protocol.planner.flood import FloodCost
 from fanet_mw.protocol.planner.head import ClusterPlan, Share
-from fanet_mw.protocol.scheduled import fit, largest_frame, links, schedule_parts
 from fanet_mw.protocol.timetable import Timetable, timetable
-from fanet_mw.protocol.turns import Turns, turn_ns
+from fanet_mw.protocol.turn_plan import Fitted, Places, fit, links, superframe
+from fanet_mw.protocol.turns import Turns
 from fanet_mw.scenario import Scenario
-from fanet_mw.units import Enu, NodeId, seconds_to_ns
+from fanet_mw.units import NodeId
 
 _MOST_TURNS: Final = 20_000
-Places = tuple[tuple[NodeId, Enu], ...]
-"""Where the nodes are, ascending."""
 
 
 class Candidate(NamedTuple):
@@ -48,67 +47,60 @@ class Superframe(NamedTuple):
     used: int
     """Turns in which some node sends; 0: there is no table."""
     packets: int
-    """Packets that the roots let out per superframe."""
+    """Root turns per superframe."""
     table: Timetable | None
+    together: int = 1
+    """Packets that a turn holds."""
     least_interval_ns: int | None = None
     """The traffic interval down to which everything arrives, when it was asked for."""
 
 
 def superframe_of(scenario: Scenario) -> Turns:
-    """The geometry of a scenario."""
-    turn = turn_ns(scenario, payload_bytes=largest_frame(scenario))
-    period_ns, contention_ns = scenario.clusters.period_ns, round(scenario.clusters.contention_ms * 1_000_000)
-    return Turns(0, period_ns, contention_ns, turn, max(0, period_ns - contention_ns) // turn)
+    """The geometry of a scenario with one packet a turn."""
+    return superframe(scenario)
 
 
-def table_for(scenario: Scenario, places: Places, members: Mapping[NodeId, int]) -> Timetable | Refused:
-    """The running protocol's timetable for heads with so many members; refused when one packet each does not fit."""
-    turns = superframe_of(scenario)
-    found = fit(scenario, places, members, turns)
+def table_for(
+    scenario: Scenario, places: Places, head_of: Mapping[NodeId, NodeId], *, quick: bool = False
+) -> Fitted | Refused:
+    """The running protocol's timetable for nodes with these heads; refused when one packet of each does not fit.
+
+    `quick`: also when the load does not.
+    """
+    found = fit(scenario, places, head_of, quick=quick)
     if found is not None:
         return found
+    turns = superframe(scenario)
     unlimited = Turns(0, turns.period_ns, 0, turns.turn_ns, _MOST_TURNS)
-    table = timetable(places, tuple(sorted(members)), links(scenario, unlimited))
+    roots = tuple(sorted({scenario.leader, *head_of.values()}))
+    table = timetable(places, roots, links(scenario, unlimited), (), Effort(pace=0.0))
     needed = f"{table.used}" if table else f"more than {_MOST_TURNS}"
     return Refused(
-        f"one packet of each of {len(members)} roots needs {needed} turns of {turns.turn_ns / 1e6:.3f} ms, "
+        f"one packet of each of {len(roots)} roots needs {needed} turns of {turns.turn_ns / 1e6:.3f} ms, "
         f"a superframe has {turns.per_frame}"
     )
 
 
-def least_interval_ns(scenario: Scenario, places: Places, members: Mapping[NodeId, int]) -> int | None:
-    """The traffic interval down to which as many packets as come fit the turns; looked for up to twice the load."""
-    turns = superframe_of(scenario)
-    geometry = links(scenario, turns)
-    largest = max(members.values())
-    enough = 2 * largest * turns.period_ns / seconds_to_ns(scenario.traffic.interval_s)
-    best = 0
-    for packets in range(1, turns.per_frame // len(members) * largest + 2):
-        control = {scenario.leader: schedule_parts(scenario)}
-        roots = tuple(
-            root for root, n in sorted(members.items()) for _ in range(control.get(root, 0) + (packets if n else 0))
-        )
-        if not turns.per_frame or timetable(places, roots, geometry) is None:
-            break
-        best = packets
-        if packets > enough:
-            break
-    return -(-turns.period_ns * largest // best) if best else None
+def judge(found: Fitted, candidate: Candidate, *, lead_ns: int, jitter_ns: int, control: int = 0) -> ClusterPlan:
+    """One root: its queue before its turns, then the span of the flood. `control`: more urgent packets per period.
 
-
-def judge(
-    table: Timetable, candidate: Candidate, turns: Turns, *, lead_ns: int, jitter_ns: int, control: int = 0
-) -> ClusterPlan:
-    """One head: its queue before its turns, then the span of the flood. `control`: more urgent packets per period."""
+    A turn that lets out k packets counts as k parts of it, one packet each. A packet must be announced before the whole
+    turn, which counts as a longer lead; and all of them are through when the turn is.
+    """
+    table, turns, together = found.table, found.turns, found.together
+    part_ns = turns.turn_ns // together
     starts_ns = sorted(
         turns.start_ns(turn.offset, frame_start_ns=0) for turn in table.roots() if turn.node == candidate.head
     )
+    parts_ns = tuple(start_ns + part * part_ns for start_ns in starts_ns for part in range(together))
     relays = sum(1 for turn in table.turns if turn.root == candidate.head and turn.instance == 0)
     span = table.spans.get(candidate.head, 1)
     offsets = [turn.offset for turn in table.roots() if turn.node == candidate.head]
     duration_ns = max((turns.flood_ns(offset, span=span) for offset in offsets), default=turns.turn_ns)
-    server = TurnServer(turns.turn_ns, turns.period_ns, tuple(starts_ns), lead_ns)
-    delays, waiting = _queue(candidate.shares, server, duration_ns - turns.turn_ns, jitter_ns, control)
+    server = TurnServer(part_ns, turns.period_ns, parts_ns, lead_ns + turns.turn_ns - part_ns)
+    delays, waiting = _queue(candidate.shares, server, duration_ns - part_ns, jitter_ns, control)
+    if not jitter_ns and not control and sum(s.sources for s in candidate.shares) == 1:
+        delays = [_alone(s, turns, sorted(offsets), span, together, lead_ns) for s in candidate.shares]
     packets = sum(s.sources * turns.period_ns / s.interval_ns for s in candidate.shares)
     packets += control if packets else 0
     return ClusterPlan(
@@ -117,12 +109,22 @@ def judge(
         hops=candidate.hops,
         slot_ns=len(starts_ns) * turns.turn_ns,
         usable_ns=len(starts_ns) * turns.turn_ns,
-        work_ns=round(packets * turns.turn_ns),
+        work_ns=round(packets * part_ns),
         packets=packets,
         flood=FloodCost(duration_ns, turns.turn_ns, relays, proven=True),
         delays=tuple(delays),
         backlog=waiting,
     )
+
+
+def _alone(share: Share, turns: Turns, offsets: Sequence[int], span: int, together: int, lead_ns: int) -> Outcome:
+    """What the node itself computes for its only class: the longest wait need not be for the longest flood."""
+    if not share.sources:
+        return Bounded(0)
+    worst_ns = turns.worst_ns(offsets, span=span, interval_ns=share.interval_ns, together=together)
+    if worst_ns is None:
+        return Refused(f"{len(offsets) * together} packets are let out per superframe, more come")
+    return Bounded(worst_ns + lead_ns)
 
 
 def _queue(

@@ -12,17 +12,18 @@ from fanet_mw.scenario import Scenario
 settings.register_profile("default", deadline=None)  # first calls compile; timing belongs in benchmarks
 settings.load_profile("default")
 
-_SERIAL = (
+_REALTIME = (
     "test_realtime", "test_host_realtime", "test_hosts", "test_radios", "test_real_radio", "test_time_scale",
     "test_back_pressure", "test_air_control",
 )  # fmt: skip
-"""Modules whose tests live in real time: beside others they would be late."""
+"""Modules whose tests live in real time: beside tests that compute they would be late. They wait more than they work,
+so two of them go side by side; what judges lateness is marked `serial` besides, and has the machine to itself."""
 
 
 def pytest_collection_modifyitems(items: list[pytest.Item]) -> None:
     for item in items:
-        if item.path.stem.startswith(_SERIAL):
-            item.add_marker(pytest.mark.serial)
+        if item.path.stem.startswith(_REALTIME):
+            item.add_marker(pytest.mark.realtime)
 
 
 MakeScenario = Callable[..., Scenario]

@@ -63,6 +63,7 @@ def _nothing_left_behind() -> Iterator[None]:
     assert left == []
 
 
+@pytest.mark.serial
 def test_turns_announced_ahead_are_kept_by_real_processes() -> None:
     """Collision-free floods leave no time between hops but the lead: what is late is lost."""
     keys = ["nodes.count=9", "nodes.layout=grid", "traffic.sources=8", "clusters.count=8", "radio.lead_ms=40"]
@@ -73,6 +74,7 @@ def test_turns_announced_ahead_are_kept_by_real_processes() -> None:
     assert summary["bound"]["violations"] == 0
 
 
+@pytest.mark.serial
 def test_a_swarm_of_processes_delivers_and_accounts_for_every_frame(tmp_path: Path) -> None:
     outcome, _ = run(scenario())
     summary = finish(outcome, out=tmp_path / "out")

@@ -20,6 +20,8 @@ from sim.results import finish
 from sim.run import simulate
 from sim.swarm import launch
 
+pytestmark = pytest.mark.serial
+
 
 @pytest.mark.parametrize(("time_scale", "late"), [(1.0, True), (0.25, False)])
 async def test_a_lead_is_swarm_time_so_that_a_slow_clock_gives_slow_processes_more_of_it(

@@ -67,8 +67,11 @@ class OwnRelease(RootRelease):
         return self._own.next_start_ns(not_before_ns=earliest_ns)
 
     def due(self, *, now_ns: int) -> list[tuple[list[Packet], int]]:
-        """Turns may have come and gone since the last look."""
+        """Turns may have come and gone since the last look. Who is woken late still uses a turn that is ahead."""
+        planned_ns = self._next_ns
         self._arm(now_ns)
+        if planned_ns is not None and now_ns <= planned_ns and self._start(planned_ns) == planned_ns:
+            self._next_ns = planned_ns
         return super().due(now_ns=now_ns)
 
     def reserve(self, *, not_before_ns: int) -> int | None:

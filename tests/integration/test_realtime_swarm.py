@@ -64,14 +64,15 @@ def _nothing_left_behind() -> Iterator[None]:
 
 
 @pytest.mark.serial
-def test_turns_announced_ahead_are_kept_by_real_processes() -> None:
+@pytest.mark.parametrize("relay", ["scheduled", "claimed"])
+def test_turns_announced_ahead_are_kept_by_real_processes(relay: str) -> None:
     """Collision-free floods leave no time between hops but the lead: what is late is lost."""
     keys = ["nodes.count=9", "nodes.layout=grid", "traffic.sources=8", "clusters.count=8", "radio.lead_ms=40"]
-    times = ["duration_s=13", "warmup_s=8", "drain_s=1"]
+    times = ["duration_s=13", "warmup_s=8", "drain_s=1", f"clusters.relay={relay}"]
     summary = finish(run(catalog.find("clusters", [*keys, *times]))[0], out=None)
     assert summary["frames"]["closes"]
     assert summary["pdr"] > 0.9
-    assert summary["bound"]["violations"] == 0
+    assert summary["bound"].get("violations", 0) == 0
 
 
 @pytest.mark.serial

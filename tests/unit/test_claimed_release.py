@@ -1,0 +1,41 @@
+"""A queue that is let out in turns of its own, and a host that wakes when it can."""
+
+import pytest
+
+from fanet_mw.protocol.claimed import OwnRelease
+from fanet_mw.protocol.own_turns import OwnTurns, Share
+from fanet_mw.protocol.turns import Turns
+from fanet_mw.protocol.txqueue import Packet, TxQueue
+from fanet_mw.units import MS
+from fanet_mw.wire import Header
+
+LEAD_NS = 5 * MS
+FIRST_NS, SECOND_NS = 46 * MS, 62 * MS
+"""Turns 3 and 11 of a period: the window, then 2 ms each."""
+PACKET = Packet(Header(0, 7, 3, 0xFFFF, 3, 0, 32, 0, 3, 0), b"")
+
+
+@pytest.fixture
+def release() -> OwnRelease:
+    own = OwnTurns(Turns(origin_ns=0, period_ns=500 * MS, contention_ns=40 * MS, turn_ns=2 * MS, per_frame=16))
+    own.share = Share(slot=3, length=8)
+    made = OwnRelease(TxQueue(capacity=4), own, lead_ns=LEAD_NS, frame_bytes=0)
+    made.push(PACKET, now_ns=0)
+    assert made.next_wake_ns() == FIRST_NS - LEAD_NS
+    return made
+
+
+@pytest.mark.parametrize("late_ns", [0, 1, 2 * MS, LEAD_NS])
+def test_who_is_woken_late_still_uses_a_turn_that_is_ahead(release: OwnRelease, late_ns: int) -> None:
+    assert release.due(now_ns=FIRST_NS - LEAD_NS + late_ns) == [([PACKET], FIRST_NS)]
+
+
+def test_a_turn_that_has_begun_is_left_for_the_next_one(release: OwnRelease) -> None:
+    assert release.due(now_ns=FIRST_NS + 1) == []
+    assert release.next_wake_ns() == SECOND_NS - LEAD_NS
+
+
+def test_a_turn_that_is_no_longer_ours_is_not_used(release: OwnRelease) -> None:
+    release._own.share = Share(slot=4, length=8)
+    assert release.due(now_ns=FIRST_NS - LEAD_NS + 1) == []
+    assert release.next_wake_ns() == FIRST_NS + 2 * MS - LEAD_NS

@@ -17,7 +17,7 @@ from fanet_mw.protocol.claimed import geometry, turn_bytes
 from fanet_mw.protocol.clustering import Cluster, balanced
 from fanet_mw.protocol.delay import Bounded, Outcome, Refused, paper
 from fanet_mw.protocol.guard import PLANNED_ERROR_NS, slot_guard_ns
-from fanet_mw.protocol.planner import parts, verdict
+from fanet_mw.protocol.planner import parts, verdict, window
 from fanet_mw.protocol.planner.access import Ways, access_outcome, ways
 from fanet_mw.protocol.planner.claimed import Claimants, Claims
 from fanet_mw.protocol.planner.demand import ClassPlan, TrafficClass
@@ -177,6 +177,7 @@ def evaluate(
     summed = tuple(_class(index, c, judged, uplink_ns) for index, c in enumerate(classes))
     late = () if judged.unfit or judged.cut_off or deadline_ns is None else tuple(verdict.late(summed, deadline_ns))
     cut_off = tuple(parts.problems(judged.cut_off))
+    crowded = tuple(window.too_short(scenario, site.adjacency)) if site.timetable else ()
     return Plan(
         scenario=scenario,
         clusters=judged.clusters,
@@ -189,7 +190,13 @@ def evaluate(
         cut_off=judged.cut_off,
         goodput=goodput(site, classes),
         deadline_ns=deadline_ns,
-        problems=judged.unfit or (*cut_off, *verdict.problems(scenario, judged.clusters, summed, cut_off), *late),
+        problems=judged.unfit
+        or (
+            *cut_off,
+            *verdict.problems(scenario, judged.clusters, summed, cut_off),
+            *crowded,
+            *late,
+        ),
         notes=(
             *verdict.notes(access, judged.clusters, guard_ns=site.guard_ns, uplink_ns=uplink_ns),
             *verdict.left_out(scenario),

@@ -1,8 +1,9 @@
 """Plan a scenario, and the cheapest change that makes it feasible: fewest keys first, then the least change of values.
 
-Searched: cluster count and flooding period; under a timetable the backoff that a turn has to hold (`radio.cw_min`) and
-every node a head; where relays contend, a timetable; in claimed slots the backoff, how many slots, small packets
-together, or a timetable. Last, less application traffic: load that does not fit has to go.
+Searched: cluster count and flooding period; under a timetable the backoff that a turn has to hold (`radio.cw_min`),
+every node a head, and at last all that makes turns short at once; where relays contend, a timetable; in claimed slots
+the backoff, how many slots, small packets together, or a timetable. Last, less application traffic: load that does not
+fit has to go.
 """
 
 from collections.abc import Iterator, Mapping, Sequence
@@ -24,6 +25,7 @@ _COUNTS: Final = (1, 2, 3, 4, 5, 6, 8, 11, 15, 22, 30, 44, 64)
 _PERIODS: Final = (0.1, 0.2, 0.4, 0.5, 0.7, 1.0, 1.4, 2.0, 3.0, 5.0, 10.0)
 """Of the scenario's own period."""
 _TURN_PERIODS_S: Final = (0.1, 0.2, 0.25, 0.3, 0.4, 0.5, 0.7, 1.0, 2.0, 5.0)
+_TIGHT_PERIOD_S: Final = 4.0
 _SLOTS: Final = (0, 6, 8, 10, 12, 14, 16, 20, 24, 32, 48, 64)
 WINDOWS: Final = (31, 15, 7, 3, 1)
 _SLOWER: Final = (1.1, 1.25, 1.5, 2.0, 2.5, 3.0, 4.0, 5.0, 7.0, 10.0, 20.0, 50.0, 100.0)
@@ -87,11 +89,11 @@ def cheapest_change(
     found = _judge(site, sources, deadline_ns)
     if isinstance(found, Plan) and found.cut_off:
         return None
-    for group in (_changes(scenario), _lighter(scenario)):
+    for group, quick in ((_changes(scenario), True), (_tightest(scenario), False), (_lighter(scenario), True)):
         for variant in sorted(group, key=lambda v: v.size):
             if hopeless(site.of(variant.scenario), sources):
                 continue
-            found = _judge(site.of(variant.scenario), sources, deadline_ns, quick=True)
+            found = _judge(site.of(variant.scenario), sources, deadline_ns, quick=quick)
             if isinstance(found, Plan) and found.feasible:
                 return Change(variant, found)
     return None
@@ -123,6 +125,22 @@ def _turn_options(scenario: Scenario) -> Iterator[dict[str, Value]]:
     periods = dict.fromkeys((clusters.flooding_period_s, *_TURN_PERIODS_S))
     for count, window, period_s in product(counts, windows, periods):
         yield {"clusters.count": count, "radio.cw_min": window, "clusters.flooding_period_s": period_s}
+
+
+def _tightest(scenario: Scenario) -> Iterator[Variant]:
+    """The most that turns can carry: short turns, long superframes, and fewer hellos, to fit a short window."""
+    if scenario.clusters.relay != "scheduled" or scenario.clock.modelled:
+        return  # clocks ask for slack
+    settings: dict[str, Value] = {
+        "radio.cw_min": 1,
+        "clusters.turn_slack_us": 20.0,
+        "clusters.contention_ms": 20.0,
+        "clusters.flooding_period_s": _TIGHT_PERIOD_S,
+        "routing.hello_interval_s": max(2.0, scenario.routing.hello_interval_s),
+    }
+    variant = vary(scenario, settings)
+    if variant is not None:
+        yield variant
 
 
 def _claim_options(scenario: Scenario) -> Iterator[dict[str, Value]]:

@@ -1,0 +1,34 @@
+"""Hellos and the window in which they contend."""
+
+import pytest
+
+from fanet_mw.protocol.planner.window import hellos_ns, too_short
+from fanet_mw.protocol.topology import within_range
+from fanet_mw.units import MS, Enu, NodeId
+from sim import catalog
+from sim.layout import positions
+
+LINE = within_range({NodeId(i): Enu(200.0 * i, 0.0, 0.0) for i in range(1, 8)}, range_m=250)
+
+
+def test_those_within_two_hops_count_with_what_each_says_in_a_superframe() -> None:
+    """Five nodes, two hellos each: 137 + 64 bytes at 11 Mb/s and the preamble, DIFS, a mean backoff of 7 / 2 slots."""
+    scenario = catalog.find("clusters", ["clusters.flooding_period_s=2", "routing.hello_interval_s=1"])
+    assert hellos_ns(scenario, LINE) == pytest.approx(5 * 2 * (192 + 147 + 50 + 70) * 1000, rel=0.01)
+
+
+def test_without_hellos_the_window_is_empty() -> None:
+    scenario = catalog.find("clusters", ["routing.hello_interval_s=0"])
+    assert hellos_ns(scenario, LINE) == 0
+    assert not list(too_short(scenario, LINE))
+
+
+@pytest.mark.parametrize(("hello_s", "fits"), [(1.0, False), (2.0, True)])
+def test_a_window_that_is_too_short_is_told_with_what_it_needs(hello_s: float, *, fits: bool) -> None:
+    keys = ["clusters.flooding_period_s=4", "clusters.contention_ms=20", "radio.cw_min=1"]
+    scenario = catalog.find("clusters", [*keys, f"routing.hello_interval_s={hello_s}"])
+    places = dict(zip(scenario.node_ids, positions(scenario), strict=True))
+    adjacency = within_range(places, range_m=scenario.radio.range_m)
+    said = list(too_short(scenario, adjacency))
+    assert (not said) == fits
+    assert fits or ("contention window of 20 ms" in said[0] and hellos_ns(scenario, adjacency) > 15 * MS)

@@ -70,18 +70,13 @@ class OwnRelease(RootRelease):
         """Turns may have come and gone since the last look. Who is woken late still uses a turn that is ahead."""
         planned_ns = self._next_ns
         self._arm(now_ns)
-        if planned_ns is not None and now_ns <= planned_ns and self._start(planned_ns) == planned_ns:
-            self._next_ns = planned_ns
+        if planned_ns is not None and planned_ns >= now_ns:
+            self._next_ns = self._start(min(planned_ns, self._next_ns or planned_ns))
         return super().due(now_ns=now_ns)
 
     def reserve(self, *, not_before_ns: int) -> int | None:
         """A turn for something that is not queued."""
         return self._own.reserve(not_before_ns=max(not_before_ns, self._free_ns))
-
-    def drain(self) -> list[Packet]:
-        """Give everything up: there are no turns of ours any more."""
-        self._next_ns = None
-        return self._queue.drain()
 
 
 class Load:

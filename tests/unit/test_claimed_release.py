@@ -39,3 +39,8 @@ def test_a_turn_that_is_no_longer_ours_is_not_used(release: OwnRelease) -> None:
     release._own.share = Share(slot=4, length=8)
     assert release.due(now_ns=FIRST_NS - LEAD_NS + 1) == []
     assert release.next_wake_ns() == FIRST_NS + 2 * MS - LEAD_NS
+
+
+def test_an_earlier_turn_that_has_become_ours_is_taken(release: OwnRelease) -> None:
+    release._own.share = Share(slot=1, length=2)
+    assert release.due(now_ns=FIRST_NS - 4 * MS - LEAD_NS) == [([PACKET], FIRST_NS - 4 * MS)]

@@ -237,14 +237,7 @@ class Uav(Actor):
                 altitude_m=abs(approach.apart.up),
                 horizontal_m=math.hypot(approach.apart.east, approach.apart.north),
             )
-            seq = self._node.send(
-                inner,
-                destination=BROADCAST,
-                priority=wire.PRIORITY_SAFETY,
-                app="warning",
-                due_ns=(now_ns + self._lead_ns) // US * US,
-                now_ns=now_ns,
-            )
+            seq = self._tell_all(inner, priority=wire.PRIORITY_SAFETY, app="warning", now_ns=now_ns)
             self.records.append(Warned(now_ns, self._id, other, seq))
         if lookout.course is not None:
             course, lookout.course = lookout.course, None
@@ -253,11 +246,9 @@ class Uav(Actor):
     def _report(self, now_ns: int) -> None:
         reports, self._mission.reports = self._mission.reports, []
         for report in reports:
-            self._node.send(
-                report.encode_frame(self._id),
-                destination=BROADCAST,
-                priority=wire.PRIORITY_REPORT,
-                app="report",
-                due_ns=(now_ns + self._lead_ns) // US * US,
-                now_ns=now_ns,
-            )
+            self._tell_all(report.encode_frame(self._id), priority=wire.PRIORITY_REPORT, app="report", now_ns=now_ns)
+
+    def _tell_all(self, inner: bytes, *, priority: int, app: str, now_ns: int) -> int:
+        """One lead from now, in whole microseconds; returns the packet's sequence number."""
+        due_ns = (now_ns + self._lead_ns) // US * US
+        return self._node.send(inner, destination=BROADCAST, priority=priority, app=app, due_ns=due_ns, now_ns=now_ns)

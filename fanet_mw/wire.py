@@ -225,11 +225,6 @@ def _with_more(packet: bytes) -> bytes:
     return b"".join((body, _CRC.pack(mcrf4xx(bytes(body[1:]) + _EXTRA)), packet[HEADER_BYTES:]))
 
 
-def is_bundle(frame: bytes) -> bool:
-    """Whether another packet follows the first one, unchecked: `unbundle` says it for sure."""
-    return len(frame) >= HEADER_BYTES and bool(frame[_FLAGS_AT] & FLAG_MORE)
-
-
 def unbundle(frame: bytes) -> list[bytes]:
     """The packets of a radio frame, each as it would come alone but for its flag; raises MalformedFrameError."""
     starts, at = [], 0

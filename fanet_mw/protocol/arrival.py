@@ -19,43 +19,28 @@ BUNDLE: Final = 1 << 30
 """The phase of a frame with several packets in it: no node has ever handled that."""
 
 
-def glance(packet: bytes) -> tuple[int, int]:
-    """`seen.key_of` a packet and the bit of its phase, unchecked; phase 0 when there can be none in these bytes."""
-    peeked = wire.peek(packet)
-    if peeked is None:
-        return 0, 0
-    origin, seq, flags = peeked
-    return seen.key_of(origin, seq), PHASES.get(flags & wire.PHASE_MASK, 0)
-
-
-def read(packet: bytes, phase: int) -> Packet:
-    """The packet in these bytes, whose phase `glance` has given; raises MalformedFrameError."""
-    if not phase:
-        raise MalformedFrameError("no routing header, or one of two phases")
-    return _new(Packet, (wire.decode_header(packet), packet))
-
-
 class Reader:
     """Reads frames; what was read of the latest is at hand."""
 
     def __init__(self) -> None:
         self.frame = b""
         self.key = 0
+        """`seen.key_of` its packet, unchecked; 0 when it has none, or several."""
         self.phase = 0
-        """What `glance` says of the packet in the frame; (0, BUNDLE) when it has several."""
+        """The bit of its packet's phase, unchecked; 0 when there can be none in these bytes; BUNDLE: it has several."""
         self.packet: Packet | None = None
         """The packet in the frame, once somebody has asked for it."""
         self._fields: wire.Fields | None = None
 
-    def look(self, frame: bytes) -> None:
-        """Take up another frame."""
+    def look(self, frame: bytes, *, alone: bool = False) -> None:
+        """Take up another frame. `alone`: it is one packet of a bundle, whatever its flags say of more."""
         self.frame, self.packet = frame, None
         fields = self._fields = wire.fields_of(frame)
         if fields is None:
             self.key = self.phase = 0
             return
         _, _, _, seq, origin, _, _, _, _, _, _, flags, _, _ = fields
-        if flags & wire.FLAG_MORE:
+        if flags & wire.FLAG_MORE and not alone:
             self.key, self.phase = 0, BUNDLE
         else:
             self.key, self.phase = seen.key_of(origin, seq), PHASES.get(flags & wire.PHASE_MASK, 0)

@@ -112,24 +112,13 @@ class Node:
     def hear(self, reception: Reception, now_ns: int) -> bool:
         """One reception, from anyone. True: a copy of what was handled before; nothing came of it."""
         self.receptions += 1
-        frame, reader, handled = reception.frame, self._reader, self._seen
-        if frame is not reader.frame:
-            reader.look(frame)
-        key, phase = reader.key, reader.phase
-        known = handled.young.get(key) or handled.bits(key)
-        if known & phase:
-            self._duplicates += 1
-            if self._overheard is not None:
-                self._overheard(key, now_ns=now_ns)
-            return True
-        if phase == arrival.BUNDLE:
+        reader = self._reader
+        if reception.frame is not reader.frame:
+            reader.look(reception.frame)
+        if reader.phase == arrival.BUNDLE:
             self._hear_bundle(reception, now_ns)
             return False
-        try:
-            self._first_copy(reader.packet or reader.read(), reception, key, known, known | phase, now_ns)
-        except MalformedFrameError:
-            self.dropped[DropReason.MALFORMED] += 1
-        return False
+        return self._take(reception, now_ns)
 
     def _hear_bundle(self, reception: Reception, now_ns: int) -> None:
         """Several packets in one frame: each as if it had come alone; what they make us send goes together again."""
@@ -140,18 +129,25 @@ class Node:
             return
         self.gather()
         for frame in packets:
-            key, phase = arrival.glance(frame)
-            known = self._seen.bits(key)
-            if known & phase:
-                self._duplicates += 1
-                self._protocol.overheard(key, now_ns=now_ns)
-                continue
-            try:
-                packet = arrival.read(frame, phase)
-                self._first_copy(packet, reception._replace(frame=frame), key, known, known | phase, now_ns)
-            except MalformedFrameError:
-                self.dropped[DropReason.MALFORMED] += 1
+            self._reader.look(frame, alone=True)
+            self._take(reception._replace(frame=frame), now_ns)
         self.send_gathered()
+
+    def _take(self, reception: Reception, now_ns: int) -> bool:
+        """The packet that the reader has before it."""
+        reader, handled = self._reader, self._seen
+        key, phase = reader.key, reader.phase
+        known = handled.young.get(key) or handled.bits(key)
+        if known & phase:
+            self._duplicates += 1
+            if self._overheard is not None:
+                self._overheard(key, now_ns=now_ns)
+            return True
+        try:
+            self._first_copy(reader.packet or reader.read(), reception, key, known, known | phase, now_ns)
+        except MalformedFrameError:
+            self.dropped[DropReason.MALFORMED] += 1
+        return False
 
     def _first_copy(self, packet: Packet, reception: Reception, key: int, before: int, bits: int, now_ns: int) -> None:
         """`before` and `bits`: what is known of the packet without and with this copy."""

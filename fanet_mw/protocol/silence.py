@@ -12,10 +12,9 @@ from collections.abc import Callable
 from typing import Final
 
 from fanet_mw.protocol.signs import Signs
+from fanet_mw.protocol.upkeep import SILENT_HELLOS
 from fanet_mw.units import NodeId, S
 
-_SILENT_HELLOS: Final = 4.0
-"""As for heads (`upkeep.py`)."""
 _AGAIN_NS: Final = 10 * S
 """Whoever still is in the schedule then was not heard of by the leader: it is said again."""
 _FORGOTTEN_NS: Final = 60 * S
@@ -26,7 +25,7 @@ class Silence:
 
     def __init__(self, signs: Signs, *, hello_ns: int) -> None:
         self._signs = signs
-        self._silent_ns = int(_SILENT_HELLOS * hello_ns)
+        self._silent_ns = int(SILENT_HELLOS * hello_ns)
         self._heard_ns: dict[NodeId, int] = {}
         self._said_ns: dict[NodeId, int] = {}
 

@@ -14,6 +14,7 @@ from collections.abc import Iterator, Mapping
 from itertools import islice
 from typing import Final, NamedTuple, Self
 
+from fanet_mw.places import CAPACITY as PLACES_CAPACITY
 from fanet_mw.protocol.packing import Effort, Geometry
 from fanet_mw.protocol.timetable import Timetable, timetable
 from fanet_mw.protocol.turns import Turns, turn_ns
@@ -104,8 +105,8 @@ def largest_frame(scenario: Scenario, *, together: int = 1) -> int:
 
 def schedule_bytes(scenario: Scenario) -> int:
     """A schedule part with its places."""
-    members = min(scenario.nodes.count, 56)
-    return HEADER_BYTES + _SCHEDULE_BYTES + _PLACES_BYTES * -(-members // 28)
+    members = min(scenario.nodes.count, CAPACITY)
+    return HEADER_BYTES + _SCHEDULE_BYTES + _PLACES_BYTES * -(-members // PLACES_CAPACITY)
 
 
 def superframe(scenario: Scenario, *, origin_ns: int = 0, period_ns: int | None = None, together: int = 1) -> Turns:

@@ -2,8 +2,8 @@
 
     announcements, stand-ins, signs of life, instants -> events -> table -> actions, which `clustered.py` carries out
 
-A head is silent when nothing that it generated, and no newer sequence of it in the hellos, has come for three hello
-intervals, or for one and a half after the MAC gave it up. The first in the succession then stands in for it, the next
+A head is silent when nothing that it generated, and no newer sequence of it in the hellos, has come for four hello
+intervals, or for two after the MAC gave it up. The first in the succession then stands in for it, the next
 ones half an interval later each. Only who had news of the head before judges it: others merely never were near it.
 """
 
@@ -17,7 +17,8 @@ from fanet_mw.protocol.states import Action, Event, State, step
 from fanet_mw.units import MS, NodeId
 from fanet_mw.wire import Join, Schedule
 
-_SILENT_HELLOS: Final = 4.0
+SILENT_HELLOS: Final = 4.0
+"""Of a head, or of any neighbor in a timetable (`silence.py`)."""
 _GIVEN_UP_HELLOS: Final = 2.0
 _TURN_HELLOS: Final = 0.5
 _AGAIN_HELLOS: Final = 2.0
@@ -170,7 +171,7 @@ class Upkeep:
             self._watch_ns = now_ns + self._hello_ns
             return []  # never near it since we follow it
         sign_ns = max(news_ns, self._signs.last_ns(member.head) or 0)
-        hellos = _GIVEN_UP_HELLOS if self._given_up_ns > sign_ns else _SILENT_HELLOS
+        hellos = _GIVEN_UP_HELLOS if self._given_up_ns > sign_ns else SILENT_HELLOS
         due_ns = sign_ns + int((hellos + (rank - current - 1) * _TURN_HELLOS) * self._hello_ns)
         if now_ns < due_ns:
             self._watch_ns = due_ns

@@ -24,9 +24,9 @@ from fanet_mw.protocol.planner.demand import ClassPlan, TrafficClass
 from fanet_mw.protocol.planner.flood import FloodCost, flood_cost
 from fanet_mw.protocol.planner.goodput_bound import Goodput, any_protocol
 from fanet_mw.protocol.planner.head import ClusterPlan, Share, slot_delays, work_ns
-from fanet_mw.protocol.planner.turns import Candidate, Superframe, judge, superframe_of, table_for
+from fanet_mw.protocol.planner.turns import Candidate, Superframe, judge, table_for
 from fanet_mw.protocol.topology import Adjacency, within_range
-from fanet_mw.protocol.turn_plan import Fitted, schedule_parts
+from fanet_mw.protocol.turn_plan import Fitted, schedule_parts, superframe
 from fanet_mw.scenario import Scenario
 from fanet_mw.units import Enu, NodeId, S
 
@@ -226,7 +226,7 @@ def _loads(
 def _shares(site: Site, head: NodeId, load: Sequence[int], classes: Sequence[TrafficClass]) -> list[Share]:
     """A turn is as long as the longest packet needs, whatever flies in it."""
     if site.timetable:
-        turn_ns = superframe_of(site.scenario).turn_ns
+        turn_ns = superframe(site.scenario).turn_ns
         turn = FloodCost(turn_ns, turn_ns, 1, proven=True)
         return [Share(n, c.interval_ns, turn) for n, c in zip(load, classes, strict=True)]
     return [Share(n, c.interval_ns, site.flood(head, c.payload_bytes)) for n, c in zip(load, classes, strict=True)]
@@ -249,7 +249,7 @@ def _access(site: Site, found: Ways, classes: Sequence[TrafficClass], shares: Se
     outcome = access_outcome(site.scenario, site.adjacency, found, classes, spacing_ns=None)
     if isinstance(outcome, Refused) or not any(found.hops.values()):
         return outcome
-    turns = superframe_of(site.scenario)
+    turns = superframe(site.scenario)
     if outcome.delay_ns > turns.contention_ns:
         return Refused(
             f"{outcome.delay_ns / 1e6:.0f} ms in the worst case, more than the contention window of "
@@ -275,13 +275,13 @@ def _in_turns(site: Site, found: Fitted | Refused, candidates: Sequence[Candidat
     scenario = site.scenario
     if isinstance(found, Refused):
         refused = tuple(_refused(candidate, found, scenario.clusters.period_ns) for candidate in candidates)
-        return _Judged(refused, (), Superframe(superframe_of(scenario), 0, 0, None), (found.reason,))
+        return _Judged(refused, (), Superframe(superframe(scenario), 0, 0, None), (found.reason,))
     lead_ns, control = scenario.radio.lead_ns, {scenario.leader: schedule_parts(scenario)}
     judged = tuple(
         judge(found, c, lead_ns=lead_ns, jitter_ns=jitter_ns, control=control.get(c.head, 0)) for c in candidates
     )
-    superframe = Superframe(found.turns, found.table.used, len(found.table.roots()), found.table, found.together)
-    return _Judged(judged, parts.missed(found.table.uncovered, leader=scenario.leader), superframe)
+    turns = Superframe(found.turns, found.table.used, len(found.table.roots()), found.table, found.together)
+    return _Judged(judged, parts.missed(found.table.uncovered, leader=scenario.leader), turns)
 
 
 def _in_slots(site: Site, candidates: Sequence[Candidate], jitter_ns: int) -> _Judged:

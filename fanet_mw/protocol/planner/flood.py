@@ -28,14 +28,17 @@ def frame_ns(radio: Radio, payload_bytes: int) -> int:
     return airtime_ns(payload_bytes + OVERHEAD_BYTES, radio, rate_mbps=radio.rate_mbps)
 
 
+def contended_ns(radio: Radio, payload_bytes: int) -> int:
+    """The same, with DIFS and a mean backoff."""
+    dcf = Dcf.of(radio)
+    return frame_ns(radio, payload_bytes) + dcf.sifs_ns + 2 * dcf.slot_ns + dcf.cw_min * dcf.slot_ns // 2
+
+
 def flood_cost(scenario: Scenario, adjacency: Adjacency, root: NodeId, *, payload_bytes: int) -> FloodCost:
     """The cost of one flood of such a packet from this head, to all it can reach."""
-    frame = frame_ns(scenario.radio, payload_bytes)
     clusters, radio = scenario.clusters, scenario.radio
     hops = levels(adjacency, root)
-    dcf = Dcf.of(radio)
-    difs_ns = dcf.sifs_ns + 2 * dcf.slot_ns
-    per_frame_ns = frame + difs_ns + dcf.cw_min * dcf.slot_ns // 2
+    per_frame_ns = contended_ns(radio, payload_bytes)
     sharing = max(1 + sum(1 for n in near if n in hops) for node, near in two_hop(adjacency).items() if node in hops)
     local_ns = round(sharing * relay_share(scenario, adjacency) * per_frame_ns)
     wait_ns = clusters.assess_ms * MS if clusters.relay == "counter" else 0

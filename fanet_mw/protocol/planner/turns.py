@@ -55,11 +55,6 @@ class Superframe(NamedTuple):
     """The traffic interval down to which everything arrives, when it was asked for."""
 
 
-def superframe_of(scenario: Scenario) -> Turns:
-    """The geometry of a scenario with one packet a turn."""
-    return superframe(scenario)
-
-
 def table_for(
     scenario: Scenario, places: Places, head_of: Mapping[NodeId, NodeId], *, quick: bool = False
 ) -> Fitted | Refused:

@@ -7,8 +7,7 @@ neighbor, so what counts are the hellos of all within two hops, each with DIFS a
 from collections.abc import Iterator
 from typing import Final
 
-from fanet_mw.protocol.delay import Dcf
-from fanet_mw.protocol.planner.flood import frame_ns
+from fanet_mw.protocol.planner.flood import contended_ns
 from fanet_mw.protocol.topology import Adjacency, two_hop
 from fanet_mw.scenario import Scenario
 from fanet_mw.units import MS, seconds_to_ns
@@ -25,9 +24,7 @@ def hellos_ns(scenario: Scenario, adjacency: Adjacency) -> int:
     if not every_ns or not adjacency:
         return 0
     crowd = 1 + max(map(len, two_hop(adjacency).values()))
-    dcf = Dcf.of(scenario.radio)
-    each_ns = frame_ns(scenario.radio, _HELLO_BYTES) + dcf.sifs_ns + 2 * dcf.slot_ns + dcf.cw_min * dcf.slot_ns // 2
-    return crowd * scenario.clusters.period_ns * each_ns // every_ns
+    return crowd * scenario.clusters.period_ns * contended_ns(scenario.radio, _HELLO_BYTES) // every_ns
 
 
 def too_short(scenario: Scenario, adjacency: Adjacency) -> Iterator[str]:

@@ -24,7 +24,7 @@ from fanet_mw.routing import make_protocol
 from fanet_mw.scenario import Scenario
 from fanet_mw.topics import Topics
 from fanet_mw.trace import Warned
-from fanet_mw.units import BROADCAST, MS, US, Enu, NodeId, seconds_to_ns
+from fanet_mw.units import BROADCAST, MS, US, Enu, NodeId, earliest, seconds_to_ns
 
 _HELLO_JITTER: Final = 0.1
 """A hello varies by this share of its interval, so that neighbors in step do not stay so (RFC 3626, 3.4)."""
@@ -73,12 +73,13 @@ class Uav(Actor):
 
     def receive(self, topic: str, message: Message, now_ns: int) -> bool:
         if type(message) is Reception:
-            if self._node.hear(message, now_ns):
+            node = self._node
+            if node.hear(message, now_ns):
                 return True  # a copy, and nothing came of it, as of most
             if self._lookout is not None:
                 self._look(message.frame, now_ns)
             self._settle(now_ns)
-            return False
+            return node.timeless
         if isinstance(message, TxStatus):
             self._node.status(message, now_ns=now_ns)
             if self._traffic.saturated and self._traffic.open_at(now_ns):
@@ -116,13 +117,8 @@ class Uav(Actor):
         return own_ns if node_ns is None or (own_ns is not None and own_ns < node_ns) else node_ns
 
     def _next_own_ns(self) -> int | None:
-        traffic_ns = self._traffic.next_ns()
-        wanted = [
-            None if traffic_ns is None else traffic_ns - self._lead_ns,
-            None if self._next_hello_ns is None else self._next_hello_ns - self._lead_ns,
-            self._autopilot.next_due_ns(),
-        ]
-        return min((t for t in wanted if t is not None), default=None)
+        send_ns = earliest(self._traffic.next_ns(), self._next_hello_ns)
+        return earliest(None if send_ns is None else send_ns - self._lead_ns, self._autopilot.next_due_ns())
 
     def know_clock_error(self, error_ns: int) -> None:
         """The greatest error of any clock in the swarm, as far as this node has heard; 0: they are exact."""
@@ -205,9 +201,10 @@ class Uav(Actor):
         node, mission = self._node, self._mission
         if node.deliveries:
             for packet in node.deliveries:
-                if packet.header.priority == wire.PRIORITY_REPORT:  # bulk was only to be carried
+                priority = packet.header.priority
+                if priority == wire.PRIORITY_REPORT:  # bulk was only to be carried
                     self._deliver(packet, now_ns)
-                elif packet.header.priority == wire.PRIORITY_SAFETY:
+                elif priority == wire.PRIORITY_SAFETY:
                     self._heed(packet, now_ns)
             node.deliveries.clear()
         if mission.reports:

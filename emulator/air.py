@@ -186,7 +186,8 @@ class Air:
         """Let time pass; returns the output rows (`emulator.state.OUT_*`) in order."""
         rows: Rows = []
         while True:
-            bound_ns = self._entry.advance(until_ns)
+            advance = self._entry.advance
+            bound_ns = advance(until_ns)
             count = self._counts[s.OUT_N]
             if count:
                 rows += _unpack(self._out_bytes[: count * _ROW_BYTES])

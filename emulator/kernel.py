@@ -122,8 +122,8 @@ def next_output(g: Ints, p: Ints, st: Ints, fr: Ints, hs: Ints) -> int:
     """A lower bound of the instant of the next reception or ACK; NEVER when nothing is under way.
 
     Frames on the air end when they end at their last receiver; others cannot end before they can start, plus their
-    airtime: looked at one by one while few are planned, else that of a bare header. Then a status of failure may be
-    told a header late.
+    airtime: looked at one by one while few are planned (of those that count, the parents in the heap count too), else
+    that of a bare header. Then a status of failure may be told a header late.
     """
     bound = NEVER
     for i in range(g[ON_AIR_N]):
@@ -132,9 +132,12 @@ def next_output(g: Ints, p: Ints, st: Ints, fr: Ints, hs: Ints) -> int:
         bound = min(bound, g[LAST_END])
     if g[HS_N] > _FEW:
         return int(min(bound, hs[0, 0] + p[HEADER_NS]))
-    for i in range(g[HS_N]):
+    latest = i = 0
+    while i < g[HS_N] and (i - 1) >> 1 <= latest:
         if hs[i, 0] < bound:
             bound = min(bound, earliest_end(g, p, st, fr, hs[i, 0], hs[i, 2], hs[i, 3], hs[i, 4]))
+            latest = i
+        i += 1
     return int(bound)
 
 

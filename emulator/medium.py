@@ -21,7 +21,7 @@ from fanet_mw.messages import Message, Obstructions, Poses, Reception, TxOutcome
 from fanet_mw.radio_control import Cut, Degrade, Jam, Restore
 from fanet_mw.scenario import Scenario
 from fanet_mw.topics import Topics
-from fanet_mw.units import BROADCAST, MS, NodeId, S
+from fanet_mw.units import BROADCAST, MS, NodeId, S, earliest
 
 TOO_LATE_NS: Final = 50 * MS
 """A request later than this is dropped: its slot is long another's."""
@@ -238,8 +238,7 @@ class Medium(Actor):
         self._due_ns = self._next_turn_ns()
 
     def _next_turn_ns(self) -> int | None:
-        wanted = (self._warm_ns, self._cool_ns, self._faults.next_ns(), self._links_ns)
-        return min((t for t in wanted if t is not None), default=None)
+        return earliest(self._warm_ns, self._cool_ns, self._faults.next_ns(), self._links_ns)
 
     def _report_links(self, now_ns: int) -> bool:
         """Tell what the links carried; returns whether it was anything."""

@@ -29,6 +29,15 @@ class Enu(NamedTuple):
         return math.hypot(self.east, self.north, self.up)
 
 
+def earliest(*instants_ns: int | None) -> int | None:
+    """The first of these instants; None where there is none, and when there is none at all."""
+    first_ns = None
+    for t_ns in instants_ns:
+        if t_ns is not None and (first_ns is None or t_ns < first_ns):
+            first_ns = t_ns
+    return first_ns
+
+
 def seconds_to_ns(seconds: float) -> int:
     """Convert people's seconds to the integer nanoseconds used everywhere inside."""
     return round(seconds * S)

@@ -150,6 +150,8 @@ _new: Final = tuple.__new__
 
 Fields = tuple[bytes, bytes, int, int, int, int, int, int, int, int, int, int, int, int]
 """What lies at the fixed offsets of a header, unchecked: two marks, the header, version, CRC."""
+NO_FIELDS: Final[Fields] = (b"", b"", 0, 0, 0, 0, 0, 0, 0, 0, 0, PHASE_MASK, 0, 0)
+"""In place of those of bytes that cannot begin with our header: of both phases at once, as no packet is."""
 
 
 def fields_of(frame: bytes) -> Fields | None:

@@ -71,8 +71,8 @@ class VirtualHost:
         for order, (expression, listener) in enumerate(listeners, start=len(self._actors)):
             self._subscribe(expression, order, _NOBODY, _deaf_to_time(listener))
         self._routes: dict[str, Route] = {}
-        self._spent = False
-        """The wake-up on top of the heap has come: the next one that is planned takes its place."""
+        self._latest: tuple[int, int, int] | None = None
+        """The wake-up that was planned last, not in the heap: most often it is the next that comes."""
         self._stall = (-1, -1, 0)
 
     def start(self) -> None:
@@ -87,22 +87,22 @@ class VirtualHost:
         """Run every event up to and including `until_ns`; may be called again with a later instant."""
         heap, armed, wakes, flush = self._heap, self._armed, [actor.wake for actor in self._actors], self._flush
         now_ns = self.now_ns
-        while heap and heap[0][0] <= until_ns:
-            t_ns, _, index = heap[0]
+        while self._latest or heap:
+            entry = heapq.heappushpop(heap, self._latest) if self._latest else heapq.heappop(heap)
+            self._latest = None
+            t_ns, _, index = entry
+            if t_ns > until_ns:
+                self._latest = entry
+                break
             if armed[index] != t_ns:
-                heapq.heappop(heap)  # re-armed since
-                continue
+                continue  # re-armed since
             armed[index] = None
-            self._spent = True
             if t_ns > now_ns:
                 self.now_ns = now_ns = t_ns
             else:
                 self._watch(index)
             wakes[index](now_ns)
             flush({index: None})
-            if self._spent:
-                self._spent = False
-                heapq.heappop(heap)
         self.now_ns = max(self.now_ns, until_ns)
         self._hand_over()
 
@@ -150,12 +150,9 @@ class VirtualHost:
             self._armed[index] = wake_ns
             if wake_ns is not None:
                 self._seq += 1
-                entry = wake_ns, self._seq, index
-                if self._spent:
-                    self._spent = False
-                    heapq.heapreplace(self._heap, entry)
-                else:
-                    heapq.heappush(self._heap, entry)
+                if self._latest is not None:
+                    heapq.heappush(self._heap, self._latest)
+                self._latest = wake_ns, self._seq, index
 
     def _hand_over(self) -> None:
         """Tell what was recorded; once per call of the host, because a record says itself when it was."""

@@ -27,18 +27,16 @@ class Reader:
         self.key = 0
         """`seen.key_of` its packet, unchecked; 0 when it has none, or several."""
         self.phase = 0
-        """The bit of its packet's phase, unchecked; 0 when there can be none in these bytes; BUNDLE: it has several."""
+        """The bit of its packet's phase, unchecked; 0 when these bytes can have none; BUNDLE: it has several."""
         self.packet: Packet | None = None
         """The packet in the frame, once somebody has asked for it."""
-        self._fields: wire.Fields | None = None
+        self.fields = wire.NO_FIELDS
+        """What lies where its header has its fields, unchecked until somebody has asked for the packet."""
 
     def look(self, frame: bytes, *, alone: bool = False) -> None:
         """Take up another frame. `alone`: it is one packet of a bundle, whatever its flags say of more."""
         self.frame, self.packet = frame, None
-        fields = self._fields = wire.fields_of(frame)
-        if fields is None:
-            self.key = self.phase = 0
-            return
+        fields = self.fields = wire.fields_of(frame) or wire.NO_FIELDS
         _, _, _, seq, origin, _, _, _, _, _, _, flags, _, _ = fields
         if flags & wire.FLAG_MORE and not alone:
             self.key, self.phase = 0, BUNDLE
@@ -47,9 +45,9 @@ class Reader:
 
     def read(self) -> Packet:
         """The packet in the frame; raises MalformedFrameError, each time."""
-        if self._fields is None or not self.phase:
+        if not self.phase:
             raise MalformedFrameError("no routing header, or one of two phases")
-        packet = self.packet = _new(Packet, (wire.checked(self.frame, self._fields), self.frame))
+        packet = self.packet = _new(Packet, (wire.checked(self.frame, self.fields), self.frame))
         return packet
 
 

@@ -37,7 +37,7 @@ from fanet_mw.protocol.states import Action
 from fanet_mw.protocol.turns import Turns, clocks_fit, turn_ns
 from fanet_mw.protocol.txqueue import Packet, TxQueue, sooner_us
 from fanet_mw.scenario import Scenario
-from fanet_mw.units import MS, NodeId, S, seconds_to_ns
+from fanet_mw.units import MS, NodeId, S, earliest, seconds_to_ns
 from fanet_mw.wire import HEADER_BYTES, Kind
 
 _LISTEN: Final = 3
@@ -263,8 +263,7 @@ class Claimed(Clustered):
     # --- time -----------------------------------------------------------------------------------------------------
 
     def next_wake_ns(self) -> int | None:
-        other_ns, own_ns = super().next_wake_ns(), self._queue.next_wake_ns()
-        return own_ns if other_ns is None or (own_ns is not None and own_ns < other_ns) else other_ns
+        return earliest(super().next_wake_ns(), self._queue.next_wake_ns())
 
     def wake(self, now_ns: int) -> None:
         super().wake(now_ns)

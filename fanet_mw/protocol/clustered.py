@@ -31,7 +31,7 @@ from fanet_mw.protocol.states import Action
 from fanet_mw.protocol.txqueue import Packet, TxQueue, sooner_us
 from fanet_mw.protocol.upkeep import Upkeep
 from fanet_mw.protocol.whereabouts import Motion, Whereabouts
-from fanet_mw.units import BROADCAST, MS, US, NodeId, S, seconds_to_ns
+from fanet_mw.units import BROADCAST, MS, US, NodeId, S, earliest, seconds_to_ns
 from fanet_mw.wire import FLAG_FLOOD, FLAG_TO_HEAD, Beacon, Join, Kind, Schedule
 
 _HELLO_LIFETIMES: Final = 3.5
@@ -358,11 +358,10 @@ class Clustered(RoutingProtocol):
     def next_wake_ns(self) -> int | None:
         upkeep_ns = self._leader.next_wake_ns() if self._leader else self._upkeep.next_wake_ns()
         repair_ns = self._repair.next_wake_ns() if self._repair else None
-        wanted = (
+        return earliest(
             self._join_ns, upkeep_ns, self._refresh.next_wake_ns(), self._release.next_wake_ns(),
             self._relay.assessment.next_wake_ns(), repair_ns,
         )  # fmt: skip
-        return min((t for t in wanted if t is not None), default=None)
 
     def wake(self, now_ns: int) -> None:
         self._do(self._upkeep.wake(now_ns), now_ns)

@@ -65,6 +65,8 @@ class Node:
         self.next_wake_ns = self._protocol.next_wake_ns
         """The protocol's own method: every wake-up is followed by this question."""
         protocol = self._protocol
+        self.timeless = type(protocol).next_wake_ns is RoutingProtocol.next_wake_ns
+        """This protocol never asks to be woken: no reception changes when the node is due."""
         self._overheard = None if type(protocol).overheard is RoutingProtocol.overheard else protocol.overheard
         """None: this protocol does not care for copies, and most receptions are copies."""
 
@@ -112,13 +114,26 @@ class Node:
     def hear(self, reception: Reception, now_ns: int) -> bool:
         """One reception, from anyone. True: a copy of what was handled before; nothing came of it."""
         self.receptions += 1
-        reader = self._reader
-        if reception.frame is not reader.frame:
-            reader.look(reception.frame)
-        if reader.phase == arrival.BUNDLE:
+        reader, frame, handled = self._reader, reception.frame, self._seen
+        if frame is not reader.frame:
+            reader.look(frame)
+        key, phase = reader.key, reader.phase
+        known = handled.young.get(key)
+        if known is None:
+            known = handled.old.get(key, 0)
+        if known & phase:
+            self._duplicates += 1
+            if self._overheard is not None:
+                self._overheard(key, now_ns=now_ns)
+            return True
+        if phase == arrival.BUNDLE:
             self._hear_bundle(reception, now_ns)
             return False
-        return self._take(reception, now_ns)
+        try:
+            self._first_copy(reader.packet or reader.read(), reception, known, now_ns)
+        except MalformedFrameError:
+            self.dropped[DropReason.MALFORMED] += 1
+        return False
 
     def _hear_bundle(self, reception: Reception, now_ns: int) -> None:
         """Several packets in one frame: each as if it had come alone; what they make us send goes together again."""
@@ -128,30 +143,18 @@ class Node:
             self.dropped[DropReason.MALFORMED] += 1
             return
         self.gather()
+        receptions = self.receptions
         for frame in packets:
             self._reader.look(frame, alone=True)
-            self._take(reception._replace(frame=frame), now_ns)
+            self.hear(reception._replace(frame=frame), now_ns)
+        self.receptions = receptions  # it was one, whatever was in it
         self.send_gathered()
 
-    def _take(self, reception: Reception, now_ns: int) -> bool:
-        """The packet that the reader has before it."""
-        reader, handled = self._reader, self._seen
-        key, phase = reader.key, reader.phase
-        known = handled.young.get(key) or handled.bits(key)
-        if known & phase:
-            self._duplicates += 1
-            if self._overheard is not None:
-                self._overheard(key, now_ns=now_ns)
-            return True
-        try:
-            self._first_copy(reader.packet or reader.read(), reception, key, known, known | phase, now_ns)
-        except MalformedFrameError:
-            self.dropped[DropReason.MALFORMED] += 1
-        return False
-
-    def _first_copy(self, packet: Packet, reception: Reception, key: int, before: int, bits: int, now_ns: int) -> None:
-        """`before` and `bits`: what is known of the packet without and with this copy."""
-        origin_us, seq, origin, destination, _, kind, _, hops, priority, _ = packet.header
+    def _first_copy(self, packet: Packet, reception: Reception, before: int, now_ns: int) -> None:
+        """The packet that the reader has before it; `before`: what was known of it without this copy."""
+        reader = self._reader
+        key, bits = reader.key, before | reader.phase
+        _, _, origin_us, seq, origin, destination, _, kind, _, hops, priority, _, _, _ = reader.fields
         if kind == _HELLO:
             self._seen.put(key, bits)
             self._protocol.hello(packet, reception, now_ns=now_ns)

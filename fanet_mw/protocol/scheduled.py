@@ -23,7 +23,7 @@ from fanet_mw.protocol.root_release import RootRelease
 from fanet_mw.protocol.turn_plan import Plan, fit, leader_load
 from fanet_mw.protocol.turns import clocks_fit
 from fanet_mw.protocol.txqueue import Packet, TxQueue, sooner_us
-from fanet_mw.units import BROADCAST, MS, US, Enu, NodeId, seconds_to_ns
+from fanet_mw.units import BROADCAST, MS, US, Enu, NodeId, earliest, seconds_to_ns
 from fanet_mw.wire import FLAG_FLOOD, PRIORITY_BULK, Kind, Schedule
 
 _JITTER: Final = 0.25
@@ -240,11 +240,8 @@ class Scheduled(Clustered):
     # --- time -----------------------------------------------------------------------------------------------------
 
     def next_wake_ns(self) -> int | None:
-        own_ns, roots_ns = super().next_wake_ns(), self._roots.next_wake_ns()
-        if self._admission is not None:
-            said_ns = self._admission.next_wake_ns()
-            own_ns = said_ns if own_ns is None or (said_ns is not None and said_ns < own_ns) else own_ns
-        return roots_ns if own_ns is None or (roots_ns is not None and roots_ns < own_ns) else own_ns
+        admission_ns = self._admission.next_wake_ns() if self._admission else None
+        return earliest(super().next_wake_ns(), self._roots.next_wake_ns(), admission_ns)
 
     def wake(self, now_ns: int) -> None:
         super().wake(now_ns)

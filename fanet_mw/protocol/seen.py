@@ -31,25 +31,26 @@ class Seen:
         self._capacity = capacity
         self.young: dict[int, int] = {}
         """The newer generation, for whoever asks at every reception: what it has of a key is all that is known."""
-        self._old: dict[int, int] = {}
+        self.old: dict[int, int] = {}
+        """The older one."""
 
     def bits(self, key: int) -> int:
         """What is known of this packet; 0 for a new one."""
         found = self.young.get(key)
-        return self._old.get(key, 0) if found is None else found
+        return self.old.get(key, 0) if found is None else found
 
     def put(self, key: int, bits: int) -> None:
         """Set what is known of a packet; `mark` for a caller that has just asked for `bits`."""
         if len(self.young) >= self._capacity:
-            self._old, self.young = self.young, {}
+            self.old, self.young = self.young, {}
         self.young[key] = bits
 
     def forget(self, key: int) -> None:
         """As if this packet had never been heard."""
         self.young.pop(key, None)
-        self._old.pop(key, None)
+        self.old.pop(key, None)
 
     def mark(self, key: int, bits: int) -> None:
         if len(self.young) >= self._capacity:
-            self._old, self.young = self.young, {}
+            self.old, self.young = self.young, {}
         self.young[key] = self.bits(key) | bits

@@ -31,9 +31,10 @@ class Flood(RoutingProtocol):
         self._port.transmit(packet.frame, BROADCAST, start_ns=due_ns)
 
     def receive(self, packet: Packet, reception: Reception, *, now_ns: int) -> None:
-        if packet.header.destination == self._port.node:
+        header = packet.header
+        if header.destination == self._port.node:
             return  # it has arrived
-        if packet.header.hop_limit <= 1:
+        if header.hop_limit <= 1:
             self._port.drop(DropReason.HOP_LIMIT, packet, now_ns=now_ns)
             return
         self._consider(packet, now_ns=now_ns)
@@ -56,4 +57,5 @@ class Flooding(Flood):
         self._jitter_ns = port.scenario.routing.jitter_ns
 
     def _consider(self, packet: Packet, *, now_ns: int) -> None:
-        self._relay(packet, start_ns=now_ns + self._lead_ns + int(self._random() * self._jitter_ns))
+        random = self._random
+        self._relay(packet, start_ns=now_ns + self._lead_ns + int(random() * self._jitter_ns))

@@ -24,7 +24,7 @@ def test_the_last_capacity_packets_are_known_and_memory_stays_bounded() -> None:
         memory.mark(seen.key_of(origin=1, seq=seq), seen.DELIVERED)
     assert all(memory.bits(seen.key_of(origin=1, seq=seq)) for seq in range(9_900, 10_000))
     assert memory.bits(seen.key_of(origin=1, seq=0)) == 0
-    assert len(memory.young) + len(memory._old) <= 200
+    assert len(memory.young) + len(memory.old) <= 200
 
 
 def test_origins_do_not_share_sequences() -> None:

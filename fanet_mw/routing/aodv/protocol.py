@@ -37,7 +37,7 @@ from fanet_mw.routing.control import Family
 from fanet_mw.routing.routed import Routed
 from fanet_mw.routing.serial import following, later, newer
 from fanet_mw.routing.waiting import WaitingRoom
-from fanet_mw.units import BROADCAST, MS, NodeId, seconds_to_ns
+from fanet_mw.units import BROADCAST, MS, NodeId, earliest, seconds_to_ns
 
 
 class Aodv(Routed):
@@ -361,14 +361,13 @@ class Aodv(Routed):
     # --- time -----------------------------------------------------------------------------------------------------
 
     def next_wake_ns(self) -> int | None:
-        wanted = (
+        return earliest(
             self._hello_ns,
             self._discovery.next_ns(),
             self._hellos.next_ns(),
             self._room.next_end_ns(),
             super().next_wake_ns(),
         )
-        return min((t_ns for t_ns in wanted if t_ns is not None), default=None)
 
     def wake(self, now_ns: int) -> None:
         super().wake(now_ns)

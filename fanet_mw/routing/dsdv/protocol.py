@@ -22,7 +22,7 @@ from fanet_mw.routing.dsdv.messages import FULL, INCREMENTAL, PER_ENTRY, Adverti
 from fanet_mw.routing.dsdv.table import PERIODIC_UPDATE_NS, Table
 from fanet_mw.routing.routed import Routed
 from fanet_mw.routing.waiting import WaitingRoom
-from fanet_mw.units import NodeId, S, seconds_to_ns
+from fanet_mw.units import NodeId, S, earliest, seconds_to_ns
 
 _GATHER_NS: Final = 1 * S
 """News goes after U(0, this), with whatever else has come by then (as ns-3's triggered updates)."""
@@ -99,8 +99,7 @@ class Dsdv(Routed):
     # --- time -------------------------------------------------------------------------------------------------------
 
     def next_wake_ns(self) -> int | None:
-        wanted = (self._full_ns, self._news_ns, self._room.next_end_ns(), super().next_wake_ns())
-        return min((t_ns for t_ns in wanted if t_ns is not None), default=None)
+        return earliest(self._full_ns, self._news_ns, self._room.next_end_ns(), super().next_wake_ns())
 
     def wake(self, now_ns: int) -> None:
         super().wake(now_ns)

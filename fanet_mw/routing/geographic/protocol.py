@@ -25,7 +25,7 @@ from fanet_mw.routing.geographic.places import HELLO_INTERVAL_NS, Places
 from fanet_mw.routing.resolution import Outgoing
 from fanet_mw.routing.routed import Routed
 from fanet_mw.routing.waiting import WaitingRoom
-from fanet_mw.units import BROADCAST, MS, US, NodeId, S, seconds_to_ns
+from fanet_mw.units import BROADCAST, MS, US, NodeId, S, earliest, seconds_to_ns
 
 LOCATION_INTERVAL_NS: Final = 5 * S
 LOCATION_AGE_NS: Final = 10 * S
@@ -158,8 +158,7 @@ class Geographic(Routed):
     # --- time -------------------------------------------------------------------------------------------------------
 
     def next_wake_ns(self) -> int | None:
-        wanted = (self._beacon_ns, self._look_ns, super().next_wake_ns())
-        return min((t_ns for t_ns in wanted if t_ns is not None), default=None)
+        return earliest(self._beacon_ns, self._look_ns, super().next_wake_ns())
 
     def wake(self, now_ns: int) -> None:
         super().wake(now_ns)

@@ -26,6 +26,9 @@ _ROW: Final = struct.Struct("=6q")
 """One row of `asked` or `out`."""
 _pack, _unpack, _ROW_BYTES = _ROW.pack_into, _ROW.iter_unpack, _ROW.size
 _MOST_ASKED: Final = 256
+_SLOTS: Final = 1000
+"""Frame slots to begin with. No power of two: what is known of one frame, a row apart each, would lie on the same few
+lines of the processor's cache, and push itself out."""
 Rows = list[tuple[int, ...]]
 
 
@@ -79,8 +82,8 @@ class Air:
         self._sf = np.zeros((s.STATION_REALS, stations), np.float64)
         self._sf[s.NOISE] = noise_mw(radio)
         self.st[s.FAULT_RANDOM] = [stream_seed(seed, "fault", i + 1) % _GENERATOR_RANGE + 1 for i in range(stations)]
-        self.fr = np.zeros((s.FRAME_ROWS, 1024), np.int64)
-        self._hs = np.zeros((8 * stations + 2 * 1024 + 64, 5), np.int64)
+        self.fr = np.zeros((s.FRAME_ROWS, _SLOTS), np.int64)
+        self._hs = np.zeros((8 * stations + 2 * _SLOTS + 64, 5), np.int64)
         self._asked = np.zeros((_MOST_ASKED, s.ASKED_COLUMNS), np.int64)
         self._out = np.zeros((2 * radio.queue_frames + 1024, s.OUT_COLUMNS), np.int64)
         # The same memory by the buffer protocol: at a few numbers a call, several times as fast as numpy's own access.

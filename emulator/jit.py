@@ -6,7 +6,8 @@ numba keeps machine code per function and looks only at that function's own file
 go on running the old code inlined into `kernel.py`. So the cache has a directory per state of all compiled sources.
 
 Functions that make no arrays, all but those of `entry.py`, are compiled without numba's counts of references to arrays
-(`_nrt`): these are atomic, a pair per array and call that is not inlined, and took half of the kernel's time.
+(`_nrt`): these are atomic, a pair per array and call that is not inlined, and took half of the kernel's time. Of what
+was left a third was calls that handed a dozen arrays on, each in nine parts: so all are inlined.
 """
 
 import hashlib
@@ -46,7 +47,8 @@ def _decorator(*, counted: bool) -> Callable[[F], F]:
     def compiled(function: F) -> F:
         numba.config.CACHE_DIR = ours  # read when a function is decorated, and by others too: put it back
         try:
-            return cast("F", numba.njit(cache=True, error_model="numpy", _nrt=counted)(function))
+            compile_ = numba.njit(cache=True, error_model="numpy", _nrt=counted, forceinline=not counted)
+            return cast("F", compile_(function))
         finally:
             numba.config.CACHE_DIR = everyone
 

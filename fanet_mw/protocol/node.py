@@ -165,7 +165,8 @@ class Node:
             self._seen.put(key, bits)
             self.drop(DropReason.EXPIRED, packet, now_ns=now_ns)
             return
-        if kind == _DATA and not before & seen.DELIVERED and destination in (BROADCAST, self.node):
+        to_us = destination == BROADCAST or destination == self.node
+        if kind == _DATA and to_us and not before & seen.DELIVERED:
             bits |= seen.DELIVERED
             self.deliveries.append(packet)
             self.records.append(_new(Delivered, (end_ns, self.node, origin, seq, age_ns, hops + 1)))

@@ -89,7 +89,9 @@ class Air:
         # The same memory by the buffer protocol: at a few numbers a call, several times as fast as numpy's own access.
         self._counts = self.g.data
         self._asked_bytes = self._asked.data.cast("B")
-        self._out_bytes = self._out.data.cast("B")
+        out_bytes = self._out.data.cast("B")
+        self._out_rows = [out_bytes[: count * _ROW_BYTES] for count in range(len(self._out) + 1)]
+        """The first rows of `out`, by how many."""
         self._err = _error_table(radio.rate_mbps, radio.ack_rate_mbps) if radio.channel != "range" else np.zeros((3, 1))
         self._airtime: dict[int, int] = {}
         self._shadowing = Shadowing(radio, seed=seed) if radio.shadowing_db else None
@@ -193,7 +195,7 @@ class Air:
             bound_ns = advance(until_ns)
             count = self._counts[s.OUT_N]
             if count:
-                rows += _unpack(self._out_bytes[: count * _ROW_BYTES])
+                rows += _unpack(self._out_rows[count])
             if bound_ns >= 0:
                 self.next_output_ns = bound_ns
                 return rows

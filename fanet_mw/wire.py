@@ -103,13 +103,13 @@ ROUTE: Final = Spec(53000, 34, struct.Struct("<QIHHHBBBBBB"))
 HEADER_BYTES: Final = ROUTE.layout.size + OVERHEAD
 _ROUTE_MARK: Final = bytes((MAGIC, ROUTE.layout.size, 0))
 _ROUTE_ID: Final = ROUTE.msgid.to_bytes(3, "little")
-_ROUTE_BEFORE: Final = (MAGIC, ROUTE.layout.size, 0, 0)
-_ROUTE_SENDER: Final = (COMPONENT, ROUTE.msgid & 0xFFFF, ROUTE.msgid >> 16)
+_ROUTE_BEFORE: Final = _ROUTE_MARK + b"\0"
+_ROUTE_SENDER: Final = bytes((COMPONENT,)) + _ROUTE_ID
 _EXTRA: Final = bytes((ROUTE.crc_extra,))
 _ANY_NODE: Final = 0xFFFF
 
 # Whole headers, MAVLink's ten bytes included: one call of struct is most of what a header costs.
-_PACKED: Final = struct.Struct("<BBBBBBBHB" + ROUTE.layout.format[1:])
+_PACKED: Final = struct.Struct("<4sBB4s" + ROUTE.layout.format[1:])
 _CHECKED: Final = struct.Struct("<3s4x3s" + ROUTE.layout.format[1:] + "H")
 _BODY_END: Final = HEADER_BYTES - 2
 _SYSTEM_AT: Final = 5
@@ -140,7 +140,8 @@ class Header(NamedTuple):
 
     def encode(self) -> bytes:
         """The MAVLink sender is the transmitter of this hop; the MAVLink sequence is the packet's, low byte."""
-        body = _PACKED.pack(*_ROUTE_BEFORE, self.seq & 0xFF, system_id(self.prev_hop), *_ROUTE_SENDER, *self, VERSION)
+        sender = system_id(self.prev_hop)
+        body = _PACKED.pack(_ROUTE_BEFORE, self.seq & 0xFF, sender, _ROUTE_SENDER, *self, VERSION)
         return body + _CRC.pack(mcrf4xx(body[1:] + _EXTRA))
 
 

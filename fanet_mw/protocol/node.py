@@ -93,9 +93,10 @@ class Node:
             hop_limit=self.scenario.routing.hop_limit,
             born_ns=due_ns,
         )
-        self.records.append(Generated(due_ns, self.node, packet.header.seq, app, len(packet.frame)))
+        seq = packet.header.seq
+        self.records.append(_new(Generated, (due_ns, self.node, seq, app, len(packet.frame))))
         self._protocol.originate(packet, due_ns=due_ns, now_ns=now_ns)
-        return packet.header.seq
+        return seq
 
     def say_hello(self, inner: bytes, *, start_ns: int, now_ns: int) -> None:
         """Broadcast our hello one hop: position frames of the application, then what the protocol adds."""
@@ -273,18 +274,9 @@ class Node:
         control = kind is not Kind.DATA
         seq = self._next_seq[control]
         self._next_seq[control] = seq + 1
-        header = Header(
-            origin_us=born_ns // US,
-            seq=seq,
-            origin=self.node,
-            destination=destination,
-            prev_hop=self.node,
-            kind=kind,
-            hop_limit=hop_limit,
-            hops=0,
-            priority=priority,
-            flags=flags,
-        )
-        packet = Packet(header, header.encode() + inner)
-        self.mark(packet, seen.DELIVERED | PHASES[flags & wire.PHASE_MASK])
-        return packet
+        node, hops = self.node, 0
+        header = _new(
+            Header, (born_ns // US, seq, node, destination, node, kind, hop_limit, hops, priority, flags)
+        )  # fmt: skip
+        self._seen.put(seen.key_of(node, seq), seen.DELIVERED | PHASES[flags & wire.PHASE_MASK])
+        return _new(Packet, (header, header.encode() + inner))

@@ -15,6 +15,7 @@ from fanet_mw.protocol.timesync import Settings, TimeSync
 from fanet_mw.rng import stream
 from fanet_mw.scenario import Clock, Scenario
 from fanet_mw.units import NodeId, S, seconds_to_ns
+from fanet_mw.wire_messages import TimeBeacon
 
 _SIGMAS: Final = 4
 _LIGHT_M_PER_S: Final = 299_792_458
@@ -162,7 +163,7 @@ class BeaconTime(SwarmTime):
         try:
             header = wire.decode_header(frame)
             if any(msgid == wire.TIME.msgid for msgid, _ in wire.inner_frames(frame)):
-                beacon = wire.TimeBeacon.decode_frame(frame)
+                beacon = TimeBeacon.decode_frame(frame)
         except MalformedFrameError:
             self._malformed += 1
             return

@@ -25,6 +25,7 @@ from fanet_mw.scenario import Scenario
 from fanet_mw.topics import Topics
 from fanet_mw.trace import Warned
 from fanet_mw.units import BROADCAST, MS, US, Enu, NodeId, earliest, seconds_to_ns
+from fanet_mw.wire_messages import Survivor
 
 _HELLO_JITTER: Final = 0.1
 """A hello varies by this share of its interval, so that neighbors in step do not stay so (RFC 3626, 3.4)."""
@@ -155,7 +156,7 @@ class Uav(Actor):
     def _deliver(self, packet: Packet, now_ns: int) -> None:
         """Survivor reports are for the mission, and for whoever inspects us."""
         try:
-            report = wire.Survivor.decode_frame(packet.frame)
+            report = Survivor.decode_frame(packet.frame)
         except MalformedFrameError:
             self._node.dropped[DropReason.MALFORMED] += 1
             return

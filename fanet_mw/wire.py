@@ -1,21 +1,21 @@
 """One radio frame: MAVLink 2 frames, concatenated. First FANET_ROUTE, rewritten per hop; then inner frames, unchanged.
 
-The codecs of our own dialect, by struct and a Rust CRC, because every reception passes here; pymavlink is their oracle
-in the tests. Every decode is total: any bytes give a value or MalformedFrameError. Layouts: docs/wire.md.
+The header and the frame around every message of our own dialect, by struct and a Rust CRC, because every reception
+passes here; pymavlink is their oracle in the tests. Every decode is total: any bytes give a value or
+MalformedFrameError. Layouts: docs/wire.md.
 """
 
-import math
 import struct
 from collections.abc import Iterator, Sequence
 from enum import IntEnum
 from functools import lru_cache
-from typing import Any, Final, NamedTuple, Self
+from typing import Any, Final, NamedTuple
 
 from fastcrc.crc16 import mcrf4xx
 
 from fanet_mw.errors import LocalProtocolError, MalformedFrameError
 from fanet_mw.rng import stream
-from fanet_mw.units import US, Enu
+from fanet_mw.units import US
 
 MAGIC: Final = 0xFD
 """MAVLink 2 start of frame."""
@@ -63,14 +63,6 @@ class Kind(IntEnum):
 _KINDS: Final = frozenset(int(kind) for kind in Kind)
 
 
-class Role(IntEnum):
-    """A node's part in its cluster."""
-
-    ISOLATED = 0
-    MEMBER = 1
-    HEAD = 2
-
-
 def system_id(node: int) -> int:
     """The MAVLink system id (1..250) that stands for a 16-bit node id; 251..255 stay free for ground stations."""
     return (node - 1) % 250 + 1
@@ -106,7 +98,8 @@ _ROUTE_ID: Final = ROUTE.msgid.to_bytes(3, "little")
 _ROUTE_BEFORE: Final = _ROUTE_MARK + b"\0"
 _ROUTE_SENDER: Final = bytes((COMPONENT,)) + _ROUTE_ID
 _EXTRA: Final = bytes((ROUTE.crc_extra,))
-_ANY_NODE: Final = 0xFFFF
+ANY_NODE: Final = 0xFFFF
+"""No node's id."""
 
 # Whole headers, MAVLink's ten bytes included: one call of struct is most of what a header costs.
 _PACKED: Final = struct.Struct("<4sBB4s" + ROUTE.layout.format[1:])
@@ -199,8 +192,8 @@ def checked(frame: bytes, fields: Fields) -> Header:
         version != VERSION
         or kind not in _KINDS
         or origin_us > LATEST_US
-        or not 0 < origin < _ANY_NODE
-        or not 0 < prev_hop < _ANY_NODE
+        or not 0 < origin < ANY_NODE
+        or not 0 < prev_hop < ANY_NODE
         or not destination
     ):
         raise MalformedFrameError(f"routing header {header}, version {version}")
@@ -283,7 +276,7 @@ def decode_every(spec: Spec, frame: bytes) -> list[tuple[Any, ...]]:
     return found
 
 
-def _inner(spec: Spec, frame: bytes) -> tuple[Any, ...]:
+def decode_first(spec: Spec, frame: bytes) -> tuple[Any, ...]:
     """The fields of the first inner frame that is this message; raises MalformedFrameError."""
     found = decode_every(spec, frame)
     if not found:
@@ -291,193 +284,7 @@ def _inner(spec: Spec, frame: bytes) -> tuple[Any, ...]:
     return found[0]
 
 
-def _check(version: int, node: int, *, t_us: int = 0) -> None:
-    if version != VERSION or not 0 < node < _ANY_NODE or t_us > LATEST_US:
-        raise MalformedFrameError(f"version {version}, node {node}, instant {t_us} us")
-
-
-class Beacon(NamedTuple):
-    """FANET_BEACON: the routing part of a hello."""
-
-    node: int
-    head: int
-    head_seq: int
-    cluster: int
-    epoch: int
-    slot: int
-    role: int
-    hops_to_head: int
-    term: int = 0
-    leader: int = 0
-    """Whom the sender follows, and since when that one leads; 0: nobody."""
-
-    def encode_frame(self, node: int) -> bytes:
-        return encode_inner(
-            BEACON, BEACON.layout.pack(self.term, *self[:6], self.leader, *self[6:8], VERSION), node=node
-        )
-
-    @classmethod
-    def decode_frame(cls, frame: bytes) -> Self:
-        term, of, head, seq, cluster, epoch, slot, leader, role, hops, version = _inner(BEACON, frame)
-        beacon = cls(of, head, seq, cluster, epoch, slot, role, hops, term, leader)
-        _check(version, beacon.node)
-        if beacon.role > Role.HEAD or _ANY_NODE in (beacon.head, beacon.leader):
-            raise MalformedFrameError(f"beacon of role {beacon.role}, head {beacon.head}")
-        return beacon
-
-
-class Member(NamedTuple):
-    """One entry of a schedule."""
-
-    node: int
-    cluster: int
-    is_head: bool
-
-
-_HEAD_BIT: Final = 0x8000
-
-
-class Schedule(NamedTuple):
-    """FANET_SCHEDULE: one part of the leader's assignment; epoch 0 and no members: a call to join."""
-
-    start_us: int
-    period_us: int
-    slot_us: int
-    epoch: int
-    leader: int
-    clusters: int
-    part: int
-    parts: int
-    members: tuple[Member, ...]
-    term: int = 0
-    """Swarm second in which the leader took office."""
-
-    def encode_frame(self, node: int) -> bytes:
-        if len(self.members) > CAPACITY or self.clusters > _HEAD_BIT:
-            raise LocalProtocolError(
-                f"schedule of {len(self.members)} entries, {self.clusters} clusters: must be <= {CAPACITY}, {_HEAD_BIT}"
-            )
-        unused = (0,) * (CAPACITY - len(self.members))
-        return encode_inner(
-            SCHEDULE,
-            SCHEDULE.layout.pack(
-                *self[:3],
-                self.term,
-                *self[3:6],
-                *(m.node for m in self.members),
-                *unused,
-                *(m.cluster | (_HEAD_BIT if m.is_head else 0) for m in self.members),
-                *unused,
-                self.part,
-                self.parts,
-                len(self.members),
-                VERSION,
-            ),
-            node=node,
-        )
-
-    @classmethod
-    def decode_frame(cls, frame: bytes) -> Self:
-        fields = _inner(SCHEDULE, frame)
-        part, parts, count, version = fields[-4:]
-        nodes, assigned = fields[7 : 7 + CAPACITY], fields[7 + CAPACITY : 7 + 2 * CAPACITY]
-        if count > CAPACITY or part >= parts:
-            raise MalformedFrameError(f"schedule part {part} of {parts} with {count} entries")
-        members = tuple(
-            Member(node, entry & ~_HEAD_BIT, bool(entry & _HEAD_BIT))
-            for node, entry in zip(nodes[:count], assigned[:count], strict=True)
-        )
-        start_us, period_us, slot_us, term, epoch, leader, clusters = fields[:7]
-        schedule = cls(start_us, period_us, slot_us, epoch, leader, clusters, part, parts, members, term)
-        _check(version, schedule.leader, t_us=start_us)
-        if not 0 < slot_us * clusters <= period_us or bool(epoch) != bool(members):
-            raise MalformedFrameError(
-                f"schedule {epoch}: {clusters} slots of {slot_us} us in {period_us} us, {count} entries"
-            )
-        if not all(0 < member.node < _ANY_NODE and member.cluster < clusters for member in members):
-            raise MalformedFrameError(f"schedule {epoch}: an entry that is no node, or none of {clusters} clusters")
-        return schedule
-
-
-class Join(NamedTuple):
-    """FANET_JOIN."""
-
-    node: int
-    position: Enu
-    velocity: Enu = Enu(0.0, 0.0, 0.0)
-    """[m/s]"""
-    instead_of: int = 0
-    """A silent node, whom this one stands in for if it is its head; the node itself: one that objects; 0: none."""
-
-    def encode_frame(self, node: int) -> bytes:
-        payload = JOIN.layout.pack(*self.position, *self.velocity, self.node, self.instead_of, VERSION)
-        return encode_inner(JOIN, payload, node=node)
-
-    @classmethod
-    def decode_frame(cls, frame: bytes) -> Self:
-        *numbers, node, instead_of, version = _inner(JOIN, frame)
-        _check(version, node)
-        if instead_of == _ANY_NODE:
-            raise MalformedFrameError(f"join of {node} instead of {instead_of}")
-        return cls(node, _finite(*numbers[:3]), _finite(*numbers[3:]), instead_of)
-
-
-class Survivor(NamedTuple):
-    """FANET_SURVIVOR: `reporter`, at `position`, hears the phone of `survivor`."""
-
-    t_us: int
-    survivor: int
-    reporter: int
-    position: Enu
-    rssi_dbm: float
-
-    def encode_frame(self, node: int) -> bytes:
-        payload = SURVIVOR.layout.pack(self.t_us, self.survivor, *self.position, self.rssi_dbm, self.reporter, VERSION)
-        return encode_inner(SURVIVOR, payload, node=node)
-
-    @classmethod
-    def decode_frame(cls, frame: bytes) -> Self:
-        t_us, survivor, east, north, up, rssi_dbm, reporter, version = _inner(SURVIVOR, frame)
-        _check(version, reporter, t_us=t_us)
-        if not math.isfinite(rssi_dbm):
-            raise MalformedFrameError(f"rssi {rssi_dbm}")
-        return cls(t_us, survivor, reporter, _finite(east, north, up), rssi_dbm)
-
-
-class TimeBeacon(NamedTuple):
-    """FANET_TIME: the swarm time at which the sender's earlier hello `hello` ended; bounds in ns."""
-
-    t_ns: int
-    error_ns: int
-    rate_ppb: int
-    worst_ns: int
-    hello: int
-    round: int
-    node: int
-    reference: int
-    worst_age_s: int
-    hops: int
-
-    def encode_frame(self, node: int) -> bytes:
-        return encode_inner(TIME, TIME.layout.pack(*self, VERSION), node=node)
-
-    @classmethod
-    def decode_frame(cls, frame: bytes) -> Self:
-        """Raises MalformedFrameError; a beacon of the reference itself, and none else, has no hops."""
-        *fields, version = _inner(TIME, frame)
-        beacon = cls(*fields)
-        _check(version, beacon.node, t_us=beacon.t_ns // US)
-        if not 0 < beacon.reference < _ANY_NODE or (beacon.reference == beacon.node) != (beacon.hops == 0):
-            raise MalformedFrameError(f"time of node {beacon.reference}, {beacon.hops} hops from {beacon.node}")
-        return beacon
-
-
-def _finite(east: float, north: float, up: float) -> Enu:
-    if not (math.isfinite(east) and math.isfinite(north) and math.isfinite(up)):
-        raise MalformedFrameError(f"position {east}, {north}, {up}")
-    return Enu(east, north, up)
-
-
+# Whose codec is in `wire_messages`, `digest`, `places`, `claims` or `routing.control`.
 BEACON: Final = Spec(53001, 43, struct.Struct("<IHHHHHHHBBB"))
 SCHEDULE: Final = Spec(53002, 88, struct.Struct("<QIIIHHH56H56HBBBB"))
 SURVIVOR: Final = Spec(53003, 240, struct.Struct("<QIffffHB"))
@@ -490,8 +297,6 @@ CLAIMS: Final = Spec(53009, 249, struct.Struct("<H16H16B16B16B16BBBBBBB"))
 ROUTING: Final = Spec(53010, 255, struct.Struct("<BBBB240B"))
 SPECS: Final = (ROUTE, BEACON, SCHEDULE, SURVIVOR, CHUNK, TIME, JOIN, DIGEST, PLACES, CLAIMS, ROUTING)
 _OURS: Final = {spec.msgid: spec for spec in SPECS}
-CAPACITY: Final = 56
-"""Entries of one schedule part."""
 
 # --- application data ---------------------------------------------------------------------------------------------
 

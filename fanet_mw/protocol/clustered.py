@@ -32,7 +32,8 @@ from fanet_mw.protocol.txqueue import Packet, TxQueue, sooner_us
 from fanet_mw.protocol.upkeep import Upkeep
 from fanet_mw.protocol.whereabouts import Motion, Whereabouts
 from fanet_mw.units import BROADCAST, MS, US, NodeId, S, earliest, seconds_to_ns
-from fanet_mw.wire import FLAG_FLOOD, FLAG_TO_HEAD, Beacon, Join, Kind, Schedule
+from fanet_mw.wire import FLAG_FLOOD, FLAG_TO_HEAD, Kind
+from fanet_mw.wire_messages import Beacon, Join, Schedule
 
 _HELLO_LIFETIMES: Final = 3.5
 """A neighbor is gone after this many silent hello intervals (OLSR's NEIGHB_HOLD_TIME is 3, RFC 3626 18.3)."""

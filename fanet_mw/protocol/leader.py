@@ -19,7 +19,7 @@ from fanet_mw.protocol.topology import Adjacency, within_range
 from fanet_mw.protocol.whereabouts import LOST_NS, Motion
 from fanet_mw.scenario import Scenario
 from fanet_mw.units import MS, US, Enu, NodeId, S, seconds_to_ns
-from fanet_mw.wire import CAPACITY, Join, Member, Schedule
+from fanet_mw.wire_messages import CAPACITY, Join, Member, Schedule
 
 SETTLE_NS: Final = 700 * MS
 """Quiet time after the last join before the clusters are computed."""

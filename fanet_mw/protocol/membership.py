@@ -11,7 +11,7 @@ from fanet_mw.protocol.slots import Superframe
 from fanet_mw.protocol.states import Event
 from fanet_mw.trace import RoleChanged
 from fanet_mw.units import US, NodeId
-from fanet_mw.wire import Role, Schedule
+from fanet_mw.wire_messages import Role, Schedule
 
 
 class Standing(NamedTuple):

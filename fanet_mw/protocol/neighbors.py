@@ -3,7 +3,7 @@
 from typing import NamedTuple
 
 from fanet_mw.units import NodeId
-from fanet_mw.wire import Beacon
+from fanet_mw.wire_messages import Beacon
 
 
 class Neighbor(NamedTuple):

@@ -12,7 +12,7 @@ from fanet_mw.protocol.lease import Authority
 from fanet_mw.protocol.seen import key_of
 from fanet_mw.protocol.txqueue import Packet
 from fanet_mw.units import MS
-from fanet_mw.wire import Beacon
+from fanet_mw.wire_messages import Beacon
 
 _FLOOD_OVER_NS: Final = 500 * MS
 """A flood that was heard is over everywhere after this."""

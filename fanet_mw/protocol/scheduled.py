@@ -24,7 +24,8 @@ from fanet_mw.protocol.turn_plan import Plan, fit, leader_load
 from fanet_mw.protocol.turns import clocks_fit
 from fanet_mw.protocol.txqueue import Packet, TxQueue, sooner_us
 from fanet_mw.units import BROADCAST, MS, US, Enu, NodeId, earliest, seconds_to_ns
-from fanet_mw.wire import FLAG_FLOOD, PRIORITY_BULK, Kind, Schedule
+from fanet_mw.wire import FLAG_FLOOD, PRIORITY_BULK, Kind
+from fanet_mw.wire_messages import Schedule
 
 _JITTER: Final = 0.25
 """Of the contention window: the most that a relay waits there."""

@@ -18,7 +18,8 @@ from fanet_mw.protocol.contract import Port
 from fanet_mw.protocol.neighborhood import Neighborhood
 from fanet_mw.protocol.txqueue import Packet
 from fanet_mw.units import NodeId, seconds_to_ns
-from fanet_mw.wire import Beacon, Kind, Role
+from fanet_mw.wire import Kind
+from fanet_mw.wire_messages import Beacon, Role
 
 _LIFETIMES: Final = 3.5
 _LEARN: Final = 4

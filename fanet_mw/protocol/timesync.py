@@ -21,7 +21,7 @@ from typing import Final, NamedTuple
 
 from fanet_mw.protocol.clock_fit import EXACT, ClockFit, Line, Oscillator, Pair
 from fanet_mw.units import MS, NodeId, S
-from fanet_mw.wire import TimeBeacon
+from fanet_mw.wire_messages import TimeBeacon
 
 _LISTEN_HELLOS: Final = 2.5
 """How long the leader listens at its start: a swarm that has a time already keeps it."""

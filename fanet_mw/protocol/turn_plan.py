@@ -20,7 +20,8 @@ from fanet_mw.protocol.timetable import Timetable, timetable
 from fanet_mw.protocol.turns import Turns, turn_ns
 from fanet_mw.scenario import Scenario
 from fanet_mw.units import MS, Enu, NodeId, seconds_to_ns
-from fanet_mw.wire import CAPACITY, HEADER_BYTES, OVERHEAD, PLACES, SCHEDULE
+from fanet_mw.wire import HEADER_BYTES, OVERHEAD, PLACES, SCHEDULE
+from fanet_mw.wire_messages import CAPACITY
 
 _SCHEDULE_BYTES: Final = SCHEDULE.layout.size + OVERHEAD
 _PLACES_BYTES: Final = PLACES.layout.size + OVERHEAD

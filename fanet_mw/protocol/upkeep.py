@@ -15,7 +15,7 @@ from fanet_mw.protocol.membership import Membership
 from fanet_mw.protocol.signs import Signs
 from fanet_mw.protocol.states import Action, Event, State, step
 from fanet_mw.units import MS, NodeId
-from fanet_mw.wire import Join, Schedule
+from fanet_mw.wire_messages import Join, Schedule
 
 SILENT_HELLOS: Final = 4.0
 """Of a head, or of any neighbor in a timetable (`silence.py`)."""

@@ -28,6 +28,7 @@ from fanet_mw.radio_control import Cut, Degrade, Jam, Restore
 from fanet_mw.scenario import Clock, Scenario
 from fanet_mw.topics import Topics
 from fanet_mw.units import MS, Enu, NodeId
+from fanet_mw.wire_messages import Join, Member, Schedule, Survivor, TimeBeacon
 from sim import catalog
 from sim.world import World
 
@@ -53,7 +54,7 @@ MAKERS: list[Callable[[Scenario], Actor]] = [
 anything = st.floats(allow_nan=True, allow_infinity=True)
 vectors = st.builds(Enu, anything, anything, anything)
 instants = st.integers(-(2**62), 2**62)
-MEMBERS = (wire.Member(2, 0, is_head=True), wire.Member(3, 0, is_head=False))
+MEMBERS = (Member(2, 0, is_head=True), Member(3, 0, is_head=False))
 HEADER = wire.Header(5, 1, 3, 0xFFFF, 3, 0, 32, 0, 3, 1).encode()
 frames = st.one_of(
     st.binary(max_size=60),
@@ -65,14 +66,14 @@ frames = st.one_of(
         st.integers(0, 50), st.integers(0, 4), st.integers(0, 3), st.integers(0, 3),
         st.one_of(
             st.binary(max_size=30),
-            st.just(wire.Join(3, Enu(1, 2, 3)).encode_frame(3)),
+            st.just(Join(3, Enu(1, 2, 3)).encode_frame(3)),
             st.builds(
-                lambda t_ns, hello: wire.TimeBeacon(t_ns, 5, 5, 5, hello, hello, 3, 1, 0, 1).encode_frame(3),
+                lambda t_ns, hello: TimeBeacon(t_ns, 5, 5, 5, hello, hello, 3, 1, 0, 1).encode_frame(3),
                 st.integers(0, 2**62), st.integers(0, 50),
             ),
-            st.just(wire.Survivor(1, 1, 3, Enu(1, 2, 3), -60.0).encode_frame(3)),
+            st.just(Survivor(1, 1, 3, Enu(1, 2, 3), -60.0).encode_frame(3)),
             st.builds(
-                lambda slot, period: wire.Schedule(
+                lambda slot, period: Schedule(
                     0, max(slot, period), slot, 1, 1, 2, 0, 1, MEMBERS
                 ).encode_frame(1),
                 st.integers(1, 2**31), st.integers(1, 2**31),

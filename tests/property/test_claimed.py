@@ -20,6 +20,7 @@ from fanet_mw.protocol.claimed import Claimed
 from fanet_mw.protocol.topology import components, two_hop
 from fanet_mw.units import MS, NodeId, S
 from fanet_mw.wire import FLAG_FLOOD, FLAG_TO_HEAD, Kind
+from fanet_mw.wire_messages import Beacon
 
 
 def scenario_of(*, aggregate: bool = False, **clusters: Any) -> Any:
@@ -272,7 +273,7 @@ def test_a_stranger_s_impossible_claim_neither_stops_us_nor_what_our_neighbors_s
     stranger = Claims(NodeId(40), Standing(0, length, 5), (Heard(NodeId(3), Standing(1, length), hears_us=True),))
     for node in (2, 3):
         hello = wire.Header(0, 1, 40, 0xFFFF, 40, Kind.HELLO, 1, 0, 0, 0).encode()
-        beacon = wire.Beacon(40, 0, 0, 0, 0, 0, 0, 255).encode_frame(40)
+        beacon = Beacon(40, 0, 0, 0, 0, 0, 0, 255).encode_frame(40)
         frame = hello + beacon + stranger.encode_frames()
         line.nodes[NodeId(node)].hear(Reception(frame, NodeId(40), line.now_ns, -60.0), now_ns=line.now_ns)
     before = {n: line.nodes[NodeId(n)].report()["slot"] for n in range(1, 6)}

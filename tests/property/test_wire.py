@@ -13,7 +13,8 @@ from fanet_mw import wire
 from fanet_mw.dialect import fanet
 from fanet_mw.errors import LocalProtocolError, MalformedFrameError
 from fanet_mw.units import Enu
-from fanet_mw.wire import Beacon, Header, Join, Member, Role, Schedule, Survivor, TimeBeacon
+from fanet_mw.wire import Header
+from fanet_mw.wire_messages import CAPACITY, Beacon, Join, Member, Role, Schedule, Survivor, TimeBeacon
 
 u8, u16, u32, u64 = (st.integers(0, 2**bits - 1) for bits in (8, 16, 32, 64))
 ids = st.integers(1, 0xFFFE)
@@ -39,7 +40,7 @@ def schedules(draw: st.DrawFn) -> Schedule:
     slot_us = draw(st.integers(1, (2**32 - 1) // clusters))
     parts = draw(st.integers(1, 255))
     entries = st.builds(Member, ids, st.integers(0, clusters - 1), st.booleans())
-    members = tuple(draw(st.lists(entries, max_size=wire.CAPACITY)))
+    members = tuple(draw(st.lists(entries, max_size=CAPACITY)))
     return Schedule(
         start_us=draw(instants), period_us=draw(st.integers(slot_us * clusters, 2**32 - 1)), slot_us=slot_us,
         epoch=draw(st.integers(1, 0xFFFF)) if members else 0, leader=draw(ids), clusters=clusters,
@@ -109,7 +110,7 @@ def test_a_schedule_has_its_entries_in_two_parallel_arrays_in_pymavlink(schedule
     (theirs,) = fanet.MAVLink(None).parse_buffer(bytearray(schedule.encode_frame(1)))
     count = len(schedule.members)
     assert theirs.count == count
-    assert theirs.nodes == [m.node for m in schedule.members] + [0] * (wire.CAPACITY - count)
+    assert theirs.nodes == [m.node for m in schedule.members] + [0] * (CAPACITY - count)
     assert theirs.assigned[:count] == [m.cluster + 0x8000 * m.is_head for m in schedule.members]
     for name in ("start_us", "period_us", "slot_us", "epoch", "leader", "clusters", "part", "parts", "term"):
         assert getattr(theirs, name) == getattr(schedule, name)

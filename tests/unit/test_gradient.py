@@ -3,7 +3,7 @@
 from fanet_mw.protocol.gradient import UNREACHABLE, Gradient, newer
 from fanet_mw.protocol.neighbors import Neighbor, Neighbors
 from fanet_mw.units import NodeId, S
-from fanet_mw.wire import Beacon
+from fanet_mw.wire_messages import Beacon
 
 ME, HEAD, OTHER = NodeId(1), NodeId(10), NodeId(20)
 

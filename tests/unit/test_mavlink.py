@@ -16,6 +16,7 @@ from fanet_mw import mavlink, tlog, wire
 from fanet_mw.errors import LocalProtocolError, MalformedFrameError
 from fanet_mw.mavlink import Attitude, Battery, Encoder, Geodetic, Ned
 from fanet_mw.units import MS, Enu, NodeId, S
+from fanet_mw.wire_messages import Join
 
 NODE = NodeId(7)
 STILL = Enu(0.0, 0.0, 0.0)
@@ -164,7 +165,7 @@ def test_each_encoder_counts_its_own_frames_and_wraps() -> None:
 
 def test_one_parser_reads_native_and_our_own_messages_in_one_frame() -> None:
     header = wire.Header(12, 1, 3, 0xFFFF, 3, wire.Kind.HELLO, 1, 0, 0, 0)
-    frame = header.encode() + Encoder(NODE).heartbeat() + wire.Join(3, STILL).encode_frame(3) + wire.filler(300)
+    frame = header.encode() + Encoder(NODE).heartbeat() + Join(3, STILL).encode_frame(3) + wire.filler(300)
     names = [message.get_type() for message in mavlink.decode(frame)]
     assert names == ["FANET_ROUTE", "HEARTBEAT", "FANET_JOIN", "FANET_CHUNK", "FANET_CHUNK"]
 

@@ -4,7 +4,7 @@ from fanet_mw.protocol.clock_fit import Oscillator
 from fanet_mw.protocol.timesync import Settings, TimeSync
 from fanet_mw.scenario import Clock
 from fanet_mw.units import MS, US, NodeId, S
-from fanet_mw.wire import TimeBeacon
+from fanet_mw.wire_messages import TimeBeacon
 from tests.property.time_network import Network, line
 
 LIMIT_NS = 5 * S

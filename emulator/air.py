@@ -102,7 +102,7 @@ class Air:
         self._blocked = np.zeros(0, np.int64)
         self._seen_anew = False
         """Whether the obstructions have changed since the links were made."""
-        self.next_output_ns = kernel.NEVER
+        self.next_output_ns = s.NEVER
         """A lower bound of the next instant at which `advance` has something to return; NEVER: nothing is planned."""
         self._gather()
 

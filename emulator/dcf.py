@@ -2,10 +2,11 @@
 
     queue -> access (DIFS or EIFS, backoff with freezing) -> frame -> ACK or timeout -> next attempt or done
 
-Backoff slots count from BASE while the medium is idle; when it turns busy, the slots that have passed are taken off
-and the rest waits. A pending access is one event; it is stale when SCHEDULED has another instant.
+The backoff itself is in `backoff`, what becomes of frames is counted in `ending`.
 """
 
+from emulator.backoff import access_from, arm, draw, on_busy, on_idle, slots_left
+from emulator.ending import done, lost, put, release
 from emulator.fading import gain
 from emulator.heap import push
 from emulator.jit import jit
@@ -24,26 +25,18 @@ from emulator.state import (
     ATTEMPTS_FAILED,
     ATTEMPTS_MADE,
     AUDIBLE,
-    BAD_UNTIL,
     BASE,
     BEGINS,
     BO,
     BORN,
-    BUSY_NS,
-    BUSY_SINCE,
     CAPTURE,
-    COLLIDED,
     COPY,
     CS,
-    CUT_OFF,
     CW,
     CW_MAX,
     CW_MIN,
     DATA,
-    DEAF,
-    DEGRADED,
     DELAY,
-    DELIVERED,
     DETECT_NS,
     DIFS_NS,
     DONE_ACKED,
@@ -51,23 +44,18 @@ from emulator.state import (
     DONE_FULL,
     DONE_RETRY,
     DONE_SENT,
-    DRAW_WHEN_INTERRUPTED,
     DST,
     ENDS,
     EVERYONE,
-    EXPIRED,
     FADING,
     FATE,
     FATE_HALF_DUPLEX,
     FATE_OPEN,
     FAULT,
     FRESH,
-    GIVEN_UP,
     HEAD,
     HR_N,
     HS_N,
-    IDLE_FROM,
-    JAMMED,
     LAST_END,
     LIFETIME_NS,
     LINK_DST,
@@ -76,35 +64,19 @@ from emulator.state import (
     LINK_POWER,
     LOCK,
     LOCK_HEADER_END,
-    LOST_COLLISION,
-    LOST_CUT,
-    LOST_DEGRADED,
-    LOST_HALF_DUPLEX,
-    LOST_JAMMED,
-    LOST_WEAK,
     MAX_ATTEMPTS,
-    N_RECEIVED,
     NAV,
     NEXT,
-    NO_RECEIVER,
-    NO_ROOM,
     NOTHING,
     ON_AIR,
     ON_AIR_COPIES,
     ON_AIR_LIST,
     ON_AIR_N,
     OPEN,
-    OUT_DONE,
-    OUT_FREE,
-    OUT_N,
     OUT_START,
-    OUTCOME,
     QLEN,
     QUEUE_LIMIT,
-    RANDOM,
     REACH_NS,
-    RECEIVED,
-    RECEIVED_COPIES,
     RESUME_FROM,
     RETRIES,
     SCHEDULED,
@@ -119,83 +91,11 @@ from emulator.state import (
     TX_FRAME,
     TX_KIND,
     UNDERWAY,
-    UNICASTS_ENDED,
     WAIT_DIFS_FIRST,
     WAITING,
-    WANTS_STATUS,
-    WEAK,
     Ints,
     Reals,
 )
-
-NEVER = 1 << 62
-_MODULUS = 2_147_483_647
-
-
-@jit
-def uniform(st: Ints, s: int) -> int:
-    """The next value of a station's generator, in [1, 2^31 - 2] (Park and Miller, CACM 31(10), 1988)."""
-    x = st[RANDOM, s] * 48271 % _MODULUS
-    st[RANDOM, s] = x
-    return int(x)
-
-
-@jit
-def draw(st: Ints, s: int) -> None:
-    """A new backoff from [0, CW]."""
-    st[BO, s] = uniform(st, s) * (st[CW, s] + 1) // _MODULUS
-
-
-@jit
-def put(g: Ints, out: Ints, kind: int, frame: int, station: int, t: int, value: int, attempts: int) -> None:
-    """An output row; the kernel's loop keeps room for what one event can make."""
-    n = g[OUT_N]
-    g[OUT_N] = n + 1
-    out[n, 0], out[n, 1], out[n, 2], out[n, 3], out[n, 4], out[n, 5] = kind, frame, station, t, value, attempts
-
-
-@jit
-def release(g: Ints, fr: Ints, out: Ints, f: int, t: int) -> None:
-    """One thing less that refers to a frame."""
-    fr[OPEN, f] -= 1
-    if fr[OPEN, f] == 0:
-        put(g, out, OUT_FREE, f, fr[SRC, f], t, verdict(fr, f), 0)
-
-
-@jit
-def verdict(fr: Ints, f: int) -> int:
-    """How a frame ended; of a broadcast that nobody got, why most copies were lost."""
-    outcome = fr[OUTCOME, f]
-    most = max(fr[LOST_COLLISION, f], fr[LOST_HALF_DUPLEX, f], fr[LOST_WEAK, f])
-    if fr[RECEIVED, f] > 0:
-        return DELIVERED
-    if outcome == DONE_FULL:
-        return NO_ROOM
-    if outcome == DONE_EXPIRED:
-        return EXPIRED
-    faults = max(fr[LOST_DEGRADED, f], fr[LOST_JAMMED, f], fr[LOST_CUT, f])
-    if faults > 0 and faults >= most:
-        if faults == fr[LOST_CUT, f]:
-            return CUT_OFF
-        return JAMMED if faults == fr[LOST_JAMMED, f] else DEGRADED
-    if fr[TARGETS, f] == 0:
-        return NO_RECEIVER
-    if outcome == DONE_RETRY:
-        return GIVEN_UP
-    if most == fr[LOST_COLLISION, f]:
-        return COLLIDED
-    return DEAF if most == fr[LOST_HALF_DUPLEX, f] else WEAK
-
-
-@jit
-def done(g: Ints, fr: Ints, out: Ints, f: int, outcome: int, t: int) -> None:
-    """The MAC is through with a frame."""
-    fr[OUTCOME, f] = outcome
-    if outcome in (DONE_ACKED, DONE_RETRY):
-        g[UNICASTS_ENDED] += 1
-    if fr[WANTS_STATUS, f] == 1:
-        put(g, out, OUT_DONE, f, fr[SRC, f], t, outcome, fr[ATTEMPTS, f])
-    release(g, fr, out, f, t)
 
 
 @jit
@@ -226,56 +126,6 @@ def expire(g: Ints, p: Ints, st: Ints, fr: Ints, out: Ints, s: int, t: int) -> N
         if st[TAIL, s] < 0:
             st[TAIL, s] = kept
         st[QLEN, s] += 1
-
-
-@jit
-def access_from(p: Ints, st: Ints, s: int) -> int:
-    """From when backoff slots count, if the medium stays idle."""
-    return int(max(st[IDLE_FROM, s], st[BAD_UNTIL, s], st[RESUME_FROM, s], st[NAV, s]) + p[DIFS_NS])
-
-
-@jit
-def arm(g: Ints, p: Ints, st: Ints, hs: Ints, s: int) -> None:
-    """The medium is idle at a station: start counting, and plan its access if it has a frame."""
-    if st[CS, s] > 0 or st[TX_KIND, s] != NOTHING or st[WAITING, s] >= 0 or st[ACK_TO, s] >= 0:
-        return
-    st[BASE, s] = access_from(p, st, s)
-    if st[HEAD, s] >= 0:
-        t = st[BASE, s] + st[BO, s] * p[SLOT_NS]
-        st[SCHEDULED, s] = t
-        push(hs, g, HS_N, t, ACCESS, s, 0)
-
-
-@jit
-def slots_left(p: Ints, st: Ints, s: int, t: int) -> int:
-    """Backoff slots left at `t`, if the medium has been idle until then."""
-    if t <= st[BASE, s]:
-        return int(st[BO, s])
-    return int(max(0, st[BO, s] - (t - st[BASE, s]) // p[SLOT_NS]))
-
-
-@jit
-def on_busy(p: Ints, st: Ints, s: int, t: int) -> None:
-    """The medium turns busy at a station: freeze the backoff."""
-    if st[BUSY_SINCE, s] < 0:
-        st[BUSY_SINCE, s] = t
-    st[BO, s] = slots_left(p, st, s, t)
-    st[BASE, s] = NEVER
-    if st[SCHEDULED, s] >= 0:
-        st[SCHEDULED, s] = -1
-        if st[FRESH, s] == 1 and p[DRAW_WHEN_INTERRUPTED] == 1:
-            draw(st, s)
-            st[FRESH, s] = 0
-
-
-@jit
-def on_idle(g: Ints, p: Ints, st: Ints, hs: Ints, s: int, t: int) -> None:
-    """The medium turns idle at a station."""
-    if st[BUSY_SINCE, s] >= 0:
-        st[BUSY_NS, s] += t - st[BUSY_SINCE, s]
-        st[BUSY_SINCE, s] = -1
-    st[IDLE_FROM, s] = t
-    arm(g, p, st, hs, s)
 
 
 @jit
@@ -373,14 +223,6 @@ def access(
         g[ATTEMPTS_MADE] += 1
     if p[CAPTURE] == 1:
         put(g, out, OUT_START, f, s, t, DATA, fr[ATTEMPTS, f])
-
-
-@jit
-def lost(g: Ints, fr: Ints, lk: Ints, fate: int, link: int, f: int) -> None:
-    """One copy less."""
-    g[RECEIVED_COPIES + fate] += 1
-    fr[LOST_COLLISION - 1 + fate, f] += 1
-    lk[N_RECEIVED + fate, link] += 1
 
 
 @jit

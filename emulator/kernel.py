@@ -4,7 +4,8 @@
 short of room; the caller drains, makes room and calls again.
 """
 
-from emulator.dcf import NEVER, access, ack_timeout, arrive, send_ack, slots_left, tx_done
+from emulator.backoff import slots_left
+from emulator.dcf import access, ack_timeout, arrive, send_ack, tx_done
 from emulator.heap import pop, push
 from emulator.jit import jit
 from emulator.phy import rx_detect, rx_end, rx_start
@@ -32,6 +33,7 @@ from emulator.state import (
     LAST_END,
     LIFETIME_NS,
     LINK_ROWS,
+    NEVER,
     NEXT,
     NOTHING,
     NOW,
@@ -295,4 +297,4 @@ def relink(  # noqa: C901  (one pass over what is under way)
     return int(used)
 
 
-__all__ = ["NEVER", "advance", "next_output", "purge", "relink", "scatter", "take_in"]
+__all__ = ["advance", "next_output", "purge", "relink", "scatter", "take_in"]

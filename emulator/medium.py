@@ -12,7 +12,6 @@ import numpy as np
 from emulator import state as s
 from emulator.accounts import Accounts
 from emulator.air import Air, Rows
-from emulator.dcf import NEVER
 from emulator.faults import Faults
 from emulator.pcap import Capture
 from fanet_mw.actor import Actor
@@ -28,7 +27,7 @@ TOO_LATE_NS: Final = 50 * MS
 ANNOUNCED: Final = 1024
 """Requests of one node that may wait for their instant, beyond what its MAC queue holds."""
 _new: Final = tuple.__new__
-_RECEPTION, _FREE, _DELIVERED = s.OUT_RECEPTION, s.OUT_FREE, s.DELIVERED
+_RECEPTION, _FREE, _DELIVERED, _NEVER = s.OUT_RECEPTION, s.OUT_FREE, s.DELIVERED, s.NEVER
 _NO_RECEPTION: Final = Reception(b"", NodeId(0), 0, 0.0)
 _SEQ_MASK: Final = 0xFFFF_FFFF
 _LONGEST_GAP: Final = 1 << 20
@@ -111,7 +110,7 @@ class Medium(Actor):
 
     def next_wake_ns(self) -> int | None:
         wake_ns, due_ns = self._air.next_output_ns, self._due_ns
-        if wake_ns == NEVER:
+        if wake_ns == _NEVER:
             return due_ns
         if self._handover_ns:
             wake_ns = -(-wake_ns // self._handover_ns) * self._handover_ns

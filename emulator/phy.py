@@ -9,7 +9,10 @@ With INTERFERENCE = 0 any overlap destroys; with 1 the loss of each segment foll
 
 import math
 
-from emulator.dcf import NEVER, acknowledged, lost, on_busy, on_idle, put, release, uniform
+from emulator.backoff import on_busy, on_idle
+from emulator.chance import uniform
+from emulator.dcf import acknowledged
+from emulator.ending import lost, put, release
 from emulator.heap import push
 from emulator.jit import jit
 from emulator.state import (
@@ -51,6 +54,7 @@ from emulator.state import (
     LOG_OK,
     N_RECEIVED,
     NAV,
+    NEVER,
     NOISE,
     NOTHING,
     NSIG,

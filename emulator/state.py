@@ -120,6 +120,9 @@ the frame now on the link, as it was at its start. SPARED: the share of frames t
 FATE_OPEN, FATE_COLLISION, FATE_HALF_DUPLEX, FATE_WEAK, FATE_DEGRADED, FATE_JAMMED, FATE_CUT = range(7)
 """Counts by fate lie side by side in this order: g from RECEIVED_COPIES, fr from LOST_COLLISION, lk from N_RECEIVED."""
 
+NEVER: Final = 1 << 62
+"""Later than any instant."""
+
 # --- events -------------------------------------------------------------------------------------------------------
 ARRIVE, ACCESS, SEND_ACK, ACK_TIMEOUT, TX_DONE, RX_START, RX_DETECT, RX_END, ALL_START, ALL_DETECT, ALL_END = range(11)
 """ALL_*: the same on the links a .. b - 1 of one transmitter, nearest receiver first, from link to link."""

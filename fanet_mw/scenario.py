@@ -1,16 +1,17 @@
 """The scenario: one frozen model of everything a run depends on. Keys are people's units, with the unit in the key.
 
 A key is a contract with users: renaming one breaks their files and sweeps. Derived values are properties, in `int` ns.
+Each table checks itself; what the tables ask of each other is in `scenario_checks.py`.
 """
 
 import math
-from collections.abc import Iterator, Sequence
 from typing import Annotated, Final, Literal, Self
 
 from pydantic import Field, model_validator
 
 from fanet_mw.fault_sections import AnyFault
-from fanet_mw.radio_control import Control, Degrade, Restore, nodes_of
+from fanet_mw.radio_control import Control
+from fanet_mw.scenario_checks import disagreements
 from fanet_mw.scenario_clock import Clock
 from fanet_mw.scenario_radio import Radio
 from fanet_mw.sections import Finite, Id, NonNegative, Positive, Section
@@ -261,7 +262,7 @@ class Scenario(Section):
 
     @model_validator(mode="after")
     def _parts_agree(self) -> Self:
-        problems = list(_disagreements(self))
+        problems = list(disagreements(self))
         if problems:
             raise ValueError("; ".join(problems))
         return self
@@ -297,106 +298,6 @@ class Scenario(Section):
 
 _LIFETIME_MS: Final = 500.0
 _FOREVER_MS: Final = 1e6
-_RIVALS: Final = ("aodv", "olsr", "dsdv", "geographic")
-_RIVAL_FRAME_BYTES: Final = 256
-"""Control messages of a fixed length must fit one frame; longer ones are divided."""
-
-
-def _disagreements(scenario: Scenario) -> Sequence[str]:
-    """What each table allows alone but the scenario as a whole does not."""
-    found = []
-    count = scenario.nodes.count
-    if scenario.warmup_s + scenario.drain_s >= scenario.duration_s:
-        found.append(
-            f"warmup_s + drain_s = {scenario.warmup_s + scenario.drain_s:g} "
-            f"must be < duration_s = {scenario.duration_s:g}"
-        )
-    traffic = scenario.traffic
-    if traffic.destination != "all" and traffic.destination > count:
-        found.append(f"traffic.destination = {traffic.destination} must be <= nodes.count = {count}")
-    if isinstance(traffic.sources, int) and traffic.sources > count:
-        found.append(f"traffic.sources = {traffic.sources} must be <= nodes.count = {count}")
-    for key, ids in (("sources", traffic.sources), ("targets", traffic.targets)):
-        if isinstance(ids, tuple) and any(i > count for i in ids):
-            found.append(f"traffic.{key} = {list(ids)} must be node ids <= nodes.count = {count}")
-    if traffic.payload_bytes > scenario.radio.max_frame_bytes:
-        found.append(
-            f"traffic.payload_bytes = {traffic.payload_bytes} must be "
-            f"<= radio.max_frame_bytes = {scenario.radio.max_frame_bytes}"
-        )
-    if scenario.clock.sync == "beacons" and not scenario.routing.hello_interval_s:
-        found.append('clock.sync = "beacons" needs hellos: routing.hello_interval_s > 0')
-    found += _unkept_deadline(scenario)
-    found += _blind_warnings(scenario)
-    found += _impossible_faults(scenario)
-    found += _wrong_for_rivals(scenario)
-    if scenario.routing.protocol == "clustered":
-        clusters = scenario.clusters
-        if clusters.count >= max(2, count):
-            found.append(f"clusters.count = {clusters.count} must be < nodes.count = {count}")
-        if clusters.guard_ms != "auto" and clusters.guard_ms * MS >= clusters.slot_ns:
-            found.append(
-                f"clusters.guard_ms = {clusters.guard_ms:g} must be < the slot, flooding_period_s / count = "
-                f"{clusters.slot_ns / MS:g} ms"
-            )
-    return found
-
-
-def _wrong_for_rivals(scenario: Scenario) -> Sequence[str]:
-    """What a protocol that goes hop by hop needs, and what needs such a protocol."""
-    found = []
-    if scenario.routing.protocol in _RIVALS and scenario.radio.max_frame_bytes < _RIVAL_FRAME_BYTES:
-        found.append(
-            f"radio.max_frame_bytes = {scenario.radio.max_frame_bytes} must be >= {_RIVAL_FRAME_BYTES} for "
-            f"routing.protocol = {scenario.routing.protocol}"
-        )
-    if scenario.routing.address_resolution != "none" and scenario.routing.protocol not in _RIVALS:
-        found.append(
-            f"routing.address_resolution = {scenario.routing.address_resolution} needs routing.protocol to be one of "
-            f"{', '.join(_RIVALS)}, not {scenario.routing.protocol}"
-        )
-    return found
-
-
-def _unkept_deadline(scenario: Scenario) -> Sequence[str]:
-    """A deadline that no node could hold a bound against."""
-    deadline_s = scenario.traffic.deadline_s
-    if deadline_s is None or (scenario.routing.protocol, scenario.clusters.relay) == ("clustered", "scheduled"):
-        return ()
-    return (
-        f"traffic.deadline_s = {deadline_s:g} needs a protocol with a bound: "
-        'routing.protocol = "clustered" and clusters.relay = "scheduled"',
-    )
-
-
-def _blind_warnings(scenario: Scenario) -> Iterator[str]:
-    """Warnings of collisions without what they are computed from, or without room to avoid."""
-    mission = scenario.mission
-    if not mission.collision_horizon_s:
-        return
-    wanted = f"mission.collision_horizon_s = {mission.collision_horizon_s:g} needs"
-    if not mission.collision_distance_m:
-        yield f"{wanted} mission.collision_distance_m > 0"
-    if not scenario.routing.hello_interval_s:
-        yield f"{wanted} hellos: routing.hello_interval_s > 0"
-    if scenario.nodes.altitude_m <= 2 * mission.collision_distance_m:
-        yield (
-            f"{wanted} room below to avoid: nodes.altitude_m = {scenario.nodes.altitude_m:g} must be > "
-            f"2 x mission.collision_distance_m = {2 * mission.collision_distance_m:g}"
-        )
-
-
-def _impossible_faults(scenario: Scenario) -> Sequence[str]:
-    """Faults of nodes that there are not, and links that are none."""
-    found = []
-    count = scenario.nodes.count
-    for index, (_, control) in enumerate(scenario.planned_faults):
-        unknown = [] if isinstance(control, Restore) else [node for node in nodes_of(control) if node > count]
-        if unknown:
-            found.append(f"faults.{index} names node {unknown[0]}, which must be <= nodes.count = {count}")
-        if isinstance(control, Degrade) and control.src == control.dst:
-            found.append(f"faults.{index}: src = dst = {control.src} is no link")
-    return found
 
 
 def grid_columns(count: int) -> int:

@@ -210,7 +210,7 @@ class Claimed(Clustered):
             self._claimed_ns = now_ns
         if before is None and self._own.share is not None:
             self._gradient.join(self._port.node, now_ns=now_ns)
-            for packet in self._homeless.drain():
+            for packet in self._uplink.drain():
                 self._let_out(packet, now_ns=now_ns)
         elif before is not None and self._own.share is None:
             self._gradient.join(_NO_HEAD, now_ns=now_ns)
@@ -272,7 +272,7 @@ class Claimed(Clustered):
         if len(self._queue):
             self._draw(now_ns)
         for packets, start_ns in self._queue.due(now_ns=now_ns):
-            self._flood_together(packets, start_ns=start_ns)
+            self._floods.begin(packets, start_ns=start_ns)
 
     # --- for people -----------------------------------------------------------------------------------------------
 

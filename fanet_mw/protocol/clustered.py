@@ -1,9 +1,9 @@
 """The paper's protocol (3.3): edge nodes unicast to their head; heads queue and flood in their own slots only.
 
 A packet has two phases, told apart by the header's flags: TO_HEAD, carried as acknowledged unicast along the gradient
-to a head, and FLOOD, released by the head in its slot and relayed once by every node. Membership comes over the air:
-nodes join by a flooded JOIN, the leader answers with a flooded SCHEDULE. What becomes of a node when heads and leaders
-die, and parts of the swarm meet, is decided in `upkeep.py`; this file carries it out.
+to a head (`uplink.py`), and FLOOD, released by the head in its slot and relayed once by every node (`floods.py`).
+Membership comes over the air: nodes join by a flooded JOIN, the leader answers with a flooded SCHEDULE. What becomes of
+a node when heads and leaders die, and parts of the swarm meet, is decided in `upkeep.py`; this file carries it out.
 """
 
 from collections.abc import Mapping, Sequence
@@ -11,10 +11,10 @@ from typing import Final
 
 from fanet_mw.digest import Digest
 from fanet_mw.errors import DropReason, MalformedFrameError
-from fanet_mw.messages import Reception, TxOutcome, TxStatus
-from fanet_mw.protocol import seen
+from fanet_mw.messages import Reception, TxStatus
 from fanet_mw.protocol.arrival import decoded
 from fanet_mw.protocol.contract import Port, RoutingProtocol
+from fanet_mw.protocol.floods import Floods
 from fanet_mw.protocol.gradient import UNREACHABLE, Gradient
 from fanet_mw.protocol.guard import slot_guard_ns
 from fanet_mw.protocol.leader import Leader
@@ -30,6 +30,7 @@ from fanet_mw.protocol.silence import Silence
 from fanet_mw.protocol.states import Action
 from fanet_mw.protocol.txqueue import Packet, TxQueue, sooner_us
 from fanet_mw.protocol.upkeep import Upkeep
+from fanet_mw.protocol.uplink import Uplink
 from fanet_mw.protocol.whereabouts import Motion, Whereabouts
 from fanet_mw.units import BROADCAST, MS, US, NodeId, S, earliest, seconds_to_ns
 from fanet_mw.wire import FLAG_FLOOD, FLAG_TO_HEAD, Kind
@@ -37,16 +38,12 @@ from fanet_mw.wire_messages import Beacon, Join, Schedule
 
 _HELLO_LIFETIMES: Final = 3.5
 """A neighbor is gone after this many silent hello intervals (OLSR's NEIGHB_HOLD_TIME is 3, RFC 3626 18.3)."""
-_UNICAST_TRIES: Final = 3
-"""Parents tried for one packet at one node; below each the MAC makes its own attempts."""
 _JOIN_WINDOW_NS: Final = 3 * S
 """Joins are floods: spread, so that a swarm that starts together does not drown in them."""
 _REJOIN_NS: Final = 2 * S
 _UPDATE_NS: Final = 100 * MS
 """Joins that only tell a new position are spread over this much per node: ten floods a second when all turn at once."""
 _CONTROL_JITTER_NS: Final = 100 * MS
-_UPLINK_NS: Final = 1 * S
-"""A packet should be flooded at most one flooding period and this after it was generated; else it may be repaired."""
 _STORE_PACKETS: Final = 4096
 """Packets kept for repair; 4 MB at 1024 B."""
 
@@ -71,8 +68,6 @@ class Clustered(RoutingProtocol):
             scenario.clusters,
             lead_ns=self._lead_ns,
         )
-        self._homeless = TxQueue(capacity=scenario.routing.queue_frames, sooner_us=sooner_us(scenario.routing))
-        self._unicasts: dict[int, tuple[Packet, NodeId, int]] = {}
         self._leader: Leader | None = None
         self._signs = Signs()
         self._lease = Lease(port.node, period_ns=scenario.clusters.period_ns, signs=self._signs)
@@ -80,16 +75,17 @@ class Clustered(RoutingProtocol):
             membership=self._membership, gradient=self._gradient, signs=self._signs, lease=self._lease,
             node=port.node, hello_ns=hello_ns, takes_slot=scenario.clusters.relay != "scheduled",
         )  # fmt: skip
+        self._uplink = Uplink(port, self._gradient, self._upkeep)
         by_places = scenario.clusters.relay == "scheduled"
         self._silence = Silence(self._signs, hello_ns=hello_ns) if by_places else None
         self._refresh = Refresh(port.stream("refresh").random)
         self._whereabouts = Whereabouts(range_m=scenario.clusters.link_m or scenario.radio.range_m)
-        self._expect_ns = scenario.clusters.period_ns + _UPLINK_NS
         self._repair = Repair(
             window_ns=seconds_to_ns(scenario.clusters.repair_s),
             capacity=_STORE_PACKETS,
             random=port.stream("repair").random,
         ) if scenario.clusters.repair_s else None  # fmt: skip
+        self._floods = Floods(port, self._repair)
         self._join_ns: int | None = None
         self._role = self._membership.standing
         self._tenure: Tenure | None = None
@@ -106,36 +102,17 @@ class Clustered(RoutingProtocol):
             self._join_ns = now_ns + 500 * MS + int(self._random() * _JOIN_WINDOW_NS)
 
     def originate(self, packet: Packet, *, due_ns: int, now_ns: int) -> None:
-        self._keep(packet, flooded=False, now_ns=due_ns)
+        self._floods.keep(packet, flooded=False, now_ns=due_ns)
         if packet.header.destination == BROADCAST:
             self._whereabouts.flooded(due_ns)
         self._forward(packet, start_ns=due_ns, now_ns=now_ns, tries=0)
 
-    def _keep(self, packet: Packet, *, flooded: bool, now_ns: int) -> None:
-        """Be able to repair this packet, if it is for everyone."""
-        if self._repair and packet.header.kind == Kind.DATA and packet.header.destination == BROADCAST:
-            self._repair.hold(packet, flooded=flooded, expect_ns=now_ns + self._expect_ns, now_ns=now_ns)
-
     def _forward(self, packet: Packet, *, start_ns: int, now_ns: int, tries: int) -> None:
-        """Bring a packet one step nearer to a head, or queue it if we are one, or keep it until there is a way."""
+        """Bring a packet one step nearer to a head, or queue it if we are one."""
         if self._membership.is_head:
             self._enqueue(packet, now_ns=now_ns)
-            return
-        route = self._gradient.route(now_ns=now_ns)
-        if route is None:
-            self._hold(packet, now_ns=now_ns)
-            return
-        self._port.mark(packet, seen.CARRIED)
-        own = packet.header.origin == self._port.node
-        stamp = self._port.stamped if own else self._port.forwarded
-        frame = stamp(packet, flags=FLAG_TO_HEAD)
-        seq = self._port.transmit(frame, route.parent, start_ns=start_ns, wants_status=True)
-        self._unicasts[seq] = (packet, route.parent, tries + 1)
-
-    def _hold(self, packet: Packet, *, now_ns: int) -> None:
-        evicted = self._homeless.push(packet)
-        if evicted is not None:
-            self._port.drop(DropReason.QUEUE_FULL, evicted, now_ns=now_ns)
+        else:
+            self._uplink.send(packet, start_ns=start_ns, now_ns=now_ns, tries=tries)
 
     def _enqueue(self, packet: Packet, *, now_ns: int) -> None:
         assert self._tenure is not None, "who queues is head, or was"
@@ -148,7 +125,7 @@ class Clustered(RoutingProtocol):
     def receive(self, packet: Packet, reception: Reception, *, now_ns: int) -> None:
         flags = packet.header.flags
         self._notice(packet.header.origin, packet.header.origin_us * US, now_ns)
-        self._keep(packet, flooded=bool(flags & FLAG_FLOOD), now_ns=now_ns)
+        self._floods.keep(packet, flooded=bool(flags & FLAG_FLOOD), now_ns=now_ns)
         if flags & FLAG_FLOOD:
             self._consume_control(packet, reception.src, now_ns=now_ns)
             self._flood_on(packet, reception, now_ns=now_ns)
@@ -176,8 +153,7 @@ class Clustered(RoutingProtocol):
         return not decoded(packet, Join.decode_frame).instead_of
 
     def _transmit_relay(self, packet: Packet, jitter_ns: int, *, now_ns: int) -> None:
-        start_ns = self._start_ns(now_ns=now_ns, jitter_ns=jitter_ns)
-        self._port.transmit(self._port.forwarded(packet, flags=FLAG_FLOOD), BROADCAST, start_ns=start_ns)
+        self._floods.relay(packet, start_ns=self._start_ns(now_ns=now_ns, jitter_ns=jitter_ns))
 
     def _start_ns(self, *, now_ns: int, jitter_ns: int) -> int:
         """When a frame may go that is ready now."""
@@ -265,7 +241,7 @@ class Clustered(RoutingProtocol):
         self._port.record(role.at(now_ns, self._port.node))
         if self._membership.is_head:
             self._release.arm(self._own_slot(), now_ns=now_ns)
-            for packet in self._homeless.drain():
+            for packet in self._uplink.drain():
                 self._enqueue(packet, now_ns=now_ns)
 
     def _own_slot(self) -> Tenure:
@@ -337,22 +313,14 @@ class Clustered(RoutingProtocol):
         digest = decoded(packet, Digest.decode_frames) if self._repair else None
         if self._repair and digest:
             self._repair.compare(digest, now_ns=now_ns)
-        if len(self._homeless) and self._gradient.route(now_ns=now_ns) is not None:
-            for held in self._homeless.drain():
-                self._forward(held, start_ns=now_ns + self._lead_ns, now_ns=now_ns, tries=0)
+        for held in self._uplink.released(now_ns=now_ns):
+            self._forward(held, start_ns=now_ns + self._lead_ns, now_ns=now_ns, tries=0)
 
     def status(self, status: TxStatus, *, now_ns: int) -> None:
-        entry = self._unicasts.pop(status.seq, None)
-        if entry is None or status.outcome is TxOutcome.ACKED:
-            return
-        packet, parent, tries = entry
-        if status.outcome is TxOutcome.RETRY_LIMIT:
-            self._gradient.lose(parent)
-            self._upkeep.given_up(parent, now_ns=now_ns)
-        if tries >= _UNICAST_TRIES:
-            self._port.drop(DropReason.RETRY_LIMIT, packet, now_ns=now_ns)
-        else:
-            self._forward(packet, start_ns=now_ns + self._lead_ns, now_ns=now_ns, tries=tries)
+        refused = self._uplink.ended(status, now_ns=now_ns)
+        if refused is not None:
+            start_ns = now_ns + self._lead_ns
+            self._forward(refused.packet, start_ns=start_ns, now_ns=now_ns, tries=refused.tries)
 
     # --- time -----------------------------------------------------------------------------------------------------
 
@@ -381,39 +349,18 @@ class Clustered(RoutingProtocol):
         for packet in self._release.expire(before_us=horizon_us):
             self._port.drop(DropReason.EXPIRED, packet, now_ns=now_ns)
         for packet, start_ns in self._release.due(self._tenure, now_ns=now_ns) if self._tenure else ():
-            self._flood_together([packet, *self._release.more(self._room(packet))], start_ns=start_ns)
+            self._floods.begin([packet, *self._release.more(self._room(packet))], start_ns=start_ns)
 
     def _room(self, packet: Packet) -> int:
         """What a frame with this packet has left for others [bytes]."""
         scenario = self._port.scenario
         return scenario.radio.max_frame_bytes - len(packet.frame) if scenario.routing.aggregate else 0
 
-    def _flood_together(self, packets: Sequence[Packet], *, start_ns: int) -> None:
-        """The floods of several packets begin here, in one frame."""
-        self._port.gather()
-        for packet in packets:
-            self._flood(packet, start_ns=start_ns)
-        self._port.send_gathered()
-
-    def _flood(self, packet: Packet, *, start_ns: int) -> None:
-        """The flood of a packet begins here."""
-        self._port.mark(packet, seen.FLOODED)
-        self._keep(packet, flooded=True, now_ns=start_ns)
-        own = packet.header.origin == self._port.node
-        stamp = self._port.stamped if own else self._port.forwarded
-        self._port.transmit(stamp(packet, flags=FLAG_FLOOD), BROADCAST, start_ns=start_ns)
-
     def _flood_again(self, packet: Packet, *, now_ns: int) -> None:
         """A neighbor lacks this packet."""
-        self._port.mark(packet, seen.FLOODED)
-        own = packet.header.origin == self._port.node
-        if own:
-            frame = self._port.stamped(packet, flags=FLAG_FLOOD)
-        elif packet.header.hop_limit > 1:
-            frame = self._port.forwarded(packet, flags=FLAG_FLOOD)
-        else:
-            return  # as far as it may go; it has been delivered here
-        self._port.transmit(frame, BROADCAST, start_ns=self._start_ns(now_ns=now_ns, jitter_ns=0))
+        frame = self._floods.again(packet)
+        if frame is not None:
+            self._port.transmit(frame, BROADCAST, start_ns=self._start_ns(now_ns=now_ns, jitter_ns=0))
 
     def _join(self, now_ns: int, *, instead_of: int = 0) -> None:
         """Tell everyone where we are, and the leader that we want a place if we have none."""
@@ -427,16 +374,14 @@ class Clustered(RoutingProtocol):
 
     def _flood_control(self, kind: Kind, inner: bytes, *, now_ns: int, urgent: bool = False) -> Packet:
         """Tell everyone; `urgent`: before data, where there are turns for it."""
-        packet = self._port.announce(
-            kind, inner, now_ns=now_ns, flags=FLAG_FLOOD, hop_limit=self._port.scenario.routing.hop_limit
-        )
+        packet = self._floods.control(kind, inner, now_ns=now_ns)
         self._port.transmit(packet.frame, BROADCAST, start_ns=self._start_ns(now_ns=now_ns, jitter_ns=0))
         return packet
 
     # --- for people -----------------------------------------------------------------------------------------------
 
     def waiting(self) -> int:
-        return len(self._homeless) + len(self._release) + len(self._unicasts) + len(self._relay.assessment)
+        return len(self._uplink) + len(self._release) + len(self._relay.assessment)
 
     def report(self) -> Mapping[str, object]:
         return {

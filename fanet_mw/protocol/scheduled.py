@@ -23,8 +23,8 @@ from fanet_mw.protocol.root_release import RootRelease
 from fanet_mw.protocol.turn_plan import Plan, fit, leader_load
 from fanet_mw.protocol.turns import clocks_fit
 from fanet_mw.protocol.txqueue import Packet, TxQueue, sooner_us
-from fanet_mw.units import BROADCAST, MS, US, Enu, NodeId, earliest, seconds_to_ns
-from fanet_mw.wire import FLAG_FLOOD, PRIORITY_BULK, Kind
+from fanet_mw.units import MS, US, Enu, NodeId, earliest, seconds_to_ns
+from fanet_mw.wire import PRIORITY_BULK, Kind
 from fanet_mw.wire_messages import Schedule
 
 _JITTER: Final = 0.25
@@ -123,7 +123,7 @@ class Scheduled(Clustered):
             [(plan.valid_ns, plan.turns, plan.roots, plan.frame_bytes) for plan in self._plans], now_ns=now_ns
         )
         stranded = [] if self._plans and self._plans[-1].roots else self._roots.drain()
-        for packet in [*stranded, *self._release.drain(), *self._homeless.drain()]:
+        for packet in [*stranded, *self._release.drain(), *self._uplink.drain()]:
             self._forward(packet, start_ns=now_ns + self._lead_ns, now_ns=now_ns, tries=0)
 
     def _plan_at(self, t_ns: int) -> Plan | None:
@@ -188,9 +188,7 @@ class Scheduled(Clustered):
         if (kind is Kind.JOIN and not urgent) or not self._plans or not self._plans[-1].roots:
             # Our turns are for what the bound is about; a join may contend.
             return super()._flood_control(kind, inner, now_ns=now_ns)
-        packet = self._port.announce(
-            kind, inner, now_ns=now_ns, flags=FLAG_FLOOD, hop_limit=self._port.scenario.routing.hop_limit
-        )
+        packet = self._floods.control(kind, inner, now_ns=now_ns)
         self._let_out(packet, now_ns=now_ns)
         return packet
 
@@ -222,7 +220,7 @@ class Scheduled(Clustered):
         if start_ns < now_ns:  # a reception that came late has used up some of the lead, or all of it
             self._missed += 1
             return
-        self._port.transmit(self._port.forwarded(packet, flags=FLAG_FLOOD), BROADCAST, start_ns=start_ns)
+        self._floods.relay(packet, start_ns=start_ns)
 
     # --- contending -----------------------------------------------------------------------------------------------
 
@@ -252,7 +250,7 @@ class Scheduled(Clustered):
         for packet in self._roots.expire(before_us=(now_ns - self._lifetime_ns) // US):
             self._port.drop(DropReason.EXPIRED, packet, now_ns=now_ns)
         for packets, start_ns in self._roots.due(now_ns=now_ns):
-            self._flood_together(packets, start_ns=start_ns)
+            self._floods.begin(packets, start_ns=start_ns)
 
     # --- for people -----------------------------------------------------------------------------------------------
 

@@ -1,84 +1,20 @@
-"""AODV against RFC 3561: each test is a rule, on a bench of nodes whose links the test makes and cuts."""
+"""AODV against RFC 3561, 6.1 to 6.7: how routes are found. Each test is a rule, on a bench of nodes."""
 
 from collections.abc import Callable
 
 import pytest
+from aodv_bench import ANSWER, ASK, LINE, MakeBench, active, answer, ask, benches, replies, requests, route
 from rival_bench import Bench
 
 from fanet_mw.routing.aodv import parameters as p
-from fanet_mw.routing.aodv.messages import (
-    DESTINATION_ONLY,
-    RERR,
-    RREP,
-    RREQ,
-    UNKNOWN_SEQUENCE,
-    RouteError,
-    RouteReply,
-    RouteRequest,
-    Unreachable,
-)
-from fanet_mw.routing.aodv.table import Route
-from fanet_mw.routing.control import Family, type_of
+from fanet_mw.routing.aodv.messages import DESTINATION_ONLY, RREQ, UNKNOWN_SEQUENCE, RouteReply
 from fanet_mw.scenario import Scenario
-from fanet_mw.units import BROADCAST, MS, S
-
-ASK, ANSWER, ERROR = (type_of(Family.AODV, number) for number in (RREQ, RREP, RERR))
-LINE = [(1, 2), (2, 3), (3, 4), (4, 5)]
-
-MakeBench = Callable[..., Bench]
+from fanet_mw.units import MS, S
 
 
 @pytest.fixture
 def bench(make_scenario: Callable[..., Scenario]) -> MakeBench:
-    def make(nodes: int = 5, links: list[tuple[int, int]] | None = None, **keys: object) -> Bench:
-        scenario = make_scenario(
-            **{"routing.protocol": "aodv", "nodes.count": 100, "radio.lead_ms": 0, "traffic.arrivals": "none", **keys}
-        )
-        wanted = LINE if links is None else links
-        return Bench(scenario, list(range(1, nodes + 1)), [link for link in wanted if max(link) <= nodes])
-
-    return make
-
-
-def requests(found: Bench, node: int | None = None, since_ns: int = 0) -> list[tuple[int, RouteRequest]]:
-    """(TTL, RREQ) of those on the air."""
-    return [
-        (sent.header.hop_limit, RouteRequest.decode(body))
-        for sent, body in found.controls(RREQ, node=node, since_ns=since_ns)
-    ]
-
-
-def replies(found: Bench, node: int | None = None, since_ns: int = 0) -> list[tuple[int, RouteReply]]:
-    """(to whom, RREP) of those that are not hellos."""
-    decoded = [(sent.dst, RouteReply.decode(b)) for sent, b in found.controls(RREP, node=node, since_ns=since_ns)]
-    return [(dst, reply) for dst, reply in decoded if not reply.is_hello]
-
-
-def hellos(found: Bench, node: int, since_ns: int = 0) -> list[int]:
-    decoded = [(sent.t_ns, RouteReply.decode(b)) for sent, b in found.controls(RREP, node=node, since_ns=since_ns)]
-    return [t_ns for t_ns, reply in decoded if reply.is_hello]
-
-
-def errors(found: Bench, node: int | None = None) -> list[tuple[int, RouteError]]:
-    return [(sent.dst, RouteError.decode(body)) for sent, body in found.controls(RERR, node=node)]
-
-
-def route(found: Bench, node: int, destination: int) -> Route | None:
-    return found.protocol(node)._table.entry(destination, now_ns=found.now_ns)
-
-
-def active(found: Bench, node: int, destination: int) -> tuple[int, int] | None:
-    """(next hop, hops)."""
-    known = route(found, node, destination)
-    return (known.next_hop, known.hops) if known is not None and known.active else None
-
-
-def ask(**change: int) -> bytes:
-    return RouteRequest(UNKNOWN_SEQUENCE, 0, 1, 9, 0, 8, 5)._replace(**change).encode()
-
-
-def answer(**change: int) -> bytes:
-    return RouteReply(0, 9, 20, 1, 5000)._replace(**change).encode()
+    return benches(make_scenario)
 
 
 # --- the whole --------------------------------------------------------------------------------------------------------
@@ -94,6 +30,17 @@ def test_a_packet_finds_its_way_over_four_hops_and_the_next_one_needs_no_request
     assert found.deliveries == [(5, 1, first, 4), (5, 1, second, 4)]
     assert len(requests(found)) == asked
     assert [sent.dst for sent in found.data(second, 1)] == [2, 3, 4, 5], "acknowledged unicast, hop by hop"
+
+
+# --- broadcast data ---------------------------------------------------------------------------------------------------
+
+
+def test_a_broadcast_is_flooded_once_by_every_node(bench: MakeBench) -> None:
+    found = bench(5, links=[*LINE, (1, 3), (2, 4)])
+    seq = found.send(1)
+    found.advance(1 * S)
+    assert sorted(node for node, *_ in found.deliveries) == [2, 3, 4, 5]
+    assert sorted(sent.node for sent in found.data(seq, 1)) == [1, 2, 3, 4, 5]
 
 
 # --- 6.1 sequence numbers ---------------------------------------------------------------------------------------------
@@ -430,169 +377,3 @@ def test_6_7_a_reply_without_a_reverse_route_ends_here(bench: MakeBench) -> None
     found.advance(20 * MS)
     assert not replies(found)
     assert active(found, 1, 9) == (3, 1)
-
-
-# --- 6.8 unidirectional links -----------------------------------------------------------------------------------------
-
-
-def test_6_8_a_neighbor_that_replies_do_not_reach_is_blacklisted_for_a_while(bench: MakeBench) -> None:
-    found = bench(2, links=[])
-    found.say(7, ASK, ask(destination=1, originator=7), to=1, ttl=1)
-    found.advance(100 * MS)
-    assert len(replies(found, node=1)) == 1, "7 is not on the bench: its acknowledgment never comes"
-    found.say(7, ASK, ask(destination=1, originator=7, rreq_id=2), to=1, ttl=1)
-    found.advance(100 * MS)
-    assert len(replies(found, node=1)) == 1
-    found.advance(p.BLACKLIST_TIMEOUT_NS)
-    found.say(7, ASK, ask(destination=1, originator=7, rreq_id=3), to=1, ttl=1)
-    found.advance(100 * MS)
-    assert len(replies(found, node=1)) == 2
-
-
-# --- 6.9 hellos -------------------------------------------------------------------------------------------------------
-
-
-def test_6_9_only_a_node_on_an_active_route_says_hello(bench: MakeBench) -> None:
-    found = bench(4, links=[(1, 2), (2, 3)])
-    found.advance(5 * S)
-    assert not any(hellos(found, node) for node in (1, 2, 3, 4))
-    for _ in range(10):
-        found.send(1, 3)
-        found.advance(1 * S)
-    assert all(8 <= len(hellos(found, node, 5 * S)) <= 11 for node in (2, 3))
-    assert not hellos(found, 4)
-
-
-def test_6_9_a_broadcast_stands_in_for_a_hello(bench: MakeBench) -> None:
-    found = bench(1)
-    found.protocol(1)._in_use_until_ns = 100 * S
-    for i in range(20):
-        found.say(2, ASK, ask(rreq_id=i), to=1, ttl=5)
-        found.advance(500 * MS)
-    assert not hellos(found, 1, 1 * S)
-    found.advance(5 * S)
-    assert len(hellos(found, 1, 10 * S)) in (4, 5)
-
-
-def test_6_9_a_hello_makes_a_route_to_its_sender_with_its_number(bench: MakeBench) -> None:
-    found = bench(1)
-    found.say(7, ANSWER, RouteReply(0, 7, 33, 7, 2000).encode(), to=1)
-    known = route(found, 1, 7)
-    assert known is not None
-    assert (known.next_hop, known.hops, known.seq, known.seq_valid) == (7, 1, 33, True)
-    assert known.ends_ns == p.ALLOWED_HELLO_LOSS * p.HELLO_INTERVAL_NS
-
-
-def test_6_9_a_neighbor_whose_hellos_stop_is_lost_after_the_allowed_loss(bench: MakeBench) -> None:
-    found = bench(1)
-    found.say(7, ANSWER, RouteReply(0, 7, 33, 7, 2000).encode(), to=1)
-    found.say(7, ANSWER, answer(hop_count=2, lifetime_ms=60_000), to=1)
-    found.advance(1900 * MS)
-    assert active(found, 1, 9) == (7, 3)
-    found.say(7, ASK, ask(), to=1)  # any packet of a neighbor counts
-    found.advance(1900 * MS)
-    assert active(found, 1, 9) == (7, 3)
-    found.advance(200 * MS)
-    assert active(found, 1, 9) is None
-
-
-# --- 6.11 errors ------------------------------------------------------------------------------------------------------
-
-
-def test_6_11_i_a_unicast_that_is_not_acknowledged_breaks_the_routes_over_that_neighbor(bench: MakeBench) -> None:
-    found = bench()
-    found.send(1, 5)
-    found.advance(2 * S)
-    before = route(found, 3, 5)
-    assert before is not None
-    number = before.seq
-    found.cut(3, 4)
-    found.send(1, 5)
-    found.advance(100 * MS)
-    broken = route(found, 3, 5)
-    assert broken is not None
-    assert (broken.active, broken.seq) == (False, number + 1)
-    assert found.nodes[3].dropped["retry_limit"] == 1
-    ((dst, error),) = errors(found, 3)
-    assert dst == 2, "one precursor: unicast"
-    assert Unreachable(5, number + 1) in error.unreachable
-    assert active(found, 1, 5) is None, "and it went on to the source"
-
-
-def test_6_11_a_source_that_is_told_searches_again_and_finds_another_way(bench: MakeBench) -> None:
-    found = bench(6, links=[(1, 2), (2, 3), (3, 5), (1, 6)])
-    found.send(1, 5)
-    found.advance(2 * S)
-    found.cut(3, 5)
-    found.connect(6, 4)
-    found.connect(4, 5)
-    found.send(1, 5)
-    found.advance(1 * S)
-    last = found.send(1, 5)
-    found.advance(2 * S)
-    assert found.deliveries[-1][:3] == (5, 1, last)
-    assert [sent.node for sent in found.data(last, 1)] == [1, 6, 4]
-
-
-def test_6_11_ii_data_without_a_route_is_dropped_and_its_sender_told(bench: MakeBench) -> None:
-    found = bench(3)
-    found.send(1, 3)
-    found.advance(2 * S)
-    stale = found.protocol(2)._table
-    stale.invalidate(stale.active(3, now_ns=found.now_ns), now_ns=found.now_ns)
-    found.send(1, 3)
-    found.advance(100 * MS)
-    assert found.nodes[2].dropped["no_route"] == 1
-    assert [(dst, [u.destination for u in error.unreachable]) for dst, error in errors(found, 2)] == [(1, [3])]
-    assert active(found, 1, 3) is None
-
-
-def test_6_11_iii_an_error_counts_only_from_the_next_hop_and_is_passed_on_to_precursors(bench: MakeBench) -> None:
-    found = bench(1)
-    for neighbor in (2, 3, 4):
-        found.connect(1, neighbor)
-    found.say(3, ANSWER, answer(hop_count=3), to=1)
-    found.say(2, ASK, ask(), to=1, ttl=5)
-    error = RouteError((Unreachable(9, 25), Unreachable(77, 1))).encode()
-    found.say(5, ERROR, error, to=1)
-    assert active(found, 1, 9) == (3, 4)
-    found.say(3, ERROR, error, to=1)
-    known = route(found, 1, 9)
-    assert known is not None
-    assert (known.active, known.seq) == (False, 25)
-    found.advance(100 * MS)
-    assert errors(found) == [(2, RouteError((Unreachable(9, 25),)))]
-
-
-def test_6_11_an_error_for_several_precursors_is_broadcast(bench: MakeBench) -> None:
-    found = bench(1)
-    for neighbor in (2, 3, 4):
-        found.connect(1, neighbor)
-    found.say(3, ANSWER, answer(hop_count=3), to=1)
-    found.say(2, ASK, ask(), to=1, ttl=5)
-    found.say(4, ASK, ask(originator=6), to=1, ttl=5)
-    found.say(3, ERROR, RouteError((Unreachable(9, 25),)).encode(), to=1)
-    found.advance(100 * MS)
-    assert [dst for dst, _ in errors(found)] == [BROADCAST]
-
-
-def test_6_11_no_more_than_ten_errors_a_second(bench: MakeBench) -> None:
-    found = bench(1)
-    found.say(3, ANSWER, answer(lifetime_ms=60_000), to=1)
-    for i in range(30):
-        found.say(2, ASK, ask(rreq_id=i, destination=9), to=1, ttl=5)
-        found.say(3, ERROR, RouteError((Unreachable(9, 25 + 2 * i),)).encode(), to=1)
-        found.say(3, ANSWER, answer(destination_seq=26 + 2 * i), to=1)
-    found.advance(500 * MS)
-    assert len(errors(found)) == p.RERR_RATELIMIT
-
-
-# --- broadcast data ---------------------------------------------------------------------------------------------------
-
-
-def test_a_broadcast_is_flooded_once_by_every_node(bench: MakeBench) -> None:
-    found = bench(5, links=[*LINE, (1, 3), (2, 4)])
-    seq = found.send(1)
-    found.advance(1 * S)
-    assert sorted(node for node, *_ in found.deliveries) == [2, 3, 4, 5]
-    assert sorted(sent.node for sent in found.data(seq, 1)) == [1, 2, 3, 4, 5]

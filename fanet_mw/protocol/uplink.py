@@ -1,0 +1,84 @@
+"""The first phase of a packet, TO_HEAD: acknowledged unicast along the gradient, from parent to parent to a head.
+
+A packet is under way to a parent that has yet to acknowledge it, or held because there is no way. What a parent does
+not take tries the parent of that moment, and is dropped after `_TRIES`; what is held meanwhile counts anew.
+"""
+
+from typing import Final, NamedTuple
+
+from fanet_mw.errors import DropReason
+from fanet_mw.messages import TxOutcome, TxStatus
+from fanet_mw.protocol import seen
+from fanet_mw.protocol.contract import Port
+from fanet_mw.protocol.gradient import Gradient
+from fanet_mw.protocol.txqueue import Packet, TxQueue, sooner_us
+from fanet_mw.protocol.upkeep import Upkeep
+from fanet_mw.units import NodeId
+from fanet_mw.wire import FLAG_TO_HEAD
+
+_TRIES: Final = 3
+"""Parents tried for one packet at one node; below each the MAC makes its own attempts."""
+
+
+class Attempt(NamedTuple):
+    """A packet under way to a parent."""
+
+    packet: Packet
+    parent: NodeId
+    tries: int
+    """This one included."""
+
+
+class Uplink:
+    """What is on its way from one node to a head."""
+
+    def __init__(self, port: Port, gradient: Gradient, upkeep: Upkeep) -> None:
+        self._port = port
+        self._gradient = gradient
+        self._upkeep = upkeep
+        routing = port.scenario.routing
+        self._held = TxQueue(capacity=routing.queue_frames, sooner_us=sooner_us(routing))
+        self._under_way: dict[int, Attempt] = {}
+        """By sequence number of the transmit request."""
+
+    def __len__(self) -> int:
+        return len(self._held) + len(self._under_way)
+
+    def send(self, packet: Packet, *, start_ns: int, now_ns: int, tries: int) -> None:
+        """Bring a packet one step nearer to a head, or keep it until there is a way."""
+        route = self._gradient.route(now_ns=now_ns)
+        if route is None:
+            self._hold(packet, now_ns=now_ns)
+            return
+        self._port.mark(packet, seen.CARRIED)
+        own = packet.header.origin == self._port.node
+        stamp = self._port.stamped if own else self._port.forwarded
+        frame = stamp(packet, flags=FLAG_TO_HEAD)
+        seq = self._port.transmit(frame, route.parent, start_ns=start_ns, wants_status=True)
+        self._under_way[seq] = Attempt(packet, route.parent, tries + 1)
+
+    def _hold(self, packet: Packet, *, now_ns: int) -> None:
+        evicted = self._held.push(packet)
+        if evicted is not None:
+            self._port.drop(DropReason.QUEUE_FULL, evicted, now_ns=now_ns)
+
+    def ended(self, status: TxStatus, *, now_ns: int) -> Attempt | None:
+        """A transmission has ended; returned is what must try again."""
+        attempt = self._under_way.pop(status.seq, None)
+        if attempt is None or status.outcome is TxOutcome.ACKED:
+            return None
+        if status.outcome is TxOutcome.RETRY_LIMIT:
+            self._gradient.lose(attempt.parent)
+            self._upkeep.given_up(attempt.parent, now_ns=now_ns)
+        if attempt.tries >= _TRIES:
+            self._port.drop(DropReason.RETRY_LIMIT, attempt.packet, now_ns=now_ns)
+            return None
+        return attempt
+
+    def released(self, *, now_ns: int) -> list[Packet]:
+        """What was held, if there is a way now."""
+        return self.drain() if len(self._held) and self._gradient.route(now_ns=now_ns) is not None else []
+
+    def drain(self) -> list[Packet]:
+        """Give up what is held: it goes another way."""
+        return self._held.drain()

@@ -345,6 +345,7 @@ class Clustered(RoutingProtocol):
             self._transmit_relay(packet, 0, now_ns=now_ns)
         for packet in self._repair.due(now_ns=now_ns) if self._repair else ():
             self._flood_again(packet, now_ns=now_ns)
+        self._uplink.expire(now_ns=now_ns)
         horizon_us = now_ns // US - self._lifetime_us
         for packet in self._release.expire(before_us=horizon_us):
             self._port.drop(DropReason.EXPIRED, packet, now_ns=now_ns)

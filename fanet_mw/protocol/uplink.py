@@ -1,7 +1,8 @@
 """The first phase of a packet, TO_HEAD: acknowledged unicast along the gradient, from parent to parent to a head.
 
-A packet is under way to a parent that has yet to acknowledge it, or held because there is no way. What a parent does
-not take tries the parent of that moment, and is dropped after `_TRIES`; what is held meanwhile counts anew.
+A packet is under way to a parent that has yet to acknowledge it, or held because there is no way, until it expires.
+What a parent does not take tries the parent of that moment, and is dropped after `_TRIES`; what is held in between
+counts anew.
 """
 
 from typing import Final, NamedTuple
@@ -13,7 +14,7 @@ from fanet_mw.protocol.contract import Port
 from fanet_mw.protocol.gradient import Gradient
 from fanet_mw.protocol.txqueue import Packet, TxQueue, sooner_us
 from fanet_mw.protocol.upkeep import Upkeep
-from fanet_mw.units import NodeId
+from fanet_mw.units import US, NodeId
 from fanet_mw.wire import FLAG_TO_HEAD
 
 _TRIES: Final = 3
@@ -38,6 +39,8 @@ class Uplink:
         self._upkeep = upkeep
         routing = port.scenario.routing
         self._held = TxQueue(capacity=routing.queue_frames, sooner_us=sooner_us(routing))
+        self._lifetime_ns = routing.lifetime_ns(-1)
+        """Of the class that lives longest; the queue knows of those that expire sooner."""
         self._under_way: dict[int, Attempt] = {}
         """By sequence number of the transmit request."""
 
@@ -76,8 +79,14 @@ class Uplink:
         return attempt
 
     def released(self, *, now_ns: int) -> list[Packet]:
-        """What was held, if there is a way now."""
+        """What was held and has not expired, if there is a way now."""
+        self.expire(now_ns=now_ns)
         return self.drain() if len(self._held) and self._gradient.route(now_ns=now_ns) is not None else []
+
+    def expire(self, *, now_ns: int) -> None:
+        """Drop what was held for longer than it lives."""
+        for packet in self._held.expire(before_us=(now_ns - self._lifetime_ns) // US):
+            self._port.drop(DropReason.EXPIRED, packet, now_ns=now_ns)
 
     def drain(self) -> list[Packet]:
         """Give up what is held: it goes another way."""

@@ -48,6 +48,7 @@ class Air:
         self._faults = faults
         self.book = LinkBook(stations)
         timing = Timing.of(radio)
+        as_ns3, sinr = radio.access == "ns3", radio.channel != "range"
         fading, shape = law_of(radio)
         self.g = np.zeros(s.GLOBALS, np.int64)
         self._p = np.zeros(s.PARAMETERS, np.int64)
@@ -55,7 +56,7 @@ class Air:
             timing.slot_ns, timing.sifs_ns, timing.difs_ns, timing.eifs_extra_ns, timing.ack_ns,
             timing.ack_timeout_ns, timing.header_ns, DETECT_NS, radio.cw_min, radio.cw_max, radio.max_attempts,
             radio.queue_frames, lifetime_ns,
-            radio.access == "standard", radio.access == "ns3", radio.channel != "range", capture,
+            radio.access == "standard", as_ns3, as_ns3 and sinr, as_ns3 and sinr, sinr, capture,
             timing.extension_ns, radio.capture, fading,
         )  # fmt: skip
         self._pf = np.array(

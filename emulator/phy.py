@@ -20,6 +20,10 @@ from emulator.state import (
     ACK_NS,
     ACK_TO,
     BAD_UNTIL,
+    BEFORE_LAST,
+    BEFORE_SEEKING,
+    BEGINS,
+    CHANGED_AT,
     COPY,
     CS,
     DATA,
@@ -28,6 +32,7 @@ from emulator.state import (
     DST,
     EIFS_EXTRA_NS,
     ENDS,
+    ENERGY,
     EVERYONE,
     EXTENSION_NS,
     FATE,
@@ -63,12 +68,17 @@ from emulator.state import (
     OUT_N,
     OUT_RECEPTION,
     OVERLAPPED,
+    OVERSEEN,
+    OVERSEES,
     POWER,
     RECEIVED,
     RECEIVED_COPIES,
     RSSI_SUM,
+    SEEKING_UNTIL,
     SEND_ACK,
     SENSED,
+    SENSES_SUM,
+    SENSITIVITY_MW,
     SIFS_NS,
     SPARED,
     TAKE_OVER,
@@ -93,7 +103,8 @@ def close_segment(p: Ints, pf: Reals, st: Ints, sf: Reals, lp: Reals, err: Reals
     if p[INTERFERENCE] == 0 or t <= begin:
         return
     wanted = lp[ON_AIR, st[LOCK, r]]
-    sinr_db = 10.0 * math.log10(wanted / (max(0.0, sf[POWER, r] - wanted) + sf[NOISE, r]))
+    unwanted = max(0.0, sf[POWER, r] - wanted - sf[OVERSEEN, r])
+    sinr_db = 10.0 * math.log10(wanted / (unwanted + sf[NOISE, r]))
     at = int((sinr_db - ERROR_FLOOR_DB) * ERROR_STEPS_PER_DB)
     at = max(0, min(err.shape[1] - 1, at))
     until = min(t, st[LOCK_DATA_END, r])
@@ -109,9 +120,27 @@ def rx_start(p: Ints, pf: Reals, st: Ints, sf: Reals, lk: Ints, lp: Reals, err: 
     r = lk[LINK_DST, link]
     if st[LOCK, r] >= 0:
         close_segment(p, pf, st, sf, lp, err, r, t)
+        sf[OVERSEEN, r] = 0.0
         st[OVERLAPPED, r] = 1
+    elif p[OVERSEES] == 1:
+        seek(p, st, sf, r, t)
     st[NSIG, r] += 1
     sf[POWER, r] += lp[ON_AIR, link]
+    st[CHANGED_AT, r] = t
+
+
+@jit
+def seek(p: Ints, st: Ints, sf: Reals, r: int, t: int) -> None:
+    """A signal opens a window in which its preamble is looked for; what was on the air before the first of several?
+
+    ns-3.44 (InterferenceHelper over YansWifiPhy) takes that as the interference with which the frame that it finds
+    begins: a weaker signal that came less than a window before it does no harm until the power changes again.
+    """
+    if t >= st[SEEKING_UNTIL, r]:
+        sf[BEFORE_SEEKING, r] = sf[POWER, r]
+    if st[TX_KIND, r] == NOTHING:
+        st[SEEKING_UNTIL, r] = t + p[DETECT_NS]
+    sf[BEFORE_LAST, r] = sf[POWER, r]
 
 
 @jit
@@ -120,9 +149,10 @@ def rx_detect(p: Ints, pf: Reals, st: Ints, sf: Reals, lk: Ints, lp: Reals, link
     r = lk[LINK_DST, link]
     audible = lk[SENSED, link] == 1
     if audible:
-        st[CS, r] += 1
-        if st[CS, r] == 1 and st[TX_KIND, r] == NOTHING:
-            on_busy(p, st, r, t)
+        busier(p, st, r, t)
+    if p[SENSES_SUM] == 1 and st[ENERGY, r] == 0 and sf[POWER, r] >= pf[SENSITIVITY_MW]:
+        st[ENERGY, r] = 1
+        busier(p, st, r, t)
     wanted = lp[ON_AIR, link]
     if p[INTERFERENCE] == 0:
         clear = st[NSIG, r] == 1
@@ -146,6 +176,25 @@ def rx_detect(p: Ints, pf: Reals, st: Ints, sf: Reals, lk: Ints, lp: Reals, link
             st[LOCK_DATA_END, r] = lk[ENDS, link] - p[EXTENSION_NS]
         st[OVERLAPPED, r] = 1 if st[NSIG, r] > 1 else 0
         sf[LOG_OK, r] = 0.0
+        sf[OVERSEEN, r] = 0.0
+        if p[OVERSEES] == 1 and st[CHANGED_AT, r] == lk[BEGINS, link]:
+            sf[OVERSEEN, r] = sf[BEFORE_LAST, r] - sf[BEFORE_SEEKING, r]
+
+
+@jit
+def busier(p: Ints, st: Ints, r: int, t: int) -> None:
+    """One more reason to call the medium busy."""
+    st[CS, r] += 1
+    if st[CS, r] == 1 and st[TX_KIND, r] == NOTHING:
+        on_busy(p, st, r, t)
+
+
+@jit
+def quieter(g: Ints, p: Ints, st: Ints, hs: Ints, r: int, t: int) -> None:
+    """One reason less."""
+    st[CS, r] -= 1
+    if st[CS, r] == 0 and st[TX_KIND, r] == NOTHING:
+        on_idle(g, p, st, hs, r, t)
 
 
 @jit
@@ -196,6 +245,8 @@ def rx_end(
     whole = False
     if st[LOCK, r] >= 0:
         close_segment(p, pf, st, sf, lp, err, r, t)
+        sf[OVERSEEN, r] = 0.0
+    st[CHANGED_AT, r] = t
     if st[LOCK, r] == link:
         st[LOCK, r] = -1
         whole = survived(p, st, sf, r)
@@ -213,9 +264,10 @@ def rx_end(
     elif whole and lk[LINK_KIND, link] == ACK and st[WAITING, r] == lk[LINK_FRAME, link]:
         acknowledged(g, p, st, fr, out, r, t)
     if lk[SENSED, link] == 1:
-        st[CS, r] -= 1
-        if st[CS, r] == 0 and st[TX_KIND, r] == NOTHING:
-            on_idle(g, p, st, hs, r, t)
+        quieter(g, p, st, hs, r, t)
+    if st[ENERGY, r] == 1 and sf[POWER, r] < pf[SENSITIVITY_MW]:
+        st[ENERGY, r] = 0
+        quieter(g, p, st, hs, r, t)
     release(g, fr, out, lk[LINK_FRAME, link], t)
 
 

@@ -29,7 +29,8 @@ Reals = npt.NDArray[np.float64]
     TX_FRAME,  # frame slot on the air, -1 none
     TX_KIND,  # NOTHING, DATA, ACK
     TX_END,
-    CS,  # signals sensed
+    CS,  # signals sensed, and one more if ENERGY
+    ENERGY,  # 1: with SENSES_SUM, all signals together are sensed
     NSIG,  # signals present, sensed or not
     LOCK,  # link being received, -1 none
     LOCK_FROM,  # start of the current interference segment
@@ -37,6 +38,8 @@ Reals = npt.NDArray[np.float64]
     LOCK_DATA_END,  # from then on only signal extension, which carries no bits; NEVER without
     LOCK_RATE,  # 1: the locked frame is data, 2: an ACK; rows of `err`, and offsets into pf
     OVERLAPPED,  # 1: another signal overlapped the locked frame
+    SEEKING_UNTIL,  # end of the last detection window that a signal has opened
+    CHANGED_AT,  # when the power last changed
     IDLE_FROM,  # when the medium last became idle
     BAD_UNTIL,  # end of the EIFS extension after a failed reception
     RESUME_FROM,  # end of an ACK timeout: access counts from here
@@ -55,15 +58,16 @@ Reals = npt.NDArray[np.float64]
     FADE_B,
     ON_AIR_LIST,  # not by station: the first ON_AIR_N entries name the stations that transmit
     STATION_ROWS,
-) = range(34)
+) = range(37)
 NOTHING: Final = 0
 DATA: Final = 1
 ACK: Final = 2
 
 # --- stations (sf) ------------------------------------------------------------------------------------------------
-POWER, LOG_OK, NOISE, STATION_REALS = range(4)
+POWER, LOG_OK, NOISE, BEFORE_SEEKING, BEFORE_LAST, OVERSEEN, STATION_REALS = range(7)
 """POWER: sum of the signals present [mW]. LOG_OK: log of the probability that the locked frame is still whole. NOISE:
-what the receiver hears besides [mW]."""
+what the receiver hears besides [mW]. With OVERSEES, BEFORE_SEEKING, BEFORE_LAST: POWER before the first signal of a
+run of detection windows, and before the last signal; OVERSEEN: what the locked frame does not notice of it [mW]."""
 
 # --- frames (fr) --------------------------------------------------------------------------------------------------
 (
@@ -185,13 +189,15 @@ DELIVERED, NO_RECEIVER, COLLIDED, DEAF, WEAK, GIVEN_UP, NO_ROOM, EXPIRED, DEGRAD
     LIFETIME_NS,
     DRAW_WHEN_INTERRUPTED,  # 1: IEEE 802.11; 0: as ns-3
     WAIT_DIFS_FIRST,  # 1: as ns-3, a frame waits one DIFS after it is queued
+    SENSES_SUM,  # 1: as ns-3, signals too weak to be sensed are sensed together
+    OVERSEES,  # 1: as ns-3, interference that began less than a detection window before is overseen for a while
     INTERFERENCE,  # 0: any overlap destroys; 1: SINR and error rate
     CAPTURE,  # 1: report every start of a transmission
     EXTENSION_NS,  # signal extension at the end of each frame (OFDM at 2.4 GHz)
     TAKE_OVER,  # 1: a later frame that is TAKE_OVER_RATIO times as strong as the locked one takes the receiver
     FADING,  # 0 none, else the law: see fading.py
     PARAMETERS,
-) = range(21)
+) = range(23)
 (
     DETECT_RATIO,
     HEADER_BITS_PER_NS,

@@ -75,8 +75,8 @@ class Radio(Section):
     """Whether a later frame that is `capture_db` stronger than the one being received takes the receiver over."""
     capture_db: NonNegative = 10.0
     access: Literal["standard", "ns3"] = "standard"
-    """`standard`: a station that finds the medium busy draws a backoff (IEEE 802.11); `ns3`: as ns-3 does it, which also
-    senses weak signals together and oversees some interference (docs/emulator.md)."""
+    """`standard`: a station that finds the medium busy draws a backoff (IEEE 802.11); `ns3`: as ns-3 does it, which
+    also senses weak signals together and oversees some interference (docs/emulator.md)."""
     cw_min: Annotated[int, Field(ge=1, le=1023)] = 31
     """By default 31, and 15 with OFDM rates."""
     cw_max: Annotated[int, Field(ge=1, le=32767)] = 1023

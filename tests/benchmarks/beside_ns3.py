@@ -1,26 +1,22 @@
 """The same swarm in ns-3 and in ours, in turns on this machine: `python tests/benchmarks/beside_ns3.py PREFIX`.
 
-PREFIX is the folder of an installed ns-3.44 with `include` and `lib64`, such as `site-packages/ns3` of an environment
-in which `pip install ns3==3.44.post0` was run (it needs g++ too; neither is a dependency of ours). Both sides are
-timed in CPU seconds of the simulation alone, without start-up; the least of the runs counts, because other work on the
-machine only ever adds. Judges nothing: the ratio depends a little on the machine.
+PREFIX: an installed ns-3.44, see `tests/ns3/live.py`. Both sides are timed in CPU seconds of the simulation alone,
+without start-up; the least of the runs counts, because other work on the machine only ever adds. Judges nothing: the
+ratio depends a little on the machine, and on how its Python was built (docs/experiments.md).
 """
 
 import argparse
-import json
-import subprocess
 import sys
 import tempfile
 from pathlib import Path
 from time import process_time
-from typing import Any, Final, NamedTuple
+from typing import Final, NamedTuple
 
 from sim import catalog
 from sim.results import finish
 from sim.run import simulate
+from tests.ns3 import live
 
-_SOURCE: Final = Path(__file__).parent / "ns3" / "flooding.cc"
-_MODULES: Final = ("core", "network", "internet", "mobility", "wifi", "propagation")
 _INTERVALS_S: Final = (1.0, 0.1)
 
 
@@ -32,20 +28,9 @@ class Run(NamedTuple):
     pdr: float
 
 
-def build(prefix: Path, folder: Path) -> Path:
-    """The ns-3 program, compiled."""
-    program = folder / "flooding"
-    libraries = prefix / "lib64"
-    command = ["g++", "-O2", "-std=c++20", f"-I{prefix / 'include'}", str(_SOURCE), "-o", str(program)]
-    command += [f"-L{libraries}", f"-Wl,-rpath,{libraries}", *(f"-lns3.44-{module}" for module in _MODULES)]
-    subprocess.run(command, check=True)
-    return program
-
-
 def theirs(program: Path, interval_s: float, seconds: float, run: int) -> Run:
-    command = [str(program), f"--interval={interval_s}", f"--duration={seconds}", f"--run={run}"]
-    said: dict[str, Any] = json.loads(subprocess.run(command, check=True, capture_output=True).stdout)
-    return Run(said["cpu_s"], said["sent"], said["pdr"])
+    said = live.run(program, interval=interval_s, duration=seconds, run=run)
+    return Run(said["cpu_s"], int(said["sent"]), said["pdr"])
 
 
 def ours(interval_s: float, seconds: float, run: int) -> Run:
@@ -66,7 +51,7 @@ def main() -> int:
     asked = flags.parse_args()
     simulate(catalog.find("flooding", ["duration_s=2"]))  # the kernel is loaded
     with tempfile.TemporaryDirectory() as folder:
-        program = build(asked.prefix, Path(folder))
+        program = live.build(asked.prefix, Path(folder))
         print(f"9 x 5 grid, flooding by 44 sources, {asked.seconds:g} s simulated, the least of {asked.runs} runs each")
         print("interval s   ns-3 CPU s  frames  PDR       ours CPU s  frames  PDR       times faster")
         for interval_s in _INTERVALS_S:

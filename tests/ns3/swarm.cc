@@ -1,0 +1,243 @@
+// Our scenarios `flooding`, `contention_broadcast`, `contention_unicast` and `hidden_terminal` in ns-3.44.
+//
+// 802.11b ad hoc at 11 Mb/s, UDP payload of 1024 bytes, addresses known from the start. Topologies: `grid`, 9 x 5 nodes
+// 200 m apart, where every node sends each new packet once more after U(0, jitter); `disc` of 100 m radius; `hidden`,
+// nodes at 0, 200, 400 m. Node 0 is the leader of the grid, the sink of unicast and the middle of `hidden`. Channel A:
+// range 250 m; B: log-distance. Prints one line of JSON: CPU seconds of Simulator::Run, frames sent, and shares.
+//
+// Not part of the product; ns-3 links under its own licence.
+#include "ns3/core-module.h"
+#include "ns3/internet-module.h"
+#include "ns3/mobility-module.h"
+#include "ns3/neighbor-cache-helper.h"
+#include "ns3/network-module.h"
+#include "ns3/propagation-module.h"
+#include "ns3/wifi-module.h"
+
+#include <cmath>
+#include <cstring>
+#include <ctime>
+#include <string>
+#include <unordered_set>
+
+using namespace ns3;
+
+static const uint16_t PORT = 9000;
+static const uint32_t PAYLOAD = 1024;
+
+struct Settings
+{
+    std::string topology = "grid", channel = "A", cast = "broadcast", arrivals = "cbr";
+    double interval = 1.0, duration = 100, jitter = 0.01;
+    uint32_t nodes = 45, sources = 44, run = 1;
+
+    bool Unicast() const { return cast == "unicast"; }
+};
+
+static struct
+{
+    uint64_t generated = 0, sent = 0, delivered = 0, received = 0, attempts = 0, failed = 0;
+} g_counts;
+
+class Station : public Object
+{
+  public:
+    Station(Ptr<Node> node, const Settings& settings, Ipv4Address destination)
+        : m_settings(settings), m_destination(destination), m_id(node->GetId()),
+          m_uniform(CreateObject<UniformRandomVariable>()), m_exponential(CreateObject<ExponentialRandomVariable>())
+    {
+        m_exponential->SetAttribute("Mean", DoubleValue(settings.interval));
+        m_socket = Socket::CreateSocket(node, UdpSocketFactory::GetTypeId());
+        m_socket->SetAllowBroadcast(true);
+        m_socket->Bind(InetSocketAddress(Ipv4Address::GetAny(), PORT));
+        m_socket->SetRecvCallback(MakeCallback(&Station::Receive, this));
+    }
+
+    void Start()
+    {
+        double first = m_settings.arrivals == "poisson" ? Gap() : m_uniform->GetValue(0, m_settings.interval);
+        Simulator::Schedule(Seconds(first), &Station::Generate, this);
+    }
+
+  private:
+    double Gap() { return m_settings.arrivals == "poisson" ? m_exponential->GetValue() : m_settings.interval; }
+
+    void Generate()
+    {
+        if (Simulator::Now().GetSeconds() >= m_settings.duration - 1)
+            return;
+        ++g_counts.generated;
+        uint64_t key = (uint64_t(m_id) << 32) | m_seq++;
+        m_seen.insert(key);
+        uint8_t bytes[PAYLOAD] = {};
+        std::memcpy(bytes, &key, sizeof key);
+        Send(Create<Packet>(bytes, PAYLOAD));
+        Simulator::Schedule(Seconds(Gap()), &Station::Generate, this);
+    }
+
+    void Send(Ptr<Packet> packet)
+    {
+        ++g_counts.sent;
+        m_socket->SendTo(packet, 0, InetSocketAddress(m_destination, PORT));
+    }
+
+    void Receive(Ptr<Socket> socket)
+    {
+        while (Ptr<Packet> packet = socket->Recv())
+        {
+            ++g_counts.received;
+            uint64_t key;
+            packet->CopyData(reinterpret_cast<uint8_t*>(&key), sizeof key);
+            if (!m_seen.insert(key).second)
+                continue;
+            ++g_counts.delivered;
+            if (m_settings.topology != "grid")
+                continue;
+            Ptr<Packet> copy = packet->Copy();
+            copy->RemoveAllPacketTags();
+            Simulator::Schedule(Seconds(m_uniform->GetValue(0, m_settings.jitter)), &Station::Send, this, copy);
+        }
+    }
+
+    const Settings& m_settings;
+    Ipv4Address m_destination;
+    uint32_t m_id, m_seq = 0;
+    Ptr<Socket> m_socket;
+    Ptr<UniformRandomVariable> m_uniform;
+    Ptr<ExponentialRandomVariable> m_exponential;
+    std::unordered_set<uint64_t> m_seen;
+};
+
+static void
+TransmissionBegins(Ptr<const Packet> packet, double)
+{
+    g_counts.attempts += packet->GetSize() > PAYLOAD; // no ACK
+}
+
+static void
+AttemptFailed(Mac48Address)
+{
+    ++g_counts.failed;
+}
+
+static Settings
+Parse(int argc, char** argv)
+{
+    Settings s;
+    CommandLine cmd;
+    cmd.AddValue("topology", "grid, disc or hidden", s.topology);
+    cmd.AddValue("channel", "A or B", s.channel);
+    cmd.AddValue("cast", "broadcast or unicast", s.cast);
+    cmd.AddValue("arrivals", "cbr, poisson or saturated", s.arrivals);
+    cmd.AddValue("interval", "between packets of a source [s]", s.interval);
+    cmd.AddValue("duration", "[s]; nothing is generated in the last second", s.duration);
+    cmd.AddValue("jitter", "most that a relay waits [s]", s.jitter);
+    cmd.AddValue("nodes", "in the disc, with the sink", s.nodes);
+    cmd.AddValue("sources", "nodes 1, 2, ... of the grid", s.sources);
+    cmd.AddValue("run", "seed", s.run);
+    cmd.Parse(argc, argv);
+    if (s.topology == "grid")
+        s.nodes = 45;
+    if (s.topology == "hidden")
+        s.nodes = 3;
+    if (s.arrivals == "saturated")
+        s.interval = 0.001;
+    return s;
+}
+
+static void
+Place(const NodeContainer& nodes, const Settings& s)
+{
+    Ptr<ListPositionAllocator> places = CreateObject<ListPositionAllocator>();
+    Ptr<UniformRandomVariable> uniform = CreateObject<UniformRandomVariable>();
+    const double middle_and_ends[] = {200, 0, 400};
+    for (uint32_t i = 0; i < s.nodes; ++i)
+    {
+        double radius = 100 * std::sqrt(uniform->GetValue(0, 1)), angle = uniform->GetValue(0, 2 * M_PI);
+        if (s.topology == "grid")
+            places->Add(Vector(200.0 * (i % 9), 200.0 * (i / 9), 0));
+        else if (s.topology == "hidden")
+            places->Add(Vector(middle_and_ends[i], 0, 0));
+        else
+            places->Add(Vector(radius * std::cos(angle), radius * std::sin(angle), 0));
+    }
+    MobilityHelper mobility;
+    mobility.SetPositionAllocator(places);
+    mobility.SetMobilityModel("ns3::ConstantPositionMobilityModel");
+    mobility.Install(nodes);
+}
+
+static NetDeviceContainer
+Radios(const NodeContainer& nodes, const Settings& s)
+{
+    YansWifiChannelHelper channel;
+    YansWifiPhyHelper phy;
+    channel.SetPropagationDelay("ns3::ConstantSpeedPropagationDelayModel");
+    if (s.channel == "A")
+        channel.AddPropagationLoss("ns3::RangePropagationLossModel", "MaxRange", DoubleValue(250));
+    else
+    {
+        channel.AddPropagationLoss("ns3::LogDistancePropagationLossModel", "Exponent", DoubleValue(3),
+                                   "ReferenceDistance", DoubleValue(1), "ReferenceLoss", DoubleValue(40.05));
+        phy.Set("TxPowerStart", DoubleValue(30));
+        phy.Set("TxPowerEnd", DoubleValue(30));
+    }
+    phy.SetChannel(channel.Create());
+    WifiMacHelper mac;
+    mac.SetType("ns3::AdhocWifiMac");
+    WifiHelper wifi;
+    wifi.SetStandard(WIFI_STANDARD_80211b);
+    StringValue rate("DsssRate11Mbps");
+    wifi.SetRemoteStationManager("ns3::ConstantRateWifiManager", "DataMode", rate, "ControlMode", rate,
+                                 "NonUnicastMode", rate);
+    NetDeviceContainer devices = wifi.Install(phy, mac, nodes);
+    for (uint32_t i = 0; i < devices.GetN(); ++i)
+    {
+        Ptr<WifiNetDevice> device = DynamicCast<WifiNetDevice>(devices.Get(i));
+        device->GetPhy()->TraceConnectWithoutContext("PhyTxBegin", MakeCallback(&TransmissionBegins));
+        device->GetRemoteStationManager()->TraceConnectWithoutContext("MacTxDataFailed", MakeCallback(&AttemptFailed));
+    }
+    return devices;
+}
+
+int
+main(int argc, char** argv)
+{
+    const Settings s = Parse(argc, argv);
+    RngSeedManager::SetRun(s.run);
+    if (s.arrivals == "saturated")
+        Config::SetDefault("ns3::WifiMacQueue::MaxDelay", TimeValue(Seconds(1000)));
+    NodeContainer nodes;
+    nodes.Create(s.nodes);
+    Place(nodes, s);
+    NetDeviceContainer devices = Radios(nodes, s);
+    InternetStackHelper internet;
+    internet.Install(nodes);
+    Ipv4AddressHelper addresses;
+    addresses.SetBase("10.0.0.0", "255.255.255.0");
+    Ipv4InterfaceContainer interfaces = addresses.Assign(devices);
+    NeighborCacheHelper().PopulateNeighborCache();
+
+    const bool all = s.topology == "disc" && !s.Unicast();
+    Ipv4Address destination = s.Unicast() ? interfaces.GetAddress(0) : Ipv4Address("255.255.255.255");
+    std::vector<Ptr<Station>> stations;
+    for (uint32_t i = 0; i < s.nodes; ++i)
+    {
+        stations.push_back(Create<Station>(nodes.Get(i), s, destination));
+        if (all || (i > 0 && (s.topology != "grid" || i <= s.sources)))
+            stations.back()->Start();
+    }
+    std::clock_t began = std::clock();
+    Simulator::Stop(Seconds(s.duration));
+    Simulator::Run();
+    const double cpu_s = double(std::clock() - began) / CLOCKS_PER_SEC;
+    const double targets = s.Unicast() || s.topology == "hidden" ? 1 : s.nodes - 1;
+    std::printf("{\"cpu_s\": %.3f, \"sent\": %lu, \"pdr\": %.6f, \"air.pdr\": %.6f, \"air.throughput_mbps\": %.6f, "
+                "\"air.attempt_failure\": %.6f}\n",
+                cpu_s, g_counts.sent, g_counts.delivered / (targets * g_counts.generated),
+                g_counts.received / (targets * g_counts.attempts), g_counts.received * 8e-6 * PAYLOAD / s.duration,
+                double(g_counts.failed) / g_counts.attempts);
+    stations.clear();
+    Simulator::Destroy();
+    return 0;
+}

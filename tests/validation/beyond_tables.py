@@ -1,10 +1,12 @@
 """Cases that are in no table, ours beside a live ns-3.44: `python tests/validation/beyond_tables.py PREFIX [--only X]`.
 
 Other node counts, loads, arrivals and jitters than in `ns3/`, on both channels; four seeds of each side. They agree
-within 0.02, 3 % of a throughput or 3 standard deviations of ns-3, the widest. PREFIX: see `tests/ns3/live.py`.
+within 0.02, 3 % of a throughput, 3 standard deviations of ns-3 or 3 standard errors of the difference, the widest.
+PREFIX: see `tests/ns3/live.py`.
 """
 
 import argparse
+import math
 import statistics
 import sys
 import tempfile
@@ -108,7 +110,8 @@ def compare(case: Case, *, program: Path) -> list[tuple[str, bool]]:
     for figure in case.figures:
         reference, sd = _mean_and_sd(theirs, figure)
         found, own_sd = _mean_and_sd(ours, figure)
-        tolerance = max(0.03 * reference if figure == "air.throughput_mbps" else 0.02, 3 * sd)
+        error = math.hypot(sd, own_sd) / math.sqrt(_SEEDS)
+        tolerance = max(0.03 * reference if figure == "air.throughput_mbps" else 0.02, 3 * sd, 3 * error)
         agrees = abs(found - reference) <= tolerance
         lines.append(
             (

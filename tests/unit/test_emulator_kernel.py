@@ -102,6 +102,7 @@ LOADS = st.tuples(
 @given(LOADS)
 @example((3830, 9, "range", "ns3"))  # a remaining backoff shorter than the DIFS that a fresh frame waits
 @example((191, 3, "log_distance", "standard"))  # the last frame ends at a station that cannot hear it
+@example((212, 11, "log_distance", "ns3"))  # the air falls silent where a frame ends that nobody could hear alone
 def test_all_books_close_and_the_air_falls_silent(load: tuple[int, int, str, str]) -> None:
     seed, count, channel, access = load
     air = medium(count, channel=channel, access=access, queue_frames=6, lifetime_ms=40)

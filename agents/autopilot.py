@@ -55,6 +55,7 @@ class Autopilot:
         self._fix_ns: int | None = None
         self._encoder = Encoder(node, component=AUTOPILOT_COMPONENT)
         self._streams = self._plan(node, telemetry_hz) if telemetry_hz else []
+        self._due_ns = min((stream.due_ns for stream in self._streams), default=None)
 
     def _plan(self, node: NodeId, telemetry_hz: float) -> list[_Stream]:
         """In order of sending. Nodes are out of step by their id, so that the bus sees no bursts; streams are not."""
@@ -106,13 +107,16 @@ class Autopilot:
 
     def next_due_ns(self) -> int | None:
         """When telemetry is due; None when there is none."""
-        return min((stream.due_ns for stream in self._streams), default=None)
+        return self._due_ns
 
     def telemetry(self, now_ns: int) -> bytes:
         """The frames that are due now, one of each stream however late: stale telemetry is of no use."""
+        if self._due_ns is None or now_ns < self._due_ns:
+            return b""
         due = [stream for stream in self._streams if stream.due_ns <= now_ns]
         for stream in due:
             stream.due_ns += ((now_ns - stream.due_ns) // stream.interval_ns + 1) * stream.interval_ns
+        self._due_ns = min(stream.due_ns for stream in self._streams)
         return b"".join(stream.encode(now_ns) for stream in due)
 
     def beacon_frames(self, now_ns: int) -> bytes:

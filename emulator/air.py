@@ -9,6 +9,7 @@ import numpy.typing as npt
 
 from emulator import kernel
 from emulator import state as s
+from emulator.chance import MODULUS
 from emulator.entry import Entry
 from emulator.error_rate import header_rates, log_success_per_bit
 from emulator.fading import law_of, seeds
@@ -21,7 +22,6 @@ from fanet_mw.link_stats import LinkStats
 from fanet_mw.rng import stream_seed
 from fanet_mw.scenario import Scenario
 
-_GENERATOR_RANGE = 2_147_483_646
 _ROW: Final = struct.Struct("=6q")
 """One row of `asked` or `out`."""
 _pack, _unpack, _ROW_BYTES = _ROW.pack_into, _ROW.iter_unpack, _ROW.size
@@ -56,7 +56,7 @@ class Air:
             timing.slot_ns, timing.sifs_ns, timing.difs_ns, timing.eifs_extra_ns, timing.ack_ns,
             timing.ack_timeout_ns, timing.header_ns, DETECT_NS, radio.cw_min, radio.cw_max, radio.max_attempts,
             radio.queue_frames, lifetime_ns,
-            radio.access == "standard", as_ns3, as_ns3 and sinr, as_ns3 and sinr, sinr, capture,
+            radio.access == "standard", as_ns3, as_ns3 and sinr, sinr, capture,
             timing.extension_ns, radio.capture, fading,
         )  # fmt: skip
         self._pf = np.array(
@@ -76,13 +76,13 @@ class Air:
             (s.HEAD, -1), (s.TAIL, -1), (s.BUSY_SINCE, -1), (s.IDLE_FROM, -timing.difs_ns),
         ):  # fmt: skip
             self.st[row] = value
-        self.st[s.RANDOM] = [stream_seed(seed, "backoff", i + 1) % _GENERATOR_RANGE + 1 for i in range(stations)]
+        self.st[s.RANDOM] = [stream_seed(seed, "backoff", i + 1) % (MODULUS - 1) + 1 for i in range(stations)]
         self.st[s.FADE_A], self.st[s.FADE_B] = np.array(
             [seeds(stream_seed(seed, "fading", i + 1)) for i in range(stations)], np.int64
         ).T
         self._sf = np.zeros((s.STATION_REALS, stations), np.float64)
         self._sf[s.NOISE] = noise_mw(radio)
-        self.st[s.FAULT_RANDOM] = [stream_seed(seed, "fault", i + 1) % _GENERATOR_RANGE + 1 for i in range(stations)]
+        self.st[s.FAULT_RANDOM] = [stream_seed(seed, "fault", i + 1) % (MODULUS - 1) + 1 for i in range(stations)]
         self.fr = np.zeros((s.FRAME_ROWS, _SLOTS), np.int64)
         self._hs = np.zeros((8 * stations + 2 * _SLOTS + 64, 5), np.int64)
         self._asked = np.zeros((_MOST_ASKED, s.ASKED_COLUMNS), np.int64)
@@ -192,8 +192,7 @@ class Air:
         """Let time pass; returns the output rows (`emulator.state.OUT_*`) in order."""
         rows: Rows = []
         while True:
-            advance = self._entry.advance
-            bound_ns = advance(until_ns)
+            bound_ns = self._entry.advance(until_ns)
             count = self._counts[s.OUT_N]
             if count:
                 rows += _unpack(self._out_rows[count])

@@ -26,6 +26,7 @@ from emulator.state import (
     NAV,
     NEVER,
     NOTHING,
+    RANDOM,
     RESUME_FROM,
     SCHEDULED,
     SLOT_NS,
@@ -38,7 +39,7 @@ from emulator.state import (
 @jit
 def draw(st: Ints, s: int) -> None:
     """A new backoff from [0, CW]."""
-    st[BO, s] = uniform(st, s) * (st[CW, s] + 1) // MODULUS
+    st[BO, s] = uniform(st, RANDOM, s) * (st[CW, s] + 1) // MODULUS
 
 
 @jit

@@ -1,14 +1,14 @@
-"""Random numbers of a station, from its own row of the state."""
+"""Random numbers of a station: a generator is a row of the state, RANDOM or FAULT_RANDOM."""
 
 from emulator.jit import jit
-from emulator.state import RANDOM, Ints
+from emulator.state import Ints
 
 MODULUS = 2_147_483_647
 
 
 @jit
-def uniform(st: Ints, s: int) -> int:
-    """The next value of a station's generator, in [1, 2^31 - 2] (Park and Miller, CACM 31(10), 1988)."""
-    x = st[RANDOM, s] * 48271 % MODULUS
-    st[RANDOM, s] = x
+def uniform(st: Ints, row: int, s: int) -> int:
+    """The next value of the generator in that row, in [1, 2^31 - 2] (Park and Miller, CACM 31(10), 1988)."""
+    x = st[row, s] * 48271 % MODULUS
+    st[row, s] = x
     return int(x)

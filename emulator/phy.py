@@ -10,7 +10,7 @@ With INTERFERENCE = 0 any overlap destroys; with 1 the loss of each segment foll
 import math
 
 from emulator.backoff import on_busy, on_idle
-from emulator.chance import uniform
+from emulator.chance import MODULUS, uniform
 from emulator.dcf import acknowledged
 from emulator.ending import lost, put, release
 from emulator.heap import push
@@ -20,7 +20,6 @@ from emulator.state import (
     ACK_NS,
     ACK_TO,
     BAD_UNTIL,
-    BEFORE_LAST,
     BEFORE_SEEKING,
     BEGINS,
     CHANGED_AT,
@@ -45,6 +44,7 @@ from emulator.state import (
     HANDED,
     HEADER_BITS_PER_NS,
     HEADER_NS,
+    HEARS_AS_NS3,
     HS_N,
     INTERFERENCE,
     LINK_DST,
@@ -69,15 +69,14 @@ from emulator.state import (
     OUT_RECEPTION,
     OVERLAPPED,
     OVERSEEN,
-    OVERSEES,
     POWER,
+    RANDOM,
     RECEIVED,
     RECEIVED_COPIES,
     RSSI_SUM,
     SEEKING_UNTIL,
     SEND_ACK,
     SENSED,
-    SENSES_SUM,
     SENSITIVITY_MW,
     SIFS_NS,
     SPARED,
@@ -92,7 +91,6 @@ from emulator.state import (
 
 ERROR_FLOOR_DB = -20.0
 ERROR_STEPS_PER_DB = 20.0
-_MODULUS = 2_147_483_647.0
 
 
 @jit
@@ -122,7 +120,7 @@ def rx_start(p: Ints, pf: Reals, st: Ints, sf: Reals, lk: Ints, lp: Reals, err: 
         close_segment(p, pf, st, sf, lp, err, r, t)
         sf[OVERSEEN, r] = 0.0
         st[OVERLAPPED, r] = 1
-    elif p[OVERSEES] == 1:
+    elif p[HEARS_AS_NS3] == 1:
         seek(p, st, sf, r, t)
     st[NSIG, r] += 1
     sf[POWER, r] += lp[ON_AIR, link]
@@ -140,7 +138,6 @@ def seek(p: Ints, st: Ints, sf: Reals, r: int, t: int) -> None:
         sf[BEFORE_SEEKING, r] = sf[POWER, r]
     if st[TX_KIND, r] == NOTHING:
         st[SEEKING_UNTIL, r] = t + p[DETECT_NS]
-    sf[BEFORE_LAST, r] = sf[POWER, r]
 
 
 @jit
@@ -150,7 +147,7 @@ def rx_detect(p: Ints, pf: Reals, st: Ints, sf: Reals, lk: Ints, lp: Reals, link
     audible = lk[SENSED, link] == 1
     if audible:
         busier(p, st, r, t)
-    if p[SENSES_SUM] == 1 and st[ENERGY, r] == 0 and sf[POWER, r] >= pf[SENSITIVITY_MW]:
+    if p[HEARS_AS_NS3] == 1 and st[ENERGY, r] == 0 and sf[POWER, r] >= pf[SENSITIVITY_MW]:
         st[ENERGY, r] = 1
         busier(p, st, r, t)
     wanted = lp[ON_AIR, link]
@@ -177,8 +174,8 @@ def rx_detect(p: Ints, pf: Reals, st: Ints, sf: Reals, lk: Ints, lp: Reals, link
         st[OVERLAPPED, r] = 1 if st[NSIG, r] > 1 else 0
         sf[LOG_OK, r] = 0.0
         sf[OVERSEEN, r] = 0.0
-        if p[OVERSEES] == 1 and st[CHANGED_AT, r] == lk[BEGINS, link]:
-            sf[OVERSEEN, r] = sf[BEFORE_LAST, r] - sf[BEFORE_SEEKING, r]
+        if p[HEARS_AS_NS3] == 1 and st[CHANGED_AT, r] == lk[BEGINS, link]:
+            sf[OVERSEEN, r] = sf[POWER, r] - wanted - sf[BEFORE_SEEKING, r]
 
 
 @jit
@@ -210,7 +207,7 @@ def survived(p: Ints, st: Ints, sf: Reals, r: int) -> bool:
         return bool(st[OVERLAPPED, r] == 0)
     if sf[LOG_OK, r] > -1e-9:
         return True
-    return bool(uniform(st, r) / _MODULUS < math.exp(sf[LOG_OK, r]))
+    return bool(uniform(st, RANDOM, r) / MODULUS < math.exp(sf[LOG_OK, r]))
 
 
 @jit
@@ -219,9 +216,7 @@ def spared(st: Ints, lp: Reals, r: int, link: int) -> bool:
     share = lp[SPARED, link]
     if share >= 1.0 or share <= 0.0:
         return bool(share >= 1.0)
-    x = st[FAULT_RANDOM, r] * 48271 % 2_147_483_647  # as `uniform`, of a stream of its own
-    st[FAULT_RANDOM, r] = x
-    return bool(x / _MODULUS < share)
+    return bool(uniform(st, FAULT_RANDOM, r) / MODULUS < share)
 
 
 @jit

@@ -30,7 +30,7 @@ Reals = npt.NDArray[np.float64]
     TX_KIND,  # NOTHING, DATA, ACK
     TX_END,
     CS,  # signals sensed, and one more if ENERGY
-    ENERGY,  # 1: with SENSES_SUM, all signals together are sensed
+    ENERGY,  # 1: with HEARS_AS_NS3, all signals together are sensed
     NSIG,  # signals present, sensed or not
     LOCK,  # link being received, -1 none
     LOCK_FROM,  # start of the current interference segment
@@ -64,10 +64,10 @@ DATA: Final = 1
 ACK: Final = 2
 
 # --- stations (sf) ------------------------------------------------------------------------------------------------
-POWER, LOG_OK, NOISE, BEFORE_SEEKING, BEFORE_LAST, OVERSEEN, STATION_REALS = range(7)
+POWER, LOG_OK, NOISE, BEFORE_SEEKING, OVERSEEN, STATION_REALS = range(6)
 """POWER: sum of the signals present [mW]. LOG_OK: log of the probability that the locked frame is still whole. NOISE:
-what the receiver hears besides [mW]. With OVERSEES, BEFORE_SEEKING, BEFORE_LAST: POWER before the first signal of a
-run of detection windows, and before the last signal; OVERSEEN: what the locked frame does not notice of it [mW]."""
+what the receiver hears besides [mW]. With HEARS_AS_NS3, BEFORE_SEEKING: POWER before the first signal of a run of
+detection windows; OVERSEEN: what the locked frame does not notice of the interference [mW]."""
 
 # --- frames (fr) --------------------------------------------------------------------------------------------------
 (
@@ -189,15 +189,14 @@ DELIVERED, NO_RECEIVER, COLLIDED, DEAF, WEAK, GIVEN_UP, NO_ROOM, EXPIRED, DEGRAD
     LIFETIME_NS,
     DRAW_WHEN_INTERRUPTED,  # 1: IEEE 802.11; 0: as ns-3
     WAIT_DIFS_FIRST,  # 1: as ns-3, a frame waits one DIFS after it is queued
-    SENSES_SUM,  # 1: as ns-3, signals too weak to be sensed are sensed together
-    OVERSEES,  # 1: as ns-3, interference that began less than a detection window before is overseen for a while
+    HEARS_AS_NS3,  # 1: weak signals are sensed together, interference within a detection window is overseen
     INTERFERENCE,  # 0: any overlap destroys; 1: SINR and error rate
     CAPTURE,  # 1: report every start of a transmission
     EXTENSION_NS,  # signal extension at the end of each frame (OFDM at 2.4 GHz)
     TAKE_OVER,  # 1: a later frame that is TAKE_OVER_RATIO times as strong as the locked one takes the receiver
     FADING,  # 0 none, else the law: see fading.py
     PARAMETERS,
-) = range(23)
+) = range(22)
 (
     DETECT_RATIO,
     HEADER_BITS_PER_NS,

@@ -41,7 +41,7 @@ class Reader:
         if flags & wire.FLAG_MORE and not alone:
             self.key, self.phase = 0, BUNDLE
         else:
-            self.key, self.phase = origin * seen.SPREAD + seq, PHASES.get(flags & wire.PHASE_MASK, 0)  # key_of
+            self.key, self.phase = seen.key_of(origin, seq), PHASES.get(flags & wire.PHASE_MASK, 0)
 
     def read(self) -> Packet:
         """The packet in the frame; raises MalformedFrameError, each time."""

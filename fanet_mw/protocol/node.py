@@ -119,7 +119,7 @@ class Node:
         if frame is not reader.frame:
             reader.look(frame)
         key, phase = reader.key, reader.phase
-        known = handled.young.get(key)
+        known = handled.young.get(key)  # as handled.bits(key), without a call for each copy
         if known is None:
             known = handled.old.get(key, 0)
         if known & phase:

@@ -14,14 +14,14 @@ CARRIED: Final = 4
 """Forwarded as unicast towards a head: carried at most once, so that no unicast loop survives."""
 
 
-SPREAD: Final = (1 << 32) + 40_503
+_SPREAD: Final = (1 << 32) + 40_503
 """Above 2^32, so that no two packets have the same key; not 2^32, because a dict looks for a number by its low bits:
 the packets that all origins send at about the same time have about the same sequence number."""
 
 
 def key_of(origin: int, seq: int) -> int:
     """One number per packet; `seq` has 32 bits."""
-    return origin * SPREAD + seq
+    return origin * _SPREAD + seq
 
 
 class Seen:

@@ -57,5 +57,4 @@ class Flooding(Flood):
         self._jitter_ns = port.scenario.routing.jitter_ns
 
     def _consider(self, packet: Packet, *, now_ns: int) -> None:
-        random = self._random
-        self._relay(packet, start_ns=now_ns + self._lead_ns + int(random() * self._jitter_ns))
+        self._relay(packet, start_ns=now_ns + self._lead_ns + int(self._random() * self._jitter_ns))

@@ -10,19 +10,16 @@ import math
 import statistics
 import sys
 import tempfile
-from collections.abc import Iterator
+from collections.abc import Iterable, Iterator
 from concurrent.futures import ProcessPoolExecutor
 from functools import partial
 from itertools import product
 from pathlib import Path
 from typing import Any, Final, NamedTuple
 
-from sim import catalog
-from sim.results import finish
-from sim.run import simulate
 from tests.ns3 import live
+from tests.validation.reference import CHANNEL, at, summary_of
 
-_CHANNELS: Final = {"A": "range", "B": "log_distance"}
 _SEEDS: Final = 4
 _BROADCAST: Final = (
     (5, 0.01, "cbr"),
@@ -49,7 +46,7 @@ class Case(NamedTuple):
 
 
 def cases() -> Iterator[Case]:
-    for letter, channel in _CHANNELS.items():
+    for letter, channel in CHANNEL.items():
         for case in _of_channel(letter):
             theirs = {"channel": letter, **case.theirs}
             yield case._replace(ours=(f"radio.channel={channel}", *case.ours), theirs=theirs)
@@ -95,21 +92,16 @@ def _load(interval_s: float, arrivals: str) -> tuple[str, str]:
     return f"traffic.interval_s={interval_s}", f"traffic.arrivals={arrivals}"
 
 
-def _ours(case: Case, seed: int) -> dict[str, float]:
-    settings = [*case.ours, f"duration_s={case.seconds}", f"seed={seed}"]
-    summary = finish(simulate(catalog.find(case.scenario, settings)), out=None)
-    return {"pdr": summary["pdr"], **{f"air.{name}": value for name, value in summary["air"].items()}}
-
-
 def compare(case: Case, *, program: Path) -> list[tuple[str, bool]]:
     """A line per figure, and whether it agrees."""
     seeds = range(1, _SEEDS + 1)
     theirs = [live.run(program, duration=case.seconds, run=seed, **case.theirs) for seed in seeds]
-    ours = [_ours(case, seed) for seed in seeds]
+    settings = (*case.ours, f"duration_s={case.seconds}")
+    summaries = [summary_of(case.scenario, settings, seed) for seed in seeds]
     lines = []
     for figure in case.figures:
-        reference, sd = _mean_and_sd(theirs, figure)
-        found, own_sd = _mean_and_sd(ours, figure)
+        reference, sd = _mean_and_sd(said[figure] for said in theirs)
+        found, own_sd = _mean_and_sd(at(summary, figure) for summary in summaries)
         error = math.hypot(sd, own_sd) / math.sqrt(_SEEDS)
         tolerance = max(0.03 * reference if figure == "air.throughput_mbps" else 0.02, 3 * sd, 3 * error)
         agrees = abs(found - reference) <= tolerance
@@ -123,8 +115,8 @@ def compare(case: Case, *, program: Path) -> list[tuple[str, bool]]:
     return lines
 
 
-def _mean_and_sd(runs: list[dict[str, float]], figure: str) -> tuple[float, float]:
-    values = [run[figure] for run in runs]
+def _mean_and_sd(figures: Iterable[float]) -> tuple[float, float]:
+    values = list(figures)
     return statistics.mean(values), statistics.stdev(values)
 
 

@@ -11,7 +11,7 @@ import json
 import os
 import statistics
 import sys
-from collections.abc import Callable, Iterator, Mapping
+from collections.abc import Callable, Iterable, Iterator, Mapping
 from concurrent.futures import ProcessPoolExecutor
 from pathlib import Path
 from typing import Any, Final, NamedTuple
@@ -21,7 +21,7 @@ from sim.results import finish
 from sim.run import simulate
 
 HERE: Final = Path(__file__).parent
-_CHANNEL: Final = {"A": "range", "B": "log_distance"}
+CHANNEL: Final = {"A": "range", "B": "log_distance"}
 _SATURATED_S: Final = 0.001
 Row = Mapping[str, str]
 
@@ -132,7 +132,7 @@ def _broadcast(row: Row) -> Case:
         f"broadcast {row['chan']} n={count} every {interval_s:g} s",
         "contention_broadcast",
         (
-            f"nodes.count={count}", f"traffic.interval_s={interval_s}", f"radio.channel={_CHANNEL[row['chan']]}",
+            f"nodes.count={count}", f"traffic.interval_s={interval_s}", f"radio.channel={CHANNEL[row['chan']]}",
             f"duration_s={4 if interval_s < 0.02 else 20}",
         ),
         (_figure(row, "pdr_air", "air.pdr", theory=theory), _figure(row, "busy", "air.busy")),
@@ -215,19 +215,20 @@ def cases() -> list[Case]:
 
 def measure(case: Case) -> list[Compared]:
     """Run a case with its seeds and compare the means."""
-    summaries = [_summary(case, seed) for seed in range(1, case.seeds + 1)]
+    summaries = [summary_of(case.scenario, case.settings, seed) for seed in range(1, case.seeds + 1)]
     return [
-        Compared(case.name, metric, statistics.fmean(_at(summary, metric.key) for summary in summaries))
+        Compared(case.name, metric, statistics.fmean(at(summary, metric.key) for summary in summaries))
         for metric in case.metrics
     ]
 
 
-def _summary(case: Case, seed: int) -> dict[str, Any]:
-    scenario = catalog.find(case.scenario, [*case.settings, f"seed={seed}"])
-    return finish(simulate(scenario), out=None)
+def summary_of(scenario: str, settings: Iterable[str], seed: int) -> dict[str, Any]:
+    """The summary of one run of a shipped scenario."""
+    return finish(simulate(catalog.find(scenario, [*settings, f"seed={seed}"])), out=None)
 
 
-def _at(summary: Mapping[str, Any], key: str) -> float:
+def at(summary: Mapping[str, Any], key: str) -> float:
+    """The figure under a dotted key."""
     value: Any = summary
     for part in key.split("."):
         value = value[part]

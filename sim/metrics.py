@@ -1,6 +1,7 @@
 """From an outcome to the summary. Every definition is written in docs/experiments.md; nothing is measured twice.
 
-pdr      = unique deliveries of application packets at their targets / (packets generated x targets)
+pdr      = unique deliveries of application packets at their targets / (packets generated x targets), never above 1
+repeated = further deliveries of a packet at a target that already had it: its process has started again
 delay    = from the generation instant to the first reception, per (packet, target)
 ledger   : frames sent by the nodes = delivered + dropped(reason) + in flight, as the medium counted them
 """
@@ -87,19 +88,28 @@ def _packets(outcome: Outcome) -> dict[str, dict[str, Any]]:
             else:
                 wanted[record.app] += scenario.nodes.count - 1
     delays: dict[str, list[int]] = {app: [] for app in _APPS}
+    repeated: Counter[str] = Counter()
     received: Counter[int] = Counter()
+    had: set[tuple[int, int, int]] = set()
     for record in outcome.records:
-        if type(record) is Delivered:
-            app = app_of.get((record.origin, record.seq))
-            if app == "report" or app == "warning":
-                delays[app].append(record.delay_ns)
-            elif app == "traffic" and record.node in targets[record.origin]:
-                delays[app].append(record.delay_ns)
-                received[record.node] += 1
+        if type(record) is not Delivered:
+            continue
+        app = app_of.get((record.origin, record.seq))
+        if app is None or not _is_target(record, app, targets):
+            continue
+        delivery = record.node, record.origin, record.seq
+        if delivery in had:
+            repeated[app] += 1
+            continue
+        had.add(delivery)
+        delays[app].append(record.delay_ns)
+        if app == "traffic":
+            received[record.node] += 1
     result: dict[str, dict[str, Any]] = {
         app: {
             "generated": generated[app],
             "delivered": len(delays[app]),
+            "repeated": repeated[app],
             "pdr": _ratio(len(delays[app]), wanted[app]),
             "delay_ms": _delay(delays[app]),
         }
@@ -107,6 +117,13 @@ def _packets(outcome: Outcome) -> dict[str, dict[str, Any]]:
     }
     result["traffic"]["worst_nodes"] = _worst_nodes(per_source, targets, received)
     return result
+
+
+def _is_target(delivered: Delivered, app: str, targets: Mapping[int, frozenset[int]]) -> bool:
+    """Whether the packet was meant for this node; reports and warnings are meant for all but their origin."""
+    if app == "traffic":
+        return delivered.node in targets[delivered.origin]
+    return delivered.node != delivered.origin
 
 
 def _worst_nodes(

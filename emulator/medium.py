@@ -61,6 +61,10 @@ class Medium(Actor):
         """Requests of each station that have not ended."""
         self._most_held = scenario.radio.queue_frames + ANNOUNCED
         self._next_seq: list[int | None] = [None] * self._count
+        self._requested = [0] * self._count
+        """Requests of each node, those included that a gap shows to be lost."""
+        self._before = [0] * self._count
+        """How many of them were of the node before its process started again."""
         self._handover_ns = scenario.radio.handover_ns
         start_ns, end_ns = scenario.traffic_window_ns
         self._warm_ns: int | None = start_ns
@@ -130,6 +134,10 @@ class Medium(Actor):
                 "in_flight": len(self._requests) - len(self._free),
                 "dropped": {reason: accounts.dropped[reason] for reason in sorted(accounts.dropped)},
             },
+            "requests": {
+                str(node): {"all": count, "before_restart": self._before[node - 1]}
+                for node, count in enumerate(self._requested, start=1)
+            },
             "copies": accounts.copies(g),
             "air": accounts.air(g, busy_ns=self._air.busy_ns(self._now_ns), now_ns=self._now_ns, stations=self._count),
             "late": accounts.lateness(),
@@ -148,6 +156,7 @@ class Medium(Actor):
             self._count_gap(station, seq)
         self._next_seq[station] = (seq + 1) & _SEQ_MASK
         self._accounts.sent += 1
+        self._requested[station] += 1
         size = len(frame)
         if (dst != BROADCAST and not 1 <= dst <= self._count) or not 0 < size <= self._max_bytes:
             self._refuse_shape(station, request, now_ns)
@@ -195,12 +204,16 @@ class Medium(Actor):
     def _count_gap(self, station: int, seq: int) -> None:
         """A gap is requests that the bus lost: they were sent, and they are dropped."""
         expected = self._next_seq[station]
-        if expected is None or seq == 0:  # 0: the node has started again
+        if expected is None:  # we are the ones who started again, or these were lost: the ledger of the run tells
+            return
+        if seq == 0:  # the node has started again
+            self._before[station] = self._requested[station]
             return
         gap = (seq - expected) & _SEQ_MASK
         if gap < _LONGEST_GAP:
             self._accounts.sent += gap
             self._accounts.dropped[DropReason.BUS] += gap
+            self._requested[station] += gap
 
     def _refuse(self, station: int, request: TxRequest, reason: DropReason, now_ns: int) -> None:
         self._accounts.drop(reason)

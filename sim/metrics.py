@@ -3,7 +3,6 @@
 pdr      = unique deliveries of application packets at their targets / (packets generated x targets), never above 1
 repeated = further deliveries of a packet at a target that already had it: its process has started again
 delay    = from the generation instant to the first reception, per (packet, target)
-ledger   : frames sent by the nodes = delivered + dropped(reason) + in flight, as the medium counted them
 """
 
 import statistics
@@ -27,6 +26,7 @@ from fanet_mw.trace import (
     Generated,
 )
 from fanet_mw.units import MS, S
+from sim import ledger
 from sim.bounds import against_bounds
 from sim.clocks import clock_errors
 from sim.outcome import Outcome
@@ -52,8 +52,8 @@ def summarize(outcome: Outcome, *, trace_sha256: str) -> dict[str, Any]:
         **packets["traffic"],
         "reports": packets["report"],
         "warnings": packets["warning"],
-        "frames": _ledger(outcome, emulator),
-        "copies": _copies(outcome, emulator),
+        "frames": ledger.frames(outcome),
+        "copies": ledger.copies(outcome),
         "air": emulator.get("air", {}),
         "lateness": _lateness(outcome, emulator),
         "bound": against_bounds(outcome),
@@ -149,38 +149,6 @@ def _delay(delays_ns: Sequence[int]) -> dict[str, float | None]:
     p50, p95, p99 = np.percentile(values, (50, 95, 99))
     named = {"mean": values.mean(), "p50": p50, "p95": p95, "p99": p99, "max": values.max()}
     return {name: round(float(value), 3) for name, value in named.items()}
-
-
-def _ledger(outcome: Outcome, emulator: Mapping[str, Any]) -> dict[str, Any]:
-    """What the nodes sent against what the medium accounted for; the two are counted apart.
-
-    A process that died took its last count with it: then the medium's own count of requests stands for `sent`.
-    """
-    counted = emulator.get("frames", {"sent": 0, "delivered": 0, "in_flight": 0, "dropped": {}})
-    agents = [report for report in outcome.reports.values() if report.get("kind") == "agent"]
-    sent = sum(report["frames_sent"] for report in agents)
-    whole = not outcome.ended and outcome.aborted is None and len(agents) == outcome.scenario.nodes.count
-    if not whole:
-        sent = max(sent, counted["sent"])
-    on_bus = max(0, sent - counted["sent"])
-    in_flight = counted["in_flight"] + on_bus
-    dropped = counted["dropped"]
-    return {
-        "sent": sent,
-        "delivered": counted["delivered"],
-        "in_flight": in_flight,
-        "dropped": dropped,
-        "closes": sent == counted["delivered"] + in_flight + sum(dropped.values()),
-    }
-
-
-def _copies(outcome: Outcome, emulator: Mapping[str, Any]) -> dict[str, Any]:
-    """The ledger at receivers, and how many of the copies handed to the bus the nodes have heard."""
-    if not emulator:
-        return {}
-    agents = [report for report in outcome.reports.values() if report.get("kind") == "agent"]
-    heard = sum(report["receptions"] for report in agents)
-    return {**emulator["copies"], "handed": sum(emulator["handed"].values()), "heard": heard}
 
 
 def _lateness(outcome: Outcome, emulator: Mapping[str, Any]) -> dict[str, Any]:

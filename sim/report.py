@@ -51,7 +51,11 @@ def _network_rows(summary: Mapping[str, Any]) -> Iterator[tuple[str, str]]:
         yield "air", f"{pdr} of copies received, busy {air['busy']:.1%}, {air['throughput_mbps']:.3f} Mb/s"
     frames = summary["frames"]
     drops = ", ".join(f"{reason} {count}" for reason, count in frames["dropped"].items()) or "none"
-    balance = "closes" if frames["closes"] else "DOES NOT CLOSE"
+    balance = (
+        "closes"
+        if frames["closes"]
+        else f"DOES NOT CLOSE: {frames['unaccounted']} unaccounted for, {frames['unasked']} that nobody asked for"
+    )
     yield (
         "frames",
         f"{frames['sent']} sent = {frames['delivered']} delivered + {sum(frames['dropped'].values())} dropped "

@@ -83,7 +83,8 @@ def test_a_swarm_of_processes_delivers_and_accounts_for_every_frame(tmp_path: Pa
     assert summary["frames"]["closes"]
     assert summary["frames"]["sent"] > 100
     assert summary["pdr"] > 0.5
-    assert summary["lateness"]["frames"] >= summary["frames"]["sent"] - summary["frames"]["in_flight"]
+    frames = summary["frames"]
+    assert summary["lateness"]["frames"] >= frames["sent"] - frames["dropped"].get("bus", 0)
     assert {report["host"]["malformed"] for report in outcome.reports.values()} == {0}
     assert json.loads((tmp_path / "out/summary.json").read_text())["trace_sha256"] == summary["trace_sha256"]
     frames = list(tlog.read(tmp_path / "out/mavlink.tlog"))
@@ -129,7 +130,9 @@ def test_the_emulator_is_started_again_with_respawn_and_frames_flow_again() -> N
     outcome, _ = run(scenario("duration_s=10"), at_s=3.2, act=kill("emulator"), respawn=True)
     assert outcome.aborted is None
     assert outcome.reports["emulator"]["frames"]["delivered"] > 50
-    assert finish(outcome, out=None)["frames"]["closes"]
+    frames = finish(outcome, out=None)["frames"]
+    assert frames["unaccounted"] > 50, "what the first emulator had"
+    assert not frames["closes"]
 
 
 def command(*arguments: str) -> list[str]:

@@ -176,5 +176,16 @@ def test_a_gap_in_a_nodes_sequence_is_frames_that_the_bus_lost(make_scenario: Ma
     air._seq[1] += 3
     air.send(1, 3 * MS)
     air.run()
-    frames = air.medium.report()["frames"]
-    assert frames == {"sent": 5, "delivered": 2, "in_flight": 0, "dropped": {"bus": 3}}
+    report = air.medium.report()
+    assert report["frames"] == {"sent": 5, "delivered": 2, "in_flight": 0, "dropped": {"bus": 3}}
+    assert report["requests"] == {"1": {"all": 5, "before_restart": 0}, "2": {"all": 0, "before_restart": 0}}
+
+
+def test_a_node_that_starts_again_is_counted_in_both_its_lives(make_scenario: MakeScenario) -> None:
+    air = Air(make_scenario(**{"nodes.count": 2}), [0, 100])
+    for t_ns in (1 * MS, 3 * MS, 5 * MS):
+        air.send(1, t_ns)
+    air._seq[1] = 0
+    air.send(1, 7 * MS)
+    air.run()
+    assert air.medium.report()["requests"]["1"] == {"all": 4, "before_restart": 3}

@@ -7,7 +7,7 @@ from typing import Final, NamedTuple
 
 from agents.clocked import make_uav
 from fanet_mw.errors import ConfigError
-from fanet_mw.hosts import loop, service
+from fanet_mw.hosts import interrupts, loop, service
 from fanet_mw.hosts.realtime import RealtimeHost, run_actor
 from fanet_mw.radios.field_bus import FieldBus, joined
 from fanet_mw.radios.udp import PORT, UdpRadio
@@ -98,4 +98,4 @@ def main() -> int:
 
 
 if __name__ == "__main__":
-    sys.exit(main())
+    interrupts.leave(main())

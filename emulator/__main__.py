@@ -1,13 +1,12 @@
 """The link emulator as a process: `python -m emulator SCENARIO.toml`, or `fanet emulator`."""
 
-import sys
 from collections.abc import Callable
 from pathlib import Path
 
 from emulator.capture_file import CaptureFile, unused
 from emulator.compile import warm_up
 from emulator.medium import Medium
-from fanet_mw.hosts import loop, service
+from fanet_mw.hosts import interrupts, loop, service
 from fanet_mw.hosts.realtime import run_actor
 from fanet_mw.scenario import Scenario
 
@@ -56,4 +55,4 @@ def main() -> int:
 
 
 if __name__ == "__main__":
-    sys.exit(main())
+    interrupts.leave(main())

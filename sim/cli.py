@@ -18,6 +18,7 @@ from rich.table import Table
 from emulator.capture_file import CaptureFile
 from fanet_mw import __version__
 from fanet_mw.errors import ConfigError, FanetError
+from fanet_mw.hosts import interrupts, loop
 from fanet_mw.scenario import Scenario
 from fanet_mw.units import NodeId
 from sim import catalog, report
@@ -32,6 +33,7 @@ app = App(
     help="Middleware for swarms of UAVs, and the network emulator it is developed and proven on.",
     version=__version__,
     console=Console(),
+    suppress_keyboard_interrupt=False,
 )
 app.command(air_app)
 _err = Console(stderr=True)
@@ -173,10 +175,10 @@ def router(
         Name of the swarm on the bus; by default the scenario's name.
 
     """
-    from sim.swarm import serve
+    from sim.router import serve
 
     chosen = choice.realtime_scenario(scenario)
-    asyncio.run(serve(chosen, swarm=swarm or chosen.name, listen=listen, on_event=lambda text: _err.print(text)))
+    loop.run(serve(chosen, swarm=swarm or chosen.name, listen=listen, on_event=lambda text: _err.print(text)))
     return 0
 
 
@@ -326,6 +328,7 @@ def _finish(outcome: Outcome, output: Output) -> int:
 
 def main() -> None:
     """The console script."""
+    interrupts.heed()
     try:
         code = app(result_action="return_value")
         sys.stdout.flush()
@@ -333,10 +336,10 @@ def main() -> None:
         nobody_reads()
     except FanetError as error:
         _err.print(f"[bold red]fanet:[/] {error}", highlight=False, soft_wrap=True)
-        sys.exit(2)
-    except KeyboardInterrupt:
-        sys.exit(130)
-    sys.exit(code if isinstance(code, int) else 0)
+        code = 2
+    except KeyboardInterrupt as interrupt:
+        code = interrupts.exit_code(interrupt)
+    interrupts.leave(code if isinstance(code, int) else 0)
 
 
 if __name__ == "__main__":

@@ -45,6 +45,20 @@ def _child(recipe: Recipe) -> None:
     sys.exit(code)
 
 
+def _start_server() -> None:
+    """Start the server that children are forked from, unless it runs, with SIGINT blocked in it and so in its children.
+
+    Ctrl-C reaches all of them. A child ignores it only once it runs `_child`, and the server only after its imports:
+    until then each would end with a traceback of its own.
+    """
+    resource_tracker.ensure_running()  # the server would start it, and it unblocks SIGINT when it has been started
+    before = signal.pthread_sigmask(signal.SIG_BLOCK, {signal.SIGINT})
+    try:
+        forkserver.ensure_running()
+    finally:
+        signal.pthread_sigmask(signal.SIG_SETMASK, before)
+
+
 def describe(exit_code: int) -> str:
     """An exit code in words: a signal by its name."""
     return f"signal {signal.Signals(-exit_code).name}" if exit_code < 0 else f"exit code {exit_code}"
@@ -65,6 +79,7 @@ class Processes:
     def start(self, name: str, entry: Entry, arguments: Mapping[str, Any], *, nice: int = 0) -> None:
         """Start a child; `entry(**arguments)` must be importable and picklable. A `nice` one lets others go first."""
         recipe = self._recipes[name] = Recipe(entry, arguments, nice)
+        _start_server()
         process = self._context.Process(target=_child, args=(recipe,), name=name)
         process.start()
         self._running[name] = process

@@ -31,6 +31,7 @@ from sim.layout import positions
 from sim.links import LinkTotals
 from sim.outcome import Outcome
 from sim.processes import Processes, describe
+from sim.router import expected_names
 from sim.world_main import run as run_world
 
 _AGENT_NICE: Final = 10
@@ -38,8 +39,6 @@ _AGENT_NICE: Final = 10
 READY_TIMEOUT_S: Final = 60.0
 _GRACE_S: Final = 5.0
 """After the end of the swarm's time, for last reports."""
-_STOP_HEARD_S: Final = 0.3
-"""Between telling services to stop and closing the bus they hear it on."""
 _MAX_RESPAWNS: Final = 5
 """Of one name: a process that cannot live is not started for ever."""
 _PROGRESS_S: Final = 0.25
@@ -51,11 +50,6 @@ def free_endpoint() -> str:
     with socket.socket() as probe:
         probe.bind(("127.0.0.1", 0))
         return f"tcp/127.0.0.1:{probe.getsockname()[1]}"
-
-
-def expected_names(scenario: Scenario) -> list[str]:
-    """Names of all actors of a swarm."""
-    return ["emulator", "world", *(f"agent-{node}" for node in scenario.node_ids)]
 
 
 class Collector:
@@ -282,17 +276,3 @@ async def launch(
         finally:
             for number in (signal.SIGINT, signal.SIGTERM):
                 loop.remove_signal_handler(number)
-
-
-async def serve(scenario: Scenario, *, swarm: str, listen: str, on_event: Tell) -> None:
-    """Be the router and keep the clock for services started one by one, until the scenario is over."""
-    with Bus.serve(listen) as bus:
-        keeper = ClockKeeper(bus, Topics(swarm), time_scale=scenario.time_scale, expected=expected_names(scenario))
-        on_event(f"serving {listen}, waiting for {len(keeper.missing())} services of swarm {swarm}")
-        clock = SwarmClock(await keeper.start(timeout_s=3600))
-        on_event("all are there: the clock runs")
-        try:
-            await asyncio.sleep(clock.wait_s(scenario.duration_ns) + 1)
-        finally:  # interrupted or not: nobody keeps running on a bus that ends
-            keeper.stop()
-            time.sleep(_STOP_HEARD_S)  # noqa: ASYNC251  (nothing else runs here, and a cancelled task cannot await)

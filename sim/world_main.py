@@ -1,8 +1,6 @@
 """The world as a process: `python -m sim.world_main SCENARIO.toml`, or `fanet world`."""
 
-import sys
-
-from fanet_mw.hosts import loop, service
+from fanet_mw.hosts import interrupts, loop, service
 from fanet_mw.hosts.realtime import run_actor
 from fanet_mw.scenario import Scenario
 from sim.world import World
@@ -22,4 +20,4 @@ def main() -> int:
 
 
 if __name__ == "__main__":
-    sys.exit(main())
+    interrupts.leave(main())

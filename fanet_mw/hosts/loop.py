@@ -1,4 +1,4 @@
-"""An event loop whose timers are good to some tens of microseconds.
+"""An event loop whose timers are good to some tens of microseconds, and which signals end in order.
 
 asyncio's usual loop sleeps in epoll, which counts whole milliseconds and rounds up: every wake-up is half a millisecond
 late on average. select() counts microseconds; that it looks at every descriptor costs nothing with the few we have.
@@ -9,13 +9,37 @@ import selectors
 from collections.abc import Coroutine
 from typing import Any, TypeVar
 
+from fanet_mw.hosts import interrupts
+
 T = TypeVar("T")
 
 
 def run(main: Coroutine[Any, Any, T]) -> T:
-    """As `asyncio.run`."""
+    """As `asyncio.run`; a signal that this process heeds cancels `main`, and KeyboardInterrupt carries its number."""
     with asyncio.Runner(loop_factory=_loop) as runner:
-        return runner.run(main)
+        return runner.run(_cancelled_by_signals(main) if interrupts.heeded() else main)
+
+
+async def _cancelled_by_signals(main: Coroutine[Any, Any, T]) -> T:
+    loop, task = asyncio.get_running_loop(), asyncio.ensure_future(main)
+    heard: list[int] = []
+
+    def on_signal(number: int) -> None:
+        heard.append(number)
+        task.cancel()
+
+    for number in interrupts.SIGNALS:
+        loop.add_signal_handler(number, on_signal, number)
+    try:
+        return await task
+    except asyncio.CancelledError:
+        if not heard:
+            raise
+        raise KeyboardInterrupt(heard[0]) from None
+    finally:
+        for number in interrupts.SIGNALS:
+            loop.remove_signal_handler(number)
+        interrupts.heed()
 
 
 def _loop() -> asyncio.AbstractEventLoop:

@@ -1,7 +1,7 @@
 """The command line of a service that is started by itself: `python -m agents rescue.toml --id 3 --connect ENDPOINT`.
 
 Standard library only, for machines that carry one UAV and not the whole of `fanet`. Exit codes: 0 the swarm's time is
-over or its clock was stopped, 2 the request was wrong, 3 the bus could not be had or was lost.
+over or its clock was stopped, 2 the request was wrong, 3 the bus could not be had or was lost, 130 SIGINT, 143 SIGTERM.
 """
 
 import argparse
@@ -12,6 +12,7 @@ from typing import Final
 
 from fanet_mw import config
 from fanet_mw.errors import ConfigError, FanetError
+from fanet_mw.hosts import interrupts
 from fanet_mw.scenario import Scenario
 
 BUS_EXIT_CODE: Final = 3
@@ -30,11 +31,12 @@ def parser(program: str, description: str) -> argparse.ArgumentParser:
 
 def serve(given: argparse.Namespace, run: Callable[[Scenario, str, str], int]) -> int:
     """Load the scenario and `run(scenario, swarm, endpoint)`; a foreseen error is one message and an exit code."""
+    interrupts.heed()
     try:
         scenario = config.load(given.scenario, given.set)
         return run(scenario, given.swarm or scenario.name, given.connect)
     except FanetError as error:
         sys.stderr.write(f"{error}\n")
         return 2 if isinstance(error, ConfigError) else BUS_EXIT_CODE
-    except KeyboardInterrupt:
-        return 130
+    except KeyboardInterrupt as interrupt:
+        return interrupts.exit_code(interrupt)

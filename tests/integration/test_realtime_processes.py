@@ -2,9 +2,11 @@
 
 import asyncio
 import os
+import re
 import signal
 import subprocess
 import sys
+import threading
 import time
 import uuid
 from collections.abc import Callable, Iterator
@@ -13,6 +15,8 @@ from pathlib import Path
 import pytest
 
 from fanet_mw.errors import BusError
+from fanet_mw.hosts.bus import Bus
+from fanet_mw.topics import Topics
 from sim.processes import Processes
 from sim.swarm import free_endpoint
 
@@ -32,6 +36,11 @@ def marked(mark: str) -> list[int]:
         except OSError:
             continue  # ended meanwhile
     return sorted(found)
+
+
+def ignores(pid: int, number: int) -> bool:
+    (mask,) = re.findall(r"^SigIgn:\s*(\w+)$", Path(f"/proc/{pid}/status").read_text(), re.MULTILINE)
+    return bool(int(mask, 16) >> (number - 1) & 1)
 
 
 def exists(pid: int) -> bool:
@@ -58,11 +67,13 @@ def mark() -> Iterator[str]:
     assert left == []
 
 
-def start(mark: str, *arguments: str, stderr: int = subprocess.PIPE) -> subprocess.Popen[str]:
-    return subprocess.Popen(
-        [sys.executable, "-m", *arguments], text=True, stderr=stderr, stdout=subprocess.DEVNULL,
-        env={**os.environ, MARK: mark},
-    )  # fmt: skip
+def start(mark: str, *arguments: str, deaf: bool = False) -> subprocess.Popen[str]:
+    """Start a command; a `deaf` one inherits an ignored SIGINT, as the line `command &` of a script does."""
+    command = [sys.executable, "-m", *arguments]
+    if deaf:
+        command = ["sh", "-c", 'trap "" INT; exec "$@"', "sh", *command]
+    environment = {**os.environ, MARK: mark}
+    return subprocess.Popen(command, text=True, stderr=subprocess.PIPE, stdout=subprocess.DEVNULL, env=environment)
 
 
 def said(process: subprocess.Popen[str], words: str) -> None:
@@ -118,7 +129,9 @@ async def test_a_child_that_ignores_ctrl_c_and_terminate_is_killed_in_the_end() 
     processes.start("deaf", deaf, {})
     processes.start("sleeper", sleeper, {"seconds": 60})
     pids = [processes.pid("deaf"), processes.pid("sleeper")]
-    await asyncio.sleep(0.5)
+    for pid in pids:  # before a child has said that it ignores Ctrl-C, and after
+        os.kill(pid, signal.SIGINT)
+    assert eventually(lambda: ignores(pids[0], signal.SIGTERM), within_s=20)
     for pid in pids:
         os.kill(pid, signal.SIGINT)
     await asyncio.sleep(0.2)
@@ -157,26 +170,76 @@ def test_a_launcher_that_is_killed_takes_all_its_processes_with_it(mark: str, tm
     assert eventually(lambda: marked(mark) == [], within_s=4), "children notice that their parent is gone"
 
 
-def test_a_router_that_is_interrupted_stops_the_services_it_kept_time_for(mark: str, tmp_path: Path) -> None:
+def ended(process: subprocess.Popen[str], *, within_s: float = 8) -> tuple[int, str]:
+    """The exit code and the last words of a command that must end."""
+    _, err = process.communicate(timeout=within_s)
+    return process.returncode, err
+
+
+@pytest.mark.parametrize(
+    ("number", "deaf"), [(signal.SIGINT, True), (signal.SIGTERM, False)], ids=["SIGINT, ignored before", "SIGTERM"]
+)
+def test_a_router_that_is_interrupted_stops_the_services_it_kept_time_for(
+    mark: str, tmp_path: Path, number: int, deaf: bool
+) -> None:
     path, endpoint = tmp_path / "small.toml", free_endpoint()
     path.write_text(SMALL % 60)
-    router = start(mark, "sim.cli", "router", str(path), "--listen", endpoint)
+    router = start(mark, "sim.cli", "router", str(path), "--listen", endpoint, deaf=deaf)
     said(router, "serving")
     common = (str(path), "--connect", endpoint)
     services = [
-        start(mark, "emulator", *common),
-        start(mark, "sim.world_main", *common),
-        *(start(mark, "agents", *common, "--id", str(node)) for node in (1, 2)),
+        start(mark, "emulator", *common, deaf=deaf),
+        start(mark, "sim.world_main", *common, deaf=deaf),
+        *(start(mark, "agents", *common, "--id", str(node), deaf=deaf) for node in (1, 2)),
     ]
     said(router, "the clock runs")
     time.sleep(1)
     assert [service.poll() for service in services] == [None] * 4
-    router.send_signal(signal.SIGINT)
+    interrupted = services.pop()
+    interrupted.send_signal(number)
+    assert ended(interrupted) == (128 + number, ""), "a service hears the same signals, and leaves without a traceback"
+    assert router.poll() is None
+    used_s = cpu_s(router.pid)
+    router.send_signal(number)
     for service in services:
-        _, err = service.communicate(timeout=8)
-        assert service.returncode == 0, err
-    router.communicate(timeout=8)
-    assert router.returncode == 130
+        assert ended(service) == (0, "")
+    assert router.stderr is not None
+    assert router.stderr.read() == ""
+    _, status, usage = os.wait4(router.pid, 0)
+    router.returncode = os.waitstatus_to_exitcode(status)
+    router.stderr.close()
+    assert router.returncode == 128 + number
+    assert usage.ru_utime + usage.ru_stime - used_s < 0.15, "a last garbage collection takes seconds on a busy machine"
+
+
+def wait_for(name: str, *, endpoint: str) -> None:
+    """Until this service has announced itself to the router, within a minute."""
+    there = threading.Event()
+    with Bus.join(endpoint) as bus:
+        bus.watch(Topics("small").alive(name), lambda _, alive: there.set() if alive else None)
+        assert there.wait(60)
+
+
+def cpu_s(pid: int) -> float:
+    """Processor time that a process has used."""
+    fields = Path(f"/proc/{pid}/stat").read_text().rpartition(")")[2].split()
+    return (int(fields[11]) + int(fields[12])) / os.sysconf("SC_CLK_TCK")
+
+
+@pytest.mark.parametrize("number", [signal.SIGINT, signal.SIGTERM])
+def test_a_router_or_service_that_still_waits_for_the_others_ends_when_interrupted(
+    mark: str, tmp_path: Path, number: int
+) -> None:
+    path, endpoint = tmp_path / "small.toml", free_endpoint()
+    path.write_text(SMALL % 60)
+    router = start(mark, "sim.cli", "router", str(path), "--listen", endpoint, deaf=True)
+    said(router, "serving")
+    agent = start(mark, "sim.cli", "agent", str(path), "--connect", endpoint, "--id", "1", deaf=True)
+    wait_for("agent-1", endpoint=endpoint)
+    agent.send_signal(number)
+    assert ended(agent) == (128 + number, "")
+    router.send_signal(number)
+    assert ended(router) == (128 + number, "")
 
 
 def test_services_of_a_router_that_is_killed_end_with_a_message_and_exit_code_3(mark: str, tmp_path: Path) -> None:
@@ -185,7 +248,7 @@ def test_services_of_a_router_that_is_killed_end_with_a_message_and_exit_code_3(
     router = start(mark, "sim.cli", "router", str(path), "--listen", endpoint)
     said(router, "serving")
     agent = start(mark, "agents", str(path), "--connect", endpoint, "--id", "2")
-    time.sleep(1)
+    wait_for("agent-2", endpoint=endpoint)
     assert agent.poll() is None
     router.kill()
     router.communicate()

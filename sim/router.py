@@ -1,0 +1,35 @@
+"""`fanet router`: the bus and the swarm clock for services that are started one by one."""
+
+import asyncio
+import time
+from collections.abc import Callable
+from typing import Final
+
+from fanet_mw.hosts.bus import Bus
+from fanet_mw.hosts.clock import ClockKeeper, SwarmClock
+from fanet_mw.scenario import Scenario
+from fanet_mw.topics import Topics
+
+_STOP_HEARD_S: Final = 0.3
+"""Between telling services to stop and closing the bus they hear it on."""
+_PATIENCE_S: Final = 3600.0
+"""For services that are started by hand."""
+
+
+def expected_names(scenario: Scenario) -> list[str]:
+    """Names of all actors of a swarm."""
+    return ["emulator", "world", *(f"agent-{node}" for node in scenario.node_ids)]
+
+
+async def serve(scenario: Scenario, *, swarm: str, listen: str, on_event: Callable[[str], None]) -> None:
+    """Be the router and keep the clock until the scenario is over; raises BusError when the endpoint cannot be had."""
+    with Bus.serve(listen) as bus:
+        keeper = ClockKeeper(bus, Topics(swarm), time_scale=scenario.time_scale, expected=expected_names(scenario))
+        on_event(f"serving {listen}, waiting for {len(keeper.missing())} services of swarm {swarm}")
+        clock = SwarmClock(await keeper.start(timeout_s=_PATIENCE_S))
+        on_event("all are there: the clock runs")
+        try:
+            await asyncio.sleep(clock.wait_s(scenario.duration_ns) + 1)
+        finally:  # interrupted or not: nobody keeps running on a bus that ends
+            keeper.stop()
+            time.sleep(_STOP_HEARD_S)  # noqa: ASYNC251  (nothing else runs here, and a cancelled task cannot await)

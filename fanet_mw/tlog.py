@@ -10,6 +10,7 @@ from typing import BinaryIO, Final
 
 from fanet_mw.errors import MalformedFrameError
 from fanet_mw.units import US
+from fanet_mw.whole_file import write_items
 from fanet_mw.wire import frames
 
 _STAMP: Final = struct.Struct(">Q")
@@ -26,10 +27,18 @@ def append(file: BinaryIO, data: bytes, *, t_us: int) -> int:
 
 
 def write(path: Path, taps: Iterable[tuple[int, bytes]], *, epoch_us: int = 0) -> None:
-    """Write (instant ns, frames) pairs; `epoch_us` is the unix time of swarm instant 0."""
-    with path.open("wb") as file:
-        for t_ns, data in taps:
-            append(file, data, t_us=epoch_us + t_ns // US)
+    """Write (instant ns, frames) pairs; `epoch_us` is the unix time of swarm instant 0.
+
+    Raises OSError when the disk is full; the file then ends with the last frame that fits.
+    """
+    write_items(path, _stamped(taps, epoch_us))
+
+
+def _stamped(taps: Iterable[tuple[int, bytes]], epoch_us: int) -> Iterator[bytes]:
+    for t_ns, data in taps:
+        stamp = _STAMP.pack(epoch_us + t_ns // US)
+        for frame in frames(data):
+            yield stamp + frame
 
 
 def read(path: Path) -> Iterator[tuple[int, bytes]]:

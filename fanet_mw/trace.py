@@ -1,11 +1,15 @@
 """The closed registry of trace records: what happened, for metrics, figures and views. Logs for people are elsewhere.
 
 A record is a NamedTuple whose first two fields are the instant and the node (0: no node). One record is one line of
-JSON in the trace file; `line` and `parse` are inverse. A new kind of record is a new class in `Record` below.
+JSON in the trace file; `line` and `parse` are inverse. A new kind of record is a new class in `Record` below. `parse`
+takes nothing that a record of ours could not hold: each field has its type, integers have 64 bits, numbers are finite.
 """
 
+import itertools
 import json
-from typing import Any, Final, NamedTuple
+import math
+import types
+from typing import Any, Final, NamedTuple, get_args, get_type_hints
 
 from fanet_mw.errors import DropReason, MalformedFrameError
 
@@ -211,6 +215,38 @@ _KINDS: Final[dict[str, type[Any]]] = {
     "deadline_lost": DeadlineLost,
 }
 _NAMES: Final[dict[type[Any], str]] = {kind: name for name, kind in _KINDS.items()}
+_JSON_TYPES: Final[dict[object, tuple[type, ...]]] = {
+    int: (int,),
+    float: (float, int),
+    str: (str,),
+    bool: (bool,),
+    types.NoneType: (types.NoneType,),
+}
+_LONGEST_TEXT: Final = 256
+_LEAST_INT: Final = -(2**63)
+_GREATEST_INT: Final = 2**63 - 1
+
+
+def _rows_of(kind: type[Any]) -> frozenset[tuple[type, ...]]:
+    """Every row of JSON types that the fields of a record may have."""
+    hints = get_type_hints(kind)
+    choices = [
+        tuple(found for part in get_args(hints[name]) or (hints[name],) for found in _JSON_TYPES[part])
+        for name in kind._fields
+    ]
+    return frozenset(itertools.product(*choices))
+
+
+_ROWS: Final = {name: _rows_of(kind) for name, kind in _KINDS.items()}
+
+
+def _in_bounds(value: object) -> bool:
+    """True for a field's value that a record of ours could hold."""
+    if isinstance(value, int):
+        return _LEAST_INT <= value <= _GREATEST_INT
+    if isinstance(value, float):
+        return math.isfinite(value)
+    return not isinstance(value, str) or len(value) <= _LONGEST_TEXT
 
 
 def kind_of(record: Record) -> str:
@@ -229,6 +265,8 @@ def parse(text: str) -> Record:
     """The record of one line; raises MalformedFrameError when the line is no record."""
     try:
         name, *fields = json.loads(text)
+        if tuple(map(type, fields)) not in _ROWS[name] or not all(map(_in_bounds, fields)):
+            raise ValueError("fields")
         record: Record = _KINDS[name](*fields)
     except (ValueError, KeyError, TypeError) as error:
         raise MalformedFrameError(f"trace line {text[:80]!r} is no record") from error

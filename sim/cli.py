@@ -131,6 +131,7 @@ def launch(
                 connect=connect,
                 respawn=respawn,
                 emulator_options={"pcap": output.capture_path(), "receptions": output.pcap_receptions},
+                spool_folder=output.out if output.out is not None and output.out.is_dir() else None,
                 on_progress=tell,
                 on_event=lambda text: _err.print(text, highlight=False),
             )
@@ -323,6 +324,10 @@ def _finish(outcome: Outcome, output: Output) -> int:
         report.show(summary, console)
         if output.out is not None:
             console.print(f"written to {output.out}")
+    for name, why in summary["unwritten"].items():
+        _err.print(f"{name} in --out {output.out} ends early: {why}", highlight=False, soft_wrap=True)
+    if summary["unwritten"]:
+        return 1
     return 0 if summary["lateness"]["valid"] and summary["frames"]["closes"] and not summary["aborted"] else 1
 
 

@@ -1,38 +1,50 @@
 """What links carried over a whole run: sums of the medium's reports, as rows for a file."""
 
 from collections.abc import Iterable
-from typing import Any
+from typing import Any, Final
 
 import numpy as np
 
 from fanet_mw.link_stats import COUNTS, LOSSES, LinkRow, LinkStats
 from fanet_mw.units import NodeId
 
+_PENDING: Final = 64
+"""Reports that wait until their sums are taken together: what is kept does not grow with the length of a run."""
+
 
 class LinkTotals:
-    """Sums per directed link; reports are kept as they come and summed when asked for."""
+    """Sums per directed link. Memory is that of the links, whatever the number of reports."""
 
     def __init__(self) -> None:
-        self._reports: list[LinkStats] = []
+        self._pending: list[LinkStats] = []
+        self._links = np.zeros((0, 2), np.uint16)
+        self._sums = np.zeros((0, 1 + COUNTS), np.int64)
 
     def add(self, stats: LinkStats) -> None:
         """Take in one report."""
-        self._reports.append(stats)
+        self._pending.append(stats)
+        if len(self._pending) >= _PENDING:
+            self._merge()
 
     def rows(self) -> list[LinkRow]:
         """All links, by source and destination."""
-        if not self._reports:
-            return []
-        ends = np.concatenate([np.frombuffer(report.ends, np.uint16) for report in self._reports])
-        counts = np.concatenate([np.frombuffer(report.counts, np.uint32) for report in self._reports])
-        rssi = np.concatenate([np.frombuffer(report.rssi_sums_mdbm, np.int64) for report in self._reports])
-        links, place = np.unique(ends.reshape(-1, 2), axis=0, return_inverse=True)
-        sums = np.zeros((len(links), 1 + COUNTS), np.int64)
-        np.add.at(sums, place.reshape(-1), np.column_stack([rssi, counts.reshape(-1, COUNTS).astype(np.int64)]))
+        self._merge()
         return [
             LinkRow(NodeId(src), NodeId(dst), received, tuple(lost), rssi_sum)
-            for (src, dst), (rssi_sum, received, *lost) in zip(links.tolist(), sums.tolist(), strict=True)
+            for (src, dst), (rssi_sum, received, *lost) in zip(self._links.tolist(), self._sums.tolist(), strict=True)
         ]
+
+    def _merge(self) -> None:
+        """Add the reports that wait to the sums."""
+        ends, sums = [self._links], [self._sums]
+        for report in self._pending:
+            ends.append(np.frombuffer(report.ends, np.uint16).reshape(-1, 2))
+            counts = np.frombuffer(report.counts, np.uint32).reshape(-1, COUNTS).astype(np.int64)
+            sums.append(np.column_stack([np.frombuffer(report.rssi_sums_mdbm, np.int64), counts]))
+        self._pending.clear()
+        self._links, place = np.unique(np.concatenate(ends), axis=0, return_inverse=True)
+        self._sums = np.zeros((len(self._links), 1 + COUNTS), np.int64)
+        np.add.at(self._sums, place.reshape(-1), np.concatenate(sums))
 
 
 def described(rows: Iterable[LinkRow]) -> list[dict[str, Any]]:

@@ -65,6 +65,8 @@ def summarize(outcome: Outcome, *, trace_sha256: str) -> dict[str, Any]:
             "ready_s": round(outcome.ready_s, 3),
             "ended": [{"name": name, "exit_code": code} for name, code in outcome.ended],
         },
+        "heard": dict(outcome.heard),
+        "absent": dict(outcome.absent),
         "aborted": outcome.aborted,
         "trace_sha256": trace_sha256,
     }

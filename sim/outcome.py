@@ -32,3 +32,7 @@ class Outcome:
     """Real time: unix time of swarm instant 0."""
     ready_s: float = 0.0
     """Real time: until all processes were up."""
+    heard: Mapping[str, Any] = field(default_factory=dict)
+    """Real time: puts that the launcher heard, and what of them was refused, by what was wrong."""
+    absent: Mapping[str, str] = field(default_factory=dict)
+    """Real time: why there is no report of an actor, by its name."""

@@ -134,6 +134,12 @@ def _separation_rows(separation: Mapping[str, Any]) -> Iterator[tuple[str, str]]
 
 
 def _warnings(summary: Mapping[str, Any]) -> Iterator[str]:
+    heard = summary["heard"]
+    if heard and heard["malformed"]:
+        what = ", ".join(f"{why} {count}" for why, count in heard["why"].items())
+        yield f"Heard on the bus and refused: {what}"
+    for name, why in summary["absent"].items():
+        yield f"Counted without {name}: {why}"
     if summary["aborted"]:
         yield f"Partial result: {summary['aborted']}"
     for item in summary["processes"]["ended"]:

@@ -7,28 +7,26 @@ ends it (or, with `respawn`, any of them is started again and finds its place by
 """
 
 import asyncio
-import json
+import contextlib
 import signal
 import socket
 import time
 from collections.abc import Callable, Mapping
+from pathlib import Path
 from typing import Any, Final
 
 from agents.__main__ import run as run_agent
 from emulator.__main__ import run as run_emulator
-from fanet_mw import topics
-from fanet_mw.errors import BusError, MalformedFrameError
+from fanet_mw.errors import BusError
 from fanet_mw.hosts.bus import Bus
 from fanet_mw.hosts.clock import ClockKeeper, SwarmClock
-from fanet_mw.link_stats import LinkStats
-from fanet_mw.messages import MavlinkTap, Message, Report, TraceBatch
 from fanet_mw.scenario import Scenario
 from fanet_mw.topics import Topics
 from fanet_mw.trace import ProcessEnded, Record, kind_of
 from fanet_mw.units import NodeId, S
 from sim.clocks import true_delays
+from sim.collector import Collector
 from sim.layout import positions
-from sim.links import LinkTotals
 from sim.outcome import Outcome
 from sim.processes import Processes, describe
 from sim.router import expected_names
@@ -52,67 +50,20 @@ def free_endpoint() -> str:
         return f"tcp/127.0.0.1:{probe.getsockname()[1]}"
 
 
-class Collector:
-    """Takes what the swarm publishes about itself. Payloads are kept as they come and decoded when the run is over."""
-
-    def __init__(self, bus: Bus, names: Topics) -> None:
-        self._traces: list[bytes] = []
-        self._reports: dict[str, bytes] = {}
-        self._taps: list[bytes] = []
-        bus.subscribe(names.all_traces, lambda _, payload: self._traces.append(payload))
-        bus.subscribe(names.all_reports, self._reports.__setitem__)
-        bus.subscribe(names.mavlink("*"), lambda _, payload: self._taps.append(payload))
-        self._links: list[bytes] = []
-        bus.subscribe(names.radio_links, lambda _, payload: self._links.append(payload))
-
-    def records(self) -> list[Record]:
-        """All trace records, by instant, node and kind."""
-        batches = [message for message in _decoded(self._traces) if isinstance(message, TraceBatch)]
-        records = [record for batch in batches for record in batch.records]
-        return sorted(records, key=lambda record: (record.t_ns, record.node, kind_of(record)))
-
-    def reports(self) -> dict[str, dict[str, Any]]:
-        """The last report of each actor."""
-        reports = [message for message in _decoded(list(self._reports.values())) if isinstance(message, Report)]
-        parsed = {report.name: _json(report.json) for report in sorted(reports, key=lambda report: report.name)}
-        return {name: content for name, content in parsed.items() if isinstance(content, dict)}
-
-    def links(self) -> LinkTotals:
-        """What each link carried."""
-        totals = LinkTotals()
-        for message in _decoded(self._links):
-            if isinstance(message, LinkStats):
-                totals.add(message)
-        return totals
-
-    def taps(self) -> list[tuple[int, bytes]]:
-        """What UAVs told inspectors, by instant."""
-        taps = [(m.t_ns, m.data) for m in _decoded(self._taps) if isinstance(m, MavlinkTap)]
-        return sorted(taps, key=lambda tap: tap[0])
-
-
-def _decoded(payloads: list[bytes]) -> list[Message]:
-    messages: list[Message] = []
-    for payload in payloads:
-        try:
-            messages += topics.decode(payload)
-        except MalformedFrameError:
-            continue  # not from one of ours
-    return messages
-
-
-def _json(text: str) -> object:
-    try:
-        content: object = json.loads(text)
-    except ValueError:
-        return None  # not from one of ours
-    return content
-
-
 class Swarm:
     """One run in real time."""
 
-    def __init__(self, scenario: Scenario, bus: Bus, *, swarm: str, endpoint: str, respawn: bool, tell: Tell) -> None:
+    def __init__(
+        self,
+        scenario: Scenario,
+        bus: Bus,
+        *,
+        swarm: str,
+        endpoint: str,
+        respawn: bool,
+        tell: Tell,
+        spool_folder: Path | None = None,
+    ) -> None:
         names = Topics(swarm)
         self.emulator_options: dict[str, Any] = {}
         """More arguments of the emulator's process."""
@@ -121,7 +72,7 @@ class Swarm:
         self._endpoint = endpoint
         self._respawn = respawn
         self._tell = tell
-        self._collector = Collector(bus, names)
+        self._collector = Collector(scenario, bus.subscribe, names, now_ns=time.monotonic_ns, folder=spool_folder)
         self._keeper = ClockKeeper(bus, names, time_scale=scenario.time_scale, expected=expected_names(scenario))
         self.processes = Processes(self._process_ended)
         self._clock: SwarmClock | None = None
@@ -146,19 +97,24 @@ class Swarm:
             self._over.set()
             self._ending = True
             await self.processes.end_all()
-        return Outcome(
-            scenario=self._scenario,
-            mode="realtime",
-            wall_s=wall_s,
-            records=self._records(),
-            reports=self._collector.reports(),
-            taps=self._collector.taps(),
-            links=self._collector.links(),
-            ended=self._ended,
-            aborted=self._aborted,
-            ready_s=ready_s,
-            epoch_unix_ns=self._keeper.clock.epoch_unix_ns if self._keeper.clock else 0,
-        )
+        with contextlib.closing(self._collector) as collector:
+            if (failure := collector.disk_failure()) is not None:
+                self._tell(f"the trace is incomplete: its temporary file could not be written: {failure}")
+            return Outcome(
+                scenario=self._scenario,
+                mode="realtime",
+                wall_s=wall_s,
+                records=self._records(),
+                reports=collector.reports(),
+                taps=collector.taps(),
+                links=collector.links(),
+                ended=self._ended,
+                aborted=self._aborted,
+                ready_s=ready_s,
+                epoch_unix_ns=self._keeper.clock.epoch_unix_ns if self._keeper.clock else 0,
+                heard=collector.figures(),
+                absent=collector.absent(),
+            )
 
     def _records(self) -> list[Record]:
         records = [*self._collector.records(), *self._obituaries]
@@ -255,17 +211,22 @@ async def launch(
     connect: str | None = None,
     respawn: bool = False,
     emulator_options: Mapping[str, Any] | None = None,
+    spool_folder: Path | None = None,
     on_progress: Callable[[float], None] = lambda _: None,
     on_event: Tell = lambda _: None,
     on_started: Callable[[Swarm], None] = lambda _: None,
 ) -> Outcome:
     """Run a scenario as real processes. `on_started` is handed the swarm while it runs, for tests and tools.
 
+    What is collected waits in temporary files in `spool_folder`; by default where the system keeps such files.
+
     Raises BusError when the bus cannot be had or the swarm does not come up.
     """
     bus, endpoint = _bus(listen, connect)
     with bus:
-        run = Swarm(scenario, bus, swarm=swarm, endpoint=endpoint, respawn=respawn, tell=on_event)
+        run = Swarm(
+            scenario, bus, swarm=swarm, endpoint=endpoint, respawn=respawn, tell=on_event, spool_folder=spool_folder
+        )
         run.emulator_options.update(emulator_options or {})
         loop = asyncio.get_running_loop()
         for number in (signal.SIGINT, signal.SIGTERM):

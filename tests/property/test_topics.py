@@ -51,10 +51,11 @@ def numbers(code: str, values: st.SearchStrategy[int], count: int) -> "st.Search
     return st.lists(values, min_size=count, max_size=count).map(lambda found: array(code, found))
 
 
+finite = st.floats(allow_nan=False, allow_infinity=False)
 records = st.one_of(
     st.builds(Delivered, *[instants] * 6),
     st.builds(Generated, instants, nodes, u32, words, u32),
-    st.builds(Detected, instants, nodes, u32, doubles),
+    st.builds(Detected, instants, nodes, u32, finite),
 )
 messages: st.SearchStrategy[Message] = st.one_of(
     st.builds(TxRequest, u32, instants, st.binary(max_size=50), nodes, st.booleans()),

@@ -1,0 +1,44 @@
+"""A file of items that is written as far as it goes: when the disk is full it ends with the last item that fits."""
+
+import os
+from collections.abc import Iterable, Iterator
+from itertools import accumulate
+from pathlib import Path
+from typing import Final
+
+_BATCH_BYTES: Final = 1 << 18
+
+
+def write_items(path: Path, items: Iterable[bytes]) -> int:
+    """Write items one after another; returns the bytes written.
+
+    Raises OSError when the file cannot be opened or written; what is in it then are whole items, as many as fit.
+    """
+    with path.open("wb", buffering=0) as file:
+        done = 0
+        for batch in _batches(items):
+            data = b"".join(batch)
+            written = 0
+            try:
+                while written < len(data):
+                    written += os.write(file.fileno(), data[written:])
+            except OSError:
+                ends = accumulate(map(len, batch))
+                kept = max((end for end in ends if end <= written), default=0)
+                os.ftruncate(file.fileno(), done + kept)
+                raise
+            done += written
+    return done
+
+
+def _batches(items: Iterable[bytes]) -> Iterator[list[bytes]]:
+    batch: list[bytes] = []
+    size = 0
+    for item in items:
+        batch.append(item)
+        size += len(item)
+        if size >= _BATCH_BYTES:
+            yield batch
+            batch, size = [], 0
+    if batch:
+        yield batch

@@ -1,0 +1,58 @@
+"""A temporary file without a name for what a run collects: memory does not grow with the run, and nothing is left.
+
+    file = (length, bytes)*
+
+An item is appended whole or not at all. A disk that is full ends the spool and not the run: what it has stays readable.
+"""
+
+import os
+import struct
+import tempfile
+from collections.abc import Iterator
+from pathlib import Path
+from typing import Final
+
+_LENGTH: Final = struct.Struct("<I")
+_BUFFER: Final = 1 << 20
+
+
+class Spool:
+    """Items of bytes that are written during a run and read after it."""
+
+    def __init__(self, folder: Path | None = None) -> None:
+        self._file = tempfile.TemporaryFile(dir=folder, buffering=0)  # noqa: SIM115  (closed by `close`)
+        self._write = os.pwrite
+        self.size = 0
+        """Bytes in the file that belong to whole items."""
+        self.failure: str | None = None
+        """Why nothing more is taken in; None while everything is."""
+
+    def append(self, item: bytes) -> bool:
+        """Write an item at the end; returns whether it is kept."""
+        if self.failure is not None:
+            return False
+        data = _LENGTH.pack(len(item)) + item
+        try:
+            written = self._write(self._file.fileno(), data, self.size)
+        except OSError as error:
+            self.failure = error.strerror or str(error)
+            return False
+        if written < len(data):
+            self.failure = "no space left for the whole of an item"
+            return False
+        self.size += written
+        return True
+
+    def items(self) -> Iterator[bytes]:
+        """What was appended, in order, as often as asked."""
+        with open(os.dup(self._file.fileno()), "rb", buffering=_BUFFER) as file:  # noqa: PTH123  (it has no path)
+            file.seek(0)
+            left = self.size
+            while left:
+                (length,) = _LENGTH.unpack(file.read(_LENGTH.size))
+                yield file.read(length)
+                left -= _LENGTH.size + length
+
+    def close(self) -> None:
+        """Give the space back."""
+        self._file.close()

@@ -1,0 +1,83 @@
+"""A client of the router that puts what it should not, while a swarm of real processes runs."""
+
+import asyncio
+import threading
+import time
+from pathlib import Path
+from typing import Self
+
+from fanet_mw import topics
+from fanet_mw.hosts.bus import Bus
+from fanet_mw.messages import MavlinkTap, Message, Report, TraceBatch
+from fanet_mw.topics import Topics
+from fanet_mw.trace import Approaching, Delivered, Generated
+from fanet_mw.units import S
+from sim import catalog
+from sim.outcome import Outcome
+from sim.results import finish
+from sim.swarm import Swarm, free_endpoint, launch
+
+NAMES = Topics("test")
+SMALL = [
+    "nodes.count=4", "clusters.count=1", "duration_s=4", "warmup_s=1", "drain_s=1", "clusters.flooding_period_s=0.5",
+]  # fmt: skip
+
+
+class Attacker:
+    """Puts the same again and again, from the moment the router is there until the swarm is over."""
+
+    def __init__(self, endpoint: str, puts: list[tuple[str, list[Message]]], *, every_s: float = 0.3) -> None:
+        self._endpoint = endpoint
+        self._puts = [(topic, topics.encode(messages)) for topic, messages in puts]
+        self._every_s = every_s
+        self._over = threading.Event()
+        self._thread = threading.Thread(target=self._run)
+
+    def _run(self) -> None:
+        with Bus.join(self._endpoint) as bus:
+            while not self._over.wait(self._every_s):
+                for topic, payload in self._puts:
+                    bus.put(topic, payload, reliable=True)
+
+    def __enter__(self) -> Self:
+        return self
+
+    def start(self, _: Swarm) -> None:
+        self._thread.start()
+
+    def __exit__(self, *_: object) -> None:
+        self._over.set()
+        self._thread.join()
+
+
+def attacked(puts: list[tuple[str, list[Message]]], *settings: str) -> tuple[Outcome, float]:
+    """A run under attack, and how long it took from its start to its end [s]."""
+    endpoint = free_endpoint()
+    began = time.monotonic()
+    with Attacker(endpoint, puts) as attacker:
+        scenario = catalog.find("quick", [*SMALL, *settings])
+        outcome = asyncio.run(launch(scenario, swarm="test", listen=endpoint, on_started=attacker.start))
+    return outcome, time.monotonic() - began
+
+
+def test_nonsense_for_the_launcher_is_counted_and_the_result_is_that_of_the_swarm(tmp_path: Path) -> None:
+    nonsense: list[tuple[str, list[Message]]] = [
+        (NAMES.report("agent-3"), [Report("agent-3", S, '{"kind": "agent", "node": 3}')]),
+        (NAMES.report("emulator"), [Report("emulator", S, '{"kind": "emulator", "frames": {"sent": "many"}}')]),
+        (NAMES.trace("agent-4"), [TraceBatch((Generated(S, 77, 1, "traffic", 5), Delivered(S, 4, 99, 1, 3, 1)))]),
+        (NAMES.trace("agent-4"), [TraceBatch((Approaching(S, 4, 99, 3, 1.0, 1.0),))]),
+        (NAMES.trace("agent-77"), [TraceBatch((Generated(S, 77, 1, "traffic", 5),))]),
+        (NAMES.mavlink(3), [MavlinkTap(2**63 - 1, b""), MavlinkTap(S, b"no frame")]),
+    ]
+    outcome, _ = attacked(nonsense)
+    summary = finish(outcome, out=tmp_path)
+    assert set(summary["heard"]["why"]) == {
+        "report: shape", "trace: node", "trace: survivor", "trace: unknown actor", "telemetry: instant",
+        "telemetry: frame",
+    }  # fmt: skip
+    assert summary["absent"] == {}
+    assert summary["unwritten"] == {}
+    assert summary["frames"]["closes"]
+    assert summary["frames"]["sent"] > 30
+    assert summary["pdr"] > 0.5
+    assert {record.node for record in outcome.records} <= {0, 1, 2, 3, 4}

@@ -1,0 +1,88 @@
+"""The files of a run: each is written as far as it goes, and one that fails takes nothing from the others."""
+
+import json
+import os
+import subprocess
+import sys
+from pathlib import Path
+
+import pytest
+
+from fanet_mw import tlog
+from fanet_mw.whole_file import write_items
+from sim import catalog
+from sim.outcome import Outcome
+from sim.results import finish
+from sim.run import simulate
+
+
+@pytest.fixture(scope="module")
+def outcome() -> Outcome:
+    return simulate(catalog.find("quick", ["duration_s=6", "warmup_s=3", "drain_s=1"]))
+
+
+def full_after(monkeypatch: pytest.MonkeyPatch, room: int) -> None:
+    """From now on the disk takes so many bytes more: the write call itself says so, a part first."""
+    write, left = os.write, room
+
+    def limited(descriptor: int, data: bytes) -> int:
+        nonlocal left
+        if not left:
+            raise OSError(28, os.strerror(28))
+        written = write(descriptor, bytes(data[:left]))
+        left -= written
+        return written
+
+    monkeypatch.setattr("fanet_mw.whole_file.os.write", limited)
+
+
+def test_a_full_disk_keeps_what_fits_and_says_what_does_not(
+    outcome: Outcome, tmp_path: Path, monkeypatch: pytest.MonkeyPatch
+) -> None:
+    whole = tmp_path / "whole"
+    finish(outcome, out=whole)
+    sizes = {path.name: path.stat().st_size for path in whole.iterdir()}
+    small = sum(sizes[name] for name in ("summary.json", "scenario.toml", "reports.json", "links.json"))
+    with monkeypatch.context() as patch:
+        full_after(patch, small + sizes["trace.jsonl"] // 2)
+        summary = finish(outcome, out=tmp_path / "full")
+    assert summary["unwritten"] == dict.fromkeys(("trace.jsonl", "mavlink.tlog"), "No space left on device")
+    assert summary["pdr"] == finish(outcome, out=None)["pdr"]
+    assert json.loads((tmp_path / "full/summary.json").read_text())["pdr"] == summary["pdr"]
+    kept = (tmp_path / "full/trace.jsonl").read_bytes()
+    assert (whole / "trace.jsonl").read_bytes().startswith(kept)
+    assert kept.endswith(b"]\n")
+    assert sizes["trace.jsonl"] // 2 - 200 < len(kept) <= sizes["trace.jsonl"] // 2
+    assert list(tlog.read(tmp_path / "full/mavlink.tlog")) == []
+    assert not (tmp_path / "full/summary.new").exists()
+
+
+def test_a_log_that_is_cut_off_ends_with_a_whole_frame(
+    outcome: Outcome, tmp_path: Path, monkeypatch: pytest.MonkeyPatch
+) -> None:
+    tlog.write(tmp_path / "whole", outcome.taps)
+    full_after(monkeypatch, 777)
+    with pytest.raises(OSError, match="No space"):
+        tlog.write(tmp_path / "cut", outcome.taps)
+    frames = list(tlog.read(tmp_path / "cut"))
+    assert 0 < len(frames) < len(list(tlog.read(tmp_path / "whole")))
+
+
+def test_items_longer_than_a_batch_are_cut_between_items(tmp_path: Path, monkeypatch: pytest.MonkeyPatch) -> None:
+    full_after(monkeypatch, 1_000_000)
+    with pytest.raises(OSError, match="No space"):
+        write_items(tmp_path / "file", [b"x" * 300_000] * 9)
+    assert (tmp_path / "file").stat().st_size == 900_000
+
+
+def test_a_file_size_limit_of_the_shell_costs_the_long_files_only(tmp_path: Path) -> None:
+    """The kernel refuses the writes here, as it does on a full disk; `ulimit -f` needs no disk of one's own."""
+    shell = f"ulimit -f 16; exec {sys.executable} -m sim.cli simulate quick --duration 20 --out {tmp_path}/out"
+    done = subprocess.run(["bash", "-c", shell], capture_output=True, text=True, timeout=100, check=False)
+    assert "Traceback" not in done.stderr
+    assert "trace.jsonl" in done.stderr
+    assert "File too large" in done.stderr
+    assert "delivered" in done.stdout, "the summary is printed"
+    assert done.returncode == 1
+    assert json.loads((tmp_path / "out/summary.json").read_text())["unwritten"]["trace.jsonl"] == "File too large"
+    assert (tmp_path / "out/trace.jsonl").read_bytes().endswith(b"]\n")

@@ -42,6 +42,7 @@ class _Shape(BaseModel):
     """Keys that are read must be there; whatever else a report holds is carried along."""
 
     model_config = ConfigDict(extra="allow", strict=True)
+    final: bool = False
 
 
 class _Frames(_Shape):
@@ -49,6 +50,11 @@ class _Frames(_Shape):
     delivered: Count
     in_flight: Count
     dropped: Reasons
+
+
+class _Requests(_Shape):
+    all: Count
+    before_restart: Count
 
 
 class _Copies(_Shape):
@@ -76,6 +82,7 @@ class _Late(_Shape):
 class _Emulator(_Shape):
     kind: Literal["emulator"]
     frames: _Frames
+    requests: dict[str, _Requests]
     copies: _Copies
     air: _Air
     late: _Late

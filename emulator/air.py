@@ -56,7 +56,7 @@ class Air:
             timing.slot_ns, timing.sifs_ns, timing.difs_ns, timing.eifs_extra_ns, timing.ack_ns,
             timing.ack_timeout_ns, timing.header_ns, DETECT_NS, radio.cw_min, radio.cw_max, radio.max_attempts,
             radio.queue_frames, lifetime_ns,
-            radio.access == "standard", as_ns3, as_ns3 and sinr, sinr, capture,
+            radio.access == "standard", as_ns3, not as_ns3, as_ns3 and sinr, sinr, capture,
             timing.extension_ns, radio.capture, fading,
         )  # fmt: skip
         self._pf = np.array(

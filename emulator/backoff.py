@@ -2,6 +2,10 @@
 
 Slots count from BASE while the medium is idle; when it turns busy, the slots that have passed are taken off and the
 rest waits. A pending access is one event; it is stale when SCHEDULED has another instant.
+
+After a reception that failed, EIFS takes the place of DIFS (10.3.2.3.7). It begins when the medium is idle after a bad
+frame, whatever else has kept it busy, and anew if it is interrupted, until it has passed or a frame was received well.
+In ns-3.44 its extension beyond DIFS begins at the end of the bad frame, and passes while the medium is busy.
 """
 
 from emulator.chance import MODULUS, uniform
@@ -19,6 +23,8 @@ from emulator.state import (
     CW,
     DIFS_NS,
     DRAW_WHEN_INTERRUPTED,
+    EIFS_EXTRA_NS,
+    EIFS_FROM_IDLE,
     FRESH,
     HEAD,
     HS_N,
@@ -73,6 +79,8 @@ def on_busy(p: Ints, st: Ints, s: int, t: int) -> None:
     """The medium turns busy at a station: freeze the backoff."""
     if st[BUSY_SINCE, s] < 0:
         st[BUSY_SINCE, s] = t
+        if st[BAD_UNTIL, s] + p[DIFS_NS] <= t:
+            st[BAD_UNTIL, s] = 0  # the EIFS has passed
     st[BO, s] = slots_left(p, st, s, t)
     st[BASE, s] = NEVER
     if st[SCHEDULED, s] >= 0:
@@ -89,4 +97,6 @@ def on_idle(g: Ints, p: Ints, st: Ints, hs: Ints, s: int, t: int) -> None:
         st[BUSY_NS, s] += t - st[BUSY_SINCE, s]
         st[BUSY_SINCE, s] = -1
     st[IDLE_FROM, s] = t
+    if p[EIFS_FROM_IDLE] == 1 and st[BAD_UNTIL, s] > 0:
+        st[BAD_UNTIL, s] = t + p[EIFS_EXTRA_NS]
     arm(g, p, st, hs, s)

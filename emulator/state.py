@@ -41,7 +41,7 @@ Reals = npt.NDArray[np.float64]
     SEEKING_UNTIL,  # end of the last detection window that a signal has opened
     CHANGED_AT,  # when the power last changed
     IDLE_FROM,  # when the medium last became idle
-    BAD_UNTIL,  # end of the EIFS extension after a failed reception
+    BAD_UNTIL,  # end of the EIFS extension after a failed reception, 0 none; see backoff.py
     RESUME_FROM,  # end of an ACK timeout: access counts from here
     NAV,  # virtual carrier sense: reserved until
     WAITING,  # frame slot whose ACK is awaited, -1 none
@@ -189,6 +189,7 @@ DELIVERED, NO_RECEIVER, COLLIDED, DEAF, WEAK, GIVEN_UP, NO_ROOM, EXPIRED, DEGRAD
     LIFETIME_NS,
     DRAW_WHEN_INTERRUPTED,  # 1: IEEE 802.11; 0: as ns-3
     WAIT_DIFS_FIRST,  # 1: as ns-3, a frame waits one DIFS after it is queued
+    EIFS_FROM_IDLE,  # 1: EIFS begins when the medium is idle after a bad frame; 0: as ns-3, at the end of the frame
     HEARS_AS_NS3,  # 1: weak signals are sensed together, interference within a detection window is overseen
     INTERFERENCE,  # 0: any overlap destroys; 1: SINR and error rate
     CAPTURE,  # 1: report every start of a transmission
@@ -196,7 +197,7 @@ DELIVERED, NO_RECEIVER, COLLIDED, DEAF, WEAK, GIVEN_UP, NO_ROOM, EXPIRED, DEGRAD
     TAKE_OVER,  # 1: a later frame that is TAKE_OVER_RATIO times as strong as the locked one takes the receiver
     FADING,  # 0 none, else the law: see fading.py
     PARAMETERS,
-) = range(22)
+) = range(23)
 (
     DETECT_RATIO,
     HEADER_BITS_PER_NS,

@@ -6,8 +6,9 @@ install ns3==3.44.post0` was run. It needs g++ too; neither is a dependency of o
 
 import json
 import subprocess
+from collections.abc import Iterable
 from pathlib import Path
-from typing import Final
+from typing import Any, Final
 
 _SOURCE: Final = Path(__file__).parent / "swarm.cc"
 _MODULES: Final = ("core", "network", "internet", "mobility", "wifi", "propagation")
@@ -23,8 +24,18 @@ def build(prefix: Path, folder: Path) -> Path:
     return program
 
 
-def run(program: Path, **settings: object) -> dict[str, float]:
+def run(program: Path, **settings: object) -> dict[str, Any]:
     """What one simulation says of itself; the settings are those of `swarm.cc`."""
     command = [str(program), *(f"--{name}={value}" for name, value in settings.items())]
-    said: dict[str, float] = json.loads(subprocess.run(command, check=True, capture_output=True).stdout)
+    said: dict[str, Any] = json.loads(subprocess.run(command, check=True, capture_output=True).stdout)
     return said
+
+
+def transmissions(
+    program: Path, places_m: Iterable[int], sends: Iterable[tuple[int, int, int]], *, channel: str = "A"
+) -> list[tuple[int, int]]:
+    """Who began to transmit when [ns], on a line of nodes 1, 2, ...; `sends`: node, instant [ns] and bytes."""
+    numbers = [str(number) for node, at_ns, size in sends for number in (node - 1, at_ns, size)]
+    places = ",".join(str(place_m) for place_m in places_m)
+    said = run(program, topology="line", channel=channel, places=places, sends=",".join(numbers))
+    return [(node + 1, began_ns) for node, began_ns in said["began"]]

@@ -2,8 +2,9 @@
 //
 // 802.11b ad hoc at 11 Mb/s, UDP payload of 1024 bytes, addresses known from the start. Topologies: `grid`, 9 x 5 nodes
 // 200 m apart, where every node sends each new packet once more after U(0, jitter); `disc` of 100 m radius; `hidden`,
-// nodes at 0, 200, 400 m. Node 0 is the leader of the grid, the sink of unicast and the middle of `hidden`. Channel A:
-// range 250 m; B: log-distance. Prints one line of JSON: CPU seconds of Simulator::Run, frames sent, and shares.
+// nodes at 0, 200, 400 m; `line`, nodes at `places`, each of which broadcasts what `sends` says and nothing else. Node 0
+// is the leader of the grid, the sink of unicast and the middle of `hidden`. Channel A: range 250 m; B: log-distance.
+// Prints one line of JSON: CPU seconds of Simulator::Run, frames sent, and shares; of a `line` when who began to transmit.
 //
 // Not part of the product; ns-3 links under its own licence.
 #include "ns3/core-module.h"
@@ -14,11 +15,15 @@
 #include "ns3/propagation-module.h"
 #include "ns3/wifi-module.h"
 
+#include <algorithm>
 #include <cmath>
 #include <cstring>
 #include <ctime>
+#include <iterator>
+#include <sstream>
 #include <string>
 #include <unordered_set>
+#include <vector>
 
 using namespace ns3;
 
@@ -27,12 +32,20 @@ static const uint32_t PAYLOAD = 1024;
 
 struct Settings
 {
-    std::string topology = "grid", channel = "A", cast = "broadcast", arrivals = "cbr";
+    std::string topology = "grid", channel = "A", cast = "broadcast", arrivals = "cbr", places, sends;
     double interval = 1.0, duration = 100, jitter = 0.01;
     uint32_t nodes = 45, sources = 44, run = 1;
 
     bool Unicast() const { return cast == "unicast"; }
 };
+
+static std::vector<int64_t>
+Numbers(std::string text)
+{
+    std::replace(text.begin(), text.end(), ',', ' '); // ns-3 reads a setting up to the first blank
+    std::istringstream words(text);
+    return {std::istream_iterator<int64_t>(words), std::istream_iterator<int64_t>()};
+}
 
 static struct
 {
@@ -57,6 +70,11 @@ class Station : public Object
     {
         double first = m_settings.arrivals == "poisson" ? Gap() : m_uniform->GetValue(0, m_settings.interval);
         Simulator::Schedule(Seconds(first), &Station::Generate, this);
+    }
+
+    void SendAt(Time start, uint32_t bytes)
+    {
+        Simulator::Schedule(start, &Station::Send, this, Create<Packet>(bytes));
     }
 
   private:
@@ -86,7 +104,7 @@ class Station : public Object
         while (Ptr<Packet> packet = socket->Recv())
         {
             ++g_counts.received;
-            uint64_t key;
+            uint64_t key = 0;
             packet->CopyData(reinterpret_cast<uint8_t*>(&key), sizeof key);
             if (!m_seen.insert(key).second)
                 continue;
@@ -108,10 +126,15 @@ class Station : public Object
     std::unordered_set<uint64_t> m_seen;
 };
 
+static std::string g_began;
+
 static void
-TransmissionBegins(Ptr<const Packet> packet, double)
+TransmissionBegins(uint32_t node, Ptr<const Packet> packet, double)
 {
     g_counts.attempts += packet->GetSize() > PAYLOAD; // no ACK
+    std::ostringstream began;
+    began << (g_began.empty() ? "[" : ", [") << node << ", " << Simulator::Now().GetNanoSeconds() << "]";
+    g_began += began.str();
 }
 
 static void
@@ -125,7 +148,9 @@ Parse(int argc, char** argv)
 {
     Settings s;
     CommandLine cmd;
-    cmd.AddValue("topology", "grid, disc or hidden", s.topology);
+    cmd.AddValue("topology", "grid, disc, hidden or line", s.topology);
+    cmd.AddValue("places", "of the nodes of the line [m], separated by commas", s.places);
+    cmd.AddValue("sends", "on the line: node, instant [ns] and bytes of each broadcast, separated by commas", s.sends);
     cmd.AddValue("channel", "A or B", s.channel);
     cmd.AddValue("cast", "broadcast or unicast", s.cast);
     cmd.AddValue("arrivals", "cbr, poisson or saturated", s.arrivals);
@@ -140,6 +165,8 @@ Parse(int argc, char** argv)
         s.nodes = 45;
     if (s.topology == "hidden")
         s.nodes = 3;
+    if (s.topology == "line")
+        s.nodes = Numbers(s.places).size();
     if (s.arrivals == "saturated")
         s.interval = 0.001;
     return s;
@@ -158,6 +185,8 @@ Place(const NodeContainer& nodes, const Settings& s)
             places->Add(Vector(200.0 * (i % 9), 200.0 * (i / 9), 0));
         else if (s.topology == "hidden")
             places->Add(Vector(middle_and_ends[i], 0, 0));
+        else if (s.topology == "line")
+            places->Add(Vector(Numbers(s.places)[i], 0, 0));
         else
             places->Add(Vector(radius * std::cos(angle), radius * std::sin(angle), 0));
     }
@@ -194,7 +223,7 @@ Radios(const NodeContainer& nodes, const Settings& s)
     for (uint32_t i = 0; i < devices.GetN(); ++i)
     {
         Ptr<WifiNetDevice> device = DynamicCast<WifiNetDevice>(devices.Get(i));
-        device->GetPhy()->TraceConnectWithoutContext("PhyTxBegin", MakeCallback(&TransmissionBegins));
+        device->GetPhy()->TraceConnectWithoutContext("PhyTxBegin", MakeBoundCallback(&TransmissionBegins, i));
         device->GetRemoteStationManager()->TraceConnectWithoutContext("MacTxDataFailed", MakeCallback(&AttemptFailed));
     }
     return devices;
@@ -224,13 +253,23 @@ main(int argc, char** argv)
     for (uint32_t i = 0; i < s.nodes; ++i)
     {
         stations.push_back(Create<Station>(nodes.Get(i), s, destination));
-        if (all || (i > 0 && (s.topology != "grid" || i <= s.sources)))
+        if (all || (i > 0 && s.topology != "line" && (s.topology != "grid" || i <= s.sources)))
             stations.back()->Start();
     }
+    const std::vector<int64_t> sends = Numbers(s.sends);
+    for (size_t i = 0; i + 2 < sends.size(); i += 3)
+        stations.at(sends[i])->SendAt(NanoSeconds(sends[i + 1]), sends[i + 2]);
     std::clock_t began = std::clock();
     Simulator::Stop(Seconds(s.duration));
     Simulator::Run();
     const double cpu_s = double(std::clock() - began) / CLOCKS_PER_SEC;
+    if (s.topology == "line")
+    {
+        std::printf("{\"began\": [%s]}\n", g_began.c_str());
+        stations.clear();
+        Simulator::Destroy();
+        return 0;
+    }
     const double targets = s.Unicast() || s.topology == "hidden" ? 1 : s.nodes - 1;
     std::printf("{\"cpu_s\": %.3f, \"sent\": %lu, \"pdr\": %.6f, \"air.pdr\": %.6f, \"air.throughput_mbps\": %.6f, "
                 "\"air.attempt_failure\": %.6f}\n",

@@ -306,7 +306,7 @@ def test_the_books_close_and_repeat_under_random_faults_moves_and_loads(
         heard = []
         seq = [0] * 9
         now_ns = 0
-        for _ in range(3000):
+        for _ in range(5000):
             now_ns += rng.randrange(2 * MS)
             dice = rng.randrange(20)
             if dice == 0:

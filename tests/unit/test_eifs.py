@@ -1,0 +1,47 @@
+"""After a reception that failed, by timelines computed by hand: IEEE 802.11-2020, 10.3.2.3.7, and as ns-3.44 has it.
+
+The timelines are those that `tests/ns3/eifs_timelines.py` puts before a live ns-3.
+"""
+
+import pytest
+from hand_driven import Air, statuses
+
+from fanet_mw.units import US
+from tests.conftest import MakeScenario
+from tests.ns3.eifs_timelines import LISTENER, PLACES_M, TIMELINES, Timeline, asked_of
+
+FRAME_US, SLOT_US = 984, 20
+SEEDS = range(1, 5)
+
+
+def began_us(make_scenario: MakeScenario, timeline: Timeline, *, access: str, seed: int = 1) -> float:
+    """When the listener's frame begins; backoffs are of 0 or 1 slot."""
+    keys = {"nodes.count": len(PLACES_M), "radio.access": access, "radio.cw_min": 1, "seed": seed}
+    air = Air(make_scenario(**keys), [float(place_m) for place_m in PLACES_M])
+    for node, at_us, size in asked_of(timeline, difs_first=access == "ns3"):
+        air.send(node, at_us * US, payload=bytes(size))
+    (ended_ns,) = [end_ns for node, _, end_ns, _ in statuses(air.run()) if node == LISTENER]
+    return ended_ns / US - FRAME_US
+
+
+@pytest.mark.parametrize("timeline", TIMELINES, ids=[timeline.name for timeline in TIMELINES])
+def test_by_the_standard_eifs_begins_when_the_medium_is_idle_after_the_bad_frame(
+    make_scenario: MakeScenario, timeline: Timeline
+) -> None:
+    began = {began_us(make_scenario, timeline, access="standard", seed=seed) for seed in SEEDS}
+    assert sorted(began) == pytest.approx([timeline.standard_us, timeline.standard_us + SLOT_US], abs=0.001)
+
+
+@pytest.mark.parametrize("timeline", TIMELINES[:-1], ids=[timeline.name for timeline in TIMELINES[:-1]])
+def test_a_frame_that_waited_through_the_bad_one_is_held_back_as_long(
+    make_scenario: MakeScenario, timeline: Timeline
+) -> None:
+    early = timeline._replace(asked_us=1200)
+    began = {began_us(make_scenario, early, access="standard", seed=seed) for seed in SEEDS}
+    assert sorted(began) == pytest.approx([timeline.standard_us, timeline.standard_us + SLOT_US], abs=0.001)
+
+
+@pytest.mark.parametrize("timeline", TIMELINES, ids=[timeline.name for timeline in TIMELINES])
+def test_as_ns3_has_it_eifs_runs_from_the_end_of_the_bad_frame(make_scenario: MakeScenario, timeline: Timeline) -> None:
+    began = began_us(make_scenario, timeline, access="ns3")
+    assert began == pytest.approx(timeline.ns3_us, abs=0.001)

@@ -1,5 +1,6 @@
 """Duplicate suppression memory."""
 
+import pytest
 from hypothesis import example, given
 from hypothesis import strategies as st
 
@@ -25,6 +26,28 @@ def test_the_last_capacity_packets_are_known_and_memory_stays_bounded() -> None:
     assert all(memory.bits(seen.key_of(origin=1, seq=seq)) for seq in range(9_900, 10_000))
     assert memory.bits(seen.key_of(origin=1, seq=0)) == 0
     assert len(memory.young) + len(memory.old) <= 200
+
+
+@pytest.mark.parametrize("name", ["mark", "put"])
+def test_a_packet_is_known_for_as_many_newer_ones_as_there_is_room_for(name: str) -> None:
+    """At every moment, and not only where a generation is just full."""
+    memory = seen.Seen(capacity=10)
+    for seq in range(55):
+        getattr(memory, name)(seen.key_of(origin=1, seq=seq), seen.FLOODED)
+        assert all(memory.bits(seen.key_of(origin=1, seq=known)) for known in range(max(0, seq - 10), seq + 1))
+
+
+def test_what_the_older_generation_knows_is_kept_when_more_becomes_known() -> None:
+    memory = seen.Seen(capacity=4)
+    first = seen.key_of(origin=1, seq=0)
+    memory.mark(first, seen.CARRIED)
+    for seq in range(1, 5):
+        memory.mark(seen.key_of(origin=1, seq=seq), seen.CARRIED)
+    assert first in memory.old
+    memory.mark(first, seen.FLOODED)
+    assert memory.bits(first) == seen.CARRIED | seen.FLOODED
+    memory.forget(first)
+    assert memory.bits(first) == 0, "in either generation"
 
 
 def test_origins_do_not_share_sequences() -> None:

@@ -1,0 +1,113 @@
+"""What the medium counts, by hand: air statistics over the measured time, lateness, what it holds of each node."""
+
+from collections.abc import Callable
+
+import pytest
+from hand_driven import NAMES, Air, receptions, statuses
+
+from fanet_mw.messages import Reception, TxOutcome, TxRequest, TxStatus
+from fanet_mw.scenario import Scenario
+from fanet_mw.units import BROADCAST, MS, US, S
+
+MakeScenario = Callable[..., Scenario]
+FRAME_NS = 984 * US
+
+
+def test_air_statistics_are_of_the_time_between_warm_up_and_drain(make_scenario: MakeScenario) -> None:
+    scenario = make_scenario(**{"nodes.count": 4, "warmup_s": 1, "drain_s": 1, "duration_s": 10})
+    start_ns, end_ns = scenario.traffic_window_ns
+    air = Air(scenario, [0, 100, 200, 9000])
+    within = [start_ns + 100 * MS, start_ns + 200 * MS, start_ns + 300 * MS]
+    for at_ns in (start_ns - 100 * MS, *within, end_ns + 1 * MS):
+        air.send(1, at_ns, now_ns=max(0, at_ns - 1 * MS))
+    air.run(until_ns=10 * S)
+    said = air.medium.report()["air"]
+    span_ns = end_ns - start_ns
+    assert said["throughput_mbps"] == pytest.approx(3 * 8 * 1024 / (span_ns / S) / 1e6, rel=1e-3)
+    assert said["busy"] == pytest.approx(3 * 3 * FRAME_NS / (4 * span_ns), rel=0.01), "three of four sense each frame"
+    assert said["pdr"] == 1.0
+
+
+def test_attempts_that_fail_and_retries_are_counted(make_scenario: MakeScenario) -> None:
+    air = Air(make_scenario(**{"nodes.count": 2, "duration_s": 10, "warmup_s": 0}), [0, 400])
+    air.send(1, 1 * MS, dst=2)
+    air.run(until_ns=500 * MS)
+    air.place([0, 100], 500 * MS)
+    air.send(1, 600 * MS, dst=2, now_ns=500 * MS)
+    air.run(until_ns=10 * S)
+    said = air.medium.report()["air"]
+    assert said["attempt_failure"] == pytest.approx(7 / 8, abs=1e-6)
+    assert said["mean_retries"] == 3.0, "six of the first, none of the second"
+
+
+def test_requests_in_time_count_for_the_percentiles_of_lateness(make_scenario: MakeScenario) -> None:
+    air = Air(make_scenario(**{"nodes.count": 2}), [0, 100])
+    for number in range(100):
+        at_ns = (10 + 2 * number) * MS
+        air.send(1, at_ns, now_ns=at_ns + (8 * MS if number >= 98 else 0))
+    air.run()
+    late = air.medium.report()["late"]
+    assert late == {"late_frames": 2, "frames": 100, "p50_ms": 0.0, "p99_ms": 10.0, "max_ms": 8.0}
+
+
+def test_what_a_node_may_announce_is_bounded_and_what_has_ended_makes_room(make_scenario: MakeScenario) -> None:
+    air = Air(make_scenario(**{"nodes.count": 2, "radio.queue_frames": 1}), [0, 100])
+    for number in range(1100):
+        air.send(1, (1000 + 2 * number) * MS, payload=bytes(20))
+    assert air.medium.report()["frames"]["dropped"] == {"backlog": 1100 - 1025}
+    air.run(until_ns=4 * S)
+    air.send(1, 5 * S, now_ns=4 * S, payload=bytes(20))
+    air.run(until_ns=6 * S)
+    frames = air.medium.report()["frames"]
+    assert frames == {"sent": 1101, "delivered": 1026, "in_flight": 0, "dropped": {"backlog": 75}}
+
+
+def test_a_node_that_starts_again_has_lost_nothing_on_the_bus(make_scenario: MakeScenario) -> None:
+    air = Air(make_scenario(**{"nodes.count": 2}), [0, 100])
+    air.send(1, 1 * MS)
+    air.send(1, 3 * MS)
+    air._seq[1] = 0
+    air.send(1, 5 * MS)
+    air.run()
+    assert air.medium.report()["frames"] == {"sent": 3, "delivered": 3, "in_flight": 0, "dropped": {}}
+
+
+def test_a_driver_hands_receptions_over_in_batches(make_scenario: MakeScenario) -> None:
+    air = Air(make_scenario(**{"nodes.count": 2, "radio.handover_ms": 5}), [0, 100])
+    air.send(1, 1 * MS)
+    air.send(1, 2 * MS)
+    heard = []
+    while (wake_ns := air.medium.next_wake_ns()) is not None:
+        air.medium.wake(wake_ns)
+        heard += [(wake_ns, m.end_ns) for _, m in air.medium.outbox if isinstance(m, Reception)]
+        air.medium.outbox.clear()
+        if wake_ns > 20 * MS:
+            break
+    assert [told_ns for told_ns, _ in heard] == [5 * MS, 5 * MS]
+    assert heard[0][1] == 1 * MS + FRAME_NS + 334, "stamped when it ended, whenever it was told"
+
+
+def test_a_reception_says_its_power_in_dbm(make_scenario: MakeScenario) -> None:
+    scenario = make_scenario(**{"nodes.count": 2})
+    air = Air(scenario, [0, 100])
+    air.send(1, 1 * MS)
+    (reception,) = [h.message for h in air.run() if isinstance(h.message, Reception)]
+    assert reception.rssi_dbm == pytest.approx(scenario.radio.tx_power_dbm, abs=0.002)
+
+
+def test_a_status_is_for_who_asked_for_it(make_scenario: MakeScenario) -> None:
+    air = Air(make_scenario(**{"nodes.count": 2}), [0, 100])
+    for seq, asks in enumerate((True, False)):
+        request = TxRequest(seq, (1 + 2 * seq) * MS, bytes(50), BROADCAST, wants_status=asks)
+        air.medium.receive(NAMES.radio_tx(1), request, 0)
+    assert [h.message.seq for h in air.run() if isinstance(h.message, TxStatus)] == [0]
+
+
+def test_a_unicast_that_always_collided_was_given_up(make_scenario: MakeScenario) -> None:
+    air = Air(make_scenario(**{"nodes.count": 3, "radio.max_attempts": 1}), [0, 200, 400])
+    air.send(1, 1 * MS, dst=2)
+    air.send(3, 1 * MS + 500 * US)
+    heard = air.run()
+    assert receptions(heard) == []
+    assert (1, TxOutcome.RETRY_LIMIT) in [(node, outcome) for node, outcome, _, _ in statuses(heard)]
+    assert air.medium.report()["frames"]["dropped"] == {"collision": 1, "retry_limit": 1}

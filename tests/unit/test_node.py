@@ -1,0 +1,159 @@
+"""What a node makes of a frame before its protocol is asked: known, expired, for us, several in one."""
+
+import pytest
+
+from fanet_mw import wire
+from fanet_mw.errors import DropReason, LocalProtocolError
+from fanet_mw.messages import Reception
+from fanet_mw.protocol.node import Node
+from fanet_mw.protocol.seen import Seen
+from fanet_mw.routing import make_protocol
+from fanet_mw.trace import Delivered, Dropped
+from fanet_mw.units import BROADCAST, MS, US, Enu, NodeId, S
+from fanet_mw.wire import FLAG_FLOOD, FLAG_TO_HEAD, PRIORITY_BULK, PRIORITY_REPORT, Header, Kind, filler
+from tests.conftest import MakeScenario
+
+OURS, THEIRS, ANOTHER = NodeId(2), NodeId(3), NodeId(4)
+PLAIN = Header(0, 7, THEIRS, BROADCAST, THEIRS, Kind.DATA, 8, 0, PRIORITY_BULK, FLAG_FLOOD)
+
+
+@pytest.fixture
+def node(make_scenario: MakeScenario) -> Node:
+    """A node that floods and relays at once."""
+    keys = {"nodes.count": 5, "routing.protocol": "flooding", "routing.jitter_ms": 0, "routing.lifetime_s": 5}
+    keys |= {"routing.report_lifetime_s": 2, "radio.max_frame_bytes": 400, "traffic.payload_bytes": 100}
+    made = Node(OURS, make_scenario(**keys), make_protocol, position=Enu(0.0, 0.0, 0.0))
+    made.start(0)
+    return made
+
+
+def frame(**change: int) -> bytes:
+    return PLAIN._replace(**change).encode() + filler(40)
+
+
+def hear(node: Node, data: bytes, *, at_ns: int = 1 * MS) -> bool:
+    return node.hear(Reception(data, NodeId(wire.decode_header(data).prev_hop), at_ns, -60.0), at_ns)
+
+
+def delivered(node: Node) -> list[Delivered]:
+    return [record for record in node.records if isinstance(record, Delivered)]
+
+
+def send(node: Node, **change: int) -> int:
+    given = {"destination": BROADCAST, "priority": PRIORITY_BULK, "due_ns": 1 * MS, "now_ns": 0} | change
+    return node.send(filler(40), app="test", **given)  # type: ignore[arg-type]
+
+
+# --- known before -------------------------------------------------------------------------------------------------
+
+
+def test_a_copy_is_known_though_a_generation_of_other_packets_came_in_between(node: Node) -> None:
+    node._seen = Seen(capacity=10)
+    assert not hear(node, frame(seq=100))
+    for seq in range(200, 210):
+        assert not hear(node, frame(seq=seq))
+    assert hear(node, frame(seq=100, hops=1, prev_hop=ANOTHER)), "ten came in between: one generation"
+    assert len(node.deliveries) == len(node.requests) == 11, "delivered and relayed once each"
+    assert node.report()["dropped"] == {DropReason.DUPLICATE: 1}
+
+
+def test_the_application_gets_a_packet_once_though_it_passes_in_both_phases(node: Node) -> None:
+    hear(node, frame(flags=FLAG_TO_HEAD))
+    hear(node, frame(flags=FLAG_FLOOD, prev_hop=ANOTHER, hops=1))
+    assert len(node.deliveries) == len(delivered(node)) == 1
+
+
+def test_what_a_node_made_itself_is_not_delivered_to_it(node: Node) -> None:
+    seq = send(node)
+    hear(node, frame(origin=OURS, seq=seq, prev_hop=THEIRS, hops=1, flags=FLAG_TO_HEAD))
+    assert not node.deliveries
+
+
+# --- for whom, and until when -------------------------------------------------------------------------------------
+
+
+@pytest.mark.parametrize(("destination", "is_ours"), [(BROADCAST, True), (OURS, True), (ANOTHER, False)])
+def test_a_packet_is_delivered_to_whom_it_is_meant_for(node: Node, destination: int, is_ours: bool) -> None:
+    hear(node, frame(destination=destination, hops=2))
+    assert len(node.deliveries) == is_ours
+    assert [(r.origin, r.seq, r.hops, r.delay_ns) for r in delivered(node)] == [(THEIRS, 7, 3, 1 * MS)] * is_ours
+
+
+@pytest.mark.parametrize(("priority", "lifetime_ns"), [(PRIORITY_BULK, 5 * S), (PRIORITY_REPORT, 2 * S)])
+def test_a_packet_ends_at_the_lifetime_of_its_class(node: Node, priority: int, lifetime_ns: int) -> None:
+    hear(node, frame(priority=priority, seq=1), at_ns=lifetime_ns)
+    hear(node, frame(priority=priority, seq=2), at_ns=lifetime_ns + 1)
+    assert [packet.header.seq for packet in node.deliveries] == [1]
+    assert len(node.requests) == 1, "what has expired is not relayed either"
+    assert node.report()["dropped"] == {DropReason.EXPIRED: 1}
+    assert [r for r in node.records if isinstance(r, Dropped)] == [
+        Dropped(lifetime_ns + 1, OURS, DropReason.EXPIRED, THEIRS, 2)
+    ]
+
+
+def test_a_relay_costs_one_of_the_hop_limit_and_a_hostile_hop_count_does_not_overflow(node: Node) -> None:
+    hear(node, frame(seq=1, hop_limit=8, hops=3))
+    hear(node, frame(seq=2, hop_limit=8, hops=255))
+    relayed = [wire.decode_header(request.frame) for request in node.requests]
+    assert [(header.hop_limit, header.hops, header.prev_hop) for header in relayed] == [(7, 4, OURS), (7, 255, OURS)]
+
+
+# --- several in one frame -----------------------------------------------------------------------------------------
+
+
+def test_a_bundle_is_one_reception_of_several_packets(node: Node) -> None:
+    hear(node, wire.bundle([frame(seq=1), frame(seq=2), frame(seq=3)]))
+    assert [packet.header.seq for packet in node.deliveries] == [1, 2, 3]
+    assert node.report()["receptions"] == 1
+    (request,) = node.requests
+    assert len(wire.unbundle(request.frame)) == 3, "what they make it send goes together again"
+
+
+@pytest.mark.parametrize("starts_ms", [(20, 30), (30, 20)])
+def test_packets_that_share_a_frame_go_at_the_first_instant_of_them(node: Node, starts_ms: tuple[int, int]) -> None:
+    node.gather()
+    for seq, start_ms in enumerate(starts_ms):
+        node.transmit(frame(seq=seq), BROADCAST, start_ns=start_ms * MS)
+    node.send_gathered()
+    assert [request.start_ns for request in node.requests] == [20 * MS]
+
+
+def test_a_shared_frame_is_no_longer_than_frames_may_be(node: Node) -> None:
+    """100 bytes and a little each: three fit 400 bytes, a fourth does not."""
+    one = len(frame())
+    fit = 400 // one
+    node.gather()
+    for seq in range(2 * fit + 1):
+        node.transmit(frame(seq=seq), BROADCAST, start_ns=1 * MS)
+    node.send_gathered()
+    assert [len(request.frame) for request in node.requests] == [fit * one, fit * one, one]
+
+
+# --- its own packets ----------------------------------------------------------------------------------------------
+
+
+def test_packets_of_one_origin_are_numbered_without_gaps_whatever_control_goes_in_between(node: Node) -> None:
+    numbers = []
+    for _ in range(3):
+        numbers.append(send(node))
+        node.announce(Kind.ROUTING, b"", now_ns=0, flags=0, hop_limit=1)
+    assert numbers == [numbers[0], numbers[0] + 1, numbers[0] + 2]
+
+
+def test_a_node_that_starts_again_does_not_reuse_the_names_of_its_packets(node: Node) -> None:
+    before = [send(node) for _ in range(100)]
+    node.start(10 * S)
+    assert send(node, due_ns=10 * S, now_ns=10 * S) > max(before)
+
+
+def test_a_packet_longer_than_frames_may_be_is_a_mistake_of_the_caller(node: Node) -> None:
+    with pytest.raises(LocalProtocolError, match=r"must be <= radio\.max_frame_bytes = 400"):
+        node.send(filler(390), destination=BROADCAST, priority=PRIORITY_BULK, app="test", due_ns=0, now_ns=0)
+
+
+def test_a_drop_is_counted_and_recorded(node: Node) -> None:
+    hear(node, frame(hop_limit=1), at_ns=300 * US)
+    assert node.report()["dropped"] == {DropReason.HOP_LIMIT: 1}
+    assert [r for r in node.records if isinstance(r, Dropped)] == [
+        Dropped(300 * US, OURS, DropReason.HOP_LIMIT, THEIRS, 7)
+    ]

@@ -1,4 +1,4 @@
-"""The application load of one node: when its next packet is born, and of what size. Announced a lead ahead.
+"""The application load of one node: when it hands its node the next packet, and of what size.
 
 Birth instants are whole microseconds, because that is what the header carries.
 """

@@ -84,7 +84,7 @@ class Uav(Actor):
         if isinstance(message, TxStatus):
             self._node.status(message, now_ns=now_ns)
             if self._traffic.saturated and self._traffic.open_at(now_ns):
-                self._send_traffic(now_ns + self._lead_ns, now_ns)
+                self._send_traffic(now_ns, now_ns)
         elif isinstance(message, Gps):
             self._autopilot.fix(message)
             self._node.position, self._node.velocity = message.position, message.velocity
@@ -101,9 +101,9 @@ class Uav(Actor):
     def wake(self, now_ns: int) -> None:
         self._node.wake(now_ns)
         due_ns = self._traffic.next_ns()
-        while due_ns is not None and due_ns - self._lead_ns <= now_ns:
+        while due_ns is not None and due_ns <= now_ns:
             for _ in range(self._traffic.depth if self._traffic.saturated else 1):
-                self._send_traffic(max(due_ns, now_ns), now_ns)
+                self._send_traffic(due_ns, now_ns)
             self._traffic.advance()
             due_ns = self._traffic.next_ns()
         self._say_hello(now_ns)
@@ -118,8 +118,8 @@ class Uav(Actor):
         return own_ns if node_ns is None or (own_ns is not None and own_ns < node_ns) else node_ns
 
     def _next_own_ns(self) -> int | None:
-        send_ns = earliest(self._traffic.next_ns(), self._next_hello_ns)
-        return earliest(None if send_ns is None else send_ns - self._lead_ns, self._autopilot.next_due_ns())
+        hello_ns = None if self._next_hello_ns is None else self._next_hello_ns - self._lead_ns
+        return earliest(self._traffic.next_ns(), hello_ns, self._autopilot.next_due_ns())
 
     def know_clock_error(self, error_ns: int) -> None:
         """The greatest error of any clock in the swarm, as far as this node has heard; 0: they are exact."""
@@ -133,14 +133,14 @@ class Uav(Actor):
 
     # --- the application ------------------------------------------------------------------------------------------
 
-    def _send_traffic(self, due_ns: int, now_ns: int) -> None:
+    def _send_traffic(self, born_ns: int, now_ns: int) -> None:
         self._generated += 1
         self._node.send(
             self._filler,
             destination=self._destination,
             priority=wire.PRIORITY_BULK,
             app="traffic",
-            due_ns=due_ns // US * US,
+            born_ns=born_ns,
             now_ns=now_ns,
         )
 
@@ -247,6 +247,5 @@ class Uav(Actor):
             self._tell_all(report.encode_frame(self._id), priority=wire.PRIORITY_REPORT, app="report", now_ns=now_ns)
 
     def _tell_all(self, inner: bytes, *, priority: int, app: str, now_ns: int) -> int:
-        """One lead from now, in whole microseconds; returns the packet's sequence number."""
-        due_ns = (now_ns + self._lead_ns) // US * US
-        return self._node.send(inner, destination=BROADCAST, priority=priority, app=app, due_ns=due_ns, now_ns=now_ns)
+        """Hand the node a packet for everyone; returns its sequence number."""
+        return self._node.send(inner, destination=BROADCAST, priority=priority, app=app, born_ns=now_ns, now_ns=now_ns)

@@ -15,7 +15,7 @@ from fanet_mw.errors import DropReason, MalformedFrameError
 
 
 class Generated(NamedTuple):
-    """An application packet was handed to the node's routing layer."""
+    """An application handed a packet to its node; every delay of the packet counts from this instant."""
 
     t_ns: int
     node: int
@@ -24,15 +24,37 @@ class Generated(NamedTuple):
     payload_bytes: int
 
 
-class Delivered(NamedTuple):
-    """The first reception of a packet by the application of a node it was meant for."""
+class LetOut(NamedTuple):
+    """The origin announced the first frame with a packet of its own; `t_ns`: when that frame may contend."""
 
     t_ns: int
+    node: int
+    seq: int
+
+
+class BoundStated(NamedTuple):
+    """The origin promised, when it accepted a packet, that no copy in turn is delivered later than this delay."""
+
+    t_ns: int
+    node: int
+    seq: int
+    bound_ns: int
+    """From the application's hand-over to the other application's receipt."""
+
+
+class Delivered(NamedTuple):
+    """A packet was handed to the application of a node that it was meant for."""
+
+    t_ns: int
+    """When that application got it."""
     node: int
     origin: int
     seq: int
     delay_ns: int
+    """From `Generated` to this instant."""
     hops: int
+    handover_ns: int = 0
+    """The last part of the delay: from the end of the frame on the air to this instant."""
 
 
 class Dropped(NamedTuple):
@@ -179,6 +201,8 @@ class DeadlineLost(NamedTuple):
 
 Record = (
     Generated
+    | LetOut
+    | BoundStated
     | Delivered
     | Dropped
     | RoleChanged
@@ -198,6 +222,8 @@ Record = (
 
 _KINDS: Final[dict[str, type[Any]]] = {
     "generated": Generated,
+    "let_out": LetOut,
+    "bound_stated": BoundStated,
     "delivered": Delivered,
     "dropped": Dropped,
     "role_changed": RoleChanged,
@@ -257,7 +283,7 @@ def kind_of(record: Record) -> str:
 def line(record: Record) -> str:
     """One JSON array, no newline: `["delivered", t_ns, node, ...]` in field order."""
     if type(record) is Delivered:  # nine lines in ten; formatting beats json.dumps by a factor of four
-        return f'["delivered",{record[0]},{record[1]},{record[2]},{record[3]},{record[4]},{record[5]}]'
+        return f'["delivered",{record[0]},{record[1]},{record[2]},{record[3]},{record[4]},{record[5]},{record[6]}]'
     return json.dumps([_NAMES[type(record)], *record], separators=(",", ":"))
 
 
@@ -274,7 +300,7 @@ def parse(text: str) -> Record:
 
 
 __all__ = [
-    "Approaching", "Arrived", "ClockSampled", "Collided", "ConflictForeseen", "ConflictOver", "DeadlineLost",
-    "DeadlineMet", "Delivered", "Detected", "DropReason", "Dropped", "Generated", "ProcessEnded", "RadioFault",
-    "Record", "RoleChanged", "Warned", "kind_of", "line", "parse",
+    "Approaching", "Arrived", "BoundStated", "ClockSampled", "Collided", "ConflictForeseen", "ConflictOver",
+    "DeadlineLost", "DeadlineMet", "Delivered", "Detected", "DropReason", "Dropped", "Generated", "LetOut",
+    "ProcessEnded", "RadioFault", "Record", "RoleChanged", "Warned", "kind_of", "line", "parse",
 ]  # fmt: skip

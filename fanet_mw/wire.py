@@ -106,6 +106,10 @@ _PACKED: Final = struct.Struct("<4sBB4s" + ROUTE.layout.format[1:])
 _CHECKED: Final = struct.Struct("<3s4x3s" + ROUTE.layout.format[1:] + "H")
 _BODY_END: Final = HEADER_BYTES - 2
 _SYSTEM_AT: Final = 5
+NAME: Final = slice(18, 24)
+"""Where a header has what names its packet: sequence number and origin."""
+SEQ: Final = slice(18, 22)
+"""Where a header has its packet's sequence number, the low byte first."""
 _PREV_HOP_AT: Final = 26
 _KIND_AT: Final = 28
 _PRIORITY_AT: Final = 31

@@ -1,47 +1,49 @@
-"""The delays of a run against the bounds that the nodes themselves computed. Empty when no node has one.
+"""The delays of a run against the bounds that were promised: per packet, as its origin stated it on accepting it.
 
-A packet counts when it was generated while its origin's bound was in force and the application was measured.
+    within_share = deliveries within the bound of their packet / (all packets x the nodes that each was meant for)
+
+A packet that never arrives, that its origin promised nothing for, or that comes too late, lowers the share; only the
+last is a violation. Empty when no origin promised anything.
 """
 
+from collections.abc import Mapping
 from typing import Any
 
-from fanet_mw.trace import Delivered, Generated
 from fanet_mw.units import MS
-from sim.outcome import Outcome
+from sim.packets import Application
 
 
-def against_bounds(outcome: Outcome) -> dict[str, Any]:
-    """`bound` of `summary.json`: the largest bound, the largest delay, and deliveries that broke their own bound."""
-    bounds = {
-        report["node"]: (report["bound_from_ms"] * MS, report["bound_ms"] * MS)
-        for report in outcome.reports.values()
-        if report.get("bound_ms") is not None
-    }
-    if not bounds:
+def against_bounds(applications: Mapping[str, Application]) -> dict[str, Any]:
+    """`bound` of `summary.json`: everything together, and by application."""
+    promised = {name: app for name, app in applications.items() if _promises(app)}
+    if not promised:
         return {}
-    start_ns, end_ns = outcome.scenario.traffic_window_ns
-    covered = {
-        (record.node, record.seq)
-        for record in outcome.records
-        if type(record) is Generated
-        and record.app == "traffic"
-        and record.node in bounds
-        and max(start_ns, bounds[record.node][0]) <= record.t_ns < end_ns
-    }
-    delays = [
-        (record.delay_ns, record.delay_ns > bounds[record.origin][1])
-        for record in outcome.records
-        if type(record) is Delivered and (record.origin, record.seq) in covered
-    ]
-    worst_ns = max(bound_ns for _, bound_ns in bounds.values())
-    observed_ns = max((delay_ns for delay_ns, _ in delays), default=0)
-    traffic = {
-        "worst_ms": round(worst_ns / MS, 3),
-        "observed_max_ms": round(observed_ns / MS, 3),
-        "deliveries": len(delays),
-        "violations": sum(late for _, late in delays),
-    }
     return {
-        "classes": {"traffic": traffic},
-        **{key: traffic[key] for key in ("worst_ms", "observed_max_ms", "violations")},
+        **_judged([app for app in applications.values() if app.sent]),
+        "classes": {name: _judged([app]) for name, app in promised.items()},
+    }
+
+
+def _promises(app: Application) -> bool:
+    return any(sent.bound_ns is not None for sent in app.sent.values())
+
+
+def _judged(apps: list[Application]) -> dict[str, Any]:
+    bounds = [sent.bound_ns for app in apps for sent in app.sent.values()]
+    stated = [bound_ns for bound_ns in bounds if bound_ns is not None]
+    wanted = sum(app.wanted for app in apps)
+    promised = [
+        (record.delay_ns, bound_ns)
+        for app in apps
+        for record in app.deliveries
+        if (bound_ns := app.sent[record.origin, record.seq].bound_ns) is not None
+    ]
+    within = sum(delay_ns <= bound_ns for delay_ns, bound_ns in promised)
+    return {
+        "within_share": round(within / wanted, 6) if wanted else None,
+        "violations": len(promised) - within,
+        "deliveries": len(promised),
+        "stated_share": round(len(stated) / len(bounds), 6),
+        "worst_ms": round(max(stated) / MS, 3),
+        "observed_max_ms": round(max((delay_ns for delay_ns, _ in promised), default=0) / MS, 3),
     }

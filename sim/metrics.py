@@ -2,17 +2,16 @@
 
 pdr      = unique deliveries of application packets at their targets / (packets generated x targets), never above 1
 repeated = further deliveries of a packet at a target that already had it: its process has started again
-delay    = from the generation instant to the first reception, per (packet, target)
+delay    = from the application's hand-over to the other application's receipt, per (packet, target)
 """
 
 import statistics
 from collections import Counter
-from collections.abc import Mapping, Sequence
-from typing import Any, Final
+from collections.abc import Mapping
+from typing import Any
 
 import numpy as np
 
-from agents.traffic import targets_of
 from fanet_mw.errors import DropReason
 from fanet_mw.trace import (
     Approaching,
@@ -20,26 +19,24 @@ from fanet_mw.trace import (
     Collided,
     DeadlineLost,
     DeadlineMet,
-    Delivered,
     Detected,
     Dropped,
-    Generated,
 )
-from fanet_mw.units import MS, S
-from sim import ledger
+from fanet_mw.units import S
+from sim import delays, ledger
 from sim.bounds import against_bounds
 from sim.clocks import clock_errors
 from sim.outcome import Outcome
+from sim.packets import Application, packets_of, targets_by_source
 from sim.separation import separation
 from sim.survivors import place
-
-_APPS: Final = ("traffic", "report", "warning")
 
 
 def summarize(outcome: Outcome, *, trace_sha256: str) -> dict[str, Any]:
     """The content of `summary.json`."""
     scenario = outcome.scenario
-    packets = _packets(outcome)
+    sent = packets_of(outcome)
+    packets = _packets(outcome, sent)
     emulator = outcome.reports.get("emulator", {})
     return {
         "scenario": scenario.name,
@@ -56,7 +53,7 @@ def summarize(outcome: Outcome, *, trace_sha256: str) -> dict[str, Any]:
         "copies": ledger.copies(outcome),
         "air": emulator.get("air", {}),
         "lateness": _lateness(outcome, emulator),
-        "bound": against_bounds(outcome),
+        "bound": against_bounds(sent),
         "clock": clock_errors(outcome),
         "admission": _admission(outcome),
         "mission": _mission(outcome),
@@ -72,60 +69,27 @@ def summarize(outcome: Outcome, *, trace_sha256: str) -> dict[str, Any]:
     }
 
 
-def _packets(outcome: Outcome) -> dict[str, dict[str, Any]]:
+def _packets(outcome: Outcome, packets: Mapping[str, Application]) -> dict[str, dict[str, Any]]:
     """Generated, delivered, PDR and delay of each application."""
-    scenario = outcome.scenario
-    app_of: dict[tuple[int, int], str] = {}
-    generated: Counter[str] = Counter()
-    wanted: Counter[str] = Counter()
-    per_source: Counter[int] = Counter()
-    targets = {node: frozenset(targets_of(scenario, node)) for node in scenario.node_ids}
-    for record in outcome.records:
-        if type(record) is Generated:
-            app_of[record.node, record.seq] = record.app
-            generated[record.app] += 1
-            if record.app == "traffic":
-                per_source[record.node] += 1
-                wanted[record.app] += len(targets[record.node])
-            else:
-                wanted[record.app] += scenario.nodes.count - 1
-    delays: dict[str, list[int]] = {app: [] for app in _APPS}
-    repeated: Counter[str] = Counter()
-    received: Counter[int] = Counter()
-    had: set[tuple[int, int, int]] = set()
-    for record in outcome.records:
-        if type(record) is not Delivered:
-            continue
-        app = app_of.get((record.origin, record.seq))
-        if app is None or not _is_target(record, app, targets):
-            continue
-        delivery = record.node, record.origin, record.seq
-        if delivery in had:
-            repeated[app] += 1
-            continue
-        had.add(delivery)
-        delays[app].append(record.delay_ns)
-        if app == "traffic":
-            received[record.node] += 1
+    lead_ns = outcome.scenario.radio.lead_ns
     result: dict[str, dict[str, Any]] = {
-        app: {
-            "generated": generated[app],
-            "delivered": len(delays[app]),
-            "repeated": repeated[app],
-            "pdr": _ratio(len(delays[app]), wanted[app]),
-            "delay_ms": _delay(delays[app]),
+        name: {
+            "generated": len(app.sent),
+            "delivered": len(app.deliveries),
+            "repeated": app.repeated,
+            "pdr": _ratio(len(app.deliveries), app.wanted),
+            "delay_ms": delays.summed_up([record.delay_ns for record in app.deliveries]),
+            "delay_parts_ms": delays.parts(app.deliveries, app.sent, lead_ns=lead_ns),
         }
-        for app in _APPS
+        for name, app in packets.items()
     }
-    result["traffic"]["worst_nodes"] = _worst_nodes(per_source, targets, received)
+    traffic = packets["traffic"]
+    result["traffic"]["worst_nodes"] = _worst_nodes(
+        Counter(node for node, _ in traffic.sent),
+        targets_by_source(outcome),
+        Counter(record.node for record in traffic.deliveries),
+    )
     return result
-
-
-def _is_target(delivered: Delivered, app: str, targets: Mapping[int, frozenset[int]]) -> bool:
-    """Whether the packet was meant for this node; reports and warnings are meant for all but their origin."""
-    if app == "traffic":
-        return delivered.node in targets[delivered.origin]
-    return delivered.node != delivered.origin
 
 
 def _worst_nodes(
@@ -142,15 +106,6 @@ def _worst_nodes(
 
 def _ratio(part: float, whole: float) -> float | None:
     return round(part / whole, 6) if whole else None
-
-
-def _delay(delays_ns: Sequence[int]) -> dict[str, float | None]:
-    if not delays_ns:
-        return dict.fromkeys(("mean", "p50", "p95", "p99", "max"))
-    values = np.asarray(delays_ns, dtype=np.float64) / MS
-    p50, p95, p99 = np.percentile(values, (50, 95, 99))
-    named = {"mean": values.mean(), "p50": p50, "p95": p95, "p99": p99, "max": values.max()}
-    return {name: round(float(value), 3) for name, value in named.items()}
 
 
 def _lateness(outcome: Outcome, emulator: Mapping[str, Any]) -> dict[str, Any]:

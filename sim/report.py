@@ -64,9 +64,11 @@ def _network_rows(summary: Mapping[str, Any]) -> Iterator[tuple[str, str]]:
     bound = summary["bound"]
     if bound:
         broken = f"broken {bound['violations']} times" if bound["violations"] else "never broken"
+        share = "-" if bound["within_share"] is None else f"{bound['within_share']:.2%}"
         yield (
             "bound",
-            f"{bound['worst_ms']:.0f} ms, computed in flight; worst seen {bound['observed_max_ms']:.0f} ms, {broken}",
+            f"{share} of packets x targets within it; at most {bound['worst_ms']:.0f} ms, stated for "
+            f"{bound['stated_share']:.1%} of the packets; worst seen {bound['observed_max_ms']:.0f} ms, {broken}",
         )
     yield from _clock_rows(summary["clock"])
     admission = summary["admission"]

@@ -76,7 +76,7 @@ class RoutingProtocol(ABC):
 
     @abstractmethod
     def originate(self, packet: Packet, *, due_ns: int, now_ns: int) -> None:
-        """A packet of this node's application; it exists from `due_ns` on, which may lie a lead ahead."""
+        """A packet of this node's application; its first frame may go from `due_ns` on, one lead after its birth."""
 
     @abstractmethod
     def receive(self, packet: Packet, reception: Reception, *, now_ns: int) -> None:

@@ -20,7 +20,7 @@ from fanet_mw.protocol.contract import RoutingProtocol
 from fanet_mw.protocol.txqueue import Packet
 from fanet_mw.rng import stream
 from fanet_mw.scenario import Scenario
-from fanet_mw.trace import Delivered, Dropped, Generated, Record
+from fanet_mw.trace import Delivered, Dropped, Generated, LetOut, Record
 from fanet_mw.units import BROADCAST, US, Enu, NodeId
 from fanet_mw.wire import Header, Kind
 
@@ -54,11 +54,14 @@ class Node:
         self.receptions = 0
         self.dropped: Counter[str] = Counter()
         self._duplicates = 0
+        self._lead_ns = scenario.radio.lead_ns
         self._next_seq = {False: 0, True: _CONTROL}
         self._lifetimes_ns = [scenario.routing.lifetime_ns(priority) for priority in range(256)]
         """By priority, whatever the air says."""
         self._reader = arrival.shared
         self._seen = seen.Seen()
+        self._held: set[bytes] = set()
+        """Names of own packets (`wire.NAME`) that were accepted, and of which no frame has been announced yet."""
         self._gathered: list[tuple[int, bytes]] | None = None
         """While set: broadcasts that may share a frame, each with its instant."""
         self._protocol = make_protocol(self)
@@ -78,12 +81,14 @@ class Node:
         self._next_seq = {False: first, True: _CONTROL + first}
         self._protocol.start(now_ns)
 
-    def send(self, inner: bytes, *, destination: NodeId, priority: int, app: str, due_ns: int, now_ns: int) -> int:
+    def send(self, inner: bytes, *, destination: NodeId, priority: int, app: str, born_ns: int, now_ns: int) -> int:
         """Send an application payload (whole MAVLink frames); returns the packet's sequence number.
 
-        The packet exists from `due_ns` on, at most one lead ahead of `now_ns`. Raises LocalProtocolError when the
-        frame would exceed `radio.max_frame_bytes`.
+        `born_ns` is when the application meant to hand it over, at most `now_ns`: a process that was woken late loses
+        that much of the lead, and not of the delay that is measured. The first frame may go one lead after it. Raises
+        LocalProtocolError when the frame would exceed `radio.max_frame_bytes`.
         """
+        born_ns = born_ns // US * US  # what the header can say
         packet = self._packet(
             Kind.DATA,
             inner,
@@ -91,11 +96,12 @@ class Node:
             priority=priority,
             flags=self._protocol.origin_flags,
             hop_limit=self.scenario.routing.hop_limit,
-            born_ns=due_ns,
+            born_ns=born_ns,
         )
         seq = packet.header.seq
-        self.records.append(_new(Generated, (due_ns, self.node, seq, app, len(packet.frame))))
-        self._protocol.originate(packet, due_ns=due_ns, now_ns=now_ns)
+        self.records.append(_new(Generated, (born_ns, self.node, seq, app, len(packet.frame))))
+        self._held.add(packet.frame[wire.NAME])
+        self._protocol.originate(packet, due_ns=max(born_ns + self._lead_ns, now_ns), now_ns=now_ns)
         return seq
 
     def say_hello(self, inner: bytes, *, start_ns: int, now_ns: int) -> None:
@@ -170,7 +176,8 @@ class Node:
         if kind == _DATA and to_us and not before & seen.DELIVERED:
             bits |= seen.DELIVERED
             self.deliveries.append(packet)
-            self.records.append(_new(Delivered, (end_ns, self.node, origin, seq, age_ns, hops + 1)))
+            late_ns = now_ns - end_ns
+            self.records.append(_new(Delivered, (now_ns, self.node, origin, seq, age_ns + late_ns, hops + 1, late_ns)))
         self._seen.put(key, bits)
         self._protocol.receive(packet, reception, now_ns=now_ns)
 
@@ -214,6 +221,9 @@ class Node:
             self.transmit(wire.bundle(chunk), BROADCAST, start_ns=first_ns)
 
     def transmit(self, frame: bytes, dst: NodeId, *, start_ns: int, wants_status: bool = False) -> int:
+        if self._held and frame[wire.NAME] in self._held:
+            self._held.remove(frame[wire.NAME])
+            self.records.append(LetOut(start_ns, self.node, int.from_bytes(frame[wire.SEQ], "little")))
         if self._gathered is not None and dst == BROADCAST and not wants_status:
             self._gathered.append((start_ns, frame))
             return self.frames_sent
@@ -248,6 +258,7 @@ class Node:
 
     def drop(self, reason: DropReason, packet: Packet, *, now_ns: int) -> None:
         self.dropped[reason] += 1
+        self._held.discard(packet.frame[wire.NAME])
         self.records.append(Dropped(now_ns, self.node, reason, packet.header.origin, packet.header.seq))
 
     def mark(self, packet: Packet, bits: int) -> None:

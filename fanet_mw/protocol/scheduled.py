@@ -21,8 +21,9 @@ from fanet_mw.protocol.lease import Authority
 from fanet_mw.protocol.membership import Version
 from fanet_mw.protocol.root_release import RootRelease
 from fanet_mw.protocol.turn_plan import Plan, fit, leader_load
-from fanet_mw.protocol.turns import clocks_fit
+from fanet_mw.protocol.turns import clocks_fit, receipt_ns
 from fanet_mw.protocol.txqueue import Packet, TxQueue, sooner_us
+from fanet_mw.trace import BoundStated
 from fanet_mw.units import MS, US, Enu, NodeId, earliest, seconds_to_ns
 from fanet_mw.wire import PRIORITY_BULK, Kind
 from fanet_mw.wire_messages import Schedule
@@ -155,6 +156,9 @@ class Scheduled(Clustered):
             self._port.drop(DropReason.ADMISSION, packet, now_ns=now_ns)
             return
         super().originate(packet, due_ns=due_ns, now_ns=now_ns)
+        bound_ns = self.bound_ns() if packet.header.priority == PRIORITY_BULK else None
+        if bound_ns is not None:
+            self._port.record(BoundStated(now_ns, self._port.node, packet.header.seq, bound_ns))
 
     # --- letting out ----------------------------------------------------------------------------------------------
 
@@ -263,7 +267,8 @@ class Scheduled(Clustered):
         if own is None or self._steady_ns is None or not self._in_step():
             return None
         interval_ns = self._admission.interval_ns if self._admission else self._interval_ns
-        return own.worst_ns(interval_ns=interval_ns)
+        worst_ns = own.worst_ns(interval_ns=interval_ns)
+        return None if worst_ns is None else self._lead_ns + worst_ns + receipt_ns(self._port.scenario)
 
     def _in_step(self) -> bool:
         """Whether the turns' slack holds what is known of the swarm's clocks."""

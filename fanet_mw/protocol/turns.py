@@ -108,6 +108,18 @@ def turn_ns(scenario: Scenario, *, payload_bytes: int) -> int:
     return frame_ns + timing.difs_ns + radio.cw_min * timing.slot_ns + slack_ns
 
 
+def receipt_ns(scenario: Scenario) -> int:
+    """The longest time from the end of a frame to the application that it is for: the handover of receptions, and one
+    lead, because a lead is how late a process may be woken.
+    """
+    return scenario.radio.handover_ns + scenario.radio.lead_ns
+
+
 def clocks_fit(scenario: Scenario, *, clock_error_ns: int) -> bool:
-    """Whether turns stay apart when no clock is farther than this from the swarm's; exact clocks always fit."""
-    return not clock_error_ns or 2 * clock_error_ns + _FLIGHT_NS <= round(scenario.clusters.turn_slack_us * US)
+    """Whether turns stay apart when no clock is farther than this from the swarm's; exact clocks always fit.
+
+    Where clocks are not exact, an error of 0 is one that the node has not heard of yet.
+    """
+    if not clock_error_ns:
+        return not scenario.clock.modelled
+    return 2 * clock_error_ns + _FLIGHT_NS <= round(scenario.clusters.turn_slack_us * US)

@@ -69,7 +69,7 @@ class Bench:
         """An application packet; returns its sequence number."""
         seq = self.nodes[origin].send(
             wire.filler(40), destination=NodeId(destination), priority=3, app="traffic",
-            due_ns=self.now_ns, now_ns=self.now_ns,
+            born_ns=self.now_ns, now_ns=self.now_ns,
         )  # fmt: skip
         self._collect()
         return seq

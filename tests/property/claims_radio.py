@@ -69,7 +69,7 @@ class GraphRadio:
         sender = self.nodes[NodeId(node)]
         seq = sender.send(
             wire.filler(size), destination=BROADCAST, priority=priority, app="traffic",
-            due_ns=self.now_ns // US * US, now_ns=self.now_ns,
+            born_ns=self.now_ns, now_ns=self.now_ns,
         )  # fmt: skip
         self._drain(sender)
         return seq

@@ -17,7 +17,7 @@ from fanet_mw.protocol.node import Node
 from fanet_mw.rng import stream
 from fanet_mw.routing import make_protocol
 from fanet_mw.scenario import Scenario
-from fanet_mw.units import BROADCAST, MS, US, Enu, NodeId, S
+from fanet_mw.units import BROADCAST, MS, Enu, NodeId, S
 
 _FLIGHT_NS = 1 * MS
 _HELLO_NS = 1 * S
@@ -67,7 +67,7 @@ class Swarm:
         """A packet of the node's application, to everyone."""
         self.nodes[NodeId(node)].send(
             wire.filler(40, node=node), destination=BROADCAST, priority=wire.PRIORITY_BULK, app="traffic",
-            due_ns=self.now_ns // US * US, now_ns=self.now_ns,
+            born_ns=self.now_ns, now_ns=self.now_ns,
         )  # fmt: skip
         self._drain(NodeId(node))
 

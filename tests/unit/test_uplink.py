@@ -18,7 +18,7 @@ def alone(make_scenario: MakeScenario) -> Node:
     node = Node(NodeId(2), make_scenario(**keys), make_protocol, position=Enu(0.0, 0.0, 0.0))
     node.start(0)
     for priority in (PRIORITY_REPORT, PRIORITY_BULK):
-        node.send(filler(40), destination=BROADCAST, priority=priority, app="test", due_ns=0, now_ns=0)
+        node.send(filler(40), destination=BROADCAST, priority=priority, app="test", born_ns=0, now_ns=0)
     return node
 
 

@@ -27,6 +27,7 @@ from fanet_mw.protocol.planner.head import ClusterPlan, Share, slot_delays, work
 from fanet_mw.protocol.planner.turns import Candidate, Superframe, judge, table_for
 from fanet_mw.protocol.topology import Adjacency, within_range
 from fanet_mw.protocol.turn_plan import Fitted, schedule_parts, superframe
+from fanet_mw.protocol.turns import receipt_ns
 from fanet_mw.scenario import Scenario
 from fanet_mw.units import Enu, NodeId, S
 
@@ -278,7 +279,15 @@ def _in_turns(site: Site, found: Fitted | Refused, candidates: Sequence[Candidat
         return _Judged(refused, (), Superframe(superframe(scenario), 0, 0, None), (found.reason,))
     lead_ns, control = scenario.radio.lead_ns, {scenario.leader: schedule_parts(scenario)}
     judged = tuple(
-        judge(found, c, lead_ns=lead_ns, jitter_ns=jitter_ns, control=control.get(c.head, 0)) for c in candidates
+        judge(
+            found,
+            c,
+            lead_ns=lead_ns,
+            receipt_ns=receipt_ns(scenario),
+            jitter_ns=jitter_ns,
+            control=control.get(c.head, 0),
+        )
+        for c in candidates
     )
     turns = Superframe(found.turns, found.table.used, len(found.table.roots()), found.table, found.together)
     return _Judged(judged, parts.missed(found.table.uncovered, leader=scenario.leader), turns)

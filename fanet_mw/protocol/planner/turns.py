@@ -76,8 +76,11 @@ def table_for(
     )
 
 
-def judge(found: Fitted, candidate: Candidate, *, lead_ns: int, jitter_ns: int, control: int = 0) -> ClusterPlan:
-    """One root: its queue before its turns, then the span of the flood. `control`: more urgent packets per period.
+def judge(
+    found: Fitted, candidate: Candidate, *, lead_ns: int, receipt_ns: int, jitter_ns: int, control: int = 0
+) -> ClusterPlan:
+    """One root: its queue before its turns, then the span of the flood, then up to `receipt_ns` until applications
+    have it. `control`: more urgent packets per period.
 
     A turn that lets out k packets counts as k parts of it, one packet each. A packet must be announced before the whole
     turn, which counts as a longer lead; and all of them are through when the turn is.
@@ -93,9 +96,9 @@ def judge(found: Fitted, candidate: Candidate, *, lead_ns: int, jitter_ns: int, 
     offsets = [turn.offset for turn in table.roots() if turn.node == candidate.head]
     duration_ns = max((turns.flood_ns(offset, span=span) for offset in offsets), default=turns.turn_ns)
     server = TurnServer(part_ns, turns.period_ns, parts_ns, lead_ns + turns.turn_ns - part_ns)
-    delays, waiting = _queue(candidate.shares, server, duration_ns - part_ns, jitter_ns, control)
+    delays, waiting = _queue(candidate.shares, server, duration_ns - part_ns + receipt_ns, jitter_ns, control)
     if not jitter_ns and not control and sum(s.sources for s in candidate.shares) == 1:
-        delays = [_alone(s, turns, sorted(offsets), span, together, lead_ns) for s in candidate.shares]
+        delays = [_alone(s, turns, sorted(offsets), span, together, lead_ns + receipt_ns) for s in candidate.shares]
     packets = sum(s.sources * turns.period_ns / s.interval_ns for s in candidate.shares)
     packets += control if packets else 0
     return ClusterPlan(
@@ -112,14 +115,14 @@ def judge(found: Fitted, candidate: Candidate, *, lead_ns: int, jitter_ns: int, 
     )
 
 
-def _alone(share: Share, turns: Turns, offsets: Sequence[int], span: int, together: int, lead_ns: int) -> Outcome:
+def _alone(share: Share, turns: Turns, offsets: Sequence[int], span: int, together: int, around_ns: int) -> Outcome:
     """What the node itself computes for its only class: the longest wait need not be for the longest flood."""
     if not share.sources:
         return Bounded(0)
     worst_ns = turns.worst_ns(offsets, span=span, interval_ns=share.interval_ns, together=together)
     if worst_ns is None:
         return Refused(f"{len(offsets) * together} packets are let out per superframe, more come")
-    return Bounded(worst_ns + lead_ns)
+    return Bounded(worst_ns + around_ns)
 
 
 def _queue(

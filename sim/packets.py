@@ -1,0 +1,83 @@
+"""Which packets the applications sent, and which of them arrived where they were meant to: once per node and packet.
+
+A packet is named by its origin and sequence number. A delivery counts where the packet was meant for the node; a second
+one at the same node is `repeated`: its process has started again, and has forgotten what it had.
+"""
+
+from collections.abc import Mapping
+from dataclasses import dataclass, field, replace
+from typing import Final
+
+from agents.traffic import targets_of
+from fanet_mw.trace import BoundStated, Delivered, Generated, LetOut
+from sim.outcome import Outcome
+
+APPS: Final = ("traffic", "report", "warning")
+Name = tuple[int, int]
+"""(origin, sequence number)."""
+
+
+@dataclass(frozen=True, slots=True)
+class Sent:
+    """One packet at its origin."""
+
+    born_ns: int
+    out_ns: int | None = None
+    """When its first frame could contend; None: it never left."""
+    bound_ns: int | None = None
+    """The delay that its origin promised when it accepted the packet; None: it promised none."""
+
+
+@dataclass(slots=True)
+class Application:
+    """What became of the packets of one application, all nodes together."""
+
+    sent: dict[Name, Sent] = field(default_factory=dict)
+    wanted: int = 0
+    """Packets times the nodes that each was meant for."""
+    deliveries: list[Delivered] = field(default_factory=list)
+    repeated: int = 0
+
+
+def packets_of(outcome: Outcome) -> Mapping[str, Application]:
+    """By application, in the order of `APPS`."""
+    found = {app: Application() for app in APPS}
+    app_of: dict[Name, Application] = {}
+    targets = targets_by_source(outcome)
+    others = outcome.scenario.nodes.count - 1
+    for record in outcome.records:
+        if type(record) is Generated:
+            app = app_of[record.node, record.seq] = found[record.app]
+            app.sent[record.node, record.seq] = Sent(record.t_ns)
+            app.wanted += len(targets[record.node]) if record.app == "traffic" else others
+        elif type(record) is LetOut and (app := app_of.get((record.node, record.seq))):
+            app.sent[record.node, record.seq] = replace(app.sent[record.node, record.seq], out_ns=record.t_ns)
+        elif type(record) is BoundStated and (app := app_of.get((record.node, record.seq))):
+            app.sent[record.node, record.seq] = replace(app.sent[record.node, record.seq], bound_ns=record.bound_ns)
+    had: set[tuple[int, int, int]] = set()
+    for record in outcome.records:
+        if type(record) is not Delivered:
+            continue
+        app = app_of.get((record.origin, record.seq))
+        if app is None or not _is_target(record, app is found["traffic"], targets):
+            continue
+        delivery = record.node, record.origin, record.seq
+        if delivery in had:
+            app.repeated += 1
+        else:
+            had.add(delivery)
+            app.deliveries.append(record)
+    return found
+
+
+def targets_by_source(outcome: Outcome) -> Mapping[int, frozenset[int]]:
+    """Of every node, the nodes that its traffic is meant for."""
+    scenario = outcome.scenario
+    return {node: frozenset(targets_of(scenario, node)) for node in scenario.node_ids}
+
+
+def _is_target(delivered: Delivered, is_traffic: bool, targets: Mapping[int, frozenset[int]]) -> bool:
+    """Whether the packet was meant for this node; reports and warnings are meant for all but their origin."""
+    if is_traffic:
+        return delivered.node in targets[delivered.origin]
+    return delivered.node != delivered.origin

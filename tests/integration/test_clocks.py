@@ -135,5 +135,5 @@ def test_the_slack_of_a_turn_holds_two_clock_errors_and_the_flight(make_scenario
 
 
 def test_no_bound_is_stated_while_the_slack_does_not_hold_the_clocks() -> None:
-    summary = summary_of("clock.sync=beacons", "clock.offset_ms=50", "clusters.turn_slack_us=25")
+    summary = summary_of("clock.sync=beacons", "clock.offset_ms=50", "clusters.turn_slack_us=20")
     assert summary["bound"] == {}

@@ -50,24 +50,28 @@ def packets_of(outcome: Outcome) -> Mapping[str, Application]:
             app = app_of[record.node, record.seq] = found[record.app]
             app.sent[record.node, record.seq] = Sent(record.t_ns)
             app.wanted += len(targets[record.node]) if record.app == "traffic" else others
-        elif type(record) is LetOut and (app := app_of.get((record.node, record.seq))):
-            app.sent[record.node, record.seq] = replace(app.sent[record.node, record.seq], out_ns=record.t_ns)
-        elif type(record) is BoundStated and (app := app_of.get((record.node, record.seq))):
-            app.sent[record.node, record.seq] = replace(app.sent[record.node, record.seq], bound_ns=record.bound_ns)
+        elif isinstance(record, LetOut | BoundStated):
+            name = record.node, record.seq
+            if name in app_of:
+                app_of[name].sent[name] = _known(app_of[name].sent[name], record)
     had: set[tuple[int, int, int]] = set()
     for record in outcome.records:
         if type(record) is not Delivered:
             continue
-        app = app_of.get((record.origin, record.seq))
-        if app is None or not _is_target(record, app is found["traffic"], targets):
+        sender = app_of.get((record.origin, record.seq))
+        if sender is None or not _is_target(record, sender is found["traffic"], targets):
             continue
         delivery = record.node, record.origin, record.seq
         if delivery in had:
-            app.repeated += 1
+            sender.repeated += 1
         else:
             had.add(delivery)
-            app.deliveries.append(record)
+            sender.deliveries.append(record)
     return found
+
+
+def _known(sent: Sent, record: LetOut | BoundStated) -> Sent:
+    return replace(sent, out_ns=record.t_ns) if isinstance(record, LetOut) else replace(sent, bound_ns=record.bound_ns)
 
 
 def targets_by_source(outcome: Outcome) -> Mapping[int, frozenset[int]]:

@@ -74,6 +74,12 @@ class Autopilot:
         ]
         return [_Stream(encode, max(interval_ns, base_ns), due_ns) for interval_ns, encode in wanted]
 
+    def start(self, now_ns: int) -> None:
+        """Telemetry keeps its phase, and begins now."""
+        for stream in self._streams:
+            stream.due_ns += max(0, -((stream.due_ns - now_ns) // stream.interval_ns)) * stream.interval_ns
+        self._due_ns = min((stream.due_ns for stream in self._streams), default=None)
+
     # --- in -------------------------------------------------------------------------------------------------------
 
     def fix(self, gps: Gps) -> None:

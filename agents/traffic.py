@@ -70,6 +70,16 @@ class Traffic:
     def _poisson_ns(self) -> int:
         return round(self._random.expovariate(1 / self._interval_ns)) // US * US
 
+    def start(self, now_ns: int) -> None:
+        """What should have been born before now never was: the process has only just been started."""
+        if self._next_ns is None or now_ns <= self._next_ns:
+            return
+        if self.saturated:
+            self._next_ns = now_ns
+            return
+        while self._next_ns < min(now_ns, self._end_ns):
+            self.advance()
+
     def next_ns(self) -> int | None:
         """When the next packet is born; None when there will be none (or, saturated, none by itself)."""
         if self._next_ns is None or self._next_ns >= self._end_ns:

@@ -68,6 +68,8 @@ class Uav(Actor):
         self._node.records = self._mission.records = self.records
         if self._lookout is not None:
             self._lookout.records = self.records
+        self._traffic.start(now_ns)
+        self._autopilot.start(now_ns)
         self._node.start(now_ns)
         self._settle(now_ns)
         self._own_wake_ns = self._next_own_ns()
@@ -151,7 +153,7 @@ class Uav(Actor):
             self._autopilot.beacon_frames(now_ns), start_ns=max(self._next_hello_ns, now_ns), now_ns=now_ns
         )
         vary = 1 + _HELLO_JITTER * (2 * self._hello_random() - 1)
-        self._next_hello_ns += int(self._hello_ns * vary)
+        self._next_hello_ns = max(self._next_hello_ns + int(self._hello_ns * vary), now_ns)
 
     def _deliver(self, packet: Packet, now_ns: int) -> None:
         """Survivor reports are for the mission, and for whoever inspects us."""

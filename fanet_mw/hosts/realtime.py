@@ -2,8 +2,9 @@
 
     Zenoh's thread -> inbox -> wake-ups of the loop drain it -> actor -> outbox, one put per topic and wake-up
 
-The host never wakes an actor early. How late it wakes it is measured and reported; the lateness of frames, which is
-what matters, is the medium's to count. An actor that raises ends its host, and with it the process.
+The host never wakes an actor early. How late it wakes it, and for how long it could do nothing at all, is measured and
+reported; the lateness of frames is the medium's to count. A wake-up asked for when its instant was past is late from
+then on, and how far past it was is told apart. An actor that raises ends its host, and with it the process.
 """
 
 import asyncio
@@ -23,6 +24,7 @@ from fanet_mw.hosts.lateness import Histogram
 from fanet_mw.messages import Message, Report, TraceBatch
 from fanet_mw.topics import Topics
 from fanet_mw.trace import Record
+from fanet_mw.units import MS, S
 
 _LOOK_EVERY_S: Final = 0.5
 """How often records are published and the router is looked for: what a killed process may lose."""
@@ -44,6 +46,15 @@ class RealtimeHost:
         self._running = False
         self._timer: asyncio.TimerHandle | None = None
         self._timer_ns: int | None = None
+        """What the actor asked for, and the timer is for."""
+        self._due_ns = 0
+        """From when on that wake-up is late."""
+        self._told_ns = 0
+        """The instant that the actor was told last."""
+        self._asked_past_ns = 0
+        """How far past an instant was, at most, when the actor asked for it."""
+        self._stall_ns = 0
+        """The longest that the loop did nothing although it should have."""
         self._records: list[Record] = []
         self._lateness = Histogram()
         self._puts = 0
@@ -65,7 +76,8 @@ class RealtimeHost:
         gc.freeze()  # what start-up made stays: the collector need not look at it again in the middle of a slot
         self._running = True
         try:
-            self._actor.start(self.now_ns())
+            self._told_ns = self.now_ns()
+            self._actor.start(self._told_ns)
             self._settle()
             self._drain()
             await self._watch(until_ns, listener)
@@ -88,9 +100,9 @@ class RealtimeHost:
         looks = 0
         try:
             while (left_s := self._clock.wait_s(until_ns)) > 0:
-                await asyncio.wait(
-                    (stopped, self._failure), timeout=min(left_s, _LOOK_EVERY_S), return_when=asyncio.FIRST_COMPLETED
-                )
+                wait_s, began_s = min(left_s, _LOOK_EVERY_S), self._loop.time()
+                await asyncio.wait((stopped, self._failure), timeout=wait_s, return_when=asyncio.FIRST_COMPLETED)
+                self._stall_ns = max(self._stall_ns, round((self._loop.time() - began_s - wait_s) * S))
                 if self._failure.done():
                     break
                 if stopped.done():
@@ -144,12 +156,15 @@ class RealtimeHost:
                 self._failure.set_exception(error)
 
     def _take_inbox(self) -> None:
-        actor = self._actor
-        more = self._inbox.deliver(lambda topic, message: actor.receive(topic, message, self.now_ns()))
+        more = self._inbox.deliver(self._receive)
         self._settle()
         if more and not self._drain_asked:  # timers, the clock and reports have their turn before the rest
             self._drain_asked = True
             self._loop.call_soon(self._drain)
+
+    def _receive(self, topic: str, message: Message) -> None:
+        self._told_ns = self.now_ns()
+        self._actor.receive(topic, message, self._told_ns)
 
     # --- time -----------------------------------------------------------------------------------------------------
 
@@ -164,9 +179,13 @@ class RealtimeHost:
             return
         if self._timer is not None:
             self._timer.cancel()
-        self._timer_ns = wake_ns
+        self._timer_ns, self._timer = wake_ns, None
+        if wake_ns is None:
+            return
         assert self._clock is not None, "the clock is running"
-        self._timer = None if wake_ns is None else self._loop.call_later(self._clock.wait_s(wake_ns), self._wake)
+        self._due_ns = max(wake_ns, self._told_ns)
+        self._asked_past_ns = max(self._asked_past_ns, self._told_ns - wake_ns)
+        self._timer = self._loop.call_later(self._clock.wait_s(wake_ns), self._wake)
 
     def _wake(self) -> None:
         self._guard(self._wake_actor)
@@ -175,7 +194,10 @@ class RealtimeHost:
         due_ns, now_ns = self._timer_ns, self.now_ns()
         self._timer = self._timer_ns = None
         if due_ns is not None and now_ns >= due_ns:  # else the loop's clock is a little fast: come again
-            self._lateness.add(now_ns - due_ns)
+            late_ns = now_ns - self._due_ns
+            self._lateness.add(late_ns)
+            self._stall_ns = max(self._stall_ns, late_ns)
+            self._told_ns = now_ns
             self._actor.wake(now_ns)
         self._settle()
 
@@ -213,6 +235,8 @@ class RealtimeHost:
         usage = resource.getrusage(resource.RUSAGE_SELF)
         return {
             "wake_lateness_ms": self._lateness.summary(),
+            "asked_past_ms": round(self._asked_past_ns / MS, 3),
+            "stall_ms": round(self._stall_ns / MS, 3),
             "cpu_s": round(usage.ru_utime + usage.ru_stime, 3),
             "uss_mb": uss_mb() if final else None,  # asking holds up the process for more than a millisecond
             "puts": self._puts,

@@ -82,9 +82,9 @@ class OwnRelease(RootRelease):
 class Load:
     """How many lots a node wants: by what it had to send, against the turns of its claim."""
 
-    def __init__(self) -> None:
+    def __init__(self, now_ns: int) -> None:
         self._pushed = 0
-        self._since_ns = 0
+        self._since_ns = now_ns
         self._said: deque[int] = deque([0] * _SAID, maxlen=_SAID)
 
     def push(self) -> None:
@@ -123,7 +123,7 @@ class Claimed(Clustered):
         self._near = Neighborhood(
             port.node, lifetime_ns=int(_LIFETIMES * self._hello_ns), rank=lambda _, standing: _rank(standing.slot)
         )
-        self._load = Load()
+        self._load = Load(0)
         self._longest = longest_superframe(self._own.turns)
         self._claims = self._new_claims(0)
         self._known_ns = 0
@@ -145,8 +145,10 @@ class Claimed(Clustered):
         )
 
     def start(self, now_ns: int) -> None:
-        """No join: nobody assigns anything."""
+        """No join: nobody assigns anything, and every node obeys none but itself."""
+        self._upkeep.start(now_ns, leads=True)
         self._claims = self._new_claims(now_ns)
+        self._load = Load(now_ns)
         self._known_ns = now_ns + _LISTEN * self._hello_ns
 
     def _do(self, actions: Sequence[Action], now_ns: int) -> None:

@@ -25,9 +25,11 @@ from fanet_mw.messages import (
     WifiScan,
 )
 from fanet_mw.radio_control import Cut, Degrade, Jam, Restore
+from fanet_mw.routing import PROTOCOLS, RELAYS
 from fanet_mw.scenario import Clock, Scenario
 from fanet_mw.topics import Topics
-from fanet_mw.units import MS, Enu, NodeId
+from fanet_mw.trace import Generated
+from fanet_mw.units import MS, Enu, NodeId, S
 from fanet_mw.wire_messages import Join, Member, Schedule, Survivor, TimeBeacon
 from sim import catalog
 from sim.world import World
@@ -132,3 +134,57 @@ def test_any_messages_on_any_topics_never_raise_and_the_actor_lives_on(
         actor.records.clear()
     actor.stop(now_ns)
     assert actor.report()["kind"] in ("agent", "emulator", "world")
+
+
+# --- started in the middle of a run -----------------------------------------------------------------------------------
+
+LATE_NS = 30 * S
+RULES = [*({"routing.protocol": name} for name in PROTOCOLS), *({"clusters.relay": name} for name in RELAYS)]
+ARRIVALS = ["cbr", "poisson", "saturated"]
+
+
+def late_scenario(make_scenario: Callable[..., Scenario], **keys: object) -> Scenario:
+    """Ten packets a second, due since second 5, when an actor is started at second 30."""
+    return make_scenario(
+        **{"nodes.count": 4, "nodes.telemetry_hz": 4, "duration_s": 60, "warmup_s": 5, "clusters.repair_s": 0,
+           "traffic.sources": "all", "traffic.interval_s": 0.1, "mission.survivors": 1, **keys}
+    )  # fmt: skip
+
+
+def live(actor: Actor, *, until_ns: int) -> tuple[list[int], list[Generated]]:
+    """Start an actor late; returns by how much each instant it asked for was past, and its packets."""
+    now_ns, behind, packets = LATE_NS, [], []
+    actor.start(now_ns)
+    while (wake_ns := actor.next_wake_ns()) is not None and wake_ns <= until_ns:
+        behind.append(max(0, now_ns - wake_ns))
+        now_ns = max(now_ns, wake_ns)
+        actor.wake(now_ns)
+        packets += [record for record in actor.records if isinstance(record, Generated)]
+        actor.outbox.clear()
+        actor.records.clear()
+        assert len(behind) < 10_000, "an actor that lets no time pass"
+    return behind, packets
+
+
+@pytest.mark.parametrize("arrivals", ARRIVALS)
+@pytest.mark.parametrize("rule", RULES, ids=lambda rule: "-".join(rule.values()))
+@pytest.mark.parametrize("node", [1, 2])
+def test_a_uav_that_is_started_late_asks_for_nothing_past_and_sends_nothing_of_before(
+    make_scenario: Callable[..., Scenario], rule: dict[str, str], node: int, arrivals: str
+) -> None:
+    scenario = late_scenario(make_scenario, **rule, **{"traffic.arrivals": arrivals})
+    uav = Uav(scenario, NodeId(node), "contract", position=Enu(0, 0, 50))
+    behind, packets = live(uav, until_ns=LATE_NS + S)
+    assert max(behind) <= scenario.radio.lead_ns, "but a packet that is due within the lead is announced at once"
+    assert min(packet.t_ns for packet in packets) >= LATE_NS
+    most = 30 if arrivals != "saturated" else 50
+    assert 3 <= len(packets) <= most, "not also the 250 that were due before"
+
+
+@pytest.mark.parametrize("make", MAKERS, ids=["leader", "member", "beacons", "gps", "medium", "world"])
+def test_an_actor_that_is_started_late_asks_for_nothing_past(
+    make_scenario: Callable[..., Scenario], make: Callable[[Scenario], Actor]
+) -> None:
+    scenario = late_scenario(make_scenario, **{"world.engine": "kinematic"})
+    behind, _ = live(make(scenario), until_ns=LATE_NS + S)
+    assert max(behind, default=0) <= scenario.radio.lead_ns

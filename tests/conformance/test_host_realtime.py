@@ -143,6 +143,40 @@ async def test_one_wake_up_is_one_put_per_topic_and_every_record_arrives_once() 
     assert host["uss_mb"] > 1
 
 
+class AsksForThePast(Ticker):
+    """Asks for an instant ten seconds back, once."""
+
+    def start(self, now_ns: int) -> None:
+        self.next_ns = now_ns - 10 * S
+
+
+async def test_an_instant_that_was_past_when_it_was_asked_for_is_not_the_hosts_lateness() -> None:
+    actor = AsksForThePast()
+    observer = await run(actor, until_ns=600 * MS)
+    host = observer.reports()[-1]["host"]
+    assert isinstance(host, dict)
+    assert actor.wakes > 3
+    assert 10_000 <= host["asked_past_ms"] < 10_500
+    assert host["wake_lateness_ms"]["max"] < 500
+    assert host["stall_ms"] < 500
+
+
+class HoldsUp(Ticker):
+    """Keeps the loop from everything for 0.4 s, once."""
+
+    def wake(self, now_ns: int) -> None:
+        super().wake(now_ns)
+        if self.wakes == 5:
+            time.sleep(0.4)
+
+
+async def test_a_host_that_could_do_nothing_for_a_while_says_for_how_long() -> None:
+    observer = await run(HoldsUp(), until_ns=1000 * MS)
+    host = observer.reports()[-1]["host"]
+    assert isinstance(host, dict)
+    assert 250 < host["stall_ms"] < 1000
+
+
 async def test_a_stopped_clock_ends_the_actor_early_and_settles_it() -> None:
     actor = Ticker()
     began = time.monotonic()

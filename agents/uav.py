@@ -42,6 +42,8 @@ class Uav(Actor):
         self._setpoint_topic = topics.setpoint(node)
         self._tap_topic = topics.mavlink(node)
         self._lead_ns = scenario.radio.lead_ns
+        self._prompt_ns = scenario.radio.handover_ns + scenario.radio.lead_ns
+        """After the end of a frame: who hears of it later than this is too late for what comes a lead after it."""
         self._destination = BROADCAST if scenario.traffic.destination == "all" else NodeId(scenario.traffic.destination)
         self._filler = wire.filler(scenario.traffic.payload_bytes - wire.HEADER_BYTES, node=node)
         self._node = Node(node, scenario, make_protocol, position=position)
@@ -57,6 +59,8 @@ class Uav(Actor):
         """When traffic, hello or telemetry is due; changes at a wake-up only."""
         self._generated = 0
         self._malformed = 0
+        self._heard_late = 0
+        """Receptions that were handed over too late."""
         self._bad_positions = 0
         """Hellos whose position is none, or not of now: of no use to the lookout."""
 
@@ -77,6 +81,8 @@ class Uav(Actor):
     def receive(self, topic: str, message: Message, now_ns: int) -> bool:
         if type(message) is Reception:
             node = self._node
+            if now_ns - message.end_ns > self._prompt_ns:
+                self._heard_late += 1
             if node.hear(message, now_ns):
                 return True  # a copy, and nothing came of it, as of most
             if self._lookout is not None:
@@ -128,7 +134,13 @@ class Uav(Actor):
         self._node.clock_error_ns = error_ns
 
     def report(self) -> Mapping[str, Any]:
-        own = {"kind": "agent", "node": self._id, "generated": self._generated, "bus_malformed": self._malformed}
+        own = {
+            "kind": "agent",
+            "node": self._id,
+            "generated": self._generated,
+            "bus_malformed": self._malformed,
+            "heard_late": self._heard_late,
+        }
         if self._lookout is not None:
             own["bad_positions"] = self._bad_positions
         return own | dict(self._node.report())

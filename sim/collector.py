@@ -169,6 +169,11 @@ class Collector:
         with self._lock:
             return {name: self._reports[name] for name in sorted(self._reports)}
 
+    def unfinished(self) -> set[str]:
+        """Who has not yet sent its last report."""
+        with self._lock:
+            return {name for name in self._plausible.node_of if not self._reports.get(name, {}).get("final")}
+
     def absent(self) -> dict[str, str]:
         """Why there is no report of an actor, by name."""
         with self._lock:

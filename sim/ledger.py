@@ -61,7 +61,9 @@ def _differences(outcome: Outcome, requests: Mapping[str, Mapping[str, int]]) ->
 def _cut_short(outcome: Outcome, name: str) -> bool:
     """Whether an actor's report does not cover all of its run."""
     report = outcome.reports.get(name)
-    return report is None or report.get("final") is False or any(ended == name for ended, _ in outcome.ended)
+    if report is None or any(ended == name for ended, _ in outcome.ended):
+        return True
+    return outcome.mode == "realtime" and not report.get("final")
 
 
 def copies(outcome: Outcome) -> dict[str, Any]:

@@ -23,7 +23,7 @@ from fanet_mw.trace import (
     Dropped,
 )
 from fanet_mw.units import S
-from sim import delays, ledger
+from sim import delays, ledger, validity
 from sim.bounds import against_bounds
 from sim.clocks import clock_errors
 from sim.outcome import Outcome
@@ -38,7 +38,12 @@ def summarize(outcome: Outcome, *, trace_sha256: str) -> dict[str, Any]:
     sent = packets_of(outcome)
     packets = _packets(outcome, sent)
     emulator = outcome.reports.get("emulator", {})
+    frames, lateness = ledger.frames(outcome), _lateness(outcome, emulator)
+    disturbance = validity.measures(outcome, frames=frames, late_share=lateness["share"])
+    reasons = validity.reasons(outcome, frames=frames, disturbance=disturbance)
     return {
+        "valid": not reasons,
+        "invalid_because": reasons,
         "scenario": scenario.name,
         "seed": scenario.seed,
         "mode": outcome.mode,
@@ -49,10 +54,13 @@ def summarize(outcome: Outcome, *, trace_sha256: str) -> dict[str, Any]:
         **packets["traffic"],
         "reports": packets["report"],
         "warnings": packets["warning"],
-        "frames": ledger.frames(outcome),
+        "frames": frames,
         "copies": ledger.copies(outcome),
         "air": emulator.get("air", {}),
-        "lateness": _lateness(outcome, emulator),
+        "lateness": lateness,
+        "disturbance": {
+            name: {"value": round(measure.value, 6), "limit": measure.limit} for name, measure in disturbance.items()
+        },
         "bound": against_bounds(sent),
         "clock": clock_errors(outcome),
         "admission": _admission(outcome),

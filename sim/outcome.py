@@ -36,3 +36,5 @@ class Outcome:
     """Real time: puts that the launcher heard, and what of them was refused, by what was wrong."""
     absent: Mapping[str, str] = field(default_factory=dict)
     """Real time: why there is no report of an actor, by its name."""
+    stall_ms: float = 0.0
+    """Real time: the longest that the launcher, and the bus with it, could do nothing."""

@@ -38,11 +38,17 @@ Share = Annotated[float, Field(ge=0, le=1)]
 Reasons = dict[str, Count]
 
 
+class _Host(BaseModel):
+    model_config = ConfigDict(extra="allow", strict=True)
+    stall_ms: Number = 0.0
+
+
 class _Shape(BaseModel):
     """Keys that are read must be there; whatever else a report holds is carried along."""
 
     model_config = ConfigDict(extra="allow", strict=True)
     final: bool = False
+    host: _Host | None = None
 
 
 class _Frames(_Shape):
@@ -101,6 +107,7 @@ class _World(_Shape):
     kind: Literal["world"]
     engine: str
     ticks: Count
+    skipped_ticks: Count = 0
     collisions: Count
     separation: _Separation
     malformed: Count
@@ -113,6 +120,7 @@ class _Agent(_Shape):
     bus_malformed: Count
     frames_sent: Count
     receptions: Count
+    heard_late: Count = 0
     dropped: Reasons
     missed_turns: Count | None = None
     bound_ms: Number | None = None

@@ -83,7 +83,7 @@ def _network_rows(summary: Mapping[str, Any]) -> Iterator[tuple[str, str]]:
         yield (
             "lateness",
             f"{late['late_frames']} of {late['frames']} frames late ({late['share']:.2%}, limit {late['limit']:.1%}), "
-            f"worst {late['max_ms']:.1f} ms: {'valid' if late['valid'] else 'NOT VALID'}",
+            f"worst {late['max_ms']:.1f} ms",
         )
 
 
@@ -140,14 +140,10 @@ def _warnings(summary: Mapping[str, Any]) -> Iterator[str]:
     if heard and heard["malformed"]:
         what = ", ".join(f"{why} {count}" for why, count in heard["why"].items())
         yield f"Heard on the bus and refused: {what}"
-    for name, why in summary["absent"].items():
-        yield f"Counted without {name}: {why}"
-    if summary["aborted"]:
-        yield f"Partial result: {summary['aborted']}"
-    for item in summary["processes"]["ended"]:
-        yield f"{item['name']} ended before its time, exit code {item['exit_code']}"
-    if not summary["lateness"]["valid"] and not summary["aborted"]:
+    for reason in summary["invalid_because"]:
+        yield f"NOT VALID: {reason}"
+    if any(item["value"] > item["limit"] for item in summary["disturbance"].values()):
         yield (
-            "This machine could not hold real time: the result is not valid. "
+            "This machine could not hold real time. "
             "Lower the load, raise radio.lead_ms, or slow the swarm clock with --set time_scale=0.5"
         )

@@ -37,6 +37,8 @@ _AGENT_NICE: Final = 10
 READY_TIMEOUT_S: Final = 60.0
 _GRACE_S: Final = 5.0
 """After the end of the swarm's time, for last reports."""
+_LAST_WORDS_S: Final = 1.0
+"""After the end of all processes, for what they said last: it may still be on its way through the bus."""
 _MAX_RESPAWNS: Final = 5
 """Of one name: a process that cannot live is not started for ever."""
 _PROGRESS_S: Final = 0.25
@@ -82,6 +84,8 @@ class Swarm:
         self._ended: list[tuple[str, int]] = []
         self._obituaries: list[Record] = []
         self._respawns: dict[str, int] = {}
+        self._stall_s = 0.0
+        """The longest that this process did nothing although it should have."""
 
     async def run(self, on_progress: Callable[[float], None]) -> Outcome:
         """Start, run, collect. Whatever happens, no process is left."""
@@ -114,6 +118,7 @@ class Swarm:
                 epoch_unix_ns=self._keeper.clock.epoch_unix_ns if self._keeper.clock else 0,
                 heard=collector.figures(),
                 absent=collector.absent(),
+                stall_ms=self._stall_s * 1000,
             )
 
     def _records(self) -> list[Record]:
@@ -155,14 +160,21 @@ class Swarm:
         assert self._clock is not None, "the clock was started"
         while self._clock.wait_s(self._scenario.duration_ns) > 0 and not self._over.is_set():
             on_progress(max(0.0, self._clock.now_ns() / S))
-            try:
+            began_s = time.monotonic()
+            with contextlib.suppress(TimeoutError):
                 await asyncio.wait_for(self._over.wait(), _PROGRESS_S)
-            except TimeoutError:
-                continue
+            self._stall_s = max(self._stall_s, time.monotonic() - began_s - _PROGRESS_S)
 
     async def _wind_up(self) -> None:
         """Everyone stops by the clock, or is told to; last reports come in."""
         self._over.set()
+        await self._end_processes()
+        dead = {name for name, _ in self._ended}
+        end_s = time.monotonic() + _LAST_WORDS_S
+        while self._collector.unfinished() - dead and time.monotonic() < end_s:  # noqa: ASYNC110  (other threads fill it)
+            await asyncio.sleep(_LAST_WORDS_S / 20)
+
+    async def _end_processes(self) -> None:
         if self._aborted is not None:
             self._keeper.stop()
         if not await self.processes.wait(_GRACE_S):

@@ -83,6 +83,8 @@ class World(Actor):
         self._tick_ns: int | None = None
         self._last_ns = 0
         self._ticks = 0
+        self._skipped = 0
+        """Ticks that came too late for anybody to use them."""
         self._collisions = 0
         self._separation = (
             Separation(scenario.mission.collision_distance_m) if scenario.mission.collision_distance_m else None
@@ -123,6 +125,7 @@ class World(Actor):
         behind = (now_ns - self._tick_ns) // self._period_ns
         if behind > 0:  # a stalled host: skip instants nobody can use any more, keep the phase
             self._tick_ns += behind * self._period_ns
+            self._skipped += behind
 
     def next_wake_ns(self) -> int | None:
         return self._tick_ns
@@ -135,6 +138,7 @@ class World(Actor):
             "kind": "world",
             "engine": self._engine.name,
             "ticks": self._ticks,
+            "skipped_ticks": self._skipped,
             "collisions": self._collisions,
             "separation": {} if self._separation is None else self._separation.report(),
             "malformed": self._malformed,

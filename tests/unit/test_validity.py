@@ -1,0 +1,219 @@
+"""May a result be used? Every reason why not, alone, and the limits from both sides."""
+
+from collections.abc import Callable
+from typing import Any
+
+import pytest
+
+from agents.uav import Uav
+from fanet_mw.messages import Reception
+from fanet_mw.scenario import Scenario
+from fanet_mw.topics import Topics
+from fanet_mw.units import MS, Enu, NodeId, S
+from sim import validity
+from sim.metrics import summarize
+from sim.outcome import Outcome
+from sim.report import show
+from sim.world import World
+
+SENT = 2000
+"""Requests of each of the two nodes."""
+HEARD = 10_000
+Change = Callable[[Outcome], object]
+
+
+@pytest.fixture
+def scenario(make_scenario: Any) -> Scenario:
+    scenario: Scenario = make_scenario(**{"nodes.count": 2})
+    return scenario
+
+
+def agent(node: int) -> dict[str, Any]:
+    return {
+        "kind": "agent", "node": node, "final": True, "frames_sent": SENT, "receptions": HEARD, "heard_late": 0,
+        "missed_turns": 0, "host": {"stall_ms": 3.0},
+    }  # fmt: skip
+
+
+def good(scenario: Scenario) -> Outcome:
+    """A run in real time with which nothing is wrong."""
+    total = 2 * SENT
+    emulator = {
+        "kind": "emulator", "final": True, "host": {"stall_ms": 2.0},
+        "frames": {"sent": total, "delivered": total, "in_flight": 0, "dropped": {}},
+        "requests": {str(node): {"all": SENT, "before_restart": 0} for node in (1, 2)},
+        "copies": {"on_air": 2 * HEARD, "received": 2 * HEARD, "lost": {}},
+        "late": {"frames": total, "late_frames": 0}, "handed": {"1": HEARD, "2": HEARD},
+    }  # fmt: skip
+    world = {"kind": "world", "final": True, "ticks": 1000, "skipped_ticks": 0, "host": {"stall_ms": 1.0}}
+    reports: dict[str, Any] = {"emulator": emulator, "world": world, "agent-1": agent(1), "agent-2": agent(2)}
+    return Outcome(scenario, "realtime", 10.0, [], reports)
+
+
+def reasons(outcome: Outcome) -> list[str]:
+    summary = summarize(outcome, trace_sha256="")
+    assert list(summary)[:2] == ["valid", "invalid_because"], "the first thing that anybody sees"
+    assert summary["valid"] == (not summary["invalid_because"])
+    found: list[str] = summary["invalid_because"]
+    return found
+
+
+def test_a_run_with_which_nothing_is_wrong_is_valid(scenario: Scenario) -> None:
+    assert reasons(good(scenario)) == []
+
+
+def put(outcome: Outcome, name: str, *path: str, value: object) -> None:
+    content: Any = outcome.reports[name]
+    for key in path[:-1]:
+        content = content[key]
+    content[path[-1]] = value
+
+
+def lose_requests(outcome: Outcome, share: float) -> None:
+    lost = round(2 * SENT * share)
+    put(outcome, "emulator", "frames", "dropped", value={"bus": lost})
+    put(outcome, "emulator", "frames", "delivered", value=2 * SENT - lost)
+
+
+MEASURED: dict[str, tuple[float, Callable[[Outcome, float], object]]] = {
+    "frames announced too late": (
+        0.01, lambda outcome, share: put(outcome, "emulator", "late", "late_frames", value=round(share * 2 * SENT))
+    ),
+    "requests lost on the bus": (validity.LOST_ON_BUS, lose_requests),
+    "receptions lost on the bus": (
+        validity.COPIES_LOST,
+        lambda outcome, share: put(outcome, "agent-2", "receptions", value=HEARD - round(2 * HEARD * share)),
+    ),
+    "receptions handed over too late": (
+        validity.HEARD_LATE,
+        lambda outcome, share: put(outcome, "agent-1", "heard_late", value=round(2 * HEARD * share)),
+    ),
+    "turns missed, of all requests": (
+        validity.MISSED_TURNS,
+        lambda outcome, share: put(outcome, "agent-1", "missed_turns", value=round(2 * SENT * share)),
+    ),
+    "ticks that the world skipped": (
+        validity.SKIPPED_TICKS,
+        lambda outcome, share: put(outcome, "world", "skipped_ticks", value=round(1000 * share / (1 - share))),
+    ),
+    "longest standstill of a process": (
+        validity.STALL_MS, lambda outcome, ms: put(outcome, "agent-2", "host", "stall_ms", value=ms)
+    ),
+}  # fmt: skip
+
+
+@pytest.mark.parametrize(("what", "limit", "disturb"), [(k, *v) for k, v in MEASURED.items()], ids=MEASURED.keys())
+def test_each_measure_makes_a_run_invalid_above_its_limit_and_not_below(
+    scenario: Scenario, what: str, limit: float, disturb: Callable[[Outcome, float], object]
+) -> None:
+    below, above = good(scenario), good(scenario)
+    disturb(below, 0.9 * limit)
+    disturb(above, 1.2 * limit)
+    assert reasons(below) == []
+    (why,) = reasons(above)
+    assert why.startswith(what)
+    assert "limit" in why
+    disturbance = summarize(above, trace_sha256="")["disturbance"]
+    assert [name for name, item in disturbance.items() if item["value"] > item["limit"]] != []
+
+
+BROKEN: dict[str, tuple[Change, str]] = {
+    "a dead agent": (
+        lambda outcome: outcome.ended.append(("agent-2", -9)),
+        "agent-2 ended before its time, with signal SIGKILL; none may",
+    ),
+    "a dead world": (
+        lambda outcome: outcome.ended.append(("world", 1)),
+        "world ended before its time, with exit code 1; none may",
+    ),
+    "aborted": (lambda outcome: setattr(outcome, "aborted", "interrupted"), "partial result: interrupted"),
+    "no report": (
+        lambda outcome: setattr(outcome, "absent", {"world": "no report was heard"}),
+        "no report of world (no report was heard); all must report",
+    ),
+    "no last report": (
+        lambda outcome: put(outcome, "agent-1", "final", value=False), "no last report of agent-1: 1, limit 0"
+    ),
+    "unasked frames": (
+        lambda outcome: put(outcome, "agent-1", "frames_sent", value=SENT - 3),
+        "frames that no node asked for: 3, limit 0",
+    ),
+    "a lost trace": (
+        lambda outcome: setattr(outcome, "heard", {"why": {"trace: disk": 7}}),
+        "trace records or puts not kept (disk): 7, limit 0",
+    ),
+    "the launcher stood still": (
+        lambda outcome: setattr(outcome, "stall_ms", 5200.0),
+        "longest standstill of a process: 5200 ms (the launcher), limit 500 ms",
+    ),
+}  # fmt: skip
+
+
+@pytest.mark.parametrize(("change", "why"), BROKEN.values(), ids=BROKEN.keys())
+def test_whatever_is_broken_makes_a_run_invalid_and_is_said(scenario: Scenario, change: Change, why: str) -> None:
+    outcome = good(scenario)
+    change(outcome)
+    assert reasons(outcome) == [why]
+
+
+def test_frames_that_a_dead_emulator_took_with_it_are_said_besides_its_death(scenario: Scenario) -> None:
+    outcome = good(scenario)
+    outcome.ended.append(("emulator", -9))
+    put(outcome, "emulator", "requests", "1", "all", value=SENT - 185)
+    put(
+        outcome,
+        "emulator",
+        "frames",
+        value={"sent": 2 * SENT - 185, "delivered": 2 * SENT - 185, "in_flight": 0, "dropped": {}},
+    )
+    assert reasons(outcome) == [
+        "emulator ended before its time, with signal SIGKILL; none may",
+        "frames unaccounted for: 185 of 4000, limit 0",
+    ]
+
+
+def test_a_run_in_virtual_time_is_judged_by_its_ledger_alone(scenario: Scenario) -> None:
+    outcome = good(scenario)
+    outcome.mode = "virtual"
+    for name in outcome.reports:
+        del outcome.reports[name]["final"], outcome.reports[name]["host"]  # type: ignore[attr-defined]
+    assert reasons(outcome) == []
+    put(outcome, "agent-1", "frames_sent", value=SENT + 1)
+    assert reasons(outcome) == ["frames unaccounted for: 1 of 4001, limit 0"]
+
+
+def test_every_reason_is_printed(scenario: Scenario, capsys: pytest.CaptureFixture[str]) -> None:
+    from sim.console import Console
+
+    outcome = good(scenario)
+    outcome.ended.append(("agent-2", -9))
+    put(outcome, "agent-1", "host", "stall_ms", value=900.0)
+    summary = summarize(outcome, trace_sha256="") | {"air": {}}
+    show(summary, Console(width=200))
+    printed = capsys.readouterr().out
+    for reason in summary["invalid_because"]:
+        assert f"NOT VALID: {reason}" in printed
+    assert len(summary["invalid_because"]) == 2
+
+
+# --- where the measures come from -------------------------------------------------------------------------------------
+
+
+@pytest.mark.parametrize(("after_ms", "late"), [(65, 0), (66, 1)])
+def test_a_reception_is_late_beyond_a_handover_and_a_lead(make_scenario: Any, after_ms: int, late: int) -> None:
+    scenario = make_scenario(**{"radio.handover_ms": 20, "radio.lead_ms": 45})
+    uav = Uav(scenario, NodeId(1), "late", position=Enu(0, 0, 50))
+    uav.start(0)
+    uav.receive(Topics("late").radio_rx(1), Reception(b"noise", NodeId(2), 1 * S, -60.0), 1 * S + after_ms * MS)
+    assert uav.report()["heard_late"] == late
+
+
+def test_a_world_that_was_held_up_says_how_many_ticks_nobody_got(make_scenario: Any) -> None:
+    keys = {"mobility.model": "formation", "mobility.speed_m_s": 5, "world.engine": "kinematic", "world.tick_ms": 100}
+    world = World(make_scenario(**keys), "late")
+    world.start(0)
+    world.wake(100 * MS)
+    assert world.report()["skipped_ticks"] == 0
+    world.wake(5200 * MS)
+    assert world.report()["skipped_ticks"] == 49
+    assert world.next_wake_ns() == 5200 * MS, "the last of them is still of use"

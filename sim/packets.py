@@ -50,12 +50,12 @@ def packets_of(outcome: Outcome) -> Mapping[str, Application]:
             app = app_of[record.node, record.seq] = found[record.app]
             app.sent[record.node, record.seq] = Sent(record.t_ns)
             app.wanted += len(targets[record.node]) if record.app == "traffic" else others
-        elif isinstance(record, LetOut | BoundStated):
+    had: set[tuple[int, int, int]] = set()
+    for record in outcome.records:
+        if isinstance(record, LetOut | BoundStated):  # in real time it may come before the packet's own, at one instant
             name = record.node, record.seq
             if name in app_of:
                 app_of[name].sent[name] = _known(app_of[name].sent[name], record)
-    had: set[tuple[int, int, int]] = set()
-    for record in outcome.records:
         if type(record) is not Delivered:
             continue
         sender = app_of.get((record.origin, record.seq))

@@ -5,7 +5,7 @@ from typing import Any
 import pytest
 
 from fanet_mw.scenario import Scenario
-from fanet_mw.trace import Delivered, Generated, Record
+from fanet_mw.trace import BoundStated, Delivered, Generated, Record
 from fanet_mw.units import MS, S
 from sim.metrics import summarize
 from sim.outcome import Outcome
@@ -61,3 +61,13 @@ def test_who_is_no_target_of_the_traffic_does_not_count(make_scenario: Any) -> N
     chosen = make_scenario(**{"nodes.count": 4, "traffic.sources": "all", "traffic.targets": [1]})
     summary = summary_of(chosen, generated("traffic"), delivered(3), delivered(4))
     assert (summary["delivered"], summary["pdr"]) == (0, 0.0)
+
+
+def test_a_bound_counts_whether_its_record_comes_before_or_after_the_packets_own(scenario: Scenario) -> None:
+    """In real time, records of one instant are in the order of their kinds' names."""
+    stated = BoundStated(5 * S, 2, A_PACKET, 15 * MS)
+    deliveries = [delivered(1), delivered(3, after_ms=20), delivered(4)]
+    before = summary_of(scenario, stated, generated("traffic"), *deliveries)["bound"]
+    after = summary_of(scenario, generated("traffic"), stated, *deliveries)["bound"]
+    assert before == after
+    assert (after["deliveries"], after["violations"]) == (3, 1)

@@ -24,6 +24,7 @@ from fanet_mw.scenario import Scenario
 from fanet_mw.topics import Topics
 from fanet_mw.trace import ProcessEnded, Record, kind_of
 from fanet_mw.units import NodeId, S
+from sim import limits
 from sim.clocks import true_delays
 from sim.collector import Collector
 from sim.layout import positions
@@ -232,8 +233,10 @@ async def launch(
 
     What is collected waits in temporary files in `spool_folder`; by default where the system keeps such files.
 
-    Raises BusError when the bus cannot be had or the swarm does not come up.
+    Raises BusError when the bus cannot be had or the swarm does not come up, ConfigError when a limit of the machine
+    is too low.
     """
+    limits.prepare(processes=len(expected_names(scenario)))
     bus, endpoint = _bus(listen, connect)
     with bus:
         run = Swarm(

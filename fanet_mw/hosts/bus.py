@@ -107,10 +107,13 @@ class Bus:
             self._session.close()  # type: ignore[no-untyped-call]  # zenoh's stub lacks it
 
     def subscribe(self, expression: str, on_sample: OnSample) -> None:
-        """Hear a key expression for the life of the session."""
-        self._session.declare_subscriber(
-            expression, lambda sample: on_sample(str(sample.key_expr), sample.payload.to_bytes())
-        )
+        """Hear a key expression for the life of the session; raises BusError when no thread can be had for it."""
+        try:
+            self._session.declare_subscriber(
+                expression, lambda sample: on_sample(str(sample.key_expr), sample.payload.to_bytes())
+            )
+        except RuntimeError as error:
+            raise BusError(f"cannot listen to {expression}: {error} (see ulimit -u and ulimit -v)") from error
 
     def put(self, topic: str, payload: bytes, *, reliable: bool = False) -> None:
         """Publish; without a router it is dropped (see `check`). Raises BusError on a session that was closed."""

@@ -1,0 +1,35 @@
+"""A machine that does not give enough: one message before anything is started, no traceback and nothing left behind."""
+
+import resource
+import subprocess
+import sys
+
+import pytest
+
+from fanet_mw.errors import ConfigError
+from sim import limits
+
+
+@pytest.mark.parametrize(
+    ("limit", "what"),
+    [
+        ("ulimit -n 40", "11 processes need 81 open files in the launcher; the limit is 40 (ulimit -n)"),
+        ("ulimit -v 600000", "needs 2048 MiB of address space; the limit is 585 MiB (ulimit -v)"),
+    ],
+)
+def test_a_limit_that_is_too_low_is_one_message(limit: str, what: str) -> None:
+    shell = f"{limit}; exec {sys.executable} -m sim.cli launch quick"
+    done = subprocess.run(["bash", "-c", shell], capture_output=True, text=True, timeout=60, check=False)
+    assert done.returncode == 2
+    assert len(done.stderr.splitlines()) == 1
+    assert what in done.stderr
+
+
+def test_a_soft_limit_of_open_files_is_raised_as_far_as_needed(monkeypatch: pytest.MonkeyPatch) -> None:
+    given = {resource.RLIMIT_NOFILE: (40, 189), resource.RLIMIT_AS: (resource.RLIM_INFINITY, resource.RLIM_INFINITY)}
+    monkeypatch.setattr(resource, "getrlimit", given.__getitem__)
+    monkeypatch.setattr(resource, "setrlimit", given.__setitem__)
+    limits.prepare(processes=47)
+    assert given[resource.RLIMIT_NOFILE] == (189, 189)
+    with pytest.raises(ConfigError, match="48 processes need 192 open files"):
+        limits.prepare(processes=48)

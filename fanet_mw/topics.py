@@ -21,7 +21,7 @@ Decoding is total: any bytes give messages or MalformedFrameError, nothing else.
 import struct
 from array import array
 from collections.abc import Callable, Iterable
-from typing import Any, Final
+from typing import Any, Final, NamedTuple
 
 from fanet_mw import trace
 from fanet_mw.errors import MalformedFrameError
@@ -119,6 +119,8 @@ _DEGRADE = struct.Struct("<HHBddq")
 _JAM = struct.Struct("<5dq")
 _CUT = struct.Struct("<Hq")
 _LINKS = struct.Struct("<qqI")
+MAX_HEARD: Final = 10_000
+"""Phones of one scan: as many as a scenario may have survivors."""
 
 
 def _encode_tx(m: TxRequest) -> bytes:
@@ -201,7 +203,7 @@ def _encode_scan(m: WifiScan) -> bytes:
 def _decode_scan(body: bytes) -> WifiScan:
     t_ns, count = _SCAN.unpack_from(body)
     rest = body[_SCAN.size :]
-    if len(rest) != count * _HEARD.size:
+    if len(rest) != count * _HEARD.size or count > MAX_HEARD:
         raise ValueError("length")
     return WifiScan(t_ns, tuple((survivor, rssi) for survivor, rssi in _HEARD.iter_unpack(rest)))
 
@@ -318,6 +320,8 @@ _CODECS: Final[dict[int, tuple[type[Any], Callable[[Any], bytes], Callable[[byte
 }
 _CODE_OF: Final = {kind: (code, encode) for code, (kind, encode, _) in _CODECS.items()}
 _ITEM: Final = struct.Struct("<BI")
+MAX_ITEMS: Final = 16_384
+"""Messages of one put: several times what the busiest medium hands over at once."""
 
 
 def encode(messages: Iterable[Message]) -> bytes:
@@ -331,18 +335,43 @@ def encode(messages: Iterable[Message]) -> bytes:
     return b"".join(parts)
 
 
+class Item(NamedTuple):
+    """Where one message of a put is, not yet decoded."""
+
+    code: int
+    start: int
+    end: int
+
+
+def codes_of(*kinds: type[Any]) -> frozenset[int]:
+    """The codes of these kinds of messages."""
+    return frozenset(_CODE_OF[kind][0] for kind in kinds)
+
+
+def items(data: bytes) -> list[Item]:
+    """The messages of one put, undecoded; raises MalformedFrameError where they are cut off or more than MAX_ITEMS."""
+    found: list[Item] = []
+    at = 0
+    while at < len(data):
+        if at + _ITEM.size > len(data) or len(found) == MAX_ITEMS:
+            raise MalformedFrameError(f"bus message malformed at byte {at}: cut off, or the {MAX_ITEMS + 1}th of a put")
+        code, length = _ITEM.unpack_from(data, at)
+        start = at + _ITEM.size
+        at = start + length
+        if at > len(data):
+            raise MalformedFrameError(f"bus message malformed at byte {start}: length beyond the end")
+        found.append(Item(code, start, at))
+    return found
+
+
+def decode_item(data: bytes, item: Item) -> Message:
+    """One message of a put; raises MalformedFrameError for anything `encode` could not have made."""
+    try:
+        return _CODECS[item.code][2](data[item.start : item.end])
+    except (struct.error, ValueError, KeyError, OverflowError, RecursionError) as error:
+        raise MalformedFrameError(f"bus message malformed at byte {item.start}: {error}") from error
+
+
 def decode(data: bytes) -> list[Message]:
     """The messages of one put; raises MalformedFrameError for anything `encode` could not have made."""
-    messages = []
-    at = 0
-    try:
-        while at < len(data):
-            code, length = _ITEM.unpack_from(data, at)
-            at += _ITEM.size
-            if at + length > len(data):
-                raise ValueError("length beyond the end")
-            messages.append(_CODECS[code][2](data[at : at + length]))
-            at += length
-    except (struct.error, ValueError, KeyError, OverflowError, RecursionError) as error:
-        raise MalformedFrameError(f"bus message malformed at byte {at}: {error}") from error
-    return messages
+    return [decode_item(data, item) for item in items(data)]

@@ -28,6 +28,16 @@ def test_air_statistics_are_of_the_time_between_warm_up_and_drain(make_scenario:
     assert said["pdr"] == 1.0
 
 
+def test_a_medium_is_busy_until_the_last_of_overlapping_signals_ends(make_scenario: MakeScenario) -> None:
+    """Node 2 senses both hidden ones, one after the other begun: 300 us and a frame; each of them itself alone."""
+    air = Air(make_scenario(**{"nodes.count": 3, "duration_s": 10}), [0, 200, 400])
+    air.send(1, 1 * MS)
+    air.send(3, 1 * MS + 300 * US)
+    air.run(until_ns=10 * S)
+    expected_ns = (FRAME_NS + 300 * US) + 2 * FRAME_NS
+    assert air.medium.report()["air"]["busy"] == pytest.approx(expected_ns / (3 * 10 * S), abs=1e-6)
+
+
 def test_attempts_that_fail_and_retries_are_counted(make_scenario: MakeScenario) -> None:
     air = Air(make_scenario(**{"nodes.count": 2, "duration_s": 10, "warmup_s": 0}), [0, 400])
     air.send(1, 1 * MS, dst=2)

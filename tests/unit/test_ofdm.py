@@ -21,7 +21,16 @@ RATES = (6.0, 9.0, 12.0, 18.0, 24.0, 36.0, 48.0, 54.0)
 
 @pytest.mark.parametrize(
     ("rate_mbps", "size", "us"),
-    [(6, 14, 44), (12, 14, 32), (24, 14, 28), (54, 1536, 248), (6, 1536, 2072), (54, 1088, 184), (9, 1, 24)],
+    [
+        (6, 14, 44),
+        (12, 14, 32),
+        (24, 14, 28),
+        (54, 1536, 248),
+        (6, 1536, 2072),
+        (54, 1088, 184),
+        (9, 1, 24),
+        (54, 25, 28),
+    ],
 )  # 20 us and whole symbols of 24, 48, 96, 216, 36 bits for 22 bits more than the frame
 def test_an_ofdm_frame_is_a_header_and_whole_symbols(rate_mbps: float, size: int, us: int) -> None:
     assert ofdm_frame_ns(size, rate_mbps=rate_mbps) == us * US

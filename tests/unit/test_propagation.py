@@ -19,7 +19,7 @@ from emulator.path_loss import (
     uma_av_db,
     uma_av_sight_probability,
 )
-from emulator.propagation import Links, pair_codes, reach_m
+from emulator.propagation import Links, milliwatt, noise_mw, pair_codes, reach_m
 from emulator.shadowing import Shadowing
 from emulator.state import AUDIBLE, LINK_DST, LINK_POWER, LINK_SRC
 from fanet_mw import config
@@ -61,6 +61,14 @@ def test_two_rays_fall_by_40_db_a_decade_beyond_the_crossover_and_are_free_space
     assert loss(1000) == pytest.approx(120 - 20 * math.log10(3), abs=1e-9)
     assert loss(10_000) - loss(1000) == pytest.approx(40, abs=1e-9)
     assert loss(306.46 + 0.01) - loss(306.46 - 0.01) == pytest.approx(0, abs=0.01), "the two laws meet"
+
+
+@pytest.mark.parametrize(("rate_mbps", "dbm"), [(11.0, -93.58), (54.0, -93.99)])
+def test_a_receiver_s_noise_is_thermal_noise_in_its_channel_and_its_own_figure(rate_mbps: float, dbm: float) -> None:
+    """-174 dBm/Hz over 22 MHz (DSSS) or 20 MHz (OFDM), and 7 dB."""
+    keys = radio(standard="g", rate_mbps=rate_mbps, noise_figure_db=7)
+    assert 10 * math.log10(noise_mw(keys)) == pytest.approx(dbm, abs=0.01)
+    assert milliwatt(-30) == pytest.approx(1e-3)
 
 
 @pytest.mark.parametrize(

@@ -1,0 +1,110 @@
+"""A node of the clustered protocol, by hand: what it passes on, whom it believes, and what its head's queue lets out."""
+
+from collections.abc import Callable
+
+import pytest
+
+from fanet_mw import wire
+from fanet_mw.errors import DropReason
+from fanet_mw.messages import Reception
+from fanet_mw.protocol.clustered import Clustered
+from fanet_mw.protocol.node import Node
+from fanet_mw.routing import make_protocol
+from fanet_mw.scenario import Scenario
+from fanet_mw.units import BROADCAST, MS, US, Enu, NodeId, S
+from fanet_mw.wire import FLAG_FLOOD, FLAG_TO_HEAD, PRIORITY_BULK, PRIORITY_CONTROL, Header, Kind, filler
+from fanet_mw.wire_messages import Beacon, Member, Role, Schedule
+
+LEADER, OURS, THEIRS, ANOTHER = NodeId(1), NodeId(2), NodeId(3), NodeId(4)
+MakeScenario = Callable[..., Scenario]
+MakeNode = Callable[..., Node]
+
+
+@pytest.fixture
+def make_node(make_scenario: MakeScenario) -> MakeNode:
+    def make(**keys: object) -> Node:
+        scenario = make_scenario(**{"nodes.count": 5, "radio.lead_ms": 0, **keys})
+        made = Node(OURS, scenario, make_protocol, position=Enu(0.0, 0.0, 50.0))
+        made.start(0)
+        return made
+
+    return make
+
+
+def hear(node: Node, header: Header, inner: bytes = b"", *, at_ns: int = 1 * S) -> None:
+    node.hear(Reception(header.encode() + inner, NodeId(header.prev_hop), at_ns, -60.0), at_ns)
+
+
+def data(*, flags: int, destination: int = BROADCAST, hop_limit: int = 8) -> Header:
+    return Header(900_000, 5, THEIRS, destination, ANOTHER, Kind.DATA, hop_limit, 1, PRIORITY_BULK, flags)
+
+
+def name_head(node: Node, *, origin: int = LEADER) -> None:
+    """A schedule names the node head of the second of two clusters: its slots are [5, 10) s of every 10 s."""
+    members = (Member(THEIRS, 0, is_head=True), Member(OURS, 1, is_head=True))
+    schedule = Schedule(0, 10_000_000, 5_000_000, 1, LEADER, 2, 0, 1, members, 0)
+    header = Header(0, 9, origin, BROADCAST, origin, Kind.SCHEDULE, 8, 0, PRIORITY_CONTROL, FLAG_FLOOD)
+    hear(node, header, schedule.encode_frame(LEADER), at_ns=100 * MS)
+
+
+def sent(node: Node, kind: Kind = Kind.DATA) -> list[wire.Header]:
+    return [header for r in node.requests if (header := wire.decode_header(r.frame)).kind == kind]
+
+
+def test_a_hop_limit_ends_a_packet_on_its_way_to_a_head(make_node: MakeNode) -> None:
+    node = make_node()
+    hear(node, data(flags=FLAG_TO_HEAD, hop_limit=1), filler(40))
+    assert node.report()["dropped"] == {DropReason.HOP_LIMIT: 1}
+    assert node.report()["waiting"] == 0
+    hear(node, data(flags=FLAG_TO_HEAD, hop_limit=2)._replace(seq=6), filler(40))
+    assert node.report()["waiting"] == 1, "it is held until there is a way"
+
+
+@pytest.mark.parametrize(("destination", "relays"), [(BROADCAST, 1), (ANOTHER, 1), (OURS, 0)])
+def test_a_flood_ends_where_it_was_meant_for(make_node: MakeNode, destination: int, relays: int) -> None:
+    node = make_node(**{"clusters.relay": "all"})
+    hear(node, data(flags=FLAG_FLOOD, destination=destination), filler(40))
+    assert len(sent(node)) == relays
+
+
+@pytest.mark.parametrize(("origin", "leader"), [(LEADER, LEADER), (ANOTHER, 0)])
+def test_nobody_announces_for_another_leader(make_node: MakeNode, origin: int, leader: int) -> None:
+    node = make_node()
+    name_head(node, origin=origin)
+    assert node.report()["leader"] == leader
+    assert node.report()["dropped"] == ({} if leader else {DropReason.MALFORMED: 1})
+
+
+def test_a_neighbor_is_gone_when_its_hellos_have_stopped_for_a_while(make_node: MakeNode) -> None:
+    node = make_node(**{"routing.hello_interval_s": 1})
+    beacon = Beacon(THEIRS, 0, 0, 0, 0, 0, Role.ISOLATED, 255)
+    header = Header(1_000_000, 0x8000_0000, THEIRS, BROADCAST, THEIRS, Kind.HELLO, 1, 0, PRIORITY_CONTROL, 0)
+    hear(node, header, beacon.encode_frame(THEIRS), at_ns=1 * S)
+    protocol = node._protocol
+    assert isinstance(protocol, Clustered)
+    assert protocol._neighbors.count(now_ns=4500 * MS) == len(protocol._neighbors.alive(now_ns=4500 * MS)) == 1
+    assert protocol._neighbors.count(now_ns=4501 * MS) == len(protocol._neighbors.alive(now_ns=4501 * MS)) == 0
+
+
+def test_what_waits_at_a_head_beyond_its_lifetime_is_dropped_with_its_reason(make_node: MakeNode) -> None:
+    node = make_node(**{"clusters.flooding_period_s": 10, "clusters.count": 2, "routing.lifetime_s": 2})
+    name_head(node)
+    node.send(filler(40), destination=BROADCAST, priority=PRIORITY_BULK, app="test", due_ns=1 * S, now_ns=1 * S)
+    node.wake(3 * S)
+    assert node.report()["waiting"] == 1
+    node.wake(3 * S + 1 * US)
+    assert node.report()["waiting"] == 0
+    assert node.report()["dropped"] == {DropReason.EXPIRED: 1}
+
+
+def test_a_head_lets_out_together_what_fits_a_frame(make_node: MakeNode) -> None:
+    keys = {"clusters.flooding_period_s": 10, "clusters.count": 2, "routing.aggregate": True}
+    node = make_node(**keys, **{"radio.max_frame_bytes": 1400, "routing.lifetime_s": 60})
+    name_head(node)
+    for _ in range(5):
+        node.send(filler(560), destination=BROADCAST, priority=PRIORITY_BULK, app="test", due_ns=1 * S, now_ns=1 * S)
+    node.requests.clear()
+    node.wake(5 * S)
+    first_ns = min(r.start_ns for r in node.requests)
+    (frame,) = [r.frame for r in node.requests if r.start_ns == first_ns]
+    assert len(wire.unbundle(frame)) == 2

@@ -1,0 +1,105 @@
+"""The leader, by hand: superframes of 1 s, joins in, schedules out."""
+
+from collections.abc import Callable, Sequence
+
+import pytest
+
+from fanet_mw.protocol.leader import OBJECTION_NS, SETTLE_NS, Leader
+from fanet_mw.protocol.lease import Authority
+from fanet_mw.protocol.signs import Signs
+from fanet_mw.protocol.whereabouts import LOST_NS, Motion
+from fanet_mw.scenario import Scenario
+from fanet_mw.units import MS, Enu, NodeId, S
+from fanet_mw.wire_messages import Join, Schedule
+
+STILL = Enu(0.0, 0.0, 0.0)
+HERE = Motion(Enu(0.0, 0.0, 50.0), STILL, 0)
+MakeScenario = Callable[..., Scenario]
+
+
+class Desk:
+    """A leader and its signs of life."""
+
+    def __init__(self, scenario: Scenario, *, epoch: int = 0) -> None:
+        self.signs = Signs()
+        self.leader = Leader(Authority(0, 1), scenario, self.signs, epoch=epoch, elected=False, now_ns=0)
+
+    def join(self, node: int, east_m: float, *, born_ns: int, instead_of: int = 0) -> None:
+        join = Join(node, Enu(east_m, 0.0, 50.0), STILL, instead_of)
+        self.signs.heard(node, born_ns=born_ns)
+        self.leader.joined(join, born_ns=born_ns, now_ns=born_ns)
+
+    def announce(self) -> tuple[int, Sequence[Schedule]]:
+        """The next announcement, and when."""
+        now_ns = self.leader.next_wake_ns()
+        return now_ns, self.leader.wake(HERE, now_ns=now_ns)
+
+    def announced_at(self, until_ns: int) -> set[int]:
+        """The members of the newest schedule at an instant."""
+        members: set[int] = set()
+        while self.leader.next_wake_ns() <= until_ns:
+            _, parts = self.announce()
+            members = {member.node for part in parts for member in part.members}
+        return members
+
+
+@pytest.fixture
+def scenario(make_scenario: MakeScenario) -> Scenario:
+    return make_scenario(**{"nodes.count": 6, "clusters.count": 1, "clusters.flooding_period_s": 1})
+
+
+def test_clusters_are_made_when_no_join_has_come_for_a_moment(scenario: Scenario) -> None:
+    desk = Desk(scenario)
+    desk.join(2, 100, born_ns=1000 * MS)
+    desk.join(3, 200, born_ns=1500 * MS)
+    now_ns, (schedule,) = desk.announce()
+    assert now_ns == 1500 * MS + SETTLE_NS
+    assert {member.node for member in schedule.members} == {2, 3}
+    assert schedule.start_us % 1_000_000 == 0
+    assert schedule.start_us * 1000 > now_ns, "its superframes begin when all have heard of it"
+
+
+def test_the_leader_itself_is_a_member_of_no_cluster(scenario: Scenario) -> None:
+    desk = Desk(scenario)
+    desk.join(1, 0, born_ns=1 * S)
+    desk.join(2, 100, born_ns=1 * S)
+    assert desk.announced_at(3 * S) == {2}
+
+
+def test_an_older_join_that_comes_later_says_nothing(scenario: Scenario) -> None:
+    desk = Desk(scenario)
+    desk.join(2, 100, born_ns=2 * S)
+    desk.join(2, 900, born_ns=1 * S)
+    desk.announced_at(4 * S)
+    assert desk.leader.place(NodeId(2)).east == 100
+
+
+def test_a_node_without_a_sign_for_long_is_forgotten(scenario: Scenario) -> None:
+    desk = Desk(scenario)
+    desk.join(2, 100, born_ns=1 * S)
+    desk.join(3, 200, born_ns=1 * S)
+    desk.signs.heard(3, born_ns=40 * S)
+    assert desk.announced_at(1 * S + LOST_NS) == {2, 3}
+    assert desk.announced_at(4 * S + LOST_NS) == {3}
+
+
+@pytest.mark.parametrize("objects", [True, False])
+def test_a_head_that_somebody_stands_in_for_is_gone_unless_it_shows_that_it_lives(
+    scenario: Scenario, objects: bool
+) -> None:
+    desk = Desk(scenario)
+    for node in (2, 3, 4):
+        desk.join(node, 100.0 * node, born_ns=1 * S)
+    assert desk.announced_at(5 * S) == {2, 3, 4}
+    desk.join(4, 400, born_ns=6 * S, instead_of=3)
+    if objects:
+        desk.signs.heard(3, born_ns=6 * S + 1)
+    assert desk.announced_at(6 * S + OBJECTION_NS + 2 * S) == ({2, 3, 4} if objects else {2, 4})
+
+
+def test_epochs_wrap_and_are_never_0(scenario: Scenario) -> None:
+    desk = Desk(scenario, epoch=0xFFFF)
+    desk.join(2, 100, born_ns=1 * S)
+    _, (schedule,) = desk.announce()
+    assert schedule.epoch == 1
+    schedule.encode_frame(1)

@@ -1,0 +1,58 @@
+"""Who hears in a hello that a neighbor follows an older schedule sends it the newest again."""
+
+import pytest
+
+from fanet_mw.protocol.lease import Authority
+from fanet_mw.protocol.refresh import Refresh
+from fanet_mw.protocol.seen import key_of
+from fanet_mw.protocol.txqueue import Packet
+from fanet_mw.units import MS, S
+from fanet_mw.wire import Header, Kind
+from fanet_mw.wire_messages import Beacon, Role
+
+OURS, EPOCH = Authority(5, 1), 7
+PACKET = Packet(Header(0, 3, 1, 0xFFFF, 1, Kind.SCHEDULE, 32, 0, 0, 1), b"schedule")
+
+
+@pytest.fixture
+def refresh() -> Refresh:
+    made = Refresh(lambda: 0.5)
+    made.keep(PACKET, 0, OURS, EPOCH, now_ns=10 * S)
+    return made
+
+
+def follows(term: int, leader: int, epoch: int) -> Beacon:
+    return Beacon(node=9, head=0, head_seq=0, cluster=0, epoch=epoch, role=Role.MEMBER, hops_to_head=255, slot=0,
+                  term=term, leader=leader)  # fmt: skip
+
+
+@pytest.mark.parametrize(
+    ("beacon", "lacks"),
+    [
+        (follows(5, 1, 7), False),
+        (follows(5, 1, 6), True),
+        (follows(5, 1, 8), False),  # it knows more than we do
+        (follows(0, 0, 0), True),  # it follows nobody
+        (follows(6, 1, 9), True),  # a junior leader
+        (follows(4, 1, 1), False),  # a senior one: it will tell us
+    ],
+)
+def test_who_follows_less_than_we_do_gets_the_newest(refresh: Refresh, beacon: Beacon, lacks: bool) -> None:
+    refresh.compare(beacon, now_ns=11 * S)
+    assert (refresh.next_wake_ns() == 11 * S + 100 * MS) == lacks
+    assert refresh.due(now_ns=12 * S) == ([PACKET] if lacks else [])
+
+
+def test_a_flood_is_given_time_to_arrive_by_itself(refresh: Refresh) -> None:
+    refresh.compare(follows(5, 1, 6), now_ns=10 * S + 499 * MS)
+    assert refresh.next_wake_ns() is None
+
+
+def test_what_another_has_sent_meanwhile_is_not_sent_again(refresh: Refresh) -> None:
+    refresh.compare(follows(5, 1, 6), now_ns=11 * S)
+    refresh.overheard(key_of(1, 3), now_ns=11 * S + 50 * MS)
+    assert refresh.due(now_ns=12 * S) == []
+    refresh.compare(follows(5, 1, 6), now_ns=11 * S + 900 * MS)
+    assert refresh.next_wake_ns() is None, "it has just been sent"
+    refresh.compare(follows(5, 1, 6), now_ns=12 * S)
+    assert refresh.next_wake_ns() is not None

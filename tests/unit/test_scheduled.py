@@ -1,0 +1,130 @@
+"""One node in a timetable made by hand: what it relays in which turn, what it misses, and what it keeps out of turns.
+
+node 3 (root) in turn 27 -> node 4 in turn 28 -> we, node 2, in turn 31 - 29 = 2 of the next superframe -> ...
+"""
+
+from collections.abc import Callable
+
+import pytest
+
+from fanet_mw import wire
+from fanet_mw.errors import DropReason
+from fanet_mw.messages import Reception
+from fanet_mw.protocol.node import Node
+from fanet_mw.protocol.scheduled import Scheduled
+from fanet_mw.protocol.timetable import Timetable, Turn
+from fanet_mw.protocol.turn_plan import Fitted, Plan
+from fanet_mw.protocol.turns import Turns
+from fanet_mw.routing import make_protocol
+from fanet_mw.scenario import Scenario
+from fanet_mw.units import BROADCAST, MS, Enu, NodeId
+from fanet_mw.wire import FLAG_FLOOD, PRIORITY_BULK, Header, Kind, filler
+
+US, ROOT, BEFORE, AFTER = NodeId(2), NodeId(3), NodeId(4), NodeId(5)
+TURNS = Turns(origin_ns=0, period_ns=100 * MS, contention_ns=40 * MS, turn_ns=2 * MS, per_frame=29)
+FLOODS = (
+    Turn(5, ROOT, ROOT, 0),
+    Turn(8, US, ROOT, 0),
+    Turn(27, ROOT, ROOT, 1),
+    Turn(28, BEFORE, ROOT, 1),
+    Turn(31, US, ROOT, 1),
+    Turn(12, US, US, 0),
+    Turn(14, ROOT, US, 0),
+)  # fmt: skip
+MakeScenario = Callable[..., Scenario]
+
+
+def planned(turns: tuple[Turn, ...], *, valid_ns: int = 0) -> Plan:
+    table = Timetable(turns, {ROOT: 5, US: 3}, {ROOT: (), US: ()}, len(turns))
+    return Plan.of(US, valid_ns, Fitted(TURNS, table, together=1, frame_bytes=1024, whole=True, enough=True))
+
+
+@pytest.fixture
+def node(make_scenario: MakeScenario) -> Node:
+    keys = {"nodes.count": 5, "clusters.relay": "scheduled", "clusters.flooding_period_s": 0.1, "radio.lead_ms": 2}
+    keys |= {"clusters.contention_ms": 40, "traffic.interval_s": 1}
+    made = Node(US, make_scenario(**keys), make_protocol, position=Enu(0.0, 0.0, 50.0))
+    made.start(0)
+    protocol_of(made)._plans = [planned(FLOODS)]
+    return made
+
+
+def protocol_of(node: Node) -> Scheduled:
+    protocol = node._protocol
+    assert isinstance(protocol, Scheduled)
+    return protocol
+
+
+def hear_in_turn(
+    node: Node, sender: NodeId, turn: int, *, superframe: int = 10, told_ns: int = 0, hop_limit: int = 9
+) -> None:
+    """A packet of the root, of one millisecond, in a turn; the application has it `told_ns` after its end."""
+    end_ns = TURNS.start_ns(turn, frame_start_ns=superframe * 100 * MS) + MS
+    seq = 1000 * superframe + turn
+    header = Header(end_ns // 1000 - 5000, seq, ROOT, BROADCAST, sender, Kind.DATA, hop_limit, 0, 3, FLAG_FLOOD)
+    node.hear(Reception(header.encode() + filler(40), sender, end_ns, -60.0), end_ns + told_ns)
+
+
+def relays(node: Node) -> list[float]:
+    """When it relays data [ms]."""
+    return [r.start_ns / MS for r in node.requests if wire.decode_header(r.frame).kind == Kind.DATA]
+
+
+def test_a_flood_is_relayed_in_our_turn_of_it(node: Node) -> None:
+    hear_in_turn(node, ROOT, 5)
+    assert relays(node) == [1040 + 8 * 2]
+
+
+def test_a_flood_that_goes_on_in_the_next_superframe_is_relayed_there(node: Node) -> None:
+    hear_in_turn(node, BEFORE, 28)
+    assert relays(node) == [1100 + 40 + 2 * 2]
+
+
+def test_a_flood_of_the_superframe_before_is_relayed_in_this_one(node: Node) -> None:
+    """Heard from another in turn 29 + 1: it began at 1000 ms, and so our turn 29 + 2 lies at 1144 ms."""
+    late = (*FLOODS[:3], Turn(30, AFTER, ROOT, 1), *FLOODS[4:])
+    protocol_of(node)._plans = [planned(late)]
+    hear_in_turn(node, AFTER, 1, superframe=11)
+    assert relays(node) == [1100 + 40 + 2 * 2]
+
+
+@pytest.mark.parametrize(("told_ns", "is_relayed"), [(5 * MS, True), (5 * MS + 1, False), (30 * MS, False)])
+def test_a_turn_that_has_begun_is_missed_counted_and_not_relayed_late(
+    node: Node, told_ns: int, is_relayed: bool
+) -> None:
+    """Heard at 1051 ms, its turn begins at 1056 ms."""
+    hear_in_turn(node, ROOT, 5, told_ns=told_ns)
+    assert len(node.deliveries) == 1, "the application has it whether or not it is relayed"
+    assert relays(node) == [1056.0] * is_relayed
+    assert node.report()["missed_turns"] == 1 - is_relayed
+
+
+def test_a_hop_limit_holds_in_turns(node: Node) -> None:
+    hear_in_turn(node, ROOT, 5, hop_limit=1)
+    assert len(node.deliveries) == 1
+    assert relays(node) == []
+
+
+def test_what_is_heard_in_no_turn_of_its_flood_is_not_relayed(node: Node) -> None:
+    hear_in_turn(node, AFTER, 5)
+    assert relays(node) == []
+
+
+def test_the_newest_timetable_in_force_counts(node: Node) -> None:
+    other = (Turn(5, ROOT, ROOT, 0), Turn(20, US, ROOT, 0), Turn(12, US, US, 0))
+    protocol_of(node)._plans = [planned(FLOODS), planned(other, valid_ns=2000 * MS)]
+    hear_in_turn(node, ROOT, 5, superframe=10)
+    hear_in_turn(node, ROOT, 5, superframe=20)
+    assert relays(node) == [1056, 2040 + 20 * 2]
+
+
+def test_a_packet_that_fits_no_turn_is_dropped_with_its_reason(node: Node) -> None:
+    node.send(filler(1100), destination=BROADCAST, priority=PRIORITY_BULK, app="test", due_ns=0, now_ns=0)
+    assert node.report()["dropped"] == {DropReason.TOO_LARGE: 1}
+
+
+@pytest.mark.parametrize(("due_ms", "earliest_ms", "latest_ms"), [(1010, 1010, 1010), (1050, 1100, 1135)])
+def test_hellos_keep_out_of_the_turns(node: Node, due_ms: int, earliest_ms: int, latest_ms: int) -> None:
+    node.say_hello(b"", start_ns=due_ms * MS, now_ns=due_ms * MS)
+    (request,) = node.requests
+    assert earliest_ms * MS <= request.start_ns <= latest_ms * MS

@@ -1,0 +1,41 @@
+"""What a timetable is computed for: how far interference reaches, how long a hop takes, and one node's view of it."""
+
+from collections.abc import Callable
+
+import pytest
+
+from fanet_mw.protocol.timetable import Timetable, Turn
+from fanet_mw.protocol.turn_plan import Fitted, Plan, links, superframe
+from fanet_mw.protocol.turns import Turns, turn_ns
+from fanet_mw.scenario import Scenario
+from fanet_mw.units import MS, US, NodeId
+
+MakeScenario = Callable[..., Scenario]
+KEYS = {"clusters.relay": "scheduled", "nodes.count": 5}
+
+
+def test_a_turn_holds_difs_the_longest_backoff_the_frame_and_the_slack(make_scenario: MakeScenario) -> None:
+    scenario = make_scenario(**KEYS, **{"clusters.turn_slack_us": 100})
+    assert turn_ns(scenario, payload_bytes=1024) == (50 + 31 * 20 + 984 + 100) * US
+
+
+@pytest.mark.parametrize(("channel", "times"), [("range", 1), ("log_distance", 2)])
+def test_interference_reaches_twice_as_far_as_reception_where_it_is_a_matter_of_power(
+    make_scenario: MakeScenario, channel: str, times: int
+) -> None:
+    scenario = make_scenario(**KEYS, **{"radio.channel": channel})
+    geometry = links(scenario, superframe(scenario))
+    assert geometry.interference_m == times * scenario.radio.range_m
+
+
+def test_a_hop_takes_the_turns_of_lead_and_handover(make_scenario: MakeScenario) -> None:
+    scenario = make_scenario(**KEYS, **{"radio.lead_ms": 10, "radio.handover_ms": 20})
+    turns = superframe(scenario)
+    assert links(scenario, turns).hop_turns == 1 + -(-30 * MS // turns.turn_ns)
+
+
+def test_a_turn_beyond_the_superframe_is_heard_in_the_next_one() -> None:
+    turns = Turns(0, 100 * MS, 40 * MS, 2 * MS, 29)
+    table = Timetable((Turn(28, NodeId(1), NodeId(1), 0), Turn(30, NodeId(2), NodeId(1), 0)), {}, {}, 2)
+    plan = Plan.of(NodeId(3), 0, Fitted(turns, table, together=1, frame_bytes=1024, whole=True, enough=True))
+    assert plan.heard == {(28, 1): (28, 1, 0), (1, 2): (30, 1, 0)}

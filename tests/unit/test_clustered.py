@@ -1,4 +1,4 @@
-"""A node of the clustered protocol, by hand: what it passes on, whom it believes, and what its head's queue lets out."""
+"""A node of the clustered protocol, by hand: what it passes on, whom it believes, what it lets out."""
 
 from collections.abc import Callable
 
@@ -89,7 +89,7 @@ def test_a_neighbor_is_gone_when_its_hellos_have_stopped_for_a_while(make_node: 
 def test_what_waits_at_a_head_beyond_its_lifetime_is_dropped_with_its_reason(make_node: MakeNode) -> None:
     node = make_node(**{"clusters.flooding_period_s": 10, "clusters.count": 2, "routing.lifetime_s": 2})
     name_head(node)
-    node.send(filler(40), destination=BROADCAST, priority=PRIORITY_BULK, app="test", due_ns=1 * S, now_ns=1 * S)
+    node.send(filler(40), destination=BROADCAST, priority=PRIORITY_BULK, app="test", born_ns=1 * S, now_ns=1 * S)
     node.wake(3 * S)
     assert node.report()["waiting"] == 1
     node.wake(3 * S + 1 * US)
@@ -102,7 +102,7 @@ def test_a_head_lets_out_together_what_fits_a_frame(make_node: MakeNode) -> None
     node = make_node(**keys, **{"radio.max_frame_bytes": 1400, "routing.lifetime_s": 60})
     name_head(node)
     for _ in range(5):
-        node.send(filler(560), destination=BROADCAST, priority=PRIORITY_BULK, app="test", due_ns=1 * S, now_ns=1 * S)
+        node.send(filler(560), destination=BROADCAST, priority=PRIORITY_BULK, app="test", born_ns=1 * S, now_ns=1 * S)
     node.requests.clear()
     node.wake(5 * S)
     first_ns = min(r.start_ns for r in node.requests)

@@ -40,7 +40,7 @@ def delivered(node: Node) -> list[Delivered]:
 
 
 def send(node: Node, **change: int) -> int:
-    given = {"destination": BROADCAST, "priority": PRIORITY_BULK, "due_ns": 1 * MS, "now_ns": 0} | change
+    given = {"destination": BROADCAST, "priority": PRIORITY_BULK, "born_ns": 0, "now_ns": 0} | change
     return node.send(filler(40), app="test", **given)  # type: ignore[arg-type]
 
 
@@ -143,12 +143,12 @@ def test_packets_of_one_origin_are_numbered_without_gaps_whatever_control_goes_i
 def test_a_node_that_starts_again_does_not_reuse_the_names_of_its_packets(node: Node) -> None:
     before = [send(node) for _ in range(100)]
     node.start(10 * S)
-    assert send(node, due_ns=10 * S, now_ns=10 * S) > max(before)
+    assert send(node, born_ns=10 * S, now_ns=10 * S) > max(before)
 
 
 def test_a_packet_longer_than_frames_may_be_is_a_mistake_of_the_caller(node: Node) -> None:
     with pytest.raises(LocalProtocolError, match=r"must be <= radio\.max_frame_bytes = 400"):
-        node.send(filler(390), destination=BROADCAST, priority=PRIORITY_BULK, app="test", due_ns=0, now_ns=0)
+        node.send(filler(390), destination=BROADCAST, priority=PRIORITY_BULK, app="test", born_ns=0, now_ns=0)
 
 
 def test_a_drop_is_counted_and_recorded(node: Node) -> None:

@@ -119,7 +119,7 @@ def test_the_newest_timetable_in_force_counts(node: Node) -> None:
 
 
 def test_a_packet_that_fits_no_turn_is_dropped_with_its_reason(node: Node) -> None:
-    node.send(filler(1100), destination=BROADCAST, priority=PRIORITY_BULK, app="test", due_ns=0, now_ns=0)
+    node.send(filler(1100), destination=BROADCAST, priority=PRIORITY_BULK, app="test", born_ns=0, now_ns=0)
     assert node.report()["dropped"] == {DropReason.TOO_LARGE: 1}
 
 

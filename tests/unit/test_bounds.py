@@ -1,0 +1,78 @@
+"""Bounds that are broken are counted, one by one, and what never comes is no proof of a bound: traces by hand."""
+
+from typing import Any
+
+import pytest
+
+from fanet_mw.scenario import Scenario
+from fanet_mw.trace import BoundStated, Delivered, Generated, Record
+from fanet_mw.units import MS, S
+from sim.metrics import summarize
+from sim.outcome import Outcome
+
+
+@pytest.fixture
+def scenario(make_scenario: Any) -> Scenario:
+    scenario: Scenario = make_scenario(**{"nodes.count": 3, "traffic.sources": "all", "traffic.interval_s": 1})
+    return scenario
+
+
+def packet(seq: int, *, bound_ms: float | None, delays_ms: dict[int, float], node: int = 1) -> list[Record]:
+    """A packet of a node, promised `bound_ms`, and when the others had it."""
+    stated = [] if bound_ms is None else [BoundStated(seq * S, node, seq, round(bound_ms * MS))]
+    arrived = {at: round(delay_ms * MS) for at, delay_ms in delays_ms.items()}
+    deliveries = [Delivered(seq * S + ns, at, node, seq, ns, 1) for at, ns in arrived.items()]
+    return [Generated(seq * S, node, seq, "traffic", 100), *stated, *deliveries]
+
+
+def bound_of(scenario: Scenario, *packets: list[Record]) -> dict[str, Any]:
+    records = [record for records in packets for record in records]
+    outcome = Outcome(scenario, "virtual", 1.0, records, {})
+    found: dict[str, Any] = summarize(outcome, trace_sha256="")["bound"]
+    return found
+
+
+@pytest.mark.parametrize(
+    ("delay_ms", "violations"), [(1, 0), (99.999999, 0), (100, 0), (100.000001, 1), (101, 1), (150, 1), (201, 1)]
+)
+def test_a_delivery_a_nanosecond_later_than_promised_breaks_its_bound(
+    scenario: Scenario, delay_ms: float, violations: int
+) -> None:
+    bound = bound_of(scenario, packet(1, bound_ms=100, delays_ms={2: delay_ms, 3: 50}))
+    assert (bound["deliveries"], bound["violations"]) == (2, violations)
+    assert bound["within_share"] == (2 - violations) / 2
+
+
+def test_each_packet_is_held_against_its_own_promise(scenario: Scenario) -> None:
+    bound = bound_of(
+        scenario,
+        packet(1, bound_ms=100, delays_ms={2: 90, 3: 110}),
+        packet(2, bound_ms=200, delays_ms={2: 90, 3: 110}),
+        packet(3, bound_ms=50, delays_ms={2: 90, 3: 110}),
+    )
+    assert bound["violations"] == 3
+    assert bound["worst_ms"] == 200
+    assert bound["observed_max_ms"] == 110
+    assert bound["within_share"] == 0.5
+
+
+def test_what_never_arrives_breaks_no_bound_but_keeps_none_either(scenario: Scenario) -> None:
+    bound = bound_of(scenario, packet(1, bound_ms=100, delays_ms={}), packet(2, bound_ms=100, delays_ms={2: 10}))
+    assert (bound["violations"], bound["within_share"]) == (0, 0.25)
+
+
+def test_a_packet_without_a_promise_counts_for_the_share_and_not_as_broken(scenario: Scenario) -> None:
+    bound = bound_of(
+        scenario,
+        packet(1, bound_ms=100, delays_ms={2: 10, 3: 10}),
+        packet(2, bound_ms=None, delays_ms={2: 10, 3: 9000}),
+    )
+    assert (bound["deliveries"], bound["violations"]) == (2, 0)
+    assert (bound["within_share"], bound["stated_share"]) == (0.5, 0.5)
+    assert bound_of(scenario, packet(1, bound_ms=None, delays_ms={2: 10})) == {}
+
+
+def test_a_delivery_at_a_node_that_is_no_target_neither_keeps_nor_breaks_a_bound(make_scenario: Any) -> None:
+    chosen = make_scenario(**{"nodes.count": 3, "traffic.sources": "all", "traffic.targets": [2]})
+    bound = bound_of(chosen, packet(1, bound_ms=100, delays_ms={2: 50, 3: 500}))
+    assert (bound["deliveries"], bound["violations"], bound["within_share"]) == (1, 0, 1.0)

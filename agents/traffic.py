@@ -6,10 +6,14 @@ Birth instants are whole microseconds, because that is what the header carries.
 import math
 from collections.abc import Sequence
 from random import Random
+from typing import Final
 
 from fanet_mw.rng import stream
 from fanet_mw.scenario import Scenario
-from fanet_mw.units import US, NodeId, S
+from fanet_mw.units import MS, US, NodeId, S
+
+_REFUSED_NS: Final = MS
+"""After a packet that the radio refused, a saturated source offers the next one so much later, not at once."""
 
 
 def sources_of(scenario: Scenario) -> Sequence[int]:
@@ -49,8 +53,11 @@ class Traffic:
         start_ns, self._end_ns = scenario.traffic_window_ns
         self._random: Random = stream(scenario.seed, "traffic", node)
         self._next_ns: int | None = None
+        self._owed = 1
+        """Packets that are born at `next_ns`."""
         if node in sources_of(scenario):
             self._next_ns = start_ns + self._first_gap_ns()
+            self._owed = self.depth if self.saturated else 1
 
     @property
     def depth(self) -> int:
@@ -80,6 +87,11 @@ class Traffic:
         while self._next_ns < min(now_ns, self._end_ns):
             self.advance()
 
+    @property
+    def owed(self) -> int:
+        """How many packets are born at `next_ns`."""
+        return self._owed
+
     def next_ns(self) -> int | None:
         """When the next packet is born; None when there will be none (or, saturated, none by itself)."""
         if self._next_ns is None or self._next_ns >= self._end_ns:
@@ -90,9 +102,19 @@ class Traffic:
         """The packet of `next_ns` was sent."""
         assert self._next_ns is not None, "only a source that has a next packet can send it"
         if self.saturated:
-            self._next_ns = None  # from here on, one packet for each that ends
+            self._next_ns, self._owed = None, 0  # from here on, one packet for each that ends
         else:
             self._next_ns += self._interval_ns if self._kind == "cbr" else self._poisson_ns()
 
-    def open_at(self, now_ns: int) -> bool:
-        return now_ns < self._end_ns
+    def ended(self, *, refused: bool, now_ns: int) -> bool:
+        """A packet of a saturated source has left, or was given up; True: the next one follows at once.
+
+        After one that the radio refused it comes a moment later, and is asked for by `next_ns`.
+        """
+        if now_ns >= self._end_ns:
+            return False
+        if refused:
+            self._owed += 1
+            if self._next_ns is None:
+                self._next_ns = now_ns + _REFUSED_NS + self._lead_ms * MS
+        return not refused

@@ -56,8 +56,10 @@ class Uav(Actor):
         self._hello_random = stream(scenario.seed, "hello", node).random
         self._next_hello_ns: int | None = None
         self._own_wake_ns: int | None = None
-        """When traffic, hello or telemetry is due; changes at a wake-up only."""
+        """When traffic, hello or telemetry is due; changes at a wake-up, and when a saturated source's packet ends."""
         self._generated = 0
+        self._outstanding: set[int] = set()
+        """Transmit requests with which packets of a saturated source began their way."""
         self._malformed = 0
         self._heard_late = 0
         """Receptions that were handed over too late."""
@@ -91,8 +93,11 @@ class Uav(Actor):
             return node.timeless
         if isinstance(message, TxStatus):
             self._node.status(message, now_ns=now_ns)
-            if self._traffic.saturated and self._traffic.open_at(now_ns):
-                self._send_traffic(now_ns, now_ns)
+            if message.seq in self._outstanding:
+                self._outstanding.discard(message.seq)
+                if self._traffic.ended(refused=not message.attempts, now_ns=now_ns):
+                    self._send_traffic(now_ns, now_ns)
+                self._own_wake_ns = self._next_own_ns()
         elif isinstance(message, Gps):
             self._autopilot.fix(message)
             self._node.position, self._node.velocity = message.position, message.velocity
@@ -110,7 +115,7 @@ class Uav(Actor):
         self._node.wake(now_ns)
         due_ns = self._traffic.next_ns()
         while due_ns is not None and due_ns <= now_ns:
-            for _ in range(self._traffic.depth if self._traffic.saturated else 1):
+            for _ in range(self._traffic.owed):
                 self._send_traffic(due_ns, now_ns)
             self._traffic.advance()
             due_ns = self._traffic.next_ns()
@@ -149,6 +154,7 @@ class Uav(Actor):
 
     def _send_traffic(self, born_ns: int, now_ns: int) -> None:
         self._generated += 1
+        requests = self._node.frames_sent
         self._node.send(
             self._filler,
             destination=self._destination,
@@ -157,6 +163,8 @@ class Uav(Actor):
             born_ns=born_ns,
             now_ns=now_ns,
         )
+        if self._traffic.saturated and self._node.frames_sent > requests:
+            self._outstanding.add(requests)
 
     def _say_hello(self, now_ns: int) -> None:
         if self._next_hello_ns is None or self._next_hello_ns - self._lead_ns > now_ns:

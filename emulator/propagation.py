@@ -45,6 +45,10 @@ def noise_mw(radio: Radio) -> float:
     return milliwatt(THERMAL_DBM_PER_HZ + 10 * math.log10(bandwidth_hz) + radio.noise_figure_db)
 
 
+_MOST_DECADES: Final = 12.0
+"""Of a meter: farther than any two nodes can be apart."""
+
+
 def reach_m(radio: Radio) -> float:
     """Beyond this distance a station does not even interfere, by the most favorable law and 2 sigma of shadowing."""
     if radio.channel == "range":
@@ -59,7 +63,8 @@ def reach_m(radio: Radio) -> float:
         "air_to_ground": [(at_1_m, 2.0)],
         "uma_av": [(28.0 + 20 * math.log10(radio.frequency_mhz / 1000), 2.2), (at_1_m, AIR_TO_AIR_EXPONENT)],
     }[radio.channel]
-    return max(1.0, *(math.pow(10.0, (budget_db - at_1_m) / (10 * exponent)) for at_1_m, exponent in laws))
+    decades = max((budget_db - at_1_m) / (10 * exponent) for at_1_m, exponent in laws)
+    return math.pow(10.0, max(0.0, min(_MOST_DECADES, decades)))
 
 
 def received_dbm(distance_m: Reals, from_m: Reals, to_m: Reals, radio: Radio) -> Reals:

@@ -9,10 +9,11 @@ from typing import Final, NamedTuple, Self
 
 from fanet_mw.errors import MalformedFrameError
 from fanet_mw.units import MAX_NODES, NodeId
-from fanet_mw.wire import CLAIMS, VERSION, decode_every, encode_inner
+from fanet_mw.wire import CLAIMS, OVERHEAD, VERSION, decode_every, encode_inner
 
 CAPACITY: Final = 16
 """Entries of one message; a few more neighbors need a second one."""
+MESSAGE_BYTES: Final = OVERHEAD + CLAIMS.layout.size
 MOST_SLOTS: Final = 254
 NO_SLOT: Final = 255
 MOST_LOTS: Final = 3
@@ -52,10 +53,12 @@ class Claims(NamedTuple):
     own: Standing
     heard: tuple[Heard, ...]
 
-    def encode_frames(self) -> bytes:
-        """One message per `CAPACITY` neighbors, at least one."""
-        starts = range(0, max(1, len(self.heard)), CAPACITY)
-        chunks = (self.heard[at : at + CAPACITY] for at in starts)
+    def encode_frames(self, room: int | None = None) -> bytes:
+        """One message per `CAPACITY` neighbors, at least one; neighbors for which there is no room are left out."""
+        most = len(self.heard) if room is None else max(1, room // MESSAGE_BYTES) * CAPACITY
+        heard = self.heard[:most]
+        starts = range(0, max(1, len(heard)), CAPACITY)
+        chunks = (heard[at : at + CAPACITY] for at in starts)
         return b"".join(encode_inner(CLAIMS, self._payload(chunk), node=self.node) for chunk in chunks)
 
     def _payload(self, chunk: Sequence[Heard]) -> bytes:

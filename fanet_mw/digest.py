@@ -9,14 +9,20 @@ from collections.abc import Sequence
 from typing import Final, NamedTuple, Self
 
 from fanet_mw.errors import MalformedFrameError
-from fanet_mw.wire import DIGEST, VERSION, decode_every, encode_inner
+from fanet_mw.wire import DIGEST, OVERHEAD, VERSION, decode_every, encode_inner
 
 WINDOW: Final = 33
 """Packets of one origin that an entry speaks of: the newest and 32 before it."""
 CAPACITY: Final = 24
 """Entries of one message."""
+MESSAGE_BYTES: Final = OVERHEAD + DIGEST.layout.size
 _SEQ_MASK: Final = 0xFFFF_FFFF
 _HALF: Final = 0x8000_0000
+
+
+def capacity(room: int) -> int:
+    """How many holdings fit into so many bytes; there is room for one message (`scenario_checks`)."""
+    return max(1, room // MESSAGE_BYTES) * CAPACITY
 
 
 class Holding(NamedTuple):

@@ -19,14 +19,14 @@ from fanet_mw.radio_control import (
     link_label,
     node_label,
 )
-from fanet_mw.sections import Finite, Id, NonNegative, Section
+from fanet_mw.sections import Coordinate, Duration, Id, Section
 from fanet_mw.units import Enu, NodeId, seconds_to_ns
 
 
 class FaultSection(Section):
     """The base of the entries of `[[faults]]`: what happens to the air at an instant of the run."""
 
-    at_s: NonNegative
+    at_s: Duration
     for_s: Annotated[float, Field(ge=0, le=1e6)] = 0.0
     """How long it lasts; 0: until it is restored."""
     label: Annotated[str, Field(max_length=MAX_LABEL, pattern=r"^[ -~]*$")] = ""
@@ -60,7 +60,7 @@ class JamFault(FaultSection):
     """An area is jammed."""
 
     kind: Literal["jam"]
-    center_m: tuple[Finite, Finite]
+    center_m: tuple[Coordinate, Coordinate]
     """East, north."""
     radius_m: Annotated[float, Field(gt=0, le=MAX_RADIUS_M)]
     noise_dbm: Annotated[float, Field(ge=-MAX_LOSS_DB, le=MAX_NOISE_DBM)] | None = None
@@ -85,7 +85,7 @@ class RestoreFault(Section):
     """The end of a fault, or of all (no label)."""
 
     kind: Literal["restore"]
-    at_s: NonNegative
+    at_s: Duration
     label: str = ""
 
     def control(self) -> Control:

@@ -126,7 +126,12 @@ def from_ned(vector: Ned) -> Enu:
 
 def _place_ints(place: Geodetic) -> tuple[int, int, int]:
     """Latitude and longitude [degrees x 1e7], altitude [mm]."""
-    return round(place.lat_deg * 1e7), round(place.lon_deg * 1e7), round(place.alt_m * 1000)
+    return round(place.lat_deg * 1e7), round(place.lon_deg * 1e7), _millimeters(place.alt_m)
+
+
+def _millimeters(height_m: float) -> int:
+    """A height in the 32 bits that MAVLink has for it; beyond 2,147 km the greatest of them."""
+    return max(-0x8000_0000, min(0x7FFF_FFFF, round(height_m * 1000)))
 
 
 def _velocity_ints(velocity: Enu) -> tuple[int, int, int]:
@@ -186,7 +191,7 @@ class Encoder:
         """GLOBAL_POSITION_INT; the relative altitude is over the origin's."""
         place = to_geodetic(position, self._origin)
         lat, lon, alt_mm = _place_ints(place)
-        relative_mm = round((place.alt_m - self._origin.alt_m) * 1000)
+        relative_mm = _millimeters(place.alt_m - self._origin.alt_m)
         velocities = _velocity_ints(velocity)
         return self._pack(
             common.MAVLink_global_position_int_message(

@@ -14,7 +14,18 @@ from fanet_mw.units import MS
 if TYPE_CHECKING:
     from fanet_mw.scenario import Scenario
 
+MESSAGE_BYTES: Final = {
+    "FANET_ROUTE": 36, "positions": 61, "COLLISION": 31, "FANET_BEACON": 33, "FANET_SCHEDULE": 266,
+    "FANET_SURVIVOR": 43, "FANET_DIGEST": 255, "FANET_PLACES": 189, "FANET_CLAIMS": 116,
+}  # fmt: skip
+"""Of messages on the air, their MAVLink frame included (docs/wire.md); `positions` are HEARTBEAT and
+GLOBAL_POSITION_INT, with which every hello begins. The air format itself is not known here: the emulator reads
+scenarios too, and to it frames are bytes."""
+_SCHEDULE_PLACES: Final = 2
+"""FANET_PLACES that go with one full FANET_SCHEDULE."""
 _RIVALS: Final = ("aodv", "olsr", "dsdv", "geographic")
+_TELLS_NEIGHBORS: Final = ("heads", "cds", "mpr", "claimed")
+"""Relay rules for which a hello says whom its sender hears."""
 _RIVAL_FRAME_BYTES: Final = 256
 """Control messages of a fixed length must fit one frame; longer ones are divided."""
 
@@ -43,12 +54,15 @@ def disagreements(scenario: Scenario) -> Sequence[str]:
         )
     if scenario.clock.sync == "beacons" and not scenario.routing.hello_interval_s:
         found.append('clock.sync = "beacons" needs hellos: routing.hello_interval_s > 0')
+    found += _too_small_frames(scenario)
     found += _unkept_deadline(scenario)
     found += _blind_warnings(scenario)
     found += _impossible_faults(scenario)
     found += _wrong_for_rivals(scenario)
     if scenario.routing.protocol == "clustered":
         clusters = scenario.clusters
+        if not scenario.routing.hello_interval_s:
+            found.append('routing.protocol = "clustered" needs hellos: routing.hello_interval_s > 0')
         if clusters.count >= max(2, count):
             found.append(f"clusters.count = {clusters.count} must be < nodes.count = {count}")
         if clusters.guard_ms != "auto" and clusters.guard_ms * MS >= clusters.slot_ns:
@@ -57,6 +71,31 @@ def disagreements(scenario: Scenario) -> Sequence[str]:
                 f"{clusters.slot_ns / MS:g} ms"
             )
     return found
+
+
+def _too_small_frames(scenario: Scenario) -> Iterator[str]:
+    """Messages that have no parts to be divided into and must fit one frame."""
+    most, relay = scenario.radio.max_frame_bytes, scenario.clusters.relay
+    clustered = scenario.routing.protocol == "clustered"
+    size, least = MESSAGE_BYTES, dict[str, int]()
+    if scenario.routing.hello_interval_s:
+        hello = size["positions"]
+        if clustered:
+            hello += size["FANET_BEACON"]
+            hello += size["FANET_DIGEST"] if scenario.clusters.repair_s else 0
+            hello += size["FANET_CLAIMS"] if relay in _TELLS_NEIGHBORS else 0
+        least["hellos"] = hello
+    if clustered and relay != "claimed":
+        places = _SCHEDULE_PLACES * size["FANET_PLACES"] if relay == "scheduled" else 0
+        least["schedules"] = size["FANET_SCHEDULE"] + places
+    if scenario.mission.survivors:
+        least["survivor reports"] = size["FANET_SURVIVOR"]
+    if scenario.mission.collision_horizon_s:
+        least["warnings"] = size["COLLISION"]
+    for what, inner in least.items():
+        whole = size["FANET_ROUTE"] + inner
+        if whole > most:
+            yield f"radio.max_frame_bytes = {most} must be >= {whole} for {what}"
 
 
 def _wrong_for_rivals(scenario: Scenario) -> Sequence[str]:

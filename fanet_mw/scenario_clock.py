@@ -9,7 +9,7 @@ from typing import Annotated, Literal, Self
 
 from pydantic import Field, model_validator
 
-from fanet_mw.sections import NonNegative, Positive, Section
+from fanet_mw.sections import Milliseconds, Section, SomeTime
 from fanet_mw.units import MS, US, seconds_to_ns
 
 
@@ -19,18 +19,18 @@ class Clock(Section):
     sync: Literal["none", "beacons", "gps"] = "none"
     """`none`: each node takes its own clock for swarm time; `beacons`: hellos carry the time of the node with the
     lowest id, hop by hop; `gps`: each position fix brings the time."""
-    offset_ms: NonNegative = 0.0
+    offset_ms: Milliseconds = 0.0
     """A node's clock is off by U(-offset, offset) at the start."""
     drift_ppm: Annotated[float, Field(ge=0, le=1000)] = 0.0
     """Bound of the error of its rate, drawn from U(-drift, drift). The nodes know it, as the oscillator's data sheet
     says it; 10 to 20 is usual of a crystal."""
     wander_ppm: Annotated[float, Field(ge=0, le=10)] = 0.0
     """The rate walks by N(0, wander) a second, and stays within `drift_ppm`."""
-    timestamp_us: NonNegative = 1.0
+    timestamp_us: Annotated[float, Field(ge=0, le=1e6)] = 1.0
     """Resolution of a radio's time stamps; the timing synchronization function of IEEE 802.11 counts microseconds."""
-    gps_sigma_ns: NonNegative = 100.0
+    gps_sigma_ns: Annotated[float, Field(ge=0, le=1e9)] = 100.0
     """`gps`: standard deviation of the time of one fix; a receiver without a timing output has some 100 ns to 1 us."""
-    limit_s: Positive = 5.0
+    limit_s: SomeTime = 5.0
     """A swarm time farther from the own clock than this is not believed, whoever says it."""
 
     @model_validator(mode="after")

@@ -9,7 +9,7 @@ from typing import Annotated, Any, Final, Literal, Self
 
 from pydantic import Field, model_validator
 
-from fanet_mw.sections import Finite, NonNegative, Positive, Section
+from fanet_mw.sections import Decibels, Length, Level, Section, SomeLength
 from fanet_mw.units import MS
 
 DSSS_RATES_MBPS: Final = (1.0, 2.0, 5.5, 11.0)
@@ -29,33 +29,33 @@ class Radio(Section):
 
     channel: Literal["range", "log_distance", "friis", "two_ray", "air_to_air", "air_to_ground", "uma_av"] = "range"
     """See docs/emulator.md for equations, sources and ranges of validity."""
-    range_m: Positive = 250.0
+    range_m: SomeLength = 250.0
     """`range`: decode and carrier-sense limit; frames are equally strong within it, silent beyond."""
     standard: Literal["b", "g", "a"] = "b"
     """`b`: DSSS; `g`: DSSS or OFDM at 2.4 GHz; `a`: OFDM at 5 GHz. Fixes the rates, the slot, SIFS and their kin."""
-    rate_mbps: Positive = 11.0
+    rate_mbps: Annotated[float, Field(gt=0, le=54)] = 11.0
     """By default 11 (`b`) or 54 (`g`, `a`)."""
-    ack_rate_mbps: Positive = 11.0
+    ack_rate_mbps: Annotated[float, Field(gt=0, le=54)] = 11.0
     """By default 11 (`b`), else the highest mandatory rate that is not above `rate_mbps` (6, 12, 24; or DSSS)."""
     preamble: Literal["long", "short"] = "long"
     """DSSS only."""
     slot: Literal["long", "short"] = "long"
     """`g` only: 20 or 9 us. The standard wants the long one in an ad hoc network; many drivers take the short one."""
-    tx_power_dbm: Finite = 30.0
+    tx_power_dbm: Level = 30.0
     exponent: Annotated[float, Field(gt=0, le=10)] = 3.0
     """`log_distance`: path loss exponent."""
-    reference_loss_db: Finite = 40.05
+    reference_loss_db: Level = 40.05
     """`log_distance`: path loss at 1 m."""
     frequency_mhz: Annotated[float, Field(ge=100, le=100_000)] = 2412.0
     """All channels but `range` and `log_distance`. By default 2412 (channel 1), and 5180 (channel 36) with `a`."""
     environment: Literal["suburban", "urban", "dense_urban", "highrise"] = "suburban"
     """`air_to_ground`: what stands around the node on the ground."""
-    airborne_m: NonNegative = 10.0
+    airborne_m: Length = 10.0
     """`air_to_ground` and `uma_av`: two nodes at or above this height see each other as `air_to_air`. By default 10,
     and 26 with `uma_av`, whose ground antenna is at 25 m."""
     shadowing_db: Annotated[float, Field(ge=0, le=30)] = 0.0
     """Standard deviation of log-normal shadowing; 0: none."""
-    shadowing_corr_m: Positive = 50.0
+    shadowing_corr_m: SomeLength = 50.0
     """Distance over which its correlation falls to 1/e."""
     fading: Literal["none", "nakagami", "rician"] = "none"
     """Small-scale fading: a power gain of mean 1 per frame and receiver."""
@@ -63,17 +63,17 @@ class Radio(Section):
     """`nakagami`: 1 is Rayleigh; more is steadier."""
     rician_k_db: Annotated[float, Field(ge=-20, le=40)] = 10.0
     """`rician`: power of the line of sight over that of all scattered paths."""
-    obstruction_loss_db: NonNegative = 20.0
+    obstruction_loss_db: Decibels = 20.0
     """What a link loses when the world says that something stands in its way; with `range` it is cut."""
-    sensitivity_dbm: Finite = -82.0
+    sensitivity_dbm: Level = -82.0
     """All channels but `range`: decode and carrier-sense limit; weaker frames only interfere."""
-    interference_floor_dbm: Finite = -101.0
+    interference_floor_dbm: Level = -101.0
     """All channels but `range`: weaker frames are nothing. In free space it is reached after tens of kilometres."""
-    preamble_snr_db: Finite = 4.0
-    noise_figure_db: NonNegative = 7.0
+    preamble_snr_db: Level = 4.0
+    noise_figure_db: Decibels = 7.0
     capture: bool = False
     """Whether a later frame that is `capture_db` stronger than the one being received takes the receiver over."""
-    capture_db: NonNegative = 10.0
+    capture_db: Decibels = 10.0
     access: Literal["standard", "ns3"] = "standard"
     """`standard`: a station that finds the medium busy draws a backoff (IEEE 802.11); `ns3`: as ns-3 does it, which
     also senses weak signals together and oversees some interference (docs/emulator.md)."""
@@ -82,12 +82,12 @@ class Radio(Section):
     cw_max: Annotated[int, Field(ge=1, le=32767)] = 1023
     max_attempts: Annotated[int, Field(ge=1, le=255)] = 7
     queue_frames: Annotated[int, Field(ge=1, le=100_000)] = 500
-    lifetime_ms: Positive | None = None
+    lifetime_ms: Annotated[float, Field(ge=1e-3, le=1e6)] | None = None
     """How long a frame may wait in the MAC queue; unset: 500 ms, or as long as it takes if arrivals are saturated."""
     max_frame_bytes: Annotated[int, Field(ge=64, le=2304)] = 2304
-    lead_ms: NonNegative = 20.0
+    lead_ms: Annotated[float, Field(ge=0, le=1000)] = 20.0
     """How long before its instant a node announces a transmission to the radio."""
-    handover_ms: NonNegative = 0.0
+    handover_ms: Annotated[float, Field(ge=0, le=10_000)] = 0.0
     """Receptions are handed to nodes at multiples of this, as a driver with interrupt coalescing does; 0: at once.
     Fewer, larger wake-ups let more processes live on one machine; instants on the air stay exact."""
     late_limit: Annotated[float, Field(ge=0, le=1)] = 0.01

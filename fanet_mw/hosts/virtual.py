@@ -21,7 +21,10 @@ Route = tuple[int, Receive, list[tuple[int, Receive]]]
 _NOBODY: Final = -1
 """In place of the index of an actor: a listener, which has no wake-ups."""
 _STALL_LIMIT: Final = 100_000
-"""Wake-ups of one actor at one instant, above which it is taken to be stuck."""
+"""Wake-ups at one instant, of one actor or of several in turn, above which they are taken to be stuck."""
+
+_STALL_SHARE: Final = 1000
+"""For each actor of a large swarm: many may have something to do at the same instant."""
 
 
 def matches(expression: str, topic: str) -> bool:
@@ -73,7 +76,8 @@ class VirtualHost:
         self._routes: dict[str, Route] = {}
         self._latest: tuple[int, int, int] | None = None
         """The wake-up that was planned last, not in the heap: most often it is the next that comes."""
-        self._stall = (-1, -1, 0)
+        self._stalled = 0
+        """Wake-ups since time moved."""
 
     def start(self) -> None:
         """Start every actor, in order, at instant 0."""
@@ -99,6 +103,7 @@ class VirtualHost:
             armed[index] = None
             if t_ns > now_ns:
                 self.now_ns = now_ns = t_ns
+                self._stalled = 0
             else:
                 self._watch(index)
             wakes[index](now_ns)
@@ -114,12 +119,12 @@ class VirtualHost:
         self._hand_over()
 
     def _watch(self, index: int) -> None:
-        """A wake-up that does not move time is allowed; an endless row of them is a bug of the actor."""
-        t_ns, last, count = self._stall
-        self._stall = (self.now_ns, index, count + 1 if (t_ns, last) == (self.now_ns, index) else 0)
-        if count > _STALL_LIMIT:
+        """A wake-up that does not move time is allowed; an endless row of them is a bug of the actors."""
+        self._stalled += 1
+        if self._stalled > max(_STALL_LIMIT, _STALL_SHARE * len(self._actors)):
             raise LocalProtocolError(
-                f"{self._actors[index].name} asked to be woken {_STALL_LIMIT} times at {self.now_ns / S} s"
+                f"actors asked to be woken {self._stalled} times at {self.now_ns / S} s, "
+                f"{self._actors[index].name} the last"
             )
 
     def _flush(self, awake: dict[int, None]) -> None:

@@ -22,7 +22,7 @@ from collections.abc import Mapping, Sequence
 from math import ceil
 from typing import Final
 
-from fanet_mw.claims import MOST_LOTS, Claims, Standing
+from fanet_mw.claims import MESSAGE_BYTES, MOST_LOTS, Claims, Standing
 from fanet_mw.errors import DropReason
 from fanet_mw.messages import Reception
 from fanet_mw.protocol.arrival import decoded
@@ -195,10 +195,11 @@ class Claimed(Clustered):
                 return own_ns
         return self._contending_ns(start_ns)
 
-    def hello_inner(self, *, now_ns: int) -> bytes:
+    def hello_inner(self, room: int, *, now_ns: int) -> bytes:
         own = self._step(now_ns)
         claims = Claims(self._port.node, own, self._near.heard(now_ns=now_ns))
-        inner = super().hello_inner(now_ns=now_ns) + claims.encode_frames()
+        inner = super().hello_inner(room - MESSAGE_BYTES, now_ns=now_ns)
+        inner += claims.encode_frames(room - len(inner))
         self._hello_bytes = HEADER_BYTES + _POSITION_BYTES + len(inner)
         return inner
 

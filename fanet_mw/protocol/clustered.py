@@ -9,7 +9,7 @@ a node when heads and leaders die, and parts of the swarm meet, is decided in `u
 from collections.abc import Mapping, Sequence
 from typing import Final
 
-from fanet_mw.digest import Digest
+from fanet_mw.digest import Digest, capacity
 from fanet_mw.errors import DropReason, MalformedFrameError
 from fanet_mw.messages import Reception, TxStatus
 from fanet_mw.protocol.arrival import decoded
@@ -265,7 +265,7 @@ class Clustered(RoutingProtocol):
     def _guard_ns(self) -> int:
         return slot_guard_ns(self._port.scenario, clock_error_ns=self._port.clock_error_ns)
 
-    def hello_inner(self, *, now_ns: int) -> bytes:
+    def hello_inner(self, room: int, *, now_ns: int) -> bytes:
         self._gradient.advance(now_ns)
         route = self._gradient.route(now_ns=now_ns)
         if (
@@ -289,7 +289,10 @@ class Clustered(RoutingProtocol):
             term=term,
             leader=leader,
         ).encode_frame(self._port.node)
-        return beacon + self._repair.digest(now_ns=now_ns).encode_frames(self._port.node) if self._repair else beacon
+        if self._repair is None:
+            return beacon
+        digest = self._repair.digest(most=capacity(room - len(beacon)), now_ns=now_ns)
+        return beacon + digest.encode_frames(self._port.node)
 
     def _tell_silence(self, silence: Silence, now_ns: int) -> None:
         """Let the leader know of a neighbor that has fallen silent; who lives will hear it too, and object."""

@@ -82,8 +82,8 @@ class RoutingProtocol(ABC):
     def receive(self, packet: Packet, reception: Reception, *, now_ns: int) -> None:
         """The first copy of a packet in its phase. Delivery to the application is the node's business."""
 
-    def hello_inner(self, *, now_ns: int) -> bytes:
-        """What this protocol adds to the node's hello."""
+    def hello_inner(self, room: int, *, now_ns: int) -> bytes:
+        """What this protocol adds to the node's hello, in at most so many bytes."""
         return b""
 
     def hello_start_ns(self, start_ns: int) -> int:

@@ -107,9 +107,10 @@ class Node:
     def say_hello(self, inner: bytes, *, start_ns: int, now_ns: int) -> None:
         """Broadcast our hello one hop: position frames of the application, then what the protocol adds."""
         start_ns = self._protocol.hello_start_ns(start_ns)
+        room = self.scenario.radio.max_frame_bytes - wire.HEADER_BYTES - len(inner)
         packet = self._packet(
             Kind.HELLO,
-            inner + self._protocol.hello_inner(now_ns=now_ns),
+            inner + self._protocol.hello_inner(room, now_ns=now_ns),
             destination=BROADCAST,
             priority=wire.PRIORITY_CONTROL,
             flags=0,

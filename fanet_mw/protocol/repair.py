@@ -93,15 +93,16 @@ class Repair:
             if not self._stored[origin]:
                 del self._stored[origin]
 
-    def digest(self, *, now_ns: int) -> Digest:
-        """What our hello says: everything, or the next part of it."""
+    def digest(self, *, now_ns: int, most: int = _MOST_ORIGINS) -> Digest:
+        """What our hello says: everything, or the next part of it; of at most so many origins."""
+        most = min(most, _MOST_ORIGINS)
         self._forget(now_ns)
         origins = sorted(self._stored)
-        if len(origins) <= _MOST_ORIGINS:
+        if len(origins) <= most:
             return Digest(tuple(self._holdings[origin] for origin in origins), complete=True)
         at = self._turn % len(origins)
-        self._turn = at + _MOST_ORIGINS
-        turn = (origins + origins)[at : at + _MOST_ORIGINS]
+        self._turn = at + most
+        turn = (origins + origins)[at : at + most]
         return Digest(tuple(self._holdings[origin] for origin in turn), complete=False)
 
     # --- what a neighbor lacks ------------------------------------------------------------------------------------

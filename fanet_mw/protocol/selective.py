@@ -10,7 +10,7 @@ no relay to spare a loss is a loss for all behind it: where relays contend, fewe
 
 from typing import Final
 
-from fanet_mw.claims import Claims, Standing
+from fanet_mw.claims import MESSAGE_BYTES, Claims, Standing
 from fanet_mw.messages import Reception
 from fanet_mw.protocol.arrival import decoded
 from fanet_mw.protocol.clustered import Clustered
@@ -44,11 +44,12 @@ class Selective(Clustered):
         super().start(now_ns)
         self._known_ns = now_ns + _LEARN * self._hello_ns
 
-    def hello_inner(self, *, now_ns: int) -> bytes:
+    def hello_inner(self, room: int, *, now_ns: int) -> bytes:
         if self._rule == "mpr":
             self._near.choose_relays(now_ns=now_ns)
         claims = Claims(self._port.node, Standing(), self._near.heard(now_ns=now_ns))
-        return super().hello_inner(now_ns=now_ns) + claims.encode_frames()
+        inner = super().hello_inner(room - MESSAGE_BYTES, now_ns=now_ns)
+        return inner + claims.encode_frames(room - len(inner))
 
     def hello(self, packet: Packet, reception: Reception, *, now_ns: int) -> None:
         super().hello(packet, reception, now_ns=now_ns)

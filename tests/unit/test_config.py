@@ -4,9 +4,13 @@ from pathlib import Path
 
 import pytest
 
-from fanet_mw import config
+from agents.autopilot import Autopilot
+from fanet_mw import config, wire
 from fanet_mw.errors import ConfigError
+from fanet_mw.mavlink import Encoder
 from fanet_mw.scenario import Scenario, grid_columns
+from fanet_mw.scenario_checks import MESSAGE_BYTES
+from fanet_mw.units import Enu, NodeId
 from sim import catalog
 
 
@@ -21,7 +25,7 @@ def test_three_mistakes_are_reported_at_once_with_file_key_value_and_bound() -> 
     lines = message.splitlines()
     assert len(lines) == 3
     assert all(line.startswith("a.toml: ") for line in lines)
-    assert "duration_s = -1: input should be greater than 0" in message
+    assert "duration_s = -1: input should be greater than or equal to 0.001" in message
     assert "nodes.cuont: unknown key; did you mean count?" in message
     assert "nodes.layout = 'hexagon'" in message
     assert "'disc'" in message
@@ -84,3 +88,14 @@ def test_a_resolved_scenario_is_read_back_as_itself() -> None:
 @pytest.mark.parametrize(("count", "columns"), [(45, 9), (9, 3), (100, 10), (1, 1), (7, 7), (47, 10)])
 def test_the_default_grid_is_near_nine_by_five(count: int, columns: int) -> None:
     assert grid_columns(count) == columns
+
+
+def test_the_sizes_of_messages_that_a_scenario_is_checked_with_are_those_of_the_air() -> None:
+    node = NodeId(5)
+    positions = Autopilot(node, position=Enu(1, 2, 3), telemetry_hz=0).beacon_frames(0)
+    warning = Encoder(node).collision(NodeId(3), closest_s=1, altitude_m=1, horizontal_m=1)
+    specs = (wire.ROUTE, wire.BEACON, wire.SCHEDULE, wire.SURVIVOR, wire.DIGEST, wire.PLACES, wire.CLAIMS)
+    names = {53000: "ROUTE", 53001: "BEACON", 53002: "SCHEDULE", 53003: "SURVIVOR", 53007: "DIGEST", 53008: "PLACES",
+             53009: "CLAIMS"}  # fmt: skip
+    sizes = {f"FANET_{names[spec.msgid]}": wire.OVERHEAD + spec.layout.size for spec in specs}
+    assert {**sizes, "positions": len(positions), "COLLISION": len(warning)} == MESSAGE_BYTES

@@ -1,0 +1,109 @@
+"""Whatever a valid scenario asks for, its run ends, raises nothing, wakes nobody without end, and accounts for all.
+
+The draws are in `scenario_draws.py`; a thousand of them are the long run. What they once found stands here by name.
+"""
+
+from collections.abc import Sequence
+
+import pytest
+import scenario_draws
+
+from fanet_mw import config
+from fanet_mw.errors import ConfigError
+from fanet_mw.scenario import Scenario
+from sim import catalog
+
+
+@pytest.mark.parametrize("seed", range(8))
+def test_a_random_valid_scenario_ends_wakes_within_bounds_and_its_ledger_closes(seed: int) -> None:
+    assert scenario_draws.check(seed, limit_s=60) == ""
+
+
+@pytest.mark.slow
+@pytest.mark.timeout(3600)
+def test_a_thousand_random_valid_scenarios_end() -> None:
+    assert [text for seed in range(1000) if (text := scenario_draws.check(seed))] == []
+
+
+SATURATED = (
+    "nodes.count=5",
+    "clusters.count=1",
+    "traffic.arrivals=saturated",
+    "warmup_s=0",
+    "drain_s=0",
+    "duration_s=3",
+)
+
+
+@pytest.mark.parametrize(
+    "protocol", ["direct", "clustered", "flooding", "aodv", "olsr", "dsdv", "geographic", "gossip"]
+)
+@pytest.mark.parametrize("keys", [
+    ("radio.lead_ms=0", "radio.queue_frames=1"),
+    ("radio.queue_frames=1", "routing.queue_frames=1"),
+    ("radio.lead_ms=0", "radio.lifetime_ms=0.001", "traffic.destination=1"),
+    ("radio.lead_ms=0", "traffic.destination=2", 'faults=[{kind="cut",at_s=0.5,node=3},{kind="cut",at_s=0.6,node=2}]'),
+], ids=["no-lead", "queue-of-one", "no-lifetime", "cut-off"])  # fmt: skip
+def test_a_saturated_source_whose_radio_refuses_everything_does_not_offer_without_end(
+    protocol: str, keys: Sequence[str]
+) -> None:
+    found = catalog.find("quick", [*SATURATED, f"routing.protocol={protocol}", *keys])
+    summary = scenario_draws.run(found, limit_s=60)
+    assert summary["frames"]["closes"], summary["frames"]
+    assert summary["generated"] < 40_000
+
+
+def test_the_densest_traffic_that_a_scenario_may_ask_for_is_carried_or_counted() -> None:
+    found = catalog.find(
+        "quick",
+        ["nodes.count=2", "clusters.count=1", "traffic.interval_s=1e-4", "warmup_s=0", "drain_s=0", "duration_s=0.5"],
+    )
+    summary = scenario_draws.run(found, limit_s=60)
+    assert summary["generated"] > 9_000
+    assert summary["frames"]["closes"]
+
+
+@pytest.mark.parametrize("keys", [
+    ("clusters.relay=scheduled", "radio.max_frame_bytes=680"),
+    ("clusters.relay=cds", "clusters.repair_s=5", "radio.max_frame_bytes=501"),
+    ("clusters.relay=claimed", "clusters.repair_s=5", "radio.max_frame_bytes=501"),
+    ("clusters.repair_s=5", "radio.max_frame_bytes=385"),
+    ("radio.max_frame_bytes=302",),
+    ("clusters.relay=counter", "radio.max_frame_bytes=302", "clock.sync=beacons"),
+])  # fmt: skip
+def test_a_swarm_whose_largest_messages_just_fit_a_frame_works(keys: Sequence[str]) -> None:
+    size = ("nodes.count=30", "nodes.spacing_m=50", "traffic.payload_bytes=128", "duration_s=12")
+    summary = scenario_draws.run(catalog.find("quick", [*size, *keys]), limit_s=60)
+    assert summary["frames"]["closes"]
+    assert summary["delivered"] > 0
+
+
+@pytest.mark.parametrize(("keys", "said"), [
+    (("routing.hello_interval_s=0",), "needs hellos: routing.hello_interval_s > 0"),
+    (("routing.hello_interval_s=1e-10",), "routing.hello_interval_s = 1e-10 must be 0 or >= 0.01"),
+    (("clusters.relay=scheduled", "radio.max_frame_bytes=679"), "radio.max_frame_bytes = 679 must be >= 680"),
+    (("clusters.repair_s=5", "radio.max_frame_bytes=384"), "radio.max_frame_bytes = 384 must be >= 385"),
+    (("radio.max_frame_bytes=301",), "radio.max_frame_bytes = 301 must be >= 302 for schedules"),
+    (("traffic.interval_s=1e-10",), "traffic.interval_s = 1e-10: input should be greater than or equal to 0.0001"),
+    (("radio.tx_power_dbm=1e308",), "radio.tx_power_dbm = 1e+308: input should be less than or equal to 300"),
+    (("radio.tx_power_dbm=nan",), "radio.tx_power_dbm = nan: input should be a finite number"),
+])  # fmt: skip
+def test_what_no_run_could_keep_is_refused_with_key_value_and_bound(keys: Sequence[str], said: str) -> None:
+    with pytest.raises(ConfigError, match=said.replace("+", r"\+")):
+        catalog.find("quick", ["traffic.payload_bytes=64", *keys])
+
+
+@pytest.mark.parametrize("value", [1e308, 1e-10, -1e308, 10**400])
+def test_every_numeric_key_takes_a_number_out_of_all_proportion_or_names_itself_and_its_bound(value: float) -> None:
+    taken: list[Scenario] = []
+    unnamed: list[str] = []
+    for key in scenario_draws.every_key():
+        try:
+            taken.append(config.build(scenario_draws.tree({"nodes.count": 2, "clusters.count": 1, key.name: value})))
+        except ConfigError as error:
+            if key.name not in str(error):
+                unnamed.append(f"{key.name}: {error}")
+    assert unnamed == []
+    for found in taken:  # what is taken works
+        short = found.model_copy(update={"duration_s": 1.0, "warmup_s": 0.0, "drain_s": 0.0})
+        assert scenario_draws.run(short, limit_s=60)["frames"]["closes"]

@@ -3,11 +3,13 @@
 import json
 import sys
 from collections.abc import Mapping
-from typing import Final, NamedTuple
+from typing import NamedTuple
 
 from agents.clocked import make_uav
 from fanet_mw.errors import ConfigError
 from fanet_mw.hosts import interrupts, loop, service
+from fanet_mw.hosts.bus import JOIN_PATIENCE_S
+from fanet_mw.hosts.clock import START_PATIENCE_S
 from fanet_mw.hosts.realtime import RealtimeHost, run_actor
 from fanet_mw.radios.field_bus import FieldBus, joined
 from fanet_mw.radios.udp import PORT, UdpRadio
@@ -15,13 +17,20 @@ from fanet_mw.scenario import Scenario
 from fanet_mw.topics import Topics
 from fanet_mw.units import Enu, NodeId, S
 
-_CLOCK_TIMEOUT_S: Final = 60.0
 
-
-def run(scenario: Scenario, *, node: NodeId, swarm: str, endpoint: str, position: Enu) -> int:
+def run(
+    scenario: Scenario,
+    *,
+    node: NodeId,
+    swarm: str,
+    endpoint: str,
+    position: Enu,
+    join_patience_s: float = JOIN_PATIENCE_S,
+) -> int:
     """Run one UAV against a router until the scenario is over; raises BusError."""
     uav = make_uav(scenario, node, swarm, position=position)
-    loop.run(run_actor(uav, swarm=swarm, endpoint=endpoint, until_ns=scenario.duration_ns))
+    until_ns = scenario.duration_ns
+    loop.run(run_actor(uav, swarm=swarm, endpoint=endpoint, until_ns=until_ns, join_patience_s=join_patience_s))
     return 0
 
 
@@ -56,7 +65,7 @@ async def _fly(
         bus.use(radio)
         await radio.open()
         try:
-            await host.run(until_ns=scenario.duration_ns, clock_timeout_s=_CLOCK_TIMEOUT_S)
+            await host.run(until_ns=scenario.duration_ns, clock_timeout_s=START_PATIENCE_S)
         finally:
             radio.close()
     return {**uav.report(), "radio": dict(sorted(radio.counts.items()))}

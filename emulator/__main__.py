@@ -1,43 +1,44 @@
 """The link emulator as a process: `python -m emulator SCENARIO.toml`, or `fanet emulator`."""
 
-from collections.abc import Callable
+from functools import partial
 from pathlib import Path
 
 from emulator.capture_file import CaptureFile, unused
 from emulator.compile import warm_up
 from emulator.medium import Medium
 from fanet_mw.hosts import interrupts, loop, service
+from fanet_mw.hosts.bus import JOIN_PATIENCE_S
 from fanet_mw.hosts.realtime import run_actor
 from fanet_mw.scenario import Scenario
 
 
-def run(scenario: Scenario, *, swarm: str, endpoint: str, pcap: Path | None = None, receptions: bool = False) -> int:
+def run(
+    scenario: Scenario,
+    *,
+    swarm: str,
+    endpoint: str,
+    pcap: Path | None = None,
+    receptions: bool = False,
+    join_patience_s: float = JOIN_PATIENCE_S,
+) -> int:
     """Run the emulator against a router until the scenario is over, with a capture if a file is named.
 
     Raises BusError, and ConfigError when the file cannot be opened.
     """
     warm_up()
+    live = partial(
+        run_actor, swarm=swarm, endpoint=endpoint, until_ns=scenario.duration_ns, join_patience_s=join_patience_s
+    )
     if pcap is None:
-        _live(Medium(scenario, swarm), scenario, swarm, endpoint)
+        loop.run(live(Medium(scenario, swarm)))
         return 0
     with CaptureFile(unused(pcap), scenario.radio, receptions=receptions) as file:
 
         def on_epoch(epoch_unix_ns: int) -> None:
             file.pcap.epoch_unix_ns = epoch_unix_ns
 
-        _live(Medium(scenario, swarm, capture=file.pcap), scenario, swarm, endpoint, on_epoch)
+        loop.run(live(Medium(scenario, swarm, capture=file.pcap), on_epoch=on_epoch))
     return 0
-
-
-def _live(
-    medium: Medium,
-    scenario: Scenario,
-    swarm: str,
-    endpoint: str,
-    on_epoch: Callable[[int], None] = lambda _: None,
-) -> None:
-    until_ns = scenario.duration_ns
-    loop.run(run_actor(medium, swarm=swarm, endpoint=endpoint, until_ns=until_ns, on_epoch=on_epoch))
 
 
 def main() -> int:

@@ -5,6 +5,7 @@ Children ignore Ctrl-C (the launcher decides), and die with their parent whateve
 
 import asyncio
 import atexit
+import contextlib
 import ctypes
 import multiprocessing
 import os
@@ -15,11 +16,12 @@ from multiprocessing import forkserver, resource_tracker
 from multiprocessing.context import ForkServerContext, ForkServerProcess
 from typing import Any, Final, NamedTuple
 
-from fanet_mw.errors import FanetError
+from fanet_mw.errors import FanetError, HostError
 from fanet_mw.hosts.service import BUS_EXIT_CODE
 
 _PRELOAD: Final = ["agents.__main__", "emulator.__main__", "sim.world_main"]
 _PR_SET_PDEATHSIG: Final = 1
+_BLOCKED: Final = (signal.SIGINT, signal.SIGTERM)
 Entry = Callable[..., int]
 
 
@@ -34,6 +36,7 @@ class Recipe(NamedTuple):
 def _child(recipe: Recipe) -> None:
     """What a child does first and last; runs in the child."""
     signal.signal(signal.SIGINT, signal.SIG_IGN)
+    signal.pthread_sigmask(signal.SIG_UNBLOCK, _BLOCKED)  # the launcher's SIGTERM ends it
     if sys.platform == "linux":
         ctypes.CDLL(None).prctl(_PR_SET_PDEATHSIG, signal.SIGKILL)
     try:
@@ -45,14 +48,18 @@ def _child(recipe: Recipe) -> None:
     sys.exit(code)
 
 
-def _start_server() -> None:
-    """Start the server that children are forked from, unless it runs, with SIGINT blocked in it and so in its children.
+def _nothing() -> None:
+    pass
 
-    Ctrl-C reaches all of them. A child ignores it only once it runs `_child`, and the server only after its imports:
-    until then each would end with a traceback of its own.
+
+def _start_server() -> None:
+    """Start the server that children are forked from, unless it runs, with both signals blocked in it and its children.
+
+    Ctrl-C, or what ends a service of the system, reaches all of them. A child ignores Ctrl-C only in `_child`, and
+    the server only after its imports: until then each would end with a traceback of its own.
     """
     resource_tracker.ensure_running()  # the server would start it, and it unblocks SIGINT when it has been started
-    before = signal.pthread_sigmask(signal.SIG_BLOCK, {signal.SIGINT})
+    before = signal.pthread_sigmask(signal.SIG_BLOCK, _BLOCKED)
     try:
         forkserver.ensure_running()
     finally:
@@ -76,12 +83,28 @@ class Processes:
         self._recipes: dict[str, Recipe] = {}
         self._empty = asyncio.Event()
 
+    async def warm_up(self) -> None:
+        """Until the server has imported what children need; the first `start` would hold up the loop meanwhile."""
+        first = self._context.Process(target=_nothing)
+
+        def run() -> None:
+            _start_server()
+            with contextlib.suppress(OSError, EOFError):  # the next `start` says so
+                first.start()
+                first.join()
+                first.close()
+
+        await asyncio.to_thread(run)
+
     def start(self, name: str, entry: Entry, arguments: Mapping[str, Any], *, nice: int = 0) -> None:
         """Start a child; `entry(**arguments)` must be importable and picklable. A `nice` one lets others go first."""
         recipe = self._recipes[name] = Recipe(entry, arguments, nice)
         _start_server()
         process = self._context.Process(target=_child, args=(recipe,), name=name)
-        process.start()
+        try:
+            process.start()
+        except (OSError, EOFError) as error:
+            raise HostError(f"{name} cannot be started: {error}") from error
         self._running[name] = process
         self._empty.clear()
         self._loop.add_reader(process.sentinel, self._ended, name)

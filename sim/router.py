@@ -6,14 +6,12 @@ from collections.abc import Callable
 from typing import Final
 
 from fanet_mw.hosts.bus import Bus
-from fanet_mw.hosts.clock import ClockKeeper, SwarmClock
+from fanet_mw.hosts.clock import START_PATIENCE_S, ClockKeeper, SwarmClock
 from fanet_mw.scenario import Scenario
 from fanet_mw.topics import Topics
 
 _STOP_HEARD_S: Final = 0.3
 """Between telling services to stop and closing the bus they hear it on."""
-_PATIENCE_S: Final = 3600.0
-"""For services that are started by hand."""
 
 
 def expected_names(scenario: Scenario) -> list[str]:
@@ -26,7 +24,7 @@ async def serve(scenario: Scenario, *, swarm: str, listen: str, on_event: Callab
     with Bus.serve(listen) as bus:
         keeper = ClockKeeper(bus, Topics(swarm), time_scale=scenario.time_scale, expected=expected_names(scenario))
         on_event(f"serving {listen}, waiting for {len(keeper.missing())} services of swarm {swarm}")
-        clock = SwarmClock(await keeper.start(timeout_s=_PATIENCE_S))
+        clock = SwarmClock(await keeper.start(timeout_s=START_PATIENCE_S))
         on_event("all are there: the clock runs")
         try:
             await asyncio.sleep(clock.wait_s(scenario.duration_ns) + 1)

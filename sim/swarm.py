@@ -11,6 +11,7 @@ import contextlib
 import signal
 import socket
 import time
+from collections import Counter
 from collections.abc import Callable, Mapping
 from pathlib import Path
 from typing import Any, Final
@@ -18,8 +19,10 @@ from typing import Any, Final
 from agents.__main__ import run as run_agent
 from emulator.__main__ import run as run_emulator
 from fanet_mw.errors import BusError
+from fanet_mw.hosts import interrupts
 from fanet_mw.hosts.bus import Bus
-from fanet_mw.hosts.clock import ClockKeeper, SwarmClock
+from fanet_mw.hosts.clock import ClockKeeper, SwarmClock, few
+from fanet_mw.hosts.service import BUS_EXIT_CODE
 from fanet_mw.scenario import Scenario
 from fanet_mw.topics import Topics
 from fanet_mw.trace import ProcessEnded, Record, kind_of
@@ -35,7 +38,12 @@ from sim.world_main import run as run_world
 
 _AGENT_NICE: Final = 10
 """All UAVs wait for the emulator, and each has its lead: it goes first when both cores are wanted."""
-READY_TIMEOUT_S: Final = 60.0
+READY_TIMEOUT_S: Final = 300.0
+"""On a machine that is busy with other things 47 processes may take a minute, and the emulator may have to compile."""
+WORD_EVERY_S: Final = 10.0
+"""How often those who wait for the swarm are told whom for."""
+_MAX_LATE_STARTS: Final = 3
+"""How often a process that found no router is started again before the swarm's time begins."""
 _GRACE_S: Final = 5.0
 """After the end of the swarm's time, for last reports."""
 _LAST_WORDS_S: Final = 1.0
@@ -87,12 +95,14 @@ class Swarm:
         self._respawns: dict[str, int] = {}
         self._stall_s = 0.0
         """The longest that this process did nothing although it should have."""
+        self._late_starts: Counter[str] = Counter()
+        self._signal: int | None = None
 
     async def run(self, on_progress: Callable[[float], None]) -> Outcome:
         """Start, run, collect. Whatever happens, no process is left."""
         began = time.monotonic()
         try:
-            self._start_all()
+            await self._start_all()
             ready_s = await self._start_clock(began)
             run_began = time.monotonic()
             await self._follow(on_progress)
@@ -127,6 +137,11 @@ class Swarm:
         records = true_delays(records) if self._scenario.clock.modelled else records
         return sorted(records, key=lambda r: (r.t_ns, r.node, kind_of(r)))
 
+    def interrupt(self, number: int) -> None:
+        """End the run early because of a signal."""
+        self._signal = number
+        self.abort(f"interrupted by {signal.Signals(number).name}")
+
     def abort(self, why: str) -> None:
         """End the run early; what has been collected becomes a partial result."""
         if self._aborted is None and not self._over.is_set():
@@ -134,23 +149,41 @@ class Swarm:
             self._tell(why)
         self._over.set()
 
-    def _start_all(self) -> None:
-        common = {"scenario": self._scenario, "swarm": self._swarm, "endpoint": self._endpoint}
+    async def _start_all(self) -> None:
+        await self.processes.warm_up()
+        self._check_not_over()
+        common = {
+            "scenario": self._scenario,
+            "swarm": self._swarm,
+            "endpoint": self._endpoint,
+            "join_patience_s": READY_TIMEOUT_S,
+        }
         self.processes.start("emulator", run_emulator, {**common, **self.emulator_options})
         self.processes.start("world", run_world, common)
         for node, position in zip(self._scenario.node_ids, positions(self._scenario), strict=True):
             arguments = {**common, "node": NodeId(node), "position": position}
             self.processes.start(f"agent-{node}", run_agent, arguments, nice=_AGENT_NICE)
+            await asyncio.sleep(0)  # signals are heard between two of many
+            self._check_not_over()
+
+    def _check_not_over(self) -> None:
+        """Raise when the swarm was told to end before its time began: there is nothing to report."""
+        if self._signal is not None:
+            raise KeyboardInterrupt(self._signal)
+        if self._over.is_set():
+            raise BusError(self._aborted or "ended before the swarm was up")
 
     async def _start_clock(self, began: float) -> float:
         """Wait for everyone; returns how long that took [s]."""
         start = asyncio.ensure_future(self._keeper.start(timeout_s=READY_TIMEOUT_S))
         over = asyncio.ensure_future(self._over.wait())
-        await asyncio.wait([start, over], return_when=asyncio.FIRST_COMPLETED)
+        while not await _any_done(start, over, timeout_s=WORD_EVERY_S):
+            missing = self._keeper.missing()
+            self._tell(f"waiting for {len(missing)} of {len(self.processes.names())} processes: {few(missing)}")
         over.cancel()
         if not start.done():
             start.cancel()
-            raise BusError(self._aborted or "ended before the swarm was up")
+            self._check_not_over()
         self._clock = SwarmClock(start.result())
         ready_s = time.monotonic() - began
         self._tell(f"{len(self.processes.names())} processes up after {ready_s:.1f} s")
@@ -187,12 +220,20 @@ class Swarm:
     def _process_ended(self, name: str, exit_code: int) -> None:
         if self._ending or (exit_code == 0 and (self._over.is_set() or self._time_is_over())):
             return
+        waits = self._clock is None and not self._over.is_set()
+        if waits and exit_code == BUS_EXIT_CODE and self._late_starts[name] < _MAX_LATE_STARTS:
+            self._late_starts[name] += 1
+            self._tell(f"{name} ended with {describe(exit_code)} before the start; started again")
+            self.processes.restart(name)
+            return
         now_ns = max(0, self._clock.now_ns()) if self._clock else 0
         self._ended.append((name, exit_code))
         node = int(name.removeprefix("agent-")) if name.startswith("agent-") else 0
         self._obituaries.append(ProcessEnded(now_ns, node, name, exit_code))
         what = f"{name} ended with {describe(exit_code)} at {now_ns / S:.1f} s"
         if self._over.is_set():
+            if exit_code == -(self._signal or 0):
+                return  # whoever interrupted us meant all of us
             self._tell(f"{what}, while the swarm was ending")
             return
         self._respawns[name] = self._respawns.get(name, 0) + 1
@@ -206,6 +247,11 @@ class Swarm:
 
     def _time_is_over(self) -> bool:
         return self._clock is not None and self._clock.wait_s(self._scenario.duration_ns) <= 0.05
+
+
+async def _any_done(*futures: asyncio.Future[Any], timeout_s: float) -> bool:
+    done, _ = await asyncio.wait(futures, timeout=timeout_s, return_when=asyncio.FIRST_COMPLETED)
+    return bool(done)
 
 
 def _bus(listen: str | None, connect: str | None) -> tuple[Bus, str]:
@@ -234,7 +280,7 @@ async def launch(
     What is collected waits in temporary files in `spool_folder`; by default where the system keeps such files.
 
     Raises BusError when the bus cannot be had or the swarm does not come up, ConfigError when a limit of the machine
-    is too low.
+    is too low, and KeyboardInterrupt with its number when a signal comes before there is anything to report.
     """
     limits.prepare(processes=len(expected_names(scenario)))
     bus, endpoint = _bus(listen, connect)
@@ -244,11 +290,11 @@ async def launch(
         )
         run.emulator_options.update(emulator_options or {})
         loop = asyncio.get_running_loop()
-        for number in (signal.SIGINT, signal.SIGTERM):
-            loop.add_signal_handler(number, run.abort, f"interrupted by {number.name}")
+        for number in interrupts.SIGNALS:
+            loop.add_signal_handler(number, run.interrupt, number)
         on_started(run)
         try:
             return await run.run(on_progress)
         finally:
-            for number in (signal.SIGINT, signal.SIGTERM):
+            for number in interrupts.SIGNALS:
                 loop.remove_signal_handler(number)

@@ -1,15 +1,17 @@
 """The world as a process: `python -m sim.world_main SCENARIO.toml`, or `fanet world`."""
 
 from fanet_mw.hosts import interrupts, loop, service
+from fanet_mw.hosts.bus import JOIN_PATIENCE_S
 from fanet_mw.hosts.realtime import run_actor
 from fanet_mw.scenario import Scenario
 from sim.world import World
 
 
-def run(scenario: Scenario, *, swarm: str, endpoint: str) -> int:
+def run(scenario: Scenario, *, swarm: str, endpoint: str, join_patience_s: float = JOIN_PATIENCE_S) -> int:
     """Run the world against a router until the scenario is over; raises BusError."""
     world = World(scenario, swarm)
-    loop.run(run_actor(world, swarm=swarm, endpoint=endpoint, until_ns=scenario.duration_ns))
+    until_ns = scenario.duration_ns
+    loop.run(run_actor(world, swarm=swarm, endpoint=endpoint, until_ns=until_ns, join_patience_s=join_patience_s))
     return 0
 
 

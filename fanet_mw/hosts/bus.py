@@ -15,7 +15,8 @@ import zenoh
 
 from fanet_mw.errors import BusError
 
-CONNECT_TIMEOUT_MS: Final = 2500
+JOIN_PATIENCE_S: Final = 2.5
+"""How long a router is waited for by default: a person who mistyped an endpoint is told soon."""
 LOST_AFTER_S: Final = 2.0
 """A router that has been away for this long is taken to be gone. Zenoh reconnects by itself to one that comes back."""
 OnSample = Callable[[str, bytes], None]
@@ -36,7 +37,7 @@ class HostBus(Protocol):
     def check(self) -> None: ...
 
 
-def _config(*, mode: str, listen: str | None, connect: str | None) -> zenoh.Config:
+def _config(*, mode: str, listen: str | None, connect: str | None, patience_s: float = 0.0) -> zenoh.Config:
     config = zenoh.Config()
     settings: dict[str, object] = {
         "mode": mode,
@@ -52,7 +53,7 @@ def _config(*, mode: str, listen: str | None, connect: str | None) -> zenoh.Conf
         "transport/link/tx/queue/congestion_control/drop/wait_before_drop": 5000,
         "connect/endpoints": [connect] if connect else [],
         "connect/exit_on_failure": True,
-        "connect/timeout_ms": CONNECT_TIMEOUT_MS,
+        "connect/timeout_ms": round(1000 * patience_s),
     }
     for key, value in settings.items():
         config.insert_json5(key, json.dumps(value))
@@ -79,14 +80,19 @@ class Bus:
             raise BusError(f"cannot serve on {endpoint}: {why}") from error
 
     @classmethod
-    def join(cls, endpoint: str) -> Self:
-        """Connect to a router; raises BusError when none answers."""
+    def join(cls, endpoint: str, *, patience_s: float = JOIN_PATIENCE_S) -> Self:
+        """Connect to a router; raises BusError when none answers within `patience_s`.
+
+        A process of a swarm, whose router is known to be there, has more patience: on a busy machine a handshake may
+        take seconds.
+        """
         try:
-            return cls(zenoh.open(_config(mode="client", listen=None, connect=endpoint)), endpoint)
+            config = _config(mode="client", listen=None, connect=endpoint, patience_s=patience_s)
+            return cls(zenoh.open(config), endpoint)
         except zenoh.ZError as error:
             why = "no answer" if "onnect" in str(error) else _first_sentence(error)
             raise BusError(
-                f"no Zenoh router at {endpoint} ({why} within {CONNECT_TIMEOUT_MS / 1000:g} s); "
+                f"no Zenoh router at {endpoint} ({why} within {patience_s:g} s); "
                 f"start one with `fanet router` or `fanet launch --listen {endpoint}`"
             ) from error
 

@@ -5,8 +5,9 @@ move the swarm's. On one machine all processes agree to microseconds; across mac
 """
 
 import asyncio
+import contextlib
 import time
-from collections.abc import Iterable
+from collections.abc import Iterable, Sequence
 from typing import Final
 
 from fanet_mw import topics
@@ -19,6 +20,8 @@ from fanet_mw.units import MS, S
 _START_DELAY_NS: Final = 300 * MS
 """From the moment all are there until swarm instant 0."""
 _ASK_EVERY_S: Final = 0.5
+START_PATIENCE_S: Final = 3600.0
+"""For services that are started by hand, one after the other. A router that goes meanwhile is noticed in seconds."""
 
 
 class SwarmClock:
@@ -41,6 +44,11 @@ class SwarmClock:
         return (instant_ns - self.now_ns()) / self._scale / S
 
 
+def few(names: Sequence[str]) -> str:
+    """The first five names of many."""
+    return ", ".join(names[:5]) + (f" and {len(names) - 5} more" if len(names) > 5 else "")
+
+
 class ClockKeeper:
     """Starts the clock when all are there, answers whoever comes later, and stops it."""
 
@@ -57,7 +65,8 @@ class ClockKeeper:
         bus.answer(names.clock, self._current)
 
         def on_change(topic: str, alive: bool) -> None:
-            loop.call_soon_threadsafe(self._seen, topic, alive)
+            with contextlib.suppress(RuntimeError):  # the loop has been closed: nobody waits any more
+                loop.call_soon_threadsafe(self._seen, topic, alive)
 
         bus.watch(names.all_alive, on_change)
 
@@ -80,8 +89,7 @@ class ClockKeeper:
             await asyncio.wait_for(self._all_there.wait(), timeout_s)
         except TimeoutError:
             names = self.missing()
-            some = ", ".join(names[:5]) + (f" and {len(names) - 5} more" if len(names) > 5 else "")
-            raise BusError(f"{len(names)} of the swarm did not come up within {timeout_s:g} s: {some}") from None
+            raise BusError(f"{len(names)} of the swarm did not come up within {timeout_s:g} s: {few(names)}") from None
         epoch_ns = time.time_ns() + _START_DELAY_NS
         self._publish(Clock(epoch_ns, self._time_scale, ClockState.RUNNING))
         assert self.clock is not None, "just published"

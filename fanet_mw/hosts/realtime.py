@@ -17,8 +17,8 @@ from typing import Any, Final
 
 from fanet_mw import topics
 from fanet_mw.actor import Actor
-from fanet_mw.hosts.bus import Bus, HostBus
-from fanet_mw.hosts.clock import ClockListener, SwarmClock
+from fanet_mw.hosts.bus import JOIN_PATIENCE_S, Bus, HostBus
+from fanet_mw.hosts.clock import START_PATIENCE_S, ClockListener, SwarmClock
 from fanet_mw.hosts.inbox import Inbox
 from fanet_mw.hosts.lateness import Histogram
 from fanet_mw.messages import Message, Report, TraceBatch
@@ -260,10 +260,11 @@ async def run_actor(
     swarm: str,
     endpoint: str,
     until_ns: int,
-    clock_timeout_s: float = 60.0,
+    clock_timeout_s: float = START_PATIENCE_S,
+    join_patience_s: float = JOIN_PATIENCE_S,
     on_epoch: Callable[[int], None] = lambda _: None,
 ) -> None:
     """Join a router, run one actor, leave. Raises BusError."""
-    with Bus.join(endpoint) as bus:
+    with Bus.join(endpoint, patience_s=join_patience_s) as bus:
         host = RealtimeHost(actor, bus, Topics(swarm))
         await host.run(until_ns=until_ns, clock_timeout_s=clock_timeout_s, on_epoch=on_epoch)

@@ -5,6 +5,7 @@ import json
 import math
 import os
 import signal
+import socket
 import subprocess
 import sys
 import time
@@ -243,6 +244,22 @@ async def test_a_host_whose_router_dies_ends_within_three_seconds(
         with pytest.raises(BusError, match=f"router at {endpoint} is gone"):
             await asyncio.wait_for(host, 10)
         assert time.monotonic() - began < 3.5
+
+
+async def test_a_router_that_is_slow_to_answer_is_waited_for() -> None:
+    """A process of a swarm on a busy machine may be connected to long before the router has time for it."""
+    endpoint = free_endpoint()
+    port = int(endpoint.rpartition(":")[2])
+    with socket.socket() as silent:
+        silent.setsockopt(socket.SOL_SOCKET, socket.SO_REUSEADDR, 1)
+        silent.bind(("127.0.0.1", port))
+        silent.listen()
+        with pytest.raises(BusError, match=r"no answer within 0\.5 s"):
+            await asyncio.to_thread(Bus.join, endpoint, patience_s=0.5)
+        joining = asyncio.create_task(asyncio.to_thread(Bus.join, endpoint, patience_s=20))
+        await asyncio.sleep(3)
+    with Bus.serve(endpoint), await joining as late:
+        assert late.connected()
 
 
 # --- the clock --------------------------------------------------------------------------------------------------------

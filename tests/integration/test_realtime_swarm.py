@@ -7,7 +7,9 @@ import signal
 import socket
 import subprocess
 import sys
+import tempfile
 import time
+import uuid
 from collections.abc import Iterator
 from concurrent.futures import ThreadPoolExecutor
 from pathlib import Path
@@ -15,10 +17,12 @@ from typing import Any
 
 import pytest
 
+from agents.__main__ import run as run_agent
 from fanet_mw import tlog
 from fanet_mw.errors import BusError
 from fanet_mw.scenario import Scenario
 from fanet_mw.trace import ProcessEnded
+from fanet_mw.units import NodeId
 from sim import catalog
 from sim.outcome import Outcome
 from sim.results import finish
@@ -31,7 +35,9 @@ def scenario(*overrides: str) -> Scenario:
     return catalog.find("quick", [*FAST, *overrides])
 
 
-def run(chosen: Scenario, *, at_s: float | None = None, act: Any = None, **options: Any) -> tuple[Outcome, list[str]]:
+def run(
+    chosen: Scenario, *, swarm: str = "test", at_s: float | None = None, act: Any = None, **options: Any
+) -> tuple[Outcome, list[str]]:
     """Launch; when `at_s` wall seconds after the start of the run have passed, do `act(swarm)`."""
     events: list[str] = []
 
@@ -44,7 +50,7 @@ def run(chosen: Scenario, *, at_s: float | None = None, act: Any = None, **optio
         if act is not None:
             swarm.task = asyncio.ensure_future(later())  # type: ignore[attr-defined]  # kept from the collector
 
-    outcome = asyncio.run(launch(chosen, swarm="test", on_event=events.append, on_started=started, **options))
+    outcome = asyncio.run(launch(chosen, swarm=swarm, on_event=events.append, on_started=started, **options))
     return outcome, events
 
 
@@ -136,7 +142,7 @@ def test_the_emulator_is_started_again_with_respawn_and_frames_flow_again() -> N
 
 
 def command(*arguments: str) -> list[str]:
-    return [sys.executable, "-m", "sim.cli", *arguments]
+    return [sys.executable, "-m", "sim", *arguments]
 
 
 def test_ctrl_c_ends_everything_cleanly_with_a_partial_result() -> None:
@@ -154,9 +160,66 @@ def test_ctrl_c_ends_everything_cleanly_with_a_partial_result() -> None:
     assert json.loads(out)["aborted"] == "interrupted by SIGINT"
 
 
+def at_start(number: int, *, after_s: float) -> tuple[int, str]:
+    """The exit code and words of a launch that is interrupted so soon, as by Ctrl-C: all its processes hear it."""
+    process = subprocess.Popen(
+        command("launch", "quick"), stdout=subprocess.DEVNULL, stderr=subprocess.PIPE, text=True, process_group=0
+    )
+    time.sleep(after_s)
+    os.killpg(process.pid, number)
+    _, err = process.communicate(timeout=30)
+    return process.returncode, err
+
+
+def test_ctrl_c_while_a_swarm_starts_ends_it_without_a_traceback() -> None:
+    """Wherever it comes: in the imports, when the server of children starts, between children, before the clock."""
+    for after_s in (0.3, 0.8, 1.5, 2.5):
+        code, said = at_start(signal.SIGINT, after_s=after_s)
+        assert code == 130, (after_s, said)
+        assert "Traceback" not in said, (after_s, said)
+        assert len(said.splitlines()) <= 3, (after_s, said)
+
+
+def test_a_launcher_that_is_terminated_while_it_starts_says_so_in_its_exit_code() -> None:
+    code, said = at_start(signal.SIGTERM, after_s=2.0)
+    assert code == 143, said
+    assert "Traceback" not in said
+
+
+def late_agent(*, node: int, **arguments: Any) -> int:
+    """Node 2 finds no router when it is started for the first time, as on a machine that has other things to do; node 3
+    takes its time."""
+    there = Path(tempfile.gettempdir()) / f"{arguments['swarm']}-agent-2"
+    if node == 2 and not there.exists():
+        there.touch()
+        raise BusError("no Zenoh router")
+    if node == 3:
+        time.sleep(3)
+    return run_agent(node=NodeId(node), **arguments)
+
+
+def test_an_agent_that_is_late_to_start_is_waited_for_and_one_that_found_no_router_is_started_again(
+    monkeypatch: pytest.MonkeyPatch,
+) -> None:
+    from sim import swarm as module
+
+    monkeypatch.setattr(module, "run_agent", late_agent)
+    monkeypatch.setattr(module, "WORD_EVERY_S", 1.0)
+    name = f"late-{uuid.uuid4().hex}"
+    try:
+        outcome, events = run(scenario(), swarm=name)
+    finally:
+        (Path(tempfile.gettempdir()) / f"{name}-agent-2").unlink(missing_ok=True)
+    assert outcome.aborted is None
+    assert outcome.ended == [], "it has missed nothing"
+    assert outcome.reports["agent-2"]["final"]
+    assert any("agent-2 ended with exit code 3 before the start; started again" in event for event in events)
+    assert any("waiting for" in event and "agent-3" in event for event in events)
+
+
 def refused(*arguments: str) -> str:
     """What a command that cannot work says; it must be one message, quickly, without a traceback."""
-    done = subprocess.run(command(*arguments), capture_output=True, text=True, timeout=15, check=False)
+    done = subprocess.run(command(*arguments), capture_output=True, text=True, timeout=60, check=False)
     assert done.returncode != 0
     assert "Traceback" not in done.stderr
     return " ".join(done.stderr.split())

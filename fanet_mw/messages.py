@@ -127,11 +127,15 @@ class ClockState(IntEnum):
 
 
 class Clock(NamedTuple):
-    """The keeper of the swarm clock -> every host: swarm instant = (unix - epoch) x scale."""
+    """The keeper of the swarm clock -> every host: swarm instant = (clock - epoch) x scale."""
 
     epoch_unix_ns: int
     time_scale: float
     state: ClockState
+    epoch_mono_ns: int = 0
+    """The same instant on the monotonic clock of the keeper's machine."""
+    machine: int = 0
+    """Which machine that is (`Timebase.machine`); 0: unknown, and only unix time counts."""
 
 
 @dataclass(frozen=True, slots=True)

@@ -113,7 +113,7 @@ _SCAN = struct.Struct("<qH")
 _HEARD = struct.Struct("<If")
 _POSES = struct.Struct("<qI")
 _OBSTRUCTIONS = struct.Struct("<qI")
-_CLOCK = struct.Struct("<qdB")
+_CLOCK = struct.Struct("<qdBqQ")
 _INSTANT = struct.Struct("<q")
 _DEGRADE = struct.Struct("<HHBddq")
 _JAM = struct.Struct("<5dq")
@@ -225,14 +225,14 @@ def _decode_trace(body: bytes) -> TraceBatch:
 
 
 def _encode_clock(m: Clock) -> bytes:
-    return _CLOCK.pack(m.epoch_unix_ns, m.time_scale, m.state)
+    return _CLOCK.pack(m.epoch_unix_ns, m.time_scale, m.state, m.epoch_mono_ns, m.machine)
 
 
 def _decode_clock(body: bytes) -> Clock:
-    epoch_unix_ns, time_scale, state = _CLOCK.unpack(body)
+    epoch_unix_ns, time_scale, state, epoch_mono_ns, machine = _CLOCK.unpack(body)
     if not 0 < time_scale <= 100:
         raise ValueError("time_scale")
-    return Clock(epoch_unix_ns, time_scale, ClockState(state))
+    return Clock(epoch_unix_ns, time_scale, ClockState(state), epoch_mono_ns, machine)
 
 
 def _encode_report(m: Report) -> bytes:

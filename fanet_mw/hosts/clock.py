@@ -1,18 +1,20 @@
-"""The swarm clock of a real-time run: swarm instant = (unix - epoch) x scale, on the monotonic clock.
+"""The swarm clock of a real-time run: swarm instant = (clock - epoch) x scale, handed over and never derived anew.
 
-Unix time is read once per process and carried on by the monotonic clock, so that a step of the system's clock does not
-move the swarm's. On one machine all processes agree to microseconds; across machines as well as their clocks do.
+The keeper fixes the epoch in unix time and in its machine's monotonic time. A process of the same machine, whenever it
+starts, counts from the monotonic epoch: they agree to microseconds, and no step of the system's clock moves any of
+them. A process of another machine reads its unix time once, when it starts, and carries it on by its own monotonic
+clock: it is right as far as the two machines' unix clocks agreed with each other at the epoch and at its start.
 """
 
 import asyncio
 import contextlib
-import time
 from collections.abc import Iterable, Sequence
 from typing import Final
 
 from fanet_mw import topics
 from fanet_mw.errors import BusError, MalformedFrameError
 from fanet_mw.hosts.bus import Bus, HostBus
+from fanet_mw.hosts.timebase import THIS_MACHINE, Timebase
 from fanet_mw.messages import Clock, ClockState
 from fanet_mw.topics import Topics
 from fanet_mw.units import MS, S
@@ -27,16 +29,19 @@ START_PATIENCE_S: Final = 3600.0
 class SwarmClock:
     """Reads swarm instants."""
 
-    def __init__(self, clock: Clock) -> None:
-        epoch_mono_ns = clock.epoch_unix_ns - (time.time_ns() - time.monotonic_ns())
+    def __init__(self, clock: Clock, timebase: Timebase = THIS_MACHINE) -> None:
         self.epoch_unix_ns = clock.epoch_unix_ns
         """Unix time of swarm instant 0."""
-        self._epoch_mono_ns = epoch_mono_ns
+        self._mono_ns = timebase.mono_ns
+        if clock.machine and clock.machine == timebase.machine:
+            self._epoch_mono_ns = clock.epoch_mono_ns
+        else:
+            self._epoch_mono_ns = clock.epoch_unix_ns - (timebase.unix_ns() - timebase.mono_ns())
         self._scale = clock.time_scale
 
     def now_ns(self) -> int:
         """The swarm instant; negative before the start."""
-        elapsed_ns = time.monotonic_ns() - self._epoch_mono_ns
+        elapsed_ns = self._mono_ns() - self._epoch_mono_ns
         return elapsed_ns if self._scale == 1 else round(elapsed_ns * self._scale)
 
     def wait_s(self, instant_ns: int) -> float:
@@ -52,7 +57,16 @@ def few(names: Sequence[str]) -> str:
 class ClockKeeper:
     """Starts the clock when all are there, answers whoever comes later, and stops it."""
 
-    def __init__(self, bus: Bus, names: Topics, *, time_scale: float, expected: Iterable[str]) -> None:
+    def __init__(
+        self,
+        bus: Bus,
+        names: Topics,
+        *,
+        time_scale: float,
+        expected: Iterable[str],
+        timebase: Timebase = THIS_MACHINE,
+    ) -> None:
+        self._timebase = timebase
         self._bus = bus
         self._names = names
         self._time_scale = time_scale
@@ -90,15 +104,16 @@ class ClockKeeper:
         except TimeoutError:
             names = self.missing()
             raise BusError(f"{len(names)} of the swarm did not come up within {timeout_s:g} s: {few(names)}") from None
-        epoch_ns = time.time_ns() + _START_DELAY_NS
-        self._publish(Clock(epoch_ns, self._time_scale, ClockState.RUNNING))
+        unix_ns = self._timebase.unix_ns() + _START_DELAY_NS
+        mono_ns = self._timebase.mono_ns() + _START_DELAY_NS
+        self._publish(Clock(unix_ns, self._time_scale, ClockState.RUNNING, mono_ns, self._timebase.machine))
         assert self.clock is not None, "just published"
         return self.clock
 
     def stop(self) -> None:
         """Everyone ends at once."""
-        epoch_ns = self.clock.epoch_unix_ns if self.clock else 0
-        self._publish(Clock(epoch_ns, self._time_scale, ClockState.STOPPED))
+        clock = self.clock or Clock(0, self._time_scale, ClockState.STOPPED)
+        self._publish(clock._replace(state=ClockState.STOPPED))
 
     def _publish(self, clock: Clock) -> None:
         self.clock = clock
@@ -108,7 +123,8 @@ class ClockKeeper:
 class ClockListener:
     """Hears the swarm clock, on the loop's thread."""
 
-    def __init__(self, bus: HostBus, names: Topics) -> None:
+    def __init__(self, bus: HostBus, names: Topics, timebase: Timebase = THIS_MACHINE) -> None:
+        self._timebase = timebase
         self._bus = bus
         self._names = names
         self._loop = asyncio.get_running_loop()
@@ -138,7 +154,8 @@ class ClockListener:
         while waited_s < timeout_s:
             self._bus.ask(self._names.clock, self._from_thread)
             try:
-                return SwarmClock(await asyncio.wait_for(asyncio.shield(self._running), _ASK_EVERY_S))
+                clock = await asyncio.wait_for(asyncio.shield(self._running), _ASK_EVERY_S)
+                return SwarmClock(clock, self._timebase)
             except TimeoutError:
                 waited_s += _ASK_EVERY_S
                 self._bus.check()

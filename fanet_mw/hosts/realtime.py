@@ -21,6 +21,7 @@ from fanet_mw.hosts.bus import JOIN_PATIENCE_S, Bus, HostBus
 from fanet_mw.hosts.clock import START_PATIENCE_S, ClockListener, SwarmClock
 from fanet_mw.hosts.inbox import Inbox
 from fanet_mw.hosts.lateness import Histogram
+from fanet_mw.hosts.timebase import THIS_MACHINE, Timebase
 from fanet_mw.messages import Message, Report, TraceBatch
 from fanet_mw.topics import Topics
 from fanet_mw.trace import Record
@@ -34,7 +35,8 @@ _LOOKS_PER_REPORT: Final = 2
 class RealtimeHost:
     """Runs one actor until its swarm time is over."""
 
-    def __init__(self, actor: Actor, bus: HostBus, names: Topics) -> None:
+    def __init__(self, actor: Actor, bus: HostBus, names: Topics, timebase: Timebase = THIS_MACHINE) -> None:
+        self._timebase = timebase
         self._actor = actor
         self._bus = bus
         self._names = names
@@ -68,7 +70,7 @@ class RealtimeHost:
         """
         for expression in self._actor.subscriptions:
             self._bus.subscribe(expression, self._from_thread)
-        listener = ClockListener(self._bus, self._names)
+        listener = ClockListener(self._bus, self._names, self._timebase)
         self._bus.announce(self._names.alive(self._actor.name))
         self._clock = await listener.running(timeout_s=clock_timeout_s)
         on_epoch(self._clock.epoch_unix_ns)
@@ -263,8 +265,9 @@ async def run_actor(
     clock_timeout_s: float = START_PATIENCE_S,
     join_patience_s: float = JOIN_PATIENCE_S,
     on_epoch: Callable[[int], None] = lambda _: None,
+    timebase: Timebase = THIS_MACHINE,
 ) -> None:
     """Join a router, run one actor, leave. Raises BusError."""
     with Bus.join(endpoint, patience_s=join_patience_s) as bus:
-        host = RealtimeHost(actor, bus, Topics(swarm))
+        host = RealtimeHost(actor, bus, Topics(swarm), timebase)
         await host.run(until_ns=until_ns, clock_timeout_s=clock_timeout_s, on_epoch=on_epoch)

@@ -22,6 +22,7 @@ from fanet_mw.hosts.bus import Bus
 from fanet_mw.hosts.clock import ClockKeeper, ClockListener, SwarmClock
 from fanet_mw.hosts.lateness import Histogram
 from fanet_mw.hosts.realtime import run_actor
+from fanet_mw.hosts.timebase import THIS_MACHINE, Timebase
 from fanet_mw.messages import Clock, ClockState, MavlinkTap, Message, Report, TraceBatch
 from fanet_mw.topics import Topics
 from fanet_mw.trace import ProcessEnded
@@ -265,12 +266,84 @@ async def test_a_router_that_is_slow_to_answer_is_waited_for() -> None:
 # --- the clock --------------------------------------------------------------------------------------------------------
 
 
-def test_a_step_of_the_systems_clock_does_not_move_the_swarm_clock(monkeypatch: pytest.MonkeyPatch) -> None:
-    clock = SwarmClock(Clock(time.time_ns(), 1.0, ClockState.RUNNING))
-    monkeypatch.setattr(time, "time_ns", lambda: 0)
-    before_ns = clock.now_ns()
-    time.sleep(0.01)
-    assert 10 * MS <= clock.now_ns() - before_ns < 2 * S
+class Machine:
+    """The clocks of a machine that a test moves: time passes for both, a step is of the unix clock alone."""
+
+    def __init__(self, machine: int, *, unix_ns: int = 1_700_000_000 * S, mono_ns: int = 5_000 * S) -> None:
+        self.unix_ns, self.mono_ns = unix_ns, mono_ns
+        self.timebase = Timebase(lambda: self.unix_ns, lambda: self.mono_ns, machine)
+
+    def let_pass(self, seconds: float) -> None:
+        self.unix_ns += round(seconds * S)
+        self.mono_ns += round(seconds * S)
+
+    def step(self, seconds: float) -> None:
+        self.unix_ns += round(seconds * S)
+
+    def clock(self) -> Clock:
+        """What a keeper on this machine publishes when swarm instant 0 is now."""
+        return Clock(self.unix_ns, 1.0, ClockState.RUNNING, self.mono_ns, self.timebase.machine)
+
+
+STEPS = pytest.mark.parametrize("step_s", [-3600.0, -10.0, 10.0, 3600.0])
+
+
+@STEPS
+def test_a_step_of_the_systems_clock_moves_no_process_whenever_it_started(step_s: float) -> None:
+    machine = Machine(7)
+    told = machine.clock()
+    early = SwarmClock(told, machine.timebase)
+    machine.let_pass(20)
+    machine.step(step_s)
+    late = SwarmClock(told, machine.timebase)
+    machine.let_pass(5)
+    assert early.now_ns() == late.now_ns() == 25 * S
+    assert late.epoch_unix_ns == told.epoch_unix_ns
+
+
+def test_a_process_of_another_machine_goes_by_unix_time_and_its_own_monotonic_clock() -> None:
+    keeper, other = Machine(7), Machine(8, mono_ns=1)
+    told = keeper.clock()
+    other.let_pass(20)
+    clock = SwarmClock(told, other.timebase)
+    assert clock.now_ns() == 20 * S
+    other.let_pass(5)
+    other.step(-10)
+    assert clock.now_ns() == 25 * S, "read once, when it started"
+
+
+def test_a_machine_that_cannot_be_told_is_never_taken_for_the_keepers() -> None:
+    keeper, other = Machine(0), Machine(0, mono_ns=1)
+    told = keeper.clock()
+    other.let_pass(20)
+    assert SwarmClock(told, other.timebase).now_ns() == 20 * S
+
+
+@pytest.mark.parametrize("step_s", [-10.0, 10.0])
+async def test_an_actor_that_starts_after_a_step_of_the_clock_joins_the_swarm_where_it_is(step_s: float) -> None:
+    """Ten seconds ahead it would take the run of two seconds for over; ten behind, it would come in again at 0."""
+    stepped = THIS_MACHINE._replace(unix_ns=lambda: time.time_ns() + round(step_s * S))
+    endpoint, actor = free_endpoint(), Ticker()
+    with Bus.serve(endpoint) as bus:
+        observer = Observer(bus)
+        keeper = ClockKeeper(bus, NAMES, time_scale=1.0, expected=[])
+        clock = SwarmClock(await keeper.start(timeout_s=5))
+        await asyncio.sleep(clock.wait_s(700 * MS))
+        host = asyncio.create_task(run_actor(actor, swarm="host", endpoint=endpoint, until_ns=2 * S, timebase=stepped))
+        while not actor.wakes and not host.done():  # noqa: ASYNC110  (real time passes)
+            await asyncio.sleep(0.01)
+        assert 700 * MS < actor.next_ns < clock.now_ns() + 100 * MS
+        await host
+        assert clock.wait_s(2 * S) <= 0.05
+        await asyncio.sleep(0.1)
+    assert observer.reports()[-1]["final"] is True
+    assert actor.wakes > 5
+
+
+def test_all_processes_of_this_machine_say_that_it_is_the_same_one() -> None:
+    command = "from fanet_mw.hosts.timebase import THIS_MACHINE; print(THIS_MACHINE.machine)"
+    said = subprocess.run([sys.executable, "-c", command], capture_output=True, text=True, check=True).stdout
+    assert int(said) == THIS_MACHINE.machine != 0
 
 
 @pytest.mark.parametrize("scale", [0.25, 1.0, 4.0])

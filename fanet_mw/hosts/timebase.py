@@ -1,0 +1,39 @@
+"""The two clocks of a machine, and which machine it is: handed to whatever tells real time.
+
+Unix time can be stepped by an operator or by NTP; the monotonic clock cannot, and all processes of one machine read
+the same one until it is booted again. What must survive a step is therefore told in monotonic time to processes of the
+same machine, and in unix time to others only.
+"""
+
+import hashlib
+import os
+import time
+from collections.abc import Callable
+from pathlib import Path
+from typing import Final, NamedTuple
+
+_BOOT: Final = Path("/proc/sys/kernel/random/boot_id")
+_TIME_NAMESPACE: Final = Path("/proc/self/ns/time")
+"""Containers may have monotonic clocks of their own (time_namespaces(7))."""
+
+
+class Timebase(NamedTuple):
+    """Where a process reads the time."""
+
+    unix_ns: Callable[[], int]
+    mono_ns: Callable[[], int]
+    machine: int
+    """The same for all processes that read the same monotonic clock; 0: that cannot be said."""
+
+
+def _machine() -> int:
+    try:
+        known = _BOOT.read_text(encoding="ascii").strip()
+        if _TIME_NAMESPACE.exists():
+            known += str(os.readlink(_TIME_NAMESPACE))  # noqa: PTH115  (the link names no file)
+    except OSError:
+        return 0
+    return int.from_bytes(hashlib.sha256(known.encode()).digest()[:8], "little")
+
+
+THIS_MACHINE: Final = Timebase(time.time_ns, time.monotonic_ns, _machine())

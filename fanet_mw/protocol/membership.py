@@ -47,6 +47,9 @@ class Membership:
         """Our cluster, the head first, then those who stand in for it."""
         self._parts: dict[int, Schedule] = {}
         self._named: Standing | None = None
+        """The role that a schedule gave us last; it holds until all parts of a newer one that concern us have come."""
+        self._told = False
+        """Whether this version has said what we are."""
 
     @property
     def epoch(self) -> int:
@@ -108,7 +111,7 @@ class Membership:
                 return None  # an older epoch, still on its way
             self.version = version
             self._parts = {}
-            self._named = None
+            self._told = False
         repeated = schedule.part in self._parts
         self._parts[schedule.part] = schedule
         event = self._find_ourselves(schedule, guard_ns)
@@ -128,7 +131,7 @@ class Membership:
             schedule.start_us * US, schedule.period_us * US, slot_ns, min(guard_ns, max(0, slot_ns - 1))
         )
         self.succession = (head, *(NodeId(m.node) for m in own if m.node != head))
-        known = self._named is not None
+        known, self._told = self._told, True
         self._named = Standing(Role.HEAD if mine.is_head else Role.MEMBER, mine.cluster, head)
         return None if known else Event.NAMED_HEAD if mine.is_head else Event.NAMED_MEMBER
 
@@ -143,7 +146,7 @@ class Membership:
 
     def resign(self) -> None:
         """No role, until another schedule names us."""
-        self.standing, self.succession, self._named = _NOWHERE, (), None
+        self.standing, self.succession, self._named, self._told = _NOWHERE, (), None, False
 
     def forget(self) -> None:
         """No schedule: the next one is new, whatever its version."""

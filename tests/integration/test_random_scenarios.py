@@ -3,6 +3,7 @@
 The draws are in `scenario_draws.py`; a thousand of them are the long run. What they once found stands here by name.
 """
 
+import random
 from collections.abc import Sequence
 
 import pytest
@@ -107,3 +108,23 @@ def test_every_numeric_key_takes_a_number_out_of_all_proportion_or_names_itself_
     for found in taken:  # what is taken works
         short = found.model_copy(update={"duration_s": 1.0, "warmup_s": 0.0, "drain_s": 0.0})
         assert scenario_draws.run(short, limit_s=60)["frames"]["closes"]
+
+
+@pytest.mark.slow
+@pytest.mark.timeout(600)
+@pytest.mark.parametrize("seed", range(4))
+def test_a_large_swarm_in_which_heads_come_and_go_all_the_time_keeps_going(seed: int) -> None:
+    """Above 56 nodes a schedule has several parts; a head that was replaced may come back between two of them."""
+    pick = random.Random(seed)
+    cuts = (
+        f'{{kind="cut",node={pick.randint(2, 70)},at_s={pick.uniform(8, 35):.1f},for_s={pick.choice([3, 4, 6, 8])}}}'
+        for _ in range(60)
+    )
+    keys = (
+        "nodes.count=72", "nodes.spacing_m=150", "duration_s=45", "warmup_s=10", "drain_s=1", "clusters.count=8",
+        "clusters.relay=counter", "clusters.reassign_s=0.5", "traffic.interval_s=2", "traffic.payload_bytes=128",
+    )  # fmt: skip
+    found = catalog.find("clusters", [*keys, f"seed={seed}", f"faults=[{','.join(cuts)}]"])
+    summary = scenario_draws.run(found, limit_s=500)
+    assert summary["frames"]["closes"]
+    assert summary["pdr"] > 0.6

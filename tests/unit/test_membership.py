@@ -1,9 +1,14 @@
 """What a schedule says of one node, part by part and epoch by epoch."""
 
+from fanet_mw.protocol.gradient import Gradient
+from fanet_mw.protocol.lease import Lease
 from fanet_mw.protocol.membership import Membership
-from fanet_mw.protocol.states import Event
-from fanet_mw.units import NodeId
-from fanet_mw.wire_messages import Member, Schedule
+from fanet_mw.protocol.neighbors import Neighbors
+from fanet_mw.protocol.signs import Signs
+from fanet_mw.protocol.states import Action, Event
+from fanet_mw.protocol.upkeep import Upkeep
+from fanet_mw.units import Enu, NodeId, S
+from fanet_mw.wire_messages import Join, Member, Schedule
 
 US = NodeId(2)
 
@@ -48,3 +53,22 @@ def test_the_head_comes_first_in_the_succession_wherever_it_is_listed() -> None:
     member.learn(schedule()._replace(members=members), guard_ns=0)
     assert member.succession == (4, 2, 3)
     assert member.rank(3) == 2
+
+
+def test_a_replaced_head_that_shows_between_two_parts_of_a_new_schedule_is_followed_as_the_old_one_named_it() -> None:
+    """Above 56 nodes a schedule has several parts, and anything may happen before the last of them has come."""
+    node, signs = NodeId(4), Signs()
+    member, lease = Membership(node), Lease(node, period_ns=S, signs=signs)
+    gradient = Gradient(node=node, neighbors=Neighbors(lifetime_ns=4 * S), hello_ns=S)
+    upkeep = Upkeep(
+        membership=member, gradient=gradient, signs=signs, lease=lease, node=node, hello_ns=S, takes_slot=True
+    )
+    upkeep.start(0, leads=False)
+    assert upkeep.announced(schedule(2, 3, 4), guard_ns=0, born_ns=S, now_ns=S)
+    assert upkeep.stands_in(Join(3, Enu(0, 0, 0), instead_of=2), born_ns=2 * S, now_ns=2 * S) == [Action.FOLLOW]
+    assert member.head == 3
+    upkeep.announced(schedule(7, 8, epoch=2, parts=2), guard_ns=0, born_ns=3 * S, now_ns=3 * S)
+    assert upkeep.lives(2, born_ns=3 * S, now_ns=3 * S) == [Action.FOLLOW]
+    assert member.head == 2
+    upkeep.announced(schedule(3, 4, epoch=2, part=1, parts=2), guard_ns=0, born_ns=4 * S, now_ns=4 * S)
+    assert member.head == 7

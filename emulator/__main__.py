@@ -1,10 +1,11 @@
 """The link emulator as a process: `python -m emulator SCENARIO.toml`, or `fanet emulator`."""
 
+import sys
 from functools import partial
 from pathlib import Path
 
 from emulator.capture_file import CaptureFile, unused
-from emulator.compile import warm_up
+from emulator.compile import WORD, must_compile, warm_up
 from emulator.medium import Medium
 from fanet_mw.hosts import interrupts, loop, service
 from fanet_mw.hosts.bus import JOIN_PATIENCE_S
@@ -47,12 +48,13 @@ def main() -> int:
     parser.add_argument("--pcap", type=Path, metavar="FILE", help="write every transmission to a capture file")
     parser.add_argument("--pcap-receptions", action="store_true", help="and every reception, with its RSSI")
     given = parser.parse_args()
-    return service.serve(
-        given,
-        lambda scenario, swarm, endpoint: run(
-            scenario, swarm=swarm, endpoint=endpoint, pcap=given.pcap, receptions=given.pcap_receptions
-        ),
-    )
+
+    def start(scenario: Scenario, swarm: str, endpoint: str) -> int:
+        if must_compile():
+            sys.stderr.write(f"{WORD}\n")
+        return run(scenario, swarm=swarm, endpoint=endpoint, pcap=given.pcap, receptions=given.pcap_receptions)
+
+    return service.serve(given, start)
 
 
 if __name__ == "__main__":

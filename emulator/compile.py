@@ -1,21 +1,42 @@
 """Compile the kernel, once: `python -m emulator.compile`. numba keeps the result in its cache."""
 
+import contextlib
+import sys
 from array import array
 from collections.abc import Mapping
+from importlib.metadata import version
+from pathlib import Path
+from typing import Final
 
-from emulator.jit import COMPILED
+from emulator.jit import COMPILED, cache_folder
 from emulator.medium import Medium
 from fanet_mw import config
 from fanet_mw.messages import Poses, TxRequest
 from fanet_mw.topics import Topics
 from fanet_mw.units import BROADCAST, MS, NodeId
 
+WORD: Final = "compiling the emulator's kernel, once: about half a minute"
+"""To be said before `warm_up` when `must_compile`."""
+
+
+def must_compile() -> bool:
+    """Whether `warm_up` will take half a minute, because machine code of all functions has not been kept yet."""
+    return COMPILED and not _marker().exists()
+
 
 def warm_up() -> bool:
     """Run every compiled function once, the optional ones too; returns whether they are machine code."""
     _run({})
     _run({"channel": "friis", "shadowing_db": 1.0, "fading": "rician", "capture": True})
+    if must_compile():
+        with contextlib.suppress(OSError):  # what cannot be kept is compiled again each time
+            _marker().touch()
     return COMPILED
+
+
+def _marker() -> Path:
+    """The file that says that everything has been compiled, by this numba in this Python."""
+    return cache_folder() / f"whole-{version('numba')}-{sys.implementation.cache_tag}"
 
 
 def _run(radio: Mapping[str, object]) -> None:
@@ -37,4 +58,6 @@ def _run(radio: Mapping[str, object]) -> None:
 
 
 if __name__ == "__main__":
+    if must_compile():
+        sys.stderr.write(f"{WORD}\n")
     warm_up()

@@ -33,6 +33,14 @@ def _fingerprint(folder: Path) -> str:
     return digest.hexdigest()[:16]
 
 
+def cache_folder() -> Path:
+    """Where machine code of these sources is kept."""
+    import numba
+
+    folder = Path(__file__).parent
+    return Path(numba.config.CACHE_DIR or folder / "__pycache__") / f"kernel-{_fingerprint(folder)}"
+
+
 def _decorator(*, counted: bool) -> Callable[[F], F]:
     if os.environ.get("FANET_NO_NUMBA"):
         return _identity
@@ -40,9 +48,8 @@ def _decorator(*, counted: bool) -> Callable[[F], F]:
         import numba
     except ImportError:
         return _identity
-    folder = Path(__file__).parent
     everyone = numba.config.CACHE_DIR
-    ours = str(Path(everyone or folder / "__pycache__") / f"kernel-{_fingerprint(folder)}")
+    ours = str(cache_folder())
 
     def compiled(function: F) -> F:
         numba.config.CACHE_DIR = ours  # read when a function is decorated, and by others too: put it back

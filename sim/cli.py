@@ -49,10 +49,14 @@ def simulate(scenario: str, *, choice: Choice = Choice(), output: Output = Outpu
         A shipped scenario's name (see `fanet scenarios`) or a .toml file.
 
     """
+    from emulator.compile import WORD, must_compile, warm_up
     from sim.run import simulate as run
 
     chosen = choice.scenario(scenario)
     path = output.capture_path()
+    if must_compile():
+        _err.print(WORD, highlight=False)
+        warm_up()
     with _progress(chosen, quiet=output.json) as tell:
         if path is None:
             outcome = run(chosen, on_progress=tell)
@@ -205,8 +209,11 @@ def emulator(
 
     """
     from emulator.__main__ import run
+    from emulator.compile import WORD, must_compile
 
     chosen = choice.realtime_scenario(scenario)
+    if must_compile():
+        _err.print(WORD, highlight=False)
     return run(
         chosen,
         swarm=join.swarm or chosen.name,

@@ -11,8 +11,8 @@ import math
 from typing import Final
 
 import numpy as np
-import pybullet
 
+from sim.bullet import pybullet
 from sim.engine import Engine, Flags, Rows
 from sim.obstacles import Hills, Obstacles
 

@@ -18,6 +18,7 @@ from typing import Any, Final, NamedTuple
 
 from fanet_mw.errors import FanetError, HostError
 from fanet_mw.hosts.service import BUS_EXIT_CODE
+from sim.process_title import entitle
 
 _PRELOAD: Final = ["agents.__main__", "emulator.__main__", "sim.world_main"]
 _PR_SET_PDEATHSIG: Final = 1
@@ -31,6 +32,9 @@ class Recipe(NamedTuple):
     entry: Entry
     arguments: Mapping[str, Any]
     nice: int
+    name: str
+    title: str
+    """What `ps` shows as the child's command line."""
 
 
 def _child(recipe: Recipe) -> None:
@@ -39,6 +43,7 @@ def _child(recipe: Recipe) -> None:
     signal.pthread_sigmask(signal.SIG_UNBLOCK, _BLOCKED)  # the launcher's SIGTERM ends it
     if sys.platform == "linux":
         ctypes.CDLL(None).prctl(_PR_SET_PDEATHSIG, signal.SIGKILL)
+    entitle(recipe.name, recipe.title)
     try:
         os.nice(recipe.nice)
         code = recipe.entry(**recipe.arguments)
@@ -74,7 +79,9 @@ def describe(exit_code: int) -> str:
 class Processes:
     """Named children, each started again on request."""
 
-    def __init__(self, on_end: Callable[[str, int], None]) -> None:
+    def __init__(self, on_end: Callable[[str, int], None], *, title: str = "fanet") -> None:
+        self._title = title
+        """What `ps` shows as the command line of each child, before its name."""
         self._context: ForkServerContext = multiprocessing.get_context("forkserver")
         self._context.set_forkserver_preload(_PRELOAD)
         self._on_end = on_end
@@ -98,7 +105,7 @@ class Processes:
 
     def start(self, name: str, entry: Entry, arguments: Mapping[str, Any], *, nice: int = 0) -> None:
         """Start a child; `entry(**arguments)` must be importable and picklable. A `nice` one lets others go first."""
-        recipe = self._recipes[name] = Recipe(entry, arguments, nice)
+        recipe = self._recipes[name] = Recipe(entry, arguments, nice, name, f"{self._title} {name}")
         _start_server()
         process = self._context.Process(target=_child, args=(recipe,), name=name)
         try:

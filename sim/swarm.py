@@ -18,6 +18,7 @@ from typing import Any, Final
 
 from agents.__main__ import run as run_agent
 from emulator.__main__ import run as run_emulator
+from emulator.compile import WORD, must_compile
 from fanet_mw.errors import BusError
 from fanet_mw.hosts import interrupts
 from fanet_mw.hosts.bus import Bus
@@ -85,7 +86,7 @@ class Swarm:
         self._tell = tell
         self._collector = Collector(scenario, bus.subscribe, names, now_ns=time.monotonic_ns, folder=spool_folder)
         self._keeper = ClockKeeper(bus, names, time_scale=scenario.time_scale, expected=expected_names(scenario))
-        self.processes = Processes(self._process_ended)
+        self.processes = Processes(self._process_ended, title=f"fanet {swarm}")
         self._clock: SwarmClock | None = None
         self._over = asyncio.Event()
         self._ending = False
@@ -283,6 +284,8 @@ async def launch(
     is too low, and KeyboardInterrupt with its number when a signal comes before there is anything to report.
     """
     limits.prepare(processes=len(expected_names(scenario)))
+    if must_compile():
+        on_event(WORD)
     bus, endpoint = _bus(listen, connect)
     with bus:
         run = Swarm(

@@ -143,6 +143,15 @@ async def test_a_child_that_ignores_ctrl_c_and_terminate_is_killed_in_the_end() 
     assert [pid for pid in pids if exists(pid)] == []
 
 
+async def test_a_child_is_called_by_its_name_wherever_processes_are_listed() -> None:
+    processes = Processes(lambda *_: None, title="fanet test")
+    processes.start("agent-1234567890", sleeper, {"seconds": 60})
+    folder = Path(f"/proc/{processes.pid('agent-1234567890')}")
+    assert eventually(lambda: folder.joinpath("comm").read_text() == "agent-123456789\n", within_s=10)
+    assert folder.joinpath("cmdline").read_bytes().rstrip(b"\0") == b"fanet test agent-1234567890"
+    await processes.end_all()
+
+
 async def test_a_restarted_child_is_the_same_with_a_new_pid() -> None:
     ended: list[tuple[str, int]] = []
     processes = Processes(lambda name, code: ended.append((name, code)))

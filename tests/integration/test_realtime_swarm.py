@@ -18,6 +18,7 @@ from typing import Any
 import pytest
 
 from agents.__main__ import run as run_agent
+from emulator.compile import must_compile, warm_up
 from fanet_mw import tlog
 from fanet_mw.errors import BusError
 from fanet_mw.scenario import Scenario
@@ -63,7 +64,8 @@ def _nothing_left_behind() -> Iterator[None]:
     yield
     listing = subprocess.run(["ps", "-eo", "pid,ppid,stat,args"], capture_output=True, text=True, check=True).stdout
     rows = [line.split(None, 3) for line in listing.splitlines()]
-    forked = [row for row in rows if "multiprocessing.forkserver" in row[3] and not row[2].startswith("Z")]
+    ours = ("multiprocessing.forkserver", "fanet test ")  # a server of children, and what a child calls itself
+    forked = [row for row in rows if any(name in row[3] for name in ours) and not row[2].startswith("Z")]
     servers = {row[0] for row in forked if int(row[1]) == os.getpid()}  # ours: they stay; their children are swarms
     left = [row for row in forked if row[1] in servers or row[1] == "1"]  # other people's runs are their own affair
     assert left == []
@@ -215,6 +217,24 @@ def test_an_agent_that_is_late_to_start_is_waited_for_and_one_that_found_no_rout
     assert outcome.reports["agent-2"]["final"]
     assert any("agent-2 ended with exit code 3 before the start; started again" in event for event in events)
     assert any("waiting for" in event and "agent-3" in event for event in events)
+
+
+@pytest.mark.parametrize("service", ["simulate", "emulator"])
+def test_who_has_to_compile_says_so_first_and_can_be_interrupted(service: str, tmp_path: Path) -> None:
+    environment = {**os.environ, "NUMBA_CACHE_DIR": str(tmp_path)}
+    process = subprocess.Popen(
+        command(service, "quick"), env=environment, stdout=subprocess.DEVNULL, stderr=subprocess.PIPE, text=True
+    )
+    assert process.stderr is not None
+    assert "compiling the emulator's kernel, once" in process.stderr.readline()
+    process.send_signal(signal.SIGINT)
+    _, err = process.communicate(timeout=30)
+    assert (process.returncode, err) == (130, "")
+
+
+def test_nobody_has_to_compile_twice() -> None:
+    warm_up()
+    assert not must_compile()
 
 
 def refused(*arguments: str) -> str:

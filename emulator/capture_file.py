@@ -28,11 +28,10 @@ def unused(path: Path) -> Path:
     return found
 
 
-def forget(path: Path) -> None:
-    """Remove the captures of an earlier run: `path`, and those with a number."""
-    for found in sorted(path.parent.glob(f"{path.stem}*{path.suffix}")):
-        if re.fullmatch(rf"{re.escape(path.stem)}(-\d+)?", found.stem):
-            found.unlink()
+def captures(path: Path) -> list[Path]:
+    """The captures of an earlier run: `path`, and those with a number."""
+    named = sorted(path.parent.glob(f"{path.stem}*{path.suffix}"))
+    return [found for found in named if re.fullmatch(rf"{re.escape(path.stem)}(-\d+)?", found.stem)]
 
 
 class CaptureFile:

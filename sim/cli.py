@@ -5,7 +5,7 @@ import gzip
 import json
 import sys
 from collections.abc import Callable, Iterator
-from contextlib import contextmanager
+from contextlib import contextmanager, nullcontext
 from importlib.resources import files
 from pathlib import Path
 from typing import Annotated, Any
@@ -53,16 +53,15 @@ def simulate(scenario: str, *, choice: Choice = Choice(), output: Output = Outpu
     from sim.run import simulate as run
 
     chosen = choice.scenario(scenario)
-    path = output.capture_path()
+    output.prepare()
     if must_compile():
         _err.print(WORD, highlight=False)
         warm_up()
-    with _progress(chosen, quiet=output.json) as tell:
-        if path is None:
-            outcome = run(chosen, on_progress=tell)
-        else:
-            with CaptureFile(path, chosen.radio, receptions=output.pcap_receptions) as file:
-                outcome = run(chosen, on_progress=tell, capture=file.pcap)
+    signals: list[int] = []
+    path = output.capture_path()
+    capture = CaptureFile(path, chosen.radio, receptions=output.pcap_receptions) if path else nullcontext()
+    with _progress(chosen, quiet=output.json) as tell, capture as file, interrupts.handed_to(signals.append):
+        outcome = run(chosen, on_progress=tell, capture=file.pcap if file else None, signals=signals)
     return _finish(outcome, output)
 
 
@@ -126,6 +125,7 @@ def launch(
     from sim.swarm import launch as run
 
     chosen = choice.realtime_scenario(scenario)
+    output.prepare()
     with _progress(chosen, quiet=output.json) as tell:
         outcome = asyncio.run(
             run(
@@ -135,7 +135,7 @@ def launch(
                 connect=connect,
                 respawn=respawn,
                 emulator_options={"pcap": output.capture_path(), "receptions": output.pcap_receptions},
-                spool_folder=output.out if output.out is not None and output.out.is_dir() else None,
+                spool_folder=output.out,
                 on_progress=tell,
                 on_event=lambda text: _err.print(text, highlight=False),
             )

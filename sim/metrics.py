@@ -49,6 +49,7 @@ def summarize(outcome: Outcome, *, trace_sha256: str) -> dict[str, Any]:
         "mode": outcome.mode,
         "nodes": scenario.nodes.count,
         "duration_s": scenario.duration_s,
+        "simulated_s": round(outcome.simulated_ns / S, 3),
         "time_scale": scenario.time_scale if outcome.mode == "realtime" else None,
         "wall_s": round(outcome.wall_s, 3),
         **packets["traffic"],

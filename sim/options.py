@@ -9,11 +9,12 @@ from typing import Annotated, Final
 
 from cyclopts import Parameter
 
-from emulator.capture_file import NAME, forget
+from emulator.capture_file import NAME
 from fanet_mw.errors import ConfigError
 from fanet_mw.scenario import Scenario
 from sim import catalog
 from sim.console import Console
+from sim.out_folder import prepare
 
 _err = Console(stderr=True)
 _LEAD_MS: Final = 40
@@ -59,6 +60,8 @@ class Output:
 
     out: Path | None = None
     """Folder for scenario.toml, summary.json, reports.json, links.json, trace.jsonl and mavlink.tlog."""
+    force: Annotated[bool, Parameter(negative="")] = False
+    """Replace the result of another run in that folder."""
     json: Annotated[bool, Parameter(negative="")] = False
     """Print the summary as JSON, and nothing else, on standard output."""
     pcap: Annotated[bool, Parameter(negative="")] = False
@@ -66,14 +69,17 @@ class Output:
     pcap_receptions: Annotated[bool, Parameter(negative="")] = False
     """Write every reception too, with its RSSI."""
 
-    def capture_path(self) -> Path | None:
-        """Where the capture goes, if one is wanted; earlier ones there are removed."""
-        if not (self.pcap or self.pcap_receptions):
-            return None
-        if self.out is None:
+    def prepare(self) -> None:
+        """See, before a run, that its result can be written; raises ConfigError."""
+        if self.out is None and (self.pcap or self.pcap_receptions):
             raise ConfigError("--pcap: needs --out DIR, the folder that air.pcap goes to")
-        forget(self.out / NAME)
-        return self.out / NAME
+        if self.out is not None:
+            prepare(self.out, force=self.force)
+
+    def capture_path(self) -> Path | None:
+        """Where the capture goes, if one is wanted."""
+        wanted = self.pcap or self.pcap_receptions
+        return self.out / NAME if wanted and self.out is not None else None
 
 
 @Parameter(name="*")

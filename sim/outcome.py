@@ -28,6 +28,8 @@ class Outcome:
     """(name, exit code) of processes that died before their time."""
     aborted: str | None = None
     """Why the run is partial; None when it ran to its end."""
+    ended_ns: int | None = None
+    """The swarm instant at which a partial run ended; None when it ran to its end."""
     epoch_unix_ns: int = 0
     """Real time: unix time of swarm instant 0."""
     ready_s: float = 0.0
@@ -38,3 +40,8 @@ class Outcome:
     """Real time: why there is no report of an actor, by its name."""
     stall_ms: float = 0.0
     """Real time: the longest that the launcher, and the bus with it, could do nothing."""
+
+    @property
+    def simulated_ns(self) -> int:
+        """How much swarm time has passed."""
+        return self.scenario.duration_ns if self.ended_ns is None else self.ended_ns

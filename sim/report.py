@@ -12,10 +12,13 @@ def show(summary: Mapping[str, Any], console: Console) -> None:
     mode = "virtual time" if summary["mode"] == "virtual" else "real processes"
     if summary["time_scale"] not in (None, 1):
         mode += f", swarm clock at {summary['time_scale']:g}"
-    pace = summary["duration_s"] / summary["wall_s"] if summary["wall_s"] else 0.0
+    pace = summary["simulated_s"] / summary["wall_s"] if summary["wall_s"] else 0.0
+    length = f"{summary['duration_s']:g} s"
+    if summary["simulated_s"] < summary["duration_s"]:
+        length = f"[bold red]partial[/], {summary['simulated_s']:g} of {length}"
     console.print(
         f"\n[bold]{summary['scenario']}[/], {summary['nodes']} nodes, seed {summary['seed']}, {mode}: "
-        f"{summary['duration_s']:g} s in {summary['wall_s']:.1f} s ({pace:.1f} x real time)"
+        f"{length} in {summary['wall_s']:.1f} s ({pace:.1f} x real time)"
     )
     table = Table(show_header=False, box=None, pad_edge=False, padding=(0, 2, 0, 0))
     table.add_column(style="bold")

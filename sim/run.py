@@ -2,8 +2,10 @@
 
 import gc
 import time
-from collections.abc import Callable, Iterator
+from collections.abc import Callable, Iterator, Sequence
 from contextlib import contextmanager
+from signal import Signals
+from typing import Final
 
 from agents.clocked import make_uav
 from emulator.medium import Medium
@@ -15,12 +17,15 @@ from fanet_mw.messages import MavlinkTap, Message
 from fanet_mw.scenario import Scenario
 from fanet_mw.topics import Topics
 from fanet_mw.trace import Record
-from fanet_mw.units import NodeId, S
+from fanet_mw.units import MS, NodeId, S
 from sim.clocks import true_delays
 from sim.layout import positions
 from sim.links import LinkTotals
 from sim.outcome import Outcome
 from sim.world import World
+
+_STEP_NS: Final = 100 * MS
+"""Between two looks for signals. How a run is cut into steps changes nothing in it."""
 
 
 def actors_of(scenario: Scenario, swarm: str, *, capture: Capture | None = None) -> list[Actor]:
@@ -31,9 +36,17 @@ def actors_of(scenario: Scenario, swarm: str, *, capture: Capture | None = None)
 
 
 def simulate(
-    scenario: Scenario, *, on_progress: Callable[[float], None] | None = None, capture: Capture | None = None
+    scenario: Scenario,
+    *,
+    on_progress: Callable[[float], None] = lambda _: None,
+    capture: Capture | None = None,
+    signals: Sequence[int] = (),
 ) -> Outcome:
-    """Run a scenario to its end; `on_progress` is told the simulated seconds that have passed."""
+    """Run a scenario to its end, or until a signal's number is in `signals`: then the outcome is what there is so far.
+
+    `on_progress` is told the simulated seconds that have passed. Raises KeyboardInterrupt with the signal's number when
+    that comes before anything has been simulated.
+    """
     swarm = scenario.name
     records: list[Record] = []
     taps: list[tuple[int, bytes]] = []
@@ -54,7 +67,8 @@ def simulate(
     host = VirtualHost(actors, on_records=records.extend, listeners=listeners)
     began = time.perf_counter()
     with _no_collector():
-        _run(host, scenario, on_progress)
+        _run(host, scenario, on_progress, signals)
+    interrupted = host.now_ns < scenario.duration_ns
     return Outcome(
         scenario=scenario,
         mode="virtual",
@@ -63,16 +77,20 @@ def simulate(
         reports={actor.name: actor.report() for actor in actors},
         taps=taps,
         links=links,
+        aborted=f"interrupted by {Signals(signals[0]).name}" if interrupted else None,
+        ended_ns=host.now_ns if interrupted else None,
     )
 
 
-def _run(host: VirtualHost, scenario: Scenario, on_progress: Callable[[float], None] | None) -> None:
+def _run(host: VirtualHost, scenario: Scenario, on_progress: Callable[[float], None], signals: Sequence[int]) -> None:
+    if signals:
+        raise KeyboardInterrupt(signals[0])
     host.start()
-    step_ns = S
-    for until_ns in range(step_ns, scenario.duration_ns + step_ns, step_ns):
+    for until_ns in range(_STEP_NS, scenario.duration_ns + _STEP_NS, _STEP_NS):
         host.run(min(until_ns, scenario.duration_ns))
-        if on_progress is not None:
-            on_progress(host.now_ns / S)
+        on_progress(host.now_ns / S)
+        if signals:
+            break
     host.stop()
 
 

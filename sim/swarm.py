@@ -107,6 +107,7 @@ class Swarm:
             ready_s = await self._start_clock(began)
             run_began = time.monotonic()
             await self._follow(on_progress)
+            ended_ns = None if self._aborted is None else self._now_ns()
             wall_s = time.monotonic() - run_began
             await self._wind_up()
         finally:
@@ -126,6 +127,7 @@ class Swarm:
                 links=collector.links(),
                 ended=self._ended,
                 aborted=self._aborted,
+                ended_ns=ended_ns,
                 ready_s=ready_s,
                 epoch_unix_ns=self._keeper.clock.epoch_unix_ns if self._keeper.clock else 0,
                 heard=collector.figures(),
@@ -227,7 +229,7 @@ class Swarm:
             self._tell(f"{name} ended with {describe(exit_code)} before the start; started again")
             self.processes.restart(name)
             return
-        now_ns = max(0, self._clock.now_ns()) if self._clock else 0
+        now_ns = self._now_ns()
         self._ended.append((name, exit_code))
         node = int(name.removeprefix("agent-")) if name.startswith("agent-") else 0
         self._obituaries.append(ProcessEnded(now_ns, node, name, exit_code))
@@ -245,6 +247,10 @@ class Swarm:
             self._tell(f"{what}; the others carry on")
         else:
             self.abort(f"{what}; the run cannot go on without it")
+
+    def _now_ns(self) -> int:
+        """The swarm instant, within the swarm's time."""
+        return min(max(0, self._clock.now_ns()), self._scenario.duration_ns) if self._clock else 0
 
     def _time_is_over(self) -> bool:
         return self._clock is not None and self._clock.wait_s(self._scenario.duration_ns) <= 0.05

@@ -247,7 +247,7 @@ def test_a_record_costs_a_few_microseconds(make_scenario: MakeScenario) -> None:
 
 def test_the_command_writes_a_capture_beside_the_result(tmp_path: Path, capsys: pytest.CaptureFixture[str]) -> None:
     short = ("--set", "duration_s=6", "--set", "drain_s=0.5", "--json")
-    command = ["simulate", "quick", *short, "--pcap", "--out", str(tmp_path)]
+    command = ["simulate", "quick", *short, "--pcap", "--out", str(tmp_path), "--force"]
     (tmp_path / "air-2.pcap").write_bytes(b"of an earlier run")
     (tmp_path / "airport.pcap").write_bytes(b"of somebody else")
     assert app(command, result_action="return_value") == 0

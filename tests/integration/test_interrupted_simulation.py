@@ -1,0 +1,81 @@
+"""Ctrl-C during a simulation: what there is by then is kept, and said to be partial."""
+
+import io
+import json
+import re
+import signal
+import subprocess
+import sys
+import time
+from pathlib import Path
+
+import pytest
+from rich.console import Console
+
+from sim import catalog, report
+from sim.results import finish, trace_bytes
+from sim.run import simulate
+
+LONG = ("simulate", "quick", "--duration", "100000")
+
+
+def interrupt(out: Path, *arguments: str, number: int = signal.SIGINT) -> tuple[int, str, str]:
+    """Exit code, output and words of a simulation that is interrupted as soon as it is under way."""
+    process = subprocess.Popen(
+        [sys.executable, "-m", "sim", *LONG, "--pcap", "--out", str(out), *arguments],
+        stdout=subprocess.PIPE, stderr=subprocess.PIPE, text=True,
+    )  # fmt: skip
+    end_s = time.monotonic() + 60
+    while not ((out / "air.pcap").exists() and (out / "air.pcap").stat().st_size > 1000) and time.monotonic() < end_s:
+        time.sleep(0.05)
+    process.send_signal(number)
+    said, err = process.communicate(timeout=60)
+    return process.returncode, said, err
+
+
+@pytest.mark.parametrize("number", [signal.SIGINT, signal.SIGTERM])
+def test_an_interrupted_simulation_keeps_its_partial_result(tmp_path: Path, number: signal.Signals) -> None:
+    code, out, err = interrupt(tmp_path, "--json", number=number)
+    assert (code, err) == (1, "")
+    summary = json.loads((tmp_path / "summary.json").read_text())
+    assert summary == json.loads(out)
+    assert summary["aborted"] == f"interrupted by {number.name}"
+    assert summary["invalid_because"][0] == f"partial result: interrupted by {number.name}"
+    assert 1 < summary["simulated_s"] < summary["duration_s"] == 100_000
+    assert summary["frames"]["closes"]
+    last = json.loads((tmp_path / "trace.jsonl").read_text().splitlines()[-1])
+    assert summary["simulated_s"] - 2 < last[1] / 1e9 <= summary["simulated_s"]
+
+
+def test_its_pace_is_that_of_what_was_simulated(tmp_path: Path) -> None:
+    code, out, _ = interrupt(tmp_path)
+    assert code == 1
+    words = " ".join(out.split())
+    found = re.search(r"partial, ([\d.]+) of 100000 s in ([\d.]+) s \(([\d.]+) x real time\)", words)
+    assert found is not None, words
+    simulated_s, wall_s, pace = map(float, found.groups())
+    assert pace == pytest.approx(simulated_s / wall_s, rel=0.2)
+    assert "partial result: interrupted by SIGINT" in words
+
+
+def test_a_signal_ends_a_run_at_its_next_tenth_of_a_second_and_before_the_first_there_is_nothing() -> None:
+    chosen = catalog.find("quick", ["duration_s=20"])
+    signals: list[int] = []
+
+    def progress(seconds: float) -> None:
+        if seconds >= 6.05 and not signals:
+            signals.append(signal.SIGTERM)
+
+    part, whole = simulate(chosen, on_progress=progress, signals=signals), simulate(chosen)
+    assert part.ended_ns == 6_100_000_000
+    assert whole.ended_ns is None
+    until = trace_bytes(part.records)
+    assert trace_bytes(whole.records).startswith(until), "up to there it is the same run"
+    summary = finish(part, out=None)
+    assert (summary["simulated_s"], summary["valid"]) == (6.1, False)
+    console = Console(file=io.StringIO(), width=200)
+    report.show({**summary, "wall_s": 2.0}, console)
+    assert "partial, 6.1 of 20 s in 2.0 s (3.0 x real time)" in console.file.getvalue()  # type: ignore[attr-defined]
+    with pytest.raises(KeyboardInterrupt) as caught:
+        simulate(chosen, signals=[signal.SIGINT])
+    assert caught.value.args == (signal.SIGINT,)

@@ -1,0 +1,67 @@
+"""The folder of `--out` is looked at before the run: writable, and nobody else's result."""
+
+import json
+import os
+from pathlib import Path
+
+import pytest
+
+from fanet_mw.errors import ConfigError
+from sim.cli import app
+from sim.out_folder import FILES, prepare
+
+SHORT = ("--set", "duration_s=1", "--set", "warmup_s=0", "--set", "drain_s=0", "--json")
+
+
+def fanet(*arguments: str) -> int:
+    code: int = app([*arguments, *SHORT], result_action="return_value")
+    return code
+
+
+@pytest.mark.parametrize("command", ["simulate", "launch"])
+def test_a_folder_that_cannot_be_written_is_found_before_the_run(
+    command: str, tmp_path: Path, monkeypatch: pytest.MonkeyPatch
+) -> None:
+    def run(*_: object, **__: object) -> None:
+        pytest.fail("the run has begun")
+
+    monkeypatch.setattr("sim.run.simulate", run)
+    monkeypatch.setattr("sim.swarm.launch", run)
+    (tmp_path / "file").touch()
+    for out in (tmp_path / "file", tmp_path / "file" / "below", Path("/proc/nowhere")):
+        with pytest.raises(ConfigError, match=f"--out {out}: cannot be written: "):
+            fanet(command, "quick", "--out", str(out))
+
+
+@pytest.mark.skipif(os.geteuid() == 0, reason="root may write everywhere")
+def test_a_folder_without_the_right_to_write_is_refused(tmp_path: Path) -> None:
+    tmp_path.chmod(0o500)
+    with pytest.raises(ConfigError, match="Permission denied"):
+        prepare(tmp_path, force=True)
+
+
+def test_a_used_folder_is_refused_and_replaced_whole_with_force(
+    tmp_path: Path, capsys: pytest.CaptureFixture[str]
+) -> None:
+    out = tmp_path / "deep" / "out"
+    assert fanet("simulate", "quick", "--seed", "1", "--pcap", "--out", str(out)) == 0
+    assert {path.name for path in out.iterdir()} == {*FILES, "air.pcap"}, "FILES names all that a run writes"
+    (out / "notes.txt").write_text("mine")
+    before = {path.name: path.read_bytes() for path in out.iterdir()}
+    with pytest.raises(ConfigError, match=r"holds the result of another run \(summary\.json, .*air\.pcap\).*--force"):
+        fanet("simulate", "quick", "--seed", "2", "--out", str(out))
+    assert {path.name: path.read_bytes() for path in out.iterdir()} == before
+    capsys.readouterr()
+    assert fanet("simulate", str(out / "scenario.toml"), "--seed", "2", "--out", str(out), "--force") == 0
+    assert json.loads((out / "summary.json").read_text()) == json.loads(capsys.readouterr().out)
+    assert {path.name for path in out.iterdir()} == {*FILES, "notes.txt"}, "the capture was of the other run"
+    assert (out / "notes.txt").read_text() == "mine"
+
+
+@pytest.mark.parametrize("name", [*FILES, "air.pcap", "air-2.pcap"])
+def test_one_file_of_another_run_is_enough_to_refuse(tmp_path: Path, name: str) -> None:
+    (tmp_path / name).touch()
+    with pytest.raises(ConfigError, match=name):
+        prepare(tmp_path, force=False)
+    prepare(tmp_path, force=True)
+    assert list(tmp_path.iterdir()) == []

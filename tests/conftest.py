@@ -4,13 +4,17 @@ from collections.abc import Callable
 from typing import Any
 
 import pytest
-from hypothesis import settings
+from hypothesis import Phase, settings
 
 from fanet_mw import config
 from fanet_mw.scenario import Scenario
 
 settings.register_profile("default", deadline=None)  # first calls compile; timing belongs in benchmarks
 settings.load_profile("default")
+settings.register_profile(
+    "mutants", deadline=None, derandomize=True, database=None, phases=(Phase.explicit, Phase.generate)
+)
+"""For `scripts/mutants`: the same examples each time, and none made smaller: that a test fails is enough."""
 
 _REALTIME = (
     "test_realtime", "test_host_realtime", "test_hosts", "test_radios", "test_real_radio", "test_time_scale",

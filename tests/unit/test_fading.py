@@ -10,6 +10,7 @@ from hypothesis import given, settings
 from hypothesis import strategies as st
 from test_emulator_kernel import Output, medium, run
 
+from emulator.fading import RICIAN, law_of
 from fanet_mw.errors import ConfigError
 from fanet_mw.messages import Reception, TxStatus
 from fanet_mw.radio_control import Cut, Degrade, Jam
@@ -122,3 +123,19 @@ def test_books_close_when_faults_lie_on_links_that_fade(seed: int, capture: bool
     assert report["refused"] == {}
     assert report["frames"]["in_flight"] == 0
     assert copies["on_air"] == copies["received"] + sum(copies["lost"].values())
+
+
+def test_a_rician_factor_is_given_in_decibels(make_scenario: MakeScenario) -> None:
+    scenario = make_scenario(**{"nodes.count": 2, "radio.channel": "friis", **LAWS["rician"]})
+    assert law_of(scenario.radio) == (RICIAN, pytest.approx(10**0.6))
+
+
+def test_what_two_stations_transmit_fades_apart(make_scenario: MakeScenario) -> None:
+    """Both are 10 m from node 2, and send in turns."""
+    air = Air(make_scenario(**{"nodes.count": 3, "radio.channel": "friis", **LAWS["rayleigh"]}), [-10, 0, 10])
+    for i in range(60):
+        air.send(1 if i % 2 else 3, (1 + i) * MS, payload=bytes(64))
+    heard = [h.message for h in air.run() if h.node == 2 and isinstance(h.message, Reception)]
+    faded = {src: [message.rssi_dbm for message in heard if message.src == src] for src in (1, 3)}
+    assert len(faded[1]) == len(faded[3]) == 30
+    assert not set(faded[1]) & set(faded[3])

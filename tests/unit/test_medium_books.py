@@ -50,6 +50,17 @@ def test_attempts_that_fail_and_retries_are_counted(make_scenario: MakeScenario)
     assert said["mean_retries"] == 3.0, "six of the first, none of the second"
 
 
+def test_what_failed_before_the_warm_up_was_over_is_not_counted(make_scenario: MakeScenario) -> None:
+    air = Air(make_scenario(**{"nodes.count": 2, "duration_s": 10, "warmup_s": 1}), [0, 400])
+    air.send(1, 1 * MS, dst=2)
+    air.run(until_ns=500 * MS)
+    air.place([0, 100], 500 * MS)
+    air.send(1, 2 * S, dst=2, now_ns=500 * MS)
+    air.run(until_ns=10 * S)
+    said = air.medium.report()["air"]
+    assert (said["attempt_failure"], said["mean_retries"], said["pdr"]) == (0.0, 0.0, 1.0)
+
+
 def test_requests_in_time_count_for_the_percentiles_of_lateness(make_scenario: MakeScenario) -> None:
     air = Air(make_scenario(**{"nodes.count": 2}), [0, 100])
     for number in range(100):

@@ -1,0 +1,43 @@
+"""What clocks did to a run, on samples written by hand."""
+
+from collections.abc import Callable
+
+import pytest
+
+from fanet_mw.scenario import Scenario
+from fanet_mw.trace import ClockSampled, Delivered, Generated, Record
+from fanet_mw.units import MS, US, S
+from sim.clocks import clock_errors, true_delays
+from sim.outcome import Outcome
+
+MakeScenario = Callable[..., Scenario]
+
+
+def errors(make_scenario: MakeScenario, *records: Record) -> dict[str, object]:
+    scenario = make_scenario(**{"nodes.count": 2, "clock.sync": "beacons", "clock.drift_ppm": 10})
+    return clock_errors(Outcome(scenario, "virtual", 1.0, list(records), {}))
+
+
+def sample(node: int, ahead_us: float, *, bound_us: float = 10, reference: int = 1, t_s: float = 5) -> ClockSampled:
+    return ClockSampled(round(t_s * S), node, round(ahead_us * US), round(bound_us * US), reference, node - 1)
+
+
+def test_an_error_is_against_the_clock_of_the_reference(make_scenario: MakeScenario) -> None:
+    found = errors(make_scenario, sample(1, 500, bound_us=0), sample(2, 503))
+    assert found["error_us"] == {"p50": 1.5, "p99": pytest.approx(2.97), "max": 3.0}
+    assert found["beyond_bound"] == 0
+    assert (found["bound_us"], found["samples"], found["synced_after_s"]) == (10, 2, 5)
+
+
+@pytest.mark.parametrize(("error_us", "beyond"), [(10, 0), (10.001, 1), (-10.001, 1), (19, 1)])
+def test_an_error_beyond_its_bound_is_counted_by_however_little(
+    make_scenario: MakeScenario, error_us: float, beyond: int
+) -> None:
+    found = errors(make_scenario, sample(1, 0, bound_us=0), sample(2, error_us))
+    assert found["beyond_bound"] == beyond
+
+
+def test_delays_run_from_the_true_instant_of_generation() -> None:
+    believed = Delivered(30 * MS, 2, 1, 7, 3 * MS, 1)
+    found = true_delays([Generated(10 * MS, 1, 7, "traffic", 100), believed, believed._replace(seq=8)])
+    assert [record.delay_ns for record in found if isinstance(record, Delivered)] == [20 * MS, 3 * MS]

@@ -1,0 +1,71 @@
+"""When an application has its next packet, who sends and for whom."""
+
+from collections.abc import Callable
+from itertools import pairwise
+
+import pytest
+
+from agents.traffic import Traffic, sources_of, targets_of
+from fanet_mw.scenario import Scenario
+from fanet_mw.units import MS, US, NodeId, S
+
+MakeScenario = Callable[..., Scenario]
+
+
+def births(scenario: Scenario, node: int) -> list[int]:
+    traffic = Traffic(scenario, NodeId(node))
+    found = []
+    while (born_ns := traffic.next_ns()) is not None:
+        found.append(born_ns)
+        traffic.advance()
+    return found
+
+
+def make(make_scenario: MakeScenario, **traffic: object) -> Scenario:
+    keys = {"nodes.count": 9, "duration_s": 40, "warmup_s": 5, "drain_s": 2}
+    return make_scenario(**keys, **{f"traffic.{key}": value for key, value in ({"sources": "all"} | traffic).items()})
+
+
+def test_cbr_comes_at_its_interval_in_the_measured_window_each_source_in_a_phase_of_its_own(
+    make_scenario: MakeScenario,
+) -> None:
+    scenario = make(make_scenario, interval_s=0.5)
+    phases = set()
+    for node in range(1, 10):
+        found = births(scenario, node)
+        assert {b - a for a, b in pairwise(found)} == {500 * MS}
+        assert 5 * S <= found[0] < 5 * S + 500 * MS
+        assert 38 * S - 500 * MS <= found[-1] < 38 * S
+        phases.add(found[0])
+    assert len(phases) == 9
+    assert max(phases) - min(phases) > 200 * MS
+
+
+def test_poisson_arrivals_have_their_mean_and_are_born_at_whole_microseconds(make_scenario: MakeScenario) -> None:
+    scenario = make(make_scenario, interval_s=0.1, arrivals="poisson")
+    found = [born_ns for node in range(1, 10) for born_ns in births(scenario, node)]
+    assert len(found) == pytest.approx(9 * 33 / 0.1, rel=0.1)
+    assert all(born_ns % US == 0 for born_ns in found)
+    assert 5 * S <= min(found) <= max(found) < 38 * S
+
+
+def test_what_should_have_been_born_before_a_start_never_was(make_scenario: MakeScenario) -> None:
+    scenario = make(make_scenario, interval_s=0.5)
+    on_time = births(scenario, 3)
+    traffic = Traffic(scenario, NodeId(3))
+    traffic.start(20 * S)
+    assert traffic.next_ns() == min(born_ns for born_ns in on_time if born_ns >= 20 * S)
+
+
+def test_a_packet_is_meant_for_all_but_its_source(make_scenario: MakeScenario) -> None:
+    assert targets_of(make(make_scenario), 4) == [1, 2, 3, 5, 6, 7, 8, 9]
+    assert targets_of(make(make_scenario, targets=[2, 4]), 4) == [2]
+
+
+@pytest.mark.parametrize("count", [1, 5, 8])
+def test_few_sources_are_members_and_not_the_leader(make_scenario: MakeScenario, count: int) -> None:
+    for seed in range(1, 6):
+        scenario = make(make_scenario, sources=count)
+        chosen = sources_of(scenario.model_copy(update={"seed": seed}))
+        assert len(chosen) == count
+        assert scenario.leader not in chosen

@@ -1,0 +1,110 @@
+"""The world, tick by tick: who is told what and when."""
+
+from array import array
+from collections.abc import Callable
+from typing import Any
+
+import numpy as np
+import pytest
+
+from fanet_mw.messages import Gps, Poses, Setpoint, WifiScan
+from fanet_mw.scenario import Scenario
+from fanet_mw.topics import Topics
+from fanet_mw.trace import Collided
+from fanet_mw.units import MS, Enu, S
+from sim.world import World
+
+NAMES = Topics("w")
+MakeScenario = Callable[..., Scenario]
+
+
+def world(make_scenario: MakeScenario, **keys: Any) -> World:
+    given = {"nodes.count": 4, "world.engine": "kinematic", "nodes.telemetry_hz": 1, "nodes.spacing_m": 100}
+    made = World(make_scenario(**given | keys), "w")
+    made.start(0)
+    return made
+
+
+def advance(made: World, until_ns: int) -> list[tuple[int, str, Any]]:
+    """(instant, topic, message) of what it says, woken just when it asks to be."""
+    found = [(0, topic, message) for topic, message in made.outbox]
+    made.outbox.clear()
+    while (wake_ns := made.next_wake_ns()) is not None and wake_ns <= until_ns:
+        made.wake(wake_ns)
+        found += [(wake_ns, topic, message) for topic, message in made.outbox]
+        made.outbox.clear()
+    return found
+
+
+def steer(made: World, node: int, place: Enu, *, speed_m_s: float = 8.0, now_ns: int = 0) -> None:
+    made.receive(NAMES.setpoint(node), Setpoint(now_ns, place, speed_m_s), now_ns)
+
+
+def test_fixes_are_as_noisy_as_the_scenario_says(make_scenario: MakeScenario) -> None:
+    said = advance(world(make_scenario, **{"world.gps_sigma_m": 3.0, "world.gps_hz": 1}), 200 * S)
+    fixes = np.array([message.position for _, topic, message in said if topic == NAMES.sensor(2, "gps")])
+    poses = next(message for _, _, message in said if isinstance(message, Poses))
+    truth = np.array(poses.states[6:9])
+    assert len(fixes) > 190
+    assert fixes.std(axis=0) == pytest.approx([3.0, 3.0, 3.0], rel=0.2)
+    assert fixes.mean(axis=0) == pytest.approx(truth, abs=1.0)
+
+
+def test_a_world_that_was_held_up_skips_instants_and_keeps_its_phase(make_scenario: MakeScenario) -> None:
+    made = world(make_scenario, **{"mobility.model": "formation", "world.tick_ms": 100})
+    advance(made, 1 * S)
+    made.wake(2030 * MS)
+    assert made.next_wake_ns() == 2000 * MS or made.next_wake_ns() == 2100 * MS
+    advance(made, 2100 * MS)
+    assert made.next_wake_ns() == 2200 * MS
+    assert made.report()["skipped_ticks"] >= 8
+
+
+@pytest.mark.parametrize(
+    "setpoint",
+    [(1, Enu(float("nan"), 0.0, 50.0), 5.0), (1, Enu(0.0, 0.0, 50.0), float("inf")), (9, Enu(0.0, 0.0, 50.0), 5.0)],
+)
+def test_a_setpoint_that_is_none_is_counted_and_nobody_moves(
+    make_scenario: MakeScenario, setpoint: tuple[int, Enu, float]
+) -> None:
+    made = world(make_scenario)
+    node, place, speed_m_s = setpoint
+    steer(made, node, place, speed_m_s=speed_m_s)
+    said = advance(made, 5 * S)
+    states = [list(message.states) for _, _, message in said if isinstance(message, Poses)]
+    assert made.report()["malformed"] == 1
+    assert all(state == states[0] for state in states)
+
+
+def test_who_flies_into_the_ground_collides_once_and_it_is_counted(make_scenario: MakeScenario) -> None:
+    """Two sent to one place, which do not see each other."""
+    made = world(make_scenario, **{"mobility.see_m": 0, "nodes.count": 2})
+    for node in (1, 2):
+        steer(made, node, Enu(0.0, 0.0, 50.0))
+    advance(made, 30 * S)
+    assert [(r.node, r.other) for r in made.records if isinstance(r, Collided)] == [(2, 1)]
+    assert made.report()["collisions"] == 1
+
+
+def test_scans_of_the_uavs_are_spread_over_the_interval(make_scenario: MakeScenario) -> None:
+    keys = {"mission.survivors": 3, "mission.scan_interval_s": 2, "mission.detection_dbm": -300, "world.tick_ms": 100}
+    said = advance(world(make_scenario, **keys, **{"mobility.model": "formation"}), 10 * S)
+    first = {}
+    for at_ns, topic, message in said:
+        if isinstance(message, WifiScan) and at_ns:
+            first.setdefault(topic, at_ns)
+    assert [first[NAMES.sensor(node, "wifi")] for node in (2, 3, 4)] == [500 * MS, 1000 * MS, 1500 * MS]
+
+
+def test_fixes_come_at_their_rate_whatever_the_ticks_are(make_scenario: MakeScenario) -> None:
+    said = advance(
+        world(make_scenario, **{"world.gps_hz": 2, "world.tick_ms": 100, "mobility.model": "formation"}), 5 * S
+    )
+    at_ns = [message.t_ns for _, topic, message in said if topic == NAMES.sensor(1, "gps") and isinstance(message, Gps)]
+    assert at_ns == [step * 500 * MS for step in range(11)]
+
+
+def test_poses_name_every_node_and_come_before_anyone_transmits(make_scenario: MakeScenario) -> None:
+    (poses, *_) = [message for _, _, message in advance(world(make_scenario), 0) if isinstance(message, Poses)]
+    assert poses.ids == array("H", [1, 2, 3, 4])
+    assert poses.t_ns == 0

@@ -22,6 +22,7 @@ from fanet_mw.radio_control import (
 from fanet_mw.units import MAX_NODES, Enu, NodeId, S, seconds_to_ns
 from sim.air import change
 from sim.console import Console
+from sim.running import locate
 
 app = App(name="air", help="Change the air of a swarm that runs: degrade a link, jam an area, cut a node off, restore.")
 
@@ -31,10 +32,10 @@ app = App(name="air", help="Change the air of a swarm that runs: degrade a link,
 class Where:
     """Which swarm."""
 
-    connect: str = "tcp/127.0.0.1:7447"
-    """Zenoh endpoint of the swarm's router."""
+    connect: str | None = None
+    """Zenoh endpoint of the swarm's router; by default that of a swarm that runs on this machine."""
     swarm: str | None = None
-    """Name of the swarm; by default the only one on that router."""
+    """Name of the swarm; by default the only one there."""
 
 
 @Parameter(name="*")
@@ -143,6 +144,6 @@ def _do(control: Control, where: Where) -> int:
         bound = "node ids from 1" if nodes_of(control) else "see `fanet air --help`"
         raise ConfigError(f"{control}: {why.removeprefix('fault_').replace('_', ' ')} out of bounds ({bound})")
     console = Console(highlight=False)
-    for fault in change(where.connect, where.swarm, control):
+    for fault in change(*locate(where.connect, where.swarm), control):
         console.print(f"{fault.label}: {fault.kind} {'since' if fault.active else 'ended at'} {fault.t_ns / S:.3f} s")
     return 0

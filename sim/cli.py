@@ -27,6 +27,7 @@ from sim.console import Console, nobody_reads
 from sim.layout import positions
 from sim.options import Choice, Join, Output
 from sim.outcome import Outcome
+from sim.running import locate, running
 
 app = App(
     name="fanet",
@@ -263,7 +264,7 @@ def agent(scenario: str, *, id: int, choice: Choice = Choice(), join: Join = Joi
 @app.command
 def links(
     *,
-    connect: str = "tcp/127.0.0.1:7447",
+    connect: str | None = None,
     swarm: str | None = None,
     node: int | None = None,
     reports: Annotated[int | None, Parameter(validator=Number(gte=1))] = None,
@@ -273,9 +274,9 @@ def links(
     Parameters
     ----------
     connect
-        Zenoh endpoint of the swarm's router.
+        Zenoh endpoint of the swarm's router; by default that of a swarm that runs on this machine.
     swarm
-        Name of the swarm; by default the only one on that router.
+        Name of the swarm; by default the only one there.
     node
         Only links from and to this node.
     reports
@@ -284,7 +285,29 @@ def links(
     """
     from sim.links_cli import watch
 
-    return watch(connect, swarm, node=node, reports=reports, console=Console())
+    return watch(*locate(connect, swarm), node=node, reports=reports, console=Console())
+
+
+@app.command
+def swarms(*, json_: Annotated[bool, Parameter(name="--json", negative="")] = False) -> int:
+    """List the swarms that run on this machine, started by `fanet launch` or `fanet router`.
+
+    Parameters
+    ----------
+    json_
+        Print JSON instead of a table.
+
+    """
+    entries = running()
+    if json_:
+        rows = [{"swarm": e.swarm, "endpoint": e.endpoint, "pid": e.pid} for e in entries]
+        sys.stdout.write(json.dumps(rows, indent=2) + "\n")
+        return 0
+    table = Table("swarm", "endpoint", "process", box=None, header_style="bold", padding=(0, 2, 0, 0))
+    for entry in entries:
+        table.add_row(entry.swarm, entry.endpoint, str(entry.pid))
+    Console().print(table if entries else "no swarm runs on this machine")
+    return 0
 
 
 @app.command

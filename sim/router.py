@@ -9,6 +9,7 @@ from fanet_mw.hosts.bus import Bus
 from fanet_mw.hosts.clock import START_PATIENCE_S, ClockKeeper, SwarmClock
 from fanet_mw.scenario import Scenario
 from fanet_mw.topics import Topics
+from sim.running import registered
 
 _STOP_HEARD_S: Final = 0.3
 """Between telling services to stop and closing the bus they hear it on."""
@@ -21,7 +22,7 @@ def expected_names(scenario: Scenario) -> list[str]:
 
 async def serve(scenario: Scenario, *, swarm: str, listen: str, on_event: Callable[[str], None]) -> None:
     """Be the router and keep the clock until the scenario is over; raises BusError when the endpoint cannot be had."""
-    with Bus.serve(listen) as bus:
+    with Bus.serve(listen) as bus, registered(swarm, listen):
         keeper = ClockKeeper(bus, Topics(swarm), time_scale=scenario.time_scale, expected=expected_names(scenario))
         on_event(f"serving {listen}, waiting for {len(keeper.missing())} services of swarm {swarm}")
         clock = SwarmClock(await keeper.start(timeout_s=START_PATIENCE_S))

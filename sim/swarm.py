@@ -35,6 +35,7 @@ from sim.layout import positions
 from sim.outcome import Outcome
 from sim.processes import Processes, describe
 from sim.router import expected_names
+from sim.running import registered
 from sim.world_main import run as run_world
 
 _AGENT_NICE: Final = 10
@@ -293,7 +294,8 @@ async def launch(
     if must_compile():
         on_event(WORD)
     bus, endpoint = _bus(listen, connect)
-    with bus:
+    with bus, registered(swarm, endpoint) as known:
+        on_event(f"swarm {swarm} on {endpoint}" + ("" if known else "; other commands must be told so: --connect"))
         run = Swarm(
             scenario, bus, swarm=swarm, endpoint=endpoint, respawn=respawn, tell=on_event, spool_folder=spool_folder
         )

@@ -239,6 +239,28 @@ def test_nobody_has_to_compile_twice() -> None:
     assert not must_compile()
 
 
+def test_a_launched_swarm_is_found_by_other_commands(tmp_path: Path, monkeypatch: pytest.MonkeyPatch) -> None:
+    monkeypatch.setenv("XDG_RUNTIME_DIR", str(tmp_path))
+    process = subprocess.Popen(
+        command("launch", "quick", "--duration", "60", "--swarm", "test"), stdout=subprocess.DEVNULL,
+        stderr=subprocess.PIPE, text=True,
+    )  # fmt: skip
+    assert process.stderr is not None
+    words = [process.stderr.readline()]
+    while "processes up" not in words[-1]:
+        words.append(process.stderr.readline())
+    listed = subprocess.run(command("swarms", "--json"), capture_output=True, text=True, check=True)
+    (entry,) = json.loads(listed.stdout)
+    assert (entry["swarm"], entry["pid"]) == ("test", process.pid)
+    assert f"swarm test on {entry['endpoint']}\n" in words
+    for arguments in (("links", "--reports", "1"), ("air", "cut", "3"), ("air", "restore", "--swarm", "test")):
+        done = subprocess.run(command(*arguments), capture_output=True, text=True, check=False, timeout=60)
+        assert (done.returncode, done.stderr) == (0, ""), arguments
+    process.send_signal(signal.SIGTERM)
+    process.communicate(timeout=30)
+    assert list((tmp_path / "fanet-mw").iterdir()) == []
+
+
 def refused(*arguments: str) -> str:
     """What a command that cannot work says; it must be one message, quickly, without a traceback."""
     done = subprocess.run(command(*arguments), capture_output=True, text=True, timeout=60, check=False)

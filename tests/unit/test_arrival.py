@@ -7,7 +7,8 @@ from hypothesis import strategies as st
 from fanet_mw import wire
 from fanet_mw.errors import MalformedFrameError
 from fanet_mw.protocol import seen
-from fanet_mw.protocol.arrival import Reader
+from fanet_mw.protocol.arrival import Memo, Reader
+from fanet_mw.protocol.txqueue import Packet
 
 FLOODED = wire.Header(5, 7, 3, 0xFFFF, 3, 0, 32, 0, 3, wire.FLAG_FLOOD)
 
@@ -58,3 +59,11 @@ def test_a_frame_without_a_packet_is_named_each_time(frame: bytes) -> None:
         with pytest.raises(MalformedFrameError):
             reader.read()
         assert reader.packet is None
+
+
+def test_what_was_decoded_of_one_packet_is_not_taken_for_another_s() -> None:
+    memo = Memo()
+    one, other = (Packet(FLOODED, frame) for frame in (b"one", b"other"))
+    assert memo.of(one, len) == 3
+    assert memo.of(other, bytes.upper) == b"OTHER"
+    assert memo.of(other, len) == 5

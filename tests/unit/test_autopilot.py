@@ -84,6 +84,15 @@ def test_after_telemetry_the_next_is_due_later_however_late_it_was(now_ns: int, 
     assert now_ns < due_ns <= now_ns + S / telemetry_hz
 
 
+@pytest.mark.parametrize("late_ms", [0, 30, 499, 1730])
+def test_telemetry_that_was_late_keeps_its_phase(late_ms: int) -> None:
+    autopilot = make(telemetry_hz=2.0)
+    first_ns = autopilot.next_due_ns()
+    assert first_ns is not None
+    autopilot.telemetry(first_ns + late_ms * MS)
+    assert autopilot.next_due_ns() == first_ns + (late_ms // 500 + 1) * 500 * MS
+
+
 def test_nodes_do_not_all_speak_at_once() -> None:
     dues = [make(node=node).next_due_ns() for node in range(1, 46)]
     assert len(set(dues)) == 45

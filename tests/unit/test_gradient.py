@@ -103,3 +103,22 @@ def test_sequences_wrap() -> None:
     assert newer(0, 0xFFFF)
     assert not newer(0xFFFF, 0)
     assert not newer(7, 7)
+
+
+def test_a_way_over_a_neighbor_is_one_hop_longer_than_its_own() -> None:
+    for hops in (0, 3):
+        found = gradient()
+        found.hear(hello(2, hops), now_ns=0)
+        route = found.route(now_ns=0)
+        assert route is not None
+        assert route.hops == hops + 1
+
+
+def test_a_longer_way_must_be_newer_by_more_than_the_next_hello() -> None:
+    """The parent says the next number with its own next hello: to turn for that would make routes swing."""
+    found = gradient()
+    found.hear(hello(2, 1, seq=5), now_ns=0)
+    found.hear(hello(3, 2, seq=6), now_ns=0)
+    assert parent(found) == 2
+    found.hear(hello(3, 2, seq=7), now_ns=0)
+    assert parent(found) == 3

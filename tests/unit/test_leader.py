@@ -64,6 +64,8 @@ def test_the_leader_itself_is_a_member_of_no_cluster(scenario: Scenario) -> None
     desk.join(1, 0, born_ns=1 * S)
     desk.join(2, 100, born_ns=1 * S)
     assert desk.announced_at(3 * S) == {2}
+    epochs = {desk.announce()[1][0].epoch for _ in range(5)}
+    assert epochs == {1}, "and its own join is no reason for another assignment"
 
 
 def test_an_older_join_that_comes_later_says_nothing(scenario: Scenario) -> None:

@@ -58,3 +58,38 @@ def test_of_two_known_survivors_the_nearer_one_is_approached_then_the_other_then
     assert [r.survivor for r in uav.records if isinstance(r, Arrived)] == [2, 4, 7]
     assert uav.course is not None
     assert uav.course.speed_m_s == HOME
+
+
+def approaching(*reports: Survivor) -> Mission:
+    """A mission that has heard of survivor 4 by these, and whose course has been taken."""
+    uav = mission()
+    for one in reports:
+        uav.reported(one, position=HERE, now_ns=S)
+    uav.course = None
+    return uav
+
+
+NEAR = [report(4, reporter, east) for reporter, east in ((2, 100), (3, 120), (5, 140))]
+
+
+def test_of_one_reporter_the_strongest_report_counts_whichever_comes_last() -> None:
+    weaker = report(4, 2, 900, rssi_dbm=-90.0)
+    for reports in ([NEAR[0], weaker, *NEAR[1:]], [weaker, *NEAR]):
+        (record,) = [r for r in approaching(*reports).records if isinstance(r, Approaching)]
+        assert 90 < record.east_m < 150
+
+
+def test_a_uav_that_has_arrived_stays_for_its_time_and_then_flies_home() -> None:
+    uav = approaching(*NEAR)
+    at = Enu(120.0, 0.0, 50.0)
+    for second, leaves in ((10, False), (11, False), (19, False), (20, True)):
+        uav.moved(at, now_ns=second * S)
+        assert (uav.course is not None and uav.course.speed_m_s == HOME) == leaves
+
+
+def test_a_better_estimate_turns_a_uav_only_when_it_is_far_off() -> None:
+    uav = approaching(*NEAR)
+    uav.reported(report(4, 5, 140, rssi_dbm=-79.99), position=HERE, now_ns=2 * S)
+    assert uav.course is None
+    uav.reported(report(4, 5, 600, rssi_dbm=-40.0), position=HERE, now_ns=3 * S)
+    assert uav.course is not None

@@ -79,6 +79,11 @@ def test_a_packet_is_delivered_to_whom_it_is_meant_for(node: Node, destination: 
     assert [(r.origin, r.seq, r.hops, r.delay_ns) for r in delivered(node)] == [(THEIRS, 7, 3, 1 * MS)] * is_ours
 
 
+def test_a_delay_ends_when_the_application_has_the_packet(node: Node) -> None:
+    node.hear(Reception(frame(origin_us=1000), THEIRS, 5 * MS, -60.0), 8 * MS)
+    assert delivered(node) == [Delivered(8 * MS, OURS, THEIRS, 7, 7 * MS, 1, 3 * MS)]
+
+
 @pytest.mark.parametrize(("priority", "lifetime_ns"), [(PRIORITY_BULK, 5 * S), (PRIORITY_REPORT, 2 * S)])
 def test_a_packet_ends_at_the_lifetime_of_its_class(node: Node, priority: int, lifetime_ns: int) -> None:
     hear(node, frame(priority=priority, seq=1), at_ns=lifetime_ns)
@@ -138,6 +143,18 @@ def test_packets_of_one_origin_are_numbered_without_gaps_whatever_control_goes_i
         numbers.append(send(node))
         node.announce(Kind.ROUTING, b"", now_ns=0, flags=0, hop_limit=1)
     assert numbers == [numbers[0], numbers[0] + 1, numbers[0] + 2]
+
+
+@pytest.mark.parametrize(("woken_ms", "start_ms"), [(100, 120), (115, 120), (120, 120), (150, 150)])
+def test_the_first_frame_of_a_packet_goes_a_lead_after_its_birth(
+    make_scenario: MakeScenario, woken_ms: int, start_ms: int
+) -> None:
+    """Born at 100 ms, with a lead of 20 ms; an application that is woken late has that much less of the lead."""
+    keys = {"nodes.count": 5, "routing.protocol": "flooding", "radio.lead_ms": 20}
+    node = Node(OURS, make_scenario(**keys), make_protocol, position=Enu(0.0, 0.0, 0.0))
+    node.start(0)
+    send(node, born_ns=100 * MS, now_ns=woken_ms * MS)
+    assert [request.start_ns for request in node.requests] == [start_ms * MS]
 
 
 def test_a_node_that_starts_again_does_not_reuse_the_names_of_its_packets(node: Node) -> None:

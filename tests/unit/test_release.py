@@ -2,6 +2,7 @@
 
 from itertools import pairwise
 
+import pytest
 from hypothesis import given
 from hypothesis import strategies as st
 
@@ -49,6 +50,23 @@ def test_every_packet_leaves_once_in_its_own_slot_at_least_a_gap_apart(
         assert start >= arrivals_ms[p.header.seq] * MS + LEAD_NS
         assert cluster * 250 * MS <= start % S < (cluster + 1) * 250 * MS - 2 * MS
     assert all(b - a >= 2 * MS for a, b in pairwise(starts))
+
+
+@pytest.mark.parametrize(
+    ("pacing", "count", "gap_us"), [("spread", 10, 24_800), ("spread", 2, 40_000), ("burst", 10, 2000)]
+)
+def test_a_slot_is_divided_among_what_is_queued_or_used_at_once(pacing: str, count: int, gap_us: int) -> None:
+    """A slot of 248 ms; floods farther apart than 40 ms do not meet anyway."""
+    release = Release(TxQueue(capacity=100), Clusters(pacing=pacing, flooding_period_s=1), lead_ns=LEAD_NS)
+    tenure = member_of(1)
+    for seq in range(count):
+        release.push(packet(seq), tenure, now_ns=0)
+    out: list[tuple[Packet, int]] = []
+    while (wake_ns := release.next_wake_ns()) is not None:
+        out += release.due(tenure, now_ns=wake_ns)
+    starts = [start_ns for _, start_ns in out]
+    assert starts[0] == 250 * MS
+    assert {b - a for a, b in pairwise(starts)} == {gap_us * US}
 
 
 def test_the_most_urgent_goes_first_and_the_least_important_is_evicted() -> None:

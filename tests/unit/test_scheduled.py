@@ -17,6 +17,7 @@ from fanet_mw.protocol.turn_plan import Fitted, Plan
 from fanet_mw.protocol.turns import Turns
 from fanet_mw.routing import make_protocol
 from fanet_mw.scenario import Scenario
+from fanet_mw.trace import BoundStated
 from fanet_mw.units import BROADCAST, MS, Enu, NodeId
 from fanet_mw.wire import FLAG_FLOOD, PRIORITY_BULK, Header, Kind, filler
 
@@ -34,8 +35,8 @@ FLOODS = (
 MakeScenario = Callable[..., Scenario]
 
 
-def planned(turns: tuple[Turn, ...], *, valid_ns: int = 0) -> Plan:
-    table = Timetable(turns, {ROOT: 5, US: 3}, {ROOT: (), US: ()}, len(turns))
+def planned(turns: tuple[Turn, ...], *, valid_ns: int = 0, unreached: tuple[NodeId, ...] = ()) -> Plan:
+    table = Timetable(turns, {ROOT: 5, US: 3}, {ROOT: (), US: unreached}, len(turns))
     return Plan.of(US, valid_ns, Fitted(TURNS, table, together=1, frame_bytes=1024, whole=True, enough=True))
 
 
@@ -121,6 +122,26 @@ def test_the_newest_timetable_in_force_counts(node: Node) -> None:
 def test_a_packet_that_fits_no_turn_is_dropped_with_its_reason(node: Node) -> None:
     node.send(filler(1100), destination=BROADCAST, priority=PRIORITY_BULK, app="test", born_ns=0, now_ns=0)
     assert node.report()["dropped"] == {DropReason.TOO_LARGE: 1}
+
+
+@pytest.mark.parametrize("handover_ms", [0, 20])
+def test_a_bound_runs_from_application_to_application(make_scenario: MakeScenario, handover_ms: int) -> None:
+    """One turn of 100 ms, a flood of three turns, a lead before it; handover and another lead behind."""
+    keys = {"nodes.count": 5, "clusters.relay": "scheduled", "clusters.flooding_period_s": 0.1, "radio.lead_ms": 2}
+    keys |= {"clusters.contention_ms": 40, "traffic.interval_s": 1, "radio.handover_ms": handover_ms}
+    node = Node(US, make_scenario(**keys), make_protocol, position=Enu(0.0, 0.0, 50.0))
+    node.start(0)
+    protocol_of(node)._plans = [planned(FLOODS)]
+    node.send(filler(40), destination=BROADCAST, priority=PRIORITY_BULK, app="test", born_ns=0, now_ns=0)
+    (stated,) = [record for record in node.records if isinstance(record, BoundStated)]
+    assert stated.bound_ns == (2 + 100 + 3 * 2 + handover_ms + 2) * MS
+
+
+def test_who_cannot_reach_everyone_promises_nothing(node: Node) -> None:
+    protocol_of(node)._plans = [planned(FLOODS, unreached=(AFTER,))]
+    node.send(filler(40), destination=BROADCAST, priority=PRIORITY_BULK, app="test", born_ns=0, now_ns=0)
+    assert not [record for record in node.records if isinstance(record, BoundStated)]
+    assert protocol_of(node).bound_ns() is None
 
 
 @pytest.mark.parametrize(("due_ms", "earliest_ms", "latest_ms"), [(1010, 1010, 1010), (1050, 1100, 1135)])

@@ -6,7 +6,7 @@ import pytest
 
 from fanet_mw.protocol.timetable import Timetable, Turn
 from fanet_mw.protocol.turn_plan import Fitted, Plan, links, superframe
-from fanet_mw.protocol.turns import Turns, turn_ns
+from fanet_mw.protocol.turns import Turns, clocks_fit, turn_ns
 from fanet_mw.scenario import Scenario
 from fanet_mw.units import MS, US, NodeId
 
@@ -17,6 +17,15 @@ KEYS = {"clusters.relay": "scheduled", "nodes.count": 5}
 def test_a_turn_holds_difs_the_longest_backoff_the_frame_and_the_slack(make_scenario: MakeScenario) -> None:
     scenario = make_scenario(**KEYS, **{"clusters.turn_slack_us": 100})
     assert turn_ns(scenario, payload_bytes=1024) == (50 + 31 * 20 + 984 + 100) * US
+
+
+@pytest.mark.parametrize(("error_us", "fits"), [(40, True), (41, False)])
+def test_the_slack_of_a_turn_holds_two_clocks_that_are_wrong_and_the_flight(
+    make_scenario: MakeScenario, error_us: int, fits: bool
+) -> None:
+    """100 us: 20 us of flight, and one clock early by 40 us while another is as late."""
+    scenario = make_scenario(**KEYS, **{"clusters.turn_slack_us": 100})
+    assert clocks_fit(scenario, clock_error_ns=error_us * US) == fits
 
 
 @pytest.mark.parametrize(("channel", "times"), [("range", 1), ("log_distance", 2)])

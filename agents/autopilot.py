@@ -54,6 +54,8 @@ class Autopilot:
         """Unknown until it has flown; north would also cost a hello its length, as MAVLink drops trailing zeros."""
         self._fix_ns: int | None = None
         self._encoder = Encoder(node, component=AUTOPILOT_COMPONENT)
+        self._beacons = Encoder(node, component=AUTOPILOT_COMPONENT)
+        """Numbers what goes over the air apart from telemetry: in each of the two a gap means a loss."""
         self._streams = self._plan(node, telemetry_hz) if telemetry_hz else []
         self._due_ns = min((stream.due_ns for stream in self._streams), default=None)
 
@@ -127,10 +129,13 @@ class Autopilot:
 
     def beacon_frames(self, now_ns: int) -> bytes:
         """The inner frames of a position beacon."""
-        return self._encoder.heartbeat() + self._global_position(now_ns)
+        return self._beacons.heartbeat() + self._position(self._beacons, now_ns)
 
     def _global_position(self, now_ns: int) -> bytes:
-        return self._encoder.global_position(self.position, self.velocity, yaw=self._yaw, now_ns=now_ns)
+        return self._position(self._encoder, now_ns)
+
+    def _position(self, encoder: Encoder, now_ns: int) -> bytes:
+        return encoder.global_position(self.position, self.velocity, yaw=self._yaw, now_ns=now_ns)
 
     def _gps_raw(self, now_ns: int) -> bytes:
         fix_ns = now_ns if self._fix_ns is None else self._fix_ns

@@ -1,9 +1,11 @@
 """The telemetry log of MAVProxy, QGroundControl and Mission Planner: 8-byte big-endian microseconds, then one frame.
 
-Only MAVLink 2 frames: what a swarm of ours writes. Instants are unix time by the format's custom.
+Only MAVLink 2 frames: what a swarm of ours writes. Instants are unix time by the format's custom. Taps of many nodes
+meet in one file, so frames of each (system, component) are numbered anew in its order: readers take gaps for losses.
 """
 
 import struct
+from collections import Counter
 from collections.abc import Iterable, Iterator
 from pathlib import Path
 from typing import BinaryIO, Final
@@ -11,7 +13,7 @@ from typing import BinaryIO, Final
 from fanet_mw.errors import MalformedFrameError
 from fanet_mw.units import US
 from fanet_mw.whole_file import write_items
-from fanet_mw.wire import frames
+from fanet_mw.wire import frames, renumbered
 
 _STAMP: Final = struct.Struct(">Q")
 _LONGEST: Final = _STAMP.size + 10 + 255 + 2 + 13
@@ -35,10 +37,13 @@ def write(path: Path, taps: Iterable[tuple[int, bytes]], *, epoch_us: int = 0) -
 
 
 def _stamped(taps: Iterable[tuple[int, bytes]], epoch_us: int) -> Iterator[bytes]:
+    numbers: Counter[bytes] = Counter()
     for t_ns, data in taps:
         stamp = _STAMP.pack(epoch_us + t_ns // US)
         for frame in frames(data):
-            yield stamp + frame
+            sender = frame[5:7]  # system, component
+            yield stamp + renumbered(frame, numbers[sender] % 256)
+            numbers[sender] += 1
 
 
 def read(path: Path) -> Iterator[tuple[int, bytes]]:

@@ -11,7 +11,7 @@ from enum import IntEnum
 from functools import lru_cache
 from typing import Any, Final, NamedTuple
 
-from fastcrc.crc16 import mcrf4xx
+from fastcrc.crc16 import kermit, mcrf4xx
 
 from fanet_mw.errors import LocalProtocolError, MalformedFrameError
 from fanet_mw.rng import stream
@@ -251,6 +251,21 @@ def frames(data: bytes, *, start: int = 0) -> Iterator[bytes]:
             raise MalformedFrameError(f"frame at byte {at} ends beyond the end")
         yield data[at:end]
         at = end
+
+
+def renumbered(frame: bytes, seq: int) -> bytes:
+    """A MAVLink 2 frame with another sequence number, and a CRC that is right, or wrong, as it was.
+
+    What the number changes in the CRC is the CRC of the change alone, begun at 0: the message's CRC_EXTRA need not be
+    known. A signed frame keeps its number, which its signature covers.
+    """
+    change = frame[4] ^ seq
+    if not change or frame[2]:
+        return frame
+    covered = OVERHEAD - 2 + frame[1]  # what the CRC is over: all but the magic, and CRC_EXTRA
+    (crc,) = _CRC.unpack_from(frame, covered)
+    crc ^= kermit(bytes((0, 0, 0, change)) + bytes(covered - 4))
+    return frame[:4] + bytes((seq,)) + frame[5:covered] + _CRC.pack(crc)
 
 
 def inner_frames(frame: bytes) -> Iterator[tuple[int, bytes]]:

@@ -51,6 +51,7 @@ def simulate(scenario: str, *, choice: Choice = Choice(), output: Output = Outpu
 
     """
     from emulator.compile import WORD, must_compile, warm_up
+    from sim.run import EPOCH_UNIX_NS
     from sim.run import simulate as run
 
     chosen = choice.scenario(scenario)
@@ -62,6 +63,8 @@ def simulate(scenario: str, *, choice: Choice = Choice(), output: Output = Outpu
     path = output.capture_path()
     capture = CaptureFile(path, chosen.radio, receptions=output.pcap_receptions) if path else nullcontext()
     with _progress(chosen, quiet=output.json) as tell, capture as file, interrupts.handed_to(signals.append):
+        if file is not None:
+            file.pcap.epoch_unix_ns = EPOCH_UNIX_NS
         outcome = run(chosen, on_progress=tell, capture=file.pcap if file else None, signals=signals)
     return _finish(outcome, output)
 

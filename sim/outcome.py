@@ -31,7 +31,7 @@ class Outcome:
     ended_ns: int | None = None
     """The swarm instant at which a partial run ended; None when it ran to its end."""
     epoch_unix_ns: int = 0
-    """Real time: unix time of swarm instant 0."""
+    """Unix time of swarm instant 0; in virtual time a fixed one, so that the same run gives the same files."""
     ready_s: float = 0.0
     """Real time: until all processes were up."""
     heard: Mapping[str, Any] = field(default_factory=dict)

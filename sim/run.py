@@ -24,6 +24,9 @@ from sim.links import LinkTotals
 from sim.outcome import Outcome
 from sim.world import World
 
+EPOCH_UNIX_NS: Final = 1_735_689_600 * S
+"""2025-01-01T00:00:00Z: when swarm instant 0 is said to have been in logs that want unix time. Not the time of the run:
+the same scenario and seed give the same files. Not 1970, which some tools take for no time at all."""
 _STEP_NS: Final = 100 * MS
 """Between two looks for signals. How a run is cut into steps changes nothing in it."""
 
@@ -77,6 +80,7 @@ def simulate(
         reports={actor.name: actor.report() for actor in actors},
         taps=taps,
         links=links,
+        epoch_unix_ns=EPOCH_UNIX_NS,
         aborted=f"interrupted by {Signals(signals[0]).name}" if interrupted else None,
         ended_ns=host.now_ns if interrupted else None,
     )

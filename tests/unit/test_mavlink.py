@@ -2,6 +2,7 @@
 
 import importlib
 import math
+import struct
 import subprocess
 import sys
 from contextlib import suppress
@@ -12,6 +13,7 @@ import pytest
 from hypothesis import given
 from hypothesis import strategies as st
 
+from agents.autopilot import Autopilot
 from fanet_mw import mavlink, tlog, wire
 from fanet_mw.errors import LocalProtocolError, MalformedFrameError
 from fanet_mw.mavlink import Attitude, Battery, Encoder, Geodetic, Ned
@@ -201,10 +203,65 @@ def test_importing_the_border_does_not_import_mavutil() -> None:
 
 
 def test_a_log_gives_back_every_frame_with_its_instant(tmp_path: Path) -> None:
-    encoder = Encoder(NODE)
+    encoder = Encoder(NODE, component=mavlink.AUTOPILOT_COMPONENT)
     first, second, third = encoder.heartbeat(), wire.filler(256), encoder.heartbeat()
     tlog.write(tmp_path / "a.tlog", [(1500, first + second), (3 * S, third)], epoch_us=10)
     assert list(tlog.read(tmp_path / "a.tlog")) == [(11, first), (11, second), (3_000_010, third)]
+
+
+@given(st.binary(max_size=64), st.integers(0, 255), st.integers(0, 255), st.integers(0, 255), st.integers(0, 255))
+def test_a_frame_with_another_number_is_the_frame_that_would_have_been_made_with_it(
+    payload: bytes, seq: int, other: int, extra: int, flip: int
+) -> None:
+    """Of any message, known or not; a CRC that was wrong stays as wrong."""
+    spec = wire.Spec(53000 + extra, extra, struct.Struct(""))
+    before, after = (wire.encode_inner(spec, payload, node=7, seq=number) for number in (seq, other))
+    assert wire.renumbered(before, other) == after
+    broken = before[:-1] + bytes((before[-1] ^ flip,))
+    assert wire.renumbered(broken, other) == after[:-1] + bytes((after[-1] ^ flip,))
+
+
+def test_a_signed_frame_keeps_its_number() -> None:
+    plain = wire.filler(60)
+    signed = plain[:2] + b"\1" + plain[3:] + bytes(13)
+    assert wire.renumbered(signed, 9) == signed
+
+
+def test_the_numbers_of_each_component_run_without_a_gap(tmp_path: Path, monkeypatch: pytest.MonkeyPatch) -> None:
+    """Frames of many nodes in one log, the same report from each that received it: a reader takes a gap for a loss."""
+    autopilots = [Autopilot(NodeId(node), position=Enu(0.0, 0.0, 50.0), telemetry_hz=4) for node in (1, 2)]
+    taps = []
+    for t_ns in range(0, 40 * S, 100 * MS):
+        for autopilot in autopilots:
+            autopilot.beacon_frames(t_ns)  # sent over the air, never logged
+            taps.append((t_ns, autopilot.telemetry(t_ns) + wire.filler(64, node=3)))
+    path = tmp_path / "a.tlog"
+    tlog.write(path, taps)
+    seen: dict[tuple[int, int], list[int]] = {}
+    for _, frame in tlog.read(path):
+        seen.setdefault((frame[5], frame[6]), []).append(frame[4])
+        assert mavlink.decode(frame)
+    assert sorted(seen) == [(1, 1), (2, 1), (3, 191)]
+    for numbers in seen.values():
+        assert len(numbers) > 256
+        assert numbers == [number % 256 for number in range(len(numbers))]
+    monkeypatch.setenv("MAVLINK20", "1")
+    log = importlib.import_module("pymavlink.mavutil").mavlink_connection(str(path), dialect="common")
+    try:
+        while log.recv_match() is not None:
+            pass
+        assert (log.mav_count > 1000, log.mav_loss) == (True, 0)
+    finally:
+        log.close()
+
+
+def test_telemetry_on_its_topic_has_no_gaps_where_hellos_were_sent() -> None:
+    autopilot = Autopilot(NodeId(1), position=Enu(0.0, 0.0, 50.0), telemetry_hz=4)
+    numbers = []
+    for t_ns in range(0, 5 * S, 100 * MS):
+        autopilot.beacon_frames(t_ns)
+        numbers += [frame[4] for frame in wire.frames(autopilot.telemetry(t_ns))]
+    assert numbers == list(range(len(numbers)))
 
 
 def test_a_log_can_be_appended_to(tmp_path: Path) -> None:

@@ -2,10 +2,12 @@
 
 import json
 import os
+import struct
 from pathlib import Path
 
 import pytest
 
+from fanet_mw import tlog
 from fanet_mw.errors import ConfigError
 from sim.cli import app
 from sim.out_folder import FILES, prepare
@@ -46,6 +48,9 @@ def test_a_used_folder_is_refused_and_replaced_whole_with_force(
     out = tmp_path / "deep" / "out"
     assert fanet("simulate", "quick", "--seed", "1", "--pcap", "--out", str(out)) == 0
     assert {path.name for path in out.iterdir()} == {*FILES, "air.pcap"}, "FILES names all that a run writes"
+    assert {stamp // 10**9 for stamp, _ in tlog.read(out / "mavlink.tlog")} == {1_735_689}, "the first of 2025"
+    (seconds,) = struct.unpack_from("<I", (out / "air.pcap").read_bytes(), 24)  # of the first record
+    assert seconds // 1000 == 1_735_689
     (out / "notes.txt").write_text("mine")
     before = {path.name: path.read_bytes() for path in out.iterdir()}
     with pytest.raises(ConfigError, match=r"holds the result of another run \(summary\.json, .*air\.pcap\).*--force"):

@@ -1,5 +1,7 @@
 """A drifting clock and its way back; the same in every run."""
 
+from itertools import pairwise
+
 from hypothesis import given
 from hypothesis import strategies as st
 
@@ -53,3 +55,11 @@ def test_far_beyond_the_walk_the_last_rate_goes_on() -> None:
     far_ns = 1 << 61
     assert abs(drifting.local_ns(far_ns) - far_ns) < 21e-6 * far_ns
     assert abs(drifting.true_ns(drifting.local_ns(far_ns)) - far_ns) < US * 1000
+
+
+def test_a_rate_that_wanders_much_stays_within_its_bound_every_second() -> None:
+    drifting = clock(drift_ppm=20, wander_ppm=10)
+    shown = [drifting.local_ns(second * S) for second in range(200)]
+    rates_ppm = [(b - a - S) / 1000 for a, b in pairwise(shown)]
+    assert max(abs(rate) for rate in rates_ppm) <= 20.001
+    assert sum(abs(rate) > 19.9 for rate in rates_ppm) > 5, "it is pressed against it"

@@ -124,3 +124,30 @@ def test_of_two_others_the_one_above_and_the_one_below_leave_the_middle_level(lo
 def test_a_position_that_is_old_or_of_the_future_is_refused(lookout, age_s) -> None:
     now_ns = 10 * S
     assert not lookout().heard(OTHER, at(0, 50, WEST, now_ns - round(age_s * S)), now_ns=now_ns)
+
+
+def test_many_at_once_are_parted_by_two_levels_at_most(lookout) -> None:
+    """Node 1 of five that come from different sides: `nodes.altitude_m` has room for two levels of 15 m."""
+    uav = lookout(1)
+    for other in range(2, 7):
+        uav.heard(NodeId(other), Motion(Enu(200, 0, 50 + 0.1 * other), WEST, 0), now_ns=0)
+    uav.moved(at(0, 50, EAST))
+    assert len([r for r in uav.records if isinstance(r, ConflictForeseen)]) == 5
+    now_ns, up_m = 0, 50.0
+    for _ in range(60):  # as it climbs
+        now_ns += S // 2
+        uav.moved(at(0, up_m, EAST, now_ns))
+        if uav.course is None or uav.course.speed_m_s == HOME:
+            break
+        climb_m = uav.course.position.up - up_m
+        up_m += climb_m / 20
+        assert up_m <= 80.01
+    assert uav.course is not None
+
+
+def test_who_is_near_but_flies_away_is_no_conflict(lookout) -> None:
+    uav = lookout()
+    uav.heard(OTHER, at(12, 50, EAST), now_ns=0)
+    uav.moved(at(0, 50, WEST))
+    assert uav.records == []
+    assert uav.warnings == []

@@ -53,3 +53,10 @@ def test_who_is_in_no_schedule_and_who_was_never_heard_concern_nobody(silence: S
     silence.said(NodeId(8), now_ns=12 * S)
     assert silence.next_silent(lambda _: False, now_ns=14 * S) is None
     assert silence.next_silent(everyone, now_ns=15 * S) is None
+
+
+def test_who_has_been_silent_for_a_minute_is_forgotten_though_nothing_was_said() -> None:
+    silence = Silence(Signs(), hello_ns=S)
+    silence.heard(NodeId(4), now_ns=0)
+    assert silence.next_silent(lambda _: True, now_ns=60 * S) == 4
+    assert silence.next_silent(lambda _: True, now_ns=60 * S + 1) is None

@@ -1,4 +1,4 @@
-"""The parts of a summary that are about the mission and about admission, on traces written by hand."""
+"""The parts of a summary that are about the mission, admission and delays, on traces written by hand."""
 
 from collections.abc import Callable
 from typing import Any
@@ -9,6 +9,7 @@ from fanet_mw.errors import DropReason
 from fanet_mw.scenario import Scenario
 from fanet_mw.trace import Approaching, Arrived, DeadlineLost, DeadlineMet, Detected, Dropped, Record
 from fanet_mw.units import MS, S
+from sim.delays import summed_up
 from sim.metrics import summarize
 from sim.outcome import Outcome
 from sim.survivors import place
@@ -33,6 +34,12 @@ def test_the_error_of_a_localization_is_its_distance_from_the_truth(make_scenari
     assert mission["localization_error_m"] == pytest.approx((50 + 5) / 2)
     assert (mission["detected"], mission["approached"], mission["reached"]) == (1, 1, 1)
     assert mission["time_to_approach_s"] == [2.0]
+
+
+def test_delays_are_summed_up_in_milliseconds() -> None:
+    """1 ms to 101 ms: half of them up to 51 ms."""
+    figures = summed_up([ms * MS for ms in range(1, 102)])
+    assert figures == {"mean": 51.0, "p50": 51.0, "p95": 96.0, "p99": 100.0, "max": 101.0}
 
 
 def test_what_was_refused_and_who_has_no_deadline_is_counted(make_scenario: MakeScenario) -> None:

@@ -29,6 +29,15 @@ def test_swarm_time_follows_the_fixes_within_the_stated_bound(clock: Clock) -> N
     assert abs(time.line.swarm_ns(20 * S) - 20 * S - OFFSET_NS) <= error_ns
 
 
+def test_a_single_fix_may_be_four_sigmas_off(make_scenario: MakeScenario) -> None:
+    keys = {"clock.sync": "gps", "clock.drift_ppm": 20, "clock.gps_sigma_ns": 50_000}
+    time = GpsTime(make_scenario(**{"nodes.count": 2, **keys}).clock, seed=1, node=NodeId(2))
+    time.fix(1 * S, 1 * S)
+    error_ns = time.error_ns(1 * S)
+    assert error_ns is not None
+    assert 200 * US <= error_ns < 220 * US
+
+
 def test_a_fix_far_from_the_own_clock_is_not_believed(clock: Clock) -> None:
     time = GpsTime(clock, seed=1, node=NodeId(2))
     time.fix(1 * S, 1 * S + clock.limit_ns + 1)

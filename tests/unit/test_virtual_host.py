@@ -108,3 +108,66 @@ def test_actors_hear_in_their_order_and_then_listeners_whatever_their_expression
     host.start()
     host.run(MS)
     assert order == ["first", "second", "listener"]
+
+
+class Sleeper(Script):
+    """What it hears is when to wake instead [ms]; it is woken at no other instant."""
+
+    def receive(self, topic: str, message: Message, now_ns: int) -> None:
+        assert isinstance(message, MavlinkTap)
+        self._wakes_ns = [int(message.data) * MS]
+
+
+@pytest.mark.parametrize("wanted_ms", [7, 20])
+def test_who_hears_something_wakes_when_it_then_wants_and_not_when_it_wanted_before(wanted_ms: int) -> None:
+    speaker, sleeper = Script(str(wanted_ms), [5 * MS]), Sleeper("sleeper", [10 * MS], hears=("t/x",), says="t/y")
+    host = VirtualHost([speaker, sleeper])
+    host.start()
+    host.run(100 * MS)
+    assert sleeper.log == [(0, "start"), (wanted_ms * MS, "wake")]
+
+
+class Again(Script):
+    """Wants to be woken again at once, as if long ago, so many times at each of its instants."""
+
+    def __init__(self, name: str, wakes_ns: list[int], *, times: int) -> None:
+        super().__init__(name, wakes_ns)
+        self._times = self._left = times
+
+    def wake(self, now_ns: int) -> None:
+        self._left -= 1
+        if not self._left:
+            super().wake(now_ns)
+            self._left = self._times
+        else:
+            self.log.append((now_ns, "again"))
+
+    def next_wake_ns(self) -> int | None:
+        return super().next_wake_ns() if self._left == self._times else 1
+
+
+def test_a_wake_up_in_the_past_comes_now_behind_those_asked_for_before() -> None:
+    order: list[str] = []
+
+    def noting(actor: Script) -> Script:
+        wake = actor.wake
+
+        def noted(now_ns: int) -> None:
+            order.append(actor.name)
+            wake(now_ns)
+
+        actor.wake = noted  # type: ignore[method-assign]
+        return actor
+
+    host = VirtualHost([noting(Again("a", [5 * MS], times=2)), noting(Script("b", [5 * MS]))])
+    host.start()
+    host.run(10 * MS)
+    assert order == ["a", "b", "a"]
+
+
+def test_wake_ups_that_do_not_move_time_are_counted_at_one_instant_and_not_over_a_run() -> None:
+    busy = Again("busy", [k * MS for k in range(1, 21)], times=6_000)
+    host = VirtualHost([busy])
+    host.start()
+    host.run(30 * MS)
+    assert len(busy.log) == 1 + 20 * 6_000

@@ -19,8 +19,8 @@ class Engine(ABC):
     name: str
 
     @abstractmethod
-    def reset(self, positions: Rows) -> None:
-        """Put every body at rest at its position."""
+    def reset(self, positions: Rows, velocities: Rows | None = None) -> None:
+        """Put every body at its position: at rest, or in flight."""
 
     @abstractmethod
     def advance(self, dt_s: float, wanted_m_s: Rows) -> None:

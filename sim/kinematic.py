@@ -26,9 +26,9 @@ class Kinematic(Engine):
         self._touching: frozenset[tuple[int, int]] = frozenset()
         self._new: list[tuple[int, int]] = []
 
-    def reset(self, positions: Rows) -> None:
+    def reset(self, positions: Rows, velocities: Rows | None = None) -> None:
         self._at = positions.copy()
-        self._velocity = np.zeros_like(positions)
+        self._velocity = np.zeros_like(positions) if velocities is None else velocities.copy()
         self._touching, self._new = frozenset(), []
 
     def advance(self, dt_s: float, wanted_m_s: Rows) -> None:

@@ -49,7 +49,7 @@ class Physics(Engine):
         self._touching: frozenset[tuple[int, int]] = frozenset()
         self._new: list[tuple[int, int]] = []
 
-    def reset(self, positions: Rows) -> None:
+    def reset(self, positions: Rows, velocities: Rows | None = None) -> None:
         client = self._client
         pybullet.resetSimulation(physicsClientId=client)
         pybullet.setGravity(0, 0, -_GRAVITY, physicsClientId=client)
@@ -74,7 +74,9 @@ class Physics(Engine):
         solid = [ground, *self._build()]
         self._node_of = dict.fromkeys(solid, 0) | {body: i + 1 for i, body in enumerate(self._bodies)}
         self._at = positions.copy()
-        self._velocity = np.zeros_like(positions)
+        self._velocity = np.zeros_like(positions) if velocities is None else velocities.copy()
+        for body, velocity in zip(self._bodies, self._velocity.tolist(), strict=True):
+            pybullet.resetBaseVelocity(body, linearVelocity=velocity, physicsClientId=client)
         self._touching, self._new, self._left_s = frozenset(), [], 0.0
 
     def _build(self) -> list[int]:

@@ -116,10 +116,10 @@ class Processes:
         self._empty.clear()
         self._loop.add_reader(process.sentinel, self._ended, name)
 
-    def restart(self, name: str) -> None:
-        """Start a child that has ended once more, as it was started before."""
+    def restart(self, name: str, **more: object) -> None:
+        """Start a child that has ended once more, as it was started before but for the arguments in `more`."""
         recipe = self._recipes[name]
-        self.start(name, recipe.entry, recipe.arguments, nice=recipe.nice)
+        self.start(name, recipe.entry, {**recipe.arguments, **more}, nice=recipe.nice)
 
     def pid(self, name: str) -> int:
         pid = self._running[name].pid

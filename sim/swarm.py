@@ -31,6 +31,7 @@ from fanet_mw.units import NodeId, S
 from sim import limits
 from sim.clocks import true_delays
 from sim.collector import Collector
+from sim.flight import FlightRecorder
 from sim.layout import positions
 from sim.outcome import Outcome
 from sim.processes import Processes, describe
@@ -86,6 +87,7 @@ class Swarm:
         self._respawn = respawn
         self._tell = tell
         self._collector = Collector(scenario, bus.subscribe, names, now_ns=time.monotonic_ns, folder=spool_folder)
+        self._recorder = FlightRecorder(scenario, bus.subscribe, names) if respawn else None
         self._keeper = ClockKeeper(bus, names, time_scale=scenario.time_scale, expected=expected_names(scenario))
         self.processes = Processes(self._process_ended, title=f"fanet {swarm}")
         self._clock: SwarmClock | None = None
@@ -243,7 +245,10 @@ class Swarm:
         self._respawns[name] = self._respawns.get(name, 0) + 1
         if self._respawn and self._respawns[name] <= _MAX_RESPAWNS:
             self._tell(f"{what}; started again")
-            self.processes.restart(name)
+            if name == "world" and self._recorder is not None:
+                self.processes.restart(name, flight=self._recorder.last())
+            else:
+                self.processes.restart(name)
         elif node and self._clock is not None:
             self._tell(f"{what}; the others carry on")
         else:

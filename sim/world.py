@@ -18,6 +18,7 @@ from fanet_mw.topics import Topics, node_of
 from fanet_mw.trace import Collided
 from fanet_mw.units import Enu, S, seconds_to_ns
 from sim.engine import Engine
+from sim.flight import Flight
 from sim.guidance import Guidance
 from sim.kinematic import Kinematic
 from sim.layout import positions
@@ -53,7 +54,8 @@ def _sight(scenario: Scenario, engine: Engine, solid: Obstacles) -> "Sight":
 class World(Actor):
     """Bodies, survivors and sensors of one swarm."""
 
-    def __init__(self, scenario: Scenario, swarm: str) -> None:
+    def __init__(self, scenario: Scenario, swarm: str, *, flight: Flight | None = None) -> None:
+        """`flight`: how the swarm was flying when the world before this one ended; None: it starts."""
         topics = Topics(swarm)
         super().__init__("world", (topics.all_setpoints,))
         self._scenario = scenario
@@ -66,9 +68,14 @@ class World(Actor):
         starts = np.array(positions(scenario), dtype=np.float64)
         solid = obstacles(scenario, starts) if scenario.world.has_obstacles else None
         self._engine = make_engine(scenario, solid)
-        self._engine.reset(starts)
+        if flight is None:
+            self._engine.reset(starts)
+        else:
+            self._engine.reset(flight.positions, flight.velocities)
         self._sight = _sight(scenario, self._engine, solid) if solid else None
         self._guidance = Guidance(starts, scenario)
+        for node, sent in sorted(flight.setpoints.items()) if flight else ():
+            self._guidance.steer(node, sent.position, speed_m_s=sent.speed_m_s)
         self._phones = PhoneSensor(scenario)
         self._noise = np.random.Generator(np.random.PCG64(stream_seed(scenario.seed, "gps")))
         self._fixes = (

@@ -4,12 +4,20 @@ from fanet_mw.hosts import interrupts, loop, service
 from fanet_mw.hosts.bus import JOIN_PATIENCE_S
 from fanet_mw.hosts.realtime import run_actor
 from fanet_mw.scenario import Scenario
+from sim.flight import Flight
 from sim.world import World
 
 
-def run(scenario: Scenario, *, swarm: str, endpoint: str, join_patience_s: float = JOIN_PATIENCE_S) -> int:
-    """Run the world against a router until the scenario is over; raises BusError."""
-    world = World(scenario, swarm)
+def run(
+    scenario: Scenario,
+    *,
+    swarm: str,
+    endpoint: str,
+    join_patience_s: float = JOIN_PATIENCE_S,
+    flight: Flight | None = None,
+) -> int:
+    """Run the world against a router until the scenario is over, on from `flight` if given; raises BusError."""
+    world = World(scenario, swarm, flight=flight)
     until_ns = scenario.duration_ns
     loop.run(run_actor(world, swarm=swarm, endpoint=endpoint, until_ns=until_ns, join_patience_s=join_patience_s))
     return 0

@@ -41,6 +41,15 @@ def test_bodies_at_rest_stay_where_they_were_put(engine: Engine) -> None:
     assert engine.contacts() == []
 
 
+def test_bodies_that_are_put_in_flight_fly_on(engine: Engine) -> None:
+    start, velocity = np.array([[0.0, 0, 50], [50, 0, 50]]), np.array([[5.0, 0, 0], [0, -3, 0]])
+    engine.reset(start, velocity)
+    assert (engine.positions() == start).all()
+    assert (engine.velocities() == velocity).all()
+    fly(engine, velocity, 1)
+    assert np.abs(engine.positions() - start - velocity).max() < 0.3
+
+
 def test_a_wanted_velocity_is_reached_and_held(engine: Engine) -> None:
     engine.reset(np.array([[0.0, 0, 50]]))
     wanted = np.array([[8.0, -3.0, 1.0]])

@@ -1,0 +1,176 @@
+"""Real swarms whose parts die, freeze or start again: none of them may look good that is not."""
+
+import asyncio
+import json
+import os
+import signal
+import subprocess
+import sys
+import time
+from collections.abc import Callable
+from functools import partial
+from itertools import pairwise
+from typing import Any
+
+import numpy as np
+import pytest
+
+from fanet_mw import topics
+from fanet_mw.hosts.bus import Bus
+from fanet_mw.messages import Poses
+from fanet_mw.scenario import Scenario
+from fanet_mw.topics import Topics
+from fanet_mw.units import S
+from sim import catalog
+from sim.outcome import Outcome
+from sim.results import finish
+from sim.swarm import Swarm, launch
+
+SHORT = ["duration_s=7", "warmup_s=3", "drain_s=1", "clusters.flooding_period_s=0.5", "world.engine=kinematic"]
+Act = Callable[[Swarm], None]
+
+
+def scenario(*overrides: str) -> Scenario:
+    return catalog.find("quick", [*SHORT, *overrides])
+
+
+def run(chosen: Scenario, *acts: tuple[float, Act], respawn: bool = False) -> tuple[Outcome, dict[str, Any]]:
+    """Launch, do each act at its swarm instant [s], and summarize."""
+    tasks = []
+
+    def started(swarm: Swarm) -> None:
+        async def later(at_s: float, act: Act) -> None:
+            while swarm._clock is None or swarm._clock.now_ns() < at_s * S:  # noqa: ASYNC110  (real time passes)
+                await asyncio.sleep(0.02)
+            act(swarm)
+
+        tasks.extend(asyncio.ensure_future(later(*item)) for item in acts)
+
+    outcome = asyncio.run(launch(chosen, swarm="verdict", respawn=respawn, on_started=started))
+    return outcome, finish(outcome, out=None)
+
+
+def send(number: signal.Signals, *names: str) -> Act:
+    def act(swarm: Swarm) -> None:
+        for name in names:
+            os.kill(swarm.processes.pid(name), number)
+
+    return act
+
+
+def about(summary: dict[str, Any], what: str) -> str:
+    """The reason that begins so; what else a busy machine adds is its own affair."""
+    assert not summary["valid"]
+    found = [why for why in summary["invalid_because"] if why.startswith(what)]
+    assert len(found) == 1, summary["invalid_because"]
+    return found[0]
+
+
+def test_a_run_whose_agents_were_all_killed_is_not_valid() -> None:
+    agents = [f"agent-{node}" for node in range(1, 10)]
+    _, summary = run(scenario(), (3.5, send(signal.SIGKILL, *agents)))
+    for name in agents:
+        assert about(summary, f"{name} ended") == f"{name} ended before its time, with signal SIGKILL; none may"
+    assert summary["frames"]["closes"], "what they had asked for is accounted for all the same"
+
+
+def test_a_run_whose_emulator_was_killed_and_started_again_is_not_valid_and_says_what_is_missing() -> None:
+    _, summary = run(scenario("duration_s=9"), (3.5, send(signal.SIGKILL, "emulator")), respawn=True)
+    assert about(summary, "emulator ended")
+    missing = summary["frames"]["unaccounted"]
+    assert missing > 20
+    assert about(summary, "frames unaccounted") == (
+        f"frames unaccounted for: {missing} of {summary['frames']['sent']}, limit 0"
+    )
+    assert summary["frames"]["in_flight"] < 20, "what nobody knows of is not called in flight"
+
+
+def test_a_run_whose_world_stood_still_for_seconds_is_not_valid() -> None:
+    moving = scenario("duration_s=10", "mobility.model=formation")
+    frozen = (3.5, send(signal.SIGSTOP, "world")), (8.5, send(signal.SIGCONT, "world"))
+    outcome, summary = run(moving, *frozen)
+    assert outcome.ended == []
+    why = about(summary, "longest standstill")
+    assert "(world), limit 500 ms" in why
+    assert 4500 < summary["disturbance"]["stall_ms"]["value"] < 9000
+    assert about(summary, "ticks that the world skipped")
+
+
+def test_a_process_that_is_frozen_to_the_end_has_no_last_report() -> None:
+    _, summary = run(scenario(), (4.0, send(signal.SIGSTOP, "agent-4")))
+    assert about(summary, "no last report") == "no last report of agent-4: 1, limit 0"
+
+
+class Watch:
+    """The positions that the world tells, as anybody on the bus sees them."""
+
+    def __init__(self) -> None:
+        self.poses: list[Poses] = []
+
+    def __call__(self, swarm: Swarm) -> None:
+        self.bus = Bus.join(swarm._endpoint)
+        self.bus.subscribe(Topics("verdict").pose, lambda _, payload: self.poses.extend(topics.decode(payload)))  # type: ignore[arg-type]
+
+    def jump_m(self) -> float:
+        """The farthest that a UAV was from where it had been in the poses before."""
+        places = [np.array(poses.states).reshape(-1, 6)[:, :3] for poses in self.poses]
+        return float(max(np.linalg.norm(b - a, axis=1).max() for a, b in pairwise(places)))
+
+
+def test_a_world_that_is_started_again_goes_on_where_it_was_and_the_run_is_not_valid() -> None:
+    watch = Watch()
+    fast = scenario("duration_s=11", "mobility.model=formation", "mobility.speed_m_s=15")
+    _, summary = run(fast, (0.5, watch), (6.0, send(signal.SIGKILL, "world")), respawn=True)
+    watch.bus.close()
+    assert about(summary, "world ended") == "world ended before its time, with signal SIGKILL; none may"
+    assert watch.poses[-1].t_ns > 9 * S, "there are poses again"
+    far_m = np.linalg.norm(np.array(watch.poses[-1].states)[:3] - np.array(watch.poses[0].states)[:3])
+    assert far_m > 60, "far from where they started"
+    assert watch.jump_m() < 10
+
+
+def test_a_launcher_that_is_stopped_until_after_the_end_does_not_exit_with_0() -> None:
+    """It is the router too: nothing reaches anybody meanwhile."""
+    command = [sys.executable, "-m", "sim.cli", "launch", "quick", "--json"]
+    for key in SHORT:
+        command += ["--set", key]
+    launcher = subprocess.Popen(command, stdout=subprocess.PIPE, stderr=subprocess.PIPE)
+    assert launcher.stderr is not None
+    for line in launcher.stderr:
+        if b"processes up" in line:
+            break
+    time.sleep(3)
+    launcher.send_signal(signal.SIGSTOP)
+    time.sleep(6)
+    launcher.send_signal(signal.SIGCONT)
+    out, _ = launcher.communicate(timeout=60)
+    assert launcher.returncode == 1
+    assert "(the launcher), limit 500 ms" in about(json.loads(out), "longest standstill")
+
+
+@pytest.mark.parametrize("step_s", [-10.0, 10.0])
+def test_an_agent_that_is_started_again_after_a_step_of_the_clock_takes_part(
+    step_s: float, monkeypatch: pytest.MonkeyPatch
+) -> None:
+    """Its process reads a unix clock that is off by the step; the swarm's time is handed to it."""
+    monkeypatch.setattr("sim.swarm.run_agent", partial(agent_after_a_step, step_s))
+    outcome, summary = run(scenario("duration_s=10"), (3.5, send(signal.SIGKILL, "agent-4")), respawn=True)
+    assert [name for name, _ in outcome.ended] == ["agent-4"], "once, because it was killed"
+    assert about(summary, "agent-4 ended")
+    assert outcome.reports["agent-4"]["final"]
+    again = outcome.reports["agent-4"]["host"]
+    assert again["asked_past_ms"] < 200
+    frames = summary["frames"]
+    assert frames["closes"]
+    assert frames["dropped"].get("late", 0) < 20, "it does not send for instants that are long past"
+
+
+def agent_after_a_step(step_s: float, **arguments: Any) -> int:
+    """An agent on a machine whose unix clock has been stepped."""
+    from agents import __main__ as agent
+    from fanet_mw.hosts.timebase import THIS_MACHINE
+
+    stepped = THIS_MACHINE._replace(unix_ns=lambda: time.time_ns() + round(step_s * S))
+    run_actor = agent.run_actor
+    agent.run_actor = lambda *given, **named: run_actor(*given, **named, timebase=stepped)  # type: ignore[attr-defined]
+    return agent.run(**arguments)

@@ -48,7 +48,7 @@ class Air:
         self._faults = faults
         self.book = LinkBook(stations)
         timing = Timing.of(radio)
-        as_ns3, sinr = radio.access == "ns3", radio.channel != "range"
+        as_ns3, sinr = radio.as_ns3, radio.channel != "range"
         fading, shape = law_of(radio)
         self.g = np.zeros(s.GLOBALS, np.int64)
         self._p = np.zeros(s.PARAMETERS, np.int64)
@@ -56,7 +56,7 @@ class Air:
             timing.slot_ns, timing.sifs_ns, timing.difs_ns, timing.eifs_extra_ns, timing.ack_ns,
             timing.ack_timeout_ns, timing.header_ns, DETECT_NS, radio.cw_min, radio.cw_max, radio.max_attempts,
             radio.queue_frames, lifetime_ns,
-            radio.access == "standard", as_ns3, not as_ns3, as_ns3 and sinr, sinr, capture,
+            "difs" in as_ns3, "eifs" in as_ns3, sinr and "sums" in as_ns3, sinr and "onset" in as_ns3, sinr, capture,
             timing.extension_ns, radio.capture, fading,
         )  # fmt: skip
         self._pf = np.array(

@@ -21,10 +21,10 @@ from emulator.state import (
     BUSY_SINCE,
     CS,
     CW,
+    DIFS_FIRST,
     DIFS_NS,
-    DRAW_WHEN_INTERRUPTED,
     EIFS_EXTRA_NS,
-    EIFS_FROM_IDLE,
+    EIFS_FROM_FRAME,
     FRESH,
     HEAD,
     HS_N,
@@ -85,7 +85,7 @@ def on_busy(p: Ints, st: Ints, s: int, t: int) -> None:
     st[BASE, s] = NEVER
     if st[SCHEDULED, s] >= 0:
         st[SCHEDULED, s] = -1
-        if st[FRESH, s] == 1 and p[DRAW_WHEN_INTERRUPTED] == 1:
+        if st[FRESH, s] == 1 and p[DIFS_FIRST] == 0:
             draw(st, s)
             st[FRESH, s] = 0
 
@@ -97,6 +97,6 @@ def on_idle(g: Ints, p: Ints, st: Ints, hs: Ints, s: int, t: int) -> None:
         st[BUSY_NS, s] += t - st[BUSY_SINCE, s]
         st[BUSY_SINCE, s] = -1
     st[IDLE_FROM, s] = t
-    if p[EIFS_FROM_IDLE] == 1 and st[BAD_UNTIL, s] > 0:
+    if p[EIFS_FROM_FRAME] == 0 and st[BAD_UNTIL, s] > 0:
         st[BAD_UNTIL, s] = t + p[EIFS_EXTRA_NS]
     arm(g, p, st, hs, s)

@@ -38,6 +38,7 @@ from emulator.state import (
     DATA,
     DELAY,
     DETECT_NS,
+    DIFS_FIRST,
     DIFS_NS,
     DONE_ACKED,
     DONE_EXPIRED,
@@ -91,7 +92,6 @@ from emulator.state import (
     TX_FRAME,
     TX_KIND,
     UNDERWAY,
-    WAIT_DIFS_FIRST,
     WAITING,
     Ints,
     Reals,
@@ -155,7 +155,7 @@ def request(g: Ints, p: Ints, st: Ints, hs: Ints, s: int, t: int) -> None:
         return  # the post-backoff of our own frame is still to be drawn
     if st[CS, s] > 0 or st[TX_KIND, s] == ACK or st[ACK_TO, s] >= 0 or st[NAV, s] > t:
         before_ack = st[CS, s] == 0 and st[TX_KIND, s] != ACK and st[NAV, s] <= t  # to ns-3 the medium is idle
-        if st[BO, s] == 0 and not (before_ack and p[WAIT_DIFS_FIRST] == 1):
+        if st[BO, s] == 0 and not (before_ack and p[DIFS_FIRST] == 1):
             draw(st, s)
         st[FRESH, s] = 0
         if st[CS, s] == 0:
@@ -165,7 +165,7 @@ def request(g: Ints, p: Ints, st: Ints, hs: Ints, s: int, t: int) -> None:
         st[BO, s] = 0
         st[FRESH, s] = 1
         start = access_from(p, st, s)
-        if p[WAIT_DIFS_FIRST] == 1:
+        if p[DIFS_FIRST] == 1:
             st[BASE, s] = max(start, t + p[DIFS_NS])
         elif start <= t:
             st[BASE, s] = t

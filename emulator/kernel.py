@@ -22,6 +22,7 @@ from emulator.state import (
     BEGINS,
     BORN,
     DETECT_NS,
+    DIFS_FIRST,
     DIFS_NS,
     DST,
     ENDS,
@@ -54,7 +55,6 @@ from emulator.state import (
     TX_END,
     TX_KIND,
     UNDERWAY,
-    WAIT_DIFS_FIRST,
     WAITING,
     WANTS_STATUS,
     Ints,
@@ -92,7 +92,7 @@ def take_in(g: Ints, p: Ints, st: Ints, fr: Ints, hs: Ints, asked: Ints, bound: 
 @jit
 def first_wait(p: Ints, st: Ints, s: int, t: int) -> int:
     """How long at least a frame that is queued at `t` waits, unless a frame of another station ends before."""
-    if p[WAIT_DIFS_FIRST] == 0 or st[HEAD, s] >= 0 or st[TX_KIND, s] != NOTHING:
+    if p[DIFS_FIRST] == 0 or st[HEAD, s] >= 0 or st[TX_KIND, s] != NOTHING:
         return 0
     return int(p[DIFS_NS]) if slots_left(p, st, s, t) == 0 else 0
 

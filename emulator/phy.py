@@ -44,7 +44,6 @@ from emulator.state import (
     HANDED,
     HEADER_BITS_PER_NS,
     HEADER_NS,
-    HEARS_AS_NS3,
     HS_N,
     INTERFERENCE,
     LINK_DST,
@@ -69,6 +68,7 @@ from emulator.state import (
     OUT_RECEPTION,
     OVERLAPPED,
     OVERSEEN,
+    OVERSEES,
     POWER,
     RANDOM,
     RECEIVED,
@@ -77,6 +77,7 @@ from emulator.state import (
     SEEKING_UNTIL,
     SEND_ACK,
     SENSED,
+    SENSES_SUMS,
     SENSITIVITY_MW,
     SIFS_NS,
     SPARED,
@@ -120,7 +121,7 @@ def rx_start(p: Ints, pf: Reals, st: Ints, sf: Reals, lk: Ints, lp: Reals, err: 
         close_segment(p, pf, st, sf, lp, err, r, t)
         sf[OVERSEEN, r] = 0.0
         st[OVERLAPPED, r] = 1
-    elif p[HEARS_AS_NS3] == 1:
+    elif p[OVERSEES] == 1:
         seek(p, st, sf, r, t)
     st[NSIG, r] += 1
     sf[POWER, r] += lp[ON_AIR, link]
@@ -147,7 +148,7 @@ def rx_detect(p: Ints, pf: Reals, st: Ints, sf: Reals, lk: Ints, lp: Reals, link
     audible = lk[SENSED, link] == 1
     if audible:
         busier(p, st, r, t)
-    if p[HEARS_AS_NS3] == 1 and st[ENERGY, r] == 0 and sf[POWER, r] >= pf[SENSITIVITY_MW]:
+    if p[SENSES_SUMS] == 1 and st[ENERGY, r] == 0 and sf[POWER, r] >= pf[SENSITIVITY_MW]:
         st[ENERGY, r] = 1
         busier(p, st, r, t)
     wanted = lp[ON_AIR, link]
@@ -174,7 +175,7 @@ def rx_detect(p: Ints, pf: Reals, st: Ints, sf: Reals, lk: Ints, lp: Reals, link
         st[OVERLAPPED, r] = 1 if st[NSIG, r] > 1 else 0
         sf[LOG_OK, r] = 0.0
         sf[OVERSEEN, r] = 0.0
-        if p[HEARS_AS_NS3] == 1 and st[CHANGED_AT, r] == lk[BEGINS, link]:
+        if p[OVERSEES] == 1 and st[CHANGED_AT, r] == lk[BEGINS, link]:
             sf[OVERSEEN, r] = sf[POWER, r] - wanted - sf[BEFORE_SEEKING, r]
 
 

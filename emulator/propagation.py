@@ -130,7 +130,7 @@ class Links:
         self.ints[DELAY, :count] = np.rint(distance / SPEED_OF_LIGHT_M_S * 1e9)
         audible = power_dbm >= radio.sensitivity_dbm if radio.channel != "range" else np.ones(count, bool)
         self.ints[AUDIBLE, :count] = audible
-        only_audible = radio.fading == "none" and radio.access == "standard"
+        only_audible = radio.fading == "none" and "sums" not in radio.as_ns3
         self.longest_ns = int((self.ints[DELAY] * (self.ints[AUDIBLE] if only_audible else 1)).max())
         """Delay of the longest link that counts: an audible one, or any when fading may lift it or a sum be sensed."""
         self.reals[LINK_POWER, :count] = np.power(10.0, power_dbm / 10)

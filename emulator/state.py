@@ -30,7 +30,7 @@ Reals = npt.NDArray[np.float64]
     TX_KIND,  # NOTHING, DATA, ACK
     TX_END,
     CS,  # signals sensed, and one more if ENERGY
-    ENERGY,  # 1: with HEARS_AS_NS3, all signals together are sensed
+    ENERGY,  # 1: with SENSES_SUMS, all signals together are sensed
     NSIG,  # signals present, sensed or not
     LOCK,  # link being received, -1 none
     LOCK_FROM,  # start of the current interference segment
@@ -66,7 +66,7 @@ ACK: Final = 2
 # --- stations (sf) ------------------------------------------------------------------------------------------------
 POWER, LOG_OK, NOISE, BEFORE_SEEKING, OVERSEEN, STATION_REALS = range(6)
 """POWER: sum of the signals present [mW]. LOG_OK: log of the probability that the locked frame is still whole. NOISE:
-what the receiver hears besides [mW]. With HEARS_AS_NS3, BEFORE_SEEKING: POWER before the first signal of a run of
+what the receiver hears besides [mW]. With OVERSEES, BEFORE_SEEKING: POWER before the first signal of a run of
 detection windows; OVERSEEN: what the locked frame does not notice of the interference [mW]."""
 
 # --- frames (fr) --------------------------------------------------------------------------------------------------
@@ -187,10 +187,10 @@ DELIVERED, NO_RECEIVER, COLLIDED, DEAF, WEAK, GIVEN_UP, NO_ROOM, EXPIRED, DEGRAD
     MAX_ATTEMPTS,
     QUEUE_LIMIT,
     LIFETIME_NS,
-    DRAW_WHEN_INTERRUPTED,  # 1: IEEE 802.11; 0: as ns-3
-    WAIT_DIFS_FIRST,  # 1: as ns-3, a frame waits one DIFS after it is queued
-    EIFS_FROM_IDLE,  # 1: EIFS begins when the medium is idle after a bad frame; 0: as ns-3, at the end of the frame
-    HEARS_AS_NS3,  # 1: weak signals are sensed together, interference within a detection window is overseen
+    DIFS_FIRST,  # 1, as ns-3: a frame waits one DIFS after it is queued, and draws nothing if it is interrupted
+    EIFS_FROM_FRAME,  # 1, as ns-3: EIFS begins at the end of a bad frame, not when the medium is idle after it
+    SENSES_SUMS,  # 1, as ns-3: signals too weak to be sensed are sensed together
+    OVERSEES,  # 1, as ns-3: interference within a detection window is overseen
     INTERFERENCE,  # 0: any overlap destroys; 1: SINR and error rate
     CAPTURE,  # 1: report every start of a transmission
     EXTENSION_NS,  # signal extension at the end of each frame (OFDM at 2.4 GHz)

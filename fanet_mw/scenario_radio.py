@@ -5,7 +5,7 @@ resolved scenario names every value it ran with.
 """
 
 from collections.abc import Iterator, Mapping
-from typing import Annotated, Any, Final, Literal, Self
+from typing import Annotated, Any, Final, Literal, Self, get_args
 
 from pydantic import Field, model_validator
 
@@ -16,6 +16,8 @@ DSSS_RATES_MBPS: Final = (1.0, 2.0, 5.5, 11.0)
 OFDM_RATES_MBPS: Final = (6.0, 9.0, 12.0, 18.0, 24.0, 36.0, 48.0, 54.0)
 RATES_MBPS: Final = {"b": DSSS_RATES_MBPS, "g": DSSS_RATES_MBPS + OFDM_RATES_MBPS, "a": OFDM_RATES_MBPS}
 """The rates of each `radio.standard`."""
+Ns3Point = Literal["difs", "eifs", "sums", "onset"]
+"""A point in which ns-3.44 differs from IEEE 802.11."""
 MANDATORY_OFDM_MBPS: Final = (6.0, 12.0, 24.0)  # 17.1.1
 
 
@@ -74,9 +76,9 @@ class Radio(Section):
     capture: bool = False
     """Whether a later frame that is `capture_db` stronger than the one being received takes the receiver over."""
     capture_db: Decibels = 10.0
-    access: Literal["standard", "ns3"] = "standard"
-    """`standard`: a station that finds the medium busy draws a backoff (IEEE 802.11); `ns3`: as ns-3 does it, which
-    also senses weak signals together and oversees some interference (docs/emulator.md)."""
+    access: Literal["standard", "ns3"] | tuple[Ns3Point, ...] = "standard"
+    """`standard`: as IEEE 802.11 has it; `ns3`: as ns-3.44 does in every point in which it differs; or a list of such
+    points: `difs`, `eifs`, `sums`, `onset` (docs/emulator.md)."""
     cw_min: Annotated[int, Field(ge=1, le=1023)] = 31
     """By default 31, and 15 with OFDM rates."""
     cw_max: Annotated[int, Field(ge=1, le=32767)] = 1023
@@ -104,6 +106,13 @@ class Radio(Section):
         if problems:
             raise ValueError("; ".join(problems))
         return self
+
+    @property
+    def as_ns3(self) -> frozenset[Ns3Point]:
+        """The points in which the radio does as ns-3.44 does."""
+        if isinstance(self.access, str):
+            return frozenset(get_args(Ns3Point) if self.access == "ns3" else ())
+        return frozenset(self.access)
 
     @property
     def lead_ns(self) -> int:

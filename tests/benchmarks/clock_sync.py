@@ -9,7 +9,7 @@ import statistics
 import sys
 from collections import defaultdict
 from collections.abc import Sequence
-from typing import Any
+from typing import Any, NamedTuple
 
 from fanet_mw.trace import ClockSampled
 from fanet_mw.units import US, S
@@ -51,8 +51,8 @@ def by_hops(outcome: Outcome) -> dict[int, list[tuple[float, float]]]:
     return found
 
 
-def told(name: str, summaries: Sequence[dict[str, Any]]) -> str:
-    """One line of the second table; the worst of all seeds."""
+def told(name: str, summaries: Sequence[dict[str, Any]]) -> list[str]:
+    """One row of the second table; the worst of all seeds."""
     pdr = ", ".join(f"{summary['pdr']:.4f}" for summary in summaries)
     clocks = [summary["clock"] for summary in summaries if summary["clock"]]
     worst = max((clock["error_us"]["max"] for clock in clocks), default=0.0)
@@ -63,12 +63,22 @@ def told(name: str, summaries: Sequence[dict[str, Any]]) -> str:
     violations = sum(b["violations"] for b in bounds)
     synced = [clock["synced_after_s"] for clock in clocks]
     after = "-" if not synced or None in synced else f"{max(synced):.0f}"
-    return f"| {name} | {worst:.1f} | {after} | {pdr} | {stated} | {violations} of {len(bounds)} |"
+    return [name, f"{worst:.1f}", after, pdr, stated, f"{violations} of {len(bounds)}"]
 
 
-def main(seeds: int) -> None:
+class Measured(NamedTuple):
+    """Two tables, heads first."""
+
+    errors: list[list[str]]
+    cases: list[list[str]]
+
+
+def measured(seeds: int) -> Measured:
+    """All cases, with this many seeds each."""
     errors: dict[int, list[tuple[float, float]]] = defaultdict(list)
-    lines = []
+    cases = [
+        ["clocks", "greatest error [us]", "synced after [s]", "PDR per seed", "worst delay / bound [ms]", "violations"]
+    ]
     for name, settings in CASES:
         summaries = []
         for seed in range(1, seeds + 1):
@@ -77,20 +87,27 @@ def main(seeds: int) -> None:
                 for hops, found in by_hops(outcome).items():
                     errors[hops] += found
             summaries.append(finish(outcome, out=None))
-        lines.append(told(name, summaries))
-    print("| hops | samples | error p50, p99, max [us] | greatest stated bound [us] | beyond it |")
-    for hops in sorted(errors):
-        found = errors[hops]
+        cases.append(told(name, summaries))
+    rows = [["hops", "samples", "error p50, p99, max [us]", "greatest stated bound [us]", "beyond it"]]
+    for hops, found in sorted(errors.items()):
         values = sorted(error for error, _ in found)
         p99 = values[min(len(values) - 1, len(values) * 99 // 100)]
-        beyond = sum(error > bound for error, bound in found)
-        print(
-            f"| {hops} | {len(values)} | {statistics.median(values):.2f}, {p99:.2f}, {values[-1]:.2f} "
-            f"| {max(bound for _, bound in found):.1f} | {beyond} |"
+        rows.append(
+            [
+                f"{hops}",
+                f"{len(values)}",
+                f"{statistics.median(values):.2f}, {p99:.2f}, {values[-1]:.2f}",
+                f"{max(bound for _, bound in found):.1f}",
+                f"{sum(error > bound for error, bound in found)}",
+            ]
         )
-    print("| clocks | greatest error [us] | synced after [s] | PDR per seed | worst delay / bound [ms] | violations |")
-    for line in lines:
-        print(line)
+    return Measured(rows, cases)
+
+
+def main(seeds: int) -> None:
+    for table in measured(seeds):
+        for cells in table:
+            print(f"| {' | '.join(cells)} |")
 
 
 if __name__ == "__main__":

@@ -112,18 +112,30 @@ def measure(settings: tuple[str, ...], seconds: float) -> tuple[Spent, float, di
     return spent, sum(map(memory_bytes, nodes)) / len(nodes), summary
 
 
-def main(seconds: float) -> None:
-    print("| protocol | PDR | control [B/s] | frames sent + heard per second | CPU per frame [us] | memory [kB] |")
-    print("|---|---|---|---|---|---|")
+def rows(seconds: float) -> list[list[str]]:
+    """A head, and a row per protocol."""
+    found = [
+        ["protocol", "PDR", "control [B/s]", "frames sent + heard per second", "CPU per frame [us]", "memory [kB]"]
+    ]
     for name, settings in CASES.items():
         spent, memory, summary = measure(settings, seconds)
         nodes = summary["nodes"]
-        print(
-            f"| {name} | {summary['pdr']:.3f} | {spent.control_bytes / nodes / seconds:.0f} "
-            f"| {spent.frames / nodes / seconds:.0f} | {spent.cpu_ns / spent.frames / 1000:.1f} "
-            f"| {memory / 1000:.0f} |",
-            flush=True,
+        found.append(
+            [
+                name,
+                f"{summary['pdr']:.3f}",
+                f"{spent.control_bytes / nodes / seconds:.0f}",
+                f"{spent.frames / nodes / seconds:.0f}",
+                f"{spent.cpu_ns / spent.frames / 1000:.1f}",
+                f"{memory / 1000:.0f}",
+            ]
         )
+    return found
+
+
+def main(seconds: float) -> None:
+    for cells in rows(seconds):
+        print(f"| {' | '.join(cells)} |")
 
 
 if __name__ == "__main__":

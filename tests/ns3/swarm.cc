@@ -272,10 +272,10 @@ main(int argc, char** argv)
     }
     const double targets = s.Unicast() || s.topology == "hidden" ? 1 : s.nodes - 1;
     std::printf("{\"cpu_s\": %.3f, \"sent\": %lu, \"pdr\": %.6f, \"air.pdr\": %.6f, \"air.throughput_mbps\": %.6f, "
-                "\"air.attempt_failure\": %.6f}\n",
+                "\"air.attempt_failure\": %.6f, \"air.mean_retries\": %.6f}\n",
                 cpu_s, g_counts.sent, g_counts.delivered / (targets * g_counts.generated),
                 g_counts.received / (targets * g_counts.attempts), g_counts.received * 8e-6 * PAYLOAD / s.duration,
-                double(g_counts.failed) / g_counts.attempts);
+                double(g_counts.failed) / g_counts.attempts, double(g_counts.attempts) / g_counts.sent - 1);
     stations.clear();
     Simulator::Destroy();
     return 0;

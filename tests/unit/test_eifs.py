@@ -8,17 +8,18 @@ from hand_driven import Air, statuses
 
 from fanet_mw.units import US
 from tests.conftest import MakeScenario
-from tests.ns3.eifs_timelines import LISTENER, PLACES_M, TIMELINES, Timeline, asked_of
+from tests.ns3.eifs_timelines import DIFS_US, LISTENER, PLACES_M, TIMELINES, Timeline, asked_of
 
+Access = str | list[str]
 FRAME_US, SLOT_US = 984, 20
 SEEDS = range(1, 5)
 
 
-def began_us(make_scenario: MakeScenario, timeline: Timeline, *, access: str, seed: int = 1) -> float:
+def began_us(make_scenario: MakeScenario, timeline: Timeline, *, access: Access, seed: int = 1) -> float:
     """When the listener's frame begins; backoffs are of 0 or 1 slot."""
     keys = {"nodes.count": len(PLACES_M), "radio.access": access, "radio.cw_min": 1, "seed": seed}
     air = Air(make_scenario(**keys), [float(place_m) for place_m in PLACES_M])
-    for node, at_us, size in asked_of(timeline, difs_first=access == "ns3"):
+    for node, at_us, size in asked_of(timeline, difs_first=access != "standard"):
         air.send(node, at_us * US, payload=bytes(size))
     (ended_ns,) = [end_ns for node, _, end_ns, _ in statuses(air.run()) if node == LISTENER]
     return ended_ns / US - FRAME_US
@@ -42,6 +43,15 @@ def test_a_frame_that_waited_through_the_bad_one_is_held_back_as_long(
 
 
 @pytest.mark.parametrize("timeline", TIMELINES, ids=[timeline.name for timeline in TIMELINES])
-def test_as_ns3_has_it_eifs_runs_from_the_end_of_the_bad_frame(make_scenario: MakeScenario, timeline: Timeline) -> None:
-    began = began_us(make_scenario, timeline, access="ns3")
-    assert began == pytest.approx(timeline.ns3_us, abs=0.001)
+@pytest.mark.parametrize("access", ["ns3", ["difs", "eifs"]])
+def test_as_ns3_has_it_eifs_runs_from_the_end_of_the_bad_frame(
+    make_scenario: MakeScenario, timeline: Timeline, access: Access
+) -> None:
+    assert began_us(make_scenario, timeline, access=access) == pytest.approx(timeline.ns3_us, abs=0.001)
+
+
+@pytest.mark.parametrize("timeline", TIMELINES, ids=[timeline.name for timeline in TIMELINES])
+def test_the_standards_eifs_goes_with_every_other_habit_of_ns3(make_scenario: MakeScenario, timeline: Timeline) -> None:
+    """In ns-3 who finds the medium idle waits for DIFS from then on, and draws no backoff."""
+    began = began_us(make_scenario, timeline, access=["difs", "sums", "onset"])
+    assert began == pytest.approx(max(timeline.standard_us, timeline.asked_us + DIFS_US), abs=0.001)

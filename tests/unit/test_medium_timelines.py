@@ -28,16 +28,18 @@ def test_airtimes_are_the_standards() -> None:
     assert frame_ns(100, rate_mbps=1, short=True) == (192 + 800) * US, "1 Mb/s knows no short preamble"
 
 
-def test_a_lone_broadcast_waits_one_difs_as_ns3_has_it(make_scenario: MakeScenario) -> None:
-    air = Air(make_scenario(**{"nodes.count": 2, "radio.access": "ns3"}), [0, 200])
+@pytest.mark.parametrize("access", ["ns3", ["difs"]])
+def test_a_lone_broadcast_waits_one_difs_as_ns3_has_it(make_scenario: MakeScenario, access: str | list[str]) -> None:
+    air = Air(make_scenario(**{"nodes.count": 2, "radio.access": access}), [0, 200])
     air.send(1, 1 * MS)
     assert receptions(air.run()) == [(2, 1, 1 * MS + DIFS_NS + FRAME_NS + 667)]
 
 
+@pytest.mark.parametrize("access", ["standard", [], ["eifs", "sums", "onset"]])
 def test_a_lone_broadcast_on_a_long_idle_medium_goes_at_once_as_the_standard_has_it(
-    make_scenario: MakeScenario,
+    make_scenario: MakeScenario, access: str | list[str]
 ) -> None:
-    air = Air(make_scenario(**{"nodes.count": 2}), [0, 200])
+    air = Air(make_scenario(**{"nodes.count": 2, "radio.access": access}), [0, 200])
     air.send(1, 1 * MS)
     assert receptions(air.run()) == [(2, 1, 1 * MS + FRAME_NS + 667)]
 

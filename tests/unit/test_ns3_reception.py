@@ -16,16 +16,17 @@ WEAK_NS = 944
 """283 m at the speed of light."""
 
 
-def air(make_scenario: MakeScenario, access: str, places_m: list[float], *, seed: int = 1) -> Air:
+def air(make_scenario: MakeScenario, access: str | list[str], places_m: list[float], *, seed: int = 1) -> Air:
     keys = {"nodes.count": len(places_m), "radio.channel": "log_distance", "radio.access": access, "seed": seed}
     return Air(make_scenario(**keys), places_m)
 
 
 @pytest.mark.parametrize("seed", [1, 2, 3])
+@pytest.mark.parametrize("access", ["ns3", ["difs", "sums"]])
 def test_signals_too_weak_to_be_sensed_are_sensed_together_as_ns3_has_it(
-    make_scenario: MakeScenario, seed: int
+    make_scenario: MakeScenario, access: str | list[str], seed: int
 ) -> None:
-    between = air(make_scenario, "ns3", [0, 283, -283], seed=seed)
+    between = air(make_scenario, access, [0, 283, -283], seed=seed)
     between.send(2, 1000 * US)
     between.send(3, 1100 * US)
     between.send(1, 1300 * US)
@@ -36,9 +37,9 @@ def test_signals_too_weak_to_be_sensed_are_sensed_together_as_ns3_has_it(
     assert 0 <= waited_ns <= 31 * SLOT_NS
 
 
-@pytest.mark.parametrize(("access", "senders"), [("ns3", [2]), ("standard", [2, 3])])
+@pytest.mark.parametrize(("access", "senders"), [("ns3", [2]), ("standard", [2, 3]), (["eifs", "onset"], [2, 3])])
 def test_one_of_them_alone_is_not_sensed_nor_are_they_by_the_standard(
-    make_scenario: MakeScenario, access: str, senders: list[int]
+    make_scenario: MakeScenario, access: str | list[str], senders: list[int]
 ) -> None:
     between = air(make_scenario, access, [0, 283, -283])
     for sender in senders:
@@ -57,10 +58,12 @@ def test_one_of_them_alone_is_not_sensed_nor_are_they_by_the_standard(
         ("ns3", -2 * US, []),
         ("standard", 2 * US, []),
         ("standard", 5 * US, []),
+        (["onset"], 2 * US, [2]),
+        (["difs", "eifs", "sums"], 2 * US, []),
     ],
 )
 def test_a_weaker_signal_less_than_a_detection_window_ahead_is_overseen_as_ns3_has_it(
-    make_scenario: MakeScenario, access: str, ahead_ns: int, heard: list[int]
+    make_scenario: MakeScenario, access: str | list[str], ahead_ns: int, heard: list[int]
 ) -> None:
     listener = air(make_scenario, access, [0, 200, -283])
     listener.send(2, 1 * MS)

@@ -1,0 +1,91 @@
+"""Measured tables of docs/protocol.md. Each costs minutes; what two tables need is measured once."""
+
+import statistics
+from functools import lru_cache
+from typing import Any, Final
+
+from scripts.rivals import connectivity
+from sim import catalog
+from sim.results import finish
+from sim.run import simulate
+from tests.benchmarks import clock_sync, protocol_cost
+from tests.tables.markdown import Rows
+
+_SPEEDS: Final = (0, 10, 20)
+_SEEDS: Final = (1, 2, 3)
+_MOST_PER_S: Final = 776
+"""Packets of 1024 B a second that can reach all of the 9 x 5 grid (`fanet_mw/protocol/planner/goodput_bound.py`)."""
+_LOADED: Final = {
+    "scheduled, period 4 s, `cw_min` 1, `turn_slack_us` 20, `contention_ms` 20, `hello_interval_s` 2": (
+        "clusters.flooding_period_s=4", "radio.cw_min=1", "clusters.turn_slack_us=20", "clusters.contention_ms=20",
+        "routing.hello_interval_s=2",
+    ),
+    "scheduled, period 1 s, `cw_min` 1": ("clusters.flooding_period_s=1", "radio.cw_min=1"),
+    "scheduled, 0.5 s, `cw_min` 7": ("clusters.flooding_period_s=0.5", "radio.cw_min=7"),
+    "claimed, 10 slots, `cw_min` 1": ("clusters.relay=claimed", "clusters.slots=10", "radio.cw_min=1"),
+    "claimed, 16 slots, `cw_min` 1": ("clusters.relay=claimed", "clusters.slots=16", "radio.cw_min=1"),
+    "claimed, 10 slots, `cw_min` 1, `routing.aggregate`": (
+        "clusters.relay=claimed", "clusters.slots=10", "radio.cw_min=1", "routing.aggregate=true",
+    ),
+    "clustered, relays `all`, 44 clusters, 0.5 s": ("clusters.relay=all", "clusters.flooding_period_s=0.5"),
+    "clustered, `counter` = 2, 44 clusters, 0.5 s": (
+        "clusters.relay=counter", "clusters.counter=2", "clusters.flooding_period_s=0.5",
+    ),
+    "clustered, `counter` = 2, 4 clusters, 5 s": (
+        "clusters.relay=counter", "clusters.counter=2", "clusters.count=4", "clusters.flooding_period_s=5",
+    ),
+    "plain flooding": ("routing.protocol=flooding", "routing.hello_interval_s=0"),
+}  # fmt: skip
+
+
+def goodput() -> Rows:
+    """44 sources every 0.1 s on the grid: deliveries over receivers and seconds."""
+    rows = [["protocol", "PDR", "goodput [packets/s]", "of the bound", "p95 delay"]]
+    for name, keys in _LOADED.items():
+        summary = _summary("clusters", "duration_s=28", "traffic.interval_s=0.1", *keys)
+        per_second = 440 * summary["pdr"]
+        share = per_second / _MOST_PER_S
+        p95_s = summary["delay_ms"]["p95"] / 1000
+        rows.append(
+            [name, f"{summary['pdr']:.3f}", f"{per_second:.0f}", f"{share:.0%}".replace("%", " %"), f"{p95_s:.2f} s"]
+        )
+    return rows
+
+
+def rivals() -> Rows:
+    """Scenario `rivals`: protocols that the reference does not have."""
+    rows = [["protocol", "PDR at 0 / 10 / 20 m/s", "mean delay [ms]", "frames per packet"]]
+    for name in ("geographic", "dsdv", "gossip", "counter", "flooding"):
+        keys = [[f"routing.protocol={name}", f"mobility.speed_m_s={speed}"] for speed in _SPEEDS]
+        found = [[_summary("rivals", *chosen, f"seed={seed}") for seed in _SEEDS] for chosen in keys]
+        pdr = [f"{statistics.fmean(s['pdr'] for s in runs):.3f}" for runs in found]
+        delay = [f"{statistics.fmean(s['delay_ms']['mean'] or 0.0 for s in runs):.1f}" for runs in found]
+        sent = [f"{statistics.fmean(s['frames']['sent'] / s['generated'] for s in runs):.1f}" for runs in found]
+        rows.append([f"`{name}`", " / ".join(pdr), " / ".join(delay), " / ".join(sent)])
+    bounds = [
+        [connectivity(catalog.find("rivals", [f"mobility.speed_m_s={speed}", f"seed={seed}"])) for seed in _SEEDS]
+        for speed in _SPEEDS
+    ]
+    return [*rows, ["`conn`", " / ".join(f"{statistics.fmean(shares):.3f}" for shares in bounds), "", ""]]
+
+
+def cost() -> Rows:
+    """What each protocol costs a node."""
+    return protocol_cost.rows(60.0)
+
+
+def clock_errors() -> Rows:
+    return _clocks().errors
+
+
+def clocks() -> Rows:
+    return _clocks().cases
+
+
+@lru_cache(maxsize=1)
+def _clocks() -> clock_sync.Measured:
+    return clock_sync.measured(seeds=len(_SEEDS))
+
+
+def _summary(scenario: str, *settings: str) -> dict[str, Any]:
+    return finish(simulate(catalog.find(scenario, list(settings))), out=None)

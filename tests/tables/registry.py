@@ -1,0 +1,42 @@
+"""Which tables of the documents are measured, by what, and how near a new measurement must come.
+
+A table is added by an entry here and its two markers in the document; `scripts/tables NAME` fills it in.
+"""
+
+from collections.abc import Callable, Mapping
+from pathlib import Path
+from typing import Final, NamedTuple
+
+from tests.tables import emulator, protocol
+from tests.tables.markdown import Rows, Tolerance
+
+DOCUMENTS: Final = Path(__file__).parents[2] / "docs"
+
+
+class Table(NamedTuple):
+    """One measured table."""
+
+    document: str
+    measure: Callable[[], Rows]
+    tolerance: Tolerance
+    machine: tuple[str, ...] = ()
+    """Columns that depend on the machine; they are written and not compared."""
+
+    @property
+    def path(self) -> Path:
+        return DOCUMENTS / self.document
+
+
+TABLES: Final[Mapping[str, Table]] = {
+    "ns3": Table("emulator.md", emulator.against_ns3, Tolerance(absolute=0.005, relative=0.01)),
+    "ns3-points": Table("emulator.md", emulator.points, Tolerance(absolute=0.005, relative=0.01)),
+    "closed-forms": Table("emulator.md", emulator.closed_forms, Tolerance(relative=0.01)),
+    "error-rates": Table("emulator.md", emulator.error_rates, Tolerance(absolute=0.05)),
+    "goodput": Table("protocol.md", protocol.goodput, Tolerance(absolute=0.02, relative=0.1)),
+    "rivals": Table("protocol.md", protocol.rivals, Tolerance(absolute=0.02, relative=0.1)),
+    "protocol-cost": Table(
+        "protocol.md", protocol.cost, Tolerance(absolute=0.02, relative=0.1), ("CPU per frame [us]",)
+    ),
+    "clock-errors": Table("protocol.md", protocol.clock_errors, Tolerance(relative=0.2)),
+    "clocks": Table("protocol.md", protocol.clocks, Tolerance(absolute=0.02, relative=0.2)),
+}

@@ -3,12 +3,14 @@
 import json
 import sys
 from collections.abc import Mapping
+from contextlib import AbstractContextManager
+from pathlib import Path
 from typing import NamedTuple
 
 from agents.clocked import make_uav
 from fanet_mw.errors import ConfigError
 from fanet_mw.hosts import interrupts, loop, service
-from fanet_mw.hosts.bus import JOIN_PATIENCE_S
+from fanet_mw.hosts.bus import JOIN_PATIENCE_S, Bus, config_of
 from fanet_mw.hosts.clock import START_PATIENCE_S
 from fanet_mw.hosts.realtime import RealtimeHost, run_actor
 from fanet_mw.radios.field_bus import FieldBus, joined
@@ -25,12 +27,21 @@ def run(
     swarm: str,
     endpoint: str,
     position: Enu,
+    zenoh_config: Path | None = None,
     join_patience_s: float = JOIN_PATIENCE_S,
 ) -> int:
     """Run one UAV against a router until the scenario is over; raises BusError."""
     uav = make_uav(scenario, node, swarm, position=position)
-    until_ns = scenario.duration_ns
-    loop.run(run_actor(uav, swarm=swarm, endpoint=endpoint, until_ns=until_ns, join_patience_s=join_patience_s))
+    loop.run(
+        run_actor(
+            uav,
+            swarm=swarm,
+            endpoint=endpoint,
+            until_ns=scenario.duration_ns,
+            zenoh_config=zenoh_config,
+            join_patience_s=join_patience_s,
+        )
+    )
     return 0
 
 
@@ -44,18 +55,30 @@ class OnAir(NamedTuple):
 
 
 def fly(
-    scenario: Scenario, on_air: OnAir, *, node: NodeId, swarm: str, endpoint: str | None, position: Enu
+    scenario: Scenario,
+    on_air: OnAir,
+    *,
+    node: NodeId,
+    swarm: str,
+    endpoint: str | None,
+    position: Enu,
+    zenoh_config: Path | None = None,
 ) -> Mapping[str, object]:
     """Run one UAV on a real radio until the scenario is over; returns its report. Raises BusError."""
-    return loop.run(_fly(scenario, on_air, node, Topics(swarm), endpoint, position))
+    return loop.run(_fly(scenario, on_air, node, Topics(swarm), joined(endpoint, zenoh_config), position))
 
 
 async def _fly(
-    scenario: Scenario, on_air: OnAir, node: NodeId, names: Topics, endpoint: str | None, position: Enu
+    scenario: Scenario,
+    on_air: OnAir,
+    node: NodeId,
+    names: Topics,
+    router: AbstractContextManager[Bus | None],
+    position: Enu,
 ) -> Mapping[str, object]:
     epoch_unix_ns = None if on_air.epoch_unix_s is None else round(on_air.epoch_unix_s * S)
     uav = make_uav(scenario, node, names.swarm, position=position)
-    with joined(endpoint) as inner:
+    with router as inner:
         bus = FieldBus(names, node, inner=inner, epoch_unix_ns=epoch_unix_ns)
         host = RealtimeHost(uav, bus, names)
         radio = UdpRadio(
@@ -96,10 +119,20 @@ def main() -> int:
                 raise ConfigError(
                     f"--epoch {given.epoch:g}: needs --radio-address; the emulated radio is on the router"
                 )
-            return run(scenario, node=node, swarm=swarm, endpoint=endpoint, position=at)
+            return run(
+                scenario, node=node, swarm=swarm, endpoint=endpoint, position=at, zenoh_config=given.zenoh_config
+            )
         on_air = OnAir(given.radio_address, given.radio_broadcast, given.radio_port, given.epoch)
         router = None if given.epoch is not None else endpoint
-        report = fly(scenario, on_air, node=node, swarm=swarm, endpoint=router, position=at)
+        report = fly(
+            scenario,
+            on_air,
+            node=node,
+            swarm=swarm,
+            endpoint=router,
+            position=at,
+            zenoh_config=config_of(given.zenoh_config, f"agent-{node}"),
+        )
         sys.stdout.write(json.dumps(report) + "\n")
         return 0
 

@@ -20,6 +20,7 @@ def run(
     endpoint: str,
     pcap: Path | None = None,
     receptions: bool = False,
+    zenoh_config: Path | None = None,
     join_patience_s: float = JOIN_PATIENCE_S,
 ) -> int:
     """Run the emulator against a router until the scenario is over, with a capture if a file is named.
@@ -28,7 +29,12 @@ def run(
     """
     warm_up()
     live = partial(
-        run_actor, swarm=swarm, endpoint=endpoint, until_ns=scenario.duration_ns, join_patience_s=join_patience_s
+        run_actor,
+        swarm=swarm,
+        endpoint=endpoint,
+        until_ns=scenario.duration_ns,
+        zenoh_config=zenoh_config,
+        join_patience_s=join_patience_s,
     )
     if pcap is None:
         loop.run(live(Medium(scenario, swarm)))
@@ -52,7 +58,14 @@ def main() -> int:
     def start(scenario: Scenario, swarm: str, endpoint: str) -> int:
         if must_compile():
             sys.stderr.write(f"{WORD}\n")
-        return run(scenario, swarm=swarm, endpoint=endpoint, pcap=given.pcap, receptions=given.pcap_receptions)
+        return run(
+            scenario,
+            swarm=swarm,
+            endpoint=endpoint,
+            pcap=given.pcap,
+            receptions=given.pcap_receptions,
+            zenoh_config=given.zenoh_config,
+        )
 
     return service.serve(given, start)
 

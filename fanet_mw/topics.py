@@ -62,6 +62,7 @@ class Topics:
         self.radio_control = f"{self._base}/radio/control"
         self.radio_links = f"{self._base}/radio/links"
         self.all_setpoints = f"{self._base}/world/*/setpoint"
+        self.all_sensors = f"{self._base}/world/*/sensor/*"
         self.all_traces = f"{self._base}/trace/*"
         self.all_reports = f"{self._base}/report/*"
         self.all_alive = f"{self._base}/alive/*"

@@ -7,16 +7,19 @@ it was refused (its report counts why) or that nobody emulates that swarm.
 import threading
 import time
 from collections.abc import Callable
+from pathlib import Path
 from typing import Final
 
 from fanet_mw import topics
 from fanet_mw.errors import FanetError, MalformedFrameError
-from fanet_mw.hosts.bus import Bus
+from fanet_mw.hosts.bus import Bus, config_of
 from fanet_mw.messages import TraceBatch
 from fanet_mw.radio_control import Control
 from fanet_mw.topics import ROOT, Topics
 from fanet_mw.trace import RadioFault
 
+OPERATOR: Final = "operator"
+"""Whom access lists know the commands of a person by."""
 CONFIRM_TIMEOUT_S: Final = 5.0
 """Emulators publish their trace twice a second."""
 _DISCOVER_S: Final = 1.0
@@ -41,13 +44,13 @@ def find_swarm(bus: Bus) -> str:
     return names[0]
 
 
-def change(endpoint: str, swarm: str | None, control: Control) -> list[RadioFault]:
+def change(endpoint: str, swarm: str | None, control: Control, *, zenoh_config: Path | None = None) -> list[RadioFault]:
     """Send one change; returns what the emulator did about it.
 
     Raises BusError without a router, FanetError without a swarm or when the emulator does not confirm within
     CONFIRM_TIMEOUT_S.
     """
-    with Bus.join(endpoint) as bus:
+    with Bus.join(endpoint, config_of(zenoh_config, OPERATOR)) as bus:
         names = Topics(swarm or find_swarm(bus))
         done: list[RadioFault] = []
         confirmed = threading.Event()

@@ -2,6 +2,7 @@
 
 import math
 from dataclasses import dataclass
+from pathlib import Path
 from typing import Annotated
 
 from cyclopts import App, Parameter
@@ -22,6 +23,7 @@ from fanet_mw.radio_control import (
 from fanet_mw.units import MAX_NODES, Enu, NodeId, S, seconds_to_ns
 from sim.air import change
 from sim.console import Console
+from sim.options import warn_of
 from sim.running import locate
 
 app = App(name="air", help="Change the air of a swarm that runs: degrade a link, jam an area, cut a node off, restore.")
@@ -36,6 +38,11 @@ class Where:
     """Zenoh endpoint of the swarm's router; by default that of a swarm that runs on this machine."""
     swarm: str | None = None
     """Name of the swarm; by default the only one there."""
+    zenoh_config: Path | None = None
+    """Zenoh's own configuration, JSON5 (TLS and the like): a file, or a folder of `fanet keys`."""
+
+    def __post_init__(self) -> None:
+        warn_of(self.connect, listens=False)
 
 
 @Parameter(name="*")
@@ -144,6 +151,6 @@ def _do(control: Control, where: Where) -> int:
         bound = "node ids from 1" if nodes_of(control) else "see `fanet air --help`"
         raise ConfigError(f"{control}: {why.removeprefix('fault_').replace('_', ' ')} out of bounds ({bound})")
     console = Console(highlight=False)
-    for fault in change(*locate(where.connect, where.swarm), control):
+    for fault in change(*locate(where.connect, where.swarm), control, zenoh_config=where.zenoh_config):
         console.print(f"{fault.label}: {fault.kind} {'since' if fault.active else 'ended at'} {fault.t_ns / S:.3f} s")
     return 0

@@ -25,7 +25,7 @@ from sim import catalog, report
 from sim.air_cli import app as air_app
 from sim.console import Console, nobody_reads
 from sim.layout import positions
-from sim.options import Choice, Join, Output
+from sim.options import Choice, Join, Output, warn_of
 from sim.outcome import Outcome
 from sim.running import locate, running
 
@@ -109,6 +109,7 @@ def launch(
     listen: str | None = None,
     connect: str | None = None,
     swarm: str | None = None,
+    zenoh_config: Path | None = None,
 ) -> int:
     """Run a scenario in real time: one process per UAV, the link emulator and the world, over Zenoh.
 
@@ -124,12 +125,16 @@ def launch(
         Zenoh endpoint of an existing router to use instead of serving one.
     swarm
         Name of the swarm on the bus; by default the scenario's name.
+    zenoh_config
+        Zenoh's own configuration, JSON5 (TLS, access lists): a file, or a folder of `fanet keys`.
 
     """
     from sim.swarm import launch as run
 
     chosen = choice.realtime_scenario(scenario)
     output.prepare()
+    warn_of(listen, listens=True)
+    warn_of(connect, listens=False)
     with _progress(chosen, quiet=output.json) as tell:
         outcome = asyncio.run(
             run(
@@ -138,6 +143,7 @@ def launch(
                 listen=listen,
                 connect=connect,
                 respawn=respawn,
+                zenoh_config=zenoh_config,
                 emulator_options={"pcap": output.capture_path(), "receptions": output.pcap_receptions},
                 spool_folder=output.out,
                 on_progress=tell,
@@ -170,7 +176,12 @@ def scenarios(*, json_: Annotated[bool, Parameter(name="--json", negative="")] =
 
 @app.command
 def router(
-    scenario: str, *, choice: Choice = Choice(), listen: str = "tcp/127.0.0.1:7447", swarm: str | None = None
+    scenario: str,
+    *,
+    choice: Choice = Choice(),
+    listen: str = "tcp/127.0.0.1:7447",
+    swarm: str | None = None,
+    zenoh_config: Path | None = None,
 ) -> int:
     """Serve the bus and keep the swarm clock, for services that are started one by one.
 
@@ -182,12 +193,23 @@ def router(
         Zenoh endpoint to serve on.
     swarm
         Name of the swarm on the bus; by default the scenario's name.
+    zenoh_config
+        Zenoh's own configuration, JSON5 (TLS, access lists): a file, or a folder of `fanet keys`.
 
     """
     from sim.router import serve
 
     chosen = choice.realtime_scenario(scenario)
-    loop.run(serve(chosen, swarm=swarm or chosen.name, listen=listen, on_event=lambda text: _err.print(text)))
+    warn_of(listen, listens=True)
+    loop.run(
+        serve(
+            chosen,
+            swarm=swarm or chosen.name,
+            listen=listen,
+            zenoh_config=zenoh_config,
+            on_event=lambda text: _err.print(text),
+        )
+    )
     return 0
 
 
@@ -224,6 +246,7 @@ def emulator(
         endpoint=join.connect,
         pcap=pcap,
         receptions=pcap_receptions,
+        zenoh_config=join.zenoh_config,
     )
 
 
@@ -240,7 +263,7 @@ def world(scenario: str, *, choice: Choice = Choice(), join: Join = Join()) -> i
     from sim.world_main import run
 
     chosen = choice.realtime_scenario(scenario)
-    return run(chosen, swarm=join.swarm or chosen.name, endpoint=join.connect)
+    return run(chosen, swarm=join.swarm or chosen.name, endpoint=join.connect, zenoh_config=join.zenoh_config)
 
 
 @app.command
@@ -261,7 +284,14 @@ def agent(scenario: str, *, id: int, choice: Choice = Choice(), join: Join = Joi
     if id not in chosen.node_ids:
         raise FanetError(f"--id {id}: must be in [1, nodes.count = {chosen.nodes.count}]")
     start = positions(chosen)[id - 1]
-    return run(chosen, node=NodeId(id), swarm=join.swarm or chosen.name, endpoint=join.connect, position=start)
+    return run(
+        chosen,
+        node=NodeId(id),
+        swarm=join.swarm or chosen.name,
+        endpoint=join.connect,
+        position=start,
+        zenoh_config=join.zenoh_config,
+    )
 
 
 @app.command
@@ -271,6 +301,7 @@ def links(
     swarm: str | None = None,
     node: int | None = None,
     reports: Annotated[int | None, Parameter(validator=Number(gte=1))] = None,
+    zenoh_config: Path | None = None,
 ) -> int:
     """Show the links of a swarm that runs, the busiest first, renewed every second.
 
@@ -284,11 +315,14 @@ def links(
         Only links from and to this node.
     reports
         End after so many; by default when interrupted.
+    zenoh_config
+        Zenoh's own configuration, JSON5 (TLS and the like): a file, or a folder of `fanet keys`.
 
     """
     from sim.links_cli import watch
 
-    return watch(*locate(connect, swarm), node=node, reports=reports, console=Console())
+    warn_of(connect, listens=False)
+    return watch(*locate(connect, swarm), node=node, reports=reports, console=Console(), zenoh_config=zenoh_config)
 
 
 @app.command
@@ -310,6 +344,40 @@ def swarms(*, json_: Annotated[bool, Parameter(name="--json", negative="")] = Fa
     for entry in entries:
         table.add_row(entry.swarm, entry.endpoint, str(entry.pid))
     Console().print(table if entries else "no swarm runs on this machine")
+    return 0
+
+
+@app.command
+def keys(
+    scenario: str,
+    *,
+    out: Path,
+    choice: Choice = Choice(),
+    swarm: str | None = None,
+    host: Annotated[tuple[str, ...], Parameter(negative="")] = (),
+    days: int = 365,
+) -> int:
+    """Make certificates and access lists for a swarm: one file per participant, for --zenoh-config. Needs openssl.
+
+    Parameters
+    ----------
+    scenario
+        The scenario of the swarm: it says which UAVs there are.
+    out
+        Folder for router.json5, emulator.json5, world.json5, operator.json5 and agent-1.json5 and so on.
+    swarm
+        Name of the swarm on the bus; by default the scenario's name.
+    host
+        Name or address at which the router is reached, besides localhost; repeatable.
+    days
+        How long the certificates are valid [days].
+
+    """
+    from sim.keys import make
+
+    chosen = choice.scenario(scenario)
+    made = make(chosen, out, swarm=swarm or chosen.name, hosts=host, days=days)
+    Console().print(f"{made} files written to {out}; each holds a private key", highlight=False, soft_wrap=True)
     return 0
 
 

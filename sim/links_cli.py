@@ -3,6 +3,7 @@
 import contextlib
 import queue
 from collections.abc import Iterable, Iterator
+from pathlib import Path
 from typing import Final
 
 from rich.console import Console
@@ -11,22 +12,30 @@ from rich.table import Table
 
 from fanet_mw import topics
 from fanet_mw.errors import MalformedFrameError
-from fanet_mw.hosts.bus import Bus
+from fanet_mw.hosts.bus import Bus, config_of
 from fanet_mw.link_stats import LOSSES, LinkRow, LinkStats
 from fanet_mw.topics import Topics
 from fanet_mw.units import S
-from sim.air import find_swarm
+from sim.air import OPERATOR, find_swarm
 
 _LOOK_S: Final = 0.5
 """How often the router is looked for while nothing comes."""
 
 
-def watch(endpoint: str, swarm: str | None, *, node: int | None, reports: int | None, console: Console) -> int:
+def watch(
+    endpoint: str,
+    swarm: str | None,
+    *,
+    node: int | None,
+    reports: int | None,
+    console: Console,
+    zenoh_config: Path | None = None,
+) -> int:
     """Show links (those of one node, if given) until interrupted, or so many reports.
 
     Raises BusError without a router or when it goes, FanetError without a swarm.
     """
-    with Bus.join(endpoint) as bus:
+    with Bus.join(endpoint, config_of(zenoh_config, OPERATOR)) as bus:
         name = swarm or find_swarm(bus)
         with Live(console=console, auto_refresh=False) as live, contextlib.suppress(KeyboardInterrupt):
             for number, stats in enumerate(_reports(bus, Topics(name)), start=1):

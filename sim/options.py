@@ -11,6 +11,7 @@ from cyclopts import Parameter
 
 from emulator.capture_file import NAME
 from fanet_mw.errors import ConfigError
+from fanet_mw.hosts.bus import exposure
 from fanet_mw.scenario import Scenario
 from sim import catalog
 from sim.console import Console
@@ -91,3 +92,14 @@ class Join:
     """Zenoh endpoint of the swarm's router."""
     swarm: str | None = None
     """Name of the swarm; by default the scenario's name."""
+    zenoh_config: Path | None = None
+    """Zenoh's own configuration, JSON5 (TLS and the like): a file, or a folder of `fanet keys`."""
+
+    def __post_init__(self) -> None:
+        warn_of(self.connect, listens=False)
+
+
+def warn_of(endpoint: str | None, *, listens: bool) -> None:
+    """Say what others can do at an endpoint that they can reach."""
+    if endpoint is not None and (warning := exposure(endpoint, listens=listens)) is not None:
+        _err.print(warning, highlight=False, soft_wrap=True, markup=False)

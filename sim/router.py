@@ -3,14 +3,17 @@
 import asyncio
 import time
 from collections.abc import Callable
+from pathlib import Path
 from typing import Final
 
-from fanet_mw.hosts.bus import Bus
+from fanet_mw.hosts.bus import Bus, config_of
 from fanet_mw.hosts.clock import START_PATIENCE_S, ClockKeeper, SwarmClock
 from fanet_mw.scenario import Scenario
 from fanet_mw.topics import Topics
 from sim.running import registered
 
+ROUTER: Final = "router"
+"""Whose configuration the router's process uses, in a folder of them."""
 _STOP_HEARD_S: Final = 0.3
 """Between telling services to stop and closing the bus they hear it on."""
 
@@ -20,9 +23,11 @@ def expected_names(scenario: Scenario) -> list[str]:
     return ["emulator", "world", *(f"agent-{node}" for node in scenario.node_ids)]
 
 
-async def serve(scenario: Scenario, *, swarm: str, listen: str, on_event: Callable[[str], None]) -> None:
+async def serve(
+    scenario: Scenario, *, swarm: str, listen: str, on_event: Callable[[str], None], zenoh_config: Path | None = None
+) -> None:
     """Be the router and keep the clock until the scenario is over; raises BusError when the endpoint cannot be had."""
-    with Bus.serve(listen) as bus, registered(swarm, listen):
+    with Bus.serve(listen, config_of(zenoh_config, ROUTER)) as bus, registered(swarm, listen):
         keeper = ClockKeeper(bus, Topics(swarm), time_scale=scenario.time_scale, expected=expected_names(scenario))
         on_event(f"serving {listen}, waiting for {len(keeper.missing())} services of swarm {swarm}")
         clock = SwarmClock(await keeper.start(timeout_s=START_PATIENCE_S))

@@ -21,7 +21,7 @@ from emulator.__main__ import run as run_emulator
 from emulator.compile import WORD, must_compile
 from fanet_mw.errors import BusError
 from fanet_mw.hosts import interrupts
-from fanet_mw.hosts.bus import Bus
+from fanet_mw.hosts.bus import Bus, config_of
 from fanet_mw.hosts.clock import ClockKeeper, SwarmClock, few
 from fanet_mw.hosts.service import BUS_EXIT_CODE
 from fanet_mw.scenario import Scenario
@@ -35,7 +35,7 @@ from sim.flight import FlightRecorder
 from sim.layout import positions
 from sim.outcome import Outcome
 from sim.processes import Processes, describe
-from sim.router import expected_names
+from sim.router import ROUTER, expected_names
 from sim.running import registered
 from sim.world_main import run as run_world
 
@@ -57,11 +57,11 @@ _PROGRESS_S: Final = 0.25
 Tell = Callable[[str], None]
 
 
-def free_endpoint() -> str:
-    """A TCP port of the loopback interface that is free now."""
+def free_endpoint(protocol: str = "tcp") -> str:
+    """A port of the loopback interface that is free now."""
     with socket.socket() as probe:
         probe.bind(("127.0.0.1", 0))
-        return f"tcp/127.0.0.1:{probe.getsockname()[1]}"
+        return f"{protocol}/127.0.0.1:{probe.getsockname()[1]}"
 
 
 class Swarm:
@@ -77,6 +77,7 @@ class Swarm:
         respawn: bool,
         tell: Tell,
         spool_folder: Path | None = None,
+        zenoh_config: Path | None = None,
     ) -> None:
         names = Topics(swarm)
         self.emulator_options: dict[str, Any] = {}
@@ -84,6 +85,7 @@ class Swarm:
         self._scenario = scenario
         self._swarm = swarm
         self._endpoint = endpoint
+        self._zenoh_config = zenoh_config
         self._respawn = respawn
         self._tell = tell
         self._collector = Collector(scenario, bus.subscribe, names, now_ns=time.monotonic_ns, folder=spool_folder)
@@ -163,6 +165,7 @@ class Swarm:
             "swarm": self._swarm,
             "endpoint": self._endpoint,
             "join_patience_s": READY_TIMEOUT_S,
+            "zenoh_config": self._zenoh_config,
         }
         self.processes.start("emulator", run_emulator, {**common, **self.emulator_options})
         self.processes.start("world", run_world, common)
@@ -267,12 +270,14 @@ async def _any_done(*futures: asyncio.Future[Any], timeout_s: float) -> bool:
     return bool(done)
 
 
-def _bus(listen: str | None, connect: str | None) -> tuple[Bus, str]:
-    """The session of the launcher, and the endpoint its children connect to."""
+def _bus(listen: str | None, connect: str | None, zenoh_config: Path | None) -> tuple[Bus, str]:
+    """The session of the launcher, and the endpoint its children connect to: TLS by default, with keys for all."""
+    config = config_of(zenoh_config, ROUTER)
     if connect is not None:
-        return Bus.join(connect), connect
-    endpoint = listen or free_endpoint()
-    return Bus.serve(endpoint), endpoint
+        return Bus.join(connect, config), connect
+    keys_for_all = zenoh_config is not None and zenoh_config.is_dir()
+    endpoint = listen or free_endpoint("tls" if keys_for_all else "tcp")
+    return Bus.serve(endpoint, config), endpoint
 
 
 async def launch(
@@ -284,12 +289,14 @@ async def launch(
     respawn: bool = False,
     emulator_options: Mapping[str, Any] | None = None,
     spool_folder: Path | None = None,
+    zenoh_config: Path | None = None,
     on_progress: Callable[[float], None] = lambda _: None,
     on_event: Tell = lambda _: None,
     on_started: Callable[[Swarm], None] = lambda _: None,
 ) -> Outcome:
     """Run a scenario as real processes. `on_started` is handed the swarm while it runs, for tests and tools.
 
+    `zenoh_config` is Zenoh's own configuration, a file for all processes or a folder with one for each.
     What is collected waits in temporary files in `spool_folder`; by default where the system keeps such files.
 
     Raises BusError when the bus cannot be had or the swarm does not come up, ConfigError when a limit of the machine
@@ -298,11 +305,18 @@ async def launch(
     limits.prepare(processes=len(expected_names(scenario)))
     if must_compile():
         on_event(WORD)
-    bus, endpoint = _bus(listen, connect)
+    bus, endpoint = _bus(listen, connect, zenoh_config)
     with bus, registered(swarm, endpoint) as known:
         on_event(f"swarm {swarm} on {endpoint}" + ("" if known else "; other commands must be told so: --connect"))
         run = Swarm(
-            scenario, bus, swarm=swarm, endpoint=endpoint, respawn=respawn, tell=on_event, spool_folder=spool_folder
+            scenario,
+            bus,
+            swarm=swarm,
+            endpoint=endpoint,
+            respawn=respawn,
+            tell=on_event,
+            spool_folder=spool_folder,
+            zenoh_config=zenoh_config,
         )
         run.emulator_options.update(emulator_options or {})
         loop = asyncio.get_running_loop()

@@ -8,12 +8,14 @@ import contextlib
 import json
 import time
 from collections.abc import Callable
+from ipaddress import ip_address
+from pathlib import Path
 from types import TracebackType
 from typing import Any, Final, Protocol, Self
 
 import zenoh
 
-from fanet_mw.errors import BusError
+from fanet_mw.errors import BusError, ConfigError
 
 JOIN_PATIENCE_S: Final = 2.5
 """How long a router is waited for by default: a person who mistyped an endpoint is told soon."""
@@ -37,8 +39,35 @@ class HostBus(Protocol):
     def check(self) -> None: ...
 
 
-def _config(*, mode: str, listen: str | None, connect: str | None, patience_s: float = 0.0) -> zenoh.Config:
-    config = zenoh.Config()
+def config_of(path: Path | None, name: str) -> Path | None:
+    """The configuration file of a participant: the file that was given, or NAME.json5 in the folder that was given."""
+    return path / f"{name}.json5" if path is not None and path.is_dir() else path
+
+
+def exposure(endpoint: str, *, listens: bool) -> str | None:
+    """A warning for an endpoint that others can reach or forge; None for the loopback interface and for TLS or QUIC."""
+    protocol, _, address = endpoint.partition("/")
+    host = address.partition("#")[0].partition("?")[0].rpartition(":")[0].strip("[]")
+    if protocol in ("tls", "quic", "unixsock-stream", "unixpipe") or host == "localhost":
+        return None
+    with contextlib.suppress(ValueError):
+        if ip_address(host).is_loopback:
+            return None
+    who = "whoever reaches it" if listens else "whoever is on the way"
+    return (
+        f"{endpoint} is neither on the loopback interface nor encrypted: {who} can stop the clock, move UAVs, change "
+        f"the air and forge results. See docs/security.md for tls/ with access lists (fanet keys, --zenoh-config)"
+    )
+
+
+def _config(
+    *, mode: str, listen: str | None, connect: str | None, file: Path | None, patience_s: float = 0.0
+) -> zenoh.Config:
+    """Our settings over those of a configuration file of Zenoh; raises ConfigError when that cannot be used."""
+    try:
+        config = zenoh.Config() if file is None else zenoh.Config.from_file(str(file))
+    except zenoh.ZError as error:
+        raise ConfigError(f"--zenoh-config {file}: {_first_sentence(error)}") from error
     settings: dict[str, object] = {
         "mode": mode,
         "scouting/multicast/enabled": False,
@@ -71,24 +100,28 @@ class Bus:
         self._away_since_s: float | None = None
 
     @classmethod
-    def serve(cls, endpoint: str) -> Self:
-        """Be the router; raises BusError when the endpoint cannot be listened on."""
+    def serve(cls, endpoint: str, config: Path | None = None) -> Self:
+        """Be the router, with a configuration file of Zenoh's for what is not said here (TLS, access lists).
+
+        Raises BusError when the endpoint cannot be listened on, ConfigError when the file cannot be used.
+        """
+        settings = _config(mode="router", listen=endpoint, connect=None, file=config)
         try:
-            return cls(zenoh.open(_config(mode="router", listen=endpoint, connect=None)), endpoint)
+            return cls(zenoh.open(settings), endpoint)
         except zenoh.ZError as error:
             why = "it is already in use" if "in use" in str(error) else _first_sentence(error)
             raise BusError(f"cannot serve on {endpoint}: {why}") from error
 
     @classmethod
-    def join(cls, endpoint: str, *, patience_s: float = JOIN_PATIENCE_S) -> Self:
-        """Connect to a router; raises BusError when none answers within `patience_s`.
+    def join(cls, endpoint: str, config: Path | None = None, *, patience_s: float = JOIN_PATIENCE_S) -> Self:
+        """Connect to a router, with a configuration file of Zenoh's; raises BusError when none answers in time.
 
         A process of a swarm, whose router is known to be there, has more patience: on a busy machine a handshake may
-        take seconds.
+        take seconds. Raises ConfigError when the file cannot be used.
         """
+        settings = _config(mode="client", listen=None, connect=endpoint, file=config, patience_s=patience_s)
         try:
-            config = _config(mode="client", listen=None, connect=endpoint, patience_s=patience_s)
-            return cls(zenoh.open(config), endpoint)
+            return cls(zenoh.open(settings), endpoint)
         except zenoh.ZError as error:
             why = "no answer" if "onnect" in str(error) else _first_sentence(error)
             raise BusError(

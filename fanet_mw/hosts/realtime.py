@@ -17,7 +17,7 @@ from typing import Any, Final
 
 from fanet_mw import topics
 from fanet_mw.actor import Actor
-from fanet_mw.hosts.bus import JOIN_PATIENCE_S, Bus, HostBus
+from fanet_mw.hosts.bus import JOIN_PATIENCE_S, Bus, HostBus, config_of
 from fanet_mw.hosts.clock import START_PATIENCE_S, ClockListener, SwarmClock
 from fanet_mw.hosts.inbox import Inbox
 from fanet_mw.hosts.lateness import Histogram
@@ -262,12 +262,16 @@ async def run_actor(
     swarm: str,
     endpoint: str,
     until_ns: int,
+    zenoh_config: Path | None = None,
     clock_timeout_s: float = START_PATIENCE_S,
     join_patience_s: float = JOIN_PATIENCE_S,
     on_epoch: Callable[[int], None] = lambda _: None,
     timebase: Timebase = THIS_MACHINE,
 ) -> None:
-    """Join a router, run one actor, leave. Raises BusError."""
-    with Bus.join(endpoint, patience_s=join_patience_s) as bus:
+    """Join a router, run one actor, leave; `zenoh_config` is a file, or a folder with one for each actor.
+
+    Raises BusError, and ConfigError when the file cannot be used.
+    """
+    with Bus.join(endpoint, config_of(zenoh_config, actor.name), patience_s=join_patience_s) as bus:
         host = RealtimeHost(actor, bus, Topics(swarm), timebase)
         await host.run(until_ns=until_ns, clock_timeout_s=clock_timeout_s, on_epoch=on_epoch)

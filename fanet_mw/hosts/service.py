@@ -13,6 +13,7 @@ from typing import Final
 from fanet_mw import config
 from fanet_mw.errors import ConfigError, FanetError
 from fanet_mw.hosts import interrupts
+from fanet_mw.hosts.bus import exposure
 from fanet_mw.scenario import Scenario
 
 BUS_EXIT_CODE: Final = 3
@@ -24,6 +25,9 @@ def parser(program: str, description: str) -> argparse.ArgumentParser:
     flags = argparse.ArgumentParser(prog=f"python -m {program}", description=description)
     flags.add_argument("scenario", type=Path, help="scenario file, the same for all services of a swarm")
     flags.add_argument("--connect", default=_DEFAULT_ENDPOINT, help="Zenoh endpoint of the router (%(default)s)")
+    flags.add_argument(
+        "--zenoh-config", type=Path, metavar="FILE", help="Zenoh's own configuration, JSON5: TLS and the like"
+    )
     flags.add_argument("--swarm", help="name of the swarm; by default the scenario's")
     flags.add_argument("--set", action="append", default=[], metavar="KEY=VALUE", help="change one scenario key")
     return flags
@@ -34,6 +38,8 @@ def serve(given: argparse.Namespace, run: Callable[[Scenario, str, str], int]) -
     interrupts.heed()
     try:
         scenario = config.load(given.scenario, given.set)
+        if (warning := exposure(given.connect, listens=False)) is not None:
+            sys.stderr.write(f"{warning}\n")
         return run(scenario, given.swarm or scenario.name, given.connect)
     except FanetError as error:
         sys.stderr.write(f"{error}\n")

@@ -6,6 +6,7 @@ telemetry and reports stay with the node.
 
 import contextlib
 from collections.abc import Iterator
+from pathlib import Path
 from typing import Protocol
 
 from fanet_mw import topics
@@ -83,10 +84,10 @@ def _decoded(payload: bytes) -> list[Message]:
 
 
 @contextlib.contextmanager
-def joined(endpoint: str | None) -> Iterator[Bus | None]:
-    """The router's session, if there is to be one."""
+def joined(endpoint: str | None, config: Path | None = None) -> Iterator[Bus | None]:
+    """The router's session, if there is to be one, with a configuration file of Zenoh's."""
     if endpoint is None:
         yield None
         return
-    with Bus.join(endpoint) as bus:
+    with Bus.join(endpoint, config) as bus:
         yield bus

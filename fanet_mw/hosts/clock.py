@@ -8,6 +8,7 @@ clock: it is right as far as the two machines' unix clocks agreed with each othe
 
 import asyncio
 import contextlib
+import math
 from collections.abc import Iterable, Sequence
 from typing import Final
 
@@ -22,6 +23,8 @@ from fanet_mw.units import MS, S
 _START_DELAY_NS: Final = 300 * MS
 """From the moment all are there until swarm instant 0."""
 _ASK_EVERY_S: Final = 0.5
+_ASK_AGAIN_S: Final = 0.05
+"""Between two questions to the keeper of whoever hears of a change."""
 START_PATIENCE_S: Final = 3600.0
 """For services that are started by hand, one after the other. A router that goes meanwhile is noticed in seconds."""
 
@@ -121,7 +124,12 @@ class ClockKeeper:
 
 
 class ClockListener:
-    """Hears the swarm clock, on the loop's thread."""
+    """Hears the swarm clock, on the loop's thread.
+
+    A put on the clock's topic may be anyone's, so it is a hint to ask the keeper, and only an answer counts: who has
+    merely put a clock that is stopped has stopped nobody. Who also answers in the keeper's place does; an access list
+    keeps others from that.
+    """
 
     def __init__(self, bus: HostBus, names: Topics, timebase: Timebase = THIS_MACHINE) -> None:
         self._timebase = timebase
@@ -130,11 +138,33 @@ class ClockListener:
         self._loop = asyncio.get_running_loop()
         self._running: asyncio.Future[Clock] = self._loop.create_future()
         self.stopped = asyncio.Event()
-        bus.subscribe(names.clock, self._from_thread)
+        self._asked_s = -math.inf
+        self._asks_again: asyncio.TimerHandle | None = None
+        bus.subscribe(names.clock, self._hinted)
 
-    def _from_thread(self, _topic: str, payload: bytes) -> None:
+    def _hinted(self, _topic: str, _payload: bytes) -> None:
+        """On the bus's thread: something was put on the clock's topic."""
+        if not self._loop.is_closed():
+            self._loop.call_soon_threadsafe(self._ask)
+
+    def _answered(self, _topic: str, payload: bytes) -> None:
+        """On the bus's thread: the keeper has answered."""
         if not self._loop.is_closed():
             self._loop.call_soon_threadsafe(self._heard, payload)
+
+    def _ask(self) -> None:
+        """Ask the keeper, at once or when the last question is old enough: a flood of hints is one question."""
+        wait_s = self._asked_s + _ASK_AGAIN_S - self._loop.time()
+        if wait_s <= 0:
+            self._asked_s = self._loop.time()
+            self._asks_again = None
+            self._bus.ask(self._names.clock, self._answered)
+        elif self._asks_again is None:
+            self._asks_again = self._loop.call_later(wait_s, self._ask_now)
+
+    def _ask_now(self) -> None:
+        self._asked_s = -math.inf
+        self._ask()
 
     def _heard(self, payload: bytes) -> None:
         try:
@@ -152,7 +182,7 @@ class ClockListener:
         """The clock, once it has started; raises BusError when nobody starts it or the router goes."""
         waited_s = 0.0
         while waited_s < timeout_s:
-            self._bus.ask(self._names.clock, self._from_thread)
+            self._ask_now()
             try:
                 clock = await asyncio.wait_for(asyncio.shield(self._running), _ASK_EVERY_S)
                 return SwarmClock(clock, self._timebase)

@@ -8,7 +8,7 @@ from typing import Self
 
 from fanet_mw import topics
 from fanet_mw.hosts.bus import Bus
-from fanet_mw.messages import MavlinkTap, Message, Report, TraceBatch
+from fanet_mw.messages import Clock, ClockState, MavlinkTap, Message, Report, TraceBatch
 from fanet_mw.topics import Topics
 from fanet_mw.trace import Approaching, Delivered, Generated
 from fanet_mw.units import S
@@ -58,6 +58,14 @@ def attacked(puts: list[tuple[str, list[Message]]], *settings: str) -> tuple[Out
         scenario = catalog.find("quick", [*SMALL, *settings])
         outcome = asyncio.run(launch(scenario, swarm="test", listen=endpoint, on_started=attacker.start))
     return outcome, time.monotonic() - began
+
+
+def test_a_forged_clock_that_is_stopped_stops_nobody() -> None:
+    """Without an access list anyone may put on the clock's topic, but only its keeper's answer counts."""
+    outcome, _ = attacked([(NAMES.clock, [Clock(0, 1.0, ClockState.STOPPED), Clock(5, 50.0, ClockState.RUNNING)])])
+    assert {report["final"] for report in outcome.reports.values()} == {True}
+    assert max(record.t_ns for record in outcome.records if isinstance(record, Delivered)) > 2.5 * S
+    assert outcome.aborted is None
 
 
 def test_nonsense_for_the_launcher_is_counted_and_the_result_is_that_of_the_swarm(tmp_path: Path) -> None:

@@ -14,18 +14,16 @@ from typing import Any, Final, NamedTuple
 from sim.outcome import Outcome
 from sim.processes import describe
 
-LOST_ON_BUS: Final = 0.005
-"""Of all requests."""
-COPIES_LOST: Final = 0.005
-"""Of all receptions that the medium handed to the bus."""
+LOST: Final = 0.005
+"""What the machine took from the air, all kinds together: requests lost on the bus or dropped as too late, turns
+missed, each of all requests, and receptions lost on the bus, of all that were handed over."""
 HEARD_LATE: Final = 0.02
 """Of all receptions: handed to their node later than a handover and a lead after the frame's end."""
-MISSED_TURNS: Final = 0.005
-"""Relays that a node skipped because their turn was past, of all requests."""
 STALL_MS: Final = 500.0
 """The longest that any process could do nothing."""
 SKIPPED_TICKS: Final = 0.02
 """Of the world's ticks."""
+_PARTS: Final = frozenset({"lost_on_bus", "dropped_late", "missed_turns", "copies_lost"})
 _NAMED: Final = 5
 """So many are named in one sentence; of the rest, how many there are."""
 
@@ -55,18 +53,27 @@ def measures(outcome: Outcome, *, frames: Mapping[str, Any], late_share: float) 
         return {}
     agents = [report for report in outcome.reports.values() if report.get("kind") == "agent"]
     world = outcome.reports.get("world", {})
-    lost = frames["dropped"].get("bus", 0)
     late, heard = _sum(agents, "heard_late"), _sum(agents, "receptions")
+    parts = {
+        "lost_on_bus": Measure(
+            "requests lost on the bus", _share(frames["dropped"].get("bus", 0), frames["sent"]), LOST
+        ),
+        "dropped_late": Measure(
+            "requests dropped as too late", _share(frames["dropped"].get("late", 0), frames["sent"]), LOST
+        ),
+        "missed_turns": Measure(
+            "turns missed, of all requests", _share(_sum(agents, "missed_turns"), frames["sent"]), LOST
+        ),
+        "copies_lost": Measure("receptions lost on the bus", _copies_lost(outcome), LOST),
+    }
+    together = sum(part.value for part in parts.values())
     ticks, skipped = world.get("ticks", 0), world.get("skipped_ticks", 0)
     stall_ms, stalled = _longest_stall(outcome)
     return {
         "late_frames": Measure("frames announced too late", late_share, outcome.scenario.radio.late_limit),
-        "lost_on_bus": Measure("requests lost on the bus", _share(lost, frames["sent"]), LOST_ON_BUS),
-        "copies_lost": Measure("receptions lost on the bus", _copies_lost(outcome), COPIES_LOST),
+        **parts,
+        "lost": Measure("lost on the bus, dropped as too late and missed, together", together, LOST),
         "heard_late": Measure("receptions handed over too late", _share(late, heard), HEARD_LATE),
-        "missed_turns": Measure(
-            "turns missed, of all requests", _share(_sum(agents, "missed_turns"), frames["sent"]), MISSED_TURNS
-        ),
         "stall_ms": Measure("longest standstill of a process", stall_ms, STALL_MS, "ms", f" ({stalled})"),
         "skipped_ticks": Measure("ticks that the world skipped", _share(skipped, ticks + skipped), SKIPPED_TICKS),
     }
@@ -78,7 +85,7 @@ def reasons(outcome: Outcome, *, frames: Mapping[str, Any], disturbance: Mapping
         *_broken(outcome),
         *_incomplete(outcome),
         *_unaccounted(frames),
-        *(measure.sentence() for measure in disturbance.values() if measure.exceeded),
+        *_disturbed(disturbance),
     ]
 
 
@@ -109,6 +116,15 @@ def _unaccounted(frames: Mapping[str, Any]) -> Iterator[str]:
         yield f"frames that no node asked for: {frames['unasked']}, limit 0"
     if not frames["closes"] and not frames["unaccounted"] and not frames["unasked"]:
         yield f"the ledger of {frames['sent']} frames does not close"
+
+
+def _disturbed(disturbance: Mapping[str, Measure]) -> Iterator[str]:
+    """The sum of what was lost is said only when none of its parts is too great by itself."""
+    exceeded = {name: measure for name, measure in disturbance.items() if measure.exceeded}
+    if not exceeded.keys().isdisjoint(_PARTS):
+        exceeded.pop("lost")
+    for measure in exceeded.values():
+        yield measure.sentence()
 
 
 def _named(names: list[str]) -> str:

@@ -41,6 +41,9 @@ SCENARIOS: Final = {
 }
 
 
+_SHARES: Final = ("late_frames", "lost_on_bus", "copies_lost", "dropped_late", "missed_turns", "lost", "heard_late")
+
+
 class Disturbance(NamedTuple):
     """Keys to set, a context around the run, and what to do to the swarm when the traffic has begun."""
 
@@ -143,7 +146,7 @@ def launch(scenario: Scenario, disturbance: Disturbance) -> dict[str, Any]:
 
 def row(what: str, case: str, summary: dict[str, Any], virtual: dict[str, Any]) -> str:
     seen = {name: item["value"] for name, item in summary["disturbance"].items()}
-    shares = " ".join(f"{100 * value:6.2f}" for name, value in seen.items() if name != "stall_ms")
+    shares = " ".join(f"{100 * seen[name]:6.2f}" for name in _SHARES)
     p95, wanted = summary["delay_ms"]["p95"] or 0.0, virtual["delay_ms"]["p95"] or 0.0
     verdict = "valid" if summary["valid"] else "; ".join(summary["invalid_because"])
     pdr, off = summary["pdr"], summary["pdr"] - virtual["pdr"]
@@ -171,12 +174,8 @@ def main(cases: list[str]) -> None:
         return
     if not cases:
         print("\n".join(spread(what) for what in SCENARIOS))
-        print(
-            "                             late    bus copies  heard missed  ticks  stall     PDR    diff     p95   diff"
-        )
-        print(
-            "                                %      %      %   late %      %      %     ms                    ms     ms"
-        )
+        print(" " * 29 + "late    bus copies   late missed    all  heard  stall     PDR    diff     p95   diff")
+        print(" " * 29 + "   %      %      %   drop      %   lost   late     ms                    ms     ms")
     for case in cases or known:
         what, _, disturbed = case.partition("/")
         name, keys = SCENARIOS[what]

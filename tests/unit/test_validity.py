@@ -69,9 +69,9 @@ def put(outcome: Outcome, name: str, *path: str, value: object) -> None:
     content[path[-1]] = value
 
 
-def lose_requests(outcome: Outcome, share: float) -> None:
+def lose_requests(outcome: Outcome, share: float, reason: str = "bus") -> None:
     lost = round(2 * SENT * share)
-    put(outcome, "emulator", "frames", "dropped", value={"bus": lost})
+    put(outcome, "emulator", "frames", "dropped", value={reason: lost})
     put(outcome, "emulator", "frames", "delivered", value=2 * SENT - lost)
 
 
@@ -79,9 +79,10 @@ MEASURED: dict[str, tuple[float, Callable[[Outcome, float], object]]] = {
     "frames announced too late": (
         0.01, lambda outcome, share: put(outcome, "emulator", "late", "late_frames", value=round(share * 2 * SENT))
     ),
-    "requests lost on the bus": (validity.LOST_ON_BUS, lose_requests),
+    "requests lost on the bus": (validity.LOST, lose_requests),
+    "requests dropped as too late": (validity.LOST, lambda outcome, share: lose_requests(outcome, share, "late")),
     "receptions lost on the bus": (
-        validity.COPIES_LOST,
+        validity.LOST,
         lambda outcome, share: put(outcome, "agent-2", "receptions", value=HEARD - round(2 * HEARD * share)),
     ),
     "receptions handed over too late": (
@@ -89,7 +90,7 @@ MEASURED: dict[str, tuple[float, Callable[[Outcome, float], object]]] = {
         lambda outcome, share: put(outcome, "agent-1", "heard_late", value=round(2 * HEARD * share)),
     ),
     "turns missed, of all requests": (
-        validity.MISSED_TURNS,
+        validity.LOST,
         lambda outcome, share: put(outcome, "agent-1", "missed_turns", value=round(2 * SENT * share)),
     ),
     "ticks that the world skipped": (
@@ -115,6 +116,16 @@ def test_each_measure_makes_a_run_invalid_above_its_limit_and_not_below(
     assert "limit" in why
     disturbance = summarize(above, trace_sha256="")["disturbance"]
     assert [name for name, item in disturbance.items() if item["value"] > item["limit"]] != []
+
+
+def test_what_is_lost_in_different_ways_adds_up(scenario: Scenario) -> None:
+    """Each kind takes copies from those who wait for them: one half of the limit and one more is too much."""
+    outcome = good(scenario)
+    lose_requests(outcome, 0.6 * validity.LOST)
+    put(outcome, "agent-1", "missed_turns", value=round(2 * SENT * 0.3 * validity.LOST))
+    assert reasons(outcome) == []
+    put(outcome, "agent-1", "missed_turns", value=round(2 * SENT * 0.6 * validity.LOST))
+    assert reasons(outcome) == ["lost on the bus, dropped as too late and missed, together: 0.600%, limit 0.500%"]
 
 
 BROKEN: dict[str, tuple[Change, str]] = {

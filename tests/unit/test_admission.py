@@ -39,6 +39,16 @@ def test_packets_that_come_too_soon_are_refused_and_do_not_count() -> None:
     assert [t for t in born if admission.admits(t)] == [1000 * MS, 1500 * MS, 2000 * MS, 2500 * MS, 3000 * MS]
 
 
+def test_packets_that_each_come_a_little_too_soon_do_not_add_up() -> None:
+    """Half a microsecond is rounding, again and again it is a higher rate."""
+    own = Own(Turns(0, 500 * MS, 40 * MS, 2 * MS, 230), (0,), 10)
+    admission = Admission(ME, deadline_ns=600 * MS, interval_ns=500 * MS)
+    admission.follow(own, now_ns=0)
+    admitted = [admission.admits(number * (500 * MS - 500)) for number in range(10)]
+    assert admitted[:2] == [True, True]
+    assert False in admitted
+
+
 def test_a_deadline_is_lost_and_met_again_with_the_timetable_and_said_once_each() -> None:
     near, far = (Own(Turns(0, 500 * MS, 40 * MS, 2 * MS, 230), (0,), span) for span in (10, 60))
     admission = Admission(ME, deadline_ns=600 * MS, interval_ns=1 * S)

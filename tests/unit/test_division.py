@@ -32,6 +32,19 @@ def test_what_is_good_enough_stays() -> None:
     assert division.renew(STANDING, swarm_of(LINE), {}, now_ns=0) == STANDING
 
 
+def test_clusters_that_are_as_good_as_new_ones_stay_though_new_ones_would_be_others() -> None:
+    """Where everyone hears everyone, any three and three are as good as any others."""
+    crowd = swarm_of({node: 10.0 * node for node in range(2, 8)})
+    mixed = [Cluster(NodeId(4), names(2, 4, 6)), Cluster(NodeId(5), names(3, 5, 7))]
+    assert Division("balanced", count=2, range_m=RANGE_M).renew(mixed, crowd, {}, now_ns=0) == mixed
+
+
+def test_clusters_that_share_the_load_badly_are_made_anew() -> None:
+    uneven = [Cluster(NodeId(3), names(2, 3, 4, 5)), Cluster(NodeId(6), names(6, 7))]
+    clusters = Division("balanced", count=2, range_m=RANGE_M).renew(uneven, swarm_of(LINE), {}, now_ns=0)
+    assert [len(cluster.members) for cluster in clusters] == [3, 3]
+
+
 def test_a_head_that_is_gone_is_followed_by_who_stands_in_for_it() -> None:
     places = {node: east for node, east in LINE.items() if node != 3}
     assert carried_on(STANDING, swarm_of(places), {NodeId(3): NodeId(4)})[0] == Cluster(NodeId(4), names(2, 4))

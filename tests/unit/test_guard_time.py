@@ -1,6 +1,7 @@
 """What a guard time must hold: both clocks' errors, their drift until the next setting, flight, and the last frame."""
 
 from fanet_mw.protocol.delay import guard_ns
+from fanet_mw.protocol.delay.access import Dcf
 from fanet_mw.units import MS, US, S
 
 QUIET = {"clock_error_ns": 0, "drift_ppm": 0.0, "resync_ns": 0, "range_m": 0.0, "overhang_ns": 0}
@@ -18,3 +19,7 @@ def test_both_clocks_may_be_off_in_opposite_directions() -> None:
 def test_flight_and_the_last_frame_come_on_top() -> None:
     assert guard_ns(**{**QUIET, "range_m": 299.792458}) == 1 * US
     assert guard_ns(**{**QUIET, "clock_error_ns": 1 * MS, "overhang_ns": 984 * US}) == 2984 * US
+
+
+def test_the_windows_that_a_bound_counts_double_up_to_the_greatest() -> None:
+    assert [Dcf().window(attempt) for attempt in range(7)] == [31, 63, 127, 255, 511, 1023, 1023]

@@ -17,6 +17,7 @@ from fanet_mw.radio_control import Degrade
 from fanet_mw.scenario import Scenario
 from fanet_mw.units import BROADCAST, MS, US, NodeId, S
 from sim import catalog
+from sim.links import LinkTotals
 from sim.results import finish
 from sim.run import simulate
 
@@ -120,3 +121,14 @@ def test_the_links_of_a_run_are_a_file_that_adds_up_to_its_copies(tmp_path: Path
         assert link["rssi_dbm"] == (30.0 if link["received"] else None), "where all are equally strong"
         lost.update(link["lost"])
     assert lost == copies["lost"]
+
+
+def test_sums_over_a_long_run_are_of_all_reports() -> None:
+    totals = LinkTotals()
+    for second in range(1, 151):
+        ends, counts = array("H", [1, 2, 2, 1]), array("I", [3, 1, 0, 0, 0, 0, 0, 1, 0, 0, 2, 0, 0, 0])
+        totals.add(LinkStats(second * S, S, ends, counts, array("q", [-180_000, -50_000])))
+    there, back = totals.rows()
+    assert (there.src, there.dst, there.received, there.copies) == (1, 2, 450, 600)
+    assert (back.src, back.dst, back.received, back.copies) == (2, 1, 150, 450)
+    assert (there.rssi_dbm, back.rssi_dbm) == (-60.0, -50.0)

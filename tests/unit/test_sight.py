@@ -15,6 +15,7 @@ from fanet_mw.units import MS, S
 from sim.layout import positions
 from sim.obstacles import Box, Obstacles, obstacles
 from sim.physics import Physics
+from sim.sight import Sight
 from sim.world import World
 
 MakeScenario = Callable[..., Scenario]
@@ -48,6 +49,15 @@ def test_a_building_hides_what_is_behind_it_and_nothing_else(
     town: Physics, first: tuple[float, ...], second: tuple[float, ...], blocked: bool
 ) -> None:
     assert town.blocked(np.array([first], float), np.array([second], float)).tolist() == [blocked]
+
+
+def test_a_pair_is_asked_for_if_one_of_them_is_below_the_highest_obstacle(
+    town: Physics, make_scenario: MakeScenario
+) -> None:
+    """Node 1 is low; node 2, above every roof, is hidden from it by the tower; node 3, as high, sees node 2."""
+    sight = Sight(make_scenario(**{"nodes.count": 3}), town, top_m=60.0)
+    at = np.array([[50.0, 0, 30], [-50, 0, 100], [-60, 0, 100]])
+    assert sight.obstructions(at, 0).pairs.tolist() == [1, 2, 1, 3]
 
 
 def test_a_uav_that_flies_into_a_building_is_stopped_and_noticed(town: Physics) -> None:

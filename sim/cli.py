@@ -3,6 +3,7 @@
 import asyncio
 import gzip
 import json
+import os
 import sys
 from collections.abc import Callable, Iterator
 from contextlib import contextmanager, nullcontext
@@ -378,6 +379,26 @@ def keys(
     chosen = choice.scenario(scenario)
     made = make(chosen, out, swarm=swarm or chosen.name, hosts=host, days=days)
     Console().print(f"{made} files written to {out}; each holds a private key", highlight=False, soft_wrap=True)
+    return 0
+
+
+@app.command
+def dialect(folder: Path | None = None, *, definitions: Annotated[bool, Parameter(negative="")] = False) -> int:
+    """Print the path of our MAVLink dialect, fanet.xml, with the definitions that it includes beside it.
+
+    Parameters
+    ----------
+    folder
+        Where to write them; by default `fanet-mw/message_definitions` in the user's folder of data.
+    definitions
+        Print the folder of definitions instead, which pymavlink wants in MDEF.
+
+    """
+    from fanet_mw.dialect.definitions import write
+
+    data = os.environ.get("XDG_DATA_HOME") or Path.home() / ".local" / "share"
+    path = write(folder or Path(data) / "fanet-mw" / "message_definitions")
+    sys.stdout.write(f"{path.parents[1] if definitions else path}\n")
     return 0
 
 

@@ -1,0 +1,44 @@
+"""The XML of our dialect beside the XML that it includes, for tools that read or generate from message definitions.
+
+What is included is pymavlink's, which is installed with us: the messages that our own parser knows.
+"""
+
+import re
+from importlib.resources import files
+from importlib.resources.abc import Traversable
+from pathlib import Path
+from typing import Final
+
+from fanet_mw.errors import ConfigError
+
+NAME: Final = "fanet.xml"
+_INCLUDE: Final = re.compile(r"<include>\s*(\S+?)\s*</include>")
+
+
+def write(folder: Path) -> Path:
+    """Write `v1.0/fanet.xml` and what it includes, as MAVLink's own repository has them; returns the path of fanet.xml.
+
+    Raises ConfigError when they cannot be written, or pymavlink came without its definitions.
+    """
+    target = folder / "v1.0"
+    ours, theirs = files("fanet_mw.dialect"), files("pymavlink.dialects.v20")
+    try:
+        target.mkdir(parents=True, exist_ok=True)
+        for name, text in _with_included(ours / NAME, theirs).items():
+            (target / name).write_text(text, encoding="utf-8")
+    except FileNotFoundError as error:
+        raise ConfigError(f"{error.filename}: is missing: install pymavlink anew") from error
+    except OSError as error:
+        raise ConfigError(f"{target}: cannot be written: {error.strerror}") from error
+    return target / NAME
+
+
+def _with_included(source: Traversable, theirs: Traversable) -> dict[str, str]:
+    """The texts of a definition and of all that it includes, by file name."""
+    found: dict[str, str] = {}
+    wanted = [source]
+    while wanted:
+        file = wanted.pop()
+        found[file.name] = file.read_text(encoding="utf-8")
+        wanted += [theirs / name for name in _INCLUDE.findall(found[file.name]) if name not in found]
+    return found

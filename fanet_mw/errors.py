@@ -78,5 +78,7 @@ class DropReason(StrEnum):
     NOT_FOR_US = "not_for_us"
     TOO_LARGE = "too_large"
     """Longer than the radio's maximum frame."""
+    MISSED_TURN = "missed_turn"
+    """Heard so late that the turn in which it was to be relayed had begun; not relayed."""
     ADMISSION = "admission"
     """Came sooner than the node's bound allows if it is to meet `traffic.deadline_s`; refused at its origin."""

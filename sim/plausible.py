@@ -9,9 +9,9 @@ Does not model: authentication. Who may say something as whom is for the router'
 import json
 import math
 from collections.abc import Mapping
-from typing import Annotated, Any, Final, Literal, Self
+from typing import Annotated, Any, Final, Literal
 
-from pydantic import BaseModel, ConfigDict, Field, ValidationError, model_validator
+from pydantic import BaseModel, ConfigDict, Field, ValidationError
 
 from fanet_mw import wire
 from fanet_mw.errors import MalformedFrameError
@@ -124,13 +124,6 @@ class _Agent(_Shape):
     dropped: Reasons
     missed_turns: Count | None = None
     bound_ms: Number | None = None
-    bound_from_ms: Number | None = None
-
-    @model_validator(mode="after")
-    def _bound_has_a_beginning(self) -> Self:
-        if (self.bound_ms is None) != (self.bound_from_ms is None):
-            raise ValueError("bound_ms and bound_from_ms")
-        return self
 
 
 _SHAPES: Final[dict[str, type[_Shape]]] = {"emulator": _Emulator, "world": _World}

@@ -10,37 +10,20 @@ that grows cannot break the deadline of those before it. Where no interval meets
 and goes on at the rate that the turns carry: late is better than never. More urgent packets are not policed.
 """
 
-from typing import Final, NamedTuple
+from typing import Final
 
-from fanet_mw.protocol.turns import Turns
+from fanet_mw.protocol.own_bound import Own
 from fanet_mw.trace import DeadlineLost, DeadlineMet
-from fanet_mw.units import US, NodeId, S
+from fanet_mw.units import US, NodeId
 
 _TOLERANCE_NS: Final = 1 * US
 """Packets are generated at whole microseconds."""
-EXPECTED_NS: Final = 8 * S
-"""After its start a node should have a bound by then: joins take 3 s, their schedule another 2 s, and a join may be
-lost (`lease.py` waits as long for a leader)."""
-
-
-class Own(NamedTuple):
-    """A node's part of a timetable: its turns, and for how long its floods last."""
-
-    turns: Turns
-    roots: tuple[int, ...]
-    span: int
-    together: int = 1
-    """Packets that one of its turns lets out."""
-
-    def worst_ns(self, *, interval_ns: int) -> int | None:
-        """The bound of packets that come no more often; None: more come than are let out."""
-        return self.turns.worst_ns(self.roots, span=self.span, interval_ns=interval_ns, together=self.together)
 
 
 class Admission:
     """One node's admission of packets of its own."""
 
-    def __init__(self, node: NodeId, *, deadline_ns: int, interval_ns: int) -> None:
+    def __init__(self, node: NodeId, *, deadline_ns: int, interval_ns: int, expected_ns: int) -> None:
         self._node = node
         self._deadline_ns = deadline_ns
         self._interval_ns = interval_ns
@@ -48,11 +31,13 @@ class Admission:
         self._met: bool | None = None
         self._least_ns = 0
         self._next_ns: int | None = None
+        self._expected_after_ns = expected_ns
+        """So long after its start a node should have a bound."""
         self._expected_ns: int | None = None
 
     def start(self, now_ns: int) -> None:
         """The node is up; it has no bound yet."""
-        self._expected_ns = now_ns + EXPECTED_NS
+        self._expected_ns = now_ns + self._expected_after_ns
 
     def next_wake_ns(self) -> int | None:
         """When it has to be said that there still is no bound; None: it has been said, or there was one."""
@@ -103,7 +88,7 @@ def least_interval_ns(own: Own, *, deadline_ns: int) -> int | None:
 
     Of a busy period, what the q-th turn lets out has come (q - 1) `together` intervals later (`Turns.worst_ns`).
     """
-    first_ns, *later_ns = own.turns.done_ns(own.roots, span=own.span)
+    first_ns, *later_ns = (ns + own.around_ns for ns in own.turns.done_ns(own.roots, span=own.span))
     if first_ns > deadline_ns:
         return None
     needed = (-(-(ns - deadline_ns) // (count * own.together)) for count, ns in enumerate(later_ns, start=1))

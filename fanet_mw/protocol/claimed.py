@@ -31,9 +31,9 @@ from fanet_mw.protocol.contract import Port
 from fanet_mw.protocol.delay.turns import TurnServer
 from fanet_mw.protocol.neighborhood import Neighborhood
 from fanet_mw.protocol.own_turns import OwnTurns, Share, draws
-from fanet_mw.protocol.root_release import RootRelease
 from fanet_mw.protocol.slot_claims import Claim, Hello, SlotClaims
 from fanet_mw.protocol.states import Action
+from fanet_mw.protocol.turn_release import OwnTurn, TurnRelease
 from fanet_mw.protocol.turns import Turns, clocks_fit, turn_ns
 from fanet_mw.protocol.txqueue import Packet, TxQueue, sooner_us
 from fanet_mw.scenario import Scenario
@@ -55,23 +55,25 @@ _POSITION_BYTES: Final = 61
 _NO_HEAD: Final = NodeId(0)
 
 
-class OwnRelease(RootRelease):
+class OwnRelease(TurnRelease):
     """What waits for our turns: own packets and relays, most urgent first."""
 
     def __init__(self, queue: TxQueue, own: OwnTurns, *, lead_ns: int, frame_bytes: int) -> None:
         super().__init__(queue, lead_ns=lead_ns)
         self._own = own
-        self._next_bytes = frame_bytes
+        self._frame_bytes = frame_bytes
 
-    def _start(self, earliest_ns: int) -> int | None:
-        return self._own.next_start_ns(not_before_ns=earliest_ns)
+    def _turn(self, earliest_ns: int) -> OwnTurn | None:
+        start_ns = self._own.next_start_ns(not_before_ns=earliest_ns)
+        return None if start_ns is None else OwnTurn(start_ns, self._frame_bytes)
 
     def due(self, *, now_ns: int) -> list[tuple[list[Packet], int]]:
         """Turns may have come and gone since the last look. Who is woken late still uses a turn that is ahead."""
-        planned_ns = self._next_ns
+        planned = self._next
         self._arm(now_ns)
-        if planned_ns is not None and planned_ns >= now_ns:
-            self._next_ns = self._start(min(planned_ns, self._next_ns or planned_ns))
+        if planned is not None and planned.start_ns >= now_ns:
+            later_ns = planned.start_ns if self._next is None else self._next.start_ns
+            self._next = self._turn(min(planned.start_ns, later_ns))
         return super().due(now_ns=now_ns)
 
     def reserve(self, *, not_before_ns: int) -> int | None:

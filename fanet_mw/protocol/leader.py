@@ -37,8 +37,20 @@ _FIRST_CALL_NS: Final = 5 * S
 """The first leader calls only if nobody has joined by then."""
 _HEARD_NS: Final = 1500 * MS
 """An announcement has reached everyone after this."""
+_NOTICE_PERIODS: Final = 2
+_NOTICE_HOPS: Final = 24
+"""With a timetable: what was promised before all have heard of the next one must be through when that is in force. So
+there must be time for two waits of a superframe and two floods of a dozen hops: the schedule's and the packet's."""
 _DRIFT: Final = 0.03
 """A timetable is made anew when more than this share of the links has changed."""
+
+
+def notice_ns(scenario: Scenario) -> int:
+    """How long before it comes into force a schedule is announced, at least."""
+    if scenario.clusters.relay != "scheduled":
+        return _HEARD_NS
+    hop_ns = scenario.radio.lead_ns + scenario.radio.handover_ns
+    return _HEARD_NS + _NOTICE_PERIODS * scenario.clusters.period_ns + _NOTICE_HOPS * hop_ns
 
 
 class _StandIn(NamedTuple):
@@ -78,6 +90,7 @@ class Leader:
         self._reassign_ns = seconds_to_ns(clusters.reassign_s)
         self._range_m = clusters.link_m or scenario.radio.range_m
         self._by_links = clusters.relay == "scheduled"
+        self._notice_ns = notice_ns(scenario)
         self._objection_ns = max(OBJECTION_NS, _OBJECTION_PERIODS * clusters.period_ns if self._by_links else 0)
         self._division = Division(clusters.method, count=clusters.count, range_m=self._range_m)
         self._epoch = epoch
@@ -156,7 +169,7 @@ class Leader:
         rests = not self._reassign_ns or self._stand_ins or now_ns < before.start_ns + self._reassign_ns
         if not changed and rests:
             return
-        start_ns = (now_ns + _HEARD_NS) // self._period_ns * self._period_ns + self._period_ns
+        start_ns = (now_ns + self._notice_ns) // self._period_ns * self._period_ns + self._period_ns
         places = self._places(here, start_ns)
         members = {node: place for node, place in places.items() if node != self._authority.leader}
         swarm = Swarm(members, within_range(members, range_m=self._range_m), velocities=self._velocities())

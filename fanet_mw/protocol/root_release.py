@@ -1,77 +1,126 @@
-"""A root's queue and when it lets packets out: as many as a frame holds in each of its turns, one lead ahead."""
+"""A root's queue and when it lets packets out: what a frame holds in each of its turns, one lead ahead.
 
-from collections.abc import Sequence
+    a turn:  | one warning | one report | bulk, in order, as many as fit              | the rest, most urgent first |
+                                        | or, in its place, a leader's announcements |
 
+Every class has room of its own, so the wait of one depends on nothing that comes later: not on reports,
+not on warnings. A turn is used only if its flood is over before the next timetable comes into force.
+"""
+
+from collections.abc import Iterator, Mapping, Sequence
+from typing import NamedTuple
+
+from fanet_mw.protocol.turn_release import OwnTurn, TurnRelease
 from fanet_mw.protocol.turns import Turns
 from fanet_mw.protocol.txqueue import Packet, TxQueue
+from fanet_mw.units import NodeId
+from fanet_mw.wire import PRIORITY_BULK, PRIORITY_CONTROL, Kind
 
-Following = tuple[int, Turns, tuple[int, ...], int]
-"""In force from an instant on: the geometry, which turns are ours, and how many bytes go into one."""
+
+class Following(NamedTuple):
+    """A timetable in force from an instant on, as far as a root needs it."""
+
+    valid_ns: int
+    turns: Turns
+    offsets: tuple[int, ...]
+    """Which turns are ours, ascending."""
+    frame_bytes: int
+    """What goes into one."""
+    span: int
+    """Turns from ours until everyone has what it let out."""
 
 
-class RootRelease:
+class RootRelease(TurnRelease):
     """The plan of one node's own turns."""
 
-    def __init__(self, queue: TxQueue, *, lead_ns: int) -> None:
-        self._queue = queue
-        self._lead_ns = lead_ns
+    def __init__(self, node: NodeId, queue: TxQueue, *, reserved: Mapping[int, int], lead_ns: int) -> None:
+        super().__init__(queue, lead_ns=lead_ns)
+        self._node = node
+        self._reserved = dict(sorted(reserved.items()))
         self._plans: Sequence[Following] = ()
-        self._free_ns = 0
-        """Just after the last turn that was used."""
-        self._next_ns: int | None = None
-        self._next_bytes = 0
-
-    def __len__(self) -> int:
-        return len(self._queue)
 
     def follow(self, plans: Sequence[Following], *, now_ns: int) -> None:
         """New turns; in order of the instants from which they hold."""
         self._plans = plans
         self._arm(now_ns)
 
-    def push(self, packet: Packet, *, now_ns: int) -> Packet | None:
-        """Queue a packet; returns the one evicted for it."""
-        evicted = self._queue.push(packet)
-        if self._next_ns is None:
-            self._arm(now_ns)
-        return evicted
+    def outdated(self, *, before_us: int) -> list[Packet]:
+        """Take out the announcements of ours that were made before an instant [swarm us] and still wait."""
+        return self._queue.take_older(before_us=before_us, rank=PRIORITY_CONTROL)
 
-    def expire(self, *, before_us: int) -> list[Packet]:
-        return self._queue.expire(before_us=before_us)
+    def through_ns(self, packet: Packet, *, now_ns: int) -> int | None:
+        """When the flood of a packet that was just pushed is over at the latest; None: nobody can say.
 
-    def drain(self) -> list[Packet]:
-        """Give everything up: it goes another way."""
-        self._next_ns = None
-        return self._queue.drain()
+        What comes later does not count: it finds room of its own, or waits behind.
+        """
+        rank = self._rank(packet)
+        waiting = self._queue.waiting(rank)
+        if not waiting or waiting[-1] is not packet:
+            return None
+        end_ns, left = None, 0
+        turns = self._upcoming(max(now_ns + self._lead_ns, self._free_ns))
+        for ahead in waiting:
+            if end_ns is None or len(ahead.frame) > left:
+                following = next(turns, None)
+                if following is None:
+                    return None
+                turn, end_ns = following
+                left = self._room(rank, turn)
+            left -= len(ahead.frame)
+        return end_ns
 
-    def next_wake_ns(self) -> int | None:
-        return None if self._next_ns is None else self._next_ns - self._lead_ns
+    def _room(self, rank: int, turn: OwnTurn) -> int:
+        """The bytes of a turn that a class has for itself."""
+        if rank < PRIORITY_BULK:
+            return self._reserved.get(rank, 0)
+        return turn.frame_bytes - sum(self._reserved.values())
 
-    def due(self, *, now_ns: int) -> list[tuple[list[Packet], int]]:
-        """Packets to announce now, those of one frame together, with its instant."""
-        released = []
-        while self._next_ns is not None and self._next_ns - self._lead_ns <= now_ns and len(self._queue):
-            first = self._queue.pop()
-            rest = self._queue.pop_fitting(self._next_bytes - len(first.frame))
-            released.append(([first, *rest], self._next_ns))
-            self._free_ns = self._next_ns + 1
-            self._arm(now_ns)
-        if not len(self._queue):
-            self._next_ns = None
-        return released
+    def _rank(self, packet: Packet) -> int:
+        """Where a packet waits: what has no room of its own in a turn waits like bulk, and overtakes none of it.
 
-    def _arm(self, now_ns: int) -> None:
-        earliest_ns = max(now_ns + self._lead_ns, self._free_ns)
-        self._next_ns = self._start(earliest_ns) if len(self._queue) else None
+        Only a leader's announcements go before everything; a leader promises no bound.
+        """
+        header = packet.header
+        if header.kind == Kind.SCHEDULE and header.origin == self._node:
+            return PRIORITY_CONTROL
+        fits = len(packet.frame) <= self._reserved.get(header.priority, 0)
+        return header.priority if fits else PRIORITY_BULK
 
-    def _start(self, earliest_ns: int) -> int | None:
-        """The first of our turns from an instant on, under whichever plan is in force then."""
-        for index, (valid_ns, turns, offsets, size) in enumerate(self._plans):
+    def _fill(self, size: int) -> list[Packet]:
+        queue = self._queue
+        taken = queue.take(size - sum(self._reserved.values()), rank=PRIORITY_CONTROL)
+        announces = bool(taken)
+        for rank, room in self._reserved.items():
+            taken += queue.take(room, rank=rank)
+        if not announces:
+            taken += queue.take(size - _bytes(taken), rank=PRIORITY_BULK)
+        taken += queue.pop_fitting(size - _bytes(taken))
+        return taken or [queue.pop()]
+
+    def _turn(self, earliest_ns: int) -> OwnTurn | None:
+        following = next(self._upcoming(earliest_ns), None)
+        return None if following is None else following[0]
+
+    def _upcoming(self, earliest_ns: int) -> Iterator[tuple[OwnTurn, int]]:
+        """Our turns from an instant on, each with the instant at which its flood is over; endless while there are any.
+
+        Each is one of the timetable that is in force then.
+        """
+        for index, (valid_ns, turns, offsets, size, span) in enumerate(self._plans):
             if not offsets:
                 continue
-            start_ns = turns.next_start_ns(offsets, not_before_ns=max(earliest_ns, valid_ns))
-            following = self._plans[index + 1][0] if index + 1 < len(self._plans) else None
-            if following is None or start_ns < following:
-                self._next_bytes = size
-                return start_ns
-        return None
+            until_ns = self._plans[index + 1].valid_ns if index + 1 < len(self._plans) else None
+            at_ns = max(earliest_ns, valid_ns)
+            while True:
+                start_ns = turns.next_start_ns(offsets, not_before_ns=at_ns)
+                offset = turns.turn_at(start_ns)
+                assert offset is not None, "our turns are turns"
+                end_ns = start_ns + turns.flood_ns(offset, span=span)
+                if until_ns is not None and end_ns > until_ns:
+                    break
+                yield OwnTurn(start_ns, size), end_ns
+                at_ns = start_ns + 1
+
+
+def _bytes(packets: Sequence[Packet]) -> int:
+    return sum(len(packet.frame) for packet in packets)

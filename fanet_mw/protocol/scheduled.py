@@ -13,23 +13,30 @@ from typing import Final
 from fanet_mw.errors import DropReason
 from fanet_mw.messages import Reception
 from fanet_mw.places import Places, rounded
-from fanet_mw.protocol.admission import Admission, Own
+from fanet_mw.protocol.admission import Admission
 from fanet_mw.protocol.arrival import decoded
 from fanet_mw.protocol.clustered import Clustered
 from fanet_mw.protocol.contract import Port
+from fanet_mw.protocol.leader import notice_ns
 from fanet_mw.protocol.lease import Authority
 from fanet_mw.protocol.membership import Version
-from fanet_mw.protocol.root_release import RootRelease
+from fanet_mw.protocol.own_bound import Own
+from fanet_mw.protocol.root_release import Following, RootRelease
 from fanet_mw.protocol.turn_plan import Plan, fit, leader_load
 from fanet_mw.protocol.turns import clocks_fit, receipt_ns
 from fanet_mw.protocol.txqueue import Packet, TxQueue, sooner_us
+from fanet_mw.protocol.urgent import reserved
 from fanet_mw.trace import BoundStated
-from fanet_mw.units import MS, US, Enu, NodeId, earliest, seconds_to_ns
-from fanet_mw.wire import PRIORITY_BULK, Kind
+from fanet_mw.units import MS, US, Enu, NodeId, S, earliest, seconds_to_ns
+from fanet_mw.wire import PRIORITY_BULK, PRIORITY_REPORT, PRIORITY_SAFETY, Kind
 from fanet_mw.wire_messages import Schedule
 
 _JITTER: Final = 0.25
 """Of the contention window: the most that a relay waits there."""
+_CLASSES: Final = {PRIORITY_SAFETY: "warning", PRIORITY_REPORT: "report", PRIORITY_BULK: "bulk"}
+_JOINED_NS: Final = 6 * S
+"""After its start a node should be in a schedule by then: joins take 3 s, a join may be lost, and the leader waits a
+moment for more."""
 
 
 class Scheduled(Clustered):
@@ -40,8 +47,11 @@ class Scheduled(Clustered):
         scenario = port.scenario
         self._lifetime_ns = seconds_to_ns(scenario.routing.lifetime_s)
         self._window_random = port.stream("window").random
+        self._reserved = reserved(scenario)
         self._roots = RootRelease(
+            port.node,
             TxQueue(capacity=scenario.routing.queue_frames, sooner_us=sooner_us(scenario.routing)),
+            reserved=self._reserved,
             lead_ns=self._lead_ns,
         )
         self._plans: list[Plan] = []
@@ -49,14 +59,17 @@ class Scheduled(Clustered):
         self._version: Version | None = None
         self._planned: Version | None = None
         self._missed = 0
-        self._steady_ns: int | None = None
-        """Since when the bound of the newest plan holds: no packet from before it is waiting."""
+        self._bounds_ns: list[Mapping[int, int]] = []
+        """Of each plan, the bound of each class (by priority) of our own packets; a class that is missing has none."""
         self._interval_ns = seconds_to_ns(scenario.traffic.interval_s)
         self._admission = (
             None
             if scenario.traffic.deadline_s is None or (port.node == scenario.leader and not leader_load(scenario))
             else Admission(
-                port.node, deadline_ns=seconds_to_ns(scenario.traffic.deadline_s), interval_ns=self._interval_ns
+                port.node,
+                deadline_ns=seconds_to_ns(scenario.traffic.deadline_s),
+                interval_ns=self._interval_ns,
+                expected_ns=_JOINED_NS + notice_ns(scenario) + scenario.clusters.period_ns,
             )
         )
 
@@ -112,20 +125,24 @@ class Scheduled(Clustered):
             origin_ns=schedule.start_us * US,
             period_ns=schedule.period_us * US,
         )
-        self._steady_ns = None
         if found is None:
-            self._plans = []  # not even one packet of each head fits a superframe; `fanet plan` says so before take-off
+            self._plans, self._bounds_ns = [], []  # not one packet of each head fits; `fanet plan` says so
             self._admit(None, now_ns=now_ns)
         else:
             valid_ns = max(now_ns, schedule.start_us * US)
-            self._plans = [*self._plans[-1:], Plan.of(self._port.node, valid_ns, found)]
-            self._admit(self._own(), now_ns=now_ns)
-        self._roots.follow(
-            [(plan.valid_ns, plan.turns, plan.roots, plan.frame_bytes) for plan in self._plans], now_ns=now_ns
-        )
+            over = self._superseded(now_ns)
+            self._plans = [*self._plans[over:], Plan.of(self._port.node, valid_ns, found)]
+            own = self._own()
+            self._admit(None if self._leader else own, now_ns=now_ns)
+            self._bounds_ns = [*self._bounds_ns[over:], self._class_bounds_ns(own)]
+        self._roots.follow([self._following(plan) for plan in self._plans], now_ns=now_ns)
         stranded = [] if self._plans and self._plans[-1].roots else self._roots.drain()
         for packet in [*stranded, *self._release.drain(), *self._uplink.drain()]:
             self._forward(packet, start_ns=now_ns + self._lead_ns, now_ns=now_ns, tries=0)
+
+    def _superseded(self, now_ns: int) -> int:
+        """How many of the plans, the oldest first, are no longer in force."""
+        return sum(plan.valid_ns <= now_ns for plan in self._plans[1:])
 
     def _plan_at(self, t_ns: int) -> Plan | None:
         for plan in reversed(self._plans):
@@ -140,9 +157,40 @@ class Scheduled(Clustered):
         plan = self._plans[-1] if self._plans else None
         if plan is None or not plan.roots or not plan.whole or plan.table.uncovered[self._port.node]:
             return None
-        if self._leader is not None:
-            return None  # schedules go before our own packets
-        return Own(plan.turns, plan.roots, plan.table.spans[self._port.node], plan.together)
+        return Own(
+            plan.turns,
+            plan.roots,
+            plan.table.spans[self._port.node],
+            plan.together,
+            self._lead_ns + receipt_ns(self._port.scenario),
+        )
+
+    def _following(self, plan: Plan) -> Following:
+        span = plan.table.spans.get(self._port.node, 1)
+        return Following(plan.valid_ns, plan.turns, plan.roots, plan.frame_bytes, span)
+
+    def _class_bounds_ns(self, own: Own | None) -> Mapping[int, int]:
+        """By priority. A packet that was accepted before another timetable was heard of must be through before that
+        comes into force: bounds longer than the notice that a leader gives are none. Nor is there one for repairs.
+        """
+        scenario = self._port.scenario
+        if own is None or scenario.clusters.repair_s:
+            return {}
+        bulk_ns: int | None = own.burst_ns(per_turn=own.together)
+        if scenario.traffic.arrivals == "cbr":
+            interval_ns = self._admission.interval_ns if self._admission else self._interval_ns
+            bulk_ns = own.worst_ns(interval_ns=interval_ns)
+        found = dict.fromkeys(self._reserved, own.burst_ns(per_turn=1))
+        if bulk_ns is not None:
+            found[PRIORITY_BULK] = bulk_ns
+        longest_ns = notice_ns(scenario) - self._learning_ns(self._plans[-1])
+        return {priority: bound_ns for priority, bound_ns in sorted(found.items()) if bound_ns <= longest_ns}
+
+    def _learning_ns(self, plan: Plan) -> int:
+        """The longest time from a leader's decision until everyone has its schedule: a superframe, and a flood."""
+        spans, turns = plan.table.spans, plan.turns
+        flood_ns = max(turns.flood_ns(turn.offset, span=spans[turn.root]) for turn in plan.table.roots())
+        return self._lead_ns + turns.period_ns + flood_ns + receipt_ns(self._port.scenario)
 
     def _admit(self, own: Own | None, *, now_ns: int) -> None:
         """The timetable has changed, or there is none for the swarm as it is now."""
@@ -156,8 +204,22 @@ class Scheduled(Clustered):
             self._port.drop(DropReason.ADMISSION, packet, now_ns=now_ns)
             return
         super().originate(packet, due_ns=due_ns, now_ns=now_ns)
-        bound_ns = self.bound_ns() if packet.header.priority == PRIORITY_BULK else None
-        if bound_ns is not None:
+        self._promise(packet, now_ns)
+
+    def _promise(self, packet: Packet, now_ns: int) -> None:
+        """State the bound of a packet that was just accepted, if it will be kept whatever comes later."""
+        priority = packet.header.priority
+        bounds = [bounds_ns.get(priority) for bounds_ns in self._bounds_ns[self._superseded(now_ns) :]]
+        known = [bound_ns for bound_ns in bounds if bound_ns is not None]
+        if not known or len(known) < len(bounds) or not self._in_step():
+            return
+        if self._leader is not None and priority == PRIORITY_BULK:
+            return  # schedules go before it
+        bound_ns = max(known)
+        through_ns = self._roots.through_ns(packet, now_ns=now_ns)
+        if through_ns is not None and through_ns + receipt_ns(self._port.scenario) <= (
+            packet.header.origin_us * US + bound_ns
+        ):
             self._port.record(BoundStated(now_ns, self._port.node, packet.header.seq, bound_ns))
 
     # --- letting out ----------------------------------------------------------------------------------------------
@@ -169,15 +231,10 @@ class Scheduled(Clustered):
             super()._forward(packet, start_ns=self._contending_ns(start_ns), now_ns=now_ns, tries=tries)
 
     def _let_out(self, packet: Packet, *, now_ns: int) -> None:
-        if len(packet.frame) > self._plans[-1].frame_bytes:
+        room = self._plans[-1].frame_bytes - sum(self._reserved.values())
+        if len(packet.frame) > (room if packet.header.kind == Kind.DATA else self._plans[-1].frame_bytes):
             self._port.drop(DropReason.TOO_LARGE, packet, now_ns=now_ns)
             return
-        if packet.header.origin != self._port.node or packet.header.kind != Kind.DATA:
-            self._steady_ns = None  # a neighbor's that has no turns yet, or control: the bound is for our data alone
-        elif (
-            self._steady_ns is None and not len(self._roots) and now_ns >= self._plans[-1].valid_ns and self._in_step()
-        ):
-            self._steady_ns = packet.header.origin_us * US
         evicted = self._roots.push(packet, now_ns=now_ns)
         if evicted is not None:
             self._port.drop(DropReason.QUEUE_FULL, evicted, now_ns=now_ns)
@@ -189,10 +246,14 @@ class Scheduled(Clustered):
             super()._enqueue(packet, now_ns=now_ns)
 
     def _flood_control(self, kind: Kind, inner: bytes, *, now_ns: int, urgent: bool = False) -> Packet:
-        if (kind is Kind.JOIN and not urgent) or not self._plans or not self._plans[-1].roots:
-            # Our turns are for what the bound is about; a join may contend.
+        plan = self._plan_at(now_ns + self._lead_ns)
+        if (kind is Kind.JOIN and not urgent) or plan is None or not plan.roots:
+            # Our turns are for what the bound is about; a join may contend. An announcement does not wait for turns
+            # that are still to come into force.
             return super()._flood_control(kind, inner, now_ns=now_ns)
         packet = self._floods.control(kind, inner, now_ns=now_ns)
+        for stale in self._roots.outdated(before_us=packet.header.origin_us):
+            self._port.drop(DropReason.EXPIRED, stale, now_ns=now_ns)
         self._let_out(packet, now_ns=now_ns)
         return packet
 
@@ -223,6 +284,7 @@ class Scheduled(Clustered):
         start_ns = plan.turns.start_ns(own, frame_start_ns=frame_ns)
         if start_ns < now_ns:  # a reception that came late has used up some of the lead, or all of it
             self._missed += 1
+            self._port.drop(DropReason.MISSED_TURN, packet, now_ns=now_ns)
             return
         self._floods.relay(packet, start_ns=start_ns)
 
@@ -262,13 +324,10 @@ class Scheduled(Clustered):
         return super().waiting() + len(self._roots)
 
     def bound_ns(self) -> int | None:
-        """The longest that a packet of our own may take to everyone, from generation; None: no bound."""
-        own = self._own()
-        if own is None or self._steady_ns is None or not self._in_step():
+        """The bound of our own bulk, from application to application, under the newest timetable; None: no bound."""
+        if not self._bounds_ns or self._leader is not None or not self._in_step():
             return None
-        interval_ns = self._admission.interval_ns if self._admission else self._interval_ns
-        worst_ns = own.worst_ns(interval_ns=interval_ns)
-        return None if worst_ns is None else self._lead_ns + worst_ns + receipt_ns(self._port.scenario)
+        return self._bounds_ns[-1].get(PRIORITY_BULK)
 
     def _in_step(self) -> bool:
         """Whether the turns' slack holds what is known of the swarm's clocks."""
@@ -280,6 +339,6 @@ class Scheduled(Clustered):
             **super().report(),
             "missed_turns": self._missed,
             "bound_ms": None if bound_ns is None else bound_ns / MS,
-            "bound_from_ms": None if self._steady_ns is None else self._steady_ns / MS,
+            "bounds_ms": {_CLASSES[p]: ns / MS for p, ns in self._bounds_ns[-1].items()} if self._bounds_ns else {},
             "planned": bool(self._plans),
         }

@@ -18,6 +18,7 @@ from fanet_mw.places import CAPACITY as PLACES_CAPACITY
 from fanet_mw.protocol.packing import Effort, Geometry
 from fanet_mw.protocol.timetable import Timetable, timetable
 from fanet_mw.protocol.turns import Turns, turn_ns
+from fanet_mw.protocol.urgent import reserved
 from fanet_mw.scenario import Scenario
 from fanet_mw.units import MS, Enu, NodeId, seconds_to_ns
 from fanet_mw.wire import HEADER_BYTES, OVERHEAD, PLACES, SCHEDULE
@@ -100,8 +101,9 @@ class _Wish(NamedTuple):
 
 
 def largest_frame(scenario: Scenario, *, together: int = 1) -> int:
-    """The largest frame a turn must hold: the application's, or a schedule part with its places."""
-    return max(together * scenario.traffic.payload_bytes, schedule_bytes(scenario))
+    """The largest frame of a turn: packets of bulk and what is reserved, or a schedule part with its places."""
+    longest = max(together * scenario.traffic.payload_bytes, schedule_bytes(scenario))
+    return longest + sum(reserved(scenario).values())
 
 
 def schedule_bytes(scenario: Scenario) -> int:
@@ -188,8 +190,9 @@ def least_interval_ns(scenario: Scenario, places: Places, head_of: Mapping[NodeI
 
 
 def most_together(scenario: Scenario) -> int:
-    """Packets that a frame holds."""
-    return max(1, scenario.radio.max_frame_bytes // scenario.traffic.payload_bytes)
+    """Packets of bulk that a frame holds besides what is reserved."""
+    room = scenario.radio.max_frame_bytes - sum(reserved(scenario).values())
+    return max(1, room // scenario.traffic.payload_bytes)
 
 
 def _table(

@@ -4,7 +4,7 @@ Order: priority first (0 is the most urgent), then arrival. When full, the least
 Classes may expire sooner than the rest: what warns of a collision is worth nothing after a second.
 """
 
-from bisect import insort
+from bisect import bisect_left, insort
 from collections.abc import Mapping
 from types import MappingProxyType
 from typing import Final, NamedTuple
@@ -45,10 +45,13 @@ class TxQueue:
     def __len__(self) -> int:
         return len(self._entries)
 
-    def push(self, packet: Packet) -> Packet | None:
-        """Add a packet; return the one that had to go for it (perhaps itself), or None."""
+    def push(self, packet: Packet, *, rank: int | None = None) -> Packet | None:
+        """Add a packet; return the one that had to go for it (perhaps itself), or None.
+
+        `rank` is the priority at which it waits here, by default its own.
+        """
         self._order += 1
-        insort(self._entries, (packet.header.priority, self._order, packet))
+        insort(self._entries, (packet.header.priority if rank is None else rank, self._order, packet))
         return self._entries.pop()[2] if len(self._entries) > self._capacity else None
 
     def pop(self) -> Packet:
@@ -63,6 +66,32 @@ class TxQueue:
             taken.append(self.pop())
             size -= len(taken[-1].frame)
         return taken
+
+    def waiting(self, rank: int) -> list[Packet]:
+        """The packets that wait at one priority, in order."""
+        return [packet for _, _, packet in self._of(rank)]
+
+    def take(self, size: int, *, rank: int) -> list[Packet]:
+        """Take packets of one priority, in order, as long as they fit into so many bytes together."""
+        taken: list[Packet] = []
+        begin = bisect_left(self._entries, (rank,))
+        for _, _, packet in self._of(rank):
+            if len(packet.frame) > size:
+                break
+            size -= len(packet.frame)
+            taken.append(packet)
+        del self._entries[begin : begin + len(taken)]
+        return taken
+
+    def take_older(self, *, before_us: int, rank: int) -> list[Packet]:
+        """Take out the packets of one priority that were generated before an instant [swarm us]."""
+        older = [entry for entry in self._of(rank) if entry[2].header.origin_us < before_us]
+        for entry in older:
+            self._entries.remove(entry)
+        return [entry[2] for entry in older]
+
+    def _of(self, rank: int) -> list[tuple[int, int, Packet]]:
+        return self._entries[bisect_left(self._entries, (rank,)) : bisect_left(self._entries, (rank + 1,))]
 
     def expire(self, *, before_us: int) -> list[Packet]:
         """Take out every packet generated before an instant [swarm us], or that much later if its class is sooner."""

@@ -6,6 +6,8 @@ from typing import Any
 import pytest
 
 from fanet_mw.protocol.scheduled import Scheduled
+from fanet_mw.protocol.txqueue import Packet
+from fanet_mw.trace import BoundStated
 from sim import catalog
 from sim.results import finish
 from sim.run import simulate
@@ -16,13 +18,15 @@ TIMES = ["duration_s=16", "warmup_s=10", "clusters.flooding_period_s=0.2"]
 
 def run(monkeypatch: pytest.MonkeyPatch, promise: Callable[[int], int]) -> dict[str, Any]:
     """`promise`: what a node says instead of its bound."""
-    honest = Scheduled.bound_ns
+    honest = Scheduled._promise
 
-    def bound_ns(self: Scheduled) -> int | None:
-        found = honest(self)
-        return None if found is None else promise(found)
+    def too_little(self: Scheduled, packet: Packet, now_ns: int) -> None:
+        honest(self, packet, now_ns)
+        records = self._port.records
+        if isinstance(records[-1], BoundStated):
+            records[-1] = records[-1]._replace(bound_ns=promise(records[-1].bound_ns))
 
-    monkeypatch.setattr(Scheduled, "bound_ns", bound_ns)
+    monkeypatch.setattr(Scheduled, "_promise", too_little)
     return finish(simulate(catalog.find("clusters", [*LINE, *TIMES])), out=None)
 
 

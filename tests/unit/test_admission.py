@@ -3,12 +3,14 @@
 from hypothesis import given
 from hypothesis import strategies as st
 
-from fanet_mw.protocol.admission import EXPECTED_NS, Admission, Own, least_interval_ns
+from fanet_mw.protocol.admission import Admission, least_interval_ns
+from fanet_mw.protocol.own_bound import Own
 from fanet_mw.protocol.turns import Turns
 from fanet_mw.trace import DeadlineLost, DeadlineMet
 from fanet_mw.units import MS, NodeId, S
 
 ME = NodeId(7)
+EXPECTED_NS = 8 * S
 
 
 @st.composite
@@ -32,7 +34,7 @@ def test_the_least_interval_meets_the_deadline_and_nothing_shorter_does(own: Own
 
 def test_packets_that_come_too_soon_are_refused_and_do_not_count() -> None:
     own = Own(Turns(0, 500 * MS, 40 * MS, 2 * MS, 230), (0,), 10)
-    admission = Admission(ME, deadline_ns=600 * MS, interval_ns=1 * S)
+    admission = Admission(ME, deadline_ns=600 * MS, interval_ns=1 * S, expected_ns=EXPECTED_NS)
     assert admission.admits(0), "until a timetable is in force everyone may send"
     assert admission.follow(own, now_ns=0) == DeadlineMet(0, ME, 520 * MS, 600 * MS, 1 * S)
     born = range(1000 * MS, 3001 * MS, 100 * MS)
@@ -51,7 +53,7 @@ def test_packets_that_each_come_a_little_too_soon_do_not_add_up() -> None:
 
 def test_a_deadline_is_lost_and_met_again_with_the_timetable_and_said_once_each() -> None:
     near, far = (Own(Turns(0, 500 * MS, 40 * MS, 2 * MS, 230), (0,), span) for span in (10, 60))
-    admission = Admission(ME, deadline_ns=600 * MS, interval_ns=1 * S)
+    admission = Admission(ME, deadline_ns=600 * MS, interval_ns=1 * S, expected_ns=EXPECTED_NS)
     said = [admission.follow(own, now_ns=t) for t, own in enumerate((near, near, far, far, None, near))]
     assert [type(record) for record in said if record] == [DeadlineMet, DeadlineLost, DeadlineMet]
     assert [record.t_ns for record in said if record] == [0, 2, 5]
@@ -59,14 +61,14 @@ def test_a_deadline_is_lost_and_met_again_with_the_timetable_and_said_once_each(
 
 
 def test_where_no_rate_meets_the_deadline_what_the_turns_carry_is_let_in() -> None:
-    admission = Admission(ME, deadline_ns=100 * MS, interval_ns=1 * S)
+    admission = Admission(ME, deadline_ns=100 * MS, interval_ns=1 * S, expected_ns=EXPECTED_NS)
     lost = admission.follow(Own(Turns(0, 500 * MS, 40 * MS, 2 * MS, 230), (0, 100), 10), now_ns=0)
     assert isinstance(lost, DeadlineLost)
     assert [t for t in range(0, 1001 * MS, 50 * MS) if admission.admits(t)] == [0, 250 * MS, 500 * MS, 750 * MS, S]
 
 
 def test_before_there_should_be_a_bound_its_absence_is_not_said_and_then_once() -> None:
-    admission = Admission(ME, deadline_ns=600 * MS, interval_ns=1 * S)
+    admission = Admission(ME, deadline_ns=600 * MS, interval_ns=1 * S, expected_ns=EXPECTED_NS)
     admission.start(2 * S)
     due_ns = 2 * S + EXPECTED_NS
     assert admission.follow(None, now_ns=4 * S) is None
@@ -81,7 +83,7 @@ def test_before_there_should_be_a_bound_its_absence_is_not_said_and_then_once() 
 
 
 def test_who_had_a_bound_says_at_once_that_it_is_gone() -> None:
-    admission = Admission(ME, deadline_ns=600 * MS, interval_ns=1 * S)
+    admission = Admission(ME, deadline_ns=600 * MS, interval_ns=1 * S, expected_ns=EXPECTED_NS)
     admission.start(0)
     own = Own(Turns(0, 500 * MS, 40 * MS, 2 * MS, 230), (0,), 10)
     assert isinstance(admission.follow(own, now_ns=4 * S), DeadlineMet)

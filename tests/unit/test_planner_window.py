@@ -17,12 +17,6 @@ def test_those_within_two_hops_count_with_what_each_says_in_a_superframe() -> No
     assert hellos_ns(scenario, LINE) == pytest.approx(5 * 2 * (192 + 147 + 50 + 70) * 1000, rel=0.01)
 
 
-def test_without_hellos_the_window_is_empty() -> None:
-    scenario = catalog.find("clusters", ["routing.hello_interval_s=0"])
-    assert hellos_ns(scenario, LINE) == 0
-    assert not list(too_short(scenario, LINE))
-
-
 @pytest.mark.parametrize(("hello_s", "fits"), [(1.0, False), (2.0, True)])
 def test_a_window_that_is_too_short_is_told_with_what_it_needs(hello_s: float, *, fits: bool) -> None:
     keys = ["clusters.flooding_period_s=4", "clusters.contention_ms=20", "radio.cw_min=1"]

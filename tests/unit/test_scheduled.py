@@ -98,6 +98,7 @@ def test_a_turn_that_has_begun_is_missed_counted_and_not_relayed_late(
     assert len(node.deliveries) == 1, "the application has it whether or not it is relayed"
     assert relays(node) == [1056.0] * is_relayed
     assert node.report()["missed_turns"] == 1 - is_relayed
+    assert node.dropped[DropReason.MISSED_TURN] == 1 - is_relayed, "it ends here, with its reason"
 
 
 def test_a_hop_limit_holds_in_turns(node: Node) -> None:

@@ -6,16 +6,13 @@ least interval: neither can be planned.
 """
 
 from collections.abc import Sequence
-from typing import Final, NamedTuple
+from typing import NamedTuple
 
 from fanet_mw import wire
 from fanet_mw.protocol.delay import Bounded, Outcome, Refused
+from fanet_mw.protocol.urgent import REPORT_BYTES, WARNING_BYTES
 from fanet_mw.scenario import Scenario
 from fanet_mw.units import NodeId, seconds_to_ns
-
-_WARNING_BYTES: Final = wire.HEADER_BYTES + 19 + wire.OVERHEAD
-"""COLLISION has 19 bytes (common.xml)."""
-_REPORT_BYTES: Final = wire.HEADER_BYTES + wire.SURVIVOR.layout.size + wire.OVERHEAD
 
 
 class TrafficClass(NamedTuple):
@@ -51,10 +48,10 @@ def demands(scenario: Scenario, sources: Sequence[NodeId] | None = None) -> list
     found = []
     if scenario.mission.collision_horizon_s:
         interval_ns = seconds_to_ns(scenario.mission.collision_repeat_s)
-        found.append(TrafficClass("warning", _WARNING_BYTES, interval_ns, _all(scenario), wire.PRIORITY_SAFETY))
+        found.append(TrafficClass("warning", WARNING_BYTES, interval_ns, _all(scenario), wire.PRIORITY_SAFETY))
     if scenario.mission.survivors:
         interval_ns = seconds_to_ns(scenario.mission.report_interval_s)
-        found.append(TrafficClass("report", _REPORT_BYTES, interval_ns, _all(scenario), wire.PRIORITY_REPORT))
+        found.append(TrafficClass("report", REPORT_BYTES, interval_ns, _all(scenario), wire.PRIORITY_REPORT))
     traffic = scenario.traffic
     if traffic.arrivals in ("saturated", "poisson"):
         return Refused(f'traffic.arrivals = "{traffic.arrivals}" has no least interval, so nothing bounds its delay')

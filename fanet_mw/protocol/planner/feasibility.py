@@ -13,6 +13,7 @@ and a flood reaches everyone.
 from collections.abc import Mapping, Sequence
 from typing import Final, NamedTuple
 
+from fanet_mw import wire
 from fanet_mw.protocol.claimed import geometry, turn_bytes
 from fanet_mw.protocol.clustering import Cluster, balanced
 from fanet_mw.protocol.delay import Bounded, Outcome, Refused, paper
@@ -229,7 +230,9 @@ def _shares(site: Site, head: NodeId, load: Sequence[int], classes: Sequence[Tra
     if site.timetable:
         turn_ns = superframe(site.scenario).turn_ns
         turn = FloodCost(turn_ns, turn_ns, 1, proven=True)
-        return [Share(n, c.interval_ns, turn) for n, c in zip(load, classes, strict=True)]
+        return [
+            Share(n, c.interval_ns, turn, c.priority < wire.PRIORITY_BULK) for n, c in zip(load, classes, strict=True)
+        ]
     return [Share(n, c.interval_ns, site.flood(head, c.payload_bytes)) for n, c in zip(load, classes, strict=True)]
 
 

@@ -33,6 +33,8 @@ class Share(NamedTuple):
     sources: int
     interval_ns: int
     flood: FloodCost
+    urgent: bool = False
+    """More urgent than bulk: under a timetable it has room of its own in each turn."""
 
 
 class ClusterPlan(NamedTuple):

@@ -5,7 +5,6 @@ whatever other floods run through the swarm meanwhile.
 """
 
 from collections.abc import Mapping, Sequence
-from itertools import chain
 from typing import Final, NamedTuple
 
 from fanet_mw.protocol.delay import (
@@ -19,6 +18,7 @@ from fanet_mw.protocol.delay import (
     delay_any_order,
     delay_fifo,
 )
+from fanet_mw.protocol.own_bound import Own
 from fanet_mw.protocol.packing import Effort
 from fanet_mw.protocol.planner.flood import FloodCost
 from fanet_mw.protocol.planner.head import ClusterPlan, Share
@@ -79,70 +79,99 @@ def table_for(
 def judge(
     found: Fitted, candidate: Candidate, *, lead_ns: int, receipt_ns: int, jitter_ns: int, control: int = 0
 ) -> ClusterPlan:
-    """One root: its queue before its turns, then the span of the flood, then up to `receipt_ns` until applications
-    have it. `control`: more urgent packets per period.
+    """One root: its queue before its turns, the span of the flood, and up to `receipt_ns` until applications have it.
 
-    A turn that lets out k packets counts as k parts of it, one packet each. A packet must be announced before the whole
-    turn, which counts as a longer lead; and all of them are through when the turn is.
+    `control`: announcements per period, which go before everything.
     """
-    table, turns, together = found.table, found.turns, found.together
-    part_ns = turns.turn_ns // together
-    starts_ns = sorted(
-        turns.start_ns(turn.offset, frame_start_ns=0) for turn in table.roots() if turn.node == candidate.head
-    )
-    parts_ns = tuple(start_ns + part * part_ns for start_ns in starts_ns for part in range(together))
-    relays = sum(1 for turn in table.turns if turn.root == candidate.head and turn.instance == 0)
+    table, turns = found.table, found.turns
+    offsets = tuple(sorted(turn.offset for turn in table.roots() if turn.node == candidate.head))
     span = table.spans.get(candidate.head, 1)
-    offsets = [turn.offset for turn in table.roots() if turn.node == candidate.head]
-    duration_ns = max((turns.flood_ns(offset, span=span) for offset in offsets), default=turns.turn_ns)
-    server = TurnServer(part_ns, turns.period_ns, parts_ns, lead_ns + turns.turn_ns - part_ns)
-    delays, waiting = _queue(candidate.shares, server, duration_ns - part_ns + receipt_ns, jitter_ns, control)
-    if not jitter_ns and not control and sum(s.sources for s in candidate.shares) == 1:
-        delays = [_alone(s, turns, sorted(offsets), span, together, lead_ns + receipt_ns) for s in candidate.shares]
+    root = _Root(Own(turns, offsets, span, found.together, lead_ns + receipt_ns), lead_ns, jitter_ns, control)
+    relays = sum(1 for turn in table.turns if turn.root == candidate.head and turn.instance == 0)
     packets = sum(s.sources * turns.period_ns / s.interval_ns for s in candidate.shares)
     packets += control if packets else 0
     return ClusterPlan(
         head=candidate.head,
         members=candidate.members,
         hops=candidate.hops,
-        slot_ns=len(starts_ns) * turns.turn_ns,
-        usable_ns=len(starts_ns) * turns.turn_ns,
-        work_ns=round(packets * part_ns),
+        slot_ns=len(offsets) * turns.turn_ns,
+        usable_ns=len(offsets) * turns.turn_ns,
+        work_ns=round(packets * (turns.turn_ns // found.together)),
         packets=packets,
-        flood=FloodCost(duration_ns, turns.turn_ns, relays, proven=True),
-        delays=tuple(delays),
-        backlog=waiting,
+        flood=FloodCost(root.flood_ns, turns.turn_ns, relays, proven=True),
+        delays=tuple(root.delay(share) for share in candidate.shares),
+        backlog=root.backlog(candidate.shares),
     )
 
 
-def _alone(share: Share, turns: Turns, offsets: Sequence[int], span: int, together: int, around_ns: int) -> Outcome:
-    """What the node itself computes for its only class: the longest wait need not be for the longest flood."""
-    if not share.sources:
-        return Bounded(0)
-    worst_ns = turns.worst_ns(offsets, span=span, interval_ns=share.interval_ns, together=together)
-    if worst_ns is None:
-        return Refused(f"{len(offsets) * together} packets are let out per superframe, more come")
-    return Bounded(worst_ns + around_ns)
+class _Root(NamedTuple):
+    """One root of a timetable, and what is known of its arrivals."""
 
+    own: Own
+    lead_ns: int
+    jitter_ns: int
+    """How late a packet may come to the root."""
+    control: int
 
-def _queue(
-    shares: Sequence[Share], server: TurnServer, rest_ns: int, jitter_ns: int, control: int
-) -> tuple[list[Outcome], int | None]:
-    """Per class, most urgent first: the wait for a turn, the turn, and the rest of the flood; most packets waiting."""
-    flows = [[Periodic(s.interval_ns, jitter_ns)] * s.sources for s in shares]
-    if not any(flows):
-        return [Bounded(0) for _ in shares], None
-    urgent = [Periodic(server.period_ns, 0)] * control
-    everything = Total((*urgent, *chain.from_iterable(flows)))
-    server.check()
-    alone = not urgent and sum(1 for row in flows if row) == 1
-    delays: list[Outcome] = []
-    for index, row in enumerate(flows):
-        if not row:
-            delays.append(Bounded(0))
-            continue
-        before = Total((*urgent, *chain.from_iterable(flows[:index]), *row[1:]))
-        queue = delay_fifo(everything, server) if alone else delay_any_order(row[0], before, server)
-        delays.append(queue if isinstance(queue, Refused) else Bounded(queue.delay_ns + rest_ns))
-    waiting = backlog(everything, server)
-    return delays, None if isinstance(waiting, Refused) else waiting
+    @property
+    def flood_ns(self) -> int:
+        turns = self.own.turns
+        longest = (turns.flood_ns(offset, span=self.own.span) for offset in self.own.roots)
+        return max(longest, default=turns.turn_ns)
+
+    def delay(self, share: Share) -> Outcome:
+        """A class has room of its own in each turn, so only its own packets make it wait, and bulk for announcements.
+
+        The only source of a class knows more: what it states in flight.
+        """
+        if not share.sources:
+            return Bounded(0)
+        if share.sources > 1 or self.jitter_ns or (self.control and not share.urgent):
+            return self._queued(share)
+        per_turn = self._per_turn(share)
+        if len(self.own.roots) * per_turn * share.interval_ns < self.own.turns.period_ns:
+            return Refused(f"{len(self.own.roots) * per_turn} packets are let out per superframe, more come")
+        if share.urgent:
+            return Bounded(self.own.burst_ns(per_turn=per_turn))
+        worst_ns = self.own.worst_ns(interval_ns=share.interval_ns)
+        assert worst_ns is not None, "as many are let out as come"
+        return Bounded(worst_ns)
+
+    def _queued(self, share: Share) -> Outcome:
+        server = self._server(self._per_turn(share))
+        server.check()
+        flow = Periodic(share.interval_ns, self.jitter_ns)
+        others = [flow] * (share.sources - 1)
+        before = [] if share.urgent else self._announcements(self._per_turn(share))
+        alone = delay_fifo(Total((flow, *others)), server)
+        queue = delay_any_order(flow, Total((*before, *others)), server) if before else alone
+        if isinstance(queue, Refused):
+            return queue
+        return Bounded(queue.delay_ns + self.flood_ns - server.airtime_ns + self.own.around_ns - self.lead_ns)
+
+    def backlog(self, shares: Sequence[Share]) -> int | None:
+        """The most packets that wait at once, all classes together."""
+        flows = [Periodic(s.interval_ns, self.jitter_ns) for s in shares for _ in range(s.sources)]
+        if not flows:
+            return None
+        waiting = backlog(Total((*self._announcements(1), *flows)), self._server(self.own.together))
+        return None if isinstance(waiting, Refused) else waiting
+
+    def _per_turn(self, share: Share) -> int:
+        return 1 if share.urgent else self.own.together
+
+    def _announcements(self, parts: int) -> list[Periodic]:
+        """Each takes a whole turn."""
+        return [Periodic(self.own.turns.period_ns, 0)] * (self.control * parts)
+
+    def _server(self, parts: int) -> TurnServer:
+        """A turn that lets out k packets counts as k parts of it, one packet each.
+
+        A packet must be announced before the whole turn, which counts as a longer lead; and all of them are through
+        when the turn is.
+        """
+        turns = self.own.turns
+        part_ns = turns.turn_ns // parts
+        starts = (turns.start_ns(offset, frame_start_ns=0) for offset in self.own.roots)
+        parts_ns = tuple(start_ns + part * part_ns for start_ns in starts for part in range(parts))
+        return TurnServer(part_ns, turns.period_ns, parts_ns, self.lead_ns + turns.turn_ns - part_ns)

@@ -1,0 +1,22 @@
+"""Packets that are more urgent than bulk: how long the ones we know are, and the room that turns reserve for them."""
+
+from collections.abc import Mapping
+from typing import Final
+
+from fanet_mw import wire
+from fanet_mw.scenario import Scenario
+
+WARNING_BYTES: Final = wire.HEADER_BYTES + 19 + wire.OVERHEAD
+"""MAVLink's COLLISION has 19 bytes (common.xml)."""
+REPORT_BYTES: Final = wire.HEADER_BYTES + wire.SURVIVOR.layout.size + wire.OVERHEAD
+
+
+def reserved(scenario: Scenario) -> Mapping[int, int]:
+    """By priority, the bytes of each turn that bulk must leave free: one packet of each urgent class that there is."""
+    mission = scenario.mission
+    found = {}
+    if mission.collision_horizon_s:
+        found[wire.PRIORITY_SAFETY] = WARNING_BYTES
+    if mission.survivors:
+        found[wire.PRIORITY_REPORT] = REPORT_BYTES
+    return found

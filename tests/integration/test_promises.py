@@ -1,0 +1,59 @@
+"""Bounds are stated only where they hold: per packet, with reports between, for random arrivals, across timetables."""
+
+from typing import Any
+
+import pytest
+
+from sim import catalog
+from sim.results import finish
+from sim.run import simulate
+
+GRID = ["nodes.count=15", "clusters.count=14", "traffic.sources=14", "traffic.interval_s=0.5", "duration_s=30"]
+
+
+def summary_of(*settings: str) -> dict[str, Any]:
+    return finish(simulate(catalog.find("clusters", [*GRID, *settings])), out=None)
+
+
+def test_reports_take_nothing_from_the_bound_of_bulk_and_have_one_of_their_own() -> None:
+    summary = summary_of("mission.survivors=30", "mission.report_interval_s=0.7")
+    bound = summary["bound"]
+    assert bound["violations"] == 0
+    assert bound["classes"]["traffic"]["within_share"] == 1.0
+    assert summary["reports"]["generated"] >= 50
+    assert bound["classes"]["report"]["stated_share"] > 0.5
+    assert bound["classes"]["report"]["within_share"] < 1, "more reports at once than a bound is stated for"
+    assert bound["worst_ms"] > bound["classes"]["traffic"]["worst_ms"]
+
+
+def test_random_arrivals_have_a_bound_as_long_as_few_of_them_wait() -> None:
+    summary = summary_of('traffic.arrivals="poisson"')
+    bound = summary["bound"]
+    assert bound["violations"] == 0
+    assert 0.6 < bound["stated_share"] < 1
+    assert bound["within_share"] == bound["stated_share"], "what has no bound may come in time and is not counted"
+    assert summary["delay_ms"]["max"] > bound["worst_ms"], "there are some that no bound would have held for"
+
+
+def test_no_bound_is_stated_where_lost_packets_are_repaired_later() -> None:
+    summary = summary_of("clusters.repair_s=10")
+    assert summary["bound"] == {}
+    assert summary["pdr"] == 1.0
+
+
+@pytest.mark.parametrize("handover_ms", [0, 20])
+def test_bounds_hold_the_lead_and_the_handover(handover_ms: int) -> None:
+    bound = summary_of("radio.lead_ms=30", f"radio.handover_ms={handover_ms}")["bound"]
+    assert bound["violations"] == 0
+    assert bound["within_share"] == 1.0
+    assert 0.7 < bound["observed_max_ms"] / bound["worst_ms"] <= 1 - 30 / bound["worst_ms"], "a lead is for the receipt"
+
+
+def test_new_timetables_break_no_promise() -> None:
+    """A swarm that moves gets another timetable every few seconds, while packets are promised all the time."""
+    keys = ('mobility.model="random_waypoint"', "mobility.speed_m_s=5", "clusters.reassign_s=2", "duration_s=50")
+    bound = summary_of(*keys)["bound"]
+    assert bound["violations"] == 0
+    assert bound["deliveries"] > 1000
+    assert bound["stated_share"] > 0.5
+    assert bound["within_share"] < 1, "nodes out of reach are no violation, and no success"

@@ -1,0 +1,127 @@
+"""What a root says of a packet when it takes it holds, whatever comes later: of any class, at any time, in any number.
+
+The queue is driven as its host drives it, with random timetables of which one replaces another on the way.
+"""
+
+from typing import NamedTuple
+
+from hypothesis import example, given, settings
+from hypothesis import strategies as st
+
+from fanet_mw.protocol.own_bound import BURST, Own
+from fanet_mw.protocol.root_release import Following, RootRelease
+from fanet_mw.protocol.turns import Turns
+from fanet_mw.protocol.txqueue import Packet, TxQueue
+from fanet_mw.units import MS, NodeId
+from fanet_mw.wire import PRIORITY_BULK, PRIORITY_CONTROL, PRIORITY_REPORT, PRIORITY_SAFETY, Header, Kind
+
+ME = NodeId(7)
+ROOMS = {PRIORITY_SAFETY: 60, PRIORITY_REPORT: 80}
+BULK_BYTES = 200
+SIZES = {PRIORITY_CONTROL: 70, PRIORITY_SAFETY: 60, PRIORITY_REPORT: 80, PRIORITY_BULK: BULK_BYTES}
+
+
+class Case(NamedTuple):
+    """Two timetables, the instant of the change, and (instant, class) of what comes."""
+
+    plans: tuple[Following, Following]
+    lead_ns: int
+    arrivals: list[tuple[int, int]]
+
+
+@st.composite
+def followings(draw: st.DrawFn, valid_ns: int) -> Following:
+    per_frame = draw(st.integers(6, 40))
+    turns = Turns(valid_ns, (40 + 2 * per_frame + draw(st.integers(0, 9))) * MS, 40 * MS, 2 * MS, per_frame)
+    offsets = draw(st.sets(st.integers(0, per_frame - 1), min_size=1, max_size=3))
+    together = draw(st.integers(1, 3))
+    return Following(
+        valid_ns, turns, tuple(sorted(offsets)), together * BULK_BYTES + sum(ROOMS.values()), draw(st.integers(1, 30))
+    )
+
+
+@st.composite
+def cases(draw: st.DrawFn) -> Case:
+    change_ns = draw(st.integers(100, 900)) * MS
+    plans = draw(followings(0)), draw(followings(change_ns))
+    times = draw(st.lists(st.integers(0, 1500).map(lambda t: t * MS), min_size=1, max_size=25))
+    classes = st.sampled_from((PRIORITY_CONTROL, PRIORITY_SAFETY, PRIORITY_REPORT, PRIORITY_BULK))
+    return Case(plans, draw(st.integers(0, 60)) * MS, [(t, draw(classes)) for t in sorted(times)])
+
+
+def packet(seq: int, priority: int, born_ns: int) -> Packet:
+    kind = Kind.JOIN if priority == PRIORITY_CONTROL else Kind.DATA
+    header = Header(born_ns // 1000, seq, ME, 0xFFFF, ME, kind, 32, 0, priority, 0)
+    return Packet(header, header.encode().ljust(SIZES[priority], b"\0"))
+
+
+class Run(NamedTuple):
+    """By sequence number: what was said, and when the flood was over."""
+
+    said_ns: dict[int, int]
+    through_ns: dict[int, int]
+    born_ns: dict[int, int]
+
+
+def drive(case: Case) -> Run:
+    release = RootRelease(ME, TxQueue(capacity=1000), reserved=ROOMS, lead_ns=case.lead_ns)
+    release.follow(case.plans, now_ns=0)
+    run = Run({}, {}, {})
+
+    def let_out(until_ns: int) -> None:
+        while (wake_ns := release.next_wake_ns()) is not None and wake_ns < until_ns:
+            for packets, start_ns in release.due(now_ns=wake_ns):
+                plan = max((p for p in case.plans if p.valid_ns <= start_ns), key=lambda p: p.valid_ns)
+                offset = plan.turns.turn_at(start_ns)
+                assert offset in plan.offsets, "only turns of ours are used"
+                end_ns = start_ns + plan.turns.flood_ns(offset, span=plan.span)
+                assert plan is case.plans[1] or end_ns <= case.plans[1].valid_ns, "no flood outlives its timetable"
+                assert sum(len(p.frame) for p in packets) <= plan.frame_bytes
+                run.through_ns.update({p.header.seq: end_ns for p in packets})
+
+    for seq, (now_ns, priority) in enumerate(case.arrivals):
+        let_out(now_ns)
+        run.born_ns[seq] = now_ns
+        taken = packet(seq, priority, now_ns)
+        assert release.push(taken, now_ns=now_ns) is None
+        said_ns = release.through_ns(taken, now_ns=now_ns)
+        assert said_ns is not None
+        run.said_ns[seq] = said_ns
+    let_out(1 << 60)
+    assert len(release) == 0
+    return run
+
+
+@settings(max_examples=60)
+@given(cases())
+@example(
+    Case(
+        (
+            Following(0, Turns(0, 100 * MS, 40 * MS, 2 * MS, 30), (5,), 340, 3),
+            Following(900 * MS, Turns(900 * MS, 100 * MS, 40 * MS, 2 * MS, 30), (9,), 340, 3),
+        ),
+        0,
+        [(0, PRIORITY_BULK), (0, PRIORITY_REPORT), (1 * MS, PRIORITY_REPORT), (2 * MS, PRIORITY_SAFETY)],
+    )
+)
+def test_no_packet_is_through_later_than_was_said_when_it_was_taken(case: Case) -> None:
+    run = drive(case)
+    assert run.through_ns.keys() == run.said_ns.keys()
+    for seq, said_ns in run.said_ns.items():
+        assert run.through_ns[seq] <= said_ns
+
+
+@settings(max_examples=40)
+@given(cases())
+def test_who_finds_fewer_than_a_burst_of_its_class_waiting_keeps_the_bound_of_a_burst(case: Case) -> None:
+    """One timetable, and at most so many reports within any superframe that fewer than `BURST` wait."""
+    plan = case.plans[0]._replace(span=3)
+    single = case._replace(plans=(plan, plan._replace(valid_ns=1 << 50)), arrivals=[])
+    gap_ns = plan.turns.period_ns
+    reports = [(n * gap_ns // BURST * BURST, PRIORITY_REPORT) for n in range(12)]
+    bulk = [(n * 3 * MS, PRIORITY_BULK) for n in range(50)]
+    run = drive(single._replace(arrivals=sorted(reports + bulk)))
+    bound_ns = Own(plan.turns, plan.offsets, plan.span, 1, case.lead_ns).burst_ns(per_turn=1)
+    classes = [priority for _, priority in sorted(reports + bulk)]
+    delays = [run.through_ns[s] - run.born_ns[s] for s, priority in enumerate(classes) if priority == PRIORITY_REPORT]
+    assert max(delays) <= bound_ns

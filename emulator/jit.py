@@ -10,6 +10,7 @@ Functions that make no arrays, all but those of `entry.py`, are compiled without
 was left a third was calls that handed a dozen arrays on, each in nine parts: so all are inlined.
 """
 
+import contextlib
 import hashlib
 import os
 from collections.abc import Callable
@@ -41,6 +42,16 @@ def cache_folder() -> Path:
     return Path(numba.config.CACHE_DIR or folder / "__pycache__") / f"kernel-{_fingerprint(folder)}"
 
 
+def _as_far_as_the_disk_goes(save: Callable[..., None]) -> Callable[..., None]:
+    """Machine code that a full disk cannot keep is used all the same, and compiled again in the next process."""
+
+    def saved(*arguments: object) -> None:
+        with contextlib.suppress(OSError):
+            save(*arguments)
+
+    return saved
+
+
 def _decorator(*, counted: bool) -> Callable[[F], F]:
     if os.environ.get("FANET_NO_NUMBA"):
         return _identity
@@ -55,9 +66,12 @@ def _decorator(*, counted: bool) -> Callable[[F], F]:
         numba.config.CACHE_DIR = ours  # read when a function is decorated, and by others too: put it back
         try:
             compile_ = numba.njit(cache=True, error_model="numpy", _nrt=counted, forceinline=not counted)
-            return cast("F", compile_(function))
+            dispatcher = compile_(function)
         finally:
             numba.config.CACHE_DIR = everyone
+        cache = dispatcher._cache  # noqa: SLF001  (numba has no option for this)
+        cache.save_overload = _as_far_as_the_disk_goes(cache.save_overload)
+        return cast("F", dispatcher)
 
     return compiled
 

@@ -13,6 +13,8 @@ from fanet_mw.units import Enu
 
 REFERENCE_LOSS_DB: Final = 40.05
 """Free-space loss at 1 m and 2.4 GHz."""
+KEPT_VALUES: Final = 8192
+"""Values of shadowing that are kept, about 1.5 MB: those of the places where UAVs are now."""
 _CELL_M: Final = 25.0
 """Shadowing is one value per survivor and ground cell of this size: what a place hides, it hides every time."""
 
@@ -54,5 +56,7 @@ class PhoneSensor:
             digest = hashlib.sha256(f"{self._seed}/{key}".encode()).digest()
             u, v = (int.from_bytes(digest[i : i + 6], "big") + 1 for i in (0, 6))
             gauss = math.sqrt(-2 * math.log(u / 2**48)) * math.cos(2 * math.pi * v / 2**48)  # Box and Muller, 1958
+            if len(self._shadow) >= KEPT_VALUES:
+                self._shadow.clear()  # each is computed again, to the same value
             value = self._shadow[key] = max(-3.5, min(3.5, gauss)) * self._mission.shadowing_db
         return value

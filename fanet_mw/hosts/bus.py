@@ -19,6 +19,8 @@ from fanet_mw.errors import BusError, ConfigError
 
 JOIN_PATIENCE_S: Final = 2.5
 """How long a router is waited for by default: a person who mistyped an endpoint is told soon."""
+MAX_PUT_BYTES: Final = 16 << 20
+"""A longer put is given up where it first arrives: by default Zenoh would gather up to 1 GiB of one in memory."""
 LOST_AFTER_S: Final = 2.0
 """A router that has been away for this long is taken to be gone. Zenoh reconnects by itself to one that comes back."""
 OnSample = Callable[[str, bytes], None]
@@ -78,6 +80,7 @@ def _config(
         # 45 of them stall two cores for half a second in the middle of a run. Frames are far too small to gain by it.
         "transport/shared_memory/enabled": False,
         # One wake-up of the medium is one put per UAV, all at once: room for such a burst, and time to write it out.
+        "transport/link/rx/max_message_size": MAX_PUT_BYTES,
         "transport/link/tx/queue/size/data": 16,
         "transport/link/tx/queue/congestion_control/drop/wait_before_drop": 5000,
         "connect/endpoints": [connect] if connect else [],

@@ -7,7 +7,7 @@ from pathlib import Path
 from typing import Self
 
 from fanet_mw import topics
-from fanet_mw.hosts.bus import Bus
+from fanet_mw.hosts.bus import MAX_PUT_BYTES, Bus
 from fanet_mw.messages import Clock, ClockState, MavlinkTap, Message, Report, TraceBatch
 from fanet_mw.topics import Topics
 from fanet_mw.trace import Approaching, Delivered, Generated
@@ -89,3 +89,20 @@ def test_nonsense_for_the_launcher_is_counted_and_the_result_is_that_of_the_swar
     assert summary["frames"]["sent"] > 30
     assert summary["pdr"] > 0.5
     assert {record.node for record in outcome.records} <= {0, 1, 2, 3, 4}
+
+
+def test_a_put_longer_than_anyone_means_ends_where_it_arrives() -> None:
+    """Neither the router nor a client gathers it in memory, and the session of whoever put it goes on."""
+    endpoint = free_endpoint()
+    heard: list[tuple[str, int]] = []
+    with Bus.serve(endpoint) as router, Bus.join(endpoint, patience_s=30) as sender, Bus.join(endpoint) as other:
+        router.subscribe("x", lambda _, payload: heard.append(("router", len(payload))))
+        other.subscribe("x", lambda _, payload: heard.append(("client", len(payload))))
+        time.sleep(0.5)
+        for size in (1_000, 5_000_000, MAX_PUT_BYTES + 1, 40_000_000, 2_000):
+            sender.put("x", bytes(size), reliable=True)
+        for _ in range(200):
+            if len(heard) >= 6:
+                break
+            time.sleep(0.05)
+    assert sorted(heard) == [(who, size) for who in ("client", "router") for size in (1_000, 2_000, 5_000_000)]

@@ -75,10 +75,21 @@ def test_items_longer_than_a_batch_are_cut_between_items(tmp_path: Path, monkeyp
     assert (tmp_path / "file").stat().st_size == 900_000
 
 
-def test_a_file_size_limit_of_the_shell_costs_the_long_files_only(tmp_path: Path) -> None:
-    """The kernel refuses the writes here, as it does on a full disk; `ulimit -f` needs no disk of one's own."""
-    shell = f"ulimit -f 16; exec {sys.executable} -m sim.cli simulate quick --duration 20 --out {tmp_path}/out"
-    done = subprocess.run(["bash", "-c", shell], capture_output=True, text=True, timeout=100, check=False)
+_LIMITED = """
+import resource, sys
+from emulator.compile import warm_up
+from sim.cli import main
+warm_up()  # compiled code is kept in files too
+resource.setrlimit(resource.RLIMIT_FSIZE, (16384, resource.RLIM_INFINITY))
+sys.argv = ["fanet", "simulate", "quick", "--duration", "20", "--out", sys.argv[1]]
+main()
+"""
+
+
+def test_a_limit_of_the_size_of_files_costs_the_long_ones_only(tmp_path: Path) -> None:
+    """The operating system refuses the writes here, as it does on a full disk, and no disk of one's own is needed."""
+    command = [sys.executable, "-c", _LIMITED, str(tmp_path / "out")]
+    done = subprocess.run(command, capture_output=True, text=True, timeout=110, check=False)
     assert "Traceback" not in done.stderr
     assert "trace.jsonl" in done.stderr
     assert "File too large" in done.stderr

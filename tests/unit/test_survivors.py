@@ -51,3 +51,14 @@ def test_what_a_place_hides_it_hides_every_time(make_scenario: MakeScenario) -> 
     phones.scan(elsewhere)
     assert phones.scan(here) == first == PhoneSensor(scenario).scan(here)
     assert [dbm for _, dbm in phones.scan(near)] == pytest.approx([dbm for _, dbm in first], abs=0.01)
+
+
+def test_what_is_kept_of_shadowing_is_bounded_and_changes_nothing(
+    make_scenario: MakeScenario, monkeypatch: pytest.MonkeyPatch
+) -> None:
+    scenario, phones = sensor(make_scenario, shadowing_db=8.0, detection_dbm=-200.0)
+    monkeypatch.setattr("sim.survivors.KEPT_VALUES", 20)
+    tour = [np.array([30.0 * i, 5.0, 50.0]) for i in range(-20, 21)]
+    there, back = [phones.scan(at) for at in tour], [phones.scan(at) for at in reversed(tour)]
+    assert there == back[::-1] == [PhoneSensor(scenario).scan(at) for at in tour]
+    assert len(phones._shadow) <= 20

@@ -12,15 +12,21 @@ from collections.abc import Iterator
 from pathlib import Path
 from typing import Final
 
+from fanet_mw.errors import ConfigError
+
 _LENGTH: Final = struct.Struct("<I")
 _BUFFER: Final = 1 << 20
 
 
 class Spool:
-    """Items of bytes that are written during a run and read after it."""
+    """Items of bytes that are written during a run and read after it; raises ConfigError when there can be no file."""
 
     def __init__(self, folder: Path | None = None) -> None:
-        self._file = tempfile.TemporaryFile(dir=folder, buffering=0)  # noqa: SIM115  (closed by `close`)
+        try:
+            self._file = tempfile.TemporaryFile(dir=folder, buffering=0)  # noqa: SIM115  (closed by `close`)
+        except OSError as error:
+            where = folder if folder is not None else "the folder of temporary files (see TMPDIR)"
+            raise ConfigError(f"{where}: no file can be made there: {error.strerror}") from error
         self._write = os.pwrite
         self.size = 0
         """Bytes in the file that belong to whole items."""

@@ -15,6 +15,7 @@ from typing import Any
 import pytest
 
 from fanet_mw import topics
+from fanet_mw.errors import ConfigError
 from fanet_mw.hosts.bus import OnSample
 from fanet_mw.link_stats import COUNTS, LinkStats
 from fanet_mw.messages import MavlinkTap, Message, Report, TraceBatch
@@ -287,6 +288,11 @@ def test_a_full_disk_under_the_spool_ends_the_trace_and_not_the_run(ear: Ear) ->
     assert 10 < len(kept) == 100 - ear.why["trace: disk"]
     assert [record.seq for record in kept if isinstance(record, Generated)] == list(range(len(kept)))
     assert ear.collector.disk_failure() == "no space left for the whole of an item"
+
+
+def test_a_folder_that_takes_no_file_is_one_message(tmp_path: Path) -> None:
+    with pytest.raises(ConfigError, match="none: no file can be made there: No such file or directory"):
+        Spool(tmp_path / "none")
 
 
 def test_items_come_back_from_a_spool_as_they_were_as_often_as_asked() -> None:

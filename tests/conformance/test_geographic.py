@@ -51,17 +51,32 @@ def test_a_packet_goes_greedily_to_a_destination_that_the_location_service_finds
     assert [(sent.node, sent.dst) for sent in found.data(seq, 1)] == [(1, 2), (2, 3), (3, 4), (4, 5)]
 
 
-def test_of_several_nearer_neighbors_the_nearest_is_taken_and_none_that_is_farther(bench: MakeBench) -> None:
+@pytest.mark.parametrize(("nearest", "other"), [(3, 2), (2, 3)])
+def test_of_several_nearer_neighbors_the_nearest_is_taken_and_none_that_is_farther(
+    bench: MakeBench, nearest: int, other: int
+) -> None:
     found = bench(1)
     far = Fix(9, Enu(2000, 0, 50), 0)
     found.advance(1 * S)
-    beacon(found, 2, 300, far._replace(t_us=1))
-    beacon(found, 3, 390)
+    beacon(found, other, 300, far._replace(t_us=1))
+    beacon(found, nearest, 390)
     beacon(found, 4, -100)
-    found.connect(1, 3)
+    found.connect(1, nearest)
     seq = found.send(1, 9)
     found.advance(10 * MS)
-    assert [sent.dst for sent in found.data(seq, 1)] == [3]
+    assert [sent.dst for sent in found.data(seq, 1)] == [nearest]
+
+
+@pytest.mark.parametrize(("age_s", "asks"), [(9, False), (11, True)])
+def test_a_location_that_is_old_is_used_and_asked_for_again(bench: MakeBench, age_s: int, asks: bool) -> None:
+    found = bench(1)
+    found.connect(1, 2)
+    found.advance(20 * S)
+    beacon(found, 2, 390, Fix(9, Enu(2000, 0, 50), (20 - age_s) * S // US))
+    seq = found.send(1, 9)
+    found.advance(200 * MS)
+    assert [sent.dst for sent in found.data(seq, 1)] == [2]
+    assert bool(found.controls(m.QUERY, node=1)) == asks
 
 
 def test_where_nobody_is_nearer_the_packet_is_carried_until_somebody_comes(bench: MakeBench) -> None:

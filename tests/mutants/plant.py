@@ -157,7 +157,7 @@ def plant(mutants: Sequence[Mutant], *, jobs: int) -> int:
         named = sorted({test for mutant in mutants for test in mutant.tests})
         files = {test for test in named if "::" not in test}
         named = [test for test in named if test in files or test.partition("::")[0] not in files]
-        code, said = pytest_in(first, named, f"-n{jobs}", limit_s=ALL_LIMIT_S)
+        code, said = pytest_in(first, named, *([f"-n{jobs}"] if jobs > 1 else ()), limit_s=ALL_LIMIT_S)
         if code != PASSED:
             sys.stderr.write(f"without any bug the tests do not pass:\n{said}\n")
             return 1

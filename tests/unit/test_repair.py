@@ -42,6 +42,7 @@ def test_what_a_neighbor_lacks_is_sent_after_the_assessment() -> None:
     assert sent(made, LATER + 99 * MS) == []
     assert sent(made, LATER + 100 * MS) == [2]
     assert made.next_wake_ns() is None
+    assert made.repaired == 1
 
 
 def test_a_flood_that_may_still_be_under_way_is_not_repaired() -> None:

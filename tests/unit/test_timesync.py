@@ -43,6 +43,16 @@ def test_a_hello_alone_tells_no_time_and_the_next_one_tells_that_of_the_first() 
     assert (sync.reference, sync.hops(4 * S)) == (1, 1)
 
 
+def test_a_pair_holds_half_the_flight_and_its_hop_s_error() -> None:
+    """Up to 20 us of flight: 10 us are taken for granted, 10 us and a stamp are stated as error."""
+    sync = TimeSync(Settings(NodeId(2), False, S, Oscillator(40e-6, 0.0, US), 20 * US, LIMIT_NS))  # noqa: FBT003
+    sync.start(0)
+    hear(sync, 1, 7, 3 * S, None)
+    hear(sync, 1, 8, 4 * S, said(3 * S + 25 * MS, 7, error_ns=5 * US))
+    assert sync.line.swarm_ns(3 * S) == 3 * S + 25 * MS + 10 * US
+    assert sync.line.stated_ns == 5 * US + 10 * US + US
+
+
 def test_however_long_contention_defers_a_hello_the_time_is_exact() -> None:
     """The beacon names when the first hello ended; when the second was made or ended does not matter."""
     found = []

@@ -173,7 +173,8 @@ class Uav(Actor):
             self._autopilot.beacon_frames(now_ns), start_ns=max(self._next_hello_ns, now_ns), now_ns=now_ns
         )
         vary = 1 + _HELLO_JITTER * (2 * self._hello_random() - 1)
-        self._next_hello_ns = max(self._next_hello_ns + int(self._hello_ns * vary), now_ns)
+        step_ns = int(self._hello_ns * vary * self._node.hello_share(now_ns))
+        self._next_hello_ns = max(self._next_hello_ns + step_ns, now_ns)
 
     def _deliver(self, packet: Packet, now_ns: int) -> None:
         """Survivor reports are for the mission, and for whoever inspects us."""

@@ -32,6 +32,9 @@ from fanet_mw.sections import (
 )
 from fanet_mw.units import MAX_NODES, MS, NodeId, seconds_to_ns
 
+_REPAIR_S: Final = 10.0
+"""Of packets that floods over measured links leave out."""
+
 
 def _none_or_interval(hello_s: float) -> float:
     if 0 < hello_s < LEAST_HELLO_S:
@@ -155,6 +158,10 @@ class Clusters(Section):
     for flight and detection."""
     slots: Annotated[int, Field(ge=0, le=254)] = 0
     """`claimed`: slots of a superframe; 0: as many as the neighborhood needs, a power of two."""
+    links: Literal["auto", "places", "measured"] = "auto"
+    """`scheduled`: what the timetable takes for a link: every pair within `link_m` (`places`), or what hellos have
+    shown (`measured`), with frames repeated according to the loss; `auto`: `measured` with shadowing or fading, else
+    `places`."""
     link_m: Length = 0.0
     """`scheduled`: nodes no farther apart are taken to hear each other; 0: `radio.range_m`."""
     interference_m: Length = 0.0
@@ -168,7 +175,8 @@ class Clusters(Section):
     reassign_s: Duration = 10.0
     """The leader makes new clusters for a swarm that has moved at most this often; 0: only when nodes come or go."""
     repair_s: Duration = 0.0
-    """Hellos say what a node holds; neighbors send again what it lacks and is younger than this; 0: no repair."""
+    """Hellos say what a node holds; neighbors send again what it lacks and is younger than this; 0: no repair, but 10 s
+    with measured links."""
 
     @property
     def period_ns(self) -> int:
@@ -292,6 +300,18 @@ class Scenario(Section):
         if problems:
             raise ValueError("; ".join(problems))
         return self
+
+    @property
+    def measures_links(self) -> bool:
+        """Whether timetables are made from measured links (`clusters.links`)."""
+        chosen, lossy = self.clusters.links, self.radio.shadowing_db > 0 or self.radio.fading != "none"
+        wanted = chosen == "measured" or (chosen == "auto" and lossy)
+        return wanted and self.clusters.relay == "scheduled" and self.routing.hello_interval_s > 0
+
+    @property
+    def repair_ns(self) -> int:
+        """For how long packets are repaired; with measured links always, because frames do get lost."""
+        return seconds_to_ns(self.clusters.repair_s or (_REPAIR_S if self.measures_links else 0.0))
 
     @property
     def mac_lifetime_ns(self) -> int:

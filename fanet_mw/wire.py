@@ -56,6 +56,8 @@ class Kind(IntEnum):
     JOIN = 2
     SCHEDULE = 3
     TIME = 4
+    LINKS = 5
+    """The leader's links of an assignment."""
     ROUTING = 8
     """Control of a rival protocol (`fanet_mw.routing.control`)."""
 
@@ -303,7 +305,7 @@ def decode_first(spec: Spec, frame: bytes) -> tuple[Any, ...]:
     return found[0]
 
 
-# Whose codec is in `wire_messages`, `digest`, `places`, `claims` or `routing.control`.
+# Whose codec is in `wire_messages`, `digest`, `places`, `claims`, `links` or `routing.control`.
 BEACON: Final = Spec(53001, 43, struct.Struct("<IHHHHHHHBBB"))
 SCHEDULE: Final = Spec(53002, 88, struct.Struct("<QIIIHHH56H56HBBBB"))
 SURVIVOR: Final = Spec(53003, 240, struct.Struct("<QIffffHB"))
@@ -314,7 +316,8 @@ DIGEST: Final = Spec(53007, 37, struct.Struct("<24I24I24HBBB"))
 PLACES: Final = Spec(53008, 1, struct.Struct("<28h28h28hhhhBBB"))
 CLAIMS: Final = Spec(53009, 249, struct.Struct("<H16H16B16B16B16BBBBBBB"))
 ROUTING: Final = Spec(53010, 255, struct.Struct("<BBBB240B"))
-SPECS: Final = (ROUTE, BEACON, SCHEDULE, SURVIVOR, CHUNK, TIME, JOIN, DIGEST, PLACES, CLAIMS, ROUTING)
+LINKS: Final = Spec(53011, 92, struct.Struct("<IHH36H36H36B36bBBBB"))
+SPECS: Final = (ROUTE, BEACON, SCHEDULE, SURVIVOR, CHUNK, TIME, JOIN, DIGEST, PLACES, CLAIMS, ROUTING, LINKS)
 _OURS: Final = {spec.msgid: spec for spec in SPECS}
 
 # --- application data ---------------------------------------------------------------------------------------------

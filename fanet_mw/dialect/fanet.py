@@ -372,6 +372,7 @@ MAVLINK_MSG_ID_FANET_DIGEST = 53007
 MAVLINK_MSG_ID_FANET_PLACES = 53008
 MAVLINK_MSG_ID_FANET_CLAIMS = 53009
 MAVLINK_MSG_ID_FANET_ROUTING = 53010
+MAVLINK_MSG_ID_FANET_LINKS = 53011
 
 
 class MAVLink_fanet_route_message(MAVLink_message):
@@ -897,6 +898,56 @@ class MAVLink_fanet_routing_message(MAVLink_message):
 setattr(MAVLink_fanet_routing_message, "name", mavlink_msg_deprecated_name_property())
 
 
+class MAVLink_fanet_links_message(MAVLink_message):
+    """
+    Measured links. With a join: whom the sender hears how well. From
+    the leader: the links from which all compute the timetable of an
+    assignment.
+    """
+
+    id = MAVLINK_MSG_ID_FANET_LINKS
+    msgname = "FANET_LINKS"
+    fieldnames = ["term", "node", "epoch", "from_nodes", "to_nodes", "grades", "powers", "part", "parts", "count", "version"]
+    ordered_fieldnames = ["term", "node", "epoch", "from_nodes", "to_nodes", "grades", "powers", "part", "parts", "count", "version"]
+    fieldtypes = ["uint32_t", "uint16_t", "uint16_t", "uint16_t", "uint16_t", "uint8_t", "int8_t", "uint8_t", "uint8_t", "uint8_t", "uint8_t"]
+    fielddisplays_by_name: Dict[str, str] = {}
+    fieldenums_by_name: Dict[str, str] = {}
+    fieldunits_by_name: Dict[str, str] = {"term": "s", "powers": "dBm"}
+    native_format = bytearray(b"<IHHHHBbBBBB")
+    orders = [0, 1, 2, 3, 4, 5, 6, 7, 8, 9, 10]
+    lengths = [1, 1, 1, 36, 36, 36, 36, 1, 1, 1, 1]
+    array_lengths = [0, 0, 0, 36, 36, 36, 36, 0, 0, 0, 0]
+    crc_extra = 92
+    unpacker = struct.Struct("<IHH36H36H36B36bBBBB")
+    instance_field = None
+    instance_offset = -1
+
+    def __init__(self, term: int, node: int, epoch: int, from_nodes: Sequence[int], to_nodes: Sequence[int], grades: Sequence[int], powers: Sequence[int], part: int, parts: int, count: int, version: int):
+        MAVLink_message.__init__(self, MAVLink_fanet_links_message.id, MAVLink_fanet_links_message.msgname)
+        self._fieldnames = MAVLink_fanet_links_message.fieldnames
+        self._instance_field = MAVLink_fanet_links_message.instance_field
+        self._instance_offset = MAVLink_fanet_links_message.instance_offset
+        self.term = term
+        self.node = node
+        self.epoch = epoch
+        self.from_nodes = from_nodes
+        self.to_nodes = to_nodes
+        self.grades = grades
+        self.powers = powers
+        self.part = part
+        self.parts = parts
+        self.count = count
+        self.version = version
+
+    def pack(self, mav: "MAVLink", force_mavlink1: bool = False) -> bytes:
+        return self._pack(mav, self.crc_extra, self.unpacker.pack(self.term, self.node, self.epoch, self.from_nodes[0], self.from_nodes[1], self.from_nodes[2], self.from_nodes[3], self.from_nodes[4], self.from_nodes[5], self.from_nodes[6], self.from_nodes[7], self.from_nodes[8], self.from_nodes[9], self.from_nodes[10], self.from_nodes[11], self.from_nodes[12], self.from_nodes[13], self.from_nodes[14], self.from_nodes[15], self.from_nodes[16], self.from_nodes[17], self.from_nodes[18], self.from_nodes[19], self.from_nodes[20], self.from_nodes[21], self.from_nodes[22], self.from_nodes[23], self.from_nodes[24], self.from_nodes[25], self.from_nodes[26], self.from_nodes[27], self.from_nodes[28], self.from_nodes[29], self.from_nodes[30], self.from_nodes[31], self.from_nodes[32], self.from_nodes[33], self.from_nodes[34], self.from_nodes[35], self.to_nodes[0], self.to_nodes[1], self.to_nodes[2], self.to_nodes[3], self.to_nodes[4], self.to_nodes[5], self.to_nodes[6], self.to_nodes[7], self.to_nodes[8], self.to_nodes[9], self.to_nodes[10], self.to_nodes[11], self.to_nodes[12], self.to_nodes[13], self.to_nodes[14], self.to_nodes[15], self.to_nodes[16], self.to_nodes[17], self.to_nodes[18], self.to_nodes[19], self.to_nodes[20], self.to_nodes[21], self.to_nodes[22], self.to_nodes[23], self.to_nodes[24], self.to_nodes[25], self.to_nodes[26], self.to_nodes[27], self.to_nodes[28], self.to_nodes[29], self.to_nodes[30], self.to_nodes[31], self.to_nodes[32], self.to_nodes[33], self.to_nodes[34], self.to_nodes[35], self.grades[0], self.grades[1], self.grades[2], self.grades[3], self.grades[4], self.grades[5], self.grades[6], self.grades[7], self.grades[8], self.grades[9], self.grades[10], self.grades[11], self.grades[12], self.grades[13], self.grades[14], self.grades[15], self.grades[16], self.grades[17], self.grades[18], self.grades[19], self.grades[20], self.grades[21], self.grades[22], self.grades[23], self.grades[24], self.grades[25], self.grades[26], self.grades[27], self.grades[28], self.grades[29], self.grades[30], self.grades[31], self.grades[32], self.grades[33], self.grades[34], self.grades[35], self.powers[0], self.powers[1], self.powers[2], self.powers[3], self.powers[4], self.powers[5], self.powers[6], self.powers[7], self.powers[8], self.powers[9], self.powers[10], self.powers[11], self.powers[12], self.powers[13], self.powers[14], self.powers[15], self.powers[16], self.powers[17], self.powers[18], self.powers[19], self.powers[20], self.powers[21], self.powers[22], self.powers[23], self.powers[24], self.powers[25], self.powers[26], self.powers[27], self.powers[28], self.powers[29], self.powers[30], self.powers[31], self.powers[32], self.powers[33], self.powers[34], self.powers[35], self.part, self.parts, self.count, self.version), force_mavlink1=force_mavlink1)
+
+
+# Define name on the class for backwards compatibility (it is now msgname).
+# Done with setattr to hide the class variable from mypy.
+setattr(MAVLink_fanet_links_message, "name", mavlink_msg_deprecated_name_property())
+
+
 mavlink_map: Dict[int, Type[MAVLink_message]] = {
     MAVLINK_MSG_ID_FANET_ROUTE: MAVLink_fanet_route_message,
     MAVLINK_MSG_ID_FANET_BEACON: MAVLink_fanet_beacon_message,
@@ -909,6 +960,7 @@ mavlink_map: Dict[int, Type[MAVLink_message]] = {
     MAVLINK_MSG_ID_FANET_PLACES: MAVLink_fanet_places_message,
     MAVLINK_MSG_ID_FANET_CLAIMS: MAVLink_fanet_claims_message,
     MAVLINK_MSG_ID_FANET_ROUTING: MAVLink_fanet_routing_message,
+    MAVLINK_MSG_ID_FANET_LINKS: MAVLink_fanet_links_message,
 }
 
 
@@ -1712,3 +1764,45 @@ class MAVLink(object):
 
         """
         self.send(self.fanet_routing_encode(length, type, part, parts, data), force_mavlink1=force_mavlink1)
+
+    def fanet_links_encode(self, term: int, node: int, epoch: int, from_nodes: Sequence[int], to_nodes: Sequence[int], grades: Sequence[int], powers: Sequence[int], part: int, parts: int, count: int, version: int) -> MAVLink_fanet_links_message:
+        """
+        Measured links. With a join: whom the sender hears how well. From the
+        leader: the links from which all compute the timetable of an
+        assignment.
+
+        term                      : From the leader: as in the schedule. With a join: 0. [s] (type:uint32_t)
+        node                      : The sender. (type:uint16_t)
+        epoch                     : From the leader: the assignment that they belong to. With a join: 0. (type:uint16_t)
+        from_nodes                : One end of each link. (type:uint16_t)
+        to_nodes                  : The other end. (type:uint16_t)
+        grades                    : Of each: -25 ln(share of frames lost), rounded; 0: all are lost. (type:uint8_t)
+        powers                    : Mean received power of each. [dBm] (type:int8_t)
+        part                      : This part of the assignment's links, from 0. (type:uint8_t)
+        parts                     : How many parts there are. (type:uint8_t)
+        count                     : How many entries are used. (type:uint8_t)
+        version                   : 1. (type:uint8_t)
+
+        """
+        return MAVLink_fanet_links_message(term, node, epoch, from_nodes, to_nodes, grades, powers, part, parts, count, version)
+
+    def fanet_links_send(self, term: int, node: int, epoch: int, from_nodes: Sequence[int], to_nodes: Sequence[int], grades: Sequence[int], powers: Sequence[int], part: int, parts: int, count: int, version: int, force_mavlink1: bool = False) -> None:
+        """
+        Measured links. With a join: whom the sender hears how well. From the
+        leader: the links from which all compute the timetable of an
+        assignment.
+
+        term                      : From the leader: as in the schedule. With a join: 0. [s] (type:uint32_t)
+        node                      : The sender. (type:uint16_t)
+        epoch                     : From the leader: the assignment that they belong to. With a join: 0. (type:uint16_t)
+        from_nodes                : One end of each link. (type:uint16_t)
+        to_nodes                  : The other end. (type:uint16_t)
+        grades                    : Of each: -25 ln(share of frames lost), rounded; 0: all are lost. (type:uint8_t)
+        powers                    : Mean received power of each. [dBm] (type:int8_t)
+        part                      : This part of the assignment's links, from 0. (type:uint8_t)
+        parts                     : How many parts there are. (type:uint8_t)
+        count                     : How many entries are used. (type:uint8_t)
+        version                   : 1. (type:uint8_t)
+
+        """
+        self.send(self.fanet_links_encode(term, node, epoch, from_nodes, to_nodes, grades, powers, part, parts, count, version), force_mavlink1=force_mavlink1)

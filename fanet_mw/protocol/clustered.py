@@ -11,6 +11,7 @@ from typing import Final
 
 from fanet_mw.digest import Digest, capacity
 from fanet_mw.errors import DropReason, MalformedFrameError
+from fanet_mw.links import Links
 from fanet_mw.messages import Reception, TxStatus
 from fanet_mw.protocol.arrival import decoded
 from fanet_mw.protocol.contract import Port, RoutingProtocol
@@ -19,6 +20,7 @@ from fanet_mw.protocol.gradient import UNREACHABLE, Gradient
 from fanet_mw.protocol.guard import slot_guard_ns
 from fanet_mw.protocol.leader import Leader
 from fanet_mw.protocol.lease import Authority, Lease
+from fanet_mw.protocol.link_quality import LinkQuality
 from fanet_mw.protocol.membership import Membership
 from fanet_mw.protocol.neighbors import Neighbor, Neighbors
 from fanet_mw.protocol.refresh import Refresh
@@ -78,13 +80,14 @@ class Clustered(RoutingProtocol):
         self._uplink = Uplink(port, self._gradient, self._upkeep)
         by_places = scenario.clusters.relay == "scheduled"
         self._silence = Silence(self._signs, hello_ns=hello_ns) if by_places else None
+        self._links = LinkQuality(port.node, hello_ns=hello_ns) if scenario.measures_links else None
         self._refresh = Refresh(port.stream("refresh").random)
         self._whereabouts = Whereabouts(range_m=scenario.clusters.link_m or scenario.radio.range_m)
         self._repair = Repair(
-            window_ns=seconds_to_ns(scenario.clusters.repair_s),
+            window_ns=scenario.repair_ns,
             capacity=_STORE_PACKETS,
             random=port.stream("repair").random,
-        ) if scenario.clusters.repair_s else None  # fmt: skip
+        ) if scenario.repair_ns else None  # fmt: skip
         self._floods = Floods(port, self._repair)
         self._join_ns: int | None = None
         self._role = self._membership.standing
@@ -96,6 +99,8 @@ class Clustered(RoutingProtocol):
     def start(self, now_ns: int) -> None:
         leads = self._port.node == self._port.scenario.leader
         self._upkeep.start(now_ns, leads=leads)
+        if self._links is not None:
+            self._links.start(now_ns)
         if leads:
             self._lead(elected=False, now_ns=now_ns)
         else:
@@ -171,6 +176,9 @@ class Clustered(RoutingProtocol):
             join, born_ns = decoded(packet, Join.decode_frame), min(packet.header.origin_us * US, now_ns)
             if self._leader is not None:
                 self._leader.joined(join, born_ns=born_ns, now_ns=now_ns)
+                told = decoded(packet, Links.decode_frames) if self._links is not None else None
+                if told is not None:
+                    self._leader.measured(NodeId(join.node), told.links)
             if join.instead_of:
                 if self._silence is not None:
                     self._silence.said(NodeId(join.instead_of), now_ns=now_ns)
@@ -197,6 +205,11 @@ class Clustered(RoutingProtocol):
         self._do(actions, now_ns)
         if self._membership.is_head:
             self._own_slot()  # of another length, perhaps, or with another guard
+
+    def _announce(self, part: Schedule, *, now_ns: int) -> None:
+        """Flood a part of our assignment, which holds for us as well."""
+        packet = self._flood_control(Kind.SCHEDULE, self._announcement(part), now_ns=now_ns)
+        self._learn(packet, now_ns=now_ns)
 
     def _announcement(self, part: Schedule) -> bytes:
         """The inner frames of a schedule packet."""
@@ -271,9 +284,18 @@ class Clustered(RoutingProtocol):
         if (
             self._join_ns is None
             and self._leader is None
-            and self._whereabouts.outdated(self._port.position, now_ns=now_ns)
+            and (
+                self._whereabouts.outdated(self._port.position, now_ns=now_ns)
+                or (
+                    self._links is not None
+                    and self._whereabouts.may_tell(now_ns)
+                    and self._links.outdated(now_ns=now_ns)
+                )
+            )
         ):
             self._join_ns = now_ns + int(self._random() * _UPDATE_NS * (1 + self._membership.nodes_listed))
+        if self._leader is not None and self._links is not None and self._links.outdated(now_ns=now_ns):
+            self._leader.measured(self._port.node, self._links.tell(now_ns=now_ns))
         if self._silence is not None and self._whereabouts.may_tell(now_ns):
             self._tell_silence(self._silence, now_ns)
         term, leader = self._lease.authority if self._lease.fresh(now_ns) and self._lease.authority else (0, 0)
@@ -294,6 +316,9 @@ class Clustered(RoutingProtocol):
         digest = self._repair.digest(most=capacity(room - len(beacon)), now_ns=now_ns)
         return beacon + digest.encode_frames(self._port.node)
 
+    def hello_share(self, *, now_ns: int) -> float:
+        return 1.0 if self._links is None else self._links.hello_share(now_ns=now_ns)
+
     def _tell_silence(self, silence: Silence, now_ns: int) -> None:
         """Let the leader know of a neighbor that has fallen silent; who lives will hear it too, and object."""
         silent = silence.next_silent(self._membership.lists, now_ns=now_ns)
@@ -309,6 +334,8 @@ class Clustered(RoutingProtocol):
         self._neighbors.heard(neighbor)
         if self._silence is not None:
             self._silence.heard(reception.src, now_ns=now_ns)
+        if self._links is not None:
+            self._links.hello(reception.src, rssi_dbm=reception.rssi_dbm, now_ns=now_ns)
         self._notice(reception.src, packet.header.origin_us * US, now_ns)
         if self._lease.fresh(now_ns):
             self._refresh.compare(neighbor.beacon, now_ns=now_ns)
@@ -340,8 +367,7 @@ class Clustered(RoutingProtocol):
         if self._join_ns is not None and now_ns >= self._join_ns:
             self._join(now_ns)
         for part in self._leader.wake(self._motion(now_ns), now_ns=now_ns) if self._leader else ():
-            packet = self._flood_control(Kind.SCHEDULE, self._announcement(part), now_ns=now_ns)
-            self._learn(packet, now_ns=now_ns)
+            self._announce(part, now_ns=now_ns)
         for packet in self._refresh.due(now_ns=now_ns):
             self._flood_again(packet, now_ns=now_ns)
         for packet in self._relay.assessment.decided(now_ns=now_ns):
@@ -374,7 +400,11 @@ class Clustered(RoutingProtocol):
         self._whereabouts.told(motion)
         join = Join(self._port.node, motion.position, motion.velocity, instead_of)
         objects = instead_of == self._port.node
-        self._flood_control(Kind.JOIN, join.encode_frame(self._port.node), now_ns=now_ns, urgent=objects)
+        inner = join.encode_frame(self._port.node)
+        links = self._links.tell(now_ns=now_ns) if self._links is not None else ()
+        if links:
+            inner += Links(self._port.node, links).encode_frames()
+        self._flood_control(Kind.JOIN, inner, now_ns=now_ns, urgent=objects)
 
     def _flood_control(self, kind: Kind, inner: bytes, *, now_ns: int, urgent: bool = False) -> Packet:
         """Tell everyone; `urgent`: before data, where there are turns for it."""

@@ -86,6 +86,10 @@ class RoutingProtocol(ABC):
         """What this protocol adds to the node's hello, in at most so many bytes."""
         return b""
 
+    def hello_share(self, *, now_ns: int) -> float:
+        """After which part of the hello interval the next hello should go."""
+        return 1.0
+
     def hello_start_ns(self, start_ns: int) -> int:
         """When a hello may go that is due at `start_ns`."""
         return start_ns

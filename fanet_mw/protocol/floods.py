@@ -36,18 +36,29 @@ class Floods:
         """A control packet of our own, for everyone."""
         return self._port.announce(kind, inner, now_ns=now_ns, flags=FLAG_FLOOD, hop_limit=self._hop_limit)
 
-    def begin(self, packets: Sequence[Packet], *, start_ns: int) -> None:
-        """The floods of several packets begin here, in one frame."""
-        self._port.gather()
+    def begin(self, packets: Sequence[Packet], *, start_ns: int, again_ns: Sequence[int] = ()) -> None:
+        """The floods of several packets begin here, in one frame, which is repeated at later instants."""
         for packet in packets:
             self._port.mark(packet, seen.FLOODED)
             self.keep(packet, flooded=True, now_ns=start_ns)
-            self._port.transmit(self._frame(packet), BROADCAST, start_ns=start_ns)
-        self._port.send_gathered()
+        for at_ns in (start_ns, *again_ns):
+            self._port.gather()
+            for packet in packets:
+                self._port.transmit(self._frame(packet), BROADCAST, start_ns=at_ns)
+            self._port.send_gathered()
 
     def relay(self, packet: Packet, *, start_ns: int) -> None:
         """Pass on a flood that began elsewhere."""
         self._port.transmit(self._port.forwarded(packet, flags=FLAG_FLOOD), BROADCAST, start_ns=start_ns)
+
+    def answer(self, packets: Sequence[Packet], *, start_ns: int) -> None:
+        """Send what neighbors lack, in one frame."""
+        self._port.gather()
+        for packet in packets:
+            frame = self.again(packet)
+            if frame is not None:
+                self._port.transmit(frame, BROADCAST, start_ns=start_ns)
+        self._port.send_gathered()
 
     def again(self, packet: Packet) -> bytes | None:
         """The frame for a neighbor that lacks this packet; None: it is as far as it may go, and needs no instant."""

@@ -11,11 +11,14 @@ from collections.abc import Mapping, Sequence
 from types import MappingProxyType
 from typing import Final, NamedTuple
 
+from fanet_mw.links import Link
 from fanet_mw.protocol.clustering import Cluster, Swarm, succession
 from fanet_mw.protocol.division import Division, drift
 from fanet_mw.protocol.lease import Authority
+from fanet_mw.protocol.link_state import LinkState, adjacency, worth_a_change
 from fanet_mw.protocol.signs import Signs
 from fanet_mw.protocol.topology import Adjacency, within_range
+from fanet_mw.protocol.turn_plan import measured_period_ns
 from fanet_mw.protocol.whereabouts import LOST_NS, Motion
 from fanet_mw.scenario import Scenario
 from fanet_mw.units import MS, US, Enu, NodeId, S, seconds_to_ns
@@ -41,6 +44,10 @@ _NOTICE_PERIODS: Final = 2
 _NOTICE_HOPS: Final = 24
 """With a timetable: what was promised before all have heard of the next one must be through when that is in force. So
 there must be time for two waits of a superframe and two floods of a dozen hops: the schedule's and the packet's."""
+_ANNOUNCEMENTS: Final = 4
+"""Over links that lose frames, an assignment has reached everyone after so many announcements."""
+_MOST: Final = 0.9
+"""Of the nodes: when so many have told their links, those are used though some are missing."""
 _DRIFT: Final = 0.03
 """A timetable is made anew when more than this share of the links has changed."""
 
@@ -71,6 +78,8 @@ class _Assigned(NamedTuple):
     links: Adjacency = MappingProxyType({})
     start_ns: int = 0
     parts: Sequence[Schedule] = ()
+    measured: tuple[Link, ...] = ()
+    """The links that everyone computes the timetable from; none: places decide."""
 
     @property
     def nodes(self) -> list[NodeId]:
@@ -96,6 +105,9 @@ class Leader:
         self._epoch = epoch
         self._motions: dict[NodeId, Motion] = {}
         self._stand_ins: dict[NodeId, _StandIn] = {}
+        self._links = LinkState() if scenario.measures_links else None
+        self._measured_ns = measured_period_ns(scenario)
+        """How often an assignment is announced whose links have been measured: once per superframe."""
         self._assigned = _Assigned()
         self._due_ns = now_ns if elected else now_ns + _FIRST_CALL_NS
         self._not_before_ns = now_ns + ANSWER_NS if elected else now_ns
@@ -113,6 +125,11 @@ class Leader:
             self._due_ns = max(now_ns + SETTLE_NS, self._not_before_ns)
         if silent != node:
             self.suspect(silent, node, self._motions[node], now_ns=now_ns)
+
+    def measured(self, node: NodeId, links: Sequence[Link]) -> None:
+        """A node, perhaps the leader itself, said how well it hears whom."""
+        if self._links is not None:
+            self._links.told(node, links)
 
     def suspect(self, silent: NodeId, by: NodeId, there: Motion, *, now_ns: int) -> None:
         """A node is said to be silent, by one who says where it is itself: it has a moment to object."""
@@ -138,7 +155,7 @@ class Leader:
         self._forget(now_ns)
         if self._motions and now_ns >= self._not_before_ns:
             self._renew(here, now_ns)
-        self._due_ns = now_ns + self._period_ns
+        self._due_ns = now_ns + (self._measured_ns if self._assigned.measured else self._period_ns)
         if now_ns < self._not_before_ns:
             self._due_ns = min(self._due_ns, self._not_before_ns)
         return self._assigned.parts or [self._call(now_ns)]
@@ -167,22 +184,37 @@ class Leader:
         before = self._assigned
         changed = sorted(self._motions) != sorted(before.nodes)
         rests = not self._reassign_ns or self._stand_ins or now_ns < before.start_ns + self._reassign_ns
-        if not changed and rests:
+        measured = self._measured()
+        if not changed and rests and not (measured and not before.measured):
             return
-        start_ns = (now_ns + self._notice_ns) // self._period_ns * self._period_ns + self._period_ns
+        notice_ns = max(self._notice_ns, _ANNOUNCEMENTS * self._measured_ns if before.measured else 0)
+        start_ns = (now_ns + notice_ns) // self._period_ns * self._period_ns + self._period_ns
         places = self._places(here, start_ns)
         members = {node: place for node, place in places.items() if node != self._authority.leader}
-        swarm = Swarm(members, within_range(members, range_m=self._range_m), velocities=self._velocities())
+        links = within_range(places, range_m=self._range_m) if not measured else adjacency(measured, places)
+        near = within_range(members, range_m=self._range_m) if not measured else adjacency(measured, members)
+        swarm = Swarm(members, near, velocities=self._velocities())
         stand_ins = {head: self._stand_ins[head].node for head in sorted(self._stand_ins)}
         clusters = self._division.renew(before.clusters, swarm, stand_ins, now_ns=now_ns)
-        links = within_range(places, range_m=self._range_m)
         same = [(c.head, sorted(c.members)) for c in clusters] == [(c.head, sorted(c.members)) for c in before.clusters]
-        if not changed and same and not (self._by_links and drift(before.links, links) > _DRIFT):
+        if measured:
+            moved = worth_a_change(before.measured, measured)
+        else:
+            moved = self._by_links and drift(before.links, links) > _DRIFT
+        if not changed and same and not moved:
             return
         self._stand_ins = {head: who for head, who in self._stand_ins.items() if head in self._motions}
         ordered = [Cluster(cluster.head, succession(cluster, swarm)) for cluster in clusters]
         self._epoch = (self._epoch + 1) & 0xFFFF or 1
-        self._assigned = _Assigned(ordered, places, links, start_ns, self._parts(ordered, start_ns))
+        self._assigned = _Assigned(ordered, places, links, start_ns, self._parts(ordered, start_ns), measured)
+
+    def _measured(self) -> tuple[Link, ...]:
+        """The links to plan with; none until most nodes have told theirs: of the rest their neighbors know."""
+        if self._links is None:
+            return ()
+        nodes = [*self._motions, NodeId(self._authority.leader)]
+        known = self._assigned.measured or self._links.known(nodes) >= _MOST * len(nodes)
+        return self._links.between(nodes) if known else ()
 
     def _places(self, here: Motion, start_ns: int) -> dict[NodeId, Enu]:
         """Where everyone will be in the middle of the time for which the assignment is made."""
@@ -216,6 +248,16 @@ class Leader:
             )
             for part, chunk in enumerate(chunks)
         ]
+
+    @property
+    def links(self) -> tuple[Link, ...]:
+        """The measured links of the assignment that is announced."""
+        return self._assigned.measured
+
+    @property
+    def epoch(self) -> int:
+        """The number of the assignment that is announced."""
+        return self._epoch
 
     def place(self, node: int) -> Enu:
         """Where a member, or the leader itself, was taken to be for the assignment that is announced."""

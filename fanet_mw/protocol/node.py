@@ -119,6 +119,10 @@ class Node:
         )
         self.transmit(packet.frame, BROADCAST, start_ns=start_ns)
 
+    def hello_share(self, now_ns: int) -> float:
+        """After which part of the hello interval the next hello should go."""
+        return self._protocol.hello_share(now_ns=now_ns)
+
     def hear(self, reception: Reception, now_ns: int) -> bool:
         """One reception, from anyone. True: a copy of what was handled before; nothing came of it."""
         self.receptions += 1

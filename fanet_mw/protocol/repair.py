@@ -23,6 +23,8 @@ _ASSESS_NS: Final = 200 * MS
 """Those who could repair the same packet wait for this long at most, so that mostly one does."""
 _FLOOD_OVER_NS: Final = 500 * MS
 """A flood that was heard is over everywhere after this."""
+RIPE_NS: Final = _FLOOD_OVER_NS + _ASSESS_NS
+"""So long after a flood somebody sends what a hello shows to be missing, at the latest."""
 _AGAIN_NS: Final = 900 * MS
 """The same node repairs the same packet again only after the neighbor had a hello to say that it still lacks it."""
 _PER_HELLO: Final = 32

@@ -81,7 +81,7 @@ class RootRelease(TurnRelease):
         Only a leader's announcements go before everything; a leader promises no bound.
         """
         header = packet.header
-        if header.kind == Kind.SCHEDULE and header.origin == self._node:
+        if header.kind in (Kind.SCHEDULE, Kind.LINKS) and header.origin == self._node:
             return PRIORITY_CONTROL
         fits = len(packet.frame) <= self._reserved.get(header.priority, 0)
         return header.priority if fits else PRIORITY_BULK

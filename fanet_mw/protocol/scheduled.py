@@ -10,11 +10,13 @@ heard outside of any turn is not relayed. Until a timetable is in force, and for
 from collections.abc import Mapping
 from typing import Final
 
-from fanet_mw.errors import DropReason
+from fanet_mw.errors import DropReason, MalformedFrameError
+from fanet_mw.links import Link, Links, frames_of
 from fanet_mw.messages import Reception
 from fanet_mw.places import Places, rounded
 from fanet_mw.protocol.admission import Admission
 from fanet_mw.protocol.arrival import decoded
+from fanet_mw.protocol.call_release import CallRelease
 from fanet_mw.protocol.clustered import Clustered
 from fanet_mw.protocol.contract import Port
 from fanet_mw.protocol.leader import notice_ns
@@ -22,7 +24,8 @@ from fanet_mw.protocol.lease import Authority
 from fanet_mw.protocol.membership import Version
 from fanet_mw.protocol.own_bound import Own
 from fanet_mw.protocol.root_release import Following, RootRelease
-from fanet_mw.protocol.turn_plan import Plan, fit, leader_load
+from fanet_mw.protocol.seen import key_of
+from fanet_mw.protocol.turn_plan import LIKELY_SHARE, Fitted, Plan, fit, fit_measured, leader_load
 from fanet_mw.protocol.turns import clocks_fit, receipt_ns
 from fanet_mw.protocol.txqueue import Packet, TxQueue, sooner_us
 from fanet_mw.protocol.urgent import reserved
@@ -31,6 +34,10 @@ from fanet_mw.units import MS, US, Enu, NodeId, S, earliest, seconds_to_ns
 from fanet_mw.wire import PRIORITY_BULK, PRIORITY_REPORT, PRIORITY_SAFETY, Kind
 from fanet_mw.wire_messages import Schedule
 
+_LINKS_PART: Final = 1 << 16
+"""Parts of the links are kept for neighbors behind those of the schedule."""
+_MOST_ANSWERS: Final = 2
+"""Answers that wait for turns; more than these contend."""
 _JITTER: Final = 0.25
 """Of the contention window: the most that a relay waits there."""
 _CLASSES: Final = {PRIORITY_SAFETY: "warning", PRIORITY_REPORT: "report", PRIORITY_BULK: "bulk"}
@@ -54,8 +61,12 @@ class Scheduled(Clustered):
             reserved=self._reserved,
             lead_ns=self._lead_ns,
         )
+        self._calls = CallRelease(TxQueue(capacity=scenario.routing.queue_frames), lead_ns=self._lead_ns)
+        """What neighbors lack, in our turns for neighbors alone; hellos go there too."""
         self._plans: list[Plan] = []
         self._schedules: dict[int, tuple[Schedule, Places]] = {}
+        self._measured: dict[int, Links] = {}
+        """The links of the schedule's version, by part."""
         self._version: Version | None = None
         self._planned: Version | None = None
         self._missed = 0
@@ -100,10 +111,55 @@ class Scheduled(Clustered):
             return
         if version != self._version:
             self._version, self._schedules = version, {}
+            if self._measured and _version_of(next(iter(self._measured.values()))) != version:
+                self._measured = {}
         self._schedules[schedule.part] = schedule, places
-        if len(self._schedules) == schedule.parts and self._planned != version:
-            self._planned = version
-            self._plan(now_ns)
+        self._plan_if_complete(now_ns)
+
+    def _announce(self, part: Schedule, *, now_ns: int) -> None:
+        super()._announce(part, now_ns=now_ns)
+        leader = self._leader
+        if leader is None or not leader.links or not part.members or part.part + 1 < part.parts:
+            return
+        frames = frames_of(leader.links)
+        for index, links in enumerate(frames):
+            told = Links(self._port.node, links, part.term, leader.epoch, index, len(frames))
+            packet = self._flood_control(Kind.LINKS, told.encode_frames(), now_ns=now_ns)
+            self._learn_links(packet, now_ns=now_ns)
+
+    def _consume_control(self, packet: Packet, src: NodeId, *, now_ns: int) -> None:
+        super()._consume_control(packet, src, now_ns=now_ns)
+        if packet.header.kind == Kind.LINKS and packet.header.origin != self._port.node and self._links is not None:
+            self._learn_links(packet, now_ns=now_ns)
+
+    def _learn_links(self, packet: Packet, *, now_ns: int) -> None:
+        """A part of the links of an assignment, which may come before the schedule does."""
+        told = decoded(packet, Links.decode_frames)
+        if told is None or told.node != packet.header.origin:
+            raise MalformedFrameError(f"links of an assignment by {packet.header.origin}")
+        version = _version_of(told)
+        if version.authority != self._lease.authority:
+            return
+        if self._measured and _version_of(next(iter(self._measured.values()))) != version:
+            self._measured = {}
+        self._measured[told.part] = told
+        if version == self._membership.version:
+            self._refresh.keep(packet, _LINKS_PART + told.part, version.authority, version.epoch, now_ns=now_ns)
+        self._plan_if_complete(now_ns)
+
+    def _plan_if_complete(self, now_ns: int) -> None:
+        """Plan once when all parts of the schedule's version have come, and all parts of its links."""
+        version = self._version
+        if version is None or self._planned == version or version != self._membership.version:
+            return
+        if len(self._schedules) < next(iter(self._schedules.values()))[0].parts:
+            return
+        if self._links is not None:
+            first = next(iter(self._measured.values()), None)
+            if first is None or _version_of(first) != version or len(self._measured) < first.parts:
+                return
+        self._planned = version
+        self._plan(now_ns)
 
     def _plan(self, now_ns: int) -> None:
         parts = [self._schedules[part] for part in sorted(self._schedules)]
@@ -117,13 +173,9 @@ class Scheduled(Clustered):
                 cluster_of[NodeId(member.node)] = member.cluster
                 if member.is_head:
                     heads[member.cluster] = NodeId(member.node)
-        found = fit(
-            self._port.scenario,
-            tuple(sorted(at.items())),
-            {node: heads[cluster] for node, cluster in sorted(cluster_of.items())},
-            leader=NodeId(schedule.leader),
-            origin_ns=schedule.start_us * US,
-            period_ns=schedule.period_us * US,
+        measured = tuple(link for part in sorted(self._measured) for link in self._measured[part].links)
+        found = self._fit(
+            schedule, at, {node: heads[cluster] for node, cluster in sorted(cluster_of.items())}, measured
         )
         if found is None:
             self._plans, self._bounds_ns = [], []  # not one packet of each head fits; `fanet plan` says so
@@ -136,6 +188,10 @@ class Scheduled(Clustered):
             self._admit(None if self._leader else own, now_ns=now_ns)
             self._bounds_ns = [*self._bounds_ns[over:], self._class_bounds_ns(own)]
         self._roots.follow([self._following(plan) for plan in self._plans], now_ns=now_ns)
+        calls = [Following(plan.valid_ns, plan.turns, plan.calls, plan.frame_bytes, 1) for plan in self._plans]
+        self._calls.follow(calls, now_ns=now_ns)
+        if not self._plans:
+            self._calls.drain()  # what neighbors lack they will say again
         stranded = [] if self._plans and self._plans[-1].roots else self._roots.drain()
         for packet in [*stranded, *self._release.drain(), *self._uplink.drain()]:
             self._forward(packet, start_ns=now_ns + self._lead_ns, now_ns=now_ns, tries=0)
@@ -143,6 +199,26 @@ class Scheduled(Clustered):
     def _superseded(self, now_ns: int) -> int:
         """How many of the plans, the oldest first, are no longer in force."""
         return sum(plan.valid_ns <= now_ns for plan in self._plans[1:])
+
+    def _fit(
+        self, schedule: Schedule, at: Mapping[NodeId, Enu], head_of: Mapping[NodeId, NodeId], measured: tuple[Link, ...]
+    ) -> Fitted | None:
+        """The timetable; by places if links are not measured, or leave no room for the load."""
+        places, leader = tuple(sorted(at.items())), NodeId(schedule.leader)
+        origin_ns, period_ns = schedule.start_us * US, schedule.period_us * US
+        found = None
+        if measured:
+            found = fit_measured(
+                self._port.scenario,
+                places,
+                measured,
+                leader=leader,
+                origin_ns=origin_ns,
+                link_parts=len(self._measured),
+            )
+        return found or fit(
+            self._port.scenario, places, head_of, leader=leader, origin_ns=origin_ns, period_ns=period_ns
+        )
 
     def _plan_at(self, t_ns: int) -> Plan | None:
         for plan in reversed(self._plans):
@@ -153,8 +229,8 @@ class Scheduled(Clustered):
     # --- letting in -----------------------------------------------------------------------------------------------
 
     def _own(self) -> Own | None:
-        """Our part of the newest plan, if it gives our packets a bound."""
-        plan = self._plans[-1] if self._plans else None
+        """Our part of the newest plan, if it gives our packets a bound: not if frames may be lost."""
+        plan = self._plans[-1] if self._plans and self._links is None else None
         if plan is None or not plan.roots or not plan.whole or plan.table.uncovered[self._port.node]:
             return None
         return Own(
@@ -247,9 +323,9 @@ class Scheduled(Clustered):
 
     def _flood_control(self, kind: Kind, inner: bytes, *, now_ns: int, urgent: bool = False) -> Packet:
         plan = self._plan_at(now_ns + self._lead_ns)
-        if (kind is Kind.JOIN and not urgent) or plan is None or not plan.roots:
-            # Our turns are for what the bound is about; a join may contend. An announcement does not wait for turns
-            # that are still to come into force.
+        if plan is None or not plan.roots or (kind is Kind.JOIN and not urgent and plan.odds is None):
+            # Our turns are for what the bound is about; a join may contend, and need not where there is no bound. An
+            # announcement does not wait for turns that are still to come into force.
             return super()._flood_control(kind, inner, now_ns=now_ns)
         packet = self._floods.control(kind, inner, now_ns=now_ns)
         for stale in self._roots.outdated(before_us=packet.header.origin_us):
@@ -277,16 +353,32 @@ class Scheduled(Clustered):
     ) -> None:
         """Relay in our turn of this flood, if we have one and it is still to come."""
         offset, root, instance = heard
-        own = plan.mine.get((root, instance))
-        if own is None or packet.header.hop_limit <= 1:
+        own = plan.mine.get((root, instance), ())
+        if not own or packet.header.hop_limit <= 1:
             return
         frame_ns = plan.turns.frame_start_ns(reception.end_ns) - offset // plan.turns.per_frame * plan.turns.period_ns
-        start_ns = plan.turns.start_ns(own, frame_start_ns=frame_ns)
-        if start_ns < now_ns:  # a reception that came late has used up some of the lead, or all of it
+        starts_ns = [plan.turns.start_ns(turn, frame_start_ns=frame_ns) for turn in own]
+        ahead_ns = [start_ns for start_ns in starts_ns if start_ns >= now_ns]
+        if not ahead_ns and (plan.odds is None or own[-1] > offset):
+            # A reception that came late has used up some of the lead, or all of it. Over lossy links the first copy
+            # that arrives may be one that was sent after our own turns.
             self._missed += 1
             self._port.drop(DropReason.MISSED_TURN, packet, now_ns=now_ns)
-            return
-        self._floods.relay(packet, start_ns=start_ns)
+        for start_ns in ahead_ns:
+            self._floods.relay(packet, start_ns=start_ns)
+
+    def _flood_again(self, packet: Packet, *, now_ns: int) -> None:
+        """A neighbor lacks this packet: in a turn for neighbors alone, if we have one and it fits."""
+        plan = self._plan_at(now_ns)
+        crowded = len(self._calls) >= _MOST_ANSWERS
+        if plan is None or not plan.calls or crowded or len(packet.frame) > plan.frame_bytes:
+            super()._flood_again(packet, now_ns=now_ns)
+        elif not self._calls.holds(_key(packet)):
+            self._calls.push(packet, now_ns=now_ns)
+
+    def overheard(self, key: int, *, now_ns: int) -> None:
+        super().overheard(key, now_ns=now_ns)
+        self._calls.cancel(key)
 
     # --- contending -----------------------------------------------------------------------------------------------
 
@@ -300,13 +392,18 @@ class Scheduled(Clustered):
         return self._contending_ns(super()._start_ns(now_ns=now_ns, jitter_ns=min(jitter_ns, most_ns)))
 
     def hello_start_ns(self, start_ns: int) -> int:
+        plan = self._plan_at(start_ns)
+        if plan is not None and plan.calls:
+            claimed_ns = self._calls.claim(not_before_ns=start_ns, now_ns=start_ns - self._lead_ns)
+            if claimed_ns is not None:
+                return claimed_ns
         return self._contending_ns(start_ns)
 
     # --- time -----------------------------------------------------------------------------------------------------
 
     def next_wake_ns(self) -> int | None:
         admission_ns = self._admission.next_wake_ns() if self._admission else None
-        return earliest(super().next_wake_ns(), self._roots.next_wake_ns(), admission_ns)
+        return earliest(super().next_wake_ns(), self._roots.next_wake_ns(), self._calls.next_wake_ns(), admission_ns)
 
     def wake(self, now_ns: int) -> None:
         super().wake(now_ns)
@@ -316,7 +413,18 @@ class Scheduled(Clustered):
         for packet in self._roots.expire(before_us=(now_ns - self._lifetime_ns) // US):
             self._port.drop(DropReason.EXPIRED, packet, now_ns=now_ns)
         for packets, start_ns in self._roots.due(now_ns=now_ns):
-            self._floods.begin(packets, start_ns=start_ns)
+            self._floods.begin(packets, start_ns=start_ns, again_ns=self._repetitions(start_ns))
+        for packets, start_ns in self._calls.due(now_ns=now_ns):
+            self._floods.answer(packets, start_ns=start_ns)
+
+    def _repetitions(self, start_ns: int) -> list[int]:
+        """When a frame that we let out at an instant is repeated."""
+        plan = self._plan_at(start_ns)
+        turn = None if plan is None else plan.turns.turn_at(start_ns)
+        if plan is None or turn is None:
+            return []
+        frame_ns = plan.turns.frame_start_ns(start_ns)
+        return [plan.turns.start_ns(later, frame_start_ns=frame_ns) for later in plan.again.get(turn, ())]
 
     # --- for people -----------------------------------------------------------------------------------------------
 
@@ -329,16 +437,41 @@ class Scheduled(Clustered):
             return None
         return self._bounds_ns[-1].get(PRIORITY_BULK)
 
+    def likely_ns(self) -> int | None:
+        """Within which time `LIKELY_SHARE` of the nodes have a packet of ours, where links lose frames; None: no such
+        time is known, or more packets are waiting than a superframe lets out.
+        """
+        plan = self._plans[-1] if self._plans else None
+        if plan is None or plan.odds is None or len(self._roots) > len(plan.roots) or not plan.roots:
+            return None
+        if self._leader is not None or plan.table.uncovered[self._port.node] or not self._in_step():
+            return None  # schedules go before our own packets
+        return plan.likely_ns(
+            self._port.node,
+            interval_ns=self._interval_ns,
+            hello_ns=seconds_to_ns(self._port.scenario.routing.hello_interval_s),
+        )
+
     def _in_step(self) -> bool:
         """Whether the turns' slack holds what is known of the swarm's clocks."""
         return clocks_fit(self._port.scenario, clock_error_ns=self._port.clock_error_ns)
 
     def report(self) -> Mapping[str, object]:
-        bound_ns = self.bound_ns()
+        bound_ns, likely_ns = self.bound_ns(), self.likely_ns()
         return {
             **super().report(),
+            "likely_ms": None if likely_ns is None else likely_ns / MS,
+            "likely_share": None if likely_ns is None else LIKELY_SHARE,
             "missed_turns": self._missed,
             "bound_ms": None if bound_ns is None else bound_ns / MS,
             "bounds_ms": {_CLASSES[p]: ns / MS for p, ns in self._bounds_ns[-1].items()} if self._bounds_ns else {},
             "planned": bool(self._plans),
         }
+
+
+def _version_of(links: Links) -> Version:
+    return Version(Authority(links.term, NodeId(links.node)), links.epoch)
+
+
+def _key(packet: Packet) -> int:
+    return key_of(origin=packet.header.origin, seq=packet.header.seq)

@@ -18,9 +18,13 @@ Not modeled: links that positions do not tell (obstacles); use a shorter `link_m
 from collections import Counter
 from collections.abc import Mapping, Sequence
 from functools import lru_cache
+from types import MappingProxyType
 from typing import NamedTuple
 
+from fanet_mw.links import Link
+from fanet_mw.protocol.odds import Odds, odds
 from fanet_mw.protocol.packing import Effort, Flood, Geometry, Packing, Swarm
+from fanet_mw.protocol.redundant_packing import Network, RedundantPacking, Wave, enough_for
 from fanet_mw.units import Enu, NodeId
 
 PLAIN = Effort()
@@ -46,10 +50,15 @@ class Timetable(NamedTuple):
     """Per root: nodes that it cannot reach at all: the swarm is in parts."""
     used: int
     """Turns that are in use, of `geometry.turns`."""
+    calls: Mapping[NodeId, tuple[int, ...]] = MappingProxyType({})
+    """Per node: turns of its own for a hello, or for a packet that a neighbor lacks."""
 
     def roots(self) -> list[Turn]:
-        """The turns in which packets are let out."""
-        return [turn for turn in self.turns if turn.node == turn.root]
+        """The turns in which packets are let out; a repetition lets out nothing new."""
+        first: dict[tuple[NodeId, int], Turn] = {}
+        for turn in sorted(self.turns):
+            first.setdefault((turn.root, turn.instance), turn)
+        return list(first.values())
 
 
 @lru_cache(maxsize=16)
@@ -86,6 +95,65 @@ def timetable(
         root: swarm.names(swarm.everyone & ~flood.goal) for flood, (root, _) in zip(floods, ordered, strict=True)
     }
     return Timetable(turns, _spans(turns), uncovered, len({turn.offset % whole for turn in turns}))
+
+
+@lru_cache(maxsize=16)
+def redundant_timetable(
+    positions: tuple[tuple[NodeId, Enu], ...],
+    measured: tuple[Link, ...],
+    roots: tuple[NodeId, ...],
+    geometry: Geometry,
+    *,
+    calls: int,
+    epsilon: float,
+    margin_db: float,
+    pace: float = 1.0,
+) -> tuple[Timetable, Odds] | None:
+    """The table for lossy links, and what to expect of it; None when the turns do not suffice.
+
+    Every node gets so many copies of each packet that it misses all of them with a probability of at most `epsilon`,
+    if their senders have it; and each node has so many `calls`, turns of its own in which all its neighbors hear it.
+    With a greater `margin_db` those who send in the same turn are farther apart.
+    """
+    if not geometry.turns:
+        return None
+    at = dict(positions)
+    network = Network(positions, geometry, measured, margin_db=margin_db)
+    enough = enough_for(epsilon)
+    ordered = _in_order(roots, at)
+    called = _in_order([node for node, _ in positions for _ in range(calls)], at)
+    waves = [Wave(network, network.row[root], enough=enough) for root, _ in ordered]
+    lone = [Wave(network, network.row[node], enough=enough, call=True) for node, _ in called]
+    if not RedundantPacking(network, geometry, pace=pace).place(_interleaved(waves, lone)):
+        return None
+    turns = tuple(
+        sorted(
+            Turn(offset, network.nodes[row], root, instance)
+            for wave, (root, instance) in zip(waves, ordered, strict=True)
+            for offset, row in wave.sent
+        )
+    )
+    own: dict[NodeId, list[int]] = {node: [] for node, _ in positions}
+    for wave, (node, _) in zip(lone, called, strict=True):
+        own[node].append(wave.sent[0][0])
+    everyone = (1 << len(positions)) - 1
+    uncovered = {root: network.names(everyone & ~wave.goal) for wave, (root, _) in zip(waves, ordered, strict=True)}
+    used = {turn.offset % geometry.turns for turn in turns} | {offset for at in own.values() for offset in at}
+    table = Timetable(
+        turns, _spans(turns), uncovered, len(used), {node: tuple(sorted(offsets)) for node, offsets in own.items()}
+    )
+    floods = [(root, wave.sent) for wave, (root, _) in zip(waves, ordered, strict=True)]
+    return table, odds(network, floods, turns=geometry.turns, hop_turns=geometry.hop_turns)
+
+
+def _interleaved(floods: Sequence[Wave], calls: Sequence[Wave]) -> list[Wave]:
+    """Both in their order, evenly mixed."""
+    places = [
+        ((index + 0.5) / len(row), kind, index, wave)
+        for kind, row in enumerate((floods, calls))
+        for index, wave in enumerate(row)
+    ]
+    return [wave for *_, wave in sorted(places, key=lambda place: place[:3])]
 
 
 def _in_order(roots: Sequence[NodeId], positions: Mapping[NodeId, Enu]) -> list[tuple[NodeId, int]]:

@@ -14,14 +14,18 @@ from collections.abc import Iterator, Mapping
 from itertools import islice
 from typing import Final, NamedTuple, Self
 
+from fanet_mw.digest import CAPACITY as DIGEST_CAPACITY
+from fanet_mw.links import MESSAGES, Link
 from fanet_mw.places import CAPACITY as PLACES_CAPACITY
+from fanet_mw.protocol.odds import Odds
 from fanet_mw.protocol.packing import Effort, Geometry
-from fanet_mw.protocol.timetable import Timetable, timetable
+from fanet_mw.protocol.repair import RIPE_NS
+from fanet_mw.protocol.timetable import Timetable, redundant_timetable, timetable
 from fanet_mw.protocol.turns import Turns, turn_ns
 from fanet_mw.protocol.urgent import reserved
 from fanet_mw.scenario import Scenario
-from fanet_mw.units import MS, Enu, NodeId, seconds_to_ns
-from fanet_mw.wire import HEADER_BYTES, OVERHEAD, PLACES, SCHEDULE
+from fanet_mw.units import MS, Enu, NodeId, S, seconds_to_ns
+from fanet_mw.wire import DIGEST, HEADER_BYTES, LINKS, OVERHEAD, PLACES, SCHEDULE
 from fanet_mw.wire_messages import CAPACITY
 
 _SCHEDULE_BYTES: Final = SCHEDULE.layout.size + OVERHEAD
@@ -31,6 +35,24 @@ _FEWER: Final = 0.95
 _EASY: Final = (Effort(), Effort(pace=0.9))
 _HARD: Final = Effort(pace=0.8, tries=8)
 """For a load that does not fit otherwise."""
+
+_REDUNDANCY: Final = ((9, 0.01), (7, 0.03), (5, 0.05), (4, 0.05), (3, 0.05), (3, 0.1), (3, 0.3))
+"""With measured links, what to try, best first: the margin against interference [dB], and the share of packets of which
+a node may lose all copies. Interference that positions do not tell costs more than frames that are sent once less."""
+_PACES: Final = (1.0, 0.9)
+_MOST_PERIODS: Final = 4
+"""Flooding periods of a superframe with measured links."""
+_LOAD: Final = 0.9
+"""Of the root turns of a node with measured links, its packets use so many: what else it has to say finds a turn."""
+_CALLS_PER_S: Final = 3
+_MOST_DIGESTS: Final = 4
+_HELLO_BYTES: Final = 200
+"""A hello without its digest."""
+
+LIKELY_SHARE: Final = 0.99
+"""Of the copies: what a node states a delay for when links lose frames."""
+_LATE_HELLO: Final = 1.1
+"""Hello intervals between two hellos at most."""
 
 _BLOCK: Final = 300
 """Packets of a block at least; fewer are packed less densely, more take long."""
@@ -52,6 +74,8 @@ class Fitted(NamedTuple):
     """Whether every node lets out its own packets; else heads do it for their members."""
     enough: bool
     """Whether as many packets are let out as come."""
+    odds: Odds | None = None
+    """Of a timetable for lossy links: how likely packets arrive; None: the table reckons with no loss."""
 
 
 class Plan(NamedTuple):
@@ -60,33 +84,61 @@ class Plan(NamedTuple):
     valid_ns: int
     turns: Turns
     table: Timetable
-    mine: Mapping[tuple[NodeId, int], int]
-    """Our turn for each (root, instance)."""
+    mine: Mapping[tuple[NodeId, int], tuple[int, ...]]
+    """Our turns for each (root, instance) of others."""
     heard: Mapping[tuple[int, NodeId], tuple[int, NodeId, int]]
     """(turn, sender) -> (offset, root, instance)."""
     roots: tuple[int, ...]
     """The turns in which we let packets out."""
+    again: Mapping[int, tuple[int, ...]]
+    """By root turn: the later turns in which we repeat what was let out."""
+    calls: tuple[int, ...]
+    """The turns in which we send what is for our neighbors alone."""
     together: int
     frame_bytes: int
     whole: bool
+    odds: Odds | None
 
     @classmethod
     def of(cls, node: NodeId, valid_ns: int, found: Fitted) -> Self:
         turns, table = found.turns, found.table
+        sends: dict[tuple[NodeId, int], list[int]] = {}
+        for turn in sorted(table.turns):
+            if turn.node == node:
+                sends.setdefault((turn.root, turn.instance), []).append(turn.offset)
+        own = [offsets for (root, _), offsets in sends.items() if root == node]
         return cls(
             valid_ns=valid_ns,
             turns=turns,
             table=table,
-            mine={(turn.root, turn.instance): turn.offset for turn in table.turns if turn.node == node != turn.root},
+            mine={flood: tuple(offsets) for flood, offsets in sends.items() if flood[0] != node},
             heard={
                 (turn.offset % turns.per_frame, turn.node): (turn.offset, turn.root, turn.instance)
                 for turn in table.turns
             },
-            roots=tuple(sorted(turn.offset for turn in table.turns if turn.node == turn.root == node)),
+            roots=tuple(sorted(offsets[0] for offsets in own)),
+            again={offsets[0]: tuple(offsets[1:]) for offsets in own},
+            calls=table.calls.get(node, ()),
             together=found.together,
             frame_bytes=found.frame_bytes,
             whole=found.whole,
+            odds=found.odds,
         )
+
+    def likely_ns(self, node: NodeId, *, interval_ns: int, hello_ns: int) -> int | None:
+        """Within which time `LIKELY_SHARE` of the copies of this node's packets arrive; None: the odds are worse.
+
+        The longest wait and flood, and as many rounds of repair as it takes: a hello, as late as it may be, which waits
+        for a turn; an answer, which may wait for the next turn but one. Half of what may be missing is left for what
+        the odds do not know.
+        """
+        assert self.odds is not None, "whoever asks has a timetable for lossy links"
+        flood_ns = self.turns.worst_ns(self.roots, span=self.table.spans[node], interval_ns=interval_ns)
+        rounds = self.odds.rounds(node, missed=(1 - LIKELY_SHARE) / 2)
+        if flood_ns is None or rounds is None or not self.calls:
+            return None
+        call_ns = self.turns.done_ns(self.calls, span=1)[0]
+        return flood_ns + (RIPE_NS if rounds else 0) + rounds * (round(_LATE_HELLO * hello_ns) + 3 * call_ns)
 
 
 class _Wish(NamedTuple):
@@ -101,8 +153,9 @@ class _Wish(NamedTuple):
 
 
 def largest_frame(scenario: Scenario, *, together: int = 1) -> int:
-    """The largest frame of a turn: packets of bulk and what is reserved, or a schedule part with its places."""
-    longest = max(together * scenario.traffic.payload_bytes, schedule_bytes(scenario))
+    """The largest frame of a turn: packets of bulk and what is reserved, or a leader's announcement."""
+    links_bytes = HEADER_BYTES + MESSAGES * (LINKS.layout.size + OVERHEAD) if scenario.measures_links else 0
+    longest = max(together * scenario.traffic.payload_bytes, schedule_bytes(scenario), links_bytes)
     return longest + sum(reserved(scenario).values())
 
 
@@ -159,6 +212,53 @@ def fit(
             frame_bytes = largest_frame(scenario, together=wish.together)
             return Fitted(turns, table, wish.together, frame_bytes, wish.whole, wish.enough)
     return None
+
+
+def measured_period_ns(scenario: Scenario) -> int:
+    """The superframe with measured links: a little less than it takes for one packet of every source, so that repeated
+    frames find room; never shorter than the flooding period, and at most four times as long.
+    """
+    one_each_ns = int(_LOAD * seconds_to_ns(scenario.traffic.interval_s))
+    return max(scenario.clusters.period_ns, min(_MOST_PERIODS * scenario.clusters.period_ns, one_each_ns))
+
+
+def fit_measured(
+    scenario: Scenario,
+    places: Places,
+    measured: tuple[Link, ...],
+    *,
+    leader: NodeId,
+    origin_ns: int,
+    link_parts: int,
+) -> Fitted | None:
+    """The timetable of a swarm whose links have been measured: every node lets out its own packets, frames are
+    repeated as long as there are turns for it. None when the turns do not suffice for the load.
+    """
+    whole_ns = measured_period_ns(scenario)
+    size = max(largest_frame(scenario), hello_bytes(scenario))
+    turn = turn_ns(scenario, payload_bytes=size)
+    contention_ns = round(scenario.clusters.contention_ms * MS * whole_ns / scenario.clusters.period_ns)
+    turns = Turns(origin_ns, whole_ns, contention_ns, turn, max(0, whole_ns - contention_ns) // turn)
+    own = leader_load(scenario) if leader == scenario.leader else 1
+    senders = [node for node, _ in places if node != leader or own]
+    each = max(1, math.ceil(whole_ns / seconds_to_ns(scenario.traffic.interval_s) / _LOAD - 1e-3))
+    roots = (*(leader,) * (schedule_parts(scenario) + link_parts), *(node for node in senders for _ in range(each)))
+    calls = max(1, round(_CALLS_PER_S * whole_ns / S))
+    geometry = links(scenario, turns)
+    for margin_db, epsilon in _REDUNDANCY:
+        for pace in _PACES:
+            found = redundant_timetable(
+                places, measured, roots, geometry, calls=calls, epsilon=epsilon, margin_db=margin_db, pace=pace
+            )
+            if found is not None:
+                return Fitted(turns, found[0], 1, size, whole=True, enough=True, odds=found[1])
+    return None
+
+
+def hello_bytes(scenario: Scenario) -> int:
+    """The largest hello that says what its sender holds."""
+    digests = min(_MOST_DIGESTS, -(-scenario.nodes.count // DIGEST_CAPACITY))
+    return HEADER_BYTES + _HELLO_BYTES + digests * (DIGEST.layout.size + OVERHEAD)
 
 
 def least_interval_ns(scenario: Scenario, places: Places, head_of: Mapping[NodeId, NodeId]) -> int | None:

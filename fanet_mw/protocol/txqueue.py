@@ -9,6 +9,7 @@ from collections.abc import Mapping
 from types import MappingProxyType
 from typing import Final, NamedTuple
 
+from fanet_mw.protocol.seen import key_of
 from fanet_mw.scenario import Routing
 from fanet_mw.units import US, NodeId
 from fanet_mw.wire import PRIORITY_REPORT, PRIORITY_SAFETY, Header
@@ -33,6 +34,10 @@ def sooner_us(routing: Routing) -> Mapping[int, int]:
     return {p: (whole_ns - routing.lifetime_ns(p)) // US for p in (PRIORITY_SAFETY, PRIORITY_REPORT)}
 
 
+def _key(packet: Packet) -> int:
+    return key_of(origin=packet.header.origin, seq=packet.header.seq)
+
+
 class TxQueue:
     """Packets waiting for a slot or a route."""
 
@@ -44,6 +49,14 @@ class TxQueue:
 
     def __len__(self) -> int:
         return len(self._entries)
+
+    def __contains__(self, key: object) -> bool:
+        """Whether a packet with this key (`seen.key_of`) is queued."""
+        return any(_key(entry[2]) == key for entry in self._entries)
+
+    def remove(self, key: int) -> None:
+        """Give up a packet, if it is queued."""
+        self._entries = [entry for entry in self._entries if _key(entry[2]) != key]
 
     def push(self, packet: Packet, *, rank: int | None = None) -> Packet | None:
         """Add a packet; return the one that had to go for it (perhaps itself), or None.

@@ -128,9 +128,9 @@ class Plan(NamedTuple):
     def likely_ns(self, node: NodeId, *, interval_ns: int, hello_ns: int) -> int | None:
         """Within which time `LIKELY_SHARE` of the copies of this node's packets arrive; None: the odds are worse.
 
-        The longest wait and flood, and as many rounds of repair as it takes: a hello, as late as it may be, which waits
-        for a turn; an answer, which may wait for the next turn but one. Half of what may be missing is left for what
-        the odds do not know.
+        The longest wait, behind a join too, which takes a turn of ours when a link has changed; the flood; and as many
+        rounds of repair as it takes: a hello, as late as it may be, which waits for a turn; an answer, which may wait
+        for the next turn but one. Half of what may be missing is left for what the odds do not know.
         """
         assert self.odds is not None, "whoever asks has a timetable for lossy links"
         flood_ns = self.turns.worst_ns(self.roots, span=self.table.spans[node], interval_ns=interval_ns)
@@ -138,6 +138,7 @@ class Plan(NamedTuple):
         if flood_ns is None or rounds is None or not self.calls:
             return None
         call_ns = self.turns.done_ns(self.calls, span=1)[0]
+        flood_ns += self.turns.period_ns // len(self.roots)
         return flood_ns + (RIPE_NS if rounds else 0) + rounds * (round(_LATE_HELLO * hello_ns) + 3 * call_ns)
 
 

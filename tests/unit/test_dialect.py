@@ -140,7 +140,7 @@ def test_the_last_byte_on_the_wire_is_the_version(spec: wire.Spec) -> None:
 
 # --- the document -------------------------------------------------------------------------------------------------
 
-SIZES = {"uint64": "Q", "uint32": "I", "uint16": "H", "int16": "h", "uint8": "B", "float": "f"}
+SIZES = {"uint64": "Q", "uint32": "I", "uint16": "H", "int16": "h", "uint8": "B", "int8": "b", "float": "f"}
 ROW = re.compile(r"^\| (\d+) \| `(\w+)` \| (\w+)(?:\[(\d+)\])? \| ([\w/]*) ?\| .+ \|$", re.MULTILINE)
 
 

@@ -1,0 +1,49 @@
+"""A swarm over links that lose frames, with timetables from measured links: what arrives, and what its nodes state."""
+
+import pytest
+
+from fanet_mw.scenario import Scenario
+from fanet_mw.trace import Delivered, Generated
+from fanet_mw.units import MS, S
+from sim.catalog import find
+from sim.run import simulate
+
+SMALL = ("nodes.count=12", "clusters.count=11", "traffic.sources=11", "duration_s=45", "warmup_s=24", "drain_s=8")
+LOSSY = ('radio.channel="log_distance"', 'radio.fading="rician"')
+
+
+def scenario(*overrides: str) -> Scenario:
+    return find("clusters", [*SMALL, *overrides])
+
+
+def test_links_are_measured_where_frames_fade_unless_places_are_wanted() -> None:
+    assert not scenario().measures_links
+    assert not scenario('radio.channel="log_distance"').measures_links
+    assert scenario(*LOSSY).measures_links
+    assert scenario('radio.channel="log_distance"', "radio.shadowing_db=4").measures_links
+    assert not scenario(*LOSSY, 'clusters.links="places"').measures_links
+    assert scenario('clusters.links="measured"').measures_links
+
+
+@pytest.mark.parametrize("loss", ['radio.fading="rician"', "radio.shadowing_db=4"])
+def test_what_nodes_state_over_lossy_links_holds(loss: str) -> None:
+    chosen = scenario('radio.channel="log_distance"', loss)
+    outcome = simulate(chosen)
+    agents = [report for report in outcome.reports.values() if report.get("kind") == "agent"]
+    stated_ns = {a["node"]: a["likely_ms"] * MS for a in agents if a["likely_ms"] is not None}
+    assert all(a["likely_share"] == 0.99 for a in agents if a["likely_ms"] is not None)
+    assert all(a["bound_ms"] is None for a in agents)
+    assert len(stated_ns) >= 10
+    born = {(r.node, r.seq): r.t_ns for r in outcome.records if isinstance(r, Generated) and r.node in stated_ns}
+    arrived = [r for r in outcome.records if isinstance(r, Delivered) and (r.origin, r.seq) in born]
+    in_time = sum(r.t_ns - born[r.origin, r.seq] <= stated_ns[r.origin] for r in arrived)
+    assert in_time / (11 * len(born)) >= 0.99
+    assert max(stated_ns.values()) < 10 * S
+
+
+def test_the_same_swarm_with_places_leaves_out_a_part() -> None:
+    """What the test above would not notice if the channel lost nothing."""
+    outcome = simulate(scenario(*LOSSY, 'clusters.links="places"'))
+    born = sum(isinstance(record, Generated) for record in outcome.records)
+    arrived = sum(isinstance(record, Delivered) for record in outcome.records)
+    assert arrived / (11 * born) < 0.9

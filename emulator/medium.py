@@ -41,6 +41,8 @@ _HORIZON_NS: Final = 60_000 * MS
 class Medium(Actor):
     """The air between the nodes of one swarm."""
 
+    hears_out = True
+
     def __init__(self, scenario: Scenario, swarm: str, *, capture: Capture | None = None) -> None:
         topics = Topics(swarm)
         super().__init__("emulator", (topics.all_tx, topics.pose, topics.obstruction, topics.radio_control))

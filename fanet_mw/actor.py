@@ -25,6 +25,9 @@ class Actor(ABC):
 
     name: str
     """Unique in a swarm; what reports, logs and messages to people call it (`agent-7`, `emulator`, `world`)."""
+    hears_out = False
+    """True for an actor that accounts for what others send: in real time, what was on its way when the time was over
+    still reaches it before `stop`."""
 
     def __init__(self, name: str, subscriptions: tuple[str, ...]) -> None:
         self.name = name

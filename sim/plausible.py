@@ -41,6 +41,7 @@ Reasons = dict[str, Count]
 class _Host(BaseModel):
     model_config = ConfigDict(extra="allow", strict=True)
     stall_ms: Number = 0.0
+    unread_receptions: Count = 0
 
 
 class _Shape(BaseModel):

@@ -14,7 +14,7 @@ from typing import Any, Final, NamedTuple
 from sim.outcome import Outcome
 from sim.processes import describe
 
-LOST: Final = 0.005
+LOST: Final = 0.0025
 """What the machine took from the air, all kinds together: requests lost on the bus or dropped as too late, turns
 missed, each of all requests, and receptions lost on the bus, of all that were handed over."""
 HEARD_LATE: Final = 0.02
@@ -92,8 +92,9 @@ def reasons(outcome: Outcome, *, frames: Mapping[str, Any], disturbance: Mapping
 def _broken(outcome: Outcome) -> Iterator[str]:
     if outcome.aborted is not None:
         yield f"partial result: {outcome.aborted}"
-    for name, code in outcome.ended:
-        yield f"{name} ended before its time, with {describe(code)}; none may"
+    for code in dict.fromkeys(code for _, code in outcome.ended):
+        dead = [name for name, ended in outcome.ended if ended == code]
+        yield f"{_named(dead)} ended before the end, with {describe(code)}: {len(dead)}, limit 0"
     for name, why in outcome.absent.items():
         yield f"no report of {name} ({why}); all must report"
     unfinished = [name for name, report in outcome.reports.items() if not report.get("final")]
@@ -140,7 +141,7 @@ def _copies_lost(outcome: Outcome) -> float:
         report = outcome.reports.get(f"agent-{node}")
         if report is not None and f"agent-{node}" not in dead:
             handed += count
-            lost += max(0, count - report["receptions"])
+            lost += max(0, count - report["receptions"] - (report.get("host") or {}).get("unread_receptions", 0))
     return _share(lost, handed)
 
 

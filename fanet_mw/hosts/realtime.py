@@ -22,13 +22,15 @@ from fanet_mw.hosts.clock import START_PATIENCE_S, ClockListener, SwarmClock
 from fanet_mw.hosts.inbox import Inbox
 from fanet_mw.hosts.lateness import Histogram
 from fanet_mw.hosts.timebase import THIS_MACHINE, Timebase
-from fanet_mw.messages import Message, Report, TraceBatch
+from fanet_mw.messages import Message, Reception, Report, TraceBatch
 from fanet_mw.topics import Topics
 from fanet_mw.trace import Record
 from fanet_mw.units import MS, S
 
 _LOOK_EVERY_S: Final = 0.5
 """How often records are published and the router is looked for: what a killed process may lose."""
+_ON_ITS_WAY_S: Final = 0.1
+"""How long the medium waits at the end for requests that are on the bus; nodes wait twice that for its last copies."""
 _LOOKS_PER_REPORT: Final = 2
 
 
@@ -57,6 +59,8 @@ class RealtimeHost:
         """How far past an instant was, at most, when the actor asked for it."""
         self._stall_ns = 0
         """The longest that the loop did nothing although it should have."""
+        self._unread = 0
+        """Receptions that came when the time was over."""
         self._records: list[Record] = []
         self._lateness = Histogram()
         self._puts = 0
@@ -87,7 +91,7 @@ class RealtimeHost:
             self._halt()
             self._publish_records()  # what led to it
             raise
-        self._finish(until_ns)
+        await self._finish(until_ns)
 
     async def _sleep_until(self, instant_ns: int) -> None:
         assert self._clock is not None, "the clock is running"
@@ -126,13 +130,22 @@ class RealtimeHost:
             self._timer.cancel()
             self._timer = None
 
-    def _finish(self, until_ns: int) -> None:
+    async def _finish(self, until_ns: int) -> None:
         self._halt()
-        now_ns = min(self.now_ns(), until_ns)
-        self._actor.stop(max(now_ns, 0))
+        now_ns = max(0, min(self.now_ns(), until_ns))
+        await asyncio.sleep(_ON_ITS_WAY_S if self._actor.hears_out else 2 * _ON_ITS_WAY_S)
+        while self._inbox.deliver(lambda topic, message: self._hear_out(topic, message, now_ns)):
+            pass
+        self._actor.stop(now_ns)
         self._settle(rearm=False)
         self._publish_records()
         self._publish_report(final=True)
+
+    def _hear_out(self, topic: str, message: Message, now_ns: int) -> None:
+        """What was on its way at the end is counted, or still taken in by who accounts for it."""
+        self._unread += isinstance(message, Reception)
+        if self._actor.hears_out:
+            self._actor.receive(topic, message, now_ns)
 
     # --- in -------------------------------------------------------------------------------------------------------
 
@@ -241,6 +254,7 @@ class RealtimeHost:
             "stall_ms": round(self._stall_ns / MS, 3),
             "cpu_s": round(usage.ru_utime + usage.ru_stime, 3),
             "uss_mb": uss_mb() if final else None,  # asking holds up the process for more than a millisecond
+            "unread_receptions": self._unread,
             "puts": self._puts,
             **self._inbox.figures(),
         }

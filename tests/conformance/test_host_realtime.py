@@ -23,10 +23,10 @@ from fanet_mw.hosts.clock import ClockKeeper, ClockListener, SwarmClock
 from fanet_mw.hosts.lateness import Histogram
 from fanet_mw.hosts.realtime import run_actor
 from fanet_mw.hosts.timebase import THIS_MACHINE, Timebase
-from fanet_mw.messages import Clock, ClockState, MavlinkTap, Message, Report, TraceBatch
+from fanet_mw.messages import Clock, ClockState, MavlinkTap, Message, Reception, Report, TraceBatch
 from fanet_mw.topics import Topics
 from fanet_mw.trace import ProcessEnded
-from fanet_mw.units import MS, S
+from fanet_mw.units import MS, NodeId, S
 from sim.swarm import free_endpoint
 
 NAMES = Topics("host")
@@ -161,6 +161,34 @@ async def test_an_instant_that_was_past_when_it_was_asked_for_is_not_the_hosts_l
     assert 10_000 <= host["asked_past_ms"] < 10_500
     assert host["wake_lateness_ms"]["max"] < 500
     assert host["stall_ms"] < 500
+
+
+class Accounts(Ticker):
+    """Counts what others send, also what was on its way at the end."""
+
+    hears_out = True
+
+
+@pytest.mark.parametrize("actor", [Ticker(hears=(NAMES.pose,)), Accounts(hears=(NAMES.pose,))], ids=["node", "medium"])
+async def test_what_was_on_its_way_at_the_end_is_counted_or_still_heard(
+    actor: Ticker, monkeypatch: pytest.MonkeyPatch
+) -> None:
+    monkeypatch.setattr("fanet_mw.hosts.realtime._ON_ITS_WAY_S", 1.0)  # a busy machine wakes this test late, too
+    endpoint, until_ns = free_endpoint(), 500 * MS
+    with Bus.serve(endpoint) as bus:
+        observer = Observer(bus)
+        keeper = ClockKeeper(bus, NAMES, time_scale=1.0, expected=[actor.name])
+        host = asyncio.create_task(run_actor(actor, swarm="host", endpoint=endpoint, until_ns=until_ns))
+        clock = SwarmClock(await keeper.start(timeout_s=5))
+        await asyncio.sleep(clock.wait_s(until_ns + 30 * MS))
+        bus.put(NAMES.pose, topics.encode([Reception(b"last", NodeId(2), until_ns, -60.0)]))
+        await host
+        await asyncio.sleep(0.1)
+    figures = observer.reports()[-1]["host"]
+    assert isinstance(figures, dict)
+    assert figures["unread_receptions"] == 1
+    assert len(actor.heard) == actor.hears_out
+    assert actor.stopped_ns == until_ns
 
 
 class HoldsUp(Ticker):

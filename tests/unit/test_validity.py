@@ -16,9 +16,9 @@ from sim.outcome import Outcome
 from sim.report import show
 from sim.world import World
 
-SENT = 2000
+SENT = 4000
 """Requests of each of the two nodes."""
-HEARD = 10_000
+HEARD = 20_000
 Change = Callable[[Outcome], object]
 
 
@@ -125,17 +125,21 @@ def test_what_is_lost_in_different_ways_adds_up(scenario: Scenario) -> None:
     put(outcome, "agent-1", "missed_turns", value=round(2 * SENT * 0.3 * validity.LOST))
     assert reasons(outcome) == []
     put(outcome, "agent-1", "missed_turns", value=round(2 * SENT * 0.6 * validity.LOST))
-    assert reasons(outcome) == ["lost on the bus, dropped as too late and missed, together: 0.600%, limit 0.500%"]
+    assert reasons(outcome) == ["lost on the bus, dropped as too late and missed, together: 0.300%, limit 0.250%"]
 
 
 BROKEN: dict[str, tuple[Change, str]] = {
     "a dead agent": (
         lambda outcome: outcome.ended.append(("agent-2", -9)),
-        "agent-2 ended before its time, with signal SIGKILL; none may",
+        "agent-2 ended before the end, with signal SIGKILL: 1, limit 0",
     ),
     "a dead world": (
         lambda outcome: outcome.ended.append(("world", 1)),
-        "world ended before its time, with exit code 1; none may",
+        "world ended before the end, with exit code 1: 1, limit 0",
+    ),
+    "many dead agents": (
+        lambda outcome: outcome.ended.extend([(f"agent-{node}", -15) for node in range(1, 10)]),
+        "agent-1, agent-2, agent-3, agent-4, agent-5 and 4 more ended before the end, with signal SIGTERM: 9, limit 0",
     ),
     "aborted": (lambda outcome: setattr(outcome, "aborted", "interrupted"), "partial result: interrupted"),
     "no report": (
@@ -178,8 +182,8 @@ def test_frames_that_a_dead_emulator_took_with_it_are_said_besides_its_death(sce
         value={"sent": 2 * SENT - 185, "delivered": 2 * SENT - 185, "in_flight": 0, "dropped": {}},
     )
     assert reasons(outcome) == [
-        "emulator ended before its time, with signal SIGKILL; none may",
-        "frames unaccounted for: 185 of 4000, limit 0",
+        "emulator ended before the end, with signal SIGKILL: 1, limit 0",
+        "frames unaccounted for: 185 of 8000, limit 0",
     ]
 
 
@@ -190,7 +194,7 @@ def test_a_run_in_virtual_time_is_judged_by_its_ledger_alone(scenario: Scenario)
         del outcome.reports[name]["final"], outcome.reports[name]["host"]  # type: ignore[attr-defined]
     assert reasons(outcome) == []
     put(outcome, "agent-1", "frames_sent", value=SENT + 1)
-    assert reasons(outcome) == ["frames unaccounted for: 1 of 4001, limit 0"]
+    assert reasons(outcome) == ["frames unaccounted for: 1 of 8001, limit 0"]
 
 
 def test_every_reason_is_printed(scenario: Scenario, capsys: pytest.CaptureFixture[str]) -> None:

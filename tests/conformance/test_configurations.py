@@ -1,5 +1,6 @@
-"""The constants of AODV and OLSR, as their RFCs list them; where they leave a choice, ns-3's."""
+"""The constants of AODV, OLSR and address resolution as RFCs list them; where they leave a choice, ns-3's."""
 
+from fanet_mw.routing import resolution
 from fanet_mw.routing.aodv import parameters as aodv
 from fanet_mw.routing.olsr import parameters as olsr
 from fanet_mw.units import MS, S
@@ -24,3 +25,9 @@ def test_olsr_has_the_values_of_rfc_3626_section_18() -> None:
     assert olsr.MAXJITTER_NS == 500 * MS
     names = (olsr.WILL_NEVER, olsr.WILL_LOW, olsr.WILL_DEFAULT, olsr.WILL_HIGH, olsr.WILL_ALWAYS)
     assert names == (0, 1, 3, 6, 7)
+
+
+def test_address_resolution_has_the_values_of_ns_3_s_arp() -> None:
+    assert (resolution.REQUEST_JITTER_NS, resolution.WAIT_REPLY_NS) == (10 * MS, 1 * S)
+    assert (resolution.MAX_RETRIES, resolution.PENDING) == (3, 3)
+    assert (resolution.ALIVE_NS, resolution.DEAD_NS) == (120 * S, 100 * S)

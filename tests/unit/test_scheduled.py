@@ -133,16 +133,16 @@ def test_a_bound_runs_from_application_to_application(make_scenario: MakeScenari
     node = Node(US, make_scenario(**keys), make_protocol, position=Enu(0.0, 0.0, 50.0))
     node.start(0)
     protocol_of(node)._plans = [planned(FLOODS)]
-    node.send(filler(40), destination=BROADCAST, priority=PRIORITY_BULK, app="test", born_ns=0, now_ns=0)
-    (stated,) = [record for record in node.records if isinstance(record, BoundStated)]
-    assert stated.bound_ns == (2 + 100 + 3 * 2 + handover_ms + 2) * MS
+    own = protocol_of(node)._own()
+    assert own is not None
+    assert own.worst_ns(interval_ns=1000 * MS) == (2 + 100 + 3 * 2 + handover_ms + 2) * MS
 
 
 def test_who_cannot_reach_everyone_promises_nothing(node: Node) -> None:
     protocol_of(node)._plans = [planned(FLOODS, unreached=(AFTER,))]
     node.send(filler(40), destination=BROADCAST, priority=PRIORITY_BULK, app="test", born_ns=0, now_ns=0)
     assert not [record for record in node.records if isinstance(record, BoundStated)]
-    assert protocol_of(node).bound_ns() is None
+    assert protocol_of(node)._own() is None
 
 
 @pytest.mark.parametrize(("due_ms", "earliest_ms", "latest_ms"), [(1010, 1010, 1010), (1050, 1100, 1135)])

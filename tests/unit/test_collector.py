@@ -5,6 +5,7 @@ import errno
 import json
 import os
 import struct
+import tracemalloc
 from array import array
 from collections.abc import Iterator
 from contextlib import closing
@@ -244,6 +245,37 @@ def test_sums_of_links_do_not_depend_on_how_many_reports_they_came_in(ear: Ear) 
     totals = ear.collector.links()
     assert [(row.received, row.rssi_dbm) for row in totals.rows()] == [(1000, -70.0)]
     assert len(totals._pending) < 64
+
+
+def test_what_is_kept_in_memory_does_not_grow_with_the_length_of_the_run(ear: Ear, genuine: Outcome) -> None:
+    """Ten stretches of a run of nine UAVs: a megabyte on disk, and as much in memory as after the second."""
+
+    def stretch() -> None:
+        for _ in range(15):
+            ear.now_ns += S
+            for node in SCENARIO.node_ids:
+                delivered = tuple(Delivered(S, node, 1 + i % 9, i, 5_000_000, 2) for i in range(20))
+                ear.say(NAMES.trace(f"agent-{node}"), TraceBatch(delivered))
+                ear.say(NAMES.mavlink(node), MavlinkTap(S, b""))
+            for name, text in reports.items():
+                ear.say(NAMES.report(name), Report(name, S, text))
+            ear.say(NAMES.radio_links, stats())
+            ear.say(NAMES.trace("agent-77"), TraceBatch(()))
+            ear.say(NAMES.report("agent-3"), Report("agent-3", S, "{}"))
+
+    reports = {name: json.dumps(content) for name, content in genuine.reports.items()}
+    stretch()
+    tracemalloc.start()
+    try:
+        stretch()
+        before = tracemalloc.get_traced_memory()[0]
+        for _ in range(8):
+            stretch()
+        grown = tracemalloc.get_traced_memory()[0] - before
+    finally:
+        tracemalloc.stop()
+    assert ear.collector._records.size > 800_000
+    assert grown < 50_000
 
 
 @pytest.mark.parametrize("topic", [NAMES.trace("agent-99"), NAMES.report("x" * 200), NAMES.mavlink(99)])

@@ -110,14 +110,14 @@ class Compared(NamedTuple):
             "" if self.can_disagree else "  (cannot disagree)",
         ]
         return (
-            f"{self.case:44} {m.key:20} {self.ours:8.4f} {m.ns3:8.4f} {theory} {self.ours - m.ns3:+8.4f} "
+            f"{self.case:50} {m.key:20} {self.ours:8.4f} {m.ns3:8.4f} {theory} {self.ours - m.ns3:+8.4f} "
             f"{self.tolerance:7.4f} {self.standard:8.4f} {self.standard - m.ns3:+8.4f}{''.join(marks)}"
         )
 
 
 _SHARES: Final = ("pdr", "air.pdr", "air.busy", "air.attempt_failure")
 HEAD: Final = (
-    f"{'case':44} {'figure':20} {'ours':>8} {'ns-3':>8} {'theory':>8} {'diff':>8} {'within':>7} "
+    f"{'case':50} {'figure':20} {'ours':>8} {'ns-3':>8} {'theory':>8} {'diff':>8} {'within':>7} "
     f"{'standard':>8} {'diff':>8}"
 )
 

@@ -11,6 +11,7 @@ from typing import Any, Final
 from agents.autopilot import Autopilot
 from agents.lookout import Lookout
 from agents.mission import Course, Mission
+from agents.steady_fix import SteadyFix
 from agents.traffic import Traffic
 from fanet_mw import mavlink, wire
 from fanet_mw.actor import Actor
@@ -49,6 +50,7 @@ class Uav(Actor):
         self._node = Node(node, scenario, make_protocol, position=position)
         self._traffic = Traffic(scenario, node)
         self._autopilot = Autopilot(node, position=position, telemetry_hz=scenario.nodes.telemetry_hz)
+        self._fixes = SteadyFix(sigma_m=scenario.world.gps_sigma_m, range_m=scenario.radio.range_m)
         self._mission = Mission(node, scenario.mission, altitude_m=scenario.nodes.altitude_m)
         self._lookout = Lookout(scenario, node) if scenario.mission.collision_horizon_s else None
         self._encoder = mavlink.Encoder(node)
@@ -100,7 +102,7 @@ class Uav(Actor):
                 self._own_wake_ns = self._next_own_ns()
         elif isinstance(message, Gps):
             self._autopilot.fix(message)
-            self._node.position, self._node.velocity = message.position, message.velocity
+            self._node.position, self._node.velocity = self._fixes.position(message), message.velocity
             self._mission.moved(message.position, now_ns=now_ns)
             if self._lookout is not None:
                 self._lookout.moved(self._motion(now_ns))

@@ -1,0 +1,53 @@
+"""Where a UAV takes itself to be when GPS errs by much: the fixes averaged along the way that its velocity tells.
+
+    estimate += velocity x time;  estimate += max(gain, 1 / fixes so far) x (fix - estimate)
+
+With fixes whose errors are independent the estimate errs by sqrt(gain / (2 - gain)) of a fix. A velocity is measured by
+Doppler shift, and far better than a position; an error of it shows as error x time between fixes / gain.
+"""
+
+import math
+from typing import Final
+
+from fanet_mw.messages import Gps
+from fanet_mw.units import Enu, S
+
+_WANTED: Final = 0.01
+"""Of the radio range: the error that timetables by places bear."""
+_NEGLIGIBLE: Final = 0.02
+"""Of the radio range: fixes that err by less are taken as they are."""
+
+
+class SteadyFix:
+    """One UAV's estimate."""
+
+    def __init__(self, *, sigma_m: float, range_m: float) -> None:
+        self._gain = gain(sigma_m=sigma_m, range_m=range_m)
+        self._at: Enu | None = None
+        self._t_ns = 0
+        self._count = 1
+        """Fixes so far: the first ones have equal weights."""
+
+    def position(self, fix: Gps) -> Enu:
+        """The estimate after another fix."""
+        if self._at is None or self._gain == 1.0:
+            self._at = fix.position
+        else:
+            seconds, v = (fix.t_ns - self._t_ns) / S, fix.velocity
+            here = Enu(
+                self._at.east + v.east * seconds, self._at.north + v.north * seconds, self._at.up + v.up * seconds
+            )
+            off = fix.position.minus(here)
+            self._count += 1
+            k = max(self._gain, 1 / self._count)
+            self._at = Enu(here.east + k * off.east, here.north + k * off.north, here.up + k * off.up)
+        self._t_ns = fix.t_ns
+        return self._at
+
+
+def gain(*, sigma_m: float, range_m: float) -> float:
+    """The weight of a fix, so that the estimate errs by `_WANTED`; 1 for fixes that are good enough."""
+    if sigma_m <= _NEGLIGIBLE * range_m:
+        return 1.0
+    share = _WANTED * range_m / sigma_m
+    return 2 * math.pow(share, 2) / (1 + math.pow(share, 2))

@@ -53,6 +53,8 @@ LIKELY_SHARE: Final = 0.99
 """Of the copies: what a node states a delay for when links lose frames."""
 _LATE_HELLO: Final = 1.1
 """Hello intervals between two hellos at most."""
+_BUSY: Final = 2
+"""How much longer a round of repair takes than when nobody else lacks anything: answers queue."""
 
 _BLOCK: Final = 300
 """Packets of a block at least; fewer are packed less densely, more take long."""
@@ -139,7 +141,8 @@ class Plan(NamedTuple):
             return None
         call_ns = self.turns.done_ns(self.calls, span=1)[0]
         flood_ns += self.turns.period_ns // len(self.roots)
-        return flood_ns + (RIPE_NS if rounds else 0) + rounds * (round(_LATE_HELLO * hello_ns) + 3 * call_ns)
+        round_ns = _BUSY * (round(_LATE_HELLO * hello_ns) + 3 * call_ns)
+        return flood_ns + (RIPE_NS if rounds else 0) + rounds * round_ns
 
 
 class _Wish(NamedTuple):

@@ -211,6 +211,10 @@ class Clustered(RoutingProtocol):
         packet = self._flood_control(Kind.SCHEDULE, self._announcement(part), now_ns=now_ns)
         self._learn(packet, now_ns=now_ns)
 
+    def _announcements(self, now_ns: int) -> Sequence[Schedule]:
+        """The parts of a schedule to announce now."""
+        return self._leader.wake(self._motion(now_ns), now_ns=now_ns) if self._leader else ()
+
     def _announcement(self, part: Schedule) -> bytes:
         """The inner frames of a schedule packet."""
         return part.encode_frame(self._port.node)
@@ -366,7 +370,7 @@ class Clustered(RoutingProtocol):
         self._do(self._upkeep.wake(now_ns), now_ns)
         if self._join_ns is not None and now_ns >= self._join_ns:
             self._join(now_ns)
-        for part in self._leader.wake(self._motion(now_ns), now_ns=now_ns) if self._leader else ():
+        for part in self._announcements(now_ns):
             self._announce(part, now_ns=now_ns)
         for packet in self._refresh.due(now_ns=now_ns):
             self._flood_again(packet, now_ns=now_ns)

@@ -40,24 +40,12 @@ _FIRST_CALL_NS: Final = 5 * S
 """The first leader calls only if nobody has joined by then."""
 _HEARD_NS: Final = 1500 * MS
 """An announcement has reached everyone after this."""
-_NOTICE_PERIODS: Final = 2
-_NOTICE_HOPS: Final = 24
-"""With a timetable: what was promised before all have heard of the next one must be through when that is in force. So
-there must be time for two waits of a superframe and two floods of a dozen hops: the schedule's and the packet's."""
 _ANNOUNCEMENTS: Final = 4
 """Over links that lose frames, an assignment has reached everyone after so many announcements."""
 _MOST: Final = 0.9
 """Of the nodes: when so many have told their links, those are used though some are missing."""
 _DRIFT: Final = 0.03
 """A timetable is made anew when more than this share of the links has changed."""
-
-
-def notice_ns(scenario: Scenario) -> int:
-    """How long before it comes into force a schedule is announced, at least."""
-    if scenario.clusters.relay != "scheduled":
-        return _HEARD_NS
-    hop_ns = scenario.radio.lead_ns + scenario.radio.handover_ns
-    return _HEARD_NS + _NOTICE_PERIODS * scenario.clusters.period_ns + _NOTICE_HOPS * hop_ns
 
 
 class _StandIn(NamedTuple):
@@ -99,7 +87,6 @@ class Leader:
         self._reassign_ns = seconds_to_ns(clusters.reassign_s)
         self._range_m = clusters.link_m or scenario.radio.range_m
         self._by_links = clusters.relay == "scheduled"
-        self._notice_ns = notice_ns(scenario)
         self._objection_ns = max(OBJECTION_NS, _OBJECTION_PERIODS * clusters.period_ns if self._by_links else 0)
         self._division = Division(clusters.method, count=clusters.count, range_m=self._range_m)
         self._epoch = epoch
@@ -148,13 +135,16 @@ class Leader:
     def next_wake_ns(self) -> int:
         return self._due_ns
 
-    def wake(self, here: Motion, *, now_ns: int) -> Sequence[Schedule]:
-        """The schedule parts to announce now; `here`: the leader itself."""
+    def wake(self, here: Motion, *, notice_ns: int = 0, now_ns: int) -> Sequence[Schedule]:
+        """The schedule parts to announce now; `here`: the leader itself.
+
+        New ones come into force `notice_ns` after this at the soonest, and not before all should have heard of them.
+        """
         if now_ns < self._due_ns:
             return []
         self._forget(now_ns)
         if self._motions and now_ns >= self._not_before_ns:
-            self._renew(here, now_ns)
+            self._renew(here, notice_ns, now_ns)
         self._due_ns = now_ns + (self._measured_ns if self._assigned.measured else self._period_ns)
         if now_ns < self._not_before_ns:
             self._due_ns = min(self._due_ns, self._not_before_ns)
@@ -179,7 +169,7 @@ class Leader:
             ):
                 del self._motions[node]
 
-    def _renew(self, here: Motion, now_ns: int) -> None:
+    def _renew(self, here: Motion, notice_ns: int, now_ns: int) -> None:
         """Another epoch, if there is a reason."""
         before = self._assigned
         changed = sorted(self._motions) != sorted(before.nodes)
@@ -187,7 +177,8 @@ class Leader:
         measured = self._measured()
         if not changed and rests and not (measured and not before.measured):
             return
-        notice_ns = max(self._notice_ns, _ANNOUNCEMENTS * self._measured_ns if before.measured else 0)
+        measured_ns = _ANNOUNCEMENTS * self._measured_ns if before.measured else 0
+        notice_ns = max(_HEARD_NS, notice_ns, measured_ns)
         start_ns = (now_ns + notice_ns) // self._period_ns * self._period_ns + self._period_ns
         places = self._places(here, start_ns)
         members = {node: place for node, place in places.items() if node != self._authority.leader}

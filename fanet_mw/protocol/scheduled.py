@@ -7,7 +7,7 @@ heard outside of any turn is not relayed. Until a timetable is in force, and for
 `clustered` hold; then all but floods of data contend in the window at the beginning of each superframe.
 """
 
-from collections.abc import Mapping
+from collections.abc import Mapping, Sequence
 from typing import Final
 
 from fanet_mw.errors import DropReason, MalformedFrameError
@@ -19,7 +19,6 @@ from fanet_mw.protocol.arrival import decoded
 from fanet_mw.protocol.call_release import CallRelease
 from fanet_mw.protocol.clustered import Clustered
 from fanet_mw.protocol.contract import Port
-from fanet_mw.protocol.leader import notice_ns
 from fanet_mw.protocol.lease import Authority
 from fanet_mw.protocol.membership import Version
 from fanet_mw.protocol.own_bound import Own
@@ -30,7 +29,7 @@ from fanet_mw.protocol.turns import clocks_fit, receipt_ns
 from fanet_mw.protocol.txqueue import Packet, TxQueue, sooner_us
 from fanet_mw.protocol.urgent import reserved
 from fanet_mw.trace import BoundStated
-from fanet_mw.units import MS, US, Enu, NodeId, S, earliest, seconds_to_ns
+from fanet_mw.units import MS, US, Enu, NodeId, earliest, seconds_to_ns
 from fanet_mw.wire import PRIORITY_BULK, PRIORITY_REPORT, PRIORITY_SAFETY, Kind
 from fanet_mw.wire_messages import Schedule
 
@@ -41,9 +40,9 @@ _MOST_ANSWERS: Final = 2
 _JITTER: Final = 0.25
 """Of the contention window: the most that a relay waits there."""
 _CLASSES: Final = {PRIORITY_SAFETY: "warning", PRIORITY_REPORT: "report", PRIORITY_BULK: "bulk"}
-_JOINED_NS: Final = 6 * S
-"""After its start a node should be in a schedule by then: joins take 3 s, a join may be lost, and the leader waits a
-moment for more."""
+_JOINED_NS: Final = 7500 * MS
+"""After its start a node should be in a timetable by then, and three superframes: joins take 3 s, a join may be lost,
+the leader waits a moment for more, and a timetable is announced ahead."""
 
 
 class Scheduled(Clustered):
@@ -72,6 +71,8 @@ class Scheduled(Clustered):
         self._missed = 0
         self._bounds_ns: list[Mapping[int, int]] = []
         """Of each plan, the bound of each class (by priority) of our own packets; a class that is missing has none."""
+        self._ahead: tuple[Plan, int] | None = None
+        """The plan looked at last, and how long before its end that must be announced."""
         self._interval_ns = seconds_to_ns(scenario.traffic.interval_s)
         self._admission = (
             None
@@ -80,7 +81,7 @@ class Scheduled(Clustered):
                 port.node,
                 deadline_ns=seconds_to_ns(scenario.traffic.deadline_s),
                 interval_ns=self._interval_ns,
-                expected_ns=_JOINED_NS + notice_ns(scenario) + scenario.clusters.period_ns,
+                expected_ns=_JOINED_NS + 3 * scenario.clusters.period_ns,
             )
         )
 
@@ -233,40 +234,48 @@ class Scheduled(Clustered):
         plan = self._plans[-1] if self._plans and self._links is None else None
         if plan is None or not plan.roots or not plan.whole or plan.table.uncovered[self._port.node]:
             return None
-        return Own(
-            plan.turns,
-            plan.roots,
-            plan.table.spans[self._port.node],
-            plan.together,
-            self._lead_ns + receipt_ns(self._port.scenario),
-        )
+        return self._own_of(self._port.node, plan)
+
+    def _own_of(self, node: NodeId, plan: Plan) -> Own:
+        offsets = plan.roots if node == self._port.node else tuple(plan.table.offsets_of(node))
+        around_ns = self._lead_ns + receipt_ns(self._port.scenario)
+        return Own(plan.turns, offsets, plan.table.spans[node], plan.together, around_ns)
 
     def _following(self, plan: Plan) -> Following:
         span = plan.table.spans.get(self._port.node, 1)
         return Following(plan.valid_ns, plan.turns, plan.roots, plan.frame_bytes, span)
 
     def _class_bounds_ns(self, own: Own | None) -> Mapping[int, int]:
-        """By priority. A packet that was accepted before another timetable was heard of must be through before that
-        comes into force: bounds longer than the notice that a leader gives are none. Nor is there one for repairs.
-        """
+        """By priority; none for what is repaired after it was lost."""
         scenario = self._port.scenario
         if own is None or scenario.clusters.repair_s:
             return {}
+        found = dict.fromkeys(self._reserved, own.burst_ns(per_turn=1))
         bulk_ns: int | None = own.burst_ns(per_turn=own.together)
         if scenario.traffic.arrivals == "cbr":
             interval_ns = self._admission.interval_ns if self._admission else self._interval_ns
             bulk_ns = own.worst_ns(interval_ns=interval_ns)
-        found = dict.fromkeys(self._reserved, own.burst_ns(per_turn=1))
-        if bulk_ns is not None:
-            found[PRIORITY_BULK] = bulk_ns
-        longest_ns = notice_ns(scenario) - self._learning_ns(self._plans[-1])
-        return {priority: bound_ns for priority, bound_ns in sorted(found.items()) if bound_ns <= longest_ns}
+        return found if bulk_ns is None else {**found, PRIORITY_BULK: bulk_ns}
 
-    def _learning_ns(self, plan: Plan) -> int:
-        """The longest time from a leader's decision until everyone has its schedule: a superframe, and a flood."""
-        spans, turns = plan.table.spans, plan.turns
-        flood_ns = max(turns.flood_ns(turn.offset, span=spans[turn.root]) for turn in plan.table.roots())
-        return self._lead_ns + turns.period_ns + flood_ns + receipt_ns(self._port.scenario)
+    def _announcements(self, now_ns: int) -> Sequence[Schedule]:
+        if self._leader is None:
+            return ()
+        notice_ns = max((self._ahead_ns(plan) for plan in self._plans[self._superseded(now_ns) :]), default=0)
+        return self._leader.wake(self._motion(now_ns), notice_ns=notice_ns, now_ns=now_ns)
+
+    def _ahead_ns(self, plan: Plan) -> int:
+        """How long before this timetable ends its end must be announced, for every promise under it to be kept.
+
+        All have heard of it after a superframe and a flood; what anyone has promised until then must be through.
+        """
+        if self._ahead is None or self._ahead[0] is not plan:
+            roots = {turn.root for turn in plan.table.roots()} if plan.whole else set()
+            owns = [self._own_of(root, plan) for root in sorted(roots)]
+            bounds = [bound_ns for own in owns for bound_ns in self._class_bounds_ns(own).values()]
+            floods = [own.turns.flood_ns(offset, span=own.span) for own in owns for offset in own.roots]
+            learnt_ns = plan.turns.period_ns + max(floods, default=0) + self._lead_ns + receipt_ns(self._port.scenario)
+            self._ahead = plan, learnt_ns + max(bounds) if bounds else 0
+        return self._ahead[1]
 
     def _admit(self, own: Own | None, *, now_ns: int) -> None:
         """The timetable has changed, or there is none for the swarm as it is now."""

@@ -60,6 +60,10 @@ class Timetable(NamedTuple):
             first.setdefault((turn.root, turn.instance), turn)
         return list(first.values())
 
+    def offsets_of(self, root: NodeId) -> list[int]:
+        """The turns in which one root lets packets out, ascending."""
+        return sorted(turn.offset for turn in self.turns if turn.node == turn.root == root)
+
 
 @lru_cache(maxsize=16)
 def timetable(

@@ -1,6 +1,7 @@
 """Measured tables of docs/protocol.md. Each costs minutes; what two tables need is measured once."""
 
 import statistics
+from collections.abc import Sequence
 from functools import lru_cache
 from typing import Any, Final
 
@@ -8,7 +9,7 @@ from scripts.rivals import connectivity
 from sim import catalog
 from sim.results import finish
 from sim.run import simulate
-from tests.benchmarks import clock_sync, protocol_cost
+from tests.benchmarks import clock_sync, collision_warnings, protocol_cost
 from tests.tables.markdown import Rows
 
 _SPEEDS: Final = (0, 10, 20)
@@ -36,6 +37,68 @@ _LOADED: Final = {
     ),
     "plain flooding": ("routing.protocol=flooding", "routing.hello_interval_s=0"),
 }  # fmt: skip
+
+
+_BOUNDED: Final = (
+    (44, 0.5, "range"), (44, 1, "range"), (44, 0.5, "log_distance"), (8, 0.5, "range"), (4, 0.5, "range"),
+    (22, 0.5, "range"),
+)  # fmt: skip
+_DISTURBED: Final = (
+    ("mission.survivors=16",),
+    ("traffic.arrivals=poisson",),
+    ("radio.lead_ms=40", "radio.handover_ms=20"),
+    ("clusters.repair_s=20",),
+    ("radio.channel=log_distance", "radio.shadowing_db=4"),
+    ("radio.channel=log_distance", "radio.fading=rician"),
+)
+
+
+def bounds() -> Rows:
+    """Scenario `clusters`: deliveries from application to application, under what their origins stated."""
+    rows = [
+        [
+            "`clusters.count`",
+            "flooding period",
+            "channel",
+            "PDR, seeds 1-3",
+            "within",
+            "worst delay / bound [ms]",
+            "broken",
+        ]
+    ]
+    for count, period_s, channel in _BOUNDED:
+        keys = (f"clusters.count={count}", f"clusters.flooding_period_s={period_s}", f"radio.channel={channel}")
+        rows.append([f"{count}", f"{period_s:g} s", f"`{channel}`", *_bound_cells(keys)])
+    return rows
+
+
+def promises() -> Rows:
+    """The same with what may break a bound, or leave a packet without one."""
+    rows = [["changed", "PDR, seeds 1-3", "packets with a bound", "within", "worst delay / bound [ms]", "broken"]]
+    for keys in _DISTURBED:
+        found = [_summary("clusters", "duration_s=30", f"seed={seed}", *keys)["bound"] for seed in _SEEDS]
+        stated = statistics.fmean(bound.get("stated_share", 0.0) for bound in found)
+        pdr, *cells = _bound_cells(keys)
+        rows.append([", ".join(f"`{key}`" for key in keys), pdr, f"{stated:.3f}", *cells])
+    return rows
+
+
+def _bound_cells(keys: Sequence[str]) -> list[str]:
+    """PDR, share within the bound, the worst delay and the bound, and how often it was broken."""
+    found = [_summary("clusters", "duration_s=30", f"seed={seed}", *keys) for seed in _SEEDS]
+    stated = [summary["bound"] for summary in found if summary["bound"]]
+    pdr = f"{statistics.fmean(summary['pdr'] for summary in found):.4f}"
+    if not stated:
+        return [pdr, "-", "-", "-"]
+    within = statistics.fmean(bound["within_share"] for bound in stated)
+    worst = max(stated, key=lambda bound: float(bound["observed_max_ms"] / bound["worst_ms"]))
+    broken = sum(bound["violations"] for bound in stated)
+    return [pdr, f"{within:.4f}", f"{worst['observed_max_ms']:.0f} / {worst['worst_ms']:.0f}", f"{broken}"]
+
+
+def warnings() -> Rows:
+    """Scenario `crossing`: what collision warnings are worth, and how they fare under load."""
+    return collision_warnings.rows(seeds=len(_SEEDS))
 
 
 def goodput() -> Rows:
@@ -87,5 +150,6 @@ def _clocks() -> clock_sync.Measured:
     return clock_sync.measured(seeds=len(_SEEDS))
 
 
+@lru_cache(maxsize=64)
 def _summary(scenario: str, *settings: str) -> dict[str, Any]:
     return finish(simulate(catalog.find(scenario, list(settings))), out=None)

@@ -32,6 +32,9 @@ TABLES: Final[Mapping[str, Table]] = {
     "ns3-points": Table("emulator.md", emulator.points, Tolerance(absolute=0.005, relative=0.01)),
     "closed-forms": Table("emulator.md", emulator.closed_forms, Tolerance(relative=0.01)),
     "error-rates": Table("emulator.md", emulator.error_rates, Tolerance(absolute=0.05)),
+    "bounds": Table("protocol.md", protocol.bounds, Tolerance(absolute=0.002, relative=0.05)),
+    "promises": Table("protocol.md", protocol.promises, Tolerance(absolute=0.02, relative=0.1)),
+    "warnings": Table("protocol.md", protocol.warnings, Tolerance(absolute=0.1, relative=0.3)),
     "goodput": Table("protocol.md", protocol.goodput, Tolerance(absolute=0.02, relative=0.1)),
     "rivals": Table("protocol.md", protocol.rivals, Tolerance(absolute=0.02, relative=0.1)),
     "protocol-cost": Table(

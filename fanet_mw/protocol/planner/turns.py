@@ -84,7 +84,7 @@ def judge(
     `control`: announcements per period, which go before everything.
     """
     table, turns = found.table, found.turns
-    offsets = tuple(sorted(turn.offset for turn in table.roots() if turn.node == candidate.head))
+    offsets = tuple(table.offsets_of(NodeId(candidate.head)))
     span = table.spans.get(candidate.head, 1)
     root = _Root(Own(turns, offsets, span, found.together, lead_ns + receipt_ns), lead_ns, jitter_ns, control)
     relays = sum(1 for turn in table.turns if turn.root == candidate.head and turn.instance == 0)

@@ -38,7 +38,7 @@ ANSWER_NS: Final = 3500 * MS
 """Joins that answer a call have come after this: they are spread over 3 s."""
 _FIRST_CALL_NS: Final = 5 * S
 """The first leader calls only if nobody has joined by then."""
-_HEARD_NS: Final = 1500 * MS
+HEARD_NS: Final = 1500 * MS
 """An announcement has reached everyone after this."""
 _ANNOUNCEMENTS: Final = 4
 """Over links that lose frames, an assignment has reached everyone after so many announcements."""
@@ -178,7 +178,7 @@ class Leader:
         if not changed and rests and not (measured and not before.measured):
             return
         measured_ns = _ANNOUNCEMENTS * self._measured_ns if before.measured else 0
-        notice_ns = max(_HEARD_NS, notice_ns, measured_ns)
+        notice_ns = max(HEARD_NS, notice_ns, measured_ns)
         start_ns = (now_ns + notice_ns) // self._period_ns * self._period_ns + self._period_ns
         places = self._places(here, start_ns)
         members = {node: place for node, place in places.items() if node != self._authority.leader}

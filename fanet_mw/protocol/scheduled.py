@@ -19,6 +19,7 @@ from fanet_mw.protocol.arrival import decoded
 from fanet_mw.protocol.call_release import CallRelease
 from fanet_mw.protocol.clustered import Clustered
 from fanet_mw.protocol.contract import Port
+from fanet_mw.protocol.leader import HEARD_NS
 from fanet_mw.protocol.lease import Authority
 from fanet_mw.protocol.membership import Version
 from fanet_mw.protocol.own_bound import Own
@@ -71,6 +72,8 @@ class Scheduled(Clustered):
         self._missed = 0
         self._bounds_ns: list[Mapping[int, int]] = []
         """Of each plan, the bound of each class (by priority) of our own packets; a class that is missing has none."""
+        self._told_ns: dict[Version, int] = {}
+        """When the leader made the latest announcement that has reached us, of the newest schedule and of what we follow."""
         self._ahead: tuple[Plan, int] | None = None
         """The plan looked at last, and how long before its end that must be announced."""
         self._interval_ns = seconds_to_ns(scenario.traffic.interval_s)
@@ -115,6 +118,10 @@ class Scheduled(Clustered):
             if self._measured and _version_of(next(iter(self._measured.values()))) != version:
                 self._measured = {}
         self._schedules[schedule.part] = schedule, places
+        told = {version: packet.header.origin_us * US}
+        if self._planned is not None and self._planned != version:
+            told[self._planned] = self._told_ns.get(self._planned, 0)
+        self._told_ns = told
         self._plan_if_complete(now_ns)
 
     def _announce(self, part: Schedule, *, now_ns: int) -> None:
@@ -182,7 +189,7 @@ class Scheduled(Clustered):
             self._plans, self._bounds_ns = [], []  # not one packet of each head fits; `fanet plan` says so
             self._admit(None, now_ns=now_ns)
         else:
-            valid_ns = max(now_ns, schedule.start_us * US)
+            valid_ns = schedule.start_us * US
             over = self._superseded(now_ns)
             self._plans = [*self._plans[over:], Plan.of(self._port.node, valid_ns, found)]
             own = self._own()
@@ -264,7 +271,7 @@ class Scheduled(Clustered):
         return self._leader.wake(self._motion(now_ns), notice_ns=notice_ns, now_ns=now_ns)
 
     def _ahead_ns(self, plan: Plan) -> int:
-        """How long before this timetable ends its end must be announced, for every promise under it to be kept.
+        """How long before this timetable ends its end is announced, for every promise under it to be kept.
 
         All have heard of it after a superframe and a flood; what anyone has promised until then must be through.
         """
@@ -274,7 +281,7 @@ class Scheduled(Clustered):
             bounds = [bound_ns for own in owns for bound_ns in self._class_bounds_ns(own).values()]
             floods = [own.turns.flood_ns(offset, span=own.span) for own in owns for offset in own.roots]
             learnt_ns = plan.turns.period_ns + max(floods, default=0) + self._lead_ns + receipt_ns(self._port.scenario)
-            self._ahead = plan, learnt_ns + max(bounds) if bounds else 0
+            self._ahead = plan, max(HEARD_NS, learnt_ns + max(bounds)) if bounds else HEARD_NS
         return self._ahead[1]
 
     def _admit(self, own: Own | None, *, now_ns: int) -> None:
@@ -302,9 +309,12 @@ class Scheduled(Clustered):
             return  # schedules go before it
         bound_ns = max(known)
         through_ns = self._roots.through_ns(packet, now_ns=now_ns)
-        if through_ns is not None and through_ns + receipt_ns(self._port.scenario) <= (
-            packet.header.origin_us * US + bound_ns
-        ):
+        if through_ns is None:
+            return
+        had_ns = through_ns + receipt_ns(self._port.scenario)
+        told_ns = self._told_ns.get(self._planned, 0) if self._planned is not None else 0
+        known_ns = told_ns + self._ahead_ns(self._plans[-1])  # another timetable comes into force no sooner
+        if had_ns <= min(packet.header.origin_us * US + bound_ns, known_ns):
             self._port.record(BoundStated(now_ns, self._port.node, packet.header.seq, bound_ns))
 
     # --- letting out ----------------------------------------------------------------------------------------------
@@ -351,6 +361,8 @@ class Scheduled(Clustered):
             return
         turn = plan.turns.turn_at(reception.end_ns)
         heard = None if turn is None else plan.heard.get((turn, reception.src))
+        if heard is not None and plan.whole and packet.header.origin != heard[1] and plan.has_turns(packet.origin):
+            return  # its sender follows another timetable
         if heard is None:
             if packet.header.kind != Kind.DATA:
                 super()._flood_on(packet, reception, now_ns=now_ns)

@@ -127,6 +127,10 @@ class Plan(NamedTuple):
             odds=found.odds,
         )
 
+    def has_turns(self, node: NodeId) -> bool:
+        """Whether this node lets its packets out itself."""
+        return node in self.table.spans
+
     def likely_ns(self, node: NodeId, *, interval_ns: int, hello_ns: int) -> int | None:
         """Within which time `LIKELY_SHARE` of the copies of this node's packets arrive; None: the odds are worse.
 

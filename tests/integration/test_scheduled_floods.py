@@ -22,7 +22,7 @@ def test_on_the_grid_every_packet_reaches_everyone_within_the_bound(period_s: fl
     bound = summary["bound"]
     assert bound["violations"] == 0
     assert bound["classes"]["traffic"]["deliveries"] > 15_000
-    assert 0.9 < bound["observed_max_ms"] / bound["worst_ms"] <= 1
+    assert 0.8 < bound["observed_max_ms"] / bound["worst_ms"] <= 1
     assert summary["frames"]["closes"]
 
 

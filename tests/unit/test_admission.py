@@ -44,7 +44,7 @@ def test_packets_that_come_too_soon_are_refused_and_do_not_count() -> None:
 def test_packets_that_each_come_a_little_too_soon_do_not_add_up() -> None:
     """Half a microsecond is rounding, again and again it is a higher rate."""
     own = Own(Turns(0, 500 * MS, 40 * MS, 2 * MS, 230), (0,), 10)
-    admission = Admission(ME, deadline_ns=600 * MS, interval_ns=500 * MS)
+    admission = Admission(ME, deadline_ns=600 * MS, interval_ns=500 * MS, expected_ns=EXPECTED_NS)
     admission.follow(own, now_ns=0)
     admitted = [admission.admits(number * (500 * MS - 500)) for number in range(10)]
     assert admitted[:2] == [True, True]

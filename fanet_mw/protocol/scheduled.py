@@ -73,7 +73,7 @@ class Scheduled(Clustered):
         self._bounds_ns: list[Mapping[int, int]] = []
         """Of each plan, the bound of each class (by priority) of our own packets; a class that is missing has none."""
         self._told_ns: dict[Version, int] = {}
-        """When the leader made the latest announcement that we know, of the newest schedule and of the one we follow."""
+        """When the leader made the latest announcement known, of the newest schedule and of the one that is followed."""
         self._ahead: tuple[Plan, int] | None = None
         """The plan looked at last, and how long before its end that must be announced."""
         self._interval_ns = seconds_to_ns(scenario.traffic.interval_s)

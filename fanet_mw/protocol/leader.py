@@ -97,6 +97,7 @@ class Leader:
         """How often an assignment is announced whose links have been measured: once per superframe."""
         self._assigned = _Assigned()
         self._due_ns = now_ns if elected else now_ns + _FIRST_CALL_NS
+        self._announced_ns = now_ns
         self._not_before_ns = now_ns + ANSWER_NS if elected else now_ns
 
     def joined(self, join: Join, *, born_ns: int, now_ns: int) -> None:
@@ -148,6 +149,7 @@ class Leader:
         self._due_ns = now_ns + (self._measured_ns if self._assigned.measured else self._period_ns)
         if now_ns < self._not_before_ns:
             self._due_ns = min(self._due_ns, self._not_before_ns)
+        self._announced_ns = now_ns
         return self._assigned.parts or [self._call(now_ns)]
 
     def _call(self, now_ns: int) -> Schedule:
@@ -179,7 +181,8 @@ class Leader:
             return
         measured_ns = _ANNOUNCEMENTS * self._measured_ns if before.measured else 0
         notice_ns = max(HEARD_NS, notice_ns, measured_ns)
-        start_ns = (now_ns + notice_ns) // self._period_ns * self._period_ns + self._period_ns
+        decided_ns = max(now_ns, self._announced_ns + self._period_ns)  # who heard the last one expects no news before
+        start_ns = (decided_ns + notice_ns) // self._period_ns * self._period_ns + self._period_ns
         places = self._places(here, start_ns)
         members = {node: place for node, place in places.items() if node != self._authority.leader}
         links = within_range(places, range_m=self._range_m) if not measured else adjacency(measured, places)

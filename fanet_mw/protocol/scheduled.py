@@ -73,7 +73,7 @@ class Scheduled(Clustered):
         self._bounds_ns: list[Mapping[int, int]] = []
         """Of each plan, the bound of each class (by priority) of our own packets; a class that is missing has none."""
         self._told_ns: dict[Version, int] = {}
-        """When the leader made the latest announcement known, of the newest schedule and of the one that is followed."""
+        """When the leader made the latest announcement that we know of the newest schedule, and of what we follow."""
         self._ahead: tuple[Plan, int] | None = None
         """The plan looked at last, and how long before its end that must be announced."""
         self._interval_ns = seconds_to_ns(scenario.traffic.interval_s)
@@ -313,7 +313,8 @@ class Scheduled(Clustered):
             return
         had_ns = through_ns + receipt_ns(self._port.scenario)
         told_ns = self._told_ns.get(self._planned, 0) if self._planned is not None else 0
-        known_ns = told_ns + self._ahead_ns(self._plans[-1])  # another timetable comes into force no sooner
+        newest = self._plans[-1]
+        known_ns = told_ns + newest.turns.period_ns + self._ahead_ns(newest)  # no other comes into force sooner
         if had_ns <= min(packet.header.origin_us * US + bound_ns, known_ns):
             self._port.record(BoundStated(now_ns, self._port.node, packet.header.seq, bound_ns))
 

@@ -237,7 +237,7 @@ class RedundantPacking:
             return
         served: dict[int, int] = {}
         for _, number, row, offer in offers:
-            if (there.sending | there.barred) >> row & 1:
+            if number not in under_way or (there.sending | there.barred) >> row & 1:
                 continue
             receivers, worth = self._receivers(offer, there.sending | served.get(number, 0), there.sending)
             if worth < offer.worth if under_way[number].call else 2 * worth < offer.worth:

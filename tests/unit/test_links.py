@@ -3,7 +3,7 @@
 import math
 
 import pytest
-from hypothesis import given, settings
+from hypothesis import example, given, settings
 from hypothesis import strategies as st
 
 from fanet_mw.errors import MalformedFrameError
@@ -218,6 +218,35 @@ def test_every_node_gets_its_dose_from_holders_undisturbed(links: tuple[Link, ..
 
 
 @settings(max_examples=25, deadline=None)
+@st.composite
+def any_network(draw: st.DrawFn) -> tuple[int, tuple[Link, ...], int]:
+    """A few nodes, links of any quality between any of them, and so many turns."""
+    count = draw(st.integers(3, 5))
+    pairs = [(a, b) for a in range(1, count + 1) for b in range(a + 1, count + 1) if draw(st.booleans())]
+    grades, powers = st.sampled_from([0, 5, 10, 30, 60, 120, 200]), st.sampled_from([-60, -75, -80, -85, -95])
+    return (
+        count,
+        tuple(Link(NodeId(a), NodeId(b), draw(grades), draw(powers)) for a, b in pairs),
+        draw(st.integers(5, 40)),
+    )
+
+
+@settings(max_examples=100, deadline=None)
+@example(
+    (4, tuple(Link(NodeId(a), NodeId(b), grade, power) for a, b, grade, power in [
+        (1, 2, 10, -75), (1, 3, 120, -60), (1, 4, 30, -95), (2, 3, 60, -95), (2, 4, 120, -85), (3, 4, 30, -85),
+    ]), 15),
+)  # fmt: skip
+@given(any_network())
+def test_any_measured_links_give_a_timetable_or_none(drawn: tuple[int, tuple[Link, ...], int]) -> None:
+    """A wave may be over while further frames of it were on offer for the same turn."""
+    count, links, turns = drawn
+    places = tuple((NodeId(node), Enu(100.0 * node, 0.0, 0.0)) for node in range(1, count + 1))
+    roots, geometry = tuple(node for node, _ in places), Geometry(100, 100, turns, 1)
+    found = redundant_timetable(places, links, roots, geometry, calls=1, epsilon=0.01, margin_db=3)
+    assert found is None or found[0].roots()
+
+
 @given(measured())
 def test_in_a_call_all_neighbors_hear_the_caller(links: tuple[Link, ...]) -> None:
     table = planned(links, epsilon=0.3)

@@ -10,6 +10,8 @@ import pytest
 from fanet_mw import wire
 from fanet_mw.errors import DropReason
 from fanet_mw.messages import Reception
+from fanet_mw.protocol.lease import Authority
+from fanet_mw.protocol.membership import Version
 from fanet_mw.protocol.node import Node
 from fanet_mw.protocol.scheduled import Scheduled
 from fanet_mw.protocol.timetable import Timetable, Turn
@@ -143,6 +145,73 @@ def test_who_cannot_reach_everyone_promises_nothing(node: Node) -> None:
     node.send(filler(40), destination=BROADCAST, priority=PRIORITY_BULK, app="test", born_ns=0, now_ns=0)
     assert not [record for record in node.records if isinstance(record, BoundStated)]
     assert protocol_of(node)._own() is None
+
+
+def informed(node: Node, *, told_ms: int) -> Scheduled:
+    """The node follows a timetable, and heard an announcement of it that was made at an instant."""
+    protocol = protocol_of(node)
+    protocol._planned = Version(Authority(0, ROOT), 1)
+    protocol._told_ns = {protocol._planned: told_ms * MS}
+    protocol._bounds_ns = [protocol._class_bounds_ns(protocol._own())]
+    protocol._roots.follow([protocol._following(plan) for plan in protocol._plans], now_ns=told_ms * MS)
+    return protocol
+
+
+def promised(node: Node, *, at_ms: int) -> list[BoundStated]:
+    node.send(
+        filler(40), destination=BROADCAST, priority=PRIORITY_BULK, app="test", born_ns=at_ms * MS, now_ns=at_ms * MS
+    )
+    return [record for record in node.records if isinstance(record, BoundStated)]
+
+
+BOUND_NS = (2 + 100 + 3 * 2 + 2) * MS
+
+
+@pytest.mark.parametrize(("told_ms", "is_promised"), [(10_000, True), (9_972, True), (9_971, False), (9_000, False)])
+def test_a_promise_reaches_as_far_as_the_leader_gives_notice(node: Node, told_ms: int, is_promised: bool) -> None:
+    """A packet of 11562 ms leaves at 11564 ms; three turns and a lead later, at 11572 ms, applications have it.
+
+    No timetable that was announced after `told_ms` comes into force sooner than a superframe and 1.5 s later.
+    """
+    informed(node, told_ms=told_ms)
+    expected = [BoundStated(11_562 * MS, US, 0, BOUND_NS)] if is_promised else []
+    assert promised(node, at_ms=11_562) == expected
+
+
+@pytest.mark.parametrize(("before", "is_promised"), [(0, True), (1, False)])
+def test_a_promise_counts_what_waits(node: Node, before: int, is_promised: bool) -> None:
+    """One packet more than a turn holds is through a superframe later than the bound."""
+    informed(node, told_ms=0)
+    for _ in range(before):
+        node.send(filler(900), destination=BROADCAST, priority=PRIORITY_BULK, app="test", born_ns=0, now_ns=0)
+    node.records.clear()
+    node.send(filler(900), destination=BROADCAST, priority=PRIORITY_BULK, app="test", born_ns=0, now_ns=0)
+    assert any(isinstance(record, BoundStated) for record in node.records) is is_promised
+
+
+def test_a_leader_promises_nothing_for_bulk(node: Node) -> None:
+    protocol = informed(node, told_ms=0)
+    protocol._lease.take_office(0)
+    protocol._lead(elected=False, now_ns=0)
+    assert promised(node, at_ms=0) == []
+
+
+def test_what_is_repaired_after_it_was_lost_has_no_bound(make_scenario: MakeScenario) -> None:
+    keys = {"nodes.count": 5, "clusters.relay": "scheduled", "clusters.flooding_period_s": 0.1, "clusters.repair_s": 5}
+    node = Node(US, make_scenario(**keys), make_protocol, position=Enu(0.0, 0.0, 50.0))
+    node.start(0)
+    protocol_of(node)._plans = [planned(FLOODS)]
+    informed(node, told_ms=0)
+    assert promised(node, at_ms=0) == []
+
+
+def test_a_flood_of_whoever_follows_another_timetable_is_not_relayed(node: Node) -> None:
+    """In this turn the node expects a packet of the root, and hears one of another node that has turns too."""
+    end_ns = TURNS.start_ns(5, frame_start_ns=1000 * MS) + MS
+    for seq, origin in ((1, US), (2, ROOT)):
+        header = Header(end_ns // 1000 - 5000, seq, origin, BROADCAST, ROOT, Kind.DATA, 9, 0, 3, FLAG_FLOOD)
+        node.hear(Reception(header.encode() + filler(40), ROOT, end_ns, -60.0), end_ns)
+    assert relays(node) == [1056.0], "only that of the root"
 
 
 @pytest.mark.parametrize(("due_ms", "earliest_ms", "latest_ms"), [(1010, 1010, 1010), (1050, 1100, 1135)])

@@ -42,6 +42,20 @@ class BoundStated(NamedTuple):
     """From the application's hand-over to the other application's receipt."""
 
 
+class LikelyStated(NamedTuple):
+    """The origin stated, when it accepted a packet, within which delay at least this share of its copies arrive.
+
+    It says so instead of a bound, where links lose frames and what is lost is repaired.
+    """
+
+    t_ns: int
+    node: int
+    seq: int
+    delay_ns: int
+    """From the application's hand-over to the other application's receipt."""
+    share: float
+
+
 class Delivered(NamedTuple):
     """A packet was handed to the application of a node that it was meant for."""
 
@@ -203,6 +217,7 @@ Record = (
     Generated
     | LetOut
     | BoundStated
+    | LikelyStated
     | Delivered
     | Dropped
     | RoleChanged
@@ -224,6 +239,7 @@ _KINDS: Final[dict[str, type[Any]]] = {
     "generated": Generated,
     "let_out": LetOut,
     "bound_stated": BoundStated,
+    "likely_stated": LikelyStated,
     "delivered": Delivered,
     "dropped": Dropped,
     "role_changed": RoleChanged,
@@ -302,5 +318,5 @@ def parse(text: str) -> Record:
 __all__ = [
     "Approaching", "Arrived", "BoundStated", "ClockSampled", "Collided", "ConflictForeseen", "ConflictOver",
     "DeadlineLost", "DeadlineMet", "Delivered", "Detected", "DropReason", "Dropped", "Generated", "LetOut",
-    "ProcessEnded", "RadioFault", "Record", "RoleChanged", "Warned", "kind_of", "line", "parse",
+    "LikelyStated", "ProcessEnded", "RadioFault", "Record", "RoleChanged", "Warned", "kind_of", "line", "parse",
 ]  # fmt: skip

@@ -24,6 +24,34 @@ def against_bounds(applications: Mapping[str, Application]) -> dict[str, Any]:
     }
 
 
+def likely(applications: Mapping[str, Application]) -> dict[str, Any]:
+    """`likely` of `summary.json`: statements of (delay, share), held against the copies of the packets they are about.
+
+    within_share = deliveries within the delay stated for their packet / (packets with a statement x their targets)
+
+    Empty when no origin stated any. The statement holds when `within_share` is at least `share`.
+    """
+    stated = [
+        (app, name, sent.likely) for app in applications.values() for name, sent in app.sent.items() if sent.likely
+    ]
+    if not stated:
+        return {}
+    delays = {name: delay_ns for _, name, (delay_ns, _) in stated}
+    within = sum(
+        record.delay_ns <= delays.get((record.origin, record.seq), -1)
+        for app in applications.values()
+        for record in app.deliveries
+    )
+    wanted = sum(app.wanted / len(app.sent) for app, _, _ in stated)
+    packets = sum(len(app.sent) for app in applications.values())
+    return {
+        "share": min(share for _, _, (_, share) in stated),
+        "within_share": round(within / wanted, 6),
+        "stated_share": round(len(stated) / packets, 6),
+        "worst_ms": round(max(delays.values()) / MS, 3),
+    }
+
+
 def _promises(app: Application) -> bool:
     return any(sent.bound_ns is not None for sent in app.sent.values())
 

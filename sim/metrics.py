@@ -24,7 +24,7 @@ from fanet_mw.trace import (
 )
 from fanet_mw.units import S
 from sim import delays, ledger, validity
-from sim.bounds import against_bounds
+from sim.bounds import against_bounds, likely
 from sim.clocks import clock_errors
 from sim.outcome import Outcome
 from sim.packets import Application, packets_of, targets_by_source
@@ -63,6 +63,7 @@ def summarize(outcome: Outcome, *, trace_sha256: str) -> dict[str, Any]:
             name: {"value": round(measure.value, 6), "limit": measure.limit} for name, measure in disturbance.items()
         },
         "bound": against_bounds(sent),
+        "likely": likely(sent),
         "clock": clock_errors(outcome),
         "admission": _admission(outcome),
         "mission": _mission(outcome),

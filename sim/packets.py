@@ -9,7 +9,7 @@ from dataclasses import dataclass, field, replace
 from typing import Final
 
 from agents.traffic import targets_of
-from fanet_mw.trace import BoundStated, Delivered, Generated, LetOut
+from fanet_mw.trace import BoundStated, Delivered, Generated, LetOut, LikelyStated
 from sim.outcome import Outcome
 
 APPS: Final = ("traffic", "report", "warning")
@@ -26,6 +26,8 @@ class Sent:
     """When its first frame could contend; None: it never left."""
     bound_ns: int | None = None
     """The delay that its origin promised when it accepted the packet; None: it promised none."""
+    likely: tuple[int, float] | None = None
+    """The delay within which its origin said that at least this share of its copies arrive; None: it said nothing."""
 
 
 @dataclass(slots=True)
@@ -52,7 +54,8 @@ def packets_of(outcome: Outcome) -> Mapping[str, Application]:
             app.wanted += len(targets[record.node]) if record.app == "traffic" else others
     had: set[tuple[int, int, int]] = set()
     for record in outcome.records:
-        if isinstance(record, LetOut | BoundStated):  # in real time it may come before the packet's own, at one instant
+        # In real time it may come before the packet's own record, at one instant.
+        if isinstance(record, LetOut | BoundStated | LikelyStated):
             name = record.node, record.seq
             if name in app_of:
                 app_of[name].sent[name] = _known(app_of[name].sent[name], record)
@@ -70,8 +73,14 @@ def packets_of(outcome: Outcome) -> Mapping[str, Application]:
     return found
 
 
-def _known(sent: Sent, record: LetOut | BoundStated) -> Sent:
-    return replace(sent, out_ns=record.t_ns) if isinstance(record, LetOut) else replace(sent, bound_ns=record.bound_ns)
+def _known(sent: Sent, record: LetOut | BoundStated | LikelyStated) -> Sent:
+    match record:
+        case LetOut():
+            return replace(sent, out_ns=record.t_ns)
+        case BoundStated():
+            return replace(sent, bound_ns=record.bound_ns)
+        case LikelyStated():
+            return replace(sent, likely=(record.delay_ns, record.share))
 
 
 def targets_by_source(outcome: Outcome) -> Mapping[int, frozenset[int]]:

@@ -73,6 +73,13 @@ def _network_rows(summary: Mapping[str, Any]) -> Iterator[tuple[str, str]]:
             f"{share} of packets x targets within it; at most {bound['worst_ms']:.0f} ms, stated for "
             f"{bound['stated_share']:.1%} of the packets; worst seen {bound['observed_max_ms']:.0f} ms, {broken}",
         )
+    stated = summary["likely"]
+    if stated:
+        yield (
+            "likely",
+            f"{stated['within_share']:.2%} of the copies within what was stated for {stated['share']:.0%} of them: "
+            f"at most {stated['worst_ms']:.0f} ms, for {stated['stated_share']:.1%} of the packets",
+        )
     yield from _clock_rows(summary["clock"])
     admission = summary["admission"]
     if admission:

@@ -29,7 +29,7 @@ from fanet_mw.protocol.turn_plan import LIKELY_SHARE, Fitted, Plan, fit, fit_mea
 from fanet_mw.protocol.turns import clocks_fit, receipt_ns
 from fanet_mw.protocol.txqueue import Packet, TxQueue, sooner_us
 from fanet_mw.protocol.urgent import reserved
-from fanet_mw.trace import BoundStated
+from fanet_mw.trace import BoundStated, LikelyStated
 from fanet_mw.units import MS, US, Enu, NodeId, earliest, seconds_to_ns
 from fanet_mw.wire import PRIORITY_BULK, PRIORITY_REPORT, PRIORITY_SAFETY, Kind
 from fanet_mw.wire_messages import Schedule
@@ -297,6 +297,10 @@ class Scheduled(Clustered):
             return
         super().originate(packet, due_ns=due_ns, now_ns=now_ns)
         self._promise(packet, now_ns)
+        likely_ns = self.likely_ns() if packet.header.priority == PRIORITY_BULK else None
+        if likely_ns is not None and self._plans[-1].valid_ns <= now_ns:
+            record = LikelyStated(now_ns, self._port.node, packet.header.seq, likely_ns, LIKELY_SHARE)
+            self._port.record(record)
 
     def _promise(self, packet: Packet, now_ns: int) -> None:
         """State the bound of a packet that was just accepted, if it will be kept whatever comes later."""
@@ -468,11 +472,12 @@ class Scheduled(Clustered):
             return None
         if self._leader is not None or plan.table.uncovered[self._port.node] or not self._in_step():
             return None  # schedules go before our own packets
-        return plan.likely_ns(
+        found_ns = plan.likely_ns(
             self._port.node,
             interval_ns=self._interval_ns,
             hello_ns=seconds_to_ns(self._port.scenario.routing.hello_interval_s),
         )
+        return None if found_ns is None else found_ns + self._lead_ns + receipt_ns(self._port.scenario)
 
     def _in_step(self) -> bool:
         """Whether the turns' slack holds what is known of the swarm's clocks."""

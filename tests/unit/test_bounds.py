@@ -5,7 +5,7 @@ from typing import Any
 import pytest
 
 from fanet_mw.scenario import Scenario
-from fanet_mw.trace import BoundStated, Delivered, Generated, Record
+from fanet_mw.trace import BoundStated, Delivered, Generated, LikelyStated, Record
 from fanet_mw.units import MS, S
 from sim.metrics import summarize
 from sim.outcome import Outcome
@@ -76,3 +76,21 @@ def test_a_delivery_at_a_node_that_is_no_target_neither_keeps_nor_breaks_a_bound
     chosen = make_scenario(**{"nodes.count": 3, "traffic.sources": "all", "traffic.targets": [2]})
     bound = bound_of(chosen, packet(1, bound_ms=100, delays_ms={2: 50, 3: 500}))
     assert (bound["deliveries"], bound["violations"], bound["within_share"]) == (1, 0, 1.0)
+
+
+def test_a_stated_share_is_held_against_the_copies_of_the_packets_it_is_about(scenario: Scenario) -> None:
+    """Four copies of packets with a statement: one in time to the nanosecond, one late, one lost, one in time."""
+    records = [
+        *packet(1, bound_ms=None, delays_ms={2: 100, 3: 100.000001}),
+        *packet(2, bound_ms=None, delays_ms={2: 10}),
+        *packet(3, bound_ms=None, delays_ms={2: 1, 3: 1}),
+        LikelyStated(1 * S, 1, 1, 100 * MS, 0.99),
+        LikelyStated(2 * S, 1, 2, 50 * MS, 0.95),
+    ]
+    summary = summarize(Outcome(scenario, "virtual", 1.0, records, {}), trace_sha256="")
+    assert summary["likely"] == {"share": 0.95, "within_share": 0.5, "stated_share": 0.666667, "worst_ms": 100}
+
+
+def test_without_a_statement_there_is_nothing_to_hold(scenario: Scenario) -> None:
+    outcome = Outcome(scenario, "virtual", 1.0, packet(1, bound_ms=100, delays_ms={2: 1}), {})
+    assert summarize(outcome, trace_sha256="")["likely"] == {}

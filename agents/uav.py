@@ -182,6 +182,8 @@ class Uav(Actor):
         """Survivor reports are for the mission, and for whoever inspects us."""
         try:
             report = Survivor.decode_frame(packet.frame)
+            if report.reporter != packet.header.origin:
+                raise MalformedFrameError(f"report of {report.reporter} by {packet.header.origin}")
         except MalformedFrameError:
             self._node.dropped[DropReason.MALFORMED] += 1
             return

@@ -38,10 +38,13 @@ class Holding(NamedTuple):
         if other is not None:
             ahead = (self.newest - other.newest) & _SEQ_MASK
             theirs = other.held << 1 | 1
-            if ahead < _HALF:
-                mine &= ~(theirs << ahead) & ((1 << ahead + WINDOW) - 1)
-            else:
-                mine &= ~(theirs >> (1 << 32) - ahead) & ((1 << max(0, WINDOW - (1 << 32) + ahead)) - 1)
+            behind = (other.newest - self.newest) & _SEQ_MASK
+            if ahead < WINDOW:
+                mine &= ~(theirs << ahead)
+            elif behind < WINDOW:
+                mine &= ~(theirs >> behind) & ((1 << WINDOW - behind) - 1)
+            elif ahead >= _HALF:
+                return []  # the other is so far ahead that it says nothing of what we hold
         if not mine:
             return []
         return [(self.newest - back) & _SEQ_MASK for back in range(WINDOW) if mine >> back & 1]

@@ -108,6 +108,8 @@ _PACKED: Final = struct.Struct("<4sBB4s" + ROUTE.layout.format[1:])
 _CHECKED: Final = struct.Struct("<3s4x3s" + ROUTE.layout.format[1:] + "H")
 _BODY_END: Final = HEADER_BYTES - 2
 _SYSTEM_AT: Final = 5
+END_TO_END: Final = slice(10, 26)
+"""Bytes of a routing header that no hop changes: birth, sequence number, origin and destination."""
 NAME: Final = slice(18, 24)
 """Where a header has what names its packet: sequence number and origin."""
 SEQ: Final = slice(18, 22)

@@ -4,7 +4,6 @@ As all of our dialect (`fanet_mw.wire`): by struct, total on any bytes, checked 
 Digests, places and claims have files of their own.
 """
 
-import math
 from enum import IntEnum
 from typing import Final, NamedTuple, Self
 
@@ -25,6 +24,13 @@ from fanet_mw.wire import (
 
 CAPACITY: Final = 56
 """Entries of one schedule part."""
+FARTHEST_M: Final = 1e7
+"""Of a coordinate: no swarm is so large, and its square is still exact."""
+FASTEST_M_S: Final = 1e4
+MOST_DBM: Final = 300.0
+"""Of a received power, either sign."""
+MOST_SURVIVORS: Final = 10_000
+"""The greatest id of one; what is remembered of them has an end."""
 
 
 class Role(IntEnum):
@@ -140,6 +146,8 @@ class Schedule(NamedTuple):
             )
         if not all(0 < member.node < ANY_NODE and member.cluster < clusters for member in members):
             raise MalformedFrameError(f"schedule {epoch}: an entry that is no node, or none of {clusters} clusters")
+        if len({member.node for member in members}) < count:
+            raise MalformedFrameError(f"schedule {epoch}: a node twice")
         return schedule
 
 
@@ -163,7 +171,8 @@ class Join(NamedTuple):
         _check(version, node)
         if instead_of == ANY_NODE:
             raise MalformedFrameError(f"join of {node} instead of {instead_of}")
-        return cls(node, _finite(*numbers[:3]), _finite(*numbers[3:]), instead_of)
+        position, velocity = _within(*numbers[:3], most=FARTHEST_M), _within(*numbers[3:], most=FASTEST_M_S)
+        return cls(node, position, velocity, instead_of)
 
 
 class Survivor(NamedTuple):
@@ -183,9 +192,9 @@ class Survivor(NamedTuple):
     def decode_frame(cls, frame: bytes) -> Self:
         t_us, survivor, east, north, up, rssi_dbm, reporter, version = decode_first(SURVIVOR, frame)
         _check(version, reporter, t_us=t_us)
-        if not math.isfinite(rssi_dbm):
-            raise MalformedFrameError(f"rssi {rssi_dbm}")
-        return cls(t_us, survivor, reporter, _finite(east, north, up), rssi_dbm)
+        if not abs(rssi_dbm) <= MOST_DBM or not 0 < survivor <= MOST_SURVIVORS:  # true for what is not a number
+            raise MalformedFrameError(f"rssi {rssi_dbm} of survivor {survivor}")
+        return cls(t_us, survivor, reporter, _within(east, north, up, most=FARTHEST_M), rssi_dbm)
 
 
 class TimeBeacon(NamedTuple):
@@ -216,7 +225,7 @@ class TimeBeacon(NamedTuple):
         return beacon
 
 
-def _finite(east: float, north: float, up: float) -> Enu:
-    if not (math.isfinite(east) and math.isfinite(north) and math.isfinite(up)):
-        raise MalformedFrameError(f"position {east}, {north}, {up}")
+def _within(east: float, north: float, up: float, *, most: float) -> Enu:
+    if not (abs(east) <= most and abs(north) <= most and abs(up) <= most):  # false for what is not a number
+        raise MalformedFrameError(f"{east}, {north}, {up} must be within {most:g}")
     return Enu(east, north, up)

@@ -87,6 +87,7 @@ def _packets(outcome: Outcome, packets: Mapping[str, Application]) -> dict[str, 
             "generated": len(app.sent),
             "delivered": len(app.deliveries),
             "repeated": app.repeated,
+            "unknown": app.unknown,
             "pdr": _ratio(len(app.deliveries), app.wanted),
             "delay_ms": delays.summed_up([record.delay_ns for record in app.deliveries]),
             "delay_parts_ms": delays.parts(app.deliveries, app.sent, lead_ns=lead_ns),
@@ -159,6 +160,8 @@ def _mission(outcome: Outcome) -> dict[str, Any]:
     for record in records:
         if type(record) is Approaching:
             first.setdefault(record.node, record.t_ns)
+            if not 1 <= record.survivor <= len(truth):
+                continue  # of whom only the air has told
             at = truth[record.survivor - 1]
             errors.append(float(np.hypot(at.east - record.east_m, at.north - record.north_m)))
     return {

@@ -1,7 +1,8 @@
 """Which packets the applications sent, and which of them arrived where they were meant to: once per node and packet.
 
 A packet is named by its origin and sequence number. A delivery counts where the packet was meant for the node; a second
-one at the same node is `repeated`: its process has started again, and has forgotten what it had.
+one at the same node is `repeated`: its process has started again, and has forgotten what it had. What nobody sent, or
+nobody sent at the instant that its header claims, is `unknown` and no delivery: forged, or its origin's record is lost.
 """
 
 from collections.abc import Mapping
@@ -39,6 +40,9 @@ class Application:
     """Packets times the nodes that each was meant for."""
     deliveries: list[Delivered] = field(default_factory=list)
     repeated: int = 0
+    unknown: int = 0
+    """Deliveries of packets that no application is known to have sent, whatever they claimed: counted once, here with
+    the first application."""
 
 
 def packets_of(outcome: Outcome) -> Mapping[str, Application]:
@@ -53,6 +57,7 @@ def packets_of(outcome: Outcome) -> Mapping[str, Application]:
             app.sent[record.node, record.seq] = Sent(record.t_ns)
             app.wanted += len(targets[record.node]) if record.app == "traffic" else others
     had: set[tuple[int, int, int]] = set()
+    exact = not outcome.scenario.clock.modelled  # else delays are true ones, whatever the header said
     for record in outcome.records:
         # In real time it may come before the packet's own record, at one instant.
         if isinstance(record, LetOut | BoundStated | LikelyStated):
@@ -62,7 +67,12 @@ def packets_of(outcome: Outcome) -> Mapping[str, Application]:
         if type(record) is not Delivered:
             continue
         sender = app_of.get((record.origin, record.seq))
-        if sender is None or not _is_target(record, sender is found["traffic"], targets):
+        if sender is None or (
+            exact and record.t_ns - record.delay_ns != sender.sent[record.origin, record.seq].born_ns
+        ):
+            found[APPS[0]].unknown += 1
+            continue
+        if not _is_target(record, sender is found["traffic"], targets):
             continue
         delivery = record.node, record.origin, record.seq
         if delivery in had:

@@ -116,7 +116,8 @@ def _traffic(part: Mapping[str, Any]) -> str:
         else (f", delay p50 {delay['p50']:.0f} ms, p95 {delay['p95']:.0f} ms, max {delay['max']:.0f} ms")
     )
     repeated = f", {part['repeated']} more repeated after a restart" if part["repeated"] else ""
-    return f"{pdr} delivered ({part['generated']} packets, {part['delivered']} deliveries{repeated}){times}"
+    unknown = f", {part['unknown']} of packets that nobody sent" if part["unknown"] else ""
+    return f"{pdr} delivered ({part['generated']} packets, {part['delivered']} deliveries{repeated}{unknown}){times}"
 
 
 def _mission_rows(mission: Mapping[str, Any]) -> Iterator[tuple[str, str]]:

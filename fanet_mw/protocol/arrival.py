@@ -19,11 +19,22 @@ BUNDLE: Final = 1 << 30
 """The phase of a frame with several packets in it: no node has ever handled that."""
 
 
+def name_of(frame: bytes) -> int:
+    """One number per packet, the same at every hop: of all that its origin wrote, not of its sequence number alone.
+
+    So nobody takes the place of a packet by sending another one under its origin and number. The hash is Python's own,
+    keyed anew for each process (SipHash), so that nobody can aim at it; no order of anything depends on it.
+    """
+    return hash(frame[wire.END_TO_END] + frame[wire.HEADER_BYTES :])
+
+
 class Reader:
     """Reads frames; what was read of the latest is at hand."""
 
     def __init__(self) -> None:
         self.frame = b""
+        self.name = 0
+        """`name_of` its packet, unchecked."""
         self.key = 0
         """`seen.key_of` its packet, unchecked; 0 when it has none, or several."""
         self.phase = 0
@@ -39,8 +50,9 @@ class Reader:
         fields = self.fields = wire.fields_of(frame) or wire.NO_FIELDS
         _, _, _, seq, origin, _, _, _, _, _, _, flags, _, _ = fields
         if flags & wire.FLAG_MORE and not alone:
-            self.key, self.phase = 0, BUNDLE
+            self.name, self.key, self.phase = 0, 0, BUNDLE
         else:
+            self.name = name_of(frame)
             self.key, self.phase = seen.key_of(origin, seq), PHASES.get(flags & wire.PHASE_MASK, 0)
 
     def read(self) -> Packet:

@@ -23,7 +23,7 @@ from math import ceil
 from typing import Final
 
 from fanet_mw.claims import MESSAGE_BYTES, MOST_LOTS, Claims, Standing
-from fanet_mw.errors import DropReason
+from fanet_mw.errors import DropReason, MalformedFrameError
 from fanet_mw.messages import Reception
 from fanet_mw.protocol.arrival import decoded
 from fanet_mw.protocol.clustered import Clustered
@@ -230,6 +230,8 @@ class Claimed(Clustered):
     def hello(self, packet: Packet, reception: Reception, *, now_ns: int) -> None:
         super().hello(packet, reception, now_ns=now_ns)
         claims = decoded(packet, Claims.decode_frames)
+        if claims is not None and any(heard.node > self._port.scenario.nodes.count for heard in claims.heard):
+            raise MalformedFrameError("claims of nodes that are not there")
         if claims is None or claims.node != reception.src:
             return
         heard = tuple(self._claim(h.node, h.standing) for h in claims.heard)

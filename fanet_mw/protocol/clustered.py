@@ -46,6 +46,11 @@ _REJOIN_NS: Final = 2 * S
 _UPDATE_NS: Final = 100 * MS
 """Joins that only tell a new position are spread over this much per node: ten floods a second when all turn at once."""
 _CONTROL_JITTER_NS: Final = 100 * MS
+_START_NS: Final = 5 * S
+"""A schedule that starts later than this, and two periods, after it comes was made by nobody."""
+_EPOCHS: Final = 16
+"""Epochs that may have been missed besides one per period since the last."""
+_HALF_EPOCHS: Final = 0x8000
 _STORE_PACKETS: Final = 4096
 """Packets kept for repair; 4 MB at 1024 B."""
 
@@ -90,6 +95,9 @@ class Clustered(RoutingProtocol):
         ) if scenario.repair_ns else None  # fmt: skip
         self._floods = Floods(port, self._repair)
         self._join_ns: int | None = None
+        self._period_us = scenario.clusters.period_ns // US
+        self._renewed_ns = 0
+        """When the schedule that we follow last changed."""
         self._role = self._membership.standing
         self._tenure: Tenure | None = None
         """The slot that is ours, or was when we last were head."""
@@ -174,6 +182,8 @@ class Clustered(RoutingProtocol):
         """Joins and announcements of leaders. Malformed ones raise and are counted by the node."""
         if packet.header.kind == Kind.JOIN:
             join, born_ns = decoded(packet, Join.decode_frame), min(packet.header.origin_us * US, now_ns)
+            if join.node != packet.header.origin or join.instead_of > self._port.scenario.nodes.count:
+                raise MalformedFrameError(f"join of {join.node} instead of {join.instead_of} by {packet.header.origin}")
             if self._leader is not None:
                 self._leader.joined(join, born_ns=born_ns, now_ns=now_ns)
                 told = decoded(packet, Links.decode_frames) if self._links is not None else None
@@ -193,12 +203,16 @@ class Clustered(RoutingProtocol):
         schedule = decoded(packet, Schedule.decode_frame)
         if schedule.leader != packet.header.origin:
             raise MalformedFrameError(f"schedule of {schedule.leader} by {packet.header.origin}")
+        self._check(schedule, now_ns)
+        before = self._membership.version
         actions = self._upkeep.announced(
             schedule,
             guard_ns=self._guard_ns(),
             born_ns=min(packet.header.origin_us * US, now_ns),
             now_ns=now_ns,
         )
+        if self._membership.version != before:
+            self._renewed_ns = now_ns
         authority = Authority(schedule.term, schedule.leader)
         if authority == self._lease.authority and schedule.epoch == self._epoch_followed:
             self._refresh.keep(packet, schedule.part, authority, schedule.epoch, now_ns=now_ns)
@@ -214,6 +228,32 @@ class Clustered(RoutingProtocol):
     def _announcements(self, now_ns: int) -> Sequence[Schedule]:
         """The parts of a schedule to announce now."""
         return self._leader.wake(self._motion(now_ns), now_ns=now_ns) if self._leader else ()
+
+    def _check(self, schedule: Schedule, now_ns: int) -> None:
+        """Raise MalformedFrameError for what no leader of this swarm announces."""
+        scenario, period_us, epoch = self._port.scenario, self._period_us, schedule.epoch
+        slot_us = scenario.clusters.period_ns // schedule.clusters // US
+        if schedule.period_us != period_us or schedule.slot_us != slot_us:
+            raise MalformedFrameError(f"slots of {schedule.slot_us} in {schedule.period_us} us, not {period_us} us")
+        if schedule.start_us * US > now_ns + 2 * scenario.clusters.period_ns + _START_NS:
+            raise MalformedFrameError(f"a schedule from {schedule.start_us} us on")
+        if any(member.node > scenario.nodes.count for member in schedule.members):
+            raise MalformedFrameError(f"a schedule of nodes beyond {scenario.nodes.count}")
+        known = self._membership.version
+        if known is None or known.authority != Authority(schedule.term, schedule.leader):
+            return
+        ahead = (epoch - known.epoch) & 0xFFFF
+        most = _EPOCHS + (now_ns - self._renewed_ns) // scenario.clusters.period_ns
+        if epoch and most < ahead < _HALF_EPOCHS:
+            raise MalformedFrameError(f"epoch {epoch} after {known.epoch}: at most {most} can have been missed")
+
+    def impersonated(self, packet: Packet, *, now_ns: int) -> None:
+        """A schedule in our name, if we lead: we announce a later one (as of link states in OSPF, RFC 2328, 13.4)."""
+        if packet.header.kind == Kind.SCHEDULE and self._leader is not None:
+            schedule = decoded(packet, Schedule.decode_frame)
+            self._check(schedule, now_ns)
+            if Authority(schedule.term, schedule.leader) == self._lease.authority:
+                self._leader.outbid(schedule.epoch, now_ns=now_ns)
 
     def _announcement(self, part: Schedule) -> bytes:
         """The inner frames of a schedule packet."""
@@ -334,7 +374,11 @@ class Clustered(RoutingProtocol):
         self._join(now_ns, instead_of=silent)
 
     def hello(self, packet: Packet, reception: Reception, *, now_ns: int) -> None:
-        neighbor = Neighbor(reception.src, now_ns, reception.rssi_dbm, decoded(packet, Beacon.decode_frame))
+        beacon, count = decoded(packet, Beacon.decode_frame), self._port.scenario.nodes.count
+        if beacon.node != reception.src or beacon.head > count or beacon.leader > count:
+            raise MalformedFrameError(f"beacon of {beacon.node}, head {beacon.head}, leader {beacon.leader}")
+        digest = decoded(packet, Digest.decode_frames) if self._repair else None
+        neighbor = Neighbor(reception.src, now_ns, reception.rssi_dbm, beacon)
         self._neighbors.heard(neighbor)
         if self._silence is not None:
             self._silence.heard(reception.src, now_ns=now_ns)
@@ -344,7 +388,6 @@ class Clustered(RoutingProtocol):
         if self._lease.fresh(now_ns):
             self._refresh.compare(neighbor.beacon, now_ns=now_ns)
         self._gradient.hear(neighbor, now_ns=now_ns)
-        digest = decoded(packet, Digest.decode_frames) if self._repair else None
         if self._repair and digest:
             self._repair.compare(digest, now_ns=now_ns)
         for held in self._uplink.released(now_ns=now_ns):

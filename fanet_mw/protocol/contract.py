@@ -97,6 +97,9 @@ class RoutingProtocol(ABC):
     def hello(self, packet: Packet, reception: Reception, *, now_ns: int) -> None:  # noqa: B027
         """A neighbor's hello."""
 
+    def impersonated(self, packet: Packet, *, now_ns: int) -> None:  # noqa: B027
+        """Somebody sent a packet in our name that we do not know of; it goes no further."""
+
     def overheard(self, key: int, *, now_ns: int) -> None:  # noqa: B027
         """Another copy, in the same phase, of a packet that was handled before (`seen.key_of`).
 

@@ -103,6 +103,8 @@ class Gradient:
     def flooded(self, head: NodeId, *, parent: NodeId, hops: int, now_ns: int) -> None:
         """A flood from our head came this way: the way back serves until hellos bring a route to it."""
         route = self.route(now_ns=now_ns)
+        if hops >= UNREACHABLE - 1:
+            return  # farther than a hello can say
         if head == self._own_head != self._node and (route is None or route.head != head):
             self._route = Route(head, 0, hops, parent, now_ns)
 

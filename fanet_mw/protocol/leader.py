@@ -95,6 +95,8 @@ class Leader:
         self._links = LinkState() if scenario.measures_links else None
         self._measured_ns = measured_period_ns(scenario)
         """How often an assignment is announced whose links have been measured: once per superframe."""
+        self._outbid = False
+        """Somebody has announced an epoch in our name: ours must be a later one, whatever has changed."""
         self._assigned = _Assigned()
         self._due_ns = now_ns if elected else now_ns + _FIRST_CALL_NS
         self._announced_ns = now_ns
@@ -118,6 +120,12 @@ class Leader:
         """A node, perhaps the leader itself, said how well it hears whom."""
         if self._links is not None:
             self._links.told(node, links)
+
+    def outbid(self, epoch: int, *, now_ns: int) -> None:
+        """A schedule in our name that is not ours: the next epoch comes after it, and soon."""
+        if 0 < ((epoch - self._epoch) & 0xFFFF) < 0x8000 and self._assigned.parts:
+            self._epoch, self._outbid = epoch, True
+            self._due_ns = min(self._due_ns, now_ns + SETTLE_NS)
 
     def suspect(self, silent: NodeId, by: NodeId, there: Motion, *, now_ns: int) -> None:
         """A node is said to be silent, by one who says where it is itself: it has a moment to object."""
@@ -174,7 +182,7 @@ class Leader:
     def _renew(self, here: Motion, notice_ns: int, now_ns: int) -> None:
         """Another epoch, if there is a reason."""
         before = self._assigned
-        changed = sorted(self._motions) != sorted(before.nodes)
+        changed = self._outbid or sorted(self._motions) != sorted(before.nodes)
         rests = not self._reassign_ns or self._stand_ins or now_ns < before.start_ns + self._reassign_ns
         measured = self._measured()
         if not changed and rests and not (measured and not before.measured):
@@ -199,7 +207,7 @@ class Leader:
             return
         self._stand_ins = {head: who for head, who in self._stand_ins.items() if head in self._motions}
         ordered = [Cluster(cluster.head, succession(cluster, swarm)) for cluster in clusters]
-        self._epoch = (self._epoch + 1) & 0xFFFF or 1
+        self._epoch, self._outbid = (self._epoch + 1) & 0xFFFF or 1, False
         self._assigned = _Assigned(ordered, places, links, start_ns, self._parts(ordered, start_ns), measured)
 
     def _measured(self) -> tuple[Link, ...]:

@@ -17,6 +17,7 @@ from fanet_mw.messages import Reception, TxRequest, TxStatus
 from fanet_mw.protocol import arrival, seen
 from fanet_mw.protocol.arrival import PHASES
 from fanet_mw.protocol.contract import RoutingProtocol
+from fanet_mw.protocol.plausible import CONTROL, RESTART_STEP_NS, Plausible
 from fanet_mw.protocol.txqueue import Packet
 from fanet_mw.rng import stream
 from fanet_mw.scenario import Scenario
@@ -27,12 +28,8 @@ from fanet_mw.wire import Header, Kind
 _DATA: Final = int(Kind.DATA)
 _HELLO: Final = int(Kind.HELLO)
 _new: Final = tuple.__new__  # for what is made once per frame
-_CONTROL: Final = 0x8000_0000
-"""Control packets are numbered apart, from here on: then data packets have no gaps, and what is missing shows."""
 _MOST_HOPS: Final = 255
 """What the hop count of the header can say."""
-_RESTART_STEP_NS: Final = 100 * US
-"""A node sends fewer packets than one per 0.1 ms, so a later start begins beyond all earlier sequence numbers."""
 
 
 class Node:
@@ -55,11 +52,12 @@ class Node:
         self.dropped: Counter[str] = Counter()
         self._duplicates = 0
         self._lead_ns = scenario.radio.lead_ns
-        self._next_seq = {False: 0, True: _CONTROL}
+        self._first_seq, self._next_seq = 0, {False: 0, True: CONTROL}
         self._lifetimes_ns = [scenario.routing.lifetime_ns(priority) for priority in range(256)]
         """By priority, whatever the air says."""
         self._reader = arrival.shared
         self._seen = seen.Seen()
+        self._plausible = Plausible(node, scenario)
         self._held: set[bytes] = set()
         """Names of own packets (`wire.NAME`) that were accepted, and of which no frame has been announced yet."""
         self._gathered: list[tuple[int, bytes]] | None = None
@@ -77,8 +75,8 @@ class Node:
 
     def start(self, now_ns: int) -> None:
         """The node is up; one that starts again later must not reuse the names of its earlier packets."""
-        first = now_ns // _RESTART_STEP_NS % _CONTROL
-        self._next_seq = {False: first, True: _CONTROL + first}
+        first = now_ns // RESTART_STEP_NS % CONTROL
+        self._first_seq, self._next_seq = first, {False: first, True: CONTROL + first}
         self._protocol.start(now_ns)
 
     def send(self, inner: bytes, *, destination: NodeId, priority: int, app: str, born_ns: int, now_ns: int) -> int:
@@ -129,14 +127,14 @@ class Node:
         reader, frame, handled = self._reader, reception.frame, self._seen
         if frame is not reader.frame:
             reader.look(frame)
-        key, phase = reader.key, reader.phase
-        known = handled.young.get(key)  # as handled.bits(key), without a call for each copy
+        name, phase = reader.name, reader.phase
+        known = handled.young.get(name)  # as handled.bits(name), without a call for each copy
         if known is None:
-            known = handled.old.get(key, 0)
+            known = handled.old.get(name, 0)
         if known & phase:
             self._duplicates += 1
             if self._overheard is not None:
-                self._overheard(key, now_ns=now_ns)
+                self._overheard(reader.key, now_ns=now_ns)
             return True
         if phase == arrival.BUNDLE:
             self._hear_bundle(reception, now_ns)
@@ -165,16 +163,21 @@ class Node:
     def _first_copy(self, packet: Packet, reception: Reception, before: int, now_ns: int) -> None:
         """The packet that the reader has before it; `before`: what was known of it without this copy."""
         reader = self._reader
-        key, bits = reader.key, before | reader.phase
+        name, bits = reader.name, before | reader.phase
         _, _, origin_us, seq, origin, destination, _, kind, _, hops, priority, _, _, _ = reader.fields
+        known = bool(before) or self._handed_on(origin, seq, kind)
+        why = self._plausible.why_not(reader.fields, known=known, src=reception.src, end_ns=reception.end_ns)
+        if why is not None:
+            self._disbelieve(why, packet, now_ns)
+            return
         if kind == _HELLO:
-            self._seen.put(key, bits)
+            self._seen.put(name, bits)
             self._protocol.hello(packet, reception, now_ns=now_ns)
             return
         end_ns = reception.end_ns
         age_ns = end_ns - origin_us * US
         if age_ns > self._lifetimes_ns[priority]:
-            self._seen.put(key, bits)
+            self._seen.put(name, bits)
             self.drop(DropReason.EXPIRED, packet, now_ns=now_ns)
             return
         to_us = destination == BROADCAST or destination == self.node
@@ -183,8 +186,18 @@ class Node:
             self.deliveries.append(packet)
             late_ns = now_ns - end_ns
             self.records.append(_new(Delivered, (now_ns, self.node, origin, seq, age_ns + late_ns, hops + 1, late_ns)))
-        self._seen.put(key, bits)
+        self._seen.put(name, bits)
         self._protocol.receive(packet, reception, now_ns=now_ns)
+
+    def _handed_on(self, origin: int, seq: int, kind: int) -> bool:
+        """Whether we gave data this name since our start: custody of it has passed on, and may come back."""
+        return kind == _DATA and origin == self.node and self._first_seq <= seq < self._next_seq[False]
+
+    def _disbelieve(self, why: DropReason, packet: Packet, now_ns: int) -> None:
+        """Counted, and neither delivered nor passed on."""
+        self.dropped[why] += 1
+        if why is DropReason.OWN:
+            self._protocol.impersonated(packet, now_ns=now_ns)
 
     def status(self, status: TxStatus, *, now_ns: int) -> None:
         self._protocol.status(status, now_ns=now_ns)
@@ -267,10 +280,10 @@ class Node:
         self.records.append(Dropped(now_ns, self.node, reason, packet.header.origin, packet.header.seq))
 
     def mark(self, packet: Packet, bits: int) -> None:
-        self._seen.mark(seen.key_of(origin=packet.header.origin, seq=packet.header.seq), bits)
+        self._seen.mark(arrival.name_of(packet.frame), bits)
 
     def forget(self, packet: Packet) -> None:
-        self._seen.forget(seen.key_of(origin=packet.header.origin, seq=packet.header.seq))
+        self._seen.forget(arrival.name_of(packet.frame))
 
     def record(self, record: Record) -> None:
         self.records.append(record)
@@ -294,5 +307,6 @@ class Node:
         header = _new(
             Header, (born_ns // US, seq, node, destination, node, kind, hop_limit, hops, priority, flags)
         )  # fmt: skip
-        self._seen.put(seen.key_of(node, seq), seen.DELIVERED | PHASES[flags & wire.PHASE_MASK])
-        return _new(Packet, (header, header.encode() + inner))
+        frame = header.encode() + inner
+        self._seen.put(arrival.name_of(frame), seen.DELIVERED | PHASES[flags & wire.PHASE_MASK])
+        return _new(Packet, (header, frame))

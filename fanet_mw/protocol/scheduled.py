@@ -181,6 +181,8 @@ class Scheduled(Clustered):
                 cluster_of[NodeId(member.node)] = member.cluster
                 if member.is_head:
                     heads[member.cluster] = NodeId(member.node)
+        if not heads.keys() >= set(cluster_of.values()):
+            return  # a cluster without a head: no leader of ours makes one
         measured = tuple(link for part in sorted(self._measured) for link in self._measured[part].links)
         found = self._fit(
             schedule, at, {node: heads[cluster] for node, cluster in sorted(cluster_of.items())}, measured

@@ -11,6 +11,7 @@ no relay to spare a loss is a loss for all behind it: where relays contend, fewe
 from typing import Final
 
 from fanet_mw.claims import MESSAGE_BYTES, Claims, Standing
+from fanet_mw.errors import MalformedFrameError
 from fanet_mw.messages import Reception
 from fanet_mw.protocol.arrival import decoded
 from fanet_mw.protocol.clustered import Clustered
@@ -54,6 +55,8 @@ class Selective(Clustered):
     def hello(self, packet: Packet, reception: Reception, *, now_ns: int) -> None:
         super().hello(packet, reception, now_ns=now_ns)
         claims = decoded(packet, Claims.decode_frames)
+        if claims is not None and any(heard.node > self._port.scenario.nodes.count for heard in claims.heard):
+            raise MalformedFrameError("claims of nodes that are not there")
         if claims is None or claims.node != reception.src:
             return
         self._near.hear(claims, now_ns=now_ns)

@@ -46,6 +46,9 @@ class TxQueue:
         self._sooner_us = sooner_us
         self._entries: list[tuple[int, int, Packet]] = []
         self._order = 0
+        self._latest_us = max(0, *sooner_us.values()) if sooner_us else 0
+        self._oldest_us = 0
+        """No packet here was generated before this instant."""
 
     def __len__(self) -> int:
         return len(self._entries)
@@ -64,6 +67,8 @@ class TxQueue:
         `rank` is the priority at which it waits here, by default its own.
         """
         self._order += 1
+        born_us = packet.header.origin_us
+        self._oldest_us = min(self._oldest_us, born_us) if self._entries else born_us
         insort(self._entries, (packet.header.priority if rank is None else rank, self._order, packet))
         return self._entries.pop()[2] if len(self._entries) > self._capacity else None
 
@@ -108,14 +113,15 @@ class TxQueue:
 
     def expire(self, *, before_us: int) -> list[Packet]:
         """Take out every packet generated before an instant [swarm us], or that much later if its class is sooner."""
-        if not self._entries:
-            return []
+        if not self._entries or self._oldest_us >= before_us + self._latest_us:
+            return []  # else every wake-up would look at all of a long queue
         stale: list[tuple[int, int, Packet]] = []
         kept: list[tuple[int, int, Packet]] = []
         for entry in self._entries:
             late_us = before_us + self._sooner_us.get(entry[0], 0)
             (stale if entry[2].header.origin_us < late_us else kept).append(entry)
         self._entries = kept
+        self._oldest_us = min((entry[2].header.origin_us for entry in kept), default=0)
         return [entry[2] for entry in stale]
 
     def drain(self) -> list[Packet]:

@@ -12,7 +12,7 @@ import asyncio
 import socket
 from collections import Counter
 from collections.abc import Callable
-from typing import Any, Final
+from typing import Any, Final, NamedTuple
 
 from fanet_mw.errors import BusError, DropReason, MalformedFrameError
 from fanet_mw.messages import Reception, TxOutcome, TxRequest, TxStatus
@@ -25,7 +25,18 @@ ATTEMPTS: Final = 4
 _ACK_WAIT_S: Final = 0.03
 _RSSI_UNKNOWN_DBM: Final = 0.0
 _HEARD: Final = 1
+MOVED_NS: Final = 10 * S
+"""A node that was silent at its address for so long may be heard from another one."""
+_MOST_ADDRESSES: Final = 4096
+_SEQ_MASK: Final = 0xFFFF_FFFF
 Address = tuple[str, int]
+
+
+class _Known(NamedTuple):
+    """Where a node is heard from, and when it was heard last."""
+
+    address: Address
+    heard_ns: int
 
 
 class UdpRadio:
@@ -49,10 +60,10 @@ class UdpRadio:
         self._now_ns = now_ns
         self._on_message = on_message
         self._loop = asyncio.get_running_loop()
-        self._addresses: dict[NodeId, Address] = {}
-        """Where each node was last heard from."""
-        self._waiting: dict[int, asyncio.Event] = {}
-        """Unicasts whose acknowledgment has not come, by sequence."""
+        self._addresses: dict[NodeId, _Known] = {}
+        """Where each node is heard from."""
+        self._waiting: dict[tuple[NodeId, int], asyncio.Event] = {}
+        """Unicasts whose acknowledgment has not come, by addressee and sequence."""
         self._tasks: set[asyncio.Task[None]] = set()
         self._heard = Seen(capacity=8192)
         self._transport: asyncio.DatagramTransport | None = None
@@ -121,12 +132,14 @@ class UdpRadio:
     async def _unicast(self, request: TxRequest) -> None:
         """Repeat until it is acknowledged; to the broadcast address while the other was never heard."""
         datagram = Datagram(DatagramKind.FRAME, self._node, request.dst, request.seq, request.frame)
-        acknowledged = self._waiting[request.seq] = asyncio.Event()
+        name = request.dst, request.seq & _SEQ_MASK
+        acknowledged = self._waiting[name] = asyncio.Event()
         outcome, attempts = TxOutcome.RETRY_LIMIT, 0
         try:
             while attempts < ATTEMPTS:
                 attempts += 1
-                self._put(datagram, self._addresses.get(request.dst, self._broadcast))
+                known = self._addresses.get(request.dst)
+                self._put(datagram, known.address if known and attempts < ATTEMPTS else self._broadcast)
                 try:
                     await asyncio.wait_for(acknowledged.wait(), _ACK_WAIT_S)
                 except TimeoutError:
@@ -134,7 +147,7 @@ class UdpRadio:
                 outcome = TxOutcome.ACKED
                 break
         finally:
-            del self._waiting[request.seq]
+            del self._waiting[name]
         if outcome is TxOutcome.RETRY_LIMIT:
             self.counts[DropReason.RETRY_LIMIT] += 1
         if request.wants_status:
@@ -156,15 +169,31 @@ class UdpRadio:
             return
         if datagram.src == self._node:
             return  # our own broadcast
-        self._addresses[datagram.src] = address
+        at_home = self._is_at(datagram.src, address)
         if datagram.dst not in (BROADCAST, self._node):
             return
         if datagram.kind is DatagramKind.ACK:
-            waiting = self._waiting.get(datagram.seq)
-            if waiting is not None:
+            waiting = self._waiting.get((datagram.src, datagram.seq))
+            if not at_home:
+                self.counts[DropReason.FORGED] += 1
+            elif waiting is not None:
                 waiting.set()
             return
         self._hear(datagram, address)
+
+    def _is_at(self, node: NodeId, address: Address) -> bool:
+        """Whether this is the address at which we know the node: that from which it was heard first.
+
+        It gets another one when it was silent at the old one for a while, as after a new start: one datagram redirects
+        nothing. Frames are taken from any address: else whoever came first could keep the others out.
+        """
+        now_ns, known = self._now_ns(), self._addresses.get(node)
+        if known is not None and known.address != address and now_ns - known.heard_ns < MOVED_NS:
+            return False
+        if known is None and len(self._addresses) >= _MOST_ADDRESSES:
+            del self._addresses[min(self._addresses, key=lambda other: (self._addresses[other].heard_ns, other))]
+        self._addresses[node] = _Known(address, now_ns)
+        return True
 
     def _hear(self, datagram: Datagram, address: Address) -> None:
         if datagram.dst == self._node:

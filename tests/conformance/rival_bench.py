@@ -47,7 +47,7 @@ class Bench:
         """(node, origin, seq, hops so far)."""
         self._events: list[tuple[int, int, int, Any]] = []
         self._order = 0
-        self._forged_seq = 0x9000_0000
+        self._forged_seq = 0x8001_0000
         for node in self.nodes.values():
             node.start(0)
         self._collect()
@@ -77,8 +77,10 @@ class Bench:
     def say(self, node: int, kind: int, body: bytes, *, to: int, ttl: int = 1, hops: int = 0, origin: int = 0) -> None:
         """Speak for a node that is not on the bench: a control message arrives at `to` now."""
         self._forged_seq += 1
+        origin = origin or node
+        hops = max(hops, int(origin != node))  # it has come by way of the node that speaks
         header = wire.Header(
-            self.now_ns // US, self._forged_seq, origin or node, BROADCAST, node, wire.Kind.ROUTING, ttl, hops, 0, 0
+            self.now_ns // US, self._forged_seq, origin, BROADCAST, node, wire.Kind.ROUTING, ttl, hops, 0, 0
         )
         self.hear(to, header.encode() + control.encode(kind, body, node=node), src=node)
 

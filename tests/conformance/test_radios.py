@@ -14,7 +14,7 @@ from fanet_mw.actor import Actor
 from fanet_mw.hosts.virtual import VirtualHost
 from fanet_mw.messages import Message, Reception, TxOutcome, TxRequest, TxStatus
 from fanet_mw.radios.datagram import Datagram, DatagramKind
-from fanet_mw.radios.udp import UdpRadio
+from fanet_mw.radios.udp import MOVED_NS, UdpRadio
 from fanet_mw.topics import Topics, node_of
 from fanet_mw.units import BROADCAST, MS, NodeId
 from sim.world import World
@@ -186,9 +186,41 @@ async def test_a_unicast_that_nobody_acknowledges_is_given_up_and_hostile_datagr
         ):
             radio._take(data, here)
         radio._take(Datagram(DatagramKind.ACK, NodeId(3), NodeId(1), 99).encode(), here)
+        radio._take(Datagram(DatagramKind.ACK, NodeId(3), NodeId(1), 4).encode(), here)  # not the addressee's
         await asyncio.sleep(0.3)
     finally:
         radio.close()
     assert [m.frame for m in told if isinstance(m, Reception)] == [b"x"]
     assert [m.outcome for m in told if isinstance(m, TxStatus)] == [TxOutcome.RETRY_LIMIT]
     assert (radio.counts["malformed"], radio.counts["duplicate"], radio.counts["too_large"]) == (5, 1, 1)
+
+
+async def test_one_datagram_does_not_redirect_a_node_s_unicasts_and_only_its_own_address_acknowledges() -> None:
+    now_ns, told, put = 0, list[Reception | TxStatus](), list[tuple[bytes, tuple[str, int]]]()
+    radio = UdpRadio(
+        NodeId(1), address="127.7.0.9", broadcast="127.255.255.255", port=24562, max_frame_bytes=300,
+        now_ns=lambda: now_ns, on_message=told.append,
+    )  # fmt: skip
+    radio._put = lambda datagram, to: put.append((datagram.frame, to))  # type: ignore[method-assign]
+    home, elsewhere = ("127.7.0.2", 24562), ("127.7.0.66", 24562)
+
+    def hear(seq: int, address: tuple[str, int]) -> None:
+        radio._take(Datagram(DatagramKind.FRAME, NodeId(2), BROADCAST, seq, b"x").encode(), address)
+
+    async def addresses() -> list[tuple[str, int]]:
+        """Where a unicast to node 2 goes that somebody else acknowledges, attempt by attempt."""
+        put.clear()
+        radio._transmit(request_of(7, at_ms=0, dst=NodeId(2), status=True))
+        await asyncio.sleep(0.01)
+        radio._take(Datagram(DatagramKind.ACK, NodeId(2), NodeId(1), 7).encode(), elsewhere)
+        await asyncio.sleep(0.2)
+        return [to for _, to in put]
+
+    hear(1, home)
+    hear(2, elsewhere)
+    assert await addresses() == [home, home, home, ("127.255.255.255", 24562)]
+    assert [status.outcome for status in told if isinstance(status, TxStatus)] == [TxOutcome.RETRY_LIMIT]
+    assert radio.counts["forged"] == 1
+    now_ns = MOVED_NS
+    hear(3, elsewhere)
+    assert await addresses() == [elsewhere], "it was silent at its old address, and has moved"

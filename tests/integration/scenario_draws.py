@@ -15,7 +15,7 @@ import signal
 import sys
 import time
 import traceback
-from collections.abc import Iterator
+from collections.abc import Iterator, Sequence
 from concurrent.futures import ProcessPoolExecutor
 from contextlib import contextmanager
 from types import FrameType, NoneType, UnionType
@@ -24,6 +24,7 @@ from typing import Annotated, Any, Final, Literal, NamedTuple, Union, get_args, 
 from pydantic.fields import FieldInfo
 
 from fanet_mw import config
+from fanet_mw.actor import Actor
 from fanet_mw.errors import ConfigError
 from fanet_mw.hosts.virtual import VirtualHost
 from fanet_mw.scenario import Scenario
@@ -37,8 +38,8 @@ from sim.run import actors_of
 LEAST_WAKES: Final = 20_000
 WAKES_A_SECOND: Final = 60_000
 """Of one actor, whatever the scenario asks for: the densest traffic is 10,000 packets a second."""
-_KEPT: Final = {"name", "description", "faults", "time_scale", "duration_s", "seed"}
-"""Keys of the root that are set below, or mean nothing in virtual time."""
+_KEPT: Final = {"name", "description", "faults", "time_scale", "duration_s", "seed", "traffic.interval_s"}
+"""Keys that are set below, or mean nothing in virtual time."""
 _SMALL: Final = {
     "nodes.count": (1, 9), "world.buildings": (0, 4), "mission.survivors": (0, 12), "world.physics_hz": (10, 240),
     "clusters.count": (1, 8),
@@ -65,17 +66,21 @@ def every_key(model: type[Section] = Scenario, prefix: str = "") -> Iterator[Key
         inner = field.annotation
         if isinstance(inner, type) and issubclass(inner, Section):
             yield from every_key(inner, f"{prefix}{name}.")
-        elif prefix or name not in _KEPT:
+        else:
             yield Key(prefix + name, inner, tuple(field.metadata), field.default)
 
 
 def scenario(seed: int) -> tuple[Scenario, dict[str, Any]]:
     """A random valid scenario, and the keys that make it."""
     pick = random.Random(f"draw/{seed}")
-    chosen: dict[str, Any] = {"name": "draw", "seed": seed, "duration_s": pick.choice([0.5, 2, 5, 12])}
+    dense = pick.random() < 0.03  # right, and a minute's work for each second
+    chosen: dict[str, Any] = {
+        "name": "draw", "seed": seed, "duration_s": 0.5 if dense else pick.choice([0.5, 2, 5, 12]),
+        "traffic.interval_s": 10 ** (pick.uniform(-4, -3) if dense else pick.uniform(-2.5, 1)),
+    }  # fmt: skip
     found = config.build({**tree(chosen), "nodes": {"count": 1}, "clusters": {"count": 1}})
     every = {key.name: key for key in every_key()}
-    order = [name for name in every if name not in _SEED_KEYS]
+    order = [name for name in every if name not in _SEED_KEYS and name not in _KEPT]
     pick.shuffle(order)
     share = pick.choice([0.05, 0.15, 0.4])
     order = [name for name in order if pick.random() < share]
@@ -115,8 +120,6 @@ def _value(key: Key, pick: random.Random) -> Any:
         return "clustered"  # has more keys, and more to go wrong, than all others together
     if key.name in _SMALL:
         return pick.randint(*_SMALL[key.name])
-    if key.name == "traffic.interval_s" and pick.random() < 0.9:
-        return math.exp(pick.uniform(math.log(0.003), math.log(10)))  # denser traffic is right, and takes minutes
     if key.name == "nodes.positions_m":
         return []
     if key.name == "radio.rate_mbps" or key.name == "radio.ack_rate_mbps":
@@ -213,10 +216,16 @@ def _alarm(limit_s: float) -> Iterator[None]:
         signal.signal(signal.SIGALRM, before)
 
 
-def run(found: Scenario, *, limit_s: float = 120.0) -> dict[str, Any]:
-    """Run it to its end, counting wake-ups; the summary. Raises EndlessError, or whatever the run raises."""
+def run(
+    found: Scenario, *, limit_s: float = 120.0, instead: Sequence[Actor] = (), reports: dict[str, Any] | None = None
+) -> dict[str, Any]:
+    """Run it to its end, counting wake-ups; the summary. Raises EndlessError, or whatever the run raises.
+
+    `instead`: actors that take the place of those of the same name; `reports` is filled with what all report.
+    """
     records: list[Record] = []
-    actors = actors_of(found, found.name)
+    others = {actor.name: actor for actor in instead}
+    actors = [others.get(actor.name, actor) for actor in actors_of(found, found.name)]
     for actor in actors:
         _count_wakes(actor, LEAST_WAKES + found.duration_s * WAKES_A_SECOND)
     host = VirtualHost(actors, on_records=records.extend)
@@ -231,6 +240,8 @@ def run(found: Scenario, *, limit_s: float = 120.0) -> dict[str, Any]:
         )  # fmt: skip
         summary = summarize(outcome, trace_sha256="")
         json.dumps(dict(outcome.reports))
+        if reports is not None:
+            reports.update(outcome.reports)
     return summary
 
 

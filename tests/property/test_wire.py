@@ -14,13 +14,29 @@ from fanet_mw.dialect import fanet
 from fanet_mw.errors import LocalProtocolError, MalformedFrameError
 from fanet_mw.units import Enu
 from fanet_mw.wire import Header
-from fanet_mw.wire_messages import CAPACITY, Beacon, Join, Member, Role, Schedule, Survivor, TimeBeacon
+from fanet_mw.wire_messages import (
+    CAPACITY,
+    FARTHEST_M,
+    FASTEST_M_S,
+    MOST_DBM,
+    MOST_SURVIVORS,
+    Beacon,
+    Join,
+    Member,
+    Role,
+    Schedule,
+    Survivor,
+    TimeBeacon,
+)
 
 u8, u16, u32, u64 = (st.integers(0, 2**bits - 1) for bits in (8, 16, 32, 64))
 ids = st.integers(1, 0xFFFE)
 instants = st.integers(0, wire.LATEST_US)
 singles = st.floats(allow_nan=False, allow_infinity=False, width=32)
-positions = st.builds(Enu, singles, singles, singles)
+coordinates = st.floats(-FARTHEST_M, FARTHEST_M, width=32)
+positions = st.builds(Enu, coordinates, coordinates, coordinates)
+speeds = st.floats(-FASTEST_M_S, FASTEST_M_S, width=32)
+velocities = st.builds(Enu, speeds, speeds, speeds)
 
 headers = st.builds(
     Header,
@@ -40,7 +56,7 @@ def schedules(draw: st.DrawFn) -> Schedule:
     slot_us = draw(st.integers(1, (2**32 - 1) // clusters))
     parts = draw(st.integers(1, 255))
     entries = st.builds(Member, ids, st.integers(0, clusters - 1), st.booleans())
-    members = tuple(draw(st.lists(entries, max_size=CAPACITY)))
+    members = tuple(draw(st.lists(entries, max_size=CAPACITY, unique_by=lambda member: member.node)))
     return Schedule(
         start_us=draw(instants), period_us=draw(st.integers(slot_us * clusters, 2**32 - 1)), slot_us=slot_us,
         epoch=draw(st.integers(1, 0xFFFF)) if members else 0, leader=draw(ids), clusters=clusters,
@@ -48,8 +64,9 @@ def schedules(draw: st.DrawFn) -> Schedule:
     )  # fmt: skip
 
 
-joins = st.builds(Join, ids, positions, positions, st.integers(0, 0xFFFE))
-survivors = st.builds(Survivor, instants, u32, ids, positions, singles)
+joins = st.builds(Join, ids, positions, velocities, st.integers(0, 0xFFFE))
+powers = st.floats(-MOST_DBM, MOST_DBM, width=32)
+survivors = st.builds(Survivor, instants, st.integers(1, MOST_SURVIVORS), ids, positions, powers)
 instants_ns = st.integers(0, wire.LATEST_US * 1000 + 999)
 times = st.builds(TimeBeacon, instants_ns, u32, u32, u32, u32, u16, ids, ids, u8, st.integers(1, 255)).map(
     lambda beacon: beacon._replace(hops=0) if beacon.reference == beacon.node else beacon

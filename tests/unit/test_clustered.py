@@ -69,7 +69,7 @@ def test_a_flood_ends_where_it_was_meant_for(make_node: MakeNode, destination: i
 
 @pytest.mark.parametrize(("origin", "leader"), [(LEADER, LEADER), (ANOTHER, 0)])
 def test_nobody_announces_for_another_leader(make_node: MakeNode, origin: int, leader: int) -> None:
-    node = make_node()
+    node = make_node(**{"clusters.flooding_period_s": 10, "clusters.count": 2})
     name_head(node, origin=origin)
     assert node.report()["leader"] == leader
     assert node.report()["dropped"] == ({} if leader else {DropReason.MALFORMED: 1})

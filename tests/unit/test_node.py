@@ -96,11 +96,13 @@ def test_a_packet_ends_at_the_lifetime_of_its_class(node: Node, priority: int, l
     ]
 
 
-def test_a_relay_costs_one_of_the_hop_limit_and_a_hostile_hop_count_does_not_overflow(node: Node) -> None:
+def test_a_relay_costs_one_of_the_hop_limit_and_a_hop_count_that_cannot_be_is_forged(node: Node) -> None:
     hear(node, frame(seq=1, hop_limit=8, hops=3))
-    hear(node, frame(seq=2, hop_limit=8, hops=255))
+    hear(node, frame(seq=2, hop_limit=8, hops=247))
+    hear(node, frame(seq=3, hop_limit=8, hops=248))
     relayed = [wire.decode_header(request.frame) for request in node.requests]
-    assert [(header.hop_limit, header.hops, header.prev_hop) for header in relayed] == [(7, 4, OURS), (7, 255, OURS)]
+    assert [(header.hop_limit, header.hops, header.prev_hop) for header in relayed] == [(7, 4, OURS), (7, 248, OURS)]
+    assert node.report()["dropped"] == {DropReason.FORGED: 1}
 
 
 # --- several in one frame -----------------------------------------------------------------------------------------

@@ -64,7 +64,8 @@ def hear_in_turn(
     """A packet of the root, of one millisecond, in a turn; the application has it `told_ns` after its end."""
     end_ns = TURNS.start_ns(turn, frame_start_ns=superframe * 100 * MS) + MS
     seq = 1000 * superframe + turn
-    header = Header(end_ns // 1000 - 5000, seq, ROOT, BROADCAST, sender, Kind.DATA, hop_limit, 0, 3, FLAG_FLOOD)
+    hops = 0 if sender == ROOT else 1
+    header = Header(end_ns // 1000 - 5000, seq, ROOT, BROADCAST, sender, Kind.DATA, hop_limit, hops, 3, FLAG_FLOOD)
     node.hear(Reception(header.encode() + filler(40), sender, end_ns, -60.0), end_ns + told_ns)
 
 

@@ -1,0 +1,59 @@
+"""What a routing header cannot truly say, whoever sent it; asked of every first copy, before anything comes of it.
+
+    origin, transmitter, destination    nodes that there are; the transmitter is the one whom the radio names
+    hops                                0 at the origin alone; with those still allowed, no more than 255
+    instant of birth                    not still to come
+    sequence number                     not beyond those that the time since swarm instant 0 has room for
+
+Not here: proof of origin. A relay may still invent a packet in the name of a node behind it; what it cannot do is keep
+out that node's own packets, because a packet is known by its content and not by its name alone (`arrival.Reader`).
+"""
+
+from typing import Final
+
+from fanet_mw.errors import DropReason
+from fanet_mw.scenario import Scenario
+from fanet_mw.units import BROADCAST, MS, US, NodeId, S
+from fanet_mw.wire import Fields, Kind
+
+RESTART_STEP_NS: Final = 100 * US
+"""A node sends fewer packets than one per 0.1 ms, so a later start begins beyond all earlier sequence numbers."""
+CONTROL: Final = 0x8000_0000
+"""Control packets are numbered apart, from here on: then data packets have no gaps, and what is missing shows."""
+_AHEAD_NS: Final = 100 * MS
+"""By so much a birth may lie ahead where all clocks are exact: hosts take their time from each other over a bus."""
+_BURST: Final = 100_000
+"""Numbers that a node may be ahead of one per `RESTART_STEP_NS`: ten seconds of the densest traffic."""
+_MOST_HOPS: Final = 255
+
+
+class Plausible:
+    """What one node believes of headers."""
+
+    def __init__(self, node: NodeId, scenario: Scenario) -> None:
+        clock = scenario.clock
+        self._node = node
+        self._count = scenario.nodes.count
+        drift_ns = round(clock.drift_ppm * 1e-6 * scenario.duration_ns)
+        self._ahead_ns = _AHEAD_NS + (2 * (clock.offset_ns + drift_ns) + S if clock.modelled else 0)
+
+    def why_not(self, fields: Fields, *, known: bool, src: NodeId, end_ns: int) -> DropReason | None:
+        """Why this header, of a frame that `src` transmitted until `end_ns`, is not to be believed; None: it is.
+
+        `known`: the packet was handled before, in another phase.
+        """
+        _, _, origin_us, seq, origin, destination, prev_hop, kind, hop_limit, hops, _, _, _, _ = fields
+        count = self._count
+        if origin > count or prev_hop > count or not (destination <= count or destination == BROADCAST):
+            return DropReason.UNKNOWN_NODE
+        if origin == self._node and not known:
+            return DropReason.OWN
+        if (
+            prev_hop != src
+            or (origin != prev_hop and (hops == 0 or kind == Kind.HELLO))
+            or hops + hop_limit > _MOST_HOPS
+            or origin_us * US > end_ns + self._ahead_ns
+            or (seq & ~CONTROL) * RESTART_STEP_NS > origin_us * US + _BURST * RESTART_STEP_NS
+        ):
+            return DropReason.FORGED
+        return None

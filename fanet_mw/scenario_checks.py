@@ -16,7 +16,7 @@ if TYPE_CHECKING:
 
 MESSAGE_BYTES: Final = {
     "FANET_ROUTE": 36, "positions": 61, "COLLISION": 31, "FANET_BEACON": 33, "FANET_SCHEDULE": 266,
-    "FANET_SURVIVOR": 43, "FANET_DIGEST": 255, "FANET_PLACES": 189, "FANET_CLAIMS": 116,
+    "FANET_SURVIVOR": 43, "FANET_DIGEST": 255, "FANET_PLACES": 189, "FANET_CLAIMS": 116, "FANET_LINKS": 240,
 }  # fmt: skip
 """Of messages on the air, their MAVLink frame included (docs/wire.md); `positions` are HEARTBEAT and
 GLOBAL_POSITION_INT, with which every hello begins. The air format itself is not known here: the emulator reads
@@ -24,6 +24,10 @@ scenarios too, and to it frames are bytes."""
 _SCHEDULE_PLACES: Final = 2
 """FANET_PLACES that go with one full FANET_SCHEDULE."""
 _RIVALS: Final = ("aodv", "olsr", "dsdv", "geographic")
+_LINKS: Final = 36
+"""Links of one FANET_LINKS."""
+_MOST_LINKS_MESSAGES: Final = 4
+"""FANET_LINKS of one frame."""
 _TELLS_NEIGHBORS: Final = ("heads", "cds", "mpr", "claimed")
 """Relay rules for which a hello says whom its sender hears."""
 _RIVAL_FRAME_BYTES: Final = 256
@@ -82,12 +86,15 @@ def _too_small_frames(scenario: Scenario) -> Iterator[str]:
         hello = size["positions"]
         if clustered:
             hello += size["FANET_BEACON"]
-            hello += size["FANET_DIGEST"] if scenario.clusters.repair_s else 0
+            hello += size["FANET_DIGEST"] if scenario.repair_ns else 0
             hello += size["FANET_CLAIMS"] if relay in _TELLS_NEIGHBORS else 0
         least["hellos"] = hello
     if clustered and relay != "claimed":
         places = _SCHEDULE_PLACES * size["FANET_PLACES"] if relay == "scheduled" else 0
         least["schedules"] = size["FANET_SCHEDULE"] + places
+    if clustered and scenario.measures_links:
+        pairs = scenario.nodes.count * (scenario.nodes.count - 1) // 2
+        least["links of timetables"] = min(_MOST_LINKS_MESSAGES, -(-pairs // _LINKS)) * size["FANET_LINKS"]
     if scenario.mission.survivors:
         least["survivor reports"] = size["FANET_SURVIVOR"]
     if scenario.mission.collision_horizon_s:

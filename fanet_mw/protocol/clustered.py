@@ -18,7 +18,7 @@ from fanet_mw.protocol.contract import Port, RoutingProtocol
 from fanet_mw.protocol.floods import Floods
 from fanet_mw.protocol.gradient import UNREACHABLE, Gradient
 from fanet_mw.protocol.guard import slot_guard_ns
-from fanet_mw.protocol.leader import Leader
+from fanet_mw.protocol.leader import SETTLE_NS, Leader
 from fanet_mw.protocol.lease import Authority, Lease
 from fanet_mw.protocol.link_quality import LinkQuality
 from fanet_mw.protocol.membership import Membership
@@ -46,10 +46,12 @@ _REJOIN_NS: Final = 2 * S
 _UPDATE_NS: Final = 100 * MS
 """Joins that only tell a new position are spread over this much per node: ten floods a second when all turn at once."""
 _CONTROL_JITTER_NS: Final = 100 * MS
-_START_NS: Final = 5 * S
-"""A schedule that starts later than this, and two periods, after it comes was made by nobody."""
+_START_NS: Final = 60 * S
+_START_PERIODS: Final = 100
+"""A schedule that starts later than this minute and so many periods after it comes was made by nobody: one of turns is
+announced as long ahead as the bounds under the one before need, and those are some superframes."""
 _EPOCHS: Final = 16
-"""Epochs that may have been missed besides one per period since the last."""
+"""Epochs that may have been missed besides those for which there was time since the last."""
 _HALF_EPOCHS: Final = 0x8000
 _STORE_PACKETS: Final = 4096
 """Packets kept for repair; 4 MB at 1024 B."""
@@ -185,8 +187,8 @@ class Clustered(RoutingProtocol):
             if join.node != packet.header.origin or join.instead_of > self._port.scenario.nodes.count:
                 raise MalformedFrameError(f"join of {join.node} instead of {join.instead_of} by {packet.header.origin}")
             if self._leader is not None:
-                self._leader.joined(join, born_ns=born_ns, now_ns=now_ns)
                 told = decoded(packet, Links.decode_frames) if self._links is not None else None
+                self._leader.joined(join, born_ns=born_ns, now_ns=now_ns)
                 if told is not None:
                     self._leader.measured(NodeId(join.node), told.links)
             if join.instead_of:
@@ -196,6 +198,7 @@ class Clustered(RoutingProtocol):
             if join.node == self._membership.head:
                 self._gradient.flooded(NodeId(join.node), parent=src, hops=packet.header.hops + 1, now_ns=now_ns)
         elif packet.header.kind == Kind.SCHEDULE and packet.header.origin != self._port.node:
+            self._check(decoded(packet, Schedule.decode_frame), now_ns)
             self._learn(packet, now_ns=now_ns)
 
     def _learn(self, packet: Packet, *, now_ns: int) -> None:
@@ -203,7 +206,6 @@ class Clustered(RoutingProtocol):
         schedule = decoded(packet, Schedule.decode_frame)
         if schedule.leader != packet.header.origin:
             raise MalformedFrameError(f"schedule of {schedule.leader} by {packet.header.origin}")
-        self._check(schedule, now_ns)
         before = self._membership.version
         actions = self._upkeep.announced(
             schedule,
@@ -235,7 +237,7 @@ class Clustered(RoutingProtocol):
         slot_us = scenario.clusters.period_ns // schedule.clusters // US
         if schedule.period_us != period_us or schedule.slot_us != slot_us:
             raise MalformedFrameError(f"slots of {schedule.slot_us} in {schedule.period_us} us, not {period_us} us")
-        if schedule.start_us * US > now_ns + 2 * scenario.clusters.period_ns + _START_NS:
+        if schedule.start_us * US > now_ns + _START_PERIODS * scenario.clusters.period_ns + _START_NS:
             raise MalformedFrameError(f"a schedule from {schedule.start_us} us on")
         if any(member.node > scenario.nodes.count for member in schedule.members):
             raise MalformedFrameError(f"a schedule of nodes beyond {scenario.nodes.count}")
@@ -243,7 +245,7 @@ class Clustered(RoutingProtocol):
         if known is None or known.authority != Authority(schedule.term, schedule.leader):
             return
         ahead = (epoch - known.epoch) & 0xFFFF
-        most = _EPOCHS + (now_ns - self._renewed_ns) // scenario.clusters.period_ns
+        most = _EPOCHS + (now_ns - self._renewed_ns) // min(scenario.clusters.period_ns, SETTLE_NS)
         if epoch and most < ahead < _HALF_EPOCHS:
             raise MalformedFrameError(f"epoch {epoch} after {known.epoch}: at most {most} can have been missed")
 

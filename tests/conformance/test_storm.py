@@ -68,11 +68,11 @@ def test_a_node_that_has_heard_enough_copies_stays_silent(bench: MakeBench) -> N
 def test_the_copy_that_makes_the_count_is_the_first_one_too_many(bench: MakeBench, copies: int, relayed: int) -> None:
     found = bench("counter", [], **{"routing.counter": 3})
     found.protocol(1)._random = lambda: 0.99
-    frame = wire.Header(0, 1, 9, 0xFFFF, 2, wire.Kind.DATA, 5, 0, 3, wire.FLAG_FLOOD).encode() + wire.filler(20)
+    frame = wire.Header(0, 1, 8, 0xFFFF, 2, wire.Kind.DATA, 5, 1, 3, wire.FLAG_FLOOD).encode() + wire.filler(20)
     for previous in range(2, 2 + copies):
         found.hear(1, frame, src=previous)
     found.advance(1 * S)
-    assert len(found.data(1, 9)) == relayed
+    assert len(found.data(1, 8)) == relayed
 
 
 def test_where_few_copies_are_heard_everyone_relays(bench: MakeBench) -> None:

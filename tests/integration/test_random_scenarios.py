@@ -66,6 +66,7 @@ def test_the_densest_traffic_that_a_scenario_may_ask_for_is_carried_or_counted()
 
 @pytest.mark.parametrize("keys", [
     ("clusters.relay=scheduled", "radio.max_frame_bytes=680"),
+    ("clusters.relay=scheduled", "clusters.links=measured", "radio.max_frame_bytes=996"),
     ("clusters.relay=cds", "clusters.repair_s=5", "radio.max_frame_bytes=501"),
     ("clusters.relay=claimed", "clusters.repair_s=5", "radio.max_frame_bytes=501"),
     ("clusters.repair_s=5", "radio.max_frame_bytes=385"),
@@ -83,6 +84,8 @@ def test_a_swarm_whose_largest_messages_just_fit_a_frame_works(keys: Sequence[st
     (("routing.hello_interval_s=0",), "needs hellos: routing.hello_interval_s > 0"),
     (("routing.hello_interval_s=1e-10",), "routing.hello_interval_s = 1e-10 must be 0 or >= 0.01"),
     (("clusters.relay=scheduled", "radio.max_frame_bytes=679"), "radio.max_frame_bytes = 679 must be >= 680"),
+    (("clusters.relay=scheduled", "clusters.links=measured", "nodes.count=30", "radio.max_frame_bytes=995"),
+     "radio.max_frame_bytes = 995 must be >= 996 for links of timetables"),
     (("clusters.repair_s=5", "radio.max_frame_bytes=384"), "radio.max_frame_bytes = 384 must be >= 385"),
     (("radio.max_frame_bytes=301",), "radio.max_frame_bytes = 301 must be >= 302 for schedules"),
     (("traffic.interval_s=1e-10",), "traffic.interval_s = 1e-10: input should be greater than or equal to 0.0001"),

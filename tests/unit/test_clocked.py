@@ -24,7 +24,7 @@ def clocked(make_scenario: MakeScenario, **keys: Any) -> ClockedUav:
 
 def schedule(at_ns: int) -> Reception:
     members = (Member(3, 0, is_head=True), Member(2, 0, is_head=False))
-    inner = Schedule(0, 5_000_000, 1_000_000, 1, 1, 1, 0, 1, members, 0).encode_frame(1)
+    inner = Schedule(0, 5_000_000, 5_000_000, 1, 1, 1, 0, 1, members, 0).encode_frame(1)
     header = Header(at_ns // US, 9, 1, BROADCAST, 1, Kind.SCHEDULE, 8, 0, PRIORITY_CONTROL, FLAG_FLOOD)
     return Reception(header.encode() + inner, NodeId(1), at_ns, -60.0)
 

@@ -13,7 +13,7 @@ from fanet_mw.routing import make_protocol
 from fanet_mw.scenario import Scenario
 from fanet_mw.units import BROADCAST, MS, US, Enu, NodeId, S
 from fanet_mw.wire import FLAG_FLOOD, FLAG_TO_HEAD, PRIORITY_BULK, PRIORITY_CONTROL, Header, Kind, filler
-from fanet_mw.wire_messages import Beacon, Member, Role, Schedule
+from fanet_mw.wire_messages import Beacon, Join, Member, Role, Schedule
 
 LEADER, OURS, THEIRS, ANOTHER = NodeId(1), NodeId(2), NodeId(3), NodeId(4)
 MakeScenario = Callable[..., Scenario]
@@ -108,3 +108,40 @@ def test_a_head_lets_out_together_what_fits_a_frame(make_node: MakeNode) -> None
     first_ns = min(r.start_ns for r in node.requests)
     (frame,) = [r.frame for r in node.requests if r.start_ns == first_ns]
     assert len(wire.unbundle(frame)) == 2
+
+
+# --- in a leader's name ---------------------------------------------------------------------------------------------
+
+
+def test_a_leader_answers_the_latest_epochs_that_may_be_claimed_in_its_name_and_believes_none_beyond(
+    make_scenario: MakeScenario,
+) -> None:
+    """Epoch 1 at 2 s: 1.3 s later there was time for one more, and sixteen may have been missed."""
+    keys = {"nodes.count": 5, "radio.lead_ms": 0, "clusters.flooding_period_s": 5}
+    leader = Node(LEADER, make_scenario(**keys), make_protocol, position=Enu(0.0, 0.0, 50.0))
+    leader.start(0)
+    joins = Header(1_000_000, 0x8000_0000, OURS, BROADCAST, OURS, Kind.JOIN, 8, 0, PRIORITY_CONTROL, FLAG_FLOOD)
+    hear(leader, joins, Join(OURS, Enu(50.0, 0.0, 50.0), Enu(0.0, 0.0, 0.0)).encode_frame(OURS))
+    at_ns = 1 * S
+    while not leader.report()["epoch"]:
+        at_ns += 10 * MS
+        leader.wake(at_ns)
+    began_ns = at_ns
+
+    def claim(epoch: int, *, after_ms: int) -> None:
+        t_ns = began_ns + after_ms * MS
+        leader.wake(t_ns)
+        members = (Member(THEIRS, 0, is_head=True),)
+        schedule = Schedule(t_ns // US, 5_000_000, 5_000_000, epoch, LEADER, 1, 0, 1, members, 0)
+        header = Header(
+            t_ns // US, 900 + epoch, LEADER, BROADCAST, THEIRS, Kind.SCHEDULE, 8, 1, PRIORITY_CONTROL, FLAG_FLOOD
+        )
+        hear(leader, header, schedule.encode_frame(LEADER), at_ns=t_ns)
+
+    claim(2, after_ms=650)
+    claim(1 + 17, after_ms=1000)
+    claim(1 + 18, after_ms=1010)
+    assert leader.report()["dropped"] == {DropReason.OWN: 3, DropReason.MALFORMED: 1}
+    for after_ms in range(1020, 8000, 10):
+        leader.wake(began_ns + after_ms * MS)
+    assert leader.report()["epoch"] == 19

@@ -50,7 +50,7 @@ def test_a_held_packet_that_has_expired_does_not_go_when_a_way_appears(alone: No
 
 def hear_head(node: Node, *, at_ns: int = 1 * MS) -> None:
     """Node 3, a head, is heard: it is the way now."""
-    header = Header(at_ns // US, 0x8000_0000 + at_ns, 3, BROADCAST, 3, Kind.HELLO, 1, 0, 0, 0)
+    header = Header(at_ns // US, 0x8000_0000 + at_ns // MS, 3, BROADCAST, 3, Kind.HELLO, 1, 0, 0, 0)
     beacon = Beacon(3, 3, 5 + at_ns // S, 0, 0, 0, Role.HEAD, 0)
     node.hear(Reception(header.encode() + beacon.encode_frame(3), NodeId(3), at_ns, -60.0), at_ns)
 

@@ -44,6 +44,10 @@ class RootRelease(TurnRelease):
         self._plans = plans
         self._arm(now_ns)
 
+    def has_turn(self, *, now_ns: int) -> bool:
+        """Whether a turn of ours lies ahead, under any timetable that is known."""
+        return self._turn(max(now_ns + self._lead_ns, self._free_ns)) is not None
+
     def outdated(self, *, before_us: int) -> list[Packet]:
         """Take out the announcements of ours that were made before an instant [swarm us] and still wait."""
         return self._queue.take_older(before_us=before_us, rank=PRIORITY_CONTROL)

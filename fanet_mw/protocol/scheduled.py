@@ -204,7 +204,7 @@ class Scheduled(Clustered):
         self._calls.follow(calls, now_ns=now_ns)
         if not self._plans:
             self._calls.drain()  # what neighbors lack they will say again
-        stranded = [] if self._plans and self._plans[-1].roots else self._roots.drain()
+        stranded = [] if self._roots.has_turn(now_ns=now_ns) else self._roots.drain()
         for packet in [*stranded, *self._release.drain(), *self._uplink.drain()]:
             self._forward(packet, start_ns=now_ns + self._lead_ns, now_ns=now_ns, tries=0)
 
@@ -329,7 +329,7 @@ class Scheduled(Clustered):
     # --- letting out ----------------------------------------------------------------------------------------------
 
     def _forward(self, packet: Packet, *, start_ns: int, now_ns: int, tries: int) -> None:
-        if self._plans and self._plans[-1].roots:
+        if self._roots.has_turn(now_ns=now_ns):
             self._let_out(packet, now_ns=now_ns)
         else:
             super()._forward(packet, start_ns=self._contending_ns(start_ns), now_ns=now_ns, tries=tries)
@@ -344,7 +344,7 @@ class Scheduled(Clustered):
             self._port.drop(DropReason.QUEUE_FULL, evicted, now_ns=now_ns)
 
     def _enqueue(self, packet: Packet, *, now_ns: int) -> None:
-        if self._plans and self._plans[-1].roots:
+        if self._roots.has_turn(now_ns=now_ns):
             self._let_out(packet, now_ns=now_ns)
         else:  # the schedule has made us head, its timetable is still to come
             super()._enqueue(packet, now_ns=now_ns)
@@ -444,6 +444,9 @@ class Scheduled(Clustered):
             self._port.drop(DropReason.EXPIRED, packet, now_ns=now_ns)
         for packets, start_ns in self._roots.due(now_ns=now_ns):
             self._floods.begin(packets, start_ns=start_ns, again_ns=self._repetitions(start_ns))
+        if len(self._roots) and not self._roots.has_turn(now_ns=now_ns):
+            for packet in self._roots.drain():  # that was our last turn: the next timetable has none for us
+                self._forward(packet, start_ns=now_ns + self._lead_ns, now_ns=now_ns, tries=0)
         for packets, start_ns in self._calls.due(now_ns=now_ns):
             self._floods.answer(packets, start_ns=start_ns)
 

@@ -124,6 +124,7 @@ def test_the_newest_timetable_in_force_counts(node: Node) -> None:
 
 
 def test_a_packet_that_fits_no_turn_is_dropped_with_its_reason(node: Node) -> None:
+    informed(node, told_ms=0)
     node.send(filler(1100), destination=BROADCAST, priority=PRIORITY_BULK, app="test", born_ns=0, now_ns=0)
     assert node.report()["dropped"] == {DropReason.TOO_LARGE: 1}
 
@@ -188,6 +189,27 @@ def test_a_promise_counts_what_waits(node: Node, before: int, is_promised: bool)
     node.records.clear()
     node.send(filler(900), destination=BROADCAST, priority=PRIORITY_BULK, app="test", born_ns=0, now_ns=0)
     assert any(isinstance(record, BoundStated) for record in node.records) is is_promised
+
+
+def test_turns_are_used_until_a_timetable_without_any_comes_into_force(node: Node) -> None:
+    """Our turn is at 64 ms of each superframe, and its flood lasts 6 ms: that at 964 ms is the last before 1 s."""
+    protocol_of(node)._plans = [planned(FLOODS), planned(FLOODS[:5], valid_ns=1000 * MS)]
+    protocol = informed(node, told_ms=0)
+    for births in ((0, 0, 0), (955, 955), (990,)):
+        for at_ms in births:
+            node.send(
+                filler(900),
+                destination=BROADCAST,
+                priority=PRIORITY_BULK,
+                app="test",
+                born_ns=at_ms * MS,
+                now_ns=at_ms * MS,
+            )
+        while (wake_ns := protocol._roots.next_wake_ns()) is not None:
+            node.wake(wake_ns)
+    assert [start_ms for start_ms in relays(node) if start_ms > 60] == [64, 164, 264, 964]
+    assert len(protocol._roots) == 0, "what has no turn any more goes another way"
+    assert protocol.waiting() == 2
 
 
 def test_a_leader_promises_nothing_for_bulk(node: Node) -> None:

@@ -105,40 +105,45 @@ class Swarm:
         self._signal: int | None = None
 
     async def run(self, on_progress: Callable[[float], None]) -> Outcome:
-        """Start, run, collect. Whatever happens, no process is left."""
-        began = time.monotonic()
-        try:
-            await self._start_all()
-            ready_s = await self._start_clock(began)
-            run_began = time.monotonic()
-            await self._follow(on_progress)
-            ended_ns = None if self._aborted is None else self._now_ns()
-            wall_s = time.monotonic() - run_began
-            await self._wind_up()
-        finally:
-            self._over.set()
-            self._ending = True
-            await self.processes.end_all()
-        with contextlib.closing(self._collector) as collector:
-            if (failure := collector.disk_failure()) is not None:
-                self._tell(f"the trace is incomplete: its temporary file could not be written: {failure}")
-            return Outcome(
-                scenario=self._scenario,
-                mode="realtime",
-                wall_s=wall_s,
-                records=self._records(),
-                reports=collector.reports(),
-                taps=collector.taps(),
-                links=collector.links(),
-                ended=self._ended,
-                aborted=self._aborted,
-                ended_ns=ended_ns,
-                ready_s=ready_s,
-                epoch_unix_ns=self._keeper.clock.epoch_unix_ns if self._keeper.clock else 0,
-                heard=collector.figures(),
-                absent=collector.absent(),
-                stall_ms=self._stall_s * 1000,
-            )
+        """Start, run, collect. Whatever happens, no process and no temporary file is left."""
+        with contextlib.closing(self._collector):
+            began = time.monotonic()
+            try:
+                await self._start_all()
+                ready_s = await self._start_clock(began)
+                run_began = time.monotonic()
+                await self._follow(on_progress)
+                ended_ns = None if self._aborted is None else self._now_ns()
+                wall_s = time.monotonic() - run_began
+                await self._wind_up()
+            finally:
+                self._over.set()
+                self._ending = True
+                await self.processes.end_all()
+            return self._outcome(wall_s=wall_s, ready_s=ready_s, ended_ns=ended_ns)
+
+    def _outcome(self, *, wall_s: float, ready_s: float, ended_ns: int | None) -> Outcome:
+        """What was collected; an incomplete trace is said to be one."""
+        collector = self._collector
+        if (failure := collector.disk_failure()) is not None:
+            self._tell(f"the trace is incomplete: its temporary file could not be written: {failure}")
+        return Outcome(
+            scenario=self._scenario,
+            mode="realtime",
+            wall_s=wall_s,
+            records=self._records(),
+            reports=collector.reports(),
+            taps=collector.taps(),
+            links=collector.links(),
+            ended=self._ended,
+            aborted=self._aborted,
+            ended_ns=ended_ns,
+            ready_s=ready_s,
+            epoch_unix_ns=self._keeper.clock.epoch_unix_ns if self._keeper.clock else 0,
+            heard=collector.figures(),
+            absent=collector.absent(),
+            stall_ms=self._stall_s * 1000,
+        )
 
     def _records(self) -> list[Record]:
         records = [*self._collector.records(), *self._obituaries]

@@ -84,6 +84,7 @@ def test_a_run_whose_emulator_was_killed_and_started_again_is_not_valid_and_says
     assert summary["frames"]["in_flight"] < 20, "what nobody knows of is not called in flight"
 
 
+@pytest.mark.slow
 def test_a_run_whose_world_stood_still_for_seconds_is_not_valid() -> None:
     moving = scenario("duration_s=7.5", "mobility.model=formation")
     frozen = (1.0, send(signal.SIGSTOP, "world")), (6.0, send(signal.SIGCONT, "world"))
@@ -129,6 +130,7 @@ def test_a_world_that_is_started_again_goes_on_where_it_was_and_the_run_is_not_v
     assert watch.jump_m() < 10
 
 
+@pytest.mark.slow
 def test_a_launcher_that_is_stopped_until_after_the_end_does_not_exit_with_0() -> None:
     """It is the router too: nothing reaches anybody meanwhile."""
     command = [sys.executable, "-m", "sim.cli", "launch", "quick", "--json"]

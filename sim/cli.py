@@ -9,10 +9,11 @@ from collections.abc import Callable, Iterator
 from contextlib import contextmanager, nullcontext
 from importlib.resources import files
 from pathlib import Path
-from typing import Annotated, Any
+from typing import TYPE_CHECKING, Annotated, Any
 
 from cyclopts import App, Parameter
 from cyclopts.validators import Number
+from rich.markup import escape
 from rich.progress import BarColumn, Progress, TextColumn, TimeElapsedColumn
 from rich.table import Table
 
@@ -20,15 +21,18 @@ from emulator.capture_file import CaptureFile
 from fanet_mw import __version__
 from fanet_mw.errors import ConfigError, FanetError
 from fanet_mw.hosts import interrupts, loop
+from fanet_mw.installation import missing_extra
 from fanet_mw.scenario import Scenario
 from fanet_mw.units import NodeId
 from sim import catalog, report
 from sim.air_cli import app as air_app
 from sim.console import Console, nobody_reads
 from sim.layout import positions
-from sim.options import Choice, Join, Output, warn_of
-from sim.outcome import Outcome
+from sim.options import Choice, Join, Output, warn_of, with_engine
 from sim.running import locate, running
+
+if TYPE_CHECKING:
+    from sim.outcome import Outcome  # needs numpy, which a machine without the emulator has not
 
 app = App(
     name="fanet",
@@ -55,7 +59,7 @@ def simulate(scenario: str, *, choice: Choice = Choice(), output: Output = Outpu
     from sim.run import EPOCH_UNIX_NS
     from sim.run import simulate as run
 
-    chosen = choice.scenario(scenario)
+    chosen = with_engine(choice.scenario(scenario))
     output.prepare()
     if must_compile():
         _err.print(WORD, highlight=False)
@@ -132,7 +136,7 @@ def launch(
     """
     from sim.swarm import launch as run
 
-    chosen = choice.realtime_scenario(scenario)
+    chosen = with_engine(choice.realtime_scenario(scenario))
     output.prepare()
     warn_of(listen, listens=True)
     warn_of(connect, listens=False)
@@ -263,7 +267,7 @@ def world(scenario: str, *, choice: Choice = Choice(), join: Join = Join()) -> i
     """
     from sim.world_main import run
 
-    chosen = choice.realtime_scenario(scenario)
+    chosen = with_engine(choice.realtime_scenario(scenario))
     return run(chosen, swarm=join.swarm or chosen.name, endpoint=join.connect, zenoh_config=join.zenoh_config)
 
 
@@ -434,7 +438,7 @@ def _progress(scenario: Scenario, *, quiet: bool) -> Iterator[Callable[[float], 
         yield lambda seconds: progress.update(task, completed=seconds)
 
 
-def _finish(outcome: Outcome, output: Output) -> int:
+def _finish(outcome: "Outcome", output: Output) -> int:
     """Write and show the result; 0 only when it may be used."""
     from sim.results import finish
 
@@ -463,6 +467,11 @@ def main() -> None:
         nobody_reads()
     except FanetError as error:
         _err.print(f"[bold red]fanet:[/] {error}", highlight=False, soft_wrap=True)
+        code = 2
+    except ModuleNotFoundError as error:
+        if (why := missing_extra(error)) is None:
+            raise
+        _err.print(f"[bold red]fanet:[/] {escape(why)}", highlight=False, soft_wrap=True)
         code = 2
     except KeyboardInterrupt as interrupt:
         code = interrupts.exit_code(interrupt)

@@ -8,6 +8,7 @@ from pathlib import Path
 from typing import NamedTuple
 
 from agents.clocked import make_uav
+from fanet_mw.bus.topics import Topics
 from fanet_mw.errors import ConfigError
 from fanet_mw.hosts import interrupts, loop, service
 from fanet_mw.hosts.bus import JOIN_PATIENCE_S, Bus, config_of
@@ -16,7 +17,6 @@ from fanet_mw.hosts.realtime import RealtimeHost, run_actor
 from fanet_mw.radios.field_bus import FieldBus, joined
 from fanet_mw.radios.udp import PORT, UdpRadio
 from fanet_mw.scenario import Scenario
-from fanet_mw.topics import Topics
 from fanet_mw.units import Enu, NodeId, S
 
 

@@ -9,8 +9,8 @@ from collections.abc import Callable
 from dataclasses import dataclass
 from typing import Final
 
+from fanet_mw.bus.messages import Gps
 from fanet_mw.mavlink import AUTOPILOT_COMPONENT, Attitude, Battery, Encoder
-from fanet_mw.messages import Gps
 from fanet_mw.units import Enu, NodeId, S
 
 GRAVITY_M_S2: Final = 9.80665

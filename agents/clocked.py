@@ -16,9 +16,19 @@ from agents.swarm_time import BeaconTime, swarm_time
 from agents.uav import Uav
 from fanet_mw import wire
 from fanet_mw.actor import Actor
-from fanet_mw.messages import Gps, MavlinkTap, Message, Reception, Setpoint, TxOutcome, TxRequest, TxStatus, WifiScan
+from fanet_mw.bus.messages import (
+    Gps,
+    MavlinkTap,
+    Message,
+    Reception,
+    Setpoint,
+    TxOutcome,
+    TxRequest,
+    TxStatus,
+    WifiScan,
+)
+from fanet_mw.bus.topics import Topics
 from fanet_mw.scenario import Scenario
-from fanet_mw.topics import Topics
 from fanet_mw.trace import ClockSampled, Record
 from fanet_mw.units import US, Enu, NodeId, S
 from fanet_mw.wire import Kind

@@ -19,7 +19,7 @@ from typing import Final, NamedTuple
 from agents.mission import HOME, Course
 from fanet_mw.approach import Approach, closest
 from fanet_mw.mavlink import Collision
-from fanet_mw.protocol.whereabouts import Motion
+from fanet_mw.routing.clustered.roles.position_updates import Motion
 from fanet_mw.scenario import Scenario
 from fanet_mw.trace import ConflictForeseen, ConflictOver, Record
 from fanet_mw.units import MS, Enu, NodeId, S, seconds_to_ns

@@ -11,7 +11,7 @@ from agents.localization import Sighting, estimate
 from fanet_mw.scenario import Mission as MissionConfig
 from fanet_mw.trace import Approaching, Arrived, Detected, Record
 from fanet_mw.units import Enu, NodeId, S
-from fanet_mw.wire_messages import Survivor
+from fanet_mw.wire.inner import Survivor
 
 _RING_M: Final = 20.0
 """UAVs hold on a ring about the survivor, each at an angle of its own, so that they see it from several sides."""

@@ -9,7 +9,7 @@ Doppler shift, and far better than a position; an error of it shows as error x t
 import math
 from typing import Final
 
-from fanet_mw.messages import Gps
+from fanet_mw.bus.messages import Gps
 from fanet_mw.units import Enu, S
 
 _WANTED: Final = 0.01

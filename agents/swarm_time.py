@@ -10,12 +10,12 @@ from typing import Final
 
 from fanet_mw import wire
 from fanet_mw.errors import MalformedFrameError
-from fanet_mw.protocol.clock_fit import EXACT, ClockFit, Line, Oscillator, Pair
-from fanet_mw.protocol.timesync import Settings, TimeSync
 from fanet_mw.rng import stream
 from fanet_mw.scenario import Clock, Scenario
+from fanet_mw.timesync.clock_fit import EXACT, ClockFit, Line, Oscillator, Pair
+from fanet_mw.timesync.ftsp import Settings, TimeSync
 from fanet_mw.units import NodeId, S, seconds_to_ns
-from fanet_mw.wire_messages import TimeBeacon
+from fanet_mw.wire.inner import TimeBeacon
 
 _SIGMAS: Final = 4
 _LIGHT_M_PER_S: Final = 299_792_458

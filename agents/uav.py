@@ -15,18 +15,18 @@ from agents.steady_fix import SteadyFix
 from agents.traffic import Traffic
 from fanet_mw import mavlink, wire
 from fanet_mw.actor import Actor
+from fanet_mw.bus.messages import Gps, MavlinkTap, Message, Reception, Setpoint, TxStatus, WifiScan
+from fanet_mw.bus.topics import Topics
 from fanet_mw.errors import DropReason, MalformedFrameError
-from fanet_mw.messages import Gps, MavlinkTap, Message, Reception, Setpoint, TxStatus, WifiScan
-from fanet_mw.protocol.node import Node
-from fanet_mw.protocol.txqueue import Packet
-from fanet_mw.protocol.whereabouts import Motion
+from fanet_mw.node.node import Node
+from fanet_mw.node.queue import Packet
 from fanet_mw.rng import stream
 from fanet_mw.routing import make_protocol
+from fanet_mw.routing.clustered.roles.position_updates import Motion
 from fanet_mw.scenario import Scenario
-from fanet_mw.topics import Topics
 from fanet_mw.trace import Warned
 from fanet_mw.units import BROADCAST, MS, US, Enu, NodeId, earliest, seconds_to_ns
-from fanet_mw.wire_messages import Survivor
+from fanet_mw.wire.inner import Survivor
 
 _HELLO_JITTER: Final = 0.1
 """A hello varies by this share of its interval, so that neighbors in step do not stay so (RFC 3626, 3.4)."""

@@ -5,7 +5,7 @@ from functools import partial
 from pathlib import Path
 
 from emulator.capture_file import CaptureFile, unused
-from emulator.compile import WORD, must_compile, warm_up
+from emulator.kernel.compile import WORD, must_compile, warm_up
 from emulator.medium import Medium
 from fanet_mw.hosts import interrupts, loop, service
 from fanet_mw.hosts.bus import JOIN_PATIENCE_S

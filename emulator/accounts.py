@@ -5,7 +5,7 @@ from typing import Any, Final
 
 import numpy as np
 
-from emulator import state as s
+from emulator.kernel import state as s
 from fanet_mw.errors import DropReason
 from fanet_mw.units import MS, S
 

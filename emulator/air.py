@@ -7,18 +7,18 @@ from typing import Final
 import numpy as np
 import numpy.typing as npt
 
-from emulator import kernel
-from emulator import state as s
 from emulator.chance import MODULUS
-from emulator.entry import Entry
-from emulator.error_rate import header_rates, log_success_per_bit
-from emulator.fading import law_of, seeds
+from emulator.channel.error_rate import header_rates, log_success_per_bit
+from emulator.channel.fading import law_of, seeds
+from emulator.channel.propagation import Links, milliwatt, noise_mw, pair_codes
+from emulator.channel.shadowing import Shadowing
 from emulator.faults import Faults
+from emulator.kernel import kernel
+from emulator.kernel import state as s
+from emulator.kernel.entry import Entry
 from emulator.link_book import LinkBook
-from emulator.propagation import Links, milliwatt, noise_mw, pair_codes
-from emulator.shadowing import Shadowing
 from fanet_mw.airtime import DETECT_NS, OVERHEAD_BYTES, Timing, airtime_ns
-from fanet_mw.link_stats import LinkStats
+from fanet_mw.bus.link_stats import LinkStats
 from fanet_mw.rng import stream_seed
 from fanet_mw.scenario import Scenario
 
@@ -34,7 +34,7 @@ Rows = list[tuple[int, ...]]
 
 @lru_cache(maxsize=8)
 def _error_table(rate_mbps: float, ack_rate_mbps: float) -> npt.NDArray[np.float64]:
-    """PLCP header, data, ACK (`emulator.state.LOCK_RATE`)."""
+    """PLCP header, data, ACK (`emulator.kernel.state.LOCK_RATE`)."""
     return np.stack([log_success_per_bit(rate) for rate in (header_rates(rate_mbps)[0], rate_mbps, ack_rate_mbps)])
 
 
@@ -189,7 +189,7 @@ class Air:
         )
 
     def advance(self, until_ns: int) -> Rows:
-        """Let time pass; returns the output rows (`emulator.state.OUT_*`) in order."""
+        """Let time pass; returns the output rows (`emulator.kernel.state.OUT_*`) in order."""
         rows: Rows = []
         while True:
             bound_ns = self._entry.advance(until_ns)

@@ -1,7 +1,7 @@
 """Random numbers of a station: a generator is a row of the state, RANDOM or FAULT_RANDOM."""
 
-from emulator.jit import jit
-from emulator.state import Ints
+from emulator.kernel.jit import jit
+from emulator.kernel.state import Ints
 
 MODULUS = 2_147_483_647
 

@@ -17,9 +17,9 @@ from typing import Final, NamedTuple
 import numpy as np
 import numpy.typing as npt
 
-from emulator import state as s
-from emulator.propagation import Links, milliwatt, noise_mw
-from fanet_mw.radio_control import Control, Cut, Degrade, Fault, Jam, Restore, wrong
+from emulator.channel.propagation import Links, milliwatt, noise_mw
+from emulator.kernel import state as s
+from fanet_mw.bus.radio_control import Control, Cut, Degrade, Fault, Jam, Restore, wrong
 from fanet_mw.scenario import Radio
 from fanet_mw.trace import RadioFault
 

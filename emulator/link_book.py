@@ -8,9 +8,9 @@ from array import array
 
 import numpy as np
 
-from emulator import state as s
-from emulator.state import Ints
-from fanet_mw.link_stats import COUNTS, LinkStats
+from emulator.kernel import state as s
+from emulator.kernel.state import Ints
+from fanet_mw.bus.link_stats import COUNTS, LinkStats
 
 _ROWS = slice(s.RSSI_SUM, s.N_CUT + 1)
 """RSSI sum, then COUNTS."""

@@ -9,17 +9,17 @@ from typing import Any, Final
 
 import numpy as np
 
-from emulator import state as s
 from emulator.accounts import Accounts
 from emulator.air import Air, Rows
 from emulator.faults import Faults
+from emulator.kernel import state as s
 from emulator.pcap import Capture
 from fanet_mw.actor import Actor
+from fanet_mw.bus.messages import Message, Obstructions, Poses, Reception, TxOutcome, TxRequest, TxStatus
+from fanet_mw.bus.radio_control import Cut, Degrade, Jam, Restore
+from fanet_mw.bus.topics import Topics
 from fanet_mw.errors import DropReason
-from fanet_mw.messages import Message, Obstructions, Poses, Reception, TxOutcome, TxRequest, TxStatus
-from fanet_mw.radio_control import Cut, Degrade, Jam, Restore
 from fanet_mw.scenario import Scenario
-from fanet_mw.topics import Topics
 from fanet_mw.units import BROADCAST, MS, NodeId, S, earliest
 
 TOO_LATE_NS: Final = 50 * MS

@@ -16,7 +16,7 @@ from abc import ABC, abstractmethod
 from collections.abc import Mapping
 from typing import Any
 
-from fanet_mw.messages import Message
+from fanet_mw.bus.messages import Message
 from fanet_mw.trace import Record
 
 

@@ -17,12 +17,12 @@ import numpy as np
 from fanet_mw.scenario import Scenario
 from fanet_mw.trace import Delivered
 from fanet_mw.units import S
-from sim import catalog
-from sim.engine import Rows
-from sim.guidance import Guidance
-from sim.layout import positions
-from sim.results import finish
-from sim.run import simulate
+from sim.results.files import finish
+from sim.run.virtual import simulate
+from sim.scenarios import catalog
+from sim.world.engine import Rows
+from sim.world.guidance import Guidance
+from sim.world.layout import positions
 
 
 def reached(at: Rows, range_m: float) -> int:

@@ -6,8 +6,7 @@ from typing import Any
 import pytest
 from hypothesis import Phase, settings
 
-from fanet_mw import config
-from fanet_mw.scenario import Scenario
+from fanet_mw.scenario import Scenario, config
 
 settings.register_profile("default", deadline=None)  # first calls compile; timing belongs in benchmarks
 settings.load_profile("default")

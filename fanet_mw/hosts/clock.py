@@ -12,12 +12,12 @@ import math
 from collections.abc import Iterable, Sequence
 from typing import Final
 
-from fanet_mw import topics
+from fanet_mw.bus import topics
+from fanet_mw.bus.messages import Clock, ClockState
+from fanet_mw.bus.topics import Topics
 from fanet_mw.errors import BusError, MalformedFrameError
 from fanet_mw.hosts.bus import Bus, HostBus
 from fanet_mw.hosts.timebase import THIS_MACHINE, Timebase
-from fanet_mw.messages import Clock, ClockState
-from fanet_mw.topics import Topics
 from fanet_mw.units import MS, S
 
 _START_DELAY_NS: Final = 300 * MS

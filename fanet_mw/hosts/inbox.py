@@ -17,10 +17,10 @@ from collections import deque
 from collections.abc import Callable
 from typing import Final, NamedTuple
 
-from fanet_mw import topics
+from fanet_mw.bus import topics
+from fanet_mw.bus.link_stats import LinkStats
+from fanet_mw.bus.messages import Message, Report, TraceBatch
 from fanet_mw.errors import MalformedFrameError
-from fanet_mw.link_stats import LinkStats
-from fanet_mw.messages import Message, Report, TraceBatch
 
 BOUND: Final = 4096
 """Puts that may wait."""

@@ -15,15 +15,15 @@ from collections.abc import Callable
 from pathlib import Path
 from typing import Any, Final
 
-from fanet_mw import topics
 from fanet_mw.actor import Actor
+from fanet_mw.bus import topics
+from fanet_mw.bus.messages import Message, Reception, Report, TraceBatch
+from fanet_mw.bus.topics import Topics
 from fanet_mw.hosts.bus import JOIN_PATIENCE_S, Bus, HostBus, config_of
 from fanet_mw.hosts.clock import START_PATIENCE_S, ClockListener, SwarmClock
 from fanet_mw.hosts.inbox import Inbox
 from fanet_mw.hosts.lateness import Histogram
 from fanet_mw.hosts.timebase import THIS_MACHINE, Timebase
-from fanet_mw.messages import Message, Reception, Report, TraceBatch
-from fanet_mw.topics import Topics
 from fanet_mw.trace import Record
 from fanet_mw.units import MS, S
 

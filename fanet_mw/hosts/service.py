@@ -10,11 +10,10 @@ from collections.abc import Callable
 from pathlib import Path
 from typing import Final
 
-from fanet_mw import config
 from fanet_mw.errors import ConfigError, FanetError
 from fanet_mw.hosts import interrupts
 from fanet_mw.hosts.bus import exposure
-from fanet_mw.scenario import Scenario
+from fanet_mw.scenario import Scenario, config
 
 BUS_EXIT_CODE: Final = 3
 _DEFAULT_ENDPOINT: Final = "tcp/127.0.0.1:7447"

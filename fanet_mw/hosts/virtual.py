@@ -9,8 +9,8 @@ from collections.abc import Callable, Iterable, Sequence
 from typing import Final
 
 from fanet_mw.actor import Actor
+from fanet_mw.bus.messages import Message
 from fanet_mw.errors import LocalProtocolError
-from fanet_mw.messages import Message
 from fanet_mw.trace import Record
 from fanet_mw.units import S
 

@@ -9,10 +9,10 @@ from collections.abc import Iterator
 from pathlib import Path
 from typing import Protocol
 
-from fanet_mw import topics
+from fanet_mw.bus import topics
+from fanet_mw.bus.messages import Clock, ClockState, Message, Reception, TxRequest, TxStatus
+from fanet_mw.bus.topics import Topics
 from fanet_mw.hosts.bus import Bus, OnSample
-from fanet_mw.messages import Clock, ClockState, Message, Reception, TxRequest, TxStatus
-from fanet_mw.topics import Topics
 from fanet_mw.units import NodeId
 
 

@@ -14,9 +14,9 @@ from collections import Counter
 from collections.abc import Callable
 from typing import Any, Final, NamedTuple
 
+from fanet_mw.bus.messages import Reception, TxOutcome, TxRequest, TxStatus
 from fanet_mw.errors import BusError, DropReason, MalformedFrameError
-from fanet_mw.messages import Reception, TxOutcome, TxRequest, TxStatus
-from fanet_mw.protocol.seen import Seen, key_of
+from fanet_mw.node.duplicates import Seen, key_of
 from fanet_mw.radios.datagram import Datagram, DatagramKind
 from fanet_mw.units import BROADCAST, NodeId, S
 

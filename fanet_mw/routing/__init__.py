@@ -3,12 +3,12 @@
 from collections.abc import Mapping
 from typing import Final
 
-from fanet_mw.protocol.claimed import Claimed
-from fanet_mw.protocol.clustered import Clustered
-from fanet_mw.protocol.contract import Port, RoutingProtocol
-from fanet_mw.protocol.scheduled import Scheduled
-from fanet_mw.protocol.selective import Selective
+from fanet_mw.node.contract import Port, RoutingProtocol
 from fanet_mw.routing.aodv import Aodv
+from fanet_mw.routing.clustered.claimed.protocol import Claimed
+from fanet_mw.routing.clustered.clustered import Clustered
+from fanet_mw.routing.clustered.scheduled import Scheduled
+from fanet_mw.routing.clustered.selective import Selective
 from fanet_mw.routing.direct import Direct
 from fanet_mw.routing.dsdv import Dsdv
 from fanet_mw.routing.flooding import Flooding

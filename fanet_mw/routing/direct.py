@@ -1,8 +1,8 @@
 """No routing: one transmission, to the destination or to whoever is in range. What the MAC alone can do."""
 
-from fanet_mw.messages import Reception
-from fanet_mw.protocol.contract import RoutingProtocol
-from fanet_mw.protocol.txqueue import Packet
+from fanet_mw.bus.messages import Reception
+from fanet_mw.node.contract import RoutingProtocol
+from fanet_mw.node.queue import Packet
 from fanet_mw.units import NodeId
 
 

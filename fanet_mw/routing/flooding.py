@@ -7,10 +7,10 @@
 from abc import abstractmethod
 from typing import ClassVar
 
+from fanet_mw.bus.messages import Reception
 from fanet_mw.errors import DropReason
-from fanet_mw.messages import Reception
-from fanet_mw.protocol.contract import Port, RoutingProtocol
-from fanet_mw.protocol.txqueue import Packet
+from fanet_mw.node.contract import Port, RoutingProtocol
+from fanet_mw.node.queue import Packet
 from fanet_mw.units import BROADCAST
 from fanet_mw.wire import FLAG_FLOOD
 

@@ -12,10 +12,10 @@ import struct
 from abc import abstractmethod
 from typing import ClassVar, Final
 
+from fanet_mw.bus.messages import Reception, TxOutcome, TxStatus
 from fanet_mw.errors import DropReason, MalformedFrameError
-from fanet_mw.messages import Reception, TxOutcome, TxStatus
-from fanet_mw.protocol.contract import Port, RoutingProtocol
-from fanet_mw.protocol.txqueue import Packet
+from fanet_mw.node.contract import Port, RoutingProtocol
+from fanet_mw.node.queue import Packet
 from fanet_mw.routing import control
 from fanet_mw.routing.control import Family, Reader, check_node, type_of
 from fanet_mw.routing.resolution import Knowledge, Outgoing, Resolver

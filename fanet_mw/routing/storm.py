@@ -10,9 +10,9 @@ same paper (neighbor counts, second chances, zones), nor the distance- and locat
 from collections.abc import Mapping
 from typing import ClassVar
 
-from fanet_mw.protocol.assessment import Assessment
-from fanet_mw.protocol.contract import Port
-from fanet_mw.protocol.txqueue import Packet
+from fanet_mw.node.contract import Port
+from fanet_mw.node.queue import Packet
+from fanet_mw.routing.assessment import Assessment
 from fanet_mw.routing.flooding import Flood
 from fanet_mw.units import MS
 

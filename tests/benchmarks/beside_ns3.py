@@ -12,9 +12,9 @@ from pathlib import Path
 from time import process_time
 from typing import Final, NamedTuple
 
-from sim import catalog
-from sim.results import finish
-from sim.run import simulate
+from sim.results.files import finish
+from sim.run.virtual import simulate
+from sim.scenarios import catalog
 from tests.ns3 import live
 
 _INTERVALS_S: Final = (1.0, 0.1)

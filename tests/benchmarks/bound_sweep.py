@@ -20,20 +20,19 @@ from typing import Any, NamedTuple
 
 from agents.clocked import make_uav
 from agents.traffic import sources_of
-from fanet_mw import config
 from fanet_mw.actor import Actor
+from fanet_mw.bus.messages import Message
+from fanet_mw.graph.topology import components, within_range
 from fanet_mw.hosts.virtual import VirtualHost
-from fanet_mw.messages import Message
-from fanet_mw.protocol.planner import Plan, plan
-from fanet_mw.protocol.topology import components, within_range
-from fanet_mw.scenario import Scenario
+from fanet_mw.planner import Plan, plan
+from fanet_mw.scenario import Scenario, config
 from fanet_mw.trace import Record
 from fanet_mw.units import MS, Enu, NodeId, S
-from sim.bounds import against_bounds
-from sim.layout import positions
-from sim.outcome import Outcome
-from sim.packets import packets_of
-from sim.run import actors_of
+from sim.results.bounds import against_bounds
+from sim.results.packets import packets_of
+from sim.run.outcome import Outcome
+from sim.run.virtual import actors_of
+from sim.world.layout import positions
 
 
 class Result(NamedTuple):

@@ -8,12 +8,12 @@ Scenario `clusters` (grid 9 x 5, 44 sources of 1024 B) and the same on a disc of
 import sys
 
 from agents.traffic import sources_of
-from fanet_mw.protocol.planner import Plan, plan
+from fanet_mw.planner import Plan, plan
 from fanet_mw.units import NodeId
-from sim import catalog
-from sim.layout import positions
-from sim.results import finish
-from sim.run import simulate
+from sim.results.files import finish
+from sim.run.virtual import simulate
+from sim.scenarios import catalog
+from sim.world.layout import positions
 
 DISC = ("nodes.layout=disc", "nodes.radius_m=250")
 CASES: tuple[tuple[str, tuple[str, ...], tuple[float, ...]], ...] = (

@@ -13,11 +13,11 @@ from typing import Any, NamedTuple
 
 from fanet_mw.trace import ClockSampled
 from fanet_mw.units import US, S
-from sim import catalog
-from sim.clocks import errors_ns
-from sim.outcome import Outcome
-from sim.results import finish
-from sim.run import simulate
+from sim.results.clocks import errors_ns
+from sim.results.files import finish
+from sim.run.outcome import Outcome
+from sim.run.virtual import simulate
+from sim.scenarios import catalog
 
 BEGIN_S, END_S = 70, 120
 GRID = [f"duration_s={END_S}", f"warmup_s={BEGIN_S}"]

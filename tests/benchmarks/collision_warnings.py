@@ -9,9 +9,9 @@ warnings that reached the UAV they are about, and how late; how often two were n
 import sys
 from typing import Any
 
-from sim import catalog
-from sim.results import finish
-from sim.run import simulate
+from sim.results.files import finish
+from sim.run.virtual import simulate
+from sim.scenarios import catalog
 
 CASES: tuple[tuple[str, ...], ...] = (
     ("mission.collision_horizon_s=0",),

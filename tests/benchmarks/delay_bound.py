@@ -14,7 +14,7 @@ sys.path.append(str(Path(__file__).parents[1] / "property"))
 from slot_simulator import Slot, delays, network
 
 from fanet_mw.airtime import OVERHEAD_BYTES, frame_ns
-from fanet_mw.protocol.delay import (
+from fanet_mw.bounds import (
     Bounded,
     Contention,
     Dcf,

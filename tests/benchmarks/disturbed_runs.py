@@ -1,12 +1,11 @@
 """Which disturbances a result survives: `python tests/benchmarks/disturbed_runs.py [SCENARIO ...]`, 5 minutes of CPU.
 
-The limits of `sim/validity.py` come from this table. Small swarms (nine UAVs, 20 s) run in virtual time, undisturbed
-and then with a host that does what a machine under load does: requests or receptions are lost or come too late,
-processes stand still. So nothing differs from the undisturbed run of the same seed but the disturbance. A line says how
-much each measure saw of it, how far delivery ratio and delay went off (mean over the seeds, and the worst), and in how
-many of the runs the verdict was `valid`. `--real CASE ...` runs real processes instead, `--list` names the cases: under
-`none` it shows what the machine itself does.
-"""
+The limits of `sim/results/validity.py` come from this table. Small swarms (nine UAVs, 20 s) run in virtual time,
+undisturbed and then with a host that does what a machine under load does: requests or receptions are lost or come too
+late, processes stand still. So nothing differs from the undisturbed run of the same seed but the disturbance. A line
+says how much each measure saw of it, how far delivery ratio and delay went off (mean over the seeds, and the worst),
+and in how many of the runs the verdict was `valid`. `--real CASE ...` runs real processes instead, `--list` names the
+cases: under `none` it shows what the machine itself does."""
 
 import asyncio
 import heapq
@@ -19,16 +18,17 @@ from random import Random
 from typing import Any, Final, NamedTuple
 
 from fanet_mw.actor import Actor
+from fanet_mw.bus.messages import Message, Reception, TxRequest
 from fanet_mw.hosts.virtual import VirtualHost
-from fanet_mw.messages import Message, Reception, TxRequest
 from fanet_mw.scenario import Scenario
 from fanet_mw.trace import Record
 from fanet_mw.units import MS, S
-from sim import catalog, swarm
-from sim.metrics import summarize
-from sim.outcome import Outcome
-from sim.results import finish
-from sim.run import actors_of, simulate
+from sim.results.files import finish
+from sim.results.metrics import summarize
+from sim.run import swarm
+from sim.run.outcome import Outcome
+from sim.run.virtual import actors_of, simulate
+from sim.scenarios import catalog
 
 _SMALL: Final = (
     "nodes.count=9",

@@ -10,7 +10,9 @@ import statistics
 import sys
 from typing import NamedTuple
 
-from fanet_mw.protocol.clustering import (
+from fanet_mw.graph.topology import within_range
+from fanet_mw.rng import stream
+from fanet_mw.routing.clustered.clustering import (
     LastingDegree,
     Maintenance,
     Swarm,
@@ -21,9 +23,7 @@ from fanet_mw.protocol.clustering import (
     by_mobility,
     heads_of,
 )
-from fanet_mw.protocol.clustering.election import Score
-from fanet_mw.protocol.topology import within_range
-from fanet_mw.rng import stream
+from fanet_mw.routing.clustered.clustering.election import Score
 from fanet_mw.units import Enu, NodeId, S
 
 NODES = 45

@@ -19,11 +19,11 @@ import statistics
 import sys
 from collections import Counter
 
-from fanet_mw import config
+from fanet_mw.scenario import config
 from fanet_mw.trace import Delivered, Generated, RoleChanged
 from fanet_mw.units import S
-from sim.outcome import Outcome
-from sim.run import simulate
+from sim.run.outcome import Outcome
+from sim.run.virtual import simulate
 
 KILLED_S = 15
 HEAD_BOUND_S = 7.0

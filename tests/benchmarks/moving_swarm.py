@@ -14,13 +14,14 @@ import time
 from collections.abc import Iterator
 from typing import NamedTuple
 
-from fanet_mw import config, wire
+from fanet_mw import wire
+from fanet_mw.bus.messages import TxRequest
+from fanet_mw.bus.topics import Topics
 from fanet_mw.hosts.virtual import VirtualHost
-from fanet_mw.messages import TxRequest
-from fanet_mw.topics import Topics
-from sim.outcome import Outcome
-from sim.results import finish
-from sim.run import actors_of
+from fanet_mw.scenario import config
+from sim.results.files import finish
+from sim.run.outcome import Outcome
+from sim.run.virtual import actors_of
 
 COUNT, DURATION_S = 25, 90
 

@@ -6,14 +6,14 @@ delay of any delivery must stay below the bound of a feasible plan; losses are n
 
 import sys
 
-from fanet_mw import config
-from fanet_mw.protocol.delay import Bounded
-from fanet_mw.protocol.planner import Plan, plan
+from fanet_mw.bounds import Bounded
+from fanet_mw.planner import Plan, plan
+from fanet_mw.scenario import config
 from fanet_mw.trace import Delivered
 from fanet_mw.units import NodeId, S
-from sim.layout import positions
-from sim.results import finish
-from sim.run import simulate
+from sim.results.files import finish
+from sim.run.virtual import simulate
+from sim.world.layout import positions
 
 CASES = ((2.0, 4, 5.0), (1.0, 4, 5.0), (1.0, 8, 2.0), (1.0, 22, 1.0), (0.5, 4, 5.0))
 """Interval [s], clusters, flooding period [s]."""

@@ -21,12 +21,12 @@ from unittest.mock import patch
 from agents.uav import Uav
 from fanet_mw import wire
 from fanet_mw.airtime import OVERHEAD_BYTES
-from fanet_mw.protocol.node import Node
+from fanet_mw.node.node import Node
 from fanet_mw.scenario import Scenario
 from fanet_mw.wire import Kind
-from sim import catalog
-from sim.results import finish
-from sim.run import simulate
+from sim.results.files import finish
+from sim.run.virtual import simulate
+from sim.scenarios import catalog
 
 CASES: dict[str, tuple[str, ...]] = {
     "clustered, all": ("clusters.relay=all", "clusters.count=4", "clusters.flooding_period_s=5"),

@@ -13,15 +13,15 @@ from collections.abc import Mapping
 from typing import Any
 
 from fanet_mw.actor import Actor
+from fanet_mw.bus.messages import MavlinkTap, Message
+from fanet_mw.bus.topics import Topics
 from fanet_mw.hosts.bus import Bus
 from fanet_mw.hosts.clock import ClockKeeper
 from fanet_mw.hosts.lateness import Histogram
 from fanet_mw.hosts.realtime import run_actor
-from fanet_mw.messages import MavlinkTap, Message
-from fanet_mw.topics import Topics
 from fanet_mw.units import S
-from sim.processes import Processes
-from sim.swarm import Collector, free_endpoint
+from sim.run.processes import Processes
+from sim.run.swarm import Collector, free_endpoint
 
 NAMES = Topics("bench")
 AGENTS = 45

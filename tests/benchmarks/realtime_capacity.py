@@ -18,7 +18,7 @@ _SECONDS = 100
 def measure(count: int) -> tuple[dict[str, Any], dict[str, Any]]:
     with tempfile.TemporaryDirectory() as folder:
         command = [
-            sys.executable, "-m", "sim.cli", "launch", "rescue", "--json", "--out", folder,
+            sys.executable, "-m", "sim.cli.app", "launch", "rescue", "--json", "--out", folder,
             "--set", f"nodes.count={count}", "--set", f"duration_s={_SECONDS}",
         ]  # fmt: skip
         subprocess.run(command, capture_output=True, check=False, timeout=300)

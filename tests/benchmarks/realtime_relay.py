@@ -18,19 +18,18 @@ from collections.abc import Mapping
 from typing import Any, Final
 
 from emulator.__main__ import run as run_emulator
-from fanet_mw import config
 from fanet_mw.actor import Actor
+from fanet_mw.bus.messages import MavlinkTap, Message, Reception, TxRequest
+from fanet_mw.bus.topics import Topics
 from fanet_mw.hosts import loop
 from fanet_mw.hosts.bus import Bus
 from fanet_mw.hosts.clock import ClockKeeper, ClockListener
 from fanet_mw.hosts.realtime import run_actor
-from fanet_mw.messages import MavlinkTap, Message, Reception, TxRequest
-from fanet_mw.scenario import Scenario
-from fanet_mw.topics import Topics
+from fanet_mw.scenario import Scenario, config
 from fanet_mw.units import MS, NodeId, S
-from sim.processes import Processes
-from sim.swarm import Collector, free_endpoint
-from sim.world_main import run as run_world
+from sim.run.processes import Processes
+from sim.run.swarm import Collector, free_endpoint
+from sim.world.__main__ import run as run_world
 
 NAMES: Final = Topics("relay")
 PAIRS: Final = 22

@@ -10,15 +10,15 @@ import sys
 from collections import Counter
 
 from agents.traffic import sources_of
-from fanet_mw.config import build
-from fanet_mw.protocol.planner.turns import table_for
-from fanet_mw.protocol.timetable import Timetable
+from fanet_mw.planner.by_turn import table_for
+from fanet_mw.routing.clustered.timetable.timetable import Timetable
 from fanet_mw.scenario import Scenario
+from fanet_mw.scenario.config import build
 from fanet_mw.trace import Delivered, Generated
 from fanet_mw.units import NodeId, S
-from sim import catalog
-from sim.layout import positions
-from sim.run import simulate
+from sim.run.virtual import simulate
+from sim.scenarios import catalog
+from sim.world.layout import positions
 
 KILLED_S = 20
 

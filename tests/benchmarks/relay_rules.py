@@ -9,9 +9,9 @@ import statistics
 import sys
 from collections import Counter
 
-from sim import catalog
-from sim.results import finish
-from sim.run import simulate
+from sim.results.files import finish
+from sim.run.virtual import simulate
+from sim.scenarios import catalog
 
 RULES = {
     "all": [], "gossip": ["clusters.gossip_degree=6"], "counter": ["clusters.counter=2"], "heads": [], "cds": [],

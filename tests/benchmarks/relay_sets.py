@@ -8,10 +8,10 @@ depends on who was heard first.
 import math
 import statistics
 
-from fanet_mw.protocol.broadcast_schedule import broadcast_schedule, shortest_relays
-from fanet_mw.protocol.connected_dominating_set import guha_khuller, wu_li
-from fanet_mw.protocol.multipoint_relays import multipoint_relays
-from fanet_mw.protocol.topology import Adjacency, components, levels, within_range
+from fanet_mw.graph.broadcast_schedule import broadcast_schedule, shortest_relays
+from fanet_mw.graph.connected_dominating_set import guha_khuller, wu_li
+from fanet_mw.graph.multipoint_relays import multipoint_relays
+from fanet_mw.graph.topology import Adjacency, components, levels, within_range
 from fanet_mw.rng import stream
 from fanet_mw.scenario import grid_columns
 from fanet_mw.units import Enu, NodeId

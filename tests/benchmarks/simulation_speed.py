@@ -12,11 +12,10 @@ import sys
 from time import process_time
 from typing import Any, Final
 
-from fanet_mw import config
-from fanet_mw.scenario import Scenario
-from sim import catalog
-from sim.results import finish
-from sim.run import simulate
+from fanet_mw.scenario import Scenario, config
+from sim.results.files import finish
+from sim.run.virtual import simulate
+from sim.scenarios import catalog
 
 _NS3_S: Final = {1.0: 21.0, 0.1: 58.0}
 _SIZES: Final = (45, 100, 200, 400, 1000)

@@ -15,8 +15,8 @@ sys.path.append(str(Path(__file__).parents[1] / "property"))
 
 from test_slots_with_reuse import LISTEN, Air
 
-from fanet_mw.protocol.coloring import clashes, dsatur, welsh_powell
-from fanet_mw.protocol.topology import Adjacency, two_hop, within_range
+from fanet_mw.graph.coloring import clashes, dsatur, welsh_powell
+from fanet_mw.graph.topology import Adjacency, two_hop, within_range
 from fanet_mw.rng import stream
 from fanet_mw.scenario import grid_columns
 from fanet_mw.units import Enu, NodeId

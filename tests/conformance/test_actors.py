@@ -12,7 +12,7 @@ from agents.uav import Uav
 from emulator.medium import Medium
 from fanet_mw import wire
 from fanet_mw.actor import Actor
-from fanet_mw.messages import (
+from fanet_mw.bus.messages import (
     Gps,
     MavlinkTap,
     Message,
@@ -24,15 +24,15 @@ from fanet_mw.messages import (
     TxStatus,
     WifiScan,
 )
-from fanet_mw.radio_control import Cut, Degrade, Jam, Restore
+from fanet_mw.bus.radio_control import Cut, Degrade, Jam, Restore
+from fanet_mw.bus.topics import Topics
 from fanet_mw.routing import PROTOCOLS, RELAYS
 from fanet_mw.scenario import Clock, Scenario
-from fanet_mw.topics import Topics
 from fanet_mw.trace import Generated
 from fanet_mw.units import MS, Enu, NodeId, S
-from fanet_mw.wire_messages import Join, Member, Schedule, Survivor, TimeBeacon
-from sim import catalog
-from sim.world import World
+from fanet_mw.wire.inner import Join, Member, Schedule, Survivor, TimeBeacon
+from sim.scenarios import catalog
+from sim.world.world import World
 
 NAMES = Topics("contract")
 SCENARIO = catalog.find("quick", ["world.engine=kinematic"])

@@ -15,19 +15,19 @@ import pytest
 from hypothesis import given
 from hypothesis import strategies as st
 
-from fanet_mw import topics
 from fanet_mw.actor import Actor
+from fanet_mw.bus import topics
+from fanet_mw.bus.messages import Clock, ClockState, MavlinkTap, Message, Reception, Report, TraceBatch
+from fanet_mw.bus.topics import Topics
 from fanet_mw.errors import BusError
 from fanet_mw.hosts.bus import Bus
 from fanet_mw.hosts.clock import ClockKeeper, ClockListener, SwarmClock
 from fanet_mw.hosts.lateness import Histogram
 from fanet_mw.hosts.realtime import run_actor
 from fanet_mw.hosts.timebase import THIS_MACHINE, Timebase
-from fanet_mw.messages import Clock, ClockState, MavlinkTap, Message, Reception, Report, TraceBatch
-from fanet_mw.topics import Topics
 from fanet_mw.trace import ProcessEnded
 from fanet_mw.units import MS, NodeId, S
-from sim.swarm import free_endpoint
+from sim.run.swarm import free_endpoint
 
 NAMES = Topics("host")
 ROUTER = """

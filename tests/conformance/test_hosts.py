@@ -6,14 +6,14 @@ from collections.abc import Callable
 import pytest
 
 from fanet_mw.actor import Actor
+from fanet_mw.bus.messages import MavlinkTap, Message
+from fanet_mw.bus.topics import Topics
 from fanet_mw.hosts.bus import Bus
 from fanet_mw.hosts.clock import ClockKeeper
 from fanet_mw.hosts.realtime import RealtimeHost
 from fanet_mw.hosts.virtual import VirtualHost
-from fanet_mw.messages import MavlinkTap, Message
-from fanet_mw.topics import Topics
 from fanet_mw.units import MS
-from sim.swarm import free_endpoint
+from sim.run.swarm import free_endpoint
 
 NAMES = Topics("contract")
 DURATION_NS = 600 * MS

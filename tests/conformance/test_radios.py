@@ -9,15 +9,15 @@ from collections.abc import Callable, Mapping
 import pytest
 
 from emulator.medium import Medium
-from fanet_mw import config
 from fanet_mw.actor import Actor
+from fanet_mw.bus.messages import Message, Reception, TxOutcome, TxRequest, TxStatus
+from fanet_mw.bus.topics import Topics, node_of
 from fanet_mw.hosts.virtual import VirtualHost
-from fanet_mw.messages import Message, Reception, TxOutcome, TxRequest, TxStatus
 from fanet_mw.radios.datagram import Datagram, DatagramKind
 from fanet_mw.radios.udp import MOVED_NS, UdpRadio
-from fanet_mw.topics import Topics, node_of
+from fanet_mw.scenario import config
 from fanet_mw.units import BROADCAST, MS, NodeId
-from sim.world import World
+from sim.world.world import World
 
 NODES = (NodeId(1), NodeId(2), NodeId(3))
 UNTIL_NS = 700 * MS

@@ -9,17 +9,17 @@ from hypothesis import given, settings
 from hypothesis import strategies as st
 from rival_bench import Bench
 
-from fanet_mw import config, wire
+from fanet_mw import wire
+from fanet_mw.bus.messages import TxRequest
+from fanet_mw.bus.topics import Topics, node_of
 from fanet_mw.hosts.virtual import VirtualHost
-from fanet_mw.messages import TxRequest
 from fanet_mw.routing import PROTOCOLS, control
-from fanet_mw.scenario import Scenario
-from fanet_mw.topics import Topics, node_of
+from fanet_mw.scenario import Scenario, config
 from fanet_mw.trace import Delivered, Dropped, Generated, Record
 from fanet_mw.units import MS, US
-from sim.outcome import Outcome
-from sim.results import finish
-from sim.run import actors_of, simulate
+from sim.results.files import finish
+from sim.run.outcome import Outcome
+from sim.run.virtual import actors_of, simulate
 
 MULTIHOP = sorted(set(PROTOCOLS) - {"direct"})
 ROUTED = [name for name in MULTIHOP if name not in ("clustered", "flooding", "gossip", "counter")]

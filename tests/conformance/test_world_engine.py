@@ -6,13 +6,13 @@ import numpy as np
 import pytest
 
 from fanet_mw.units import Enu
-from sim import catalog
-from sim.engine import Engine, Rows
-from sim.guidance import Guidance
-from sim.kinematic import Kinematic
-from sim.obstacles import Box, Obstacles
-from sim.physics import Physics
-from sim.survivors import PhoneSensor, place
+from sim.scenarios import catalog
+from sim.world.engine import Engine, Rows
+from sim.world.guidance import Guidance
+from sim.world.kinematic import Kinematic
+from sim.world.obstacles import Box, Obstacles
+from sim.world.physics import Physics
+from sim.world.survivors import PhoneSensor, place
 
 FAR_AWAY = Obstacles(hills=None, boxes=(Box(400, 400, 30, 30, 60),))
 

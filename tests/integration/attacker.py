@@ -5,8 +5,8 @@ from typing import Any
 
 from fanet_mw import wire
 from fanet_mw.actor import Actor
-from fanet_mw.messages import Message, TxRequest
-from fanet_mw.topics import Topics
+from fanet_mw.bus.messages import Message, TxRequest
+from fanet_mw.bus.topics import Topics
 from fanet_mw.units import BROADCAST, MS, US, NodeId
 from fanet_mw.wire import FLAG_FLOOD, Header, Kind
 

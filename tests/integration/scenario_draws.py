@@ -23,17 +23,16 @@ from typing import Annotated, Any, Final, Literal, NamedTuple, Union, get_args, 
 
 from pydantic.fields import FieldInfo
 
-from fanet_mw import config
 from fanet_mw.actor import Actor
 from fanet_mw.errors import ConfigError
 from fanet_mw.hosts.virtual import VirtualHost
-from fanet_mw.scenario import Scenario
-from fanet_mw.sections import Section
+from fanet_mw.scenario import Scenario, config
+from fanet_mw.scenario.sections import Section
 from fanet_mw.trace import Record
 from fanet_mw.units import S
-from sim.metrics import summarize
-from sim.outcome import Outcome
-from sim.run import actors_of
+from sim.results.metrics import summarize
+from sim.run.outcome import Outcome
+from sim.run.virtual import actors_of
 
 LEAST_WAKES: Final = 20_000
 WAKES_A_SECOND: Final = 60_000

@@ -16,13 +16,13 @@ from attacker import Attacker, Plan, packet
 
 from agents.autopilot import Autopilot
 from fanet_mw import wire
-from fanet_mw.claims import Claims, Heard, Standing
-from fanet_mw.digest import Digest, Holding
 from fanet_mw.scenario import Scenario
 from fanet_mw.units import MS, Enu, NodeId, S
 from fanet_mw.wire import FLAG_FLOOD, Kind
-from fanet_mw.wire_messages import Beacon, Join, Member, Role, Schedule, Survivor, TimeBeacon
-from sim import catalog
+from fanet_mw.wire.claims import Claims, Heard, Standing
+from fanet_mw.wire.digest import Digest, Holding
+from fanet_mw.wire.inner import Beacon, Join, Member, Role, Schedule, Survivor, TimeBeacon
+from sim.scenarios import catalog
 
 EVIL = NodeId(5)
 HONEST = [node for node in range(1, 10) if node != EVIL]

@@ -9,22 +9,23 @@ from collections.abc import AsyncIterator
 
 import pytest
 
-from emulator.compile import warm_up
+from emulator.kernel.compile import warm_up
 from emulator.medium import Medium
-from fanet_mw import topics
+from fanet_mw.bus import topics
+from fanet_mw.bus.messages import Poses, Report, TxRequest
+from fanet_mw.bus.radio_control import Control, Cut, Restore
+from fanet_mw.bus.topics import Topics
 from fanet_mw.errors import FanetError
 from fanet_mw.hosts.bus import Bus
 from fanet_mw.hosts.clock import ClockKeeper, SwarmClock
 from fanet_mw.hosts.realtime import run_actor
-from fanet_mw.messages import Poses, Report, TxRequest
-from fanet_mw.radio_control import Control, Cut, Restore
-from fanet_mw.topics import Topics
 from fanet_mw.units import BROADCAST, MS, NodeId, S
-from sim import air, catalog
-from sim.cli import app
-from sim.results import finish
-from sim.run import simulate
-from sim.swarm import free_endpoint
+from sim.cli.app import app
+from sim.results.files import finish
+from sim.run import air
+from sim.run.swarm import free_endpoint
+from sim.run.virtual import simulate
+from sim.scenarios import catalog
 
 
 @contextlib.asynccontextmanager

@@ -12,25 +12,25 @@ import pytest
 from test_air_control import emulator
 
 from emulator.medium import ANNOUNCED, Medium
-from fanet_mw import topics
 from fanet_mw.actor import Actor
+from fanet_mw.bus import topics
+from fanet_mw.bus.messages import MavlinkTap, Message, Report, TxOutcome, TxRequest, TxStatus
+from fanet_mw.bus.topics import Topics
 from fanet_mw.hosts.bus import Bus
 from fanet_mw.hosts.clock import ClockKeeper
 from fanet_mw.hosts.inbox import BOUND
 from fanet_mw.hosts.realtime import RealtimeHost
-from fanet_mw.messages import MavlinkTap, Message, Report, TxOutcome, TxRequest, TxStatus
 from fanet_mw.scenario import Scenario
-from fanet_mw.topics import Topics
 from fanet_mw.units import BROADCAST, MS, S
-from sim.swarm import free_endpoint
+from sim.run.swarm import free_endpoint
 
 NAMES = Topics("flood")
 FLOOD = """
 import sys, time
 from fanet_mw import topics
 from fanet_mw.hosts.bus import Bus
-from fanet_mw.messages import TxRequest
-from fanet_mw.topics import Topics
+from fanet_mw.bus.messages import TxRequest
+from fanet_mw.bus.topics import Topics
 from fanet_mw.units import BROADCAST
 with Bus.join(sys.argv[1]) as bus:
     topic, began, seq = Topics("flood").radio_tx(1), time.monotonic(), 0

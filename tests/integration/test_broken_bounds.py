@@ -5,12 +5,12 @@ from typing import Any
 
 import pytest
 
-from fanet_mw.protocol.scheduled import Scheduled
-from fanet_mw.protocol.txqueue import Packet
+from fanet_mw.node.queue import Packet
+from fanet_mw.routing.clustered.scheduled import Scheduled
 from fanet_mw.trace import BoundStated
-from sim import catalog
-from sim.results import finish
-from sim.run import simulate
+from sim.results.files import finish
+from sim.run.virtual import simulate
+from sim.scenarios import catalog
 
 LINE = ['nodes.layout="line"', "nodes.count=5", "clusters.count=4", "traffic.sources=4", "traffic.interval_s=0.25"]
 TIMES = ["duration_s=16", "warmup_s=10", "clusters.flooding_period_s=0.2"]

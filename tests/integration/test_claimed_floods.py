@@ -4,9 +4,9 @@ from typing import Any
 
 import pytest
 
-from sim import catalog
-from sim.results import finish
-from sim.run import simulate
+from sim.results.files import finish
+from sim.run.virtual import simulate
+from sim.scenarios import catalog
 
 SHORT = ["duration_s=17", "warmup_s=12", "drain_s=1"]
 

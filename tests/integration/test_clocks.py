@@ -7,16 +7,16 @@ import pytest
 
 from agents.clocked import ClockedUav, make_uav
 from agents.uav import Uav
-from fanet_mw.messages import Reception
-from fanet_mw.protocol.guard import slot_guard_ns
-from fanet_mw.protocol.turns import clocks_fit
-from fanet_mw.topics import Topics
+from fanet_mw.bounds.guard import slot_guard_ns
+from fanet_mw.bus.messages import Reception
+from fanet_mw.bus.topics import Topics
+from fanet_mw.routing.clustered.tdma.turns import clocks_fit
 from fanet_mw.trace import Delivered, Generated
 from fanet_mw.units import MS, US, Enu, NodeId
-from sim import catalog
-from sim.outcome import Outcome
-from sim.results import finish, trace_bytes
-from sim.run import simulate
+from sim.results.files import finish, trace_bytes
+from sim.run.outcome import Outcome
+from sim.run.virtual import simulate
+from sim.scenarios import catalog
 from tests.conftest import MakeScenario
 
 GRID = [
@@ -104,7 +104,7 @@ def heard_schedules(scenario: Any) -> list[Reception]:
     """The schedules that node 3 hears in a run."""
     from fanet_mw import wire
     from fanet_mw.hosts.virtual import VirtualHost
-    from sim.run import actors_of
+    from sim.run.virtual import actors_of
 
     found: list[Reception] = []
 

@@ -22,7 +22,11 @@ def test_a_command_ends_quietly_when_nobody_reads(arguments: tuple[str, ...]) ->
     os.close(read)
     try:
         done = subprocess.run(
-            [sys.executable, "-m", "sim.cli", *arguments], stdout=write, stderr=subprocess.PIPE, text=True, timeout=60
+            [sys.executable, "-m", "sim.cli.app", *arguments],
+            stdout=write,
+            stderr=subprocess.PIPE,
+            text=True,
+            timeout=60,
         )
     finally:
         os.close(write)

@@ -5,13 +5,13 @@ from typing import Any
 import pytest
 
 from fanet_mw import mavlink
-from fanet_mw.config import build
 from fanet_mw.errors import ConfigError
+from fanet_mw.scenario.config import build
 from fanet_mw.trace import ConflictForeseen, ConflictOver, Warned
-from sim import catalog
-from sim.outcome import Outcome
-from sim.results import finish, trace_bytes
-from sim.run import simulate
+from sim.results.files import finish, trace_bytes
+from sim.run.outcome import Outcome
+from sim.run.virtual import simulate
+from sim.scenarios import catalog
 
 PAIR = [[300, 0, 50], [-300, 0, 50]]
 ABOVE = [0, 60, 120]

@@ -4,14 +4,14 @@ from typing import Any
 
 import pytest
 
-from fanet_mw.config import build
 from fanet_mw.errors import ConfigError
+from fanet_mw.scenario.config import build
 from fanet_mw.trace import DeadlineLost, DeadlineMet, Dropped
-from sim import catalog
-from sim.outcome import Outcome
-from sim.plan_cli import judge
-from sim.results import finish
-from sim.run import simulate
+from sim.cli.plan import judge
+from sim.results.files import finish
+from sim.run.outcome import Outcome
+from sim.run.virtual import simulate
+from sim.scenarios import catalog
 
 LINE = ['nodes.layout="line"', "nodes.count=9", "clusters.count=8", "traffic.sources=8"]
 

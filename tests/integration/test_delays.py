@@ -7,17 +7,17 @@ import pytest
 from fanet_mw.scenario import Scenario
 from fanet_mw.trace import Delivered, Generated
 from fanet_mw.units import MS
-from sim.delays import PARTS
-from sim.outcome import Outcome
-from sim.results import finish
-from sim.run import simulate
+from sim.results.delays import PARTS
+from sim.results.files import finish
+from sim.run.outcome import Outcome
+from sim.run.virtual import simulate
 
 LEAD_MS, HANDOVER_MS = 40, 20
 
 
 @pytest.fixture(scope="module")
 def outcome() -> Outcome:
-    from sim import catalog
+    from sim.scenarios import catalog
 
     keys = ("nodes.count=6", f"radio.lead_ms={LEAD_MS}", f"radio.handover_ms={HANDOVER_MS}", "mission.survivors=4")
     return simulate(catalog.find("quick", [*keys, "duration_s=20"]))

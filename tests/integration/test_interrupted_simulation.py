@@ -12,9 +12,10 @@ from pathlib import Path
 import pytest
 from rich.console import Console
 
-from sim import catalog, report
-from sim.results import finish, trace_bytes
-from sim.run import simulate
+from sim.results import report
+from sim.results.files import finish, trace_bytes
+from sim.run.virtual import simulate
+from sim.scenarios import catalog
 
 LONG = ("simulate", "quick", "--duration", "100000")
 

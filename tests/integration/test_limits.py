@@ -7,7 +7,7 @@ import sys
 import pytest
 
 from fanet_mw.errors import ConfigError
-from sim import limits
+from sim.run import limits
 
 
 @pytest.mark.parametrize(
@@ -18,7 +18,7 @@ from sim import limits
     ],
 )
 def test_a_limit_that_is_too_low_is_one_message(limit: str, what: str) -> None:
-    shell = f"{limit}; exec {sys.executable} -m sim.cli launch quick"
+    shell = f"{limit}; exec {sys.executable} -m sim.cli.app launch quick"
     done = subprocess.run(["bash", "-c", shell], capture_output=True, text=True, timeout=60, check=False)
     assert done.returncode == 2
     assert len(done.stderr.splitlines()) == 1

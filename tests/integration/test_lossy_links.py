@@ -5,8 +5,8 @@ import pytest
 from fanet_mw.scenario import Scenario
 from fanet_mw.trace import Delivered, Generated
 from fanet_mw.units import MS, S
-from sim.catalog import find
-from sim.run import simulate
+from sim.run.virtual import simulate
+from sim.scenarios.catalog import find
 
 SMALL = ("nodes.count=12", "clusters.count=11", "traffic.sources=11", "duration_s=45", "warmup_s=24", "drain_s=8")
 LOSSY = ('radio.channel="log_distance"', 'radio.fading="rician"')

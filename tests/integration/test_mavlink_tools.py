@@ -15,8 +15,8 @@ from fanet_mw import tlog
 from fanet_mw.dialect import definitions
 from fanet_mw.errors import ConfigError
 from fanet_mw.units import Enu, NodeId, S
-from fanet_mw.wire_messages import Survivor
-from sim.cli import app
+from fanet_mw.wire.inner import Survivor
+from sim.cli.app import app
 
 INSTALLED = Path(pymavlink.__file__).parent
 SURVIVOR = Survivor(t_us=1_500_000, survivor=3, reporter=1, position=Enu(1.0, 2.0, 3.0), rssi_dbm=-70.5)

@@ -11,9 +11,8 @@ from itertools import islice
 import pytest
 
 from emulator.medium import Medium
-from fanet_mw import topics
-from fanet_mw.hosts.inbox import Inbox
-from fanet_mw.messages import (
+from fanet_mw.bus import topics
+from fanet_mw.bus.messages import (
     Clock,
     ClockState,
     MavlinkTap,
@@ -25,11 +24,12 @@ from fanet_mw.messages import (
     TxRequest,
     TxStatus,
 )
-from fanet_mw.radio_control import Control, Cut, Degrade, Jam, Restore
-from fanet_mw.topics import Topics
+from fanet_mw.bus.radio_control import Control, Cut, Degrade, Jam, Restore
+from fanet_mw.bus.topics import Topics
+from fanet_mw.hosts.inbox import Inbox
 from fanet_mw.trace import ProcessEnded
 from fanet_mw.units import BROADCAST, MS, Enu, NodeId
-from sim import catalog
+from sim.scenarios import catalog
 
 NAMES = Topics("fuzz")
 SCENARIO = catalog.find("quick", ["nodes.count=9", "radio.queue_frames=50"])

@@ -4,9 +4,9 @@ from typing import Any, NamedTuple
 
 import pytest
 
-from fanet_mw import config
-from sim.results import finish
-from sim.run import simulate
+from fanet_mw.scenario import config
+from sim.results.files import finish
+from sim.run.virtual import simulate
 
 
 class Flight(NamedTuple):

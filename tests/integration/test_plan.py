@@ -7,10 +7,10 @@ from typing import Any
 
 import pytest
 
-from sim import catalog
-from sim.plan_cli import judge
-from sim.results import finish
-from sim.run import simulate
+from sim.cli.plan import judge
+from sim.results.files import finish
+from sim.run.virtual import simulate
+from sim.scenarios import catalog
 
 
 def planned(*settings: str, deadline_s: float | None = None, **options: bool) -> tuple[str, dict[str, Any], bool]:
@@ -93,7 +93,7 @@ def test_the_search_meets_its_deadline_and_every_delivery_of_the_swarm_does() ->
 )
 def test_the_command_prints_its_verdict_and_ends_with_it(arguments: tuple[str, ...], code: int, said: str) -> None:
     done = subprocess.run(
-        [sys.executable, "-m", "sim.cli", "plan", *arguments], capture_output=True, text=True, timeout=60
+        [sys.executable, "-m", "sim.cli.app", "plan", *arguments], capture_output=True, text=True, timeout=60
     )
     assert done.returncode == code, done.stderr
     assert said in done.stdout + done.stderr

@@ -2,10 +2,10 @@
 
 import pytest
 
-from sim import catalog
-from sim.plan_cli import judge
-from sim.results import finish
-from sim.run import simulate
+from sim.cli.plan import judge
+from sim.results.files import finish
+from sim.run.virtual import simulate
+from sim.scenarios import catalog
 
 LINE = ['nodes.layout="line"', "nodes.count=8", "clusters.count=7", "traffic.sources=7", "radio.channel=log_distance"]
 

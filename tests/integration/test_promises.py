@@ -4,9 +4,9 @@ from typing import Any
 
 import pytest
 
-from sim import catalog
-from sim.results import finish
-from sim.run import simulate
+from sim.results.files import finish
+from sim.run.virtual import simulate
+from sim.scenarios import catalog
 
 GRID = ["nodes.count=15", "clusters.count=14", "traffic.sources=14", "traffic.interval_s=0.5", "duration_s=30"]
 

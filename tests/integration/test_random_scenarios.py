@@ -9,10 +9,9 @@ from collections.abc import Sequence
 import pytest
 import scenario_draws
 
-from fanet_mw import config
 from fanet_mw.errors import ConfigError
-from fanet_mw.scenario import Scenario
-from sim import catalog
+from fanet_mw.scenario import Scenario, config
+from sim.scenarios import catalog
 
 
 @pytest.mark.parametrize("seed", range(8))

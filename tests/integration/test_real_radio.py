@@ -14,16 +14,17 @@ from pathlib import Path
 
 import pytest
 
-from fanet_mw import config, topics
 from fanet_mw.actor import Actor
+from fanet_mw.bus import topics
+from fanet_mw.bus.messages import Message, TraceBatch, WifiScan
+from fanet_mw.bus.topics import Topics
 from fanet_mw.hosts.bus import Bus
 from fanet_mw.hosts.clock import ClockKeeper, SwarmClock
 from fanet_mw.hosts.virtual import VirtualHost
-from fanet_mw.messages import Message, TraceBatch, WifiScan
-from fanet_mw.topics import Topics
+from fanet_mw.scenario import config
 from fanet_mw.trace import Delivered, Generated, Record
 from fanet_mw.units import MS, S
-from sim.run import actors_of
+from sim.run.virtual import actors_of
 
 COUNT = 5
 PHONE = 3

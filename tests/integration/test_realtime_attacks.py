@@ -6,16 +6,16 @@ import time
 from pathlib import Path
 from typing import Self
 
-from fanet_mw import topics
+from fanet_mw.bus import topics
+from fanet_mw.bus.messages import Clock, ClockState, MavlinkTap, Message, Report, TraceBatch
+from fanet_mw.bus.topics import Topics
 from fanet_mw.hosts.bus import MAX_PUT_BYTES, Bus
-from fanet_mw.messages import Clock, ClockState, MavlinkTap, Message, Report, TraceBatch
-from fanet_mw.topics import Topics
 from fanet_mw.trace import Approaching, Delivered, Generated
 from fanet_mw.units import S
-from sim import catalog
-from sim.outcome import Outcome
-from sim.results import finish
-from sim.swarm import Swarm, free_endpoint, launch
+from sim.results.files import finish
+from sim.run.outcome import Outcome
+from sim.run.swarm import Swarm, free_endpoint, launch
+from sim.scenarios import catalog
 
 NAMES = Topics("test")
 SMALL = [

@@ -14,11 +14,11 @@ from pathlib import Path
 
 import pytest
 
+from fanet_mw.bus.topics import Topics
 from fanet_mw.errors import BusError
 from fanet_mw.hosts.bus import Bus
-from fanet_mw.topics import Topics
-from sim.processes import Processes
-from sim.swarm import free_endpoint
+from sim.run.processes import Processes
+from sim.run.swarm import free_endpoint
 
 MARK = "FANET_TEST_MARK"
 SMALL = "nodes = {count = 2}\nclusters = {count = 1}\nduration_s = %s\nwarmup_s = 0\ndrain_s = 0\n"
@@ -178,7 +178,7 @@ async def test_a_restarted_child_is_the_same_with_a_new_pid() -> None:
 def test_a_launcher_that_is_killed_takes_all_its_processes_with_it(mark: str, tmp_path: Path) -> None:
     path = tmp_path / "small.toml"
     path.write_text(SMALL % 60)
-    launcher = start(mark, "sim.cli", "launch", str(path))
+    launcher = start(mark, "sim.cli.app", "launch", str(path))
     said(launcher, "processes up")
     assert len(marked(mark)) >= 2 + 2 + 1 + 1  # agents, emulator and world, the fork server, the launcher
     launcher.kill()
@@ -200,12 +200,12 @@ def test_a_router_that_is_interrupted_stops_the_services_it_kept_time_for(
 ) -> None:
     path, endpoint = tmp_path / "small.toml", free_endpoint()
     path.write_text(SMALL % 60)
-    router = start(mark, "sim.cli", "router", str(path), "--listen", endpoint, deaf=deaf)
+    router = start(mark, "sim.cli.app", "router", str(path), "--listen", endpoint, deaf=deaf)
     said(router, "serving")
     common = (str(path), "--connect", endpoint)
     services = [
         start(mark, "emulator", *common, deaf=deaf),
-        start(mark, "sim.world_main", *common, deaf=deaf),
+        start(mark, "sim.world.__main__", *common, deaf=deaf),
         *(start(mark, "agents", *common, "--id", str(node), deaf=deaf) for node in (1, 2)),
     ]
     said(router, "the clock runs")
@@ -248,9 +248,9 @@ def test_a_router_or_service_that_still_waits_for_the_others_ends_when_interrupt
 ) -> None:
     path, endpoint = tmp_path / "small.toml", free_endpoint()
     path.write_text(SMALL % 60)
-    router = start(mark, "sim.cli", "router", str(path), "--listen", endpoint, deaf=True)
+    router = start(mark, "sim.cli.app", "router", str(path), "--listen", endpoint, deaf=True)
     said(router, "serving")
-    agent = start(mark, "sim.cli", "agent", str(path), "--connect", endpoint, "--id", "1", deaf=True)
+    agent = start(mark, "sim.cli.app", "agent", str(path), "--connect", endpoint, "--id", "1", deaf=True)
     wait_for("agent-1", endpoint=endpoint)
     agent.send_signal(number)
     assert ended(agent) == (128 + number, "")
@@ -261,7 +261,7 @@ def test_a_router_or_service_that_still_waits_for_the_others_ends_when_interrupt
 def test_services_of_a_router_that_is_killed_end_with_a_message_and_exit_code_3(mark: str, tmp_path: Path) -> None:
     path, endpoint = tmp_path / "small.toml", free_endpoint()
     path.write_text(SMALL % 60)
-    router = start(mark, "sim.cli", "router", str(path), "--listen", endpoint)
+    router = start(mark, "sim.cli.app", "router", str(path), "--listen", endpoint)
     said(router, "serving")
     agent = start(mark, "agents", str(path), "--connect", endpoint, "--id", "2")
     wait_for("agent-2", endpoint=endpoint)

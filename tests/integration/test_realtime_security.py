@@ -12,11 +12,8 @@ from pathlib import Path
 
 import pytest
 
-from fanet_mw import topics
-from fanet_mw.errors import BusError, ConfigError
-from fanet_mw.hosts.bus import Bus, exposure
-from fanet_mw.hosts.clock import ClockKeeper, ClockListener
-from fanet_mw.messages import (
+from fanet_mw.bus import topics
+from fanet_mw.bus.messages import (
     Clock,
     ClockState,
     Gps,
@@ -29,13 +26,16 @@ from fanet_mw.messages import (
     TraceBatch,
     TxRequest,
 )
-from fanet_mw.radio_control import Jam
-from fanet_mw.topics import Topics
+from fanet_mw.bus.radio_control import Jam
+from fanet_mw.bus.topics import Topics
+from fanet_mw.errors import BusError, ConfigError
+from fanet_mw.hosts.bus import Bus, exposure
+from fanet_mw.hosts.clock import ClockKeeper, ClockListener
 from fanet_mw.units import BROADCAST, Enu, NodeId, S
-from sim import catalog
-from sim.keys import make
-from sim.results import finish
-from sim.swarm import free_endpoint, launch
+from sim.results.files import finish
+from sim.run.keys import make
+from sim.run.swarm import free_endpoint, launch
+from sim.scenarios import catalog
 
 NAMES = Topics("test")
 SMALL = [
@@ -204,7 +204,7 @@ def test_an_endpoint_that_others_can_reach_is_warned_of(endpoint: str, warned: b
 
 
 def test_the_router_says_so() -> None:
-    command = [sys.executable, "-m", "sim.cli", "router", "quick", "--listen"]
+    command = [sys.executable, "-m", "sim.cli.app", "router", "quick", "--listen"]
     nobodys = "tcp/192.0.2.1:1"  # for documentation (RFC 5737): no machine can listen there
     done = subprocess.run([*command, nobodys], capture_output=True, text=True, timeout=100, check=False)
     assert done.returncode == 2

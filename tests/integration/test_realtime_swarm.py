@@ -18,16 +18,16 @@ from typing import Any
 import pytest
 
 from agents.__main__ import run as run_agent
-from emulator.compile import must_compile, warm_up
+from emulator.kernel.compile import must_compile, warm_up
 from fanet_mw import tlog
 from fanet_mw.errors import BusError
 from fanet_mw.scenario import Scenario
 from fanet_mw.trace import ProcessEnded
 from fanet_mw.units import NodeId
-from sim import catalog
-from sim.outcome import Outcome
-from sim.results import finish
-from sim.swarm import Swarm, launch
+from sim.results.files import finish
+from sim.run.outcome import Outcome
+from sim.run.swarm import Swarm, launch
+from sim.scenarios import catalog
 
 FAST = ["duration_s=6", "warmup_s=3", "drain_s=1", "clusters.flooding_period_s=0.5"]
 
@@ -215,7 +215,7 @@ def late_agent(*, node: int, **arguments: Any) -> int:
 def test_an_agent_that_is_late_to_start_is_waited_for_and_one_that_found_no_router_is_started_again(
     monkeypatch: pytest.MonkeyPatch,
 ) -> None:
-    from sim import swarm as module
+    from sim.run import swarm as module
 
     monkeypatch.setattr(module, "run_agent", late_agent)
     monkeypatch.setattr(module, "WORD_EVERY_S", 1.0)
@@ -330,7 +330,7 @@ def test_services_started_one_by_one_make_a_swarm() -> None:
 
 
 def test_a_swarm_that_does_not_come_up_names_who_is_missing(monkeypatch: pytest.MonkeyPatch) -> None:
-    from sim import swarm as module
+    from sim.run import swarm as module
 
     monkeypatch.setattr(module, "READY_TIMEOUT_S", 1.0)
     monkeypatch.setattr(module, "expected_names", lambda _: ["emulator", "nobody"])

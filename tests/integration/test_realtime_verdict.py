@@ -15,16 +15,16 @@ from typing import Any
 import numpy as np
 import pytest
 
-from fanet_mw import topics
+from fanet_mw.bus import topics
+from fanet_mw.bus.messages import Poses
+from fanet_mw.bus.topics import Topics
 from fanet_mw.hosts.bus import Bus
-from fanet_mw.messages import Poses
 from fanet_mw.scenario import Scenario
-from fanet_mw.topics import Topics
 from fanet_mw.units import S
-from sim import catalog
-from sim.outcome import Outcome
-from sim.results import finish
-from sim.swarm import Swarm, launch
+from sim.results.files import finish
+from sim.run.outcome import Outcome
+from sim.run.swarm import Swarm, launch
+from sim.scenarios import catalog
 
 SHORT = ["duration_s=4", "warmup_s=1", "drain_s=0.5", "clusters.flooding_period_s=0.5", "world.engine=kinematic"]
 Act = Callable[[Swarm], None]
@@ -133,7 +133,7 @@ def test_a_world_that_is_started_again_goes_on_where_it_was_and_the_run_is_not_v
 @pytest.mark.slow
 def test_a_launcher_that_is_stopped_until_after_the_end_does_not_exit_with_0() -> None:
     """It is the router too: nothing reaches anybody meanwhile."""
-    command = [sys.executable, "-m", "sim.cli", "launch", "quick", "--json"]
+    command = [sys.executable, "-m", "sim.cli.app", "launch", "quick", "--json"]
     for key in SHORT:
         command += ["--set", key]
     launcher = subprocess.Popen(command, stdout=subprocess.PIPE, stderr=subprocess.PIPE)
@@ -155,7 +155,7 @@ def test_an_agent_that_is_started_again_after_a_step_of_the_clock_takes_part(
     step_s: float, monkeypatch: pytest.MonkeyPatch
 ) -> None:
     """Its process reads a unix clock that is off by the step; the swarm's time is handed to it."""
-    monkeypatch.setattr("sim.swarm.run_agent", partial(agent_after_a_step, step_s))
+    monkeypatch.setattr("sim.run.swarm.run_agent", partial(agent_after_a_step, step_s))
     outcome, summary = run(scenario("duration_s=6"), (2.0, send(signal.SIGKILL, "agent-4")), respawn=True)
     assert [name for name, _ in outcome.ended] == ["agent-4"], "once, because it was killed"
     assert about(summary, "agent-4 ended")

@@ -9,16 +9,16 @@ from pathlib import Path
 import pytest
 from test_air_control import emulator
 
-from fanet_mw import topics
+from fanet_mw.bus import topics
+from fanet_mw.bus.messages import Report, TxRequest
+from fanet_mw.bus.topics import Topics
 from fanet_mw.hosts.bus import Bus
-from fanet_mw.messages import Report, TxRequest
-from fanet_mw.topics import Topics
 from fanet_mw.trace import Generated
 from fanet_mw.units import BROADCAST, MS, S
-from sim import catalog
-from sim.results import finish
-from sim.run import simulate
-from sim.swarm import launch
+from sim.results.files import finish
+from sim.run.swarm import launch
+from sim.run.virtual import simulate
+from sim.scenarios import catalog
 
 pytestmark = pytest.mark.serial
 

@@ -9,10 +9,10 @@ from fanet_mw import wire
 from fanet_mw.scenario import Scenario
 from fanet_mw.trace import Approaching, Delivered, Generated, RoleChanged
 from fanet_mw.units import MS, S
-from sim import catalog
-from sim.outcome import Outcome
-from sim.results import finish
-from sim.run import simulate
+from sim.results.files import finish
+from sim.run.outcome import Outcome
+from sim.run.virtual import simulate
+from sim.scenarios import catalog
 
 MakeScenario = Callable[..., Scenario]
 
@@ -89,10 +89,10 @@ def test_what_the_network_delivers_changes_the_flight() -> None:
 
 
 def test_floods_leave_their_head_only_in_its_slot(make_scenario: MakeScenario) -> None:
+    from fanet_mw.bus.messages import TxRequest
+    from fanet_mw.bus.topics import Topics, node_of
     from fanet_mw.hosts.virtual import VirtualHost
-    from fanet_mw.messages import TxRequest
-    from fanet_mw.topics import Topics, node_of
-    from sim.run import actors_of
+    from sim.run.virtual import actors_of
 
     scenario = catalog.find("quick", ["mission.survivors=0", "duration_s=15"])
     sent: list[tuple[int, TxRequest]] = []

@@ -7,7 +7,7 @@ import subprocess
 
 import pytest
 
-from sim.cli import app
+from sim.cli.app import app
 
 TSHARK = shutil.which("tshark")
 pytestmark = pytest.mark.skipif(TSHARK is None, reason="tshark, Wireshark's command-line version, is not installed")

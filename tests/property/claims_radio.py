@@ -9,9 +9,9 @@ from collections.abc import Callable
 from itertools import count
 
 from fanet_mw import wire
-from fanet_mw.messages import Reception, TxOutcome, TxRequest, TxStatus
-from fanet_mw.protocol.node import Node
-from fanet_mw.protocol.topology import symmetric
+from fanet_mw.bus.messages import Reception, TxOutcome, TxRequest, TxStatus
+from fanet_mw.graph.topology import symmetric
+from fanet_mw.node.node import Node
 from fanet_mw.rng import stream
 from fanet_mw.routing import make_protocol
 from fanet_mw.scenario import Scenario

@@ -11,11 +11,11 @@ from collections.abc import Iterable
 from itertools import count
 
 from fanet_mw import wire
-from fanet_mw.messages import Reception, TxOutcome, TxRequest, TxStatus
-from fanet_mw.protocol.clustered import Clustered
-from fanet_mw.protocol.node import Node
+from fanet_mw.bus.messages import Reception, TxOutcome, TxRequest, TxStatus
+from fanet_mw.node.node import Node
 from fanet_mw.rng import stream
 from fanet_mw.routing import make_protocol
+from fanet_mw.routing.clustered.clustered import Clustered
 from fanet_mw.scenario import Scenario
 from fanet_mw.units import BROADCAST, MS, Enu, NodeId, S
 

@@ -13,14 +13,15 @@ from hypothesis import strategies as st
 from hypothesis.stateful import RuleBasedStateMachine, invariant, precondition, rule
 from test_slots_with_reuse import longest_chain
 
-from fanet_mw import config, wire
-from fanet_mw.claims import Claims, Heard, Standing
-from fanet_mw.messages import Reception
-from fanet_mw.protocol.claimed import Claimed
-from fanet_mw.protocol.topology import components, two_hop
+from fanet_mw import wire
+from fanet_mw.bus.messages import Reception
+from fanet_mw.graph.topology import components, two_hop
+from fanet_mw.routing.clustered.claimed.protocol import Claimed
+from fanet_mw.scenario import config
 from fanet_mw.units import MS, NodeId, S
 from fanet_mw.wire import FLAG_FLOOD, FLAG_TO_HEAD, Kind
-from fanet_mw.wire_messages import Beacon
+from fanet_mw.wire.claims import Claims, Heard, Standing
+from fanet_mw.wire.inner import Beacon
 
 
 def scenario_of(*, aggregate: bool = False, **clusters: Any) -> Any:

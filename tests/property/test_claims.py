@@ -6,10 +6,10 @@ import pytest
 from hypothesis import given
 from hypothesis import strategies as st
 
-from fanet_mw.claims import CAPACITY, NO_SLOT, Claims, Heard, Standing
 from fanet_mw.dialect import fanet
 from fanet_mw.errors import MalformedFrameError
 from fanet_mw.wire import CLAIMS, HEADER_BYTES, encode_inner
+from fanet_mw.wire.claims import CAPACITY, NO_SLOT, Claims, Heard, Standing
 
 HEADER = b"\x00" * HEADER_BYTES
 IDS = st.integers(1, 65534)

@@ -6,7 +6,9 @@ import pytest
 from hypothesis import given
 from hypothesis import strategies as st
 
-from fanet_mw.protocol.clustering import (
+from fanet_mw.graph.topology import symmetric, within_range
+from fanet_mw.rng import stream
+from fanet_mw.routing.clustered.clustering import (
     HIGHEST_DEGREE,
     LOWEST_ID,
     MOBIC,
@@ -26,8 +28,6 @@ from fanet_mw.protocol.clustering import (
     heads_of,
     link_lifetime_s,
 )
-from fanet_mw.protocol.topology import symmetric, within_range
-from fanet_mw.rng import stream
 from fanet_mw.units import Enu, NodeId, S
 
 RANGE_M = 250.0

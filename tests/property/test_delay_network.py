@@ -8,8 +8,7 @@ from hypothesis import given, settings
 from hypothesis import strategies as st
 from slot_simulator import Slot, delays, earliest_start, network
 
-from fanet_mw.errors import LocalProtocolError
-from fanet_mw.protocol.delay import (
+from fanet_mw.bounds import (
     Bounded,
     Flow,
     Hop,
@@ -25,6 +24,7 @@ from fanet_mw.protocol.delay import (
     path_bounds,
     token_bucket,
 )
+from fanet_mw.errors import LocalProtocolError
 from fanet_mw.rng import stream
 
 

@@ -5,8 +5,8 @@ from hypothesis import example, given, settings
 from hypothesis import strategies as st
 from slot_simulator import Slot, delays
 
+from fanet_mw.bounds import Bounded, Periodic, Refused, SlotServer, delay_fifo, paper, single_slot_bound
 from fanet_mw.errors import LocalProtocolError
-from fanet_mw.protocol.delay import Bounded, Periodic, Refused, SlotServer, delay_fifo, paper, single_slot_bound
 from fanet_mw.units import seconds_to_ns
 
 ORACLES = [  # C, S, P, p [s]; equation (4); corrected (None: refused)

@@ -5,8 +5,8 @@ from hypothesis import given, settings
 from hypothesis import strategies as st
 from test_delay_network import periodics, spread, trace
 
+from fanet_mw.bounds import Bounded, Periodic, Refused, Total, TurnServer, backlog, delay_any_order, delay_fifo
 from fanet_mw.errors import LocalProtocolError
-from fanet_mw.protocol.delay import Bounded, Periodic, Refused, Total, TurnServer, backlog, delay_any_order, delay_fifo
 from fanet_mw.rng import stream
 
 

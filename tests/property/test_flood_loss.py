@@ -6,10 +6,10 @@ import pytest
 from hypothesis import given, settings
 from hypothesis import strategies as st
 
-from fanet_mw.protocol.packing import Effort, Geometry
-from fanet_mw.protocol.planner.loss import loss
-from fanet_mw.protocol.timetable import timetable
-from fanet_mw.protocol.topology import components, within_range
+from fanet_mw.graph.topology import components, within_range
+from fanet_mw.planner.loss import loss
+from fanet_mw.routing.clustered.timetable.list_scheduling import Effort, Geometry
+from fanet_mw.routing.clustered.timetable.timetable import timetable
 from fanet_mw.units import Enu, NodeId
 
 

@@ -6,11 +6,11 @@ import pytest
 from hypothesis import given, settings
 from hypothesis import strategies as st
 
-from fanet_mw.protocol.connected_dominating_set import guha_khuller
-from fanet_mw.protocol.planner.goodput_bound import fewest_transmissions, goodput_bound
-from fanet_mw.protocol.timetable import Geometry, timetable
-from fanet_mw.protocol.topology import components, within_range
-from fanet_mw.protocol.turns import Turns
+from fanet_mw.graph.connected_dominating_set import guha_khuller
+from fanet_mw.graph.topology import components, within_range
+from fanet_mw.planner.goodput_bound import fewest_transmissions, goodput_bound
+from fanet_mw.routing.clustered.tdma.turns import Turns
+from fanet_mw.routing.clustered.timetable.timetable import Geometry, timetable
 from fanet_mw.units import Enu, NodeId, S
 
 

@@ -6,22 +6,22 @@ from hypothesis import strategies as st
 
 from agents.traffic import sources_of
 from fanet_mw import wire
+from fanet_mw.bounds import Bounded, Refused
+from fanet_mw.graph.topology import within_range
 from fanet_mw.mavlink import Encoder
-from fanet_mw.protocol.delay import Bounded, Refused
-from fanet_mw.protocol.planner import Plan, cheapest_change, describe, describe_change, plan
-from fanet_mw.protocol.planner.access import ways
-from fanet_mw.protocol.planner.demand import TrafficClass, demands
-from fanet_mw.protocol.planner.flood import FloodCost
-from fanet_mw.protocol.planner.head import Share, slot_delays, work_ns
-from fanet_mw.protocol.planner.search import _changes
-from fanet_mw.protocol.planner.turns import table_for
-from fanet_mw.protocol.topology import within_range
+from fanet_mw.planner import Plan, cheapest_change, describe, describe_change, plan
+from fanet_mw.planner.access import ways
+from fanet_mw.planner.by_turn import table_for
+from fanet_mw.planner.demand import TrafficClass, demands
+from fanet_mw.planner.flood import FloodCost
+from fanet_mw.planner.head import Share, slot_delays, work_ns
+from fanet_mw.planner.search import _changes
 from fanet_mw.rng import stream
 from fanet_mw.trace import Delivered
 from fanet_mw.units import Enu, NodeId, S
-from sim import catalog
-from sim.layout import positions
-from sim.run import simulate as simulate_swarm
+from sim.run.virtual import simulate as simulate_swarm
+from sim.scenarios import catalog
+from sim.world.layout import positions
 
 # --- one head against exact simulation ---
 

@@ -6,14 +6,14 @@ import pytest
 from hypothesis import given, settings
 from hypothesis import strategies as st
 
-from fanet_mw import config
-from fanet_mw.protocol.delay import Refused
-from fanet_mw.protocol.planner import Plan, cheapest_change, describe, plan
-from fanet_mw.protocol.planner.claimed import settled
-from fanet_mw.protocol.topology import two_hop, within_range
-from fanet_mw.protocol.turns import Turns
+from fanet_mw.bounds import Refused
+from fanet_mw.graph.topology import two_hop, within_range
+from fanet_mw.planner import Plan, cheapest_change, describe, plan
+from fanet_mw.planner.claimed import settled
+from fanet_mw.routing.clustered.tdma.turns import Turns
+from fanet_mw.scenario import config
 from fanet_mw.units import Enu, NodeId, S
-from sim.layout import positions
+from sim.world.layout import positions
 
 
 def placed(scenario) -> dict[NodeId, Enu]:

@@ -8,10 +8,10 @@ from typing import NamedTuple
 from hypothesis import example, given, settings
 from hypothesis import strategies as st
 
-from fanet_mw.protocol.own_bound import BURST, Own
-from fanet_mw.protocol.root_release import Following, RootRelease
-from fanet_mw.protocol.turns import Turns
-from fanet_mw.protocol.txqueue import Packet, TxQueue
+from fanet_mw.node.queue import Packet, TxQueue
+from fanet_mw.routing.clustered.tdma.own_bound import BURST, Own
+from fanet_mw.routing.clustered.tdma.root_release import Following, RootRelease
+from fanet_mw.routing.clustered.tdma.turns import Turns
 from fanet_mw.units import MS, NodeId
 from fanet_mw.wire import PRIORITY_BULK, PRIORITY_CONTROL, PRIORITY_REPORT, PRIORITY_SAFETY, Header, Kind
 

@@ -6,10 +6,10 @@ from hypothesis import strategies as st
 from test_slots_with_reuse import graphs
 
 from fanet_mw.errors import LocalProtocolError
-from fanet_mw.protocol.broadcast_schedule import broadcast_schedule, pipeline_spacing, shortest_relays
-from fanet_mw.protocol.connected_dominating_set import dominates, guha_khuller, wu_li
-from fanet_mw.protocol.multipoint_relays import WILL_ALWAYS, WILL_NEVER, multipoint_relays
-from fanet_mw.protocol.topology import components, levels, symmetric, two_hop, within_range
+from fanet_mw.graph.broadcast_schedule import broadcast_schedule, pipeline_spacing, shortest_relays
+from fanet_mw.graph.connected_dominating_set import dominates, guha_khuller, wu_li
+from fanet_mw.graph.multipoint_relays import WILL_ALWAYS, WILL_NEVER, multipoint_relays
+from fanet_mw.graph.topology import components, levels, symmetric, two_hop, within_range
 from fanet_mw.units import Enu, NodeId
 
 

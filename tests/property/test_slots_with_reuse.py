@@ -5,10 +5,10 @@ from hypothesis import given, settings
 from hypothesis import strategies as st
 
 from fanet_mw.errors import LocalProtocolError
-from fanet_mw.protocol.coloring import clashes, dsatur, welsh_powell
-from fanet_mw.protocol.slot_claims import Claim, Hello, SlotClaims
-from fanet_mw.protocol.topology import components, levels, symmetric, two_hop, within_range
+from fanet_mw.graph.coloring import clashes, dsatur, welsh_powell
+from fanet_mw.graph.topology import components, levels, symmetric, two_hop, within_range
 from fanet_mw.rng import stream
+from fanet_mw.routing.clustered.claimed.slot_claims import Claim, Hello, SlotClaims
 from fanet_mw.units import Enu, NodeId, S
 
 LISTEN = 2

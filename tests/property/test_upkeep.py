@@ -8,10 +8,9 @@ from hypothesis import HealthCheck, settings
 from hypothesis import strategies as st
 from hypothesis.stateful import RuleBasedStateMachine, initialize, invariant, precondition, rule
 
-from fanet_mw import config
-from fanet_mw.protocol import upkeep
-from fanet_mw.protocol.states import TRANSITIONS, Event, Row, State, step
-from fanet_mw.scenario import Scenario
+from fanet_mw.routing.clustered.roles import failover
+from fanet_mw.routing.clustered.roles.states import TRANSITIONS, Event, Row, State, step
+from fanet_mw.scenario import Scenario, config
 from fanet_mw.units import Enu, NodeId, S
 
 NODES = 7
@@ -203,7 +202,7 @@ def test_the_running_nodes_take_rows_of_the_table_only_and_most_of_them(monkeypa
         taken[state, event] += 1
         return step(state, event)
 
-    monkeypatch.setattr(upkeep, "step", watched)
+    monkeypatch.setattr(failover, "step", watched)
     for test in (
         test_a_backup_takes_over_a_dead_head_s_slot_before_the_leader_confirms,
         test_a_new_leader_is_elected_and_a_restarted_one_is_junior,

@@ -6,6 +6,7 @@ from contextlib import suppress
 from typing import Any
 
 import pytest
+from fastcrc.crc16 import mcrf4xx
 from hypothesis import assume, given
 from hypothesis import strategies as st
 
@@ -14,7 +15,7 @@ from fanet_mw.dialect import fanet
 from fanet_mw.errors import LocalProtocolError, MalformedFrameError
 from fanet_mw.units import Enu
 from fanet_mw.wire import Header
-from fanet_mw.wire_messages import (
+from fanet_mw.wire.inner import (
     CAPACITY,
     FARTHEST_M,
     FASTEST_M_S,
@@ -278,7 +279,7 @@ def test_a_schedule_too_long_for_a_message_is_our_own_mistake() -> None:
 def flagged(frame: bytes, flags: int) -> bytes:
     """A JOIN with these incompatibility flags, its CRC right."""
     body = frame[:2] + bytes((flags,)) + frame[3:-2]
-    return body + struct.pack("<H", wire.mcrf4xx(body[1:] + bytes((wire.JOIN.crc_extra,))))
+    return body + struct.pack("<H", mcrf4xx(body[1:] + bytes((wire.JOIN.crc_extra,))))
 
 
 @pytest.mark.parametrize("flags", [2, 3, 0x80])

@@ -10,11 +10,11 @@ from collections.abc import Mapping, Sequence
 from random import Random
 
 from agents.local_clock import LocalClock
-from fanet_mw.protocol.clock_fit import Oscillator
-from fanet_mw.protocol.timesync import Settings, TimeSync
 from fanet_mw.scenario import Clock
+from fanet_mw.timesync.clock_fit import Oscillator
+from fanet_mw.timesync.ftsp import Settings, TimeSync
 from fanet_mw.units import MS, US, NodeId, S
-from fanet_mw.wire_messages import TimeBeacon
+from fanet_mw.wire.inner import TimeBeacon
 
 DEFER_NS = 40 * MS
 FLIGHT_NS = 834

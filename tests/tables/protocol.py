@@ -6,16 +6,16 @@ from functools import lru_cache
 from typing import Any, Final
 
 from scripts.rivals import connectivity
-from sim import catalog
-from sim.results import finish
-from sim.run import simulate
+from sim.results.files import finish
+from sim.run.virtual import simulate
+from sim.scenarios import catalog
 from tests.benchmarks import clock_sync, collision_warnings, protocol_cost
 from tests.tables.markdown import Rows
 
 _SPEEDS: Final = (0, 10, 20)
 _SEEDS: Final = (1, 2, 3)
 _MOST_PER_S: Final = 776
-"""Packets of 1024 B a second that can reach all of the 9 x 5 grid (`fanet_mw/protocol/planner/goodput_bound.py`)."""
+"""Packets of 1024 B a second that can reach all of the 9 x 5 grid (`fanet_mw/planner/goodput_bound.py`)."""
 _LOADED: Final = {
     "scheduled, period 4 s, `cw_min` 1, `turn_slack_us` 20, `contention_ms` 20, `hello_interval_s` 2": (
         "clusters.flooding_period_s=4", "radio.cw_min=1", "clusters.turn_slack_us=20", "clusters.contention_ms=20",

@@ -4,9 +4,9 @@ from array import array
 from typing import NamedTuple
 
 from emulator.medium import Medium
-from fanet_mw.messages import Message, Poses, Reception, TxOutcome, TxRequest, TxStatus
+from fanet_mw.bus.messages import Message, Poses, Reception, TxOutcome, TxRequest, TxStatus
+from fanet_mw.bus.topics import Topics, node_of
 from fanet_mw.scenario import Scenario
-from fanet_mw.topics import Topics, node_of
 from fanet_mw.units import BROADCAST, MS, NodeId
 
 PAYLOAD = bytes(1024)

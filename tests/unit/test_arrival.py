@@ -6,9 +6,9 @@ from hypothesis import strategies as st
 
 from fanet_mw import wire
 from fanet_mw.errors import MalformedFrameError
-from fanet_mw.protocol import seen
-from fanet_mw.protocol.arrival import Memo, Reader
-from fanet_mw.protocol.txqueue import Packet
+from fanet_mw.node import duplicates
+from fanet_mw.node.arrival import Memo, Reader
+from fanet_mw.node.queue import Packet
 
 FLOODED = wire.Header(5, 7, 3, 0xFFFF, 3, 0, 32, 0, 3, wire.FLAG_FLOOD)
 
@@ -46,7 +46,7 @@ def test_what_is_read_of_a_frame_does_not_depend_on_what_was_read_before(order: 
 def test_all_who_hear_one_frame_hold_one_packet() -> None:
     reader = Reader()
     reader.look(FLOODED.encode())
-    assert (reader.key, reader.phase, reader.packet) == (seen.key_of(3, 7), seen.FLOODED, None)
+    assert (reader.key, reader.phase, reader.packet) == (duplicates.key_of(3, 7), duplicates.FLOODED, None)
     assert reader.read() is reader.packet
     assert reader.packet.header == FLOODED
 

@@ -10,8 +10,8 @@ from hypothesis import strategies as st
 
 from agents.autopilot import ENDURANCE_NS, GRAVITY_M_S2, MAX_TILT, Autopilot
 from fanet_mw import mavlink
+from fanet_mw.bus.messages import Gps
 from fanet_mw.mavlink import Attitude
-from fanet_mw.messages import Gps
 from fanet_mw.units import MS, Enu, NodeId, S
 
 NODE = NodeId(3)

@@ -3,16 +3,16 @@
 import pytest
 
 from fanet_mw import wire
-from fanet_mw.claims import Claims, Standing
-from fanet_mw.messages import Reception
-from fanet_mw.protocol.claimed import Claimed
-from fanet_mw.protocol.node import Node
-from fanet_mw.protocol.own_turns import Share, draws
-from fanet_mw.protocol.slot_claims import Claim, Hello, SlotClaims
+from fanet_mw.bus.messages import Reception
+from fanet_mw.node.node import Node
 from fanet_mw.routing import make_protocol
+from fanet_mw.routing.clustered.claimed.own_turns import Share, draws
+from fanet_mw.routing.clustered.claimed.protocol import Claimed
+from fanet_mw.routing.clustered.claimed.slot_claims import Claim, Hello, SlotClaims
 from fanet_mw.units import BROADCAST, MS, Enu, NodeId, S
 from fanet_mw.wire import Header, Kind
-from fanet_mw.wire_messages import Beacon, Role
+from fanet_mw.wire.claims import Claims, Standing
+from fanet_mw.wire.inner import Beacon, Role
 from tests.conftest import MakeScenario
 
 

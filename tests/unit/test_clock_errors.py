@@ -7,8 +7,8 @@ import pytest
 from fanet_mw.scenario import Scenario
 from fanet_mw.trace import ClockSampled, Delivered, Generated, Record
 from fanet_mw.units import MS, US, S
-from sim.clocks import clock_errors, true_delays
-from sim.outcome import Outcome
+from sim.results.clocks import clock_errors, true_delays
+from sim.run.outcome import Outcome
 
 MakeScenario = Callable[..., Scenario]
 

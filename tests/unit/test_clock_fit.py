@@ -2,7 +2,7 @@
 
 import pytest
 
-from fanet_mw.protocol.clock_fit import PAIRS, ClockFit, Oscillator, Pair
+from fanet_mw.timesync.clock_fit import PAIRS, ClockFit, Oscillator, Pair
 from fanet_mw.units import MS, US, S
 
 OSCILLATOR = Oscillator(rate=40e-6, wander=0.0, stamp_ns=US)

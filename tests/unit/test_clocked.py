@@ -4,12 +4,12 @@ from collections.abc import Callable
 from typing import Any
 
 from agents.clocked import ClockedUav
-from fanet_mw.messages import Reception, TxRequest
+from fanet_mw.bus.messages import Reception, TxRequest
+from fanet_mw.bus.topics import Topics
 from fanet_mw.scenario import Scenario
-from fanet_mw.topics import Topics
 from fanet_mw.units import BROADCAST, MS, US, Enu, NodeId, S
 from fanet_mw.wire import FLAG_FLOOD, PRIORITY_CONTROL, Header, Kind
-from fanet_mw.wire_messages import Member, Schedule
+from fanet_mw.wire.inner import Member, Schedule
 
 NAMES = Topics("c")
 MakeScenario = Callable[..., Scenario]

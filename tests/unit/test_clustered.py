@@ -5,15 +5,15 @@ from collections.abc import Callable
 import pytest
 
 from fanet_mw import wire
+from fanet_mw.bus.messages import Reception
 from fanet_mw.errors import DropReason
-from fanet_mw.messages import Reception
-from fanet_mw.protocol.clustered import Clustered
-from fanet_mw.protocol.node import Node
+from fanet_mw.node.node import Node
 from fanet_mw.routing import make_protocol
+from fanet_mw.routing.clustered.clustered import Clustered
 from fanet_mw.scenario import Scenario
 from fanet_mw.units import BROADCAST, MS, US, Enu, NodeId, S
 from fanet_mw.wire import FLAG_FLOOD, FLAG_TO_HEAD, PRIORITY_BULK, PRIORITY_CONTROL, Header, Kind, filler
-from fanet_mw.wire_messages import Beacon, Join, Member, Role, Schedule
+from fanet_mw.wire.inner import Beacon, Join, Member, Role, Schedule
 
 LEADER, OURS, THEIRS, ANOTHER = NodeId(1), NodeId(2), NodeId(3), NodeId(4)
 MakeScenario = Callable[..., Scenario]

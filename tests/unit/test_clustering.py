@@ -3,7 +3,7 @@
 from hypothesis import given
 from hypothesis import strategies as st
 
-from fanet_mw.protocol.clustering import balanced
+from fanet_mw.routing.clustered.clustering import balanced
 from fanet_mw.units import Enu, NodeId
 
 places = st.builds(Enu, *[st.floats(-5000, 5000, allow_nan=False)] * 3)

@@ -16,12 +16,12 @@ from typing import Any
 
 import pytest
 
-from fanet_mw import topics
+from fanet_mw.bus import topics
+from fanet_mw.bus.link_stats import COUNTS, LinkStats
+from fanet_mw.bus.messages import MavlinkTap, Message, Report, TraceBatch
+from fanet_mw.bus.topics import Topics
 from fanet_mw.errors import ConfigError
 from fanet_mw.hosts.bus import OnSample
-from fanet_mw.link_stats import COUNTS, LinkStats
-from fanet_mw.messages import MavlinkTap, Message, Report, TraceBatch
-from fanet_mw.topics import Topics
 from fanet_mw.trace import (
     Approaching,
     Arrived,
@@ -36,12 +36,12 @@ from fanet_mw.trace import (
     RoleChanged,
 )
 from fanet_mw.units import S
-from sim import catalog
-from sim.collector import BURST_BYTES, BYTES_PER_S, Collector
-from sim.outcome import Outcome
-from sim.results import finish
-from sim.run import simulate
-from sim.spool import Spool
+from sim.results.files import finish
+from sim.run.collector import BURST_BYTES, BYTES_PER_S, Collector
+from sim.run.outcome import Outcome
+from sim.run.spool import Spool
+from sim.run.virtual import simulate
+from sim.scenarios import catalog
 
 NAMES = Topics("swarm")
 SCENARIO = catalog.find(

@@ -5,13 +5,13 @@ from pathlib import Path
 import pytest
 
 from agents.autopilot import Autopilot
-from fanet_mw import config, wire
+from fanet_mw import wire
 from fanet_mw.errors import ConfigError
 from fanet_mw.mavlink import Encoder
-from fanet_mw.scenario import Scenario, grid_columns
-from fanet_mw.scenario_checks import MESSAGE_BYTES
+from fanet_mw.scenario import Scenario, config, grid_columns
+from fanet_mw.scenario.checks import MESSAGE_BYTES
 from fanet_mw.units import Enu, NodeId
-from sim import catalog
+from sim.scenarios import catalog
 
 
 def refusal(text: str, *overrides: str) -> str:

@@ -9,7 +9,7 @@ import pytest
 
 from emulator.pcap import PORT
 from fanet_mw import wire
-from sim.cli import app
+from sim.cli.app import app
 
 ROOT = Path(__file__).resolve().parents[2]
 

@@ -3,12 +3,12 @@
 from hypothesis import given
 from hypothesis import strategies as st
 
-from fanet_mw.protocol.clustering import Cluster, Swarm, heads_of
-from fanet_mw.protocol.division import Division, carried_on, cost, drift
-from fanet_mw.protocol.lease import Authority, Lease
-from fanet_mw.protocol.signs import Signs
-from fanet_mw.protocol.topology import within_range
-from fanet_mw.protocol.whereabouts import Motion, Whereabouts
+from fanet_mw.graph.topology import within_range
+from fanet_mw.routing.clustered.clustering import Cluster, Swarm, heads_of
+from fanet_mw.routing.clustered.clustering.division import Division, carried_on, cost, drift
+from fanet_mw.routing.clustered.roles.lease import Authority, Lease
+from fanet_mw.routing.clustered.roles.position_updates import Motion, Whereabouts
+from fanet_mw.routing.clustered.roles.signs_of_life import Signs
 from fanet_mw.units import Enu, NodeId, S
 
 RANGE_M = 250.0

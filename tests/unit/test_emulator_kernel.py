@@ -14,15 +14,15 @@ import pytest
 from hypothesis import example, given, settings
 from hypothesis import strategies as st
 
-from emulator import jit, state
-from emulator.error_rate import log_success_per_bit
+from emulator.channel.error_rate import log_success_per_bit
+from emulator.channel.spatial import neighbors
+from emulator.kernel import jit, state
+from emulator.kernel.phy import ERROR_FLOOR_DB, ERROR_STEPS_PER_DB
 from emulator.medium import Medium
-from emulator.phy import ERROR_FLOOR_DB, ERROR_STEPS_PER_DB
-from emulator.spatial import neighbors
-from fanet_mw import config
-from fanet_mw.messages import Poses, Reception, TxOutcome, TxRequest, TxStatus
+from fanet_mw.bus.messages import Poses, Reception, TxOutcome, TxRequest, TxStatus
+from fanet_mw.bus.topics import Topics
 from fanet_mw.rng import stream
-from fanet_mw.topics import Topics
+from fanet_mw.scenario import config
 from fanet_mw.units import BROADCAST, MS, US, NodeId
 
 NAMES = Topics("k")
@@ -161,12 +161,16 @@ def fingerprint() -> str:
 
 
 def test_a_change_in_any_compiled_source_changes_where_its_machine_code_is_kept(tmp_path: Path) -> None:
-    for name, source in (("dcf.py", "from emulator.jit import jit\n"), ("state.py", "A = 1\n"), ("medium.py", "\n")):
+    for name, source in (
+        ("dcf.py", "from emulator.kernel.jit import jit\n"),
+        ("state.py", "A = 1\n"),
+        ("medium.py", "\n"),
+    ):
         (tmp_path / name).write_text(source)
     before = jit._fingerprint(tmp_path)
     (tmp_path / "medium.py").write_text("# not compiled\n")
     assert jit._fingerprint(tmp_path) == before
-    (tmp_path / "dcf.py").write_text("from emulator.jit import jit\n# changed\n")
+    (tmp_path / "dcf.py").write_text("from emulator.kernel.jit import jit\n# changed\n")
     assert jit._fingerprint(tmp_path) != before
 
 

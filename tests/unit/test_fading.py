@@ -10,12 +10,12 @@ from hypothesis import given, settings
 from hypothesis import strategies as st
 from test_emulator_kernel import Output, medium, run
 
-from emulator.fading import RICIAN, law_of
+from emulator.channel.fading import RICIAN, law_of
+from fanet_mw.bus.messages import Reception, TxStatus
+from fanet_mw.bus.radio_control import Cut, Degrade, Jam
+from fanet_mw.bus.topics import Topics
 from fanet_mw.errors import ConfigError
-from fanet_mw.messages import Reception, TxStatus
-from fanet_mw.radio_control import Cut, Degrade, Jam
 from fanet_mw.scenario import Scenario
-from fanet_mw.topics import Topics
 from fanet_mw.units import MS, Enu, NodeId
 
 MakeScenario = Callable[..., Scenario]

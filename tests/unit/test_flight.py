@@ -8,14 +8,14 @@ from typing import Any
 import numpy as np
 import pytest
 
-from fanet_mw import topics
+from fanet_mw.bus import topics
+from fanet_mw.bus.messages import Message, Poses, Setpoint
+from fanet_mw.bus.topics import Topics
 from fanet_mw.hosts.bus import OnSample
-from fanet_mw.messages import Message, Poses, Setpoint
 from fanet_mw.scenario import Scenario
-from fanet_mw.topics import Topics
 from fanet_mw.units import MS, Enu, S
-from sim.flight import Flight, FlightRecorder
-from sim.world import World
+from sim.world.flight import Flight, FlightRecorder
+from sim.world.world import World
 
 NAMES = Topics("flight")
 TICK_NS = 100 * MS

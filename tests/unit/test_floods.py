@@ -5,11 +5,11 @@ from collections.abc import Callable
 import pytest
 
 from fanet_mw import wire
-from fanet_mw.messages import Reception
-from fanet_mw.protocol.floods import Floods
-from fanet_mw.protocol.node import Node
-from fanet_mw.protocol.txqueue import Packet
+from fanet_mw.bus.messages import Reception
+from fanet_mw.node.node import Node
+from fanet_mw.node.queue import Packet
 from fanet_mw.routing import make_protocol
+from fanet_mw.routing.clustered.forwarding.floods import Floods
 from fanet_mw.scenario import Scenario
 from fanet_mw.units import BROADCAST, MS, Enu, NodeId
 from fanet_mw.wire import FLAG_FLOOD, FLAG_TO_HEAD, Header, Kind, filler

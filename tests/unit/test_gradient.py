@@ -1,9 +1,9 @@
 """The way to a head."""
 
-from fanet_mw.protocol.gradient import UNREACHABLE, Gradient, newer
-from fanet_mw.protocol.neighbors import Neighbor, Neighbors
+from fanet_mw.node.neighbors import Neighbor, Neighbors
+from fanet_mw.routing.clustered.forwarding.gradient import UNREACHABLE, Gradient, newer
 from fanet_mw.units import NodeId, S
-from fanet_mw.wire_messages import Beacon
+from fanet_mw.wire.inner import Beacon
 
 ME, HEAD, OTHER = NodeId(1), NodeId(10), NodeId(20)
 

@@ -6,10 +6,10 @@ from array import array
 from hypothesis import given
 from hypothesis import strategies as st
 
-from fanet_mw import topics
+from fanet_mw.bus import topics
+from fanet_mw.bus.messages import MavlinkTap, Message, Poses, Report, TraceBatch
+from fanet_mw.bus.radio_control import Restore
 from fanet_mw.hosts.inbox import BOUND, BOUND_BYTES, TURN, Inbox
-from fanet_mw.messages import MavlinkTap, Message, Poses, Report, TraceBatch
-from fanet_mw.radio_control import Restore
 
 TAP = topics.encode([MavlinkTap(1, b"x")])
 

@@ -6,7 +6,7 @@ from pathlib import Path
 
 import pytest
 
-from emulator import jit
+from emulator.kernel import jit
 
 caching = pytest.importorskip("numba.core.caching")
 

@@ -6,7 +6,7 @@ from collections.abc import Callable
 import pytest
 
 from fanet_mw.scenario import Scenario
-from sim.layout import positions
+from sim.world.layout import positions
 
 MakeScenario = Callable[..., Scenario]
 

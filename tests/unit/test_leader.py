@@ -4,13 +4,13 @@ from collections.abc import Callable, Sequence
 
 import pytest
 
-from fanet_mw.protocol.leader import OBJECTION_NS, SETTLE_NS, Leader
-from fanet_mw.protocol.lease import Authority
-from fanet_mw.protocol.signs import Signs
-from fanet_mw.protocol.whereabouts import LOST_NS, Motion
+from fanet_mw.routing.clustered.roles.leader import OBJECTION_NS, SETTLE_NS, Leader
+from fanet_mw.routing.clustered.roles.lease import Authority
+from fanet_mw.routing.clustered.roles.position_updates import LOST_NS, Motion
+from fanet_mw.routing.clustered.roles.signs_of_life import Signs
 from fanet_mw.scenario import Scenario
 from fanet_mw.units import MS, Enu, NodeId, S
-from fanet_mw.wire_messages import Join, Schedule
+from fanet_mw.wire.inner import Join, Schedule
 
 STILL = Enu(0.0, 0.0, 0.0)
 HERE = Motion(Enu(0.0, 0.0, 50.0), STILL, 0)

@@ -2,8 +2,8 @@
 
 import pytest
 
-from fanet_mw.protocol.lease import Authority, Lease
-from fanet_mw.protocol.signs import Signs
+from fanet_mw.routing.clustered.roles.lease import Authority, Lease
+from fanet_mw.routing.clustered.roles.signs_of_life import Signs
 from fanet_mw.units import NodeId, S
 
 LEADER = Authority(5, 9)

@@ -8,15 +8,15 @@ import pytest
 from agents.clocked import make_uav
 from emulator.medium import Medium
 from fanet_mw.actor import Actor
+from fanet_mw.bus.messages import Message, TxRequest
 from fanet_mw.hosts.virtual import VirtualHost
-from fanet_mw.messages import Message, TxRequest
 from fanet_mw.scenario import Scenario
 from fanet_mw.units import NodeId
-from sim import ledger
-from sim.layout import positions
-from sim.outcome import Outcome
-from sim.run import simulate
-from sim.world import World
+from sim.results import ledger
+from sim.run.outcome import Outcome
+from sim.run.virtual import simulate
+from sim.world.layout import positions
+from sim.world.world import World
 
 Keep = Callable[[int, TxRequest], bool]
 

@@ -11,15 +11,15 @@ import pytest
 from test_medium_timelines import NAMES, PAYLOAD, Air
 
 from emulator.medium import Medium
-from fanet_mw.link_stats import LOSSES, LinkRow, LinkStats
-from fanet_mw.messages import Poses, Reception, TxRequest
-from fanet_mw.radio_control import Degrade
+from fanet_mw.bus.link_stats import LOSSES, LinkRow, LinkStats
+from fanet_mw.bus.messages import Poses, Reception, TxRequest
+from fanet_mw.bus.radio_control import Degrade
 from fanet_mw.scenario import Scenario
 from fanet_mw.units import BROADCAST, MS, US, NodeId, S
-from sim import catalog
-from sim.links import LinkTotals
-from sim.results import finish
-from sim.run import simulate
+from sim.results.files import finish
+from sim.results.links import LinkTotals
+from sim.run.virtual import simulate
+from sim.scenarios import catalog
 
 MakeScenario = Callable[..., Scenario]
 

@@ -10,8 +10,8 @@ from itertools import pairwise
 import pytest
 from hand_driven import NAMES, Air, receptions, statuses
 
-from fanet_mw.messages import TxOutcome
-from fanet_mw.radio_control import Degrade
+from fanet_mw.bus.messages import TxOutcome
+from fanet_mw.bus.radio_control import Degrade
 from fanet_mw.scenario import Scenario
 from fanet_mw.units import MS, US, NodeId
 

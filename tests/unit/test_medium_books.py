@@ -5,7 +5,7 @@ from collections.abc import Callable
 import pytest
 from hand_driven import NAMES, Air, receptions, statuses
 
-from fanet_mw.messages import Reception, TxOutcome, TxRequest, TxStatus
+from fanet_mw.bus.messages import Reception, TxOutcome, TxRequest, TxStatus
 from fanet_mw.scenario import Scenario
 from fanet_mw.units import BROADCAST, MS, US, S
 

@@ -7,7 +7,7 @@ import pytest
 from hand_driven import NAMES, PAYLOAD, Air, receptions, statuses
 
 from fanet_mw.airtime import frame_ns
-from fanet_mw.messages import Poses, TxOutcome, TxRequest, TxStatus
+from fanet_mw.bus.messages import Poses, TxOutcome, TxRequest, TxStatus
 from fanet_mw.scenario import Scenario
 from fanet_mw.units import BROADCAST, MS, US
 

@@ -1,14 +1,14 @@
 """What a schedule says of one node, part by part and epoch by epoch."""
 
-from fanet_mw.protocol.gradient import Gradient
-from fanet_mw.protocol.lease import Lease
-from fanet_mw.protocol.membership import Membership
-from fanet_mw.protocol.neighbors import Neighbors
-from fanet_mw.protocol.signs import Signs
-from fanet_mw.protocol.states import Action, Event
-from fanet_mw.protocol.upkeep import Upkeep
+from fanet_mw.node.neighbors import Neighbors
+from fanet_mw.routing.clustered.forwarding.gradient import Gradient
+from fanet_mw.routing.clustered.roles.failover import Upkeep
+from fanet_mw.routing.clustered.roles.lease import Lease
+from fanet_mw.routing.clustered.roles.membership import Membership
+from fanet_mw.routing.clustered.roles.signs_of_life import Signs
+from fanet_mw.routing.clustered.roles.states import Action, Event
 from fanet_mw.units import Enu, NodeId, S
-from fanet_mw.wire_messages import Join, Member, Schedule
+from fanet_mw.wire.inner import Join, Member, Schedule
 
 US = NodeId(2)
 

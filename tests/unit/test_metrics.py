@@ -7,8 +7,8 @@ import pytest
 from fanet_mw.scenario import Scenario
 from fanet_mw.trace import BoundStated, Delivered, Generated, Record
 from fanet_mw.units import MS, S
-from sim.metrics import summarize
-from sim.outcome import Outcome
+from sim.results.metrics import summarize
+from sim.run.outcome import Outcome
 
 A_PACKET = 7
 

@@ -4,7 +4,7 @@ from agents.mission import HOME, Mission
 from fanet_mw.scenario import Mission as Config
 from fanet_mw.trace import Approaching, Arrived, Detected
 from fanet_mw.units import Enu, NodeId, S
-from fanet_mw.wire_messages import Survivor
+from fanet_mw.wire.inner import Survivor
 
 HERE = Enu(0, 0, 50)
 CONFIG = Config(survivors=9, reports_to_approach=3, report_interval_s=5, dwell_s=10, arrival_m=30)

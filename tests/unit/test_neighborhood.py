@@ -2,9 +2,9 @@
 
 import pytest
 
-from fanet_mw.claims import Claims, Heard, Standing
-from fanet_mw.protocol.neighborhood import Neighborhood
+from fanet_mw.routing.clustered.relaying.neighborhood import Neighborhood
 from fanet_mw.units import NodeId, S
+from fanet_mw.wire.claims import Claims, Heard, Standing
 
 US, LIFETIME_NS = NodeId(1), 3 * S
 NO_SLOT = Standing()

@@ -3,10 +3,10 @@
 import pytest
 
 from fanet_mw import wire
+from fanet_mw.bus.messages import Reception
 from fanet_mw.errors import DropReason, LocalProtocolError
-from fanet_mw.messages import Reception
-from fanet_mw.protocol.node import Node
-from fanet_mw.protocol.seen import Seen
+from fanet_mw.node.duplicates import Seen
+from fanet_mw.node.node import Node
 from fanet_mw.routing import make_protocol
 from fanet_mw.trace import Delivered, Dropped
 from fanet_mw.units import BROADCAST, MS, US, Enu, NodeId, S

@@ -7,11 +7,11 @@ import numpy as np
 import pytest
 from hand_driven import Air, receptions, statuses
 
-from emulator.error_rate import log_success_per_bit
-from emulator.phy import ERROR_FLOOR_DB, ERROR_STEPS_PER_DB
+from emulator.channel.error_rate import log_success_per_bit
+from emulator.kernel.phy import ERROR_FLOOR_DB, ERROR_STEPS_PER_DB
 from fanet_mw.airtime import Timing, ofdm_frame_ns
+from fanet_mw.bus.messages import TxOutcome
 from fanet_mw.errors import ConfigError
-from fanet_mw.messages import TxOutcome
 from fanet_mw.scenario import Scenario
 from fanet_mw.units import MS, US
 

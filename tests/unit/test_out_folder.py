@@ -9,8 +9,8 @@ import pytest
 
 from fanet_mw import tlog
 from fanet_mw.errors import ConfigError
-from sim.cli import app
-from sim.out_folder import FILES, prepare
+from sim.cli.app import app
+from sim.cli.out_folder import FILES, prepare
 
 SHORT = ("--set", "duration_s=1", "--set", "warmup_s=0", "--set", "drain_s=0", "--json")
 
@@ -27,8 +27,8 @@ def test_a_folder_that_cannot_be_written_is_found_before_the_run(
     def run(*_: object, **__: object) -> None:
         pytest.fail("the run has begun")
 
-    monkeypatch.setattr("sim.run.simulate", run)
-    monkeypatch.setattr("sim.swarm.launch", run)
+    monkeypatch.setattr("sim.run.virtual.simulate", run)
+    monkeypatch.setattr("sim.run.swarm.launch", run)
     (tmp_path / "file").touch()
     for out in (tmp_path / "file", tmp_path / "file" / "below", Path("/proc/nowhere")):
         with pytest.raises(ConfigError, match=f"--out {out}: cannot be written: "):

@@ -2,8 +2,8 @@
 
 import pytest
 
-from fanet_mw.protocol.own_bound import BURST, Own
-from fanet_mw.protocol.turns import Turns
+from fanet_mw.routing.clustered.tdma.own_bound import BURST, Own
+from fanet_mw.routing.clustered.tdma.turns import Turns
 from fanet_mw.units import MS
 
 TURNS = Turns(origin_ns=0, period_ns=100 * MS, contention_ns=40 * MS, turn_ns=2 * MS, per_frame=29)

@@ -20,13 +20,13 @@ from emulator.capture_file import CaptureFile, unused
 from emulator.medium import Medium
 from emulator.pcap import Pcap, checksum
 from fanet_mw import mavlink, wire
+from fanet_mw.bus.messages import Reception
 from fanet_mw.errors import ConfigError
-from fanet_mw.messages import Reception
 from fanet_mw.scenario import Radio, Scenario
 from fanet_mw.units import BROADCAST, MS, US, S
-from sim import catalog
-from sim.cli import app
-from sim.run import simulate
+from sim.cli.app import app
+from sim.run.virtual import simulate
+from sim.scenarios import catalog
 
 MakeScenario = Callable[..., Scenario]
 RADIOTAP_FIELDS = [  # radiotap.org: bit, name, size, alignment

@@ -2,11 +2,11 @@
 
 import pytest
 
-from fanet_mw.protocol.planner.window import hellos_ns, too_short
-from fanet_mw.protocol.topology import within_range
+from fanet_mw.graph.topology import within_range
+from fanet_mw.planner.contention_window import hellos_ns, too_short
 from fanet_mw.units import MS, Enu, NodeId
-from sim import catalog
-from sim.layout import positions
+from sim.scenarios import catalog
+from sim.world.layout import positions
 
 LINE = within_range({NodeId(i): Enu(200.0 * i, 0.0, 0.0) for i in range(1, 8)}, range_m=250)
 

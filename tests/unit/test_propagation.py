@@ -9,7 +9,7 @@ import pytest
 from hypothesis import given, settings
 from hypothesis import strategies as st
 
-from emulator.path_loss import (
+from emulator.channel.path_loss import (
     ENVIRONMENTS,
     air_to_ground_db,
     crossover_m,
@@ -19,12 +19,11 @@ from emulator.path_loss import (
     uma_av_db,
     uma_av_sight_probability,
 )
-from emulator.propagation import Links, milliwatt, noise_mw, pair_codes, reach_m
-from emulator.shadowing import Shadowing
-from emulator.state import AUDIBLE, LINK_DST, LINK_POWER, LINK_SRC
-from fanet_mw import config
+from emulator.channel.propagation import Links, milliwatt, noise_mw, pair_codes, reach_m
+from emulator.channel.shadowing import Shadowing
+from emulator.kernel.state import AUDIBLE, LINK_DST, LINK_POWER, LINK_SRC
 from fanet_mw.errors import ConfigError
-from fanet_mw.scenario import Radio, Scenario
+from fanet_mw.scenario import Radio, Scenario, config
 
 MakeScenario = Callable[..., Scenario]
 CHANNELS = ("log_distance", "friis", "two_ray", "air_to_air", "air_to_ground", "uma_av")

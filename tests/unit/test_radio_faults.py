@@ -8,11 +8,10 @@ from collections.abc import Callable
 import pytest
 from test_medium_timelines import ACK_NS, FRAME_NS, NAMES, PAYLOAD, SIFS_NS, Air, receptions, statuses
 
-from fanet_mw import config
+from fanet_mw.bus.messages import Poses, Reception, TxOutcome, TxRequest
+from fanet_mw.bus.radio_control import Control, Cut, Degrade, Jam, Restore
 from fanet_mw.errors import ConfigError
-from fanet_mw.messages import Poses, Reception, TxOutcome, TxRequest
-from fanet_mw.radio_control import Control, Cut, Degrade, Jam, Restore
-from fanet_mw.scenario import Scenario
+from fanet_mw.scenario import Scenario, config
 from fanet_mw.trace import RadioFault
 from fanet_mw.units import BROADCAST, MS, US, Enu, NodeId, S
 

@@ -2,13 +2,13 @@
 
 import pytest
 
-from fanet_mw.protocol.lease import Authority
-from fanet_mw.protocol.refresh import Refresh
-from fanet_mw.protocol.seen import key_of
-from fanet_mw.protocol.txqueue import Packet
+from fanet_mw.node.duplicates import key_of
+from fanet_mw.node.queue import Packet
+from fanet_mw.routing.clustered.roles.lease import Authority
+from fanet_mw.routing.clustered.roles.schedule_refresh import Refresh
 from fanet_mw.units import MS, S
 from fanet_mw.wire import Header, Kind
-from fanet_mw.wire_messages import Beacon, Role
+from fanet_mw.wire.inner import Beacon, Role
 
 OURS, EPOCH = Authority(5, 1), 7
 PACKET = Packet(Header(0, 3, 1, 0xFFFF, 1, Kind.SCHEDULE, 32, 0, 0, 1), b"schedule")

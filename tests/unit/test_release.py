@@ -6,9 +6,9 @@ import pytest
 from hypothesis import given
 from hypothesis import strategies as st
 
-from fanet_mw.protocol.release import Release, Tenure
-from fanet_mw.protocol.slots import Superframe
-from fanet_mw.protocol.txqueue import Packet, TxQueue, sooner_us
+from fanet_mw.node.queue import Packet, TxQueue, sooner_us
+from fanet_mw.routing.clustered.tdma.slot_release import Release, Tenure
+from fanet_mw.routing.clustered.tdma.slots import Superframe
 from fanet_mw.scenario import Clusters, Routing
 from fanet_mw.units import MS, US, S
 from fanet_mw.wire import PRIORITY_BULK, PRIORITY_CONTROL, PRIORITY_REPORT, PRIORITY_SAFETY, Header

@@ -1,12 +1,12 @@
 """Repair as timelines of one node: what a neighbor lacks is sent once more, once, and not too early."""
 
 from fanet_mw import wire
-from fanet_mw.digest import Digest, Holding
-from fanet_mw.protocol.repair import Repair
-from fanet_mw.protocol.seen import key_of
-from fanet_mw.protocol.txqueue import Packet
+from fanet_mw.node.duplicates import key_of
+from fanet_mw.node.queue import Packet
+from fanet_mw.routing.clustered.forwarding.repair import Repair
 from fanet_mw.units import BROADCAST, MS, NodeId, S
 from fanet_mw.wire import Header, Kind
+from fanet_mw.wire.digest import Digest, Holding
 
 NOTHING = Digest((), complete=True)
 LATER = 2 * S

@@ -10,10 +10,10 @@ import pytest
 
 from fanet_mw import tlog
 from fanet_mw.whole_file import write_items
-from sim import catalog
-from sim.outcome import Outcome
-from sim.results import finish
-from sim.run import simulate
+from sim.results.files import finish
+from sim.run.outcome import Outcome
+from sim.run.virtual import simulate
+from sim.scenarios import catalog
 
 
 @pytest.fixture(scope="module")
@@ -77,8 +77,8 @@ def test_items_longer_than_a_batch_are_cut_between_items(tmp_path: Path, monkeyp
 
 _LIMITED = """
 import resource, sys
-from emulator.compile import warm_up
-from sim.cli import main
+from emulator.kernel.compile import warm_up
+from sim.cli.app import main
 warm_up()  # compiled code is kept in files too
 resource.setrlimit(resource.RLIMIT_FSIZE, (16384, resource.RLIM_INFINITY))
 sys.argv = ["fanet", "simulate", "quick", "--duration", "20", "--out", sys.argv[1]]

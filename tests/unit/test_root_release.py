@@ -2,9 +2,9 @@
 
 import pytest
 
-from fanet_mw.protocol.root_release import Following, RootRelease
-from fanet_mw.protocol.turns import Turns
-from fanet_mw.protocol.txqueue import Packet, TxQueue
+from fanet_mw.node.queue import Packet, TxQueue
+from fanet_mw.routing.clustered.tdma.root_release import Following, RootRelease
+from fanet_mw.routing.clustered.tdma.turns import Turns
 from fanet_mw.units import MS, NodeId
 from fanet_mw.wire import PRIORITY_BULK, PRIORITY_CONTROL, PRIORITY_REPORT, PRIORITY_SAFETY, Header, Kind
 

@@ -9,8 +9,8 @@ from pathlib import Path
 import pytest
 
 from fanet_mw.errors import FanetError
-from sim.cli import app
-from sim.running import DEFAULT_ENDPOINT, Running, locate, registered, running
+from sim.cli.app import app
+from sim.run.running import DEFAULT_ENDPOINT, Running, locate, registered, running
 
 
 @pytest.fixture(autouse=True)
@@ -61,7 +61,7 @@ def test_two_of_one_name_are_told_apart_by_their_endpoints() -> None:
 def test_a_file_of_a_dead_process_is_ignored_and_removed(folder: Path) -> None:
     killed = [
         sys.executable, "-c",
-        "import os, signal; from sim.running import registered\n"
+        "import os, signal; from sim.run.running import registered\n"
         "with registered('dead', 'tcp/127.0.0.1:1'): os.kill(os.getpid(), signal.SIGKILL)",
     ]  # fmt: skip
     subprocess.run(killed, check=False)

@@ -8,16 +8,16 @@ from collections.abc import Callable
 import pytest
 
 from fanet_mw import wire
+from fanet_mw.bus.messages import Reception
 from fanet_mw.errors import DropReason
-from fanet_mw.messages import Reception
-from fanet_mw.protocol.lease import Authority
-from fanet_mw.protocol.membership import Version
-from fanet_mw.protocol.node import Node
-from fanet_mw.protocol.scheduled import Scheduled
-from fanet_mw.protocol.timetable import Timetable, Turn
-from fanet_mw.protocol.turn_plan import Fitted, Plan
-from fanet_mw.protocol.turns import Turns
+from fanet_mw.node.node import Node
 from fanet_mw.routing import make_protocol
+from fanet_mw.routing.clustered.roles.lease import Authority
+from fanet_mw.routing.clustered.roles.membership import Version
+from fanet_mw.routing.clustered.scheduled import Scheduled
+from fanet_mw.routing.clustered.tdma.turns import Turns
+from fanet_mw.routing.clustered.timetable.timetable import Timetable, Turn
+from fanet_mw.routing.clustered.timetable.turn_plan import Fitted, Plan
 from fanet_mw.scenario import Scenario
 from fanet_mw.trace import BoundStated
 from fanet_mw.units import BROADCAST, MS, Enu, NodeId

@@ -2,7 +2,7 @@
 
 import numpy as np
 
-from sim.separation import Separation
+from sim.world.separation import Separation
 
 
 def rows(*places: tuple[float, float]) -> np.ndarray:

@@ -8,15 +8,15 @@ import numpy as np
 import pytest
 from hand_driven import NAMES, Air, receptions
 
+from fanet_mw.bus.messages import Obstructions, Poses
 from fanet_mw.errors import ConfigError
-from fanet_mw.messages import Obstructions, Poses
 from fanet_mw.scenario import Scenario
 from fanet_mw.units import MS, S
-from sim.layout import positions
-from sim.obstacles import Box, Obstacles, obstacles
-from sim.physics import Physics
-from sim.sight import Sight
-from sim.world import World
+from sim.world.layout import positions
+from sim.world.obstacles import Box, Obstacles, obstacles
+from sim.world.physics import Physics
+from sim.world.sight import Sight
+from sim.world.world import World
 
 MakeScenario = Callable[..., Scenario]
 TOWER = Box(0, 0, 20, 40, 60)

@@ -2,8 +2,8 @@
 
 import pytest
 
-from fanet_mw.protocol.signs import Signs
-from fanet_mw.protocol.silence import Silence
+from fanet_mw.routing.clustered.roles.failure_detector import Silence
+from fanet_mw.routing.clustered.roles.signs_of_life import Signs
 from fanet_mw.units import NodeId, S
 
 OTHER = NodeId(7)

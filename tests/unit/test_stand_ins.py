@@ -2,15 +2,15 @@
 
 import pytest
 
-from fanet_mw.protocol.gradient import Gradient
-from fanet_mw.protocol.lease import Lease
-from fanet_mw.protocol.membership import Membership
-from fanet_mw.protocol.neighbors import Neighbor, Neighbors
-from fanet_mw.protocol.signs import Signs
-from fanet_mw.protocol.states import Action, State
-from fanet_mw.protocol.upkeep import Upkeep
+from fanet_mw.node.neighbors import Neighbor, Neighbors
+from fanet_mw.routing.clustered.forwarding.gradient import Gradient
+from fanet_mw.routing.clustered.roles.failover import Upkeep
+from fanet_mw.routing.clustered.roles.lease import Lease
+from fanet_mw.routing.clustered.roles.membership import Membership
+from fanet_mw.routing.clustered.roles.signs_of_life import Signs
+from fanet_mw.routing.clustered.roles.states import Action, State
 from fanet_mw.units import MS, NodeId, S
-from fanet_mw.wire_messages import Beacon, Member, Role, Schedule
+from fanet_mw.wire.inner import Beacon, Member, Role, Schedule
 
 LEADER, HEAD = NodeId(1), NodeId(9)
 CLUSTER = (9, 2, 3, 4)

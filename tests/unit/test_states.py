@@ -6,7 +6,7 @@ from types import ModuleType
 
 import pytest
 
-from fanet_mw.protocol.states import TRANSITIONS, Action, Event, State, mermaid
+from fanet_mw.routing.clustered.roles.states import TRANSITIONS, Action, Event, State, mermaid
 
 ROOT = Path(__file__).parents[2]
 

@@ -5,7 +5,7 @@ import statistics
 import pytest
 
 from agents.steady_fix import SteadyFix, gain
-from fanet_mw.messages import Gps
+from fanet_mw.bus.messages import Gps
 from fanet_mw.rng import stream
 from fanet_mw.units import MS, Enu
 

@@ -9,10 +9,10 @@ from fanet_mw.errors import DropReason
 from fanet_mw.scenario import Scenario
 from fanet_mw.trace import Approaching, Arrived, DeadlineLost, DeadlineMet, Detected, Dropped, Record
 from fanet_mw.units import MS, S
-from sim.delays import summed_up
-from sim.metrics import summarize
-from sim.outcome import Outcome
-from sim.survivors import place
+from sim.results.delays import summed_up
+from sim.results.metrics import summarize
+from sim.run.outcome import Outcome
+from sim.world.survivors import place
 
 MakeScenario = Callable[..., Scenario]
 

@@ -4,8 +4,8 @@ import time
 
 import pytest
 
+from fanet_mw.bus.messages import Clock, ClockState
 from fanet_mw.hosts.clock import SwarmClock
-from fanet_mw.messages import Clock, ClockState
 from fanet_mw.units import S
 
 

@@ -1,10 +1,10 @@
 """Time beacons over hops, by timelines: two steps, election, a reference that comes back, and neighbors that lie."""
 
-from fanet_mw.protocol.clock_fit import Oscillator
-from fanet_mw.protocol.timesync import Settings, TimeSync
 from fanet_mw.scenario import Clock
+from fanet_mw.timesync.clock_fit import Oscillator
+from fanet_mw.timesync.ftsp import Settings, TimeSync
 from fanet_mw.units import MS, US, NodeId, S
-from fanet_mw.wire_messages import TimeBeacon
+from fanet_mw.wire.inner import TimeBeacon
 from tests.property.time_network import Network, line
 
 LIMIT_NS = 5 * S

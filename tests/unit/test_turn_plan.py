@@ -4,9 +4,9 @@ from collections.abc import Callable
 
 import pytest
 
-from fanet_mw.protocol.timetable import Timetable, Turn
-from fanet_mw.protocol.turn_plan import Fitted, Plan, links, superframe
-from fanet_mw.protocol.turns import Turns, clocks_fit, turn_ns
+from fanet_mw.routing.clustered.tdma.turns import Turns, clocks_fit, turn_ns
+from fanet_mw.routing.clustered.timetable.timetable import Timetable, Turn
+from fanet_mw.routing.clustered.timetable.turn_plan import Fitted, Plan, links, superframe
 from fanet_mw.scenario import Scenario
 from fanet_mw.units import MS, US, NodeId
 

@@ -8,12 +8,12 @@ import pytest
 
 from agents.uav import Uav
 from fanet_mw import wire
-from fanet_mw.messages import MavlinkTap, Reception, TxRequest
+from fanet_mw.bus.messages import MavlinkTap, Reception, TxRequest
+from fanet_mw.bus.topics import Topics
 from fanet_mw.scenario import Scenario
-from fanet_mw.topics import Topics
 from fanet_mw.units import BROADCAST, MS, Enu, NodeId, S
 from fanet_mw.wire import FLAG_FLOOD, PRIORITY_REPORT, Header, Kind
-from fanet_mw.wire_messages import Survivor
+from fanet_mw.wire.inner import Survivor
 
 NAMES, LEAD_NS = Topics("u"), 20 * MS
 MakeScenario = Callable[..., Scenario]

@@ -3,14 +3,14 @@
 import pytest
 
 from fanet_mw import wire
+from fanet_mw.bus.messages import Reception, TxOutcome, TxStatus
 from fanet_mw.errors import DropReason
-from fanet_mw.messages import Reception, TxOutcome, TxStatus
-from fanet_mw.protocol.node import Node
+from fanet_mw.node.node import Node
 from fanet_mw.routing import make_protocol
 from fanet_mw.trace import Dropped
 from fanet_mw.units import BROADCAST, MS, US, Enu, NodeId, S
 from fanet_mw.wire import FLAG_TO_HEAD, PRIORITY_BULK, PRIORITY_REPORT, Header, Kind, filler
-from fanet_mw.wire_messages import Beacon, Role
+from fanet_mw.wire.inner import Beacon, Role
 from tests.conftest import MakeScenario
 
 

@@ -6,15 +6,15 @@ from typing import Any
 import pytest
 
 from agents.uav import Uav
-from fanet_mw.messages import Reception
+from fanet_mw.bus.messages import Reception
+from fanet_mw.bus.topics import Topics
 from fanet_mw.scenario import Scenario
-from fanet_mw.topics import Topics
 from fanet_mw.units import MS, Enu, NodeId, S
-from sim import validity
-from sim.metrics import summarize
-from sim.outcome import Outcome
-from sim.report import show
-from sim.world import World
+from sim.results import validity
+from sim.results.metrics import summarize
+from sim.results.report import show
+from sim.run.outcome import Outcome
+from sim.world.world import World
 
 SENT = 4000
 """Requests of each of the two nodes."""
@@ -198,7 +198,7 @@ def test_a_run_in_virtual_time_is_judged_by_its_ledger_alone(scenario: Scenario)
 
 
 def test_every_reason_is_printed(scenario: Scenario, capsys: pytest.CaptureFixture[str]) -> None:
-    from sim.console import Console
+    from sim.cli.console import Console
 
     outcome = good(scenario)
     outcome.ended.append(("agent-2", -9))

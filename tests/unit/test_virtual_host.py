@@ -3,9 +3,9 @@
 import pytest
 
 from fanet_mw.actor import Actor
+from fanet_mw.bus.messages import MavlinkTap, Message
 from fanet_mw.errors import LocalProtocolError
 from fanet_mw.hosts.virtual import VirtualHost, matches
-from fanet_mw.messages import MavlinkTap, Message
 from fanet_mw.units import MS
 
 

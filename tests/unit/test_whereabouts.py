@@ -2,7 +2,7 @@
 
 import pytest
 
-from fanet_mw.protocol.whereabouts import Motion, Whereabouts
+from fanet_mw.routing.clustered.roles.position_updates import Motion, Whereabouts
 from fanet_mw.units import Enu, S
 
 HERE, STILL = Enu(0.0, 0.0, 50.0), Enu(0.0, 0.0, 0.0)

@@ -7,12 +7,12 @@ from typing import Any
 import numpy as np
 import pytest
 
-from fanet_mw.messages import Gps, Poses, Setpoint, WifiScan
+from fanet_mw.bus.messages import Gps, Poses, Setpoint, WifiScan
+from fanet_mw.bus.topics import Topics
 from fanet_mw.scenario import Scenario
-from fanet_mw.topics import Topics
 from fanet_mw.trace import Collided
 from fanet_mw.units import MS, Enu, S
-from sim.world import World
+from sim.world.world import World
 
 NAMES = Topics("w")
 MakeScenario = Callable[..., Scenario]

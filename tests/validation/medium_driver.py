@@ -7,10 +7,10 @@ from collections.abc import Sequence
 from typing import Any
 
 from emulator.medium import Medium
-from fanet_mw import config
-from fanet_mw.messages import Poses, Reception, TxRequest
+from fanet_mw.bus.messages import Poses, Reception, TxRequest
+from fanet_mw.bus.topics import Topics
 from fanet_mw.rng import stream
-from fanet_mw.topics import Topics
+from fanet_mw.scenario import config
 from fanet_mw.units import BROADCAST, NodeId, seconds_to_ns
 
 Place = tuple[float, float]

@@ -23,9 +23,9 @@ from concurrent.futures import ProcessPoolExecutor
 from pathlib import Path
 from typing import Any, Final, NamedTuple
 
-from sim import catalog
-from sim.results import finish
-from sim.run import simulate
+from sim.results.files import finish
+from sim.run.virtual import simulate
+from sim.scenarios import catalog
 
 HERE: Final = Path(__file__).parent
 CHANNEL: Final = {"A": "range", "B": "log_distance"}

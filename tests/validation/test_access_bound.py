@@ -4,10 +4,10 @@ import pytest
 from medium_driver import disc, medium, poses
 
 from fanet_mw.airtime import DETECT_NS, OVERHEAD_BYTES, airtime_ns
-from fanet_mw.messages import TxOutcome, TxRequest, TxStatus
-from fanet_mw.protocol.delay import Bounded, Contention, Dcf, Refused, access_bound
+from fanet_mw.bounds import Bounded, Contention, Dcf, Refused, access_bound
+from fanet_mw.bus.messages import TxOutcome, TxRequest, TxStatus
+from fanet_mw.bus.topics import Topics
 from fanet_mw.scenario import Radio
-from fanet_mw.topics import Topics
 from fanet_mw.units import MS, US, NodeId, S
 
 HEAD = NodeId(1)

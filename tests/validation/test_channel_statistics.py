@@ -6,11 +6,11 @@ from typing import Any
 import numpy as np
 import pytest
 
-from emulator import fading, state
-from emulator.shadowing import Shadowing
-from fanet_mw import config
+from emulator.channel import fading
+from emulator.channel.shadowing import Shadowing
+from emulator.kernel import state
 from fanet_mw.rng import stream_seed
-from fanet_mw.scenario import Radio
+from fanet_mw.scenario import Radio, config
 
 FAR_M = 5000.0
 SEEDS = range(40)

@@ -11,10 +11,10 @@ Broadcast data is flooded, each node once after U(0, `routing.jitter_ms`), as ar
 from collections.abc import Mapping
 from typing import ClassVar
 
+from fanet_mw.bus.messages import Reception, TxOutcome
 from fanet_mw.errors import DropReason, MalformedFrameError
-from fanet_mw.messages import Reception, TxOutcome
-from fanet_mw.protocol.contract import Port
-from fanet_mw.protocol.txqueue import Packet
+from fanet_mw.node.contract import Port
+from fanet_mw.node.queue import Packet
 from fanet_mw.routing import control
 from fanet_mw.routing.aodv import parameters as p
 from fanet_mw.routing.aodv.discovery import Discovery, HeardRequests, RateLimit, Search

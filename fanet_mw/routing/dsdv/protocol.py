@@ -12,10 +12,10 @@ are ns-3's. Broadcast data is flooded. Does not model: the base-station extensio
 from collections.abc import Mapping
 from typing import ClassVar, Final
 
+from fanet_mw.bus.messages import Reception, TxOutcome
 from fanet_mw.errors import DropReason, MalformedFrameError
-from fanet_mw.messages import Reception, TxOutcome
-from fanet_mw.protocol.contract import Port
-from fanet_mw.protocol.txqueue import Packet
+from fanet_mw.node.contract import Port
+from fanet_mw.node.queue import Packet
 from fanet_mw.routing import control
 from fanet_mw.routing.control import Family
 from fanet_mw.routing.dsdv.messages import FULL, INCREMENTAL, PER_ENTRY, Advertised, Update

@@ -15,10 +15,10 @@ neighbors between beacons; recovery round voids other than by carrying (perimete
 from collections.abc import Mapping
 from typing import ClassVar, Final
 
+from fanet_mw.bus.messages import Reception, TxOutcome
 from fanet_mw.errors import DropReason, MalformedFrameError
-from fanet_mw.messages import Reception, TxOutcome
-from fanet_mw.protocol.contract import Port
-from fanet_mw.protocol.txqueue import Packet
+from fanet_mw.node.contract import Port
+from fanet_mw.node.queue import Packet
 from fanet_mw.routing.control import Family
 from fanet_mw.routing.geographic.messages import BEACON, LOCATION, QUERY, Beacon, Fix, Location, Query
 from fanet_mw.routing.geographic.places import HELLO_INTERVAL_NS, Places

@@ -13,10 +13,10 @@ keeps them by number rather than for DUP_HOLD_TIME, and it stops a data packet t
 from collections.abc import Mapping
 from typing import ClassVar, Final
 
+from fanet_mw.bus.messages import Reception
 from fanet_mw.errors import DropReason, MalformedFrameError
-from fanet_mw.messages import Reception
-from fanet_mw.protocol.contract import Port
-from fanet_mw.protocol.txqueue import Packet
+from fanet_mw.node.contract import Port
+from fanet_mw.node.queue import Packet
 from fanet_mw.routing import control
 from fanet_mw.routing.control import Family
 from fanet_mw.routing.olsr import parameters as p

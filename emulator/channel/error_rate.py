@@ -1,0 +1,80 @@
+"""The share of bits that noise and interference spoil: DSSS DBPSK and DQPSK, CCK 5.5 and 11 Mb/s; OFDM is next door.
+
+DBPSK     1/2 exp(-Eb/N0)                                               Proakis, Digital Communications, 4th ed., 5.2.8
+DQPSK     (1+sqrt2)/sqrt(8 pi sqrt2 x) exp(-(2-sqrt2) x), x = Eb/N0        (tight approximation of the same section)
+CCK       biorthogonal signalling of 4 (5.5) or 8 (11) dimensions times a DQPSK rotation, per 8-chip symbol (5.2.2)
+
+SINR is over the 22 MHz channel. Values are logs of the success probability of one bit, tabulated over SINR in dB.
+"""
+
+import math
+from typing import Final
+
+import numpy as np
+import numpy.typing as npt
+
+from emulator.channel.ofdm_error_rate import bit_error
+from emulator.channel.propagation import DSSS_BANDWIDTH_HZ
+from emulator.kernel.phy import ERROR_FLOOR_DB, ERROR_STEPS_PER_DB
+from fanet_mw.scenario.radio import is_ofdm
+
+_TOP_DB: Final = 35.0
+_SYMBOLS_PER_S: Final = 1.375e6
+"""CCK symbols: 11 Mchip/s, 8 chips each."""
+
+Reals = npt.NDArray[np.float64]
+
+
+def log_success_per_bit(rate_mbps: float) -> Reals:
+    """ln(1 - bit error rate) at each step of the SINR axis."""
+    sinr_db = np.arange(ERROR_FLOOR_DB, _TOP_DB, 1 / ERROR_STEPS_PER_DB)
+    sinr = np.power(10.0, sinr_db / 10)
+    if is_ofdm(rate_mbps):
+        return np.asarray(np.log(np.maximum(1.0 - bit_error(sinr, rate_mbps), 1e-300)), dtype=np.float64)
+    if rate_mbps == 1:
+        return _from_bit_error(0.5 * np.exp(-sinr * DSSS_BANDWIDTH_HZ / 1e6))
+    if rate_mbps == 2:
+        return _from_bit_error(_dqpsk(sinr * DSSS_BANDWIDTH_HZ / 2e6))
+    bits = 4 if rate_mbps == 5.5 else 8
+    symbol_snr = sinr * DSSS_BANDWIDTH_HZ / _SYMBOLS_PER_S
+    success = np.array([_cck_symbol_success(float(snr), bits) for snr in symbol_snr])
+    return np.asarray(np.log(np.maximum(success, 1e-300)) / bits, dtype=np.float64)
+
+
+def header_rates(rate_mbps: float) -> tuple[float, float]:
+    """What protects the header of a frame: the rate [Mb/s] of its modulation, and its mean bits per ns.
+
+    DSSS: preamble and header are sent at 1 Mb/s. OFDM: 24 bits of SIGNAL at 6 Mb/s follow 16 us of training.
+    """
+    return (6.0, 24 / 20_000) if is_ofdm(rate_mbps) else (1.0, 1e-3)
+
+
+def _from_bit_error(rate: Reals) -> Reals:
+    return np.asarray(np.log1p(-np.minimum(rate, 0.5)), dtype=np.float64)
+
+
+def _dqpsk(per_bit: Reals) -> Reals:
+    root = math.sqrt(2.0)
+    return np.asarray(
+        np.minimum(0.5, (1 + root) / np.sqrt(8 * math.pi * root * per_bit) * np.exp(-(2 - root) * per_bit)),
+        dtype=np.float64,
+    )
+
+
+def _cck_symbol_success(symbol_snr: float, bits: int) -> float:
+    """One symbol right: CCK 11 is two independent quadrature decisions of biorthogonal sets, 5.5 one of them.
+
+    Es/N0 is over both quadratures; a decision sees the energy of one, and of half a symbol at 11 Mb/s.
+    """
+    if bits == 8:
+        return _biorthogonal_success(symbol_snr / 4, 16) ** 2
+    return _biorthogonal_success(symbol_snr / 2, 16)
+
+
+def _biorthogonal_success(snr: float, signals: int) -> float:
+    """Proakis (5.2-34): the largest of M/2 correlators is the right one, with the right sign."""
+    root = math.sqrt(2 * snr)
+    v = np.linspace(-root, 10.0, 600) if root < 10 else np.linspace(-10.0, 10.0, 600)
+    inner = np.array([math.erf(max(0.0, x + root) / math.sqrt(2.0)) for x in v])
+    density = np.exp(-v * v / 2) / math.sqrt(2 * math.pi)
+    return float(min(1.0, np.trapezoid(np.power(inner, signals / 2 - 1) * density, v)))

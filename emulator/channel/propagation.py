@@ -1,0 +1,163 @@
+"""Links: who hears whom how strongly, from positions. Distances in metres, powers in dBm and mW.
+
+    path loss of the channel (`path_loss.py`) -> shadowing (`shadowing.py`) -> obstruction -> links above the floor
+
+`range` is no law of physics: every frame within `range_m` is received at the transmit power, nothing beyond (ns-3's
+range model), and nothing through an obstruction. Fading is drawn per frame, in the kernel (`fading.py`). Not modeled:
+antenna patterns, Doppler, interference of links below `interference_floor_dbm`.
+"""
+
+import math
+from typing import Final
+
+import numpy as np
+
+from emulator.channel.path_loss import (
+    AIR_TO_AIR_EXPONENT,
+    ENVIRONMENTS,
+    SPEED_OF_LIGHT_M_S,
+    air_to_air_db,
+    air_to_ground_db,
+    friis_db,
+    log_distance_db,
+    two_ray_db,
+    uma_av_db,
+)
+from emulator.channel.shadowing import Shadowing
+from emulator.channel.spatial import neighbors
+from emulator.kernel.state import (
+    AUDIBLE,
+    DELAY,
+    LINK_DST,
+    LINK_POWER,
+    LINK_REALS,
+    LINK_ROWS,
+    LINK_SRC,
+    SPARED,
+    Ints,
+    Reals,
+)
+from fanet_mw.scenario.radio import Radio, is_ofdm
+
+THERMAL_DBM_PER_HZ: Final = -174.0
+DSSS_BANDWIDTH_HZ: Final = 22e6
+OFDM_BANDWIDTH_HZ: Final = 20e6
+_ROUNDING_DB: Final = 1e-9
+"""So that a link at the very reach is not lost to rounding."""
+
+
+def milliwatt(dbm: float) -> float:
+    return math.pow(10.0, dbm / 10)
+
+
+def noise_mw(radio: Radio) -> float:
+    """Thermal noise in the channel plus the receiver's noise figure."""
+    bandwidth_hz = OFDM_BANDWIDTH_HZ if is_ofdm(radio.rate_mbps) else DSSS_BANDWIDTH_HZ
+    return milliwatt(THERMAL_DBM_PER_HZ + 10 * math.log10(bandwidth_hz) + radio.noise_figure_db)
+
+
+_MOST_DECADES: Final = 12.0
+"""Of a meter: farther than any two nodes can be apart."""
+
+
+def reach_m(radio: Radio) -> float:
+    """Beyond this distance a station does not even interfere, by the most favorable law and 2 sigma of shadowing."""
+    if radio.channel == "range":
+        return radio.range_m
+    budget_db = radio.tx_power_dbm - radio.interference_floor_dbm + 2 * radio.shadowing_db
+    at_1_m = float(friis_db(np.ones(1), frequency_mhz=radio.frequency_mhz)[0])
+    laws = {
+        "log_distance": [(radio.reference_loss_db, radio.exponent)],
+        "friis": [(at_1_m, 2.0)],
+        "two_ray": [(at_1_m, 2.0)],
+        "air_to_air": [(at_1_m, AIR_TO_AIR_EXPONENT)],
+        "air_to_ground": [(at_1_m, 2.0)],
+        "uma_av": [(28.0 + 20 * math.log10(radio.frequency_mhz / 1000), 2.2), (at_1_m, AIR_TO_AIR_EXPONENT)],
+    }[radio.channel]
+    decades = max((budget_db - at_1_m) / (10 * exponent) for at_1_m, exponent in laws)
+    return math.pow(10.0, max(0.0, min(_MOST_DECADES, decades)))
+
+
+def received_dbm(distance_m: Reals, from_m: Reals, to_m: Reals, radio: Radio) -> Reals:
+    """Mean power of each link, without shadowing; `from_m` and `to_m` are its ends [n, 3], heights above the ground."""
+    if radio.channel == "range":
+        return np.full_like(distance_m, radio.tx_power_dbm)
+    return np.asarray(radio.tx_power_dbm - _loss_db(distance_m, from_m, to_m, radio), dtype=np.float64)
+
+
+def _loss_db(distance_m: Reals, from_m: Reals, to_m: Reals, radio: Radio) -> Reals:
+    mhz = radio.frequency_mhz
+    if radio.channel == "log_distance":
+        return log_distance_db(distance_m, reference_db=radio.reference_loss_db, exponent=radio.exponent)
+    if radio.channel == "friis":
+        return friis_db(distance_m, frequency_mhz=mhz)
+    if radio.channel == "two_ray":
+        return two_ray_db(distance_m, from_m[:, 2], to_m[:, 2], frequency_mhz=mhz)
+    in_the_air = air_to_air_db(distance_m, frequency_mhz=mhz)
+    if radio.channel == "air_to_air":
+        return in_the_air
+    low, high = np.minimum(from_m[:, 2], to_m[:, 2]), np.maximum(from_m[:, 2], to_m[:, 2])
+    if radio.channel == "air_to_ground":
+        environment = ENVIRONMENTS[radio.environment]
+        to_ground = air_to_ground_db(distance_m, high - low, environment, frequency_mhz=mhz)
+    else:
+        along_m = np.hypot(*(from_m - to_m)[:, :2].T)
+        to_ground = uma_av_db(distance_m, along_m, high, frequency_mhz=mhz)
+    return np.where(low >= radio.airborne_m, in_the_air, to_ground)
+
+
+class Links:
+    """All links of one set of positions, as the kernel's arrays, with room for `spare` more."""
+
+    def __init__(
+        self, at: Reals, radio: Radio, *, spare: int, shadowing: Shadowing | None = None, blocked: Ints | None = None
+    ) -> None:
+        """`blocked`: codes, see `pair_codes`, of the pairs between which something stands, ascending."""
+        found, distance = neighbors(at, reach_m(radio))
+        power_dbm = received_dbm(distance, at[found[:, 0]], at[found[:, 1]], radio)
+        if shadowing is not None:
+            power_dbm = power_dbm - shadowing.loss_db(at, found, distance)
+        hidden = np.zeros(len(found), bool)
+        if blocked is not None and len(blocked):
+            hidden = np.isin(pair_codes(found, len(at)), blocked)
+        if radio.channel == "range":
+            heard = ~hidden
+        else:
+            power_dbm = power_dbm - radio.obstruction_loss_db * hidden
+            heard = power_dbm >= radio.interference_floor_dbm - _ROUNDING_DB
+        if not heard.all():
+            found, distance, power_dbm = found[heard], distance[heard], power_dbm[heard]
+        nearest_first = np.lexsort((found[:, 1], distance, found[:, 0]))
+        found, distance, power_dbm = found[nearest_first], distance[nearest_first], power_dbm[nearest_first]
+        self._fill(found, distance, power_dbm, radio, stations=len(at), spare=spare)
+
+    def _fill(self, found: Ints, distance: Reals, power_dbm: Reals, radio: Radio, *, stations: int, spare: int) -> None:
+        count = len(found)
+        self.count = count
+        self.ints = np.zeros((LINK_ROWS, count + spare + 1), np.int64)  # never empty: numba indexes it
+        self.reals = np.zeros((LINK_REALS, count + spare + 1), np.float64)
+        self.ints[LINK_SRC, :count] = found[:, 0]
+        self.ints[LINK_DST, :count] = found[:, 1]
+        self.ints[DELAY, :count] = np.rint(distance / SPEED_OF_LIGHT_M_S * 1e9)
+        audible = power_dbm >= radio.sensitivity_dbm if radio.channel != "range" else np.ones(count, bool)
+        self.ints[AUDIBLE, :count] = audible
+        only_audible = radio.fading == "none" and "sums" not in radio.as_ns3
+        self.longest_ns = int((self.ints[DELAY] * (self.ints[AUDIBLE] if only_audible else 1)).max())
+        """Delay of the longest link that counts: an audible one, or any when fading may lift it or a sum be sensed."""
+        self.reals[LINK_POWER, :count] = np.power(10.0, power_dbm / 10)
+        self.reals[SPARED, :count] = 1.0
+        self.ptr = np.searchsorted(found[:, 0], np.arange(stations + 1)).astype(np.int64)
+
+    def dead_last(self) -> None:
+        """Links without power come last of their transmitter's; else the order stays: nearest first."""
+        used = slice(self.count)
+        dead = self.reals[LINK_POWER, used] == 0.0
+        if dead.any():
+            order = np.lexsort((dead, self.ints[LINK_SRC, used]))  # stable
+            self.ints[:, used] = self.ints[:, used][:, order]
+            self.reals[:, used] = self.reals[:, used][:, order]
+
+
+def pair_codes(found: Ints, stations: int) -> Ints:
+    """One number per pair [n, 2] of stations, the same for both directions."""
+    return np.asarray(np.minimum(*found.T) * stations + np.maximum(*found.T), dtype=np.int64)

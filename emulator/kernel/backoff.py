@@ -1,0 +1,102 @@
+"""The backoff of a station (IEEE 802.11-2020, 10.3.3), functions over state rows.
+
+Slots count from BASE while the medium is idle; when it turns busy, the slots that have passed are taken off and the
+rest waits. A pending access is one event; it is stale when SCHEDULED has another instant.
+
+After a reception that failed, EIFS takes the place of DIFS (10.3.2.3.7). It begins when the medium is idle after a bad
+frame, whatever else has kept it busy, and anew if it is interrupted, until it has passed or a frame was received well.
+In ns-3.44 its extension beyond DIFS begins at the end of the bad frame, and passes while the medium is busy.
+"""
+
+from emulator.chance import MODULUS, uniform
+from emulator.kernel.heap import push
+from emulator.kernel.jit import jit
+from emulator.kernel.state import (
+    ACCESS,
+    ACK_TO,
+    BAD_UNTIL,
+    BASE,
+    BO,
+    BUSY_NS,
+    BUSY_SINCE,
+    CS,
+    CW,
+    DIFS_FIRST,
+    DIFS_NS,
+    EIFS_EXTRA_NS,
+    EIFS_FROM_FRAME,
+    FRESH,
+    HEAD,
+    HS_N,
+    IDLE_FROM,
+    NAV,
+    NEVER,
+    NOTHING,
+    RANDOM,
+    RESUME_FROM,
+    SCHEDULED,
+    SLOT_NS,
+    TX_KIND,
+    WAITING,
+    Ints,
+)
+
+
+@jit
+def draw(st: Ints, s: int) -> None:
+    """A new backoff from [0, CW]."""
+    st[BO, s] = uniform(st, RANDOM, s) * (st[CW, s] + 1) // MODULUS
+
+
+@jit
+def access_from(p: Ints, st: Ints, s: int) -> int:
+    """From when backoff slots count, if the medium stays idle."""
+    return int(max(st[IDLE_FROM, s], st[BAD_UNTIL, s], st[RESUME_FROM, s], st[NAV, s]) + p[DIFS_NS])
+
+
+@jit
+def arm(g: Ints, p: Ints, st: Ints, hs: Ints, s: int) -> None:
+    """The medium is idle at a station: start counting, and plan its access if it has a frame."""
+    if st[CS, s] > 0 or st[TX_KIND, s] != NOTHING or st[WAITING, s] >= 0 or st[ACK_TO, s] >= 0:
+        return
+    st[BASE, s] = access_from(p, st, s)
+    if st[HEAD, s] >= 0:
+        t = st[BASE, s] + st[BO, s] * p[SLOT_NS]
+        st[SCHEDULED, s] = t
+        push(hs, g, HS_N, t, ACCESS, s, 0)
+
+
+@jit
+def slots_left(p: Ints, st: Ints, s: int, t: int) -> int:
+    """Backoff slots left at `t`, if the medium has been idle until then."""
+    if t <= st[BASE, s]:
+        return int(st[BO, s])
+    return int(max(0, st[BO, s] - (t - st[BASE, s]) // p[SLOT_NS]))
+
+
+@jit
+def on_busy(p: Ints, st: Ints, s: int, t: int) -> None:
+    """The medium turns busy at a station: freeze the backoff."""
+    if st[BUSY_SINCE, s] < 0:
+        st[BUSY_SINCE, s] = t
+        if st[BAD_UNTIL, s] + p[DIFS_NS] <= t:
+            st[BAD_UNTIL, s] = 0  # the EIFS has passed
+    st[BO, s] = slots_left(p, st, s, t)
+    st[BASE, s] = NEVER
+    if st[SCHEDULED, s] >= 0:
+        st[SCHEDULED, s] = -1
+        if st[FRESH, s] == 1 and p[DIFS_FIRST] == 0:
+            draw(st, s)
+            st[FRESH, s] = 0
+
+
+@jit
+def on_idle(g: Ints, p: Ints, st: Ints, hs: Ints, s: int, t: int) -> None:
+    """The medium turns idle at a station."""
+    if st[BUSY_SINCE, s] >= 0:
+        st[BUSY_NS, s] += t - st[BUSY_SINCE, s]
+        st[BUSY_SINCE, s] = -1
+    st[IDLE_FROM, s] = t
+    if p[EIFS_FROM_FRAME] == 0 and st[BAD_UNTIL, s] > 0:
+        st[BAD_UNTIL, s] = t + p[EIFS_EXTRA_NS]
+    arm(g, p, st, hs, s)

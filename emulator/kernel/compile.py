@@ -1,0 +1,63 @@
+"""Compile the kernel, once: `python -m emulator.kernel.compile`. numba keeps the result in its cache."""
+
+import contextlib
+import sys
+from array import array
+from collections.abc import Mapping
+from importlib.metadata import version
+from pathlib import Path
+from typing import Final
+
+from emulator.kernel.jit import COMPILED, cache_folder
+from emulator.medium import Medium
+from fanet_mw.bus.messages import Poses, TxRequest
+from fanet_mw.bus.topics import Topics
+from fanet_mw.scenario import config
+from fanet_mw.units import BROADCAST, MS, NodeId
+
+WORD: Final = "compiling the emulator's kernel, once: about half a minute"
+"""To be said before `warm_up` when `must_compile`."""
+
+
+def must_compile() -> bool:
+    """Whether `warm_up` will take half a minute, because machine code of all functions has not been kept yet."""
+    return COMPILED and not _marker().exists()
+
+
+def warm_up() -> bool:
+    """Run every compiled function once, the optional ones too; returns whether they are machine code."""
+    _run({})
+    _run({"channel": "friis", "shadowing_db": 1.0, "fading": "rician", "capture": True})
+    if must_compile():
+        with contextlib.suppress(OSError):  # what cannot be kept is compiled again each time
+            _marker().touch()
+    return COMPILED
+
+
+def _marker() -> Path:
+    """The file that says that everything has been compiled, by this numba in this Python."""
+    return cache_folder() / f"whole-{version('numba')}-{sys.implementation.cache_tag}"
+
+
+def _run(radio: Mapping[str, object]) -> None:
+    """Two stations, a few frames, poses in the middle of one."""
+    scenario = config.build({"nodes": {"count": 2}, "clusters": {"count": 1}, "radio": radio})
+    topics = Topics("warm-up")
+    medium = Medium(scenario, "warm-up")
+    medium.start(0)
+
+    def poses(t_ns: int, east: float) -> Poses:
+        return Poses(t_ns, array("H", [1, 2]), array("d", [0.0] * 6 + [east] + [0.0] * 5))
+
+    medium.receive(topics.pose, poses(0, 100.0), 0)
+    medium.receive(topics.radio_tx(1), TxRequest(0, 0, b"x", BROADCAST, wants_status=False), 0)
+    medium.receive(topics.radio_tx(1), TxRequest(1, 0, b"x" * 500, NodeId(2), wants_status=True), 0)
+    medium.receive(topics.pose, poses(MS, 120.0), MS)
+    medium.next_wake_ns()
+    medium.stop(20 * MS)
+
+
+if __name__ == "__main__":
+    if must_compile():
+        sys.stderr.write(f"{WORD}\n")
+    warm_up()

@@ -1,0 +1,374 @@
+"""The MAC of a station: the distributed coordination function (IEEE 802.11-2020, 10.3), functions over state rows.
+
+    queue -> access (DIFS or EIFS, backoff with freezing) -> frame -> ACK or timeout -> next attempt or done
+
+The backoff itself is in `backoff`, what becomes of frames is counted in `ending`.
+"""
+
+from emulator.channel.fading import gain
+from emulator.kernel.backoff import access_from, arm, draw, on_busy, on_idle, slots_left
+from emulator.kernel.ending import done, lost, put, release
+from emulator.kernel.heap import push
+from emulator.kernel.jit import jit
+from emulator.kernel.state import (
+    ACCESS,
+    ACK,
+    ACK_NS,
+    ACK_TIMEOUT,
+    ACK_TIMEOUT_NS,
+    ACK_TO,
+    AIRTIME,
+    ALL_DETECT,
+    ALL_END,
+    ALL_START,
+    ATTEMPTS,
+    ATTEMPTS_FAILED,
+    ATTEMPTS_MADE,
+    AUDIBLE,
+    BASE,
+    BEGINS,
+    BO,
+    BORN,
+    CAPTURE,
+    COPY,
+    CS,
+    CW,
+    CW_MAX,
+    CW_MIN,
+    DATA,
+    DELAY,
+    DETECT_NS,
+    DIFS_FIRST,
+    DIFS_NS,
+    DONE_ACKED,
+    DONE_EXPIRED,
+    DONE_FULL,
+    DONE_RETRY,
+    DONE_SENT,
+    DST,
+    ENDS,
+    EVERYONE,
+    FADING,
+    FATE,
+    FATE_HALF_DUPLEX,
+    FATE_OPEN,
+    FAULT,
+    FRESH,
+    HEAD,
+    HR_N,
+    HS_N,
+    LAST_END,
+    LIFETIME_NS,
+    LINK_DST,
+    LINK_FRAME,
+    LINK_KIND,
+    LINK_POWER,
+    LOCK,
+    LOCK_HEADER_END,
+    MAX_ATTEMPTS,
+    NAV,
+    NEXT,
+    NOTHING,
+    ON_AIR,
+    ON_AIR_COPIES,
+    ON_AIR_LIST,
+    ON_AIR_N,
+    OPEN,
+    OUT_START,
+    QLEN,
+    QUEUE_LIMIT,
+    REACH_NS,
+    RESUME_FROM,
+    RETRIES,
+    SCHEDULED,
+    SENSED,
+    SENSITIVITY_MW,
+    SLOT_NS,
+    SRC,
+    TAIL,
+    TARGETS,
+    TX_DONE,
+    TX_END,
+    TX_FRAME,
+    TX_KIND,
+    UNDERWAY,
+    WAITING,
+    Ints,
+    Reals,
+)
+
+
+@jit
+def take_head(st: Ints, fr: Ints, s: int) -> None:
+    """Remove the first frame of the queue."""
+    st[HEAD, s] = fr[NEXT, st[HEAD, s]]
+    if st[HEAD, s] < 0:
+        st[TAIL, s] = -1
+    st[QLEN, s] -= 1
+
+
+@jit
+def expire(g: Ints, p: Ints, st: Ints, fr: Ints, out: Ints, s: int, t: int) -> None:
+    """Drop what has waited in the queue beyond its lifetime; the contention window is no business of a lifetime.
+
+    The first frame is not in question while it is on the air or its ACK is awaited.
+    """
+    kept = st[HEAD, s] if st[TX_KIND, s] == DATA or st[WAITING, s] >= 0 else -1
+    if kept >= 0:
+        take_head(st, fr, s)
+    while st[HEAD, s] >= 0 and t - fr[BORN, st[HEAD, s]] >= p[LIFETIME_NS]:
+        f = st[HEAD, s]
+        take_head(st, fr, s)
+        done(g, fr, out, f, DONE_EXPIRED, t)
+    if kept >= 0:
+        fr[NEXT, kept] = st[HEAD, s]
+        st[HEAD, s] = kept
+        if st[TAIL, s] < 0:
+            st[TAIL, s] = kept
+        st[QLEN, s] += 1
+
+
+@jit
+def arrive(g: Ints, p: Ints, st: Ints, fr: Ints, hs: Ints, out: Ints, f: int, t: int) -> None:
+    """A frame enters the MAC queue of its station."""
+    s = fr[SRC, f]
+    if st[QLEN, s] >= p[QUEUE_LIMIT]:
+        expire(g, p, st, fr, out, s, t)
+    if st[QLEN, s] >= p[QUEUE_LIMIT]:
+        done(g, fr, out, f, DONE_FULL, t)
+        return
+    fr[NEXT, f] = -1
+    st[QLEN, s] += 1
+    if st[HEAD, s] >= 0:
+        fr[NEXT, st[TAIL, s]] = f
+        st[TAIL, s] = f
+        return
+    st[HEAD, s] = f
+    st[TAIL, s] = f
+    request(g, p, st, hs, s, t)
+
+
+@jit
+def request(g: Ints, p: Ints, st: Ints, hs: Ints, s: int, t: int) -> None:
+    """The first frame of an empty queue asks for the medium (802.11-2020, 10.3.4.2: at once after DIFS of idle)."""
+    if st[TX_KIND, s] == DATA or st[WAITING, s] >= 0:
+        return  # the post-backoff of our own frame is still to be drawn
+    if st[CS, s] > 0 or st[TX_KIND, s] == ACK or st[ACK_TO, s] >= 0 or st[NAV, s] > t:
+        before_ack = st[CS, s] == 0 and st[TX_KIND, s] != ACK and st[NAV, s] <= t  # to ns-3 the medium is idle
+        if st[BO, s] == 0 and not (before_ack and p[DIFS_FIRST] == 1):
+            draw(st, s)
+        st[FRESH, s] = 0
+        if st[CS, s] == 0:
+            arm(g, p, st, hs, s)
+        return
+    if slots_left(p, st, s, t) == 0:
+        st[BO, s] = 0
+        st[FRESH, s] = 1
+        start = access_from(p, st, s)
+        if p[DIFS_FIRST] == 1:
+            st[BASE, s] = max(start, t + p[DIFS_NS])
+        elif start <= t:
+            st[BASE, s] = t
+        else:  # idle, but not yet for DIFS: a backoff is due
+            draw(st, s)
+            st[FRESH, s] = 0
+            st[BASE, s] = start
+    else:
+        st[FRESH, s] = 0
+    at = st[BASE, s] + st[BO, s] * p[SLOT_NS]
+    st[SCHEDULED, s] = at
+    push(hs, g, HS_N, at, ACCESS, s, 0)
+
+
+@jit
+def access(
+    g: Ints,
+    p: Ints,
+    pf: Reals,
+    st: Ints,
+    fr: Ints,
+    lk: Ints,
+    lp: Reals,
+    ptr: Ints,
+    hs: Ints,
+    hr: Ints,
+    out: Ints,
+    s: int,
+    t: int,
+) -> None:
+    """The backoff has run out: transmit the first frame that is still alive."""
+    if st[SCHEDULED, s] != t:
+        return  # frozen or planned anew since
+    st[SCHEDULED, s] = -1
+    st[BO, s] = 0
+    st[FRESH, s] = 0
+    st[BASE, s] = t
+    expire(g, p, st, fr, out, s, t)
+    f = st[HEAD, s]
+    if f < 0:
+        return
+    fr[ATTEMPTS, f] += 1
+    begin_tx(g, p, pf, st, fr, lk, lp, ptr, hr, s, f, DATA, t)
+    targets = 0
+    for link in range(ptr[s], ptr[s + 1]):
+        if fr[DST, f] == EVERYONE or fr[DST, f] == lk[LINK_DST, link]:
+            if lp[LINK_POWER, link] > 0.0 and lk[COPY, link] == 1:
+                targets += 1
+            elif lk[FAULT, link] != 0:
+                g[ON_AIR_COPIES] += 1
+                lost(g, fr, lk, lk[FAULT, link], link, f)
+    fr[TARGETS, f] = targets
+    g[ON_AIR_COPIES] += targets
+    if fr[DST, f] != EVERYONE:
+        g[ATTEMPTS_MADE] += 1
+    if p[CAPTURE] == 1:
+        put(g, out, OUT_START, f, s, t, DATA, fr[ATTEMPTS, f])
+
+
+@jit
+def begin_tx(
+    g: Ints,
+    p: Ints,
+    pf: Reals,
+    st: Ints,
+    fr: Ints,
+    lk: Ints,
+    lp: Reals,
+    ptr: Ints,
+    hr: Ints,
+    s: int,
+    f: int,
+    kind: int,
+    t: int,
+) -> None:
+    """A station starts to transmit; whatever it was receiving is lost."""
+    if st[LOCK, s] >= 0:
+        lk[FATE, st[LOCK, s]] = FATE_HALF_DUPLEX
+        st[LOCK, s] = -1
+    on_busy(p, st, s, t)
+    airtime = fr[AIRTIME, f] if kind == DATA else p[ACK_NS]
+    st[TX_KIND, s] = kind
+    st[TX_FRAME, s] = f
+    st[TX_END, s] = t + airtime
+    st[ON_AIR_LIST, g[ON_AIR_N]] = s
+    g[ON_AIR_N] += 1
+    push(hr, g, HR_N, t + airtime, TX_DONE, s, 0)
+    first, last = ptr[s], ptr[s + 1]
+    while last > first and lp[LINK_POWER, last - 1] == 0.0:
+        last -= 1  # cut off
+    for link in range(first, last):
+        lp[ON_AIR, link] = lp[LINK_POWER, link]
+        lk[SENSED, link] = lk[AUDIBLE, link]
+        lk[COPY, link] = lk[AUDIBLE, link]
+        if p[FADING] != 0:
+            lp[ON_AIR, link] *= gain(p, pf, st, s)
+            lk[SENSED, link] = 1 if lp[ON_AIR, link] >= pf[SENSITIVITY_MW] else 0
+            lk[COPY, link] = max(lk[AUDIBLE, link], lk[SENSED, link])
+        lk[FATE, link] = FATE_OPEN
+        lk[LINK_FRAME, link] = f
+        lk[LINK_KIND, link] = kind
+        lk[UNDERWAY, link] = 1
+        lk[BEGINS, link] = t + lk[DELAY, link]
+        lk[ENDS, link] = lk[BEGINS, link] + airtime
+    if first < last:
+        fr[OPEN, f] += last - first
+        push(hr, g, HR_N, lk[BEGINS, first], ALL_START, first, last)
+        push(hr, g, HR_N, lk[BEGINS, first] + p[DETECT_NS], ALL_DETECT, first, last)
+        push(hr, g, HR_N, lk[ENDS, first], ALL_END, first, last)
+
+
+@jit
+def leave_air(g: Ints, st: Ints, s: int, t: int) -> None:
+    """Take a station off the list of those that transmit."""
+    last = g[ON_AIR_N] - 1
+    g[ON_AIR_N] = last
+    g[LAST_END] = t + g[REACH_NS]
+    for i in range(last):
+        if st[ON_AIR_LIST, i] == s:
+            st[ON_AIR_LIST, i] = st[ON_AIR_LIST, last]
+            return
+
+
+@jit
+def tx_done(g: Ints, p: Ints, st: Ints, fr: Ints, hs: Ints, out: Ints, s: int, t: int) -> None:
+    """The last bit has left the antenna."""
+    kind, f = st[TX_KIND, s], st[TX_FRAME, s]
+    st[TX_KIND, s] = NOTHING
+    leave_air(g, st, s, t)
+    if kind == DATA:
+        if fr[DST, f] == EVERYONE:
+            take_head(st, fr, s)
+            draw(st, s)
+            done(g, fr, out, f, DONE_SENT, t)
+        else:
+            st[WAITING, s] = f
+            push(hs, g, HS_N, t + p[ACK_TIMEOUT_NS], ACK_TIMEOUT, s, f)
+    if st[CS, s] == 0:
+        on_idle(g, p, st, hs, s, t)
+
+
+@jit
+def acknowledged(g: Ints, p: Ints, st: Ints, fr: Ints, out: Ints, s: int, t: int) -> None:
+    """The ACK a station waited for."""
+    f = st[WAITING, s]
+    st[WAITING, s] = -1
+    st[CW, s] = p[CW_MIN]
+    take_head(st, fr, s)
+    draw(st, s)
+    done(g, fr, out, f, DONE_ACKED, t)
+
+
+@jit
+def ack_timeout(g: Ints, p: Ints, st: Ints, fr: Ints, lk: Ints, hs: Ints, out: Ints, s: int, f: int, t: int) -> None:
+    """No ACK: another attempt with a doubled window, or the end of it (802.11-2020, 10.3.4.4).
+
+    A frame whose header has been received by now may be the ACK: its end decides (10.3.2.11).
+    """
+    if st[WAITING, s] != f:
+        return
+    link = st[LOCK, s]
+    if link >= 0 and st[LOCK_HEADER_END, s] <= t:
+        push(hs, g, HS_N, lk[ENDS, link] + 1, ACK_TIMEOUT, s, f)
+        return
+    st[WAITING, s] = -1
+    st[RESUME_FROM, s] = t
+    g[ATTEMPTS_FAILED] += 1
+    if fr[ATTEMPTS, f] >= p[MAX_ATTEMPTS]:
+        st[CW, s] = p[CW_MIN]
+        take_head(st, fr, s)
+        done(g, fr, out, f, DONE_RETRY, t)
+    else:
+        g[RETRIES] += 1
+        st[CW, s] = min(2 * st[CW, s] + 1, p[CW_MAX])
+    draw(st, s)
+    arm(g, p, st, hs, s)
+
+
+@jit
+def send_ack(
+    g: Ints,
+    p: Ints,
+    pf: Reals,
+    st: Ints,
+    fr: Ints,
+    lk: Ints,
+    lp: Reals,
+    ptr: Ints,
+    hs: Ints,
+    hr: Ints,
+    out: Ints,
+    s: int,
+    f: int,
+    t: int,
+) -> None:
+    """SIFS after a unicast frame for us: acknowledge, whatever the medium does."""
+    st[ACK_TO, s] = -1
+    if st[TX_KIND, s] == NOTHING:
+        if p[CAPTURE] == 1:
+            put(g, out, OUT_START, f, s, t, ACK, 0)
+        begin_tx(g, p, pf, st, fr, lk, lp, ptr, hr, s, f, ACK, t)
+        release(g, fr, out, f, t)
+        return
+    release(g, fr, out, f, t)
+    if st[CS, s] == 0:
+        arm(g, p, st, hs, s)

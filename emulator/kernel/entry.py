@@ -1,0 +1,71 @@
+"""The way into the compiled kernel, once per wake-up of the medium: one argument in place of fourteen.
+
+At every call numba finds out type, address and shape of every array it is handed; that takes longer than what the
+kernel then does for a frame. So a table says where the arrays are, and they are put together inside. Uncompiled, there
+is no table.
+"""
+
+from collections.abc import Callable
+from functools import partial
+from typing import Any, Final, cast
+
+import numpy as np
+import numpy.typing as npt
+
+from emulator.kernel.jit import COMPILED, jit_views
+from emulator.kernel.kernel import advance
+from emulator.kernel.state import Ints
+
+_ARRAYS: Final = 14
+Array = npt.NDArray[np.int64] | npt.NDArray[np.float64]
+
+
+class Entry:
+    """`kernel.advance` for these arrays, in its order. A replaced array needs a new entry."""
+
+    def __init__(self, *arrays: Array) -> None:
+        self._arrays = arrays  # the table does not keep them alive
+        self.advance: Callable[[int], int]
+        """Until when, in; what `kernel.advance` returns, out."""
+        if COMPILED:
+            assert len(arrays) == _ARRAYS, "as many as the kernel takes"
+            assert all(a.flags.c_contiguous for a in arrays), "inside they are taken for whole rows"
+            self._table = np.array([(a.ctypes.data, a.shape[0], a.shape[-1]) for a in arrays], np.int64)
+            self.advance = partial(advance_at, self._table.ctypes.data)
+        else:
+            self.advance = partial(cast("Callable[..., int]", advance), *arrays)
+
+
+if COMPILED:
+    from numba import carray
+    from numba.core.types import CPointer  # type: ignore[attr-defined]
+    from numba.extending import intrinsic
+
+    @intrinsic  # type: ignore[untyped-decorator]
+    def pointer(_: Any, address: Any, dtype: Any) -> Any:
+        """An address as a pointer to numbers of this kind."""
+
+        def generate(context: Any, builder: Any, signature: Any, arguments: Any) -> Any:
+            return builder.inttoptr(arguments[0], context.get_value_type(signature.return_type))
+
+        return CPointer(dtype.dtype)(address, dtype), generate
+
+    @jit_views
+    def line(table: Ints, i: int, dtype: Any) -> Any:
+        return carray(pointer(table[i, 0], dtype), (table[i, 1],))
+
+    @jit_views
+    def rows(table: Ints, i: int, dtype: Any) -> Any:
+        return carray(pointer(table[i, 0], dtype), (table[i, 1], table[i, 2]))
+
+    @jit_views
+    def advance_at(address: int, until: int) -> int:
+        """`kernel.advance`, its arrays from the table at this address."""
+        ints, reals = np.int64, np.float64
+        table = carray(pointer(address, ints), (_ARRAYS, 3))
+        return advance(
+            line(table, 0, ints), line(table, 1, ints), line(table, 2, reals), rows(table, 3, ints),
+            rows(table, 4, reals), rows(table, 5, ints), rows(table, 6, ints), rows(table, 7, reals),
+            line(table, 8, ints), rows(table, 9, ints), rows(table, 10, ints), rows(table, 11, ints),
+            rows(table, 12, ints), rows(table, 13, reals), until,
+        )  # fmt: skip

@@ -1,0 +1,300 @@
+"""The event loop of the emulated air: two heaps merged in (t, seq) order until an instant. Sans-IO, integer ns.
+
+`advance` is one call for any number of internal events. It returns early only when its output rows or a heap run
+short of room; the caller drains, makes room and calls again.
+"""
+
+from emulator.kernel.backoff import slots_left
+from emulator.kernel.dcf import access, ack_timeout, arrive, send_ack, tx_done
+from emulator.kernel.heap import pop, push
+from emulator.kernel.jit import jit
+from emulator.kernel.phy import rx_detect, rx_end, rx_start
+from emulator.kernel.state import (
+    ACCESS,
+    ACK_NS,
+    ACK_TIMEOUT,
+    AIRTIME,
+    ALL_DETECT,
+    ALL_END,
+    ALL_START,
+    ARRIVE,
+    ASKED_N,
+    BEGINS,
+    BORN,
+    DETECT_NS,
+    DIFS_FIRST,
+    DIFS_NS,
+    DST,
+    ENDS,
+    FRAME_ROWS,
+    HEAD,
+    HEADER_NS,
+    HR_N,
+    HS_N,
+    LAST_END,
+    LIFETIME_NS,
+    LINK_ROWS,
+    NEVER,
+    NEXT,
+    NOTHING,
+    NOW,
+    ON_AIR_LIST,
+    ON_AIR_N,
+    OPEN,
+    OUT_N,
+    QUEUE_LIMIT,
+    REACH_NS,
+    RX_DETECT,
+    RX_END,
+    RX_START,
+    SCHEDULED,
+    SEND_ACK,
+    SENSED,
+    SRC,
+    TX_DONE,
+    TX_END,
+    TX_KIND,
+    UNDERWAY,
+    WAITING,
+    WANTS_STATUS,
+    Ints,
+    Reals,
+)
+
+MARGIN = 16
+"""Rows that one event may need in the start heap."""
+AT_ONCE = 4
+"""Receivers that one event handles; each may plan two starts, and all of them must find room."""
+_FEW = 128
+"""Planned starts that are worth looking at one by one."""
+
+
+@jit
+def take_in(g: Ints, p: Ints, st: Ints, fr: Ints, hs: Ints, asked: Ints, bound: int) -> int:
+    """Plan the frames asked for; returns the bound of the next output, from that before. The start heap has room."""
+    for i in range(g[ASKED_N]):
+        f, src, airtime, t = asked[i, 0], asked[i, 1], asked[i, 3], asked[i, 4]
+        for row in range(FRAME_ROWS):
+            fr[row, f] = 0
+        fr[SRC, f] = src
+        fr[DST, f] = asked[i, 2]
+        fr[AIRTIME, f] = airtime
+        fr[BORN, f] = t
+        fr[NEXT, f] = -1
+        fr[OPEN, f] = 1
+        fr[WANTS_STATUS, f] = asked[i, 5]
+        push(hs, g, HS_N, t, ARRIVE, f, 0)
+        bound = min(bound, t + airtime + first_wait(p, st, src, t) + g[REACH_NS])
+    g[ASKED_N] = 0
+    return int(bound)
+
+
+@jit
+def first_wait(p: Ints, st: Ints, s: int, t: int) -> int:
+    """How long at least a frame that is queued at `t` waits, unless a frame of another station ends before."""
+    if p[DIFS_FIRST] == 0 or st[HEAD, s] >= 0 or st[TX_KIND, s] != NOTHING:
+        return 0
+    return int(p[DIFS_NS]) if slots_left(p, st, s, t) == 0 else 0
+
+
+@jit
+def purge(g: Ints, st: Ints, hs: Ints) -> None:
+    """Take stale access events out of the start heap."""
+    n = g[HS_N]
+    g[HS_N] = 0
+    for i in range(n):
+        kind, a = hs[i, 2], hs[i, 3]
+        if kind == ACCESS and st[SCHEDULED, a] != hs[i, 0]:
+            continue
+        j = g[HS_N]  # keep (t, seq): the order among equals must not change
+        g[HS_N] = j + 1
+        t, seq, b = hs[i, 0], hs[i, 1], hs[i, 4]
+        while j > 0:
+            up = (j - 1) >> 1
+            if hs[up, 0] < t or (hs[up, 0] == t and hs[up, 1] < seq):
+                break
+            for column in range(5):
+                hs[j, column] = hs[up, column]
+            j = up
+        hs[j, 0], hs[j, 1], hs[j, 2], hs[j, 3], hs[j, 4] = t, seq, kind, a, b
+
+
+@jit
+def next_output(g: Ints, p: Ints, st: Ints, fr: Ints, hs: Ints) -> int:
+    """A lower bound of the instant of the next reception or ACK; NEVER when nothing is under way.
+
+    Frames on the air end when they end at their last receiver; others cannot end before they can start, plus their
+    airtime: looked at one by one while few are planned (of those that count, the parents in the heap count too), else
+    that of a bare header. Then a status of failure may be told a header late.
+    """
+    bound = NEVER
+    for i in range(g[ON_AIR_N]):
+        bound = min(bound, st[TX_END, st[ON_AIR_LIST, i]] + g[REACH_NS])
+    if g[LAST_END] > g[NOW]:
+        bound = min(bound, g[LAST_END])
+    if g[HS_N] > _FEW:
+        return int(min(bound, hs[0, 0] + p[HEADER_NS]))
+    latest = i = 0
+    while i < g[HS_N] and (i - 1) >> 1 <= latest:
+        if hs[i, 0] < bound:
+            bound = min(bound, earliest_end(g, p, st, fr, hs[i, 0], hs[i, 2], hs[i, 3], hs[i, 4]))
+            latest = i
+        i += 1
+    return int(bound)
+
+
+@jit
+def earliest_end(g: Ints, p: Ints, st: Ints, fr: Ints, t: int, kind: int, a: int, b: int) -> int:
+    """When the frame that an event may start can have ended at its last receiver, at the earliest."""
+    if kind == ARRIVE:
+        return int(t + fr[AIRTIME, a] + first_wait(p, st, fr[SRC, a], t) + g[REACH_NS])
+    if kind == SEND_ACK:
+        return int(t + p[ACK_NS] + g[REACH_NS])
+    if kind == ACK_TIMEOUT:
+        return int(t) if st[WAITING, a] == b else NEVER
+    if st[SCHEDULED, a] != t or st[HEAD, a] < 0:
+        return NEVER
+    f = st[HEAD, a]
+    return int(t) if t - fr[BORN, f] >= p[LIFETIME_NS] else int(t + fr[AIRTIME, f] + g[REACH_NS])
+
+
+@jit
+def advance(  # noqa: C901  (one dispatch; splitting it would only move the branches)
+    g: Ints, p: Ints, pf: Reals, st: Ints, sf: Reals, fr: Ints, lk: Ints, lp: Reals, ptr: Ints, hs: Ints, hr: Ints,
+    asked: Ints, out: Ints, err: Reals, until: int,
+) -> int:  # fmt: skip
+    """Take in what was asked for, and process every event up to and including `until`; returns `next_output`.
+
+    `out` begins anew with every call. -1: there is no room; take what is in `out`, make some, and call again.
+    """
+    g[OUT_N] = 0
+    if g[HS_N] + g[ASKED_N] + MARGIN > hs.shape[0]:
+        return -1
+    take_in(g, p, st, fr, hs, asked, NEVER)
+    room = out.shape[0] - 2 * p[QUEUE_LIMIT] - 8  # one event may expire a whole queue
+    while True:
+        if g[OUT_N] >= room:
+            return -1
+        if g[HS_N] + MARGIN > hs.shape[0]:
+            purge(g, st, hs)
+            if g[HS_N] + MARGIN > hs.shape[0]:
+                return -1
+        starts = hs[0, 0] if g[HS_N] > 0 else NEVER
+        ends = hr[0, 0] if g[HR_N] > 0 else NEVER
+        if starts > until and ends > until:
+            g[NOW] = until
+            return next_output(g, p, st, fr, hs)
+        if starts < ends or (starts == ends and hs[0, 1] < hr[0, 1]):
+            kind, a, b = hs[0, 2], hs[0, 3], hs[0, 4]
+            pop(hs, g, HS_N)
+            if kind == ACCESS:
+                access(g, p, pf, st, fr, lk, lp, ptr, hs, hr, out, a, starts)
+            elif kind == ARRIVE:
+                arrive(g, p, st, fr, hs, out, a, starts)
+            elif kind == SEND_ACK:
+                send_ack(g, p, pf, st, fr, lk, lp, ptr, hs, hr, out, a, b, starts)
+            elif kind == ACK_TIMEOUT:
+                ack_timeout(g, p, st, fr, lk, hs, out, a, b, starts)
+        else:
+            kind, a, b = hr[0, 2], hr[0, 3], hr[0, 4]
+            pop(hr, g, HR_N)
+            if kind == RX_START:
+                rx_start(p, pf, st, sf, lk, lp, err, a, ends)
+            elif kind == RX_DETECT:
+                rx_detect(p, pf, st, sf, lk, lp, a, ends)
+            elif kind == RX_END:
+                rx_end(g, p, pf, st, sf, fr, lk, lp, hs, out, err, a, ends)
+            elif kind == TX_DONE:
+                tx_done(g, p, st, fr, hs, out, a, ends)
+            else:
+                spread(g, p, pf, st, sf, fr, lk, lp, hs, hr, out, err, kind, a, b, ends)
+
+
+@jit
+def spread(
+    g: Ints, p: Ints, pf: Reals, st: Ints, sf: Reals, fr: Ints, lk: Ints, lp: Reals, hs: Ints, hr: Ints, out: Ints,
+    err: Reals, kind: int, link: int, end: int, t: int,
+) -> None:  # fmt: skip
+    """One moment of a frame at its receivers, `link` to `end` - 1: at those it reaches now, then at the next ones."""
+    until = min(end, link + AT_ONCE)
+    while link < until and moment(p, lk, kind, link) == t:
+        if kind == ALL_START:
+            rx_start(p, pf, st, sf, lk, lp, err, link, t)
+        elif kind == ALL_DETECT:
+            rx_detect(p, pf, st, sf, lk, lp, link, t)
+        else:
+            rx_end(g, p, pf, st, sf, fr, lk, lp, hs, out, err, link, t)
+        link += 1
+    if link < end:
+        push(hr, g, HR_N, moment(p, lk, kind, link), kind, link, end)
+
+
+@jit
+def moment(p: Ints, lk: Ints, kind: int, link: int) -> int:
+    """When the frame on a link begins, is detected or ends at its receiver."""
+    if kind == ALL_END:
+        return int(lk[ENDS, link])
+    return int(lk[BEGINS, link] + (p[DETECT_NS] if kind == ALL_DETECT else 0))
+
+
+@jit
+def scatter(g: Ints, p: Ints, lk: Ints, hr: Ints) -> None:
+    """Replace each event on many links by one on each: the links are about to change."""
+    i = 0
+    while i < g[HR_N]:
+        kind, first, end = hr[i, 2], hr[i, 3], hr[i, 4]
+        if kind < ALL_START:
+            i += 1
+            continue
+        single = kind - ALL_START + RX_START
+        hr[i, 2], hr[i, 4] = single, 0
+        for link in range(first + 1, end):
+            push(hr, g, HR_N, moment(p, lk, kind, link), single, link, 0)
+        i = 0  # rows have moved
+
+
+@jit
+def relink(  # noqa: C901  (one pass over what is under way)
+    hr: Ints, g: Ints, lk: Ints, lp: Reals, ptr: Ints, lock: Ints, new_lk: Ints, new_lp: Reals, new_ptr: Ints
+) -> int:  # fmt: skip
+    """Carry what is under way on the old links over to the new ones.
+
+    `new_lk` has room for every old link behind its `new_ptr[-1]` links: a frame that was under way on a link which is
+    gone ends on an orphan there. Returns how many links are in use. `lock` is the LOCK row of the stations.
+    """
+    used = new_ptr[new_ptr.shape[0] - 1]
+    for old in range(lk.shape[1]):
+        if lk[UNDERWAY, old] == 0:
+            continue
+        src, dst = lk[0, old], lk[1, old]
+        target = -1
+        if src >= 0:
+            for link in range(new_ptr[src], new_ptr[src + 1]):
+                if new_lk[1, link] == dst and new_lk[UNDERWAY, link] == 0:
+                    target = link
+                    break
+        if target < 0:
+            target = used
+            used += 1
+            for row in range(LINK_ROWS):
+                new_lk[row, target] = lk[row, old]
+        else:
+            for row in range(SENSED, LINK_ROWS):
+                new_lk[row, target] = lk[row, old]
+        new_lp[1, target] = lp[1, old]
+        new_lp[2, target] = lp[2, old] if target >= new_ptr[new_ptr.shape[0] - 1] else new_lp[2, target]
+        for i in range(g[HR_N]):
+            if hr[i, 2] != TX_DONE and hr[i, 3] == old and hr[i, 4] == 0:
+                hr[i, 3] = target
+                hr[i, 4] = 1  # moved: do not move it again
+        if lock[dst] == old:
+            lock[dst] = -2 - target
+    for i in range(g[HR_N]):
+        hr[i, 4] = 0
+    for s in range(lock.shape[0]):
+        if lock[s] < -1:
+            lock[s] = -2 - lock[s]
+    return int(used)
+
+
+__all__ = ["advance", "next_output", "purge", "relink", "scatter", "take_in"]

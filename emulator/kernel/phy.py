@@ -1,0 +1,305 @@
+"""What a station's receiver makes of overlapping frames: detection, interference, success; as functions over rows.
+
+    frame begins -> detected after 4 us if nothing drowns it -> received while interference allows -> decoded or lost
+
+A frame is sensed from its detection on. A receiver stays with the frame it detected first, unless TAKE_OVER = 1 and
+a later one, whose preamble stands out of everything else, is TAKE_OVER_RATIO times as strong: then the first is lost.
+With INTERFERENCE = 0 any overlap destroys; with 1 the loss of each segment follows from its SINR.
+"""
+
+import math
+
+from emulator.chance import MODULUS, uniform
+from emulator.kernel.backoff import on_busy, on_idle
+from emulator.kernel.dcf import acknowledged
+from emulator.kernel.ending import lost, put, release
+from emulator.kernel.heap import push
+from emulator.kernel.jit import jit
+from emulator.kernel.state import (
+    ACK,
+    ACK_NS,
+    ACK_TO,
+    BAD_UNTIL,
+    BEFORE_SEEKING,
+    BEGINS,
+    CHANGED_AT,
+    COPY,
+    CS,
+    DATA,
+    DETECT_NS,
+    DETECT_RATIO,
+    DST,
+    EIFS_EXTRA_NS,
+    ENDS,
+    ENERGY,
+    EVERYONE,
+    EXTENSION_NS,
+    FATE,
+    FATE_COLLISION,
+    FATE_HALF_DUPLEX,
+    FATE_OPEN,
+    FATE_WEAK,
+    FAULT,
+    FAULT_RANDOM,
+    HANDED,
+    HEADER_BITS_PER_NS,
+    HEADER_NS,
+    HS_N,
+    INTERFERENCE,
+    LINK_DST,
+    LINK_FRAME,
+    LINK_KIND,
+    LINK_SRC,
+    LOCK,
+    LOCK_DATA_END,
+    LOCK_FROM,
+    LOCK_HEADER_END,
+    LOCK_RATE,
+    LOG_OK,
+    N_RECEIVED,
+    NAV,
+    NEVER,
+    NOISE,
+    NOTHING,
+    NSIG,
+    ON_AIR,
+    OPEN,
+    OUT_N,
+    OUT_RECEPTION,
+    OVERLAPPED,
+    OVERSEEN,
+    OVERSEES,
+    POWER,
+    RANDOM,
+    RECEIVED,
+    RECEIVED_COPIES,
+    RSSI_SUM,
+    SEEKING_UNTIL,
+    SEND_ACK,
+    SENSED,
+    SENSES_SUMS,
+    SENSITIVITY_MW,
+    SIFS_NS,
+    SPARED,
+    TAKE_OVER,
+    TAKE_OVER_RATIO,
+    TX_KIND,
+    UNDERWAY,
+    WAITING,
+    Ints,
+    Reals,
+)
+
+ERROR_FLOOR_DB = -20.0
+ERROR_STEPS_PER_DB = 20.0
+
+
+@jit
+def close_segment(p: Ints, pf: Reals, st: Ints, sf: Reals, lp: Reals, err: Reals, r: int, t: int) -> None:
+    """Account for the part of the locked frame since the last change of interference."""
+    begin = st[LOCK_FROM, r]
+    st[LOCK_FROM, r] = t
+    if p[INTERFERENCE] == 0 or t <= begin:
+        return
+    wanted = lp[ON_AIR, st[LOCK, r]]
+    unwanted = max(0.0, sf[POWER, r] - wanted - sf[OVERSEEN, r])
+    sinr_db = 10.0 * math.log10(wanted / (unwanted + sf[NOISE, r]))
+    at = int((sinr_db - ERROR_FLOOR_DB) * ERROR_STEPS_PER_DB)
+    at = max(0, min(err.shape[1] - 1, at))
+    until = min(t, st[LOCK_DATA_END, r])
+    header_ns = max(0, min(until, st[LOCK_HEADER_END, r]) - begin)
+    sf[LOG_OK, r] += header_ns * pf[HEADER_BITS_PER_NS] * err[0, at]
+    rate = st[LOCK_RATE, r]
+    sf[LOG_OK, r] += max(0, until - begin - header_ns) * pf[HEADER_BITS_PER_NS + rate] * err[rate, at]
+
+
+@jit
+def rx_start(p: Ints, pf: Reals, st: Ints, sf: Reals, lk: Ints, lp: Reals, err: Reals, link: int, t: int) -> None:
+    """The first bit of a frame reaches a station."""
+    r = lk[LINK_DST, link]
+    if st[LOCK, r] >= 0:
+        close_segment(p, pf, st, sf, lp, err, r, t)
+        sf[OVERSEEN, r] = 0.0
+        st[OVERLAPPED, r] = 1
+    elif p[OVERSEES] == 1:
+        seek(p, st, sf, r, t)
+    st[NSIG, r] += 1
+    sf[POWER, r] += lp[ON_AIR, link]
+    st[CHANGED_AT, r] = t
+
+
+@jit
+def seek(p: Ints, st: Ints, sf: Reals, r: int, t: int) -> None:
+    """A signal opens a window in which its preamble is looked for; what was on the air before the first of several?
+
+    ns-3.44 (InterferenceHelper over YansWifiPhy) takes that as the interference with which the frame that it finds
+    begins: a weaker signal that came less than a window before it does no harm until the power changes again.
+    """
+    if t >= st[SEEKING_UNTIL, r]:
+        sf[BEFORE_SEEKING, r] = sf[POWER, r]
+    if st[TX_KIND, r] == NOTHING:
+        st[SEEKING_UNTIL, r] = t + p[DETECT_NS]
+
+
+@jit
+def rx_detect(p: Ints, pf: Reals, st: Ints, sf: Reals, lk: Ints, lp: Reals, link: int, t: int) -> None:
+    """The preamble has been there long enough to be found, and the energy to be sensed."""
+    r = lk[LINK_DST, link]
+    audible = lk[SENSED, link] == 1
+    if audible:
+        busier(p, st, r, t)
+    if p[SENSES_SUMS] == 1 and st[ENERGY, r] == 0 and sf[POWER, r] >= pf[SENSITIVITY_MW]:
+        st[ENERGY, r] = 1
+        busier(p, st, r, t)
+    wanted = lp[ON_AIR, link]
+    if p[INTERFERENCE] == 0:
+        clear = st[NSIG, r] == 1
+    else:
+        clear = wanted >= pf[DETECT_RATIO] * (max(0.0, sf[POWER, r] - wanted) + sf[NOISE, r])
+    if st[TX_KIND, r] != NOTHING:
+        lk[FATE, link] = FATE_HALF_DUPLEX
+    elif not audible:
+        lk[FATE, link] = FATE_WEAK
+    elif not clear or (st[LOCK, r] >= 0 and not captures(p, pf, st, lp, r, wanted)):
+        lk[FATE, link] = FATE_COLLISION if st[NSIG, r] > 1 else FATE_WEAK
+    else:
+        if st[LOCK, r] >= 0:
+            lk[FATE, st[LOCK, r]] = FATE_COLLISION
+        st[LOCK, r] = link
+        st[LOCK_FROM, r] = t
+        st[LOCK_HEADER_END, r] = t - p[DETECT_NS] + p[HEADER_NS]
+        st[LOCK_RATE, r] = 2 if lk[LINK_KIND, link] == ACK else 1
+        st[LOCK_DATA_END, r] = NEVER
+        if p[EXTENSION_NS] > 0:
+            st[LOCK_DATA_END, r] = lk[ENDS, link] - p[EXTENSION_NS]
+        st[OVERLAPPED, r] = 1 if st[NSIG, r] > 1 else 0
+        sf[LOG_OK, r] = 0.0
+        sf[OVERSEEN, r] = 0.0
+        if p[OVERSEES] == 1 and st[CHANGED_AT, r] == lk[BEGINS, link]:
+            sf[OVERSEEN, r] = sf[POWER, r] - wanted - sf[BEFORE_SEEKING, r]
+
+
+@jit
+def busier(p: Ints, st: Ints, r: int, t: int) -> None:
+    """One more reason to call the medium busy."""
+    st[CS, r] += 1
+    if st[CS, r] == 1 and st[TX_KIND, r] == NOTHING:
+        on_busy(p, st, r, t)
+
+
+@jit
+def quieter(g: Ints, p: Ints, st: Ints, hs: Ints, r: int, t: int) -> None:
+    """One reason less."""
+    st[CS, r] -= 1
+    if st[CS, r] == 0 and st[TX_KIND, r] == NOTHING:
+        on_idle(g, p, st, hs, r, t)
+
+
+@jit
+def captures(p: Ints, pf: Reals, st: Ints, lp: Reals, r: int, wanted: float) -> bool:
+    """Whether a later frame takes a receiver away from the frame it is locked on (message in message)."""
+    return bool(p[TAKE_OVER] == 1 and wanted >= pf[TAKE_OVER_RATIO] * lp[ON_AIR, st[LOCK, r]])
+
+
+@jit
+def survived(p: Ints, st: Ints, sf: Reals, r: int) -> bool:
+    """Whether the locked frame came through whole."""
+    if p[INTERFERENCE] == 0:
+        return bool(st[OVERLAPPED, r] == 0)
+    if sf[LOG_OK, r] > -1e-9:
+        return True
+    return bool(uniform(st, RANDOM, r) / MODULUS < math.exp(sf[LOG_OK, r]))
+
+
+@jit
+def spared(st: Ints, lp: Reals, r: int, link: int) -> bool:
+    """Whether the fault on a link lets a frame through that was otherwise received."""
+    share = lp[SPARED, link]
+    if share >= 1.0 or share <= 0.0:
+        return bool(share >= 1.0)
+    return bool(uniform(st, FAULT_RANDOM, r) / MODULUS < share)
+
+
+@jit
+def rx_end(
+    g: Ints,
+    p: Ints,
+    pf: Reals,
+    st: Ints,
+    sf: Reals,
+    fr: Ints,
+    lk: Ints,
+    lp: Reals,
+    hs: Ints,
+    out: Ints,
+    err: Reals,
+    link: int,
+    t: int,
+) -> None:
+    """The last bit of a frame reaches a station."""
+    r = lk[LINK_DST, link]
+    whole = False
+    if st[LOCK, r] >= 0:
+        close_segment(p, pf, st, sf, lp, err, r, t)
+        sf[OVERSEEN, r] = 0.0
+    st[CHANGED_AT, r] = t
+    if st[LOCK, r] == link:
+        st[LOCK, r] = -1
+        whole = survived(p, st, sf, r)
+        if not whole:
+            lk[FATE, link] = FATE_COLLISION if st[OVERLAPPED, r] == 1 else FATE_WEAK
+        elif lk[FAULT, link] != 0 and not spared(st, lp, r, link):
+            whole = False
+            lk[FATE, link] = lk[FAULT, link]
+        st[BAD_UNTIL, r] = 0 if whole else t + p[EIFS_EXTRA_NS]
+    st[NSIG, r] -= 1
+    sf[POWER, r] = 0.0 if st[NSIG, r] == 0 else sf[POWER, r] - lp[ON_AIR, link]
+    lk[UNDERWAY, link] = 0
+    if lk[LINK_KIND, link] == DATA:
+        data_end(g, p, st, fr, lk, lp, hs, out, link, whole, t)
+    elif whole and lk[LINK_KIND, link] == ACK and st[WAITING, r] == lk[LINK_FRAME, link]:
+        acknowledged(g, p, st, fr, out, r, t)
+    if lk[SENSED, link] == 1:
+        quieter(g, p, st, hs, r, t)
+    if st[ENERGY, r] == 1 and sf[POWER, r] < pf[SENSITIVITY_MW]:
+        st[ENERGY, r] = 0
+        quieter(g, p, st, hs, r, t)
+    release(g, fr, out, lk[LINK_FRAME, link], t)
+
+
+@jit
+def repeats(g: Ints, out: Ints, f: int, t: int, millidbm: int) -> int:
+    """Whether the row before says the same of another station: then there is one message for both."""
+    n = g[OUT_N] - 1
+    return int(n >= 0 and out[n, 0] == OUT_RECEPTION and out[n, 1] == f and out[n, 3] == t and out[n, 4] == millidbm)
+
+
+@jit
+def data_end(
+    g: Ints, p: Ints, st: Ints, fr: Ints, lk: Ints, lp: Reals, hs: Ints, out: Ints, link: int, whole: bool, t: int
+) -> None:
+    """A data frame has ended at a station: hand it up, acknowledge it, or count why not."""
+    r, f = lk[LINK_DST, link], lk[LINK_FRAME, link]
+    ours = fr[DST, f] == EVERYONE or fr[DST, f] == r
+    if whole and not ours:
+        st[NAV, r] = max(st[NAV, r], t + p[SIFS_NS] + p[ACK_NS])
+    if not ours or lk[COPY, link] == 0:
+        return
+    if not whole:
+        fate = lk[FATE, link]
+        if fate in (FATE_WEAK, FATE_OPEN):
+            fate = lk[FAULT, link] if lk[FAULT, link] != 0 else FATE_WEAK
+        lost(g, fr, lk, fate, link, f)
+        return
+    millidbm = int(10_000.0 * math.log10(lp[ON_AIR, link]))
+    g[RECEIVED_COPIES] += 1
+    lk[N_RECEIVED, link] += 1
+    lk[RSSI_SUM, link] += millidbm
+    if fr[DST, f] == EVERYONE or fr[RECEIVED, f] == 0:
+        fr[RECEIVED, f] += 1
+        st[HANDED, r] += 1
+        put(g, out, OUT_RECEPTION, f, r, t, millidbm, repeats(g, out, f, t, millidbm))
+    if fr[DST, f] == r:
+        st[ACK_TO, r] = lk[LINK_SRC, link]
+        push(hs, g, HS_N, t + p[SIFS_NS], SEND_ACK, r, f)
+        fr[OPEN, f] += 1  # the ACK to come refers to it

@@ -1,0 +1,40 @@
+"""Worst-case delay: the paper's estimate, and bounds that hold. Pure functions of integer nanoseconds.
+
+`paper` is equations (1)-(4) to the letter, for comparison; `slot` is one head's slot, `turns` single turns of a
+superframe; `arrivals` and `network` are the parts of network calculus that bound queues fed by bursts; `tandem` joins
+hops; `access` is the way to the head below.
+"""
+
+from fanet_mw.bounds.access import Contention, Dcf, access_bound, guard_ns
+from fanet_mw.bounds.arrivals import Arrivals, Limited, Periodic, Total, token_bucket
+from fanet_mw.bounds.network import backlog, delay_any_order, delay_fifo
+from fanet_mw.bounds.outcome import Bounded, Outcome, Refused
+from fanet_mw.bounds.slot import Server, SlotServer, single_slot_bound
+from fanet_mw.bounds.tandem import Flow, Hop, ordered_tandem, path_bounds
+from fanet_mw.bounds.turn_gaps import TurnServer
+
+__all__ = [
+    "Arrivals",
+    "Bounded",
+    "Contention",
+    "Dcf",
+    "Flow",
+    "Hop",
+    "Limited",
+    "Outcome",
+    "Periodic",
+    "Refused",
+    "Server",
+    "SlotServer",
+    "Total",
+    "TurnServer",
+    "access_bound",
+    "backlog",
+    "delay_any_order",
+    "delay_fifo",
+    "guard_ns",
+    "ordered_tandem",
+    "path_bounds",
+    "single_slot_bound",
+    "token_bucket",
+]

@@ -1,0 +1,138 @@
+"""Delay and backlog of one head's queue: horizontal and vertical deviation of arrival and service curve.
+
+A busy period begins with a packet that finds the queue empty. Its q-th packet arrives span(q) later at the earliest and
+is through completion(q) later at the latest, so its delay is at most completion(q) - span(q) (Le Boudec & Thiran,
+theorem 1.4.2, for staircases). The period is over with the first Q for which completion(Q) <= span(Q+1): a further
+packet finds the queue empty. All q up to Q are examined, not only the first (Davis et al. 2007).
+
+At a load of exactly one the period may never end. Then the spans are examined until they repeat; where they are not
+known to, or the period is longer than the limit, the affine bound T + burst / R answers: looser, and still sound.
+"""
+
+from fractions import Fraction
+from itertools import islice
+from math import ceil, lcm
+from typing import Final
+
+from fanet_mw.bounds.arrivals import Arrivals, Periodic
+from fanet_mw.bounds.outcome import Bounded, Outcome, Refused
+from fanet_mw.bounds.slot import Server
+
+_PACKETS_EXAMINED: Final = 100_000
+
+
+def load(arrivals: Arrivals, server: Server) -> Fraction:
+    """Packets that arrive in one period, over packets that its slot holds; stable up to 1."""
+    return arrivals.rate * server.period_ns / server.frames
+
+
+def refusal(arrivals: Arrivals, server: Server) -> Refused | None:
+    """Why there is no bound, or None."""
+    server.check()
+    if not server.frames:
+        return Refused(f"no frame ever fits {server}")
+    if load(arrivals, server) > 1:
+        return Refused(
+            f"unstable: {server.frames} frames fit a slot every {server.period_ns / 1e6:g} ms, "
+            f"{float(arrivals.rate * server.period_ns):.3f} arrive"
+        )
+    return None
+
+
+def delay_fifo(arrivals: Arrivals, server: Server) -> Outcome:
+    """The worst delay [ns] of any packet of the aggregate, first come first served; arrival to end of airtime."""
+    refused = refusal(arrivals, server)
+    if refused is not None:
+        return refused
+    examined = _busy_period(arrivals, server)
+    if examined is None:
+        return Bounded(_affine_ns(arrivals, server))
+    return Bounded(max(server.completion_ns(q) - span_ns for q, span_ns in enumerate(examined, start=1)))
+
+
+def backlog(arrivals: Arrivals, server: Server) -> int | Refused:
+    """The most packets in the queue at once, the one on the air included: what the queue's bound must hold."""
+    refused = refusal(arrivals, server)
+    if refused is not None:
+        return refused
+    examined = _busy_period(arrivals, server)
+    if examined is None:
+        return ceil(arrivals.burst + arrivals.rate * server.latency_ns)
+    return max(q - server.served(span_ns) for q, span_ns in enumerate(examined, start=1))
+
+
+def delay_any_order(flow: Periodic, cross: Arrivals, server: Server, *, blocking: int = 0) -> Outcome:
+    """The worst delay of `flow`'s packets when the head may send `cross` first as it likes (priorities, any order).
+
+    With priorities, `cross` is what is as urgent or more, and `blocking` the frames of the longest less urgent packet:
+    one may have begun just before, and whole frames are not taken back.
+
+    Blind multiplexing: the slot is a strict service curve, so what the cross traffic leaves is one for the flow (Le
+    Boudec & Thiran, theorem 6.2.1): the q-th packet is through at the first w with w >= completion(q + cross(w)).
+    Packets of the flow itself stay in order.
+    """
+    worst_ns = 0
+    both = flow.rate + cross.rate
+    server.check()
+    if not server.frames or both * server.period_ns >= server.frames:
+        return Refused(
+            f"unstable or full: {server.frames} frames fit a slot every {server.period_ns / 1e6:g} ms, "
+            f"{float(both * server.period_ns):.3f} arrive; any order needs less than a full slot"
+        )
+    before = _Counter(cross)
+    for q, span_ns in enumerate(flow.spans(), start=1):
+        w_ns = server.completion_ns(q + blocking)
+        while w_ns < (through_ns := server.completion_ns(q + blocking + before.within(w_ns))):
+            w_ns = through_ns
+        worst_ns = max(worst_ns, w_ns - span_ns)
+        if w_ns <= max(0, q * flow.interval_ns - flow.jitter_ns):
+            return Bounded(worst_ns)
+        if q + before.seen > _PACKETS_EXAMINED:
+            break
+    return Refused(f"the busy period is longer than {_PACKETS_EXAMINED} packets")
+
+
+class _Counter:
+    """How many packets a window holds, for windows that only grow."""
+
+    def __init__(self, arrivals: Arrivals) -> None:
+        self._spans = arrivals.spans()
+        self._next_ns = next(self._spans, None)
+        self.seen = 0
+
+    def within(self, window_ns: int) -> int:
+        while self._next_ns is not None and self._next_ns <= window_ns:
+            self.seen += 1
+            self._next_ns = next(self._spans, None)
+        return self.seen
+
+
+def _busy_period(arrivals: Arrivals, server: Server) -> list[int] | None:
+    """The spans of the longest busy period, or until they repeat; None when that is too long to examine."""
+    horizon_ns = _horizon_ns(arrivals, server)
+    if horizon_ns is None and load(arrivals, server) == 1:
+        return None
+    if not arrivals.rate:
+        return [0]
+    examined: list[int] = []
+    for span_ns in islice(arrivals.spans(), _PACKETS_EXAMINED):
+        if examined and server.completion_ns(len(examined)) <= span_ns:
+            return examined
+        examined.append(span_ns)
+        if horizon_ns is not None and span_ns > horizon_ns:
+            return examined
+    return None
+
+
+def _horizon_ns(arrivals: Arrivals, server: Server) -> int | None:
+    """Beyond this span completion and arrivals both repeat, and no new maximum comes."""
+    pattern = arrivals.repeat()
+    if pattern is None:
+        return None
+    onset_ns, length_ns = pattern
+    return onset_ns + 2 * lcm(length_ns, server.period_ns)
+
+
+def _affine_ns(arrivals: Arrivals, server: Server) -> int:
+    """T + burst / R: token bucket against rate-latency server (Le Boudec & Thiran, 1.4.1)."""
+    return ceil(server.latency_ns + arrivals.burst * Fraction(server.period_ns, server.frames))

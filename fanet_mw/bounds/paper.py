@@ -1,0 +1,69 @@
+"""Equations (1)-(4) of the paper, Section 3.3, to the letter: an estimate, not a bound. Kept to compare with.
+
+w(q) = ceil((q b/R) / S) p_c                              (4)    S = ((b/R)/p) p_c unless a slot is given
+WD_c = max over q = 1..Q of w(q) - (q-1) p                (2, 3) Q: the first integer with w(Q) <= Q p
+WD   = sum of WD_c over the clusters c on the path        (1)
+
+Here C = b/R is `airtime_ns`, p `interval_ns`, p_c `period_ns`, S `slot_ns`. What (4) gets wrong: it lets a slot serve
+fractions of a packet, so slots that are no multiple of C look larger than they are; it counts from the beginning of a
+period, so a packet that just missed its slot waits longer than w(1) says; it takes arrivals at every hop as periodic.
+When C p_c > S p no Q exists: the equations give no number, and neither do we. With the paper's own S, C p_c = S p
+always, so they accept any load, even one packet longer than the period.
+"""
+
+from collections.abc import Iterable
+from fractions import Fraction
+from math import ceil, floor
+from typing import Final
+
+from fanet_mw.bounds.outcome import Bounded, Outcome, Refused
+from fanet_mw.errors import LocalProtocolError
+
+_SLOTS_EXAMINED: Final = 1_000_000
+
+
+def paper_slot(*, airtime_ns: int, interval_ns: int, period_ns: int) -> Fraction:
+    """S = ((b/R)/p) p_c [ns], a fraction: it just holds the packets of one period."""
+    return Fraction(airtime_ns * period_ns, interval_ns)
+
+
+def w_ns(q: int, *, airtime_ns: int, slot_ns: Fraction | int, period_ns: int) -> int:
+    """Equation (4): when the q-th packet is through."""
+    return ceil(Fraction(q * airtime_ns) / slot_ns) * period_ns
+
+
+def cluster_estimate(*, airtime_ns: int, slot_ns: Fraction | int | None, period_ns: int, interval_ns: int) -> Outcome:
+    """WD_c of equation (3); `slot_ns` None takes the paper's own S.
+
+    All q with the same ceiling share w(q), so only the first of each is examined: the rest are smaller by multiples
+    of p. Refused when no Q exists, or when the busy period is longer than a million slots.
+    """
+    if min(airtime_ns, period_ns, interval_ns) <= 0 or (slot_ns is not None and slot_ns <= 0):
+        raise LocalProtocolError(f"{airtime_ns=} {slot_ns=} {period_ns=} {interval_ns=} must all be > 0")
+    own = paper_slot(airtime_ns=airtime_ns, interval_ns=interval_ns, period_ns=period_ns)
+    slot = own if slot_ns is None else Fraction(slot_ns)
+    if slot < own:
+        return Refused(
+            f"no Q in equation (3): slot {float(slot):.0f} ns < (airtime/interval) period = {float(own):.0f} ns"
+        )
+    per_slot = slot / airtime_ns
+    worst_ns = 0
+    for m in range(1, _SLOTS_EXAMINED + 1):
+        first = floor((m - 1) * per_slot) + 1
+        last = floor(m * per_slot)
+        if first > last:  # S < C: no q has this ceiling
+            continue
+        worst_ns = max(worst_ns, m * period_ns - (first - 1) * interval_ns)
+        if m * period_ns <= last * interval_ns:
+            return Bounded(worst_ns)
+    return Refused(f"Q in equation (3) lies beyond {_SLOTS_EXAMINED} slots")
+
+
+def path_estimate(clusters: Iterable[Outcome]) -> Outcome:
+    """Equation (1): the sum over the clusters on the path; refused if one of them is."""
+    total_ns = 0
+    for outcome in clusters:
+        if isinstance(outcome, Refused):
+            return outcome
+        total_ns += outcome.delay_ns
+    return Bounded(total_ns)

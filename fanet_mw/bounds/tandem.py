@@ -1,0 +1,147 @@
+"""Bounds over several heads: what one slot released is a burst for the next.
+
+Behind a hop a flow keeps its interval and gains jitter: the hop's worst delay less its least (one airtime). Frames
+from one head arrive no denser than its slot lets them out. The worst delay of a path is the sum over its hops, each
+with the jitter gathered so far (Le Boudec & Thiran, 1.4.3 and 1.5; Richter's event streams).
+
+Heads that flood to each other make cycles: A's output is B's input and the reverse. The delays are iterated from below
+to a fixed point. It is sound by causality: look at the first packet, in time, to exceed its hop's delay; up to that
+instant every arrival had kept to its curve, so the delay could not be exceeded. If the iteration does not settle,
+there is no bound.
+
+Assumed: first come first served at each head; all frames of a slot have its airtime; no loss and no retransmission.
+"""
+
+from collections.abc import Mapping, Sequence
+from itertools import pairwise
+from typing import Final, NamedTuple
+
+from fanet_mw.bounds.arrivals import Arrivals, Limited, Periodic, Total
+from fanet_mw.bounds.network import backlog, delay_fifo
+from fanet_mw.bounds.outcome import Bounded, Outcome, Refused
+from fanet_mw.bounds.slot import SlotServer
+from fanet_mw.errors import LocalProtocolError
+
+_ROUNDS: Final = 500
+_HOPELESS_NS: Final = 86_400 * 10**9
+"""A jitter of a day is taken as divergence."""
+
+
+class Hop(NamedTuple):
+    """A head: its slot, and how long a frame takes from the end of its airtime to the next head's queue."""
+
+    server: SlotServer
+    relay_least_ns: int = 0
+    relay_most_ns: int = 0
+
+
+class Flow(NamedTuple):
+    """Packets of one source and the heads they pass, first to last."""
+
+    arrivals: Periodic
+    path: tuple[int, ...]
+
+
+class PathBounds(NamedTuple):
+    """What the fixed point says: end to end per flow (relay times included), and delay and backlog per hop."""
+
+    flows: tuple[Outcome, ...]
+    hops: Mapping[int, Outcome]
+    backlogs: Mapping[int, int]
+
+
+def path_bounds(flows: Sequence[Flow], hops: Mapping[int, Hop]) -> PathBounds:
+    """Bound every flow over its path; a flow through an overloaded hop is refused with that hop's reason."""
+    for flow in flows:
+        flow.arrivals.check()
+        if not flow.path or len(set(flow.path)) < len(flow.path) or any(hop not in hops for hop in flow.path):
+            raise LocalProtocolError(f"path {flow.path} must name hops of {sorted(hops)}, each once")
+    solved = _fixed_point(flows, hops)
+    backlogs = {}
+    for name, arrivals in _inputs(flows, hops, solved).items():
+        frames = backlog(arrivals, hops[name].server)
+        if not isinstance(frames, Refused) and isinstance(solved[name], Bounded):
+            backlogs[name] = frames
+    return PathBounds(tuple(_along(flow, hops, solved) for flow in flows), solved, backlogs)
+
+
+def _fixed_point(flows: Sequence[Flow], hops: Mapping[int, Hop]) -> dict[int, Outcome]:
+    delays: dict[int, Outcome] = {name: Bounded(hops[name].server.airtime_ns) for name in sorted(hops)}
+    for _ in range(_ROUNDS):
+        inputs = _inputs(flows, hops, delays)
+        found = {name: delay_fifo(inputs[name], hops[name].server) for name in delays}
+        if found == delays:
+            return found
+        delays = found
+        diverging = [name for name, d in delays.items() if isinstance(d, Bounded) and d.delay_ns > _HOPELESS_NS]
+        if diverging:
+            break
+    reason = Refused(f"bursts grow around a cycle of heads: no fixed point after {_ROUNDS} rounds or one day of delay")
+    return {name: d if isinstance(d, Refused) else reason for name, d in delays.items()}
+
+
+def _inputs(flows: Sequence[Flow], hops: Mapping[int, Hop], delays: Mapping[int, Outcome]) -> dict[int, Arrivals]:
+    """What arrives at each hop, given the delays of all: own packets, and what each upstream slot lets out."""
+    own: dict[int, list[Arrivals]] = {name: [] for name in hops}
+    relayed: dict[int, dict[int, list[Arrivals]]] = {name: {} for name in hops}
+    for flow in flows:
+        at = flow.arrivals
+        own[flow.path[0]].append(at)
+        for here, following in pairwise(flow.path):
+            delay = delays[here]
+            if isinstance(delay, Refused):
+                break
+            hop = hops[here]
+            at = at.delayed(
+                least_ns=hop.server.airtime_ns + hop.relay_least_ns, most_ns=delay.delay_ns + hop.relay_most_ns
+            )
+            relayed[following].setdefault(here, []).append(at)
+    inputs: dict[int, Arrivals] = {}
+    for name in hops:
+        shaped = [
+            Limited(Total(tuple(parts)), hops[here].server, hops[here].relay_most_ns - hops[here].relay_least_ns)
+            for here, parts in sorted(relayed[name].items())
+        ]
+        inputs[name] = Total((*own[name], *shaped))
+    return inputs
+
+
+def _along(flow: Flow, hops: Mapping[int, Hop], delays: Mapping[int, Outcome]) -> Outcome:
+    total_ns = 0
+    for name in flow.path:
+        delay = delays[name]
+        if isinstance(delay, Refused):
+            return Refused(f"hop {name}: {delay.reason}")
+        total_ns += delay.delay_ns
+    return Bounded(total_ns + sum(hops[name].relay_most_ns for name in flow.path[:-1]))
+
+
+def ordered_tandem(
+    arrivals: Arrivals, servers: Sequence[SlotServer], starts_ns: Sequence[int], *, relay_ns: int = 0
+) -> Outcome:
+    """The end-to-end delay when the slots' places in one common period are known and nobody else uses them.
+
+    What one occurrence of a slot releases is queued at the next head before its next occurrence begins, and leaves in
+    it: after the first hop a frame only moves from slot to slot. `gap` is the distance of the slots' beginnings, the
+    first that leaves room for the slot and `relay_ns` between. delay = delay(first) + sum of gaps. Slots in the order
+    of the path cross several hops in one period; the reverse order costs a period per hop (Djukic & Valaee, Delay
+    aware link scheduling for multi-hop TDMA wireless networks, IEEE/ACM ToN 2009).
+    """
+    if not servers or len(servers) != len(starts_ns):
+        raise LocalProtocolError(f"{len(servers)} servers need as many starts_ns, and at least one")
+    for at, following in pairwise(servers):
+        if following.period_ns != at.period_ns:
+            raise LocalProtocolError(f"period_ns {at.period_ns} and {following.period_ns} must be the same")
+        if following.frames < at.frames or following.airtime_ns > at.airtime_ns:
+            return Refused(
+                f"a slot of {following.frames} frames of {following.airtime_ns} ns behind one of {at.frames} frames of "
+                f"{at.airtime_ns} ns cannot pass on in one occurrence what it gets in one"
+            )
+    first = delay_fifo(arrivals, servers[0])
+    if isinstance(first, Refused):
+        return first
+    total_ns = first.delay_ns
+    for index, at in enumerate(servers[:-1]):
+        least_ns = at.slot_ns + relay_ns
+        total_ns += least_ns + (starts_ns[index + 1] - starts_ns[index] - least_ns) % at.period_ns
+    return Bounded(total_ns)

@@ -1,0 +1,1 @@
+"""Graphs of who hears whom, as plain values: neighborhoods, colorings, dominating sets. Pure functions."""

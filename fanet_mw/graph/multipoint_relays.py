@@ -1,0 +1,69 @@
+"""Which neighbors relay what a node sends, so that everyone two hops away hears it (RFC 3626, 8.3.1).
+
+Each node chooses its own relays out of what its neighbors' hellos say. A packet is relayed by those whom the last
+sender chose. Unlike a connected dominating set the relays depend on where the packet comes from.
+"""
+
+from collections.abc import Mapping
+from types import MappingProxyType
+from typing import Final
+
+from fanet_mw.graph.topology import Adjacency
+from fanet_mw.units import NodeId
+
+WILL_NEVER: Final = 0  # RFC 3626, 18.8
+WILL_DEFAULT: Final = 3
+WILL_ALWAYS: Final = 7
+_DEFAULT: Final[Mapping[NodeId, int]] = MappingProxyType({})
+
+
+def multipoint_relays(
+    node: NodeId, adjacency: Adjacency, *, willingness: Mapping[NodeId, int] = _DEFAULT
+) -> tuple[NodeId, ...]:
+    """The relays of `node`. It suffices that `adjacency` holds the node and its neighbors.
+
+    Steps as in the RFC: the always willing; those that alone reach someone; then by willingness, how many they still
+    reach, and degree, and by lower id; at last those are dropped without whom everyone is reached as well.
+    """
+    will = {n: willingness.get(n, WILL_DEFAULT) for n in adjacency[node]}
+    near = frozenset(adjacency[node])
+    reach = {
+        n: frozenset(m for m in adjacency[n] if m != node and m not in near)
+        for n in adjacency[node]
+        if will[n] != WILL_NEVER
+    }
+    relays = {n for n in reach if will[n] == WILL_ALWAYS}
+    relays |= _only_ones(reach)
+    missing = set().union(*reach.values()) if reach else set()
+    for n in relays:
+        missing -= reach[n]
+    while missing:
+        # D(y), the degree, counts neighbors that are neither ours nor us: the whole of reach
+        best = max(
+            (n for n in sorted(reach) if n not in relays and reach[n] & missing),
+            key=lambda n: (will[n], len(reach[n] & missing), len(reach[n]), -n),
+        )
+        relays.add(best)
+        missing -= reach[best]
+    return _without_idle(relays, reach, will)
+
+
+def _only_ones(reach: Mapping[NodeId, frozenset[NodeId]]) -> set[NodeId]:
+    through: dict[NodeId, list[NodeId]] = {}
+    for n in reach:
+        for far in sorted(reach[n]):
+            through.setdefault(far, []).append(n)
+    return {ways[0] for ways in through.values() if len(ways) == 1}
+
+
+def _without_idle(
+    relays: set[NodeId], reach: Mapping[NodeId, frozenset[NodeId]], will: Mapping[NodeId, int]
+) -> tuple[NodeId, ...]:
+    kept = set(relays)
+    for n in sorted(relays, key=lambda n: (will[n], n)):
+        if will[n] == WILL_ALWAYS:
+            continue
+        others = frozenset().union(*(reach[m] for m in kept if m != n))
+        if reach[n] <= others:
+            kept.discard(n)
+    return tuple(sorted(kept))

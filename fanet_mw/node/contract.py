@@ -1,0 +1,124 @@
+"""The contract between a node and a routing protocol. Every protocol, ours or a rival, is one class behind it.
+
+The node owns identity, sequence numbers, duplicate suppression, the header and the counters. The protocol decides
+what happens to a packet next, by calling its port. Both are sans-IO: instants are handed in.
+"""
+
+from abc import ABC, abstractmethod
+from collections.abc import Mapping
+from random import Random
+from typing import ClassVar, Protocol
+
+from fanet_mw.bus.messages import Reception, TxStatus
+from fanet_mw.errors import DropReason
+from fanet_mw.node.queue import Packet
+from fanet_mw.scenario import Scenario
+from fanet_mw.trace import Record
+from fanet_mw.units import BROADCAST, Enu, NodeId
+from fanet_mw.wire import Kind
+
+
+class Port(Protocol):
+    """What a node offers to its protocol."""
+
+    node: NodeId
+    scenario: Scenario
+    position: Enu
+    """Where the node last knew itself to be."""
+    clock_error_ns: int
+    """The greatest error of any clock in the swarm, as far as the node has heard; 0: they are exact."""
+    velocity: Enu
+    """How fast it last knew itself to move [m/s]."""
+
+    def transmit(self, frame: bytes, dst: NodeId, *, start_ns: int, wants_status: bool = False) -> int:
+        """Announce a transmission; returns the request's sequence number."""
+
+    def gather(self) -> None:
+        """Hold broadcasts back until `send_gathered`, which sends as few frames as they fit."""
+
+    def send_gathered(self) -> None: ...
+
+    def announce(
+        self, kind: Kind, inner: bytes, *, now_ns: int, flags: int, hop_limit: int, destination: NodeId = BROADCAST
+    ) -> Packet:
+        """Make a control packet of our own, next sequence number, marked as handled here."""
+
+    def stamped(self, packet: Packet, *, flags: int) -> bytes:
+        """The bytes of a packet of our own (or newly in its phase) with other flags, hops unchanged."""
+
+    def forwarded(self, packet: Packet, *, flags: int) -> bytes:
+        """The bytes of a packet for its next hop: one hop more, our id as previous hop."""
+
+    def drop(self, reason: DropReason, packet: Packet, *, now_ns: int) -> None: ...
+
+    def mark(self, packet: Packet, bits: int) -> None:
+        """Remember a phase (`seen.FLOODED` ...) of a packet as handled."""
+
+    def forget(self, packet: Packet) -> None:
+        """Treat a later copy of this packet as new: it was not ours to handle yet, or its custody has passed on."""
+
+    def record(self, record: Record) -> None: ...
+
+    def stream(self, use: str) -> Random: ...
+
+
+class RoutingProtocol(ABC):
+    """One routing protocol at one node."""
+
+    origin_flags: ClassVar[int] = 0
+    """The flags with which the node makes this protocol's application packets."""
+
+    def __init__(self, port: Port) -> None:
+        self._port = port
+
+    def start(self, now_ns: int) -> None:  # noqa: B027  (stateless protocols have nothing to start)
+        """The node is up."""
+
+    @abstractmethod
+    def originate(self, packet: Packet, *, due_ns: int, now_ns: int) -> None:
+        """A packet of this node's application; its first frame may go from `due_ns` on, one lead after its birth."""
+
+    @abstractmethod
+    def receive(self, packet: Packet, reception: Reception, *, now_ns: int) -> None:
+        """The first copy of a packet in its phase. Delivery to the application is the node's business."""
+
+    def hello_inner(self, room: int, *, now_ns: int) -> bytes:
+        """What this protocol adds to the node's hello, in at most so many bytes."""
+        return b""
+
+    def hello_share(self, *, now_ns: int) -> float:
+        """After which part of the hello interval the next hello should go."""
+        return 1.0
+
+    def hello_start_ns(self, start_ns: int) -> int:
+        """When a hello may go that is due at `start_ns`."""
+        return start_ns
+
+    def hello(self, packet: Packet, reception: Reception, *, now_ns: int) -> None:  # noqa: B027
+        """A neighbor's hello."""
+
+    def impersonated(self, packet: Packet, *, now_ns: int) -> None:  # noqa: B027
+        """Somebody sent a packet in our name that we do not know of; it goes no further."""
+
+    def overheard(self, key: int, *, now_ns: int) -> None:  # noqa: B027
+        """Another copy, in the same phase, of a packet that was handled before (`seen.key_of`).
+
+        It may call off what is planned; nothing may become due sooner, because nobody asks again.
+        """
+
+    def status(self, status: TxStatus, *, now_ns: int) -> None:  # noqa: B027
+        """How a transmission ended that asked for it."""
+
+    def wake(self, now_ns: int) -> None:  # noqa: B027
+        """An instant named by `next_wake_ns` has come."""
+
+    def next_wake_ns(self) -> int | None:
+        return None
+
+    def waiting(self) -> int:
+        """Packets held inside the protocol."""
+        return 0
+
+    def report(self) -> Mapping[str, object]:
+        """JSON-able state, for people."""
+        return {}

@@ -1,0 +1,40 @@
+"""Who is heard directly, and what they said last. A neighbor expires when its hellos stop."""
+
+from typing import NamedTuple
+
+from fanet_mw.units import NodeId
+from fanet_mw.wire.inner import Beacon
+
+
+class Neighbor(NamedTuple):
+    """The last hello of one neighbor."""
+
+    node: NodeId
+    heard_ns: int
+    rssi_dbm: float
+    beacon: Beacon
+
+
+class Neighbors:
+    """The neighbors of one node."""
+
+    def __init__(self, *, lifetime_ns: int) -> None:
+        self._lifetime_ns = lifetime_ns
+        self._by_id: dict[NodeId, Neighbor] = {}
+
+    def heard(self, neighbor: Neighbor) -> None:
+        self._by_id[neighbor.node] = neighbor
+
+    def forget(self, node: NodeId) -> None:
+        """The link failed: do not wait for the lifetime to run out."""
+        self._by_id.pop(node, None)
+
+    def count(self, *, now_ns: int) -> int:
+        """How many are not yet expired."""
+        horizon_ns = now_ns - self._lifetime_ns
+        return sum(1 for neighbor in self._by_id.values() if neighbor.heard_ns >= horizon_ns)
+
+    def alive(self, *, now_ns: int) -> list[Neighbor]:
+        """Neighbors not yet expired, by id."""
+        horizon_ns = now_ns - self._lifetime_ns
+        return [self._by_id[node] for node in sorted(self._by_id) if self._by_id[node].heard_ns >= horizon_ns]

@@ -1,0 +1,130 @@
+"""The bounded priority queue of a node. Nothing leaves it without being transmitted or named in a drop.
+
+Order: priority first (0 is the most urgent), then arrival. When full, the least important and youngest entry goes.
+Classes may expire sooner than the rest: what warns of a collision is worth nothing after a second.
+"""
+
+from bisect import bisect_left, insort
+from collections.abc import Mapping
+from types import MappingProxyType
+from typing import Final, NamedTuple
+
+from fanet_mw.node.duplicates import key_of
+from fanet_mw.scenario import Routing
+from fanet_mw.units import US, NodeId
+from fanet_mw.wire import PRIORITY_REPORT, PRIORITY_SAFETY, Header
+
+_ALIKE: Final[Mapping[int, int]] = MappingProxyType({})
+
+
+class Packet(NamedTuple):
+    """A routed packet as a node holds it: its header, decoded, and its bytes."""
+
+    header: Header
+    frame: bytes
+
+    @property
+    def origin(self) -> NodeId:
+        return NodeId(self.header.origin)
+
+
+def sooner_us(routing: Routing) -> Mapping[int, int]:
+    """By priority, how much sooner than `routing.lifetime_s` a class expires."""
+    whole_ns = routing.lifetime_ns(-1)
+    return {p: (whole_ns - routing.lifetime_ns(p)) // US for p in (PRIORITY_SAFETY, PRIORITY_REPORT)}
+
+
+def _key(packet: Packet) -> int:
+    return key_of(origin=packet.header.origin, seq=packet.header.seq)
+
+
+class TxQueue:
+    """Packets waiting for a slot or a route."""
+
+    def __init__(self, *, capacity: int, sooner_us: Mapping[int, int] = _ALIKE) -> None:
+        self._capacity = capacity
+        self._sooner_us = sooner_us
+        self._entries: list[tuple[int, int, Packet]] = []
+        self._order = 0
+        self._latest_us = max(0, *sooner_us.values()) if sooner_us else 0
+        self._oldest_us = 0
+        """No packet here was generated before this instant."""
+
+    def __len__(self) -> int:
+        return len(self._entries)
+
+    def __contains__(self, key: object) -> bool:
+        """Whether a packet with this key (`seen.key_of`) is queued."""
+        return any(_key(entry[2]) == key for entry in self._entries)
+
+    def remove(self, key: int) -> None:
+        """Give up a packet, if it is queued."""
+        self._entries = [entry for entry in self._entries if _key(entry[2]) != key]
+
+    def push(self, packet: Packet, *, rank: int | None = None) -> Packet | None:
+        """Add a packet; return the one that had to go for it (perhaps itself), or None.
+
+        `rank` is the priority at which it waits here, by default its own.
+        """
+        self._order += 1
+        born_us = packet.header.origin_us
+        self._oldest_us = min(self._oldest_us, born_us) if self._entries else born_us
+        insort(self._entries, (packet.header.priority if rank is None else rank, self._order, packet))
+        return self._entries.pop()[2] if len(self._entries) > self._capacity else None
+
+    def pop(self) -> Packet:
+        """Take the most urgent packet."""
+        assert self._entries, "whoever pops has looked at the length"
+        return self._entries.pop(0)[2]
+
+    def pop_fitting(self, size: int) -> list[Packet]:
+        """Take the most urgent packets, in order, as long as they fit into so many bytes together."""
+        taken = []
+        while self._entries and len(self._entries[0][2].frame) <= size:
+            taken.append(self.pop())
+            size -= len(taken[-1].frame)
+        return taken
+
+    def waiting(self, rank: int) -> list[Packet]:
+        """The packets that wait at one priority, in order."""
+        return [packet for _, _, packet in self._of(rank)]
+
+    def take(self, size: int, *, rank: int) -> list[Packet]:
+        """Take packets of one priority, in order, as long as they fit into so many bytes together."""
+        taken: list[Packet] = []
+        begin = bisect_left(self._entries, (rank,))
+        for _, _, packet in self._of(rank):
+            if len(packet.frame) > size:
+                break
+            size -= len(packet.frame)
+            taken.append(packet)
+        del self._entries[begin : begin + len(taken)]
+        return taken
+
+    def take_older(self, *, before_us: int, rank: int) -> list[Packet]:
+        """Take out the packets of one priority that were generated before an instant [swarm us]."""
+        older = [entry for entry in self._of(rank) if entry[2].header.origin_us < before_us]
+        for entry in older:
+            self._entries.remove(entry)
+        return [entry[2] for entry in older]
+
+    def _of(self, rank: int) -> list[tuple[int, int, Packet]]:
+        return self._entries[bisect_left(self._entries, (rank,)) : bisect_left(self._entries, (rank + 1,))]
+
+    def expire(self, *, before_us: int) -> list[Packet]:
+        """Take out every packet generated before an instant [swarm us], or that much later if its class is sooner."""
+        if not self._entries or self._oldest_us >= before_us + self._latest_us:
+            return []  # else every wake-up would look at all of a long queue
+        stale: list[tuple[int, int, Packet]] = []
+        kept: list[tuple[int, int, Packet]] = []
+        for entry in self._entries:
+            late_us = before_us + self._sooner_us.get(entry[0], 0)
+            (stale if entry[2].header.origin_us < late_us else kept).append(entry)
+        self._entries = kept
+        self._oldest_us = min((entry[2].header.origin_us for entry in kept), default=0)
+        return [entry[2] for entry in stale]
+
+    def drain(self) -> list[Packet]:
+        """Take everything, most urgent first."""
+        entries, self._entries = self._entries, []
+        return [entry[2] for entry in entries]

@@ -1,0 +1,167 @@
+"""Heads judged under a timetable: the turns that the running protocol will give them, and the bound of their gaps.
+
+The table is the one that `scheduled` makes. Who knows the turns knows the longest wait; the flood's span comes on top,
+whatever other floods run through the swarm meanwhile.
+"""
+
+from collections.abc import Mapping, Sequence
+from typing import Final, NamedTuple
+
+from fanet_mw.bounds import Bounded, Outcome, Periodic, Refused, Total, TurnServer, backlog, delay_any_order, delay_fifo
+from fanet_mw.planner.flood import FloodCost
+from fanet_mw.planner.head import ClusterPlan, Share
+from fanet_mw.routing.clustered.tdma.own_bound import Own
+from fanet_mw.routing.clustered.tdma.turns import Turns
+from fanet_mw.routing.clustered.timetable.list_scheduling import Effort
+from fanet_mw.routing.clustered.timetable.timetable import Timetable, timetable
+from fanet_mw.routing.clustered.timetable.turn_plan import Fitted, Places, fit, links, superframe
+from fanet_mw.scenario import Scenario
+from fanet_mw.units import NodeId
+
+_MOST_TURNS: Final = 20_000
+
+
+class Candidate(NamedTuple):
+    """A cluster before it has turns: its head, its size, its greatest way to the head, and its classes' shares."""
+
+    head: NodeId
+    members: int
+    hops: int
+    shares: Sequence[Share]
+
+
+class Superframe(NamedTuple):
+    """The timetable of a plan: its geometry, and how full it is."""
+
+    turns: Turns
+    used: int
+    """Turns in which some node sends; 0: there is no table."""
+    packets: int
+    """Root turns per superframe."""
+    table: Timetable | None
+    together: int = 1
+    """Packets that a turn holds."""
+    least_interval_ns: int | None = None
+    """The traffic interval down to which everything arrives, when it was asked for."""
+
+
+def table_for(
+    scenario: Scenario, places: Places, head_of: Mapping[NodeId, NodeId], *, quick: bool = False
+) -> Fitted | Refused:
+    """The running protocol's timetable for nodes with these heads; refused when one packet of each does not fit.
+
+    `quick`: also when the load does not.
+    """
+    found = fit(scenario, places, head_of, quick=quick)
+    if found is not None:
+        return found
+    turns = superframe(scenario)
+    unlimited = Turns(0, turns.period_ns, 0, turns.turn_ns, _MOST_TURNS)
+    roots = tuple(sorted({scenario.leader, *head_of.values()}))
+    table = timetable(places, roots, links(scenario, unlimited), (), Effort(pace=0.0))
+    needed = f"{table.used}" if table else f"more than {_MOST_TURNS}"
+    return Refused(
+        f"one packet of each of {len(roots)} roots needs {needed} turns of {turns.turn_ns / 1e6:.3f} ms, "
+        f"a superframe has {turns.per_frame}"
+    )
+
+
+def judge(
+    found: Fitted, candidate: Candidate, *, lead_ns: int, receipt_ns: int, jitter_ns: int, control: int = 0
+) -> ClusterPlan:
+    """One root: its queue before its turns, the span of the flood, and up to `receipt_ns` until applications have it.
+
+    `control`: announcements per period, which go before everything.
+    """
+    table, turns = found.table, found.turns
+    offsets = tuple(table.offsets_of(NodeId(candidate.head)))
+    span = table.spans.get(candidate.head, 1)
+    root = _Root(Own(turns, offsets, span, found.together, lead_ns + receipt_ns), lead_ns, jitter_ns, control)
+    relays = sum(1 for turn in table.turns if turn.root == candidate.head and turn.instance == 0)
+    packets = sum(s.sources * turns.period_ns / s.interval_ns for s in candidate.shares)
+    packets += control if packets else 0
+    return ClusterPlan(
+        head=candidate.head,
+        members=candidate.members,
+        hops=candidate.hops,
+        slot_ns=len(offsets) * turns.turn_ns,
+        usable_ns=len(offsets) * turns.turn_ns,
+        work_ns=round(packets * (turns.turn_ns // found.together)),
+        packets=packets,
+        flood=FloodCost(root.flood_ns, turns.turn_ns, relays, proven=True),
+        delays=tuple(root.delay(share) for share in candidate.shares),
+        backlog=root.backlog(candidate.shares),
+    )
+
+
+class _Root(NamedTuple):
+    """One root of a timetable, and what is known of its arrivals."""
+
+    own: Own
+    lead_ns: int
+    jitter_ns: int
+    """How late a packet may come to the root."""
+    control: int
+
+    @property
+    def flood_ns(self) -> int:
+        turns = self.own.turns
+        longest = (turns.flood_ns(offset, span=self.own.span) for offset in self.own.roots)
+        return max(longest, default=turns.turn_ns)
+
+    def delay(self, share: Share) -> Outcome:
+        """A class has room of its own in each turn, so only its own packets make it wait, and bulk for announcements.
+
+        The only source of a class knows more: what it states in flight.
+        """
+        if not share.sources:
+            return Bounded(0)
+        if share.sources > 1 or self.jitter_ns or (self.control and not share.urgent):
+            return self._queued(share)
+        per_turn = self._per_turn(share)
+        if len(self.own.roots) * per_turn * share.interval_ns < self.own.turns.period_ns:
+            return Refused(f"{len(self.own.roots) * per_turn} packets are let out per superframe, more come")
+        if share.urgent:
+            return Bounded(self.own.burst_ns(per_turn=per_turn))
+        worst_ns = self.own.worst_ns(interval_ns=share.interval_ns)
+        assert worst_ns is not None, "as many are let out as come"
+        return Bounded(worst_ns)
+
+    def _queued(self, share: Share) -> Outcome:
+        server = self._server(self._per_turn(share))
+        server.check()
+        flow = Periodic(share.interval_ns, self.jitter_ns)
+        others = [flow] * (share.sources - 1)
+        before = [] if share.urgent else self._announcements(self._per_turn(share))
+        alone = delay_fifo(Total((flow, *others)), server)
+        queue = delay_any_order(flow, Total((*before, *others)), server) if before else alone
+        if isinstance(queue, Refused):
+            return queue
+        return Bounded(queue.delay_ns + self.flood_ns - server.airtime_ns + self.own.around_ns - self.lead_ns)
+
+    def backlog(self, shares: Sequence[Share]) -> int | None:
+        """The most packets that wait at once, all classes together."""
+        flows = [Periodic(s.interval_ns, self.jitter_ns) for s in shares for _ in range(s.sources)]
+        if not flows:
+            return None
+        waiting = backlog(Total((*self._announcements(1), *flows)), self._server(self.own.together))
+        return None if isinstance(waiting, Refused) else waiting
+
+    def _per_turn(self, share: Share) -> int:
+        return 1 if share.urgent else self.own.together
+
+    def _announcements(self, parts: int) -> list[Periodic]:
+        """Each takes a whole turn."""
+        return [Periodic(self.own.turns.period_ns, 0)] * (self.control * parts)
+
+    def _server(self, parts: int) -> TurnServer:
+        """A turn that lets out k packets counts as k parts of it, one packet each.
+
+        A packet must be announced before the whole turn, which counts as a longer lead; and all of them are through
+        when the turn is.
+        """
+        turns = self.own.turns
+        part_ns = turns.turn_ns // parts
+        starts = (turns.start_ns(offset, frame_start_ns=0) for offset in self.own.roots)
+        parts_ns = tuple(start_ns + part * part_ns for start_ns in starts for part in range(parts))
+        return TurnServer(part_ns, turns.period_ns, parts_ns, self.lead_ns + turns.turn_ns - part_ns)

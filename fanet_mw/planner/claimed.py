@@ -1,0 +1,234 @@
+"""Slots claimed over the air, judged before take-off: which turns each node will have, and whether its load fits them.
+
+    positions -> who hears whom -> the protocol's own claims, run without losses -> slots, superframes, turns by lot
+              -> the protocol's own rule of relays                             -> who sends how much
+
+A relay sends its own packets and everyone else's, any other node its own; every second hello takes a turn too. Of the
+turns that nobody within two hops claims, a node that draws wins its lots over all lots within two hops, on average.
+Feasible: each node's load fits its claimed turns and those it wins. That is a statement about rates: nothing bounds a
+delay end to end when packets queue. A packet that finds no queue takes hops x hop at most.
+
+The claims that are made in flight differ with the instants at which nodes start; lengths and counts hardly do.
+"""
+
+from collections.abc import Mapping, Sequence
+from math import ceil, inf
+from typing import Final, NamedTuple
+
+from fanet_mw.bounds import TurnServer
+from fanet_mw.graph.connected_dominating_set import dominates
+from fanet_mw.graph.topology import Adjacency, two_hop
+from fanet_mw.planner.demand import TrafficClass
+from fanet_mw.routing.clustered.claimed.own_turns import Share
+from fanet_mw.routing.clustered.claimed.protocol import IDLE, geometry, longest_superframe, turn_bytes
+from fanet_mw.routing.clustered.claimed.slot_claims import SlotClaims
+from fanet_mw.routing.clustered.tdma.turns import Turns
+from fanet_mw.scenario import Scenario
+from fanet_mw.units import NodeId, S, seconds_to_ns
+from fanet_mw.wire.claims import MOST_LOTS
+
+_ROUNDS: Final = 60
+"""Hello intervals in which claims settle; the law needs 2 d + 6, d the longest chain of rivals."""
+_LISTEN: Final = 3
+_HELLOS_IN_TURNS: Final = 0.5
+_NARROW: Final = 0.001
+
+
+class NodeTurns(NamedTuple):
+    """One node's part of a period. Turns that are won by lot are an expectation."""
+
+    node: NodeId
+    relays: bool
+    slot: int | None
+    """None: no slot is free for it."""
+    superframe: int
+    claimed: int
+    won: float
+    load: float
+    """Turns that its packets and hellos need."""
+    hop_ns: int | None
+    """The longest that a packet takes over this node when none is before it."""
+
+    @property
+    def utilization(self) -> float:
+        turns = self.claimed + self.won
+        return self.load / turns if turns else inf
+
+
+class Claims(NamedTuple):
+    """A swarm in claimed slots."""
+
+    turns: Turns
+    nodes: tuple[NodeTurns, ...]
+    hops: int
+    """The longest way of a flood, over relays alone."""
+    least_interval_ns: int | None = None
+    """Of the application, at which the fullest node is full."""
+
+    @property
+    def hop_ns(self) -> int | None:
+        """The greatest of any node; None: some node has no turn."""
+        own = [node.hop_ns for node in self.nodes]
+        return None if None in own else max(hop_ns for hop_ns in own if hop_ns is not None)
+
+    @property
+    def lone_ns(self) -> int | None:
+        """A packet that finds no queue on its way is with everyone after this."""
+        hop_ns = self.hop_ns
+        return None if hop_ns is None else self.hops * hop_ns
+
+    @property
+    def fullest(self) -> NodeTurns:
+        return max(self.nodes, key=lambda node: (node.utilization, -node.node))
+
+
+class Claimants:
+    """What the positions alone decide: slots, relays, ways."""
+
+    def __init__(self, scenario: Scenario, adjacency: Adjacency) -> None:
+        self.turns = geometry(scenario, turn_bytes(scenario))
+        self._near = two_hop(adjacency)
+        self._shares = settled(scenario, adjacency, self.turns)
+        self.relays = {node: dominates(node, adjacency) for node in adjacency}
+        self._hops = max((_depth(adjacency, root, self.relays) for root in adjacency), default=0)
+        self._free = {node: self._unclaimed(node) for node in adjacency}
+        self._hops_ns: dict[int, int | None] = {}
+        self._ahead_ns = scenario.radio.lead_ns + scenario.radio.handover_ns
+
+    def _unclaimed(self, node: NodeId) -> int:
+        known = (self._shares[n] for n in (node, *self._near[node]))
+        taken = {share for share in known if share is not None}
+        return sum(1 for turn in range(self.turns.per_frame) if not any(share.has(turn) for share in taken))
+
+    def judge(self, scenario: Scenario, classes: Sequence[TrafficClass]) -> Claims:
+        """Every node under a load."""
+        claimed = {node: _turns(share, self.turns) for node, share in self._shares.items()}
+        loads = self._loads(scenario, classes)
+        said, drawn = self._lots(scenario, loads, claimed)
+        nodes = []
+        for node in sorted(loads):
+            lots = drawn[node] + sum(said[n] for n in self._near[node])
+            share = self._shares[node]
+            nodes.append(
+                NodeTurns(
+                    node=node,
+                    relays=self.relays[node],
+                    slot=None if share is None else share.slot,
+                    superframe=0 if share is None else share.length,
+                    claimed=len(claimed[node]),
+                    won=self._free[node] * drawn[node] / lots if drawn[node] else 0.0,
+                    load=loads[node] + self._hellos(scenario),
+                    hop_ns=None if share is None else self._hop_ns(share.length),
+                )
+            )
+        return Claims(self.turns, tuple(nodes), self._hops)
+
+    def _loads(self, scenario: Scenario, classes: Sequence[TrafficClass]) -> dict[NodeId, float]:
+        """Turns per period that each node's packets need. With aggregation a turn takes as many as fit."""
+        period_ns = self.turns.period_ns
+        most = turn_bytes(scenario)
+        each = [
+            period_ns / c.interval_ns / (max(1, most // c.payload_bytes) if scenario.routing.aggregate else 1)
+            for c in classes
+        ]
+        everything = sum(one * len(c.sources) for one, c in zip(each, classes, strict=True))
+        loads = {}
+        for node in self._near:
+            own = sum(one for one, c in zip(each, classes, strict=True) if node in c.sources)
+            loads[node] = everything if self.relays[node] else own
+        return loads
+
+    def _hellos(self, scenario: Scenario) -> float:
+        hello_ns = seconds_to_ns(scenario.routing.hello_interval_s)
+        return _HELLOS_IN_TURNS * self.turns.period_ns / hello_ns if hello_ns else 0.0
+
+    def _lots(
+        self, scenario: Scenario, loads: Mapping[NodeId, float], claimed: Mapping[NodeId, Sequence[int]]
+    ) -> tuple[dict[NodeId, float], dict[NodeId, int]]:
+        """What each node says on average, and what it draws with: the least of its last hellos (`claimed.Load`).
+
+        A hello interval holds a packet more or less; who now and then says that it draws costs the others turns.
+        """
+        periods = seconds_to_ns(scenario.routing.hello_interval_s) / self.turns.period_ns
+        said, drawn = {}, {}
+        for node, load in loads.items():
+            turns = len(claimed[node]) * periods
+            least, more = divmod(load * periods, 1)
+            drawn[node] = _lots(least, turns)
+            said[node] = (1 - more) * drawn[node] + more * _lots(least + 1, turns)
+        return said, drawn
+
+    def _hop_ns(self, length: int) -> int | None:
+        """As a node will report it, whichever slot of its superframe it gets: one turn may go to a hello."""
+        if length not in self._hops_ns:
+            turns, found = self.turns, []
+            for slot in range(min(length, turns.per_frame)):
+                starts = tuple(turns.start_ns(turn, frame_start_ns=0) for turn in _turns(Share(slot, length), turns))
+                found.append(TurnServer(turns.turn_ns, turns.period_ns, starts, self._ahead_ns).completion_ns(2))
+            self._hops_ns[length] = max(found, default=None) if length <= turns.per_frame else None
+        return self._hops_ns[length]
+
+    def least_interval_ns(self, scenario: Scenario, classes: Sequence[TrafficClass]) -> int | None:
+        """The shortest interval of the application at which everything fits, to a thousandth; None: none does."""
+        if not any(c.name == "application" for c in classes):
+            return None
+
+        def fits(interval_ns: int) -> bool:
+            changed = [c._replace(interval_ns=interval_ns) if c.name == "application" else c for c in classes]
+            return self.judge(scenario, changed).fullest.utilization <= 1
+
+        low, high = 1, 1000 * S
+        if not fits(high):
+            return None
+        while high - low > max(1, _NARROW * high):
+            middle = (low + high) // 2
+            low, high = (low, middle) if fits(middle) else (middle, high)
+        return high
+
+
+def settled(scenario: Scenario, adjacency: Adjacency, turns: Turns) -> dict[NodeId, Share | None]:
+    """The slots of all nodes after the protocol's claims have settled: one hello after the other, none lost."""
+    slots = scenario.clusters.slots
+    sized = None if slots else longest_superframe(turns)
+    claims = {
+        node: SlotClaims(node, now_ns=0, listen_ns=_LISTEN, lifetime_ns=2, slots=slots or None, sized_to=sized)
+        for node in sorted(adjacency)
+    }
+    before: Mapping[NodeId, object] = {}
+    for now in range(_ROUNDS):
+        for node, own in claims.items():
+            hello = own.step(now)
+            for neighbor in adjacency[node]:
+                claims[neighbor].hear(hello, now_ns=now)
+        said = {node: (own.own.slot, own.own.length) for node, own in claims.items()}
+        if now > 4 * _LISTEN and said == before:
+            break
+        before = said
+    return {
+        node: None if own.slot is None else Share(own.slot, slots or own.own.length) for node, own in claims.items()
+    }
+
+
+def _turns(share: Share | None, turns: Turns) -> tuple[int, ...]:
+    return () if share is None else tuple(range(share.slot, turns.per_frame, share.length))
+
+
+def _lots(packets: float, turns: float) -> int:
+    """As `claimed.Load` has it for the packets and the turns of a hello interval, when none wait."""
+    wanted = packets / turns if turns else 0.0
+    return 0 if wanted < IDLE else min(MOST_LOTS, ceil(2 * wanted))
+
+
+def _depth(adjacency: Adjacency, root: NodeId, relays: Mapping[NodeId, bool]) -> int:
+    """Transmissions until a flood has reached everyone that relays lead to."""
+    hops = {root: 0}
+    frontier = [root]
+    while frontier:
+        following = []
+        for node in frontier:
+            for neighbor in adjacency[node] if node == root or relays[node] else ():
+                if neighbor not in hops:
+                    hops[neighbor] = hops[node] + 1
+                    following.append(neighbor)
+        frontier = following
+    return max(hops.values())

@@ -1,0 +1,75 @@
+"""What the swarm wants to send: traffic classes out of a scenario.
+
+Each class is periodic per source. Warnings count one conflict of every UAV at a time, survivor reports one survivor
+heard by every UAV: who hears two at once reports twice as often. Saturated sources have no period, Poisson arrivals no
+least interval: neither can be planned.
+"""
+
+from collections.abc import Sequence
+from typing import NamedTuple
+
+from fanet_mw import wire
+from fanet_mw.bounds import Bounded, Outcome, Refused
+from fanet_mw.routing.clustered.tdma.urgent import REPORT_BYTES, WARNING_BYTES
+from fanet_mw.scenario import Scenario
+from fanet_mw.units import NodeId, seconds_to_ns
+
+
+class TrafficClass(NamedTuple):
+    """Packets of `payload_bytes` (UDP payload on the air), one per source and interval."""
+
+    name: str
+    payload_bytes: int
+    interval_ns: int
+    sources: tuple[NodeId, ...]
+    priority: int = wire.PRIORITY_BULK
+
+    @property
+    def per_second(self) -> float:
+        return len(self.sources) * 1e9 / self.interval_ns
+
+
+class ClassPlan(NamedTuple):
+    """A traffic class: its bound from the source to the last node, and from the head on."""
+
+    name: str
+    sources: int
+    interval_ns: int
+    bound: Outcome
+    from_head: Outcome
+    priority: int = wire.PRIORITY_BULK
+
+    def meets(self, deadline_ns: int) -> bool:
+        return isinstance(self.bound, Bounded) and self.bound.delay_ns <= deadline_ns
+
+
+def demands(scenario: Scenario, sources: Sequence[NodeId] | None = None) -> list[TrafficClass] | Refused:
+    """The classes, most urgent first. `sources` of the application traffic; by default every node that may be one."""
+    found = []
+    if scenario.mission.collision_horizon_s:
+        interval_ns = seconds_to_ns(scenario.mission.collision_repeat_s)
+        found.append(TrafficClass("warning", WARNING_BYTES, interval_ns, _all(scenario), wire.PRIORITY_SAFETY))
+    if scenario.mission.survivors:
+        interval_ns = seconds_to_ns(scenario.mission.report_interval_s)
+        found.append(TrafficClass("report", REPORT_BYTES, interval_ns, _all(scenario), wire.PRIORITY_REPORT))
+    traffic = scenario.traffic
+    if traffic.arrivals in ("saturated", "poisson"):
+        return Refused(f'traffic.arrivals = "{traffic.arrivals}" has no least interval, so nothing bounds its delay')
+    if traffic.arrivals == "cbr":
+        who = _eligible(scenario) if sources is None else tuple(sorted(sources))
+        if who:
+            found.append(TrafficClass("application", traffic.payload_bytes, seconds_to_ns(traffic.interval_s), who))
+    return found
+
+
+def _all(scenario: Scenario) -> tuple[NodeId, ...]:
+    return tuple(NodeId(n) for n in scenario.node_ids)
+
+
+def _eligible(scenario: Scenario) -> tuple[NodeId, ...]:
+    """Who may be a source; a number of them is taken as the lowest ids: pass `sources` for those a seed draws."""
+    traffic = scenario.traffic
+    if isinstance(traffic.sources, tuple):
+        return tuple(NodeId(n) for n in sorted(set(traffic.sources)))
+    candidates = tuple(n for n in _all(scenario) if n != traffic.destination)
+    return candidates if traffic.sources == "all" else candidates[: traffic.sources]

@@ -1,0 +1,382 @@
+"""One scenario judged: per cluster its slot's load, delay and backlog; per class a bound from source to last node.
+
+    source --access--> head's queue --slot--> flood --> last node
+           uplink_ns          slot_delays        FloodCost.duration
+
+A head's slot holds floods one spacing apart; under a timetable each of its turns holds one. Packets reach the head late
+by up to the uplink: its bound where there is one, else one second (or period) is assumed, and said so.
+
+Feasible: each slot is stable, every packet is through before its lifetime and any deadline ends, no queue overflows,
+and a flood reaches everyone.
+"""
+
+from collections.abc import Mapping, Sequence
+from typing import Final, NamedTuple
+
+from fanet_mw import wire
+from fanet_mw.bounds import Bounded, Outcome, Refused, paper
+from fanet_mw.bounds.guard import PLANNED_ERROR_NS, slot_guard_ns
+from fanet_mw.graph.topology import Adjacency, within_range
+from fanet_mw.planner import contention_window, parts, verdict
+from fanet_mw.planner.access import Ways, access_outcome, ways
+from fanet_mw.planner.by_turn import Candidate, Superframe, judge, table_for
+from fanet_mw.planner.claimed import Claimants, Claims
+from fanet_mw.planner.demand import ClassPlan, TrafficClass
+from fanet_mw.planner.flood import FloodCost, flood_cost
+from fanet_mw.planner.goodput_bound import Goodput, any_protocol
+from fanet_mw.planner.head import ClusterPlan, Share, slot_delays, work_ns
+from fanet_mw.routing.clustered.claimed.protocol import geometry, turn_bytes
+from fanet_mw.routing.clustered.clustering import Cluster, balanced
+from fanet_mw.routing.clustered.tdma.turns import receipt_ns
+from fanet_mw.routing.clustered.timetable.turn_plan import Fitted, schedule_parts, superframe
+from fanet_mw.scenario import Scenario
+from fanet_mw.units import Enu, NodeId, S
+
+_ASSUMED_UPLINK_NS: Final = 1 * S
+
+
+class Plan(NamedTuple):
+    """The verdict on a scenario."""
+
+    scenario: Scenario
+    clusters: tuple[ClusterPlan, ...]
+    classes: tuple[ClassPlan, ...]
+    access: Outcome
+    uplink_ns: int
+    paper: Outcome
+    """What equations (1)-(4) say of the fullest cluster: to compare with, not to rely on."""
+    superframe: Superframe | None
+    """None without a timetable."""
+    claims: Claims | None
+    """Only with claimed slots; then `clusters` are the nodes."""
+    cut_off: tuple[NodeId, ...]
+    """Nodes that no flood of the leader's part of the swarm reaches."""
+    goodput: Goodput | None
+    """What no protocol can exceed; None: traffic is not for everyone, or the swarm is in parts."""
+    deadline_ns: int | None
+    problems: tuple[str, ...]
+    """Why it is not feasible; none when it is."""
+    notes: tuple[str, ...]
+    """What the bounds assume or cannot promise."""
+
+    @property
+    def feasible(self) -> bool:
+        return not self.problems
+
+    @property
+    def proven(self) -> bool:
+        """Whether the bounds hold, not only estimates of what CSMA/CA does."""
+        return isinstance(self.access, Bounded) and all(cluster.flood.proven for cluster in self.clusters)
+
+    @property
+    def carried_per_second(self) -> float | None:
+        """Application packets per second, all sources together, that this configuration carries; None: unknown.
+
+        Exact for a timetable whose capacity was asked for; where relays contend, what would fill the fullest slot; in
+        claimed slots what fills the fullest node, on average.
+        """
+        application = next((c for c in self.classes if c.name == "application"), None)
+        if application is None or not application.sources:
+            return None
+        exact = self.superframe or self.claims
+        if exact is not None:
+            least_ns = exact.least_interval_ns
+            return None if least_ns is None else application.sources * S / least_ns
+        used = self.bottleneck.utilization if self.bottleneck else 0.0
+        return application.sources * S / application.interval_ns / used if used else None
+
+    @property
+    def bottleneck(self) -> ClusterPlan | None:
+        """The cluster whose slot is fullest."""
+        return max(self.clusters, key=lambda c: (c.utilization, -c.head), default=None)
+
+
+class Site:
+    """A scenario and where its nodes are; what depends on positions alone is computed once for all variants."""
+
+    def __init__(self, scenario: Scenario, positions: Mapping[NodeId, Enu], adjacency: Adjacency | None = None) -> None:
+        self.scenario = scenario
+        self.positions = positions
+        self.adjacency = within_range(positions, range_m=scenario.radio.range_m) if adjacency is None else adjacency
+        self._floods: dict[tuple[NodeId, int], FloodCost] = {}
+        self._claimants: dict[object, Claimants] = {}
+
+    def of(self, scenario: Scenario) -> "Site":
+        """The same nodes under another scenario; floods cost the same where the rules of relaying are the same."""
+        other = Site(scenario, self.positions, self.adjacency)
+        if scenario.clusters.relay == self.scenario.clusters.relay and scenario.radio == self.scenario.radio:
+            other._floods = self._floods
+        other._claimants = self._claimants
+        return other
+
+    def claimants(self) -> Claimants:
+        """Slots and relays where slots are claimed; they follow from positions and the geometry of turns."""
+        scenario = self.scenario
+        key = geometry(scenario, turn_bytes(scenario)), scenario.clusters.slots, scenario.radio
+        if key not in self._claimants:
+            self._claimants[key] = Claimants(scenario, self.adjacency)
+        return self._claimants[key]
+
+    @property
+    def timetable(self) -> bool:
+        return self.scenario.clusters.relay == "scheduled"
+
+    @property
+    def guard_ns(self) -> int:
+        error_ns = PLANNED_ERROR_NS if self.scenario.clock.sync != "none" else 0
+        return slot_guard_ns(self.scenario, clock_error_ns=error_ns)
+
+    def flood(self, head: NodeId, payload_bytes: int) -> FloodCost:
+        key = head, payload_bytes
+        if key not in self._floods:
+            self._floods[key] = flood_cost(self.scenario, self.adjacency, head, payload_bytes=payload_bytes)
+        return self._floods[key]
+
+
+class _Judged(NamedTuple):
+    """The heads under one way to relay."""
+
+    clusters: tuple[ClusterPlan, ...]
+    cut_off: tuple[NodeId, ...]
+    superframe: Superframe | None = None
+    unfit: tuple[str, ...] = ()
+
+
+def members_of(scenario: Scenario, positions: Mapping[NodeId, Enu]) -> list[Cluster]:
+    """The clusters that the leader will make. It is in none, unless it is alone; under a timetable it has turns."""
+    others = {node: at for node, at in positions.items() if node != scenario.leader}
+    clusters = balanced(others or positions, count=scenario.clusters.count)
+    if scenario.clusters.relay == "scheduled" and others and scenario.leader in positions:
+        clusters.append(Cluster(scenario.leader, (scenario.leader,)))
+    return clusters
+
+
+def evaluate(
+    site: Site, classes: Sequence[TrafficClass], *, deadline_ns: int | None = None, quick: bool = False
+) -> Plan:
+    """Judge one scenario. `quick`: a timetable for less than the load, or that takes seconds, is not looked for."""
+    scenario = site.scenario
+    fitted = _fitted(site, quick=quick) if site.timetable else None
+    clusters = members_of(scenario, site.positions)
+    if isinstance(fitted, Fitted) and fitted.whole:  # each node lets out its own; the way to its head is in its flood
+        clusters = [Cluster(node, (node,)) for node in sorted(site.positions)]
+    head_of = {member: cluster.head for cluster in clusters for member in cluster.members}
+    heads = [cluster.head for cluster in clusters]
+    found = ways(site.adjacency, head_of, classes)
+    loads = _loads(heads, head_of, found, classes)
+    shares = [_shares(site, head, load, classes) for head, load in zip(heads, loads, strict=True)]
+    access = _access(site, found, classes, shares)
+    uplink_ns = access.delay_ns if isinstance(access, Bounded) else _assumed_ns(site)
+    candidates = [
+        Candidate(
+            cluster.head, len(cluster.members), max((found.hops.get(n, 0) for n in cluster.members), default=0), row
+        )
+        for cluster, row in zip(clusters, shares, strict=True)
+    ]
+    judged = (
+        _in_slots(site, candidates, uplink_ns) if fitted is None else _in_turns(site, fitted, candidates, uplink_ns)
+    )
+    summed = tuple(_class(index, c, judged, uplink_ns) for index, c in enumerate(classes))
+    late = () if judged.unfit or judged.cut_off or deadline_ns is None else tuple(verdict.late(summed, deadline_ns))
+    cut_off = tuple(parts.problems(judged.cut_off))
+    crowded = tuple(contention_window.too_short(scenario, site.adjacency)) if site.timetable else ()
+    return Plan(
+        scenario=scenario,
+        clusters=judged.clusters,
+        classes=summed,
+        access=access,
+        uplink_ns=uplink_ns,
+        paper=_paper(judged.clusters, scenario),
+        superframe=judged.superframe,
+        claims=None,
+        cut_off=judged.cut_off,
+        goodput=goodput(site, classes),
+        deadline_ns=deadline_ns,
+        problems=judged.unfit
+        or (
+            *cut_off,
+            *verdict.problems(scenario, judged.clusters, summed, cut_off),
+            *crowded,
+            *late,
+        ),
+        notes=(
+            *verdict.notes(access, judged.clusters, guard_ns=site.guard_ns, uplink_ns=uplink_ns),
+            *verdict.left_out(scenario),
+        ),
+    )
+
+
+def goodput(site: Site, classes: Sequence[TrafficClass]) -> Goodput | None:
+    everyone = site.scenario.traffic.destination == "all"
+    sources = next((c.sources for c in classes if c.name == "application"), ())
+    return any_protocol(site.scenario, site.adjacency, sources) if everyone else None
+
+
+def _loads(
+    heads: Sequence[NodeId], head_of: Mapping[NodeId, NodeId], found: Ways, classes: Sequence[TrafficClass]
+) -> list[list[int]]:
+    """Sources per class of each head. A node without a head counts with the lowest: some head gets its packets."""
+    homeless = frozenset(found.homeless)
+    rows = {head: [0] * len(classes) for head in heads}
+    for index, c in enumerate(classes):
+        for source in c.sources:
+            if heads and source not in homeless:
+                rows[head_of.get(source, min(heads))][index] += 1
+    return [rows[head] for head in heads]
+
+
+def _shares(site: Site, head: NodeId, load: Sequence[int], classes: Sequence[TrafficClass]) -> list[Share]:
+    """A turn is as long as the longest packet needs, whatever flies in it."""
+    if site.timetable:
+        turn_ns = superframe(site.scenario).turn_ns
+        turn = FloodCost(turn_ns, turn_ns, 1, proven=True)
+        return [
+            Share(n, c.interval_ns, turn, c.priority < wire.PRIORITY_BULK) for n, c in zip(load, classes, strict=True)
+        ]
+    return [Share(n, c.interval_ns, site.flood(head, c.payload_bytes)) for n, c in zip(load, classes, strict=True)]
+
+
+def _longest(shares: Sequence[Share]) -> FloodCost:
+    return max((s.flood for s in shares), key=lambda f: f.duration_ns, default=FloodCost(0, 1, 0, proven=True))
+
+
+def _assumed_ns(site: Site) -> int:
+    """The way to the head where nothing bounds it; a timetable lets members contend only once per period."""
+    return max(_ASSUMED_UPLINK_NS, site.scenario.clusters.period_ns) if site.timetable else _ASSUMED_UPLINK_NS
+
+
+def _access(site: Site, found: Ways, classes: Sequence[TrafficClass], shares: Sequence[Sequence[Share]]) -> Outcome:
+    """The way to the head. Under a timetable it shares no air with floods, but has to fit its window."""
+    if not site.timetable:
+        spacing_ns = min((s.flood.spacing_ns for row in shares for s in row), default=S)
+        return access_outcome(site.scenario, site.adjacency, found, classes, spacing_ns=spacing_ns)
+    outcome = access_outcome(site.scenario, site.adjacency, found, classes, spacing_ns=None)
+    if isinstance(outcome, Refused) or not any(found.hops.values()):
+        return outcome
+    turns = superframe(site.scenario)
+    if outcome.delay_ns > turns.contention_ns:
+        return Refused(
+            f"{outcome.delay_ns / 1e6:.0f} ms in the worst case, more than the contention window of "
+            f"{turns.contention_ns / 1e6:g} ms"
+        )
+    return Bounded(outcome.delay_ns + turns.period_ns - turns.contention_ns)
+
+
+def heads_of(scenario: Scenario, positions: Mapping[NodeId, Enu]) -> dict[NodeId, NodeId]:
+    """The head of each node but the leader, as the leader will assign them."""
+    clusters = members_of(scenario, positions)
+    found = {member: cluster.head for cluster in clusters for member in cluster.members}
+    return {node: head for node, head in found.items() if node != scenario.leader}
+
+
+def _fitted(site: Site, *, quick: bool) -> Fitted | Refused:
+    places = tuple(sorted(site.positions.items()))
+    return table_for(site.scenario, places, heads_of(site.scenario, site.positions), quick=quick)
+
+
+def _in_turns(site: Site, found: Fitted | Refused, candidates: Sequence[Candidate], jitter_ns: int) -> _Judged:
+    """All roots under one timetable; when the turns do not suffice, each is refused with that, and it is said."""
+    scenario = site.scenario
+    if isinstance(found, Refused):
+        refused = tuple(_refused(candidate, found, scenario.clusters.period_ns) for candidate in candidates)
+        return _Judged(refused, (), Superframe(superframe(scenario), 0, 0, None), (found.reason,))
+    lead_ns, control = scenario.radio.lead_ns, {scenario.leader: schedule_parts(scenario)}
+    judged = tuple(
+        judge(
+            found,
+            c,
+            lead_ns=lead_ns,
+            receipt_ns=receipt_ns(scenario),
+            jitter_ns=jitter_ns,
+            control=control.get(c.head, 0),
+        )
+        for c in candidates
+    )
+    turns = Superframe(found.turns, found.table.used, len(found.table.roots()), found.table, found.together)
+    return _Judged(judged, parts.missed(found.table.uncovered, leader=scenario.leader), turns)
+
+
+def _in_slots(site: Site, candidates: Sequence[Candidate], jitter_ns: int) -> _Judged:
+    """Equal slots, one head after the other, as the leader divides the period."""
+    period_ns = site.scenario.clusters.period_ns
+    slot_ns = period_ns // max(1, len(candidates))
+    judged = tuple(
+        _cluster(candidate, slot_ns=slot_ns, period_ns=period_ns, guard_ns=site.guard_ns, jitter_ns=jitter_ns)
+        for candidate in candidates
+    )
+    return _Judged(judged, parts.split(site.adjacency, leader=site.scenario.leader))
+
+
+def _refused(candidate: Candidate, why: Refused, period_ns: int) -> ClusterPlan:
+    return ClusterPlan(
+        head=candidate.head,
+        members=candidate.members,
+        hops=candidate.hops,
+        slot_ns=0,
+        usable_ns=0,
+        work_ns=work_ns(candidate.shares, period_ns=period_ns),
+        packets=_packets(candidate.shares, period_ns),
+        flood=_longest(candidate.shares),
+        delays=tuple(why if s.sources else Bounded(0) for s in candidate.shares),
+        backlog=None,
+    )
+
+
+def _cluster(candidate: Candidate, *, slot_ns: int, period_ns: int, guard_ns: int, jitter_ns: int) -> ClusterPlan:
+    shares = candidate.shares
+    usable_ns = max(0, slot_ns - guard_ns)
+    delays, waiting = slot_delays(shares, usable_ns=usable_ns, period_ns=period_ns, jitter_ns=jitter_ns)
+    return ClusterPlan(
+        head=candidate.head,
+        members=candidate.members,
+        hops=candidate.hops,
+        slot_ns=slot_ns,
+        usable_ns=usable_ns,
+        work_ns=work_ns(shares, period_ns=period_ns),
+        packets=_packets(shares, period_ns),
+        flood=_longest(shares),
+        delays=tuple(delays),
+        backlog=waiting,
+    )
+
+
+def _packets(shares: Sequence[Share], period_ns: int) -> float:
+    return sum(s.sources * period_ns / s.interval_ns for s in shares)
+
+
+def _planned(c: TrafficClass, bound: Outcome, from_head: Outcome) -> ClassPlan:
+    return ClassPlan(c.name, len(c.sources), c.interval_ns, bound, from_head, c.priority)
+
+
+def _class(index: int, c: TrafficClass, judged: _Judged, uplink_ns: int) -> ClassPlan:
+    if judged.cut_off:
+        refused = Refused(f"{len(judged.cut_off)} nodes are out of reach")
+        return _planned(c, refused, refused)
+    worst_ns = 0
+    for cluster in judged.clusters:
+        outcome = cluster.delays[index]
+        if isinstance(outcome, Refused):
+            refused = outcome if judged.unfit else Refused(f"head {cluster.head}: {outcome.reason}")
+            return _planned(c, refused, refused)
+        worst_ns = max(worst_ns, outcome.delay_ns)
+    return _planned(c, Bounded(worst_ns + uplink_ns), Bounded(worst_ns))
+
+
+def _paper(clusters: Sequence[ClusterPlan], scenario: Scenario) -> Outcome:
+    """Equations (3) and (4) of each cluster, its packets taken as evenly spaced; the greatest."""
+    worst_ns, period_ns = 0, scenario.clusters.period_ns
+    for cluster in clusters:
+        if not cluster.packets:
+            continue
+        if not cluster.usable_ns:
+            return Refused(f"head {cluster.head} has no slot")
+        found = paper.cluster_estimate(
+            airtime_ns=max(1, round(cluster.work_ns / cluster.packets)),
+            slot_ns=cluster.usable_ns,
+            period_ns=period_ns,
+            interval_ns=max(1, round(period_ns / cluster.packets)),
+        )
+        if isinstance(found, Refused):
+            return found
+        worst_ns = max(worst_ns, found.delay_ns)
+    return Bounded(worst_ns)

@@ -1,0 +1,64 @@
+"""What one flood costs where relays contend: how long until all have it, and how soon the next may follow.
+
+Around the busiest node every relay within two hops takes its turn on one channel, airtime + DIFS + the mean backoff
+each; floods closer than that pile up. The duration is that per hop, with jitter, handover and lead. An estimate:
+CSMA/CA bounds neither. Under a timetable both are exact; see `turns.py`.
+"""
+
+from typing import NamedTuple
+
+from fanet_mw.airtime import OVERHEAD_BYTES, airtime_ns
+from fanet_mw.bounds import Dcf
+from fanet_mw.graph.topology import Adjacency, levels, two_hop
+from fanet_mw.scenario import Radio, Scenario
+from fanet_mw.units import MS, NodeId
+
+
+class FloodCost(NamedTuple):
+    """`duration_ns` from the head's first bit to the last node's; `spacing_ns` to the next flood; frames sent."""
+
+    duration_ns: int
+    spacing_ns: int
+    transmissions: int
+    proven: bool
+
+
+def frame_ns(radio: Radio, payload_bytes: int) -> int:
+    """Airtime of a data frame with this UDP payload."""
+    return airtime_ns(payload_bytes + OVERHEAD_BYTES, radio, rate_mbps=radio.rate_mbps)
+
+
+def contended_ns(radio: Radio, payload_bytes: int) -> int:
+    """The same, with DIFS and a mean backoff."""
+    dcf = Dcf.of(radio)
+    return frame_ns(radio, payload_bytes) + dcf.sifs_ns + 2 * dcf.slot_ns + dcf.cw_min * dcf.slot_ns // 2
+
+
+def flood_cost(scenario: Scenario, adjacency: Adjacency, root: NodeId, *, payload_bytes: int) -> FloodCost:
+    """The cost of one flood of such a packet from this head, to all it can reach."""
+    clusters, radio = scenario.clusters, scenario.radio
+    hops = levels(adjacency, root)
+    per_frame_ns = contended_ns(radio, payload_bytes)
+    sharing = max(1 + sum(1 for n in near if n in hops) for node, near in two_hop(adjacency).items() if node in hops)
+    local_ns = round(sharing * relay_share(scenario, adjacency) * per_frame_ns)
+    wait_ns = clusters.assess_ms * MS if clusters.relay == "counter" else 0
+    per_hop_ns = round(scenario.routing.jitter_ns + wait_ns + radio.handover_ns + radio.lead_ns + local_ns)
+    transmissions = 1 + round((len(hops) - 1) * relay_share(scenario, adjacency))
+    spacing_ns = max(local_ns, round(clusters.release_gap_ms * MS))
+    return FloodCost(max(1, max(hops.values())) * per_hop_ns, spacing_ns, transmissions, proven=False)
+
+
+def relay_share(scenario: Scenario, adjacency: Adjacency) -> float:
+    """The part of the nodes that relays a flood: all; or about `gossip_degree`, or `counter`, of each neighborhood.
+
+    `heads`, `cds`, `mpr` and `claimed` relay no more than all; how much less is not estimated.
+
+    For `counter` twice the threshold of each neighborhood relays at most, as those out of range of each other do not
+    hear each other's copies.
+    """
+    clusters = scenario.clusters
+    neighbors = sum(len(near) for near in adjacency.values()) / max(1, len(adjacency))
+    if clusters.relay not in ("gossip", "counter") or neighbors == 0:
+        return 1.0
+    wanted = clusters.gossip_degree if clusters.relay == "gossip" else 2.0 * clusters.counter
+    return min(1.0, wanted / neighbors)

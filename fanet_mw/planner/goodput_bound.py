@@ -1,0 +1,95 @@
+"""How many packets per second can reach everyone, whatever the protocol. An upper bound, by counting at receivers.
+
+Of each packet everyone needs a copy. F: airtime of its frame; D: DIFS, for which a sender finds its medium idle first
+(IEEE 802.11-2020, 10.3.4.2). A station sends or receives, and receives one frame at a time, whatever the channel:
+
+    (1)  t(u) (F + D) + (L - l(u)) F <= 1       per second, at every node u that sends t(u) frames, l(u) of them for
+                                                packets of its own, L packets of all nodes together
+    (2)  sum over u in N(v) of t(u) >= L        at every node v whose neighbors N(v) are not all: they bring v what
+                                                it lacks, and one of them takes on what is v's own
+
+(1) summed over N(v), of which d nodes with a share s of the packets, and (2):      L ((F + D) + (d - s) F) <= d
+(1) summed over all n nodes, m transmissions per packet:                     L (m (F + D) + (n - 1) F) <= n
+
+A packet's m transmitters are connected and reach all. The first reaches itself and its neighbors, each other at most
+all of its neighbors but the one it has the packet from: m is not below the least number whose greatest degrees suffice.
+The least of all these is the bound. It is not known to be reachable: nothing in it says that transmissions collide at
+any but the receiver that counts.
+
+A frame with k packets counts as k of 1/k of its time each, F and D alike: the longer frame has the smaller share of
+preamble and MAC header, so k as large as a frame permits bounds all. In (2) neighbors bring packets, however many in a
+frame; (1) is a sum of times. Neither changes.
+
+Assumed: frames carry whole packets (no coding across packets), sources are equally busy, neighbors are those given.
+With fewer sources than all the rest need copies too, which is counted.
+"""
+
+from collections.abc import Collection
+from typing import NamedTuple
+
+from fanet_mw.airtime import Timing
+from fanet_mw.graph.topology import Adjacency, components
+from fanet_mw.planner.flood import frame_ns
+from fanet_mw.routing.clustered.tdma.turns import Turns
+from fanet_mw.routing.clustered.timetable.turn_plan import most_together
+from fanet_mw.scenario import Scenario
+from fanet_mw.units import NodeId, S
+
+
+class Goodput(NamedTuple):
+    """At most so many packets per second, all sources together, and what limits it."""
+
+    per_second: float
+    sources: int
+    around: NodeId | None
+    """The node whose neighbors are the bottleneck; None: the swarm as a whole is."""
+
+    @property
+    def least_interval_ns(self) -> int:
+        """Each source sends no more often than this if all is to arrive."""
+        return round(self.sources * S / self.per_second)
+
+
+def goodput_bound(
+    adjacency: Adjacency, sources: Collection[NodeId], *, send_ns: int, receive_ns: int
+) -> Goodput | None:
+    """The bound where a transmission takes its sender `send_ns` and each receiver `receive_ns`; None in parts."""
+    nodes, senders = len(adjacency), frozenset(sources)
+    if nodes < 2 or not senders or len(components(adjacency)) > 1:
+        return None
+    whole = fewest_transmissions(adjacency) * send_ns + (nodes - 1) * receive_ns
+    best = Goodput(nodes * S / whole, len(senders), None)
+    for node, near in sorted(adjacency.items()):
+        if len(near) == nodes - 1:
+            continue
+        share = sum(1 for n in near if n in senders) / len(senders)
+        per_second = len(near) * S / (send_ns + (len(near) - share) * receive_ns)
+        if per_second < best.per_second:
+            best = Goodput(per_second, len(senders), node)
+    return best
+
+
+def fewest_transmissions(adjacency: Adjacency) -> int:
+    """No flood that reaches all of a connected swarm takes fewer."""
+    missing = len(adjacency) - 2
+    for count, degree in enumerate(sorted((len(near) for near in adjacency.values()), reverse=True), start=1):
+        missing -= degree - 1
+        if missing <= 0:
+            return count
+    return len(adjacency)
+
+
+def any_protocol(scenario: Scenario, adjacency: Adjacency, sources: Collection[NodeId]) -> Goodput | None:
+    """The bound for the application's packets, over the scenario's MAC, as many in a frame as it holds."""
+    together = most_together(scenario)
+    frame = frame_ns(scenario.radio, together * scenario.traffic.payload_bytes)
+    send_ns = (frame + Timing.of(scenario.radio).difs_ns) // together
+    return goodput_bound(adjacency, sources, send_ns=send_ns, receive_ns=frame // together)
+
+
+def in_turns(turns: Turns, adjacency: Adjacency, sources: Collection[NodeId], *, together: int = 1) -> Goodput | None:
+    """The bound for any timetable of such turns, each with one frame of so many packets."""
+    if not turns.per_frame:
+        return None
+    each_ns = turns.period_ns // (turns.per_frame * together)
+    return goodput_bound(adjacency, sources, send_ns=each_ns, receive_ns=each_ns)

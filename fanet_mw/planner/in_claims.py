@@ -1,0 +1,101 @@
+"""The plan of a swarm in claimed slots. Its verdict is on rates; the only delay it states is that without queues."""
+
+from collections.abc import Iterator, Sequence
+
+from fanet_mw.bounds import Bounded, Refused
+from fanet_mw.planner import parts, verdict
+from fanet_mw.planner.claimed import Claims, NodeTurns
+from fanet_mw.planner.demand import ClassPlan, TrafficClass
+from fanet_mw.planner.feasibility import Plan, Site, goodput
+from fanet_mw.planner.flood import FloodCost
+from fanet_mw.planner.head import ClusterPlan
+from fanet_mw.scenario import Scenario
+from fanet_mw.units import MS
+
+_NO_BOUND = Refused("nothing bounds how many packets queue at a relay")
+
+
+def evaluate_claims(site: Site, classes: Sequence[TrafficClass], *, deadline_ns: int | None = None) -> Plan:
+    """Judge a scenario with `clusters.relay = "claimed"`."""
+    scenario = site.scenario
+    claimants = site.claimants()
+    claims = claimants.judge(scenario, classes)
+    claims = claims._replace(least_interval_ns=claimants.least_interval_ns(scenario, classes))
+    cut_off = parts.split(site.adjacency, leader=scenario.leader)
+    refused = Refused(f"{len(cut_off)} nodes are out of reach") if cut_off else _NO_BOUND
+    planned = tuple(ClassPlan(c.name, len(c.sources), c.interval_ns, refused, refused, c.priority) for c in classes)
+    return Plan(
+        scenario=scenario,
+        clusters=tuple(_row(node, claims) for node in claims.nodes),
+        classes=planned,
+        access=Bounded(0),
+        uplink_ns=0,
+        paper=Refused("there are no heads"),
+        superframe=None,
+        claims=claims,
+        cut_off=cut_off,
+        goodput=goodput(site, classes),
+        deadline_ns=deadline_ns,
+        problems=(*parts.problems(cut_off), *_problems(scenario, claims, planned, deadline_ns)),
+        notes=(*_notes(claims), *verdict.left_out(scenario)),
+    )
+
+
+def _row(node: NodeTurns, claims: Claims) -> ClusterPlan:
+    """A node as if it were the head of a cluster of its own."""
+    turn_ns = claims.turns.turn_ns
+    usable_ns = round((node.claimed + node.won) * turn_ns)
+    hop_ns = node.hop_ns or 0
+    return ClusterPlan(
+        head=node.node,
+        members=1,
+        hops=0,
+        slot_ns=node.claimed * turn_ns,
+        usable_ns=usable_ns,
+        work_ns=round(node.load * turn_ns),
+        packets=node.load,
+        flood=FloodCost(hop_ns, turn_ns, 1, proven=False),
+        delays=(),
+        backlog=None,
+    )
+
+
+def _problems(
+    scenario: Scenario, claims: Claims, classes: Sequence[ClassPlan], deadline_ns: int | None
+) -> Iterator[str]:
+    without = [node for node in claims.nodes if not node.claimed]
+    if without:
+        longest = max(node.superframe for node in claims.nodes) or scenario.clusters.slots
+        yield (
+            f"{len(without)} nodes have no turn, the first is node {without[0].node}: superframes of up to {longest} "
+            f"slots, a period has {claims.turns.per_frame} turns"
+        )
+        return
+    full = [node for node in claims.nodes if node.utilization > 1]
+    if full:
+        worst = claims.fullest
+        others = "" if len(full) == 1 else f"; {len(full) - 1} other nodes have too few as well"
+        yield (
+            f"node {worst.node}: its packets need {worst.load:.1f} turns a period, it has {worst.claimed} and wins "
+            f"{worst.won:.1f} by lot{others}"
+        )
+    lone_ns = claims.lone_ns
+    for c in classes:
+        said = None if lone_ns is None else verdict.expired(scenario, c, lone_ns)
+        if said is not None:
+            yield f"{said}, even without queues"
+        if deadline_ns is not None:
+            yield f"{c.name}: no bound in claimed slots, so the deadline of {deadline_ns / MS:g} ms cannot be promised"
+
+
+def _notes(claims: Claims) -> Iterator[str]:
+    lone_ns, hop_ns = claims.lone_ns, claims.hop_ns
+    if lone_ns is not None and hop_ns is not None:
+        yield (
+            f"a packet that finds no queue is with everyone within {claims.hops} hops x {hop_ns / MS:.1f} ms = "
+            f"{lone_ns / MS:.0f} ms; when packets queue nothing bounds the delay: urgent ones go first at each node"
+        )
+    yield (
+        "turns won by lot are an average, and claims made in flight may differ; what interference from beyond two hops "
+        "costs is not counted"
+    )

@@ -1,0 +1,71 @@
+"""How likely a packet misses a node under a timetable: the other half of a bound, as (delay, probability).
+
+The table says who sends in the same turn, so each copy's chance is that of its link against those senders. A packet
+reaches a node at least when every frame of one way to it survives; frames are lost independently, so
+
+    P(reached) >= max over ways of the product of their frames' chances
+
+The truth is better: other copies count too, and turns without a packet do not interfere. Holds for losses that are
+independent from frame to frame (error rates). Not for shadowing, which spoils a link for long; nor for the way of a
+member to its head, where attempts that collide once tend to collide again: there is no probability for these.
+Frames of the contention window that reach into the turns are not counted.
+"""
+
+from collections.abc import Callable, Sequence
+from typing import NamedTuple
+
+from fanet_mw.graph.topology import Adjacency
+from fanet_mw.routing.clustered.timetable.timetable import Timetable, Turn
+from fanet_mw.units import NodeId
+
+Chance = Callable[[NodeId, NodeId, tuple[NodeId, ...]], float]
+"""The probability that a receiver gets a sender's frame while others send."""
+
+
+class Loss(NamedTuple):
+    """Upper bounds of the probability that a packet does not reach a node."""
+
+    worst: float
+    root: NodeId
+    node: NodeId
+    """The pair that has the worst."""
+    mean: float
+    """Over all roots and nodes: of the share of copies that never arrive."""
+
+
+def loss(table: Timetable, adjacency: Adjacency, *, per_frame: int, hop_turns: int, chance: Chance) -> Loss:
+    """The loss of the floods of a table; `adjacency` are the links that count, the others are taken as silent."""
+    together: dict[int, list[NodeId]] = {}
+    for turn in table.turns:
+        together.setdefault(turn.offset % per_frame, []).append(turn.node)
+    floods: dict[tuple[NodeId, int], list[Turn]] = {}
+    for turn in sorted(table.turns):
+        floods.setdefault((turn.root, turn.instance), []).append(turn)
+    missed = []
+    for (root, _), turns in sorted(floods.items()):
+        heard: dict[NodeId, list[tuple[int, float]]] = {root: [(turns[0].offset - hop_turns, 1.0)]}
+        for turn in turns:
+            others = tuple(node for node in together[turn.offset % per_frame] if node != turn.node)
+            _send(turn, others, heard, adjacency, hop_turns=hop_turns, chance=chance)
+        missed += [(1 - _best(heard.get(node, ())), root, node) for node in adjacency if node != root]
+    worst, root, node = max(missed, key=lambda item: (item[0], -item[1], -item[2]))
+    return Loss(worst, root, node, sum(item[0] for item in missed) / len(missed))
+
+
+def _send(
+    turn: Turn,
+    others: tuple[NodeId, ...],
+    heard: dict[NodeId, list[tuple[int, float]]],
+    adjacency: Adjacency,
+    *,
+    hop_turns: int,
+    chance: Chance,
+) -> None:
+    """A relay sends what it heard in time; whoever it reaches may know it from there."""
+    sent = _best([item for item in heard.get(turn.node, ()) if item[0] + hop_turns <= turn.offset])
+    for node in adjacency[turn.node] if sent else ():
+        heard.setdefault(node, []).append((turn.offset, sent * chance(turn.node, node, others)))
+
+
+def _best(arrivals: Sequence[tuple[int, float]]) -> float:
+    return max((probability for _, probability in arrivals), default=0.0)

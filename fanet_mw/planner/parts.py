@@ -1,0 +1,29 @@
+"""A swarm in parts: which nodes a flood cannot reach. Then no packet can be promised to everyone."""
+
+from collections.abc import Iterator, Mapping, Sequence
+from typing import Final
+
+from fanet_mw.graph.topology import Adjacency, components
+from fanet_mw.units import NodeId
+
+_NAMED: Final = 12
+
+
+def split(adjacency: Adjacency, *, leader: NodeId) -> tuple[NodeId, ...]:
+    """The nodes that do not hear the leader over any number of hops."""
+    return tuple(sorted(node for part in components(adjacency) if leader not in part for node in part))
+
+
+def missed(uncovered: Mapping[NodeId, Sequence[NodeId]], *, leader: NodeId) -> tuple[NodeId, ...]:
+    """The same for a timetable, which knows for each root whom it does not reach."""
+    found = uncovered.get(leader) or next((nodes for _, nodes in sorted(uncovered.items()) if nodes), ())
+    return tuple(found)
+
+
+def problems(cut_off: Sequence[NodeId]) -> Iterator[str]:
+    """One sentence, if there is anything to say."""
+    if cut_off:
+        named = ", ".join(map(str, cut_off[:_NAMED]))
+        rest = f" and {len(cut_off) - _NAMED} more" if len(cut_off) > _NAMED else ""
+        noun = "node" if len(cut_off) == 1 else "nodes"
+        yield f"the swarm is in parts: no flood of the leader's part reaches {noun} {named}{rest}"

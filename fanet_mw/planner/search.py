@@ -1,0 +1,172 @@
+"""Plan a scenario, and the cheapest change that makes it feasible: fewest keys first, then the least change of values.
+
+Searched: cluster count and flooding period; under a timetable the backoff that a turn has to hold (`radio.cw_min`),
+every node a head, and at last all that makes turns short at once; where relays contend, a timetable; in claimed slots
+the backoff, how many slots, small packets together, or a timetable. Last, less application traffic: load that does not
+fit has to go.
+"""
+
+from collections.abc import Iterator, Mapping, Sequence
+from itertools import product
+from typing import Final, NamedTuple
+
+from fanet_mw.bounds import Refused
+from fanet_mw.graph.topology import Adjacency
+from fanet_mw.planner.demand import demands
+from fanet_mw.planner.feasibility import Plan, Site, evaluate, heads_of
+from fanet_mw.planner.goodput_bound import in_turns
+from fanet_mw.planner.in_claims import evaluate_claims
+from fanet_mw.planner.variant import Value, Variant, vary
+from fanet_mw.routing.clustered.timetable.turn_plan import least_interval_ns, most_together, superframe
+from fanet_mw.scenario import Scenario
+from fanet_mw.units import Enu, NodeId
+
+_COUNTS: Final = (1, 2, 3, 4, 5, 6, 8, 11, 15, 22, 30, 44, 64)
+_PERIODS: Final = (0.1, 0.2, 0.4, 0.5, 0.7, 1.0, 1.4, 2.0, 3.0, 5.0, 10.0)
+"""Of the scenario's own period."""
+_TURN_PERIODS_S: Final = (0.1, 0.2, 0.25, 0.3, 0.4, 0.5, 0.7, 1.0, 2.0, 5.0)
+_TIGHT_PERIOD_S: Final = 4.0
+_SLOTS: Final = (0, 6, 8, 10, 12, 14, 16, 20, 24, 32, 48, 64)
+WINDOWS: Final = (31, 15, 7, 3, 1)
+_SLOWER: Final = (1.1, 1.25, 1.5, 2.0, 2.5, 3.0, 4.0, 5.0, 7.0, 10.0, 20.0, 50.0, 100.0)
+
+
+class Change(NamedTuple):
+    """The cheapest change that makes a plan feasible, and what the plan then is."""
+
+    variant: Variant
+    plan: Plan
+
+
+def plan(
+    scenario: Scenario,
+    positions: Mapping[NodeId, Enu],
+    *,
+    adjacency: Adjacency | None = None,
+    sources: Sequence[NodeId] | None = None,
+    deadline_ns: int | None = None,
+) -> Plan | Refused:
+    """Judge the scenario as it stands. Refused when its traffic cannot be planned at all.
+
+    `adjacency` is who hears whom, by default everyone within `radio.range_m` (a timetable looks at positions only);
+    `sources` are the nodes that send the application's traffic; each class has to meet the deadline.
+    """
+    return _judge(Site(scenario, positions, adjacency), sources, deadline_ns)
+
+
+def _judge(
+    site: Site, sources: Sequence[NodeId] | None, deadline_ns: int | None, *, quick: bool = False
+) -> Plan | Refused:
+    classes = demands(site.scenario, sources)
+    if isinstance(classes, Refused):
+        return classes
+    if site.scenario.clusters.relay == "claimed":
+        return evaluate_claims(site, classes, deadline_ns=deadline_ns)
+    return evaluate(site, classes, deadline_ns=deadline_ns, quick=quick)
+
+
+def with_capacity(found: Plan, positions: Mapping[NodeId, Enu]) -> Plan:
+    """The same plan with the traffic interval down to which its slots carry everything; takes a second."""
+    if found.superframe is None or not found.superframe.used or found.cut_off:
+        return found
+    least = least_interval_ns(found.scenario, tuple(sorted(positions.items())), heads_of(found.scenario, positions))
+    return found._replace(superframe=found.superframe._replace(least_interval_ns=least))
+
+
+def cheapest_change(
+    scenario: Scenario,
+    positions: Mapping[NodeId, Enu],
+    *,
+    adjacency: Adjacency | None = None,
+    sources: Sequence[NodeId] | None = None,
+    deadline_ns: int | None = None,
+) -> Change | None:
+    """The least change after which `plan` is feasible; None when none of those searched is.
+
+    Nothing is searched for a swarm in parts: only nodes that come nearer help it.
+    """
+    site = Site(scenario, positions, adjacency)
+    found = _judge(site, sources, deadline_ns)
+    if isinstance(found, Plan) and found.cut_off:
+        return None
+    for group, quick in ((_changes(scenario), True), (_tightest(scenario), False), (_lighter(scenario), True)):
+        for variant in sorted(group, key=lambda v: v.size):
+            if hopeless(site.of(variant.scenario), sources):
+                continue
+            found = _judge(site.of(variant.scenario), sources, deadline_ns, quick=quick)
+            if isinstance(found, Plan) and found.feasible:
+                return Change(variant, found)
+    return None
+
+
+def hopeless(site: Site, sources: Sequence[NodeId] | None) -> bool:
+    """Whether no timetable at all carries the load in this scenario's turns; saves making one."""
+    classes = demands(site.scenario, sources)
+    if not site.timetable or isinstance(classes, Refused) or site.scenario.traffic.destination != "all":
+        return False
+    together = most_together(site.scenario)
+    turns = superframe(site.scenario, together=together)
+    limits = ((c.interval_ns, in_turns(turns, site.adjacency, c.sources, together=together)) for c in classes)
+    return any(most is not None and interval_ns < most.least_interval_ns for interval_ns, most in limits)
+
+
+def _changes(scenario: Scenario) -> Iterator[Variant]:
+    options = {"scheduled": _turn_options, "claimed": _claim_options}.get(scenario.clusters.relay, _slot_options)
+    for settings in options(scenario):
+        variant = vary(scenario, settings)
+        if variant is not None:
+            yield variant
+
+
+def _turn_options(scenario: Scenario) -> Iterator[dict[str, Value]]:
+    clusters, radio = scenario.clusters, scenario.radio
+    counts = dict.fromkeys((clusters.count, scenario.nodes.count - 1))
+    windows = dict.fromkeys((radio.cw_min, *(w for w in WINDOWS if w < radio.cw_min)))
+    periods = dict.fromkeys((clusters.flooding_period_s, *_TURN_PERIODS_S))
+    for count, window, period_s in product(counts, windows, periods):
+        yield {"clusters.count": count, "radio.cw_min": window, "clusters.flooding_period_s": period_s}
+
+
+def _tightest(scenario: Scenario) -> Iterator[Variant]:
+    """The most that turns can carry: short turns, long superframes, and fewer hellos, to fit a short window."""
+    if scenario.clusters.relay != "scheduled" or scenario.clock.modelled:
+        return  # clocks ask for slack
+    settings: dict[str, Value] = {
+        "radio.cw_min": 1,
+        "clusters.turn_slack_us": 20.0,
+        "clusters.contention_ms": 20.0,
+        "clusters.flooding_period_s": _TIGHT_PERIOD_S,
+        "routing.hello_interval_s": max(2.0, scenario.routing.hello_interval_s),
+    }
+    variant = vary(scenario, settings)
+    if variant is not None:
+        yield variant
+
+
+def _claim_options(scenario: Scenario) -> Iterator[dict[str, Value]]:
+    windows = dict.fromkeys((scenario.radio.cw_min, *(w for w in WINDOWS if w < scenario.radio.cw_min)))
+    together = dict.fromkeys((scenario.routing.aggregate, True))
+    for window, slots, aggregate in product(windows, dict.fromkeys((scenario.clusters.slots, *_SLOTS)), together):
+        yield {"radio.cw_min": window, "clusters.slots": slots, "routing.aggregate": aggregate}
+    yield from ({"clusters.relay": "scheduled", **turned} for turned in _turn_options(scenario))
+
+
+def _slot_options(scenario: Scenario) -> Iterator[dict[str, Value]]:
+    clusters, nodes = scenario.clusters, scenario.nodes.count
+    counts = dict.fromkeys((clusters.count, *(n for n in _COUNTS if n < max(2, nodes))))
+    periods = dict.fromkeys(round(clusters.flooding_period_s * factor, 6) for factor in _PERIODS)
+    for count, period_s in product(counts, periods):
+        yield {"clusters.count": count, "clusters.flooding_period_s": period_s}
+    turned: dict[str, Value] = {"clusters.relay": "scheduled"}
+    yield turned
+    turned["clusters.count"] = nodes - 1
+    for period_s in dict.fromkeys((clusters.flooding_period_s, *_TURN_PERIODS_S)):
+        yield {**turned, "clusters.flooding_period_s": period_s}
+        yield {**turned, "clusters.flooding_period_s": period_s, "clusters.guard_ms": 0.5}
+
+
+def _lighter(scenario: Scenario) -> Iterator[Variant]:
+    for factor in _SLOWER:
+        variant = vary(scenario, {"traffic.interval_s": float(f"{scenario.traffic.interval_s * factor:.6g}")})
+        if variant is not None and scenario.traffic.arrivals == "cbr":
+            yield variant

@@ -1,0 +1,212 @@
+"""A plan in lines for people. Every figure has its unit; what is not proven says so."""
+
+import textwrap
+from collections.abc import Iterator
+from typing import Final
+
+from fanet_mw.bounds import Bounded, Outcome, Refused
+from fanet_mw.planner.by_turn import Superframe
+from fanet_mw.planner.claimed import Claims
+from fanet_mw.planner.demand import ClassPlan
+from fanet_mw.planner.feasibility import Plan
+from fanet_mw.planner.head import ClusterPlan
+from fanet_mw.planner.loss import Loss
+from fanet_mw.planner.optimum import Optimum
+from fanet_mw.planner.search import Change
+from fanet_mw.units import MS, S
+
+_SHOWN: Final = 8
+"""Heads listed, the fullest first."""
+_WIDTH: Final = 100
+_LABEL: Final = 14
+
+
+def describe(found: Plan | Refused) -> str:
+    """The plan as text, without a final newline."""
+    return f"cannot be planned: {found.reason}" if isinstance(found, Refused) else "\n".join(_lines(found))
+
+
+def describe_loss(found: Loss | None) -> str:
+    """How likely a packet misses somebody."""
+    if found is None:
+        return item("loss", "no probability: shadowing, fading and obstacles spoil links for longer than a frame")
+    if not found.worst:
+        return item("loss", "none in this channel: every packet reaches everyone")
+    return item(
+        "loss",
+        f"a packet misses a node with probability {found.mean:.2g} at most on average, {found.worst:.2g} at worst "
+        f"(node {found.root} to node {found.node}), repairs not counted",
+    )
+
+
+def describe_change(change: Change | None, found: Plan) -> str:
+    """What would make it feasible."""
+    if found.cut_off:
+        return item("change", "nodes have to come nearer: nothing that can be set joins the parts of a swarm")
+    if change is None:
+        return item("change", "none of those searched (clusters, period, backoff, relays, load) makes it feasible")
+    lines = [item("change", " ".join(f"--set {argument}" for argument in change.variant.arguments))]
+    lines += [item("", f"then {_class(c, change.plan)}") for c in change.plan.classes]
+    return "\n".join(lines)
+
+
+def describe_optimum(found: Optimum | None, *, deadline_ns: int | None) -> str:
+    """What takes the least air."""
+    goal = "any proven bound" if deadline_ns is None else f"a proven bound within {deadline_ns / MS:g} ms"
+    if found is None:
+        return item("least airtime", f"nothing that was searched has {goal}")
+    plan = found.plan
+    lines = [
+        item("least airtime", " ".join(f"--set {argument}" for argument in found.variant.arguments)),
+        item(
+            "",
+            f"{found.airtime_ns / MS:.1f} ms of air per packet, {found.floods_ns / MS:.1f} ms of it relays; "
+            f"the least with {goal}, of {found.tried} tried",
+        ),
+        item("", _shape(plan)),
+    ]
+    lines += [item("", _class(c, plan)) for c in plan.classes]
+    return "\n".join(lines)
+
+
+def item(label: str, text: str) -> str:
+    """A labelled paragraph; what is to be copied is not broken."""
+    first = f"  {label:{_LABEL}}"
+    if "--set" in text:
+        return first + text
+    return textwrap.fill(text, _WIDTH, initial_indent=first, subsequent_indent=" " * len(first), break_on_hyphens=False)
+
+
+def _lines(found: Plan) -> Iterator[str]:
+    yield f"{'FEASIBLE' if found.feasible else 'NOT FEASIBLE'}  {found.scenario.name}: {_shape(found)}"
+    yield from (item("problem", problem) for problem in found.problems)
+    yield from (item("class" if index == 0 else "", _class(c, found)) for index, c in enumerate(found.classes))
+    if found.claims is not None:
+        yield from _claims(found.claims)
+    elif isinstance(found.access, Bounded):
+        yield item("to the head", "every source is one" if not found.access.delay_ns else _say(found.access))
+    if found.superframe is not None:
+        yield from _superframe(found.superframe)
+    yield from _capacity(found)
+    bottleneck = found.bottleneck
+    if bottleneck is not None and bottleneck.usable_ns:
+        whose = "the slot of head" if found.claims is None else "the turns of node"
+        yield item("bottleneck", f"{whose} {bottleneck.head}, {100 * bottleneck.utilization:.0f} % used")
+    if found.claims is not None:
+        yield from _nodes(found.claims)
+    elif found.superframe is None or found.superframe.used:
+        yield from _details(found)
+    yield from (item("note", note) for note in found.notes)
+
+
+def _details(found: Plan) -> Iterator[str]:
+    yield item("equation (4)", f"says {_say(found.paper)} per cluster: the paper's estimate, to compare with")
+    yield from _slots(found)
+
+
+def _shape(found: Plan) -> str:
+    scenario = found.scenario
+    if found.claims is not None:
+        return f"{scenario.nodes.count} nodes, floods in claimed slots"
+    relays = (
+        "collision-free floods" if found.superframe else f"floods relayed by contention ({scenario.clusters.relay})"
+    )
+    return (
+        f"{scenario.nodes.count} nodes, {scenario.clusters.count} clusters, flooding period "
+        f"{scenario.clusters.flooding_period_s:g} s, {relays}"
+    )
+
+
+def _superframe(superframe: Superframe) -> Iterator[str]:
+    turns = superframe.turns
+    yield item(
+        "superframe",
+        f"{turns.contention_ns / MS:g} ms of contention + {turns.per_frame} turns of {turns.turn_ns / MS:.3f} ms",
+    )
+    if superframe.used:
+        share = 100 * superframe.used / turns.per_frame
+        floods = "packets" if superframe.together == 1 else f"frames of {superframe.together} packets"
+        yield item("turns in use", f"{superframe.used} ({share:.0f} %) for {superframe.packets} {floods} a period")
+
+
+def _claims(claims: Claims) -> Iterator[str]:
+    turns, nodes = claims.turns, claims.nodes
+    yield item(
+        "period",
+        f"{turns.period_ns / MS:g} ms: {turns.contention_ns / MS:g} ms of contention + {turns.per_frame} turns of "
+        f"{turns.turn_ns / MS:.3f} ms",
+    )
+    lengths = sorted({node.superframe for node in nodes if node.slot is not None})
+    if lengths:
+        said = f"{lengths[0]}" if len(lengths) == 1 else f"{lengths[0]} to {lengths[-1]}"
+        yield item("superframes", f"{said} slots; {sum(node.relays for node in nodes)} of {len(nodes)} nodes relay")
+
+
+def _nodes(claims: Claims) -> Iterator[str]:
+    yield "\n    node  relays  superframe  claimed  by lot  needed  used %"
+    fullest = sorted(claims.nodes, key=lambda node: (-node.utilization, node.node))
+    for node in fullest[:_SHOWN]:
+        yield (
+            f"    {node.node:4}  {'yes' if node.relays else 'no':>6}  {node.superframe:10}  {node.claimed:7}  "
+            f"{node.won:6.1f}  {node.load:6.1f}  {100 * node.utilization:6.0f}"
+        )
+    if len(fullest) > _SHOWN:
+        yield f"    and {len(fullest) - _SHOWN} nodes with no fuller turns"
+    yield ""
+
+
+def _capacity(found: Plan) -> Iterator[str]:
+    """What this configuration carries, against what no protocol can exceed."""
+    carried, most = found.carried_per_second, found.goodput
+    application = next((c for c in found.classes if c.name == "application"), None)
+    if carried is not None and application is not None:
+        about = "" if found.superframe else "about "
+        yield item(
+            "capacity",
+            f"{about}one packet per source every {application.sources / carried:.3f} s ({carried:.0f} a second)",
+        )
+    if most is not None:
+        share = "" if carried is None else f"; this configuration: {100 * carried / most.per_second:.0f} % of that"
+        yield item(
+            "any protocol",
+            f"at most one packet per source every {most.least_interval_ns / S:.3f} s ({most.per_second:.0f} a second) "
+            f"can reach everyone{share}",
+        )
+
+
+def _class(c: ClassPlan, found: Plan) -> str:
+    line = f"{c.name}, {c.sources} sources every {c.interval_ns / S:g} s: {_say(c.bound)}"
+    if isinstance(c.bound, Bounded) and isinstance(c.from_head, Bounded) and c.bound != c.from_head:
+        line += f" ({c.from_head.delay_ns / S:.3f} s from the head on)"
+    if isinstance(c.bound, Bounded) and not found.proven:
+        line += ", an estimate"
+    if found.claims is not None and found.claims.lone_ns is not None and not found.cut_off:
+        line += f"; at most {found.claims.lone_ns / S:.3f} s without queues"
+    if found.deadline_ns is not None:
+        verdict = "met" if c.meets(found.deadline_ns) else "NOT met"
+        line += f"; deadline {found.deadline_ns / S:g} s {verdict}"
+    return line
+
+
+def _slots(found: Plan) -> Iterator[str]:
+    yield "\n    head  members  hops  slot ms  flood ms  packets/period  used %  waiting"
+    fullest = sorted(found.clusters, key=lambda c: (-c.utilization, c.head))
+    yield from (_cluster(cluster) for cluster in fullest[:_SHOWN])
+    if len(fullest) > _SHOWN:
+        yield f"    and {len(fullest) - _SHOWN} heads with no fuller slots"
+    yield ""
+
+
+def _cluster(c: ClusterPlan) -> str:
+    queue = "-" if c.backlog is None else str(c.backlog)
+    used = f"{100 * c.utilization:.0f}" if c.usable_ns else "-"
+    return (
+        f"    {c.head:4}  {c.members:7}  {c.hops:4}  {c.slot_ns / MS:7.1f}  {c.flood.duration_ns / MS:8.1f}  "
+        f"{c.packets:14.1f}  {used:>6}  {queue:>7}"
+    )
+
+
+def _say(outcome: Outcome) -> str:
+    if isinstance(outcome, Bounded):
+        return f"at most {outcome.delay_ns / S:.3f} s"
+    return f"no bound ({outcome.reason})"

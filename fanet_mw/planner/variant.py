@@ -1,0 +1,61 @@
+"""A scenario with some settings changed, and how great a change that is.
+
+Settings are keys of the scenario, so that what the planner proposes can be flown: `arguments` are what `--set` takes.
+"""
+
+import math
+from collections.abc import Mapping
+from typing import NamedTuple
+
+from fanet_mw.errors import ConfigError
+from fanet_mw.scenario import Scenario, config
+
+Value = float | int | str
+
+
+class Variant(NamedTuple):
+    """A valid scenario and what was changed to get it."""
+
+    scenario: Scenario
+    settings: tuple[tuple[str, Value], ...]
+    octaves: float
+    """The sum of the changes of numbers, each as the logarithm of new over old."""
+
+    @property
+    def arguments(self) -> tuple[str, ...]:
+        """KEY=VALUE of each setting."""
+        return tuple(f"{key}={_text(value)}" for key, value in self.settings)
+
+    @property
+    def size(self) -> tuple[int, float, tuple[str, ...]]:
+        """To compare changes by: keys, then octaves; the rest only settles ties."""
+        return len(self.settings), self.octaves, self.arguments
+
+
+def vary(scenario: Scenario, settings: Mapping[str, Value]) -> Variant | None:
+    """The scenario with these settings; None when it is not valid, or nothing differs."""
+    tree = scenario.model_dump(exclude_none=True)
+    changed: list[tuple[str, Value]] = []
+    octaves = 0.0
+    for key, value in settings.items():
+        *path, last = key.split(".")
+        table = tree
+        for part in path:
+            table = table[part]
+        old = table.get(last)
+        if old == value:
+            continue
+        changed.append((key, value))
+        if isinstance(old, float | int) and not isinstance(value, str):
+            octaves += abs(math.log2(value / old)) if old > 0 and value > 0 else 1.0
+        table[last] = value
+    if not changed:
+        return None
+    try:
+        return Variant(config.build(tree), tuple(changed), octaves)
+    except ConfigError:
+        return None
+
+
+def _text(value: Value) -> str:
+    return value if isinstance(value, str) else f"{value:.6g}"

@@ -1,0 +1,79 @@
+"""What a plan says in sentences: why it is not feasible, what its bounds assume, what they leave out."""
+
+from collections.abc import Iterator, Sequence
+from typing import Final
+
+from fanet_mw import wire
+from fanet_mw.bounds import Bounded, Outcome, Refused
+from fanet_mw.planner.demand import ClassPlan
+from fanet_mw.planner.head import ClusterPlan
+from fanet_mw.scenario import Scenario
+from fanet_mw.units import MS, S
+
+_LIFETIMES: Final = {wire.PRIORITY_SAFETY: "safety_lifetime_s", wire.PRIORITY_REPORT: "report_lifetime_s"}
+
+
+def late(classes: Sequence[ClassPlan], deadline_ns: int) -> Iterator[str]:
+    for c in classes:
+        if isinstance(c.bound, Bounded) and not c.meets(deadline_ns):
+            yield (f"{c.name}: takes up to {c.bound.delay_ns / MS:.1f} ms, the deadline is {deadline_ns / MS:g} ms")
+
+
+def expired(scenario: Scenario, c: ClassPlan, delay_ns: int) -> str | None:
+    """What is said of a class whose packets may die of age on their way; None: they do not."""
+    lifetime_ns = scenario.routing.lifetime_ns(c.priority)
+    if delay_ns <= lifetime_ns:
+        return None
+    own = _LIFETIMES.get(c.priority, "")
+    key = own if own and getattr(scenario.routing, own) else "lifetime_s"
+    return f"{c.name}: takes up to {delay_ns / S:.1f} s, and expires after routing.{key} = {lifetime_ns / S:g}"
+
+
+def problems(
+    scenario: Scenario, clusters: Sequence[ClusterPlan], classes: Sequence[ClassPlan], cut_off: Sequence[str]
+) -> Iterator[str]:
+    full = sorted((c for c in clusters if c.utilization > 1), key=lambda c: (-c.utilization, c.head))
+    if full:
+        worst = full[0]
+        others = "" if len(full) == 1 else f"; {len(full) - 1} other slots are too full as well"
+        yield (
+            f"head {worst.head}: the {worst.packets:.1f} packets of a flooding period take "
+            f"{worst.work_ns / 1e6:.1f} ms, its slot of {worst.slot_ns / 1e6:.1f} ms has "
+            f"{worst.usable_ns / 1e6:.1f} ms for them{others}"
+        )
+    for cluster in clusters:
+        if cluster.backlog is not None and cluster.backlog > scenario.routing.queue_frames:
+            yield (
+                f"head {cluster.head}: up to {cluster.backlog} packets wait, "
+                f"routing.queue_frames = {scenario.routing.queue_frames}"
+            )
+    for c in classes:
+        if isinstance(c.bound, Refused):
+            if not full and not cut_off:
+                yield f"{c.name}: {c.bound.reason}"
+            continue
+        said = expired(scenario, c, c.bound.delay_ns)
+        if said is not None:
+            yield said
+
+
+def left_out(scenario: Scenario) -> Iterator[str]:
+    if scenario.radio.channel != "range":
+        yield "who hears whom is taken by distance, up to radio.range_m, whatever the channel does"
+    if scenario.clusters.repair_s > 0:
+        yield "repairs of lost packets come later than any bound here, and their load is not counted"
+
+
+def notes(access: Outcome, clusters: Sequence[ClusterPlan], *, guard_ns: int, uplink_ns: int) -> Iterator[str]:
+    if isinstance(access, Refused):
+        yield f"the way to the head is assumed to take at most {uplink_ns / S:g} s, not proven: {access.reason}"
+    if any(not cluster.flood.proven for cluster in clusters):
+        yield "floods are relayed by CSMA/CA: their duration and spacing are estimates, and losses are not counted"
+        tail_ns = max(cluster.flood.duration_ns - cluster.flood.spacing_ns for cluster in clusters)
+        if tail_ns > guard_ns:
+            yield (
+                f"a slot's last flood runs about {tail_ns / 1e6:.0f} ms into the next slot, the guard time is "
+                f"{guard_ns / 1e6:g} ms: floods of neighboring slots meet"
+            )
+    else:
+        yield "floods hold their bound while no frame is lost and the nodes are where the timetable has them"

@@ -1,1 +1,0 @@
-"""The sans-IO core: no clock, no socket, no thread."""

@@ -1,0 +1,135 @@
+"""How the leader divides the nodes it knows, and when it does so anew. Pure functions of what it knows.
+
+What stands is first carried on: members that are gone leave, a head that is gone is replaced by who stands in for it,
+newcomers go to the nearest head. Then it is weighed against a new division by what it costs: hops from each member to
+its head, and members above the fair share. The new one is taken only when what stands costs `_WORSE` times as much, and
+then heads, and their slots, are kept where they are nearly as good.
+"""
+
+import math
+from collections.abc import Mapping, Sequence
+from typing import Final
+
+from fanet_mw.graph.topology import Adjacency, levels
+from fanet_mw.routing.clustered.clustering import (
+    AffinityPropagation,
+    Balanced,
+    Cluster,
+    Clustering,
+    LastingDegree,
+    Maintenance,
+    Swarm,
+    Weights,
+    by_degree,
+    by_id,
+)
+from fanet_mw.routing.clustered.clustering.election import Score
+from fanet_mw.units import NodeId, S
+
+_WORSE: Final = 1.25
+_CONTENTION_NS: Final = 3 * S
+"""Heads that meet wait this long before one gives way (Basu et al. 2001)."""
+
+
+class Division:
+    """One leader's way of dividing, `clusters.method` of the scenario."""
+
+    def __init__(self, method: str, *, count: int, range_m: float) -> None:
+        scores: dict[str, Score] = {"lowest_id": by_id, "highest_degree": by_degree}
+        scores["wca"] = Weights(range_m).__call__
+        scores["lasting_degree"] = LastingDegree(range_m).__call__
+        self._count = count if method == "balanced" else None
+        self._once: Clustering = AffinityPropagation(range_m) if method == "affinity" else Balanced(count)
+        self._over_time = (
+            Maintenance(scores[method], keep=math.inf, contention_ns=_CONTENTION_NS, patient=True)
+            if method in scores
+            else None
+        )
+
+    def divide(self, swarm: Swarm, *, now_ns: int) -> list[Cluster]:
+        """A new division; `swarm.previous` stands."""
+        if self._over_time is None:
+            return self._once.divide(swarm)
+        self._over_time.clusters = list(swarm.previous)
+        return self._over_time.step(swarm, now_ns=now_ns)
+
+    def renew(
+        self, standing: Sequence[Cluster], swarm: Swarm, stand_ins: Mapping[NodeId, NodeId], *, now_ns: int
+    ) -> list[Cluster]:
+        """The clusters from now on, in order of their slots; what stands, if that is good enough."""
+        kept = carried_on(standing, swarm, stand_ins)
+        fresh = self.divide(swarm._replace(previous=kept), now_ns=now_ns)
+        if kept and self._keeps_promise(kept, len(fresh), swarm.adjacency):
+            fair = math.ceil(len(swarm.adjacency) / len(kept)) if self._count else len(swarm.adjacency)
+            if cost(kept, swarm.adjacency, fair=fair) <= _WORSE * cost(fresh, swarm.adjacency, fair=fair):
+                return kept
+        return in_their_slots(fresh, kept, swarm.adjacency)
+
+    def _keeps_promise(self, kept: Sequence[Cluster], fresh: int, adjacency: Adjacency) -> bool:
+        """As many clusters as there should be, or, where the method promises it, every member hears its head."""
+        if self._count is not None:
+            return len(kept) == fresh
+        return all(m == cluster.head or m in adjacency[cluster.head] for cluster in kept for m in cluster.members)
+
+
+def cost(clusters: Sequence[Cluster], adjacency: Adjacency, *, fair: int) -> float:
+    """Transmissions that bring a packet of each member to its head, and one for each member above the fair share."""
+    total = 0
+    for cluster in clusters:
+        total += _distance(cluster.head, cluster.members, adjacency) + max(0, len(cluster.members) - fair)
+    return total
+
+
+def _distance(head: NodeId, members: Sequence[NodeId], adjacency: Adjacency) -> int:
+    """Hops to the head, over all members; as many as there are nodes where there is no way."""
+    hops = levels(adjacency, head)
+    return sum(hops.get(member, len(adjacency)) for member in members)
+
+
+def carried_on(standing: Sequence[Cluster], swarm: Swarm, stand_ins: Mapping[NodeId, NodeId]) -> list[Cluster]:
+    """The standing clusters without those who are gone and with those who are new."""
+    here = swarm.adjacency
+    clusters = []
+    for cluster in standing:
+        members = [node for node in cluster.members if node in here]
+        if members:
+            stand_in = stand_ins.get(cluster.head, cluster.head)
+            head = next((node for node in (cluster.head, stand_in) if node in members), None)
+            clusters.append(Cluster(head or _nearest_to_all(members, here), tuple(members)))
+    placed = {node for cluster in clusters for node in cluster.members}
+    hops = [levels(here, cluster.head) for cluster in clusters]
+    for node in sorted(here):
+        if node not in placed and clusters:
+            best = min(range(len(clusters)), key=lambda k: (hops[k].get(node, len(here)), len(clusters[k].members), k))
+            clusters[best] = clusters[best]._replace(members=tuple(sorted((*clusters[best].members, node))))
+    return clusters
+
+
+def _nearest_to_all(members: Sequence[NodeId], adjacency: Adjacency) -> NodeId:
+    return min(members, key=lambda node: (_distance(node, members, adjacency), node))
+
+
+def in_their_slots(fresh: Sequence[Cluster], kept: Sequence[Cluster], adjacency: Adjacency) -> list[Cluster]:
+    """The new clusters, heads kept where they are nearly as near to their members, and each kept head in its slot."""
+    slot_of = {cluster.head: slot for slot, cluster in enumerate(kept)}
+    slots: dict[int, Cluster] = {}
+    rest = []
+    for cluster in fresh:
+        best = _distance(cluster.head, cluster.members, adjacency)
+        held = [node for node in cluster.members if node in slot_of]
+        near = [(_distance(node, cluster.members, adjacency), node) for node in held]
+        hops, head = min(near, default=(len(adjacency) ** 2, cluster.head))
+        chosen = cluster._replace(head=head) if hops <= _WORSE * best + 1 else cluster
+        slot = slot_of.get(chosen.head, len(fresh))
+        if slot < len(fresh):
+            slots[slot] = chosen
+        else:
+            rest.append(chosen)
+    return [slots[slot] if slot in slots else rest.pop(0) for slot in range(len(fresh))]
+
+
+def drift(before: Adjacency, after: Adjacency) -> float:
+    """The share of links, of both, that only one of them has."""
+    links = [{(a, b) for a, near in adjacency.items() for b in near if a < b} for adjacency in (before, after)]
+    either = len(links[0] | links[1])
+    return len(links[0] ^ links[1]) / either if either else 0.0

@@ -1,0 +1,152 @@
+"""Heads by rank: the best node without a head becomes one, and takes its neighbors that have none (Gerla & Tsai 1995).
+
+The heads are a maximal independent set, so each node hears a head or is one. What tells the methods apart is the score
+alone (lower is better; equal scores: lower id):
+
+    lowest-ID        Ephremides, Wieselthier & Baker 1987      the id
+    highest degree   Gerla & Tsai 1995                         most neighbors
+    WCA              Chatterjee, Das & Turgut 2002             w1 |d - d0| + w2 distances + w3 mobility + w4 energy used
+    MOBIC            Basu, Khan & Little 2001                  aggregate local mobility
+    lasting degree   ours                                      neighbors, by how long they will be in range
+
+Hysteresis: a head that stands is counted `keep` better than its score. With infinity only a better head in range
+deposes it (least cluster change, Chiang et al. 1997); pairs under `truce` may meanwhile hear each other. Members keep
+their head while they hear it.
+"""
+
+import math
+from collections.abc import Callable, Collection, Mapping
+from typing import Final, NamedTuple
+
+from fanet_mw.graph.topology import Adjacency
+from fanet_mw.routing.clustered.clustering.contract import Cluster, Promise, Swarm, heads_of
+from fanet_mw.routing.clustered.clustering.mobility import link_lifetime_s
+from fanet_mw.units import NodeId
+
+Score = Callable[[NodeId, Swarm], float]
+Pair = tuple[NodeId, NodeId]
+"""Two heads, the lower id first."""
+
+
+def by_id(node: NodeId, swarm: Swarm) -> float:
+    """Lowest-ID."""
+    return float(node)
+
+
+def by_degree(node: NodeId, swarm: Swarm) -> float:
+    """Highest degree."""
+    return -float(len(swarm.adjacency[node]))
+
+
+def by_mobility(node: NodeId, swarm: Swarm) -> float:
+    """MOBIC."""
+    return swarm.mobility.get(node, 0.0)
+
+
+class Weights(NamedTuple):
+    """WCA's combined weight. Distances count in units of `range_m`, so that the terms are of one size.
+
+    The paper's weights are 0.7, 0.2, 0.05, 0.05; its fourth term is the time spent as head, for which we take the
+    energy used. `ideal_degree` is the number of members a head can serve.
+    """
+
+    range_m: float
+    ideal_degree: int = 10
+    degree: float = 0.7
+    distance: float = 0.2
+    mobility: float = 0.05
+    energy: float = 0.05
+
+    def __call__(self, node: NodeId, swarm: Swarm) -> float:
+        at = swarm.positions[node]
+        neighbors = swarm.adjacency[node]
+        distances_m = math.fsum(swarm.positions[n].minus(at).norm() for n in neighbors)
+        return (
+            self.degree * abs(len(neighbors) - self.ideal_degree)
+            + self.distance * distances_m / self.range_m
+            + self.mobility * swarm.mobility.get(node, 0.0)
+            + self.energy * (1 - swarm.energy.get(node, 1.0))
+        )
+
+
+class LastingDegree(NamedTuple):
+    """How many neighbors a head would keep, each counted by the part of the horizon it will be in range."""
+
+    range_m: float
+    horizon_s: float = 30.0
+
+    def __call__(self, node: NodeId, swarm: Swarm) -> float:
+        return -math.fsum(
+            min(link_lifetime_s(swarm, node, n, range_m=self.range_m), self.horizon_s) / self.horizon_s
+            for n in swarm.adjacency[node]
+        )
+
+
+class Elected(NamedTuple):
+    """A method of this file: a score, and how much better a standing head counts."""
+
+    score: Score
+    keep: float = 0.0
+    truce: frozenset[Pair] = frozenset()
+
+    @property
+    def promise(self) -> Promise:
+        return Promise(dominating=True, independent=not self.truce)
+
+    def divide(self, swarm: Swarm) -> list[Cluster]:
+        scores = {node: self.score(node, swarm) for node in sorted(swarm.adjacency)}
+        standing = frozenset(heads_of(swarm.previous))
+        ranks = {node: (score - self.keep if node in standing else score, score) for node, score in scores.items()}
+        heads = _elect(swarm.adjacency, ranks, self.truce)
+        return _gather(swarm, heads)
+
+
+LOWEST_ID: Final = Elected(by_id)
+HIGHEST_DEGREE: Final = Elected(by_degree)
+MOBIC: Final = Elected(by_mobility)
+
+
+def _elect(adjacency: Adjacency, ranks: Mapping[NodeId, tuple[float, float]], truce: Collection[Pair]) -> list[NodeId]:
+    """The heads, best first."""
+    heads: dict[NodeId, None] = {}
+    for node in sorted(adjacency, key=lambda n: (ranks[n], n)):
+        heard = (n for n in adjacency[node] if n in heads)
+        if all((min(node, head), max(node, head)) in truce for head in heard):
+            heads[node] = None
+    return list(heads)
+
+
+def _gather(swarm: Swarm, heads: list[NodeId]) -> list[Cluster]:
+    """Each member stays with the head it had, or joins the best one it hears."""
+    before = {member: cluster.head for cluster in swarm.previous for member in cluster.members}
+    place = {head: index for index, head in enumerate(heads)}
+    members: dict[NodeId, list[NodeId]] = {head: [head] for head in heads}
+    for node in sorted(swarm.adjacency):
+        if node in place:
+            continue
+        heard = [n for n in swarm.adjacency[node] if n in place]
+        assert heard, "a node that is no head was covered by one"
+        mine = before.get(node)
+        members[mine if mine in heard else min(heard, key=place.__getitem__)].append(node)
+    return [Cluster(head, tuple(sorted(members[head]))) for head in sorted(heads)]
+
+
+def succession(cluster: Cluster, swarm: Swarm) -> tuple[NodeId, ...]:
+    """The head, then who stands in for it: those who hear the head first, since they notice first that it is gone."""
+    near, inside = frozenset(swarm.adjacency[cluster.head]), frozenset(cluster.members)
+
+    def rank(node: NodeId) -> tuple[bool, int, NodeId]:
+        return node not in near, -sum(1 for n in swarm.adjacency[node] if n in inside), node
+
+    return (cluster.head, *sorted((node for node in cluster.members if node != cluster.head), key=rank))
+
+
+def backup_head(cluster: Cluster, swarm: Swarm, score: Score = by_id) -> NodeId | None:
+    """Who takes over when the head dies: the member that hears most of the others; by score, then id, when equal."""
+    others = [node for node in cluster.members if node != cluster.head]
+    inside = frozenset(others)
+
+    def rank(node: NodeId) -> tuple[int, float, NodeId]:
+        return -sum(1 for n in swarm.adjacency[node] if n in inside), score(node, swarm), node
+
+    return min(others, key=rank, default=None)

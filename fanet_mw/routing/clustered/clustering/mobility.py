@@ -1,0 +1,37 @@
+"""How nodes move relative to each other: what MOBIC hears in received powers, and how long a link will last."""
+
+import math
+from collections.abc import Iterable
+
+from fanet_mw.routing.clustered.clustering.contract import Swarm
+from fanet_mw.units import Enu, NodeId
+
+
+def aggregate_mobility_db2(powers_dbm: Iterable[tuple[float, float]]) -> float:
+    """MOBIC's M of one node [dB^2]: the mean square of the relative mobility to each neighbor (Basu et al. 2001).
+
+    Each pair is (previous, new) received power of two successive hellos of one neighbor. Their ratio, new - previous
+    in dB, is positive when it comes nearer. Mean square and not variance: the deviation is from 0, from not moving.
+    """
+    squares = [(new - old) ** 2 for old, new in powers_dbm]
+    return math.fsum(squares) / len(squares) if squares else 0.0
+
+
+def link_lifetime_s(swarm: Swarm, a: NodeId, b: NodeId, *, range_m: float) -> float:
+    """When two nodes will leave each other's range, if both fly on straight [s]; infinite at equal velocities.
+
+    Link expiration time after Su, Lee & Gerla 2001: the greater root of |offset + t drift| = range.
+    """
+    rest = Enu(0.0, 0.0, 0.0)
+    offset = swarm.positions[b].minus(swarm.positions[a])
+    drift = swarm.velocities.get(b, rest).minus(swarm.velocities.get(a, rest))
+    speed2 = _dot(drift, drift)
+    if speed2 <= 0.0:
+        return math.inf
+    along = _dot(offset, drift)
+    inside = along * along - speed2 * (_dot(offset, offset) - range_m * range_m)
+    return max(0.0, (math.sqrt(inside) - along) / speed2) if inside >= 0 else 0.0
+
+
+def _dot(a: Enu, b: Enu) -> float:
+    return a.east * b.east + a.north * b.north + a.up * b.up

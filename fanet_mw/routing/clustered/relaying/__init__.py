@@ -1,0 +1,1 @@
+"""Which nodes pass a flooded packet on."""

@@ -1,0 +1,202 @@
+"""Finds the events that change a node's part in the swarm, and takes the rows of `states.TRANSITIONS` for them.
+
+    announcements, stand-ins, signs of life, instants -> events -> table -> actions, which `clustered.py` carries out
+
+A head is silent when nothing that it generated, and no newer sequence of it in the hellos, has come for four hello
+intervals, or for two after the MAC gave it up. The first in the succession then stands in for it, the next
+ones half an interval later each. Only who had news of the head before judges it: others merely never were near it.
+"""
+
+from typing import Final
+
+from fanet_mw.routing.clustered.forwarding.gradient import Gradient
+from fanet_mw.routing.clustered.roles.lease import Authority, Lease
+from fanet_mw.routing.clustered.roles.membership import Membership
+from fanet_mw.routing.clustered.roles.signs_of_life import Signs
+from fanet_mw.routing.clustered.roles.states import Action, Event, State, step
+from fanet_mw.units import MS, NodeId
+from fanet_mw.wire.inner import Join, Schedule
+
+SILENT_HELLOS: Final = 4.0
+"""Of a head, or of any neighbor in a timetable (`silence.py`)."""
+_GIVEN_UP_HELLOS: Final = 2.0
+_TURN_HELLOS: Final = 0.5
+_AGAIN_HELLOS: Final = 2.0
+"""Who stands in says so again at this interval, until a new schedule confirms it or the head objects."""
+_OBJECT_NS: Final = 500 * MS
+
+
+class Upkeep:
+    """One node's part in the swarm."""
+
+    def __init__(
+        self,
+        *,
+        membership: Membership,
+        gradient: Gradient,
+        signs: Signs,
+        lease: Lease,
+        node: NodeId,
+        hello_ns: int,
+        takes_slot: bool,
+    ) -> None:
+        """`takes_slot`: who stands in for a head serves its slot; else it only tells the leader."""
+        self.state = State.SEEKING
+        self.silent_head = NodeId(0)
+        """Whom we stand in for, while we do."""
+        self._takes_slot = takes_slot
+        self._node = node
+        self._membership = membership
+        self._gradient = gradient
+        self._signs = signs
+        self._lease = lease
+        self._hello_ns = hello_ns
+        self._since_ns = 0
+        """Since when we follow the head that we follow."""
+        self._named = NodeId(0)
+        self._given_up_ns = -1
+        self._object_ns = 0
+        self._watch_ns: int | None = None
+
+    def start(self, now_ns: int, *, leads: bool) -> None:
+        self._lease.start(now_ns)
+        if leads:
+            self._lease.take_office(now_ns)
+            self.state = State.LEADING
+
+    @property
+    def placed(self) -> bool:
+        """Whether the leader that we obey has given us a place."""
+        version = self._membership.version
+        return self._membership.assigned and version is not None and version.authority == self._lease.authority
+
+    # --- what the air brings --------------------------------------------------------------------------------------
+
+    def announced(self, schedule: Schedule, *, guard_ns: int, born_ns: int, now_ns: int) -> list[Action]:
+        """A leader's announcement, first copy or ours."""
+        authority, leads = Authority(schedule.term, schedule.leader), self.state is State.LEADING
+        own = self._lease.authority
+        if schedule.leader == self._node:
+            if not leads or authority != own:
+                return []  # from before we started again, or stepped down
+        elif leads and own is not None and authority > own:
+            return []  # a junior one: it will hear us
+        actions = []
+        if not leads or authority != own:
+            prevails = own != authority
+            if leads:
+                self._lease.authority = None  # the senior prevails over what we are
+            if not self._lease.accept(authority, born_ns=born_ns, now_ns=now_ns):
+                self._lease.authority = own
+                return []
+            if prevails:
+                if leads:
+                    self._membership.forget()
+                actions.append(self._take(Event.NEW_LEADER, now_ns))
+        event = self._membership.learn(schedule, guard_ns=guard_ns) if schedule.members else None
+        if event is not None:
+            actions.append(self._take(event, now_ns))
+        return actions
+
+    def stands_in(self, join: Join, *, born_ns: int, now_ns: int) -> list[Action]:
+        """A node says that it stands in for the head of a cluster; in a timetable, that some node is silent."""
+        member = self._membership
+        if not self._takes_slot and (join.instead_of == self._node or join.instead_of != member.head):
+            return self._object(join, now_ns)
+        rank, current = member.rank(join.node), member.rank(member.head)
+        if not rank or current is None or self.state is State.LEADING or join.node == join.instead_of:
+            return []  # of another cluster, or another epoch, or a head that objects
+        if self.state is State.HEAD:
+            return [self._take(Event.HEAD_REPLACED, now_ns)]
+        sign_ns = self._signs.last_ns(member.head) or 0
+        if join.node == member.head or (current < rank and (member.head == self._node or sign_ns > born_ns)):
+            return []
+        if self._takes_slot:
+            member.follow(NodeId(join.node))
+        return [self._take(Event.HEAD_REPLACED, now_ns)]
+
+    def _object(self, join: Join, now_ns: int) -> list[Action]:
+        """Are we said to be silent? Said often, it is answered seldom: each answer is a flood."""
+        called = join.instead_of == self._node != join.node
+        if not called or now_ns < self._object_ns or self.state in (State.SEEKING, State.LEADING):
+            return []
+        self._object_ns = now_ns + _OBJECT_NS
+        return [self._take(Event.SAID_SILENT, now_ns)]
+
+    def lives(self, node: int, *, born_ns: int, now_ns: int) -> list[Action]:
+        """A sign of life."""
+        self._signs.heard(node, born_ns=born_ns)
+        member = self._membership
+        if node != member.named_head or born_ns <= self._since_ns:
+            return []
+        replaced = self.state is State.ACTING or (self.state is State.MEMBER and member.head != node)
+        return [self._take(Event.HEAD_BACK, now_ns)] if replaced else []
+
+    def given_up(self, node: NodeId, *, now_ns: int) -> None:
+        """The MAC could not reach this neighbor."""
+        if node == self._membership.head and self.state is State.MEMBER:
+            self._given_up_ns = now_ns
+            self._watch_ns = now_ns
+
+    # --- time -----------------------------------------------------------------------------------------------------
+
+    def next_wake_ns(self) -> int | None:
+        if self.state is State.LEADING:
+            return None
+        stand_ns = self._lease.next_wake_ns()
+        return stand_ns if self._watch_ns is None or stand_ns < self._watch_ns else self._watch_ns
+
+    def wake(self, now_ns: int) -> list[Action]:
+        if self.state is State.LEADING:
+            return []
+        if self._lease.must_stand(now_ns):
+            self._lease.take_office(now_ns)
+            return [self._take(Event.LEADER_SILENT, now_ns)]
+        if self._watch_ns is None or now_ns < self._watch_ns:
+            return []
+        if self.state is State.ACTING:
+            self._watch_ns = now_ns + int(_AGAIN_HELLOS * self._hello_ns)
+            return [self._take(Event.HEAD_SILENT, now_ns)]
+        return self._judge(now_ns)
+
+    def _judge(self, now_ns: int) -> list[Action]:
+        """Whether it is our turn to stand in for the head."""
+        member = self._membership
+        rank, current = member.rank(self._node), member.rank(member.head)
+        if self.state is not State.MEMBER or not rank or current is None or rank <= current:
+            self._watch_ns = None
+            return []
+        news_ns = self._gradient.news_ns(member.head)
+        if news_ns is None or news_ns < self._since_ns:
+            self._watch_ns = now_ns + self._hello_ns
+            return []  # never near it since we follow it
+        sign_ns = max(news_ns, self._signs.last_ns(member.head) or 0)
+        hellos = _GIVEN_UP_HELLOS if self._given_up_ns > sign_ns else SILENT_HELLOS
+        due_ns = sign_ns + int((hellos + (rank - current - 1) * _TURN_HELLOS) * self._hello_ns)
+        if now_ns < due_ns:
+            self._watch_ns = due_ns
+            return []
+        self._watch_ns = now_ns + int(_AGAIN_HELLOS * self._hello_ns)
+        return [self._take(Event.HEAD_SILENT, now_ns)]
+
+    # --- the table ------------------------------------------------------------------------------------------------
+
+    def _take(self, event: Event, now_ns: int) -> Action:
+        """The only place where the state changes."""
+        before = self.state
+        self.state, action = step(before, event)
+        member = self._membership
+        if event in (Event.NAMED_MEMBER, Event.NAMED_HEAD, Event.HEAD_BACK):
+            member.obey()
+        elif action in (Action.LEAVE, Action.RESIGN, Action.STEP_DOWN):
+            member.resign()
+        elif action is Action.TAKE_OVER and before is not State.ACTING:
+            self.silent_head, self._since_ns = member.head, now_ns
+            if self._takes_slot:
+                member.follow(self._node)
+        if action is Action.FOLLOW:
+            if event is not Event.NAMED_MEMBER or self._named != member.named_head:
+                self._since_ns = now_ns  # else what was known of the head still holds
+            self._named = member.named_head
+            self._watch_ns = now_ns + self._hello_ns
+        return action

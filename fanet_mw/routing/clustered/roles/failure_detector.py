@@ -1,0 +1,55 @@
+"""Which neighbors have fallen silent, where that cuts others off: in a timetable a dead relay loses all behind it.
+
+    no hello of it for 4 intervals, and nothing that it generated -> with our next hello a join that says so, unless
+    another has said it -> it objects, and stays; or the leader makes a timetable without it
+
+A neighbor that flew away looks the same from here: then it objects, and nothing more is said of it until its hellos
+are heard again. Where its objection does not arrive it is said again every 10 s, for a minute; where packets of it
+still arrive, never. A word is a join, and a node floods one of those in 5 s at most. Bounded by the number of nodes.
+"""
+
+from collections.abc import Callable
+from typing import Final
+
+from fanet_mw.routing.clustered.roles.failover import SILENT_HELLOS
+from fanet_mw.routing.clustered.roles.signs_of_life import Signs
+from fanet_mw.units import NodeId, S
+
+_AGAIN_NS: Final = 10 * S
+"""Whoever still is in the schedule then was not heard of by the leader: it is said again."""
+_FORGOTTEN_NS: Final = 60 * S
+
+
+class Silence:
+    """One node's watch over its neighbors."""
+
+    def __init__(self, signs: Signs, *, hello_ns: int) -> None:
+        self._signs = signs
+        self._silent_ns = int(SILENT_HELLOS * hello_ns)
+        self._heard_ns: dict[NodeId, int] = {}
+        self._said_ns: dict[NodeId, int] = {}
+
+    def heard(self, node: NodeId, *, now_ns: int) -> None:
+        """A neighbor's hello."""
+        self._heard_ns[node] = now_ns
+        self._said_ns.pop(node, None)
+
+    def said(self, node: NodeId, *, now_ns: int) -> None:
+        """Somebody, perhaps we, told the leader that this node is silent."""
+        if node in self._heard_ns:
+            self._said_ns[node] = now_ns
+
+    def next_silent(self, lists: Callable[[NodeId], bool], *, now_ns: int) -> NodeId | None:
+        """A neighbor of which the leader should be told now; `lists`: whether the schedule names a node."""
+        for node in sorted(self._heard_ns):
+            quiet_ns = now_ns - self._heard_ns[node]
+            if quiet_ns < self._silent_ns:
+                continue
+            sign_ns, said_ns = self._signs.last_ns(node) or 0, self._said_ns.get(node)
+            objected = said_ns is not None and sign_ns > said_ns
+            if objected or quiet_ns > _FORGOTTEN_NS or not lists(node):
+                del self._heard_ns[node]
+                self._said_ns.pop(node, None)
+            elif now_ns - sign_ns >= self._silent_ns and (said_ns is None or now_ns - said_ns >= _AGAIN_NS):
+                return node
+        return None

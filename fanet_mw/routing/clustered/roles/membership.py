@@ -1,0 +1,159 @@
+"""Which cluster a node belongs to, as the newest schedule says. All parts of an epoch count, in any order.
+
+A schedule lists the members of a cluster in the order in which they stand in for each other, the head first. Whoever
+is in no part of a complete schedule has no role.
+"""
+
+from typing import NamedTuple
+
+from fanet_mw.routing.clustered.roles.lease import Authority
+from fanet_mw.routing.clustered.roles.states import Event
+from fanet_mw.routing.clustered.tdma.slots import Superframe
+from fanet_mw.trace import RoleChanged
+from fanet_mw.units import US, NodeId
+from fanet_mw.wire.inner import Role, Schedule
+
+
+class Standing(NamedTuple):
+    """A node's place in its cluster; head 0: none."""
+
+    role: Role = Role.ISOLATED
+    cluster: int = 0
+    head: NodeId = NodeId(0)
+
+    def at(self, now_ns: int, node: NodeId) -> RoleChanged:
+        return RoleChanged(now_ns, node, self.role.name.lower(), self.cluster, self.head)
+
+
+class Version(NamedTuple):
+    """Names one assignment."""
+
+    authority: Authority
+    epoch: int
+
+
+_NOWHERE = Standing()
+
+
+class Membership:
+    """One node's view of the schedule."""
+
+    def __init__(self, node: NodeId) -> None:
+        self._node = node
+        self.version: Version | None = None
+        self.standing = _NOWHERE
+        self.superframe: Superframe | None = None
+        self.succession: tuple[NodeId, ...] = ()
+        """Our cluster, the head first, then those who stand in for it."""
+        self._parts: dict[int, Schedule] = {}
+        self._named: Standing | None = None
+        """The role that a schedule gave us last; it holds until all parts of a newer one that concern us have come."""
+        self._told = False
+        """Whether this version has said what we are."""
+
+    @property
+    def epoch(self) -> int:
+        return self.version.epoch if self.version else 0
+
+    @property
+    def role(self) -> Role:
+        return self.standing.role
+
+    @property
+    def cluster(self) -> int:
+        return self.standing.cluster
+
+    @property
+    def head(self) -> NodeId:
+        """Who serves our cluster now: the one named, or the one who stands in for it."""
+        return self.standing.head
+
+    @property
+    def assigned(self) -> bool:
+        return self.role is not Role.ISOLATED
+
+    @property
+    def is_head(self) -> bool:
+        return self.role is Role.HEAD
+
+    @property
+    def slot(self) -> int:
+        """Head of cluster k owns slot k."""
+        return self.cluster
+
+    @property
+    def parts(self) -> int:
+        """How many parts of this version have come."""
+        return len(self._parts)
+
+    @property
+    def named_head(self) -> NodeId:
+        """The head that the schedule names; 0: none known."""
+        return self.succession[0] if self.succession else NodeId(0)
+
+    @property
+    def nodes_listed(self) -> int:
+        return sum(len(part.members) for part in self._parts.values())
+
+    def lists(self, node: int) -> bool:
+        """Whether the schedule names this node."""
+        return any(member.node == node for part in self._parts.values() for member in part.members)
+
+    def rank(self, node: int) -> int | None:
+        """The node's place in the succession of our cluster."""
+        return self.succession.index(NodeId(node)) if node in self.succession else None
+
+    def learn(self, schedule: Schedule, *, guard_ns: int) -> Event | None:
+        """Take in one part; returns what it says of us, once per version: the role itself is taken by `obey`."""
+        version = Version(Authority(schedule.term, schedule.leader), schedule.epoch)
+        if version != self.version:
+            if self.version and version.authority == self.version.authority and not newer(version, self.version):
+                return None  # an older epoch, still on its way
+            self.version = version
+            self._parts = {}
+            self._told = False
+        repeated = schedule.part in self._parts
+        self._parts[schedule.part] = schedule
+        event = self._find_ourselves(schedule, guard_ns)
+        return None if repeated else event
+
+    def _find_ourselves(self, schedule: Schedule, guard_ns: int) -> Event | None:
+        members = [member for part in sorted(self._parts) for member in self._parts[part].members]
+        mine = next((member for member in members if member.node == self._node), None)
+        if mine is None:
+            return Event.LEFT_OUT if len(self._parts) == schedule.parts else None
+        own = [member for member in members if member.cluster == mine.cluster]
+        head = next((NodeId(m.node) for m in own if m.is_head), None)
+        if head is None:
+            return None  # in a part that has not come yet
+        slot_ns = schedule.slot_us * US
+        self.superframe = Superframe(
+            schedule.start_us * US, schedule.period_us * US, slot_ns, min(guard_ns, max(0, slot_ns - 1))
+        )
+        self.succession = (head, *(NodeId(m.node) for m in own if m.node != head))
+        known, self._told = self._told, True
+        self._named = Standing(Role.HEAD if mine.is_head else Role.MEMBER, mine.cluster, head)
+        return None if known else Event.NAMED_HEAD if mine.is_head else Event.NAMED_MEMBER
+
+    def obey(self) -> None:
+        """Take the role that the schedule gives us."""
+        assert self._named is not None, "only who has been named has a role to take"
+        self.standing = self._named
+
+    def follow(self, head: NodeId) -> None:
+        """Another member serves our cluster, perhaps ourselves."""
+        self.standing = self.standing._replace(role=Role.HEAD if head == self._node else Role.MEMBER, head=head)
+
+    def resign(self) -> None:
+        """No role, until another schedule names us."""
+        self.standing, self.succession, self._named, self._told = _NOWHERE, (), None, False
+
+    def forget(self) -> None:
+        """No schedule: the next one is new, whatever its version."""
+        self.resign()
+        self.version, self._parts = None, {}
+
+
+def newer(version: Version, than: Version) -> bool:
+    """Whether a version of the same authority is a later one (16-bit serial numbers, RFC 1982)."""
+    return 0 < ((version.epoch - than.epoch) & 0xFFFF) < 0x8000

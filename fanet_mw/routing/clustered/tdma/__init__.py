@@ -1,0 +1,1 @@
+"""Whose instant it is: slots of heads, turns of the timetable, and the queues that are let out in them."""

@@ -1,0 +1,44 @@
+"""A node's calls, its turns for neighbors alone over lossy links: for hellos, and for packets that neighbors lack."""
+
+from collections.abc import Sequence
+
+from fanet_mw.routing.clustered.tdma.root_release import Following
+from fanet_mw.routing.clustered.tdma.turn_release import OwnTurn, TurnRelease
+
+
+class CallRelease(TurnRelease):
+    """The queue of answers, and the plan of one node's calls."""
+
+    _plans: Sequence[Following] = ()
+
+    def follow(self, plans: Sequence[Following], *, now_ns: int) -> None:
+        """New calls; in order of the instants from which they hold."""
+        self._plans = plans
+        self._arm(now_ns)
+
+    def claim(self, *, not_before_ns: int, now_ns: int) -> int | None:
+        """Take the next call for a frame that is not queued; None: there is none."""
+        turn = self._turn(max(not_before_ns, self._free_ns))
+        if turn is None:
+            return None
+        self._free_ns = turn.start_ns + 1
+        self._arm(now_ns)
+        return turn.start_ns
+
+    def cancel(self, key: int) -> None:
+        """Somebody else has sent this packet (`seen.key_of`)."""
+        self._queue.remove(key)
+
+    def holds(self, key: int) -> bool:
+        """Whether this packet is queued."""
+        return key in self._queue
+
+    def _turn(self, earliest_ns: int) -> OwnTurn | None:
+        """The first call from an instant on, under whichever timetable is in force then."""
+        for index, plan in enumerate(self._plans):
+            if plan.offsets:
+                not_before_ns = max(earliest_ns, plan.valid_ns)
+                start_ns = plan.turns.next_start_ns(plan.offsets, not_before_ns=not_before_ns)
+                if index + 1 == len(self._plans) or start_ns < self._plans[index + 1].valid_ns:
+                    return OwnTurn(start_ns, plan.frame_bytes)
+        return None

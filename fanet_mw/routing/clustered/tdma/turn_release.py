@@ -1,0 +1,74 @@
+"""A queue that is let out in turns, one frame in each, announced one lead ahead; a subclass says whose turns."""
+
+from abc import ABC, abstractmethod
+from typing import NamedTuple
+
+from fanet_mw.node.queue import Packet, TxQueue
+
+
+class OwnTurn(NamedTuple):
+    """A turn to come in which the node may let packets out."""
+
+    start_ns: int
+    frame_bytes: int
+    """What it holds; 0: one packet, however long."""
+
+
+class TurnRelease(ABC):
+    """The queue of one node, and the next turn that is planned for it."""
+
+    def __init__(self, queue: TxQueue, *, lead_ns: int) -> None:
+        self._queue = queue
+        self._lead_ns = lead_ns
+        self._free_ns = 0
+        """Just after the last turn that was used."""
+        self._next: OwnTurn | None = None
+
+    @abstractmethod
+    def _turn(self, earliest_ns: int) -> OwnTurn | None:
+        """The first turn of the node from an instant on."""
+
+    def __len__(self) -> int:
+        return len(self._queue)
+
+    def push(self, packet: Packet, *, now_ns: int) -> Packet | None:
+        """Queue a packet; returns the one evicted for it."""
+        evicted = self._queue.push(packet, rank=self._rank(packet))
+        if self._next is None:
+            self._arm(now_ns)
+        return evicted
+
+    def expire(self, *, before_us: int) -> list[Packet]:
+        return self._queue.expire(before_us=before_us)
+
+    def drain(self) -> list[Packet]:
+        """Give everything up: it goes another way."""
+        self._next = None
+        return self._queue.drain()
+
+    def next_wake_ns(self) -> int | None:
+        return None if self._next is None else self._next.start_ns - self._lead_ns
+
+    def due(self, *, now_ns: int) -> list[tuple[list[Packet], int]]:
+        """Packets to announce now, those of one frame together, with its instant."""
+        released = []
+        while self._next is not None and self._next.start_ns - self._lead_ns <= now_ns and len(self._queue):
+            released.append((self._fill(self._next.frame_bytes), self._next.start_ns))
+            self._free_ns = self._next.start_ns + 1
+            self._arm(now_ns)
+        if not len(self._queue):
+            self._next = None
+        return released
+
+    def _rank(self, packet: Packet) -> int:
+        """The priority at which a packet waits here."""
+        return packet.header.priority
+
+    def _fill(self, size: int) -> list[Packet]:
+        """The packets of one turn: the most urgent, and with it what fits."""
+        first = self._queue.pop()
+        return [first, *self._queue.pop_fitting(size - len(first.frame))]
+
+    def _arm(self, now_ns: int) -> None:
+        earliest_ns = max(now_ns + self._lead_ns, self._free_ns)
+        self._next = self._turn(earliest_ns) if len(self._queue) else None

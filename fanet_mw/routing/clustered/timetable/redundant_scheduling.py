@@ -1,0 +1,282 @@
+"""Turns filled with floods over lossy links: a frame is repeated, by one relay or by several, until it is likely heard.
+
+    dose of a node    sum of -ln(loss) over the copies of a packet that were meant for it
+    enough            -ln(epsilon): all those copies are lost with a probability of epsilon
+    holder            the root, and whoever has had enough: it may relay, several times if its neighbors need it
+    call              one frame of a node to its neighbors, in a turn of its own: a hello, or the answer to one
+
+Turns are filled one after the other as in `packing.py`, by the same rules but one: a neighbor of a sender that somebody
+else in the turn disturbs is left out, and served later, as long as half of what the frame is worth remains; a call is
+for all. Whether a node disturbs a link depends on how strong that link is (`Network`).
+
+Not modeled: that a relay may lack the packet although it has had its dose (`planner/loss.py` reckons with it).
+"""
+
+import math
+from collections.abc import Sequence
+from typing import Final, NamedTuple
+
+from fanet_mw.routing.clustered.timetable.list_scheduling import Geometry, rows
+from fanet_mw.units import Enu, NodeId
+from fanet_mw.wire.links import NEPERS, Link
+
+_RECEIVER: Final = 100
+"""What it is worth that a node gets all of its dose, in turns of its flood's age."""
+_ONLY: Final = 50
+"""And that no other holder could have served it."""
+_WINDOW: Final = 24
+"""Floods under way at once."""
+_CHANCES: Final = (0.5, 0.25, 0.1)
+"""Links below the first are used only if some node would be cut off without them, and so on."""
+_SINR_DB: Final = 11
+"""A frame this much stronger than another in the same turn survives it: 8 dB at 11 Mb/s, and 3 dB to be sure."""
+_DECADE_DB: Final = 30
+"""By how much power falls over a decade of distance."""
+
+
+class Network:
+    """Who hears whom how well, and who disturbs which link, as bit sets over row numbers."""
+
+    def __init__(
+        self, positions: Sequence[tuple[NodeId, Enu]], geometry: Geometry, measured: Sequence[Link], *, margin_db: float
+    ) -> None:
+        """`geometry.interference_m` is for pairs that do not hear each other at all, and for a link that is
+        `margin_db` above the weakest; more margin keeps them farther apart.
+        """
+        self.nodes = [node for node, _ in positions]
+        self.row = {node: row for row, node in enumerate(self.nodes)}
+        known = [link for link in measured if link.a in self.row and link.b in self.row]
+        self._dbm = {
+            pair: link.power_dbm
+            for link in known
+            for pair in ((self.row[link.a], self.row[link.b]), (self.row[link.b], self.row[link.a]))
+        }
+        self.senses = self._links(known, least=0.0)
+        self.hears, chance = self._connected(known)
+        self.dose: dict[tuple[int, int], int] = {}
+        """By (sender, receiver), in grades."""
+        for link in known:
+            if link.chance >= chance:
+                a, b = self.row[link.a], self.row[link.b]
+                self.dose[a, b] = self.dose[b, a] = max(1, link.grade)
+        self._disturbing = self._who_disturbs([place for _, place in positions], geometry.interference_m, margin_db)
+
+    def _links(self, known: Sequence[Link], *, least: float) -> list[int]:
+        found = [0] * len(self.nodes)
+        for link in known:
+            if link.chance >= least:
+                a, b = self.row[link.a], self.row[link.b]
+                found[a] |= 1 << b
+                found[b] |= 1 << a
+        return found
+
+    def _connected(self, known: Sequence[Link]) -> tuple[list[int], float]:
+        """The best links that keep together what is together, and from which share on a link is one of them."""
+        choices = [(self._links(known, least=least), least) for least in _CHANCES]
+        whole = [reach(choices[-1][0], row) for row in range(len(self.nodes))]
+        for hears, least in choices:
+            if [reach(hears, row) for row in range(len(self.nodes))] == whole:
+                return hears, least
+        raise AssertionError("the last choice is the whole")
+
+    def _who_disturbs(self, at: Sequence[Enu], interference_m: float, margin_db: float) -> dict[tuple[int, int], int]:
+        """By link: the rows whose frames spoil it."""
+        weakest = min((dbm for dbm in self._dbm.values()), default=0)
+        apart = [[here.minus(there).norm() for there in at] for here in at]
+        found = {}
+        for sender, receiver in self.dose:
+            dbm = self._dbm[sender, receiver]
+            near_m = interference_m * math.pow(10.0, (weakest + margin_db - dbm) / _DECADE_DB)
+            found[sender, receiver] = sum(
+                1 << other
+                for other in range(len(at))
+                if other not in (sender, receiver)
+                and self._spoils(other, receiver, dbm, apart[other][receiver], near_m)
+            )
+        return found
+
+    def _spoils(self, other: int, receiver: int, dbm: int, apart_m: float, near_m: float) -> bool:
+        heard_dbm = self._dbm.get((other, receiver))
+        return apart_m <= near_m if heard_dbm is None else heard_dbm > dbm - _SINR_DB
+
+    def disturbing(self, sender: int, receiver: int) -> int:
+        """The rows whose frames spoil this link."""
+        return self._disturbing[sender, receiver]
+
+    def names(self, bits: int) -> tuple[NodeId, ...]:
+        return tuple(self.nodes[row] for row in rows(bits))
+
+
+def reach(hears: Sequence[int], root: int) -> int:
+    """All that a flood of this row can reach, itself included."""
+    found = frontier = 1 << root
+    while frontier:
+        near = 0
+        for row in rows(frontier):
+            near |= hears[row]
+        frontier = near & ~found
+        found |= near
+    return found
+
+
+class _Offer(NamedTuple):
+    """A holder that somebody around waits for."""
+
+    ready: int
+    """From which offset on it can send."""
+    worth: int
+    row: int
+    gains: tuple[tuple[int, int], ...]
+    """(receiver, what its copy is worth)."""
+
+
+class Wave:
+    """One packet on its way; a call is a wave that ends with its first frame."""
+
+    def __init__(self, network: Network, root: int, *, enough: int, call: bool = False) -> None:
+        self.root = root
+        self.call = call
+        self.sent: list[tuple[int, int]] = []
+        """(offset, row), in order."""
+        self.goal = network.hears[root] | 1 << root if call else reach(network.hears, root)
+        self._network = network
+        self._enough = enough
+        self._has = 1 << root
+        self._missing: dict[int, int] = {}
+        """What is left of the dose of whoever has had some of it."""
+        self._ready = {root: 0}
+        self._offers: list[_Offer] | None = None
+
+    @property
+    def done(self) -> bool:
+        return bool(self.sent) and (self.call or self._has == self.goal)
+
+    def age(self, offset: int) -> int:
+        """Turns since it began."""
+        return offset - self.sent[0][0] if self.sent else 0
+
+    def offers(self) -> list[_Offer]:
+        if self._offers is None:
+            self._offers = self._look()
+        return self._offers
+
+    def _look(self) -> list[_Offer]:
+        network, has = self._network, self._has
+        if not self.sent and self.goal == has:
+            return [_Offer(0, 0, self.root, ())]  # nobody else in this part of the swarm; it speaks all the same
+        found = []
+        for row, ready in self._ready.items():
+            lacking = network.hears[row] & ~has
+            if lacking:
+                gains = tuple((other, self._gain(row, other)) for other in rows(lacking))
+                found.append(_Offer(ready, sum(gain for _, gain in gains), row, gains))
+        return found
+
+    def _gain(self, row: int, other: int) -> int:
+        network, enough = self._network, self._enough
+        gain = _RECEIVER * min(self._missing.get(other, enough), network.dose[row, other]) // enough
+        return gain + (_ONLY if network.hears[other] & self._has == 1 << row else 0)
+
+    def send(self, offset: int, row: int, receivers: Sequence[int], *, hop_turns: int) -> None:
+        """A row sends in a turn, and these get a copy."""
+        self.sent.append((offset, row))
+        for other in receivers:
+            missing = self._missing[other] = self._missing.get(other, self._enough) - self._network.dose[row, other]
+            if missing <= 0 and not self._has >> other & 1:
+                self._has |= 1 << other
+                self._ready[other] = offset + hop_turns
+        self._offers = None
+
+
+class _Turn(NamedTuple):
+    """What is in a turn, as bit sets: who sends, who must not, and who may be deaf for some time after it."""
+
+    sending: int = 0
+    barred: int = 0
+    deaf: int = 0
+
+
+class RedundantPacking:
+    """Fills the turns of one superframe."""
+
+    def __init__(self, network: Network, geometry: Geometry, *, pace: float = 1.0) -> None:
+        """`pace`: waves begin within this share of the superframe."""
+        self._network = network
+        self._turns = geometry.turns
+        self._hop_turns = geometry.hop_turns
+        self._pace = pace
+        self._filled = [_Turn()] * geometry.turns
+
+    def place(self, waves: Sequence[Wave]) -> bool:
+        """Give every wave its turns; False when there are not enough."""
+        turns, count, begun, offset = self._turns, len(waves), 0, 0
+        under_way: dict[int, Wave] = {}
+        while begun < count or under_way:
+            while begun < count and len(under_way) < _WINDOW and offset * count >= int(begun * turns * self._pace):
+                under_way[begun] = waves[begun]
+                begun += 1
+            unbegun = begun < count or any(not wave.sent for wave in under_way.values())
+            if offset >= turns and (unbegun or offset > 2 * turns):
+                return False
+            self._fill(offset, under_way)
+            offset += 1
+        return True
+
+    def _fill(self, offset: int, under_way: dict[int, Wave]) -> None:
+        turn = offset % self._turns
+        there, deaf = self._filled[turn], self._filled[turn - 1].deaf
+        following = self._filled[(turn + 1) % self._turns].sending
+        closed = there.sending | there.barred | deaf
+        offers = sorted(
+            (-offer.worth - wave.age(offset) // self._hop_turns, number, offer.row, offer)
+            for number, wave in under_way.items()
+            for offer in wave.offers()
+            if offer.ready <= offset and not closed >> offer.row & 1
+        )
+        if not offers:
+            return
+        served: dict[int, int] = {}
+        for _, number, row, offer in offers:
+            if number not in under_way or (there.sending | there.barred) >> row & 1:
+                continue
+            receivers, worth = self._receivers(offer, there.sending | served.get(number, 0), there.sending)
+            if worth < offer.worth if under_way[number].call else 2 * worth < offer.worth:
+                continue
+            deaf = self._deaf(there.sending | 1 << row) if following else 0
+            if deaf & following:
+                continue
+            barred = there.barred
+            for other in receivers:
+                barred |= self._network.disturbing(row, other) | 1 << other
+                served[number] = served.get(number, 0) | 1 << other
+            there = _Turn(there.sending | 1 << row, barred)
+            under_way[number].send(offset, row, receivers, hop_turns=self._hop_turns)
+            if under_way[number].done:
+                del under_way[number]
+        self._filled[turn] = there._replace(deaf=self._deaf(there.sending))
+
+    def _receivers(self, offer: _Offer, out: int, sending: int) -> tuple[list[int], int]:
+        """Who of those that wait gets the frame undisturbed, and what that is worth."""
+        network = self._network
+        found, worth = [], 0
+        for other, gain in offer.gains:
+            if not out >> other & 1 and not network.disturbing(offer.row, other) & sending:
+                found.append(other)
+                worth += gain
+        return found, worth
+
+    def _deaf(self, sending: int) -> int:
+        """Who hears a frame that another spoils; it waits for EIFS then (IEEE 802.11-2020, 10.3.7)."""
+        network, found = self._network, 0
+        for row in rows(sending):
+            for other in rows(network.senses[row] & ~sending & ~found):
+                used = (row, other) in network.dose
+                others = network.disturbing(row, other) if used else network.senses[other] & ~(1 << row)
+                if others & sending:
+                    found |= 1 << other
+        return found
+
+
+def enough_for(epsilon: float) -> int:
+    """The dose after which all copies are lost with this probability, in grades."""
+    return max(1, round(-NEPERS * math.log(epsilon)))

@@ -1,0 +1,387 @@
+"""What the turns of a superframe are given to: how many packets of whom, how many of them in a frame. Pure functions.
+
+    first     a little more turns than each node's load needs, so that a backlog drains
+    else      as many as it needs; with several of its packets in a frame if they fit: longer turns, fewer preambles
+    else      fewer; the node lets out what they carry, and has no bound
+    else      turns for heads only: members' packets contend on their way to them, and have no bound either
+
+A member's packet has turns of its own on a shortest way to its head, and the head passes it on at once: the head's turn
+lies right behind, so nothing waits there. Everyone computes the same from the same schedule and places.
+"""
+
+import math
+from collections.abc import Iterator, Mapping
+from itertools import islice
+from typing import Final, NamedTuple, Self
+
+from fanet_mw.routing.clustered.forwarding.repair import RIPE_NS
+from fanet_mw.routing.clustered.tdma.turns import Turns, turn_ns
+from fanet_mw.routing.clustered.tdma.urgent import reserved
+from fanet_mw.routing.clustered.timetable.delivery_odds import Odds
+from fanet_mw.routing.clustered.timetable.list_scheduling import Effort, Geometry
+from fanet_mw.routing.clustered.timetable.timetable import Timetable, redundant_timetable, timetable
+from fanet_mw.scenario import Scenario
+from fanet_mw.units import MS, Enu, NodeId, S, seconds_to_ns
+from fanet_mw.wire import DIGEST, HEADER_BYTES, LINKS, OVERHEAD, PLACES, SCHEDULE
+from fanet_mw.wire.digest import CAPACITY as DIGEST_CAPACITY
+from fanet_mw.wire.inner import CAPACITY
+from fanet_mw.wire.links import MESSAGES, Link
+from fanet_mw.wire.places import CAPACITY as PLACES_CAPACITY
+
+_SCHEDULE_BYTES: Final = SCHEDULE.layout.size + OVERHEAD
+_PLACES_BYTES: Final = PLACES.layout.size + OVERHEAD
+_FEWER: Final = 0.95
+"""When the turns do not suffice for the load, try this much of it, and so on."""
+_EASY: Final = (Effort(), Effort(pace=0.9))
+_HARD: Final = Effort(pace=0.8, tries=8)
+"""For a load that does not fit otherwise."""
+
+_REDUNDANCY: Final = ((9, 0.01), (7, 0.03), (5, 0.05), (4, 0.05), (3, 0.05), (3, 0.1), (3, 0.3))
+"""With measured links, what to try, best first: the margin against interference [dB], and the share of packets of which
+a node may lose all copies. Interference that positions do not tell costs more than frames that are sent once less."""
+_PACES: Final = (1.0, 0.9)
+_MOST_PERIODS: Final = 4
+"""Flooding periods of a superframe with measured links."""
+_LOAD: Final = 0.9
+"""Of the root turns of a node with measured links, its packets use so many: what else it has to say finds a turn."""
+_CALLS_PER_S: Final = 3
+_MOST_DIGESTS: Final = 4
+_HELLO_BYTES: Final = 200
+"""A hello without its digest."""
+
+LIKELY_SHARE: Final = 0.99
+"""Of the copies: what a node states a delay for when links lose frames."""
+_LATE_HELLO: Final = 1.1
+"""Hello intervals between two hellos at most."""
+_BUSY: Final = 2
+"""How much longer a round of repair takes than when nobody else lacks anything: answers queue."""
+
+_BLOCK: Final = 300
+"""Packets of a block at least; fewer are packed less densely, more take long."""
+
+Places = tuple[tuple[NodeId, Enu], ...]
+"""Where the nodes are [m], ascending."""
+
+
+class Fitted(NamedTuple):
+    """A timetable and the turns that it is for."""
+
+    turns: Turns
+    table: Timetable
+    together: int
+    """Packets that a root lets out in one of its turns."""
+    frame_bytes: int
+    """What one turn holds."""
+    whole: bool
+    """Whether every node lets out its own packets; else heads do it for their members."""
+    enough: bool
+    """Whether as many packets are let out as come."""
+    odds: Odds | None = None
+    """Of a timetable for lossy links: how likely packets arrive; None: the table reckons with no loss."""
+
+
+class Plan(NamedTuple):
+    """A timetable in force from an instant on, as one node sees it."""
+
+    valid_ns: int
+    turns: Turns
+    table: Timetable
+    mine: Mapping[tuple[NodeId, int], tuple[int, ...]]
+    """Our turns for each (root, instance) of others."""
+    heard: Mapping[tuple[int, NodeId], tuple[int, NodeId, int]]
+    """(turn, sender) -> (offset, root, instance)."""
+    roots: tuple[int, ...]
+    """The turns in which we let packets out."""
+    again: Mapping[int, tuple[int, ...]]
+    """By root turn: the later turns in which we repeat what was let out."""
+    calls: tuple[int, ...]
+    """The turns in which we send what is for our neighbors alone."""
+    together: int
+    frame_bytes: int
+    whole: bool
+    odds: Odds | None
+
+    @classmethod
+    def of(cls, node: NodeId, valid_ns: int, found: Fitted) -> Self:
+        turns, table = found.turns, found.table
+        sends: dict[tuple[NodeId, int], list[int]] = {}
+        for turn in sorted(table.turns):
+            if turn.node == node:
+                sends.setdefault((turn.root, turn.instance), []).append(turn.offset)
+        own = [offsets for (root, _), offsets in sends.items() if root == node]
+        return cls(
+            valid_ns=valid_ns,
+            turns=turns,
+            table=table,
+            mine={flood: tuple(offsets) for flood, offsets in sends.items() if flood[0] != node},
+            heard={
+                (turn.offset % turns.per_frame, turn.node): (turn.offset, turn.root, turn.instance)
+                for turn in table.turns
+            },
+            roots=tuple(sorted(offsets[0] for offsets in own)),
+            again={offsets[0]: tuple(offsets[1:]) for offsets in own},
+            calls=table.calls.get(node, ()),
+            together=found.together,
+            frame_bytes=found.frame_bytes,
+            whole=found.whole,
+            odds=found.odds,
+        )
+
+    def has_turns(self, node: NodeId) -> bool:
+        """Whether this node lets its packets out itself."""
+        return node in self.table.spans
+
+    def likely_ns(self, node: NodeId, *, interval_ns: int, hello_ns: int) -> int | None:
+        """Within which time `LIKELY_SHARE` of the copies of this node's packets arrive; None: the odds are worse.
+
+        The longest wait, behind a join too, which takes a turn of ours when a link has changed; the flood; and as many
+        rounds of repair as it takes: a hello, as late as it may be, which waits for a turn; an answer, which may wait
+        for the next turn but one. Half of what may be missing is left for what the odds do not know.
+        """
+        assert self.odds is not None, "whoever asks has a timetable for lossy links"
+        flood_ns = self.turns.worst_ns(self.roots, span=self.table.spans[node], interval_ns=interval_ns)
+        rounds = self.odds.rounds(node, missed=(1 - LIKELY_SHARE) / 2)
+        if flood_ns is None or rounds is None or not self.calls:
+            return None
+        call_ns = self.turns.done_ns(self.calls, span=1)[0]
+        flood_ns += self.turns.period_ns // len(self.roots)
+        round_ns = _BUSY * (round(_LATE_HELLO * hello_ns) + 3 * call_ns)
+        return flood_ns + (RIPE_NS if rounds else 0) + rounds * round_ns
+
+
+class _Wish(NamedTuple):
+    """Turns for so many packets of each root, and how many share a turn."""
+
+    roots: tuple[NodeId, ...]
+    together: int
+    hard: bool
+    blocks: int = 1
+    whole: bool = True
+    enough: bool = True
+
+
+def largest_frame(scenario: Scenario, *, together: int = 1) -> int:
+    """The largest frame of a turn: packets of bulk and what is reserved, or a leader's announcement."""
+    links_bytes = HEADER_BYTES + MESSAGES * (LINKS.layout.size + OVERHEAD) if scenario.measures_links else 0
+    longest = max(together * scenario.traffic.payload_bytes, schedule_bytes(scenario), links_bytes)
+    return longest + sum(reserved(scenario).values())
+
+
+def schedule_bytes(scenario: Scenario) -> int:
+    """A schedule part with its places."""
+    members = min(scenario.nodes.count, CAPACITY)
+    return HEADER_BYTES + _SCHEDULE_BYTES + _PLACES_BYTES * -(-members // PLACES_CAPACITY)
+
+
+def superframe(scenario: Scenario, *, origin_ns: int = 0, period_ns: int | None = None, together: int = 1) -> Turns:
+    """The geometry of a scenario whose turns hold so many packets each."""
+    turn = turn_ns(scenario, payload_bytes=largest_frame(scenario, together=together))
+    whole_ns = scenario.clusters.period_ns if period_ns is None else period_ns
+    contention_ns = round(scenario.clusters.contention_ms * MS)
+    return Turns(origin_ns, whole_ns, contention_ns, turn, max(0, whole_ns - contention_ns) // turn)
+
+
+def links(scenario: Scenario, turns: Turns) -> Geometry:
+    """What a timetable of this scenario is computed for."""
+    clusters, radio = scenario.clusters, scenario.radio
+    wait_ns = radio.lead_ns + radio.handover_ns
+    return Geometry(
+        link_m=clusters.link_m or radio.range_m,
+        interference_m=clusters.interference_m or radio.range_m * (1 if radio.channel == "range" else 2),
+        turns=turns.per_frame,
+        hop_turns=1 + -(-wait_ns // turns.turn_ns),
+    )
+
+
+def fit(
+    scenario: Scenario,
+    places: Places,
+    head_of: Mapping[NodeId, NodeId],
+    *,
+    leader: NodeId | None = None,
+    origin_ns: int = 0,
+    period_ns: int | None = None,
+    quick: bool = False,
+) -> Fitted | None:
+    """The timetable of a swarm; None when not even one packet of each head fits. `head_of`: of all but the leader.
+
+    `quick`: None as well when the load does not fit without the effort that may take seconds.
+    """
+    leads = leader or scenario.leader
+    heads = tuple((node, head) for node, head in sorted(head_of.items()) if node != head)
+    whole_ns = scenario.clusters.period_ns if period_ns is None else period_ns
+    for wish in islice(_wishes(scenario, head_of, leads, whole_ns), int(quick), None):
+        if quick and not wish.enough:
+            return None
+        turns = superframe(scenario, origin_ns=origin_ns, period_ns=whole_ns, together=wish.together)
+        geometry, ways = links(scenario, turns), heads if wish.whole else ()
+        table = _table(places, wish.roots, geometry, ways, blocks=wish.blocks, hard=wish.hard and not quick)
+        if table is not None:
+            frame_bytes = largest_frame(scenario, together=wish.together)
+            return Fitted(turns, table, wish.together, frame_bytes, wish.whole, wish.enough)
+    return None
+
+
+def measured_period_ns(scenario: Scenario) -> int:
+    """The superframe with measured links: a little less than it takes for one packet of every source, so that repeated
+    frames find room; never shorter than the flooding period, and at most four times as long.
+    """
+    one_each_ns = int(_LOAD * seconds_to_ns(scenario.traffic.interval_s))
+    return max(scenario.clusters.period_ns, min(_MOST_PERIODS * scenario.clusters.period_ns, one_each_ns))
+
+
+def fit_measured(
+    scenario: Scenario,
+    places: Places,
+    measured: tuple[Link, ...],
+    *,
+    leader: NodeId,
+    origin_ns: int,
+    link_parts: int,
+) -> Fitted | None:
+    """The timetable of a swarm whose links have been measured: every node lets out its own packets, frames are
+    repeated as long as there are turns for it. None when the turns do not suffice for the load.
+    """
+    whole_ns = measured_period_ns(scenario)
+    size = max(largest_frame(scenario), hello_bytes(scenario))
+    turn = turn_ns(scenario, payload_bytes=size)
+    contention_ns = round(scenario.clusters.contention_ms * MS * whole_ns / scenario.clusters.period_ns)
+    turns = Turns(origin_ns, whole_ns, contention_ns, turn, max(0, whole_ns - contention_ns) // turn)
+    own = leader_load(scenario) if leader == scenario.leader else 1
+    senders = [node for node, _ in places if node != leader or own]
+    each = max(1, math.ceil(whole_ns / seconds_to_ns(scenario.traffic.interval_s) / _LOAD - 1e-3))
+    roots = (*(leader,) * (schedule_parts(scenario) + link_parts), *(node for node in senders for _ in range(each)))
+    calls = max(1, round(_CALLS_PER_S * whole_ns / S))
+    geometry = links(scenario, turns)
+    for margin_db, epsilon in _REDUNDANCY:
+        for pace in _PACES:
+            found = redundant_timetable(
+                places, measured, roots, geometry, calls=calls, epsilon=epsilon, margin_db=margin_db, pace=pace
+            )
+            if found is not None:
+                return Fitted(turns, found[0], 1, size, whole=True, enough=True, odds=found[1])
+    return None
+
+
+def hello_bytes(scenario: Scenario) -> int:
+    """The largest hello that says what its sender holds."""
+    digests = min(_MOST_DIGESTS, -(-scenario.nodes.count // DIGEST_CAPACITY))
+    return HEADER_BYTES + _HELLO_BYTES + digests * (DIGEST.layout.size + OVERHEAD)
+
+
+def least_interval_ns(scenario: Scenario, places: Places, head_of: Mapping[NodeId, NodeId]) -> int | None:
+    """The traffic interval down to which as many packets as come fit the turns; looked for up to twice the load."""
+    period_ns = scenario.clusters.period_ns
+    heads = tuple((node, head) for node, head in sorted(head_of.items()) if node != head)
+    senders = [*sorted(head_of), *([scenario.leader] if leader_load(scenario) else [])]
+    control = (scenario.leader,) * schedule_parts(scenario)
+    enough = 2 * period_ns / seconds_to_ns(scenario.traffic.interval_s)
+    best = 0
+    for together in range(1, most_together(scenario) + 1):
+        turns = superframe(scenario, together=together)
+        geometry = links(scenario, turns)
+
+        def fits(packets: int, geometry: Geometry, *, hard: bool) -> bool:
+            blocks = _blocks(packets * len(senders), len(senders))
+            roots = (*control, *(node for node in senders for _ in range(packets // blocks)))
+            return _table(places, roots, geometry, heads, blocks=blocks, hard=hard) is not None
+
+        most = min(turns.per_frame // max(1, len(senders)), math.ceil(enough / together))
+        low, high = best // together, most
+        while low < high:
+            middle = (low + high + 1) // 2
+            low, high = (middle, high) if fits(middle, geometry, hard=False) else (low, middle - 1)
+        while low < most and fits(low + 1, geometry, hard=True):
+            low += 1
+        best = max(best, low * together)
+    return -(-period_ns // best) if best else None
+
+
+def most_together(scenario: Scenario) -> int:
+    """Packets of bulk that a frame holds besides what is reserved."""
+    room = scenario.radio.max_frame_bytes - sum(reserved(scenario).values())
+    return max(1, room // scenario.traffic.payload_bytes)
+
+
+def _table(
+    places: Places,
+    roots: tuple[NodeId, ...],
+    geometry: Geometry,
+    heads: tuple[tuple[NodeId, NodeId], ...],
+    *,
+    blocks: int,
+    hard: bool,
+) -> Timetable | None:
+    """The easy packing whose floods are over soonest; when there is none, and it is wished, the hard one."""
+    if not geometry.turns:
+        return None
+    found = [(effort, timetable(places, roots, geometry, heads, effort, blocks)) for effort in _EASY]
+    easy = [(_lasts(table) - effort.pace * geometry.turns, table) for effort, table in found if table is not None]
+    if easy:
+        return min(easy, key=lambda item: item[0])[1]
+    return timetable(places, roots, geometry, heads, _HARD, blocks) if hard else None
+
+
+def _lasts(table: Timetable) -> int:
+    return max(table.spans.values(), default=0)
+
+
+def _wishes(scenario: Scenario, head_of: Mapping[NodeId, NodeId], leader: NodeId, period_ns: int) -> Iterator[_Wish]:
+    """What to try, best first."""
+    own = leader_load(scenario) if leader == scenario.leader else 1
+    control = (leader,) * schedule_parts(scenario)
+    senders = [*sorted(head_of), *([leader] if own else [])]
+    per_node = period_ns / seconds_to_ns(scenario.traffic.interval_s)
+    most = most_together(scenario)
+
+    def wish(packets: int, together: int, *, hard: bool, enough: bool = True) -> _Wish:
+        blocks = _blocks(packets, len(senders))
+        each, more = divmod(packets // blocks, max(1, len(senders)))
+        turns = (node for rank, node in enumerate(senders) for _ in range(each + (rank < more)))
+        return _Wish((*control, *turns), together, hard, blocks, enough=enough)
+
+    yield wish((int(per_node) + 1) * len(senders), 1, hard=False)
+    fewest = max(1, math.ceil(per_node / most - 1e-9))
+    before = 0
+    for together in range(1, most + 1):
+        needed = max(1, math.ceil(per_node / together - 1e-9))
+        if needed != before:
+            yield wish(needed * len(senders), together, hard=needed == fewest)
+        before = needed
+    together = next(n for n in range(1, most + 1) if per_node / n <= fewest + 1e-9)
+    packets = fewest * len(senders)
+    while packets > len(senders):
+        packets = max(len(senders), int(packets * _FEWER))
+        yield wish(packets, together, hard=packets == len(senders), enough=False)
+    if together > 1:
+        yield wish(len(senders), 1, hard=True, enough=False)
+    yield _for_heads(head_of, control, leader if own else None)
+
+
+def _blocks(packets: int, senders: int) -> int:
+    """Parts of a superframe that are alike: as many as leave each long, and every sender as many turns as the next."""
+    each, more = divmod(packets, max(1, senders))
+    if more:
+        return max(1, packets // _BLOCK)
+    return max(n for n in range(1, each + 1) if n == 1 or (each % n == 0 and packets // n >= _BLOCK))
+
+
+def _for_heads(head_of: Mapping[NodeId, NodeId], control: tuple[NodeId, ...], leader: NodeId | None) -> _Wish:
+    heads = sorted(set(head_of.values()))
+    return _Wish((*control, *heads, *((leader,) if leader else ())), 1, hard=True, whole=False, enough=False)
+
+
+def leader_load(scenario: Scenario) -> int:
+    """The leader is in no cluster, but its own packets need turns too: 1 if the application may send from it."""
+    traffic = scenario.traffic
+    if traffic.arrivals == "none" or traffic.destination == scenario.leader:
+        return 0
+    if isinstance(traffic.sources, tuple):
+        return int(scenario.leader in traffic.sources)
+    others = scenario.nodes.count - 1 - (traffic.destination != "all")
+    return int(traffic.sources == "all" or traffic.sources > others)
+
+
+def schedule_parts(scenario: Scenario) -> int:
+    """Turns that the leader's schedules take of each superframe."""
+    return max(1, -(-(scenario.nodes.count - 1) // CAPACITY))

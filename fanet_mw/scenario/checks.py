@@ -1,0 +1,162 @@
+"""What each table of a scenario allows alone but the scenario as a whole does not.
+
+Each problem is a sentence with the keys, their values and the bound; all of them are found, not only the first.
+"""
+
+from __future__ import annotations  # `Scenario` imports this module: to it, the name is a type only
+
+from collections.abc import Iterator, Sequence
+from typing import TYPE_CHECKING, Final
+
+from fanet_mw.bus.radio_control import Degrade, Restore, nodes_of
+from fanet_mw.units import MS
+
+if TYPE_CHECKING:
+    from fanet_mw.scenario import Scenario
+
+MESSAGE_BYTES: Final = {
+    "FANET_ROUTE": 36, "positions": 61, "COLLISION": 31, "FANET_BEACON": 33, "FANET_SCHEDULE": 266,
+    "FANET_SURVIVOR": 43, "FANET_DIGEST": 255, "FANET_PLACES": 189, "FANET_CLAIMS": 116, "FANET_LINKS": 240,
+}  # fmt: skip
+"""Of messages on the air, their MAVLink frame included (docs/wire.md); `positions` are HEARTBEAT and
+GLOBAL_POSITION_INT, with which every hello begins. The air format itself is not known here: the emulator reads
+scenarios too, and to it frames are bytes."""
+_SCHEDULE_PLACES: Final = 2
+"""FANET_PLACES that go with one full FANET_SCHEDULE."""
+_RIVALS: Final = ("aodv", "olsr", "dsdv", "geographic")
+_LINKS: Final = 36
+"""Links of one FANET_LINKS."""
+_MOST_LINKS_MESSAGES: Final = 4
+"""FANET_LINKS of one frame."""
+_TELLS_NEIGHBORS: Final = ("heads", "cds", "mpr", "claimed")
+"""Relay rules for which a hello says whom its sender hears."""
+_RIVAL_FRAME_BYTES: Final = 256
+"""Control messages of a fixed length must fit one frame; longer ones are divided."""
+
+
+def disagreements(scenario: Scenario) -> Sequence[str]:
+    """One sentence for each problem; none: the tables agree."""
+    found = []
+    count = scenario.nodes.count
+    if scenario.warmup_s + scenario.drain_s >= scenario.duration_s:
+        found.append(
+            f"warmup_s + drain_s = {scenario.warmup_s + scenario.drain_s:g} "
+            f"must be < duration_s = {scenario.duration_s:g}"
+        )
+    traffic = scenario.traffic
+    if traffic.destination != "all" and traffic.destination > count:
+        found.append(f"traffic.destination = {traffic.destination} must be <= nodes.count = {count}")
+    if isinstance(traffic.sources, int) and traffic.sources > count:
+        found.append(f"traffic.sources = {traffic.sources} must be <= nodes.count = {count}")
+    for key, ids in (("sources", traffic.sources), ("targets", traffic.targets)):
+        if isinstance(ids, tuple) and any(i > count for i in ids):
+            found.append(f"traffic.{key} = {list(ids)} must be node ids <= nodes.count = {count}")
+    if traffic.payload_bytes > scenario.radio.max_frame_bytes:
+        found.append(
+            f"traffic.payload_bytes = {traffic.payload_bytes} must be "
+            f"<= radio.max_frame_bytes = {scenario.radio.max_frame_bytes}"
+        )
+    if scenario.clock.sync == "beacons" and not scenario.routing.hello_interval_s:
+        found.append('clock.sync = "beacons" needs hellos: routing.hello_interval_s > 0')
+    found += _too_small_frames(scenario)
+    found += _unkept_deadline(scenario)
+    found += _blind_warnings(scenario)
+    found += _impossible_faults(scenario)
+    found += _wrong_for_rivals(scenario)
+    if scenario.routing.protocol == "clustered":
+        clusters = scenario.clusters
+        if not scenario.routing.hello_interval_s:
+            found.append('routing.protocol = "clustered" needs hellos: routing.hello_interval_s > 0')
+        if clusters.count >= max(2, count):
+            found.append(f"clusters.count = {clusters.count} must be < nodes.count = {count}")
+        if clusters.guard_ms != "auto" and clusters.guard_ms * MS >= clusters.slot_ns:
+            found.append(
+                f"clusters.guard_ms = {clusters.guard_ms:g} must be < the slot, flooding_period_s / count = "
+                f"{clusters.slot_ns / MS:g} ms"
+            )
+    return found
+
+
+def _too_small_frames(scenario: Scenario) -> Iterator[str]:
+    """Messages that have no parts to be divided into and must fit one frame."""
+    most, relay = scenario.radio.max_frame_bytes, scenario.clusters.relay
+    clustered = scenario.routing.protocol == "clustered"
+    size, least = MESSAGE_BYTES, dict[str, int]()
+    if scenario.routing.hello_interval_s:
+        hello = size["positions"]
+        if clustered:
+            hello += size["FANET_BEACON"]
+            hello += size["FANET_DIGEST"] if scenario.repair_ns else 0
+            hello += size["FANET_CLAIMS"] if relay in _TELLS_NEIGHBORS else 0
+        least["hellos"] = hello
+    if clustered and relay != "claimed":
+        places = _SCHEDULE_PLACES * size["FANET_PLACES"] if relay == "scheduled" else 0
+        least["schedules"] = size["FANET_SCHEDULE"] + places
+    if clustered and scenario.measures_links:
+        pairs = scenario.nodes.count * (scenario.nodes.count - 1) // 2
+        least["links of timetables"] = min(_MOST_LINKS_MESSAGES, -(-pairs // _LINKS)) * size["FANET_LINKS"]
+    if scenario.mission.survivors:
+        least["survivor reports"] = size["FANET_SURVIVOR"]
+    if scenario.mission.collision_horizon_s:
+        least["warnings"] = size["COLLISION"]
+    for what, inner in least.items():
+        whole = size["FANET_ROUTE"] + inner
+        if whole > most:
+            yield f"radio.max_frame_bytes = {most} must be >= {whole} for {what}"
+
+
+def _wrong_for_rivals(scenario: Scenario) -> Sequence[str]:
+    """What a protocol that goes hop by hop needs, and what needs such a protocol."""
+    found = []
+    if scenario.routing.protocol in _RIVALS and scenario.radio.max_frame_bytes < _RIVAL_FRAME_BYTES:
+        found.append(
+            f"radio.max_frame_bytes = {scenario.radio.max_frame_bytes} must be >= {_RIVAL_FRAME_BYTES} for "
+            f"routing.protocol = {scenario.routing.protocol}"
+        )
+    if scenario.routing.address_resolution != "none" and scenario.routing.protocol not in _RIVALS:
+        found.append(
+            f"routing.address_resolution = {scenario.routing.address_resolution} needs routing.protocol to be one of "
+            f"{', '.join(_RIVALS)}, not {scenario.routing.protocol}"
+        )
+    return found
+
+
+def _unkept_deadline(scenario: Scenario) -> Sequence[str]:
+    """A deadline that no node could hold a bound against."""
+    deadline_s = scenario.traffic.deadline_s
+    if deadline_s is None or (scenario.routing.protocol, scenario.clusters.relay) == ("clustered", "scheduled"):
+        return ()
+    return (
+        f"traffic.deadline_s = {deadline_s:g} needs a protocol with a bound: "
+        'routing.protocol = "clustered" and clusters.relay = "scheduled"',
+    )
+
+
+def _blind_warnings(scenario: Scenario) -> Iterator[str]:
+    """Warnings of collisions without what they are computed from, or without room to avoid."""
+    mission = scenario.mission
+    if not mission.collision_horizon_s:
+        return
+    wanted = f"mission.collision_horizon_s = {mission.collision_horizon_s:g} needs"
+    if not mission.collision_distance_m:
+        yield f"{wanted} mission.collision_distance_m > 0"
+    if not scenario.routing.hello_interval_s:
+        yield f"{wanted} hellos: routing.hello_interval_s > 0"
+    if scenario.nodes.altitude_m <= 2 * mission.collision_distance_m:
+        yield (
+            f"{wanted} room below to avoid: nodes.altitude_m = {scenario.nodes.altitude_m:g} must be > "
+            f"2 x mission.collision_distance_m = {2 * mission.collision_distance_m:g}"
+        )
+
+
+def _impossible_faults(scenario: Scenario) -> Sequence[str]:
+    """Faults of nodes that there are not, and links that are none."""
+    found = []
+    count = scenario.nodes.count
+    for index, (_, control) in enumerate(scenario.planned_faults):
+        unknown = [] if isinstance(control, Restore) else [node for node in nodes_of(control) if node > count]
+        if unknown:
+            found.append(f"faults.{index} names node {unknown[0]}, which must be <= nodes.count = {count}")
+        if isinstance(control, Degrade) and control.src == control.dst:
+            found.append(f"faults.{index}: src = dst = {control.src} is no link")
+    return found

@@ -1,0 +1,95 @@
+"""The entries of a scenario's `[[faults]]`: controls of the air at an instant, in people's units."""
+
+import math
+from typing import Annotated, Literal
+
+from pydantic import Field
+
+from fanet_mw.bus.radio_control import (
+    JAM_LABEL,
+    MAX_LABEL,
+    MAX_LOSS_DB,
+    MAX_NOISE_DBM,
+    MAX_RADIUS_M,
+    Control,
+    Cut,
+    Degrade,
+    Jam,
+    Restore,
+    link_label,
+    node_label,
+)
+from fanet_mw.scenario.sections import Coordinate, Duration, Id, Section
+from fanet_mw.units import Enu, NodeId, seconds_to_ns
+
+
+class FaultSection(Section):
+    """The base of the entries of `[[faults]]`: what happens to the air at an instant of the run."""
+
+    at_s: Duration
+    for_s: Annotated[float, Field(ge=0, le=1e6)] = 0.0
+    """How long it lasts; 0: until it is restored."""
+    label: Annotated[str, Field(max_length=MAX_LABEL, pattern=r"^[ -~]*$")] = ""
+    """What `restore` calls it; by default made from its kind and nodes. A new fault ends an old one of its label."""
+
+    @property
+    def for_ns(self) -> int:
+        return seconds_to_ns(self.for_s)
+
+
+class DegradeFault(FaultSection):
+    """A link is weaker or loses frames."""
+
+    kind: Literal["degrade"]
+    src: Id
+    dst: Id
+    both: bool = True
+    """Also the other direction."""
+    loss_db: Annotated[float, Field(ge=0, le=MAX_LOSS_DB)] = 0.0
+    """Added to the path loss."""
+    loss_share: Annotated[float, Field(ge=0, le=1)] = 0.0
+    """Of the frames that would have been received."""
+
+    def control(self) -> Control:
+        label = self.label or link_label(self.src, self.dst)
+        ends = NodeId(self.src), NodeId(self.dst)
+        return Degrade(label, *ends, self.both, self.loss_db, self.loss_share, self.for_ns)
+
+
+class JamFault(FaultSection):
+    """An area is jammed."""
+
+    kind: Literal["jam"]
+    center_m: tuple[Coordinate, Coordinate]
+    """East, north."""
+    radius_m: Annotated[float, Field(gt=0, le=MAX_RADIUS_M)]
+    noise_dbm: Annotated[float, Field(ge=-MAX_LOSS_DB, le=MAX_NOISE_DBM)] | None = None
+    """Noise at each receiver inside; by default nothing is received there."""
+
+    def control(self) -> Control:
+        noise_dbm = math.inf if self.noise_dbm is None else self.noise_dbm
+        return Jam(self.label or JAM_LABEL, Enu(*self.center_m, 0.0), self.radius_m, noise_dbm, self.for_ns)
+
+
+class CutFault(FaultSection):
+    """A node's radio is off."""
+
+    kind: Literal["cut"]
+    node: Id
+
+    def control(self) -> Control:
+        return Cut(self.label or node_label(self.node), NodeId(self.node), self.for_ns)
+
+
+class RestoreFault(Section):
+    """The end of a fault, or of all (no label)."""
+
+    kind: Literal["restore"]
+    at_s: Duration
+    label: str = ""
+
+    def control(self) -> Control:
+        return Restore(self.label)
+
+
+AnyFault = Annotated[DegradeFault | JamFault | CutFault | RestoreFault, Field(discriminator="kind")]

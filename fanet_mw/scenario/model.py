@@ -1,0 +1,360 @@
+"""The scenario: one frozen model of everything a run depends on. Keys are people's units, with the unit in the key.
+
+A key is a contract with users: renaming one breaks their files and sweeps. Derived values are properties, in `int` ns.
+Each table checks itself; what the tables ask of each other is in `scenario_checks.py`.
+"""
+
+import math
+from typing import Annotated, Final, Literal, Self
+
+from pydantic import AfterValidator, Field, model_validator
+
+from fanet_mw.bus.radio_control import Control
+from fanet_mw.scenario.checks import disagreements
+from fanet_mw.scenario.clock import Clock
+from fanet_mw.scenario.faults import AnyFault
+from fanet_mw.scenario.radio import Radio
+from fanet_mw.scenario.sections import (
+    MOST_S,
+    Coordinate,
+    Count,
+    Duration,
+    Id,
+    Interval,
+    Length,
+    Level,
+    Milliseconds,
+    Rate,
+    Section,
+    SomeLength,
+    SomeTime,
+    Speed,
+)
+from fanet_mw.units import MAX_NODES, MS, NodeId, seconds_to_ns
+
+_REPAIR_S: Final = 10.0
+"""Of packets that floods over measured links leave out."""
+
+
+def _none_or_interval(hello_s: float) -> float:
+    if 0 < hello_s < LEAST_HELLO_S:
+        raise ValueError(f"routing.hello_interval_s = {hello_s:g} must be 0 or >= {LEAST_HELLO_S:g}")
+    return hello_s
+
+
+LEAST_HELLO_S: Final = 0.01
+HelloInterval = Annotated[Duration, AfterValidator(_none_or_interval)]
+
+
+class Nodes(Section):
+    """How many nodes there are and where they start. Node ids run from 1; node 1 is the leader."""
+
+    count: Annotated[int, Field(ge=1, le=MAX_NODES)] = 45
+    layout: Literal["grid", "disc", "line", "explicit"] = "grid"
+    spacing_m: SomeLength = 200.0
+    radius_m: SomeLength = 100.0
+    columns: Count | None = None
+    """Grid columns; by default the widest near-square factorisation in the manner of 9 x 5."""
+    altitude_m: Length = 50.0
+    telemetry_hz: Rate = 1.0
+    """Native MAVLink telemetry of each node on its tap; 0 sends none."""
+    positions_m: tuple[tuple[Coordinate, Coordinate, Coordinate], ...] = ()
+    """Layout `explicit`: one [east, north, up] per node."""
+
+    @model_validator(mode="after")
+    def _explicit_has_positions(self) -> Self:
+        if self.layout == "explicit" and len(self.positions_m) != self.count:
+            raise ValueError(
+                f"nodes.positions_m has {len(self.positions_m)} entries; "
+                f'layout = "explicit" needs nodes.count = {self.count}'
+            )
+        return self
+
+
+class Traffic(Section):
+    """The application load: who sends how much, how often, to whom."""
+
+    payload_bytes: Annotated[int, Field(ge=64, le=2304)] = 1024
+    """UDP payload on the air, our routing header included."""
+    interval_s: Annotated[float, Field(ge=1e-4, le=MOST_S)] = 1.0
+    """At least 0.1 ms: packets are named by numbers of which a node has one for each 0.1 ms."""
+    arrivals: Literal["cbr", "poisson", "saturated", "none"] = "cbr"
+    sources: Literal["all"] | Annotated[int, Field(ge=0, le=MAX_NODES)] | tuple[Id, ...] = "all"
+    """A number of sources (drawn by seed among the nodes that are neither leader nor destination), a list of node
+    ids, or every node but the destination."""
+    destination: Literal["all"] | Id = "all"
+    deadline_s: SomeTime | None = None
+    """`clusters.relay = "scheduled"`: nodes refuse packets that would break this, and record whether their bound meets
+    it; unset: every packet is taken."""
+    targets: tuple[Id, ...] = ()
+    """Nodes at which delivery counts when the destination is `all`; empty: every other node."""
+
+
+class Routing(Section):
+    """The protocol above the radio."""
+
+    protocol: Literal["direct", "flooding", "clustered", "aodv", "olsr", "dsdv", "gossip", "counter", "geographic"] = (
+        "clustered"
+    )
+    address_resolution: Literal["none", "rfc826", "ns3"] = "none"
+    """`aodv`, `olsr`, `dsdv`, `geographic`: a node asks for a neighbor's address before its first unicast to it, as IP
+    does, by the rules of RFC 826 or by ns-3's. `none`: a node id is an address, and nobody needs to ask."""
+    jitter_ms: Milliseconds = 10.0
+    """A relay waits U(0, jitter) after a reception."""
+    hop_limit: Annotated[int, Field(ge=1, le=255)] = 32
+    queue_frames: Count = 512
+    """Bound of a node's own queue; the least important packet is evicted, with a reason."""
+    lifetime_s: SomeTime = 30.0
+    """A packet older than this is dropped where it waits."""
+    safety_lifetime_s: Duration = 1.0
+    """The same for warnings (priority 1): a position that old warns of nothing; 0: as `lifetime_s`."""
+    report_lifetime_s: Duration = 0.0
+    """The same for survivor reports (priority 2); 0: as `lifetime_s`."""
+    aggregate: bool = False
+    """`clustered`: packets that are released together share frames of up to `radio.max_frame_bytes`, and so do their
+    relays. `clusters.relay = "scheduled"` decides that by the load instead."""
+    hello_interval_s: HelloInterval = 1.0
+    """Position beacon and hello, one hop; 0 sends none (`clustered` needs them)."""
+    gossip_p: Annotated[float, Field(ge=0, le=1)] = 0.65
+    """Protocol `gossip`: probability with which a node relays a flooded packet."""
+    gossip_k: Annotated[int, Field(ge=0, le=255)] = 1
+    """Protocol `gossip`: within so many hops of the origin everyone relays."""
+    counter: Annotated[int, Field(ge=2, le=1_000_000)] = 3
+    """Protocol `counter`: a node that has heard so many copies does not relay."""
+    assess_ms: Milliseconds = 20.0
+    """Protocol `counter`: copies are counted for U(0, assess_ms)."""
+
+    @property
+    def jitter_ns(self) -> int:
+        return round(self.jitter_ms * MS)
+
+    def lifetime_ns(self, priority: int) -> int:
+        """How long a packet of this priority (`wire.PRIORITY_...`) lives."""
+        own_s = {1: self.safety_lifetime_s, 2: self.report_lifetime_s}.get(priority, 0.0)
+        return seconds_to_ns(own_s or self.lifetime_s)
+
+
+class Clusters(Section):
+    """The paper's protocol: k clusters, one slot each per flooding period."""
+
+    count: Annotated[int, Field(ge=1, le=1024)] = 4
+    flooding_period_s: Annotated[float, Field(ge=0.01, le=4000)] = 5.0
+    guard_ms: Milliseconds | Literal["auto"] = 2.0
+    """The silent end of a slot; `auto`: as long as the greatest clock error in the swarm, the range and the largest
+    frame ask for."""
+    release_gap_ms: Milliseconds = 2.0
+    """The least time between two packets that a head releases in its slot."""
+    pacing: Literal["burst", "spread"] = "spread"
+    """`burst` releases at `release_gap_ms`; `spread` divides the slot evenly among the queued packets."""
+    relay: Literal["all", "gossip", "counter", "heads", "cds", "mpr", "scheduled", "claimed"] = "all"
+    """Who relays a flooded packet: every node; each with probability min(1, gossip_degree / neighbors); each that has
+    heard fewer than `counter` copies after U(0, assess_ms); heads and who connects them; a connected dominating set;
+    multipoint relays; those that a collision-free timetable names, each in a turn of its own; or a connected
+    dominating set in slots that nodes agree on over the air."""
+    contention_ms: Milliseconds = 40.0
+    """`scheduled`, `claimed`: the beginning of each period, for all that has no turn: hellos, joins, unicasts."""
+    turn_slack_us: Annotated[float, Field(ge=0, le=1e6)] = 50.0
+    """`scheduled`, `claimed`: what a turn is longer than its frame: twice the bound of a clock's error, and some 20 us
+    for flight and detection."""
+    slots: Annotated[int, Field(ge=0, le=254)] = 0
+    """`claimed`: slots of a superframe; 0: as many as the neighborhood needs, a power of two."""
+    links: Literal["auto", "places", "measured"] = "auto"
+    """`scheduled`: what the timetable takes for a link: every pair within `link_m` (`places`), or what hellos have
+    shown (`measured`), with frames repeated according to the loss; `auto`: `measured` with shadowing or fading, else
+    `places`."""
+    link_m: Length = 0.0
+    """`scheduled`: nodes no farther apart are taken to hear each other; 0: `radio.range_m`."""
+    interference_m: Length = 0.0
+    """`scheduled`: nodes no farther apart may disturb each other; 0: `radio.range_m` for `range`, else twice that."""
+    gossip_degree: Annotated[float, Field(gt=0, le=1e6)] = 6.0
+    counter: Annotated[int, Field(ge=2, le=1_000_000)] = 3
+    assess_ms: Milliseconds = 100.0
+    method: Literal["balanced", "lowest_id", "highest_degree", "wca", "lasting_degree", "affinity"] = "balanced"
+    """How the leader divides the swarm. All but `balanced` make as many clusters as the topology asks for, whatever
+    `count` says: every member hears its head."""
+    reassign_s: Duration = 10.0
+    """The leader makes new clusters for a swarm that has moved at most this often; 0: only when nodes come or go."""
+    repair_s: Duration = 0.0
+    """Hellos say what a node holds; neighbors send again what it lacks and is younger than this; 0: no repair, but 10 s
+    with measured links."""
+
+    @property
+    def period_ns(self) -> int:
+        return seconds_to_ns(self.flooding_period_s)
+
+    @property
+    def slot_ns(self) -> int:
+        """Length of one slot, guard included."""
+        return self.period_ns // self.count
+
+
+class Mobility(Section):
+    """What a UAV does when the mission asks nothing of it."""
+
+    model: Literal["static", "formation", "random_waypoint", "crossing"] = "static"
+    """`formation` sweeps the area keeping the layout; `random_waypoint` is the statistical model, without pause;
+    `crossing` flies everyone through the middle of the area to the point opposite its start, and back."""
+    speed_m_s: Speed = 7.5
+    see_m: Length = 50.0
+    """UAVs nearer than this see each other without radio and keep clear; 0: they are blind."""
+
+
+Building = tuple[Coordinate, Coordinate, SomeLength, SomeLength, SomeLength]
+
+
+class World(Section):
+    """The engine that moves the bodies, and the area they move in."""
+
+    engine: Literal["pybullet", "kinematic"] = "kinematic"
+    area_m: SomeLength = 2500.0
+    """Side of the square area, centred at the origin."""
+    tick_ms: Annotated[float, Field(ge=1, le=10_000)] = 100.0
+    """Period at which poses are published."""
+    physics_hz: Annotated[int, Field(ge=10, le=2000)] = 240
+    buildings: Annotated[int, Field(ge=0, le=10_000)] | tuple[Building, ...] = 0
+    """A number of boxes at seeded places, or each as [east, north, width, depth, height] in metres: its middle, its
+    extent to the east and to the north, and its roof above the ground. UAVs collide with them, radio is obstructed."""
+    building_size_m: tuple[SomeLength, SomeLength] = (15.0, 40.0)
+    """Least and greatest width and depth of a seeded building."""
+    building_height_m: tuple[SomeLength, SomeLength] = (8.0, 30.0)
+    terrain_m: Annotated[float, Field(ge=0, le=1000)] = 0.0
+    """Height of the highest hill above the plain at 0; 0: no hills."""
+    terrain_scale_m: Annotated[float, Field(ge=1, le=1e6)] = 400.0
+    """Distance from hill to hill."""
+    gps_hz: Annotated[float, Field(ge=1e-6, le=1000)] = 5.0
+    gps_sigma_m: Annotated[float, Field(ge=0, le=1000)] = 1.5
+
+    @model_validator(mode="after")
+    def _obstacles_agree(self) -> Self:
+        if self.has_obstacles and self.engine != "pybullet":
+            raise ValueError('world.buildings and world.terrain_m need world.engine = "pybullet"')
+        for key in ("building_size_m", "building_height_m"):
+            least, greatest = getattr(self, key)
+            if least > greatest:
+                raise ValueError(f"world.{key} = [{least:g}, {greatest:g}] must be [least, greatest]")
+        return self
+
+    @property
+    def has_obstacles(self) -> bool:
+        """Whether anything but a plain can stand between two nodes."""
+        return bool(self.buildings) or self.terrain_m > 0
+
+    @property
+    def tick_ns(self) -> int:
+        return round(self.tick_ms * MS)
+
+
+class Mission(Section):
+    """Search and rescue: survivors, the sensor that finds their phones, and the rule that moves the UAVs."""
+
+    survivors: Annotated[int, Field(ge=0, le=10_000)] = 0
+    reports_to_approach: Count = 3
+    """A UAV approaches when this many different nodes have reported the same survivor (paper, 4.1)."""
+    report_interval_s: Interval = 5.0
+    """How often a UAV repeats its report of a survivor it still hears."""
+    scan_interval_s: Interval = 1.0
+    phone_power_dbm: Level = 15.0
+    phone_exponent: Annotated[float, Field(ge=0.1, le=10)] = 3.0
+    detection_dbm: Level = -90.0
+    shadowing_db: Annotated[float, Field(ge=0, le=30)] = 4.0
+    approach_speed_m_s: Annotated[float, Field(ge=1e-3, le=1000)] = 10.0
+    arrival_m: SomeLength = 30.0
+    dwell_s: Duration = 10.0
+    """How long a UAV stays with a survivor before it turns to the next one it knows of."""
+    collision_distance_m: Annotated[float, Field(ge=0, le=1000)] = 0.0
+    """UAVs nearer to each other have lost separation, which the world counts; 0: nobody looks."""
+    collision_horizon_s: Annotated[float, Field(ge=0, le=120)] = 0.0
+    """A UAV that foresees a loss of separation within this time warns the other one, and both avoid; 0: no warnings."""
+    collision_repeat_s: Annotated[float, Field(gt=0, le=120)] = 1.0
+    """A warning is repeated at this interval until the closest point of approach."""
+
+
+class Scenario(Section):
+    """One file; one execution of it with one seed is a run."""
+
+    name: Annotated[str, Field(pattern=r"^[A-Za-z0-9_-]{1,64}$")] = "unnamed"
+    description: str = ""
+    duration_s: SomeTime = 100.0
+    warmup_s: Duration = 0.0
+    """Application traffic begins here; nothing before it is measured."""
+    drain_s: Duration = 0.0
+    """Application traffic ends this long before the end, so that what is under way can arrive."""
+    seed: Annotated[int, Field(ge=0, lt=2**63)] = 1
+    time_scale: Annotated[float, Field(ge=1e-3, le=100)] = 1.0
+    """Real time only: swarm seconds per wall second."""
+    nodes: Nodes = Nodes()
+    traffic: Traffic = Traffic()
+    routing: Routing = Routing()
+    clusters: Clusters = Clusters()
+    radio: Radio = Radio()
+    mobility: Mobility = Mobility()
+    clock: Clock = Clock()
+    world: World = World()
+    mission: Mission = Mission()
+    faults: tuple[AnyFault, ...] = ()
+    """What happens to the air, and when; by message too (`fanet air`)."""
+
+    @model_validator(mode="after")
+    def _parts_agree(self) -> Self:
+        problems = list(disagreements(self))
+        if problems:
+            raise ValueError("; ".join(problems))
+        return self
+
+    @property
+    def measures_links(self) -> bool:
+        """Whether timetables are made from measured links (`clusters.links`)."""
+        chosen, lossy = self.clusters.links, self.radio.shadowing_db > 0 or self.radio.fading != "none"
+        wanted = chosen == "measured" or (chosen == "auto" and lossy)
+        return wanted and self.clusters.relay == "scheduled" and self.routing.hello_interval_s > 0
+
+    @property
+    def repair_ns(self) -> int:
+        """For how long packets are repaired; with measured links always, because frames do get lost."""
+        return seconds_to_ns(self.clusters.repair_s or (_REPAIR_S if self.measures_links else 0.0))
+
+    @property
+    def mac_lifetime_ns(self) -> int:
+        """How long a frame may wait in the MAC queue (`radio.lifetime_ms`)."""
+        unset_ms = _FOREVER_MS if self.traffic.arrivals == "saturated" else _LIFETIME_MS
+        return round((self.radio.lifetime_ms or unset_ms) * MS)
+
+    @property
+    def duration_ns(self) -> int:
+        return seconds_to_ns(self.duration_s)
+
+    @property
+    def traffic_window_ns(self) -> tuple[int, int]:
+        """Application packets are generated, and measured, in [start, end)."""
+        return seconds_to_ns(self.warmup_s), seconds_to_ns(self.duration_s - self.drain_s)
+
+    @property
+    def planned_faults(self) -> list[tuple[int, Control]]:
+        """(instant ns, what happens), in the order of the file."""
+        return [(seconds_to_ns(fault.at_s), fault.control()) for fault in self.faults]
+
+    @property
+    def node_ids(self) -> range:
+        return range(1, self.nodes.count + 1)
+
+    @property
+    def leader(self) -> NodeId:
+        return NodeId(1)
+
+
+_LIFETIME_MS: Final = 500.0
+_FOREVER_MS: Final = 1e6
+
+
+def grid_columns(count: int) -> int:
+    """Columns of the default grid: the factorisation nearest to 9:5, else the square root rounded up."""
+    wanted = math.sqrt(count * 9 / 5)
+    divisors = [d for d in range(1, count + 1) if count % d == 0 and d * d >= count]
+    best = min(divisors, key=lambda d: abs(d - wanted))
+    return best if best <= 2 * wanted else math.ceil(wanted)
+
+
+__all__ = [
+    "Clock", "Clusters", "Mission", "Mobility", "Nodes", "Radio", "Routing", "Scenario", "Section", "Traffic", "World",
+    "grid_columns",
+]  # fmt: skip

@@ -1,0 +1,1 @@
+"""A common time for the swarm, agreed on over the air."""

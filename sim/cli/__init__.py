@@ -1,0 +1,1 @@
+"""The `fanet` command and its subcommands."""

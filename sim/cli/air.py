@@ -1,0 +1,156 @@
+"""The `fanet air` commands: parsing and printing; what they do is in `sim.run.air`."""
+
+import math
+from dataclasses import dataclass
+from pathlib import Path
+from typing import Annotated
+
+from cyclopts import App, Parameter
+
+from fanet_mw.bus.radio_control import (
+    JAM_LABEL,
+    Control,
+    Cut,
+    Degrade,
+    Jam,
+    Restore,
+    link_label,
+    node_label,
+    nodes_of,
+    wrong,
+)
+from fanet_mw.errors import ConfigError
+from fanet_mw.units import MAX_NODES, Enu, NodeId, S, seconds_to_ns
+from sim.cli.console import Console
+from sim.cli.options import warn_of
+from sim.run.air import change
+from sim.run.running import locate
+
+app = App(name="air", help="Change the air of a swarm that runs: degrade a link, jam an area, cut a node off, restore.")
+
+
+@Parameter(name="*")
+@dataclass(frozen=True)
+class Where:
+    """Which swarm."""
+
+    connect: str | None = None
+    """Zenoh endpoint of the swarm's router; by default that of a swarm that runs on this machine."""
+    swarm: str | None = None
+    """Name of the swarm; by default the only one there."""
+    zenoh_config: Path | None = None
+    """Zenoh's own configuration, JSON5 (TLS and the like): a file, or a folder of `fanet keys`."""
+
+    def __post_init__(self) -> None:
+        warn_of(self.connect, listens=False)
+
+
+@Parameter(name="*")
+@dataclass(frozen=True)
+class Life:
+    """What the fault is called, and how long it stands."""
+
+    label: str | None = None
+    """What `restore` calls it; by default made from its kind and nodes. A new fault ends an old one of its label."""
+    for_s: Annotated[float, Parameter(name="--for")] = 0.0
+    """Swarm seconds; 0: until it is restored [s]."""
+
+    @property
+    def for_ns(self) -> int:
+        return seconds_to_ns(self.for_s)
+
+
+@app.command
+def degrade(
+    src: int,
+    dst: int,
+    *,
+    loss_db: float = 0.0,
+    loss_share: float = 0.0,
+    one_way: Annotated[bool, Parameter(negative="")] = False,
+    life: Life = Life(),
+    where: Where = Where(),
+) -> int:
+    """Make a link weaker, or let it lose frames.
+
+    Parameters
+    ----------
+    src
+        Node id of one end.
+    dst
+        Node id of the other.
+    loss_db
+        Added to the path loss [dB].
+    loss_share
+        Share of the frames lost of those that would have been received.
+    one_way
+        Only from src to dst.
+
+    """
+    label = life.label or link_label(src, dst)
+    return _do(Degrade(label, NodeId(src), NodeId(dst), not one_way, loss_db, loss_share, life.for_ns), where)
+
+
+@app.command
+def jam(
+    east_m: float,
+    north_m: float,
+    radius_m: float,
+    *,
+    noise_dbm: float | None = None,
+    life: Life = Life(),
+    where: Where = Where(),
+) -> int:
+    """Jam the receivers in a circle, at any height.
+
+    Parameters
+    ----------
+    east_m
+        Center, east of the origin [m].
+    north_m
+        Center, north of the origin [m].
+    radius_m
+        Radius [m].
+    noise_dbm
+        Noise that each receiver inside hears [dBm]; by default nothing is received there.
+
+    """
+    center = Enu(east_m, north_m, 0.0)
+    noise = math.inf if noise_dbm is None else noise_dbm
+    return _do(Jam(life.label or JAM_LABEL, center, radius_m, noise, life.for_ns), where)
+
+
+@app.command
+def cut(node: int, *, life: Life = Life(), where: Where = Where()) -> int:
+    """Switch a node's radio off.
+
+    Parameters
+    ----------
+    node
+        Node id.
+
+    """
+    return _do(Cut(life.label or node_label(node), NodeId(node), life.for_ns), where)
+
+
+@app.command
+def restore(label: str = "", *, where: Where = Where()) -> int:
+    """End a fault, or all of them.
+
+    Parameters
+    ----------
+    label
+        Of the fault: the one given with it, or link-SRC-DST, node-ID, jam. By default all.
+
+    """
+    return _do(Restore(label), where)
+
+
+def _do(control: Control, where: Where) -> int:
+    if not isinstance(control, Restore) and (why := wrong(control, count=MAX_NODES)):
+        bound = "node ids from 1" if nodes_of(control) else "see `fanet air --help`"
+        raise ConfigError(f"{control}: {why.removeprefix('fault_').replace('_', ' ')} out of bounds ({bound})")
+    console = Console(highlight=False)
+    for fault in change(*locate(where.connect, where.swarm), control, zenoh_config=where.zenoh_config):
+        console.print(f"{fault.label}: {fault.kind} {'since' if fault.active else 'ended at'} {fault.t_ns / S:.3f} s")
+    return 0

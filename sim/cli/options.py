@@ -1,0 +1,105 @@
+"""What commands of `fanet` have in common: options that several of them take, and what follows from them.
+
+Field names are the flags, their docstrings the help; the command line reads both at run time.
+"""
+
+from dataclasses import dataclass, replace
+from pathlib import Path
+from typing import Annotated, Final
+
+from cyclopts import Parameter
+
+from emulator.capture_file import NAME
+from fanet_mw.errors import ConfigError
+from fanet_mw.hosts.bus import exposure
+from fanet_mw.scenario import Scenario
+from sim.cli.console import Console
+from sim.cli.out_folder import prepare
+from sim.scenarios import catalog
+
+_err = Console(stderr=True)
+_LEAD_MS: Final = 40
+"""What a scenario without a lead is given in real time: asyncio's timers and the bus are late by some milliseconds."""
+
+
+@Parameter(name="*")
+@dataclass(frozen=True)
+class Choice:
+    """What to run: a scenario and what to change in it."""
+
+    set: Annotated[
+        tuple[str, ...], Parameter(name="--set", negative="", help="Change one scenario key, KEY=VALUE.")
+    ] = ()
+    """Repeatable, for example --set nodes.count=20 --set radio.channel=log_distance."""
+    seed: int | None = None
+    """Seed of every random stream of the run."""
+    duration: float | None = None
+    """Simulated seconds to run [s]."""
+
+    def scenario(self, name: str) -> Scenario:
+        """The scenario with these changes."""
+        overrides = list(self.set)
+        if self.seed is not None:
+            overrides.append(f"seed={self.seed}")
+        if self.duration is not None:
+            overrides.append(f"duration_s={self.duration}")
+        return catalog.find(name, overrides)
+
+    def realtime_scenario(self, name: str) -> Scenario:
+        """The same for real processes, which can announce nothing without a lead: where it is 0, one that they need."""
+        chosen = self.scenario(name)
+        if chosen.radio.lead_ms:
+            return chosen
+        _err.print(f"radio.lead_ms = 0 is for virtual time; {_LEAD_MS} here, --set radio.lead_ms to choose")
+        return replace(self, set=(*self.set, f"radio.lead_ms={_LEAD_MS}")).scenario(name)
+
+
+@Parameter(name="*")
+@dataclass(frozen=True)
+class Output:
+    """Where the result goes."""
+
+    out: Path | None = None
+    """Folder for scenario.toml, summary.json, reports.json, links.json, trace.jsonl and mavlink.tlog."""
+    force: Annotated[bool, Parameter(negative="")] = False
+    """Replace the result of another run in that folder."""
+    json: Annotated[bool, Parameter(negative="")] = False
+    """Print the summary as JSON, and nothing else, on standard output."""
+    pcap: Annotated[bool, Parameter(negative="")] = False
+    """Write every transmission to air.pcap in that folder, for Wireshark."""
+    pcap_receptions: Annotated[bool, Parameter(negative="")] = False
+    """Write every reception too, with its RSSI."""
+
+    def prepare(self) -> None:
+        """See, before a run, that its result can be written; raises ConfigError."""
+        if self.out is None and (self.pcap or self.pcap_receptions):
+            raise ConfigError("--pcap: needs --out DIR, the folder that air.pcap goes to")
+        if self.out is not None:
+            prepare(self.out, force=self.force)
+
+    def capture_path(self) -> Path | None:
+        """Where the capture goes, if one is wanted."""
+        wanted = self.pcap or self.pcap_receptions
+        return self.out / NAME if wanted and self.out is not None else None
+
+
+@Parameter(name="*")
+@dataclass(frozen=True)
+class Join:
+    """How a single service finds its swarm."""
+
+    connect: str = "tcp/127.0.0.1:7447"
+    """Zenoh endpoint of the swarm's router."""
+    swarm: str | None = None
+    """Name of the swarm; by default the scenario's name."""
+    zenoh_config: Path | None = None
+    """Zenoh's own configuration, JSON5 (TLS and the like): a file, or a folder of `fanet keys`."""
+
+    def __post_init__(self) -> None:
+        warn_of(self.connect, listens=False)
+
+
+def warn_of(endpoint: str | None, *, listens: bool) -> None:
+    """Say what others can do at an endpoint that they can reach."""
+    if endpoint is not None and (warning := exposure(endpoint, listens=listens)) is not None:
+        _err.print(warning, highlight=False, soft_wrap=True, markup=False)

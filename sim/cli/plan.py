@@ -1,0 +1,197 @@
+"""`fanet plan`: is a scenario feasible, before take-off? The planner is `fanet_mw.planner`.
+
+Exit codes: 0 feasible, 1 not feasible, 2 the scenario or a flag is wrong (as with every command).
+"""
+
+import json
+import math
+from typing import Any
+
+from agents.traffic import sources_of
+from fanet_mw.bounds import Bounded, Outcome, Refused
+from fanet_mw.errors import ConfigError
+from fanet_mw.graph.topology import within_range
+from fanet_mw.planner import (
+    Change,
+    ClassPlan,
+    Loss,
+    Optimum,
+    Plan,
+    cheapest_change,
+    describe,
+    describe_change,
+    describe_loss,
+    describe_optimum,
+    loss,
+    optimum,
+    plan,
+    with_capacity,
+)
+from fanet_mw.planner.by_turn import Superframe
+from fanet_mw.planner.claimed import Claims
+from fanet_mw.routing.clustered.timetable.timetable import Timetable
+from fanet_mw.routing.clustered.timetable.turn_plan import links
+from fanet_mw.scenario import Scenario
+from fanet_mw.units import MS, Enu, NodeId, S, seconds_to_ns
+from fanet_mw.wire.places import rounded
+from sim.cli.frame_chance import chance_of
+from sim.world.layout import positions
+
+
+def judge(
+    scenario: Scenario, *, deadline_s: float | None = None, search: bool = False, change: bool = True
+) -> tuple[str, dict[str, Any], bool]:
+    """(text, JSON, feasible) of a scenario where its nodes start.
+
+    `change`: look for the cheapest change when it is not feasible; `search`: for what takes the least airtime.
+    """
+    if scenario.routing.protocol != "clustered":
+        raise ConfigError(f'routing.protocol = {scenario.routing.protocol}: only "clustered" can be planned')
+    if deadline_s is not None and not (math.isfinite(deadline_s) and deadline_s > 0):
+        raise ConfigError(f"--deadline {deadline_s:g}: must be > 0 [s]")
+    at = _places(scenario)
+    wanted_s = scenario.traffic.deadline_s if deadline_s is None else deadline_s
+    deadline_ns = None if wanted_s is None else seconds_to_ns(wanted_s)
+    sources = [NodeId(node) for node in sources_of(scenario)]
+    found = plan(scenario, at, sources=sources, deadline_ns=deadline_ns)
+    if isinstance(found, Refused):
+        return describe(found), {"feasible": False, "problems": [found.reason]}, False
+    found = with_capacity(found, at)
+    text, content = [describe(found)], _json(found)
+    if found.superframe is not None and found.superframe.table is not None and not found.cut_off:
+        missed = _loss(found.scenario, found.superframe, found.superframe.table, at)
+        text.append(describe_loss(missed))
+        content["loss"] = None if missed is None else missed._asdict()
+    if change and not found.feasible:
+        cheapest = cheapest_change(scenario, at, sources=sources, deadline_ns=deadline_ns)
+        text.append(describe_change(cheapest, found))
+        content["change"] = None if cheapest is None else _change_json(cheapest)
+    if search:
+        best = optimum(scenario, at, deadline_ns=deadline_ns, sources=sources)
+        text.append(describe_optimum(best, deadline_ns=deadline_ns))
+        content["search"] = None if best is None else _optimum_json(best)
+    return "\n".join(text), content, found.feasible
+
+
+def _places(scenario: Scenario) -> dict[NodeId, Enu]:
+    """Where the nodes start; in whole metres, as the leader will tell them."""
+    start = zip(scenario.node_ids, positions(scenario), strict=True)
+    return {NodeId(node): rounded(place) if scenario.clusters.relay == "scheduled" else place for node, place in start}
+
+
+def _loss(scenario: Scenario, superframe: Superframe, table: Timetable, at: dict[NodeId, Enu]) -> Loss | None:
+    """Of what has turns; a way to a head that contends is not in it."""
+    chance = chance_of(scenario, at)
+    if chance is None:
+        return None
+    turns = superframe.turns
+    geometry = links(scenario, turns)
+    adjacency = within_range(at, range_m=geometry.link_m)
+    return loss(table, adjacency, per_frame=turns.per_frame, hop_turns=geometry.hop_turns, chance=chance)
+
+
+def _json(found: Plan) -> dict[str, Any]:
+    superframe, bottleneck = found.superframe, found.bottleneck
+    return {
+        "scenario": found.scenario.name,
+        "feasible": found.feasible,
+        "proven": found.proven,
+        "deadline_ms": None if found.deadline_ns is None else found.deadline_ns / MS,
+        "classes": [_class_json(c, found.deadline_ns) for c in found.classes],
+        "to_head_ms": _ms(found.access),
+        "superframe": None if superframe is None else {
+            "period_ms": superframe.turns.period_ns / MS,
+            "contention_ms": superframe.turns.contention_ns / MS,
+            "turn_ms": superframe.turns.turn_ns / MS,
+            "turns": superframe.turns.per_frame,
+            "used": superframe.used,
+            "packets": superframe.packets,
+            "together": superframe.together,
+            "least_interval_s": None if superframe.least_interval_ns is None else superframe.least_interval_ns / S,
+        },
+        "claims": None if found.claims is None else _claims_json(found.claims),
+        "slots": [
+            {
+                "head": c.head,
+                "members": c.members,
+                "hops": c.hops,
+                "slot_ms": c.slot_ns / MS,
+                "flood_ms": c.flood.duration_ns / MS,
+                "packets_per_period": c.packets,
+                "used": c.utilization if c.usable_ns else None,
+                "waiting": c.backlog,
+            }
+            for c in found.clusters
+        ],
+        "carried_per_s": found.carried_per_second,
+        "any_protocol_per_s": None if found.goodput is None else found.goodput.per_second,
+        "bottleneck": None if bottleneck is None else bottleneck.head,
+        "equation_4_ms": _ms(found.paper),
+        "cut_off": list(found.cut_off),
+        "problems": list(found.problems),
+        "notes": list(found.notes),
+    }  # fmt: skip
+
+
+def _claims_json(claims: Claims) -> dict[str, Any]:
+    return {
+        "period_ms": claims.turns.period_ns / MS,
+        "contention_ms": claims.turns.contention_ns / MS,
+        "turn_ms": claims.turns.turn_ns / MS,
+        "turns": claims.turns.per_frame,
+        "hops": claims.hops,
+        "hop_ms": None if claims.hop_ns is None else claims.hop_ns / MS,
+        "lone_ms": None if claims.lone_ns is None else claims.lone_ns / MS,
+        "least_interval_s": None if claims.least_interval_ns is None else claims.least_interval_ns / S,
+        "nodes": [
+            {
+                "node": node.node,
+                "relays": node.relays,
+                "superframe": node.superframe,
+                "claimed": node.claimed,
+                "by_lot": round(node.won, 3),
+                "needed": round(node.load, 3),
+                "used": round(node.utilization, 6) if node.claimed else None,
+            }
+            for node in claims.nodes
+        ],
+    }
+
+
+def _class_json(c: ClassPlan, deadline_ns: int | None) -> dict[str, Any]:
+    return {
+        "name": c.name,
+        "sources": c.sources,
+        "interval_s": c.interval_ns / S,
+        "bound_ms": _ms(c.bound),
+        "from_head_ms": _ms(c.from_head),
+        "refused": c.bound.reason if isinstance(c.bound, Refused) else None,
+        "deadline_met": None if deadline_ns is None else c.meets(deadline_ns),
+    }
+
+
+def _change_json(change: Change) -> dict[str, Any]:
+    return {
+        "set": list(change.variant.arguments),
+        "classes": [_class_json(c, change.plan.deadline_ns) for c in change.plan.classes],
+    }
+
+
+def _optimum_json(best: Optimum) -> dict[str, Any]:
+    return {
+        "set": list(best.variant.arguments),
+        "airtime_per_packet_ms": best.airtime_ns / MS,
+        "relays_per_packet_ms": best.floods_ns / MS,
+        "classes": [_class_json(c, best.plan.deadline_ns) for c in best.plan.classes],
+    }
+
+
+def _ms(outcome: Outcome) -> float | None:
+    return outcome.delay_ns / MS if isinstance(outcome, Bounded) else None
+
+
+def show(scenario: Scenario, *, deadline: float | None, search: bool, as_json: bool) -> int:
+    """Print the plan; 0: feasible, 1: not."""
+    text, content, feasible = judge(scenario, deadline_s=deadline, search=search)
+    print(json.dumps(content, indent=2) if as_json else text)
+    return 0 if feasible else 1

@@ -1,0 +1,68 @@
+"""What clocks did to a run: true delays in the trace, and how far swarm time was off.
+
+A node knows its own idea of swarm time only; how long a packet took, and how wrong a clock was, is known to the run.
+"""
+
+from collections import defaultdict
+from collections.abc import Mapping, Sequence
+from typing import Any
+
+import numpy as np
+import numpy.typing as npt
+
+from fanet_mw.trace import ClockSampled, Delivered, Generated, Record
+from fanet_mw.units import US, S
+from sim.run.outcome import Outcome
+
+
+def true_delays(records: Sequence[Record]) -> list[Record]:
+    """The records with each delay from the true instant of generation; unchanged where that was never recorded."""
+    born = {(record.node, record.seq): record.t_ns for record in records if type(record) is Generated}
+    return [_true_delay(record, born) if type(record) is Delivered else record for record in records]
+
+
+def _true_delay(record: Delivered, born: Mapping[tuple[int, int], int]) -> Delivered:
+    born_ns = born.get((record.origin, record.seq))
+    return record if born_ns is None else record._replace(delay_ns=record.t_ns - born_ns)
+
+
+def errors_ns(samples: Sequence[ClockSampled]) -> list[tuple[ClockSampled, int]]:
+    """Each sample with its true error: against its reference's own clock at that instant, else against true time."""
+    ahead = {(sample.t_ns, sample.node): sample.ahead_ns for sample in samples}
+    return [(sample, sample.ahead_ns - ahead.get((sample.t_ns, sample.reference), 0)) for sample in samples]
+
+
+def clock_errors(outcome: Outcome) -> dict[str, Any]:
+    """`clock` of `summary.json`; empty while clocks are exact."""
+    samples = [record for record in outcome.records if type(record) is ClockSampled]
+    if not samples:
+        return {}
+    start_ns, end_ns = outcome.scenario.traffic_window_ns
+    measured = [
+        (sample, abs(error))
+        for sample, error in errors_ns(samples)
+        if start_ns <= sample.t_ns < end_ns and (sample.bound_ns >= 0 or outcome.scenario.clock.sync == "none")
+    ]
+    values = np.asarray([error for _, error in measured], dtype=np.float64) / US
+    bounds = [sample.bound_ns / US for sample, _ in measured if sample.bound_ns >= 0]
+    return {
+        "error_us": _quantiles(values) if len(values) else dict.fromkeys(("p50", "p99", "max")),
+        "bound_us": round(max(bounds), 3) if bounds else None,
+        "beyond_bound": sum(error > sample.bound_ns >= 0 for sample, error in measured),
+        "samples": len(measured),
+        "synced_after_s": _synced_after_s(samples, outcome.scenario.nodes.count),
+    }
+
+
+def _quantiles(values: npt.NDArray[np.float64]) -> dict[str, float]:
+    p50, p99 = np.percentile(values, (50, 99))
+    return {"p50": round(float(p50), 3), "p99": round(float(p99), 3), "max": round(float(values.max()), 3)}
+
+
+def _synced_after_s(samples: Sequence[ClockSampled], nodes: int) -> float | None:
+    """When the last node first stated a bound; None when one never did."""
+    first: dict[int, int] = defaultdict(lambda: -1)
+    for sample in samples:
+        if sample.bound_ns >= 0 and first[sample.node] < 0:
+            first[sample.node] = sample.t_ns
+    return max(first.values()) / S if sum(at >= 0 for at in first.values()) == nodes else None

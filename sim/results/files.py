@@ -1,0 +1,97 @@
+"""The output folder of a run: resolved scenario, summary, trace, `.tlog`. The hash is of the trace file's bytes.
+
+Each file is written for itself, the smallest first: one that cannot be written whole is named in the summary's
+`unwritten` with the reason, keeps what fits, and takes nothing from the others.
+"""
+
+import hashlib
+import json
+from collections.abc import Callable, Iterable, Iterator
+from functools import partial
+from pathlib import Path
+from typing import Any
+
+import tomli_w
+
+from fanet_mw import tlog, trace
+from fanet_mw.errors import ConfigError
+from fanet_mw.trace import Record
+from fanet_mw.whole_file import write_items
+from sim.results.links import described
+from sim.results.metrics import summarize
+from sim.run.outcome import Outcome
+
+
+def trace_lines(records: Iterable[Record]) -> Iterator[bytes]:
+    """The trace file, line by line: one JSON array each."""
+    for record in records:
+        yield f"{trace.line(record)}\n".encode()
+
+
+def trace_bytes(records: Iterable[Record]) -> bytes:
+    """The whole trace file."""
+    return b"".join(trace_lines(records))
+
+
+def finish(outcome: Outcome, *, out: Path | None) -> dict[str, Any]:
+    """Summarize a run and, when a folder is given, write it.
+
+    Raises ConfigError when the folder cannot be had at all. What was measured is written even if summarizing it raises.
+    """
+    if out is not None:
+        try:
+            out.mkdir(parents=True, exist_ok=True)
+        except OSError as error:
+            raise ConfigError(f"--out {out}: cannot be written: {error.strerror}") from error
+    digest = hashlib.sha256()
+    for line in trace_lines(outcome.records):
+        digest.update(line)
+    summary: dict[str, Any] = {}
+    try:
+        summary = {**summarize(outcome, trace_sha256=digest.hexdigest()), "unwritten": {}}
+    finally:
+        if out is not None:
+            unwritten = _write(outcome, summary, out)
+            if unwritten:
+                summary["unwritten"] = unwritten
+                _try(partial(_replace, out / "summary.json", summary))
+    return summary
+
+
+def _write(outcome: Outcome, summary: dict[str, Any], out: Path) -> dict[str, str]:
+    """Write every file that can be written; returns what was wrong with the others, by name."""
+    resolved = outcome.scenario.model_dump(mode="json", exclude_none=True)
+    links = ",\n".join(json.dumps(row) for row in described(outcome.links.rows()))  # a line per link
+    writers: dict[str, Callable[[Path], object]] = {
+        "summary.json": lambda path: write_items(path, _json_lines(summary)),
+        "scenario.toml": lambda path: write_items(path, [tomli_w.dumps(resolved).encode()]),
+        "reports.json": lambda path: write_items(path, _json_lines(dict(outcome.reports))),
+        "links.json": lambda path: write_items(path, f"[\n{links}\n]\n".encode().splitlines(keepends=True)),
+        "trace.jsonl": lambda path: write_items(path, trace_lines(outcome.records)),
+        "mavlink.tlog": lambda path: tlog.write(path, outcome.taps, epoch_us=outcome.epoch_unix_ns // 1000),
+    }
+    failed = {name: _try(partial(write, out / name)) for name, write in writers.items()}
+    return {name: why for name, why in failed.items() if why is not None}
+
+
+def _json_lines(content: dict[str, Any]) -> list[bytes]:
+    return [f"{json.dumps(content, indent=2)}\n".encode()]
+
+
+def _replace(path: Path, summary: dict[str, Any]) -> None:
+    """Write the summary anew beside the old one, which stays when that fails."""
+    fresh = path.with_suffix(".new")
+    try:
+        write_items(fresh, _json_lines(summary))
+        fresh.replace(path)
+    finally:
+        fresh.unlink(missing_ok=True)
+
+
+def _try(write: Callable[[], object]) -> str | None:
+    """Why something could not be written; None when it was."""
+    try:
+        write()
+    except OSError as error:
+        return error.strerror or str(error)
+    return None

@@ -1,0 +1,76 @@
+"""Every frame of a run, counted twice: by the nodes that asked for it and by the medium that had it.
+
+    sent + unasked = delivered + dropped(reason) + in flight + unaccounted
+
+It closes when nothing is unasked or unaccounted. Node by node, a request that the medium never had was lost on the bus
+(reason `bus`); in virtual time there is no bus that could lose one, so there it is unaccounted for, and so is what an
+emulator that died took with it. `unasked` is what the medium had of a node that never asked for it.
+"""
+
+from collections import Counter
+from collections.abc import Mapping
+from typing import Any
+
+from fanet_mw.errors import DropReason
+from sim.run.outcome import Outcome
+
+_NO_FRAMES: Mapping[str, Any] = {"sent": 0, "delivered": 0, "in_flight": 0, "dropped": {}}
+
+
+def frames(outcome: Outcome) -> dict[str, Any]:
+    """`frames` of `summary.json`."""
+    emulator = outcome.reports.get("emulator", {})
+    counted = emulator.get("frames", _NO_FRAMES)
+    missing, unasked = _differences(outcome, emulator.get("requests", {}))
+    dropped = Counter(counted["dropped"])
+    unaccounted = 0
+    if outcome.mode == "virtual":
+        unaccounted = missing + dropped.pop(DropReason.BUS, 0)
+    elif _cut_short(outcome, "emulator"):
+        unaccounted = missing
+    elif missing:
+        dropped[DropReason.BUS] += missing
+    sent = counted["sent"] + missing - unasked
+    explained = counted["delivered"] + counted["in_flight"] + dropped.total()
+    return {
+        "sent": sent,
+        "delivered": counted["delivered"],
+        "in_flight": counted["in_flight"],
+        "dropped": {reason: dropped[reason] for reason in sorted(dropped)},
+        "unaccounted": unaccounted,
+        "unasked": unasked,
+        "closes": not unaccounted and not unasked and sent == explained,
+    }
+
+
+def _differences(outcome: Outcome, requests: Mapping[str, Mapping[str, int]]) -> tuple[int, int]:
+    """Requests that the medium never had of the nodes that made them, and requests that it had of nobody."""
+    missing = unasked = 0
+    for node in outcome.scenario.node_ids:
+        name = f"agent-{node}"
+        counts = requests.get(str(node), {})
+        had = counts.get("all", 0)
+        made = outcome.reports.get(name, {}).get("frames_sent", 0)
+        if _cut_short(outcome, name):  # its own count ended before it did: the medium's stands for the rest
+            made = max(had, counts.get("before_restart", 0) + made)
+        missing += max(0, made - had)
+        unasked += max(0, had - made)
+    return missing, unasked
+
+
+def _cut_short(outcome: Outcome, name: str) -> bool:
+    """Whether an actor's report does not cover all of its run."""
+    report = outcome.reports.get(name)
+    if report is None or any(ended == name for ended, _ in outcome.ended):
+        return True
+    return outcome.mode == "realtime" and not report.get("final")
+
+
+def copies(outcome: Outcome) -> dict[str, Any]:
+    """`copies` of `summary.json`: the ledger at receivers, and how many of those handed to the bus the nodes heard."""
+    emulator = outcome.reports.get("emulator", {})
+    if not emulator:
+        return {}
+    agents = [report for report in outcome.reports.values() if report.get("kind") == "agent"]
+    heard = sum(report["receptions"] for report in agents)
+    return {**emulator["copies"], "handed": sum(emulator["handed"].values()), "heard": heard}

@@ -1,0 +1,62 @@
+"""What links carried over a whole run: sums of the medium's reports, as rows for a file."""
+
+from collections.abc import Iterable
+from typing import Any, Final
+
+import numpy as np
+
+from fanet_mw.bus.link_stats import COUNTS, LOSSES, LinkRow, LinkStats
+from fanet_mw.units import NodeId
+
+_PENDING: Final = 64
+"""Reports that wait until their sums are taken together: what is kept does not grow with the length of a run."""
+
+
+class LinkTotals:
+    """Sums per directed link. Memory is that of the links, whatever the number of reports."""
+
+    def __init__(self) -> None:
+        self._pending: list[LinkStats] = []
+        self._links = np.zeros((0, 2), np.uint16)
+        self._sums = np.zeros((0, 1 + COUNTS), np.int64)
+
+    def add(self, stats: LinkStats) -> None:
+        """Take in one report."""
+        self._pending.append(stats)
+        if len(self._pending) >= _PENDING:
+            self._merge()
+
+    def rows(self) -> list[LinkRow]:
+        """All links, by source and destination."""
+        self._merge()
+        return [
+            LinkRow(NodeId(src), NodeId(dst), received, tuple(lost), rssi_sum)
+            for (src, dst), (rssi_sum, received, *lost) in zip(self._links.tolist(), self._sums.tolist(), strict=True)
+        ]
+
+    def _merge(self) -> None:
+        """Add the reports that wait to the sums."""
+        ends, sums = [self._links], [self._sums]
+        for report in self._pending:
+            ends.append(np.frombuffer(report.ends, np.uint16).reshape(-1, 2))
+            counts = np.frombuffer(report.counts, np.uint32).reshape(-1, COUNTS).astype(np.int64)
+            sums.append(np.column_stack([np.frombuffer(report.rssi_sums_mdbm, np.int64), counts]))
+        self._pending.clear()
+        self._links, place = np.unique(np.concatenate(ends), axis=0, return_inverse=True)
+        self._sums = np.zeros((len(self._links), 1 + COUNTS), np.int64)
+        np.add.at(self._sums, place.reshape(-1), np.concatenate(sums))
+
+
+def described(rows: Iterable[LinkRow]) -> list[dict[str, Any]]:
+    """The content of `links.json`: copies, received, lost by reason, and the mean RSSI [dBm] of those received."""
+    return [
+        {
+            "src": row.src,
+            "dst": row.dst,
+            "copies": row.copies,
+            "received": row.received,
+            "lost": {reason.value: count for reason, count in zip(LOSSES, row.lost, strict=True) if count},
+            "rssi_dbm": None if row.rssi_dbm is None else round(row.rssi_dbm, 2),
+        }
+        for row in rows
+    ]

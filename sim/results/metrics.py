@@ -1,0 +1,176 @@
+"""From an outcome to the summary. Every definition is written in docs/experiments.md; nothing is measured twice.
+
+pdr      = unique deliveries of application packets at their targets / (packets generated x targets), never above 1
+repeated = further deliveries of a packet at a target that already had it: its process has started again
+delay    = from the application's hand-over to the other application's receipt, per (packet, target)
+"""
+
+import statistics
+from collections import Counter
+from collections.abc import Mapping
+from typing import Any
+
+import numpy as np
+
+from fanet_mw.errors import DropReason
+from fanet_mw.trace import (
+    Approaching,
+    Arrived,
+    Collided,
+    DeadlineLost,
+    DeadlineMet,
+    Detected,
+    Dropped,
+)
+from fanet_mw.units import S
+from sim.results import delays, ledger, validity
+from sim.results.bounds import against_bounds, likely
+from sim.results.clocks import clock_errors
+from sim.results.packets import Application, packets_of, targets_by_source
+from sim.run.outcome import Outcome
+from sim.world.separation import separation
+from sim.world.survivors import place
+
+
+def summarize(outcome: Outcome, *, trace_sha256: str) -> dict[str, Any]:
+    """The content of `summary.json`."""
+    scenario = outcome.scenario
+    sent = packets_of(outcome)
+    packets = _packets(outcome, sent)
+    emulator = outcome.reports.get("emulator", {})
+    frames, lateness = ledger.frames(outcome), _lateness(outcome, emulator)
+    disturbance = validity.measures(outcome, frames=frames, late_share=lateness["share"])
+    reasons = validity.reasons(outcome, frames=frames, disturbance=disturbance)
+    return {
+        "valid": not reasons,
+        "invalid_because": reasons,
+        "scenario": scenario.name,
+        "seed": scenario.seed,
+        "mode": outcome.mode,
+        "nodes": scenario.nodes.count,
+        "duration_s": scenario.duration_s,
+        "simulated_s": round(outcome.simulated_ns / S, 3),
+        "time_scale": scenario.time_scale if outcome.mode == "realtime" else None,
+        "wall_s": round(outcome.wall_s, 3),
+        **packets["traffic"],
+        "reports": packets["report"],
+        "warnings": packets["warning"],
+        "frames": frames,
+        "copies": ledger.copies(outcome),
+        "air": emulator.get("air", {}),
+        "lateness": lateness,
+        "disturbance": {
+            name: {"value": round(measure.value, 6), "limit": measure.limit} for name, measure in disturbance.items()
+        },
+        "bound": against_bounds(sent),
+        "likely": likely(sent),
+        "clock": clock_errors(outcome),
+        "admission": _admission(outcome),
+        "mission": _mission(outcome),
+        "separation": separation(outcome),
+        "processes": {
+            "ready_s": round(outcome.ready_s, 3),
+            "ended": [{"name": name, "exit_code": code} for name, code in outcome.ended],
+        },
+        "heard": dict(outcome.heard),
+        "absent": dict(outcome.absent),
+        "aborted": outcome.aborted,
+        "trace_sha256": trace_sha256,
+    }
+
+
+def _packets(outcome: Outcome, packets: Mapping[str, Application]) -> dict[str, dict[str, Any]]:
+    """Generated, delivered, PDR and delay of each application."""
+    lead_ns = outcome.scenario.radio.lead_ns
+    result: dict[str, dict[str, Any]] = {
+        name: {
+            "generated": len(app.sent),
+            "delivered": len(app.deliveries),
+            "repeated": app.repeated,
+            "unknown": app.unknown,
+            "pdr": _ratio(len(app.deliveries), app.wanted),
+            "delay_ms": delays.summed_up([record.delay_ns for record in app.deliveries]),
+            "delay_parts_ms": delays.parts(app.deliveries, app.sent, lead_ns=lead_ns),
+        }
+        for name, app in packets.items()
+    }
+    traffic = packets["traffic"]
+    result["traffic"]["worst_nodes"] = _worst_nodes(
+        Counter(node for node, _ in traffic.sent),
+        targets_by_source(outcome),
+        Counter(record.node for record in traffic.deliveries),
+    )
+    return result
+
+
+def _worst_nodes(
+    per_source: Counter[int], targets: Mapping[int, frozenset[int]], received: Counter[int], most: int = 5
+) -> list[dict[str, Any]]:
+    """The nodes that received the least of what was meant for them, worst first."""
+    wanted: Counter[int] = Counter()
+    for source, packets in per_source.items():
+        for node in targets[source]:
+            wanted[node] += packets
+    shares = sorted((received[node] / wanted[node], node) for node in wanted)
+    return [{"node": node, "pdr": round(share, 4)} for share, node in shares[:most]]
+
+
+def _ratio(part: float, whole: float) -> float | None:
+    return round(part / whole, 6) if whole else None
+
+
+def _lateness(outcome: Outcome, emulator: Mapping[str, Any]) -> dict[str, Any]:
+    late = emulator.get("late", {})
+    frames, late_frames = late.get("frames", 0), late.get("late_frames", 0)
+    share = late_frames / frames if frames else 0.0
+    return {
+        "p50_ms": late.get("p50_ms", 0.0),
+        "p99_ms": late.get("p99_ms", 0.0),
+        "max_ms": late.get("max_ms", 0.0),
+        "late_frames": late_frames,
+        "frames": frames,
+        "share": round(share, 6),
+        "limit": outcome.scenario.radio.late_limit,
+        "valid": outcome.mode == "virtual" or (share <= outcome.scenario.radio.late_limit and outcome.aborted is None),
+    }
+
+
+def _admission(outcome: Outcome) -> dict[str, Any]:
+    """What the nodes refused, and what they said of the deadline; empty without `traffic.deadline_s`."""
+    deadline_s = outcome.scenario.traffic.deadline_s
+    if deadline_s is None:
+        return {}
+    said = [record for record in outcome.records if isinstance(record, DeadlineMet | DeadlineLost)]
+    last = {record.node: isinstance(record, DeadlineMet) for record in said}
+    reasons = (record.reason for record in outcome.records if type(record) is Dropped)
+    return {
+        "deadline_ms": round(deadline_s * 1000, 3),
+        "refused": sum(reason == DropReason.ADMISSION for reason in reasons),
+        "lost": sum(isinstance(record, DeadlineLost) for record in said),
+        "met": sum(isinstance(record, DeadlineMet) for record in said),
+        "nodes_without": sum(not met for met in last.values()),
+    }
+
+
+def _mission(outcome: Outcome) -> dict[str, Any]:
+    records, scenario = outcome.records, outcome.scenario
+    first: dict[int, int] = {}
+    errors: list[float] = []
+    truth = place(scenario)
+    for record in records:
+        if type(record) is Approaching:
+            first.setdefault(record.node, record.t_ns)
+            if not 1 <= record.survivor <= len(truth):
+                continue  # of whom only the air has told
+            at = truth[record.survivor - 1]
+            errors.append(float(np.hypot(at.east - record.east_m, at.north - record.north_m)))
+    return {
+        "survivors": scenario.mission.survivors,
+        "detected": len({r.survivor for r in records if type(r) is Detected}),
+        "approached": len({r.survivor for r in records if type(r) is Approaching}),
+        "reached": len({r.survivor for r in records if type(r) is Arrived}),
+        "uavs_approaching": len(first),
+        "time_to_approach_s": sorted(round(t_ns / S, 3) for t_ns in first.values()),
+        "localization_error_m": round(statistics.median(errors), 1) if errors else None,
+        "collisions": sum(1 for r in records if type(r) is Collided),
+    }

@@ -1,0 +1,161 @@
+"""May this result be used? One function says why not, in sentences; the summary's `valid` and the exit code follow it.
+
+    valid  =  it ran to its end, no process died, every actor's last report is there, every frame is accounted for,
+              and (real time) each measure of how the machine disturbed the run is within its limit
+
+The limits are chosen from runs that were disturbed on purpose, held against virtual time: within them the delivery
+ratio is off by no more than two seeds differ by themselves (`tests/benchmarks/disturbed_runs.py`, table in
+docs/experiments.md). In virtual time nothing disturbs a run.
+"""
+
+from collections.abc import Iterator, Mapping
+from typing import Any, Final, NamedTuple
+
+from sim.run.outcome import Outcome
+from sim.run.processes import describe
+
+LOST: Final = 0.0025
+"""What the machine took from the air, all kinds together: requests lost on the bus or dropped as too late, turns
+missed, each of all requests, and receptions lost on the bus, of all that were handed over."""
+HEARD_LATE: Final = 0.02
+"""Of all receptions: handed to their node later than a handover and a lead after the frame's end."""
+STALL_MS: Final = 500.0
+"""The longest that any process could do nothing."""
+SKIPPED_TICKS: Final = 0.02
+"""Of the world's ticks."""
+_PARTS: Final = frozenset({"lost_on_bus", "dropped_late", "missed_turns", "copies_lost"})
+_NAMED: Final = 5
+"""So many are named in one sentence; of the rest, how many there are."""
+
+
+class Measure(NamedTuple):
+    """One figure of how the machine disturbed a run; a share, or milliseconds."""
+
+    what: str
+    value: float
+    limit: float
+    unit: str = ""
+    who: str = ""
+
+    @property
+    def exceeded(self) -> bool:
+        return self.value > self.limit
+
+    def sentence(self) -> str:
+        if self.unit:
+            return f"{self.what}: {self.value:.0f} {self.unit}{self.who}, limit {self.limit:.0f} {self.unit}"
+        return f"{self.what}: {self.value:.3%}, limit {self.limit:.3%}"
+
+
+def measures(outcome: Outcome, *, frames: Mapping[str, Any], late_share: float) -> dict[str, Measure]:
+    """How the machine disturbed the run, by name; empty in virtual time."""
+    if outcome.mode == "virtual":
+        return {}
+    agents = [report for report in outcome.reports.values() if report.get("kind") == "agent"]
+    world = outcome.reports.get("world", {})
+    late, heard = _sum(agents, "heard_late"), _sum(agents, "receptions")
+    parts = {
+        "lost_on_bus": Measure(
+            "requests lost on the bus", _share(frames["dropped"].get("bus", 0), frames["sent"]), LOST
+        ),
+        "dropped_late": Measure(
+            "requests dropped as too late", _share(frames["dropped"].get("late", 0), frames["sent"]), LOST
+        ),
+        "missed_turns": Measure(
+            "turns missed, of all requests", _share(_sum(agents, "missed_turns"), frames["sent"]), LOST
+        ),
+        "copies_lost": Measure("receptions lost on the bus", _copies_lost(outcome), LOST),
+    }
+    together = sum(part.value for part in parts.values())
+    ticks, skipped = world.get("ticks", 0), world.get("skipped_ticks", 0)
+    stall_ms, stalled = _longest_stall(outcome)
+    return {
+        "late_frames": Measure("frames announced too late", late_share, outcome.scenario.radio.late_limit),
+        **parts,
+        "lost": Measure("lost on the bus, dropped as too late and missed, together", together, LOST),
+        "heard_late": Measure("receptions handed over too late", _share(late, heard), HEARD_LATE),
+        "stall_ms": Measure("longest standstill of a process", stall_ms, STALL_MS, "ms", f" ({stalled})"),
+        "skipped_ticks": Measure("ticks that the world skipped", _share(skipped, ticks + skipped), SKIPPED_TICKS),
+    }
+
+
+def reasons(outcome: Outcome, *, frames: Mapping[str, Any], disturbance: Mapping[str, Measure]) -> list[str]:
+    """Why the result may not be used, gravest first, a sentence each; none when it may."""
+    return [
+        *_broken(outcome),
+        *_incomplete(outcome),
+        *_unaccounted(frames),
+        *_disturbed(disturbance),
+    ]
+
+
+def _broken(outcome: Outcome) -> Iterator[str]:
+    if outcome.aborted is not None:
+        yield f"partial result: {outcome.aborted}"
+    for code in dict.fromkeys(code for _, code in outcome.ended):
+        dead = [name for name, ended in outcome.ended if ended == code]
+        yield f"{_named(dead)} ended before the end, with {describe(code)}: {len(dead)}, limit 0"
+    for name, why in outcome.absent.items():
+        yield f"no report of {name} ({why}); all must report"
+    unfinished = [name for name, report in outcome.reports.items() if not report.get("final")]
+    if unfinished and outcome.mode == "realtime":
+        yield f"no last report of {_named(unfinished)}: {len(unfinished)}, limit 0"
+
+
+def _incomplete(outcome: Outcome) -> Iterator[str]:
+    refused = outcome.heard.get("why", {})
+    for why in ("disk", "excess"):
+        count = refused.get(f"trace: {why}", 0)
+        if count:
+            yield f"trace records or puts not kept ({why}): {count}, limit 0"
+
+
+def _unaccounted(frames: Mapping[str, Any]) -> Iterator[str]:
+    if frames["unaccounted"]:
+        yield f"frames unaccounted for: {frames['unaccounted']} of {frames['sent']}, limit 0"
+    if frames["unasked"]:
+        yield f"frames that no node asked for: {frames['unasked']}, limit 0"
+    if not frames["closes"] and not frames["unaccounted"] and not frames["unasked"]:
+        yield f"the ledger of {frames['sent']} frames does not close"
+
+
+def _disturbed(disturbance: Mapping[str, Measure]) -> Iterator[str]:
+    """The sum of what was lost is said only when none of its parts is too great by itself."""
+    exceeded = {name: measure for name, measure in disturbance.items() if measure.exceeded}
+    if not exceeded.keys().isdisjoint(_PARTS):
+        exceeded.pop("lost")
+    for measure in exceeded.values():
+        yield measure.sentence()
+
+
+def _named(names: list[str]) -> str:
+    more = len(names) - _NAMED
+    return ", ".join(names[:_NAMED]) + (f" and {more} more" if more > 0 else "")
+
+
+def _copies_lost(outcome: Outcome) -> float:
+    """Of what the medium handed to nodes that lived through the run, the share that they never had."""
+    dead = {name for name, _ in outcome.ended}
+    handed = lost = 0
+    for node, count in outcome.reports.get("emulator", {}).get("handed", {}).items():
+        report = outcome.reports.get(f"agent-{node}")
+        if report is not None and f"agent-{node}" not in dead:
+            handed += count
+            lost += max(0, count - report["receptions"] - (report.get("host") or {}).get("unread_receptions", 0))
+    return _share(lost, handed)
+
+
+def _longest_stall(outcome: Outcome) -> tuple[float, str]:
+    """How long [ms], and which process."""
+    stalls = {name: (report.get("host") or {}).get("stall_ms", 0.0) for name, report in outcome.reports.items()}
+    stalls["the launcher"] = outcome.stall_ms
+    worst = max(stalls, key=lambda name: stalls[name])
+    return stalls[worst], worst
+
+
+def _sum(reports: list[Mapping[str, Any]], key: str) -> int:
+    return sum(report.get(key) or 0 for report in reports)  # not every protocol has turns
+
+
+def _share(part: float, whole: float) -> float:
+    return part / whole if whole else 0.0

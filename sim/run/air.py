@@ -1,0 +1,80 @@
+"""`fanet air`: change the air of a swarm that runs, and see that the emulator has done it.
+
+A change is one message on `fanet/<swarm>/radio/control`. The emulator's trace says that it was done; silence means that
+it was refused (its report counts why) or that nobody emulates that swarm.
+"""
+
+import threading
+import time
+from collections.abc import Callable
+from pathlib import Path
+from typing import Final
+
+from fanet_mw.bus import topics
+from fanet_mw.bus.messages import TraceBatch
+from fanet_mw.bus.radio_control import Control
+from fanet_mw.bus.topics import ROOT, Topics
+from fanet_mw.errors import FanetError, MalformedFrameError
+from fanet_mw.hosts.bus import Bus, config_of
+from fanet_mw.trace import RadioFault
+
+OPERATOR: Final = "operator"
+"""Whom access lists know the commands of a person by."""
+CONFIRM_TIMEOUT_S: Final = 5.0
+"""Emulators publish their trace twice a second."""
+_DISCOVER_S: Final = 1.0
+
+
+def find_swarm(bus: Bus) -> str:
+    """The swarm on this router whose emulator runs; raises FanetError unless there is exactly one."""
+    found: list[str] = []
+    came = threading.Event()
+
+    def on_change(topic: str, alive: bool) -> None:
+        if alive:
+            found.append(topic.split("/")[1])
+            came.set()
+
+    bus.watch(f"{ROOT}/*/alive/emulator", on_change)
+    if came.wait(_DISCOVER_S):
+        time.sleep(0.1)  # others may answer too
+    names = sorted(found)
+    if len(names) != 1:
+        raise FanetError(f"{len(names)} swarms with an emulator on this router ({', '.join(names)}): say --swarm NAME")
+    return names[0]
+
+
+def change(endpoint: str, swarm: str | None, control: Control, *, zenoh_config: Path | None = None) -> list[RadioFault]:
+    """Send one change; returns what the emulator did about it.
+
+    Raises BusError without a router, FanetError without a swarm or when the emulator does not confirm within
+    CONFIRM_TIMEOUT_S.
+    """
+    with Bus.join(endpoint, config_of(zenoh_config, OPERATOR)) as bus:
+        names = Topics(swarm or find_swarm(bus))
+        done: list[RadioFault] = []
+        confirmed = threading.Event()
+        bus.subscribe(names.trace("emulator"), _watch(control, done, confirmed))
+        bus.put(names.radio_control, topics.encode([control]), reliable=True)
+        if not confirmed.wait(CONFIRM_TIMEOUT_S):
+            raise FanetError(
+                f"the emulator did not confirm within {CONFIRM_TIMEOUT_S:g} s: refused (see `refused` in its report), "
+                f"or no emulator on {names.radio_control}"
+            )
+        return list(done)
+
+
+def _watch(control: Control, done: list[RadioFault], confirmed: threading.Event) -> Callable[[str, bytes], None]:
+    """Collects the faults of the control's label that the emulator traces; all labels of a restore of all."""
+
+    def on_sample(_topic: str, payload: bytes) -> None:
+        try:
+            batches = [message for message in topics.decode(payload) if isinstance(message, TraceBatch)]
+        except MalformedFrameError:
+            return
+        faults = [record for batch in batches for record in batch.records if isinstance(record, RadioFault)]
+        done.extend(fault for fault in faults if control.label in ("", fault.label))
+        if done:
+            confirmed.set()
+
+    return on_sample

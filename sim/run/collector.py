@@ -1,0 +1,209 @@
+"""What a run in real time collects from the bus: traces, reports, telemetry and link counts of the swarm's own actors.
+
+    put -> a known actor? -> within its allowance? -> decoded -> each item plausible? -> spool on disk, or last report
+                                  whatever fails is counted by what was wrong, and goes no further
+
+Memory holds the last valid report of each actor and the sums of the links, not the length of the run: trace records
+and telemetry go to temporary files and are read when the run is over. Puts of one actor that exceed its allowance are
+counted as `excess` before they are decoded, so that a flood costs neither time nor disk.
+"""
+
+import struct
+import threading
+from collections import Counter
+from collections.abc import Callable
+from pathlib import Path
+from typing import Any, Final
+
+from fanet_mw import trace
+from fanet_mw.bus import topics
+from fanet_mw.bus.link_stats import LinkStats
+from fanet_mw.bus.messages import MavlinkTap, Message, Report, TraceBatch
+from fanet_mw.bus.topics import Topics
+from fanet_mw.errors import MalformedFrameError
+from fanet_mw.hosts.bus import OnSample
+from fanet_mw.scenario import Scenario
+from fanet_mw.trace import Record, kind_of
+from fanet_mw.units import S
+from sim.results.links import LinkTotals
+from sim.run.plausible import Plausible
+from sim.run.spool import Spool
+
+BURST_BYTES: Final = 16 << 20
+"""What one actor may put at once; ten hours of a UAV's trace in `rescue`."""
+BYTES_PER_S: Final = 1 << 20
+"""What one actor may put for long; two hundred times what a UAV of `rescue` does."""
+_LONGEST_WHY: Final = 120
+_INSTANT: Final = struct.Struct("<q")
+Subscribe = Callable[[str, OnSample], None]
+
+
+class Allowance:
+    """A token bucket of bytes for each name."""
+
+    def __init__(self, *, burst: int, per_s: int) -> None:
+        self._burst = burst
+        self._per_s = per_s
+        self._left: dict[str, tuple[int, int]] = {}
+        """(bytes left, when) by name."""
+
+    def take(self, name: str, size: int, *, now_ns: int) -> bool:
+        """Whether so many bytes may pass now."""
+        left, then_ns = self._left.get(name, (self._burst, now_ns))
+        left = min(self._burst, left + (now_ns - then_ns) * self._per_s // S)
+        fits = size <= left
+        self._left[name] = (left - size if fits else left, now_ns)
+        return fits
+
+
+class Collector:
+    """Hears a swarm; `now_ns` is a monotonic clock, `folder` where temporary files go."""
+
+    def __init__(
+        self, scenario: Scenario, subscribe: Subscribe, names: Topics, *, now_ns: Callable[[], int], folder: Path | None
+    ) -> None:
+        self._plausible = Plausible(scenario)
+        self._now_ns = now_ns
+        self._lock = threading.Lock()  # Zenoh calls from several threads
+        self._allowance = Allowance(burst=BURST_BYTES, per_s=BYTES_PER_S)
+        self._records = Spool(folder)
+        self._taps = Spool(folder)
+        self._reports: dict[str, dict[str, Any]] = {}
+        self._links = LinkTotals()
+        self._refused: Counter[str] = Counter()
+        self._why_no_report: dict[str, str] = {}
+        self._puts = 0
+        for expression, what, take in (
+            (names.all_traces, "trace", self._take_records),
+            (names.all_reports, "report", self._take_report),
+            (names.mavlink("*"), "telemetry", self._take_tap),
+            (names.radio_links, "links", self._take_links),
+        ):
+            subscribe(expression, self._hearer(what, take))
+
+    # --- in: on threads of the bus --------------------------------------------------------------------------------
+
+    def _hearer(self, what: str, take: Callable[[str, Message], str | None]) -> OnSample:
+        def hear(topic: str, payload: bytes) -> None:
+            with self._lock:
+                self._puts += 1
+                why = self._hear(what, topic, payload, take)
+                if why is not None:
+                    self._refused[f"{what}: {why}"] += 1
+
+        return hear
+
+    def _hear(self, what: str, topic: str, payload: bytes, take: Callable[[str, Message], str | None]) -> str | None:
+        """Take in one put; returns what was wrong with it, or with the last item in it that was wrong."""
+        last = topic.rpartition("/")[2]
+        name = {"telemetry": f"agent-{last}", "links": "emulator"}.get(what, last)
+        if name not in self._plausible.node_of:
+            return "unknown actor"
+        if not self._allowance.take(f"{what}/{name}", len(payload), now_ns=self._now_ns()):
+            return "excess"
+        try:
+            messages = topics.decode(payload)
+        except MalformedFrameError:
+            return "undecodable"
+        wrong: str | None = None
+        for message in messages:
+            why = take(name, message)
+            if why is not None:
+                if wrong is not None:
+                    self._refused[f"{what}: {wrong}"] += 1
+                wrong = why
+        return wrong
+
+    def _take_records(self, name: str, message: Message) -> str | None:
+        if not isinstance(message, TraceBatch):
+            return "message type"
+        lines = []
+        for record in message.records:
+            why = self._plausible.record(name, record)
+            if why is None:
+                lines.append(trace.line(record))
+            else:
+                self._refused[f"trace: {why}"] += 1
+        if lines and not self._records.append("\n".join(lines).encode()):
+            self._refused["trace: disk"] += len(lines)
+        return None
+
+    def _take_report(self, name: str, message: Message) -> str | None:
+        if not isinstance(message, Report):
+            return "message type"
+        if message.name != name:
+            return "speaker"
+        content, why = self._plausible.report(name, message.json)
+        if why is not None:
+            self._why_no_report[name] = f"malformed: {why[:_LONGEST_WHY]}"
+            return "shape"
+        self._reports[name] = content
+        return None
+
+    def _take_tap(self, name: str, message: Message) -> str | None:
+        if not isinstance(message, MavlinkTap):
+            return "message type"
+        why = self._plausible.tap(message)
+        if why is None and not self._taps.append(_INSTANT.pack(message.t_ns) + message.data):
+            return "disk"
+        return why
+
+    def _take_links(self, _name: str, message: Message) -> str | None:
+        if not isinstance(message, LinkStats):
+            return "message type"
+        why = self._plausible.links(message)
+        if why is None:
+            self._links.add(message)
+        return why
+
+    # --- out: when the run is over --------------------------------------------------------------------------------
+
+    def records(self) -> list[Record]:
+        """All trace records, by instant, node and kind."""
+        with self._lock:
+            found = [trace.parse(line) for item in self._records.items() for line in item.decode().split("\n")]
+        found.sort(key=lambda record: (record.t_ns, record.node, kind_of(record)))
+        return found
+
+    def reports(self) -> dict[str, dict[str, Any]]:
+        """The last valid report of each actor, by name."""
+        with self._lock:
+            return {name: self._reports[name] for name in sorted(self._reports)}
+
+    def unfinished(self) -> set[str]:
+        """Who has not yet sent its last report."""
+        with self._lock:
+            return {name for name in self._plausible.node_of if not self._reports.get(name, {}).get("final")}
+
+    def absent(self) -> dict[str, str]:
+        """Why there is no report of an actor, by name."""
+        with self._lock:
+            missing = [name for name in self._plausible.node_of if name not in self._reports]
+            return {name: self._why_no_report.get(name, "no report was heard") for name in missing}
+
+    def links(self) -> LinkTotals:
+        """What each link carried."""
+        with self._lock:
+            return self._links
+
+    def taps(self) -> list[tuple[int, bytes]]:
+        """What UAVs told inspectors, by instant."""
+        with self._lock:
+            taps = [(_INSTANT.unpack_from(item)[0], item[_INSTANT.size :]) for item in self._taps.items()]
+        return sorted(taps, key=lambda tap: tap[0])
+
+    def figures(self) -> dict[str, Any]:
+        """Puts heard, and what of them was refused (items: records, reports, taps), by what was wrong."""
+        with self._lock:
+            why = dict(sorted(self._refused.items()))
+            return {"puts": self._puts, "malformed": sum(why.values()), "why": why}
+
+    def disk_failure(self) -> str | None:
+        """Why trace or telemetry is incomplete; None when it is not."""
+        return self._records.failure or self._taps.failure
+
+    def close(self) -> None:
+        """Give the disk space back."""
+        with self._lock:
+            self._records.close()
+            self._taps.close()

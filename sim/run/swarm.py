@@ -1,0 +1,335 @@
+"""A swarm as real processes: router and clock here, the emulator, the world and every UAV in a process of its own.
+
+    start all -> wait until all are up -> start the clock -> collect traces, reports and taps -> all end -> outcome
+
+A UAV that dies is reported and the others carry on; without the emulator or the world there is no run, so their end
+ends it (or, with `respawn`, any of them is started again and finds its place by the clock).
+"""
+
+import asyncio
+import contextlib
+import signal
+import socket
+import time
+from collections import Counter
+from collections.abc import Callable, Mapping
+from pathlib import Path
+from typing import Any, Final
+
+from agents.__main__ import run as run_agent
+from emulator.__main__ import run as run_emulator
+from emulator.kernel.compile import WORD, must_compile
+from fanet_mw.bus.topics import Topics
+from fanet_mw.errors import BusError
+from fanet_mw.hosts import interrupts
+from fanet_mw.hosts.bus import Bus, config_of
+from fanet_mw.hosts.clock import ClockKeeper, SwarmClock, few
+from fanet_mw.hosts.service import BUS_EXIT_CODE
+from fanet_mw.scenario import Scenario
+from fanet_mw.trace import ProcessEnded, Record, kind_of
+from fanet_mw.units import NodeId, S
+from sim.results.clocks import true_delays
+from sim.run import limits
+from sim.run.collector import Collector
+from sim.run.outcome import Outcome
+from sim.run.processes import Processes, describe
+from sim.run.router import ROUTER, expected_names
+from sim.run.running import registered
+from sim.world.__main__ import run as run_world
+from sim.world.flight import FlightRecorder
+from sim.world.layout import positions
+
+_AGENT_NICE: Final = 10
+"""All UAVs wait for the emulator, and each has its lead: it goes first when both cores are wanted."""
+READY_TIMEOUT_S: Final = 300.0
+"""On a machine that is busy with other things 47 processes may take a minute, and the emulator may have to compile."""
+WORD_EVERY_S: Final = 10.0
+"""How often those who wait for the swarm are told whom for."""
+_MAX_LATE_STARTS: Final = 3
+"""How often a process that found no router is started again before the swarm's time begins."""
+_GRACE_S: Final = 5.0
+"""After the end of the swarm's time, for last reports."""
+_LAST_WORDS_S: Final = 1.0
+"""After the end of all processes, for what they said last: it may still be on its way through the bus."""
+_MAX_RESPAWNS: Final = 5
+"""Of one name: a process that cannot live is not started for ever."""
+_PROGRESS_S: Final = 0.25
+Tell = Callable[[str], None]
+
+
+def free_endpoint(protocol: str = "tcp") -> str:
+    """A port of the loopback interface that is free now."""
+    with socket.socket() as probe:
+        probe.bind(("127.0.0.1", 0))
+        return f"{protocol}/127.0.0.1:{probe.getsockname()[1]}"
+
+
+class Swarm:
+    """One run in real time."""
+
+    def __init__(
+        self,
+        scenario: Scenario,
+        bus: Bus,
+        *,
+        swarm: str,
+        endpoint: str,
+        respawn: bool,
+        tell: Tell,
+        spool_folder: Path | None = None,
+        zenoh_config: Path | None = None,
+    ) -> None:
+        names = Topics(swarm)
+        self.emulator_options: dict[str, Any] = {}
+        """More arguments of the emulator's process."""
+        self._scenario = scenario
+        self._swarm = swarm
+        self._endpoint = endpoint
+        self._zenoh_config = zenoh_config
+        self._respawn = respawn
+        self._tell = tell
+        self._collector = Collector(scenario, bus.subscribe, names, now_ns=time.monotonic_ns, folder=spool_folder)
+        self._recorder = FlightRecorder(scenario, bus.subscribe, names) if respawn else None
+        self._keeper = ClockKeeper(bus, names, time_scale=scenario.time_scale, expected=expected_names(scenario))
+        self.processes = Processes(self._process_ended, title=f"fanet {swarm}")
+        self._clock: SwarmClock | None = None
+        self._over = asyncio.Event()
+        self._ending = False
+        self._aborted: str | None = None
+        self._ended: list[tuple[str, int]] = []
+        self._obituaries: list[Record] = []
+        self._respawns: dict[str, int] = {}
+        self._stall_s = 0.0
+        """The longest that this process did nothing although it should have."""
+        self._late_starts: Counter[str] = Counter()
+        self._signal: int | None = None
+
+    async def run(self, on_progress: Callable[[float], None]) -> Outcome:
+        """Start, run, collect. Whatever happens, no process and no temporary file is left."""
+        with contextlib.closing(self._collector):
+            began = time.monotonic()
+            try:
+                await self._start_all()
+                ready_s = await self._start_clock(began)
+                run_began = time.monotonic()
+                await self._follow(on_progress)
+                ended_ns = None if self._aborted is None else self._now_ns()
+                wall_s = time.monotonic() - run_began
+                await self._wind_up()
+            finally:
+                self._over.set()
+                self._ending = True
+                await self.processes.end_all()
+            return self._outcome(wall_s=wall_s, ready_s=ready_s, ended_ns=ended_ns)
+
+    def _outcome(self, *, wall_s: float, ready_s: float, ended_ns: int | None) -> Outcome:
+        """What was collected; an incomplete trace is said to be one."""
+        collector = self._collector
+        if (failure := collector.disk_failure()) is not None:
+            self._tell(f"the trace is incomplete: its temporary file could not be written: {failure}")
+        return Outcome(
+            scenario=self._scenario,
+            mode="realtime",
+            wall_s=wall_s,
+            records=self._records(),
+            reports=collector.reports(),
+            taps=collector.taps(),
+            links=collector.links(),
+            ended=self._ended,
+            aborted=self._aborted,
+            ended_ns=ended_ns,
+            ready_s=ready_s,
+            epoch_unix_ns=self._keeper.clock.epoch_unix_ns if self._keeper.clock else 0,
+            heard=collector.figures(),
+            absent=collector.absent(),
+            stall_ms=self._stall_s * 1000,
+        )
+
+    def _records(self) -> list[Record]:
+        records = [*self._collector.records(), *self._obituaries]
+        records = true_delays(records) if self._scenario.clock.modelled else records
+        return sorted(records, key=lambda r: (r.t_ns, r.node, kind_of(r)))
+
+    def interrupt(self, number: int) -> None:
+        """End the run early because of a signal."""
+        self._signal = number
+        self.abort(f"interrupted by {signal.Signals(number).name}")
+
+    def abort(self, why: str) -> None:
+        """End the run early; what has been collected becomes a partial result."""
+        if self._aborted is None and not self._over.is_set():
+            self._aborted = why
+            self._tell(why)
+        self._over.set()
+
+    async def _start_all(self) -> None:
+        await self.processes.warm_up()
+        self._check_not_over()
+        common = {
+            "scenario": self._scenario,
+            "swarm": self._swarm,
+            "endpoint": self._endpoint,
+            "join_patience_s": READY_TIMEOUT_S,
+            "zenoh_config": self._zenoh_config,
+        }
+        self.processes.start("emulator", run_emulator, {**common, **self.emulator_options})
+        self.processes.start("world", run_world, common)
+        for node, position in zip(self._scenario.node_ids, positions(self._scenario), strict=True):
+            arguments = {**common, "node": NodeId(node), "position": position}
+            self.processes.start(f"agent-{node}", run_agent, arguments, nice=_AGENT_NICE)
+            await asyncio.sleep(0)  # signals are heard between two of many
+            self._check_not_over()
+
+    def _check_not_over(self) -> None:
+        """Raise when the swarm was told to end before its time began: there is nothing to report."""
+        if self._signal is not None:
+            raise KeyboardInterrupt(self._signal)
+        if self._over.is_set():
+            raise BusError(self._aborted or "ended before the swarm was up")
+
+    async def _start_clock(self, began: float) -> float:
+        """Wait for everyone; returns how long that took [s]."""
+        start = asyncio.ensure_future(self._keeper.start(timeout_s=READY_TIMEOUT_S))
+        over = asyncio.ensure_future(self._over.wait())
+        while not await _any_done(start, over, timeout_s=WORD_EVERY_S):
+            missing = self._keeper.missing()
+            self._tell(f"waiting for {len(missing)} of {len(self.processes.names())} processes: {few(missing)}")
+        over.cancel()
+        if not start.done():
+            start.cancel()
+            self._check_not_over()
+        self._clock = SwarmClock(start.result())
+        ready_s = time.monotonic() - began
+        self._tell(f"{len(self.processes.names())} processes up after {ready_s:.1f} s")
+        return ready_s
+
+    async def _follow(self, on_progress: Callable[[float], None]) -> None:
+        """Until the swarm's time is over or the run is aborted."""
+        assert self._clock is not None, "the clock was started"
+        while self._clock.wait_s(self._scenario.duration_ns) > 0 and not self._over.is_set():
+            on_progress(max(0.0, self._clock.now_ns() / S))
+            began_s = time.monotonic()
+            with contextlib.suppress(TimeoutError):
+                await asyncio.wait_for(self._over.wait(), _PROGRESS_S)
+            self._stall_s = max(self._stall_s, time.monotonic() - began_s - _PROGRESS_S)
+
+    async def _wind_up(self) -> None:
+        """Everyone stops by the clock, or is told to; last reports come in."""
+        self._over.set()
+        await self._end_processes()
+        dead = {name for name, _ in self._ended}
+        end_s = time.monotonic() + _LAST_WORDS_S
+        while self._collector.unfinished() - dead and time.monotonic() < end_s:  # noqa: ASYNC110  (other threads fill it)
+            await asyncio.sleep(_LAST_WORDS_S / 20)
+
+    async def _end_processes(self) -> None:
+        if self._aborted is not None:
+            self._keeper.stop()
+        if not await self.processes.wait(_GRACE_S):
+            late = self.processes.names()
+            self._keeper.stop()
+            if not await self.processes.wait(_GRACE_S / 2):
+                self._tell(f"{len(late)} processes did not end by themselves: {', '.join(late[:5])}")
+
+    def _process_ended(self, name: str, exit_code: int) -> None:
+        if self._ending or (exit_code == 0 and (self._over.is_set() or self._time_is_over())):
+            return
+        waits = self._clock is None and not self._over.is_set()
+        if waits and exit_code == BUS_EXIT_CODE and self._late_starts[name] < _MAX_LATE_STARTS:
+            self._late_starts[name] += 1
+            self._tell(f"{name} ended with {describe(exit_code)} before the start; started again")
+            self.processes.restart(name)
+            return
+        now_ns = self._now_ns()
+        self._ended.append((name, exit_code))
+        node = int(name.removeprefix("agent-")) if name.startswith("agent-") else 0
+        self._obituaries.append(ProcessEnded(now_ns, node, name, exit_code))
+        what = f"{name} ended with {describe(exit_code)} at {now_ns / S:.1f} s"
+        if self._over.is_set():
+            if exit_code == -(self._signal or 0):
+                return  # whoever interrupted us meant all of us
+            self._tell(f"{what}, while the swarm was ending")
+            return
+        self._respawns[name] = self._respawns.get(name, 0) + 1
+        if self._respawn and self._respawns[name] <= _MAX_RESPAWNS:
+            self._tell(f"{what}; started again")
+            if name == "world" and self._recorder is not None:
+                self.processes.restart(name, flight=self._recorder.last())
+            else:
+                self.processes.restart(name)
+        elif node and self._clock is not None:
+            self._tell(f"{what}; the others carry on")
+        else:
+            self.abort(f"{what}; the run cannot go on without it")
+
+    def _now_ns(self) -> int:
+        """The swarm instant, within the swarm's time."""
+        return min(max(0, self._clock.now_ns()), self._scenario.duration_ns) if self._clock else 0
+
+    def _time_is_over(self) -> bool:
+        return self._clock is not None and self._clock.wait_s(self._scenario.duration_ns) <= 0.05
+
+
+async def _any_done(*futures: asyncio.Future[Any], timeout_s: float) -> bool:
+    done, _ = await asyncio.wait(futures, timeout=timeout_s, return_when=asyncio.FIRST_COMPLETED)
+    return bool(done)
+
+
+def _bus(listen: str | None, connect: str | None, zenoh_config: Path | None) -> tuple[Bus, str]:
+    """The session of the launcher, and the endpoint its children connect to: TLS by default, with keys for all."""
+    config = config_of(zenoh_config, ROUTER)
+    if connect is not None:
+        return Bus.join(connect, config), connect
+    keys_for_all = zenoh_config is not None and zenoh_config.is_dir()
+    endpoint = listen or free_endpoint("tls" if keys_for_all else "tcp")
+    return Bus.serve(endpoint, config), endpoint
+
+
+async def launch(
+    scenario: Scenario,
+    *,
+    swarm: str,
+    listen: str | None = None,
+    connect: str | None = None,
+    respawn: bool = False,
+    emulator_options: Mapping[str, Any] | None = None,
+    spool_folder: Path | None = None,
+    zenoh_config: Path | None = None,
+    on_progress: Callable[[float], None] = lambda _: None,
+    on_event: Tell = lambda _: None,
+    on_started: Callable[[Swarm], None] = lambda _: None,
+) -> Outcome:
+    """Run a scenario as real processes. `on_started` is handed the swarm while it runs, for tests and tools.
+
+    `zenoh_config` is Zenoh's own configuration, a file for all processes or a folder with one for each.
+    What is collected waits in temporary files in `spool_folder`; by default where the system keeps such files.
+
+    Raises BusError when the bus cannot be had or the swarm does not come up, ConfigError when a limit of the machine
+    is too low, and KeyboardInterrupt with its number when a signal comes before there is anything to report.
+    """
+    limits.prepare(processes=len(expected_names(scenario)))
+    if must_compile():
+        on_event(WORD)
+    bus, endpoint = _bus(listen, connect, zenoh_config)
+    with bus, registered(swarm, endpoint) as known:
+        on_event(f"swarm {swarm} on {endpoint}" + ("" if known else "; other commands must be told so: --connect"))
+        run = Swarm(
+            scenario,
+            bus,
+            swarm=swarm,
+            endpoint=endpoint,
+            respawn=respawn,
+            tell=on_event,
+            spool_folder=spool_folder,
+            zenoh_config=zenoh_config,
+        )
+        run.emulator_options.update(emulator_options or {})
+        loop = asyncio.get_running_loop()
+        for number in interrupts.SIGNALS:
+            loop.add_signal_handler(number, run.interrupt, number)
+        on_started(run)
+        try:
+            return await run.run(on_progress)
+        finally:
+            for number in interrupts.SIGNALS:
+                loop.remove_signal_handler(number)

@@ -1,0 +1,41 @@
+"""The shipped scenarios, and finding one by name or path."""
+
+import difflib
+import tomllib
+from collections.abc import Iterable
+from importlib.resources import files
+from pathlib import Path
+from typing import NamedTuple
+
+from fanet_mw.errors import ConfigError
+from fanet_mw.scenario import Scenario, config
+
+
+class Entry(NamedTuple):
+    """One shipped scenario."""
+
+    name: str
+    description: str
+    text: str
+
+
+def shipped() -> list[Entry]:
+    """All shipped scenarios, by name."""
+    entries = []
+    for item in sorted(files("sim.scenarios").iterdir(), key=lambda item: item.name):
+        if item.name.endswith(".toml"):
+            text = item.read_text(encoding="utf-8")
+            entries.append(Entry(item.name.removesuffix(".toml"), tomllib.loads(text).get("description", ""), text))
+    return entries
+
+
+def find(name: str, overrides: Iterable[str] = ()) -> Scenario:
+    """The scenario of a file (anything with a slash or ending in .toml), else the shipped one of that name."""
+    if name.endswith(".toml") or "/" in name:
+        return config.load(Path(name), overrides)
+    entries = {entry.name: entry for entry in shipped()}
+    if name not in entries:
+        close = difflib.get_close_matches(name, entries, n=1)
+        hint = f"did you mean {close[0]}?" if close else f"shipped: {', '.join(entries)}; or give a .toml file"
+        raise ConfigError(f"unknown scenario {name!r}; {hint}")
+    return config.parse(entries[name].text, source=f"scenario {name}", name=name, overrides=overrides)

@@ -1,0 +1,64 @@
+"""A cheap engine: point masses with limited acceleration. For protocol work, where only distances matter.
+
+Does not model: attitude, drag, gravity. Bodies are spheres of `RADIUS_M` that notice contact but do not bounce.
+"""
+
+from typing import Final
+
+import numpy as np
+
+from sim.world.engine import Engine, Rows
+
+ACCELERATION_M_S2: Final = 5.0
+RADIUS_M: Final = 0.25
+_CROWD: Final = 400
+"""Above this many nodes contacts between bodies are not looked for: it is quadratic, and such swarms are for radio."""
+
+
+class Kinematic(Engine):
+    """Velocity follows the wish as fast as the acceleration allows."""
+
+    name = "kinematic"
+
+    def __init__(self) -> None:
+        self._at = np.zeros((0, 3))
+        self._velocity = np.zeros((0, 3))
+        self._touching: frozenset[tuple[int, int]] = frozenset()
+        self._new: list[tuple[int, int]] = []
+
+    def reset(self, positions: Rows, velocities: Rows | None = None) -> None:
+        self._at = positions.copy()
+        self._velocity = np.zeros_like(positions) if velocities is None else velocities.copy()
+        self._touching, self._new = frozenset(), []
+
+    def advance(self, dt_s: float, wanted_m_s: Rows) -> None:
+        change = wanted_m_s - self._velocity
+        size = np.linalg.norm(change, axis=1, keepdims=True)
+        limit = ACCELERATION_M_S2 * dt_s
+        change *= np.minimum(1.0, limit / np.maximum(size, 1e-12))
+        before = self._velocity
+        self._velocity = before + change
+        self._at = self._at + (before + self._velocity) * (dt_s / 2)
+        below = self._at[:, 2] < 0
+        self._at[below, 2] = 0.0
+        self._velocity[below] = 0.0
+        self._notice_contacts()
+
+    def positions(self) -> Rows:
+        return self._at
+
+    def velocities(self) -> Rows:
+        return self._velocity
+
+    def contacts(self) -> list[tuple[int, int]]:
+        new, self._new = self._new, []
+        return new
+
+    def _notice_contacts(self) -> None:
+        now = {(0, int(i) + 1) for i in np.flatnonzero(self._at[:, 2] <= RADIUS_M)}
+        if len(self._at) <= _CROWD:
+            apart = np.linalg.norm(self._at[:, None] - self._at[None], axis=2)
+            first, second = np.nonzero(np.triu(apart < 2 * RADIUS_M, k=1))
+            now |= {(int(a) + 1, int(b) + 1) for a, b in zip(first, second, strict=True)}
+        self._new += sorted(now - self._touching)
+        self._touching = frozenset(now)

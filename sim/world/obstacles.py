@@ -1,0 +1,120 @@
+"""What stands in the world: hills and buildings, from the scenario and its seed. ENU metres; no physics here.
+
+Hills are a sum of a few cosine waves, scaled to [0, `terrain_m`]. Buildings are upright boxes, aligned with the axes,
+from the plain at 0 to their height above the ground at their middle. A seeded building keeps clear of every start.
+Not modeled: streets, bridges, trees, anything with a hole.
+"""
+
+import math
+from random import Random
+from typing import Final, NamedTuple
+
+import numpy as np
+
+from fanet_mw.errors import ConfigError
+from fanet_mw.rng import stream
+from fanet_mw.scenario import Scenario, World
+from sim.world.engine import Rows
+
+_CLEAR_M: Final = 5.0
+"""Distance between a seeded building and a UAV at its start."""
+_TRIES: Final = 200
+_CELLS: Final = 96
+"""Grid cells of the hills per side, at most."""
+_WAVES: Final = 8
+
+
+class Box(NamedTuple):
+    """One building: its middle, its extents, and its roof above 0."""
+
+    east: float
+    north: float
+    width: float
+    depth: float
+    roof: float
+
+    def near(self, places: Rows, *, margin_m: float) -> bool:
+        """Whether any place is within the box, or closer to it than the margin."""
+        return bool(
+            (
+                (np.abs(places[:, 0] - self.east) < self.width / 2 + margin_m)
+                & (np.abs(places[:, 1] - self.north) < self.depth / 2 + margin_m)
+                & (places[:, 2] < self.roof + margin_m)
+            ).any()
+        )
+
+
+class Hills(NamedTuple):
+    """Heights above 0 at the corners of a square grid, centered at the origin; row by row to the north."""
+
+    heights: Rows
+    cell_m: float
+
+    def at(self, east: float, north: float) -> float:
+        """Height of the nearest grid point."""
+        side = self.heights.shape[0]
+        row, column = (min(side - 1, max(0, round(value / self.cell_m + (side - 1) / 2))) for value in (north, east))
+        return float(self.heights[row, column])
+
+
+class Obstacles(NamedTuple):
+    """Everything solid but the plain."""
+
+    hills: Hills | None
+    boxes: tuple[Box, ...]
+
+    @property
+    def top_m(self) -> float:
+        """No obstacle reaches higher."""
+        hill = float(self.hills.heights.max()) if self.hills else 0.0
+        return max([hill, *(box.roof for box in self.boxes)])
+
+
+def obstacles(scenario: Scenario, starts: Rows) -> Obstacles:
+    """The obstacles of a scenario whose UAVs start at `starts` [nodes, 3]; ConfigError when one is in the way."""
+    world = scenario.world
+    hills = _hills(world, stream(scenario.seed, "terrain")) if world.terrain_m else None
+    if hills is not None:
+        for node, (east, north, up) in enumerate(starts.tolist(), 1):
+            if up < hills.at(east, north):
+                raise ConfigError(
+                    f"node {node} starts at {up:g} m, below a hill of {hills.at(east, north):.0f} m; "
+                    f"world.terrain_m = {world.terrain_m:g} must leave room for nodes.altitude_m"
+                )
+    if isinstance(world.buildings, int):
+        random = stream(scenario.seed, "buildings")
+        return Obstacles(hills, tuple(_seeded(world, random, hills, starts) for _ in range(world.buildings)))
+    boxes = []
+    for east, north, width, depth, height in world.buildings:
+        box = Box(east, north, width, depth, height + (hills.at(east, north) if hills else 0.0))
+        if box.near(starts, margin_m=0.0):
+            raise ConfigError(f"world.buildings: a node starts within the building at [{east:g}, {north:g}]")
+        boxes.append(box)
+    return Obstacles(hills, tuple(boxes))
+
+
+def _seeded(world: World, random: Random, hills: Hills | None, starts: Rows) -> Box:
+    half = world.area_m / 2
+    for _ in range(_TRIES):
+        east, north = random.uniform(-half, half), random.uniform(-half, half)
+        width, depth = random.uniform(*world.building_size_m), random.uniform(*world.building_size_m)
+        roof = random.uniform(*world.building_height_m) + (hills.at(east, north) if hills else 0.0)
+        box = Box(east, north, width, depth, roof)
+        if not box.near(starts, margin_m=_CLEAR_M):
+            return box
+    raise ConfigError(
+        f"world.buildings = {world.buildings}: no place found for one, clear of every start by {_CLEAR_M:g} m"
+    )
+
+
+def _hills(world: World, random: Random) -> Hills:
+    cells = max(8, min(_CELLS, math.ceil(4 * world.area_m / world.terrain_scale_m)))
+    axis = np.linspace(-world.area_m / 2, world.area_m / 2, cells + 1)
+    east, north = np.meshgrid(axis, axis)
+    surface = np.zeros_like(east)
+    for _ in range(_WAVES):
+        heading, phase = random.uniform(0, 2 * math.pi), random.uniform(0, 2 * math.pi)
+        per_m = 2 * math.pi / (world.terrain_scale_m * random.uniform(0.7, 1.4))
+        surface += np.cos(per_m * (math.cos(heading) * east + math.sin(heading) * north) + phase)
+    surface -= surface.min()
+    return Hills(np.asarray(surface * (world.terrain_m / max(float(surface.max()), 1e-9))), world.area_m / cells)

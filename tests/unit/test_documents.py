@@ -1,0 +1,41 @@
+"""Documents lead where they say: every relative link, and every file of ours that is named with its folder, exists."""
+
+import re
+from collections.abc import Iterator
+from pathlib import Path
+
+import pytest
+
+ROOT = Path(__file__).parents[2]
+PAGES = sorted(
+    {*ROOT.glob("*.md"), *(ROOT / "docs").rglob("*.md"), *(ROOT / "examples").rglob("*.md")} - {ROOT / "CHANGELOG.md"}
+)
+_LINK = re.compile(r"\]\(([^)#\s]+)(#[^)\s]*)?\)")
+_FILE = re.compile(r"(?<![\w./-])((?:fanet_mw|agents|emulator|sim|tests|scripts|docs|examples)/[\w./-]*\w)(?![\w*{<])")
+
+
+def links(page: Path) -> Iterator[Path]:
+    for target, _ in _LINK.findall(page.read_text(encoding="utf-8")):
+        if "://" not in target and not target.startswith("mailto:"):
+            yield page.parent / target
+
+
+def names(page: Path) -> Iterator[str]:
+    for name in _FILE.findall(page.read_text(encoding="utf-8")):
+        if Path(name).suffix in {".py", ".toml", ".md", ".xml", ".csv", ".cc", ".sh"}:
+            yield name
+
+
+@pytest.mark.parametrize("page", PAGES, ids=lambda page: str(page.relative_to(ROOT)))
+def test_every_link_of_a_page_and_every_file_that_it_names_exists(page: Path) -> None:
+    missing = [str(target) for target in links(page) if not target.exists()]
+    missing += [name for name in names(page) if not (ROOT / name).exists()]
+    assert not missing
+
+
+def test_every_file_of_ours_that_source_text_names_exists() -> None:
+    folders = ("fanet_mw", "agents", "emulator", "sim", "tests", "scripts")
+    sources = [path for folder in folders for path in (ROOT / folder).rglob("*") if path.suffix in {".py", ".toml"}]
+    assert sources
+    missing = {name: str(source) for source in sources for name in names(source) if not (ROOT / name).exists()}
+    assert not missing

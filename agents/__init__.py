@@ -1,1 +1,1 @@
-"""The UAV process: routing core, autopilot, traffic and mission of one node."""
+"""The UAV process of fanet-mw: routing core, autopilot, traffic and mission of one node."""

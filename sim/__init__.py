@@ -1,1 +1,1 @@
-"""Worlds and runs: what stands around the agents and the emulator."""
+"""Worlds and runs: what stands around the agents and the emulator of fanet-mw."""

@@ -9,10 +9,11 @@ from collections.abc import Callable, Iterator
 from contextlib import contextmanager, nullcontext
 from importlib.resources import files
 from pathlib import Path
-from typing import Annotated, Any
+from typing import TYPE_CHECKING, Annotated, Any
 
 from cyclopts import App, Parameter
 from cyclopts.validators import Number
+from rich.markup import escape
 from rich.progress import BarColumn, Progress, TextColumn, TimeElapsedColumn
 from rich.table import Table
 
@@ -20,16 +21,19 @@ from emulator.capture_file import CaptureFile
 from fanet_mw import __version__
 from fanet_mw.errors import ConfigError, FanetError
 from fanet_mw.hosts import interrupts, loop
+from fanet_mw.installation import missing_extra
 from fanet_mw.scenario import Scenario
 from fanet_mw.units import NodeId
 from sim.cli.air import app as air_app
 from sim.cli.console import Console, nobody_reads
-from sim.cli.options import Choice, Join, Output, warn_of
+from sim.cli.options import Choice, Join, Output, warn_of, with_engine
 from sim.results import report
-from sim.run.outcome import Outcome
 from sim.run.running import locate, running
 from sim.scenarios import catalog
 from sim.world.layout import positions
+
+if TYPE_CHECKING:
+    from sim.run.outcome import Outcome  # needs numpy, which a machine without the emulator has not
 
 app = App(
     name="fanet",
@@ -56,7 +60,7 @@ def simulate(scenario: str, *, choice: Choice = Choice(), output: Output = Outpu
     from sim.run.virtual import EPOCH_UNIX_NS
     from sim.run.virtual import simulate as run
 
-    chosen = choice.scenario(scenario)
+    chosen = with_engine(choice.scenario(scenario))
     output.prepare()
     if must_compile():
         _err.print(WORD, highlight=False)
@@ -133,7 +137,7 @@ def launch(
     """
     from sim.run.swarm import launch as run
 
-    chosen = choice.realtime_scenario(scenario)
+    chosen = with_engine(choice.realtime_scenario(scenario))
     output.prepare()
     warn_of(listen, listens=True)
     warn_of(connect, listens=False)
@@ -264,7 +268,7 @@ def world(scenario: str, *, choice: Choice = Choice(), join: Join = Join()) -> i
     """
     from sim.world.__main__ import run
 
-    chosen = choice.realtime_scenario(scenario)
+    chosen = with_engine(choice.realtime_scenario(scenario))
     return run(chosen, swarm=join.swarm or chosen.name, endpoint=join.connect, zenoh_config=join.zenoh_config)
 
 
@@ -435,7 +439,7 @@ def _progress(scenario: Scenario, *, quiet: bool) -> Iterator[Callable[[float], 
         yield lambda seconds: progress.update(task, completed=seconds)
 
 
-def _finish(outcome: Outcome, output: Output) -> int:
+def _finish(outcome: "Outcome", output: Output) -> int:
     """Write and show the result; 0 only when it may be used."""
     from sim.results.files import finish
 
@@ -464,6 +468,11 @@ def main() -> None:
         nobody_reads()
     except FanetError as error:
         _err.print(f"[bold red]fanet:[/] {error}", highlight=False, soft_wrap=True)
+        code = 2
+    except ModuleNotFoundError as error:
+        if (why := missing_extra(error)) is None:
+            raise
+        _err.print(f"[bold red]fanet:[/] {escape(why)}", highlight=False, soft_wrap=True)
         code = 2
     except KeyboardInterrupt as interrupt:
         code = interrupts.exit_code(interrupt)

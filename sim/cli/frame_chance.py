@@ -8,11 +8,6 @@ import math
 from collections.abc import Mapping
 from functools import cache
 
-import numpy as np
-
-from emulator.channel.error_rate import header_rates, log_success_per_bit
-from emulator.channel.propagation import milliwatt, noise_mw, received_dbm
-from emulator.kernel.phy import ERROR_FLOOR_DB, ERROR_STEPS_PER_DB
 from fanet_mw.airtime import OVERHEAD_BYTES, Timing
 from fanet_mw.planner.loss import Chance
 from fanet_mw.scenario import Scenario
@@ -26,6 +21,21 @@ def chance_of(scenario: Scenario, at: Mapping[NodeId, Enu]) -> Chance | None:
         return None
     if radio.channel == "range":
         return lambda sender, receiver, others: _clear(at, receiver, (sender, *others), radio.range_m)
+    return _by_error_rate(scenario, at)
+
+
+def _by_error_rate(scenario: Scenario, at: Mapping[NodeId, Enu]) -> Chance:
+    """Channels with powers: the error rates at the signal to noise and interference ratio.
+
+    What computes with numpy is imported here, so that a plan on the channel `range` needs no extra of the package.
+    """
+    import numpy as np
+
+    from emulator.channel.error_rate import header_rates, log_success_per_bit
+    from emulator.kernel.phy import ERROR_FLOOR_DB, ERROR_STEPS_PER_DB
+    from emulator.channel.propagation import milliwatt, noise_mw, received_dbm
+
+    radio = scenario.radio
     header_rate, bits_per_ns = header_rates(radio.rate_mbps)
     tables = log_success_per_bit(header_rate), log_success_per_bit(radio.rate_mbps)
     bits = Timing.of(radio).header_ns * bits_per_ns, 8 * (scenario.traffic.payload_bytes + OVERHEAD_BYTES)

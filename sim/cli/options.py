@@ -4,6 +4,7 @@ Field names are the flags, their docstrings the help; the command line reads bot
 """
 
 from dataclasses import dataclass, replace
+from importlib.util import find_spec
 from pathlib import Path
 from typing import Annotated, Final
 
@@ -97,6 +98,30 @@ class Join:
 
     def __post_init__(self) -> None:
         warn_of(self.connect, listens=False)
+
+
+def with_engine(scenario: Scenario) -> Scenario:
+    """The scenario with a world engine that is installed: where pybullet is not, `kinematic` serves, and it is said so.
+
+    Raises ConfigError for a world with obstacles, which only pybullet has.
+    """
+    world = scenario.world
+    if world.engine != "pybullet" or find_spec("pybullet") is not None:
+        return scenario
+    if world.has_obstacles:
+        raise ConfigError(
+            f'scenario {scenario.name}: world.buildings and world.terrain_m need world.engine = "pybullet", '
+            "which is not installed: pip install 'fanet-mw[pybullet]'"
+        )
+    _err.print(
+        "pybullet is not installed (pip install 'fanet-mw[pybullet]'): world.engine = \"kinematic\" serves instead.",
+        highlight=False,
+        soft_wrap=True,
+        markup=False,
+    )
+    tree = scenario.model_dump()
+    tree["world"]["engine"] = "kinematic"
+    return Scenario.model_validate(tree)
 
 
 def warn_of(endpoint: str | None, *, listens: bool) -> None:

@@ -1,0 +1,32 @@
+"""The console script: `fanet`, or `python -m fanet_mw`. Ctrl-C is quiet from the first moment on.
+
+Importing the command line takes half a second, and a signal that comes meanwhile would show where Python was. The
+command line is imported by name, and only when this installation was found whole: this package knows nothing of it.
+"""
+
+import os
+import signal
+import sys
+from importlib import import_module
+from types import FrameType
+from typing import NoReturn
+
+from fanet_mw.installation import damage
+
+
+def main() -> None:
+    """Import the command line, and run it."""
+    for number in (signal.SIGINT, signal.SIGTERM):
+        signal.signal(number, _leave)
+    if (why := damage()) is not None:
+        sys.stderr.write(f"fanet: {why}\n")
+        sys.exit(2)
+    import_module("sim.cli.app").main()
+
+
+def _leave(number: int, _frame: FrameType | None) -> NoReturn:
+    os._exit(128 + number)  # nothing has been started, nothing is to be written
+
+
+if __name__ == "__main__":
+    main()

@@ -1,0 +1,46 @@
+"""Whether this installation is whole: a package may have been overwritten by another distribution, an extra missing.
+
+The distribution fanet-mw has four packages at the top level, and other distributions have some of the same names
+(`openai-agents` has `agents`): installed into one environment, the later one overwrites files of the earlier one.
+"""
+
+from importlib.metadata import packages_distributions
+from importlib.util import find_spec
+from pathlib import Path
+from typing import Final
+
+PACKAGES: Final = ("agents", "emulator", "sim")
+"""The packages of this distribution besides `fanet_mw`."""
+_MARK: Final = "fanet-mw"
+"""What the first lines of each of our packages say."""
+_EXTRAS: Final = {"numpy": "emulator", "numba": "emulator", "pybullet": "pybullet"}
+"""The extra that brings a module."""
+_REMEDY: Final = (
+    "install fanet-mw into an environment of its own: python3 -m venv fanet && fanet/bin/pip install 'fanet-mw[all]'"
+)
+
+
+def damage() -> str | None:
+    """What is wrong with this installation, and the remedy; None when it is whole. None of the packages is imported."""
+    for package in PACKAGES:
+        spec = find_spec(package)
+        if spec is None or spec.origin is None:
+            return f"the package {package!r} of fanet-mw is not there (another distribution removed it?); {_REMEDY}"
+        path = Path(spec.origin)
+        if _MARK not in path.read_text(encoding="utf-8", errors="replace"):
+            return f"{path.parent} is not the package {package!r} of fanet-mw{_owner(package)}; {_REMEDY}"
+    return None
+
+
+def missing_extra(error: ModuleNotFoundError) -> str | None:
+    """What to install for a module that is not there; None when it is of no extra of ours."""
+    extra = _EXTRAS.get((error.name or "").partition(".")[0])
+    if extra is None:
+        return None
+    return f"this command needs {error.name}, which is not installed: pip install 'fanet-mw[{extra}]'"
+
+
+def _owner(package: str) -> str:
+    """The other distributions that say they brought a package of this name."""
+    others = sorted({name for name in packages_distributions().get(package, ()) if name != "fanet-mw"})
+    return f": it was installed by {', '.join(others)}" if others else ""

@@ -1,0 +1,127 @@
+"""The package as it is installed: whole or damaged, with and without its extras."""
+
+import ast
+import os
+import re
+import subprocess
+import sys
+import tomllib
+from pathlib import Path
+
+import pytest
+
+from fanet_mw import installation
+
+ROOT = Path(__file__).parents[2]
+PROJECT = tomllib.loads((ROOT / "pyproject.toml").read_text())["project"]
+EXTRAS = ("numpy", "numba", "pybullet")
+"""The modules that only extras bring."""
+DEVELOPMENT = {"pytest", "mypy", "hypothesis", "ruff", "import-linter"}
+
+
+def fanet(*arguments: str, path: tuple[Path, ...]) -> subprocess.CompletedProcess[str]:
+    environment = {**os.environ, "PYTHONPATH": os.pathsep.join(map(str, (*path, ROOT)))}
+    command = [sys.executable, "-m", "fanet_mw", *arguments]
+    return subprocess.run(
+        command, env=environment, capture_output=True, text=True, timeout=60, check=False, cwd=path[0]
+    )
+
+
+@pytest.fixture
+def core_only(tmp_path: Path) -> Path:
+    """A folder that hides what extras bring from every interpreter that has it on its path."""
+    (tmp_path / "sitecustomize.py").write_text(
+        "import sys\n"
+        "class Hidden:\n"
+        "    def find_spec(self, name, path=None, target=None):\n"
+        f"        if name.partition('.')[0] in {EXTRAS!r}:\n"
+        "            raise ModuleNotFoundError(f'No module named {name!r}', name=name)\n"
+        "sys.meta_path.insert(0, Hidden())\n"
+    )
+    return tmp_path
+
+
+def test_this_installation_is_whole() -> None:
+    assert installation.damage() is None
+
+
+def test_a_distribution_that_overwrites_one_of_our_packages_is_named_at_start(tmp_path: Path) -> None:
+    (tmp_path / "agents").mkdir()
+    (tmp_path / "agents" / "__init__.py").write_text('"""Agents of somebody else."""\nraise RuntimeError("was run")\n')
+    record = tmp_path / "openai_agents-1.0.dist-info"
+    record.mkdir()
+    (record / "METADATA").write_text("Metadata-Version: 2.1\nName: openai-agents\nVersion: 1.0\n")
+    (record / "top_level.txt").write_text("agents\n")
+
+    ended = fanet("--version", path=(tmp_path,))
+
+    assert ended.returncode == 2
+    assert f"{tmp_path / 'agents'} is not the package 'agents' of fanet-mw" in ended.stderr
+    assert "it was installed by openai-agents" in ended.stderr
+    assert "environment of its own" in ended.stderr
+    assert "Traceback" not in ended.stderr
+
+
+def test_a_package_of_ours_that_is_gone_is_named(tmp_path: Path) -> None:
+    for package in ("fanet_mw", "emulator", "sim"):
+        (tmp_path / package).symlink_to(ROOT / package)
+    ask = (
+        f"import sys; sys.path.insert(0, {str(tmp_path)!r}); from fanet_mw.installation import damage; print(damage())"
+    )
+    # -S: without the site packages, and so without the installation that runs this test
+    said = subprocess.run([sys.executable, "-S", "-c", ask], capture_output=True, text=True, check=True, cwd=tmp_path)
+
+    assert "the package 'agents' of fanet-mw is not there" in said.stdout
+
+
+@pytest.mark.parametrize("arguments", [("scenarios",), ("plan", "clusters")])
+def test_a_command_that_needs_no_extra_runs_without_any(core_only: Path, arguments: tuple[str, ...]) -> None:
+    ended = fanet(*arguments, path=(core_only,))
+
+    assert (ended.returncode, ended.stderr) == (0, "")
+    assert ended.stdout
+
+
+def test_a_command_that_needs_an_extra_says_which(core_only: Path) -> None:
+    ended = fanet("simulate", "flooding", path=(core_only,))
+
+    assert ended.returncode == 2
+    assert ended.stderr == (
+        "fanet: this command needs numpy, which is not installed: pip install 'fanet-mw[emulator]'\n"
+    )
+
+
+def test_where_pybullet_is_not_installed_kinematic_serves_and_one_sentence_says_so(tmp_path: Path) -> None:
+    (tmp_path / "sitecustomize.py").write_text(
+        "import importlib.util as util\n"
+        "find = util.find_spec\n"
+        "util.find_spec = lambda name, package=None: None if name == 'pybullet' else find(name, package)\n"
+    )
+
+    ended = fanet(
+        "simulate", "quick", "--set", "warmup_s=0", "--set", "drain_s=0", "--duration", "1", "--json", path=(tmp_path,)
+    )
+    assert ended.returncode == 0
+    assert ended.stderr.splitlines() == [
+        'world.engine = "kinematic" serves for "pybullet", which is not installed (pip install \'fanet-mw[pybullet]\').'
+    ]
+
+    refused = fanet("simulate", "town", "--duration", "1", path=(tmp_path,))
+    assert refused.returncode == 2
+    assert "world.buildings and world.terrain_m need" in refused.stderr
+
+
+def test_every_dependency_is_imported_by_us_and_none_is_for_development() -> None:
+    imported = set()
+    for package in ("fanet_mw", "agents", "emulator", "sim"):
+        for path in (ROOT / package).rglob("*.py"):
+            for node in ast.walk(ast.parse(path.read_text())):
+                names = [a.name for a in node.names] if isinstance(node, ast.Import) else []
+                names += [node.module or ""] if isinstance(node, ast.ImportFrom) else []
+                imported.update(name.partition(".")[0] for name in names)
+    extras = [line for lines in PROJECT["optional-dependencies"].values() for line in lines]
+    wanted = {re.split(r"[\[<>=; ]", line)[0] for line in (*PROJECT["dependencies"], *extras)} - {"fanet-mw"}
+
+    modules = {name: {"eclipse-zenoh": "zenoh"}.get(name, name.replace("-", "_")) for name in wanted}
+    assert {name for name, module in modules.items() if module not in imported} == set()
+    assert not wanted & DEVELOPMENT

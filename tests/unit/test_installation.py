@@ -11,6 +11,9 @@ from pathlib import Path
 import pytest
 
 from fanet_mw import installation
+from fanet_mw.errors import ConfigError
+from sim import catalog
+from sim.options import with_engine
 
 ROOT = Path(__file__).parents[2]
 PROJECT = tomllib.loads((ROOT / "pyproject.toml").read_text())["project"]
@@ -91,24 +94,22 @@ def test_a_command_that_needs_an_extra_says_which(core_only: Path) -> None:
     )
 
 
-def test_where_pybullet_is_not_installed_kinematic_serves_and_one_sentence_says_so(tmp_path: Path) -> None:
-    (tmp_path / "sitecustomize.py").write_text(
-        "import importlib.util as util\n"
-        "find = util.find_spec\n"
-        "util.find_spec = lambda name, package=None: None if name == 'pybullet' else find(name, package)\n"
-    )
+def test_where_pybullet_is_not_installed_kinematic_serves_and_one_sentence_says_so(
+    monkeypatch: pytest.MonkeyPatch, capsys: pytest.CaptureFixture[str]
+) -> None:
+    monkeypatch.setitem(sys.modules, "pybullet", None)  # an import of it fails
 
-    ended = fanet(
-        "simulate", "quick", "--set", "warmup_s=0", "--set", "drain_s=0", "--duration", "1", "--json", path=(tmp_path,)
-    )
-    assert ended.returncode == 0
-    assert ended.stderr.splitlines() == [
-        'world.engine = "kinematic" serves for "pybullet", which is not installed (pip install \'fanet-mw[pybullet]\').'
+    assert with_engine(catalog.find("quick")).world.engine == "kinematic"
+    assert capsys.readouterr().err.splitlines() == [
+        "pybullet is not installed (pip install 'fanet-mw[pybullet]'): world.engine = \"kinematic\" serves instead."
     ]
+    with pytest.raises(ConfigError, match="world.buildings and world.terrain_m need"):
+        with_engine(catalog.find("town"))
 
-    refused = fanet("simulate", "town", "--duration", "1", path=(tmp_path,))
-    assert refused.returncode == 2
-    assert "world.buildings and world.terrain_m need" in refused.stderr
+
+def test_where_pybullet_is_installed_it_serves() -> None:
+    scenario = catalog.find("quick")
+    assert with_engine(scenario) is scenario
 
 
 def test_every_dependency_is_imported_by_us_and_none_is_for_development() -> None:

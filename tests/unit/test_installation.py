@@ -12,8 +12,8 @@ import pytest
 
 from fanet_mw import installation
 from fanet_mw.errors import ConfigError
-from sim import catalog
-from sim.options import with_engine
+from sim.cli.options import with_engine
+from sim.scenarios import catalog
 
 ROOT = Path(__file__).parents[2]
 PROJECT = tomllib.loads((ROOT / "pyproject.toml").read_text())["project"]
@@ -103,7 +103,7 @@ def test_where_pybullet_is_not_installed_kinematic_serves_and_one_sentence_says_
     assert capsys.readouterr().err.splitlines() == [
         "pybullet is not installed (pip install 'fanet-mw[pybullet]'): world.engine = \"kinematic\" serves instead."
     ]
-    with pytest.raises(ConfigError, match="world.buildings and world.terrain_m need"):
+    with pytest.raises(ConfigError, match=r"world\.buildings and world\.terrain_m need"):
         with_engine(catalog.find("town"))
 
 

@@ -16,7 +16,7 @@ from pymavlink.generator import mavgen, mavparse
 from fanet_mw import wire
 from fanet_mw.dialect import fanet
 
-ROOT = Path(__file__).resolve().parents[2]
+ROOT = Path(__file__).resolve().parents[3]
 DIALECT = ROOT / "fanet_mw" / "dialect"
 DOCUMENT = (ROOT / "docs" / "wire.md").read_text(encoding="utf-8")
 

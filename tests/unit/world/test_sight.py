@@ -6,7 +6,6 @@ from typing import Any
 
 import numpy as np
 import pytest
-from hand_driven import NAMES, Air, receptions
 
 from fanet_mw.bus.messages import Obstructions, Poses
 from fanet_mw.errors import ConfigError
@@ -17,6 +16,7 @@ from sim.world.obstacles import Box, Obstacles, obstacles
 from sim.world.physics import Physics
 from sim.world.sight import Sight
 from sim.world.world import World
+from tests.unit.emulator.hand_driven import NAMES, Air, receptions
 
 MakeScenario = Callable[..., Scenario]
 TOWER = Box(0, 0, 20, 40, 60)

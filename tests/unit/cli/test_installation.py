@@ -15,7 +15,7 @@ from fanet_mw.errors import ConfigError
 from sim.cli.options import with_engine
 from sim.scenarios import catalog
 
-ROOT = Path(__file__).parents[2]
+ROOT = Path(__file__).parents[3]
 PROJECT = tomllib.loads((ROOT / "pyproject.toml").read_text())["project"]
 EXTRAS = ("numpy", "numba", "pybullet")
 """The modules that only extras bring."""
@@ -71,8 +71,10 @@ def test_a_package_of_ours_that_is_gone_is_named(tmp_path: Path) -> None:
     ask = (
         f"import sys; sys.path.insert(0, {str(tmp_path)!r}); from fanet_mw.installation import damage; print(damage())"
     )
-    # -S: without the site packages, and so without the installation that runs this test
-    said = subprocess.run([sys.executable, "-S", "-c", ask], capture_output=True, text=True, check=True, cwd=tmp_path)
+    # -S, -E: without the site packages and PYTHONPATH, and so without the installation that runs this test
+    said = subprocess.run(
+        [sys.executable, "-S", "-E", "-c", ask], capture_output=True, text=True, check=True, cwd=tmp_path
+    )
 
     assert "the package 'agents' of fanet-mw is not there" in said.stdout
 

@@ -11,7 +11,7 @@ from emulator.pcap import PORT
 from fanet_mw import wire
 from sim.cli.app import app
 
-ROOT = Path(__file__).resolve().parents[2]
+ROOT = Path(__file__).resolve().parents[3]
 
 
 @pytest.fixture

@@ -8,7 +8,7 @@ import pytest
 
 from fanet_mw.routing.clustered.roles.states import TRANSITIONS, Action, Event, State, mermaid
 
-ROOT = Path(__file__).parents[2]
+ROOT = Path(__file__).parents[5]
 
 
 @pytest.fixture

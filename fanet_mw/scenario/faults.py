@@ -27,6 +27,7 @@ class FaultSection(Section):
     """The base of the entries of `[[faults]]`: what happens to the air at an instant of the run."""
 
     at_s: Duration
+    """When it begins, in swarm time."""
     for_s: Annotated[float, Field(ge=0, le=1e6)] = 0.0
     """How long it lasts; 0: until it is restored."""
     label: Annotated[str, Field(max_length=MAX_LABEL, pattern=r"^[ -~]*$")] = ""
@@ -41,14 +42,17 @@ class DegradeFault(FaultSection):
     """A link is weaker or loses frames."""
 
     kind: Literal["degrade"]
+    """`degrade`: a link is weaker or loses frames."""
     src: Id
+    """Node id of one end of the link."""
     dst: Id
+    """Node id of the other end."""
     both: bool = True
     """Also the other direction."""
     loss_db: Annotated[float, Field(ge=0, le=MAX_LOSS_DB)] = 0.0
     """Added to the path loss."""
     loss_share: Annotated[float, Field(ge=0, le=1)] = 0.0
-    """Of the frames that would have been received."""
+    """Share that is lost of the frames that would have been received."""
 
     def control(self) -> Control:
         label = self.label or link_label(self.src, self.dst)
@@ -60,9 +64,11 @@ class JamFault(FaultSection):
     """An area is jammed."""
 
     kind: Literal["jam"]
+    """`jam`: an area is jammed."""
     center_m: tuple[Coordinate, Coordinate]
-    """East, north."""
+    """Center of the circle: east, north."""
     radius_m: Annotated[float, Field(gt=0, le=MAX_RADIUS_M)]
+    """Radius of the circle, at any height."""
     noise_dbm: Annotated[float, Field(ge=-MAX_LOSS_DB, le=MAX_NOISE_DBM)] | None = None
     """Noise at each receiver inside; by default nothing is received there."""
 
@@ -75,7 +81,9 @@ class CutFault(FaultSection):
     """A node's radio is off."""
 
     kind: Literal["cut"]
+    """`cut`: a node's radio is off."""
     node: Id
+    """Id of that node."""
 
     def control(self) -> Control:
         return Cut(self.label or node_label(self.node), NodeId(self.node), self.for_ns)
@@ -85,8 +93,11 @@ class RestoreFault(Section):
     """The end of a fault, or of all (no label)."""
 
     kind: Literal["restore"]
+    """`restore`: the end of a fault."""
     at_s: Duration
+    """When the fault ends, in swarm time."""
     label: str = ""
+    """Label of that fault; all of them by default."""
 
     def control(self) -> Control:
         return Restore(self.label)

@@ -50,12 +50,17 @@ class Nodes(Section):
     """How many nodes there are and where they start. Node ids run from 1; node 1 is the leader."""
 
     count: Annotated[int, Field(ge=1, le=MAX_NODES)] = 45
+    """Number of nodes; their ids are 1 to `count`."""
     layout: Literal["grid", "disc", "line", "explicit"] = "grid"
+    """Where the nodes start: in a `grid`, at random places in a `disc`, in a `line`, or as `positions_m` says."""
     spacing_m: SomeLength = 200.0
+    """`grid` and `line`: distance from one node to the next."""
     radius_m: SomeLength = 100.0
+    """`disc`: its radius."""
     columns: Count | None = None
     """Grid columns; by default the widest near-square factorisation in the manner of 9 x 5."""
     altitude_m: Length = 50.0
+    """Height at which the nodes start and fly; every layout but `explicit` uses it."""
     telemetry_hz: Rate = 1.0
     """Native MAVLink telemetry of each node on its tap; 0 sends none."""
     positions_m: tuple[tuple[Coordinate, Coordinate, Coordinate], ...] = ()
@@ -79,10 +84,13 @@ class Traffic(Section):
     interval_s: Annotated[float, Field(ge=1e-4, le=MOST_S)] = 1.0
     """At least 0.1 ms: packets are named by numbers of which a node has one for each 0.1 ms."""
     arrivals: Literal["cbr", "poisson", "saturated", "none"] = "cbr"
+    """When a source offers packets: one per interval, with exponential gaps of that mean, always one more as soon as the
+    last has ended, or never."""
     sources: Literal["all"] | Annotated[int, Field(ge=0, le=MAX_NODES)] | tuple[Id, ...] = "all"
     """A number of sources (drawn by seed among the nodes that are neither leader nor destination), a list of node
     ids, or every node but the destination."""
     destination: Literal["all"] | Id = "all"
+    """One node's id, or `all`: packets are flooded."""
     deadline_s: SomeTime | None = None
     """`clusters.relay = "scheduled"`: nodes refuse packets that would break this, and record whether their bound meets
     it; unset: every packet is taken."""
@@ -96,12 +104,16 @@ class Routing(Section):
     protocol: Literal["direct", "flooding", "clustered", "aodv", "olsr", "dsdv", "gossip", "counter", "geographic"] = (
         "clustered"
     )
+    """How packets find their way: one hop only (`direct`), a relay by every node (`flooding`), with a probability
+    (`gossip`) or by those that heard few copies (`counter`), the time-divided floods of cluster heads (`clustered`), or
+    a route found on demand, by link states, by distance vectors or by positions."""
     address_resolution: Literal["none", "rfc826", "ns3"] = "none"
     """`aodv`, `olsr`, `dsdv`, `geographic`: a node asks for a neighbor's address before its first unicast to it, as IP
     does, by the rules of RFC 826 or by ns-3's. `none`: a node id is an address, and nobody needs to ask."""
     jitter_ms: Milliseconds = 10.0
     """A relay waits U(0, jitter) after a reception."""
     hop_limit: Annotated[int, Field(ge=1, le=255)] = 32
+    """A packet is not relayed farther than so many hops."""
     queue_frames: Count = 512
     """Bound of a node's own queue; the least important packet is evicted, with a reason."""
     lifetime_s: SomeTime = 30.0
@@ -138,7 +150,9 @@ class Clusters(Section):
     """The paper's protocol: k clusters, one slot each per flooding period."""
 
     count: Annotated[int, Field(ge=1, le=1024)] = 4
+    """Number of clusters, and so of slots in a flooding period."""
     flooding_period_s: Annotated[float, Field(ge=0.01, le=4000)] = 5.0
+    """Each head floods once in such a period, in its slot."""
     guard_ms: Milliseconds | Literal["auto"] = 2.0
     """The silent end of a slot; `auto`: as long as the greatest clock error in the swarm, the range and the largest
     frame ask for."""
@@ -167,8 +181,11 @@ class Clusters(Section):
     interference_m: Length = 0.0
     """`scheduled`: nodes no farther apart may disturb each other; 0: `radio.range_m` for `range`, else twice that."""
     gossip_degree: Annotated[float, Field(gt=0, le=1e6)] = 6.0
+    """`gossip`: how many neighbors of a node relay on average."""
     counter: Annotated[int, Field(ge=2, le=1_000_000)] = 3
+    """`counter`: a node that has heard so many copies does not relay."""
     assess_ms: Milliseconds = 100.0
+    """`counter`: copies are counted for U(0, assess_ms)."""
     method: Literal["balanced", "lowest_id", "highest_degree", "wca", "lasting_degree", "affinity"] = "balanced"
     """How the leader divides the swarm. All but `balanced` make as many clusters as the topology asks for, whatever
     `count` says: every member hears its head."""
@@ -195,6 +212,7 @@ class Mobility(Section):
     """`formation` sweeps the area keeping the layout; `random_waypoint` is the statistical model, without pause;
     `crossing` flies everyone through the middle of the area to the point opposite its start, and back."""
     speed_m_s: Speed = 7.5
+    """Cruising speed."""
     see_m: Length = 50.0
     """UAVs nearer than this see each other without radio and keep clear; 0: they are blind."""
 
@@ -206,23 +224,29 @@ class World(Section):
     """The engine that moves the bodies, and the area they move in."""
 
     engine: Literal["pybullet", "kinematic"] = "kinematic"
+    """What moves the bodies: rigid-body physics with collisions (`pybullet`, an extra of the package), or point masses
+    of limited acceleration (`kinematic`)."""
     area_m: SomeLength = 2500.0
     """Side of the square area, centred at the origin."""
     tick_ms: Annotated[float, Field(ge=1, le=10_000)] = 100.0
     """Period at which poses are published."""
     physics_hz: Annotated[int, Field(ge=10, le=2000)] = 240
+    """`pybullet`: steps of the physics per second."""
     buildings: Annotated[int, Field(ge=0, le=10_000)] | tuple[Building, ...] = 0
     """A number of boxes at seeded places, or each as [east, north, width, depth, height] in metres: its middle, its
     extent to the east and to the north, and its roof above the ground. UAVs collide with them, radio is obstructed."""
     building_size_m: tuple[SomeLength, SomeLength] = (15.0, 40.0)
     """Least and greatest width and depth of a seeded building."""
     building_height_m: tuple[SomeLength, SomeLength] = (8.0, 30.0)
+    """Least and greatest height of a seeded building."""
     terrain_m: Annotated[float, Field(ge=0, le=1000)] = 0.0
     """Height of the highest hill above the plain at 0; 0: no hills."""
     terrain_scale_m: Annotated[float, Field(ge=1, le=1e6)] = 400.0
     """Distance from hill to hill."""
     gps_hz: Annotated[float, Field(ge=1e-6, le=1000)] = 5.0
+    """Position fixes of each UAV per second."""
     gps_sigma_m: Annotated[float, Field(ge=0, le=1000)] = 1.5
+    """Standard deviation of a fix along each axis."""
 
     @model_validator(mode="after")
     def _obstacles_agree(self) -> Self:
@@ -248,17 +272,25 @@ class Mission(Section):
     """Search and rescue: survivors, the sensor that finds their phones, and the rule that moves the UAVs."""
 
     survivors: Annotated[int, Field(ge=0, le=10_000)] = 0
+    """Number of survivors, at seeded places of the area."""
     reports_to_approach: Count = 3
     """A UAV approaches when this many different nodes have reported the same survivor (paper, 4.1)."""
     report_interval_s: Interval = 5.0
     """How often a UAV repeats its report of a survivor it still hears."""
     scan_interval_s: Interval = 1.0
+    """How often the Wi-Fi sensor of a UAV looks for phones."""
     phone_power_dbm: Level = 15.0
+    """Transmit power of a survivor's phone."""
     phone_exponent: Annotated[float, Field(ge=0.1, le=10)] = 3.0
+    """Path loss exponent from a phone to the sensor."""
     detection_dbm: Level = -90.0
+    """The sensor hears a phone at this level or above."""
     shadowing_db: Annotated[float, Field(ge=0, le=30)] = 4.0
+    """Standard deviation of the shadowing of a phone's signal."""
     approach_speed_m_s: Annotated[float, Field(ge=1e-3, le=1000)] = 10.0
+    """Speed at which a UAV approaches a survivor."""
     arrival_m: SomeLength = 30.0
+    """A UAV that is this near to a survivor has arrived."""
     dwell_s: Duration = 10.0
     """How long a UAV stays with a survivor before it turns to the next one it knows of."""
     collision_distance_m: Annotated[float, Field(ge=0, le=1000)] = 0.0
@@ -273,13 +305,17 @@ class Scenario(Section):
     """One file; one execution of it with one seed is a run."""
 
     name: Annotated[str, Field(pattern=r"^[A-Za-z0-9_-]{1,64}$")] = "unnamed"
+    """Name of the scenario, and of its swarm on the bus; by default the file's name."""
     description: str = ""
+    """One sentence for `fanet scenarios`."""
     duration_s: SomeTime = 100.0
+    """Length of a run in swarm time."""
     warmup_s: Duration = 0.0
     """Application traffic begins here; nothing before it is measured."""
     drain_s: Duration = 0.0
     """Application traffic ends this long before the end, so that what is under way can arrive."""
     seed: Annotated[int, Field(ge=0, lt=2**63)] = 1
+    """Seed of every random stream: the same scenario and seed give the same trace, byte by byte."""
     time_scale: Annotated[float, Field(ge=1e-3, le=100)] = 1.0
     """Real time only: swarm seconds per wall second."""
     nodes: Nodes = Nodes()

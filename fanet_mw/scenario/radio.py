@@ -30,26 +30,27 @@ class Radio(Section):
     """The radio, its MAC and the channel. Defaults are the reference set-up: 802.11b, DSSS 11 Mb/s, long preamble."""
 
     channel: Literal["range", "log_distance", "friis", "two_ray", "air_to_air", "air_to_ground", "uma_av"] = "range"
-    """See docs/emulator.md for equations, sources and ranges of validity."""
+    """The path loss model: see docs/emulator.md for equations, sources and ranges of validity."""
     range_m: SomeLength = 250.0
     """`range`: decode and carrier-sense limit; frames are equally strong within it, silent beyond."""
     standard: Literal["b", "g", "a"] = "b"
     """`b`: DSSS; `g`: DSSS or OFDM at 2.4 GHz; `a`: OFDM at 5 GHz. Fixes the rates, the slot, SIFS and their kin."""
     rate_mbps: Annotated[float, Field(gt=0, le=54)] = 11.0
-    """By default 11 (`b`) or 54 (`g`, `a`)."""
+    """Bit rate of data frames, one of the standard's. By default 11 (`b`) or 54 (`g`, `a`)."""
     ack_rate_mbps: Annotated[float, Field(gt=0, le=54)] = 11.0
-    """By default 11 (`b`), else the highest mandatory rate that is not above `rate_mbps` (6, 12, 24; or DSSS)."""
+    """Bit rate of acknowledgments. By default 11 (`b`), else the highest mandatory rate that is not above `rate_mbps` (6, 12, 24; or DSSS)."""
     preamble: Literal["long", "short"] = "long"
-    """DSSS only."""
+    """Preamble of DSSS frames: 192 or 96 us."""
     slot: Literal["long", "short"] = "long"
-    """`g` only: 20 or 9 us. The standard wants the long one in an ad hoc network; many drivers take the short one."""
+    """Slot time; `g` only: 20 or 9 us. The standard wants the long one in an ad hoc network; many drivers take the short one."""
     tx_power_dbm: Level = 30.0
+    """Transmit power; all channels but `range`."""
     exponent: Annotated[float, Field(gt=0, le=10)] = 3.0
     """`log_distance`: path loss exponent."""
     reference_loss_db: Level = 40.05
     """`log_distance`: path loss at 1 m."""
     frequency_mhz: Annotated[float, Field(ge=100, le=100_000)] = 2412.0
-    """All channels but `range` and `log_distance`. By default 2412 (channel 1), and 5180 (channel 36) with `a`."""
+    """Carrier frequency; all channels but `range` and `log_distance`. By default 2412 (channel 1), and 5180 (channel 36) with `a`."""
     environment: Literal["suburban", "urban", "dense_urban", "highrise"] = "suburban"
     """`air_to_ground`: what stands around the node on the ground."""
     airborne_m: Length = 10.0
@@ -72,21 +73,29 @@ class Radio(Section):
     interference_floor_dbm: Level = -101.0
     """All channels but `range`: weaker frames are nothing. In free space it is reached after tens of kilometres."""
     preamble_snr_db: Level = 4.0
+    """All channels but `range`: a receiver locks on to a frame whose preamble is this far above noise and
+    interference."""
     noise_figure_db: Decibels = 7.0
+    """All channels but `range`: what the receiver adds to thermal noise."""
     capture: bool = False
     """Whether a later frame that is `capture_db` stronger than the one being received takes the receiver over."""
     capture_db: Decibels = 10.0
+    """`capture`: how much stronger the later frame must be."""
     access: Literal["standard", "ns3"] | tuple[Ns3Point, ...] = "standard"
     """`standard`: as IEEE 802.11 has it; `ns3`: as ns-3.44 does in every point in which it differs; or a list of such
     points: `difs`, `eifs`, `sums`, `onset` (docs/emulator.md)."""
     cw_min: Annotated[int, Field(ge=1, le=1023)] = 31
-    """By default 31, and 15 with OFDM rates."""
+    """The first contention window, in slots. By default 31, and 15 with OFDM rates."""
     cw_max: Annotated[int, Field(ge=1, le=32767)] = 1023
+    """The contention window is doubled after a failed unicast up to this many slots."""
     max_attempts: Annotated[int, Field(ge=1, le=255)] = 7
+    """So often a unicast is sent until it is given up."""
     queue_frames: Annotated[int, Field(ge=1, le=100_000)] = 500
+    """Frames that wait in the MAC queue at most."""
     lifetime_ms: Annotated[float, Field(ge=1e-3, le=1e6)] | None = None
     """How long a frame may wait in the MAC queue; unset: 500 ms, or as long as it takes if arrivals are saturated."""
     max_frame_bytes: Annotated[int, Field(ge=64, le=2304)] = 2304
+    """The longest frame that the radio takes."""
     lead_ms: Annotated[float, Field(ge=0, le=1000)] = 20.0
     """How long before its instant a node announces a transmission to the radio."""
     handover_ms: Annotated[float, Field(ge=0, le=10_000)] = 0.0

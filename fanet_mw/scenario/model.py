@@ -84,8 +84,8 @@ class Traffic(Section):
     interval_s: Annotated[float, Field(ge=1e-4, le=MOST_S)] = 1.0
     """At least 0.1 ms: packets are named by numbers of which a node has one for each 0.1 ms."""
     arrivals: Literal["cbr", "poisson", "saturated", "none"] = "cbr"
-    """When a source offers packets: one per interval, with exponential gaps of that mean, always one more as soon as the
-    last has ended, or never."""
+    """When a source offers packets: one per interval, with exponential gaps of that mean, always one more as soon as
+    the last has ended, or never."""
     sources: Literal["all"] | Annotated[int, Field(ge=0, le=MAX_NODES)] | tuple[Id, ...] = "all"
     """A number of sources (drawn by seed among the nodes that are neither leader nor destination), a list of node
     ids, or every node but the destination."""

@@ -38,11 +38,13 @@ class Radio(Section):
     rate_mbps: Annotated[float, Field(gt=0, le=54)] = 11.0
     """Bit rate of data frames, one of the standard's. By default 11 (`b`) or 54 (`g`, `a`)."""
     ack_rate_mbps: Annotated[float, Field(gt=0, le=54)] = 11.0
-    """Bit rate of acknowledgments. By default 11 (`b`), else the highest mandatory rate that is not above `rate_mbps` (6, 12, 24; or DSSS)."""
+    """Bit rate of acknowledgments. By default 11 (`b`), else the highest mandatory rate that is not above `rate_mbps`
+    (6, 12, 24; or DSSS)."""
     preamble: Literal["long", "short"] = "long"
     """Preamble of DSSS frames: 192 or 96 us."""
     slot: Literal["long", "short"] = "long"
-    """Slot time; `g` only: 20 or 9 us. The standard wants the long one in an ad hoc network; many drivers take the short one."""
+    """Slot time; `g` only: 20 or 9 us. The standard wants the long one in an ad hoc network; many drivers take the
+    short one."""
     tx_power_dbm: Level = 30.0
     """Transmit power; all channels but `range`."""
     exponent: Annotated[float, Field(gt=0, le=10)] = 3.0
@@ -50,7 +52,8 @@ class Radio(Section):
     reference_loss_db: Level = 40.05
     """`log_distance`: path loss at 1 m."""
     frequency_mhz: Annotated[float, Field(ge=100, le=100_000)] = 2412.0
-    """Carrier frequency; all channels but `range` and `log_distance`. By default 2412 (channel 1), and 5180 (channel 36) with `a`."""
+    """Carrier frequency; all channels but `range` and `log_distance`. By default 2412 (channel 1), and 5180 (channel
+    36) with `a`."""
     environment: Literal["suburban", "urban", "dense_urban", "highrise"] = "suburban"
     """`air_to_ground`: what stands around the node on the ground."""
     airborne_m: Length = 10.0

@@ -42,4 +42,6 @@ Id = Annotated[int, Field(ge=1, le=MAX_NODES)]
 class Section(BaseModel):
     """The base of every table of a scenario file."""
 
-    model_config = ConfigDict(frozen=True, extra="forbid", validate_default=True, allow_inf_nan=False, use_attribute_docstrings=True)
+    model_config = ConfigDict(
+        frozen=True, extra="forbid", validate_default=True, allow_inf_nan=False, use_attribute_docstrings=True
+    )

@@ -17,14 +17,20 @@ from agents.uav import Uav
 from fanet_mw import wire
 from fanet_mw.actor import Actor
 from fanet_mw.bus.messages import (
+    Altimeter,
+    Battery,
+    Camera,
     Gps,
+    Inertial,
     MavlinkTap,
     Message,
+    Radar,
     Reception,
     Setpoint,
     TxOutcome,
     TxRequest,
     TxStatus,
+    Voice,
     WifiScan,
 )
 from fanet_mw.bus.topics import Topics
@@ -152,7 +158,7 @@ class ClockedUav(Actor):
             return None
         if isinstance(message, Gps):
             self._time.fix(self._stamped_ns(message.t_ns), message.t_ns)
-        if isinstance(message, Gps | WifiScan):
+        if isinstance(message, Gps | WifiScan | Camera | Voice | Radar | Altimeter | Inertial | Battery):
             return message._replace(t_ns=self._time.line.swarm_ns(self._stamped_ns(message.t_ns)))
         return message
 

@@ -29,6 +29,12 @@ class Enu(NamedTuple):
         return math.hypot(self.east, self.north, self.up)
 
 
+def direction(*, bearing_rad: float, elevation_rad: float) -> Enu:
+    """The unit vector of a bearing (from north, clockwise) and an elevation above the horizontal."""
+    level = math.cos(elevation_rad)
+    return Enu(level * math.sin(bearing_rad), level * math.cos(bearing_rad), math.sin(elevation_rad))
+
+
 def earliest(*instants_ns: int | None) -> int | None:
     """The first of these instants; None where there is none, and when there is none at all."""
     first_ns = None

@@ -9,12 +9,12 @@ from __future__ import annotations
 from array import array
 from dataclasses import dataclass
 from enum import IntEnum
-from typing import NamedTuple
+from typing import Final, NamedTuple
 
 from fanet_mw.bus.link_stats import LinkStats
 from fanet_mw.bus.radio_control import Cut, Degrade, Jam, Restore
 from fanet_mw.trace import Record
-from fanet_mw.units import Enu, NodeId
+from fanet_mw.units import Enu, NodeId, S
 
 
 class TxRequest(NamedTuple):
@@ -82,12 +82,34 @@ class Obstructions(NamedTuple):
     """`array('H')`, two node ids per pair, the smaller first, ascending."""
 
 
+class SetpointKind(IntEnum):
+    """What a setpoint asks of the flight controller. Values are the codes on the bus."""
+
+    POSITION = 0
+    """Fly to `position` at no more than `speed_m_s` and hold there; a speed of 0 or less ends all setpoints."""
+    VELOCITY = 1
+    """Fly at `velocity`; one that is not renewed within `VELOCITY_LASTS_NS` becomes HOLD."""
+    HOLD = 2
+    """Stop and stay."""
+    TAKEOFF = 3
+    """Climb straight up to the height of `position` at `speed_m_s` and hold there."""
+    LAND = 4
+    """Sink straight down at `speed_m_s`, and stop the motors on the ground."""
+
+
+VELOCITY_LASTS_NS: Final = 1 * S
+"""A UAV whose computer died must not fly on for ever at its last velocity."""
+
+
 class Setpoint(NamedTuple):
-    """UAV -> world: fly to `position` at no more than `speed_m_s`, and hold there."""
+    """UAV -> world: what its flight controller is to do until the next setpoint."""
 
     t_ns: int
     position: Enu
     speed_m_s: float
+    kind: SetpointKind = SetpointKind.POSITION
+    velocity: Enu = Enu(0.0, 0.0, 0.0)
+    """VELOCITY: the velocity to fly, over the ground."""
 
 
 class Gps(NamedTuple):
@@ -104,6 +126,89 @@ class WifiScan(NamedTuple):
     t_ns: int
     heard: tuple[tuple[int, float], ...]
     """(survivor id, RSSI dBm)."""
+
+
+class Person(NamedTuple):
+    """Somebody whom a camera recognized. Angles are those of the sensor after its own error; nobody is named."""
+
+    bearing_rad: float
+    """From north, clockwise."""
+    elevation_rad: float
+    """Above the horizontal; negative below it."""
+    pixels: float
+    """Across the person: the square root of the area in the image."""
+
+
+class Camera(NamedTuple):
+    """World -> one UAV: the people in one image of its downward camera; an image without any is not told."""
+
+    t_ns: int
+    people: tuple[Person, ...]
+
+
+class Call(NamedTuple):
+    """A voice that a microphone array made out."""
+
+    bearing_rad: float
+    """From north, clockwise."""
+    elevation_rad: float
+    level_db: float
+    """Sound pressure level at the array [dB re 20 uPa]."""
+    snr_db: float
+    """Over rotor and wind noise, after the array's processing."""
+
+
+class Voice(NamedTuple):
+    """World -> one UAV: the voices that its microphones made out; silence is not told."""
+
+    t_ns: int
+    calls: tuple[Call, ...]
+
+
+class Echo(NamedTuple):
+    """One return of a radar: a UAV, a wall, a hillside, or clutter; a radar cannot tell which."""
+
+    range_m: float
+    bearing_rad: float
+    """From north, clockwise."""
+    elevation_rad: float
+    closing_m_s: float
+    """How fast the range shrinks."""
+    snr_db: float
+
+
+class Radar(NamedTuple):
+    """World -> one UAV: the returns of one scan, nearest first; a scan without any is not told."""
+
+    t_ns: int
+    echoes: tuple[Echo, ...]
+
+
+class Altimeter(NamedTuple):
+    """World -> one UAV: its height by air pressure, and its height over whatever is below."""
+
+    t_ns: int
+    up_m: float
+    """By the barometer: noisy, with a slow drift."""
+    above_ground_m: float | None
+    """By the rangefinder that looks down; None: nothing is within its range."""
+
+
+class Inertial(NamedTuple):
+    """World -> one UAV: its velocity by inertial sensors and optical flow; needs no GPS, and drifts."""
+
+    t_ns: int
+    velocity: Enu
+
+
+class Battery(NamedTuple):
+    """World -> one UAV: the state of its battery."""
+
+    t_ns: int
+    voltage_v: float
+    current_a: float
+    charge: float
+    """Share of the capacity that is left, 0 to 1."""
 
 
 class MavlinkTap(NamedTuple):
@@ -156,6 +261,12 @@ Message = (
     | Setpoint
     | Gps
     | WifiScan
+    | Camera
+    | Voice
+    | Radar
+    | Altimeter
+    | Inertial
+    | Battery
     | MavlinkTap
     | TraceBatch
     | Clock

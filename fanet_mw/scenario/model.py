@@ -30,6 +30,7 @@ from fanet_mw.scenario.sections import (
     SomeTime,
     Speed,
 )
+from fanet_mw.scenario.sensors import Sensors
 from fanet_mw.units import MAX_NODES, MS, NodeId, seconds_to_ns
 
 _REPAIR_S: Final = 10.0
@@ -61,6 +62,8 @@ class Nodes(Section):
     """Grid columns; by default the widest near-square factorisation in the manner of 9 x 5."""
     altitude_m: Length = 50.0
     """Height at which the nodes start and fly; every layout but `explicit` uses it."""
+    on_ground: bool = False
+    """UAVs stand on the ground at the start and take off when told to; else they start at `altitude_m`."""
     telemetry_hz: Rate = 1.0
     """Native MAVLink telemetry of each node on its tap; 0 sends none."""
     positions_m: tuple[tuple[Coordinate, Coordinate, Coordinate], ...] = ()
@@ -208,9 +211,10 @@ class Clusters(Section):
 class Mobility(Section):
     """What a UAV does when the mission asks nothing of it."""
 
-    model: Literal["static", "formation", "random_waypoint", "crossing"] = "static"
+    model: Literal["static", "formation", "random_waypoint", "crossing", "onboard"] = "static"
     """`formation` sweeps the area keeping the layout; `random_waypoint` is the statistical model, without pause;
-    `crossing` flies everyone through the middle of the area to the point opposite its start, and back."""
+    `crossing` flies everyone through the middle of the area to the point opposite its start, and back.
+    `onboard`: the world decides nothing, keeps nobody clear of others, and flies what each UAV's computer asks for."""
     speed_m_s: Speed = 7.5
     """Cruising speed."""
     see_m: Length = 50.0
@@ -230,6 +234,12 @@ class World(Section):
     """Side of the square area, centred at the origin."""
     tick_ms: Annotated[float, Field(ge=1, le=10_000)] = 100.0
     """Period at which poses are published."""
+    base_m: tuple[Coordinate, Coordinate] = (0.0, 0.0)
+    """East and north of the base: the middle of the layout in which the swarm starts."""
+    crash: Literal["none", "falls"] = "none"
+    """What a contact does to a vehicle: nothing but being counted, or it falls to the ground and stays there."""
+    crash_radio: Literal["survives", "dies"] = "dies"
+    """Whether the radio of a crashed vehicle goes on."""
     physics_hz: Annotated[int, Field(ge=10, le=2000)] = 240
     """`pybullet`: steps of the physics per second."""
     buildings: Annotated[int, Field(ge=0, le=10_000)] | tuple[Building, ...] = 0
@@ -273,6 +283,8 @@ class Mission(Section):
 
     survivors: Annotated[int, Field(ge=0, le=10_000)] = 0
     """Number of survivors, at seeded places of the area."""
+    buried: Annotated[float, Field(ge=0, le=1)] = 0.0
+    """Share of the survivors that lie under rubble (`sensors.burial_phone_db`, `sensors.burial_voice_db`)."""
     reports_to_approach: Count = 3
     """A UAV approaches when this many different nodes have reported the same survivor (paper, 4.1)."""
     report_interval_s: Interval = 5.0
@@ -327,6 +339,7 @@ class Scenario(Section):
     clock: Clock = Clock()
     world: World = World()
     mission: Mission = Mission()
+    sensors: Sensors = Sensors()
     faults: tuple[AnyFault, ...] = ()
     """What happens to the air, and when; by message too (`fanet air`)."""
 
@@ -391,6 +404,6 @@ def grid_columns(count: int) -> int:
 
 
 __all__ = [
-    "Clock", "Clusters", "Mission", "Mobility", "Nodes", "Radio", "Routing", "Scenario", "Section", "Traffic", "World",
-    "grid_columns",
+    "Clock", "Clusters", "Mission", "Mobility", "Nodes", "Radio", "Routing", "Scenario", "Section", "Sensors",
+    "Traffic", "World", "grid_columns",
 ]  # fmt: skip

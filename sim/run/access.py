@@ -2,7 +2,7 @@
 
     agent-N    says its own requests, setpoint, telemetry, trace and report; hears its own receptions and sensors
     emulator   says receptions, links, its trace and report; hears requests, poses, obstructions, changes of the air
-    world      says poses, obstructions, sensors, its trace and report; hears setpoints
+    world      says poses, obstructions, sensors, radios of crashed UAVs, its trace and report; hears setpoints
     operator   says changes of the air; hears links, traces, reports and telemetry
 
 All but the operator hear the clock, ask for it, and say that they are alive. The router itself is the launcher: its own
@@ -56,7 +56,9 @@ def rights(scenario: Scenario, names: Topics) -> dict[str, Rights]:
             (names.radio_rx("*"), names.radio_links),
             (names.all_tx, names.pose, names.obstruction, names.radio_control),
         ),
-        "world": actor("world", (names.pose, names.obstruction, names.all_sensors), (names.all_setpoints,)),
+        "world": actor(
+            "world", (names.pose, names.obstruction, names.all_sensors, names.radio_control), (names.all_setpoints,)
+        ),
         **{f"agent-{node}": agent(node) for node in scenario.node_ids},
         OPERATOR: Rights(
             says=(names.radio_control,),

@@ -10,6 +10,8 @@ import numpy.typing as npt
 
 Rows = npt.NDArray[np.float64]
 """float64 [nodes, 3]."""
+Values = npt.NDArray[np.float64]
+"""float64 of any shape."""
 Flags = npt.NDArray[np.bool_]
 
 
@@ -31,6 +33,10 @@ class Engine(ABC):
 
     @abstractmethod
     def velocities(self) -> Rows: ...
+
+    @abstractmethod
+    def fall(self, row: int) -> None:
+        """The motors of a body are off for good: it falls, whatever velocity is wanted of it."""
 
     @abstractmethod
     def contacts(self) -> list[tuple[int, int]]:

@@ -65,7 +65,10 @@ class FlightRecorder:
         sent: dict[int, Setpoint] = {}
         for node in sorted(setpoints):
             for message in _decoded(setpoints[node]):
-                if isinstance(message, Setpoint) and np.isfinite([*message.position, message.speed_m_s]).all():
+                if (
+                    isinstance(message, Setpoint)
+                    and np.isfinite([*message.position, message.speed_m_s, *message.velocity]).all()
+                ):
                     sent[node] = message
         return Flight(states[:, :3].copy(), states[:, 3:].copy(), sent)
 

@@ -5,15 +5,17 @@ so that UAVs sent to one point settle around it.
 """
 
 import math
-from typing import Final, NamedTuple
+from collections.abc import Callable
+from typing import Final, NamedTuple, assert_never
 
 import numpy as np
 import numpy.typing as npt
 
+from fanet_mw.bus.messages import VELOCITY_LASTS_NS, Setpoint, SetpointKind
 from fanet_mw.rng import stream
 from fanet_mw.scenario import Scenario
-from fanet_mw.units import Enu
-from sim.world.engine import Rows
+from fanet_mw.units import Enu, S
+from sim.world.engine import Rows, Values
 
 _GAIN: Final = 0.8
 """Position loop [1/s]."""
@@ -24,7 +26,15 @@ _BRAKE_M_S2: Final = 2.5
 _PUSH_M_S: Final = 4.0
 _ROUNDS: Final = 4
 FLOOR_M: Final = 5.0
-"""No setpoint is flown below this height."""
+"""No position is flown to below this height."""
+_HOLD_M_S: Final = 5.0
+"""Who holds comes back to its place at this speed at most."""
+_LEAST_CLIMB_M_S: Final = 0.5
+_TOUCHDOWN_M_S: Final = 0.5
+"""Speed at which a landing meets the ground; ArduPilot's LAND_SPEED, too."""
+_FLARE_PER_S: Final = 0.5
+"""Sinking speed for each metre of height."""
+_ON_GROUND_M: Final = 0.3
 
 
 class Track(NamedTuple):
@@ -129,11 +139,18 @@ class Crossing:
 class Guidance:
     """The track of the mobility model, overridden per node by setpoints."""
 
-    def __init__(self, starts: Rows, scenario: Scenario) -> None:
-        self._starts = starts
-        self._half = scenario.world.area_m / 2
-        self._see_m = scenario.mobility.see_m
+    def __init__(self, starts: Rows, scenario: Scenario, *, ground_m: Callable[[Rows], Values] | None = None) -> None:
+        """`ground_m`: heights of the ground at places [n, 3]; None: a plain at 0."""
+        self._ground_m = ground_m or (lambda places: np.zeros(len(places)))
         model = scenario.mobility.model
+        self._onboard = model == "onboard"
+        """Whether UAVs are flown by their own computers: the world then keeps nobody clear of others."""
+        self._see_m = 0.0 if self._onboard else scenario.mobility.see_m
+        half = scenario.world.area_m / 2
+        reach = np.maximum(half, np.abs(starts[:, :2]).max(axis=0)) if self._onboard else (half, half)
+        self._half_east, self._half_north = float(reach[0]), float(reach[1])
+        self._starts = starts.copy()
+        """Where each UAV holds while neither a mobility model nor a setpoint moves it."""
         self._model = (
             Formation(starts, scenario) if model == "formation"
             else RandomWaypoint(starts, scenario) if model == "random_waypoint"
@@ -141,11 +158,51 @@ class Guidance:
             else None
         )  # fmt: skip
         self._setpoints: dict[int, tuple[Enu, float]] = {}
+        self._velocities: dict[int, tuple[Enu, float]] = {}
+        """Velocity setpoints by row, each with the instant [s] at which it ends."""
+        self._landings: dict[int, float] = {}
+        """Speeds of those rows that land, or have landed."""
+        self._grounded = set(range(len(starts))) if scenario.nodes.on_ground else set[int]()
+        """Rows that have not taken off yet, or that are taking off."""
 
     @property
     def still(self) -> bool:
         """Nothing moves and nothing was asked to."""
-        return self._model is None and not self._setpoints
+        asked = self._setpoints or self._velocities or self._landings
+        return self._model is None and not self._onboard and not asked
+
+    def obey(self, node: int, setpoint: Setpoint, *, at: Values, t_s: float) -> None:
+        """Take a setpoint of a UAV that is `at` [3] at an instant."""
+        here = Enu(*at.tolist())
+        row = node - 1
+        kind, place, speed_m_s = setpoint.kind, setpoint.position, setpoint.speed_m_s
+        if kind is not SetpointKind.LAND:
+            self._landings.pop(row, None)
+        self._velocities.pop(row, None)
+        if kind is SetpointKind.POSITION:
+            self.steer(node, place, speed_m_s=speed_m_s)
+            if speed_m_s <= 0 and self._onboard:
+                self._hold(row, here)
+        elif kind is SetpointKind.VELOCITY:
+            self._setpoints.pop(row, None)
+            self._velocities[row] = setpoint.velocity, t_s + VELOCITY_LASTS_NS / S
+        elif kind is SetpointKind.HOLD:
+            self._hold(row, here)
+        elif kind is SetpointKind.TAKEOFF:
+            self._grounded.add(row)  # until it is clear of the ground
+            self.steer(node, Enu(here.east, here.north, place.up), speed_m_s=max(_LEAST_CLIMB_M_S, speed_m_s))
+        elif kind is SetpointKind.LAND:
+            self._setpoints.pop(row, None)
+            self._landings[row] = max(_TOUCHDOWN_M_S, speed_m_s)
+        else:
+            assert_never(kind)
+
+    def may_touch_down(self, node: int) -> bool:
+        """Whether this UAV touches the ground on purpose."""
+        return node - 1 in self._landings or node - 1 in self._grounded
+
+    def _hold(self, row: int, here: Enu) -> None:
+        self._setpoints[row] = here, _HOLD_M_S
 
     def steer(self, node: int, place: Enu, *, speed_m_s: float) -> None:
         """Send a UAV somewhere, within the area; a speed of 0 or less sends it back to its track."""
@@ -153,8 +210,8 @@ class Guidance:
             self._setpoints.pop(node - 1, None)
             return
         inside = Enu(
-            max(-self._half, min(self._half, place.east)),
-            max(-self._half, min(self._half, place.north)),
+            max(-self._half_east, min(self._half_east, place.east)),
+            max(-self._half_north, min(self._half_north, place.north)),
             max(FLOOR_M, min(1000.0, place.up)),
         )
         self._setpoints[node - 1] = inside, speed_m_s
@@ -168,13 +225,36 @@ class Guidance:
         places, feed = self.track(t_s)
         places, feed = places.copy(), feed.copy()
         limit = np.linalg.norm(feed, axis=1) + 5.0
+        self._expire(t_s, at)
         for row in sorted(self._setpoints):
             places[row], limit[row] = self._setpoints[row][0], self._setpoints[row][1]
             feed[row] = 0.0
         wish = feed + _GAIN * (places - at)
         speed = np.linalg.norm(wish, axis=1)
         wish *= np.minimum(1.0, limit / np.maximum(speed, 1e-9))[:, None]
+        for row, (velocity_m_s, _) in self._velocities.items():
+            wish[row] = velocity_m_s
+        if self._landings or self._grounded:
+            self._near_the_ground(wish, at)
         return _keep_clear(wish, at, self._see_m) if len(at) > 1 and self._see_m else wish
+
+    def _expire(self, t_s: float, at: Rows) -> None:
+        """Who flies at a velocity that was not renewed in time stops."""
+        for row in [row for row, (_, until_s) in self._velocities.items() if t_s >= until_s]:
+            del self._velocities[row]
+            self._hold(row, Enu(*at[row].tolist()))
+
+    def _near_the_ground(self, wish: Rows, at: Rows) -> None:
+        """Sink straight down, the slower the nearer the ground; forget who has taken off."""
+        height = at[:, 2] - self._ground_m(at)
+        for row, speed_m_s in self._landings.items():
+            sink = min(speed_m_s, max(_TOUCHDOWN_M_S, _FLARE_PER_S * float(height[row])))
+            wish[row] = [0.0, 0.0, -sink if height[row] > _ON_GROUND_M else 0.0]
+        for row in [row for row in self._grounded if height[row] > _CLEAR_M]:
+            self._grounded.discard(row)
+        for row in self._grounded:
+            if row not in self._setpoints and row not in self._velocities:
+                wish[row] = 0.0
 
 
 def _keep_clear(wish: Rows, at: Rows, see_m: float) -> Rows:

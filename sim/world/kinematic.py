@@ -1,6 +1,7 @@
 """A cheap engine: point masses with limited acceleration. For protocol work, where only distances matter.
 
-Does not model: attitude, drag, gravity. Bodies are spheres of `RADIUS_M` that notice contact but do not bounce.
+Does not model: attitude, drag, and gravity but for wrecks. Bodies are spheres of `RADIUS_M` that notice contact but
+do not bounce.
 """
 
 from typing import Final
@@ -10,6 +11,7 @@ import numpy as np
 from sim.world.engine import Engine, Rows
 
 ACCELERATION_M_S2: Final = 5.0
+GRAVITY_M_S2: Final = 9.81
 RADIUS_M: Final = 0.25
 _CROWD: Final = 400
 """Above this many nodes contacts between bodies are not looked for: it is quadratic, and such swarms are for radio."""
@@ -25,11 +27,12 @@ class Kinematic(Engine):
         self._velocity = np.zeros((0, 3))
         self._touching: frozenset[tuple[int, int]] = frozenset()
         self._new: list[tuple[int, int]] = []
+        self._wrecks: list[int] = []
 
     def reset(self, positions: Rows, velocities: Rows | None = None) -> None:
         self._at = positions.copy()
         self._velocity = np.zeros_like(positions) if velocities is None else velocities.copy()
-        self._touching, self._new = frozenset(), []
+        self._touching, self._new, self._wrecks = frozenset(), [], []
 
     def advance(self, dt_s: float, wanted_m_s: Rows) -> None:
         change = wanted_m_s - self._velocity
@@ -37,6 +40,8 @@ class Kinematic(Engine):
         limit = ACCELERATION_M_S2 * dt_s
         change *= np.minimum(1.0, limit / np.maximum(size, 1e-12))
         before = self._velocity
+        if self._wrecks:
+            change[self._wrecks] = [0.0, 0.0, -GRAVITY_M_S2 * dt_s]
         self._velocity = before + change
         self._at = self._at + (before + self._velocity) * (dt_s / 2)
         below = self._at[:, 2] < 0
@@ -49,6 +54,9 @@ class Kinematic(Engine):
 
     def velocities(self) -> Rows:
         return self._velocity
+
+    def fall(self, row: int) -> None:
+        self._wrecks.append(row)
 
     def contacts(self) -> list[tuple[int, int]]:
         new, self._new = self._new, []

@@ -1,14 +1,33 @@
 """Where the nodes stand at the beginning. Node 1, the leader, is the first of each layout."""
 
 import math
+from typing import Final
 
 from fanet_mw.rng import stream
 from fanet_mw.scenario import Scenario, grid_columns
 from fanet_mw.units import Enu
+from sim.world.obstacles import terrain
+
+ON_GROUND_M: Final = 0.1
+"""Height of a UAV's middle that stands on the ground."""
 
 
 def positions(scenario: Scenario) -> list[Enu]:
-    """The start of every node, in order of id."""
+    """The start of every node, in order of id: the layout about the base, in the air or on the ground."""
+    places = _layout(scenario)
+    east, north = scenario.world.base_m
+    if east or north:
+        places = [Enu(at.east + east, at.north + north, at.up) for at in places]
+    if not scenario.nodes.on_ground:
+        return places
+    ground = terrain(scenario)
+    return [
+        Enu(at.east, at.north, ground.at(at.east, at.north) + ON_GROUND_M if ground else ON_GROUND_M) for at in places
+    ]
+
+
+def _layout(scenario: Scenario) -> list[Enu]:
+    """Every node's place about the origin."""
     nodes = scenario.nodes
     if nodes.layout == "grid":
         columns = nodes.columns or grid_columns(nodes.count)

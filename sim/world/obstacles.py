@@ -32,13 +32,18 @@ class Box(NamedTuple):
     width: float
     depth: float
     roof: float
+    yaw: float = 0.0
+    """Angle by which it is turned, from east to north [rad]."""
 
     def near(self, places: Rows, *, margin_m: float) -> bool:
         """Whether any place is within the box, or closer to it than the margin."""
+        east, north = places[:, 0] - self.east, places[:, 1] - self.north
+        along = math.cos(self.yaw) * east + math.sin(self.yaw) * north
+        across = math.cos(self.yaw) * north - math.sin(self.yaw) * east
         return bool(
             (
-                (np.abs(places[:, 0] - self.east) < self.width / 2 + margin_m)
-                & (np.abs(places[:, 1] - self.north) < self.depth / 2 + margin_m)
+                (np.abs(along) < self.width / 2 + margin_m)
+                & (np.abs(across) < self.depth / 2 + margin_m)
                 & (places[:, 2] < self.roof + margin_m)
             ).any()
         )
@@ -70,10 +75,15 @@ class Obstacles(NamedTuple):
         return max([hill, *(box.roof for box in self.boxes)])
 
 
+def terrain(scenario: Scenario) -> Hills | None:
+    """The hills of a scenario; None for a plain."""
+    return _hills(scenario.world, stream(scenario.seed, "terrain")) if scenario.world.terrain_m else None
+
+
 def obstacles(scenario: Scenario, starts: Rows) -> Obstacles:
     """The obstacles of a scenario whose UAVs start at `starts` [nodes, 3]; ConfigError when one is in the way."""
     world = scenario.world
-    hills = _hills(world, stream(scenario.seed, "terrain")) if world.terrain_m else None
+    hills = terrain(scenario)
     if hills is not None:
         for node, (east, north, up) in enumerate(starts.tolist(), 1):
             if up < hills.at(east, north):

@@ -48,6 +48,7 @@ class Physics(Engine):
         self._velocity = np.zeros((0, 3))
         self._touching: frozenset[tuple[int, int]] = frozenset()
         self._new: list[tuple[int, int]] = []
+        self._wrecks: list[int] = []
 
     def reset(self, positions: Rows, velocities: Rows | None = None) -> None:
         client = self._client
@@ -77,7 +78,7 @@ class Physics(Engine):
         self._velocity = np.zeros_like(positions) if velocities is None else velocities.copy()
         for body, velocity in zip(self._bodies, self._velocity.tolist(), strict=True):
             pybullet.resetBaseVelocity(body, linearVelocity=velocity, physicsClientId=client)
-        self._touching, self._new, self._left_s = frozenset(), [], 0.0
+        self._touching, self._new, self._wrecks, self._left_s = frozenset(), [], [], 0.0
 
     def _build(self) -> list[int]:
         """Put hills and buildings where they belong; returns their bodies."""
@@ -88,7 +89,11 @@ class Physics(Engine):
             half = [box.width / 2, box.depth / 2, box.roof / 2]
             shape = pybullet.createCollisionShape(pybullet.GEOM_BOX, halfExtents=half, physicsClientId=client)
             middle = [box.east, box.north, box.roof / 2]
-            bodies.append(pybullet.createMultiBody(0, shape, basePosition=middle, physicsClientId=client))
+            turned = [0.0, 0.0, math.sin(box.yaw / 2), math.cos(box.yaw / 2)]
+            body = pybullet.createMultiBody(
+                0, shape, basePosition=middle, baseOrientation=turned, physicsClientId=client
+            )
+            bodies.append(body)
         if self._obstacles.hills:
             bodies.append(self._raise_hills(self._obstacles.hills))
         for body in bodies:
@@ -144,6 +149,7 @@ class Physics(Engine):
         by_thrust = np.sqrt(np.maximum(0.0, _MAX_THRUST_N**2 - thrust[:, 2] ** 2))
         limit = np.minimum(by_tilt, by_thrust)
         thrust[:, :2] *= np.minimum(1.0, limit / np.maximum(sideways, 1e-9))[:, None]
+        thrust[self._wrecks] = 0.0
         return np.asarray(thrust - _DRAG_N_S_M * self._velocity, dtype=np.float64)
 
     def _notice_contacts(self) -> None:
@@ -161,6 +167,9 @@ class Physics(Engine):
 
     def velocities(self) -> Rows:
         return self._velocity
+
+    def fall(self, row: int) -> None:
+        self._wrecks.append(row)
 
     def contacts(self) -> list[tuple[int, int]]:
         new, self._new = self._new, []

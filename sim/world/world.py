@@ -11,20 +11,23 @@ from typing import TYPE_CHECKING, Any, Final
 import numpy as np
 
 from fanet_mw.actor import Actor
-from fanet_mw.bus.messages import Gps, Message, Poses, Setpoint, WifiScan
+from fanet_mw.bus.messages import Message, Poses, Setpoint
+from fanet_mw.bus.radio_control import Cut
 from fanet_mw.bus.topics import Topics, node_of
-from fanet_mw.rng import stream_seed
 from fanet_mw.scenario import Scenario
 from fanet_mw.trace import Collided
-from fanet_mw.units import Enu, S, seconds_to_ns
+from fanet_mw.units import NodeId, S
 from sim.world.engine import Engine
 from sim.world.flight import Flight
 from sim.world.guidance import Guidance
 from sim.world.kinematic import Kinematic
 from sim.world.layout import positions
 from sim.world.obstacles import Obstacles, obstacles
+from sim.world.sensors.contract import Truth
+from sim.world.sensors.suite import Suite, sensors_of
 from sim.world.separation import Separation
-from sim.world.survivors import PhoneSensor
+from sim.world.solids import Solids
+from sim.world.survivors import Survivors
 
 if TYPE_CHECKING:
     from sim.world.sight import Sight
@@ -62,31 +65,23 @@ class World(Actor):
         self._count = scenario.nodes.count
         self._pose_topic = topics.pose
         self._obstruction_topic = topics.obstruction
-        self._gps_topics = [topics.sensor(node, "gps") for node in scenario.node_ids]
-        self._wifi_topics = [topics.sensor(node, "wifi") for node in scenario.node_ids]
+        self._fault_topic = topics.radio_control
         self._ids = array("H", scenario.node_ids)
         starts = np.array(positions(scenario), dtype=np.float64)
         solid = obstacles(scenario, starts) if scenario.world.has_obstacles else None
+        solids = Solids(solid)
         self._engine = make_engine(scenario, solid)
         if flight is None:
             self._engine.reset(starts)
         else:
             self._engine.reset(flight.positions, flight.velocities)
         self._sight = _sight(scenario, self._engine, solid) if solid else None
-        self._guidance = Guidance(starts, scenario)
+        self._guidance = Guidance(starts, scenario, ground_m=solids.ground_m)
         for node, sent in sorted(flight.setpoints.items()) if flight else ():
-            self._guidance.steer(node, sent.position, speed_m_s=sent.speed_m_s)
-        self._phones = PhoneSensor(scenario)
-        self._noise = np.random.Generator(np.random.PCG64(stream_seed(scenario.seed, "gps")))
-        self._fixes = (
-            scenario.nodes.telemetry_hz > 0
-            or scenario.clock.sync == "gps"
-            or scenario.mission.collision_horizon_s > 0
-            or _routed_by_places(scenario)
-        )
-        """Whether anybody uses position fixes."""
-        self._gps_ns = round(S / scenario.world.gps_hz)
-        self._scan_ns = seconds_to_ns(scenario.mission.scan_interval_s)
+            self._guidance.obey(node, sent, at=self._engine.positions()[node - 1], t_s=sent.t_ns / S)
+        self._suite = Suite(scenario, sensors_of(scenario, Survivors(scenario, solids.ground_m), solids), topics)
+        self._flies = np.ones(self._count, bool)
+        """Which UAVs have not crashed."""
         self._tick_ns: int | None = None
         self._last_ns = 0
         self._ticks = 0
@@ -110,14 +105,14 @@ class World(Actor):
         if (
             not isinstance(message, Setpoint)
             or not 1 <= node <= self._count
-            or not np.isfinite([*message.position, message.speed_m_s]).all()
+            or not np.isfinite([*message.position, message.speed_m_s, *message.velocity]).all()
         ):
             self._malformed += 1
         else:
             if self._guidance.still:  # time stood still until now
                 self._last_ns = max(self._last_ns, now_ns - self._scenario.world.tick_ns)
                 self._tick_ns = now_ns + self._scenario.world.tick_ns
-            self._guidance.steer(node, message.position, speed_m_s=message.speed_m_s)
+            self._guidance.obey(node, message, at=self._engine.positions()[node - 1], t_s=now_ns / S)
 
     def wake(self, now_ns: int) -> None:
         if self._tick_ns is None or now_ns < self._tick_ns:
@@ -147,6 +142,7 @@ class World(Actor):
             "ticks": self._ticks,
             "skipped_ticks": self._skipped,
             "collisions": self._collisions,
+            "crashed": int((~self._flies).sum()),
             "separation": {} if self._separation is None else self._separation.report(),
             "malformed": self._malformed,
         }
@@ -169,8 +165,24 @@ class World(Actor):
             if self._separation is not None:
                 self._separation.watch(before, engine.positions())
         for first, second in engine.contacts():
-            self._collisions += 1
-            self.records.append(Collided(now_ns, second, first))
+            self._contact(first, second, now_ns)
+
+    def _contact(self, first: int, second: int, now_ns: int) -> None:
+        """Two bodies touch, of which the ground and obstacles are 0: a landing, a wreck, or a collision."""
+        touching = [node for node in (first, second) if node and self._flies[node - 1]]
+        if not touching or (first == 0 and self._guidance.may_touch_down(second)):
+            return
+        self._collisions += 1
+        self.records.append(Collided(now_ns, second, first))
+        if self._scenario.world.crash == "falls":
+            for node in touching:
+                self._crash(node)
+
+    def _crash(self, node: int) -> None:
+        self._flies[node - 1] = False
+        self._engine.fall(node - 1)
+        if self._scenario.world.crash_radio == "dies":
+            self.outbox.append((self._fault_topic, Cut(f"crash-{node}", NodeId(node))))
 
     def _publish(self, now_ns: int, before_ns: int) -> None:
         """Poses, and the sensors whose instant lies in (before, now]."""
@@ -179,25 +191,4 @@ class World(Actor):
             self.outbox.append((self._obstruction_topic, self._sight.obstructions(at, now_ns)))
         states = array("d", np.hstack([at, velocity]).astype(np.float64).tobytes())
         self.outbox.append((self._pose_topic, Poses(now_ns, self._ids, states)))
-        if self._fixes and _due(now_ns, before_ns, self._gps_ns, 0):
-            noisy = at + self._noise.normal(0.0, self._scenario.world.gps_sigma_m, at.shape)
-            for row in range(self._count):
-                fix = Gps(now_ns, Enu(*noisy[row].tolist()), Enu(*velocity[row].tolist()))
-                self.outbox.append((self._gps_topics[row], fix))
-        if self._scenario.mission.survivors:
-            for row in range(self._count):
-                if _due(now_ns, before_ns, self._scan_ns, row * self._scan_ns // self._count):
-                    heard = self._phones.scan(at[row])
-                    if heard:
-                        self.outbox.append((self._wifi_topics[row], WifiScan(now_ns, heard)))
-
-
-def _due(now_ns: int, before_ns: int, period_ns: int, phase_ns: int) -> bool:
-    """Whether an instant of a period (shifted by a phase) lies in (before, now]."""
-    return (now_ns - phase_ns) // period_ns > (before_ns - phase_ns) // period_ns
-
-
-def _routed_by_places(scenario: Scenario) -> bool:
-    """Whether the protocol needs to know where its node has gone."""
-    moves = scenario.mobility.model != "static" or scenario.mission.survivors > 0
-    return scenario.routing.protocol == "geographic" or (scenario.routing.protocol == "clustered" and moves)
+        self.outbox.extend(self._suite.readings(Truth(now_ns, at, velocity), self._flies, before_ns=before_ns))

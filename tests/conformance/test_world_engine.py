@@ -12,7 +12,8 @@ from sim.world.guidance import Guidance
 from sim.world.kinematic import Kinematic
 from sim.world.obstacles import Box, Obstacles
 from sim.world.physics import Physics
-from sim.world.survivors import PhoneSensor, place
+from sim.world.sensors.phone import PhoneSensor
+from sim.world.survivors import place
 
 FAR_AWAY = Obstacles(hills=None, boxes=(Box(400, 400, 30, 30, 60),))
 

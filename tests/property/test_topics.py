@@ -10,20 +10,30 @@ from hypothesis import strategies as st
 from fanet_mw.bus import topics
 from fanet_mw.bus.link_stats import COUNTS, LinkStats
 from fanet_mw.bus.messages import (
+    Altimeter,
+    Battery,
+    Call,
+    Camera,
     Clock,
     ClockState,
+    Echo,
     Gps,
+    Inertial,
     MavlinkTap,
     Message,
     Obstructions,
+    Person,
     Poses,
+    Radar,
     Reception,
     Report,
     Setpoint,
+    SetpointKind,
     TraceBatch,
     TxOutcome,
     TxRequest,
     TxStatus,
+    Voice,
     WifiScan,
 )
 from fanet_mw.bus.radio_control import Cut, Degrade, Jam, Restore
@@ -68,6 +78,13 @@ messages: st.SearchStrategy[Message] = st.one_of(
         st.lists(st.tuples(nodes, nodes), max_size=5),
     ),
     st.builds(Setpoint, instants, vectors, doubles),
+    st.builds(Setpoint, instants, vectors, doubles, st.sampled_from(SetpointKind), vectors),
+    st.builds(Camera, instants, st.lists(st.builds(Person, *[finite] * 3), max_size=4).map(tuple)),
+    st.builds(Voice, instants, st.lists(st.builds(Call, *[finite] * 4), max_size=4).map(tuple)),
+    st.builds(Radar, instants, st.lists(st.builds(Echo, *[finite] * 5), max_size=4).map(tuple)),
+    st.builds(Altimeter, instants, finite, st.none() | finite),
+    st.builds(Inertial, instants, st.builds(Enu, finite, finite, finite)),
+    st.builds(Battery, instants, finite, finite, finite),
     st.builds(Gps, instants, vectors, vectors),
     st.builds(WifiScan, instants, st.lists(st.tuples(u32, singles), max_size=5).map(tuple)),
     st.builds(MavlinkTap, instants, st.binary(max_size=50)),
@@ -109,6 +126,23 @@ def test_a_changed_byte_is_one_error_or_other_messages(batch: list[Message], dat
     mutated[at] ^= data.draw(st.integers(1, 255))
     with suppress(MalformedFrameError):
         topics.decode(bytes(mutated))
+
+
+@pytest.mark.parametrize(
+    "reading",
+    [
+        Camera(0, (Person(0.0, float("nan"), 1.0),)),
+        Voice(0, (Call(0.0, 0.0, float("inf"), 1.0),)),
+        Radar(0, (Echo(float("nan"), 0.0, 0.0, 0.0, 0.0),)),
+        Altimeter(0, float("nan"), None),
+        Altimeter(0, 0.0, float("inf")),
+        Inertial(0, Enu(0.0, float("nan"), 0.0)),
+        Battery(0, 11.1, 5.0, float("nan")),
+    ],
+)
+def test_a_reading_that_is_no_number_is_malformed(reading: Message) -> None:
+    with pytest.raises(MalformedFrameError):
+        topics.decode(topics.encode([reading]))
 
 
 def test_the_node_of_a_topic_is_its_fourth_part() -> None:

@@ -1,4 +1,4 @@
-"""The measured tables of the emulator."""
+"""The measured tables of docs/emulator.md."""
 
 import math
 import statistics

@@ -1,7 +1,6 @@
 """The mission of one UAV, as timelines."""
 
-from agents.mission import Mission
-from fanet_mw.application import HOME
+from agents.mission import HOME, Mission
 from fanet_mw.scenario import Mission as Config
 from fanet_mw.trace import Approaching, Arrived, Detected
 from fanet_mw.units import Enu, NodeId, S

@@ -6,7 +6,8 @@ import numpy as np
 import pytest
 
 from fanet_mw.scenario import Scenario
-from sim.world.survivors import PhoneSensor, place
+from sim.world.sensors.phone import PhoneSensor
+from sim.world.survivors import place
 
 MakeScenario = Callable[..., Scenario]
 
@@ -57,7 +58,7 @@ def test_what_is_kept_of_shadowing_is_bounded_and_changes_nothing(
     make_scenario: MakeScenario, monkeypatch: pytest.MonkeyPatch
 ) -> None:
     scenario, phones = sensor(make_scenario, shadowing_db=8.0, detection_dbm=-200.0)
-    monkeypatch.setattr("sim.world.survivors.KEPT_VALUES", 20)
+    monkeypatch.setattr("sim.world.sensors.phone.KEPT_VALUES", 20)
     tour = [np.array([30.0 * i, 5.0, 50.0]) for i in range(-20, 21)]
     there, back = [phones.scan(at) for at in tour], [phones.scan(at) for at in reversed(tour)]
     assert there == back[::-1] == [PhoneSensor(scenario).scan(at) for at in tour]

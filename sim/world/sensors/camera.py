@@ -1,0 +1,100 @@
+"""A camera that looks straight down, and what finds people in its images.
+
+    across a person     sqrt(1.7 m x 0.5 m) = 0.92 m, who lies on the ground
+    ground per pixel    2 depth tan(fov / 2) / width
+    pixels              0.92 m / ground per pixel;   line pairs N = pixels / 2
+    P(recognized)       x^E / (1 + x^E),  x = N / N50,  E = 2.7 + 0.7 x
+
+Johnson, "Analysis of image forming systems", 1958, for the line pairs N50 at which half of the observers tell what
+they see; the curve around it is the target transfer probability function of the Night Vision Laboratory's static
+performance model (Ratches et al., ECOM-7043, 1975). Each image is a new trial. A person who is buried, or with
+anything solid on the line to the camera, is not seen. A gimbal keeps the image's width along east; angular errors
+are Gaussian. False alarms are a Poisson process, anywhere in the image. Not modeled: light, motion blur, that
+successive images are alike.
+"""
+
+import math
+from collections.abc import Iterator, Sequence
+from typing import Final
+
+import numpy as np
+import numpy.typing as npt
+
+from fanet_mw.bus.messages import Camera, Message, Person
+from fanet_mw.scenario.model import Scenario
+from fanet_mw.units import S
+from sim.world.engine import Rows, Values
+from sim.world.sensors.contract import Sensor, Truth, angles, generator, shaken
+from sim.world.solids import Solids
+from sim.world.survivors import Survivors
+
+PERSON_M: Final = math.sqrt(1.7 * 0.5)
+_EYE_M: Final = 0.3
+"""Height over the ground of the part of a person that a ray must reach."""
+
+
+def recognized_share(pixels: Values, *, cycles_for_half: float) -> Values:
+    """Probability that a person of so many pixels is recognized, by the target transfer probability function."""
+    x = np.maximum(pixels, 1e-9) / 2 / cycles_for_half
+    odds = np.exp(np.minimum((2.7 + 0.7 * x) * np.log(x), 700.0))
+    return np.asarray(odds / (1 + odds))
+
+
+class CameraSensor(Sensor):
+    """One camera per UAV."""
+
+    kind = "camera"
+
+    def __init__(self, scenario: Scenario, survivors: Survivors, solids: Solids) -> None:
+        config = scenario.sensors
+        width, height = config.camera_pixels
+        self.period_ns = round(S / config.camera_hz)
+        self._half_width = math.tan(math.radians(config.camera_fov_deg) / 2)
+        self._half_height = self._half_width * height / width
+        self._width = width
+        self._cycles = config.camera_cycles
+        self._sigma_rad = math.radians(config.camera_sigma_deg)
+        self._false_per_image = config.camera_false_per_hour / config.camera_hz / 3600
+        self._survivors, self._solids = survivors, solids
+        self._random = generator(scenario.seed, "camera")
+
+    def read(self, truth: Truth, rows: Sequence[int]) -> Iterator[tuple[int, Message]]:
+        for row in rows:
+            people = [*self._true_people(truth.at[row]), *self._false_people(truth.at[row])]
+            if people:
+                yield row, Camera(truth.now_ns, tuple(people))
+
+    def pixels(self, depth_m: Values) -> Values:
+        """Across a person at a depth below the camera."""
+        return np.asarray(PERSON_M * self._width / (2 * np.maximum(depth_m, 0.1) * self._half_width))
+
+    def _in_view(self, offset: Rows) -> npt.NDArray[np.intp]:
+        """The indices of the survivors, at `offset` [n, 3] from the camera, that the image covers."""
+        depth = -offset[:, 2]
+        inside = (np.abs(offset[:, 0]) <= depth * self._half_width) & (
+            np.abs(offset[:, 1]) <= depth * self._half_height
+        )
+        return np.flatnonzero(inside & (depth > 0) & ~self._survivors.buried)
+
+    def _true_people(self, at: Values) -> Iterator[Person]:
+        offset = self._survivors.places - at
+        found = self._in_view(offset)
+        if not len(found):
+            return
+        target = self._survivors.places[found] + [0.0, 0.0, _EYE_M]
+        found = found[~self._solids.blocked(np.broadcast_to(at, target.shape), target)]
+        pixels = self.pixels(-offset[found, 2])
+        seen = self._random.random(len(found)) < recognized_share(pixels, cycles_for_half=self._cycles)
+        for index, across in zip(found[seen].tolist(), pixels[seen].tolist(), strict=True):
+            direction = offset[index] / np.linalg.norm(offset[index])
+            yield Person(*angles(shaken(self._random, direction, self._sigma_rad)), across)
+
+    def _false_people(self, at: Values) -> Iterator[Person]:
+        if not self._false_per_image:
+            return
+        for _ in range(int(self._random.poisson(self._false_per_image))):
+            x, y = self._random.uniform(-1.0, 1.0, 2).tolist()
+            depth_m = np.array([max(0.1, float(at[2]))])
+            yield Person(
+                *angles(np.array([x * self._half_width, y * self._half_height, -1.0])), float(self.pixels(depth_m)[0])
+            )

@@ -1,0 +1,88 @@
+"""The contract of a sensor: the truth of one instant goes in, the readings of those UAVs that are due come out.
+
+A sensor adds its own error to the truth, from random streams of its own, so that a sensor more or less on board
+changes no other one's readings. Whoever hears a reading learns nothing else of the truth.
+"""
+
+import math
+from abc import ABC, abstractmethod
+from collections.abc import Iterator, Sequence
+from typing import NamedTuple
+
+import numpy as np
+
+from fanet_mw.bus.messages import Message
+from fanet_mw.rng import stream_seed
+from fanet_mw.units import S
+from sim.world.engine import Rows, Values
+
+
+class Truth(NamedTuple):
+    """The state of all bodies at one instant; row i is node i + 1."""
+
+    now_ns: int
+    at: Rows
+    velocity: Rows
+
+
+class Sensor(ABC):
+    """One kind of sensor, on every UAV."""
+
+    kind: str
+    """The last part of its topics."""
+    period_ns: int
+    spread = True
+    """Whether the UAVs' instants are spread over the period, so that readings do not all come at once."""
+
+    @abstractmethod
+    def read(self, truth: Truth, rows: Sequence[int]) -> Iterator[tuple[int, Message]]:
+        """The readings of the UAVs `rows`, each with its row; a UAV whose sensor has nothing to tell gives none."""
+
+    def due(self, count: int, *, now_ns: int, before_ns: int) -> list[int]:
+        """The rows of which an instant lies in (before, now]."""
+        period_ns = self.period_ns
+        if not self.spread:
+            return list(range(count)) if _due(now_ns, before_ns, period_ns, 0) else []
+        return [row for row in range(count) if _due(now_ns, before_ns, period_ns, row * period_ns // count)]
+
+
+def _due(now_ns: int, before_ns: int, period_ns: int, phase_ns: int) -> bool:
+    """Whether an instant of a period (shifted by a phase) lies in (before, now]."""
+    return (now_ns - phase_ns) // period_ns > (before_ns - phase_ns) // period_ns
+
+
+def generator(seed: int, *names: str) -> np.random.Generator:
+    """The random numbers of one named use."""
+    return np.random.Generator(np.random.PCG64(stream_seed(seed, *names)))
+
+
+class Drift:
+    """Slow errors: a Gauss-Markov process per UAV and axis, x' = -x / tau + noise, of a given standard deviation."""
+
+    def __init__(self, random: np.random.Generator, shape: tuple[int, ...], *, sigma: float, tau_s: float) -> None:
+        self._random = random
+        self._sigma, self._tau_s = sigma, tau_s
+        self._value = random.normal(0.0, sigma, shape)
+        self._t_ns = 0
+
+    def at(self, now_ns: int) -> Values:
+        """The errors of all at an instant, which must not lie before the last one."""
+        elapsed_s = (now_ns - self._t_ns) / S
+        if elapsed_s > 0:
+            kept = math.exp(-elapsed_s / self._tau_s)
+            fresh = self._random.normal(0.0, self._sigma * math.sqrt(1 - kept * kept), self._value.shape)
+            self._value = kept * self._value + fresh
+            self._t_ns = now_ns
+        return self._value
+
+
+def angles(direction: Values) -> tuple[float, float]:
+    """Bearing from north, clockwise, and elevation [rad] of a vector [3]."""
+    east, north, up = direction.tolist()
+    return math.atan2(east, north) % (2 * math.pi), math.atan2(up, math.hypot(east, north))
+
+
+def shaken(random: np.random.Generator, direction: Values, sigma_rad: float) -> Values:
+    """A unit vector [3] with an error of `sigma_rad` along each of the two axes across it."""
+    moved: Values = direction + random.normal(0.0, sigma_rad, 3)
+    return moved / np.linalg.norm(moved)

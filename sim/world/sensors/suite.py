@@ -1,0 +1,69 @@
+"""Everything that UAVs carry in a scenario, read when it is due."""
+
+from collections.abc import Iterator
+
+from fanet_mw.bus.messages import Message
+from fanet_mw.bus.topics import Topics
+from fanet_mw.scenario.model import Scenario
+from sim.world.engine import Flags
+from sim.world.sensors.altimeter import AltimeterSensor
+from sim.world.sensors.camera import CameraSensor
+from sim.world.sensors.contract import Sensor, Truth
+from sim.world.sensors.gps import GpsReceiver
+from sim.world.sensors.inertial import InertialSensor
+from sim.world.sensors.phone import PhoneSensor
+from sim.world.sensors.radar import RadarSensor
+from sim.world.sensors.voice import VoiceSensor
+from sim.world.solids import Solids
+from sim.world.survivors import Survivors
+
+
+def sensors_of(scenario: Scenario, survivors: Survivors, solids: Solids) -> list[Sensor]:
+    """The sensors that a scenario asks for, in the order in which their readings go out."""
+    config = scenario.sensors
+    found: list[Sensor] = []
+    if uses_fixes(scenario):
+        found.append(GpsReceiver(scenario))
+    if scenario.mission.survivors:
+        found.append(PhoneSensor(scenario, survivors))
+    if config.camera_hz and scenario.mission.survivors:
+        found.append(CameraSensor(scenario, survivors, solids))
+    if config.voice_hz and scenario.mission.survivors:
+        found.append(VoiceSensor(scenario, survivors, solids))
+    if config.radar_hz:
+        found.append(RadarSensor(scenario, solids))
+    if config.altimeter_hz:
+        found.append(AltimeterSensor(scenario, solids))
+    if config.inertial_hz:
+        found.append(InertialSensor(scenario))
+    return found
+
+
+def uses_fixes(scenario: Scenario) -> bool:
+    """Whether anybody uses position fixes."""
+    moves = scenario.mobility.model != "static" or scenario.mission.survivors > 0
+    by_places = scenario.routing.protocol == "geographic" or (scenario.routing.protocol == "clustered" and moves)
+    return (
+        scenario.nodes.telemetry_hz > 0
+        or scenario.clock.sync == "gps"
+        or scenario.mission.collision_horizon_s > 0
+        or by_places
+    )
+
+
+class Suite:
+    """The sensors of a swarm and the topics of their readings."""
+
+    def __init__(self, scenario: Scenario, sensors: list[Sensor], topics: Topics) -> None:
+        self._sensors = [
+            (sensor, [topics.sensor(node, sensor.kind) for node in scenario.node_ids]) for sensor in sensors
+        ]
+        self._count = scenario.nodes.count
+
+    def readings(self, truth: Truth, alive: Flags, *, before_ns: int) -> Iterator[tuple[str, Message]]:
+        """Topics and readings of all instants in (before, now], for UAVs that are `alive`."""
+        for sensor, topics in self._sensors:
+            rows = [row for row in sensor.due(self._count, now_ns=truth.now_ns, before_ns=before_ns) if alive[row]]
+            if rows:
+                for row, reading in sensor.read(truth, rows):
+                    yield topics[row], reading

@@ -1,0 +1,94 @@
+"""A microphone array that makes out calls for help through the noise of its own rotors and of the wind.
+
+    level    L1 - 20 log10(d / 1 m) - a d - (what rubble or a wall takes)      a = 0.005 dB/m
+    noise    power sum of the rotors' level at the array, and of the wind's
+    SNR      level - noise + gain of the array
+    wind     40 log10 V - 23 log10(f D / V) + 15   [dB]     f = 500 Hz, D = 0.1 m
+
+Spherical spreading; air takes 5 dB/km at 1 kHz, 20 degrees and 50 to 70 % humidity (ISO 9613-1). A shout is 82 dB at
+1 m with ANSI S3.5-1997, up to 90 dB for those who shout as loudly as they can. A wall in between takes 20 dB
+(Maekawa's limit for a single edge). Wind noise in a third-octave band behind a windscreen of diameter D at an
+airspeed V: Strasberg, J. Acoust. Soc. Am. 83(2), 1988. A call is made out when its SNR is above a threshold; the
+error of its direction is Gaussian along each of two axes and falls with the square root of the SNR, as the
+Cramer-Rao bound does. Arrays of 12 to 16 microphones on multirotors: Hoshiba et al., Sensors 17(11), 2017. A
+survivor calls in a share of the instants, drawn anew each time. Not modeled: echoes, and two calls that mask each
+other.
+"""
+
+import math
+from collections.abc import Iterator, Sequence
+from typing import Final
+
+import numpy as np
+
+from fanet_mw.bus.messages import Call, Message, Voice
+from fanet_mw.scenario.model import Scenario
+from fanet_mw.units import S
+from sim.world.engine import Values
+from sim.world.sensors.contract import Sensor, Truth, angles, generator, shaken
+from sim.world.solids import Solids
+from sim.world.survivors import Survivors
+
+AIR_DB_PER_M: Final = 0.005
+WALL_DB: Final = 20.0
+_BAND_HZ: Final = 500.0
+_SCREEN_M: Final = 0.1
+_LEAST_WIND_M_S: Final = 0.1
+_WORST_SIGMA_RAD: Final = 1.0
+
+
+def level_db(distance_m: Values, *, at_1_m_db: float) -> Values:
+    """Sound pressure level at a distance, in the open [dB re 20 uPa]."""
+    distance_m = np.maximum(distance_m, 1.0)
+    return np.asarray(at_1_m_db - 20 * np.log10(distance_m) - AIR_DB_PER_M * distance_m)
+
+
+def wind_noise_db(airspeed_m_s: Values) -> Values:
+    """Level that an airflow makes behind the windscreen."""
+    v = np.maximum(airspeed_m_s, _LEAST_WIND_M_S)
+    return np.asarray(40 * np.log10(v) - 23 * np.log10(_BAND_HZ * _SCREEN_M / v) + 15)
+
+
+def power_sum_db(first_db: Values | float, second_db: Values) -> Values:
+    """The level of two noises together."""
+    return np.asarray(10 * np.log10(10 ** (np.asarray(first_db) / 10) + 10 ** (second_db / 10)))
+
+
+class VoiceSensor(Sensor):
+    """One array per UAV."""
+
+    kind = "voice"
+
+    def __init__(self, scenario: Scenario, survivors: Survivors, solids: Solids) -> None:
+        self._config = scenario.sensors
+        self.period_ns = round(S / self._config.voice_hz)
+        self._sigma_rad = math.radians(self._config.voice_sigma_deg)
+        self._survivors, self._solids = survivors, solids
+        self._buried_db = np.where(survivors.buried, self._config.burial_voice_db, 0.0)
+        self._random = generator(scenario.seed, "voice")
+
+    def read(self, truth: Truth, rows: Sequence[int]) -> Iterator[tuple[int, Message]]:
+        config, places = self._config, self._survivors.places
+        speed = np.linalg.norm(truth.velocity, axis=1)
+        noise_db = power_sum_db(config.voice_rotor_db, wind_noise_db(speed))
+        for row in rows:
+            calling = self._random.random(len(places)) < config.voice_share
+            offset = places - truth.at[row]
+            level = level_db(np.linalg.norm(offset, axis=1), at_1_m_db=config.voice_level_db) - self._buried_db
+            snr = level - noise_db[row] + config.voice_gain_db
+            near = np.flatnonzero(calling & (snr >= config.voice_snr_db))
+            if not len(near):
+                continue
+            walls = self._solids.blocked(np.broadcast_to(truth.at[row], (len(near), 3)), places[near]) * WALL_DB
+            calls = tuple(
+                self._call(offset[index], float(level[index] - wall), float(snr[index] - wall))
+                for index, wall in zip(near.tolist(), walls.tolist(), strict=True)
+                if snr[index] - wall >= config.voice_snr_db
+            )
+            if calls:
+                yield row, Voice(truth.now_ns, calls)
+
+    def _call(self, offset: Values, level: float, snr: float) -> Call:
+        sigma = min(_WORST_SIGMA_RAD, self._sigma_rad * math.pow(10.0, -snr / 20))
+        direction = offset / max(1e-6, float(np.linalg.norm(offset)))
+        return Call(*angles(shaken(self._random, direction, sigma)), level, snr)

@@ -16,7 +16,7 @@ import math
 from dataclasses import dataclass
 from typing import Final, NamedTuple
 
-from agents.mission import HOME, Course
+from fanet_mw.application import HOME, Course
 from fanet_mw.approach import Approach, closest
 from fanet_mw.mavlink import Collision
 from fanet_mw.routing.clustered.roles.position_updates import Motion

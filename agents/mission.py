@@ -5,9 +5,10 @@ positions go in; survivor reports to send, setpoints and trace records come out.
 """
 
 import math
-from typing import Final, NamedTuple
+from typing import Final
 
 from agents.localization import Sighting, estimate
+from fanet_mw.application import HOME, Course
 from fanet_mw.scenario import Mission as MissionConfig
 from fanet_mw.trace import Approaching, Arrived, Detected, Record
 from fanet_mw.units import Enu, NodeId, S
@@ -18,15 +19,6 @@ _RING_M: Final = 20.0
 _GOLDEN_ANGLE: Final = math.pi * (3 - math.sqrt(5))
 _MOVED_M: Final = 10.0
 """A better estimate changes the setpoint only when it moved this far."""
-HOME: Final = 0.0
-"""The speed of a setpoint that sends a UAV back to its formation."""
-
-
-class Course(NamedTuple):
-    """Fly there; a speed of 0 means back to the formation."""
-
-    position: Enu
-    speed_m_s: float
 
 
 class Mission:

@@ -1,16 +1,19 @@
 """The application load of one node: when it hands its node the next packet, and of what size.
 
-Birth instants are whole microseconds, because that is what the header carries.
+`Traffic` says when, `Load` is the application that sends. Birth instants are whole microseconds, because that is what
+the header carries.
 """
 
 import math
-from collections.abc import Sequence
+from collections.abc import Mapping, Sequence
 from random import Random
-from typing import Final
+from typing import Any, Final
 
+from fanet_mw import wire
+from fanet_mw.application import Application, AppPort, Fate, Status
 from fanet_mw.rng import stream
 from fanet_mw.scenario import Scenario
-from fanet_mw.units import MS, US, NodeId, S
+from fanet_mw.units import BROADCAST, MS, US, NodeId, S
 
 _REFUSED_NS: Final = MS
 """After a packet that the radio refused, a saturated source offers the next one so much later, not at once."""
@@ -118,3 +121,43 @@ class Traffic:
             if self._next_ns is None:
                 self._next_ns = now_ns + _REFUSED_NS + self._lead_ms * MS
         return not refused
+
+
+class Load(Application):
+    """One node's source of packets whose content does not matter."""
+
+    name: Final = "traffic"
+
+    def __init__(self, scenario: Scenario, node: NodeId) -> None:
+        self._traffic = Traffic(scenario, node)
+        self._destination = BROADCAST if scenario.traffic.destination == "all" else NodeId(scenario.traffic.destination)
+        self._filler = wire.filler(scenario.traffic.payload_bytes - wire.HEADER_BYTES, node=node)
+        self.follows = (Fate.SENT, Fate.TURNED_AWAY) if self._traffic.saturated else ()
+        self._generated = 0
+
+    def start(self, port: AppPort, now_ns: int) -> None:
+        super().start(port, now_ns)
+        self._traffic.start(now_ns)
+
+    def wake(self, now_ns: int) -> None:
+        due_ns = self._traffic.next_ns()
+        while due_ns is not None and due_ns <= now_ns:
+            for _ in range(self._traffic.owed):
+                self._send(due_ns)
+            self._traffic.advance()
+            due_ns = self._traffic.next_ns()
+
+    def next_wake_ns(self) -> int | None:
+        return self._traffic.next_ns()
+
+    def on_status(self, status: Status, now_ns: int) -> None:
+        """A packet of a saturated source has left, or was given up."""
+        if self._traffic.ended(refused=status.fate is Fate.TURNED_AWAY, now_ns=now_ns):
+            self._send(now_ns)
+
+    def report(self) -> Mapping[str, Any]:
+        return {"generated": self._generated}
+
+    def _send(self, born_ns: int) -> None:
+        self._generated += 1
+        self.port.send(self._filler, destination=self._destination, priority=wire.PRIORITY_BULK, born_ns=born_ns)

@@ -21,6 +21,7 @@ from fanet_mw.wire import COMPONENT, frames, inner_frames, system_id
 
 common.mavlink_map.update(fanet.mavlink_map)  # one parser for both dialects
 
+COLLISION_ID: Final = int(common.MAVLINK_MSG_ID_COLLISION)
 AUTOPILOT_COMPONENT: Final = 1
 """MAV_COMP_ID_AUTOPILOT1: who the telemetry is from. Ground stations take no other component for a vehicle."""
 

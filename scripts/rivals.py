@@ -1,4 +1,4 @@
-"""The table of rivals in docs/protocol.md: scenario `rivals` per protocol, speed and seed, and what geometry allows.
+"""The table in docs/results/rivals.md: scenario `rivals` per protocol, speed and seed, and what geometry allows.
 
 `conn` is an upper bound of the PDR: the share of (node, second) of the measured window in which a node has a multi-hop
 path of `radio.range_m` links to the leader, on the ideal track of the mobility model.

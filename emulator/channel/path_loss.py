@@ -9,7 +9,7 @@
 
 Distances and heights in metres, frequencies in MHz, losses in dB between isotropic antennas. Below 1 m the loss is that
 at 1 m. Not modeled: antenna patterns and airframes, weather, the curvature of the earth, the oscillation of two rays
-before the crossover. The ranges of validity are in docs/emulator.md.
+before the crossover. The ranges of validity are in docs/explanation/emulator.md.
 """
 
 import math

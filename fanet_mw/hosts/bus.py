@@ -58,7 +58,8 @@ def exposure(endpoint: str, *, listens: bool) -> str | None:
     who = "whoever reaches it" if listens else "whoever is on the way"
     return (
         f"{endpoint} is neither on the loopback interface nor encrypted: {who} can stop the clock, move UAVs, change "
-        f"the air and forge results. See docs/security.md for tls/ with access lists (fanet keys, --zenoh-config)"
+        f"the air and forge results. See docs/how-to/security.md for tls/ with access lists (fanet keys, "
+        f"--zenoh-config)"
     )
 
 

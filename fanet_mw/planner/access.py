@@ -17,7 +17,7 @@ from fanet_mw.scenario import Scenario
 from fanet_mw.units import NodeId, seconds_to_ns
 
 _HELLO_BYTES: Final = 700
-"""A hello with digests of 45 origins, the longest (docs/protocol.md, Repair)."""
+"""A hello with digests of 45 origins, the longest (docs/explanation/protocol.md, Repair)."""
 _ROUNDS: Final = 200
 
 

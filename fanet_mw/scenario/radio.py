@@ -30,7 +30,7 @@ class Radio(Section):
     """The radio, its MAC and the channel. Defaults are the reference set-up: 802.11b, DSSS 11 Mb/s, long preamble."""
 
     channel: Literal["range", "log_distance", "friis", "two_ray", "air_to_air", "air_to_ground", "uma_av"] = "range"
-    """The path loss model: see docs/emulator.md for equations, sources and ranges of validity."""
+    """The path loss model: see docs/explanation/emulator.md for equations, sources and ranges of validity."""
     range_m: SomeLength = 250.0
     """`range`: decode and carrier-sense limit; frames are equally strong within it, silent beyond."""
     standard: Literal["b", "g", "a"] = "b"
@@ -86,7 +86,7 @@ class Radio(Section):
     """`capture`: how much stronger the later frame must be."""
     access: Literal["standard", "ns3"] | tuple[Ns3Point, ...] = "standard"
     """`standard`: as IEEE 802.11 has it; `ns3`: as ns-3.44 does in every point in which it differs; or a list of such
-    points: `difs`, `eifs`, `sums`, `onset` (docs/emulator.md)."""
+    points: `difs`, `eifs`, `sums`, `onset` (docs/explanation/emulator.md)."""
     cw_min: Annotated[int, Field(ge=1, le=1023)] = 31
     """The first contention window, in slots. By default 31, and 15 with OFDM rates."""
     cw_max: Annotated[int, Field(ge=1, le=32767)] = 1023

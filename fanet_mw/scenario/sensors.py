@@ -1,6 +1,6 @@
 """The `[sensors]` table: what each UAV carries besides GPS and a Wi-Fi receiver, and how good it is.
 
-A sensor of which the rate is 0 is not on board. The models, their units and sources are in docs/sensors.md.
+A sensor of which the rate is 0 is not on board. The models, their units and sources are in docs/reference/sensors.md.
 """
 
 from typing import Annotated, Self

@@ -2,7 +2,7 @@
 
 The header and the frame around every message of our own dialect, by struct and a Rust CRC, because every reception
 passes here; pymavlink is their oracle in the tests. Every decode is total: any bytes give a value or
-MalformedFrameError. Layouts: docs/wire.md.
+MalformedFrameError. Layouts: docs/reference/air-format.md.
 """
 
 import struct

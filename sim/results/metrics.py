@@ -1,4 +1,4 @@
-"""From an outcome to the summary. Every definition is written in docs/experiments.md; nothing is measured twice.
+"""From an outcome to the summary. Every definition is written in docs/reference/results.md; nothing is measured twice.
 
 pdr      = unique deliveries of application packets at their targets / (packets generated x targets), never above 1
 repeated = further deliveries of a packet at a target that already had it: its process has started again

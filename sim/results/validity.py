@@ -5,7 +5,7 @@
 
 The limits are chosen from runs that were disturbed on purpose, held against virtual time: within them the delivery
 ratio is off by no more than two seeds differ by themselves (`tests/benchmarks/disturbed_runs.py`, table in
-docs/experiments.md). In virtual time nothing disturbs a run.
+docs/reference/results.md). In virtual time nothing disturbs a run.
 """
 
 from collections.abc import Iterator, Mapping

@@ -3,7 +3,7 @@
     who says it -> what it may say -> about whom (nodes and survivors that exist) -> when (within the run)
 
 Each check answers with a word for what is wrong, or None. Reports have shapes: the keys that metrics read, with types.
-Does not model: authentication. Who may say something as whom is for the router's access list (docs/security.md).
+Does not model: authentication. Who may say something as whom is for the router's access list (docs/how-to/security.md).
 """
 
 import json

@@ -2,7 +2,7 @@
 
 PREFIX: an installed ns-3.44, see `tests/ns3/live.py`. Both sides are timed in CPU seconds of the simulation alone,
 without start-up; the least of the runs counts, because other work on the machine only ever adds. Judges nothing: the
-ratio depends a little on the machine, and on how its Python was built (docs/experiments.md).
+ratio depends a little on the machine, and on how its Python was built (docs/reference/results.md).
 """
 
 import argparse

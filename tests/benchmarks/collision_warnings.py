@@ -30,7 +30,7 @@ def delays(part: dict[str, Any]) -> str:
 
 
 def rows(seeds: int) -> list[list[str]]:
-    """The table of docs/protocol.md, header first."""
+    """The table of docs/explanation/protocol.md, header first."""
     found = [
         ["changed", "warning [ms]", "report [ms]", "bulk [ms]", "the other: share, p95 [ms]", "losses", "least [m]"]
     ]

@@ -18,10 +18,10 @@ from typing import Final, NamedTuple
 
 from fanet_mw.errors import ConfigError
 from fanet_mw.scenario import Scenario
-from sim import catalog
-from sim.links import described
-from sim.results import trace_lines
-from sim.run import simulate
+from sim.results.files import trace_lines
+from sim.results.links import described
+from sim.run.virtual import simulate
+from sim.scenarios import catalog
 
 _SHIPPED: Final = {
     "clusters": 20, "contention_broadcast": 3, "contention_unicast": 3, "crossing": 20, "faults": 20, "flooding": 6,

@@ -27,7 +27,7 @@ from sim.run.swarm import free_endpoint
 NAMES = Topics("flood")
 FLOOD = """
 import sys, time
-from fanet_mw import topics
+from fanet_mw.bus import topics
 from fanet_mw.hosts.bus import Bus
 from fanet_mw.bus.messages import TxRequest
 from fanet_mw.bus.topics import Topics

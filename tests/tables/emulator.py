@@ -1,4 +1,4 @@
-"""The measured tables of docs/emulator.md."""
+"""The measured tables of the emulator."""
 
 import math
 import statistics

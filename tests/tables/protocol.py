@@ -1,4 +1,4 @@
-"""Measured tables of docs/protocol.md. Each costs minutes; what two tables need is measured once."""
+"""Measured tables of the protocol. Each costs minutes; what two tables need is measured once."""
 
 import statistics
 from collections.abc import Sequence

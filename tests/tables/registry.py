@@ -28,18 +28,18 @@ class Table(NamedTuple):
 
 
 TABLES: Final[Mapping[str, Table]] = {
-    "ns3": Table("emulator.md", emulator.against_ns3, Tolerance(absolute=0.005, relative=0.01)),
-    "ns3-points": Table("emulator.md", emulator.points, Tolerance(absolute=0.005, relative=0.01)),
-    "closed-forms": Table("emulator.md", emulator.closed_forms, Tolerance(relative=0.01)),
-    "error-rates": Table("emulator.md", emulator.error_rates, Tolerance(absolute=0.05)),
-    "bounds": Table("protocol.md", protocol.bounds, Tolerance(absolute=0.002, relative=0.05)),
-    "promises": Table("protocol.md", protocol.promises, Tolerance(absolute=0.02, relative=0.1)),
-    "warnings": Table("protocol.md", protocol.warnings, Tolerance(absolute=0.1, relative=0.3)),
-    "goodput": Table("protocol.md", protocol.goodput, Tolerance(absolute=0.02, relative=0.1)),
-    "rivals": Table("protocol.md", protocol.rivals, Tolerance(absolute=0.02, relative=0.1)),
+    "ns3": Table("results/against-ns3.md", emulator.against_ns3, Tolerance(absolute=0.005, relative=0.01)),
+    "ns3-points": Table("results/against-ns3.md", emulator.points, Tolerance(absolute=0.005, relative=0.01)),
+    "closed-forms": Table("results/against-ns3.md", emulator.closed_forms, Tolerance(relative=0.01)),
+    "error-rates": Table("explanation/channel.md", emulator.error_rates, Tolerance(absolute=0.05)),
+    "bounds": Table("explanation/timetable.md", protocol.bounds, Tolerance(absolute=0.002, relative=0.05)),
+    "promises": Table("explanation/timetable.md", protocol.promises, Tolerance(absolute=0.02, relative=0.1)),
+    "warnings": Table("explanation/protocol.md", protocol.warnings, Tolerance(absolute=0.1, relative=0.3)),
+    "goodput": Table("explanation/planning.md", protocol.goodput, Tolerance(absolute=0.02, relative=0.1)),
+    "rivals": Table("results/rivals.md", protocol.rivals, Tolerance(absolute=0.02, relative=0.1)),
     "protocol-cost": Table(
-        "protocol.md", protocol.cost, Tolerance(absolute=0.02, relative=0.1), ("CPU per frame [us]",)
+        "results/cost.md", protocol.cost, Tolerance(absolute=0.02, relative=0.1), ("CPU per frame [us]",)
     ),
-    "clock-errors": Table("protocol.md", protocol.clock_errors, Tolerance(relative=0.2)),
-    "clocks": Table("protocol.md", protocol.clocks, Tolerance(absolute=0.02, relative=0.2)),
+    "clock-errors": Table("explanation/time.md", protocol.clock_errors, Tolerance(relative=0.2)),
+    "clocks": Table("explanation/time.md", protocol.clocks, Tolerance(absolute=0.02, relative=0.2)),
 }

@@ -5,7 +5,7 @@ from typing import Any
 import pytest
 
 from agents.lookout import Lookout
-from agents.mission import HOME, Course
+from fanet_mw.application import HOME, Course
 from fanet_mw.mavlink import Collision
 from fanet_mw.routing.clustered.roles.position_updates import Motion
 from fanet_mw.trace import ConflictForeseen, ConflictOver

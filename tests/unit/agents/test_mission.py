@@ -1,6 +1,7 @@
 """The mission of one UAV, as timelines."""
 
-from agents.mission import HOME, Mission
+from agents.mission import Mission
+from fanet_mw.application import HOME
 from fanet_mw.scenario import Mission as Config
 from fanet_mw.trace import Approaching, Arrived, Detected
 from fanet_mw.units import Enu, NodeId, S

@@ -18,7 +18,8 @@ from fanet_mw.dialect import fanet
 
 ROOT = Path(__file__).resolve().parents[3]
 DIALECT = ROOT / "fanet_mw" / "dialect"
-DOCUMENT = (ROOT / "docs" / "wire.md").read_text(encoding="utf-8")
+_PAGES = ("air-format.md", "air-messages.md", "air-messages-clusters.md")
+DOCUMENT = "\n".join((ROOT / "docs" / "reference" / page).read_text(encoding="utf-8") for page in _PAGES)
 
 
 def load(path: Path, name: str) -> ModuleType:
@@ -147,7 +148,7 @@ ROW = re.compile(r"^\| (\d+) \| `(\w+)` \| (\w+)(?:\[(\d+)\])? \| ([\w/]*) ?\| .
 @pytest.mark.parametrize("spec", wire.SPECS, ids=lambda spec: str(spec.msgid))
 def test_the_document_has_every_field_with_its_offset_type_and_unit(spec: wire.Spec) -> None:
     message: Any = fanet.mavlink_map[spec.msgid]
-    (section,) = re.findall(rf"^## {message.msgname} \({spec.msgid}\)\n(.*?)(?=^## )", DOCUMENT, re.S | re.M)
+    (section,) = re.findall(rf"^## {message.msgname} \({spec.msgid}\)\n(.*?)(?=^##? |\Z)", DOCUMENT, re.S | re.M)
     size = spec.layout.size
     assert f"Payload {size} bytes, frame {size + wire.OVERHEAD}, CRC_EXTRA {spec.crc_extra}." in section
     rows = ROW.findall(section)

@@ -10,7 +10,7 @@ ROOT = Path(__file__).parents[3]
 PAGES = sorted(
     {*ROOT.glob("*.md"), *(ROOT / "docs").rglob("*.md"), *(ROOT / "examples").rglob("*.md")} - {ROOT / "CHANGELOG.md"}
 )
-_LINK = re.compile(r"\]\(([^)#\s]+)(#[^)\s]*)?\)")
+_LINK = re.compile(r"\]\(([^)#\s]*)(#[^)\s]+)?\)")
 _FILE = re.compile(r"(?<![\w./-])((?:fanet_mw|agents|emulator|sim|tests|scripts|docs|examples)/[\w./-]*\w)(?![\w*{<])")
 
 
@@ -39,3 +39,26 @@ def test_every_file_of_ours_that_source_text_names_exists() -> None:
     assert sources
     missing = {name: str(source) for source in sources for name in names(source) if not (ROOT / name).exists()}
     assert not missing
+
+
+def anchor(heading: str) -> str:
+    """The name that a heading gets on the page, as GitHub makes it."""
+    return re.sub(r"[^\w\s-]", "", heading.lstrip("#").strip().lower()).replace(" ", "-")
+
+
+@pytest.mark.parametrize("page", PAGES, ids=lambda page: str(page.relative_to(ROOT)))
+def test_every_link_to_a_heading_finds_it(page: Path) -> None:
+    missing = []
+    for target, name in _LINK.findall(page.read_text(encoding="utf-8")):
+        if name and "://" not in target:
+            lines = (page.parent / target if target else page).read_text(encoding="utf-8").splitlines()
+            if name[1:] not in {anchor(line) for line in lines if line.startswith("#")}:
+                missing.append(target + name)
+    assert not missing
+
+
+@pytest.mark.parametrize("page", PAGES, ids=lambda page: str(page.relative_to(ROOT)))
+def test_no_page_is_longer_than_two_thousand_words_of_text(page: Path) -> None:
+    """Tables of keys and measured figures are looked up, not read."""
+    lines = [line for line in page.read_text(encoding="utf-8").splitlines() if not line.startswith("|")]
+    assert len(" ".join(lines).split()) <= 2000

@@ -22,7 +22,9 @@ WITHIN = Tolerance(absolute=0.01)
 
 def test_every_measured_table_of_the_documents_is_one_that_a_command_writes_and_the_other_way_round() -> None:
     marked = {
-        (name, document.name) for document in DOCUMENTS.glob("*.md") for name in names(document.read_text("utf-8"))
+        (name, str(document.relative_to(DOCUMENTS)))
+        for document in DOCUMENTS.rglob("*.md")
+        for name in names(document.read_text("utf-8"))
     }
     assert marked == {(name, table.document) for name, table in TABLES.items()}
     for name, table in TABLES.items():

@@ -1,7 +1,7 @@
 """A node's part in running the swarm, as a table: (state, event) -> (state, action). Nothing else changes a state.
 
-The diagram in docs/protocol.md is generated from the table (`scripts/generate_state_diagram.py`). What is in no row
-cannot happen: `upkeep.py`, which finds the events, asks for a row and fails without one.
+The diagram in docs/explanation/roles.md is generated from the table by `scripts/generate_state_diagram.py`. What is in
+no row cannot happen: `failover.py`, which finds the events, asks for a row and fails without one.
 """
 
 from collections.abc import Mapping

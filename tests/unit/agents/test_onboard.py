@@ -1,0 +1,194 @@
+"""Applications of a user beside the scenario's on one UAV, hand-driven: who is given what, and what becomes of it."""
+
+from collections.abc import Callable
+from typing import Any
+
+import pytest
+
+from agents.uav import Uav
+from fanet_mw import mavlink
+from fanet_mw.application import Application, Course, Received, SensorReading
+from fanet_mw.bus.messages import Gps, MavlinkTap, Reception, Setpoint, TxRequest, WifiScan
+from fanet_mw.bus.topics import Topics
+from fanet_mw.errors import LocalProtocolError, MalformedFrameError
+from fanet_mw.scenario import Scenario
+from fanet_mw.trace import Generated
+from fanet_mw.units import BROADCAST, MS, Enu, NodeId, S
+from fanet_mw.wire import FLAG_FLOOD, PRIORITY_REPORT, SURVIVOR, Header, Kind
+from fanet_mw.wire.inner import Survivor
+
+NAMES, OWN, OTHER = Topics("u"), NodeId(2), NodeId(3)
+ELSEWHERE = Course(Enu(100.0, 0.0, 50.0), 8.0)
+MakeScenario = Callable[..., Scenario]
+
+
+class Diary(Application):
+    """Writes down what it is told."""
+
+    listens = (SURVIVOR.msgid,)
+
+    def __init__(self, name: str, *, wake_ns: int | None = None, permits: bool = True) -> None:
+        self.name = name
+        self.lines: list[Any] = []
+        self.wake_ns = wake_ns
+        self.willing = permits
+
+    def on_message(self, message: Received, now_ns: int) -> None:
+        self.lines.append((message.origin, message.born_ns, message.hops))
+        if Survivor.decode_frame(message.frame).survivor == 7:
+            raise MalformedFrameError("not that one")
+
+    def on_fix(self, fix: Gps, now_ns: int) -> None:
+        self.lines.append(fix.position)
+
+    def on_sensor(self, reading: SensorReading, now_ns: int) -> None:
+        self.lines.append(reading)
+
+    def permits(self, course: Course, now_ns: int) -> bool:
+        self.lines.append(course)
+        return self.willing
+
+    def wake(self, now_ns: int) -> None:
+        self.lines.append(now_ns)
+        self.wake_ns = None
+
+    def next_wake_ns(self) -> int | None:
+        return self.wake_ns
+
+    def report(self) -> dict[str, int]:
+        return {"lines": len(self.lines)}
+
+
+def uav(make_scenario: MakeScenario, *applications: Application, **keys: Any) -> Uav:
+    given = {
+        "nodes.count": 3,
+        "routing.protocol": "flooding",
+        "traffic.arrivals": "none",
+        "routing.hello_interval_s": 0,
+    }
+    made = Uav(make_scenario(**given | keys), OWN, "u", position=Enu(0.0, 0.0, 50.0), applications=applications)
+    made.start(0)
+    return made
+
+
+def hear(made: Uav, inner: bytes, *, seq: int = 5, now_ns: int = S) -> None:
+    header = Header(900_000, seq, OTHER, BROADCAST, OTHER, Kind.DATA, 8, 0, PRIORITY_REPORT, FLAG_FLOOD)
+    made.receive(NAMES.radio_rx(OWN), Reception(header.encode() + inner, OTHER, now_ns, -60.0), now_ns)
+
+
+def survivor(number: int) -> bytes:
+    return Survivor(900_000, number, OTHER, Enu(10.0, 20.0, 50.0), -70.0).encode_frame(OTHER)
+
+
+def test_a_message_is_given_to_all_that_listen_to_it_and_to_no_other(make_scenario: MakeScenario) -> None:
+    a, b, deaf = Diary("a"), Diary("b"), Diary("c")
+    deaf.listens = ()
+    made = uav(make_scenario, a, b, deaf)
+    hear(made, survivor(1))
+    hear(made, mavlink.Encoder(OTHER).heartbeat(), seq=6)
+    assert a.lines == b.lines == [(OTHER, 900 * MS, 1)]
+    assert deaf.lines == []
+
+
+def test_what_makes_no_sense_to_an_application_is_counted_and_the_others_have_it(make_scenario: MakeScenario) -> None:
+    made = uav(make_scenario, Diary("a"), last := Diary("b"))
+    hear(made, survivor(7))
+    assert made.report()["dropped"]["malformed"] == 2
+    assert len(last.lines) == 1
+
+
+def test_fixes_and_readings_go_to_all(make_scenario: MakeScenario) -> None:
+    made = uav(make_scenario, diary := Diary("a"))
+    scan = WifiScan(S, ())
+    made.receive(NAMES.sensor(OWN, "gps"), Gps(S, Enu(1, 2, 3), Enu(0, 0, 0)), S)
+    made.receive(NAMES.sensor(OWN, "wifi"), scan, S)
+    assert diary.lines == [Enu(1, 2, 3), scan]
+
+
+def test_each_is_woken_at_its_own_instant(make_scenario: MakeScenario) -> None:
+    soon, late = Diary("a", wake_ns=300 * MS), Diary("b", wake_ns=700 * MS)
+    made = uav(make_scenario, soon, late)
+    for expected_ns in (300 * MS, 700 * MS):
+        assert made.next_wake_ns() == expected_ns
+        made.wake(expected_ns)
+    assert (soon.lines, late.lines) == ([300 * MS], [700 * MS])
+    assert made.next_wake_ns() is None
+
+
+def test_an_instant_that_an_input_brings_nearer_is_heeded(make_scenario: MakeScenario) -> None:
+    class Hasty(Diary):
+        def on_message(self, message: Received, now_ns: int) -> None:
+            self.wake_ns = now_ns + 10 * MS
+
+    made = uav(make_scenario, Hasty("a", wake_ns=9 * S))
+    assert made.next_wake_ns() == 9 * S
+    hear(made, survivor(1))
+    assert made.next_wake_ns() == S + 10 * MS
+
+
+class Pilot(Application):
+    """Wants to be elsewhere from its first fix on."""
+
+    name = "pilot"
+
+    def on_fix(self, fix: Gps, now_ns: int) -> None:
+        self.port.fly(ELSEWHERE._replace(speed_m_s=1.0))
+        self.port.fly(ELSEWHERE)
+
+    def permits(self, course: Course, now_ns: int) -> bool:
+        return False
+
+
+@pytest.mark.parametrize("willing", [True, False])
+def test_of_several_courses_the_last_is_flown_if_no_other_application_objects(
+    make_scenario: MakeScenario, willing: bool
+) -> None:
+    made = uav(make_scenario, Pilot(), diary := Diary("judge", permits=willing))
+    made.receive(NAMES.sensor(OWN, "gps"), Gps(S, Enu(1, 2, 3), Enu(0, 0, 0)), S)
+    assert diary.lines[1:] == [ELSEWHERE]
+    flown = [message for _, message in made.outbox if isinstance(message, Setpoint)]
+    assert flown == ([Setpoint(S, *ELSEWHERE)] if willing else [])
+
+
+class Caller(Application):
+    """Sends a heartbeat at second 1, as if it had meant to at another instant, and shows it."""
+
+    name = "caller"
+
+    def __init__(self, born_ns: int) -> None:
+        self._born_ns = born_ns
+        self._due_ns: int | None = S
+
+    def next_wake_ns(self) -> int | None:
+        return self._due_ns
+
+    def wake(self, now_ns: int) -> None:
+        self._due_ns = None
+        frames = mavlink.Encoder(self.port.node).heartbeat()
+        self.handle = self.port.send(frames, destination=OTHER, born_ns=self._born_ns)
+        self.port.tap(frames)
+
+
+@pytest.mark.parametrize("born_ns", [S - 5 * MS, S + 5 * MS])
+def test_what_is_sent_is_traced_and_goes_out_one_lead_after_its_birth_which_is_never_later_than_now(
+    make_scenario: MakeScenario, born_ns: int
+) -> None:
+    made = uav(make_scenario, caller := Caller(born_ns), **{"radio.lead_ms": 20, "routing.protocol": "direct"})
+    made.wake(S)
+    (request,) = [message for _, message in made.outbox if isinstance(message, TxRequest)]
+    (tap,) = [message for _, message in made.outbox if isinstance(message, MavlinkTap)]
+    (record,) = [record for record in made.records if isinstance(record, Generated)]
+    assert record[1:4] == (OWN, caller.handle, "caller")
+    assert record.t_ns == min(born_ns, S)
+    assert request.start_ns == record.t_ns + 20 * MS
+    assert request.frame.endswith(tap.data)
+
+
+def test_two_applications_of_one_name_are_refused(make_scenario: MakeScenario) -> None:
+    with pytest.raises(LocalProtocolError, match="each name must be there once"):
+        uav(make_scenario, Diary("traffic"))
+
+
+def test_a_report_has_what_a_users_applications_say(make_scenario: MakeScenario) -> None:
+    made = uav(make_scenario, Diary("a"), Application())
+    assert made.report()["applications"] == {"a": {"lines": 0}}

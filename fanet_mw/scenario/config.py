@@ -13,6 +13,7 @@ from pydantic import BaseModel, ValidationError
 
 from fanet_mw.errors import ConfigError
 from fanet_mw.scenario import Scenario
+from fanet_mw.scenario.quantities import in_unit_of, unit_of
 
 
 def load(path: Path, overrides: Iterable[str] = ()) -> Scenario:
@@ -37,7 +38,11 @@ def parse(text: str, *, source: str, name: str, overrides: Iterable[str] = ()) -
 
 
 def build(tree: Mapping[str, Any], *, source: str = "scenario") -> Scenario:
-    """Validate a tree of plain values."""
+    """Validate a tree of plain values; a number may be text with a unit, which its key turns into its own."""
+    problems: list[str] = []
+    tree = {key: _plain(key, value, problems, key) for key, value in tree.items()}
+    if problems:
+        raise ConfigError("\n".join(f"{source}: {problem}" for problem in problems))
     try:
         return Scenario.model_validate(tree)
     except ValidationError as error:
@@ -52,13 +57,40 @@ def _apply(tree: dict[str, Any], override: str) -> None:
     if not equals or not key:
         raise ConfigError(f"--set {override!r}: must be KEY=VALUE, for example nodes.count=10")
     *path, last = key.split(".")
-    table = tree
+    table: Any = tree
     for part in path:
-        inner = table.setdefault(part, {})
-        if not isinstance(inner, dict):
+        inner = _entry(table, part, override) if isinstance(table, list) else table.setdefault(part, {})
+        if not isinstance(inner, dict | list):
             raise ConfigError(f"--set {override!r}: {part!r} is a value, not a table")
         table = inner
-    table[last] = _value(text.strip())
+    if isinstance(table, list):
+        _entry(table, last, override)
+        table[int(last)] = _value(text.strip())
+    else:
+        table[last] = _value(text.strip())
+
+
+def _entry(entries: list[Any], part: str, override: str) -> Any:  # noqa: ANN401  (a value of a TOML file)
+    """One entry of an array by its number."""
+    if not part.isdecimal() or int(part) >= len(entries):
+        raise ConfigError(f"--set {override!r}: {part!r} must be the number of an entry, 0 to {len(entries) - 1}")
+    return entries[int(part)]
+
+
+def _plain(key: str, value: object, problems: list[str], path: str) -> object:
+    """A value without units; what is wrong with its unit goes to `problems`."""
+    if isinstance(value, Mapping):
+        return {name: _plain(name, inner, problems, f"{path}.{name}") for name, inner in value.items()}
+    if isinstance(value, list | tuple):
+        return [_plain(key, inner, problems, f"{path}.{index}") for index, inner in enumerate(value)]
+    if not isinstance(value, str) or not unit_of(key):
+        return value
+    try:
+        number = in_unit_of(key, value)
+    except ValueError as error:
+        problems.append(f"{path} = {value!r}: {error}")
+        return value
+    return value if number is None else number
 
 
 def _value(text: str) -> object:

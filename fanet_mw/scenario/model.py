@@ -85,7 +85,8 @@ class Traffic(Section):
     payload_bytes: Annotated[int, Field(ge=64, le=2304)] = 1024
     """UDP payload on the air, our routing header included."""
     interval_s: Annotated[float, Field(ge=1e-4, le=MOST_S)] = 1.0
-    """At least 0.1 ms: packets are named by numbers of which a node has one for each 0.1 ms."""
+    """From one packet of a source to its next. At least 0.1 ms: packets are named by numbers of which a node has one
+    for each 0.1 ms."""
     arrivals: Literal["cbr", "poisson", "saturated", "none"] = "cbr"
     """When a source offers packets: one per interval, with exponential gaps of that mean, always one more as soon as
     the last has ended, or never."""

@@ -65,8 +65,8 @@ class Radio(Section):
     """Distance over which its correlation falls to 1/e."""
     fading: Literal["none", "nakagami", "rician"] = "none"
     """Small-scale fading: a power gain of mean 1 per frame and receiver."""
-    nakagami_m: Annotated[float, Field(ge=0.5, le=1000)] = 3.0
-    """`nakagami`: 1 is Rayleigh; more is steadier."""
+    nakagami_m: Annotated[float, Field(ge=0.5, le=1000, json_schema_extra={"unit": ""})] = 3.0
+    """`nakagami`: the shape m; 1 is Rayleigh; more is steadier."""
     rician_k_db: Annotated[float, Field(ge=-20, le=40)] = 10.0
     """`rician`: power of the line of sight over that of all scattered paths."""
     obstruction_loss_db: Decibels = 20.0

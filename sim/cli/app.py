@@ -24,7 +24,9 @@ from fanet_mw.hosts import interrupts, loop
 from fanet_mw.installation import missing_extra
 from fanet_mw.scenario import Scenario
 from fanet_mw.units import NodeId
+from sim.cli import scenario_files
 from sim.cli.air import app as air_app
+from sim.cli.completion import ScenarioName
 from sim.cli.console import Console, nobody_reads
 from sim.cli.options import Choice, Join, Output, warn_of, with_engine
 from sim.results import report
@@ -43,11 +45,13 @@ app = App(
     suppress_keyboard_interrupt=False,
 )
 app.command(air_app)
+scenario_files.add_to(app)
+app.register_install_completion_command()
 _err = Console(stderr=True)
 
 
 @app.command
-def simulate(scenario: str, *, choice: Choice = Choice(), output: Output = Output()) -> int:
+def simulate(scenario: ScenarioName, *, choice: Choice = Choice(), output: Output = Output()) -> int:
     """Run a scenario in virtual time: deterministic, as fast as it goes.
 
     Parameters
@@ -77,7 +81,7 @@ def simulate(scenario: str, *, choice: Choice = Choice(), output: Output = Outpu
 
 @app.command
 def plan(
-    scenario: str,
+    scenario: ScenarioName,
     *,
     choice: Choice = Choice(),
     deadline: float | None = None,
@@ -107,7 +111,7 @@ def plan(
 
 @app.command
 def launch(
-    scenario: str,
+    scenario: ScenarioName,
     *,
     choice: Choice = Choice(),
     output: Output = Output(),
@@ -182,7 +186,7 @@ def scenarios(*, json_: Annotated[bool, Parameter(name="--json", negative="")] =
 
 @app.command
 def router(
-    scenario: str,
+    scenario: ScenarioName,
     *,
     choice: Choice = Choice(),
     listen: str = "tcp/127.0.0.1:7447",
@@ -221,7 +225,7 @@ def router(
 
 @app.command
 def emulator(
-    scenario: str,
+    scenario: ScenarioName,
     *,
     choice: Choice = Choice(),
     join: Join = Join(),
@@ -257,7 +261,7 @@ def emulator(
 
 
 @app.command
-def world(scenario: str, *, choice: Choice = Choice(), join: Join = Join()) -> int:
+def world(scenario: ScenarioName, *, choice: Choice = Choice(), join: Join = Join()) -> int:
     """Run the world alone, against a router.
 
     Parameters
@@ -273,7 +277,7 @@ def world(scenario: str, *, choice: Choice = Choice(), join: Join = Join()) -> i
 
 
 @app.command
-def agent(scenario: str, *, id: int, choice: Choice = Choice(), join: Join = Join()) -> int:  # noqa: A002
+def agent(scenario: ScenarioName, *, id: int, choice: Choice = Choice(), join: Join = Join()) -> int:  # noqa: A002
     """Run one UAV alone, against a router.
 
     Parameters
@@ -355,7 +359,7 @@ def swarms(*, json_: Annotated[bool, Parameter(name="--json", negative="")] = Fa
 
 @app.command
 def keys(
-    scenario: str,
+    scenario: ScenarioName,
     *,
     out: Path,
     choice: Choice = Choice(),

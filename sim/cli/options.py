@@ -3,17 +3,20 @@
 Field names are the flags, their docstrings the help; the command line reads both at run time.
 """
 
+from collections.abc import Sequence
 from dataclasses import dataclass, replace
 from importlib.util import find_spec
 from pathlib import Path
 from typing import Annotated, Final
 
-from cyclopts import Parameter
+from cyclopts import Parameter, Token
 
 from emulator.capture_file import NAME
 from fanet_mw.errors import ConfigError
 from fanet_mw.hosts.bus import exposure
 from fanet_mw.scenario import Scenario
+from fanet_mw.scenario.quantities import in_unit_of
+from sim.cli.completion import keys
 from sim.cli.console import Console
 from sim.cli.out_folder import prepare
 from sim.scenarios import catalog
@@ -23,19 +26,33 @@ _LEAD_MS: Final = 40
 """What a scenario without a lead is given in real time: asyncio's timers and the bus are late by some milliseconds."""
 
 
+def _seconds(_type: object, tokens: Sequence[Token]) -> float:
+    """A number of seconds, or a time with a unit."""
+    text = tokens[0].value
+    given = in_unit_of("duration_s", text)
+    return float(text) if given is None else given
+
+
 @Parameter(name="*")
 @dataclass(frozen=True)
 class Choice:
     """What to run: a scenario and what to change in it."""
 
     set: Annotated[
-        tuple[str, ...], Parameter(name="--set", negative="", help="Change one scenario key, KEY=VALUE.")
+        tuple[str, ...],
+        Parameter(
+            name="--set",
+            negative="",
+            consume_multiple=True,
+            completer=keys,
+            help="Change scenario keys, KEY=VALUE ..., for example --set nodes.count=20 duration_s=2min.",
+        ),
     ] = ()
-    """Repeatable, for example --set nodes.count=20 --set radio.channel=log_distance."""
+    """Repeatable; each may be followed by several."""
     seed: int | None = None
     """Seed of every random stream of the run."""
-    duration: float | None = None
-    """Simulated seconds to run [s]."""
+    duration: Annotated[float | None, Parameter(converter=_seconds)] = None
+    """Simulated time to run [s]; or with a unit, for example 2min."""
 
     def scenario(self, name: str) -> Scenario:
         """The scenario with these changes."""

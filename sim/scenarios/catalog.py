@@ -31,11 +31,25 @@ def shipped() -> list[Entry]:
 
 def find(name: str, overrides: Iterable[str] = ()) -> Scenario:
     """The scenario of a file (anything with a slash or ending in .toml), else the shipped one of that name."""
-    if name.endswith(".toml") or "/" in name:
+    if _is_file(name):
         return config.load(Path(name), overrides)
+    return config.parse(_shipped(name).text, source=f"scenario {name}", name=name, overrides=overrides)
+
+
+def text_of(name: str) -> str:
+    """The text of a scenario that is right: of a file, or of the shipped one of that name."""
+    find(name)
+    return Path(name).read_text(encoding="utf-8") if _is_file(name) else _shipped(name).text
+
+
+def _is_file(name: str) -> bool:
+    return name.endswith(".toml") or "/" in name
+
+
+def _shipped(name: str) -> Entry:
     entries = {entry.name: entry for entry in shipped()}
     if name not in entries:
         close = difflib.get_close_matches(name, entries, n=1)
         hint = f"did you mean {close[0]}?" if close else f"shipped: {', '.join(entries)}; or give a .toml file"
         raise ConfigError(f"unknown scenario {name!r}; {hint}")
-    return config.parse(entries[name].text, source=f"scenario {name}", name=name, overrides=overrides)
+    return entries[name]

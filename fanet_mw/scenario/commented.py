@@ -1,0 +1,87 @@
+"""A scenario file for people: every key with its meaning, unit and bound in a comment above it.
+
+A key that is set stands as it is; a key that has its default stands behind `#`, ready to be changed.
+"""
+
+import json
+import textwrap
+from collections.abc import Iterator, Mapping
+from itertools import groupby
+from typing import Any, Final
+
+import tomli_w
+
+from fanet_mw.scenario.reference import REQUIRED, Key, Table, tables
+
+_WIDTH: Final = 100
+SCHEMA_NAME: Final = "fanet-scenario.schema.json"
+"""The file of the JSON schema that a scenario file names in its first line, for editors."""
+
+
+def commented(tree: Mapping[str, Any], *, every_key: bool = True, schema: bool = False) -> str:
+    """A scenario file that reads back as `tree`; without `every_key` it has only those keys that `tree` has.
+
+    `schema`: its first line names the JSON schema beside it.
+    """
+    lines = [f"#:schema ./{SCHEMA_NAME}"] if schema else []
+    if every_key:
+        lines += ["# A key behind # has its default. `fanet check FILE` says whether the file is right.", ""]
+    for path, group in groupby(tables(), key=lambda table: table.path):
+        kinds = list(group)
+        given = tree.get(path) if path else tree
+        if isinstance(given, list | tuple):
+            lines += [*_entries(path, given), *(line for table in kinds if every_key for line in _outline(table))]
+        elif isinstance(given, Mapping):
+            lines += _table(_of_kind(kinds, given), given, every_key=every_key)
+        elif every_key:
+            lines += [line for table in kinds for line in (_outline(table) if table.repeated else _table(table, {}))]
+    return "\n".join(lines).strip() + "\n"
+
+
+def _of_kind(kinds: list[Table], given: Mapping[str, Any]) -> Table:
+    """The table whose kind the given values name; the first when they name none."""
+    return next(
+        (table for table in kinds if table.heading and table.heading == f'kind = "{given.get("kind")}"'), kinds[0]
+    )
+
+
+def _table(table: Table, given: Mapping[str, Any], *, every_key: bool = True) -> Iterator[str]:
+    keys = [key for key in table.keys if every_key or key.name in given]
+    if table.path and (keys or given):
+        yield from ("", *_comment(table.meaning), f"[{table.path}]")
+    for key in keys:
+        yield from ("", *_comment(_sentence(key))) if every_key else _comment(_sentence(key))
+        if key.name in given:
+            yield tomli_w.dumps({key.name: given[key.name]}).rstrip()
+        else:
+            yield f"# {key.name} = {_default(key)}"
+
+
+def _entries(path: str, given: list[Any] | tuple[Any, ...]) -> Iterator[str]:
+    for entry in given:
+        yield from ("", f"[[{path}]]", tomli_w.dumps(entry).rstrip())
+
+
+def _outline(table: Table) -> Iterator[str]:
+    """What an entry of an array of tables would be, all of it behind `#`."""
+    yield from ("", *_comment(table.meaning), f"# [[{table.path}]]")
+    for key in table.keys:
+        value = table.heading.partition(" = ")[2] if key.name == "kind" else _default(key)
+        yield f"# {key.name} = {value}  # {_sentence(key)}"
+
+
+def _sentence(key: Key) -> str:
+    unit = f" {key.unit}" if key.unit else ""
+    return f"{key.meaning} [{key.bound}{unit}]"
+
+
+def _default(key: Key) -> str:
+    if key.default is REQUIRED:
+        return "..."
+    if key.default is None:
+        return "(unset)"
+    return json.dumps(key.default)
+
+
+def _comment(text: str) -> list[str]:
+    return textwrap.wrap(text, _WIDTH, initial_indent="# ", subsequent_indent="# ", break_long_words=False)

@@ -1,0 +1,184 @@
+"""What can be said of every key of a scenario: its table, unit, bound, default and meaning, read from the models.
+
+One walk serves the reference page, the comments that `fanet init` writes, and the completion of keys.
+"""
+
+import json
+import re
+from collections.abc import Iterator, Mapping
+from typing import Any, Final, NamedTuple
+
+from fanet_mw.scenario.model import Scenario
+from fanet_mw.scenario.quantities import unit_of
+
+Schema = Mapping[str, Any]
+_REFERENCE: Final = "#/$defs/"
+REQUIRED: Final = object()
+"""The default of a key that has none."""
+
+
+class Key(NamedTuple):
+    """One key of a table."""
+
+    name: str
+    unit: str
+    bound: str
+    default: object
+    meaning: str
+
+
+class Table(NamedTuple):
+    """One table of a scenario file."""
+
+    path: str
+    """As in the file, for example `radio`; empty for the keys above all tables."""
+    heading: str
+    """What tells it from other tables of the same path, for example `kind = "jam"`."""
+    repeated: bool
+    """True for an array of tables: `[[faults]]`."""
+    meaning: str
+    keys: tuple[Key, ...]
+
+    @property
+    def title(self) -> str:
+        """As it is written in a file."""
+        brackets = f"[[{self.path}]]" if self.repeated else f"[{self.path}]"
+        return f"{brackets} {self.heading}".strip() if self.path else "Top level"
+
+
+def json_schema() -> dict[str, Any]:
+    """The JSON schema of a scenario file, with descriptions, for editors and other tools."""
+    schema = _single_lines(Scenario.model_json_schema())
+    assert isinstance(schema, dict), "the schema of a model is an object"
+    del schema["description"]
+    return {
+        "$schema": "https://json-schema.org/draft/2020-12/schema",
+        **schema,
+        "title": "fanet-mw scenario",
+    }
+
+
+def tables() -> list[Table]:
+    """Every table of a scenario file, the keys above all tables first."""
+    schema = json_schema()
+    return list(_tables("", schema, schema["$defs"], meaning="One file is one scenario.", repeated=False))
+
+
+def dotted_keys() -> list[str]:
+    """Every key as `--set` takes it; those of arrays of tables are left out."""
+    return [f"{table.path}.{key.name}".lstrip(".") for table in tables() if not table.repeated for key in table.keys]
+
+
+def _tables(
+    path: str, model: Schema, models: Mapping[str, Schema], *, meaning: str, repeated: bool, heading: str = ""
+) -> Iterator[Table]:
+    inner: list[tuple[str, str, str, set[bool]]] = []
+    keys = []
+    needed = model.get("required", ())
+    for name, schema in model["properties"].items():
+        references: dict[str, set[bool]] = {}
+        for model_name, many in _references(schema):
+            references.setdefault(model_name, set()).add(many)
+        if references:
+            said = schema.get("description", "")
+            inner += [
+                (f"{path}.{name}".lstrip("."), model_name, said, forms) for model_name, forms in references.items()
+            ]
+            continue
+        default = REQUIRED if name in needed else schema.get("default")
+        keys.append(Key(name, _unit(name, schema), bound(schema), default, schema.get("description", "")))
+    yield Table(path, heading, repeated, meaning, tuple(keys))
+    for inner_path, model_name, said, forms in inner:
+        one = models[model_name]
+        kind = one["properties"].get("kind", {}).get("const")
+        yield from _tables(
+            inner_path,
+            one,
+            models,
+            meaning=f"{one.get('description', '')} {said}".strip(),
+            repeated=False not in forms,
+            heading="" if kind is None else f'kind = "{kind}"',
+        )
+
+
+def _references(schema: Schema, *, many: bool = False) -> Iterator[tuple[str, bool]]:
+    """(model, whether in an array) of the tables that a value may be."""
+    if "$ref" in schema:
+        yield schema["$ref"].removeprefix(_REFERENCE), many
+    for word in ("anyOf", "oneOf", "allOf"):
+        for part in schema.get(word, ()):
+            yield from _references(part, many=many)
+    if isinstance(schema.get("items"), dict):
+        yield from _references(schema["items"], many=True)
+
+
+def _unit(name: str, schema: Schema) -> str:
+    """Of a key that holds numbers: the unit that its name ends in, unless the model says another."""
+    unit = schema.get("unit", unit_of(name))
+    return str(unit) if "number" in (types := set(_types(schema))) or "integer" in types else ""
+
+
+def _types(schema: Schema) -> Iterator[str]:
+    if "type" in schema:
+        yield schema["type"]
+    for part in (*schema.get("anyOf", ()), *schema.get("prefixItems", ())):
+        yield from _types(part)
+    if isinstance(schema.get("items"), dict):
+        yield from _types(schema["items"])
+
+
+def bound(schema: Schema) -> str:
+    """In words, which values a schema allows."""
+    if "anyOf" in schema:
+        return "; or ".join(bound(part) for part in schema["anyOf"] if part.get("type") != "null")
+    if "const" in schema:
+        return json.dumps(schema["const"])
+    if "enum" in schema:
+        return ", ".join(json.dumps(value) for value in schema["enum"])
+    match schema.get("type"):
+        case "boolean":
+            return "true, false"
+        case "integer":
+            return f"whole, {_range(schema)}"
+        case "number":
+            return _range(schema)
+        case "array":
+            return _list(schema)
+        case "string":
+            return f"text matching `{schema['pattern']}`" if "pattern" in schema else "text"
+    return "any"
+
+
+def _range(schema: Schema) -> str:
+    least, above = schema.get("minimum"), schema.get("exclusiveMinimum")
+    most, below = schema.get("maximum"), schema.get("exclusiveMaximum")
+    if least is not None and most is not None:
+        return f"{_number(least)} to {_number(most)}"
+    words = [
+        f"{sign} {_number(limit)}"
+        for sign, limit in ((">=", least), (">", above), ("<=", most), ("<", below))
+        if limit is not None
+    ]
+    return ", ".join(words) or "any number"
+
+
+def _number(value: float) -> str:
+    return f"{value:,.10g}" if abs(value) < 1e12 else f"{value:.4g}"
+
+
+def _list(schema: Schema) -> str:
+    if "prefixItems" in schema:
+        bounds = [bound(part) for part in schema["prefixItems"]]
+        each = f"each {bounds[0]}" if len(set(bounds)) == 1 else " | ".join(bounds)
+        return f"[{len(bounds)} values], {each}"
+    return f"list of ({bound(schema['items'])})"
+
+
+def _single_lines(value: object) -> object:
+    """A schema whose descriptions are single lines: a docstring's lines end where the source's do."""
+    if isinstance(value, dict):
+        return {
+            key: re.sub(r"\s+", " ", item) if key == "description" and isinstance(item, str) else _single_lines(item)
+            for key, item in value.items()
+        }
+    return [_single_lines(item) for item in value] if isinstance(value, list) else value

@@ -1,0 +1,24 @@
+"""What the shell offers where a word of ours is wanted: scenarios by name, and keys of a scenario for `--set`."""
+
+from typing import Annotated, TypeAlias
+
+from cyclopts import Parameter
+from cyclopts.completion import CompletionContext
+
+from sim.scenarios import catalog
+
+
+def scenario_names(context: CompletionContext) -> list[str]:
+    """Shipped scenarios; the shell itself offers files."""
+    return [entry.name for entry in catalog.shipped() if entry.name.startswith(context.incomplete)]
+
+
+def keys(context: CompletionContext) -> list[str]:
+    """Dotted keys of a scenario, each with its `=`."""
+    from fanet_mw.scenario.reference import dotted_keys
+
+    return [f"{key}=" for key in dotted_keys() if key.startswith(context.incomplete)]
+
+
+ScenarioName: TypeAlias = Annotated[str, Parameter(completer=scenario_names)]
+"""A shipped scenario's name, or a .toml file."""

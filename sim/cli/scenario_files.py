@@ -1,0 +1,142 @@
+"""`fanet init`, `show`, `check` and `schema`: scenario files for people and for their editors."""
+
+import json
+import sys
+import tomllib
+from pathlib import Path
+from typing import Annotated
+
+import tomli_w
+from cyclopts import App, Parameter
+
+from fanet_mw.errors import ConfigError
+from fanet_mw.scenario import Scenario, config
+from fanet_mw.scenario.commented import SCHEMA_NAME, commented
+from fanet_mw.scenario.reference import json_schema
+from sim.cli.completion import ScenarioName
+from sim.cli.console import Console
+from sim.cli.options import Choice
+from sim.scenarios import catalog
+
+Switch = Annotated[bool, Parameter(negative="")]
+
+
+def add_to(app: App) -> None:
+    """Register the commands."""
+    for command in (init, show, check, schema):
+        app.command(command)
+
+
+def init(
+    file: Path,
+    *,
+    from_: Annotated[ScenarioName, Parameter(name="--from")] = "quick",
+    short: Switch = False,
+    schema: Switch = False,
+    force: Switch = False,
+) -> int:
+    """Write a scenario file to start from, with every key, its meaning, unit, bound and default in comments.
+
+    Parameters
+    ----------
+    file
+        The file to write, for example mine.toml.
+    from_
+        The scenario that it starts from: a shipped one's name or a .toml file.
+    short
+        Write only those keys that the scenario sets.
+    schema
+        Write the JSON schema beside it too, and name it in the first line, so that editors complete and check keys.
+    force
+        Replace a file that is there.
+
+    """
+    text = catalog.text_of(from_)
+    content = commented(tomllib.loads(text), every_key=not short, schema=schema)
+    config.parse(content, source=str(file), name="made")
+    if file.exists() and not force:
+        raise ConfigError(f"{file}: is there already; choose another name, or replace it with --force")
+    _write(file, content)
+    if schema:
+        _write(file.parent / SCHEMA_NAME, _schema_text())
+    console = Console(stderr=True)
+    console.print(
+        f"written to {file}; next: fanet check {file}, fanet simulate {file}", highlight=False, soft_wrap=True
+    )
+    return 0
+
+
+def show(
+    scenario: ScenarioName,
+    *,
+    choice: Choice = Choice(),
+    changed: Switch = False,
+    json_: Annotated[bool, Parameter(name="--json", negative="")] = False,
+) -> int:
+    """Print a scenario with every value that a run of it would use, as TOML.
+
+    Parameters
+    ----------
+    scenario
+        A shipped scenario's name (see `fanet scenarios`) or a .toml file.
+    changed
+        Print only what differs from the defaults.
+    json_
+        Print JSON instead.
+
+    """
+    chosen = choice.scenario(scenario)
+    tree = chosen.model_dump(mode="json", exclude_none=True, exclude_defaults=changed)
+    sys.stdout.write(json.dumps(tree, indent=2) + "\n" if json_ else tomli_w.dumps(tree))
+    return 0
+
+
+def check(file: ScenarioName, *, choice: Choice = Choice()) -> int:
+    """Say whether a scenario file is right; name every mistake with its key, value and bound.
+
+    Exit code 0: it is right; 2: it is not.
+
+    Parameters
+    ----------
+    file
+        A .toml file, or a shipped scenario's name.
+
+    """
+    chosen = choice.scenario(file)
+    Console().print(f"{file}: {_sentence(chosen)}", highlight=False, soft_wrap=True, markup=False)
+    return 0
+
+
+def schema(file: Path | None = None) -> int:
+    """Print the JSON schema of scenario files, from which editors complete and check keys.
+
+    Parameters
+    ----------
+    file
+        Where to write it; by default it is printed.
+
+    """
+    if file is None:
+        sys.stdout.write(_schema_text())
+    else:
+        _write(file, _schema_text())
+    return 0
+
+
+def _sentence(scenario: Scenario) -> str:
+    protocol = scenario.routing.protocol
+    return (
+        f"scenario {scenario.name} is right: {scenario.nodes.count} nodes, {scenario.duration_s:g} s, "
+        f"{protocol}, seed {scenario.seed}"
+    )
+
+
+def _schema_text() -> str:
+    return json.dumps(json_schema(), indent=2) + "\n"
+
+
+def _write(path: Path, text: str) -> None:
+    try:
+        path.write_text(text, encoding="utf-8")
+    except OSError as error:
+        raise ConfigError(f"{path}: cannot be written: {error.strerror}") from error

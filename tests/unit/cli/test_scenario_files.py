@@ -1,0 +1,75 @@
+"""`fanet init`, `show`, `check`, `schema`, completion, and `--set`: what a person does before a run."""
+
+import json
+import tomllib
+from pathlib import Path
+
+import pytest
+
+from fanet_mw.errors import ConfigError
+from sim.cli.app import app
+from sim.scenarios import catalog
+
+
+def fanet(*words: str) -> int:
+    return int(app(words, result_action="return_value"))
+
+
+def test_from_init_over_check_to_show(tmp_path: Path, capsys: pytest.CaptureFixture[str]) -> None:
+    file = tmp_path / "mine.toml"
+    assert fanet("init", str(file), "--from", "flooding") == 0
+    assert "next: fanet check" in capsys.readouterr().err
+    file.write_text(file.read_text().replace("# hop_limit = 32", "hop_limit = 5"))
+
+    assert fanet("check", str(file)) == 0
+    assert "scenario mine is right: 45 nodes" in capsys.readouterr().out
+    assert fanet("show", str(file)) == 0
+    shown = tomllib.loads(capsys.readouterr().out)
+    assert shown["routing"] == {**catalog.find("flooding").model_dump(mode="json")["routing"], "hop_limit": 5}
+
+    with pytest.raises(ConfigError, match="is there already"):
+        fanet("init", str(file))
+    assert fanet("init", str(file), "--force", "--short", "--schema") == 0
+    assert json.loads((tmp_path / "fanet-scenario.schema.json").read_text())["title"] == "fanet-mw scenario"
+    assert "hop_limit" not in file.read_text()
+
+
+def test_a_wrong_file_is_told_every_mistake(tmp_path: Path) -> None:
+    file = tmp_path / "wrong.toml"
+    file.write_text('duration_s = "3 m"\n')
+    with pytest.raises(ConfigError, match="'m' is not understood"):
+        fanet("check", str(file))
+    file.write_text("[radio]\nled_ms = 3\nrange_m = -1\n")
+    with pytest.raises(ConfigError, match=r"range_m = -1(.|\n)*did you mean lead_ms"):
+        fanet("check", str(file))
+
+
+def test_only_what_was_changed_is_shown(capsys: pytest.CaptureFixture[str]) -> None:
+    assert (
+        fanet("show", "quick", "--changed", "--set", "nodes.count=12", "radio.range_m=0.3km", "--duration", "1min") == 0
+    )
+    shown = tomllib.loads(capsys.readouterr().out)
+    assert shown["nodes"] == {"count": 12, "spacing_m": 150.0}
+    assert shown["radio"] == {"range_m": 300.0}
+    assert shown["duration_s"] == 60.0
+
+
+def test_set_is_repeatable_too(capsys: pytest.CaptureFixture[str]) -> None:
+    assert fanet("show", "quick", "--set", "nodes.count=12", "--set", "seed=4", "--json") == 0
+    shown = json.loads(capsys.readouterr().out)
+    assert (shown["nodes"]["count"], shown["seed"]) == (12, 4)
+
+
+@pytest.mark.parametrize(
+    ("words", "offered"),
+    [
+        (("simulate", "cro"), "crossing"),
+        (("init", "x.toml", "--from", "hid"), "hidden_terminal"),
+        (("launch", "quick", "--set", "radio.lead"), "radio.lead_ms="),
+    ],
+)
+def test_the_shell_completes_commands_scenarios_and_keys(
+    words: tuple[str, ...], offered: str, capsys: pytest.CaptureFixture[str]
+) -> None:
+    app._run_complete(words)
+    assert offered in capsys.readouterr().out

@@ -1,0 +1,79 @@
+"""A number with a unit is understood or refused, and never taken for a number without one."""
+
+import pytest
+from hypothesis import given
+from hypothesis import strategies as st
+
+from fanet_mw.errors import ConfigError
+from fanet_mw.scenario import Scenario, config
+from fanet_mw.scenario.quantities import in_unit_of, unit_of
+
+
+def scenario(*overrides: str, text: str = "") -> Scenario:
+    return config.parse(text, source="a.toml", name="a", overrides=overrides)
+
+
+@pytest.mark.parametrize(
+    ("key", "text", "value"),
+    [
+        ("duration_s", "2 min", 120.0),
+        ("duration_s", "90s", 90.0),
+        ("lead_ms", "0.06s", 60.0),
+        ("lead_ms", "250 us", 0.25),
+        ("area_m", "2.5km", 2500.0),
+        ("speed_m_s", "36 km/h", 10.0),
+        ("frequency_mhz", "2.412 GHz", 2412.0),
+        ("tx_power_dbm", "-3 dBm", -3.0),
+        ("payload_bytes", "1 kB", 1000.0),
+        ("turn_slack_us", "50 µs", 50.0),
+    ],
+)
+def test_a_unit_of_the_keys_dimension_is_understood(key: str, text: str, value: float) -> None:
+    assert in_unit_of(key, text) == pytest.approx(value, rel=1e-12)
+
+
+@pytest.mark.parametrize(
+    ("key", "text"),
+    [("duration_s", "2 m"), ("area_m", "3 s"), ("count", "9 m"), ("tx_power_dbm", "1 mW"), ("seed", "3s")],
+)
+def test_any_other_unit_is_refused(key: str, text: str) -> None:
+    with pytest.raises(ValueError, match="is not understood"):
+        in_unit_of(key, text)
+
+
+def test_the_longest_ending_counts() -> None:
+    assert [unit_of(key) for key in ("speed_m_s", "area_m", "lead_ms", "rate_mbps", "noise_dbm", "count")] == [
+        "m/s", "m", "ms", "Mb/s", "dBm", "",
+    ]  # fmt: skip
+
+
+@given(st.integers(1, 10**6))
+def test_milliseconds_as_seconds_and_back_are_exact(value: int) -> None:
+    assert in_unit_of("slot_ms", f"{value} ms") == value
+    assert in_unit_of("slot_s", f"{value * 1000} ms") == value
+
+
+def test_files_and_flags_understand_units_in_tables_too() -> None:
+    made = scenario("radio.lead_ms=0.06s", "duration_s=2min", text='[world]\narea_m = "1.5 km"\n')
+    assert (made.radio.lead_ms, made.duration_s, made.world.area_m) == (60.0, 120.0, 1500.0)
+
+
+def test_a_unit_that_does_not_fit_names_key_value_and_units() -> None:
+    with pytest.raises(ConfigError) as caught:
+        scenario("radio.lead_ms=3 m", text='duration_s = "3 dB"')
+    assert "radio.lead_ms = '3 m': 'm' is not understood: a number in ms, or with one of" in str(caught.value)
+    assert "duration_s = '3 dB'" in str(caught.value)
+
+
+def test_words_and_plain_text_stay_what_they_are() -> None:
+    made = scenario("clusters.guard_ms=auto", "description=5 s", text='name = "a"\n[clusters]\nrelay = "scheduled"')
+    assert made.clusters.guard_ms == "auto"
+    assert made.description == "5 s"
+
+
+def test_an_entry_of_an_array_is_changed_by_its_number() -> None:
+    text = '[[faults]]\nkind = "cut"\nnode = 2\nat_s = 3\n'
+    assert scenario("faults.0.node=4", text=text).faults[0].node == 4  # type: ignore[union-attr]
+    for wrong in ("faults.1.node=4", "faults.x.node=4"):
+        with pytest.raises(ConfigError, match="must be the number of an entry, 0 to 0"):
+            scenario(wrong, text=text)

@@ -1,4 +1,4 @@
-"""Every key of a scenario can be looked up: meaning, unit, bound and default, on the page, in a file and in an editor."""
+"""Every key of a scenario can be looked up, on a page, in a file and in an editor: meaning, unit, bound and default."""
 
 import json
 import runpy
@@ -15,9 +15,9 @@ from sim.scenarios import catalog
 ROOT = Path(__file__).parents[3]
 TABLES = {(table.path, table.heading): table for table in tables()}
 DIMENSIONLESS = {
-    "time_scale", "exponent", "phone_exponent", "nakagami_m", "gossip_p", "gossip_degree", "late_limit", "loss_share",
+    "time_scale", "camera_cycles", "exponent", "phone_exponent", "nakagami_m", "gossip_degree",
 }  # fmt: skip
-"""Keys of numbers that are pure: shares, factors, exponents."""
+"""Keys of numbers that are pure: factors, exponents; shares are known by their bound."""
 
 
 def table(path: str, heading: str = "") -> Table:
@@ -30,7 +30,11 @@ def test_every_key_says_what_it_means_and_every_measure_has_a_unit(of: Table) ->
     assert [key.name for key in of.keys if len(key.meaning) < 10] == []
     assert [key.name for key in of.keys if not key.bound or key.bound == "any"] == []
     unitless = {
-        key.name for key in of.keys if not key.unit and not key.bound.startswith(("whole", '"', "text", "true", "list"))
+        key.name
+        for key in of.keys
+        if not key.unit
+        and key.bound != "0 to 1"
+        and not key.bound.startswith(("whole", "> 0, < ", '"', "text", "true", "list"))
     }
     assert unitless - DIMENSIONLESS == set()
 
@@ -66,7 +70,7 @@ def test_every_default_in_a_commented_file_is_taken_when_it_is_uncommented() -> 
     text = "\n".join(
         line.removeprefix("# ")
         for line in lines[: lines.index("# [[faults]]")]
-        if line.startswith(("#", "[")) and "= " in line and unset not in line and _is_toml(line) or line.startswith("[")
+        if line.startswith("[") or (unset not in line and _is_toml(line))
     )
     assert config.parse(text, source="made", name="unnamed") == config.parse("", source="none", name="unnamed")
 

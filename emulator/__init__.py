@@ -1,1 +1,1 @@
-"""The link emulator of fanet-mw: decides who hears whom. Frames are bytes to it."""
+"""The link emulator of fanet-mw: it decides which station receives which frame. A frame is only bytes to it."""

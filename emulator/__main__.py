@@ -5,7 +5,7 @@ from functools import partial
 from pathlib import Path
 
 from emulator.capture_file import CaptureFile, unused
-from emulator.kernel.compile import WORD, must_compile, warm_up
+from emulator.kernel.compile import COMPILING_NOTICE, must_compile, warm_up
 from emulator.medium import Medium
 from fanet_mw.hosts import interrupts, loop, service
 from fanet_mw.hosts.bus import JOIN_PATIENCE_S
@@ -57,7 +57,7 @@ def main() -> int:
 
     def start(scenario: Scenario, swarm: str, endpoint: str) -> int:
         if must_compile():
-            sys.stderr.write(f"{WORD}\n")
+            sys.stderr.write(f"{COMPILING_NOTICE}\n")
         return run(
             scenario,
             swarm=swarm,

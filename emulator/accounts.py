@@ -1,4 +1,4 @@
-"""The medium's books: every request, every copy, every late frame. What is counted here is never counted elsewhere."""
+"""The medium's counters: requests, copies, late frames. What is counted here is counted nowhere else."""
 
 from collections import Counter
 from typing import Any, Final
@@ -22,11 +22,11 @@ _REASON_OF: Final = {
     s.CUT_OFF: DropReason.STATION_DOWN,
 }
 _LATENESS_STEPS: Final = (0.1, 0.2, 0.5, 1, 2, 5, 10, 20, 50, 100, 200, 500, 1000)
-"""Upper edges of the lateness histogram [ms]; percentiles are given as the edge they fall under."""
+"""Upper edges of the bins of the lateness histogram [ms]; a percentile is given as the upper edge of its bin."""
 
 
 class Accounts:
-    """Counters at request level, and what the kernel counted at copy level."""
+    """What the medium counted per request, beside what the kernel counted per copy."""
 
     def __init__(self) -> None:
         self.sent = 0
@@ -34,11 +34,11 @@ class Accounts:
         self.delivered_bytes = 0
         self.dropped: Counter[str] = Counter()
         self.refused: Counter[str] = Counter()
-        """Hostile or misdirected input, by kind; none of it became a frame."""
+        """Input that was hostile or misdirected, by its kind; none of it became a frame."""
         self.poses = 0
-        """Sets of positions taken in."""
+        """How many sets of positions were accepted."""
         self.controls = 0
-        """Changes of the air that were obeyed."""
+        """How many changes of the air were carried out."""
         self.late_frames = 0
         self._max_late_ns = 0
         self._lateness = [0] * (len(_LATENESS_STEPS) + 1)
@@ -60,22 +60,22 @@ class Accounts:
         self._lateness[index] += 1
 
     def lost(self, verdict: int) -> None:
-        """Nothing refers to a frame any more, and nobody got it."""
+        """Count a frame that nobody received, when nothing refers to it any more."""
         self.dropped[_REASON_OF[verdict]] += 1
 
     def measure_from(self, g: s.Ints, *, busy_ns: int, now_ns: int) -> None:
-        """Air statistics begin here: the warm-up is over."""
+        """The warm-up is over: statistics of the air begin here."""
         self._baseline = g.copy()
         self._busy_baseline_ns = busy_ns
         self._bytes_baseline = self.delivered_bytes
         self._measured_from_ns = now_ns
 
     def measure_until(self, g: s.Ints, *, busy_ns: int, now_ns: int) -> None:
-        """Air statistics end here: what comes now only drains."""
+        """The measurement is over: statistics of the air end here, because what follows only drains."""
         self._end = g.copy(), busy_ns, self.delivered_bytes, now_ns
 
     def air(self, g: s.Ints, *, busy_ns: int, now_ns: int, stations: int) -> dict[str, float | None]:
-        """Air statistics from `measure_from` to `measure_until`, or until now."""
+        """Statistics of the air from `measure_from` to `measure_until`, or until now when that was not called."""
         g, busy_ns, delivered_bytes, now_ns = self._end or (g, busy_ns, self.delivered_bytes, now_ns)
         d = (g - self._baseline).tolist()
         span_ns = max(1, now_ns - self._measured_from_ns)
@@ -90,7 +90,7 @@ class Accounts:
         }
 
     def copies(self, g: s.Ints) -> dict[str, Any]:
-        """The ledger at receivers: copies put on the air in range, and what became of them."""
+        """The ledger at receivers: the copies that went on the air in range of a receiver, and how each ended."""
         lost = {
             DropReason.COLLISION: int(g[s.COLLISION_COPIES]),
             DropReason.HALF_DUPLEX: int(g[s.HALF_DUPLEX_COPIES]),
@@ -106,7 +106,7 @@ class Accounts:
         }
 
     def lateness(self) -> dict[str, float]:
-        """Over all requests; a request in time is late by 0."""
+        """How late requests came, over all of them; a request in time counts as 0 ms late."""
         return {
             "late_frames": self.late_frames,
             "frames": self.sent,

@@ -1,4 +1,7 @@
-"""The kernel's arrays and the calls into it. Stations and frame slots; bytes, topics and nodes are the medium's."""
+"""The kernel's arrays and the calls into it, in terms of stations and frame slots.
+
+Bytes, topics and node ids are known to the medium only.
+"""
 
 import struct
 from functools import lru_cache
@@ -23,23 +26,24 @@ from fanet_mw.rng import stream_seed
 from fanet_mw.scenario import Scenario
 
 _ROW: Final = struct.Struct("=6q")
-"""One row of `asked` or `out`."""
+"""The layout of one row of `asked` and of `out`."""
 _pack, _unpack, _ROW_BYTES = _ROW.pack_into, _ROW.iter_unpack, _ROW.size
 _MOST_ASKED: Final = 256
+"""How many requests may wait to be handed to the kernel."""
 _SLOTS: Final = 1000
-"""Frame slots to begin with. No power of two: what is known of one frame, a row apart each, would lie on the same few
-lines of the processor's cache, and push itself out."""
+"""How many frame slots there are at first. The number is no power of two: with a power of two the rows of one frame
+would compete for the same few lines of the processor's cache."""
 Rows = list[tuple[int, ...]]
 
 
 @lru_cache(maxsize=8)
 def _error_table(rate_mbps: float, ack_rate_mbps: float) -> npt.NDArray[np.float64]:
-    """PLCP header, data, ACK (`emulator.kernel.state.LOCK_RATE`)."""
+    """The rows of the kernel's `err`: PLCP header, data, ACK (see `emulator.kernel.state.LOCK_RATE`)."""
     return np.stack([log_success_per_bit(rate) for rate in (header_rates(rate_mbps)[0], rate_mbps, ack_rate_mbps)])
 
 
 class Air:
-    """The state of the channel and of all MACs."""
+    """The state of the channel and of the MAC of every station."""
 
     def __init__(self, scenario: Scenario, *, stations: int, faults: Faults, capture: bool = False) -> None:
         radio, seed, lifetime_ns = scenario.radio, scenario.seed, scenario.mac_lifetime_ns
@@ -87,12 +91,12 @@ class Air:
         self._hs = np.zeros((8 * stations + 2 * _SLOTS + 64, 5), np.int64)
         self._asked = np.zeros((_MOST_ASKED, s.ASKED_COLUMNS), np.int64)
         self._out = np.zeros((2 * radio.queue_frames + 1024, s.OUT_COLUMNS), np.int64)
-        # The same memory by the buffer protocol: at a few numbers a call, several times as fast as numpy's own access.
+        # These views are the same memory by the buffer protocol, which reads a few numbers faster than numpy does.
         self._counts = self.g.data
         self._asked_bytes = self._asked.data.cast("B")
         out_bytes = self._out.data.cast("B")
         self._out_rows = [out_bytes[: count * _ROW_BYTES] for count in range(len(self._out) + 1)]
-        """The first rows of `out`, by how many."""
+        """At index n: the first n rows of `out`, as bytes."""
         self._err = _error_table(radio.rate_mbps, radio.ack_rate_mbps) if radio.channel != "range" else np.zeros((3, 1))
         self._airtime: dict[int, int] = {}
         self._shadowing = Shadowing(radio, seed=seed) if radio.shadowing_db else None
@@ -101,28 +105,28 @@ class Air:
         self._hr = np.zeros((64, 5), np.int64)
         self._at = np.full((stations, 3), np.inf)
         self._blocked = np.zeros(0, np.int64)
-        self._seen_anew = False
-        """Whether the obstructions have changed since the links were made."""
+        self._sight_changed = False
+        """True when the obstructions have changed since the links were made."""
         self.next_output_ns = s.NEVER
-        """A lower bound of the next instant at which `advance` has something to return; NEVER: nothing is planned."""
-        self._gather()
+        """A lower bound of the next instant at which `advance` returns rows; NEVER when nothing is planned."""
+        self._renew_entry()
 
     def obstruct(self, pairs: npt.NDArray[np.int64]) -> None:
-        """Something stands between these pairs of stations [n, 2], and no others, from the next `place` on."""
+        """Set the pairs of stations [n, 2] between which something stands; it counts from the next `place` on."""
         blocked = np.unique(pair_codes(pairs, self._stations))
-        self._seen_anew = self._seen_anew or not np.array_equal(blocked, self._blocked)
+        self._sight_changed = self._sight_changed or not np.array_equal(blocked, self._blocked)
         self._blocked = blocked
 
     def place(self, at: npt.NDArray[np.float64]) -> None:
-        """New positions [m], one row per station; frames under way are carried over."""
-        if np.array_equal(at, self._at) and not self._seen_anew:
+        """Take over new positions [m], one row per station; frames on the way are carried over to the new links."""
+        if np.array_equal(at, self._at) and not self._sight_changed:
             return
-        self._seen_anew = False
+        self._sight_changed = False
         self._at = at
         self.relink()
 
     def relink(self) -> None:
-        """Make the links anew: stations have moved, or faults have changed."""
+        """Make the links anew, because stations have moved or faults have changed."""
         at = self._at
         self._take_in()
         self.book.take(self._lk)
@@ -130,7 +134,7 @@ class Air:
         links = Links(
             np.ascontiguousarray(at), self._radio, spare=spare, shadowing=self._shadowing, blocked=self._blocked
         )
-        self._sf[s.NOISE] = self._faults.shape(links, at)
+        self._sf[s.NOISE] = self._faults.apply(links, at)
         self.g[s.REACH_NS] = max(self.g[s.REACH_NS] if spare else 0, links.longest_ns)
         room = 4 * (links.ints.shape[1] + self._stations) + 64
         if self._hr.shape[0] < room + self.g[s.HR_N]:
@@ -141,32 +145,32 @@ class Air:
                 self._hr, self.g, self._lk, self._lp, self._ptr, self.st[s.LOCK], links.ints, links.reals, links.ptr
             )
         self._lk, self._lp, self._ptr = links.ints, links.reals, links.ptr
-        self._gather()
+        self._renew_entry()
         self.next_output_ns = int(kernel.next_output(self.g, self._p, self.st, self.fr, self._hs))
 
     def links(self, now_ns: int) -> LinkStats | None:
-        """What the links carried since this was last asked; None when it was nothing."""
+        """What the links have carried since the previous call; None when they have carried nothing."""
         self.book.take(self._lk)
         return self.book.close(now_ns)
 
     def neighbors(self, station: int) -> int:
-        """How many stations hear this one."""
+        """How many stations are in range of this one."""
         return int(self._lk[s.AUDIBLE, self._ptr[station] : self._ptr[station + 1]].sum())
 
     def slots(self) -> int:
-        """Frame slots there are."""
+        """How many frame slots there are."""
         return int(self.fr.shape[1])
 
     def grow(self) -> None:
-        """Twice as many frame slots."""
+        """Double the number of frame slots."""
         more = self.slots()
         self.fr = np.concatenate([self.fr, np.zeros_like(self.fr)], axis=1)
         self._more_starts(2 * more)
 
     def submit(self, slot: int, src: int, dst: int, size: int, start_ns: int, wants_status: bool) -> None:
-        """A frame of `size` bytes (UDP payload) will enter its station's queue at `start_ns`.
+        """Announce a frame of `size` bytes (UDP payload) that will enter its station's queue at `start_ns`.
 
-        The kernel is told by the next `advance`; at once only if the frame may be the next that ends.
+        The kernel learns of it at the next `advance`, or at once if this frame might be the next one to end.
         """
         airtime = self._airtime.get(size)
         if airtime is None:
@@ -180,7 +184,7 @@ class Air:
             self._take_in()
 
     def _take_in(self) -> None:
-        """Tell the kernel what was asked for."""
+        """Hand the requests that wait in `asked` to the kernel."""
         counts = self._counts
         if counts[s.HS_N] + counts[s.ASKED_N] + 2 * kernel.MARGIN > len(self._hs):
             self._more_starts(len(self._hs))
@@ -189,7 +193,7 @@ class Air:
         )
 
     def advance(self, until_ns: int) -> Rows:
-        """Let time pass; returns the output rows (`emulator.kernel.state.OUT_*`) in order."""
+        """Let time pass until `until_ns`; returns the output rows (`emulator.kernel.state.OUT_*`) in order."""
         rows: Rows = []
         while True:
             bound_ns = self._entry.advance(until_ns)
@@ -203,18 +207,18 @@ class Air:
                 self._more_starts(len(self._hs))
 
     def _more_starts(self, rows: int) -> None:
-        """Room for `rows` more planned starts."""
+        """Make room for `rows` more planned starts."""
         self._hs = np.concatenate([self._hs, np.zeros((rows, 5), np.int64)])
-        self._gather()
+        self._renew_entry()
 
-    def _gather(self) -> None:
-        """The way into `kernel.advance`; to be renewed when an array is replaced."""
+    def _renew_entry(self) -> None:
+        """Make the entry to `kernel.advance` anew, as is needed whenever an array has been replaced."""
         self._entry = Entry(
             self.g, self._p, self._pf, self.st, self._sf, self.fr, self._lk, self._lp, self._ptr, self._hs, self._hr,
             self._asked, self._out, self._err,
         )  # fmt: skip
 
     def busy_ns(self, now_ns: int) -> int:
-        """Time in which the PHY was not idle, summed over stations."""
+        """The time for which the PHY was not idle, summed over all stations."""
         since = self.st[s.BUSY_SINCE]
         return int(self.st[s.BUSY_NS].sum() + np.where(since >= 0, now_ns - since, 0).sum())

@@ -1,6 +1,6 @@
-"""The file of a capture: opened and written here, for the entry points; the medium only knows `Capture`.
+"""The file of a capture, opened and written on behalf of the entry points; the medium knows only `Capture`.
 
-A disk that fails ends the capture and not the run: it is said once, and the file keeps what it had.
+When the disk fails, the capture ends and the run goes on: one message says so, and the file keeps what it has.
 """
 
 import contextlib
@@ -19,7 +19,7 @@ _BUFFER: Final = 1 << 18
 
 
 def unused(path: Path) -> Path:
-    """`path`, or with a number when there is one: an emulator that is started again keeps what the last one saw."""
+    """`path`, or `path` with a number if that file exists: a restarted emulator must not overwrite a capture."""
     number = 1
     found = path
     while found.exists():
@@ -29,13 +29,13 @@ def unused(path: Path) -> Path:
 
 
 def captures(path: Path) -> list[Path]:
-    """The captures of an earlier run: `path`, and those with a number."""
+    """The captures that a finished run has left: `path`, and the same name with a number."""
     named = sorted(path.parent.glob(f"{path.stem}*{path.suffix}"))
     return [found for found in named if re.fullmatch(rf"{re.escape(path.stem)}(-\d+)?", found.stem)]
 
 
 class CaptureFile:
-    """A `Pcap` on a file; raises ConfigError when that cannot be opened."""
+    """A `Pcap` that writes to a file; raises ConfigError when the file cannot be opened."""
 
     def __init__(self, path: Path, radio: Radio, *, receptions: bool = False) -> None:
         try:

@@ -1,12 +1,13 @@
-"""Faults that lie on the air now, and those still to come: they change links and noise, nothing else.
+"""The faults that are in force on the air now, and those to come. They change links and noise, nothing else.
 
     degraded   power x 10^(-loss_db / 10); below the sensitivity the link is gone; a share of what is received is lost
     jammed     the noise at receivers inside is higher, or nothing is received there; a jammer is not sensed (the clear
                channel assessment of 802.11-2020, 16.3.8.5, mode 2 looks for signals, not for energy)
     cut        no power to or from the node
 
-A link that is audible without its faults is marked with the gravest of them, so that what it loses as weak is counted
-under it. Frames under way keep the power they started with. Does not model: jammers that move, or react.
+A link that would be audible without its faults is marked with the gravest of them, so that what it loses as too weak is
+counted under that fault. Frames on the way keep the power with which they started. Not modeled: jammers that move or
+react.
 """
 
 import heapq
@@ -24,19 +25,19 @@ from fanet_mw.scenario import Radio
 from fanet_mw.trace import RadioFault
 
 MAX_FAULTS: Final = 1024
-"""At a time; more are refused."""
+"""The number of faults that may be in force at the same time; a further one is refused."""
 _KINDS: Final = {Degrade: "degrade", Jam: "jam", Cut: "cut"}
 
 
 class _Standing(NamedTuple):
-    """A fault that lies on the air; `number` tells it from an earlier one of its label."""
+    """A fault in force; `number` distinguishes it from an ended fault of the same label."""
 
     fault: Fault
     number: int
 
 
 class Faults:
-    """What is wrong with the air, by label."""
+    """The faults in force, by label, and the agenda of those that begin or end by themselves."""
 
     def __init__(self, radio: Radio, *, stations: int, planned: Iterable[tuple[int, Control]] = ()) -> None:
         self._radio = radio
@@ -44,21 +45,21 @@ class Faults:
         self._standing: dict[str, _Standing] = {}
         self._number = 0
         self._agenda: list[tuple[int, int, Control | None, str, int]] = []
-        """(instant, order, what begins, or: label and number of what ends), a heap."""
+        """A heap of (instant, order, what begins; or the label and number of what ends)."""
         for at_ns, control in planned:
             self._push(at_ns, control)
         self.records: list[RadioFault] = []
 
     def cut_off(self) -> frozenset[int]:
-        """Stations whose radio is off."""
+        """The stations whose radio is off."""
         return frozenset(item.fault.node - 1 for item in self._standing.values() if isinstance(item.fault, Cut))
 
     def next_ns(self) -> int | None:
-        """When the next fault begins or ends by itself."""
+        """The instant at which the next fault begins or ends by itself; None when there is none."""
         return self._agenda[0][0] if self._agenda else None
 
     def pass_time(self, now_ns: int) -> list[str]:
-        """Begin and end what is due by `now_ns`; returns the kinds of what was refused."""
+        """Begin and end what is due by `now_ns`; returns for each refused fault why it was refused."""
         refused = []
         while self._agenda and self._agenda[0][0] <= now_ns:
             at_ns, _, control, label, number = heapq.heappop(self._agenda)
@@ -70,7 +71,7 @@ class Faults:
         return refused
 
     def obey(self, control: Control, now_ns: int) -> str | None:
-        """Begin or end something now; returns why not, None when it was done."""
+        """Begin or end a fault now; returns why that was refused, None when it was done."""
         if isinstance(control, Restore):
             if control.label and control.label not in self._standing:
                 return "fault_unknown_label"
@@ -108,10 +109,10 @@ class Faults:
         other = fault.dst if isinstance(fault, Degrade) else 0
         self.records.append(RadioFault(now_ns, node, other, _KINDS[type(fault)], fault.label, active))
 
-    # --- what they do to the air ----------------------------------------------------------------------------------
+    # --- the effect on links and noise ----------------------------------------------------------------------------
 
-    def shape(self, links: Links, at: npt.NDArray[np.float64]) -> npt.NDArray[np.float64]:
-        """Change the links of stations `at` [m, n x 3]; returns the noise at each station [mW]."""
+    def apply(self, links: Links, at: npt.NDArray[np.float64]) -> npt.NDArray[np.float64]:
+        """Apply the faults to the links of stations at `at` [m, n x 3]; returns the noise at each station [mW]."""
         noise = np.full(self._stations, noise_mw(self._radio))
         faults = [item.fault for item in self._standing.values()]
         for fault in faults:
@@ -126,14 +127,14 @@ class Faults:
         if cut:
             self._cut(links, sorted(cut))
         if faults:
-            links.dead_last()
+            links.sort_dead_last()
         return noise
 
     def _degrade(self, links: Links, src: int, dst: int, fault: Degrade) -> None:
         first, end = links.ptr[src], links.ptr[src + 1]
         found = np.flatnonzero(links.ints[s.LINK_DST, first:end] == dst)
         if not len(found):
-            return  # out of reach
+            return  # the two stations are out of reach of each other
         link = int(first + found[0])
         power_mw = links.reals[s.LINK_POWER, link] * milliwatt(-fault.loss_db)
         if not links.ints[s.AUDIBLE, link]:
@@ -143,12 +144,12 @@ class Faults:
         links.ints[s.AUDIBLE, link] = audible
         links.ints[s.FAULT, link] = s.FATE_DEGRADED
         links.reals[s.SPARED, link] *= 1 - fault.loss_share
-        unheard = not audible and self._radio.channel == "range"  # where whatever arrives at all destroys
+        unheard = not audible and self._radio.channel == "range"  # in this model any overlap destroys a frame
         links.reals[s.LINK_POWER, link] = 0.0 if unheard else power_mw
 
     def _jam(self, links: Links, at: npt.NDArray[np.float64], fault: Jam) -> npt.NDArray[np.float64]:
-        """Returns what is added to the noise at each station [mW]."""
-        with np.errstate(invalid="ignore"):  # stations of unknown position are far away
+        """Mark the links into the jammed area; returns what is added to the noise at each station [mW]."""
+        with np.errstate(invalid="ignore"):  # a station of unknown position is infinitely far away
             inside = np.hypot(at[:, 0] - fault.center.east, at[:, 1] - fault.center.north) <= fault.radius_m
         count = links.count
         hit = inside[links.ints[s.LINK_DST, :count]] & (links.ints[s.AUDIBLE, :count] == 1)

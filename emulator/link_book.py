@@ -1,7 +1,7 @@
-"""Counts of links across their remaking: the kernel counts on the links it has, poses make new ones ten times a second.
+"""The counts of links, kept while links are made anew: the kernel counts on its links, and poses replace those.
 
-`take` moves the counts of an array of links into the book and leaves zeros; `close` sums what was taken since the last
-time. Both are a few vector operations, whatever the number of frames.
+`take` moves the counts of an array of links into the book and leaves zeros there; `close` sums what was taken since the
+last report. Both are a few vector operations, whatever the number of frames.
 """
 
 from array import array
@@ -13,11 +13,11 @@ from emulator.kernel.state import Ints
 from fanet_mw.bus.link_stats import COUNTS, LinkStats
 
 _ROWS = slice(s.RSSI_SUM, s.N_CUT + 1)
-"""RSSI sum, then COUNTS."""
+"""The rows of a link that are counts: the sum of RSSI, then one per name in COUNTS."""
 
 
 class LinkBook:
-    """What links have carried since the last report."""
+    """What the links have carried since the last report."""
 
     def __init__(self, stations: int) -> None:
         self._stations = stations
@@ -26,11 +26,11 @@ class LinkBook:
         self._since_ns = 0
 
     def begin(self, now_ns: int) -> None:
-        """The first report covers the time from now on."""
+        """Start the time that the first report covers."""
         self._since_ns = now_ns
 
     def take(self, lk: Ints) -> None:
-        """Move the counts of these links here."""
+        """Move the counts of these links into the book."""
         used = np.flatnonzero(lk[s.N_RECEIVED : s.N_CUT + 1].any(axis=0))
         if len(used):
             self._keys.append(lk[s.LINK_SRC, used] * self._stations + lk[s.LINK_DST, used])

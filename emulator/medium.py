@@ -1,7 +1,7 @@
 """The link emulator as an actor: transmit requests and poses in, receptions and transmit statuses out.
 
-Frames are bytes here, stations are node ids minus one. Requests are announced ahead and wait for their instant in the
-kernel; what arrives too late is counted, and dropped when it is later than anyone could have meant.
+Frames are only bytes here, and a station is a node id minus one. Requests are announced ahead and wait in the kernel
+for their instant. A request that comes after its instant is counted, and dropped when it is over `TOO_LATE_NS` late.
 """
 
 from collections.abc import Mapping
@@ -23,19 +23,19 @@ from fanet_mw.scenario import Scenario
 from fanet_mw.units import BROADCAST, MS, NodeId, S, earliest
 
 TOO_LATE_NS: Final = 50 * MS
-"""A request later than this is dropped: its slot is long another's."""
+"""A request later than this is dropped, because by then its slot belongs to another node."""
 ANNOUNCED: Final = 1024
-"""Requests of one node that may wait for their instant, beyond what its MAC queue holds."""
+"""How many requests of one node may wait for their instant, beyond what its MAC queue holds."""
 _new: Final = tuple.__new__
 _RECEPTION, _FREE, _DELIVERED, _NEVER = s.OUT_RECEPTION, s.OUT_FREE, s.DELIVERED, s.NEVER
 _NO_RECEPTION: Final = Reception(b"", NodeId(0), 0, 0.0)
 _SEQ_MASK: Final = 0xFFFF_FFFF
 _LONGEST_GAP: Final = 1 << 20
-"""Requests; a longer one is no loss but nonsense."""
+"""The greatest gap in request numbers that is taken for requests that were lost; a longer one is taken for nonsense."""
 _FARTHEST_M: Final = 1e7
-"""Of a coordinate; positions beyond are no swarm's, and would overflow the cells in which neighbors are looked for."""
+"""The greatest coordinate; larger ones would overflow the cells in which neighbors are looked for."""
 _HORIZON_NS: Final = 60_000 * MS
-"""A request for an instant further ahead than this is refused: nobody plans so far, and it would only take room."""
+"""A request further ahead than this is refused: no node plans so far, and the request would only occupy memory."""
 
 
 class Medium(Actor):
@@ -57,24 +57,24 @@ class Medium(Actor):
         self._requests: list[TxRequest | None] = [None] * self._air.slots()
         self._ids = [NodeId(node) for node in scenario.node_ids]
         self._sources = [self._ids[0]] * self._air.slots()
-        """Sender of the request in each slot."""
+        """The sender of the request in each slot."""
         self._free = list(range(self._air.slots() - 1, -1, -1))
         self._held = [0] * self._count
-        """Requests of each station that have not ended."""
+        """How many requests of each station have not ended."""
         self._most_held = scenario.radio.queue_frames + ANNOUNCED
         self._next_seq: list[int | None] = [None] * self._count
         self._requested = [0] * self._count
-        """Requests of each node, those included that a gap shows to be lost."""
+        """How many requests each node has made, including those that a gap in its numbers shows to be lost."""
         self._before = [0] * self._count
-        """How many of them were of the node before its process started again."""
+        """How many of them were made by the node before its process was restarted."""
         self._handover_ns = scenario.radio.handover_ns
         start_ns, end_ns = scenario.traffic_window_ns
         self._warm_ns: int | None = start_ns
         self._cool_ns: int | None = end_ns
         self._links_topic = topics.radio_links
         self._links_ns: int | None = None
-        """When links are reported next; None while the air is silent."""
-        self._due_ns = self._next_turn_ns()
+        """The instant of the next report of links; None while the air is silent."""
+        self._due_ns = self._next_due_ns()
         self._now_ns = 0
         self._control_topic = topics.radio_control
 
@@ -100,14 +100,14 @@ class Medium(Actor):
             self.wake(now_ns)
             why = self._faults.obey(message, self._now_ns)
             self._accounts.controls += why is None
-            self._change(why)
+            self._take_in_faults(why)
         else:
             self._accounts.refused["message_type"] += 1
 
     def wake(self, now_ns: int) -> None:
-        """Advance the air to `now_ns` and hand out what came of it."""
+        """Advance the air to `now_ns` and hand out what has resulted."""
         while self._due_ns is not None and self._due_ns <= now_ns:
-            self._turn(self._due_ns)
+            self._pass_due(self._due_ns)
         rows = self._air.advance(now_ns)
         if rows:
             self._hand_out(rows)
@@ -152,7 +152,7 @@ class Medium(Actor):
     # --- requests -------------------------------------------------------------------------------------------------
 
     def _request(self, station: int, request: TxRequest, now_ns: int) -> None:
-        """Take in one request; whatever is wrong with it is counted, never raised."""
+        """Take in one request; what is wrong with a request is counted, never raised."""
         seq, start_ns, frame, dst, wants_status = request
         if seq != self._next_seq[station]:
             self._count_gap(station, seq)
@@ -181,10 +181,10 @@ class Medium(Actor):
         self._air.submit(slot, station, s.EVERYONE if dst == BROADCAST else dst - 1, size, start_ns, wants_status)
         if self._links_ns is None:
             self._links_ns = (self._now_ns // S + 1) * S
-            self._due_ns = self._next_turn_ns()
+            self._due_ns = self._next_due_ns()
 
     def _refuse_shape(self, station: int, request: TxRequest, now_ns: int) -> None:
-        """Nobody to send it to, or nothing that fits into a frame."""
+        """Refuse a request whose destination does not exist or whose frame is empty or too long."""
         size = len(request.frame)
         if request.dst != BROADCAST and not 1 <= request.dst <= self._count:
             reason = DropReason.NO_RECEIVER
@@ -193,7 +193,7 @@ class Medium(Actor):
         self._refuse(station, request, reason, now_ns)
 
     def _refuse_instant(self, station: int, request: TxRequest, now_ns: int) -> bool:
-        """An instant that nobody means is refused, and so is one too long ago; a late one is counted."""
+        """Refuse a request whose instant is absurd or too long past; a late one is counted. True if it was refused."""
         late_ns = now_ns - request.start_ns
         if not -_HORIZON_NS < late_ns < _HORIZON_NS:
             self._refuse(station, request, DropReason.MALFORMED, now_ns)
@@ -204,11 +204,11 @@ class Medium(Actor):
         return late_ns > TOO_LATE_NS
 
     def _count_gap(self, station: int, seq: int) -> None:
-        """A gap is requests that the bus lost: they were sent, and they are dropped."""
+        """Count the requests that the bus lost, as a gap in their numbers shows: they were sent, and are dropped."""
         expected = self._next_seq[station]
-        if expected is None:  # we are the ones who started again, or these were lost: the ledger of the run tells
+        if expected is None:  # the emulator has restarted, or the first requests were lost: the run's ledger finds that
             return
-        if seq == 0:  # the node has started again
+        if seq == 0:  # the node has been restarted
             self._before[station] = self._requested[station]
             return
         gap = (seq - expected) & _SEQ_MASK
@@ -233,8 +233,8 @@ class Medium(Actor):
 
     # --- time -----------------------------------------------------------------------------------------------------
 
-    def _turn(self, due_ns: int) -> None:
-        """Everything before this instant has happened: the warm-up ends, faults begin and end, links are reported."""
+    def _pass_due(self, due_ns: int) -> None:
+        """Process what falls due at this instant: measurement begins or ends, faults change, links are reported."""
         self._hand_out(self._air.advance(max(due_ns, self._now_ns)))
         self._now_ns = max(self._now_ns, due_ns)
         if self._warm_ns is not None and self._warm_ns <= due_ns:
@@ -245,24 +245,24 @@ class Medium(Actor):
             self._cool_ns = None
         fault_ns = self._faults.next_ns()
         if fault_ns is not None and fault_ns <= due_ns:
-            self._change(*self._faults.pass_time(due_ns))
+            self._take_in_faults(*self._faults.pass_time(due_ns))
         if self._links_ns is not None and self._links_ns <= due_ns:
             silent = not self._report_links(due_ns) and len(self._free) == len(self._requests)
             self._links_ns = None if silent else (due_ns // S + 1) * S
-        self._due_ns = self._next_turn_ns()
+        self._due_ns = self._next_due_ns()
 
-    def _next_turn_ns(self) -> int | None:
+    def _next_due_ns(self) -> int | None:
         return earliest(self._warm_ns, self._cool_ns, self._faults.next_ns(), self._links_ns)
 
     def _report_links(self, now_ns: int) -> bool:
-        """Tell what the links carried; returns whether it was anything."""
+        """Report what the links have carried; returns False when it was nothing."""
         stats = self._air.links(now_ns)
         if stats is not None:
             self.outbox.append((self._links_topic, stats))
         return stats is not None
 
-    def _change(self, *refused: str | None) -> None:
-        """Faults may have changed; those that could not be are counted by what was wrong."""
+    def _take_in_faults(self, *refused: str | None) -> None:
+        """Take in changes of faults, and count each refused one by what was wrong with it."""
         for why in refused:
             if why is not None:
                 self._accounts.refused[why] += 1
@@ -270,7 +270,7 @@ class Medium(Actor):
             self.records += self._faults.records
             self._faults.records.clear()
             self._air.relink()
-            self._due_ns = self._next_turn_ns()
+            self._due_ns = self._next_due_ns()
 
     def _hand_out(self, rows: Rows) -> None:
         if self._capture is not None:
@@ -281,7 +281,7 @@ class Medium(Actor):
             request = requests[slot]
             assert request is not None, "the kernel speaks only of frames it was given"
             if kind == _RECEPTION:
-                if not attempts:  # as Reception(...), which takes three times as long
+                if not attempts:  # `_new` does what Reception(...) does in a third of the time
                     reception = _new(Reception, (request.frame, sources[slot], t_ns, value / 1000))
                 append((rx_topics[station], reception))
             elif kind == _FREE:
@@ -297,7 +297,7 @@ class Medium(Actor):
                 append((rx_topics[station], TxStatus(request.seq, TxOutcome(value), t_ns, attempts)))
 
     def _record(self, rows: Rows, capture: Capture) -> Rows:
-        """Tell the capture what it wants to know; returns the rows that are for the nodes."""
+        """Pass the rows of a capture to it; returns the rows that are meant for nodes."""
         for kind, slot, station, t_ns, value, attempts in rows:
             request, node, src = self._requests[slot], station + 1, self._sources[slot]
             assert request is not None, "the kernel speaks only of frames it was given"
@@ -312,7 +312,7 @@ class Medium(Actor):
     # --- positions ------------------------------------------------------------------------------------------------
 
     def _obstruct(self, obstructions: Obstructions) -> None:
-        """What stands between nodes counts from the next poses on: they were taken at the same instant."""
+        """Take in what stands between nodes; it counts from the next poses on, which are of the same instant."""
         pairs = np.frombuffer(obstructions.pairs, np.uint16).astype(np.int64)
         if len(pairs) % 2 or (len(pairs) and not 1 <= pairs.min() <= pairs.max() <= self._count):
             self._accounts.refused["obstructions"] += 1
@@ -326,7 +326,7 @@ class Medium(Actor):
             return
         states = np.frombuffer(poses.states, np.float64).reshape(-1, 6)
         known = (ids >= 1) & (ids <= self._count)
-        if not known.all() or not (np.abs(states[:, :3]) <= _FARTHEST_M).all():  # false for what is not a number
+        if not known.all() or not (np.abs(states[:, :3]) <= _FARTHEST_M).all():  # false for a NaN too
             self._accounts.refused["poses"] += 1
             return
         self._accounts.poses += 1

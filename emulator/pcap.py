@@ -1,16 +1,17 @@
-"""What goes over the air as a capture file: pcap with nanoseconds, radiotap, 802.11, LLC/SNAP, IPv4, UDP, our frame.
+"""A capture of what goes over the air: pcap with nanoseconds, radiotap, 802.11, LLC/SNAP, IPv4, UDP, our frame.
 
-One record per transmission attempt, stamped with the instant of its first bit: data (with the retry bit and the number
-of retries before) and ACKs. On request also one per frame handed to a station, stamped with the instant of its last
-bit; its RSSI tells it from a transmission, which has a transmit power. Instants are swarm time plus the epoch.
+There is one record per transmission attempt, stamped with the instant of its first bit: data (with the retry bit and
+the number of retries so far) and ACKs. On request there is also one per frame handed to a station, stamped with the
+instant of its last bit; a reception has an RSSI where a transmission has a transmit power. Instants are swarm time plus
+the epoch.
 
     pcap        libpcap's file format, magic 0xA1B23C4D, link type 127 (IEEE802_11_RADIOTAP)
     radiotap    radiotap.org: flags, rate, channel, signal or power, antenna, data retries
     802.11      802.11-2020, 9.2.4 and 9.3.2.1: data frames of an independent BSS, 24 bytes and FCS; 9.3.1.4: ACK
     LLC/SNAP    RFC 1042;  IPv4 RFC 791;  UDP RFC 768 (port 14550, MAVLink's); checksums RFC 1071
 
-Addresses are made of node ids: 02:FA:4E:45:hi:lo and 10.0.hi.lo. Sans-IO: `write` is given. Does not model: beacons of
-the IBSS, ARP, fragmentation; a station that hears what is not meant for it; copies that were lost.
+Addresses are made of node ids: 02:FA:4E:45:hi:lo and 10.0.hi.lo. Sans-IO: the caller provides `write`. Not modeled:
+beacons of the IBSS, ARP, fragmentation, frames overheard by other stations, copies that were lost.
 """
 
 import struct
@@ -30,7 +31,7 @@ _FLAG_FCS: Final = 0x10
 _SENT: Final = 1 << 1 | 1 << 2 | 1 << 3 | 1 << 10 | 1 << 17
 """Radiotap fields of a transmission: flags, rate, channel, transmit power, data retries."""
 _HEARD: Final = 1 << 1 | 1 << 2 | 1 << 3 | 1 << 5 | 1 << 11
-"""Of a reception: flags, rate, channel, antenna signal, antenna (the receiver's id, modulo 256)."""
+"""Radiotap fields of a reception: flags, rate, channel, antenna signal, antenna (the receiver's id, modulo 256)."""
 _CCK: Final = 0x0020
 _OFDM: Final = 0x0040
 _2_GHZ: Final = 0x0080
@@ -53,7 +54,7 @@ _UDP = struct.Struct(">HHHH")
 
 
 class Capture(Protocol):
-    """Who wants to know what happens on the air; given to the medium by its host."""
+    """A recorder of what happens on the air, given to the medium by its host."""
 
     def transmitted(self, t_ns: int, src: int, dst: int, seq: int, frame: bytes, attempt: int) -> None: ...
 
@@ -65,12 +66,12 @@ class Capture(Protocol):
 
 
 def mac_address(node: int) -> bytes:
-    """A locally administered address; broadcast has its own."""
+    """The locally administered MAC address of a node; that of the broadcast is all ones."""
     return _EVERYONE if node == BROADCAST else _MAC_PREFIX + node.to_bytes(2, "big")
 
 
 def ip_address(node: int) -> bytes:
-    """10.0.0.0/16, whose broadcast address is 10.0.255.255."""
+    """The address of a node in 10.0.0.0/16; that of the broadcast is 10.0.255.255."""
     return b"\x0a\x00" + node.to_bytes(2, "big")
 
 
@@ -91,7 +92,7 @@ class Pcap:
         receptions: bool = False,
         flush: Callable[[], object] = lambda: None,
     ) -> None:
-        """`flush` is called once a second of swarm time, between records: what was written can be looked at."""
+        """`flush` is called once a second of swarm time, between records, so that the file can be read meanwhile."""
         self.epoch_unix_ns = 0
         self._flush = flush
         self._flush_ns = S
@@ -112,7 +113,7 @@ class Pcap:
         write(_FILE.pack(MAGIC, 2, 4, 0, 0, 65535, LINK_TYPE))
 
     def transmitted(self, t_ns: int, src: int, dst: int, seq: int, frame: bytes, attempt: int) -> None:
-        """A data frame leaves an antenna, for the `attempt`-th time (from 1)."""
+        """Record that a data frame leaves an antenna, for the `attempt`-th time (from 1)."""
         tap = _RADIOTAP.pack(
             0, 0, _RADIOTAP.size, _SENT, self._data_flags, self._rate, *self._channel,
             self._power_dbm, min(255, attempt - 1),
@@ -120,7 +121,7 @@ class Pcap:
         self._put(t_ns, tap, self._data(src, dst, seq, frame, retry=attempt > 1))
 
     def acknowledged(self, t_ns: int, src: int, dst: int) -> None:
-        """An ACK leaves an antenna."""
+        """Record that an ACK leaves an antenna."""
         tap = _RADIOTAP.pack(
             0,
             0,
@@ -135,7 +136,7 @@ class Pcap:
         self._put(t_ns, tap, _ACK.pack(0xD4, 0, 0, mac_address(dst)))
 
     def received(self, t_ns: int, station: int, src: int, dst: int, seq: int, frame: bytes, rssi_dbm: float) -> None:
-        """A frame was decoded by a station."""
+        """Record that a station has decoded a frame."""
         if not self._receptions:
             return
         tap = _RADIOTAP.pack(

@@ -1,1 +1,1 @@
-"""What becomes of a signal between two antennas: path loss, shadowing, fading, error rates."""
+"""What happens to a signal between two antennas: path loss, shadowing, fading, and the error rates that result."""

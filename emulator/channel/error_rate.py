@@ -1,10 +1,10 @@
-"""The share of bits that noise and interference spoil: DSSS DBPSK and DQPSK, CCK 5.5 and 11 Mb/s; OFDM is next door.
+"""Bit error rates under noise and interference: DSSS DBPSK, DQPSK, CCK at 5.5 and 11 Mb/s (OFDM: `ofdm_error_rate`).
 
 DBPSK     1/2 exp(-Eb/N0)                                               Proakis, Digital Communications, 4th ed., 5.2.8
 DQPSK     (1+sqrt2)/sqrt(8 pi sqrt2 x) exp(-(2-sqrt2) x), x = Eb/N0        (tight approximation of the same section)
 CCK       biorthogonal signalling of 4 (5.5) or 8 (11) dimensions times a DQPSK rotation, per 8-chip symbol (5.2.2)
 
-SINR is over the 22 MHz channel. Values are logs of the success probability of one bit, tabulated over SINR in dB.
+The SINR is that in the 22 MHz channel. Values are logarithms of the success probability of one bit, by SINR in dB.
 """
 
 import math
@@ -20,7 +20,7 @@ from fanet_mw.scenario.radio import is_ofdm
 
 _TOP_DB: Final = 35.0
 _SYMBOLS_PER_S: Final = 1.375e6
-"""CCK symbols: 11 Mchip/s, 8 chips each."""
+"""Rate of CCK symbols: 11 Mchip/s in symbols of 8 chips."""
 
 Reals = npt.NDArray[np.float64]
 
@@ -42,7 +42,7 @@ def log_success_per_bit(rate_mbps: float) -> Reals:
 
 
 def header_rates(rate_mbps: float) -> tuple[float, float]:
-    """What protects the header of a frame: the rate [Mb/s] of its modulation, and its mean bits per ns.
+    """How the header of a frame is sent: the rate [Mb/s] of its modulation, and its mean number of bits per ns.
 
     DSSS: preamble and header are sent at 1 Mb/s. OFDM: 24 bits of SIGNAL at 6 Mb/s follow 16 us of training.
     """
@@ -62,9 +62,10 @@ def _dqpsk(per_bit: Reals) -> Reals:
 
 
 def _cck_symbol_success(symbol_snr: float, bits: int) -> float:
-    """One symbol right: CCK 11 is two independent quadrature decisions of biorthogonal sets, 5.5 one of them.
+    """Probability that a symbol is decoded: at 11 Mb/s it takes two independent decisions, at 5.5 Mb/s one.
 
-    Es/N0 is over both quadratures; a decision sees the energy of one, and of half a symbol at 11 Mb/s.
+    Each decision is among the signals of a biorthogonal set. Es/N0 counts both quadratures; a decision has the energy
+    of one quadrature, and at 11 Mb/s of half a symbol.
     """
     if bits == 8:
         return _biorthogonal_success(symbol_snr / 4, 16) ** 2
@@ -72,7 +73,7 @@ def _cck_symbol_success(symbol_snr: float, bits: int) -> float:
 
 
 def _biorthogonal_success(snr: float, signals: int) -> float:
-    """Proakis (5.2-34): the largest of M/2 correlators is the right one, with the right sign."""
+    """Proakis (5.2-34): the probability that the right one of M/2 correlators is the largest, with the right sign."""
     root = math.sqrt(2 * snr)
     v = np.linspace(-root, 10.0, 600) if root < 10 else np.linspace(-10.0, 10.0, 600)
     inner = np.array([math.erf(max(0.0, x + root) / math.sqrt(2.0)) for x in v])

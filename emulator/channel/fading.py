@@ -1,11 +1,12 @@
 """Small-scale fading: one power gain per frame and receiver, of mean 1, drawn when the frame starts.
 
     nakagami   gamma distributed with shape m and mean 1                           m = 1 is Rayleigh
-    rician     |sqrt(K / (K + 1)) + complex normal of variance 1 / (K + 1)|^2      K: power seen over power scattered
+    rician     |sqrt(K / (K + 1)) + complex normal of variance 1 / (K + 1)|^2      K: direct over scattered power
 
-Each transmitter has its own generator (named stream `fading`), which is drawn from in the order of its links: the same
-frames at the same instants give the same gains. A frame fades as a whole, flat over its band and its length, and each
-frame anew. Not modeled: coherence time, Doppler, frequency selectivity, that both directions of a link fade alike.
+Each transmitter has a generator of its own (named stream `fading`) and draws from it in the order of its links, so that
+the same frames at the same instants meet the same gains. The gain of a frame is constant over its band and its length,
+and independent of the gain of the next frame. Not modeled: coherence time, Doppler, frequency selectivity, and that
+both directions of a link fade alike.
 """
 
 import math
@@ -24,7 +25,7 @@ _TWO_PI = 2.0 * math.pi
 
 
 def law_of(radio: Radio) -> tuple[int, float]:
-    """What the kernel wants to know: which law, and its m, or its K as a ratio."""
+    """What the kernel needs of the fading: the number of the law, and its parameter (m, or K as a ratio)."""
     if radio.fading == "nakagami":
         return NAKAGAMI, radio.nakagami_m
     if radio.fading == "rician":
@@ -33,7 +34,7 @@ def law_of(radio: Radio) -> tuple[int, float]:
 
 
 def seeds(seed: int) -> tuple[int, int]:
-    """The two states of a generator from 63 random bits."""
+    """The two initial states of a generator, made of 63 random bits."""
     return seed % (_MODULUS_A - 1) + 1, (seed >> 31) % (_MODULUS_B - 1) + 1
 
 

@@ -1,4 +1,4 @@
-"""The share of bits that noise and interference spoil in OFDM, 6-54 Mb/s: the NIST model of Pei and Henderson (2010).
+"""Bit error rates of OFDM, 6-54 Mb/s, under noise and interference: the NIST model of Pei and Henderson (2010).
 
     uncoded       BPSK, QPSK, 16-QAM, 64-QAM with Gray mapping; SINR over the 20 MHz channel is that of a subcarrier
     after Viterbi union bound over the first terms of the distance spectrum, each bounded by D^d, D = sqrt(4 p (1 - p))
@@ -15,9 +15,9 @@ import numpy.typing as npt
 
 Reals = npt.NDArray[np.float64]
 
-# Distance d: number of information bits in error over all paths of that weight, for the K = 7 code (133, 171) and its
-# punctured forms. Rate 1/2: J. Conan, IEEE Trans. Commun. 32(9), 1984; 2/3 and 3/4: D. Haccoun, G. Begin, IEEE Trans.
-# Commun. 37(11), 1989. Rate 2/3 and 3/4 sums are per 2 and 3 information bits.
+# Distance d: number of information bits in error, over all paths of that weight, for the K = 7 code (133, 171) and its
+# punctured forms. Rate 1/2: J. Conan, IEEE Trans. Commun. 32(9), 1984; rates 2/3 and 3/4: D. Haccoun, G. Begin, IEEE
+# Trans. Commun. 37(11), 1989, where the sums are per 2 and per 3 information bits.
 _HALF: Final = {
     10: 36, 12: 211, 14: 1404, 16: 11633, 18: 77433, 20: 502690, 22: 3322763, 24: 21292910, 26: 134365911,
 }  # fmt: skip
@@ -38,10 +38,10 @@ _SCHEMES: Final = {
     48.0: ("64-qam", 2, _TWO_THIRDS),
     54.0: ("64-qam", 3, _THREE_QUARTERS),
 }
-"""Modulation, information bits per step of the code, spectrum (IEEE 802.11-2020, table 17-4)."""
+"""By rate [Mb/s]: modulation, information bits per step of the code, spectrum (IEEE 802.11-2020, table 17-4)."""
 
 _SHARE_AND_SCALE: Final = {"bpsk": (1 / 2, 1), "qpsk": (1 / 2, 2), "16-qam": (3 / 8, 10), "64-qam": (7 / 24, 42)}
-"""p = share x erfc(sqrt(SINR / scale))."""
+"""Share and scale in p = share x erfc(sqrt(SINR / scale)), the uncoded error rate, by modulation."""
 
 
 def bit_error(sinr: Reals, rate_mbps: float) -> Reals:

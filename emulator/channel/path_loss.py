@@ -1,4 +1,4 @@
-"""Path loss over distance: what a frame loses on the way, as equations. Arrays in, arrays out; no state, no scenario.
+"""Path loss over distance, as equations: arrays in, arrays out, without state and without the scenario.
 
     friis          20 log10(4 pi d f / c)
     log_distance   L(1 m) + 10 n log10 d
@@ -22,14 +22,14 @@ Reals = npt.NDArray[np.float64]
 
 SPEED_OF_LIGHT_M_S: Final = 299_792_458.0
 LEAST_HEIGHT_M: Final = 0.5
-"""An antenna on the ground is this high for the two rays: at 0 the ground ray would cancel everything."""
+"""The least antenna height in the two-ray model; at height 0 the reflected ray would cancel the direct ray."""
 AIR_TO_AIR_EXPONENT: Final = 2.05
 """N. Ahmed, S. Kanhere, S. Jha, "On the importance of link characterization for aerial wireless sensor networks", IEEE
 Commun. Mag. 54(5), 2016: between two airborne 2.4 GHz radios."""
 
 
 class Environment(NamedTuple):
-    """What stands on the ground: P(LoS) = 1 / (1 + a exp(-b (elevation - a))), excess losses in dB."""
+    """An environment on the ground: P(LoS) = 1 / (1 + a exp(-b (elevation - a))), with its excess losses in dB."""
 
     a: float
     b: float
@@ -49,7 +49,7 @@ environments", GLOBECOM 2014."""
 
 
 def friis_db(distance_m: Reals, *, frequency_mhz: float) -> Reals:
-    """Free space (H. T. Friis, Proc. IRE 34, 1946)."""
+    """Loss in free space (H. T. Friis, Proc. IRE 34, 1946)."""
     at_1_m = 20 * math.log10(4 * math.pi * frequency_mhz * 1e6 / SPEED_OF_LIGHT_M_S)
     return log_distance_db(distance_m, reference_db=at_1_m, exponent=2.0)
 
@@ -59,13 +59,13 @@ def log_distance_db(distance_m: Reals, *, reference_db: float, exponent: float) 
 
 
 def crossover_m(height_a_m: Reals, height_b_m: Reals, *, frequency_mhz: float) -> Reals:
-    """Where the two laws of `two_ray_db` meet."""
+    """The distance at which the two laws of `two_ray_db` meet."""
     product = np.maximum(height_a_m, LEAST_HEIGHT_M) * np.maximum(height_b_m, LEAST_HEIGHT_M)
     return np.asarray(4 * math.pi * product * frequency_mhz * 1e6 / SPEED_OF_LIGHT_M_S, dtype=np.float64)
 
 
 def two_ray_db(distance_m: Reals, height_a_m: Reals, height_b_m: Reals, *, frequency_mhz: float) -> Reals:
-    """Direct ray and ground reflection (T. S. Rappaport, Wireless Communications, 2nd ed., 4.6)."""
+    """Loss of a direct ray and its ground reflection (T. S. Rappaport, Wireless Communications, 2nd ed., 4.6)."""
     product = np.maximum(height_a_m, LEAST_HEIGHT_M) * np.maximum(height_b_m, LEAST_HEIGHT_M)
     beyond = 40 * np.log10(np.maximum(distance_m, 1.0)) - 20 * np.log10(product)
     near = distance_m < crossover_m(height_a_m, height_b_m, frequency_mhz=frequency_mhz)
@@ -73,20 +73,20 @@ def two_ray_db(distance_m: Reals, height_a_m: Reals, height_b_m: Reals, *, frequ
 
 
 def air_to_air_db(distance_m: Reals, *, frequency_mhz: float) -> Reals:
-    """Between two UAVs, both clear of the ground."""
+    """Loss between two UAVs that are both clear of the ground."""
     at_1_m = 20 * math.log10(4 * math.pi * frequency_mhz * 1e6 / SPEED_OF_LIGHT_M_S)
     return log_distance_db(distance_m, reference_db=at_1_m, exponent=AIR_TO_AIR_EXPONENT)
 
 
 def sight_probability(elevation_deg: Reals, environment: Environment) -> Reals:
-    """Probability that a UAV at this elevation is seen from the ground (Al-Hourani et al. 2014, equation 5)."""
+    """Probability of line of sight between the ground and a UAV at this elevation (Al-Hourani et al. 2014, eq. 5)."""
     return np.asarray(
         1 / (1 + environment.a * np.exp(-environment.b * (elevation_deg - environment.a))), dtype=np.float64
     )
 
 
 def air_to_ground_db(distance_m: Reals, rise_m: Reals, environment: Environment, *, frequency_mhz: float) -> Reals:
-    """Mean loss between a place on the ground and a UAV `rise_m` above it (the same, equation 6)."""
+    """Mean loss between a place on the ground and a UAV `rise_m` above it (Al-Hourani et al. 2014, equation 6)."""
     elevation_deg = np.degrees(np.arcsin(np.minimum(1.0, rise_m / np.maximum(distance_m, 1e-9))))
     sight = sight_probability(elevation_deg, environment)
     excess = sight * environment.los_db + (1 - sight) * environment.nlos_db
@@ -94,7 +94,7 @@ def air_to_ground_db(distance_m: Reals, rise_m: Reals, environment: Environment,
 
 
 def uma_av_sight_probability(along_m: Reals, height_m: Reals) -> Reals:
-    """P(LoS) of an aerial user of an urban macro cell over the distance along the ground (TR 36.777, table B-1)."""
+    """P(LoS) of an aerial user of an urban macro cell, over the horizontal distance (TR 36.777, table B-1)."""
     height = np.maximum(height_m, 22.5)
     decay_m = 4300 * np.log10(height) - 3800
     near_m = np.maximum(460 * np.log10(height) - 700, 18.0)

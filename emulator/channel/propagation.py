@@ -1,10 +1,10 @@
-"""Links: who hears whom how strongly, from positions. Distances in metres, powers in dBm and mW.
+"""Links: which station receives which other one, and how strongly, by their positions [m]. Powers in dBm and mW.
 
     path loss of the channel (`path_loss.py`) -> shadowing (`shadowing.py`) -> obstruction -> links above the floor
 
 `range` is no law of physics: every frame within `range_m` is received at the transmit power, nothing beyond (ns-3's
 range model), and nothing through an obstruction. Fading is drawn per frame, in the kernel (`fading.py`). Not modeled:
-antenna patterns, Doppler, interference of links below `interference_floor_dbm`.
+antenna patterns, Doppler, interference by links below `interference_floor_dbm`.
 """
 
 import math
@@ -43,7 +43,7 @@ THERMAL_DBM_PER_HZ: Final = -174.0
 DSSS_BANDWIDTH_HZ: Final = 22e6
 OFDM_BANDWIDTH_HZ: Final = 20e6
 _ROUNDING_DB: Final = 1e-9
-"""So that a link at the very reach is not lost to rounding."""
+"""A tolerance, so that rounding does not remove a link that is exactly as long as the reach."""
 
 
 def milliwatt(dbm: float) -> float:
@@ -51,17 +51,17 @@ def milliwatt(dbm: float) -> float:
 
 
 def noise_mw(radio: Radio) -> float:
-    """Thermal noise in the channel plus the receiver's noise figure."""
+    """Thermal noise in the channel, raised by the receiver's noise figure."""
     bandwidth_hz = OFDM_BANDWIDTH_HZ if is_ofdm(radio.rate_mbps) else DSSS_BANDWIDTH_HZ
     return milliwatt(THERMAL_DBM_PER_HZ + 10 * math.log10(bandwidth_hz) + radio.noise_figure_db)
 
 
 _MOST_DECADES: Final = 12.0
-"""Of a meter: farther than any two nodes can be apart."""
+"""The greatest reach is 10^12 m: farther than any two nodes can be apart."""
 
 
 def reach_m(radio: Radio) -> float:
-    """Beyond this distance a station does not even interfere, by the most favorable law and 2 sigma of shadowing."""
+    """The distance beyond which no station even interferes, by the most favorable law and 2 sigma of shadowing."""
     if radio.channel == "range":
         return radio.range_m
     budget_db = radio.tx_power_dbm - radio.interference_floor_dbm + 2 * radio.shadowing_db
@@ -79,7 +79,7 @@ def reach_m(radio: Radio) -> float:
 
 
 def received_dbm(distance_m: Reals, from_m: Reals, to_m: Reals, radio: Radio) -> Reals:
-    """Mean power of each link, without shadowing; `from_m` and `to_m` are its ends [n, 3], heights above the ground."""
+    """Mean power of each link without shadowing; `from_m` and `to_m` [n, 3] are its ends, heights above the ground."""
     if radio.channel == "range":
         return np.full_like(distance_m, radio.tx_power_dbm)
     return np.asarray(radio.tx_power_dbm - _loss_db(distance_m, from_m, to_m, radio), dtype=np.float64)
@@ -112,7 +112,7 @@ class Links:
     def __init__(
         self, at: Reals, radio: Radio, *, spare: int, shadowing: Shadowing | None = None, blocked: Ints | None = None
     ) -> None:
-        """`blocked`: codes, see `pair_codes`, of the pairs between which something stands, ascending."""
+        """`blocked`: the codes (see `pair_codes`), ascending, of the pairs between which something stands."""
         found, distance = neighbors(at, reach_m(radio))
         power_dbm = received_dbm(distance, at[found[:, 0]], at[found[:, 1]], radio)
         if shadowing is not None:
@@ -134,7 +134,7 @@ class Links:
     def _fill(self, found: Ints, distance: Reals, power_dbm: Reals, radio: Radio, *, stations: int, spare: int) -> None:
         count = len(found)
         self.count = count
-        self.ints = np.zeros((LINK_ROWS, count + spare + 1), np.int64)  # never empty: numba indexes it
+        self.ints = np.zeros((LINK_ROWS, count + spare + 1), np.int64)  # one column at least, because numba indexes it
         self.reals = np.zeros((LINK_REALS, count + spare + 1), np.float64)
         self.ints[LINK_SRC, :count] = found[:, 0]
         self.ints[LINK_DST, :count] = found[:, 1]
@@ -143,21 +143,21 @@ class Links:
         self.ints[AUDIBLE, :count] = audible
         only_audible = radio.fading == "none" and "sums" not in radio.as_ns3
         self.longest_ns = int((self.ints[DELAY] * (self.ints[AUDIBLE] if only_audible else 1)).max())
-        """Delay of the longest link that counts: an audible one, or any when fading may lift it or a sum be sensed."""
+        """The delay of the longest link that matters: of an audible one; of any, if fading or sums can raise it."""
         self.reals[LINK_POWER, :count] = np.power(10.0, power_dbm / 10)
         self.reals[SPARED, :count] = 1.0
         self.ptr = np.searchsorted(found[:, 0], np.arange(stations + 1)).astype(np.int64)
 
-    def dead_last(self) -> None:
-        """Links without power come last of their transmitter's; else the order stays: nearest first."""
+    def sort_dead_last(self) -> None:
+        """Sort the links without power behind the others of their transmitter; the others stay nearest first."""
         used = slice(self.count)
         dead = self.reals[LINK_POWER, used] == 0.0
         if dead.any():
-            order = np.lexsort((dead, self.ints[LINK_SRC, used]))  # stable
+            order = np.lexsort((dead, self.ints[LINK_SRC, used]))  # a stable sort keeps the order otherwise
             self.ints[:, used] = self.ints[:, used][:, order]
             self.reals[:, used] = self.reals[:, used][:, order]
 
 
 def pair_codes(found: Ints, stations: int) -> Ints:
-    """One number per pair [n, 2] of stations, the same for both directions."""
+    """One number for each pair [n, 2] of stations, the same for both directions."""
     return np.asarray(np.minimum(*found.T) * stations + np.maximum(*found.T), dtype=np.int64)

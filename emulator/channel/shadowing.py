@@ -1,14 +1,14 @@
-"""Log-normal shadowing that is a property of places: the loss of a link follows from where its two ends are.
+"""Log-normal shadowing as a property of places: the loss of a link follows from the positions of its two ends.
 
-A Gaussian field over both ends, made of plane waves: S(a, b) = sqrt(2 / N) sum cos(k a + l b + phase), symmetrized. The
-waves are drawn from the spectrum whose correlation is exponential (in 3 dimensions: the Cauchy distribution, whose
-characteristic function is exp(-|d| / d_corr)), for each end by itself. So the correlation of a link's shadowing is
-exp(-d / d_corr) when one end moves by d (M. Gudmundson, Electronics Letters 27(23), 1991), and the product of both
-factors when both move (Z. Wang, E. Tameh, A. Nix, IEEE Trans. Veh. Technol. 57(2), 2008).
+The loss is a Gaussian field over both ends, made of plane waves: S(a, b) = sqrt(2 / N) sum cos(k a + l b + phase),
+symmetrized. The waves are drawn from the spectrum whose correlation is exponential (in 3 dimensions: the Cauchy
+distribution, whose characteristic function is exp(-|d| / d_corr)), for each end separately. So the correlation of a
+link's shadowing is exp(-d / d_corr) when one end moves by d (M. Gudmundson, Electronics Letters 27(23), 1991), and the
+product of both factors when both ends move (Z. Wang, E. Tameh, A. Nix, IEEE Trans. Veh. Technol. 57(2), 2008).
 
-The same poses give the same shadowing, whatever came before. Not modeled: dependence on the surroundings, the angle or
-the height; correlation is alike in all three directions. With N waves the correlation seen within one seed differs
-from the law by about 1 / sqrt(2 N).
+The same poses give the same shadowing, whichever poses preceded them. Not modeled: dependence on the surroundings, on
+angle or height; the correlation is alike in all three directions. With N waves the correlation measured within one seed
+differs from the law by about 1 / sqrt(2 N).
 """
 
 import math
@@ -20,12 +20,12 @@ from emulator.kernel.state import Ints, Reals
 from fanet_mw.rng import stream_seed
 from fanet_mw.scenario.radio import Radio
 
-WAVES = 128  # a multiple of 4
+WAVES = 128  # a multiple of 4: see `one_way`
 
 
 @jit
 def one_way(cos_k: Reals, sin_k: Reals, cos_l: Reals, sin_l: Reals) -> float:
-    """Sum of cos(k + l) over the waves, in four sums side by side: the processor adds them at once."""
+    """Sum of cos(k + l) over the waves, in four partial sums that the processor can add at the same time."""
     s0, s1, s2, s3 = 0.0, 0.0, 0.0, 0.0
     for n in range(0, WAVES, 4):
         s0 += cos_k[n] * cos_l[n] - sin_k[n] * sin_l[n]
@@ -37,14 +37,14 @@ def one_way(cos_k: Reals, sin_k: Reals, cos_l: Reals, sin_l: Reals) -> float:
 
 @jit
 def superpose(found: Ints, cos_k: Reals, sin_k: Reals, cos_l: Reals, sin_l: Reals, total: Reals) -> None:
-    """Sum of the waves over each pair, both ways round, so that the sum of (a, b) is that of (b, a) to the last bit."""
+    """Sum of the waves for each pair, added both ways round so that (a, b) and (b, a) agree to the last bit."""
     for link in range(found.shape[0]):
         a, b = found[link, 0], found[link, 1]
         total[link] = one_way(cos_k[a], sin_k[a], cos_l[b], sin_l[b]) + one_way(cos_k[b], sin_k[b], cos_l[a], sin_l[a])
 
 
 class Shadowing:
-    """One seeded field."""
+    """One field, drawn from the scenario's seed."""
 
     def __init__(self, radio: Radio, *, seed: int) -> None:
         random = np.random.Generator(np.random.PCG64(stream_seed(seed, "shadowing")))
@@ -55,7 +55,7 @@ class Shadowing:
         self._phase = random.uniform(0.0, 2 * math.pi, WAVES)
 
     def _wave_vectors(self, random: np.random.Generator) -> Reals:
-        """[3, WAVES], 1/m: multivariate Cauchy, a normal vector over an independent normal number."""
+        """Wave vectors [3, WAVES] in 1/m, multivariate Cauchy: a normal vector over an independent normal number."""
         return np.asarray(
             random.normal(size=(3, WAVES)) / np.abs(random.normal(size=WAVES)) / self._correlation_m, dtype=np.float64
         )
@@ -63,7 +63,7 @@ class Shadowing:
     def loss_db(self, at: Reals, found: Ints, distance: Reals) -> Reals:
         """Loss [dB] of each ordered pair [n, 2] of stations at `at` [m], `distance` [m] apart; zero mean.
 
-        Where the ends are close the two ways round are alike, and their sum is scaled down to keep its variance.
+        Where the ends are close, both ways round give nearly the same, and the sum is scaled to keep its variance.
         """
         if not len(found):
             return np.zeros(0)

@@ -1,6 +1,6 @@
-"""Which stations are within reach of each other: cells as wide as the reach, so that the cost follows the neighbors.
+"""Which stations are within reach of each other, found in cells as wide as the reach: the cost follows the neighbors.
 
-Distances in metres, through space. The cells are of the ground: stations above each other share one.
+Distances are in metres and through space. The cells divide the ground: stations above each other share one.
 """
 
 import math
@@ -18,9 +18,9 @@ def pairs(
 ) -> int:
     """Ordered pairs of stations within reach, by source then destination; returns how many there are.
 
-    `order` lists the stations by cell, `keys` the cells in that order: a neighbor is in the same cell or in one of
-    eight around it, and three cells of one column are adjacent. Fills `found` (int64 [n, 2]) and `distance` as far as
-    they go: with too little room, call again with more.
+    `order` lists the stations by cell and `keys` the cells in that order: a neighbor is in the same cell or in one of
+    the eight around it, and three cells of one column are adjacent. The call fills `found` (int64 [n, 2]) and
+    `distance` as far as they go; with too little room it is to be repeated with more.
     """
     n = 0
     for a in range(at.shape[0]):
@@ -39,7 +39,7 @@ def pairs(
                     n += 1
                     continue
                 j = n
-                while j > first and found[j - 1, 1] > b:  # in order of ids, whatever the cells
+                while j > first and found[j - 1, 1] > b:  # destinations are sorted, whatever the cells
                     found[j, 1] = found[j - 1, 1]
                     distance[j] = distance[j - 1]
                     j -= 1
@@ -53,14 +53,14 @@ def pairs(
 def neighbors(at: npt.NDArray[np.float64], reach: float) -> tuple[Ints, Reals]:
     """Ordered pairs of stations within reach [n, 2], by source then destination, and their distances [m].
 
-    Stations of unknown position (not finite) have no neighbors.
+    A station whose position is unknown (not finite) has no neighbors.
     """
     known = np.flatnonzero(np.isfinite(at).all(axis=1))
     if not len(known):
         return np.zeros((0, 2), np.int64), np.zeros(0, np.float64)
     here = np.ascontiguousarray(at[known])
     east, north = np.floor((here[:, :2] - here[:, :2].min(axis=0)) / reach).astype(np.int64).T
-    rows = int(north.max()) + 3  # one empty cell on either side: columns do not touch
+    rows = int(north.max()) + 3  # one empty cell at either end keeps columns apart
     cell = east * rows + north
     order = np.argsort(cell, kind="stable")
     room = 32 * len(here)

@@ -1,1 +1,1 @@
-"""The 802.11 kernel: stations, DCF and PHY as plain functions over arrays, compiled where numba is there."""
+"""The 802.11 kernel: stations, DCF and PHY as plain functions over arrays, compiled when numba is installed."""

@@ -1,11 +1,12 @@
-"""The backoff of a station (IEEE 802.11-2020, 10.3.3), functions over state rows.
+"""The backoff of a station (IEEE 802.11-2020, 10.3.3), as functions over the rows of its state.
 
-Slots count from BASE while the medium is idle; when it turns busy, the slots that have passed are taken off and the
-rest waits. A pending access is one event; it is stale when SCHEDULED has another instant.
+Slots count from BASE while the medium is idle; when it turns busy, the slots that have passed are subtracted and the
+rest is kept. A pending access is one event; the event is stale when SCHEDULED holds another instant.
 
-After a reception that failed, EIFS takes the place of DIFS (10.3.2.3.7). It begins when the medium is idle after a bad
-frame, whatever else has kept it busy, and anew if it is interrupted, until it has passed or a frame was received well.
-In ns-3.44 its extension beyond DIFS begins at the end of the bad frame, and passes while the medium is busy.
+After a reception that failed, EIFS takes the place of DIFS (10.3.2.3.7). EIFS begins when the medium is idle after the
+bad frame, whatever else has kept it busy. If it is interrupted it begins again, until it has passed or until a frame is
+received without error. In ns-3.44 the extension beyond DIFS begins at the end of the bad frame, and passes while the
+medium is busy.
 """
 
 from emulator.chance import MODULUS, uniform
@@ -44,19 +45,19 @@ from emulator.kernel.state import (
 
 @jit
 def draw(st: Ints, s: int) -> None:
-    """A new backoff from [0, CW]."""
+    """Draw a new backoff from [0, CW]."""
     st[BO, s] = uniform(st, RANDOM, s) * (st[CW, s] + 1) // MODULUS
 
 
 @jit
 def access_from(p: Ints, st: Ints, s: int) -> int:
-    """From when backoff slots count, if the medium stays idle."""
+    """The instant from which backoff slots count, if the medium stays idle."""
     return int(max(st[IDLE_FROM, s], st[BAD_UNTIL, s], st[RESUME_FROM, s], st[NAV, s]) + p[DIFS_NS])
 
 
 @jit
 def arm(g: Ints, p: Ints, st: Ints, hs: Ints, s: int) -> None:
-    """The medium is idle at a station: start counting, and plan its access if it has a frame."""
+    """Start the countdown of a station whose medium is idle, and plan its access if it has a frame."""
     if st[CS, s] > 0 or st[TX_KIND, s] != NOTHING or st[WAITING, s] >= 0 or st[ACK_TO, s] >= 0:
         return
     st[BASE, s] = access_from(p, st, s)
@@ -68,7 +69,7 @@ def arm(g: Ints, p: Ints, st: Ints, hs: Ints, s: int) -> None:
 
 @jit
 def slots_left(p: Ints, st: Ints, s: int, t: int) -> int:
-    """Backoff slots left at `t`, if the medium has been idle until then."""
+    """The backoff slots that are left at `t`, if the medium has been idle until then."""
     if t <= st[BASE, s]:
         return int(st[BO, s])
     return int(max(0, st[BO, s] - (t - st[BASE, s]) // p[SLOT_NS]))
@@ -76,7 +77,7 @@ def slots_left(p: Ints, st: Ints, s: int, t: int) -> int:
 
 @jit
 def on_busy(p: Ints, st: Ints, s: int, t: int) -> None:
-    """The medium turns busy at a station: freeze the backoff."""
+    """Freeze the backoff of a station, because its medium turns busy."""
     if st[BUSY_SINCE, s] < 0:
         st[BUSY_SINCE, s] = t
         if st[BAD_UNTIL, s] + p[DIFS_NS] <= t:
@@ -92,7 +93,7 @@ def on_busy(p: Ints, st: Ints, s: int, t: int) -> None:
 
 @jit
 def on_idle(g: Ints, p: Ints, st: Ints, hs: Ints, s: int, t: int) -> None:
-    """The medium turns idle at a station."""
+    """Resume the backoff of a station, because its medium turns idle."""
     if st[BUSY_SINCE, s] >= 0:
         st[BUSY_NS, s] += t - st[BUSY_SINCE, s]
         st[BUSY_SINCE, s] = -1

@@ -1,4 +1,4 @@
-"""Compile the kernel, once: `python -m emulator.kernel.compile`. numba keeps the result in its cache."""
+"""Compiles the kernel ahead of its first use: `python -m emulator.kernel.compile`. numba caches the machine code."""
 
 import contextlib
 import sys
@@ -15,32 +15,32 @@ from fanet_mw.bus.topics import Topics
 from fanet_mw.scenario import config
 from fanet_mw.units import BROADCAST, MS, NodeId
 
-WORD: Final = "compiling the emulator's kernel, once: about half a minute"
-"""To be said before `warm_up` when `must_compile`."""
+COMPILING_NOTICE: Final = "compiling the emulator's kernel, once: about half a minute"
+"""What to tell the user before `warm_up` when `must_compile` is true."""
 
 
 def must_compile() -> bool:
-    """Whether `warm_up` will take half a minute, because machine code of all functions has not been kept yet."""
+    """True if `warm_up` will take half a minute, because the machine code of some function is not cached yet."""
     return COMPILED and not _marker().exists()
 
 
 def warm_up() -> bool:
-    """Run every compiled function once, the optional ones too; returns whether they are machine code."""
+    """Run every compiled function once, the optional ones too; returns True if they run as machine code."""
     _run({})
     _run({"channel": "friis", "shadowing_db": 1.0, "fading": "rician", "capture": True})
     if must_compile():
-        with contextlib.suppress(OSError):  # what cannot be kept is compiled again each time
+        with contextlib.suppress(OSError):  # without this mark the next process compiles again, which is only slow
             _marker().touch()
     return COMPILED
 
 
 def _marker() -> Path:
-    """The file that says that everything has been compiled, by this numba in this Python."""
+    """The file whose existence says that everything has been compiled by this numba for this Python."""
     return cache_folder() / f"whole-{version('numba')}-{sys.implementation.cache_tag}"
 
 
 def _run(radio: Mapping[str, object]) -> None:
-    """Two stations, a few frames, poses in the middle of one."""
+    """Let two stations send a few frames, with new poses while one of them is on the air."""
     scenario = config.build({"nodes": {"count": 2}, "clusters": {"count": 1}, "radio": radio})
     topics = Topics("warm-up")
     medium = Medium(scenario, "warm-up")
@@ -59,5 +59,5 @@ def _run(radio: Mapping[str, object]) -> None:
 
 if __name__ == "__main__":
     if must_compile():
-        sys.stderr.write(f"{WORD}\n")
+        sys.stderr.write(f"{COMPILING_NOTICE}\n")
     warm_up()

@@ -1,8 +1,8 @@
-"""The MAC of a station: the distributed coordination function (IEEE 802.11-2020, 10.3), functions over state rows.
+"""The MAC of a station: the distributed coordination function (IEEE 802.11-2020, 10.3), as functions over its state.
 
     queue -> access (DIFS or EIFS, backoff with freezing) -> frame -> ACK or timeout -> next attempt or done
 
-The backoff itself is in `backoff`, what becomes of frames is counted in `ending`.
+The countdown itself is in `backoff`; how frames end is counted in `ending`.
 """
 
 from emulator.channel.fading import gain
@@ -100,7 +100,7 @@ from emulator.kernel.state import (
 
 @jit
 def take_head(st: Ints, fr: Ints, s: int) -> None:
-    """Remove the first frame of the queue."""
+    """Remove the first frame of a station's queue."""
     st[HEAD, s] = fr[NEXT, st[HEAD, s]]
     if st[HEAD, s] < 0:
         st[TAIL, s] = -1
@@ -109,9 +109,9 @@ def take_head(st: Ints, fr: Ints, s: int) -> None:
 
 @jit
 def expire(g: Ints, p: Ints, st: Ints, fr: Ints, out: Ints, s: int, t: int) -> None:
-    """Drop what has waited in the queue beyond its lifetime; the contention window is no business of a lifetime.
+    """Drop the frames that have waited in the queue beyond their lifetime; the contention window stays as it is.
 
-    The first frame is not in question while it is on the air or its ACK is awaited.
+    The first frame is kept while it is on the air or its ACK is awaited.
     """
     kept = st[HEAD, s] if st[TX_KIND, s] == DATA or st[WAITING, s] >= 0 else -1
     if kept >= 0:
@@ -130,7 +130,7 @@ def expire(g: Ints, p: Ints, st: Ints, fr: Ints, out: Ints, s: int, t: int) -> N
 
 @jit
 def arrive(g: Ints, p: Ints, st: Ints, fr: Ints, hs: Ints, out: Ints, f: int, t: int) -> None:
-    """A frame enters the MAC queue of its station."""
+    """Put a frame into the MAC queue of its station; it is dropped when the queue is full."""
     s = fr[SRC, f]
     if st[QLEN, s] >= p[QUEUE_LIMIT]:
         expire(g, p, st, fr, out, s, t)
@@ -150,11 +150,11 @@ def arrive(g: Ints, p: Ints, st: Ints, fr: Ints, hs: Ints, out: Ints, f: int, t:
 
 @jit
 def request(g: Ints, p: Ints, st: Ints, hs: Ints, s: int, t: int) -> None:
-    """The first frame of an empty queue asks for the medium (802.11-2020, 10.3.4.2: at once after DIFS of idle)."""
+    """Ask for the medium on behalf of a frame in an empty queue (802.11-2020, 10.3.4.2: at once after DIFS of idle)."""
     if st[TX_KIND, s] == DATA or st[WAITING, s] >= 0:
-        return  # the post-backoff of our own frame is still to be drawn
+        return  # the station's own frame has not ended: its post-backoff is still to be drawn
     if st[CS, s] > 0 or st[TX_KIND, s] == ACK or st[ACK_TO, s] >= 0 or st[NAV, s] > t:
-        before_ack = st[CS, s] == 0 and st[TX_KIND, s] != ACK and st[NAV, s] <= t  # to ns-3 the medium is idle
+        before_ack = st[CS, s] == 0 and st[TX_KIND, s] != ACK and st[NAV, s] <= t  # in ns-3 this medium is idle
         if st[BO, s] == 0 and not (before_ack and p[DIFS_FIRST] == 1):
             draw(st, s)
         st[FRESH, s] = 0
@@ -169,7 +169,7 @@ def request(g: Ints, p: Ints, st: Ints, hs: Ints, s: int, t: int) -> None:
             st[BASE, s] = max(start, t + p[DIFS_NS])
         elif start <= t:
             st[BASE, s] = t
-        else:  # idle, but not yet for DIFS: a backoff is due
+        else:  # the medium is idle, but has not been so for DIFS: a backoff is due
             draw(st, s)
             st[FRESH, s] = 0
             st[BASE, s] = start
@@ -196,9 +196,9 @@ def access(
     s: int,
     t: int,
 ) -> None:
-    """The backoff has run out: transmit the first frame that is still alive."""
+    """Transmit the first frame that is still alive, because the backoff has run out."""
     if st[SCHEDULED, s] != t:
-        return  # frozen or planned anew since
+        return  # the backoff was frozen or planned anew after this event was made
     st[SCHEDULED, s] = -1
     st[BO, s] = 0
     st[FRESH, s] = 0
@@ -241,7 +241,7 @@ def begin_tx(
     kind: int,
     t: int,
 ) -> None:
-    """A station starts to transmit; whatever it was receiving is lost."""
+    """Let a station start to transmit; what it was receiving is lost."""
     if st[LOCK, s] >= 0:
         lk[FATE, st[LOCK, s]] = FATE_HALF_DUPLEX
         st[LOCK, s] = -1
@@ -255,7 +255,7 @@ def begin_tx(
     push(hr, g, HR_N, t + airtime, TX_DONE, s, 0)
     first, last = ptr[s], ptr[s + 1]
     while last > first and lp[LINK_POWER, last - 1] == 0.0:
-        last -= 1  # cut off
+        last -= 1  # links without power come last and carry nothing
     for link in range(first, last):
         lp[ON_AIR, link] = lp[LINK_POWER, link]
         lk[SENSED, link] = lk[AUDIBLE, link]
@@ -291,7 +291,7 @@ def leave_air(g: Ints, st: Ints, s: int, t: int) -> None:
 
 @jit
 def tx_done(g: Ints, p: Ints, st: Ints, fr: Ints, hs: Ints, out: Ints, s: int, t: int) -> None:
-    """The last bit has left the antenna."""
+    """The last bit of a frame has left the antenna of its transmitter."""
     kind, f = st[TX_KIND, s], st[TX_FRAME, s]
     st[TX_KIND, s] = NOTHING
     leave_air(g, st, s, t)
@@ -309,7 +309,7 @@ def tx_done(g: Ints, p: Ints, st: Ints, fr: Ints, hs: Ints, out: Ints, s: int, t
 
 @jit
 def acknowledged(g: Ints, p: Ints, st: Ints, fr: Ints, out: Ints, s: int, t: int) -> None:
-    """The ACK a station waited for."""
+    """End the frame of a station that has received the ACK for it."""
     f = st[WAITING, s]
     st[WAITING, s] = -1
     st[CW, s] = p[CW_MIN]
@@ -320,9 +320,9 @@ def acknowledged(g: Ints, p: Ints, st: Ints, fr: Ints, out: Ints, s: int, t: int
 
 @jit
 def ack_timeout(g: Ints, p: Ints, st: Ints, fr: Ints, lk: Ints, hs: Ints, out: Ints, s: int, f: int, t: int) -> None:
-    """No ACK: another attempt with a doubled window, or the end of it (802.11-2020, 10.3.4.4).
+    """No ACK has come: make another attempt with a doubled window, or give the frame up (802.11-2020, 10.3.4.4).
 
-    A frame whose header has been received by now may be the ACK: its end decides (10.3.2.11).
+    If the header of some frame has been received by now, that frame may be the ACK: its end decides (10.3.2.11).
     """
     if st[WAITING, s] != f:
         return
@@ -361,7 +361,7 @@ def send_ack(
     f: int,
     t: int,
 ) -> None:
-    """SIFS after a unicast frame for us: acknowledge, whatever the medium does."""
+    """Send an ACK, SIFS after the end of a unicast frame, whether or not the medium is busy."""
     st[ACK_TO, s] = -1
     if st[TX_KIND, s] == NOTHING:
         if p[CAPTURE] == 1:

@@ -1,4 +1,4 @@
-"""How frames and copies end: counted at once, told when nothing refers to the frame any more."""
+"""How frames and copies end: each is counted at once, and reported when nothing refers to the frame any more."""
 
 from emulator.kernel.jit import jit
 from emulator.kernel.state import (
@@ -42,7 +42,7 @@ from emulator.kernel.state import (
 
 @jit
 def put(g: Ints, out: Ints, kind: int, frame: int, station: int, t: int, value: int, attempts: int) -> None:
-    """An output row; the kernel's loop keeps room for what one event can make."""
+    """Append an output row; the kernel's loop keeps room for all rows that one event can make."""
     n = g[OUT_N]
     g[OUT_N] = n + 1
     out[n, 0], out[n, 1], out[n, 2], out[n, 3], out[n, 4], out[n, 5] = kind, frame, station, t, value, attempts
@@ -50,7 +50,7 @@ def put(g: Ints, out: Ints, kind: int, frame: int, station: int, t: int, value: 
 
 @jit
 def release(g: Ints, fr: Ints, out: Ints, f: int, t: int) -> None:
-    """One thing less that refers to a frame."""
+    """Remove one reference to a frame; after the last one its slot is reported free."""
     fr[OPEN, f] -= 1
     if fr[OPEN, f] == 0:
         put(g, out, OUT_FREE, f, fr[SRC, f], t, verdict(fr, f), 0)
@@ -58,7 +58,7 @@ def release(g: Ints, fr: Ints, out: Ints, f: int, t: int) -> None:
 
 @jit
 def verdict(fr: Ints, f: int) -> int:
-    """How a frame ended; of a broadcast that nobody got, why most copies were lost."""
+    """How a frame ended for its receivers; for a broadcast that none received, why most copies were lost."""
     outcome = fr[OUTCOME, f]
     most = max(fr[LOST_COLLISION, f], fr[LOST_HALF_DUPLEX, f], fr[LOST_WEAK, f])
     if fr[RECEIVED, f] > 0:
@@ -83,7 +83,7 @@ def verdict(fr: Ints, f: int) -> int:
 
 @jit
 def done(g: Ints, fr: Ints, out: Ints, f: int, outcome: int, t: int) -> None:
-    """The MAC is through with a frame."""
+    """Record that the MAC has finished with a frame."""
     fr[OUTCOME, f] = outcome
     if outcome in (DONE_ACKED, DONE_RETRY):
         g[UNICASTS_ENDED] += 1
@@ -94,7 +94,7 @@ def done(g: Ints, fr: Ints, out: Ints, f: int, outcome: int, t: int) -> None:
 
 @jit
 def lost(g: Ints, fr: Ints, lk: Ints, fate: int, link: int, f: int) -> None:
-    """One copy less."""
+    """Count one lost copy by its fate."""
     g[RECEIVED_COPIES + fate] += 1
     fr[LOST_COLLISION - 1 + fate, f] += 1
     lk[N_RECEIVED + fate, link] += 1

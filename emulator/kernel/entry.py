@@ -1,8 +1,8 @@
-"""The way into the compiled kernel, once per wake-up of the medium: one argument in place of fourteen.
+"""The entry to the compiled kernel, used once per wake-up of the medium: one argument in place of fourteen.
 
-At every call numba finds out type, address and shape of every array it is handed; that takes longer than what the
-kernel then does for a frame. So a table says where the arrays are, and they are put together inside. Uncompiled, there
-is no table.
+At every call numba determines type, address and shape of each array argument, which takes longer than the kernel needs
+for a frame. So a table holds the addresses, and the arrays are put together inside. Without compilation there is no
+table.
 """
 
 from collections.abc import Callable
@@ -21,12 +21,12 @@ Array = npt.NDArray[np.int64] | npt.NDArray[np.float64]
 
 
 class Entry:
-    """`kernel.advance` for these arrays, in its order. A replaced array needs a new entry."""
+    """`kernel.advance` bound to these arrays, given in its order. When an array is replaced, a new entry is needed."""
 
     def __init__(self, *arrays: Array) -> None:
-        self._arrays = arrays  # the table does not keep them alive
+        self._arrays = arrays  # holds a reference to each array: the table of addresses does not
         self.advance: Callable[[int], int]
-        """Until when, in; what `kernel.advance` returns, out."""
+        """Takes the instant until which to advance; returns what `kernel.advance` returns."""
         if COMPILED:
             assert len(arrays) == _ARRAYS, "as many as the kernel takes"
             assert all(a.flags.c_contiguous for a in arrays), "inside they are taken for whole rows"
@@ -43,7 +43,7 @@ if COMPILED:
 
     @intrinsic  # type: ignore[untyped-decorator]
     def pointer(_: Any, address: Any, dtype: Any) -> Any:
-        """An address as a pointer to numbers of this kind."""
+        """The address as a pointer to numbers of the given type."""
 
         def generate(context: Any, builder: Any, signature: Any, arguments: Any) -> Any:
             return builder.inttoptr(arguments[0], context.get_value_type(signature.return_type))
@@ -60,7 +60,7 @@ if COMPILED:
 
     @jit_views
     def advance_at(address: int, until: int) -> int:
-        """`kernel.advance`, its arrays from the table at this address."""
+        """`kernel.advance` on the arrays that the table at this address describes."""
         ints, reals = np.int64, np.float64
         table = carray(pointer(address, ints), (_ARRAYS, 3))
         return advance(

@@ -1,4 +1,4 @@
-"""A binary heap of (t_ns, seq, kind, a, b) rows in an array. Plain functions that numba compiles."""
+"""A binary heap of (t_ns, seq, kind, a, b) rows in an array, as plain functions that numba compiles."""
 
 from emulator.kernel.jit import jit
 from emulator.kernel.state import SEQ, Ints
@@ -6,7 +6,7 @@ from emulator.kernel.state import SEQ, Ints
 
 @jit
 def push(heap: Ints, g: Ints, size_at: int, t: int, kind: int, a: int, b: int) -> None:
-    """Add an event; `g[size_at]` holds the heap's size. The caller has made sure that there is room."""
+    """Add an event to the heap whose size is in `g[size_at]`. The caller has made sure that there is room."""
     g[SEQ] += 1
     seq = g[SEQ]
     i = g[size_at]

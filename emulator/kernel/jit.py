@@ -1,13 +1,14 @@
-"""numba when it is installed, the same source uncompiled otherwise (slow: for debugging and coverage).
+"""Compilation by numba when it is installed; otherwise the same source runs uncompiled (for debugging and coverage).
 
-FANET_NO_NUMBA=1 in the environment leaves functions uncompiled. Read here, once, and nowhere else.
+FANET_NO_NUMBA=1 in the environment leaves functions uncompiled. The variable is read here, once, and nowhere else.
 
-numba keeps machine code per function and looks only at that function's own file: after a change to `dcf.py` it would
-go on running the old code inlined into `kernel.py`. So the cache has a directory per state of all compiled sources.
+numba caches machine code per function and looks only at that function's own file: after a change to `dcf.py` it would
+go on running the old code inlined into `kernel.py`. So each state of all compiled sources has a cache directory of its
+own.
 
-Functions that make no arrays, all but those of `entry.py`, are compiled without numba's counts of references to arrays
-(`_nrt`): these are atomic, a pair per array and call that is not inlined, and took half of the kernel's time. Of what
-was left a third was calls that handed a dozen arrays on, each in nine parts: so all are inlined.
+Functions that make no arrays, which are all but those of `entry.py`, are compiled without numba's reference counts of
+arrays (`_nrt`). These counts are atomic, a pair per array and call that is not inlined, and took half of the kernel's
+time. A third of the rest was spent on calls that pass a dozen arrays, each in nine parts: so all calls are inlined.
 """
 
 import contextlib
@@ -25,7 +26,7 @@ def _identity(function: F) -> F:
 
 
 def _fingerprint(folder: Path) -> str:
-    """What the sources with compiled functions say, the constants they use and how they are compiled, in short."""
+    """A hash of the sources that hold compiled functions, the constants they use and the way they are compiled."""
     digest = hashlib.sha256()
     for path in sorted(folder.rglob("*.py")):
         source = path.read_bytes()
@@ -35,7 +36,7 @@ def _fingerprint(folder: Path) -> str:
 
 
 def cache_folder() -> Path:
-    """Where machine code of these sources is kept."""
+    """The directory in which the machine code of these sources is cached."""
     import numba
 
     folder = Path(__file__).parents[1]
@@ -43,7 +44,7 @@ def cache_folder() -> Path:
 
 
 def _as_far_as_the_disk_goes(save: Callable[..., None]) -> Callable[..., None]:
-    """Machine code that a full disk cannot keep is used all the same, and compiled again in the next process."""
+    """`save`, except that a full disk is no error: the code is used, and the next run compiles it again."""
 
     def saved(*arguments: object) -> None:
         with contextlib.suppress(OSError):
@@ -63,7 +64,7 @@ def _decorator(*, counted: bool) -> Callable[[F], F]:
     ours = str(cache_folder())
 
     def compiled(function: F) -> F:
-        numba.config.CACHE_DIR = ours  # read when a function is decorated, and by others too: put it back
+        numba.config.CACHE_DIR = ours  # numba reads this when it decorates a function; others rely on it: put it back
         try:
             compile_ = numba.njit(cache=True, error_model="numpy", _nrt=counted, forceinline=not counted)
             dispatcher = compile_(function)
@@ -78,6 +79,6 @@ def _decorator(*, counted: bool) -> Callable[[F], F]:
 
 jit = _decorator(counted=False)
 jit_views = _decorator(counted=True)
-"""For functions that make arrays of memory they are pointed to."""
+"""The decorator of functions that make arrays of the memory to which they are given pointers."""
 COMPILED = jit is not _identity
-"""Whether the kernel is machine code."""
+"""True when the kernel runs as machine code."""

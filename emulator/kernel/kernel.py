@@ -1,7 +1,7 @@
 """The event loop of the emulated air: two heaps merged in (t, seq) order until an instant. Sans-IO, integer ns.
 
-`advance` is one call for any number of internal events. It returns early only when its output rows or a heap run
-short of room; the caller drains, makes room and calls again.
+One call of `advance` processes any number of events. It returns early only when its output rows or a heap run out of
+room; the caller takes the rows, makes room and calls again.
 """
 
 from emulator.kernel.backoff import slots_left
@@ -62,16 +62,19 @@ from emulator.kernel.state import (
 )
 
 MARGIN = 16
-"""Rows that one event may need in the start heap."""
+"""Rows that one event may need in the heap of starts."""
 AT_ONCE = 4
-"""Receivers that one event handles; each may plan two starts, and all of them must find room."""
+"""Receivers that one event handles; each may plan two starts, for which there must be room."""
 _FEW = 128
-"""Planned starts that are worth looking at one by one."""
+"""Up to this many planned starts are examined one by one."""
 
 
 @jit
 def take_in(g: Ints, p: Ints, st: Ints, fr: Ints, hs: Ints, asked: Ints, bound: int) -> int:
-    """Plan the frames asked for; returns the bound of the next output, from that before. The start heap has room."""
+    """Plan the frames asked for; returns the smaller of `bound` and the first instant at which one of them can end.
+
+    The caller has made sure that the heap of starts has room.
+    """
     for i in range(g[ASKED_N]):
         f, src, airtime, t = asked[i, 0], asked[i, 1], asked[i, 3], asked[i, 4]
         for row in range(FRAME_ROWS):
@@ -91,7 +94,7 @@ def take_in(g: Ints, p: Ints, st: Ints, fr: Ints, hs: Ints, asked: Ints, bound: 
 
 @jit
 def first_wait(p: Ints, st: Ints, s: int, t: int) -> int:
-    """How long at least a frame that is queued at `t` waits, unless a frame of another station ends before."""
+    """How long a frame that is queued at `t` waits at least, unless a frame of another station ends first."""
     if p[DIFS_FIRST] == 0 or st[HEAD, s] >= 0 or st[TX_KIND, s] != NOTHING:
         return 0
     return int(p[DIFS_NS]) if slots_left(p, st, s, t) == 0 else 0
@@ -99,14 +102,14 @@ def first_wait(p: Ints, st: Ints, s: int, t: int) -> int:
 
 @jit
 def purge(g: Ints, st: Ints, hs: Ints) -> None:
-    """Take stale access events out of the start heap."""
+    """Remove stale access events from the heap of starts."""
     n = g[HS_N]
     g[HS_N] = 0
     for i in range(n):
         kind, a = hs[i, 2], hs[i, 3]
         if kind == ACCESS and st[SCHEDULED, a] != hs[i, 0]:
             continue
-        j = g[HS_N]  # keep (t, seq): the order among equals must not change
+        j = g[HS_N]  # (t, seq) is kept, because the order among equal instants must not change
         g[HS_N] = j + 1
         t, seq, b = hs[i, 0], hs[i, 1], hs[i, 4]
         while j > 0:
@@ -121,11 +124,12 @@ def purge(g: Ints, st: Ints, hs: Ints) -> None:
 
 @jit
 def next_output(g: Ints, p: Ints, st: Ints, fr: Ints, hs: Ints) -> int:
-    """A lower bound of the instant of the next reception or ACK; NEVER when nothing is under way.
+    """A lower bound of the instant of the next reception or ACK; NEVER when nothing is on the way.
 
-    Frames on the air end when they end at their last receiver; others cannot end before they can start, plus their
-    airtime: looked at one by one while few are planned (of those that count, the parents in the heap count too), else
-    that of a bare header. Then a status of failure may be told a header late.
+    A frame on the air ends when it ends at its last receiver; a planned frame cannot end earlier than its start plus
+    its airtime. Planned starts are examined one by one while they are few: of those whose instant is below the bound,
+    the parents in the heap are below it too. When they are many, the first start plus the airtime of a bare header is
+    taken; then the report of a failure may come late by a header.
     """
     bound = NEVER
     for i in range(g[ON_AIR_N]):
@@ -145,7 +149,7 @@ def next_output(g: Ints, p: Ints, st: Ints, fr: Ints, hs: Ints) -> int:
 
 @jit
 def earliest_end(g: Ints, p: Ints, st: Ints, fr: Ints, t: int, kind: int, a: int, b: int) -> int:
-    """When the frame that an event may start can have ended at its last receiver, at the earliest."""
+    """The earliest instant at which the frame that this event may start can have ended at its last receiver."""
     if kind == ARRIVE:
         return int(t + fr[AIRTIME, a] + first_wait(p, st, fr[SRC, a], t) + g[REACH_NS])
     if kind == SEND_ACK:
@@ -165,13 +169,14 @@ def advance(  # noqa: C901  (one dispatch; splitting it would only move the bran
 ) -> int:  # fmt: skip
     """Take in what was asked for, and process every event up to and including `until`; returns `next_output`.
 
-    `out` begins anew with every call. -1: there is no room; take what is in `out`, make some, and call again.
+    `out` is filled from its beginning at every call. A result of -1 means that room ran out: the caller takes the rows
+    in `out`, makes room, and calls again.
     """
     g[OUT_N] = 0
     if g[HS_N] + g[ASKED_N] + MARGIN > hs.shape[0]:
         return -1
     take_in(g, p, st, fr, hs, asked, NEVER)
-    room = out.shape[0] - 2 * p[QUEUE_LIMIT] - 8  # one event may expire a whole queue
+    room = out.shape[0] - 2 * p[QUEUE_LIMIT] - 8  # a single event may let a whole queue expire
     while True:
         if g[OUT_N] >= room:
             return -1
@@ -215,7 +220,10 @@ def spread(
     g: Ints, p: Ints, pf: Reals, st: Ints, sf: Reals, fr: Ints, lk: Ints, lp: Reals, hs: Ints, hr: Ints, out: Ints,
     err: Reals, kind: int, link: int, end: int, t: int,
 ) -> None:  # fmt: skip
-    """One moment of a frame at its receivers, `link` to `end` - 1: at those it reaches now, then at the next ones."""
+    """Handle one moment of a frame (`kind`) at its receivers on the links `link` to `end` - 1.
+
+    The receivers that the moment reaches at `t` are handled now; an event is planned for the next one.
+    """
     until = min(end, link + AT_ONCE)
     while link < until and moment(p, lk, kind, link) == t:
         if kind == ALL_START:
@@ -231,7 +239,7 @@ def spread(
 
 @jit
 def moment(p: Ints, lk: Ints, kind: int, link: int) -> int:
-    """When the frame on a link begins, is detected or ends at its receiver."""
+    """The instant at which the frame on a link begins, is detected, or ends at its receiver, according to `kind`."""
     if kind == ALL_END:
         return int(lk[ENDS, link])
     return int(lk[BEGINS, link] + (p[DETECT_NS] if kind == ALL_DETECT else 0))
@@ -239,7 +247,7 @@ def moment(p: Ints, lk: Ints, kind: int, link: int) -> int:
 
 @jit
 def scatter(g: Ints, p: Ints, lk: Ints, hr: Ints) -> None:
-    """Replace each event on many links by one on each: the links are about to change."""
+    """Replace each event that stands for many links by one event per link, because the links are about to change."""
     i = 0
     while i < g[HR_N]:
         kind, first, end = hr[i, 2], hr[i, 3], hr[i, 4]
@@ -250,17 +258,17 @@ def scatter(g: Ints, p: Ints, lk: Ints, hr: Ints) -> None:
         hr[i, 2], hr[i, 4] = single, 0
         for link in range(first + 1, end):
             push(hr, g, HR_N, moment(p, lk, kind, link), single, link, 0)
-        i = 0  # rows have moved
+        i = 0  # the pushes have moved rows of the heap
 
 
 @jit
 def relink(  # noqa: C901  (one pass over what is under way)
     hr: Ints, g: Ints, lk: Ints, lp: Reals, ptr: Ints, lock: Ints, new_lk: Ints, new_lp: Reals, new_ptr: Ints
 ) -> int:  # fmt: skip
-    """Carry what is under way on the old links over to the new ones.
+    """Carry the frames on the old links over to the new links; returns how many links are in use.
 
-    `new_lk` has room for every old link behind its `new_ptr[-1]` links: a frame that was under way on a link which is
-    gone ends on an orphan there. Returns how many links are in use. `lock` is the LOCK row of the stations.
+    `new_lk` has room for every old link behind its own `new_ptr[-1]` links: a frame on a link that no longer exists
+    ends on an orphan there. `lock` is the LOCK row of the stations.
     """
     used = new_ptr[new_ptr.shape[0] - 1]
     for old in range(lk.shape[1]):
@@ -286,7 +294,7 @@ def relink(  # noqa: C901  (one pass over what is under way)
         for i in range(g[HR_N]):
             if hr[i, 2] != TX_DONE and hr[i, 3] == old and hr[i, 4] == 0:
                 hr[i, 3] = target
-                hr[i, 4] = 1  # moved: do not move it again
+                hr[i, 4] = 1  # marks an event that has been moved, so that it is not moved again
         if lock[dst] == old:
             lock[dst] = -2 - target
     for i in range(g[HR_N]):

@@ -1,10 +1,11 @@
-"""What a station's receiver makes of overlapping frames: detection, interference, success; as functions over rows.
+"""A station's receiver under overlapping frames: detection, interference, success; as functions over its state.
 
-    frame begins -> detected after 4 us if nothing drowns it -> received while interference allows -> decoded or lost
+    frame begins -> detected after 4 us if it is strong enough -> received, loss by interference -> decoded or lost
 
-A frame is sensed from its detection on. A receiver stays with the frame it detected first, unless TAKE_OVER = 1 and
-a later one, whose preamble stands out of everything else, is TAKE_OVER_RATIO times as strong: then the first is lost.
-With INTERFERENCE = 0 any overlap destroys; with 1 the loss of each segment follows from its SINR.
+A frame is sensed from its detection on. A receiver stays with the frame that it detected first, unless TAKE_OVER = 1
+and a later frame, whose preamble can be detected above everything else, is TAKE_OVER_RATIO times as strong: then the
+first frame is lost. With INTERFERENCE = 0 any overlap destroys a frame; with 1 the loss in each segment follows from
+its SINR.
 """
 
 import math
@@ -67,8 +68,8 @@ from emulator.kernel.state import (
     OUT_N,
     OUT_RECEPTION,
     OVERLAPPED,
-    OVERSEEN,
-    OVERSEES,
+    OVERLOOKED,
+    OVERLOOKS,
     POWER,
     RANDOM,
     RECEIVED,
@@ -96,13 +97,13 @@ ERROR_STEPS_PER_DB = 20.0
 
 @jit
 def close_segment(p: Ints, pf: Reals, st: Ints, sf: Reals, lp: Reals, err: Reals, r: int, t: int) -> None:
-    """Account for the part of the locked frame since the last change of interference."""
+    """Account for the part of the locked frame that has passed since the interference last changed."""
     begin = st[LOCK_FROM, r]
     st[LOCK_FROM, r] = t
     if p[INTERFERENCE] == 0 or t <= begin:
         return
     wanted = lp[ON_AIR, st[LOCK, r]]
-    unwanted = max(0.0, sf[POWER, r] - wanted - sf[OVERSEEN, r])
+    unwanted = max(0.0, sf[POWER, r] - wanted - sf[OVERLOOKED, r])
     sinr_db = 10.0 * math.log10(wanted / (unwanted + sf[NOISE, r]))
     at = int((sinr_db - ERROR_FLOOR_DB) * ERROR_STEPS_PER_DB)
     at = max(0, min(err.shape[1] - 1, at))
@@ -115,13 +116,13 @@ def close_segment(p: Ints, pf: Reals, st: Ints, sf: Reals, lp: Reals, err: Reals
 
 @jit
 def rx_start(p: Ints, pf: Reals, st: Ints, sf: Reals, lk: Ints, lp: Reals, err: Reals, link: int, t: int) -> None:
-    """The first bit of a frame reaches a station."""
+    """The first bit of a frame has reached a station."""
     r = lk[LINK_DST, link]
     if st[LOCK, r] >= 0:
         close_segment(p, pf, st, sf, lp, err, r, t)
-        sf[OVERSEEN, r] = 0.0
+        sf[OVERLOOKED, r] = 0.0
         st[OVERLAPPED, r] = 1
-    elif p[OVERSEES] == 1:
+    elif p[OVERLOOKS] == 1:
         seek(p, st, sf, r, t)
     st[NSIG, r] += 1
     sf[POWER, r] += lp[ON_AIR, link]
@@ -130,10 +131,10 @@ def rx_start(p: Ints, pf: Reals, st: Ints, sf: Reals, lk: Ints, lp: Reals, err: 
 
 @jit
 def seek(p: Ints, st: Ints, sf: Reals, r: int, t: int) -> None:
-    """A signal opens a window in which its preamble is looked for; what was on the air before the first of several?
+    """Open the window in which a signal's preamble is looked for, and note the power that preceded a run of windows.
 
-    ns-3.44 (InterferenceHelper over YansWifiPhy) takes that as the interference with which the frame that it finds
-    begins: a weaker signal that came less than a window before it does no harm until the power changes again.
+    ns-3.44 (InterferenceHelper over YansWifiPhy) takes this power as the interference with which the frame that it
+    detects begins: a weaker signal that came less than a window before that frame does no harm until the power changes.
     """
     if t >= st[SEEKING_UNTIL, r]:
         sf[BEFORE_SEEKING, r] = sf[POWER, r]
@@ -143,7 +144,7 @@ def seek(p: Ints, st: Ints, sf: Reals, r: int, t: int) -> None:
 
 @jit
 def rx_detect(p: Ints, pf: Reals, st: Ints, sf: Reals, lk: Ints, lp: Reals, link: int, t: int) -> None:
-    """The preamble has been there long enough to be found, and the energy to be sensed."""
+    """The preamble of a frame has been present long enough to be detected, and its energy to be sensed."""
     r = lk[LINK_DST, link]
     audible = lk[SENSED, link] == 1
     if audible:
@@ -174,14 +175,14 @@ def rx_detect(p: Ints, pf: Reals, st: Ints, sf: Reals, lk: Ints, lp: Reals, link
             st[LOCK_DATA_END, r] = lk[ENDS, link] - p[EXTENSION_NS]
         st[OVERLAPPED, r] = 1 if st[NSIG, r] > 1 else 0
         sf[LOG_OK, r] = 0.0
-        sf[OVERSEEN, r] = 0.0
-        if p[OVERSEES] == 1 and st[CHANGED_AT, r] == lk[BEGINS, link]:
-            sf[OVERSEEN, r] = sf[POWER, r] - wanted - sf[BEFORE_SEEKING, r]
+        sf[OVERLOOKED, r] = 0.0
+        if p[OVERLOOKS] == 1 and st[CHANGED_AT, r] == lk[BEGINS, link]:
+            sf[OVERLOOKED, r] = sf[POWER, r] - wanted - sf[BEFORE_SEEKING, r]
 
 
 @jit
 def busier(p: Ints, st: Ints, r: int, t: int) -> None:
-    """One more reason to call the medium busy."""
+    """Add one reason to call a station's medium busy."""
     st[CS, r] += 1
     if st[CS, r] == 1 and st[TX_KIND, r] == NOTHING:
         on_busy(p, st, r, t)
@@ -189,7 +190,7 @@ def busier(p: Ints, st: Ints, r: int, t: int) -> None:
 
 @jit
 def quieter(g: Ints, p: Ints, st: Ints, hs: Ints, r: int, t: int) -> None:
-    """One reason less."""
+    """Remove one reason to call a station's medium busy."""
     st[CS, r] -= 1
     if st[CS, r] == 0 and st[TX_KIND, r] == NOTHING:
         on_idle(g, p, st, hs, r, t)
@@ -197,13 +198,13 @@ def quieter(g: Ints, p: Ints, st: Ints, hs: Ints, r: int, t: int) -> None:
 
 @jit
 def captures(p: Ints, pf: Reals, st: Ints, lp: Reals, r: int, wanted: float) -> bool:
-    """Whether a later frame takes a receiver away from the frame it is locked on (message in message)."""
+    """True if a later frame takes the receiver over from the frame on which it is locked (message in message)."""
     return bool(p[TAKE_OVER] == 1 and wanted >= pf[TAKE_OVER_RATIO] * lp[ON_AIR, st[LOCK, r]])
 
 
 @jit
 def survived(p: Ints, st: Ints, sf: Reals, r: int) -> bool:
-    """Whether the locked frame came through whole."""
+    """True if the locked frame is received without error."""
     if p[INTERFERENCE] == 0:
         return bool(st[OVERLAPPED, r] == 0)
     if sf[LOG_OK, r] > -1e-9:
@@ -213,7 +214,7 @@ def survived(p: Ints, st: Ints, sf: Reals, r: int) -> bool:
 
 @jit
 def spared(st: Ints, lp: Reals, r: int, link: int) -> bool:
-    """Whether the fault on a link lets a frame through that was otherwise received."""
+    """True if the fault on a link lets a frame pass that would otherwise be received."""
     share = lp[SPARED, link]
     if share >= 1.0 or share <= 0.0:
         return bool(share >= 1.0)
@@ -236,12 +237,12 @@ def rx_end(
     link: int,
     t: int,
 ) -> None:
-    """The last bit of a frame reaches a station."""
+    """The last bit of a frame has reached a station."""
     r = lk[LINK_DST, link]
     whole = False
     if st[LOCK, r] >= 0:
         close_segment(p, pf, st, sf, lp, err, r, t)
-        sf[OVERSEEN, r] = 0.0
+        sf[OVERLOOKED, r] = 0.0
     st[CHANGED_AT, r] = t
     if st[LOCK, r] == link:
         st[LOCK, r] = -1
@@ -269,7 +270,7 @@ def rx_end(
 
 @jit
 def repeats(g: Ints, out: Ints, f: int, t: int, millidbm: int) -> int:
-    """Whether the row before says the same of another station: then there is one message for both."""
+    """1 if the previous row says the same about another station, so that one message serves both; 0 otherwise."""
     n = g[OUT_N] - 1
     return int(n >= 0 and out[n, 0] == OUT_RECEPTION and out[n, 1] == f and out[n, 3] == t and out[n, 4] == millidbm)
 
@@ -278,7 +279,7 @@ def repeats(g: Ints, out: Ints, f: int, t: int, millidbm: int) -> int:
 def data_end(
     g: Ints, p: Ints, st: Ints, fr: Ints, lk: Ints, lp: Reals, hs: Ints, out: Ints, link: int, whole: bool, t: int
 ) -> None:
-    """A data frame has ended at a station: hand it up, acknowledge it, or count why not."""
+    """End a data frame at a station: hand it up and acknowledge it, or count why it was lost."""
     r, f = lk[LINK_DST, link], lk[LINK_FRAME, link]
     ours = fr[DST, f] == EVERYONE or fr[DST, f] == r
     if whole and not ours:
@@ -302,4 +303,4 @@ def data_end(
     if fr[DST, f] == r:
         st[ACK_TO, r] = lk[LINK_SRC, link]
         push(hs, g, HS_N, t + p[SIFS_NS], SEND_ACK, r, f)
-        fr[OPEN, f] += 1  # the ACK to come refers to it
+        fr[OPEN, f] += 1  # the ACK to come refers to the frame

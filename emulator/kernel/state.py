@@ -1,11 +1,11 @@
-"""The kernel's state: rows of a few arrays, because a call with few arguments is a cheap call.
+"""The kernel's state: the rows of a few arrays, because a call with few arguments is cheap.
 
     st  int64   [station rows, stations]      sf  float64 [station rows, stations]
     fr  int64   [frame rows, frame slots]
     lk  int64   [link rows, links]            lp  float64 [link rows, links]      ptr int64 [stations + 1]
-    hs, hr int64 [capacity, 5]                heaps of (t_ns, seq, kind, a, b): what may start a frame; receptions
+    hs, hr int64 [capacity, 5]                heaps of (t_ns, seq, kind, a, b): starts (hs), receptions (hr)
     g   int64   [globals]                     p int64, pf float64: parameters
-    asked, out int64 [capacity, 6]            what is handed to the kernel and what it hands back, by the next call
+    asked, out int64 [capacity, 6]            requests handed to the kernel, results handed back; emptied at each call
 
 Instants are swarm ns. A link is one direction of a pair of stations; the links of one transmitter are adjacent
 (compressed rows, `ptr`). A station transmits one frame at a time, so a link carries at most one.
@@ -22,41 +22,41 @@ Reals = npt.NDArray[np.float64]
 # --- stations (st) ------------------------------------------------------------------------------------------------
 (
     BO,  # backoff slots left
-    BASE,  # instant from which they count, while the medium is idle
+    BASE,  # instant from which backoff slots count while the medium is idle
     SCHEDULED,  # instant of the pending access, -1 none; an access event of another instant is stale
     CW,  # contention window
     FRESH,  # 1: the frame waiting for access has drawn no backoff (immediate access)
     TX_FRAME,  # frame slot on the air, -1 none
     TX_KIND,  # NOTHING, DATA, ACK
-    TX_END,
-    CS,  # signals sensed, and one more if ENERGY
-    ENERGY,  # 1: with SENSES_SUMS, all signals together are sensed
+    TX_END,  # instant at which the frame on the air ends
+    CS,  # number of signals sensed, plus one if ENERGY
+    ENERGY,  # 1: all signals together are sensed (only with SENSES_SUMS)
     NSIG,  # signals present, sensed or not
     LOCK,  # link being received, -1 none
     LOCK_FROM,  # start of the current interference segment
     LOCK_HEADER_END,  # end of the PLCP preamble and header of the locked frame
-    LOCK_DATA_END,  # from then on only signal extension, which carries no bits; NEVER without
-    LOCK_RATE,  # 1: the locked frame is data, 2: an ACK; rows of `err`, and offsets into pf
+    LOCK_DATA_END,  # instant from which only signal extension follows, which carries no bits; NEVER if there is none
+    LOCK_RATE,  # 1: the locked frame is data, 2: it is an ACK; the row of `err`, and an offset into pf
     OVERLAPPED,  # 1: another signal overlapped the locked frame
     SEEKING_UNTIL,  # end of the last detection window that a signal has opened
-    CHANGED_AT,  # when the power last changed
-    IDLE_FROM,  # when the medium last became idle
+    CHANGED_AT,  # instant at which the power last changed
+    IDLE_FROM,  # instant at which the medium last became idle
     BAD_UNTIL,  # end of the EIFS extension after a failed reception, 0 none; see backoff.py
-    RESUME_FROM,  # end of an ACK timeout: access counts from here
-    NAV,  # virtual carrier sense: reserved until
+    RESUME_FROM,  # end of the last ACK timeout: access counts from there
+    NAV,  # network allocation vector: the medium is reserved until this instant
     WAITING,  # frame slot whose ACK is awaited, -1 none
     ACK_TO,  # station to acknowledge, -1 none
     HEAD,  # frame slot at the head of the MAC queue, -1 none
-    TAIL,
-    QLEN,
-    BUSY_SINCE,  # -1 idle
+    TAIL,  # frame slot at the end of the MAC queue, -1 none
+    QLEN,  # number of frames in the MAC queue
+    BUSY_SINCE,  # instant at which the medium turned busy, -1 idle
     BUSY_NS,  # busy time so far
-    RANDOM,  # state of the station's generator
-    FAULT_RANDOM,  # of the one that says which frames a fault takes
-    HANDED,  # receptions handed to the station
-    FADE_A,  # state of the generator for the fading of what the station transmits
-    FADE_B,
-    ON_AIR_LIST,  # not by station: the first ON_AIR_N entries name the stations that transmit
+    RANDOM,  # state of the generator for backoff and reception
+    FAULT_RANDOM,  # state of the generator that says which frames a fault destroys
+    HANDED,  # number of receptions handed to the station
+    FADE_A,  # first state of the generator for the fading of what the station transmits
+    FADE_B,  # its second state
+    ON_AIR_LIST,  # not indexed by station: the first ON_AIR_N entries are the stations that transmit
     STATION_ROWS,
 ) = range(37)
 NOTHING: Final = 0
@@ -64,29 +64,29 @@ DATA: Final = 1
 ACK: Final = 2
 
 # --- stations (sf) ------------------------------------------------------------------------------------------------
-POWER, LOG_OK, NOISE, BEFORE_SEEKING, OVERSEEN, STATION_REALS = range(6)
-"""POWER: sum of the signals present [mW]. LOG_OK: log of the probability that the locked frame is still whole. NOISE:
-what the receiver hears besides [mW]. With OVERSEES, BEFORE_SEEKING: POWER before the first signal of a run of
-detection windows; OVERSEEN: what the locked frame does not notice of the interference [mW]."""
+POWER, LOG_OK, NOISE, BEFORE_SEEKING, OVERLOOKED, STATION_REALS = range(6)
+"""POWER: sum of the signals present [mW]. LOG_OK: log of the probability that the locked frame has no error so far.
+NOISE: noise at the receiver [mW]. Only with OVERLOOKS: BEFORE_SEEKING is POWER before the first signal of a run of
+detection windows, OVERLOOKED is the part of the interference that does not count against the locked frame [mW]."""
 
 # --- frames (fr) --------------------------------------------------------------------------------------------------
 (
     SRC,
     DST,  # station, or EVERYONE
     AIRTIME,
-    BORN,  # when it entered (or will enter) the MAC queue
-    NEXT,  # next in the queue, -1 none
-    ATTEMPTS,
-    RECEIVED,  # copies received, duplicates of a unicast not counted
-    OPEN,  # receptions still under way, plus 1 while the MAC holds the frame
-    OUTCOME,
-    LOST_COLLISION,
+    BORN,  # instant at which the frame enters the MAC queue
+    NEXT,  # next frame in the queue, -1 none
+    ATTEMPTS,  # transmissions so far
+    RECEIVED,  # copies received; duplicates of a unicast are not counted
+    OPEN,  # references to the frame: receptions not yet ended, the ACK to come, and 1 while the MAC holds it
+    OUTCOME,  # DONE_*
+    LOST_COLLISION,  # copies lost; the next five rows count the other fates
     LOST_HALF_DUPLEX,
     LOST_WEAK,
     LOST_DEGRADED,
     LOST_JAMMED,
     LOST_CUT,
-    TARGETS,  # copies in range at the last attempt
+    TARGETS,  # receivers in range at the last attempt
     WANTS_STATUS,
     FRAME_ROWS,
 ) = range(18)
@@ -96,52 +96,53 @@ EVERYONE: Final = -1
 (
     LINK_SRC,
     LINK_DST,
-    DELAY,
-    AUDIBLE,  # 1: strong enough to sense and decode; others only interfere
-    FAULT,  # FATE_DEGRADED, FATE_JAMMED or FATE_CUT while a fault lies on a link that were audible without it, else 0
-    RSSI_SUM,  # of the copies received [1/1000 dBm]; this and the counts are since the links were made
-    N_RECEIVED,  # copies received; then, by fate, copies lost
+    DELAY,  # propagation delay
+    AUDIBLE,  # 1: strong enough to sense and decode; 0: it only interferes
+    FAULT,  # FATE_DEGRADED, FATE_JAMMED or FATE_CUT while a fault lies on a link that is otherwise audible, else 0
+    RSSI_SUM,  # sum over the copies received [1/1000 dBm]; this and the counts are since the links were made
+    N_RECEIVED,  # copies received; the next six rows count copies lost, by fate
     N_COLLISION,
     N_HALF_DUPLEX,
     N_WEAK,
     N_DEGRADED,
     N_JAMMED,
     N_CUT,
-    SENSED,  # AUDIBLE at the start of the frame now on the link, or as fading has it; rows from here on are of it
-    COPY,  # 1: the frame counts as a copy for this receiver: audible on average, or lifted by fading
+    SENSED,  # 1: the frame on the link is sensed (AUDIBLE, changed by fading); this and later rows are of that frame
+    COPY,  # 1: the frame counts as a copy for this receiver: audible on average, or raised by fading
     FATE,
-    LINK_FRAME,  # of an ACK: the frame it acknowledges
+    LINK_FRAME,  # frame slot; for an ACK, of the frame that it acknowledges
     LINK_KIND,
-    UNDERWAY,  # 1 until its end
-    BEGINS,  # its first bit at the receiver
-    ENDS,  # its last
+    UNDERWAY,  # 1 until the frame has ended at the receiver
+    BEGINS,  # instant of its first bit at the receiver
+    ENDS,  # instant of its last bit at the receiver
     LINK_ROWS,
 ) = range(22)
 LINK_POWER, ON_AIR, SPARED, LINK_REALS = range(4)
-"""LINK_POWER: received power [mW], 0: the link carries nothing, and comes last of its transmitter's. ON_AIR: that of
-the frame now on the link, as it was at its start. SPARED: the share of frames that the link's FAULT lets through."""
+"""LINK_POWER: received power [mW]; at 0 the link carries nothing, and is sorted behind the others of its transmitter.
+ON_AIR: the power of the frame now on the link, as it was at its start. SPARED: the share of frames that the FAULT of
+the link lets pass."""
 
 FATE_OPEN, FATE_COLLISION, FATE_HALF_DUPLEX, FATE_WEAK, FATE_DEGRADED, FATE_JAMMED, FATE_CUT = range(7)
-"""Counts by fate lie side by side in this order: g from RECEIVED_COPIES, fr from LOST_COLLISION, lk from N_RECEIVED."""
+"""Counts by fate are adjacent in this order: g from RECEIVED_COPIES, fr from LOST_COLLISION, lk from N_RECEIVED."""
 
 NEVER: Final = 1 << 62
 """Later than any instant."""
 
 # --- events -------------------------------------------------------------------------------------------------------
 ARRIVE, ACCESS, SEND_ACK, ACK_TIMEOUT, TX_DONE, RX_START, RX_DETECT, RX_END, ALL_START, ALL_DETECT, ALL_END = range(11)
-"""ALL_*: the same on the links a .. b - 1 of one transmitter, nearest receiver first, from link to link."""
+"""Each ALL_* stands for RX_* on the links a .. b - 1 of one transmitter, handled in order, nearest receiver first."""
 
 # --- requests (asked): frame, source, destination, airtime, start, wants status ---------------------------------------
 ASKED_COLUMNS: Final = 6
 
 # --- outputs (out): kind, frame, station, t_ns, rssi in 1/1000 dBm, attempts ------------------------------------------
 OUT_RECEPTION, OUT_DONE, OUT_FREE, OUT_START, OUT_COLUMNS = 0, 1, 2, 3, 6
-"""A copy was decoded (attempts: 1 if the row before differs only in the station); the MAC is done with a frame that
-wants a status (value: outcome); nothing refers to the slot any more (value: verdict); with CAPTURE, a station starts to
-transmit (value: DATA or ACK)."""
+"""OUT_RECEPTION: a copy was decoded (attempts: 1 if the previous row differs only in the station). OUT_DONE: the MAC is
+done with a frame that wants a status (value: outcome). OUT_FREE: nothing refers to the slot any more (value:
+verdict). OUT_START, only with CAPTURE: a station starts to transmit (value: DATA or ACK)."""
 
 DONE_SENT, DONE_ACKED, DONE_RETRY, DONE_FULL, DONE_EXPIRED = range(5)
-"""Outcomes; the values of `messages.TxOutcome`."""
+"""Outcomes of a frame for its transmitter, equal to the values of `messages.TxOutcome`."""
 
 DELIVERED, NO_RECEIVER, COLLIDED, DEAF, WEAK, GIVEN_UP, NO_ROOM, EXPIRED, DEGRADED, JAMMED, CUT_OFF = range(11)
 """Verdicts: how a frame ended for its receivers."""
@@ -165,10 +166,10 @@ DELIVERED, NO_RECEIVER, COLLIDED, DEAF, WEAK, GIVEN_UP, NO_ROOM, EXPIRED, DEGRAD
     ATTEMPTS_FAILED,
     UNICASTS_ENDED,
     RETRIES,
-    ON_AIR_N,  # stations transmitting
-    LAST_END,  # when the last frame to leave its antenna has ended at its last receiver
+    ON_AIR_N,  # number of stations that transmit
+    LAST_END,  # instant at which the last frame to leave its antenna has ended at its last receiver
     REACH_NS,  # longest delay of an audible link
-    ASKED_N,
+    ASKED_N,  # rows of `asked` in use
     GLOBALS,
 ) = range(22)
 
@@ -190,12 +191,12 @@ DELIVERED, NO_RECEIVER, COLLIDED, DEAF, WEAK, GIVEN_UP, NO_ROOM, EXPIRED, DEGRAD
     DIFS_FIRST,  # 1, as ns-3: a frame waits one DIFS after it is queued, and draws nothing if it is interrupted
     EIFS_FROM_FRAME,  # 1, as ns-3: EIFS begins at the end of a bad frame, not when the medium is idle after it
     SENSES_SUMS,  # 1, as ns-3: signals too weak to be sensed are sensed together
-    OVERSEES,  # 1, as ns-3: interference within a detection window is overseen
-    INTERFERENCE,  # 0: any overlap destroys; 1: SINR and error rate
-    CAPTURE,  # 1: report every start of a transmission
+    OVERLOOKS,  # 1, as ns-3: interference that begins within a detection window is overlooked
+    INTERFERENCE,  # 0: any overlap destroys a frame; 1: loss by SINR and error rate
+    CAPTURE,  # 1: every start of a transmission is reported
     EXTENSION_NS,  # signal extension at the end of each frame (OFDM at 2.4 GHz)
     TAKE_OVER,  # 1: a later frame that is TAKE_OVER_RATIO times as strong as the locked one takes the receiver
-    FADING,  # 0 none, else the law: see fading.py
+    FADING,  # 0 none, else the number of the law (fading.py)
     PARAMETERS,
 ) = range(23)
 (

@@ -60,14 +60,14 @@ def simulate(scenario: ScenarioName, *, choice: Choice = Choice(), output: Outpu
         A shipped scenario's name (see `fanet scenarios`) or a .toml file.
 
     """
-    from emulator.kernel.compile import WORD, must_compile, warm_up
+    from emulator.kernel.compile import COMPILING_NOTICE, must_compile, warm_up
     from sim.run.virtual import EPOCH_UNIX_NS
     from sim.run.virtual import simulate as run
 
     chosen = with_engine(choice.scenario(scenario))
     output.prepare()
     if must_compile():
-        _err.print(WORD, highlight=False)
+        _err.print(COMPILING_NOTICE, highlight=False)
         warm_up()
     signals: list[int] = []
     path = output.capture_path()
@@ -245,11 +245,11 @@ def emulator(
 
     """
     from emulator.__main__ import run
-    from emulator.kernel.compile import WORD, must_compile
+    from emulator.kernel.compile import COMPILING_NOTICE, must_compile
 
     chosen = choice.realtime_scenario(scenario)
     if must_compile():
-        _err.print(WORD, highlight=False)
+        _err.print(COMPILING_NOTICE, highlight=False)
     return run(
         chosen,
         swarm=join.swarm or chosen.name,

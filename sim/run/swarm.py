@@ -18,7 +18,7 @@ from typing import Any, Final
 
 from agents.__main__ import run as run_agent
 from emulator.__main__ import run as run_emulator
-from emulator.kernel.compile import WORD, must_compile
+from emulator.kernel.compile import COMPILING_NOTICE, must_compile
 from fanet_mw.bus.topics import Topics
 from fanet_mw.errors import BusError
 from fanet_mw.hosts import interrupts
@@ -309,7 +309,7 @@ async def launch(
     """
     limits.prepare(processes=len(expected_names(scenario)))
     if must_compile():
-        on_event(WORD)
+        on_event(COMPILING_NOTICE)
     bus, endpoint = _bus(listen, connect, zenoh_config)
     with bus, registered(swarm, endpoint) as known:
         on_event(f"swarm {swarm} on {endpoint}" + ("" if known else "; other commands must be told so: --connect"))

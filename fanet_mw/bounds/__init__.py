@@ -1,12 +1,14 @@
 """Worst-case delay: the paper's estimate, and bounds that hold. Pure functions of integer nanoseconds.
 
-`paper` is equations (1)-(4) to the letter, for comparison; `slot` is one head's slot, `turns` single turns of a
-superframe; `arrivals` and `network` are the parts of network calculus that bound queues fed by bursts; `tandem` joins
-hops; `access` is the way to the head below.
+`paper` holds the paper's equations (1)-(4) to the letter, for comparison. `slot` is the service of one slot per
+superframe, `turn_gaps` that of single turns. `arrivals` and `network` are the parts of network calculus that bound a
+queue fed by bursts; `tandem` joins several hops. `access` bounds the unicast from a source to its head, `guard` is the
+guard time of a slot.
 """
 
-from fanet_mw.bounds.access import Contention, Dcf, access_bound, guard_ns
+from fanet_mw.bounds.access import Contention, Dcf, access_bound
 from fanet_mw.bounds.arrivals import Arrivals, Limited, Periodic, Total, token_bucket
+from fanet_mw.bounds.guard import guard_ns
 from fanet_mw.bounds.network import backlog, delay_any_order, delay_fifo
 from fanet_mw.bounds.outcome import Bounded, Outcome, Refused
 from fanet_mw.bounds.slot import Server, SlotServer, single_slot_bound

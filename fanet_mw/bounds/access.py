@@ -1,25 +1,25 @@
-"""The way to the head: how long an acknowledged unicast can take at an 802.11 station, and what a guard time must hold.
+"""Medium access: how long an acknowledged unicast can take at an 802.11 station, from its queueing to its outcome.
 
-DCF gives no bound against stations that always have something to send: one that draws a backoff of 0 again and again
-can hold the others off without end. A bound needs limited traffic, which a contention window of the superframe gives:
+DCF gives no bound against stations that always have something to send: a station that draws a backoff of 0 again and
+again can hold the others off without end. A bound needs limited traffic, which a contention window of the superframe
+provides:
 
   * n stations, this one included, can be sensed (their frames or the acknowledgements to them); no other traffic;
-  * each of the others sends at most m frames from the instant at which ours is queued until its outcome is known;
-  * this station has at most f frames queued, ours last;
+  * each other station sends at most m frames from the queueing of this station's frame until its outcome is known;
+  * this station has at most f frames queued, the frame in question last;
   * every frame has at most R attempts (IEEE 802.11-2020, 10.3.4.4).
 
-An attempt of ours costs at most   EIFS + CW_i slots + airtime + max(SIFS + ACK, ACK timeout), CW_i = 2^i (CW+1) - 1
-An attempt of another freezes us   airtime + SIFS + ACK + EIFS + 1 slot (which it cut short), (n-1) m R times
+An attempt of its own costs at most    EIFS + CW_i slots + airtime + max(SIFS + ACK, ACK timeout), CW_i = 2^i (CW+1) - 1
+An attempt of another one freezes it   airtime + SIFS + ACK + EIFS + 1 slot (cut short by it), (n-1) m R times
 
-and the bound is f times the first, summed over i < R, plus all of the second. EIFS stands for every DIFS, for
-any reception may have failed (10.3.7). Attempts that collide overlap; counting them apart is on the safe side. The
-bound is for the outcome, acknowledged or given up: hidden stations can make all R attempts fail, and no bound on
-delivery exists then.
-It is far above what is seen: all backoffs would have to be the greatest at once.
+The bound is f times the first, summed over i < R, plus all of the second. EIFS stands for every DIFS, because any
+reception may have failed (10.3.7). Attempts that collide overlap in time; to count them separately is on the safe side.
+The outcome that is bounded is that the frame is acknowledged or given up: hidden stations can make all R attempts fail,
+so there is no bound on delivery. The bound lies far above what is measured, because all backoffs would have to be the
+greatest at once.
 """
 
-from math import ceil
-from typing import Final, NamedTuple
+from typing import NamedTuple
 
 from fanet_mw.airtime import Timing
 from fanet_mw.bounds.outcome import Bounded, Outcome, Refused
@@ -27,11 +27,9 @@ from fanet_mw.errors import LocalProtocolError
 from fanet_mw.scenario.radio import Radio
 from fanet_mw.units import US
 
-_LIGHT_M_PER_S: Final = 299_792_458
-
 
 class Dcf(NamedTuple):
-    """The MAC's constants; defaults: 802.11b, long preamble, ACK at 11 Mb/s (IEEE 802.11-2020, clauses 15, 16)."""
+    """The constants of a MAC; by default 802.11b, long preamble, ACK at 11 Mb/s (IEEE 802.11-2020, clauses 15, 16)."""
 
     slot_ns: int = 20 * US
     sifs_ns: int = 10 * US
@@ -44,7 +42,7 @@ class Dcf(NamedTuple):
 
     @classmethod
     def of(cls, radio: Radio) -> "Dcf":
-        """The constants that a scenario's standard, rates and preamble give."""
+        """The constants that follow from a scenario's standard, rates and preamble."""
         timing = Timing.of(radio)
         return cls(
             slot_ns=timing.slot_ns,
@@ -58,12 +56,15 @@ class Dcf(NamedTuple):
         )
 
     def window(self, attempt: int) -> int:
-        """The contention window [slots] of an attempt, the first being 0 (10.3.3)."""
+        """The contention window [slots] of an attempt; the first attempt is 0 (10.3.3)."""
         return min(self.cw_max, ((self.cw_min + 1) << attempt) - 1)
 
 
 class Contention(NamedTuple):
-    """Who else is there: n stations in all, m frames from each other one, f frames queued here, the others' airtime."""
+    """The traffic to contend with.
+
+    There are n stations in all; each other one sends m frames of this airtime, and f frames are queued here.
+    """
 
     stations: int
     airtime_ns: int
@@ -72,7 +73,7 @@ class Contention(NamedTuple):
 
 
 def access_bound(dcf: Dcf, own_airtime_ns: int, others: Contention, *, window_ns: int | None = None) -> Outcome:
-    """The longest time from queueing an acknowledged unicast to its outcome; refused if the window is shorter."""
+    """The longest time from queueing an acknowledged unicast to its outcome; refused if `window_ns` is shorter."""
     if others.stations < 1 or others.frames_each < 0 or others.own_frames < 1 or own_airtime_ns <= 0:
         raise LocalProtocolError(f"{others} and {own_airtime_ns=} must have stations, own frames and airtime > 0")
     answer_ns = max(dcf.sifs_ns + dcf.ack_ns, dcf.ack_timeout_ns)
@@ -83,13 +84,3 @@ def access_bound(dcf: Dcf, own_airtime_ns: int, others: Contention, *, window_ns
     if window_ns is not None and bound_ns > window_ns:
         return Refused(f"access may take {bound_ns} ns, the contention window is {window_ns} ns")
     return Bounded(bound_ns)
-
-
-def guard_ns(*, clock_error_ns: int, drift_ppm: float, resync_ns: int, range_m: float, overhang_ns: int) -> int:
-    """The silent end of a slot that keeps two heads apart.
-
-    Both clocks may be off by `clock_error_ns` when set, and drift apart at twice `drift_ppm` for `resync_ns` until they
-    are set again; the last frame travels `range_m`, and goes on for `overhang_ns` after the last permitted start.
-    """
-    drift_ns = ceil(2 * drift_ppm * resync_ns / 1_000_000)
-    return 2 * clock_error_ns + drift_ns + ceil(range_m * 1_000_000_000 / _LIGHT_M_PER_S) + overhang_ns

@@ -2,8 +2,8 @@
 
 A span is the pseudo-inverse of an arrival curve (Le Boudec & Thiran, Network Calculus, ch. 1): span(n) <= t iff a
 closed window of length t can hold n packets. For whole packets it is exact where affine curves round up, and it stays
-in integer nanoseconds. span(1) = 0 and spans never fall. Sums of curves merge their spans; the least of several curves
-is the greatest of their spans.
+in integer nanoseconds. span(1) = 0, and spans never decrease. The sum of several curves merges their spans; the least
+of several curves has the greatest of their spans.
 
 `rate` [packets/ns] and `burst` [packets] give the token bucket around each curve: span(n) >= (n - burst) / rate.
 """
@@ -20,7 +20,7 @@ from fanet_mw.errors import LocalProtocolError
 
 
 class Arrivals(Protocol):
-    """What can arrive at a queue."""
+    """An arrival curve: what can arrive at a queue."""
 
     @property
     def rate(self) -> Fraction:
@@ -29,20 +29,20 @@ class Arrivals(Protocol):
 
     @property
     def burst(self) -> Fraction:
-        """Packets beyond the rate, at most."""
+        """The most packets that can arrive beyond the rate."""
         ...
 
     def spans(self) -> Iterator[int]:
-        """Least spans [ns] of 1, 2, 3, ... packets; endless."""
+        """The least spans [ns] of 1, 2, 3, ... packets, without end."""
         ...
 
     def repeat(self) -> tuple[int, int] | None:
-        """(onset, length) [ns]: beyond the onset the spans repeat with this length; None if not known."""
+        """(onset, length) [ns]: beyond the onset the spans repeat with this length. None if that is not known."""
         ...
 
 
 class Periodic(NamedTuple):
-    """One packet per interval, each late by at most `jitter_ns`.
+    """One packet per interval, each of them late by at most `jitter_ns`.
 
     Jitter beyond the interval is a burst: up to 1 + jitter / interval packets at once.
     """
@@ -71,19 +71,19 @@ class Periodic(NamedTuple):
         return self.jitter_ns, self.interval_ns
 
     def delayed(self, *, least_ns: int, most_ns: int) -> "Periodic":
-        """The flow behind something that delays each packet by [least, most]: more jitter."""
+        """The flow behind something that delays each packet by between least and most: its jitter grows."""
         return Periodic(self.interval_ns, self.jitter_ns + most_ns - least_ns)
 
 
 def token_bucket(*, burst: int, interval_ns: int) -> Periodic:
-    """At most `burst` packets at once and one per interval in the long run; staircase of floor(burst + t/interval)."""
+    """At most `burst` packets at once and one per interval in the long run: the staircase floor(burst + t/interval)."""
     if burst < 1:
         raise LocalProtocolError(f"burst = {burst} must be >= 1 packet")
     return Periodic(interval_ns, (burst - 1) * interval_ns)
 
 
 class Total(NamedTuple):
-    """Several sources into one queue, in any phase to each other."""
+    """The sum of several sources into one queue, in any phase to each other."""
 
     parts: tuple[Arrivals, ...]
 
@@ -107,9 +107,9 @@ class Total(NamedTuple):
 
 
 class Limited(NamedTuple):
-    """`source` as it leaves `through`'s slot, each packet then later by [0, `jitter_ns`].
+    """The output of the slot `through`, fed by `source`, each packet then delayed by up to `jitter_ns` more.
 
-    A slot lets at most k frames out per period, whatever burst went in: the lesser of both curves holds.
+    A slot lets at most k frames out per period whatever burst went in, so the lesser of both curves holds.
     """
 
     source: Arrivals
@@ -129,7 +129,7 @@ class Limited(NamedTuple):
 
     @property
     def slot_burst(self) -> Fraction:
-        """The largest n - rate * span(n) of the slot alone; it repeats every k, and span(1) = 0 is the odd one."""
+        """The largest n - rate * span(n) of the slot alone; it repeats every k, except that span(1) is 0."""
         server = self.through
         rate = Fraction(server.frames, server.period_ns)
         return max(

@@ -1,21 +1,32 @@
-"""How long a slot's silent end is: as the scenario says, or as long as the clocks and the air ask for."""
+"""The guard time of a slot: given by the scenario, or computed from clock error, propagation and overhang."""
 
+from math import ceil
 from typing import Final
 
 from fanet_mw.airtime import OVERHEAD_BYTES, airtime_ns
-from fanet_mw.bounds import guard_ns
 from fanet_mw.scenario import Scenario
 from fanet_mw.units import MS, US
 
 PLANNED_ERROR_NS: Final = 50 * US
-"""What a plan before take-off assumes of clocks that are synchronized."""
+"""The clock error that a plan before take-off assumes of synchronized clocks."""
+_LIGHT_M_PER_S: Final = 299_792_458
+
+
+def guard_ns(*, clock_error_ns: int, drift_ppm: float, resync_ns: int, range_m: float, overhang_ns: int) -> int:
+    """The guard time that keeps the frames of two successive heads apart.
+
+    Both clocks may be off by `clock_error_ns` when they are set, and drift apart at twice `drift_ppm` for `resync_ns`
+    until they are set again. The last frame travels `range_m`, and ends `overhang_ns` after the last permitted start.
+    """
+    drift_ns = ceil(2 * drift_ppm * resync_ns / 1_000_000)
+    return 2 * clock_error_ns + drift_ns + ceil(range_m * 1_000_000_000 / _LIGHT_M_PER_S) + overhang_ns
 
 
 def slot_guard_ns(scenario: Scenario, *, clock_error_ns: int) -> int:
-    """The silent end of a slot; with `auto` for clocks that are at most `clock_error_ns` off at any time.
+    """The guard time of a slot; with `auto` it suffices for clocks that are at most `clock_error_ns` off at any time.
 
-    `auto` holds one data frame that starts with the slot's last instant; relays that go on after it are not its
-    business, as they are not with a given guard.
+    `auto` allows for one data frame that starts at the slot's last instant. Relays that continue behind that frame are
+    not allowed for, just as with a guard time that is given.
     """
     given_ms, radio = scenario.clusters.guard_ms, scenario.radio
     if given_ms != "auto":

@@ -1,12 +1,12 @@
 """Delay and backlog of one head's queue: horizontal and vertical deviation of arrival and service curve.
 
 A busy period begins with a packet that finds the queue empty. Its q-th packet arrives span(q) later at the earliest and
-is through completion(q) later at the latest, so its delay is at most completion(q) - span(q) (Le Boudec & Thiran,
-theorem 1.4.2, for staircases). The period is over with the first Q for which completion(Q) <= span(Q+1): a further
+is completed completion(q) later at the latest, so its delay is at most completion(q) - span(q) (Le Boudec & Thiran,
+theorem 1.4.2, for staircases). The period ends with the first Q for which completion(Q) <= span(Q+1), because a further
 packet finds the queue empty. All q up to Q are examined, not only the first (Davis et al. 2007).
 
-At a load of exactly one the period may never end. Then the spans are examined until they repeat; where they are not
-known to, or the period is longer than the limit, the affine bound T + burst / R answers: looser, and still sound.
+At a load of exactly one the period may never end. Then the spans are examined until they repeat. Where it is not known
+when they repeat, or the period exceeds the limit, the affine bound T + burst / R is the answer: looser, but sound.
 """
 
 from fractions import Fraction
@@ -22,12 +22,12 @@ _PACKETS_EXAMINED: Final = 100_000
 
 
 def load(arrivals: Arrivals, server: Server) -> Fraction:
-    """Packets that arrive in one period, over packets that its slot holds; stable up to 1."""
+    """Packets that arrive in one period, over packets that the slot of a period holds; stable up to 1."""
     return arrivals.rate * server.period_ns / server.frames
 
 
 def refusal(arrivals: Arrivals, server: Server) -> Refused | None:
-    """Why there is no bound, or None."""
+    """The reason why there is no bound; None if there is one."""
     server.check()
     if not server.frames:
         return Refused(f"no frame ever fits {server}")
@@ -40,7 +40,7 @@ def refusal(arrivals: Arrivals, server: Server) -> Refused | None:
 
 
 def delay_fifo(arrivals: Arrivals, server: Server) -> Outcome:
-    """The worst delay [ns] of any packet of the aggregate, first come first served; arrival to end of airtime."""
+    """The worst delay [ns] of any packet of the aggregate, in FIFO order, from arrival to the end of its airtime."""
     refused = refusal(arrivals, server)
     if refused is not None:
         return refused
@@ -51,7 +51,7 @@ def delay_fifo(arrivals: Arrivals, server: Server) -> Outcome:
 
 
 def backlog(arrivals: Arrivals, server: Server) -> int | Refused:
-    """The most packets in the queue at once, the one on the air included: what the queue's bound must hold."""
+    """The most packets in the queue at once, including the one on the air: the length that the queue must allow."""
     refused = refusal(arrivals, server)
     if refused is not None:
         return refused
@@ -62,14 +62,14 @@ def backlog(arrivals: Arrivals, server: Server) -> int | Refused:
 
 
 def delay_any_order(flow: Periodic, cross: Arrivals, server: Server, *, blocking: int = 0) -> Outcome:
-    """The worst delay of `flow`'s packets when the head may send `cross` first as it likes (priorities, any order).
+    """The worst delay of `flow`'s packets when the head may send `cross` first (priorities, or any order).
 
-    With priorities, `cross` is what is as urgent or more, and `blocking` the frames of the longest less urgent packet:
-    one may have begun just before, and whole frames are not taken back.
+    With priorities, `cross` is the traffic that is as urgent or more urgent, and `blocking` the number of frames of the
+    longest less urgent packet: such a packet may have begun just before, and is not interrupted.
 
-    Blind multiplexing: the slot is a strict service curve, so what the cross traffic leaves is one for the flow (Le
-    Boudec & Thiran, theorem 6.2.1): the q-th packet is through at the first w with w >= completion(q + cross(w)).
-    Packets of the flow itself stay in order.
+    This is blind multiplexing: the slot is a strict service curve, so what the cross traffic leaves is a service curve
+    for the flow (Le Boudec & Thiran, theorem 6.2.1): the q-th packet is completed at the first w with
+    w >= completion(q + cross(w)). Packets of the flow itself stay in order.
     """
     worst_ns = 0
     both = flow.rate + cross.rate
@@ -93,7 +93,7 @@ def delay_any_order(flow: Periodic, cross: Arrivals, server: Server, *, blocking
 
 
 class _Counter:
-    """How many packets a window holds, for windows that only grow."""
+    """Counts how many packets a window can hold, for windows that only grow."""
 
     def __init__(self, arrivals: Arrivals) -> None:
         self._spans = arrivals.spans()
@@ -108,7 +108,7 @@ class _Counter:
 
 
 def _busy_period(arrivals: Arrivals, server: Server) -> list[int] | None:
-    """The spans of the longest busy period, or until they repeat; None when that is too long to examine."""
+    """The spans of the longest busy period, or up to their repetition; None when that is too long to examine."""
     horizon_ns = _horizon_ns(arrivals, server)
     if horizon_ns is None and load(arrivals, server) == 1:
         return None
@@ -125,7 +125,7 @@ def _busy_period(arrivals: Arrivals, server: Server) -> list[int] | None:
 
 
 def _horizon_ns(arrivals: Arrivals, server: Server) -> int | None:
-    """Beyond this span completion and arrivals both repeat, and no new maximum comes."""
+    """The span beyond which completion and arrivals both repeat, so that no new maximum can follow."""
     pattern = arrivals.repeat()
     if pattern is None:
         return None
@@ -134,5 +134,5 @@ def _horizon_ns(arrivals: Arrivals, server: Server) -> int | None:
 
 
 def _affine_ns(arrivals: Arrivals, server: Server) -> int:
-    """T + burst / R: token bucket against rate-latency server (Le Boudec & Thiran, 1.4.1)."""
+    """The bound T + burst / R of a token bucket and a rate-latency server (Le Boudec & Thiran, 1.4.1)."""
     return ceil(server.latency_ns + arrivals.burst * Fraction(server.period_ns, server.frames))

@@ -1,4 +1,4 @@
-"""A bound either holds or is refused with the sentence that says why; there is no third, optimistic answer."""
+"""What a bound's function returns: a bound that holds, or a refusal with its reason; there is no optimistic third."""
 
 from typing import NamedTuple
 
@@ -10,7 +10,7 @@ class Bounded(NamedTuple):
 
 
 class Refused(NamedTuple):
-    """No bound exists, or none can be given: the name, the value and the limit that was passed."""
+    """No bound exists, or none can be given; the reason names the quantity, its value and the limit it exceeds."""
 
     reason: str
 

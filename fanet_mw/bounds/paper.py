@@ -1,4 +1,4 @@
-"""Equations (1)-(4) of the paper, Section 3.3, to the letter: an estimate, not a bound. Kept to compare with.
+"""Equations (1)-(4) of the paper, Section 3.3, to the letter: an estimate for comparison, not a bound.
 
 w(q) = ceil((q b/R) / S) p_c                              (4)    S = ((b/R)/p) p_c unless a slot is given
 WD_c = max over q = 1..Q of w(q) - (q-1) p                (2, 3) Q: the first integer with w(Q) <= Q p
@@ -6,9 +6,9 @@ WD   = sum of WD_c over the clusters c on the path        (1)
 
 Here C = b/R is `airtime_ns`, p `interval_ns`, p_c `period_ns`, S `slot_ns`. What (4) gets wrong: it lets a slot serve
 fractions of a packet, so slots that are no multiple of C look larger than they are; it counts from the beginning of a
-period, so a packet that just missed its slot waits longer than w(1) says; it takes arrivals at every hop as periodic.
-When C p_c > S p no Q exists: the equations give no number, and neither do we. With the paper's own S, C p_c = S p
-always, so they accept any load, even one packet longer than the period.
+period, so a packet that has just missed its slot waits longer than w(1) says; and it takes arrivals at every hop as
+periodic. When C p_c > S p no Q exists: the equations give no number, so there is none here. With the paper's own S
+always C p_c = S p, so they accept any load, even a single packet that is longer than the period.
 """
 
 from collections.abc import Iterable
@@ -23,20 +23,20 @@ _SLOTS_EXAMINED: Final = 1_000_000
 
 
 def paper_slot(*, airtime_ns: int, interval_ns: int, period_ns: int) -> Fraction:
-    """S = ((b/R)/p) p_c [ns], a fraction: it just holds the packets of one period."""
+    """S = ((b/R)/p) p_c [ns], a fraction: the slot that just holds the packets of one period."""
     return Fraction(airtime_ns * period_ns, interval_ns)
 
 
 def w_ns(q: int, *, airtime_ns: int, slot_ns: Fraction | int, period_ns: int) -> int:
-    """Equation (4): when the q-th packet is through."""
+    """Equation (4): the instant at which the q-th packet is completed."""
     return ceil(Fraction(q * airtime_ns) / slot_ns) * period_ns
 
 
 def cluster_estimate(*, airtime_ns: int, slot_ns: Fraction | int | None, period_ns: int, interval_ns: int) -> Outcome:
-    """WD_c of equation (3); `slot_ns` None takes the paper's own S.
+    """WD_c of equation (3); `slot_ns` None stands for the paper's own S.
 
-    All q with the same ceiling share w(q), so only the first of each is examined: the rest are smaller by multiples
-    of p. Refused when no Q exists, or when the busy period is longer than a million slots.
+    All q with the same ceiling share w(q), so only the first of each is examined: the others are smaller by multiples
+    of p. The estimate is refused when no Q exists, or when the busy period is longer than a million slots.
     """
     if min(airtime_ns, period_ns, interval_ns) <= 0 or (slot_ns is not None and slot_ns <= 0):
         raise LocalProtocolError(f"{airtime_ns=} {slot_ns=} {period_ns=} {interval_ns=} must all be > 0")
@@ -51,7 +51,7 @@ def cluster_estimate(*, airtime_ns: int, slot_ns: Fraction | int | None, period_
     for m in range(1, _SLOTS_EXAMINED + 1):
         first = floor((m - 1) * per_slot) + 1
         last = floor(m * per_slot)
-        if first > last:  # S < C: no q has this ceiling
+        if first > last:  # no q has this ceiling, because S < C
             continue
         worst_ns = max(worst_ns, m * period_ns - (first - 1) * interval_ns)
         if m * period_ns <= last * interval_ns:
@@ -60,7 +60,7 @@ def cluster_estimate(*, airtime_ns: int, slot_ns: Fraction | int | None, period_
 
 
 def path_estimate(clusters: Iterable[Outcome]) -> Outcome:
-    """Equation (1): the sum over the clusters on the path; refused if one of them is."""
+    """Equation (1): the sum over the clusters on the path; refused if one of the clusters is."""
     total_ns = 0
     for outcome in clusters:
         if isinstance(outcome, Refused):

@@ -1,17 +1,17 @@
-"""One slot per period that sends whole frames, first come first served: what it guarantees, and the exact bound.
+"""One slot per period that sends whole frames in FIFO order: the service that it guarantees, and the exact bound.
 
 |<------------- P ------------->|
-|   S   |                       |   S   |      a frame of airtime C starts only if it ends within the slot
+|   S   |                       |   S   |      a frame of airtime C starts only if it also ends within the slot
  C C C x                                       k = floor(S/C) frames fit; the rest x of the slot stays empty
 
-The worst instant to find the slot is just after the last start that fits, S - C into it. From there the n-th frame of
-a queue that never empties is through within
+The worst instant to arrive is just after the last start that fits, S - C into the slot. From there the n-th frame of
+a queue that never empties is completed within
 
     completion(n) = (P - S + C) + floor((n-1)/k) P + ((n-1) mod k + 1) C
 
-Finding it earlier, with room for j frames, gives the first j their airtime only and postpones nothing. Frames shorter
-than C start no later than if they all were C, so the largest airtime bounds a mix. Not modelled: contention within
-the slot, loss, clock error (take the guard time off S).
+Arriving earlier, with room for j frames, costs the first j only their airtime and postpones none. Frames shorter than
+C start no later than if all had airtime C, so the largest airtime bounds a mix. Not modeled: contention within the
+slot, loss, clock error (subtract the guard time from S).
 """
 
 from fractions import Fraction
@@ -22,11 +22,11 @@ from fanet_mw.errors import LocalProtocolError
 
 
 class Server(Protocol):
-    """What the bounds need to know of a head: how fast its queue empties in the worst case."""
+    """What the bounds need to know of a head's service: how fast its queue empties in the worst case."""
 
     @property
     def frames(self) -> int:
-        """Frames per period."""
+        """The number of frames per period."""
         ...
 
     @property
@@ -34,7 +34,7 @@ class Server(Protocol):
 
     @property
     def latency_ns(self) -> Fraction:
-        """T of the rate-latency curve under the service: completion(n) <= T + n period / frames."""
+        """T of the rate-latency curve below the service: completion(n) <= T + n period / frames."""
         ...
 
     def check(self) -> None:
@@ -42,16 +42,16 @@ class Server(Protocol):
         ...
 
     def completion_ns(self, n: int) -> int:
-        """The longest time from the beginning of a busy period until `n` frames are through."""
+        """The longest time from the beginning of a busy period until `n` frames are completed."""
         ...
 
     def served(self, window_ns: int) -> int:
-        """The frames that are certainly through after `window_ns` of a busy period."""
+        """The number of frames that are certainly completed after `window_ns` of a busy period."""
         ...
 
 
 class SlotServer(NamedTuple):
-    """The service of one head: C, S and P as above."""
+    """The service of one slot per period: C, S and P as above."""
 
     airtime_ns: int
     slot_ns: int
@@ -67,21 +67,21 @@ class SlotServer(NamedTuple):
 
     @property
     def frames(self) -> int:
-        """k, the whole frames of one slot."""
+        """k, the number of whole frames that fit one slot."""
         return self.slot_ns // self.airtime_ns
 
     @property
     def latency_ns(self) -> Fraction:
-        """The first frame of a slot meets it: P >= k C makes the others less."""
+        """The first frame of a slot decides the latency: since P >= k C, the other frames need less."""
         return self.completion_ns(1) - Fraction(self.period_ns, self.frames)
 
     def completion_ns(self, n: int) -> int:
-        """The longest time from the beginning of a busy period until `n` frames are through."""
+        """The longest time from the beginning of a busy period until `n` frames are completed."""
         turns, rest = divmod(n - 1, self.frames)
         return self.period_ns - self.slot_ns + self.airtime_ns * (rest + 2) + turns * self.period_ns
 
     def served(self, window_ns: int) -> int:
-        """The frames that are certainly through after `window_ns` of a busy period: the service curve."""
+        """The service curve: the frames that are certainly completed after `window_ns` of a busy period."""
         left_ns = window_ns - (self.period_ns - self.slot_ns + self.airtime_ns)
         if left_ns < self.airtime_ns:
             return 0
@@ -91,8 +91,8 @@ class SlotServer(NamedTuple):
     def least_span_ns(self, n: int) -> int:
         """The least time from the end of one frame to the end of the (n-1)-th after it: how bursty the output is.
 
-        Up to k frames follow each other at once. More need several slots: the last frames of one, the first of
-        another, and whole slots between.
+        Up to k frames follow each other directly. More frames need several slots: the last frames of one slot, the
+        first of another, and whole slots in between.
         """
         slots = -(-n // self.frames)
         if slots == 1:
@@ -102,12 +102,12 @@ class SlotServer(NamedTuple):
 
 
 def single_slot_bound(server: SlotServer, *, interval_ns: int) -> Outcome:
-    """The worst delay, arrival to end of airtime, of packets that arrive every `interval_ns` = p, any phase.
+    """The worst delay, from arrival to end of airtime, of packets that arrive every `interval_ns` = p in any phase.
 
-    max over q of completion(q) - (q-1) p, all q of the busy period (Davis et al. 2007, "Controller Area Network (CAN)
-    schedulability analysis: refuted, revisited and revised"). Stable iff k p >= P; then q and q + k differ by
-    P - k p <= 0, so q = 1..k hold the maximum; and p >= P/k >= C makes the terms fall from q = 1 on. What is left is
-    P - S + 2 C, whatever p. It is a supremum: arrivals 1 ns after the last start reach it but for that 1 ns.
+    It is the maximum over q of completion(q) - (q-1) p, for all q of the busy period (Davis et al. 2007, "Controller
+    Area Network (CAN) schedulability analysis: refuted, revisited and revised"). Stable iff k p >= P; then q and q + k
+    differ by P - k p <= 0, so q = 1..k hold the maximum; and p >= P/k >= C makes the terms fall from q = 1 on. What
+    remains is P - S + 2 C for every p. It is a supremum: arrivals 1 ns after the last start stay 1 ns below it.
     """
     server.check()
     if interval_ns <= 0:

@@ -1,15 +1,15 @@
-"""Bounds over several heads: what one slot released is a burst for the next.
+"""Bounds over several heads: what one slot releases arrives as a burst at the next head.
 
-Behind a hop a flow keeps its interval and gains jitter: the hop's worst delay less its least (one airtime). Frames
-from one head arrive no denser than its slot lets them out. The worst delay of a path is the sum over its hops, each
-with the jitter gathered so far (Le Boudec & Thiran, 1.4.3 and 1.5; Richter's event streams).
+Behind a hop a flow keeps its interval and gains jitter: the hop's worst delay minus its least (one airtime). Frames
+from one head arrive no denser than its slot releases them. The worst delay of a path is the sum over its hops, each
+with the jitter accumulated so far (Le Boudec & Thiran, 1.4.3 and 1.5; Richter's event streams).
 
-Heads that flood to each other make cycles: A's output is B's input and the reverse. The delays are iterated from below
-to a fixed point. It is sound by causality: look at the first packet, in time, to exceed its hop's delay; up to that
-instant every arrival had kept to its curve, so the delay could not be exceeded. If the iteration does not settle,
+Heads that flood to each other form cycles: A's output is B's input and the reverse. The delays are iterated from below
+to a fixed point. This is sound by causality: consider the first packet, in time, to exceed its hop's delay; up to that
+instant every arrival had kept to its curve, so the delay could not be exceeded. If the iteration does not converge,
 there is no bound.
 
-Assumed: first come first served at each head; all frames of a slot have its airtime; no loss and no retransmission.
+Assumed: FIFO at each head; all frames of a slot have its airtime; no loss and no retransmission.
 """
 
 from collections.abc import Mapping, Sequence
@@ -24,11 +24,11 @@ from fanet_mw.errors import LocalProtocolError
 
 _ROUNDS: Final = 500
 _HOPELESS_NS: Final = 86_400 * 10**9
-"""A jitter of a day is taken as divergence."""
+"""A jitter of a day counts as divergence."""
 
 
 class Hop(NamedTuple):
-    """A head: its slot, and how long a frame takes from the end of its airtime to the next head's queue."""
+    """A head: its slot, and the time from the end of a frame's airtime to its queueing at the next head."""
 
     server: SlotServer
     relay_least_ns: int = 0
@@ -36,14 +36,14 @@ class Hop(NamedTuple):
 
 
 class Flow(NamedTuple):
-    """Packets of one source and the heads they pass, first to last."""
+    """The packets of one source and the heads that they pass, first to last."""
 
     arrivals: Periodic
     path: tuple[int, ...]
 
 
 class PathBounds(NamedTuple):
-    """What the fixed point says: end to end per flow (relay times included), and delay and backlog per hop."""
+    """The fixed point: delay end to end per flow (relay times included), delay and backlog per hop."""
 
     flows: tuple[Outcome, ...]
     hops: Mapping[int, Outcome]
@@ -81,7 +81,7 @@ def _fixed_point(flows: Sequence[Flow], hops: Mapping[int, Hop]) -> dict[int, Ou
 
 
 def _inputs(flows: Sequence[Flow], hops: Mapping[int, Hop], delays: Mapping[int, Outcome]) -> dict[int, Arrivals]:
-    """What arrives at each hop, given the delays of all: own packets, and what each upstream slot lets out."""
+    """What arrives at each hop, given all delays: its own packets, and what each upstream slot releases."""
     own: dict[int, list[Arrivals]] = {name: [] for name in hops}
     relayed: dict[int, dict[int, list[Arrivals]]] = {name: {} for name in hops}
     for flow in flows:
@@ -119,13 +119,14 @@ def _along(flow: Flow, hops: Mapping[int, Hop], delays: Mapping[int, Outcome]) -
 def ordered_tandem(
     arrivals: Arrivals, servers: Sequence[SlotServer], starts_ns: Sequence[int], *, relay_ns: int = 0
 ) -> Outcome:
-    """The end-to-end delay when the slots' places in one common period are known and nobody else uses them.
+    """The end-to-end delay when the positions of the slots in a common period are known and no other traffic uses them.
 
-    What one occurrence of a slot releases is queued at the next head before its next occurrence begins, and leaves in
-    it: after the first hop a frame only moves from slot to slot. `gap` is the distance of the slots' beginnings, the
-    first that leaves room for the slot and `relay_ns` between. delay = delay(first) + sum of gaps. Slots in the order
-    of the path cross several hops in one period; the reverse order costs a period per hop (Djukic & Valaee, Delay
-    aware link scheduling for multi-hop TDMA wireless networks, IEEE/ACM ToN 2009).
+    What one occurrence of a slot releases is queued at the next head before that head's next occurrence begins, and
+    leaves in it: after the first hop a frame only moves from slot to slot. The gap of two heads is the distance of
+    their slots' beginnings, the first distance that leaves room for the slot and for `relay_ns`. Then
+    delay = delay(first) + sum of gaps. Slots in the order of the path cross several hops in one period; the reverse
+    order costs a period per hop (Djukic & Valaee, Delay aware link scheduling for multi-hop TDMA wireless networks,
+    IEEE/ACM ToN 2009).
     """
     if not servers or len(servers) != len(starts_ns):
         raise LocalProtocolError(f"{len(servers)} servers need as many starts_ns, and at least one")

@@ -1,14 +1,14 @@
-"""A head that may let one packet out in each of its turns, at known places of a repeating superframe.
+"""The service of a head that may send one packet in each of its turns, at known places of a repeating superframe.
 
-    |   t   t     t          |   t   t     t          |      turns of this head; the others' are left out
+    |   t   t     t          |   t   t     t          |      the turns of this head; those of others are not shown
 
 A packet announced less than `lead_ns` before a turn misses it. From the worst instant, just too late for turn i, the
-n-th packet of a queue that never empties is through at the end of the turn n places on:
+n-th packet of a queue that never empties is completed at the end of the n-th turn from there:
 
     completion(n) = lead + max over i of start(i+n) - start(i) + airtime
 
-Every turn takes one packet of any length that fits, so there is nothing to fill unevenly and nothing that blocks: an
-urgent packet takes the next turn it is announced for.
+Every turn takes one packet of any length that fits, so no room is lost at the end of a turn and no packet blocks
+another: an urgent packet takes the next turn for which it is announced.
 """
 
 from dataclasses import dataclass, field
@@ -19,15 +19,15 @@ from fanet_mw.errors import LocalProtocolError
 
 @dataclass(frozen=True)
 class TurnServer:
-    """The service of one head's turns; stands in for `SlotServer` in all bounds of a queue."""
+    """The service of one head's turns; it takes the place of `SlotServer` in all bounds of a queue."""
 
     airtime_ns: int
     period_ns: int
     starts_ns: tuple[int, ...]
-    """Ascending, within one period."""
+    """The starts of the turns, ascending within one period."""
     lead_ns: int = 0
     _apart_ns: tuple[int, ...] = field(init=False, repr=False, compare=False)
-    """The greatest distance of two turns with n - 1 between, for n below the turns of a period."""
+    """At index n: the greatest distance of two turns with n - 1 turns between them, for n below `frames`."""
 
     def __post_init__(self) -> None:
         k, starts = self.frames, self.starts_ns
@@ -48,7 +48,7 @@ class TurnServer:
 
     @property
     def frames(self) -> int:
-        """Turns per period."""
+        """The number of turns per period."""
         return len(self.starts_ns)
 
     @property
@@ -58,12 +58,12 @@ class TurnServer:
         return max(self.completion_ns(n) - n * share for n in range(1, self.frames + 1))
 
     def completion_ns(self, n: int) -> int:
-        """The longest time from the beginning of a busy period until `n` packets are through."""
+        """The longest time from the beginning of a busy period until `n` packets are completed."""
         periods, rest = divmod(n, self.frames)
         return self.lead_ns + periods * self.period_ns + self._apart_ns[rest] + self.airtime_ns
 
     def served(self, window_ns: int) -> int:
-        """The packets that are certainly through after `window_ns` of a busy period."""
+        """The number of packets that are certainly completed after `window_ns` of a busy period."""
         n = max(0, (window_ns - self.lead_ns - self.airtime_ns) // self.period_ns) * self.frames
         while self.completion_ns(n + 1) <= window_ns:
             n += 1

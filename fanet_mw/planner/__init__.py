@@ -1,12 +1,12 @@
-"""Is a set of clusters with given slots feasible, what bounds each traffic class, and what would make it so?
+"""Analysis before take-off: is a scenario feasible, what delay is promised to each traffic class, and what would help?
 
-`plan` is the entry: a scenario and where the nodes are go in, a `Plan` comes out; `cheapest_change` says what would
-make it feasible, `optimum` what would meet a deadline with the least airtime; `describe` puts them into lines.
+`plan` judges a scenario with the given positions and returns a `Plan`. `cheapest_change` finds what would make the
+scenario feasible, `optimum` what would meet a deadline with the least airtime; `describe` turns results into text.
 """
 
 from fanet_mw.planner.demand import ClassPlan, TrafficClass, demands
 from fanet_mw.planner.feasibility import Plan, Site, evaluate
-from fanet_mw.planner.head import ClusterPlan
+from fanet_mw.planner.head_slot import ClusterPlan
 from fanet_mw.planner.loss import Loss, loss
 from fanet_mw.planner.optimum import Optimum, optimum
 from fanet_mw.planner.search import Change, cheapest_change, plan, with_capacity

@@ -1,9 +1,10 @@
-"""The way from a member to its head, hop by hop over contended air: a bound where the traffic is light enough for one.
+"""The way from a member to its head, hop by hop over contended air: a bound, if the traffic is light enough for one.
 
-Every node within two hops of a station can freeze it, by its frames or by the acknowledgements to them: unicasts of own
-and forwarded packets with all their attempts, relays of floods, hellos. How many there are in a time w is limited by
-their periods; the bound is the least w that holds them all, each at its cost in `delay.access`. Flows that wait gain
-jitter, so each hop's bound feeds the next; if it grows beyond the flooding period there is none.
+Every node within two hops of a station can freeze its backoff, by its frames or by the acknowledgements to them:
+unicasts of its own and forwarded packets with all attempts, relays of floods, hellos. Their periods limit how many
+there are in a time w; the bound is the least w that holds them all, each at its cost by `bounds.access`. Flows that
+wait gain jitter, so the bound of each hop enters that of the next; if it grows beyond the flooding period, there is no
+bound.
 """
 
 from collections.abc import Mapping, Sequence
@@ -17,21 +18,21 @@ from fanet_mw.scenario import Scenario
 from fanet_mw.units import NodeId, seconds_to_ns
 
 _HELLO_BYTES: Final = 700
-"""A hello with digests of 45 origins, the longest (docs/explanation/protocol.md, Repair)."""
+"""The longest hello: one with digests of 45 origins (docs/explanation/protocol.md, Repair)."""
 _ROUNDS: Final = 200
 
 
 class Ways(NamedTuple):
-    """`hops` of each node to its head, and who forwards for whom: `through[n]` are the packets per class at node n."""
+    """The ways to the heads: `hops` of each node to its head; `through[n]`, the packets per class that n sends on."""
 
     hops: Mapping[NodeId, int]
     through: Mapping[NodeId, tuple[int, ...]]
     homeless: tuple[NodeId, ...]
-    """Nodes from which no head can be reached."""
+    """The nodes from which no head can be reached."""
 
 
 def ways(adjacency: Adjacency, head_of: Mapping[NodeId, NodeId], classes: Sequence[TrafficClass]) -> Ways:
-    """Shortest ways to each node's head; a node without a head, or cut off from it, takes the nearest it can reach."""
+    """Shortest ways to each node's head; a node that has none, or cannot reach it, takes the nearest head."""
     parents = {head: _tree(adjacency, (head,)) for head in sorted(set(head_of.values()))}
     nearest = _tree(adjacency, tuple(parents))
     hops: dict[NodeId, int] = {}
@@ -53,7 +54,7 @@ def ways(adjacency: Adjacency, head_of: Mapping[NodeId, NodeId], classes: Sequen
 
 
 def _tree(adjacency: Adjacency, roots: Sequence[NodeId]) -> dict[NodeId, NodeId]:
-    """Each node's next hop towards the nearest root, breadth first by id; a root's is itself."""
+    """The next hop of each node towards the nearest root, breadth first by id; the next hop of a root is itself."""
     parent = {root: root for root in sorted(roots)}
     frontier = list(parent)
     while frontier:
@@ -70,7 +71,7 @@ def _tree(adjacency: Adjacency, roots: Sequence[NodeId]) -> dict[NodeId, NodeId]
 def access_outcome(
     scenario: Scenario, adjacency: Adjacency, found: Ways, classes: Sequence[TrafficClass], *, spacing_ns: int | None
 ) -> Outcome:
-    """The longest time from any member to its head, all hops; `spacing_ns` is the least between two floods, if any."""
+    """The longest time from any member to its head over all hops; `spacing_ns` is the least between floods, if any."""
     if not classes or not any(found.hops.values()):
         return Bounded(0)
     most_hops = max(found.hops.values())
@@ -87,7 +88,11 @@ def access_outcome(
 
 
 def _neighborhoods(adjacency: Adjacency, found: Ways) -> list[tuple[tuple[int, ...], tuple[int, ...]]]:
-    """(packets per class of all others within two hops, then how many those are; own packets) of each sender, once."""
+    """What each sender contends with, without repetitions.
+
+    Each entry is (packets per class of all other nodes within two hops, then the number of these nodes; its own packets
+    per class).
+    """
     rivals = two_hop(adjacency)
     kinds: dict[tuple[tuple[int, ...], tuple[int, ...]], None] = {}
     for node, own in found.through.items():
@@ -106,7 +111,7 @@ def _hop_ns(
     hops: int,
     spacing_ns: int | None,
 ) -> int | None:
-    """The least w that holds everything that can be sent before ours is through; None when it does not settle."""
+    """The least w that holds all that can be sent before a packet of this node ends; None without a fixed point."""
     radio, dcf = scenario.radio, Dcf.of(scenario.radio)
     *packets, stations = near
     hello_every_ns = max(1, seconds_to_ns(scenario.routing.hello_interval_s) or scenario.duration_ns)

@@ -1,7 +1,8 @@
-"""Whether the hellos of a superframe fit its contention window: neighbors that are missed are taken for dead.
+"""Whether the hellos of a superframe fit its contention window: nodes whose hellos are lost are taken for dead.
 
-All that is no flood of data contends there, and hellos are nearly all of it. Two hellos destroy each other at a common
-neighbor, so what counts are the hellos of all within two hops, each with DIFS and a mean backoff. An estimate.
+Everything except floods of data contends there, and hellos are nearly all of it. Two hellos destroy each other at a
+common neighbor, so the hellos of all nodes within two hops count, each with DIFS and a mean backoff. This is an
+estimate.
 """
 
 from collections.abc import Iterator
@@ -13,13 +14,14 @@ from fanet_mw.scenario import Scenario
 from fanet_mw.units import MS, seconds_to_ns
 
 MOST: Final = 0.75
-"""Share of the window. On the 9 x 5 grid hellos that ask for all of it reach 0.58 of those who should hear them."""
+"""The share of the window that hellos may take. On the 9 x 5 grid, hellos that need all of the window reach 0.58 of the
+nodes that should receive them."""
 _HELLO_BYTES: Final = 137
-"""Routing header, HEARTBEAT, GLOBAL_POSITION_INT and FANET_BEACON."""
+"""The length of a hello: routing header, HEARTBEAT, GLOBAL_POSITION_INT and FANET_BEACON."""
 
 
 def hellos_ns(scenario: Scenario, adjacency: Adjacency) -> int:
-    """Air that the hellos of one superframe take where most nodes are within two hops."""
+    """The airtime that the hellos of one superframe take where most nodes are within two hops of each other."""
     every_ns = seconds_to_ns(scenario.routing.hello_interval_s)
     if not every_ns or not adjacency:
         return 0
@@ -28,7 +30,7 @@ def hellos_ns(scenario: Scenario, adjacency: Adjacency) -> int:
 
 
 def too_short(scenario: Scenario, adjacency: Adjacency) -> Iterator[str]:
-    """What is said of a window that does not hold them."""
+    """A sentence about a window that is too short for the hellos; nothing when it is not."""
     needed_ns, window_ns = hellos_ns(scenario, adjacency), round(scenario.clusters.contention_ms * MS)
     if needed_ns > MOST * window_ns:
         yield (

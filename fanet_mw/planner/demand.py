@@ -1,8 +1,8 @@
-"""What the swarm wants to send: traffic classes out of a scenario.
+"""What the swarm is to send: the traffic classes that follow from a scenario.
 
-Each class is periodic per source. Warnings count one conflict of every UAV at a time, survivor reports one survivor
-heard by every UAV: who hears two at once reports twice as often. Saturated sources have no period, Poisson arrivals no
-least interval: neither can be planned.
+Each class is periodic per source. Warnings are counted as one conflict of every UAV at a time, survivor reports as one
+survivor detected by every UAV; a UAV that detects two at once reports twice as often. Saturated sources have no period
+and Poisson arrivals no least interval, so neither can be planned.
 """
 
 from collections.abc import Sequence
@@ -30,7 +30,7 @@ class TrafficClass(NamedTuple):
 
 
 class ClassPlan(NamedTuple):
-    """A traffic class: its bound from the source to the last node, and from the head on."""
+    """The plan of a traffic class: its bound from the source to the last node, and from the head on."""
 
     name: str
     sources: int
@@ -44,7 +44,7 @@ class ClassPlan(NamedTuple):
 
 
 def demands(scenario: Scenario, sources: Sequence[NodeId] | None = None) -> list[TrafficClass] | Refused:
-    """The classes, most urgent first. `sources` of the application traffic; by default every node that may be one."""
+    """The classes, most urgent first; by default, all nodes that may send the application's traffic are its sources."""
     found = []
     if scenario.mission.collision_horizon_s:
         interval_ns = seconds_to_ns(scenario.mission.collision_repeat_s)
@@ -67,7 +67,7 @@ def _all(scenario: Scenario) -> tuple[NodeId, ...]:
 
 
 def _eligible(scenario: Scenario) -> tuple[NodeId, ...]:
-    """Who may be a source; a number of them is taken as the lowest ids: pass `sources` for those a seed draws."""
+    """The nodes that may be sources; a number of them is taken as the lowest ids, whichever a seed would draw."""
     traffic = scenario.traffic
     if isinstance(traffic.sources, tuple):
         return tuple(NodeId(n) for n in sorted(set(traffic.sources)))

@@ -1,13 +1,14 @@
-"""One scenario judged: per cluster its slot's load, delay and backlog; per class a bound from source to last node.
+"""One scenario judged: load, delay and backlog of each cluster's slot; for each class a bound from source to last node.
 
     source --access--> head's queue --slot--> flood --> last node
            uplink_ns          slot_delays        FloodCost.duration
 
-A head's slot holds floods one spacing apart; under a timetable each of its turns holds one. Packets reach the head late
-by up to the uplink: its bound where there is one, else one second (or period) is assumed, and said so.
+A head's slot holds floods that are one spacing apart; under a timetable each of its turns holds one flood. Packets
+reach the head late by up to `uplink_ns`: its bound if there is one; otherwise one second (or a period) is assumed, and
+a note says so.
 
-Feasible: each slot is stable, every packet is through before its lifetime and any deadline ends, no queue overflows,
-and a flood reaches everyone.
+A scenario is feasible if each slot is stable, every packet arrives before its lifetime and any deadline end, no queue
+overflows, and a flood reaches every node.
 """
 
 from collections.abc import Mapping, Sequence
@@ -17,14 +18,14 @@ from fanet_mw import wire
 from fanet_mw.bounds import Bounded, Outcome, Refused, paper
 from fanet_mw.bounds.guard import PLANNED_ERROR_NS, slot_guard_ns
 from fanet_mw.graph.topology import Adjacency, within_range
-from fanet_mw.planner import contention_window, parts, verdict
+from fanet_mw.planner import contention_window, reachability, verdict
 from fanet_mw.planner.access import Ways, access_outcome, ways
-from fanet_mw.planner.by_turn import Candidate, Superframe, judge, table_for
-from fanet_mw.planner.claimed import Claimants, Claims
+from fanet_mw.planner.claimed_turns import Claimants, ClaimedPlan
 from fanet_mw.planner.demand import ClassPlan, TrafficClass
 from fanet_mw.planner.flood import FloodCost, flood_cost
 from fanet_mw.planner.goodput_bound import Goodput, any_protocol
-from fanet_mw.planner.head import ClusterPlan, Share, slot_delays, work_ns
+from fanet_mw.planner.head_slot import ClassLoad, ClusterPlan, slot_delays, work_ns
+from fanet_mw.planner.timetable_plan import Candidate, TimetablePlan, judge, table_for
 from fanet_mw.routing.clustered.claimed.protocol import geometry, turn_bytes
 from fanet_mw.routing.clustered.clustering import Cluster, balanced
 from fanet_mw.routing.clustered.tdma.turns import receipt_ns
@@ -44,20 +45,20 @@ class Plan(NamedTuple):
     access: Outcome
     uplink_ns: int
     paper: Outcome
-    """What equations (1)-(4) say of the fullest cluster: to compare with, not to rely on."""
-    superframe: Superframe | None
-    """None without a timetable."""
-    claims: Claims | None
-    """Only with claimed slots; then `clusters` are the nodes."""
+    """The estimate of the paper's equations (1)-(4) for the fullest cluster, for comparison only."""
+    superframe: TimetablePlan | None
+    """The timetable; None where relays are not scheduled."""
+    claims: ClaimedPlan | None
+    """The plan of claimed slots, where slots are claimed; then `clusters` holds one entry per node."""
     cut_off: tuple[NodeId, ...]
-    """Nodes that no flood of the leader's part of the swarm reaches."""
+    """The nodes that floods of the leader's part of the swarm do not reach."""
     goodput: Goodput | None
-    """What no protocol can exceed; None: traffic is not for everyone, or the swarm is in parts."""
+    """What no protocol can exceed; None when traffic is not for every node, or the swarm is in parts."""
     deadline_ns: int | None
     problems: tuple[str, ...]
-    """Why it is not feasible; none when it is."""
+    """Why the scenario is not feasible; empty when it is."""
     notes: tuple[str, ...]
-    """What the bounds assume or cannot promise."""
+    """What the bounds assume, or cannot promise."""
 
     @property
     def feasible(self) -> bool:
@@ -65,15 +66,15 @@ class Plan(NamedTuple):
 
     @property
     def proven(self) -> bool:
-        """Whether the bounds hold, not only estimates of what CSMA/CA does."""
+        """True if the bounds hold; False if some are estimates of what CSMA/CA does."""
         return isinstance(self.access, Bounded) and all(cluster.flood.proven for cluster in self.clusters)
 
     @property
     def carried_per_second(self) -> float | None:
-        """Application packets per second, all sources together, that this configuration carries; None: unknown.
+        """Application packets per second, all sources together, that this configuration carries; None when unknown.
 
-        Exact for a timetable whose capacity was asked for; where relays contend, what would fill the fullest slot; in
-        claimed slots what fills the fullest node, on average.
+        It is exact for a timetable whose capacity was asked for. Where relays contend it is what would fill the fullest
+        slot, and in claimed slots what fills the fullest node on average.
         """
         application = next((c for c in self.classes if c.name == "application"), None)
         if application is None or not application.sources:
@@ -87,12 +88,12 @@ class Plan(NamedTuple):
 
     @property
     def bottleneck(self) -> ClusterPlan | None:
-        """The cluster whose slot is fullest."""
+        """The cluster whose slot is the fullest."""
         return max(self.clusters, key=lambda c: (c.utilization, -c.head), default=None)
 
 
 class Site:
-    """A scenario and where its nodes are; what depends on positions alone is computed once for all variants."""
+    """A scenario and the positions of its nodes; what depends on positions alone is computed once for all variants."""
 
     def __init__(self, scenario: Scenario, positions: Mapping[NodeId, Enu], adjacency: Adjacency | None = None) -> None:
         self.scenario = scenario
@@ -102,7 +103,7 @@ class Site:
         self._claimants: dict[object, Claimants] = {}
 
     def of(self, scenario: Scenario) -> "Site":
-        """The same nodes under another scenario; floods cost the same where the rules of relaying are the same."""
+        """The same nodes under another scenario; costs of floods are shared when the rules of relaying are equal."""
         other = Site(scenario, self.positions, self.adjacency)
         if scenario.clusters.relay == self.scenario.clusters.relay and scenario.radio == self.scenario.radio:
             other._floods = self._floods
@@ -110,7 +111,7 @@ class Site:
         return other
 
     def claimants(self) -> Claimants:
-        """Slots and relays where slots are claimed; they follow from positions and the geometry of turns."""
+        """The slots and relays of claimed slots, which follow from positions and the geometry of turns."""
         scenario = self.scenario
         key = geometry(scenario, turn_bytes(scenario)), scenario.clusters.slots, scenario.radio
         if key not in self._claimants:
@@ -134,16 +135,16 @@ class Site:
 
 
 class _Judged(NamedTuple):
-    """The heads under one way to relay."""
+    """The judgement of all heads, under whichever way of relaying."""
 
     clusters: tuple[ClusterPlan, ...]
     cut_off: tuple[NodeId, ...]
-    superframe: Superframe | None = None
+    superframe: TimetablePlan | None = None
     unfit: tuple[str, ...] = ()
 
 
 def members_of(scenario: Scenario, positions: Mapping[NodeId, Enu]) -> list[Cluster]:
-    """The clusters that the leader will make. It is in none, unless it is alone; under a timetable it has turns."""
+    """The clusters that the leader will make. A leader with others is in none, but under a timetable it has turns."""
     others = {node: at for node, at in positions.items() if node != scenario.leader}
     clusters = balanced(others or positions, count=scenario.clusters.count)
     if scenario.clusters.relay == "scheduled" and others and scenario.leader in positions:
@@ -154,11 +155,11 @@ def members_of(scenario: Scenario, positions: Mapping[NodeId, Enu]) -> list[Clus
 def evaluate(
     site: Site, classes: Sequence[TrafficClass], *, deadline_ns: int | None = None, quick: bool = False
 ) -> Plan:
-    """Judge one scenario. `quick`: a timetable for less than the load, or that takes seconds, is not looked for."""
+    """Judge one scenario. With `quick`, no timetable is looked for that carries less than the load or takes seconds."""
     scenario = site.scenario
     fitted = _fitted(site, quick=quick) if site.timetable else None
     clusters = members_of(scenario, site.positions)
-    if isinstance(fitted, Fitted) and fitted.whole:  # each node lets out its own; the way to its head is in its flood
+    if isinstance(fitted, Fitted) and fitted.whole:  # each node's own turns include the way to its head
         clusters = [Cluster(node, (node,)) for node in sorted(site.positions)]
     head_of = {member: cluster.head for cluster in clusters for member in cluster.members}
     heads = [cluster.head for cluster in clusters]
@@ -178,7 +179,7 @@ def evaluate(
     )
     summed = tuple(_class(index, c, judged, uplink_ns) for index, c in enumerate(classes))
     late = () if judged.unfit or judged.cut_off or deadline_ns is None else tuple(verdict.late(summed, deadline_ns))
-    cut_off = tuple(parts.problems(judged.cut_off))
+    cut_off = tuple(reachability.problems(judged.cut_off))
     crowded = tuple(contention_window.too_short(scenario, site.adjacency)) if site.timetable else ()
     return Plan(
         scenario=scenario,
@@ -215,7 +216,7 @@ def goodput(site: Site, classes: Sequence[TrafficClass]) -> Goodput | None:
 def _loads(
     heads: Sequence[NodeId], head_of: Mapping[NodeId, NodeId], found: Ways, classes: Sequence[TrafficClass]
 ) -> list[list[int]]:
-    """Sources per class of each head. A node without a head counts with the lowest: some head gets its packets."""
+    """The number of sources per class at each head. A node without a head is counted at the head with the lowest id."""
     homeless = frozenset(found.homeless)
     rows = {head: [0] * len(classes) for head in heads}
     for index, c in enumerate(classes):
@@ -225,28 +226,29 @@ def _loads(
     return [rows[head] for head in heads]
 
 
-def _shares(site: Site, head: NodeId, load: Sequence[int], classes: Sequence[TrafficClass]) -> list[Share]:
-    """A turn is as long as the longest packet needs, whatever flies in it."""
+def _shares(site: Site, head: NodeId, load: Sequence[int], classes: Sequence[TrafficClass]) -> list[ClassLoad]:
+    """The load of each class at a head. Under a timetable a turn is as long as the longest packet needs."""
     if site.timetable:
         turn_ns = superframe(site.scenario).turn_ns
         turn = FloodCost(turn_ns, turn_ns, 1, proven=True)
         return [
-            Share(n, c.interval_ns, turn, c.priority < wire.PRIORITY_BULK) for n, c in zip(load, classes, strict=True)
+            ClassLoad(n, c.interval_ns, turn, c.priority < wire.PRIORITY_BULK)
+            for n, c in zip(load, classes, strict=True)
         ]
-    return [Share(n, c.interval_ns, site.flood(head, c.payload_bytes)) for n, c in zip(load, classes, strict=True)]
+    return [ClassLoad(n, c.interval_ns, site.flood(head, c.payload_bytes)) for n, c in zip(load, classes, strict=True)]
 
 
-def _longest(shares: Sequence[Share]) -> FloodCost:
+def _longest(shares: Sequence[ClassLoad]) -> FloodCost:
     return max((s.flood for s in shares), key=lambda f: f.duration_ns, default=FloodCost(0, 1, 0, proven=True))
 
 
 def _assumed_ns(site: Site) -> int:
-    """The way to the head where nothing bounds it; a timetable lets members contend only once per period."""
+    """The way to the head where it has no bound; under a timetable members can contend only once per period."""
     return max(_ASSUMED_UPLINK_NS, site.scenario.clusters.period_ns) if site.timetable else _ASSUMED_UPLINK_NS
 
 
-def _access(site: Site, found: Ways, classes: Sequence[TrafficClass], shares: Sequence[Sequence[Share]]) -> Outcome:
-    """The way to the head. Under a timetable it shares no air with floods, but has to fit its window."""
+def _access(site: Site, found: Ways, classes: Sequence[TrafficClass], shares: Sequence[Sequence[ClassLoad]]) -> Outcome:
+    """The way to the head. Under a timetable it shares no air with floods, but it has to fit the contention window."""
     if not site.timetable:
         spacing_ns = min((s.flood.spacing_ns for row in shares for s in row), default=S)
         return access_outcome(site.scenario, site.adjacency, found, classes, spacing_ns=spacing_ns)
@@ -263,7 +265,7 @@ def _access(site: Site, found: Ways, classes: Sequence[TrafficClass], shares: Se
 
 
 def heads_of(scenario: Scenario, positions: Mapping[NodeId, Enu]) -> dict[NodeId, NodeId]:
-    """The head of each node but the leader, as the leader will assign them."""
+    """The head of each node except the leader, as the leader will assign them."""
     clusters = members_of(scenario, positions)
     found = {member: cluster.head for cluster in clusters for member in cluster.members}
     return {node: head for node, head in found.items() if node != scenario.leader}
@@ -275,11 +277,11 @@ def _fitted(site: Site, *, quick: bool) -> Fitted | Refused:
 
 
 def _in_turns(site: Site, found: Fitted | Refused, candidates: Sequence[Candidate], jitter_ns: int) -> _Judged:
-    """All roots under one timetable; when the turns do not suffice, each is refused with that, and it is said."""
+    """All roots under one timetable; when the turns do not suffice, each root is refused with that reason."""
     scenario = site.scenario
     if isinstance(found, Refused):
         refused = tuple(_refused(candidate, found, scenario.clusters.period_ns) for candidate in candidates)
-        return _Judged(refused, (), Superframe(superframe(scenario), 0, 0, None), (found.reason,))
+        return _Judged(refused, (), TimetablePlan(superframe(scenario), 0, 0, None), (found.reason,))
     lead_ns, control = scenario.radio.lead_ns, {scenario.leader: schedule_parts(scenario)}
     judged = tuple(
         judge(
@@ -292,8 +294,8 @@ def _in_turns(site: Site, found: Fitted | Refused, candidates: Sequence[Candidat
         )
         for c in candidates
     )
-    turns = Superframe(found.turns, found.table.used, len(found.table.roots()), found.table, found.together)
-    return _Judged(judged, parts.missed(found.table.uncovered, leader=scenario.leader), turns)
+    turns = TimetablePlan(found.turns, found.table.used, len(found.table.roots()), found.table, found.together)
+    return _Judged(judged, reachability.missed(found.table.uncovered, leader=scenario.leader), turns)
 
 
 def _in_slots(site: Site, candidates: Sequence[Candidate], jitter_ns: int) -> _Judged:
@@ -304,7 +306,7 @@ def _in_slots(site: Site, candidates: Sequence[Candidate], jitter_ns: int) -> _J
         _cluster(candidate, slot_ns=slot_ns, period_ns=period_ns, guard_ns=site.guard_ns, jitter_ns=jitter_ns)
         for candidate in candidates
     )
-    return _Judged(judged, parts.split(site.adjacency, leader=site.scenario.leader))
+    return _Judged(judged, reachability.split(site.adjacency, leader=site.scenario.leader))
 
 
 def _refused(candidate: Candidate, why: Refused, period_ns: int) -> ClusterPlan:
@@ -340,7 +342,7 @@ def _cluster(candidate: Candidate, *, slot_ns: int, period_ns: int, guard_ns: in
     )
 
 
-def _packets(shares: Sequence[Share], period_ns: int) -> float:
+def _packets(shares: Sequence[ClassLoad], period_ns: int) -> float:
     return sum(s.sources * period_ns / s.interval_ns for s in shares)
 
 
@@ -363,7 +365,7 @@ def _class(index: int, c: TrafficClass, judged: _Judged, uplink_ns: int) -> Clas
 
 
 def _paper(clusters: Sequence[ClusterPlan], scenario: Scenario) -> Outcome:
-    """Equations (3) and (4) of each cluster, its packets taken as evenly spaced; the greatest."""
+    """The greatest estimate by equations (3) and (4) of any cluster, whose packets are taken as evenly spaced."""
     worst_ns, period_ns = 0, scenario.clusters.period_ns
     for cluster in clusters:
         if not cluster.packets:

@@ -1,8 +1,8 @@
-"""What one flood costs where relays contend: how long until all have it, and how soon the next may follow.
+"""What one flood costs where relays contend: how long until all nodes have it, and how soon the next may follow.
 
-Around the busiest node every relay within two hops takes its turn on one channel, airtime + DIFS + the mean backoff
-each; floods closer than that pile up. The duration is that per hop, with jitter, handover and lead. An estimate:
-CSMA/CA bounds neither. Under a timetable both are exact; see `turns.py`.
+Around the busiest node every relay within two hops sends in turn on one channel, each taking airtime + DIFS + the mean
+backoff; floods closer than that accumulate. The duration is that time per hop, plus jitter, handover and lead. This is
+an estimate, because CSMA/CA bounds neither. Under a timetable both are exact; see `routing/clustered/tdma/turns.py`.
 """
 
 from typing import NamedTuple
@@ -15,7 +15,7 @@ from fanet_mw.units import MS, NodeId
 
 
 class FloodCost(NamedTuple):
-    """`duration_ns` from the head's first bit to the last node's; `spacing_ns` to the next flood; frames sent."""
+    """`duration_ns` from the head's first bit to the last node's; `spacing_ns` to the next flood; the frames sent."""
 
     duration_ns: int
     spacing_ns: int
@@ -24,18 +24,18 @@ class FloodCost(NamedTuple):
 
 
 def frame_ns(radio: Radio, payload_bytes: int) -> int:
-    """Airtime of a data frame with this UDP payload."""
+    """The airtime of a data frame with this UDP payload."""
     return airtime_ns(payload_bytes + OVERHEAD_BYTES, radio, rate_mbps=radio.rate_mbps)
 
 
 def contended_ns(radio: Radio, payload_bytes: int) -> int:
-    """The same, with DIFS and a mean backoff."""
+    """The airtime of such a frame, with DIFS and a mean backoff."""
     dcf = Dcf.of(radio)
     return frame_ns(radio, payload_bytes) + dcf.sifs_ns + 2 * dcf.slot_ns + dcf.cw_min * dcf.slot_ns // 2
 
 
 def flood_cost(scenario: Scenario, adjacency: Adjacency, root: NodeId, *, payload_bytes: int) -> FloodCost:
-    """The cost of one flood of such a packet from this head, to all it can reach."""
+    """The cost of one flood of such a packet, from this head to all nodes that it can reach."""
     clusters, radio = scenario.clusters, scenario.radio
     hops = levels(adjacency, root)
     per_frame_ns = contended_ns(radio, payload_bytes)
@@ -49,12 +49,13 @@ def flood_cost(scenario: Scenario, adjacency: Adjacency, root: NodeId, *, payloa
 
 
 def relay_share(scenario: Scenario, adjacency: Adjacency) -> float:
-    """The part of the nodes that relays a flood: all; or about `gossip_degree`, or `counter`, of each neighborhood.
+    """The share of the nodes that relays a flood: all, or about `gossip_degree` or `counter` nodes of each
+    neighborhood.
 
-    `heads`, `cds`, `mpr` and `claimed` relay no more than all; how much less is not estimated.
+    The rules `heads`, `cds`, `mpr` and `claimed` relay no more than all; how much less is not estimated.
 
-    For `counter` twice the threshold of each neighborhood relays at most, as those out of range of each other do not
-    hear each other's copies.
+    With `counter` at most twice the threshold of each neighborhood relays, because nodes out of range of each other do
+    not receive each other's copies.
     """
     clusters = scenario.clusters
     neighbors = sum(len(near) for near in adjacency.values()) / max(1, len(adjacency))

@@ -1,27 +1,27 @@
-"""How many packets per second can reach everyone, whatever the protocol. An upper bound, by counting at receivers.
+"""How many packets per second can reach every node, whatever the protocol: an upper bound by counting at receivers.
 
-Of each packet everyone needs a copy. F: airtime of its frame; D: DIFS, for which a sender finds its medium idle first
-(IEEE 802.11-2020, 10.3.4.2). A station sends or receives, and receives one frame at a time, whatever the channel:
+Every node needs a copy of each packet. F: airtime of its frame; D: DIFS, for which a sender finds its medium idle first
+(IEEE 802.11-2020, 10.3.4.2). A station either sends or receives, and it receives one frame at a time on any channel:
 
     (1)  t(u) (F + D) + (L - l(u)) F <= 1       per second, at every node u that sends t(u) frames, l(u) of them for
                                                 packets of its own, L packets of all nodes together
-    (2)  sum over u in N(v) of t(u) >= L        at every node v whose neighbors N(v) are not all: they bring v what
-                                                it lacks, and one of them takes on what is v's own
+    (2)  sum over u in N(v) of t(u) >= L        at every node v whose neighbors N(v) are not all nodes: they bring v
+                                                what it lacks, and one of them takes over each packet of v's own
 
 (1) summed over N(v), of which d nodes with a share s of the packets, and (2):      L ((F + D) + (d - s) F) <= d
 (1) summed over all n nodes, m transmissions per packet:                     L (m (F + D) + (n - 1) F) <= n
 
-A packet's m transmitters are connected and reach all. The first reaches itself and its neighbors, each other at most
-all of its neighbors but the one it has the packet from: m is not below the least number whose greatest degrees suffice.
-The least of all these is the bound. It is not known to be reachable: nothing in it says that transmissions collide at
-any but the receiver that counts.
+The m transmitters of a packet are connected and reach all nodes. The first reaches itself and its neighbors, each other
+one at most all its neighbors except the one from which it has the packet: so m is at least the smallest number of nodes
+whose greatest degrees suffice. The least of all these is the bound. Whether it can be reached is not known: it counts
+collisions only at the receiver in question.
 
-A frame with k packets counts as k of 1/k of its time each, F and D alike: the longer frame has the smaller share of
-preamble and MAC header, so k as large as a frame permits bounds all. In (2) neighbors bring packets, however many in a
-frame; (1) is a sum of times. Neither changes.
+A frame with k packets counts as k frames of 1/k of its time each, for F and D alike. A longer frame has the smaller
+share of preamble and MAC header, so the greatest k that a frame permits bounds all. In (2) neighbors bring packets,
+however many there are in a frame; (1) is a sum of times. So neither changes.
 
-Assumed: frames carry whole packets (no coding across packets), sources are equally busy, neighbors are those given.
-With fewer sources than all the rest need copies too, which is counted.
+Assumed: frames carry whole packets (no coding across packets), sources are equally busy, and the neighbors are those
+given. With fewer sources than nodes the other nodes need copies too, which is counted.
 """
 
 from collections.abc import Collection
@@ -37,16 +37,16 @@ from fanet_mw.units import NodeId, S
 
 
 class Goodput(NamedTuple):
-    """At most so many packets per second, all sources together, and what limits it."""
+    """An upper bound of the packets per second, all sources together, and what limits it."""
 
     per_second: float
     sources: int
     around: NodeId | None
-    """The node whose neighbors are the bottleneck; None: the swarm as a whole is."""
+    """The node whose neighbors are the bottleneck; None when the swarm as a whole is."""
 
     @property
     def least_interval_ns(self) -> int:
-        """Each source sends no more often than this if all is to arrive."""
+        """The interval below which no source can send if every packet is to arrive."""
         return round(self.sources * S / self.per_second)
 
 
@@ -70,7 +70,7 @@ def goodput_bound(
 
 
 def fewest_transmissions(adjacency: Adjacency) -> int:
-    """No flood that reaches all of a connected swarm takes fewer."""
+    """A lower bound of the transmissions of a flood that reaches all nodes of a connected swarm."""
     missing = len(adjacency) - 2
     for count, degree in enumerate(sorted((len(near) for near in adjacency.values()), reverse=True), start=1):
         missing -= degree - 1
@@ -80,7 +80,7 @@ def fewest_transmissions(adjacency: Adjacency) -> int:
 
 
 def any_protocol(scenario: Scenario, adjacency: Adjacency, sources: Collection[NodeId]) -> Goodput | None:
-    """The bound for the application's packets, over the scenario's MAC, as many in a frame as it holds."""
+    """The bound for the application's packets over the scenario's MAC, with as many in a frame as it holds."""
     together = most_together(scenario)
     frame = frame_ns(scenario.radio, together * scenario.traffic.payload_bytes)
     send_ns = (frame + Timing.of(scenario.radio).difs_ns) // together
@@ -88,7 +88,7 @@ def any_protocol(scenario: Scenario, adjacency: Adjacency, sources: Collection[N
 
 
 def in_turns(turns: Turns, adjacency: Adjacency, sources: Collection[NodeId], *, together: int = 1) -> Goodput | None:
-    """The bound for any timetable of such turns, each with one frame of so many packets."""
+    """The bound for any timetable of such turns, each with one frame of `together` packets."""
     if not turns.per_frame:
         return None
     each_ns = turns.period_ns // (turns.per_frame * together)

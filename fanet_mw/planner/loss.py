@@ -1,14 +1,14 @@
 """How likely a packet misses a node under a timetable: the other half of a bound, as (delay, probability).
 
-The table says who sends in the same turn, so each copy's chance is that of its link against those senders. A packet
-reaches a node at least when every frame of one way to it survives; frames are lost independently, so
+The timetable says which nodes send in the same turn, so the probability of each copy is that of its link against those
+senders. A packet reaches a node at least when every frame on one way to it survives; frames are lost independently, so
 
-    P(reached) >= max over ways of the product of their frames' chances
+    P(reached) >= max over ways of the product of the probabilities of their frames
 
-The truth is better: other copies count too, and turns without a packet do not interfere. Holds for losses that are
-independent from frame to frame (error rates). Not for shadowing, which spoils a link for long; nor for the way of a
-member to its head, where attempts that collide once tend to collide again: there is no probability for these.
-Frames of the contention window that reach into the turns are not counted.
+The truth is better: other copies count too, and turns without a packet do not interfere. The bound holds for losses
+that are independent from frame to frame (error rates). It does not hold for shadowing, which spoils a link for long,
+nor for the way of a member to its head, where attempts that collide once tend to collide again. Frames of the
+contention window that reach into the turns are not counted.
 """
 
 from collections.abc import Callable, Sequence
@@ -19,7 +19,7 @@ from fanet_mw.routing.clustered.timetable.timetable import Timetable, Turn
 from fanet_mw.units import NodeId
 
 Chance = Callable[[NodeId, NodeId, tuple[NodeId, ...]], float]
-"""The probability that a receiver gets a sender's frame while others send."""
+"""The probability that a receiver (second) gets a sender's (first) frame while others (third) send."""
 
 
 class Loss(NamedTuple):
@@ -28,13 +28,13 @@ class Loss(NamedTuple):
     worst: float
     root: NodeId
     node: NodeId
-    """The pair that has the worst."""
+    """The root and the node with the worst loss."""
     mean: float
-    """Over all roots and nodes: of the share of copies that never arrive."""
+    """The mean over all roots and nodes: a bound of the share of copies that never arrive."""
 
 
 def loss(table: Timetable, adjacency: Adjacency, *, per_frame: int, hop_turns: int, chance: Chance) -> Loss:
-    """The loss of the floods of a table; `adjacency` are the links that count, the others are taken as silent."""
+    """The loss of the floods of a timetable; `adjacency` holds the links that count, all others are taken as silent."""
     together: dict[int, list[NodeId]] = {}
     for turn in table.turns:
         together.setdefault(turn.offset % per_frame, []).append(turn.node)
@@ -61,7 +61,7 @@ def _send(
     hop_turns: int,
     chance: Chance,
 ) -> None:
-    """A relay sends what it heard in time; whoever it reaches may know it from there."""
+    """Let a relay send what has reached it in time, and note the probability with which its neighbors receive it."""
     sent = _best([item for item in heard.get(turn.node, ()) if item[0] + hop_turns <= turn.offset])
     for node in adjacency[turn.node] if sent else ():
         heard.setdefault(node, []).append((turn.offset, sent * chance(turn.node, node, others)))

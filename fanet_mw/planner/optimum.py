@@ -1,11 +1,11 @@
-"""The configuration that meets a deadline with the least airtime: the number of clusters, heads and relays, the slots.
+"""The configuration that meets a deadline with the least airtime: number of clusters, heads and relays, the slots.
 
     airtime per packet = way to the head + relays of its flood x its frame
                        + what hellos and the leader's schedules take meanwhile
 
-Searched: timetables, for only their bounds are proven. Turns hold what each head's load needs, so the slot lengths
-follow from the number of heads, the period and `radio.cw_min`. Schedules go out once per flooding period: of two that
-meet the deadline the longer period takes less air, so each search for a period begins with the longest.
+Only timetables are searched, because only their bounds are proven. Turns hold what each head's load needs, so the slot
+lengths follow from the number of heads, the period and `radio.cw_min`. Schedules are sent once per flooding period: of
+two periods that meet the deadline the longer one takes less air, so each search begins with the longest period.
 """
 
 from collections.abc import Iterator, Mapping, Sequence
@@ -24,22 +24,22 @@ from fanet_mw.scenario import Scenario
 from fanet_mw.units import Enu, NodeId, S, seconds_to_ns
 
 _HELLO_BYTES: Final = 140
-"""A hello without digests."""
+"""The length of a hello without digests."""
 _PERIOD_STEPS: Final = (1.0, 0.98, 0.95, 0.92, 0.88, 0.84, 0.8, 0.75, 0.7, 0.6, 0.5, 0.4, 0.3, 0.2)
-"""Of the deadline: a packet waits up to a period, and then crosses the swarm."""
+"""Periods to try, as shares of the deadline: a packet waits up to a period, and then crosses the swarm."""
 _LONGEST_S: Final = 10.0
-"""The period where there is no deadline."""
+"""The longest period to try where there is no deadline."""
 
 
 class Optimum(NamedTuple):
-    """The best found: how to get it, what it promises, and what it takes of the air."""
+    """The best configuration found: its settings, what it promises, and how much air it takes."""
 
     variant: Variant
     plan: Plan
     airtime_ns: int
-    """Per application packet, all frames of all nodes, control included."""
+    """Airtime per application packet: all frames of all nodes, including control."""
     floods_ns: int
-    """Of which relays of the packet."""
+    """The part of it that goes to relays of the packet."""
     tried: int
 
 
@@ -50,7 +50,7 @@ def optimum(
     deadline_ns: int | None,
     sources: Sequence[NodeId] | None = None,
 ) -> Optimum | None:
-    """The cheapest in airtime whose bounds are proven and within the deadline; None when none of those tried is."""
+    """The configuration of least airtime whose bounds are proven and within the deadline; None when none was found."""
     site = Site(scenario, positions)
     best: Optimum | None = None
     tried = 0
@@ -65,13 +65,13 @@ def optimum(
                 continue
             plan, classes = found
             if not plan.proven:
-                break  # no period bounds the way to the head
+                break  # with no period is there a bound for the way to the head
             if not plan.feasible:
                 continue
             cost = _airtime_ns(plan, classes, site)
             if best is None or (cost[0], variant.size) < (best.airtime_ns, best.variant.size):
                 best = Optimum(variant, plan, *cost, tried)
-            break  # shorter periods only cost more
+            break  # a shorter period only takes more air
     return best._replace(tried=tried) if best else None
 
 
@@ -85,7 +85,7 @@ def _judge(
 
 
 def _families(scenario: Scenario) -> Iterator[dict[str, float | int | str]]:
-    """Everything but the period. Heads from all down to a few: fewer need fewer turns but a way to the head."""
+    """All settings except the period. Fewer heads need fewer turns, but then members have a way to their head."""
     most = scenario.nodes.count - 1
     windows = dict.fromkeys((scenario.radio.cw_min, *(w for w in WINDOWS if w < scenario.radio.cw_min)))
     for count in dict.fromkeys(max(1, round(most / share)) for share in (1, 2, 4, 10)):
@@ -100,12 +100,12 @@ def _periods(scenario: Scenario, deadline_ns: int | None) -> Iterator[float]:
 
 
 def _airtime_ns(plan: Plan, classes: Sequence[TrafficClass], site: Site) -> tuple[int, int]:
-    """(per packet in all, of which floods): means over the packets of a second."""
+    """The mean airtime per packet over a second: (in all, of which floods)."""
     scenario = plan.scenario
     radio, timing = scenario.radio, Timing.of(scenario.radio)
     relays = {c.head: c.flood.transmissions for c in plan.clusters}
     head_of = {m: cluster.head for cluster in members_of(scenario, site.positions) for m in cluster.members}
-    head_of |= {node: node for node in head_of if node in relays}  # what lets out its own has its way in its flood
+    head_of |= {node: node for node in head_of if node in relays}  # a node with turns of its own has no way to a head
     hops = ways(site.adjacency, head_of, classes).hops
     floods = uplinks = 0.0
     for c in classes:

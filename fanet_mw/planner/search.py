@@ -1,9 +1,9 @@
-"""Plan a scenario, and the cheapest change that makes it feasible: fewest keys first, then the least change of values.
+"""Plan a scenario, and find the cheapest change that makes it feasible: fewest keys first, then least change of values.
 
-Searched: cluster count and flooding period; under a timetable the backoff that a turn has to hold (`radio.cw_min`),
-every node a head, and at last all that makes turns short at once; where relays contend, a timetable; in claimed slots
-the backoff, how many slots, small packets together, or a timetable. Last, less application traffic: load that does not
-fit has to go.
+What is searched: cluster count and flooding period. Under a timetable also the backoff that a turn has to hold
+(`radio.cw_min`), every node as a head, and at last everything together that makes turns short. Where relays contend, a
+timetable. In claimed slots the backoff, the number of slots, small packets together, or a timetable. The last resort is
+less application traffic, because a load that does not fit has to go.
 """
 
 from collections.abc import Iterator, Mapping, Sequence
@@ -12,10 +12,10 @@ from typing import Final, NamedTuple
 
 from fanet_mw.bounds import Refused
 from fanet_mw.graph.topology import Adjacency
+from fanet_mw.planner.claimed_verdict import evaluate_claims
 from fanet_mw.planner.demand import demands
 from fanet_mw.planner.feasibility import Plan, Site, evaluate, heads_of
 from fanet_mw.planner.goodput_bound import in_turns
-from fanet_mw.planner.in_claims import evaluate_claims
 from fanet_mw.planner.variant import Value, Variant, vary
 from fanet_mw.routing.clustered.timetable.turn_plan import least_interval_ns, most_together, superframe
 from fanet_mw.scenario import Scenario
@@ -23,7 +23,7 @@ from fanet_mw.units import Enu, NodeId
 
 _COUNTS: Final = (1, 2, 3, 4, 5, 6, 8, 11, 15, 22, 30, 44, 64)
 _PERIODS: Final = (0.1, 0.2, 0.4, 0.5, 0.7, 1.0, 1.4, 2.0, 3.0, 5.0, 10.0)
-"""Of the scenario's own period."""
+"""Periods to try, as multiples of the scenario's own period."""
 _TURN_PERIODS_S: Final = (0.1, 0.2, 0.25, 0.3, 0.4, 0.5, 0.7, 1.0, 2.0, 5.0)
 _TIGHT_PERIOD_S: Final = 4.0
 _SLOTS: Final = (0, 6, 8, 10, 12, 14, 16, 20, 24, 32, 48, 64)
@@ -32,7 +32,7 @@ _SLOWER: Final = (1.1, 1.25, 1.5, 2.0, 2.5, 3.0, 4.0, 5.0, 7.0, 10.0, 20.0, 50.0
 
 
 class Change(NamedTuple):
-    """The cheapest change that makes a plan feasible, and what the plan then is."""
+    """The cheapest change that makes a plan feasible, and the plan with that change."""
 
     variant: Variant
     plan: Plan
@@ -48,8 +48,8 @@ def plan(
 ) -> Plan | Refused:
     """Judge the scenario as it stands. Refused when its traffic cannot be planned at all.
 
-    `adjacency` is who hears whom, by default everyone within `radio.range_m` (a timetable looks at positions only);
-    `sources` are the nodes that send the application's traffic; each class has to meet the deadline.
+    `adjacency` says which nodes hear each other, by default those within `radio.range_m` (a timetable uses positions
+    only); `sources` are the nodes that send the application's traffic; each class has to meet the deadline.
     """
     return _judge(Site(scenario, positions, adjacency), sources, deadline_ns)
 
@@ -66,7 +66,7 @@ def _judge(
 
 
 def with_capacity(found: Plan, positions: Mapping[NodeId, Enu]) -> Plan:
-    """The same plan with the traffic interval down to which its slots carry everything; takes a second."""
+    """The same plan, with the traffic interval down to which its slots carry everything; this takes a second."""
     if found.superframe is None or not found.superframe.used or found.cut_off:
         return found
     least = least_interval_ns(found.scenario, tuple(sorted(positions.items())), heads_of(found.scenario, positions))
@@ -81,9 +81,9 @@ def cheapest_change(
     sources: Sequence[NodeId] | None = None,
     deadline_ns: int | None = None,
 ) -> Change | None:
-    """The least change after which `plan` is feasible; None when none of those searched is.
+    """The least change after which `plan` is feasible; None when none of those searched makes it so.
 
-    Nothing is searched for a swarm in parts: only nodes that come nearer help it.
+    For a swarm in parts nothing is searched, because it helps only if nodes come nearer.
     """
     site = Site(scenario, positions, adjacency)
     found = _judge(site, sources, deadline_ns)
@@ -100,7 +100,7 @@ def cheapest_change(
 
 
 def hopeless(site: Site, sources: Sequence[NodeId] | None) -> bool:
-    """Whether no timetable at all carries the load in this scenario's turns; saves making one."""
+    """True if no timetable at all can carry the load in this scenario's turns, so that none need be made."""
     classes = demands(site.scenario, sources)
     if not site.timetable or isinstance(classes, Refused) or site.scenario.traffic.destination != "all":
         return False
@@ -128,9 +128,9 @@ def _turn_options(scenario: Scenario) -> Iterator[dict[str, Value]]:
 
 
 def _tightest(scenario: Scenario) -> Iterator[Variant]:
-    """The most that turns can carry: short turns, long superframes, and fewer hellos, to fit a short window."""
+    """The most that turns can carry: short turns, long superframes, and so few hellos that they fit a short window."""
     if scenario.clusters.relay != "scheduled" or scenario.clock.modelled:
-        return  # clocks ask for slack
+        return  # clocks that drift need slack
     settings: dict[str, Value] = {
         "radio.cw_min": 1,
         "clusters.turn_slack_us": 20.0,

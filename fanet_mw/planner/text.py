@@ -1,22 +1,22 @@
-"""A plan in lines for people. Every figure has its unit; what is not proven says so."""
+"""A plan as lines of text. Every figure has its unit, and what is not proven says so."""
 
 import textwrap
 from collections.abc import Iterator
 from typing import Final
 
 from fanet_mw.bounds import Bounded, Outcome, Refused
-from fanet_mw.planner.by_turn import Superframe
-from fanet_mw.planner.claimed import Claims
+from fanet_mw.planner.claimed_turns import ClaimedPlan
 from fanet_mw.planner.demand import ClassPlan
 from fanet_mw.planner.feasibility import Plan
-from fanet_mw.planner.head import ClusterPlan
+from fanet_mw.planner.head_slot import ClusterPlan
 from fanet_mw.planner.loss import Loss
 from fanet_mw.planner.optimum import Optimum
 from fanet_mw.planner.search import Change
+from fanet_mw.planner.timetable_plan import TimetablePlan
 from fanet_mw.units import MS, S
 
 _SHOWN: Final = 8
-"""Heads listed, the fullest first."""
+"""How many heads are listed, the fullest first."""
 _WIDTH: Final = 100
 _LABEL: Final = 14
 
@@ -27,7 +27,7 @@ def describe(found: Plan | Refused) -> str:
 
 
 def describe_loss(found: Loss | None) -> str:
-    """How likely a packet misses somebody."""
+    """A sentence on how likely a packet misses a node."""
     if found is None:
         return item("loss", "no probability: shadowing, fading and obstacles spoil links for longer than a frame")
     if not found.worst:
@@ -40,7 +40,7 @@ def describe_loss(found: Loss | None) -> str:
 
 
 def describe_change(change: Change | None, found: Plan) -> str:
-    """What would make it feasible."""
+    """What would make the plan feasible, as text."""
     if found.cut_off:
         return item("change", "nodes have to come nearer: nothing that can be set joins the parts of a swarm")
     if change is None:
@@ -51,7 +51,7 @@ def describe_change(change: Change | None, found: Plan) -> str:
 
 
 def describe_optimum(found: Optimum | None, *, deadline_ns: int | None) -> str:
-    """What takes the least air."""
+    """The configuration of least airtime, as text."""
     goal = "any proven bound" if deadline_ns is None else f"a proven bound within {deadline_ns / MS:g} ms"
     if found is None:
         return item("least airtime", f"nothing that was searched has {goal}")
@@ -70,7 +70,7 @@ def describe_optimum(found: Optimum | None, *, deadline_ns: int | None) -> str:
 
 
 def item(label: str, text: str) -> str:
-    """A labelled paragraph; what is to be copied is not broken."""
+    """A labelled paragraph; a line that is meant to be copied is not broken."""
     first = f"  {label:{_LABEL}}"
     if "--set" in text:
         return first + text
@@ -84,7 +84,7 @@ def _lines(found: Plan) -> Iterator[str]:
     if found.claims is not None:
         yield from _claims(found.claims)
     elif isinstance(found.access, Bounded):
-        yield item("to the head", "every source is one" if not found.access.delay_ns else _say(found.access))
+        yield item("to the head", "every source is one" if not found.access.delay_ns else _bound_text(found.access))
     if found.superframe is not None:
         yield from _superframe(found.superframe)
     yield from _capacity(found)
@@ -100,7 +100,7 @@ def _lines(found: Plan) -> Iterator[str]:
 
 
 def _details(found: Plan) -> Iterator[str]:
-    yield item("equation (4)", f"says {_say(found.paper)} per cluster: the paper's estimate, to compare with")
+    yield item("equation (4)", f"says {_bound_text(found.paper)} per cluster: the paper's estimate, to compare with")
     yield from _slots(found)
 
 
@@ -117,7 +117,7 @@ def _shape(found: Plan) -> str:
     )
 
 
-def _superframe(superframe: Superframe) -> Iterator[str]:
+def _superframe(superframe: TimetablePlan) -> Iterator[str]:
     turns = superframe.turns
     yield item(
         "superframe",
@@ -129,7 +129,7 @@ def _superframe(superframe: Superframe) -> Iterator[str]:
         yield item("turns in use", f"{superframe.used} ({share:.0f} %) for {superframe.packets} {floods} a period")
 
 
-def _claims(claims: Claims) -> Iterator[str]:
+def _claims(claims: ClaimedPlan) -> Iterator[str]:
     turns, nodes = claims.turns, claims.nodes
     yield item(
         "period",
@@ -142,7 +142,7 @@ def _claims(claims: Claims) -> Iterator[str]:
         yield item("superframes", f"{said} slots; {sum(node.relays for node in nodes)} of {len(nodes)} nodes relay")
 
 
-def _nodes(claims: Claims) -> Iterator[str]:
+def _nodes(claims: ClaimedPlan) -> Iterator[str]:
     yield "\n    node  relays  superframe  claimed  by lot  needed  used %"
     fullest = sorted(claims.nodes, key=lambda node: (-node.utilization, node.node))
     for node in fullest[:_SHOWN]:
@@ -156,7 +156,7 @@ def _nodes(claims: Claims) -> Iterator[str]:
 
 
 def _capacity(found: Plan) -> Iterator[str]:
-    """What this configuration carries, against what no protocol can exceed."""
+    """What this configuration carries, and what no protocol can exceed."""
     carried, most = found.carried_per_second, found.goodput
     application = next((c for c in found.classes if c.name == "application"), None)
     if carried is not None and application is not None:
@@ -175,7 +175,7 @@ def _capacity(found: Plan) -> Iterator[str]:
 
 
 def _class(c: ClassPlan, found: Plan) -> str:
-    line = f"{c.name}, {c.sources} sources every {c.interval_ns / S:g} s: {_say(c.bound)}"
+    line = f"{c.name}, {c.sources} sources every {c.interval_ns / S:g} s: {_bound_text(c.bound)}"
     if isinstance(c.bound, Bounded) and isinstance(c.from_head, Bounded) and c.bound != c.from_head:
         line += f" ({c.from_head.delay_ns / S:.3f} s from the head on)"
     if isinstance(c.bound, Bounded) and not found.proven:
@@ -206,7 +206,7 @@ def _cluster(c: ClusterPlan) -> str:
     )
 
 
-def _say(outcome: Outcome) -> str:
+def _bound_text(outcome: Outcome) -> str:
     if isinstance(outcome, Bounded):
         return f"at most {outcome.delay_ns / S:.3f} s"
     return f"no bound ({outcome.reason})"

@@ -1,6 +1,6 @@
-"""A scenario with some settings changed, and how great a change that is.
+"""A scenario with some settings changed, and a measure of how great the change is.
 
-Settings are keys of the scenario, so that what the planner proposes can be flown: `arguments` are what `--set` takes.
+Settings are keys of the scenario, so that what the planner proposes can be used: `arguments` are arguments of `--set`.
 """
 
 import math
@@ -14,26 +14,26 @@ Value = float | int | str
 
 
 class Variant(NamedTuple):
-    """A valid scenario and what was changed to get it."""
+    """A valid scenario, and what was changed to obtain it."""
 
     scenario: Scenario
     settings: tuple[tuple[str, Value], ...]
     octaves: float
-    """The sum of the changes of numbers, each as the logarithm of new over old."""
+    """The sum of the changes of numbers, each as |log2(new / old)|."""
 
     @property
     def arguments(self) -> tuple[str, ...]:
-        """KEY=VALUE of each setting."""
+        """KEY=VALUE for each setting."""
         return tuple(f"{key}={_text(value)}" for key, value in self.settings)
 
     @property
     def size(self) -> tuple[int, float, tuple[str, ...]]:
-        """To compare changes by: keys, then octaves; the rest only settles ties."""
+        """The order of changes: the number of keys, then octaves; the arguments only decide between equals."""
         return len(self.settings), self.octaves, self.arguments
 
 
 def vary(scenario: Scenario, settings: Mapping[str, Value]) -> Variant | None:
-    """The scenario with these settings; None when it is not valid, or nothing differs."""
+    """The scenario with these settings; None when it is not valid, or when nothing differs."""
     tree = scenario.model_dump(exclude_none=True)
     changed: list[tuple[str, Value]] = []
     octaves = 0.0

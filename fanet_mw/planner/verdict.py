@@ -1,4 +1,4 @@
-"""What a plan says in sentences: why it is not feasible, what its bounds assume, what they leave out."""
+"""The sentences of a plan: why it is not feasible, what its bounds assume, and what they leave out."""
 
 from collections.abc import Iterator, Sequence
 from typing import Final
@@ -6,7 +6,7 @@ from typing import Final
 from fanet_mw import wire
 from fanet_mw.bounds import Bounded, Outcome, Refused
 from fanet_mw.planner.demand import ClassPlan
-from fanet_mw.planner.head import ClusterPlan
+from fanet_mw.planner.head_slot import ClusterPlan
 from fanet_mw.scenario import Scenario
 from fanet_mw.units import MS, S
 
@@ -20,7 +20,7 @@ def late(classes: Sequence[ClassPlan], deadline_ns: int) -> Iterator[str]:
 
 
 def expired(scenario: Scenario, c: ClassPlan, delay_ns: int) -> str | None:
-    """What is said of a class whose packets may die of age on their way; None: they do not."""
+    """A sentence about a class whose packets may exceed their lifetime on the way; None when they do not."""
     lifetime_ns = scenario.routing.lifetime_ns(c.priority)
     if delay_ns <= lifetime_ns:
         return None
@@ -52,9 +52,9 @@ def problems(
             if not full and not cut_off:
                 yield f"{c.name}: {c.bound.reason}"
             continue
-        said = expired(scenario, c, c.bound.delay_ns)
-        if said is not None:
-            yield said
+        problem = expired(scenario, c, c.bound.delay_ns)
+        if problem is not None:
+            yield problem
 
 
 def left_out(scenario: Scenario) -> Iterator[str]:

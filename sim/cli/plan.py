@@ -27,8 +27,8 @@ from fanet_mw.planner import (
     plan,
     with_capacity,
 )
-from fanet_mw.planner.by_turn import Superframe
-from fanet_mw.planner.claimed import Claims
+from fanet_mw.planner.claimed_turns import ClaimedPlan
+from fanet_mw.planner.timetable_plan import TimetablePlan
 from fanet_mw.routing.clustered.timetable.timetable import Timetable
 from fanet_mw.routing.clustered.timetable.turn_plan import links
 from fanet_mw.scenario import Scenario
@@ -79,7 +79,7 @@ def _places(scenario: Scenario) -> dict[NodeId, Enu]:
     return {NodeId(node): rounded(place) if scenario.clusters.relay == "scheduled" else place for node, place in start}
 
 
-def _loss(scenario: Scenario, superframe: Superframe, table: Timetable, at: dict[NodeId, Enu]) -> Loss | None:
+def _loss(scenario: Scenario, superframe: TimetablePlan, table: Timetable, at: dict[NodeId, Enu]) -> Loss | None:
     """Of what has turns; a way to a head that contends is not in it."""
     chance = chance_of(scenario, at)
     if chance is None:
@@ -133,7 +133,7 @@ def _json(found: Plan) -> dict[str, Any]:
     }  # fmt: skip
 
 
-def _claims_json(claims: Claims) -> dict[str, Any]:
+def _claims_json(claims: ClaimedPlan) -> dict[str, Any]:
     return {
         "period_ms": claims.turns.period_ns / MS,
         "contention_ms": claims.turns.contention_ns / MS,

@@ -10,7 +10,7 @@ import sys
 from collections import Counter
 
 from agents.traffic import sources_of
-from fanet_mw.planner.by_turn import table_for
+from fanet_mw.planner.timetable_plan import table_for
 from fanet_mw.routing.clustered.timetable.timetable import Timetable
 from fanet_mw.scenario import Scenario
 from fanet_mw.scenario.config import build

@@ -11,11 +11,11 @@ from fanet_mw.graph.topology import within_range
 from fanet_mw.mavlink import Encoder
 from fanet_mw.planner import Plan, cheapest_change, describe, describe_change, plan
 from fanet_mw.planner.access import ways
-from fanet_mw.planner.by_turn import table_for
 from fanet_mw.planner.demand import TrafficClass, demands
 from fanet_mw.planner.flood import FloodCost
-from fanet_mw.planner.head import Share, slot_delays, work_ns
+from fanet_mw.planner.head_slot import ClassLoad, slot_delays, work_ns
 from fanet_mw.planner.search import _changes
+from fanet_mw.planner.timetable_plan import table_for
 from fanet_mw.rng import stream
 from fanet_mw.trace import Delivered
 from fanet_mw.units import Enu, NodeId, S
@@ -51,7 +51,7 @@ def simulate(shares, arrivals, *, usable, period, start):
 def heads(draw):
     classes = draw(st.integers(1, 3))
     shares = [
-        Share(draw(st.integers(0, 3)), draw(st.integers(60, 400)), cost(draw(st.integers(1, 9))))
+        ClassLoad(draw(st.integers(0, 3)), draw(st.integers(60, 400)), cost(draw(st.integers(1, 9))))
         for _ in range(classes)
     ]
     usable = draw(st.integers(5, 60))
@@ -84,7 +84,7 @@ def test_no_head_takes_longer_or_holds_more_than_its_plan(head, seed) -> None:
 
 
 def test_the_urgent_are_bounded_though_the_bulk_overloads_the_slot() -> None:
-    shares = [Share(2, 10_000, cost(10)), Share(50, 100, cost(20))]
+    shares = [ClassLoad(2, 10_000, cost(10)), ClassLoad(50, 100, cost(20))]
     bounds, waiting = slot_delays(shares, usable_ns=200, period_ns=1000, jitter_ns=0)
     assert isinstance(bounds[0], Bounded)
     assert isinstance(bounds[1], Refused)
@@ -92,14 +92,14 @@ def test_the_urgent_are_bounded_though_the_bulk_overloads_the_slot() -> None:
 
 
 def test_a_flood_adds_what_it_runs_beyond_its_spacing() -> None:
-    short, _ = slot_delays([Share(1, 1000, cost(10))], usable_ns=100, period_ns=1000, jitter_ns=0)
-    long, _ = slot_delays([Share(1, 1000, cost(10, 75))], usable_ns=100, period_ns=1000, jitter_ns=0)
+    short, _ = slot_delays([ClassLoad(1, 1000, cost(10))], usable_ns=100, period_ns=1000, jitter_ns=0)
+    long, _ = slot_delays([ClassLoad(1, 1000, cost(10, 75))], usable_ns=100, period_ns=1000, jitter_ns=0)
     assert short == [Bounded(1000 - 100 + 2 * 10)]
     assert long == [Bounded(1000 - 100 + 2 * 10 + 65)]
 
 
 def test_work_is_what_all_floods_of_a_period_take() -> None:
-    shares = [Share(3, 500, cost(10)), Share(2, 1000, cost(7))]
+    shares = [ClassLoad(3, 500, cost(10)), ClassLoad(2, 1000, cost(7))]
     assert work_ns(shares, period_ns=2000) == 3 * 4 * 10 + 2 * 2 * 7
 
 

@@ -9,7 +9,7 @@ from hypothesis import strategies as st
 from fanet_mw.bounds import Refused
 from fanet_mw.graph.topology import two_hop, within_range
 from fanet_mw.planner import Plan, cheapest_change, describe, plan
-from fanet_mw.planner.claimed import settled
+from fanet_mw.planner.claimed_turns import converged_slots
 from fanet_mw.routing.clustered.tdma.turns import Turns
 from fanet_mw.scenario import config
 from fanet_mw.units import Enu, NodeId, S
@@ -38,7 +38,7 @@ def swarms(draw) -> dict[NodeId, Enu]:
 def test_the_slots_of_a_plan_never_meet_within_two_hops_and_their_length_follows_the_law(at) -> None:
     adjacency = within_range(at, range_m=250)
     turns = Turns(0, 500_000_000, 40_000_000, 1_200_000, 380)
-    shares = settled(config.build({"clusters": {"relay": "claimed", "count": 1}}), adjacency, turns)
+    shares = converged_slots(config.build({"clusters": {"relay": "claimed", "count": 1}}), adjacency, turns)
     near = two_hop(adjacency)
     for node, share in shares.items():
         assert share is not None

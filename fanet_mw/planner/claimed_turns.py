@@ -1,14 +1,15 @@
-"""Slots claimed over the air, judged before take-off: which turns each node will have, and whether its load fits them.
+"""Claimed slots, judged before take-off: which turns each node will have, and whether its load fits them.
 
     positions -> who hears whom -> the protocol's own claims, run without losses -> slots, superframes, turns by lot
               -> the protocol's own rule of relays                             -> who sends how much
 
-A relay sends its own packets and everyone else's, any other node its own; every second hello takes a turn too. Of the
-turns that nobody within two hops claims, a node that draws wins its lots over all lots within two hops, on average.
-Feasible: each node's load fits its claimed turns and those it wins. That is a statement about rates: nothing bounds a
-delay end to end when packets queue. A packet that finds no queue takes hops x hop at most.
+A relay sends its own packets and those of all others, any other node only its own; every second hello takes a turn too.
+Of the turns that nobody within two hops claims, a node that draws lots wins the share of its lots among all lots drawn
+within two hops, on average. The plan is feasible if each node's load fits the turns that it claims and wins. This is a
+statement about rates: nothing bounds a delay end to end when packets queue. A packet that meets no queue takes at most
+hops x hop_ns.
 
-The claims that are made in flight differ with the instants at which nodes start; lengths and counts hardly do.
+The claims made in flight depend on the instants at which nodes start; their lengths and numbers hardly do.
 """
 
 from collections.abc import Mapping, Sequence
@@ -28,26 +29,26 @@ from fanet_mw.units import NodeId, S, seconds_to_ns
 from fanet_mw.wire.claims import MOST_LOTS
 
 _ROUNDS: Final = 60
-"""Hello intervals in which claims settle; the law needs 2 d + 6, d the longest chain of rivals."""
+"""Hello intervals in which claims converge; the law needs 2 d + 6, where d is the longest chain of rivals."""
 _LISTEN: Final = 3
 _HELLOS_IN_TURNS: Final = 0.5
 _NARROW: Final = 0.001
 
 
 class NodeTurns(NamedTuple):
-    """One node's part of a period. Turns that are won by lot are an expectation."""
+    """One node's part of a period; the turns that it wins by lot are an expectation."""
 
     node: NodeId
     relays: bool
     slot: int | None
-    """None: no slot is free for it."""
+    """The slot that it claims; None when no slot is free for it."""
     superframe: int
     claimed: int
     won: float
     load: float
-    """Turns that its packets and hellos need."""
+    """The number of turns that its packets and hellos need."""
     hop_ns: int | None
-    """The longest that a packet takes over this node when none is before it."""
+    """The longest time that a packet takes over this node when no other packet waits there."""
 
     @property
     def utilization(self) -> float:
@@ -55,25 +56,25 @@ class NodeTurns(NamedTuple):
         return self.load / turns if turns else inf
 
 
-class Claims(NamedTuple):
-    """A swarm in claimed slots."""
+class ClaimedPlan(NamedTuple):
+    """The plan of a swarm in claimed slots."""
 
     turns: Turns
     nodes: tuple[NodeTurns, ...]
     hops: int
-    """The longest way of a flood, over relays alone."""
+    """The number of hops of the longest flood, over relays only."""
     least_interval_ns: int | None = None
-    """Of the application, at which the fullest node is full."""
+    """The interval of the application's traffic at which the fullest node is full."""
 
     @property
     def hop_ns(self) -> int | None:
-        """The greatest of any node; None: some node has no turn."""
+        """The greatest `hop_ns` of all nodes; None when some node has no turn."""
         own = [node.hop_ns for node in self.nodes]
         return None if None in own else max(hop_ns for hop_ns in own if hop_ns is not None)
 
     @property
     def lone_ns(self) -> int | None:
-        """A packet that finds no queue on its way is with everyone after this."""
+        """The time within which a packet that meets no queue on its way has reached every node."""
         hop_ns = self.hop_ns
         return None if hop_ns is None else self.hops * hop_ns
 
@@ -83,12 +84,12 @@ class Claims(NamedTuple):
 
 
 class Claimants:
-    """What the positions alone decide: slots, relays, ways."""
+    """What positions alone decide in claimed slots: slots, relays, ways."""
 
     def __init__(self, scenario: Scenario, adjacency: Adjacency) -> None:
         self.turns = geometry(scenario, turn_bytes(scenario))
         self._near = two_hop(adjacency)
-        self._shares = settled(scenario, adjacency, self.turns)
+        self._shares = converged_slots(scenario, adjacency, self.turns)
         self.relays = {node: dominates(node, adjacency) for node in adjacency}
         self._hops = max((_depth(adjacency, root, self.relays) for root in adjacency), default=0)
         self._free = {node: self._unclaimed(node) for node in adjacency}
@@ -100,14 +101,14 @@ class Claimants:
         taken = {share for share in known if share is not None}
         return sum(1 for turn in range(self.turns.per_frame) if not any(share.has(turn) for share in taken))
 
-    def judge(self, scenario: Scenario, classes: Sequence[TrafficClass]) -> Claims:
-        """Every node under a load."""
+    def judge(self, scenario: Scenario, classes: Sequence[TrafficClass]) -> ClaimedPlan:
+        """Judge every node under a load."""
         claimed = {node: _turns(share, self.turns) for node, share in self._shares.items()}
         loads = self._loads(scenario, classes)
-        said, drawn = self._lots(scenario, loads, claimed)
+        announced, drawn = self._lots(scenario, loads, claimed)
         nodes = []
         for node in sorted(loads):
-            lots = drawn[node] + sum(said[n] for n in self._near[node])
+            lots = drawn[node] + sum(announced[n] for n in self._near[node])
             share = self._shares[node]
             nodes.append(
                 NodeTurns(
@@ -121,10 +122,10 @@ class Claimants:
                     hop_ns=None if share is None else self._hop_ns(share.length),
                 )
             )
-        return Claims(self.turns, tuple(nodes), self._hops)
+        return ClaimedPlan(self.turns, tuple(nodes), self._hops)
 
     def _loads(self, scenario: Scenario, classes: Sequence[TrafficClass]) -> dict[NodeId, float]:
-        """Turns per period that each node's packets need. With aggregation a turn takes as many as fit."""
+        """The turns per period that each node's packets need. With aggregation a turn takes as many packets as fit."""
         period_ns = self.turns.period_ns
         most = turn_bytes(scenario)
         each = [
@@ -145,21 +146,22 @@ class Claimants:
     def _lots(
         self, scenario: Scenario, loads: Mapping[NodeId, float], claimed: Mapping[NodeId, Sequence[int]]
     ) -> tuple[dict[NodeId, float], dict[NodeId, int]]:
-        """What each node says on average, and what it draws with: the least of its last hellos (`claimed.Load`).
+        """How many lots each node announces on average, and how many it draws with.
 
-        A hello interval holds a packet more or less; who now and then says that it draws costs the others turns.
+        A node draws with the least number of its last hellos (`claimed.Load`). The number of packets in a hello
+        interval varies by one, and a node that only sometimes announces lots costs the others turns.
         """
         periods = seconds_to_ns(scenario.routing.hello_interval_s) / self.turns.period_ns
-        said, drawn = {}, {}
+        announced, drawn = {}, {}
         for node, load in loads.items():
             turns = len(claimed[node]) * periods
             least, more = divmod(load * periods, 1)
             drawn[node] = _lots(least, turns)
-            said[node] = (1 - more) * drawn[node] + more * _lots(least + 1, turns)
-        return said, drawn
+            announced[node] = (1 - more) * drawn[node] + more * _lots(least + 1, turns)
+        return announced, drawn
 
     def _hop_ns(self, length: int) -> int | None:
-        """As a node will report it, whichever slot of its superframe it gets: one turn may go to a hello."""
+        """The hop time that a node will report, in the worst slot of its superframe; one turn may go to a hello."""
         if length not in self._hops_ns:
             turns, found = self.turns, []
             for slot in range(min(length, turns.per_frame)):
@@ -169,7 +171,7 @@ class Claimants:
         return self._hops_ns[length]
 
     def least_interval_ns(self, scenario: Scenario, classes: Sequence[TrafficClass]) -> int | None:
-        """The shortest interval of the application at which everything fits, to a thousandth; None: none does."""
+        """The shortest interval of the application at which everything fits, to a thousandth; None when none does."""
         if not any(c.name == "application" for c in classes):
             return None
 
@@ -186,8 +188,8 @@ class Claimants:
         return high
 
 
-def settled(scenario: Scenario, adjacency: Adjacency, turns: Turns) -> dict[NodeId, Share | None]:
-    """The slots of all nodes after the protocol's claims have settled: one hello after the other, none lost."""
+def converged_slots(scenario: Scenario, adjacency: Adjacency, turns: Turns) -> dict[NodeId, Share | None]:
+    """The slots of all nodes after the protocol's claims have converged, with hellos sent in turn and none lost."""
     slots = scenario.clusters.slots
     sized = None if slots else longest_superframe(turns)
     claims = {
@@ -200,10 +202,10 @@ def settled(scenario: Scenario, adjacency: Adjacency, turns: Turns) -> dict[Node
             hello = own.step(now)
             for neighbor in adjacency[node]:
                 claims[neighbor].hear(hello, now_ns=now)
-        said = {node: (own.own.slot, own.own.length) for node, own in claims.items()}
-        if now > 4 * _LISTEN and said == before:
+        claimed = {node: (own.own.slot, own.own.length) for node, own in claims.items()}
+        if now > 4 * _LISTEN and claimed == before:
             break
-        before = said
+        before = claimed
     return {
         node: None if own.slot is None else Share(own.slot, slots or own.own.length) for node, own in claims.items()
     }
@@ -214,13 +216,13 @@ def _turns(share: Share | None, turns: Turns) -> tuple[int, ...]:
 
 
 def _lots(packets: float, turns: float) -> int:
-    """As `claimed.Load` has it for the packets and the turns of a hello interval, when none wait."""
+    """The rule of `claimed.Load`, for the packets and the turns of a hello interval when no packets wait."""
     wanted = packets / turns if turns else 0.0
     return 0 if wanted < IDLE else min(MOST_LOTS, ceil(2 * wanted))
 
 
 def _depth(adjacency: Adjacency, root: NodeId, relays: Mapping[NodeId, bool]) -> int:
-    """Transmissions until a flood has reached everyone that relays lead to."""
+    """The number of transmissions in sequence after which a flood over these relays has reached all it can reach."""
     hops = {root: 0}
     frontier = [root]
     while frontier:

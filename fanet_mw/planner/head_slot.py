@@ -1,8 +1,9 @@
-"""One head's slot: what of it the floods need, and how long packets wait for it.
+"""One head's slot: how much of it the floods need, and how long packets wait for it.
 
-One class is served first come first served, whole floods in the slot: exact. Several are counted in units of a
-quarter of the longest spacing, and one longest spacing is taken off the slot for the flood that no longer fits: the
-rest is work that a slot certainly does. The more urgent go first, and a flood that has begun is not taken back.
+One class alone is served in FIFO order, with whole floods in the slot: its bound is exact. Several classes are counted
+in units of a quarter of the longest spacing, and one longest spacing is subtracted from the slot for the flood that no
+longer fits; the rest is work that a slot certainly does. More urgent classes go first, and a flood that has begun is
+not interrupted.
 """
 
 from collections.abc import Sequence
@@ -14,21 +15,21 @@ from fanet_mw.bounds import Bounded, Outcome, Periodic, Refused, SlotServer, Tot
 from fanet_mw.planner.flood import FloodCost
 
 _PARTS: Final = 4
-"""Units per longest spacing: finer is tighter and slower."""
+"""Units per longest spacing; more units give a tighter bound and take longer."""
 
 
-class Share(NamedTuple):
-    """A class at one head: how many sources, one packet per interval each, and what a flood of it costs."""
+class ClassLoad(NamedTuple):
+    """The load of a class at one head: the number of sources, with one packet per interval each, and a flood's cost."""
 
     sources: int
     interval_ns: int
     flood: FloodCost
     urgent: bool = False
-    """More urgent than bulk: under a timetable it has room of its own in each turn."""
+    """True if the class is more urgent than bulk: under a timetable it has room of its own in each turn."""
 
 
 class ClusterPlan(NamedTuple):
-    """One head's slot. `usable_ns` is where floods may begin; `work_ns` is what they take of it per flooding period."""
+    """One head's slot. Floods may begin in `usable_ns` of it; `work_ns` is what they take of it per flooding period."""
 
     head: int
     members: int
@@ -37,11 +38,11 @@ class ClusterPlan(NamedTuple):
     usable_ns: int
     work_ns: int
     packets: float
-    """Per flooding period."""
+    """Packets per flooding period."""
     flood: FloodCost
-    """Of the longest packet."""
+    """The cost of a flood of the longest packet."""
     delays: tuple[Outcome, ...]
-    """Per class, from the head's queue to the last node; nothing waits where a class has no source."""
+    """For each class the time from the head's queue to the last node; 0 for a class without a source."""
     backlog: int | None
 
     @property
@@ -49,15 +50,15 @@ class ClusterPlan(NamedTuple):
         return self.work_ns / self.usable_ns if self.usable_ns > 0 else inf if self.work_ns else 0.0
 
 
-def work_ns(shares: Sequence[Share], *, period_ns: int) -> int:
-    """How much of one flooding period the floods take."""
+def work_ns(shares: Sequence[ClassLoad], *, period_ns: int) -> int:
+    """How much of one flooding period all floods together take."""
     return ceil(sum(s.sources * s.flood.spacing_ns * period_ns / s.interval_ns for s in shares))
 
 
 def slot_delays(
-    shares: Sequence[Share], *, usable_ns: int, period_ns: int, jitter_ns: int
+    shares: Sequence[ClassLoad], *, usable_ns: int, period_ns: int, jitter_ns: int
 ) -> tuple[list[Outcome], int | None]:
-    """Per class, most urgent first, the longest time from the head's queue to the last node; and the most waiting.
+    """For each class, most urgent first, the longest time from the head's queue to the last node; and the backlog.
 
     A class without sources is bounded by 0. Packets arrive late by up to `jitter_ns`.
     """
@@ -84,9 +85,9 @@ def slot_delays(
 
 
 def _by_priority(
-    index: int, shares: Sequence[Share], units: Sequence[Sequence[Periodic]], server: SlotServer
+    index: int, shares: Sequence[ClassLoad], units: Sequence[Sequence[Periodic]], server: SlotServer
 ) -> Outcome:
-    """All as urgent or more go before the packet's last unit, and one less urgent packet may have begun."""
+    """The bound of one class: all equally or more urgent packets go first, and one less urgent may have begun."""
     if not units[index]:
         return Bounded(0)
     before = [*chain.from_iterable(units[:index]), *units[index][1:]]
@@ -94,8 +95,8 @@ def _by_priority(
     return delay_any_order(units[index][0], Total(tuple(before)), server, blocking=max(lower, default=0))
 
 
-def _flooded(share: Share, queue: Outcome) -> Outcome:
-    """From the head's queue to the last node: the slot, then the flood from its first spacing on."""
+def _flooded(share: ClassLoad, queue: Outcome) -> Outcome:
+    """The time from the head's queue to the last node: the wait for the slot, and the rest of the flood."""
     if isinstance(queue, Refused) or not share.sources:
         return queue
     return Bounded(queue.delay_ns + max(0, share.flood.duration_ns - share.flood.spacing_ns))

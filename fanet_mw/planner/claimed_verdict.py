@@ -1,14 +1,14 @@
-"""The plan of a swarm in claimed slots. Its verdict is on rates; the only delay it states is that without queues."""
+"""The plan of a swarm in claimed slots. Its verdict is on rates; the only delay stated is that without queues."""
 
 from collections.abc import Iterator, Sequence
 
 from fanet_mw.bounds import Bounded, Refused
-from fanet_mw.planner import parts, verdict
-from fanet_mw.planner.claimed import Claims, NodeTurns
+from fanet_mw.planner import reachability, verdict
+from fanet_mw.planner.claimed_turns import ClaimedPlan, NodeTurns
 from fanet_mw.planner.demand import ClassPlan, TrafficClass
 from fanet_mw.planner.feasibility import Plan, Site, goodput
 from fanet_mw.planner.flood import FloodCost
-from fanet_mw.planner.head import ClusterPlan
+from fanet_mw.planner.head_slot import ClusterPlan
 from fanet_mw.scenario import Scenario
 from fanet_mw.units import MS
 
@@ -21,7 +21,7 @@ def evaluate_claims(site: Site, classes: Sequence[TrafficClass], *, deadline_ns:
     claimants = site.claimants()
     claims = claimants.judge(scenario, classes)
     claims = claims._replace(least_interval_ns=claimants.least_interval_ns(scenario, classes))
-    cut_off = parts.split(site.adjacency, leader=scenario.leader)
+    cut_off = reachability.split(site.adjacency, leader=scenario.leader)
     refused = Refused(f"{len(cut_off)} nodes are out of reach") if cut_off else _NO_BOUND
     planned = tuple(ClassPlan(c.name, len(c.sources), c.interval_ns, refused, refused, c.priority) for c in classes)
     return Plan(
@@ -36,13 +36,13 @@ def evaluate_claims(site: Site, classes: Sequence[TrafficClass], *, deadline_ns:
         cut_off=cut_off,
         goodput=goodput(site, classes),
         deadline_ns=deadline_ns,
-        problems=(*parts.problems(cut_off), *_problems(scenario, claims, planned, deadline_ns)),
+        problems=(*reachability.problems(cut_off), *_problems(scenario, claims, planned, deadline_ns)),
         notes=(*_notes(claims), *verdict.left_out(scenario)),
     )
 
 
-def _row(node: NodeTurns, claims: Claims) -> ClusterPlan:
-    """A node as if it were the head of a cluster of its own."""
+def _row(node: NodeTurns, claims: ClaimedPlan) -> ClusterPlan:
+    """A node, represented as the head of a cluster of its own."""
     turn_ns = claims.turns.turn_ns
     usable_ns = round((node.claimed + node.won) * turn_ns)
     hop_ns = node.hop_ns or 0
@@ -61,7 +61,7 @@ def _row(node: NodeTurns, claims: Claims) -> ClusterPlan:
 
 
 def _problems(
-    scenario: Scenario, claims: Claims, classes: Sequence[ClassPlan], deadline_ns: int | None
+    scenario: Scenario, claims: ClaimedPlan, classes: Sequence[ClassPlan], deadline_ns: int | None
 ) -> Iterator[str]:
     without = [node for node in claims.nodes if not node.claimed]
     if without:
@@ -81,14 +81,14 @@ def _problems(
         )
     lone_ns = claims.lone_ns
     for c in classes:
-        said = None if lone_ns is None else verdict.expired(scenario, c, lone_ns)
-        if said is not None:
-            yield f"{said}, even without queues"
+        problem = None if lone_ns is None else verdict.expired(scenario, c, lone_ns)
+        if problem is not None:
+            yield f"{problem}, even without queues"
         if deadline_ns is not None:
             yield f"{c.name}: no bound in claimed slots, so the deadline of {deadline_ns / MS:g} ms cannot be promised"
 
 
-def _notes(claims: Claims) -> Iterator[str]:
+def _notes(claims: ClaimedPlan) -> Iterator[str]:
     lone_ns, hop_ns = claims.lone_ns, claims.hop_ns
     if lone_ns is not None and hop_ns is not None:
         yield (

@@ -1,7 +1,7 @@
-"""Heads judged under a timetable: the turns that the running protocol will give them, and the bound of their gaps.
+"""Heads under a timetable: the turns that the running protocol will give them, and the bound that follows.
 
-The table is the one that `scheduled` makes. Who knows the turns knows the longest wait; the flood's span comes on top,
-whatever other floods run through the swarm meanwhile.
+The timetable is the one that `clusters.relay = "scheduled"` makes. Known turns give the longest wait for a turn; to it
+the duration of the flood is added, which does not depend on other floods in the swarm.
 """
 
 from collections.abc import Mapping, Sequence
@@ -9,7 +9,7 @@ from typing import Final, NamedTuple
 
 from fanet_mw.bounds import Bounded, Outcome, Periodic, Refused, Total, TurnServer, backlog, delay_any_order, delay_fifo
 from fanet_mw.planner.flood import FloodCost
-from fanet_mw.planner.head import ClusterPlan, Share
+from fanet_mw.planner.head_slot import ClassLoad, ClusterPlan
 from fanet_mw.routing.clustered.tdma.own_bound import Own
 from fanet_mw.routing.clustered.tdma.turns import Turns
 from fanet_mw.routing.clustered.timetable.list_scheduling import Effort
@@ -22,35 +22,35 @@ _MOST_TURNS: Final = 20_000
 
 
 class Candidate(NamedTuple):
-    """A cluster before it has turns: its head, its size, its greatest way to the head, and its classes' shares."""
+    """A cluster that has no turns yet: head, size, greatest number of hops to the head, and the load of each class."""
 
     head: NodeId
     members: int
     hops: int
-    shares: Sequence[Share]
+    shares: Sequence[ClassLoad]
 
 
-class Superframe(NamedTuple):
-    """The timetable of a plan: its geometry, and how full it is."""
+class TimetablePlan(NamedTuple):
+    """The timetable of a plan: the geometry of its superframe, and how full it is."""
 
     turns: Turns
     used: int
-    """Turns in which some node sends; 0: there is no table."""
+    """The number of turns in which some node sends; 0 when there is no timetable."""
     packets: int
-    """Root turns per superframe."""
+    """The number of root turns per superframe, each of which starts a flood."""
     table: Timetable | None
     together: int = 1
-    """Packets that a turn holds."""
+    """The number of packets that a turn holds."""
     least_interval_ns: int | None = None
-    """The traffic interval down to which everything arrives, when it was asked for."""
+    """The shortest traffic interval at which everything arrives; None when it was not asked for."""
 
 
 def table_for(
     scenario: Scenario, places: Places, head_of: Mapping[NodeId, NodeId], *, quick: bool = False
 ) -> Fitted | Refused:
-    """The running protocol's timetable for nodes with these heads; refused when one packet of each does not fit.
+    """The running protocol's timetable for nodes with these heads; refused when one packet of each root does not fit.
 
-    `quick`: also when the load does not.
+    With `quick` it is also refused when the load does not fit.
     """
     found = fit(scenario, places, head_of, quick=quick)
     if found is not None:
@@ -69,9 +69,10 @@ def table_for(
 def judge(
     found: Fitted, candidate: Candidate, *, lead_ns: int, receipt_ns: int, jitter_ns: int, control: int = 0
 ) -> ClusterPlan:
-    """One root: its queue before its turns, the span of the flood, and up to `receipt_ns` until applications have it.
+    """Judge one root: its queue before its turns, the duration of the flood, and `receipt_ns` until applications have
+    it.
 
-    `control`: announcements per period, which go before everything.
+    `control` is the number of announcements per period, which go before everything else.
     """
     table, turns = found.table, found.turns
     offsets = tuple(table.offsets_of(NodeId(candidate.head)))
@@ -95,12 +96,12 @@ def judge(
 
 
 class _Root(NamedTuple):
-    """One root of a timetable, and what is known of its arrivals."""
+    """One root of a timetable, and the arrivals at its queue."""
 
     own: Own
     lead_ns: int
     jitter_ns: int
-    """How late a packet may come to the root."""
+    """By how much a packet may reach the root late."""
     control: int
 
     @property
@@ -109,10 +110,11 @@ class _Root(NamedTuple):
         longest = (turns.flood_ns(offset, span=self.own.span) for offset in self.own.roots)
         return max(longest, default=turns.turn_ns)
 
-    def delay(self, share: Share) -> Outcome:
-        """A class has room of its own in each turn, so only its own packets make it wait, and bulk for announcements.
+    def delay(self, share: ClassLoad) -> Outcome:
+        """The bound of a class at this root.
 
-        The only source of a class knows more: what it states in flight.
+        A class has room of its own in each turn, so a packet waits only for packets of its class; bulk also waits for
+        announcements. When the class has only one source, that source's own statement in flight (`Own`) is tighter.
         """
         if not share.sources:
             return Bounded(0)
@@ -127,7 +129,7 @@ class _Root(NamedTuple):
         assert worst_ns is not None, "as many are let out as come"
         return Bounded(worst_ns)
 
-    def _queued(self, share: Share) -> Outcome:
+    def _queued(self, share: ClassLoad) -> Outcome:
         server = self._server(self._per_turn(share))
         server.check()
         flow = Periodic(share.interval_ns, self.jitter_ns)
@@ -139,26 +141,26 @@ class _Root(NamedTuple):
             return queue
         return Bounded(queue.delay_ns + self.flood_ns - server.airtime_ns + self.own.around_ns - self.lead_ns)
 
-    def backlog(self, shares: Sequence[Share]) -> int | None:
-        """The most packets that wait at once, all classes together."""
+    def backlog(self, shares: Sequence[ClassLoad]) -> int | None:
+        """The most packets that wait at the same time, all classes together."""
         flows = [Periodic(s.interval_ns, self.jitter_ns) for s in shares for _ in range(s.sources)]
         if not flows:
             return None
         waiting = backlog(Total((*self._announcements(1), *flows)), self._server(self.own.together))
         return None if isinstance(waiting, Refused) else waiting
 
-    def _per_turn(self, share: Share) -> int:
+    def _per_turn(self, share: ClassLoad) -> int:
         return 1 if share.urgent else self.own.together
 
     def _announcements(self, parts: int) -> list[Periodic]:
-        """Each takes a whole turn."""
+        """The leader's announcements as arrivals: each takes a whole turn, which counts as `parts`."""
         return [Periodic(self.own.turns.period_ns, 0)] * (self.control * parts)
 
     def _server(self, parts: int) -> TurnServer:
-        """A turn that lets out k packets counts as k parts of it, one packet each.
+        """The service of turns that send k packets each: such a turn counts as k parts with one packet each.
 
-        A packet must be announced before the whole turn, which counts as a longer lead; and all of them are through
-        when the turn is.
+        A packet must be announced before the whole turn, which counts as a longer lead; and all packets of a turn are
+        completed at its end.
         """
         turns = self.own.turns
         part_ns = turns.turn_ns // parts

@@ -1,4 +1,4 @@
-"""A swarm in parts: which nodes a flood cannot reach. Then no packet can be promised to everyone."""
+"""A swarm in parts: which nodes a flood cannot reach. In such a swarm no packet can be promised to every node."""
 
 from collections.abc import Iterator, Mapping, Sequence
 from typing import Final
@@ -10,18 +10,18 @@ _NAMED: Final = 12
 
 
 def split(adjacency: Adjacency, *, leader: NodeId) -> tuple[NodeId, ...]:
-    """The nodes that do not hear the leader over any number of hops."""
+    """The nodes that are not connected with the leader over any number of hops."""
     return tuple(sorted(node for part in components(adjacency) if leader not in part for node in part))
 
 
 def missed(uncovered: Mapping[NodeId, Sequence[NodeId]], *, leader: NodeId) -> tuple[NodeId, ...]:
-    """The same for a timetable, which knows for each root whom it does not reach."""
+    """The nodes that a timetable does not reach: those that the leader's floods miss, or those of some other root."""
     found = uncovered.get(leader) or next((nodes for _, nodes in sorted(uncovered.items()) if nodes), ())
     return tuple(found)
 
 
 def problems(cut_off: Sequence[NodeId]) -> Iterator[str]:
-    """One sentence, if there is anything to say."""
+    """A sentence about the nodes that are cut off; nothing when there are none."""
     if cut_off:
         named = ", ".join(map(str, cut_off[:_NAMED]))
         rest = f" and {len(cut_off) - _NAMED} more" if len(cut_off) > _NAMED else ""

@@ -62,6 +62,7 @@ def disagreements(scenario: Scenario) -> Sequence[str]:
     found += _unkept_deadline(scenario)
     found += _blind_warnings(scenario)
     found += _impossible_faults(scenario)
+    found += _impossible_places(scenario)
     found += _wrong_for_rivals(scenario)
     if scenario.routing.protocol == "clustered":
         clusters = scenario.clusters
@@ -147,6 +148,21 @@ def _blind_warnings(scenario: Scenario) -> Iterator[str]:
             f"{wanted} room below to avoid: nodes.altitude_m = {scenario.nodes.altitude_m:g} must be > "
             f"2 x mission.collision_distance_m = {2 * mission.collision_distance_m:g}"
         )
+
+
+def _impossible_places(scenario: Scenario) -> Iterator[str]:
+    """Survivors outside the area, or in buildings that there are not."""
+    mission, world = scenario.mission, scenario.world
+    for index, (east, north) in enumerate(mission.survivor_positions_m):
+        if max(abs(east), abs(north)) > world.area_m / 2:
+            yield (
+                f"mission.survivor_positions_m.{index} = [{east:g}, {north:g}] must be within "
+                f"+-world.area_m / 2 = {world.area_m / 2:g}"
+            )
+    if mission.survivors_in == "buildings" and not (world.buildings or world.buildings_geojson):
+        yield 'mission.survivors_in = "buildings" needs world.buildings or world.buildings_geojson'
+    if mission.survivors_in == "buildings" and mission.survivor_positions_m:
+        yield 'mission.survivors_in = "buildings" and mission.survivor_positions_m exclude each other'
 
 
 def _impossible_faults(scenario: Scenario) -> Sequence[str]:

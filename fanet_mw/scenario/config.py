@@ -7,13 +7,16 @@ import difflib
 import tomllib
 from collections.abc import Iterable, Mapping
 from pathlib import Path
-from typing import Any
+from typing import Any, Final
 
 from pydantic import BaseModel, ValidationError
 
 from fanet_mw.errors import ConfigError
 from fanet_mw.scenario import Scenario
 from fanet_mw.scenario.quantities import in_unit_of, unit_of
+
+_PATHS: Final = ("heightmap", "buildings_geojson")
+"""Keys of `[world]` that name files."""
 
 
 def load(path: Path, overrides: Iterable[str] = ()) -> Scenario:
@@ -22,16 +25,21 @@ def load(path: Path, overrides: Iterable[str] = ()) -> Scenario:
         text = path.read_text(encoding="utf-8")
     except (OSError, UnicodeDecodeError) as error:
         raise ConfigError(f"{path}: cannot be read: {getattr(error, 'strerror', None) or error}") from error
-    return parse(text, source=str(path), name=path.stem, overrides=overrides)
+    return parse(text, source=str(path), name=path.stem, overrides=overrides, folder=path.parent)
 
 
-def parse(text: str, *, source: str, name: str, overrides: Iterable[str] = ()) -> Scenario:
-    """Build a scenario from TOML text; `source` is what messages call it, `name` its name unless it has its own."""
+def parse(text: str, *, source: str, name: str, overrides: Iterable[str] = (), folder: Path | None = None) -> Scenario:
+    """Build a scenario from TOML text; `source` is what messages call it, `name` its name unless it has its own.
+
+    Paths in the text are taken from `folder`, those in overrides from the current one.
+    """
     try:
         tree: dict[str, Any] = tomllib.loads(text)
     except tomllib.TOMLDecodeError as error:
         raise ConfigError(f"{source}: not valid TOML: {error}") from error
     tree.setdefault("name", name)
+    if folder is not None:
+        _from_folder(tree, folder)
     for override in overrides:
         _apply(tree, override)
     return build(tree, source=source)
@@ -48,6 +56,16 @@ def build(tree: Mapping[str, Any], *, source: str = "scenario") -> Scenario:
     except ValidationError as error:
         lines = [_sentence(dict(item)) for item in error.errors()]
         raise ConfigError("\n".join(f"{source}: {text}" for text in dict.fromkeys(lines))) from error
+
+
+def _from_folder(tree: dict[str, Any], folder: Path) -> None:
+    """Make the paths of other files in a tree independent of the current folder."""
+    world = tree.get("world")
+    if not isinstance(world, dict):
+        return
+    for key in _PATHS:
+        if isinstance(world.get(key), str) and world[key]:
+            world[key] = str(folder.absolute() / world[key])
 
 
 def _apply(tree: dict[str, Any], override: str) -> None:

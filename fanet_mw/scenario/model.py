@@ -254,6 +254,20 @@ class World(Section):
     """Height of the highest hill above the plain at 0; 0: no hills."""
     terrain_scale_m: Annotated[float, Field(ge=1, le=1e6)] = 400.0
     """Distance from hill to hill."""
+    heightmap: str = ""
+    """File with the heights of the ground, in place of seeded hills: an ASCII grid (.asc), or a grayscale picture
+    (.png). Its middle is the origin, its lowest point is at 0. A path is taken from the scenario file's folder."""
+    heightmap_white_m: Annotated[float, Field(gt=0, le=9000)] = 100.0
+    """Height of a white pixel above a black one."""
+    heightmap_pixel_m: Annotated[float, Field(gt=0, le=1e5)] = 10.0
+    """Width of a pixel."""
+    buildings_geojson: str = ""
+    """File with the outlines of buildings (GeoJSON), in place of `buildings`. A path is taken from the scenario file's
+    folder."""
+    origin_deg: tuple[Annotated[float, Field(ge=-90, le=90)], Annotated[float, Field(ge=-180, le=180)]] | None = None
+    """Latitude and longitude that become the origin; unset: the middle of the buildings of the file."""
+    no_fly_m: tuple[tuple[Coordinate, Coordinate, SomeLength], ...] = ()
+    """Areas that nobody may enter, each as [east, north, radius]; the world counts who does."""
     gps_hz: Annotated[float, Field(ge=1e-6, le=1000)] = 5.0
     """Position fixes of each UAV per second."""
     gps_sigma_m: Annotated[float, Field(ge=0, le=1000)] = 1.5
@@ -261,8 +275,10 @@ class World(Section):
 
     @model_validator(mode="after")
     def _obstacles_agree(self) -> Self:
-        if self.has_obstacles and self.engine != "pybullet":
-            raise ValueError('world.buildings and world.terrain_m need world.engine = "pybullet"')
+        if self.buildings_geojson and self.buildings:
+            raise ValueError("world.buildings and world.buildings_geojson exclude each other")
+        if self.heightmap and self.terrain_m:
+            raise ValueError("world.terrain_m and world.heightmap exclude each other")
         for key in ("building_size_m", "building_height_m"):
             least, greatest = getattr(self, key)
             if least > greatest:
@@ -272,7 +288,7 @@ class World(Section):
     @property
     def has_obstacles(self) -> bool:
         """Whether anything but a plain can stand between two nodes."""
-        return bool(self.buildings) or self.terrain_m > 0
+        return bool(self.buildings or self.buildings_geojson or self.heightmap) or self.terrain_m > 0
 
     @property
     def tick_ns(self) -> int:
@@ -284,6 +300,10 @@ class Mission(Section):
 
     survivors: Annotated[int, Field(ge=0, le=10_000)] = 0
     """Number of survivors, at seeded places of the area."""
+    survivor_positions_m: tuple[tuple[Coordinate, Coordinate], ...] = ()
+    """East and north of each survivor; empty: seeded places."""
+    survivors_in: Literal["area", "buildings"] = "area"
+    """Where seeded places are: anywhere in the area, or within its buildings."""
     buried: Annotated[float, Field(ge=0, le=1)] = 0.0
     """Share of the survivors that lie under rubble (`sensors.burial_phone_db`, `sensors.burial_voice_db`)."""
     reports_to_approach: Count = 3
@@ -312,6 +332,15 @@ class Mission(Section):
     """A UAV that foresees a loss of separation within this time warns the other one, and both avoid; 0: no warnings."""
     collision_repeat_s: Annotated[float, Field(gt=0, le=120)] = 1.0
     """A warning is repeated at this interval until the closest point of approach."""
+
+    @model_validator(mode="after")
+    def _survivors_have_positions(self) -> Self:
+        if self.survivor_positions_m and len(self.survivor_positions_m) != self.survivors:
+            raise ValueError(
+                f"mission.survivor_positions_m has {len(self.survivor_positions_m)} entries; "
+                f"it must have mission.survivors = {self.survivors}"
+            )
+        return self
 
 
 class Scenario(Section):

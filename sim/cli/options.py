@@ -118,18 +118,10 @@ class Join:
 
 
 def with_engine(scenario: Scenario) -> Scenario:
-    """The scenario with a world engine that is installed: where pybullet is not, `kinematic` serves, and it is said so.
-
-    Raises ConfigError for a world with obstacles, which only pybullet has.
-    """
+    """The scenario with a world engine that is installed: where pybullet is not, `kinematic` serves, and says so."""
     world = scenario.world
     if world.engine != "pybullet" or find_spec("pybullet") is not None:
         return scenario
-    if world.has_obstacles:
-        raise ConfigError(
-            f'scenario {scenario.name}: world.buildings and world.terrain_m need world.engine = "pybullet", '
-            "which is not installed: pip install 'fanet-mw[pybullet]'"
-        )
     _err.print(
         "pybullet is not installed (pip install 'fanet-mw[pybullet]'): world.engine = \"kinematic\" serves instead.",
         highlight=False,

@@ -111,6 +111,7 @@ class _World(_Shape):
     skipped_ticks: Count = 0
     collisions: Count
     crashed: Count = 0
+    no_fly_entries: Count = 0
     separation: _Separation
     malformed: Count
 

@@ -8,7 +8,8 @@ from typing import Final
 
 import numpy as np
 
-from sim.world.engine import Engine, Rows
+from sim.world.engine import Engine, Flags, Rows
+from sim.world.solids import Solids
 
 ACCELERATION_M_S2: Final = 5.0
 GRAVITY_M_S2: Final = 9.81
@@ -22,7 +23,8 @@ class Kinematic(Engine):
 
     name = "kinematic"
 
-    def __init__(self) -> None:
+    def __init__(self, solids: Solids | None = None) -> None:
+        self._solids = solids if solids is not None and solids.any else None
         self._at = np.zeros((0, 3))
         self._velocity = np.zeros((0, 3))
         self._touching: frozenset[tuple[int, int]] = frozenset()
@@ -43,11 +45,17 @@ class Kinematic(Engine):
         if self._wrecks:
             change[self._wrecks] = [0.0, 0.0, -GRAVITY_M_S2 * dt_s]
         self._velocity = before + change
-        self._at = self._at + (before + self._velocity) * (dt_s / 2)
+        came_from = self._at
+        self._at = came_from + (before + self._velocity) * (dt_s / 2)
         below = self._at[:, 2] < 0
         self._at[below, 2] = 0.0
         self._velocity[below] = 0.0
+        if self._solids is not None:
+            self._stop_at_walls(came_from, self._solids)
         self._notice_contacts()
+
+    def blocked(self, first: Rows, second: Rows) -> Flags:
+        return super().blocked(first, second) if self._solids is None else self._solids.blocked(first, second)
 
     def positions(self) -> Rows:
         return self._at
@@ -62,8 +70,17 @@ class Kinematic(Engine):
         new, self._new = self._new, []
         return new
 
+    def _stop_at_walls(self, came_from: Rows, solids: Solids) -> None:
+        """Who would be within something solid is put back where it came from, or on the ground, and stands still."""
+        inside = solids.gap_m(self._at) <= 0
+        if inside.any():
+            self._at[inside] = came_from[inside]
+            self._at[inside, 2] = np.maximum(self._at[inside, 2], solids.ground_m(self._at[inside]))
+            self._velocity[inside] = 0.0
+
     def _notice_contacts(self) -> None:
-        now = {(0, int(i) + 1) for i in np.flatnonzero(self._at[:, 2] <= RADIUS_M)}
+        gap = self._at[:, 2] if self._solids is None else self._solids.gap_m(self._at)
+        now = {(0, int(i) + 1) for i in np.flatnonzero(gap <= RADIUS_M)}
         if len(self._at) <= _CROWD:
             apart = np.linalg.norm(self._at[:, None] - self._at[None], axis=2)
             first, second = np.nonzero(np.triu(apart < 2 * RADIUS_M, k=1))

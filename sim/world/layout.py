@@ -6,7 +6,6 @@ from typing import Final
 from fanet_mw.rng import stream
 from fanet_mw.scenario import Scenario, grid_columns
 from fanet_mw.units import Enu
-from sim.world.obstacles import terrain
 
 ON_GROUND_M: Final = 0.1
 """Height of a UAV's middle that stands on the ground."""
@@ -20,6 +19,8 @@ def positions(scenario: Scenario) -> list[Enu]:
         places = [Enu(at.east + east, at.north + north, at.up) for at in places]
     if not scenario.nodes.on_ground:
         return places
+    from sim.world.obstacles import terrain  # brings numpy, which not every command needs
+
     ground = terrain(scenario)
     return [
         Enu(at.east, at.north, ground.at(at.east, at.north) + ON_GROUND_M if ground else ON_GROUND_M) for at in places

@@ -1,11 +1,14 @@
 """What stands in the world: hills and buildings, from the scenario and its seed. ENU metres; no physics here.
 
-Hills are a sum of a few cosine waves, scaled to [0, `terrain_m`]. Buildings are upright boxes, aligned with the axes,
-from the plain at 0 to their height above the ground at their middle. A seeded building keeps clear of every start.
-Not modeled: streets, bridges, trees, anything with a hole.
+Seeded hills are a sum of a few cosine waves, scaled to [0, `terrain_m`]. Buildings are upright boxes from the plain
+at 0 to their height above the ground at their middle; seeded ones are aligned with the axes and keep clear of every
+start. Both may come from files instead (`heightmap.py`, `footprints.py`). Not modeled: streets, bridges, trees,
+anything with a hole.
 """
 
 import math
+from collections.abc import Iterator
+from pathlib import Path
 from random import Random
 from typing import Final, NamedTuple
 
@@ -14,6 +17,7 @@ import numpy as np
 from fanet_mw.errors import ConfigError
 from fanet_mw.rng import stream
 from fanet_mw.scenario import Scenario, World
+from sim.world import footprints, heightmap
 from sim.world.engine import Rows
 
 _CLEAR_M: Final = 5.0
@@ -21,6 +25,8 @@ _CLEAR_M: Final = 5.0
 _TRIES: Final = 200
 _CELLS: Final = 96
 """Grid cells of the hills per side, at most."""
+_FILE_CELLS: Final = 255
+"""The same for hills from a file: pybullet takes no more."""
 _WAVES: Final = 8
 
 
@@ -76,8 +82,11 @@ class Obstacles(NamedTuple):
 
 
 def terrain(scenario: Scenario) -> Hills | None:
-    """The hills of a scenario; None for a plain."""
-    return _hills(scenario.world, stream(scenario.seed, "terrain")) if scenario.world.terrain_m else None
+    """The hills of a scenario, from its file or its seed; None for a plain."""
+    world = scenario.world
+    if world.heightmap:
+        return _hills_of_file(scenario)
+    return _hills(world, stream(scenario.seed, "terrain")) if world.terrain_m else None
 
 
 def obstacles(scenario: Scenario, starts: Rows) -> Obstacles:
@@ -85,12 +94,15 @@ def obstacles(scenario: Scenario, starts: Rows) -> Obstacles:
     world = scenario.world
     hills = terrain(scenario)
     if hills is not None:
+        key = f"world.heightmap = {world.heightmap}" if world.heightmap else f"world.terrain_m = {world.terrain_m:g}"
         for node, (east, north, up) in enumerate(starts.tolist(), 1):
             if up < hills.at(east, north):
                 raise ConfigError(
                     f"node {node} starts at {up:g} m, below a hill of {hills.at(east, north):.0f} m; "
-                    f"world.terrain_m = {world.terrain_m:g} must leave room for nodes.altitude_m"
+                    f"{key} must leave room for nodes.altitude_m"
                 )
+    if world.buildings_geojson:
+        return Obstacles(hills, tuple(_of_file(world, hills, starts)))
     if isinstance(world.buildings, int):
         random = stream(scenario.seed, "buildings")
         return Obstacles(hills, tuple(_seeded(world, random, hills, starts) for _ in range(world.buildings)))
@@ -101,6 +113,44 @@ def obstacles(scenario: Scenario, starts: Rows) -> Obstacles:
             raise ConfigError(f"world.buildings: a node starts within the building at [{east:g}, {north:g}]")
         boxes.append(box)
     return Obstacles(hills, tuple(boxes))
+
+
+def _of_file(world: World, hills: Hills | None, starts: Rows) -> Iterator[Box]:
+    """Buildings of the scenario's GeoJSON file of which the middle lies in the area."""
+    height_m = sum(world.building_height_m) / 2
+    found = footprints.read(Path(world.buildings_geojson), origin_deg=world.origin_deg, height_m=height_m)
+    inside = [b for b in found if max(abs(b.east), abs(b.north)) <= world.area_m / 2]
+    if not inside:
+        raise ConfigError(
+            f"world.buildings_geojson: none of the {len(found)} buildings of {world.buildings_geojson} lies within "
+            f"world.area_m = {world.area_m:g}; is world.origin_deg right?"
+        )
+    for east, north, width, depth, yaw, height in inside:
+        box = Box(east, north, width, depth, height + (hills.at(east, north) if hills else 0.0), yaw)
+        if box.near(starts, margin_m=0.0):
+            raise ConfigError(
+                f"world.buildings_geojson: a node starts within the building at [{east:.0f}, {north:.0f}]"
+            )
+        yield box
+
+
+def _hills_of_file(scenario: Scenario) -> Hills:
+    """The file's heights on a square grid over the area; beyond the file its edge goes on."""
+    world = scenario.world
+    heights, cell_m = heightmap.read(
+        Path(world.heightmap), white_m=world.heightmap_white_m, pixel_m=world.heightmap_pixel_m
+    )
+    rows, columns = heights.shape
+    for side, count in (("east", columns), ("north", rows)):
+        if (count - 1) * cell_m < world.area_m - cell_m:
+            raise ConfigError(
+                f"world.heightmap: {world.heightmap} covers {(count - 1) * cell_m:g} m to the {side}, "
+                f"which must be >= world.area_m = {world.area_m:g}"
+            )
+    cells = max(8, min(_FILE_CELLS, math.ceil(world.area_m / cell_m)))
+    axis = np.linspace(-world.area_m / 2, world.area_m / 2, cells + 1)
+    east, north = np.meshgrid(axis, axis)
+    return Hills(heightmap.sample(heights, cell_m, east, north), world.area_m / cells)
 
 
 def _seeded(world: World, random: Random, hills: Hills | None, starts: Rows) -> Box:

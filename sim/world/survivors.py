@@ -1,6 +1,8 @@
 """Where the survivors are, and which of them are buried. Ids run from 1."""
 
+import math
 from collections.abc import Callable
+from random import Random
 
 import numpy as np
 
@@ -8,15 +10,32 @@ from fanet_mw.rng import stream
 from fanet_mw.scenario.model import Scenario
 from fanet_mw.units import Enu
 from sim.world.engine import Flags, Rows, Values
+from sim.world.layout import positions
+from sim.world.obstacles import obstacles
 
 
 def place(scenario: Scenario) -> list[Enu]:
-    """The true positions: uniform over the area, on the plain."""
+    """The true positions, on the plain: as listed, or uniform over the area or over the floors of its buildings."""
+    mission = scenario.mission
+    if mission.survivor_positions_m:
+        return [Enu(east, north, 0.0) for east, north in mission.survivor_positions_m]
     random = stream(scenario.seed, "survivors")
+    if mission.survivors_in == "buildings" and mission.survivors:
+        return _in_buildings(scenario, random)
     half = scenario.world.area_m / 2
-    return [
-        Enu(random.uniform(-half, half), random.uniform(-half, half), 0.0) for _ in range(scenario.mission.survivors)
-    ]
+    return [Enu(random.uniform(-half, half), random.uniform(-half, half), 0.0) for _ in range(mission.survivors)]
+
+
+def _in_buildings(scenario: Scenario, random: Random) -> list[Enu]:
+    """A building for each, larger ones more often, and a place within it."""
+    boxes = obstacles(scenario, np.array(positions(scenario), dtype=np.float64)).boxes
+    chosen = random.choices(boxes, weights=[box.width * box.depth for box in boxes], k=scenario.mission.survivors)
+    places = []
+    for box in chosen:
+        along, across = (side * random.uniform(-0.5, 0.5) for side in (box.width, box.depth))
+        cos, sin = math.cos(box.yaw), math.sin(box.yaw)
+        places.append(Enu(box.east + cos * along - sin * across, box.north + sin * along + cos * across, 0.0))
+    return places
 
 
 class Survivors:

@@ -22,6 +22,7 @@ from sim.world.flight import Flight
 from sim.world.guidance import Guidance
 from sim.world.kinematic import Kinematic
 from sim.world.layout import positions
+from sim.world.no_fly import NoFly
 from sim.world.obstacles import Obstacles, obstacles
 from sim.world.sensors.contract import Truth
 from sim.world.sensors.suite import Suite, sensors_of
@@ -41,7 +42,7 @@ _CONTROL_S: Final = 0.05
 def make_engine(scenario: Scenario, solid: Obstacles | None = None) -> Engine:
     """The engine that the scenario names, with what stands in its world."""
     if scenario.world.engine == "kinematic":
-        return Kinematic()
+        return Kinematic(Solids(solid))
     from sim.world.physics import Physics
 
     return Physics(physics_hz=scenario.world.physics_hz, obstacles=solid)
@@ -88,6 +89,7 @@ class World(Actor):
         self._skipped = 0
         """Ticks that came too late for anybody to use them."""
         self._collisions = 0
+        self._no_fly = NoFly(scenario.world.no_fly_m, starts)
         self._separation = (
             Separation(scenario.mission.collision_distance_m) if scenario.mission.collision_distance_m else None
         )
@@ -143,6 +145,7 @@ class World(Actor):
             "skipped_ticks": self._skipped,
             "collisions": self._collisions,
             "crashed": int((~self._flies).sum()),
+            "no_fly_entries": self._no_fly.entries,
             "separation": {} if self._separation is None else self._separation.report(),
             "malformed": self._malformed,
         }
@@ -164,6 +167,7 @@ class World(Actor):
             engine.advance(elapsed_s / steps, self._guidance.wanted(t_s, before, engine.velocities()))
             if self._separation is not None:
                 self._separation.watch(before, engine.positions())
+        self._no_fly.watch(engine.positions())
         for first, second in engine.contacts():
             self._contact(first, second, now_ns)
 

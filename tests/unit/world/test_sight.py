@@ -108,7 +108,8 @@ def test_seeded_buildings_are_those_of_the_seed_and_clear_of_every_start(make_sc
 @pytest.mark.parametrize(
     ("keys", "named"),
     [
-        ({"world.buildings": 3}, 'need world.engine = "pybullet"'),
+        ({"world.buildings": 3, "world.buildings_geojson": "town.geojson"}, "exclude each other"),
+        ({"world.terrain_m": 3, "world.heightmap": "hills.asc"}, "exclude each other"),
         ({"world.engine": "pybullet", "world.building_size_m": (9, 3)}, r"must be \[least, greatest\]"),
     ],
 )

@@ -22,6 +22,7 @@ from fanet_mw.wire import FLAG_FLOOD, Kind
 from fanet_mw.wire.claims import Claims, Heard, Standing
 from fanet_mw.wire.digest import Digest, Holding
 from fanet_mw.wire.inner import Beacon, Join, Member, Role, Schedule, Survivor, TimeBeacon
+from fanet_mw.wire.links import Link, Links
 from sim.scenarios import catalog
 
 EVIL = NodeId(5)
@@ -160,6 +161,17 @@ def test_nobody_hears_of_neighbors_that_are_not_there(relay: str) -> None:
         return hello(t_ns, seq, beacon(), Claims(EVIL, Standing(), heard).encode_frames())
 
     summary, reports = attacked(scenario(f"clusters.relay={relay}"), every(200, lie))
+    assert dropped(reports, "malformed") > 50
+    assert summary["pdr"] > 0.9
+
+
+def test_a_leader_s_links_of_nodes_that_are_not_there_are_refused() -> None:
+    def lie(t_ns: int, seq: int) -> bytes:
+        link = Link(NodeId(3), NodeId(10), grade=100, power_dbm=-60)
+        inner = Links(1, (link,)).encode_frames()
+        return packet(inner, by=EVIL, t_ns=t_ns, seq=CONTROL + 9000 + seq, origin=1, kind=Kind.LINKS)
+
+    summary, reports = attacked(scenario("clusters.relay=scheduled", "clusters.links=measured"), every(200, lie))
     assert dropped(reports, "malformed") > 50
     assert summary["pdr"] > 0.9
 

@@ -63,7 +63,7 @@ def numbers(code: str, values: st.SearchStrategy[int], count: int) -> "st.Search
 
 finite = st.floats(allow_nan=False, allow_infinity=False)
 records = st.one_of(
-    st.builds(Delivered, *[instants] * 6),
+    st.builds(Delivered, *[instants] * 7),
     st.builds(Generated, instants, nodes, u32, words, u32),
     st.builds(Detected, instants, nodes, u32, finite),
 )

@@ -1,0 +1,172 @@
+"""Valid bytes to begin with: what a few short runs of all protocols put on the air and on the bus.
+
+    a run in virtual time -> every frame that a node hands to its radio, every message that an actor puts -> by kind
+
+What no run says (faults on command, a clock) is made by hand.
+"""
+
+import json
+from array import array
+from collections import defaultdict
+from collections.abc import Sequence
+from random import Random
+from typing import Any, Final, NamedTuple
+
+from fanet_mw import wire
+from fanet_mw.bus import topics
+from fanet_mw.bus.messages import Clock, ClockState, Message, Obstructions, Report, TraceBatch, TxRequest
+from fanet_mw.bus.radio_control import Cut, Degrade, Jam, Restore
+from fanet_mw.bus.topics import Topics
+from fanet_mw.errors import MalformedFrameError
+from fanet_mw.hosts.virtual import VirtualHost
+from fanet_mw.mavlink import Encoder
+from fanet_mw.radios.datagram import Datagram, DatagramKind
+from fanet_mw.routing import control
+from fanet_mw.trace import Record
+from fanet_mw.units import BROADCAST, Enu, NodeId, S
+from sim.run.virtual import actors_of
+from sim.scenarios import catalog
+
+SETTINGS: Final[dict[str, tuple[str, ...]]] = {
+    "direct": ("routing.protocol=direct", "nodes.spacing_m=60"),
+    "flooding": ("routing.protocol=flooding",),
+    "gossip": ("routing.protocol=gossip",),
+    "counter": ("routing.protocol=counter",),
+    "aodv": ("routing.protocol=aodv", "traffic.destination=9"),
+    "olsr": ("routing.protocol=olsr", "traffic.destination=9"),
+    "dsdv": ("routing.protocol=dsdv", "traffic.destination=9"),
+    "geographic": ("routing.protocol=geographic", "traffic.destination=9"),
+    "all": ("clusters.relay=all", "clusters.repair_s=5", "clusters.reassign_s=1"),
+    "relay-counter": ("clusters.relay=counter", "clock.sync=beacons", "clock.offset_ms=5", "clock.drift_ppm=20"),
+    "scheduled": ("clusters.relay=scheduled",),
+    "measured": ("clusters.relay=scheduled", "clusters.links=measured", "clusters.repair_s=5"),
+    "claimed": ("clusters.relay=claimed", "clusters.repair_s=5"),
+    "cds": ("clusters.relay=cds", "mobility.model=crossing"),
+    "mpr": ("clusters.relay=mpr", "clusters.method=wca", "clusters.reassign_s=1", "clock.sync=beacons"),
+}
+"""Fifteen swarms: every routing protocol, and of `clustered` every way to relay, repair and keep time but one."""
+SMALL: Final = (
+    "nodes.count=9", "clusters.count=2", "nodes.spacing_m=120", "world.engine=kinematic", "mobility.model=static",
+    "mission.survivors=3", "clusters.flooding_period_s=0.5", "traffic.interval_s=0.5", "traffic.payload_bytes=128",
+    "radio.max_frame_bytes=1500", "warmup_s=1", "drain_s=0.5", "nodes.telemetry_hz=1",
+)  # fmt: skip
+
+
+def scenario_of(name: str, *more: str) -> Any:
+    """One of the fifteen."""
+    return catalog.find("quick", [*SMALL, *SETTINGS[name], *more])
+
+
+class Corpus(NamedTuple):
+    """Valid inputs, by kind."""
+
+    frames: Sequence[bytes]
+    """Radio frames; first those of each message, so that a short look at them meets all."""
+    control: Sequence[tuple[int, bytes]]
+    """Types and bodies of the rivals' messages."""
+    puts: Sequence[bytes]
+    """One message of the bus each."""
+    lines: Sequence[str]
+    """Lines of a trace."""
+    datagrams: Sequence[bytes]
+
+
+def recorded(*, seconds: float = 10, swarms: Sequence[str] = tuple(SETTINGS)) -> Corpus:
+    """What these swarms say in so many seconds; the same each time."""
+    frames: dict[bytes, None] = {}
+    puts: dict[type[Any], dict[bytes, None]] = defaultdict(dict)
+    records: list[Record] = []
+    for message in (message for name in swarms for message in _said(name, seconds, records)):
+        if isinstance(message, TxRequest):
+            frames[message.frame] = None
+        kept = puts[type(message)]
+        if len(kept) < 200:
+            kept[topics.encode([message])] = None
+    header = wire.Header(12, 1, 3, BROADCAST, 3, wire.Kind.DATA, 8, 0, wire.PRIORITY_SAFETY, wire.FLAG_FLOOD).encode()
+    warning = Encoder(NodeId(3), component=wire.COMPONENT).collision(
+        NodeId(2), closest_s=3.0, altitude_m=2.0, horizontal_m=9.0
+    )
+    frames[header + warning] = None
+    for message in _BY_HAND:
+        puts[type(message)][topics.encode([message])] = None
+    rare_first = sorted(frames, key=_commonness(list(frames)).__getitem__)
+    return Corpus(
+        frames=rare_first,
+        control=[found for frame in rare_first if (found := _control_of(frame)) is not None],
+        puts=[put for kind in puts.values() for put in kind],
+        lines=lines_in(puts[TraceBatch]),
+        datagrams=[
+            *(Datagram(DatagramKind.FRAME, NodeId(1), BROADCAST, 7, frame).encode() for frame in rare_first[:20]),
+            Datagram(DatagramKind.ACK, NodeId(2), NodeId(1), 7).encode(),
+        ],
+    )  # fmt: skip
+
+
+def _said(name: str, seconds: float, records: list[Record]) -> list[Message]:
+    found = scenario_of(name, f"duration_s={seconds}", "seed=3")
+    names = Topics(found.name)
+    said: list[Message] = []
+
+    def hear(_: str, message: Message) -> None:
+        said.append(message)
+
+    everything = (
+        names.all_tx, names.radio_rx("*"), names.radio_links, names.pose, names.obstruction, names.all_setpoints,
+        names.all_sensors, names.mavlink("*"),
+    )  # fmt: skip
+    actors = actors_of(found, found.name)
+    host = VirtualHost(actors, on_records=records.extend, listeners=[(topic, hear) for topic in everything])
+    records.clear()
+    host.start()
+    host.run(found.duration_ns)
+    host.stop()
+    said += [TraceBatch(tuple(records[at : at + 5])) for at in range(0, len(records), 5)]
+    said += [Report(actor.name, S, json.dumps(actor.report())) for actor in actors]
+    return said
+
+
+_BY_HAND: Final[tuple[Message, ...]] = (
+    Clock(1_735_689_600 * S, 1.0, ClockState.RUNNING, 5 * S, 77),
+    Obstructions(S, array("H", [1, 2, 3, 4])),
+    Degrade("link", NodeId(1), NodeId(2), both=True, loss_db=10.0, loss_share=0.5, for_ns=S),
+    Jam("jam", Enu(1.0, 2.0, 3.0), 100.0, -60.0, for_ns=S),
+    Cut("cut", NodeId(3), for_ns=S),
+    Restore("cut"),
+)
+
+
+def _messages_in(frame: bytes) -> tuple[int, ...]:
+    return tuple(int.from_bytes(inner[7:10], "little") for inner in wire.frames(frame))
+
+
+def _commonness(frames: Sequence[bytes]) -> dict[bytes, int]:
+    """How many frames of the same messages come before each."""
+    seen: dict[tuple[int, ...], int] = defaultdict(int)
+    rank = {}
+    for frame in frames:
+        kinds = _messages_in(frame)
+        rank[frame] = seen[kinds]
+        seen[kinds] += 1
+    return rank
+
+
+def kind_of(frame: bytes) -> int:
+    """What kind of packet a valid frame is."""
+    return wire.decode_header(frame).kind
+
+
+def _control_of(frame: bytes) -> tuple[int, bytes] | None:
+    try:
+        return control.decode(frame)
+    except MalformedFrameError:
+        return None
+
+
+def lines_in(batches: Sequence[bytes] | dict[bytes, None]) -> list[str]:
+    """The lines in some puts of trace records."""
+    return [line for put in batches for line in put[5:].decode().splitlines()]
+
+
+def shuffled(frames: Sequence[bytes], pick: Random) -> list[bytes]:
+    """All of them, in another order."""
+    return pick.sample(list(frames), len(frames))

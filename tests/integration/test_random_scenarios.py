@@ -73,7 +73,9 @@ def test_the_densest_traffic_that_a_scenario_may_ask_for_is_carried_or_counted()
     ("clusters.relay=counter", "radio.max_frame_bytes=302", "clock.sync=beacons"),
 ])  # fmt: skip
 def test_a_swarm_whose_largest_messages_just_fit_a_frame_works(keys: Sequence[str]) -> None:
-    size = ("nodes.count=30", "nodes.spacing_m=50", "traffic.payload_bytes=128", "duration_s=12")
+    size = (
+        "nodes.count=30", "nodes.spacing_m=50", "traffic.payload_bytes=128", "duration_s=8", "warmup_s=2", "drain_s=1",
+    )  # fmt: skip
     summary = scenario_draws.run(catalog.find("quick", [*size, *keys]), limit_s=60)
     assert summary["frames"]["closes"]
     assert summary["delivered"] > 0

@@ -29,7 +29,7 @@ from sim.run.outcome import Outcome
 from sim.run.swarm import Swarm, launch
 from sim.scenarios import catalog
 
-FAST = ["duration_s=6", "warmup_s=3", "drain_s=1", "clusters.flooding_period_s=0.5"]
+FAST = ["duration_s=5", "warmup_s=2", "drain_s=1", "clusters.flooding_period_s=0.5"]
 
 
 def scenario(*overrides: str) -> Scenario:
@@ -76,7 +76,7 @@ def _nothing_left_behind() -> Iterator[None]:
 def test_turns_announced_ahead_are_kept_by_real_processes(relay: str) -> None:
     """Collision-free floods leave no time between hops but the lead: what is late is lost."""
     keys = ["nodes.count=9", "nodes.layout=grid", "traffic.sources=8", "clusters.count=8", "radio.lead_ms=40"]
-    times = ["duration_s=13", "warmup_s=8", "drain_s=1", f"clusters.relay={relay}"]
+    times = ["duration_s=11", "warmup_s=7.5", "drain_s=1", f"clusters.relay={relay}"]
     summary = finish(run(catalog.find("clusters", [*keys, *times]))[0], out=None)
     assert summary["frames"]["closes"]
     assert summary["pdr"] > 0.9
@@ -100,7 +100,7 @@ def test_a_swarm_of_processes_delivers_and_accounts_for_every_frame(tmp_path: Pa
 
 
 def test_a_killed_agent_is_named_and_the_others_carry_on() -> None:
-    outcome, events = run(scenario(), at_s=3.5, act=kill("agent-4"))
+    outcome, events = run(scenario(), at_s=2.5, act=kill("agent-4"))
     assert outcome.aborted is None
     assert outcome.ended == [("agent-4", -signal.SIGKILL)]
     assert any("agent-4 ended with signal SIGKILL" in event for event in events)
@@ -111,7 +111,7 @@ def test_a_killed_agent_is_named_and_the_others_carry_on() -> None:
 
 
 def test_a_killed_agent_is_started_again_with_respawn_and_takes_part() -> None:
-    outcome, events = run(scenario("duration_s=9"), at_s=3.5, act=kill("agent-4"), respawn=True)
+    outcome, events = run(scenario("duration_s=8"), at_s=2.5, act=kill("agent-4"), respawn=True)
     assert outcome.aborted is None
     assert any("agent-4" in event and "started again" in event for event in events)
     report = outcome.reports["agent-4"]
@@ -126,21 +126,12 @@ def test_without_the_emulator_the_run_ends_within_three_seconds_with_a_partial_r
         killed.append(time.monotonic())
         kill("emulator")(swarm)
 
-    outcome, events = run(scenario("duration_s=60"), at_s=3.5, act=act)
+    outcome, events = run(scenario("duration_s=60"), at_s=1.5, act=act)
     assert time.monotonic() - killed[0] < 5
     assert outcome.aborted is not None
     assert "emulator ended with signal SIGKILL" in outcome.aborted
     assert outcome.aborted in events
     assert not finish(outcome, out=None)["lateness"]["valid"]
-
-
-def test_the_emulator_is_started_again_with_respawn_and_frames_flow_again() -> None:
-    outcome, _ = run(scenario("duration_s=10"), at_s=3.2, act=kill("emulator"), respawn=True)
-    assert outcome.aborted is None
-    assert outcome.reports["emulator"]["frames"]["delivered"] > 50
-    frames = finish(outcome, out=None)["frames"]
-    assert frames["unaccounted"] > 50, "what the first emulator had"
-    assert not frames["closes"]
 
 
 def command(*arguments: str) -> list[str]:

@@ -57,7 +57,7 @@ def worst_of_all_phases(server: SlotServer, interval: int, packets: int) -> int:
     return max(max(delays(slot, [phase + n * interval for n in range(packets)])) for phase in range(server.period_ns))
 
 
-@settings(max_examples=1000)
+@settings(max_examples=250)
 @given(slots())
 @example((SlotServer(1, 1, 1), 1))
 def test_no_phase_is_worse_and_the_worst_is_one_tick_below(case) -> None:
@@ -68,7 +68,7 @@ def test_no_phase_is_worse_and_the_worst_is_one_tick_below(case) -> None:
     assert worst == bound.delay_ns - 1, "the worst phase is one tick after the last start that fits"
 
 
-@settings(max_examples=300)
+@settings(max_examples=100)
 @given(slots())
 def test_examining_all_q_as_davis_does_gives_the_same(case) -> None:
     server, interval = case
@@ -81,7 +81,7 @@ def test_examining_all_q_as_davis_does_gives_the_same(case) -> None:
     assert delay_fifo(Periodic(interval), server) == Bounded(letter)
 
 
-@settings(max_examples=200)
+@settings(max_examples=80)
 @given(slots(feasible=False))
 def test_what_is_refused_does_grow_without_limit(case) -> None:
     server, interval = case
@@ -116,7 +116,7 @@ def q_by_q(c: int, s: int, period: int, p: int) -> int:
             return worst
 
 
-@settings(max_examples=500)
+@settings(max_examples=150)
 @given(st.integers(1, 30), st.integers(1, 60), st.integers(1, 100), st.integers(1, 200))
 def test_the_paper_s_q_rule_is_followed_to_the_letter(c, s, period, p) -> None:
     found = paper.cluster_estimate(airtime_ns=c, slot_ns=s, period_ns=period, interval_ns=p)

@@ -21,7 +21,7 @@ def swarm(points):
 points = st.lists(st.tuples(st.integers(0, 900), st.integers(0, 600)), min_size=3, max_size=14, unique=True)
 
 
-@settings(max_examples=150, deadline=None)
+@settings(max_examples=60, deadline=None)
 @given(points, st.integers(1, 3))
 def test_no_timetable_exceeds_the_bound(at, packets) -> None:
     places = swarm(at)
@@ -36,7 +36,7 @@ def test_no_timetable_exceeds_the_bound(at, packets) -> None:
     assert len(roots) / (table.used * turns.turn_ns) * S <= most.per_second * (1 + 1e-9)
 
 
-@settings(max_examples=150, deadline=None)
+@settings(max_examples=60, deadline=None)
 @given(points)
 def test_no_connected_dominating_set_is_smaller_than_the_fewest_transmissions(at) -> None:
     adjacency = within_range(swarm(at), range_m=250)

@@ -62,7 +62,7 @@ def cost(spacing: int, duration: int | None = None) -> FloodCost:
     return FloodCost(duration or spacing, spacing, 1, proven=True)
 
 
-@settings(max_examples=600)
+@settings(max_examples=150)
 @given(heads(), st.integers(0, 10**6))
 def test_no_head_takes_longer_or_holds_more_than_its_plan(head, seed) -> None:
     shares, usable, period, jitter = head

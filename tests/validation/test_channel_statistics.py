@@ -1,6 +1,7 @@
 """Shadowing and fading against their laws: standard deviation, autocorrelation, distribution."""
 
 import math
+from functools import cache
 from typing import Any
 
 import numpy as np
@@ -20,6 +21,7 @@ def radio(**keys: Any) -> Radio:
     return config.build({"clusters": {"count": 1}, "radio": {"channel": "friis", **keys}}).radio
 
 
+@cache
 def along_a_way(seed: int, *, step_m: float, count: int, both: bool = False) -> Any:
     """Shadowing [dB] of one link while one end, or both, fly straight."""
     keys = radio(shadowing_db=6, shadowing_corr_m=50)

@@ -98,7 +98,7 @@ LOADS = st.tuples(
 )  # fmt: skip
 
 
-@settings(max_examples=1500)
+@settings(max_examples=300)
 @given(LOADS)
 @example((3830, 9, "range", "ns3"))  # a remaining backoff shorter than the DIFS that a fresh frame waits
 @example((191, 3, "log_distance", "standard"))  # the last frame ends at a station that cannot hear it

@@ -75,7 +75,7 @@ FULL = {
 }  # fmt: skip
 
 
-@settings(max_examples=150)
+@settings(max_examples=40)
 @given(st.integers(0, 10_000), st.integers(2, 12), st.sampled_from(["rician", "nakagami"]), st.booleans())
 def test_all_books_close_with_everything_on(seed: int, count: int, fading: str, ofdm: bool) -> None:
     keys = {**FULL, "fading": fading}
@@ -106,7 +106,7 @@ def test_fading_without_powers_is_refused(make_scenario: MakeScenario) -> None:
         make_scenario(**{"radio.fading": "rician"})
 
 
-@settings(max_examples=40)
+@settings(max_examples=20)
 @given(st.integers(0, 10_000), st.booleans())
 def test_books_close_when_faults_lie_on_links_that_fade(seed: int, capture: bool) -> None:
     count = 6

@@ -83,7 +83,7 @@ async def _fly(
         host = RealtimeHost(uav, bus, names)
         radio = UdpRadio(
             node, address=on_air.address, broadcast=on_air.broadcast, port=on_air.port,
-            max_frame_bytes=scenario.radio.max_frame_bytes, now_ns=host.now_ns, on_message=bus.heard,
+            max_frame_bytes=scenario.radio.max_frame_bytes, now_ns=host.now_ns, on_message=bus.on_radio,
         )  # fmt: skip
         bus.use(radio)
         await radio.open()

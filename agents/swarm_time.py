@@ -167,7 +167,7 @@ class BeaconTime(SwarmTime):
         except MalformedFrameError:
             self._malformed += 1
             return
-        self._sync.hear(NodeId(header.prev_hop), header.seq, beacon, ended_ns=ended_ns, local_ns=local_ns)
+        self._sync.on_hello(NodeId(header.prev_hop), header.seq, beacon, ended_ns=ended_ns, local_ns=local_ns)
 
     def report(self) -> Mapping[str, object]:
         return {**self._sync.report(), "malformed": self._malformed}

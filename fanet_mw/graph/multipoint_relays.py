@@ -1,7 +1,7 @@
-"""Which neighbors relay what a node sends, so that everyone two hops away hears it (RFC 3626, 8.3.1).
+"""Multipoint relays: the neighbors that relay what a node sends, so that every node two hops away receives it.
 
-Each node chooses its own relays out of what its neighbors' hellos say. A packet is relayed by those whom the last
-sender chose. Unlike a connected dominating set the relays depend on where the packet comes from.
+Each node chooses its own relays from what its neighbors' hellos say (RFC 3626, 8.3.1). A packet is relayed by the nodes
+that its last sender has chosen. Unlike in a connected dominating set, the relays depend on where the packet comes from.
 """
 
 from collections.abc import Mapping
@@ -22,8 +22,9 @@ def multipoint_relays(
 ) -> tuple[NodeId, ...]:
     """The relays of `node`. It suffices that `adjacency` holds the node and its neighbors.
 
-    Steps as in the RFC: the always willing; those that alone reach someone; then by willingness, how many they still
-    reach, and degree, and by lower id; at last those are dropped without whom everyone is reached as well.
+    The steps are those of the RFC: first the neighbors that are always willing; then those that alone reach some node;
+    then by willingness, by the number of nodes that they still add, by degree, and by lower id; in the end relays
+    without which every node is still reached are dropped.
     """
     will = {n: willingness.get(n, WILL_DEFAULT) for n in adjacency[node]}
     near = frozenset(adjacency[node])
@@ -38,7 +39,7 @@ def multipoint_relays(
     for n in relays:
         missing -= reach[n]
     while missing:
-        # D(y), the degree, counts neighbors that are neither ours nor us: the whole of reach
+        # The degree D(y) counts the neighbors of y other than `node` and its neighbors, which is the whole of `reach`.
         best = max(
             (n for n in sorted(reach) if n not in relays and reach[n] & missing),
             key=lambda n: (will[n], len(reach[n] & missing), len(reach[n]), -n),

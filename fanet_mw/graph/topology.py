@@ -1,7 +1,7 @@
-"""Who hears whom, as plain values: nodes to their neighbors in order of id. Pure functions.
+"""The topology of a swarm: each node's neighbors in order of id, as plain values. Pure functions.
 
-Everything built on it (clusters, slots, relays) counts only links that work both ways; `symmetric` makes it so. What is
-not modelled: link quality. A link is there or not.
+Clusters, slots and relays are built on links that work both ways; `symmetric` keeps only those. Not modeled: link
+quality; a link exists or not.
 """
 
 from collections.abc import Collection, Iterable, Mapping
@@ -10,13 +10,13 @@ from typing import Final
 from fanet_mw.units import Enu, NodeId
 
 Adjacency = Mapping[NodeId, tuple[NodeId, ...]]
-"""Every node is a key; its neighbors are ascending, without itself, and each has it as a neighbor too."""
+"""Every node is a key. Its neighbors are ascending, without the node itself, and each has it as a neighbor too."""
 
 _MIN_CELL_M: Final = 1e-3
 
 
 def symmetric(heard: Mapping[NodeId, Collection[NodeId]]) -> dict[NodeId, tuple[NodeId, ...]]:
-    """Keep the links on which both ends hear each other; nodes that only others name are dropped."""
+    """Keep the links on which both ends hear each other; nodes that are named only by others are dropped."""
     nodes = sorted(heard)
     sets = {node: frozenset(heard[node]) for node in nodes}
     return {
@@ -26,7 +26,7 @@ def symmetric(heard: Mapping[NodeId, Collection[NodeId]]) -> dict[NodeId, tuple[
 
 
 def within_range(positions: Mapping[NodeId, Enu], *, range_m: float) -> dict[NodeId, tuple[NodeId, ...]]:
-    """The neighbors of a disk model: everyone no farther than `range_m` in three dimensions."""
+    """The neighbors in a disk model: all nodes within `range_m` in three dimensions."""
     cell_m = max(range_m, _MIN_CELL_M)
     cells: dict[tuple[int, int], list[NodeId]] = {}
     place = {node: (int(at.east // cell_m), int(at.north // cell_m)) for node, at in positions.items()}
@@ -48,7 +48,7 @@ def within_range(positions: Mapping[NodeId, Enu], *, range_m: float) -> dict[Nod
 
 
 def two_hop(adjacency: Adjacency) -> dict[NodeId, tuple[NodeId, ...]]:
-    """Everyone within two hops of each node: those that share its slot's air, at it or at a common neighbor."""
+    """The nodes within two hops of each node: a frame of theirs can collide with its frames at a common neighbor."""
     found = {}
     for node in sorted(adjacency):
         reach = set(adjacency[node])
@@ -60,7 +60,7 @@ def two_hop(adjacency: Adjacency) -> dict[NodeId, tuple[NodeId, ...]]:
 
 
 def levels(adjacency: Adjacency, root: NodeId) -> dict[NodeId, int]:
-    """Hops from the root, breadth first; nodes that cannot be reached are missing."""
+    """The hops of each node from the root, breadth first; nodes that cannot be reached are missing."""
     hops = {root: 0}
     frontier = [root]
     while frontier:
@@ -75,7 +75,7 @@ def levels(adjacency: Adjacency, root: NodeId) -> dict[NodeId, int]:
 
 
 def components(adjacency: Adjacency) -> list[tuple[NodeId, ...]]:
-    """The parts of a swarm that cannot hear each other over any number of hops, by their lowest ids."""
+    """The parts of a swarm that are not connected with each other, each as its nodes, in order of their lowest ids."""
     done: set[NodeId] = set()
     found = []
     for node in sorted(adjacency):

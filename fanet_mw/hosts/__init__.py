@@ -1,1 +1,1 @@
-"""Hosts run actors: virtual time on one heap, or real time on asyncio over Zenoh."""
+"""Hosts, which run actors: in virtual time on one heap, or in real time on asyncio over Zenoh."""

@@ -1,7 +1,8 @@
-"""One Zenoh session, with the settings a swarm needs, as a context manager that always closes it.
+"""One Zenoh session with the settings that a swarm needs, as a context manager that always closes it.
 
-Scouting is off: who connects to whom is said, never discovered. Frames, poses and sensor readings are best effort and
-dropped under congestion (late is worse than lost, and gaps are counted); traces and reports are reliable.
+Scouting is off: which process connects to which is configured, never discovered. Frames, poses and sensor readings are
+best effort and dropped under congestion (to be late is worse than to be lost, and gaps are counted); traces and reports
+are reliable.
 """
 
 import contextlib
@@ -18,17 +19,17 @@ import zenoh
 from fanet_mw.errors import BusError, ConfigError
 
 JOIN_PATIENCE_S: Final = 2.5
-"""How long a router is waited for by default: a person who mistyped an endpoint is told soon."""
+"""How long to wait for a router by default; a user who has mistyped an endpoint learns of it soon."""
 MAX_PUT_BYTES: Final = 16 << 20
-"""A longer put is given up where it first arrives: by default Zenoh would gather up to 1 GiB of one in memory."""
+"""A longer put is dropped where it first arrives: by default Zenoh would collect up to 1 GiB of one put in memory."""
 LOST_AFTER_S: Final = 2.0
-"""A router that has been away for this long is taken to be gone. Zenoh reconnects by itself to one that comes back."""
+"""A router that has been away for this long is taken to be gone. Zenoh reconnects by itself to one that returns."""
 OnSample = Callable[[str, bytes], None]
-"""(topic, payload); called on a thread of Zenoh's."""
+"""A callback (topic, payload); it is called on a thread of Zenoh."""
 
 
 class HostBus(Protocol):
-    """What a host needs of a bus: `Bus`, or one that keeps some topics to itself."""
+    """What a host needs of a bus: `Bus`, or a bus that keeps some topics to itself."""
 
     def subscribe(self, expression: str, on_sample: OnSample) -> None: ...
 
@@ -42,12 +43,12 @@ class HostBus(Protocol):
 
 
 def config_of(path: Path | None, name: str) -> Path | None:
-    """The configuration file of a participant: the file that was given, or NAME.json5 in the folder that was given."""
+    """The configuration file of a participant: the given file, or NAME.json5 in the given folder."""
     return path / f"{name}.json5" if path is not None and path.is_dir() else path
 
 
 def exposure(endpoint: str, *, listens: bool) -> str | None:
-    """A warning for an endpoint that others can reach or forge; None for the loopback interface and for TLS or QUIC."""
+    """A warning about an endpoint that others can reach or forge; None for the loopback interface, TLS and QUIC."""
     protocol, _, address = endpoint.partition("/")
     host = address.partition("#")[0].partition("?")[0].rpartition(":")[0].strip("[]")
     if protocol in ("tls", "quic", "unixsock-stream", "unixpipe") or host == "localhost":
@@ -66,7 +67,7 @@ def exposure(endpoint: str, *, listens: bool) -> str | None:
 def _config(
     *, mode: str, listen: str | None, connect: str | None, file: Path | None, patience_s: float = 0.0
 ) -> zenoh.Config:
-    """Our settings over those of a configuration file of Zenoh; raises ConfigError when that cannot be used."""
+    """The settings of this module over those of a Zenoh configuration file; raises ConfigError when it is unusable."""
     try:
         config = zenoh.Config() if file is None else zenoh.Config.from_file(str(file))
     except zenoh.ZError as error:
@@ -77,10 +78,10 @@ def _config(
         "scouting/gossip/enabled": False,
         "listen/endpoints": [listen] if listen else [],
         "listen/exit_on_failure": True,
-        # Some seconds after its opening each session would map and zero 16 MB of shared memory, all at the same time:
-        # 45 of them stall two cores for half a second in the middle of a run. Frames are far too small to gain by it.
+        # Some seconds after it was opened each session would map and zero 16 MB of shared memory, all at the same time:
+        # 45 sessions stall two cores for half a second in the middle of a run. Frames are too small to gain from it.
         "transport/shared_memory/enabled": False,
-        # One wake-up of the medium is one put per UAV, all at once: room for such a burst, and time to write it out.
+        # One wake-up of the medium makes one put per UAV, all at once: there is room for that, and time to write it.
         "transport/link/rx/max_message_size": MAX_PUT_BYTES,
         "transport/link/tx/queue/size/data": 16,
         "transport/link/tx/queue/congestion_control/drop/wait_before_drop": 5000,
@@ -105,9 +106,9 @@ class Bus:
 
     @classmethod
     def serve(cls, endpoint: str, config: Path | None = None) -> Self:
-        """Be the router, with a configuration file of Zenoh's for what is not said here (TLS, access lists).
+        """Open a session as the router; a Zenoh configuration file adds what is not set here (TLS, access lists).
 
-        Raises BusError when the endpoint cannot be listened on, ConfigError when the file cannot be used.
+        Raises BusError when it cannot listen on the endpoint, ConfigError when the file cannot be used.
         """
         settings = _config(mode="router", listen=endpoint, connect=None, file=config)
         try:
@@ -118,10 +119,10 @@ class Bus:
 
     @classmethod
     def join(cls, endpoint: str, config: Path | None = None, *, patience_s: float = JOIN_PATIENCE_S) -> Self:
-        """Connect to a router, with a configuration file of Zenoh's; raises BusError when none answers in time.
+        """Open a session as a client of a router, with a Zenoh configuration file; raises BusError when none answers.
 
-        A process of a swarm, whose router is known to be there, has more patience: on a busy machine a handshake may
-        take seconds. Raises ConfigError when the file cannot be used.
+        A process of a launched swarm, whose router is known to exist, has more patience: on a busy machine a handshake
+        may take seconds. Raises ConfigError when the file cannot be used.
         """
         settings = _config(mode="client", listen=None, connect=endpoint, file=config, patience_s=patience_s)
         try:
@@ -142,15 +143,15 @@ class Bus:
         self.close()
 
     def close(self) -> None:
-        """End the session; a process that does not would hang at its exit."""
+        """End the session; a process that omits this would hang at its exit."""
         self._publishers.clear()
         if self._session.is_closed():
             return
-        with contextlib.suppress(zenoh.ZError):  # a router that is frozen cannot be said goodbye to
+        with contextlib.suppress(zenoh.ZError):  # a router that is frozen does not answer the closing of a session
             self._session.close()  # type: ignore[no-untyped-call]  # zenoh's stub lacks it
 
     def subscribe(self, expression: str, on_sample: OnSample) -> None:
-        """Hear a key expression for the life of the session; raises BusError when no thread can be had for it."""
+        """Receive what is put on a key expression, as long as the session lasts; raises BusError without a thread."""
         try:
             self._session.declare_subscriber(
                 expression, lambda sample: on_sample(str(sample.key_expr), sample.payload.to_bytes())
@@ -159,25 +160,25 @@ class Bus:
             raise BusError(f"cannot listen to {expression}: {error} (see ulimit -u and ulimit -v)") from error
 
     def put(self, topic: str, payload: bytes, *, reliable: bool = False) -> None:
-        """Publish; without a router it is dropped (see `check`). Raises BusError on a session that was closed."""
+        """Publish; without a router the put is dropped (see `check`). Raises BusError on a closed session."""
         publisher = self._publishers.get(topic)
         if publisher is None:
             control = zenoh.CongestionControl.BLOCK if reliable else zenoh.CongestionControl.DROP
             if self._session.is_closed():
                 raise BusError(f"cannot put on {topic}: the session with {self._endpoint} is closed")
-            # Not express: under pressure Zenoh then packs many puts into one of its few send buffers. Express, a burst
-            # of small ones fills these at once, and the rest is dropped (0.4 % of the frames of 45 agents on 2 cores).
+            # Not express: under pressure Zenoh then packs many puts into one of its few send buffers. As express, a
+            # burst of small puts fills the buffers and the rest is dropped (0.4 % of the frames of 45 agents, 2 cores).
             publisher = self._publishers[topic] = self._session.declare_publisher(
                 topic, congestion_control=control, express=False
             )
         publisher.put(payload)
 
     def announce(self, topic: str) -> None:
-        """A liveliness token: others see it until this session ends, however it ends."""
+        """Declare a liveliness token, which others see until this session ends in whatever way."""
         self._tokens.append(self._session.liveliness().declare_token(topic))
 
     def watch(self, expression: str, on_change: Callable[[str, bool], None]) -> None:
-        """Hear of liveliness tokens, those already there included: (topic, alive)."""
+        """Report liveliness tokens, also those that exist already: (topic, alive)."""
         self._session.liveliness().declare_subscriber(
             expression,
             lambda sample: on_change(str(sample.key_expr), sample.kind == zenoh.SampleKind.PUT),
@@ -185,7 +186,7 @@ class Bus:
         )
 
     def answer(self, topic: str, reply: Callable[[], bytes | None]) -> None:
-        """Answer queries for a topic with what `reply` gives; None stays silent."""
+        """Answer queries on a topic with what `reply` returns; with None there is no answer."""
 
         def on_query(query: zenoh.Query) -> None:
             payload = reply()
@@ -204,11 +205,11 @@ class Bus:
         self._session.get(topic, on_reply, timeout=2.0)
 
     def connected(self) -> bool:
-        """Whether a client has its router."""
+        """True if a client has its router."""
         return not self._session.is_closed() and bool(self._session.info.routers_zid())
 
     def check(self) -> None:
-        """To be asked now and then by a client; raises BusError once the router has been away for LOST_AFTER_S."""
+        """Raise BusError once the router has been away for LOST_AFTER_S; a client calls this now and then."""
         if self.connected():
             self._away_since_s = None
             return

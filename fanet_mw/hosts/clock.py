@@ -1,9 +1,9 @@
-"""The swarm clock of a real-time run: swarm instant = (clock - epoch) x scale, handed over and never derived anew.
+"""The swarm clock of a real-time run: swarm instant = (clock - epoch) x scale, with an epoch that one keeper announces.
 
-The keeper fixes the epoch in unix time and in its machine's monotonic time. A process of the same machine, whenever it
-starts, counts from the monotonic epoch: they agree to microseconds, and no step of the system's clock moves any of
-them. A process of another machine reads its unix time once, when it starts, and carries it on by its own monotonic
-clock: it is right as far as the two machines' unix clocks agreed with each other at the epoch and at its start.
+The keeper fixes the epoch in unix time and in the monotonic time of its machine. A process of the same machine counts
+from the monotonic epoch, whenever it starts: all of these agree to microseconds, and no step of the system's clock
+moves any of them. A process of another machine reads its unix time once, when it starts, and continues by its own
+monotonic clock: it is as accurate as the agreement of the two machines' unix clocks at the epoch and at its start.
 """
 
 import asyncio
@@ -21,20 +21,20 @@ from fanet_mw.hosts.timebase import THIS_MACHINE, Timebase
 from fanet_mw.units import MS, S
 
 _START_DELAY_NS: Final = 300 * MS
-"""From the moment all are there until swarm instant 0."""
+"""The time from the moment at which all participants are present until swarm instant 0."""
 _ASK_EVERY_S: Final = 0.5
 _ASK_AGAIN_S: Final = 0.05
-"""Between two questions to the keeper of whoever hears of a change."""
+"""The least time between two questions to the keeper."""
 START_PATIENCE_S: Final = 3600.0
-"""For services that are started by hand, one after the other. A router that goes meanwhile is noticed in seconds."""
+"""How long a service that is started by hand waits for the others. A router that goes away is noticed in seconds."""
 
 
 class SwarmClock:
-    """Reads swarm instants."""
+    """The swarm instant as this process reads it."""
 
     def __init__(self, clock: Clock, timebase: Timebase = THIS_MACHINE) -> None:
         self.epoch_unix_ns = clock.epoch_unix_ns
-        """Unix time of swarm instant 0."""
+        """The unix time of swarm instant 0."""
         self._mono_ns = timebase.mono_ns
         if clock.machine and clock.machine == timebase.machine:
             self._epoch_mono_ns = clock.epoch_mono_ns
@@ -43,22 +43,22 @@ class SwarmClock:
         self._scale = clock.time_scale
 
     def now_ns(self) -> int:
-        """The swarm instant; negative before the start."""
+        """The swarm instant now; it is negative before the start."""
         elapsed_ns = self._mono_ns() - self._epoch_mono_ns
         return elapsed_ns if self._scale == 1 else round(elapsed_ns * self._scale)
 
     def wait_s(self, instant_ns: int) -> float:
-        """Wall seconds until a swarm instant; negative when it has passed."""
+        """Seconds of real time until a swarm instant; negative when it has passed."""
         return (instant_ns - self.now_ns()) / self._scale / S
 
 
 def few(names: Sequence[str]) -> str:
-    """The first five names of many."""
+    """The first five of the names, and how many more there are."""
     return ", ".join(names[:5]) + (f" and {len(names) - 5} more" if len(names) > 5 else "")
 
 
 class ClockKeeper:
-    """Starts the clock when all are there, answers whoever comes later, and stops it."""
+    """Starts the clock when all participants are present, answers those that come later, and stops it."""
 
     def __init__(
         self,
@@ -82,7 +82,7 @@ class ClockKeeper:
         bus.answer(names.clock, self._current)
 
         def on_change(topic: str, alive: bool) -> None:
-            with contextlib.suppress(RuntimeError):  # the loop has been closed: nobody waits any more
+            with contextlib.suppress(RuntimeError):  # the loop has been closed, so nothing waits for this any more
                 loop.call_soon_threadsafe(self._seen, topic, alive)
 
         bus.watch(names.all_alive, on_change)
@@ -97,11 +97,11 @@ class ClockKeeper:
             self._all_there.set()
 
     def missing(self) -> list[str]:
-        """Who is not there yet."""
+        """The participants that are not present yet."""
         return sorted(self._missing.values())
 
     async def start(self, *, timeout_s: float) -> Clock:
-        """Wait for everyone, then start; raises BusError naming who did not come."""
+        """Wait for all participants, then start; raises BusError naming those that did not come."""
         try:
             await asyncio.wait_for(self._all_there.wait(), timeout_s)
         except TimeoutError:
@@ -114,7 +114,7 @@ class ClockKeeper:
         return self.clock
 
     def stop(self) -> None:
-        """Everyone ends at once."""
+        """Stop the clock, so that every process ends at once."""
         clock = self.clock or Clock(0, self._time_scale, ClockState.STOPPED)
         self._publish(clock._replace(state=ClockState.STOPPED))
 
@@ -124,11 +124,11 @@ class ClockKeeper:
 
 
 class ClockListener:
-    """Hears the swarm clock, on the loop's thread.
+    """Follows the swarm clock, on the loop's thread.
 
-    A put on the clock's topic may be anyone's, so it is a hint to ask the keeper, and only an answer counts: who has
-    merely put a clock that is stopped has stopped nobody. Who also answers in the keeper's place does; an access list
-    keeps others from that.
+    Anyone may put something on the clock's topic, so a put is only a hint to ask the keeper, and only an answer counts:
+    a put that says the clock has stopped stops nothing. A forger that also answers in the keeper's place does; an
+    access list prevents that.
     """
 
     def __init__(self, bus: HostBus, names: Topics, timebase: Timebase = THIS_MACHINE) -> None:
@@ -140,25 +140,25 @@ class ClockListener:
         self.stopped = asyncio.Event()
         self._asked_s = -math.inf
         self._asks_again: asyncio.TimerHandle | None = None
-        bus.subscribe(names.clock, self._hinted)
+        bus.subscribe(names.clock, self._on_hint)
 
-    def _hinted(self, _topic: str, _payload: bytes) -> None:
-        """On the bus's thread: something was put on the clock's topic."""
+    def _on_hint(self, _topic: str, _payload: bytes) -> None:
+        """Called on the bus's thread when something was put on the clock's topic."""
         if not self._loop.is_closed():
             self._loop.call_soon_threadsafe(self._ask)
 
-    def _answered(self, _topic: str, payload: bytes) -> None:
-        """On the bus's thread: the keeper has answered."""
+    def _from_keeper(self, _topic: str, payload: bytes) -> None:
+        """Called on the bus's thread when the keeper has answered."""
         if not self._loop.is_closed():
-            self._loop.call_soon_threadsafe(self._heard, payload)
+            self._loop.call_soon_threadsafe(self._on_answer, payload)
 
     def _ask(self) -> None:
-        """Ask the keeper, at once or when the last question is old enough: a flood of hints is one question."""
+        """Ask the keeper, at once or when the last question is old enough, so that many hints make one question."""
         wait_s = self._asked_s + _ASK_AGAIN_S - self._loop.time()
         if wait_s <= 0:
             self._asked_s = self._loop.time()
             self._asks_again = None
-            self._bus.ask(self._names.clock, self._answered)
+            self._bus.ask(self._names.clock, self._from_keeper)
         elif self._asks_again is None:
             self._asks_again = self._loop.call_later(wait_s, self._ask_now)
 
@@ -166,7 +166,7 @@ class ClockListener:
         self._asked_s = -math.inf
         self._ask()
 
-    def _heard(self, payload: bytes) -> None:
+    def _on_answer(self, payload: bytes) -> None:
         try:
             messages = topics.decode(payload)
         except MalformedFrameError:
@@ -179,7 +179,7 @@ class ClockListener:
                     self._running.set_result(message)
 
     async def running(self, *, timeout_s: float) -> SwarmClock:
-        """The clock, once it has started; raises BusError when nobody starts it or the router goes."""
+        """The clock once it has started; raises BusError when it is not started in time or the router is gone."""
         waited_s = 0.0
         while waited_s < timeout_s:
             self._ask_now()

@@ -1,8 +1,8 @@
-"""SIGINT and SIGTERM, as the commands of this project hear them, and how a command leaves.
+"""SIGINT and SIGTERM, as the commands of this project handle them, and how a command leaves.
 
-Python hears SIGINT only when it was not ignored at the start of the process, and a shell script starts `command &` with
-SIGINT ignored. Each entry point therefore calls `heed`: from then on both signals raise KeyboardInterrupt with the
-signal's number, and `hosts.loop.run` cancels its coroutine instead, so that nothing is cut in half.
+Python handles SIGINT only if it was not ignored when the process started, and a shell script starts `command &` with
+SIGINT ignored. Each entry point therefore calls `install`: from then on both signals raise KeyboardInterrupt with the
+signal's number; `hosts.loop.run` cancels its coroutine instead, so that nothing is interrupted half-way.
 """
 
 import gc
@@ -20,23 +20,23 @@ def _raise(number: int, _frame: FrameType | None) -> NoReturn:
     raise KeyboardInterrupt(number)
 
 
-def heed() -> None:
-    """Hear both signals from here on, even if this process was started with them ignored."""
+def install() -> None:
+    """Handle both signals from here on, even if the process was started with them ignored."""
     for number in SIGNALS:
         signal.signal(number, _raise)
 
 
-def heeded() -> bool:
-    """False in a child of `fanet launch`, which leaves both signals to the launcher."""
+def installed() -> bool:
+    """True if `install` is in force; it is not in a child of `fanet launch`, which leaves signals to the launcher."""
     return all(signal.getsignal(number) is _raise for number in SIGNALS)
 
 
 @contextmanager
 def handed_to(hear: Callable[[int], None]) -> Iterator[None]:
-    """Call `hear` with the number of the first signal that comes; any further one raises KeyboardInterrupt."""
+    """Call `hear` with the number of the first signal that comes; any further signal raises KeyboardInterrupt."""
 
     def first(number: int, _frame: FrameType | None) -> None:
-        heed()
+        install()
         hear(number)
 
     before = [signal.getsignal(number) for number in SIGNALS]
@@ -50,15 +50,15 @@ def handed_to(hear: Callable[[int], None]) -> Iterator[None]:
 
 
 def exit_code(interrupt: KeyboardInterrupt) -> int:
-    """What a shell shows for a process that this signal ended."""
+    """The exit code that a shell shows for a process ended by this signal."""
     number: int = interrupt.args[0] if interrupt.args else signal.SIGINT
     return 128 + number
 
 
 def leave(code: int) -> NoReturn:
-    """End the process without a last garbage collection over everything that is imported.
+    """End the process without a final garbage collection over everything that is imported.
 
-    That collection takes a fifth of a second with numba, on a machine whose cores are busy several seconds of waiting.
+    With numba that collection takes a fifth of a second, and several seconds on a machine whose cores are busy.
     """
     gc.freeze()
     sys.exit(code)

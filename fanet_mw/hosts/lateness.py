@@ -1,4 +1,4 @@
-"""How late things were, in logarithmic bins: constant memory, percentiles good to a tenth."""
+"""How late wake-ups were, in logarithmic bins: constant memory, and percentiles with an error of up to a tenth."""
 
 import math
 from typing import Final
@@ -10,7 +10,7 @@ _LEAST_NS: Final = 1_000
 
 
 class Histogram:
-    """Counts of durations."""
+    """A histogram of durations."""
 
     def __init__(self) -> None:
         self._bins: dict[int, int] = {}
@@ -33,7 +33,7 @@ class Histogram:
         return 0
 
     def summary(self) -> dict[str, float]:
-        """p50, p99 and max [ms], and the count."""
+        """The 50th and 99th percentile and the maximum [ms], and the count."""
         return {
             "p50": round(self.percentile_ns(0.5) / MS, 3),
             "p99": round(self.percentile_ns(0.99) / MS, 3),

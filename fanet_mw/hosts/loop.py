@@ -1,7 +1,7 @@
-"""An event loop whose timers are good to some tens of microseconds, and which signals end in order.
+"""An event loop with timers that are good to some tens of microseconds, and an orderly end on a signal.
 
 asyncio's usual loop sleeps in epoll, which counts whole milliseconds and rounds up: every wake-up is half a millisecond
-late on average. select() counts microseconds; that it looks at every descriptor costs nothing with the few we have.
+late on average. select() counts microseconds; it looks at every descriptor, which costs nothing for the few there are.
 """
 
 import asyncio
@@ -15,9 +15,9 @@ T = TypeVar("T")
 
 
 def run(main: Coroutine[Any, Any, T]) -> T:
-    """As `asyncio.run`; a signal that this process heeds cancels `main`, and KeyboardInterrupt carries its number."""
+    """Like `asyncio.run`; with `interrupts.install`, a signal cancels `main` and KeyboardInterrupt has its number."""
     with asyncio.Runner(loop_factory=_loop) as runner:
-        return runner.run(_cancelled_by_signals(main) if interrupts.heeded() else main)
+        return runner.run(_cancelled_by_signals(main) if interrupts.installed() else main)
 
 
 async def _cancelled_by_signals(main: Coroutine[Any, Any, T]) -> T:
@@ -39,7 +39,7 @@ async def _cancelled_by_signals(main: Coroutine[Any, Any, T]) -> T:
     finally:
         for number in interrupts.SIGNALS:
             loop.remove_signal_handler(number)
-        interrupts.heed()
+        interrupts.install()
 
 
 def _loop() -> asyncio.AbstractEventLoop:

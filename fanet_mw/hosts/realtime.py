@@ -2,9 +2,10 @@
 
     Zenoh's thread -> inbox -> wake-ups of the loop drain it -> actor -> outbox, one put per topic and wake-up
 
-The host never wakes an actor early. How late it wakes it, and for how long it could do nothing at all, is measured and
-reported; the lateness of frames is the medium's to count. A wake-up asked for when its instant was past is late from
-then on, and how far past it was is told apart. An actor that raises ends its host, and with it the process.
+The host never wakes an actor early. It measures and reports how late it wakes the actor, and for how long it could do
+nothing at all; the lateness of frames is counted by the medium. A wake-up that is requested for an instant in the past
+counts as late from the request on; how far past the instant was is reported separately. An actor that raises ends its
+host, and with it the process.
 """
 
 import asyncio
@@ -28,7 +29,7 @@ from fanet_mw.trace import Record
 from fanet_mw.units import MS, S
 
 _LOOK_EVERY_S: Final = 0.5
-"""How often records are published and the router is looked for: what a killed process may lose."""
+"""How often records are published and the router is checked; a killed process loses the records of this time."""
 _ON_ITS_WAY_S: Final = 0.1
 """How long the medium waits at the end for requests that are on the bus; nodes wait twice that for its last copies."""
 _LOOKS_PER_REPORT: Final = 2
@@ -50,17 +51,17 @@ class RealtimeHost:
         self._running = False
         self._timer: asyncio.TimerHandle | None = None
         self._timer_ns: int | None = None
-        """What the actor asked for, and the timer is for."""
+        """The wake-up that the actor has requested and the timer is set for."""
         self._due_ns = 0
-        """From when on that wake-up is late."""
-        self._told_ns = 0
-        """The instant that the actor was told last."""
+        """The instant from which that wake-up counts as late."""
+        self._call_ns = 0
+        """The instant that the actor was given at its last call."""
         self._asked_past_ns = 0
-        """How far past an instant was, at most, when the actor asked for it."""
+        """How far an instant lay in the past at most when the actor requested it."""
         self._stall_ns = 0
-        """The longest that the loop did nothing although it should have."""
+        """The longest time for which the loop did nothing although it should have."""
         self._unread = 0
-        """Receptions that came when the time was over."""
+        """How many receptions came after the end."""
         self._records: list[Record] = []
         self._lateness = Histogram()
         self._puts = 0
@@ -70,7 +71,7 @@ class RealtimeHost:
     ) -> None:
         """Declare, announce, wait for the clock, run, report. Raises BusError, and whatever the actor raises.
 
-        `on_epoch` is told the unix time of swarm instant 0 [ns] before the actor starts.
+        `on_epoch` is called with the unix time [ns] of swarm instant 0 before the actor starts.
         """
         for expression in self._actor.subscriptions:
             self._bus.subscribe(expression, self._from_thread)
@@ -79,17 +80,17 @@ class RealtimeHost:
         self._clock = await listener.running(timeout_s=clock_timeout_s)
         on_epoch(self._clock.epoch_unix_ns)
         await self._sleep_until(0)
-        gc.freeze()  # what start-up made stays: the collector need not look at it again in the middle of a slot
+        gc.freeze()  # what start-up has made stays alive: the collector need not examine it in the middle of a slot
         self._running = True
         try:
-            self._told_ns = self.now_ns()
-            self._actor.start(self._told_ns)
-            self._settle()
+            self._call_ns = self.now_ns()
+            self._actor.start(self._call_ns)
+            self._publish_and_arm()
             self._drain()
             await self._watch(until_ns, listener)
         except BaseException:
             self._halt()
-            self._publish_records()  # what led to it
+            self._publish_records()  # they show what led to the failure
             raise
         await self._finish(until_ns)
 
@@ -100,7 +101,7 @@ class RealtimeHost:
             await asyncio.sleep(wait_s)
 
     async def _watch(self, until_ns: int, listener: ClockListener) -> None:
-        """Report now and then, until the time is over, the clock is stopped or the router is gone."""
+        """Publish records and reports until the time is over, the clock is stopped or the router is gone."""
         assert self._clock is not None, "the clock is running"
         stopped = asyncio.ensure_future(listener.stopped.wait())
         looks = 0
@@ -124,7 +125,7 @@ class RealtimeHost:
             self._failure.result()
 
     def _halt(self) -> None:
-        """No more calls of the actor from the loop."""
+        """Make no more calls of the actor from the loop."""
         self._running = False
         if self._timer is not None:
             self._timer.cancel()
@@ -134,15 +135,15 @@ class RealtimeHost:
         self._halt()
         now_ns = max(0, min(self.now_ns(), until_ns))
         await asyncio.sleep(_ON_ITS_WAY_S if self._actor.hears_out else 2 * _ON_ITS_WAY_S)
-        while self._inbox.deliver(lambda topic, message: self._hear_out(topic, message, now_ns)):
+        while self._inbox.deliver(lambda topic, message: self._receive_last(topic, message, now_ns)):
             pass
         self._actor.stop(now_ns)
-        self._settle(rearm=False)
+        self._publish_and_arm(rearm=False)
         self._publish_records()
         self._publish_report(final=True)
 
-    def _hear_out(self, topic: str, message: Message, now_ns: int) -> None:
-        """What was on its way at the end is counted, or still taken in by who accounts for it."""
+    def _receive_last(self, topic: str, message: Message, now_ns: int) -> None:
+        """Count what was on its way at the end; an actor that accounts for it (`hears_out`) still receives it."""
         self._unread += isinstance(message, Reception)
         if self._actor.hears_out:
             self._actor.receive(topic, message, now_ns)
@@ -150,7 +151,7 @@ class RealtimeHost:
     # --- in -------------------------------------------------------------------------------------------------------
 
     def _from_thread(self, topic: str, payload: bytes) -> None:
-        """On Zenoh's thread: many samples, one wake-up."""
+        """Called on Zenoh's thread: many samples cause one wake-up of the loop."""
         self._inbox.offer(topic, payload)
         if not self._drain_asked and not self._loop.is_closed():
             self._drain_asked = True
@@ -158,33 +159,33 @@ class RealtimeHost:
 
     def _drain(self) -> None:
         self._drain_asked = False
-        if self._running:  # else kept until the start, or come after the end
+        if self._running:  # otherwise samples wait for the start, or come after the end
             self._guard(self._take_inbox)
 
     def _guard(self, step: Callable[[], None]) -> None:
-        """The loop would log what a callback raises and go on, with an actor that nothing ever wakes again."""
+        """Run a step; without this the loop would log an error and go on, with an actor that is never woken again."""
         try:
             step()
-        except Exception as error:  # noqa: BLE001  (the outermost call of the actor: `_watch` raises it)
+        except Exception as error:  # noqa: BLE001  (this is the outermost call of the actor; `_watch` raises the error)
             self._halt()
             if not self._failure.done():
                 self._failure.set_exception(error)
 
     def _take_inbox(self) -> None:
         more = self._inbox.deliver(self._receive)
-        self._settle()
-        if more and not self._drain_asked:  # timers, the clock and reports have their turn before the rest
+        self._publish_and_arm()
+        if more and not self._drain_asked:  # timers, the clock and reports may run before the rest
             self._drain_asked = True
             self._loop.call_soon(self._drain)
 
     def _receive(self, topic: str, message: Message) -> None:
-        self._told_ns = self.now_ns()
-        self._actor.receive(topic, message, self._told_ns)
+        self._call_ns = self.now_ns()
+        self._actor.receive(topic, message, self._call_ns)
 
     # --- time -----------------------------------------------------------------------------------------------------
 
     def now_ns(self) -> int:
-        """The swarm instant; only once the clock runs."""
+        """The swarm instant; available only when the clock runs."""
         assert self._clock is not None, "the clock is running"
         return self._clock.now_ns()
 
@@ -198,8 +199,8 @@ class RealtimeHost:
         if wake_ns is None:
             return
         assert self._clock is not None, "the clock is running"
-        self._due_ns = max(wake_ns, self._told_ns)
-        self._asked_past_ns = max(self._asked_past_ns, self._told_ns - wake_ns)
+        self._due_ns = max(wake_ns, self._call_ns)
+        self._asked_past_ns = max(self._asked_past_ns, self._call_ns - wake_ns)
         self._timer = self._loop.call_later(self._clock.wait_s(wake_ns), self._wake)
 
     def _wake(self) -> None:
@@ -208,18 +209,18 @@ class RealtimeHost:
     def _wake_actor(self) -> None:
         due_ns, now_ns = self._timer_ns, self.now_ns()
         self._timer = self._timer_ns = None
-        if due_ns is not None and now_ns >= due_ns:  # else the loop's clock is a little fast: come again
+        if due_ns is not None and now_ns >= due_ns:  # otherwise the loop's clock is a little fast: arm again
             late_ns = now_ns - self._due_ns
             self._lateness.add(late_ns)
             self._stall_ns = max(self._stall_ns, late_ns)
-            self._told_ns = now_ns
+            self._call_ns = now_ns
             self._actor.wake(now_ns)
-        self._settle()
+        self._publish_and_arm()
 
     # --- out ------------------------------------------------------------------------------------------------------
 
-    def _settle(self, *, rearm: bool = True) -> None:
-        """Publish what the actor has put out, one put per topic, and arm its next wake-up."""
+    def _publish_and_arm(self, *, rearm: bool = True) -> None:
+        """Publish the actor's outbox, one put per topic, and set the timer for its next wake-up."""
         actor = self._actor
         if actor.outbox:
             by_topic: dict[str, list[Message]] = {}
@@ -253,7 +254,7 @@ class RealtimeHost:
             "asked_past_ms": round(self._asked_past_ns / MS, 3),
             "stall_ms": round(self._stall_ns / MS, 3),
             "cpu_s": round(usage.ru_utime + usage.ru_stime, 3),
-            "uss_mb": uss_mb() if final else None,  # asking holds up the process for more than a millisecond
+            "uss_mb": uss_mb() if final else None,  # reading it holds up the process for more than a millisecond
             "unread_receptions": self._unread,
             "puts": self._puts,
             **self._inbox.figures(),
@@ -261,7 +262,7 @@ class RealtimeHost:
 
 
 def uss_mb() -> float | None:
-    """Memory that this process shares with no other [MB]; None where /proc does not say."""
+    """The memory that this process shares with no other [MB]; None where /proc does not tell."""
     try:
         text = Path("/proc/self/smaps_rollup").read_text(encoding="ascii")
     except OSError:
@@ -282,7 +283,7 @@ async def run_actor(
     on_epoch: Callable[[int], None] = lambda _: None,
     timebase: Timebase = THIS_MACHINE,
 ) -> None:
-    """Join a router, run one actor, leave; `zenoh_config` is a file, or a folder with one for each actor.
+    """Join a router, run one actor, leave; `zenoh_config` is a file, or a folder with one file for each actor.
 
     Raises BusError, and ConfigError when the file cannot be used.
     """

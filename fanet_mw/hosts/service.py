@@ -1,7 +1,8 @@
-"""The command line of a service that is started by itself: `python -m agents rescue.toml --id 3 --connect ENDPOINT`.
+"""The command line of a service that is started on its own: `python -m agents rescue.toml --id 3 --connect ENDPOINT`.
 
-Standard library only, for machines that carry one UAV and not the whole of `fanet`. Exit codes: 0 the swarm's time is
-over or its clock was stopped, 2 the request was wrong, 3 the bus could not be had or was lost, 130 SIGINT, 143 SIGTERM.
+It uses the standard library only, for machines that carry one UAV and not the whole of `fanet`. Exit codes: 0 the
+swarm's time is over or its clock was stopped, 2 the request was wrong, 3 the bus could not be used or was lost, 130
+SIGINT, 143 SIGTERM.
 """
 
 import argparse
@@ -20,7 +21,7 @@ _DEFAULT_ENDPOINT: Final = "tcp/127.0.0.1:7447"
 
 
 def parser(program: str, description: str) -> argparse.ArgumentParser:
-    """What every service asks for; a service adds its own."""
+    """The arguments that every service has; a service adds its own."""
     flags = argparse.ArgumentParser(prog=f"python -m {program}", description=description)
     flags.add_argument("scenario", type=Path, help="scenario file, the same for all services of a swarm")
     flags.add_argument("--connect", default=_DEFAULT_ENDPOINT, help="Zenoh endpoint of the router (%(default)s)")
@@ -33,8 +34,8 @@ def parser(program: str, description: str) -> argparse.ArgumentParser:
 
 
 def serve(given: argparse.Namespace, run: Callable[[Scenario, str, str], int]) -> int:
-    """Load the scenario and `run(scenario, swarm, endpoint)`; a foreseen error is one message and an exit code."""
-    interrupts.heed()
+    """Load the scenario and `run(scenario, swarm, endpoint)`; a foreseen error becomes one message and an exit code."""
+    interrupts.install()
     try:
         scenario = config.load(given.scenario, given.set)
         if (warning := exposure(given.connect, listens=False)) is not None:

@@ -1,8 +1,8 @@
-"""The two clocks of a machine, and which machine it is: handed to whatever tells real time.
+"""The two clocks of a machine, and an identity of the machine, for everything that tells real time.
 
-Unix time can be stepped by an operator or by NTP; the monotonic clock cannot, and all processes of one machine read
-the same one until it is booted again. What must survive a step is therefore told in monotonic time to processes of the
-same machine, and in unix time to others only.
+Unix time can be stepped by an operator or by NTP. The monotonic clock cannot, and all processes of one machine read the
+same one until the machine is booted again. What must survive a step is therefore stated in monotonic time to processes
+of the same machine, and in unix time only to others.
 """
 
 import hashlib
@@ -14,16 +14,16 @@ from typing import Final, NamedTuple
 
 _BOOT: Final = Path("/proc/sys/kernel/random/boot_id")
 _TIME_NAMESPACE: Final = Path("/proc/self/ns/time")
-"""Containers may have monotonic clocks of their own (time_namespaces(7))."""
+"""A container may have a monotonic clock of its own (time_namespaces(7))."""
 
 
 class Timebase(NamedTuple):
-    """Where a process reads the time."""
+    """The clocks that a process reads."""
 
     unix_ns: Callable[[], int]
     mono_ns: Callable[[], int]
     machine: int
-    """The same for all processes that read the same monotonic clock; 0: that cannot be said."""
+    """A number that is equal for all processes that read the same monotonic clock; 0 when it is not known."""
 
 
 def _machine() -> int:

@@ -1,7 +1,7 @@
 """Virtual time: any number of actors on one `(t_ns, seq)` heap, deterministic, as fast as it goes.
 
-A message put at t is received at t, first put first received, before time moves on. Ties between wake-ups go by the
-order in which they were asked for. Nothing here depends on a clock, a hash or a set's order.
+A message put at t is received at t, first put first received, before time moves on. Ties between wake-ups are resolved
+in the order in which they were requested. Nothing here depends on a clock, a hash or the order of a set.
 """
 
 import heapq
@@ -17,23 +17,23 @@ from fanet_mw.units import S
 Listener = Callable[[str, Message], None]
 Receive = Callable[[str, Message, int], bool | None]
 Route = tuple[int, Receive, list[tuple[int, Receive]]]
-"""Index and `receive` of the first who hears a topic, and of the others: nearly every topic has one hearer."""
+"""Index and `receive` of the first receiver of a topic, then those of the others: nearly every topic has only one."""
 _NOBODY: Final = -1
-"""In place of the index of an actor: a listener, which has no wake-ups."""
+"""Stands for the index of an actor where the receiver is a listener, which has no wake-ups."""
 _STALL_LIMIT: Final = 100_000
-"""Wake-ups at one instant, of one actor or of several in turn, above which they are taken to be stuck."""
+"""The number of wake-ups at one instant, of one actor or of several in turn, above which actors count as stuck."""
 
 _STALL_SHARE: Final = 1000
-"""For each actor of a large swarm: many may have something to do at the same instant."""
+"""The part of this limit that each actor of a large swarm adds, because many may act at the same instant."""
 
 
 def matches(expression: str, topic: str) -> bool:
-    """Whether a key expression (with `*` for one chunk) covers a topic."""
+    """True if a key expression (with `*` for one chunk) covers a topic."""
     want, have = expression.split("/"), topic.split("/")
     return len(want) == len(have) and all(w in ("*", h) for w, h in zip(want, have, strict=True))
 
 
-def _deaf_to_time(listener: Listener) -> Receive:
+def _without_time(listener: Listener) -> Receive:
     def hear(topic: str, message: Message, _: int) -> bool:
         listener(topic, message)
         return True
@@ -41,12 +41,12 @@ def _deaf_to_time(listener: Listener) -> Receive:
     return hear
 
 
-def _deaf(_topic: str, _message: Message, _now_ns: int) -> bool:
+def _discard(_topic: str, _message: Message, _now_ns: int) -> bool:
     return True
 
 
 class VirtualHost:
-    """Runs actors in virtual time. `listeners` hear topics without being actors (taps, recorders)."""
+    """Runs actors in virtual time. `listeners` receive topics without being actors (taps, recorders)."""
 
     def __init__(
         self,
@@ -64,20 +64,20 @@ class VirtualHost:
         self._armed: list[int | None] = [None] * len(self._actors)
         self._queue: list[tuple[str, Message]] = []
         self._records: list[Record] = []
-        for actor in self._actors:  # all append to the same lists, so that nothing needs to be gathered
+        for actor in self._actors:  # all actors append to the same lists, so that nothing has to be collected
             actor.outbox, actor.records = self._queue, self._records
-        self._hearing: dict[str, list[tuple[int, str, int, Receive]]] = {}
-        """(order, key expression, index, receive) by what the expression begins with, up to its first `*`."""
+        self._receivers: dict[str, list[tuple[int, str, int, Receive]]] = {}
+        """(order, key expression, index, receive), by the beginning of the expression up to its first `*`."""
         for index, actor in enumerate(self._actors):
             for expression in actor.subscriptions:
                 self._subscribe(expression, index, index, actor.receive)
         for order, (expression, listener) in enumerate(listeners, start=len(self._actors)):
-            self._subscribe(expression, order, _NOBODY, _deaf_to_time(listener))
+            self._subscribe(expression, order, _NOBODY, _without_time(listener))
         self._routes: dict[str, Route] = {}
         self._latest: tuple[int, int, int] | None = None
-        """The wake-up that was planned last, not in the heap: most often it is the next that comes."""
+        """The wake-up that was planned last; it is not in the heap, because most often it is also the next."""
         self._stalled = 0
-        """Wake-ups since time moved."""
+        """The number of wake-ups since time last advanced."""
 
     def start(self) -> None:
         """Start every actor, in order, at instant 0."""
@@ -99,7 +99,7 @@ class VirtualHost:
                 self._latest = entry
                 break
             if armed[index] != t_ns:
-                continue  # re-armed since
+                continue  # the actor has requested another wake-up since
             armed[index] = None
             if t_ns > now_ns:
                 self.now_ns = now_ns = t_ns
@@ -112,14 +112,14 @@ class VirtualHost:
         self._hand_over()
 
     def stop(self) -> None:
-        """Stop every actor, in order, and hand over what it still had to say."""
+        """Stop every actor, in order, and hand over its last records."""
         for actor in self._actors:
             actor.stop(self.now_ns)
         self._flush({})
         self._hand_over()
 
     def _watch(self, index: int) -> None:
-        """A wake-up that does not move time is allowed; an endless row of them is a bug of the actors."""
+        """Count wake-ups that do not advance time: some are allowed, an endless series is a bug of the actors."""
         self._stalled += 1
         if self._stalled > max(_STALL_LIMIT, _STALL_SHARE * len(self._actors)):
             raise LocalProtocolError(
@@ -128,15 +128,15 @@ class VirtualHost:
             )
 
     def _flush(self, awake: dict[int, None]) -> None:
-        """Deliver all messages of this instant, in order; then plan the wake-ups of `awake` and of who heard any."""
+        """Deliver all messages of this instant, in order; then plan the wake-ups of `awake` and of their receivers."""
         queue, routes, now_ns = self._queue, self._routes, self.now_ns
-        for topic, message in queue:  # it grows meanwhile
+        for topic, message in queue:  # the queue grows meanwhile
             try:
                 index, receive, others = routes[topic]
             except KeyError:
                 index, receive, others = routes[topic] = self._resolve(topic)
             if not receive(topic, message, now_ns):
-                awake[index] = None  # in order, each once
+                awake[index] = None  # keys of a dict: in order, and each once
             for index, receive in others:
                 if not receive(topic, message, now_ns):
                     awake[index] = None
@@ -148,7 +148,7 @@ class VirtualHost:
                 self._arm(index, wake_ns)
 
     def _arm(self, index: int, wake_ns: int | None) -> None:
-        """Plan an actor's next wake-up."""
+        """Plan an actor's next wake-up; an instant in the past counts as now."""
         if wake_ns is not None and wake_ns < self.now_ns:
             wake_ns = self.now_ns
         if wake_ns != self._armed[index]:
@@ -160,23 +160,23 @@ class VirtualHost:
                 self._latest = wake_ns, self._seq, index
 
     def _hand_over(self) -> None:
-        """Tell what was recorded; once per call of the host, because a record says itself when it was."""
+        """Hand over the records, once per call of the host, because each record states its own instant."""
         if self._on_records is not None:
             self._on_records(self._records)
         self._records.clear()
 
     def _subscribe(self, expression: str, order: int, index: int, receive: Receive) -> None:
-        """Actors hear a topic in their order, then listeners in theirs."""
+        """Register a receiver; actors receive a topic in their order, then listeners in theirs."""
         beginning, star, _ = expression.partition("*")
-        self._hearing.setdefault(beginning if star else expression, []).append((order, expression, index, receive))
+        self._receivers.setdefault(beginning if star else expression, []).append((order, expression, index, receive))
 
     def _resolve(self, topic: str) -> Route:
-        """Who hears a topic; the cost does not depend on how many there are who do not."""
-        found: dict[int, tuple[int, Receive]] = {}  # each once, whichever of its expressions it is
+        """The receivers of a topic; the cost does not depend on the number of actors that do not receive it."""
+        found: dict[int, tuple[int, Receive]] = {}  # each receiver once, even if several of its expressions match
         chunks = topic.split("/")
         for beginning in (topic, *("/".join(chunks[:n]) + "/" for n in range(1, len(chunks))), ""):
-            for order, expression, index, receive in self._hearing.get(beginning, ()):
+            for order, expression, index, receive in self._receivers.get(beginning, ()):
                 if matches(expression, topic):
                     found[order] = index, receive
-        hearers = [found[order] for order in sorted(found)] or [(_NOBODY, _deaf)]
+        hearers = [found[order] for order in sorted(found)] or [(_NOBODY, _discard)]
         return (*hearers[0], hearers[1:])

@@ -1,1 +1,1 @@
-"""Real radios behind the contract that the emulated medium keeps: transmit requests in, receptions and statuses out."""
+"""Real radios, under the same contract as the emulated medium: transmit requests in, receptions and statuses out."""

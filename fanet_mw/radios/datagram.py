@@ -1,6 +1,6 @@
-"""What the UDP radio puts around a frame: who sends it to whom, so that unicasts can be acknowledged. 12 bytes.
+"""The datagram of the UDP radio: 12 bytes in front of a frame say who sends it to whom, so that it can be acknowledged.
 
-"FN" | version | kind (frame, ack) | source | destination | sequence of the request | frame
+"FN" | version | kind (frame, ack) | source | destination | sequence number of the request | frame
 """
 
 import struct
@@ -17,14 +17,14 @@ _SEQ_MASK: Final = 0xFFFF_FFFF
 
 
 class DatagramKind(IntEnum):
-    """What a datagram is."""
+    """The kind of a datagram."""
 
     FRAME = 0
     ACK = 1
 
 
 class Datagram(NamedTuple):
-    """One UDP payload."""
+    """The payload of one UDP packet."""
 
     kind: DatagramKind
     src: NodeId
@@ -37,7 +37,7 @@ class Datagram(NamedTuple):
 
     @classmethod
     def decode(cls, data: bytes) -> Self:
-        """Raises MalformedFrameError."""
+        """Decode a UDP payload; raises MalformedFrameError."""
         if len(data) < _LAYOUT.size:
             raise MalformedFrameError(f"datagram of {len(data)} bytes")
         magic, version, kind, src, dst, seq = _LAYOUT.unpack_from(data)

@@ -1,6 +1,7 @@
-"""The bus of a UAV in the field: its own radio topics go to a real radio, the rest to Zenoh if there is a router.
+"""The bus of a UAV in the field: the radio topics of its node go to a real radio, all others to Zenoh if it has a
+router.
 
-Without a router there is no world and no launcher: swarm time starts at an epoch that all were given, and traces,
+Without a router there is no world and no launcher: swarm time starts at an epoch that all nodes were given, and traces,
 telemetry and reports stay with the node.
 """
 
@@ -23,7 +24,7 @@ class Radio(Protocol):
 
 
 class FieldBus:
-    """Looks like `Bus` to a host."""
+    """A bus for a host, like `Bus`, which keeps the node's radio topics to itself."""
 
     def __init__(self, names: Topics, node: NodeId, *, inner: Bus | None, epoch_unix_ns: int | None) -> None:
         self._tx_topic = names.radio_tx(node)
@@ -35,17 +36,17 @@ class FieldBus:
         self._on_rx: OnSample | None = None
         self._radio: Radio | None = None
         self.reports: list[bytes] = []
-        """What was reported when nobody could hear it: the last one."""
+        """The last report, kept while there is no router that could receive it."""
 
     def use(self, radio: Radio) -> None:
         self._radio = radio
 
-    def heard(self, message: Reception | TxStatus) -> None:
-        """The radio has something for the node."""
+    def on_radio(self, message: Reception | TxStatus) -> None:
+        """Pass a message of the radio to the node."""
         if self._on_rx is not None:
             self._on_rx(self._rx_topic, topics.encode([message]))
 
-    # --- as `Bus` -------------------------------------------------------------------------------------------------
+    # --- the interface of `Bus` -----------------------------------------------------------------------------------
 
     def subscribe(self, expression: str, on_sample: OnSample) -> None:
         if expression == self._rx_topic:
@@ -79,13 +80,13 @@ class FieldBus:
 
 
 def _decoded(payload: bytes) -> list[Message]:
-    """Our own node's messages: what does not decode is a bug of ours, and raises."""
+    """The messages of the own node; one that cannot be decoded is a bug of this program, and raises."""
     return list(topics.decode(payload))
 
 
 @contextlib.contextmanager
 def joined(endpoint: str | None, config: Path | None = None) -> Iterator[Bus | None]:
-    """The router's session, if there is to be one, with a configuration file of Zenoh's."""
+    """A session with the router, if there is to be one; `config` is a configuration file of Zenoh."""
     if endpoint is None:
         yield None
         return

@@ -1,11 +1,11 @@
-"""A radio on a real interface: frames as UDP datagrams, broadcast on its network, unicasts acknowledged.
+"""A radio on a real interface: frames as UDP datagrams, broadcasts to its network, unicasts with acknowledgement.
 
-    request -> waits for its instant -> socket -> driver and air -> socket of the other -> reception
+    request -> waits for its instant -> socket -> driver and air -> socket of the other node -> reception
 
-The interface is an ad hoc (IBSS or mesh) Wi-Fi interface with an address of its own; the driver does CSMA/CA. A unicast
-is acknowledged by the other radio and repeated `ATTEMPTS` times, because no driver tells whether its own ACK came. What
-the air brings never raises: it is counted. Not known here: RSSI (a reception says 0), and the instant at which a frame
-really left; `end_ns` is when it was taken from the socket.
+The interface is an ad hoc (IBSS or mesh) Wi-Fi interface with an address of its own; its driver does CSMA/CA. A unicast
+is acknowledged by the other radio and sent up to `ATTEMPTS` times, because no driver tells whether the MAC's own ACK
+came. What comes off the air never raises: it is counted. Not known here: the RSSI (a reception says 0), and the instant
+at which a frame really ended; `end_ns` is the instant at which it was taken from the socket.
 """
 
 import asyncio
@@ -24,23 +24,23 @@ PORT: Final = 14560
 ATTEMPTS: Final = 4
 _ACK_WAIT_S: Final = 0.03
 _RSSI_UNKNOWN_DBM: Final = 0.0
-_HEARD: Final = 1
+_RECEIVED: Final = 1
 MOVED_NS: Final = 10 * S
-"""A node that was silent at its address for so long may be heard from another one."""
+"""A node that has been silent at its address for this long may be accepted from another address."""
 _MOST_ADDRESSES: Final = 4096
 _SEQ_MASK: Final = 0xFFFF_FFFF
 Address = tuple[str, int]
 
 
 class _Known(NamedTuple):
-    """Where a node is heard from, and when it was heard last."""
+    """The address from which a node is heard, and when it was heard last."""
 
     address: Address
     heard_ns: int
 
 
 class UdpRadio:
-    """One node's radio. `on_message` is told receptions and statuses, on the loop's thread."""
+    """The radio of one node. `on_message` receives its receptions and statuses, on the loop's thread."""
 
     def __init__(
         self,
@@ -61,17 +61,17 @@ class UdpRadio:
         self._on_message = on_message
         self._loop = asyncio.get_running_loop()
         self._addresses: dict[NodeId, _Known] = {}
-        """Where each node is heard from."""
+        """The address from which each node is heard."""
         self._waiting: dict[tuple[NodeId, int], asyncio.Event] = {}
-        """Unicasts whose acknowledgment has not come, by addressee and sequence."""
+        """The unicasts whose acknowledgement is awaited, by destination and sequence number."""
         self._tasks: set[asyncio.Task[None]] = set()
-        self._heard = Seen(capacity=8192)
+        self._seen = Seen(capacity=8192)
         self._transport: asyncio.DatagramTransport | None = None
         self._listener: asyncio.DatagramTransport | None = None
         self.counts: Counter[str] = Counter()
 
     async def open(self) -> None:
-        """Bind to the address (for what is ours) and to the broadcast address; raises BusError."""
+        """Bind to the own address, for unicasts, and to the broadcast address; raises BusError."""
         try:
             self._transport = await self._bind(self._address)
             self._listener = await self._bind(self._broadcast)
@@ -82,18 +82,18 @@ class UdpRadio:
     async def _bind(self, address: Address) -> asyncio.DatagramTransport:
         sock = socket.socket(socket.AF_INET, socket.SOCK_DGRAM)
         try:
-            sock.setsockopt(socket.SOL_SOCKET, socket.SO_REUSEADDR, 1)  # several radios of one machine hear broadcasts
+            sock.setsockopt(socket.SOL_SOCKET, socket.SO_REUSEADDR, 1)  # several radios on one machine get broadcasts
             sock.setsockopt(socket.SOL_SOCKET, socket.SO_BROADCAST, 1)
             sock.settimeout(0)
             sock.bind(address)
-            transport, _ = await self._loop.create_datagram_endpoint(lambda: _Ear(self._take), sock=sock)
+            transport, _ = await self._loop.create_datagram_endpoint(lambda: _Receiver(self._on_datagram), sock=sock)
         except BaseException:
             sock.close()
             raise
         return transport
 
     def close(self) -> None:
-        """No more sending, no more hearing."""
+        """Stop sending and receiving."""
         for task in self._tasks:
             task.cancel()
         for transport in (self._transport, self._listener):
@@ -101,10 +101,10 @@ class UdpRadio:
                 transport.close()
         self._transport = self._listener = None
 
-    # --- out ------------------------------------------------------------------------------------------------------
+    # --- transmit -------------------------------------------------------------------------------------------------
 
     def request(self, request: TxRequest) -> None:
-        """Send a frame at its instant; at once, and counted, if that has passed."""
+        """Send a frame at its instant; if that has passed, at once, and counted as late."""
         self.counts["sent"] += 1
         if not 0 < len(request.frame) <= self._max_frame_bytes:
             self._drop(DropReason.TOO_LARGE if request.frame else DropReason.MALFORMED, request)
@@ -130,7 +130,7 @@ class UdpRadio:
         task.add_done_callback(self._tasks.discard)
 
     async def _unicast(self, request: TxRequest) -> None:
-        """Repeat until it is acknowledged; to the broadcast address while the other was never heard."""
+        """Repeat a frame until it is acknowledged; to the broadcast address if the other node was never heard."""
         datagram = Datagram(DatagramKind.FRAME, self._node, request.dst, request.seq, request.frame)
         name = request.dst, request.seq & _SEQ_MASK
         acknowledged = self._waiting[name] = asyncio.Event()
@@ -158,17 +158,17 @@ class UdpRadio:
             self._transport.sendto(datagram.encode(), to)
             self.counts["datagrams"] += 1
 
-    # --- in -------------------------------------------------------------------------------------------------------
+    # --- receive --------------------------------------------------------------------------------------------------
 
-    def _take(self, data: bytes, address: Address) -> None:
-        """One datagram, from anyone."""
+    def _on_datagram(self, data: bytes, address: Address) -> None:
+        """Take in one datagram, whoever sent it."""
         try:
             datagram = Datagram.decode(data)
         except MalformedFrameError:
             self.counts[DropReason.MALFORMED] += 1
             return
         if datagram.src == self._node:
-            return  # our own broadcast
+            return  # this is the node's own broadcast
         at_home = self._is_at(datagram.src, address)
         if datagram.dst not in (BROADCAST, self._node):
             return
@@ -179,13 +179,14 @@ class UdpRadio:
             elif waiting is not None:
                 waiting.set()
             return
-        self._hear(datagram, address)
+        self._on_frame(datagram, address)
 
     def _is_at(self, node: NodeId, address: Address) -> bool:
-        """Whether this is the address at which we know the node: that from which it was heard first.
+        """True if this is the address at which the node is known: the address from which it was heard first.
 
-        It gets another one when it was silent at the old one for a while, as after a new start: one datagram redirects
-        nothing. Frames are taken from any address: else whoever came first could keep the others out.
+        A node gets another address after it was silent at the old one for a while, as after a restart, so that a single
+        datagram redirects nothing. Frames are accepted from any address: otherwise the sender that comes first could
+        keep out the others.
         """
         now_ns, known = self._now_ns(), self._addresses.get(node)
         if known is not None and known.address != address and now_ns - known.heard_ns < MOVED_NS:
@@ -195,25 +196,25 @@ class UdpRadio:
         self._addresses[node] = _Known(address, now_ns)
         return True
 
-    def _hear(self, datagram: Datagram, address: Address) -> None:
+    def _on_frame(self, datagram: Datagram, address: Address) -> None:
         if datagram.dst == self._node:
             self._put(Datagram(DatagramKind.ACK, self._node, datagram.src, datagram.seq), address)
         key = key_of(origin=datagram.src, seq=datagram.seq)
         if len(datagram.frame) > self._max_frame_bytes:
             self.counts[DropReason.TOO_LARGE] += 1
-        elif self._heard.bits(key):
+        elif self._seen.bits(key):
             self.counts[DropReason.DUPLICATE] += 1
         else:
-            self._heard.mark(key, _HEARD)
+            self._seen.mark(key, _RECEIVED)
             self.counts["received"] += 1
             self._on_message(Reception(datagram.frame, datagram.src, self._now_ns(), _RSSI_UNKNOWN_DBM))
 
 
-class _Ear(asyncio.DatagramProtocol):
-    """Hands datagrams on; what the network says about earlier ones (nobody there) is no error of ours."""
+class _Receiver(asyncio.DatagramProtocol):
+    """Passes datagrams on. Errors that the network reports about datagrams sent (no receiver there) are ignored."""
 
     def __init__(self, take: Callable[[bytes, Address], None]) -> None:
-        self._take = take
+        self._on_datagram = take
 
     def datagram_received(self, data: bytes, addr: tuple[str | Any, int]) -> None:
-        self._take(data, (str(addr[0]), addr[1]))
+        self._on_datagram(data, (str(addr[0]), addr[1]))

@@ -1,1 +1,1 @@
-"""A common time for the swarm, agreed on over the air."""
+"""Swarm time: a common time that the nodes agree on over the air."""

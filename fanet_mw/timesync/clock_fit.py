@@ -1,10 +1,11 @@
-"""Swarm time as a line over the own clock, fitted to pairs (own instant, how far swarm time is ahead then).
+"""Swarm time as a line over a node's own clock, fitted to pairs (own instant, how far swarm time is ahead of it then).
 
     swarm - own = offset + rate x (own - at)       weighted least squares over the last pairs (FTSP, Maroti et al. 2004)
 
-Each pair comes with a bound of its error; a pair that lies beyond that and the line's own is counted and left out. When
-more pairs of the window agree against the line than for it, the line was wrong: it starts anew from them. The error
-that is stated is an estimate, not a proof: four standard deviations of the fit, on top of what the pairs state.
+Each pair comes with a bound of its error; a pair that lies farther from the line than both errors allow is counted and
+left out. When more pairs of the window agree with each other against the line than support it, the line was wrong and
+is fitted anew to them. The error that is stated is an estimate, not a proof: four standard deviations of the fit, in
+addition to the errors that the pairs state.
 """
 
 import math
@@ -14,53 +15,54 @@ from typing import Final, NamedTuple
 from fanet_mw.units import S
 
 PAIRS: Final = 32
+"""How many pairs are kept, the latest."""
 WINDOW_NS: Final = 30 * S
-"""Pairs older than this, or beyond this many, are forgotten: rates wander."""
+"""Older pairs are dropped, because rates wander."""
 _SIGMAS: Final = 4.0
 _AGREEING: Final = 2
-"""So many pairs at least overthrow a line."""
+"""The least number of agreeing pairs that replace a line."""
 
 
 class Pair(NamedTuple):
-    """At the own instant `local_ns` swarm time was ahead by `offset_ns`, give or take `error_ns`."""
+    """At the own instant `local_ns` swarm time was ahead by `offset_ns`, with an error of at most `error_ns`."""
 
     local_ns: int
     offset_ns: int
     error_ns: int
     rate: float = 0.0
-    """How fast that error may have grown since, as whoever said it states (parts)."""
+    """How fast that error may have grown since, as the sender of the pair states it (parts)."""
 
 
 class Oscillator(NamedTuple):
-    """What a node knows of its own clock and of those it follows."""
+    """What a node knows of its own clock and of the clocks that it follows."""
 
     rate: float
-    """Bound by which two clocks may run apart (parts, not ppm)."""
+    """A bound of the rate at which two clocks may run apart (parts, not ppm)."""
     wander: float
-    """Standard deviation by which a rate changes in a second (parts)."""
+    """The standard deviation of the change of a rate in one second (parts)."""
     stamp_ns: int
-    """Resolution of time stamps."""
+    """The resolution of time stamps."""
 
 
 class Line(NamedTuple):
-    """The fit, and how well it is known."""
+    """A fitted line, and how accurate it is."""
 
     at_ns: int
     offset_ns: int
     rate: float
     stated_ns: float
-    """What the pairs state as their error, by weight; of the last one, if that is more."""
+    """The weighted mean of the errors that the pairs state, or that of the last pair if it is greater."""
     offset_sd_ns: float
     rate_sd: float
     last_ns: int = 0
     stated_rate: float = 0.0
-    """What is stated of the rate they all follow: what may have grown since the last of them."""
+    """The rate error that the last pair states: how fast the error may have grown since that pair."""
 
     def offset_at(self, local_ns: int) -> int:
         return self.offset_ns + round((local_ns - self.at_ns) * self.rate)
 
     def swarm_ns(self, local_ns: int) -> int:
-        """Swarm time when the own clock shows `local_ns`."""
+        """Swarm time at the instant at which the own clock shows `local_ns`."""
         return local_ns + self.offset_at(local_ns)
 
     def local_ns(self, swarm_ns: int) -> int:
@@ -69,7 +71,7 @@ class Line(NamedTuple):
         return self.at_ns + beyond_ns - round(beyond_ns * (self.rate / (1 + self.rate)))
 
     def error_ns(self, local_ns: int, oscillator: Oscillator) -> int:
-        """The stated bound of the error at an instant."""
+        """A bound of the line's error at an instant, as it is stated to others."""
         far_ns = abs(local_ns - self.at_ns)
         drift_ns = min(oscillator.rate, _SIGMAS * self.rate_sd) * far_ns
         drift_ns += min(oscillator.rate, self.stated_rate) * abs(local_ns - self.last_ns)
@@ -79,16 +81,16 @@ class Line(NamedTuple):
         return math.ceil(self.stated_ns + _SIGMAS * self.offset_sd_ns + drift_ns + wander_ns)
 
     def rate_error(self, oscillator: Oscillator) -> float:
-        """The stated bound of the error of the rate (parts)."""
+        """A bound of the error of the rate (parts), as it is stated to others."""
         return min(oscillator.rate, self.stated_rate + _SIGMAS * self.rate_sd)
 
 
 EXACT: Final = Line(0, 0, 0.0, 0.0, 0.0, 0.0)
-"""The own clock is swarm time."""
+"""The line of a node whose own clock is swarm time."""
 
 
 def fitted(pairs: list[Pair], oscillator: Oscillator) -> Line:
-    """The line of at least one pair; a pair weighs by the square of how well it is known."""
+    """The line through at least one pair; each pair is weighted by the inverse square of its error."""
     at_ns, base_ns = pairs[-1].local_ns, pairs[-1].offset_ns
     count, floor_ns = len(pairs), max(1.0, oscillator.stamp_ns / 2)
     weights = [1 / (pair.error_ns + floor_ns) ** 2 for pair in pairs]
@@ -105,7 +107,7 @@ def fitted(pairs: list[Pair], oscillator: Oscillator) -> Line:
     residual = math.fsum(w * (y - rate * x) ** 2 for w, x, y in points) / whole
     free = count / (count - 2) if count > 2 else 1.0
     sigma_ns = max(floor_ns, math.sqrt(residual * free))
-    slope_ns = max(sigma_ns, stated_ns / count**2)  # few pairs: what they state may be a slope too
+    slope_ns = max(sigma_ns, stated_ns / count**2)  # with few pairs their stated errors may amount to a slope too
     effective = whole * whole / math.fsum(w * w for w in weights)
     middle_ns = at_ns + round(mean_x)
     return Line(
@@ -121,7 +123,7 @@ def fitted(pairs: list[Pair], oscillator: Oscillator) -> Line:
 
 
 class ClockFit:
-    """One node's line, and the pairs for and against it."""
+    """A node's line, the pairs that support it, and those that contradict it."""
 
     def __init__(self, oscillator: Oscillator) -> None:
         self._oscillator = oscillator
@@ -129,15 +131,15 @@ class ClockFit:
         self._against: deque[Pair] = deque(maxlen=PAIRS + 1)
         self.line: Line | None = None
         self.outliers = 0
-        """Pairs left out."""
+        """How many pairs were left out."""
         self.steps = 0
-        """Times the line was overthrown."""
+        """How many times contradicting pairs have replaced the line."""
 
     def __len__(self) -> int:
         return len(self._pairs)
 
     def add(self, pair: Pair) -> bool:
-        """Take in a pair; returns whether it is believed."""
+        """Take in a pair; returns True if it is believed."""
         horizon_ns = pair.local_ns - WINDOW_NS
         while self._against and self._against[0].local_ns < horizon_ns:
             self._against.popleft()
@@ -160,20 +162,20 @@ class ClockFit:
         self.line = fitted(list(self._pairs), self._oscillator)
 
     def agrees(self, pair: Pair) -> bool:
-        """Whether a pair is where the line may be, both errors counted."""
+        """True if the pair lies where the line may be, with both errors allowed for."""
         assert self.line is not None, "only a line can be agreed with"
         apart_ns = abs(pair.offset_ns - self.line.offset_at(pair.local_ns))
         margin_ns = self.line.error_ns(pair.local_ns, self._oscillator) + pair.error_ns
         return apart_ns <= margin_ns + 2 * self._oscillator.stamp_ns
 
     def _alike(self, one: Pair, other: Pair) -> bool:
-        """Whether two pairs may be of one line, whichever."""
+        """True if both pairs may lie on one line."""
         drift_ns = self._oscillator.rate * abs(one.local_ns - other.local_ns)
         margin_ns = one.error_ns + other.error_ns + 2 * self._oscillator.stamp_ns
         return abs(one.offset_ns - other.offset_ns) <= drift_ns + margin_ns
 
-    def settle(self, line: Line) -> None:
-        """From now on this line, whatever the pairs said."""
+    def replace(self, line: Line) -> None:
+        """Replace the line by this one, and forget all pairs."""
         self._pairs.clear()
         self._against.clear()
         self.line = line

@@ -464,7 +464,7 @@ def _finish(outcome: "Outcome", output: Output) -> int:
 
 def main() -> None:
     """The console script."""
-    interrupts.heed()
+    interrupts.install()
     try:
         code = app(result_action="return_value")
         sys.stdout.flush()

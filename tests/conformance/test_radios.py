@@ -184,9 +184,9 @@ async def test_a_unicast_that_nobody_acknowledges_is_given_up_and_hostile_datagr
             good,
             good,
         ):
-            radio._take(data, here)
-        radio._take(Datagram(DatagramKind.ACK, NodeId(3), NodeId(1), 99).encode(), here)
-        radio._take(Datagram(DatagramKind.ACK, NodeId(3), NodeId(1), 4).encode(), here)  # not the addressee's
+            radio._on_datagram(data, here)
+        radio._on_datagram(Datagram(DatagramKind.ACK, NodeId(3), NodeId(1), 99).encode(), here)
+        radio._on_datagram(Datagram(DatagramKind.ACK, NodeId(3), NodeId(1), 4).encode(), here)  # not the addressee's
         await asyncio.sleep(0.3)
     finally:
         radio.close()
@@ -205,14 +205,14 @@ async def test_one_datagram_does_not_redirect_a_node_s_unicasts_and_only_its_own
     home, elsewhere = ("127.7.0.2", 24562), ("127.7.0.66", 24562)
 
     def hear(seq: int, address: tuple[str, int]) -> None:
-        radio._take(Datagram(DatagramKind.FRAME, NodeId(2), BROADCAST, seq, b"x").encode(), address)
+        radio._on_datagram(Datagram(DatagramKind.FRAME, NodeId(2), BROADCAST, seq, b"x").encode(), address)
 
     async def addresses() -> list[tuple[str, int]]:
         """Where a unicast to node 2 goes that somebody else acknowledges, attempt by attempt."""
         put.clear()
         radio._transmit(request_of(7, at_ms=0, dst=NodeId(2), status=True))
         await asyncio.sleep(0.01)
-        radio._take(Datagram(DatagramKind.ACK, NodeId(2), NodeId(1), 7).encode(), elsewhere)
+        radio._on_datagram(Datagram(DatagramKind.ACK, NodeId(2), NodeId(1), 7).encode(), elsewhere)
         await asyncio.sleep(0.2)
         return [to for _, to in put]
 

@@ -82,7 +82,7 @@ class Network:
             return
         other.clock.pass_time(ended_ns, until_ns=10**13)
         local_ns = other.clock.local_ns(ended_ns)
-        other.sync.hear(NodeId(src), hello, beacon, ended_ns=other.stamp(ended_ns), local_ns=local_ns)
+        other.sync.on_hello(NodeId(src), hello, beacon, ended_ns=other.stamp(ended_ns), local_ns=local_ns)
 
     def errors(self, reference: int = 1) -> dict[int, tuple[int, int | None]]:
         """(true error against the reference's time, bound that the node states), by node."""

@@ -9,12 +9,12 @@ from hypothesis import strategies as st
 from fanet_mw.bus import topics
 from fanet_mw.bus.messages import MavlinkTap, Message, Poses, Report, TraceBatch
 from fanet_mw.bus.radio_control import Restore
-from fanet_mw.hosts.inbox import BOUND, BOUND_BYTES, TURN, Inbox
+from fanet_mw.hosts.inbox import BOUND, BOUND_BYTES, PORTION, Inbox
 
 TAP = topics.encode([MavlinkTap(1, b"x")])
 
 
-def delivered(inbox: Inbox, *, most: int = TURN) -> list[str]:
+def delivered(inbox: Inbox, *, most: int = PORTION) -> list[str]:
     heard: list[str] = []
 
     def receive(topic: str, _message: Message) -> None:
@@ -58,14 +58,14 @@ def test_one_topic_that_floods_leaves_room_for_the_others() -> None:
     for i in range(100):
         inbox.offer(f"calm-{i}", TAP)
     assert inbox.figures()["waiting"] == BOUND // 4 + 100
-    while len(found := delivered(inbox)) == TURN:
+    while len(found := delivered(inbox)) == PORTION:
         pass
     assert found[-1] == "calm-99"
     inbox.offer("flood", TAP)
     assert delivered(inbox) == ["flood"], "its share is free again"
 
 
-def test_more_topics_than_there_can_be_share_one_share() -> None:
+def test_more_topics_than_there_can_be_share_one_quota() -> None:
     inbox = Inbox(bound=100_000)
     for i in range(60_000):
         inbox.offer(f"{i}", TAP)
@@ -74,7 +74,7 @@ def test_more_topics_than_there_can_be_share_one_share() -> None:
         inbox.offer(f"{i % 8000}", TAP)
     assert inbox.figures()["waiting"] == 100_000
     assert inbox.inbox_full == 100_000 - (100_000 - 8192 - 25_000)
-    assert len(inbox._shares) <= 8193
+    assert len(inbox._usages) <= 8193
 
 
 def test_a_put_of_many_messages_is_handed_over_in_turns() -> None:
@@ -82,7 +82,7 @@ def test_a_put_of_many_messages_is_handed_over_in_turns() -> None:
     inbox.offer("a", TAP * 1000)
     inbox.offer("b", TAP)
     turns = [delivered(inbox) for _ in range(4)]
-    assert [len(turn) for turn in turns] == [TURN, TURN, TURN, 1001 - 3 * TURN]
+    assert [len(turn) for turn in turns] == [PORTION, PORTION, PORTION, 1001 - 3 * PORTION]
     assert turns[-1][-1] == "b"
     assert inbox.taken == 2
 
@@ -120,7 +120,7 @@ def test_more_messages_in_a_put_than_anyone_means_are_malformed() -> None:
     inbox.offer("a", topics.encode([Restore("")] * (topics.MAX_ITEMS + 1)))
     heard = 0
     while found := delivered(inbox):
-        assert len(found) <= TURN
+        assert len(found) <= PORTION
         heard += len(found)
     assert heard == topics.MAX_ITEMS
     assert (inbox.taken, inbox.malformed) == (1, 1)

@@ -22,7 +22,7 @@ def said(t_ns: int, hello: int, *, node: int = 1, reference: int = 1, hops: int 
 
 
 def hear(sync: TimeSync, src: int, hello: int, ended_ns: int, beacon: TimeBeacon | None) -> None:
-    sync.hear(NodeId(src), hello, beacon, ended_ns=ended_ns, local_ns=ended_ns)
+    sync.on_hello(NodeId(src), hello, beacon, ended_ns=ended_ns, local_ns=ended_ns)
 
 
 def follow(sync: TimeSync, *, ahead_ns: int, hellos: int, src: int = 1, first: int = 1, **keys: int) -> None:
@@ -110,7 +110,7 @@ def test_a_reference_that_restarts_learns_the_time_and_leads_on() -> None:
     network.members[1] = fresh
     fresh.sync.start(fresh.clock.local_ns(40 * S))
     network.run(75)
-    assert fresh.sync.leading
+    assert fresh.sync.is_reference
     assert abs(network.members[2].swarm_ns(75 * S) - 75 * S - before_ns) < 2 * MS, "not the restarted clock's second"
     assert network.worst_us() < 30
 

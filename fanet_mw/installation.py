@@ -13,7 +13,14 @@ PACKAGES: Final = ("agents", "emulator", "sim")
 """The packages of this distribution besides `fanet_mw`."""
 _MARK: Final = "fanet-mw"
 """What the first lines of each of our packages say."""
-_EXTRAS: Final = {"numpy": "emulator", "numba": "emulator", "pybullet": "pybullet"}
+_EXTRAS: Final = {
+    "numpy": "emulator",
+    "numba": "emulator",
+    "pybullet": "pybullet",
+    "pyarrow": "sweep",
+    "distributed": "dask",
+    "matplotlib": "figures",
+}
 """The extra that brings a module."""
 _REMEDY: Final = (
     "install fanet-mw into an environment of its own: python3 -m venv fanet && fanet/bin/pip install 'fanet-mw[all]'"

@@ -29,6 +29,7 @@ from sim.cli.air import app as air_app
 from sim.cli.completion import ScenarioName
 from sim.cli.console import Console, nobody_reads
 from sim.cli.options import Choice, Join, Output, warn_of, with_engine
+from sim.cli.sweep import sweep
 from sim.results import report
 from sim.run.running import locate, running
 from sim.scenarios import catalog
@@ -47,6 +48,7 @@ app = App(
 app.command(air_app)
 scenario_files.add_to(app)
 app.register_install_completion_command()
+app.command(sweep)
 _err = Console(stderr=True)
 
 

@@ -6,7 +6,6 @@ Children ignore Ctrl-C (the launcher decides), and die with their parent whateve
 import asyncio
 import atexit
 import contextlib
-import ctypes
 import multiprocessing
 import os
 import signal
@@ -18,10 +17,10 @@ from typing import Any, Final, NamedTuple
 
 from fanet_mw.errors import FanetError, HostError
 from fanet_mw.hosts.service import BUS_EXIT_CODE
+from sim.run.children import die_with_parent
 from sim.run.process_title import entitle
 
 _PRELOAD: Final = ["agents.__main__", "emulator.__main__", "sim.world.__main__"]
-_PR_SET_PDEATHSIG: Final = 1
 _BLOCKED: Final = (signal.SIGINT, signal.SIGTERM)
 Entry = Callable[..., int]
 
@@ -41,8 +40,7 @@ def _child(recipe: Recipe) -> None:
     """What a child does first and last; runs in the child."""
     signal.signal(signal.SIGINT, signal.SIG_IGN)
     signal.pthread_sigmask(signal.SIG_UNBLOCK, _BLOCKED)  # the launcher's SIGTERM ends it
-    if sys.platform == "linux":
-        ctypes.CDLL(None).prctl(_PR_SET_PDEATHSIG, signal.SIGKILL)
+    die_with_parent()
     entitle(recipe.name, recipe.title)
     try:
         os.nice(recipe.nice)

@@ -1,0 +1,236 @@
+"""`fanet sweep`: many runs, validated before the first, kept as they end."""
+
+import contextlib
+import json as json_module
+import os
+import sys
+import time
+from collections.abc import Callable, Iterator
+from pathlib import Path
+from typing import TYPE_CHECKING, Annotated, Final
+
+from cyclopts import Parameter
+from cyclopts.validators import Number
+from rich.progress import BarColumn, TextColumn
+from rich.progress import Progress as Bar
+
+from fanet_mw.errors import ConfigError
+from sim.cli.console import Console
+from sim.sweep import spec
+from sim.sweep.spec import Sweep
+from sim.sweep.toml_values import axis
+
+if TYPE_CHECKING:
+    from pyarrow import Table
+
+    from sim.sweep.run import Plan, Progress, Workers
+    from sim.sweep.store import Store
+
+_err = Console(stderr=True)
+_SAY_S: Final = 20.0
+"""How often progress is said where nobody watches a bar."""
+
+
+def sweep(
+    what: str,
+    *,
+    set: Annotated[tuple[str, ...], Parameter(name="--set", negative="")] = (),  # noqa: A002
+    seeds: Annotated[int | None, Parameter(validator=Number(gte=1))] = None,
+    variant: str | None = None,
+    out: Path | None = None,
+    jobs: Annotated[int | None, Parameter(validator=Number(gte=1))] = None,
+    scheduler: str | None = None,
+    retry: Annotated[bool, Parameter(negative="")] = False,
+    dry_run: Annotated[bool, Parameter(negative="")] = False,
+    json: Annotated[bool, Parameter(negative="")] = False,
+) -> int:
+    """Run a scenario many times in virtual time, with settings and seeds, and make a table of it.
+
+    Exit code 0: every run is in the table; 1: some failed; 2: the sweep or a flag is wrong.
+
+    Parameters
+    ----------
+    what
+        A sweep file (TOML with a `base`), a shipped sweep, or a scenario.
+    set
+        Scenario key and its value, or its values in turn: KEY=A,B,C; repeatable. Every combination is run.
+    seeds
+        Run every setting with seeds 1 to so many.
+    variant
+        `quick` or `full`, where the sweep has it.
+    out
+        Folder for runs.parquet; by default sweeps/NAME. Runs that are finished there are not repeated.
+    jobs
+        Processes of this machine; by default one per core.
+    scheduler
+        A Dask scheduler, for example tcp://10.0.0.1:8786, whose workers carry out the runs.
+    retry
+        Repeat runs that failed.
+    dry_run
+        Validate, count, estimate, and stop.
+    json
+        Print what came out as JSON, on standard output.
+
+    """
+    name, wanted = asked(what, set, seeds, variant)
+    return carry_out(
+        name, wanted, out=out or Path("sweeps") / name, jobs=jobs, scheduler=scheduler, retry=retry, dry_run=dry_run,
+        json=json,
+    )  # fmt: skip
+
+
+def carry_out(
+    name: str,
+    wanted: Sweep,
+    *,
+    out: Path,
+    jobs: int | None,
+    scheduler: str | None,
+    retry: bool = False,
+    dry_run: bool = False,
+    json: bool = False,
+) -> int:
+    """Plan a sweep, say what it will take, and carry it out."""
+    from sim.sweep.run import Plan, run
+    from sim.sweep.store import TABLE, Store
+    from sim.sweep.tasks import tasks_of
+
+    tasks = tasks_of(wanted)
+    store = Store(out)
+    with store.alone():
+        store.read()
+        plan = Plan(tasks, store, retry=retry)
+        workers = _workers(jobs, scheduler, plan, dry_run=dry_run)
+        _say(_announcement(name, wanted, plan, workers.workers))
+        _warn_of_codes(store, plan)
+        if dry_run:
+            return 0
+        if plan.todo:
+            _compile()
+        began = time.monotonic()
+        with _progress(name, quiet=json) as tell:
+            try:
+                table = run(plan, store, workers, wanted.varied(), on_progress=tell)
+            except KeyboardInterrupt:
+                _say(f"interrupted: what is finished is kept in {out}; the same command goes on from there")
+                raise
+    statuses = table.column("status").to_pylist()
+    failed = statuses.count("failed")
+    if json:
+        answer = {"table": str(out / TABLE), "rows": len(statuses), "failed": failed, "ran": len(plan.todo)}
+        sys.stdout.write(f"{json_module.dumps(answer)}\n")
+    else:
+        took = time.monotonic() - began
+        Console().print(f"{len(statuses)} rows in {out / TABLE}, {len(plan.todo)} of them new, in {took:.0f} s",
+                        highlight=False, soft_wrap=True)  # fmt: skip
+    if failed:
+        _say_failures(table)
+    return 1 if failed else 0
+
+
+def asked(what: str, sets: tuple[str, ...], seeds: int | None, variant: str | None) -> tuple[str, Sweep]:
+    """The sweep that is meant, and its name."""
+    name = Path(what).stem
+    if spec.is_sweep(what):
+        found = spec.find(what).variant(variant)
+    elif variant is not None:
+        raise ConfigError(f"--variant {variant}: {what} is a scenario; only a sweep file has variants")
+    else:
+        found = Sweep(base=what)
+    axes = dict(axis(text) for text in sets)
+    fixed = {key: values[0] for key, values in axes.items() if len(values) == 1}
+    grid = {key: values for key, values in axes.items() if len(values) > 1}
+    kept = {key: values for key, values in found.grid.items() if key not in fixed}
+    found = found.model_copy(update={"set": {**found.set, **fixed}, "grid": {**kept, **grid}})
+    return name, found if seeds is None else found.model_copy(update={"seeds": seeds})
+
+
+def _workers(jobs: int | None, scheduler: str | None, plan: "Plan", *, dry_run: bool) -> "Workers":
+    if scheduler is None or dry_run:
+        from sim.sweep.pool import Pool
+
+        cores = len(os.sched_getaffinity(0))
+        return Pool(max(1, min(jobs or cores, len(plan.todo))))
+    from sim.sweep.cluster import Cluster
+
+    return Cluster(scheduler)
+
+
+def _announcement(name: str, wanted: Sweep, plan: "Plan", workers: int) -> str:
+    settings = plan.total // max(1, len(wanted.seed_list()))
+    text = f"{name}: {plan.total} runs ({settings} settings x {len(wanted.seed_list())} seeds)"
+    if len(plan.todo) < plan.total:
+        text += f", {plan.total - len(plan.todo)} finished before"
+    if not plan.todo:
+        return f"{text}; nothing to do"
+    from sim.sweep.cost import spoken
+
+    return f"{text}; about {spoken(plan.seconds(workers))} with {workers} processes"
+
+
+def _warn_of_codes(store: "Store", plan: "Plan") -> None:
+    from sim.sweep.provenance import code
+
+    others = {done.code for task in plan.tasks if (done := store.get(task.key)) is not None} - {code()}
+    if others:
+        _say(
+            f"[bold]finished runs are of other code ({', '.join(sorted(others))}; this is {code()}): "
+            "the column `code` tells; choose another --out to have all anew[/]"
+        )
+
+
+def _compile() -> None:
+    """Compile the kernel once, before workers do so each for itself."""
+    from emulator.kernel.compile import WORD, must_compile, warm_up
+
+    if must_compile():
+        _say(WORD)
+        warm_up()
+
+
+def _say(text: str) -> None:
+    _err.print(text, highlight=False, soft_wrap=True)
+
+
+def _say_failures(table: "Table") -> None:
+    rows = [row for row in table.select(["status", "error", "command"]).to_pylist() if row["status"] == "failed"]
+    _say(f"[bold red]{len(rows)} runs failed[/]:")
+    for row in rows[:5]:
+        _err.print(
+            f"  {row['error'].splitlines()[0]}\n    {row['command']}", markup=False, highlight=False, soft_wrap=True
+        )
+
+
+@contextlib.contextmanager
+def _progress(name: str, *, quiet: bool) -> "Iterator[Callable[[Progress], None]]":
+    """A bar when a person watches, else a line now and then."""
+    from sim.sweep.cost import spoken
+
+    if quiet:
+        yield lambda _: None
+        return
+    if not _err.is_terminal:
+        said = time.monotonic()
+
+        def line(at: "Progress") -> None:
+            nonlocal said
+            if time.monotonic() - said >= _SAY_S and at.done < at.total:
+                said = time.monotonic()
+                _say(f"{name}: {at.done} of {at.total} runs, about {spoken(at.left_s)} left{_failures(at)}")
+
+        yield line
+        return
+    columns = (TextColumn("{task.description}"), BarColumn(), TextColumn("{task.completed}/{task.total}"),
+               TextColumn("{task.fields[left]}"))  # fmt: skip
+    with Bar(*columns, console=_err, transient=True) as bar:
+        shown = bar.add_task(name, total=None, left="")
+
+        def renew(at: "Progress") -> None:
+            left = f"about {spoken(at.left_s)} left{_failures(at)}"
+            bar.update(shown, completed=at.done, total=at.total, left=left)
+
+        yield renew
+
+
+def _failures(at: "Progress") -> str:
+    return f", {at.failed} failed" if at.failed else ""

@@ -1,0 +1,65 @@
+"""The finished runs of a sweep, looked up by case and settings: one value per seed, in the order of the seeds."""
+
+from collections.abc import Callable, Mapping, Sequence
+from typing import Any
+
+from pyarrow import Table
+
+from sim.figures.statistics import Interval, interval
+
+Row = Mapping[str, Any]
+Quantity = str | Callable[[Row], float]
+"""A column, or a function of a row."""
+
+
+class Runs:
+    """The rows of a table; failed runs are in none of its figures."""
+
+    def __init__(self, table: Table) -> None:
+        rows = table.drop_columns([name for name in ("scenario", "summary") if name in table.column_names]).to_pylist()
+        self.rows: list[Row] = [row for row in rows if row["status"] == "ok"]
+        self.failed = len(rows) - len(self.rows)
+
+    def where(self, **settings: object) -> list[Row]:
+        """Rows with these settings; `case` is one of them, a dot in a key is written `__`."""
+        wanted = {key.replace("__", "."): value for key, value in settings.items()}
+        return [row for row in self.rows if all(row.get(key) == value for key, value in wanted.items())]
+
+    def per_seed(self, quantity: Quantity, **settings: object) -> dict[int, float]:
+        """The quantity of each seed, in their order; runs in which it is undefined are left out."""
+        found: dict[int, float] = {}
+        for row in sorted(self.where(**settings), key=lambda row: row["seed"]):
+            value = row.get(quantity) if isinstance(quantity, str) else quantity(row)
+            if value is not None:
+                found[row["seed"]] = float(value)
+        return found
+
+    def of(self, quantity: Quantity, **settings: object) -> Interval:
+        """Mean and interval over the seeds."""
+        return interval(list(self.per_seed(quantity, **settings).values()))
+
+    def levels(self, key: str, **settings: object) -> list[Any]:
+        """The values of a setting that occur, ascending."""
+        return sorted({row[key] for row in self.where(**settings) if row[key] is not None})
+
+
+def differences(left: Mapping[int, float], right: Mapping[int, float]) -> list[float]:
+    """Left minus right of every seed that both have: common random numbers make it a difference of pairs."""
+    return [left[seed] - right[seed] for seed in left if seed in right]
+
+
+def pooled(*many: Mapping[int, float]) -> dict[int, float]:
+    """The mean of several quantities, seed by seed: one value per seed, so that seeds stay the independent units."""
+    seeds = [seed for seed in many[0] if all(seed in other for other in many)] if many else []
+    return {seed: sum(one[seed] for one in many) / len(many) for seed in seeds}
+
+
+def best(*many: Mapping[int, float]) -> dict[int, float]:
+    """The greatest of several quantities, seed by seed."""
+    seeds = [seed for seed in many[0] if all(seed in other for other in many)] if many else []
+    return {seed: max(one[seed] for one in many) for seed in seeds}
+
+
+def as_column(levels: Sequence[object]) -> list[str]:
+    """Numbers as an axis has them."""
+    return [f"{level:g}" if isinstance(level, int | float) else str(level) for level in levels]

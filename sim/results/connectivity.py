@@ -1,0 +1,40 @@
+"""What geometry allows: which nodes a multi-hop path connects, on the ideal track of the mobility model.
+
+No protocol that delivers at once can exceed it; one that carries packets for a while can.
+"""
+
+import numpy as np
+import numpy.typing as npt
+
+from agents.traffic import sources_of, targets_of
+from fanet_mw.scenario.model import Scenario
+from fanet_mw.units import S
+from sim.world.engine import Rows
+from sim.world.guidance import Guidance
+from sim.world.layout import positions
+
+
+def parts(places: Rows, range_m: float) -> npt.NDArray[np.int64]:
+    """Of each node the number of its connected part; equal numbers are connected over links of `range_m`."""
+    linked = np.linalg.norm(places[:, None] - places[None], axis=2) <= range_m
+    part = np.arange(len(places))
+    while True:
+        lower = np.where(linked, part[None], len(places)).min(axis=1)
+        if (lower == part).all():
+            return part
+        part = lower
+
+
+def connectivity(scenario: Scenario) -> float:
+    """The share of (source, target, second of the measured window) with a multi-hop path of `radio.range_m` links."""
+    guidance = Guidance(np.array(positions(scenario), dtype=np.float64), scenario)
+    first_ns, end_ns = scenario.traffic_window_ns
+    pairs = [(source, target) for source in sources_of(scenario) for target in targets_of(scenario, source)]
+    if not pairs:
+        return 0.0
+    sources, targets = np.array(pairs).T - 1
+    shares = []
+    for t_s in range(first_ns // S, max(end_ns // S, first_ns // S + 1)):
+        part = parts(guidance.track(float(t_s)).places, scenario.radio.range_m)
+        shares.append(float((part[sources] == part[targets]).mean()))
+    return float(np.mean(shares))

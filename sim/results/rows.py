@@ -1,0 +1,24 @@
+"""The figures of a summary as one flat row: `delay_ms.p95` and the like."""
+
+from collections.abc import Mapping
+from typing import Any
+
+Cell = float | bool | str | list[float] | None
+
+
+def flat(summary: Mapping[str, Any], prefix: str = "") -> dict[str, Cell]:
+    """Every number, truth and text of a summary under its dotted name, and lists of numbers; no other lists."""
+    row: dict[str, Cell] = {}
+    for key, value in summary.items():
+        name = f"{prefix}{key}"
+        match value:
+            case Mapping():
+                row.update(flat(value, f"{name}."))
+            case list():
+                if value and all(isinstance(item, int | float) for item in value):
+                    row[name] = [float(item) for item in value]
+            case bool() | str() | None:
+                row[name] = value
+            case int() | float():
+                row[name] = float(value)
+    return row

@@ -1,0 +1,52 @@
+"""One run of a sweep, in whatever process it is handed to: it returns what the run came to, and never raises."""
+
+import json
+import time
+import traceback
+from dataclasses import dataclass
+
+from fanet_mw.errors import FanetError
+from fanet_mw.scenario import config
+from sim.results.files import finish
+from sim.run.virtual import simulate
+from sim.sweep.measures import MEASURES, Value
+from sim.sweep.provenance import code
+from sim.sweep.tasks import Task
+
+
+@dataclass(frozen=True, slots=True)
+class Finished:
+    """What one run came to. `wall_s` depends on the machine; nothing else does."""
+
+    key: str
+    code: str
+    wall_s: float
+    summary: str | None = None
+    """The summary as JSON, without what depends on the machine; None: the run failed."""
+    measured: str = "{}"
+    """What was measured besides, as JSON."""
+    error: str | None = None
+    """Why there is no summary: the last line of the traceback, and below it the whole."""
+
+    @property
+    def failed(self) -> bool:
+        return self.summary is None
+
+
+def carry_out(task: Task) -> Finished:
+    """Simulate, summarize and measure one run."""
+    began = time.perf_counter()
+    try:
+        scenario = config.build(task.tree)
+        outcome = simulate(scenario)
+        summary = finish(outcome, out=None)
+        del summary["wall_s"], summary["unwritten"]
+        measured: dict[str, Value] = {name: MEASURES[name](outcome) for name in task.measure}
+    except Exception as error:  # noqa: BLE001 one run of many: the others go on, and the table names this one
+        lines = error.args[0] if isinstance(error, FanetError) and error.args else traceback.format_exc()
+        return Finished(
+            task.key, code(), time.perf_counter() - began, error=f"{type(error).__name__}: {error}\n{lines}"
+        )
+    return Finished(
+        task.key, code(), time.perf_counter() - began, summary=json.dumps(summary), measured=json.dumps(measured)
+    )

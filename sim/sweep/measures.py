@@ -1,0 +1,76 @@
+"""What a run of a sweep can measure besides its summary. Each is a function of the outcome to a column's value."""
+
+import math
+from collections.abc import Callable, Iterable, Mapping
+from typing import Final
+
+import numpy as np
+
+from fanet_mw.errors import ConfigError
+from fanet_mw.trace import Approaching, Detected
+from fanet_mw.units import S
+from sim.results.connectivity import connectivity
+from sim.results.packets import packets_of
+from sim.run.outcome import Outcome
+
+Value = float | list[float] | None
+_LEAST_S: Final = 1e-3
+_PER_DECADE: Final = 40
+_DECADES: Final = 6
+DELAY_EDGES_S: Final = tuple(
+    _LEAST_S * math.pow(10.0, step / _PER_DECADE) for step in range(_PER_DECADE * _DECADES + 1)
+)
+"""Upper edges of the classes of `delay_counts`: 40 a decade from 1 ms to 1,000 s; the first holds all that is less."""
+
+
+def delay_counts(outcome: Outcome) -> list[float]:
+    """Deliveries of application packets by delay: one count per edge of `DELAY_EDGES_S`, and one for all beyond."""
+    delays_s = (
+        np.asarray([record.delay_ns for record in packets_of(outcome)["traffic"].deliveries], dtype=np.float64) / S
+    )
+    counts = np.bincount(np.searchsorted(DELAY_EDGES_S, delays_s), minlength=len(DELAY_EDGES_S) + 1)
+    return [float(count) for count in counts]
+
+
+def wanted(outcome: Outcome) -> float:
+    """Packets times the nodes that each was meant for: what `delay_counts` would sum up to if nothing were lost."""
+    return float(packets_of(outcome)["traffic"].wanted)
+
+
+def connected(outcome: Outcome) -> float:
+    """The share of (source, target) pairs that a multi-hop path connected, on average over the measured window."""
+    return connectivity(outcome.scenario)
+
+
+def first_detected_s(outcome: Outcome) -> list[float]:
+    """Of each UAV that heard a survivor's phone: when it first did [s]."""
+    return _first_of_each(outcome, Detected)
+
+
+def first_approach_s(outcome: Outcome) -> list[float]:
+    """Of each UAV that changed course towards a survivor: when it first did [s]."""
+    return _first_of_each(outcome, Approaching)
+
+
+def _first_of_each(outcome: Outcome, kind: type[Approaching] | type[Detected]) -> list[float]:
+    first: dict[int, int] = {}
+    for record in outcome.records:
+        if isinstance(record, kind):
+            first.setdefault(record.node, record.t_ns)
+    return sorted(t_ns / S for t_ns in first.values())
+
+
+MEASURES: Final[Mapping[str, Callable[[Outcome], Value]]] = {
+    "delay_counts": delay_counts,
+    "wanted": wanted,
+    "connected": connected,
+    "first_detected_s": first_detected_s,
+    "first_approach_s": first_approach_s,
+}
+
+
+def check(names: Iterable[str]) -> None:
+    """Raise ConfigError for a measure that there is not."""
+    for name in names:
+        if name not in MEASURES:
+            raise ConfigError(f"measure = {name!r}: must be one of {', '.join(MEASURES)}")

@@ -1,0 +1,124 @@
+"""The processes of this machine that carry out runs, one run at a time each.
+
+A worker that dies takes its run with it: the run is handed to a new worker once more, and is a failed one when that
+dies too. Workers die with the process that started them, whatever kills it.
+"""
+
+import multiprocessing
+import signal
+from collections import deque
+from collections.abc import Iterator, Sequence
+from dataclasses import dataclass
+from multiprocessing.connection import Connection, wait
+from multiprocessing.context import SpawnProcess
+from typing import Final
+
+from sim.run.children import die_with_parent
+from sim.sweep.execution import Finished, carry_out
+from sim.sweep.provenance import code
+from sim.sweep.tasks import Task
+
+_LIVES: Final = 2
+"""A run that has killed so many workers is not tried again."""
+
+
+def _work(tasks: Connection) -> None:
+    """The whole life of a worker: a task in, what it came to out, until the other end is closed."""
+    signal.signal(signal.SIGINT, signal.SIG_IGN)  # the sweep hears it, and ends its workers
+    signal.signal(signal.SIGTERM, signal.SIG_DFL)
+    die_with_parent()
+    while True:
+        try:
+            task: Task = tasks.recv()
+        except EOFError:
+            return
+        tasks.send(carry_out(task))
+
+
+@dataclass(slots=True)
+class _Worker:
+    process: SpawnProcess
+    tasks: Connection
+    task: Task | None = None
+
+
+class Pool:
+    """A fixed number of workers."""
+
+    def __init__(self, workers: int) -> None:
+        self.workers = workers
+        self._context = multiprocessing.get_context("spawn")
+        self._running: list[_Worker] = []
+
+    def carry_out(self, tasks: Sequence[Task]) -> Iterator[Finished]:
+        """What each task came to, in the order in which they end."""
+        waiting = deque(tasks)
+        deaths: dict[str, int] = {}
+        try:
+            while waiting or any(worker.task for worker in self._running):
+                self._hand_out(waiting)
+                for worker in self._ready():
+                    task = worker.task
+                    assert task is not None, "only a worker that has a task is waited for"
+                    try:
+                        done: Finished = worker.tasks.recv()
+                    except (EOFError, OSError):
+                        exit_code = self._bury(worker)
+                        deaths[task.key] = deaths.get(task.key, 0) + 1
+                        if deaths[task.key] < _LIVES:
+                            waiting.appendleft(task)
+                        else:
+                            yield Finished(task.key, code(), 0.0, error=_last_words(exit_code))
+                        continue
+                    worker.task = None
+                    yield done
+        finally:
+            self.close()
+
+    def _hand_out(self, waiting: deque[Task]) -> None:
+        """Give every idle worker a task, and start workers while there are too few."""
+        while waiting:
+            idle = next((worker for worker in self._running if worker.task is None), None)
+            if idle is None:
+                if len(self._running) >= self.workers:
+                    return
+                idle = self._start()
+            try:
+                idle.tasks.send(waiting[0])
+            except OSError:  # it died idle
+                self._bury(idle)
+                continue
+            idle.task = waiting.popleft()
+
+    def _start(self) -> _Worker:
+        ours, theirs = self._context.Pipe()
+        process = self._context.Process(target=_work, args=(theirs,), name="fanet sweep", daemon=True)
+        process.start()
+        theirs.close()
+        worker = _Worker(process, ours)
+        self._running.append(worker)
+        return worker
+
+    def _ready(self) -> list[_Worker]:
+        """Workers that have something to say, or have died; waits for the first."""
+        busy = {worker.tasks: worker for worker in self._running if worker.task is not None}
+        return [busy[end] for end in wait(list(busy)) if isinstance(end, Connection)]
+
+    def _bury(self, worker: _Worker) -> int:
+        """Forget a worker that is dead; returns its exit code."""
+        self._running.remove(worker)
+        worker.tasks.close()
+        worker.process.join()
+        return worker.process.exitcode or 0
+
+    def close(self) -> None:
+        """End every worker, whatever it is at."""
+        for worker in self._running:
+            worker.process.terminate()
+        for worker in list(self._running):
+            self._bury(worker)
+
+
+def _last_words(exit_code: int) -> str:
+    how = f"signal {signal.Signals(-exit_code).name}" if exit_code < 0 else f"exit code {exit_code}"
+    return f"the process that ran it died with {how}, {_LIVES} times"

@@ -1,0 +1,92 @@
+"""Carrying a sweep out: what is finished already is not repeated, and what ends is kept at once."""
+
+import time
+from collections.abc import Callable, Iterator, Sequence
+from dataclasses import dataclass
+from typing import Final, Protocol
+
+import pyarrow as pa
+
+from fanet_mw.scenario import config
+from sim.sweep.cost import TimeLeft, guess_s
+from sim.sweep.execution import Finished
+from sim.sweep.store import Store
+from sim.sweep.tasks import Task
+
+_PUBLISH_S: Final = 15.0
+"""The table for people is written anew this often while runs end."""
+
+
+class Workers(Protocol):
+    """Whoever carries out runs: processes of this machine, or a cluster."""
+
+    workers: int
+
+    def carry_out(self, tasks: Sequence[Task]) -> Iterator[Finished]: ...
+
+
+@dataclass(frozen=True, slots=True)
+class Progress:
+    """How far a sweep has come."""
+
+    done: int
+    total: int
+    failed: int
+    left_s: float
+
+
+class Plan:
+    """The runs of a sweep, and which of them are still to do."""
+
+    def __init__(self, tasks: Sequence[Task], store: Store, *, retry: bool = False) -> None:
+        self.tasks = tasks
+        distinct = {task.key: task for task in tasks}
+        self.total = len(distinct)
+        self.todo = [task for key, task in distinct.items() if _wanted(store.get(key), retry=retry)]
+        self.guesses_s = {task.key: guess_s(config.build(task.tree)) for task in self.todo}
+
+    def seconds(self, workers: int) -> float:
+        """How long it will take, about."""
+        return TimeLeft(self.guesses_s.values(), workers=workers).seconds()
+
+
+def _wanted(done: Finished | None, *, retry: bool) -> bool:
+    return done is None or (retry and done.failed)
+
+
+def run(
+    plan: Plan,
+    store: Store,
+    workers: Workers,
+    varied: Sequence[str],
+    *,
+    on_progress: Callable[[Progress], None] = lambda _: None,
+) -> pa.Table:
+    """Carry out what is to do, the longest runs first, and return the table.
+
+    However it ends, the table has been written with what is finished.
+    """
+    left = TimeLeft(plan.guesses_s.values(), workers=workers.workers)
+    todo = sorted(plan.todo, key=lambda task: -plan.guesses_s[task.key])
+    waiting = {task.key for task in todo}
+    failed = sum(
+        1
+        for task in plan.tasks
+        if task.key not in waiting and (done := store.get(task.key)) is not None and done.failed
+    )
+    count = plan.total - len(todo)
+    on_progress(Progress(count, plan.total, failed, left.seconds()))
+    published = time.monotonic()
+    try:
+        for done in workers.carry_out(todo) if todo else ():
+            store.add(done)
+            count += 1
+            failed += done.failed
+            left.done(plan.guesses_s[done.key], done.wall_s)
+            on_progress(Progress(count, plan.total, failed, left.seconds()))
+            if time.monotonic() - published > _PUBLISH_S:
+                store.publish(plan.tasks, varied)
+                published = time.monotonic()
+    finally:
+        table = store.publish(plan.tasks, varied)
+    return table

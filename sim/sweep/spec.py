@@ -1,0 +1,211 @@
+"""The sweep file: a base scenario, what is changed in all runs, what is varied, and the seeds.
+
+    base = "flooding"
+    seeds = 10                          # seeds 1 to 10; or a list
+    [set]                               # in every run
+    traffic.interval_s = 1
+    [grid]                              # every combination
+    traffic.sources = [1, 10, 44]
+    [[case]]                            # each with the whole grid; a case may have [case.grid] of its own
+    name = "flooding"
+    set.routing.protocol = "flooding"
+    [quick]                             # a variant replaces what it names
+    seeds = 2
+
+Keys are those of a scenario, written as tables or quoted with dots. Every run of a sweep has the same seeds in all its
+settings, and a seed draws the same places, births and losses whatever else is set: differences between settings are
+differences of pairs (common random numbers).
+"""
+
+import itertools
+import tomllib
+from collections.abc import Iterator, Mapping, Sequence
+from importlib.resources import files
+from pathlib import Path
+from typing import Annotated, Any, Final
+
+from pydantic import BaseModel, BeforeValidator, ConfigDict, Field, ValidationError
+
+from fanet_mw.errors import ConfigError
+from sim.sweep.toml_values import toml_value
+
+MOST_RUNS: Final = 100_000
+"""More runs than this are taken for a mistake in the file."""
+_Tree = Mapping[str, Any]
+
+
+def flattened(tree: object) -> object:
+    """Nested tables as dotted keys; a table is never a value of a scenario key."""
+    if not isinstance(tree, Mapping):
+        return tree
+    flat: dict[str, Any] = {}
+    for key, value in tree.items():
+        if isinstance(value, Mapping):
+            inner = flattened(value)
+            assert isinstance(inner, Mapping), "a table stays one"
+            flat.update({f"{key}.{rest}": leaf for rest, leaf in inner.items()})
+        else:
+            flat[str(key)] = value
+    return flat
+
+
+Changes = Annotated[dict[str, Any], BeforeValidator(flattened)]
+"""Scenario keys and the value of each."""
+Axes = Annotated[dict[str, Annotated[list[Any], Field(min_length=1)]], BeforeValidator(flattened)]
+"""Scenario keys and the values that each takes in turn."""
+Seeds = Annotated[int, Field(ge=1, le=10_000)] | Annotated[list[Annotated[int, Field(ge=0)]], Field(min_length=1)]
+
+
+class _Table(BaseModel):
+    model_config = ConfigDict(frozen=True, extra="forbid")
+
+
+class Case(_Table):
+    """Settings with a name: what is drawn as one line of a figure, mostly."""
+
+    name: Annotated[str, Field(min_length=1, max_length=64)]
+    set: Changes = {}
+    grid: Axes = {}
+
+
+class Variant(_Table):
+    """What a variant of the sweep replaces: the seeds, single keys of `set`, single axes of the grid, the cases."""
+
+    seeds: Seeds | None = None
+    set: Changes = {}
+    grid: Axes = {}
+    cases: Annotated[tuple[str, ...] | None, Field(min_length=1)] = None
+    """The names of the cases that are run; by default all."""
+
+
+class Setting(_Table):
+    """One point of a sweep: the case it belongs to and every scenario key that differs from the base."""
+
+    case: str
+    changes: dict[str, Any]
+
+    def overrides(self) -> list[str]:
+        """The changes as `--set` wants them."""
+        return [f"{key}={toml_value(value)}" for key, value in self.changes.items()]
+
+
+class Sweep(_Table):
+    """A sweep as its file has it."""
+
+    description: str = ""
+    base: str
+    """A shipped scenario, or a .toml file beside the sweep's own."""
+    seeds: Seeds = 1
+    set: Changes = {}
+    grid: Axes = {}
+    case: tuple[Case, ...] = ()
+    measure: tuple[str, ...] = ()
+    """What is measured besides the summary; see `sim/sweep/measures.py`."""
+    quick: Variant | None = None
+    full: Variant | None = None
+
+    def variant(self, name: str | None) -> "Sweep":
+        """The sweep with what the variant replaces; None: as it stands."""
+        if name is None:
+            return self
+        chosen = getattr(self, name, None) if name in VARIANTS else None
+        if not isinstance(chosen, Variant):
+            has = [known for known in VARIANTS if getattr(self, known) is not None]
+            raise ConfigError(f"--variant {name}: the sweep has {' and '.join(has) or 'no variants'}")
+        cases = self.case
+        if chosen.cases is not None:
+            unknown = set(chosen.cases) - {case.name for case in self.case}
+            if unknown:
+                raise ConfigError(f"{name}.cases: no case is called {', '.join(sorted(unknown))}")
+            cases = tuple(case for case in self.case if case.name in chosen.cases)
+        return self.model_copy(
+            update={
+                "seeds": self.seeds if chosen.seeds is None else chosen.seeds,
+                "set": {**self.set, **chosen.set},
+                "grid": {**self.grid, **chosen.grid},
+                "case": cases,
+            }
+        )
+
+    def seed_list(self) -> Sequence[int]:
+        """The seeds in order, each once."""
+        return range(1, self.seeds + 1) if isinstance(self.seeds, int) else list(dict.fromkeys(self.seeds))
+
+    def varied(self) -> list[str]:
+        """Every scenario key that an axis or a case sets, in order: the columns that tell runs apart."""
+        keys = [key for case in self.case for key in case.set]
+        keys += [key for grid in (self.grid, *(case.grid for case in self.case)) for key in grid]
+        return list(dict.fromkeys(keys))
+
+    def settings(self) -> Iterator[Setting]:
+        """Every point of the sweep; the last axis changes fastest."""
+        for case in self.case or (Case(name="-"),):
+            axes = {**self.grid, **case.grid}
+            for values in itertools.product(*axes.values()):
+                yield Setting(case=case.name, changes={**self.set, **case.set, **dict(zip(axes, values, strict=True))})
+
+    def count(self) -> int:
+        """How many runs there are."""
+        points = sum(1 for _ in itertools.islice(self.settings(), MOST_RUNS + 1))
+        return points * len(self.seed_list())
+
+
+VARIANTS: Final = ("quick", "full")
+
+
+def shipped() -> list[str]:
+    """The names of the shipped sweeps."""
+    return sorted(
+        item.name.removesuffix(".toml") for item in files("sim.sweeps").iterdir() if item.name.endswith(".toml")
+    )
+
+
+def find(name: str) -> Sweep:
+    """The sweep of a file (anything with a slash or ending in .toml), else the shipped one of that name."""
+    if not (name.endswith(".toml") or "/" in name):
+        if name not in shipped():
+            raise ConfigError(f"unknown sweep {name!r}; shipped: {', '.join(shipped())}; or give a .toml file")
+        return parse(files("sim.sweeps").joinpath(f"{name}.toml").read_text(encoding="utf-8"), source=f"sweep {name}")
+    path = Path(name)
+    try:
+        text = path.read_text(encoding="utf-8")
+    except (OSError, UnicodeDecodeError) as error:
+        raise ConfigError(f"{path}: cannot be read: {getattr(error, 'strerror', None) or error}") from error
+    sweep = parse(text, source=str(path))
+    if sweep.base.endswith(".toml") and not Path(sweep.base).is_absolute():
+        return sweep.model_copy(update={"base": str(path.parent / sweep.base)})
+    return sweep
+
+
+def is_sweep(name: str) -> bool:
+    """True for a shipped sweep and for a file that has a `base`; a scenario has none."""
+    if not (name.endswith(".toml") or "/" in name):
+        return name in shipped()
+    try:
+        return "base" in tomllib.loads(Path(name).read_text(encoding="utf-8"))
+    except (OSError, UnicodeDecodeError, tomllib.TOMLDecodeError):
+        return False
+
+
+def parse(text: str, *, source: str) -> Sweep:
+    """The sweep of some TOML text; raises ConfigError with every mistake."""
+    try:
+        tree = tomllib.loads(text)
+    except tomllib.TOMLDecodeError as error:
+        raise ConfigError(f"{source}: not valid TOML: {error}") from error
+    try:
+        return Sweep.model_validate(tree)
+    except ValidationError as error:
+        lines = dict.fromkeys(_sentence(dict(item)) for item in error.errors())
+        raise ConfigError("\n".join(f"{source}: {line}" for line in lines)) from error
+
+
+def _sentence(item: Mapping[str, Any]) -> str:
+    """One mistake as `key = value: bound`."""
+    key = ".".join(str(part) for part in item["loc"] if part not in {"int", "list[constrained-int]"})
+    if item["type"] == "extra_forbidden":
+        return f"{key}: unknown key; known keys: {', '.join(Sweep.model_fields)}"
+    if item["type"] == "missing":
+        return f"{key}: is missing"
+    message = str(item["msg"])
+    return f"{key} = {item['input']!r}: {message[0].lower()}{message[1:]}"

@@ -1,0 +1,122 @@
+"""The folder of a sweep: what every finished run came to, kept so that a crash loses only what was running.
+
+    DIR/finished/*.parquet   one row per finished run, under its key; each file is written whole, then renamed
+    DIR/runs.parquet         the table for people: a row per run of the sweep, in its order, with settings and figures
+
+A finished run is found again by its key, which is made of its resolved scenario: a sweep that has grown, or another
+one in the same folder, repeats nothing. `runs.parquet` holds nothing that depends on the machine or on the order of
+runs: the same sweep by the same code is the same table.
+"""
+
+import contextlib
+import fcntl
+import os
+import tempfile
+from collections.abc import Iterable, Iterator, Sequence
+from dataclasses import asdict, fields
+from pathlib import Path
+from typing import Final
+
+import pyarrow as pa
+import pyarrow.parquet as pq
+
+from fanet_mw.errors import ConfigError
+from sim.sweep.execution import Finished
+from sim.sweep.table import table_of
+from sim.sweep.tasks import Task
+
+TABLE: Final = "runs.parquet"
+_SCHEMA: Final = pa.schema(
+    [
+        (field.name, pa.float64() if field.name == "wall_s" else pa.string())
+        for field in fields(Finished)
+    ]
+)  # fmt: skip
+_MERGE_AT: Final = 200
+"""So many files of single runs are made one: a folder of thousands is slow to read."""
+
+
+class Store:
+    """The finished runs of one folder."""
+
+    def __init__(self, folder: Path) -> None:
+        self.folder = folder
+        self._parts = folder / "finished"
+        self._finished: dict[str, Finished] = {}
+        self._files: list[Path] = []
+        self._next = 0
+
+    def read(self) -> None:
+        """Read what earlier sweeps have finished here; what is half written is removed."""
+        try:
+            self._parts.mkdir(parents=True, exist_ok=True)
+            for left in self._parts.glob("*.tmp"):
+                left.unlink()
+            self._files = sorted(self._parts.glob("*.parquet"))
+            for path in self._files:
+                for row in pq.read_table(path).to_pylist():
+                    self._finished[row["key"]] = Finished(**row)
+        except OSError as error:
+            raise ConfigError(f"--out {self.folder}: cannot be written: {error.strerror}") from error
+        except pa.ArrowException as error:
+            raise ConfigError(f"--out {self.folder}: {error}") from error
+        self._next = max((int(path.stem) for path in self._files), default=0) + 1
+
+    def get(self, key: str) -> Finished | None:
+        return self._finished.get(key)
+
+    def codes(self) -> set[str]:
+        """Every code that made one of the rows."""
+        return {done.code for done in self._finished.values()}
+
+    def add(self, done: Finished) -> None:
+        """Keep one more run; it is on disk when this returns."""
+        self._finished[done.key] = done
+        self._files.append(self._write([done]))
+        if len(self._files) >= _MERGE_AT:
+            self._merge()
+
+    def _merge(self) -> None:
+        old = self._files
+        self._files = [self._write(self._finished.values())]
+        for path in old:  # the new file holds them all; if we die here, both say the same
+            path.unlink()
+
+    def _write(self, rows: Iterable[Finished]) -> Path:
+        path = self._parts / f"{self._next:06}.parquet"
+        self._next += 1
+        write_whole(path, pa.Table.from_pylist([asdict(row) for row in rows], schema=_SCHEMA))
+        return path
+
+    def publish(self, tasks: Sequence[Task], columns: Sequence[str]) -> pa.Table:
+        """Write the table of these runs, as far as they are finished, and return it."""
+        rows = [(task, self._finished[task.key]) for task in tasks if task.key in self._finished]
+        table = table_of(rows, columns)
+        write_whole(self.folder / TABLE, table)
+        return table
+
+    @contextlib.contextmanager
+    def alone(self) -> Iterator[None]:
+        """Nobody else writes here meanwhile; raises ConfigError when somebody does."""
+        try:
+            self.folder.mkdir(parents=True, exist_ok=True)
+            lock = os.open(self.folder / ".lock", os.O_CREAT | os.O_RDWR)
+        except OSError as error:
+            raise ConfigError(f"--out {self.folder}: cannot be written: {error.strerror}") from error
+        try:
+            fcntl.flock(lock, fcntl.LOCK_EX | fcntl.LOCK_NB)
+            yield
+        except BlockingIOError as error:
+            raise ConfigError(f"--out {self.folder}: another sweep writes there now") from error
+        finally:
+            os.close(lock)
+
+
+def write_whole(path: Path, table: pa.Table) -> None:
+    """Write a table so that the file is the whole of it or is not there, whenever the process or the machine dies."""
+    with tempfile.NamedTemporaryFile(dir=path.parent, suffix=".tmp", delete=False) as file:
+        fresh = Path(file.name)
+        pq.write_table(table, file, compression="zstd")
+        file.flush()
+        os.fsync(file.fileno())
+    fresh.replace(path)

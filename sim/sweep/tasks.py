@@ -1,0 +1,66 @@
+"""One run of a sweep: what to simulate, by which name it is kept, and the command that repeats it alone."""
+
+import hashlib
+import json
+import shlex
+from collections.abc import Mapping
+from dataclasses import dataclass
+from typing import Any
+
+from fanet_mw.errors import ConfigError
+from fanet_mw.scenario.model import Scenario
+from sim.scenarios import catalog
+from sim.sweep import measures
+from sim.sweep.spec import MOST_RUNS, Sweep
+
+
+@dataclass(frozen=True, slots=True)
+class Task:
+    """One run, as plain values that any process on any machine can be handed."""
+
+    key: str
+    """Of the resolved scenario and the measures: equal keys are equal runs."""
+    case: str
+    seed: int
+    tree: Mapping[str, Any]
+    """The resolved scenario, every default written out."""
+    measure: tuple[str, ...]
+    command: str
+    """Repeats this run alone."""
+
+    def value(self, key: str) -> object:
+        """The resolved value of a dotted scenario key; None where the scenario leaves it unset."""
+        at: object = self.tree
+        for part in key.split("."):
+            at = at.get(part) if isinstance(at, Mapping) else None
+        return at
+
+
+def tasks_of(sweep: Sweep) -> list[Task]:
+    """Every run of a sweep, each validated; raises ConfigError with the mistakes of all settings."""
+    if sweep.count() > MOST_RUNS:
+        raise ConfigError(f"the sweep has more than {MOST_RUNS} runs")
+    measures.check(sweep.measure)
+    tasks: list[Task] = []
+    mistakes: dict[str, None] = {}
+    for setting in sweep.settings():
+        overrides = setting.overrides()
+        for seed in sweep.seed_list():
+            try:
+                scenario = catalog.find(sweep.base, [*overrides, f"seed={seed}"])
+            except ConfigError as error:
+                mistakes[f"case {setting.case}, {', '.join(overrides)}: {error}"] = None
+                break
+            sets = [f"--set {shlex.quote(override)}" for override in overrides]
+            command = " ".join(["fanet simulate", shlex.quote(sweep.base), *sets, f"--seed {seed}"])
+            tasks.append(_task(scenario, setting.case, sweep.measure, command))
+    if mistakes:
+        raise ConfigError("\n".join(mistakes))
+    return tasks
+
+
+def _task(scenario: Scenario, case: str, measure: tuple[str, ...], command: str) -> Task:
+    tree = scenario.model_dump(mode="json", exclude_none=True)
+    named = {key: value for key, value in tree.items() if key != "description"}
+    text = json.dumps([named, sorted(measure)], sort_keys=True)
+    return Task(hashlib.sha256(text.encode()).hexdigest()[:16], case, scenario.seed, tree, measure, command)

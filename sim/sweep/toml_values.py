@@ -1,0 +1,59 @@
+"""Values as TOML text and back, as `--set KEY=VALUE` has them. `toml_value` and `one_value` are inverse."""
+
+import json
+import tomllib
+from collections.abc import Iterator, Mapping
+
+from fanet_mw.errors import ConfigError
+
+_OPENING = "[{"
+_CLOSING = "]}"
+
+
+def toml_value(value: object) -> str:
+    """One value in one line of TOML."""
+    match value:
+        case bool():
+            return "true" if value else "false"
+        case int() | float():
+            return repr(value)
+        case str():
+            return json.dumps(value, ensure_ascii=False).replace("\x7f", "\\u007f")  # TOML wants DEL escaped, JSON not
+        case list() | tuple():
+            return f"[{', '.join(toml_value(item) for item in value)}]"
+        case Mapping():
+            return f"{{{', '.join(f'{key} = {toml_value(item)}' for key, item in value.items())}}}"
+        case _:
+            raise ConfigError(f"{value!r} is no value of a scenario key")
+
+
+def one_value(text: str) -> object:
+    """The value of some TOML text; what is no TOML is a string, so that names need no quotes."""
+    try:
+        return tomllib.loads(f"value = {text}")["value"]
+    except tomllib.TOMLDecodeError:
+        return text
+
+
+def axis(text: str) -> tuple[str, list[object]]:
+    """`KEY=A,B,C` as a key and its values; commas within brackets or quotes belong to a value."""
+    key, equals, values = text.partition("=")
+    if not equals or not key.strip() or not values.strip():
+        raise ConfigError(f"--set {text!r}: must be KEY=VALUE or KEY=VALUE,VALUE,..., for example nodes.count=10,20,40")
+    return key.strip(), [one_value(part.strip()) for part in _parts(values)]
+
+
+def _parts(text: str) -> Iterator[str]:
+    depth, quote, part = 0, "", ""
+    for letter in text:
+        if quote:
+            quote = "" if letter == quote else quote
+        elif letter in "\"'":
+            quote = letter
+        depth += (letter in _OPENING) - (letter in _CLOSING) if not quote else 0
+        if letter == "," and not quote and depth == 0:
+            yield part
+            part = ""
+        else:
+            part += letter
+    yield part

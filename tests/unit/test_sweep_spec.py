@@ -1,0 +1,143 @@
+"""What a sweep file means, and what is wrong with one, before anything runs."""
+
+import pytest
+from hypothesis import given
+from hypothesis import strategies as st
+
+from fanet_mw.errors import ConfigError
+from sim.cli.sweep import asked
+from sim.sweep import spec
+from sim.sweep.tasks import tasks_of
+from sim.sweep.toml_values import axis, one_value, toml_value
+
+FILE = """
+base = "flooding"
+seeds = 3
+[set]
+duration_s = 2
+[grid]
+traffic.sources = [1, 4]
+"nodes.count" = [5, 9]
+[[case]]
+name = "flooding"
+set.routing.protocol = "flooding"
+[[case]]
+name = "gossip"
+set.routing.protocol = "gossip"
+grid.routing.gossip_p = [0.5]
+[quick]
+seeds = [7]
+cases = ["gossip"]
+grid.traffic.sources = [2]
+"""
+
+
+def test_every_case_is_run_with_every_combination_of_the_grid_and_every_seed() -> None:
+    tasks = tasks_of(spec.parse(FILE, source="test"))
+
+    assert len(tasks) == 2 * 2 * 2 * 3
+    points = {(task.case, task.value("traffic.sources"), task.value("nodes.count"), task.seed) for task in tasks}
+    assert points == {
+        (c, s, n, seed) for c in ("flooding", "gossip") for s in (1, 4) for n in (5, 9) for seed in (1, 2, 3)
+    }
+    assert {task.value("duration_s") for task in tasks} == {2.0}
+    assert len({task.key for task in tasks}) == len(tasks)
+
+
+def test_a_variant_replaces_what_it_names_and_nothing_else() -> None:
+    tasks = tasks_of(spec.parse(FILE, source="test").variant("quick"))
+
+    points = {(task.case, task.value("traffic.sources"), task.value("nodes.count"), task.seed) for task in tasks}
+    assert points == {("gossip", 2, 5, 7), ("gossip", 2, 9, 7)}
+    with pytest.raises(ConfigError, match="full: the sweep has quick"):
+        spec.parse(FILE, source="test").variant("full")
+
+
+def test_the_columns_of_a_table_are_the_keys_that_vary() -> None:
+    varied = spec.parse(FILE, source="test").varied()
+    assert varied == ["routing.protocol", "traffic.sources", "nodes.count", "routing.gossip_p"]
+
+
+def test_the_command_of_a_run_names_every_change_and_the_seed() -> None:
+    task = tasks_of(spec.parse(FILE, source="test"))[-1]
+    assert task.command == (
+        "fanet simulate flooding --set duration_s=2 --set 'routing.protocol=\"gossip\"' --set traffic.sources=4 "
+        "--set nodes.count=9 --set routing.gossip_p=0.5 --seed 3"
+    )
+
+
+@pytest.mark.parametrize(
+    ("text", "mistake"),
+    [
+        ("seeds = 3", "base: is missing"),
+        ('base = "quick"\nseed = 1', "seed: unknown key; known keys: .*seeds"),
+        ('base = "quick"\nseeds = 0', r"seeds.* = 0: .*greater than or equal to 1"),
+        ('base = "quick"\n[grid]\nnodes.count = []', r"grid.nodes.count = \[\]"),
+        ('base = "quick"\n[[case]]\nset.nodes.count = 5', "case.0.name: is missing"),
+        ("base = ", "not valid TOML"),
+    ],
+)
+def test_a_mistake_in_the_file_is_named_with_its_key(text: str, mistake: str) -> None:
+    with pytest.raises(ConfigError, match=f"test: {mistake}"):
+        spec.parse(text, source="test")
+
+
+def test_every_setting_that_cannot_run_is_named_before_the_first_run() -> None:
+    found = spec.parse('base = "quick"\n[grid]\nnodes.count = [9, 0, 100000]', source="test")
+    with pytest.raises(ConfigError) as error:
+        tasks_of(found)
+    assert "nodes.count=0" in str(error.value)
+    assert "nodes.count=100000" in str(error.value)
+    assert "nodes.count=9:" not in str(error.value)
+
+
+def test_a_measure_that_there_is_not_is_an_error() -> None:
+    with pytest.raises(ConfigError, match="measure = 'speed': must be one of delay_counts"):
+        tasks_of(spec.parse('base = "quick"\nmeasure = ["speed"]', source="test"))
+
+
+def test_flags_make_a_sweep_of_a_scenario() -> None:
+    name, found = asked("quick", ("nodes.count=5,9", "duration_s=2", 'clusters.guard_ms=2,"auto"'), 4, None)
+    assert name == "quick"
+    assert found.set == {"duration_s": 2}
+    assert found.grid == {"nodes.count": [5, 9], "clusters.guard_ms": [2, "auto"]}
+    assert len(found.seed_list()) == 4
+
+
+def test_flags_change_a_sweep_of_a_file(tmp_path) -> None:
+    path = tmp_path / "mine.toml"
+    path.write_text(FILE)
+    name, found = asked(str(path), ("traffic.sources=3", "nodes.count=6,7,8"), None, "quick")
+    assert name == "mine"
+    assert found.set["traffic.sources"] == 3
+    assert found.grid == {"nodes.count": [6, 7, 8]}
+
+
+def test_commas_within_brackets_and_quotes_belong_to_a_value() -> None:
+    assert axis('traffic.sources=[1,2],"all",3') == ("traffic.sources", [[1, 2], "all", 3])
+    assert axis("routing.protocol=aodv,olsr") == ("routing.protocol", ["aodv", "olsr"])
+    for wrong in ("nodes.count", "=3", "nodes.count="):
+        with pytest.raises(ConfigError, match="must be KEY=VALUE"):
+            axis(wrong)
+
+
+values = st.recursive(
+    st.booleans()
+    | st.integers(-(2**63), 2**63 - 1)
+    | st.floats(allow_nan=False, allow_infinity=False)
+    | st.text(st.characters(exclude_categories=["Cs"])),
+    lambda inner: st.lists(inner, max_size=4),
+    max_leaves=8,
+)
+
+
+@given(values)
+def test_toml_text_of_a_value_is_read_back_as_that_value(value: object) -> None:
+    assert one_value(toml_value(value)) == value
+
+
+def test_every_shipped_sweep_is_valid_in_every_variant() -> None:
+    for name in spec.shipped():
+        found = spec.find(name)
+        for variant in (None, *(known for known in spec.VARIANTS if getattr(found, known) is not None)):
+            assert tasks_of(found.variant(variant).model_copy(update={"seeds": 1}))

@@ -1,0 +1,175 @@
+"""Sweeps that are cut short and taken up again: the table is that of an uninterrupted one, and nothing runs twice."""
+
+import json
+from collections.abc import Iterator, Sequence
+from pathlib import Path
+
+import pytest
+
+from fanet_mw.errors import ConfigError
+from fanet_mw.results import read
+from sim.results.rows import flat
+from sim.sweep import spec
+from sim.sweep.execution import Finished, carry_out
+from sim.sweep.run import Plan, Progress, run
+from sim.sweep.store import TABLE, Store
+from sim.sweep.tasks import Task, tasks_of
+
+FILE = """
+base = "flooding"
+seeds = 2
+measure = ["delay_counts", "wanted", "connected"]
+set = {duration_s = 1.5, drain_s = 0.5, nodes.count = 4, traffic.interval_s = 0.2, world.engine = "kinematic"}
+grid = {traffic.sources = [1, 2]}
+"""
+
+
+class OneByOne:
+    """Carries runs out in this process, and dies before the run of the given number as a killed process would."""
+
+    workers = 1
+
+    def __init__(self, *, dies_after: int | None = None, backwards: bool = False) -> None:
+        self.ran: list[str] = []
+        self._dies_after = dies_after
+        self._step = -1 if backwards else 1
+
+    def carry_out(self, tasks: Sequence[Task]) -> Iterator[Finished]:
+        for task in tasks[:: self._step]:
+            if len(self.ran) == self._dies_after:
+                raise KeyboardInterrupt
+            self.ran.append(task.key)
+            yield carry_out(task)
+
+
+@pytest.fixture(scope="module")
+def sweep() -> spec.Sweep:
+    return spec.parse(FILE, source="test")
+
+
+def go(folder: Path, sweep: spec.Sweep, workers: OneByOne, *, retry: bool = False) -> list[Progress]:
+    store, told = Store(folder), []
+    with store.alone():
+        store.read()
+        plan = Plan(tasks_of(sweep), store, retry=retry)
+        run(plan, store, workers, sweep.varied(), on_progress=told.append)
+    return told
+
+
+@pytest.fixture(scope="module")
+def whole(sweep, tmp_path_factory) -> Path:
+    folder = tmp_path_factory.mktemp("whole")
+    go(folder, sweep, OneByOne())
+    return folder
+
+
+def test_a_sweep_that_is_ended_three_times_and_taken_up_again_is_byte_for_byte_an_uninterrupted_one(
+    sweep, whole, tmp_path
+) -> None:
+    ran: list[str] = []
+    for dies_after in (1, 0, 2, None):
+        workers = OneByOne(dies_after=dies_after, backwards=dies_after == 2)
+        try:
+            go(tmp_path, sweep, workers)
+        except KeyboardInterrupt:
+            assert read(tmp_path).num_rows == len(ran) + len(workers.ran)
+        ran += workers.ran
+        (tmp_path / "finished" / "half.tmp").write_bytes(b"PAR1 half written")
+
+    assert len(ran) == len(set(ran)) == 4
+    assert (tmp_path / TABLE).read_bytes() == (whole / TABLE).read_bytes()
+
+
+def test_progress_counts_what_was_finished_before(sweep, tmp_path) -> None:
+    with pytest.raises(KeyboardInterrupt):
+        go(tmp_path, sweep, OneByOne(dies_after=3))
+    told = go(tmp_path, sweep, OneByOne())
+    assert [(at.done, at.total) for at in told] == [(3, 4), (4, 4)]
+    assert told[0].left_s > told[1].left_s == 0
+
+
+def test_a_row_has_settings_figures_and_the_command_that_gives_the_same_figures(sweep, whole) -> None:
+    row = read(whole).to_pylist()[-1]
+    assert (row["traffic.sources"], row["seed"], row["status"], row["valid"]) == (2, 2, "ok", True)
+    assert row["command"].startswith("fanet simulate flooding --set duration_s=1.5 --set drain_s=0.5")
+    summary = json.loads(row["summary"])
+    assert "wall_s" not in summary
+    assert {name: row[name] for name in ("pdr", "delay_ms.p95", "copies.on_air")} == {
+        name: flat(summary)[name] for name in ("pdr", "delay_ms.p95", "copies.on_air")
+    }
+    assert row["wanted"] == row["generated"] * 3
+    assert sum(row["delay_counts"]) == row["delivered"] > 0
+    assert row["connected"] == 1
+
+
+def test_settings_that_share_a_seed_draw_the_same_births(sweep, whole) -> None:
+    """Common random numbers: the births of a source do not depend on how many others there are."""
+    tasks = {(task.value("traffic.sources"), task.seed): task for task in tasks_of(sweep)}
+    from fanet_mw.scenario import config
+    from sim.run.virtual import simulate
+
+    def births(sources: int) -> dict[int, list[int]]:
+        found: dict[int, list[int]] = {}
+        for record in simulate(config.build(tasks[sources, 1].tree)).records:
+            if type(record).__name__ == "Generated":
+                found.setdefault(record.node, []).append(record.t_ns)
+        return found
+
+    one, two = births(1), births(2)
+    shared = set(one) & set(two)
+    assert shared
+    assert all(one[node] == two[node] for node in shared)
+
+
+def test_a_run_that_fails_is_a_row_with_its_error_and_is_repeated_only_when_asked(sweep, tmp_path, monkeypatch) -> None:
+    from sim.sweep import execution
+
+    def broken(_: object) -> None:
+        raise RuntimeError("the medium is on fire")
+
+    with monkeypatch.context() as patched:
+        patched.setattr(execution, "simulate", broken)
+        told = go(tmp_path, sweep, OneByOne())
+    assert told[-1].failed == 4
+    row = read(tmp_path).to_pylist()[0]
+    assert row["status"] == "failed"
+    assert row["error"].startswith("RuntimeError: the medium is on fire\n")
+    assert "in broken" in row["error"]
+    assert row["command"].startswith("fanet simulate flooding")
+
+    assert go(tmp_path, sweep, OneByOne())[-1].failed == 4
+    assert go(tmp_path, sweep, OneByOne(), retry=True)[-1].failed == 0
+    assert set(read(tmp_path).column("status").to_pylist()) == {"ok"}
+
+
+def test_a_sweep_that_has_grown_runs_only_what_is_new(sweep, whole, tmp_path) -> None:
+    import shutil
+
+    shutil.copytree(whole, tmp_path / "grown")
+    workers = OneByOne()
+    go(tmp_path / "grown", sweep.model_copy(update={"seeds": 3}), workers)
+    assert len(workers.ran) == 2
+    assert read(tmp_path / "grown").num_rows == 6
+
+
+def test_two_sweeps_do_not_write_to_one_folder(sweep, tmp_path) -> None:
+    with (
+        Store(tmp_path).alone(),
+        pytest.raises(ConfigError, match="another sweep writes there"),
+        Store(tmp_path).alone(),
+    ):
+        pass
+
+
+def test_files_of_single_runs_are_made_one_before_they_are_many(sweep, tmp_path, monkeypatch) -> None:
+    monkeypatch.setattr("sim.sweep.store._MERGE_AT", 3)
+    go(tmp_path, sweep, OneByOne())
+    assert len(list((tmp_path / "finished").glob("*.parquet"))) == 2
+    workers = OneByOne()
+    go(tmp_path, sweep, workers)
+    assert workers.ran == []
+
+
+def test_a_folder_without_results_is_an_error(tmp_path) -> None:
+    with pytest.raises(ConfigError, match=r"holds neither runs\.parquet"):
+        read(tmp_path)

@@ -181,10 +181,10 @@ def _warn_of_codes(store: "Store", plan: "Plan") -> None:
 
 def _compile() -> None:
     """Compile the kernel once, before workers do so each for itself."""
-    from emulator.kernel.compile import WORD, must_compile, warm_up
+    from emulator.kernel.compile import COMPILING_NOTICE, must_compile, warm_up
 
     if must_compile():
-        _say(WORD)
+        _say(COMPILING_NOTICE)
         warm_up()
 
 

@@ -1,9 +1,12 @@
 """Who is heard directly, and what they said last. A neighbor expires when its hellos stop."""
 
-from typing import NamedTuple
+from typing import Final, NamedTuple
 
 from fanet_mw.units import NodeId
 from fanet_mw.wire.inner import Beacon
+
+LIFETIME_HELLOS: Final = 3.5
+"""A neighbor is gone after this many silent hello intervals (OLSR's NEIGHB_HOLD_TIME is 3, RFC 3626 18.3)."""
 
 
 class Neighbor(NamedTuple):

@@ -26,7 +26,7 @@ from fanet_mw.planner.flood import FloodCost, flood_cost
 from fanet_mw.planner.goodput_bound import Goodput, any_protocol
 from fanet_mw.planner.head_slot import ClassLoad, ClusterPlan, slot_delays, work_ns
 from fanet_mw.planner.timetable_plan import Candidate, TimetablePlan, judge, table_for
-from fanet_mw.routing.clustered.claimed.protocol import geometry, turn_bytes
+from fanet_mw.routing.clustered.claimed.claiming import geometry, turn_bytes
 from fanet_mw.routing.clustered.clustering import Cluster, balanced
 from fanet_mw.routing.clustered.tdma.turns import receipt_ns
 from fanet_mw.routing.clustered.timetable.turn_plan import Fitted, schedule_parts, superframe

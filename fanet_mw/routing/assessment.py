@@ -27,7 +27,7 @@ class Assessment:
         self._pending[key] = 1, packet
         heapq.heappush(self._due, (due_ns, key))
 
-    def another_copy(self, key: int) -> None:
+    def overheard(self, key: int, *, now_ns: int) -> None:
         """Somebody else relayed it."""
         pending = self._pending.get(key)
         if pending is None:

@@ -49,7 +49,7 @@ class CounterBased(Flood):
         self._assessment.first_copy(packet, due_ns=now_ns + int(self._random() * self._assess_ns))
 
     def overheard(self, key: int, *, now_ns: int) -> None:
-        self._assessment.another_copy(key)
+        self._assessment.overheard(key, now_ns=now_ns)
 
     def next_wake_ns(self) -> int | None:
         return self._assessment.next_wake_ns()

@@ -3,7 +3,7 @@
 Every shipped scenario, shortened, and settings of `clustered` drawn at random: of each run the SHA-256 of its trace
 file, of its reports, of what its nodes handed to MAVLink taps, and of its links. The same code gives the same hashes on
 any machine of one kind (the radio's arithmetic is floating point), so a restructuring changes none of them.
-`--only TEXT` takes the runs whose name contains it.
+`--only TEXT...` takes the runs whose name contains one of them.
 """
 
 import argparse
@@ -130,13 +130,13 @@ def main() -> int:
     flags = argparse.ArgumentParser(description=__doc__, formatter_class=argparse.RawDescriptionHelpFormatter)
     flags.add_argument("what", choices=("save", "compare"))
     flags.add_argument("file", type=Path)
-    flags.add_argument("--only", default="", help="the runs whose name contains this")
+    flags.add_argument("--only", default=[""], nargs="+", help="the runs whose name contains one of these")
     given = flags.parse_args()
     before = json.loads(given.file.read_text()) if given.what == "compare" else {}
     found: dict[str, dict[str, str]] = {}
     differing = 0
     for name, scenario in runs():
-        if given.only not in name:
+        if not any(part in name for part in given.only):
             continue
         began_s = process_time()
         found[name] = hashes(scenario)

@@ -6,7 +6,7 @@ from typing import Any
 import pytest
 
 from fanet_mw.node.queue import Packet
-from fanet_mw.routing.clustered.scheduled import Scheduled
+from fanet_mw.routing.clustered.timetable.promises import Promises
 from fanet_mw.trace import BoundStated
 from sim.results.files import finish
 from sim.run.virtual import simulate
@@ -18,15 +18,15 @@ TIMES = ["duration_s=16", "warmup_s=10", "clusters.flooding_period_s=0.2"]
 
 def run(monkeypatch: pytest.MonkeyPatch, promise: Callable[[int], int]) -> dict[str, Any]:
     """`promise`: what a node says instead of its bound."""
-    honest = Scheduled._promise
+    honest = Promises.state
 
-    def too_little(self: Scheduled, packet: Packet, now_ns: int) -> None:
-        honest(self, packet, now_ns)
+    def too_little(self: Promises, packet: Packet, *, now_ns: int) -> None:
+        honest(self, packet, now_ns=now_ns)
         records = self._port.records
         if isinstance(records[-1], BoundStated):
             records[-1] = records[-1]._replace(bound_ns=promise(records[-1].bound_ns))
 
-    monkeypatch.setattr(Scheduled, "_promise", too_little)
+    monkeypatch.setattr(Promises, "state", too_little)
     return finish(simulate(catalog.find("clusters", [*LINE, *TIMES])), out=None)
 
 

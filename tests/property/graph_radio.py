@@ -16,6 +16,8 @@ from fanet_mw.node.node import Node
 from fanet_mw.rng import stream
 from fanet_mw.routing import make_protocol
 from fanet_mw.routing.clustered.clustered import Clustered
+from fanet_mw.routing.clustered.roles.assigned import AssignedRoles
+from fanet_mw.routing.clustered.roles.membership import Membership
 from fanet_mw.scenario import Scenario
 from fanet_mw.units import BROADCAST, MS, Enu, NodeId, S
 
@@ -155,6 +157,11 @@ class Swarm:
         assert isinstance(protocol, Clustered)
         return protocol
 
+    def membership(self, node: NodeId) -> Membership:
+        roles = self.protocol(node).parts.roles
+        assert isinstance(roles, AssignedRoles)
+        return roles.parts.membership
+
     def never_twice(self) -> None:
         """Whatever happens: nothing is delivered or relayed twice by one node."""
         assert max(self.delivered.values(), default=0) <= 1, "delivered twice"
@@ -174,7 +181,7 @@ class Swarm:
             owned = Counter(reports[node]["cluster"] for node in heads)
             wrong += [f"{times} heads of slot {slot} in {part}" for slot, times in owned.items() if times > 1]
             for node in part:
-                route = self.protocol(node)._gradient.route(now_ns=self.now_ns)
+                route = self.protocol(node).parts.gradient.route(now_ns=self.now_ns)
                 if len(part) > 1 and node not in heads and (route is None or route.head not in heads):
                     wrong.append(f"{node} of {part} has no live head: {route}")
         return wrong

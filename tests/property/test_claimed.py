@@ -16,7 +16,9 @@ from test_slots_with_reuse import longest_chain
 from fanet_mw import wire
 from fanet_mw.bus.messages import Reception
 from fanet_mw.graph.topology import components, two_hop
-from fanet_mw.routing.clustered.claimed.protocol import Claimed
+from fanet_mw.routing.clustered.claimed.access import ClaimedAccess
+from fanet_mw.routing.clustered.claimed.claiming import Claiming
+from fanet_mw.routing.clustered.clustered import Clustered
 from fanet_mw.scenario import config
 from fanet_mw.units import MS, NodeId, S
 from fanet_mw.wire import FLAG_FLOOD, FLAG_TO_HEAD, Kind
@@ -34,10 +36,11 @@ def scenario_of(*, aggregate: bool = False, **clusters: Any) -> Any:
     return config.build(tree)
 
 
-def protocol(radio: GraphRadio, node: int) -> Claimed:
+def claiming(radio: GraphRadio, node: int) -> Claiming:
     found = radio.nodes[NodeId(node)]._protocol
-    assert isinstance(found, Claimed)
-    return found
+    assert isinstance(found, Clustered)
+    assert isinstance(found.parts.access, ClaimedAccess)
+    return found.parts.access._claiming
 
 
 def settle_s(radio: GraphRadio) -> int:
@@ -48,7 +51,7 @@ def settle_s(radio: GraphRadio) -> int:
 def meetings(radio: GraphRadio) -> list[tuple[int, int]]:
     """Pairs within two hops that hold a common turn."""
     rivals = two_hop(radio.adjacency)
-    own = {n: protocol(radio, n)._claims.own for n in rivals}
+    own = {n: claiming(radio, n)._claims.own for n in rivals}
     return [(a, b) for a in sorted(rivals) for b in rivals[a] if a < b and own[a].meets(own[b])]
 
 
@@ -117,7 +120,7 @@ class Swarm(RuleBasedStateMachine):
         radio = self.radio
         radio.run(settle_s(radio) * S)
         assert not meetings(radio)
-        assert all(protocol(radio, n)._own.share is not None for n in radio.nodes)
+        assert all(claiming(radio, n).own.share is not None for n in radio.nodes)
         began_ns = radio.now_ns
         packets = {node: radio.send(node) for node in sorted(radio.nodes)}
         radio.run(6 * S)
@@ -170,7 +173,7 @@ def test_a_row_of_five_reuses_slots_and_a_packet_crosses_it_in_few_superframes(l
     assert line.delivered[5, 1, seq] == 1
     relays = [(t, n) for t, n, header in line.sent if t >= began_ns and header.kind == Kind.DATA]
     assert [n for _, n in relays] == [1, 2, 3, 4], "the end of the row need not relay"
-    hop_ms = max(protocol(line, n).hop_ns() or 0 for n in range(1, 6)) / MS
+    hop_ms = max(line.nodes[NodeId(n)].report()["hop_ms"] for n in range(1, 6))
     assert (relays[-1][0] - began_ns) / MS <= 4 * hop_ms
 
 

@@ -44,7 +44,7 @@ def standing(**clusters: object) -> Swarm:
 
 
 def head_of(swarm: Swarm, node: int) -> NodeId:
-    return swarm.protocol(NodeId(node))._membership.head
+    return NodeId(swarm.protocol(NodeId(node)).report()["head"])
 
 
 def calm(swarm: Swarm, most_s: int = SETTLED_S) -> int:
@@ -159,7 +159,7 @@ def timetabled() -> Swarm:
 
 
 def listed(swarm: Swarm, node: int) -> bool:
-    return swarm.protocol(NodeId(1))._membership.lists(node)
+    return swarm.membership(NodeId(1)).lists(node)
 
 
 def joins(swarm: Swarm) -> set[tuple[int, int]]:

@@ -35,8 +35,8 @@ from fanet_mw.routing.aodv.neighbors import Hellos
 from fanet_mw.routing.aodv.table import Route, Table
 from fanet_mw.routing.control import Family
 from fanet_mw.routing.routed import Routed
-from fanet_mw.routing.serial import following, later, newer
 from fanet_mw.routing.waiting import WaitingRoom
+from fanet_mw.serial import following, later, newer
 from fanet_mw.units import BROADCAST, MS, NodeId, earliest, seconds_to_ns
 
 

@@ -36,7 +36,7 @@ from fanet_mw.routing.olsr.messages import (
 )
 from fanet_mw.routing.olsr.state import State
 from fanet_mw.routing.routed import Routed
-from fanet_mw.routing.serial import following
+from fanet_mw.serial import following
 from fanet_mw.units import BROADCAST, NodeId
 
 _HELLO_VTIME: Final = encode_time(p.NEIGHB_HOLD_TIME_NS)

@@ -11,6 +11,7 @@ from fanet_mw.node import duplicates
 from fanet_mw.node.contract import Port
 from fanet_mw.node.queue import Packet
 from fanet_mw.routing.clustered.forwarding.repair import Repair
+from fanet_mw.routing.clustered.tdma.contention import Contention
 from fanet_mw.units import BROADCAST, S
 from fanet_mw.wire import FLAG_FLOOD, Kind
 
@@ -21,9 +22,10 @@ _UPLINK_NS: Final = 1 * S
 class Floods:
     """Floods as one node sends them."""
 
-    def __init__(self, port: Port, repair: Repair | None) -> None:
+    def __init__(self, port: Port, repair: Repair | None, contention: Contention) -> None:
         self._port = port
         self._repair = repair
+        self._contention = contention
         self._expect_ns = port.scenario.clusters.period_ns + _UPLINK_NS
         self._hop_limit = port.scenario.routing.hop_limit
 
@@ -35,6 +37,18 @@ class Floods:
     def control(self, kind: Kind, inner: bytes, *, now_ns: int) -> Packet:
         """A control packet of our own, for everyone."""
         return self._port.announce(kind, inner, now_ns=now_ns, flags=FLAG_FLOOD, hop_limit=self._hop_limit)
+
+    def contend_control(self, kind: Kind, inner: bytes, *, now_ns: int) -> Packet:
+        """A control packet of our own, sent as soon as it may contend."""
+        packet = self.control(kind, inner, now_ns=now_ns)
+        self._port.transmit(packet.frame, BROADCAST, start_ns=self._contention.start_ns(now_ns=now_ns))
+        return packet
+
+    def contend_again(self, packet: Packet, *, now_ns: int) -> None:
+        """Send what a neighbor lacks as soon as it may contend."""
+        frame = self.again(packet)
+        if frame is not None:
+            self._port.transmit(frame, BROADCAST, start_ns=self._contention.start_ns(now_ns=now_ns))
 
     def begin(self, packets: Sequence[Packet], *, start_ns: int, again_ns: Sequence[int] = ()) -> None:
         """The floods of several packets begin here, in one frame, which is repeated at later instants."""

@@ -1,7 +1,7 @@
 """The first phase of a packet, TO_HEAD: acknowledged unicast along the gradient, from parent to parent to a head.
 
 A packet is under way to a parent that has yet to acknowledge it, or held because there is no way, until it expires.
-What a parent does not take tries the parent of that moment, and is dropped after `_TRIES`; what is held in between
+What a parent does not take tries the parent of that moment, and is dropped after `MOST_TRIES`; what is held in between
 counts anew.
 """
 
@@ -13,11 +13,10 @@ from fanet_mw.node import duplicates
 from fanet_mw.node.contract import Port
 from fanet_mw.node.queue import Packet, TxQueue, sooner_us
 from fanet_mw.routing.clustered.forwarding.gradient import Gradient
-from fanet_mw.routing.clustered.roles.failover import Upkeep
 from fanet_mw.units import US, NodeId
 from fanet_mw.wire import FLAG_TO_HEAD
 
-_TRIES: Final = 3
+MOST_TRIES: Final = 3
 """Parents tried for one packet at one node; below each the MAC makes its own attempts."""
 
 
@@ -33,10 +32,9 @@ class Attempt(NamedTuple):
 class Uplink:
     """What is on its way from one node to a head."""
 
-    def __init__(self, port: Port, gradient: Gradient, upkeep: Upkeep) -> None:
+    def __init__(self, port: Port, gradient: Gradient) -> None:
         self._port = port
         self._gradient = gradient
-        self._upkeep = upkeep
         routing = port.scenario.routing
         self._held = TxQueue(capacity=routing.queue_frames, sooner_us=sooner_us(routing))
         self._lifetime_ns = routing.lifetime_ns(-1)
@@ -65,17 +63,15 @@ class Uplink:
         if evicted is not None:
             self._port.drop(DropReason.QUEUE_FULL, evicted, now_ns=now_ns)
 
-    def ended(self, status: TxStatus, *, now_ns: int) -> Attempt | None:
-        """A transmission has ended; returned is what must try again."""
+    def ended(self, status: TxStatus) -> Attempt | None:
+        """A transmission has ended; returned is an attempt that has failed. A parent that did not acknowledge is none
+        any more.
+        """
         attempt = self._under_way.pop(status.seq, None)
         if attempt is None or status.outcome is TxOutcome.ACKED:
             return None
         if status.outcome is TxOutcome.RETRY_LIMIT:
             self._gradient.lose(attempt.parent)
-            self._upkeep.given_up(attempt.parent, now_ns=now_ns)
-        if attempt.tries >= _TRIES:
-            self._port.drop(DropReason.RETRY_LIMIT, attempt.packet, now_ns=now_ns)
-            return None
         return attempt
 
     def released(self, *, now_ns: int) -> list[Packet]:

@@ -1,6 +1,6 @@
 """Finds the events that change a node's part in the swarm, and takes the rows of `states.TRANSITIONS` for them.
 
-    announcements, stand-ins, signs of life, instants -> events -> table -> actions, which `clustered.py` carries out
+    announcements, stand-ins, signs of life, instants -> events -> table -> actions, which `assigned.py` carries out
 
 A head is silent when nothing that it generated, and no newer sequence of it in the hellos, has come for four hello
 intervals, or for two after the MAC gave it up. The first in the succession then stands in for it, the next

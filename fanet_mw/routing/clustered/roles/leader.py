@@ -78,15 +78,24 @@ class Leader:
     """Computes schedules out of joins."""
 
     def __init__(
-        self, authority: Authority, scenario: Scenario, signs: Signs, *, epoch: int, elected: bool, now_ns: int
+        self,
+        authority: Authority,
+        *,
+        scenario: Scenario,
+        signs: Signs,
+        needs_every_link: bool,
+        epoch: int,
+        elected: bool,
+        now_ns: int,
     ) -> None:
+        """`needs_every_link`: a timetable is made out of the assignment, for which more is watched and made anew."""
         clusters = scenario.clusters
         self._authority = authority
         self._signs = signs
         self._period_ns = clusters.period_ns
         self._reassign_ns = seconds_to_ns(clusters.reassign_s)
         self._range_m = clusters.link_m or scenario.radio.range_m
-        self._by_links = clusters.relay == "scheduled"
+        self._by_links = needs_every_link
         self._objection_ns = max(OBJECTION_NS, _OBJECTION_PERIODS * clusters.period_ns if self._by_links else 0)
         self._division = Division(clusters.method, count=clusters.count, range_m=self._range_m)
         self._epoch = epoch

@@ -49,6 +49,11 @@ class Lease:
         """Nobody has been heard yet."""
         self._until_ns = self._stand_ns = now_ns + _FIRST_NS + self._silence_ns
 
+    @property
+    def leads(self) -> bool:
+        """Whether the node obeys itself: it is the leader."""
+        return self.authority is not None and self.authority.leader == self._node
+
     def valid(self, now_ns: int) -> bool:
         """Whether the leader has been heard of lately."""
         return self.authority is not None and now_ns <= self._until_ns

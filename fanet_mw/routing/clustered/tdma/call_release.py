@@ -25,7 +25,7 @@ class CallRelease(TurnRelease):
         self._arm(now_ns)
         return turn.start_ns
 
-    def cancel(self, key: int) -> None:
+    def overheard(self, key: int, *, now_ns: int) -> None:
         """Somebody else has sent this packet (`seen.key_of`)."""
         self._queue.remove(key)
 

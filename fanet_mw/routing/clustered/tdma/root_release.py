@@ -36,7 +36,8 @@ class RootRelease(TurnRelease):
     def __init__(self, node: NodeId, queue: TxQueue, *, reserved: Mapping[int, int], lead_ns: int) -> None:
         super().__init__(queue, lead_ns=lead_ns)
         self._node = node
-        self._reserved = dict(sorted(reserved.items()))
+        self.reserved: Mapping[int, int] = dict(sorted(reserved.items()))
+        """By priority, the bytes of each turn that bulk leaves free."""
         self._plans: Sequence[Following] = ()
 
     def follow(self, plans: Sequence[Following], *, now_ns: int) -> None:
@@ -76,8 +77,8 @@ class RootRelease(TurnRelease):
     def _room(self, rank: int, turn: OwnTurn) -> int:
         """The bytes of a turn that a class has for itself."""
         if rank < PRIORITY_BULK:
-            return self._reserved.get(rank, 0)
-        return turn.frame_bytes - sum(self._reserved.values())
+            return self.reserved.get(rank, 0)
+        return turn.frame_bytes - sum(self.reserved.values())
 
     def _rank(self, packet: Packet) -> int:
         """Where a packet waits: what has no room of its own in a turn waits like bulk, and overtakes none of it.
@@ -87,14 +88,14 @@ class RootRelease(TurnRelease):
         header = packet.header
         if header.kind in (Kind.SCHEDULE, Kind.LINKS) and header.origin == self._node:
             return PRIORITY_CONTROL
-        fits = len(packet.frame) <= self._reserved.get(header.priority, 0)
+        fits = len(packet.frame) <= self.reserved.get(header.priority, 0)
         return header.priority if fits else PRIORITY_BULK
 
     def _fill(self, size: int) -> list[Packet]:
         queue = self._queue
-        taken = queue.take(size - sum(self._reserved.values()), rank=PRIORITY_CONTROL)
+        taken = queue.take(size - sum(self.reserved.values()), rank=PRIORITY_CONTROL)
         announces = bool(taken)
-        for rank, room in self._reserved.items():
+        for rank, room in self.reserved.items():
             taken += queue.take(room, rank=rank)
         if not announces:
             taken += queue.take(size - _bytes(taken), rank=PRIORITY_BULK)

@@ -82,8 +82,9 @@ def test_a_neighbor_is_gone_when_its_hellos_have_stopped_for_a_while(make_node: 
     hear(node, header, beacon.encode_frame(THEIRS), at_ns=1 * S)
     protocol = node._protocol
     assert isinstance(protocol, Clustered)
-    assert protocol._neighbors.count(now_ns=4500 * MS) == len(protocol._neighbors.alive(now_ns=4500 * MS)) == 1
-    assert protocol._neighbors.count(now_ns=4501 * MS) == len(protocol._neighbors.alive(now_ns=4501 * MS)) == 0
+    neighbors = protocol.parts.neighbors
+    assert neighbors.count(now_ns=4500 * MS) == len(neighbors.alive(now_ns=4500 * MS)) == 1
+    assert neighbors.count(now_ns=4501 * MS) == len(neighbors.alive(now_ns=4501 * MS)) == 0
 
 
 def test_what_waits_at_a_head_beyond_its_lifetime_is_dropped_with_its_reason(make_node: MakeNode) -> None:

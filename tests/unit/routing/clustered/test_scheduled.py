@@ -12,11 +12,10 @@ from fanet_mw.bus.messages import Reception
 from fanet_mw.errors import DropReason
 from fanet_mw.node.node import Node
 from fanet_mw.routing import make_protocol
-from fanet_mw.routing.clustered.roles.lease import Authority
-from fanet_mw.routing.clustered.roles.membership import Version
-from fanet_mw.routing.clustered.scheduled import Scheduled
+from fanet_mw.routing.clustered.clustered import Clustered
 from fanet_mw.routing.clustered.tdma.turns import Turns
 from fanet_mw.routing.clustered.timetable.timetable import Timetable, Turn
+from fanet_mw.routing.clustered.timetable.turn_access import TurnAccess
 from fanet_mw.routing.clustered.timetable.turn_plan import Fitted, Plan
 from fanet_mw.scenario import Scenario
 from fanet_mw.trace import BoundStated
@@ -48,14 +47,15 @@ def node(make_scenario: MakeScenario) -> Node:
     keys |= {"clusters.contention_ms": 40, "traffic.interval_s": 1}
     made = Node(US, make_scenario(**keys), make_protocol, position=Enu(0.0, 0.0, 50.0))
     made.start(0)
-    protocol_of(made)._plans = [planned(FLOODS)]
+    access_of(made)._plans.in_order = [planned(FLOODS)]
     return made
 
 
-def protocol_of(node: Node) -> Scheduled:
+def access_of(node: Node) -> TurnAccess:
     protocol = node._protocol
-    assert isinstance(protocol, Scheduled)
-    return protocol
+    assert isinstance(protocol, Clustered)
+    assert isinstance(protocol.parts.access, TurnAccess)
+    return protocol.parts.access
 
 
 def hear_in_turn(
@@ -87,7 +87,7 @@ def test_a_flood_that_goes_on_in_the_next_superframe_is_relayed_there(node: Node
 def test_a_flood_of_the_superframe_before_is_relayed_in_this_one(node: Node) -> None:
     """Heard from another in turn 29 + 1: it began at 1000 ms, and so our turn 29 + 2 lies at 1144 ms."""
     late = (*FLOODS[:3], Turn(30, AFTER, ROOT, 1), *FLOODS[4:])
-    protocol_of(node)._plans = [planned(late)]
+    access_of(node)._plans.in_order = [planned(late)]
     hear_in_turn(node, AFTER, 1, superframe=11)
     assert relays(node) == [1100 + 40 + 2 * 2]
 
@@ -117,7 +117,7 @@ def test_what_is_heard_in_no_turn_of_its_flood_is_not_relayed(node: Node) -> Non
 
 def test_the_newest_timetable_in_force_counts(node: Node) -> None:
     other = (Turn(5, ROOT, ROOT, 0), Turn(20, US, ROOT, 0), Turn(12, US, US, 0))
-    protocol_of(node)._plans = [planned(FLOODS), planned(other, valid_ns=2000 * MS)]
+    access_of(node)._plans.in_order = [planned(FLOODS), planned(other, valid_ns=2000 * MS)]
     hear_in_turn(node, ROOT, 5, superframe=10)
     hear_in_turn(node, ROOT, 5, superframe=20)
     assert relays(node) == [1056, 2040 + 20 * 2]
@@ -136,27 +136,26 @@ def test_a_bound_runs_from_application_to_application(make_scenario: MakeScenari
     keys |= {"clusters.contention_ms": 40, "traffic.interval_s": 1, "radio.handover_ms": handover_ms}
     node = Node(US, make_scenario(**keys), make_protocol, position=Enu(0.0, 0.0, 50.0))
     node.start(0)
-    protocol_of(node)._plans = [planned(FLOODS)]
-    own = protocol_of(node)._own()
+    access_of(node)._plans.in_order = [planned(FLOODS)]
+    own = access_of(node)._promises.own()
     assert own is not None
     assert own.worst_ns(interval_ns=1000 * MS) == (2 + 100 + 3 * 2 + handover_ms + 2) * MS
 
 
 def test_who_cannot_reach_everyone_promises_nothing(node: Node) -> None:
-    protocol_of(node)._plans = [planned(FLOODS, unreached=(AFTER,))]
+    access_of(node)._plans.in_order = [planned(FLOODS, unreached=(AFTER,))]
     node.send(filler(40), destination=BROADCAST, priority=PRIORITY_BULK, app="test", born_ns=0, now_ns=0)
     assert not [record for record in node.records if isinstance(record, BoundStated)]
-    assert protocol_of(node)._own() is None
+    assert access_of(node)._promises.own() is None
 
 
-def informed(node: Node, *, told_ms: int) -> Scheduled:
+def informed(node: Node, *, told_ms: int) -> TurnAccess:
     """The node follows a timetable, and heard an announcement of it that was made at an instant."""
-    protocol = protocol_of(node)
-    protocol._planned = Version(Authority(0, ROOT), 1)
-    protocol._told_ns = {protocol._planned: told_ms * MS}
-    protocol._bounds_ns = [protocol._class_bounds_ns(protocol._own())]
-    protocol._roots.follow([protocol._following(plan) for plan in protocol._plans], now_ns=told_ms * MS)
-    return protocol
+    access = access_of(node)
+    access._promises.announced_ns = told_ms * MS
+    access._promises.follow(superseded=0, now_ns=told_ms * MS)
+    access.use_turns(told_ms * MS)
+    return access
 
 
 def promised(node: Node, *, at_ms: int) -> list[BoundStated]:
@@ -193,8 +192,8 @@ def test_a_promise_counts_what_waits(node: Node, before: int, is_promised: bool)
 
 def test_turns_are_used_until_a_timetable_without_any_comes_into_force(node: Node) -> None:
     """Our turn is at 64 ms of each superframe, and its flood lasts 6 ms: that at 964 ms is the last before 1 s."""
-    protocol_of(node)._plans = [planned(FLOODS), planned(FLOODS[:5], valid_ns=1000 * MS)]
-    protocol = informed(node, told_ms=0)
+    access_of(node)._plans.in_order = [planned(FLOODS), planned(FLOODS[:5], valid_ns=1000 * MS)]
+    access = informed(node, told_ms=0)
     for births in ((0, 0, 0), (955, 955), (990,)):
         for at_ms in births:
             node.send(
@@ -205,17 +204,15 @@ def test_turns_are_used_until_a_timetable_without_any_comes_into_force(node: Nod
                 born_ns=at_ms * MS,
                 now_ns=at_ms * MS,
             )
-        while (wake_ns := protocol._roots.next_wake_ns()) is not None:
+        while (wake_ns := access._roots.next_wake_ns()) is not None:
             node.wake(wake_ns)
     assert [start_ms for start_ms in relays(node) if start_ms > 60] == [64, 164, 264, 964]
-    assert len(protocol._roots) == 0, "what has no turn any more goes another way"
-    assert protocol.waiting() == 2
+    assert len(access._roots) == 0, "what has no turn any more goes another way"
+    assert node.report()["waiting"] == 2
 
 
 def test_a_leader_promises_nothing_for_bulk(node: Node) -> None:
-    protocol = informed(node, told_ms=0)
-    protocol._lease.take_office(0)
-    protocol._lead(elected=False, now_ns=0)
+    informed(node, told_ms=0)._promises._lease.take_office(0)
     assert promised(node, at_ms=0) == []
 
 
@@ -223,7 +220,7 @@ def test_what_is_repaired_after_it_was_lost_has_no_bound(make_scenario: MakeScen
     keys = {"nodes.count": 5, "clusters.relay": "scheduled", "clusters.flooding_period_s": 0.1, "clusters.repair_s": 5}
     node = Node(US, make_scenario(**keys), make_protocol, position=Enu(0.0, 0.0, 50.0))
     node.start(0)
-    protocol_of(node)._plans = [planned(FLOODS)]
+    access_of(node)._plans.in_order = [planned(FLOODS)]
     informed(node, told_ms=0)
     assert promised(node, at_ms=0) == []
 

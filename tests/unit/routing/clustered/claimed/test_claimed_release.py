@@ -4,7 +4,7 @@ import pytest
 
 from fanet_mw.node.queue import Packet, TxQueue
 from fanet_mw.routing.clustered.claimed.own_turns import OwnTurns, Share
-from fanet_mw.routing.clustered.claimed.protocol import OwnRelease
+from fanet_mw.routing.clustered.claimed.turn_queue import OwnRelease
 from fanet_mw.routing.clustered.tdma.turns import Turns
 from fanet_mw.units import MS
 from fanet_mw.wire import Header

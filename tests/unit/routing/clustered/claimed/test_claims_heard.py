@@ -6,9 +6,11 @@ from fanet_mw import wire
 from fanet_mw.bus.messages import Reception
 from fanet_mw.node.node import Node
 from fanet_mw.routing import make_protocol
+from fanet_mw.routing.clustered.claimed.access import ClaimedAccess
+from fanet_mw.routing.clustered.claimed.claiming import Claiming
 from fanet_mw.routing.clustered.claimed.own_turns import Share, draws
-from fanet_mw.routing.clustered.claimed.protocol import Claimed
 from fanet_mw.routing.clustered.claimed.slot_claims import Claim, Hello, SlotClaims
+from fanet_mw.routing.clustered.clustered import Clustered
 from fanet_mw.units import BROADCAST, MS, Enu, NodeId, S
 from fanet_mw.wire import Header, Kind
 from fanet_mw.wire.claims import Claims, Standing
@@ -26,15 +28,27 @@ def node(make_scenario: MakeScenario) -> Node:
     return made
 
 
-def protocol_of(node: Node) -> Claimed:
+def claiming_of(node: Node) -> Claiming:
     protocol = node._protocol
-    assert isinstance(protocol, Claimed)
-    return protocol
+    assert isinstance(protocol, Clustered)
+    assert isinstance(protocol.parts.access, ClaimedAccess)
+    return protocol.parts.access._claiming
+
+
+def test_no_node_calls_itself_leader_where_nobody_assigns_anything(node: Node) -> None:
+    """Neither in its report nor in its hellos on the air, however long it flies."""
+    for second in range(1, 15):
+        node.wake(second * S)
+        node.say_hello(b"", start_ns=second * S, now_ns=second * S)
+    beacons = [Beacon.decode_frame(request.frame) for request in node.requests]
+    assert len(beacons) == 14
+    assert {(beacon.leader, beacon.term, beacon.role) for beacon in beacons} == {(0, 0, Role.ISOLATED)}
+    assert not {"state", "leader", "term"} & node.report().keys(), "it has no part in a swarm that has no parts"
 
 
 @pytest.mark.parametrize(("length", "slot"), [(8, 3), (7, None), (1 << 20, None)])
 def test_a_superframe_that_cannot_be_is_no_claim(node: Node, length: int, slot: int | None) -> None:
-    claim = protocol_of(node)._claim(NodeId(5), Standing(slot=3, length=length, crowd=4))
+    claim = claiming_of(node).claim_of(NodeId(5), Standing(slot=3, length=length, crowd=4))
     assert (claim.slot, claim.crowd) == (slot, 4)
 
 
@@ -45,7 +59,7 @@ def test_a_hello_speaks_for_its_sender_alone(node: Node, speaker: int, known: li
     inner = beacon + Claims(NodeId(speaker), Standing(slot=1, length=8), ()).encode_frames()
     node.hear(Reception(header.encode() + inner, NodeId(3), 5 * MS, -60.0), 5 * MS)
     assert wire.decode_header(header.encode() + inner).origin == 3
-    assert [claims.node for claims in protocol_of(node)._near.alive(now_ns=6 * MS)] == known
+    assert [claims.node for claims in claiming_of(node).near.alive(now_ns=6 * MS)] == known
 
 
 @pytest.mark.parametrize("said", [(3, 1), (1, 3)])

@@ -10,6 +10,7 @@ from fanet_mw.node.node import Node
 from fanet_mw.node.queue import Packet
 from fanet_mw.routing import make_protocol
 from fanet_mw.routing.clustered.forwarding.floods import Floods
+from fanet_mw.routing.clustered.tdma.contention import Contention
 from fanet_mw.scenario import Scenario
 from fanet_mw.units import BROADCAST, MS, Enu, NodeId
 from fanet_mw.wire import FLAG_FLOOD, FLAG_TO_HEAD, Header, Kind, filler
@@ -23,6 +24,11 @@ def node(make_scenario: MakeScenario) -> Node:
     return Node(OURS, make_scenario(**{"nodes.count": 4}), make_protocol, position=Enu(0.0, 0.0, 0.0))
 
 
+def floods(node: Node) -> Floods:
+    stream = node.stream("test").random
+    return Floods(node, None, Contention(lead_ns=0, jitter=stream, window=stream))
+
+
 def packet(*, origin: int = THEIRS, hop_limit: int = 8) -> Packet:
     header = Header(0, 5, origin, BROADCAST, origin, Kind.DATA, hop_limit, 0, 3, FLAG_TO_HEAD)
     return Packet(header, header.encode() + filler(40))
@@ -34,7 +40,7 @@ def hops_left(frame: bytes) -> tuple[int, int]:
 
 
 def test_who_begins_a_flood_knows_it_when_it_comes_back(node: Node) -> None:
-    Floods(node, None).begin([packet()], start_ns=1 * MS)
+    floods(node).begin([packet()], start_ns=1 * MS)
     (request,) = node.requests
     back = wire.rewrite(request.frame, THEIRS, 6, 2, FLAG_FLOOD)
     assert node.hear(Reception(back, THEIRS, 3 * MS, -60.0), 3 * MS), "a copy"
@@ -42,11 +48,11 @@ def test_who_begins_a_flood_knows_it_when_it_comes_back(node: Node) -> None:
 
 @pytest.mark.parametrize(("origin", "left"), [(OURS, (8, 0)), (THEIRS, (7, 1))])
 def test_a_flood_of_our_own_begins_with_all_its_hops(node: Node, origin: int, left: tuple[int, int]) -> None:
-    Floods(node, None).begin([packet(origin=origin)], start_ns=1 * MS)
+    floods(node).begin([packet(origin=origin)], start_ns=1 * MS)
     assert [hops_left(request.frame) for request in node.requests] == [left]
 
 
 @pytest.mark.parametrize(("origin", "hop_limit", "goes"), [(THEIRS, 2, True), (THEIRS, 1, False), (OURS, 1, True)])
 def test_once_more_costs_a_hop_too(node: Node, origin: int, hop_limit: int, goes: bool) -> None:
-    frame = Floods(node, None).again(packet(origin=origin, hop_limit=hop_limit))
+    frame = floods(node).again(packet(origin=origin, hop_limit=hop_limit))
     assert (frame is not None) == goes

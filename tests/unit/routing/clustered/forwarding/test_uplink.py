@@ -39,7 +39,7 @@ def test_a_packet_without_a_way_is_dropped_when_its_class_expires(alone: Node) -
 
 
 def test_a_held_packet_that_has_expired_does_not_go_when_a_way_appears(alone: Node) -> None:
-    uplink = alone._protocol._uplink  # type: ignore[attr-defined]
+    uplink = alone._protocol.parts.uplink  # type: ignore[attr-defined]
     assert uplink.released(now_ns=5 * S + MS) == []
     assert len(uplink) == 0
     assert len(dropped(alone)) == 2

@@ -22,7 +22,10 @@ class Desk:
 
     def __init__(self, scenario: Scenario, *, epoch: int = 0) -> None:
         self.signs = Signs()
-        self.leader = Leader(Authority(0, 1), scenario, self.signs, epoch=epoch, elected=False, now_ns=0)
+        self.leader = Leader(
+            Authority(0, 1), scenario=scenario, signs=self.signs, epoch=epoch, elected=False, now_ns=0,
+            needs_every_link=scenario.clusters.relay == "scheduled",
+        )  # fmt: skip
 
     def join(self, node: int, east_m: float, *, born_ns: int, instead_of: int = 0) -> None:
         join = Join(node, Enu(east_m, 0.0, 50.0), STILL, instead_of)

@@ -1,0 +1,308 @@
+"""Builds the clustered protocol of one node: the only place that asks which `clusters.relay` a scenario has.
+
+clusters.relay          roles      access            relaying
+all, gossip, counter    assigned   slots of heads    contending, by that rule
+heads, cds, mpr         assigned   slots of heads    contending, by nodes that hellos choose
+scheduled               assigned   timetable         by turn; contending until there is one
+claimed                 none       claimed turns     pipelined in those turns
+"""
+
+from collections.abc import Callable, Mapping
+from functools import partial
+from typing import Final, NamedTuple
+
+from fanet_mw.node.contract import Port
+from fanet_mw.node.neighbors import LIFETIME_HELLOS, Neighbors
+from fanet_mw.node.queue import TxQueue, sooner_us
+from fanet_mw.routing.clustered.claimed.access import ClaimedAccess
+from fanet_mw.routing.clustered.claimed.claiming import Claiming, geometry, turn_bytes
+from fanet_mw.routing.clustered.claimed.own_turns import OwnTurns
+from fanet_mw.routing.clustered.claimed.turn_queue import OwnRelease
+from fanet_mw.routing.clustered.clustered import Clustered, Parts
+from fanet_mw.routing.clustered.contract import ScheduledAccess
+from fanet_mw.routing.clustered.forwarding.floods import Floods
+from fanet_mw.routing.clustered.forwarding.gradient import Gradient
+from fanet_mw.routing.clustered.forwarding.repair import Repair
+from fanet_mw.routing.clustered.forwarding.uplink import Uplink
+from fanet_mw.routing.clustered.relaying.by_turn import ByTurn
+from fanet_mw.routing.clustered.relaying.chosen import Choice, Chosen, DominatingSet, HeadsFirst, MultipointRelays
+from fanet_mw.routing.clustered.relaying.contending import Contending
+from fanet_mw.routing.clustered.relaying.neighborhood import Neighborhood
+from fanet_mw.routing.clustered.relaying.pipelined import Pipelined
+from fanet_mw.routing.clustered.relaying.rules import All, Counter, Gossip, Rule
+from fanet_mw.routing.clustered.roles.absent import NoRoles
+from fanet_mw.routing.clustered.roles.assigned import AssignedRoles, RoleParts
+from fanet_mw.routing.clustered.roles.failover import Upkeep
+from fanet_mw.routing.clustered.roles.failure_detector import Silence
+from fanet_mw.routing.clustered.roles.joining import Joining
+from fanet_mw.routing.clustered.roles.leader import Leader
+from fanet_mw.routing.clustered.roles.lease import Lease
+from fanet_mw.routing.clustered.roles.membership import Membership
+from fanet_mw.routing.clustered.roles.position_updates import Whereabouts
+from fanet_mw.routing.clustered.roles.schedule_check import ScheduleCheck
+from fanet_mw.routing.clustered.roles.schedule_refresh import Refresh
+from fanet_mw.routing.clustered.roles.signs_of_life import Signs
+from fanet_mw.routing.clustered.tdma.admission import Admission
+from fanet_mw.routing.clustered.tdma.call_release import CallRelease
+from fanet_mw.routing.clustered.tdma.contention import Contention
+from fanet_mw.routing.clustered.tdma.root_release import RootRelease
+from fanet_mw.routing.clustered.tdma.slot_access import SlotAccess
+from fanet_mw.routing.clustered.tdma.slot_release import Release
+from fanet_mw.routing.clustered.tdma.urgent import reserved
+from fanet_mw.routing.clustered.timetable.link_quality import LinkQuality
+from fanet_mw.routing.clustered.timetable.plans import Plans
+from fanet_mw.routing.clustered.timetable.promises import Promises
+from fanet_mw.routing.clustered.timetable.timetabling import FromPlaces, NoTimetable, Timetabling
+from fanet_mw.routing.clustered.timetable.turn_access import TurnAccess
+from fanet_mw.routing.clustered.timetable.turn_plan import leader_load
+from fanet_mw.units import MS, seconds_to_ns
+
+_STORE_PACKETS: Final = 4096
+"""Packets kept for repair; 4 MB at 1024 B."""
+_JITTER: Final = 0.25
+"""Of the contention window: the most that a relay waits there. A flood whose relays wait for longer than the window
+lasts goes one hop a superframe."""
+_JOINED_NS: Final = 7500 * MS
+"""After its start a node should be in a timetable by then, and three superframes: joins take 3 s, a join may be lost,
+the leader waits a moment for more, and a timetable is announced ahead."""
+
+
+class _Ground(NamedTuple):
+    """What every kind of the protocol stands on."""
+
+    port: Port
+    random: Callable[[], float]
+    contention: Contention
+    neighbors: Neighbors
+    gradient: Gradient
+    uplink: Uplink
+    repair: Repair | None
+    floods: Floods
+
+    @property
+    def hello_ns(self) -> int:
+        return seconds_to_ns(self.port.scenario.routing.hello_interval_s)
+
+    @property
+    def lifetime_ns(self) -> int:
+        """Of what a neighbor said in its last hello."""
+        return int(LIFETIME_HELLOS * self.hello_ns)
+
+    def queue(self) -> TxQueue:
+        """For packets that wait to be let out, most urgent first."""
+        routing = self.port.scenario.routing
+        return TxQueue(capacity=routing.queue_frames, sooner_us=sooner_us(routing))
+
+
+def make_clustered(port: Port) -> Clustered:
+    """The protocol as the port's scenario has it."""
+    return RELAYS[port.scenario.clusters.relay](_ground(port))
+
+
+def _ground(port: Port) -> _Ground:
+    scenario = port.scenario
+    random = port.stream("clustered").random
+    hello_ns = seconds_to_ns(scenario.routing.hello_interval_s)
+    neighbors = Neighbors(lifetime_ns=int(LIFETIME_HELLOS * hello_ns))
+    gradient = Gradient(node=port.node, neighbors=neighbors, hello_ns=hello_ns)
+    contention = Contention(lead_ns=scenario.radio.lead_ns, jitter=random, window=port.stream("window").random)
+    repair = None
+    if scenario.repair_ns:
+        repair = Repair(window_ns=scenario.repair_ns, capacity=_STORE_PACKETS, random=port.stream("repair").random)
+    return _Ground(
+        port=port,
+        random=random,
+        contention=contention,
+        neighbors=neighbors,
+        gradient=gradient,
+        uplink=Uplink(port, gradient),
+        repair=repair,
+        floods=Floods(port, repair, contention),
+    )
+
+
+# --- slots of heads ---------------------------------------------------------------------------------------------------
+
+
+def _by_all(ground: _Ground) -> Clustered:
+    return _in_slots(ground, All())
+
+
+def _by_gossip(ground: _Ground) -> Clustered:
+    return _in_slots(ground, Gossip(ground.port.scenario.clusters, ground.neighbors, ground.random))
+
+
+def _by_counter(ground: _Ground) -> Clustered:
+    rule = Counter(ground.port.scenario.clusters, ground.random)
+    return _in_slots(ground, rule, rule.open_until.overheard)
+
+
+def _by_set(ground: _Ground) -> Clustered:
+    return _by_choice(ground, _membership(ground), DominatingSet(_near(ground)))
+
+
+def _by_mpr(ground: _Ground) -> Clustered:
+    return _by_choice(ground, _membership(ground), MultipointRelays(_near(ground)))
+
+
+def _by_heads(ground: _Ground) -> Clustered:
+    membership = _membership(ground)
+    choice = HeadsFirst(ground.port.node, lifetime_ns=ground.lifetime_ns, membership=membership)
+    return _by_choice(ground, membership, choice)
+
+
+def _membership(ground: _Ground) -> Membership:
+    return Membership(ground.port.node)
+
+
+def _near(ground: _Ground) -> Neighborhood:
+    return Neighborhood(ground.port.node, lifetime_ns=ground.lifetime_ns)
+
+
+def _in_slots(ground: _Ground, rule: Rule, *on_copy: Callable[..., object]) -> Clustered:
+    parts = _role_parts(ground, _membership(ground), takes_slot=True)
+    access = _slots(ground, parts.membership)
+    roles = _roles(ground, parts, access, NoTimetable())
+    relaying = Contending(ground.port, rule, ground.contention)
+    whole = Parts(
+        neighbors=ground.neighbors, gradient=ground.gradient, uplink=ground.uplink, repair=ground.repair,
+        floods=ground.floods, roles=roles, access=access, relaying=relaying, two_hops=None,
+    )  # fmt: skip
+    return _protocol(ground, whole, *on_copy, parts.refresh.overheard)
+
+
+def _by_choice(ground: _Ground, membership: Membership, choice: Choice) -> Clustered:
+    parts = _role_parts(ground, membership, takes_slot=True)
+    access = _slots(ground, membership)
+    roles = _roles(ground, parts, access, NoTimetable())
+    relaying = Chosen(ground.port, choice, Contending(ground.port, All(), ground.contention))
+    whole = Parts(
+        neighbors=ground.neighbors, gradient=ground.gradient, uplink=ground.uplink, repair=ground.repair,
+        floods=ground.floods, roles=roles, access=access, relaying=relaying, two_hops=relaying,
+    )  # fmt: skip
+    return _protocol(ground, whole, parts.refresh.overheard)
+
+
+def _slots(ground: _Ground, membership: Membership) -> SlotAccess:
+    scenario = ground.port.scenario
+    release = Release(ground.queue(), scenario.clusters, lead_ns=scenario.radio.lead_ns)
+    return SlotAccess(ground.port, release, membership=membership, uplink=ground.uplink, floods=ground.floods)
+
+
+# --- a timetable ------------------------------------------------------------------------------------------------------
+
+
+def _by_timetable(ground: _Ground) -> Clustered:
+    port, scenario = ground.port, ground.port.scenario
+    plans = Plans()
+    ground.contention.turns_at = plans.turns_at
+    ground.contention.most_jitter_ns = round(scenario.clusters.contention_ms * MS * _JITTER)
+    parts = _role_parts(ground, _membership(ground), takes_slot=False)
+    lead_ns = scenario.radio.lead_ns
+    roots = RootRelease(port.node, ground.queue(), reserved=reserved(scenario), lead_ns=lead_ns)
+    calls = CallRelease(TxQueue(capacity=scenario.routing.queue_frames), lead_ns=lead_ns)
+    promises = Promises(port, plans=plans, roots=roots, lease=parts.lease, admission=_admission(port))
+    access = TurnAccess(
+        port, plans=plans, roots=roots, calls=calls, slots=_slots(ground, parts.membership), promises=promises,
+        floods=ground.floods, contention=ground.contention,
+    )  # fmt: skip
+    timetabling = FromPlaces(
+        port, lease=parts.lease, membership=parts.membership, refresh=parts.refresh, promises=promises, access=access
+    )
+    relaying = ByTurn(port, plans, Contending(port, All(), ground.contention))
+    whole = Parts(
+        neighbors=ground.neighbors, gradient=ground.gradient, uplink=ground.uplink, repair=ground.repair,
+        floods=ground.floods, roles=_roles(ground, parts, access, timetabling), access=access, relaying=relaying,
+        two_hops=None,
+    )  # fmt: skip
+    return _protocol(ground, whole, parts.refresh.overheard, calls.overheard)
+
+
+def _admission(port: Port) -> Admission | None:
+    """Where the application states a deadline; a leader whose packets have no turns promises nothing."""
+    scenario = port.scenario
+    if scenario.traffic.deadline_s is None or (port.node == scenario.leader and not leader_load(scenario)):
+        return None
+    return Admission(
+        port.node,
+        deadline_ns=seconds_to_ns(scenario.traffic.deadline_s),
+        interval_ns=seconds_to_ns(scenario.traffic.interval_s),
+        expected_ns=_JOINED_NS + 3 * scenario.clusters.period_ns,
+    )
+
+
+# --- roles ------------------------------------------------------------------------------------------------------------
+
+
+def _role_parts(ground: _Ground, membership: Membership, *, takes_slot: bool) -> RoleParts:
+    """`takes_slot`: a node that stands in for a head serves its slot, and nobody else need be watched; else whoever
+    hears of a silent node only tells the leader.
+    """
+    port, scenario = ground.port, ground.port.scenario
+    signs = Signs()
+    lease = Lease(port.node, period_ns=scenario.clusters.period_ns, signs=signs)
+    links = LinkQuality(port.node, hello_ns=ground.hello_ns) if scenario.measures_links else None
+    updates = Whereabouts(range_m=scenario.clusters.link_m or scenario.radio.range_m)
+    return RoleParts(
+        membership=membership,
+        lease=lease,
+        failover=Upkeep(
+            membership=membership, gradient=ground.gradient, signs=signs, lease=lease, node=port.node,
+            hello_ns=ground.hello_ns, takes_slot=takes_slot,
+        ),
+        joining=Joining(port, updates, links, ground.random),
+        refresh=Refresh(port.stream("refresh").random),
+        check=ScheduleCheck(port, membership),
+        detector=None if takes_slot else Silence(signs, hello_ns=ground.hello_ns),
+        links=links,
+        signs=signs,
+    )  # fmt: skip
+
+
+def _roles(ground: _Ground, parts: RoleParts, access: ScheduledAccess, timetabling: Timetabling) -> AssignedRoles:
+    make_leader = partial(
+        Leader, scenario=ground.port.scenario, signs=parts.signs, needs_every_link=timetabling.needs_every_link
+    )
+    return AssignedRoles(
+        ground.port, parts, gradient=ground.gradient, access=access, timetabling=timetabling, make_leader=make_leader
+    )
+
+
+# --- claimed slots ----------------------------------------------------------------------------------------------------
+
+
+def _by_claims(ground: _Ground) -> Clustered:
+    port, scenario = ground.port, ground.port.scenario
+    size = turn_bytes(scenario)
+    own = OwnTurns(geometry(scenario, size))
+    ground.contention.turns_at = lambda _: own.turns
+    claiming = Claiming(port, own)
+    frame_bytes = scenario.radio.max_frame_bytes if scenario.routing.aggregate else 0
+    access = ClaimedAccess(
+        port, claiming=claiming, turn_bytes=size, gradient=ground.gradient, uplink=ground.uplink,
+        queue=OwnRelease(ground.queue(), own, lead_ns=scenario.radio.lead_ns, frame_bytes=frame_bytes),
+        floods=ground.floods, contention=ground.contention,
+    )  # fmt: skip
+    relaying = Pipelined(port, claiming, access, Contending(port, All(), ground.contention))
+    whole = Parts(
+        neighbors=ground.neighbors, gradient=ground.gradient, uplink=ground.uplink, repair=ground.repair,
+        floods=ground.floods, roles=NoRoles(port), access=access, relaying=relaying, two_hops=access,
+    )  # fmt: skip
+    return _protocol(ground, whole)
+
+
+def _protocol(ground: _Ground, whole: Parts, *on_copy: Callable[..., object]) -> Clustered:
+    repaired = () if ground.repair is None else (ground.repair.overheard,)
+    return Clustered(ground.port, whole, [*on_copy, *repaired])
+
+
+RELAYS: Final[Mapping[str, Callable[[_Ground], Clustered]]] = {
+    "all": _by_all,
+    "gossip": _by_gossip,
+    "counter": _by_counter,
+    "heads": _by_heads,
+    "cds": _by_set,
+    "mpr": _by_mpr,
+    "scheduled": _by_timetable,
+    "claimed": _by_claims,
+}

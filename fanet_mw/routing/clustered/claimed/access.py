@@ -1,0 +1,157 @@
+"""Access by claimed slots: the clustered protocol in slots that nodes agree on over the air, without a leader.
+
+    listen -> claim a slot free within two hops, say so in hellos -> own packets and relays go in turns of its own
+
+Every node that holds a slot lets its packets out itself; one that holds none yet brings them to a neighbor that does,
+as acknowledged unicast in the contention window at the beginning of each period. A period holds as many superframes as
+fit; lengths of superframes and spare turns: `slot_claims.py`, `own_turns.py`.
+
+Hellos go in a turn of the node or in the contention window, at random: in a turn no other of two hops disturbs them,
+but two that claim one slot and hear each other, or share a neighbor, would never learn of it. The window is short: a
+hello that is lost in it comes in a turn the next time.
+
+Bound: a packet that finds none before it leaves within `hop_ms` (report), each hop. There is no bound end to end when
+packets queue: how many come together at a relay depends on all sources and on the way here. Not modeled: interference
+from beyond two hops; clocks that disagree by more than `clusters.turn_slack_us` allows (no bound is stated then).
+"""
+
+from collections.abc import Mapping
+from typing import Final
+
+from fanet_mw.bounds.turn_gaps import TurnServer
+from fanet_mw.errors import DropReason
+from fanet_mw.node.contract import Port
+from fanet_mw.node.queue import Packet
+from fanet_mw.routing.clustered.claimed.claiming import Change, Claiming
+from fanet_mw.routing.clustered.claimed.turn_queue import OwnRelease
+from fanet_mw.routing.clustered.forwarding.floods import Floods
+from fanet_mw.routing.clustered.forwarding.gradient import Gradient
+from fanet_mw.routing.clustered.forwarding.uplink import Uplink
+from fanet_mw.routing.clustered.tdma.contention import Contention
+from fanet_mw.routing.clustered.tdma.turns import clocks_fit
+from fanet_mw.units import MS, US, NodeId, seconds_to_ns
+from fanet_mw.wire import Kind
+from fanet_mw.wire.claims import Claims
+from fanet_mw.wire.inner import Beacon
+
+_NO_HEAD: Final = NodeId(0)
+
+
+class ClaimedAccess:
+    """The claimed turns of one node, and its way to a neighbor that has some while it has none."""
+
+    def __init__(
+        self,
+        port: Port,
+        *,
+        claiming: Claiming,
+        queue: OwnRelease,
+        turn_bytes: int,
+        gradient: Gradient,
+        uplink: Uplink,
+        floods: Floods,
+        contention: Contention,
+    ) -> None:
+        self._port = port
+        self._claiming = claiming
+        self._queue = queue
+        self._turn_bytes = turn_bytes
+        self._gradient = gradient
+        self._uplink = uplink
+        self._floods = floods
+        self._contention = contention
+        self._lead_ns = port.scenario.radio.lead_ns
+        self._lifetime_ns = seconds_to_ns(port.scenario.routing.lifetime_s)
+
+    def start(self, now_ns: int) -> None:
+        """No join: nobody assigns anything."""
+        self._claiming.start(now_ns)
+
+    # --- letting out ----------------------------------------------------------------------------------------------
+
+    def admits(self, packet: Packet, *, due_ns: int) -> bool:
+        return True
+
+    def originate(self, packet: Packet, *, due_ns: int, now_ns: int) -> None:
+        self.forward(packet, start_ns=due_ns, now_ns=now_ns)
+
+    def forward(self, packet: Packet, *, start_ns: int, now_ns: int, tries: int = 0) -> None:
+        if self._claiming.own.share is None:
+            start_ns = self._contention.not_before(start_ns)
+            self._uplink.send(packet, start_ns=start_ns, now_ns=now_ns, tries=tries)
+        else:
+            self.let_out(packet, now_ns=now_ns)
+
+    def let_out(self, packet: Packet, *, now_ns: int) -> None:
+        """Queue a packet for the turns of this node: one of its own, or one that it relays."""
+        if len(packet.frame) > self._turn_bytes:
+            self._port.drop(DropReason.TOO_LARGE, packet, now_ns=now_ns)
+            return
+        self._claiming.push()
+        evicted = self._queue.push(packet, now_ns=now_ns)
+        if evicted is not None:
+            self._port.drop(DropReason.QUEUE_FULL, evicted, now_ns=now_ns)
+
+    def flood_control(self, kind: Kind, inner: bytes, *, now_ns: int, urgent: bool = False) -> Packet:
+        return self._floods.contend_control(kind, inner, now_ns=now_ns)
+
+    def answer(self, packet: Packet, *, now_ns: int) -> None:
+        self._floods.contend_again(packet, now_ns=now_ns)
+
+    # --- hellos ---------------------------------------------------------------------------------------------------
+
+    def hello_start_ns(self, start_ns: int, *, size: int) -> int:
+        if size <= self._turn_bytes and self._contention.by_chance(0.5):
+            own_ns = self._queue.reserve(not_before_ns=start_ns)
+            if own_ns is not None:
+                return own_ns
+        return self._contention.not_before(start_ns)
+
+    def claims(self, now_ns: int) -> Claims:
+        """Settle the claim, and what follows from it, once per hello."""
+        change = self._claiming.settle(now_ns)
+        if change is Change.WON:
+            self._gradient.join(self._port.node, now_ns=now_ns)
+            for packet in self._uplink.drain():
+                self.let_out(packet, now_ns=now_ns)
+        elif change is Change.LOST:
+            self._gradient.join(_NO_HEAD, now_ns=now_ns)
+            for packet in self._queue.drain():
+                self.forward(packet, start_ns=now_ns + self._lead_ns, now_ns=now_ns)
+        standing = self._claiming.standing(waiting=len(self._queue), now_ns=now_ns)
+        return Claims(self._port.node, standing, self._claiming.near.heard(now_ns=now_ns))
+
+    def on_claims(self, claims: Claims, beacon: Beacon, *, now_ns: int) -> None:
+        self._claiming.on_claims(claims, now_ns=now_ns)
+
+    # --- time -----------------------------------------------------------------------------------------------------
+
+    def next_wake_ns(self) -> int | None:
+        return self._queue.next_wake_ns()
+
+    def wake(self, now_ns: int) -> None:
+        for packet in self._queue.expire(before_us=(now_ns - self._lifetime_ns) // US):
+            self._port.drop(DropReason.EXPIRED, packet, now_ns=now_ns)
+        if len(self._queue):
+            self._claiming.draw(now_ns)
+        for packets, start_ns in self._queue.due(now_ns=now_ns):
+            self._floods.begin(packets, start_ns=start_ns)
+
+    # --- for people -----------------------------------------------------------------------------------------------
+
+    def waiting(self) -> int:
+        return len(self._queue)
+
+    def hop_ns(self) -> int | None:
+        """The longest that a packet may take over this node when none is before it: one turn may go to a hello."""
+        turns, claimed = self._claiming.own.turns, self._claiming.own.claimed()
+        scenario = self._port.scenario
+        if not claimed or not clocks_fit(scenario, clock_error_ns=self._port.clock_error_ns):
+            return None
+        starts = tuple(turns.start_ns(turn, frame_start_ns=0) for turn in claimed)
+        ahead_ns = self._lead_ns + scenario.radio.handover_ns
+        return TurnServer(turns.turn_ns, turns.period_ns, starts, ahead_ns).completion_ns(2)
+
+    def report(self) -> Mapping[str, object]:
+        hop_ns = self.hop_ns()
+        return {**self._claiming.report(), "hop_ms": None if hop_ns is None else hop_ns / MS}

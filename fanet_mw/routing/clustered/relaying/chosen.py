@@ -1,0 +1,138 @@
+"""Relays chosen by what hellos say of the two hops around: `heads`, `cds`, `mpr`.
+
+`heads`  cluster heads, and the nodes that are needed to connect them: a dominating set in which heads come first
+`cds`    the connected dominating set of Wu and Li, each node deciding for itself (`graph/connected_dominating_set.py`)
+`mpr`    the nodes that the last sender chose as multipoint relays; the first copy decides (RFC 3626, 3.4.1 and 8.3.1)
+
+A node that came up less than four hello intervals ago knows too little and relays. With no relay to spare a loss is a
+loss for all behind it: where relays contend, fewer of them deliver less than `all` does.
+"""
+
+from collections.abc import Mapping, Sequence
+from typing import Final, Protocol
+
+from fanet_mw.bus.messages import Reception
+from fanet_mw.node.contract import Port
+from fanet_mw.node.queue import Packet
+from fanet_mw.routing.clustered.contract import Relaying
+from fanet_mw.routing.clustered.relaying.neighborhood import Neighborhood
+from fanet_mw.routing.clustered.roles.membership import Membership
+from fanet_mw.units import NodeId, seconds_to_ns
+from fanet_mw.wire import Kind
+from fanet_mw.wire.claims import Claims, Standing
+from fanet_mw.wire.inner import Beacon, Role
+
+_LEARN: Final = 4
+"""Hello intervals after which the two hops are known: one for the neighbors, one for theirs, and two may be lost."""
+
+
+class Choice(Protocol):
+    """Which nodes relay, once the two hops are known."""
+
+    near: Neighborhood
+
+    def before_hello(self, now_ns: int) -> None:
+        """The node's next hello is about to say what this choice asks it to say."""
+
+    def on_beacon(self, beacon: Beacon) -> None:
+        """A neighbor said what it is."""
+
+    def relays(self, sender: NodeId, *, now_ns: int) -> bool:
+        """Whether the node relays what `sender` transmitted."""
+
+
+class MultipointRelays:
+    """Each node chooses those of its neighbors that relay what it sends."""
+
+    def __init__(self, near: Neighborhood) -> None:
+        self.near = near
+
+    def before_hello(self, now_ns: int) -> None:
+        self.near.choose_relays(now_ns=now_ns)
+
+    def on_beacon(self, beacon: Beacon) -> None:
+        """What a neighbor is makes no difference."""
+
+    def relays(self, sender: NodeId, *, now_ns: int) -> bool:
+        return self.near.chosen_by(sender)
+
+
+class DominatingSet:
+    """A node relays if the connected dominating set needs it."""
+
+    def __init__(self, near: Neighborhood) -> None:
+        self.near = near
+
+    def before_hello(self, now_ns: int) -> None:
+        """The set needs no word of the node itself."""
+
+    def on_beacon(self, beacon: Beacon) -> None:
+        """What a neighbor is makes no difference."""
+
+    def relays(self, sender: NodeId, *, now_ns: int) -> bool:
+        return self.near.dominates(own_rank=0.0, now_ns=now_ns)
+
+
+class HeadsFirst:
+    """Cluster heads relay, and those that the dominating set needs to connect them."""
+
+    def __init__(self, node: NodeId, *, lifetime_ns: int, membership: Membership) -> None:
+        self._membership = membership
+        self._is_head: dict[int, bool] = {}
+        self.near = Neighborhood(node, lifetime_ns=lifetime_ns, rank=self._rank)
+
+    def _rank(self, node: NodeId, _: Standing) -> float:
+        return float(self._is_head.get(node, False))
+
+    def before_hello(self, now_ns: int) -> None:
+        """The beacon says of the node whether it is a head."""
+
+    def on_beacon(self, beacon: Beacon) -> None:
+        is_head = beacon.role == Role.HEAD
+        if self._is_head.get(beacon.node) is not is_head:
+            self._is_head[beacon.node] = is_head
+            self.near.forget_rank()
+
+    def relays(self, sender: NodeId, *, now_ns: int) -> bool:
+        return self._membership.is_head or self.near.dominates(own_rank=0.0, now_ns=now_ns)
+
+
+class Chosen:
+    """The relays of one node where hellos decide who relays data; control goes on as `otherwise` says."""
+
+    def __init__(self, port: Port, choice: Choice, otherwise: Relaying) -> None:
+        self._node = port.node
+        self._learn_ns = _LEARN * seconds_to_ns(port.scenario.routing.hello_interval_s)
+        self._choice = choice
+        self._otherwise = otherwise
+        self._known_ns = 0
+
+    def start(self, now_ns: int) -> None:
+        self._known_ns = now_ns + self._learn_ns
+        self._otherwise.start(now_ns)
+
+    def on_flood(self, packet: Packet, reception: Reception, *, at_once: bool, now_ns: int) -> Sequence[int]:
+        is_data = packet.header.kind == Kind.DATA
+        if is_data and now_ns >= self._known_ns and not self._choice.relays(reception.src, now_ns=now_ns):
+            return ()
+        return self._otherwise.on_flood(packet, reception, at_once=at_once, now_ns=now_ns)
+
+    def claims(self, now_ns: int) -> Claims:
+        self._choice.before_hello(now_ns)
+        return Claims(self._node, Standing(), self._choice.near.heard(now_ns=now_ns))
+
+    def on_claims(self, claims: Claims, beacon: Beacon, *, now_ns: int) -> None:
+        self._choice.near.hear(claims, now_ns=now_ns)
+        self._choice.on_beacon(beacon)
+
+    def decided(self, now_ns: int) -> Sequence[tuple[Packet, int]]:
+        return self._otherwise.decided(now_ns)
+
+    def next_wake_ns(self) -> int | None:
+        return self._otherwise.next_wake_ns()
+
+    def waiting(self) -> int:
+        return self._otherwise.waiting()
+
+    def report(self) -> Mapping[str, object]:
+        return self._otherwise.report()

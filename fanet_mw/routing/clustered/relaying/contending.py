@@ -1,0 +1,53 @@
+"""Relays that contend: a flooded packet goes on after a random jitter if a rule says so; urgent control always does."""
+
+from collections.abc import Mapping, Sequence
+from typing import Final
+
+from fanet_mw.bus.messages import Reception
+from fanet_mw.errors import DropReason
+from fanet_mw.node.contract import Port
+from fanet_mw.node.queue import Packet
+from fanet_mw.routing.clustered.relaying.rules import Rule
+from fanet_mw.routing.clustered.tdma.contention import Contention
+from fanet_mw.units import MS
+
+_CONTROL_JITTER_NS: Final = 100 * MS
+_NOTHING: Final[Mapping[str, object]] = {}
+
+
+class Contending:
+    """The relays of one node that go as soon as they may contend."""
+
+    def __init__(self, port: Port, rule: Rule, contention: Contention) -> None:
+        self._port = port
+        self._rule = rule
+        self._contention = contention
+        self._jitter_ns = port.scenario.routing.jitter_ns
+
+    def start(self, now_ns: int) -> None:
+        """No packet is known yet."""
+
+    def on_flood(self, packet: Packet, reception: Reception, *, at_once: bool, now_ns: int) -> Sequence[int]:
+        if packet.header.destination == self._port.node:
+            return ()
+        if packet.header.hop_limit <= 1:
+            self._port.drop(DropReason.HOP_LIMIT, packet, now_ns=now_ns)
+            return ()
+        if at_once:
+            return (self._contention.start_ns(now_ns=now_ns, jitter_ns=_CONTROL_JITTER_NS),)
+        if self._rule.relays_now(packet, now_ns=now_ns):
+            return (self._contention.start_ns(now_ns=now_ns, jitter_ns=self._jitter_ns),)
+        return ()
+
+    def decided(self, now_ns: int) -> Sequence[tuple[Packet, int]]:
+        packets = self._rule.open_until.decided(now_ns=now_ns)
+        return [(packet, self._contention.start_ns(now_ns=now_ns)) for packet in packets]
+
+    def next_wake_ns(self) -> int | None:
+        return self._rule.open_until.next_wake_ns()
+
+    def waiting(self) -> int:
+        return len(self._rule.open_until)
+
+    def report(self) -> Mapping[str, object]:
+        return _NOTHING

@@ -1,0 +1,48 @@
+"""Relays in claimed turns: many floods at once, each passed on as the relay's next turn comes (pipelined)."""
+
+from collections.abc import Mapping, Sequence
+
+from fanet_mw.bus.messages import Reception
+from fanet_mw.errors import DropReason
+from fanet_mw.node.contract import Port
+from fanet_mw.node.queue import Packet
+from fanet_mw.routing.clustered.claimed.access import ClaimedAccess
+from fanet_mw.routing.clustered.claimed.claiming import Claiming
+from fanet_mw.routing.clustered.contract import Relaying
+from fanet_mw.wire import Kind
+
+
+class Pipelined:
+    """The relays of one node, which wait behind its own packets; what is no data goes on as `otherwise` says."""
+
+    def __init__(self, port: Port, claiming: Claiming, access: ClaimedAccess, otherwise: Relaying) -> None:
+        self._port = port
+        self._claiming = claiming
+        self._access = access
+        self._otherwise = otherwise
+
+    def start(self, now_ns: int) -> None:
+        self._otherwise.start(now_ns)
+
+    def on_flood(self, packet: Packet, reception: Reception, *, at_once: bool, now_ns: int) -> Sequence[int]:
+        header = packet.header
+        if header.kind != Kind.DATA:
+            return self._otherwise.on_flood(packet, reception, at_once=at_once, now_ns=now_ns)
+        if header.destination != self._port.node and self._claiming.relays(now_ns):
+            if header.hop_limit <= 1:
+                self._port.drop(DropReason.HOP_LIMIT, packet, now_ns=now_ns)
+            else:
+                self._access.let_out(packet, now_ns=now_ns)
+        return ()
+
+    def decided(self, now_ns: int) -> Sequence[tuple[Packet, int]]:
+        return self._otherwise.decided(now_ns)
+
+    def next_wake_ns(self) -> int | None:
+        return self._otherwise.next_wake_ns()
+
+    def waiting(self) -> int:
+        return self._otherwise.waiting()
+
+    def report(self) -> Mapping[str, object]:
+        return self._otherwise.report()

@@ -1,0 +1,66 @@
+"""No roles: nobody leads, nobody assigns anything, and every node lets out its own packets."""
+
+from collections.abc import Mapping
+
+from fanet_mw.node.contract import Port
+from fanet_mw.node.neighbors import Neighbor
+from fanet_mw.node.queue import Packet
+from fanet_mw.routing.clustered.forwarding.gradient import UNREACHABLE, Route
+from fanet_mw.units import NodeId
+from fanet_mw.wire.inner import Beacon, Role
+
+
+class NoRoles:
+    """A node that is nothing but itself. Its beacon says how far it is from a node that lets packets out."""
+
+    def __init__(self, port: Port) -> None:
+        self._port = port
+
+    def start(self, now_ns: int) -> None:
+        """There is nobody to join."""
+
+    def on_sign_of_life(self, node: int, *, born_ns: int, now_ns: int) -> None:
+        """Nobody watches over others."""
+
+    def on_control(self, packet: Packet, src: NodeId, *, now_ns: int) -> bool:
+        """No node of such a swarm sends control packets: they are relayed like data, and mean nothing."""
+        return False
+
+    def on_hello(self, neighbor: Neighbor, *, born_ns: int, now_ns: int) -> None:
+        """What a neighbor says of leaders does not count."""
+
+    def on_impersonation(self, packet: Packet, *, now_ns: int) -> None:
+        """There is no leader in whose name anything could be announced."""
+
+    def on_flooding(self, due_ns: int) -> None:
+        """Nobody needs to know that the node lives."""
+
+    def on_parent_lost(self, parent: NodeId, *, now_ns: int) -> None:
+        """No parent is anybody's head."""
+
+    def before_hello(self, now_ns: int) -> None:
+        """Nothing goes with the rhythm of the hellos."""
+
+    def beacon(self, route: Route | None, *, now_ns: int) -> Beacon:
+        return Beacon(
+            node=self._port.node,
+            head=route.head if route else 0,
+            head_seq=route.head_seq if route else 0,
+            cluster=0,
+            epoch=0,
+            slot=0,
+            role=Role.ISOLATED,
+            hops_to_head=route.hops if route else UNREACHABLE,
+        )
+
+    def hello_share(self, now_ns: int) -> float:
+        return 1.0
+
+    def next_wake_ns(self) -> int | None:
+        return None
+
+    def wake(self, now_ns: int) -> None:
+        """Nothing is ever due."""
+
+    def report(self) -> Mapping[str, object]:
+        return {}

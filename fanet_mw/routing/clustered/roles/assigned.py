@@ -1,0 +1,296 @@
+"""Roles that a leader assigns: nodes join by a flooded JOIN, the leader answers with a flooded SCHEDULE.
+
+What becomes of a node when heads and leaders die, and parts of the swarm meet, is decided in `failover.py` by the table
+of `states.py`; this file carries it out: it joins, announces, and tells the access what the node is now.
+"""
+
+from collections.abc import Mapping, Sequence
+from typing import NamedTuple, Protocol
+
+from fanet_mw.bounds.guard import slot_guard_ns
+from fanet_mw.errors import MalformedFrameError
+from fanet_mw.node.arrival import decoded
+from fanet_mw.node.contract import Port
+from fanet_mw.node.neighbors import Neighbor
+from fanet_mw.node.queue import Packet
+from fanet_mw.routing.clustered.contract import ScheduledAccess
+from fanet_mw.routing.clustered.forwarding.gradient import UNREACHABLE, Gradient, Route
+from fanet_mw.routing.clustered.roles.failover import Upkeep
+from fanet_mw.routing.clustered.roles.failure_detector import Silence
+from fanet_mw.routing.clustered.roles.joining import Joining
+from fanet_mw.routing.clustered.roles.leader import Leader
+from fanet_mw.routing.clustered.roles.lease import Authority, Lease
+from fanet_mw.routing.clustered.roles.membership import Membership
+from fanet_mw.routing.clustered.roles.schedule_check import ScheduleCheck
+from fanet_mw.routing.clustered.roles.schedule_refresh import Refresh
+from fanet_mw.routing.clustered.roles.signs_of_life import Signs
+from fanet_mw.routing.clustered.roles.states import Action
+from fanet_mw.routing.clustered.timetable.link_quality import LinkQuality
+from fanet_mw.routing.clustered.timetable.timetabling import Timetabling
+from fanet_mw.units import US, NodeId, earliest
+from fanet_mw.wire import Kind
+from fanet_mw.wire.inner import Beacon, Join, Schedule
+from fanet_mw.wire.links import Links
+
+
+class MakeLeader(Protocol):
+    """Makes the leader's part of a node that takes office."""
+
+    def __call__(self, authority: Authority, *, epoch: int, elected: bool, now_ns: int) -> Leader: ...
+
+
+class RoleParts(NamedTuple):
+    """What the roles of a node are made of."""
+
+    membership: Membership
+    lease: Lease
+    failover: Upkeep
+    joining: Joining
+    refresh: Refresh
+    check: ScheduleCheck
+    detector: Silence | None
+    """None: a silent neighbor is nobody's business but that of its cluster."""
+    links: LinkQuality | None
+    """None: links are not measured."""
+    signs: Signs
+
+
+class AssignedRoles:
+    """The roles of one node."""
+
+    def __init__(
+        self,
+        port: Port,
+        parts: RoleParts,
+        *,
+        gradient: Gradient,
+        access: ScheduledAccess,
+        timetabling: Timetabling,
+        make_leader: MakeLeader,
+    ) -> None:
+        self.parts = parts
+        self._port = port
+        self._gradient = gradient
+        self._access = access
+        self._timetabling = timetabling
+        self._make_leader = make_leader
+        self._leader: Leader | None = None
+        self._standing = parts.membership.standing
+        """The place of the node as the access knows it."""
+
+    def start(self, now_ns: int) -> None:
+        leads = self._port.node == self._port.scenario.leader
+        self.parts.failover.start(now_ns, leads=leads)
+        if self.parts.links is not None:
+            self.parts.links.start(now_ns)
+        if leads:
+            self._lead(elected=False, now_ns=now_ns)
+        else:
+            self.parts.joining.start(now_ns)
+
+    # --- what the air brings --------------------------------------------------------------------------------------
+
+    def on_sign_of_life(self, node: int, *, born_ns: int, now_ns: int) -> None:
+        actions = self.parts.failover.lives(node, born_ns=min(born_ns, now_ns), now_ns=now_ns)
+        if actions:
+            self._do(actions, now_ns)
+
+    def on_control(self, packet: Packet, src: NodeId, *, now_ns: int) -> bool:
+        kind, ours = packet.header.kind, packet.header.origin == self._port.node
+        if kind == Kind.JOIN:
+            join = decoded(packet, Join.decode_frame)
+            self._on_join(packet, join, src, now_ns)
+            # The join of a node that has a place only tells where it is, and need not be relayed by everyone.
+            return bool(join.instead_of) or not self.parts.membership.lists(packet.header.origin)
+        if kind == Kind.SCHEDULE and not ours:
+            self.parts.check.check(decoded(packet, Schedule.decode_frame), now_ns)
+            self._on_schedule(packet, now_ns=now_ns)
+        elif kind == Kind.LINKS and not ours and self.parts.links is not None:
+            self._timetabling.on_links(packet, now_ns=now_ns)
+        return kind == Kind.SCHEDULE
+
+    def _on_join(self, packet: Packet, join: Join, src: NodeId, now_ns: int) -> None:
+        parts, header, born_ns = self.parts, packet.header, min(packet.header.origin_us * US, now_ns)
+        if join.node != header.origin or join.instead_of > self._port.scenario.nodes.count:
+            raise MalformedFrameError(f"join of {join.node} instead of {join.instead_of} by {header.origin}")
+        if self._leader is not None:
+            told = decoded(packet, Links.decode_frames) if parts.links is not None else None
+            self._leader.joined(join, born_ns=born_ns, now_ns=now_ns)
+            if told is not None:
+                self._leader.measured(NodeId(join.node), told.links)
+        if join.instead_of:
+            if parts.detector is not None:
+                parts.detector.said(NodeId(join.instead_of), now_ns=now_ns)
+            self._do(parts.failover.stands_in(join, born_ns=born_ns, now_ns=now_ns), now_ns)
+        if join.node == parts.membership.head:
+            self._gradient.flooded(NodeId(join.node), parent=src, hops=header.hops + 1, now_ns=now_ns)
+
+    def _on_schedule(self, packet: Packet, *, now_ns: int) -> None:
+        """An announcement of a leader, perhaps of this node."""
+        schedule, parts = decoded(packet, Schedule.decode_frame), self.parts
+        places = self._timetabling.read(packet, schedule)
+        if schedule.leader != packet.header.origin:
+            raise MalformedFrameError(f"schedule of {schedule.leader} by {packet.header.origin}")
+        before = parts.membership.version
+        actions = parts.failover.announced(
+            schedule,
+            guard_ns=slot_guard_ns(self._port.scenario, clock_error_ns=self._port.clock_error_ns),
+            born_ns=min(packet.header.origin_us * US, now_ns),
+            now_ns=now_ns,
+        )
+        if parts.membership.version != before:
+            parts.check.renewed(now_ns)
+        authority = Authority(schedule.term, schedule.leader)
+        if authority == parts.lease.authority and schedule.epoch == self._epoch_followed:
+            parts.refresh.keep(packet, schedule.part, authority, schedule.epoch, now_ns=now_ns)
+        self._do(actions, now_ns)
+        if parts.membership.is_head:
+            self._access.renew_slot()
+        self._timetabling.on_schedule(packet, schedule, places, now_ns=now_ns)
+
+    def on_impersonation(self, packet: Packet, *, now_ns: int) -> None:
+        """A schedule in the leader's name: it announces a later one (as of link states in OSPF, RFC 2328, 13.4)."""
+        if packet.header.kind == Kind.SCHEDULE and self._leader is not None:
+            schedule = decoded(packet, Schedule.decode_frame)
+            self.parts.check.check(schedule, now_ns)
+            if Authority(schedule.term, schedule.leader) == self.parts.lease.authority:
+                self._leader.outbid(schedule.epoch, now_ns=now_ns)
+
+    def on_hello(self, neighbor: Neighbor, *, born_ns: int, now_ns: int) -> None:
+        parts = self.parts
+        if parts.detector is not None:
+            parts.detector.heard(neighbor.node, now_ns=now_ns)
+        if parts.links is not None:
+            parts.links.hello(neighbor.node, rssi_dbm=neighbor.rssi_dbm, now_ns=now_ns)
+        self.on_sign_of_life(neighbor.node, born_ns=born_ns, now_ns=now_ns)
+        if parts.lease.fresh(now_ns):
+            parts.refresh.compare(neighbor.beacon, now_ns=now_ns)
+
+    def on_flooding(self, due_ns: int) -> None:
+        self.parts.joining.on_flooding(due_ns)
+
+    def on_parent_lost(self, parent: NodeId, *, now_ns: int) -> None:
+        self.parts.failover.given_up(parent, now_ns=now_ns)
+
+    # --- the node's part in the swarm -----------------------------------------------------------------------------
+
+    @property
+    def _epoch_followed(self) -> int:
+        """The newest epoch of the leader that the node obeys; 0: it has only called so far."""
+        version = self.parts.membership.version
+        return version.epoch if version and version.authority == self.parts.lease.authority else 0
+
+    def _do(self, actions: Sequence[Action], now_ns: int) -> None:
+        """Carry out what the table asks for."""
+        parts = self.parts
+        for action in actions:
+            if action is Action.CALL:
+                self._lead(elected=True, now_ns=now_ns)
+            elif action in (Action.JOIN, Action.LEAVE, Action.STEP_DOWN):
+                self._leader = None
+                parts.joining.ask_for_a_place(now_ns)
+            elif action in (Action.TAKE_OVER, Action.OBJECT):
+                silent = parts.failover.silent_head if action is Action.TAKE_OVER else self._port.node
+                self._join(now_ns, instead_of=silent)
+            elif parts.failover.placed:
+                parts.joining.rest()
+        if self._standing != parts.membership.standing:
+            self._standing = parts.membership.standing
+            self._change_role(now_ns)
+
+    def _change_role(self, now_ns: int) -> None:
+        self._gradient.join(self._standing.head, now_ns=now_ns)
+        self._port.record(self._standing.at(now_ns, self._port.node))
+        if self.parts.membership.is_head:
+            self._access.serve(now_ns)
+
+    def _lead(self, *, elected: bool, now_ns: int) -> None:
+        authority = self.parts.lease.authority
+        assert authority is not None, "a node that leads has taken office"
+        self.parts.joining.rest()
+        self._leader = self._make_leader(authority, epoch=self.parts.membership.epoch, elected=elected, now_ns=now_ns)
+
+    def _join(self, now_ns: int, *, instead_of: int = 0) -> None:
+        """Tell everyone where the node is, and the leader that it wants a place if it has none."""
+        again = not self.parts.failover.placed and self._leader is None
+        inner = self.parts.joining.join(instead_of=instead_of, again=again, now_ns=now_ns)
+        self._access.flood_control(Kind.JOIN, inner, now_ns=now_ns, urgent=instead_of == self._port.node)
+
+    def _announce(self, part: Schedule, leader: Leader, *, now_ns: int) -> None:
+        """Flood a part of the leader's assignment, which holds for the leader as well."""
+        inner = part.encode_frame(self._port.node) + self._timetabling.addition(part, leader)
+        self._on_schedule(self._access.flood_control(Kind.SCHEDULE, inner, now_ns=now_ns), now_ns=now_ns)
+        for links in self._timetabling.links_after(part, leader) if self._leader is not None else ():
+            self._timetabling.on_links(self._access.flood_control(Kind.LINKS, links, now_ns=now_ns), now_ns=now_ns)
+
+    # --- hellos ---------------------------------------------------------------------------------------------------
+
+    def before_hello(self, now_ns: int) -> None:
+        parts, leader = self.parts, self._leader
+        if leader is None:
+            parts.joining.update_if_outdated(listed=parts.membership.nodes_listed, now_ns=now_ns)
+        elif parts.links is not None and parts.links.outdated(now_ns=now_ns):
+            leader.measured(self._port.node, parts.links.tell(now_ns=now_ns))
+        if parts.detector is not None and parts.joining.may_tell(now_ns):
+            self._tell_silence(parts.detector, now_ns)
+
+    def _tell_silence(self, detector: Silence, now_ns: int) -> None:
+        """Let the leader know of a neighbor that has fallen silent; one that lives will hear it too, and object."""
+        silent = detector.next_silent(self.parts.membership.lists, now_ns=now_ns)
+        if silent is None:
+            return
+        detector.said(silent, now_ns=now_ns)
+        if self._leader is not None:
+            self._leader.suspect(silent, self._port.node, self.parts.joining.motion(now_ns), now_ns=now_ns)
+        self._join(now_ns, instead_of=silent)
+
+    def beacon(self, route: Route | None, *, now_ns: int) -> Beacon:
+        membership, lease = self.parts.membership, self.parts.lease
+        term, leader = lease.authority if lease.fresh(now_ns) and lease.authority else (0, 0)
+        return Beacon(
+            node=self._port.node,
+            head=route.head if route else 0,
+            head_seq=route.head_seq if route else 0,
+            cluster=membership.cluster,
+            epoch=self._epoch_followed,
+            role=membership.role,
+            hops_to_head=route.hops if route else UNREACHABLE,
+            slot=membership.slot,
+            term=term,
+            leader=leader,
+        )
+
+    def hello_share(self, now_ns: int) -> float:
+        return 1.0 if self.parts.links is None else self.parts.links.hello_share(now_ns=now_ns)
+
+    # --- time -----------------------------------------------------------------------------------------------------
+
+    def next_wake_ns(self) -> int | None:
+        parts, leader = self.parts, self._leader
+        role_ns = leader.next_wake_ns() if leader else parts.failover.next_wake_ns()
+        return earliest(parts.joining.due_ns, role_ns, parts.refresh.next_wake_ns())
+
+    def wake(self, now_ns: int) -> None:
+        parts = self.parts
+        self._do(parts.failover.wake(now_ns), now_ns)
+        if parts.joining.due_ns is not None and now_ns >= parts.joining.due_ns:
+            self._join(now_ns)
+        leader = self._leader
+        if leader is not None:
+            notice_ns = self._timetabling.notice_ns(now_ns)
+            for part in leader.wake(parts.joining.motion(now_ns), notice_ns=notice_ns, now_ns=now_ns):
+                self._announce(part, leader, now_ns=now_ns)
+        for packet in parts.refresh.due(now_ns=now_ns):
+            self._access.answer(packet, now_ns=now_ns)
+
+    def report(self) -> Mapping[str, object]:
+        membership, authority = self.parts.membership, self.parts.lease.authority
+        return {
+            "role": membership.role.name.lower(),
+            "state": self.parts.failover.state.value,
+            "leader": authority.leader if authority else 0,
+            "term": authority.term if authority else 0,
+            "cluster": membership.cluster,
+            "head": membership.head,
+            "epoch": membership.epoch,
+        }

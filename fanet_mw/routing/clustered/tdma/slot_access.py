@@ -1,0 +1,115 @@
+"""Access by the slots of heads, as in the paper (3.3): members bring packets to a head, which floods in its own slot.
+
+What contends may go at any time: hellos, control packets, relays and the unicasts on the way to a head.
+"""
+
+from collections.abc import Mapping
+from typing import Final
+
+from fanet_mw.errors import DropReason
+from fanet_mw.node.contract import Port
+from fanet_mw.node.queue import Packet
+from fanet_mw.routing.clustered.forwarding.floods import Floods
+from fanet_mw.routing.clustered.forwarding.uplink import Uplink
+from fanet_mw.routing.clustered.roles.membership import Membership
+from fanet_mw.routing.clustered.tdma.slot_release import Release, Tenure
+from fanet_mw.units import US
+from fanet_mw.wire import Kind
+
+_NOTHING: Final[Mapping[str, object]] = {}
+
+
+class SlotAccess:
+    """One node's queue for the slot of its cluster, while it is head; its way to a head while it is not."""
+
+    def __init__(self, port: Port, release: Release, *, membership: Membership, uplink: Uplink, floods: Floods) -> None:
+        self._port = port
+        self._release = release
+        self._membership = membership
+        self._uplink = uplink
+        self._floods = floods
+        self._lifetime_us = round(port.scenario.routing.lifetime_s * 1_000_000)
+        self._tenure: Tenure | None = None
+        """The slot of this node, or the one that it had when it last was head."""
+
+    def start(self, now_ns: int) -> None:
+        """Nothing waits yet."""
+
+    def admits(self, packet: Packet, *, due_ns: int) -> bool:
+        return True
+
+    def originate(self, packet: Packet, *, due_ns: int, now_ns: int) -> None:
+        self.forward(packet, start_ns=due_ns, now_ns=now_ns)
+
+    def forward(self, packet: Packet, *, start_ns: int, now_ns: int, tries: int = 0) -> None:
+        if self._membership.is_head:
+            self.enqueue(packet, now_ns=now_ns)
+        else:
+            self._uplink.send(packet, start_ns=start_ns, now_ns=now_ns, tries=tries)
+
+    def enqueue(self, packet: Packet, *, now_ns: int) -> None:
+        """Let a packet out in the slot of this head."""
+        assert self._tenure is not None, "a node that queues is head, or was"
+        evicted = self._release.push(packet, self._tenure, now_ns=now_ns)
+        if evicted is not None:
+            self._port.drop(DropReason.QUEUE_FULL, evicted, now_ns=now_ns)
+
+    def flood_control(self, kind: Kind, inner: bytes, *, now_ns: int, urgent: bool = False) -> Packet:
+        return self._floods.contend_control(kind, inner, now_ns=now_ns)
+
+    def answer(self, packet: Packet, *, now_ns: int) -> None:
+        self._floods.contend_again(packet, now_ns=now_ns)
+
+    def hello_start_ns(self, start_ns: int, *, size: int) -> int:
+        return start_ns
+
+    # --- what a schedule makes of the node ------------------------------------------------------------------------
+
+    def serve(self, now_ns: int) -> None:
+        self.arm(now_ns)
+        for packet in self.drain_uplink():
+            self.enqueue(packet, now_ns=now_ns)
+
+    def arm(self, now_ns: int) -> None:
+        """Let out what waits here in the slot that the schedule gives this head."""
+        self.renew_slot()
+        assert self._tenure is not None, "the slot was renewed just now"
+        self._release.arm(self._tenure, now_ns=now_ns)
+
+    def renew_slot(self) -> None:
+        superframe = self._membership.superframe
+        assert superframe is not None, "a head has been named by a schedule"
+        self._tenure = Tenure(superframe, self._membership.slot)
+
+    def drain_uplink(self) -> list[Packet]:
+        """Give up what waits for a way to a head: it goes another way."""
+        return self._uplink.drain()
+
+    def drain(self) -> list[Packet]:
+        """Give up what waits here, or for a way to a head: it goes another way."""
+        return [*self._release.drain(), *self.drain_uplink()]
+
+    # --- time -----------------------------------------------------------------------------------------------------
+
+    def next_wake_ns(self) -> int | None:
+        return self._release.next_wake_ns()
+
+    def wake(self, now_ns: int) -> None:
+        horizon_us = now_ns // US - self._lifetime_us
+        for packet in self._release.expire(before_us=horizon_us):
+            self._port.drop(DropReason.EXPIRED, packet, now_ns=now_ns)
+        for packet, start_ns in self._release.due(self._tenure, now_ns=now_ns) if self._tenure else ():
+            self._floods.begin([packet, *self._release.more(self._room(packet))], start_ns=start_ns)
+
+    def _room(self, packet: Packet) -> int:
+        """What a frame with this packet has left for others [bytes]."""
+        scenario = self._port.scenario
+        return scenario.radio.max_frame_bytes - len(packet.frame) if scenario.routing.aggregate else 0
+
+    # --- for people -----------------------------------------------------------------------------------------------
+
+    def waiting(self) -> int:
+        return len(self._release)
+
+    def report(self) -> Mapping[str, object]:
+        return _NOTHING

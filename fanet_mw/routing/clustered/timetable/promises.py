@@ -1,0 +1,193 @@
+"""What one node may promise of its own packets: bounds of delay, admission by a deadline, likely delays with loss.
+
+A bound is stated for a packet when the packet is accepted: only then are queue and turns known. It is stated if it will
+be kept whatever comes later: until the packet is through no other timetable may come into force, of which the leader
+gives notice in time. Every class of packets has room of its own in a turn, so each has a bound of its own.
+"""
+
+from collections.abc import Mapping
+from typing import Final
+
+from fanet_mw.node.contract import Port
+from fanet_mw.node.queue import Packet
+from fanet_mw.routing.clustered.roles.leader import HEARD_NS
+from fanet_mw.routing.clustered.roles.lease import Lease
+from fanet_mw.routing.clustered.tdma.admission import Admission
+from fanet_mw.routing.clustered.tdma.own_bound import Own
+from fanet_mw.routing.clustered.tdma.root_release import RootRelease
+from fanet_mw.routing.clustered.tdma.turns import clocks_fit, receipt_ns
+from fanet_mw.routing.clustered.timetable.plans import Plans
+from fanet_mw.routing.clustered.timetable.turn_plan import LIKELY_SHARE, Plan
+from fanet_mw.trace import BoundStated, LikelyStated
+from fanet_mw.units import MS, US, NodeId, seconds_to_ns
+from fanet_mw.wire import PRIORITY_BULK, PRIORITY_REPORT, PRIORITY_SAFETY
+
+_CLASSES: Final = {PRIORITY_SAFETY: "warning", PRIORITY_REPORT: "report", PRIORITY_BULK: "bulk"}
+
+
+class Promises:
+    """The bounds and likely delays of one node's packets under its timetables."""
+
+    def __init__(
+        self, port: Port, *, plans: Plans, roots: RootRelease, lease: Lease, admission: Admission | None
+    ) -> None:
+        self._port = port
+        self._plans = plans
+        self._roots = roots
+        self._lease = lease
+        self._admission = admission
+        self._lead_ns = port.scenario.radio.lead_ns
+        self._interval_ns = seconds_to_ns(port.scenario.traffic.interval_s)
+        self._bounds_ns: list[Mapping[int, int]] = []
+        """Of each timetable, the bound of each class (by priority) of the node's packets; a missing class has none."""
+        self._ahead: tuple[Plan, int] | None = None
+        """The timetable looked at last, and how long before its end that must be announced."""
+        self.announced_ns = 0
+        """When the leader made the latest announcement that is known of the timetable that is followed."""
+
+    def start(self, now_ns: int) -> None:
+        """The node is up; it has no bound yet."""
+        if self._admission is not None:
+            self._admission.start(now_ns)
+
+    # --- timetables -----------------------------------------------------------------------------------------------
+
+    def follow(self, *, superseded: int, now_ns: int) -> None:
+        """The newest timetable is another one, or there is none; so many of those before it no longer hold."""
+        if self._plans.newest is None:
+            self._bounds_ns = []
+            self._admit(None, now_ns=now_ns)
+            return
+        own = self.own()
+        self._admit(None if self._lease.leads else own, now_ns=now_ns)
+        self._bounds_ns = [*self._bounds_ns[superseded:], self.class_bounds_ns(own)]
+
+    def _admit(self, own: Own | None, *, now_ns: int) -> None:
+        record = None if self._admission is None else self._admission.follow(own, now_ns=now_ns)
+        if record is not None:
+            self._port.record(record)
+
+    def own(self) -> Own | None:
+        """The node's part of the newest timetable, if that gives its packets a bound: not if frames may be lost."""
+        plan = None if self._port.scenario.measures_links else self._plans.newest
+        if plan is None or not plan.roots or not plan.whole or plan.table.uncovered[self._port.node]:
+            return None
+        return self._own_of(self._port.node, plan)
+
+    def _own_of(self, node: NodeId, plan: Plan) -> Own:
+        offsets = plan.roots if node == self._port.node else tuple(plan.table.offsets_of(node))
+        around_ns = self._lead_ns + receipt_ns(self._port.scenario)
+        return Own(plan.turns, offsets, plan.table.spans[node], plan.together, around_ns)
+
+    def class_bounds_ns(self, own: Own | None) -> Mapping[int, int]:
+        """By priority; none for what is repaired after it was lost."""
+        scenario = self._port.scenario
+        if own is None or scenario.clusters.repair_s:
+            return {}
+        found = dict.fromkeys(self._roots.reserved, own.burst_ns(per_turn=1))
+        bulk_ns: int | None = own.burst_ns(per_turn=own.together)
+        if scenario.traffic.arrivals == "cbr":
+            interval_ns = self._admission.interval_ns if self._admission else self._interval_ns
+            bulk_ns = own.worst_ns(interval_ns=interval_ns)
+        return found if bulk_ns is None else {**found, PRIORITY_BULK: bulk_ns}
+
+    def notice_ns(self, now_ns: int) -> int:
+        """How long ahead another timetable must be announced for every promise under those in force to be kept."""
+        in_force = self._plans.in_order[self._plans.superseded(now_ns) :]
+        return max((self._ahead_ns(plan) for plan in in_force), default=0)
+
+    def _ahead_ns(self, plan: Plan) -> int:
+        """How long before this timetable ends its end is announced.
+
+        All have heard of it after a superframe and a flood; what any node has promised until then must be through.
+        """
+        if self._ahead is None or self._ahead[0] is not plan:
+            roots = {turn.root for turn in plan.table.roots()} if plan.whole else set()
+            owns = [self._own_of(root, plan) for root in sorted(roots)]
+            bounds = [bound_ns for own in owns for bound_ns in self.class_bounds_ns(own).values()]
+            floods = [own.turns.flood_ns(offset, span=own.span) for own in owns for offset in own.roots]
+            learnt_ns = plan.turns.period_ns + max(floods, default=0) + self._lead_ns + receipt_ns(self._port.scenario)
+            self._ahead = plan, max(HEARD_NS, learnt_ns + max(bounds)) if bounds else HEARD_NS
+        return self._ahead[1]
+
+    # --- packets --------------------------------------------------------------------------------------------------
+
+    def admits(self, packet: Packet, *, due_ns: int) -> bool:
+        """Whether a packet of the application may be let in without harm to the deadline of those before it."""
+        policed = self._admission if packet.header.priority == PRIORITY_BULK else None
+        return policed is None or policed.admits(due_ns)
+
+    def state(self, packet: Packet, *, now_ns: int) -> None:
+        """Record what is promised of a packet that was just accepted."""
+        bound_ns = self._kept_bound_ns(packet, now_ns)
+        if bound_ns is not None:
+            self._port.record(BoundStated(now_ns, self._port.node, packet.header.seq, bound_ns))
+        likely_ns = self.likely_ns() if packet.header.priority == PRIORITY_BULK else None
+        newest = self._plans.newest
+        if likely_ns is not None and newest is not None and newest.valid_ns <= now_ns:
+            record = LikelyStated(now_ns, self._port.node, packet.header.seq, likely_ns, LIKELY_SHARE)
+            self._port.record(record)
+
+    def _kept_bound_ns(self, packet: Packet, now_ns: int) -> int | None:
+        """The bound of a packet that was just accepted, if it will be kept whatever comes later."""
+        priority = packet.header.priority
+        bounds = [bounds_ns.get(priority) for bounds_ns in self._bounds_ns[self._plans.superseded(now_ns) :]]
+        known = [bound_ns for bound_ns in bounds if bound_ns is not None]
+        newest = self._plans.newest
+        if not known or len(known) < len(bounds) or newest is None or not self._in_step():
+            return None
+        if self._lease.leads and priority == PRIORITY_BULK:
+            return None  # schedules go before it
+        bound_ns = max(known)
+        through_ns = self._roots.through_ns(packet, now_ns=now_ns)
+        if through_ns is None:
+            return None
+        had_ns = through_ns + receipt_ns(self._port.scenario)
+        known_ns = self.announced_ns + newest.turns.period_ns + self._ahead_ns(newest)  # no other is in force sooner
+        return bound_ns if had_ns <= min(packet.header.origin_us * US + bound_ns, known_ns) else None
+
+    # --- time and people ------------------------------------------------------------------------------------------
+
+    def next_wake_ns(self) -> int | None:
+        return self._admission.next_wake_ns() if self._admission else None
+
+    def wake(self, now_ns: int) -> None:
+        lost = self._admission.wake(now_ns) if self._admission else None
+        if lost is not None:
+            self._port.record(lost)
+
+    def bound_ns(self) -> int | None:
+        """The bound of the node's bulk, application to application, under the newest timetable; None: no bound."""
+        if not self._bounds_ns or self._lease.leads or not self._in_step():
+            return None
+        return self._bounds_ns[-1].get(PRIORITY_BULK)
+
+    def likely_ns(self) -> int | None:
+        """Within which time `LIKELY_SHARE` of the nodes have a packet of this node, where links lose frames; None: no
+        such time is known, or more packets are waiting than a superframe lets out.
+        """
+        plan = self._plans.newest
+        if plan is None or plan.odds is None or len(self._roots) > len(plan.roots) or not plan.roots:
+            return None
+        if self._lease.leads or plan.table.uncovered[self._port.node] or not self._in_step():
+            return None  # schedules go before the leader's own packets
+        found_ns = plan.likely_ns(
+            self._port.node,
+            interval_ns=self._interval_ns,
+            hello_ns=seconds_to_ns(self._port.scenario.routing.hello_interval_s),
+        )
+        return None if found_ns is None else found_ns + self._lead_ns + receipt_ns(self._port.scenario)
+
+    def _in_step(self) -> bool:
+        """Whether the turns' slack holds what is known of the swarm's clocks."""
+        return clocks_fit(self._port.scenario, clock_error_ns=self._port.clock_error_ns)
+
+    def report(self) -> Mapping[str, object]:
+        """JSON-able state."""
+        bound_ns, likely_ns = self.bound_ns(), self.likely_ns()
+        return {
+            "likely_ms": None if likely_ns is None else likely_ns / MS,
+            "likely_share": None if likely_ns is None else LIKELY_SHARE,
+            "bound_ms": None if bound_ns is None else bound_ns / MS,
+            "bounds_ms": {_CLASSES[p]: ns / MS for p, ns in self._bounds_ns[-1].items()} if self._bounds_ns else {},
+        }

@@ -1,0 +1,191 @@
+"""Access by a timetable: a node lets its packets out in its own turns, and relays find theirs (`relaying/by_turn.py`).
+
+Until a timetable gives the node turns it brings packets to a head, as with slots. What has no turn contends in the
+window at the beginning of each superframe: hellos, joins, unicasts to a head, and what neighbors lack; over lossy
+links hellos and answers have turns of their own, the calls.
+"""
+
+from collections.abc import Mapping
+from typing import Final
+
+from fanet_mw.errors import DropReason
+from fanet_mw.node.contract import Port
+from fanet_mw.node.duplicates import key_of
+from fanet_mw.node.queue import Packet
+from fanet_mw.routing.clustered.forwarding.floods import Floods
+from fanet_mw.routing.clustered.tdma.call_release import CallRelease
+from fanet_mw.routing.clustered.tdma.contention import Contention
+from fanet_mw.routing.clustered.tdma.root_release import Following, RootRelease
+from fanet_mw.routing.clustered.tdma.slot_access import SlotAccess
+from fanet_mw.routing.clustered.timetable.plans import Plans
+from fanet_mw.routing.clustered.timetable.promises import Promises
+from fanet_mw.routing.clustered.timetable.turn_plan import Plan
+from fanet_mw.units import US, earliest, seconds_to_ns
+from fanet_mw.wire import Kind
+
+_MOST_ANSWERS: Final = 2
+"""Answers that wait for turns; more than these contend."""
+
+
+class TurnAccess:
+    """The turns of one node, and the slots of heads while it has none."""
+
+    def __init__(
+        self,
+        port: Port,
+        *,
+        plans: Plans,
+        roots: RootRelease,
+        calls: CallRelease,
+        slots: SlotAccess,
+        promises: Promises,
+        floods: Floods,
+        contention: Contention,
+    ) -> None:
+        self._port = port
+        self._plans = plans
+        self._roots = roots
+        self._calls = calls
+        self._slots = slots
+        self._promises = promises
+        self._floods = floods
+        self._contention = contention
+        self._lead_ns = port.scenario.radio.lead_ns
+        self._lifetime_ns = seconds_to_ns(port.scenario.routing.lifetime_s)
+
+    def start(self, now_ns: int) -> None:
+        self._promises.start(now_ns)
+
+    # --- timetables and roles -------------------------------------------------------------------------------------
+
+    def follow(self, plan: Plan | None, *, now_ns: int) -> None:
+        """Take up a timetable that comes into force later; None: there is none that fits."""
+        superseded = self._plans.superseded(now_ns)
+        self._plans.follow(plan, now_ns=now_ns)
+        self._promises.follow(superseded=superseded, now_ns=now_ns)
+        self.use_turns(now_ns)
+        if plan is None:
+            self._calls.drain()  # what neighbors lack they will say again
+        stranded = [] if self._roots.has_turn(now_ns=now_ns) else self._roots.drain()
+        for packet in [*stranded, *self._slots.drain()]:
+            self.forward(packet, start_ns=now_ns + self._lead_ns, now_ns=now_ns)
+
+    def use_turns(self, now_ns: int) -> None:
+        """Let packets out in the turns of the timetables that are followed."""
+        plans, node = self._plans.in_order, self._port.node
+        roots = [(plan, plan.table.spans.get(node, 1)) for plan in plans]
+        self._roots.follow(
+            [Following(plan.valid_ns, plan.turns, plan.roots, plan.frame_bytes, span) for plan, span in roots],
+            now_ns=now_ns,
+        )
+        self._calls.follow(
+            [Following(plan.valid_ns, plan.turns, plan.calls, plan.frame_bytes, 1) for plan in plans], now_ns=now_ns
+        )
+
+    def serve(self, now_ns: int) -> None:
+        self._slots.arm(now_ns)
+        for packet in self._slots.drain_uplink():
+            if self._roots.has_turn(now_ns=now_ns):
+                self._let_out(packet, now_ns=now_ns)
+            else:  # the schedule has made the node head, its timetable is still to come
+                self._slots.enqueue(packet, now_ns=now_ns)
+
+    def renew_slot(self) -> None:
+        self._slots.renew_slot()
+
+    # --- letting out ----------------------------------------------------------------------------------------------
+
+    def admits(self, packet: Packet, *, due_ns: int) -> bool:
+        return self._promises.admits(packet, due_ns=due_ns)
+
+    def originate(self, packet: Packet, *, due_ns: int, now_ns: int) -> None:
+        self.forward(packet, start_ns=due_ns, now_ns=now_ns)
+        self._promises.state(packet, now_ns=now_ns)
+
+    def forward(self, packet: Packet, *, start_ns: int, now_ns: int, tries: int = 0) -> None:
+        if self._roots.has_turn(now_ns=now_ns):
+            self._let_out(packet, now_ns=now_ns)
+        else:
+            start_ns = self._contention.not_before(start_ns)
+            self._slots.forward(packet, start_ns=start_ns, now_ns=now_ns, tries=tries)
+
+    def _let_out(self, packet: Packet, *, now_ns: int) -> None:
+        newest = self._plans.newest
+        assert newest is not None, "a node without a timetable has no turn"
+        size = newest.frame_bytes
+        room = size - sum(self._roots.reserved.values())
+        if len(packet.frame) > (room if packet.header.kind == Kind.DATA else size):
+            self._port.drop(DropReason.TOO_LARGE, packet, now_ns=now_ns)
+            return
+        evicted = self._roots.push(packet, now_ns=now_ns)
+        if evicted is not None:
+            self._port.drop(DropReason.QUEUE_FULL, evicted, now_ns=now_ns)
+
+    def flood_control(self, kind: Kind, inner: bytes, *, now_ns: int, urgent: bool = False) -> Packet:
+        plan = self._plans.at(now_ns + self._lead_ns)
+        if plan is None or not plan.roots or (kind is Kind.JOIN and not urgent and plan.odds is None):
+            # Turns are for what the bound is about; a join may contend, and need not where there is no bound. An
+            # announcement does not wait for turns that are still to come into force.
+            return self._floods.contend_control(kind, inner, now_ns=now_ns)
+        packet = self._floods.control(kind, inner, now_ns=now_ns)
+        for stale in self._roots.outdated(before_us=packet.header.origin_us):
+            self._port.drop(DropReason.EXPIRED, stale, now_ns=now_ns)
+        self._let_out(packet, now_ns=now_ns)
+        return packet
+
+    def answer(self, packet: Packet, *, now_ns: int) -> None:
+        """In a turn for neighbors alone, if the node has one and the packet fits."""
+        plan = self._plans.at(now_ns)
+        crowded = len(self._calls) >= _MOST_ANSWERS
+        if plan is None or not plan.calls or crowded or len(packet.frame) > plan.frame_bytes:
+            self._floods.contend_again(packet, now_ns=now_ns)
+        elif not self._calls.holds(key_of(packet.header.origin, packet.header.seq)):
+            self._calls.push(packet, now_ns=now_ns)
+
+    def hello_start_ns(self, start_ns: int, *, size: int) -> int:
+        plan = self._plans.at(start_ns)
+        if plan is not None and plan.calls:
+            claimed_ns = self._calls.claim(not_before_ns=start_ns, now_ns=start_ns - self._lead_ns)
+            if claimed_ns is not None:
+                return claimed_ns
+        return self._contention.not_before(start_ns)
+
+    # --- time -----------------------------------------------------------------------------------------------------
+
+    def next_wake_ns(self) -> int | None:
+        return earliest(
+            self._slots.next_wake_ns(),
+            self._roots.next_wake_ns(),
+            self._calls.next_wake_ns(),
+            self._promises.next_wake_ns(),
+        )
+
+    def wake(self, now_ns: int) -> None:
+        self._slots.wake(now_ns)
+        self._promises.wake(now_ns)
+        for packet in self._roots.expire(before_us=(now_ns - self._lifetime_ns) // US):
+            self._port.drop(DropReason.EXPIRED, packet, now_ns=now_ns)
+        for packets, start_ns in self._roots.due(now_ns=now_ns):
+            self._floods.begin(packets, start_ns=start_ns, again_ns=self._repetitions(start_ns))
+        if len(self._roots) and not self._roots.has_turn(now_ns=now_ns):
+            for packet in self._roots.drain():  # that was the node's last turn: the next timetable has none for it
+                self.forward(packet, start_ns=now_ns + self._lead_ns, now_ns=now_ns)
+        for packets, start_ns in self._calls.due(now_ns=now_ns):
+            self._floods.answer(packets, start_ns=start_ns)
+
+    def _repetitions(self, start_ns: int) -> list[int]:
+        """When a frame that is let out at an instant is repeated."""
+        plan = self._plans.at(start_ns)
+        turn = None if plan is None else plan.turns.turn_at(start_ns)
+        if plan is None or turn is None:
+            return []
+        frame_ns = plan.turns.frame_start_ns(start_ns)
+        return [plan.turns.start_ns(later, frame_start_ns=frame_ns) for later in plan.again.get(turn, ())]
+
+    # --- for people -----------------------------------------------------------------------------------------------
+
+    def waiting(self) -> int:
+        return self._slots.waiting() + len(self._roots)
+
+    def report(self) -> Mapping[str, object]:
+        return {**self._promises.report(), "planned": bool(self._plans.in_order)}

@@ -8,7 +8,7 @@ antenna patterns, Doppler, interference by links below `interference_floor_dbm`.
 """
 
 import math
-from typing import Final
+from typing import Final, Protocol
 
 import numpy as np
 
@@ -37,7 +37,8 @@ from emulator.kernel.state import (
     Ints,
     Reals,
 )
-from fanet_mw.scenario.radio import Radio, is_ofdm
+from fanet_mw.extensions import load
+from fanet_mw.scenario.radio import CHANNELS, Radio, is_ofdm
 
 THERMAL_DBM_PER_HZ: Final = -174.0
 DSSS_BANDWIDTH_HZ: Final = 22e6
@@ -65,6 +66,8 @@ def reach_m(radio: Radio) -> float:
     if radio.channel == "range":
         return radio.range_m
     budget_db = radio.tx_power_dbm - radio.interference_floor_dbm + 2 * radio.shadowing_db
+    if radio.channel not in CHANNELS:
+        return _foreign(radio).reach_m(budget_db)
     at_1_m = float(friis_db(np.ones(1), frequency_mhz=radio.frequency_mhz)[0])
     laws = {
         "log_distance": [(radio.reference_loss_db, radio.exponent)],
@@ -86,6 +89,8 @@ def received_dbm(distance_m: Reals, from_m: Reals, to_m: Reals, radio: Radio) ->
 
 
 def _loss_db(distance_m: Reals, from_m: Reals, to_m: Reals, radio: Radio) -> Reals:
+    if radio.channel not in CHANNELS:
+        return _foreign(radio).loss_db(distance_m, from_m, to_m)
     mhz = radio.frequency_mhz
     if radio.channel == "log_distance":
         return log_distance_db(distance_m, reference_db=radio.reference_loss_db, exponent=radio.exponent)
@@ -104,6 +109,26 @@ def _loss_db(distance_m: Reals, from_m: Reals, to_m: Reals, radio: Radio) -> Rea
         along_m = np.hypot(*(from_m - to_m)[:, :2].T)
         to_ground = uma_av_db(distance_m, along_m, high, frequency_mhz=mhz)
     return np.where(low >= radio.airborne_m, in_the_air, to_ground)
+
+
+class Channel(Protocol):
+    """The path loss of a channel that another package brings (`fanet_mw.extensions`): a class that takes `Radio`.
+
+    It is made anew whenever links are computed, and keeps nothing: the same places give the same losses.
+    """
+
+    def loss_db(self, distance_m: Reals, from_m: Reals, to_m: Reals) -> Reals:
+        """What frames lose on each link [n] between its ends [n, 3]."""
+        ...
+
+    def reach_m(self, budget_db: float) -> float:
+        """A distance beyond which no link loses less than the budget."""
+        ...
+
+
+def _foreign(radio: Radio) -> Channel:
+    channel: Channel = load("radio.channel", radio.channel)(radio)
+    return channel
 
 
 class Links:

@@ -3,6 +3,7 @@
 from collections.abc import Callable, Mapping
 from typing import Final
 
+from fanet_mw.extensions import load
 from fanet_mw.node.contract import Port, RoutingProtocol
 from fanet_mw.routing.aodv import Aodv
 from fanet_mw.routing.clustered.build import make_clustered
@@ -28,4 +29,6 @@ PROTOCOLS: Final[Mapping[str, Callable[[Port], RoutingProtocol]]] = {
 
 def make_protocol(port: Port) -> RoutingProtocol:
     """The protocol that the port's scenario names."""
-    return PROTOCOLS[port.scenario.routing.protocol](port)
+    name = port.scenario.routing.protocol
+    made: RoutingProtocol = (PROTOCOLS.get(name) or load("routing.protocol", name))(port)
+    return made

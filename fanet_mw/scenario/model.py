@@ -5,11 +5,12 @@ Each table checks itself; what the tables ask of each other is in `scenario_chec
 """
 
 import math
-from typing import Annotated, Final, Literal, Self
+from typing import Annotated, Any, Final, Literal, Self
 
 from pydantic import AfterValidator, Field, model_validator
 
 from fanet_mw.bus.radio_control import Control
+from fanet_mw.extensions import Named, OptionsOf
 from fanet_mw.scenario.checks import disagreements
 from fanet_mw.scenario.clock import Clock
 from fanet_mw.scenario.faults import AnyFault
@@ -45,6 +46,13 @@ def _none_or_interval(hello_s: float) -> float:
 
 LEAST_HELLO_S: Final = 0.01
 HelloInterval = Annotated[Duration, AfterValidator(_none_or_interval)]
+
+
+PROTOCOLS: Final = (
+    "direct", "flooding", "clustered", "aodv", "olsr", "dsdv", "gossip", "counter", "geographic",
+)  # fmt: skip
+METHODS: Final = ("balanced", "lowest_id", "highest_degree", "wca", "lasting_degree", "affinity")
+MOBILITY_MODELS: Final = ("static", "formation", "random_waypoint", "crossing", "onboard")
 
 
 class Nodes(Section):
@@ -105,12 +113,12 @@ class Traffic(Section):
 class Routing(Section):
     """The protocol above the radio."""
 
-    protocol: Literal["direct", "flooding", "clustered", "aodv", "olsr", "dsdv", "gossip", "counter", "geographic"] = (
-        "clustered"
-    )
+    protocol: Annotated[str, Named("routing.protocol", PROTOCOLS)] = "clustered"
     """How packets find their way: one hop only (`direct`), a relay by every node (`flooding`), with a probability
     (`gossip`) or by those that heard few copies (`counter`), the time-divided floods of cluster heads (`clustered`), or
-    a route found on demand, by link states, by distance vectors or by positions."""
+    a route found on demand, by link states, by distance vectors or by positions; or as another package does it."""
+    options: Annotated[dict[str, Any], OptionsOf("routing.protocol", PROTOCOLS), Field(default_factory=dict)]
+    """The table of a protocol that another package brings, as that package documents it."""
     address_resolution: Literal["none", "rfc826", "ns3"] = "none"
     """`aodv`, `olsr`, `dsdv`, `geographic`: a node asks for a neighbor's address before its first unicast to it, as IP
     does, by the rules of RFC 826 or by ns-3's. `none`: a node id is an address, and nobody needs to ask."""
@@ -190,9 +198,11 @@ class Clusters(Section):
     """`counter`: a node that has heard so many copies does not relay."""
     assess_ms: Milliseconds = 100.0
     """`counter`: copies are counted for U(0, assess_ms)."""
-    method: Literal["balanced", "lowest_id", "highest_degree", "wca", "lasting_degree", "affinity"] = "balanced"
+    method: Annotated[str, Named("clusters.method", METHODS)] = "balanced"
     """How the leader divides the swarm. All but `balanced` make as many clusters as the topology asks for, whatever
     `count` says: every member hears its head."""
+    options: Annotated[dict[str, Any], OptionsOf("clusters.method", METHODS), Field(default_factory=dict)]
+    """The table of a method that another package brings, as that package documents it."""
     reassign_s: Duration = 10.0
     """The leader makes new clusters for a swarm that has moved at most this often; 0: only when nodes come or go."""
     repair_s: Duration = 0.0
@@ -212,10 +222,12 @@ class Clusters(Section):
 class Mobility(Section):
     """What a UAV does when the mission asks nothing of it."""
 
-    model: Literal["static", "formation", "random_waypoint", "crossing", "onboard"] = "static"
+    model: Annotated[str, Named("mobility.model", MOBILITY_MODELS)] = "static"
     """`formation` sweeps the area keeping the layout; `random_waypoint` is the statistical model, without pause;
     `crossing` flies everyone through the middle of the area to the point opposite its start, and back.
     `onboard`: the world decides nothing, keeps nobody clear of others, and flies what each UAV's computer asks for."""
+    options: Annotated[dict[str, Any], OptionsOf("mobility.model", MOBILITY_MODELS), Field(default_factory=dict)]
+    """The table of a model that another package brings, as that package documents it."""
     speed_m_s: Speed = 7.5
     """Cruising speed."""
     see_m: Length = 50.0

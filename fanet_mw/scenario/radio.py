@@ -9,6 +9,7 @@ from typing import Annotated, Any, Final, Literal, Self, get_args
 
 from pydantic import Field, model_validator
 
+from fanet_mw.extensions import Named, OptionsOf
 from fanet_mw.scenario.sections import Decibels, Length, Level, Section, SomeLength
 from fanet_mw.units import MS
 
@@ -16,6 +17,7 @@ DSSS_RATES_MBPS: Final = (1.0, 2.0, 5.5, 11.0)
 OFDM_RATES_MBPS: Final = (6.0, 9.0, 12.0, 18.0, 24.0, 36.0, 48.0, 54.0)
 RATES_MBPS: Final = {"b": DSSS_RATES_MBPS, "g": DSSS_RATES_MBPS + OFDM_RATES_MBPS, "a": OFDM_RATES_MBPS}
 """The rates of each `radio.standard`."""
+CHANNELS: Final = ("range", "log_distance", "friis", "two_ray", "air_to_air", "air_to_ground", "uma_av")
 Ns3Point = Literal["difs", "eifs", "sums", "onset"]
 """A point in which ns-3.44 differs from IEEE 802.11."""
 MANDATORY_OFDM_MBPS: Final = (6.0, 12.0, 24.0)  # 17.1.1
@@ -29,8 +31,10 @@ def is_ofdm(rate_mbps: float) -> bool:
 class Radio(Section):
     """The radio, its MAC and the channel. Defaults are the reference set-up: 802.11b, DSSS 11 Mb/s, long preamble."""
 
-    channel: Literal["range", "log_distance", "friis", "two_ray", "air_to_air", "air_to_ground", "uma_av"] = "range"
+    channel: Annotated[str, Named("radio.channel", CHANNELS)] = "range"
     """The path loss model: see docs/explanation/emulator.md for equations, sources and ranges of validity."""
+    options: Annotated[dict[str, Any], OptionsOf("radio.channel", CHANNELS), Field(default_factory=dict)]
+    """The table of a channel that another package brings, as that package documents it."""
     range_m: SomeLength = 250.0
     """`range`: decode and carrier-sense limit; frames are equally strong within it, silent beyond."""
     standard: Literal["b", "g", "a"] = "b"

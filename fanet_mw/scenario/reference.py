@@ -144,6 +144,10 @@ def bound(schema: Schema) -> str:
             return _range(schema)
         case "array":
             return _list(schema)
+        case "object":
+            return "table"
+        case "string" if "x-names" in schema:
+            return str(schema["x-names"])
         case "string":
             return f"text matching `{schema['pattern']}`" if "pattern" in schema else "text"
     return "any"

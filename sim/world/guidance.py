@@ -6,14 +6,16 @@ so that UAVs sent to one point settle around it.
 
 import math
 from collections.abc import Callable
-from typing import Final, NamedTuple, assert_never
+from typing import Final, NamedTuple, Protocol, assert_never
 
 import numpy as np
 import numpy.typing as npt
 
 from fanet_mw.bus.messages import VELOCITY_LASTS_NS, Setpoint, SetpointKind
+from fanet_mw.extensions import load
 from fanet_mw.rng import stream
 from fanet_mw.scenario import Scenario
+from fanet_mw.scenario.model import MOBILITY_MODELS
 from fanet_mw.units import Enu, S
 from sim.world.engine import Rows, Values
 
@@ -42,6 +44,18 @@ class Track(NamedTuple):
 
     places: Rows
     velocities: Rows
+
+
+class MobilityModel(Protocol):
+    """Where UAVs fly while no setpoint says otherwise.
+
+    Another package may bring one (`fanet_mw.extensions`): a class that takes the places [n, 3] where the UAVs start,
+    and the scenario.
+    """
+
+    def track(self, t_s: float) -> Track:
+        """Where everyone should be at a swarm instant [s], asked in order; the same calls give the same places."""
+        ...
 
 
 class Formation:
@@ -151,11 +165,12 @@ class Guidance:
         self._half_east, self._half_north = float(reach[0]), float(reach[1])
         self._starts = starts.copy()
         """Where each UAV holds while neither a mobility model nor a setpoint moves it."""
-        self._model = (
+        self._model: MobilityModel | None = (
             Formation(starts, scenario) if model == "formation"
             else RandomWaypoint(starts, scenario) if model == "random_waypoint"
             else Crossing(starts, scenario) if model == "crossing"
-            else None
+            else None if model in MOBILITY_MODELS
+            else load("mobility.model", model)(starts.copy(), scenario)
         )  # fmt: skip
         self._setpoints: dict[int, tuple[Enu, float]] = {}
         self._velocities: dict[int, tuple[Enu, float]] = {}

@@ -4,7 +4,7 @@ from collections.abc import Iterator
 
 from fanet_mw.bus.messages import Message
 from fanet_mw.bus.topics import Topics
-from fanet_mw.scenario.model import Scenario
+from fanet_mw.scenario.model import PROTOCOLS, Scenario
 from sim.world.engine import Flags
 from sim.world.sensors.altimeter import AltimeterSensor
 from sim.world.sensors.camera import CameraSensor
@@ -42,7 +42,8 @@ def sensors_of(scenario: Scenario, survivors: Survivors, solids: Solids) -> list
 def uses_fixes(scenario: Scenario) -> bool:
     """Whether anybody uses position fixes."""
     moves = scenario.mobility.model != "static" or scenario.mission.survivors > 0
-    by_places = scenario.routing.protocol == "geographic" or (scenario.routing.protocol == "clustered" and moves)
+    protocol = scenario.routing.protocol
+    by_places = protocol == "geographic" or (protocol == "clustered" and moves) or protocol not in PROTOCOLS
     return (
         scenario.nodes.telemetry_hz > 0
         or scenario.clock.sync == "gps"

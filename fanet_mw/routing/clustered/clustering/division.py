@@ -8,8 +8,10 @@ then heads, and their slots, are kept where they are nearly as good.
 
 import math
 from collections.abc import Mapping, Sequence
-from typing import Final
+from types import MappingProxyType
+from typing import Any, Final
 
+from fanet_mw.extensions import load
 from fanet_mw.graph.topology import Adjacency, levels
 from fanet_mw.routing.clustered.clustering import (
     AffinityPropagation,
@@ -24,6 +26,7 @@ from fanet_mw.routing.clustered.clustering import (
     by_id,
 )
 from fanet_mw.routing.clustered.clustering.election import Score
+from fanet_mw.scenario.model import METHODS
 from fanet_mw.units import NodeId, S
 
 _WORSE: Final = 1.25
@@ -34,12 +37,18 @@ _CONTENTION_NS: Final = 3 * S
 class Division:
     """One leader's way of dividing, `clusters.method` of the scenario."""
 
-    def __init__(self, method: str, *, count: int, range_m: float) -> None:
+    def __init__(
+        self, method: str, *, count: int, range_m: float, options: Mapping[str, Any] = MappingProxyType({})
+    ) -> None:
+        """A method that is none of ours is that of another package, made of the same arguments."""
         scores: dict[str, Score] = {"lowest_id": by_id, "highest_degree": by_degree}
         scores["wca"] = Weights(range_m).__call__
         scores["lasting_degree"] = LastingDegree(range_m).__call__
-        self._count = count if method == "balanced" else None
         self._once: Clustering = AffinityPropagation(range_m) if method == "affinity" else Balanced(count)
+        self._count = count if method == "balanced" else None
+        if method not in METHODS:
+            self._once = load("clusters.method", method)(count=count, range_m=range_m, options=options)
+            self._count = None if self._once.promise.dominating else count
         self._over_time = (
             Maintenance(scores[method], keep=math.inf, contention_ns=_CONTENTION_NS, patient=True)
             if method in scores

@@ -97,7 +97,9 @@ class Leader:
         self._range_m = clusters.link_m or scenario.radio.range_m
         self._by_links = needs_every_link
         self._objection_ns = max(OBJECTION_NS, _OBJECTION_PERIODS * clusters.period_ns if self._by_links else 0)
-        self._division = Division(clusters.method, count=clusters.count, range_m=self._range_m)
+        self._division = Division(
+            clusters.method, count=clusters.count, range_m=self._range_m, options=clusters.options
+        )
         self._epoch = epoch
         self._motions: dict[NodeId, Motion] = {}
         self._stand_ins: dict[NodeId, _StandIn] = {}

@@ -1,0 +1,1 @@
+"""Parts for fanet-mw, each behind one of its contracts; pyproject.toml names them."""

@@ -1,0 +1,138 @@
+"""Parts that other packages bring: a scenario names one, and every process that needs it imports it.
+
+    routing.protocol = "gossip3"              the name of an entry point, group `fanet_mw.routing`
+    routing.protocol = "mypackage:Gossip3"    or a module and what is in it
+    [routing.options]                         its own table, checked by its `Options`, a pydantic model
+
+A name of ours always means ours. What is named is looked for when the scenario is read, so that a run never begins with
+a part that is not there.
+"""
+
+import difflib
+from collections.abc import Mapping, Sequence
+from functools import lru_cache
+from importlib import import_module
+from importlib.metadata import EntryPoint, entry_points
+from typing import Any, Final
+
+from pydantic import BaseModel, GetCoreSchemaHandler, GetJsonSchemaHandler, ValidationError, ValidationInfo
+from pydantic.json_schema import JsonSchemaValue
+from pydantic_core import core_schema
+
+GROUPS: Final[Mapping[str, str]] = {
+    "routing.protocol": "fanet_mw.routing",
+    "mobility.model": "fanet_mw.mobility",
+    "clusters.method": "fanet_mw.clustering",
+    "radio.channel": "fanet_mw.channels",
+    "applications.use": "fanet_mw.applications",
+}
+"""The keys of a scenario that may name a part of another package, and the group of its entry points."""
+_NOT_EVERYWHERE: Final = ("numpy", "numba")
+"""What a companion computer has not. A channel or a mobility model computes with it elsewhere, and is checked there."""
+
+
+def installed(key: str) -> dict[str, EntryPoint]:
+    """The entry points that installed packages offer for a key."""
+    return {entry.name: entry for entry in sorted(entry_points(group=GROUPS[key]))}
+
+
+@lru_cache(maxsize=64)
+def load(key: str, name: str) -> Any:  # noqa: ANN401  (whatever the contract of the key asks for)
+    """The class that a scenario names; raises ValueError that says what is wrong with the name.
+
+    Raises ModuleNotFoundError when the part needs what only machines with an emulator have.
+    """
+    entry = installed(key).get(name)
+    text = entry.value if entry is not None else name
+    module, colon, path = text.partition(":")
+    if not colon:
+        known = ", ".join(installed(key)) or "none"
+        raise ValueError(
+            f"{key} = {name!r}: is neither one of ours, nor an entry point of the group {GROUPS[key]} "
+            f"(installed: {known}), nor MODULE:CLASS"
+        )
+    try:
+        found: Any = import_module(module)
+        for part in path.split("."):
+            found = getattr(found, part)
+    except ModuleNotFoundError as error:
+        if (error.name or "").partition(".")[0] in _NOT_EVERYWHERE:
+            raise
+        raise ValueError(f"{key} = {name!r}: {text} cannot be imported: {error}") from error
+    except (ImportError, AttributeError) as error:
+        raise ValueError(f"{key} = {name!r}: {text} cannot be imported: {error}") from error
+    if not callable(found):
+        raise ValueError(f"{key} = {name!r}: {text} is no class")  # noqa: TRY004  (a value of a file)
+    return found
+
+
+class Named:
+    """The annotation of a key that holds the name of a part: one of ours, or one that can be loaded."""
+
+    def __init__(self, key: str, ours: Sequence[str]) -> None:
+        self._key = key
+        self._ours = tuple(ours)
+
+    def __get_pydantic_core_schema__(self, source: object, handler: GetCoreSchemaHandler) -> core_schema.CoreSchema:
+        return core_schema.no_info_after_validator_function(self._check, handler(source))
+
+    def __get_pydantic_json_schema__(self, _: core_schema.CoreSchema, __: GetJsonSchemaHandler) -> JsonSchemaValue:
+        other = f"an entry point of {GROUPS[self._key]}, or MODULE:CLASS"
+        return {"anyOf": [{"enum": list(self._ours), "type": "string"}, {"type": "string", "x-names": other}]}
+
+    def _check(self, name: str) -> str:
+        if name not in self._ours:
+            try:
+                load(self._key, name)
+            except ModuleNotFoundError:
+                return name  # this machine does not run it
+            except ValueError as error:
+                close = difflib.get_close_matches(name, self._ours, n=1)
+                hint = f"did you mean {close[0]}?" if close else f"ours: {', '.join(self._ours)}"
+                raise ValueError(f"{error}; {hint}") from error
+        return name
+
+
+class OptionsOf:
+    """The annotation of the table of options beside such a key.
+
+    It is checked by the part's own `Options`, with its defaults written out; a part of ours has no options.
+    """
+
+    def __init__(self, key: str, ours: Sequence[str]) -> None:
+        self._key = key
+        self._ours = tuple(ours)
+
+    def __get_pydantic_core_schema__(self, source: object, handler: GetCoreSchemaHandler) -> core_schema.CoreSchema:
+        return core_schema.with_info_after_validator_function(self._check, handler(source))
+
+    def _check(self, options: dict[str, Any], info: ValidationInfo) -> dict[str, Any]:
+        table, field = self._key.split(".")
+        name = info.data.get(field)
+        if name is None:
+            return options  # the name itself is wrong, and was reported
+        model = None if name in self._ours else _model(self._key, name)
+        if model is None:
+            if options and name in self._ours:
+                raise ValueError(f"{table}.options: {field} = {name!r} is one of ours and has no options")
+            return options
+        try:
+            return model.model_validate(options).model_dump(mode="json", exclude_none=True)
+        except ValidationError as error:
+            wrong = (f"{table}.options.{_path(item['loc'])}: {item['msg']}" for item in error.errors())
+            raise ValueError("; ".join(wrong)) from error
+
+
+def _model(key: str, name: str) -> type[BaseModel] | None:
+    """The model of the options of a part, which is its attribute `Options`."""
+    try:
+        model = getattr(load(key, name), "Options", None)
+    except (ValueError, ModuleNotFoundError):
+        return None
+    if model is None or (isinstance(model, type) and issubclass(model, BaseModel)):
+        return model
+    raise ValueError(f"{key} = {name!r}: its Options must be a pydantic model")
+
+
+def _path(location: Sequence[str | int]) -> str:
+    return ".".join(str(part) for part in location)

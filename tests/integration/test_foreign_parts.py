@@ -1,0 +1,106 @@
+"""Parts of another package, installed beside ours, in virtual time and in every process: examples/swarm-parts."""
+
+import json
+import os
+import subprocess
+import sys
+from pathlib import Path
+
+import pytest
+
+from fanet_mw import extensions
+from fanet_mw.errors import ConfigError
+from fanet_mw.scenario import config
+from sim.results.files import finish
+from sim.run.virtual import simulate
+from sim.scenarios import catalog
+
+ROOT = Path(__file__).parents[2]
+EXAMPLE = ROOT / "examples" / "swarm-parts"
+
+
+@pytest.fixture(scope="module")
+def installed(tmp_path_factory: pytest.TempPathFactory) -> Path:
+    """The example, built and installed as any package is, without a network."""
+    target = tmp_path_factory.mktemp("site")
+    pip = [sys.executable, "-m", "pip", "install", "--quiet", "--no-deps", "--no-build-isolation", "--no-index"]
+    subprocess.run([*pip, "--target", str(target), str(EXAMPLE)], check=True, timeout=60)
+    return target
+
+
+def run(installed: Path, *command: str, cwd: Path) -> subprocess.CompletedProcess[str]:
+    environment = {**os.environ, "PYTHONPATH": os.pathsep.join((str(installed), str(ROOT)))}
+    return subprocess.run(
+        [sys.executable, *command], cwd=cwd, env=environment, capture_output=True, text=True, timeout=110, check=False
+    )
+
+
+def test_a_protocol_of_another_package_keeps_the_contract(installed: Path, tmp_path: Path) -> None:
+    tests = f"{EXAMPLE / 'tests' / 'test_gossip3.py'}::TestGossip3"
+    ended = run(
+        installed, "-m", "pytest", "-q", "-p", "no:cacheprovider", "--rootdir", str(tmp_path), tests, cwd=tmp_path
+    )
+    assert ended.returncode == 0, ended.stdout + ended.stderr
+    assert "15 passed" in ended.stdout
+
+
+@pytest.mark.slow
+def test_a_protocol_that_breaks_the_contract_is_told(installed: Path, tmp_path: Path) -> None:
+    """One that never ends a wake-up, and one that takes a packet and relays nothing."""
+    (tmp_path / "broken.py").write_text(
+        "from swarm_parts.gossip3 import Gossip3\n"
+        "class Restless(Gossip3):\n"
+        "    def next_wake_ns(self): return 1\n"
+        "class Silent(Gossip3):\n"
+        "    def receive(self, packet, reception, *, now_ns): pass\n"
+    )
+    (tmp_path / "test_broken.py").write_text(
+        "from fanet_mw.testing.routing_contract import RoutingContract\n"
+        "class TestRestless(RoutingContract): protocol = 'broken:Restless'\n"
+        "class TestSilent(RoutingContract): protocol = 'broken:Silent'\n"
+    )
+    chosen = "wake_up or (Silent and nearly_all and all)"
+    options = ["-q", "-p", "no:cacheprovider", "--rootdir", str(tmp_path), "-k", chosen, "-o", "pythonpath=."]
+    ended = run(installed, "-m", "pytest", *options, "test_broken.py", cwd=tmp_path)
+    assert "TestRestless::test_a_wake_up_that_has_come_is_done" in ended.stdout
+    assert "TestSilent::test_a_connected_swarm_at_rest_gets_nearly_all[all]" in ended.stdout
+
+
+def test_four_parts_of_another_package_serve_a_run(installed: Path, tmp_path: Path) -> None:
+    simulate = ["-m", "fanet_mw", "simulate", str(EXAMPLE / "scenario.toml"), "--out", str(tmp_path / "out"), "--json"]
+    ended = run(installed, *simulate, cwd=tmp_path)
+    assert ended.returncode == 0, ended.stderr
+    summary = json.loads(ended.stdout)
+    assert summary["pdr"] > 0.9
+    resolved = (tmp_path / "out" / "scenario.toml").read_text()
+    assert "patience_ms = 50.0" in resolved, "the defaults of the package's own table are written out"
+
+
+@pytest.mark.parametrize(
+    ("changes", "said"),
+    [
+        (["routing.options.p=2"], "routing.options.p: Input should be less than or equal to 1"),
+        (["routing.options.q=0.5"], "routing.options.q: Extra inputs are not permitted"),
+        (["routing.protocol=gossip4"], "(installed: gossip3), nor MODULE:CLASS"),
+        (["routing.protocol=swarm_parts.gossip3:Gossip4"], "has no attribute 'Gossip4'"),
+        (["mobility.model=static"], "mobility.options: model = 'static' is one of ours and has no options"),
+    ],
+)
+def test_what_is_wrong_with_a_part_is_said_before_a_run(
+    installed: Path, monkeypatch: pytest.MonkeyPatch, changes: list[str], said: str
+) -> None:
+    monkeypatch.syspath_prepend(installed)
+    extensions.load.cache_clear()
+    with pytest.raises(ConfigError) as caught:
+        config.load(EXAMPLE / "scenario.toml", changes)
+    assert said in str(caught.value)
+
+
+def test_clusters_may_be_made_by_another_package(installed: Path, monkeypatch: pytest.MonkeyPatch) -> None:
+    monkeypatch.syspath_prepend(installed)
+    extensions.load.cache_clear()
+    keys = ["clusters.method=cells", "clusters.options.cell_m=300", "duration_s=15", "warmup_s=8", "drain_s=3"]
+    summary = finish(
+        simulate(catalog.find("quick", [*keys, "world.engine=kinematic", "mission.survivors=0"])), out=None
+    )
+    assert summary["pdr"] > 0.9

@@ -33,7 +33,7 @@ class Radio(Section):
 
     channel: Annotated[str, Named("radio.channel", CHANNELS)] = "range"
     """The path loss model: see docs/explanation/emulator.md for equations, sources and ranges of validity."""
-    options: Annotated[dict[str, Any], OptionsOf("radio.channel", CHANNELS), Field(default_factory=dict)]
+    options: Annotated[dict[str, Any], OptionsOf("radio.channel", CHANNELS)] = Field(default_factory=dict)
     """The table of a channel that another package brings, as that package documents it."""
     range_m: SomeLength = 250.0
     """`range`: decode and carrier-sense limit; frames are equally strong within it, silent beyond."""

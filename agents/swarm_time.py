@@ -121,6 +121,7 @@ class BeaconTime(SwarmTime):
                 oscillator=oscillator(clock, others=1),
                 flight_ns=math.ceil(radio.range_m / _LIGHT_M_PER_S * S),
                 limit_ns=clock.limit_ns,
+                leader=scenario.leader,
             )
         )
         self._malformed = 0

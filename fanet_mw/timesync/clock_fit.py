@@ -4,8 +4,9 @@
 
 Each pair comes with a bound of its error; a pair that lies farther from the line than both errors allow is counted and
 left out. When more pairs of the window agree with each other against the line than support it, the line was wrong and
-is fitted anew to them. The error that is stated is an estimate, not a proof: four standard deviations of the fit, in
-addition to the errors that the pairs state.
+is fitted anew to them; a single source cannot achieve that against others, however many pairs it states. The error that
+is stated is an estimate, not a proof: four standard deviations of the fit, in addition to the errors that the pairs
+state.
 """
 
 import math
@@ -31,6 +32,8 @@ class Pair(NamedTuple):
     error_ns: int
     rate: float = 0.0
     """How fast that error may have grown since, as the sender of the pair states it (parts)."""
+    source: int = 0
+    """Which node stated the pair."""
 
 
 class Oscillator(NamedTuple):
@@ -83,6 +86,19 @@ class Line(NamedTuple):
     def rate_error(self, oscillator: Oscillator) -> float:
         """A bound of the error of the rate (parts), as it is stated to others."""
         return min(oscillator.rate, self.stated_rate + _SIGMAS * self.rate_sd)
+
+
+def alike(one: Pair, other: Pair, oscillator: Oscillator) -> bool:
+    """True if both pairs may lie on one line."""
+    drift_ns = oscillator.rate * abs(one.local_ns - other.local_ns)
+    margin_ns = one.error_ns + other.error_ns + 2 * oscillator.stamp_ns
+    return abs(one.offset_ns - other.offset_ns) <= drift_ns + margin_ns
+
+
+def _is_one_against_others(against: list[Pair], for_it: list[Pair]) -> bool:
+    """True if a single source contradicts what others have stated."""
+    sources = {pair.source for pair in against}
+    return len(sources) == 1 and any(pair.source not in sources for pair in for_it)
 
 
 EXACT: Final = Line(0, 0, 0.0, 0.0, 0.0, 0.0)
@@ -148,9 +164,9 @@ class ClockFit:
             return True
         self.outliers += 1
         self._against.append(pair)
-        together = [other for other in self._against if self._alike(other, pair)]
-        for_it = sum(1 for old in self._pairs if old.local_ns >= horizon_ns)
-        if len(together) < _AGREEING or len(together) <= for_it:
+        together = [other for other in self._against if alike(other, pair, self._oscillator)]
+        for_it = [old for old in self._pairs if old.local_ns >= horizon_ns]
+        if len(together) < _AGREEING or len(together) <= len(for_it) or _is_one_against_others(together, for_it):
             return False
         self.steps += 1
         self._against.clear()
@@ -167,12 +183,6 @@ class ClockFit:
         apart_ns = abs(pair.offset_ns - self.line.offset_at(pair.local_ns))
         margin_ns = self.line.error_ns(pair.local_ns, self._oscillator) + pair.error_ns
         return apart_ns <= margin_ns + 2 * self._oscillator.stamp_ns
-
-    def _alike(self, one: Pair, other: Pair) -> bool:
-        """True if both pairs may lie on one line."""
-        drift_ns = self._oscillator.rate * abs(one.local_ns - other.local_ns)
-        margin_ns = one.error_ns + other.error_ns + 2 * self._oscillator.stamp_ns
-        return abs(one.offset_ns - other.offset_ns) <= drift_ns + margin_ns
 
     def replace(self, line: Line) -> None:
         """Replace the line by this one, and forget all pairs."""

@@ -10,8 +10,8 @@ the swarm has. Pairs are taken from the neighbors nearest to the reference; othe
 beacon is news if the reference's `round` has advanced.
 
 Sans-IO: own instants and beacons go in; the line to swarm time, its error and the next beacon come out. Not provided:
-secrecy and proof of origin. A forged beacon that is plausible counts as one neighbor's statement; it can be outvoted,
-but is not recognized.
+secrecy and proof of origin. A forged beacon that is plausible counts as one neighbor's statement, also if it is the
+first of all; it can be outvoted, but is not recognized.
 """
 
 import math
@@ -21,6 +21,7 @@ from dataclasses import dataclass, field
 from typing import Final, NamedTuple
 
 from fanet_mw.timesync.clock_fit import EXACT, ClockFit, Line, Oscillator, Pair
+from fanet_mw.timesync.first_time import FirstTime
 from fanet_mw.units import MS, NodeId, S
 from fanet_mw.wire.inner import TimeBeacon
 
@@ -38,6 +39,8 @@ _PROVEN: Final = 2
 """How many pairs it takes to follow another reference."""
 _HASTY: Final = 4
 """Pairs of one neighbor that are closer together than a hello interval divided by this are not counted."""
+_DOUBT_HELLOS: Final = 1.5
+"""How long a node without a time waits for a second neighbor that states the same; each states it once per hello."""
 _STAMPS: Final = 4
 """Of how many hellos of each neighbor the end is remembered."""
 _NEIGHBORS: Final = 256
@@ -60,6 +63,8 @@ class Settings(NamedTuple):
     """The longest propagation delay to a neighbor."""
     limit_ns: int
     """A swarm time that is farther than this from the own clock is not believed."""
+    leader: NodeId
+    """The leader of the swarm; what it states of its own time needs no second statement."""
 
     @property
     def hop_ns(self) -> int:
@@ -91,6 +96,13 @@ class TimeSync:
         self._rival: tuple[int, ClockFit, int] | None = None
         """Another reference that may be followed: its id, its pairs so far, and since when it has been considered."""
         self._neighbors: dict[NodeId, _Neighbor] = {}
+        self._doubt_ns = int(_DOUBT_HELLOS * own.hello_ns)
+        self._first = FirstTime(
+            own.oscillator,
+            leader=own.leader,
+            wait_ns=self._doubt_ns,
+            memory_ns=int(_FRESH_HELLOS * own.hello_ns),
+        )
         self._sent: tuple[int, int] | None = None
         """The last hello that this node has sent: its number, and when it ended."""
         self.reference: int | None = None
@@ -242,11 +254,16 @@ class TimeSync:
             return None
         neighbor.paired_ns = ended_ns
         return Pair(
-            ended_ns, offset_ns + self._own.flight_ns // 2, beacon.error_ns + self._own.hop_ns, beacon.rate_ppb / _PPB
-        )
+            ended_ns, offset_ns + self._own.flight_ns // 2, beacon.error_ns + self._own.hop_ns, beacon.rate_ppb / _PPB,
+            source=src,
+        )  # fmt: skip
 
     def _on_pair(self, neighbor: _Neighbor, beacon: TimeBeacon, pair: Pair, local_ns: int) -> None:
         if self.reference is None:
+            if not self._first.believes(NodeId(beacon.node), beacon.reference, pair, local_ns=local_ns):
+                self.counts["doubted"] += 1
+                self._claim_ns = max(self._claim_ns, local_ns + self._doubt_ns)  # the swarm has a time already
+                return
             self.reference = beacon.reference
             self._note_news(neighbor, local_ns)
         if beacon.reference == self.reference:
@@ -260,7 +277,7 @@ class TimeSync:
         """Take in a pair from a neighbor that follows the same reference."""
         steps = self._fit.steps
         if self._fit.line is None:
-            self._fit.add(pair)  # the first pair is taken from any neighbor
+            self._fit.add(pair)  # `FirstTime` has believed it
             return
         agrees = self._fit.agrees(pair)
         if not agrees:

@@ -232,7 +232,8 @@ def test_who_transmits_in_another_s_name_is_refused() -> None:
 # --- time ----------------------------------------------------------------------------------------------------------
 
 
-def test_time_beacons_from_the_start_do_not_set_the_swarm_s_time() -> None:
+@pytest.mark.parametrize("seed", [2, 3, 5])
+def test_time_beacons_from_the_start_do_not_pull_the_swarm_s_time_apart(seed: int) -> None:
     said: list[int] = []
 
     def lie(t_ns: int, seq: int) -> bytes:
@@ -241,8 +242,8 @@ def test_time_beacons_from_the_start_do_not_set_the_swarm_s_time() -> None:
         time = TimeBeacon(said[max(0, seq - 1)] + 46 * MS, 0, 0, 0, CONTROL + seq - 1, seq, EVIL, 1, 0, 1)
         return hello(t_ns, seq, beacon(), time.encode_frame(EVIL) if seq else b"")
 
-    keys = ("clock.sync=beacons", "clock.offset_ms=5", "clock.drift_ppm=20")
+    keys = ("clock.sync=beacons", "clock.offset_ms=5", "clock.drift_ppm=20", f"seed={seed}")
     summary, _ = attacked(scenario(*keys), every(300, lie, start_s=0.1, end_s=22))
-    calm, _ = attacked(scenario(*keys), [])
-    assert summary["clock"]["error_us"]["max"] < 10 * calm["clock"]["error_us"]["max"]
-    assert summary["clock"]["beyond_bound"] <= 0.05 * summary["clock"]["samples"]
+    assert summary["clock"]["error_us"]["max"] < 40
+    assert summary["clock"]["beyond_bound"] <= 0.4 * summary["clock"]["samples"]
+    assert summary["pdr"] > 0.97

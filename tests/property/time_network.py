@@ -28,7 +28,7 @@ class Member:
         self.node = NodeId(node)
         self.clock = LocalClock(clock, seed=seed, node=self.node)
         oscillator = Oscillator(2e-6 * clock.drift_ppm, 1e-6 * clock.wander_ppm, STAMP_NS)
-        self.sync = TimeSync(Settings(self.node, node == 1, S, oscillator, FLIGHT_NS, clock.limit_ns))
+        self.sync = TimeSync(Settings(self.node, node == 1, S, oscillator, FLIGHT_NS, clock.limit_ns, NodeId(1)))
         self.hello = 0
         self.alive = True
 

@@ -8,9 +8,9 @@ from fanet_mw.units import MS, US, S
 OSCILLATOR = Oscillator(rate=40e-6, wander=0.0, stamp_ns=US)
 
 
-def pair(second: float, *, ppm: float = 10.0, start_us: float = 500.0, error_us: float = 1.0) -> Pair:
+def pair(second: float, *, ppm: float = 10.0, start_us: float = 500.0, error_us: float = 1.0, source: int = 0) -> Pair:
     local_ns = round(second * S)
-    return Pair(local_ns, round(start_us * US + ppm * 1e-6 * local_ns), round(error_us * US))
+    return Pair(local_ns, round(start_us * US + ppm * 1e-6 * local_ns), round(error_us * US), source=source)
 
 
 def fit_of(*pairs: Pair) -> ClockFit:
@@ -87,3 +87,16 @@ def test_a_wandering_rate_makes_the_error_grow_faster_than_time() -> None:
     errors = [line.error_ns(20 * S + ahead * S, wandering) for ahead in (0, 10, 20)]
     assert errors[2] - errors[1] > errors[1] - errors[0] > 0
     assert errors[2] < MS
+
+
+def test_one_source_overthrows_no_line_that_another_has_borne_out_however_much_it_says() -> None:
+    fit = fit_of(pair(0, source=1), pair(1, source=2))
+    assert not any(fit.add(pair(1 + n / 4, start_us=9000, source=3)) for n in range(1, 40))
+    assert fit.add(pair(11, start_us=9000, source=4)), "two that agree are heard"
+    assert fit.steps == 1
+
+
+def test_a_source_that_bore_out_a_line_alone_may_overthrow_it() -> None:
+    """A neighbor whose own line was overthrown, of a node that has no other."""
+    fit = fit_of(pair(0, source=3), pair(1, source=3))
+    assert [fit.add(pair(2 + second, start_us=9000, source=3)) for second in range(3)] == [False, False, True]

@@ -12,7 +12,7 @@ CRYSTAL = Clock(sync="beacons", offset_ms=500, drift_ppm=20)
 
 
 def follower(node: int = 2, *, leads: bool = False) -> TimeSync:
-    sync = TimeSync(Settings(NodeId(node), leads, S, Oscillator(40e-6, 0.0, US), 834, LIMIT_NS))
+    sync = TimeSync(Settings(NodeId(node), leads, S, Oscillator(40e-6, 0.0, US), 834, LIMIT_NS, NodeId(1)))
     sync.start(0)
     return sync
 
@@ -45,7 +45,7 @@ def test_a_hello_alone_tells_no_time_and_the_next_one_tells_that_of_the_first() 
 
 def test_a_pair_holds_half_the_flight_and_its_hop_s_error() -> None:
     """Up to 20 us of flight: 10 us are taken for granted, 10 us and a stamp are stated as error."""
-    sync = TimeSync(Settings(NodeId(2), False, S, Oscillator(40e-6, 0.0, US), 20 * US, LIMIT_NS))  # noqa: FBT003
+    sync = TimeSync(Settings(NodeId(2), False, S, Oscillator(40e-6, 0.0, US), 20 * US, LIMIT_NS, NodeId(1)))  # noqa: FBT003
     sync.start(0)
     hear(sync, 1, 7, 3 * S, None)
     hear(sync, 1, 8, 4 * S, said(3 * S + 25 * MS, 7, error_ns=5 * US))
@@ -147,6 +147,31 @@ def test_one_liar_among_honest_neighbors_moves_nothing_whenever_it_begins() -> N
                 hear(sync, src, hello, hello * S, beacon)
         assert abs(sync.line.swarm_ns(40 * S) - (40 * S + 30 * MS)) < 10 * US
         assert sync.counts["outlier"] >= 20
+
+
+def test_a_liar_that_is_the_first_to_tell_the_time_is_not_believed_for_a_moment() -> None:
+    sync = follower(5)
+    for hello in range(1, 12):
+        for src, ahead_ns in ((4, 2 * S), (2, 30 * MS), (3, 30 * MS)):
+            beacon = said((hello - 1) * S + ahead_ns, hello - 1, node=src, hops=1) if hello > 1 else None
+            hear(sync, src, hello, hello * S, beacon)
+            assert abs(sync.line.offset_at(hello * S)) < 31 * MS
+    assert abs(sync.line.swarm_ns(12 * S) - (12 * S + 30 * MS)) < 10 * US
+    assert sync.counts["doubted"] == 2
+
+
+def test_who_hears_of_a_time_that_it_doubts_does_not_set_up_another() -> None:
+    """A leader that starts again in the last moment of its listening, beside one neighbor."""
+    leader = follower(1, leads=True)
+    hear(leader, 2, 1, 1400 * MS, None)
+    hear(leader, 2, 2, 2400 * MS, said(1400 * MS + 30 * MS, 1, node=2, hops=1))
+    leader.pass_time(2600 * MS)
+    assert not leader.is_reference
+    hear(leader, 2, 3, 3400 * MS, said(2400 * MS + 30 * MS, 2, node=2, hops=1))
+    leader.pass_time(3800 * MS)
+    hear(leader, 2, 4, 4400 * MS, said(3400 * MS + 30 * MS, 3, node=2, hops=1))
+    leader.pass_time(4500 * MS)
+    assert abs(leader.line.swarm_ns(4500 * MS) - 4530 * MS) < 100 * US
 
 
 def test_a_liar_that_talks_ten_times_as_fast_has_no_more_votes() -> None:

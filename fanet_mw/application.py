@@ -50,27 +50,45 @@ class Received(NamedTuple):
     """When its application handed it over, by the origin's clock; never later than now."""
     hops: int
     frame: bytes
-    """The packet as the radio brought it, routing header first."""
+    """The packet as the radio brought it, routing header first; of several the one that made the message whole."""
+    port: int = 0
+    """The numbered port that bytes were sent to; 0: MAVLink frames."""
+    content: bytes | None = None
+    """The bytes that were sent to a port."""
 
     @property
     def data(self) -> bytes:
-        """The MAVLink frames that were sent."""
-        return self.frame[HEADER_BYTES:]
+        """What was sent: the bytes, or the MAVLink frames."""
+        return self.frame[HEADER_BYTES:] if self.content is None else self.content
+
+
+class Data(NamedTuple):
+    """Bytes for whoever listens on a numbered port."""
+
+    port: int
+    """1 to 65535."""
+    data: bytes
 
 
 class Fate(StrEnum):
     """What has become of a message at its sender."""
 
     ADMITTED = "admitted"
-    """The network has taken it."""
+    """The node has taken it."""
     REFUSED = "refused"
-    """It came sooner than the deadline allows; `Status.interval_ns` says how far apart messages must be."""
+    """The node has not taken it: the deadline cannot be kept, or too much waits already (`Status.reason`)."""
     LET_OUT = "let_out"
     """Its first frame was announced to the radio."""
     SENT = "sent"
     """The radio has done with its first frame."""
     TURNED_AWAY = "turned_away"
     """The radio did not try to send its first frame: its queue was full, or the frame came too late."""
+    ACKNOWLEDGED = "acknowledged"
+    """The application of a node (`Status.nodes`) has it; told of each node once."""
+    UNWANTED = "unwanted"
+    """No application of that node listens to it."""
+    EXPIRED = "expired"
+    """Its lifetime was over; `Status.nodes` are those that have not acknowledged it, where that was asked for."""
     DROPPED = "dropped"
     """It ended in this node; `Status.reason` says why."""
 
@@ -82,8 +100,15 @@ class Status(NamedTuple):
     fate: Fate
     t_ns: int
     reason: DropReason | None = None
+    nodes: tuple[NodeId, ...] = ()
+    last: bool = False
+    """True when nothing more can become of it as far as this node will hear."""
     interval_ns: int | None = None
     """The least interval between messages that the network can serve in time; None: unknown."""
+
+
+Destination = NodeId | Collection[NodeId]
+"""One node, several, or BROADCAST."""
 
 
 class AppPort(Protocol):
@@ -105,16 +130,23 @@ class AppPort(Protocol):
 
     def send(
         self,
-        frames: bytes,
+        content: bytes | Data,
         *,
-        destination: NodeId = BROADCAST,
+        destination: Destination = BROADCAST,
         priority: int = PRIORITY_BULK,
+        confirm: bool = False,
+        lifetime_ns: int | None = None,
+        deadline_ns: int | None = None,
         born_ns: int | None = None,
     ) -> int:
-        """Send whole MAVLink frames; returns the handle that statuses name: the packet's sequence number.
+        """Send whole MAVLink frames, or bytes to a port; returns the handle that statuses name.
 
-        `born_ns` is when the application meant to send, by default now. Raises LocalProtocolError when the frames do
-        not fit one packet.
+        A message that is to be confirmed is sent again until each of its targets has it, and messages to the same
+        targets, on one port and of one priority, are then handed over in order. Its lifetime is by default that of its
+        priority in the scenario. A message with a deadline is refused if the network states that it cannot be kept.
+        `born_ns` is when the application meant to send, by default now. Of plain MAVLink frames the handle is the
+        packet's sequence number. Raises LocalProtocolError when the content cannot be sent at all: frames that do not
+        fit one packet, more bytes than 64 packets hold, a destination that is not in the scenario.
         """
 
     def fly(self, course: Course) -> None:
@@ -137,6 +169,8 @@ class Application:
     """Unique at its node; what the trace calls its packets."""
     listens: Collection[int] = ()
     """Ids of the MAVLink messages it is given: a packet counts as what its first inner frame is."""
+    ports: Collection[int] = ()
+    """Ports whose messages it is given."""
     follows: Collection[Fate] = ()
     """What it is told of its messages."""
     port: AppPort

@@ -373,6 +373,9 @@ MAVLINK_MSG_ID_FANET_PLACES = 53008
 MAVLINK_MSG_ID_FANET_CLAIMS = 53009
 MAVLINK_MSG_ID_FANET_ROUTING = 53010
 MAVLINK_MSG_ID_FANET_LINKS = 53011
+MAVLINK_MSG_ID_FANET_MESSAGE = 53012
+MAVLINK_MSG_ID_FANET_RECEIPT = 53013
+MAVLINK_MSG_ID_FANET_TARGETS = 53014
 
 
 class MAVLink_fanet_route_message(MAVLink_message):
@@ -948,6 +951,140 @@ class MAVLink_fanet_links_message(MAVLink_message):
 setattr(MAVLink_fanet_links_message, "name", mavlink_msg_deprecated_name_property())
 
 
+class MAVLink_fanet_message_message(MAVLink_message):
+    """
+    Head of one piece of an application's message; the data follows in
+    the same packet: FANET_CHUNK, or the MAVLink messages that were
+    sent.
+    """
+
+    id = MAVLINK_MSG_ID_FANET_MESSAGE
+    msgname = "FANET_MESSAGE"
+    fieldnames = ["born_us", "number", "previous", "size", "lifetime_ms", "port", "flow", "stride", "piece", "pieces", "confirm", "version"]
+    ordered_fieldnames = ["born_us", "number", "previous", "size", "lifetime_ms", "port", "flow", "stride", "piece", "pieces", "confirm", "version"]
+    fieldtypes = ["uint64_t", "uint32_t", "uint32_t", "uint32_t", "uint32_t", "uint16_t", "uint16_t", "uint16_t", "uint8_t", "uint8_t", "uint8_t", "uint8_t"]
+    fielddisplays_by_name: Dict[str, str] = {}
+    fieldenums_by_name: Dict[str, str] = {}
+    fieldunits_by_name: Dict[str, str] = {"born_us": "us", "size": "bytes", "lifetime_ms": "ms", "stride": "bytes"}
+    native_format = bytearray(b"<QIIIIHHHBBBB")
+    orders = [0, 1, 2, 3, 4, 5, 6, 7, 8, 9, 10, 11]
+    lengths = [1, 1, 1, 1, 1, 1, 1, 1, 1, 1, 1, 1]
+    array_lengths = [0, 0, 0, 0, 0, 0, 0, 0, 0, 0, 0, 0]
+    crc_extra = 170
+    unpacker = struct.Struct("<QIIIIHHHBBBB")
+    instance_field = None
+    instance_offset = -1
+
+    def __init__(self, born_us: int, number: int, previous: int, size: int, lifetime_ms: int, port: int, flow: int, stride: int, piece: int, pieces: int, confirm: int, version: int):
+        MAVLink_message.__init__(self, MAVLink_fanet_message_message.id, MAVLink_fanet_message_message.msgname)
+        self._fieldnames = MAVLink_fanet_message_message.fieldnames
+        self._instance_field = MAVLink_fanet_message_message.instance_field
+        self._instance_offset = MAVLink_fanet_message_message.instance_offset
+        self.born_us = born_us
+        self.number = number
+        self.previous = previous
+        self.size = size
+        self.lifetime_ms = lifetime_ms
+        self.port = port
+        self.flow = flow
+        self.stride = stride
+        self.piece = piece
+        self.pieces = pieces
+        self.confirm = confirm
+        self.version = version
+
+    def pack(self, mav: "MAVLink", force_mavlink1: bool = False) -> bytes:
+        return self._pack(mav, self.crc_extra, self.unpacker.pack(self.born_us, self.number, self.previous, self.size, self.lifetime_ms, self.port, self.flow, self.stride, self.piece, self.pieces, self.confirm, self.version), force_mavlink1=force_mavlink1)
+
+
+# Define name on the class for backwards compatibility (it is now msgname).
+# Done with setattr to hide the class variable from mypy.
+setattr(MAVLink_fanet_message_message, "name", mavlink_msg_deprecated_name_property())
+
+
+class MAVLink_fanet_receipt_message(MAVLink_message):
+    """
+    What has come of a message, to its origin. Several of these share
+    a packet.
+    """
+
+    id = MAVLINK_MSG_ID_FANET_RECEIPT
+    msgname = "FANET_RECEIPT"
+    fieldnames = ["held", "number", "outcome", "version"]
+    ordered_fieldnames = ["held", "number", "outcome", "version"]
+    fieldtypes = ["uint64_t", "uint32_t", "uint8_t", "uint8_t"]
+    fielddisplays_by_name: Dict[str, str] = {}
+    fieldenums_by_name: Dict[str, str] = {}
+    fieldunits_by_name: Dict[str, str] = {}
+    native_format = bytearray(b"<QIBB")
+    orders = [0, 1, 2, 3]
+    lengths = [1, 1, 1, 1]
+    array_lengths = [0, 0, 0, 0]
+    crc_extra = 26
+    unpacker = struct.Struct("<QIBB")
+    instance_field = None
+    instance_offset = -1
+
+    def __init__(self, held: int, number: int, outcome: int, version: int):
+        MAVLink_message.__init__(self, MAVLink_fanet_receipt_message.id, MAVLink_fanet_receipt_message.msgname)
+        self._fieldnames = MAVLink_fanet_receipt_message.fieldnames
+        self._instance_field = MAVLink_fanet_receipt_message.instance_field
+        self._instance_offset = MAVLink_fanet_receipt_message.instance_offset
+        self.held = held
+        self.number = number
+        self.outcome = outcome
+        self.version = version
+
+    def pack(self, mav: "MAVLink", force_mavlink1: bool = False) -> bytes:
+        return self._pack(mav, self.crc_extra, self.unpacker.pack(self.held, self.number, self.outcome, self.version), force_mavlink1=force_mavlink1)
+
+
+# Define name on the class for backwards compatibility (it is now msgname).
+# Done with setattr to hide the class variable from mypy.
+setattr(MAVLink_fanet_receipt_message, "name", mavlink_msg_deprecated_name_property())
+
+
+class MAVLink_fanet_targets_message(MAVLink_message):
+    """
+    Before a FANET_MESSAGE that not every node is meant to have: who
+    is. More nodes than fit come in several messages.
+    """
+
+    id = MAVLINK_MSG_ID_FANET_TARGETS
+    msgname = "FANET_TARGETS"
+    fieldnames = ["nodes", "count", "version"]
+    ordered_fieldnames = ["nodes", "count", "version"]
+    fieldtypes = ["uint16_t", "uint8_t", "uint8_t"]
+    fielddisplays_by_name: Dict[str, str] = {}
+    fieldenums_by_name: Dict[str, str] = {}
+    fieldunits_by_name: Dict[str, str] = {}
+    native_format = bytearray(b"<HBB")
+    orders = [0, 1, 2]
+    lengths = [32, 1, 1]
+    array_lengths = [32, 0, 0]
+    crc_extra = 54
+    unpacker = struct.Struct("<32HBB")
+    instance_field = None
+    instance_offset = -1
+
+    def __init__(self, nodes: Sequence[int], count: int, version: int):
+        MAVLink_message.__init__(self, MAVLink_fanet_targets_message.id, MAVLink_fanet_targets_message.msgname)
+        self._fieldnames = MAVLink_fanet_targets_message.fieldnames
+        self._instance_field = MAVLink_fanet_targets_message.instance_field
+        self._instance_offset = MAVLink_fanet_targets_message.instance_offset
+        self.nodes = nodes
+        self.count = count
+        self.version = version
+
+    def pack(self, mav: "MAVLink", force_mavlink1: bool = False) -> bytes:
+        return self._pack(mav, self.crc_extra, self.unpacker.pack(self.nodes[0], self.nodes[1], self.nodes[2], self.nodes[3], self.nodes[4], self.nodes[5], self.nodes[6], self.nodes[7], self.nodes[8], self.nodes[9], self.nodes[10], self.nodes[11], self.nodes[12], self.nodes[13], self.nodes[14], self.nodes[15], self.nodes[16], self.nodes[17], self.nodes[18], self.nodes[19], self.nodes[20], self.nodes[21], self.nodes[22], self.nodes[23], self.nodes[24], self.nodes[25], self.nodes[26], self.nodes[27], self.nodes[28], self.nodes[29], self.nodes[30], self.nodes[31], self.count, self.version), force_mavlink1=force_mavlink1)
+
+
+# Define name on the class for backwards compatibility (it is now msgname).
+# Done with setattr to hide the class variable from mypy.
+setattr(MAVLink_fanet_targets_message, "name", mavlink_msg_deprecated_name_property())
+
+
 mavlink_map: Dict[int, Type[MAVLink_message]] = {
     MAVLINK_MSG_ID_FANET_ROUTE: MAVLink_fanet_route_message,
     MAVLINK_MSG_ID_FANET_BEACON: MAVLink_fanet_beacon_message,
@@ -961,6 +1098,9 @@ mavlink_map: Dict[int, Type[MAVLink_message]] = {
     MAVLINK_MSG_ID_FANET_CLAIMS: MAVLink_fanet_claims_message,
     MAVLINK_MSG_ID_FANET_ROUTING: MAVLink_fanet_routing_message,
     MAVLINK_MSG_ID_FANET_LINKS: MAVLink_fanet_links_message,
+    MAVLINK_MSG_ID_FANET_MESSAGE: MAVLink_fanet_message_message,
+    MAVLINK_MSG_ID_FANET_RECEIPT: MAVLink_fanet_receipt_message,
+    MAVLINK_MSG_ID_FANET_TARGETS: MAVLink_fanet_targets_message,
 }
 
 
@@ -1806,3 +1946,97 @@ class MAVLink(object):
 
         """
         self.send(self.fanet_links_encode(term, node, epoch, from_nodes, to_nodes, grades, powers, part, parts, count, version), force_mavlink1=force_mavlink1)
+
+    def fanet_message_encode(self, born_us: int, number: int, previous: int, size: int, lifetime_ms: int, port: int, flow: int, stride: int, piece: int, pieces: int, confirm: int, version: int) -> MAVLink_fanet_message_message:
+        """
+        Head of one piece of an application's message; the data follows in the
+        same packet: FANET_CHUNK, or the MAVLink messages that were
+        sent.
+
+        born_us                   : When the application handed it over. [us] (type:uint64_t)
+        number                    : Of the message at its origin. (type:uint32_t)
+        previous                  : The message of the same flow that has to be handed over before it; 0: none. (type:uint32_t)
+        size                      : Of the whole message. [bytes] (type:uint32_t)
+        lifetime_ms               : So long after its birth the message is of no use any more. [ms] (type:uint32_t)
+        port                      : For which application; 0: MAVLink messages. (type:uint16_t)
+        flow                      : Of messages to the same nodes, on one port and of one priority, that are to be confirmed: these are handed over in order. (type:uint16_t)
+        stride                    : Data in each piece but the last. [bytes] (type:uint16_t)
+        piece                     : This piece, from 0. (type:uint8_t)
+        pieces                    : How many pieces there are. (type:uint8_t)
+        confirm                   : 1: the origin wants a FANET_RECEIPT. (type:uint8_t)
+        version                   : 1. (type:uint8_t)
+
+        """
+        return MAVLink_fanet_message_message(born_us, number, previous, size, lifetime_ms, port, flow, stride, piece, pieces, confirm, version)
+
+    def fanet_message_send(self, born_us: int, number: int, previous: int, size: int, lifetime_ms: int, port: int, flow: int, stride: int, piece: int, pieces: int, confirm: int, version: int, force_mavlink1: bool = False) -> None:
+        """
+        Head of one piece of an application's message; the data follows in the
+        same packet: FANET_CHUNK, or the MAVLink messages that were
+        sent.
+
+        born_us                   : When the application handed it over. [us] (type:uint64_t)
+        number                    : Of the message at its origin. (type:uint32_t)
+        previous                  : The message of the same flow that has to be handed over before it; 0: none. (type:uint32_t)
+        size                      : Of the whole message. [bytes] (type:uint32_t)
+        lifetime_ms               : So long after its birth the message is of no use any more. [ms] (type:uint32_t)
+        port                      : For which application; 0: MAVLink messages. (type:uint16_t)
+        flow                      : Of messages to the same nodes, on one port and of one priority, that are to be confirmed: these are handed over in order. (type:uint16_t)
+        stride                    : Data in each piece but the last. [bytes] (type:uint16_t)
+        piece                     : This piece, from 0. (type:uint8_t)
+        pieces                    : How many pieces there are. (type:uint8_t)
+        confirm                   : 1: the origin wants a FANET_RECEIPT. (type:uint8_t)
+        version                   : 1. (type:uint8_t)
+
+        """
+        self.send(self.fanet_message_encode(born_us, number, previous, size, lifetime_ms, port, flow, stride, piece, pieces, confirm, version), force_mavlink1=force_mavlink1)
+
+    def fanet_receipt_encode(self, held: int, number: int, outcome: int, version: int) -> MAVLink_fanet_receipt_message:
+        """
+        What has come of a message, to its origin. Several of these share a
+        packet.
+
+        held                      : Bit i: the sender of this receipt has piece i. (type:uint64_t)
+        number                    : Of the message at its origin. (type:uint32_t)
+        outcome                   : 0: pieces are missing, or an earlier message is; 1: handed to its application; 2: no application listens on this port; 3: given up. (type:uint8_t)
+        version                   : 1. (type:uint8_t)
+
+        """
+        return MAVLink_fanet_receipt_message(held, number, outcome, version)
+
+    def fanet_receipt_send(self, held: int, number: int, outcome: int, version: int, force_mavlink1: bool = False) -> None:
+        """
+        What has come of a message, to its origin. Several of these share a
+        packet.
+
+        held                      : Bit i: the sender of this receipt has piece i. (type:uint64_t)
+        number                    : Of the message at its origin. (type:uint32_t)
+        outcome                   : 0: pieces are missing, or an earlier message is; 1: handed to its application; 2: no application listens on this port; 3: given up. (type:uint8_t)
+        version                   : 1. (type:uint8_t)
+
+        """
+        self.send(self.fanet_receipt_encode(held, number, outcome, version), force_mavlink1=force_mavlink1)
+
+    def fanet_targets_encode(self, nodes: Sequence[int], count: int, version: int) -> MAVLink_fanet_targets_message:
+        """
+        Before a FANET_MESSAGE that not every node is meant to have: who is.
+        More nodes than fit come in several messages.
+
+        nodes                     : Node ids, ascending. (type:uint16_t)
+        count                     : How many entries of this message are used. (type:uint8_t)
+        version                   : 1. (type:uint8_t)
+
+        """
+        return MAVLink_fanet_targets_message(nodes, count, version)
+
+    def fanet_targets_send(self, nodes: Sequence[int], count: int, version: int, force_mavlink1: bool = False) -> None:
+        """
+        Before a FANET_MESSAGE that not every node is meant to have: who is.
+        More nodes than fit come in several messages.
+
+        nodes                     : Node ids, ascending. (type:uint16_t)
+        count                     : How many entries of this message are used. (type:uint8_t)
+        version                   : 1. (type:uint8_t)
+
+        """
+        self.send(self.fanet_targets_encode(nodes, count, version), force_mavlink1=force_mavlink1)

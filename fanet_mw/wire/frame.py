@@ -307,7 +307,7 @@ def decode_first(spec: Spec, frame: bytes) -> tuple[Any, ...]:
     return found[0]
 
 
-# Whose codec is in `wire_messages`, `digest`, `places`, `claims`, `links` or `routing.control`.
+# Whose codec is in `inner`, `digest`, `places`, `claims`, `links`, `message` or `routing.control`.
 BEACON: Final = Spec(53001, 43, struct.Struct("<IHHHHHHHBBB"))
 SCHEDULE: Final = Spec(53002, 88, struct.Struct("<QIIIHHH56H56HBBBB"))
 SURVIVOR: Final = Spec(53003, 240, struct.Struct("<QIffffHB"))
@@ -319,7 +319,13 @@ PLACES: Final = Spec(53008, 1, struct.Struct("<28h28h28hhhhBBB"))
 CLAIMS: Final = Spec(53009, 249, struct.Struct("<H16H16B16B16B16BBBBBBB"))
 ROUTING: Final = Spec(53010, 255, struct.Struct("<BBBB240B"))
 LINKS: Final = Spec(53011, 92, struct.Struct("<IHH36H36H36B36bBBBB"))
-SPECS: Final = (ROUTE, BEACON, SCHEDULE, SURVIVOR, CHUNK, TIME, JOIN, DIGEST, PLACES, CLAIMS, ROUTING, LINKS)
+MESSAGE: Final = Spec(53012, 170, struct.Struct("<QIIIIHHHBBBB"))
+RECEIPT: Final = Spec(53013, 26, struct.Struct("<QIBB"))
+TARGETS: Final = Spec(53014, 54, struct.Struct("<32HBB"))
+SPECS: Final = (
+    ROUTE, BEACON, SCHEDULE, SURVIVOR, CHUNK, TIME, JOIN, DIGEST, PLACES, CLAIMS, ROUTING, LINKS,
+    MESSAGE, RECEIPT, TARGETS,
+)  # fmt: skip
 _OURS: Final = {spec.msgid: spec for spec in SPECS}
 
 # --- application data ---------------------------------------------------------------------------------------------

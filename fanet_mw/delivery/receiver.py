@@ -1,0 +1,226 @@
+"""The receiving side: pieces become messages, each is handed over once, and its sender is told.
+
+A message that is to be confirmed waits for the one before it in its flow. What is kept is bounded in bytes, per sender
+and together, and in messages; what does not fit is not taken, and its sender, who hears nothing, sends it again.
+Pieces that contradict each other are counted as malformed by whoever calls.
+"""
+
+from collections.abc import Callable
+from dataclasses import dataclass, field
+from typing import Final, NamedTuple
+
+from fanet_mw.errors import MalformedFrameError
+from fanet_mw.units import MS, US, NodeId, earliest
+from fanet_mw.wire.message import DELIVERED, GIVEN_UP, MISSING, NO_LISTENER, Piece, Receipt
+
+MOST_BYTES: Final = 4 << 20
+"""Of pieces of all senders together."""
+MOST_BYTES_EACH: Final = 1 << 20
+"""Of one sender."""
+MOST_MESSAGES: Final = 4096
+"""Of all senders together, that are not whole or wait for one before them."""
+MOST_MESSAGES_EACH: Final = 512
+"""Of one sender."""
+RECEIPT_NS: Final = 50 * MS
+"""A receipt waits this long for others to the same node."""
+_MOST_DONE: Final = 8192
+"""Messages of which is remembered that they were handed over."""
+_MOST_FLOWS: Final = 4096
+
+
+class Whole(NamedTuple):
+    """A message to be handed over."""
+
+    origin: NodeId
+    head: Head
+    data: bytes
+    frame: bytes
+    """The packet with its last piece."""
+
+
+@dataclass
+class _Incoming:
+    """A message that is not whole, or waits."""
+
+    head: Head
+    until_ns: int
+    pieces: dict[int, bytes] = field(default_factory=dict)
+    frame: bytes = b""
+
+    @property
+    def held(self) -> int:
+        return sum(1 << piece for piece in self.pieces)
+
+    @property
+    def size(self) -> int:
+        return sum(map(len, self.pieces.values()))
+
+    @property
+    def whole(self) -> bool:
+        return len(self.pieces) == self.head.pieces
+
+
+class Receiver:
+    """What other nodes' applications have sent to one node."""
+
+    def __init__(self, node: NodeId, listens: Callable[[Piece], bool]) -> None:
+        """`listens` says whether an application listens to a message of which this is a piece."""
+        self._node = node
+        self._listens = listens
+        self._incoming: dict[tuple[NodeId, int], _Incoming] = {}
+        self._bytes: dict[NodeId, int] = {}
+        """Of pieces kept, by sender."""
+        self._counts: dict[NodeId, int] = {}
+        """Of messages in `_incoming`, by sender."""
+        self._done: dict[tuple[NodeId, int], int] = {}
+        """What was told of a message in the end, for those whose sender has not heard of it."""
+        self._last: dict[tuple[NodeId, int], int] = {}
+        """Of each flow, the number of the message that was handed over last."""
+        self._receipts: dict[NodeId, dict[int, tuple[Receipt, int]]] = {}
+        """To whom, and of which messages, with the priority of each."""
+        self._receipts_ns: int | None = None
+        self._sweep_ns: int | None = None
+        self.arrived: list[Whole] = []
+        """Messages to hand over, in order, since this list was emptied last."""
+        self.not_taken = 0
+        """Pieces for which there was no room."""
+        self.expired = 0
+        """Messages that were not whole, or still waited, when their time was over."""
+
+    @property
+    def kept_bytes(self) -> int:
+        return sum(self._bytes.values())
+
+    def hear(self, origin: NodeId, piece: Piece, frame: bytes, *, priority: int, now_ns: int) -> None:
+        """One piece; raises MalformedFrameError when it contradicts another one of its message."""
+        head = piece.head
+        if piece.targets is not None and self._node not in piece.targets:
+            return
+        name = origin, head.number
+        outcome = self._done.get(name)
+        followers: list[int] = []
+        if outcome is None:
+            outcome = self._take(name, piece, frame, now_ns, followers)
+        if head.confirm:
+            self._confirm(name, outcome, priority, now_ns)
+            for number in followers:
+                self._confirm((origin, number), DELIVERED, priority, now_ns)
+
+    def _take(
+        self, name: tuple[NodeId, int], piece: Piece, frame: bytes, now_ns: int, followers: list[int]
+    ) -> int:
+        """Keep a new piece; returns what is to be told of its message, and adds those handed over after it."""
+        head, (origin, number) = piece.head, name
+        until_ns = min(head.born_us * US, now_ns) + head.lifetime_ms * MS
+        late = head.confirm and number <= self._last.get((origin, head.flow), 0)
+        if until_ns <= now_ns or late:
+            return GIVEN_UP
+        if not self._listens(piece):
+            return self._over(name, NO_LISTENER)
+        message = self._incoming.get(name)
+        if message is None:
+            if len(self._incoming) >= MOST_MESSAGES or self._counts.get(origin, 0) >= MOST_MESSAGES_EACH:
+                self.not_taken += 1
+                return MISSING
+            message = _Incoming(head, until_ns)
+        elif message.head._replace(piece=0, previous=0) != head._replace(piece=0, previous=0):
+            raise MalformedFrameError(f"piece {head} of {message.head}")
+        else:
+            message.head = head  # the message before it may have been given up
+        if head.piece not in message.pieces:
+            kept, size = self._bytes.get(origin, 0), len(piece.data)
+            if kept + size > MOST_BYTES_EACH or self.kept_bytes + size > MOST_BYTES:
+                self.not_taken += 1
+                return MISSING
+            self._bytes[origin] = kept + size
+            message.pieces[head.piece] = piece.data
+            message.frame = frame
+        if name not in self._incoming:
+            self._incoming[name] = message
+            self._counts[origin] = self._counts.get(origin, 0) + 1
+            self._sweep_ns = earliest(self._sweep_ns, until_ns)
+        followers += self._hand_over(name, message)[1:]
+        return self._done.get(name, MISSING)
+
+    def _hand_over(self, name: tuple[NodeId, int], message: _Incoming) -> list[int]:
+        """Hand a message over if it is whole and its turn, and then those that have waited for it; their numbers."""
+        numbers: list[int] = []
+        origin, flow = name[0], message.head.flow
+        while message.whole and (not message.head.confirm or message.head.previous <= self._last.get((origin, flow), 0)):
+            data = b"".join(message.pieces[piece] for piece in range(message.head.pieces))
+            self.arrived.append(Whole(origin, message.head, data, message.frame))
+            confirm = message.head.confirm
+            self._forget(name, message)
+            self._over(name, DELIVERED)
+            numbers.append(name[1])
+            if not confirm:
+                break
+            self._last.pop((origin, flow), None)
+            self._last[origin, flow] = name[1]
+            while len(self._last) > _MOST_FLOWS:
+                del self._last[next(iter(self._last))]
+            following = [
+                number
+                for (other, number), m in self._incoming.items()
+                if other == origin and m.head.confirm and m.head.flow == flow and m.head.previous == name[1]
+            ]
+            if not following:
+                break
+            name = origin, min(following)
+            message = self._incoming[name]
+        return numbers
+
+    def _over(self, name: tuple[NodeId, int], outcome: int) -> int:
+        self._done[name] = outcome
+        while len(self._done) > _MOST_DONE:
+            del self._done[next(iter(self._done))]
+        return outcome
+
+    def _forget(self, name: tuple[NodeId, int], message: _Incoming) -> None:
+        del self._incoming[name]
+        for counts, less in ((self._bytes, message.size), (self._counts, 1)):
+            left = counts.get(name[0], 0) - less
+            if left:
+                counts[name[0]] = left
+            else:
+                counts.pop(name[0], None)
+
+    def _confirm(self, name: tuple[NodeId, int], outcome: int, priority: int, now_ns: int) -> None:
+        origin, number = name
+        message = self._incoming.get(name)
+        held = message.held if message is not None else 0
+        self._receipts.setdefault(origin, {})[number] = Receipt(held, number, outcome), priority
+        if self._receipts_ns is None:
+            self._receipts_ns = now_ns + RECEIPT_NS
+
+    # --- out ------------------------------------------------------------------------------------------------------
+
+    def due(self, now_ns: int) -> list[tuple[NodeId, list[Receipt], int]]:
+        """Receipts to send now: to whom, which, and the most urgent priority among their messages."""
+        if self._sweep_ns is not None and self._sweep_ns <= now_ns:
+            self._sweep(now_ns)
+        if self._receipts_ns is None or now_ns < self._receipts_ns:
+            return []
+        self._receipts_ns = None
+        receipts, self._receipts = self._receipts, {}
+        found = []
+        for origin, of_origin in receipts.items():
+            latest = [self._latest(origin, receipt) for receipt, _ in of_origin.values()]
+            found.append((origin, latest, min(priority for _, priority in of_origin.values())))
+        return found
+
+    def _latest(self, origin: NodeId, receipt: Receipt) -> Receipt:
+        """A receipt as it is to be said now: the message may have been handed over since."""
+        outcome = self._done.get((origin, receipt.number))
+        return receipt if outcome is None else Receipt(receipt.held, receipt.number, outcome)
+
+    def _sweep(self, now_ns: int) -> None:
+        """Let go of what has expired."""
+        for name, message in list(self._incoming.items()):
+            if message.until_ns <= now_ns:
+                self._forget(name, message)
+                self.expired += 1
+        self._sweep_ns = min((message.until_ns for message in self._incoming.values()), default=None)
+
+    def next_wake_ns(self) -> int | None:
+        return earliest(self._receipts_ns, self._sweep_ns)

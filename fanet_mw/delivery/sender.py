@@ -1,0 +1,315 @@
+"""The sending side: messages that are to be confirmed, which pieces each target lacks, and what to send next.
+
+    sent -> every target has it -> acknowledged
+         -> no word in time     -> the missing pieces again, and twice the patience
+         -> lifetime over       -> expired: who has not confirmed it is named
+
+How long to wait for a receipt follows from those that came (RFC 6298). The pieces under way of all messages together
+are bounded by a window, which shrinks when something has to be repeated (half) and grows with each message that was
+confirmed (by one). What is kept has a bound too: a message that does not fit is refused by whoever asks `full` first.
+"""
+
+import heapq
+from collections.abc import Collection, Sequence
+from dataclasses import dataclass, field
+from typing import Final, NamedTuple
+
+from fanet_mw.units import BROADCAST, MS, US, NodeId
+from fanet_mw.wire import message as wire_message
+from fanet_mw.wire.message import MAVLINK_PORT, MOST_PIECES, Head, Receipt
+
+MOST_BYTES: Final = 4 << 20
+"""What is kept of all messages together."""
+MOST_MESSAGES: Final = 4096
+EXPIRED: Final = -1
+"""The outcome of a message whose lifetime is over, beside those of receipts."""
+_WINDOW: Final = 32
+"""Pieces under way, at most: ten kilobytes and more, and no flood of packets."""
+_LEAST_WINDOW: Final = 2
+_LEAST_WAIT_NS: Final = 300 * MS
+_MOST_DOUBLINGS: Final = 3
+_MOST_FLOWS: Final = 1024
+_FEW: Final = 2
+"""So many targets that still lack something are sent to one by one; more of them together."""
+_NAMED: Final = 32
+"""Of a message for everyone, at most so many that still lack something are named when it is repeated."""
+
+
+class Packet(NamedTuple):
+    """What the node is to send: one piece of a message."""
+
+    number: int
+    inner: bytes
+    destination: NodeId
+    priority: int
+    first: bool
+    """True for the first packet of its message."""
+
+
+class Told(NamedTuple):
+    """What became of a message: a target has confirmed or refused it, or its time was over."""
+
+    number: int
+    outcome: int
+    """As in a receipt, or `EXPIRED`."""
+    targets: tuple[NodeId, ...]
+    """Who said so; of a message that expired: who has not confirmed it."""
+    last: bool
+    """True when nothing more will be told of this message."""
+
+
+@dataclass
+class _Flow:
+    """The messages to the same nodes, on one port and of one priority."""
+
+    number: int
+    open: list[int] = field(default_factory=list)
+    """Numbers of those that have not been confirmed by all nor given up, ascending."""
+
+
+@dataclass
+class _Outgoing:
+    """One message that is to be confirmed."""
+
+    number: int
+    flow: _Flow
+    data: bytes
+    port: int
+    priority: int
+    stride: int
+    pieces: int
+    born_us: int
+    lifetime_ms: int
+    everyone: bool
+    """True for a message for everyone."""
+    lacking: dict[NodeId, int]
+    """Who has not confirmed it yet, and which pieces each of them has, as bits."""
+    again_ns: int = 0
+    """When to send again what is lacking; 0: it waits for its turn to be sent."""
+    sent_ns: int = 0
+    rounds: int = 0
+
+    @property
+    def until_ns(self) -> int:
+        return self.born_us * US + self.lifetime_ms * MS
+
+
+class Sender:
+    """The messages of one node that are to be confirmed and are on their way."""
+
+    def __init__(self, node: NodeId, everyone: Collection[int], *, most_bytes: int, wait_ns: int) -> None:
+        """`most_bytes`: inner frames of one packet; `wait_ns`: patience with a target of which no receipt has come."""
+        self._node = node
+        self._everyone = tuple(NodeId(other) for other in everyone if other != node)
+        self._most_bytes = most_bytes
+        self._wait_ns = wait_ns
+        self._messages: dict[int, _Outgoing] = {}
+        self._flows: dict[tuple[tuple[NodeId, ...], int, int], _Flow] = {}
+        self._next_flow = 0
+        self._next_number = 1
+        self._ready: list[tuple[int, int]] = []
+        """(priority, number) of messages of which something is to be sent as soon as the window has room: a heap."""
+        self._timers: list[tuple[int, int]] = []
+        """(instant, number): when a message is sent again, or expires; those that no longer hold are skipped."""
+        self._kept_bytes = 0
+        self._under_way = 0
+        self._window = _WINDOW
+        self._rtt_ns: dict[NodeId, tuple[int, int]] = {}
+        """Of each target, the smoothed time until its receipt, and how much that varies."""
+        self.told: list[Told] = []
+        """What has become of messages since this list was emptied last."""
+        self.repeated = 0
+        """Pieces that were sent again."""
+
+    def start(self, first_number: int) -> None:
+        """Numbers go on from here; a node that starts again must not use its earlier ones again."""
+        self._next_number = first_number
+        self._next_flow = first_number
+
+    # --- in -------------------------------------------------------------------------------------------------------
+
+    @property
+    def full(self) -> bool:
+        return self._kept_bytes >= MOST_BYTES or len(self._messages) >= MOST_MESSAGES
+
+    def most_bytes(self, targets: int) -> int:
+        """The longest message on a port, if so many targets must be named."""
+        return MOST_PIECES * self._stride(targets)
+
+    def _stride(self, targets: int) -> int:
+        named = wire_message.targets_bytes(targets)
+        return wire_message.room_for_data(self._most_bytes - wire_message.HEAD_BYTES - named)
+
+    def unconfirmed(
+        self, data: bytes, *, port: int, destination: NodeId, targets: tuple[NodeId, ...], priority: int,
+        born_us: int, lifetime_ms: int,
+    ) -> tuple[int, Sequence[Packet]]:  # fmt: skip
+        """A message that nobody is to confirm: its number, and all its packets."""
+        number = self._take_number()
+        stride, pieces = self._division(data, port, len(targets))
+        packets = []
+        for piece in range(pieces):
+            head = Head(born_us, number, 0, len(data), lifetime_ms, port, 0, stride, piece, pieces, 0)
+            part = data[piece * stride : (piece + 1) * stride]
+            inner = wire_message.encode_piece(head, part, node=self._node, targets=targets)
+            packets.append(Packet(number, inner, destination, priority, piece == 0))
+        return number, packets
+
+    def confirmed(
+        self, data: bytes, *, port: int, targets: tuple[NodeId, ...] | None, priority: int, born_us: int,
+        lifetime_ms: int,
+    ) -> int:  # fmt: skip
+        """Take a message that its targets are to confirm (None: everyone); returns its number."""
+        whom = self._everyone if targets is None else targets
+        number = self._take_number()
+        flow = self._flow(whom, port, priority)
+        flow.open.append(number)
+        named = min(len(whom), _NAMED) if targets is None else len(whom)
+        stride, pieces = self._division(data, port, named if len(whom) > 1 else 0)
+        message = _Outgoing(
+            number, flow, data, port, priority, stride, pieces, born_us, lifetime_ms, targets is None,
+            dict.fromkeys(whom, 0),
+        )  # fmt: skip
+        self._kept_bytes += len(data)
+        self._messages[number] = message
+        heapq.heappush(self._ready, (priority, number))
+        heapq.heappush(self._timers, (message.until_ns, number))
+        return number
+
+    def _take_number(self) -> int:
+        self._next_number += 1
+        return self._next_number - 1
+
+    def _division(self, data: bytes, port: int, named: int) -> tuple[int, int]:
+        """Bytes of each piece but the last, and how many pieces."""
+        if port == MAVLINK_PORT or not data:
+            return len(data), 1
+        stride = min(len(data), self._stride(named))
+        return stride, -(-len(data) // stride)
+
+    def _flow(self, whom: tuple[NodeId, ...], port: int, priority: int) -> _Flow:
+        key = whom, port, priority
+        flow = self._flows.pop(key, None)
+        if flow is None:
+            if len(self._flows) >= _MOST_FLOWS:
+                del self._flows[next(iter(self._flows))]
+            flow = _Flow(self._next_flow & 0xFFFF)
+            self._next_flow += 1
+        self._flows[key] = flow  # the one that was used last is the last to be forgotten
+        return flow
+
+    def receipt(self, origin: NodeId, receipt: Receipt, now_ns: int) -> None:
+        """A target says what has come of a message."""
+        message = self._messages.get(receipt.number)
+        if message is None or origin not in message.lacking:
+            return
+        if message.rounds == 1:  # else nobody knows to which copy the receipt is
+            self._measured(origin, now_ns - message.sent_ns)
+        if receipt.outcome == wire_message.MISSING:
+            message.lacking[origin] |= receipt.held & ((1 << message.pieces) - 1)
+            return
+        del message.lacking[origin]
+        self.told.append(Told(message.number, receipt.outcome, (origin,), last=not message.lacking))
+        if not message.lacking:
+            self._window = min(_WINDOW, self._window + 1)
+            self._close(message)
+
+    def _measured(self, target: NodeId, took_ns: int) -> None:
+        """RFC 6298, section 2."""
+        known = self._rtt_ns.get(target)
+        if known is None:
+            self._rtt_ns[target] = took_ns, took_ns // 2
+            return
+        smooth_ns, varies_ns = known
+        varies_ns += (abs(smooth_ns - took_ns) - varies_ns) // 4
+        self._rtt_ns[target] = smooth_ns + (took_ns - smooth_ns) // 8, varies_ns
+
+    def _close(self, message: _Outgoing) -> None:
+        del self._messages[message.number]
+        message.flow.open.remove(message.number)
+        self._kept_bytes -= len(message.data)
+        if message.again_ns:
+            self._under_way -= message.pieces
+
+    # --- out ------------------------------------------------------------------------------------------------------
+
+    def due(self, now_ns: int) -> list[Packet]:
+        """What the node is to send now."""
+        while self._timers and self._timers[0][0] <= now_ns:
+            _, number = heapq.heappop(self._timers)
+            message = self._messages.get(number)
+            if message is None:
+                continue
+            if message.until_ns <= now_ns:
+                self.told.append(Told(number, EXPIRED, tuple(message.lacking), last=True))
+                self._close(message)
+            elif 0 < message.again_ns <= now_ns:
+                self._under_way -= message.pieces
+                message.again_ns = 0
+                self._window = max(_LEAST_WINDOW, self._window // 2)
+                heapq.heappush(self._ready, (message.priority, number))
+        packets: list[Packet] = []
+        while self._ready and self._under_way < self._window:
+            message = self._messages.get(heapq.heappop(self._ready)[1])
+            if message is not None:
+                packets += self._round(message, now_ns)
+        return packets
+
+    def _round(self, message: _Outgoing, now_ns: int) -> list[Packet]:
+        """Send what is lacking; a target that has every piece is asked again by the last one."""
+        whole, last = (1 << message.pieces) - 1, 1 << (message.pieces - 1)
+        wanted = {target: (whole & ~held) or last for target, held in message.lacking.items()}
+        packets: list[Packet] = []
+        if len(wanted) <= _FEW:
+            for target, bits in wanted.items():
+                packets += self._packets(message, bits, target, ())
+        else:
+            union = 0
+            for bits in wanted.values():
+                union |= bits
+            all_lack = len(wanted) == len(self._everyone)
+            named = () if all_lack or (message.everyone and len(wanted) > _NAMED) else tuple(wanted)
+            packets += self._packets(message, union, BROADCAST, named)
+        self.repeated += len(packets) if message.rounds else 0
+        message.rounds += 1
+        message.sent_ns = now_ns
+        message.again_ns = now_ns + self._patience_ns(message)
+        self._under_way += message.pieces
+        heapq.heappush(self._timers, (message.again_ns, message.number))
+        return packets
+
+    def _patience_ns(self, message: _Outgoing) -> int:
+        most_ns = 0
+        for target in message.lacking:
+            known = self._rtt_ns.get(target)
+            wait_ns = self._wait_ns if known is None else max(_LEAST_WAIT_NS, known[0] + 4 * known[1])
+            most_ns = max(most_ns, wait_ns)
+        return most_ns << min(message.rounds - 1, _MOST_DOUBLINGS)
+
+    def _packets(self, message: _Outgoing, bits: int, destination: NodeId, named: tuple[NodeId, ...]) -> list[Packet]:
+        open_before = [number for number in message.flow.open if number < message.number]
+        previous = open_before[-1] if open_before else 0
+        packets = []
+        for piece in range(message.pieces):
+            if not bits >> piece & 1:
+                continue
+            head = Head(
+                message.born_us, message.number, previous, len(message.data), message.lifetime_ms, message.port,
+                message.flow.number, message.stride, piece, message.pieces, 1,
+            )  # fmt: skip
+            part = message.data[piece * message.stride : (piece + 1) * message.stride]
+            inner = wire_message.encode_piece(head, part, node=self._node, targets=named)
+            first = not message.rounds and not packets
+            packets.append(Packet(message.number, inner, destination, message.priority, first))
+        return packets
+
+    def next_wake_ns(self) -> int | None:
+        """When something is to be sent again, or expires."""
+        timers = self._timers
+        while timers:
+            t_ns, number = timers[0]
+            message = self._messages.get(number)
+            if message is not None and t_ns in (message.until_ns, message.again_ns):
+                return t_ns
+            heapq.heappop(timers)
+        return None

@@ -19,6 +19,7 @@ from fanet_mw.errors import DropReason, LocalProtocolError
 from fanet_mw.node.node import Node
 from fanet_mw.node.plausible import CONTROL, RESTART_STEP_NS
 from fanet_mw.node.queue import Packet as RoutedPacket
+from fanet_mw.rng import stream
 from fanet_mw.units import BROADCAST, MAX_NODES, MS, US, NodeId, S, earliest, seconds_to_ns
 from fanet_mw.wire.message import (
     DELIVERED,
@@ -59,14 +60,16 @@ class Messenger:
         self._listeners = listeners
         self._room = scenario.radio.max_frame_bytes - wire.HEADER_BYTES
         self._sender = Sender(node.node, scenario.node_ids, most_bytes=self._room, wait_ns=wait_ns)
-        self._receiver = Receiver(node.node, self._has_listener)
+        self._receiver = Receiver(node.node, self._has_listener, random=stream(scenario.seed, "receipts", node.node))
+        self._in_time_ns: int | None = None
+        """When the last message with a deadline was taken."""
         self._owners: dict[int, Application] = {}
         """By handle: who sent a message that is to be confirmed."""
         self._watched: dict[int, _Watched] = {}
         """By sequence number."""
         self._statuses: deque[tuple[Application, Status]] = deque()
         self.counts: Counter[str] = Counter()
-        """What became of messages, by fate, and how many were sent and handed over."""
+        """What became of messages in pieces, by fate, and how many were sent and handed over."""
 
     def start(self, now_ns: int) -> None:
         self._sender.start(CONTROL | now_ns // RESTART_STEP_NS % CONTROL)
@@ -92,11 +95,13 @@ class Messenger:
         named = 0 if len(targets) < 2 else len(targets)
         if not plain:
             self._check(content, port, data, named)
-        self.counts["sent"] += 1
-        if deadline_ns is not None and not self._in_time(deadline_ns):
-            return self._refused(application, DropReason.ADMISSION, now_ns)
+        if deadline_ns is not None:
+            in_time, interval_ns = self._judge(deadline_ns, born_ns)
+            if not in_time:
+                return self._refused(application, DropReason.ADMISSION, now_ns, interval_ns=interval_ns)
         if plain:
             return self._plain(application, data, to, priority=priority, born_ns=born_ns, now_ns=now_ns)
+        self.counts["sent"] += 1
         own_ns = self._node.scenario.routing.lifetime_ns(priority) if lifetime_ns is None else lifetime_ns
         lifetime_ms, born_us = max(1, min(MOST_LIFETIME_MS, own_ns // MS)), born_ns // US
         if not confirm:
@@ -139,22 +144,34 @@ class Messenger:
         if len(data) > most:
             raise LocalProtocolError(f"message of {len(data)} bytes must be <= {most} (radio.max_frame_bytes)")
 
-    def _in_time(self, deadline_ns: int) -> bool:
-        """False when the network states a bound for packets of this node, and it is above the deadline."""
-        bound_ns = self._node.bound_ns()
-        return bound_ns is None or bound_ns <= deadline_ns
+    def _judge(self, deadline_ns: int, born_ns: int) -> tuple[bool, int | None]:
+        """Whether a message can be there in time, and the least interval between such messages, where that is known.
 
-    def _refused(self, application: Application, reason: DropReason, now_ns: int) -> int:
+        Where the network states no bound, every message is taken. Messages that are taken are at least the interval
+        apart, which is what the bound assumes.
+        """
+        if self._node.bound_ns() is None:
+            return True, None
+        interval_ns = self._node.least_interval_ns(deadline_ns)
+        if interval_ns is None or (self._in_time_ns is not None and born_ns < self._in_time_ns + interval_ns):
+            return False, interval_ns
+        self._in_time_ns = born_ns
+        return True, interval_ns
+
+    def _refused(
+        self, application: Application, reason: DropReason, now_ns: int, *, interval_ns: int | None = None
+    ) -> int:
         handle = self._sender.take_number()
-        self._tell(application, Status(handle, Fate.REFUSED, now_ns, reason, last=True))
+        self._tell(application, Status(handle, Fate.REFUSED, now_ns, reason, last=True, interval_ns=interval_ns))
         return handle
 
     def _plain(
         self, application: Application, frames: bytes, to: NodeId, *, priority: int, born_ns: int, now_ns: int
     ) -> int:
         seq = self._node.send(
-            frames, destination=to, priority=priority, app=application.name, born_ns=born_ns, now_ns=now_ns
-        )
+            frames, destination=to, priority=priority, app=application.name, born_ns=born_ns, now_ns=now_ns,
+            watch=bool(application.follows),
+        )  # fmt: skip
         if application.follows:
             self._tell(application, Status(seq, Fate.ADMITTED, now_ns))
             self._watch(seq, _Watched(application, seq, first=True, confirmed=False))
@@ -165,13 +182,12 @@ class Messenger:
     ) -> None:
         seq = self._node.send(
             packet.inner, destination=packet.destination, priority=packet.priority, app=application.name,
-            born_ns=born_ns, now_ns=now_ns,
+            born_ns=born_ns, now_ns=now_ns, watch=packet.first or not confirmed,
         )  # fmt: skip
         if packet.first or not confirmed:
             self._watch(seq, _Watched(application, packet.number, packet.first, confirmed))
 
     def _watch(self, seq: int, watched: _Watched) -> None:
-        self._node.watched.add(seq)
         self._watched[seq] = watched
         if len(self._watched) > _MOST_WATCHED:
             self._unwatch(next(iter(self._watched)))
@@ -214,7 +230,8 @@ class Messenger:
     # --- what became of it ----------------------------------------------------------------------------------------
 
     def _tell(self, application: Application, status: Status) -> None:
-        self.counts[status.fate] += 1
+        if status.handle & CONTROL:
+            self.counts[status.fate.value] += 1
         if status.fate in application.follows:
             self._statuses.append((application, status))
 
@@ -250,7 +267,9 @@ class Messenger:
         if confirmed:
             return  # it is sent again
         fate = {DropReason.ADMISSION: Fate.REFUSED, DropReason.EXPIRED: Fate.EXPIRED}.get(reason, Fate.DROPPED)
-        interval_ns = self._node.least_interval_ns() if fate is Fate.REFUSED else None
+        deadline_s = self._node.scenario.traffic.deadline_s
+        refused = fate is Fate.REFUSED and deadline_s is not None
+        interval_ns = self._node.least_interval_ns(seconds_to_ns(deadline_s or 0)) if refused else None
         self._tell(application, Status(handle, fate, t_ns, reason, last=True, interval_ns=interval_ns))
 
     # --- time -----------------------------------------------------------------------------------------------------
@@ -266,7 +285,9 @@ class Messenger:
                 )
 
     def next_wake_ns(self) -> int | None:
-        return earliest(self._sender.next_wake_ns(), self._receiver.next_wake_ns(), 0 if self._statuses else None)
+        if self._statuses or self._node.fates or self._sender.told:
+            return 0  # at once
+        return earliest(self._sender.next_wake_ns(), self._receiver.next_wake_ns())
 
     def report(self) -> Mapping[str, Any]:
         """Counters, for people; nothing when no application has sent or got anything by way of here."""
@@ -297,5 +318,3 @@ def _received(whole: Whole) -> Received:
         whole.head.port,
         None if native else whole.data,
     )
-
-

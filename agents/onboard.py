@@ -9,8 +9,18 @@ from collections.abc import Callable, Iterable, Mapping, Sequence
 from random import Random
 from typing import Any, Final
 
+from agents.messenger import Messenger
 from fanet_mw import wire
-from fanet_mw.application import Application, Course, Fate, Received, SensorReading, Status
+from fanet_mw.application import (
+    Application,
+    Course,
+    Data,
+    Destination,
+    Fate,
+    Received,
+    SensorReading,
+    Status,
+)
 from fanet_mw.bus.messages import Gps, TxStatus
 from fanet_mw.errors import DropReason, LocalProtocolError, MalformedFrameError
 from fanet_mw.node.node import Node
@@ -21,6 +31,12 @@ from fanet_mw.trace import Record
 from fanet_mw.units import BROADCAST, US, Enu, NodeId, earliest
 
 _RADIO_FATES: Final = frozenset((Fate.SENT, Fate.TURNED_AWAY))
+_OF_MESSENGER: Final = {
+    wire.MESSAGE.msgid: lambda messenger: messenger.piece,
+    wire.TARGETS.msgid: lambda messenger: messenger.piece,
+    wire.RECEIPT.msgid: lambda messenger: messenger.receipts,
+}
+"""What of the messenger a packet is for that begins with this message."""
 
 
 class Onboard:
@@ -49,9 +65,14 @@ class Onboard:
         self._fly = fly
         self._applications = tuple(applications)
         self._listeners: dict[int, list[Application]] = {}
+        """By MAVLink message."""
+        self._at_port: dict[int, list[Application]] = {}
         for application in applications:
             for message in application.listens:
                 self._listeners.setdefault(message, []).append(application)
+            for port in application.ports:
+                self._at_port.setdefault(port, []).append(application)
+        self._messenger = Messenger(node, self._listening)
         self._on_fix = _overriding(applications, "on_fix")
         self._on_sensor = _overriding(applications, "on_sensor")
         self._on_hello = _overriding(applications, "on_hello")
@@ -66,10 +87,18 @@ class Onboard:
     def hears_hellos(self) -> bool:
         return bool(self._on_hello)
 
+    def _listening(self, port: int, message: int) -> Sequence[Application]:
+        return self._at_port.get(port, ()) if port else self._listeners.get(message, ())
+
     def start(self, now_ns: int) -> None:
         self._call(now_ns)
+        self._messenger.start(now_ns)
         for application in self._applications:
             application.start(_Port(self, application), now_ns)
+
+    def messages(self) -> Mapping[str, Any]:
+        """Counters of messages in pieces; nothing when there were none."""
+        return self._messenger.report()
 
     def report(self, names: Iterable[str]) -> Mapping[str, Any]:
         """The reports of these applications, by their names; those that have nothing to say are left out."""
@@ -86,7 +115,12 @@ class Onboard:
         """A packet for this node; nobody listens to most."""
         frame = packet.frame
         at = wire.HEADER_BYTES + 7  # where the first inner frame has its message id
-        listeners = self._listeners.get(int.from_bytes(frame[at : at + 3], "little"))
+        message_id = int.from_bytes(frame[at : at + 3], "little")
+        if message_id in _OF_MESSENGER:
+            self._guard(_OF_MESSENGER[message_id](self._messenger), packet, now_ns)
+            self._call(now_ns)
+            return
+        listeners = self._listeners.get(message_id)
         if listeners is None:
             return
         self._call(now_ns)
@@ -140,21 +174,36 @@ class Onboard:
             due_ns = application.next_wake_ns()
             if due_ns is not None and due_ns <= now_ns:
                 application.wake(now_ns)
+        due_ns = self._messenger.next_wake_ns()
+        if due_ns is not None and due_ns <= now_ns:
+            self._messenger.wake(now_ns)
 
     def next_wake_ns(self) -> int | None:
-        return earliest(*[application.next_wake_ns() for application in self._timed])
+        return earliest(self._messenger.next_wake_ns(), *[application.next_wake_ns() for application in self._timed])
 
     # --- out ------------------------------------------------------------------------------------------------------
 
     def send(
-        self, application: Application, frames: bytes, *, destination: NodeId, priority: int, born_ns: int | None
+        self,
+        application: Application,
+        content: bytes | Data,
+        *,
+        destination: Destination,
+        priority: int,
+        confirm: bool,
+        lifetime_ns: int | None,
+        deadline_ns: int | None,
+        born_ns: int | None,
     ) -> int:
         requests = self.node.frames_sent
-        handle = self.node.send(
-            frames,
+        handle = self._messenger.send(
+            application,
+            content,
             destination=destination,
             priority=priority,
-            app=application.name,
+            confirm=confirm,
+            lifetime_ns=lifetime_ns,
+            deadline_ns=deadline_ns,
             born_ns=self.now_ns if born_ns is None else min(born_ns, self.now_ns),
             now_ns=self.now_ns,
         )
@@ -162,10 +211,18 @@ class Onboard:
             self._with_radio[requests] = application, handle
         return handle
 
+    def settle(self, now_ns: int) -> None:
+        """Hand over messages that have become whole, tell of those that were sent, and fly as was commanded."""
+        for application, message in self._messenger.arrived():
+            self._guard(application.on_message, message, now_ns)
+        for application, status in self._messenger.statuses(now_ns):
+            application.on_status(status, now_ns)
+        self._steer(now_ns)
+
     def command(self, application: Application, course: Course) -> None:
         self._courses[application.name] = course
 
-    def steer(self, now_ns: int) -> None:
+    def _steer(self, now_ns: int) -> None:
         """Fly as the applications have commanded since the last input, in their order, unless another objects."""
         if not self._courses:
             return
@@ -204,14 +261,24 @@ class _Port:
 
     def send(
         self,
-        frames: bytes,
+        content: bytes | Data,
         *,
-        destination: NodeId = BROADCAST,
+        destination: Destination = BROADCAST,
         priority: int = wire.PRIORITY_BULK,
+        confirm: bool = False,
+        lifetime_ns: int | None = None,
+        deadline_ns: int | None = None,
         born_ns: int | None = None,
     ) -> int:
         return self._onboard.send(
-            self._application, frames, destination=destination, priority=priority, born_ns=born_ns
+            self._application,
+            content,
+            destination=destination,
+            priority=priority,
+            confirm=confirm,
+            lifetime_ns=lifetime_ns,
+            deadline_ns=deadline_ns,
+            born_ns=born_ns,
         )
 
     def fly(self, course: Course) -> None:

@@ -133,6 +133,8 @@ class Uav(Actor):
         }
         for counters in self._onboard.report(_BUILT_IN).values():
             own |= counters
+        if messages := self._onboard.messages():
+            own["messages"] = messages
         if self._own:
             own["applications"] = self._onboard.report(self._own)
         return own | dict(self._node.report())
@@ -158,9 +160,10 @@ class Uav(Actor):
             deliveries, node.deliveries = node.deliveries, []
             for packet in deliveries:
                 onboard.deliver(packet, now_ns)
-        called, onboard.called = onboard.called, False
+        called = onboard.called or bool(node.fates)
         if called:
-            onboard.steer(now_ns)
+            onboard.settle(now_ns)
+            onboard.called = False
             self._own_wake_ns = self._next_own_ns()
         if node.requests:
             outbox, topic = self.outbox, self._tx_topic

@@ -1,4 +1,4 @@
-"""Messages of applications from end to end: in pieces, once, in order where it is asked for, and with word of their fate.
+"""Messages of applications from end to end: in pieces, once, in order where that is asked for, and their fate is told.
 
     application -> Sender    pieces of a message -> packets of the node -> any routing protocol
     packets     -> Receiver  pieces put together -> in order of the flow -> application, and receipts to the sender

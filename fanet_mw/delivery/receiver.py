@@ -7,11 +7,12 @@ Pieces that contradict each other are counted as malformed by whoever calls.
 
 from collections.abc import Callable
 from dataclasses import dataclass, field
+from random import Random
 from typing import Final, NamedTuple
 
 from fanet_mw.errors import MalformedFrameError
 from fanet_mw.units import MS, US, NodeId, earliest
-from fanet_mw.wire.message import DELIVERED, GIVEN_UP, MISSING, NO_LISTENER, Piece, Receipt
+from fanet_mw.wire.message import DELIVERED, GIVEN_UP, MISSING, NO_LISTENER, Head, Piece, Receipt
 
 MOST_BYTES: Final = 4 << 20
 """Of pieces of all senders together."""
@@ -21,8 +22,10 @@ MOST_MESSAGES: Final = 4096
 """Of all senders together, that are not whole or wait for one before them."""
 MOST_MESSAGES_EACH: Final = 512
 """Of one sender."""
-RECEIPT_NS: Final = 50 * MS
-"""A receipt waits this long for others to the same node."""
+RECEIPT_NS: Final = 20 * MS
+"""A receipt waits this long for others to the same node, and up to `_SPREAD_NS` longer: who heard the same broadcast
+must not answer at the same instant."""
+_SPREAD_NS: Final = 80 * MS
 _MOST_DONE: Final = 8192
 """Messages of which is remembered that they were handed over."""
 _MOST_FLOWS: Final = 4096
@@ -63,10 +66,11 @@ class _Incoming:
 class Receiver:
     """What other nodes' applications have sent to one node."""
 
-    def __init__(self, node: NodeId, listens: Callable[[Piece], bool]) -> None:
+    def __init__(self, node: NodeId, listens: Callable[[Piece], bool], *, random: Random) -> None:
         """`listens` says whether an application listens to a message of which this is a piece."""
         self._node = node
         self._listens = listens
+        self._random = random
         self._incoming: dict[tuple[NodeId, int], _Incoming] = {}
         self._bytes: dict[NodeId, int] = {}
         """Of pieces kept, by sender."""
@@ -106,9 +110,7 @@ class Receiver:
             for number in followers:
                 self._confirm((origin, number), DELIVERED, priority, now_ns)
 
-    def _take(
-        self, name: tuple[NodeId, int], piece: Piece, frame: bytes, now_ns: int, followers: list[int]
-    ) -> int:
+    def _take(self, name: tuple[NodeId, int], piece: Piece, frame: bytes, now_ns: int, followers: list[int]) -> int:
         """Keep a new piece; returns what is to be told of its message, and adds those handed over after it."""
         head, (origin, number) = piece.head, name
         until_ns = min(head.born_us * US, now_ns) + head.lifetime_ms * MS
@@ -146,7 +148,7 @@ class Receiver:
         """Hand a message over if it is whole and its turn, and then those that have waited for it; their numbers."""
         numbers: list[int] = []
         origin, flow = name[0], message.head.flow
-        while message.whole and (not message.head.confirm or message.head.previous <= self._last.get((origin, flow), 0)):
+        while message.whole and self._is_next(origin, message.head):
             data = b"".join(message.pieces[piece] for piece in range(message.head.pieces))
             self.arrived.append(Whole(origin, message.head, data, message.frame))
             confirm = message.head.confirm
@@ -170,6 +172,9 @@ class Receiver:
             message = self._incoming[name]
         return numbers
 
+    def _is_next(self, origin: NodeId, head: Head) -> bool:
+        return not head.confirm or head.previous <= self._last.get((origin, head.flow), 0)
+
     def _over(self, name: tuple[NodeId, int], outcome: int) -> int:
         self._done[name] = outcome
         while len(self._done) > _MOST_DONE:
@@ -191,7 +196,7 @@ class Receiver:
         held = message.held if message is not None else 0
         self._receipts.setdefault(origin, {})[number] = Receipt(held, number, outcome), priority
         if self._receipts_ns is None:
-            self._receipts_ns = now_ns + RECEIPT_NS
+            self._receipts_ns = now_ns + RECEIPT_NS + int(self._random.random() * _SPREAD_NS)
 
     # --- out ------------------------------------------------------------------------------------------------------
 

@@ -145,7 +145,7 @@ class Sender:
         born_us: int, lifetime_ms: int,
     ) -> tuple[int, Sequence[Packet]]:  # fmt: skip
         """A message that nobody is to confirm: its number, and all its packets."""
-        number = self._take_number()
+        number = self.take_number()
         stride, pieces = self._division(data, port, len(targets))
         packets = []
         for piece in range(pieces):
@@ -161,7 +161,7 @@ class Sender:
     ) -> int:  # fmt: skip
         """Take a message that its targets are to confirm (None: everyone); returns its number."""
         whom = self._everyone if targets is None else targets
-        number = self._take_number()
+        number = self.take_number()
         flow = self._flow(whom, port, priority)
         flow.open.append(number)
         named = min(len(whom), _NAMED) if targets is None else len(whom)
@@ -176,7 +176,7 @@ class Sender:
         heapq.heappush(self._timers, (message.until_ns, number))
         return number
 
-    def _take_number(self) -> int:
+    def take_number(self) -> int:
         self._next_number += 1
         return self._next_number - 1
 
@@ -270,7 +270,10 @@ class Sender:
             all_lack = len(wanted) == len(self._everyone)
             named = () if all_lack or (message.everyone and len(wanted) > _NAMED) else tuple(wanted)
             packets += self._packets(message, union, BROADCAST, named)
-        self.repeated += len(packets) if message.rounds else 0
+        if message.rounds:
+            self.repeated += len(packets)
+        else:
+            packets[0] = packets[0]._replace(first=True)
         message.rounds += 1
         message.sent_ns = now_ns
         message.again_ns = now_ns + self._patience_ns(message)
@@ -289,7 +292,7 @@ class Sender:
     def _packets(self, message: _Outgoing, bits: int, destination: NodeId, named: tuple[NodeId, ...]) -> list[Packet]:
         open_before = [number for number in message.flow.open if number < message.number]
         previous = open_before[-1] if open_before else 0
-        packets = []
+        packets: list[Packet] = []
         for piece in range(message.pieces):
             if not bits >> piece & 1:
                 continue
@@ -299,8 +302,7 @@ class Sender:
             )  # fmt: skip
             part = message.data[piece * message.stride : (piece + 1) * message.stride]
             inner = wire_message.encode_piece(head, part, node=self._node, targets=named)
-            first = not message.rounds and not packets
-            packets.append(Packet(message.number, inner, destination, message.priority, first))
+            packets.append(Packet(message.number, inner, destination, message.priority, first=False))
         return packets
 
     def next_wake_ns(self) -> int | None:

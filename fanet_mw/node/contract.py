@@ -119,6 +119,16 @@ class RoutingProtocol(ABC):
         """Packets held inside the protocol."""
         return 0
 
+    def bound_ns(self) -> int | None:
+        """Within which delay everyone has the next packet of this node; None: no bound is stated."""
+        return None
+
+    def least_interval_ns(self, deadline_ns: int) -> int | None:
+        """The least interval between packets of this node at which everyone has each within this delay; None: unknown,
+        or there is none.
+        """
+        return None
+
     def report(self) -> Mapping[str, object]:
         """JSON-able state, for people."""
         return {}

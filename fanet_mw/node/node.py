@@ -46,6 +46,10 @@ class Node:
         self.requests: list[TxRequest] = []
         self.deliveries: list[Packet] = []
         """Packets for the application of this node."""
+        self.watched: set[int] = set()
+        """Sequence numbers of own packets whose fate is of interest."""
+        self.fates: list[tuple[int, int, DropReason | None]] = []
+        """What became of these: (number, instant, why it was dropped; None: it was let out)."""
         self.records: list[Record] = []
         self.frames_sent = 0
         self.receptions = 0
@@ -79,12 +83,23 @@ class Node:
         self._first_seq, self._next_seq = first, {False: first, True: CONTROL + first}
         self._protocol.start(now_ns)
 
-    def send(self, inner: bytes, *, destination: NodeId, priority: int, app: str, born_ns: int, now_ns: int) -> int:
+    def send(
+        self,
+        inner: bytes,
+        *,
+        destination: NodeId,
+        priority: int,
+        app: str,
+        born_ns: int,
+        now_ns: int,
+        watch: bool = False,
+    ) -> int:
         """Send an application payload (whole MAVLink frames); returns the packet's sequence number.
 
         `born_ns` is when the application meant to hand it over, at most `now_ns`: a process that was woken late loses
-        that much of the lead, and not of the delay that is measured. The first frame may go one lead after it. Raises
-        LocalProtocolError when the frame would exceed `radio.max_frame_bytes`.
+        that much of the lead, and not of the delay that is measured. The first frame may go one lead after it. What
+        becomes of a packet that is to be watched is in `fates`. Raises LocalProtocolError when the frame would exceed
+        `radio.max_frame_bytes`.
         """
         born_ns = born_ns // US * US  # what the header can say
         packet = self._packet(
@@ -99,6 +114,8 @@ class Node:
         seq = packet.header.seq
         self.records.append(_new(Generated, (born_ns, self.node, seq, app, len(packet.frame))))
         self._held.add(packet.frame[wire.NAME])
+        if watch:
+            self.watched.add(seq)
         self._protocol.originate(packet, due_ns=max(born_ns + self._lead_ns, now_ns), now_ns=now_ns)
         return seq
 
@@ -205,6 +222,14 @@ class Node:
     def wake(self, now_ns: int) -> None:
         self._protocol.wake(now_ns)
 
+    def bound_ns(self) -> int | None:
+        """Within which delay everyone has the next packet of this node; None: the protocol states none."""
+        return self._protocol.bound_ns()
+
+    def least_interval_ns(self, deadline_ns: int) -> int | None:
+        """The least interval between packets of this node that meets a deadline; None: unknown, or there is none."""
+        return self._protocol.least_interval_ns(deadline_ns)
+
     def report(self) -> Mapping[str, object]:
         """JSON-able counters and the protocol's state."""
         return {
@@ -241,7 +266,10 @@ class Node:
     def transmit(self, frame: bytes, dst: NodeId, *, start_ns: int, wants_status: bool = False) -> int:
         if self._held and frame[wire.NAME] in self._held:
             self._held.remove(frame[wire.NAME])
-            self.records.append(LetOut(start_ns, self.node, int.from_bytes(frame[wire.SEQ], "little")))
+            own = int.from_bytes(frame[wire.SEQ], "little")
+            self.records.append(LetOut(start_ns, self.node, own))
+            if own in self.watched:
+                self.fates.append((own, start_ns, None))
         if self._gathered is not None and dst == BROADCAST and not wants_status:
             self._gathered.append((start_ns, frame))
             return self.frames_sent
@@ -277,6 +305,8 @@ class Node:
     def drop(self, reason: DropReason, packet: Packet, *, now_ns: int) -> None:
         self.dropped[reason] += 1
         self._held.discard(packet.frame[wire.NAME])
+        if packet.header.origin == self.node and packet.header.seq in self.watched:
+            self.fates.append((packet.header.seq, now_ns, reason))
         self.records.append(Dropped(now_ns, self.node, reason, packet.header.origin, packet.header.seq))
 
     def mark(self, packet: Packet, bits: int) -> None:

@@ -213,7 +213,7 @@ def _by_timetable(ground: _Ground) -> Clustered:
     whole = Parts(
         neighbors=ground.neighbors, gradient=ground.gradient, uplink=ground.uplink, repair=ground.repair,
         floods=ground.floods, roles=_roles(ground, parts, access, timetabling), access=access, relaying=relaying,
-        two_hops=None,
+        two_hops=None, promises=promises,
     )  # fmt: skip
     return _protocol(ground, whole, parts.refresh.overheard, calls.overheard)
 

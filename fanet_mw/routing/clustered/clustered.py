@@ -22,6 +22,7 @@ from fanet_mw.routing.clustered.forwarding.floods import Floods
 from fanet_mw.routing.clustered.forwarding.gradient import Gradient
 from fanet_mw.routing.clustered.forwarding.repair import Repair
 from fanet_mw.routing.clustered.forwarding.uplink import MOST_TRIES, Uplink
+from fanet_mw.routing.clustered.timetable.promises import Promises
 from fanet_mw.units import BROADCAST, US, earliest
 from fanet_mw.wire import FLAG_FLOOD, FLAG_TO_HEAD, HEADER_BYTES, Kind
 from fanet_mw.wire.claims import MESSAGE_BYTES, Claims
@@ -45,6 +46,8 @@ class Parts(NamedTuple):
     relaying: Relaying
     two_hops: TwoHops | None
     """None: hellos say nothing of neighbors."""
+    promises: Promises | None = None
+    """None: this access has no bound to state."""
 
 
 class Clustered(RoutingProtocol):
@@ -89,6 +92,12 @@ class Clustered(RoutingProtocol):
                 self._port.drop(DropReason.HOP_LIMIT, packet, now_ns=now_ns)
             else:
                 parts.access.forward(packet, start_ns=now_ns + self._lead_ns, now_ns=now_ns)
+
+    def bound_ns(self) -> int | None:
+        return None if self.parts.promises is None else self.parts.promises.bound_ns()
+
+    def least_interval_ns(self, deadline_ns: int) -> int | None:
+        return None if self.parts.promises is None else self.parts.promises.least_interval_ns(deadline_ns)
 
     def overheard(self, key: int, *, now_ns: int) -> None:
         for on_copy in self._on_copy:

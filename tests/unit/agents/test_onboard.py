@@ -7,10 +7,10 @@ import pytest
 
 from agents.uav import Uav
 from fanet_mw import mavlink
-from fanet_mw.application import Application, Course, Received, SensorReading
+from fanet_mw.application import Application, Course, Data, Fate, Received, SensorReading, Status
 from fanet_mw.bus.messages import Gps, MavlinkTap, Reception, Setpoint, TxRequest, WifiScan
 from fanet_mw.bus.topics import Topics
-from fanet_mw.errors import LocalProtocolError, MalformedFrameError
+from fanet_mw.errors import DropReason, LocalProtocolError, MalformedFrameError
 from fanet_mw.scenario import Scenario
 from fanet_mw.trace import Generated
 from fanet_mw.units import BROADCAST, MS, Enu, NodeId, S
@@ -18,6 +18,7 @@ from fanet_mw.wire import FLAG_FLOOD, PRIORITY_REPORT, SURVIVOR, Header, Kind
 from fanet_mw.wire.inner import Survivor
 
 NAMES, OWN, OTHER = Topics("u"), NodeId(2), NodeId(3)
+HELLO = Data(5, b"hello")
 ELSEWHERE = Course(Enu(100.0, 0.0, 50.0), 8.0)
 MakeScenario = Callable[..., Scenario]
 
@@ -192,3 +193,107 @@ def test_two_applications_of_one_name_are_refused(make_scenario: MakeScenario) -
 def test_a_report_has_what_a_users_applications_say(make_scenario: MakeScenario) -> None:
     made = uav(make_scenario, Diary("a"), Application())
     assert made.report()["applications"] == {"a": {"lines": 0}}
+
+
+# --- messages to ports, and what becomes of them ---------------------------------------------------------------------
+
+
+class Post(Application):
+    """Sends what it is told to at second 1, and writes down what becomes of it."""
+
+    name = "post"
+    ports = (5,)
+    follows = tuple(Fate)
+
+    def __init__(self, content: bytes | Data = HELLO, *, times: int = 1, **options: Any) -> None:
+        self._content, self._options, self._times, self._due_ns = content, options, times, S
+        self.told: list[Status] = []
+        self.got: list[bytes] = []
+        self.error: LocalProtocolError | None = None
+
+    def next_wake_ns(self) -> int | None:
+        return self._due_ns or None
+
+    def wake(self, now_ns: int) -> None:
+        self._due_ns = 0
+        try:
+            for _ in range(self._times):
+                self.handle = self.port.send(self._content, **self._options)
+        except LocalProtocolError as error:
+            self.error = error
+
+    def on_status(self, status: Status, now_ns: int) -> None:
+        self.told.append(status)
+
+    def on_message(self, message: Received, now_ns: int) -> None:
+        self.got.append(message.data)
+
+
+def live(made: Uav, until_ns: int) -> list[TxRequest]:
+    """Wake a UAV whenever it asks for it; what it announced."""
+    found: list[TxRequest] = []
+    now_ns = 0
+    while (wake_ns := made.next_wake_ns()) is not None and wake_ns <= until_ns:
+        now_ns = max(now_ns, wake_ns)
+        made.wake(now_ns)
+        found += [message for _, message in made.outbox if isinstance(message, TxRequest)]
+        made.outbox.clear()
+    return found
+
+
+@pytest.mark.parametrize("content", [Data(5, bytes(3000)), mavlink.Encoder(OWN).heartbeat()], ids=["bytes", "mavlink"])
+def test_a_message_that_nobody_confirms_is_sent_again_until_its_lifetime_is_over(
+    make_scenario: MakeScenario, content: bytes | Data
+) -> None:
+    post = Post(content, destination=OTHER, confirm=True, lifetime_ns=4 * S)
+    made = uav(make_scenario, post)
+    frames = live(made, 10 * S)
+    pieces = 1 if isinstance(content, bytes) else 2
+    assert len(frames) >= 2 * pieces
+    assert [status.fate for status in post.told] == [Fate.ADMITTED, Fate.LET_OUT, Fate.EXPIRED]
+    assert post.told[-1] == Status(post.handle, Fate.EXPIRED, 5 * S, nodes=(OTHER,), last=True)
+
+
+def test_what_is_not_to_be_confirmed_is_sent_once(make_scenario: MakeScenario) -> None:
+    post = Post(destination=BROADCAST)
+    frames = live(uav(make_scenario, post), 10 * S)
+    assert len(frames) == 1
+    assert [status.fate for status in post.told] == [Fate.ADMITTED, Fate.LET_OUT]
+
+
+def test_what_the_node_drops_is_told_with_the_reason(make_scenario: MakeScenario) -> None:
+    post = Post(destination=OTHER)
+    live(uav(make_scenario, post, **{"routing.protocol": "dsdv", "routing.lifetime_s": 5}), 10 * S)
+    assert post.told[-1].last
+    assert (post.told[-1].fate, post.told[-1].reason) in (
+        (Fate.DROPPED, DropReason.NO_ROUTE), (Fate.EXPIRED, DropReason.EXPIRED)
+    )  # fmt: skip
+
+
+def test_messages_that_cannot_be_kept_are_refused(make_scenario: MakeScenario) -> None:
+    post = Post(Data(5, bytes(60_000)), times=80, destination=OTHER, confirm=True)
+    live(uav(make_scenario, post), S)
+    fates = [status.fate for status in post.told if status.fate is not Fate.LET_OUT]
+    assert fates == [Fate.ADMITTED] * 70 + [Fate.REFUSED] * 10, "four megabytes are kept"
+    assert {s.reason for s in post.told if s.fate is Fate.REFUSED} == {DropReason.QUEUE_FULL}
+
+
+@pytest.mark.parametrize(
+    ("content", "options"),
+    [
+        (Data(0, b""), {}),
+        (Data(70_000, b""), {}),
+        (Data(5, bytes(200_000)), {}),
+        (Data(5, b""), {"destination": (OWN,)}),
+        (Data(5, b""), {"destination": (9, 2)}),
+        (Data(5, b""), {"destination": 0}),
+        (mavlink.Encoder(OWN).heartbeat() * 200, {"confirm": True}),
+    ],
+)
+def test_what_cannot_be_sent_at_all_is_a_mistake_of_the_application(
+    make_scenario: MakeScenario, content: bytes | Data, options: dict[str, Any]
+) -> None:
+    made = uav(make_scenario, post := Post(content, **options))
+    made.wake(S)
+    assert post.error is not None
+    assert "must be" in str(post.error)

@@ -12,7 +12,7 @@ from fanet_mw.node.contract import Port
 from fanet_mw.node.queue import Packet
 from fanet_mw.routing.clustered.roles.leader import HEARD_NS
 from fanet_mw.routing.clustered.roles.lease import Lease
-from fanet_mw.routing.clustered.tdma.admission import Admission
+from fanet_mw.routing.clustered.tdma.admission import Admission, least_interval_ns
 from fanet_mw.routing.clustered.tdma.own_bound import Own
 from fanet_mw.routing.clustered.tdma.root_release import RootRelease
 from fanet_mw.routing.clustered.tdma.turns import clocks_fit, receipt_ns
@@ -161,6 +161,11 @@ class Promises:
         if not self._bounds_ns or self._lease.leads or not self._in_step():
             return None
         return self._bounds_ns[-1].get(PRIORITY_BULK)
+
+    def least_interval_ns(self, deadline_ns: int) -> int | None:
+        """The least interval between packets of the node that meets a deadline; None: there is none, or no bound."""
+        own = self.own()
+        return None if own is None or self.bound_ns() is None else least_interval_ns(own, deadline_ns=deadline_ns)
 
     def likely_ns(self) -> int | None:
         """Within which time `LIKELY_SHARE` of the nodes have a packet of this node, where links lose frames; None: no

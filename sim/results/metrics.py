@@ -26,7 +26,7 @@ from fanet_mw.units import S
 from sim.results import delays, ledger, validity
 from sim.results.bounds import against_bounds, likely
 from sim.results.clocks import clock_errors
-from sim.results.packets import Application, packets_of, targets_by_source
+from sim.results.packets import APPS, Application, packets_of, targets_by_source
 from sim.run.outcome import Outcome
 from sim.world.separation import separation
 from sim.world.survivors import place
@@ -55,6 +55,8 @@ def summarize(outcome: Outcome, *, trace_sha256: str) -> dict[str, Any]:
         **packets["traffic"],
         "reports": packets["report"],
         "warnings": packets["warning"],
+        "applications": {name: part for name, part in packets.items() if name not in APPS},
+        "messages": _messages(outcome),
         "frames": frames,
         "copies": ledger.copies(outcome),
         "air": emulator.get("air", {}),
@@ -77,6 +79,14 @@ def summarize(outcome: Outcome, *, trace_sha256: str) -> dict[str, Any]:
         "aborted": outcome.aborted,
         "trace_sha256": trace_sha256,
     }
+
+
+def _messages(outcome: Outcome) -> dict[str, int]:
+    """What became of the messages of users' applications, all nodes together; empty when there were none."""
+    total: Counter[str] = Counter()
+    for report in outcome.reports.values():
+        total.update(report.get("messages", {}))
+    return dict(sorted(total.items()))
 
 
 def _packets(outcome: Outcome, packets: Mapping[str, Application]) -> dict[str, dict[str, Any]]:

@@ -46,16 +46,20 @@ class Application:
 
 
 def packets_of(outcome: Outcome) -> Mapping[str, Application]:
-    """By application, in the order of `APPS`."""
+    """By application: those of `APPS`, then those of users in the order in which they began to send.
+
+    To which nodes a packet of a user's application is meant to go is not in the trace: its `wanted` stays 0.
+    """
     found = {app: Application() for app in APPS}
     app_of: dict[Name, Application] = {}
     targets = targets_by_source(outcome)
     others = outcome.scenario.nodes.count - 1
     for record in outcome.records:
         if type(record) is Generated:
-            app = app_of[record.node, record.seq] = found[record.app]
+            app = app_of[record.node, record.seq] = found.setdefault(record.app, Application())
             app.sent[record.node, record.seq] = Sent(record.t_ns)
-            app.wanted += len(targets[record.node]) if record.app == "traffic" else others
+            if record.app in APPS:
+                app.wanted += len(targets[record.node]) if record.app == "traffic" else others
     had: set[tuple[int, int, int]] = set()
     exact = not outcome.scenario.clock.modelled  # else delays are true ones, whatever the header said
     for record in outcome.records:

@@ -260,7 +260,7 @@ class Messenger:
             return
         application, handle, first, confirmed = watched
         if reason is None:
-            if first:
+            if first and (not confirmed or handle in self._owners):  # else it is over: nobody waits to hear of it
                 self._tell(application, Status(handle, Fate.LET_OUT, t_ns))
             return
         self._unwatch(seq)

@@ -179,8 +179,8 @@ def test_every_message_arrives_once_whole_and_in_order_or_its_sender_is_told_who
 def test_ten_thousand_messages_arrive_once_whole_and_in_order_or_their_senders_are_told(
     make_scenario: MakeScenario,
 ) -> None:
-    scenario = make_scenario(**KEYS, **{"routing.protocol": "clustered", "duration_s": 1040})
-    mails, more = run(scenario, letters(10_000, over_s=1000))
+    scenario = make_scenario(**KEYS, **{"routing.protocol": "clustered", "duration_s": 640})
+    mails, more = run(scenario, letters(10_000, over_s=600))
     figures = check(mails)
     print(figures, more["most_bytes"])
     assert sum(len(mail.sent) for mail in mails.values()) == 10_000

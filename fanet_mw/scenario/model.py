@@ -234,15 +234,24 @@ class Mobility(Section):
     """UAVs nearer than this see each other without radio and keep clear; 0: they are blind."""
 
 
+WindSpeed = Annotated[float, Field(ge=-50, le=50)]
 Building = tuple[Coordinate, Coordinate, SomeLength, SomeLength, SomeLength]
 
 
 class World(Section):
     """The engine that moves the bodies, and the area they move in."""
 
-    engine: Literal["pybullet", "kinematic"] = "kinematic"
-    """What moves the bodies: rigid-body physics with collisions (`pybullet`, an extra of the package), or point masses
-    of limited acceleration (`kinematic`)."""
+    engine: Literal["pybullet", "kinematic", "rotors"] = "kinematic"
+    """What moves the bodies: rigid-body physics with collisions (`pybullet`, an extra of the package), point masses of
+    limited acceleration (`kinematic`), or multirotors with their rotors, motors, control loops and wind (`rotors`)."""
+    vehicle: Literal["iris", "crazyflie"] = "iris"
+    """The vehicle whose battery is drained, and which `rotors` flies: a 3DR Iris of 1.5 kg, or a Crazyflie of 30 g."""
+    charge: tuple[Annotated[float, Field(gt=0, le=1)], Annotated[float, Field(gt=0, le=1)]] = (1.0, 1.0)
+    """Least and greatest share of its capacity that a battery holds at the start; which is drawn by the seed."""
+    wind_m_s: tuple[WindSpeed, WindSpeed] = (0.0, 0.0)
+    """`rotors`: where the mean wind blows to, east and north."""
+    gusts_m_s: Annotated[float, Field(ge=0, le=50)] = 0.0
+    """`rotors`: the wind 6 m above the ground that makes the gusts (Dryden): they have a tenth of it upwards."""
     area_m: SomeLength = 2500.0
     """Side of the square area, centred at the origin."""
     tick_ms: Annotated[float, Field(ge=1, le=10_000)] = 100.0
@@ -291,7 +300,9 @@ class World(Section):
             raise ValueError("world.buildings and world.buildings_geojson exclude each other")
         if self.heightmap and self.terrain_m:
             raise ValueError("world.terrain_m and world.heightmap exclude each other")
-        for key in ("building_size_m", "building_height_m"):
+        if self.engine != "rotors" and (any(self.wind_m_s) or self.gusts_m_s):
+            raise ValueError(f'world.wind_m_s and world.gusts_m_s need world.engine = "rotors", not "{self.engine}"')
+        for key in ("building_size_m", "building_height_m", "charge"):
             least, greatest = getattr(self, key)
             if least > greatest:
                 raise ValueError(f"world.{key} = [{least:g}, {greatest:g}] must be [least, greatest]")

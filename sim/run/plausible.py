@@ -112,6 +112,7 @@ class _World(_Shape):
     collisions: Count
     crashed: Count = 0
     no_fly_entries: Count = 0
+    least_charge: Number | None = None
     separation: _Separation
     malformed: Count
 

@@ -46,5 +46,9 @@ class Engine(ABC):
         """Whether an obstacle stands between each `first` and `second` [n, 3]; bodies and the plain do not count."""
         return np.zeros(len(first), bool)
 
+    def power_w(self) -> Values | None:
+        """What each body's battery gives now; None for an engine that knows no rotors."""
+        return None
+
     def close(self) -> None:  # noqa: B027  (only physics holds anything)
         """Give back what the engine holds."""

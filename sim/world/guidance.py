@@ -17,7 +17,7 @@ from fanet_mw.rng import stream
 from fanet_mw.scenario import Scenario
 from fanet_mw.scenario.model import MOBILITY_MODELS
 from fanet_mw.units import Enu, S
-from sim.world.engine import Rows, Values
+from sim.world.engine import Flags, Rows, Values
 
 _GAIN: Final = 0.8
 """Position loop [1/s]."""
@@ -215,6 +215,13 @@ class Guidance:
     def may_touch_down(self, node: int) -> bool:
         """Whether this UAV touches the ground on purpose."""
         return node - 1 in self._landings or node - 1 in self._grounded
+
+    def grounded(self, at: Rows) -> Flags:
+        """Which UAVs stand on the ground with their motors off: they have landed, or wait for their takeoff."""
+        off = np.zeros(len(at), bool)
+        waiting = [row for row in self._grounded if row not in self._setpoints and row not in self._velocities]
+        off[[*self._landings, *waiting]] = True
+        return np.asarray(off & (at[:, 2] - self._ground_m(at) <= _ON_GROUND_M))
 
     def _hold(self, row: int, here: Enu) -> None:
         self._setpoints[row] = here, _HOLD_M_S

@@ -8,14 +8,13 @@ from typing import Final
 
 import numpy as np
 
+from sim.world.contacts import Contacts
 from sim.world.engine import Engine, Flags, Rows
 from sim.world.solids import Solids
 
 ACCELERATION_M_S2: Final = 5.0
 GRAVITY_M_S2: Final = 9.81
 RADIUS_M: Final = 0.25
-_CROWD: Final = 400
-"""Above this many nodes contacts between bodies are not looked for: it is quadratic, and such swarms are for radio."""
 
 
 class Kinematic(Engine):
@@ -27,14 +26,14 @@ class Kinematic(Engine):
         self._solids = solids if solids is not None and solids.any else None
         self._at = np.zeros((0, 3))
         self._velocity = np.zeros((0, 3))
-        self._touching: frozenset[tuple[int, int]] = frozenset()
-        self._new: list[tuple[int, int]] = []
+        self._contacts = Contacts(RADIUS_M, self._solids)
         self._wrecks: list[int] = []
 
     def reset(self, positions: Rows, velocities: Rows | None = None) -> None:
         self._at = positions.copy()
         self._velocity = np.zeros_like(positions) if velocities is None else velocities.copy()
-        self._touching, self._new, self._wrecks = frozenset(), [], []
+        self._wrecks = []
+        self._contacts.reset()
 
     def advance(self, dt_s: float, wanted_m_s: Rows) -> None:
         change = wanted_m_s - self._velocity
@@ -52,7 +51,7 @@ class Kinematic(Engine):
         self._velocity[below] = 0.0
         if self._solids is not None:
             self._stop_at_walls(came_from, self._solids)
-        self._notice_contacts()
+        self._contacts.notice(self._at)
 
     def blocked(self, first: Rows, second: Rows) -> Flags:
         return super().blocked(first, second) if self._solids is None else self._solids.blocked(first, second)
@@ -67,8 +66,7 @@ class Kinematic(Engine):
         self._wrecks.append(row)
 
     def contacts(self) -> list[tuple[int, int]]:
-        new, self._new = self._new, []
-        return new
+        return self._contacts.take()
 
     def _stop_at_walls(self, came_from: Rows, solids: Solids) -> None:
         """Who would be within something solid is put back where it came from, or on the ground, and stands still."""
@@ -77,13 +75,3 @@ class Kinematic(Engine):
             self._at[inside] = came_from[inside]
             self._at[inside, 2] = np.maximum(self._at[inside, 2], solids.ground_m(self._at[inside]))
             self._velocity[inside] = 0.0
-
-    def _notice_contacts(self) -> None:
-        gap = self._at[:, 2] if self._solids is None else self._solids.gap_m(self._at)
-        now = {(0, int(i) + 1) for i in np.flatnonzero(gap <= RADIUS_M)}
-        if len(self._at) <= _CROWD:
-            apart = np.linalg.norm(self._at[:, None] - self._at[None], axis=2)
-            first, second = np.nonzero(np.triu(apart < 2 * RADIUS_M, k=1))
-            now |= {(int(a) + 1, int(b) + 1) for a, b in zip(first, second, strict=True)}
-        self._new += sorted(now - self._touching)
-        self._touching = frozenset(now)

@@ -14,9 +14,11 @@ from fanet_mw.actor import Actor
 from fanet_mw.bus.messages import Message, Poses, Setpoint
 from fanet_mw.bus.radio_control import Cut
 from fanet_mw.bus.topics import Topics, node_of
+from fanet_mw.rng import stream_seed
 from fanet_mw.scenario import Scenario
 from fanet_mw.trace import Collided
 from fanet_mw.units import NodeId, S
+from sim.world.energy import Energy
 from sim.world.engine import Engine
 from sim.world.flight import Flight
 from sim.world.guidance import Guidance
@@ -24,11 +26,14 @@ from sim.world.kinematic import Kinematic
 from sim.world.layout import positions
 from sim.world.no_fly import NoFly
 from sim.world.obstacles import Obstacles, obstacles
+from sim.world.rotors.engine import Rotors
+from sim.world.rotors.vehicle import VEHICLES
 from sim.world.sensors.contract import Truth
 from sim.world.sensors.suite import Suite, sensors_of
 from sim.world.separation import Separation
 from sim.world.solids import Solids
 from sim.world.survivors import Survivors
+from sim.world.wind import Wind
 
 if TYPE_CHECKING:
     from sim.world.sight import Sight
@@ -41,11 +46,16 @@ _CONTROL_S: Final = 0.05
 
 def make_engine(scenario: Scenario, solid: Obstacles | None = None) -> Engine:
     """The engine that the scenario names, with what stands in its world."""
-    if scenario.world.engine == "kinematic":
+    world = scenario.world
+    if world.engine == "kinematic":
         return Kinematic(Solids(solid))
+    if world.engine == "rotors":
+        random = np.random.Generator(np.random.PCG64(stream_seed(scenario.seed, "wind")))
+        wind = Wind(random, scenario.nodes.count, mean_m_s=world.wind_m_s, w20_m_s=world.gusts_m_s)
+        return Rotors(VEHICLES[world.vehicle], wind=wind, solids=Solids(solid))
     from sim.world.physics import Physics
 
-    return Physics(physics_hz=scenario.world.physics_hz, obstacles=solid)
+    return Physics(physics_hz=world.physics_hz, obstacles=solid)
 
 
 def _sight(scenario: Scenario, engine: Engine, solid: Obstacles) -> "Sight":
@@ -80,7 +90,10 @@ class World(Actor):
         self._guidance = Guidance(starts, scenario, ground_m=solids.ground_m)
         for node, sent in sorted(flight.setpoints.items()) if flight else ():
             self._guidance.obey(node, sent, at=self._engine.positions()[node - 1], t_s=sent.t_ns / S)
-        self._suite = Suite(scenario, sensors_of(scenario, Survivors(scenario, solids.ground_m), solids), topics)
+        drained = scenario.sensors.battery_hz > 0 or scenario.world.engine == "rotors"
+        self._energy = Energy(scenario) if drained else None
+        survivors = Survivors(scenario, solids.ground_m)
+        self._suite = Suite(scenario, sensors_of(scenario, survivors, solids, self._energy), topics)
         self._flies = np.ones(self._count, bool)
         """Which UAVs have not crashed."""
         self._tick_ns: int | None = None
@@ -146,6 +159,7 @@ class World(Actor):
             "collisions": self._collisions,
             "crashed": int((~self._flies).sum()),
             "no_fly_entries": self._no_fly.entries,
+            "least_charge": None if self._energy is None else round(float(self._energy.batteries.charge.min()), 4),
             "separation": {} if self._separation is None else self._separation.report(),
             "malformed": self._malformed,
         }
@@ -168,6 +182,10 @@ class World(Actor):
             if self._separation is not None:
                 self._separation.watch(before, engine.positions())
         self._no_fly.watch(engine.positions())
+        if self._energy is not None:
+            motors = self._flies & ~self._guidance.grounded(engine.positions())
+            for row in self._energy.pass_time(elapsed_s, engine, motors):
+                self._crash(row + 1, radio_dies=True)
         for first, second in engine.contacts():
             self._contact(first, second, now_ns)
 
@@ -180,12 +198,15 @@ class World(Actor):
         self.records.append(Collided(now_ns, second, first))
         if self._scenario.world.crash == "falls":
             for node in touching:
-                self._crash(node)
+                self._crash(node, radio_dies=self._scenario.world.crash_radio == "dies")
 
-    def _crash(self, node: int) -> None:
+    def _crash(self, node: int, *, radio_dies: bool) -> None:
+        """From now on it falls: it touched something, or its battery is empty."""
+        if not self._flies[node - 1]:
+            return
         self._flies[node - 1] = False
         self._engine.fall(node - 1)
-        if self._scenario.world.crash_radio == "dies":
+        if radio_dies:
             self.outbox.append((self._fault_topic, Cut(f"crash-{node}", NodeId(node))))
 
     def _publish(self, now_ns: int, before_ns: int) -> None:

@@ -1,4 +1,4 @@
-"""The engine contract, run against both engines."""
+"""The engine contract, run against every engine."""
 
 from collections.abc import Iterator
 
@@ -12,17 +12,23 @@ from sim.world.guidance import Guidance
 from sim.world.kinematic import Kinematic
 from sim.world.obstacles import Box, Obstacles
 from sim.world.physics import Physics
+from sim.world.rotors.engine import Rotors
+from sim.world.rotors.vehicle import CRAZYFLIE, IRIS
 from sim.world.sensors.phone import PhoneSensor
 from sim.world.survivors import place
 
 FAR_AWAY = Obstacles(hills=None, boxes=(Box(400, 400, 30, 30, 60),))
 
 
-@pytest.fixture(params=["kinematic", "pybullet", "pybullet with a building"])
+@pytest.fixture(params=["kinematic", "pybullet", "pybullet with a building", "rotors", "crazyflies"])
 def engine(request: pytest.FixtureRequest) -> Iterator[Engine]:
     made: Engine
     if request.param == "kinematic":
         made = Kinematic()
+    elif request.param == "crazyflies":
+        made = Rotors(CRAZYFLIE)
+    elif request.param == "rotors":
+        made = Rotors(IRIS)
     else:
         made = Physics(physics_hz=240, obstacles=FAR_AWAY if "building" in request.param else None)
     yield made
@@ -79,6 +85,17 @@ def test_bodies_that_meet_are_noticed(engine: Engine) -> None:
     assert engine.contacts() == [(1, 2)]
 
 
+def test_who_has_no_power_falls_whatever_is_wanted_of_it(engine: Engine) -> None:
+    engine.reset(np.array([[0.0, 0, 50], [20, 0, 50]]))
+    engine.fall(0)
+    fly(engine, np.array([[0.0, 0, 5], [0, 0, 0]]), 1)
+    assert engine.positions()[0, 2] == pytest.approx(50 - 9.81 / 2, abs=1.5)
+    fly(engine, np.array([[0.0, 0, 5], [0, 0, 0]]), 6)
+    assert engine.positions()[0, 2] < 0.3
+    assert engine.positions()[1, 2] == pytest.approx(50, abs=0.2)
+    assert set(engine.contacts()) == {(0, 1)}, "more than once where bodies bounce"
+
+
 def test_the_same_calls_give_the_same_bytes(engine: Engine) -> None:
     def run() -> bytes:
         engine.reset(np.array([[0.0, 0, 50], [3, 0, 50]]))
@@ -95,7 +112,7 @@ def test_ten_uavs_sent_to_one_point_settle_around_it_and_never_touch(engine: Eng
     engine.reset(start)
     for node in range(1, 11):
         guidance.steer(node, Enu(0, 0, 50), speed_m_s=10)
-    for step in range(600):
+    for step in range(500):
         engine.advance(0.05, guidance.wanted(step * 0.05, engine.positions(), engine.velocities()))
         assert engine.contacts() == []
     assert np.linalg.norm(engine.positions() - [0, 0, 50], axis=1).max() < 40

@@ -5,8 +5,10 @@ from collections.abc import Iterator
 from fanet_mw.bus.messages import Message
 from fanet_mw.bus.topics import Topics
 from fanet_mw.scenario.model import PROTOCOLS, Scenario
+from sim.world.energy import Energy
 from sim.world.engine import Flags
 from sim.world.sensors.altimeter import AltimeterSensor
+from sim.world.sensors.battery import BatterySensor
 from sim.world.sensors.camera import CameraSensor
 from sim.world.sensors.contract import Sensor, Truth
 from sim.world.sensors.gps import GpsReceiver
@@ -18,8 +20,11 @@ from sim.world.solids import Solids
 from sim.world.survivors import Survivors
 
 
-def sensors_of(scenario: Scenario, survivors: Survivors, solids: Solids) -> list[Sensor]:
-    """The sensors that a scenario asks for, in the order in which their readings go out."""
+def sensors_of(scenario: Scenario, survivors: Survivors, solids: Solids, energy: Energy | None = None) -> list[Sensor]:
+    """The sensors that a scenario asks for, in the order in which their readings go out.
+
+    `energy`: the batteries; None: nobody has any, and none is told of.
+    """
     config = scenario.sensors
     found: list[Sensor] = []
     if uses_fixes(scenario):
@@ -36,6 +41,8 @@ def sensors_of(scenario: Scenario, survivors: Survivors, solids: Solids) -> list
         found.append(AltimeterSensor(scenario, solids))
     if config.inertial_hz:
         found.append(InertialSensor(scenario))
+    if config.battery_hz and energy is not None:
+        found.append(BatterySensor(scenario, energy))
     return found
 
 

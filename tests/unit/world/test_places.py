@@ -16,11 +16,14 @@ from fanet_mw.mavlink import Geodetic, to_geodetic
 from fanet_mw.scenario import Scenario, config
 from fanet_mw.units import Enu
 from sim.world import footprints, heightmap
+from sim.world.engine import Engine
 from sim.world.kinematic import Kinematic
 from sim.world.layout import positions
 from sim.world.no_fly import NoFly
 from sim.world.obstacles import Box, Hills, Obstacles, obstacles
 from sim.world.physics import Physics
+from sim.world.rotors.engine import Rotors
+from sim.world.rotors.vehicle import IRIS
 from sim.world.solids import Solids
 from sim.world.survivors import Survivors, place
 
@@ -235,7 +238,7 @@ def test_a_building_is_the_smallest_rectangle_about_its_outline(tmp_path: Path) 
     assert (first.height, second.height, third.height) == (12.0, 12.0, 19.0)
 
 
-@pytest.mark.parametrize("engine", ["kinematic", "pybullet"])
+@pytest.mark.parametrize("engine", ["kinematic", "pybullet", "rotors"])
 def test_a_turned_building_hides_and_is_hit_where_it_stands(
     make_scenario: MakeScenario, tmp_path: Path, engine: str
 ) -> None:
@@ -245,7 +248,11 @@ def test_a_turned_building_hides_and_is_hit_where_it_stands(
            "nodes.positions_m": ((-60, 0, 20),), "world.area_m": 500},
     )  # fmt: skip
     solid = obstacles(scenario, np.array(positions(scenario)))
-    made = Physics(physics_hz=240, obstacles=solid) if engine == "pybullet" else Kinematic(Solids(solid))
+    made: Engine
+    if engine == "pybullet":
+        made = Physics(physics_hz=240, obstacles=solid)
+    else:
+        made = Kinematic(Solids(solid)) if engine == "kinematic" else Rotors(IRIS, solids=Solids(solid))
     made.reset(np.array([[-60.0, 0, 20]]))
     first = np.array([[-60.0, 0, 20], [-60, 18, 20], [-60, 22, 20], [-60, 0, 41]])
     assert made.blocked(first, first + np.array([120.0, 0, 0])).tolist() == [True, True, False, False]

@@ -1,0 +1,32 @@
+"""The battery's state, as a power module and its coulomb counter tell it; they err by less than anybody acts on."""
+
+from collections.abc import Iterator, Sequence
+
+from fanet_mw.bus.messages import Battery, Message
+from fanet_mw.scenario import Scenario
+from fanet_mw.units import S
+from sim.world.energy import Energy
+from sim.world.sensors.contract import Sensor, Truth
+
+
+class BatterySensor(Sensor):
+    """One power module per UAV."""
+
+    kind = "battery"
+
+    def __init__(self, scenario: Scenario, energy: Energy) -> None:
+        self.period_ns = round(S / scenario.sensors.battery_hz)
+        self._batteries = energy.batteries
+
+    def read(self, truth: Truth, rows: Sequence[int]) -> Iterator[tuple[int, Message]]:
+        batteries = self._batteries
+        for row in rows:
+            yield (
+                row,
+                Battery(
+                    truth.now_ns,
+                    float(batteries.voltage_v[row]),
+                    float(batteries.current_a[row]),
+                    float(batteries.charge[row]),
+                ),
+            )

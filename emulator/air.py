@@ -13,7 +13,7 @@ import numpy.typing as npt
 from emulator.chance import MODULUS
 from emulator.channel.error_rate import header_rates, log_success_per_bit
 from emulator.channel.fading import law_of, seeds
-from emulator.channel.propagation import Links, milliwatt, noise_mw, pair_codes
+from emulator.channel.propagation import LinkTable, milliwatt, noise_mw, pair_codes
 from emulator.channel.shadowing import Shadowing
 from emulator.faults import Faults
 from emulator.kernel import kernel
@@ -100,7 +100,7 @@ class Air:
         self._err = _error_table(radio.rate_mbps, radio.ack_rate_mbps) if radio.channel != "range" else np.zeros((3, 1))
         self._airtime: dict[int, int] = {}
         self._shadowing = Shadowing(radio, seed=seed) if radio.shadowing_db else None
-        nowhere = Links(np.full((stations, 3), np.inf), radio, spare=0)
+        nowhere = LinkTable(np.full((stations, 3), np.inf), radio, spare=0)
         self._lk, self._lp, self._ptr = nowhere.ints, nowhere.reals, nowhere.ptr
         self._hr = np.zeros((64, 5), np.int64)
         self._at = np.full((stations, 3), np.inf)
@@ -131,7 +131,7 @@ class Air:
         self._take_in()
         self.book.take(self._lk)
         spare = int(self._lk[s.UNDERWAY].sum())
-        links = Links(
+        links = LinkTable(
             np.ascontiguousarray(at), self._radio, spare=spare, shadowing=self._shadowing, blocked=self._blocked
         )
         self._sf[s.NOISE] = self._faults.apply(links, at)

@@ -18,7 +18,7 @@ from typing import Final, NamedTuple
 import numpy as np
 import numpy.typing as npt
 
-from emulator.channel.propagation import Links, milliwatt, noise_mw
+from emulator.channel.propagation import LinkTable, milliwatt, noise_mw
 from emulator.kernel import state as s
 from fanet_mw.bus.radio_control import Control, Cut, Degrade, Fault, Jam, Restore, wrong
 from fanet_mw.scenario import Radio
@@ -111,7 +111,7 @@ class Faults:
 
     # --- the effect on links and noise ----------------------------------------------------------------------------
 
-    def apply(self, links: Links, at: npt.NDArray[np.float64]) -> npt.NDArray[np.float64]:
+    def apply(self, links: LinkTable, at: npt.NDArray[np.float64]) -> npt.NDArray[np.float64]:
         """Apply the faults to the links of stations at `at` [m, n x 3]; returns the noise at each station [mW]."""
         noise = np.full(self._stations, noise_mw(self._radio))
         faults = [item.fault for item in self._standing.values()]
@@ -130,7 +130,7 @@ class Faults:
             links.sort_dead_last()
         return noise
 
-    def _degrade(self, links: Links, src: int, dst: int, fault: Degrade) -> None:
+    def _degrade(self, links: LinkTable, src: int, dst: int, fault: Degrade) -> None:
         first, end = links.ptr[src], links.ptr[src + 1]
         found = np.flatnonzero(links.ints[s.LINK_DST, first:end] == dst)
         if not len(found):
@@ -147,7 +147,7 @@ class Faults:
         unheard = not audible and self._radio.channel == "range"  # in this model any overlap destroys a frame
         links.reals[s.LINK_POWER, link] = 0.0 if unheard else power_mw
 
-    def _jam(self, links: Links, at: npt.NDArray[np.float64], fault: Jam) -> npt.NDArray[np.float64]:
+    def _jam(self, links: LinkTable, at: npt.NDArray[np.float64], fault: Jam) -> npt.NDArray[np.float64]:
         """Mark the links into the jammed area; returns what is added to the noise at each station [mW]."""
         with np.errstate(invalid="ignore"):  # a station of unknown position is infinitely far away
             inside = np.hypot(at[:, 0] - fault.center.east, at[:, 1] - fault.center.north) <= fault.radius_m
@@ -159,7 +159,7 @@ class Faults:
             return np.zeros(self._stations)
         return np.where(inside, milliwatt(fault.noise_dbm), 0.0)
 
-    def _cut(self, links: Links, cut: list[int]) -> None:
+    def _cut(self, links: LinkTable, cut: list[int]) -> None:
         off = np.zeros(self._stations, bool)
         off[cut] = True
         count = links.count

@@ -21,13 +21,13 @@ from fanet_mw.trace import Record
 
 
 class Actor(ABC):
-    """One process' worth of behaviour, with no process in it."""
+    """The behavior of one process, without the process."""
 
     name: str
-    """Unique in a swarm; what reports, logs and messages to people call it (`agent-7`, `emulator`, `world`)."""
+    """The actor's name, unique in a swarm, used in reports, logs and messages (`agent-7`, `emulator`, `world`)."""
     hears_out = False
-    """True for an actor that accounts for what others send: in real time, what was on its way when the time was over
-    still reaches it before `stop`."""
+    """True for an actor that accounts for what others send: in real time it still receives, before `stop`, what was on
+    its way at the end."""
 
     def __init__(self, name: str, subscriptions: tuple[str, ...]) -> None:
         self.name = name
@@ -43,18 +43,18 @@ class Actor(ABC):
 
     @abstractmethod
     def receive(self, topic: str, message: Message, now_ns: int) -> bool | None:
-        """True: nothing has become due sooner than `next_wake_ns()` said last, and the host need not ask again."""
+        """Take in a message. True means that the next wake-up has not moved, so that the host need not ask for it."""
 
     @abstractmethod
     def wake(self, now_ns: int) -> None: ...
 
     @abstractmethod
     def next_wake_ns(self) -> int | None:
-        """The instant of the next wanted `wake`, or None. May lie in the past: then at once."""
+        """The instant of the next `wake` that is wanted, or None. An instant in the past means at once."""
 
-    def stop(self, now_ns: int) -> None:  # noqa: B027  (most actors have nothing to settle)
-        """The run is over; settle what is in flight into counters."""
+    def stop(self, now_ns: int) -> None:  # noqa: B027  (most actors have nothing to do here)
+        """The run is over: count what is still in flight."""
 
     def report(self) -> Mapping[str, Any]:
-        """JSON-able counters, cumulative since `start`. May be asked at any time."""
+        """Counters as JSON values, cumulative since `start`. May be called at any time."""
         return {}

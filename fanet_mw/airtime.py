@@ -1,10 +1,10 @@
-"""How long things take, by standard: `b` (DSSS, HR/DSSS), `g` (the same, and OFDM at 2.4 GHz), `a` (OFDM at 5 GHz).
+"""Airtimes and MAC timing by standard: `b` (DSSS, HR/DSSS), `g` (`b`, and OFDM at 2.4 GHz), `a` (OFDM at 5 GHz).
 
     DSSS   PLCP preamble and header + payload bits / rate, rounded up to 1 us
     OFDM   preamble 16 us + SIGNAL 4 us + 4 us per symbol of (SERVICE 16 + payload + tail 6) bits, + 6 us at 2.4 GHz
 
-Clauses are of IEEE 802.11-2020: 15 and 16 (DSSS), 17 (OFDM), 18 (ERP). Not modeled: protection of OFDM frames
-from stations that only know DSSS, 5 and 10 MHz channels, QoS access categories.
+Clauses are of IEEE 802.11-2020: 15 and 16 (DSSS), 17 (OFDM), 18 (ERP). Not modeled: protection of OFDM frames from
+stations that know only DSSS, 5 and 10 MHz channels, QoS access categories.
 """
 
 import math
@@ -14,10 +14,10 @@ from fanet_mw.scenario.radio import Radio, is_ofdm
 from fanet_mw.units import US
 
 OVERHEAD_BYTES: Final = 8 + 20 + 8 + 24 + 4
-"""UDP + IPv4 + LLC/SNAP + MAC header + FCS: what surrounds our frame, which is the UDP payload."""
+"""UDP + IPv4 + LLC/SNAP + MAC header + FCS: the bytes around a frame of this project, which is the UDP payload."""
 ACK_BYTES: Final = 14
 DETECT_NS: Final = 4 * US
-"""From the first bit at a station until the preamble is found and the medium sensed busy (as ns-3 has it)."""
+"""The time from a frame's first bit at a station until it is detected and the medium sensed busy (as in ns-3)."""
 OFDM_HEADER_NS: Final = 20 * US  # 17.3.2.4 and table 17-5: two training fields of 8 us, SIGNAL of 4 us
 SYMBOL_NS: Final = 4 * US  # table 17-5 (T_SYM)
 SIGNAL_EXTENSION_NS: Final = 6 * US  # table 18-5 (aSignalExtension), ERP-OFDM only
@@ -25,14 +25,14 @@ _SERVICE_AND_TAIL_BITS: Final = 16 + 6  # 17.3.5.2, 17.3.5.3
 
 
 def plcp_ns(*, short: bool) -> int:
-    """PLCP preamble and header: 144 + 48 us, or 72 + 24 us short (16.2.2)."""
+    """The duration of PLCP preamble and header: 144 + 48 us, or 72 + 24 us when short (16.2.2)."""
     return 96 * US if short else 192 * US
 
 
 def frame_ns(size: int, *, rate_mbps: float, short: bool) -> int:
     """Airtime of a MAC frame of `size` bytes, FCS included; payload time is rounded up to whole us (16.3.4).
 
-    The short preamble does not exist at 1 Mb/s.
+    At 1 Mb/s there is no short preamble.
     """
     return plcp_ns(short=short and rate_mbps > 1) + math.ceil(8 * size / rate_mbps - 1e-9) * US
 
@@ -44,7 +44,7 @@ def ofdm_frame_ns(size: int, *, rate_mbps: float, extension_ns: int = 0) -> int:
 
 
 class Timing(NamedTuple):
-    """Everything the DCF needs, in ns."""
+    """The durations that the DCF needs, in ns."""
 
     slot_ns: int
     sifs_ns: int
@@ -58,12 +58,12 @@ class Timing(NamedTuple):
 
     @classmethod
     def of(cls, radio: Radio) -> "Timing":
-        """The values that the scenario's standard, rates and preamble give."""
+        """The values that follow from the scenario's standard, rates and preamble."""
         short = radio.preamble == "short"
         ofdm = is_ofdm(radio.rate_mbps)
         extension_ns = SIGNAL_EXTENSION_NS if ofdm and radio.standard == "g" else 0
         sifs_ns = 16 * US if radio.standard == "a" else 10 * US  # tables 17-21, 15-5, 18-5 (aSIFSTime)
-        slot_ns = 9 * US if radio.standard == "a" or radio.slot == "short" else 20 * US  # the same (aSlotTime)
+        slot_ns = 9 * US if radio.standard == "a" or radio.slot == "short" else 20 * US  # tables as above (aSlotTime)
         header_ns = OFDM_HEADER_NS if ofdm else plcp_ns(short=short)
         if radio.standard == "a":
             lowest_ack_ns = ofdm_frame_ns(ACK_BYTES, rate_mbps=6)

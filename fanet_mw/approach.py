@@ -1,4 +1,4 @@
-"""The closest point of approach of two bodies that fly on straight. Pure geometry.
+"""The closest point of approach of two bodies that continue to fly straight. Pure geometry.
 
 With r from one to the other and v the other's velocity relative to it, |r + v t| is least at t = -r.v / v.v (the TCPA
 and DCPA of collision avoidance at sea and in the air).
@@ -10,12 +10,12 @@ from fanet_mw.units import Enu
 
 
 class Approach(NamedTuple):
-    """How near two bodies will come, and when."""
+    """How near two bodies will come to each other, and when."""
 
     closest_s: float
-    """From now; 0: they are nearest now."""
+    """The time until then, from now; 0 when they are nearest now."""
     apart: Enu
-    """From one to the other, then [m]."""
+    """The vector from one body to the other at that time [m]."""
 
     @property
     def distance_m(self) -> float:
@@ -23,7 +23,7 @@ class Approach(NamedTuple):
 
 
 def closest(position: Enu, velocity: Enu, *, within_s: float) -> Approach:
-    """The nearest that a body comes in [0, `within_s`], as seen from the other: its relative position and velocity."""
+    """The closest approach in [0, `within_s`] of a body whose position and velocity relative to the other are given."""
     speed2 = velocity.east**2 + velocity.north**2 + velocity.up**2
     closing = -(position.east * velocity.east + position.north * velocity.north + position.up * velocity.up)
     at_s = min(max(0.0, closing / speed2), within_s) if speed2 > 0 else 0.0

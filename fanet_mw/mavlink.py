@@ -1,11 +1,11 @@
-"""Native MAVLink messages, and the only place that knows NED and geodetic coordinates. The border to pymavlink.
+"""Native MAVLink messages, and the only module that knows NED and geodetic coordinates. The border to pymavlink.
 
 Inside, positions are ENU metres in the plane that touches the WGS84 ellipsoid at an origin. Outside are degrees x 1e7,
-millimetres of height, and velocities north, east, down in cm/s. Conversions go through the earth-centered frame and are
-exact; what a message rounds is under 1 cm. `mavutil` is not imported: it loads every dialect.
+millimetres of height, and velocities north, east, down in cm/s. Conversions use the earth-centered frame and are exact;
+the rounding in a message is below 1 cm. `mavutil` is not imported, because it loads every dialect.
 
-Not modeled: geoid height (altitudes are over the ellipsoid) and the turn of the axes with distance (velocities and
-headings are the origin's north and east: 0.1 degrees off at 10 km).
+Not modeled: geoid height (altitudes are over the ellipsoid), and the turn of the axes with distance (velocities and
+headings refer to north and east at the origin: 0.1 degrees off at 10 km).
 """
 
 import math
@@ -23,7 +23,7 @@ common.mavlink_map.update(fanet.mavlink_map)  # one parser for both dialects
 
 COLLISION_ID: Final = int(common.MAVLINK_MSG_ID_COLLISION)
 AUTOPILOT_COMPONENT: Final = 1
-"""MAV_COMP_ID_AUTOPILOT1: who the telemetry is from. Ground stations take no other component for a vehicle."""
+"""MAV_COMP_ID_AUTOPILOT1, the sender of telemetry: ground stations take no other component for a vehicle."""
 
 _A: Final = 6_378_137.0
 """WGS84 semi-major axis [m]."""
@@ -48,14 +48,14 @@ class Geodetic(NamedTuple):
 
 
 ORIGIN: Final = Geodetic(37.5665, 126.978, 0.0)
-"""Where the swarm's frame touches the earth unless told otherwise."""
+"""The point at which the swarm's frame touches the earth by default."""
 
 
 # --- coordinates --------------------------------------------------------------------------------------------------
 
 
 class _Plane(NamedTuple):
-    """An origin in the earth-centered frame, and the sines and cosines that turn into its east, north, up."""
+    """An origin in the earth-centered frame, and the sines and cosines that turn vectors into its east, north, up."""
 
     x: float
     y: float
@@ -83,7 +83,7 @@ def _plane(origin: Geodetic) -> _Plane:
 
 
 def to_geodetic(position: Enu, origin: Geodetic = ORIGIN) -> Geodetic:
-    """Where on earth a point of the swarm's frame is."""
+    """The place on earth of a point in the swarm's frame."""
     o = _plane(origin)
     outward = o.cos_lat * position.up - o.sin_lat * position.north
     x = o.x + o.cos_lon * outward - o.sin_lon * position.east
@@ -131,7 +131,7 @@ def _place_ints(place: Geodetic) -> tuple[int, int, int]:
 
 
 def _millimeters(height_m: float) -> int:
-    """A height in the 32 bits that MAVLink has for it; beyond 2,147 km the greatest of them."""
+    """A height in the 32 bits that MAVLink has for it, limited to 2,147 km."""
     return max(-0x8000_0000, min(0x7FFF_FFFF, round(height_m * 1000)))
 
 
@@ -158,7 +158,7 @@ class Attitude(NamedTuple):
 
 
 class Battery(NamedTuple):
-    """A battery's state."""
+    """The state of a battery."""
 
     cells_v: tuple[float, ...]
     current_a: float
@@ -168,7 +168,7 @@ class Battery(NamedTuple):
 
 
 class Encoder:
-    """Native messages of one node, as MAVLink 2 frames with their own sequence."""
+    """Makes the native messages of one node, as MAVLink 2 frames with a sequence of their own."""
 
     def __init__(self, node: NodeId, *, component: int = COMPONENT, origin: Geodetic = ORIGIN) -> None:
         self._mav = common.MAVLink(None, srcSystem=system_id(node), srcComponent=component)
@@ -176,11 +176,11 @@ class Encoder:
 
     def _pack(self, message: Any) -> bytes:  # noqa: ANN401  (pymavlink has no types)
         data = bytes(message.pack(self._mav))
-        self._mav.seq = (self._mav.seq + 1) % 256  # `pack` leaves it to `send`, which wants a file
+        self._mav.seq = (self._mav.seq + 1) % 256  # `pack` leaves this to `send`, which needs a file
         return data
 
     def heartbeat(self) -> bytes:
-        """Armed, flying by itself. `GENERIC`, because INVALID would say that this is no flight controller."""
+        """HEARTBEAT: armed and autonomous. GENERIC, because INVALID would mean that there is no flight controller."""
         mode = common.MAV_MODE_FLAG_SAFETY_ARMED | common.MAV_MODE_FLAG_AUTO_ENABLED
         return self._pack(
             common.MAVLink_heartbeat_message(
@@ -189,7 +189,7 @@ class Encoder:
         )
 
     def global_position(self, position: Enu, velocity: Enu, *, yaw: float | None, now_ns: int) -> bytes:
-        """GLOBAL_POSITION_INT; the relative altitude is over the origin's."""
+        """GLOBAL_POSITION_INT; the relative altitude is that over the origin."""
         place = to_geodetic(position, self._origin)
         lat, lon, alt_mm = _place_ints(place)
         relative_mm = _millimeters(place.alt_m - self._origin.alt_m)
@@ -201,7 +201,7 @@ class Encoder:
         )
 
     def gps_raw(self, position: Enu, velocity: Enu, *, has_fix: bool, fix_ns: int) -> bytes:
-        """GPS_RAW_INT: what the receiver said last."""
+        """GPS_RAW_INT: the last reading of the receiver."""
         ground_m_s = math.hypot(velocity.east, velocity.north)
         course = math.atan2(velocity.east, velocity.north) if ground_m_s else None
         return self._pack(
@@ -218,11 +218,11 @@ class Encoder:
         )
 
     def attitude(self, attitude: Attitude, *, now_ns: int) -> bytes:
-        """ATTITUDE; the rates are zero, nothing here knows them."""
+        """ATTITUDE; the rates are zero, because they are not known here."""
         return self._pack(common.MAVLink_attitude_message(_boot_ms(now_ns), *attitude, 0.0, 0.0, 0.0))
 
     def sys_status(self, battery: Battery) -> bytes:
-        """SYS_STATUS: the battery, and the sensors that are there, on and well: GPS alone."""
+        """SYS_STATUS: the battery, and the sensors present, enabled and healthy, of which GPS is the only one."""
         gps = common.MAV_SYS_STATUS_SENSOR_GPS
         return self._pack(
             common.MAVLink_sys_status_message(
@@ -256,23 +256,23 @@ class Encoder:
         )
 
     def home_position(self, position: Enu) -> bytes:
-        """HOME_POSITION: where the node started, on level ground facing north; to be approached from straight above."""
+        """HOME_POSITION: where the node started, on level ground facing north, to be approached from straight above."""
         ned = to_ned(position)
         level = (1.0, 0.0, 0.0, 0.0)
         lat, lon, alt_mm = _place_ints(to_geodetic(position, self._origin))
         return self._pack(common.MAVLink_home_position_message(lat, lon, alt_mm, *ned, level, 0.0, 0.0, 0.0))
 
     def extended_sys_state(self) -> bytes:
-        """EXTENDED_SYS_STATE: in the air, and no VTOL."""
+        """EXTENDED_SYS_STATE: in the air, and not a VTOL."""
         return self._pack(
             common.MAVLink_extended_sys_state_message(common.MAV_VTOL_STATE_UNDEFINED, common.MAV_LANDED_STATE_IN_AIR)
         )
 
     def collision(self, other: NodeId, *, closest_s: float, altitude_m: float, horizontal_m: float) -> bytes:
-        """COLLISION with another node: both know of it by positions over the air, and avoid by height.
+        """COLLISION with another node: both know of it by positions over the air, and avoid it by height.
 
-        The distances are those at the closest point of approach, `closest_s` from now. `id` is the node, which is its
-        MAVLink system up to 250.
+        The distances are those at the closest point of approach, `closest_s` from now. `id` is the node, which equals
+        its MAVLink system up to 250.
         """
         return self._pack(
             common.MAVLink_collision_message(
@@ -288,7 +288,7 @@ class Encoder:
 
 
 def _boot_ms(now_ns: int) -> int:
-    """MAVLink's 32 bits of milliseconds since boot: since the swarm's epoch; they wrap after 49 days."""
+    """MAVLink's 32 bits of milliseconds since boot, counted from the swarm's epoch; they wrap after 49 days."""
     return now_ns // MS & 0xFFFF_FFFF
 
 
@@ -296,10 +296,10 @@ def _boot_ms(now_ns: int) -> int:
 
 
 def decode(data: bytes) -> list[Any]:
-    """Every message in some bytes, native or ours; raises MalformedFrameError when they are not whole MAVLink 2 frames.
+    """Every message in some bytes, native or of this dialect; raises MalformedFrameError unless all frames are whole.
 
-    Signatures are not verified: pymavlink's check refuses the reordering that flooding always has. A message whose
-    definition neither dialect has comes as UNKNOWN_<id>, its CRC unchecked.
+    Signatures are not verified: pymavlink's check refuses the reordering that flooding always has. A message that
+    neither dialect defines comes as UNKNOWN_<id>, with its CRC unchecked.
     """
     parser = common.MAVLink(None)
     try:
@@ -317,12 +317,12 @@ def _only(frame: bytes, message_id: int) -> Any:  # noqa: ANN401  (pymavlink has
 
 
 class Kinematics(NamedTuple):
-    """What a GLOBAL_POSITION_INT says, in the swarm's frame."""
+    """The content of a GLOBAL_POSITION_INT, in the swarm's frame."""
 
     position: Enu
     velocity: Enu
     yaw: float | None
-    """[rad], clockwise from north."""
+    """The heading [rad], clockwise from north."""
     t_ms: int
 
 
@@ -340,7 +340,7 @@ def kinematics_of(frame: bytes, origin: Geodetic = ORIGIN) -> Kinematics:
 
 
 class Collision(NamedTuple):
-    """What a COLLISION says: with whom, when, and how far apart then."""
+    """The content of a COLLISION: with which node, when, and how far apart at that time."""
 
     other: int
     closest_s: float
@@ -349,7 +349,7 @@ class Collision(NamedTuple):
 
 
 def collision_of(frame: bytes) -> Collision:
-    """The COLLISION in a radio frame; raises MalformedFrameError, also for one that is none among nodes."""
+    """The COLLISION in a radio frame; raises MalformedFrameError, also for one that is not between nodes."""
     message = _only(frame, common.MAVLINK_MSG_ID_COLLISION)
     found = Collision(
         message.id, message.time_to_minimum_delta, message.altitude_minimum_delta, message.horizontal_minimum_delta

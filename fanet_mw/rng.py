@@ -1,4 +1,4 @@
-"""Named random streams: one stream per use, derived from text, so that no two uses share or shift draws."""
+"""Named random streams: one stream per use, seeded from text, so that no two uses share or shift their draws."""
 
 from random import Random
 from typing import Final
@@ -7,7 +7,7 @@ from typing import Final
 def stream(seed: int, *names: str | int) -> Random:
     """Return the generator for one named use, for example `stream(7, "backoff", node)`.
 
-    `Random(str)` seeds by SHA-512 of the text: independent of PYTHONHASHSEED and of every other stream.
+    `Random(str)` seeds by SHA-512 of the text, independently of PYTHONHASHSEED and of every other stream.
     """
     return Random("/".join(str(part) for part in (seed, *names)))
 
@@ -23,8 +23,8 @@ _FIRST: Final = 0xBF58_476D_1CE4_E5B9
 _SECOND: Final = 0x94D0_49BB_1331_11EB
 
 
-def lot(node: int, turn: int = 0, number: int = 0) -> int:
-    """64 bits that every node computes alike, for what a swarm decides by lot without a word: no stream, no seed."""
+def priority_hash(node: int, turn: int = 0, number: int = 0) -> int:
+    """64 bits that every node computes alike, for what a swarm decides at random without a message or a seed."""
     x = (node * _STEP + turn * _FIRST + number * _SECOND) & _MASK
     x = (x ^ x >> 30) * _FIRST & _MASK
     x = (x ^ x >> 27) * _SECOND & _MASK

@@ -2,12 +2,12 @@
 
 
 def newer(a: int, b: int, *, bits: int = 32) -> bool:
-    """Whether `a` comes after `b`; numbers half the range apart are not."""
+    """True if `a` comes after `b`; of numbers half the range apart neither comes after the other."""
     return 0 < ((a - b) & ((1 << bits) - 1)) < 1 << (bits - 1)
 
 
 def later(a: int, b: int, *, bits: int = 32) -> int:
-    """The one that comes after the other."""
+    """The one of two numbers that comes after the other."""
     return a if newer(a, b, bits=bits) else b
 
 

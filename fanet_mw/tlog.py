@@ -1,7 +1,8 @@
 """The telemetry log of MAVProxy, QGroundControl and Mission Planner: 8-byte big-endian microseconds, then one frame.
 
-Only MAVLink 2 frames: what a swarm of ours writes. Instants are unix time by the format's custom. Taps of many nodes
-meet in one file, so frames of each (system, component) are numbered anew in its order: readers take gaps for losses.
+A log holds only MAVLink 2 frames, as a swarm sends them. By the format's custom instants are unix time. The taps of
+many nodes are in one file, so the frames of each (system, component) are numbered anew in its order, because readers
+take gaps for losses.
 """
 
 import struct
@@ -20,7 +21,7 @@ _LONGEST: Final = _STAMP.size + 10 + 255 + 2 + 13
 
 
 def append(file: BinaryIO, data: bytes, *, t_us: int) -> int:
-    """Append each frame of a run of frames under one stamp; returns how many. Raises before it writes a broken one."""
+    """Append each frame of a run under one stamp; returns how many. It raises before it writes any of a broken run."""
     stamp = _STAMP.pack(t_us)
     whole = list(frames(data))
     for frame in whole:

@@ -15,7 +15,7 @@ BROADCAST: Final = NodeId(0xFFFF)
 
 
 class Enu(NamedTuple):
-    """A vector in east, north, up; metres, or metres per second for a velocity."""
+    """A vector in east, north, up: metres, or metres per second for a velocity."""
 
     east: float
     north: float
@@ -36,7 +36,7 @@ def direction(*, bearing_rad: float, elevation_rad: float) -> Enu:
 
 
 def earliest(*instants_ns: int | None) -> int | None:
-    """The first of these instants; None where there is none, and when there is none at all."""
+    """The first of these instants, leaving out those that are None; None when all are."""
     first_ns = None
     for t_ns in instants_ns:
         if t_ns is not None and (first_ns is None or t_ns < first_ns):
@@ -45,5 +45,5 @@ def earliest(*instants_ns: int | None) -> int | None:
 
 
 def seconds_to_ns(seconds: float) -> int:
-    """Convert people's seconds to the integer nanoseconds used everywhere inside."""
+    """Convert seconds, as people write them, to the integer nanoseconds that are used inside."""
     return round(seconds * S)

@@ -1,4 +1,4 @@
-"""A file of items that is written as far as it goes: when the disk is full it ends with the last item that fits."""
+"""A file of whole items: when the disk is full, the file ends with the last item that fits."""
 
 import os
 from collections.abc import Iterable, Iterator
@@ -10,9 +10,9 @@ _BATCH_BYTES: Final = 1 << 18
 
 
 def write_items(path: Path, items: Iterable[bytes]) -> int:
-    """Write items one after another; returns the bytes written.
+    """Write items one after another; returns the number of bytes written.
 
-    Raises OSError when the file cannot be opened or written; what is in it then are whole items, as many as fit.
+    Raises OSError when the file cannot be opened or written; it then holds as many whole items as fit.
     """
     with path.open("wb", buffering=0) as file:
         done = 0

@@ -131,7 +131,7 @@ def _foreign(radio: Radio) -> Channel:
     return channel
 
 
-class Links:
+class LinkTable:
     """All links of one set of positions, as the kernel's arrays, with room for `spare` more."""
 
     def __init__(

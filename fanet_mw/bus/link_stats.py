@@ -1,8 +1,8 @@
-"""What each directed link carried in a stretch of time, as the medium counted it: columns, because there are thousands.
+"""What each directed link has carried in a span of time, as counted by the medium: columns, because links are many.
 
-    copies on a link = received + lost by reason (LOSSES), counted when they end; ACKs are not among them
+    copies on a link = received + lost by reason (LOSSES), counted when they end; ACKs are not included
 
-Does not model: which frames they were (that is a capture's business), nor links that carried nothing.
+Not modeled: which frames they were (a capture tells that), and links that carried nothing.
 """
 
 from __future__ import annotations
@@ -23,7 +23,7 @@ LOSSES: Final = (
     DropReason.STATION_DOWN,
 )
 COUNTS: Final = 1 + len(LOSSES)
-"""Per link: copies received, then copies lost by reason."""
+"""Counts per link: copies received, then copies lost by reason."""
 
 
 class LinkRow(NamedTuple):
@@ -33,9 +33,9 @@ class LinkRow(NamedTuple):
     dst: NodeId
     received: int
     lost: tuple[int, ...]
-    """In the order of LOSSES."""
+    """Copies lost, in the order of LOSSES."""
     rssi_sum_mdbm: int
-    """Sum over the copies received [1/1000 dBm]."""
+    """The sum over the copies received [1/1000 dBm]."""
 
     @property
     def copies(self) -> int:
@@ -43,19 +43,19 @@ class LinkRow(NamedTuple):
 
     @property
     def rssi_dbm(self) -> float | None:
-        """Mean over the copies received [dBm]; None when there were none."""
+        """The mean over the copies received [dBm]; None when there were none."""
         return self.rssi_sum_mdbm / self.received / 1000 if self.received else None
 
 
 class LinkStats(NamedTuple):
-    """Medium -> whoever looks: every link with traffic since the report before, by source and destination.
+    """Medium -> any observer: every link with traffic since the previous report, by source and destination.
 
-    One a second, at whole seconds, and one at the end; none while the air is silent.
+    There is one report a second, at whole seconds, and one at the end; none while the air is silent.
     """
 
     t_ns: int
     span_ns: int
-    """Since the report before, silence included."""
+    """The time since the previous report, silence included."""
     ends: array[int]
     """`array('H')`: source and destination of each link."""
     counts: array[int]
@@ -64,7 +64,7 @@ class LinkStats(NamedTuple):
     """`array('q')`: one per link."""
 
     def rows(self) -> Iterator[LinkRow]:
-        """Link by link."""
+        """The links, one by one."""
         for i, rssi_sum_mdbm in enumerate(self.rssi_sums_mdbm):
             received, *lost = self.counts[i * COUNTS : (i + 1) * COUNTS]
             yield LinkRow(NodeId(self.ends[2 * i]), NodeId(self.ends[2 * i + 1]), received, tuple(lost), rssi_sum_mdbm)

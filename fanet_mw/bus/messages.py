@@ -1,7 +1,7 @@
-"""What travels on the bus. Typed values; their bytes are the business of `fanet_mw.bus.topics`.
+"""The messages on the bus, as typed values; their bytes are defined in `fanet_mw.bus.topics`.
 
-The virtual host hands these objects over as they are; the real-time host encodes them per topic. Treat every message
-as immutable: in the virtual host the receiver holds the sender's object.
+The virtual host hands these objects over as they are; the real-time host encodes them per topic. Every message is to be
+treated as immutable: in the virtual host the receiver holds the sender's object.
 """
 
 from __future__ import annotations
@@ -18,22 +18,22 @@ from fanet_mw.units import Enu, NodeId, S
 
 
 class TxRequest(NamedTuple):
-    """Node -> radio: put `frame` on the air at `start_ns`, announced some milliseconds before (the lead)."""
+    """Node -> radio: put `frame` on the air at `start_ns`, announced some milliseconds ahead (the lead)."""
 
     seq: int
-    """Counts the requests of this node from 0; a gap is a request the bus lost."""
+    """The number of this request, counted per node from 0; a gap means requests that the bus has lost."""
     start_ns: int
     """Swarm instant from which the MAC may contend for the channel."""
     frame: bytes
-    """Whole MAVLink frames, routing header first. Its length is the UDP payload charged on the air."""
+    """Whole MAVLink frames, the routing header first. Its length is the UDP payload that is charged on the air."""
     dst: NodeId
     """A neighbor (unicast, acknowledged) or BROADCAST."""
     wants_status: bool
-    """Ask for a `TxStatus`; unicast senders do, broadcasts usually not."""
+    """True if a `TxStatus` is wanted, as it is for unicasts, and usually not for broadcasts."""
 
 
 class Reception(NamedTuple):
-    """Radio -> node: a frame was decoded by this station."""
+    """Radio -> node: this station has decoded a frame."""
 
     frame: bytes
     src: NodeId
@@ -65,7 +65,7 @@ class TxStatus(NamedTuple):
 
 
 class Poses(NamedTuple):
-    """World -> everyone: the true state of all bodies at one instant."""
+    """World -> all: the true state of all bodies at one instant."""
 
     t_ns: int
     ids: array[int]
@@ -75,7 +75,7 @@ class Poses(NamedTuple):
 
 
 class Obstructions(NamedTuple):
-    """World -> medium: the pairs of nodes between which something solid stands at one instant, and no others."""
+    """World -> medium: all pairs of nodes between which something solid stands at one instant."""
 
     t_ns: int
     pairs: array[int]
@@ -98,11 +98,11 @@ class SetpointKind(IntEnum):
 
 
 VELOCITY_LASTS_NS: Final = 1 * S
-"""A UAV whose computer died must not fly on for ever at its last velocity."""
+"""How long a velocity setpoint lasts: a UAV whose computer has died must not fly on for ever."""
 
 
 class Setpoint(NamedTuple):
-    """UAV -> world: what its flight controller is to do until the next setpoint."""
+    """UAV -> world: what the UAV's flight controller is to do until the next setpoint."""
 
     t_ns: int
     position: Enu
@@ -113,7 +113,7 @@ class Setpoint(NamedTuple):
 
 
 class Gps(NamedTuple):
-    """World -> one UAV: where its receiver says it is."""
+    """World -> one UAV: its position and velocity according to its receiver."""
 
     t_ns: int
     position: Enu
@@ -121,7 +121,7 @@ class Gps(NamedTuple):
 
 
 class WifiScan(NamedTuple):
-    """World -> one UAV: the phones it hears, strongest first."""
+    """World -> one UAV: the phones that it receives, strongest first."""
 
     t_ns: int
     heard: tuple[tuple[int, float], ...]
@@ -219,13 +219,13 @@ class MavlinkTap(NamedTuple):
 
 
 class TraceBatch(NamedTuple):
-    """Any actor -> the collector of the run."""
+    """Any actor -> the collector of the run: trace records."""
 
     records: tuple[Record, ...]
 
 
 class ClockState(IntEnum):
-    """What the swarm clock is doing."""
+    """The state of the swarm clock."""
 
     RUNNING = 1
     STOPPED = 2
@@ -238,9 +238,9 @@ class Clock(NamedTuple):
     time_scale: float
     state: ClockState
     epoch_mono_ns: int = 0
-    """The same instant on the monotonic clock of the keeper's machine."""
+    """The same instant as the epoch, on the monotonic clock of the keeper's machine."""
     machine: int = 0
-    """Which machine that is (`Timebase.machine`); 0: unknown, and only unix time counts."""
+    """The keeper's machine (`Timebase.machine`); with 0 it is unknown, and only unix time counts."""
 
 
 @dataclass(frozen=True, slots=True)

@@ -1,9 +1,9 @@
-"""Changes of the air while a swarm runs: a degraded link, a jammed area, a node cut off; and their end.
+"""Changes of the air while a swarm runs: a degraded link, a jammed area, a node cut off, and the end of each.
 
-A fault has a label; a new one of the same label takes the place of the old, `Restore` ends one or all. Each lasts
-`for_ns` from the instant at which the medium takes it, or until it is restored (0). These are messages on
-`fanet/<s>/radio/control` and the entries of a scenario's `[[faults]]`. `wrong` is what the medium asks before it obeys.
-Does not model: faults of the bus itself, or of a node's processor.
+A fault has a label; a new fault with the same label replaces it, and `Restore` ends one or all. A fault lasts `for_ns`
+from the instant at which the medium takes it, or until it is restored (0). These are the messages on
+`fanet/<s>/radio/control` and the entries of a scenario's `[[faults]]`; the medium checks each with `wrong`. Not
+modeled: faults of the bus itself, or of a node's processor.
 """
 
 import math
@@ -25,29 +25,29 @@ class Degrade(NamedTuple):
     src: NodeId
     dst: NodeId
     both: bool
-    """Also the link from `dst` to `src`."""
+    """True if the link from `dst` to `src` is degraded too."""
     loss_db: float
-    """Added to the path loss [dB], in [0, 300]. Channel `range` knows no SNR: there it lowers the RSSI, and the link is
-    gone where that falls below the sensitivity."""
+    """The loss added to the path loss [dB], in [0, 300]. Channel `range` has no SNR: there it lowers the RSSI, and the
+    link is gone when the RSSI falls below the sensitivity."""
     loss_share: float
-    """Of frames that would have been received, in [0, 1]."""
+    """The share of lost frames among those that would have been received, in [0, 1]."""
     for_ns: int = 0
 
 
 class Jam(NamedTuple):
-    """Receivers within `radius_m` of a place, at any height, hear noise."""
+    """Receivers within `radius_m` of a place, at any height, receive noise."""
 
     label: str
     center: Enu
     radius_m: float
     noise_dbm: float
-    """At each receiver inside, added to its own noise [dBm], at most 100; inf: nothing is received. Channel `range`
-    knows no SNR: there any noise means that nothing is received."""
+    """Noise at each receiver inside, added to its own noise [dBm], at most 100; with inf nothing is received. Channel
+    `range` has no SNR: there any noise means that nothing is received."""
     for_ns: int = 0
 
 
 class Cut(NamedTuple):
-    """A node's radio is off: it neither sends nor hears, and nobody senses it."""
+    """The radio of a node is off: it neither sends nor receives, and no station senses it."""
 
     label: str
     node: NodeId
@@ -55,7 +55,7 @@ class Cut(NamedTuple):
 
 
 class Restore(NamedTuple):
-    """End the fault of this label, or all of them (empty)."""
+    """End the fault with this label, or all faults (empty)."""
 
     label: str
 
@@ -86,7 +86,7 @@ def nodes_of(fault: Fault) -> tuple[int, ...]:
 
 
 def wrong(fault: Fault, *, count: int) -> str | None:
-    """Why a fault cannot be meant in a swarm of `count` nodes, in a word; None when it can."""
+    """Why a fault is not valid in a swarm of `count` nodes, as one word; None when it is valid."""
     label = fault.label
     if not 0 < len(label) <= MAX_LABEL or not (label.isascii() and label.isprintable()):
         return "fault_label"

@@ -1,4 +1,4 @@
-"""Zenoh topics of a swarm, and the bytes of the messages on them. The only place that knows either.
+"""The Zenoh topics of a swarm, and the bytes of the messages on them. This is the only module that knows either.
 
     fanet/<swarm>/radio/<id>/tx          TxRequest              node -> medium
     fanet/<swarm>/radio/<id>/rx          Reception | TxStatus   medium -> node
@@ -104,7 +104,7 @@ class Topics:
         return f"{self._base}/report/{name}"
 
     def alive(self, name: str) -> str:
-        """Liveliness token of an actor's host."""
+        """The liveliness token of an actor's host."""
         return f"{self._base}/alive/{name}"
 
 
@@ -112,7 +112,7 @@ def node_of(topic: str) -> int:
     """The node id in a `radio/<id>/..` or `world/<id>/..` topic; 0 when there is none."""
     parts = topic.split("/")
     text = parts[3] if len(parts) > 3 else ""
-    return int(text) if len(text) <= 5 and text.isascii() and text.isdigit() else 0  # ids have five digits at most
+    return int(text) if len(text) <= 5 and text.isascii() and text.isdigit() else 0  # an id has at most five digits
 
 
 # --- bodies: one encoder and one decoder per message type, beside each other -------------------------------------
@@ -230,7 +230,7 @@ def _decode_scan(body: bytes) -> WifiScan:
 
 
 def _finite(values: Iterable[float]) -> None:
-    """Raise ValueError for a reading that no sensor of ours gives."""
+    """Raise ValueError for a reading that no sensor of this project gives."""
     if not all(map(math.isfinite, values)):
         raise ValueError("not finite")
 
@@ -240,7 +240,7 @@ def _encode_rows(t_ns: int, rows: Sequence[tuple[float, ...]], row: struct.Struc
 
 
 def _decode_rows(body: bytes, row: struct.Struct, *, most: int) -> tuple[int, list[tuple[float, ...]]]:
-    """The instant, and as many rows of finite numbers as the count before them says."""
+    """The instant, and as many rows of finite numbers as the count in front of them says."""
     t_ns, count = _SCAN.unpack_from(body)
     if len(body) != _SCAN.size + count * row.size or count > most:
         raise ValueError("length")
@@ -427,7 +427,7 @@ _CODECS: Final[dict[int, tuple[type[Any], Callable[[Any], bytes], Callable[[byte
 _CODE_OF: Final = {kind: (code, encode) for code, (kind, encode, _) in _CODECS.items()}
 _ITEM: Final = struct.Struct("<BI")
 MAX_ITEMS: Final = 16_384
-"""Messages of one put: several times what the busiest medium hands over at once."""
+"""The most messages of one put: several times what the busiest medium hands over at once."""
 
 
 def encode(messages: Iterable[Message]) -> bytes:
@@ -442,7 +442,7 @@ def encode(messages: Iterable[Message]) -> bytes:
 
 
 class Item(NamedTuple):
-    """Where one message of a put is, not yet decoded."""
+    """The position of one message in a put, not yet decoded."""
 
     code: int
     start: int
@@ -455,7 +455,7 @@ def codes_of(*kinds: type[Any]) -> frozenset[int]:
 
 
 def items(data: bytes) -> list[Item]:
-    """The messages of one put, undecoded; raises MalformedFrameError where they are cut off or more than MAX_ITEMS."""
+    """The messages of one put, undecoded; raises MalformedFrameError where they are cut off or over MAX_ITEMS."""
     found: list[Item] = []
     at = 0
     while at < len(data):
@@ -471,7 +471,7 @@ def items(data: bytes) -> list[Item]:
 
 
 def decode_item(data: bytes, item: Item) -> Message:
-    """One message of a put; raises MalformedFrameError for anything `encode` could not have made."""
+    """One message of a put; raises MalformedFrameError for bytes that `encode` could not have made."""
     try:
         return _CODECS[item.code][2](data[item.start : item.end])
     except (struct.error, ValueError, KeyError, OverflowError, RecursionError) as error:
@@ -479,5 +479,5 @@ def decode_item(data: bytes, item: Item) -> Message:
 
 
 def decode(data: bytes) -> list[Message]:
-    """The messages of one put; raises MalformedFrameError for anything `encode` could not have made."""
+    """The messages of one put; raises MalformedFrameError for bytes that `encode` could not have made."""
     return [decode_item(data, item) for item in items(data)]

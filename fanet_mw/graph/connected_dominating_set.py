@@ -10,7 +10,7 @@ from types import MappingProxyType
 from typing import Final
 
 from fanet_mw.graph.topology import Adjacency, components
-from fanet_mw.rng import lot
+from fanet_mw.rng import priority_hash
 from fanet_mw.units import NodeId
 
 _EQUAL: Final[Mapping[NodeId, float]] = MappingProxyType({})
@@ -58,7 +58,7 @@ def dominates(node: NodeId, adjacency: Adjacency, *, priority: Mapping[NodeId, f
 
 
 def _strength(node: NodeId, priority: Mapping[NodeId, float]) -> tuple[float, int, NodeId]:
-    return priority.get(node, 0.0), lot(node), node
+    return priority.get(node, 0.0), priority_hash(node), node
 
 
 def _complete(nodes: tuple[NodeId, ...], near: Mapping[NodeId, frozenset[NodeId]]) -> bool:

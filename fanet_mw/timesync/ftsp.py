@@ -20,6 +20,7 @@ from collections.abc import Mapping
 from dataclasses import dataclass, field
 from typing import Final, NamedTuple
 
+from fanet_mw.serial import newer
 from fanet_mw.timesync.clock_fit import EXACT, ClockFit, Line, Oscillator, Pair
 from fanet_mw.timesync.first_time import FirstTime
 from fanet_mw.units import MS, NodeId, S
@@ -237,7 +238,7 @@ class TimeSync:
         if beacon.node != src:
             self.counts["foreign"] += 1
             return None
-        if beacon.reference != neighbor.reference or 0 < ((beacon.round - neighbor.round) & 0xFFFF) < 0x8000:
+        if beacon.reference != neighbor.reference or newer(beacon.round, neighbor.round, bits=16):
             neighbor.reference, neighbor.round, neighbor.advanced_ns = beacon.reference, beacon.round, local_ns
             neighbor.hops = beacon.hops
             self._note_news(neighbor, local_ns)

@@ -1,4 +1,4 @@
-"""The air format: one radio frame is a run of MAVLink 2 frames, first of them the routing header of this package.
+"""The air format: one radio frame is a run of MAVLink 2 frames, the first of which is this package's routing header.
 
 The header and the framing are re-exported here; each group of inner messages has a module of its own.
 """

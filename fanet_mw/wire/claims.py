@@ -1,7 +1,8 @@
-"""FANET_CLAIMS: whom a node hears, and who of them claims which slot, as its hello says it.
+"""FANET_CLAIMS: in a hello, the neighbors that its sender hears, and the slot that each of them claims.
 
-With it each receiver knows its two hops: who is there, who hears whom, and which slots are taken. The relays by
-neighbor knowledge (`cds`, `mpr`, `heads`) need only the neighbors; slots are "none" then.
+From it each receiver knows its two hops: which nodes are there, which of them hear each other, and which slots are
+taken. The rules of relaying by neighbor knowledge (`cds`, `mpr`, `heads`) need only the neighbors; their slots are
+"none".
 """
 
 from collections.abc import Sequence
@@ -12,7 +13,7 @@ from fanet_mw.units import MAX_NODES, NodeId
 from fanet_mw.wire import CLAIMS, OVERHEAD, VERSION, decode_every, encode_inner
 
 CAPACITY: Final = 16
-"""Entries of one message; a few more neighbors need a second one."""
+"""Entries of one message; more neighbors need a further message."""
 MESSAGE_BYTES: Final = OVERHEAD + CLAIMS.layout.size
 MOST_SLOTS: Final = 254
 NO_SLOT: Final = 255
@@ -23,35 +24,35 @@ _KNOWN: Final = MOST_LOTS | _HEARS_US | _RELAY
 _MOST: Final = 255
 
 
-class Standing(NamedTuple):
-    """What a node says of its own slots."""
+class SlotStatus(NamedTuple):
+    """The slot that a node claims for itself, and its superframe."""
 
     slot: int | None = None
     length: int = 0
-    """Slots of the superframe in which that slot repeats."""
+    """The number of slots in the superframe in which the slot repeats."""
     crowd: int = 1
-    """Nodes within two hops, itself included."""
+    """The number of nodes within two hops, including the node itself."""
     lots: int = 0
-    """How many lots it has in turns that nobody claims."""
+    """The number of lots that the node draws in each turn that nobody claims."""
 
 
-class Heard(NamedTuple):
+class HeardNeighbor(NamedTuple):
     """One neighbor, as the sender of a hello knows it."""
 
     node: NodeId
-    standing: Standing
+    standing: SlotStatus
     hears_us: bool
-    """The link works both ways: it names the sender of this hello among its own neighbors."""
+    """True if the link works both ways: the neighbor names the sender of this hello among its own neighbors."""
     relay: bool = False
-    """The sender chose it as one of its multipoint relays."""
+    """True if the sender has chosen the neighbor as one of its multipoint relays."""
 
 
 class Claims(NamedTuple):
-    """All that one hello says."""
+    """All claims that one hello states."""
 
     node: NodeId
-    own: Standing
-    heard: tuple[Heard, ...]
+    own: SlotStatus
+    heard: tuple[HeardNeighbor, ...]
 
     def encode_frames(self, room: int | None = None) -> bytes:
         """One message per `CAPACITY` neighbors, at least one; neighbors for which there is no room are left out."""
@@ -61,7 +62,7 @@ class Claims(NamedTuple):
         chunks = (heard[at : at + CAPACITY] for at in starts)
         return b"".join(encode_inner(CLAIMS, self._payload(chunk), node=self.node) for chunk in chunks)
 
-    def _payload(self, chunk: Sequence[Heard]) -> bytes:
+    def _payload(self, chunk: Sequence[HeardNeighbor]) -> bytes:
         unused = (0,) * (CAPACITY - len(chunk))
         return CLAIMS.layout.pack(
             self.node,
@@ -75,8 +76,8 @@ class Claims(NamedTuple):
 
     @classmethod
     def decode_frames(cls, frame: bytes) -> Self | None:
-        """What the hello in a frame says, None when it says nothing of claims; raises MalformedFrameError."""
-        heard: list[Heard] = []
+        """The claims in a hello; None when it has none. Raises MalformedFrameError."""
+        heard: list[HeardNeighbor] = []
         messages = decode_every(CLAIMS, frame)
         if not messages:
             return None
@@ -89,18 +90,18 @@ class Claims(NamedTuple):
         return cls(NodeId(node), own, tuple(heard))
 
 
-def _slot(standing: Standing) -> int:
+def _slot(standing: SlotStatus) -> int:
     return NO_SLOT if standing.slot is None else standing.slot
 
 
-def _standing(slot: int, length: int, crowd: int, lots: int) -> Standing:
+def _standing(slot: int, length: int, crowd: int, lots: int) -> SlotStatus:
     if slot != NO_SLOT and slot >= length:
         raise MalformedFrameError(f"slot {slot} of a superframe of {length}")
-    return Standing(None if slot == NO_SLOT else slot, length, crowd, lots)
+    return SlotStatus(None if slot == NO_SLOT else slot, length, crowd, lots)
 
 
-def _heard(node: int, slot: int, length: int, crowd: int, facts: int) -> Heard:
+def _heard(node: int, slot: int, length: int, crowd: int, facts: int) -> HeardNeighbor:
     if not 0 < node <= MAX_NODES or facts & ~_KNOWN:
         raise MalformedFrameError(f"a claim of node {node}, facts {facts}")
     standing = _standing(slot, length, crowd, facts & MOST_LOTS)
-    return Heard(NodeId(node), standing, bool(facts & _HEARS_US), bool(facts & _RELAY))
+    return HeardNeighbor(NodeId(node), standing, bool(facts & _HEARS_US), bool(facts & _RELAY))

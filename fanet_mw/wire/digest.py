@@ -1,39 +1,42 @@
-"""FANET_DIGEST: which recent packets a node holds, per origin, as its hello says it. Sequence numbers as in RFC 1982.
+"""FANET_DIGEST: in a hello, which recent packets its sender holds, per origin. Sequence numbers as in RFC 1982.
 
     newest = 107, held = 0b0101   holds 107, 106 and 104; lacks 105
 
-Data packets of one origin are numbered without gaps, so what is missing shows.
+Data packets of one origin are numbered without gaps, so a missing packet shows.
 """
 
 from collections.abc import Sequence
 from typing import Final, NamedTuple, Self
 
 from fanet_mw.errors import MalformedFrameError
+from fanet_mw.serial import newer
 from fanet_mw.wire import DIGEST, OVERHEAD, VERSION, decode_every, encode_inner
 
 WINDOW: Final = 33
-"""Packets of one origin that an entry speaks of: the newest and 32 before it."""
+"""The packets of one origin that an entry covers: the newest and the 32 before it."""
 CAPACITY: Final = 24
 """Entries of one message."""
 MESSAGE_BYTES: Final = OVERHEAD + DIGEST.layout.size
 _SEQ_MASK: Final = 0xFFFF_FFFF
-_HALF: Final = 0x8000_0000
 
 
 def capacity(room: int) -> int:
-    """How many holdings fit into so many bytes; there is room for one message (`scenario_checks`)."""
+    """How many holdings fit into so many bytes; there is always room for one message (checked with the scenario)."""
     return max(1, room // MESSAGE_BYTES) * CAPACITY
 
 
 class Holding(NamedTuple):
-    """What is held of one origin."""
+    """The packets of one origin that are held."""
 
     origin: int
     newest: int
     held: int
 
     def beyond(self, other: "Holding | None") -> list[int]:
-        """What this one holds and the other lacks, newest first; what lies before its window it may or may not have."""
+        """The packets that this holding has and the other lacks, newest first.
+
+        Packets before the other's window are included, because the other may or may not have them.
+        """
         mine = self.held << 1 | 1
         if other is not None:
             ahead = (self.newest - other.newest) & _SEQ_MASK
@@ -43,18 +46,18 @@ class Holding(NamedTuple):
                 mine &= ~(theirs << ahead)
             elif behind < WINDOW:
                 mine &= ~(theirs >> behind) & ((1 << WINDOW - behind) - 1)
-            elif ahead >= _HALF:
-                return []  # the other is so far ahead that it says nothing of what we hold
+            elif not newer(self.newest, other.newest):
+                return []  # the other is so far ahead that its window says nothing about the packets held here
         if not mine:
             return []
         return [(self.newest - back) & _SEQ_MASK for back in range(WINDOW) if mine >> back & 1]
 
     def with_(self, seq: int) -> "Holding":
-        """The same, and this packet."""
+        """The same holding with this packet added."""
         ahead = (seq - self.newest) & _SEQ_MASK
         if ahead == 0:
             return self
-        if ahead < _HALF:
+        if newer(seq, self.newest):
             held = (self.held << ahead | 1 << (ahead - 1)) & _SEQ_MASK if ahead < WINDOW else 0
             return Holding(self.origin, seq, held)
         behind = (self.newest - seq) & _SEQ_MASK
@@ -62,11 +65,11 @@ class Holding(NamedTuple):
 
 
 class Digest(NamedTuple):
-    """All that one hello says."""
+    """All holdings that one hello states."""
 
     holdings: tuple[Holding, ...]
     complete: bool
-    """An origin without a holding is one of which nothing is held."""
+    """True if nothing is held of any origin without a holding."""
 
     def encode_frames(self, node: int) -> bytes:
         """One message per `CAPACITY` holdings, at least one."""
@@ -84,7 +87,7 @@ class Digest(NamedTuple):
 
     @classmethod
     def decode_frames(cls, frame: bytes) -> Self | None:
-        """The digest in a hello, None when it has none; raises MalformedFrameError."""
+        """The digest in a hello; None when it has none. Raises MalformedFrameError."""
         holdings: list[Holding] = []
         messages = decode_every(DIGEST, frame)
         for fields in messages:

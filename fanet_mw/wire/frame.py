@@ -1,7 +1,7 @@
 """One radio frame: MAVLink 2 frames, concatenated. First FANET_ROUTE, rewritten per hop; then inner frames, unchanged.
 
-The header and the frame around every message of our own dialect, by struct and a Rust CRC, because every reception
-passes here; pymavlink is their oracle in the tests. Every decode is total: any bytes give a value or
+The header, and the frame around every message of this project's dialect, are coded by struct and a Rust CRC, because
+every reception passes here; in the tests pymavlink is their oracle. Every decoder is total: any bytes give a value or
 MalformedFrameError. Layouts: docs/reference/air-format.md.
 """
 
@@ -18,11 +18,11 @@ from fanet_mw.rng import stream
 from fanet_mw.units import US
 
 MAGIC: Final = 0xFD
-"""MAVLink 2 start of frame."""
+"""The start byte of a MAVLink 2 frame."""
 COMPONENT: Final = 191
 """MAV_COMP_ID_ONBOARD_COMPUTER: the companion computer that runs this middleware."""
 VERSION: Final = 1
-"""Of our messages; non-zero and last on the wire, so that MAVLink's trailing-zero truncation never shortens them."""
+"""The version of this dialect's messages; it is non-zero and last, so that MAVLink never truncates them."""
 
 FLAG_FLOOD: Final = 1
 """The packet is in its flooding phase."""
@@ -38,18 +38,18 @@ PRIORITY_REPORT: Final = 2
 PRIORITY_BULK: Final = 3
 
 OVERHEAD: Final = 12
-"""Bytes of a MAVLink 2 frame around its payload: 10 before, 2 of CRC after."""
+"""The bytes of a MAVLink 2 frame around its payload: 10 in front, 2 of CRC behind."""
 _PREFIX: Final = struct.Struct("<BBBBBBBHB")
 _CRC: Final = struct.Struct("<H")
 _SIGNED: Final = 1
-"""The only incompatibility flag MAVLink 2 defines; a frame with another one must not be read."""
+"""The only incompatibility flag that MAVLink 2 defines; a frame with another flag must not be read."""
 _SIGNATURE: Final = 13
 LATEST_US: Final = (1 << 63) // US - 1
-"""The latest instant a message may name: in nanoseconds it still fits the 64 bits of the bus and of the kernel."""
+"""The latest instant that a message may name: in nanoseconds it still fits the 64 bits of bus and kernel."""
 
 
 class Kind(IntEnum):
-    """What a packet is, to the routing layer."""
+    """The kind of a packet, for the routing layer."""
 
     DATA = 0
     HELLO = 1
@@ -59,7 +59,7 @@ class Kind(IntEnum):
     LINKS = 5
     """The leader's links of an assignment."""
     ROUTING = 8
-    """Control of a rival protocol (`fanet_mw.routing.control`)."""
+    """A control message of a rival protocol (`fanet_mw.routing.control`)."""
 
 
 _KINDS: Final = frozenset(int(kind) for kind in Kind)
@@ -79,7 +79,7 @@ class Spec(NamedTuple):
 
 
 def encode_inner(spec: Spec, payload: bytes, *, node: int, seq: int = 0) -> bytes:
-    """A MAVLink 2 frame of one of our messages."""
+    """A MAVLink 2 frame with one message of this dialect."""
     head = _PREFIX.pack(
         MAGIC, len(payload), 0, 0, seq & 0xFF, system_id(node), COMPONENT, spec.msgid & 0xFFFF, spec.msgid >> 16
     )
@@ -101,27 +101,27 @@ _ROUTE_BEFORE: Final = _ROUTE_MARK + b"\0"
 _ROUTE_SENDER: Final = bytes((COMPONENT,)) + _ROUTE_ID
 _EXTRA: Final = bytes((ROUTE.crc_extra,))
 ANY_NODE: Final = 0xFFFF
-"""No node's id."""
+"""A value that is the id of no node."""
 
-# Whole headers, MAVLink's ten bytes included: one call of struct is most of what a header costs.
+# These layouts are of whole headers, with MAVLink's ten bytes: one call of struct is most of what a header costs.
 _PACKED: Final = struct.Struct("<4sBB4s" + ROUTE.layout.format[1:])
 _CHECKED: Final = struct.Struct("<3s4x3s" + ROUTE.layout.format[1:] + "H")
 _BODY_END: Final = HEADER_BYTES - 2
 _SYSTEM_AT: Final = 5
 END_TO_END: Final = slice(10, 26)
-"""Bytes of a routing header that no hop changes: birth, sequence number, origin and destination."""
+"""The bytes of a routing header that no hop changes: birth, sequence number, origin and destination."""
 NAME: Final = slice(18, 24)
-"""Where a header has what names its packet: sequence number and origin."""
+"""The bytes of a header that name its packet: sequence number and origin."""
 SEQ: Final = slice(18, 22)
-"""Where a header has its packet's sequence number, the low byte first."""
+"""The bytes of a header that hold its packet's sequence number, the low byte first."""
 _PREV_HOP_AT: Final = 26
 _KIND_AT: Final = 28
 _PRIORITY_AT: Final = 31
 _FLAGS_AT: Final = 32
 _REWRITTEN: Final = struct.Struct("<4sB20sH7B")
-"""What the CRC of a header covers: the header without its first byte, then CRC_EXTRA."""
+"""The bytes that the CRC of a header covers: the header without its first byte, then CRC_EXTRA."""
 _HEADER: Final = struct.Struct("<c33sH")
-"""First byte, the rest without CRC_EXTRA, CRC."""
+"""A header as its first byte, the rest without CRC_EXTRA, and the CRC."""
 _START: Final = bytes((MAGIC,))
 
 
@@ -140,26 +140,26 @@ class Header(NamedTuple):
     flags: int
 
     def encode(self) -> bytes:
-        """The MAVLink sender is the transmitter of this hop; the MAVLink sequence is the packet's, low byte."""
+        """The header's bytes; MAVLink's sender is the transmitter, its sequence the low byte of the packet's number."""
         sender = system_id(self.prev_hop)
         body = _PACKED.pack(_ROUTE_BEFORE, self.seq & 0xFF, sender, _ROUTE_SENDER, *self, VERSION)
         return body + _CRC.pack(mcrf4xx(body[1:] + _EXTRA))
 
 
 _new: Final = tuple.__new__
-"""Makes a named tuple three times as fast as its class does; for what is made once per frame."""
+"""Makes a named tuple three times as fast as its class does; used for what is made once per frame."""
 
 
 Fields = tuple[bytes, bytes, int, int, int, int, int, int, int, int, int, int, int, int]
-"""What lies at the fixed offsets of a header, unchecked: two marks, the header, version, CRC."""
+"""The fields at the fixed offsets of a header, unchecked: two marks, the header, version, CRC."""
 NO_FIELDS: Final[Fields] = (b"", b"", 0, 0, 0, 0, 0, 0, 0, 0, 0, PHASE_MASK, 0, 0)
-"""In place of those of bytes that cannot begin with our header: of both phases at once, as no packet is."""
+"""Stands for the fields of bytes that cannot begin with a routing header: in both phases at once, as no packet is."""
 
 
 def fields_of(frame: bytes) -> Fields | None:
-    """What lies where a header has its fields; None when these bytes cannot begin with our header.
+    """The fields at the offsets of a header; None when these bytes cannot begin with a routing header.
 
-    Origin, sequence number and flags are enough to recognize a duplicate; whoever goes on needs `checked`.
+    Origin, sequence number and flags suffice to recognize a duplicate; any further use needs `checked`.
     """
     if len(frame) < HEADER_BYTES:
         return None
@@ -168,13 +168,13 @@ def fields_of(frame: bytes) -> Fields | None:
 
 
 def peek(frame: bytes) -> tuple[int, int, int] | None:
-    """(origin, seq, flags), unchecked; None when these bytes cannot begin with our header."""
+    """(origin, seq, flags), unchecked; None when these bytes cannot begin with a routing header."""
     fields = fields_of(frame)
     return None if fields is None else (fields[4], fields[3], fields[11])
 
 
 def peek_kind(frame: bytes) -> int | None:
-    """The kind of packet at its fixed offset, unchecked; None when these bytes cannot begin with our header."""
+    """The kind of a packet, unchecked; None when these bytes cannot begin with a routing header."""
     whole = len(frame) >= HEADER_BYTES and frame[:3] == _ROUTE_MARK and frame[7:10] == _ROUTE_ID
     return frame[_KIND_AT] if whole else None
 
@@ -219,7 +219,7 @@ def rewrite(frame: bytes, prev_hop: int, hop_limit: int, hops: int, flags: int) 
 
 
 def bundle(packets: Sequence[bytes]) -> bytes:
-    """One radio frame out of several packets, each with its header; they must have been decoded."""
+    """One radio frame that holds several packets, each with its header; the packets must have been decoded."""
     return b"".join((*(_with_more(packet) for packet in packets[:-1]), packets[-1]))
 
 
@@ -230,7 +230,7 @@ def _with_more(packet: bytes) -> bytes:
 
 
 def unbundle(frame: bytes) -> list[bytes]:
-    """The packets of a radio frame, each as it would come alone but for its flag; raises MalformedFrameError."""
+    """The packets of a radio frame, each as it would come alone except for its flag; raises MalformedFrameError."""
     starts, at = [], 0
     for inner in frames(frame):
         if _message_id(inner) == ROUTE.msgid:
@@ -245,7 +245,7 @@ def unbundle(frame: bytes) -> list[bytes]:
 
 
 def frames(data: bytes, *, start: int = 0) -> Iterator[bytes]:
-    """Each MAVLink 2 frame of a run of frames, by lengths alone; raises MalformedFrameError at a broken one."""
+    """Each MAVLink 2 frame of a run of frames, found by lengths alone; raises MalformedFrameError at a broken one."""
     at = start
     while at < len(data):
         if len(data) - at < OVERHEAD or data[at] != MAGIC or data[at + 2] & ~_SIGNED:
@@ -258,15 +258,15 @@ def frames(data: bytes, *, start: int = 0) -> Iterator[bytes]:
 
 
 def renumbered(frame: bytes, seq: int) -> bytes:
-    """A MAVLink 2 frame with another sequence number, and a CRC that is right, or wrong, as it was.
+    """A MAVLink 2 frame with another sequence number; its CRC stays right, or wrong, as it was.
 
-    What the number changes in the CRC is the CRC of the change alone, begun at 0: the message's CRC_EXTRA need not be
-    known. A signed frame keeps its number, which its signature covers.
+    The effect of the number on the CRC is the CRC of the change alone, started at 0, so the CRC_EXTRA of the message
+    need not be known. A signed frame keeps its number, which its signature covers.
     """
     change = frame[4] ^ seq
     if not change or frame[2]:
         return frame
-    covered = OVERHEAD - 2 + frame[1]  # what the CRC is over: all but the magic, and CRC_EXTRA
+    covered = OVERHEAD - 2 + frame[1]  # the CRC covers all but the magic byte, and CRC_EXTRA
     (crc,) = _CRC.unpack_from(frame, covered)
     crc ^= kermit(bytes((0, 0, 0, change)) + bytes(covered - 4))
     return frame[:4] + bytes((seq,)) + frame[5:covered] + _CRC.pack(crc)
@@ -275,7 +275,7 @@ def renumbered(frame: bytes, seq: int) -> bytes:
 def inner_frames(frame: bytes) -> Iterator[tuple[int, bytes]]:
     """(message id, whole MAVLink frame) of each inner frame, in order; raises MalformedFrameError at a broken one.
 
-    The CRC is checked of our own messages only: MAVLink's needs the message's definition.
+    The CRC is checked only of messages of this dialect; for others it would need the message's definition.
     """
     for inner in frames(frame, start=HEADER_BYTES):
         msgid = _message_id(inner)
@@ -289,7 +289,7 @@ def inner_frames(frame: bytes) -> Iterator[tuple[int, bytes]]:
 
 
 def decode_every(spec: Spec, frame: bytes) -> list[tuple[Any, ...]]:
-    """The fields of each inner frame that is this message; raises MalformedFrameError."""
+    """The fields of each inner frame with this message; raises MalformedFrameError."""
     found = []
     for msgid, inner in inner_frames(frame):
         if msgid == spec.msgid:
@@ -300,14 +300,14 @@ def decode_every(spec: Spec, frame: bytes) -> list[tuple[Any, ...]]:
 
 
 def decode_first(spec: Spec, frame: bytes) -> tuple[Any, ...]:
-    """The fields of the first inner frame that is this message; raises MalformedFrameError."""
+    """The fields of the first inner frame with this message; raises MalformedFrameError."""
     found = decode_every(spec, frame)
     if not found:
         raise MalformedFrameError(f"no message {spec.msgid} in the frame")
     return found[0]
 
 
-# Whose codec is in `inner`, `digest`, `places`, `claims`, `links`, `message` or `routing.control`.
+# The codecs of these messages are in `inner`, `digest`, `places`, `claims`, `links`, `message` and `routing.control`.
 BEACON: Final = Spec(53001, 43, struct.Struct("<IHHHHHHHBBB"))
 SCHEDULE: Final = Spec(53002, 88, struct.Struct("<QIIIHHH56H56HBBBB"))
 SURVIVOR: Final = Spec(53003, 240, struct.Struct("<QIffffHB"))
@@ -341,8 +341,8 @@ _MOST: Final = 255 * _WHOLE_CHUNK
 def filler(size: int, *, node: int = 1) -> bytes:
     """Inner FANET_CHUNK frames of exactly `size` bytes: application data whose content does not matter.
 
-    `size` is 0 or at least 17, one frame with one byte of data. The bytes are fixed, pseudo-random and never zero, so
-    that nothing is truncated and nothing depends on a run. `node` is who they say they are from.
+    `size` is 0 or at least 17, which is one frame with one byte of data. The bytes are fixed, pseudo-random and never
+    zero, so that nothing is truncated and nothing depends on a run. `node` is their MAVLink sender.
     """
     if size == 0:
         return b""
@@ -350,7 +350,7 @@ def filler(size: int, *, node: int = 1) -> bytes:
         raise LocalProtocolError(f"filler size = {size} must be 0 or in [{_LEAST_CHUNK}, {_MOST}]")
     lengths = [_WHOLE_CHUNK] * (size // _WHOLE_CHUNK)
     rest = size % _WHOLE_CHUNK
-    if 0 < rest < _LEAST_CHUNK:  # too short for a frame of its own: the one before gives some bytes
+    if 0 < rest < _LEAST_CHUNK:  # too short for a frame of its own: the previous frame gives up some bytes
         lengths[-1] -= _LEAST_CHUNK - rest
         rest = _LEAST_CHUNK
     if rest:

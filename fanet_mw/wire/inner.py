@@ -1,7 +1,7 @@
-"""The inner messages by which clusters, clocks and the mission work: hello, schedule, join, survivor, time.
+"""The inner messages of clusters, clocks and the mission: hello, schedule, join, survivor, time.
 
-As all of our dialect (`fanet_mw.wire`): by struct, total on any bytes, checked for what no sender of ours would say.
-Digests, places and claims have files of their own.
+Like all of this dialect (`fanet_mw.wire`) they are coded by struct; decoders are total, and refuse values that no
+sender of this project states. Digests, places, claims and links have files of their own.
 """
 
 from enum import IntEnum
@@ -23,18 +23,19 @@ from fanet_mw.wire import (
 )
 
 CAPACITY: Final = 56
-"""Entries of one schedule part."""
+"""Entries of one part of a schedule."""
 FARTHEST_M: Final = 1e7
-"""Of a coordinate: no swarm is so large, and its square is still exact."""
+"""The greatest coordinate: no swarm is so large, and its square is still exact."""
 FASTEST_M_S: Final = 1e4
 MOST_DBM: Final = 300.0
+"""The greatest received power, of either sign."""
 """Of a received power, either sign."""
 MOST_SURVIVORS: Final = 10_000
-"""The greatest id of one; what is remembered of them has an end."""
+"""The greatest id of a survivor, which limits how much is remembered of them."""
 
 
 class Role(IntEnum):
-    """A node's part in its cluster."""
+    """A node's role in its cluster."""
 
     ISOLATED = 0
     MEMBER = 1
@@ -47,7 +48,7 @@ def _check(version: int, node: int, *, t_us: int = 0) -> None:
 
 
 class Beacon(NamedTuple):
-    """FANET_BEACON: the routing part of a hello."""
+    """FANET_BEACON: the part of a hello for routing."""
 
     node: int
     head: int
@@ -59,7 +60,7 @@ class Beacon(NamedTuple):
     hops_to_head: int
     term: int = 0
     leader: int = 0
-    """Whom the sender follows, and since when that one leads; 0: nobody."""
+    """The leader that the sender follows, and (`term`) since when that node leads; 0 when it follows none."""
 
     def encode_frame(self, node: int) -> bytes:
         return encode_inner(
@@ -88,7 +89,7 @@ _HEAD_BIT: Final = 0x8000
 
 
 class Schedule(NamedTuple):
-    """FANET_SCHEDULE: one part of the leader's assignment; epoch 0 and no members: a call to join."""
+    """FANET_SCHEDULE: one part of the leader's assignment; epoch 0 without members is a call to join."""
 
     start_us: int
     period_us: int
@@ -100,7 +101,7 @@ class Schedule(NamedTuple):
     parts: int
     members: tuple[Member, ...]
     term: int = 0
-    """Swarm second in which the leader took office."""
+    """The swarm second in which the leader took office."""
 
     def encode_frame(self, node: int) -> bytes:
         if len(self.members) > CAPACITY or self.clusters > _HEAD_BIT:
@@ -152,14 +153,14 @@ class Schedule(NamedTuple):
 
 
 class Join(NamedTuple):
-    """FANET_JOIN."""
+    """FANET_JOIN: a node asks the leader for a place in the next assignment."""
 
     node: int
     position: Enu
     velocity: Enu = Enu(0.0, 0.0, 0.0)
-    """[m/s]"""
+    """The velocity [m/s]."""
     instead_of: int = 0
-    """A silent node, whom this one stands in for if it is its head; the node itself: one that objects; 0: none."""
+    """The silent node that this one stands in for if it is that node's head; the node's own id: it objects; 0: none."""
 
     def encode_frame(self, node: int) -> bytes:
         payload = JOIN.layout.pack(*self.position, *self.velocity, self.node, self.instead_of, VERSION)
@@ -176,7 +177,7 @@ class Join(NamedTuple):
 
 
 class Survivor(NamedTuple):
-    """FANET_SURVIVOR: `reporter`, at `position`, hears the phone of `survivor`."""
+    """FANET_SURVIVOR: `reporter`, at `position`, receives the phone of `survivor`."""
 
     t_us: int
     survivor: int
@@ -198,7 +199,7 @@ class Survivor(NamedTuple):
 
 
 class TimeBeacon(NamedTuple):
-    """FANET_TIME: the swarm time at which the sender's earlier hello `hello` ended; bounds in ns."""
+    """FANET_TIME: the swarm time at which hello number `hello` of its sender ended; bounds in ns."""
 
     t_ns: int
     error_ns: int
@@ -216,7 +217,7 @@ class TimeBeacon(NamedTuple):
 
     @classmethod
     def decode_frame(cls, frame: bytes) -> Self:
-        """Raises MalformedFrameError; a beacon of the reference itself, and none else, has no hops."""
+        """Decode a beacon; raises MalformedFrameError. Only a beacon of the reference itself has 0 hops."""
         *fields, version = decode_first(TIME, frame)
         beacon = cls(*fields)
         _check(version, beacon.node, t_us=beacon.t_ns // US)

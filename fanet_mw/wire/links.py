@@ -1,7 +1,7 @@
 """FANET_LINKS: how well nodes hear each other, as joins report it and as the leader announces it with an assignment.
 
     join of a node       epoch 0; from_nodes: the neighbor, to_nodes: the sender of the join
-    leader to everyone   the links of one assignment, both directions of a pair as one entry, in parts of one frame each
+    leader to all        the links of one assignment, both directions of a pair as one entry, in parts of one frame each
 
 A grade is the logarithm of the share of frames that a link loses, so that grades of independent copies add up.
 """
@@ -17,9 +17,9 @@ from fanet_mw.wire import ANY_NODE, LINKS, VERSION, decode_every, encode_inner
 CAPACITY: Final = 36
 """Entries of one message."""
 MESSAGES: Final = 4
-"""Messages of one frame: 144 links, just under 1000 bytes."""
+"""Messages of one frame: 144 links, which take just under 1000 bytes."""
 NEPERS: Final = 25.0
-"""Grades per factor e of loss."""
+"""Steps of the grade per factor e of loss."""
 _MOST_GRADE: Final = 230
 _LEAST_DBM: Final = -128
 _MOST_DBM: Final = 127
@@ -45,7 +45,7 @@ def grade_of(chance: float) -> int:
 
 
 def power_of(rssi_dbm: float) -> int:
-    """A received power as it is told, in whole dBm."""
+    """A received power as it is sent, in whole dBm."""
     return max(_LEAST_DBM, min(_MOST_DBM, round(rssi_dbm)))
 
 
@@ -85,7 +85,7 @@ class Links(NamedTuple):
 
     @classmethod
     def decode_frames(cls, frame: bytes) -> Self | None:
-        """All links in a packet, None when it says nothing of links; raises MalformedFrameError."""
+        """All links in a packet; None when it has none. Raises MalformedFrameError."""
         found: list[Link] = []
         names: set[tuple[int, ...]] = set()
         for term, node, epoch, *lists, part, parts, count, version in decode_every(LINKS, frame):

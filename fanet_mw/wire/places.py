@@ -1,6 +1,6 @@
-"""FANET_PLACES: where the members of a schedule part are, in whole meters, so that all compute the same timetable.
+"""FANET_PLACES: where the members of a schedule part are, in whole meters, so that all nodes compute one timetable.
 
-It follows its FANET_SCHEDULE in the same packet; entry i belongs to member `first + i` of that part.
+The message follows its FANET_SCHEDULE in the same packet; entry i belongs to member `first + i` of that part.
 """
 
 from collections.abc import Sequence
@@ -11,18 +11,18 @@ from fanet_mw.units import Enu
 from fanet_mw.wire import PLACES, VERSION, decode_every, encode_inner
 
 CAPACITY: Final = 28
-"""Entries of one message: two of them hold what one schedule part does."""
+"""Entries of one message; two messages hold the members of one schedule part."""
 _MOST_M: Final = 32767
 
 
 def rounded(place: Enu) -> Enu:
-    """As it arrives: whole meters, within 32 km of the origin."""
+    """A place as it arrives: in whole meters, within 32 km of the origin."""
     east, north, up = (float(max(-_MOST_M, min(_MOST_M, round(part)))) for part in place)
     return Enu(east, north, up)
 
 
 class Places(NamedTuple):
-    """The places of one schedule part, and of the leader, who is in no cluster."""
+    """The places of one schedule part, and of the leader, which is in no cluster."""
 
     members: tuple[Enu, ...]
     leader: Enu
@@ -43,7 +43,7 @@ class Places(NamedTuple):
 
     @classmethod
     def decode_frames(cls, frame: bytes) -> Self:
-        """All places in a packet; raises MalformedFrameError when they are none, or not in order."""
+        """All places in a packet; raises MalformedFrameError when there are none, or when they are out of order."""
         found: list[Enu] = []
         leader: Enu | None = None
         for *values, first, count, version in decode_every(PLACES, frame):

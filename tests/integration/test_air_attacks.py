@@ -19,7 +19,7 @@ from fanet_mw import wire
 from fanet_mw.scenario import Scenario
 from fanet_mw.units import MS, Enu, NodeId, S
 from fanet_mw.wire import FLAG_FLOOD, Kind
-from fanet_mw.wire.claims import Claims, Heard, Standing
+from fanet_mw.wire.claims import Claims, HeardNeighbor, SlotStatus
 from fanet_mw.wire.digest import Digest, Holding
 from fanet_mw.wire.inner import Beacon, Join, Member, Role, Schedule, Survivor, TimeBeacon
 from fanet_mw.wire.links import Link, Links
@@ -157,8 +157,8 @@ def test_ghosts_do_not_join() -> None:
 @pytest.mark.parametrize("relay", ["cds", "mpr", "heads", "claimed"])
 def test_nobody_hears_of_neighbors_that_are_not_there(relay: str) -> None:
     def lie(t_ns: int, seq: int) -> bytes:
-        heard = tuple(Heard(NodeId(100 + k), Standing(), hears_us=True) for k in range(16))
-        return hello(t_ns, seq, beacon(), Claims(EVIL, Standing(), heard).encode_frames())
+        heard = tuple(HeardNeighbor(NodeId(100 + k), SlotStatus(), hears_us=True) for k in range(16))
+        return hello(t_ns, seq, beacon(), Claims(EVIL, SlotStatus(), heard).encode_frames())
 
     summary, reports = attacked(scenario(f"clusters.relay={relay}"), every(200, lie))
     assert dropped(reports, "malformed") > 50

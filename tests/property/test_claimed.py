@@ -22,7 +22,7 @@ from fanet_mw.routing.clustered.clustered import Clustered
 from fanet_mw.scenario import config
 from fanet_mw.units import MS, NodeId, S
 from fanet_mw.wire import FLAG_FLOOD, FLAG_TO_HEAD, Kind
-from fanet_mw.wire.claims import Claims, Heard, Standing
+from fanet_mw.wire.claims import Claims, HeardNeighbor, SlotStatus
 from fanet_mw.wire.inner import Beacon
 
 
@@ -274,7 +274,9 @@ def test_a_bundle_of_which_a_part_is_known_brings_only_the_rest() -> None:
 def test_a_stranger_s_impossible_claim_neither_stops_us_nor_what_our_neighbors_say(
     line: GraphRadio, length: int
 ) -> None:
-    stranger = Claims(NodeId(40), Standing(0, length, 5), (Heard(NodeId(3), Standing(1, length), hears_us=True),))
+    stranger = Claims(
+        NodeId(40), SlotStatus(0, length, 5), (HeardNeighbor(NodeId(3), SlotStatus(1, length), hears_us=True),)
+    )
     for node in (2, 3):
         hello = wire.Header(0, 1, 40, 0xFFFF, 40, Kind.HELLO, 1, 0, 0, 0).encode()
         beacon = Beacon(40, 0, 0, 0, 0, 0, 0, 255).encode_frame(40)

@@ -9,20 +9,20 @@ from hypothesis import strategies as st
 from fanet_mw.dialect import fanet
 from fanet_mw.errors import MalformedFrameError
 from fanet_mw.wire import CLAIMS, HEADER_BYTES, encode_inner
-from fanet_mw.wire.claims import CAPACITY, NO_SLOT, Claims, Heard, Standing
+from fanet_mw.wire.claims import CAPACITY, NO_SLOT, Claims, HeardNeighbor, SlotStatus
 
 HEADER = b"\x00" * HEADER_BYTES
 IDS = st.integers(1, 65534)
 
 
 @st.composite
-def standings(draw: st.DrawFn) -> Standing:
+def standings(draw: st.DrawFn) -> SlotStatus:
     length = draw(st.integers(0, 255))
     slot = draw(st.none() | st.integers(0, min(length, 255) - 1)) if length else None
-    return Standing(slot, length, draw(st.integers(0, 255)), draw(st.integers(0, 3)))
+    return SlotStatus(slot, length, draw(st.integers(0, 255)), draw(st.integers(0, 3)))
 
 
-HEARD = st.builds(Heard, IDS, standings(), st.booleans(), st.booleans())
+HEARD = st.builds(HeardNeighbor, IDS, standings(), st.booleans(), st.booleans())
 CLAIMS_OF = st.builds(Claims, IDS, standings(), st.lists(HEARD, max_size=3 * CAPACITY).map(tuple))
 
 

@@ -19,7 +19,7 @@ from emulator.channel.path_loss import (
     uma_av_db,
     uma_av_sight_probability,
 )
-from emulator.channel.propagation import Links, milliwatt, noise_mw, pair_codes, reach_m
+from emulator.channel.propagation import LinkTable, milliwatt, noise_mw, pair_codes, reach_m
 from emulator.channel.shadowing import Shadowing
 from emulator.kernel.state import AUDIBLE, LINK_DST, LINK_POWER, LINK_SRC
 from fanet_mw.errors import ConfigError
@@ -97,7 +97,7 @@ def test_uma_av_is_the_mean_of_its_two_losses() -> None:
 
 def links_of(at: list[list[float]], keys: Radio, **more: Any) -> dict[tuple[int, int], float]:
     """Mean power [dBm] of each link."""
-    links = Links(np.array(at, dtype=np.float64), keys, spare=0, **more)
+    links = LinkTable(np.array(at, dtype=np.float64), keys, spare=0, **more)
     ends = links.ints[[LINK_SRC, LINK_DST], : links.count].T.tolist()
     return {(a, b): 10 * math.log10(mw) for (a, b), mw in zip(ends, links.reals[LINK_POWER].tolist(), strict=False)}
 
@@ -157,7 +157,7 @@ def test_an_obstruction_costs_its_loss_and_cuts_a_link_of_the_range_channel() ->
 
 def test_beyond_the_sensitivity_a_link_only_interferes() -> None:
     keys = radio(channel="friis", sensitivity_dbm=-60, interference_floor_dbm=-90)
-    links = Links(np.array([[0.0, 0, 50], [500, 0, 50]]), keys, spare=0)
+    links = LinkTable(np.array([[0.0, 0, 50], [500, 0, 50]]), keys, spare=0)
     assert links.count == 2
     assert not links.ints[AUDIBLE].any()
 

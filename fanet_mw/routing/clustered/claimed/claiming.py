@@ -19,7 +19,7 @@ from fanet_mw.routing.clustered.relaying.neighborhood import Neighborhood
 from fanet_mw.routing.clustered.tdma.turns import Turns, turn_ns
 from fanet_mw.scenario import Scenario
 from fanet_mw.units import MS, NodeId, S, seconds_to_ns
-from fanet_mw.wire.claims import MOST_LOTS, Claims, Standing
+from fanet_mw.wire.claims import MOST_LOTS, Claims, SlotStatus
 
 _LISTEN: Final = 3
 """Hello intervals before the first claim: neighbors and theirs are known after two, when none is lost."""
@@ -118,14 +118,14 @@ class Claiming:
             return Change.NONE
         return Change.WON if before is None else Change.LOST
 
-    def standing(self, *, waiting: int, now_ns: int) -> Standing:
+    def standing(self, *, waiting: int, now_ns: int) -> SlotStatus:
         """What the hello says of the node's own slots, with so many packets waiting."""
         claim = self._claims.own
         turns_per_s = len(self.own.claimed()) * S / self.own.turns.period_ns
         lots = self._load.lots(waiting=waiting, turns_per_s=turns_per_s, now_ns=now_ns)
         self._news = True  # somebody may have fallen silent
         self.draw(now_ns)
-        return Standing(claim.slot, self._port.scenario.clusters.slots or claim.length, claim.crowd, lots)
+        return SlotStatus(claim.slot, self._port.scenario.clusters.slots or claim.length, claim.crowd, lots)
 
     def on_claims(self, claims: Claims, *, now_ns: int) -> None:
         """What a neighbor's hello says."""
@@ -133,7 +133,7 @@ class Claiming:
         self._claims.hear(Hello(self.claim_of(claims.node, claims.own), heard), now_ns=now_ns)
         self._news |= self.near.hear(claims, now_ns=now_ns)
 
-    def claim_of(self, node: NodeId, standing: Standing) -> Claim:
+    def claim_of(self, node: NodeId, standing: SlotStatus) -> Claim:
         """As `slot_claims` knows it. What no superframe can hold is no claim: it came off the air."""
         slot, length = standing.slot, standing.length
         fixed = self._port.scenario.clusters.slots

@@ -12,7 +12,7 @@ that it has said in its last hellos; until two hops know of a change, it draws l
 from collections.abc import Iterable
 from typing import NamedTuple
 
-from fanet_mw.rng import lot
+from fanet_mw.rng import priority_hash
 from fanet_mw.routing.clustered.tdma.turns import Turns
 from fanet_mw.units import NodeId
 
@@ -42,8 +42,8 @@ class Draws(NamedTuple):
         """`turn` within its period, `count` from the swarm's beginning."""
         if not self.lots or any(share.has(turn) for share in self.taken):
             return False
-        best = max(lot(self.node, count, number) for number in range(self.lots))
-        return all(lot(node, count, number) < best for node, lots in self.rivals for number in range(lots))
+        best = max(priority_hash(self.node, count, number) for number in range(self.lots))
+        return all(priority_hash(node, count, number) < best for node, lots in self.rivals for number in range(lots))
 
 
 def draws(

@@ -19,7 +19,7 @@ from fanet_mw.routing.clustered.relaying.neighborhood import Neighborhood
 from fanet_mw.routing.clustered.roles.membership import Membership
 from fanet_mw.units import NodeId, seconds_to_ns
 from fanet_mw.wire import Kind
-from fanet_mw.wire.claims import Claims, Standing
+from fanet_mw.wire.claims import Claims, SlotStatus
 from fanet_mw.wire.inner import Beacon, Role
 
 _LEARN: Final = 4
@@ -81,7 +81,7 @@ class HeadsFirst:
         self._is_head: dict[int, bool] = {}
         self.near = Neighborhood(node, lifetime_ns=lifetime_ns, rank=self._rank)
 
-    def _rank(self, node: NodeId, _: Standing) -> float:
+    def _rank(self, node: NodeId, _: SlotStatus) -> float:
         return float(self._is_head.get(node, False))
 
     def before_hello(self, now_ns: int) -> None:
@@ -119,7 +119,7 @@ class Chosen:
 
     def claims(self, now_ns: int) -> Claims:
         self._choice.before_hello(now_ns)
-        return Claims(self._node, Standing(), self._choice.near.heard(now_ns=now_ns))
+        return Claims(self._node, SlotStatus(), self._choice.near.heard(now_ns=now_ns))
 
     def on_claims(self, claims: Claims, beacon: Beacon, *, now_ns: int) -> None:
         self._choice.near.hear(claims, now_ns=now_ns)

@@ -10,7 +10,7 @@ from typing import NamedTuple
 from fanet_mw.graph.connected_dominating_set import dominates
 from fanet_mw.graph.multipoint_relays import multipoint_relays
 from fanet_mw.units import NodeId
-from fanet_mw.wire.claims import Claims, Heard, Standing
+from fanet_mw.wire.claims import Claims, HeardNeighbor, SlotStatus
 
 
 class _Entry(NamedTuple):
@@ -22,7 +22,7 @@ class Neighborhood:
     """One node's two-hop knowledge."""
 
     def __init__(
-        self, node: NodeId, *, lifetime_ns: int, rank: Callable[[NodeId, Standing], float] = lambda _, __: 0.0
+        self, node: NodeId, *, lifetime_ns: int, rank: Callable[[NodeId, SlotStatus], float] = lambda _, __: 0.0
     ) -> None:
         """`rank`: which neighbors are to relay rather than others."""
         self._node = node
@@ -74,7 +74,7 @@ class Neighborhood:
         """Ranks have changed: ask again."""
         self._belongs = None
 
-    def standings(self, *, now_ns: int) -> list[tuple[NodeId, Standing]]:
+    def standings(self, *, now_ns: int) -> list[tuple[NodeId, SlotStatus]]:
         """What is said of everyone within two hops: by itself, if it is a neighbor; by all that hear it, if not."""
         alive = self.alive(now_ns=now_ns)
         known = frozenset(claims.node for claims in alive) | {self._node}
@@ -90,10 +90,10 @@ class Neighborhood:
         """Our own multipoint relays, for the hello."""
         self._relays = multipoint_relays(self._node, self.adjacency(now_ns=now_ns))
 
-    def heard(self, *, now_ns: int) -> tuple[Heard, ...]:
+    def heard(self, *, now_ns: int) -> tuple[HeardNeighbor, ...]:
         """What our hello says of our neighbors."""
         return tuple(
-            Heard(
+            HeardNeighbor(
                 claims.node,
                 claims.own,
                 any(h.node == self._node for h in claims.heard),

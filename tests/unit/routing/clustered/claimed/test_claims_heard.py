@@ -13,7 +13,7 @@ from fanet_mw.routing.clustered.claimed.slot_claims import Claim, Hello, SlotCla
 from fanet_mw.routing.clustered.clustered import Clustered
 from fanet_mw.units import BROADCAST, MS, Enu, NodeId, S
 from fanet_mw.wire import Header, Kind
-from fanet_mw.wire.claims import Claims, Standing
+from fanet_mw.wire.claims import Claims, SlotStatus
 from fanet_mw.wire.inner import Beacon, Role
 from tests.conftest import MakeScenario
 
@@ -48,7 +48,7 @@ def test_no_node_calls_itself_leader_where_nobody_assigns_anything(node: Node) -
 
 @pytest.mark.parametrize(("length", "slot"), [(8, 3), (7, None), (1 << 20, None)])
 def test_a_superframe_that_cannot_be_is_no_claim(node: Node, length: int, slot: int | None) -> None:
-    claim = claiming_of(node).claim_of(NodeId(5), Standing(slot=3, length=length, crowd=4))
+    claim = claiming_of(node).claim_of(NodeId(5), SlotStatus(slot=3, length=length, crowd=4))
     assert (claim.slot, claim.crowd) == (slot, 4)
 
 
@@ -56,7 +56,7 @@ def test_a_superframe_that_cannot_be_is_no_claim(node: Node, length: int, slot: 
 def test_a_hello_speaks_for_its_sender_alone(node: Node, speaker: int, known: list[int]) -> None:
     header = Header(1000, 0x8000_0001, 3, BROADCAST, 3, Kind.HELLO, 1, 0, 0, 0)
     beacon = Beacon(3, 0, 0, 0, 0, 0, Role.ISOLATED, 255).encode_frame(3)
-    inner = beacon + Claims(NodeId(speaker), Standing(slot=1, length=8), ()).encode_frames()
+    inner = beacon + Claims(NodeId(speaker), SlotStatus(slot=1, length=8), ()).encode_frames()
     node.hear(Reception(header.encode() + inner, NodeId(3), 5 * MS, -60.0), 5 * MS)
     assert wire.decode_header(header.encode() + inner).origin == 3
     assert [claims.node for claims in claiming_of(node).near.alive(now_ns=6 * MS)] == known

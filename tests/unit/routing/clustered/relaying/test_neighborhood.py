@@ -4,14 +4,14 @@ import pytest
 
 from fanet_mw.routing.clustered.relaying.neighborhood import Neighborhood
 from fanet_mw.units import NodeId, S
-from fanet_mw.wire.claims import Claims, Heard, Standing
+from fanet_mw.wire.claims import Claims, HeardNeighbor, SlotStatus
 
 US, LIFETIME_NS = NodeId(1), 3 * S
-NO_SLOT = Standing()
+NO_SLOT = SlotStatus()
 
 
 def hello(node: int, *neighbors: int) -> Claims:
-    return Claims(NodeId(node), NO_SLOT, tuple(Heard(NodeId(n), NO_SLOT, hears_us=True) for n in neighbors))
+    return Claims(NodeId(node), NO_SLOT, tuple(HeardNeighbor(NodeId(n), NO_SLOT, hears_us=True) for n in neighbors))
 
 
 @pytest.fixture

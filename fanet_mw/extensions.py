@@ -9,6 +9,7 @@ a part that is not there.
 """
 
 import difflib
+import json
 from collections.abc import Mapping, Sequence
 from functools import lru_cache
 from importlib import import_module
@@ -29,6 +30,19 @@ GROUPS: Final[Mapping[str, str]] = {
 """The keys of a scenario that may name a part of another package, and the group of its entry points."""
 _NOT_EVERYWHERE: Final = ("numpy", "numba")
 """What a companion computer has not. A channel or a mobility model computes with it elsewhere, and is checked there."""
+
+
+class Table(dict[str, Any]):
+    """The options of a part. Like all of a scenario they do not change, and so they can be a key of a cache."""
+
+    def __hash__(self) -> int:  # type: ignore[override]  # a dict has none, because a dict changes
+        return hash(json.dumps(self, sort_keys=True, default=str))
+
+    def __setitem__(self, key: str, value: object) -> None:
+        raise TypeError(f"options do not change; {key} = {value!r} was to be set")
+
+    def __reduce__(self) -> tuple[type["Table"], tuple[dict[str, Any]]]:
+        return Table, (dict(self),)
 
 
 def installed(key: str) -> dict[str, EntryPoint]:
@@ -71,24 +85,24 @@ class Named:
 
     def __init__(self, key: str, ours: Sequence[str]) -> None:
         self._key = key
-        self._ours = tuple(ours)
+        self.ours: Final = tuple(ours)
 
     def __get_pydantic_core_schema__(self, source: object, handler: GetCoreSchemaHandler) -> core_schema.CoreSchema:
         return core_schema.no_info_after_validator_function(self._check, handler(source))
 
     def __get_pydantic_json_schema__(self, _: core_schema.CoreSchema, __: GetJsonSchemaHandler) -> JsonSchemaValue:
         other = f"an entry point of {GROUPS[self._key]}, or MODULE:CLASS"
-        return {"anyOf": [{"enum": list(self._ours), "type": "string"}, {"type": "string", "x-names": other}]}
+        return {"anyOf": [{"enum": list(self.ours), "type": "string"}, {"type": "string", "x-names": other}]}
 
     def _check(self, name: str) -> str:
-        if name not in self._ours:
+        if name not in self.ours:
             try:
                 load(self._key, name)
             except ModuleNotFoundError:
                 return name  # this machine does not run it
             except ValueError as error:
-                close = difflib.get_close_matches(name, self._ours, n=1)
-                hint = f"did you mean {close[0]}?" if close else f"ours: {', '.join(self._ours)}"
+                close = difflib.get_close_matches(name, self.ours, n=1)
+                hint = f"did you mean {close[0]}?" if close else f"ours: {', '.join(self.ours)}"
                 raise ValueError(f"{error}; {hint}") from error
         return name
 
@@ -110,14 +124,14 @@ class OptionsOf:
         table, field = self._key.split(".")
         name = info.data.get(field)
         if name is None:
-            return options  # the name itself is wrong, and was reported
+            return Table(options)  # the name itself is wrong, and was reported
         model = None if name in self._ours else _model(self._key, name)
         if model is None:
             if options and name in self._ours:
                 raise ValueError(f"{table}.options: {field} = {name!r} is one of ours and has no options")
-            return options
+            return Table(options)
         try:
-            return model.model_validate(options).model_dump(mode="json", exclude_none=True)
+            return Table(model.model_validate(options).model_dump(mode="json", exclude_none=True))
         except ValidationError as error:
             wrong = (f"{table}.options.{_path(item['loc'])}: {item['msg']}" for item in error.errors())
             raise ValueError("; ".join(wrong)) from error

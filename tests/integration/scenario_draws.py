@@ -25,6 +25,7 @@ from pydantic.fields import FieldInfo
 
 from fanet_mw.actor import Actor
 from fanet_mw.errors import ConfigError
+from fanet_mw.extensions import Named
 from fanet_mw.hosts.virtual import VirtualHost
 from fanet_mw.scenario import Scenario, config
 from fanet_mw.scenario.sections import Section
@@ -37,8 +38,12 @@ from sim.run.virtual import actors_of
 LEAST_WAKES: Final = 20_000
 WAKES_A_SECOND: Final = 60_000
 """Of one actor, whatever the scenario asks for: the densest traffic is 10,000 packets a second."""
-_KEPT: Final = {"name", "description", "faults", "time_scale", "duration_s", "seed", "traffic.interval_s"}
-"""Keys that are set below, or mean nothing in virtual time."""
+_KEPT: Final = {
+    "name", "description", "faults", "time_scale", "duration_s", "seed", "traffic.interval_s",
+    "routing.options", "clusters.options", "radio.options", "mobility.options",
+    "world.heightmap", "world.buildings_geojson",
+}  # fmt: skip
+"""Keys that are set below, mean nothing in virtual time, belong to parts of other packages, or name files."""
 _SMALL: Final = {
     "nodes.count": (1, 9), "world.buildings": (0, 4), "mission.survivors": (0, 12), "world.physics_hz": (10, 240),
     "clusters.count": (1, 8),
@@ -123,6 +128,9 @@ def _value(key: Key, pick: random.Random) -> Any:
         return []
     if key.name == "radio.rate_mbps" or key.name == "radio.ack_rate_mbps":
         return pick.choice([1.0, 2.0, 5.5, 11.0, 6.0, 24.0, 54.0])
+    for item in key.metadata:
+        if isinstance(item, Named):
+            return pick.choice(item.ours)
     value = _of(key.annotation, key.metadata, pick)
     if type(value) is type(key.default) is float and value > 0 and pick.random() < 0.5:
         return key.default * 10 ** pick.uniform(-1.5, 1.5)

@@ -2,6 +2,7 @@
 
 import json
 import os
+import pickle
 import subprocess
 import sys
 from pathlib import Path
@@ -10,6 +11,7 @@ import pytest
 
 from fanet_mw import extensions
 from fanet_mw.errors import ConfigError
+from fanet_mw.extensions import Table
 from fanet_mw.scenario import config
 from sim.results.files import finish
 from sim.run.virtual import simulate
@@ -104,3 +106,12 @@ def test_clusters_may_be_made_by_another_package(installed: Path, monkeypatch: p
         simulate(catalog.find("quick", [*keys, "world.engine=kinematic", "mission.survivors=0"])), out=None
     )
     assert summary["pdr"] > 0.9
+
+
+def test_a_scenario_with_options_is_a_key_of_a_cache_and_goes_to_other_processes_whole() -> None:
+    options = Table({"fanout": 3})
+
+    assert hash(options) == hash(Table({"fanout": 3})) != hash(Table({"fanout": 4}))
+    assert pickle.loads(pickle.dumps(options)) == options
+    with pytest.raises(TypeError, match="options do not change"):
+        options["fanout"] = 4

@@ -8,7 +8,9 @@ from hypothesis import Phase, settings
 
 from fanet_mw.scenario import Scenario, config
 
-settings.register_profile("default", deadline=None)  # first calls compile; timing belongs in benchmarks
+settings.register_profile(
+    "default", deadline=None, max_examples=60
+)  # first calls compile; timing belongs in benchmarks
 settings.load_profile("default")
 settings.register_profile(
     "mutants", deadline=None, derandomize=True, database=None, phases=(Phase.explicit, Phase.generate)

@@ -36,8 +36,10 @@ EVIL: Final = NodeId(5)
 """In the middle of nine: four hear it, and it hears them."""
 MOST_MB: Final = 400
 """By how much one run may raise the peak of the process that runs it."""
-_KEPT: Final = 400
-"""Frames that are remembered to be changed later."""
+_KEPT: Final = 40
+"""Frames of a kind that are remembered to be changed later; kinds are picked alike, however often they are heard."""
+_CONTROL_TYPE_AT: Final = wire.HEADER_BYTES + 11
+"""Where a rival's control packet has the type of its message."""
 
 
 class Fuzzer(Actor):
@@ -48,7 +50,7 @@ class Fuzzer(Actor):
         super().__init__(f"agent-{EVIL}", (names.radio_rx(EVIL),))
         self._topic = names.radio_tx(EVIL)
         self._pick = stream(seed, "fuzzer", EVIL)
-        self._heard: list[bytes] = []
+        self._heard: dict[tuple[int, int], list[bytes]] = {}
         self._every_ns = round(every_ms * MS)
         self._due_ns = 0
         self._receptions = 0
@@ -60,10 +62,11 @@ class Fuzzer(Actor):
     def receive(self, topic: str, message: Message, now_ns: int) -> None:
         if isinstance(message, Reception):
             self._receptions += 1
-            if len(self._heard) < _KEPT:
-                self._heard.append(message.frame)
+            kept = self._heard.setdefault(kind_of(message.frame), [])
+            if len(kept) < _KEPT:
+                kept.append(message.frame)
             else:
-                self._heard[self._pick.randrange(_KEPT)] = message.frame
+                kept[self._pick.randrange(_KEPT)] = message.frame
 
     def next_wake_ns(self) -> int | None:
         return self._due_ns
@@ -75,9 +78,10 @@ class Fuzzer(Actor):
         self._due_ns = now_ns + round(self._every_ns * pick.uniform(0.2, 1.8))
         if not self._heard:
             return
-        frame = pick.choice(self._heard)
+        frame = pick.choice(self._heard[pick.choice([*self._heard])])
+        others = self._heard[pick.choice([*self._heard])]
         for _ in range(pick.choice((1, 1, 1, 2, 3))):
-            frame = mutations.frame_changed(frame, self._heard, pick)
+            frame = mutations.frame_changed(frame, others, pick)
         if pick.random() < 0.8:
             frame = passed_off(frame, pick, now_ns=now_ns)
         dst = BROADCAST if pick.random() < 0.8 else NodeId(pick.randint(1, 9))
@@ -88,6 +92,14 @@ class Fuzzer(Actor):
     def report(self) -> Mapping[str, Any]:
         own = {"kind": "agent", "node": EVIL, "generated": 0, "bus_malformed": 0}
         return {**own, "frames_sent": self.sent, "receptions": self._receptions, "dropped": {}}
+
+
+def kind_of(frame: bytes) -> tuple[int, int]:
+    """The kind of packet, and of a rival's control packet the type of its message."""
+    kind = wire.peek_kind(frame)
+    if kind is None:
+        return -1, 0
+    return kind, frame[_CONTROL_TYPE_AT] if kind == wire.Kind.ROUTING and len(frame) > _CONTROL_TYPE_AT else 0
 
 
 def passed_off(frame: bytes, pick: Random, *, now_ns: int) -> bytes:
@@ -160,7 +172,9 @@ def main() -> int:
     pairs = [(names[at % len(names)], first + at // len(names)) for at in range(runs)]
     began_s, wrong, frames, most_mb = time.perf_counter(), 0, 0, 0.0
     with ProcessPoolExecutor(processes) as pool:
-        for result in pool.map(_of_pair, pairs, chunksize=1):
+        for count, result in enumerate(pool.map(_of_pair, pairs, chunksize=1), start=1):
+            if count % 100 == 0:
+                print(f"{count} runs, {wrong} with something wrong", flush=True)
             frames += result.frames
             most_mb = max(most_mb, result.memory_mb)
             if result.wrong:

@@ -135,12 +135,14 @@ def _control_changed(payload: bytes, pick: Random) -> bytes:
 
 
 def integers_changed(body: bytes, pick: Random) -> bytes:
-    """A body of packed integers, one of them another; now and then scrambled."""
+    """A body of packed integers, a few of them others; now and then scrambled."""
     if not body or pick.random() < 0.3:
         return scrambled(body, pick)
     codes = [code for code in ("B", "H", "I", "f") if _BYTES_OF[code] <= len(body)]
-    code = pick.choice(codes)
-    return with_another_number(body, Field(code, pick.randint(0, len(body) - _BYTES_OF[code])), pick)
+    for _ in range(1 if pick.random() < 0.6 else pick.randint(2, 4)):
+        code = pick.choice(codes)
+        body = with_another_number(body, Field(code, pick.randint(0, len(body) - _BYTES_OF[code])), pick)
+    return body
 
 
 def frame_changed(frame: bytes, others: Sequence[bytes], pick: Random) -> bytes:

@@ -1,0 +1,84 @@
+#!/usr/bin/env python
+"""Draw how the vehicles fly into docs/results/flight/: `python scripts/flights.py` (needs matplotlib)."""
+
+import sys
+from pathlib import Path
+
+import matplotlib as mpl
+import numpy as np
+
+ROOT = Path(__file__).parents[1]
+sys.path.insert(0, str(ROOT))
+mpl.use("Agg")
+
+from matplotlib import pyplot as plt  # noqa: E402  (the backend comes first)
+from matplotlib.axes import Axes  # noqa: E402
+
+from sim.world.kinematic import Kinematic  # noqa: E402  (the tree's root is on the path now)
+from sim.world.rotors.engine import Rotors  # noqa: E402
+from sim.world.rotors.power import trimmed_w  # noqa: E402
+from tests.tables.flight import STEP_S, TRIALS, Trial, around, in_gusts, stepped  # noqa: E402
+
+OUT = ROOT / "docs" / "results" / "flight"
+
+
+def _step(axes: Axes, trial: Trial) -> None:
+    for axis, size, name in ((0, trial.step_m_s, "ahead"), (2, 2.0, "up")):
+        speed = stepped(trial, Rotors(trial.vehicle), axis, size)
+        t_s = STEP_S * (1 + np.arange(len(speed)))
+        (line,) = axes.plot(t_s, speed, label=name)
+        axes.axhline(size, color=line.get_color(), linestyle=":", linewidth=0.8)
+        if axis == 0:
+            fast = stepped(trial, Kinematic(), axis, size)
+            axes.plot(t_s, fast, color=line.get_color(), linestyle="--", linewidth=0.9, label="ahead, fast model")
+    axes.set(title="Step of the wanted velocity", xlabel="time [s]", ylabel="velocity [m/s]")
+    axes.legend(loc="lower right")
+
+
+def _gusts(axes: Axes, trial: Trial) -> None:
+    off = in_gusts(trial)[:, 0]
+    t_s = STEP_S * np.arange(len(off))
+    for axis, name in enumerate(("along the wind", "across", "up")):
+        axes.plot(t_s, off[:, axis], label=name, linewidth=0.9)
+    title = f"Hover in wind of {trial.mean_wind_m_s:g} m/s, gusts of W20 = {trial.w20_m_s:g} m/s"
+    axes.set(title=title, xlabel="time [s]", ylabel="off its place [m]")
+    axes.legend(loc="upper right")
+
+
+def _eight(axes: Axes, trial: Trial) -> None:
+    full, wanted = around(trial, Rotors(trial.vehicle))
+    fast, _ = around(trial, Kinematic())
+    axes.plot(wanted[:, 0], wanted[:, 1], color="0.7", linewidth=3, label="wanted")
+    axes.plot(full[:, 0], full[:, 1], label="rotors")
+    axes.plot(fast[:, 0], fast[:, 1], linestyle="--", linewidth=0.9, label="fast model")
+    axes.set(title=f"Figure of eight in {trial.round_s:g} s", xlabel="east [m]", ylabel="north [m]", aspect="equal")
+    axes.legend(loc="upper center", ncols=3)
+    axes.margins(y=0.25)
+
+
+def _power(axes: Axes, trial: Trial) -> None:
+    speed = np.linspace(0.0, 16.0, 81)
+    power = trimmed_w(trial.vehicle, speed, np.zeros_like(speed))
+    (line,) = axes.plot(speed, power, label="power")
+    axes.set(title="Power and energy in steady flight", xlabel="airspeed [m/s]", ylabel="power [W]", ylim=(0, None))
+    beside = axes.twinx()
+    (other,) = beside.plot(speed[15:], power[15:] / speed[15:], color="tab:orange", label="energy per km")
+    beside.set(ylabel="energy [kJ/km]", ylim=(0, None))
+    axes.legend(handles=[line, other], loc="lower center")
+
+
+def main() -> None:
+    """One picture per vehicle."""
+    OUT.mkdir(parents=True, exist_ok=True)
+    for trial in TRIALS:
+        figure, axes = plt.subplots(2, 2, figsize=(11, 7.5), layout="constrained")
+        for draw, place in zip((_step, _gusts, _eight, _power), axes.flat, strict=True):
+            draw(place, trial)
+            place.grid(alpha=0.3)
+        figure.suptitle(f"{trial.vehicle.name}, {trial.vehicle.mass_kg:g} kg")
+        figure.savefig(OUT / f"{trial.vehicle.name}.png", dpi=80)
+        plt.close(figure)
+
+
+if __name__ == "__main__":
+    main()

@@ -28,6 +28,8 @@ from sim.cli import scenario_files
 from sim.cli.air import app as air_app
 from sim.cli.completion import ScenarioName
 from sim.cli.console import Console, nobody_reads
+from sim.cli.figures import figures
+from sim.cli.figures import report as report_command
 from sim.cli.options import Choice, Join, Output, warn_of, with_engine
 from sim.cli.sweep import sweep
 from sim.results import report
@@ -49,6 +51,8 @@ app.command(air_app)
 scenario_files.add_to(app)
 app.register_install_completion_command()
 app.command(sweep)
+app.command(figures)
+app.command(report_command, name="report")
 _err = Console(stderr=True)
 
 
@@ -450,6 +454,10 @@ def _finish(outcome: "Outcome", output: Output) -> int:
     from sim.results.files import finish
 
     summary: dict[str, Any] = finish(outcome, out=output.out)
+    if output.report and output.out is not None:
+        from sim.report.page import write
+
+        write([output.out], output.out)
     if output.json:
         sys.stdout.write(json.dumps(summary, indent=2) + "\n")
     else:

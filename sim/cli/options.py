@@ -88,8 +88,15 @@ class Output:
     pcap_receptions: Annotated[bool, Parameter(negative="")] = False
     """Write every reception too, with its RSSI."""
 
+    report: Annotated[bool, Parameter(negative="")] = False
+    """Write a page of the run with pictures into that folder, report.html and report.md."""
+
     def prepare(self) -> None:
         """See, before a run, that its result can be written; raises ConfigError."""
+        if self.out is None and self.report:
+            raise ConfigError("--report: needs --out DIR, the folder that report.html goes to")
+        if self.report:
+            import sim.report.page  # noqa: F401  what is missing is said before the run, not after it
         if self.out is None and (self.pcap or self.pcap_receptions):
             raise ConfigError("--pcap: needs --out DIR, the folder that air.pcap goes to")
         if self.out is not None:

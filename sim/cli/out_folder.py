@@ -11,7 +11,10 @@ from emulator.capture_file import NAME as CAPTURE
 from emulator.capture_file import captures
 from fanet_mw.errors import ConfigError
 
-FILES: Final = ("summary.json", "scenario.toml", "reports.json", "links.json", "trace.jsonl", "mavlink.tlog")
+FILES: Final = (
+    "summary.json", "scenario.toml", "reports.json", "links.json", "trace.jsonl", "mavlink.tlog",
+    "report.html", "report.md",
+)  # fmt: skip
 """What a run writes, besides captures."""
 
 

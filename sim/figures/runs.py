@@ -1,6 +1,6 @@
 """The finished runs of a sweep, looked up by case and settings: one value per seed, in the order of the seeds."""
 
-from collections.abc import Callable, Mapping, Sequence
+from collections.abc import Callable, Mapping
 from typing import Any
 
 from pyarrow import Table
@@ -8,7 +8,7 @@ from pyarrow import Table
 from sim.figures.statistics import Interval, interval
 
 Row = Mapping[str, Any]
-Quantity = str | Callable[[Row], float]
+Quantity = str | Callable[[Row], float | None]
 """A column, or a function of a row."""
 
 
@@ -58,8 +58,3 @@ def best(*many: Mapping[int, float]) -> dict[int, float]:
     """The greatest of several quantities, seed by seed."""
     seeds = [seed for seed in many[0] if all(seed in other for other in many)] if many else []
     return {seed: max(one[seed] for one in many) for seed in seeds}
-
-
-def as_column(levels: Sequence[object]) -> list[str]:
-    """Numbers as an axis has them."""
-    return [f"{level:g}" if isinstance(level, int | float) else str(level) for level in levels]

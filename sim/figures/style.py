@@ -5,6 +5,7 @@ Colors are those of Okabe and Ito (2008). No line is told by its color alone: ea
 
 import csv
 from collections.abc import Iterable, Mapping, Sequence
+from contextlib import AbstractContextManager
 from pathlib import Path
 from typing import Any, Final, NamedTuple
 
@@ -25,17 +26,24 @@ class Look(NamedTuple):
 
 
 LOOKS: Final[Mapping[str, Look]] = {
-    "ours": Look("fanet-mw, timetable", "#0072B2", "o", "-"),
+    "ours": Look("fanet-mw", "#0072B2", "o", "-"),
     "paper": Look("the paper's method", "#D55E00", "s", "--"),
     "flooding": Look("plain flooding", "#009E73", "^", "-."),
-    "aodv": Look("AODV", "#CC79A7", "D", (0, (3, 1, 1, 1, 1, 1))),
-    "olsr": Look("OLSR", "#56B4E9", "v", ":"),
-    "limit": Look("connected at all", "#000000", "", (0, (1, 3))),
-    "other": Look("", "#E69F00", "P", "-"),
+    "aodv": Look("AODV", "#CC79A7", "D", (0, (5, 1))),
+    "olsr": Look("OLSR", "#E69F00", "v", (0, (3, 1, 1, 1))),
+    "gossip": Look("gossip", "#CC79A7", "D", (0, (5, 1))),
+    "counter": Look("counter-based", "#E69F00", "v", (0, (3, 1, 1, 1))),
+    "limit": Look("a path exists", "#000000", "", (0, (1, 2))),
 }
-SERIES: Final = ("#0072B2", "#D55E00", "#009E73", "#CC79A7", "#E69F00", "#56B4E9", "#000000")
-MARKERS: Final = ("o", "s", "^", "D", "P", "v", "X")
-DASHES: Final = ("-", "--", "-.", ":", (0, (3, 1, 1, 1, 1, 1)), (0, (5, 1)), (0, (1, 3)))
+"""By case of a sweep."""
+SERIES: Final = (
+    Look("", "#0072B2", "o", "-"),
+    Look("", "#D55E00", "s", "--"),
+    Look("", "#009E73", "^", "-."),
+    Look("", "#CC79A7", "D", (0, (5, 1))),
+    Look("", "#E69F00", "v", (0, (3, 1, 1, 1))),
+)
+"""For lines that are levels of a setting, in their order."""
 
 _PARAMETERS: Final[Mapping[str, Any]] = {
     "figure.dpi": 110,
@@ -59,13 +67,17 @@ _PARAMETERS: Final[Mapping[str, Any]] = {
 }
 
 
+def applied() -> AbstractContextManager[None]:
+    """The style holds for what is drawn and saved within; matplotlib's own settings are as before afterwards."""
+    return mpl.rc_context(dict(_PARAMETERS))
+
+
 def canvas(
     columns: int = 1, rows: int = 1, *, width: float = 4.2, height: float = 3.2, share_y: bool = False
 ) -> tuple[Figure, list[Axes]]:
     """A figure with so many panels, in reading order."""
-    with mpl.rc_context(dict(_PARAMETERS)):
-        figure = Figure(figsize=(width * columns, height * rows), layout="constrained")
-        panels = figure.subplots(rows, columns, squeeze=False, sharey=share_y)
+    figure = Figure(figsize=(width * columns, height * rows), layout="constrained")
+    panels = figure.subplots(rows, columns, squeeze=False, sharey=share_y)
     return figure, list(panels.flat)
 
 
@@ -82,9 +94,8 @@ def line(axes: Axes, look: Look, xs: Sequence[float], intervals: Sequence[Interv
 def save(figure: Figure, folder: Path, name: str) -> list[Path]:
     """Write PNG and SVG; the same figure gives the same bytes."""
     paths = [folder / f"{name}.png", folder / f"{name}.svg"]
-    with mpl.rc_context(dict(_PARAMETERS)):
-        figure.savefig(paths[0], metadata={"Software": None})
-        figure.savefig(paths[1], metadata={"Date": None})
+    figure.savefig(paths[0], metadata={"Software": None})
+    figure.savefig(paths[1], metadata={"Date": None})
     return paths
 
 

@@ -1,0 +1,90 @@
+"""`fanet figures` and `fanet report`: the paper's evaluation from shipped sweeps, with a verdict of each claim."""
+
+from pathlib import Path
+from typing import Annotated
+
+from cyclopts import Parameter
+from cyclopts.validators import Number
+from rich.table import Table
+
+from fanet_mw.errors import ConfigError
+from sim.cli.console import Console
+from sim.cli.sweep import carry_out
+
+
+def figures(
+    *which: str,
+    quick: Annotated[bool, Parameter(negative="")] = False,
+    full: Annotated[bool, Parameter(negative="")] = False,
+    out: Path = Path("figures"),
+    jobs: Annotated[int | None, Parameter(validator=Number(gte=1))] = None,
+    scheduler: str | None = None,
+    draw_only: Annotated[bool, Parameter(negative="")] = False,
+) -> int:
+    """Recreate the paper's figures 8 to 12, and figures beyond it, and say which of its claims hold.
+
+    Runs that are finished in the folder are not repeated; an interrupted command goes on where it was.
+
+    Parameters
+    ----------
+    which
+        8, 9, 10, 11, 12, load, ablation, or all, which is the default.
+    quick
+        Few seeds and short runs, all figures within 15 minutes on two cores; the default.
+    full
+        10 seeds and long runs: hours.
+    out
+        Folder for the figures (PNG, SVG, CSV, verdicts as JSON) and, under sweeps/, the runs.
+    jobs
+        Processes of this machine; by default one per core.
+    scheduler
+        A Dask scheduler whose workers carry out the runs.
+    draw_only
+        Draw from the runs that are finished, and run nothing.
+
+    """
+    from sim.figures.all_figures import chosen
+    from sim.figures.render import render
+    from sim.results.read import read
+    from sim.sweep import spec
+
+    if quick and full:
+        raise ConfigError("--quick and --full exclude each other")
+    variant = "full" if full else "quick"
+    verdicts = []
+    code = 0
+    for recipe in chosen(which):
+        runs = out / "sweeps" / f"{recipe.sweep}-{variant}"
+        if not draw_only:
+            found = spec.find(recipe.sweep).variant(variant)
+            code |= carry_out(recipe.sweep, found, out=runs, jobs=jobs, scheduler=scheduler)
+        verdicts += [(recipe.name, claim) for claim in render(recipe, read(runs), out)]
+    console = Console()
+    table = Table("figure", "claim", "verdict", box=None, header_style="bold", padding=(0, 2, 0, 0))
+    for name, claim in verdicts:
+        table.add_row(name, claim.claim, claim.verdict.value)
+        for statement in claim.statements:
+            table.add_row("", f"[dim]{statement.text()}[/]", "")
+    console.print(table)
+    console.print(f"figures, data and verdicts in {out}; fanet report {out} makes a page of them", highlight=False)
+    return code
+
+
+def report(*folders: Path, out: Path | None = None) -> int:
+    """Make one page of figures and verdicts: report.html, which needs nothing else, and report.md.
+
+    Parameters
+    ----------
+    folders
+        Folders of `fanet figures`, and of single runs (`fanet simulate --out`).
+    out
+        Folder for the page; by default the first of the folders.
+
+    """
+    from sim.report.page import write
+
+    if not folders:
+        raise ConfigError("fanet report: needs at least one folder")
+    paths = write(folders, out or folders[0])
+    Console().print(f"written: {', '.join(map(str, paths))}", highlight=False, soft_wrap=True)
+    return 0

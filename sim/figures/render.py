@@ -1,0 +1,41 @@
+"""From the table of a sweep to the files of a figure: PNG, SVG, the numbers beside them, and the verdicts."""
+
+import json
+from pathlib import Path
+
+from pyarrow import Table
+
+from fanet_mw.errors import ConfigError
+from sim.figures.claims import Claim
+from sim.figures.recipe import Recipe
+from sim.figures.runs import Runs
+from sim.figures.style import applied, save, save_data
+
+
+def render(recipe: Recipe, table: Table, folder: Path) -> list[Claim]:
+    """Draw a figure and judge its claims; returns them."""
+    runs = Runs(table)
+    if not runs.rows:
+        raise ConfigError(f"{recipe.name}: the sweep has no run that ended well")
+    try:
+        folder.mkdir(parents=True, exist_ok=True)
+        with applied():
+            drawing = recipe.draw(runs)
+            save(drawing.figure, folder, recipe.name)
+        claims = recipe.claims(runs)
+        save_data(drawing.data, folder / f"{recipe.name}.csv")
+        about = {
+            "name": recipe.name,
+            "title": recipe.title,
+            "caption": recipe.caption,
+            "sweep": recipe.sweep,
+            "runs": len(runs.rows),
+            "failed": runs.failed,
+            "seeds": len({row["seed"] for row in runs.rows}),
+            "code": sorted({row["code"] for row in runs.rows}),
+            "claims": [claim.plain() for claim in claims],
+        }
+        (folder / f"{recipe.name}.json").write_text(f"{json.dumps(about, indent=2)}\n", encoding="utf-8")
+    except OSError as error:
+        raise ConfigError(f"{folder}: cannot be written: {error.strerror}") from error
+    return claims

@@ -1,0 +1,1 @@
+"""Pages for people: of the paper's evaluation with verdicts, and of a single run."""

@@ -1,0 +1,119 @@
+"""A page as a list of blocks, written as one HTML file that needs nothing else, and as Markdown beside its pictures."""
+
+import base64
+import html
+from collections.abc import Iterable, Sequence
+from dataclasses import dataclass
+from pathlib import Path
+from typing import Final
+
+_STYLE: Final = """
+body { font: 16px/1.5 system-ui, sans-serif; color: #1a1a1a; max-width: 72rem; margin: 2rem auto; padding: 0 1.2rem; }
+h1 { font-size: 1.7rem; } h2 { font-size: 1.3rem; margin-top: 2.5rem; border-bottom: 1px solid #ccc; }
+table { border-collapse: collapse; margin: .8rem 0; font-size: .93rem; }
+th, td { text-align: left; vertical-align: top; padding: .3rem .7rem; border-bottom: 1px solid #ddd; }
+th { background: #f3f3f3; } figure { margin: 1rem 0; } figure img { max-width: 100%; height: auto; }
+figcaption { color: #444; font-size: .93rem; } code, pre { background: #f5f5f5; font-size: .9rem; }
+pre { padding: .7rem; overflow-x: auto; } .agrees { color: #00543d; font-weight: 600; }
+.partly { color: #7a4b00; font-weight: 600; } .differs { color: #9c2a00; font-weight: 600; }
+"""
+
+
+@dataclass(frozen=True, slots=True)
+class Heading:
+    """The title of a part of the page."""
+
+    text: str
+    level: int = 2
+
+
+@dataclass(frozen=True, slots=True)
+class Text:
+    """A paragraph."""
+
+    text: str
+
+
+@dataclass(frozen=True, slots=True)
+class Commands:
+    """Lines for a shell."""
+
+    lines: Sequence[str]
+
+
+@dataclass(frozen=True, slots=True)
+class Picture:
+    """A PNG with its caption."""
+
+    path: Path
+    caption: str
+
+
+@dataclass(frozen=True, slots=True)
+class Rows:
+    """A table; a cell that is a verdict is shown as one."""
+
+    head: Sequence[str]
+    rows: Sequence[Sequence[str]]
+
+
+Block = Heading | Text | Commands | Picture | Rows
+_VERDICTS: Final = ("agrees", "partly", "differs")
+
+
+def as_html(title: str, blocks: Iterable[Block]) -> str:
+    """The page with its pictures inside: it can be mailed, and opened without a network."""
+    body = "\n".join(_html(block) for block in blocks)
+    return (
+        f'<!doctype html>\n<html lang="en">\n<head>\n<meta charset="utf-8">\n<title>{html.escape(title)}</title>\n'
+        f"<style>{_STYLE}</style>\n</head>\n<body>\n<h1>{html.escape(title)}</h1>\n{body}\n</body>\n</html>\n"
+    )
+
+
+def _html(block: Block) -> str:
+    match block:
+        case Heading(text, level):
+            return f"<h{level}>{html.escape(text)}</h{level}>"
+        case Text(text):
+            return f"<p>{html.escape(text)}</p>"
+        case Commands(lines):
+            return f"<pre>{html.escape(chr(10).join(lines))}</pre>"
+        case Picture(path, caption):
+            image, said = base64.b64encode(path.read_bytes()).decode(), html.escape(caption)
+            drawn = f'<img alt="{said}" src="data:image/png;base64,{image}">'
+            return f"<figure>{drawn}<figcaption>{said}</figcaption></figure>"
+        case Rows(head, rows):
+            first = "".join(f"<th>{html.escape(cell)}</th>" for cell in head)
+            rest = "".join(f"<tr>{''.join(_cell(cell) for cell in row)}</tr>\n" for row in rows)
+            return f"<table><thead><tr>{first}</tr></thead>\n<tbody>{rest}</tbody></table>"
+
+
+def _cell(text: str) -> str:
+    kind = f' class="{text}"' if text in _VERDICTS else ""
+    return f"<td{kind}>{html.escape(text).replace(chr(10), '<br>')}</td>"
+
+
+def as_markdown(title: str, blocks: Iterable[Block], folder: Path) -> str:
+    """The page as Markdown for this folder: pictures are linked by their place relative to it."""
+    return "\n\n".join([f"# {title}", *(_markdown(block, folder.resolve()) for block in blocks)]) + "\n"
+
+
+def _markdown(block: Block, folder: Path) -> str:
+    match block:
+        case Heading(text, level):
+            return f"{'#' * level} {text}"
+        case Text(text):
+            return text
+        case Commands(lines):
+            return "\n".join(["```", *lines, "```"])
+        case Picture(path, caption):
+            place = path.resolve()
+            near = place.relative_to(folder) if place.is_relative_to(folder) else place
+            return f"![{caption}]({near.as_posix()})"
+        case Rows(head, rows):
+            table: list[Sequence[str]] = [head, ["---"] * len(head), *rows]
+            return "\n".join(f"| {' | '.join(_plain(cell) for cell in line)} |" for line in table)
+
+
+def _plain(text: str) -> str:
+    return text.replace("|", "\\|").replace("\n", "<br>")

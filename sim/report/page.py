@@ -1,0 +1,118 @@
+"""The page of an evaluation: settings beside the paper's, each figure with claims, findings and verdicts, commands."""
+
+import json
+from collections.abc import Sequence
+from pathlib import Path
+from typing import Any, Final
+
+from fanet_mw.errors import ConfigError
+from sim.report.html import Block, Commands, Heading, Picture, Rows, Text, as_html, as_markdown
+from sim.report.run_page import blocks_of_run, is_run
+
+_TITLE: Final = "Reliable Flying IoT Networks for UAV Disaster Rescue Operations, recreated"
+_ORDER: Final = ("figure-8", "figure-9", "figure-10", "figure-11", "figure-12", "load", "ablation")
+_SETTINGS: Final = Rows(
+    ("quantity", "the paper (Tables 1, 2)", "here", "why it differs"),
+    (
+        ("radio", "802.11 DSSS 11 Mb/s, UDP", "the same; own kernel of 802.11 DCF, held against ns-3.44", ""),
+        ("packets", "1024 B, on-off application", "1024 B, constant rate, random phases", "on and off times not said"),
+        ("range", "about 250 m", "250 m, sharp", "the channel is not said"),
+        ("area, nodes, spacing", "2500 x 2500 m, 45, 200 m", "the same; 9 x 5 grid at first", ""),
+        ("speed", "5-10 m/s", "1-20 m/s in figure 8, 7.5 m/s in figure 12", "a trend needs more than two speeds"),
+        ("duration", "100 s", "15-107 s, by sweep", "warm-up and drain are not measured"),
+        ("clusters", "2, 4 (8), 22, 44", "2, 4, 8, 22, 44", ""),
+        ("generation period", "0.1 and 1 s", "the same", ""),
+        ("flooding period", "0.5, 1, 5 s", "the same", ""),
+        ("survivors", "16", "the same", ""),
+        (
+            "mobility, figure 8",
+            "clusters in formation",
+            "waypoints; a rigid formation",
+            "relative motion not said",
+        ),
+        ("robots", "Gazebo, ROS", "pybullet, or point masses with --quick; Zenoh", ""),
+        ("runs per point", "not said", "several seeds, 95 % intervals (Student's t)", ""),
+    ),
+)
+
+
+def write(folders: Sequence[Path], out: Path) -> list[Path]:
+    """Write report.html and report.md of these folders; returns their paths."""
+    try:
+        out.mkdir(parents=True, exist_ok=True)
+        title, blocks = _blocks(folders, out)
+        pages = {out / "report.html": as_html(title, blocks), out / "report.md": as_markdown(title, blocks, out)}
+        for path, text in pages.items():
+            path.write_text(text, encoding="utf-8")
+    except OSError as error:
+        raise ConfigError(f"{error.filename or out}: {error.strerror}") from error
+    return list(pages)
+
+
+def _blocks(folders: Sequence[Path], out: Path) -> tuple[str, list[Block]]:
+    figures = [found for folder in folders for found in _figures(folder)]
+    runs = [folder for folder in folders if is_run(folder)]
+    for folder in folders:
+        if folder not in runs and not _figures(folder):
+            raise ConfigError(f"{folder}: holds neither figures (fanet figures) nor a run (fanet simulate --out)")
+    blocks: list[Block] = []
+    if figures:
+        blocks += [*_overview(figures), Heading("Settings"), _SETTINGS]
+        for folder, about in figures:
+            blocks += _figure(folder, about)
+        blocks += _commands(figures)
+    for folder in runs:
+        blocks += blocks_of_run(folder, out)
+    return _TITLE if figures else "Runs" if len(runs) > 1 else "A run", blocks
+
+
+def _figures(folder: Path) -> list[tuple[Path, dict[str, Any]]]:
+    """What `fanet figures` left in a folder, in the order of the paper."""
+    names = [name for name in _ORDER if (folder / f"{name}.json").exists() and (folder / f"{name}.png").exists()]
+    return [(folder, json.loads((folder / f"{name}.json").read_text(encoding="utf-8"))) for name in names]
+
+
+def _overview(figures: Sequence[tuple[Path, dict[str, Any]]]) -> list[Block]:
+    claims = [claim for _, about in figures for claim in about["claims"] if claim["figure"]]
+    counts = [sum(claim["verdict"] == verdict for claim in claims) for verdict in ("agrees", "partly", "differs")]
+    return [
+        Text(
+            f"Of {len(claims)} claims: {counts[0]} agree, {counts[1]} partly, {counts[2]} differ. "
+            "Each verdict is made by code: a claim is one or more quantities with a threshold each; it agrees when the "
+            "whole 95 % interval of every quantity is on the claimed side, differs when every one is wholly on the "
+            "other side, and is partly so otherwise."
+        ),
+        Rows(("figure", "claim", "verdict"), [(str(one["figure"]), one["claim"], one["verdict"]) for one in claims]),
+    ]
+
+
+def _figure(folder: Path, about: dict[str, Any]) -> list[Block]:
+    rows = [
+        (claim["claim"], "\n".join(one["text"] for one in claim["statements"]), claim["verdict"], claim["why"])
+        for claim in about["claims"]
+    ]
+    name = about["name"]
+    head = f"{name.capitalize().replace('-', ' ')}: {about['title']}" if name.startswith("figure") else about["title"]
+    failed = f", {about['failed']} runs failed and are left out" if about["failed"] else ""
+    made = f"{about['runs']} runs, {about['seeds']} seeds{failed}; code {', '.join(about['code'])}."
+    blocks: list[Block] = [Heading(head), Picture(folder / f"{name}.png", about["caption"]), Text(made)]
+    if rows:
+        blocks.append(Rows(("claim", "findings", "verdict", "why"), rows))
+    return blocks
+
+
+def _commands(figures: Sequence[tuple[Path, dict[str, Any]]]) -> list[Block]:
+    lines = [
+        "fanet figures all --quick --out figures",
+        "fanet figures all --full --out figures",
+        "fanet report figures",
+    ]
+    lines += [f"fanet sweep {about['sweep']} --variant quick    # the runs of {about['name']}" for _, about in figures]
+    return [
+        Heading("Commands"),
+        Commands(lines),
+        Text(
+            "Every row of a sweep's runs.parquet has the command that repeats its run alone. Beside each picture are "
+            "the numbers in it (CSV), an SVG, and the verdicts as JSON."
+        ),
+    ]

@@ -1,0 +1,256 @@
+"""The page of one run, from the files of its folder: what arrived and when, over which links, in which slots."""
+
+import json
+import tomllib
+from collections import Counter, defaultdict
+from collections.abc import Iterable, Mapping, Sequence
+from dataclasses import dataclass, field
+from pathlib import Path
+from typing import Any
+
+from matplotlib.axes import Axes
+from matplotlib.collections import LineCollection
+
+from agents.traffic import targets_of
+from fanet_mw import trace
+from fanet_mw.errors import ConfigError
+from fanet_mw.scenario import config
+from fanet_mw.scenario.model import Scenario
+from fanet_mw.trace import Approaching, Arrived, BoundStated, Delivered, Detected, Generated, LetOut, RoleChanged
+from fanet_mw.units import MS, S
+from sim.figures.style import SERIES, applied, canvas, save
+from sim.report.html import Block, Commands, Heading, Picture, Rows, Text
+from sim.world.layout import positions
+
+_WINDOWS = 40
+"""Steps of the delivery ratio over time."""
+_BLUE, _RED, _GREEN, _PINK, _ORANGE = (look.color for look in SERIES)
+
+
+def is_run(folder: Path) -> bool:
+    """True for a folder of `fanet simulate --out` or `fanet launch --out`."""
+    return all((folder / name).exists() for name in ("summary.json", "scenario.toml", "trace.jsonl"))
+
+
+@dataclass(slots=True)
+class _Story:
+    """What the trace tells, as the pictures need it."""
+
+    scenario: Scenario
+    sent: dict[tuple[int, int], int] = field(default_factory=dict)
+    """Of each packet of the load, its instant."""
+    bounds: dict[tuple[int, int], int] = field(default_factory=dict)
+    delivered: list[Delivered] = field(default_factory=list)
+    let_out: list[LetOut] = field(default_factory=list)
+    heads: dict[int, int] = field(default_factory=dict)
+    """The last head of each node."""
+    mission: list[Detected | Approaching | Arrived] = field(default_factory=list)
+
+    def read(self, lines: Iterable[str]) -> None:
+        had: set[tuple[int, int, int]] = set()
+        for record in map(trace.parse, lines):
+            match record:
+                case Generated() if record.app == "traffic":
+                    self.sent[record.node, record.seq] = record.t_ns
+                case Delivered() if (record.node, record.origin, record.seq) not in had:
+                    had.add((record.node, record.origin, record.seq))
+                    self.delivered.append(record)
+                case BoundStated():
+                    self.bounds[record.node, record.seq] = record.bound_ns
+                case LetOut():
+                    self.let_out.append(record)
+                case RoleChanged():
+                    self.heads[record.node] = record.head
+                case Detected() | Approaching() | Arrived():
+                    self.mission.append(record)
+        targets = {node: set(targets_of(self.scenario, node)) for node in self.scenario.node_ids}
+        self.delivered = [
+            one for one in self.delivered if (one.origin, one.seq) in self.sent and one.node in targets[one.origin]
+        ]
+
+    def targets(self, origin: int) -> Sequence[int]:
+        return targets_of(self.scenario, origin)
+
+
+def blocks_of_run(folder: Path, out: Path) -> list[Block]:
+    """The page of one run; its pictures go to a folder beside the page."""
+    summary = json.loads((folder / "summary.json").read_text(encoding="utf-8"))
+    tree = tomllib.loads((folder / "scenario.toml").read_text(encoding="utf-8"))
+    story = _Story(config.build(tree, source=str(folder / "scenario.toml")))
+    try:
+        with (folder / "trace.jsonl").open(encoding="utf-8") as file:
+            story.read(file)
+    except ValueError as error:
+        raise ConfigError(f"{folder / 'trace.jsonl'}: {error}") from error
+    links = json.loads((folder / "links.json").read_text(encoding="utf-8")) if (folder / "links.json").exists() else []
+    pictures = out / "pictures"
+    pictures.mkdir(parents=True, exist_ok=True)
+    name = f"{summary['scenario']}-{summary['seed']}"
+    blocks: list[Block] = [
+        Heading(f"{summary['scenario']}, seed {summary['seed']}, {summary['nodes']} nodes"),
+        Text(tree.get("description", "")),
+        Text("The result may be used." if summary["valid"] else f"NOT VALID: {'; '.join(summary['invalid_because'])}."),
+        _figures_of(summary),
+    ]
+    for draw, kind, caption in (
+        (lambda: _delays(story), "delays", "Delays of the load against the bound that each packet's origin stated."),
+        (lambda: _delivery(story), "delivery", "Delivery ratio by the instant a packet was born, and per receiver."),
+        (lambda: _map(story, links), "links", "Links by the share of copies received; nodes where they started."),
+        (lambda: _slots(story), "slots", "When packets were let out first, by place in the flooding period."),
+        (lambda: _mission(story), "mission", "What UAVs did for survivors."),
+    ):
+        with applied():
+            figure = draw()
+            if figure is not None:
+                save(figure, pictures, f"{name}-{kind}")
+                blocks.append(Picture(pictures / f"{name}-{kind}.png", caption))
+    if summary["mode"] == "realtime":
+        late = summary["lateness"]
+        blocks.append(Heading("Lateness", 3))
+        blocks.append(
+            Rows(
+                ("late frames", "of", "share", "limit", "p50 [ms]", "p99 [ms]", "worst [ms]"),
+                [
+                    [
+                        f"{late[key]:g}"
+                        for key in ("late_frames", "frames", "share", "limit", "p50_ms", "p99_ms", "max_ms")
+                    ]
+                ],
+            )
+        )
+    return [*blocks, Commands([f"fanet simulate {folder / 'scenario.toml'}"])]
+
+
+def _figures_of(summary: Mapping[str, Any]) -> Rows:
+    """The summary's first figures, with what they count."""
+    bound, air = summary["bound"], summary["air"]
+    rows = [
+        ("delivered / (packets x targets)", _said(summary["pdr"])),
+        ("delay, application to application: p50, p95, max [ms]",
+         ", ".join(_said(summary["delay_ms"][key]) for key in ("p50", "p95", "max"))),
+        ("share of the time that the air is busy", _said(air.get("busy"))),
+        ("copies received / copies in range", _said(air.get("pdr"))),
+    ]  # fmt: skip
+    if bound:
+        rows.append(("packets x targets within the bound stated for each", _said(bound["within_share"])))
+        rows.append(("greatest bound stated, greatest delay under one [ms]",
+                     f"{_said(bound['worst_ms'])}, {_said(bound['observed_max_ms'])}"))  # fmt: skip
+    if summary["mission"]["survivors"]:
+        mission = summary["mission"]
+        rows.append(("survivors detected, approached, reached",
+                     ", ".join(str(mission[key]) for key in ("detected", "approached", "reached"))))  # fmt: skip
+    return Rows(("quantity", "value"), rows)
+
+
+def _said(value: float | None) -> str:
+    return "-" if value is None else f"{value:.4g}"
+
+
+def _steps(axes: Axes, values: Sequence[float], whole: int, label: str, color: str, dash: object) -> None:
+    ordered = sorted(values)
+    axes.plot(ordered, [(rank + 1) / whole for rank in range(len(ordered))], color=color, label=label, linestyle=dash,
+              drawstyle="steps-post")  # fmt: skip
+
+
+def _delays(story: _Story) -> Any:  # noqa: ANN401 a matplotlib figure, or None
+    if not story.delivered:
+        return None
+    figure, (axes,) = canvas(1, width=6.5)
+    whole = sum(len(story.targets(origin)) for origin, _ in story.sent)
+    _steps(axes, [one.delay_ns / MS for one in story.delivered], whole, "delay", _BLUE, "-")
+    bounds = [bound / MS for name, bound in story.bounds.items() if name in story.sent]
+    if bounds:
+        _steps(axes, bounds, len(story.sent), "bound stated by the origin", _RED, "--")
+    axes.set_xlabel("end-to-end delay [ms]")
+    axes.set_ylabel("share of packets x targets")
+    axes.set_ylim(0, 1.05)
+    axes.legend(loc="lower right")
+    return figure
+
+
+def _delivery(story: _Story) -> Any:  # noqa: ANN401
+    if not story.sent:
+        return None
+    figure, (over_time, per_node) = canvas(2, width=4.6)
+    start_ns, end_ns = story.scenario.traffic_window_ns
+    step_ns = max(1, (end_ns - start_ns) // _WINDOWS)
+    wanted: Counter[int] = Counter()
+    had: Counter[int] = Counter()
+    of_node: dict[int, list[int]] = defaultdict(lambda: [0, 0])
+    for (origin, _), t_ns in story.sent.items():
+        for node in story.targets(origin):
+            wanted[(t_ns - start_ns) // step_ns] += 1
+            of_node[node][1] += 1
+    for one in story.delivered:
+        had[(story.sent[one.origin, one.seq] - start_ns) // step_ns] += 1
+        of_node[one.node][0] += 1
+    steps = sorted(wanted)
+    times = [(start_ns + (step + 0.5) * step_ns) / S for step in steps]
+    over_time.plot(times, [had[step] / wanted[step] for step in steps], color=_BLUE)
+    over_time.set_xlabel("instant at which packets were born [s]")
+    nodes = sorted(of_node)
+    per_node.bar(nodes, [of_node[node][0] / of_node[node][1] for node in nodes], color=_BLUE)
+    per_node.set_xlabel("receiver (node id)")
+    for axes in (over_time, per_node):
+        axes.set_ylabel("packet delivery ratio")
+        axes.set_ylim(0, 1.05)
+    return figure
+
+
+def _map(story: _Story, links: Sequence[Mapping[str, Any]]) -> Any:  # noqa: ANN401
+    if not links:
+        return None
+    figure, (axes,) = canvas(1, width=6.5, height=4.6)
+    places = positions(story.scenario)
+    known = [link for link in links if link["copies"]]
+    ends = [[places[link[end] - 1][:2] for end in ("src", "dst")] for link in known]
+    shares = [link["received"] / link["copies"] for link in known]
+    lines = LineCollection(ends, cmap="viridis", linewidths=1.1, alpha=0.8)
+    lines.set_array(shares)
+    lines.set_clim(0, 1)
+    axes.add_collection(lines)
+    heads = {head for head in story.heads.values() if head}
+    for wanted, label, marker in ((True, "cluster head", "s"), (False, "node", "o")):
+        chosen = [places[node - 1] for node in story.scenario.node_ids if (node in heads) == wanted]
+        if chosen:
+            axes.scatter([at[0] for at in chosen], [at[1] for at in chosen], marker=marker, s=26, zorder=3,
+                         color="#222222" if wanted else "#ffffff", edgecolors="#222222", label=label)  # fmt: skip
+    axes.set_aspect("equal")
+    axes.set_xlabel("east [m]")
+    axes.set_ylabel("north [m]")
+    axes.legend(loc="upper left", bbox_to_anchor=(0, 1.14), ncols=2)
+    figure.colorbar(lines, ax=axes, label="copies received / copies in range")
+    return figure
+
+
+def _slots(story: _Story) -> Any:  # noqa: ANN401
+    if story.scenario.routing.protocol != "clustered" or not story.let_out:
+        return None
+    figure, (axes,) = canvas(1, width=6.5, height=4.0)
+    period_ns = story.scenario.clusters.period_ns
+    axes.scatter([one.t_ns % period_ns / MS for one in story.let_out], [one.node for one in story.let_out], s=5,
+                 color=_BLUE, alpha=0.5, linewidths=0)  # fmt: skip
+    axes.set_xlabel(f"place in the flooding period of {period_ns / MS:g} ms [ms]")
+    axes.set_ylabel("origin (node id)")
+    axes.set_xlim(0, period_ns / MS)
+    return figure
+
+
+def _mission(story: _Story) -> Any:  # noqa: ANN401
+    if not story.mission:
+        return None
+    figure, (axes,) = canvas(1, width=6.5)
+    kinds = ((Detected, "first heard a phone", _ORANGE, "o"), (Approaching, "changed course", _BLUE, "s"),
+             (Arrived, "arrived", _GREEN, "^"))  # fmt: skip
+    for kind, label, color, marker in kinds:
+        first: dict[int, int] = {}
+        for record in story.mission:
+            if isinstance(record, kind):
+                first.setdefault(record.node, record.t_ns)
+        times = sorted(t_ns / S for t_ns in first.values())
+        axes.plot(times, range(1, len(times) + 1), color=color, marker=marker, markersize=3, label=label,
+                  drawstyle="steps-post")  # fmt: skip
+    axes.set_xlabel("time [s]")
+    axes.set_ylabel("UAVs that have done so")
+    axes.legend(loc="best")
+    return figure

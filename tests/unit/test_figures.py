@@ -1,0 +1,172 @@
+"""Verdicts of claims, figures from real (tiny) sweeps, and the pages made of them."""
+
+import csv
+import json
+import math
+import re
+import statistics
+from pathlib import Path
+
+import pytest
+
+from fanet_mw.errors import ConfigError
+from sim.figures.all_figures import FIGURES, chosen
+from sim.figures.claims import Claim, Finding, Statement, Verdict
+from sim.figures.render import render
+from sim.figures.runs import Runs, best, differences, pooled
+from sim.figures.statistics import interval, quantile_975
+from sim.report.page import write
+from sim.results.files import finish
+from sim.run.virtual import simulate
+from sim.scenarios import catalog
+from sim.sweep import spec
+from sim.sweep.execution import carry_out
+from sim.sweep.table import table_of
+from sim.sweep.tasks import tasks_of
+
+
+def statement(values: list[float], side: str, threshold: float) -> Statement:
+    return Statement("it", values, side, threshold)
+
+
+def test_an_interval_is_that_of_student() -> None:
+    """Five values with mean 3 and standard deviation 1.581: half width 2.776 x 1.581 / sqrt(5) = 1.963."""
+    found = interval([1, 2, 3, 4, 5])
+    assert found.mean == 3
+    assert found.high - 3 == pytest.approx(1.963, abs=1e-3)
+    assert 3 - found.low == pytest.approx(1.963, abs=1e-3)
+    assert interval([7.0]).low == -math.inf
+    assert math.isnan(interval([]).mean)
+
+
+def test_quantiles_fall_towards_the_normal_one() -> None:
+    found = [quantile_975(freedom) for freedom in range(1, 200)]
+    assert found == sorted(found, reverse=True)
+    assert quantile_975(40) == pytest.approx(2.021, abs=0.01)
+    assert quantile_975(10_000) == pytest.approx(1.960, abs=0.001)
+
+
+@pytest.mark.parametrize(
+    ("values", "side", "finding"),
+    [
+        ([2.0, 2.1, 1.9], "above", Finding.HOLDS),
+        ([2.0, 2.1, 1.9], "below", Finding.FAILS),
+        ([0.0, 0.1, -0.1], "above", Finding.FAILS),
+        ([0.0, 0.1, -0.1], "below", Finding.HOLDS),
+        ([0.0, 2.0, 1.0], "above", Finding.OPEN),
+        ([5.0], "above", Finding.OPEN),
+        ([], "above", Finding.OPEN),
+        ([1.0, 1.0], "below", Finding.HOLDS),
+    ],
+)
+def test_a_statement_holds_only_with_its_whole_interval(values: list[float], side: str, finding: Finding) -> None:
+    assert statement(values, side, 1.0).finding is finding
+
+
+def test_a_claim_agrees_when_all_holds_differs_when_all_fails_and_is_partly_so_otherwise() -> None:
+    holds, fails, is_open = (statement(values, "above", 1.0) for values in ([2.0, 2.0], [0.0, 0.0], [0.0, 2.0]))
+    assert Claim(8, "it", [holds, holds]).verdict is Verdict.AGREES
+    assert Claim(8, "it", [fails, fails]).verdict is Verdict.DIFFERS
+    for mixed in ([holds, fails], [holds, is_open], [fails, is_open], [is_open]):
+        assert Claim(8, "it", mixed).verdict is Verdict.PARTLY
+
+
+def test_differences_are_taken_seed_by_seed() -> None:
+    assert differences({1: 5.0, 2: 7.0, 3: 1.0}, {2: 1.0, 1: 2.0}) == [3.0, 6.0]
+    assert pooled({1: 1.0, 2: 3.0}, {1: 3.0}) == {1: 2.0}
+    assert best({1: 1.0, 2: 3.0}, {1: 3.0, 2: 0.0}) == {1: 3.0, 2: 3.0}
+
+
+def test_a_figure_that_there_is_not_is_an_error() -> None:
+    assert next(iter(chosen(["9", "all"]))).name == "figure-9"
+    assert len(chosen([])) == len(FIGURES)
+    with pytest.raises(ConfigError, match="figure '7': must be one of 8, 9, 10"):
+        chosen(["7"])
+
+
+def tiny(name: str, **changes: object):
+    """A shipped sweep with few nodes and short runs, carried out here."""
+    found = spec.find(name)
+    grid = {key: changes.get(key, [values[0], values[-1]]) for key, values in found.grid.items()}
+    small = {"nodes.count": 9, "duration_s": 4, "warmup_s": 1, "drain_s": 1, "traffic.sources": 4, **changes}
+    small = {key: value for key, value in small.items() if key not in grid}
+    sweep = found.model_copy(update={"seeds": 2, "grid": grid, "set": {**found.set, **small}})
+    rows = [(task, carry_out(task)) for task in tasks_of(sweep)]
+    assert [done.error for _, done in rows if done.failed] == []
+    return table_of(rows, sweep.varied())
+
+
+@pytest.fixture(scope="module")
+def nine(tmp_path_factory):
+    table = tiny("fig9", **{"traffic.sources": [1, 8], "traffic.interval_s": [1, 0.05]})
+    folder = tmp_path_factory.mktemp("figures")
+    return table, folder, render(FIGURES["9"], table, folder)
+
+
+def test_a_figure_has_its_picture_its_numbers_and_its_verdicts_beside_each_other(nine) -> None:
+    table, folder, claims = nine
+    assert (folder / "figure-9.png").read_bytes().startswith(b"\x89PNG")
+    assert "<svg" in (folder / "figure-9.svg").read_text()
+    with (folder / "figure-9.csv").open() as file:
+        rows = [row for row in csv.DictReader(file) if row["panel"] == "pdr"]
+    runs = [row for row in table.to_pylist() if (row["traffic.sources"], row["traffic.interval_s"]) == (8, 0.05)]
+    [drawn] = [row for row in rows if (row["sources"], row["interval_s"]) == ("8", "0.05")]
+    assert float(drawn["mean"]) == pytest.approx(statistics.mean(row["pdr"] for row in runs))
+    about = json.loads((folder / "figure-9.json").read_text())
+    assert [claim["verdict"] for claim in about["claims"]] == [claim.verdict for claim in claims]
+    assert about["runs"] == 8
+
+
+def test_the_same_table_gives_the_same_picture(nine, tmp_path) -> None:
+    table, folder, _ = nine
+    render(FIGURES["9"], table, tmp_path)
+    for name in ("figure-9.svg", "figure-9.csv", "figure-9.json"):
+        assert (tmp_path / name).read_bytes() == (folder / name).read_bytes()
+
+
+def test_failed_runs_are_in_no_figure(nine) -> None:
+    table, _, _ = nine
+    status = table.column("status").to_pylist()
+    changed = table.set_column(table.column_names.index("status"), "status", [["failed", *status[1:]]])
+    runs = Runs(changed)
+    assert (len(runs.rows), runs.failed) == (len(status) - 1, 1)
+
+
+def test_a_page_needs_nothing_else_and_has_every_verdict(nine) -> None:
+    _, folder, claims = nine
+    html, markdown = (path.read_text() for path in write([folder], folder))
+    assert html.count("data:image/png;base64,") == 1
+    assert re.findall(r"(?:src|href)=\"(?!data:)", html) == []
+    for claim in claims:
+        assert claim.claim in markdown
+        assert f'<td class="{claim.verdict}">{claim.verdict}</td>' in html
+    assert "](figure-9.png)" in markdown
+    with pytest.raises(ConfigError, match="holds neither figures"):
+        write([folder / "sweeps"], folder)
+
+
+@pytest.mark.parametrize("scenario", ["quick", "clusters"])
+def test_a_run_has_a_page_with_its_delays_links_and_mission(scenario: str, tmp_path: Path) -> None:
+    keys = ["nodes.count=9", "world.engine=kinematic", "duration_s=8", "warmup_s=5", "drain_s=1", "traffic.sources=all"]
+    keys += ["clusters.count=8"] if scenario == "clusters" else []
+    finish(simulate(catalog.find(scenario, keys)), out=tmp_path)
+    html, markdown = (path.read_text() for path in write([tmp_path], tmp_path))
+    pictures = {path.stem.removeprefix(f"{scenario}-1-") for path in (tmp_path / "pictures").glob("*.png")}
+    assert pictures == {"delays", "delivery", "links", "slots"} | ({"mission"} if scenario == "quick" else set())
+    assert html.count("data:image/png;base64,") == len(pictures)
+    assert ("within the bound stated" in markdown) == (scenario == "clusters")
+
+
+@pytest.mark.slow
+@pytest.mark.parametrize("name", sorted(set(FIGURES) - {"9"}))
+def test_every_figure_is_drawn_from_its_shipped_sweep(name: str, tmp_path: Path) -> None:
+    recipe = FIGURES[name]
+    changes: dict[str, object] = {}
+    if name == "8":
+        changes = {"nodes.layout": "grid", "nodes.positions_m": []}
+    if name == "12":
+        changes = {"world.engine": "kinematic"}
+    table = tiny(recipe.sweep, **changes)
+    claims = render(recipe, table, tmp_path)
+    assert (tmp_path / f"{recipe.name}.png").exists()
+    assert all(claim.statements for claim in claims)

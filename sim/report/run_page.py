@@ -5,6 +5,7 @@ import tomllib
 from collections import Counter, defaultdict
 from collections.abc import Iterable, Mapping, Sequence
 from dataclasses import dataclass, field
+from functools import partial
 from pathlib import Path
 from typing import Any
 
@@ -93,11 +94,11 @@ def blocks_of_run(folder: Path, out: Path) -> list[Block]:
         _figures_of(summary),
     ]
     for draw, kind, caption in (
-        (lambda: _delays(story), "delays", "Delays of the load against the bound that each packet's origin stated."),
-        (lambda: _delivery(story), "delivery", "Delivery ratio by the instant a packet was born, and per receiver."),
-        (lambda: _map(story, links), "links", "Links by the share of copies received; nodes where they started."),
-        (lambda: _slots(story), "slots", "When packets were let out first, by place in the flooding period."),
-        (lambda: _mission(story), "mission", "What UAVs did for survivors."),
+        (partial(_delays, story), "delays", "Delays of the load against the bound that each packet's origin stated."),
+        (partial(_delivery, story), "delivery", "Delivery ratio by the instant a packet was born, and per receiver."),
+        (partial(_map, story, links), "links", "Links by the share of copies received; nodes where they started."),
+        (partial(_slots, story), "slots", "When packets were let out first, by place in the flooding period."),
+        (partial(_mission, story), "mission", "What UAVs did for survivors."),
     ):
         with applied():
             figure = draw()

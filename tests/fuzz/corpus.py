@@ -24,6 +24,7 @@ from fanet_mw.radios.datagram import Datagram, DatagramKind
 from fanet_mw.routing import control
 from fanet_mw.trace import Record
 from fanet_mw.units import BROADCAST, Enu, NodeId, S
+from fanet_mw.wire.message import DELIVERED, MISSING, Head, Receipt, encode_piece, encode_receipts
 from sim.run.virtual import actors_of
 from sim.scenarios import catalog
 
@@ -86,7 +87,8 @@ def recorded(*, seconds: float = 10, swarms: Sequence[str] = tuple(SETTINGS)) ->
     warning = Encoder(NodeId(3), component=wire.COMPONENT).collision(
         NodeId(2), closest_s=3.0, altitude_m=2.0, horizontal_m=9.0
     )
-    frames[header + warning] = None
+    for inner in (warning, *_of_messages()):
+        frames[header + inner] = None
     for message in _BY_HAND:
         puts[type(message)][topics.encode([message])] = None
     rare_first = sorted(frames, key=_commonness(list(frames)).__getitem__)
@@ -123,6 +125,20 @@ def _said(name: str, seconds: float, records: list[Record]) -> list[Message]:
     said += [TraceBatch(tuple(records[at : at + 5])) for at in range(0, len(records), 5)]
     said += [Report(actor.name, S, json.dumps(actor.report())) for actor in actors]
     return said
+
+
+def _of_messages() -> list[bytes]:
+    """Messages of applications, which these swarms do not send: in pieces, to targets, as MAVLink; receipts."""
+    head = Head(7, 3, 1, 300, 5000, 14, 2, 200, 0, 2, 1)
+    text = Encoder(NodeId(3), component=wire.COMPONENT).collision(
+        NodeId(2), closest_s=3.0, altitude_m=2.0, horizontal_m=9.0
+    )
+    return [
+        encode_piece(head, bytes(range(200)), node=3),
+        encode_piece(head._replace(piece=1), bytes(100), node=3, targets=range(1, 40)),
+        encode_piece(head._replace(size=len(text), port=0, pieces=1, stride=1000), text, node=3, targets=(4,)),
+        encode_receipts([Receipt(3, 9, DELIVERED), Receipt(1, 8, MISSING)], node=4),
+    ]
 
 
 _BY_HAND: Final[tuple[Message, ...]] = (

@@ -32,6 +32,7 @@ from fanet_mw.routing.aodv import messages as aodv
 from fanet_mw.routing.dsdv import messages as dsdv
 from fanet_mw.routing.geographic import messages as geographic
 from fanet_mw.routing.olsr import messages as olsr
+from fanet_mw.wire import message as pieces
 from fanet_mw.wire.claims import Claims
 from fanet_mw.wire.digest import Digest
 from fanet_mw.wire.inner import Beacon, Join, Schedule, Survivor, TimeBeacon
@@ -90,6 +91,12 @@ def _of_the_air(found: Corpus) -> Iterator[Decoder]:
     yield Decoder("Digest", _there_and_back(Digest.decode_frames, lambda m: m.encode_frames(3)), of(wire.DIGEST.msgid))
     yield Decoder("Claims", _there_and_back(Claims.decode_frames, lambda m: m.encode_frames()), of(wire.CLAIMS.msgid))
     yield Decoder("Links", _there_and_back(Links.decode_frames, lambda m: m.encode_frames()), of(wire.LINKS.msgid))
+    yield Decoder("piece", _there_and_back(pieces.decode_piece, _encode_piece), of(wire.MESSAGE.msgid))
+    yield Decoder(
+        "receipts",
+        _there_and_back(pieces.decode_receipts, lambda m: pieces.encode_receipts(m, node=3)),
+        of(wire.RECEIPT.msgid),
+    )
     yield Decoder("Places", Places.decode_frames, of(wire.PLACES.msgid))
     yield Decoder("position", mavlink.kinematics_of, of(mavlink.common.MAVLINK_MSG_ID_GLOBAL_POSITION_INT))
     yield Decoder("collision", mavlink.collision_of, of(mavlink.common.MAVLINK_MSG_ID_COLLISION))
@@ -98,6 +105,10 @@ def _of_the_air(found: Corpus) -> Iterator[Decoder]:
 
 def _encode_frame(message: Any) -> bytes:
     return message.encode_frame(3)  # type: ignore[no-any-return]
+
+
+def _encode_piece(piece: pieces.Piece) -> bytes:
+    return pieces.encode_piece(piece.head, piece.data, node=3, targets=piece.targets or ())
 
 
 def _there_and_back(decode: Callable[[bytes], Any], encode: Callable[[Any], bytes]) -> Callable[[bytes], object]:
@@ -114,10 +125,10 @@ def _there_and_back(decode: Callable[[bytes], Any], encode: Callable[[Any], byte
 def _of_rivals(found: Corpus) -> Iterator[Decoder]:
     frames = [frame for frame in found.frames if corpus.kind_of(frame) == wire.Kind.ROUTING]
 
-    def pieces(pick: Random) -> bytes:
+    def fragments(pick: Random) -> bytes:
         return mutations.frame_changed(pick.choice(frames), frames, pick)
 
-    yield Decoder("control pieces", control.decode, pieces)
+    yield Decoder("control pieces", control.decode, fragments)
     messages: list[tuple[str, int, Any]] = [
         ("RREQ", 0x11, aodv.RouteRequest), ("RREP", 0x12, aodv.RouteReply), ("RERR", 0x13, aodv.RouteError),
         ("OLSR hello", 0x21, olsr.Hello), ("TC", 0x22, olsr.TopologyControl), ("DSDV update", 0x31, dsdv.Update),

@@ -117,7 +117,7 @@ def message_changed(inner: bytes, pick: Random) -> bytes:
     msgid = int.from_bytes(inner[7:10], "little")
     payload = inner[_PAYLOAD_AT : _PAYLOAD_AT + inner[1]]
     layout = _LAYOUTS.get(msgid, _NO_LAYOUT)
-    if msgid == wire.ROUTING.msgid and pick.random() < 0.9:
+    if msgid == wire.ROUTING.msgid and len(payload) > 4 and pick.random() < 0.9:
         return _control_changed(payload, pick)
     if not layout.fields or pick.random() < 0.03:
         return sealed(inner, scrambled(payload, pick)[:255], layout.crc_extra)

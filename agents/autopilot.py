@@ -1,4 +1,4 @@
-"""What a flight controller says of itself: the last fix, and telemetry frames at their rates. Sans-IO.
+"""The flight controller of a UAV as seen over MAVLink: the last fix, and telemetry frames at their rates. Sans-IO.
 
 Position and velocity are the receiver's. Attitude is inferred: a multirotor leans so that thrust and gravity add up to
 its acceleration, and faces where it flies. The battery is a clock: full at the epoch, empty after `ENDURANCE_NS`.
@@ -15,11 +15,11 @@ from fanet_mw.units import Enu, NodeId, S
 
 GRAVITY_M_S2: Final = 9.80665
 MAX_TILT: Final = math.radians(35)
-"""The usual lean limit of a multirotor's position controller; a jump in the velocity's noise is no acrobatics."""
+"""The usual lean limit of a multirotor's position controller; noise in the velocity must not look like acrobatics."""
 TURNING_M_S: Final = 0.5
-"""Slower than this, the course is noise and the heading is kept."""
+"""Below this speed the course is noise, and the heading is kept."""
 ENDURANCE_NS: Final = 25 * 60 * S
-"""A small multirotor's flight time."""
+"""The flight time of a small multirotor."""
 
 _STILL: Final = Enu(0.0, 0.0, 0.0)
 _CELLS: Final = 4
@@ -27,7 +27,7 @@ _FULL_V: Final = 4.2
 _EMPTY_V: Final = 3.5
 _CAPACITY_MAH: Final = 5000
 
-# A stream never comes more often than this; `telemetry_hz` bounds each of them too, and sets the position's.
+# No stream comes more often than this; `telemetry_hz` also bounds each stream, and sets the rate of the position.
 _EVERY_NS: Final = 1 * S
 _SELDOM_NS: Final = 5 * S
 _RARELY_NS: Final = 10 * S
@@ -35,7 +35,7 @@ _RARELY_NS: Final = 10 * S
 
 @dataclass
 class _Stream:
-    """One message, its interval and when it is due next."""
+    """One message, its interval, and when it is due next."""
 
     encode: Callable[[int], bytes]
     interval_ns: int
@@ -43,7 +43,7 @@ class _Stream:
 
 
 class Autopilot:
-    """One UAV's flight controller, as seen over MAVLink."""
+    """The flight controller of one UAV, as seen over MAVLink."""
 
     def __init__(self, node: NodeId, *, position: Enu, telemetry_hz: float) -> None:
         self.position = position
@@ -51,16 +51,16 @@ class Autopilot:
         self._home = position
         self._acceleration = _STILL
         self._yaw: float | None = None
-        """Unknown until it has flown; north would also cost a hello its length, as MAVLink drops trailing zeros."""
+        """Unknown until the UAV has flown; a yaw of 0 would also shorten a hello, as MAVLink drops trailing zeros."""
         self._fix_ns: int | None = None
         self._encoder = Encoder(node, component=AUTOPILOT_COMPONENT)
         self._beacons = Encoder(node, component=AUTOPILOT_COMPONENT)
-        """Numbers what goes over the air apart from telemetry: in each of the two a gap means a loss."""
+        """Numbers the frames that go over the air apart from telemetry, so that in either of them a gap is a loss."""
         self._streams = self._plan(node, telemetry_hz) if telemetry_hz else []
         self._due_ns = min((stream.due_ns for stream in self._streams), default=None)
 
     def _plan(self, node: NodeId, telemetry_hz: float) -> list[_Stream]:
-        """In order of sending. Nodes are out of step by their id, so that the bus sees no bursts; streams are not."""
+        """The streams in the order of sending; nodes differ in phase by their id, so that the bus sees no bursts."""
         encoder = self._encoder
         base_ns = max(1, round(S / telemetry_hz))
         due_ns = node * 7_919_000 % base_ns
@@ -77,7 +77,7 @@ class Autopilot:
         return [_Stream(encode, max(interval_ns, base_ns), due_ns) for interval_ns, encode in wanted]
 
     def start(self, now_ns: int) -> None:
-        """Telemetry keeps its phase, and begins now."""
+        """Begin telemetry now, in the phase that it has."""
         for stream in self._streams:
             stream.due_ns += max(0, -((stream.due_ns - now_ns) // stream.interval_ns)) * stream.interval_ns
         self._due_ns = min((stream.due_ns for stream in self._streams), default=None)
@@ -85,7 +85,7 @@ class Autopilot:
     # --- in -------------------------------------------------------------------------------------------------------
 
     def fix(self, gps: Gps) -> None:
-        """A position fix; the acceleration is what changed the velocity since the last one. Older ones are ignored."""
+        """Take in a fix; the acceleration is the change of velocity since the last one. An older fix is ignored."""
         if self._fix_ns is not None:
             if gps.t_ns <= self._fix_ns:
                 return
@@ -100,12 +100,12 @@ class Autopilot:
 
     @property
     def attitude(self) -> Attitude:
-        """How it must lean to accelerate as it does, facing where it flies."""
+        """The lean that the present acceleration needs, facing the direction of flight."""
         east, north, up = self._acceleration
         yaw = self._yaw or 0.0
         forward = east * math.sin(yaw) + north * math.cos(yaw)
         right = east * math.cos(yaw) - north * math.sin(yaw)
-        thrust_up = max(GRAVITY_M_S2 + up, 0.1 * GRAVITY_M_S2)  # propellers push one way only
+        thrust_up = max(GRAVITY_M_S2 + up, 0.1 * GRAVITY_M_S2)  # propellers push only one way
         wanted, most = math.hypot(forward, right), thrust_up * math.tan(MAX_TILT)
         if wanted > most:
             forward, right = forward * most / wanted, right * most / wanted
@@ -114,11 +114,11 @@ class Autopilot:
         return Attitude(roll, pitch, yaw)
 
     def next_due_ns(self) -> int | None:
-        """When telemetry is due; None when there is none."""
+        """The instant at which telemetry is due; None when there is no telemetry."""
         return self._due_ns
 
     def telemetry(self, now_ns: int) -> bytes:
-        """The frames that are due now, one of each stream however late: stale telemetry is of no use."""
+        """The frames that are due now, one of each stream however late, because stale telemetry is of no use."""
         if self._due_ns is None or now_ns < self._due_ns:
             return b""
         due = [stream for stream in self._streams if stream.due_ns <= now_ns]
@@ -143,7 +143,7 @@ class Autopilot:
 
 
 def _battery(now_ns: int) -> Battery:
-    """Drained evenly; the voltage falls with the charge."""
+    """The state of a battery that drains evenly; its voltage falls with the charge."""
     left = max(0.0, 1 - now_ns / ENDURANCE_NS)
     return Battery(
         cells_v=(_EMPTY_V + (_FULL_V - _EMPTY_V) * left,) * _CELLS,

@@ -1,13 +1,13 @@
-"""Collision avoidance as an application: hellos, warnings and fixes to the lookout, its warnings to everyone.
+"""Collision avoidance as an application: it feeds a conflict monitor, and sends the monitor's warnings to all nodes.
 
-It objects to the courses of other applications while it avoids somebody.
+While it avoids another UAV, it objects to the courses of other applications.
 """
 
 import math
 from collections.abc import Mapping
 from typing import Any, Final
 
-from agents.lookout import Lookout
+from agents.conflicts import ConflictMonitor
 from fanet_mw import mavlink, wire
 from fanet_mw.application import Application, AppPort, Course, Received
 from fanet_mw.bus.messages import Gps
@@ -19,41 +19,41 @@ from fanet_mw.units import MS, NodeId
 
 
 class CollisionAvoidance(Application):
-    """One UAV that warns others, and avoids them."""
+    """Warns other UAVs of collisions, and avoids them."""
 
     name: Final = "warning"
     listens = (mavlink.COLLISION_ID,)
 
     def __init__(self, scenario: Scenario, node: NodeId) -> None:
-        self._lookout = Lookout(scenario, node)
+        self._monitor = ConflictMonitor(scenario, node)
         self._encoder = mavlink.Encoder(node)
         self._bad_positions = 0
-        """Hellos whose position is none, or not of now."""
+        """The number of hellos whose position is missing, or not of the present."""
 
     def on_hello(self, frame: bytes, now_ns: int) -> None:
-        """A neighbor's hello says where it flies."""
+        """Take in where a neighbor flies, from its hello."""
         try:
             origin = NodeId(wire.decode_header(frame).origin)
-            told = mavlink.kinematics_of(frame)
+            heard = mavlink.kinematics_of(frame)
         except MalformedFrameError:
             self._bad_positions += 1
             return
-        if not self._lookout.heard(origin, Motion(told.position, told.velocity, told.t_ms * MS), now_ns=now_ns):
+        if not self._monitor.on_hello(origin, Motion(heard.position, heard.velocity, heard.t_ms * MS), now_ns=now_ns):
             self._bad_positions += 1
 
     def on_message(self, message: Received, now_ns: int) -> None:
-        """A warning of another UAV, for us perhaps."""
+        """Take in a warning of another UAV, which may be for this one."""
         warning = mavlink.collision_of(message.frame)
-        self._lookout.warned(message.origin, warning, self._motion(now_ns), born_ns=message.born_ns, now_ns=now_ns)
+        self._monitor.on_warning(message.origin, warning, self._motion(now_ns), born_ns=message.born_ns, now_ns=now_ns)
         self.port.tap(message.frame)
-        self._settle(now_ns)
+        self._hand_over(now_ns)
 
     def on_fix(self, fix: Gps, now_ns: int) -> None:
-        self._lookout.moved(self._motion(now_ns))
-        self._settle(now_ns)
+        self._monitor.on_fix(self._motion(now_ns))
+        self._hand_over(now_ns)
 
     def permits(self, course: Course, now_ns: int) -> bool:
-        return self._lookout.steered(course)
+        return self._monitor.permits(course)
 
     def report(self) -> Mapping[str, Any]:
         return {"bad_positions": self._bad_positions}
@@ -61,11 +61,11 @@ class CollisionAvoidance(Application):
     def _motion(self, now_ns: int) -> Motion:
         return Motion(self.port.position, self.port.velocity, now_ns)
 
-    def _settle(self, now_ns: int) -> None:
-        """Bring what the lookout put out to where it goes: records, warnings, and how to fly."""
-        lookout, port = self._lookout, self.port
-        _record(lookout, port)
-        warnings, lookout.warnings = lookout.warnings, []
+    def _hand_over(self, now_ns: int) -> None:
+        """Pass on what the monitor has put out: records, warnings, and a course."""
+        monitor, port = self._monitor, self.port
+        _record(monitor, port)
+        warnings, monitor.warnings = monitor.warnings, []
         for other, approach in warnings:
             inner = self._encoder.collision(
                 other,
@@ -75,12 +75,12 @@ class CollisionAvoidance(Application):
             )
             handle = port.send(inner, priority=wire.PRIORITY_SAFETY)
             port.record(Warned(now_ns, port.node, other, handle))
-        if lookout.course is not None:
-            port.fly(lookout.course)
-            lookout.course = None
+        if monitor.course is not None:
+            port.fly(monitor.course)
+            monitor.course = None
 
 
-def _record(lookout: Lookout, port: AppPort) -> None:
-    for record in lookout.records:
+def _record(monitor: ConflictMonitor, port: AppPort) -> None:
+    for record in monitor.records:
         port.record(record)
-    lookout.records.clear()
+    monitor.records.clear()

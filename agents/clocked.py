@@ -1,11 +1,11 @@
-"""A UAV that does not know the time: between it and its host every instant is translated.
+"""A UAV with a clock of its own: every instant between it and its host is translated.
 
     host: true time  |  own clock (`local_clock`)  |  swarm time as this node believes it (`swarm_time`)  |  UAV
 
-The UAV lives in swarm time as it believes it; receptions and statuses reach it as its radio's own clock stamped them.
-Its requests leave in true time, and so do its trace records: delays are measured across nodes. Time beacons are added
-to hellos here, so that protocols know nothing of clocks. A clock that turns out to have been ahead stands still until
-swarm time has come up with it. Until a node has swarm time no schedule reaches it: it owns no slot and contends.
+The UAV lives in swarm time as it believes it; receptions and statuses reach it as stamped by its radio's own clock. Its
+requests leave in true time, and so do its trace records, because delays are measured across nodes. Time beacons are
+added to hellos here, so that protocols know nothing of clocks. A clock that turns out to have been ahead stands still
+until swarm time has caught up. Until a node has swarm time no schedule reaches it: it owns no slot, and contends.
 """
 
 from collections.abc import Mapping
@@ -40,11 +40,11 @@ from fanet_mw.units import US, Enu, NodeId, S
 from fanet_mw.wire import Kind
 
 _SAMPLE_NS: Final = S
-"""How often the true error is recorded."""
+"""The interval at which the true error is recorded."""
 _ROUNDING_NS: Final = 2 * US
-"""An instant that went to the host and came back may differ by this much; a wake-up within it is due."""
+"""An instant that has gone to the host and back may differ by this much; a wake-up within it counts as due."""
 _HELLOS: Final = 8
-"""Hellos whose status is awaited."""
+"""The number of hellos whose status is awaited."""
 
 
 class ClockedUav(Actor):
@@ -61,12 +61,12 @@ class ClockedUav(Actor):
         self._most_bytes = scenario.radio.max_frame_bytes
         self._until_ns = scenario.duration_ns
         self._shown_ns = 0
-        """Swarm time as the UAV was last told: it never goes back."""
+        """Swarm time as it was last given to the UAV; it never goes back."""
         self._sample_ns = 0
         self._hellos: dict[int, int] = {}
-        """Which of our requests are hellos, and their numbers."""
+        """The requests of this UAV that are hellos, with their numbers."""
         self._withheld = 0
-        """Schedules that came before there was swarm time."""
+        """The number of schedules that came before there was swarm time."""
 
     # --- the actor contract ---------------------------------------------------------------------------------------
 
@@ -80,10 +80,10 @@ class ClockedUav(Actor):
 
     def receive(self, topic: str, message: Message, now_ns: int) -> None:
         self._clock.pass_time(now_ns, until_ns=self._until_ns)
-        heard = self._translated(message, now_ns)
-        if heard is not None:
-            self._uav.receive(topic, heard, self._now(now_ns))
-        known = {heard.end_ns: message.end_ns} if isinstance(heard, Reception) else {}  # type: ignore[union-attr]
+        translated = self._translated(message, now_ns)
+        if translated is not None:
+            self._uav.receive(topic, translated, self._now(now_ns))
+        known = {translated.end_ns: message.end_ns} if isinstance(translated, Reception) else {}  # type: ignore[union-attr]
         self._hand_over(now_ns, known)
 
     def wake(self, now_ns: int) -> None:
@@ -123,7 +123,7 @@ class ClockedUav(Actor):
     # --- instants -------------------------------------------------------------------------------------------------
 
     def _now(self, now_ns: int) -> int:
-        """Swarm time now, as the UAV is told."""
+        """Swarm time now, as the UAV is given it."""
         swarm_ns = self._time.line.swarm_ns(self._clock.local_ns(now_ns))
         self._shown_ns = max(self._shown_ns, swarm_ns)
         return self._shown_ns
@@ -138,12 +138,12 @@ class ClockedUav(Actor):
     # --- in -------------------------------------------------------------------------------------------------------
 
     def _translated(self, message: Message, now_ns: int) -> Message | None:
-        """A message as the UAV is to have it; None: it is not to have it."""
+        """A message as the UAV is to receive it; None when it is to receive nothing."""
         if isinstance(message, Reception):
             ended_ns = self._stamped_ns(message.end_ns)
             kind = wire.peek_kind(message.frame)
             if kind == Kind.HELLO and isinstance(self._time, BeaconTime):
-                self._time.heard(message.frame, ended_ns=ended_ns, local_ns=self._clock.local_ns(now_ns))
+                self._time.on_hello(message.frame, ended_ns=ended_ns, local_ns=self._clock.local_ns(now_ns))
             elif kind == Kind.SCHEDULE and not self._time.synced:
                 self._withheld += 1
                 return None
@@ -165,7 +165,7 @@ class ClockedUav(Actor):
     # --- out ------------------------------------------------------------------------------------------------------
 
     def _hand_over(self, now_ns: int, known: Mapping[int, int] | None = None) -> None:
-        """Bring out what the UAV has to say; `known`: the true instants of what it was told of."""
+        """Take over what the UAV has put out; `known` maps instants given to the UAV to their true instants."""
         uav = self._uav
         for topic, message in uav.outbox:
             if type(message) is TxRequest:
@@ -194,7 +194,7 @@ class ClockedUav(Actor):
         return request
 
     def _with_time(self, request: TxRequest, time: BeaconTime, now_ns: int) -> TxRequest:
-        """A hello says when the one before it ended, and asks when it ends itself."""
+        """Add to a hello when the previous one ended, and ask for a status that tells when this one ends."""
         seen = wire.peek(request.frame)
         assert seen is not None, "our own frames begin with a header"
         while len(self._hellos) >= _HELLOS:
@@ -218,6 +218,6 @@ class ClockedUav(Actor):
 
 
 def make_uav(scenario: Scenario, node: NodeId, swarm: str, *, position: Enu) -> Actor:
-    """A UAV as the scenario has it: with its host's clock, or with one of its own."""
+    """A UAV as the scenario wants it: with its host's clock, or with a clock of its own."""
     kind = ClockedUav if scenario.clock.modelled else Uav
     return kind(scenario, node, swarm, position=position)

@@ -1,9 +1,9 @@
-"""A UAV's oscillator: what its clock shows at a true instant, and the way back. Known to the run, not to the node.
+"""A UAV's oscillator: what its clock shows at a true instant, and the reverse. Known to the run, not to the node.
 
     local = true + offset + sum over seconds of rate x time,   the rate a bounded random walk, constant within a second
 
-Instants before the start and beyond the walk are carried on at the first and the last rate. Not modelled: temperature,
-voltage, aging, and jumps of the counter.
+Before the start and beyond the walk the first and the last rate hold on. Not modeled: temperature, voltage, aging, and
+jumps of the counter.
 """
 
 from typing import Final, NamedTuple
@@ -14,11 +14,11 @@ from fanet_mw.units import NodeId, S
 
 _PPM: Final = 1e-6
 _AHEAD_NS: Final = 60 * S
-"""The walk is known this far ahead: nothing is announced farther."""
+"""The walk is computed this far ahead; nothing is announced further ahead."""
 
 
 class _Second(NamedTuple):
-    """From this true instant on, the clock shows `local_ns` and runs fast by `rate`."""
+    """From this true instant on the clock shows `local_ns` and runs fast by `rate`."""
 
     true_ns: int
     local_ns: int
@@ -38,7 +38,7 @@ class LocalClock:
         self._walk = [_Second(0, self._offset_ns, rate)]
 
     def pass_time(self, true_ns: int, *, until_ns: int) -> None:
-        """Know the walk for what may be asked from now on; it ends at `until_ns`."""
+        """Extend the walk over all instants that may be asked for from now on, up to `until_ns`."""
         if not self._wander:
             return
         while self._walk[-1].true_ns < min(true_ns, until_ns) + _AHEAD_NS:
@@ -53,7 +53,7 @@ class LocalClock:
         return _shown(self._walk[index], true_ns)
 
     def true_ns(self, local_ns: int) -> int:
-        """When the clock shows that."""
+        """The true instant at which the clock shows `local_ns`."""
         index = max(0, min(len(self._walk) - 1, (local_ns - self._offset_ns) // S))
         while index and self._walk[index].local_ns > local_ns:
             index -= 1

@@ -1,9 +1,9 @@
-"""Where a UAV takes itself to be when GPS errs by much: the fixes averaged along the way that its velocity tells.
+"""A UAV's estimate of its position when GPS errs by much: the fixes, averaged along the track that its velocity gives.
 
     estimate += velocity x time;  estimate += max(gain, 1 / fixes so far) x (fix - estimate)
 
-With fixes whose errors are independent the estimate errs by sqrt(gain / (2 - gain)) of a fix. A velocity is measured by
-Doppler shift, and far better than a position; an error of it shows as error x time between fixes / gain.
+With fixes whose errors are independent, the error of the estimate is sqrt(gain / (2 - gain)) of a fix's. A velocity is
+measured by Doppler shift, much more accurately than a position; its error shows as error x time between fixes / gain.
 """
 
 import math
@@ -13,20 +13,20 @@ from fanet_mw.bus.messages import Gps
 from fanet_mw.units import Enu, S
 
 _WANTED: Final = 0.01
-"""Of the radio range: the error that timetables by places bear."""
+"""The share of the radio range that the estimate may err by: timetables by places tolerate that much."""
 _NEGLIGIBLE: Final = 0.02
-"""Of the radio range: fixes that err by less are taken as they are."""
+"""Fixes that err by less than this share of the radio range are used as they are."""
 
 
 class SteadyFix:
-    """One UAV's estimate."""
+    """The position estimate of one UAV."""
 
     def __init__(self, *, sigma_m: float, range_m: float) -> None:
         self._gain = gain(sigma_m=sigma_m, range_m=range_m)
         self._at: Enu | None = None
         self._t_ns = 0
         self._count = 1
-        """Fixes so far: the first ones have equal weights."""
+        """The number of fixes so far; the first fixes have equal weights."""
 
     def position(self, fix: Gps) -> Enu:
         """The estimate after another fix."""
@@ -46,7 +46,7 @@ class SteadyFix:
 
 
 def gain(*, sigma_m: float, range_m: float) -> float:
-    """The weight of a fix, so that the estimate errs by `_WANTED`; 1 for fixes that are good enough."""
+    """The weight of a fix that gives the estimate an error of `_WANTED`; 1 for fixes that are good enough."""
     if sigma_m <= _NEGLIGIBLE * range_m:
         return 1.0
     share = _WANTED * range_m / sigma_m

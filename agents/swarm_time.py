@@ -1,6 +1,6 @@
 """How a UAV's clock is brought to swarm time: not at all, by time beacons, or by GPS. Own instants in, a line out.
 
-Not modelled of GPS: outages (a world that gives no fixes does), multipath, and errors that last from fix to fix.
+Not modeled of GPS: outages (they are modeled by a world without fixes), multipath, errors that last from fix to fix.
 """
 
 import math
@@ -23,10 +23,10 @@ _PPM: Final = 1e-6
 
 
 class SwarmTime(ABC):
-    """The own clock taken for swarm time, until something better is known."""
+    """A way to swarm time; until something better is known, the own clock is taken for it."""
 
-    says_time: bool = False
-    """Whether hellos carry it."""
+    sends_beacons: bool = False
+    """True if hellos carry swarm time."""
 
     @property
     @abstractmethod
@@ -38,32 +38,32 @@ class SwarmTime(ABC):
 
     @abstractmethod
     def error_ns(self, local_ns: int) -> int | None:
-        """The stated bound of the own error; None: there is none to state."""
+        """The bound of this node's error, as it is stated; None when there is none to state."""
 
     def worst_ns(self, local_ns: int) -> int:
         """The greatest error of any node, as far as it is known here."""
         return self.error_ns(local_ns) or 0
 
     def place(self, local_ns: int) -> tuple[int, int]:
-        """(the node whose clock is followed, hops to it); 0 and 0 when it is no node's."""
+        """(the node whose clock is followed, hops to it); 0 and 0 when no node's clock is followed."""
         return 0, 0
 
     def start(self, local_ns: int) -> None:  # noqa: B027
-        """The node is up."""
+        """The node has started."""
 
     def pass_time(self, local_ns: int) -> None:  # noqa: B027
-        """It is later."""
+        """Time has passed."""
 
     def fix(self, local_ns: int, gps_ns: int) -> None:  # noqa: B027
-        """A position fix: true time at an own instant."""
+        """Take in a position fix, which gives the true time at an own instant."""
 
     def report(self) -> Mapping[str, object]:
-        """JSON-able state."""
+        """The state, as JSON values."""
         return {}
 
 
 class OwnTime(SwarmTime):
-    """`clock.sync = "none"`: no agreement; whoever believes it believes every clock to be exact."""
+    """`clock.sync = "none"`: nodes do not synchronize, as if every clock were exact."""
 
     line = EXACT
     synced = True
@@ -73,7 +73,7 @@ class OwnTime(SwarmTime):
 
 
 class GpsTime(SwarmTime):
-    """`clock.sync = "gps"`: a line through the last fixes; between and after them it holds over."""
+    """`clock.sync = "gps"`: a line through the last fixes, which also holds between and after them."""
 
     def __init__(self, clock: Clock, *, seed: int, node: NodeId) -> None:
         self._sigma_ns = clock.gps_sigma_ns
@@ -98,18 +98,18 @@ class GpsTime(SwarmTime):
         if abs(gps_ns - local_ns) > self._limit_ns:
             self._implausible += 1
             return
-        said_ns = gps_ns + round(self._gauss(0.0, self._sigma_ns))
+        stated_ns = gps_ns + round(self._gauss(0.0, self._sigma_ns))
         error_ns = math.ceil(_SIGMAS * self._sigma_ns) + self._oscillator.stamp_ns
-        self._fit.add(Pair(local_ns, said_ns - local_ns, error_ns))
+        self._fit.add(Pair(local_ns, stated_ns - local_ns, error_ns))
 
     def report(self) -> Mapping[str, object]:
         return {"fixes": len(self._fit), "outlier": self._fit.outliers, "implausible": self._implausible}
 
 
 class BeaconTime(SwarmTime):
-    """`clock.sync = "beacons"`: `TimeSync`, and what of it is in frames."""
+    """`clock.sync = "beacons"`: a `TimeSync`, and its beacons in frames."""
 
-    says_time = True
+    sends_beacons = True
 
     def __init__(self, scenario: Scenario, node: NodeId) -> None:
         clock, radio = scenario.clock, scenario.radio
@@ -150,16 +150,16 @@ class BeaconTime(SwarmTime):
         self._sync.pass_time(local_ns)
 
     def hello_sent(self, hello: int, *, ended_ns: int) -> None:
-        """A hello of ours has left, and ended then."""
+        """A hello of this node has left the antenna, and ended at that instant."""
         self._sync.hello_sent(hello, ended_ns=ended_ns)
 
     def beacon(self, node: NodeId, local_ns: int) -> bytes:
-        """What the next hello carries."""
+        """The time beacon for the next hello."""
         beacon = self._sync.beacon(local_ns)
         return b"" if beacon is None else beacon.encode_frame(node)
 
-    def heard(self, frame: bytes, *, ended_ns: int, local_ns: int) -> None:
-        """A neighbor's hello. Its sender is who its header names: the radio's word for it does not pass every bus."""
+    def on_hello(self, frame: bytes, *, ended_ns: int, local_ns: int) -> None:
+        """Take in a neighbor's hello. Its header names the sender; the radio's source is not passed on by every bus."""
         beacon = None
         try:
             header = wire.decode_header(frame)
@@ -175,13 +175,13 @@ class BeaconTime(SwarmTime):
 
 
 def oscillator(clock: Clock, *, others: int) -> Oscillator:
-    """What a data sheet says of the own clock, and of the one it follows when that drifts too."""
+    """What a data sheet says of the own clock, and of the clock that it follows if that drifts too."""
     rate = (1 + others) * clock.drift_ppm * _PPM
     return Oscillator(rate=rate, wander=clock.wander_ppm * _PPM, stamp_ns=clock.stamp_ns)
 
 
 def swarm_time(scenario: Scenario, node: NodeId) -> SwarmTime:
-    """As the scenario says."""
+    """The way to swarm time that the scenario chooses."""
     if scenario.clock.sync == "beacons":
         return BeaconTime(scenario, node)
     if scenario.clock.sync == "gps":

@@ -8,9 +8,9 @@ guard time of a slot.
 
 from fanet_mw.bounds.access import Contention, Dcf, access_bound
 from fanet_mw.bounds.arrivals import Arrivals, Limited, Periodic, Total, token_bucket
+from fanet_mw.bounds.delay_bound import Bounded, DelayBound, Refused
 from fanet_mw.bounds.guard import guard_ns
 from fanet_mw.bounds.network import backlog, delay_any_order, delay_fifo
-from fanet_mw.bounds.outcome import Bounded, Outcome, Refused
 from fanet_mw.bounds.slot import Server, SlotServer, single_slot_bound
 from fanet_mw.bounds.tandem import Flow, Hop, ordered_tandem, path_bounds
 from fanet_mw.bounds.turn_gaps import TurnServer
@@ -23,7 +23,7 @@ __all__ = [
     "Flow",
     "Hop",
     "Limited",
-    "Outcome",
+    "DelayBound",
     "Periodic",
     "Refused",
     "Server",

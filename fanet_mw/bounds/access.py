@@ -22,7 +22,7 @@ greatest at once.
 from typing import NamedTuple
 
 from fanet_mw.airtime import Timing
-from fanet_mw.bounds.outcome import Bounded, Outcome, Refused
+from fanet_mw.bounds.delay_bound import Bounded, DelayBound, Refused
 from fanet_mw.errors import LocalProtocolError
 from fanet_mw.scenario.radio import Radio
 from fanet_mw.units import US
@@ -72,7 +72,7 @@ class Contention(NamedTuple):
     own_frames: int = 1
 
 
-def access_bound(dcf: Dcf, own_airtime_ns: int, others: Contention, *, window_ns: int | None = None) -> Outcome:
+def access_bound(dcf: Dcf, own_airtime_ns: int, others: Contention, *, window_ns: int | None = None) -> DelayBound:
     """The longest time from queueing an acknowledged unicast to its outcome; refused if `window_ns` is shorter."""
     if others.stations < 1 or others.frames_each < 0 or others.own_frames < 1 or own_airtime_ns <= 0:
         raise LocalProtocolError(f"{others} and {own_airtime_ns=} must have stations, own frames and airtime > 0")

@@ -15,7 +15,7 @@ from math import ceil, lcm
 from typing import Final
 
 from fanet_mw.bounds.arrivals import Arrivals, Periodic
-from fanet_mw.bounds.outcome import Bounded, Outcome, Refused
+from fanet_mw.bounds.delay_bound import Bounded, DelayBound, Refused
 from fanet_mw.bounds.slot import Server
 
 _PACKETS_EXAMINED: Final = 100_000
@@ -39,7 +39,7 @@ def refusal(arrivals: Arrivals, server: Server) -> Refused | None:
     return None
 
 
-def delay_fifo(arrivals: Arrivals, server: Server) -> Outcome:
+def delay_fifo(arrivals: Arrivals, server: Server) -> DelayBound:
     """The worst delay [ns] of any packet of the aggregate, in FIFO order, from arrival to the end of its airtime."""
     refused = refusal(arrivals, server)
     if refused is not None:
@@ -61,7 +61,7 @@ def backlog(arrivals: Arrivals, server: Server) -> int | Refused:
     return max(q - server.served(span_ns) for q, span_ns in enumerate(examined, start=1))
 
 
-def delay_any_order(flow: Periodic, cross: Arrivals, server: Server, *, blocking: int = 0) -> Outcome:
+def delay_any_order(flow: Periodic, cross: Arrivals, server: Server, *, blocking: int = 0) -> DelayBound:
     """The worst delay of `flow`'s packets when the head may send `cross` first (priorities, or any order).
 
     With priorities, `cross` is the traffic that is as urgent or more urgent, and `blocking` the number of frames of the

@@ -16,7 +16,7 @@ from fractions import Fraction
 from math import ceil, floor
 from typing import Final
 
-from fanet_mw.bounds.outcome import Bounded, Outcome, Refused
+from fanet_mw.bounds.delay_bound import Bounded, DelayBound, Refused
 from fanet_mw.errors import LocalProtocolError
 
 _SLOTS_EXAMINED: Final = 1_000_000
@@ -32,7 +32,9 @@ def w_ns(q: int, *, airtime_ns: int, slot_ns: Fraction | int, period_ns: int) ->
     return ceil(Fraction(q * airtime_ns) / slot_ns) * period_ns
 
 
-def cluster_estimate(*, airtime_ns: int, slot_ns: Fraction | int | None, period_ns: int, interval_ns: int) -> Outcome:
+def cluster_estimate(
+    *, airtime_ns: int, slot_ns: Fraction | int | None, period_ns: int, interval_ns: int
+) -> DelayBound:
     """WD_c of equation (3); `slot_ns` None stands for the paper's own S.
 
     All q with the same ceiling share w(q), so only the first of each is examined: the others are smaller by multiples
@@ -59,7 +61,7 @@ def cluster_estimate(*, airtime_ns: int, slot_ns: Fraction | int | None, period_
     return Refused(f"Q in equation (3) lies beyond {_SLOTS_EXAMINED} slots")
 
 
-def path_estimate(clusters: Iterable[Outcome]) -> Outcome:
+def path_estimate(clusters: Iterable[DelayBound]) -> DelayBound:
     """Equation (1): the sum over the clusters on the path; refused if one of the clusters is."""
     total_ns = 0
     for outcome in clusters:

@@ -17,7 +17,7 @@ slot, loss, clock error (subtract the guard time from S).
 from fractions import Fraction
 from typing import NamedTuple, Protocol
 
-from fanet_mw.bounds.outcome import Bounded, Outcome, Refused
+from fanet_mw.bounds.delay_bound import Bounded, DelayBound, Refused
 from fanet_mw.errors import LocalProtocolError
 
 
@@ -101,7 +101,7 @@ class SlotServer(NamedTuple):
         return (slots - 1) * self.period_ns - self.slot_ns + (outer - 1) * self.airtime_ns
 
 
-def single_slot_bound(server: SlotServer, *, interval_ns: int) -> Outcome:
+def single_slot_bound(server: SlotServer, *, interval_ns: int) -> DelayBound:
     """The worst delay, from arrival to end of airtime, of packets that arrive every `interval_ns` = p in any phase.
 
     It is the maximum over q of completion(q) - (q-1) p, for all q of the busy period (Davis et al. 2007, "Controller

@@ -17,8 +17,8 @@ from itertools import pairwise
 from typing import Final, NamedTuple
 
 from fanet_mw.bounds.arrivals import Arrivals, Limited, Periodic, Total
+from fanet_mw.bounds.delay_bound import Bounded, DelayBound, Refused
 from fanet_mw.bounds.network import backlog, delay_fifo
-from fanet_mw.bounds.outcome import Bounded, Outcome, Refused
 from fanet_mw.bounds.slot import SlotServer
 from fanet_mw.errors import LocalProtocolError
 
@@ -45,8 +45,8 @@ class Flow(NamedTuple):
 class PathBounds(NamedTuple):
     """The fixed point: delay end to end per flow (relay times included), delay and backlog per hop."""
 
-    flows: tuple[Outcome, ...]
-    hops: Mapping[int, Outcome]
+    flows: tuple[DelayBound, ...]
+    hops: Mapping[int, DelayBound]
     backlogs: Mapping[int, int]
 
 
@@ -65,8 +65,8 @@ def path_bounds(flows: Sequence[Flow], hops: Mapping[int, Hop]) -> PathBounds:
     return PathBounds(tuple(_along(flow, hops, solved) for flow in flows), solved, backlogs)
 
 
-def _fixed_point(flows: Sequence[Flow], hops: Mapping[int, Hop]) -> dict[int, Outcome]:
-    delays: dict[int, Outcome] = {name: Bounded(hops[name].server.airtime_ns) for name in sorted(hops)}
+def _fixed_point(flows: Sequence[Flow], hops: Mapping[int, Hop]) -> dict[int, DelayBound]:
+    delays: dict[int, DelayBound] = {name: Bounded(hops[name].server.airtime_ns) for name in sorted(hops)}
     for _ in range(_ROUNDS):
         inputs = _inputs(flows, hops, delays)
         found = {name: delay_fifo(inputs[name], hops[name].server) for name in delays}
@@ -80,7 +80,7 @@ def _fixed_point(flows: Sequence[Flow], hops: Mapping[int, Hop]) -> dict[int, Ou
     return {name: d if isinstance(d, Refused) else reason for name, d in delays.items()}
 
 
-def _inputs(flows: Sequence[Flow], hops: Mapping[int, Hop], delays: Mapping[int, Outcome]) -> dict[int, Arrivals]:
+def _inputs(flows: Sequence[Flow], hops: Mapping[int, Hop], delays: Mapping[int, DelayBound]) -> dict[int, Arrivals]:
     """What arrives at each hop, given all delays: its own packets, and what each upstream slot releases."""
     own: dict[int, list[Arrivals]] = {name: [] for name in hops}
     relayed: dict[int, dict[int, list[Arrivals]]] = {name: {} for name in hops}
@@ -106,7 +106,7 @@ def _inputs(flows: Sequence[Flow], hops: Mapping[int, Hop], delays: Mapping[int,
     return inputs
 
 
-def _along(flow: Flow, hops: Mapping[int, Hop], delays: Mapping[int, Outcome]) -> Outcome:
+def _along(flow: Flow, hops: Mapping[int, Hop], delays: Mapping[int, DelayBound]) -> DelayBound:
     total_ns = 0
     for name in flow.path:
         delay = delays[name]
@@ -118,7 +118,7 @@ def _along(flow: Flow, hops: Mapping[int, Hop], delays: Mapping[int, Outcome]) -
 
 def ordered_tandem(
     arrivals: Arrivals, servers: Sequence[SlotServer], starts_ns: Sequence[int], *, relay_ns: int = 0
-) -> Outcome:
+) -> DelayBound:
     """The end-to-end delay when the positions of the slots in a common period are known and no other traffic uses them.
 
     What one occurrence of a slot releases is queued at the next head before that head's next occurrence begins, and

@@ -1,8 +1,8 @@
-"""Who must relay so that a flood reaches all: a connected set that every node is in or hears.
+"""Connected dominating sets: relays with which a flood reaches all nodes, because each node is in the set or hears it.
 
-Two ways: `wu_li` needs only two-hop knowledge, so each node can find out for itself whether it belongs; `guha_khuller`
-sees everything and needs fewer. A swarm in several parts gets one set per part, of at least one node each. With no
-relay to spare, a loss is final; who wants redundancy relays more.
+There are two constructions: `wu_li` needs only two-hop knowledge, so that each node can decide for itself whether it
+belongs; `guha_khuller` sees the whole topology and needs fewer relays. A swarm in several parts gets one set per part,
+with at least one node. Without a spare relay a loss is final; redundancy takes more relays.
 """
 
 from collections.abc import Mapping
@@ -28,18 +28,18 @@ def wu_li(adjacency: Adjacency, *, priority: Mapping[NodeId, float] = _EQUAL) ->
     kept = {node for node in marked if not _covered(node, marked, near, rank)}
     for part in components(adjacency):
         if not any(node in kept for node in part):
-            kept.add(max(part, key=rank.__getitem__))  # everyone hears everyone: one is enough
+            kept.add(max(part, key=rank.__getitem__))  # all hear each other, so one relay is enough
     return tuple(sorted(kept))
 
 
 def dominates(node: NodeId, adjacency: Adjacency, *, priority: Mapping[NodeId, float] = _EQUAL) -> bool:
-    """Whether `node` belongs to the set, decided by itself: `adjacency` need hold the node and its neighbors only.
+    """True if `node` belongs to the set, as it decides by itself; `adjacency` needs only the node and its neighbors.
 
-    It does not when any two of its neighbors hear each other or have a way over nodes that are all stronger (coverage
-    condition I of Wu & Dai, "A generic distributed broadcast scheme in ad hoc wireless networks", ICDCS 2003), as
-    far as its two hops show. Prunes what rule k does, and more in thin swarms, where ways lead around the node. A hash
-    of the id breaks ties: in a swarm numbered row by row no node has stronger ones all around. Where everyone hears
-    everyone nobody belongs: whoever sends reaches all.
+    It does not belong if any two of its neighbors hear each other or are connected over nodes that are all stronger
+    (coverage condition I of Wu & Dai, "A generic distributed broadcast scheme in ad hoc wireless networks", ICDCS
+    2003), as far as its two hops show. This prunes what rule k prunes, and more in sparse swarms, where connections
+    lead around the node. A hash of the id breaks ties: with plain ids, a swarm numbered row by row has no node with
+    stronger ones all around. Where all nodes hear each other none belongs, because each sender reaches all.
     """
     near = {n: frozenset(adjacency[n]) for n in (node, *adjacency[node])}
     if _complete(adjacency[node], near):

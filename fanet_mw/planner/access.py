@@ -10,7 +10,7 @@ bound.
 from collections.abc import Mapping, Sequence
 from typing import Final, NamedTuple
 
-from fanet_mw.bounds import Bounded, Dcf, Outcome, Refused
+from fanet_mw.bounds import Bounded, Dcf, DelayBound, Refused
 from fanet_mw.graph.topology import Adjacency, two_hop
 from fanet_mw.planner.demand import TrafficClass
 from fanet_mw.planner.flood import frame_ns
@@ -70,7 +70,7 @@ def _tree(adjacency: Adjacency, roots: Sequence[NodeId]) -> dict[NodeId, NodeId]
 
 def access_outcome(
     scenario: Scenario, adjacency: Adjacency, found: Ways, classes: Sequence[TrafficClass], *, spacing_ns: int | None
-) -> Outcome:
+) -> DelayBound:
     """The longest time from any member to its head over all hops; `spacing_ns` is the least between floods, if any."""
     if not classes or not any(found.hops.values()):
         return Bounded(0)

@@ -9,7 +9,7 @@ from collections.abc import Sequence
 from typing import NamedTuple
 
 from fanet_mw import wire
-from fanet_mw.bounds import Bounded, Outcome, Refused
+from fanet_mw.bounds import Bounded, DelayBound, Refused
 from fanet_mw.routing.clustered.tdma.urgent import REPORT_BYTES, WARNING_BYTES
 from fanet_mw.scenario import Scenario
 from fanet_mw.units import NodeId, seconds_to_ns
@@ -35,8 +35,8 @@ class ClassPlan(NamedTuple):
     name: str
     sources: int
     interval_ns: int
-    bound: Outcome
-    from_head: Outcome
+    bound: DelayBound
+    from_head: DelayBound
     priority: int = wire.PRIORITY_BULK
 
     def meets(self, deadline_ns: int) -> bool:

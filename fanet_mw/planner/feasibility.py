@@ -15,7 +15,7 @@ from collections.abc import Mapping, Sequence
 from typing import Final, NamedTuple
 
 from fanet_mw import wire
-from fanet_mw.bounds import Bounded, Outcome, Refused, paper
+from fanet_mw.bounds import Bounded, DelayBound, Refused, paper
 from fanet_mw.bounds.guard import PLANNED_ERROR_NS, slot_guard_ns
 from fanet_mw.graph.topology import Adjacency, within_range
 from fanet_mw.planner import contention_window, reachability, verdict
@@ -42,9 +42,9 @@ class Plan(NamedTuple):
     scenario: Scenario
     clusters: tuple[ClusterPlan, ...]
     classes: tuple[ClassPlan, ...]
-    access: Outcome
+    access: DelayBound
     uplink_ns: int
-    paper: Outcome
+    paper: DelayBound
     """The estimate of the paper's equations (1)-(4) for the fullest cluster, for comparison only."""
     superframe: TimetablePlan | None
     """The timetable; None where relays are not scheduled."""
@@ -247,7 +247,9 @@ def _assumed_ns(site: Site) -> int:
     return max(_ASSUMED_UPLINK_NS, site.scenario.clusters.period_ns) if site.timetable else _ASSUMED_UPLINK_NS
 
 
-def _access(site: Site, found: Ways, classes: Sequence[TrafficClass], shares: Sequence[Sequence[ClassLoad]]) -> Outcome:
+def _access(
+    site: Site, found: Ways, classes: Sequence[TrafficClass], shares: Sequence[Sequence[ClassLoad]]
+) -> DelayBound:
     """The way to the head. Under a timetable it shares no air with floods, but it has to fit the contention window."""
     if not site.timetable:
         spacing_ns = min((s.flood.spacing_ns for row in shares for s in row), default=S)
@@ -346,7 +348,7 @@ def _packets(shares: Sequence[ClassLoad], period_ns: int) -> float:
     return sum(s.sources * period_ns / s.interval_ns for s in shares)
 
 
-def _planned(c: TrafficClass, bound: Outcome, from_head: Outcome) -> ClassPlan:
+def _planned(c: TrafficClass, bound: DelayBound, from_head: DelayBound) -> ClassPlan:
     return ClassPlan(c.name, len(c.sources), c.interval_ns, bound, from_head, c.priority)
 
 
@@ -364,7 +366,7 @@ def _class(index: int, c: TrafficClass, judged: _Judged, uplink_ns: int) -> Clas
     return _planned(c, Bounded(worst_ns + uplink_ns), Bounded(worst_ns))
 
 
-def _paper(clusters: Sequence[ClusterPlan], scenario: Scenario) -> Outcome:
+def _paper(clusters: Sequence[ClusterPlan], scenario: Scenario) -> DelayBound:
     """The greatest estimate by equations (3) and (4) of any cluster, whose packets are taken as evenly spaced."""
     worst_ns, period_ns = 0, scenario.clusters.period_ns
     for cluster in clusters:

@@ -11,7 +11,17 @@ from itertools import chain
 from math import ceil, inf
 from typing import Final, NamedTuple
 
-from fanet_mw.bounds import Bounded, Outcome, Periodic, Refused, SlotServer, Total, backlog, delay_any_order, delay_fifo
+from fanet_mw.bounds import (
+    Bounded,
+    DelayBound,
+    Periodic,
+    Refused,
+    SlotServer,
+    Total,
+    backlog,
+    delay_any_order,
+    delay_fifo,
+)
 from fanet_mw.planner.flood import FloodCost
 
 _PARTS: Final = 4
@@ -41,7 +51,7 @@ class ClusterPlan(NamedTuple):
     """Packets per flooding period."""
     flood: FloodCost
     """The cost of a flood of the longest packet."""
-    delays: tuple[Outcome, ...]
+    delays: tuple[DelayBound, ...]
     """For each class the time from the head's queue to the last node; 0 for a class without a source."""
     backlog: int | None
 
@@ -57,7 +67,7 @@ def work_ns(shares: Sequence[ClassLoad], *, period_ns: int) -> int:
 
 def slot_delays(
     shares: Sequence[ClassLoad], *, usable_ns: int, period_ns: int, jitter_ns: int
-) -> tuple[list[Outcome], int | None]:
+) -> tuple[list[DelayBound], int | None]:
     """For each class, most urgent first, the longest time from the head's queue to the last node; and the backlog.
 
     A class without sources is bounded by 0. Packets arrive late by up to `jitter_ns`.
@@ -86,7 +96,7 @@ def slot_delays(
 
 def _by_priority(
     index: int, shares: Sequence[ClassLoad], units: Sequence[Sequence[Periodic]], server: SlotServer
-) -> Outcome:
+) -> DelayBound:
     """The bound of one class: all equally or more urgent packets go first, and one less urgent may have begun."""
     if not units[index]:
         return Bounded(0)
@@ -95,7 +105,7 @@ def _by_priority(
     return delay_any_order(units[index][0], Total(tuple(before)), server, blocking=max(lower, default=0))
 
 
-def _flooded(share: ClassLoad, queue: Outcome) -> Outcome:
+def _flooded(share: ClassLoad, queue: DelayBound) -> DelayBound:
     """The time from the head's queue to the last node: the wait for the slot, and the rest of the flood."""
     if isinstance(queue, Refused) or not share.sources:
         return queue

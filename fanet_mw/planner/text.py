@@ -4,7 +4,7 @@ import textwrap
 from collections.abc import Iterator
 from typing import Final
 
-from fanet_mw.bounds import Bounded, Outcome, Refused
+from fanet_mw.bounds import Bounded, DelayBound, Refused
 from fanet_mw.planner.claimed_turns import ClaimedPlan
 from fanet_mw.planner.demand import ClassPlan
 from fanet_mw.planner.feasibility import Plan
@@ -206,7 +206,7 @@ def _cluster(c: ClusterPlan) -> str:
     )
 
 
-def _bound_text(outcome: Outcome) -> str:
+def _bound_text(outcome: DelayBound) -> str:
     if isinstance(outcome, Bounded):
         return f"at most {outcome.delay_ns / S:.3f} s"
     return f"no bound ({outcome.reason})"

@@ -7,7 +7,17 @@ the duration of the flood is added, which does not depend on other floods in the
 from collections.abc import Mapping, Sequence
 from typing import Final, NamedTuple
 
-from fanet_mw.bounds import Bounded, Outcome, Periodic, Refused, Total, TurnServer, backlog, delay_any_order, delay_fifo
+from fanet_mw.bounds import (
+    Bounded,
+    DelayBound,
+    Periodic,
+    Refused,
+    Total,
+    TurnServer,
+    backlog,
+    delay_any_order,
+    delay_fifo,
+)
 from fanet_mw.planner.flood import FloodCost
 from fanet_mw.planner.head_slot import ClassLoad, ClusterPlan
 from fanet_mw.routing.clustered.tdma.own_bound import Own
@@ -110,7 +120,7 @@ class _Root(NamedTuple):
         longest = (turns.flood_ns(offset, span=self.own.span) for offset in self.own.roots)
         return max(longest, default=turns.turn_ns)
 
-    def delay(self, share: ClassLoad) -> Outcome:
+    def delay(self, share: ClassLoad) -> DelayBound:
         """The bound of a class at this root.
 
         A class has room of its own in each turn, so a packet waits only for packets of its class; bulk also waits for
@@ -129,7 +139,7 @@ class _Root(NamedTuple):
         assert worst_ns is not None, "as many are let out as come"
         return Bounded(worst_ns)
 
-    def _queued(self, share: ClassLoad) -> Outcome:
+    def _queued(self, share: ClassLoad) -> DelayBound:
         server = self._server(self._per_turn(share))
         server.check()
         flow = Periodic(share.interval_ns, self.jitter_ns)

@@ -4,7 +4,7 @@ from collections.abc import Iterator, Sequence
 from typing import Final
 
 from fanet_mw import wire
-from fanet_mw.bounds import Bounded, Outcome, Refused
+from fanet_mw.bounds import Bounded, DelayBound, Refused
 from fanet_mw.planner.demand import ClassPlan
 from fanet_mw.planner.head_slot import ClusterPlan
 from fanet_mw.scenario import Scenario
@@ -64,7 +64,7 @@ def left_out(scenario: Scenario) -> Iterator[str]:
         yield "repairs of lost packets come later than any bound here, and their load is not counted"
 
 
-def notes(access: Outcome, clusters: Sequence[ClusterPlan], *, guard_ns: int, uplink_ns: int) -> Iterator[str]:
+def notes(access: DelayBound, clusters: Sequence[ClusterPlan], *, guard_ns: int, uplink_ns: int) -> Iterator[str]:
     if isinstance(access, Refused):
         yield f"the way to the head is assumed to take at most {uplink_ns / S:g} s, not proven: {access.reason}"
     if any(not cluster.flood.proven for cluster in clusters):

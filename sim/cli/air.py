@@ -1,4 +1,4 @@
-"""The `fanet air` commands: parsing and printing; what they do is in `sim.run.air`."""
+"""The `fanet air` commands: parsing and printing; what they do is in `sim.run.air_control`."""
 
 import math
 from dataclasses import dataclass
@@ -23,7 +23,7 @@ from fanet_mw.errors import ConfigError
 from fanet_mw.units import MAX_NODES, Enu, NodeId, S, seconds_to_ns
 from sim.cli.console import Console
 from sim.cli.options import warn_of
-from sim.run.air import change
+from sim.run.air_control import change
 from sim.run.running import locate
 
 app = App(name="air", help="Change the air of a swarm that runs: degrade a link, jam an area, cut a node off, restore.")

@@ -8,7 +8,7 @@ import math
 from typing import Any
 
 from agents.traffic import sources_of
-from fanet_mw.bounds import Bounded, Outcome, Refused
+from fanet_mw.bounds import Bounded, DelayBound, Refused
 from fanet_mw.errors import ConfigError
 from fanet_mw.graph.topology import within_range
 from fanet_mw.planner import (
@@ -186,7 +186,7 @@ def _optimum_json(best: Optimum) -> dict[str, Any]:
     }
 
 
-def _ms(outcome: Outcome) -> float | None:
+def _ms(outcome: DelayBound) -> float | None:
     return outcome.delay_ns / MS if isinstance(outcome, Bounded) else None
 
 

@@ -1,1 +1,1 @@
-"""What a run is worth: counts, delays, bounds, ledger, verdict, files and the report for people."""
+"""The results of a run: counts, delays, bounds, ledger, validity, files, and a report for people."""

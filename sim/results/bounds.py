@@ -1,9 +1,10 @@
-"""The delays of a run against the bounds that were promised: per packet, as its origin stated it on accepting it.
+"""The delays of a run against the bounds that were promised: each packet's origin states one when it accepts the
+packet.
 
-    within_share = deliveries within the bound of their packet / (all packets x the nodes that each was meant for)
+    within_share = deliveries within the bound of their packet / (all packets x the nodes for which each was meant)
 
-A packet that never arrives, that its origin promised nothing for, or that comes too late, lowers the share; only the
-last is a violation. Empty when no origin promised anything.
+A packet that never arrives, that comes too late, or for which its origin promised nothing lowers the share; only one
+that comes too late is a violation. The result is empty when no origin promised anything.
 """
 
 from collections.abc import Mapping
@@ -25,11 +26,11 @@ def against_bounds(applications: Mapping[str, Application]) -> dict[str, Any]:
 
 
 def likely(applications: Mapping[str, Application]) -> dict[str, Any]:
-    """`likely` of `summary.json`: statements of (delay, share), held against the copies of the packets they are about.
+    """`likely` of `summary.json`: statements of (delay, share), compared with the copies of the packets they are about.
 
     within_share = deliveries within the delay stated for their packet / (packets with a statement x their targets)
 
-    Empty when no origin stated any. The statement holds when `within_share` is at least `share`.
+    The result is empty when no origin stated any. The statement holds when `within_share` is at least `share`.
     """
     stated = [
         (app, name, sent.likely) for app in applications.values() for name, sent in app.sent.items() if sent.likely

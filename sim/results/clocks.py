@@ -1,6 +1,6 @@
-"""What clocks did to a run: true delays in the trace, and how far swarm time was off.
+"""The effect of clocks on a run: true delays for the trace, and how far swarm time was off.
 
-A node knows its own idea of swarm time only; how long a packet took, and how wrong a clock was, is known to the run.
+A node knows only its own estimate of swarm time; how long a packet took and how wrong a clock was is known to the run.
 """
 
 from collections import defaultdict
@@ -16,7 +16,7 @@ from sim.run.outcome import Outcome
 
 
 def true_delays(records: Sequence[Record]) -> list[Record]:
-    """The records with each delay from the true instant of generation; unchanged where that was never recorded."""
+    """The records with delays from the true instant of generation; a delay stays where that instant is not recorded."""
     born = {(record.node, record.seq): record.t_ns for record in records if type(record) is Generated}
     return [_true_delay(record, born) if type(record) is Delivered else record for record in records]
 
@@ -27,13 +27,13 @@ def _true_delay(record: Delivered, born: Mapping[tuple[int, int], int]) -> Deliv
 
 
 def errors_ns(samples: Sequence[ClockSampled]) -> list[tuple[ClockSampled, int]]:
-    """Each sample with its true error: against its reference's own clock at that instant, else against true time."""
+    """Each sample with its true error: against the clock of its reference at that instant, or against true time."""
     ahead = {(sample.t_ns, sample.node): sample.ahead_ns for sample in samples}
     return [(sample, sample.ahead_ns - ahead.get((sample.t_ns, sample.reference), 0)) for sample in samples]
 
 
 def clock_errors(outcome: Outcome) -> dict[str, Any]:
-    """`clock` of `summary.json`; empty while clocks are exact."""
+    """`clock` of `summary.json`; empty when clocks are exact."""
     samples = [record for record in outcome.records if type(record) is ClockSampled]
     if not samples:
         return {}
@@ -60,7 +60,7 @@ def _quantiles(values: npt.NDArray[np.float64]) -> dict[str, float]:
 
 
 def _synced_after_s(samples: Sequence[ClockSampled], nodes: int) -> float | None:
-    """When the last node first stated a bound; None when one never did."""
+    """The instant at which the last node first stated a bound; None when some node never did."""
     first: dict[int, int] = defaultdict(lambda: -1)
     for sample in samples:
         if sample.bound_ns >= 0 and first[sample.node] < 0:

@@ -1,4 +1,4 @@
-"""Delays of packets from application to application, summed up, and the parts that they are made of.
+"""Delays of packets from application to application: their statistics, and the parts of which they consist.
 
 hand-over ......... let out ......... end of the frame ......... receipt
 |  lead  |  queue  |      air, relays included      |  handover  |
@@ -17,7 +17,7 @@ PARTS: Final = ("lead", "queue", "air", "handover")
 
 
 def summed_up(delays_ns: Sequence[int]) -> dict[str, float | None]:
-    """Mean, percentiles and greatest of some delays [ms]; None where there are none."""
+    """Mean, percentiles and maximum of some delays [ms]; None for each when there are no delays."""
     if not delays_ns:
         return dict.fromkeys(("mean", "p50", "p95", "p99", "max"))
     values = np.asarray(delays_ns, dtype=np.float64) / MS
@@ -27,7 +27,7 @@ def summed_up(delays_ns: Sequence[int]) -> dict[str, float | None]:
 
 
 def parts(delivered: Iterable[Delivered], sent: Mapping[Name, Sent], *, lead_ns: int) -> dict[str, float | None]:
-    """The mean of each part [ms] over the deliveries of packets that were seen to leave their origin."""
+    """The mean of each part [ms], over the deliveries of packets that are known to have left their origin."""
     rows = [_row(record, sent[record.origin, record.seq], lead_ns) for record in delivered]
     known = [row for row in rows if row is not None]
     if not known:

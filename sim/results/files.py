@@ -1,7 +1,7 @@
-"""The output folder of a run: resolved scenario, summary, trace, `.tlog`. The hash is of the trace file's bytes.
+"""The output folder of a run: resolved scenario, summary, trace, `.tlog`. The hash is that of the trace file's bytes.
 
-Each file is written for itself, the smallest first: one that cannot be written whole is named in the summary's
-`unwritten` with the reason, keeps what fits, and takes nothing from the others.
+Each file is written separately, the smallest first. A file that cannot be written whole keeps what fits, is named in
+the summary's `unwritten` with the reason, and does not affect the others.
 """
 
 import hashlib
@@ -23,7 +23,7 @@ from sim.run.outcome import Outcome
 
 
 def trace_lines(records: Iterable[Record]) -> Iterator[bytes]:
-    """The trace file, line by line: one JSON array each."""
+    """The lines of the trace file, each one JSON array."""
     for record in records:
         yield f"{trace.line(record)}\n".encode()
 
@@ -36,7 +36,7 @@ def trace_bytes(records: Iterable[Record]) -> bytes:
 def finish(outcome: Outcome, *, out: Path | None) -> dict[str, Any]:
     """Summarize a run and, when a folder is given, write it.
 
-    Raises ConfigError when the folder cannot be had at all. What was measured is written even if summarizing it raises.
+    Raises ConfigError when the folder cannot be used at all. What was measured is written even if summarizing raises.
     """
     if out is not None:
         try:
@@ -59,9 +59,9 @@ def finish(outcome: Outcome, *, out: Path | None) -> dict[str, Any]:
 
 
 def _write(outcome: Outcome, summary: dict[str, Any], out: Path) -> dict[str, str]:
-    """Write every file that can be written; returns what was wrong with the others, by name."""
+    """Write every file that can be written; returns by name what was wrong with the others."""
     resolved = outcome.scenario.model_dump(mode="json", exclude_none=True)
-    links = ",\n".join(json.dumps(row) for row in described(outcome.links.rows()))  # a line per link
+    links = ",\n".join(json.dumps(row) for row in described(outcome.links.rows()))  # one line per link
     writers: dict[str, Callable[[Path], object]] = {
         "summary.json": lambda path: write_items(path, _json_lines(summary)),
         "scenario.toml": lambda path: write_items(path, [tomli_w.dumps(resolved).encode()]),
@@ -79,7 +79,7 @@ def _json_lines(content: dict[str, Any]) -> list[bytes]:
 
 
 def _replace(path: Path, summary: dict[str, Any]) -> None:
-    """Write the summary anew beside the old one, which stays when that fails."""
+    """Write the summary anew beside the old one, which stays if that fails."""
     fresh = path.with_suffix(".new")
     try:
         write_items(fresh, _json_lines(summary))

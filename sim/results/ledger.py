@@ -1,10 +1,10 @@
-"""Every frame of a run, counted twice: by the nodes that asked for it and by the medium that had it.
+"""The ledger: every frame of a run is counted twice, by the node that requested it and by the medium that had it.
 
     sent + unasked = delivered + dropped(reason) + in flight + unaccounted
 
-It closes when nothing is unasked or unaccounted. Node by node, a request that the medium never had was lost on the bus
-(reason `bus`); in virtual time there is no bus that could lose one, so there it is unaccounted for, and so is what an
-emulator that died took with it. `unasked` is what the medium had of a node that never asked for it.
+The ledger closes when nothing is unasked or unaccounted. Node by node, a request that the medium never had was lost on
+the bus (reason `bus`). In virtual time no bus can lose one, so there it is unaccounted for, and so is what an emulator
+that died took with it. `unasked` counts what the medium had of a node that never requested it.
 """
 
 from collections import Counter
@@ -44,14 +44,14 @@ def frames(outcome: Outcome) -> dict[str, Any]:
 
 
 def _differences(outcome: Outcome, requests: Mapping[str, Mapping[str, int]]) -> tuple[int, int]:
-    """Requests that the medium never had of the nodes that made them, and requests that it had of nobody."""
+    """Requests of nodes that the medium never had, and requests that the medium had and no node made."""
     missing = unasked = 0
     for node in outcome.scenario.node_ids:
         name = f"agent-{node}"
         counts = requests.get(str(node), {})
         had = counts.get("all", 0)
         made = outcome.reports.get(name, {}).get("frames_sent", 0)
-        if _cut_short(outcome, name):  # its own count ended before it did: the medium's stands for the rest
+        if _cut_short(outcome, name):  # the node's count ends before the node did: the medium's count fills the gap
             made = max(had, counts.get("before_restart", 0) + made)
         missing += max(0, made - had)
         unasked += max(0, had - made)
@@ -59,7 +59,7 @@ def _differences(outcome: Outcome, requests: Mapping[str, Mapping[str, int]]) ->
 
 
 def _cut_short(outcome: Outcome, name: str) -> bool:
-    """Whether an actor's report does not cover all of its run."""
+    """True if an actor's report does not cover all of its run."""
     report = outcome.reports.get(name)
     if report is None or any(ended == name for ended, _ in outcome.ended):
         return True
@@ -67,7 +67,7 @@ def _cut_short(outcome: Outcome, name: str) -> bool:
 
 
 def copies(outcome: Outcome) -> dict[str, Any]:
-    """`copies` of `summary.json`: the ledger at receivers, and how many of those handed to the bus the nodes heard."""
+    """`copies` of `summary.json`: the ledger at receivers, and how many copies handed to the bus reached the nodes."""
     emulator = outcome.reports.get("emulator", {})
     if not emulator:
         return {}

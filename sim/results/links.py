@@ -1,4 +1,4 @@
-"""What links carried over a whole run: sums of the medium's reports, as rows for a file."""
+"""What links have carried over a whole run: the sums of the medium's reports, as rows for a file."""
 
 from collections.abc import Iterable
 from typing import Any, Final
@@ -9,11 +9,11 @@ from fanet_mw.bus.link_stats import COUNTS, LOSSES, LinkRow, LinkStats
 from fanet_mw.units import NodeId
 
 _PENDING: Final = 64
-"""Reports that wait until their sums are taken together: what is kept does not grow with the length of a run."""
+"""Reports that wait to be summed together, so that memory does not grow with the length of a run."""
 
 
 class LinkTotals:
-    """Sums per directed link. Memory is that of the links, whatever the number of reports."""
+    """Sums per directed link. Memory depends on the number of links, not of reports."""
 
     def __init__(self) -> None:
         self._pending: list[LinkStats] = []
@@ -35,7 +35,7 @@ class LinkTotals:
         ]
 
     def _merge(self) -> None:
-        """Add the reports that wait to the sums."""
+        """Add the waiting reports to the sums."""
         ends, sums = [self._links], [self._sums]
         for report in self._pending:
             ends.append(np.frombuffer(report.ends, np.uint16).reshape(-1, 2))

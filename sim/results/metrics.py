@@ -1,8 +1,8 @@
-"""From an outcome to the summary. Every definition is written in docs/reference/results.md; nothing is measured twice.
+"""The summary of a run, computed from its outcome. docs/reference/results.md defines each figure.
 
 pdr      = unique deliveries of application packets at their targets / (packets generated x targets), never above 1
-repeated = further deliveries of a packet at a target that already had it: its process has started again
-delay    = from the application's hand-over to the other application's receipt, per (packet, target)
+repeated = further deliveries of a packet at a target that already had it, whose process was restarted
+delay    = from the hand-over by one application to the receipt by the other, per (packet, target)
 """
 
 import statistics
@@ -82,7 +82,7 @@ def summarize(outcome: Outcome, *, trace_sha256: str) -> dict[str, Any]:
 
 
 def _messages(outcome: Outcome) -> dict[str, int]:
-    """What became of the messages of users' applications, all nodes together; empty when there were none."""
+    """The fates of the messages of users' applications, all nodes together; empty when there were none."""
     total: Counter[str] = Counter()
     for report in outcome.reports.values():
         total.update(report.get("messages", {}))
@@ -116,7 +116,7 @@ def _packets(outcome: Outcome, packets: Mapping[str, Application]) -> dict[str, 
 def _worst_nodes(
     per_source: Counter[int], targets: Mapping[int, frozenset[int]], received: Counter[int], most: int = 5
 ) -> list[dict[str, Any]]:
-    """The nodes that received the least of what was meant for them, worst first."""
+    """The nodes that received the smallest share of what was meant for them, worst first."""
     wanted: Counter[int] = Counter()
     for source, packets in per_source.items():
         for node in targets[source]:
@@ -146,7 +146,7 @@ def _lateness(outcome: Outcome, emulator: Mapping[str, Any]) -> dict[str, Any]:
 
 
 def _admission(outcome: Outcome) -> dict[str, Any]:
-    """What the nodes refused, and what they said of the deadline; empty without `traffic.deadline_s`."""
+    """What nodes refused, and how often they met or lost the deadline; empty without `traffic.deadline_s`."""
     deadline_s = outcome.scenario.traffic.deadline_s
     if deadline_s is None:
         return {}
@@ -171,7 +171,7 @@ def _mission(outcome: Outcome) -> dict[str, Any]:
         if type(record) is Approaching:
             first.setdefault(record.node, record.t_ns)
             if not 1 <= record.survivor <= len(truth):
-                continue  # of whom only the air has told
+                continue  # this survivor does not exist: the report of it was forged
             at = truth[record.survivor - 1]
             errors.append(float(np.hypot(at.east - record.east_m, at.north - record.north_m)))
     return {

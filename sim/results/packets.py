@@ -1,8 +1,9 @@
-"""Which packets the applications sent, and which of them arrived where they were meant to: once per node and packet.
+"""The packets that applications sent, and those that arrived where they were meant to: once per node and packet.
 
-A packet is named by its origin and sequence number. A delivery counts where the packet was meant for the node; a second
-one at the same node is `repeated`: its process has started again, and has forgotten what it had. What nobody sent, or
-nobody sent at the instant that its header claims, is `unknown` and no delivery: forged, or its origin's record is lost.
+A packet is named by its origin and sequence number. A delivery counts if the packet was meant for the node. A second
+delivery at the same node is `repeated`: the node's process was restarted and has forgotten the first. A packet that no
+node sent, or none at the instant that its header states, is `unknown` and no delivery: it is forged, or its origin's
+record is lost.
 """
 
 from collections.abc import Mapping
@@ -15,7 +16,7 @@ from sim.run.outcome import Outcome
 
 APPS: Final = ("traffic", "report", "warning")
 Name = tuple[int, int]
-"""(origin, sequence number)."""
+"""The name of a packet: (origin, sequence number)."""
 
 
 @dataclass(frozen=True, slots=True)
@@ -24,20 +25,20 @@ class Sent:
 
     born_ns: int
     out_ns: int | None = None
-    """When its first frame could contend; None: it never left."""
+    """When the packet's first frame could contend; None when the packet never left its origin."""
     bound_ns: int | None = None
-    """The delay that its origin promised when it accepted the packet; None: it promised none."""
+    """The delay that the origin promised when it accepted the packet; None when it promised none."""
     likely: tuple[int, float] | None = None
-    """The delay within which its origin said that at least this share of its copies arrive; None: it said nothing."""
+    """The delay within which, as the origin stated, at least this share of its copies arrive; None if it did not."""
 
 
 @dataclass(slots=True)
 class Application:
-    """What became of the packets of one application, all nodes together."""
+    """The packets of one application and their deliveries, all nodes together."""
 
     sent: dict[Name, Sent] = field(default_factory=dict)
     wanted: int = 0
-    """Packets times the nodes that each was meant for."""
+    """The number of packets times the nodes for which each was meant."""
     deliveries: list[Delivered] = field(default_factory=list)
     repeated: int = 0
     unknown: int = 0
@@ -98,13 +99,13 @@ def _known(sent: Sent, record: LetOut | BoundStated | LikelyStated) -> Sent:
 
 
 def targets_by_source(outcome: Outcome) -> Mapping[int, frozenset[int]]:
-    """Of every node, the nodes that its traffic is meant for."""
+    """For every node the nodes for which its traffic is meant."""
     scenario = outcome.scenario
     return {node: frozenset(targets_of(scenario, node)) for node in scenario.node_ids}
 
 
 def _is_target(delivered: Delivered, is_traffic: bool, targets: Mapping[int, frozenset[int]]) -> bool:
-    """Whether the packet was meant for this node; reports and warnings are meant for all but their origin."""
+    """True if the packet was meant for this node; reports and warnings are meant for all but their origin."""
     if is_traffic:
         return delivered.node in targets[delivered.origin]
     return delivered.node != delivered.origin

@@ -1,4 +1,4 @@
-"""A summary as a person wants to read it: what was asked, what the network did, what the mission got from it."""
+"""A summary for a person to read: the request, what the network did, and what the mission gained from it."""
 
 from collections.abc import Iterator, Mapping
 from typing import Any

@@ -1,11 +1,11 @@
-"""May this result be used? One function says why not, in sentences; the summary's `valid` and the exit code follow it.
+"""May this result be used? One function gives the reasons why not, in sentences; `valid` and the exit code follow it.
 
-    valid  =  it ran to its end, no process died, every actor's last report is there, every frame is accounted for,
-              and (real time) each measure of how the machine disturbed the run is within its limit
+    valid  =  the run ended by itself, no process died, every actor's last report is there, every frame is accounted
+              for, and (in real time) each measure of how the machine disturbed the run is within its limit
 
-The limits are chosen from runs that were disturbed on purpose, held against virtual time: within them the delivery
-ratio is off by no more than two seeds differ by themselves (`tests/benchmarks/disturbed_runs.py`, table in
-docs/reference/results.md). In virtual time nothing disturbs a run.
+The limits come from runs that were disturbed on purpose and compared with virtual time: within them the delivery ratio
+differs by no more than between two seeds (`tests/benchmarks/disturbed_runs.py`, table in docs/reference/results.md). In
+virtual time nothing disturbs a run.
 """
 
 from collections.abc import Iterator, Mapping
@@ -15,21 +15,21 @@ from sim.run.outcome import Outcome
 from sim.run.processes import describe
 
 LOST: Final = 0.0025
-"""What the machine took from the air, all kinds together: requests lost on the bus or dropped as too late, turns
-missed, each of all requests, and receptions lost on the bus, of all that were handed over."""
+"""The limit for all that the machine took from the air: requests lost on the bus or dropped as too late and turns
+missed, each as a share of all requests, and receptions lost on the bus, as a share of those handed over."""
 HEARD_LATE: Final = 0.02
-"""Of all receptions: handed to their node later than a handover and a lead after the frame's end."""
+"""The limit for receptions handed to their node later than a handover and a lead after the frame's end."""
 STALL_MS: Final = 500.0
-"""The longest that any process could do nothing."""
+"""The longest time for which a process may do nothing."""
 SKIPPED_TICKS: Final = 0.02
-"""Of the world's ticks."""
+"""The limit for skipped ticks of the world."""
 _PARTS: Final = frozenset({"lost_on_bus", "dropped_late", "missed_turns", "copies_lost"})
 _NAMED: Final = 5
-"""So many are named in one sentence; of the rest, how many there are."""
+"""How many names a sentence lists; of further ones it gives the number."""
 
 
 class Measure(NamedTuple):
-    """One figure of how the machine disturbed a run; a share, or milliseconds."""
+    """One measure of how the machine disturbed the run, as a share or in milliseconds."""
 
     what: str
     value: float
@@ -48,7 +48,7 @@ class Measure(NamedTuple):
 
 
 def measures(outcome: Outcome, *, frames: Mapping[str, Any], late_share: float) -> dict[str, Measure]:
-    """How the machine disturbed the run, by name; empty in virtual time."""
+    """The measures of how the machine disturbed the run, by name; empty in virtual time."""
     if outcome.mode == "virtual":
         return {}
     agents = [report for report in outcome.reports.values() if report.get("kind") == "agent"]
@@ -80,7 +80,7 @@ def measures(outcome: Outcome, *, frames: Mapping[str, Any], late_share: float) 
 
 
 def reasons(outcome: Outcome, *, frames: Mapping[str, Any], disturbance: Mapping[str, Measure]) -> list[str]:
-    """Why the result may not be used, gravest first, a sentence each; none when it may."""
+    """The reasons why the result may not be used, gravest first, one sentence each; empty when it may."""
     return [
         *_broken(outcome),
         *_incomplete(outcome),
@@ -120,7 +120,7 @@ def _unaccounted(frames: Mapping[str, Any]) -> Iterator[str]:
 
 
 def _disturbed(disturbance: Mapping[str, Measure]) -> Iterator[str]:
-    """The sum of what was lost is said only when none of its parts is too great by itself."""
+    """Sentences on exceeded limits; that of the sum of losses appears only when no part exceeds its own limit."""
     exceeded = {name: measure for name, measure in disturbance.items() if measure.exceeded}
     if not exceeded.keys().isdisjoint(_PARTS):
         exceeded.pop("lost")
@@ -134,7 +134,7 @@ def _named(names: list[str]) -> str:
 
 
 def _copies_lost(outcome: Outcome) -> float:
-    """Of what the medium handed to nodes that lived through the run, the share that they never had."""
+    """The share that never arrived of what the medium handed to the nodes that lived through the run."""
     dead = {name for name, _ in outcome.ended}
     handed = lost = 0
     for node, count in outcome.reports.get("emulator", {}).get("handed", {}).items():
@@ -146,7 +146,7 @@ def _copies_lost(outcome: Outcome) -> float:
 
 
 def _longest_stall(outcome: Outcome) -> tuple[float, str]:
-    """How long [ms], and which process."""
+    """The longest standstill [ms], and the process that had it."""
     stalls = {name: (report.get("host") or {}).get("stall_ms", 0.0) for name, report in outcome.reports.items()}
     stalls["the launcher"] = outcome.stall_ms
     worst = max(stalls, key=lambda name: stalls[name])
@@ -154,7 +154,7 @@ def _longest_stall(outcome: Outcome) -> tuple[float, str]:
 
 
 def _sum(reports: list[Mapping[str, Any]], key: str) -> int:
-    return sum(report.get(key) or 0 for report in reports)  # not every protocol has turns
+    return sum(report.get(key) or 0 for report in reports)  # a key is absent where the protocol has no turns
 
 
 def _share(part: float, whole: float) -> float:

@@ -1,20 +1,20 @@
-"""Who of a swarm may say and hear what, as an access list of Zenoh's router: what is not allowed is denied.
+"""The rights of each participant of a swarm, as an access list of Zenoh's router: what is not allowed is denied.
 
-    agent-N    says its own requests, setpoint, telemetry, trace and report; hears its own receptions and sensors
-    emulator   says receptions, links, its trace and report; hears requests, poses, obstructions, changes of the air
-    world      says poses, obstructions, sensors, radios of crashed UAVs, its trace and report; hears setpoints
-    operator   says changes of the air; hears links, traces, reports and telemetry
+    agent-N    puts its requests, setpoint, telemetry, trace and report; subscribes to its receptions and sensors
+    emulator   puts receptions, links, trace and report; subscribes to requests, poses, obstructions, changes of the air
+    world      puts poses, obstructions, sensors, radios of crashed UAVs, trace, report; subscribes to setpoints
+    operator   puts changes of the air; subscribes to links, traces, reports and telemetry
 
-All but the operator hear the clock, ask for it, and say that they are alive. The router itself is the launcher: its own
-puts (the clock) pass no access list. Participants are known by the common names of their certificates. A put that is
-denied vanishes without a word to whoever made it.
+All but the operator subscribe to the clock, query it, and declare that they are alive. The launcher is the router
+itself: its own puts (the clock) pass no access list. Participants are identified by the common names of their
+certificates. A put that is denied disappears without a message to its sender.
 """
 
 from typing import Any, Final, NamedTuple
 
 from fanet_mw.bus.topics import ROOT, Topics
 from fanet_mw.scenario import Scenario
-from sim.run.air import OPERATOR
+from sim.run.air_control import OPERATOR
 
 _INTO: Final = "ingress"
 _OUT_OF: Final = "egress"
@@ -23,24 +23,24 @@ _OUT_OF: Final = "egress"
 class Rights(NamedTuple):
     """What one participant may do, by key expressions."""
 
-    says: tuple[str, ...] = ()
-    hears: tuple[str, ...] = ()
-    asks: tuple[str, ...] = ()
-    lives: tuple[str, ...] = ()
+    puts: tuple[str, ...] = ()
+    subscribes: tuple[str, ...] = ()
+    queries: tuple[str, ...] = ()
+    alive: tuple[str, ...] = ()
     """Liveliness tokens that it may declare."""
     watches: tuple[str, ...] = ()
-    """Liveliness tokens that it may look for."""
+    """Liveliness tokens that it may watch."""
 
 
 def rights(scenario: Scenario, names: Topics) -> dict[str, Rights]:
-    """Every participant of a swarm but the router, by its name."""
+    """The rights of all participants of a swarm except the router, by name."""
 
-    def actor(name: str, says: tuple[str, ...], hears: tuple[str, ...]) -> Rights:
+    def actor(name: str, puts: tuple[str, ...], subscribes: tuple[str, ...]) -> Rights:
         return Rights(
-            says=(*says, names.trace(name), names.report(name)),
-            hears=(*hears, names.clock),
-            asks=(names.clock,),
-            lives=(names.alive(name),),
+            puts=(*puts, names.trace(name), names.report(name)),
+            subscribes=(*subscribes, names.clock),
+            queries=(names.clock,),
+            alive=(names.alive(name),),
         )
 
     def agent(node: int) -> Rights:
@@ -61,29 +61,29 @@ def rights(scenario: Scenario, names: Topics) -> dict[str, Rights]:
         ),
         **{f"agent-{node}": agent(node) for node in scenario.node_ids},
         OPERATOR: Rights(
-            says=(names.radio_control,),
-            hears=(names.radio_links, names.all_traces, names.all_reports, names.mavlink("*")),
+            puts=(names.radio_control,),
+            subscribes=(names.radio_links, names.all_traces, names.all_reports, names.mavlink("*")),
             watches=(f"{ROOT}/*/alive/*",),
         ),
     }
 
 
 def access_control(participants: dict[str, Rights]) -> dict[str, Any]:
-    """The `access_control` of the router's configuration."""
+    """The section `access_control` of the router's configuration."""
     everything = (f"{ROOT}/**",)
     rules: list[dict[str, Any]] = [
-        # Without these a client's publisher never learns that anyone listens, and stays silent.
+        # Without this rule a client's publisher never learns that there are subscribers, and sends nothing.
         _rule("know-of-others", _OUT_OF, ("declare_subscriber", "declare_queryable"), everything)
     ]
     policies = []
     for name, may in participants.items():
         own = [
-            _rule(f"{name}-says", _INTO, ("put",), may.says),
-            _rule(f"{name}-listens", _INTO, ("declare_subscriber",), may.hears),
-            _rule(f"{name}-hears", _OUT_OF, ("put",), may.hears),
-            _rule(f"{name}-asks", _INTO, ("query",), may.asks),
-            _rule(f"{name}-is-answered", _OUT_OF, ("reply",), may.asks),
-            _rule(f"{name}-lives", _INTO, ("liveliness_token",), may.lives),
+            _rule(f"{name}-says", _INTO, ("put",), may.puts),
+            _rule(f"{name}-listens", _INTO, ("declare_subscriber",), may.subscribes),
+            _rule(f"{name}-hears", _OUT_OF, ("put",), may.subscribes),
+            _rule(f"{name}-asks", _INTO, ("query",), may.queries),
+            _rule(f"{name}-is-answered", _OUT_OF, ("reply",), may.queries),
+            _rule(f"{name}-lives", _INTO, ("liveliness_token",), may.alive),
             _rule(f"{name}-looks", _INTO, ("liveliness_query", "declare_liveliness_subscriber"), may.watches),
             _rule(f"{name}-sees", _OUT_OF, ("liveliness_token",), may.watches),
         ]

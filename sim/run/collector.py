@@ -1,11 +1,11 @@
 """What a run in real time collects from the bus: traces, reports, telemetry and link counts of the swarm's own actors.
 
-    put -> a known actor? -> within its allowance? -> decoded -> each item plausible? -> spool on disk, or last report
+    put -> from a known actor? -> within its allowance? -> decoded -> each item valid? -> spool on disk, or last report
                                   whatever fails is counted by what was wrong, and goes no further
 
-Memory holds the last valid report of each actor and the sums of the links, not the length of the run: trace records
-and telemetry go to temporary files and are read when the run is over. Puts of one actor that exceed its allowance are
-counted as `excess` before they are decoded, so that a flood costs neither time nor disk.
+Memory holds the last valid report of each actor and the sums of the links, independently of the length of the run:
+trace records and telemetry go to temporary files and are read when the run is over. Puts of one actor that exceed its
+allowance are counted as `excess` before they are decoded, so that a flood costs neither time nor disk space.
 """
 
 import struct
@@ -26,13 +26,13 @@ from fanet_mw.scenario import Scenario
 from fanet_mw.trace import Record, kind_of
 from fanet_mw.units import S
 from sim.results.links import LinkTotals
-from sim.run.plausible import Plausible
+from sim.run.input_checks import InputChecks
 from sim.run.spool import Spool
 
 BURST_BYTES: Final = 16 << 20
-"""What one actor may put at once; ten hours of a UAV's trace in `rescue`."""
+"""The bytes that one actor may put at once; ten hours of a UAV's trace in `rescue`."""
 BYTES_PER_S: Final = 1 << 20
-"""What one actor may put for long; two hundred times what a UAV of `rescue` does."""
+"""The bytes per second that one actor may put for long; two hundred times what a UAV of `rescue` puts."""
 _LONGEST_WHY: Final = 120
 _INSTANT: Final = struct.Struct("<q")
 Subscribe = Callable[[str, OnSample], None]
@@ -45,10 +45,10 @@ class Allowance:
         self._burst = burst
         self._per_s = per_s
         self._left: dict[str, tuple[int, int]] = {}
-        """(bytes left, when) by name."""
+        """The bytes left of each name, and when that was."""
 
     def take(self, name: str, size: int, *, now_ns: int) -> bool:
-        """Whether so many bytes may pass now."""
+        """True if so many bytes of this name may pass now."""
         left, then_ns = self._left.get(name, (self._burst, now_ns))
         left = min(self._burst, left + (now_ns - then_ns) * self._per_s // S)
         fits = size <= left
@@ -57,12 +57,12 @@ class Allowance:
 
 
 class Collector:
-    """Hears a swarm; `now_ns` is a monotonic clock, `folder` where temporary files go."""
+    """Collects from a swarm; `now_ns` is a monotonic clock, `folder` the place of temporary files."""
 
     def __init__(
         self, scenario: Scenario, subscribe: Subscribe, names: Topics, *, now_ns: Callable[[], int], folder: Path | None
     ) -> None:
-        self._plausible = Plausible(scenario)
+        self._checks = InputChecks(scenario)
         self._now_ns = now_ns
         self._lock = threading.Lock()  # Zenoh calls from several threads
         self._allowance = Allowance(burst=BURST_BYTES, per_s=BYTES_PER_S)
@@ -81,7 +81,7 @@ class Collector:
         ):
             subscribe(expression, self._hearer(what, take))
 
-    # --- in: on threads of the bus --------------------------------------------------------------------------------
+    # --- receiving, on threads of the bus -------------------------------------------------------------------------
 
     def _hearer(self, what: str, take: Callable[[str, Message], str | None]) -> OnSample:
         def hear(topic: str, payload: bytes) -> None:
@@ -94,10 +94,10 @@ class Collector:
         return hear
 
     def _hear(self, what: str, topic: str, payload: bytes, take: Callable[[str, Message], str | None]) -> str | None:
-        """Take in one put; returns what was wrong with it, or with the last item in it that was wrong."""
+        """Take in one put; returns what was wrong with it, or with the last of its items that were wrong."""
         last = topic.rpartition("/")[2]
         name = {"telemetry": f"agent-{last}", "links": "emulator"}.get(what, last)
-        if name not in self._plausible.node_of:
+        if name not in self._checks.node_of:
             return "unknown actor"
         if not self._allowance.take(f"{what}/{name}", len(payload), now_ns=self._now_ns()):
             return "excess"
@@ -119,7 +119,7 @@ class Collector:
             return "message type"
         lines = []
         for record in message.records:
-            why = self._plausible.record(name, record)
+            why = self._checks.record(name, record)
             if why is None:
                 lines.append(trace.line(record))
             else:
@@ -133,7 +133,7 @@ class Collector:
             return "message type"
         if message.name != name:
             return "speaker"
-        content, why = self._plausible.report(name, message.json)
+        content, why = self._checks.report(name, message.json)
         if why is not None:
             self._why_no_report[name] = f"malformed: {why[:_LONGEST_WHY]}"
             return "shape"
@@ -143,7 +143,7 @@ class Collector:
     def _take_tap(self, name: str, message: Message) -> str | None:
         if not isinstance(message, MavlinkTap):
             return "message type"
-        why = self._plausible.tap(message)
+        why = self._checks.tap(message)
         if why is None and not self._taps.append(_INSTANT.pack(message.t_ns) + message.data):
             return "disk"
         return why
@@ -151,12 +151,12 @@ class Collector:
     def _take_links(self, _name: str, message: Message) -> str | None:
         if not isinstance(message, LinkStats):
             return "message type"
-        why = self._plausible.links(message)
+        why = self._checks.links(message)
         if why is None:
             self._links.add(message)
         return why
 
-    # --- out: when the run is over --------------------------------------------------------------------------------
+    # --- results, when the run is over ----------------------------------------------------------------------------
 
     def records(self) -> list[Record]:
         """All trace records, by instant, node and kind."""
@@ -171,39 +171,39 @@ class Collector:
             return {name: self._reports[name] for name in sorted(self._reports)}
 
     def unfinished(self) -> set[str]:
-        """Who has not yet sent its last report."""
+        """The actors that have not yet sent their last report."""
         with self._lock:
-            return {name for name in self._plausible.node_of if not self._reports.get(name, {}).get("final")}
+            return {name for name in self._checks.node_of if not self._reports.get(name, {}).get("final")}
 
     def absent(self) -> dict[str, str]:
-        """Why there is no report of an actor, by name."""
+        """Why there is no report, by the actor's name."""
         with self._lock:
-            missing = [name for name in self._plausible.node_of if name not in self._reports]
+            missing = [name for name in self._checks.node_of if name not in self._reports]
             return {name: self._why_no_report.get(name, "no report was heard") for name in missing}
 
     def links(self) -> LinkTotals:
-        """What each link carried."""
+        """What each link has carried."""
         with self._lock:
             return self._links
 
     def taps(self) -> list[tuple[int, bytes]]:
-        """What UAVs told inspectors, by instant."""
+        """The telemetry of all UAVs, by instant."""
         with self._lock:
             taps = [(_INSTANT.unpack_from(item)[0], item[_INSTANT.size :]) for item in self._taps.items()]
         return sorted(taps, key=lambda tap: tap[0])
 
     def figures(self) -> dict[str, Any]:
-        """Puts heard, and what of them was refused (items: records, reports, taps), by what was wrong."""
+        """The number of puts received, and of items refused (records, reports, taps), by what was wrong."""
         with self._lock:
             why = dict(sorted(self._refused.items()))
             return {"puts": self._puts, "malformed": sum(why.values()), "why": why}
 
     def disk_failure(self) -> str | None:
-        """Why trace or telemetry is incomplete; None when it is not."""
+        """Why trace or telemetry is incomplete; None when both are complete."""
         return self._records.failure or self._taps.failure
 
     def close(self) -> None:
-        """Give the disk space back."""
+        """Free the disk space."""
         with self._lock:
             self._records.close()
             self._taps.close()

@@ -1,8 +1,8 @@
 """`fanet keys`: certificates for every participant of a swarm, and the router's access list.
 
 Each participant gets one file of Zenoh's configuration that holds its certificate, its private key and the authority's
-certificate, so that it can be carried to the machine it is for. The authority's own key is made in a temporary folder
-and not kept: nobody can make a further certificate for the swarm, and new keys are made for all.
+certificate, so that it can be carried to the machine for which it is meant. The authority's own key is made in a
+temporary folder and not kept: no further certificate can be made for the swarm, only new keys for all.
 """
 
 import base64
@@ -26,7 +26,7 @@ _AT_HOME: Final = ("DNS:localhost", "IP:127.0.0.1", "IP:::1")
 
 
 def make(scenario: Scenario, out: Path, *, swarm: str, hosts: Iterable[str] = (), days: int = 365) -> int:
-    """Write NAME.json5 for each participant into a folder; returns how many. Raises ConfigError when it cannot."""
+    """Write NAME.json5 for each participant into a folder; returns how many. Raises ConfigError when that fails."""
     participants = rights(scenario, Topics(swarm))
     names = ",".join((*_AT_HOME, *(_subject(host) for host in hosts)))
     try:
@@ -43,7 +43,7 @@ def make(scenario: Scenario, out: Path, *, swarm: str, hosts: Iterable[str] = ()
 
 
 def _subject(host: str) -> str:
-    """A host as certificates name it."""
+    """A host in the form in which certificates name it."""
     try:
         return f"IP:{ip_address(host)}"
     except ValueError:
@@ -51,7 +51,7 @@ def _subject(host: str) -> str:
 
 
 class _Authority:
-    """Signs certificates; its files are in a folder that goes away with it."""
+    """Signs certificates; its files are in a folder that is removed with it."""
 
     def __init__(self, folder: Path, *, days: int) -> None:
         self._folder = folder
@@ -102,7 +102,7 @@ class _Authority:
 
 
 def _write_secret(path: Path, text: str) -> None:
-    """Write a file that only its owner can read, whoever could read one of that name before."""
+    """Write a file that only its owner can read, even if a file of that name existed with other rights."""
     path.unlink(missing_ok=True)
     path.touch(mode=0o600)
     path.write_text(text, encoding="utf-8")

@@ -1,6 +1,6 @@
-"""What a run in real time needs of the machine's limits, looked at before anything is started.
+"""The limits of the machine that a run in real time needs, checked before anything is started.
 
-A limit that is too low would else show as a traceback somewhere in the middle: of a pipe, a thread or a mapping.
+A limit that is too low would otherwise show as a traceback in the middle of a run: of a pipe, a thread or a mapping.
 """
 
 import resource
@@ -9,11 +9,11 @@ from typing import Final
 from fanet_mw.errors import ConfigError
 
 _FILES: Final = 48
-"""Files that the launcher has open besides those of its children (29 measured)."""
+"""The files that the launcher has open besides those of its children (29 measured)."""
 _FILES_PER_PROCESS: Final = 3
-"""A sentinel, a pipe and a connection of the bus."""
+"""The files per child: a sentinel, a pipe and a connection of the bus."""
 _ADDRESS_SPACE_MIB: Final = 2048
-"""Of each process; the launcher of 47 processes takes 1,440, mostly stacks and arenas that it never touches."""
+"""The address space of each process; the launcher of 47 processes takes 1,440, mostly untouched memory."""
 
 
 def prepare(*, processes: int) -> None:

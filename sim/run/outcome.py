@@ -1,4 +1,4 @@
-"""What a run leaves behind, whichever host ran it. The input of metrics and files."""
+"""The result of a run, whichever host ran it: the input of metrics and files."""
 
 from collections.abc import Mapping
 from dataclasses import dataclass, field
@@ -11,35 +11,35 @@ from sim.results.links import LinkTotals
 
 @dataclass(slots=True)
 class Outcome:
-    """One finished (or cut short) run."""
+    """The result of one run, finished or cut short."""
 
     scenario: Scenario
     mode: Literal["virtual", "realtime"]
     wall_s: float
     records: list[Record]
-    """By instant; within one instant as they were made (virtual) or by node (real time)."""
+    """The trace records by instant; within one instant as they were made (virtual) or by node (real time)."""
     reports: Mapping[str, Mapping[str, Any]]
     """The last report of each actor, by its name."""
     taps: list[tuple[int, bytes]] = field(default_factory=list)
-    """(instant ns, MAVLink bytes) for the `.tlog`."""
+    """Pairs (instant ns, MAVLink bytes) for the `.tlog`."""
     links: LinkTotals = field(default_factory=LinkTotals)
-    """What each link carried."""
+    """What each link has carried."""
     ended: list[tuple[str, int]] = field(default_factory=list)
-    """(name, exit code) of processes that died before their time."""
+    """Pairs (name, exit code) of processes that ended before their time."""
     aborted: str | None = None
     """Why the run is partial; None when it ran to its end."""
     ended_ns: int | None = None
     """The swarm instant at which a partial run ended; None when it ran to its end."""
     epoch_unix_ns: int = 0
-    """Unix time of swarm instant 0; in virtual time a fixed one, so that the same run gives the same files."""
+    """The unix time of swarm instant 0; a fixed one in virtual time, so that the same run gives the same files."""
     ready_s: float = 0.0
-    """Real time: until all processes were up."""
+    """In real time: how long it took until all processes were up."""
     heard: Mapping[str, Any] = field(default_factory=dict)
-    """Real time: puts that the launcher heard, and what of them was refused, by what was wrong."""
+    """In real time: the puts that the launcher received, and what of them was refused, by what was wrong."""
     absent: Mapping[str, str] = field(default_factory=dict)
-    """Real time: why there is no report of an actor, by its name."""
+    """In real time: why there is no report, by the actor's name."""
     stall_ms: float = 0.0
-    """Real time: the longest that the launcher, and the bus with it, could do nothing."""
+    """In real time: the longest time for which the launcher, and with it the bus, could do nothing."""
 
     @property
     def simulated_ns(self) -> int:

@@ -1,6 +1,6 @@
-"""The processes of a swarm: forked from one warmed-up server, watched, ended without leaving any behind.
+"""The processes of a swarm: forked from one warmed-up server, watched, and ended without leaving any behind.
 
-Children ignore Ctrl-C (the launcher decides), and die with their parent whatever kills it.
+Children ignore Ctrl-C, because the launcher decides, and die with their parent however it ends.
 """
 
 import asyncio
@@ -37,7 +37,7 @@ class Recipe(NamedTuple):
 
 
 def _child(recipe: Recipe) -> None:
-    """What a child does first and last; runs in the child."""
+    """Run a child: its preparations, its work, its exit code."""
     signal.signal(signal.SIGINT, signal.SIG_IGN)
     signal.pthread_sigmask(signal.SIG_UNBLOCK, _BLOCKED)  # the launcher's SIGTERM ends it
     die_with_parent()
@@ -56,12 +56,12 @@ def _nothing() -> None:
 
 
 def _start_server() -> None:
-    """Start the server that children are forked from, unless it runs, with both signals blocked in it and its children.
+    """Start the server from which children are forked, with both signals blocked in it and its children.
 
-    Ctrl-C, or what ends a service of the system, reaches all of them. A child ignores Ctrl-C only in `_child`, and
-    the server only after its imports: until then each would end with a traceback of its own.
+    Ctrl-C, or the end of a service of the system, reaches all of them. A child ignores Ctrl-C only from `_child` on,
+    and the server only after its imports: until then each would end with a traceback of its own.
     """
-    resource_tracker.ensure_running()  # the server would start it, and it unblocks SIGINT when it has been started
+    resource_tracker.ensure_running()  # otherwise the server starts the tracker, which unblocks SIGINT
     before = signal.pthread_sigmask(signal.SIG_BLOCK, _BLOCKED)
     try:
         forkserver.ensure_running()
@@ -70,16 +70,16 @@ def _start_server() -> None:
 
 
 def describe(exit_code: int) -> str:
-    """An exit code in words: a signal by its name."""
+    """An exit code in words; a signal is given by its name."""
     return f"signal {signal.Signals(-exit_code).name}" if exit_code < 0 else f"exit code {exit_code}"
 
 
 class Processes:
-    """Named children, each started again on request."""
+    """Children by name, each of which can be started again."""
 
     def __init__(self, on_end: Callable[[str, int], None], *, title: str = "fanet") -> None:
         self._title = title
-        """What `ps` shows as the command line of each child, before its name."""
+        """What `ps` shows as the command line of each child, in front of its name."""
         self._context: ForkServerContext = multiprocessing.get_context("forkserver")
         self._context.set_forkserver_preload(_PRELOAD)
         self._on_end = on_end
@@ -89,12 +89,12 @@ class Processes:
         self._empty = asyncio.Event()
 
     async def warm_up(self) -> None:
-        """Until the server has imported what children need; the first `start` would hold up the loop meanwhile."""
+        """Wait until the server has imported what children need; otherwise the first `start` would block the loop."""
         first = self._context.Process(target=_nothing)
 
         def run() -> None:
             _start_server()
-            with contextlib.suppress(OSError, EOFError):  # the next `start` says so
+            with contextlib.suppress(OSError, EOFError):  # the next `start` reports the error
                 first.start()
                 first.join()
                 first.close()
@@ -102,7 +102,7 @@ class Processes:
         await asyncio.to_thread(run)
 
     def start(self, name: str, entry: Entry, arguments: Mapping[str, Any], *, nice: int = 0) -> None:
-        """Start a child; `entry(**arguments)` must be importable and picklable. A `nice` one lets others go first."""
+        """Start a child; `entry(**arguments)` must be importable and picklable. With `nice` it lets others go first."""
         recipe = self._recipes[name] = Recipe(entry, arguments, nice, name, f"{self._title} {name}")
         _start_server()
         process = self._context.Process(target=_child, args=(recipe,), name=name)
@@ -115,7 +115,7 @@ class Processes:
         self._loop.add_reader(process.sentinel, self._ended, name)
 
     def restart(self, name: str, **more: object) -> None:
-        """Start a child that has ended once more, as it was started before but for the arguments in `more`."""
+        """Start a child that has ended again, with its former arguments except for those in `more`."""
         recipe = self._recipes[name]
         self.start(name, recipe.entry, {**recipe.arguments, **more}, nice=recipe.nice)
 
@@ -138,7 +138,7 @@ class Processes:
         self._on_end(name, code)
 
     async def wait(self, timeout_s: float) -> bool:
-        """Until every child has ended by itself; False when some had not in time."""
+        """Wait until all children have ended by themselves; returns False when some have not in time."""
         try:
             await asyncio.wait_for(self._empty.wait(), timeout_s)
         except TimeoutError:
@@ -146,7 +146,7 @@ class Processes:
         return True
 
     async def end_all(self) -> None:
-        """Ask, then insist. Nothing is left running."""
+        """Ask all children to end, then kill those that have not; none is left running."""
         for send, patience_s in (("terminate", 2.0), ("kill", 5.0)):
             for process in list(self._running.values()):
                 getattr(process, send)()
@@ -156,7 +156,7 @@ class Processes:
 
 @atexit.register
 def _end_servers() -> None:
-    """End multiprocessing's own helpers with us; left alone they go some tens of milliseconds later."""
-    # There is no public way; CPython's own tests use these.
+    """End multiprocessing's helper processes with this one; by themselves they end some tens of milliseconds later."""
+    # There is no public way to do this; CPython's own tests use these calls.
     forkserver._forkserver._stop()  # type: ignore[attr-defined]  # noqa: SLF001
     resource_tracker._resource_tracker._stop()  # type: ignore[attr-defined]  # noqa: SLF001

@@ -13,9 +13,9 @@ from fanet_mw.scenario import Scenario
 from sim.run.running import registered
 
 ROUTER: Final = "router"
-"""Whose configuration the router's process uses, in a folder of them."""
+"""The name of the router's configuration in a folder of configurations."""
 _STOP_HEARD_S: Final = 0.3
-"""Between telling services to stop and closing the bus they hear it on."""
+"""The time between telling services to stop and closing the bus on which they receive it."""
 
 
 def expected_names(scenario: Scenario) -> list[str]:
@@ -26,7 +26,7 @@ def expected_names(scenario: Scenario) -> list[str]:
 async def serve(
     scenario: Scenario, *, swarm: str, listen: str, on_event: Callable[[str], None], zenoh_config: Path | None = None
 ) -> None:
-    """Be the router and keep the clock until the scenario is over; raises BusError when the endpoint cannot be had."""
+    """Serve the bus and the clock until the scenario is over; raises BusError when it cannot listen on the endpoint."""
     with Bus.serve(listen, config_of(zenoh_config, ROUTER)) as bus, registered(swarm, listen):
         keeper = ClockKeeper(bus, Topics(swarm), time_scale=scenario.time_scale, expected=expected_names(scenario))
         on_event(f"serving {listen}, waiting for {len(keeper.missing())} services of swarm {swarm}")
@@ -34,6 +34,6 @@ async def serve(
         on_event("all are there: the clock runs")
         try:
             await asyncio.sleep(clock.wait_s(scenario.duration_ns) + 1)
-        finally:  # interrupted or not: nobody keeps running on a bus that ends
+        finally:  # interrupted or not, no service goes on running on a bus that ends
             keeper.stop()
             time.sleep(_STOP_HEARD_S)  # noqa: ASYNC251  (nothing else runs here, and a cancelled task cannot await)

@@ -1,7 +1,8 @@
-"""The swarms that run on this machine: a file for each, so that a command finds one whose port was chosen at random.
+"""The swarms that run on this machine, one file for each, so that a command finds a swarm on a random port.
 
-The files are in a folder of this user's, `$XDG_RUNTIME_DIR/fanet-mw` or `fanet-mw-UID` where temporary files go. Who
-serves or uses a router writes one and removes it in the end; one whose process is gone is removed by whoever sees it.
+The files are in a folder of this user: `$XDG_RUNTIME_DIR/fanet-mw`, or `fanet-mw-UID` among the temporary files. A
+process that serves or uses a router writes one and removes it at its end; a file whose process is gone is removed by
+the next reader.
 """
 
 import json
@@ -16,19 +17,19 @@ from fanet_mw.errors import FanetError
 
 DEFAULT_ENDPOINT: Final = "tcp/127.0.0.1:7447"
 _START_TIME: Final = 22 - 3
-"""Field of /proc/PID/stat (proc_pid_stat(5)), counted from the one after the command's closing parenthesis."""
+"""Field of /proc/PID/stat (proc_pid_stat(5)), counted from the field after the command's closing parenthesis."""
 
 
 class Running(NamedTuple):
-    """A swarm that runs here."""
+    """A swarm that runs on this machine."""
 
     swarm: str
     endpoint: str
-    """Of its Zenoh router."""
+    """The endpoint of its Zenoh router."""
     pid: int
-    """Of the launcher or router."""
+    """The process id of its launcher or router."""
     started: str
-    """When that process began, as the kernel counts: a process id may be used again."""
+    """When that process began, in the kernel's count, because a process id may be used again."""
 
 
 def _folder() -> Path:
@@ -37,7 +38,7 @@ def _folder() -> Path:
 
 
 def _ours(folder: Path) -> bool:
-    """Whether a folder is this user's alone; where everybody may write, somebody else may have made it."""
+    """True if a folder belongs to this user alone; where all users may write, another may have made it."""
     try:
         status = folder.lstat()
     except OSError:
@@ -46,7 +47,7 @@ def _ours(folder: Path) -> bool:
 
 
 def _started(pid: int) -> str:
-    """When a process began; empty when it is gone, or a zombie."""
+    """When a process began; empty when it is gone or a zombie."""
     try:
         fields = Path(f"/proc/{pid}/stat").read_text(encoding="utf-8").rpartition(")")[2].split()
     except OSError:
@@ -56,7 +57,7 @@ def _started(pid: int) -> str:
 
 @contextmanager
 def registered(swarm: str, endpoint: str) -> Iterator[bool]:
-    """Let commands find a swarm meanwhile; yields whether they can."""
+    """Let commands find a swarm while the context lasts; yields True if they can."""
     folder, pid = _folder(), os.getpid()
     entry = Running(swarm, endpoint, pid, _started(pid))
     try:
@@ -81,7 +82,7 @@ def _create(folder: Path, pid: int) -> tuple[int, str]:
 
 
 def running() -> list[Running]:
-    """The swarms that run, by name."""
+    """The swarms that run on this machine, by name."""
     folder = _folder()
     if not _ours(folder):
         return []
@@ -90,12 +91,12 @@ def running() -> list[Running]:
 
 
 def _read(path: Path) -> Running | None:
-    """What a file says, if its process lives; a file of a dead one is removed."""
+    """The content of a file, if its process lives; the file of a dead process is removed."""
     try:
         entry = Running(**json.loads(path.read_text(encoding="utf-8")))
         alive = bool(entry.started) and _started(int(entry.pid)) == entry.started
     except (OSError, ValueError, TypeError):
-        return None  # it is being written, has just been removed, or is not ours
+        return None  # the file is being written, has just been removed, or is not of this program
     if not alive:
         with suppress(OSError):
             path.unlink()
@@ -106,7 +107,7 @@ def _read(path: Path) -> Running | None:
 def locate(connect: str | None, swarm: str | None) -> tuple[str, str | None]:
     """The endpoint and the name of the swarm that is meant: by endpoint, by name, or because no other runs here.
 
-    The name is None when only the router knows. Raises FanetError when several could be meant.
+    The name is None when only the router knows it. Raises FanetError when several swarms could be meant.
     """
     if connect is not None:
         return connect, swarm

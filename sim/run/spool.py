@@ -1,8 +1,8 @@
-"""A temporary file without a name for what a run collects: memory does not grow with the run, and nothing is left.
+"""A temporary file without a name for what a run collects, so that memory does not grow with the run.
 
     file = (length, bytes)*
 
-An item is appended whole or not at all. A disk that is full ends the spool and not the run: what it has stays readable.
+An item is appended whole or not at all. A full disk ends the spool and not the run: what the spool has stays readable.
 """
 
 import os
@@ -19,7 +19,7 @@ _BUFFER: Final = 1 << 20
 
 
 class Spool:
-    """Items of bytes that are written during a run and read after it; raises ConfigError when there can be no file."""
+    """Items of bytes, written during a run and read after it; raises ConfigError when no file can be made."""
 
     def __init__(self, folder: Path | None = None) -> None:
         try:
@@ -29,12 +29,12 @@ class Spool:
             raise ConfigError(f"{where}: no file can be made there: {error.strerror}") from error
         self._write = os.pwrite
         self.size = 0
-        """Bytes in the file that belong to whole items."""
+        """The bytes of the file that belong to whole items."""
         self.failure: str | None = None
-        """Why nothing more is taken in; None while everything is."""
+        """Why no more items are accepted; None while they are."""
 
     def append(self, item: bytes) -> bool:
-        """Write an item at the end; returns whether it is kept."""
+        """Write an item at the end; returns True if it is kept."""
         if self.failure is not None:
             return False
         data = _LENGTH.pack(len(item)) + item
@@ -50,7 +50,7 @@ class Spool:
         return True
 
     def items(self) -> Iterator[bytes]:
-        """What was appended, in order, as often as asked."""
+        """The items in the order in which they were appended; may be read repeatedly."""
         with open(os.dup(self._file.fileno()), "rb", buffering=_BUFFER) as file:  # noqa: PTH123  (it has no path)
             file.seek(0)
             left = self.size
@@ -60,5 +60,5 @@ class Spool:
                 left -= _LENGTH.size + length
 
     def close(self) -> None:
-        """Give the space back."""
+        """Free the disk space."""
         self._file.close()

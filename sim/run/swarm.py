@@ -1,9 +1,9 @@
-"""A swarm as real processes: router and clock here, the emulator, the world and every UAV in a process of its own.
+"""A swarm as real processes: router and clock here; the emulator, the world and every UAV in a process of its own.
 
     start all -> wait until all are up -> start the clock -> collect traces, reports and taps -> all end -> outcome
 
-A UAV that dies is reported and the others carry on; without the emulator or the world there is no run, so their end
-ends it (or, with `respawn`, any of them is started again and finds its place by the clock).
+When a UAV's process dies that is reported and the others carry on. A run needs the emulator and the world, so the end
+of either ends it; with `respawn` any of them is started again and finds its place by the clock.
 """
 
 import asyncio
@@ -40,31 +40,31 @@ from sim.world.flight import FlightRecorder
 from sim.world.layout import positions
 
 _AGENT_NICE: Final = 10
-"""All UAVs wait for the emulator, and each has its lead: it goes first when both cores are wanted."""
+"""The niceness of UAVs: all of them wait for the emulator, which goes first when all cores are in use."""
 READY_TIMEOUT_S: Final = 300.0
-"""On a machine that is busy with other things 47 processes may take a minute, and the emulator may have to compile."""
+"""How long to wait until all are up: on a busy machine 47 processes take a minute, and a compilation comes on top."""
 WORD_EVERY_S: Final = 10.0
-"""How often those who wait for the swarm are told whom for."""
+"""How often it is reported which processes are being waited for."""
 _MAX_LATE_STARTS: Final = 3
-"""How often a process that found no router is started again before the swarm's time begins."""
+"""How often a process that has found no router is started again before the swarm's time begins."""
 _GRACE_S: Final = 5.0
-"""After the end of the swarm's time, for last reports."""
+"""How long to wait for last reports after the end of the swarm's time."""
 _LAST_WORDS_S: Final = 1.0
-"""After the end of all processes, for what they said last: it may still be on its way through the bus."""
+"""How long to wait, after the end of all processes, for what they sent last: it may still be on the bus."""
 _MAX_RESPAWNS: Final = 5
-"""Of one name: a process that cannot live is not started for ever."""
+"""How often a process of one name is started again: one that cannot live is not started for ever."""
 _PROGRESS_S: Final = 0.25
 Tell = Callable[[str], None]
 
 
 def free_endpoint(protocol: str = "tcp") -> str:
-    """A port of the loopback interface that is free now."""
+    """An endpoint on the loopback interface with a port that is free now."""
     with socket.socket() as probe:
         probe.bind(("127.0.0.1", 0))
         return f"{protocol}/127.0.0.1:{probe.getsockname()[1]}"
 
 
-class Swarm:
+class SwarmRun:
     """One run in real time."""
 
     def __init__(
@@ -81,7 +81,7 @@ class Swarm:
     ) -> None:
         names = Topics(swarm)
         self.emulator_options: dict[str, Any] = {}
-        """More arguments of the emulator's process."""
+        """Additional arguments of the emulator's process."""
         self._scenario = scenario
         self._swarm = swarm
         self._endpoint = endpoint
@@ -100,12 +100,12 @@ class Swarm:
         self._obituaries: list[Record] = []
         self._respawns: dict[str, int] = {}
         self._stall_s = 0.0
-        """The longest that this process did nothing although it should have."""
+        """The longest time for which this process did nothing although it should have."""
         self._late_starts: Counter[str] = Counter()
         self._signal: int | None = None
 
     async def run(self, on_progress: Callable[[float], None]) -> Outcome:
-        """Start, run, collect. Whatever happens, no process and no temporary file is left."""
+        """Start, run, collect. In any case no process and no temporary file is left."""
         with contextlib.closing(self._collector):
             began = time.monotonic()
             try:
@@ -123,7 +123,7 @@ class Swarm:
             return self._outcome(wall_s=wall_s, ready_s=ready_s, ended_ns=ended_ns)
 
     def _outcome(self, *, wall_s: float, ready_s: float, ended_ns: int | None) -> Outcome:
-        """What was collected; an incomplete trace is said to be one."""
+        """The outcome with what was collected; an incomplete trace is reported."""
         collector = self._collector
         if (failure := collector.disk_failure()) is not None:
             self._tell(f"the trace is incomplete: its temporary file could not be written: {failure}")
@@ -177,18 +177,18 @@ class Swarm:
         for node, position in zip(self._scenario.node_ids, positions(self._scenario), strict=True):
             arguments = {**common, "node": NodeId(node), "position": position}
             self.processes.start(f"agent-{node}", run_agent, arguments, nice=_AGENT_NICE)
-            await asyncio.sleep(0)  # signals are heard between two of many
+            await asyncio.sleep(0)  # signals are handled between two of many processes
             self._check_not_over()
 
     def _check_not_over(self) -> None:
-        """Raise when the swarm was told to end before its time began: there is nothing to report."""
+        """Raise if the swarm was told to end before its time began, because then there is nothing to report."""
         if self._signal is not None:
             raise KeyboardInterrupt(self._signal)
         if self._over.is_set():
             raise BusError(self._aborted or "ended before the swarm was up")
 
     async def _start_clock(self, began: float) -> float:
-        """Wait for everyone; returns how long that took [s]."""
+        """Wait for all participants, then start the clock; returns how long that took [s]."""
         start = asyncio.ensure_future(self._keeper.start(timeout_s=READY_TIMEOUT_S))
         over = asyncio.ensure_future(self._over.wait())
         while not await _any_done(start, over, timeout_s=WORD_EVERY_S):
@@ -204,7 +204,7 @@ class Swarm:
         return ready_s
 
     async def _follow(self, on_progress: Callable[[float], None]) -> None:
-        """Until the swarm's time is over or the run is aborted."""
+        """Wait until the swarm's time is over or the run is aborted."""
         assert self._clock is not None, "the clock was started"
         while self._clock.wait_s(self._scenario.duration_ns) > 0 and not self._over.is_set():
             on_progress(max(0.0, self._clock.now_ns() / S))
@@ -214,7 +214,7 @@ class Swarm:
             self._stall_s = max(self._stall_s, time.monotonic() - began_s - _PROGRESS_S)
 
     async def _wind_up(self) -> None:
-        """Everyone stops by the clock, or is told to; last reports come in."""
+        """End all processes, by the clock or by order, and wait for last reports."""
         self._over.set()
         await self._end_processes()
         dead = {name for name, _ in self._ended}
@@ -247,7 +247,7 @@ class Swarm:
         what = f"{name} ended with {describe(exit_code)} at {now_ns / S:.1f} s"
         if self._over.is_set():
             if exit_code == -(self._signal or 0):
-                return  # whoever interrupted us meant all of us
+                return  # the signal that interrupted this process was meant for all
             self._tell(f"{what}, while the swarm was ending")
             return
         self._respawns[name] = self._respawns.get(name, 0) + 1
@@ -263,7 +263,7 @@ class Swarm:
             self.abort(f"{what}; the run cannot go on without it")
 
     def _now_ns(self) -> int:
-        """The swarm instant, within the swarm's time."""
+        """The swarm instant, limited to the swarm's time."""
         return min(max(0, self._clock.now_ns()), self._scenario.duration_ns) if self._clock else 0
 
     def _time_is_over(self) -> bool:
@@ -276,7 +276,7 @@ async def _any_done(*futures: asyncio.Future[Any], timeout_s: float) -> bool:
 
 
 def _bus(listen: str | None, connect: str | None, zenoh_config: Path | None) -> tuple[Bus, str]:
-    """The session of the launcher, and the endpoint its children connect to: TLS by default, with keys for all."""
+    """The session of the launcher, and the endpoint to which its children connect: TLS by default with keys for all."""
     config = config_of(zenoh_config, ROUTER)
     if connect is not None:
         return Bus.join(connect, config), connect
@@ -297,14 +297,14 @@ async def launch(
     zenoh_config: Path | None = None,
     on_progress: Callable[[float], None] = lambda _: None,
     on_event: Tell = lambda _: None,
-    on_started: Callable[[Swarm], None] = lambda _: None,
+    on_started: Callable[[SwarmRun], None] = lambda _: None,
 ) -> Outcome:
-    """Run a scenario as real processes. `on_started` is handed the swarm while it runs, for tests and tools.
+    """Run a scenario as real processes. `on_started` receives the swarm while it runs, for tests and tools.
 
-    `zenoh_config` is Zenoh's own configuration, a file for all processes or a folder with one for each.
-    What is collected waits in temporary files in `spool_folder`; by default where the system keeps such files.
+    `zenoh_config` is Zenoh's own configuration: a file for all processes, or a folder with one file for each. What is
+    collected waits in temporary files in `spool_folder`, by default where the system keeps such files.
 
-    Raises BusError when the bus cannot be had or the swarm does not come up, ConfigError when a limit of the machine
+    Raises BusError when the bus cannot be used or the swarm does not come up, ConfigError when a limit of the machine
     is too low, and KeyboardInterrupt with its number when a signal comes before there is anything to report.
     """
     limits.prepare(processes=len(expected_names(scenario)))
@@ -313,7 +313,7 @@ async def launch(
     bus, endpoint = _bus(listen, connect, zenoh_config)
     with bus, registered(swarm, endpoint) as known:
         on_event(f"swarm {swarm} on {endpoint}" + ("" if known else "; other commands must be told so: --connect"))
-        run = Swarm(
+        run = SwarmRun(
             scenario,
             bus,
             swarm=swarm,

@@ -25,14 +25,14 @@ from sim.world.layout import positions
 from sim.world.world import World
 
 EPOCH_UNIX_NS: Final = 1_735_689_600 * S
-"""2025-01-01T00:00:00Z: when swarm instant 0 is said to have been in logs that want unix time. Not the time of the run:
-the same scenario and seed give the same files. Not 1970, which some tools take for no time at all."""
+"""2025-01-01T00:00:00Z, the instant of swarm instant 0 in logs that want unix time. It is not the time of the run, so
+that the same scenario and seed give the same files; and it is not 1970, which some tools take for no time at all."""
 _STEP_NS: Final = 100 * MS
-"""Between two looks for signals. How a run is cut into steps changes nothing in it."""
+"""The time between two checks for signals. How a run is divided into steps changes nothing in it."""
 
 
 def actors_of(scenario: Scenario, swarm: str, *, capture: Capture | None = None) -> list[Actor]:
-    """Every actor of a swarm: the world first, so that poses stand before anyone transmits."""
+    """All actors of a swarm: the world first, so that there are poses before any node transmits."""
     starts = positions(scenario)
     uavs = [make_uav(scenario, NodeId(node), swarm, position=starts[node - 1]) for node in scenario.node_ids]
     return [World(scenario, swarm), Medium(scenario, swarm, capture=capture), *uavs]
@@ -45,10 +45,10 @@ def simulate(
     capture: Capture | None = None,
     signals: Sequence[int] = (),
 ) -> Outcome:
-    """Run a scenario to its end, or until a signal's number is in `signals`: then the outcome is what there is so far.
+    """Run a scenario to its end, or until `signals` holds a signal's number: then the outcome is what there is so far.
 
-    `on_progress` is told the simulated seconds that have passed. Raises KeyboardInterrupt with the signal's number when
-    that comes before anything has been simulated.
+    `on_progress` receives the simulated seconds that have passed. Raises KeyboardInterrupt with the signal's number
+    when the signal comes before anything has been simulated.
     """
     swarm = scenario.name
     records: list[Record] = []
@@ -100,7 +100,7 @@ def _run(host: VirtualHost, scenario: Scenario, on_progress: Callable[[float], N
 
 @contextmanager
 def _no_collector() -> Iterator[None]:
-    """A run makes millions of small tuples and no cycles: looking for some would take a tenth of its time."""
+    """Switch the garbage collector off: a run makes millions of small tuples and no cycles; this saves a tenth."""
     was_on = gc.isenabled()
     gc.disable()
     try:
@@ -109,4 +109,4 @@ def _no_collector() -> Iterator[None]:
         if was_on:
             gc.freeze()
             gc.enable()
-            gc.unfreeze()  # what the run left counts as old: the collector does not walk through all of it at once
+            gc.unfreeze()  # what the run has left counts as old, so that the collector does not walk through it at once

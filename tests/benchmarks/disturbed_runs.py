@@ -159,7 +159,7 @@ def real(scenario: Scenario, what: Disturbance) -> dict[str, Any]:
     assert what.lost + what.late == 0, "a bus that loses or delays is for virtual time"
     tasks = []
 
-    def started(run: swarm.Swarm) -> None:
+    def started(run: swarm.SwarmRun) -> None:
         async def later() -> None:
             while run._clock is None or run._clock.now_ns() < _ACTS_NS:  # noqa: ASYNC110  (real time passes)
                 await asyncio.sleep(0.02)

@@ -38,7 +38,7 @@ from fanet_mw.wire.digest import Digest
 from fanet_mw.wire.inner import Beacon, Join, Schedule, Survivor, TimeBeacon
 from fanet_mw.wire.links import Links
 from fanet_mw.wire.places import Places
-from sim.run.plausible import Plausible
+from sim.run.input_checks import InputChecks
 
 SLOW_S: Final = 0.5
 """Of processor time, the most that one input may cost; usual are microseconds."""
@@ -159,7 +159,7 @@ def _made(message: Any) -> Any:
 
 
 def _of_the_bus(found: Corpus) -> Iterator[Decoder]:
-    checks = Plausible(corpus.scenario_of("all", "duration_s=30"))
+    checks = InputChecks(corpus.scenario_of("all", "duration_s=30"))
     said = {kind: [put for put in found.puts if put[0] in topics.codes_of(kind)] for kind in _CHECKED}
 
     def put(pick: Random) -> bytes:

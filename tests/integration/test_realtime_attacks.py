@@ -14,7 +14,7 @@ from fanet_mw.trace import Approaching, Delivered, Generated
 from fanet_mw.units import S
 from sim.results.files import finish
 from sim.run.outcome import Outcome
-from sim.run.swarm import Swarm, free_endpoint, launch
+from sim.run.swarm import SwarmRun, free_endpoint, launch
 from sim.scenarios import catalog
 
 NAMES = Topics("test")
@@ -42,7 +42,7 @@ class Attacker:
     def __enter__(self) -> Self:
         return self
 
-    def start(self, _: Swarm) -> None:
+    def start(self, _: SwarmRun) -> None:
         self._thread.start()
 
     def __exit__(self, *_: object) -> None:

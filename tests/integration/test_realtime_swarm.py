@@ -26,7 +26,7 @@ from fanet_mw.trace import ProcessEnded
 from fanet_mw.units import NodeId
 from sim.results.files import finish
 from sim.run.outcome import Outcome
-from sim.run.swarm import Swarm, launch
+from sim.run.swarm import SwarmRun, launch
 from sim.scenarios import catalog
 
 FAST = ["duration_s=5", "warmup_s=2", "drain_s=1", "clusters.flooding_period_s=0.5"]
@@ -42,7 +42,7 @@ def run(
     """Launch; when `at_s` wall seconds after the start of the run have passed, do `act(swarm)`."""
     events: list[str] = []
 
-    def started(swarm: Swarm) -> None:
+    def started(swarm: SwarmRun) -> None:
         async def later() -> None:
             while swarm._clock is None or swarm._clock.now_ns() < at_s * 1e9:  # noqa: ASYNC110  (real time passes)
                 await asyncio.sleep(0.02)
@@ -122,7 +122,7 @@ def test_a_killed_agent_is_started_again_with_respawn_and_takes_part() -> None:
 def test_without_the_emulator_the_run_ends_within_three_seconds_with_a_partial_result() -> None:
     killed: list[float] = []
 
-    def act(swarm: Swarm) -> None:
+    def act(swarm: SwarmRun) -> None:
         killed.append(time.monotonic())
         kill("emulator")(swarm)
 

@@ -23,11 +23,11 @@ from fanet_mw.scenario import Scenario
 from fanet_mw.units import S
 from sim.results.files import finish
 from sim.run.outcome import Outcome
-from sim.run.swarm import Swarm, launch
+from sim.run.swarm import SwarmRun, launch
 from sim.scenarios import catalog
 
 SHORT = ["duration_s=4", "warmup_s=1", "drain_s=0.5", "clusters.flooding_period_s=0.5", "world.engine=kinematic"]
-Act = Callable[[Swarm], None]
+Act = Callable[[SwarmRun], None]
 
 
 def scenario(*overrides: str) -> Scenario:
@@ -38,7 +38,7 @@ def run(chosen: Scenario, *acts: tuple[float, Act], respawn: bool = False) -> tu
     """Launch, do each act at its swarm instant [s], and summarize."""
     tasks = []
 
-    def started(swarm: Swarm) -> None:
+    def started(swarm: SwarmRun) -> None:
         async def later(at_s: float, act: Act) -> None:
             while swarm._clock is None or swarm._clock.now_ns() < at_s * S:  # noqa: ASYNC110  (real time passes)
                 await asyncio.sleep(0.02)
@@ -51,7 +51,7 @@ def run(chosen: Scenario, *acts: tuple[float, Act], respawn: bool = False) -> tu
 
 
 def send(number: signal.Signals, *names: str) -> Act:
-    def act(swarm: Swarm) -> None:
+    def act(swarm: SwarmRun) -> None:
         for name in names:
             os.kill(swarm.processes.pid(name), number)
 
@@ -111,7 +111,7 @@ class Watch:
     def __init__(self) -> None:
         self.poses: list[Poses] = []
 
-    def __call__(self, swarm: Swarm) -> None:
+    def __call__(self, swarm: SwarmRun) -> None:
         self.bus = Bus.join(swarm._endpoint)
         self.bus.subscribe(Topics("verdict").pose, lambda _, payload: self.poses.extend(topics.decode(payload)))  # type: ignore[arg-type]
 

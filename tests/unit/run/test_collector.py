@@ -209,7 +209,7 @@ def test_no_report_that_gets_through_can_keep_the_result_from_being_computed(gen
                     del inner[path[-1]]
                 else:
                     inner[path[-1]] = value
-                checked, why = made.collector._plausible.report(name, json.dumps(content))
+                checked, why = made.collector._checks.report(name, json.dumps(content))
                 if why is not None:
                     refused += 1
                     continue

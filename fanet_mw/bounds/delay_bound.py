@@ -15,4 +15,4 @@ class Refused(NamedTuple):
     reason: str
 
 
-Outcome = Bounded | Refused
+DelayBound = Bounded | Refused

@@ -1,15 +1,15 @@
-"""Collision warnings at one UAV: who is on a course of conflict, whom to tell, and how to fly until it is past.
+"""Collision avoidance of one UAV: which UAVs it is in conflict with, which to warn, and how to fly until that is past.
 
-    own fixes, others' hellos -> closest point of approach too near, too soon -> warn it, change height
-    a warning that names us   -> the same, even if we do not hear the other one
-    far enough, sideways      -> the course as before
+    own fixes, others' hellos     -> closest approach too near and too soon -> warn the other, change height
+    a warning that names this UAV -> the same, even if the other UAV is not received
+    far enough, sideways          -> the course as before
 
-Heights need no agreement, only the ids: for each other one a UAV goes one level up if its own id is the lower one, else
-one down. So two always part, of three in conflict with each other no two share a level, and a warning need not say
-which way its sender goes. A level is the distance to be kept. Sans-IO.
+Heights need no agreement, only ids: for each other UAV a UAV goes one level up if its own id is the lower one, else one
+down. So two always part, of three in conflict with each other no two share a level, and a warning need not say which
+way its sender goes. A level is the distance to be kept. Sans-IO.
 
-Both fly on sideways as they did. Not modelled: turns that the other one has planned, and conflicts that the change of
-height itself causes until the next hello shows them.
+Both are assumed to fly on sideways as they did. Not modeled: turns that the other UAV has planned, and conflicts that
+the change of height itself causes until the next hello shows them.
 """
 
 import math
@@ -25,27 +25,27 @@ from fanet_mw.trace import ConflictForeseen, ConflictOver, Record
 from fanet_mw.units import MS, Enu, NodeId, S, seconds_to_ns
 
 _LIFETIME_HELLOS: Final = 3.5
-"""What was heard of another UAV counts for so many hello intervals."""
+"""The position of another UAV is used for this many hello intervals."""
 _FUTURE_NS: Final = S
-"""A position from further ahead is none: clocks agree better than that."""
+"""A position from further in the future than this is invalid, because clocks agree better than that."""
 _CLEAR: Final = 1.5
-"""A conflict is over when the two will stay this much farther apart, sideways, than they must."""
+"""A conflict is over when the two will stay this many times farther apart sideways than they must."""
 _PAST_NS: Final = 3 * S
-"""After the closest approach of a UAV that we were only told of."""
+"""The time after the closest approach to a UAV known only by its warning, after which the conflict is over."""
 _CLIMB_M_S: Final = 4.0
-"""A small multirotor's comfortable rate."""
+"""The comfortable climb rate of a small multirotor."""
 _LEVELS: Final = 2
-"""At most so many levels up or down: `nodes.altitude_m` has room for them."""
+"""The most levels up or down, for which `nodes.altitude_m` has room."""
 _AHEAD_S: Final = 10.0
-"""How far ahead our setpoints lie: the farther, the less a fix's error turns the course that others hear of."""
+"""How far ahead setpoints lie: the farther, the less does the error of a fix turn the course that others receive."""
 _SOON_S: Final = 2.0
-"""In which a height, or a goal, is approached when it is near."""
+"""The time in which a height or a goal is approached when it is near."""
 _LEAST_M_S: Final = 0.5
 _EVER_S: Final = 1e6
 
 
 class Alert(NamedTuple):
-    """What we have to say of another UAV."""
+    """A warning for another UAV."""
 
     other: NodeId
     approach: Approach
@@ -53,24 +53,24 @@ class Alert(NamedTuple):
 
 @dataclass
 class _Threat:
-    """One other UAV that we avoid."""
+    """One other UAV that this UAV avoids."""
 
     until_ns: int
-    """When it will be past, as far as is known without hearing it."""
-    said_ns: int | None = None
-    """When either of us last warned the other."""
+    """When the conflict will be past, as far as is known without receiving the other UAV."""
+    warned_ns: int | None = None
+    """When either of the two last warned the other."""
 
 
 @dataclass
 class _Avoidance:
-    """What we were flying when it began."""
+    """The height and velocity that the UAV flew when avoidance began."""
 
     up_m: float
     velocity: Enu
 
 
-class Lookout:
-    """One UAV's watch over the others."""
+class ConflictMonitor:
+    """Detects conflicts of one UAV with others, and avoids them."""
 
     def __init__(self, scenario: Scenario, node: NodeId) -> None:
         mission = scenario.mission
@@ -83,24 +83,24 @@ class Lookout:
         self.records: list[Record] = []
         self.warnings: list[Alert] = []
         self.course: Course | None = None
-        """A new course to fly, for the host to take."""
+        """A new course to fly, to be taken by the host."""
         self._others: dict[NodeId, Motion] = {}
         self._threats: dict[NodeId, _Threat] = {}
         self._avoidance: _Avoidance | None = None
         self._wanted: Course | None = None
-        """The mission's course; None: the formation's."""
+        """The mission's course; None when the UAV flies in formation."""
 
-    # --- what comes in --------------------------------------------------------------------------------------------
+    # --- input ----------------------------------------------------------------------------------------------------
 
-    def heard(self, node: NodeId, motion: Motion, *, now_ns: int) -> bool:
-        """A hello said where another UAV flies; False when that is too old to be of use, or of the future."""
+    def on_hello(self, node: NodeId, motion: Motion, *, now_ns: int) -> bool:
+        """Take in where another UAV flies, from its hello; False when that is too old to be used, or in the future."""
         if not now_ns - self._lifetime_ns <= motion.at_ns <= now_ns + _FUTURE_NS:
             return False
         self._others[node] = motion
         return True
 
-    def warned(self, origin: NodeId, warning: Collision, own: Motion, *, born_ns: int, now_ns: int) -> None:
-        """Another UAV has warned of a collision; with us?"""
+    def on_warning(self, origin: NodeId, warning: Collision, own: Motion, *, born_ns: int, now_ns: int) -> None:
+        """Take in the warning of another UAV, and avoid that UAV if the warning names this one."""
         left_ns = born_ns + round(min(warning.closest_s, _EVER_S) * S) - now_ns
         if warning.other != self._node or origin == self._node or left_ns > seconds_to_ns(self._horizon_s):
             return
@@ -109,47 +109,47 @@ class Lookout:
         threat = self._threats.get(origin)
         if threat is None:
             if left_ns <= 0:
-                return  # past before we were told
+                return  # the approach was past before the warning came
             threat = self._avoid(origin, own, now_ns + left_ns)
             distance_m = math.hypot(warning.altitude_m, warning.horizontal_m)
-            self._foreseen(origin, left_ns, distance_m, told=True, now_ns=now_ns)
-        threat.said_ns = max(born_ns, threat.said_ns or 0)
+            self._record_conflict(origin, left_ns, distance_m, told=True, now_ns=now_ns)
+        threat.warned_ns = max(born_ns, threat.warned_ns or 0)
         threat.until_ns = max(threat.until_ns, now_ns + left_ns)
         self._fly(own)
 
-    def moved(self, own: Motion) -> None:
-        """A fix of our own: look at everyone."""
+    def on_fix(self, own: Motion) -> None:
+        """Take in a fix of this UAV, and examine all other UAVs."""
         now_ns = own.at_ns
         self._others = {n: m for n, m in self._others.items() if now_ns - m.at_ns <= self._lifetime_ns}
         for node in sorted(self._others):
-            self._look(node, own)
+            self._examine(node, own)
         for node in sorted(self._threats):
             if self._is_over(node, own):
                 del self._threats[node]
                 self.records.append(ConflictOver(now_ns, self._node, node))
         self._fly(own)
 
-    def steered(self, course: Course) -> bool:
-        """The mission has chosen a course; True when it may be flown now."""
+    def permits(self, course: Course) -> bool:
+        """Note the course that the mission has chosen; True when it may be flown now."""
         self._wanted = None if course.speed_m_s == HOME else course
         return self._avoidance is None
 
     # --- conflicts ------------------------------------------------------------------------------------------------
 
-    def _look(self, node: NodeId, own: Motion) -> None:
-        """Is there a conflict, and is it time to say so?"""
+    def _examine(self, node: NodeId, own: Motion) -> None:
+        """Examine one other UAV: is there a conflict, and is a warning due?"""
         now_ns = own.at_ns
         threat = self._threats.get(node)
         approach = min((self._approach(node, course) for course in self._courses(own)), key=lambda a: a.distance_m)
-        if threat is not None:  # by height it may be settled already
+        if threat is not None:  # the conflict may be solved by height already
             if 0 < approach.closest_s < self._horizon_s and approach.distance_m < self._clear_m:
                 threat.until_ns = now_ns + round(approach.closest_s * S)
-                self._say(node, threat, approach, now_ns)
+                self._warn(node, threat, approach, now_ns)
         elif approach.closest_s > 0 and approach.distance_m < self._distance_m:
             left_ns = round(approach.closest_s * S)
             threat = self._avoid(node, own, now_ns + left_ns)
-            self._foreseen(node, left_ns, approach.distance_m, told=False, now_ns=now_ns)
-            self._say(node, threat, approach, now_ns)
+            self._record_conflict(node, left_ns, approach.distance_m, told=False, now_ns=now_ns)
+            self._warn(node, threat, approach, now_ns)
 
     def _approach(self, node: NodeId, own: Motion) -> Approach:
         other = self._others[node]
@@ -157,21 +157,21 @@ class Lookout:
         return closest(apart, other.velocity.minus(own.velocity), within_s=self._horizon_s)
 
     def _courses(self, own: Motion) -> list[Motion]:
-        """Where we fly; while we avoid, level at the height that we have and at the one to which we shall return."""
+        """The courses to examine: the own one; while avoiding, level flight at the present and at the former height."""
         if self._avoidance is None:
             return [own]
         level = own._replace(velocity=_level(own.velocity))
         here = own.position
         return [level, level._replace(position=Enu(here.east, here.north, self._avoidance.up_m))]
 
-    def _foreseen(self, node: NodeId, left_ns: int, distance_m: float, *, told: bool, now_ns: int) -> None:
+    def _record_conflict(self, node: NodeId, left_ns: int, distance_m: float, *, told: bool, now_ns: int) -> None:
         record = ConflictForeseen(now_ns, self._node, node, round(left_ns / MS), round(distance_m, 2), told)
         self.records.append(record)
 
-    def _say(self, node: NodeId, threat: _Threat, approach: Approach, now_ns: int) -> None:
-        """Both would say the same: who has heard the other's warning need not repeat it yet."""
-        if threat.said_ns is None or now_ns - threat.said_ns >= self._repeat_ns:
-            threat.said_ns = now_ns
+    def _warn(self, node: NodeId, threat: _Threat, approach: Approach, now_ns: int) -> None:
+        """Warn the other UAV, unless either of the two has warned a moment ago: both warnings would say the same."""
+        if threat.warned_ns is None or now_ns - threat.warned_ns >= self._repeat_ns:
+            threat.warned_ns = now_ns
             self.warnings.append(Alert(node, approach))
 
     def _is_over(self, node: NodeId, own: Motion) -> bool:
@@ -191,7 +191,7 @@ class Lookout:
         return threat
 
     def _fly(self, own: Motion) -> None:
-        """The next setpoint: on as before, at the height that keeps us apart; or back to the course."""
+        """Choose the next setpoint: on as before at the height that keeps distance, or back to the course."""
         before = self._avoidance
         if before is None:
             return
@@ -207,7 +207,7 @@ class Lookout:
         self.course = Course(ahead, max(_LEAST_M_S, velocity.norm()))
 
     def _sideways(self, here: Enu) -> Enu | None:
-        """How to fly on towards the mission's goal; None without one."""
+        """The horizontal velocity towards the mission's goal; None without a goal."""
         if self._wanted is None:
             return None
         way = _level(self._wanted.position.minus(here))

@@ -1,7 +1,7 @@
-"""`fanet air`: change the air of a swarm that runs, and see that the emulator has done it.
+"""`fanet air`: change the air of a running swarm, and confirm that the emulator has carried the change out.
 
-A change is one message on `fanet/<swarm>/radio/control`. The emulator's trace says that it was done; silence means that
-it was refused (its report counts why) or that nobody emulates that swarm.
+A change is one message on `fanet/<swarm>/radio/control`. The emulator's trace shows that it was carried out; silence
+means that it was refused (the emulator's report counts why) or that no emulator serves that swarm.
 """
 
 import threading
@@ -19,9 +19,9 @@ from fanet_mw.hosts.bus import Bus, config_of
 from fanet_mw.trace import RadioFault
 
 OPERATOR: Final = "operator"
-"""Whom access lists know the commands of a person by."""
+"""The name under which access lists know the commands of a person."""
 CONFIRM_TIMEOUT_S: Final = 5.0
-"""Emulators publish their trace twice a second."""
+"""How long to wait for the confirmation; emulators publish their trace twice a second."""
 _DISCOVER_S: Final = 1.0
 
 
@@ -37,7 +37,7 @@ def find_swarm(bus: Bus) -> str:
 
     bus.watch(f"{ROOT}/*/alive/emulator", on_change)
     if came.wait(_DISCOVER_S):
-        time.sleep(0.1)  # others may answer too
+        time.sleep(0.1)  # other emulators may answer too
     names = sorted(found)
     if len(names) != 1:
         raise FanetError(f"{len(names)} swarms with an emulator on this router ({', '.join(names)}): say --swarm NAME")
@@ -65,7 +65,7 @@ def change(endpoint: str, swarm: str | None, control: Control, *, zenoh_config: 
 
 
 def _watch(control: Control, done: list[RadioFault], confirmed: threading.Event) -> Callable[[str, bytes], None]:
-    """Collects the faults of the control's label that the emulator traces; all labels of a restore of all."""
+    """A handler that collects the faults with the control's label from the trace; all faults if the label is empty."""
 
     def on_sample(_topic: str, payload: bytes) -> None:
         try:

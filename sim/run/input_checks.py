@@ -1,9 +1,9 @@
-"""What can be meant by what a run's collector hears: the border between the bus and metrics.
+"""Checks of what a run's collector receives: the border between the bus and the metrics.
 
-    who says it -> what it may say -> about whom (nodes and survivors that exist) -> when (within the run)
+    sender -> the kinds it may send -> the nodes and survivors it names (they exist) -> the instant (within the run)
 
-Each check answers with a word for what is wrong, or None. Reports have shapes: the keys that metrics read, with types.
-Does not model: authentication. Who may say something as whom is for the router's access list (docs/how-to/security.md).
+Each check returns a word for what is wrong, or None. Reports have shapes: the keys that metrics read, with types. Not
+modeled: authentication, which is for the router's access list (docs/how-to/security.md).
 """
 
 import json
@@ -24,13 +24,13 @@ from fanet_mw.units import S
 _SLACK_NS: Final = 10 * S
 """How far outside the scenario's time an instant may lie: processes start before it and end after it."""
 _DEEPEST: Final = 6
-"""Levels of a report's JSON."""
+"""The most levels of nesting in a report's JSON."""
 _MOST_RSSI_MDBM: Final = 400_000
-"""Magnitude of the mean RSSI of a link [1/1000 dBm]."""
+"""The greatest magnitude of the mean RSSI of a link [1/1000 dBm]."""
 _SPEAKERS: Final[dict[type[Any], str | None]] = {Collided: "world", RadioFault: "emulator", ProcessEnded: None}
-"""Who alone may say a kind of record; None: nobody on the bus. All other kinds are said by the node they are about."""
+"""The only actor that may send a kind of record; None: no actor may. All other kinds are sent by the node they name."""
 _ABOUT_NODES: Final = ("origin", "other", "reference")
-"""Fields of records that name a node, or 0."""
+"""The fields of records that name a node, or 0."""
 
 Count = Annotated[int, Field(ge=0, le=2**53)]
 Number = Annotated[float, Field(ge=-1e18, le=1e18)]
@@ -45,7 +45,7 @@ class _Host(BaseModel):
 
 
 class _Shape(BaseModel):
-    """Keys that are read must be there; whatever else a report holds is carried along."""
+    """The keys that are read must be present; whatever else a report holds is kept."""
 
     model_config = ConfigDict(extra="allow", strict=True)
     final: bool = False
@@ -133,18 +133,18 @@ class _Agent(_Shape):
 _SHAPES: Final[dict[str, type[_Shape]]] = {"emulator": _Emulator, "world": _World}
 
 
-class Plausible:
-    """The checks of one scenario."""
+class InputChecks:
+    """The checks for one scenario."""
 
     def __init__(self, scenario: Scenario) -> None:
         self._nodes = scenario.nodes.count
         self._survivors = scenario.mission.survivors
         self._until_ns = scenario.duration_ns + _SLACK_NS
         self.node_of: Mapping[str, int] = {"emulator": 0, "world": 0, **{f"agent-{n}": n for n in scenario.node_ids}}
-        """The node of each actor that the swarm has, by the actor's name; 0: not a node."""
+        """The node of each actor of the swarm, by the actor's name; 0 for an actor that is not a node."""
 
     def record(self, name: str, record: Record) -> str | None:
-        """What is wrong with a trace record of the actor of this name."""
+        """What is wrong with a trace record that came from the actor of this name."""
         kind = type(record)
         if kind in _SPEAKERS:
             if _SPEAKERS[kind] != name:
@@ -162,7 +162,7 @@ class Plausible:
         return None
 
     def tap(self, tap: MavlinkTap) -> str | None:
-        """What is wrong with telemetry; a log can hold whole frames only, stamped within the run."""
+        """What is wrong with telemetry; a log can hold only whole frames, stamped within the run."""
         if not 0 <= tap.t_ns <= self._until_ns:
             return "instant"
         try:
@@ -184,7 +184,7 @@ class Plausible:
         return None
 
     def report(self, name: str, text: str) -> tuple[dict[str, Any], str | None]:
-        """The content of a report, and what is wrong with it; the content is empty then."""
+        """The content of a report, and what is wrong with it; if something is, the content is empty."""
         try:
             content = json.loads(text)
         except (ValueError, RecursionError):

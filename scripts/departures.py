@@ -34,7 +34,7 @@ class Hellos(Aodv):
         self._broadcast_ns = -1
         self._hello_ns = now_ns + int(self._random() * 100 * MS)
 
-    def _say_hello(self, now_ns: int) -> None:
+    def _send_hello(self, now_ns: int) -> None:
         since_ns = now_ns - self._broadcast_ns if self._broadcast_ns >= 0 else 0
         if not since_ns:
             node = self._port.node
@@ -63,15 +63,15 @@ class Stale(Aodv):
 class Reverse(Aodv):
     """A RREQ replaces the reverse route whatever its sequence number and hop count (RFC 3561, 6.2: only if newer)."""
 
-    def _requested(self, request: RouteRequest, ttl: int, previous: NodeId, *, now_ns: int) -> None:
+    def _on_request(self, request: RouteRequest, ttl: int, previous: NodeId, *, now_ns: int) -> None:
         known = self._table.entry(NodeId(request.originator), now_ns=now_ns)
-        heard = (request.originator, request.rreq_id) in self._requests._ends_ns  # noqa: SLF001
-        barred = self._blacklist.get(previous, now_ns) > now_ns or request.originator == self._port.node
-        if known is not None and not heard and not barred:
+        seen = (request.originator, request.rreq_id) in self._requests._ends_ns  # noqa: SLF001
+        ignored = self._blacklist.get(previous, now_ns) > now_ns or request.originator == self._port.node
+        if known is not None and not seen and not ignored:
             known.seq = later(known.seq, request.originator_seq)
             hops = request.hop_count + 1
             self._table._point(known, next_hop=previous, hops=hops, ends_ns=now_ns)  # noqa: SLF001
-        super()._requested(request, ttl, previous, now_ns=now_ns)
+        super()._on_request(request, ttl, previous, now_ns=now_ns)
 
 
 class Loop(Aodv):
@@ -79,9 +79,9 @@ class Loop(Aodv):
 
     _previous = NodeId(0)
 
-    def _requested(self, request: RouteRequest, ttl: int, previous: NodeId, *, now_ns: int) -> None:
+    def _on_request(self, request: RouteRequest, ttl: int, previous: NodeId, *, now_ns: int) -> None:
         self._previous = previous
-        super()._requested(request, ttl, previous, now_ns=now_ns)
+        super()._on_request(request, ttl, previous, now_ns=now_ns)
 
     def _pass_on(self, request: RouteRequest, *, hops: int, ttl: int, now_ns: int) -> None:
         known = self._table.entry(NodeId(request.destination), now_ns=now_ns)
@@ -92,8 +92,8 @@ class Loop(Aodv):
 class Trusting(Aodv):
     """A neighbor to which data was forwarded counts as heard for 3 s, whether it was or not."""
 
-    def _transit(self, packet: Packet, reception: Reception, *, start_ns: int, now_ns: int) -> None:
-        super()._transit(packet, reception, start_ns=start_ns, now_ns=now_ns)
+    def _route_transit(self, packet: Packet, reception: Reception, *, start_ns: int, now_ns: int) -> None:
+        super()._route_transit(packet, reception, start_ns=start_ns, now_ns=now_ns)
         route = self._table.active(NodeId(packet.header.destination), now_ns=now_ns)
         if route is not None:
             ends_ns = self._hellos._ends_ns  # noqa: SLF001
@@ -104,17 +104,17 @@ class Trusting(Aodv):
 class Unlisted(Aodv):
     """No blacklist: ns-3 sets the timer of its RREP-ACK, but never starts it (RFC 3561, 6.8)."""
 
-    def _control_failed(self, next_hop: NodeId, outcome: TxOutcome, *, now_ns: int) -> None:
-        super()._control_failed(next_hop, outcome, now_ns=now_ns)
+    def _on_control_failure(self, next_hop: NodeId, outcome: TxOutcome, *, now_ns: int) -> None:
+        super()._on_control_failure(next_hop, outcome, now_ns=now_ns)
         self._blacklist.clear()
 
 
 class Patient(Aodv):
     """Packets that wait are sent when a RREP or the end of a ring comes, not by any other news of a route."""
 
-    def _heard(self, number: int, body: bytes, packet: Packet, reception: Reception, *, now_ns: int) -> None:
+    def _on_control(self, number: int, body: bytes, packet: Packet, reception: Reception, *, now_ns: int) -> None:
         self._answered = number == RREP and not RouteReply.decode(body).is_hello
-        super()._heard(number, body, packet, reception, now_ns=now_ns)
+        super()._on_control(number, body, packet, reception, now_ns=now_ns)
 
     def wake(self, now_ns: int) -> None:
         self._answered = bool(self._discovery.due(now_ns))
@@ -132,9 +132,9 @@ class AllOfAodv(Hellos, Stale, Reverse, Loop, Trusting, Unlisted, Patient):
 class Circling(Olsr):
     """A data packet that comes back is routed on, as IP does, until its hops are used up."""
 
-    def _outgoing(self, packet: Packet, *, start_ns: int, now_ns: int) -> None:
+    def _route_own(self, packet: Packet, *, start_ns: int, now_ns: int) -> None:
         self._port.forget(packet)
-        super()._outgoing(packet, start_ns=start_ns, now_ns=now_ns)
+        super()._route_own(packet, start_ns=start_ns, now_ns=now_ns)
 
 
 class Periodic(Olsr):
@@ -146,11 +146,11 @@ class Periodic(Olsr):
     def _next(self, now_ns: int, interval_ns: int) -> int:
         return now_ns + interval_ns
 
-    def _say(
+    def _send_control(
         self, number: int, body: bytes, *, start_ns: int, now_ns: int, to: NodeId = BROADCAST, ttl: int = 1
     ) -> None:
         late_ns = self._jittered(now_ns, olsr.MAXJITTER_NS)
-        super()._say(number, body, start_ns=late_ns, now_ns=now_ns, to=to, ttl=ttl)
+        super()._send_control(number, body, start_ns=late_ns, now_ns=now_ns, to=to, ttl=ttl)
 
 
 class AllOfOlsr(Circling, Periodic):

@@ -18,13 +18,13 @@ _DEFAULT: Final[Mapping[NodeId, int]] = MappingProxyType({})
 
 
 def multipoint_relays(
-    node: NodeId, adjacency: Adjacency, *, willingness: Mapping[NodeId, int] = _DEFAULT
+    node: NodeId, adjacency: Adjacency, *, willingness: Mapping[NodeId, int] = _DEFAULT, drop_redundant: bool = True
 ) -> tuple[NodeId, ...]:
     """The relays of `node`. It suffices that `adjacency` holds the node and its neighbors.
 
     The steps are those of the RFC: first the neighbors that are always willing; then those that alone reach some node;
-    then by willingness, by the number of nodes that they still add, by degree, and by lower id; in the end relays
-    without which every node is still reached are dropped.
+    then by willingness, by the number of nodes that they still add, by degree, and by lower id. In the end relays
+    without which every node is still reached are dropped, a step that the RFC leaves optional (`drop_redundant`).
     """
     will = {n: willingness.get(n, WILL_DEFAULT) for n in adjacency[node]}
     near = frozenset(adjacency[node])
@@ -46,7 +46,7 @@ def multipoint_relays(
         )
         relays.add(best)
         missing -= reach[best]
-    return _without_idle(relays, reach, will)
+    return _without_redundant(relays, reach, will) if drop_redundant else tuple(sorted(relays))
 
 
 def _only_ones(reach: Mapping[NodeId, frozenset[NodeId]]) -> set[NodeId]:
@@ -57,7 +57,7 @@ def _only_ones(reach: Mapping[NodeId, frozenset[NodeId]]) -> set[NodeId]:
     return {ways[0] for ways in through.values() if len(ways) == 1}
 
 
-def _without_idle(
+def _without_redundant(
     relays: set[NodeId], reach: Mapping[NodeId, frozenset[NodeId]], will: Mapping[NodeId, int]
 ) -> tuple[NodeId, ...]:
     kept = set(relays)

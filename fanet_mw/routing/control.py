@@ -1,8 +1,8 @@
-"""How rival protocols put their control messages on the air: pieces of FANET_ROUTING in a packet of kind ROUTING.
+"""Control messages of rival protocols on the air: pieces of FANET_ROUTING in a packet of kind ROUTING.
 
-A message is a type and bytes; the type's high half names the protocol, so that two protocols never read each other.
-All pieces of one message travel in one radio frame, so `capacity` bounds a message. Bodies are read by `Reader`, which
-turns any missing byte into MalformedFrameError.
+A message is a type and bytes. The high half of the type names the protocol, so that no protocol decodes messages of
+another. All pieces of a message travel in one radio frame, so `capacity` bounds its length. Bodies are read by
+`BodyReader`, which raises MalformedFrameError for any byte that is missing.
 """
 
 import struct
@@ -17,19 +17,19 @@ from fanet_mw.wire import OVERHEAD, ROUTING, encode_inner
 _HEAD: Final = struct.Struct("<BBBB")
 _PIECE: Final = 239
 _AT: Final = OVERHEAD - 2
-"""Where the payload of a MAVLink 2 frame begins."""
+"""The offset of the payload in a MAVLink 2 frame."""
 _END: Final = bytes((wire.VERSION,))
 
 
 class Family(IntEnum):
-    """The protocol in the high half of a type."""
+    """The protocol named by the high half of a type."""
 
     AODV = 1
     OLSR = 2
     DSDV = 3
     GEOGRAPHIC = 4
     ADDRESS = 5
-    """Not a protocol of its own: address resolution, beside any of them (`fanet_mw.routing.resolution`)."""
+    """Address resolution, which is no routing protocol but runs beside any of them (`fanet_mw.routing.resolution`)."""
 
 
 def type_of(family: Family, number: int) -> int:
@@ -38,7 +38,7 @@ def type_of(family: Family, number: int) -> int:
 
 
 def capacity(max_frame_bytes: int) -> int:
-    """Bytes of control that fit into one radio frame beside the headers."""
+    """The bytes of control that fit into one radio frame beside the headers."""
     room = max_frame_bytes - wire.HEADER_BYTES
     whole, rest = divmod(room, OVERHEAD + _HEAD.size + _PIECE + 1)
     return whole * _PIECE + max(0, rest - OVERHEAD - _HEAD.size - 1)
@@ -69,8 +69,8 @@ def decode(frame: bytes) -> tuple[int, bytes]:
     return kind, body
 
 
-class Reader:
-    """Reads a body from its beginning; asking for what is not there raises MalformedFrameError."""
+class BodyReader:
+    """Reads a body from its beginning; a request for more than there is raises MalformedFrameError."""
 
     def __init__(self, body: bytes) -> None:
         self._body = body
@@ -85,7 +85,7 @@ class Reader:
         return fields
 
     def rest(self, layout: struct.Struct) -> Iterator[tuple[Any, ...]]:
-        """Every entry up to the end, which must be the end of an entry."""
+        """All entries up to the end of the body, which must be the end of an entry."""
         while self._at < len(self._body):
             yield self.take(layout)
 

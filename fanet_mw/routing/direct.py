@@ -1,4 +1,4 @@
-"""No routing: one transmission, to the destination or to whoever is in range. What the MAC alone can do."""
+"""No routing: one transmission, to the destination or to all nodes in range. It shows what the MAC alone can do."""
 
 from fanet_mw.bus.messages import Reception
 from fanet_mw.node.contract import RoutingProtocol
@@ -14,4 +14,4 @@ class Direct(RoutingProtocol):
         self._port.transmit(packet.frame, NodeId(packet.header.destination), start_ns=due_ns, wants_status=saturated)
 
     def receive(self, packet: Packet, reception: Reception, *, now_ns: int) -> None:
-        pass  # delivered by the node, or not for it
+        pass  # the node has delivered the packet, or the packet is for another node

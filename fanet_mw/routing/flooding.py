@@ -1,7 +1,7 @@
 """Plain flooding: every node re-broadcasts each new packet once, after a random jitter (paper, Figure 9).
 
-`Flood` is what all have in common that flood everything, unicast too: `flooding` here, `gossip` and `counter` in
-`storm`.
+`Flood` is the common base of the protocols that flood everything, unicast included: `flooding` here, `gossip` and
+`counter` in `storm`.
 """
 
 from abc import abstractmethod
@@ -16,16 +16,16 @@ from fanet_mw.wire import FLAG_FLOOD
 
 
 class Flood(RoutingProtocol):
-    """Everything goes out as a flood, and a first copy is a question; duplicates were suppressed by the node."""
+    """Sends everything as a flood, and asks its subclass about each first copy; the node suppresses duplicates."""
 
     origin_flags: ClassVar[int] = FLAG_FLOOD
-    draws: ClassVar[str]
-    """Name of the random stream."""
+    stream_name: ClassVar[str]
+    """The name of the random stream."""
 
     def __init__(self, port: Port) -> None:
         super().__init__(port)
         self._lead_ns = port.scenario.radio.lead_ns
-        self._random = port.stream(self.draws).random
+        self._random = port.stream(self.stream_name).random
 
     def originate(self, packet: Packet, *, due_ns: int, now_ns: int) -> None:
         self._port.transmit(packet.frame, BROADCAST, start_ns=due_ns)
@@ -33,7 +33,7 @@ class Flood(RoutingProtocol):
     def receive(self, packet: Packet, reception: Reception, *, now_ns: int) -> None:
         header = packet.header
         if header.destination == self._port.node:
-            return  # it has arrived
+            return  # the packet has reached its destination
         if header.hop_limit <= 1:
             self._port.drop(DropReason.HOP_LIMIT, packet, now_ns=now_ns)
             return
@@ -41,16 +41,16 @@ class Flood(RoutingProtocol):
 
     @abstractmethod
     def _consider(self, packet: Packet, *, now_ns: int) -> None:
-        """The first copy of a packet that may be relayed."""
+        """Decide about the first copy of a packet that may be relayed."""
 
     def _relay(self, packet: Packet, *, start_ns: int) -> None:
         self._port.transmit(self._port.forwarded(packet, flags=FLAG_FLOOD), BROADCAST, start_ns=start_ns)
 
 
 class Flooding(Flood):
-    """Relay at reception + lead + U(0, jitter)."""
+    """Relays each packet at reception + lead + U(0, jitter)."""
 
-    draws: ClassVar[str] = "jitter"
+    stream_name: ClassVar[str] = "jitter"
 
     def __init__(self, port: Port) -> None:
         super().__init__(port)

@@ -1,14 +1,14 @@
-"""Which neighbor has which address, as a node with an IP stack must ask before its first unicast to it.
+"""Address resolution: which neighbor has which address, as a node with an IP stack must ask before its first unicast.
 
-    unknown --frame--> waiting   a request goes after U(0, 10 ms), again after 1 s, three times more; 3 frames wait
-    waiting --heard--> known     what waits goes; known for 120 s, then the next frame asks again
-    waiting --nobody--> unknown  [rfc826] or dead for 100 s [ns3]: what waits, and with ns3 what comes, is dropped
+    unknown --frame--> waiting   a request is sent after U(0, 10 ms), again after 1 s, up to three times; 3 frames wait
+    waiting --heard--> known     the frames are sent; known for 120 s, then the next frame causes a new request
+    waiting --silence--> unknown [rfc826] or dead for 100 s [ns3]: waiting frames are dropped; with ns3 later ones too
 
-Two sets of rules. `rfc826`: RFC 826's reception algorithm (any request or reply of a known sender updates it, and
-whoever is asked learns who asks), with RFC 1122, 2.3.2: one request a second per neighbor, the latest frames wait.
-`ns3`: ns-3's ArpL3Protocol and ArpCache with their default attributes: only answers that are waited for teach, frames
-that find three waiting are dropped, one timer retries all that wait. Does not model: gratuitous requests, conflict
-detection (RFC 5227), unicast polls; a link that fails does not flush its entry (in ns-3 neither).
+There are two sets of rules. `rfc826`: RFC 826's reception algorithm (any request or reply of a known sender updates its
+entry, and the node that is asked learns the sender's address), with RFC 1122, 2.3.2: one request per second and
+neighbor, the latest frames wait. `ns3`: ns-3's ArpL3Protocol and ArpCache with their default attributes: only expected
+answers are learned, frames that find three waiting are dropped, one timer repeats all requests. Not modeled: gratuitous
+requests, conflict detection (RFC 5227), unicast polls; as in ns-3, a link that fails does not remove its entry.
 """
 
 from collections.abc import Callable
@@ -26,11 +26,11 @@ PENDING: Final = 3
 ALIVE_NS: Final = 120 * S
 DEAD_NS: Final = 100 * S
 """ns-3 `ArpL3Protocol::RequestJitter`, `ArpCache::WaitReplyTimeout`, `MaxRetries`, `PendingQueueSize`, `AliveTimeout`,
-`DeadTimeout`. RFC 826 has no numbers; these keep within RFC 1122, 2.3.2."""
+`DeadTimeout`. RFC 826 has no numbers; these comply with RFC 1122, 2.3.2."""
 
 
 class Knowledge(Enum):
-    """What a node knows of a neighbor's address."""
+    """The state of a neighbor's address."""
 
     WAITING = "waiting"
     KNOWN = "known"
@@ -38,7 +38,7 @@ class Knowledge(Enum):
 
 
 class Outgoing(NamedTuple):
-    """A unicast frame on its way to the MAC, and the packet it carries."""
+    """A unicast frame on its way to the MAC, and the packet that it carries."""
 
     packet: Packet
     frame: bytes
@@ -47,14 +47,14 @@ class Outgoing(NamedTuple):
 
 
 @dataclass(slots=True)
-class Entry:
-    """One neighbor."""
+class AddressEntry:
+    """The address state of one neighbor."""
 
     knowledge: Knowledge
     since_ns: int
-    """When it came to be known, or was given up."""
+    """When the address became known, or was given up."""
     due_ns: int = 0
-    """Waiting: when the next request goes, or it is given up."""
+    """While waiting: when the next request is sent, or the address is given up."""
     retries: int = 0
     pending: list[Outgoing] = field(default_factory=list)
 
@@ -66,12 +66,12 @@ class Resolver:
         self._as_ns3 = as_ns3
         self._draw = draw
         self._ask = ask
-        self._entries: dict[NodeId, Entry] = {}
+        self._entries: dict[NodeId, AddressEntry] = {}
         self._due_ns: int | None = None
-        """When the first of those that wait is due."""
+        """When the first of the waiting entries is due."""
 
     def knowledge(self, neighbor: NodeId, *, now_ns: int) -> Knowledge | None:
-        """What is known of a neighbor; None: nothing."""
+        """The state of a neighbor's address; None when nothing is known."""
         entry = self._entries.get(neighbor)
         if entry is None:
             return None
@@ -79,7 +79,7 @@ class Resolver:
         return None if now_ns > ends_ns.get(entry.knowledge, now_ns) else entry.knowledge
 
     def hold(self, out: Outgoing, *, start_ns: int, now_ns: int) -> Outgoing | None:
-        """Keep a frame until its next hop is known, and ask; returns the frame that has to go for it, if any."""
+        """Keep a frame until its next hop is known, and ask; returns the frame that is given up for it, if any."""
         entry = self._entries.get(out.next_hop)
         if entry is None or entry.knowledge is not Knowledge.WAITING:
             entry = self._wait(out.next_hop, now_ns=now_ns)
@@ -92,16 +92,16 @@ class Resolver:
         entry.pending.append(out)
         return entry.pending.pop(0)
 
-    def _wait(self, neighbor: NodeId, *, now_ns: int) -> Entry:
-        """ns-3 has one timer for all that wait: who comes later waits for the same instant."""
+    def _wait(self, neighbor: NodeId, *, now_ns: int) -> AddressEntry:
+        """Make a waiting entry. ns-3 has one timer for all waiting entries, so all are due at the same instant."""
         shared_ns = self._due_ns if self._as_ns3 else None
-        entry = Entry(Knowledge.WAITING, now_ns, now_ns + WAIT_REPLY_NS if shared_ns is None else shared_ns)
+        entry = AddressEntry(Knowledge.WAITING, now_ns, now_ns + WAIT_REPLY_NS if shared_ns is None else shared_ns)
         self._entries[neighbor] = entry
         self._plan()
         return entry
 
-    def heard(self, neighbor: NodeId, *, asks_us: bool, answers_us: bool, now_ns: int) -> list[Outgoing]:
-        """A request or a reply of a neighbor: learn its address by the rules; returns what waited for it."""
+    def on_address_message(self, neighbor: NodeId, *, asks_us: bool, answers_us: bool, now_ns: int) -> list[Outgoing]:
+        """Handle a request or a reply of a neighbor by the rules; returns the frames that waited for its address."""
         entry = self._entries.get(neighbor)
         if self._as_ns3:
             learns = answers_us and entry is not None and entry.knowledge is Knowledge.WAITING
@@ -109,12 +109,12 @@ class Resolver:
             learns = entry is not None or asks_us or answers_us
         if not learns:
             return []
-        self._entries[neighbor] = Entry(Knowledge.KNOWN, now_ns)
+        self._entries[neighbor] = AddressEntry(Knowledge.KNOWN, now_ns)
         self._plan()
         return [] if entry is None else entry.pending
 
     def expire(self, *, now_ns: int) -> list[Outgoing]:
-        """Ask again for those who have not answered, or give them up; returns what waited in vain."""
+        """Repeat requests that have no answer, or give them up; returns the frames that have waited in vain."""
         if self._due_ns is None or now_ns < self._due_ns:
             return []
         lost: list[Outgoing] = []
@@ -129,7 +129,7 @@ class Resolver:
                 continue
             lost += entry.pending
             if self._as_ns3:
-                self._entries[neighbor] = Entry(Knowledge.DEAD, now_ns)
+                self._entries[neighbor] = AddressEntry(Knowledge.DEAD, now_ns)
             else:
                 del self._entries[neighbor]
         self._plan()
@@ -143,5 +143,5 @@ class Resolver:
         self._due_ns = min(waiting, default=None)
 
     def waiting(self) -> int:
-        """Data packets among the frames that wait."""
+        """The number of data packets among the frames that wait."""
         return sum(out.is_data for entry in self._entries.values() for out in entry.pending)

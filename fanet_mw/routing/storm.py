@@ -1,10 +1,10 @@
-"""Two answers to the broadcast storm: flooding in which not everyone relays. Everything is flooded, unicast too.
+"""Two answers to the broadcast storm: flooding in which not every node relays. Everything is flooded, unicast included.
 
 `gossip`   GOSSIP1(p, k): relay with probability p, always within the first k hops  (Haas, Halpern, Li, ToN 14(3), 2006)
-`counter`  wait U(0, assess), stay silent if C copies were heard meanwhile          (Ni et al., MobiCom 1999, 3.2)
+`counter`  wait U(0, assess); do not relay if C copies are heard meanwhile          (Ni et al., MobiCom 1999, 3.2)
 
-Probabilities and bounds are `routing.gossip_p`, `gossip_k`, `counter`, `assess_ms`. Does not model: GOSSIP2 to 4 of the
-same paper (neighbor counts, second chances, zones), nor the distance- and location-based schemes of the other.
+Probabilities and bounds are `routing.gossip_p`, `gossip_k`, `counter`, `assess_ms`. Not modeled: GOSSIP2 to GOSSIP4 of
+the first paper (neighbor counts, second chances, zones), the distance- and location-based schemes of the second.
 """
 
 from collections.abc import Mapping
@@ -18,9 +18,9 @@ from fanet_mw.units import MS
 
 
 class Gossip(Flood):
-    """Relay by lot."""
+    """Relays at random."""
 
-    draws: ClassVar[str] = "storm"
+    stream_name: ClassVar[str] = "storm"
 
     def __init__(self, port: Port) -> None:
         super().__init__(port)
@@ -28,16 +28,16 @@ class Gossip(Flood):
         self._p, self._k, self._jitter_ns = routing.gossip_p, routing.gossip_k, routing.jitter_ns
 
     def _consider(self, packet: Packet, *, now_ns: int) -> None:
-        """`hops` counts transmissions before the one we heard: the neighbors of the origin are hop 1."""
-        lot, jitter = self._random(), self._random()
-        if packet.header.hops + 1 <= self._k or lot < self._p:
+        """Relay within k hops, or with probability p; `hops` counts the transmissions before the one received."""
+        draw, jitter = self._random(), self._random()
+        if packet.header.hops + 1 <= self._k or draw < self._p:
             self._relay(packet, start_ns=now_ns + self._lead_ns + int(jitter * self._jitter_ns))
 
 
 class CounterBased(Flood):
-    """Relay what few others relay."""
+    """Relays a packet that few other nodes relay."""
 
-    draws: ClassVar[str] = "storm"
+    stream_name: ClassVar[str] = "storm"
 
     def __init__(self, port: Port) -> None:
         super().__init__(port)

@@ -1,4 +1,4 @@
-"""Packets that wait for a route: bounded, oldest out first, each with its end. Nothing leaves without a name."""
+"""Packets that wait for a route: a bounded FIFO that evicts the oldest; each packet also has an end."""
 
 from typing import NamedTuple
 
@@ -7,14 +7,14 @@ from fanet_mw.units import NodeId
 
 
 class Held(NamedTuple):
-    """A packet and the instant beyond which nobody wants it."""
+    """A packet, and the instant at which it is given up."""
 
     packet: Packet
     ends_ns: int
 
 
 class WaitingRoom:
-    """First in, first out, by destination."""
+    """The packets of one node that wait for routes, first in, first out."""
 
     def __init__(self, *, capacity: int, hold_ns: int) -> None:
         self._capacity = capacity
@@ -25,23 +25,23 @@ class WaitingRoom:
         return len(self._held)
 
     def push(self, packet: Packet, *, now_ns: int) -> Packet | None:
-        """Take a packet in; return the oldest, if it had to go."""
+        """Add a packet; returns the oldest one if it had to leave."""
         self._held.append(Held(packet, now_ns + self._hold_ns))
         return self._held.pop(0).packet if len(self._held) > self._capacity else None
 
     def destinations(self) -> list[NodeId]:
-        """For whom packets wait, ascending."""
+        """The destinations for which packets wait, ascending."""
         return sorted({NodeId(held.packet.header.destination) for held in self._held})
 
     def take(self, destination: NodeId) -> list[Packet]:
-        """Take out everything for one destination, in the order it came."""
+        """Remove and return all packets for one destination, in the order in which they came."""
         taken = [held.packet for held in self._held if held.packet.header.destination == destination]
         if taken:
             self._held = [held for held in self._held if held.packet.header.destination != destination]
         return taken
 
     def expire(self, *, now_ns: int) -> list[Packet]:
-        """Take out what nobody wants any more."""
+        """Remove and return the packets that have reached their end."""
         over = [held.packet for held in self._held if held.ends_ns <= now_ns]
         if over:
             self._held = [held for held in self._held if held.ends_ns > now_ns]

@@ -5,7 +5,7 @@ from collections.abc import Callable
 from rival_bench import Bench
 
 from fanet_mw.routing.control import Family, type_of
-from fanet_mw.routing.olsr.messages import HELLO, TC, Heard, Hello, Link, Neighborhood, encode_time
+from fanet_mw.routing.olsr.messages import HELLO, TC, Hello, HelloNeighbor, LinkType, NeighborType, encode_time
 from fanet_mw.scenario import Scenario
 from fanet_mw.units import NodeId, S
 
@@ -29,17 +29,17 @@ def benches(make_scenario: Callable[..., Scenario]) -> MakeBench:
     return make
 
 
-def hello(*heard: tuple[Link, Neighborhood, int], willingness: int = 3, vtime: int = SIX_S) -> bytes:
-    return Hello(vtime, encode_time(2 * S), willingness, tuple(Heard(*entry) for entry in heard)).encode()
+def hello(*heard: tuple[LinkType, NeighborType, int], willingness: int = 3, vtime: int = SIX_S) -> bytes:
+    return Hello(vtime, encode_time(2 * S), willingness, tuple(HelloNeighbor(*entry) for entry in heard)).encode()
 
 
-SEES_US = (Link.SYM, Neighborhood.SYM, 1)
-CHOSE_US = (Link.SYM, Neighborhood.MPR, 1)
-HEARS_US = (Link.ASYM, Neighborhood.NOT, 1)
+SEES_US = (LinkType.SYM, NeighborType.SYM, 1)
+CHOSE_US = (LinkType.SYM, NeighborType.MPR, 1)
+HEARS_US = (LinkType.ASYM, NeighborType.NOT, 1)
 
 
-def with_neighbors(*nodes: int) -> list[tuple[Link, Neighborhood, int]]:
-    return [(Link.SYM, Neighborhood.SYM, node) for node in nodes]
+def with_neighbors(*nodes: int) -> list[tuple[LinkType, NeighborType, int]]:
+    return [(LinkType.SYM, NeighborType.SYM, node) for node in nodes]
 
 
 def own_hellos(found: Bench, node: int = 1, since_ns: int = 0) -> list[tuple[int, Hello]]:

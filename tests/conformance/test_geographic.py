@@ -8,7 +8,7 @@ from rival_bench import Bench
 from fanet_mw import wire
 from fanet_mw.routing.control import Family, type_of
 from fanet_mw.routing.geographic import messages as m
-from fanet_mw.routing.geographic.messages import Beacon, Fix, Location, Query
+from fanet_mw.routing.geographic.messages import Fix, Location, PositionBeacon, Query
 from fanet_mw.scenario import Scenario
 from fanet_mw.units import MS, US, Enu, S
 
@@ -35,11 +35,11 @@ def bench(make_scenario: Callable[..., Scenario]) -> MakeBench:
 
 def beacon(found: Bench, node: int, east: float, *fixes: Fix) -> None:
     """A neighbor of node 1 says where it is."""
-    found.say(node, type_of(Family.GEOGRAPHIC, m.BEACON), Beacon(Enu(east, 0, 50), fixes).encode(), to=1)
+    found.say(node, type_of(Family.GEOGRAPHIC, m.BEACON), PositionBeacon(Enu(east, 0, 50), fixes).encode(), to=1)
 
 
 def located(found: Bench, node: int, destination: int) -> Fix | None:
-    return found.protocol(node)._places.fix(destination)
+    return found.protocol(node)._locations.fix(destination)
 
 
 def test_a_packet_goes_greedily_to_a_destination_that_the_location_service_finds(bench: MakeBench) -> None:

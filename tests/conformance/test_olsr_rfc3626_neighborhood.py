@@ -20,9 +20,9 @@ from olsr_bench import (
 )
 from rival_bench import Bench
 
+from fanet_mw.graph.multipoint_relays import multipoint_relays
 from fanet_mw.routing.olsr import parameters as p
-from fanet_mw.routing.olsr.choice import multipoint_relays
-from fanet_mw.routing.olsr.messages import Heard, Link, Neighborhood, decode_time, encode_time
+from fanet_mw.routing.olsr.messages import HelloNeighbor, LinkType, NeighborType, decode_time, encode_time
 from fanet_mw.scenario import Scenario
 from fanet_mw.units import MS, NodeId, S
 
@@ -32,7 +32,7 @@ def bench(make_scenario: Callable[..., Scenario]) -> MakeBench:
     return benches(make_scenario)
 
 
-def link(found: Bench, node: int) -> Link | None:
+def link(found: Bench, node: int) -> LinkType | None:
     return found.protocol(1)._state.link_of(node, now_ns=found.now_ns)
 
 
@@ -66,48 +66,48 @@ def test_6_2_a_neighbor_that_is_only_heard_is_told_as_asymmetric(bench: MakeBenc
     found = bench(1)
     found.say(2, HELLO_TYPE, hello(), to=1)
     found.advance(2 * S)
-    assert own_hellos(found)[-1][1].heard == (Heard(*HEARS_US)._replace(node=2),)
+    assert own_hellos(found)[-1][1].neighbors == (HelloNeighbor(*HEARS_US)._replace(node=2),)
 
 
 def test_7_1_a_link_is_symmetric_once_the_neighbor_says_that_it_hears_us(bench: MakeBench) -> None:
     found = bench(1)
     found.say(2, HELLO_TYPE, hello(), to=1)
-    assert link(found, 2) is Link.ASYM
+    assert link(found, 2) is LinkType.ASYM
     found.say(2, HELLO_TYPE, hello(HEARS_US), to=1)
-    assert link(found, 2) is Link.SYM
+    assert link(found, 2) is LinkType.SYM
     found.advance(2 * S)
-    assert own_hellos(found)[-1][1].heard[0][:2] == (Link.SYM, Neighborhood.SYM)
+    assert own_hellos(found)[-1][1].neighbors[0][:2] == (LinkType.SYM, NeighborType.SYM)
 
 
 def test_7_1_a_neighbor_that_has_lost_us_is_not_symmetric(bench: MakeBench) -> None:
     found = bench(1)
     found.say(2, HELLO_TYPE, hello(SEES_US), to=1)
-    found.say(2, HELLO_TYPE, hello((Link.LOST, Neighborhood.NOT, 1)), to=1)
-    assert link(found, 2) is Link.ASYM
+    found.say(2, HELLO_TYPE, hello((LinkType.LOST, NeighborType.NOT, 1)), to=1)
+    assert link(found, 2) is LinkType.ASYM
 
 
 def test_7_1_a_silent_neighbor_is_lost_after_its_holding_time_and_told_so_for_as_long(bench: MakeBench) -> None:
     found = bench(1)
     found.say(2, HELLO_TYPE, hello(SEES_US), to=1)
     found.advance(6 * S)
-    assert link(found, 2) is Link.SYM
+    assert link(found, 2) is LinkType.SYM
     found.advance(10 * MS)
-    assert link(found, 2) is Link.LOST
+    assert link(found, 2) is LinkType.LOST
     found.advance(2 * S)
-    assert own_hellos(found)[-1][1].heard == (Heard(Link.LOST, Neighborhood.NOT, 2),)
+    assert own_hellos(found)[-1][1].neighbors == (HelloNeighbor(LinkType.LOST, NeighborType.NOT, 2),)
     found.advance(p.NEIGHB_HOLD_TIME_NS)
     assert link(found, 2) is None
     found.advance(2 * S)
-    assert own_hellos(found)[-1][1].heard == ()
+    assert own_hellos(found)[-1][1].neighbors == ()
 
 
 def test_7_1_the_validity_is_what_the_neighbor_says(bench: MakeBench) -> None:
     found = bench(1)
     found.say(2, HELLO_TYPE, hello(SEES_US, vtime=encode_time(1 * S)), to=1)
     found.advance(1 * S)
-    assert link(found, 2) is Link.SYM
+    assert link(found, 2) is LinkType.SYM
     found.advance(1 * MS)
-    assert link(found, 2) is Link.LOST
+    assert link(found, 2) is LinkType.LOST
 
 
 def test_the_number_of_pairs_a_hello_names_does_not_depend_on_one_frame(bench: MakeBench) -> None:
@@ -118,7 +118,7 @@ def test_the_number_of_pairs_a_hello_names_does_not_depend_on_one_frame(bench: M
         found.say(node, HELLO_TYPE, hello(), to=1)
     found.advance(4 * S)
     last_ns = own_hellos(found)[-1][0]
-    told = [h.node for t_ns, said in own_hellos(found) if t_ns == last_ns for h in said.heard]
+    told = [h.node for t_ns, said in own_hellos(found) if t_ns == last_ns for h in said.neighbors]
     assert sorted(told) == list(range(2, 60))
     assert all(a != b for a, b in combinations(told, 2))
 
@@ -134,14 +134,14 @@ def test_8_2_the_symmetric_neighbors_of_a_symmetric_neighbor_are_two_hops_away(b
     found = bench(1)
     found.say(2, HELLO_TYPE, hello(*with_neighbors(7, 8)), to=1)
     assert two_hop(found, 2) == [], "it does not hear us yet"
-    found.say(2, HELLO_TYPE, hello(SEES_US, *with_neighbors(7), (Link.SYM, Neighborhood.MPR, 8)), to=1)
+    found.say(2, HELLO_TYPE, hello(SEES_US, *with_neighbors(7), (LinkType.SYM, NeighborType.MPR, 8)), to=1)
     assert two_hop(found, 2) == [7, 8], "and we ourselves are not"
 
 
 def test_8_2_a_neighbor_that_says_it_has_lost_another_takes_it_away(bench: MakeBench) -> None:
     found = bench(1)
     found.say(2, HELLO_TYPE, hello(SEES_US, *with_neighbors(7, 8)), to=1)
-    found.say(2, HELLO_TYPE, hello(SEES_US, (Link.LOST, Neighborhood.NOT, 7), *with_neighbors(8)), to=1)
+    found.say(2, HELLO_TYPE, hello(SEES_US, (LinkType.LOST, NeighborType.NOT, 7), *with_neighbors(8)), to=1)
     assert two_hop(found, 2) == [8]
 
 
@@ -150,7 +150,7 @@ def test_8_5_a_lost_neighbor_takes_its_two_hop_neighbors_and_its_choice_along(be
     found.say(2, HELLO_TYPE, hello(CHOSE_US, *with_neighbors(7)), to=1)
     assert found.protocol(1)._state.selectors(now_ns=found.now_ns) == [2]
     assert hops(found, 1, 7) == (2, 2)
-    found.say(2, HELLO_TYPE, hello((Link.LOST, Neighborhood.NOT, 1)), to=1)
+    found.say(2, HELLO_TYPE, hello((LinkType.LOST, NeighborType.NOT, 1)), to=1)
     assert found.protocol(1)._state.selectors(now_ns=found.now_ns) == []
     assert hops(found, 1, 7) is None
 
@@ -160,8 +160,9 @@ def test_8_5_a_lost_neighbor_takes_its_two_hop_neighbors_and_its_choice_along(be
 
 def relays(neighbors: dict[int, set[int]], **willing: int) -> list[int]:
     willingness = {NodeId(n): willing.get(f"n{n}", p.WILL_DEFAULT) for n in neighbors}
-    known = {NodeId(n): frozenset(NodeId(far) for far in reach) for n, reach in neighbors.items()}
-    return [int(n) for n in multipoint_relays(NodeId(1), known, willingness)]
+    known = {NodeId(n): tuple(NodeId(far) for far in sorted(reach)) for n, reach in neighbors.items()}
+    known[NodeId(1)] = tuple(sorted(known))
+    return [int(n) for n in multipoint_relays(NodeId(1), known, willingness=willingness, drop_redundant=False)]
 
 
 def test_8_3_1_the_only_way_to_a_node_is_a_relay_and_what_it_covers_needs_no_other() -> None:
@@ -204,5 +205,5 @@ def test_8_3_1_relays_together_reach_every_node_two_hops_away(neighbors: dict[in
 def test_8_3_a_chosen_relay_is_told_in_the_next_hello(bench: MakeBench) -> None:
     found = bench(3)
     found.advance(10 * S)
-    assert {h.node: h.neighborhood for h in own_hellos(found, 1)[-1][1].heard} == {2: Neighborhood.MPR}
-    assert {h.neighborhood for h in own_hellos(found, 2)[-1][1].heard} == {Neighborhood.SYM}
+    assert {h.node: h.neighbor_type for h in own_hellos(found, 1)[-1][1].neighbors} == {2: NeighborType.MPR}
+    assert {h.neighbor_type for h in own_hellos(found, 2)[-1][1].neighbors} == {NeighborType.SYM}

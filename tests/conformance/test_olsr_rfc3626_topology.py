@@ -9,8 +9,8 @@ from olsr_bench import CHOSE_US, FIFTEEN_S, HELLO_TYPE, SEES_US, TC_TYPE, MakeBe
 from rival_bench import Bench
 
 from fanet_mw.routing.olsr import parameters as p
-from fanet_mw.routing.olsr.choice import routing_table
 from fanet_mw.routing.olsr.messages import TC, TopologyControl, decode_time
+from fanet_mw.routing.olsr.routes import routing_table
 from fanet_mw.scenario import Scenario
 from fanet_mw.units import MS, NodeId, S
 

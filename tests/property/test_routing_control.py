@@ -54,10 +54,10 @@ def test_pieces_that_are_missing_repeated_or_of_two_types_are_malformed() -> Non
 
 def test_a_reader_never_gives_bytes_that_are_not_there() -> None:
     pair, single = struct.Struct("<HH"), struct.Struct("<H")
-    assert list(control.Reader(b"\x01\x00\x02\x00").rest(single)) == [(1,), (2,)]
+    assert list(control.BodyReader(b"\x01\x00\x02\x00").rest(single)) == [(1,), (2,)]
     with pytest.raises(MalformedFrameError):
-        control.Reader(b"\x01\x00\x02").take(pair)
+        control.BodyReader(b"\x01\x00\x02").take(pair)
     with pytest.raises(MalformedFrameError):
-        list(control.Reader(b"\x01\x00\x02").rest(single))
+        list(control.BodyReader(b"\x01\x00\x02").rest(single))
     with pytest.raises(MalformedFrameError):
-        control.Reader(b"\x01").finish()
+        control.BodyReader(b"\x01").finish()

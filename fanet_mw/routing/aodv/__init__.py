@@ -1,4 +1,4 @@
-"""AODV (RFC 3561) behind the contract."""
+"""AODV (RFC 3561), a rival behind the contract of routing protocols."""
 
 from fanet_mw.routing.aodv.protocol import Aodv
 

@@ -1,7 +1,7 @@
-"""Which destinations AODV is searching for, how far the search goes and when it is repeated (RFC 3561, 6.3 and 6.4).
+"""Route discovery of AODV: the destinations searched for, how far each search goes, when it is repeated (6.3, 6.4).
 
-TTL 1, 3, 5, 7, then NET_DIAMETER RREQ_RETRIES times with doubled waiting; then it has failed.
-A route that was known before starts the ring at its last hop count + TTL_INCREMENT.
+Section numbers are of RFC 3561. A search has TTL 1, 3, 5, 7, then NET_DIAMETER, RREQ_RETRIES times with doubled
+waiting; then it has failed. For a destination that had a route the first TTL is that route's hop count + TTL_INCREMENT.
 """
 
 from collections import deque
@@ -22,13 +22,13 @@ from fanet_mw.units import NodeId, S
 
 
 class RateLimit:
-    """At most so many a second."""
+    """A limit of the number of events in any second."""
 
     def __init__(self, most: int) -> None:
         self._recent_ns: deque[int] = deque(maxlen=most)
 
     def free_ns(self, now_ns: int) -> int:
-        """When the next one may go."""
+        """The earliest instant at which the next event is allowed."""
         full = len(self._recent_ns) == self._recent_ns.maxlen
         return max(now_ns, self._recent_ns[0] + S) if full else now_ns
 
@@ -36,14 +36,14 @@ class RateLimit:
         self._recent_ns.append(now_ns)
 
 
-class HeardRequests:
-    """(originator, RREQ id) of the last PATH_DISCOVERY_TIME (6.5)."""
+class SeenRequests:
+    """The (originator, RREQ id) of the requests that came within the last PATH_DISCOVERY_TIME (6.5)."""
 
     def __init__(self) -> None:
         self._ends_ns: dict[tuple[int, int], int] = {}
 
     def is_new(self, originator: int, rreq_id: int, *, now_ns: int) -> bool:
-        """Whether this request was not handled yet; it is from now on."""
+        """True if this request has not been handled yet; from now on it has."""
         ends_ns = self._ends_ns
         while ends_ns and ends_ns[oldest := next(iter(ends_ns))] <= now_ns:
             del ends_ns[oldest]
@@ -61,14 +61,14 @@ class Search:
     destination: NodeId
     ttl: int
     due_ns: int
-    """When the next RREQ goes, or the search has failed."""
+    """The instant at which the next RREQ is sent, or the search has failed."""
     full: int = 0
-    """RREQs already sent with TTL = NET_DIAMETER."""
+    """The number of RREQs already sent with TTL = NET_DIAMETER."""
     asked: bool = False
-    """A RREQ with the present TTL has gone; false while the rate limit holds it back."""
+    """True when a RREQ with the present TTL has been sent; false while the rate limit holds it back."""
 
     def sent(self, now_ns: int) -> None:
-        """A RREQ went with the present TTL: wait for its ring (6.4), or, at full width, doubled each time (6.3)."""
+        """A RREQ was sent with the present TTL: wait for its ring (6.4), or at full width doubled each time (6.3)."""
         self.asked = True
         if self.ttl < NET_DIAMETER:
             self.due_ns = now_ns + 2 * NODE_TRAVERSAL_TIME_NS * (self.ttl + TIMEOUT_BUFFER)
@@ -86,7 +86,7 @@ class Search:
 
 
 class Discovery:
-    """Every search of one node."""
+    """All searches of one node."""
 
     def __init__(self) -> None:
         self._searches: dict[NodeId, Search] = {}
@@ -95,7 +95,7 @@ class Discovery:
         return destination in self._searches
 
     def begin(self, destination: NodeId, *, last_hops: int | None, now_ns: int) -> Search:
-        """Start searching; `last_hops` is what a former route needed."""
+        """Start a search; `last_hops` is the hop count of a former route."""
         ttl = TTL_START if last_hops is None else last_hops + TTL_INCREMENT
         search = Search(destination, ttl if ttl <= TTL_THRESHOLD else NET_DIAMETER, now_ns)
         self._searches[destination] = search
@@ -105,7 +105,7 @@ class Discovery:
         self._searches.pop(destination, None)
 
     def due(self, now_ns: int) -> list[Search]:
-        """Searches whose waiting is over, by destination."""
+        """The searches whose waiting is over, by destination."""
         return [self._searches[node] for node in sorted(self._searches) if self._searches[node].due_ns <= now_ns]
 
     def wanted(self) -> list[NodeId]:

@@ -1,15 +1,15 @@
-"""AODV's messages (RFC 3561, 5), node ids in place of IP addresses: little endian, without reserved bits.
+"""The messages of AODV (RFC 3561, 5) with node ids in place of IP addresses: little endian, without reserved bits.
 
 The hop count is in the message and the TTL in the routing header (`hop_limit`), as with IP. A hello is a RREP about its
-sender to its sender (6.9). Not carried: J and R (multicast), N (local repair), prefix size, RREP-ACK (the MAC's
-acknowledgment is taken instead).
+sender (6.9). Not carried: J and R (multicast), N (local repair), prefix size, and RREP-ACK (the MAC's acknowledgement
+takes its place).
 """
 
 import struct
 from typing import Final, NamedTuple, Self
 
 from fanet_mw.errors import MalformedFrameError
-from fanet_mw.routing.control import Reader, check_node
+from fanet_mw.routing.control import BodyReader, check_node
 
 RREQ: Final = 1
 RREP: Final = 2
@@ -41,18 +41,18 @@ class RouteRequest(NamedTuple):
 
     @classmethod
     def decode(cls, body: bytes) -> Self:
-        reader = Reader(body)
+        reader = BodyReader(body)
         request = cls(*reader.take(_RREQ))
         reader.finish()
         check_node(request.destination)
         check_node(request.originator)
-        if request.hop_count == 255:  # one more does not fit its byte
+        if request.hop_count == 255:  # the next hop count would not fit its byte
             raise MalformedFrameError(f"RREQ of {request.hop_count} hops")
         return request
 
 
 class RouteReply(NamedTuple):
-    """RREP (5.2); `lifetime_ms` is what the route is good for."""
+    """RREP (5.2); `lifetime_ms` is how long the route is valid."""
 
     hop_count: int
     destination: int
@@ -69,7 +69,7 @@ class RouteReply(NamedTuple):
 
     @classmethod
     def decode(cls, body: bytes) -> Self:
-        reader = Reader(body)
+        reader = BodyReader(body)
         reply = cls(*reader.take(_RREP))
         reader.finish()
         check_node(reply.destination)
@@ -87,7 +87,7 @@ class Unreachable(NamedTuple):
 
 
 def most_unreachable(capacity: int) -> int:
-    """How many destinations a RERR of so many bytes can name; its count has one byte."""
+    """The number of destinations that a RERR of this many bytes can name; the count has one byte."""
     return min(255, (capacity - _COUNT.size) // _ENTRY.size)
 
 
@@ -101,7 +101,7 @@ class RouteError(NamedTuple):
 
     @classmethod
     def decode(cls, body: bytes) -> Self:
-        reader = Reader(body)
+        reader = BodyReader(body)
         (count,) = reader.take(_COUNT)
         entries = tuple(Unreachable(*fields) for fields in reader.rest(_ENTRY))
         if not count or count != len(entries):

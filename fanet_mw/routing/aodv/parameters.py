@@ -1,4 +1,4 @@
-"""AODV's configuration (RFC 3561, 10). Where the RFC gives a choice, ns-3's; sources name the section."""
+"""The configuration of AODV (RFC 3561, 10). Where the RFC leaves a choice it is ns-3's; sources name sections."""
 
 from typing import Final
 
@@ -12,7 +12,7 @@ NODE_TRAVERSAL_TIME_NS: Final = 40 * MS
 NET_TRAVERSAL_TIME_NS: Final = 2 * NODE_TRAVERSAL_TIME_NS * NET_DIAMETER
 RREQ_RETRIES: Final = 2
 RREQ_RATELIMIT: Final = 10
-"""RREQs originated per second, at most (6.3)."""
+"""The most RREQs that a node originates per second (6.3)."""
 RERR_RATELIMIT: Final = 10
 TTL_START: Final = 1
 TTL_INCREMENT: Final = 2
@@ -21,7 +21,7 @@ TIMEOUT_BUFFER: Final = 2
 PATH_DISCOVERY_TIME_NS: Final = 2 * NET_TRAVERSAL_TIME_NS
 BLACKLIST_TIMEOUT_NS: Final = RREQ_RETRIES * NET_TRAVERSAL_TIME_NS
 MY_ROUTE_TIMEOUT_NS: Final = 2 * max(PATH_DISCOVERY_TIME_NS, ACTIVE_ROUTE_TIMEOUT_NS)
-"""RFC: 2 * ACTIVE_ROUTE_TIMEOUT; ns-3 takes the longer of that and 2 * PATH_DISCOVERY_TIME, and so do we."""
+"""The RFC has 2 * ACTIVE_ROUTE_TIMEOUT; here as in ns-3 it is the longer of that and 2 * PATH_DISCOVERY_TIME."""
 DELETE_PERIOD_NS: Final = 5 * max(ACTIVE_ROUTE_TIMEOUT_NS, HELLO_INTERVAL_NS)
-"""K = 5 (10)."""
+"""The factor K is 5 (10)."""
 NEIGHBOR_LIFETIME_NS: Final = ALLOWED_HELLO_LOSS * HELLO_INTERVAL_NS

@@ -1,11 +1,11 @@
-"""AODV at one node (RFC 3561): routes are asked for when wanted, and told of when they break.
+"""AODV at one node (RFC 3561): a route is requested when it is needed, and its users are reported when it breaks.
 
-    wanted  -> RREQ floods, ring by ring -> the destination, or who knows, answers RREP along the reverse way
-    used    -> the route, its reverse and both next hops live on
+    needed  -> RREQ floods, ring by ring -> the destination, or a node with a route, answers RREP along the reverse way
+    used    -> the route, its reverse and both next hops stay active
     broken  -> (unicast not acknowledged, or hellos gone) -> RERR to the precursors
 
-Broadcast data is flooded, each node once after U(0, `routing.jitter_ms`), as are RREQs. Does not model: local repair
-(6.12, optional), multicast, gateways, RREP-ACK (the MAC acknowledges), the quiet time after a reboot (6.13).
+Broadcast data is flooded, by each node once after U(0, `routing.jitter_ms`), and so are RREQs. Not modeled: local
+repair (6.12, optional), multicast, gateways, RREP-ACK (the MAC acknowledges), the quiet time after a reboot (6.13).
 """
 
 from collections.abc import Mapping
@@ -17,7 +17,7 @@ from fanet_mw.node.contract import Port
 from fanet_mw.node.queue import Packet
 from fanet_mw.routing import control
 from fanet_mw.routing.aodv import parameters as p
-from fanet_mw.routing.aodv.discovery import Discovery, HeardRequests, RateLimit, Search
+from fanet_mw.routing.aodv.discovery import Discovery, RateLimit, Search, SeenRequests
 from fanet_mw.routing.aodv.messages import (
     DESTINATION_ONLY,
     GRATUITOUS,
@@ -31,7 +31,7 @@ from fanet_mw.routing.aodv.messages import (
     Unreachable,
     most_unreachable,
 )
-from fanet_mw.routing.aodv.neighbors import Hellos
+from fanet_mw.routing.aodv.neighbors import HelloNeighbors
 from fanet_mw.routing.aodv.table import Route, Table
 from fanet_mw.routing.control import Family
 from fanet_mw.routing.routed import Routed
@@ -50,19 +50,19 @@ class Aodv(Routed):
         routing = port.scenario.routing
         self._table = Table()
         self._discovery = Discovery()
-        self._requests = HeardRequests()
-        self._hellos = Hellos()
+        self._requests = SeenRequests()
+        self._hellos = HelloNeighbors()
         self._room = WaitingRoom(capacity=routing.queue_frames, hold_ns=seconds_to_ns(routing.lifetime_s))
         self._rreq_limit = RateLimit(p.RREQ_RATELIMIT)
         self._rerr_limit = RateLimit(p.RERR_RATELIMIT)
         self._blacklist: dict[NodeId, int] = {}
-        """Neighbors to which a RREP did not get through, and until when their RREQs are ignored (6.8)."""
+        """Neighbors that could not be reached with a RREP, and until when their RREQs are ignored (6.8)."""
         self._most_unreachable = most_unreachable(control.capacity(port.scenario.radio.max_frame_bytes))
         self._seq = 0
         self._rreq_id = 0
         self._hello_ns: int | None = None
         self._broadcast_ns = -p.HELLO_INTERVAL_NS
-        """When we last sent a broadcast: it stands in for a hello (6.9)."""
+        """When this node last sent a broadcast, which takes the place of a hello (6.9)."""
         self._in_use_until_ns = -1
 
     def start(self, now_ns: int) -> None:
@@ -70,7 +70,7 @@ class Aodv(Routed):
 
     # --- data -----------------------------------------------------------------------------------------------------
 
-    def _outgoing(self, packet: Packet, *, start_ns: int, now_ns: int) -> None:
+    def _route_own(self, packet: Packet, *, start_ns: int, now_ns: int) -> None:
         destination = NodeId(packet.header.destination)
         route = self._table.active(destination, now_ns=now_ns)
         if route is not None:
@@ -82,24 +82,24 @@ class Aodv(Routed):
             self._port.drop(DropReason.QUEUE_FULL, evicted, now_ns=now_ns)
         self._search(destination, now_ns=now_ns)
 
-    def _transit(self, packet: Packet, reception: Reception, *, start_ns: int, now_ns: int) -> None:
-        self._hellos.heard(reception.src, now_ns=now_ns)
+    def _route_transit(self, packet: Packet, reception: Reception, *, start_ns: int, now_ns: int) -> None:
+        self._hellos.on_packet(reception.src, now_ns=now_ns)
         destination = NodeId(packet.header.destination)
         route = self._table.active(destination, now_ns=now_ns)
         if route is None:
             self._port.drop(DropReason.NO_ROUTE, packet, now_ns=now_ns)
-            self._deny(destination, reception.src, now_ns=now_ns)
+            self._report_no_route(destination, reception.src, now_ns=now_ns)
             return
         self._use(route, now_ns=now_ns)
         self._keep(packet.origin, reception.src, now_ns=now_ns)
         self._send(packet, route.next_hop, start_ns=start_ns, now_ns=now_ns)
 
-    def _arrived(self, packet: Packet, reception: Reception, *, now_ns: int) -> None:
-        self._hellos.heard(reception.src, now_ns=now_ns)
+    def _on_arrival(self, packet: Packet, reception: Reception, *, now_ns: int) -> None:
+        self._hellos.on_packet(reception.src, now_ns=now_ns)
         self._keep(packet.origin, reception.src, now_ns=now_ns)
 
     def _use(self, route: Route, *, now_ns: int) -> None:
-        """A data packet takes this route: it and the way to its next hop stay active (6.2)."""
+        """Keep this route and the route to its next hop active, because a data packet uses them (6.2)."""
         self._keep(route.destination, route.next_hop, now_ns=now_ns)
 
     def _keep(self, far: NodeId, near: NodeId, *, now_ns: int) -> None:
@@ -108,8 +108,8 @@ class Aodv(Routed):
         if near != far:
             self._table.extend(self._table.active(near, now_ns=now_ns), ends_ns=ends_ns)
 
-    def _failed(self, packet: Packet, next_hop: NodeId, outcome: TxOutcome, *, now_ns: int) -> None:
-        super()._failed(packet, next_hop, outcome, now_ns=now_ns)
+    def _on_failure(self, packet: Packet, next_hop: NodeId, outcome: TxOutcome, *, now_ns: int) -> None:
+        super()._on_failure(packet, next_hop, outcome, now_ns=now_ns)
         if outcome is TxOutcome.RETRY_LIMIT:
             self._link_broke(next_hop, now_ns=now_ns)
 
@@ -147,7 +147,7 @@ class Aodv(Routed):
         search.sent(now_ns)
 
     def _repeat(self, search: Search, *, now_ns: int) -> None:
-        """A search brought nothing in its time: wider, or give up (6.3)."""
+        """A search has had no answer in time: widen it, or give it up (6.3)."""
         if search.exhausted:
             self._discovery.end(search.destination)
             for packet in self._room.take(search.destination):
@@ -158,7 +158,7 @@ class Aodv(Routed):
         self._ask(search, now_ns=now_ns)
 
     def _release(self, now_ns: int) -> None:
-        """Routes that were searched for may have come: send what waits for them."""
+        """Send the packets that wait for routes that have become known."""
         for destination in self._discovery.wanted():
             route = self._table.active(destination, now_ns=now_ns)
             if route is None:
@@ -170,28 +170,28 @@ class Aodv(Routed):
 
     # --- control --------------------------------------------------------------------------------------------------
 
-    def _heard(self, number: int, body: bytes, packet: Packet, reception: Reception, *, now_ns: int) -> None:
+    def _on_control(self, number: int, body: bytes, packet: Packet, reception: Reception, *, now_ns: int) -> None:
         previous = reception.src
         if number == RREQ:
-            self._requested(RouteRequest.decode(body), packet.header.hop_limit, previous, now_ns=now_ns)
+            self._on_request(RouteRequest.decode(body), packet.header.hop_limit, previous, now_ns=now_ns)
         elif number == RREP:
             reply = RouteReply.decode(body)
             if reply.is_hello:
-                self._hello(reply, previous, now_ns=now_ns)
+                self._on_hello(reply, previous, now_ns=now_ns)
             else:
-                self._replied(reply, packet.header.hop_limit, previous, now_ns=now_ns)
+                self._on_reply(reply, packet.header.hop_limit, previous, now_ns=now_ns)
         elif number == RERR:
-            self._denied(RouteError.decode(body), previous, now_ns=now_ns)
+            self._on_error(RouteError.decode(body), previous, now_ns=now_ns)
         else:
             raise MalformedFrameError(f"AODV message {number}")
-        self._hellos.heard(previous, now_ns=now_ns)
+        self._hellos.on_packet(previous, now_ns=now_ns)
         self._release(now_ns)
 
     def _neighbor(self, node: NodeId, *, now_ns: int) -> None:
         self._table.learn_neighbor(node, ends_ns=now_ns + p.ACTIVE_ROUTE_TIMEOUT_NS, now_ns=now_ns)
 
-    def _requested(self, request: RouteRequest, ttl: int, previous: NodeId, *, now_ns: int) -> None:
-        """6.5: reverse route; then an answer, or one ring further."""
+    def _on_request(self, request: RouteRequest, ttl: int, previous: NodeId, *, now_ns: int) -> None:
+        """Handle a RREQ (6.5): set up the reverse route, then answer, or relay it to the next ring."""
         if self._blacklist.get(previous, now_ns) > now_ns or request.originator == self._port.node:
             return
         self._neighbor(previous, now_ns=now_ns)
@@ -209,7 +209,7 @@ class Aodv(Routed):
             return
         route = self._table.active(NodeId(request.destination), now_ns=now_ns)
         if route is not None and self._may_answer_for(route, request):
-            if route.next_hop != previous:  # else the asker knows better than we do
+            if route.next_hop != previous:  # otherwise the node that asks is the next hop and knows better
                 self._answer_for(route, request, now_ns=now_ns)
         elif ttl > 1:
             self._pass_on(request, hops=hops, ttl=ttl - 1, now_ns=now_ns)
@@ -224,23 +224,23 @@ class Aodv(Routed):
         self._broadcast(RREQ, onward.encode(), ttl=ttl, now_ns=now_ns)
 
     def _may_answer_for(self, route: Route, request: RouteRequest) -> bool:
-        """6.6: an intermediate node answers with a route at least as new as asked for."""
+        """True if a route is at least as new as the request asks, so that an intermediate node may answer (6.6)."""
         if request.flags & DESTINATION_ONLY or not route.seq_valid:
             return False
         return bool(request.flags & UNKNOWN_SEQUENCE) or not newer(request.destination_seq, route.seq)
 
     def _answer(self, request: RouteRequest, *, now_ns: int) -> None:
-        """6.6.1: we are the destination."""
+        """Answer as the destination (6.6.1)."""
         if not request.flags & UNKNOWN_SEQUENCE:
             self._seq = later(request.destination_seq, self._seq)
         reply = RouteReply(0, self._port.node, self._seq, request.originator, p.MY_ROUTE_TIMEOUT_NS // MS)
         self._send_reply(reply, NodeId(request.originator), now_ns=now_ns)
 
     def _answer_for(self, route: Route, request: RouteRequest, *, now_ns: int) -> None:
-        """6.6.2: we know the way; 6.6.3: the destination learns of the asker too."""
+        """Answer as a node that has a route (6.6.2), and tell the destination of the originator (6.6.3)."""
         reverse = self._table.active(NodeId(request.originator), now_ns=now_ns)
         if reverse is None:
-            return  # it expired at once: hostile hop counts only
+            return  # the reverse route has expired at once, which only hostile hop counts bring about
         route.precursors[reverse.next_hop] = None
         reverse.precursors[route.next_hop] = None
         left_ms = (route.ends_ns - now_ns) // MS
@@ -256,13 +256,15 @@ class Aodv(Routed):
         route = self._table.active(towards, now_ns=now_ns)
         if route is not None:
             self._keep(towards, route.next_hop, now_ns=now_ns)
-            self._say(RREP, reply.encode(), start_ns=now_ns + self._lead_ns, now_ns=now_ns, to=route.next_hop, ttl=ttl)
+            self._send_control(
+                RREP, reply.encode(), start_ns=now_ns + self._lead_ns, now_ns=now_ns, to=route.next_hop, ttl=ttl
+            )
 
-    def _replied(self, reply: RouteReply, ttl: int, previous: NodeId, *, now_ns: int) -> None:
-        """6.7: a forward route; on towards who asked."""
+    def _on_reply(self, reply: RouteReply, ttl: int, previous: NodeId, *, now_ns: int) -> None:
+        """Handle a RREP (6.7): set up the forward route, and pass the reply on towards the originator."""
         self._neighbor(previous, now_ns=now_ns)
         if reply.destination == self._port.node:
-            return  # a gratuitous one about us: somebody forged it
+            return  # a gratuitous reply about this node itself is forged
         hops, destination = reply.hop_count + 1, NodeId(reply.destination)
         ends_ns = now_ns + reply.lifetime_ms * MS
         self._table.offer(
@@ -281,22 +283,22 @@ class Aodv(Routed):
             near.precursors[reverse.next_hop] = None
         self._send_reply(reply._replace(hop_count=hops), originator, now_ns=now_ns, ttl=ttl - 1)
 
-    def _control_failed(self, next_hop: NodeId, outcome: TxOutcome, *, now_ns: int) -> None:
+    def _on_control_failure(self, next_hop: NodeId, outcome: TxOutcome, *, now_ns: int) -> None:
         if outcome is TxOutcome.RETRY_LIMIT:
             self._blacklist[next_hop] = now_ns + p.BLACKLIST_TIMEOUT_NS
             self._link_broke(next_hop, now_ns=now_ns)
 
     # --- hellos ---------------------------------------------------------------------------------------------------
 
-    def _hello(self, reply: RouteReply, previous: NodeId, *, now_ns: int) -> None:
+    def _on_hello(self, reply: RouteReply, previous: NodeId, *, now_ns: int) -> None:
         if reply.destination != previous:
             raise MalformedFrameError(f"hello of {reply.destination} from {previous}")
         ends_ns = now_ns + p.NEIGHBOR_LIFETIME_NS
         self._table.learn_neighbor(previous, ends_ns=ends_ns, now_ns=now_ns, seq=reply.destination_seq)
-        self._hellos.hello(previous, now_ns=now_ns)
+        self._hellos.on_hello(previous, now_ns=now_ns)
 
-    def _say_hello(self, now_ns: int) -> None:
-        """6.9: only as part of an active route, and only if no other broadcast was sent meanwhile."""
+    def _send_hello(self, now_ns: int) -> None:
+        """Send a hello (6.9): only when part of an active route, and only without another broadcast meanwhile."""
         assert self._hello_ns is not None, "only a node that was started says hello"
         self._hello_ns = max(now_ns, self._hello_ns) + p.HELLO_INTERVAL_NS
         if self._broadcast_ns + p.HELLO_INTERVAL_NS > now_ns:
@@ -309,15 +311,15 @@ class Aodv(Routed):
     # --- broken links ---------------------------------------------------------------------------------------------
 
     def _link_broke(self, neighbor: NodeId, *, now_ns: int) -> None:
-        """6.11 (i): every active route over this neighbor ends; who used them is told."""
+        """End every active route over this neighbor, and tell the nodes that used them (6.11, case i)."""
         self._hellos.forget(neighbor)
         broken = self._table.over(neighbor, now_ns=now_ns)
         for route in broken:
             self._table.invalidate(route, now_ns=now_ns)
-        self._tell(broken, now_ns=now_ns)
+        self._report_broken(broken, now_ns=now_ns)
 
-    def _deny(self, destination: NodeId, asker: NodeId, *, now_ns: int) -> None:
-        """6.11 (ii): data came for which there is no route; the neighbor that sent it is the precursor."""
+    def _report_no_route(self, destination: NodeId, asker: NodeId, *, now_ns: int) -> None:
+        """Report a missing route to the neighbor that has sent data for it, and which is the precursor (6.11, ii)."""
         known = self._table.entry(destination, now_ns=now_ns)
         seq = 0
         if known is not None:
@@ -325,23 +327,23 @@ class Aodv(Routed):
             seq = known.seq
         self._send_error([Unreachable(destination, seq)], asker, now_ns=now_ns)
 
-    def _denied(self, error: RouteError, previous: NodeId, *, now_ns: int) -> None:
-        """6.11 (iii): a neighbor lost ways that we use over it."""
+    def _on_error(self, error: RouteError, previous: NodeId, *, now_ns: int) -> None:
+        """Handle a RERR (6.11, case iii): end the routes over a neighbor that it has lost."""
         broken = []
         for destination, seq in error.unreachable:
             route = self._table.active(NodeId(destination), now_ns=now_ns)
             if route is not None and route.next_hop == previous:
                 self._table.invalidate(route, now_ns=now_ns, seq=seq)
                 broken.append(route)
-        self._tell(broken, now_ns=now_ns)
+        self._report_broken(broken, now_ns=now_ns)
 
-    def _tell(self, broken: list[Route], *, now_ns: int) -> None:
-        """A RERR with what has precursors: unicast to a single one, else broadcast (6.11)."""
-        told = [route for route in broken if route.precursors]
-        precursors = sorted({node for route in told for node in route.precursors})
-        if told:
+    def _report_broken(self, broken: list[Route], *, now_ns: int) -> None:
+        """Send a RERR about the routes that have precursors: unicast to a single precursor, else broadcast (6.11)."""
+        reported = [route for route in broken if route.precursors]
+        precursors = sorted({node for route in reported for node in route.precursors})
+        if reported:
             to = precursors[0] if len(precursors) == 1 else BROADCAST
-            self._send_error([Unreachable(route.destination, route.seq) for route in told], to, now_ns=now_ns)
+            self._send_error([Unreachable(route.destination, route.seq) for route in reported], to, now_ns=now_ns)
 
     def _send_error(self, unreachable: list[Unreachable], to: NodeId, *, now_ns: int) -> None:
         if self._rerr_limit.free_ns(now_ns) > now_ns:
@@ -351,12 +353,12 @@ class Aodv(Routed):
         if to == BROADCAST:
             self._broadcast(RERR, body, ttl=1, now_ns=now_ns)
         else:
-            self._say(RERR, body, start_ns=now_ns + self._lead_ns, now_ns=now_ns, to=to)
+            self._send_control(RERR, body, start_ns=now_ns + self._lead_ns, now_ns=now_ns, to=to)
 
     def _broadcast(self, number: int, body: bytes, *, ttl: int, now_ns: int) -> None:
-        """Neighbors that heard the same must not answer at once: jitter before every broadcast."""
+        """Send a broadcast after a jitter, because neighbors that received the same must not answer at once."""
         self._broadcast_ns = now_ns
-        self._say(number, body, start_ns=self._jittered(now_ns, self._jitter_ns), now_ns=now_ns, ttl=ttl)
+        self._send_control(number, body, start_ns=self._jittered(now_ns, self._jitter_ns), now_ns=now_ns, ttl=ttl)
 
     # --- time -----------------------------------------------------------------------------------------------------
 
@@ -379,9 +381,9 @@ class Aodv(Routed):
         for search in self._discovery.due(now_ns):
             self._repeat(search, now_ns=now_ns)
         if self._hello_ns is not None and now_ns >= self._hello_ns:
-            self._say_hello(now_ns)
+            self._send_hello(now_ns)
 
-    # --- for people -----------------------------------------------------------------------------------------------
+    # --- reporting ------------------------------------------------------------------------------------------------
 
     def waiting(self) -> int:
         return super().waiting() + len(self._room)

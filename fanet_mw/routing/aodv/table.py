@@ -1,6 +1,6 @@
-"""AODV's routing table (RFC 3561, 2 and 6.2): who is how far over whom, how new that is, and until when it holds.
+"""AODV's routing table (RFC 3561, 2 and 6.2): next hop, distance, freshness and lifetime of each destination.
 
-    active --expired or broken--> inactive (keeps its sequence number) --DELETE_PERIOD--> gone
+    active --expired or broken--> inactive (keeps its sequence number) --DELETE_PERIOD--> deleted
 
 Entries expire when they are looked at; nothing here has a timer.
 """
@@ -14,28 +14,28 @@ from fanet_mw.units import NodeId
 
 @dataclass(slots=True)
 class Route:
-    """One entry. `seq` means nothing while `seq_valid` is false."""
+    """One entry of the table. `seq` has no meaning while `seq_valid` is false."""
 
     destination: NodeId
     next_hop: NodeId
     hops: int
     ends_ns: int
-    """Active: when it expires. Inactive: when it is forgotten."""
+    """When an active entry expires, or an inactive one is deleted."""
     seq: int = 0
     seq_valid: bool = False
     active: bool = True
     precursors: dict[NodeId, None] = field(default_factory=dict)
-    """Neighbors that may be using this route over us, in the order they came."""
+    """The neighbors that may be using this route over this node, in the order in which they came."""
 
 
 class Table:
-    """Every route of one node."""
+    """All routes of one node."""
 
     def __init__(self) -> None:
         self._routes: dict[NodeId, Route] = {}
 
     def entry(self, destination: NodeId, *, now_ns: int) -> Route | None:
-        """What is known, active or not; expiry is applied first."""
+        """The entry of a destination, active or not; expiry is applied first."""
         route = self._routes.get(destination)
         if route is None:
             return None
@@ -52,7 +52,7 @@ class Table:
         return route if route is not None and route.active else None
 
     def learn_neighbor(self, neighbor: NodeId, *, ends_ns: int, now_ns: int, seq: int | None = None) -> Route:
-        """A packet came straight from this node (6.2); a hello gives its newest sequence number too (6.9)."""
+        """Note a packet that came directly from this node (6.2); a hello also brings its sequence number (6.9)."""
         route = self.entry(neighbor, now_ns=now_ns)
         if route is None:
             route = self._routes[neighbor] = Route(neighbor, neighbor, 1, ends_ns)
@@ -63,7 +63,7 @@ class Table:
         return route
 
     def offer(self, destination: NodeId, *, seq: int, hops: int, next_hop: NodeId, ends_ns: int, now_ns: int) -> bool:
-        """Consider a route with a known sequence number; says whether it was taken (6.2, 6.7)."""
+        """Consider a route with a known sequence number; returns True if it was taken (6.2, 6.7)."""
         route = self.entry(destination, now_ns=now_ns)
         if route is None:
             self._routes[destination] = Route(destination, next_hop, hops, ends_ns, seq, seq_valid=True)
@@ -80,14 +80,14 @@ class Table:
         return True
 
     def _point(self, route: Route, *, next_hop: NodeId, hops: int, ends_ns: int) -> None:
-        if not route.active:  # whoever used it before was told, or has given it up too
+        if not route.active:  # its former precursors were told, or have given the route up too
             route.precursors = {}
             route.ends_ns = ends_ns
         route.next_hop, route.hops, route.active = next_hop, hops, True
         self.extend(route, ends_ns=ends_ns)
 
     def extend(self, route: Route | None, *, ends_ns: int) -> None:
-        """Using an active route keeps it (6.2)."""
+        """Keep an active route that is used (6.2)."""
         if route is not None and route.active and ends_ns > route.ends_ns:
             route.ends_ns = ends_ns
 
@@ -97,7 +97,7 @@ class Table:
         return [route for route in found if route is not None and route.next_hop == next_hop]
 
     def invalidate(self, route: Route, *, now_ns: int, seq: int | None = None) -> None:
-        """A link broke: the sequence number grows, or is the one a RERR names (6.11)."""
+        """Deactivate a broken route: its sequence number grows, or is the number that a RERR names (6.11)."""
         if seq is not None:
             route.seq, route.seq_valid = seq if not route.seq_valid else later(seq, route.seq), True
         elif route.seq_valid:

@@ -1,4 +1,4 @@
-"""DSDV (Perkins and Bhagwat, 1994) behind the contract."""
+"""DSDV (Perkins and Bhagwat, 1994), a rival behind the contract of routing protocols."""
 
 from fanet_mw.routing.dsdv.protocol import Dsdv
 

@@ -1,14 +1,15 @@
-"""DSDV's update: (destination, metric, sequence number) of some routes (incremental) or all of them (full dump).
+"""The update of DSDV: (destination, metric, sequence number) of some routes (incremental) or all of them (full dump).
 
-Little endian, node ids in place of addresses. A sender's own entry has metric 0; 255 is an infinite metric, and comes
-with an odd sequence number: a broken way, said by another than the destination (Perkins and Bhagwat 1994, section 3).
+Little endian, with node ids in place of addresses. A sender's entry for itself has metric 0. Metric 255 is infinite and
+has an odd sequence number: a broken route, reported by a node other than the destination (Perkins and Bhagwat 1994,
+section 3).
 """
 
 import struct
 from typing import Final, NamedTuple, Self
 
 from fanet_mw.errors import MalformedFrameError
-from fanet_mw.routing.control import Reader, check_node
+from fanet_mw.routing.control import BodyReader, check_node
 
 FULL: Final = 1
 INCREMENTAL: Final = 2
@@ -27,7 +28,7 @@ class Advertised(NamedTuple):
 
 
 class Update(NamedTuple):
-    """An update, or the part of one that fits a frame."""
+    """An update, or the part of an update that fits a frame."""
 
     routes: tuple[Advertised, ...]
 
@@ -36,7 +37,7 @@ class Update(NamedTuple):
 
     @classmethod
     def decode(cls, body: bytes) -> Self:
-        routes = tuple(Advertised(*fields) for fields in Reader(body).rest(_ENTRY))
+        routes = tuple(Advertised(*fields) for fields in BodyReader(body).rest(_ENTRY))
         for route in routes:
             check_node(route.destination)
             if (route.metric == INFINITE) != bool(route.seq & 1):

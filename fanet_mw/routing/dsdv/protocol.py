@@ -1,12 +1,13 @@
-"""DSDV at one node (Perkins and Bhagwat, SIGCOMM 1994): everyone tells its neighbors its distances, with numbers.
+"""DSDV at one node (Perkins and Bhagwat, SIGCOMM 1994): each node advertises its distances, with sequence numbers.
 
     every 15 s  -> full dump, own number + 2
-    news        -> an incremental update within a second: new destinations and broken ways at once, another metric when
-                   it has settled
-    link breaks -> (unicast not acknowledged, or nothing heard for three periods) infinite metric, odd number
+    changes     -> an incremental update within a second: new destinations and broken routes at once, another metric
+                   when it has settled
+    link breaks -> (unicast not acknowledged, or no update for three periods) infinite metric, odd number
 
-As in ns-3 a packet without a route waits at its origin, an infinite metric counts only from our next hop, and periods
-are ns-3's. Broadcast data is flooded. Does not model: the base-station extension and layer-2 addresses (section 4).
+As in ns-3 a packet without a route waits at its origin, an infinite metric counts only from the next hop, and the
+periods are the same. Broadcast data is flooded. Not modeled: the base-station extension and layer-2 addresses
+(section 4).
 """
 
 from collections.abc import Mapping
@@ -25,7 +26,7 @@ from fanet_mw.routing.waiting import WaitingRoom
 from fanet_mw.units import NodeId, S, earliest, seconds_to_ns
 
 _GATHER_NS: Final = 1 * S
-"""News goes after U(0, this), with whatever else has come by then (as ns-3's triggered updates)."""
+"""A change is advertised after U(0, this time), with all changes that have come by then (ns-3's triggered updates)."""
 
 
 class Dsdv(Routed):
@@ -47,7 +48,7 @@ class Dsdv(Routed):
 
     # --- data -------------------------------------------------------------------------------------------------------
 
-    def _outgoing(self, packet: Packet, *, start_ns: int, now_ns: int) -> None:
+    def _route_own(self, packet: Packet, *, start_ns: int, now_ns: int) -> None:
         next_hop = self._table.next_hop(NodeId(packet.header.destination))
         if next_hop is not None:
             self._send(packet, next_hop, start_ns=start_ns, now_ns=now_ns)
@@ -56,25 +57,25 @@ class Dsdv(Routed):
         if evicted is not None:
             self._port.drop(DropReason.QUEUE_FULL, evicted, now_ns=now_ns)
 
-    def _transit(self, packet: Packet, reception: Reception, *, start_ns: int, now_ns: int) -> None:
+    def _route_transit(self, packet: Packet, reception: Reception, *, start_ns: int, now_ns: int) -> None:
         next_hop = self._table.next_hop(NodeId(packet.header.destination))
         if next_hop is None:
             self._port.drop(DropReason.NO_ROUTE, packet, now_ns=now_ns)
         else:
             self._send(packet, next_hop, start_ns=start_ns, now_ns=now_ns)
 
-    def _failed(self, packet: Packet, next_hop: NodeId, outcome: TxOutcome, *, now_ns: int) -> None:
-        super()._failed(packet, next_hop, outcome, now_ns=now_ns)
+    def _on_failure(self, packet: Packet, next_hop: NodeId, outcome: TxOutcome, *, now_ns: int) -> None:
+        super()._on_failure(packet, next_hop, outcome, now_ns=now_ns)
         if outcome is TxOutcome.RETRY_LIMIT and self._table.lose(next_hop, now_ns=now_ns):
             self._plan(now_ns)
 
     # --- control ----------------------------------------------------------------------------------------------------
 
-    def _heard(self, number: int, body: bytes, packet: Packet, reception: Reception, *, now_ns: int) -> None:
+    def _on_control(self, number: int, body: bytes, packet: Packet, reception: Reception, *, now_ns: int) -> None:
         if number not in (FULL, INCREMENTAL):
             raise MalformedFrameError(f"DSDV message {number}")
-        for told in Update.decode(body).routes:
-            self._table.hear(reception.src, told, now_ns=now_ns)
+        for advertised in Update.decode(body).routes:
+            self._table.on_advertised(reception.src, advertised, now_ns=now_ns)
         self._release(now_ns)
         self._plan(now_ns)
 
@@ -86,15 +87,15 @@ class Dsdv(Routed):
                     self._send(packet, next_hop, start_ns=now_ns + self._lead_ns, now_ns=now_ns)
 
     def _plan(self, now_ns: int) -> None:
-        """News is due: choose when to tell it, unless an update is planned that takes it along."""
+        """Choose when to advertise changes, unless an update is planned that will include them."""
         due_ns = self._table.next_news_ns()
         if due_ns is not None and (self._news_ns is None or self._news_ns > due_ns + _GATHER_NS):
             self._news_ns = max(now_ns, due_ns) + int(self._random() * _GATHER_NS)
 
-    def _tell(self, number: int, routes: list[Advertised], *, now_ns: int) -> None:
+    def _advertise(self, number: int, routes: list[Advertised], *, now_ns: int) -> None:
         for at in range(0, len(routes), self._most):
             update = Update(tuple(routes[at : at + self._most]))
-            self._say(number, update.encode(), start_ns=self._jittered(now_ns, self._jitter_ns), now_ns=now_ns)
+            self._send_control(number, update.encode(), start_ns=self._jittered(now_ns, self._jitter_ns), now_ns=now_ns)
 
     # --- time -------------------------------------------------------------------------------------------------------
 
@@ -107,15 +108,15 @@ class Dsdv(Routed):
             self._port.drop(DropReason.EXPIRED, packet, now_ns=now_ns)
         if self._full_ns is not None and now_ns >= self._full_ns:
             self._table.tidy(now_ns)
-            self._tell(FULL, self._table.full(), now_ns=now_ns)
+            self._advertise(FULL, self._table.full(), now_ns=now_ns)
             self._full_ns += PERIODIC_UPDATE_NS
             self._news_ns = None
         elif self._news_ns is not None and now_ns >= self._news_ns:
-            self._tell(INCREMENTAL, self._table.news(now_ns), now_ns=now_ns)
+            self._advertise(INCREMENTAL, self._table.news(now_ns), now_ns=now_ns)
             self._news_ns = None
         self._plan(now_ns)
 
-    # --- for people -------------------------------------------------------------------------------------------------
+    # --- reporting --------------------------------------------------------------------------------------------------
 
     def waiting(self) -> int:
         return super().waiting() + len(self._room)

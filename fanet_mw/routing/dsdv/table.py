@@ -1,8 +1,8 @@
-"""DSDV's routes and which of them are news (Perkins and Bhagwat 1994, sections 3.1 to 3.4).
+"""DSDV's routing table, and which of its routes are to be advertised (Perkins and Bhagwat 1994, sections 3.1 to 3.4).
 
-A newer sequence number beats a shorter way; of equally new ways the shorter wins. Forwarding uses the best way at once.
-Telling others waits: a new destination or a broken way is told at once, another metric when it has settled, that is
-after twice the weighted average of how long better ways with the same number kept coming.
+A newer sequence number prevails over a shorter route; of equally new routes the shorter prevails. Forwarding uses the
+best route at once. Advertising waits: a new destination or a broken route is advertised at once, another metric when it
+has settled, that is after twice the weighted average of how long better routes with the same number kept coming.
 """
 
 from dataclasses import dataclass
@@ -15,16 +15,16 @@ from fanet_mw.units import NodeId, S
 PERIODIC_UPDATE_NS: Final = 15 * S
 """ns-3's PeriodicUpdateInterval."""
 MAX_SETTLING_NS: Final = 5 * S
-"""ns-3's SettlingTime; here the bound of what the average may ask for."""
+"""ns-3's SettlingTime; here an upper bound of the settling time."""
 HOLD_NS: Final = 3 * PERIODIC_UPDATE_NS
-"""A way that was not renewed for three periods is broken (ns-3's Holdtimes)."""
+"""A route that has not been renewed for three periods is broken (ns-3's Holdtimes)."""
 _WEIGHT: Final = 7 / 8
-"""Of the past in the average settling time (ns-3's WeightedFactor 0.875)."""
+"""The weight of the past in the average settling time (ns-3's WeightedFactor 0.875)."""
 
 
 @dataclass(slots=True)
 class Route:
-    """The way to one destination, as it is used and as it was last told."""
+    """The route to one destination, as it is used and as it was last advertised."""
 
     next_hop: NodeId
     metric: int
@@ -32,23 +32,23 @@ class Route:
     renewed_ns: int
     """When the sequence number last grew."""
     settling_ns: float = MAX_SETTLING_NS / 2
-    """Weighted average of the settling time."""
-    told_metric: int = -1
-    """The metric last told to neighbors; -1: never told."""
-    tell_ns: int | None = None
-    """When the change is due to be told; None: nothing to tell before the next full dump."""
+    """The weighted average of the settling time."""
+    advertised_metric: int = -1
+    """The metric that was last advertised; -1 when none was."""
+    due_ns: int | None = None
+    """When the change is to be advertised; None when it can wait for the next full dump."""
 
 
 class Table:
-    """Every route of one node."""
+    """All routes of one node."""
 
     def __init__(self, node: NodeId) -> None:
         self._node = node
         self._routes: dict[NodeId, Route] = {}
         self.seq = 0
-        """Our own number: even, from ourselves."""
-        self.tell_own_ns: int | None = None
-        """Somebody called us unreachable: tell a newer number."""
+        """This node's own sequence number, which is even."""
+        self.own_due_ns: int | None = None
+        """When to advertise a newer number, because another node has called this node unreachable; None if not."""
 
     def next_hop(self, destination: NodeId) -> NodeId | None:
         route = self._routes.get(destination)
@@ -57,56 +57,56 @@ class Table:
     def count(self) -> int:
         return sum(1 for route in self._routes.values() if route.metric < INFINITE)
 
-    # --- hearing ----------------------------------------------------------------------------------------------------
+    # --- receiving --------------------------------------------------------------------------------------------------
 
-    def hear(self, sender: NodeId, told: Advertised, *, now_ns: int) -> None:
-        """One route of a neighbor's update."""
-        destination = NodeId(told.destination)
-        metric = INFINITE if told.metric >= INFINITE - 1 else told.metric + 1
+    def on_advertised(self, sender: NodeId, advertised: Advertised, *, now_ns: int) -> None:
+        """Take in one route of a neighbor's update."""
+        destination = NodeId(advertised.destination)
+        metric = INFINITE if advertised.metric >= INFINITE - 1 else advertised.metric + 1
         if destination == self._node:
-            if told.metric == INFINITE and newer(told.seq, self.seq):
-                self.seq = following(told.seq)
-                self.tell_own_ns = now_ns
+            if advertised.metric == INFINITE and newer(advertised.seq, self.seq):
+                self.seq = following(advertised.seq)
+                self.own_due_ns = now_ns
             return
         route = self._routes.get(destination)
-        if told.seq & 1:
-            if route is not None and route.next_hop == sender and newer(told.seq, route.seq):
-                self._break(route, seq=told.seq, now_ns=now_ns)
+        if advertised.seq & 1:
+            if route is not None and route.next_hop == sender and newer(advertised.seq, route.seq):
+                self._break(route, seq=advertised.seq, now_ns=now_ns)
         elif metric == INFINITE:
             return
         elif route is None or route.metric == INFINITE:
-            if route is None or newer(told.seq, route.seq):
-                self._routes[destination] = Route(sender, metric, told.seq, now_ns, tell_ns=now_ns)
-        elif newer(told.seq, route.seq):
-            route.next_hop, route.seq, route.renewed_ns = sender, told.seq, now_ns
-            self._settle(route, metric, now_ns=now_ns)
-        elif told.seq == route.seq and metric < route.metric:
+            if route is None or newer(advertised.seq, route.seq):
+                self._routes[destination] = Route(sender, metric, advertised.seq, now_ns, due_ns=now_ns)
+        elif newer(advertised.seq, route.seq):
+            route.next_hop, route.seq, route.renewed_ns = sender, advertised.seq, now_ns
+            self._update_metric(route, metric, now_ns=now_ns)
+        elif advertised.seq == route.seq and metric < route.metric:
             late_ns = now_ns - route.renewed_ns
             route.settling_ns = _WEIGHT * route.settling_ns + (1 - _WEIGHT) * late_ns
             route.next_hop = sender
-            self._settle(route, metric, now_ns=now_ns)
+            self._update_metric(route, metric, now_ns=now_ns)
 
-    def _settle(self, route: Route, metric: int, *, now_ns: int) -> None:
+    def _update_metric(self, route: Route, metric: int, *, now_ns: int) -> None:
         route.metric = metric
-        if metric == route.told_metric:
-            route.tell_ns = None  # a newer number alone is no news: the next full dump carries it
-        elif route.told_metric >= 0:
-            route.tell_ns = now_ns + min(MAX_SETTLING_NS, int(2 * route.settling_ns))
+        if metric == route.advertised_metric:
+            route.due_ns = None  # a newer number alone is no change: the next full dump carries it
+        elif route.advertised_metric >= 0:
+            route.due_ns = now_ns + min(MAX_SETTLING_NS, int(2 * route.settling_ns))
 
     # --- breaking ---------------------------------------------------------------------------------------------------
 
     def lose(self, neighbor: NodeId, *, now_ns: int) -> bool:
-        """A link broke: every way over it is infinite, with the next odd number; says whether there was one."""
+        """A link has broken: routes over it become infinite, with the next odd number; True if there were any."""
         over = [r for r in self._routes.values() if r.next_hop == neighbor and r.metric < INFINITE]
         for route in over:
             self._break(route, seq=following(route.seq), now_ns=now_ns)
         return bool(over)
 
     def _break(self, route: Route, *, seq: int, now_ns: int) -> None:
-        route.metric, route.seq, route.renewed_ns, route.tell_ns = INFINITE, seq, now_ns, now_ns
+        route.metric, route.seq, route.renewed_ns, route.due_ns = INFINITE, seq, now_ns, now_ns
 
     def tidy(self, now_ns: int) -> None:
-        """Ways that nobody renews are broken; broken ones are forgotten after as long."""
+        """Break the routes that nobody renews, and delete the broken ones after the same time."""
         for destination in sorted(self._routes):
             route = self._routes[destination]
             if route.renewed_ns + HOLD_NS <= now_ns:
@@ -115,31 +115,29 @@ class Table:
                 else:
                     self._break(route, seq=following(route.seq), now_ns=now_ns)
 
-    # --- telling ----------------------------------------------------------------------------------------------------
+    # --- advertising ------------------------------------------------------------------------------------------------
 
     def next_news_ns(self) -> int | None:
-        news = [route.tell_ns for route in self._routes.values() if route.tell_ns is not None]
-        if self.tell_own_ns is not None:
-            news.append(self.tell_own_ns)
+        news = [route.due_ns for route in self._routes.values() if route.due_ns is not None]
+        if self.own_due_ns is not None:
+            news.append(self.own_due_ns)
         return min(news, default=None)
 
     def full(self) -> list[Advertised]:
-        """Every route; our own number grows first."""
+        """All routes for a full dump; the node's own number grows first."""
         self.seq = following(self.seq, step=2)
-        return [self._own(), *(self._tell(destination) for destination in sorted(self._routes))]
+        return [self._own(), *(self._advertise(destination) for destination in sorted(self._routes))]
 
     def news(self, now_ns: int) -> list[Advertised]:
-        """What is due to be told, after ourselves."""
-        due = [
-            n for n in sorted(self._routes) if (tell_ns := self._routes[n].tell_ns) is not None and tell_ns <= now_ns
-        ]
-        return [self._own(), *(self._tell(destination) for destination in due)]
+        """The node itself, and the routes whose changes are due to be advertised."""
+        due = [n for n in sorted(self._routes) if (due_ns := self._routes[n].due_ns) is not None and due_ns <= now_ns]
+        return [self._own(), *(self._advertise(destination) for destination in due)]
 
     def _own(self) -> Advertised:
-        self.tell_own_ns = None
+        self.own_due_ns = None
         return Advertised(self._node, 0, self.seq)
 
-    def _tell(self, destination: NodeId) -> Advertised:
+    def _advertise(self, destination: NodeId) -> Advertised:
         route = self._routes[destination]
-        route.told_metric, route.tell_ns = route.metric, None
+        route.advertised_metric, route.due_ns = route.metric, None
         return Advertised(destination, route.metric, route.seq)

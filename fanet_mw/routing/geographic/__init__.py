@@ -1,4 +1,4 @@
-"""Geographic carry-and-forward routing behind the contract."""
+"""Geographic carry-and-forward routing, a rival behind the contract of routing protocols."""
 
 from fanet_mw.routing.geographic.protocol import Geographic
 

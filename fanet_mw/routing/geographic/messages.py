@@ -1,7 +1,7 @@
-"""What the geographic protocol says: where we are, where others were, and who is looked for.
+"""The messages of geographic routing: the sender's position, the locations of others, and queries for a location.
 
-Little endian; positions are ENU metres as floats, instants swarm microseconds. A LOCATION is of the packet's origin, at
-the instant of its header.
+Little endian; positions are ENU metres as floats, instants swarm microseconds. A LOCATION is that of the packet's
+origin, at the instant in its header.
 """
 
 import math
@@ -10,7 +10,7 @@ from typing import Any, Final, NamedTuple, Self
 
 from fanet_mw import wire
 from fanet_mw.errors import MalformedFrameError
-from fanet_mw.routing.control import Reader, check_node
+from fanet_mw.routing.control import BodyReader, check_node
 from fanet_mw.units import Enu
 
 BEACON: Final = 1
@@ -21,7 +21,7 @@ _PLACE: Final = struct.Struct("<fff")
 _FIX: Final = struct.Struct("<HfffQ")
 _WANTED: Final = struct.Struct("<H")
 MOST_FIXES: Final = 8
-"""Locations of others in one beacon, at most."""
+"""The most locations of other nodes in one beacon."""
 
 
 def _position(fields: tuple[Any, ...]) -> Enu:
@@ -31,15 +31,15 @@ def _position(fields: tuple[Any, ...]) -> Enu:
 
 
 class Fix(NamedTuple):
-    """Where a node was, and when [swarm us]."""
+    """The position of a node, and the instant at which it was there [swarm us]."""
 
     node: int
     position: Enu
     t_us: int
 
 
-class Beacon(NamedTuple):
-    """BEACON, one hop: the sender's position, and the locations of destinations it has used last."""
+class PositionBeacon(NamedTuple):
+    """BEACON, one hop: the sender's position, and the locations of the destinations that it has used last."""
 
     position: Enu
     fixes: tuple[Fix, ...]
@@ -49,7 +49,7 @@ class Beacon(NamedTuple):
 
     @classmethod
     def decode(cls, body: bytes) -> Self:
-        reader = Reader(body)
+        reader = BodyReader(body)
         position = _position(reader.take(_PLACE))
         fixes = tuple(
             Fix(check_node(node), _position((east, north, up)), t_us)
@@ -61,7 +61,7 @@ class Beacon(NamedTuple):
 
 
 class Location(NamedTuple):
-    """LOCATION, flooded: the origin is here."""
+    """LOCATION, flooded: the position of its origin."""
 
     position: Enu
 
@@ -70,14 +70,14 @@ class Location(NamedTuple):
 
     @classmethod
     def decode(cls, body: bytes) -> Self:
-        reader = Reader(body)
+        reader = BodyReader(body)
         position = _position(reader.take(_PLACE))
         reader.finish()
         return cls(position)
 
 
 class Query(NamedTuple):
-    """QUERY, flooded: where is this node?"""
+    """QUERY, flooded: a question for the location of this node."""
 
     wanted: int
 
@@ -86,7 +86,7 @@ class Query(NamedTuple):
 
     @classmethod
     def decode(cls, body: bytes) -> Self:
-        reader = Reader(body)
+        reader = BodyReader(body)
         (wanted,) = reader.take(_WANTED)
         reader.finish()
         return cls(check_node(wanted))

@@ -1,14 +1,15 @@
 """Carry and forward by position, in the manner of VADD (Zhao and Cao, IEEE INFOCOM 2006), without its roads.
 
-    a neighbor nearer to the destination  -> hand the packet over (acknowledged), the nearest first
-    none                                  -> keep it and fly on; look again twice a second
-    handed over                           -> custody has passed: the same packet may come back later
+    a neighbor nearer to the destination  -> hand the packet over (acknowledged), to the nearest such neighbor
+    none                                  -> keep it while flying on; look again twice a second
+    handed over                           -> custody has passed on: the same packet may come back later
 
-Location service: a destination that receives data floods its position every 5 s; who has a packet for a node of unknown
-or old location floods a query, which it answers; beacons (1 s, one hop) pass the locations in use on, so that whoever
-moves between partitions brings them along. A stale location is used until a newer one comes. Broadcast data is flooded.
+Location service: a destination that receives data floods its position every 5 s. A node that has a packet for a
+destination of unknown or old location floods a query, which the destination answers. Beacons (1 s, one hop) pass on the
+locations in use, so that a node that moves between partitions carries them along. A stale location is used until a
+newer one comes. Broadcast data is flooded.
 
-Does not model: VADD's delay estimates per road segment, intersections and its L-, D- and H- variants; motion of
+Not modeled: VADD's delay estimates per road segment, intersections and its L-, D- and H- variants; the motion of
 neighbors between beacons; recovery round voids other than by carrying (perimeter routing).
 """
 
@@ -20,8 +21,8 @@ from fanet_mw.errors import DropReason, MalformedFrameError
 from fanet_mw.node.contract import Port
 from fanet_mw.node.queue import Packet
 from fanet_mw.routing.control import Family
-from fanet_mw.routing.geographic.messages import BEACON, LOCATION, QUERY, Beacon, Fix, Location, Query
-from fanet_mw.routing.geographic.places import HELLO_INTERVAL_NS, Places
+from fanet_mw.routing.geographic.locations import HELLO_INTERVAL_NS, LocationTable
+from fanet_mw.routing.geographic.messages import BEACON, LOCATION, QUERY, Fix, Location, PositionBeacon, Query
 from fanet_mw.routing.resolution import Outgoing
 from fanet_mw.routing.routed import Routed
 from fanet_mw.routing.waiting import WaitingRoom
@@ -29,46 +30,46 @@ from fanet_mw.units import BROADCAST, MS, US, NodeId, S, earliest, seconds_to_ns
 
 LOCATION_INTERVAL_NS: Final = 5 * S
 LOCATION_AGE_NS: Final = 10 * S
-"""An older location is asked for again."""
+"""A location older than this is queried again."""
 QUERY_INTERVAL_NS: Final = 5 * S
-"""Of one node for one destination."""
+"""The least time between two queries of one node for one destination."""
 LOOK_INTERVAL_NS: Final = 500 * MS
 
 
 class Geographic(Routed):
-    """Greedy forwarding by position, carrying where there is nobody nearer."""
+    """Greedy forwarding by position; a packet is carried while no neighbor is nearer to its destination."""
 
     family: ClassVar[Family] = Family.GEOGRAPHIC
 
     def __init__(self, port: Port) -> None:
         super().__init__(port)
         routing = port.scenario.routing
-        self._places = Places()
+        self._locations = LocationTable()
         self._room = WaitingRoom(capacity=routing.queue_frames, hold_ns=seconds_to_ns(routing.lifetime_s))
         self._hops = routing.hop_limit
         self._beacon_ns: int | None = None
-        self._look_ns: int | None = None
+        self._retry_ns: int | None = None
         self._located_ns = -LOCATION_INTERVAL_NS
-        """When we last flooded our location."""
-        self._asked_ns: dict[NodeId, int] = {}
+        """When this node last flooded its location."""
+        self._queried_ns: dict[NodeId, int] = {}
 
     def start(self, now_ns: int) -> None:
         self._beacon_ns = now_ns + int(self._random() * HELLO_INTERVAL_NS)
 
     # --- data -------------------------------------------------------------------------------------------------------
 
-    def _outgoing(self, packet: Packet, *, start_ns: int, now_ns: int) -> None:
+    def _route_own(self, packet: Packet, *, start_ns: int, now_ns: int) -> None:
         self._forward(packet, start_ns=start_ns, now_ns=now_ns)
 
-    def _transit(self, packet: Packet, reception: Reception, *, start_ns: int, now_ns: int) -> None:
+    def _route_transit(self, packet: Packet, reception: Reception, *, start_ns: int, now_ns: int) -> None:
         self._forward(packet, start_ns=start_ns, now_ns=now_ns)
 
     def _forward(self, packet: Packet, *, start_ns: int, now_ns: int) -> None:
         destination = NodeId(packet.header.destination)
-        self._places.use(destination)
-        self._look_up(destination, now_ns=now_ns)
-        barred = NodeId(packet.header.prev_hop)
-        next_hop = self._places.next_hop(destination, at=self._port.position, barred=barred, now_ns=now_ns)
+        self._locations.use(destination)
+        self._query(destination, now_ns=now_ns)
+        excluded = NodeId(packet.header.prev_hop)
+        next_hop = self._locations.next_hop(destination, at=self._port.position, excluded=excluded, now_ns=now_ns)
         if next_hop is None:
             self._carry(packet, now_ns=now_ns)
         else:
@@ -78,12 +79,12 @@ class Geographic(Routed):
         evicted = self._room.push(packet, now_ns=now_ns)
         if evicted is not None:
             self._port.drop(DropReason.QUEUE_FULL, evicted, now_ns=now_ns)
-        if self._look_ns is None:
-            self._look_ns = now_ns + LOOK_INTERVAL_NS
+        if self._retry_ns is None:
+            self._retry_ns = now_ns + LOOK_INTERVAL_NS
 
-    def _look(self, now_ns: int) -> None:
-        """Somebody nearer may have come. A packet older than its lifetime ends, however young its stay here."""
-        self._look_ns = None
+    def _retry_carried(self, now_ns: int) -> None:
+        """Try to forward what is carried. A packet older than its lifetime is dropped, however short its stay here."""
+        self._retry_ns = None
         for packet in self._room.expire(now_ns=now_ns):
             self._port.drop(DropReason.EXPIRED, packet, now_ns=now_ns)
         oldest_us = now_ns // US - round(self._port.scenario.routing.lifetime_s * 1_000_000)
@@ -94,59 +95,59 @@ class Geographic(Routed):
                 else:
                     self._forward(packet, start_ns=now_ns + self._lead_ns, now_ns=now_ns)
 
-    def _failed(self, packet: Packet, next_hop: NodeId, outcome: TxOutcome, *, now_ns: int) -> None:
-        """Custody stays here: the neighbor is gone, or the MAC is full."""
+    def _on_failure(self, packet: Packet, next_hop: NodeId, outcome: TxOutcome, *, now_ns: int) -> None:
+        """Keep custody of a packet: the neighbor is gone, or the MAC queue is full."""
         if outcome is TxOutcome.RETRY_LIMIT:
-            self._places.forget(next_hop)
+            self._locations.forget(next_hop)
         self._carry(packet, now_ns=now_ns)
 
-    def _unresolved(self, out: Outgoing, *, now_ns: int) -> None:
-        """Custody stays here: nobody of that address has answered."""
+    def _on_unresolved(self, out: Outgoing, *, now_ns: int) -> None:
+        """Keep custody of a packet: the neighbor has not answered a request for its address."""
         if out.is_data:
-            self._places.forget(out.next_hop)
+            self._locations.forget(out.next_hop)
             self._carry(out.packet, now_ns=now_ns)
         else:
-            super()._unresolved(out, now_ns=now_ns)
+            super()._on_unresolved(out, now_ns=now_ns)
 
-    def _acknowledged(self, packet: Packet, next_hop: NodeId) -> None:
+    def _on_acknowledged(self, packet: Packet, next_hop: NodeId) -> None:
         self._port.forget(packet)
 
-    def _arrived(self, packet: Packet, reception: Reception, *, now_ns: int) -> None:
-        self._tell_location(now_ns=now_ns, every_ns=LOCATION_INTERVAL_NS)
+    def _on_arrival(self, packet: Packet, reception: Reception, *, now_ns: int) -> None:
+        self._flood_location(now_ns=now_ns, every_ns=LOCATION_INTERVAL_NS)
 
     # --- location service -------------------------------------------------------------------------------------------
 
-    def _look_up(self, destination: NodeId, *, now_ns: int) -> None:
-        """Ask for a location that is unknown or old, now and then."""
-        fix = self._places.fix(destination)
+    def _query(self, destination: NodeId, *, now_ns: int) -> None:
+        """Query a location that is unknown or old, at most once per QUERY_INTERVAL_NS."""
+        fix = self._locations.fix(destination)
         if fix is not None and fix.t_us * US + LOCATION_AGE_NS > now_ns:
             return
-        if self._asked_ns.get(destination, -QUERY_INTERVAL_NS) + QUERY_INTERVAL_NS <= now_ns:
-            self._asked_ns[destination] = now_ns
+        if self._queried_ns.get(destination, -QUERY_INTERVAL_NS) + QUERY_INTERVAL_NS <= now_ns:
+            self._queried_ns[destination] = now_ns
             self._flood_control(QUERY, Query(destination).encode(), now_ns=now_ns)
 
-    def _tell_location(self, *, now_ns: int, every_ns: int) -> None:
+    def _flood_location(self, *, now_ns: int, every_ns: int) -> None:
         if self._located_ns + every_ns <= now_ns:
             self._located_ns = now_ns
             self._flood_control(LOCATION, Location(self._port.position).encode(), now_ns=now_ns)
 
     def _flood_control(self, number: int, body: bytes, *, now_ns: int) -> None:
         start_ns = self._jittered(now_ns, self._jitter_ns)
-        self._say(number, body, start_ns=start_ns, now_ns=now_ns, ttl=self._hops)
+        self._send_control(number, body, start_ns=start_ns, now_ns=now_ns, ttl=self._hops)
 
-    def _heard(self, number: int, body: bytes, packet: Packet, reception: Reception, *, now_ns: int) -> None:
+    def _on_control(self, number: int, body: bytes, packet: Packet, reception: Reception, *, now_ns: int) -> None:
         if number == BEACON:
-            beacon = Beacon.decode(body)
-            self._places.heard(reception.src, beacon.position, now_ns=now_ns)
+            beacon = PositionBeacon.decode(body)
+            self._locations.on_beacon(reception.src, beacon.position, now_ns=now_ns)
             for fix in (Fix(reception.src, beacon.position, now_ns // US), *beacon.fixes):
-                self._places.learn(fix, now_us=now_ns // US)
+                self._locations.learn(fix, now_us=now_ns // US)
             return
         if number == LOCATION:
             fix = Fix(packet.origin, Location.decode(body).position, packet.header.origin_us)
-            self._places.learn(fix, now_us=now_ns // US)
+            self._locations.learn(fix, now_us=now_ns // US)
         elif number == QUERY:
             if Query.decode(body).wanted == self._port.node:
-                self._tell_location(now_ns=now_ns, every_ns=S)
+                self._flood_location(now_ns=now_ns, every_ns=S)
                 return
         else:
             raise MalformedFrameError(f"geographic message {number}")
@@ -158,18 +159,18 @@ class Geographic(Routed):
     # --- time -------------------------------------------------------------------------------------------------------
 
     def next_wake_ns(self) -> int | None:
-        return earliest(self._beacon_ns, self._look_ns, super().next_wake_ns())
+        return earliest(self._beacon_ns, self._retry_ns, super().next_wake_ns())
 
     def wake(self, now_ns: int) -> None:
         super().wake(now_ns)
         if self._beacon_ns is not None and now_ns >= self._beacon_ns:
-            beacon = Beacon(self._port.position, self._places.worth_telling())
-            self._say(BEACON, beacon.encode(), start_ns=self._jittered(now_ns, self._jitter_ns), now_ns=now_ns)
+            beacon = PositionBeacon(self._port.position, self._locations.in_use())
+            self._send_control(BEACON, beacon.encode(), start_ns=self._jittered(now_ns, self._jitter_ns), now_ns=now_ns)
             self._beacon_ns = max(now_ns, self._beacon_ns + HELLO_INTERVAL_NS)
-        if self._look_ns is not None and now_ns >= self._look_ns:
-            self._look(now_ns)
+        if self._retry_ns is not None and now_ns >= self._retry_ns:
+            self._retry_carried(now_ns)
 
-    # --- for people -------------------------------------------------------------------------------------------------
+    # --- reporting --------------------------------------------------------------------------------------------------
 
     def waiting(self) -> int:
         return super().waiting() + len(self._room)

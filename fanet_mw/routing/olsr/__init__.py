@@ -1,4 +1,4 @@
-"""OLSR (RFC 3626) behind the contract."""
+"""OLSR (RFC 3626), a rival behind the contract of routing protocols."""
 
 from fanet_mw.routing.olsr.protocol import Olsr
 

@@ -1,13 +1,14 @@
-"""OLSR at one node (RFC 3626): everyone knows the topology all the time, and only chosen relays pass it on.
+"""OLSR at one node (RFC 3626): each node always knows the topology, and only chosen relays pass it on.
 
-    HELLO (2 s, one hop)  -> links, 2-hop neighbors -> who are our multipoint relays, and whose are we
-    TC (5 s, flooded)     -> the links between relays and those that chose them -> shortest paths to everyone
-    data                  -> the next hop of the routing table, or it is dropped
+    HELLO (2 s, one hop)  -> links, 2-hop neighbors -> this node's multipoint relays, and the nodes that it relays for
+    TC (5 s, flooded)     -> the links between relays and the nodes that chose them -> shortest paths to all nodes
+    data                  -> the next hop of the routing table; without one it is dropped
 
-Broadcast data is flooded by the same rule as TCs: relayed by those whom the transmitter has chosen as MPR (3.4.1).
-Does not model: several interfaces (MID), gateways (HNA), link hysteresis (14), TC redundancy (15), MPR coverage (16),
-link-layer notification (13), all optional and off in ns-3 too. The node's memory of packets is the duplicate set; it
-keeps them by number rather than for DUP_HOLD_TIME, and it stops a data packet that comes back, which IP would not.
+Broadcast data is flooded by the same rule as TCs: it is relayed by the nodes that the transmitter has chosen as MPRs
+(3.4.1). Not modeled: several interfaces (MID), gateways (HNA), link hysteresis (14), TC redundancy (15), MPR coverage
+(16), link-layer notification (13), which are all optional and off in ns-3 too. The node's duplicate set takes the place
+of OLSR's; it keeps packets by number instead of for DUP_HOLD_TIME, and it stops a data packet that returns to a node,
+which IP would not.
 """
 
 from collections.abc import Mapping
@@ -15,26 +16,27 @@ from typing import ClassVar, Final
 
 from fanet_mw.bus.messages import Reception
 from fanet_mw.errors import DropReason, MalformedFrameError
+from fanet_mw.graph.multipoint_relays import multipoint_relays
 from fanet_mw.node.contract import Port
 from fanet_mw.node.queue import Packet
 from fanet_mw.routing import control
 from fanet_mw.routing.control import Family
 from fanet_mw.routing.olsr import parameters as p
-from fanet_mw.routing.olsr.choice import Route, multipoint_relays, routing_table
 from fanet_mw.routing.olsr.messages import (
     HELLO,
     HELLO_HEAD,
     PER_NODE,
     TC,
     TC_HEAD,
-    Heard,
     Hello,
-    Link,
-    Neighborhood,
+    HelloNeighbor,
+    LinkType,
+    NeighborType,
     TopologyControl,
     encode_time,
 )
-from fanet_mw.routing.olsr.state import State
+from fanet_mw.routing.olsr.routes import Route, routing_table
+from fanet_mw.routing.olsr.state import Repositories
 from fanet_mw.routing.routed import Routed
 from fanet_mw.serial import following
 from fanet_mw.units import BROADCAST, NodeId
@@ -52,14 +54,14 @@ class Olsr(Routed):
 
     def __init__(self, port: Port) -> None:
         super().__init__(port)
-        self._state = State(port.node)
+        self._state = Repositories(port.node)
         self._room = control.capacity(port.scenario.radio.max_frame_bytes)
         self._hello_ns: int | None = None
         self._tc_ns: int | None = None
         self._ansn = 0
         self._advertised: list[NodeId] = []
         self._tc_until_ns = -1
-        """A node whose last selector has gone says so for TOP_HOLD_TIME (9.3)."""
+        """A node whose last selector is gone advertises that until this instant, for TOP_HOLD_TIME (9.3)."""
         self._routes: dict[NodeId, Route] = {}
         self._routes_version = -1
         self._routes_end_ns = -1
@@ -70,21 +72,21 @@ class Olsr(Routed):
 
     # --- data -------------------------------------------------------------------------------------------------------
 
-    def _outgoing(self, packet: Packet, *, start_ns: int, now_ns: int) -> None:
+    def _route_own(self, packet: Packet, *, start_ns: int, now_ns: int) -> None:
         route = self._route(NodeId(packet.header.destination), now_ns=now_ns)
         if route is None:
             self._port.drop(DropReason.NO_ROUTE, packet, now_ns=now_ns)
         else:
             self._send(packet, route.next_hop, start_ns=start_ns, now_ns=now_ns)
 
-    def _transit(self, packet: Packet, reception: Reception, *, start_ns: int, now_ns: int) -> None:
-        self._outgoing(packet, start_ns=start_ns, now_ns=now_ns)
+    def _route_transit(self, packet: Packet, reception: Reception, *, start_ns: int, now_ns: int) -> None:
+        self._route_own(packet, start_ns=start_ns, now_ns=now_ns)
 
     def _relays(self, packet: Packet, reception: Reception, *, now_ns: int) -> bool:
         return self.willingness != p.WILL_NEVER and self._state.is_selector(reception.src, now_ns=now_ns)
 
     def _route(self, destination: NodeId, *, now_ns: int) -> Route | None:
-        """From the routing table, calculated anew when what it is made of has changed (10)."""
+        """The entry of the routing table, which is computed anew when its inputs have changed (10)."""
         state = self._state
         if self._routes_version != state.version or now_ns > self._routes_end_ns:
             neighbors = {n: state.two_hop(n, now_ns=now_ns) for n in state.symmetric(now_ns=now_ns)}
@@ -96,56 +98,60 @@ class Olsr(Routed):
 
     # --- control ----------------------------------------------------------------------------------------------------
 
-    def _heard(self, number: int, body: bytes, packet: Packet, reception: Reception, *, now_ns: int) -> None:
+    def _on_control(self, number: int, body: bytes, packet: Packet, reception: Reception, *, now_ns: int) -> None:
         origin, sender = packet.origin, reception.src
         if origin == self._port.node:
-            return  # our own, from before a restart
+            return  # the message is this node's own, from before a restart
         if number == HELLO:
             if origin != sender:
                 raise MalformedFrameError(f"hello of {origin} from {sender}")
-            self._state.hear_hello(sender, Hello.decode(body), now_ns=now_ns)
+            self._state.on_hello(sender, Hello.decode(body), now_ns=now_ns)
         elif number == TC:
             self._topology(TopologyControl.decode(body), packet, sender, now_ns=now_ns)
         else:
             raise MalformedFrameError(f"OLSR message {number}")
 
     def _topology(self, tc: TopologyControl, packet: Packet, sender: NodeId, *, now_ns: int) -> None:
-        """9.5, then the default forwarding algorithm (3.4.1)."""
+        """Handle a TC (9.5), then forward it by the default forwarding algorithm (3.4.1)."""
         if not self._state.is_symmetric(sender, now_ns=now_ns):
-            self._port.forget(packet)  # it does not count as received: a symmetric neighbor may bring it yet
+            self._port.forget(packet)  # this copy does not count as received: a symmetric neighbor may still bring one
             return
-        self._state.hear_tc(packet.origin, tc, now_ns=now_ns)
+        self._state.on_tc(packet.origin, tc, now_ns=now_ns)
         if packet.header.hop_limit > 1 and self._state.is_selector(sender, now_ns=now_ns):
             self.control_sent += 1
             frame = self._port.forwarded(packet, flags=0)
             self._port.transmit(frame, BROADCAST, start_ns=self._jittered(now_ns, p.MAXJITTER_NS))
 
-    def _multipoint_relays(self, now_ns: int) -> list[NodeId]:
-        state = self._state
-        neighbors = {n: frozenset(state.two_hop(n, now_ns=now_ns)) for n in state.symmetric(now_ns=now_ns)}
-        return multipoint_relays(self._port.node, neighbors, {n: state.willingness(n) for n in neighbors})
+    def _multipoint_relays(self, now_ns: int) -> tuple[NodeId, ...]:
+        """The multipoint relays of this node (8.3.1), without the optional step that drops redundant ones."""
+        state, node = self._state, self._port.node
+        neighbors = {n: tuple(state.two_hop(n, now_ns=now_ns)) for n in state.symmetric(now_ns=now_ns)}
+        willingness = {n: state.willingness(n) for n in neighbors}
+        return multipoint_relays(
+            node, {**neighbors, node: tuple(neighbors)}, willingness=willingness, drop_redundant=False
+        )
 
-    def _say_hello(self, now_ns: int) -> None:
-        """6.2: every link there is, in as many messages as it takes."""
+    def _send_hello(self, now_ns: int) -> None:
+        """Send hellos with every link (6.2), in as many messages as that takes."""
         state = self._state
         relays = frozenset(self._multipoint_relays(now_ns))
-        heard = []
+        neighbors = []
         for node in state.linked(now_ns=now_ns):
-            link = state.link_of(node, now_ns=now_ns)
-            assert link is not None, "linked nodes have a link"
-            neighborhood = (
-                Neighborhood.NOT if link is not Link.SYM
-                else Neighborhood.MPR if node in relays
-                else Neighborhood.SYM
+            link_type = state.link_of(node, now_ns=now_ns)
+            assert link_type is not None, "linked nodes have a link"
+            neighbor_type = (
+                NeighborType.NOT if link_type is not LinkType.SYM
+                else NeighborType.MPR if node in relays
+                else NeighborType.SYM
             )  # fmt: skip
-            heard.append(Heard(link, neighborhood, node))
+            neighbors.append(HelloNeighbor(link_type, neighbor_type, node))
         most = min(255, (self._room - HELLO_HEAD) // PER_NODE)
-        for at in range(0, max(1, len(heard)), most):
-            hello = Hello(_HELLO_VTIME, _HELLO_HTIME, self.willingness, tuple(heard[at : at + most]))
-            self._say(HELLO, hello.encode(), start_ns=now_ns + self._lead_ns, now_ns=now_ns)
+        for at in range(0, max(1, len(neighbors)), most):
+            hello = Hello(_HELLO_VTIME, _HELLO_HTIME, self.willingness, tuple(neighbors[at : at + most]))
+            self._send_control(HELLO, hello.encode(), start_ns=now_ns + self._lead_ns, now_ns=now_ns)
 
-    def _say_topology(self, now_ns: int) -> None:
-        """9.2, 9.3: who has chosen us; a change of that is a new ANSN."""
+    def _send_topology(self, now_ns: int) -> None:
+        """Send TCs with the nodes that have chosen this node as MPR (9.2, 9.3); a changed set has a new ANSN."""
         advertised = self._state.selectors(now_ns=now_ns)
         if advertised != self._advertised:
             self._ansn = following(self._ansn, bits=16)
@@ -157,7 +163,7 @@ class Olsr(Routed):
         most = (self._room - TC_HEAD) // PER_NODE
         for at in range(0, max(1, len(advertised)), most):
             tc = TopologyControl(_TC_VTIME, self._ansn, tuple(advertised[at : at + most]))
-            self._say(TC, tc.encode(), start_ns=now_ns + self._lead_ns, now_ns=now_ns, ttl=255)
+            self._send_control(TC, tc.encode(), start_ns=now_ns + self._lead_ns, now_ns=now_ns, ttl=255)
 
     # --- time -------------------------------------------------------------------------------------------------------
 
@@ -171,17 +177,17 @@ class Olsr(Routed):
         super().wake(now_ns)
         if self._hello_ns is not None and now_ns >= self._hello_ns:
             self._state.tidy(now_ns)
-            self._say_hello(now_ns)
+            self._send_hello(now_ns)
             self._hello_ns = self._next(now_ns, p.HELLO_INTERVAL_NS)
         if self._tc_ns is not None and now_ns >= self._tc_ns:
-            self._say_topology(now_ns)
+            self._send_topology(now_ns)
             self._tc_ns = self._next(now_ns, p.TC_INTERVAL_NS)
 
     def _next(self, now_ns: int, interval_ns: int) -> int:
-        """Intervals are shortened by a jitter, so that neighbors do not fall into step (18.1)."""
+        """The end of an interval, shortened by a jitter so that neighbors do not synchronize (18.1)."""
         return now_ns + interval_ns - int(self._random() * p.MAXJITTER_NS)
 
-    # --- for people -------------------------------------------------------------------------------------------------
+    # --- reporting --------------------------------------------------------------------------------------------------
 
     def report(self) -> Mapping[str, object]:
         return {"control_sent": self.control_sent, "waiting": self.waiting(), "routes": len(self._routes)}

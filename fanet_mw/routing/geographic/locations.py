@@ -1,4 +1,4 @@
-"""Where others are: neighbors by their beacons, anyone by the location service; and which neighbor is nearer."""
+"""Where other nodes are: neighbors by their beacons, any node by the location service; and which neighbor is nearer."""
 
 from typing import Final
 
@@ -7,31 +7,31 @@ from fanet_mw.units import Enu, NodeId, S
 
 HELLO_INTERVAL_NS: Final = 1 * S
 NEIGHBOR_LIFETIME_NS: Final = 5 * HELLO_INTERVAL_NS // 2
-"""Two beacons may be lost, a third not."""
+"""Two beacons in a row may be lost, but not three."""
 MIN_PROGRESS_M: Final = 10.0
-"""A neighbor that is nearer by less is not worth a hop; several times the error of a position fix."""
+"""A neighbor must be nearer by at least this to be worth a hop; it is several times the error of a position fix."""
 _FUTURE_US: Final = 1_000_000
-"""A location from later than this is not believed: it would never be replaced."""
+"""A location from further in the future than this is not believed, because it would never be replaced."""
 
 
-class Places:
-    """What one node knows of where others are."""
+class LocationTable:
+    """What one node knows of the locations of others."""
 
     def __init__(self) -> None:
         self._neighbors: dict[NodeId, tuple[Enu, int]] = {}
-        """Position and until when it holds."""
+        """The position of each neighbor, and until when it holds."""
         self._fixes: dict[NodeId, Fix] = {}
         self._used: dict[NodeId, None] = {}
         """Destinations in the order of their last use."""
 
-    def heard(self, neighbor: NodeId, position: Enu, *, now_ns: int) -> None:
+    def on_beacon(self, neighbor: NodeId, position: Enu, *, now_ns: int) -> None:
         self._neighbors[neighbor] = position, now_ns + NEIGHBOR_LIFETIME_NS
 
     def forget(self, neighbor: NodeId) -> None:
         self._neighbors.pop(neighbor, None)
 
     def learn(self, fix: Fix, *, now_us: int) -> None:
-        """A location; the latest is kept."""
+        """Take in a location; the latest of each node is kept."""
         node = NodeId(fix.node)
         known = self._fixes.get(node)
         if fix.t_us <= now_us + _FUTURE_US and (known is None or fix.t_us > known.t_us):
@@ -41,19 +41,20 @@ class Places:
         return self._fixes.get(node)
 
     def use(self, destination: NodeId) -> None:
-        """The location of this destination is worth passing on."""
+        """Note that a destination is in use, so that its location is worth passing on."""
         self._used.pop(destination, None)
         self._used[destination] = None
         while len(self._used) > MOST_FIXES:
             del self._used[next(iter(self._used))]
 
-    def worth_telling(self) -> tuple[Fix, ...]:
+    def in_use(self) -> tuple[Fix, ...]:
         return tuple(self._fixes[node] for node in self._used if node in self._fixes)
 
-    def next_hop(self, destination: NodeId, *, at: Enu, barred: NodeId, now_ns: int) -> NodeId | None:
+    def next_hop(self, destination: NodeId, *, at: Enu, excluded: NodeId, now_ns: int) -> NodeId | None:
         """The destination if it is a neighbor, else the neighbor nearest to it, if that is nearer than `at`.
 
-        Never `barred`, who gave us the packet: two nodes that know different locations would play it back and forth.
+        It is never `excluded`, the node that handed the packet over: two nodes that know different locations would pass
+        the packet back and forth.
         """
         if destination in self._neighbors and self._neighbors[destination][1] > now_ns:
             return destination
@@ -64,7 +65,7 @@ class Places:
         for node in sorted(self._neighbors):
             position, ends_ns = self._neighbors[node]
             left_m = fix.position.minus(position).norm()
-            if ends_ns > now_ns and node != barred and left_m < best_m:
+            if ends_ns > now_ns and node != excluded and left_m < best_m:
                 best, best_m = node, left_m
         return best
 

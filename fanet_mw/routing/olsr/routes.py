@@ -1,0 +1,46 @@
+"""The routing table that an OLSR node computes (RFC 3626, 10), as a pure function."""
+
+from collections.abc import Mapping, Sequence
+from typing import NamedTuple
+
+from fanet_mw.routing.olsr.parameters import WILL_NEVER
+from fanet_mw.units import NodeId
+
+
+class Route(NamedTuple):
+    """An entry of the routing table."""
+
+    next_hop: NodeId
+    hops: int
+
+
+def routing_table(
+    node: NodeId,
+    neighbors: Mapping[NodeId, Sequence[NodeId]],
+    willingness: Mapping[NodeId, int],
+    topology: Sequence[tuple[NodeId, NodeId]],
+) -> dict[NodeId, Route]:
+    """The shortest known routes (10): to neighbors, to 2-hop neighbors, then over the topology set hop by hop.
+
+    `topology` holds pairs (last hop, destination). Of equally short routes the one over the lowest ids is taken.
+    """
+    routes = {neighbor: Route(neighbor, 1) for neighbor in sorted(neighbors)}
+    for neighbor in sorted(neighbors):
+        if willingness[neighbor] != WILL_NEVER:
+            for far in neighbors[neighbor]:
+                if far != node and far not in routes:
+                    routes[far] = Route(neighbor, 2)
+    onward: dict[NodeId, list[NodeId]] = {}
+    for last, destination in topology:
+        onward.setdefault(last, []).append(destination)
+    ring, hops = [far for far in routes if routes[far].hops == 2], 2
+    while ring:
+        hops += 1
+        wider: list[NodeId] = []
+        for last in sorted(ring):
+            for destination in onward.get(last, ()):
+                if destination != node and destination not in routes:
+                    routes[destination] = Route(routes[last].next_hop, hops)
+                    wider.append(destination)
+        ring = wider
+    return routes

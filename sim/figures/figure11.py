@@ -5,7 +5,7 @@ from collections.abc import Callable
 from itertools import accumulate
 from typing import Final
 
-from fanet_mw.bounds.outcome import Bounded
+from fanet_mw.bounds.delay_bound import Bounded
 from fanet_mw.bounds.paper import cluster_estimate
 from fanet_mw.units import MS, S
 from sim.figures.claims import Claim, Statement

@@ -39,6 +39,7 @@ def run(
             endpoint=endpoint,
             until_ns=scenario.duration_ns,
             zenoh_config=zenoh_config,
+            scenario=scenario,
             join_patience_s=join_patience_s,
         )
     )

@@ -77,7 +77,9 @@ class Topics:
         self.all_sensors = f"{self._base}/world/*/sensor/*"
         self.all_traces = f"{self._base}/trace/*"
         self.all_reports = f"{self._base}/report/*"
-        self.all_alive = f"{self._base}/alive/*"
+        self.all_alive = f"{self._base}/alive/**"
+        self.scenario = f"{self._base}/scenario"
+        """Asked, never put: the keeper of the clock answers with the scenario as JSON."""
 
     def radio_tx(self, node: int | str) -> str:
         return f"{self._base}/radio/{node}/tx"
@@ -103,9 +105,10 @@ class Topics:
     def report(self, name: str) -> str:
         return f"{self._base}/report/{name}"
 
-    def alive(self, name: str) -> str:
-        """The liveliness token of an actor's host."""
-        return f"{self._base}/alive/{name}"
+    def alive(self, name: str, *, fingerprint: str = "", instance: str = "") -> str:
+        """The liveliness token of an actor's host: which scenario it runs, and which of several of that name it is."""
+        rest = f"/{fingerprint}/{instance}" if fingerprint else ""
+        return f"{self._base}/alive/{name}{rest}"
 
 
 def node_of(topic: str) -> int:
@@ -424,6 +427,15 @@ _CODECS: Final[dict[int, tuple[type[Any], Callable[[Any], bytes], Callable[[byte
     22: (Inertial, _encode_inertial, _decode_inertial),
     23: (Battery, _encode_battery, _decode_battery),
 }
+HEADS: Final[dict[type[Any], tuple[struct.Struct, ...]]] = {
+    TxRequest: (_TX,), Reception: (_RX,), TxStatus: (_STATUS,), Poses: (_POSES,), Setpoint: (_SETPOINT,), Gps: (_GPS,),
+    WifiScan: (_SCAN, _HEARD), MavlinkTap: (_INSTANT,), TraceBatch: (), Clock: (_CLOCK,), Report: (_INSTANT,),
+    Degrade: (_DEGRADE,), Jam: (_JAM,), Cut: (_CUT,), Restore: (), LinkStats: (_LINKS,),
+    Obstructions: (_OBSTRUCTIONS,), Camera: (_SCAN, _PERSON), Voice: (_SCAN, _CALL), Radar: (_SCAN, _ECHO),
+    Altimeter: (_ALTIMETER,), Inertial: (_INERTIAL,), Battery: (_BATTERY,),
+}  # fmt: skip
+"""The structs of each kind: that of its head, and that of each row where rows of one kind follow."""
+CODES: Final = {kind: code for code, (kind, _, _) in _CODECS.items()}
 _CODE_OF: Final = {kind: (code, encode) for code, (kind, encode, _) in _CODECS.items()}
 _ITEM: Final = struct.Struct("<BI")
 MAX_ITEMS: Final = 16_384

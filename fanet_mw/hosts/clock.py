@@ -9,7 +9,7 @@ monotonic clock: it is as accurate as the agreement of the two machines' unix cl
 import asyncio
 import contextlib
 import math
-from collections.abc import Iterable, Sequence
+from collections.abc import Iterable
 from typing import Final
 
 from fanet_mw.bus import topics
@@ -17,7 +17,10 @@ from fanet_mw.bus.messages import Clock, ClockState
 from fanet_mw.bus.topics import Topics
 from fanet_mw.errors import BusError, MalformedFrameError
 from fanet_mw.hosts.bus import Bus, HostBus
+from fanet_mw.hosts.presence import Presence
 from fanet_mw.hosts.timebase import THIS_MACHINE, Timebase
+from fanet_mw.scenario import Scenario
+from fanet_mw.scenario.identity import as_json, fingerprint
 from fanet_mw.units import MS, S
 
 _START_DELAY_NS: Final = 300 * MS
@@ -52,11 +55,6 @@ class SwarmClock:
         return (instant_ns - self.now_ns()) / self._scale / S
 
 
-def few(names: Sequence[str]) -> str:
-    """The first five of the names, and how many more there are."""
-    return ", ".join(names[:5]) + (f" and {len(names) - 5} more" if len(names) > 5 else "")
-
-
 class ClockKeeper:
     """Starts the clock when all participants are present, answers those that come later, and stops it."""
 
@@ -67,19 +65,25 @@ class ClockKeeper:
         *,
         time_scale: float,
         expected: Iterable[str],
+        scenario: Scenario | None = None,
         timebase: Timebase = THIS_MACHINE,
     ) -> None:
+        """With a `scenario`, participants that run another one do not count as present, and are told which it is."""
         self._timebase = timebase
         self._bus = bus
         self._names = names
         self._time_scale = time_scale
-        self._missing = {names.alive(name): name for name in expected}
+        own = fingerprint(scenario) if scenario is not None else None
+        self.presence = Presence(names, expected, fingerprint=own)
         self._all_there = asyncio.Event()
-        if not self._missing:
+        if self.presence.complete():
             self._all_there.set()
         self.clock: Clock | None = None
         loop = asyncio.get_running_loop()
         bus.answer(names.clock, self._current)
+        if scenario is not None:
+            content = as_json(scenario).encode()
+            bus.answer(names.scenario, lambda: content)
 
         def on_change(topic: str, alive: bool) -> None:
             with contextlib.suppress(RuntimeError):  # the loop has been closed, so nothing waits for this any more
@@ -91,22 +95,23 @@ class ClockKeeper:
         return topics.encode([self.clock]) if self.clock else None
 
     def _seen(self, topic: str, alive: bool) -> None:
-        if alive:
-            self._missing.pop(topic, None)
-        if not self._missing:
+        self.presence.seen(topic, alive=alive)
+        if self.presence.complete():
             self._all_there.set()
+        else:
+            self._all_there.clear()
 
     def missing(self) -> list[str]:
         """The participants that are not present yet."""
-        return sorted(self._missing.values())
+        return self.presence.missing()
 
     async def start(self, *, timeout_s: float) -> Clock:
         """Wait for all participants, then start; raises BusError naming those that did not come."""
         try:
             await asyncio.wait_for(self._all_there.wait(), timeout_s)
         except TimeoutError:
-            names = self.missing()
-            raise BusError(f"{len(names)} of the swarm did not come up within {timeout_s:g} s: {few(names)}") from None
+            names, why = self.missing(), self.presence.sentence()
+            raise BusError(f"{len(names)} of the swarm did not come up within {timeout_s:g} s: {why}") from None
         unix_ns = self._timebase.unix_ns() + _START_DELAY_NS
         mono_ns = self._timebase.mono_ns() + _START_DELAY_NS
         self._publish(Clock(unix_ns, self._time_scale, ClockState.RUNNING, mono_ns, self._timebase.machine))

@@ -12,6 +12,7 @@ import asyncio
 import gc
 import json
 import resource
+import secrets
 from collections.abc import Callable
 from pathlib import Path
 from typing import Any, Final
@@ -20,11 +21,15 @@ from fanet_mw.actor import Actor
 from fanet_mw.bus import topics
 from fanet_mw.bus.messages import Message, Reception, Report, TraceBatch
 from fanet_mw.bus.topics import Topics
+from fanet_mw.errors import ConfigError
 from fanet_mw.hosts.bus import JOIN_PATIENCE_S, Bus, HostBus, config_of
 from fanet_mw.hosts.clock import START_PATIENCE_S, ClockListener, SwarmClock
 from fanet_mw.hosts.inbox import Inbox
 from fanet_mw.hosts.lateness import Histogram
+from fanet_mw.hosts.presence import few
 from fanet_mw.hosts.timebase import THIS_MACHINE, Timebase
+from fanet_mw.scenario import Scenario
+from fanet_mw.scenario.identity import as_json, differences, fingerprint
 from fanet_mw.trace import Record
 from fanet_mw.units import MS, S
 
@@ -33,6 +38,8 @@ _LOOK_EVERY_S: Final = 0.5
 _ON_ITS_WAY_S: Final = 0.1
 """How long the medium waits at the end for requests that are on the bus; nodes wait twice that for its last copies."""
 _LOOKS_PER_REPORT: Final = 2
+_SCENARIO_S: Final = 1.0
+"""How long a process waits to be told which scenario the swarm runs."""
 
 
 class RealtimeHost:
@@ -67,16 +74,24 @@ class RealtimeHost:
         self._puts = 0
 
     async def run(
-        self, *, until_ns: int, clock_timeout_s: float, on_epoch: Callable[[int], None] = lambda _: None
+        self,
+        *,
+        until_ns: int,
+        clock_timeout_s: float,
+        scenario: Scenario | None = None,
+        on_epoch: Callable[[int], None] = lambda _: None,
     ) -> None:
         """Declare, announce, wait for the clock, run, report. Raises BusError, and whatever the actor raises.
 
+        With a `scenario`, raises ConfigError when the keeper of the clock has another one for this swarm.
         `on_epoch` is called with the unix time [ns] of swarm instant 0 before the actor starts.
         """
         for expression in self._actor.subscriptions:
             self._bus.subscribe(expression, self._from_thread)
         listener = ClockListener(self._bus, self._names, self._timebase)
-        self._bus.announce(self._names.alive(self._actor.name))
+        await self._agree(scenario)
+        own = fingerprint(scenario) if scenario is not None else ""
+        self._bus.announce(self._names.alive(self._actor.name, fingerprint=own, instance=secrets.token_hex(4)))
         self._clock = await listener.running(timeout_s=clock_timeout_s)
         on_epoch(self._clock.epoch_unix_ns)
         await self._sleep_until(0)
@@ -93,6 +108,28 @@ class RealtimeHost:
             self._publish_records()  # they show what led to the failure
             raise
         await self._finish(until_ns)
+
+    async def _agree(self, scenario: Scenario | None) -> None:
+        """Ask the keeper which scenario the swarm runs; one that does not answer is content with any."""
+        if scenario is None:
+            return
+        answer: asyncio.Future[bytes] = self._loop.create_future()
+
+        def on_answer(_topic: str, payload: bytes) -> None:
+            if not self._loop.is_closed():
+                self._loop.call_soon_threadsafe(_settle, answer, payload)
+
+        self._bus.ask(self._names.scenario, on_answer)
+        try:
+            theirs = json.loads(await asyncio.wait_for(answer, _SCENARIO_S))
+        except (TimeoutError, ValueError, RecursionError):
+            return
+        if not isinstance(theirs, dict):
+            return
+        found = list(differences(json.loads(as_json(scenario)), theirs))
+        if found:
+            keys = few(f"{key} = {ours!r} here, {other!r} there" for key, ours, other in found)
+            raise ConfigError(f"{self._actor.name} runs another scenario than swarm {self._names.swarm}: {keys}")
 
     async def _sleep_until(self, instant_ns: int) -> None:
         assert self._clock is not None, "the clock is running"
@@ -261,6 +298,11 @@ class RealtimeHost:
         }
 
 
+def _settle(answer: "asyncio.Future[bytes]", payload: bytes) -> None:
+    if not answer.done():
+        answer.set_result(payload)
+
+
 def uss_mb() -> float | None:
     """The memory that this process shares with no other [MB]; None where /proc does not tell."""
     try:
@@ -278,6 +320,7 @@ async def run_actor(
     endpoint: str,
     until_ns: int,
     zenoh_config: Path | None = None,
+    scenario: Scenario | None = None,
     clock_timeout_s: float = START_PATIENCE_S,
     join_patience_s: float = JOIN_PATIENCE_S,
     on_epoch: Callable[[int], None] = lambda _: None,
@@ -285,8 +328,8 @@ async def run_actor(
 ) -> None:
     """Join a router, run one actor, leave; `zenoh_config` is a file, or a folder with one file for each actor.
 
-    Raises BusError, and ConfigError when the file cannot be used.
+    Raises BusError, and ConfigError when the file cannot be used, or the swarm runs another scenario than `scenario`.
     """
     with Bus.join(endpoint, config_of(zenoh_config, actor.name), patience_s=join_patience_s) as bus:
         host = RealtimeHost(actor, bus, Topics(swarm), timebase)
-        await host.run(until_ns=until_ns, clock_timeout_s=clock_timeout_s, on_epoch=on_epoch)
+        await host.run(until_ns=until_ns, clock_timeout_s=clock_timeout_s, scenario=scenario, on_epoch=on_epoch)

@@ -122,6 +122,7 @@ def launch(
     choice: Choice = Choice(),
     output: Output = Output(),
     respawn: Annotated[bool, Parameter(negative="")] = False,
+    no_world: Annotated[bool, Parameter(negative="")] = False,
     listen: str | None = None,
     connect: str | None = None,
     swarm: str | None = None,
@@ -135,6 +136,8 @@ def launch(
         A shipped scenario's name (see `fanet scenarios`) or a .toml file.
     respawn
         Start a process again when it dies.
+    no_world
+        Start no world: somebody else's process says where everyone is (see docs/reference/bus.md).
     listen
         Zenoh endpoint to serve on, for example tcp/127.0.0.1:7447; by default a free port of the loopback interface.
     connect
@@ -159,6 +162,7 @@ def launch(
                 listen=listen,
                 connect=connect,
                 respawn=respawn,
+                own_world=not no_world,
                 zenoh_config=zenoh_config,
                 emulator_options={"pcap": output.capture_path(), "receptions": output.pcap_receptions},
                 spool_folder=output.out,
@@ -197,9 +201,13 @@ def router(
     choice: Choice = Choice(),
     listen: str = "tcp/127.0.0.1:7447",
     swarm: str | None = None,
+    out: Path | None = None,
+    force: Annotated[bool, Parameter(negative="")] = False,
     zenoh_config: Path | None = None,
 ) -> int:
     """Serve the bus and keep the swarm clock, for services that are started one by one.
+
+    It says every five seconds who is missing, there twice, or runs another scenario.
 
     Parameters
     ----------
@@ -209,6 +217,10 @@ def router(
         Zenoh endpoint to serve on.
     swarm
         Name of the swarm on the bus; by default the scenario's name.
+    out
+        Folder for the result of the services, as `fanet launch --out` writes it.
+    force
+        Replace the result of another run in that folder.
     zenoh_config
         Zenoh's own configuration, JSON5 (TLS, access lists): a file, or a folder of `fanet keys`.
 
@@ -216,17 +228,21 @@ def router(
     from sim.run.router import serve
 
     chosen = choice.realtime_scenario(scenario)
+    Output(out=out, force=force).prepare()
     warn_of(listen, listens=True)
-    loop.run(
+    code: int = loop.run(
         serve(
             chosen,
             swarm=swarm or chosen.name,
             listen=listen,
+            out=out,
             zenoh_config=zenoh_config,
-            on_event=lambda text: _err.print(text),
+            on_event=lambda text: _err.print(text, highlight=False, soft_wrap=True, markup=False),
         )
     )
-    return 0
+    if out is not None:
+        report.show(json.loads((out / "summary.json").read_text(encoding="utf-8")), Console())
+    return code
 
 
 @app.command

@@ -39,8 +39,8 @@ def rights(scenario: Scenario, names: Topics) -> dict[str, Rights]:
         return Rights(
             puts=(*puts, names.trace(name), names.report(name)),
             subscribes=(*subscribes, names.clock),
-            queries=(names.clock,),
-            alive=(names.alive(name),),
+            queries=(names.clock, names.scenario),
+            alive=(f"{names.alive(name)}/**",),
         )
 
     def agent(node: int) -> Rights:
@@ -63,7 +63,7 @@ def rights(scenario: Scenario, names: Topics) -> dict[str, Rights]:
         OPERATOR: Rights(
             puts=(names.radio_control,),
             subscribes=(names.radio_links, names.all_traces, names.all_reports, names.mavlink("*")),
-            watches=(f"{ROOT}/*/alive/*",),
+            watches=(f"{ROOT}/*/alive/**",),
         ),
     }
 

@@ -35,10 +35,10 @@ def find_swarm(bus: Bus) -> str:
             found.append(topic.split("/")[1])
             came.set()
 
-    bus.watch(f"{ROOT}/*/alive/emulator", on_change)
+    bus.watch(f"{ROOT}/*/alive/emulator/**", on_change)
     if came.wait(_DISCOVER_S):
         time.sleep(0.1)  # other emulators may answer too
-    names = sorted(found)
+    names = sorted(set(found))
     if len(names) != 1:
         raise FanetError(f"{len(names)} swarms with an emulator on this router ({', '.join(names)}): say --swarm NAME")
     return names[0]

@@ -23,7 +23,7 @@ from fanet_mw.bus.topics import Topics
 from fanet_mw.errors import BusError
 from fanet_mw.hosts import interrupts
 from fanet_mw.hosts.bus import Bus, config_of
-from fanet_mw.hosts.clock import ClockKeeper, SwarmClock, few
+from fanet_mw.hosts.clock import ClockKeeper, SwarmClock
 from fanet_mw.hosts.service import BUS_EXIT_CODE
 from fanet_mw.scenario import Scenario
 from fanet_mw.trace import ProcessEnded, Record, kind_of
@@ -76,10 +76,13 @@ class SwarmRun:
         endpoint: str,
         respawn: bool,
         tell: Tell,
+        own_world: bool = True,
         spool_folder: Path | None = None,
         zenoh_config: Path | None = None,
     ) -> None:
         names = Topics(swarm)
+        self._own_world = own_world
+        """False when a foreign world tells where the UAVs are; no report of it is expected."""
         self.emulator_options: dict[str, Any] = {}
         """Additional arguments of the emulator's process."""
         self._scenario = scenario
@@ -90,7 +93,9 @@ class SwarmRun:
         self._tell = tell
         self._collector = Collector(scenario, bus.subscribe, names, now_ns=time.monotonic_ns, folder=spool_folder)
         self._recorder = FlightRecorder(scenario, bus.subscribe, names) if respawn else None
-        self._keeper = ClockKeeper(bus, names, time_scale=scenario.time_scale, expected=expected_names(scenario))
+        self._keeper = ClockKeeper(
+            bus, names, time_scale=scenario.time_scale, expected=expected_names(scenario), scenario=scenario
+        )
         self.processes = Processes(self._process_ended, title=f"fanet {swarm}")
         self._clock: SwarmClock | None = None
         self._over = asyncio.Event()
@@ -141,7 +146,7 @@ class SwarmRun:
             ready_s=ready_s,
             epoch_unix_ns=self._keeper.clock.epoch_unix_ns if self._keeper.clock else 0,
             heard=collector.figures(),
-            absent=collector.absent(),
+            absent={name: why for name, why in collector.absent().items() if self._own_world or name != "world"},
             stall_ms=self._stall_s * 1000,
         )
 
@@ -173,7 +178,8 @@ class SwarmRun:
             "zenoh_config": self._zenoh_config,
         }
         self.processes.start("emulator", run_emulator, {**common, **self.emulator_options})
-        self.processes.start("world", run_world, common)
+        if self._own_world:
+            self.processes.start("world", run_world, common)
         for node, position in zip(self._scenario.node_ids, positions(self._scenario), strict=True):
             arguments = {**common, "node": NodeId(node), "position": position}
             self.processes.start(f"agent-{node}", run_agent, arguments, nice=_AGENT_NICE)
@@ -192,8 +198,10 @@ class SwarmRun:
         start = asyncio.ensure_future(self._keeper.start(timeout_s=READY_TIMEOUT_S))
         over = asyncio.ensure_future(self._over.wait())
         while not await _any_done(start, over, timeout_s=WORD_EVERY_S):
-            missing = self._keeper.missing()
-            self._tell(f"waiting for {len(missing)} of {len(self.processes.names())} processes: {few(missing)}")
+            presence = self._keeper.presence
+            self._tell(
+                f"waiting for {len(presence.missing())} of {len(expected_names(self._scenario))}: {presence.sentence()}"
+            )
         over.cancel()
         if not start.done():
             start.cancel()
@@ -217,7 +225,7 @@ class SwarmRun:
         """End all processes, by the clock or by order, and wait for last reports."""
         self._over.set()
         await self._end_processes()
-        dead = {name for name, _ in self._ended}
+        dead = {name for name, _ in self._ended} | (set() if self._own_world else {"world"})
         end_s = time.monotonic() + _LAST_WORDS_S
         while self._collector.unfinished() - dead and time.monotonic() < end_s:  # noqa: ASYNC110  (other threads fill it)
             await asyncio.sleep(_LAST_WORDS_S / 20)
@@ -292,6 +300,7 @@ async def launch(
     listen: str | None = None,
     connect: str | None = None,
     respawn: bool = False,
+    own_world: bool = True,
     emulator_options: Mapping[str, Any] | None = None,
     spool_folder: Path | None = None,
     zenoh_config: Path | None = None,
@@ -301,6 +310,7 @@ async def launch(
 ) -> Outcome:
     """Run a scenario as real processes. `on_started` receives the swarm while it runs, for tests and tools.
 
+    Without `own_world` the swarm waits for a foreign world, which declares the liveliness token of `world`.
     `zenoh_config` is Zenoh's own configuration: a file for all processes, or a folder with one file for each. What is
     collected waits in temporary files in `spool_folder`, by default where the system keeps such files.
 
@@ -319,6 +329,7 @@ async def launch(
             swarm=swarm,
             endpoint=endpoint,
             respawn=respawn,
+            own_world=own_world,
             tell=on_event,
             spool_folder=spool_folder,
             zenoh_config=zenoh_config,

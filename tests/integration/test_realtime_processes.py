@@ -232,7 +232,7 @@ def wait_for(name: str, *, endpoint: str) -> None:
     """Until this service has announced itself to the router, within a minute."""
     there = threading.Event()
     with Bus.join(endpoint) as bus:
-        bus.watch(Topics("small").alive(name), lambda _, alive: there.set() if alive else None)
+        bus.watch(f"{Topics('small').alive(name)}/**", lambda _, alive: there.set() if alive else None)
         assert there.wait(60)
 
 

@@ -1,0 +1,101 @@
+"""The byte layout of every message on the bus, for the reference page: names for the fields of the codecs' structs.
+
+The structs are those that encode and decode (`topics.HEADS`); a struct of another length than its names is refused.
+"""
+
+import re
+import struct
+from collections.abc import Iterator
+from typing import Any, Final, NamedTuple
+
+from fanet_mw.bus import messages as m
+from fanet_mw.bus.link_stats import COUNTS, LOSSES, LinkStats
+from fanet_mw.bus.radio_control import Cut, Degrade, Jam, Restore
+from fanet_mw.bus.topics import CODES, HEADS
+
+TYPES: Final = {
+    "B": "uint8", "H": "uint16", "I": "uint32", "Q": "uint64", "q": "int64", "f": "float32", "d": "float64",
+}  # fmt: skip
+"""Names of the codes of `struct`."""
+
+
+class Named(NamedTuple):
+    """What the codecs do not say: names of the fields, and what follows them."""
+
+    topic: str
+    fields: str
+    """Of the head, in order."""
+    rest: str = ""
+    row: str = ""
+    """Fields of each row, where rows follow the head."""
+
+
+class Field(NamedTuple):
+    """One field of a struct."""
+
+    offset: int
+    kind: str
+    name: str
+
+
+_VECTOR: Final = "east_m north_m up_m"
+_MOVES: Final = "east_m_s north_m_s up_m_s"
+NAMED: Final[dict[type[Any], Named]] = {
+    m.TxRequest: Named("radio/<id>/tx", "seq start_ns dst wants_status", "the frame, MAVLink, to the end"),
+    m.Reception: Named("radio/<id>/rx", "src end_ns rssi_dbm", "the frame, MAVLink, to the end"),
+    m.TxStatus: Named("radio/<id>/rx", "seq outcome end_ns attempts"),
+    m.Poses: Named(
+        "world/pose", "t_ns count", f"`count` x uint16: ids, ascending; `count` x 6 float64: {_VECTOR} {_MOVES}",
+    ),
+    m.Obstructions: Named("world/obstruction", "t_ns count", "`count` x uint16: pairs of node ids, smaller first"),
+    m.Setpoint: Named("world/<id>/setpoint", f"t_ns {_VECTOR} speed_m_s kind {_MOVES}"),
+    m.Gps: Named("world/<id>/sensor/gps", f"t_ns {_VECTOR} {_MOVES}"),
+    m.WifiScan: Named("world/<id>/sensor/wifi", "t_ns count", row="survivor rssi_dbm"),
+    m.MavlinkTap: Named("mavlink/<id>", "t_ns", "MAVLink frames to the end"),
+    m.TraceBatch: Named("trace/<name>", "", "records, UTF-8: one JSON array per line"),
+    m.Clock: Named("clock", "epoch_unix_ns time_scale state epoch_mono_ns machine"),
+    m.Report: Named("report/<name>", "t_ns", "UTF-8: the name, a line feed, a JSON object"),
+    Degrade: Named("radio/control", "src dst both loss_db loss_share for_ns", "the label, UTF-8"),
+    Jam: Named("radio/control", f"{_VECTOR} radius_m noise_dbm for_ns", "the label, UTF-8"),
+    Cut: Named("radio/control", "node for_ns", "the label, UTF-8"),
+    Restore: Named("radio/control", "", "the label, UTF-8; empty: all faults"),
+    LinkStats: Named(
+        "radio/links", "t_ns span_ns count",
+        f"`count` x 2 uint16: source, destination; `count` x {COUNTS} uint32: received, then lost by "
+        f"{', '.join(LOSSES)}; `count` x int64: sum of RSSI [1/1000 dBm]",
+    ),
+    m.Camera: Named("world/<id>/sensor/camera", "t_ns count", row="bearing_rad elevation_rad pixels"),
+    m.Voice: Named("world/<id>/sensor/voice", "t_ns count", row="bearing_rad elevation_rad level_db snr_db"),
+    m.Radar: Named("world/<id>/sensor/radar", "t_ns count", row="range_m bearing_rad elevation_rad closing_m_s snr_db"),
+    m.Altimeter: Named("world/<id>/sensor/altimeter", "t_ns up_m above_ground_m"),
+    m.Inertial: Named("world/<id>/sensor/inertial", f"t_ns {_MOVES}"),
+    m.Battery: Named("world/<id>/sensor/battery", "t_ns voltage_v current_a charge"),
+}  # fmt: skip
+
+
+def kinds() -> list[type[Any]]:
+    """Every kind of message, by its code."""
+    return sorted(CODES, key=lambda kind: CODES[kind])
+
+
+def head(kind: type[Any]) -> list[Field]:
+    """The fields at the beginning of a body; empty when it has none of fixed size."""
+    structs = HEADS[kind]
+    return list(_fields(structs[0], NAMED[kind].fields)) if structs else []
+
+
+def row(kind: type[Any]) -> list[Field]:
+    """The fields of each row after the head; empty when no rows follow."""
+    structs = HEADS[kind]
+    return list(_fields(structs[1], NAMED[kind].row)) if len(structs) > 1 else []
+
+
+def _fields(layout: struct.Struct, names: str) -> Iterator[Field]:
+    codes = [code for count, code in re.findall(r"(\d*)([a-zA-Z])", layout.format) for _ in range(int(count or 1))]
+    found = names.split()
+    if len(found) != len(codes):
+        raise ValueError(f"{layout.format!r} has {len(codes)} fields, {len(found)} are named: {names}")
+    offset = 0
+    for code, name in zip(codes, found, strict=True):
+        yield Field(offset, TYPES[code], name)
+        offset += struct.calcsize(f"<{code}")

@@ -11,11 +11,10 @@ from emulator.capture_file import NAME as CAPTURE
 from emulator.capture_file import captures
 from fanet_mw.errors import ConfigError
 
-FILES: Final = (
-    "summary.json", "scenario.toml", "reports.json", "links.json", "trace.jsonl", "mavlink.tlog",
-    "report.html", "report.md",
-)  # fmt: skip
+FILES: Final = ("summary.json", "scenario.toml", "reports.json", "links.json", "trace.jsonl", "mavlink.tlog")
 """What a run writes, besides captures."""
+PAGES: Final = ("report.html", "report.md")
+"""What `--report` adds."""
 
 
 def prepare(out: Path, *, force: bool) -> None:
@@ -27,7 +26,9 @@ def prepare(out: Path, *, force: bool) -> None:
         out.mkdir(parents=True, exist_ok=True)
         with tempfile.TemporaryFile(dir=out) as file:
             file.write(b"a run would be lost")
-        used = [path for path in (*(out / name for name in FILES), *captures(out / CAPTURE)) if path.exists()]
+        used = [
+            path for path in (*(out / name for name in (*FILES, *PAGES)), *captures(out / CAPTURE)) if path.exists()
+        ]
         if used and not force:
             raise ConfigError(
                 f"--out {out}: holds the result of another run ({', '.join(path.name for path in used)}); "

@@ -10,7 +10,7 @@ import pytest
 from fanet_mw import tlog
 from fanet_mw.errors import ConfigError
 from sim.cli.app import app
-from sim.cli.out_folder import FILES, prepare
+from sim.cli.out_folder import FILES, PAGES, prepare
 
 SHORT = ("--set", "duration_s=1", "--set", "warmup_s=0", "--set", "drain_s=0", "--json")
 
@@ -63,7 +63,7 @@ def test_a_used_folder_is_refused_and_replaced_whole_with_force(
     assert (out / "notes.txt").read_text() == "mine"
 
 
-@pytest.mark.parametrize("name", [*FILES, "air.pcap", "air-2.pcap"])
+@pytest.mark.parametrize("name", [*FILES, *PAGES, "air.pcap", "air-2.pcap"])
 def test_one_file_of_another_run_is_enough_to_refuse(tmp_path: Path, name: str) -> None:
     (tmp_path / name).touch()
     with pytest.raises(ConfigError, match=name):

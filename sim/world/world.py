@@ -40,6 +40,8 @@ if TYPE_CHECKING:
 
 _STILL_NS: Final = S
 """How often a world in which nothing moves says so."""
+_WRECK_M: Final = 0.5
+"""Nobody flies so near to the ground or a wall."""
 _CONTROL_S: Final = 0.05
 """Guidance runs at least this often within a tick."""
 
@@ -96,6 +98,8 @@ class World(Actor):
         self._suite = Suite(scenario, sensors_of(scenario, survivors, solids, self._energy), topics)
         self._flies = np.ones(self._count, bool)
         """Which UAVs have not crashed."""
+        if flight is not None and scenario.world.crash == "falls":
+            self._find_wrecks(solids)
         self._tick_ns: int | None = None
         self._last_ns = 0
         self._ticks = 0
@@ -188,6 +192,14 @@ class World(Actor):
                 self._crash(row + 1, radio_dies=True)
         for first, second in engine.contacts():
             self._contact(first, second, now_ns)
+
+    def _find_wrecks(self, solids: Solids) -> None:
+        """In a world that goes on: who lies on the ground and was not told to is a wreck."""
+        at = self._engine.positions()
+        for row in np.flatnonzero(solids.gap_m(at) <= _WRECK_M).tolist():
+            if not self._guidance.may_touch_down(row + 1):
+                self._flies[row] = False
+                self._engine.fall(row)
 
     def _contact(self, first: int, second: int, now_ns: int) -> None:
         """Two bodies touch, of which the ground and obstacles are 0: a landing, a wreck, or a collision."""

@@ -12,6 +12,7 @@ from fanet_mw.bus.topics import Topics
 from fanet_mw.scenario import Scenario
 from fanet_mw.trace import Collided
 from fanet_mw.units import Enu, S
+from sim.world.flight import Flight as FlightState
 from sim.world.world import World
 
 MakeScenario = Callable[..., Scenario]
@@ -124,6 +125,14 @@ def test_a_wreck_falls_its_radio_goes_and_it_senses_nothing_more(make_scenario: 
     flying.ask(1, SetpointKind.TAKEOFF, Enu(0.0, 0.0, 30.0))
     flying.fly(10)
     assert flying.at(1)[2] == pytest.approx(0, abs=0.3), "a wreck does not take off"
+
+
+def test_a_world_that_goes_on_knows_its_wrecks(make_scenario: MakeScenario) -> None:
+    keys = {"nodes.count": 3, "mobility.model": "onboard", "world.crash": "falls", "world.area_m": 1000}
+    at = np.array([[0.0, 0, 0.1], [50, 0, 0.1], [100, 0, 50]])
+    landed = Setpoint(0, STILL, 1.0, SetpointKind.LAND)
+    world = World(make_scenario(**keys), "m", flight=FlightState(at, np.zeros((3, 3)), {2: landed}))
+    assert world.report()["crashed"] == 1, "the first; the second has landed, the third flies"
 
 
 def test_the_radio_of_a_wreck_may_survive(make_scenario: MakeScenario) -> None:

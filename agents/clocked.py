@@ -8,14 +8,15 @@ added to hellos here, so that protocols know nothing of clocks. A clock that tur
 until swarm time has caught up. Until a node has swarm time no schedule reaches it: it owns no slot, and contends.
 """
 
-from collections.abc import Mapping
+from collections.abc import Mapping, Sequence
 from typing import Any, Final
 
 from agents.local_clock import LocalClock
 from agents.swarm_time import BeaconTime, swarm_time
-from agents.uav import Uav
+from agents.uav import NodeState, Uav
 from fanet_mw import wire
 from fanet_mw.actor import Actor
+from fanet_mw.application import Application
 from fanet_mw.bus.messages import (
     Altimeter,
     Battery,
@@ -50,8 +51,16 @@ _HELLOS: Final = 8
 class ClockedUav(Actor):
     """One UAV behind a clock of its own."""
 
-    def __init__(self, scenario: Scenario, node: NodeId, swarm: str, *, position: Enu) -> None:
-        self._uav = Uav(scenario, node, swarm, position=position)
+    def __init__(
+        self,
+        scenario: Scenario,
+        node: NodeId,
+        swarm: str,
+        *,
+        position: Enu,
+        applications: Sequence[Application] = (),
+    ) -> None:
+        self._uav = Uav(scenario, node, swarm, position=position, applications=applications)
         super().__init__(self._uav.name, self._uav.subscriptions)
         self._node = node
         self._tx_topic = Topics(swarm).radio_tx(node)
@@ -97,6 +106,15 @@ class ClockedUav(Actor):
             self._shown_ns = max(shown_ns, wanted_ns)
             self._uav.wake(self._shown_ns)
         self._hand_over(now_ns)
+
+    def nudge(self, now_ns: int) -> None:
+        self._clock.pass_time(now_ns, until_ns=self._until_ns)
+        self._uav.nudge(self._now(now_ns))
+        self._hand_over(now_ns)
+
+    def state(self, now_ns: int) -> NodeState:
+        """What the node knows of the network."""
+        return self._uav.state(self._now(now_ns))
 
     def next_wake_ns(self) -> int | None:
         wanted_ns = self._uav.next_wake_ns()
@@ -217,7 +235,9 @@ class ClockedUav(Actor):
         self._uav.know_clock_error(self._time.worst_ns(local_ns))
 
 
-def make_uav(scenario: Scenario, node: NodeId, swarm: str, *, position: Enu) -> Actor:
-    """A UAV as the scenario wants it: with its host's clock, or with a clock of its own."""
+def make_uav(
+    scenario: Scenario, node: NodeId, swarm: str, *, position: Enu, applications: Sequence[Application] = ()
+) -> Uav | ClockedUav:
+    """A UAV as the scenario has it, with its host's clock or with one of its own, and with a user's applications."""
     kind = ClockedUav if scenario.clock.modelled else Uav
-    return kind(scenario, node, swarm, position=position)
+    return kind(scenario, node, swarm, position=position, applications=applications)

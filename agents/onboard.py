@@ -12,6 +12,7 @@ from typing import Any, Final
 from agents.messenger import Messenger
 from fanet_mw import wire
 from fanet_mw.application import (
+    ANY,
     Application,
     Course,
     Data,
@@ -67,6 +68,8 @@ class Onboard:
         self._listeners: dict[int, list[Application]] = {}
         """By MAVLink message."""
         self._at_port: dict[int, list[Application]] = {}
+        self._to_all = [application for application in applications if application.listens == ANY]
+        self._at_all = [application for application in applications if application.ports == ANY]
         for application in applications:
             for message in application.listens:
                 self._listeners.setdefault(message, []).append(application)
@@ -88,7 +91,9 @@ class Onboard:
         return bool(self._on_hello)
 
     def _listening(self, port: int, message: int) -> Sequence[Application]:
-        return self._at_port.get(port, ()) if port else self._listeners.get(message, ())
+        if port:
+            return [*self._at_port.get(port, ()), *self._at_all]
+        return [*self._listeners.get(message, ()), *self._to_all]
 
     def start(self, now_ns: int) -> None:
         self._call(now_ns)
@@ -121,7 +126,9 @@ class Onboard:
             self._call(now_ns)
             return
         listeners = self._listeners.get(message_id)
-        if listeners is None:
+        if self._to_all and message_id != wire.CHUNK.msgid:
+            listeners = [*(listeners or ()), *self._to_all]
+        if not listeners:
             return
         self._call(now_ns)
         header = packet.header

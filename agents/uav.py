@@ -5,7 +5,7 @@ tap. Everything that decides is in the parts; this file only says what goes wher
 """
 
 from collections.abc import Mapping, Sequence
-from typing import Any, Final
+from typing import Any, Final, NamedTuple
 
 from agents.autopilot import Autopilot
 from agents.avoidance import CollisionAvoidance
@@ -27,8 +27,19 @@ from fanet_mw.units import Enu, NodeId, earliest, seconds_to_ns
 
 _HELLO_JITTER: Final = 0.1
 """A hello varies by this share of its interval, so that neighbors in step do not stay so (RFC 3626, 3.4)."""
+_LIFETIME_HELLOS: Final = 4
+"""A node that has not been heard for so many hello intervals is no neighbor any more."""
 _BUILT_IN: Final = ("traffic", "report", "warning", "telemetry")
 """Applications whose counters stand among the UAV's own in its report."""
+
+
+class NodeState(NamedTuple):
+    """What a node knows of the network it is in."""
+
+    neighbors: tuple[NodeId, ...]
+    bound_ns: int | None
+    clusters: Mapping[NodeId, tuple[NodeId, ...]]
+    """By head, the nodes of each cluster, the head first, as far as the node knows."""
 
 
 class Uav(Actor):
@@ -69,6 +80,8 @@ class Uav(Actor):
         self._next_hello_ns: int | None = None
         self._own_wake_ns: int | None = None
         """When an application or a hello is due; changes whenever an application has been called."""
+        self._heard_ns: dict[NodeId, int] = {}
+        """When a hello of each other node was heard last."""
         self._malformed = 0
         self._heard_late = 0
         """Receptions that were handed over too late."""
@@ -92,8 +105,10 @@ class Uav(Actor):
             if node.hear(message, now_ns):
                 return True  # a copy, and nothing came of it, as of most
             onboard = self._onboard
-            if onboard.hears_hellos and wire.peek_kind(message.frame) == wire.Kind.HELLO:
-                onboard.hello(message.frame, now_ns)
+            if wire.peek_kind(message.frame) == wire.Kind.HELLO:
+                self._heard_ns[message.src] = now_ns
+                if onboard.hears_hellos:
+                    onboard.hello(message.frame, now_ns)
             return not self._settle(now_ns) and node.timeless
         if isinstance(message, TxStatus):
             self._node.status(message, now_ns=now_ns)
@@ -115,9 +130,19 @@ class Uav(Actor):
         self._say_hello(now_ns)
         self._settle(now_ns)
 
+    def nudge(self, now_ns: int) -> None:
+        self._onboard.wake(now_ns)
+        self._settle(now_ns)
+
     def next_wake_ns(self) -> int | None:
         own_ns, node_ns = self._own_wake_ns, self._node.next_wake_ns()
         return own_ns if node_ns is None or (own_ns is not None and own_ns < node_ns) else node_ns
+
+    def state(self, now_ns: int) -> NodeState:
+        """What the node knows of the network."""
+        lifetime_ns = _LIFETIME_HELLOS * self._hello_ns
+        self._heard_ns = {node: t_ns for node, t_ns in self._heard_ns.items() if now_ns - t_ns <= lifetime_ns}
+        return NodeState(tuple(sorted(self._heard_ns)), self._node.bound_ns(), self._node.clusters())
 
     def know_clock_error(self, error_ns: int) -> None:
         """The greatest error of any clock in the swarm, as far as this node has heard; 0: they are exact."""

@@ -1,3 +1,70 @@
-"""fanet-mw: real-time middleware for swarms of UAVs. The sans-IO core, its hosts and its radios."""
+"""fanet-mw: real-time middleware for swarms of UAVs.
+
+What `__all__` names, here and in `fanet_mw.testing`, is the public interface: it changes only with a new minor version,
+and the changelog says how (docs/reference/api.md). Everything else is private. Names are loaded when they are first
+used: `import fanet_mw` costs nothing, and what needs numpy says so when it is asked for.
+"""
+
+from importlib import import_module
+from typing import TYPE_CHECKING, Any, Final
+
+if TYPE_CHECKING:
+    from agents.joined import Emulated, Message, Node, NodeClosedError, OnAir, Sent, join
+    from fanet_mw.application import (
+        ANY,
+        HOME,
+        Application,
+        AppPort,
+        Course,
+        Data,
+        Fate,
+        Received,
+        SensorReading,
+        Status,
+    )
+    from fanet_mw.bus.messages import Gps, WifiScan
+    from fanet_mw.errors import BusError, ConfigError, DropReason, FanetError, MalformedFrameError
+    from fanet_mw.scenario import Scenario
+    from fanet_mw.scenario.config import load as load_scenario
+    from fanet_mw.units import BROADCAST, Enu, NodeId
+    from sim.run.api import Launched, VirtualSwarm, launch, simulate
+    from sim.run.result import Result
 
 __version__ = "0.1.0"
+
+_HOMES: Final = {
+    "agents.joined": ("Emulated", "Message", "Node", "NodeClosedError", "OnAir", "Sent", "join"),
+    "fanet_mw.application": (
+        "ANY", "HOME", "AppPort", "Application", "Course", "Data", "Fate", "Received", "SensorReading", "Status",
+    ),
+    "fanet_mw.bus.messages": ("Gps", "WifiScan"),
+    "fanet_mw.errors": ("BusError", "ConfigError", "DropReason", "FanetError", "MalformedFrameError"),
+    "fanet_mw.scenario": ("Scenario",),
+    "fanet_mw.units": ("BROADCAST", "Enu", "NodeId"),
+    "sim.run.api": ("Launched", "VirtualSwarm", "launch", "simulate"),
+    "sim.run.result": ("Result",),
+}  # fmt: skip
+"""Where each name is at home. The packages above this one are named here and imported by nothing else in it."""
+_HOME_OF: Final = {name: module for module, names in _HOMES.items() for name in names}
+
+__all__ = [
+    "ANY", "AppPort", "Application", "BROADCAST", "BusError", "ConfigError", "Course", "Data", "DropReason", "Emulated",
+    "Enu", "FanetError", "Fate", "Gps", "HOME", "Launched", "MalformedFrameError", "Message", "Node", "NodeClosedError",
+    "NodeId", "OnAir", "Received", "Result", "Scenario", "SensorReading", "Sent", "Status", "VirtualSwarm", "WifiScan",
+    "__version__", "join", "launch", "load_scenario", "simulate",
+]  # fmt: skip
+
+
+def __getattr__(name: str) -> Any:  # noqa: ANN401  (whatever the name stands for)
+    if name == "load_scenario":
+        value = import_module("fanet_mw.scenario.config").load
+    elif name in _HOME_OF:
+        value = getattr(import_module(_HOME_OF[name]), name)
+    else:
+        raise AttributeError(f"module 'fanet_mw' has no attribute {name!r}")
+    globals()[name] = value
+    return value
+
+
+def __dir__() -> list[str]:
+    return sorted(__all__)

@@ -5,6 +5,7 @@ An actor never sleeps, reads a clock, opens a socket or starts a thread. A host 
     start(now)  once, before anything else
     receive(topic, message, now)  for every message on a subscribed topic
     wake(now)   at or after the instant that `next_wake_ns()` named, whichever host runs it
+    nudge(now)  at any instant, when somebody outside has given a part of it something to do
     stop(now)   once, last; then `report()` says how it went
 
 After every call, or after several at one instant, the host takes all of `outbox` and `records`, and asks
@@ -51,6 +52,9 @@ class Actor(ABC):
     @abstractmethod
     def next_wake_ns(self) -> int | None:
         """The instant of the next `wake` that is wanted, or None. An instant in the past means at once."""
+
+    def nudge(self, now_ns: int) -> None:  # noqa: B027  (most actors have no part that is used from outside)
+        """Code outside of the actor has given one of its parts something to do, and it should look now."""
 
     def stop(self, now_ns: int) -> None:  # noqa: B027  (most actors have nothing to do here)
         """The run is over: count what is still in flight."""

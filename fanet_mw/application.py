@@ -25,6 +25,8 @@ from fanet_mw.trace import Record
 from fanet_mw.units import BROADCAST, Enu, NodeId
 from fanet_mw.wire import HEADER_BYTES, PRIORITY_BULK
 
+ANY: Final[Collection[int]] = (-1,)
+"""In place of ids or ports: all of them, but for load whose content does not matter."""
 HOME: Final = 0.0
 """The speed of a course that sends a UAV back to its formation."""
 

@@ -287,6 +287,14 @@ class Encoder:
         )
 
 
+def packed(message: object, node: NodeId) -> bytes:
+    """A message of pymavlink as the frame of a node; raises LocalProtocolError for anything else."""
+    pack = getattr(message, "pack", None)
+    if pack is None:
+        raise LocalProtocolError(f"{type(message).__name__} is no MAVLink message of pymavlink")
+    return bytes(pack(common.MAVLink(None, srcSystem=system_id(node), srcComponent=COMPONENT)))
+
+
 def _boot_ms(now_ns: int) -> int:
     """MAVLink's 32 bits of milliseconds since boot, counted from the swarm's epoch; they wrap after 49 days."""
     return now_ns // MS & 0xFFFF_FFFF

@@ -8,6 +8,9 @@ from hypothesis import Phase, settings
 
 from fanet_mw.scenario import Scenario, config
 
+pytest_plugins = ["fanet_mw.testing.plugin"]
+"""The fixtures that we ship: found by itself only where the package is installed anew."""
+
 settings.register_profile(
     "default", deadline=None, max_examples=60
 )  # first calls compile; timing belongs in benchmarks

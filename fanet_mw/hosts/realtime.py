@@ -131,6 +131,21 @@ class RealtimeHost:
             keys = few(f"{key} = {ours!r} here, {other!r} there" for key, ours, other in found)
             raise ConfigError(f"{self._actor.name} runs another scenario than swarm {self._names.swarm}: {keys}")
 
+    @property
+    def running(self) -> bool:
+        """Whether the actor has been started, and is still called."""
+        return self._running
+
+    def nudge(self) -> None:
+        """Let the actor look now at what was given to it from outside, on this thread; nothing before it runs."""
+        if self._running:
+            self._guard(self._nudge_actor)
+
+    def _nudge_actor(self) -> None:
+        self._call_ns = self.now_ns()
+        self._actor.nudge(self._call_ns)
+        self._publish_and_arm()
+
     async def _sleep_until(self, instant_ns: int) -> None:
         assert self._clock is not None, "the clock is running"
         wait_s = self._clock.wait_s(instant_ns)

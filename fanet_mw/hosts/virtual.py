@@ -111,6 +111,16 @@ class VirtualHost:
         self.now_ns = max(self.now_ns, until_ns)
         self._hand_over()
 
+    def put(self, topic: str, message: Message) -> None:
+        """Publish a message from outside now; between two calls of `run`."""
+        self._queue.append((topic, message))
+        self._flush({})
+
+    def nudge(self, actor: Actor) -> None:
+        """Let an actor look now at what was given to it from outside; between two calls of `run`."""
+        actor.nudge(self.now_ns)
+        self._flush({self._actors.index(actor): None})
+
     def stop(self) -> None:
         """Stop every actor, in order, and hand over its last records."""
         for actor in self._actors:

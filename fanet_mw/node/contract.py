@@ -123,6 +123,10 @@ class RoutingProtocol(ABC):
         """Within which delay everyone has the next packet of this node; None: no bound is stated."""
         return None
 
+    def clusters(self) -> Mapping[NodeId, tuple[NodeId, ...]]:
+        """By head, the nodes of each cluster, the head first, as far as this node knows; empty: there are none."""
+        return {}
+
     def least_interval_ns(self, deadline_ns: int) -> int | None:
         """The least interval between packets of this node at which everyone has each within this delay; None: unknown,
         or there is none.

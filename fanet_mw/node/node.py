@@ -226,6 +226,10 @@ class Node:
         """Within which delay everyone has the next packet of this node; None: the protocol states none."""
         return self._protocol.bound_ns()
 
+    def clusters(self) -> Mapping[NodeId, tuple[NodeId, ...]]:
+        """By head, the nodes of each cluster, as far as this node knows."""
+        return self._protocol.clusters()
+
     def least_interval_ns(self, deadline_ns: int) -> int | None:
         """The least interval between packets of this node that meets a deadline; None: unknown, or there is none."""
         return self._protocol.least_interval_ns(deadline_ns)

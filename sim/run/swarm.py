@@ -12,7 +12,7 @@ import signal
 import socket
 import time
 from collections import Counter
-from collections.abc import Callable, Mapping
+from collections.abc import Callable, Collection, Mapping
 from pathlib import Path
 from typing import Any, Final
 
@@ -79,6 +79,7 @@ class SwarmRun:
         own_world: bool = True,
         spool_folder: Path | None = None,
         zenoh_config: Path | None = None,
+        leave_out: Collection[int] = (),
     ) -> None:
         names = Topics(swarm)
         self._own_world = own_world
@@ -86,8 +87,10 @@ class SwarmRun:
         self.emulator_options: dict[str, Any] = {}
         """Additional arguments of the emulator's process."""
         self._scenario = scenario
-        self._swarm = swarm
-        self._endpoint = endpoint
+        self._leave_out = frozenset(leave_out)
+        """Nodes whose processes somebody else starts."""
+        self.name = swarm
+        self.endpoint = endpoint
         self._zenoh_config = zenoh_config
         self._respawn = respawn
         self._tell = tell
@@ -172,8 +175,8 @@ class SwarmRun:
         self._check_not_over()
         common = {
             "scenario": self._scenario,
-            "swarm": self._swarm,
-            "endpoint": self._endpoint,
+            "swarm": self.name,
+            "endpoint": self.endpoint,
             "join_patience_s": READY_TIMEOUT_S,
             "zenoh_config": self._zenoh_config,
         }
@@ -181,6 +184,8 @@ class SwarmRun:
         if self._own_world:
             self.processes.start("world", run_world, common)
         for node, position in zip(self._scenario.node_ids, positions(self._scenario), strict=True):
+            if node in self._leave_out:
+                continue
             arguments = {**common, "node": NodeId(node), "position": position}
             self.processes.start(f"agent-{node}", run_agent, arguments, nice=_AGENT_NICE)
             await asyncio.sleep(0)  # signals are handled between two of many processes
@@ -240,7 +245,7 @@ class SwarmRun:
                 self._tell(f"{len(late)} processes did not end by themselves: {', '.join(late[:5])}")
 
     def _process_ended(self, name: str, exit_code: int) -> None:
-        if self._ending or (exit_code == 0 and (self._over.is_set() or self._time_is_over())):
+        if self._ending or (exit_code == 0 and (self._over.is_set() or self.time_is_over())):
             return
         waits = self._clock is None and not self._over.is_set()
         if waits and exit_code == BUS_EXIT_CODE and self._late_starts[name] < _MAX_LATE_STARTS:
@@ -274,7 +279,7 @@ class SwarmRun:
         """The swarm instant, limited to the swarm's time."""
         return min(max(0, self._clock.now_ns()), self._scenario.duration_ns) if self._clock else 0
 
-    def _time_is_over(self) -> bool:
+    def time_is_over(self) -> bool:
         return self._clock is not None and self._clock.wait_s(self._scenario.duration_ns) <= 0.05
 
 
@@ -307,9 +312,12 @@ async def launch(
     on_progress: Callable[[float], None] = lambda _: None,
     on_event: Tell = lambda _: None,
     on_started: Callable[[SwarmRun], None] = lambda _: None,
+    leave_out: Collection[int] = (),
+    heed_signals: bool = True,
 ) -> Outcome:
     """Run a scenario as real processes. `on_started` receives the swarm while it runs, for tests and tools.
 
+    The nodes of `leave_out` are waited for and not started: a program of the user's own joins in their place.
     Without `own_world` the swarm waits for a foreign world, which declares the liveliness token of `world`.
     `zenoh_config` is Zenoh's own configuration: a file for all processes, or a folder with one file for each. What is
     collected waits in temporary files in `spool_folder`, by default where the system keeps such files.
@@ -333,14 +341,16 @@ async def launch(
             tell=on_event,
             spool_folder=spool_folder,
             zenoh_config=zenoh_config,
+            leave_out=leave_out,
         )
         run.emulator_options.update(emulator_options or {})
         loop = asyncio.get_running_loop()
-        for number in interrupts.SIGNALS:
+        signals = interrupts.SIGNALS if heed_signals else ()
+        for number in signals:
             loop.add_signal_handler(number, run.interrupt, number)
         on_started(run)
         try:
             return await run.run(on_progress)
         finally:
-            for number in interrupts.SIGNALS:
+            for number in signals:
                 loop.remove_signal_handler(number)

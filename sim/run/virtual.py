@@ -11,6 +11,7 @@ from agents.clocked import make_uav
 from emulator.medium import Medium
 from emulator.pcap import Capture
 from fanet_mw.actor import Actor
+from fanet_mw.application import Application
 from fanet_mw.bus.link_stats import LinkStats
 from fanet_mw.bus.messages import MavlinkTap, Message
 from fanet_mw.bus.topics import Topics
@@ -27,14 +28,31 @@ from sim.world.world import World
 EPOCH_UNIX_NS: Final = 1_735_689_600 * S
 """2025-01-01T00:00:00Z, the instant of swarm instant 0 in logs that want unix time. It is not the time of the run, so
 that the same scenario and seed give the same files; and it is not 1970, which some tools take for no time at all."""
+Applications = Callable[[int], Sequence[Application]]
+"""The applications of a user for each node."""
+
+
+def no_applications(_: int) -> Sequence[Application]:
+    return ()
+
+
 _STEP_NS: Final = 100 * MS
 """The time between two checks for signals. How a run is divided into steps changes nothing in it."""
 
 
-def actors_of(scenario: Scenario, swarm: str, *, capture: Capture | None = None) -> list[Actor]:
-    """All actors of a swarm: the world first, so that there are poses before any node transmits."""
+def actors_of(
+    scenario: Scenario,
+    swarm: str,
+    *,
+    capture: Capture | None = None,
+    applications: Applications = no_applications,
+) -> list[Actor]:
+    """Every actor of a swarm: the world first, so that poses stand before anyone transmits."""
     starts = positions(scenario)
-    uavs = [make_uav(scenario, NodeId(node), swarm, position=starts[node - 1]) for node in scenario.node_ids]
+    uavs = [
+        make_uav(scenario, NodeId(n), swarm, position=starts[n - 1], applications=applications(n))
+        for n in scenario.node_ids
+    ]
     return [World(scenario, swarm), Medium(scenario, swarm, capture=capture), *uavs]
 
 
@@ -44,46 +62,63 @@ def simulate(
     on_progress: Callable[[float], None] = lambda _: None,
     capture: Capture | None = None,
     signals: Sequence[int] = (),
+    applications: Applications = no_applications,
 ) -> Outcome:
     """Run a scenario to its end, or until `signals` holds a signal's number: then the outcome is what there is so far.
 
-    `on_progress` receives the simulated seconds that have passed. Raises KeyboardInterrupt with the signal's number
-    when the signal comes before anything has been simulated.
+    `applications` gives those of the user for each node, beside what the scenario asks for. `on_progress` is told the
+    simulated seconds that have passed. Raises KeyboardInterrupt with the signal's number when that comes before
+    anything has been simulated.
     """
-    swarm = scenario.name
-    records: list[Record] = []
-    taps: list[tuple[int, bytes]] = []
-
-    def tap(_: str, message: Message) -> None:
-        if isinstance(message, MavlinkTap):
-            taps.append((message.t_ns, message.data))
-
-    links = LinkTotals()
-
-    def add_links(_: str, message: Message) -> None:
-        if isinstance(message, LinkStats):
-            links.add(message)
-
-    actors = actors_of(scenario, swarm, capture=capture)
-    names = Topics(swarm)
-    listeners = [(names.mavlink("*"), tap), (names.radio_links, add_links)]
-    host = VirtualHost(actors, on_records=records.extend, listeners=listeners)
+    observed = Observed(scenario, capture=capture, applications=applications)
     began = time.perf_counter()
     with _no_collector():
-        _run(host, scenario, on_progress, signals)
-    interrupted = host.now_ns < scenario.duration_ns
-    return Outcome(
-        scenario=scenario,
-        mode="virtual",
-        wall_s=time.perf_counter() - began,
-        records=true_delays(records) if scenario.clock.modelled else records,
-        reports={actor.name: actor.report() for actor in actors},
-        taps=taps,
-        links=links,
-        epoch_unix_ns=EPOCH_UNIX_NS,
-        aborted=f"interrupted by {Signals(signals[0]).name}" if interrupted else None,
-        ended_ns=host.now_ns if interrupted else None,
-    )
+        _run(observed.host, scenario, on_progress, signals)
+    interrupted = f"interrupted by {Signals(signals[0]).name}" if signals else ""
+    return observed.outcome(wall_s=time.perf_counter() - began, cut_short=interrupted)
+
+
+class Observed:
+    """The actors of a scenario on their host, and what is heard of them."""
+
+    def __init__(
+        self, scenario: Scenario, *, capture: Capture | None = None, applications: Applications = no_applications
+    ) -> None:
+        self.scenario = scenario
+        self.records: list[Record] = []
+        self.names = Topics(scenario.name)
+        self._taps: list[tuple[int, bytes]] = []
+        self._links = LinkTotals()
+        self.actors = actors_of(scenario, scenario.name, capture=capture, applications=applications)
+        self.host = VirtualHost(
+            self.actors,
+            on_records=self.records.extend,
+            listeners=[(self.names.mavlink("*"), self._tap), (self.names.radio_links, self._add_links)],
+        )
+
+    def _tap(self, _: str, message: Message) -> None:
+        if isinstance(message, MavlinkTap):
+            self._taps.append((message.t_ns, message.data))
+
+    def _add_links(self, _: str, message: Message) -> None:
+        if isinstance(message, LinkStats):
+            self._links.add(message)
+
+    def outcome(self, *, wall_s: float, cut_short: str) -> Outcome:
+        """What there is, once the host has been stopped; `cut_short`: why, if that was before the scenario's end."""
+        cut = self.host.now_ns < self.scenario.duration_ns
+        return Outcome(
+            scenario=self.scenario,
+            mode="virtual",
+            wall_s=wall_s,
+            records=true_delays(self.records) if self.scenario.clock.modelled else self.records,
+            reports={actor.name: actor.report() for actor in self.actors},
+            taps=self._taps,
+            links=self._links,
+            epoch_unix_ns=EPOCH_UNIX_NS,
+            aborted=cut_short if cut else None,
+            ended_ns=self.host.now_ns if cut else None,
+        )
 
 
 def _run(host: VirtualHost, scenario: Scenario, on_progress: Callable[[float], None], signals: Sequence[int]) -> None:

@@ -23,7 +23,7 @@ from fanet_mw.routing.clustered.forwarding.gradient import Gradient
 from fanet_mw.routing.clustered.forwarding.repair import Repair
 from fanet_mw.routing.clustered.forwarding.uplink import MOST_TRIES, Uplink
 from fanet_mw.routing.clustered.timetable.promises import Promises
-from fanet_mw.units import BROADCAST, US, earliest
+from fanet_mw.units import BROADCAST, US, NodeId, earliest
 from fanet_mw.wire import FLAG_FLOOD, FLAG_TO_HEAD, HEADER_BYTES, Kind
 from fanet_mw.wire.claims import MESSAGE_BYTES, Claims
 from fanet_mw.wire.digest import Digest, capacity
@@ -95,6 +95,9 @@ class Clustered(RoutingProtocol):
 
     def bound_ns(self) -> int | None:
         return None if self.parts.promises is None else self.parts.promises.bound_ns()
+
+    def clusters(self) -> Mapping[NodeId, tuple[NodeId, ...]]:
+        return self.parts.roles.clusters()
 
     def least_interval_ns(self, deadline_ns: int) -> int | None:
         return None if self.parts.promises is None else self.parts.promises.least_interval_ns(deadline_ns)

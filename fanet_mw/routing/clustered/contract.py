@@ -61,6 +61,9 @@ class Roles(Protocol):
 
     def wake(self, now_ns: int) -> None: ...
 
+    def clusters(self) -> Mapping[NodeId, tuple[NodeId, ...]]:
+        """By head, the nodes of each cluster, the head first, as far as the node knows."""
+
     def report(self) -> Mapping[str, object]:
         """JSON-able state."""
 

@@ -62,5 +62,8 @@ class NoRoles:
     def wake(self, now_ns: int) -> None:
         """Nothing is ever due."""
 
+    def clusters(self) -> Mapping[NodeId, tuple[NodeId, ...]]:
+        return {}
+
     def report(self) -> Mapping[str, object]:
         return {}

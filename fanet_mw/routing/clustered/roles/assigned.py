@@ -283,6 +283,9 @@ class AssignedRoles:
         for packet in parts.refresh.due(now_ns=now_ns):
             self._access.answer(packet, now_ns=now_ns)
 
+    def clusters(self) -> Mapping[NodeId, tuple[NodeId, ...]]:
+        return self.parts.membership.clusters()
+
     def report(self) -> Mapping[str, object]:
         membership, authority = self.parts.membership, self.parts.lease.authority
         return {

@@ -4,6 +4,7 @@ A schedule lists the members of a cluster in the order in which they stand in fo
 is in no part of a complete schedule has no role.
 """
 
+from collections.abc import Mapping
 from typing import NamedTuple
 
 from fanet_mw.routing.clustered.roles.lease import Authority
@@ -11,7 +12,7 @@ from fanet_mw.routing.clustered.roles.states import Event
 from fanet_mw.routing.clustered.tdma.slots import Superframe
 from fanet_mw.trace import RoleChanged
 from fanet_mw.units import US, NodeId
-from fanet_mw.wire.inner import Role, Schedule
+from fanet_mw.wire.inner import Member, Role, Schedule
 
 
 class Standing(NamedTuple):
@@ -98,6 +99,15 @@ class Membership:
     def lists(self, node: int) -> bool:
         """Whether the schedule names this node."""
         return any(member.node == node for part in self._parts.values() for member in part.members)
+
+    def clusters(self) -> Mapping[NodeId, tuple[NodeId, ...]]:
+        """By head, the nodes of each cluster that the schedule names, the head first."""
+        found: dict[int, list[Member]] = {}
+        for part in sorted(self._parts):
+            for member in self._parts[part].members:
+                found.setdefault(member.cluster, []).append(member)
+        in_order = (sorted(members, key=lambda m: not m.is_head) for members in found.values())
+        return {NodeId(m[0].node): tuple(NodeId(one.node) for one in m) for m in in_order if m[0].is_head}
 
     def rank(self, node: int) -> int | None:
         """The node's place in the succession of our cluster."""

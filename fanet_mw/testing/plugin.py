@@ -1,0 +1,57 @@
+"""Fixtures for pytest, for applications and programs of one's own.
+
+    async def test_my_message(swarm):
+        async with swarm("quick") as s:
+            a, b = s.node(1), s.node(3)
+            assert (await a.send(b"hello", port=7, to=3)).ok
+            assert (await b.receive()).data == b"hello"
+
+`swarm` makes swarms in virtual time; `real_swarm` starts real processes. Both end what they began. An asynchronous test
+needs a plugin that runs it (pytest-asyncio, anyio). This file imports neither numpy nor the core until it is used.
+"""
+
+import contextlib
+import importlib
+from collections.abc import AsyncIterator, Callable
+from typing import TYPE_CHECKING, Any
+
+import pytest
+
+if TYPE_CHECKING:
+    from sim.run.api import Launched, VirtualSwarm
+
+__all__ = ["LaunchSwarm", "MakeSwarm", "real_swarm", "swarm"]
+
+MakeSwarm = Callable[..., contextlib.AbstractAsyncContextManager["VirtualSwarm"]]
+"""What the fixture `swarm` is."""
+LaunchSwarm = Callable[..., contextlib.AbstractAsyncContextManager["Launched"]]
+"""What the fixture `real_swarm` is."""
+
+
+def _api() -> Any:  # noqa: ANN401  (a module)
+    """What runs swarms; a test that asks for it is skipped where the emulator is not installed."""
+    try:
+        return importlib.import_module("sim.run.api")
+    except ModuleNotFoundError as error:
+        pytest.skip(f"needs fanet-mw[emulator]: {error}")
+
+
+@pytest.fixture
+def swarm() -> MakeSwarm:
+    """`swarm(scenario, applications=..., seed=..., overrides=[...])`: a swarm in virtual time, as a context manager."""
+    api = _api()
+
+    @contextlib.asynccontextmanager
+    async def make(scenario: object, **more: object) -> AsyncIterator["VirtualSwarm"]:
+        made = api.VirtualSwarm(scenario, **more)
+        yield made
+        made.result()  # whatever the test looked at, the run ends in order
+
+    return make
+
+
+@pytest.fixture
+def real_swarm() -> LaunchSwarm:
+    """`real_swarm(scenario, leave_out=[3], overrides=[...])`: a swarm of processes, as a context manager."""
+    found: LaunchSwarm = _api().launch
+    return found

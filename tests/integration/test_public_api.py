@@ -1,0 +1,164 @@
+"""The public interface, as a program and a notebook use it, in virtual time."""
+
+import asyncio
+import subprocess
+import sys
+
+import pytest
+
+import fanet_mw
+from fanet_mw import mavlink
+from fanet_mw.dialect import fanet
+from fanet_mw.testing.plugin import MakeSwarm
+
+SURVIVOR = 53003
+QUIET = [
+    "traffic.arrivals=none",
+    "nodes.telemetry_hz=0",
+    "duration_s=40",
+    "world.engine=kinematic",
+    "mission.survivors=0",
+]
+
+
+async def test_what_one_node_sends_another_has_and_the_sender_knows(swarm: MakeSwarm) -> None:
+    async with swarm("quick", overrides=QUIET) as s:
+        a, b = s.node(1), s.node(3)
+        sent = await a.send(b"hello", port=7, to=3)
+        assert sent.ok
+        assert sent.acknowledged == (3,)
+        message = await b.receive()
+        assert (message.origin, message.port, message.data) == (1, 7, b"hello")
+        assert 0 < message.delay_ms < 1000 * s.now_s
+
+
+async def test_to_several_to_all_and_mavlink(swarm: MakeSwarm) -> None:
+    async with swarm("quick", overrides=QUIET) as s:
+        nodes = {number: s.node(number, messages=(SURVIVOR,)) for number in (1, 2, 4)}
+        await s.run_until(8)
+        assert (await nodes[1].send(bytes(5000), port=7, to=(2, 4))).acknowledged == (2, 4)
+        assert (await nodes[1].send(b"all", port=8)).fate is fanet_mw.Fate.LET_OUT
+        survivor = fanet.MAVLink_fanet_survivor_message(1, 1, 0.0, 0.0, 0.0, -50.0, 2, 1)
+        assert (await nodes[2].send(survivor, to=4, priority="report")).ok
+        await s.run_for(5)
+        got = {message.port: message for message in [await nodes[4].receive() for _ in range(3)]}
+        assert (got[7].data, got[8].data) == (bytes(5000), b"all")
+        assert got[None].origin == 2
+        (heard,) = mavlink.decode(got[None].data)
+        assert heard.get_type() == "FANET_SURVIVOR"
+
+
+async def test_a_node_knows_its_neighbors_and_its_clusters(swarm: MakeSwarm) -> None:
+    async with swarm("quick", overrides=QUIET) as s:
+        node = s.node(2)
+        await s.run_until(15)
+        assert node.neighbors
+        assert 2 not in node.neighbors
+        members = [member for cluster in node.clusters.values() for member in cluster]
+        assert 2 in members
+        assert all(head == cluster[0] for head, cluster in node.clusters.items())
+        assert node.bound_ms is None
+        assert node.report()["kind"] == "agent"
+
+
+async def test_faults_and_who_is_out_of_reach(swarm: MakeSwarm) -> None:
+    async with swarm("quick", overrides=QUIET) as s:
+        node, _, _ = s.node(1), s.node(2), s.node(9)
+        await s.run_until(6)
+        s.cut(9)
+        sent = await node.send(b"anyone?", port=7, to=(2, 9), lifetime_s=20)
+        assert (sent.fate, sent.lacking) == (fanet_mw.Fate.EXPIRED, (9,))
+        assert (await node.send(b"nobody listens", port=7, to=4)).fate is fanet_mw.Fate.UNWANTED
+        s.assert_ledger_closes()
+
+
+@pytest.mark.parametrize(
+    "options", [{"port": 0}, {"to": "everyone"}, {"to": 0}, {"to": ()}, {"port": 70_000}, {"priority": "urgent"}, {}]
+)
+async def test_what_cannot_be_sent_is_said_with_its_value(swarm: MakeSwarm, options: dict[str, object]) -> None:
+    async with swarm("quick", overrides=QUIET) as s:
+        content = object() if not options else bytes(5)
+        with pytest.raises(fanet_mw.ConfigError, match=r"must be|is no MAVLink message"):
+            await s.node(1).send(content, **{"port": 7, **options} if options else {})  # type: ignore[arg-type]
+
+
+async def test_the_end_of_the_swarms_time_ends_who_listens_and_who_sends(swarm: MakeSwarm) -> None:
+    async with swarm("quick", overrides=[*QUIET, "duration_s=9"]) as s:
+        node = s.node(1)
+        assert [message async for message in node] == []
+        with pytest.raises(fanet_mw.NodeClosedError):
+            await node.send(b"late", port=7)
+
+
+async def test_tasks_that_wait_for_each_other_let_time_pass(swarm: MakeSwarm) -> None:
+    async with swarm("quick", overrides=QUIET) as s:
+        a, b = s.node(1), s.node(4)
+
+        async def answer() -> None:
+            async for message in b:
+                await b.send(b"re: " + message.data, port=7, to=message.origin)
+
+        task = asyncio.ensure_future(answer())
+        await a.send(b"question", port=7, to=4)
+        assert (await a.receive()).data == b"re: question"
+        task.cancel()
+
+
+async def test_join_takes_a_swarm_in_virtual_time_as_its_radio() -> None:
+    swarm = fanet_mw.VirtualSwarm("quick", overrides=QUIET)
+    async with (
+        fanet_mw.join(swarm.scenario, node=2, radio=swarm) as a,
+        fanet_mw.join(swarm.scenario, node=3, radio=swarm) as b,
+    ):
+        await a.send(b"x", port=9, to=3)
+        assert (await b.receive()).origin == 2
+        with pytest.raises(fanet_mw.ConfigError, match="before time passes"):
+            async with fanet_mw.join(swarm.scenario, node=4, radio=swarm):
+                pass
+
+
+class Beacon(fanet_mw.Application):
+    """Sends a number each second."""
+
+    name = "beacon"
+    ports = (4,)
+
+    def __init__(self) -> None:
+        self.due_ns, self.heard = 6_000_000_000, 0
+
+    def next_wake_ns(self) -> int:
+        return self.due_ns
+
+    def wake(self, now_ns: int) -> None:
+        self.due_ns += 1_000_000_000
+        self.port.send(fanet_mw.Data(4, now_ns.to_bytes(8)))
+
+    def on_message(self, message: fanet_mw.Received, now_ns: int) -> None:
+        self.heard += 1
+
+    def report(self) -> dict[str, int]:
+        return {"heard": self.heard}
+
+
+def test_a_simulation_gives_its_summary_its_trace_in_columns_and_its_deliveries() -> None:
+    def run(seed: int) -> fanet_mw.Result:
+        return fanet_mw.simulate("quick", applications=lambda _: [Beacon()], seed=seed, overrides=QUIET)
+
+    result, again, other = run(3), run(3), run(4)
+    assert result.summary["trace_sha256"] == again.summary["trace_sha256"] != other.summary["trace_sha256"]
+    assert result.summary["seed"] == 3
+    sent = result.summary["applications"]["beacon"]["generated"]
+    assert sent == 35 * result.summary["nodes"]
+    columns = result.trace["delivered"]
+    assert len(columns["node"]) == len(columns["delay_ns"]) == len(result.deliveries) > sent
+    heard = sum(result.reports[f"agent-{n}"]["applications"]["beacon"]["heard"] for n in range(1, 10))
+    assert heard == len(result.deliveries)
+
+
+def test_importing_fanet_mw_loads_nothing_else_and_all_names_are_there() -> None:
+    code = (
+        "import sys, fanet_mw; heavy = {'numpy', 'pydantic', 'zenoh', 'pymavlink', 'sim', 'agents'} & set(sys.modules);"
+        "assert not heavy, heavy; assert all(getattr(fanet_mw, name) is not None for name in fanet_mw.__all__)"
+    )
+    subprocess.run([sys.executable, "-c", code], check=True)
+    assert set(fanet_mw.__all__) <= set(dir(fanet_mw))

@@ -1,1 +1,1 @@
-"""Graphs of who hears whom, as plain values: neighborhoods, colorings, dominating sets. Pure functions."""
+"""Graphs of the nodes that hear each other, as plain values: neighborhoods, relays, dominating sets. Pure functions."""

@@ -7,9 +7,14 @@ depends on who was heard first.
 
 import math
 import statistics
+import sys
+from pathlib import Path
 
-from fanet_mw.graph.broadcast_schedule import broadcast_schedule, shortest_relays
-from fanet_mw.graph.connected_dominating_set import guha_khuller, wu_li
+sys.path.append(str(Path(__file__).parents[1] / "property"))
+
+from broadcast_schedule import broadcast_schedule, shortest_relays
+from dominating_sets import guha_khuller, wu_li
+
 from fanet_mw.graph.multipoint_relays import multipoint_relays
 from fanet_mw.graph.topology import Adjacency, components, levels, within_range
 from fanet_mw.rng import stream

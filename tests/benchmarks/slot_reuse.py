@@ -13,9 +13,9 @@ from time import perf_counter
 
 sys.path.append(str(Path(__file__).parents[1] / "property"))
 
+from coloring import clashes, dsatur, welsh_powell
 from test_slots_with_reuse import LISTEN, Air
 
-from fanet_mw.graph.coloring import clashes, dsatur, welsh_powell
 from fanet_mw.graph.topology import Adjacency, two_hop, within_range
 from fanet_mw.rng import stream
 from fanet_mw.scenario import grid_columns

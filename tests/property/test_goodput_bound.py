@@ -3,10 +3,10 @@
 from itertools import product
 
 import pytest
+from dominating_sets import guha_khuller
 from hypothesis import given, settings
 from hypothesis import strategies as st
 
-from fanet_mw.graph.connected_dominating_set import guha_khuller
 from fanet_mw.graph.topology import components, within_range
 from fanet_mw.planner.goodput_bound import fewest_transmissions, goodput_bound
 from fanet_mw.routing.clustered.tdma.turns import Turns

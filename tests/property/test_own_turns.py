@@ -1,10 +1,10 @@
 """Turns by claim and by lot: of two within two hops never both have a turn, and no turn that is wanted stays free."""
 
+from coloring import dsatur
 from hypothesis import given
 from hypothesis import strategies as st
 from test_slots_with_reuse import graphs
 
-from fanet_mw.graph.coloring import dsatur
 from fanet_mw.graph.topology import two_hop
 from fanet_mw.rng import stream
 from fanet_mw.routing.clustered.claimed.own_turns import OwnTurns, Share, draws

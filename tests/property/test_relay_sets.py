@@ -1,13 +1,14 @@
 """Relay sets reach everyone, with fewer than all; schedules of them never let two copies meet at a node."""
 
 import pytest
+from broadcast_schedule import broadcast_schedule, pipeline_spacing, shortest_relays
+from dominating_sets import guha_khuller, wu_li
 from hypothesis import given, settings
 from hypothesis import strategies as st
 from test_slots_with_reuse import graphs
 
 from fanet_mw.errors import LocalProtocolError
-from fanet_mw.graph.broadcast_schedule import broadcast_schedule, pipeline_spacing, shortest_relays
-from fanet_mw.graph.connected_dominating_set import dominates, guha_khuller, wu_li
+from fanet_mw.graph.connected_dominating_set import dominates
 from fanet_mw.graph.multipoint_relays import WILL_ALWAYS, WILL_NEVER, multipoint_relays
 from fanet_mw.graph.topology import components, levels, symmetric, two_hop, within_range
 from fanet_mw.units import Enu, NodeId

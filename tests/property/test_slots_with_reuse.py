@@ -1,11 +1,11 @@
 """Slots are free of clashes within two hops: by coloring at once, by claims within the stated number of superframes."""
 
 import pytest
+from coloring import clashes, dsatur, welsh_powell
 from hypothesis import given, settings
 from hypothesis import strategies as st
 
 from fanet_mw.errors import LocalProtocolError
-from fanet_mw.graph.coloring import clashes, dsatur, welsh_powell
 from fanet_mw.graph.topology import components, levels, symmetric, two_hop, within_range
 from fanet_mw.rng import stream
 from fanet_mw.routing.clustered.claimed.slot_claims import Claim, Hello, SlotClaims

@@ -20,12 +20,12 @@ assignment in ad hoc networks" (AINA 2003). A crowd takes two superframes to be 
 Lengthening keeps a part of the turns, and so clashes with nobody; shortening waits until it has been possible a while.
 """
 
-from collections.abc import Iterator
+from collections.abc import Iterable, Iterator
+from itertools import count
 from math import gcd
 from typing import Final, NamedTuple
 
 from fanet_mw.errors import LocalProtocolError
-from fanet_mw.graph.coloring import lowest_free
 from fanet_mw.units import NodeId
 
 _PATIENCE: Final = 8
@@ -162,3 +162,9 @@ class SlotClaims:
             for claim in hello.heard:
                 if claim.node != self._own.node and claim.node not in self._hellos:
                     yield claim
+
+
+def lowest_free(taken: Iterable[int]) -> int:
+    """The lowest slot that is not taken."""
+    used = frozenset(taken)
+    return next(slot for slot in count() if slot not in used)

@@ -1,21 +1,21 @@
 """Slots with spatial reuse, computed at one place: two nodes share a slot only beyond two hops of each other.
 
-Then no node hears two frames of one slot, so slotted frames meet no collision among themselves, hidden stations
-included. The fewest slots is graph coloring of the two-hop conflicts (NP-hard); the two greedy orders here need at most
-the greatest number of conflicts plus one. `slot_claims.py` does the same over the air. Not modelled: interference from
-beyond two hops.
+No node then receives two frames of one slot, so frames in slots do not collide with each other, not even those of
+hidden stations. The least number of slots is a graph coloring of the two-hop conflicts (NP-hard); each of the two
+greedy orders needs at most the greatest number of conflicts plus one. Tests and benchmarks compare claims over the air with
+these. Not modeled: interference from beyond two hops.
 """
 
 import heapq
-from collections.abc import Iterable, Mapping
-from itertools import count
+from collections.abc import Mapping
 
 from fanet_mw.graph.topology import Adjacency, two_hop
+from fanet_mw.routing.clustered.claimed.slot_claims import lowest_free
 from fanet_mw.units import NodeId
 
 
 def welsh_powell(adjacency: Adjacency) -> dict[NodeId, int]:
-    """The lowest free slot for each node, those with most conflicts first (Welsh & Powell 1967)."""
+    """The lowest free slot for each node, nodes with most conflicts first (Welsh & Powell 1967)."""
     rivals = two_hop(adjacency)
     slots: dict[NodeId, int] = {}
     for node in sorted(rivals, key=lambda n: (-len(rivals[n]), n)):
@@ -24,7 +24,7 @@ def welsh_powell(adjacency: Adjacency) -> dict[NodeId, int]:
 
 
 def dsatur(adjacency: Adjacency) -> dict[NodeId, int]:
-    """The lowest free slot for each node, next the one that sees most different slots taken (Brelaz 1979)."""
+    """The lowest free slot for each node, next the node with most different slots among its rivals (Brelaz 1979)."""
     rivals = two_hop(adjacency)
     seen: dict[NodeId, set[int]] = {node: set() for node in rivals}
     heap = [(0, -len(rivals[node]), node) for node in rivals]
@@ -33,7 +33,7 @@ def dsatur(adjacency: Adjacency) -> dict[NodeId, int]:
     while heap:
         saturation, _, node = heapq.heappop(heap)
         if node in slots or -saturation != len(seen[node]):
-            continue  # an older entry: pushed again when it saw more
+            continue  # the entry is outdated: the node was pushed again when its rivals had more slots
         slots[node] = lowest_free(seen[node])
         for rival in rivals[node]:
             if rival not in slots and slots[node] not in seen[rival]:
@@ -42,14 +42,8 @@ def dsatur(adjacency: Adjacency) -> dict[NodeId, int]:
     return slots
 
 
-def lowest_free(taken: Iterable[int]) -> int:
-    """The lowest slot that is not taken."""
-    used = frozenset(taken)
-    return next(slot for slot in count() if slot not in used)
-
-
 def clashes(slots: Mapping[NodeId, int | None], adjacency: Adjacency) -> list[tuple[NodeId, NodeId]]:
-    """Pairs within two hops that share a slot, the lower id first; nodes without a slot clash with nobody."""
+    """Pairs within two hops that share a slot, the lower id first; a node without a slot clashes with none."""
     rivals = two_hop(adjacency)
     return [
         (node, rival)

@@ -4,10 +4,10 @@ r"""When each relay of one flood sends, in equal sub-slots, so that no two copie
     root  ------> A ---> C ---> E                 C and D have no common neighbor: they share a sub-slot
            \----> B ---> D
 
-Two relays share a sub-slot only if they are more than two hops apart: then no node hears both, and neither senses the
-other and defers. Taken in the order of levels (breadth first from the root over the relays), each gets the earliest
-sub-slot that is free. Those that would reach nobody new stay silent when `prune` is set. What it does not
-do: repeat. A lost copy is lost to all behind it unless another relay reaches them; repeat the schedule for that.
+Two relays share a sub-slot only if they are more than two hops apart: then no node receives both, and neither of them
+senses the other and defers. In the order of levels (breadth first from the root over the relays) each gets the earliest
+sub-slot that is free. With `prune`, relays that would reach no new node stay silent. The schedule does not repeat: a
+lost copy is lost to all nodes behind it unless another relay reaches them.
 """
 
 from collections.abc import Collection
@@ -96,10 +96,10 @@ def pipeline_spacing(schedule: BroadcastSchedule, adjacency: Adjacency) -> int:
 
 
 def _order(hops: dict[NodeId, int], adjacency: Adjacency, reached: set[NodeId], *, prune: bool) -> list[NodeId]:
-    """Level by level, those that reach most new nodes first; without those that reach none, if pruned.
+    """The relays level by level, those that reach most new nodes first; with `prune` without those that reach none.
 
-    A relay whose packet would come from a silent one is not reached by the tree any more: whoever is new to `reached`
-    was reached by a relay that sends, so each in the order has a sender before it.
+    A node enters `reached` only by a relay that sends, so each relay in the order has a sender before it, even where
+    pruned relays are silent.
     """
     order: list[NodeId] = []
     for level in range(1, max(hops.values()) + 1):

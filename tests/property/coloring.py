@@ -2,8 +2,8 @@
 
 No node then receives two frames of one slot, so frames in slots do not collide with each other, not even those of
 hidden stations. The least number of slots is a graph coloring of the two-hop conflicts (NP-hard); each of the two
-greedy orders needs at most the greatest number of conflicts plus one. Tests and benchmarks compare claims over the air with
-these. Not modeled: interference from beyond two hops.
+greedy orders needs at most the greatest number of conflicts plus one. Tests and benchmarks compare claims over the air
+with these. Not modeled: interference from beyond two hops.
 """
 
 import heapq

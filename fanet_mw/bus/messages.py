@@ -129,7 +129,7 @@ class WifiScan(NamedTuple):
 
 
 class Person(NamedTuple):
-    """Somebody whom a camera recognized. Angles are those of the sensor after its own error; nobody is named."""
+    """A person that a camera has recognized, without identification. The angles include the error of the sensor."""
 
     bearing_rad: float
     """From north, clockwise."""

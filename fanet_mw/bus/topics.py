@@ -3,7 +3,7 @@
     fanet/<swarm>/radio/<id>/tx          TxRequest              node -> medium
     fanet/<swarm>/radio/<id>/rx          Reception | TxStatus   medium -> node
     fanet/<swarm>/radio/control          Degrade | Jam | Cut | Restore   anyone -> medium
-    fanet/<swarm>/radio/links            LinkStats              medium -> whoever looks
+    fanet/<swarm>/radio/links            LinkStats              medium -> observers
     fanet/<swarm>/world/pose             Poses
     fanet/<swarm>/world/obstruction      Obstructions
     fanet/<swarm>/world/<id>/setpoint    Setpoint               UAV -> world

@@ -1,6 +1,6 @@
-"""The XML of our dialect beside the XML that it includes, for tools that read or generate from message definitions.
+"""The XML of the dialect beside the XML that it includes, for tools that read or generate from message definitions.
 
-What is included is pymavlink's, which is installed with us: the messages that our own parser knows.
+The included XML is that of the installed pymavlink, so it has the messages that this package's parser knows.
 """
 
 import re

@@ -479,9 +479,9 @@ setattr(MAVLink_fanet_beacon_message, "name", mavlink_msg_deprecated_name_proper
 class MAVLink_fanet_schedule_message(MAVLink_message):
     """
     The leader's assignment of nodes to clusters and of slots to
-    clusters; head of cluster k owns slot k. Long ones come in parts.
-    Without entries it is a call: the leader has no assignment yet and
-    asks everyone to join.
+    clusters; head of cluster k owns slot k. A long schedule comes in
+    parts. Without entries it is a call: the leader has no assignment
+    yet and asks all nodes to join.
     """
 
     id = MAVLINK_MSG_ID_FANET_SCHEDULE
@@ -531,7 +531,7 @@ setattr(MAVLink_fanet_schedule_message, "name", mavlink_msg_deprecated_name_prop
 
 class MAVLink_fanet_survivor_message(MAVLink_message):
     """
-    A node hears a survivor's phone.
+    Report of a node that receives a survivor's phone.
     """
 
     id = MAVLINK_MSG_ID_FANET_SURVIVOR
@@ -669,9 +669,9 @@ setattr(MAVLink_fanet_time_message, "name", mavlink_msg_deprecated_name_property
 
 class MAVLink_fanet_join_message(MAVLink_message):
     """
-    A node asks the leader for a place in a cluster, says where it has
-    gone since, that it stands in for a head that fell silent, or,
-    with a timetable, that a neighbor did.
+    A node asks the leader for a place in a cluster, or reports that
+    it has moved, that it stands in for a silent head, or, with a
+    timetable, that a neighbor has fallen silent.
     """
 
     id = MAVLINK_MSG_ID_FANET_JOIN
@@ -718,8 +718,8 @@ setattr(MAVLink_fanet_join_message, "name", mavlink_msg_deprecated_name_property
 class MAVLink_fanet_digest_message(MAVLink_message):
     """
     Which recent packets the sender of a hello holds, so that its
-    neighbors can repair what it missed. Long ones come in several
-    messages.
+    neighbors can send what it has missed. A long digest comes in
+    several messages.
     """
 
     id = MAVLINK_MSG_ID_FANET_DIGEST
@@ -762,8 +762,8 @@ setattr(MAVLink_fanet_digest_message, "name", mavlink_msg_deprecated_name_proper
 
 class MAVLink_fanet_places_message(MAVLink_message):
     """
-    Where the members of the schedule part in the same packet are, for
-    those who compute the timetable of floods from it.
+    Positions of the members of the schedule part in the same packet,
+    from which nodes compute the timetable of floods.
     """
 
     id = MAVLINK_MSG_ID_FANET_PLACES
@@ -809,8 +809,9 @@ setattr(MAVLink_fanet_places_message, "name", mavlink_msg_deprecated_name_proper
 
 class MAVLink_fanet_claims_message(MAVLink_message):
     """
-    Part of a hello: whom the sender hears, and which slots it and
-    they claim. More neighbors than fit come in several messages.
+    Part of a hello: the neighbors that the sender hears, and the
+    slots that it and they claim. More neighbors than fit come in
+    several messages.
     """
 
     id = MAVLINK_MSG_ID_FANET_CLAIMS
@@ -859,9 +860,9 @@ setattr(MAVLink_fanet_claims_message, "name", mavlink_msg_deprecated_name_proper
 
 class MAVLink_fanet_routing_message(MAVLink_message):
     """
-    Control of a routing protocol other than ours (AODV, OLSR and
-    others), a piece of it; truncated after the byte that follows the
-    used data.
+    A piece of a control message of AODV, OLSR or another routing
+    protocol that has no messages of its own here; truncated after the
+    byte that follows the used data.
     """
 
     id = MAVLINK_MSG_ID_FANET_ROUTING
@@ -903,9 +904,9 @@ setattr(MAVLink_fanet_routing_message, "name", mavlink_msg_deprecated_name_prope
 
 class MAVLink_fanet_links_message(MAVLink_message):
     """
-    Measured links. With a join: whom the sender hears how well. From
-    the leader: the links from which all compute the timetable of an
-    assignment.
+    Measured links. With a join: how well the sender hears its
+    neighbors. From the leader: the links from which all nodes compute
+    the timetable of an assignment.
     """
 
     id = MAVLINK_MSG_ID_FANET_LINKS
@@ -1580,9 +1581,9 @@ class MAVLink(object):
     def fanet_schedule_encode(self, start_us: int, period_us: int, slot_us: int, term: int, epoch: int, leader: int, clusters: int, nodes: Sequence[int], assigned: Sequence[int], part: int, parts: int, count: int, version: int) -> MAVLink_fanet_schedule_message:
         """
         The leader's assignment of nodes to clusters and of slots to clusters;
-        head of cluster k owns slot k. Long ones come in parts.
+        head of cluster k owns slot k. A long schedule comes in parts.
         Without entries it is a call: the leader has no assignment yet
-        and asks everyone to join.
+        and asks all nodes to join.
 
         start_us                  : An instant at which a superframe starts. [us] (type:uint64_t)
         period_us                 : Length of the superframe: the flooding period. [us] (type:uint32_t)
@@ -1591,7 +1592,7 @@ class MAVLink(object):
         epoch                     : Number of this assignment; of one leader and term, newer replaces older. 0: a call. (type:uint16_t)
         leader                    : The node that made it. (type:uint16_t)
         clusters                  : How many clusters there are. (type:uint16_t)
-        nodes                     : Node ids; of one cluster the head first, then those who stand in for it, in this order. (type:uint16_t)
+        nodes                     : Node ids; of each cluster the head first, then the nodes that stand in for it, in this order. (type:uint16_t)
         assigned                  : The cluster of each; bit 15: it is the head. (type:uint16_t)
         part                      : This part, from 0. (type:uint8_t)
         parts                     : How many parts the assignment has. (type:uint8_t)
@@ -1604,9 +1605,9 @@ class MAVLink(object):
     def fanet_schedule_send(self, start_us: int, period_us: int, slot_us: int, term: int, epoch: int, leader: int, clusters: int, nodes: Sequence[int], assigned: Sequence[int], part: int, parts: int, count: int, version: int, force_mavlink1: bool = False) -> None:
         """
         The leader's assignment of nodes to clusters and of slots to clusters;
-        head of cluster k owns slot k. Long ones come in parts.
+        head of cluster k owns slot k. A long schedule comes in parts.
         Without entries it is a call: the leader has no assignment yet
-        and asks everyone to join.
+        and asks all nodes to join.
 
         start_us                  : An instant at which a superframe starts. [us] (type:uint64_t)
         period_us                 : Length of the superframe: the flooding period. [us] (type:uint32_t)
@@ -1615,7 +1616,7 @@ class MAVLink(object):
         epoch                     : Number of this assignment; of one leader and term, newer replaces older. 0: a call. (type:uint16_t)
         leader                    : The node that made it. (type:uint16_t)
         clusters                  : How many clusters there are. (type:uint16_t)
-        nodes                     : Node ids; of one cluster the head first, then those who stand in for it, in this order. (type:uint16_t)
+        nodes                     : Node ids; of each cluster the head first, then the nodes that stand in for it, in this order. (type:uint16_t)
         assigned                  : The cluster of each; bit 15: it is the head. (type:uint16_t)
         part                      : This part, from 0. (type:uint8_t)
         parts                     : How many parts the assignment has. (type:uint8_t)
@@ -1627,15 +1628,15 @@ class MAVLink(object):
 
     def fanet_survivor_encode(self, t_us: int, survivor: int, east: float, north: float, up: float, rssi: float, reporter: int, version: int) -> MAVLink_fanet_survivor_message:
         """
-        A node hears a survivor's phone.
+        Report of a node that receives a survivor's phone.
 
-        t_us                      : When. [us] (type:uint64_t)
-        survivor                  : Which phone. (type:uint32_t)
-        east                      : Where the reporter is. [m] (type:float)
-        north                     : Where the reporter is. [m] (type:float)
-        up                        : Where the reporter is. [m] (type:float)
+        t_us                      : Instant of the reception. [us] (type:uint64_t)
+        survivor                  : Id of the survivor whose phone it is. (type:uint32_t)
+        east                      : Position of the reporter. [m] (type:float)
+        north                     : Position of the reporter. [m] (type:float)
+        up                        : Position of the reporter. [m] (type:float)
         rssi                      : Received power of the phone. [dBm] (type:float)
-        reporter                  : The node that hears it. (type:uint16_t)
+        reporter                  : The node that receives the phone. (type:uint16_t)
         version                   : 1. (type:uint8_t)
 
         """
@@ -1643,15 +1644,15 @@ class MAVLink(object):
 
     def fanet_survivor_send(self, t_us: int, survivor: int, east: float, north: float, up: float, rssi: float, reporter: int, version: int, force_mavlink1: bool = False) -> None:
         """
-        A node hears a survivor's phone.
+        Report of a node that receives a survivor's phone.
 
-        t_us                      : When. [us] (type:uint64_t)
-        survivor                  : Which phone. (type:uint32_t)
-        east                      : Where the reporter is. [m] (type:float)
-        north                     : Where the reporter is. [m] (type:float)
-        up                        : Where the reporter is. [m] (type:float)
+        t_us                      : Instant of the reception. [us] (type:uint64_t)
+        survivor                  : Id of the survivor whose phone it is. (type:uint32_t)
+        east                      : Position of the reporter. [m] (type:float)
+        north                     : Position of the reporter. [m] (type:float)
+        up                        : Position of the reporter. [m] (type:float)
         rssi                      : Received power of the phone. [dBm] (type:float)
-        reporter                  : The node that hears it. (type:uint16_t)
+        reporter                  : The node that receives the phone. (type:uint16_t)
         version                   : 1. (type:uint8_t)
 
         """
@@ -1694,9 +1695,9 @@ class MAVLink(object):
         t_ns                      : Swarm time at the end of that hello, as the sender knows it. [ns] (type:uint64_t)
         error_ns                  : What the sender states as the bound of its error then. [ns] (type:uint32_t)
         rate_ppb                  : What the sender states as the bound of the error of its rate, in parts per billion: how fast its error may grow. (type:uint32_t)
-        worst_ns                  : The greatest such bound of any node that the sender has heard of. [ns] (type:uint32_t)
+        worst_ns                  : The greatest such bound of any node that is known to the sender. [ns] (type:uint32_t)
         hello                     : Sequence number of that hello. (type:uint32_t)
-        round                     : The reference counts its own hellos; whoever follows it repeats what it heard last. (type:uint16_t)
+        round                     : The reference counts its own hellos; a node that follows it repeats the last count it has received. (type:uint16_t)
         node                      : The sender. (type:uint16_t)
         reference                 : The node whose clock it follows. (type:uint16_t)
         worst_age_s               : How old that news of the greatest bound is. [s] (type:uint8_t)
@@ -1715,9 +1716,9 @@ class MAVLink(object):
         t_ns                      : Swarm time at the end of that hello, as the sender knows it. [ns] (type:uint64_t)
         error_ns                  : What the sender states as the bound of its error then. [ns] (type:uint32_t)
         rate_ppb                  : What the sender states as the bound of the error of its rate, in parts per billion: how fast its error may grow. (type:uint32_t)
-        worst_ns                  : The greatest such bound of any node that the sender has heard of. [ns] (type:uint32_t)
+        worst_ns                  : The greatest such bound of any node that is known to the sender. [ns] (type:uint32_t)
         hello                     : Sequence number of that hello. (type:uint32_t)
-        round                     : The reference counts its own hellos; whoever follows it repeats what it heard last. (type:uint16_t)
+        round                     : The reference counts its own hellos; a node that follows it repeats the last count it has received. (type:uint16_t)
         node                      : The sender. (type:uint16_t)
         reference                 : The node whose clock it follows. (type:uint16_t)
         worst_age_s               : How old that news of the greatest bound is. [s] (type:uint8_t)
@@ -1729,18 +1730,18 @@ class MAVLink(object):
 
     def fanet_join_encode(self, east: float, north: float, up: float, east_speed: float, north_speed: float, up_speed: float, node: int, instead_of: int, version: int) -> MAVLink_fanet_join_message:
         """
-        A node asks the leader for a place in a cluster, says where it has
-        gone since, that it stands in for a head that fell silent, or,
-        with a timetable, that a neighbor did.
+        A node asks the leader for a place in a cluster, or reports that it
+        has moved, that it stands in for a silent head, or, with a
+        timetable, that a neighbor has fallen silent.
 
-        east                      : Where it is. [m] (type:float)
-        north                     : Where it is. [m] (type:float)
-        up                        : Where it is. [m] (type:float)
-        east_speed                : How fast it moves. [m/s] (type:float)
-        north_speed               : How fast it moves. [m/s] (type:float)
-        up_speed                  : How fast it moves. [m/s] (type:float)
-        node                      : Which node. (type:uint16_t)
-        instead_of                : The silent node; whoever sends this stands in for it if it is the head of its cluster; the node itself: it objects; 0: none. (type:uint16_t)
+        east                      : Position of the node. [m] (type:float)
+        north                     : Position of the node. [m] (type:float)
+        up                        : Position of the node. [m] (type:float)
+        east_speed                : Velocity of the node. [m/s] (type:float)
+        north_speed               : Velocity of the node. [m/s] (type:float)
+        up_speed                  : Velocity of the node. [m/s] (type:float)
+        node                      : The node that joins. (type:uint16_t)
+        instead_of                : The silent node, which the sender stands in for if it is the head of the sender's cluster; the silent node's own id, sent by itself: it objects; 0: none. (type:uint16_t)
         version                   : 1. (type:uint8_t)
 
         """
@@ -1748,18 +1749,18 @@ class MAVLink(object):
 
     def fanet_join_send(self, east: float, north: float, up: float, east_speed: float, north_speed: float, up_speed: float, node: int, instead_of: int, version: int, force_mavlink1: bool = False) -> None:
         """
-        A node asks the leader for a place in a cluster, says where it has
-        gone since, that it stands in for a head that fell silent, or,
-        with a timetable, that a neighbor did.
+        A node asks the leader for a place in a cluster, or reports that it
+        has moved, that it stands in for a silent head, or, with a
+        timetable, that a neighbor has fallen silent.
 
-        east                      : Where it is. [m] (type:float)
-        north                     : Where it is. [m] (type:float)
-        up                        : Where it is. [m] (type:float)
-        east_speed                : How fast it moves. [m/s] (type:float)
-        north_speed               : How fast it moves. [m/s] (type:float)
-        up_speed                  : How fast it moves. [m/s] (type:float)
-        node                      : Which node. (type:uint16_t)
-        instead_of                : The silent node; whoever sends this stands in for it if it is the head of its cluster; the node itself: it objects; 0: none. (type:uint16_t)
+        east                      : Position of the node. [m] (type:float)
+        north                     : Position of the node. [m] (type:float)
+        up                        : Position of the node. [m] (type:float)
+        east_speed                : Velocity of the node. [m/s] (type:float)
+        north_speed               : Velocity of the node. [m/s] (type:float)
+        up_speed                  : Velocity of the node. [m/s] (type:float)
+        node                      : The node that joins. (type:uint16_t)
+        instead_of                : The silent node, which the sender stands in for if it is the head of the sender's cluster; the silent node's own id, sent by itself: it objects; 0: none. (type:uint16_t)
         version                   : 1. (type:uint8_t)
 
         """
@@ -1768,14 +1769,14 @@ class MAVLink(object):
     def fanet_digest_encode(self, newest: Sequence[int], held: Sequence[int], origins: Sequence[int], count: int, complete: int, version: int) -> MAVLink_fanet_digest_message:
         """
         Which recent packets the sender of a hello holds, so that its
-        neighbors can repair what it missed. Long ones come in several
-        messages.
+        neighbors can send what it has missed. A long digest comes in
+        several messages.
 
         newest                    : Highest sequence number held of each origin. (type:uint32_t)
         held                      : Bit i: newest - 1 - i is held too. (type:uint32_t)
         origins                   : Node ids. (type:uint16_t)
         count                     : How many entries of this message are used. (type:uint8_t)
-        complete                  : 1: an origin that is in no digest of this hello is one of which nothing is held. (type:uint8_t)
+        complete                  : 1: nothing is held of any origin that is in no digest of this hello. (type:uint8_t)
         version                   : 1. (type:uint8_t)
 
         """
@@ -1784,14 +1785,14 @@ class MAVLink(object):
     def fanet_digest_send(self, newest: Sequence[int], held: Sequence[int], origins: Sequence[int], count: int, complete: int, version: int, force_mavlink1: bool = False) -> None:
         """
         Which recent packets the sender of a hello holds, so that its
-        neighbors can repair what it missed. Long ones come in several
-        messages.
+        neighbors can send what it has missed. A long digest comes in
+        several messages.
 
         newest                    : Highest sequence number held of each origin. (type:uint32_t)
         held                      : Bit i: newest - 1 - i is held too. (type:uint32_t)
         origins                   : Node ids. (type:uint16_t)
         count                     : How many entries of this message are used. (type:uint8_t)
-        complete                  : 1: an origin that is in no digest of this hello is one of which nothing is held. (type:uint8_t)
+        complete                  : 1: nothing is held of any origin that is in no digest of this hello. (type:uint8_t)
         version                   : 1. (type:uint8_t)
 
         """
@@ -1799,15 +1800,15 @@ class MAVLink(object):
 
     def fanet_places_encode(self, east: Sequence[int], north: Sequence[int], up: Sequence[int], leader_east: int, leader_north: int, leader_up: int, first: int, count: int, version: int) -> MAVLink_fanet_places_message:
         """
-        Where the members of the schedule part in the same packet are, for
-        those who compute the timetable of floods from it.
+        Positions of the members of the schedule part in the same packet, from
+        which nodes compute the timetable of floods.
 
-        east                      : Of each member. [m] (type:int16_t)
-        north                     : Of each member. [m] (type:int16_t)
-        up                        : Of each member. [m] (type:int16_t)
-        leader_east               : Of the leader, who is in no cluster. [m] (type:int16_t)
-        leader_north              : Of the leader. [m] (type:int16_t)
-        leader_up                 : Of the leader. [m] (type:int16_t)
+        east                      : Positions of the members. [m] (type:int16_t)
+        north                     : Positions of the members. [m] (type:int16_t)
+        up                        : Positions of the members. [m] (type:int16_t)
+        leader_east               : Position of the leader, which is in no cluster. [m] (type:int16_t)
+        leader_north              : Position of the leader. [m] (type:int16_t)
+        leader_up                 : Position of the leader. [m] (type:int16_t)
         first                     : Entry i belongs to this member of the part, plus i. (type:uint8_t)
         count                     : How many entries are used. (type:uint8_t)
         version                   : 1. (type:uint8_t)
@@ -1817,15 +1818,15 @@ class MAVLink(object):
 
     def fanet_places_send(self, east: Sequence[int], north: Sequence[int], up: Sequence[int], leader_east: int, leader_north: int, leader_up: int, first: int, count: int, version: int, force_mavlink1: bool = False) -> None:
         """
-        Where the members of the schedule part in the same packet are, for
-        those who compute the timetable of floods from it.
+        Positions of the members of the schedule part in the same packet, from
+        which nodes compute the timetable of floods.
 
-        east                      : Of each member. [m] (type:int16_t)
-        north                     : Of each member. [m] (type:int16_t)
-        up                        : Of each member. [m] (type:int16_t)
-        leader_east               : Of the leader, who is in no cluster. [m] (type:int16_t)
-        leader_north              : Of the leader. [m] (type:int16_t)
-        leader_up                 : Of the leader. [m] (type:int16_t)
+        east                      : Positions of the members. [m] (type:int16_t)
+        north                     : Positions of the members. [m] (type:int16_t)
+        up                        : Positions of the members. [m] (type:int16_t)
+        leader_east               : Position of the leader, which is in no cluster. [m] (type:int16_t)
+        leader_north              : Position of the leader. [m] (type:int16_t)
+        leader_up                 : Position of the leader. [m] (type:int16_t)
         first                     : Entry i belongs to this member of the part, plus i. (type:uint8_t)
         count                     : How many entries are used. (type:uint8_t)
         version                   : 1. (type:uint8_t)
@@ -1835,15 +1836,16 @@ class MAVLink(object):
 
     def fanet_claims_encode(self, node: int, nodes: Sequence[int], slots: Sequence[int], lengths: Sequence[int], crowds: Sequence[int], facts: Sequence[int], slot: int, length: int, crowd: int, lots: int, count: int, version: int) -> MAVLink_fanet_claims_message:
         """
-        Part of a hello: whom the sender hears, and which slots it and they
-        claim. More neighbors than fit come in several messages.
+        Part of a hello: the neighbors that the sender hears, and the slots
+        that it and they claim. More neighbors than fit come in
+        several messages.
 
         node                      : The sender. (type:uint16_t)
         nodes                     : Neighbors, ascending. (type:uint16_t)
         slots                     : The slot each claims; 255: none. (type:uint8_t)
-        lengths                   : Slots in the superframe of that claim; 0: the sender of it knows no length. (type:uint8_t)
+        lengths                   : Slots in the superframe of that claim; 0: the neighbor knows no length. (type:uint8_t)
         crowds                    : Nodes within two hops of each, itself included. (type:uint8_t)
-        facts                     : Bits 0-1: lots in turns that nobody claims. Bit 2: it hears the sender. Bit 3: the sender wants it to relay. (type:uint8_t)
+        facts                     : Bits 0-1: lots in turns that no node claims. Bit 2: it hears the sender. Bit 3: the sender wants it to relay. (type:uint8_t)
         slot                      : The slot the sender claims; 255: none. (type:uint8_t)
         length                    : Slots in the superframe of that claim. (type:uint8_t)
         crowd                     : Nodes within two hops of the sender, itself included. (type:uint8_t)
@@ -1856,15 +1858,16 @@ class MAVLink(object):
 
     def fanet_claims_send(self, node: int, nodes: Sequence[int], slots: Sequence[int], lengths: Sequence[int], crowds: Sequence[int], facts: Sequence[int], slot: int, length: int, crowd: int, lots: int, count: int, version: int, force_mavlink1: bool = False) -> None:
         """
-        Part of a hello: whom the sender hears, and which slots it and they
-        claim. More neighbors than fit come in several messages.
+        Part of a hello: the neighbors that the sender hears, and the slots
+        that it and they claim. More neighbors than fit come in
+        several messages.
 
         node                      : The sender. (type:uint16_t)
         nodes                     : Neighbors, ascending. (type:uint16_t)
         slots                     : The slot each claims; 255: none. (type:uint8_t)
-        lengths                   : Slots in the superframe of that claim; 0: the sender of it knows no length. (type:uint8_t)
+        lengths                   : Slots in the superframe of that claim; 0: the neighbor knows no length. (type:uint8_t)
         crowds                    : Nodes within two hops of each, itself included. (type:uint8_t)
-        facts                     : Bits 0-1: lots in turns that nobody claims. Bit 2: it hears the sender. Bit 3: the sender wants it to relay. (type:uint8_t)
+        facts                     : Bits 0-1: lots in turns that no node claims. Bit 2: it hears the sender. Bit 3: the sender wants it to relay. (type:uint8_t)
         slot                      : The slot the sender claims; 255: none. (type:uint8_t)
         length                    : Slots in the superframe of that claim. (type:uint8_t)
         crowd                     : Nodes within two hops of the sender, itself included. (type:uint8_t)
@@ -1877,9 +1880,9 @@ class MAVLink(object):
 
     def fanet_routing_encode(self, length: int, type: int, part: int, parts: int, data: Sequence[int]) -> MAVLink_fanet_routing_message:
         """
-        Control of a routing protocol other than ours (AODV, OLSR and others),
-        a piece of it; truncated after the byte that follows the used
-        data.
+        A piece of a control message of AODV, OLSR or another routing protocol
+        that has no messages of its own here; truncated after the byte
+        that follows the used data.
 
         length                    : How many bytes of data are used. [bytes] (type:uint8_t)
         type                      : Which message: high four bits the protocol, low four bits its message type. (type:uint8_t)
@@ -1892,9 +1895,9 @@ class MAVLink(object):
 
     def fanet_routing_send(self, length: int, type: int, part: int, parts: int, data: Sequence[int], force_mavlink1: bool = False) -> None:
         """
-        Control of a routing protocol other than ours (AODV, OLSR and others),
-        a piece of it; truncated after the byte that follows the used
-        data.
+        A piece of a control message of AODV, OLSR or another routing protocol
+        that has no messages of its own here; truncated after the byte
+        that follows the used data.
 
         length                    : How many bytes of data are used. [bytes] (type:uint8_t)
         type                      : Which message: high four bits the protocol, low four bits its message type. (type:uint8_t)
@@ -1907,9 +1910,9 @@ class MAVLink(object):
 
     def fanet_links_encode(self, term: int, node: int, epoch: int, from_nodes: Sequence[int], to_nodes: Sequence[int], grades: Sequence[int], powers: Sequence[int], part: int, parts: int, count: int, version: int) -> MAVLink_fanet_links_message:
         """
-        Measured links. With a join: whom the sender hears how well. From the
-        leader: the links from which all compute the timetable of an
-        assignment.
+        Measured links. With a join: how well the sender hears its neighbors.
+        From the leader: the links from which all nodes compute the
+        timetable of an assignment.
 
         term                      : From the leader: as in the schedule. With a join: 0. [s] (type:uint32_t)
         node                      : The sender. (type:uint16_t)
@@ -1928,9 +1931,9 @@ class MAVLink(object):
 
     def fanet_links_send(self, term: int, node: int, epoch: int, from_nodes: Sequence[int], to_nodes: Sequence[int], grades: Sequence[int], powers: Sequence[int], part: int, parts: int, count: int, version: int, force_mavlink1: bool = False) -> None:
         """
-        Measured links. With a join: whom the sender hears how well. From the
-        leader: the links from which all compute the timetable of an
-        assignment.
+        Measured links. With a join: how well the sender hears its neighbors.
+        From the leader: the links from which all nodes compute the
+        timetable of an assignment.
 
         term                      : From the leader: as in the schedule. With a join: 0. [s] (type:uint32_t)
         node                      : The sender. (type:uint16_t)

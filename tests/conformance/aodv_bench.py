@@ -1,4 +1,4 @@
-"""AODV nodes on a bench: what a test puts on the air, and reads of the air and of their tables."""
+"""AODV nodes on a bench: what tests put on the air, and what they read from the air and from the nodes' tables."""
 
 from collections.abc import Callable
 

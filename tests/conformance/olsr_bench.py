@@ -1,4 +1,4 @@
-"""OLSR nodes on a bench: what a test puts on the air, and reads of the air and of what they know."""
+"""OLSR nodes on a bench: what tests put on the air, and what they read from the air and from the nodes' state."""
 
 from collections.abc import Callable
 

@@ -1,4 +1,4 @@
-"""Geographic carry and forward: greedy by position, carried where nobody is nearer, found by the location service."""
+"""Geographic routing: greedy by position, carried while no neighbor is nearer, with a location service."""
 
 from collections.abc import Callable
 

@@ -1,4 +1,4 @@
-"""Gossip (Haas et al. 2006) and the counter-based scheme (Ni et al. 1999): who relays a flood, and who does not."""
+"""Gossip (Haas et al. 2006) and the counter-based scheme (Ni et al. 1999): which nodes relay a flood."""
 
 from collections.abc import Callable
 

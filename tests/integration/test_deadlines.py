@@ -1,4 +1,4 @@
-"""Whole swarms with a deadline: what is let in meets it; who cannot meet it any more says so."""
+"""Whole swarms with a deadline: packets that are admitted meet it, and a node that can no longer meet it says so."""
 
 from typing import Any
 

@@ -1,4 +1,4 @@
-"""Children of a launcher: whatever kills whom, it is told by name and nothing is left running."""
+"""Children of a launcher: whichever process is killed, its end is reported by name and no process is left running."""
 
 import asyncio
 import os

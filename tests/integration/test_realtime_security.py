@@ -1,4 +1,4 @@
-"""Keys and access lists with real Zenoh sessions: who may say what, and that a swarm lives under them."""
+"""Keys and access lists with real Zenoh sessions: the rights of each participant, and a swarm that runs under them."""
 
 import asyncio
 import shutil

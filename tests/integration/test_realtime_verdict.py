@@ -1,4 +1,4 @@
-"""Real swarms whose parts die, freeze or start again: none of them may look good that is not."""
+"""Real swarms whose parts die, freeze or are restarted: none of them may be called valid that is not."""
 
 import asyncio
 import json

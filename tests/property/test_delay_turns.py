@@ -1,4 +1,4 @@
-"""A head with turns at known places: no trace is worse than the bounds, and the worst comes within one tick."""
+"""A head with turns at known places: no trace is worse than the bounds, and the worst trace comes within one tick."""
 
 import pytest
 from hypothesis import given, settings

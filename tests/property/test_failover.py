@@ -1,4 +1,4 @@
-"""Clusters stay alive: real nodes over a graph, and whatever can happen to a swarm in any order."""
+"""Clusters survive: real nodes over a graph, and any sequence of what can happen to a swarm."""
 
 from collections import Counter
 

@@ -1,4 +1,4 @@
-"""Relay sets reach everyone, with fewer than all; schedules of them never let two copies meet at a node."""
+"""Relay sets reach all nodes with fewer relays than nodes; no two copies of their schedules collide at a node."""
 
 import pytest
 from broadcast_schedule import broadcast_schedule, pipeline_spacing, shortest_relays

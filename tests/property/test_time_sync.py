@@ -1,4 +1,4 @@
-"""What time synchronization promises: a time for all who hear the reference, and an error within what they state."""
+"""Time synchronization: all nodes that hear the reference get its time, with an error within what they state."""
 
 from hypothesis import given, settings
 from hypothesis import strategies as st

@@ -1,4 +1,4 @@
-"""A UAV behind a clock of its own, hand-driven: what it is told of time, and what it is not told without any."""
+"""A UAV behind a clock of its own, hand-driven: the instants it is given, and what waits until it has swarm time."""
 
 from collections.abc import Callable
 from typing import Any

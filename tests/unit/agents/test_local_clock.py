@@ -1,4 +1,4 @@
-"""A drifting clock and its way back; the same in every run."""
+"""A drifting clock: its reading at a true instant, the reverse, and the same drift in every run."""
 
 from itertools import pairwise
 

@@ -1,4 +1,4 @@
-"""Where is the phone?"""
+"""The estimate of a phone's place from several RSSI readings."""
 
 import math
 

@@ -1,4 +1,4 @@
-"""What is imported says nothing of its own."""
+"""Importing the packages prints nothing."""
 
 import subprocess
 import sys

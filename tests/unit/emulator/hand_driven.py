@@ -1,4 +1,4 @@
-"""A medium driven by hand, for timelines computed by hand; and what it said, in short."""
+"""A medium driven by hand, for timelines computed by hand; its outputs in a short form."""
 
 from array import array
 from typing import NamedTuple

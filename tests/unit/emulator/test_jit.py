@@ -1,4 +1,4 @@
-"""Compiled code and where it is kept."""
+"""Compilation of the kernel, and where machine code is cached."""
 
 import errno
 import os

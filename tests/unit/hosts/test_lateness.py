@@ -1,4 +1,4 @@
-"""How late things were: the greatest to the nanosecond, percentiles to a tenth."""
+"""The histogram of lateness: the maximum is exact, percentiles are within a tenth."""
 
 import pytest
 from hypothesis import given

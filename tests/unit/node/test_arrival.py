@@ -1,4 +1,4 @@
-"""What a node reads of a frame: the same for everyone who hears it, whatever was read before."""
+"""Reading a received frame: the result is the same for every receiver, whatever was read before."""
 
 import pytest
 from hypothesis import given

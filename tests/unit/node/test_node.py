@@ -1,4 +1,4 @@
-"""What a node makes of a frame before its protocol is asked: known, expired, for us, several in one."""
+"""How a node treats a frame before its protocol sees it: duplicate, expired, for this node, several packets in one."""
 
 import pytest
 

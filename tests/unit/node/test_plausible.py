@@ -1,4 +1,4 @@
-"""What is believed of a routing header: each thing that it cannot truly say, at its bound and one beyond."""
+"""Checks of routing headers: each statement that cannot be true, at its bound and one beyond."""
 
 import pytest
 

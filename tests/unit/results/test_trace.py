@@ -1,4 +1,4 @@
-"""One record is one line, and back."""
+"""Trace records: one record is one line of JSON, and parsing the line gives the record."""
 
 import json
 

@@ -1,4 +1,4 @@
-"""What the launcher makes of what it hears: no put ends a run, or gets into its result unchecked."""
+"""The collector of a run: no put on the bus ends a run, or gets into its result unchecked."""
 
 import copy
 import errno

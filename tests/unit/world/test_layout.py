@@ -1,4 +1,4 @@
-"""Where nodes start."""
+"""The places at which nodes start."""
 
 import math
 from collections.abc import Callable

@@ -1,4 +1,4 @@
-"""A node of the clustered protocol, by hand: what it passes on, whom it believes, what it lets out."""
+"""A node of the clustered protocol, by hand: what it relays, which leader it believes, and what it lets out."""
 
 from collections.abc import Callable
 

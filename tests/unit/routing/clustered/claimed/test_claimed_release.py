@@ -1,4 +1,4 @@
-"""A queue that is let out in turns of its own, and a host that wakes when it can."""
+"""A queue that is let out in a node's own turns, under a host whose wake-ups are late."""
 
 import pytest
 

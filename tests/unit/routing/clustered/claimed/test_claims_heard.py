@@ -1,4 +1,4 @@
-"""What a node makes of claims that others say: impossible ones, those of a third, and how many lots a rival has."""
+"""How a node treats claims in hellos: impossible ones, claims about third nodes, and how many lots a rival has."""
 
 import pytest
 

@@ -1,4 +1,4 @@
-"""How the leader carries clusters on, and what nodes tell it."""
+"""How the leader carries clusters on from one assignment to the next, and what joins tell it."""
 
 from hypothesis import given
 from hypothesis import strategies as st

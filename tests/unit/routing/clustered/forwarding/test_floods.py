@@ -1,4 +1,4 @@
-"""What a node sends of a flood: its beginning, a relay, and once more for who lacks it."""
+"""What a node sends of a flood: the first frame, a relay, and one more copy for a neighbor that lacks it."""
 
 from collections.abc import Callable
 

@@ -1,4 +1,4 @@
-"""The way to a head."""
+"""The gradient: the next hop towards a head, learned from neighbors' hellos, by hand."""
 
 from fanet_mw.node.neighbors import Neighbor, Neighbors
 from fanet_mw.routing.clustered.forwarding.gradient import UNREACHABLE, Gradient, newer

@@ -1,4 +1,4 @@
-"""Repair as timelines of one node: what a neighbor lacks is sent once more, once, and not too early."""
+"""Repair at one node, as timelines: a packet that a neighbor lacks is sent once more, only once, and not too early."""
 
 from fanet_mw import wire
 from fanet_mw.node.duplicates import key_of

@@ -1,4 +1,4 @@
-"""Which neighbors have fallen silent, as timelines; hellos come every second."""
+"""Which neighbors count as silent, as timelines with hellos every second."""
 
 import pytest
 

@@ -1,4 +1,4 @@
-"""Whom a node obeys, and when it must stand itself: superframes of 1 s, so a leader is given up after 4 s."""
+"""Which leader a node follows, and when it stands for election: superframes of 1 s, a leader is given up after 4 s."""
 
 import pytest
 

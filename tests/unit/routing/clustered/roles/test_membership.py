@@ -1,4 +1,4 @@
-"""What a schedule says of one node, part by part and epoch by epoch."""
+"""What one node learns from schedules about its own place, part by part and epoch by epoch."""
 
 from fanet_mw.node.neighbors import Neighbors
 from fanet_mw.routing.clustered.forwarding.gradient import Gradient

@@ -1,4 +1,4 @@
-"""When a node tells where it is: range 250 m, so 25 m off; 5 s apart at least; after 20 s of silence at the latest."""
+"""When a node sends a position update: range 250 m, so 25 m off; at least 5 s apart; after 20 s at the latest."""
 
 import pytest
 

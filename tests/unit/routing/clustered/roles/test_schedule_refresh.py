@@ -1,4 +1,4 @@
-"""Who hears in a hello that a neighbor follows an older schedule sends it the newest again."""
+"""A node that learns from a hello that a neighbor follows an older schedule sends it the newest one again."""
 
 import pytest
 

@@ -1,4 +1,4 @@
-"""Who stands in for a silent head, and when it is back: one node's part, by hand. Hellos come every second."""
+"""Which member stands in for a silent head, and until when: one node, by hand, with hellos every second."""
 
 import pytest
 

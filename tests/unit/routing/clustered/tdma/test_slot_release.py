@@ -1,4 +1,4 @@
-"""A head's queue: nothing leaves it outside its slot, nothing leaves it unnamed."""
+"""A head's queue: no packet leaves it outside the head's slot, and every dropped packet has a reason."""
 
 from itertools import pairwise
 

@@ -1,4 +1,4 @@
-"""Superframe geometry."""
+"""Superframe geometry: which instant belongs to which slot."""
 
 import pytest
 from hypothesis import given

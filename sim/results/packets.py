@@ -61,7 +61,7 @@ def packets_of(outcome: Outcome) -> Mapping[str, Application]:
             app.sent[record.node, record.seq] = Sent(record.t_ns)
             if record.app in APPS:
                 app.wanted += len(targets[record.node]) if record.app == "traffic" else others
-    had: set[tuple[int, int, int]] = set()
+    had: dict[Name, int] = {}  # a bit for each node: there are as many deliveries as records, and far fewer packets
     exact = not outcome.scenario.clock.modelled  # else delays are true ones, whatever the header said
     for record in outcome.records:
         # In real time it may come before the packet's own record, at one instant.
@@ -79,11 +79,12 @@ def packets_of(outcome: Outcome) -> Mapping[str, Application]:
             continue
         if not _is_target(record, sender is found["traffic"], targets):
             continue
-        delivery = record.node, record.origin, record.seq
-        if delivery in had:
+        name = record.origin, record.seq
+        before, bit = had.get(name, 0), 1 << record.node
+        if before & bit:
             sender.repeated += 1
         else:
-            had.add(delivery)
+            had[name] = before | bit
             sender.deliveries.append(record)
     return found
 

@@ -9,7 +9,6 @@ import json
 from array import array
 from collections import defaultdict
 from collections.abc import Sequence
-from random import Random
 from typing import Any, Final, NamedTuple
 
 from fanet_mw import wire
@@ -181,8 +180,3 @@ def _control_of(frame: bytes) -> tuple[int, bytes] | None:
 def lines_in(batches: Sequence[bytes] | dict[bytes, None]) -> list[str]:
     """The lines in some puts of trace records."""
     return [line for put in batches for line in put[5:].decode().splitlines()]
-
-
-def shuffled(frames: Sequence[bytes], pick: Random) -> list[bytes]:
-    """All of them, in another order."""
-    return pick.sample(list(frames), len(frames))

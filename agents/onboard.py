@@ -80,6 +80,7 @@ class Onboard:
         self._on_sensor = _overriding(applications, "on_sensor")
         self._on_hello = _overriding(applications, "on_hello")
         self._judges = _overriding(applications, "permits")
+        self._hello_frames = _overriding(applications, "hello_frames")
         self._timed = _overriding(applications, "next_wake_ns")
         self._courses: dict[str, Course] = {}
         """What was commanded during this input, by application."""
@@ -171,6 +172,10 @@ class Onboard:
         if fate in application.follows:
             application.on_status(Status(handle, fate, now_ns), now_ns)
         return True
+
+    def hello_frames(self, now_ns: int) -> bytes:
+        """What applications add to the hello that goes out now."""
+        return b"".join(application.hello_frames(now_ns) for application in self._hello_frames)
 
     # --- time -----------------------------------------------------------------------------------------------------
 

@@ -2,7 +2,7 @@
 
 from typing import Final
 
-from agents.mission import Mission
+from agents.mission.everyone import Mission
 from fanet_mw.application import Application, Received, SensorReading
 from fanet_mw.bus.messages import Gps, WifiScan
 from fanet_mw.errors import MalformedFrameError

@@ -11,13 +11,24 @@ from agents.autopilot import Autopilot
 from agents.avoidance import CollisionAvoidance
 from agents.onboard import Onboard
 from agents.rescue import Rescue
+from agents.search import PlannedSearch
 from agents.steady_fix import SteadyFix
 from agents.telemetry import Telemetry
 from agents.traffic import Load
 from fanet_mw import wire
 from fanet_mw.actor import Actor
 from fanet_mw.application import Application, Course
-from fanet_mw.bus.messages import Gps, MavlinkTap, Message, Reception, Setpoint, TxStatus, WifiScan
+from fanet_mw.bus.messages import (
+    Camera,
+    Gps,
+    MavlinkTap,
+    Message,
+    Reception,
+    Setpoint,
+    SetpointKind,
+    TxStatus,
+    WifiScan,
+)
 from fanet_mw.bus.topics import Topics
 from fanet_mw.node.node import Node
 from fanet_mw.rng import stream
@@ -71,7 +82,7 @@ class Uav(Actor):
         self._onboard = Onboard(
             self._node,
             lambda: (self._autopilot.position, self._autopilot.velocity),
-            [*_asked_for(scenario, node, self._autopilot), *applications],
+            [*_asked_for(scenario, node, self._autopilot, position), *applications],
             fly=self._steer,
             tap=self._tap,
         )
@@ -117,7 +128,7 @@ class Uav(Actor):
             self._autopilot.fix(message)
             self._node.position, self._node.velocity = self._fixes.position(message), message.velocity
             self._onboard.fix(message, now_ns)
-        elif isinstance(message, WifiScan):
+        elif isinstance(message, WifiScan | Camera):
             self._onboard.sensor(message, now_ns)
         else:
             self._malformed += 1
@@ -169,9 +180,8 @@ class Uav(Actor):
     def _say_hello(self, now_ns: int) -> None:
         if self._next_hello_ns is None or self._next_hello_ns - self._lead_ns > now_ns:
             return
-        self._node.say_hello(
-            self._autopilot.beacon_frames(now_ns), start_ns=max(self._next_hello_ns, now_ns), now_ns=now_ns
-        )
+        inner = self._autopilot.beacon_frames(now_ns) + self._onboard.hello_frames(now_ns)
+        self._node.say_hello(inner, start_ns=max(self._next_hello_ns, now_ns), now_ns=now_ns)
         vary = 1 + _HELLO_JITTER * (2 * self._hello_random() - 1)
         step_ns = int(self._hello_ns * vary * self._node.hello_share(now_ns))
         self._next_hello_ns = max(self._next_hello_ns + step_ns, now_ns)
@@ -202,16 +212,24 @@ class Uav(Actor):
         return earliest(self._onboard.next_wake_ns(), hello_ns)
 
     def _steer(self, course: Course, now_ns: int) -> None:
-        self.outbox.append((self._setpoint_topic, Setpoint(now_ns, course.position, course.speed_m_s)))
+        setpoint = Setpoint(now_ns, course.position, course.speed_m_s)
+        if course.velocity is not None:
+            setpoint = setpoint._replace(kind=SetpointKind.VELOCITY, velocity=course.velocity)
+        self.outbox.append((self._setpoint_topic, setpoint))
 
     def _tap(self, frames: bytes, now_ns: int) -> None:
         self.outbox.append((self._tap_topic, MavlinkTap(now_ns, frames)))
 
 
-def _asked_for(scenario: Scenario, node: NodeId, autopilot: Autopilot) -> Sequence[Application]:
+def _asked_for(scenario: Scenario, node: NodeId, autopilot: Autopilot, position: Enu) -> Sequence[Application]:
     """The applications that a scenario asks for, in the order in which they have their turn."""
+    searches = scenario.mission.search != "none"
     applications: list[Application]
-    applications = [Telemetry(autopilot), Load(scenario, node), Rescue(scenario, node)]
+    applications = [
+        Telemetry(autopilot),
+        Load(scenario, node),
+        PlannedSearch(scenario, node, position=position) if searches else Rescue(scenario, node),
+    ]
     if scenario.mission.collision_horizon_s:
         applications.append(CollisionAvoidance(scenario, node))
     return applications

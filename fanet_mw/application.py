@@ -18,7 +18,7 @@ from enum import StrEnum
 from random import Random
 from typing import Any, Final, NamedTuple, Protocol
 
-from fanet_mw.bus.messages import Gps, WifiScan
+from fanet_mw.bus.messages import Camera, Gps, WifiScan
 from fanet_mw.errors import DropReason
 from fanet_mw.scenario import Scenario
 from fanet_mw.trace import Record
@@ -30,7 +30,7 @@ ANY: Final[Collection[int]] = (-1,)
 HOME: Final = 0.0
 """The speed of a course that sends a UAV back to its formation."""
 
-SensorReading = WifiScan
+SensorReading = WifiScan | Camera
 """Any reading of a sensor but the position fix; a further kind of sensor is a further member of this union."""
 
 
@@ -39,6 +39,8 @@ class Course(NamedTuple):
 
     position: Enu
     speed_m_s: float
+    velocity: Enu | None = None
+    """Fly at this velocity instead, until the next command; the position is where that leads."""
 
 
 class Received(NamedTuple):
@@ -195,6 +197,10 @@ class Application:
 
     def on_hello(self, frame: bytes, now_ns: int) -> None:
         """A neighbor's hello, routing header first: it says where that neighbor flies."""
+
+    def hello_frames(self, now_ns: int) -> bytes:
+        """MAVLink frames for the hello that goes out now: it reaches neighbors sooner than any flood does."""
+        return b""
 
     def permits(self, course: Course, now_ns: int) -> bool:
         """Whether a course that another application has commanded may be flown now."""

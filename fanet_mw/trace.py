@@ -120,6 +120,35 @@ class Arrived(NamedTuple):
     survivor: int
 
 
+class Confirmed(NamedTuple):
+    """A UAV confirmed a survivor at close range, at the place that it announced."""
+
+    t_ns: int
+    node: int
+    survivor: int
+    east_m: float
+    north_m: float
+
+
+class Planned(NamedTuple):
+    """A UAV took over a plan of the search, and its place in it; place -1: it has none."""
+
+    t_ns: int
+    node: int
+    revision: int
+    place: int
+
+
+class Posed(NamedTuple):
+    """Where a UAV truly was."""
+
+    t_ns: int
+    node: int
+    east_m: float
+    north_m: float
+    up_m: float
+
+
 class Collided(NamedTuple):
     """Two bodies touched; `other` 0 is the ground."""
 
@@ -224,6 +253,9 @@ Record = (
     | Detected
     | Approaching
     | Arrived
+    | Confirmed
+    | Planned
+    | Posed
     | Collided
     | ConflictForeseen
     | Warned
@@ -246,6 +278,9 @@ _KINDS: Final[dict[str, type[Any]]] = {
     "detected": Detected,
     "approaching": Approaching,
     "arrived": Arrived,
+    "confirmed": Confirmed,
+    "planned": Planned,
+    "posed": Posed,
     "collided": Collided,
     "conflict_foreseen": ConflictForeseen,
     "warned": Warned,
@@ -316,7 +351,8 @@ def parse(text: str) -> Record:
 
 
 __all__ = [
-    "Approaching", "Arrived", "BoundStated", "ClockSampled", "Collided", "ConflictForeseen", "ConflictOver",
-    "DeadlineLost", "DeadlineMet", "Delivered", "Detected", "DropReason", "Dropped", "Generated", "LetOut",
-    "LikelyStated", "ProcessEnded", "RadioFault", "Record", "RoleChanged", "Warned", "kind_of", "line", "parse",
+    "Approaching", "Arrived", "BoundStated", "ClockSampled", "Collided", "Confirmed", "ConflictForeseen",
+    "ConflictOver", "DeadlineLost", "DeadlineMet", "Delivered", "Detected", "DropReason", "Dropped", "Generated",
+    "LetOut", "LikelyStated", "Planned", "Posed", "ProcessEnded", "RadioFault", "Record", "RoleChanged", "Warned",
+    "kind_of", "line", "parse",
 ]  # fmt: skip

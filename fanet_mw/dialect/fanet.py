@@ -376,6 +376,10 @@ MAVLINK_MSG_ID_FANET_LINKS = 53011
 MAVLINK_MSG_ID_FANET_MESSAGE = 53012
 MAVLINK_MSG_ID_FANET_RECEIPT = 53013
 MAVLINK_MSG_ID_FANET_TARGETS = 53014
+MAVLINK_MSG_ID_FANET_SEARCH = 53020
+MAVLINK_MSG_ID_FANET_STATUS = 53021
+MAVLINK_MSG_ID_FANET_BIDS = 53022
+MAVLINK_MSG_ID_FANET_FOUND = 53023
 
 
 class MAVLink_fanet_route_message(MAVLink_message):
@@ -1086,6 +1090,199 @@ class MAVLink_fanet_targets_message(MAVLink_message):
 setattr(MAVLink_fanet_targets_message, "name", mavlink_msg_deprecated_name_property())
 
 
+class MAVLink_fanet_search_message(MAVLink_message):
+    """
+    The plan of a search: a formation, when it sweeps, and which node
+    takes which place of it. Two lines abreast begin beside the middle
+    of the area and part; a chain of relays lies between them,
+    followers fly behind.
+    """
+
+    id = MAVLINK_MSG_ID_FANET_SEARCH
+    msgname = "FANET_SEARCH"
+    fieldnames = ["start_us", "half_width", "first", "last", "height", "speed", "deploy_ds", "revision", "planner", "nodes", "lanes", "relays", "followers", "version"]
+    ordered_fieldnames = ["start_us", "half_width", "first", "last", "height", "speed", "deploy_ds", "revision", "planner", "nodes", "lanes", "relays", "followers", "version"]
+    fieldtypes = ["uint64_t", "float", "float", "float", "float", "float", "uint16_t", "uint16_t", "uint16_t", "uint16_t", "uint8_t", "uint8_t", "uint8_t", "uint8_t"]
+    fielddisplays_by_name: Dict[str, str] = {}
+    fieldenums_by_name: Dict[str, str] = {}
+    fieldunits_by_name: Dict[str, str] = {"start_us": "us", "half_width": "m", "first": "m", "last": "m", "height": "m", "speed": "m/s", "deploy_ds": "ds"}
+    native_format = bytearray(b"<QfffffHHHHBBBB")
+    orders = [0, 1, 2, 3, 4, 5, 6, 7, 8, 9, 10, 11, 12, 13]
+    lengths = [1, 1, 1, 1, 1, 1, 1, 1, 1, 80, 1, 1, 1, 1]
+    array_lengths = [0, 0, 0, 0, 0, 0, 0, 0, 0, 80, 0, 0, 0, 0]
+    crc_extra = 79
+    unpacker = struct.Struct("<QfffffHHH80HBBBB")
+    instance_field = None
+    instance_offset = -1
+
+    def __init__(self, start_us: int, half_width: float, first: float, last: float, height: float, speed: float, deploy_ds: int, revision: int, planner: int, nodes: Sequence[int], lanes: int, relays: int, followers: int, version: int):
+        MAVLink_message.__init__(self, MAVLink_fanet_search_message.id, MAVLink_fanet_search_message.msgname)
+        self._fieldnames = MAVLink_fanet_search_message.fieldnames
+        self._instance_field = MAVLink_fanet_search_message.instance_field
+        self._instance_offset = MAVLink_fanet_search_message.instance_offset
+        self.start_us = start_us
+        self.half_width = half_width
+        self.first = first
+        self.last = last
+        self.height = height
+        self.speed = speed
+        self.deploy_ds = deploy_ds
+        self.revision = revision
+        self.planner = planner
+        self.nodes = nodes
+        self.lanes = lanes
+        self.relays = relays
+        self.followers = followers
+        self.version = version
+
+    def pack(self, mav: "MAVLink", force_mavlink1: bool = False) -> bytes:
+        return self._pack(mav, self.crc_extra, self.unpacker.pack(self.start_us, self.half_width, self.first, self.last, self.height, self.speed, self.deploy_ds, self.revision, self.planner, self.nodes[0], self.nodes[1], self.nodes[2], self.nodes[3], self.nodes[4], self.nodes[5], self.nodes[6], self.nodes[7], self.nodes[8], self.nodes[9], self.nodes[10], self.nodes[11], self.nodes[12], self.nodes[13], self.nodes[14], self.nodes[15], self.nodes[16], self.nodes[17], self.nodes[18], self.nodes[19], self.nodes[20], self.nodes[21], self.nodes[22], self.nodes[23], self.nodes[24], self.nodes[25], self.nodes[26], self.nodes[27], self.nodes[28], self.nodes[29], self.nodes[30], self.nodes[31], self.nodes[32], self.nodes[33], self.nodes[34], self.nodes[35], self.nodes[36], self.nodes[37], self.nodes[38], self.nodes[39], self.nodes[40], self.nodes[41], self.nodes[42], self.nodes[43], self.nodes[44], self.nodes[45], self.nodes[46], self.nodes[47], self.nodes[48], self.nodes[49], self.nodes[50], self.nodes[51], self.nodes[52], self.nodes[53], self.nodes[54], self.nodes[55], self.nodes[56], self.nodes[57], self.nodes[58], self.nodes[59], self.nodes[60], self.nodes[61], self.nodes[62], self.nodes[63], self.nodes[64], self.nodes[65], self.nodes[66], self.nodes[67], self.nodes[68], self.nodes[69], self.nodes[70], self.nodes[71], self.nodes[72], self.nodes[73], self.nodes[74], self.nodes[75], self.nodes[76], self.nodes[77], self.nodes[78], self.nodes[79], self.lanes, self.relays, self.followers, self.version), force_mavlink1=force_mavlink1)
+
+
+# Define name on the class for backwards compatibility (it is now msgname).
+# Done with setattr to hide the class variable from mypy.
+setattr(MAVLink_fanet_search_message, "name", mavlink_msg_deprecated_name_property())
+
+
+class MAVLink_fanet_status_message(MAVLink_message):
+    """
+    A UAV says where it is and how it is, for those who plan.
+    """
+
+    id = MAVLINK_MSG_ID_FANET_STATUS
+    msgname = "FANET_STATUS"
+    fieldnames = ["t_us", "east", "north", "up", "node", "revision", "charge", "version"]
+    ordered_fieldnames = ["t_us", "east", "north", "up", "node", "revision", "charge", "version"]
+    fieldtypes = ["uint64_t", "float", "float", "float", "uint16_t", "uint16_t", "uint8_t", "uint8_t"]
+    fielddisplays_by_name: Dict[str, str] = {}
+    fieldenums_by_name: Dict[str, str] = {}
+    fieldunits_by_name: Dict[str, str] = {"t_us": "us", "east": "m", "north": "m", "up": "m", "charge": "%"}
+    native_format = bytearray(b"<QfffHHBB")
+    orders = [0, 1, 2, 3, 4, 5, 6, 7]
+    lengths = [1, 1, 1, 1, 1, 1, 1, 1]
+    array_lengths = [0, 0, 0, 0, 0, 0, 0, 0]
+    crc_extra = 199
+    unpacker = struct.Struct("<QfffHHBB")
+    instance_field = None
+    instance_offset = -1
+
+    def __init__(self, t_us: int, east: float, north: float, up: float, node: int, revision: int, charge: int, version: int):
+        MAVLink_message.__init__(self, MAVLink_fanet_status_message.id, MAVLink_fanet_status_message.msgname)
+        self._fieldnames = MAVLink_fanet_status_message.fieldnames
+        self._instance_field = MAVLink_fanet_status_message.instance_field
+        self._instance_offset = MAVLink_fanet_status_message.instance_offset
+        self.t_us = t_us
+        self.east = east
+        self.north = north
+        self.up = up
+        self.node = node
+        self.revision = revision
+        self.charge = charge
+        self.version = version
+
+    def pack(self, mav: "MAVLink", force_mavlink1: bool = False) -> bytes:
+        return self._pack(mav, self.crc_extra, self.unpacker.pack(self.t_us, self.east, self.north, self.up, self.node, self.revision, self.charge, self.version), force_mavlink1=force_mavlink1)
+
+
+# Define name on the class for backwards compatibility (it is now msgname).
+# Done with setattr to hide the class variable from mypy.
+setattr(MAVLink_fanet_status_message, "name", mavlink_msg_deprecated_name_property())
+
+
+class MAVLink_fanet_bids_message(MAVLink_message):
+    """
+    The best bids for tasks that the sender knows of, its own among
+    them: who would be with a survivor how soon.
+    """
+
+    id = MAVLINK_MSG_ID_FANET_BIDS
+    msgname = "FANET_BIDS"
+    fieldnames = ["survivors", "bidders", "etas_ds", "serials", "node", "ages_s", "count", "version"]
+    ordered_fieldnames = ["survivors", "bidders", "etas_ds", "serials", "node", "ages_s", "count", "version"]
+    fieldtypes = ["uint16_t", "uint16_t", "uint16_t", "uint16_t", "uint16_t", "uint8_t", "uint8_t", "uint8_t"]
+    fielddisplays_by_name: Dict[str, str] = {}
+    fieldenums_by_name: Dict[str, str] = {}
+    fieldunits_by_name: Dict[str, str] = {"etas_ds": "ds", "ages_s": "s"}
+    native_format = bytearray(b"<HHHHHBBB")
+    orders = [0, 1, 2, 3, 4, 5, 6, 7]
+    lengths = [12, 12, 12, 12, 1, 12, 1, 1]
+    array_lengths = [12, 12, 12, 12, 0, 12, 0, 0]
+    crc_extra = 212
+    unpacker = struct.Struct("<12H12H12H12HH12BBB")
+    instance_field = None
+    instance_offset = -1
+
+    def __init__(self, survivors: Sequence[int], bidders: Sequence[int], etas_ds: Sequence[int], serials: Sequence[int], node: int, ages_s: Sequence[int], count: int, version: int):
+        MAVLink_message.__init__(self, MAVLink_fanet_bids_message.id, MAVLink_fanet_bids_message.msgname)
+        self._fieldnames = MAVLink_fanet_bids_message.fieldnames
+        self._instance_field = MAVLink_fanet_bids_message.instance_field
+        self._instance_offset = MAVLink_fanet_bids_message.instance_offset
+        self.survivors = survivors
+        self.bidders = bidders
+        self.etas_ds = etas_ds
+        self.serials = serials
+        self.node = node
+        self.ages_s = ages_s
+        self.count = count
+        self.version = version
+
+    def pack(self, mav: "MAVLink", force_mavlink1: bool = False) -> bytes:
+        return self._pack(mav, self.crc_extra, self.unpacker.pack(self.survivors[0], self.survivors[1], self.survivors[2], self.survivors[3], self.survivors[4], self.survivors[5], self.survivors[6], self.survivors[7], self.survivors[8], self.survivors[9], self.survivors[10], self.survivors[11], self.bidders[0], self.bidders[1], self.bidders[2], self.bidders[3], self.bidders[4], self.bidders[5], self.bidders[6], self.bidders[7], self.bidders[8], self.bidders[9], self.bidders[10], self.bidders[11], self.etas_ds[0], self.etas_ds[1], self.etas_ds[2], self.etas_ds[3], self.etas_ds[4], self.etas_ds[5], self.etas_ds[6], self.etas_ds[7], self.etas_ds[8], self.etas_ds[9], self.etas_ds[10], self.etas_ds[11], self.serials[0], self.serials[1], self.serials[2], self.serials[3], self.serials[4], self.serials[5], self.serials[6], self.serials[7], self.serials[8], self.serials[9], self.serials[10], self.serials[11], self.node, self.ages_s[0], self.ages_s[1], self.ages_s[2], self.ages_s[3], self.ages_s[4], self.ages_s[5], self.ages_s[6], self.ages_s[7], self.ages_s[8], self.ages_s[9], self.ages_s[10], self.ages_s[11], self.count, self.version), force_mavlink1=force_mavlink1)
+
+
+# Define name on the class for backwards compatibility (it is now msgname).
+# Done with setattr to hide the class variable from mypy.
+setattr(MAVLink_fanet_bids_message, "name", mavlink_msg_deprecated_name_property())
+
+
+class MAVLink_fanet_found_message(MAVLink_message):
+    """
+    Where a survivor is estimated to be, with covariance; or that it
+    is confirmed there.
+    """
+
+    id = MAVLINK_MSG_ID_FANET_FOUND
+    msgname = "FANET_FOUND"
+    fieldnames = ["t_us", "survivor", "east", "north", "east_variance", "covariance", "north_variance", "node", "confirmed", "version"]
+    ordered_fieldnames = ["t_us", "survivor", "east", "north", "east_variance", "covariance", "north_variance", "node", "confirmed", "version"]
+    fieldtypes = ["uint64_t", "uint32_t", "float", "float", "float", "float", "float", "uint16_t", "uint8_t", "uint8_t"]
+    fielddisplays_by_name: Dict[str, str] = {}
+    fieldenums_by_name: Dict[str, str] = {}
+    fieldunits_by_name: Dict[str, str] = {"t_us": "us", "east": "m", "north": "m"}
+    native_format = bytearray(b"<QIfffffHBB")
+    orders = [0, 1, 2, 3, 4, 5, 6, 7, 8, 9]
+    lengths = [1, 1, 1, 1, 1, 1, 1, 1, 1, 1]
+    array_lengths = [0, 0, 0, 0, 0, 0, 0, 0, 0, 0]
+    crc_extra = 195
+    unpacker = struct.Struct("<QIfffffHBB")
+    instance_field = None
+    instance_offset = -1
+
+    def __init__(self, t_us: int, survivor: int, east: float, north: float, east_variance: float, covariance: float, north_variance: float, node: int, confirmed: int, version: int):
+        MAVLink_message.__init__(self, MAVLink_fanet_found_message.id, MAVLink_fanet_found_message.msgname)
+        self._fieldnames = MAVLink_fanet_found_message.fieldnames
+        self._instance_field = MAVLink_fanet_found_message.instance_field
+        self._instance_offset = MAVLink_fanet_found_message.instance_offset
+        self.t_us = t_us
+        self.survivor = survivor
+        self.east = east
+        self.north = north
+        self.east_variance = east_variance
+        self.covariance = covariance
+        self.north_variance = north_variance
+        self.node = node
+        self.confirmed = confirmed
+        self.version = version
+
+    def pack(self, mav: "MAVLink", force_mavlink1: bool = False) -> bytes:
+        return self._pack(mav, self.crc_extra, self.unpacker.pack(self.t_us, self.survivor, self.east, self.north, self.east_variance, self.covariance, self.north_variance, self.node, self.confirmed, self.version), force_mavlink1=force_mavlink1)
+
+
+# Define name on the class for backwards compatibility (it is now msgname).
+# Done with setattr to hide the class variable from mypy.
+setattr(MAVLink_fanet_found_message, "name", mavlink_msg_deprecated_name_property())
+
+
 mavlink_map: Dict[int, Type[MAVLink_message]] = {
     MAVLINK_MSG_ID_FANET_ROUTE: MAVLink_fanet_route_message,
     MAVLINK_MSG_ID_FANET_BEACON: MAVLink_fanet_beacon_message,
@@ -1102,6 +1299,10 @@ mavlink_map: Dict[int, Type[MAVLink_message]] = {
     MAVLINK_MSG_ID_FANET_MESSAGE: MAVLink_fanet_message_message,
     MAVLINK_MSG_ID_FANET_RECEIPT: MAVLink_fanet_receipt_message,
     MAVLINK_MSG_ID_FANET_TARGETS: MAVLink_fanet_targets_message,
+    MAVLINK_MSG_ID_FANET_SEARCH: MAVLink_fanet_search_message,
+    MAVLINK_MSG_ID_FANET_STATUS: MAVLink_fanet_status_message,
+    MAVLINK_MSG_ID_FANET_BIDS: MAVLink_fanet_bids_message,
+    MAVLINK_MSG_ID_FANET_FOUND: MAVLink_fanet_found_message,
 }
 
 
@@ -2043,3 +2244,157 @@ class MAVLink(object):
 
         """
         self.send(self.fanet_targets_encode(nodes, count, version), force_mavlink1=force_mavlink1)
+
+    def fanet_search_encode(self, start_us: int, half_width: float, first: float, last: float, height: float, speed: float, deploy_ds: int, revision: int, planner: int, nodes: Sequence[int], lanes: int, relays: int, followers: int, version: int) -> MAVLink_fanet_search_message:
+        """
+        The plan of a search: a formation, when it sweeps, and which node
+        takes which place of it. Two lines abreast begin beside the
+        middle of the area and part; a chain of relays lies between
+        them, followers fly behind.
+
+        start_us                  : When everyone leaves for its place. [us] (type:uint64_t)
+        half_width                : How far the outermost lanes are from the middle. [m] (type:float)
+        first                     : How far from the middle each line is when its sweep begins. [m] (type:float)
+        last                      : How far it is where it turns. [m] (type:float)
+        height                    : At which the lines fly. [m] (type:float)
+        speed                     : Of the sweep. [m/s] (type:float)
+        deploy_ds                 : How long everyone has to reach its place. [ds] (type:uint16_t)
+        revision                  : A higher one replaces a lower one; of equal ones the planner with the lower id prevails. (type:uint16_t)
+        planner                   : The node that made it. (type:uint16_t)
+        nodes                     : The node of each place: line 0 from west to east, line 1, the chain from line 0, followers; 0: vacant. (type:uint16_t)
+        lanes                     : Places of each line. (type:uint8_t)
+        relays                    : Places of the chain. (type:uint8_t)
+        followers                 : Places behind the lines. (type:uint8_t)
+        version                   : 1. (type:uint8_t)
+
+        """
+        return MAVLink_fanet_search_message(start_us, half_width, first, last, height, speed, deploy_ds, revision, planner, nodes, lanes, relays, followers, version)
+
+    def fanet_search_send(self, start_us: int, half_width: float, first: float, last: float, height: float, speed: float, deploy_ds: int, revision: int, planner: int, nodes: Sequence[int], lanes: int, relays: int, followers: int, version: int, force_mavlink1: bool = False) -> None:
+        """
+        The plan of a search: a formation, when it sweeps, and which node
+        takes which place of it. Two lines abreast begin beside the
+        middle of the area and part; a chain of relays lies between
+        them, followers fly behind.
+
+        start_us                  : When everyone leaves for its place. [us] (type:uint64_t)
+        half_width                : How far the outermost lanes are from the middle. [m] (type:float)
+        first                     : How far from the middle each line is when its sweep begins. [m] (type:float)
+        last                      : How far it is where it turns. [m] (type:float)
+        height                    : At which the lines fly. [m] (type:float)
+        speed                     : Of the sweep. [m/s] (type:float)
+        deploy_ds                 : How long everyone has to reach its place. [ds] (type:uint16_t)
+        revision                  : A higher one replaces a lower one; of equal ones the planner with the lower id prevails. (type:uint16_t)
+        planner                   : The node that made it. (type:uint16_t)
+        nodes                     : The node of each place: line 0 from west to east, line 1, the chain from line 0, followers; 0: vacant. (type:uint16_t)
+        lanes                     : Places of each line. (type:uint8_t)
+        relays                    : Places of the chain. (type:uint8_t)
+        followers                 : Places behind the lines. (type:uint8_t)
+        version                   : 1. (type:uint8_t)
+
+        """
+        self.send(self.fanet_search_encode(start_us, half_width, first, last, height, speed, deploy_ds, revision, planner, nodes, lanes, relays, followers, version), force_mavlink1=force_mavlink1)
+
+    def fanet_status_encode(self, t_us: int, east: float, north: float, up: float, node: int, revision: int, charge: int, version: int) -> MAVLink_fanet_status_message:
+        """
+        A UAV says where it is and how it is, for those who plan.
+
+        t_us                      : When. [us] (type:uint64_t)
+        east                      : Where it is. [m] (type:float)
+        north                     : Where it is. [m] (type:float)
+        up                        : Where it is. [m] (type:float)
+        node                      : Which node. (type:uint16_t)
+        revision                  : The plan it flies by; 0: none. (type:uint16_t)
+        charge                    : What is left in its battery. [%] (type:uint8_t)
+        version                   : 1. (type:uint8_t)
+
+        """
+        return MAVLink_fanet_status_message(t_us, east, north, up, node, revision, charge, version)
+
+    def fanet_status_send(self, t_us: int, east: float, north: float, up: float, node: int, revision: int, charge: int, version: int, force_mavlink1: bool = False) -> None:
+        """
+        A UAV says where it is and how it is, for those who plan.
+
+        t_us                      : When. [us] (type:uint64_t)
+        east                      : Where it is. [m] (type:float)
+        north                     : Where it is. [m] (type:float)
+        up                        : Where it is. [m] (type:float)
+        node                      : Which node. (type:uint16_t)
+        revision                  : The plan it flies by; 0: none. (type:uint16_t)
+        charge                    : What is left in its battery. [%] (type:uint8_t)
+        version                   : 1. (type:uint8_t)
+
+        """
+        self.send(self.fanet_status_encode(t_us, east, north, up, node, revision, charge, version), force_mavlink1=force_mavlink1)
+
+    def fanet_bids_encode(self, survivors: Sequence[int], bidders: Sequence[int], etas_ds: Sequence[int], serials: Sequence[int], node: int, ages_s: Sequence[int], count: int, version: int) -> MAVLink_fanet_bids_message:
+        """
+        The best bids for tasks that the sender knows of, its own among them:
+        who would be with a survivor how soon.
+
+        survivors                 : Which survivor each is for. (type:uint16_t)
+        bidders                   : Who bids. (type:uint16_t)
+        etas_ds                   : How long that node needs from the time of its bid; 65535: it takes its bid back. [ds] (type:uint16_t)
+        serials                   : Of several bids of a node for a survivor, the one with the highest number counts. (type:uint16_t)
+        node                      : The sender. (type:uint16_t)
+        ages_s                    : How long ago the bidder last stood by each. [s] (type:uint8_t)
+        count                     : How many entries are used. (type:uint8_t)
+        version                   : 1. (type:uint8_t)
+
+        """
+        return MAVLink_fanet_bids_message(survivors, bidders, etas_ds, serials, node, ages_s, count, version)
+
+    def fanet_bids_send(self, survivors: Sequence[int], bidders: Sequence[int], etas_ds: Sequence[int], serials: Sequence[int], node: int, ages_s: Sequence[int], count: int, version: int, force_mavlink1: bool = False) -> None:
+        """
+        The best bids for tasks that the sender knows of, its own among them:
+        who would be with a survivor how soon.
+
+        survivors                 : Which survivor each is for. (type:uint16_t)
+        bidders                   : Who bids. (type:uint16_t)
+        etas_ds                   : How long that node needs from the time of its bid; 65535: it takes its bid back. [ds] (type:uint16_t)
+        serials                   : Of several bids of a node for a survivor, the one with the highest number counts. (type:uint16_t)
+        node                      : The sender. (type:uint16_t)
+        ages_s                    : How long ago the bidder last stood by each. [s] (type:uint8_t)
+        count                     : How many entries are used. (type:uint8_t)
+        version                   : 1. (type:uint8_t)
+
+        """
+        self.send(self.fanet_bids_encode(survivors, bidders, etas_ds, serials, node, ages_s, count, version), force_mavlink1=force_mavlink1)
+
+    def fanet_found_encode(self, t_us: int, survivor: int, east: float, north: float, east_variance: float, covariance: float, north_variance: float, node: int, confirmed: int, version: int) -> MAVLink_fanet_found_message:
+        """
+        Where a survivor is estimated to be, with covariance; or that it is
+        confirmed there.
+
+        t_us                      : When that was estimated, or confirmed. [us] (type:uint64_t)
+        survivor                  : Which one. (type:uint32_t)
+        east                      : Where. [m] (type:float)
+        north                     : Where. [m] (type:float)
+        east_variance             : Variance of east, in square metres. (type:float)
+        covariance                : Covariance of east and north, in square metres. (type:float)
+        north_variance            : Variance of north, in square metres. (type:float)
+        node                      : Who estimated it, or confirmed it. (type:uint16_t)
+        confirmed                 : 1: seen or heard at close range; nobody needs to go there any more. (type:uint8_t)
+        version                   : 1. (type:uint8_t)
+
+        """
+        return MAVLink_fanet_found_message(t_us, survivor, east, north, east_variance, covariance, north_variance, node, confirmed, version)
+
+    def fanet_found_send(self, t_us: int, survivor: int, east: float, north: float, east_variance: float, covariance: float, north_variance: float, node: int, confirmed: int, version: int, force_mavlink1: bool = False) -> None:
+        """
+        Where a survivor is estimated to be, with covariance; or that it is
+        confirmed there.
+
+        t_us                      : When that was estimated, or confirmed. [us] (type:uint64_t)
+        survivor                  : Which one. (type:uint32_t)
+        east                      : Where. [m] (type:float)
+        north                     : Where. [m] (type:float)
+        east_variance             : Variance of east, in square metres. (type:float)
+        covariance                : Covariance of east and north, in square metres. (type:float)
+        north_variance            : Variance of north, in square metres. (type:float)
+        node                      : Who estimated it, or confirmed it. (type:uint16_t)
+        confirmed                 : 1: seen or heard at close range; nobody needs to go there any more. (type:uint8_t)
+        version                   : 1. (type:uint8_t)
+
+        """
+        self.send(self.fanet_found_encode(t_us, survivor, east, north, east_variance, covariance, north_variance, node, confirmed, version), force_mavlink1=force_mavlink1)

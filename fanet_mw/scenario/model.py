@@ -331,6 +331,12 @@ class Mission(Section):
     """Share of the survivors that lie under rubble (`sensors.burial_phone_db`, `sensors.burial_voice_db`)."""
     reports_to_approach: Count = 3
     """A UAV approaches when this many different nodes have reported the same survivor (paper, 4.1)."""
+    search: Literal["none", "lines"] = "none"
+    """`lines`: UAVs search by a plan that one of them makes and hands out over the air, in two lines abreast that part
+    from the middle of the area; of those who find, `responders` go. `none`: the paper's rule, by which everyone goes
+    who has heard enough reports."""
+    responders: Annotated[int, Field(ge=1, le=1000)] = 3
+    """`search`: as many UAVs go to a survivor, chosen by auction; the others search on."""
     report_interval_s: Interval = 5.0
     """How often a UAV repeats its report of a survivor it still hears."""
     scan_interval_s: Interval = 1.0

@@ -299,6 +299,14 @@ def decode_every(spec: Spec, frame: bytes) -> list[tuple[Any, ...]]:
     return found
 
 
+def fields_of_each(frame: bytes) -> Iterator[tuple[Spec, tuple[Any, ...]]]:
+    """The fields of each inner frame that is one of our messages; raises MalformedFrameError."""
+    for msgid, inner in inner_frames(frame):
+        spec = _OURS.get(msgid)
+        if spec is not None and inner[1] == spec.layout.size:
+            yield spec, spec.layout.unpack_from(inner, 10)
+
+
 def decode_first(spec: Spec, frame: bytes) -> tuple[Any, ...]:
     """The fields of the first inner frame with this message; raises MalformedFrameError."""
     found = decode_every(spec, frame)
@@ -307,7 +315,8 @@ def decode_first(spec: Spec, frame: bytes) -> tuple[Any, ...]:
     return found[0]
 
 
-# The codecs of these messages are in `inner`, `digest`, `places`, `claims`, `links`, `message` and `routing.control`.
+# The codecs of these messages are in `inner`, `digest`, `places`, `claims`, `links`, `message`, `search` and
+# `routing.control`.
 BEACON: Final = Spec(53001, 43, struct.Struct("<IHHHHHHHBBB"))
 SCHEDULE: Final = Spec(53002, 88, struct.Struct("<QIIIHHH56H56HBBBB"))
 SURVIVOR: Final = Spec(53003, 240, struct.Struct("<QIffffHB"))
@@ -322,9 +331,13 @@ LINKS: Final = Spec(53011, 92, struct.Struct("<IHH36H36H36B36bBBBB"))
 MESSAGE: Final = Spec(53012, 170, struct.Struct("<QIIIIHHHBBBB"))
 RECEIPT: Final = Spec(53013, 26, struct.Struct("<QIBB"))
 TARGETS: Final = Spec(53014, 54, struct.Struct("<32HBB"))
+SEARCH: Final = Spec(53020, 79, struct.Struct("<QfffffHHH80HBBBB"))
+STATUS: Final = Spec(53021, 199, struct.Struct("<QfffHHBB"))
+BIDS: Final = Spec(53022, 212, struct.Struct("<12H12H12H12HH12BBB"))
+FOUND: Final = Spec(53023, 195, struct.Struct("<QIfffffHBB"))
 SPECS: Final = (
     ROUTE, BEACON, SCHEDULE, SURVIVOR, CHUNK, TIME, JOIN, DIGEST, PLACES, CLAIMS, ROUTING, LINKS,
-    MESSAGE, RECEIPT, TARGETS,
+    MESSAGE, RECEIPT, TARGETS, SEARCH, STATUS, BIDS, FOUND,
 )  # fmt: skip
 _OURS: Final = {spec.msgid: spec for spec in SPECS}
 

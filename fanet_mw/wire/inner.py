@@ -5,7 +5,7 @@ sender of this project states. Digests, places, claims and links have files of t
 """
 
 from enum import IntEnum
-from typing import Final, NamedTuple, Self
+from typing import Any, Final, NamedTuple, Self
 
 from fanet_mw.errors import LocalProtocolError, MalformedFrameError
 from fanet_mw.units import US, Enu
@@ -191,7 +191,12 @@ class Survivor(NamedTuple):
 
     @classmethod
     def decode_frame(cls, frame: bytes) -> Self:
-        t_us, survivor, east, north, up, rssi_dbm, reporter, version = decode_first(SURVIVOR, frame)
+        return cls.checked(decode_first(SURVIVOR, frame))
+
+    @classmethod
+    def checked(cls, fields: tuple[Any, ...]) -> Self:
+        """The report of these fields; raises MalformedFrameError."""
+        t_us, survivor, east, north, up, rssi_dbm, reporter, version = fields
         _check(version, reporter, t_us=t_us)
         if not abs(rssi_dbm) <= MOST_DBM or not 0 < survivor <= MOST_SURVIVORS:  # true for what is not a number
             raise MalformedFrameError(f"rssi {rssi_dbm} of survivor {survivor}")

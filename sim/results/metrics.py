@@ -5,31 +5,24 @@ repeated = further deliveries of a packet at a target that already had it, whose
 delay    = from the hand-over by one application to the receipt by the other, per (packet, target)
 """
 
-import statistics
 from collections import Counter
 from collections.abc import Mapping
 from typing import Any
 
-import numpy as np
-
 from fanet_mw.errors import DropReason
 from fanet_mw.trace import (
-    Approaching,
-    Arrived,
-    Collided,
     DeadlineLost,
     DeadlineMet,
-    Detected,
     Dropped,
 )
 from fanet_mw.units import S
 from sim.results import delays, ledger, validity
 from sim.results.bounds import against_bounds, likely
 from sim.results.clocks import clock_errors
+from sim.results.mission import mission
 from sim.results.packets import APPS, Application, packets_of, targets_by_source
 from sim.run.outcome import Outcome
 from sim.world.separation import separation
-from sim.world.survivors import place
 
 
 def summarize(outcome: Outcome, *, trace_sha256: str) -> dict[str, Any]:
@@ -68,7 +61,7 @@ def summarize(outcome: Outcome, *, trace_sha256: str) -> dict[str, Any]:
         "likely": likely(sent),
         "clock": clock_errors(outcome),
         "admission": _admission(outcome),
-        "mission": _mission(outcome),
+        "mission": mission(outcome),
         "separation": separation(outcome),
         "processes": {
             "ready_s": round(outcome.ready_s, 3),
@@ -159,28 +152,4 @@ def _admission(outcome: Outcome) -> dict[str, Any]:
         "lost": sum(isinstance(record, DeadlineLost) for record in said),
         "met": sum(isinstance(record, DeadlineMet) for record in said),
         "nodes_without": sum(not met for met in last.values()),
-    }
-
-
-def _mission(outcome: Outcome) -> dict[str, Any]:
-    records, scenario = outcome.records, outcome.scenario
-    first: dict[int, int] = {}
-    errors: list[float] = []
-    truth = place(scenario)
-    for record in records:
-        if type(record) is Approaching:
-            first.setdefault(record.node, record.t_ns)
-            if not 1 <= record.survivor <= len(truth):
-                continue  # this survivor does not exist: the report of it was forged
-            at = truth[record.survivor - 1]
-            errors.append(float(np.hypot(at.east - record.east_m, at.north - record.north_m)))
-    return {
-        "survivors": scenario.mission.survivors,
-        "detected": len({r.survivor for r in records if type(r) is Detected}),
-        "approached": len({r.survivor for r in records if type(r) is Approaching}),
-        "reached": len({r.survivor for r in records if type(r) is Arrived}),
-        "uavs_approaching": len(first),
-        "time_to_approach_s": sorted(round(t_ns / S, 3) for t_ns in first.values()),
-        "localization_error_m": round(statistics.median(errors), 1) if errors else None,
-        "collisions": sum(1 for r in records if type(r) is Collided),
     }

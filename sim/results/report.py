@@ -126,6 +126,14 @@ def _mission_rows(mission: Mapping[str, Any]) -> Iterator[tuple[str, str]]:
         f"{mission['detected']} of {mission['survivors']} detected, {mission['approached']} approached, "
         f"{mission['reached']} reached",
     )
+    if mission["confirmed"]:
+        last_s, error_m = mission["time_to_confirm_s"][-1], mission["confirmed_error_m"]
+        yield "confirmed", f"{mission['confirmed']}, the last after {last_s:.0f} s, median error {error_m:.1f} m"
+    if mission["coverage"] is not None:
+        yield (
+            "search",
+            f"{mission['coverage']:.1%} of the area covered, connected {mission['connected']:.1%} of the time",
+        )
     times = mission["time_to_approach_s"]
     if times:
         middle = times[len(times) // 2]

@@ -18,7 +18,7 @@ from fanet_mw.bus.link_stats import LinkStats
 from fanet_mw.bus.messages import MavlinkTap
 from fanet_mw.errors import MalformedFrameError
 from fanet_mw.scenario import Scenario
-from fanet_mw.trace import Collided, ProcessEnded, RadioFault, Record
+from fanet_mw.trace import Collided, Posed, ProcessEnded, RadioFault, Record
 from fanet_mw.units import S
 
 _SLACK_NS: Final = 10 * S
@@ -27,7 +27,12 @@ _DEEPEST: Final = 6
 """The most levels of nesting in a report's JSON."""
 _MOST_RSSI_MDBM: Final = 400_000
 """The greatest magnitude of the mean RSSI of a link [1/1000 dBm]."""
-_SPEAKERS: Final[dict[type[Any], str | None]] = {Collided: "world", RadioFault: "emulator", ProcessEnded: None}
+_SPEAKERS: Final[dict[type[Any], str | None]] = {
+    Posed: "world",
+    Collided: "world",
+    RadioFault: "emulator",
+    ProcessEnded: None,
+}
 """The only actor that may send a kind of record; None: no actor may. All other kinds are sent by the node they name."""
 _ABOUT_NODES: Final = ("origin", "other", "reference")
 """The fields of records that name a node, or 0."""

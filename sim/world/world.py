@@ -16,7 +16,7 @@ from fanet_mw.bus.radio_control import Cut
 from fanet_mw.bus.topics import Topics, node_of
 from fanet_mw.rng import stream_seed
 from fanet_mw.scenario import Scenario
-from fanet_mw.trace import Collided
+from fanet_mw.trace import Collided, Posed
 from fanet_mw.units import NodeId, S
 from sim.world.energy import Energy
 from sim.world.engine import Engine
@@ -38,6 +38,8 @@ from sim.world.wind import Wind
 if TYPE_CHECKING:
     from sim.world.sight import Sight
 
+_TRACED_NS: Final = S
+"""How often positions go into the trace."""
 _STILL_NS: Final = S
 """How often a world in which nothing moves says so."""
 _WRECK_M: Final = 0.5
@@ -110,6 +112,7 @@ class World(Actor):
         self._separation = (
             Separation(scenario.mission.collision_distance_m) if scenario.mission.collision_distance_m else None
         )
+        self._moves = scenario.mobility.model != "static" or scenario.mission.survivors > 0
         self._malformed = 0
 
     # --- the actor contract ---------------------------------------------------------------------------------------
@@ -228,4 +231,8 @@ class World(Actor):
             self.outbox.append((self._obstruction_topic, self._sight.obstructions(at, now_ns)))
         states = array("d", np.hstack([at, velocity]).astype(np.float64).tobytes())
         self.outbox.append((self._pose_topic, Poses(now_ns, self._ids, states)))
+        if self._moves and now_ns // _TRACED_NS > before_ns // _TRACED_NS:
+            for node, (east, north, up) in zip(self._ids, at.tolist(), strict=True):
+                if self._flies[node - 1]:
+                    self.records.append(Posed(now_ns, node, round(east, 2), round(north, 2), round(up, 2)))
         self.outbox.extend(self._suite.readings(Truth(now_ns, at, velocity), self._flies, before_ns=before_ns))

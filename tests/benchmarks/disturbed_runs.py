@@ -41,7 +41,10 @@ _SMALL: Final = (
 _FLY: Final = ("mobility.model=random_waypoint", "mobility.speed_m_s=10", "world.area_m=600", "world.engine=kinematic")
 SCENARIOS: Final = {
     "flooding": ("flooding", (*_SMALL, *_FLY, "traffic.sources=4", "traffic.interval_s=1", "radio.lead_ms=20")),
-    "clustered": ("rescue", (*_SMALL, "mobility.model=static", "clusters.count=3", "clusters.flooding_period_s=1")),
+    "clustered": (
+        "rescue-paper",
+        (*_SMALL, "mobility.model=static", "clusters.count=3", "clusters.flooding_period_s=1"),
+    ),
     "turns": ("clusters", (*_SMALL, "traffic.sources=8", "clusters.count=8", "radio.lead_ms=40")),
 }
 _SEEDS: Final = (1, 2, 3)

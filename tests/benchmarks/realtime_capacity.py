@@ -1,7 +1,7 @@
 """How many UAV processes one machine holds in real time: `python tests/benchmarks/realtime_capacity.py [COUNT ...]`.
 
-The shipped rescue, 100 s, with more and more UAVs. Late frames are those that reach the medium after the instant they
-asked for; the mark is 0.1 %. What is used up is shown beside it: CPU of all processes over wall time and cores.
+Scenario rescue-paper, 100 s, with more and more UAVs. Late frames are those that reach the medium after the instant
+they asked for; the mark is 0.1 %. What is used up is shown beside it: CPU of all processes over wall time and cores.
 """
 
 import json
@@ -18,7 +18,7 @@ _SECONDS = 100
 def measure(count: int) -> tuple[dict[str, Any], dict[str, Any]]:
     with tempfile.TemporaryDirectory() as folder:
         command = [
-            sys.executable, "-m", "sim.cli.app", "launch", "rescue", "--json", "--out", folder,
+            sys.executable, "-m", "sim.cli.app", "launch", "rescue-paper", "--json", "--out", folder,
             "--set", f"nodes.count={count}", "--set", f"duration_s={_SECONDS}",
         ]  # fmt: skip
         subprocess.run(command, capture_output=True, check=False, timeout=300)

@@ -25,7 +25,7 @@ from sim.scenarios import catalog
 
 _SHIPPED: Final = {
     "clusters": 20, "contention_broadcast": 3, "contention_unicast": 3, "crossing": 20, "faults": 20, "flooding": 6,
-    "hidden_terminal": 6, "quick": 20, "rescue": 20, "rivals": 20, "town": 20,
+    "hidden_terminal": 6, "quick": 20, "rescue": 20, "rescue-paper": 20, "rivals": 20, "town": 20,
 }  # fmt: skip
 """Simulated seconds of each shipped scenario; of one that is not listed, `_OTHERS_S`."""
 _OTHERS_S: Final = 14

@@ -1,6 +1,6 @@
 """The mission of one UAV, as timelines."""
 
-from agents.mission import Mission
+from agents.mission.everyone import Mission
 from fanet_mw.application import HOME
 from fanet_mw.scenario import Mission as Config
 from fanet_mw.trace import Approaching, Arrived, Detected

@@ -148,7 +148,7 @@ def test_of_several_courses_the_last_is_flown_if_no_other_application_objects(
     made.receive(NAMES.sensor(OWN, "gps"), Gps(S, Enu(1, 2, 3), Enu(0, 0, 0)), S)
     assert diary.lines[1:] == [ELSEWHERE]
     flown = [message for _, message in made.outbox if isinstance(message, Setpoint)]
-    assert flown == ([Setpoint(S, *ELSEWHERE)] if willing else [])
+    assert flown == ([Setpoint(S, ELSEWHERE.position, ELSEWHERE.speed_m_s)] if willing else [])
 
 
 class Caller(Application):

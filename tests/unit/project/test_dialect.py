@@ -18,7 +18,7 @@ from fanet_mw.dialect import fanet
 
 ROOT = Path(__file__).resolve().parents[3]
 DIALECT = ROOT / "fanet_mw" / "dialect"
-_PAGES = ("air-format.md", "air-messages.md", "air-messages-clusters.md")
+_PAGES = ("air-format.md", "air-messages.md", "air-messages-clusters.md", "air-messages-search.md")
 DOCUMENT = "\n".join((ROOT / "docs" / "reference" / page).read_text(encoding="utf-8") for page in _PAGES)
 
 
@@ -142,7 +142,7 @@ def test_the_last_byte_on_the_wire_is_the_version(spec: wire.Spec) -> None:
 # --- the document -------------------------------------------------------------------------------------------------
 
 SIZES = {"uint64": "Q", "uint32": "I", "uint16": "H", "int16": "h", "uint8": "B", "int8": "b", "float": "f"}
-ROW = re.compile(r"^\| (\d+) \| `(\w+)` \| (\w+)(?:\[(\d+)\])? \| ([\w/]*) ?\| .+ \|$", re.MULTILINE)
+ROW = re.compile(r"^\| (\d+) \| `(\w+)` \| (\w+)(?:\[(\d+)\])? \| ([\w/%]*) ?\| .+ \|$", re.MULTILINE)
 
 
 @pytest.mark.parametrize("spec", wire.SPECS, ids=lambda spec: str(spec.msgid))

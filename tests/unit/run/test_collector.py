@@ -30,6 +30,7 @@ from fanet_mw.trace import (
     Detected,
     Dropped,
     Generated,
+    Posed,
     ProcessEnded,
     RadioFault,
     Record,
@@ -95,7 +96,7 @@ def genuine() -> Outcome:
 
 
 def speaker(record: Record) -> str:
-    return {Collided: "world", RadioFault: "emulator"}.get(type(record), f"agent-{record.node}")
+    return {Collided: "world", Posed: "world", RadioFault: "emulator"}.get(type(record), f"agent-{record.node}")
 
 
 def replay(ear: Ear, outcome: Outcome) -> None:

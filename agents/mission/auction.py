@@ -1,0 +1,108 @@
+"""Who goes: bids that neighbors pass on with their hellos until all who matter agree on the same winners.
+
+    a task needs n UAVs; of the bids known for it, the n with the earliest times of arrival win, ties to the lower id
+
+Every node keeps of each bidder the bid with the highest serial number and merges what it hears, so any two nodes that
+have heard the same bids name the same winners, in whatever order the bids came: the consensus of CBBA (Choi, Brunet,
+How, IEEE Transactions on Robotics 25(4), 2009) for tasks that are bid for one by one. A winner that falls silent is
+forgotten after a while, and the task is open again.
+"""
+
+from collections.abc import Iterable
+from typing import Final, NamedTuple
+
+from fanet_mw.units import NodeId, S
+from fanet_mw.wire.search import MOST_BIDS, WITHDRAWN, Bid
+
+_FORGOTTEN_NS: Final = 15 * S
+"""A bid that its bidder has not stood by for so long counts no more."""
+_OLDEST_S: Final = 255
+
+
+class _Known(NamedTuple):
+    eta_ds: int
+    serial: int
+    stood_ns: int
+
+
+class Auction:
+    """What one node knows of all bids."""
+
+    def __init__(self, node: NodeId) -> None:
+        self._node = node
+        self._bids: dict[int, dict[int, _Known]] = {}
+        self._serial = 0
+
+    def bid(self, survivor: int, *, eta_s: float, now_ns: int) -> None:
+        """Place our bid, in place of an earlier one."""
+        self._place(survivor, max(0, min(WITHDRAWN - 1, round(10 * eta_s))), now_ns)
+
+    def withdraw(self, survivor: int, *, now_ns: int) -> None:
+        """Take our bid back, if there is one."""
+        mine = self._bids.get(survivor, {}).get(self._node)
+        if mine is not None and mine.eta_ds != WITHDRAWN:
+            self._place(survivor, WITHDRAWN, now_ns)
+
+    def merge(self, bids: Iterable[Bid], *, now_ns: int) -> None:
+        """What another node knows. Our own bids we know best, unless we have started anew since."""
+        for bid in bids:
+            stood_ns = now_ns - bid.age_s * S
+            if stood_ns < now_ns - _FORGOTTEN_NS:
+                continue
+            of_task = self._bids.setdefault(bid.survivor, {})
+            known = of_task.get(bid.bidder)
+            if bid.bidder == self._node:
+                self._serial = max(self._serial, bid.serial)
+            elif known is None or (bid.serial, stood_ns) > (known.serial, known.stood_ns):
+                of_task[bid.bidder] = _Known(bid.eta_ds, bid.serial, stood_ns)
+
+    def close(self, survivor: int) -> None:
+        """The task is done."""
+        self._bids.pop(survivor, None)
+
+    def has_bid(self, survivor: int) -> bool:
+        """Whether our own bid stands."""
+        mine = self._bids.get(survivor, {}).get(self._node)
+        return mine is not None and mine.eta_ds != WITHDRAWN
+
+    def winners(self, survivor: int, *, count: int, now_ns: int) -> list[int]:
+        """The best bidders, best first."""
+        standing = [
+            (known.eta_ds, bidder)
+            for bidder, known in self._bids.get(survivor, {}).items()
+            if known.eta_ds != WITHDRAWN and self._counts(bidder, known, now_ns)
+        ]
+        return [bidder for _, bidder in sorted(standing)[:count]]
+
+    def would_win(self, survivor: int, *, eta_s: float, count: int, now_ns: int) -> bool:
+        """Whether a bid of ours would be among the best."""
+        before = self.winners(survivor, count=count, now_ns=now_ns)
+        if len(before) < count:
+            return True
+        worst = before[-1]
+        return (round(10 * eta_s), self._node) < (self._bids[survivor][worst].eta_ds, worst)
+
+    def told(self, tasks: Iterable[int], *, now_ns: int) -> list[Bid]:
+        """The bids to pass on: our own first, then the best of each open task, as many as one message holds."""
+        own: list[Bid] = []
+        others: list[tuple[int, Bid]] = []
+        for survivor in tasks:
+            for bidder, known in sorted(self._bids.get(survivor, {}).items()):
+                if not self._counts(bidder, known, now_ns):
+                    continue
+                age_s = 0 if bidder == self._node else min(_OLDEST_S, -((known.stood_ns - now_ns) // S))
+                bid = Bid(survivor, bidder, known.eta_ds, known.serial, age_s)
+                if bidder == self._node:
+                    own.append(bid)
+                else:
+                    others.append((known.eta_ds, bid))
+        others.sort()
+        return [*own, *(bid for _, bid in others)][:MOST_BIDS]
+
+    def _place(self, survivor: int, eta_ds: int, now_ns: int) -> None:
+        self._serial = (self._serial + 1) & 0xFFFF
+        self._bids.setdefault(survivor, {})[self._node] = _Known(eta_ds, self._serial, now_ns)
+
+    def _counts(self, bidder: int, known: _Known, now_ns: int) -> bool:
+        """True for a bid that is ours or that its bidder has stood by lately."""
+        return bidder == self._node or now_ns - known.stood_ns <= _FORGOTTEN_NS

@@ -1,0 +1,70 @@
+"""Which velocities keep a UAV clear of others, and which keep it in reach of those that it is tied to.
+
+Collision avoidance is ORCA (van den Berg, Guy, Lin, Manocha: Reciprocal n-Body Collision Avoidance, 2011): each of two
+takes half of the change that leads out of the velocity obstacle. What is known of the other is a received position and
+velocity; the older they are, the larger the clearance that is asked for, because the other may have turned since.
+"""
+
+import math
+from typing import Final
+
+from agents.mission.half_planes import HalfPlane, Velocity
+from fanet_mw.units import Enu
+
+_TURN_M_S2: Final = 1.0
+"""How fast another UAV's velocity is taken to change, on average, since it was last heard."""
+_MOST_GROWTH_M: Final = 12.0
+
+
+def grown_m(age_s: float) -> float:
+    """How much farther from its extrapolated place another UAV may be, after so long without word from it [m]."""
+    return min(_MOST_GROWTH_M, 0.5 * _TURN_M_S2 * age_s * age_s)
+
+
+def avoiding(
+    offset: Enu, velocity: Velocity, other_velocity: Velocity, *, clearance_m: float, horizon_s: float, share: float
+) -> HalfPlane:
+    """The half-plane of velocities that avoid one other body within the horizon.
+
+    `offset`: from us to it. `share`: of the change that is ours; 0.5 when it avoids as well, 1 when it does not.
+    """
+    px, py = offset.east, offset.north
+    vx, vy = velocity[0] - other_velocity[0], velocity[1] - other_velocity[1]
+    distance2 = px * px + py * py
+    radius2 = clearance_m * clearance_m
+    if distance2 <= radius2:  # too near already: part within a second
+        distance = math.sqrt(distance2)
+        nx, ny = (-px / distance, -py / distance) if distance > 1e-6 else (1.0, 0.0)
+        away = clearance_m - distance  # [m] within one second
+        ux_dot = away - (vx * nx + vy * ny)
+        return HalfPlane(nx, ny, velocity[0] * nx + velocity[1] * ny + share * ux_dot)
+    wx, wy = vx - px / horizon_s, vy - py / horizon_s
+    w_length2 = wx * wx + wy * wy
+    dot = wx * px + wy * py
+    if dot < 0.0 and dot * dot > radius2 * w_length2:  # the nearest border is the cut-off circle
+        w_length = math.sqrt(w_length2)
+        nx, ny = wx / w_length, wy / w_length
+        change = clearance_m / horizon_s - w_length
+    else:  # the nearest border is a leg of the cone
+        leg = math.sqrt(distance2 - radius2)
+        if px * wy - py * wx > 0.0:
+            dx, dy = (px * leg - py * clearance_m) / distance2, (px * clearance_m + py * leg) / distance2
+        else:
+            dx, dy = -(px * leg + py * clearance_m) / distance2, -(-px * clearance_m + py * leg) / distance2
+        nx, ny = -dy, dx
+        change = -(vx * nx + vy * ny)
+    return HalfPlane(nx, ny, velocity[0] * nx + velocity[1] * ny + share * change)
+
+
+def staying_near(offset: Enu, other_velocity: Velocity, *, tether_m: float, within_s: float) -> HalfPlane | None:
+    """The half-plane of velocities that do not carry us out of reach of another within a time; None when it is near.
+
+    Both may part; each answers for half of what is left of the tether.
+    """
+    distance = math.hypot(offset.east, offset.north)
+    if distance < 0.3 * tether_m:
+        return None
+    nx, ny = offset.east / distance, offset.north / distance
+    slack_m = tether_m - distance
+    parting = (slack_m / within_s) * (0.5 if slack_m > 0 else 1.0)
+    return HalfPlane(nx, ny, other_velocity[0] * nx + other_velocity[1] * ny - parting)

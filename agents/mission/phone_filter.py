@@ -1,0 +1,265 @@
+"""Where a phone is: the posterior over a grid, given received powers, of a phone whose own power is not known either.
+
+    RSSI_i = P + b - L0 - 10 n log10(d_i) + shadowing_i,   b ~ N(0, s_b^2),   shadowing ~ N(0, s^2)
+    nothing heard at i:   P(RSSI_i < threshold)
+
+The offset b (burial, antenna, battery) is integrated out in closed form, so a cell needs only the sums of the residuals
+and of their squares. A histogram filter as in Thrun, Burgard, Fox: Probabilistic Robotics, 2005, chapter 4: no starting
+point, and the mirror image that a straight flight leaves open stays in the posterior until somebody resolves it.
+A camera's or voice's sighting is a direct measurement of the place; from then on the estimate is a Kalman filter's.
+"""
+
+import math
+from functools import lru_cache
+from typing import Final, NamedTuple
+
+from fanet_mw.units import Enu
+
+REFERENCE_LOSS_DB: Final = 40.05
+"""Free-space loss at 1 m and 2.4 GHz."""
+_CELL_M: Final = 20.0
+_HALF_CELLS: Final = 16
+"""The grid reaches this many cells to each side of the place from which the phone was first heard."""
+_OFF_CENTER_M: Final = 120.0
+"""The grid is laid anew when the strongest sample is this far from its middle."""
+_DOUBT: Final = 1.5
+"""Samples near each other share shadowing, so that each counts for less than an independent one."""
+_SILENCE_M: Final = 450.0
+"""Silence farther away than this from where a phone was heard tells nothing."""
+_NEVER: Final = 0.02
+"""Some phones are not heard however near: a receiver misses them, or rubble lies between."""
+_STEP_M: Final = 5.0
+_SAME_PLACE_M: Final = 25.0
+"""Two samples of one node nearer than this share their shadowing, and count as one."""
+
+
+class Estimate(NamedTuple):
+    """A place on the ground, with covariance."""
+
+    east_m: float
+    north_m: float
+    east_variance_m2: float
+    covariance_m2: float
+    north_variance_m2: float
+
+    @property
+    def sigma_m(self) -> float:
+        """The standard deviation along the worst axis."""
+        mean = (self.east_variance_m2 + self.north_variance_m2) / 2
+        half = (self.east_variance_m2 - self.north_variance_m2) / 2
+        return math.sqrt(mean + math.hypot(half, self.covariance_m2))
+
+    def distance_m(self, place: Enu) -> float:
+        """On the ground."""
+        return math.hypot(self.east_m - place.east, self.north_m - place.north)
+
+
+class PhoneModel(NamedTuple):
+    """What is known of all phones before any is heard."""
+
+    power_dbm: float
+    exponent: float
+    shadowing_db: float
+    offset_db: float
+    """Standard deviation of a phone's own offset."""
+    threshold_dbm: float
+    """The least power that is heard."""
+
+
+class PhoneFilter:
+    """One phone."""
+
+    def __init__(self, model: PhoneModel) -> None:
+        self._model = model
+        self._silence = _silence_scores(model)
+        self._middle: Enu | None = None
+        self._silent_at: list[Enu] = []
+        self._scores: list[float] = []
+        """Twice the logarithm of how likely silence was, per cell."""
+        self._totals: list[float] = []
+        """The posterior: twice its logarithm, up to a constant."""
+        self._samples: list[tuple[Enu, float | None]] = []
+        """Places and received powers; None: nothing was heard there."""
+        self._pending: list[tuple[Enu, float | None]] = []
+        """What was heard since somebody last wanted to know."""
+        self._sums: list[float] = []
+        self._squares: list[float] = []
+        self._count = 0
+        self._taken: dict[int, list[Enu]] = {}
+        self._estimate: Estimate | None = None
+        self._seen: Estimate | None = None
+        """What direct sightings make of it."""
+
+    # --- measurements ---------------------------------------------------------------------------------------------
+
+    def heard(self, reporter: int, position: Enu, rssi_dbm: float) -> bool:
+        """A received power at a place; False when it tells nothing new."""
+        taken = self._taken.setdefault(reporter, [])
+        if any(_ground_m(p, position) < _SAME_PLACE_M for p in taken):
+            return False
+        taken.append(position)
+        if self._middle is None:
+            self._middle = position
+        self._pending.append((position, rssi_dbm))
+        return True
+
+    def silent(self, position: Enu) -> None:
+        """Nothing was heard at a place of our own."""
+        if self._middle is None or not self.near(position, within_m=_SILENCE_M):
+            return
+        if any(_ground_m(p, position) < _SAME_PLACE_M for p in self._silent_at):
+            return
+        self._silent_at.append(position)
+        self._pending.append((position, None))
+
+    def seen(self, east_m: float, north_m: float, *, sigma_m: float) -> None:
+        """A direct sighting of the place, by a camera say."""
+        before, variance = self._seen, sigma_m * sigma_m
+        if before is None:
+            self._seen = Estimate(east_m, north_m, variance, 0.0, variance)
+            return
+        gain = before.east_variance_m2 / (before.east_variance_m2 + variance)
+        self._seen = Estimate(
+            before.east_m + gain * (east_m - before.east_m),
+            before.north_m + gain * (north_m - before.north_m),
+            before.east_variance_m2 * (1 - gain),
+            0.0,
+            before.north_variance_m2 * (1 - gain),
+        )
+
+    @property
+    def is_seen(self) -> bool:
+        return self._seen is not None
+
+    # --- the estimate ---------------------------------------------------------------------------------------------
+
+    def estimate(self) -> Estimate | None:
+        """Mean and covariance; None before anything was measured."""
+        if self._seen is None:
+            self._catch_up()
+        return self._seen or self._estimate
+
+    def _catch_up(self) -> None:
+        """Take in what has been heard since the last time; lay the grid anew when its middle was a bad guess."""
+        if not self._pending:
+            return
+        assert self._middle is not None, "something was heard before anything is pending"
+        self._samples += self._pending
+        fresh, self._pending = self._pending, []
+        strongest = max((s for s in self._samples if s[1] is not None), key=lambda s: s[1] or 0.0)[0]
+        if not self._sums or _ground_m(self._middle, strongest) > _OFF_CENTER_M:
+            self._middle, fresh, self._count = strongest, self._samples, 0
+            cells = (2 * _HALF_CELLS + 1) ** 2
+            self._sums, self._squares, self._scores = [0.0] * cells, [0.0] * cells, [0.0] * cells
+        for position, rssi_dbm in fresh:
+            if rssi_dbm is None:
+                self._rule_out(position)
+            else:
+                self._update(position, rssi_dbm)
+                self._count += 1
+        self._estimate = self._moments()
+
+    def deficit(self, east_m: float, north_m: float) -> float:
+        """How much less likely a place is than the best one: twice the difference of the logarithms."""
+        self.estimate()
+        if self._middle is None or not self._totals:
+            return 0.0
+        i = round((east_m - self._middle.east) / _CELL_M) + _HALF_CELLS
+        j = round((north_m - self._middle.north) / _CELL_M) + _HALF_CELLS
+        if not (0 <= i <= 2 * _HALF_CELLS and 0 <= j <= 2 * _HALF_CELLS):
+            return math.inf
+        return max(self._totals) - self._totals[j * (2 * _HALF_CELLS + 1) + i]
+
+    def near(self, place: Enu, *, within_m: float) -> bool:
+        """Whether the phone was first heard no farther from a place; cheap, and True of what was only seen."""
+        middle = self._middle
+        return middle is None or _ground_m(middle, place) <= within_m
+
+    def _update(self, position: Enu, rssi_dbm: float) -> None:
+        assert self._middle is not None, "the grid lies around the first sample"
+        model = self._model
+        expected_at_1_m = model.power_dbm - REFERENCE_LOSS_DB
+        slope = 5 * model.exponent / math.log(10)  # per natural logarithm of the squared distance
+        residual_at_1_m = rssi_dbm - expected_at_1_m
+        up2 = max(1.0, position.up * position.up)
+        sums, squares, log = self._sums, self._squares, math.log
+        west = self._middle.east - _HALF_CELLS * _CELL_M - position.east
+        south = self._middle.north - _HALF_CELLS * _CELL_M - position.north
+        span = range(2 * _HALF_CELLS + 1)
+        east2 = [(west + i * _CELL_M) ** 2 for i in span]
+        at = 0
+        for j in span:
+            rest = (south + j * _CELL_M) ** 2 + up2
+            for i in span:
+                residual = residual_at_1_m + slope * log(east2[i] + rest)
+                sums[at] += residual
+                squares[at] += residual * residual
+                at += 1
+
+    def _rule_out(self, position: Enu) -> None:
+        """Cells from which the phone would have been heard become less likely."""
+        assert self._middle is not None, "the grid lies around the first sample"
+        scores, table, most, sqrt = self._scores, self._silence, len(self._silence) - 1, math.sqrt
+        west = self._middle.east - _HALF_CELLS * _CELL_M - position.east
+        south = self._middle.north - _HALF_CELLS * _CELL_M - position.north
+        span = range(2 * _HALF_CELLS + 1)
+        east2 = [(west + i * _CELL_M) ** 2 for i in span]
+        at = 0
+        for j in span:
+            rest = (south + j * _CELL_M) ** 2 + position.up * position.up
+            for i in span:
+                scores[at] += table[min(most, int(sqrt(east2[i] + rest) / _STEP_M))]
+                at += 1
+
+    def _moments(self) -> Estimate:
+        assert self._middle is not None, "only what was heard has moments"
+        model = self._model
+        per = 1 / (_DOUBT * max(model.shadowing_db, 1.0) ** 2)
+        shrink = per * per / (per * self._count + 1 / max(model.offset_db, 0.1) ** 2)
+        scores = [
+            shrink * s * s - per * q + silence
+            for s, q, silence in zip(self._sums, self._squares, self._scores, strict=True)
+        ]
+        self._totals = scores
+        best = max(scores)
+        total = mean_i = mean_j = ii = ij = jj = 0.0
+        width = 2 * _HALF_CELLS + 1
+        exp = math.exp
+        for at, score in enumerate(scores):
+            if score < best - 40.0:
+                continue
+            weight = exp(0.5 * (score - best))
+            j, i = divmod(at, width)
+            total += weight
+            mean_i += weight * i
+            mean_j += weight * j
+            ii += weight * i * i
+            ij += weight * i * j
+            jj += weight * j * j
+        mean_i, mean_j = mean_i / total, mean_j / total
+        cell2 = _CELL_M * _CELL_M
+        quantized = 1 / 12
+        return Estimate(
+            self._middle.east + (mean_i - _HALF_CELLS) * _CELL_M,
+            self._middle.north + (mean_j - _HALF_CELLS) * _CELL_M,
+            (max(0.0, ii / total - mean_i * mean_i) + quantized) * cell2,
+            (ij / total - mean_i * mean_j) * cell2,
+            (max(0.0, jj / total - mean_j * mean_j) + quantized) * cell2,
+        )
+
+
+def _ground_m(a: Enu, b: Enu) -> float:
+    return math.hypot(a.east - b.east, a.north - b.north)
+
+
+@lru_cache(maxsize=8)
+def _silence_scores(model: PhoneModel) -> tuple[float, ...]:
+    """Twice the logarithm of the probability that a phone is not heard, for distances in steps."""
+    sigma = math.hypot(max(model.shadowing_db, 1.0), model.offset_db)
+    scores = []
+    for step in range(200):
+        distance_m = max(1.0, (step + 0.5) * _STEP_M)
+        margin = model.power_dbm - REFERENCE_LOSS_DB - 10 * model.exponent * math.log10(distance_m)
+        chance = 0.5 * math.erfc((margin - model.threshold_dbm) / (sigma * math.sqrt(2)))
+        scores.append(2 / _DOUBT * math.log(max(chance, _NEVER)))
+    return tuple(scores)

@@ -1,0 +1,176 @@
+"""The plan of the search: who takes which place of the formation, made by one node and handed out over the air.
+
+    every node: says where it is, at once and then every STATUS_S
+    planner:    the lowest id that has been heard of lately; it plans once all have been heard of, or after PATIENCE_S
+    lost nodes: whoever holds a place and was not heard of for LOST_S is replaced: by a follower when its place is in a
+                line or in the chain, because those places hold the swarm together and sweep the area
+
+The first assignment minimizes the sum of the squared distances flown. Ways on which everyone leaves and arrives at the
+same instants then do not cross, and UAVs that were near each other stay so.
+"""
+
+from typing import Final, NamedTuple
+
+from agents.mission.assignment import assign
+from agents.mission.pattern import Pattern
+from fanet_mw.units import US, Enu, NodeId, S
+from fanet_mw.wire.search import Search, Status
+
+STATUS_S: Final = 12.0
+"""How often a UAV says how it is."""
+_LOST_NS: Final = 40 * S
+_PATIENCE_NS: Final = 14 * S
+"""How long the first plan waits for those who have not been heard of."""
+_NOTICE_NS: Final = 7 * S
+"""From the first telling of a plan to its beginning: a flood through the slots of all clusters."""
+_REPEAT_NS: Final = 6 * S
+_REPEATS: Final = 3
+
+
+class _Member(NamedTuple):
+    position: Enu
+    heard_ns: int
+    revision: int
+
+
+class Planner:
+    """One node's part in planning. Any node can be the planner; all but one only listen."""
+
+    def __init__(self, node: NodeId, *, expected: int, deploy_speed_m_s: float) -> None:
+        self._node = node
+        self._expected = expected
+        self._deploy_speed = deploy_speed_m_s
+        self._members: dict[int, _Member] = {}
+        self._began_ns: int | None = None
+        self.plan: Search | None = None
+        self.to_tell: list[Search] = []
+        """Plans to be flooded, for the host to take."""
+        self._told_ns: int | None = None
+        self._tellings_left = 0
+
+    # --- what comes in --------------------------------------------------------------------------------------------
+
+    def status(self, status: Status, *, now_ns: int) -> None:
+        """A UAV, we ourselves perhaps, said where it is."""
+        before = self._members.get(status.node)
+        if before is None or status.t_us * US >= before.heard_ns - S:
+            self._members[status.node] = _Member(status.position, min(now_ns, status.t_us * US), status.revision)
+
+    def alive(self, node: int, position: Enu, *, now_ns: int) -> None:
+        """A neighbor was heard at a place."""
+        before = self._members.get(node)
+        self._members[node] = _Member(position, now_ns, before.revision if before else 0)
+
+    def planned(self, plan: Search) -> bool:
+        """A plan came over the air; whether it replaces the one we have."""
+        mine = self.plan
+        if mine is not None and (plan.revision, -plan.planner) <= (mine.revision, -mine.planner):
+            return False
+        self.plan = plan
+        return True
+
+    # --- decisions ------------------------------------------------------------------------------------------------
+
+    def review(self, pattern: Pattern | None, *, now_ns: int) -> bool:
+        """Called about every second. Make a plan, mend it, or tell it again; whether there is a new one."""
+        if self._began_ns is None:
+            self._began_ns = now_ns
+        if self._leads(now_ns):
+            if self.plan is None:
+                everyone = len(self._members) >= self._expected
+                if pattern is not None and (everyone or now_ns - self._began_ns >= _PATIENCE_NS):
+                    self._adopt(self._first(pattern, now_ns), now_ns)
+                    return True
+            elif now_ns > self.plan.start_us * US:
+                mended = self._mended(self.plan, now_ns)
+                if mended is not None:
+                    self._adopt(mended, now_ns)
+                    return True
+            self._tell_again(now_ns)
+        return False
+
+    def _leads(self, now_ns: int) -> bool:
+        return all(node >= self._node or now_ns - member.heard_ns > _LOST_NS for node, member in self._members.items())
+
+    def _adopt(self, plan: Search, now_ns: int) -> None:
+        self.plan = plan
+        self.to_tell.append(plan)
+        self._told_ns, self._tellings_left = now_ns, _REPEATS
+
+    def _tell_again(self, now_ns: int) -> None:
+        """A plan is told several times, and then to whoever says that it flies by an older one."""
+        if self.plan is None or self._told_ns is None or now_ns - self._told_ns < _REPEAT_NS:
+            return
+        behind = any(
+            member.revision < self.plan.revision and now_ns - member.heard_ns < _REPEAT_NS
+            for node, member in self._members.items()
+            if node != self._node
+        )
+        if self._tellings_left or (behind and now_ns - self._told_ns > 2 * _REPEAT_NS):
+            self._tellings_left = max(0, self._tellings_left - 1)
+            self._told_ns = now_ns
+            self.to_tell.append(self.plan)
+
+    def _first(self, pattern: Pattern, now_ns: int) -> Search:
+        nodes = sorted(self._members)[: pattern.places]
+        places = list(range(pattern.places))
+        goals = [pattern.at(place, 0.0) for place in places]
+        costs = [[_distance2(self._members[node].position, goal) for goal in goals] for node in nodes]
+        chosen = assign(costs)
+        holders = [0] * pattern.places
+        for node, place in zip(nodes, chosen, strict=True):
+            holders[place] = node
+        holders = _filled(holders, pattern)
+        farthest_m = max(costs[row][place] for row, place in enumerate(chosen)) ** 0.5
+        return Search(
+            (now_ns + _NOTICE_NS) // US, pattern.half_width_m, pattern.first_m, pattern.last_m, pattern.height_m,
+            pattern.speed_m_s, round(10 * max(1.0, farthest_m / self._deploy_speed)), 1, self._node, tuple(holders),
+            pattern.lanes, pattern.relays, pattern.followers,
+        )  # fmt: skip
+
+    def _mended(self, plan: Search, now_ns: int) -> Search | None:
+        """The plan without those who are lost and with those who are new; None when nothing changed."""
+        pattern = pattern_of(plan)
+        alive = {node for node, member in self._members.items() if now_ns - member.heard_ns <= _LOST_NS}
+        alive.add(self._node)
+        if 2 * len(alive) <= sum(1 for node in plan.nodes if node):
+            return None  # we are the smaller part of a swarm that has come apart, and shall meet the others again
+        holders = [node if node in alive else 0 for node in plan.nodes]
+        newcomers = sorted(alive - set(holders))
+        for place, holder in enumerate(holders):
+            if not holder and newcomers:
+                holders[place] = newcomers.pop(0)
+        holders = _filled(holders, pattern)
+        if tuple(holders) == plan.nodes:
+            return None
+        return plan._replace(revision=plan.revision + 1, planner=self._node, nodes=tuple(holders))
+
+
+def pattern_of(plan: Search) -> Pattern:
+    """The formation that a plan names."""
+    return Pattern(
+        plan.lanes, plan.relays, plan.followers, plan.half_width_m, plan.first_m, plan.last_m, plan.height_m,
+        plan.speed_m_s,
+    )  # fmt: skip
+
+
+def _filled(holders: list[int], pattern: Pattern) -> list[int]:
+    """Vacant places of lines and chain go to the nearest followers."""
+    filled = list(holders)
+    for place in range(2 * pattern.lanes + pattern.relays):
+        if filled[place]:
+            continue
+        goal = pattern.at(place, 0.0)
+        spare = [
+            (_distance2(pattern.at(other, 0.0), goal), other)
+            for other in range(2 * pattern.lanes + pattern.relays, pattern.places)
+            if filled[other]
+        ]
+        if spare:
+            _, other = min(spare)
+            filled[place], filled[other] = filled[other], 0
+    return filled
+
+
+def _distance2(a: Enu, b: Enu) -> float:
+    return (a.east - b.east) ** 2 + (a.north - b.north) ** 2

@@ -1,0 +1,126 @@
+"""The planned search as an application: what the searcher of this UAV senses, is told, tells and flies."""
+
+from functools import lru_cache
+from typing import Final
+
+from agents.mission.searcher import Heard, Searcher
+from fanet_mw import mavlink, wire
+from fanet_mw.application import Application, AppPort, Course, Received, SensorReading
+from fanet_mw.bus.messages import Camera, Gps, WifiScan
+from fanet_mw.errors import MalformedFrameError
+from fanet_mw.scenario import Scenario
+from fanet_mw.units import MS, Enu, NodeId, S
+from fanet_mw.wire import BIDS, FOUND, PRIORITY_REPORT, SEARCH, STATUS, SURVIVOR
+from fanet_mw.wire.inner import Survivor
+from fanet_mw.wire.search import Found, Search, Status, Told, told_in
+
+_FUTURE_NS: Final = S
+"""A position from further ahead is none: clocks agree better than that."""
+_AHEAD_S: Final = 10.0
+"""How far ahead a course lies: the farther, the less a fix's error turns it."""
+_LEAST_M_S: Final = 0.05
+
+
+class PlannedSearch(Application):
+    """One UAV's part in a search."""
+
+    name: Final = "report"
+    listens = (SURVIVOR.msgid, SEARCH.msgid, STATUS.msgid, BIDS.msgid, FOUND.msgid)
+
+    def __init__(self, scenario: Scenario, node: NodeId, *, position: Enu) -> None:
+        self._searcher = Searcher(scenario, node, position=position)
+        self._bad_positions = 0
+        """Hellos whose position is none, or not of now."""
+
+    def start(self, port: AppPort, now_ns: int) -> None:
+        super().start(port, now_ns)
+        self._searcher.start(now_ns)
+
+    def on_message(self, message: Received, now_ns: int) -> None:
+        for told in told_in(message.frame):
+            if _speaker(told) not in (None, message.origin):
+                raise MalformedFrameError(f"{type(told).__name__} of {_speaker(told)} by {message.origin}")
+            self._searcher.told(told, now_ns=now_ns)
+        self.port.tap(message.frame)
+        self._settle()
+
+    def on_hello(self, frame: bytes, now_ns: int) -> None:
+        """A neighbor's hello says where it flies, and passes on what it knows."""
+        origin, heard, messages = _hello(frame)
+        if origin == self.port.node:
+            raise MalformedFrameError(f"a hello in the name of {origin}, who heard it")
+        if heard.at_ns > now_ns + _FUTURE_NS:
+            self._bad_positions += 1
+            return
+        self._searcher.hello(origin, heard, now_ns=now_ns)
+        for told in messages:
+            self._searcher.told(told, now_ns=now_ns)
+        self._settle()
+
+    def hello_frames(self, now_ns: int) -> bytes:
+        return self._searcher.hello_frames(now_ns)
+
+    def on_fix(self, fix: Gps, now_ns: int) -> None:
+        self._searcher.fix(fix.position, fix.velocity, now_ns=now_ns)
+        self._settle()
+
+    def on_sensor(self, reading: SensorReading, now_ns: int) -> None:
+        if isinstance(reading, WifiScan):
+            self._searcher.scan(reading.heard, now_ns=now_ns)
+        elif isinstance(reading, Camera):
+            people = [(person.bearing_rad, person.elevation_rad) for person in reading.people]
+            self._searcher.camera(people, now_ns=now_ns)
+        self._settle()
+
+    def wake(self, now_ns: int) -> None:
+        self._searcher.wake(now_ns)
+        self._settle()
+
+    def next_wake_ns(self) -> int | None:
+        return self._searcher.next_wake_ns()
+
+    def report(self) -> dict[str, int]:
+        return {"bad_positions": self._bad_positions}
+
+    def _settle(self) -> None:
+        """Bring what the searcher put out to where it goes."""
+        searcher, port = self._searcher, self.port
+        for record in searcher.records:
+            port.record(record)
+        searcher.records.clear()
+        packets, searcher.packets = searcher.packets, []
+        for frames in packets:
+            port.send(frames, priority=PRIORITY_REPORT)
+        velocity, searcher.velocity = searcher.velocity, None
+        if velocity is not None:
+            port.fly(_course(port.position, velocity))
+
+
+def _course(here: Enu, velocity: Enu) -> Course:
+    """Fly on at a velocity; the point to fly to lies far ahead."""
+    speed = velocity.norm()
+    if speed < _LEAST_M_S:
+        return Course(here, _LEAST_M_S)
+    ahead = Enu(
+        here.east + velocity.east * _AHEAD_S, here.north + velocity.north * _AHEAD_S, here.up + velocity.up * _AHEAD_S
+    )
+    return Course(ahead, speed, velocity)
+
+
+def _speaker(told: Told) -> int | None:
+    """Who alone may flood this message; None: it may be passed on by anyone."""
+    if isinstance(told, Survivor):
+        return told.reporter
+    if isinstance(told, Search):
+        return told.planner
+    if isinstance(told, Status):
+        return told.node
+    return None if not isinstance(told, Found) or told.confirmed else told.node
+
+
+@lru_cache(maxsize=512)
+def _hello(frame: bytes) -> tuple[int, Heard, tuple[Told, ...]]:
+    """Who says it, how that one flies, and what it tells; raises MalformedFrameError. Cached: many hear the same."""
+    origin = wire.decode_header(frame).origin
+    motion = mavlink.kinematics_of(frame)
+    return origin, Heard(motion.position, motion.velocity, motion.t_ms * MS), tuple(told_in(frame))

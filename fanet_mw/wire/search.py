@@ -1,0 +1,233 @@
+"""The inner messages of a planned search: the plan, how each UAV is, bids for tasks, and where survivors are.
+
+As all of our dialect: by struct, total on any bytes, checked for what no sender of ours would say.
+"""
+
+import math
+from collections.abc import Callable, Mapping, Sequence
+from typing import Any, Final, NamedTuple, Self
+
+from fanet_mw.errors import LocalProtocolError, MalformedFrameError
+from fanet_mw.units import Enu
+from fanet_mw.wire.frame import (
+    ANY_NODE,
+    BIDS,
+    FOUND,
+    LATEST_US,
+    SEARCH,
+    STATUS,
+    SURVIVOR,
+    VERSION,
+    decode_first,
+    encode_inner,
+    fields_of_each,
+)
+from fanet_mw.wire.inner import FARTHEST_M, MOST_SURVIVORS, Survivor
+
+MOST_PLACES: Final = 80
+"""Places of a formation that one message can hand out."""
+MOST_BIDS: Final = 12
+"""Bids of one message."""
+WITHDRAWN: Final = 0xFFFF
+"""The time of arrival of a bid that is taken back."""
+_MOST_VARIANCE_M2: Final = 1e10
+_FASTEST_M_S: Final = 1000.0
+
+
+def _refuse_unless(holds: bool, what: str) -> None:
+    if not holds:
+        raise MalformedFrameError(what)
+
+
+class Search(NamedTuple):
+    """FANET_SEARCH: the plan of a search."""
+
+    start_us: int
+    half_width_m: float
+    first_m: float
+    last_m: float
+    height_m: float
+    speed_m_s: float
+    deploy_ds: int
+    revision: int
+    planner: int
+    nodes: tuple[int, ...]
+    """The node of each place; 0: vacant."""
+    lanes: int
+    relays: int
+    followers: int
+
+    def encode_frame(self, node: int) -> bytes:
+        if len(self.nodes) > MOST_PLACES:
+            raise LocalProtocolError(f"a plan of {len(self.nodes)} places must have <= {MOST_PLACES}")
+        unused = (0,) * (MOST_PLACES - len(self.nodes))
+        return encode_inner(SEARCH, SEARCH.layout.pack(*self[:9], *self.nodes, *unused, *self[10:], VERSION), node=node)
+
+    @classmethod
+    def decode_frame(cls, frame: bytes) -> Self:
+        """The first of a frame; raises MalformedFrameError for a plan that nobody could fly."""
+        return cls.checked(decode_first(SEARCH, frame))
+
+    @classmethod
+    def checked(cls, fields: tuple[Any, ...]) -> Self:
+        """The plan of these fields; raises MalformedFrameError."""
+        lanes, relays, followers, version = fields[-4:]
+        places = 2 * lanes + relays + followers
+        _refuse_unless(version == VERSION and lanes >= 2 and places <= MOST_PLACES, f"a plan of {places} places")
+        nodes = fields[9 : 9 + places]
+        plan = cls._make((*fields[:9], nodes, lanes, relays, followers))
+        named = [node for node in nodes if node]
+        _refuse_unless(
+            plan.start_us <= LATEST_US
+            and 0 < plan.planner < ANY_NODE
+            and plan.revision > 0
+            and ANY_NODE not in named
+            and len(set(named)) == len(named),
+            f"plan {plan.revision} of {plan.planner}",
+        )
+        lengths = (plan.half_width_m, plan.first_m, plan.last_m, plan.height_m)
+        _refuse_unless(
+            all(0 <= length <= FARTHEST_M for length in lengths)
+            and plan.last_m - plan.first_m >= 1.0
+            and 0.1 <= plan.speed_m_s <= _FASTEST_M_S,
+            f"a formation of {lengths} m at {plan.speed_m_s} m/s",
+        )
+        return plan
+
+
+class Status(NamedTuple):
+    """FANET_STATUS: where a UAV is and how it is."""
+
+    t_us: int
+    position: Enu
+    node: int
+    revision: int
+    charge: int
+    """Percent."""
+
+    def encode_frame(self, node: int) -> bytes:
+        payload = STATUS.layout.pack(self.t_us, *self.position, *self[2:], VERSION)
+        return encode_inner(STATUS, payload, node=node)
+
+    @classmethod
+    def decode_frame(cls, frame: bytes) -> Self:
+        """The first of a frame; raises MalformedFrameError."""
+        return cls.checked(decode_first(STATUS, frame))
+
+    @classmethod
+    def checked(cls, fields: tuple[Any, ...]) -> Self:
+        """The status of these fields; raises MalformedFrameError."""
+        t_us, east, north, up, node, revision, charge, version = fields
+        position = Enu(east, north, up)
+        _refuse_unless(
+            version == VERSION
+            and 0 < node < ANY_NODE
+            and t_us <= LATEST_US
+            and charge <= 100
+            and all(abs(axis) <= FARTHEST_M for axis in position),
+            f"status of {node}: {position}, {charge} %",
+        )
+        return cls(t_us, position, node, revision, charge)
+
+
+class Bid(NamedTuple):
+    """One entry of FANET_BIDS: `bidder` would be with `survivor` within `eta_ds` tenths of a second."""
+
+    survivor: int
+    bidder: int
+    eta_ds: int
+    serial: int
+    age_s: int = 0
+    """How long ago the bidder last stood by it."""
+
+
+def encode_bids(bids: Sequence[Bid], *, node: int) -> bytes:
+    """One FANET_BIDS message."""
+    if len(bids) > MOST_BIDS:
+        raise LocalProtocolError(f"{len(bids)} bids must be <= {MOST_BIDS} for one message")
+    unused = (0,) * (MOST_BIDS - len(bids))
+    columns = [[bid[axis] for bid in bids] for axis in range(5)]
+    flat = [value for column in columns[:4] for value in (*column, *unused)]
+    payload = BIDS.layout.pack(*flat, node, *columns[4], *unused, len(bids), VERSION)
+    return encode_inner(BIDS, payload, node=node)
+
+
+def checked_bids(fields: tuple[Any, ...]) -> "Bids":
+    """The bids of the fields of one message; raises MalformedFrameError."""
+    count, version = fields[-2:]
+    _refuse_unless(version == VERSION and count <= MOST_BIDS, f"{count} bids")
+    columns = [fields[at : at + count] for at in (0, 12, 24, 36, 49)]
+    found = tuple(Bid(*row) for row in zip(*columns, strict=True))
+    for bid in found:
+        _refuse_unless(
+            0 < bid.survivor <= MOST_SURVIVORS and 0 < bid.bidder < ANY_NODE, f"bid of {bid.bidder} for {bid.survivor}"
+        )
+    return Bids(found)
+
+
+class Bids(NamedTuple):
+    """What one message FANET_BIDS holds."""
+
+    bids: tuple[Bid, ...]
+
+
+class Found(NamedTuple):
+    """FANET_FOUND: where a survivor is estimated to be, or that it is confirmed there."""
+
+    t_us: int
+    survivor: int
+    east_m: float
+    north_m: float
+    east_variance_m2: float
+    covariance_m2: float
+    north_variance_m2: float
+    node: int
+    confirmed: bool
+
+    def encode_frame(self, node: int) -> bytes:
+        return encode_inner(FOUND, FOUND.layout.pack(*self, VERSION), node=node)
+
+    @classmethod
+    def decode_frame(cls, frame: bytes) -> Self:
+        """The first of a frame; raises MalformedFrameError, for what is no covariance too."""
+        return cls.checked(decode_first(FOUND, frame))
+
+    @classmethod
+    def checked(cls, fields: tuple[Any, ...]) -> Self:
+        """The estimate of these fields; raises MalformedFrameError."""
+        *values, confirmed, version = fields
+        found = cls._make((*values, bool(confirmed)))
+        _refuse_unless(
+            version == VERSION
+            and confirmed <= 1
+            and 0 < found.survivor <= MOST_SURVIVORS
+            and 0 < found.node < ANY_NODE
+            and found.t_us <= LATEST_US,
+            f"survivor {found.survivor} found by {found.node}",
+        )
+        east, north = found.east_variance_m2, found.north_variance_m2
+        _refuse_unless(
+            abs(found.east_m) <= FARTHEST_M
+            and abs(found.north_m) <= FARTHEST_M
+            and 0 <= east <= _MOST_VARIANCE_M2
+            and 0 <= north <= _MOST_VARIANCE_M2
+            and abs(found.covariance_m2) <= math.sqrt(east * north) * (1 + 1e-3) + 1e-3,
+            f"an estimate with variances {east}, {north} and covariance {found.covariance_m2}",
+        )
+        return found
+
+
+Told = Survivor | Search | Status | Bids | Found
+"""What searching UAVs tell each other."""
+_CHECKED: Final[Mapping[int, Callable[[tuple[Any, ...]], Told]]] = {
+    SURVIVOR.msgid: Survivor.checked,
+    SEARCH.msgid: Search.checked,
+    STATUS.msgid: Status.checked,
+    BIDS.msgid: checked_bids,
+    FOUND.msgid: Found.checked,
+}
+
+
+def told_in(frame: bytes) -> list[Told]:
+    """Every message of a search in a frame, in order; raises MalformedFrameError."""
+    return [_CHECKED[spec.msgid](fields) for spec, fields in fields_of_each(frame) if spec.msgid in _CHECKED]

@@ -1,0 +1,144 @@
+"""What a mission came to, from the trace: who was confirmed when and where, what was covered, whether the swarm held.
+
+    coverage    share of the area that came within the nominal range of a phone's receiver of a UAV, a cell at a time
+    connected   share of the time in which all living UAVs were one component at the radio's reach
+    confirmed   survivors of whom a UAV said that it saw them at close range; the error is that of the place it told
+
+Positions are the true ones, once a second (`Posed`).
+"""
+
+import math
+import statistics
+from collections.abc import Iterable, Iterator
+from typing import Any, Final
+
+import numpy as np
+import numpy.typing as npt
+
+from fanet_mw.scenario import Scenario
+from fanet_mw.trace import Approaching, Arrived, Collided, Confirmed, Detected, Posed, ProcessEnded, Record
+from fanet_mw.units import S
+from sim.run.outcome import Outcome
+from sim.world.sensors.phone import REFERENCE_LOSS_DB
+from sim.world.survivors import place
+
+_CELL_M: Final = 25.0
+_NEARLY_ALL: Final = 0.95
+
+Rows = npt.NDArray[np.float64]
+
+
+def mission(outcome: Outcome) -> dict[str, Any]:
+    """The table `mission` of the summary."""
+    records, scenario = outcome.records, outcome.scenario
+    truth = place(scenario)
+    first: dict[int, int] = {}
+    errors: list[float] = []
+    confirmed: dict[int, Confirmed] = {}
+    for record in records:
+        if type(record) is Approaching:
+            first.setdefault(record.node, record.t_ns)
+            if 1 <= record.survivor <= len(truth):  # else only the air has told of it
+                at = truth[record.survivor - 1]
+                errors.append(math.hypot(at.east - record.east_m, at.north - record.north_m))
+        elif type(record) is Confirmed and 1 <= record.survivor <= len(truth):
+            confirmed.setdefault(record.survivor, record)
+    confirmed_errors = [
+        math.hypot(truth[s - 1].east - r.east_m, truth[s - 1].north - r.north_m) for s, r in confirmed.items()
+    ]
+    return {
+        "survivors": scenario.mission.survivors,
+        "detected": len({r.survivor for r in records if type(r) is Detected}),
+        "approached": len({r.survivor for r in records if type(r) is Approaching}),
+        "reached": len({r.survivor for r in records if type(r) is Arrived}),
+        "confirmed": len(confirmed),
+        "time_to_confirm_s": sorted(round(r.t_ns / S, 3) for r in confirmed.values()),
+        "uavs_approaching": len(first),
+        "time_to_approach_s": sorted(round(t_ns / S, 3) for t_ns in first.values()),
+        "localization_error_m": _median(errors),
+        "confirmed_error_m": _median(confirmed_errors),
+        "collisions": sum(1 for r in records if type(r) is Collided),
+        **_flown(scenario, records),
+    }
+
+
+def _median(values: list[float]) -> float | None:
+    return round(statistics.median(values), 1) if values else None
+
+
+def _flown(scenario: Scenario, records: Iterable[Record]) -> dict[str, Any]:
+    """Coverage and coherence; None where the trace has no positions."""
+    covered = _Covered(scenario)
+    together = instants = 0
+    nearly_all_ns: int | None = None
+    for t_ns, at in _instants(records):
+        instants += 1
+        together += _is_one(at, scenario.radio.range_m)
+        covered.add(at)
+        if nearly_all_ns is None and covered.share >= _NEARLY_ALL:
+            nearly_all_ns = t_ns
+    return {
+        "coverage": round(covered.share, 6) if instants else None,
+        "covered_95_s": None if nearly_all_ns is None else round(nearly_all_ns / S, 3),
+        "connected": round(together / instants, 6) if instants else None,
+    }
+
+
+def _instants(records: Iterable[Record]) -> Iterator[tuple[int, Rows]]:
+    """The instants of the trace that have positions, and those of the UAVs that live then."""
+    dead: set[int] = set()
+    rows: list[tuple[float, float, float]] = []
+    t_ns = 0
+    for record in records:
+        if type(record) is ProcessEnded:
+            dead.add(record.node)
+        if type(record) is not Posed:
+            continue
+        if record.t_ns != t_ns and rows:
+            yield t_ns, np.array(rows)
+            rows = []
+        t_ns = record.t_ns
+        if record.node not in dead:
+            rows.append((record.east_m, record.north_m, record.up_m))
+    if rows:
+        yield t_ns, np.array(rows)
+
+
+def _is_one(at: Rows, reach_m: float) -> bool:
+    """Whether everyone reaches everyone, over hops of at most the radio's reach."""
+    near = np.linalg.norm(at[:, None] - at[None], axis=2) <= reach_m
+    reached = np.zeros(len(at), bool)
+    reached[0] = True
+    while True:
+        further = near[reached].any(axis=0)
+        if (further == reached).all():
+            return bool(reached.all())
+        reached = further
+
+
+class _Covered:
+    """The cells of the area that have been overflown."""
+
+    def __init__(self, scenario: Scenario) -> None:
+        mission, half = scenario.mission, scenario.world.area_m / 2
+        budget_db = mission.phone_power_dbm - REFERENCE_LOSS_DB - mission.detection_dbm
+        self._range_m = 10 ** (budget_db / (10 * mission.phone_exponent))
+        count = max(1, round(2 * half / _CELL_M))
+        self._axis = (np.arange(count) + 0.5) * (2 * half / count) - half
+        self._seen = np.zeros((count, count), bool)
+
+    @property
+    def share(self) -> float:
+        return float(self._seen.mean())
+
+    def add(self, at: Rows) -> None:
+        for east, north, up in at.tolist():
+            ground2 = self._range_m**2 - up**2
+            if ground2 <= 0:
+                continue
+            near_e = np.flatnonzero(np.abs(self._axis - east) <= math.sqrt(ground2))
+            near_n = np.flatnonzero(np.abs(self._axis - north) <= math.sqrt(ground2))
+            if len(near_e) and len(near_n):
+                within = (self._axis[near_n, None] - north) ** 2 + (self._axis[None, near_e] - east) ** 2 <= ground2
+                block = np.ix_(near_n, near_e)
+                self._seen[block] |= within

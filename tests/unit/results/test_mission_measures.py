@@ -1,0 +1,54 @@
+"""What is measured of a mission, on traces of a few lines."""
+
+import math
+from collections.abc import Sequence
+from typing import Any
+
+from fanet_mw.scenario import Scenario
+from fanet_mw.trace import Confirmed, Posed, ProcessEnded, Record
+from fanet_mw.units import S
+from sim.results.mission import mission
+from sim.run.outcome import Outcome
+
+KEYS: dict[str, Any] = {
+    "nodes": {"count": 3}, "clusters": {"count": 1}, "world": {"area_m": 500.0}, "radio": {"range_m": 250.0},
+    "mission": {"survivors": 2, "survivor_positions_m": ((100.0, 0.0), (-100.0, 0.0))},
+}  # fmt: skip
+
+
+def measured(records: Sequence[Record]) -> dict[str, Any]:
+    outcome = Outcome(scenario=Scenario(**KEYS), mode="virtual", wall_s=1.0, records=list(records), reports={})
+    return mission(outcome)
+
+
+def at(t_s: int, *easts: float) -> list[Record]:
+    return [Posed(t_s * S, node, east, 0.0, 50.0) for node, east in enumerate(easts, start=1)]
+
+
+def test_a_swarm_is_connected_while_everyone_reaches_everyone_over_hops() -> None:
+    found = measured([*at(1, 0, 240, 480), *at(2, 0, 240, 491), *at(3, 0, 240, 489), *at(4, 0, 251, 502)])
+    assert found["connected"] == 0.5
+
+
+def test_the_dead_need_no_connection() -> None:
+    found = measured([ProcessEnded(S, 3, "agent-3", 1), *at(2, 0, 240, 900)])
+    assert found["connected"] == 1.0
+
+
+def test_coverage_is_the_share_of_the_area_within_range_of_a_receiver() -> None:
+    circle = math.pi * 137**2 / 500**2
+    assert abs(measured(at(1, 0, 0, 0))["coverage"] - circle) < 0.02, "cells of 25 m"
+    everywhere = [Posed(S * k, 1, -250 + 100 * (k % 6), -250 + 100 * (k // 6), 50.0) for k in range(36)]
+    found = measured(everywhere)
+    assert found["coverage"] == 1.0
+    assert found["covered_95_s"] < 36
+
+
+def test_a_survivor_is_confirmed_once_and_its_error_is_that_of_the_place_that_was_told_first() -> None:
+    found = measured([Confirmed(7 * S, 1, 1, 103.0, 4.0), Confirmed(9 * S, 2, 1, 100.0, 0.0)])
+    assert (found["confirmed"], found["time_to_confirm_s"], found["confirmed_error_m"]) == (1, [7.0], 5.0)
+
+
+def test_without_positions_nothing_is_claimed_of_the_flight() -> None:
+    found = measured([])
+    assert (found["coverage"], found["covered_95_s"], found["connected"]) == (None, None, None)

@@ -45,13 +45,14 @@ _CONTROL_TYPE_AT: Final = wire.HEADER_BYTES + 11
 class Fuzzer(Actor):
     """A node's station in the hands of somebody who has read the sources."""
 
-    def __init__(self, swarm: str, seed: int, *, every_ms: float) -> None:
+    def __init__(self, swarm: str, seed: int, *, every_ms: float, lead_ms: float = 15) -> None:
         names = Topics(swarm)
         super().__init__(f"agent-{EVIL}", (names.radio_rx(EVIL),))
         self._topic = names.radio_tx(EVIL)
         self._pick = stream(seed, "fuzzer", EVIL)
         self._heard: dict[tuple[int, int], list[bytes]] = {}
         self._every_ns = round(every_ms * MS)
+        self._lead_ns = round(lead_ms * MS)
         self._due_ns = 0
         self._receptions = 0
         self.sent = 0
@@ -86,7 +87,7 @@ class Fuzzer(Actor):
             frame = passed_off(frame, pick, now_ns=now_ns)
         dst = BROADCAST if pick.random() < 0.8 else NodeId(pick.randint(1, 9))
         frame = frame[:1500] or b"\0"
-        self.outbox.append((self._topic, TxRequest(self.sent, now_ns + 15 * MS, frame, dst, wants_status=False)))
+        self.outbox.append((self._topic, TxRequest(self.sent, now_ns + self._lead_ns, frame, dst, wants_status=False)))
         self.sent += 1
 
     def report(self) -> Mapping[str, Any]:

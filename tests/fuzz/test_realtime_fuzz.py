@@ -1,0 +1,41 @@
+"""A swarm of real processes, one of which is the fuzzer of the air: the others live on, and all is accounted for."""
+
+import asyncio
+from typing import Any
+
+import pytest
+from air import EVIL, Fuzzer
+
+from agents.__main__ import run as run_agent
+from fanet_mw.hosts import loop
+from fanet_mw.hosts.realtime import run_actor
+from fanet_mw.scenario import Scenario
+from sim.results.files import finish
+from sim.run.swarm import launch
+from sim.scenarios import catalog
+
+
+def agent_or_fuzzer(*, scenario: Scenario, node: int, swarm: str, endpoint: str, **others: Any) -> int:
+    """What runs in the place of an agent."""
+    if node != EVIL:
+        return run_agent(scenario=scenario, node=node, swarm=swarm, endpoint=endpoint, **others)
+    fuzzer = Fuzzer(swarm, scenario.seed, every_ms=10, lead_ms=60)
+    loop.run(run_actor(fuzzer, swarm=swarm, endpoint=endpoint, until_ns=scenario.duration_ns, scenario=scenario))
+    return 0
+
+
+def test_near_misses_off_a_real_time_air_end_no_process_and_close_the_books(monkeypatch: pytest.MonkeyPatch) -> None:
+    monkeypatch.setattr("sim.run.swarm.run_agent", agent_or_fuzzer)
+    times = ["duration_s=5", "warmup_s=1", "drain_s=1"]
+    settings = ["clusters.relay=cds", "clusters.flooding_period_s=0.5", "clusters.repair_s=5", "clock.sync=beacons"]
+    scenario = catalog.find("quick", [*times, *settings])
+    outcome = asyncio.run(launch(scenario, swarm="test"))
+    summary = finish(outcome, out=None)
+    assert (outcome.ended, outcome.aborted) == ([], None)
+    honest = [outcome.reports[f"agent-{node}"] for node in scenario.node_ids if node != EVIL]
+    assert all(report["final"] for report in honest)
+    refused = sum(report["dropped"].get(why, 0) for report in honest for why in ("malformed", "forged"))
+    assert refused > 100, "they were attacked"
+    assert summary["frames"]["closes"]
+    assert summary["heard"]["malformed"] == 0
+    assert summary["delivered"] > 0

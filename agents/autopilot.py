@@ -10,7 +10,7 @@ from dataclasses import dataclass
 from typing import Final
 
 from fanet_mw.bus.messages import Gps
-from fanet_mw.mavlink import AUTOPILOT_COMPONENT, Attitude, Battery, Encoder
+from fanet_mw.mavlink import AUTOPILOT_COMPONENT, Attitude, BatteryState, Encoder
 from fanet_mw.units import Enu, NodeId, S
 
 GRAVITY_M_S2: Final = 9.80665
@@ -142,10 +142,10 @@ class Autopilot:
         return self._encoder.gps_raw(self.position, self.velocity, has_fix=self._fix_ns is not None, fix_ns=fix_ns)
 
 
-def _battery(now_ns: int) -> Battery:
+def _battery(now_ns: int) -> BatteryState:
     """The state of a battery that drains evenly; its voltage falls with the charge."""
     left = max(0.0, 1 - now_ns / ENDURANCE_NS)
-    return Battery(
+    return BatteryState(
         cells_v=(_EMPTY_V + (_FULL_V - _EMPTY_V) * left,) * _CELLS,
         current_a=_CAPACITY_MAH / 1000 * 3600 * S / ENDURANCE_NS,
         consumed_mah=round(_CAPACITY_MAH * (1 - left)),

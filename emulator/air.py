@@ -18,7 +18,7 @@ from emulator.channel.shadowing import Shadowing
 from emulator.faults import Faults
 from emulator.kernel import kernel
 from emulator.kernel import state as s
-from emulator.kernel.entry import Entry
+from emulator.kernel.entry import KernelEntry
 from emulator.link_book import LinkBook
 from fanet_mw.airtime import DETECT_NS, OVERHEAD_BYTES, Timing, airtime_ns
 from fanet_mw.bus.link_stats import LinkStats
@@ -213,7 +213,7 @@ class Air:
 
     def _renew_entry(self) -> None:
         """Make the entry to `kernel.advance` anew, as is needed whenever an array has been replaced."""
-        self._entry = Entry(
+        self._entry = KernelEntry(
             self.g, self._p, self._pf, self.st, self._sf, self.fr, self._lk, self._lp, self._ptr, self._hs, self._hr,
             self._asked, self._out, self._err,
         )  # fmt: skip

@@ -157,7 +157,7 @@ class Attitude(NamedTuple):
     yaw: float
 
 
-class Battery(NamedTuple):
+class BatteryState(NamedTuple):
     """The state of a battery."""
 
     cells_v: tuple[float, ...]
@@ -221,7 +221,7 @@ class Encoder:
         """ATTITUDE; the rates are zero, because they are not known here."""
         return self._pack(common.MAVLink_attitude_message(_boot_ms(now_ns), *attitude, 0.0, 0.0, 0.0))
 
-    def sys_status(self, battery: Battery) -> bytes:
+    def sys_status(self, battery: BatteryState) -> bytes:
         """SYS_STATUS: the battery, and the sensors present, enabled and healthy, of which GPS is the only one."""
         gps = common.MAV_SYS_STATUS_SENSOR_GPS
         return self._pack(
@@ -237,7 +237,7 @@ class Encoder:
             )
         )
 
-    def battery_status(self, battery: Battery) -> bytes:
+    def battery_status(self, battery: BatteryState) -> bytes:
         """BATTERY_STATUS of the one battery."""
         millivolts = [round(1000 * volts) for volts in battery.cells_v]
         return self._pack(

@@ -20,7 +20,7 @@ _ARRAYS: Final = 14
 Array = npt.NDArray[np.int64] | npt.NDArray[np.float64]
 
 
-class Entry:
+class KernelEntry:
     """`kernel.advance` bound to these arrays, given in its order. When an array is replaced, a new entry is needed."""
 
     def __init__(self, *arrays: Array) -> None:

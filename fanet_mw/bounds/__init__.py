@@ -6,7 +6,7 @@ queue fed by bursts; `tandem` joins several hops. `access` bounds the unicast fr
 guard time of a slot.
 """
 
-from fanet_mw.bounds.access import Contention, Dcf, access_bound
+from fanet_mw.bounds.access import ContendingTraffic, Dcf, access_bound
 from fanet_mw.bounds.arrivals import Arrivals, Limited, Periodic, Total, token_bucket
 from fanet_mw.bounds.delay_bound import Bounded, DelayBound, Refused
 from fanet_mw.bounds.guard import guard_ns
@@ -18,7 +18,7 @@ from fanet_mw.bounds.turn_gaps import TurnServer
 __all__ = [
     "Arrivals",
     "Bounded",
-    "Contention",
+    "ContendingTraffic",
     "Dcf",
     "Flow",
     "Hop",

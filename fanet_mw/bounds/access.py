@@ -60,7 +60,7 @@ class Dcf(NamedTuple):
         return min(self.cw_max, ((self.cw_min + 1) << attempt) - 1)
 
 
-class Contention(NamedTuple):
+class ContendingTraffic(NamedTuple):
     """The traffic to contend with.
 
     There are n stations in all; each other one sends m frames of this airtime, and f frames are queued here.
@@ -72,7 +72,9 @@ class Contention(NamedTuple):
     own_frames: int = 1
 
 
-def access_bound(dcf: Dcf, own_airtime_ns: int, others: Contention, *, window_ns: int | None = None) -> DelayBound:
+def access_bound(
+    dcf: Dcf, own_airtime_ns: int, others: ContendingTraffic, *, window_ns: int | None = None
+) -> DelayBound:
     """The longest time from queueing an acknowledged unicast to its outcome; refused if `window_ns` is shorter."""
     if others.stations < 1 or others.frames_each < 0 or others.own_frames < 1 or own_airtime_ns <= 0:
         raise LocalProtocolError(f"{others} and {own_airtime_ns=} must have stations, own frames and airtime > 0")

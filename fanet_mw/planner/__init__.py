@@ -9,12 +9,12 @@ from fanet_mw.planner.feasibility import Plan, Site, evaluate
 from fanet_mw.planner.head_slot import ClusterPlan
 from fanet_mw.planner.loss import Loss, loss
 from fanet_mw.planner.optimum import Optimum, optimum
-from fanet_mw.planner.search import Change, cheapest_change, plan, with_capacity
+from fanet_mw.planner.search import ScenarioChange, cheapest_change, plan, with_capacity
 from fanet_mw.planner.text import describe, describe_change, describe_loss, describe_optimum
 from fanet_mw.planner.variant import Variant, vary
 
 __all__ = [
-    "Change",
+    "ScenarioChange",
     "ClassPlan",
     "ClusterPlan",
     "Loss",

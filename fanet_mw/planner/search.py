@@ -31,7 +31,7 @@ WINDOWS: Final = (31, 15, 7, 3, 1)
 _SLOWER: Final = (1.1, 1.25, 1.5, 2.0, 2.5, 3.0, 4.0, 5.0, 7.0, 10.0, 20.0, 50.0, 100.0)
 
 
-class Change(NamedTuple):
+class ScenarioChange(NamedTuple):
     """The cheapest change that makes a plan feasible, and the plan with that change."""
 
     variant: Variant
@@ -80,7 +80,7 @@ def cheapest_change(
     adjacency: Adjacency | None = None,
     sources: Sequence[NodeId] | None = None,
     deadline_ns: int | None = None,
-) -> Change | None:
+) -> ScenarioChange | None:
     """The least change after which `plan` is feasible; None when none of those searched makes it so.
 
     For a swarm in parts nothing is searched, because it helps only if nodes come nearer.
@@ -95,7 +95,7 @@ def cheapest_change(
                 continue
             found = _judge(site.of(variant.scenario), sources, deadline_ns, quick=quick)
             if isinstance(found, Plan) and found.feasible:
-                return Change(variant, found)
+                return ScenarioChange(variant, found)
     return None
 
 

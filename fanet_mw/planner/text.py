@@ -11,7 +11,7 @@ from fanet_mw.planner.feasibility import Plan
 from fanet_mw.planner.head_slot import ClusterPlan
 from fanet_mw.planner.loss import Loss
 from fanet_mw.planner.optimum import Optimum
-from fanet_mw.planner.search import Change
+from fanet_mw.planner.search import ScenarioChange
 from fanet_mw.planner.timetable_plan import TimetablePlan
 from fanet_mw.units import MS, S
 
@@ -39,7 +39,7 @@ def describe_loss(found: Loss | None) -> str:
     )
 
 
-def describe_change(change: Change | None, found: Plan) -> str:
+def describe_change(change: ScenarioChange | None, found: Plan) -> str:
     """What would make the plan feasible, as text."""
     if found.cut_off:
         return item("change", "nodes have to come nearer: nothing that can be set joins the parts of a swarm")

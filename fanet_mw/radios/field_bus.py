@@ -17,7 +17,7 @@ from fanet_mw.hosts.bus import Bus, OnSample
 from fanet_mw.units import NodeId
 
 
-class Radio(Protocol):
+class RadioPort(Protocol):
     """What a node needs of a radio."""
 
     def request(self, request: TxRequest) -> None: ...
@@ -34,11 +34,11 @@ class FieldBus:
         self._inner = inner
         self._clock = None if epoch_unix_ns is None else Clock(epoch_unix_ns, 1.0, ClockState.RUNNING)
         self._on_rx: OnSample | None = None
-        self._radio: Radio | None = None
+        self._radio: RadioPort | None = None
         self.reports: list[bytes] = []
         """The last report, kept while there is no router that could receive it."""
 
-    def use(self, radio: Radio) -> None:
+    def use(self, radio: RadioPort) -> None:
         self._radio = radio
 
     def on_radio(self, message: Reception | TxStatus) -> None:

@@ -1,7 +1,7 @@
 """Plain flooding: every node re-broadcasts each new packet once, after a random jitter (paper, Figure 9).
 
-`Flood` is the common base of the protocols that flood everything, unicast included: `flooding` here, `gossip` and
-`counter` in `storm`.
+`FloodingProtocol` is the common base of the protocols that flood everything, unicast included: `flooding` here,
+`gossip` and `counter` in `storm`.
 """
 
 from abc import abstractmethod
@@ -15,7 +15,7 @@ from fanet_mw.units import BROADCAST
 from fanet_mw.wire import FLAG_FLOOD
 
 
-class Flood(RoutingProtocol):
+class FloodingProtocol(RoutingProtocol):
     """Sends everything as a flood, and asks its subclass about each first copy; the node suppresses duplicates."""
 
     origin_flags: ClassVar[int] = FLAG_FLOOD
@@ -47,7 +47,7 @@ class Flood(RoutingProtocol):
         self._port.transmit(self._port.forwarded(packet, flags=FLAG_FLOOD), BROADCAST, start_ns=start_ns)
 
 
-class Flooding(Flood):
+class Flooding(FloodingProtocol):
     """Relays each packet at reception + lead + U(0, jitter)."""
 
     stream_name: ClassVar[str] = "jitter"

@@ -13,11 +13,11 @@ from typing import ClassVar
 from fanet_mw.node.contract import Port
 from fanet_mw.node.queue import Packet
 from fanet_mw.routing.assessment import Assessment
-from fanet_mw.routing.flooding import Flood
+from fanet_mw.routing.flooding import FloodingProtocol
 from fanet_mw.units import MS
 
 
-class Gossip(Flood):
+class Gossip(FloodingProtocol):
     """Relays at random."""
 
     stream_name: ClassVar[str] = "storm"
@@ -34,7 +34,7 @@ class Gossip(Flood):
             self._relay(packet, start_ns=now_ns + self._lead_ns + int(jitter * self._jitter_ns))
 
 
-class CounterBased(Flood):
+class CounterBased(FloodingProtocol):
     """Relays a packet that few other nodes relay."""
 
     stream_name: ClassVar[str] = "storm"

@@ -12,7 +12,6 @@ from fanet_mw.bounds import Bounded, DelayBound, Refused
 from fanet_mw.errors import ConfigError
 from fanet_mw.graph.topology import within_range
 from fanet_mw.planner import (
-    Change,
     ClassPlan,
     Loss,
     Optimum,
@@ -170,7 +169,7 @@ def _class_json(c: ClassPlan, deadline_ns: int | None) -> dict[str, Any]:
     }
 
 
-def _change_json(change: Change) -> dict[str, Any]:
+def _change_json(change: ScenarioChange) -> dict[str, Any]:
     return {
         "set": list(change.variant.arguments),
         "classes": [_class_json(c, change.plan.deadline_ns) for c in change.plan.classes],

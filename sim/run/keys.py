@@ -18,7 +18,7 @@ from typing import Any, Final
 from fanet_mw.bus.topics import Topics
 from fanet_mw.errors import ConfigError
 from fanet_mw.scenario import Scenario
-from sim.run.access import access_control, rights
+from sim.run.rights import access_control, rights
 from sim.run.router import ROUTER
 
 _NEW_KEY: Final = ("req", "-x509", "-newkey", "ec", "-pkeyopt", "ec_paramgen_curve:prime256v1", "-nodes")

@@ -25,7 +25,7 @@ _BLOCKED: Final = (signal.SIGINT, signal.SIGTERM)
 Entry = Callable[..., int]
 
 
-class Recipe(NamedTuple):
+class ChildRecipe(NamedTuple):
     """How to start a child: `entry(**arguments)`, with `nice` added to the launcher's niceness."""
 
     entry: Entry
@@ -36,7 +36,7 @@ class Recipe(NamedTuple):
     """What `ps` shows as the child's command line."""
 
 
-def _child(recipe: Recipe) -> None:
+def _child(recipe: ChildRecipe) -> None:
     """Run a child: its preparations, its work, its exit code."""
     signal.signal(signal.SIGINT, signal.SIG_IGN)
     signal.pthread_sigmask(signal.SIG_UNBLOCK, _BLOCKED)  # the launcher's SIGTERM ends it
@@ -85,7 +85,7 @@ class Processes:
         self._on_end = on_end
         self._loop = asyncio.get_running_loop()
         self._running: dict[str, ForkServerProcess] = {}
-        self._recipes: dict[str, Recipe] = {}
+        self._recipes: dict[str, ChildRecipe] = {}
         self._empty = asyncio.Event()
 
     async def warm_up(self) -> None:
@@ -103,7 +103,7 @@ class Processes:
 
     def start(self, name: str, entry: Entry, arguments: Mapping[str, Any], *, nice: int = 0) -> None:
         """Start a child; `entry(**arguments)` must be importable and picklable. With `nice` it lets others go first."""
-        recipe = self._recipes[name] = Recipe(entry, arguments, nice, name, f"{self._title} {name}")
+        recipe = self._recipes[name] = ChildRecipe(entry, arguments, nice, name, f"{self._title} {name}")
         _start_server()
         process = self._context.Process(target=_child, args=(recipe,), name=name)
         try:

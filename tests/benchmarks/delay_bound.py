@@ -16,7 +16,7 @@ from slot_simulator import Slot, delays, network
 from fanet_mw.airtime import OVERHEAD_BYTES, frame_ns
 from fanet_mw.bounds import (
     Bounded,
-    Contention,
+    ContendingTraffic,
     Dcf,
     Flow,
     Hop,
@@ -147,7 +147,7 @@ def access() -> None:
     frame = frame_ns(1024 + 100 + OVERHEAD_BYTES, rate_mbps=11, short=False)
     for stations in (1, 2, 5, 12, 23):
         for attempts in (3, 7):
-            found = access_bound(Dcf(attempts=attempts), frame, Contention(stations, frame))
+            found = access_bound(Dcf(attempts=attempts), frame, ContendingTraffic(stations, frame))
             assert isinstance(found, Bounded)
             what = f"{stations} stations, one {frame / US:.0f} us frame each, {attempts} attempts"
             print(f"access, {what}: {found.delay_ns / MS:.1f} ms")

@@ -4,7 +4,7 @@ import pytest
 from medium_driver import disc, medium, poses
 
 from fanet_mw.airtime import DETECT_NS, OVERHEAD_BYTES, airtime_ns
-from fanet_mw.bounds import Bounded, Contention, Dcf, Refused, access_bound
+from fanet_mw.bounds import Bounded, ContendingTraffic, Dcf, Refused, access_bound
 from fanet_mw.bus.messages import TxOutcome, TxRequest, TxStatus
 from fanet_mw.bus.topics import Topics
 from fanet_mw.scenario import Radio
@@ -37,7 +37,9 @@ def test_the_defaults_are_those_of_the_reference_radio() -> None:
 @pytest.mark.parametrize("access", ["standard", "ns3"])
 @pytest.mark.parametrize(("stations", "frames_each"), [(2, 1), (5, 3), (12, 1), (24, 2)])
 def test_no_unicast_takes_longer_than_its_bound(access: str, stations: int, frames_each: int) -> None:
-    bound = access_bound(Dcf(), AIRTIME_NS, Contention(stations, AIRTIME_NS, frames_each, own_frames=frames_each))
+    bound = access_bound(
+        Dcf(), AIRTIME_NS, ContendingTraffic(stations, AIRTIME_NS, frames_each, own_frames=frames_each)
+    )
     assert isinstance(bound, Bounded)
     worst = 0
     for seed in range(15):
@@ -58,13 +60,13 @@ def test_with_backoffs_of_fixed_size_the_bound_of_a_lone_station_is_near() -> No
     while (wake_ns := air.next_wake_ns()) is not None and wake_ns < 9 * S:
         air.wake(wake_ns)
     (status,) = [message for _, message in air.outbox if type(message) is TxStatus]
-    bound = access_bound(Dcf(cw_min=1, cw_max=1), AIRTIME_NS, Contention(1, AIRTIME_NS))
+    bound = access_bound(Dcf(cw_min=1, cw_max=1), AIRTIME_NS, ContendingTraffic(1, AIRTIME_NS))
     assert isinstance(bound, Bounded)
     assert status.outcome is TxOutcome.RETRY_LIMIT
     assert 0 <= bound.delay_ns - (status.end_ns - S) <= (7 * (364 - 50 + 20) + 50) * US
 
 
 def test_a_window_that_is_too_short_is_refused_with_both_lengths() -> None:
-    found = access_bound(Dcf(), 1 * MS, Contention(10, 1 * MS), window_ns=20 * MS)
+    found = access_bound(Dcf(), 1 * MS, ContendingTraffic(10, 1 * MS), window_ns=20 * MS)
     assert isinstance(found, Refused)
     assert "20000000 ns" in found.reason

@@ -17,13 +17,15 @@ from hypothesis import strategies as st
 from agents.autopilot import Autopilot
 from fanet_mw import mavlink, tlog, wire
 from fanet_mw.errors import LocalProtocolError, MalformedFrameError
-from fanet_mw.mavlink import Attitude, Battery, Encoder, Geodetic, Ned
+from fanet_mw.mavlink import Attitude, BatteryState, Encoder, Geodetic, Ned
 from fanet_mw.units import MS, Enu, NodeId, S
 from fanet_mw.wire.inner import Join
 
 NODE = NodeId(7)
 STILL = Enu(0.0, 0.0, 0.0)
-BATTERY = Battery(cells_v=(3.9, 3.9, 3.8), current_a=11.5, consumed_mah=1200, remaining_percent=76, remaining_s=900)
+BATTERY = BatteryState(
+    cells_v=(3.9, 3.9, 3.8), current_a=11.5, consumed_mah=1200, remaining_percent=76, remaining_s=900
+)
 
 local_m = st.floats(-10_000, 10_000)
 positions = st.builds(Enu, local_m, local_m, st.floats(-100, 5_000))

@@ -1,11 +1,11 @@
-"""The application contract: what a UAV carries, beside the network itself, is applications. Several run on one node.
+"""The application contract: what a UAV does beside the network itself is done by applications, several on one node.
 
     start(port, now)       once, first; through the port it sends, flies and records from then on
-    on_message(message, now)   a message for this node that the application listens to
-    on_status(status, now)     what became of a message that it sent
-    on_fix, on_sensor, on_hello    what the vehicle's receivers and neighbors say
+    on_message(message, now)   a message for this node of a kind that the application listens to
+    on_status(status, now)     what became of a message that it has sent
+    on_fix, on_sensor, on_hello    readings of the vehicle's receivers, hellos of neighbors
     wake(now)              at or after the instant that `next_wake_ns()` named
-    report()               how it went, at any time
+    report()               counters, at any time
 
 An application is sans-IO, as an actor is: it never sleeps, reads a clock, opens a socket or starts a thread, and
 instants never decrease. So the same object runs in virtual time, over Zenoh and on a real radio. `next_wake_ns()` is
@@ -26,12 +26,12 @@ from fanet_mw.units import BROADCAST, Enu, NodeId
 from fanet_mw.wire import HEADER_BYTES, PRIORITY_BULK
 
 ANY: Final[Collection[int]] = (-1,)
-"""In place of ids or ports: all of them, but for load whose content does not matter."""
+"""Stands for all ids or ports, except those of load whose content does not matter."""
 HOME: Final = 0.0
 """The speed of a course that sends a UAV back to its formation."""
 
 SensorReading = WifiScan | Camera
-"""Any reading of a sensor but the position fix; a further kind of sensor is a further member of this union."""
+"""Any reading of a sensor except the position fix; a new kind of sensor is a new member of this union."""
 
 
 class Course(NamedTuple):
@@ -40,7 +40,7 @@ class Course(NamedTuple):
     position: Enu
     speed_m_s: float
     velocity: Enu | None = None
-    """Fly at this velocity instead, until the next command; the position is where that leads."""
+    """If given, the UAV flies at this velocity until the next command; the position is where that leads."""
 
 
 class Received(NamedTuple):
@@ -48,17 +48,17 @@ class Received(NamedTuple):
 
     origin: NodeId
     destination: NodeId
-    """This node, or BROADCAST."""
+    """The id of this node, or BROADCAST."""
     priority: int
     born_ns: int
-    """When its application handed it over, by the origin's clock; never later than now."""
+    """When the application handed it over, by the origin's clock; never later than now."""
     hops: int
     frame: bytes
-    """The packet as the radio brought it, routing header first; of several the one that made the message whole."""
+    """The packet as the radio delivered it, routing header first; of several packets the one that came last."""
     port: int = 0
-    """The numbered port that bytes were sent to; 0: MAVLink frames."""
+    """The numbered port to which bytes were sent; 0 for MAVLink frames."""
     content: bytes | None = None
-    """The bytes that were sent to a port."""
+    """The bytes that were sent to a port; None for MAVLink frames."""
 
     @property
     def data(self) -> bytes:
@@ -67,10 +67,10 @@ class Received(NamedTuple):
 
 
 class Data(NamedTuple):
-    """Bytes for whoever listens on a numbered port."""
+    """Bytes for the application that listens on a numbered port."""
 
     port: int
-    """1 to 65535."""
+    """The port, 1 to 65535."""
     data: bytes
 
 
@@ -78,21 +78,21 @@ class Fate(StrEnum):
     """What has become of a message at its sender."""
 
     ADMITTED = "admitted"
-    """The node has taken it."""
+    """The node has accepted the message."""
     REFUSED = "refused"
-    """The node has not taken it: the deadline cannot be kept, or too much waits already (`Status.reason`)."""
+    """The node has not accepted it: the deadline cannot be kept, or too many messages wait (`Status.reason`)."""
     LET_OUT = "let_out"
     """Its first frame was announced to the radio."""
     SENT = "sent"
-    """The radio has done with its first frame."""
+    """The radio has finished with its first frame."""
     TURNED_AWAY = "turned_away"
     """The radio did not try to send its first frame: its queue was full, or the frame came too late."""
     ACKNOWLEDGED = "acknowledged"
-    """The application of a node (`Status.nodes`) has it; told of each node once."""
+    """The application of a node (`Status.nodes`) has received it; reported once per node."""
     UNWANTED = "unwanted"
     """No application of that node listens to it."""
     EXPIRED = "expired"
-    """Its lifetime was over; `Status.nodes` are those that have not acknowledged it, where that was asked for."""
+    """Its lifetime is over; `Status.nodes` are the nodes that have not acknowledged it, if that was asked for."""
     DROPPED = "dropped"
     """It ended in this node; `Status.reason` says why."""
 
@@ -106,9 +106,9 @@ class Status(NamedTuple):
     reason: DropReason | None = None
     nodes: tuple[NodeId, ...] = ()
     last: bool = False
-    """True when nothing more can become of it as far as this node will hear."""
+    """True if this is the last status of the message."""
     interval_ns: int | None = None
-    """The least interval between messages that the network can serve in time; None: unknown."""
+    """The least interval between messages that the network can serve in time; None when it is unknown."""
 
 
 Destination = NodeId | Collection[NodeId]
@@ -157,7 +157,7 @@ class AppPort(Protocol):
         """Command the vehicle. Of several commands during one call the last counts, and others may object to it."""
 
     def tap(self, frames: bytes) -> None:
-        """Show MAVLink frames to whoever inspects this node."""
+        """Show MAVLink frames to the inspectors of this node."""
 
     def record(self, record: Record) -> None:
         """Write a record into the trace of the run."""
@@ -170,49 +170,49 @@ class Application:
     """One application at one node."""
 
     name: str = "application"
-    """Unique at its node; what the trace calls its packets."""
+    """A name that is unique at its node; the trace uses it for the application's packets."""
     listens: Collection[int] = ()
-    """Ids of the MAVLink messages it is given: a packet counts as what its first inner frame is."""
+    """Ids of the MAVLink messages that it receives; the first inner frame decides what a packet counts as."""
     ports: Collection[int] = ()
-    """Ports whose messages it is given."""
+    """Ports whose messages it receives."""
     follows: Collection[Fate] = ()
-    """What it is told of its messages."""
+    """The fates of its messages that are reported to it."""
     port: AppPort
 
     def start(self, port: AppPort, now_ns: int) -> None:
-        """The node is up."""
+        """The node has started."""
         self.port = port
 
     def on_message(self, message: Received, now_ns: int) -> None:
-        """A message for this node."""
+        """Take in a message for this node."""
 
     def on_status(self, status: Status, now_ns: int) -> None:
-        """What became of a message; only the fates in `follows`."""
+        """Take in what became of a message; only fates in `follows` are reported."""
 
     def on_fix(self, fix: Gps, now_ns: int) -> None:
-        """Where the vehicle's receiver says it is."""
+        """Take in a position fix of the vehicle's receiver."""
 
     def on_sensor(self, reading: SensorReading, now_ns: int) -> None:
-        """What another sensor says."""
+        """Take in a reading of another sensor."""
 
     def on_hello(self, frame: bytes, now_ns: int) -> None:
-        """A neighbor's hello, routing header first: it says where that neighbor flies."""
+        """Take in a neighbor's hello, routing header first; it says where that neighbor flies."""
 
     def hello_frames(self, now_ns: int) -> bytes:
-        """MAVLink frames for the hello that goes out now: it reaches neighbors sooner than any flood does."""
+        """MAVLink frames to add to the hello that is sent now; it reaches neighbors sooner than any flood."""
         return b""
 
     def permits(self, course: Course, now_ns: int) -> bool:
-        """Whether a course that another application has commanded may be flown now."""
+        """True if a course that another application has commanded may be flown now."""
         return True
 
     def wake(self, now_ns: int) -> None:
-        """An instant named by `next_wake_ns` has come."""
+        """Act at an instant that `next_wake_ns` has named."""
 
     def next_wake_ns(self) -> int | None:
-        """When it wants to be woken; None: not at all."""
+        """The instant of the next wake-up that is wanted; None when none is."""
         return None
 
     def report(self) -> Mapping[str, Any]:
-        """JSON-able counters, cumulative since `start`."""
+        """Counters as JSON values, cumulative since `start`."""
         return {}

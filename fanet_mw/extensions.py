@@ -1,11 +1,11 @@
-"""Parts that other packages bring: a scenario names one, and every process that needs it imports it.
+"""Parts from other packages: a scenario names one, and every process that needs it imports it.
 
     routing.protocol = "gossip3"              the name of an entry point, group `fanet_mw.routing`
-    routing.protocol = "mypackage:Gossip3"    or a module and what is in it
-    [routing.options]                         its own table, checked by its `Options`, a pydantic model
+    routing.protocol = "mypackage:Gossip3"    or a module and a name in it
+    [routing.options]                         the part's own table, checked by its `Options`, a pydantic model
 
-A name of ours always means ours. What is named is looked for when the scenario is read, so that a run never begins with
-a part that is not there.
+A name of this package's own parts always means these. A named part is looked up when the scenario is read, so that no
+run begins with a part that is missing.
 """
 
 import difflib
@@ -29,11 +29,11 @@ GROUPS: Final[Mapping[str, str]] = {
 }
 """The keys of a scenario that may name a part of another package, and the group of its entry points."""
 _NOT_EVERYWHERE: Final = ("numpy", "numba")
-"""What a companion computer has not. A channel or a mobility model computes with it elsewhere, and is checked there."""
+"""Modules that a companion computer lacks. A part that needs one runs, and is checked, elsewhere."""
 
 
 class Table(dict[str, Any]):
-    """The options of a part. Like all of a scenario they do not change, and so they can be a key of a cache."""
+    """The options of a part. Like a whole scenario they are immutable, so that they can be part of a cache's key."""
 
     def __hash__(self) -> int:  # type: ignore[override]  # a dict has none, because a dict changes
         return hash(json.dumps(self, sort_keys=True, default=str))
@@ -81,7 +81,7 @@ def load(key: str, name: str) -> Any:  # noqa: ANN401  (whatever the contract of
 
 
 class Named:
-    """The annotation of a key that holds the name of a part: one of ours, or one that can be loaded."""
+    """The annotation of a key that holds the name of a part: an own part, or one that can be loaded."""
 
     def __init__(self, key: str, ours: Sequence[str]) -> None:
         self._key = key
@@ -110,7 +110,7 @@ class Named:
 class OptionsOf:
     """The annotation of the table of options beside such a key.
 
-    It is checked by the part's own `Options`, with its defaults written out; a part of ours has no options.
+    It is checked by the part's own `Options`, with its defaults written out; this package's own parts have no options.
     """
 
     def __init__(self, key: str, ours: Sequence[str]) -> None:
@@ -124,7 +124,7 @@ class OptionsOf:
         table, field = self._key.split(".")
         name = info.data.get(field)
         if name is None:
-            return Table(options)  # the name itself is wrong, and was reported
+            return Table(options)  # the name itself is wrong, which has been reported
         model = None if name in self._ours else _model(self._key, name)
         if model is None:
             if options and name in self._ours:
@@ -138,7 +138,7 @@ class OptionsOf:
 
 
 def _model(key: str, name: str) -> type[BaseModel] | None:
-    """The model of the options of a part, which is its attribute `Options`."""
+    """The model of a part's options, which is its attribute `Options`."""
     try:
         model = getattr(load(key, name), "Options", None)
     except (ValueError, ModuleNotFoundError):

@@ -1,4 +1,4 @@
-"""Whether this installation is whole: a package may have been overwritten by another distribution, an extra missing.
+"""Is this installation whole? A package may have been overwritten by another distribution, or an extra be missing.
 
 The distribution fanet-mw has four packages at the top level, and other distributions have some of the same names
 (`openai-agents` has `agents`): installed into one environment, the later one overwrites files of the earlier one.
@@ -12,7 +12,7 @@ from typing import Final
 PACKAGES: Final = ("agents", "emulator", "sim")
 """The packages of this distribution besides `fanet_mw`."""
 _MARK: Final = "fanet-mw"
-"""What the first lines of each of our packages say."""
+"""A text that is among the first lines of each package of this distribution."""
 _EXTRAS: Final = {
     "numpy": "emulator",
     "numba": "emulator",
@@ -21,7 +21,7 @@ _EXTRAS: Final = {
     "distributed": "dask",
     "matplotlib": "figures",
 }
-"""The extra that brings a module."""
+"""The extra that installs a module."""
 _REMEDY: Final = (
     "install fanet-mw into an environment of its own: python3 -m venv fanet && fanet/bin/pip install 'fanet-mw[all]'"
 )
@@ -40,7 +40,7 @@ def damage() -> str | None:
 
 
 def missing_extra(error: ModuleNotFoundError) -> str | None:
-    """What to install for a module that is not there; None when it is of no extra of ours."""
+    """What to install for a missing module; None when no extra of this distribution has it."""
     extra = _EXTRAS.get((error.name or "").partition(".")[0])
     if extra is None:
         return None
@@ -48,6 +48,6 @@ def missing_extra(error: ModuleNotFoundError) -> str | None:
 
 
 def _owner(package: str) -> str:
-    """The other distributions that say they brought a package of this name."""
+    """The other distributions that claim to have installed a package of this name."""
     others = sorted({name for name in packages_distributions().get(package, ()) if name != "fanet-mw"})
     return f": it was installed by {', '.join(others)}" if others else ""

@@ -16,6 +16,7 @@ from fanet_mw.planner import (
     Loss,
     Optimum,
     Plan,
+    ScenarioChange,
     cheapest_change,
     describe,
     describe_change,

@@ -1,0 +1,21 @@
+"""The tutorial prints what it says: every command of it is run again."""
+
+import runpy
+from pathlib import Path
+
+import pytest
+
+ROOT = Path(__file__).parents[2]
+
+
+@pytest.mark.slow
+def test_the_commands_of_the_tutorial_print_what_stands_below_them() -> None:
+    main = runpy.run_path(str(ROOT / "scripts" / "transcripts.py"))["main"]
+    assert main(["--check"]) == 0
+
+
+def test_a_page_is_played_and_a_changed_output_is_noticed(tmp_path: Path) -> None:
+    played = runpy.run_path(str(ROOT / "scripts" / "transcripts.py"))["played"]
+    page = "```python\n# two.py\nprint(1 + 1)\n```\n\n```console\n$ python two.py\n3\n$ cat two.py | head -1\n```\n"
+    now = played(page, tmp_path)
+    assert now == page.replace("\n3\n", "\n2\n").replace("head -1\n", "head -1\n# two.py\n")

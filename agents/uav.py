@@ -30,6 +30,7 @@ from fanet_mw.bus.messages import (
     WifiScan,
 )
 from fanet_mw.bus.topics import Topics
+from fanet_mw.extensions import load
 from fanet_mw.node.node import Node
 from fanet_mw.rng import stream
 from fanet_mw.routing import make_protocol
@@ -78,11 +79,12 @@ class Uav(Actor):
         self._node = Node(node, scenario, make_protocol, position=position)
         self._autopilot = Autopilot(node, position=position, telemetry_hz=scenario.nodes.telemetry_hz)
         self._fixes = SteadyFix(sigma_m=scenario.world.gps_sigma_m, range_m=scenario.radio.range_m)
-        self._own = tuple(application.name for application in applications)
+        carried = (*_foreign(scenario, node), *applications)
+        self._own = tuple(application.name for application in carried)
         self._onboard = Onboard(
             self._node,
             lambda: (self._autopilot.position, self._autopilot.velocity),
-            [*_asked_for(scenario, node, self._autopilot, position), *applications],
+            [*_asked_for(scenario, node, self._autopilot, position), *carried],
             fly=self._steer,
             tap=self._tap,
         )
@@ -233,3 +235,9 @@ def _asked_for(scenario: Scenario, node: NodeId, autopilot: Autopilot, position:
     if scenario.mission.collision_horizon_s:
         applications.append(CollisionAvoidance(scenario, node))
     return applications
+
+
+def _foreign(scenario: Scenario, node: NodeId) -> Sequence[Application]:
+    """The applications of other packages that a scenario asks for."""
+    entries = [entry for entry in scenario.applications if entry.on(node)]
+    return [load("applications.use", entry.use)(scenario, node, entry.options) for entry in entries]

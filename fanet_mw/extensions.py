@@ -92,7 +92,8 @@ class Named:
 
     def __get_pydantic_json_schema__(self, _: core_schema.CoreSchema, __: GetJsonSchemaHandler) -> JsonSchemaValue:
         other = f"an entry point of {GROUPS[self._key]}, or MODULE:CLASS"
-        return {"anyOf": [{"enum": list(self.ours), "type": "string"}, {"type": "string", "x-names": other}]}
+        foreign = {"type": "string", "x-names": other}
+        return {"anyOf": [{"enum": list(self.ours), "type": "string"}, foreign]} if self.ours else foreign
 
     def _check(self, name: str) -> str:
         if name not in self.ours:
@@ -102,8 +103,10 @@ class Named:
                 return name  # this machine does not run it
             except ValueError as error:
                 close = difflib.get_close_matches(name, self.ours, n=1)
-                hint = f"did you mean {close[0]}?" if close else f"ours: {', '.join(self.ours)}"
-                raise ValueError(f"{error}; {hint}") from error
+                hint = (
+                    f"; did you mean {close[0]}?" if close else f"; ours: {', '.join(self.ours)}" if self.ours else ""
+                )
+                raise ValueError(f"{error}{hint}") from error
         return name
 
 

@@ -62,6 +62,12 @@ def disagreements(scenario: Scenario) -> Sequence[str]:
     found += _unkept_deadline(scenario)
     found += _blind_warnings(scenario)
     found += _impossible_faults(scenario)
+    found += [
+        f"applications.{index}.nodes names node {node}, which must be <= nodes.count = {count}"
+        for index, entry in enumerate(scenario.applications)
+        for node in (() if entry.nodes == "all" else entry.nodes)
+        if node > count
+    ]
     found += _impossible_places(scenario)
     found += _wrong_for_rivals(scenario)
     if scenario.routing.protocol == "clustered":

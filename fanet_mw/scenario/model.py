@@ -11,6 +11,7 @@ from pydantic import AfterValidator, Field, model_validator
 
 from fanet_mw.bus.radio_control import Control
 from fanet_mw.extensions import Named, OptionsOf, Table
+from fanet_mw.scenario.applications import ForeignApplication
 from fanet_mw.scenario.checks import disagreements
 from fanet_mw.scenario.clock import Clock
 from fanet_mw.scenario.faults import AnyFault
@@ -399,6 +400,8 @@ class Scenario(Section):
     world: World = World()
     mission: Mission = Mission()
     sensors: Sensors = Sensors()
+    applications: tuple[ForeignApplication, ...] = ()
+    """They run in the order in which they stand, after those of fanet-mw."""
     faults: tuple[AnyFault, ...] = ()
     """What happens to the air, and when; by message too (`fanet air`)."""
 

@@ -68,12 +68,14 @@ def test_a_protocol_that_breaks_the_contract_is_told(installed: Path, tmp_path: 
     assert "TestSilent::test_a_connected_swarm_at_rest_gets_nearly_all[all]" in ended.stdout
 
 
-def test_four_parts_of_another_package_serve_a_run(installed: Path, tmp_path: Path) -> None:
+def test_five_parts_of_another_package_serve_a_run(installed: Path, tmp_path: Path) -> None:
     simulate = ["-m", "fanet_mw", "simulate", str(EXAMPLE / "scenario.toml"), "--out", str(tmp_path / "out"), "--json"]
     ended = run(installed, *simulate, cwd=tmp_path)
     assert ended.returncode == 0, ended.stderr
     summary = json.loads(ended.stdout)
     assert summary["pdr"] > 0.9
+    reports = json.loads((tmp_path / "out" / "reports.json").read_text())
+    assert len(reports["agent-1"]["applications"]["roll_call"]["heard"]) >= 14
     resolved = (tmp_path / "out" / "scenario.toml").read_text()
     assert "patience_ms = 50.0" in resolved, "the defaults of the package's own table are written out"
 
@@ -85,6 +87,12 @@ def test_four_parts_of_another_package_serve_a_run(installed: Path, tmp_path: Pa
         (["routing.options.q=0.5"], "routing.options.q: Extra inputs are not permitted"),
         (["routing.protocol=gossip4"], "(installed: gossip3), nor MODULE:CLASS"),
         (["routing.protocol=swarm_parts.gossip3:Gossip4"], "has no attribute 'Gossip4'"),
+        (
+            ["applications.0.options.every_s=0"],
+            "applications.options.every_s: Input should be greater than or equal to",
+        ),
+        (["applications.0.use=rolls"], "(installed: roll_call), nor MODULE:CLASS"),
+        (["applications.0.nodes=[99]"], "applications.0.nodes names node 99, which must be <= nodes.count = 16"),
         (["mobility.model=static"], "mobility.options: model = 'static' is one of ours and has no options"),
     ],
 )

@@ -34,7 +34,7 @@ def test_every_key_says_what_it_means_and_every_measure_has_a_unit(of: Table) ->
         for key in of.keys
         if not key.unit
         and key.bound != "0 to 1"
-        and not key.bound.startswith(("whole", "> 0, < ", '"', "text", "true", "list", "table"))
+        and not key.bound.startswith(("whole", "> 0, < ", '"', "text", "true", "list", "table", "an entry"))
     }
     assert unitless - DIMENSIONLESS == set()
 
@@ -69,7 +69,7 @@ def test_every_default_in_a_commented_file_is_taken_when_it_is_uncommented() -> 
     unset = "(unset)"
     text = "\n".join(
         line.removeprefix("# ")
-        for line in lines[: lines.index("# [[faults]]")]
+        for line in lines[: next(at for at, line in enumerate(lines) if line.startswith("# [["))]
         if line.startswith("[") or (unset not in line and _is_toml(line))
     )
     assert config.parse(text, source="made", name="unnamed") == config.parse("", source="none", name="unnamed")

@@ -1,0 +1,23 @@
+"""The entries of a scenario's `[[applications]]`: what UAVs carry besides what fanet-mw brings."""
+
+from typing import Annotated, Any, Literal
+
+from pydantic import Field
+
+from fanet_mw.extensions import Named, OptionsOf
+from fanet_mw.scenario.sections import Id, Section
+
+
+class ForeignApplication(Section):
+    """An application of another package (`docs/how-to/extend.md`), on board of some or all UAVs."""
+
+    use: Annotated[str, Named("applications.use", ())]
+    """The application: an entry point, or module and class."""
+    nodes: Literal["all"] | tuple[Id, ...] = "all"
+    """Ids of the nodes that carry it, or `all`."""
+    options: Annotated[dict[str, Any], OptionsOf("applications.use", ())] = Field(default_factory=dict)
+    """The table of the application, as its package documents it."""
+
+    def on(self, node: int) -> bool:
+        """Whether a node carries it."""
+        return self.nodes == "all" or node in self.nodes

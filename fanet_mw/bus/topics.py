@@ -19,28 +19,25 @@ One put on the bus carries a batch: each message is one kind byte, a 32-bit leng
 Decoding is total: any bytes give messages or MalformedFrameError, nothing else.
 """
 
-import math
 import struct
 from array import array
-from collections.abc import Callable, Iterable, Sequence
+from collections.abc import Callable, Iterable
 from typing import Any, Final, NamedTuple
 
 from fanet_mw import trace
+from fanet_mw.bus import sensor_codecs
 from fanet_mw.bus.link_stats import COUNTS, LinkStats
 from fanet_mw.bus.messages import (
     Altimeter,
     Battery,
-    Call,
     Camera,
     Clock,
     ClockState,
-    Echo,
     Gps,
     Inertial,
     MavlinkTap,
     Message,
     Obstructions,
-    Person,
     Poses,
     Radar,
     Reception,
@@ -124,15 +121,6 @@ _TX = struct.Struct("<IqHB")
 _RX = struct.Struct("<Hqf")
 _STATUS = struct.Struct("<IBqB")
 _SETPOINT = struct.Struct("<q4dB3d")
-_GPS = struct.Struct("<q6d")
-_SCAN = struct.Struct("<qH")
-_HEARD = struct.Struct("<If")
-_PERSON = struct.Struct("<3d")
-_CALL = struct.Struct("<4d")
-_ECHO = struct.Struct("<5d")
-_ALTIMETER = struct.Struct("<q2d")
-_INERTIAL = struct.Struct("<q3d")
-_BATTERY = struct.Struct("<q3d")
 _POSES = struct.Struct("<qI")
 _OBSTRUCTIONS = struct.Struct("<qI")
 _CLOCK = struct.Struct("<qdBqQ")
@@ -141,10 +129,6 @@ _DEGRADE = struct.Struct("<HHBddq")
 _JAM = struct.Struct("<5dq")
 _CUT = struct.Struct("<Hq")
 _LINKS = struct.Struct("<qqI")
-MAX_HEARD: Final = 10_000
-"""Phones of one scan, people of one image, voices: as many as a scenario may have survivors."""
-MAX_ECHOES: Final = 4_096
-"""Returns of one radar scan."""
 
 
 def _encode_tx(m: TxRequest) -> bytes:
@@ -209,106 +193,6 @@ def _encode_setpoint(m: Setpoint) -> bytes:
 def _decode_setpoint(body: bytes) -> Setpoint:
     t_ns, east, north, up, speed_m_s, kind, *velocity = _SETPOINT.unpack(body)
     return Setpoint(t_ns, Enu(east, north, up), speed_m_s, SetpointKind(kind), Enu(*velocity))
-
-
-def _encode_gps(m: Gps) -> bytes:
-    return _GPS.pack(m.t_ns, *m.position, *m.velocity)
-
-
-def _decode_gps(body: bytes) -> Gps:
-    t_ns, *values = _GPS.unpack(body)
-    return Gps(t_ns, Enu(*values[:3]), Enu(*values[3:]))
-
-
-def _encode_scan(m: WifiScan) -> bytes:
-    return _SCAN.pack(m.t_ns, len(m.heard)) + b"".join(_HEARD.pack(*item) for item in m.heard)
-
-
-def _decode_scan(body: bytes) -> WifiScan:
-    t_ns, count = _SCAN.unpack_from(body)
-    rest = body[_SCAN.size :]
-    if len(rest) != count * _HEARD.size or count > MAX_HEARD:
-        raise ValueError("length")
-    return WifiScan(t_ns, tuple((survivor, rssi) for survivor, rssi in _HEARD.iter_unpack(rest)))
-
-
-def _finite(values: Iterable[float]) -> None:
-    """Raise ValueError for a reading that no sensor of this project gives."""
-    if not all(map(math.isfinite, values)):
-        raise ValueError("not finite")
-
-
-def _encode_rows(t_ns: int, rows: Sequence[tuple[float, ...]], row: struct.Struct) -> bytes:
-    return _SCAN.pack(t_ns, len(rows)) + b"".join(row.pack(*item) for item in rows)
-
-
-def _decode_rows(body: bytes, row: struct.Struct, *, most: int) -> tuple[int, list[tuple[float, ...]]]:
-    """The instant, and as many rows of finite numbers as the count in front of them says."""
-    t_ns, count = _SCAN.unpack_from(body)
-    if len(body) != _SCAN.size + count * row.size or count > most:
-        raise ValueError("length")
-    rows = list(row.iter_unpack(body[_SCAN.size :]))
-    for item in rows:
-        _finite(item)
-    return t_ns, rows
-
-
-def _encode_camera(m: Camera) -> bytes:
-    return _encode_rows(m.t_ns, m.people, _PERSON)
-
-
-def _decode_camera(body: bytes) -> Camera:
-    t_ns, rows = _decode_rows(body, _PERSON, most=MAX_HEARD)
-    return Camera(t_ns, tuple(Person(*row) for row in rows))
-
-
-def _encode_voice(m: Voice) -> bytes:
-    return _encode_rows(m.t_ns, m.calls, _CALL)
-
-
-def _decode_voice(body: bytes) -> Voice:
-    t_ns, rows = _decode_rows(body, _CALL, most=MAX_HEARD)
-    return Voice(t_ns, tuple(Call(*row) for row in rows))
-
-
-def _encode_radar(m: Radar) -> bytes:
-    return _encode_rows(m.t_ns, m.echoes, _ECHO)
-
-
-def _decode_radar(body: bytes) -> Radar:
-    t_ns, rows = _decode_rows(body, _ECHO, most=MAX_ECHOES)
-    return Radar(t_ns, tuple(Echo(*row) for row in rows))
-
-
-def _encode_altimeter(m: Altimeter) -> bytes:
-    return _ALTIMETER.pack(m.t_ns, m.up_m, math.nan if m.above_ground_m is None else m.above_ground_m)
-
-
-def _decode_altimeter(body: bytes) -> Altimeter:
-    t_ns, up_m, above_ground_m = _ALTIMETER.unpack(body)
-    nothing = math.isnan(above_ground_m)
-    _finite((up_m,) if nothing else (up_m, above_ground_m))
-    return Altimeter(t_ns, up_m, None if nothing else above_ground_m)
-
-
-def _encode_inertial(m: Inertial) -> bytes:
-    return _INERTIAL.pack(m.t_ns, *m.velocity)
-
-
-def _decode_inertial(body: bytes) -> Inertial:
-    t_ns, *velocity = _INERTIAL.unpack(body)
-    _finite(velocity)
-    return Inertial(t_ns, Enu(*velocity))
-
-
-def _encode_battery(m: Battery) -> bytes:
-    return _BATTERY.pack(m.t_ns, m.voltage_v, m.current_a, m.charge)
-
-
-def _decode_battery(body: bytes) -> Battery:
-    t_ns, *values = _BATTERY.unpack(body)
-    _finite(values)
-    return Battery(t_ns, *values)
 
 
 def _encode_tap(m: MavlinkTap) -> bytes:
@@ -408,8 +292,8 @@ _CODECS: Final[dict[int, tuple[type[Any], Callable[[Any], bytes], Callable[[byte
     3: (TxStatus, _encode_status, _decode_status),
     4: (Poses, _encode_poses, _decode_poses),
     5: (Setpoint, _encode_setpoint, _decode_setpoint),
-    6: (Gps, _encode_gps, _decode_gps),
-    7: (WifiScan, _encode_scan, _decode_scan),
+    6: (Gps, sensor_codecs.encode_gps, sensor_codecs.decode_gps),
+    7: (WifiScan, sensor_codecs.encode_scan, sensor_codecs.decode_scan),
     8: (MavlinkTap, _encode_tap, _decode_tap),
     9: (TraceBatch, _encode_trace, _decode_trace),
     10: (Clock, _encode_clock, _decode_clock),
@@ -420,19 +304,18 @@ _CODECS: Final[dict[int, tuple[type[Any], Callable[[Any], bytes], Callable[[byte
     15: (Restore, _encode_restore, _decode_restore),
     16: (LinkStats, _encode_links, _decode_links),
     17: (Obstructions, _encode_obstructions, _decode_obstructions),
-    18: (Camera, _encode_camera, _decode_camera),
-    19: (Voice, _encode_voice, _decode_voice),
-    20: (Radar, _encode_radar, _decode_radar),
-    21: (Altimeter, _encode_altimeter, _decode_altimeter),
-    22: (Inertial, _encode_inertial, _decode_inertial),
-    23: (Battery, _encode_battery, _decode_battery),
+    18: (Camera, sensor_codecs.encode_camera, sensor_codecs.decode_camera),
+    19: (Voice, sensor_codecs.encode_voice, sensor_codecs.decode_voice),
+    20: (Radar, sensor_codecs.encode_radar, sensor_codecs.decode_radar),
+    21: (Altimeter, sensor_codecs.encode_altimeter, sensor_codecs.decode_altimeter),
+    22: (Inertial, sensor_codecs.encode_inertial, sensor_codecs.decode_inertial),
+    23: (Battery, sensor_codecs.encode_battery, sensor_codecs.decode_battery),
 }
 HEADS: Final[dict[type[Any], tuple[struct.Struct, ...]]] = {
-    TxRequest: (_TX,), Reception: (_RX,), TxStatus: (_STATUS,), Poses: (_POSES,), Setpoint: (_SETPOINT,), Gps: (_GPS,),
-    WifiScan: (_SCAN, _HEARD), MavlinkTap: (_INSTANT,), TraceBatch: (), Clock: (_CLOCK,), Report: (_INSTANT,),
-    Degrade: (_DEGRADE,), Jam: (_JAM,), Cut: (_CUT,), Restore: (), LinkStats: (_LINKS,),
-    Obstructions: (_OBSTRUCTIONS,), Camera: (_SCAN, _PERSON), Voice: (_SCAN, _CALL), Radar: (_SCAN, _ECHO),
-    Altimeter: (_ALTIMETER,), Inertial: (_INERTIAL,), Battery: (_BATTERY,),
+    TxRequest: (_TX,), Reception: (_RX,), TxStatus: (_STATUS,), Poses: (_POSES,), Setpoint: (_SETPOINT,),
+    MavlinkTap: (_INSTANT,), TraceBatch: (), Clock: (_CLOCK,), Report: (_INSTANT,), Degrade: (_DEGRADE,),
+    Jam: (_JAM,), Cut: (_CUT,), Restore: (), LinkStats: (_LINKS,), Obstructions: (_OBSTRUCTIONS,),
+    **sensor_codecs.HEADS,
 }  # fmt: skip
 """The structs of each kind: that of its head, and that of each row where rows of one kind follow."""
 CODES: Final = {kind: code for code, (kind, _, _) in _CODECS.items()}

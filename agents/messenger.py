@@ -17,8 +17,8 @@ from fanet_mw.delivery.receiver import Receiver, Whole
 from fanet_mw.delivery.sender import EXPIRED, Packet, Sender
 from fanet_mw.errors import DropReason, LocalProtocolError
 from fanet_mw.node.node import Node
+from fanet_mw.node.packet import Packet as RoutedPacket
 from fanet_mw.node.plausible import CONTROL, RESTART_STEP_NS
-from fanet_mw.node.queue import Packet as RoutedPacket
 from fanet_mw.rng import stream
 from fanet_mw.units import BROADCAST, MAX_NODES, MS, US, NodeId, S, earliest, seconds_to_ns
 from fanet_mw.wire.message import (

@@ -25,7 +25,7 @@ from fanet_mw.application import (
 from fanet_mw.bus.messages import Gps, TxStatus
 from fanet_mw.errors import DropReason, LocalProtocolError, MalformedFrameError
 from fanet_mw.node.node import Node
-from fanet_mw.node.queue import Packet
+from fanet_mw.node.packet import Packet
 from fanet_mw.rng import stream
 from fanet_mw.scenario import Scenario
 from fanet_mw.trace import Record

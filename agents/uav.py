@@ -128,7 +128,7 @@ class Uav(Actor):
             self._onboard.radio_done(message, now_ns)
         elif isinstance(message, Gps):
             self._autopilot.fix(message)
-            self._node.position, self._node.velocity = self._fixes.position(message), message.velocity
+            self._node.moved(self._fixes.position(message), message.velocity)
             self._onboard.fix(message, now_ns)
         elif isinstance(message, WifiScan | Camera):
             self._onboard.sensor(message, now_ns)
@@ -159,7 +159,7 @@ class Uav(Actor):
 
     def know_clock_error(self, error_ns: int) -> None:
         """The greatest error of any clock in the swarm, as far as this node has heard; 0: they are exact."""
-        self._node.clock_error_ns = error_ns
+        self._node.know_clock_error(error_ns)
 
     def report(self) -> Mapping[str, Any]:
         own = {

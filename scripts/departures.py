@@ -15,7 +15,7 @@ from unittest.mock import patch
 from fanet_mw import routing
 from fanet_mw.bus.messages import Reception, TxOutcome
 from fanet_mw.node.contract import Port
-from fanet_mw.node.queue import Packet
+from fanet_mw.node.packet import Packet
 from fanet_mw.routing.aodv import Aodv
 from fanet_mw.routing.aodv import parameters as p
 from fanet_mw.routing.aodv.messages import RREP, RouteReply, RouteRequest

@@ -10,7 +10,7 @@ from typing import Any, Final, TypeVar
 from fanet_mw import wire
 from fanet_mw.errors import MalformedFrameError
 from fanet_mw.node import duplicates
-from fanet_mw.node.queue import Packet
+from fanet_mw.node.packet import Packet
 
 PHASES: Final = {0: duplicates.DELIVERED, wire.FLAG_FLOOD: duplicates.FLOODED, wire.FLAG_TO_HEAD: duplicates.CARRIED}
 """Which bit says that a packet was handled, by the phase flags of the frame that brought it."""

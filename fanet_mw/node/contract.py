@@ -5,13 +5,13 @@ what happens to a packet next, by calling its port. Both are sans-IO: instants a
 """
 
 from abc import ABC, abstractmethod
-from collections.abc import Mapping
+from collections.abc import Mapping, Sequence
 from random import Random
 from typing import ClassVar, Protocol
 
 from fanet_mw.bus.messages import Reception, TxStatus
 from fanet_mw.errors import DropReason
-from fanet_mw.node.queue import Packet
+from fanet_mw.node.packet import Packet, Relay
 from fanet_mw.scenario import Scenario
 from fanet_mw.trace import Record
 from fanet_mw.units import BROADCAST, Enu, NodeId
@@ -19,7 +19,7 @@ from fanet_mw.wire import Kind
 
 
 class Port(Protocol):
-    """What a node offers to its protocol."""
+    """What a node offers to its protocol (`port.py`)."""
 
     node: NodeId
     scenario: Scenario
@@ -33,26 +33,33 @@ class Port(Protocol):
     def transmit(self, frame: bytes, dst: NodeId, *, start_ns: int, wants_status: bool = False) -> int:
         """Announce a transmission; returns the request's sequence number."""
 
-    def gather(self) -> None:
-        """Hold broadcasts back until `send_gathered`, which sends as few frames as they fit."""
+    def transmit_together(self, packets: Sequence[Packet], *, flags: int, at_ns: Sequence[int]) -> None:
+        """Begin a phase of several packets: broadcast them at each of the given instants, in as few frames as they
+        fit. Copies of them in that phase that come back are known.
+        """
 
-    def send_gathered(self) -> None: ...
+    def transmit_to(self, packet: Packet, dst: NodeId, *, flags: int, start_ns: int) -> int:
+        """Send a packet to one neighbor, in a phase that begins here; returns the request's number, whose status
+        comes. Copies of the packet in that phase that come back are known.
+        """
+
+    def relay_together(self, relays: Sequence[Relay]) -> None:
+        """Pass flooded packets on, one hop more each, in as few frames as they fit; a frame goes at the first instant
+        of those in it.
+        """
 
     def announce(
         self, kind: Kind, inner: bytes, *, now_ns: int, flags: int, hop_limit: int, destination: NodeId = BROADCAST
     ) -> Packet:
         """Make a control packet of our own, next sequence number, marked as handled here."""
 
-    def stamped(self, packet: Packet, *, flags: int) -> bytes:
-        """The bytes of a packet of our own (or newly in its phase) with other flags, hops unchanged."""
-
     def forwarded(self, packet: Packet, *, flags: int) -> bytes:
         """The bytes of a packet for its next hop: one hop more, our id as previous hop."""
 
     def drop(self, reason: DropReason, packet: Packet, *, now_ns: int) -> None: ...
 
-    def mark(self, packet: Packet, bits: int) -> None:
-        """Remember a phase (`seen.FLOODED` ...) of a packet as handled."""
+    def mark(self, packet: Packet, *, flags: int) -> None:
+        """Know copies of a packet in the phase of these flags that come from now on."""
 
     def forget(self, packet: Packet) -> None:
         """Treat a later copy of this packet as new: it was not ours to handle yet, or its custody has passed on."""
@@ -79,8 +86,12 @@ class RoutingProtocol(ABC):
         """A packet of this node's application; its first frame may go from `due_ns` on, one lead after its birth."""
 
     @abstractmethod
-    def receive(self, packet: Packet, reception: Reception, *, now_ns: int) -> None:
-        """The first copy of a packet in its phase. Delivery to the application is the node's business."""
+    def receive(self, packet: Packet, reception: Reception, *, now_ns: int) -> Sequence[Relay] | None:
+        """The first copy of a packet in its phase. Delivery to the application is the node's business.
+
+        Returned is what is passed on because of it, if anything: the node sends that, together with what else came
+        in the same frame. Anything else a protocol sends through its port.
+        """
 
     def hello_inner(self, room: int, *, now_ns: int) -> bytes:
         """What this protocol adds to the node's hello, in at most so many bytes."""

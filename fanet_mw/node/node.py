@@ -1,86 +1,115 @@
 """The sans-IO core of one node: feed receptions, statuses and instants; drain requests, deliveries and records.
 
-    reception -> header at fixed offsets -> handled before in this phase? -> full header -> deliver -> protocol
+    reception -> header at fixed offsets -> handled before in this phase? -> full header -> deliver -> protocol -> relay
 
-What comes off the air never raises here: it is counted by reason. The node owns its identity, sequence numbers,
-duplicate suppression and headers; the routing protocol behind it decides what happens next.
+What comes off the air never raises here: it is counted by reason. The node owns its identity and duplicate suppression;
+the routing protocol behind it decides what happens next, and sends through the node's port (`port.py`).
 """
 
 from collections import Counter
-from collections.abc import Callable, Mapping
-from random import Random
+from collections.abc import Callable, Mapping, Sequence
 from typing import Final
 
 from fanet_mw import wire
 from fanet_mw.bus.messages import Reception, TxRequest, TxStatus
-from fanet_mw.errors import DropReason, LocalProtocolError, MalformedFrameError
+from fanet_mw.errors import DropReason, MalformedFrameError
 from fanet_mw.node import arrival, duplicates
-from fanet_mw.node.arrival import PHASES
-from fanet_mw.node.contract import RoutingProtocol
-from fanet_mw.node.plausible import CONTROL, RESTART_STEP_NS, Plausible
-from fanet_mw.node.queue import Packet
-from fanet_mw.rng import stream
+from fanet_mw.node.contract import Port, RoutingProtocol
+from fanet_mw.node.own_packets import OwnPackets
+from fanet_mw.node.packet import Packet, Relay
+from fanet_mw.node.plausible import Plausible
+from fanet_mw.node.port import NodePort
 from fanet_mw.scenario import Scenario
-from fanet_mw.trace import Delivered, Dropped, Generated, LetOut, Record
+from fanet_mw.trace import Delivered, Generated, Record
 from fanet_mw.units import BROADCAST, US, Enu, NodeId
-from fanet_mw.wire import Header, Kind
+from fanet_mw.wire import Kind
 
 _DATA: Final = int(Kind.DATA)
 _HELLO: Final = int(Kind.HELLO)
+_NONE: Final[Sequence[Relay]] = ()
 _new: Final = tuple.__new__  # for what is made once per frame
-_MOST_HOPS: Final = 255
-"""What the hop count of the header can say."""
 
 
 class Node:
     """One protocol instance."""
 
     def __init__(
-        self, node: NodeId, scenario: Scenario, make_protocol: Callable[["Node"], RoutingProtocol], *, position: Enu
+        self, node: NodeId, scenario: Scenario, make_protocol: Callable[[Port], RoutingProtocol], *, position: Enu
     ) -> None:
         self.node = node
         self.scenario = scenario
-        self.position = position
-        self.clock_error_ns = 0
-        self.velocity = Enu(0.0, 0.0, 0.0)
-        self.requests: list[TxRequest] = []
         self.deliveries: list[Packet] = []
         """Packets for the application of this node."""
-        self.watched: set[int] = set()
-        """Sequence numbers of own packets whose fate is of interest."""
-        self.fates: list[tuple[int, int, DropReason | None]] = []
-        """What became of these: (number, instant, why it was dropped; None: it was let out)."""
-        self.records: list[Record] = []
-        self.frames_sent = 0
         self.receptions = 0
-        self.dropped: Counter[str] = Counter()
         self._duplicates = 0
-        self._lead_ns = scenario.radio.lead_ns
-        self._first_seq, self._next_seq = 0, {False: 0, True: CONTROL}
         self._lifetimes_ns = [scenario.routing.lifetime_ns(priority) for priority in range(256)]
         """By priority, whatever the air says."""
         self._reader = arrival.shared
         self._seen = duplicates.Seen()
         self._plausible = Plausible(node, scenario)
-        self._held: set[bytes] = set()
-        """Names of own packets (`wire.NAME`) that were accepted, and of which no frame has been announced yet."""
-        self._gathered: list[tuple[int, bytes]] | None = None
-        """While set: broadcasts that may share a frame, each with its instant."""
-        self._protocol = make_protocol(self)
-        self.next_wake_ns = self._protocol.next_wake_ns
+        self._own = OwnPackets(node, self._seen, most_bytes=scenario.radio.max_frame_bytes)
+        self.port = NodePort(node, scenario, self._seen, self._own, position=position)
+        protocol = self._protocol = make_protocol(self.port)
+        self.next_wake_ns = protocol.next_wake_ns
         """The protocol's own method: every wake-up is followed by this question."""
-        protocol = self._protocol
         self.timeless = type(protocol).next_wake_ns is RoutingProtocol.next_wake_ns
         """This protocol never asks to be woken: no reception changes when the node is due."""
         self._overheard = None if type(protocol).overheard is RoutingProtocol.overheard else protocol.overheard
         """None: this protocol does not care for copies, and most receptions are copies."""
 
+    # --- what goes out, and what is known of the node (its actor reads and writes them) ---------------------------
+
+    @property
+    def requests(self) -> list[TxRequest]:
+        """Transmissions that the actor is to take to the radio."""
+        return self.port.requests
+
+    @requests.setter
+    def requests(self, requests: list[TxRequest]) -> None:
+        self.port.requests = requests
+
+    @property
+    def records(self) -> list[Record]:
+        """Trace records, in order."""
+        return self.port.records
+
+    @records.setter
+    def records(self, records: list[Record]) -> None:
+        self.port.records = records
+
+    @property
+    def frames_sent(self) -> int:
+        """How many transmissions have been requested: the sequence number of the next request."""
+        return self.port.frames_sent
+
+    @property
+    def dropped(self) -> Counter[str]:
+        """What has ended here, by reason."""
+        return self.port.dropped
+
+    @property
+    def watched(self) -> set[int]:
+        """Sequence numbers of own packets whose fate is of interest."""
+        return self.port.watched
+
+    @property
+    def fates(self) -> list[tuple[int, int, DropReason | None]]:
+        """What became of these: (number, instant, why it was dropped; None: it was let out)."""
+        return self.port.fates
+
+    def moved(self, position: Enu, velocity: Enu) -> None:
+        """The node knows itself to be here, and to move at so many m/s."""
+        self.port.position, self.port.velocity = position, velocity
+
+    def know_clock_error(self, error_ns: int) -> None:
+        """The greatest error of any clock in the swarm, as far as this node has heard; 0: they are exact."""
+        self.port.clock_error_ns = error_ns
+
     # --- from the host's side -------------------------------------------------------------------------------------
 
     def start(self, now_ns: int) -> None:
         """The node is up; one that starts again later must not reuse the names of its earlier packets."""
-        first = now_ns // RESTART_STEP_NS % CONTROL
-        self._first_seq, self._next_seq = first, {False: first, True: CONTROL + first}
+        self._own.start(now_ns)
         self._protocol.start(now_ns)
 
     def send(
@@ -102,28 +131,30 @@ class Node:
         `radio.max_frame_bytes`.
         """
         born_ns = born_ns // US * US  # what the header can say
-        packet = self._packet(
+        scenario = self.scenario
+        packet = self._own.make(
             Kind.DATA,
             inner,
             destination=destination,
             priority=priority,
             flags=self._protocol.origin_flags,
-            hop_limit=self.scenario.routing.hop_limit,
+            hop_limit=scenario.routing.hop_limit,
             born_ns=born_ns,
         )
         seq = packet.header.seq
-        self.records.append(_new(Generated, (born_ns, self.node, seq, app, len(packet.frame))))
-        self._held.add(packet.frame[wire.NAME])
+        self.port.records.append(_new(Generated, (born_ns, self.node, seq, app, len(packet.frame))))
+        self._own.held.add(packet.frame[wire.NAME])
         if watch:
-            self.watched.add(seq)
-        self._protocol.originate(packet, due_ns=max(born_ns + self._lead_ns, now_ns), now_ns=now_ns)
+            self.port.watched.add(seq)
+        due_ns = max(born_ns + scenario.radio.lead_ns, now_ns)
+        self._protocol.originate(packet, due_ns=due_ns, now_ns=now_ns)
         return seq
 
     def say_hello(self, inner: bytes, *, start_ns: int, now_ns: int) -> None:
         """Broadcast our hello one hop: position frames of the application, then what the protocol adds."""
         start_ns = self._protocol.hello_start_ns(start_ns)
         room = self.scenario.radio.max_frame_bytes - wire.HEADER_BYTES - len(inner)
-        packet = self._packet(
+        packet = self._own.make(
             Kind.HELLO,
             inner + self._protocol.hello_inner(room, now_ns=now_ns),
             destination=BROADCAST,
@@ -132,7 +163,7 @@ class Node:
             hop_limit=1,
             born_ns=start_ns,
         )
-        self.transmit(packet.frame, BROADCAST, start_ns=start_ns)
+        self.port.transmit(packet.frame, BROADCAST, start_ns=start_ns)
 
     def hello_share(self, now_ns: int) -> float:
         """After which part of the hello interval the next hello should go."""
@@ -157,62 +188,79 @@ class Node:
             self._hear_bundle(reception, now_ns)
             return False
         try:
-            self._first_copy(reader.packet or reader.read(), reception, known, now_ns)
+            relays = self._first_copy(reader.packet or reader.read(), reception, known, now_ns)
         except MalformedFrameError:
-            self.dropped[DropReason.MALFORMED] += 1
+            self.port.dropped[DropReason.MALFORMED] += 1
+            return False
+        for relay in relays:
+            self.port.relay_together((relay,))
         return False
 
     def _hear_bundle(self, reception: Reception, now_ns: int) -> None:
-        """Several packets in one frame: each as if it had come alone; what they make us send goes together again."""
+        """Several packets in one frame: each as if it had come alone; those that are passed on go together again."""
         try:
             packets = wire.unbundle(reception.frame)
         except MalformedFrameError:
-            self.dropped[DropReason.MALFORMED] += 1
+            self.port.dropped[DropReason.MALFORMED] += 1
             return
-        self.gather()
-        receptions = self.receptions
+        relays: list[Relay] = []
         for frame in packets:
             self._reader.look(frame, alone=True)
-            self.hear(reception._replace(frame=frame), now_ns)
-        self.receptions = receptions  # it was one, whatever was in it
-        self.send_gathered()
+            relays += self._hear_one(reception._replace(frame=frame), now_ns)
+        if relays:
+            self.port.relay_together(relays)
 
-    def _first_copy(self, packet: Packet, reception: Reception, before: int, now_ns: int) -> None:
-        """The packet that the reader has before it; `before`: what was known of it without this copy."""
+    def _hear_one(self, reception: Reception, now_ns: int) -> Sequence[Relay]:
+        """One packet of several that came in a frame; returned is what of it is passed on."""
+        reader = self._reader
+        known = self._seen.bits(reader.name)
+        if known & reader.phase:
+            self._duplicates += 1
+            if self._overheard is not None:
+                self._overheard(reader.key, now_ns=now_ns)
+            return _NONE
+        try:
+            return self._first_copy(reader.packet or reader.read(), reception, known, now_ns)
+        except MalformedFrameError:
+            self.port.dropped[DropReason.MALFORMED] += 1
+            return _NONE
+
+    def _first_copy(self, packet: Packet, reception: Reception, before: int, now_ns: int) -> Sequence[Relay]:
+        """The packet that the reader has before it; `before`: what was known of it without this copy. Returned is
+        what of it is passed on.
+        """
         reader = self._reader
         name, bits = reader.name, before | reader.phase
         _, _, origin_us, seq, origin, destination, _, kind, _, hops, priority, _, _, _ = reader.fields
-        known = bool(before) or self._handed_on(origin, seq, kind)
+        known = bool(before) or (kind == _DATA and self._own.handed_on(origin, seq))
         why = self._plausible.why_not(reader.fields, known=known, src=reception.src, end_ns=reception.end_ns)
         if why is not None:
             self._disbelieve(why, packet, now_ns)
-            return
+            return _NONE
         if kind == _HELLO:
             self._seen.put(name, bits)
             self._protocol.hello(packet, reception, now_ns=now_ns)
-            return
+            return _NONE
         end_ns = reception.end_ns
         age_ns = end_ns - origin_us * US
         if age_ns > self._lifetimes_ns[priority]:
             self._seen.put(name, bits)
-            self.drop(DropReason.EXPIRED, packet, now_ns=now_ns)
-            return
+            self.port.drop(DropReason.EXPIRED, packet, now_ns=now_ns)
+            return _NONE
         to_us = destination == BROADCAST or destination == self.node
         if kind == _DATA and to_us and not before & duplicates.DELIVERED:
             bits |= duplicates.DELIVERED
             self.deliveries.append(packet)
             late_ns = now_ns - end_ns
-            self.records.append(_new(Delivered, (now_ns, self.node, origin, seq, age_ns + late_ns, hops + 1, late_ns)))
+            self.port.records.append(
+                _new(Delivered, (now_ns, self.node, origin, seq, age_ns + late_ns, hops + 1, late_ns))
+            )
         self._seen.put(name, bits)
-        self._protocol.receive(packet, reception, now_ns=now_ns)
-
-    def _handed_on(self, origin: int, seq: int, kind: int) -> bool:
-        """Whether we gave data this name since our start: custody of it has passed on, and may come back."""
-        return kind == _DATA and origin == self.node and self._first_seq <= seq < self._next_seq[False]
+        return self._protocol.receive(packet, reception, now_ns=now_ns) or _NONE
 
     def _disbelieve(self, why: DropReason, packet: Packet, now_ns: int) -> None:
         """Counted, and neither delivered nor passed on."""
-        self.dropped[why] += 1
+        self.port.dropped[why] += 1
         if why is DropReason.OWN:
             self._protocol.impersonated(packet, now_ns=now_ns)
 
@@ -237,110 +285,12 @@ class Node:
     def report(self) -> Mapping[str, object]:
         """JSON-able counters and the protocol's state."""
         return {
-            "frames_sent": self.frames_sent,
+            "frames_sent": self.port.frames_sent,
             "receptions": self.receptions,
             "dropped": self._drops(),
             **self._protocol.report(),
         }
 
     def _drops(self) -> dict[str, int]:
-        dropped = self.dropped + Counter({DropReason.DUPLICATE: self._duplicates})
+        dropped = self.port.dropped + Counter({DropReason.DUPLICATE: self._duplicates})
         return {reason: dropped[reason] for reason in sorted(dropped)}
-
-    # --- the port of the protocol (fanet_mw.node.contract.Port) -----------------------------------------------
-
-    def gather(self) -> None:
-        self._gathered = []
-
-    def send_gathered(self) -> None:
-        """The first instant of each frame's packets is that of the frame."""
-        gathered, self._gathered = self._gathered or [], None
-        chunk: list[bytes] = []
-        first_ns, size, most = 0, 0, self.scenario.radio.max_frame_bytes
-        for start_ns, frame in gathered:
-            if chunk and size + len(frame) > most:
-                self.transmit(wire.bundle(chunk), BROADCAST, start_ns=first_ns)
-                chunk, size = [], 0
-            first_ns = min(first_ns, start_ns) if chunk else start_ns
-            chunk.append(frame)
-            size += len(frame)
-        if chunk:
-            self.transmit(wire.bundle(chunk), BROADCAST, start_ns=first_ns)
-
-    def transmit(self, frame: bytes, dst: NodeId, *, start_ns: int, wants_status: bool = False) -> int:
-        if self._held and frame[wire.NAME] in self._held:
-            self._held.remove(frame[wire.NAME])
-            own = int.from_bytes(frame[wire.SEQ], "little")
-            self.records.append(LetOut(start_ns, self.node, own))
-            if own in self.watched:
-                self.fates.append((own, start_ns, None))
-        if self._gathered is not None and dst == BROADCAST and not wants_status:
-            self._gathered.append((start_ns, frame))
-            return self.frames_sent
-        seq = self.frames_sent
-        self.frames_sent = seq + 1
-        self.requests.append(_new(TxRequest, (seq, start_ns, frame, dst, wants_status)))
-        return seq
-
-    def announce(
-        self, kind: Kind, inner: bytes, *, now_ns: int, flags: int, hop_limit: int, destination: NodeId = BROADCAST
-    ) -> Packet:
-        return self._packet(
-            kind,
-            inner,
-            destination=destination,
-            priority=wire.PRIORITY_CONTROL,
-            flags=flags,
-            hop_limit=hop_limit,
-            born_ns=now_ns,
-        )
-
-    def stamped(self, packet: Packet, *, flags: int) -> bytes:
-        header = packet.header
-        return wire.rewrite(packet.frame, self.node, header.hop_limit, header.hops, flags)
-
-    def forwarded(self, packet: Packet, *, flags: int) -> bytes:
-        header = packet.header
-        hops = header.hops
-        if hops < _MOST_HOPS:  # a hostile frame may come with all of them
-            hops += 1
-        return wire.rewrite(packet.frame, self.node, header.hop_limit - 1, hops, flags)
-
-    def drop(self, reason: DropReason, packet: Packet, *, now_ns: int) -> None:
-        self.dropped[reason] += 1
-        self._held.discard(packet.frame[wire.NAME])
-        if packet.header.origin == self.node and packet.header.seq in self.watched:
-            self.fates.append((packet.header.seq, now_ns, reason))
-        self.records.append(Dropped(now_ns, self.node, reason, packet.header.origin, packet.header.seq))
-
-    def mark(self, packet: Packet, bits: int) -> None:
-        self._seen.mark(arrival.name_of(packet.frame), bits)
-
-    def forget(self, packet: Packet) -> None:
-        self._seen.forget(arrival.name_of(packet.frame))
-
-    def record(self, record: Record) -> None:
-        self.records.append(record)
-
-    def stream(self, use: str) -> Random:
-        return stream(self.scenario.seed, use, self.node)
-
-    # --- inside ---------------------------------------------------------------------------------------------------
-
-    def _packet(
-        self, kind: Kind, inner: bytes, *, destination: NodeId, priority: int, flags: int, hop_limit: int, born_ns: int
-    ) -> Packet:
-        size = wire.HEADER_BYTES + len(inner)
-        bound = self.scenario.radio.max_frame_bytes
-        if size > bound:
-            raise LocalProtocolError(f"frame of {size} bytes must be <= radio.max_frame_bytes = {bound}")
-        control = kind is not Kind.DATA
-        seq = self._next_seq[control]
-        self._next_seq[control] = seq + 1
-        node, hops = self.node, 0
-        header = _new(
-            Header, (born_ns // US, seq, node, destination, node, kind, hop_limit, hops, priority, flags)
-        )  # fmt: skip
-        frame = header.encode() + inner
-        self._seen.put(arrival.name_of(frame), duplicates.DELIVERED | PHASES[flags & wire.PHASE_MASK])
-        return _new(Packet, (header, frame))

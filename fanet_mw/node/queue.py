@@ -7,25 +7,15 @@ Classes may expire sooner than the rest: what warns of a collision is worth noth
 from bisect import bisect_left, insort
 from collections.abc import Mapping
 from types import MappingProxyType
-from typing import Final, NamedTuple
+from typing import Final
 
 from fanet_mw.node.duplicates import key_of
+from fanet_mw.node.packet import Packet
 from fanet_mw.scenario import Routing
-from fanet_mw.units import US, NodeId
-from fanet_mw.wire import PRIORITY_REPORT, PRIORITY_SAFETY, Header
+from fanet_mw.units import US
+from fanet_mw.wire import PRIORITY_REPORT, PRIORITY_SAFETY
 
 _ALIKE: Final[Mapping[int, int]] = MappingProxyType({})
-
-
-class Packet(NamedTuple):
-    """A routed packet as a node holds it: its header, decoded, and its bytes."""
-
-    header: Header
-    frame: bytes
-
-    @property
-    def origin(self) -> NodeId:
-        return NodeId(self.header.origin)
 
 
 def sooner_us(routing: Routing) -> Mapping[int, int]:

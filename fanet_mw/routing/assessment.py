@@ -6,7 +6,7 @@ first copy -> wait -> fewer than `enough` copies heard: it is relayed | enough c
 import heapq
 
 from fanet_mw.node.duplicates import key_of
-from fanet_mw.node.queue import Packet
+from fanet_mw.node.packet import Packet
 
 
 class Assessment:

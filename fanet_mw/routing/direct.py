@@ -2,7 +2,7 @@
 
 from fanet_mw.bus.messages import Reception
 from fanet_mw.node.contract import RoutingProtocol
-from fanet_mw.node.queue import Packet
+from fanet_mw.node.packet import Packet
 from fanet_mw.units import NodeId
 
 

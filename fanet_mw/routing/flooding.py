@@ -5,12 +5,13 @@
 """
 
 from abc import abstractmethod
+from collections.abc import Sequence
 from typing import ClassVar
 
 from fanet_mw.bus.messages import Reception
 from fanet_mw.errors import DropReason
 from fanet_mw.node.contract import Port, RoutingProtocol
-from fanet_mw.node.queue import Packet
+from fanet_mw.node.packet import Packet, Relay
 from fanet_mw.units import BROADCAST
 from fanet_mw.wire import FLAG_FLOOD
 
@@ -30,21 +31,18 @@ class FloodingProtocol(RoutingProtocol):
     def originate(self, packet: Packet, *, due_ns: int, now_ns: int) -> None:
         self._port.transmit(packet.frame, BROADCAST, start_ns=due_ns)
 
-    def receive(self, packet: Packet, reception: Reception, *, now_ns: int) -> None:
+    def receive(self, packet: Packet, reception: Reception, *, now_ns: int) -> Sequence[Relay]:
         header = packet.header
         if header.destination == self._port.node:
-            return  # the packet has reached its destination
+            return ()  # the packet has reached its destination
         if header.hop_limit <= 1:
             self._port.drop(DropReason.HOP_LIMIT, packet, now_ns=now_ns)
-            return
-        self._consider(packet, now_ns=now_ns)
+            return ()
+        return self._consider(packet, now_ns=now_ns)
 
     @abstractmethod
-    def _consider(self, packet: Packet, *, now_ns: int) -> None:
-        """Decide about the first copy of a packet that may be relayed."""
-
-    def _relay(self, packet: Packet, *, start_ns: int) -> None:
-        self._port.transmit(self._port.forwarded(packet, flags=FLAG_FLOOD), BROADCAST, start_ns=start_ns)
+    def _consider(self, packet: Packet, *, now_ns: int) -> Sequence[Relay]:
+        """Decide about the first copy of a packet that may be relayed; returned is when it is, if that is decided."""
 
 
 class Flooding(FloodingProtocol):
@@ -56,5 +54,5 @@ class Flooding(FloodingProtocol):
         super().__init__(port)
         self._jitter_ns = port.scenario.routing.jitter_ns
 
-    def _consider(self, packet: Packet, *, now_ns: int) -> None:
-        self._relay(packet, start_ns=now_ns + self._lead_ns + int(self._random() * self._jitter_ns))
+    def _consider(self, packet: Packet, *, now_ns: int) -> Sequence[Relay]:
+        return (Relay(packet, now_ns + self._lead_ns + int(self._random() * self._jitter_ns)),)

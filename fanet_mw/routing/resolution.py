@@ -16,7 +16,7 @@ from dataclasses import dataclass, field
 from enum import Enum
 from typing import Final, NamedTuple
 
-from fanet_mw.node.queue import Packet
+from fanet_mw.node.packet import Packet
 from fanet_mw.units import MS, NodeId, S
 
 REQUEST_JITTER_NS: Final = 10 * MS

@@ -16,7 +16,7 @@ from typing import ClassVar, Final
 from fanet_mw.bus.messages import Reception, TxOutcome, TxStatus
 from fanet_mw.errors import DropReason, MalformedFrameError
 from fanet_mw.node.contract import Port, RoutingProtocol
-from fanet_mw.node.queue import Packet
+from fanet_mw.node.packet import Packet
 from fanet_mw.routing import control
 from fanet_mw.routing.control import BodyReader, Family, check_node, type_of
 from fanet_mw.routing.resolution import Knowledge, Outgoing, Resolver

@@ -7,11 +7,11 @@ Probabilities and bounds are `routing.gossip_p`, `gossip_k`, `counter`, `assess_
 the first paper (neighbor counts, second chances, zones), the distance- and location-based schemes of the second.
 """
 
-from collections.abc import Mapping
+from collections.abc import Mapping, Sequence
 from typing import ClassVar
 
 from fanet_mw.node.contract import Port
-from fanet_mw.node.queue import Packet
+from fanet_mw.node.packet import Packet, Relay
 from fanet_mw.routing.assessment import Assessment
 from fanet_mw.routing.flooding import FloodingProtocol
 from fanet_mw.units import MS
@@ -27,11 +27,12 @@ class Gossip(FloodingProtocol):
         routing = port.scenario.routing
         self._p, self._k, self._jitter_ns = routing.gossip_p, routing.gossip_k, routing.jitter_ns
 
-    def _consider(self, packet: Packet, *, now_ns: int) -> None:
+    def _consider(self, packet: Packet, *, now_ns: int) -> Sequence[Relay]:
         """Relay within k hops, or with probability p; `hops` counts the transmissions before the one received."""
         draw, jitter = self._random(), self._random()
         if packet.header.hops + 1 <= self._k or draw < self._p:
-            self._relay(packet, start_ns=now_ns + self._lead_ns + int(jitter * self._jitter_ns))
+            return (Relay(packet, now_ns + self._lead_ns + int(jitter * self._jitter_ns)),)
+        return ()
 
 
 class CounterBased(FloodingProtocol):
@@ -45,8 +46,9 @@ class CounterBased(FloodingProtocol):
         self._assess_ns = round(routing.assess_ms * MS)
         self._assessment = Assessment(enough=routing.counter)
 
-    def _consider(self, packet: Packet, *, now_ns: int) -> None:
+    def _consider(self, packet: Packet, *, now_ns: int) -> Sequence[Relay]:
         self._assessment.first_copy(packet, due_ns=now_ns + int(self._random() * self._assess_ns))
+        return ()
 
     def overheard(self, key: int, *, now_ns: int) -> None:
         self._assessment.overheard(key, now_ns=now_ns)
@@ -56,7 +58,7 @@ class CounterBased(FloodingProtocol):
 
     def wake(self, now_ns: int) -> None:
         for packet in self._assessment.decided(now_ns=now_ns):
-            self._relay(packet, start_ns=now_ns + self._lead_ns)
+            self._port.relay_together([Relay(packet, now_ns + self._lead_ns)])
 
     def waiting(self) -> int:
         return len(self._assessment)

@@ -2,7 +2,7 @@
 
 from typing import NamedTuple
 
-from fanet_mw.node.queue import Packet
+from fanet_mw.node.packet import Packet
 from fanet_mw.units import NodeId
 
 

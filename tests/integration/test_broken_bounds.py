@@ -5,7 +5,7 @@ from typing import Any
 
 import pytest
 
-from fanet_mw.node.queue import Packet
+from fanet_mw.node.packet import Packet
 from fanet_mw.routing.clustered.timetable.promises import Promises
 from fanet_mw.trace import BoundStated
 from sim.results.files import finish

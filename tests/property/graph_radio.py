@@ -63,7 +63,7 @@ class Swarm:
     def move(self, node: int, place: Enu) -> None:
         self.places[NodeId(node)] = place
         if node in self.nodes:
-            self.nodes[NodeId(node)].position = place
+            self.nodes[NodeId(node)].moved(place, Enu(0.0, 0.0, 0.0))
 
     def send(self, node: int) -> None:
         """A packet of the node's application, to everyone."""

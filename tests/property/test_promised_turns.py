@@ -8,7 +8,8 @@ from typing import NamedTuple
 from hypothesis import example, given, settings
 from hypothesis import strategies as st
 
-from fanet_mw.node.queue import Packet, TxQueue
+from fanet_mw.node.packet import Packet
+from fanet_mw.node.queue import TxQueue
 from fanet_mw.routing.clustered.tdma.own_bound import BURST, Own
 from fanet_mw.routing.clustered.tdma.root_release import Following, RootRelease
 from fanet_mw.routing.clustered.tdma.turns import Turns

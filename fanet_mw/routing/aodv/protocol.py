@@ -14,7 +14,7 @@ from typing import ClassVar
 from fanet_mw.bus.messages import Reception, TxOutcome
 from fanet_mw.errors import DropReason, MalformedFrameError
 from fanet_mw.node.contract import Port
-from fanet_mw.node.queue import Packet
+from fanet_mw.node.packet import Packet
 from fanet_mw.routing import control
 from fanet_mw.routing.aodv import parameters as p
 from fanet_mw.routing.aodv.discovery import Discovery, RateLimit, Search, SeenRequests

@@ -16,7 +16,7 @@ from fanet_mw.errors import DropReason, MalformedFrameError
 from fanet_mw.node.arrival import decoded
 from fanet_mw.node.contract import Port, RoutingProtocol
 from fanet_mw.node.neighbors import Neighbor, Neighbors
-from fanet_mw.node.queue import Packet
+from fanet_mw.node.packet import Packet, Relay
 from fanet_mw.routing.clustered.contract import Access, Relaying, Roles, TwoHops
 from fanet_mw.routing.clustered.forwarding.floods import Floods
 from fanet_mw.routing.clustered.forwarding.gradient import Gradient
@@ -78,20 +78,20 @@ class Clustered(RoutingProtocol):
             parts.roles.on_flooding(due_ns)
         parts.access.originate(packet, due_ns=due_ns, now_ns=now_ns)
 
-    def receive(self, packet: Packet, reception: Reception, *, now_ns: int) -> None:
+    def receive(self, packet: Packet, reception: Reception, *, now_ns: int) -> Sequence[Relay]:
         parts, header = self.parts, packet.header
         flags = header.flags
         parts.roles.on_sign_of_life(header.origin, born_ns=header.origin_us * US, now_ns=now_ns)
         parts.floods.keep(packet, flooded=bool(flags & FLAG_FLOOD), now_ns=now_ns)
         if flags & FLAG_FLOOD:
             at_once = header.kind != Kind.DATA and parts.roles.on_control(packet, reception.src, now_ns=now_ns)
-            for start_ns in parts.relaying.on_flood(packet, reception, at_once=at_once, now_ns=now_ns):
-                parts.floods.relay(packet, start_ns=start_ns)
-        elif flags & FLAG_TO_HEAD:
+            return parts.relaying.on_flood(packet, reception, at_once=at_once, now_ns=now_ns)
+        if flags & FLAG_TO_HEAD:
             if header.hop_limit <= 1:
                 self._port.drop(DropReason.HOP_LIMIT, packet, now_ns=now_ns)
             else:
                 parts.access.forward(packet, start_ns=now_ns + self._lead_ns, now_ns=now_ns)
+        return ()
 
     def bound_ns(self) -> int | None:
         return None if self.parts.promises is None else self.parts.promises.bound_ns()
@@ -178,8 +178,8 @@ class Clustered(RoutingProtocol):
     def wake(self, now_ns: int) -> None:
         parts = self.parts
         parts.roles.wake(now_ns)
-        for packet, start_ns in parts.relaying.decided(now_ns):
-            parts.floods.relay(packet, start_ns=start_ns)
+        for relay in parts.relaying.decided(now_ns):
+            self._port.relay_together([relay])
         for packet in parts.repair.due(now_ns=now_ns) if parts.repair else ():
             parts.access.answer(packet, now_ns=now_ns)
         parts.uplink.expire(now_ns=now_ns)

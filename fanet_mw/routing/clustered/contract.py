@@ -13,7 +13,7 @@ from typing import Protocol
 
 from fanet_mw.bus.messages import Reception
 from fanet_mw.node.neighbors import Neighbor
-from fanet_mw.node.queue import Packet
+from fanet_mw.node.packet import Packet, Relay
 from fanet_mw.routing.clustered.forwarding.gradient import Route
 from fanet_mw.units import NodeId
 from fanet_mw.wire import Kind
@@ -119,13 +119,13 @@ class Relaying(Protocol):
     def start(self, now_ns: int) -> None:
         """The node is up."""
 
-    def on_flood(self, packet: Packet, reception: Reception, *, at_once: bool, now_ns: int) -> Sequence[int]:
-        """The first copy of a flooded packet; returned are the instants at which the node passes it on, mostly one or
-        none. `at_once`: every node passes it on, and soon.
+    def on_flood(self, packet: Packet, reception: Reception, *, at_once: bool, now_ns: int) -> Sequence[Relay]:
+        """The first copy of a flooded packet; returned is when the node passes it on, mostly once or never. `at_once`:
+        every node passes it on, and soon.
         """
 
-    def decided(self, now_ns: int) -> Sequence[tuple[Packet, int]]:
-        """Packets whose relay was open until now, each with the instant at which it goes."""
+    def decided(self, now_ns: int) -> Sequence[Relay]:
+        """Packets whose relay was open until now."""
 
     def next_wake_ns(self) -> int | None:
         """When the next decision is due."""

@@ -16,7 +16,7 @@ from typing import ClassVar, Final
 from fanet_mw.bus.messages import Reception, TxOutcome
 from fanet_mw.errors import DropReason, MalformedFrameError
 from fanet_mw.node.contract import Port
-from fanet_mw.node.queue import Packet
+from fanet_mw.node.packet import Packet
 from fanet_mw.routing import control
 from fanet_mw.routing.control import Family
 from fanet_mw.routing.dsdv.messages import FULL, INCREMENTAL, PER_ENTRY, Advertised, Update

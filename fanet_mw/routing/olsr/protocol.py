@@ -18,7 +18,7 @@ from fanet_mw.bus.messages import Reception
 from fanet_mw.errors import DropReason, MalformedFrameError
 from fanet_mw.graph.multipoint_relays import multipoint_relays
 from fanet_mw.node.contract import Port
-from fanet_mw.node.queue import Packet
+from fanet_mw.node.packet import Packet
 from fanet_mw.routing import control
 from fanet_mw.routing.control import Family
 from fanet_mw.routing.olsr import parameters as p

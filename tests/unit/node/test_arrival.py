@@ -8,7 +8,7 @@ from fanet_mw import wire
 from fanet_mw.errors import MalformedFrameError
 from fanet_mw.node import duplicates
 from fanet_mw.node.arrival import Memo, Reader
-from fanet_mw.node.queue import Packet
+from fanet_mw.node.packet import Packet
 
 FLOODED = wire.Header(5, 7, 3, 0xFFFF, 3, 0, 32, 0, 3, wire.FLAG_FLOOD)
 

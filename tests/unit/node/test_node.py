@@ -7,6 +7,7 @@ from fanet_mw.bus.messages import Reception
 from fanet_mw.errors import DropReason, LocalProtocolError
 from fanet_mw.node.duplicates import Seen
 from fanet_mw.node.node import Node
+from fanet_mw.node.packet import Packet, Relay
 from fanet_mw.routing import make_protocol
 from fanet_mw.trace import Delivered, Dropped
 from fanet_mw.units import BROADCAST, MS, US, Enu, NodeId, S
@@ -29,6 +30,10 @@ def node(make_scenario: MakeScenario) -> Node:
 
 def frame(**change: int) -> bytes:
     return PLAIN._replace(**change).encode() + filler(40)
+
+
+def packet(**change: int) -> Packet:
+    return Packet(PLAIN._replace(**change), frame(**change))
 
 
 def hear(node: Node, data: bytes, *, at_ns: int = 1 * MS) -> bool:
@@ -118,10 +123,7 @@ def test_a_bundle_is_one_reception_of_several_packets(node: Node) -> None:
 
 @pytest.mark.parametrize("starts_ms", [(20, 30), (30, 20)])
 def test_packets_that_share_a_frame_go_at_the_first_instant_of_them(node: Node, starts_ms: tuple[int, int]) -> None:
-    node.gather()
-    for seq, start_ms in enumerate(starts_ms):
-        node.transmit(frame(seq=seq), BROADCAST, start_ns=start_ms * MS)
-    node.send_gathered()
+    node.port.relay_together([Relay(packet(seq=seq), start_ms * MS) for seq, start_ms in enumerate(starts_ms)])
     assert [request.start_ns for request in node.requests] == [20 * MS]
 
 
@@ -129,10 +131,7 @@ def test_a_shared_frame_is_no_longer_than_frames_may_be(node: Node) -> None:
     """100 bytes and a little each: three fit 400 bytes, a fourth does not."""
     one = len(frame())
     fit = 400 // one
-    node.gather()
-    for seq in range(2 * fit + 1):
-        node.transmit(frame(seq=seq), BROADCAST, start_ns=1 * MS)
-    node.send_gathered()
+    node.port.relay_together([Relay(packet(seq=seq), 1 * MS) for seq in range(2 * fit + 1)])
     assert [len(request.frame) for request in node.requests] == [fit * one, fit * one, one]
 
 
@@ -143,7 +142,7 @@ def test_packets_of_one_origin_are_numbered_without_gaps_whatever_control_goes_i
     numbers = []
     for _ in range(3):
         numbers.append(send(node))
-        node.announce(Kind.ROUTING, b"", now_ns=0, flags=0, hop_limit=1)
+        node.port.announce(Kind.ROUTING, b"", now_ns=0, flags=0, hop_limit=1)
     assert numbers == [numbers[0], numbers[0] + 1, numbers[0] + 2]
 
 

@@ -21,7 +21,7 @@ from typing import Final
 from fanet_mw.bounds.turn_gaps import TurnServer
 from fanet_mw.errors import DropReason
 from fanet_mw.node.contract import Port
-from fanet_mw.node.queue import Packet
+from fanet_mw.node.packet import Packet
 from fanet_mw.routing.clustered.claimed.claiming import Change, Claiming
 from fanet_mw.routing.clustered.claimed.turn_queue import OwnRelease
 from fanet_mw.routing.clustered.forwarding.floods import Floods

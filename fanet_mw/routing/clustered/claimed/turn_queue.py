@@ -1,6 +1,7 @@
 """The queue of one node in claimed slots: own packets and relays, most urgent first, in the turns that are its own."""
 
-from fanet_mw.node.queue import Packet, TxQueue
+from fanet_mw.node.packet import Packet
+from fanet_mw.node.queue import TxQueue
 from fanet_mw.routing.clustered.claimed.own_turns import OwnTurns
 from fanet_mw.routing.clustered.tdma.turn_release import OwnTurn, TurnRelease
 

@@ -7,9 +7,8 @@ and when a node floods is for its protocol to decide; this is what it sends then
 from collections.abc import Sequence
 from typing import Final
 
-from fanet_mw.node import duplicates
 from fanet_mw.node.contract import Port
-from fanet_mw.node.queue import Packet
+from fanet_mw.node.packet import Packet
 from fanet_mw.routing.clustered.forwarding.repair import Repair
 from fanet_mw.routing.clustered.tdma.contention import Contention
 from fanet_mw.units import BROADCAST, S
@@ -46,42 +45,24 @@ class Floods:
 
     def contend_again(self, packet: Packet, *, now_ns: int) -> None:
         """Send what a neighbor lacks as soon as it may contend."""
-        frame = self.again(packet)
-        if frame is not None:
-            self._port.transmit(frame, BROADCAST, start_ns=self._contention.start_ns(now_ns=now_ns))
+        if self._goes_on(packet):  # else it needs no instant
+            start_ns = self._contention.start_ns(now_ns=now_ns)
+            self._port.transmit_together([packet], flags=FLAG_FLOOD, at_ns=(start_ns,))
 
     def begin(self, packets: Sequence[Packet], *, start_ns: int, again_ns: Sequence[int] = ()) -> None:
         """The floods of several packets begin here, in one frame, which is repeated at later instants."""
         for packet in packets:
-            self._port.mark(packet, duplicates.FLOODED)
             self.keep(packet, flooded=True, now_ns=start_ns)
-        for at_ns in (start_ns, *again_ns):
-            self._port.gather()
-            for packet in packets:
-                self._port.transmit(self._frame(packet), BROADCAST, start_ns=at_ns)
-            self._port.send_gathered()
-
-    def relay(self, packet: Packet, *, start_ns: int) -> None:
-        """Pass on a flood that began elsewhere."""
-        self._port.transmit(self._port.forwarded(packet, flags=FLAG_FLOOD), BROADCAST, start_ns=start_ns)
+        self._port.transmit_together(packets, flags=FLAG_FLOOD, at_ns=(start_ns, *again_ns))
 
     def answer(self, packets: Sequence[Packet], *, start_ns: int) -> None:
         """Send what neighbors lack, in one frame."""
-        self._port.gather()
-        for packet in packets:
-            frame = self.again(packet)
-            if frame is not None:
-                self._port.transmit(frame, BROADCAST, start_ns=start_ns)
-        self._port.send_gathered()
+        goes = [packet for packet in packets if self._goes_on(packet)]
+        self._port.transmit_together(goes, flags=FLAG_FLOOD, at_ns=(start_ns,))
 
-    def again(self, packet: Packet) -> bytes | None:
-        """The frame for a neighbor that lacks this packet; None: it is as far as it may go, and needs no instant."""
-        self._port.mark(packet, duplicates.FLOODED)
-        own = packet.header.origin == self._port.node
-        return self._frame(packet) if own or packet.header.hop_limit > 1 else None
-
-    def _frame(self, packet: Packet) -> bytes:
-        """What begins here: a packet of our own as it is, another's one hop further."""
-        own = packet.header.origin == self._port.node
-        stamp = self._port.stamped if own else self._port.forwarded
-        return stamp(packet, flags=FLAG_FLOOD)
+    def _goes_on(self, packet: Packet) -> bool:
+        """Whether a packet is not yet as far as it may go; one that is counts as flooded here all the same."""
+        if packet.header.origin == self._port.node or packet.header.hop_limit > 1:
+            return True
+        self._port.mark(packet, flags=FLAG_FLOOD)
+        return False

@@ -15,7 +15,7 @@ from itertools import islice
 from typing import Final, NamedTuple
 
 from fanet_mw.node.duplicates import key_of
-from fanet_mw.node.queue import Packet
+from fanet_mw.node.packet import Packet
 from fanet_mw.units import MS, US
 from fanet_mw.wire.digest import CAPACITY, Digest, Holding
 

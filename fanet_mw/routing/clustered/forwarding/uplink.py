@@ -9,9 +9,9 @@ from typing import Final, NamedTuple
 
 from fanet_mw.bus.messages import TxOutcome, TxStatus
 from fanet_mw.errors import DropReason
-from fanet_mw.node import duplicates
 from fanet_mw.node.contract import Port
-from fanet_mw.node.queue import Packet, TxQueue, sooner_us
+from fanet_mw.node.packet import Packet
+from fanet_mw.node.queue import TxQueue, sooner_us
 from fanet_mw.routing.clustered.forwarding.gradient import Gradient
 from fanet_mw.units import US, NodeId
 from fanet_mw.wire import FLAG_TO_HEAD
@@ -51,11 +51,7 @@ class Uplink:
         if route is None:
             self._hold(packet, now_ns=now_ns)
             return
-        self._port.mark(packet, duplicates.CARRIED)
-        own = packet.header.origin == self._port.node
-        stamp = self._port.stamped if own else self._port.forwarded
-        frame = stamp(packet, flags=FLAG_TO_HEAD)
-        seq = self._port.transmit(frame, route.parent, start_ns=start_ns, wants_status=True)
+        seq = self._port.transmit_to(packet, route.parent, flags=FLAG_TO_HEAD, start_ns=start_ns)
         self._under_way[seq] = Attempt(packet, route.parent, tries + 1)
 
     def _hold(self, packet: Packet, *, now_ns: int) -> None:

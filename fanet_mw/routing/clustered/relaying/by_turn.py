@@ -9,7 +9,7 @@ from collections.abc import Mapping, Sequence
 from fanet_mw.bus.messages import Reception
 from fanet_mw.errors import DropReason
 from fanet_mw.node.contract import Port
-from fanet_mw.node.queue import Packet
+from fanet_mw.node.packet import Packet, Relay
 from fanet_mw.routing.clustered.contract import Relaying
 from fanet_mw.routing.clustered.timetable.plans import Plans
 from fanet_mw.routing.clustered.timetable.turn_plan import Plan
@@ -30,7 +30,7 @@ class ByTurn:
     def start(self, now_ns: int) -> None:
         self._otherwise.start(now_ns)
 
-    def on_flood(self, packet: Packet, reception: Reception, *, at_once: bool, now_ns: int) -> Sequence[int]:
+    def on_flood(self, packet: Packet, reception: Reception, *, at_once: bool, now_ns: int) -> Sequence[Relay]:
         plan = self._plans.at(reception.end_ns)
         if plan is None:
             return self._otherwise.on_flood(packet, reception, at_once=at_once, now_ns=now_ns)
@@ -46,8 +46,8 @@ class ByTurn:
 
     def _in_turn(
         self, packet: Packet, plan: Plan, heard: tuple[int, NodeId, int], reception: Reception, now_ns: int
-    ) -> Sequence[int]:
-        """The turns of this flood that are the node's and still to come."""
+    ) -> Sequence[Relay]:
+        """In the turns of this flood that are the node's and still to come."""
         offset, root, instance = heard
         own = plan.mine.get((root, instance), ())
         if not own or packet.header.hop_limit <= 1:
@@ -60,9 +60,9 @@ class ByTurn:
             # that arrives may be one that was sent after the node's own turns.
             self._missed += 1
             self._port.drop(DropReason.MISSED_TURN, packet, now_ns=now_ns)
-        return ahead_ns
+        return [Relay(packet, start_ns) for start_ns in ahead_ns]
 
-    def decided(self, now_ns: int) -> Sequence[tuple[Packet, int]]:
+    def decided(self, now_ns: int) -> Sequence[Relay]:
         return self._otherwise.decided(now_ns)
 
     def next_wake_ns(self) -> int | None:

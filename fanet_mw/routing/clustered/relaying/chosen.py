@@ -13,7 +13,7 @@ from typing import Final, Protocol
 
 from fanet_mw.bus.messages import Reception
 from fanet_mw.node.contract import Port
-from fanet_mw.node.queue import Packet
+from fanet_mw.node.packet import Packet, Relay
 from fanet_mw.routing.clustered.contract import Relaying
 from fanet_mw.routing.clustered.relaying.neighborhood import Neighborhood
 from fanet_mw.routing.clustered.roles.membership import Membership
@@ -111,7 +111,7 @@ class Chosen:
         self._known_ns = now_ns + self._learn_ns
         self._otherwise.start(now_ns)
 
-    def on_flood(self, packet: Packet, reception: Reception, *, at_once: bool, now_ns: int) -> Sequence[int]:
+    def on_flood(self, packet: Packet, reception: Reception, *, at_once: bool, now_ns: int) -> Sequence[Relay]:
         is_data = packet.header.kind == Kind.DATA
         if is_data and now_ns >= self._known_ns and not self._choice.relays(reception.src, now_ns=now_ns):
             return ()
@@ -125,7 +125,7 @@ class Chosen:
         self._choice.near.hear(claims, now_ns=now_ns)
         self._choice.on_beacon(beacon)
 
-    def decided(self, now_ns: int) -> Sequence[tuple[Packet, int]]:
+    def decided(self, now_ns: int) -> Sequence[Relay]:
         return self._otherwise.decided(now_ns)
 
     def next_wake_ns(self) -> int | None:

@@ -6,7 +6,7 @@ from typing import Final
 from fanet_mw.bus.messages import Reception
 from fanet_mw.errors import DropReason
 from fanet_mw.node.contract import Port
-from fanet_mw.node.queue import Packet
+from fanet_mw.node.packet import Packet, Relay
 from fanet_mw.routing.clustered.relaying.rules import Rule
 from fanet_mw.routing.clustered.tdma.contention import Contention
 from fanet_mw.units import MS
@@ -27,21 +27,24 @@ class Contending:
     def start(self, now_ns: int) -> None:
         """No packet is known yet."""
 
-    def on_flood(self, packet: Packet, reception: Reception, *, at_once: bool, now_ns: int) -> Sequence[int]:
+    def on_flood(self, packet: Packet, reception: Reception, *, at_once: bool, now_ns: int) -> Sequence[Relay]:
         if packet.header.destination == self._port.node:
             return ()
         if packet.header.hop_limit <= 1:
             self._port.drop(DropReason.HOP_LIMIT, packet, now_ns=now_ns)
             return ()
         if at_once:
-            return (self._contention.start_ns(now_ns=now_ns, jitter_ns=_CONTROL_JITTER_NS),)
+            return (self._relay(packet, _CONTROL_JITTER_NS, now_ns),)
         if self._rule.relays_now(packet, now_ns=now_ns):
-            return (self._contention.start_ns(now_ns=now_ns, jitter_ns=self._jitter_ns),)
+            return (self._relay(packet, self._jitter_ns, now_ns),)
         return ()
 
-    def decided(self, now_ns: int) -> Sequence[tuple[Packet, int]]:
+    def decided(self, now_ns: int) -> Sequence[Relay]:
         packets = self._rule.open_until.decided(now_ns=now_ns)
-        return [(packet, self._contention.start_ns(now_ns=now_ns)) for packet in packets]
+        return [self._relay(packet, 0, now_ns) for packet in packets]
+
+    def _relay(self, packet: Packet, jitter_ns: int, now_ns: int) -> Relay:
+        return Relay(packet, self._contention.start_ns(now_ns=now_ns, jitter_ns=jitter_ns))
 
     def next_wake_ns(self) -> int | None:
         return self._rule.open_until.next_wake_ns()

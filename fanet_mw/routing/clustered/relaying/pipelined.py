@@ -5,7 +5,7 @@ from collections.abc import Mapping, Sequence
 from fanet_mw.bus.messages import Reception
 from fanet_mw.errors import DropReason
 from fanet_mw.node.contract import Port
-from fanet_mw.node.queue import Packet
+from fanet_mw.node.packet import Packet, Relay
 from fanet_mw.routing.clustered.claimed.access import ClaimedAccess
 from fanet_mw.routing.clustered.claimed.claiming import Claiming
 from fanet_mw.routing.clustered.contract import Relaying
@@ -24,7 +24,7 @@ class Pipelined:
     def start(self, now_ns: int) -> None:
         self._otherwise.start(now_ns)
 
-    def on_flood(self, packet: Packet, reception: Reception, *, at_once: bool, now_ns: int) -> Sequence[int]:
+    def on_flood(self, packet: Packet, reception: Reception, *, at_once: bool, now_ns: int) -> Sequence[Relay]:
         header = packet.header
         if header.kind != Kind.DATA:
             return self._otherwise.on_flood(packet, reception, at_once=at_once, now_ns=now_ns)
@@ -35,7 +35,7 @@ class Pipelined:
                 self._access.let_out(packet, now_ns=now_ns)
         return ()
 
-    def decided(self, now_ns: int) -> Sequence[tuple[Packet, int]]:
+    def decided(self, now_ns: int) -> Sequence[Relay]:
         return self._otherwise.decided(now_ns)
 
     def next_wake_ns(self) -> int | None:

@@ -11,7 +11,7 @@ from collections.abc import Callable
 from typing import Protocol
 
 from fanet_mw.node.neighbors import Neighbors
-from fanet_mw.node.queue import Packet
+from fanet_mw.node.packet import Packet
 from fanet_mw.routing.assessment import Assessment
 from fanet_mw.scenario import Clusters
 from fanet_mw.units import MS

@@ -4,7 +4,7 @@ from collections.abc import Mapping
 
 from fanet_mw.node.contract import Port
 from fanet_mw.node.neighbors import Neighbor
-from fanet_mw.node.queue import Packet
+from fanet_mw.node.packet import Packet
 from fanet_mw.routing.clustered.forwarding.gradient import UNREACHABLE, Route
 from fanet_mw.units import NodeId
 from fanet_mw.wire.inner import Beacon, Role

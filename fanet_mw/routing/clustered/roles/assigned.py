@@ -12,7 +12,7 @@ from fanet_mw.errors import MalformedFrameError
 from fanet_mw.node.arrival import decoded
 from fanet_mw.node.contract import Port
 from fanet_mw.node.neighbors import Neighbor
-from fanet_mw.node.queue import Packet
+from fanet_mw.node.packet import Packet
 from fanet_mw.routing.clustered.contract import ScheduledAccess
 from fanet_mw.routing.clustered.forwarding.gradient import UNREACHABLE, Gradient, Route
 from fanet_mw.routing.clustered.roles.failover import Upkeep

@@ -9,7 +9,7 @@ from collections.abc import Callable
 from typing import Final
 
 from fanet_mw.node.duplicates import key_of
-from fanet_mw.node.queue import Packet
+from fanet_mw.node.packet import Packet
 from fanet_mw.routing.clustered.roles.lease import Authority
 from fanet_mw.units import MS
 from fanet_mw.wire.inner import Beacon

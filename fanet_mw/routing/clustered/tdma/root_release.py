@@ -10,7 +10,8 @@ not on warnings. A turn is used only if its flood is over before the next timeta
 from collections.abc import Iterator, Mapping, Sequence
 from typing import NamedTuple
 
-from fanet_mw.node.queue import Packet, TxQueue
+from fanet_mw.node.packet import Packet
+from fanet_mw.node.queue import TxQueue
 from fanet_mw.routing.clustered.tdma.turn_release import OwnTurn, TurnRelease
 from fanet_mw.routing.clustered.tdma.turns import Turns
 from fanet_mw.units import NodeId

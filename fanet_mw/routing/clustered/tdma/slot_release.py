@@ -7,7 +7,8 @@ that is deposed lets out what it still holds in the slot that it had: handing it
 
 from typing import Final, NamedTuple
 
-from fanet_mw.node.queue import Packet, TxQueue
+from fanet_mw.node.packet import Packet
+from fanet_mw.node.queue import TxQueue
 from fanet_mw.routing.clustered.tdma.slots import Slot, Superframe
 from fanet_mw.scenario import Clusters
 from fanet_mw.units import MS

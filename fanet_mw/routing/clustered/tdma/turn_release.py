@@ -3,7 +3,8 @@
 from abc import ABC, abstractmethod
 from typing import NamedTuple
 
-from fanet_mw.node.queue import Packet, TxQueue
+from fanet_mw.node.packet import Packet
+from fanet_mw.node.queue import TxQueue
 
 
 class OwnTurn(NamedTuple):

@@ -9,7 +9,7 @@ from collections.abc import Mapping
 from typing import Final
 
 from fanet_mw.node.contract import Port
-from fanet_mw.node.queue import Packet
+from fanet_mw.node.packet import Packet
 from fanet_mw.routing.clustered.roles.leader import HEARD_NS
 from fanet_mw.routing.clustered.roles.lease import Lease
 from fanet_mw.routing.clustered.tdma.admission import Admission, least_interval_ns

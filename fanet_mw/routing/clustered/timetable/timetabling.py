@@ -12,7 +12,7 @@ from typing import Final, Protocol
 from fanet_mw.errors import MalformedFrameError
 from fanet_mw.node.arrival import decoded
 from fanet_mw.node.contract import Port
-from fanet_mw.node.queue import Packet
+from fanet_mw.node.packet import Packet
 from fanet_mw.routing.clustered.roles.leader import Leader
 from fanet_mw.routing.clustered.roles.lease import Authority, Lease
 from fanet_mw.routing.clustered.roles.membership import Membership, Version

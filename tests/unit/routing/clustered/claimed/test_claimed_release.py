@@ -2,7 +2,8 @@
 
 import pytest
 
-from fanet_mw.node.queue import Packet, TxQueue
+from fanet_mw.node.packet import Packet
+from fanet_mw.node.queue import TxQueue
 from fanet_mw.routing.clustered.claimed.own_turns import OwnTurns, Share
 from fanet_mw.routing.clustered.claimed.turn_queue import OwnRelease
 from fanet_mw.routing.clustered.tdma.turns import Turns

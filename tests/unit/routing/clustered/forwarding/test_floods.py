@@ -7,7 +7,7 @@ import pytest
 from fanet_mw import wire
 from fanet_mw.bus.messages import Reception
 from fanet_mw.node.node import Node
-from fanet_mw.node.queue import Packet
+from fanet_mw.node.packet import Packet
 from fanet_mw.routing import make_protocol
 from fanet_mw.routing.clustered.forwarding.floods import Floods
 from fanet_mw.routing.clustered.tdma.contention import Contention
@@ -25,8 +25,8 @@ def node(make_scenario: MakeScenario) -> Node:
 
 
 def floods(node: Node) -> Floods:
-    stream = node.stream("test").random
-    return Floods(node, None, Contention(lead_ns=0, jitter=stream, window=stream))
+    stream = node.port.stream("test").random
+    return Floods(node.port, None, Contention(lead_ns=0, jitter=stream, window=stream))
 
 
 def packet(*, origin: int = THEIRS, hop_limit: int = 8) -> Packet:
@@ -54,5 +54,5 @@ def test_a_flood_of_our_own_begins_with_all_its_hops(node: Node, origin: int, le
 
 @pytest.mark.parametrize(("origin", "hop_limit", "goes"), [(THEIRS, 2, True), (THEIRS, 1, False), (OURS, 1, True)])
 def test_once_more_costs_a_hop_too(node: Node, origin: int, hop_limit: int, goes: bool) -> None:
-    frame = floods(node).again(packet(origin=origin, hop_limit=hop_limit))
-    assert (frame is not None) == goes
+    floods(node).answer([packet(origin=origin, hop_limit=hop_limit)], start_ns=1 * MS)
+    assert bool(node.requests) == goes

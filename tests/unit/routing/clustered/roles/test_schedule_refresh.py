@@ -3,7 +3,7 @@
 import pytest
 
 from fanet_mw.node.duplicates import key_of
-from fanet_mw.node.queue import Packet
+from fanet_mw.node.packet import Packet
 from fanet_mw.routing.clustered.roles.lease import Authority
 from fanet_mw.routing.clustered.roles.schedule_refresh import Refresh
 from fanet_mw.units import MS, S

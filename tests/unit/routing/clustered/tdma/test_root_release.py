@@ -2,7 +2,8 @@
 
 import pytest
 
-from fanet_mw.node.queue import Packet, TxQueue
+from fanet_mw.node.packet import Packet
+from fanet_mw.node.queue import TxQueue
 from fanet_mw.routing.clustered.tdma.root_release import Following, RootRelease
 from fanet_mw.routing.clustered.tdma.turns import Turns
 from fanet_mw.units import MS, NodeId

@@ -6,7 +6,8 @@ import pytest
 from hypothesis import given
 from hypothesis import strategies as st
 
-from fanet_mw.node.queue import Packet, TxQueue, sooner_us
+from fanet_mw.node.packet import Packet
+from fanet_mw.node.queue import TxQueue, sooner_us
 from fanet_mw.routing.clustered.tdma.slot_release import Release, Tenure
 from fanet_mw.routing.clustered.tdma.slots import Superframe
 from fanet_mw.scenario import Clusters, Routing

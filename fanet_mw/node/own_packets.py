@@ -1,0 +1,60 @@
+"""The packets that begin at one node: numbered without gaps, and known to the node before any copy comes back.
+
+Data and control packets are numbered apart, so that a missing number of data shows a missing packet. A node that starts
+again must not reuse the names of its earlier packets: its numbers begin beyond all that time had room for.
+"""
+
+from typing import Final
+
+from fanet_mw import wire
+from fanet_mw.errors import LocalProtocolError
+from fanet_mw.node import duplicates
+from fanet_mw.node.arrival import PHASES, name_of
+from fanet_mw.node.duplicates import Seen
+from fanet_mw.node.packet import Packet
+from fanet_mw.node.plausible import CONTROL, RESTART_STEP_NS
+from fanet_mw.units import US, NodeId
+from fanet_mw.wire import Header, Kind
+
+_new: Final = tuple.__new__  # for what is made once per frame
+
+
+class OwnPackets:
+    """Makes the packets of one node."""
+
+    def __init__(self, node: NodeId, seen: Seen, *, most_bytes: int) -> None:
+        self._node = node
+        self._seen = seen
+        self._most_bytes = most_bytes
+        """What a frame may be long (`radio.max_frame_bytes`)."""
+        self._first_seq, self._next_seq = 0, {False: 0, True: CONTROL}
+        self.held: set[bytes] = set()
+        """Names of data packets (`wire.NAME`) that were accepted, and of which no frame has been announced yet."""
+
+    def start(self, now_ns: int) -> None:
+        """The node is up, for the first time or again."""
+        first = now_ns // RESTART_STEP_NS % CONTROL
+        self._first_seq, self._next_seq = first, {False: first, True: CONTROL + first}
+
+    def make(
+        self, kind: Kind, inner: bytes, *, destination: NodeId, priority: int, flags: int, hop_limit: int, born_ns: int
+    ) -> Packet:
+        """The next packet, marked as handled; raises LocalProtocolError when it is longer than a frame may be."""
+        size = wire.HEADER_BYTES + len(inner)
+        bound = self._most_bytes
+        if size > bound:
+            raise LocalProtocolError(f"frame of {size} bytes must be <= radio.max_frame_bytes = {bound}")
+        control = kind is not Kind.DATA
+        seq = self._next_seq[control]
+        self._next_seq[control] = seq + 1
+        node, hops = self._node, 0
+        header = _new(
+            Header, (born_ns // US, seq, node, destination, node, kind, hop_limit, hops, priority, flags)
+        )  # fmt: skip
+        frame = header.encode() + inner
+        self._seen.put(name_of(frame), duplicates.DELIVERED | PHASES[flags & wire.PHASE_MASK])
+        return _new(Packet, (header, frame))
+
+    def handed_on(self, origin: int, seq: int) -> bool:
+        """Whether the node has given data this name since its start: custody of it has passed on, and may come back."""
+        return origin == self._node and self._first_seq <= seq < self._next_seq[False]

@@ -1,0 +1,152 @@
+"""What a node offers to its protocol: frames go out here, control packets are made, drops are counted and recorded.
+
+Nothing here calls the node or its protocol. What a protocol wants sent waits in `requests` until the actor takes it.
+"""
+
+from collections import Counter
+from collections.abc import Sequence
+from random import Random
+from typing import Final
+
+from fanet_mw import wire
+from fanet_mw.bus.messages import TxRequest
+from fanet_mw.errors import DropReason
+from fanet_mw.node.arrival import PHASES, name_of
+from fanet_mw.node.duplicates import Seen
+from fanet_mw.node.own_packets import OwnPackets
+from fanet_mw.node.packet import Packet, Relay
+from fanet_mw.rng import stream
+from fanet_mw.scenario import Scenario
+from fanet_mw.trace import Dropped, LetOut, Record
+from fanet_mw.units import BROADCAST, Enu, NodeId
+from fanet_mw.wire import Kind
+
+_MOST_HOPS: Final = 255
+"""What the hop count of the header can say."""
+_new: Final = tuple.__new__  # for what is made once per frame
+
+
+class NodePort:
+    """The port of one node (`contract.Port`)."""
+
+    def __init__(self, node: NodeId, scenario: Scenario, seen: Seen, own: OwnPackets, *, position: Enu) -> None:
+        self.node = node
+        self.scenario = scenario
+        self.position = position
+        self.velocity = Enu(0.0, 0.0, 0.0)
+        self.clock_error_ns = 0
+        self.requests: list[TxRequest] = []
+        self.records: list[Record] = []
+        self.frames_sent = 0
+        self.dropped: Counter[str] = Counter()
+        self.watched: set[int] = set()
+        """Sequence numbers of own packets whose fate is of interest."""
+        self.fates: list[tuple[int, int, DropReason | None]] = []
+        """What became of these: (number, instant, why it was dropped; None: it was let out)."""
+        self._seen = seen
+        self._own = own
+        self._held = own.held
+
+    # --- frames ---------------------------------------------------------------------------------------------------
+
+    def transmit(self, frame: bytes, dst: NodeId, *, start_ns: int, wants_status: bool = False) -> int:
+        if self._held:
+            self._let_out(frame, start_ns)
+        seq = self.frames_sent
+        self.frames_sent = seq + 1
+        self.requests.append(_new(TxRequest, (seq, start_ns, frame, dst, wants_status)))
+        return seq
+
+    def mark(self, packet: Packet, *, flags: int) -> None:
+        self._seen.mark(name_of(packet.frame), PHASES[flags])
+
+    def transmit_together(self, packets: Sequence[Packet], *, flags: int, at_ns: Sequence[int]) -> None:
+        for packet in packets:
+            self.mark(packet, flags=flags)
+        frames = [self._begun(packet, flags) for packet in packets]
+        for start_ns in at_ns:
+            self._share([(start_ns, frame) for frame in frames])
+
+    def transmit_to(self, packet: Packet, dst: NodeId, *, flags: int, start_ns: int) -> int:
+        self.mark(packet, flags=flags)
+        return self.transmit(self._begun(packet, flags), dst, start_ns=start_ns, wants_status=True)
+
+    def relay_together(self, relays: Sequence[Relay]) -> None:
+        self._share([(start_ns, self.forwarded(packet, flags=wire.FLAG_FLOOD)) for packet, start_ns in relays])
+
+    def forwarded(self, packet: Packet, *, flags: int) -> bytes:
+        header = packet.header
+        hops = header.hops
+        if hops < _MOST_HOPS:  # a hostile frame may come with all of them
+            hops += 1
+        return wire.rewrite(packet.frame, self.node, header.hop_limit - 1, hops, flags)
+
+    def _begun(self, packet: Packet, flags: int) -> bytes:
+        """The bytes of a packet whose phase begins here: of the node's own as it is, of another's one hop further."""
+        header = packet.header
+        if header.origin != self.node:
+            return self.forwarded(packet, flags=flags)
+        return wire.rewrite(packet.frame, self.node, header.hop_limit, header.hops, flags)
+
+    def _share(self, frames: Sequence[tuple[int, bytes]]) -> None:
+        """Broadcast packets in as few frames as they fit; a frame goes at the first instant of those in it."""
+        chunk: list[bytes] = []
+        first_ns, size, most = 0, 0, self.scenario.radio.max_frame_bytes
+        for start_ns, frame in frames:
+            if self._held:
+                self._let_out(frame, start_ns)
+            if chunk and size + len(frame) > most:
+                self._broadcast(chunk, first_ns)
+                chunk, size = [], 0
+            first_ns = min(first_ns, start_ns) if chunk else start_ns
+            chunk.append(frame)
+            size += len(frame)
+        if chunk:
+            self._broadcast(chunk, first_ns)
+
+    def _broadcast(self, frames: list[bytes], start_ns: int) -> None:
+        frame = frames[0] if len(frames) == 1 else wire.bundle(frames)
+        seq = self.frames_sent
+        self.frames_sent = seq + 1
+        self.requests.append(_new(TxRequest, (seq, start_ns, frame, BROADCAST, False)))
+
+    def _let_out(self, frame: bytes, start_ns: int) -> None:
+        """Record when the first frame of a packet of the node's application goes."""
+        name = frame[wire.NAME]
+        if name in self._held:
+            self._held.remove(name)
+            own = int.from_bytes(frame[wire.SEQ], "little")
+            self.records.append(LetOut(start_ns, self.node, own))
+            if own in self.watched:
+                self.fates.append((own, start_ns, None))
+
+    # --- packets --------------------------------------------------------------------------------------------------
+
+    def announce(
+        self, kind: Kind, inner: bytes, *, now_ns: int, flags: int, hop_limit: int, destination: NodeId = BROADCAST
+    ) -> Packet:
+        return self._own.make(
+            kind,
+            inner,
+            destination=destination,
+            priority=wire.PRIORITY_CONTROL,
+            flags=flags,
+            hop_limit=hop_limit,
+            born_ns=now_ns,
+        )
+
+    def drop(self, reason: DropReason, packet: Packet, *, now_ns: int) -> None:
+        self.dropped[reason] += 1
+        self._held.discard(packet.frame[wire.NAME])
+        if packet.header.origin == self.node and packet.header.seq in self.watched:
+            self.fates.append((packet.header.seq, now_ns, reason))
+        self.records.append(Dropped(now_ns, self.node, reason, packet.header.origin, packet.header.seq))
+
+    def forget(self, packet: Packet) -> None:
+        self._seen.forget(name_of(packet.frame))
+
+    def record(self, record: Record) -> None:
+        self.records.append(record)
+
+    def stream(self, use: str) -> Random:
+        return stream(self.scenario.seed, use, self.node)

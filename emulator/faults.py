@@ -164,8 +164,8 @@ class Faults:
         off[cut] = True
         count = links.count
         hit = off[links.ints[s.LINK_SRC, :count]] | off[links.ints[s.LINK_DST, :count]]
-        heard = hit & ((links.ints[s.AUDIBLE, :count] == 1) | (links.ints[s.FAULT, :count] != 0))
-        links.ints[s.FAULT, :count][heard] = s.FATE_CUT
+        audible = hit & ((links.ints[s.AUDIBLE, :count] == 1) | (links.ints[s.FAULT, :count] != 0))
+        links.ints[s.FAULT, :count][audible] = s.FATE_CUT
         links.ints[s.AUDIBLE, :count][hit] = 0
         links.reals[s.LINK_POWER, :count][hit] = 0.0
         links.reals[s.SPARED, :count][hit] = 0.0

@@ -146,12 +146,12 @@ class LinkTable:
         if blocked is not None and len(blocked):
             hidden = np.isin(pair_codes(found, len(at)), blocked)
         if radio.channel == "range":
-            heard = ~hidden
+            kept = ~hidden
         else:
             power_dbm = power_dbm - radio.obstruction_loss_db * hidden
-            heard = power_dbm >= radio.interference_floor_dbm - _ROUNDING_DB
-        if not heard.all():
-            found, distance, power_dbm = found[heard], distance[heard], power_dbm[heard]
+            kept = power_dbm >= radio.interference_floor_dbm - _ROUNDING_DB
+        if not kept.all():
+            found, distance, power_dbm = found[kept], distance[kept], power_dbm[kept]
         nearest_first = np.lexsort((found[:, 1], distance, found[:, 0]))
         found, distance, power_dbm = found[nearest_first], distance[nearest_first], power_dbm[nearest_first]
         self._fill(found, distance, power_dbm, radio, stations=len(at), spare=spare)

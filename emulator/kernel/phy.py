@@ -281,10 +281,10 @@ def data_end(
 ) -> None:
     """End a data frame at a station: hand it up and acknowledge it, or count why it was lost."""
     r, f = lk[LINK_DST, link], lk[LINK_FRAME, link]
-    ours = fr[DST, f] == EVERYONE or fr[DST, f] == r
-    if whole and not ours:
+    addressed = fr[DST, f] == EVERYONE or fr[DST, f] == r
+    if whole and not addressed:
         st[NAV, r] = max(st[NAV, r], t + p[SIFS_NS] + p[ACK_NS])
-    if not ours or lk[COPY, link] == 0:
+    if not addressed or lk[COPY, link] == 0:
         return
     if not whole:
         fate = lk[FATE, link]

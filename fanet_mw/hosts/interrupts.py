@@ -32,12 +32,12 @@ def installed() -> bool:
 
 
 @contextmanager
-def handed_to(hear: Callable[[int], None]) -> Iterator[None]:
-    """Call `hear` with the number of the first signal that comes; any further signal raises KeyboardInterrupt."""
+def handed_to(on_signal: Callable[[int], None]) -> Iterator[None]:
+    """Call `on_signal` with the number of the first signal that comes; any further signal raises KeyboardInterrupt."""
 
     def first(number: int, _frame: FrameType | None) -> None:
         install()
-        hear(number)
+        on_signal(number)
 
     before = [signal.getsignal(number) for number in SIGNALS]
     for number in SIGNALS:

@@ -22,10 +22,10 @@ def run(main: Coroutine[Any, Any, T]) -> T:
 
 async def _cancelled_by_signals(main: Coroutine[Any, Any, T]) -> T:
     loop, task = asyncio.get_running_loop(), asyncio.ensure_future(main)
-    heard: list[int] = []
+    caught: list[int] = []
 
     def on_signal(number: int) -> None:
-        heard.append(number)
+        caught.append(number)
         task.cancel()
 
     for number in interrupts.SIGNALS:
@@ -33,9 +33,9 @@ async def _cancelled_by_signals(main: Coroutine[Any, Any, T]) -> T:
     try:
         return await task
     except asyncio.CancelledError:
-        if not heard:
+        if not caught:
             raise
-        raise KeyboardInterrupt(heard[0]) from None
+        raise KeyboardInterrupt(caught[0]) from None
     finally:
         for number in interrupts.SIGNALS:
             loop.remove_signal_handler(number)

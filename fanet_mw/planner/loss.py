@@ -43,11 +43,11 @@ def loss(table: Timetable, adjacency: Adjacency, *, per_frame: int, hop_turns: i
         floods.setdefault((turn.root, turn.instance), []).append(turn)
     missed = []
     for (root, _), turns in sorted(floods.items()):
-        heard: dict[NodeId, list[tuple[int, float]]] = {root: [(turns[0].offset - hop_turns, 1.0)]}
+        arrivals: dict[NodeId, list[tuple[int, float]]] = {root: [(turns[0].offset - hop_turns, 1.0)]}
         for turn in turns:
             others = tuple(node for node in together[turn.offset % per_frame] if node != turn.node)
-            _send(turn, others, heard, adjacency, hop_turns=hop_turns, chance=chance)
-        missed += [(1 - _best(heard.get(node, ())), root, node) for node in adjacency if node != root]
+            _send(turn, others, arrivals, adjacency, hop_turns=hop_turns, chance=chance)
+        missed += [(1 - _best(arrivals.get(node, ())), root, node) for node in adjacency if node != root]
     worst, root, node = max(missed, key=lambda item: (item[0], -item[1], -item[2]))
     return Loss(worst, root, node, sum(item[0] for item in missed) / len(missed))
 
@@ -55,16 +55,16 @@ def loss(table: Timetable, adjacency: Adjacency, *, per_frame: int, hop_turns: i
 def _send(
     turn: Turn,
     others: tuple[NodeId, ...],
-    heard: dict[NodeId, list[tuple[int, float]]],
+    arrivals: dict[NodeId, list[tuple[int, float]]],
     adjacency: Adjacency,
     *,
     hop_turns: int,
     chance: Chance,
 ) -> None:
     """Let a relay send what has reached it in time, and note the probability with which its neighbors receive it."""
-    sent = _best([item for item in heard.get(turn.node, ()) if item[0] + hop_turns <= turn.offset])
+    sent = _best([item for item in arrivals.get(turn.node, ()) if item[0] + hop_turns <= turn.offset])
     for node in adjacency[turn.node] if sent else ():
-        heard.setdefault(node, []).append((turn.offset, sent * chance(turn.node, node, others)))
+        arrivals.setdefault(node, []).append((turn.offset, sent * chance(turn.node, node, others)))
 
 
 def _best(arrivals: Sequence[tuple[int, float]]) -> float:

@@ -7,7 +7,7 @@ import math
 from dataclasses import dataclass, field
 from typing import Final
 
-from agents.mission.phone_filter import Estimate, PhoneFilter, PhoneModel
+from agents.mission.phone_filter import REFERENCE_LOSS_DB, Estimate, PhoneFilter, PhoneModel
 from fanet_mw.units import US, Enu, S
 from fanet_mw.wire.inner import Survivor
 from fanet_mw.wire.search import Found
@@ -17,7 +17,7 @@ _GATE: Final = 25.0
 Far above 11.8, the 99.7 % of chi-square with 2 degrees: the shadowing of neighboring samples is not independent."""
 _SAME_PERSON_M: Final = 12.0
 """Sightings nearer to each other than this are of one person."""
-_OLD_SIGHTING_NS: Final = 10 * S
+_OLD_SIGHTING_NS: Final = 5 * S
 _PASSED_ON: Final = 5
 """Reports of one hello."""
 _FRESH_NS: Final = 8 * S
@@ -35,6 +35,7 @@ class Find:
     first_ns: int = 0
     own_heard_ns: int | None = None
     """When our own receiver last heard the phone."""
+    own_rssi_dbm: float = 0.0
     sightings: int = 0
     told: Found | None = None
     """The best estimate that another node has told."""
@@ -64,7 +65,7 @@ class Finds:
         if find is None:
             find = self.known[report.survivor] = Find(PhoneFilter(self._model), first_ns=now_ns)
         if own:
-            find.own_heard_ns = now_ns
+            find.own_heard_ns, find.own_rssi_dbm = now_ns, report.rssi_dbm
         before = find.latest.get(report.reporter)
         if before is None or report.t_us > before.t_us:
             find.latest[report.reporter] = report
@@ -87,9 +88,9 @@ class Finds:
             find.told = found
         return False
 
-    def seen(self, east_m: float, north_m: float, *, sigma_m: float, now_ns: int) -> int | None:
-        """Somebody was seen there; the survivor whose phone that is taken to be, whom a camera cannot name."""
-        at = Enu(east_m, north_m, 0.0)
+    def seen(self, at: Enu, *, by: Enu, sigma_m: float, now_ns: int) -> int | None:
+        """Somebody was seen on the ground, by a camera that names nobody; the survivor who that is taken to be."""
+        east_m, north_m = at.east, at.north
         best: tuple[float, int] | None = None
         for survivor, find in self.known.items():
             if find.confirmed is not None and _estimate(find.confirmed).distance_m(at) <= _SAME_PERSON_M:
@@ -104,7 +105,7 @@ class Finds:
                     continue
                 score = 0.0
             else:
-                score = find.filter.deficit(east_m, north_m)
+                score = find.filter.deficit(east_m, north_m) + self._surprise(find, by, at)
             if score <= _GATE:
                 best = (score, survivor) if best is None else min(best, (score, survivor))
         if best is None:
@@ -114,6 +115,14 @@ class Finds:
             find.filter.seen(east_m, north_m, sigma_m=sigma_m)
             find.sightings += 1
         return best[1]
+
+    def _surprise(self, find: Find, by: Enu, at: Enu) -> float:
+        """How little the power that we hear of a phone fits somebody at a place: the squared deviation in sigmas."""
+        model = self._model
+        distance_m = max(1.0, by.minus(at).norm())
+        expected_dbm = model.power_dbm - REFERENCE_LOSS_DB - 10 * model.exponent * math.log10(distance_m)
+        variance = max(model.shadowing_db, 1.0) ** 2 + model.offset_db**2
+        return (find.own_rssi_dbm - expected_dbm) ** 2 / variance
 
     def open(self) -> list[int]:
         """The survivors that wait to be confirmed, in order of id."""

@@ -18,7 +18,7 @@ from fanet_mw.units import Enu
 _CHAIN_HIGHER_M: Final = 6.0
 _FOLLOWER_HIGHER_M: Final = 12.0
 """Places of different kinds fly at heights of their own, so that a follower may cross a line."""
-_WIDE: Final = 0.88
+_WIDE: Final = 0.9
 """Places that are to hear each other are at most this share of the radio's reach apart."""
 _BUNCHED_M: Final = 280.0
 """While the lines are near each other, the chain between them lies slantwise, and reaches this far to either side."""
@@ -30,8 +30,10 @@ _FIRST_M: Final = 16.0
 """How far from the middle the lines begin: apart enough not to be in each other's way, and nothing lies behind them."""
 _LANES: Final = 1.35
 """The distance of two lanes as a multiple of the range of the phones' receiver."""
-_EDGE_M: Final = 40.0
-"""How near to the edge of the area the lines turn: a camera sees that far. The outermost lanes may be left sideways."""
+_EDGE_M: Final = 25.0
+"""How near to the edge of the area the lines turn: a camera sees that far."""
+_SIDE_M: Final = 65.0
+"""How near to the edge the outermost lanes are: they may be left sideways."""
 _TURN_S: Final = 10.0
 """How long the lines stay where they turn, so that whoever has fallen behind has seen the edge of the area too."""
 _LEAST_LANES: Final = 2
@@ -161,8 +163,8 @@ def fitted(
     """
     half = area_m / 2
     apart = min(_WIDE * reach_m, _LANES * seen_m)
-    edge = min(_EDGE_M, half / 2)
-    half_width = max(1.0, half - 1.7 * edge)
+    edge, side = min(_EDGE_M, half / 2), min(_SIDE_M, half / 2)
+    half_width = half - side
     lanes = max(_LEAST_LANES, math.ceil(2 * half_width / apart) + 1)
     last = half - edge
     relays = max(0, math.ceil(2 * last / (_WIDE * reach_m)) - 1)

@@ -64,6 +64,8 @@ class PhoneModel(NamedTuple):
     """Standard deviation of a phone's own offset."""
     threshold_dbm: float
     """The least power that is heard."""
+    half_m: float = math.inf
+    """Nobody is farther east, west, north or south of the middle than this."""
 
 
 class PhoneFilter:
@@ -211,6 +213,15 @@ class PhoneFilter:
                 scores[at] += table[min(most, int(sqrt(east2[i] + rest) / _STEP_M))]
                 at += 1
 
+    def _inside(self, width: int) -> list[bool]:
+        """Which cells are in the area; all of them when none is."""
+        assert self._middle is not None, "the grid lies around a sample"
+        half = self._model.half_m + _CELL_M / 2
+        east = [abs(self._middle.east + (i - _HALF_CELLS) * _CELL_M) <= half for i in range(width)]
+        north = [abs(self._middle.north + (j - _HALF_CELLS) * _CELL_M) <= half for j in range(width)]
+        found = [row and column for row in north for column in east]
+        return found if any(found) else [True] * len(found)
+
     def _moments(self) -> Estimate:
         assert self._middle is not None, "only what was heard has moments"
         model = self._model
@@ -221,12 +232,13 @@ class PhoneFilter:
             for s, q, silence in zip(self._sums, self._squares, self._scores, strict=True)
         ]
         self._totals = scores
-        best = max(scores)
-        total = mean_i = mean_j = ii = ij = jj = 0.0
         width = 2 * _HALF_CELLS + 1
+        inside = self._inside(width)
+        best = max(score for score, possible in zip(scores, inside, strict=True) if possible)
+        total = mean_i = mean_j = ii = ij = jj = 0.0
         exp = math.exp
         for at, score in enumerate(scores):
-            if score < best - 40.0:
+            if score < best - 40.0 or not inside[at]:
                 continue
             weight = exp(0.5 * (score - best))
             j, i = divmod(at, width)

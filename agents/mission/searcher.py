@@ -29,6 +29,8 @@ from fanet_mw.units import MS, US, Enu, NodeId, S, seconds_to_ns
 from fanet_mw.wire.inner import Survivor
 from fanet_mw.wire.search import Bid, Bids, Found, Search, Status, Told, encode_bids
 
+_OFFSET_DB: Final = 1.0
+"""How much one phone's power is taken to differ from another's: standard deviation."""
 _REVIEW_NS: Final = 1 * S
 _HEARD_FOR_NS: Final = seconds_to_ns(6.0)
 """A neighbor that was not heard for so long is no longer avoided, nor are we tied to it."""
@@ -45,11 +47,13 @@ _WATCH_M: Final = 150.0
 _TETHER: Final = 0.95
 """Share of the radio's reach at which a tether ends."""
 _TETHER_S: Final = 4.0
-_FREE_REACH: Final = 0.8
+_FREE_REACH: Final = 0.84
 """Share of the reach within which a follower stays of its line, so that it is heard there wherever it goes."""
-_SHARED_M: Final = 15.0
+_VAGUE_M: Final = 50.0
+"""An estimate whose standard deviation is larger leads nobody off its lane."""
+_SHARED_M: Final = 35.0
 """An estimate so near to the border of two lanes belongs to both."""
-_ASIDE_M: Final = 40.0
+_ASIDE_M: Final = 70.0
 """How far aside of the leash a survivor may be to be looked at still."""
 _FAR_M: Final = 600.0
 """Who is farther from a survivor than this leaves it to others."""
@@ -61,7 +65,7 @@ _LAG_M: Final = 140.0
 """How far it may fall behind its line."""
 _SCOUT_AFTER_NS: Final = 4 * S
 """How long a survivor may be short of reporters before somebody is sent to be another one."""
-_CLOSE_M: Final = 70.0
+_CLOSE_M: Final = 100.0
 """Slant range of a sighting that confirms."""
 _ANGLE_RAD: Final = 0.03
 """Standard deviation of where a camera looks, attitude included."""
@@ -119,7 +123,12 @@ class Searcher:
         self._random = stream(scenario.seed, "mission", node).random
         self._heights = scenario.nodes.altitude_m
         model = PhoneModel(
-            mission.phone_power_dbm, mission.phone_exponent, mission.shadowing_db, 1.0, mission.detection_dbm
+            mission.phone_power_dbm,
+            mission.phone_exponent,
+            mission.shadowing_db,
+            _OFFSET_DB,
+            mission.detection_dbm,
+            scenario.world.area_m / 2,
         )
         self._fitted = fitted(
             scenario.nodes.count,
@@ -220,7 +229,8 @@ class Searcher:
             if looked is None or looked[2] > 2 * _CLOSE_M:
                 continue
             sigma_m = max(1.0, _ANGLE_RAD * looked[2] * looked[2] / max(1.0, self._position.up))
-            survivor = self.finds.seen(looked[0], looked[1], sigma_m=sigma_m, now_ns=now_ns)
+            at = Enu(looked[0], looked[1], 0.0)
+            survivor = self.finds.seen(at, by=self._position, sigma_m=sigma_m, now_ns=now_ns)
             if survivor is not None and looked[2] <= _CLOSE_M:
                 self._confirm(survivor, now_ns)
 
@@ -411,7 +421,7 @@ class Searcher:
 
     def _still_coherent(self, find: Find, now_ns: int) -> bool:
         place = find.place()
-        return place is not None and self._coherent(place, now_ns, within_s=0.0)
+        return place is not None and self._coherent(place, now_ns, within_s=-5.0)
 
     def _distance_m(self, survivor: int) -> float:
         place = self.finds.known[survivor].place()
@@ -420,7 +430,7 @@ class Searcher:
     def _eta_s(self, survivor: int, now_ns: int) -> float | None:
         """When we would be with a survivor; None when our place in the formation forbids it."""
         place = self.finds.known[survivor].place()
-        if place is None:
+        if place is None or (place.sigma_m > _VAGUE_M and not self._free):
             return None
         busy_s = 0.0 if self._response is None else 15.0 + self._distance_m(self._response.survivor) / self._most_m_s
         eta_s = busy_s + place.distance_m(self._position) / self._most_m_s
@@ -498,7 +508,9 @@ class Searcher:
         for survivor in self.finds.open():
             find = self.finds.known[survivor]
             estimate = find.place() if find.filter.near(self._position, within_m=_FAR_M) else None
-            if estimate is None or abs(estimate.east_m - lane.east) > 0.5 * pattern.lane_m + _SHARED_M:
+            if estimate is None or estimate.sigma_m > _VAGUE_M:
+                continue
+            if abs(estimate.east_m - lane.east) > 0.5 * pattern.lane_m + _SHARED_M:
                 continue
             if self._leashed(survivor, lane, moves):
                 candidate = estimate.distance_m(self._position), survivor

@@ -299,11 +299,13 @@ def test_somebody_seen_is_the_owner_of_the_phone_that_was_heard_there() -> None:
             at = Enu(east + 40 * node - 60, 30, 50)
             report = Survivor(0, survivor, node + 1, at, rssi_dbm(Enu(east, 0, 0), at))
             finds.report(report, now_ns=0, own=True)
-    assert finds.seen(155, 5, sigma_m=2, now_ns=S) == 2
-    assert finds.seen(3, -4, sigma_m=2, now_ns=S) == 1
-    assert finds.seen(900, 900, sigma_m=2, now_ns=S) is None
+
+    def seen(east: float, north: float) -> int | None:
+        return finds.seen(Enu(east, north, 0), by=Enu(80, 30, 50), sigma_m=2, now_ns=S)
+
+    assert (seen(155, 5), seen(3, -4), seen(900, 900)) == (2, 1, None)
     finds.told(Found(0, 1, 3, -4, 4, 0, 4, 9, confirmed=True), now_ns=S)
-    assert finds.seen(3, -4, sigma_m=2, now_ns=S) is None, "a survivor that was struck off is no news"
+    assert seen(3, -4) is None, "a survivor that was struck off is no news"
 
 
 @given(st.floats(-1000, 1000), st.floats(-1000, 1000), st.floats(20, 100), st.floats(-80, 80), st.floats(-80, 80))

@@ -30,10 +30,9 @@ from fanet_mw.radios.field_bus import FieldBus, joined
 from fanet_mw.radios.udp import PORT, UdpRadio
 from fanet_mw.scenario import Scenario, config
 from fanet_mw.units import BROADCAST, MS, Enu, NodeId, S, seconds_to_ns
-from fanet_mw.wire import PRIORITY_BULK, PRIORITY_REPORT, PRIORITY_SAFETY
+from fanet_mw.wire import PRIORITIES
 
 T = TypeVar("T")
-PRIORITIES: Final[Mapping[str, int]] = {"safety": PRIORITY_SAFETY, "report": PRIORITY_REPORT, "bulk": PRIORITY_BULK}
 ALL: Final = "all"
 _MOST_UNREAD: Final = 4096
 _POLL_S: Final = 0.01

@@ -41,8 +41,6 @@ _HELLO_JITTER: Final = 0.1
 """A hello varies by this share of its interval, so that neighbors in step do not stay so (RFC 3626, 3.4)."""
 _LIFETIME_HELLOS: Final = 4
 """A node that has not been heard for so many hello intervals is no neighbor any more."""
-_BUILT_IN: Final = ("traffic", "report", "warning", "telemetry")
-"""Applications whose counters stand among the UAV's own in its report."""
 
 
 class NodeState(NamedTuple):
@@ -79,12 +77,15 @@ class Uav(Actor):
         self._node = Node(node, scenario, make_protocol, position=position)
         self._autopilot = Autopilot(node, position=position, telemetry_hz=scenario.nodes.telemetry_hz)
         self._fixes = SteadyFix(sigma_m=scenario.world.gps_sigma_m, range_m=scenario.radio.range_m)
+        asked_for = _asked_for(scenario, node, self._autopilot, position)
+        self._built_in = tuple(application.name for application in asked_for)
+        """Applications whose counters stand among the UAV's own in its report."""
         carried = (*_foreign(scenario, node), *applications)
         self._own = tuple(application.name for application in carried)
         self._onboard = Onboard(
             self._node,
             lambda: (self._autopilot.position, self._autopilot.velocity),
-            [*_asked_for(scenario, node, self._autopilot, position), *carried],
+            [*asked_for, *carried],
             fly=self._steer,
             tap=self._tap,
         )
@@ -162,15 +163,16 @@ class Uav(Actor):
         self._node.know_clock_error(error_ns)
 
     def report(self) -> Mapping[str, Any]:
-        own = {
+        own: dict[str, Any] = {
             "kind": "agent",
             "node": self._id,
             "generated": 0,
             "bus_malformed": self._malformed,
             "heard_late": self._heard_late,
         }
-        for counters in self._onboard.report(_BUILT_IN).values():
-            own |= counters
+        for counters in self._onboard.report(self._built_in).values():
+            for name, count in counters.items():
+                own[name] = own.get(name, 0) + count
         if messages := self._onboard.messages():
             own["messages"] = messages
         if self._own:
@@ -227,11 +229,9 @@ def _asked_for(scenario: Scenario, node: NodeId, autopilot: Autopilot, position:
     """The applications that a scenario asks for, in the order in which they have their turn."""
     searches = scenario.mission.search != "none"
     applications: list[Application]
-    applications = [
-        Telemetry(autopilot),
-        Load(scenario, node),
-        PlannedSearch(scenario, node, position=position) if searches else Rescue(scenario, node),
-    ]
+    loads = [Load(scenario, node, name) for name in scenario.traffic_classes]
+    rescue = PlannedSearch(scenario, node, position=position) if searches else Rescue(scenario, node)
+    applications = [Telemetry(autopilot), *loads, rescue]
     if scenario.mission.collision_horizon_s:
         applications.append(CollisionAvoidance(scenario, node))
     return applications

@@ -11,7 +11,7 @@ from typing import NamedTuple
 from fanet_mw import wire
 from fanet_mw.bounds import Bounded, DelayBound, Refused
 from fanet_mw.routing.clustered.tdma.urgent import REPORT_BYTES, WARNING_BYTES
-from fanet_mw.scenario import Scenario
+from fanet_mw.scenario import Scenario, Traffic
 from fanet_mw.units import NodeId, seconds_to_ns
 
 
@@ -52,23 +52,26 @@ def demands(scenario: Scenario, sources: Sequence[NodeId] | None = None) -> list
     if scenario.mission.survivors:
         interval_ns = seconds_to_ns(scenario.mission.report_interval_s)
         found.append(TrafficClass("report", REPORT_BYTES, interval_ns, _all(scenario), wire.PRIORITY_REPORT))
-    traffic = scenario.traffic
-    if traffic.arrivals in ("saturated", "poisson"):
-        return Refused(f'traffic.arrivals = "{traffic.arrivals}" has no least interval, so nothing bounds its delay')
-    if traffic.arrivals == "cbr":
-        who = _eligible(scenario) if sources is None else tuple(sorted(sources))
-        if who:
-            found.append(TrafficClass("application", traffic.payload_bytes, seconds_to_ns(traffic.interval_s), who))
-    return found
+    for name, traffic in scenario.traffic_classes.items():
+        first = traffic is scenario.traffic
+        if traffic.arrivals in ("saturated", "poisson", "trace"):
+            return Refused(
+                f'traffic.arrivals = "{traffic.arrivals}" has no least interval, so nothing bounds its delay'
+            )
+        who = _eligible(scenario, traffic) if sources is None or not first else tuple(sorted(sources))
+        if traffic.arrivals != "none" and who:
+            interval_ns, priority = seconds_to_ns(traffic.interval_s), wire.PRIORITIES[traffic.priority]
+            label = "application" if first else name
+            found.append(TrafficClass(label, traffic.payload_bytes, interval_ns, who, priority))
+    return sorted(found, key=lambda demand: demand.priority)
 
 
 def _all(scenario: Scenario) -> tuple[NodeId, ...]:
     return tuple(NodeId(n) for n in scenario.node_ids)
 
 
-def _eligible(scenario: Scenario) -> tuple[NodeId, ...]:
+def _eligible(scenario: Scenario, traffic: Traffic) -> tuple[NodeId, ...]:
     """The nodes that may be sources; a number of them is taken as the lowest ids, whichever a seed would draw."""
-    traffic = scenario.traffic
     if isinstance(traffic.sources, tuple):
         return tuple(NodeId(n) for n in sorted(set(traffic.sources)))
     candidates = tuple(n for n in _all(scenario) if n != traffic.destination)

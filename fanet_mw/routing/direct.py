@@ -10,7 +10,7 @@ class Direct(RoutingProtocol):
     """Sends its own packets once and relays nothing."""
 
     def originate(self, packet: Packet, *, due_ns: int, now_ns: int) -> None:
-        saturated = self._port.scenario.traffic.arrivals == "saturated"
+        saturated = self._port.scenario.saturated
         self._port.transmit(packet.frame, NodeId(packet.header.destination), start_ns=due_ns, wants_status=saturated)
 
     def receive(self, packet: Packet, reception: Reception, *, now_ns: int) -> None:

@@ -12,7 +12,7 @@ from fanet_mw.bus.radio_control import Degrade, Restore, nodes_of
 from fanet_mw.units import MS
 
 if TYPE_CHECKING:
-    from fanet_mw.scenario import Scenario
+    from fanet_mw.scenario import Scenario, Traffic
 
 MESSAGE_BYTES: Final = {
     "FANET_ROUTE": 36, "positions": 61, "COLLISION": 31, "FANET_BEACON": 33, "FANET_SCHEDULE": 266,
@@ -23,6 +23,8 @@ GLOBAL_POSITION_INT, with which every hello begins. The air format itself is not
 scenarios too, and to it frames are bytes."""
 _SCHEDULE_PLACES: Final = 2
 """FANET_PLACES that go with one full FANET_SCHEDULE."""
+_TAKEN: Final = frozenset(("report", "warning", "telemetry", "receipt", "joined"))
+"""What other applications are called in a trace."""
 _RIVALS: Final = ("aodv", "olsr", "dsdv", "geographic")
 _LINKS: Final = 36
 """Links of one FANET_LINKS."""
@@ -43,19 +45,11 @@ def disagreements(scenario: Scenario) -> Sequence[str]:
             f"warmup_s + drain_s = {scenario.warmup_s + scenario.drain_s:g} "
             f"must be < duration_s = {scenario.duration_s:g}"
         )
-    traffic = scenario.traffic
-    if traffic.destination != "all" and traffic.destination > count:
-        found.append(f"traffic.destination = {traffic.destination} must be <= nodes.count = {count}")
-    if isinstance(traffic.sources, int) and traffic.sources > count:
-        found.append(f"traffic.sources = {traffic.sources} must be <= nodes.count = {count}")
-    for key, ids in (("sources", traffic.sources), ("targets", traffic.targets)):
-        if isinstance(ids, tuple) and any(i > count for i in ids):
-            found.append(f"traffic.{key} = {list(ids)} must be node ids <= nodes.count = {count}")
-    if traffic.payload_bytes > scenario.radio.max_frame_bytes:
-        found.append(
-            f"traffic.payload_bytes = {traffic.payload_bytes} must be "
-            f"<= radio.max_frame_bytes = {scenario.radio.max_frame_bytes}"
-        )
+    for traffic in (scenario.traffic, *scenario.further_traffic):
+        found += _impossible_traffic(scenario, traffic)
+    names = [*scenario.traffic_classes]
+    if len(names) <= len(scenario.further_traffic) or _TAKEN & set(names):
+        found.append(f"traffic.name: {', '.join(names)} must be different, and none of {', '.join(sorted(_TAKEN))}")
     if scenario.clock.sync == "beacons" and not scenario.routing.hello_interval_s:
         found.append('clock.sync = "beacons" needs hellos: routing.hello_interval_s > 0')
     found += _too_small_frames(scenario)
@@ -82,6 +76,28 @@ def disagreements(scenario: Scenario) -> Sequence[str]:
                 f"{clusters.slot_ns / MS:g} ms"
             )
     return found
+
+
+def _impossible_traffic(scenario: Scenario, traffic: Traffic) -> Iterator[str]:
+    """Nodes that there are not, packets that are too long, and what a timetable has no room for."""
+    count, most = scenario.nodes.count, scenario.radio.max_frame_bytes
+    if traffic.destination != "all" and traffic.destination > count:
+        yield f"traffic.destination = {traffic.destination} must be <= nodes.count = {count}"
+    if isinstance(traffic.sources, int) and traffic.sources > count:
+        yield f"traffic.sources = {traffic.sources} must be <= nodes.count = {count}"
+    for key, ids in (("sources", traffic.sources), ("targets", traffic.targets)):
+        if isinstance(ids, tuple) and any(i > count for i in ids):
+            yield f"traffic.{key} = {list(ids)} must be node ids <= nodes.count = {count}"
+    longest = max((size for _, size in traffic.packets), default=traffic.payload_bytes)
+    if longest > most:
+        yield f"traffic.payload_bytes = {longest} must be <= radio.max_frame_bytes = {most}"
+    if (scenario.routing.protocol, scenario.clusters.relay) == ("clustered", "scheduled"):
+        room = scenario.traffic.payload_bytes
+        if longest > room or traffic.priority != "bulk":
+            yield (
+                f"traffic.payload_bytes = {longest}, priority = {traffic.priority}: a timetable "
+                f'(clusters.relay = "scheduled") has room for bulk of the first class, {room} bytes'
+            )
 
 
 def _too_small_frames(scenario: Scenario) -> Iterator[str]:

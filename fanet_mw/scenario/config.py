@@ -60,12 +60,37 @@ def build(tree: Mapping[str, Any], *, source: str = "scenario") -> Scenario:
 
 def _from_folder(tree: dict[str, Any], folder: Path) -> None:
     """Make the paths of other files in a tree independent of the current folder."""
+    traffic = tree.get("traffic")
+    for number, table in enumerate(traffic if isinstance(traffic, list) else [traffic]):
+        if isinstance(table, dict) and isinstance(table.get("packets_csv"), str) and table["packets_csv"]:
+            table["packets"] = _packets(folder / table.pop("packets_csv"), f"traffic.{number}.packets_csv")
     world = tree.get("world")
     if not isinstance(world, dict):
         return
     for key in _PATHS:
         if isinstance(world.get(key), str) and world[key]:
             world[key] = str(folder.absolute() / world[key])
+
+
+def _packets(path: Path, key: str) -> list[list[str]]:
+    """The packets of a file, `seconds,bytes` on each line; raises ConfigError with the line that is none."""
+    try:
+        lines = path.read_text(encoding="utf-8").splitlines()
+    except (OSError, UnicodeDecodeError) as error:
+        raise ConfigError(f"{key} = {path}: cannot be read: {getattr(error, 'strerror', None) or error}") from error
+    found = []
+    for number, line in enumerate(lines, start=1):
+        cells = [cell.strip() for cell in line.split(",")]
+        if not line.strip() or line.startswith("#") or (number == 1 and not _is_number(cells[0])):
+            continue  # a heading, or nothing
+        if len(cells) != 2 or not all(_is_number(cell) for cell in cells):
+            raise ConfigError(f"{key} = {path}, line {number}: {line!r} must be seconds,bytes")
+        found.append(cells)
+    return found
+
+
+def _is_number(text: str) -> bool:
+    return text.replace(".", "", 1).replace("e-", "", 1).isdecimal()
 
 
 def _apply(tree: dict[str, Any], override: str) -> None:

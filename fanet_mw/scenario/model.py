@@ -5,6 +5,7 @@ Each table checks itself; what the tables ask of each other is in `scenario_chec
 """
 
 import math
+from collections.abc import Mapping
 from typing import Annotated, Any, Final, Literal, Self
 
 from pydantic import AfterValidator, Field, model_validator
@@ -89,16 +90,30 @@ class Nodes(Section):
 
 
 class Traffic(Section):
-    """The application load: who sends how much, how often, to whom."""
+    """The application load: who sends how much, how often, to whom. Several classes: `[[traffic]]` for each."""
 
+    name: Annotated[str, Field(pattern=r"^[A-Za-z0-9_-]{0,64}$")] = ""
+    """What results call a class of traffic; empty: `traffic` for the first one, `traffic_2` and so on."""
     payload_bytes: Annotated[int, Field(ge=64, le=2304)] = 1024
     """UDP payload on the air, our routing header included."""
     interval_s: Annotated[float, Field(ge=1e-4, le=MOST_S)] = 1.0
     """From one packet of a source to its next. At least 0.1 ms: packets are named by numbers of which a node has one
     for each 0.1 ms."""
-    arrivals: Literal["cbr", "poisson", "saturated", "none"] = "cbr"
+    arrivals: Literal["cbr", "poisson", "saturated", "on_off", "trace", "none"] = "cbr"
     """When a source offers packets: one per interval, with exponential gaps of that mean, always one more as soon as
-    the last has ended, or never."""
+    the last has ended, one per interval in periods of activity (`on_s`, `off_s`), as `packets` says, or never."""
+    on_s: SomeTime = 1.0
+    """Arrivals `on_off`: mean of the exponential periods in which a source is active."""
+    off_s: Duration = 1.0
+    """Arrivals `on_off`: mean of the exponential pauses between these."""
+    packets: tuple[tuple[Duration, Annotated[int, Field(ge=64, le=2304)]], ...] = ()
+    """Arrivals `trace`: each packet of a source as [seconds after `start_s`, bytes as in `payload_bytes`]."""
+    packets_csv: str = ""
+    """Arrivals `trace`: a file with a line `seconds,bytes` for each packet, read when the scenario is."""
+    start_s: Duration | None = None
+    """When a class begins; unset: with the measured part of the run (`warmup_s`)."""
+    priority: Literal["safety", "report", "bulk"] = "bulk"
+    """Which packets go first where several wait, and after which time they expire (`routing`)."""
     sources: Literal["all"] | Annotated[int, Field(ge=0, le=MAX_NODES)] | tuple[Id, ...] = "all"
     """A number of sources (drawn by seed among the nodes that are neither leader nor destination), a list of node
     ids, or every node but the destination."""
@@ -106,9 +121,17 @@ class Traffic(Section):
     """One node's id, or `all`: packets are flooded."""
     deadline_s: SomeTime | None = None
     """`clusters.relay = "scheduled"`: nodes refuse packets that would break this, and record whether their bound meets
-    it; unset: every packet is taken."""
+    it; unset: every packet is taken. Each class has its own; what nodes record is about the first one's."""
     targets: tuple[Id, ...] = ()
     """Nodes at which delivery counts when the destination is `all`; empty: every other node."""
+
+    @model_validator(mode="after")
+    def _trace_has_packets(self) -> Self:
+        if self.packets_csv:
+            raise ValueError(f"traffic.packets_csv = {self.packets_csv!r}: is read with a scenario file only")
+        if (self.arrivals == "trace") != bool(self.packets):
+            raise ValueError(f"traffic.packets: {len(self.packets)} with arrivals = {self.arrivals!r}; for trace, some")
+        return self
 
 
 class Routing(Section):
@@ -404,6 +427,25 @@ class Scenario(Section):
     """They run in the order in which they stand, after those of fanet-mw."""
     faults: tuple[AnyFault, ...] = ()
     """What happens to the air, and when; by message too (`fanet air`)."""
+    further_traffic: tuple[Traffic, ...] = ()
+    """Classes of traffic beside the first one; in a file, write `[[traffic]]` several times instead."""
+
+    @model_validator(mode="before")
+    @classmethod
+    def _several_classes(cls, tree: object) -> object:
+        """`[[traffic]]`: the first is the traffic, the others go with it."""
+        if not isinstance(tree, Mapping) or not isinstance(tree.get("traffic"), list | tuple):
+            return tree
+        first, *others = tree["traffic"] or [{"arrivals": "none"}]
+        return {**tree, "traffic": first, "further_traffic": [*others, *tree.get("further_traffic", ())]}
+
+    @property
+    def traffic_classes(self) -> Mapping[str, Traffic]:
+        """All classes of traffic by their names, in the order of the file."""
+        return {
+            traffic.name or ("traffic" if index == 1 else f"traffic_{index}"): traffic
+            for index, traffic in enumerate((self.traffic, *self.further_traffic), start=1)
+        }
 
     @model_validator(mode="after")
     def _parts_agree(self) -> Self:
@@ -425,9 +467,14 @@ class Scenario(Section):
         return seconds_to_ns(self.clusters.repair_s or (_REPAIR_S if self.measures_links else 0.0))
 
     @property
+    def saturated(self) -> bool:
+        """Whether a class of traffic always has one more packet to send."""
+        return any(traffic.arrivals == "saturated" for traffic in self.traffic_classes.values())
+
+    @property
     def mac_lifetime_ns(self) -> int:
         """How long a frame may wait in the MAC queue (`radio.lifetime_ms`)."""
-        unset_ms = _FOREVER_MS if self.traffic.arrivals == "saturated" else _LIFETIME_MS
+        unset_ms = _FOREVER_MS if self.saturated else _LIFETIME_MS
         return round((self.radio.lifetime_ms or unset_ms) * MS)
 
     @property

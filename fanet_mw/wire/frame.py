@@ -9,6 +9,7 @@ import struct
 from collections.abc import Iterator, Sequence
 from enum import IntEnum
 from functools import lru_cache
+from types import MappingProxyType
 from typing import Any, Final, NamedTuple
 
 from fastcrc.crc16 import kermit, mcrf4xx
@@ -36,6 +37,8 @@ PRIORITY_CONTROL: Final = 0
 PRIORITY_SAFETY: Final = 1
 PRIORITY_REPORT: Final = 2
 PRIORITY_BULK: Final = 3
+PRIORITIES: Final = MappingProxyType({"safety": PRIORITY_SAFETY, "report": PRIORITY_REPORT, "bulk": PRIORITY_BULK})
+"""Of applications' packets, by the name that people give them."""
 
 OVERHEAD: Final = 12
 """The bytes of a MAVLink 2 frame around its payload: 10 in front, 2 of CRC behind."""

@@ -20,7 +20,7 @@ from sim.results import delays, ledger, validity
 from sim.results.bounds import against_bounds, likely
 from sim.results.clocks import clock_errors
 from sim.results.mission import mission
-from sim.results.packets import APPS, Application, packets_of, targets_by_source
+from sim.results.packets import OTHER_APPS, Application, packets_of, targets_by_source
 from sim.run.outcome import Outcome
 from sim.world.separation import separation
 
@@ -29,6 +29,7 @@ def summarize(outcome: Outcome, *, trace_sha256: str) -> dict[str, Any]:
     """The content of `summary.json`."""
     scenario = outcome.scenario
     sent = packets_of(outcome)
+    classes = [*scenario.traffic_classes]
     packets = _packets(outcome, sent)
     emulator = outcome.reports.get("emulator", {})
     frames, lateness = ledger.frames(outcome), _lateness(outcome, emulator)
@@ -45,10 +46,11 @@ def summarize(outcome: Outcome, *, trace_sha256: str) -> dict[str, Any]:
         "simulated_s": round(outcome.simulated_ns / S, 3),
         "time_scale": scenario.time_scale if outcome.mode == "realtime" else None,
         "wall_s": round(outcome.wall_s, 3),
-        **packets["traffic"],
+        **packets[classes[0]],
+        "classes": {name: packets[name] for name in classes} if len(classes) > 1 else {},
         "reports": packets["report"],
         "warnings": packets["warning"],
-        "applications": {name: part for name, part in packets.items() if name not in APPS},
+        "applications": {name: part for name, part in packets.items() if name not in (*classes, *OTHER_APPS)},
         "messages": _messages(outcome),
         "frames": frames,
         "copies": ledger.copies(outcome),
@@ -97,8 +99,9 @@ def _packets(outcome: Outcome, packets: Mapping[str, Application]) -> dict[str, 
         }
         for name, app in packets.items()
     }
-    traffic = packets["traffic"]
-    result["traffic"]["worst_nodes"] = _worst_nodes(
+    first = next(iter(outcome.scenario.traffic_classes))
+    traffic = packets[first]
+    result[first]["worst_nodes"] = _worst_nodes(
         Counter(node for node, _ in traffic.sent),
         targets_by_source(outcome),
         Counter(record.node for record in traffic.deliveries),

@@ -14,7 +14,8 @@ from agents.traffic import targets_of
 from fanet_mw.trace import BoundStated, Delivered, Generated, LetOut, LikelyStated
 from sim.run.outcome import Outcome
 
-APPS: Final = ("traffic", "report", "warning")
+OTHER_APPS: Final = ("report", "warning")
+"""Applications of ours beside the classes of traffic."""
 Name = tuple[int, int]
 """The name of a packet: (origin, sequence number)."""
 
@@ -47,20 +48,25 @@ class Application:
 
 
 def packets_of(outcome: Outcome) -> Mapping[str, Application]:
-    """By application: those of `APPS`, then those of users in the order in which they began to send.
+    """By application: classes of traffic, those of `OTHER_APPS`, then those of users as they began to send.
 
     To which nodes a packet of a user's application is meant to go is not in the trace: its `wanted` stays 0.
     """
-    found = {app: Application() for app in APPS}
+    classes = [*outcome.scenario.traffic_classes]
+    found = {app: Application() for app in (*classes, *OTHER_APPS)}
     app_of: dict[Name, Application] = {}
-    targets = targets_by_source(outcome)
+    meant_for: dict[Name, frozenset[int]] = {}  # the targets of packets of traffic
+    targets = {name: targets_by_source(outcome, name) for name in classes}
     others = outcome.scenario.nodes.count - 1
     for record in outcome.records:
         if type(record) is Generated:
             app = app_of[record.node, record.seq] = found.setdefault(record.app, Application())
             app.sent[record.node, record.seq] = Sent(record.t_ns)
-            if record.app in APPS:
-                app.wanted += len(targets[record.node]) if record.app == "traffic" else others
+            if record.app in targets:
+                meant_for[record.node, record.seq] = targets[record.app][record.node]
+                app.wanted += len(targets[record.app][record.node])
+            elif record.app in OTHER_APPS:
+                app.wanted += others
     had: dict[Name, int] = {}  # a bit for each node: there are as many deliveries as records, and far fewer packets
     exact = not outcome.scenario.clock.modelled  # else delays are true ones, whatever the header said
     for record in outcome.records:
@@ -75,9 +81,10 @@ def packets_of(outcome: Outcome) -> Mapping[str, Application]:
         if sender is None or (
             exact and record.t_ns - record.delay_ns != sender.sent[record.origin, record.seq].born_ns
         ):
-            found[APPS[0]].unknown += 1
+            found[classes[0]].unknown += 1
             continue
-        if not _is_target(record, sender is found["traffic"], targets):
+        wanted_by = meant_for.get((record.origin, record.seq))
+        if record.node == record.origin or (wanted_by is not None and record.node not in wanted_by):
             continue
         name = record.origin, record.seq
         before, bit = had.get(name, 0), 1 << record.node
@@ -87,6 +94,11 @@ def packets_of(outcome: Outcome) -> Mapping[str, Application]:
             had[name] = before | bit
             sender.deliveries.append(record)
     return found
+
+
+def first_class_of(outcome: Outcome) -> Application:
+    """The first class of traffic."""
+    return packets_of(outcome)[next(iter(outcome.scenario.traffic_classes))]
 
 
 def _known(sent: Sent, record: LetOut | BoundStated | LikelyStated) -> Sent:
@@ -99,14 +111,7 @@ def _known(sent: Sent, record: LetOut | BoundStated | LikelyStated) -> Sent:
             return replace(sent, likely=(record.delay_ns, record.share))
 
 
-def targets_by_source(outcome: Outcome) -> Mapping[int, frozenset[int]]:
-    """For every node the nodes for which its traffic is meant."""
+def targets_by_source(outcome: Outcome, name: str | None = None) -> Mapping[int, frozenset[int]]:
+    """For every node the nodes for which its traffic of a class is meant, by default of the first class."""
     scenario = outcome.scenario
-    return {node: frozenset(targets_of(scenario, node)) for node in scenario.node_ids}
-
-
-def _is_target(delivered: Delivered, is_traffic: bool, targets: Mapping[int, frozenset[int]]) -> bool:
-    """True if the packet was meant for this node; reports and warnings are meant for all but their origin."""
-    if is_traffic:
-        return delivered.node in targets[delivered.origin]
-    return delivered.node != delivered.origin
+    return {node: frozenset(targets_of(scenario, node, name)) for node in scenario.node_ids}

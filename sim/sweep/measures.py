@@ -10,7 +10,7 @@ from fanet_mw.errors import ConfigError
 from fanet_mw.trace import Approaching, Detected
 from fanet_mw.units import S
 from sim.results.connectivity import connectivity
-from sim.results.packets import packets_of
+from sim.results.packets import first_class_of
 from sim.run.outcome import Outcome
 
 Value = float | list[float] | None
@@ -26,7 +26,11 @@ DELAY_EDGES_S: Final = tuple(
 def delay_counts(outcome: Outcome) -> list[float]:
     """Deliveries of application packets by delay: one count per edge of `DELAY_EDGES_S`, and one for all beyond."""
     delays_s = (
-        np.asarray([record.delay_ns for record in packets_of(outcome)["traffic"].deliveries], dtype=np.float64) / S
+        np.asarray(
+            [record.delay_ns for record in first_class_of(outcome).deliveries],
+            dtype=np.float64,
+        )
+        / S
     )
     counts = np.bincount(np.searchsorted(DELAY_EDGES_S, delays_s), minlength=len(DELAY_EDGES_S) + 1)
     return [float(count) for count in counts]
@@ -34,7 +38,7 @@ def delay_counts(outcome: Outcome) -> list[float]:
 
 def wanted(outcome: Outcome) -> float:
     """Packets times the nodes that each was meant for: what `delay_counts` would sum up to if nothing were lost."""
-    return float(packets_of(outcome)["traffic"].wanted)
+    return float(first_class_of(outcome).wanted)
 
 
 def connected(outcome: Outcome) -> float:

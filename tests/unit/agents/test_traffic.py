@@ -69,3 +69,63 @@ def test_few_sources_are_members_and_not_the_leader(make_scenario: MakeScenario,
         chosen = sources_of(scenario.model_copy(update={"seed": seed}))
         assert len(chosen) == count
         assert scenario.leader not in chosen
+
+
+# --- several classes --------------------------------------------------------------------------------------------------
+
+CLASSES = [
+    {"name": "app_1", "payload_bytes": 1024, "interval_s": 1.0},
+    {"name": "app_2", "payload_bytes": 512, "interval_s": 0.5, "priority": "report", "sources": [2, 3], "start_s": 10},
+]
+
+
+def of_class(scenario: Scenario, node: int, name: str) -> list[tuple[int, int]]:
+    """(birth, bytes) of the packets of one class at one node."""
+    traffic = Traffic(scenario, NodeId(node), name)
+    found = []
+    while (born_ns := traffic.next_ns()) is not None:
+        found.append((born_ns, traffic.next_bytes))
+        traffic.advance()
+    return found
+
+
+def test_each_class_has_its_own_sources_start_size_and_interval(make_scenario: MakeScenario) -> None:
+    scenario = make_scenario(**{"nodes.count": 9, "duration_s": 40, "warmup_s": 5, "drain_s": 2, "traffic": CLASSES})
+    assert [*scenario.traffic_classes] == ["app_1", "app_2"]
+    assert sources_of(scenario, "app_2") == [2, 3]
+    first, second = of_class(scenario, 2, "app_1"), of_class(scenario, 2, "app_2")
+    assert (len(first), {size for _, size in first}) == (33, {1024})
+    assert (len(second), {size for _, size in second}) == (56, {512})
+    assert 10 * S <= second[0][0] < 10.5 * S
+    assert of_class(scenario, 4, "app_2") == []
+
+
+def test_a_single_table_and_the_first_of_several_have_the_same_packets(make_scenario: MakeScenario) -> None:
+    alone = make(make_scenario, interval_s=0.5)
+    keys = {"nodes.count": 9, "duration_s": 40, "warmup_s": 5, "drain_s": 2}
+    both = make_scenario(**keys, traffic=[{"interval_s": 0.5}, CLASSES[1]])
+    assert births(alone, 3) == births(both, 3)
+    assert [*both.traffic_classes] == ["traffic", "app_2"]
+
+
+def test_an_on_off_source_sends_in_its_periods_and_pauses_between(make_scenario: MakeScenario) -> None:
+    found = []
+    for node in range(1, 10):
+        scenario = make_scenario(
+            **{"nodes.count": 9, "duration_s": 400, "traffic.arrivals": "on_off", "traffic.interval_s": 0.1,
+               "traffic.on_s": 2, "traffic.off_s": 6}
+        )  # fmt: skip
+        found.append(births(scenario, node))
+    gaps = [b - a for line in found for a, b in pairwise(line)]
+    assert min(gaps) == 100 * MS
+    pauses = [gap for gap in gaps if gap > 150 * MS]
+    assert sum(pauses) / len(pauses) == pytest.approx(6 * S, rel=0.25)
+    assert len(gaps) == pytest.approx(9 * 400 * 0.25 / 0.1, rel=0.25)
+
+
+def test_a_trace_gives_each_packets_instant_and_size(make_scenario: MakeScenario) -> None:
+    keys = {"nodes.count": 3, "warmup_s": 2, "traffic.arrivals": "trace", "traffic.packets": [(1.5, 200), (0.25, 64)]}
+    assert of_class(make_scenario(**keys), 2, "traffic") == [(2250 * MS, 64), (3500 * MS, 200)]
+    late = Traffic(make_scenario(**keys), NodeId(2))
+    late.start(3 * S)
+    assert (late.next_ns(), late.next_bytes) == (3500 * MS, 200)

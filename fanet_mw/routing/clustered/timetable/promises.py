@@ -86,7 +86,7 @@ class Promises:
             return {}
         found = dict.fromkeys(self._roots.reserved, own.burst_ns(per_turn=1))
         bulk_ns: int | None = own.burst_ns(per_turn=own.together)
-        if scenario.traffic.arrivals == "cbr":
+        if scenario.traffic.arrivals == "cbr" and not scenario.further_traffic:
             interval_ns = self._admission.interval_ns if self._admission else self._interval_ns
             bulk_ns = own.worst_ns(interval_ns=interval_ns)
         return found if bulk_ns is None else {**found, PRIORITY_BULK: bulk_ns}

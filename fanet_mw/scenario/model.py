@@ -1,7 +1,7 @@
 """The scenario: one frozen model of everything a run depends on. Keys are people's units, with the unit in the key.
 
 A key is a contract with users: renaming one breaks their files and sweeps. Derived values are properties, in `int` ns.
-Each table checks itself; what the tables ask of each other is in `scenario_checks.py`.
+Each table checks itself; what the tables ask of each other is in `checks.py`.
 """
 
 import math

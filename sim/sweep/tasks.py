@@ -3,7 +3,7 @@
 import hashlib
 import json
 import shlex
-from collections.abc import Mapping
+from collections.abc import Mapping, Sequence
 from dataclasses import dataclass
 from typing import Any
 
@@ -42,21 +42,27 @@ def tasks_of(sweep: Sweep) -> list[Task]:
         raise ConfigError(f"the sweep has more than {MOST_RUNS} runs")
     measures.check(sweep.measure)
     tasks: list[Task] = []
-    mistakes: dict[str, None] = {}
+    mistakes: dict[str, list[str]] = {}
     for setting in sweep.settings():
         overrides = setting.overrides()
         for seed in sweep.seed_list():
             try:
                 scenario = catalog.find(sweep.base, [*overrides, f"seed={seed}"])
             except ConfigError as error:
-                mistakes[f"case {setting.case}, {', '.join(overrides)}: {error}"] = None
+                mistakes.setdefault(str(error), []).append(f"case {setting.case}, {', '.join(overrides)}")
                 break
             sets = [f"--set {shlex.quote(override)}" for override in overrides]
             command = " ".join(["fanet simulate", shlex.quote(sweep.base), *sets, f"--seed {seed}"])
             tasks.append(_task(scenario, setting.case, sweep.measure, command))
     if mistakes:
-        raise ConfigError("\n".join(mistakes))
+        raise ConfigError("\n".join(f"{error} ({_first_of(settings)})" for error, settings in mistakes.items()))
     return tasks
+
+
+def _first_of(settings: Sequence[str]) -> str:
+    """The first setting that has a mistake, and how many others have it too."""
+    others = len(settings) - 1
+    return f"{settings[0]}{f'; and in {others} other settings' if others else ''}"
 
 
 def _task(scenario: Scenario, case: str, measure: tuple[str, ...], command: str) -> Task:

@@ -88,7 +88,15 @@ def test_every_setting_that_cannot_run_is_named_before_the_first_run() -> None:
         tasks_of(found)
     assert "nodes.count=0" in str(error.value)
     assert "nodes.count=100000" in str(error.value)
-    assert "nodes.count=9:" not in str(error.value)
+    assert "nodes.count=9)" not in str(error.value)
+
+
+def test_a_mistake_of_many_settings_is_said_once() -> None:
+    found = spec.parse('base = "quick"\n[grid]\nduration_s = [20, 30]\nnodes.count = [0]', source="test")
+    with pytest.raises(ConfigError) as error:
+        tasks_of(found)
+    assert str(error.value).count("greater than or equal to 1") == 1
+    assert str(error.value).endswith("(case -, duration_s=20, nodes.count=0; and in 1 other settings)")
 
 
 def test_a_measure_that_there_is_not_is_an_error() -> None:

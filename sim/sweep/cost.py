@@ -19,6 +19,8 @@ _PER_BODY_S: Final = 3e-3
 """The same for a body of the physics engine."""
 _PER_FRAME_S: Final = 40e-6
 """CPU seconds per frame on the air, with its copies at some eight receivers."""
+_PER_TURN_S: Final = 250e-6
+"""CPU seconds per packet and node in a timetable: turns, room and bounds are computed for each."""
 _MOST_FRAMES: Final = 80
 """Frames per node and second when the channel is full: 11 Mb/s, shared by some nine in reach."""
 
@@ -31,9 +33,12 @@ def guess_s(scenario: Scenario) -> float:
     relays = count if traffic.destination == "all" and scenario.routing.protocol != "direct" else 5
     frames = min(packets * relays, _MOST_FRAMES * count)
     start_ns, end_ns = scenario.traffic_window_ns
+    work_s = frames * _PER_FRAME_S
+    if scenario.routing.protocol == "clustered" and scenario.clusters.relay == "scheduled":
+        work_s += min(packets, _MOST_FRAMES * 10) * count * _PER_TURN_S
     bodies = _PER_BODY_S * count if scenario.world.engine == "pybullet" else 0.0
     idle = _START_S + scenario.duration_s * (_PER_NODE_S * count + bodies)
-    return idle + (end_ns - start_ns) / 1e9 * frames * _PER_FRAME_S
+    return idle + (end_ns - start_ns) / 1e9 * work_s
 
 
 class TimeLeft:

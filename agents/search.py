@@ -6,7 +6,7 @@ from typing import Final
 from agents.mission.searcher import Heard, Searcher
 from fanet_mw import mavlink, wire
 from fanet_mw.application import Application, AppPort, Course, Received, SensorReading
-from fanet_mw.bus.messages import Camera, Gps, WifiScan
+from fanet_mw.bus.messages import Altimeter, Camera, Gps, WifiScan
 from fanet_mw.errors import MalformedFrameError
 from fanet_mw.scenario import Scenario
 from fanet_mw.units import MS, Enu, NodeId, S
@@ -70,6 +70,8 @@ class PlannedSearch(Application):
         elif isinstance(reading, Camera):
             people = [(person.bearing_rad, person.elevation_rad) for person in reading.people]
             self._searcher.camera(people, now_ns=now_ns)
+        elif isinstance(reading, Altimeter):
+            self._searcher.altimeter(reading.above_ground_m, now_ns=now_ns)
         self._settle()
 
     def wake(self, now_ns: int) -> None:

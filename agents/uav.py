@@ -9,6 +9,7 @@ from typing import Any, Final, NamedTuple
 
 from agents.autopilot import Autopilot
 from agents.avoidance import CollisionAvoidance
+from agents.dead_reckoning import DeadReckoning
 from agents.onboard import Onboard
 from agents.rescue import Rescue
 from agents.search import PlannedSearch
@@ -19,14 +20,19 @@ from fanet_mw import wire
 from fanet_mw.actor import Actor
 from fanet_mw.application import Application, Course
 from fanet_mw.bus.messages import (
+    Altimeter,
+    Battery,
     Camera,
     Gps,
+    Inertial,
     MavlinkTap,
     Message,
+    Radar,
     Reception,
     Setpoint,
     SetpointKind,
     TxStatus,
+    Voice,
     WifiScan,
 )
 from fanet_mw.bus.topics import Topics
@@ -76,6 +82,7 @@ class Uav(Actor):
         """After the end of a frame: who hears of it later than this is too late for what comes a lead after it."""
         self._node = Node(node, scenario, make_protocol, position=position)
         self._autopilot = Autopilot(node, position=position, telemetry_hz=scenario.nodes.telemetry_hz)
+        self._reckoning = DeadReckoning()
         self._fixes = SteadyFix(sigma_m=scenario.world.gps_sigma_m, range_m=scenario.radio.range_m)
         asked_for = _asked_for(scenario, node, self._autopilot, position)
         self._built_in = tuple(application.name for application in asked_for)
@@ -128,15 +135,26 @@ class Uav(Actor):
             self._node.status(message, now_ns=now_ns)
             self._onboard.radio_done(message, now_ns)
         elif isinstance(message, Gps):
-            self._autopilot.fix(message)
-            self._node.moved(self._fixes.position(message), message.velocity)
-            self._onboard.fix(message, now_ns)
-        elif isinstance(message, WifiScan | Camera):
+            self._reckoning.fix(message)
+            self._fix(message, now_ns)
+        elif isinstance(message, Inertial):
+            reckoned = self._reckoning.velocity(message)
+            if reckoned is not None:
+                self._fix(reckoned, now_ns)
+        elif isinstance(message, WifiScan | Camera | Altimeter):
             self._onboard.sensor(message, now_ns)
+        elif isinstance(message, Voice | Radar | Battery):
+            pass  # on board, but nobody uses it yet
         else:
             self._malformed += 1
         self._settle(now_ns)
         return False
+
+    def _fix(self, fix: Gps, now_ns: int) -> None:
+        """Where we are, by GPS or in place of it."""
+        self._autopilot.fix(fix)
+        self._node.moved(self._fixes.position(fix), fix.velocity)
+        self._onboard.fix(fix, now_ns)
 
     def wake(self, now_ns: int) -> None:
         self._node.wake(now_ns)

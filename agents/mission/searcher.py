@@ -38,6 +38,8 @@ _FIX_GAIN: Final = 0.15
 """Weight of a position fix against dead reckoning by its velocity."""
 _LANE_GAIN: Final = 0.4
 """How fast a deviation from the lane is made good [1/s]."""
+_RANGED_NS: Final = 1 * S
+"""A height over the ground is used for so long."""
 _CLIMB_M_S: Final = 2.5
 _LEVEL_M: Final = 4.0
 """Heights farther apart than twice this are different levels: nobody there is in the way, once both keep theirs."""
@@ -149,6 +151,7 @@ class Searcher:
         self._position, self._own_velocity = position, Enu(0.0, 0.0, 0.0)
         self._fix_ns: int | None = None
         self._scan_ns = 0
+        self._above_ground: tuple[float, int] | None = None
         self._neighbors: dict[int, Heard] = {}
         self._pattern: Pattern | None = None
         self._place: int | None = None
@@ -222,15 +225,27 @@ class Searcher:
                 self._told_ns[survivor] = now_ns
                 self.packets.append(report.encode_frame(self._node))
 
+    def altimeter(self, above_ground_m: float | None, *, now_ns: int) -> None:
+        """The rangefinder tells how high we are over whatever is below; None: nothing is within its range."""
+        if above_ground_m is not None:
+            self._above_ground = above_ground_m, now_ns
+
+    def _height_m(self, now_ns: int) -> float:
+        """Over the ground, as far as a rangefinder has told lately; else over the plain."""
+        if self._above_ground is not None and now_ns - self._above_ground[1] <= _RANGED_NS:
+            return self._above_ground[0]
+        return self._position.up
+
     def camera(self, people: Sequence[tuple[float, float]], *, now_ns: int) -> None:
         """Our camera shows people at these bearings and elevations [rad]."""
         for bearing_rad, elevation_rad in people:
-            looked = ground_place(self._position, bearing_rad=bearing_rad, elevation_rad=elevation_rad)
+            here = self._position._replace(up=self._height_m(now_ns))
+            looked = ground_place(here, bearing_rad=bearing_rad, elevation_rad=elevation_rad)
             if looked is None or looked[2] > 2 * _CLOSE_M:
                 continue
-            sigma_m = max(1.0, _ANGLE_RAD * looked[2] * looked[2] / max(1.0, self._position.up))
+            sigma_m = max(1.0, _ANGLE_RAD * looked[2] * looked[2] / max(1.0, here.up))
             at = Enu(looked[0], looked[1], 0.0)
-            survivor = self.finds.seen(at, by=self._position, sigma_m=sigma_m, now_ns=now_ns)
+            survivor = self.finds.seen(at, by=here, sigma_m=sigma_m, now_ns=now_ns)
             if survivor is not None and looked[2] <= _CLOSE_M:
                 self._confirm(survivor, now_ns)
 
@@ -574,7 +589,7 @@ class Searcher:
         hard = len(planes)
         planes += self._tied(now_ns)
         east, north = nearest(wanted, planes, limit=self._most_m_s, hard=hard) if planes else wanted
-        up = max(-_CLIMB_M_S, min(_CLIMB_M_S, 0.5 * off.up))
+        up = max(-_CLIMB_M_S, min(_CLIMB_M_S, 0.5 * (goal.up - self._height_m(now_ns))))
         return Enu(east, north, up)
 
     def _clear_of_others(self, now_ns: int) -> list[HalfPlane]:

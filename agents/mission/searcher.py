@@ -57,7 +57,7 @@ _SHARED_M: Final = 35.0
 """An estimate so near to the border of two lanes belongs to both."""
 _ASIDE_M: Final = 70.0
 """How far aside of the leash a survivor may be to be looked at still."""
-_FAR_M: Final = 600.0
+_FAR_M: Final = 450.0
 """Who is farther from a survivor than this leaves it to others."""
 _AHEAD_M: Final = 250.0
 _STILL: Final = Enu(0.0, 0.0, 0.0)

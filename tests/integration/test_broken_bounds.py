@@ -5,7 +5,6 @@ from typing import Any
 
 import pytest
 
-from fanet_mw.node.packet import Packet
 from fanet_mw.routing.clustered.timetable.promises import Promises
 from fanet_mw.trace import BoundStated
 from sim.results.files import finish
@@ -20,8 +19,8 @@ def run(monkeypatch: pytest.MonkeyPatch, promise: Callable[[int], int]) -> dict[
     """`promise`: what a node says instead of its bound."""
     honest = Promises.state
 
-    def too_little(self: Promises, packet: Packet, *, now_ns: int) -> None:
-        honest(self, packet, now_ns=now_ns)
+    def too_little(self: Promises, *given: Any, **instants: int) -> None:
+        honest(self, *given, **instants)
         records = self._port.records
         if isinstance(records[-1], BoundStated):
             records[-1] = records[-1]._replace(bound_ns=promise(records[-1].bound_ns))

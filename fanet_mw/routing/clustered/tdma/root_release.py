@@ -50,6 +50,9 @@ class RootRelease(TurnRelease):
         """Whether a turn of ours lies ahead, under any timetable that is known."""
         return self._turn(max(now_ns + self._lead_ns, self._free_ns)) is not None
 
+    def push(self, packet: Packet, *, now_ns: int) -> Packet | None:
+        return self._push(packet, self._rank(packet), now_ns)
+
     def outdated(self, *, before_us: int) -> list[Packet]:
         """Take out the announcements of ours that were made before an instant [swarm us] and still wait."""
         return self._queue.take_older(before_us=before_us, rank=PRIORITY_CONTROL)

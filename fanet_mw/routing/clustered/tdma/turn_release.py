@@ -34,7 +34,11 @@ class TurnRelease(ABC):
 
     def push(self, packet: Packet, *, now_ns: int) -> Packet | None:
         """Queue a packet; returns the one evicted for it."""
-        evicted = self._queue.push(packet, rank=self._rank(packet))
+        return self._push(packet, packet.header.priority, now_ns)
+
+    def _push(self, packet: Packet, rank: int, now_ns: int) -> Packet | None:
+        """Queue a packet at a priority."""
+        evicted = self._queue.push(packet, rank=rank)
         if self._next is None:
             self._arm(now_ns)
         return evicted
@@ -60,10 +64,6 @@ class TurnRelease(ABC):
         if not len(self._queue):
             self._next = None
         return released
-
-    def _rank(self, packet: Packet) -> int:
-        """The priority at which a packet waits here."""
-        return packet.header.priority
 
     def _fill(self, size: int) -> list[Packet]:
         """The packets of one turn: the most urgent, and with it what fits."""

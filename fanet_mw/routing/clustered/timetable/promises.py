@@ -117,34 +117,29 @@ class Promises:
         policed = self._admission if packet.header.priority == PRIORITY_BULK else None
         return policed is None or policed.admits(due_ns)
 
-    def state(self, packet: Packet, *, now_ns: int) -> None:
-        """Record what is promised of a packet that was just accepted."""
-        bound_ns = self._kept_bound_ns(packet, now_ns)
-        if bound_ns is not None:
-            self._port.record(BoundStated(now_ns, self._port.node, packet.header.seq, bound_ns))
-        likely_ns = self.likely_ns() if packet.header.priority == PRIORITY_BULK else None
-        newest = self._plans.newest
-        if likely_ns is not None and newest is not None and newest.valid_ns <= now_ns:
-            record = LikelyStated(now_ns, self._port.node, packet.header.seq, likely_ns, LIKELY_SHARE)
-            self._port.record(record)
-
-    def _kept_bound_ns(self, packet: Packet, now_ns: int) -> int | None:
-        """The bound of a packet that was just accepted, if it will be kept whatever comes later."""
+    def greatest_bound_ns(self, packet: Packet, *, now_ns: int) -> int | None:
+        """The greatest bound of packets of this class under the timetables in force; None: under one there is none."""
         priority = packet.header.priority
         bounds = [bounds_ns.get(priority) for bounds_ns in self._bounds_ns[self._plans.superseded(now_ns) :]]
         known = [bound_ns for bound_ns in bounds if bound_ns is not None]
-        newest = self._plans.newest
-        if not known or len(known) < len(bounds) or newest is None or not self._in_step():
+        if not known or len(known) < len(bounds) or not self._in_step():
             return None
         if self._lease.leads and priority == PRIORITY_BULK:
             return None  # schedules go before it
-        bound_ns = max(known)
-        through_ns = self._roots.through_ns(packet, now_ns=now_ns)
-        if through_ns is None:
-            return None
-        had_ns = through_ns + receipt_ns(self._port.scenario)
-        known_ns = self.announced_ns + newest.turns.period_ns + self._ahead_ns(newest)  # no other is in force sooner
-        return bound_ns if had_ns <= min(packet.header.origin_us * US + bound_ns, known_ns) else None
+        return max(known)
+
+    def state(self, packet: Packet, bound_ns: int | None, *, through_ns: int | None, now_ns: int) -> None:
+        """Record what is promised of a packet that was just accepted, and whose flood is over at `through_ns`."""
+        newest = self._plans.newest
+        if bound_ns is not None and through_ns is not None and newest is not None:
+            had_ns = through_ns + receipt_ns(self._port.scenario)
+            known_ns = self.announced_ns + newest.turns.period_ns + self._ahead_ns(newest)  # until then none is newer
+            if had_ns <= min(packet.header.origin_us * US + bound_ns, known_ns):
+                self._port.record(BoundStated(now_ns, self._port.node, packet.header.seq, bound_ns))
+        likely_ns = self.likely_ns() if packet.header.priority == PRIORITY_BULK else None
+        if likely_ns is not None and newest is not None and newest.valid_ns <= now_ns:
+            record = LikelyStated(now_ns, self._port.node, packet.header.seq, likely_ns, LIKELY_SHARE)
+            self._port.record(record)
 
     # --- time and people ------------------------------------------------------------------------------------------
 

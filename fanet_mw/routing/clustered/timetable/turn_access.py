@@ -100,7 +100,9 @@ class TurnAccess:
 
     def originate(self, packet: Packet, *, due_ns: int, now_ns: int) -> None:
         self.forward(packet, start_ns=due_ns, now_ns=now_ns)
-        self._promises.state(packet, now_ns=now_ns)
+        bound_ns = self._promises.greatest_bound_ns(packet, now_ns=now_ns)
+        through_ns = None if bound_ns is None else self._roots.through_ns(packet, now_ns=now_ns)
+        self._promises.state(packet, bound_ns, through_ns=through_ns, now_ns=now_ns)
 
     def forward(self, packet: Packet, *, start_ns: int, now_ns: int, tries: int = 0) -> None:
         if self._roots.has_turn(now_ns=now_ns):

@@ -191,8 +191,8 @@ class Guidance:
         here = Enu(*at.tolist())
         row = node - 1
         kind, place, speed_m_s = setpoint.kind, setpoint.position, setpoint.speed_m_s
-        if kind is not SetpointKind.LAND:
-            self._landings.pop(row, None)
+        if kind is not SetpointKind.LAND and self._landings.pop(row, None) is not None:
+            self._grounded.add(row)  # it may stand on the ground, until it is seen clear of it
         self._velocities.pop(row, None)
         if kind is SetpointKind.POSITION:
             self.steer(node, place, speed_m_s=speed_m_s)
@@ -275,7 +275,7 @@ class Guidance:
         for row in [row for row in self._grounded if height[row] > _CLEAR_M]:
             self._grounded.discard(row)
         for row in self._grounded:
-            if row not in self._setpoints and row not in self._velocities:
+            if row not in self._setpoints and row not in self._velocities and row not in self._landings:
                 wish[row] = 0.0
 
 

@@ -109,6 +109,20 @@ def test_a_uav_takes_off_flies_and_lands_without_a_collision(make_scenario: Make
     assert flying.world.report()["crashed"] == 0
 
 
+def test_who_is_told_to_land_while_it_takes_off_lands_and_takes_off_again(make_scenario: MakeScenario) -> None:
+    flying = Flying(make_scenario, **{"nodes.on_ground": True, "world.crash": "falls"})
+    flying.ask(1, SetpointKind.TAKEOFF, Enu(0.0, 0.0, 30.0), speed_m_s=2.0)
+    flying.fly(1.2)
+    assert 0.5 < flying.at(1)[2] < 3
+    flying.ask(1, SetpointKind.LAND, speed_m_s=2.0)
+    flying.fly(15)
+    assert flying.at(1)[2] < 0.35
+    flying.ask(1, SetpointKind.POSITION, Enu(-50.0, 0.0, 20.0), speed_m_s=5.0)
+    flying.fly(15)
+    assert flying.at(1) == pytest.approx([-50, 0, 20], abs=0.5)
+    assert flying.collisions == []
+
+
 def test_a_wreck_falls_its_radio_goes_and_it_senses_nothing_more(make_scenario: MakeScenario) -> None:
     flying = Flying(make_scenario, **{"world.crash": "falls", "nodes.count": 3, "nodes.telemetry_hz": 1})
     for node in (1, 2):

@@ -222,7 +222,7 @@ def turned(corners: list[tuple[float, float]], degrees: float, about: tuple[floa
     return [(about[0] + cos * x - sin * y, about[1] + sin * x + cos * y) for x, y in corners]
 
 
-HOUSE = [(-20.0, -5.0), (20.0, -5.0), (20.0, 5.0), (0.0, 5.0), (0.0, 4.0), (-20.0, 4.0)]
+HOUSE = [(-20.0, -5.0), (20.0, -5.0), (20.0, 5.0), (0.0, 5.0), (0.0, 4.0), (-18.0, 4.0), (-20.0, 2.0)]
 
 
 def test_a_building_is_the_smallest_rectangle_about_its_outline(tmp_path: Path) -> None:

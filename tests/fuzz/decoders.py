@@ -132,7 +132,7 @@ def _of_rivals(found: Corpus) -> Iterator[Decoder]:
     messages: list[tuple[str, int, Any]] = [
         ("RREQ", 0x11, aodv.RouteRequest), ("RREP", 0x12, aodv.RouteReply), ("RERR", 0x13, aodv.RouteError),
         ("OLSR hello", 0x21, olsr.Hello), ("TC", 0x22, olsr.TopologyControl), ("DSDV update", 0x31, dsdv.Update),
-        ("geographic beacon", 0x41, geographic.Beacon), ("location", 0x42, geographic.Location),
+        ("geographic beacon", 0x41, geographic.PositionBeacon), ("location", 0x42, geographic.Location),
         ("query", 0x43, geographic.Query),
     ]  # fmt: skip
     for name, kind, message in messages:

@@ -12,9 +12,15 @@ from fanet_mw.units import US, Enu, S
 from fanet_mw.wire.inner import Survivor
 from fanet_mw.wire.search import Found
 
-_GATE: Final = 25.0
+_GATE: Final = 16.0
 """A sighting less likely than this by what was heard of a phone is not of its owner: twice a difference of logarithms.
-Far above 11.8, the 99.7 % of chi-square with 2 degrees: the shadowing of neighboring samples is not independent."""
+Above 11.8, the 99.7 % of chi-square with 2 degrees: the shadowing of neighboring samples is not independent."""
+_VAGUE_M: Final = 80.0
+"""A phone whose place has a larger standard deviation than this could be anybody's."""
+_SURE_OF_TAKEN_M: Final = 30.0
+"""The same where somebody has been confirmed already."""
+_GATE_TAKEN: Final = 6.0
+"""The gate where somebody has been confirmed already: most likely that one again, but two may lie side by side."""
 _SAME_PERSON_M: Final = 12.0
 """Sightings nearer to each other than this are of one person."""
 _OLD_SIGHTING_NS: Final = 5 * S
@@ -92,13 +98,16 @@ class Finds:
         """Somebody was seen on the ground, by a camera that names nobody; the survivor who that is taken to be."""
         east_m, north_m = at.east, at.north
         best: tuple[float, int] | None = None
+        taken = any(
+            find.confirmed is not None and _estimate(find.confirmed).distance_m(at) <= _SAME_PERSON_M
+            for find in self.known.values()
+        )
+        gate = _GATE_TAKEN if taken else _GATE
         for survivor, find in self.known.items():
-            if find.confirmed is not None and _estimate(find.confirmed).distance_m(at) <= _SAME_PERSON_M:
-                return None
             if find.confirmed is not None or find.own_heard_ns is None or now_ns - find.own_heard_ns > _OLD_SIGHTING_NS:
                 continue
             place = find.place()
-            if place is None:
+            if place is None or place.sigma_m > (_SURE_OF_TAKEN_M if taken else _VAGUE_M):
                 continue
             if find.filter.is_seen:
                 if place.distance_m(at) > _SAME_PERSON_M:
@@ -106,7 +115,7 @@ class Finds:
                 score = 0.0
             else:
                 score = find.filter.deficit(east_m, north_m) + self._surprise(find, by, at)
-            if score <= _GATE:
+            if score <= gate:
                 best = (score, survivor) if best is None else min(best, (score, survivor))
         if best is None:
             return None

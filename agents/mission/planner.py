@@ -18,7 +18,7 @@ from fanet_mw.wire.search import Search, Status
 
 STATUS_S: Final = 12.0
 """How often a UAV says how it is."""
-_LOST_NS: Final = 40 * S
+_LOST_NS: Final = 70 * S
 _PATIENCE_NS: Final = 14 * S
 """How long the first plan waits for those who have not been heard of."""
 _NOTICE_NS: Final = 7 * S

@@ -618,13 +618,15 @@ class Searcher:
         return [plane for _, plane in sorted(planes)]
 
     def _nearest_anchor(self, now_ns: int) -> tuple[int, ...]:
-        """The place of a line or of the chain whose holder is nearest to us."""
+        """Of a follower: the place of its own line whose holder is nearest to us."""
         plan, pattern = self._planner.plan, self._pattern
         assert plan is not None, "who has a place has a plan"
         assert pattern is not None, "a plan has a pattern"
+        assert self._place is not None, "a follower has a place"
+        line = pattern.line_of(self._place)
         near = [
             (heard.now(now_ns).minus(self._position).norm(), other)
-            for other in range(2 * pattern.lanes + pattern.relays)
+            for other in range(line * pattern.lanes, (line + 1) * pattern.lanes)
             if (heard := self._neighbors.get(plan.nodes[other])) is not None and now_ns - heard.at_ns <= _HEARD_FOR_NS
         ]
         return (min(near)[1],) if near else ()

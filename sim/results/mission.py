@@ -2,7 +2,8 @@
 
     coverage    share of the area that came within the nominal range of a phone's receiver of a UAV, a cell at a time
     connected   share of the time in which all living UAVs were one component at the radio's reach
-    confirmed   survivors of whom a UAV said that it saw them at close range; the error is that of the place it told
+    confirmed   survivors of whom a UAV said that it saw them at close range, and where they truly are: within 25 m; the
+                others are mistaken. The error is that of the place it told first, of both
 
 Positions are the true ones, once a second (`Posed`).
 """
@@ -24,6 +25,8 @@ from sim.world.survivors import place
 
 _CELL_M: Final = 25.0
 _NEARLY_ALL: Final = 0.95
+_MISTAKEN_M: Final = 25.0
+"""Whoever announces a survivor farther than this from the true place has taken somebody else for that one."""
 
 Rows = npt.NDArray[np.float64]
 
@@ -43,20 +46,22 @@ def mission(outcome: Outcome) -> dict[str, Any]:
                 errors.append(math.hypot(at.east - record.east_m, at.north - record.north_m))
         elif type(record) is Confirmed and 1 <= record.survivor <= len(truth):
             confirmed.setdefault(record.survivor, record)
-    confirmed_errors = [
-        math.hypot(truth[s - 1].east - r.east_m, truth[s - 1].north - r.north_m) for s, r in confirmed.items()
-    ]
+    error_m = {
+        s: math.hypot(truth[s - 1].east - r.east_m, truth[s - 1].north - r.north_m) for s, r in confirmed.items()
+    }
+    right = [s for s in confirmed if error_m[s] <= _MISTAKEN_M]
     return {
         "survivors": scenario.mission.survivors,
         "detected": len({r.survivor for r in records if type(r) is Detected}),
         "approached": len({r.survivor for r in records if type(r) is Approaching}),
         "reached": len({r.survivor for r in records if type(r) is Arrived}),
-        "confirmed": len(confirmed),
-        "time_to_confirm_s": sorted(round(r.t_ns / S, 3) for r in confirmed.values()),
+        "confirmed": len(right),
+        "mistaken": len(confirmed) - len(right),
+        "time_to_confirm_s": sorted(round(confirmed[s].t_ns / S, 3) for s in right),
         "uavs_approaching": len(first),
         "time_to_approach_s": sorted(round(t_ns / S, 3) for t_ns in first.values()),
         "localization_error_m": _median(errors),
-        "confirmed_error_m": _median(confirmed_errors),
+        "confirmed_error_m": _median(list(error_m.values())),
         "collisions": sum(1 for r in records if type(r) is Collided),
         **_flown(scenario, records),
     }

@@ -124,7 +124,7 @@ def test_the_place_of_a_lost_uav_in_a_line_goes_to_a_follower() -> None:
     planner.review(pattern, now_ns=S)
     before = planner.plan
     assert before is not None
-    lost, later_ns = before.nodes[3], 60 * S
+    lost, later_ns = before.nodes[3], 90 * S
     for node in range(1, 46):
         if node != lost:
             planner.status(Status(later_ns // US, Enu(0, 0, 50), node, 1, 100), now_ns=later_ns)
@@ -143,7 +143,7 @@ def test_only_the_lowest_id_that_is_alive_plans() -> None:
 def test_the_smaller_part_of_a_swarm_that_came_apart_makes_no_plan_of_its_own() -> None:
     planner, pattern = planner_with(45), formation()
     planner.review(pattern, now_ns=S)
-    later_ns = 60 * S
+    later_ns = 90 * S
     for node in range(1, 20):
         planner.status(Status(later_ns // US, Enu(0, 0, 50), node, 1, 100), now_ns=later_ns)
     assert not planner.review(pattern, now_ns=later_ns)

@@ -52,3 +52,8 @@ def test_a_survivor_is_confirmed_once_and_its_error_is_that_of_the_place_that_wa
 def test_without_positions_nothing_is_claimed_of_the_flight() -> None:
     found = measured([])
     assert (found["coverage"], found["covered_95_s"], found["connected"]) == (None, None, None)
+
+
+def test_a_survivor_announced_where_somebody_else_is_does_not_count() -> None:
+    found = measured([Confirmed(7 * S, 1, 1, -100.0, 0.0), Confirmed(9 * S, 2, 1, 100.0, 0.0)])
+    assert (found["confirmed"], found["mistaken"], found["time_to_confirm_s"]) == (0, 1, [])

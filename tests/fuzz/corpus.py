@@ -24,6 +24,7 @@ from fanet_mw.routing import control
 from fanet_mw.trace import Record
 from fanet_mw.units import BROADCAST, Enu, NodeId, S
 from fanet_mw.wire.message import DELIVERED, MISSING, Head, Receipt, encode_piece, encode_receipts
+from fanet_mw.wire.search import Bid, Found, Search, Status, encode_bids
 from sim.run.virtual import actors_of
 from sim.scenarios import catalog
 
@@ -86,7 +87,7 @@ def recorded(*, seconds: float = 10, swarms: Sequence[str] = tuple(SETTINGS)) ->
     warning = Encoder(NodeId(3), component=wire.COMPONENT).collision(
         NodeId(2), closest_s=3.0, altitude_m=2.0, horizontal_m=9.0
     )
-    for inner in (warning, *_of_messages()):
+    for inner in (warning, *_not_recorded()):
         frames[header + inner] = None
     for message in _BY_HAND:
         puts[type(message)][topics.encode([message])] = None
@@ -126,13 +127,18 @@ def _said(name: str, seconds: float, records: list[Record]) -> list[Message]:
     return said
 
 
-def _of_messages() -> list[bytes]:
-    """Messages of applications, which these swarms do not send: in pieces, to targets, as MAVLink; receipts."""
+def _not_recorded() -> list[bytes]:
+    """What these swarms do not send: plan, status, bids and finds of a search; pieces and receipts of messages."""
     head = Head(7, 3, 1, 300, 5000, 14, 2, 200, 0, 2, 1)
     text = Encoder(NodeId(3), component=wire.COMPONENT).collision(
         NodeId(2), closest_s=3.0, altitude_m=2.0, horizontal_m=9.0
     )
+    covariance = {"east_variance_m2": 90.0, "covariance_m2": 3.0, "north_variance_m2": 40.0}
     return [
+        Search(7, 100.0, 0.0, 400.0, 50.0, 10.0, 30, 1, 1, (1, 2, 3, 4, 5, 0, 7), 3, 1, 0).encode_frame(1),
+        Status(7, Enu(1.0, 2.0, 3.0), 4, 1, 80).encode_frame(4),
+        encode_bids([Bid(3, 4, 200, 7), Bid(5, 6, 0xFFFF, 8, 2)], node=4),
+        Found(7, 3, 10.0, 20.0, node=4, confirmed=False, **covariance).encode_frame(4),
         encode_piece(head, bytes(range(200)), node=3),
         encode_piece(head._replace(piece=1), bytes(100), node=3, targets=range(1, 40)),
         encode_piece(head._replace(size=len(text), port=0, pieces=1, stride=1000), text, node=3, targets=(4,)),

@@ -38,6 +38,8 @@ from fanet_mw.wire.digest import Digest
 from fanet_mw.wire.inner import Beacon, Join, Schedule, Survivor, TimeBeacon
 from fanet_mw.wire.links import Links
 from fanet_mw.wire.places import Places
+from fanet_mw.wire.search import Found as FoundMessage
+from fanet_mw.wire.search import Search, Status, checked_bids
 from sim.run.input_checks import InputChecks
 
 SLOW_S: Final = 0.5
@@ -97,6 +99,9 @@ def _of_the_air(found: Corpus) -> Iterator[Decoder]:
         _there_and_back(pieces.decode_receipts, lambda m: pieces.encode_receipts(m, node=3)),
         of(wire.RECEIPT.msgid),
     )
+    for kind, spec in ((Search, wire.SEARCH), (Status, wire.STATUS), (FoundMessage, wire.FOUND)):
+        yield Decoder(kind.__name__, _there_and_back(kind.decode_frame, _encode_frame), of(spec.msgid))
+    yield Decoder("Bids", lambda data: checked_bids(wire.decode_first(wire.BIDS, data)), of(wire.BIDS.msgid))
     yield Decoder("Places", Places.decode_frames, of(wire.PLACES.msgid))
     yield Decoder("position", mavlink.kinematics_of, of(mavlink.common.MAVLINK_MSG_ID_GLOBAL_POSITION_INT))
     yield Decoder("collision", mavlink.collision_of, of(mavlink.common.MAVLINK_MSG_ID_COLLISION))

@@ -2,11 +2,12 @@
 
     period:  | contention window | turn 0 | 1 | 2 | ... | L | L+1 | ...    slot s: turns s, s + L, s + 2L, ...
 
-A turn that nobody within two hops claims goes to the node with the highest lot among all within two hops that draw for
-it. Lots are hashes of node, turn and number, so every node knows everyone's; who has more to send draws more often.
-After Bao and Garcia-Luna-Aceves, "A new approach to channel access scheduling for ad hoc networks" (MobiCom 2001).
-Of two nodes that know each other and each other's lots only one can win. A node therefore draws with the least number
-that it has said in its last hellos; until two hops know of a change, it draws less often than the others believe.
+A turn that no node within two hops claims goes to the node with the highest lot among those within two hops that draw
+for it. Lots are hashes of node, turn and number, so every node can compute those of all others; a node that has more to
+send draws more lots. After Bao and Garcia-Luna-Aceves, "A new approach to channel access scheduling for ad hoc
+networks" (MobiCom 2001). Of two nodes that know each other and each other's number of lots only one can win. A node
+therefore draws with the least number that it has stated in its last hellos; until nodes two hops away know of a change,
+it draws less often than they believe.
 """
 
 from collections.abc import Iterable
@@ -28,18 +29,18 @@ class Share(NamedTuple):
 
 
 class Draws(NamedTuple):
-    """All that decides about turns nobody claims."""
+    """All that decides whether a node wins a turn that no node claims."""
 
     node: NodeId
     lots: int
-    """Of ours; 0: we do not draw."""
+    """The number of lots that this node draws per turn; 0 when it draws none."""
     taken: tuple[Share, ...]
-    """The claims of all within two hops, but ours."""
+    """The claims of all other nodes within two hops."""
     rivals: tuple[tuple[NodeId, int], ...]
-    """Everyone else within two hops, and how many lots they have."""
+    """The other nodes within two hops that draw, with their numbers of lots."""
 
     def wins(self, turn: int, count: int) -> bool:
-        """`turn` within its period, `count` from the swarm's beginning."""
+        """True if this node wins a turn, which is number `turn` of its period and number `count` of all periods."""
         if not self.lots or any(share.has(turn) for share in self.taken):
             return False
         best = max(priority_hash(self.node, count, number) for number in range(self.lots))
@@ -49,9 +50,9 @@ class Draws(NamedTuple):
 def draws(
     node: NodeId, lots: int, claims: Iterable[tuple[NodeId, Share | None]], rivals: Iterable[tuple[NodeId, int]]
 ) -> Draws:
-    """`claims` and `rivals` of all but the node itself. Each rival has the most lots that anyone says it has.
+    """`claims` and `rivals` are those of all other nodes. A rival has the greatest number of lots stated for it.
 
-    To believe that it has too many costs turns, too few a collision.
+    A number that is believed too great costs turns; one that is believed too small costs a collision.
     """
     most: dict[NodeId, int] = {}
     for rival, count in rivals:
@@ -61,17 +62,17 @@ def draws(
 
 
 class OwnTurns:
-    """One node's turns, as far as it knows now."""
+    """One node's own turns, as far as they are known now."""
 
     def __init__(self, turns: Turns) -> None:
         self.turns = turns
         self.share: Share | None = None
         self.draws: Draws | None = None
         self._reserved_ns = -1
-        """A turn that is used already, for a hello."""
+        """The start of a turn that is already taken for a hello; -1 when there is none."""
 
     def next_start_ns(self, *, not_before_ns: int) -> int | None:
-        """The first turn of ours that starts at or after an instant; None without a claim."""
+        """The start of this node's first own turn at or after an instant; None without a claim."""
         if self.share is None or self.share.slot >= self.turns.per_frame:
             return None
         turns = self.turns
@@ -96,7 +97,7 @@ class OwnTurns:
         return self.draws.wins(turn, period * self.turns.per_frame + turn)
 
     def reserve(self, *, not_before_ns: int) -> int | None:
-        """Take the next turn of ours out of what `next_start_ns` gives; one at a time."""
+        """Take the next own turn out of what `next_start_ns` returns; only one turn is taken at a time."""
         self._reserved_ns = -1
         start_ns = self.next_start_ns(not_before_ns=not_before_ns)
         if start_ns is not None:
@@ -104,5 +105,5 @@ class OwnTurns:
         return start_ns
 
     def claimed(self) -> tuple[int, ...]:
-        """The turns of each period that our claim gives us."""
+        """The turns of each period that the claim gives to this node."""
         return () if self.share is None else tuple(range(self.share.slot, self.turns.per_frame, self.share.length))

@@ -1,8 +1,8 @@
 """The way to a head: hop counts grow from each head outwards, carried by hellos, kept fresh by the head's sequence.
 
-As in DSDV, a route carries the head's own sequence number: newer beats shorter, equal needs fewer hops, so an old
-route can never be chosen through a node that depends on it. A node without a head (the leader), or whose own cluster
-has no way to it, joins the way of a neighbor to another head: the packet reaches some head rather than none.
+As in DSDV, a route carries the head's own sequence number: newer prevails over shorter, and of equally new routes the
+shorter prevails, so an old route is never chosen through a node that depends on it. A node without a head (the leader),
+or without a way to its own head, joins a neighbor's way to another head, so that the packet reaches some head at least.
 """
 
 from typing import Final, NamedTuple
@@ -13,9 +13,9 @@ from fanet_mw.units import NodeId
 UNREACHABLE: Final = 255
 _NO_HEAD: Final = NodeId(0)
 _STALE: Final = 4
-"""A route is given up when the head's sequence has not advanced for this many hello intervals."""
+"""The number of hello intervals without a new sequence number of the head after which a route is given up."""
 _FORGET: Final = 4
-"""After this many times as long nobody talks of a dead head any more: who does so then has started again, from 0."""
+"""After this many times as long no node states a dead head any more: a head stated then has restarted, from 0."""
 
 
 class Route(NamedTuple):
@@ -26,7 +26,7 @@ class Route(NamedTuple):
     hops: int
     parent: NodeId
     fresh_ns: int
-    """When the head's sequence last advanced."""
+    """When the head's sequence number last advanced."""
 
 
 def newer(a: int, b: int) -> bool:
@@ -35,7 +35,7 @@ def newer(a: int, b: int) -> bool:
 
 
 class Gradient:
-    """One node's route to a head."""
+    """The route of one node to a head."""
 
     def __init__(self, *, node: NodeId, neighbors: Neighbors, hello_ns: int) -> None:
         self._node = node
@@ -45,26 +45,26 @@ class Gradient:
         self._seq = 0
         self._route: Route | None = None
         self._news: dict[int, tuple[int, int]] = {}
-        """The newest sequence heard of each head, and when: who still talks of a dead one has no news."""
+        """The newest sequence number of each head, and since when; a node that states a dead head brings no news."""
 
     def join(self, head: NodeId, *, now_ns: int) -> None:
-        """The schedule gave us this head (perhaps ourselves); any route to another one is only second best now."""
+        """Follow the head that the schedule gives, perhaps this node itself; a route to another is second best now."""
         if head == self._own_head:
             return
         self._own_head = head
         self._route = Route(head, self._seq, 0, self._node, now_ns) if head == self._node else None
 
     def advance(self, now_ns: int) -> None:
-        """A head's next sequence number, once per hello."""
+        """Advance the head's own sequence number, once per hello."""
         if self._own_head == self._node:
             self._seq = (self._seq + 1) & 0xFFFF
             self._route = Route(self._node, self._seq, 0, self._node, now_ns)
 
     def hear(self, neighbor: Neighbor, *, now_ns: int) -> None:
-        """A hello may bring a better route."""
+        """Take in a neighbor's hello, which may bring a better route."""
         beacon = neighbor.beacon
         if self._own_head == self._node:
-            return  # we are one
+            return  # this node is a head itself
         route = self.route(now_ns=now_ns)
         if beacon.hops_to_head >= UNREACHABLE - 1 or beacon.head == _NO_HEAD:
             if route is not None and route.parent == neighbor.node:
@@ -78,7 +78,7 @@ class Gradient:
             self._route = offered
 
     def _heard(self, head: int, seq: int, now_ns: int) -> int:
-        """Since when we know a head's sequence to be at least this; the same news by another way is not fresher."""
+        """Since when a head's sequence is known to be at least this; the same news by another way is not fresher."""
         known = self._news.get(head)
         forgotten = known is None or known[1] + _FORGET * self._stale_ns < now_ns
         if known is None or forgotten or newer(seq, known[0]):
@@ -90,32 +90,32 @@ class Gradient:
         if offered.head != route.head:
             return offered.head == self._own_head
         if newer(offered.head_seq, route.head_seq):
-            # The parent may just not have said it yet: one step newer by a longer way is no reason to turn.
+            # The parent may only be late to state it: one step newer by a longer way is no reason to switch.
             one_step = (offered.head_seq - route.head_seq) & 0xFFFF == 1
             return offered.parent == route.parent or offered.hops <= route.hops or not one_step
         return offered.head_seq == route.head_seq and offered.hops < route.hops
 
     def news_ns(self, head: NodeId) -> int | None:
-        """When this head's sequence last advanced in the hellos we hear; None: never."""
+        """When this head's sequence last advanced in received hellos; None when it never did."""
         known = self._news.get(head)
         return None if known is None else known[1]
 
     def flooded(self, head: NodeId, *, parent: NodeId, hops: int, now_ns: int) -> None:
-        """A flood from our head came this way: the way back serves until hellos bring a route to it."""
+        """Take a flood from the head as a route back, until hellos bring a route."""
         route = self.route(now_ns=now_ns)
         if hops >= UNREACHABLE - 1:
-            return  # farther than a hello can say
+            return  # the head is farther than a hello can state
         if head == self._own_head != self._node and (route is None or route.head != head):
             self._route = Route(head, 0, hops, parent, now_ns)
 
     def lose(self, neighbor: NodeId) -> None:
-        """The link to a neighbor failed."""
+        """Drop a neighbor to which the link has failed."""
         self._neighbors.forget(neighbor)
         if self._route is not None and self._route.parent == neighbor:
             self._route = None
 
     def route(self, *, now_ns: int) -> Route | None:
-        """The current route, unless its news has gone stale."""
+        """The current route; None when there is none or its news is stale."""
         route = self._route
         if route is not None and route.parent != self._node and route.fresh_ns + self._stale_ns < now_ns:
             self._route = route = None

@@ -1,11 +1,11 @@
-"""Anti-entropy: a neighbor's hello says what it holds; what it lacks and we hold, one of us sends once more.
+"""Anti-entropy: a neighbor's hello states what it holds; of the nodes that hold what it lacks, one sends it once more.
 
-    hello with digest -> packets it lacks -> after U(0, assessment), unless somebody else sent it -> flooded again
+    hello with digest -> packets it lacks -> after U(0, assessment), unless another node has sent it -> flooded again
 
-Packets wait in a bounded store, so that a swarm that was in parts for a while becomes one again in what it knows. A
-packet is repaired only when its own flood should be long over. After the idea of epidemic routing (Vahdat and Becker,
-2000) and of Trickle's suppression (RFC 6206). What is lost for more than `window_s`, or is more than 32 packets of its
-origin behind, stays lost.
+Packets wait in a bounded store, so that a swarm that was in parts for a while gets to know what each part knew. A
+packet is repaired only when its own flood should be long over. After epidemic routing (Vahdat and Becker, 2000) and
+Trickle's suppression (RFC 6206). What is lost for more than `window_s`, or is more than 32 packets of its origin
+behind, stays lost.
 """
 
 import heapq
@@ -20,17 +20,17 @@ from fanet_mw.units import MS, US
 from fanet_mw.wire.digest import CAPACITY, Digest, Holding
 
 _ASSESS_NS: Final = 200 * MS
-"""Those who could repair the same packet wait for this long at most, so that mostly one does."""
+"""The nodes that could repair the same packet wait for a random time up to this, so that mostly only one does."""
 _FLOOD_OVER_NS: Final = 500 * MS
-"""A flood that was heard is over everywhere after this."""
+"""The time after which a flood that was heard is over everywhere."""
 RIPE_NS: Final = _FLOOD_OVER_NS + _ASSESS_NS
-"""So long after a flood somebody sends what a hello shows to be missing, at the latest."""
+"""The time after a flood within which some node sends what a hello shows to be missing."""
 _AGAIN_NS: Final = 900 * MS
-"""The same node repairs the same packet again only after the neighbor had a hello to say that it still lacks it."""
+"""The time after which a node repairs the same packet again: the neighbor has had a hello to state that it lacks it."""
 _PER_HELLO: Final = 32
-"""Packets sent for one hello at most: 35 ms of airtime at 11 Mb/s and 1024 B."""
+"""The most packets sent for one hello: 35 ms of airtime at 11 Mb/s and 1024 B."""
 _MOST_ORIGINS: Final = 4 * CAPACITY
-"""A hello holds this many holdings: four messages, 1028 bytes. Larger swarms tell them in turns."""
+"""The most holdings in one hello: four messages, 1028 bytes. Larger swarms state them in turns."""
 
 
 class _Kept(NamedTuple):
@@ -38,11 +38,11 @@ class _Kept(NamedTuple):
 
     packet: Packet
     ripe_ns: int
-    """Not repaired before."""
+    """The instant before which the packet is not repaired."""
 
 
 class Repair:
-    """One node's store and its repairs."""
+    """The store of one node, and its repairs."""
 
     def __init__(self, *, window_ns: int, capacity: int, random: Callable[[], float]) -> None:
         self._window_ns = window_ns
@@ -50,11 +50,11 @@ class Repair:
         self._random = random
         self._holdings: dict[int, Holding] = {}
         self._store: dict[int, _Kept] = {}
-        """By key."""
+        """The packets kept, by key."""
         self._order: deque[int] = deque()
-        """Keys of the store, oldest first."""
+        """The keys of the store, oldest first."""
         self._stored: dict[int, int] = {}
-        """How many packets of each origin are in the store."""
+        """The number of packets of each origin in the store."""
         self._pending: dict[int, int] = {}
         """When each packet is to be sent, by key."""
         self._due: list[tuple[int, int]] = []
@@ -64,7 +64,7 @@ class Repair:
     # --- what we hold ---------------------------------------------------------------------------------------------
 
     def hold(self, packet: Packet, *, flooded: bool, expect_ns: int, now_ns: int) -> None:
-        """A data packet came by, or is our own; it should have been flooded by `expect_ns` if it was not yet."""
+        """Keep a data packet that came by, or an own one; one not yet flooded should have been by `expect_ns`."""
         header = packet.header
         key = key_of(origin=header.origin, seq=header.seq)
         holding = self._holdings.get(header.origin)

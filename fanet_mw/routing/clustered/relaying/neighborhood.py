@@ -1,7 +1,7 @@
-"""What hellos say of our two hops: who is there, who hears whom, and whether that makes us a relay.
+"""Two-hop knowledge from hellos: the nodes within two hops, their links, and whether this node must relay.
 
-A link counts when both ends say so. What is known is as old as the hellos: a node that moves may for some hello
-intervals believe another to relay in its place, and then nobody does (`clusters.repair_s` heals it).
+A link counts when both ends state it. The knowledge is as old as the hellos: for some hello intervals a node that moves
+may believe that another one relays in its place when none does (`clusters.repair_s` mends that).
 """
 
 from collections.abc import Callable
@@ -19,22 +19,22 @@ class _Entry(NamedTuple):
 
 
 class Neighborhood:
-    """One node's two-hop knowledge."""
+    """The two-hop knowledge of one node."""
 
     def __init__(
         self, node: NodeId, *, lifetime_ns: int, rank: Callable[[NodeId, SlotStatus], float] = lambda _, __: 0.0
     ) -> None:
-        """`rank`: which neighbors are to relay rather than others."""
+        """`rank` says which neighbors are to relay rather than others."""
         self._node = node
         self._lifetime_ns = lifetime_ns
         self._rank = rank
         self._entries: dict[NodeId, _Entry] = {}
         self._relays: tuple[NodeId, ...] = ()
         self._belongs: bool | None = None
-        """Whether we dominate, as long as nothing has changed."""
+        """Whether this node is a relay of the dominating set; None when it must be computed anew."""
 
     def hear(self, claims: Claims, *, now_ns: int) -> bool:
-        """A neighbor's hello; True when it says something new."""
+        """Take in a neighbor's claims; True if they say something new."""
         if claims.node == self._node:
             return False
         known = self._entries.get(claims.node)
@@ -44,7 +44,7 @@ class Neighborhood:
         return known is None or known.claims != claims
 
     def alive(self, *, now_ns: int) -> list[Claims]:
-        """What each neighbor said last, by id, without those that have fallen silent."""
+        """The last claims of each neighbor, by id, without neighbors that have fallen silent."""
         horizon_ns = now_ns - self._lifetime_ns
         if any(entry.heard_ns < horizon_ns for entry in self._entries.values()):
             self._entries = {n: entry for n, entry in self._entries.items() if entry.heard_ns >= horizon_ns}
@@ -52,7 +52,7 @@ class Neighborhood:
         return [self._entries[node].claims for node in sorted(self._entries)]
 
     def adjacency(self, *, now_ns: int) -> dict[NodeId, tuple[NodeId, ...]]:
-        """The links that work both ways, of ourselves and of each neighbor."""
+        """The links that work both ways, of this node and of each neighbor."""
         both = [claims for claims in self.alive(now_ns=now_ns) if any(h.node == self._node for h in claims.heard)]
         found = {self._node: tuple(claims.node for claims in both)}
         for claims in both:
@@ -61,7 +61,7 @@ class Neighborhood:
         return found
 
     def dominates(self, *, own_rank: float, now_ns: int) -> bool:
-        """Whether a flood needs us as a relay, whoever began it."""
+        """True if floods need this node as a relay, whichever node began them."""
         alive = self.alive(now_ns=now_ns)
         if self._belongs is None:
             rank = {h.node: self._rank(h.node, h.standing) for claims in alive for h in claims.heard}
@@ -71,27 +71,27 @@ class Neighborhood:
         return self._belongs
 
     def forget_rank(self) -> None:
-        """Ranks have changed: ask again."""
+        """Compute anew whether this node relays, because ranks have changed."""
         self._belongs = None
 
     def standings(self, *, now_ns: int) -> list[tuple[NodeId, SlotStatus]]:
-        """What is said of everyone within two hops: by itself, if it is a neighbor; by all that hear it, if not."""
+        """The slot status of every node within two hops: its own statement, or those of all neighbors that hear it."""
         alive = self.alive(now_ns=now_ns)
         known = frozenset(claims.node for claims in alive) | {self._node}
         others = [(h.node, h.standing) for claims in alive for h in claims.heard if h.node not in known]
         return [(claims.node, claims.own) for claims in alive] + others
 
     def chosen_by(self, neighbor: NodeId) -> bool:
-        """Whether that neighbor's last hello names us as one of its multipoint relays."""
+        """True if that neighbor's last hello names this node as one of its multipoint relays."""
         entry = self._entries.get(neighbor)
         return entry is not None and any(h.relay for h in entry.claims.heard if h.node == self._node)
 
     def choose_relays(self, *, now_ns: int) -> None:
-        """Our own multipoint relays, for the hello."""
+        """Choose this node's multipoint relays, for its hello."""
         self._relays = multipoint_relays(self._node, self.adjacency(now_ns=now_ns))
 
     def heard(self, *, now_ns: int) -> tuple[HeardNeighbor, ...]:
-        """What our hello says of our neighbors."""
+        """What this node's hello states about its neighbors."""
         return tuple(
             HeardNeighbor(
                 claims.node,
@@ -104,5 +104,5 @@ class Neighborhood:
 
 
 def _matters(claims: Claims) -> tuple[object, ...]:
-    """What a hello says that may make or unmake a relay of us."""
+    """The part of a neighbor's claims on which it depends whether this node relays."""
     return claims.own.slot is None, tuple((h.node, h.hears_us, h.standing.slot is None) for h in claims.heard)

@@ -1,10 +1,10 @@
-"""Finds the events that change a node's part in the swarm, and takes the rows of `states.TRANSITIONS` for them.
+"""Finds the events that change a node's state, and takes the rows of `states.TRANSITIONS` for them.
 
     announcements, stand-ins, signs of life, instants -> events -> table -> actions, which `assigned.py` carries out
 
-A head is silent when nothing that it generated, and no newer sequence of it in the hellos, has come for four hello
-intervals, or for two after the MAC gave it up. The first in the succession then stands in for it, the next
-ones half an interval later each. Only who had news of the head before judges it: others merely never were near it.
+A head is silent when no packet that it generated, and no newer sequence number of it in hellos, has come for four hello
+intervals, or for two after the MAC gave it up. The first member in the succession then stands in for it, each further
+one half an interval later. Only members that have had news of the head judge it: others may never have been near it.
 """
 
 from typing import Final
@@ -18,16 +18,16 @@ from fanet_mw.units import MS, NodeId
 from fanet_mw.wire.inner import Join, Schedule
 
 SILENT_HELLOS: Final = 4.0
-"""Of a head, or of any neighbor in a timetable (`silence.py`)."""
+"""The number of hello intervals after which a head, or any neighbor in a timetable, counts as silent."""
 _GIVEN_UP_HELLOS: Final = 2.0
 _TURN_HELLOS: Final = 0.5
 _AGAIN_HELLOS: Final = 2.0
-"""Who stands in says so again at this interval, until a new schedule confirms it or the head objects."""
+"""How many hellos apart a stand-in announces itself, until a new schedule confirms it or the head objects."""
 _OBJECT_NS: Final = 500 * MS
 
 
 class Upkeep:
-    """One node's part in the swarm."""
+    """The state of one node in the swarm, and the events that change it."""
 
     def __init__(
         self,
@@ -40,10 +40,10 @@ class Upkeep:
         hello_ns: int,
         takes_slot: bool,
     ) -> None:
-        """`takes_slot`: who stands in for a head serves its slot; else it only tells the leader."""
+        """With `takes_slot` a stand-in serves the slot of the silent head; otherwise it only informs the leader."""
         self.state = State.SEEKING
         self.silent_head = NodeId(0)
-        """Whom we stand in for, while we do."""
+        """The head that this node stands in for, while it does."""
         self._takes_slot = takes_slot
         self._node = node
         self._membership = membership
@@ -52,7 +52,7 @@ class Upkeep:
         self._lease = lease
         self._hello_ns = hello_ns
         self._since_ns = 0
-        """Since when we follow the head that we follow."""
+        """When this node began to follow its present head."""
         self._named = NodeId(0)
         self._given_up_ns = -1
         self._object_ns = 0
@@ -66,26 +66,26 @@ class Upkeep:
 
     @property
     def placed(self) -> bool:
-        """Whether the leader that we obey has given us a place."""
+        """True if the leader that this node follows has assigned it to a cluster."""
         version = self._membership.version
         return self._membership.assigned and version is not None and version.authority == self._lease.authority
 
-    # --- what the air brings --------------------------------------------------------------------------------------
+    # --- receiving ------------------------------------------------------------------------------------------------
 
     def announced(self, schedule: Schedule, *, guard_ns: int, born_ns: int, now_ns: int) -> list[Action]:
-        """A leader's announcement, first copy or ours."""
+        """Handle a leader's announcement: the first copy, or this node's own."""
         authority, leads = Authority(schedule.term, schedule.leader), self.state is State.LEADING
         own = self._lease.authority
         if schedule.leader == self._node:
             if not leads or authority != own:
-                return []  # from before we started again, or stepped down
+                return []  # the announcement is from before a restart, or from before this node stepped down
         elif leads and own is not None and authority > own:
-            return []  # a junior one: it will hear us
+            return []  # the other leader is junior, and will receive this node's announcements
         actions = []
         if not leads or authority != own:
             prevails = own != authority
             if leads:
-                self._lease.authority = None  # the senior prevails over what we are
+                self._lease.authority = None  # the senior leader prevails over this node's own office
             if not self._lease.accept(authority, born_ns=born_ns, now_ns=now_ns):
                 self._lease.authority = own
                 return []
@@ -99,13 +99,13 @@ class Upkeep:
         return actions
 
     def stands_in(self, join: Join, *, born_ns: int, now_ns: int) -> list[Action]:
-        """A node says that it stands in for the head of a cluster; in a timetable, that some node is silent."""
+        """Handle a node's statement that it stands in for a head; in a timetable, that some node is silent."""
         member = self._membership
         if not self._takes_slot and (join.instead_of == self._node or join.instead_of != member.head):
             return self._object(join, now_ns)
         rank, current = member.rank(join.node), member.rank(member.head)
         if not rank or current is None or self.state is State.LEADING or join.node == join.instead_of:
-            return []  # of another cluster, or another epoch, or a head that objects
+            return []  # it is of another cluster or epoch, or it is a head that objects
         if self.state is State.HEAD:
             return [self._take(Event.HEAD_REPLACED, now_ns)]
         sign_ns = self._signs.last_ns(member.head) or 0
@@ -116,7 +116,7 @@ class Upkeep:
         return [self._take(Event.HEAD_REPLACED, now_ns)]
 
     def _object(self, join: Join, now_ns: int) -> list[Action]:
-        """Are we said to be silent? Said often, it is answered seldom: each answer is a flood."""
+        """Object if this node is said to be silent; not too often, because each objection is a flood."""
         called = join.instead_of == self._node != join.node
         if not called or now_ns < self._object_ns or self.state in (State.SEEKING, State.LEADING):
             return []
@@ -124,7 +124,7 @@ class Upkeep:
         return [self._take(Event.SAID_SILENT, now_ns)]
 
     def lives(self, node: int, *, born_ns: int, now_ns: int) -> list[Action]:
-        """A sign of life."""
+        """Handle a sign of life of a node."""
         self._signs.heard(node, born_ns=born_ns)
         member = self._membership
         if node != member.named_head or born_ns <= self._since_ns:
@@ -133,7 +133,7 @@ class Upkeep:
         return [self._take(Event.HEAD_BACK, now_ns)] if replaced else []
 
     def given_up(self, node: NodeId, *, now_ns: int) -> None:
-        """The MAC could not reach this neighbor."""
+        """Note that the MAC could not reach this neighbor."""
         if node == self._membership.head and self.state is State.MEMBER:
             self._given_up_ns = now_ns
             self._watch_ns = now_ns
@@ -160,7 +160,7 @@ class Upkeep:
         return self._judge(now_ns)
 
     def _judge(self, now_ns: int) -> list[Action]:
-        """Whether it is our turn to stand in for the head."""
+        """Stand in for the head if it is silent and this node is next in the succession."""
         member = self._membership
         rank, current = member.rank(self._node), member.rank(member.head)
         if self.state is not State.MEMBER or not rank or current is None or rank <= current:
@@ -169,7 +169,7 @@ class Upkeep:
         news_ns = self._gradient.news_ns(member.head)
         if news_ns is None or news_ns < self._since_ns:
             self._watch_ns = now_ns + self._hello_ns
-            return []  # never near it since we follow it
+            return []  # this node has not been near the head since it follows it
         sign_ns = max(news_ns, self._signs.last_ns(member.head) or 0)
         hellos = _GIVEN_UP_HELLOS if self._given_up_ns > sign_ns else SILENT_HELLOS
         due_ns = sign_ns + int((hellos + (rank - current - 1) * _TURN_HELLOS) * self._hello_ns)
@@ -182,7 +182,7 @@ class Upkeep:
     # --- the table ------------------------------------------------------------------------------------------------
 
     def _take(self, event: Event, now_ns: int) -> Action:
-        """The only place where the state changes."""
+        """Take a row of the table; this is the only place where the state changes."""
         before = self.state
         self.state, action = step(before, event)
         member = self._membership
@@ -196,7 +196,7 @@ class Upkeep:
                 member.follow(self._node)
         if action is Action.FOLLOW:
             if event is not Event.NAMED_MEMBER or self._named != member.named_head:
-                self._since_ns = now_ns  # else what was known of the head still holds
+                self._since_ns = now_ns  # otherwise what was known of the head still holds
             self._named = member.named_head
             self._watch_ns = now_ns + self._hello_ns
         return action

@@ -1,10 +1,10 @@
-"""The leader's part: know where everyone is from joins, divide the nodes into clusters, announce the schedule.
+"""The leader's work: learn from joins where nodes are, divide them into clusters, announce the schedule.
 
     joins -> no more for a moment -> division -> schedule, once per flooding period
-    somebody is new or gone, or what stands has become too bad -> another epoch, at most one per `clusters.reassign_s`
+    a node is new or gone, or the clusters have become too bad -> another epoch, at most one per `clusters.reassign_s`
 
-Joins come in bursts, so an assignment waits until no join has come for a moment. A leader that was elected knows nobody
-yet: it calls, and assigns when all had the time to answer. Positions are carried on by dead reckoning.
+Joins come in bursts, so an assignment waits until no join has come for a moment. An elected leader knows no nodes yet:
+it calls, and assigns when all have had the time to answer. Positions are extrapolated by dead reckoning.
 """
 
 from collections.abc import Mapping, Sequence
@@ -25,41 +25,41 @@ from fanet_mw.wire.inner import CAPACITY, Join, Member, Schedule
 from fanet_mw.wire.links import Link
 
 SETTLE_NS: Final = 700 * MS
-"""Quiet time after the last join before the clusters are computed."""
+"""The quiet time after the last join before the clusters are computed."""
 OBJECTION_NS: Final = 2 * S
-"""A head that somebody stands in for has so long to show that it lives; meanwhile its cluster is served."""
+"""The time in which a head that is said to be silent may object; meanwhile a stand-in serves its cluster."""
 _MISSED_NS: Final = 4 * S
-"""A node was silent for about this long when it is said."""
+"""About this long a node has been silent when that is reported."""
 _SURE: Final = 0.9
-"""Of the range of a link: places are good to a tenth of it."""
+"""The share of the range within which a link is certain, because places are accurate to a tenth of the range."""
 _OBJECTION_PERIODS: Final = 4
-"""And this long with a timetable: the word that it is silent waits for a contention window, its answer for a turn."""
+"""The same with a timetable, in periods: the report waits for a contention window, the objection for a turn."""
 ANSWER_NS: Final = 3500 * MS
-"""Joins that answer a call have come after this: they are spread over 3 s."""
+"""The time after which the joins that answer a call have come: they are spread over 3 s."""
 _FIRST_CALL_NS: Final = 5 * S
-"""The first leader calls only if nobody has joined by then."""
+"""The first leader calls only if no node has joined by then."""
 HEARD_NS: Final = 1500 * MS
-"""An announcement has reached everyone after this."""
+"""The time after which an announcement has reached all nodes."""
 _ANNOUNCEMENTS: Final = 4
-"""Over links that lose frames, an assignment has reached everyone after so many announcements."""
+"""The number of announcements after which an assignment has reached all nodes over links that lose frames."""
 _MOST: Final = 0.9
-"""Of the nodes: when so many have told their links, those are used though some are missing."""
+"""The share of nodes whose links must be known before measured links are used."""
 _DRIFT: Final = 0.03
-"""A timetable is made anew when more than this share of the links has changed."""
+"""The share of links that must have changed before a timetable is made anew."""
 
 
 class _StandIn(NamedTuple):
-    """Who serves a cluster in place of its silent head, or only missed the node."""
+    """The node that serves a cluster in place of its silent head, or that has reported a silent node."""
 
     node: NodeId
     since_ns: int
-    """When we heard of it."""
+    """When the leader learned of it."""
     said_ns: int
-    """When it was said: whoever generated something later lives."""
+    """When it was reported; a node that has generated something later is alive."""
 
 
 class _Assigned(NamedTuple):
-    """What stands."""
+    """The present assignment."""
 
     clusters: Sequence[Cluster] = ()
     places: Mapping[NodeId, Enu] = MappingProxyType({})
@@ -67,7 +67,7 @@ class _Assigned(NamedTuple):
     start_ns: int = 0
     parts: Sequence[Schedule] = ()
     measured: tuple[Link, ...] = ()
-    """The links that everyone computes the timetable from; none: places decide."""
+    """The links from which all nodes compute the timetable; empty when places decide."""
 
     @property
     def nodes(self) -> list[NodeId]:
@@ -75,7 +75,7 @@ class _Assigned(NamedTuple):
 
 
 class Leader:
-    """Computes schedules out of joins."""
+    """Computes schedules from joins."""
 
     def __init__(
         self,
@@ -88,7 +88,7 @@ class Leader:
         elected: bool,
         now_ns: int,
     ) -> None:
-        """`needs_every_link`: a timetable is made out of the assignment, for which more is watched and made anew."""
+        """With `needs_every_link` a timetable is made from the assignment, which then depends on more than clusters."""
         clusters = scenario.clusters
         self._authority = authority
         self._signs = signs
@@ -107,14 +107,14 @@ class Leader:
         self._measured_ns = measured_period_ns(scenario)
         """How often an assignment is announced whose links have been measured: once per superframe."""
         self._outbid = False
-        """Somebody has announced an epoch in our name: ours must be a later one, whatever has changed."""
+        """True if another node has announced an epoch in this leader's name, so that the next epoch must be later."""
         self._assigned = _Assigned()
         self._due_ns = now_ns if elected else now_ns + _FIRST_CALL_NS
         self._announced_ns = now_ns
         self._not_before_ns = now_ns + ANSWER_NS if elected else now_ns
 
     def joined(self, join: Join, *, born_ns: int, now_ns: int) -> None:
-        """A node said where it is, or that it stands in. The leader itself is a member of no cluster (paper, 4.1)."""
+        """Take in a node's place, or that it stands in. The leader is a member of no cluster (paper, 4.1)."""
         node, silent = NodeId(join.node), NodeId(join.instead_of)
         if node == self._authority.leader:
             return
@@ -128,25 +128,25 @@ class Leader:
             self.suspect(silent, node, self._motions[node], now_ns=now_ns)
 
     def measured(self, node: NodeId, links: Sequence[Link]) -> None:
-        """A node, perhaps the leader itself, said how well it hears whom."""
+        """Take in how well a node, perhaps the leader itself, hears its neighbors."""
         if self._links is not None:
             self._links.told(node, links)
 
     def outbid(self, epoch: int, *, now_ns: int) -> None:
-        """A schedule in our name that is not ours: the next epoch comes after it, and soon."""
+        """Handle a schedule in this leader's name that it has not made: announce a later epoch soon."""
         if 0 < ((epoch - self._epoch) & 0xFFFF) < 0x8000 and self._assigned.parts:
             self._epoch, self._outbid = epoch, True
             self._due_ns = min(self._due_ns, now_ns + SETTLE_NS)
 
     def suspect(self, silent: NodeId, by: NodeId, there: Motion, *, now_ns: int) -> None:
-        """A node is said to be silent, by one who says where it is itself: it has a moment to object."""
+        """Note that a node is reported silent by a node whose place is given; it has some time to object."""
         if silent in self._motions and (not self._by_links or self._near(silent, there)):
             known = self._stand_ins.get(silent, _StandIn(by, now_ns, there.at_ns))
             self._stand_ins[silent] = known._replace(node=by)
             self._due_ns = min(self._due_ns, max(known.since_ns + self._objection_ns, now_ns))
 
     def _near(self, node: NodeId, there: Motion) -> bool:
-        """Whether the two should have heard each other all the while: who flew away is not silent, but elsewhere."""
+        """True if the two should have heard each other all the time; a node that has flown away is not silent."""
         known = self._motions[node]
         instants = (there.at_ns - _MISSED_NS, there.at_ns)
         apart = (known.position_at(t_ns).minus(there.position_at(t_ns)).norm() for t_ns in instants)
@@ -156,9 +156,9 @@ class Leader:
         return self._due_ns
 
     def wake(self, here: Motion, *, notice_ns: int = 0, now_ns: int) -> Sequence[Schedule]:
-        """The schedule parts to announce now; `here`: the leader itself.
+        """The parts of the schedule to announce now; `here` is the place of the leader itself.
 
-        New ones come into force `notice_ns` after this at the soonest, and not before all should have heard of them.
+        New parts come into force `notice_ns` later at the earliest, and not before all nodes should have received them.
         """
         if now_ns < self._due_ns:
             return []
@@ -172,18 +172,18 @@ class Leader:
         return self._assigned.parts or [self._call(now_ns)]
 
     def _call(self, now_ns: int) -> Schedule:
-        """Nobody is assigned yet: who hears this joins."""
+        """A call to join, while no node is assigned."""
         period_us = self._period_ns // US
         term, leader = self._authority
         return Schedule(now_ns // US, period_us, period_us, 0, leader, 1, 0, 1, (), term)
 
     def _forget(self, now_ns: int) -> None:
-        """Nodes of which there was no sign for long, and heads that somebody stands in for, unless they live."""
+        """Forget nodes without a sign of life for long, and reported nodes that have not objected in time."""
         for node in sorted(self._motions):
             last_ns = max(self._signs.last_ns(node) or 0, self._motions[node].at_ns)
             stand_in = self._stand_ins.get(node)
             if stand_in is not None and last_ns > stand_in.said_ns:
-                del self._stand_ins[node]  # it objected
+                del self._stand_ins[node]  # the node has objected
                 stand_in = None
             if now_ns - last_ns > LOST_NS or (
                 stand_in is not None and now_ns >= stand_in.since_ns + self._objection_ns
@@ -191,7 +191,7 @@ class Leader:
                 del self._motions[node]
 
     def _renew(self, here: Motion, notice_ns: int, now_ns: int) -> None:
-        """Another epoch, if there is a reason."""
+        """Make another epoch, if there is a reason."""
         before = self._assigned
         changed = self._outbid or sorted(self._motions) != sorted(before.nodes)
         rests = not self._reassign_ns or self._stand_ins or now_ns < before.start_ns + self._reassign_ns
@@ -200,7 +200,7 @@ class Leader:
             return
         measured_ns = _ANNOUNCEMENTS * self._measured_ns if before.measured else 0
         notice_ns = max(HEARD_NS, notice_ns, measured_ns)
-        decided_ns = max(now_ns, self._announced_ns + self._period_ns)  # who heard the last one expects no news before
+        decided_ns = max(now_ns, self._announced_ns + self._period_ns)  # nodes expect no news within a period
         start_ns = (decided_ns + notice_ns) // self._period_ns * self._period_ns + self._period_ns
         places = self._places(here, start_ns)
         members = {node: place for node, place in places.items() if node != self._authority.leader}
@@ -222,7 +222,7 @@ class Leader:
         self._assigned = _Assigned(ordered, places, links, start_ns, self._parts(ordered, start_ns), measured)
 
     def _measured(self) -> tuple[Link, ...]:
-        """The links to plan with; none until most nodes have told theirs: of the rest their neighbors know."""
+        """The links to plan with; empty until most nodes have reported theirs: neighbors know the links of the rest."""
         if self._links is None:
             return ()
         nodes = [*self._motions, NodeId(self._authority.leader)]
@@ -230,7 +230,7 @@ class Leader:
         return self._links.between(nodes) if known else ()
 
     def _places(self, here: Motion, start_ns: int) -> dict[NodeId, Enu]:
-        """Where everyone will be in the middle of the time for which the assignment is made."""
+        """The places of all nodes in the middle of the time for which the assignment is made."""
         t_ns = start_ns + self._reassign_ns // 2
         motions = self._motions | {NodeId(self._authority.leader): here}
         return {node: motions[node].position_at(t_ns) for node in sorted(motions)}
@@ -239,7 +239,7 @@ class Leader:
         return {node: self._motions[node].velocity for node in sorted(self._motions)}
 
     def _parts(self, clusters: list[Cluster], start_ns: int) -> list[Schedule]:
-        """The schedule; its superframes begin when all should have heard of it."""
+        """The parts of the schedule; its superframes begin when all nodes should have received it."""
         members = [
             Member(node, index, node == cluster.head)
             for index, cluster in enumerate(clusters)
@@ -273,5 +273,5 @@ class Leader:
         return self._epoch
 
     def place(self, node: int) -> Enu:
-        """Where a member, or the leader itself, was taken to be for the assignment that is announced."""
+        """The place that the announced assignment assumes for a member, or for the leader itself."""
         return self._assigned.places[NodeId(node)]

@@ -1,10 +1,10 @@
-"""Whom a node obeys: one leader, as long as its announcements keep coming; and when the node itself must stand.
+"""Which leader a node follows as long as its announcements keep coming, and when the node itself takes office.
 
 Authorities are ordered: the lower term (the swarm second in which the leader took office) prevails, then the lower id.
 So when two parts of a swarm meet, the leader longest in office stays, whichever part is larger; a node that was cut
-off for a while and elected itself never deposes the leader of all others; and one that starts again is junior.
+off for a while and elected itself never deposes the leader of all others; and a restarted node is junior.
 
-    announced -> ... silent for `silence_ns` -> the lowest live id stands at once, others up to 3 s later -> call
+    announced -> ... silent for `silence_ns` -> the lowest live id takes office at once, others up to 3 s later -> call
 """
 
 from typing import Final, NamedTuple
@@ -15,27 +15,27 @@ from fanet_mw.units import NodeId, S
 _PERIODS: Final = 4
 _LEAST_NS: Final = 4 * S
 _FIRST_NS: Final = 8 * S
-"""At its start a node waits this long for a leader: joins take 3 s, their assignment another 2 s."""
+"""How long a node waits for a leader at its start: joins take 3 s, and their assignment another 2 s."""
 _TURN_NS: Final = 1 * S
-"""How long the next one waits for a node with a lower id to stand."""
+"""How long a node waits for each node with a lower id to take office first."""
 _TURNS: Final = 3
 _FOREVER_NS: Final = 1 << 62
 
 
 def silence_ns(period_ns: int) -> int:
-    """A leader is given up when its newest announcement is this old: four superframes, at least 4 s."""
+    """The age of the newest announcement at which a leader is given up: four superframes, at least 4 s."""
     return max(_PERIODS * period_ns, _LEAST_NS)
 
 
 class Authority(NamedTuple):
-    """A leader in office; the lesser prevails, as tuples are compared."""
+    """A leader in office; of two authorities the lesser prevails, compared as tuples."""
 
     term: int
     leader: int
 
 
 class Lease:
-    """One node's obedience."""
+    """One node's allegiance to a leader."""
 
     def __init__(self, node: NodeId, *, period_ns: int, signs: Signs) -> None:
         self._node = node
@@ -46,27 +46,29 @@ class Lease:
         self._stand_ns = 0
 
     def start(self, now_ns: int) -> None:
-        """Nobody has been heard yet."""
+        """Begin to wait for a leader, because none has been heard yet."""
         self._until_ns = self._stand_ns = now_ns + _FIRST_NS + self._silence_ns
 
     @property
     def leads(self) -> bool:
-        """Whether the node obeys itself: it is the leader."""
+        """True if this node is the leader itself."""
         return self.authority is not None and self.authority.leader == self._node
 
     def valid(self, now_ns: int) -> bool:
-        """Whether the leader has been heard of lately."""
+        """True while the leader's newest announcement is not older than the silence limit."""
         return self.authority is not None and now_ns <= self._until_ns
 
     def fresh(self, now_ns: int) -> bool:
-        """Whether it was heard of so lately that nobody need worry: who cannot say so asks its neighbors, in time."""
+        """True while the newest announcement is younger than half the silence limit. A node for which this is False
+        asks its neighbors, so that one lost announcement does not let the limit pass.
+        """
         return self.authority is not None and now_ns <= self._until_ns - self._silence_ns // 2
 
     def accept(self, authority: Authority, *, born_ns: int, now_ns: int) -> bool:
-        """Whether to obey an announcement that was made at `born_ns`; if so, its authority holds from now on."""
+        """Consider an announcement made at `born_ns`; True if it is accepted, and its authority holds from now on."""
         until_ns = born_ns + self._silence_ns
         if until_ns < now_ns:
-            return False  # old news of one who may be dead
+            return False  # the announcement is so old that its leader may be dead
         if self.authority is not None and authority > self.authority and self.valid(now_ns):
             return False
         self._until_ns = max(until_ns, self._until_ns if authority == self.authority else 0)
@@ -75,7 +77,7 @@ class Lease:
         return True
 
     def take_office(self, now_ns: int) -> Authority:
-        """We lead from now on."""
+        """Become the leader from now on."""
         self.authority = Authority(now_ns // S, self._node)
         self._until_ns = _FOREVER_NS
         return self.authority
@@ -84,7 +86,7 @@ class Lease:
         return self._stand_ns
 
     def must_stand(self, now_ns: int) -> bool:
-        """Whether nobody else will: the leader is silent, and no node with a lower id has stood in its turn."""
+        """True if this node must take office: the leader is silent, and no node with a lower id has done so in time."""
         if now_ns < self._stand_ns:
             return False
         lower = self._signs.alive_below(self._node, since_ns=now_ns - self._silence_ns)

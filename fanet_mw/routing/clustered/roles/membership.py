@@ -1,7 +1,7 @@
-"""Which cluster a node belongs to, as the newest schedule says. All parts of an epoch count, in any order.
+"""The cluster to which a node belongs, by the newest schedule. All parts of an epoch count, in any order.
 
-A schedule lists the members of a cluster in the order in which they stand in for each other, the head first. Whoever
-is in no part of a complete schedule has no role.
+A schedule lists the members of a cluster in the order in which they stand in for each other, the head first. A node
+that is in no part of a complete schedule has no role.
 """
 
 from collections.abc import Mapping
@@ -16,7 +16,7 @@ from fanet_mw.wire.inner import Member, Role, Schedule
 
 
 class Standing(NamedTuple):
-    """A node's place in its cluster; head 0: none."""
+    """A node's place in its cluster; head 0 means none."""
 
     role: Role = Role.ISOLATED
     cluster: int = 0
@@ -27,7 +27,7 @@ class Standing(NamedTuple):
 
 
 class Version(NamedTuple):
-    """Names one assignment."""
+    """The name of one assignment."""
 
     authority: Authority
     epoch: int
@@ -37,7 +37,7 @@ _NOWHERE = Standing()
 
 
 class Membership:
-    """One node's view of the schedule."""
+    """What one node knows of the schedule."""
 
     def __init__(self, node: NodeId) -> None:
         self._node = node
@@ -45,12 +45,12 @@ class Membership:
         self.standing = _NOWHERE
         self.superframe: Superframe | None = None
         self.succession: tuple[NodeId, ...] = ()
-        """Our cluster, the head first, then those who stand in for it."""
+        """The members of this node's cluster: the head first, then the nodes that stand in for it in this order."""
         self._parts: dict[int, Schedule] = {}
         self._named: Standing | None = None
-        """The role that a schedule gave us last; it holds until all parts of a newer one that concern us have come."""
+        """The last role that a schedule gave; it holds until all relevant parts of a newer schedule have come."""
         self._told = False
-        """Whether this version has said what we are."""
+        """True if this version has given the node's role."""
 
     @property
     def epoch(self) -> int:
@@ -66,7 +66,7 @@ class Membership:
 
     @property
     def head(self) -> NodeId:
-        """Who serves our cluster now: the one named, or the one who stands in for it."""
+        """The node that serves this node's cluster now: the named head, or the node that stands in for it."""
         return self.standing.head
 
     @property
@@ -79,17 +79,17 @@ class Membership:
 
     @property
     def slot(self) -> int:
-        """Head of cluster k owns slot k."""
+        """The slot of the cluster; the head of cluster k owns slot k."""
         return self.cluster
 
     @property
     def parts(self) -> int:
-        """How many parts of this version have come."""
+        """The number of parts of this version that have come."""
         return len(self._parts)
 
     @property
     def named_head(self) -> NodeId:
-        """The head that the schedule names; 0: none known."""
+        """The head that the schedule names; 0 when none is known."""
         return self.succession[0] if self.succession else NodeId(0)
 
     @property
@@ -97,11 +97,11 @@ class Membership:
         return sum(len(part.members) for part in self._parts.values())
 
     def lists(self, node: int) -> bool:
-        """Whether the schedule names this node."""
+        """True if the schedule names this node."""
         return any(member.node == node for part in self._parts.values() for member in part.members)
 
     def clusters(self) -> Mapping[NodeId, tuple[NodeId, ...]]:
-        """By head, the nodes of each cluster that the schedule names, the head first."""
+        """The nodes of each cluster that the schedule names, by head; the head is also the first of them."""
         found: dict[int, list[Member]] = {}
         for part in sorted(self._parts):
             for member in self._parts[part].members:
@@ -110,15 +110,15 @@ class Membership:
         return {NodeId(m[0].node): tuple(NodeId(one.node) for one in m) for m in in_order if m[0].is_head}
 
     def rank(self, node: int) -> int | None:
-        """The node's place in the succession of our cluster."""
+        """The node's place in the succession of this node's cluster; None when it is not in it."""
         return self.succession.index(NodeId(node)) if node in self.succession else None
 
     def learn(self, schedule: Schedule, *, guard_ns: int) -> Event | None:
-        """Take in one part; returns what it says of us, once per version: the role itself is taken by `obey`."""
+        """Take in one part; returns the role that it gives, once per version; `obey` then takes the role."""
         version = Version(Authority(schedule.term, schedule.leader), schedule.epoch)
         if version != self.version:
             if self.version and version.authority == self.version.authority and not newer(version, self.version):
-                return None  # an older epoch, still on its way
+                return None  # the part is of an older epoch, and was still on its way
             self.version = version
             self._parts = {}
             self._told = False
@@ -135,7 +135,7 @@ class Membership:
         own = [member for member in members if member.cluster == mine.cluster]
         head = next((NodeId(m.node) for m in own if m.is_head), None)
         if head is None:
-            return None  # in a part that has not come yet
+            return None  # the head is in a part that has not come yet
         slot_ns = schedule.slot_us * US
         self.superframe = Superframe(
             schedule.start_us * US, schedule.period_us * US, slot_ns, min(guard_ns, max(0, slot_ns - 1))
@@ -146,20 +146,20 @@ class Membership:
         return None if known else Event.NAMED_HEAD if mine.is_head else Event.NAMED_MEMBER
 
     def obey(self) -> None:
-        """Take the role that the schedule gives us."""
+        """Take the role that the schedule gives to this node."""
         assert self._named is not None, "only who has been named has a role to take"
         self.standing = self._named
 
     def follow(self, head: NodeId) -> None:
-        """Another member serves our cluster, perhaps ourselves."""
+        """Note that another member, or this node itself, serves the cluster now."""
         self.standing = self.standing._replace(role=Role.HEAD if head == self._node else Role.MEMBER, head=head)
 
     def resign(self) -> None:
-        """No role, until another schedule names us."""
+        """Give up the role until another schedule names this node."""
         self.standing, self.succession, self._named, self._told = _NOWHERE, (), None, False
 
     def forget(self) -> None:
-        """No schedule: the next one is new, whatever its version."""
+        """Forget the schedule, so that the next one is new whatever its version."""
         self.resign()
         self.version, self._parts = None, {}
 

@@ -23,7 +23,7 @@ from fanet_mw import mavlink
 from fanet_mw.application import ANY, Application, Data, Fate, Received, Status
 from fanet_mw.bus.topics import Topics
 from fanet_mw.errors import BusError, ConfigError, DropReason, LocalProtocolError
-from fanet_mw.hosts.bus import JOIN_PATIENCE_S, Bus, config_of
+from fanet_mw.hosts.bus import Bus, config_of
 from fanet_mw.hosts.clock import START_PATIENCE_S
 from fanet_mw.hosts.realtime import RealtimeHost
 from fanet_mw.radios.field_bus import FieldBus, joined
@@ -36,6 +36,8 @@ T = TypeVar("T")
 ALL: Final = "all"
 _MOST_UNREAD: Final = 4096
 _POLL_S: Final = 0.01
+_PATIENCE_S: Final = 10.0
+"""Longer than for a person at a terminal: on a busy machine a handshake may take seconds."""
 _ORIGIN: Final = Enu(0.0, 0.0, 0.0)
 
 
@@ -317,9 +319,11 @@ class _RealTime:
 
 
 @contextlib.asynccontextmanager
-async def _running(uav: Uav | ClockedUav, host: RealtimeHost, until_ns: int) -> AsyncIterator[Drive]:
+async def _running(uav: Uav | ClockedUav, host: RealtimeHost, scenario: Scenario) -> AsyncIterator[Drive]:
     """A host in a task; yields when its UAV has been started, and ends it whatever happens."""
-    task = asyncio.ensure_future(host.run(until_ns=until_ns, clock_timeout_s=START_PATIENCE_S))
+    task = asyncio.ensure_future(
+        host.run(until_ns=scenario.duration_ns, clock_timeout_s=START_PATIENCE_S, scenario=scenario)
+    )
     try:
         while not host.running:
             if task.done():
@@ -341,7 +345,8 @@ class Emulated:
     swarm: str | None = None
     """By default the scenario's name."""
     zenoh_config: Path | None = None
-    patience_s: float = JOIN_PATIENCE_S
+    patience_s: float = _PATIENCE_S
+    """How long the router is waited for."""
     position: Enu = _ORIGIN
     """Where the node is until its first fix."""
 
@@ -354,7 +359,7 @@ class Emulated:
         file = config_of(self.zenoh_config, uav.name)
         bus = await asyncio.to_thread(Bus.join, self.endpoint, file, patience_s=self.patience_s)
         with bus:
-            async with _running(uav, RealtimeHost(uav, bus, Topics(swarm)), scenario.duration_ns) as drive:
+            async with _running(uav, RealtimeHost(uav, bus, Topics(swarm)), scenario) as drive:
                 yield drive
 
 
@@ -393,7 +398,7 @@ class OnAir:
             bus.use(radio)
             await radio.open()
             try:
-                async with _running(uav, host, scenario.duration_ns) as drive:
+                async with _running(uav, host, scenario) as drive:
                     yield drive
             finally:
                 radio.close()

@@ -1,8 +1,8 @@
 """fanet-mw: real-time middleware for swarms of UAVs.
 
 What `__all__` names, here and in `fanet_mw.testing`, is the public interface: it changes only with a new minor version,
-and the changelog says how (docs/reference/api.md). Everything else is private. Names are loaded when they are first
-used: `import fanet_mw` costs nothing, and what needs numpy says so when it is asked for.
+and the changelog says how (docs/how-to/send-messages.md). Everything else is private. Names are loaded when they are
+first used: `import fanet_mw` costs nothing, and what needs numpy says so when it is asked for.
 """
 
 from importlib import import_module

@@ -20,7 +20,7 @@ from fanet_mw.scenario import Scenario
 from fanet_mw.trace import Delivered
 from fanet_mw.units import MS, NodeId, S, seconds_to_ns
 from sim.run.result import Result
-from sim.run.swarm import SwarmRun
+from sim.run.swarm import READY_TIMEOUT_S, SwarmRun
 from sim.run.swarm import launch as launch_processes
 from sim.run.virtual import Observed
 from sim.run.virtual import simulate as run_virtual
@@ -69,7 +69,7 @@ class Launched:
     def __init__(self, scenario: Scenario, swarm: SwarmRun) -> None:
         self.scenario = scenario
         self.processes = swarm.processes
-        self.radio = Emulated(endpoint=swarm.endpoint, swarm=swarm.name)
+        self.radio = Emulated(endpoint=swarm.endpoint, swarm=swarm.name, patience_s=READY_TIMEOUT_S)
         """How a node that was left out joins: `join(swarm.scenario, node=3, radio=swarm.radio)`."""
         self.result: Result | None = None
         """Once the block is left."""

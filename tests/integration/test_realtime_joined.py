@@ -1,0 +1,168 @@
+"""One application in virtual time, over Zenoh and over UDP between network namespaces: the same messages arrive.
+
+And a program of a user's own that joins a swarm of processes: what it is told, and how it ends.
+"""
+
+import ast
+import asyncio
+import json
+import subprocess
+import sys
+import time
+from pathlib import Path
+
+import pytest
+from correspondent import Correspondent
+from test_real_radio import COUNT, network
+
+import fanet_mw
+from fanet_mw.bus.topics import Topics
+from fanet_mw.hosts.bus import Bus
+from fanet_mw.hosts.clock import ClockKeeper
+from fanet_mw.scenario import config
+from sim.run.swarm import free_endpoint
+
+__all__ = ["network"]
+EXAMPLES = Path(__file__).resolve().parents[2] / "examples" / "my-message"
+SCENARIO = """
+name = "letters"
+duration_s = 12
+warmup_s = 1
+[nodes]
+count = 5
+layout = "disc"
+radius_m = 50
+telemetry_hz = 0
+[traffic]
+arrivals = "none"
+[routing]
+protocol = "flooding"
+[clusters]
+count = 1
+[world]
+engine = "kinematic"
+"""
+Got = set[tuple[int, int, str]]
+
+
+def _text(path: Path) -> Path:
+    path.write_text(SCENARIO, encoding="utf-8")
+    return path
+
+
+def in_virtual_time(path: Path) -> Got:
+    result = fanet_mw.simulate(path, applications=lambda node: [Correspondent(node, COUNT)])
+    reports = [result.reports[f"agent-{node}"]["applications"]["letters"] for node in range(1, COUNT + 1)]
+    assert {fate for report in reports for fate in report["fates"]} == {"acknowledged"}
+    got = [item for report in reports for item in report["got"]]
+    assert len(got) == len(set(got)) == 3 * COUNT * (COUNT - 1) * 2, "each to each, and all to all"
+    return set(got)
+
+
+async def over_zenoh(path: Path) -> Got:
+    scenario = config.load(path)
+    mails = [Correspondent(node, COUNT) for node in scenario.node_ids]
+
+    async def carry(radio: fanet_mw.Emulated, mail: Correspondent) -> None:
+        async with fanet_mw.join(scenario, node=mail.node, radio=radio, applications=[mail]) as node:
+            async for _ in node:
+                pass
+
+    async with fanet_mw.launch(scenario, leave_out=scenario.node_ids) as swarm:
+        await asyncio.gather(*(carry(swarm.radio, mail) for mail in mails))
+    assert swarm.result is not None
+    assert swarm.result.summary["aborted"] is None
+    return {item for mail in mails for item in mail.got}
+
+
+def on_air(path: Path, names: list[str]) -> Got:
+    epoch = str(time.time() + 4)  # noqa: TID251  (a real clock)
+    script = str(Path(__file__).with_name("correspondent.py"))
+    processes = [
+        subprocess.Popen(
+            ["ip", "netns", "exec", name, sys.executable, script, str(path), str(node), f"10.77.0.{node}",
+             "10.77.0.255", epoch],
+            stdout=subprocess.PIPE, stderr=subprocess.PIPE, text=True,
+        )
+        for node, name in enumerate(names, start=1)
+    ]  # fmt: skip
+    ended = [process.communicate(timeout=60) for process in processes]
+    assert [process.returncode for process in processes] == [0] * COUNT, [err for _, err in ended]
+    return {(item[0], item[1], item[2]) for out, _ in ended for item in json.loads(out)["got"]}
+
+
+@pytest.mark.slow
+def test_the_same_messages_arrive_in_virtual_time_over_zenoh_and_over_udp(tmp_path: Path, network: list[str]) -> None:
+    path = _text(tmp_path / "letters.toml")
+    expected = in_virtual_time(path)
+    assert on_air(path, network) == expected
+    assert asyncio.run(over_zenoh(path)) == expected
+
+
+def test_the_example_of_a_node_joins_and_is_answered_and_leaves_with_the_swarm(tmp_path: Path) -> None:
+    path = _text(tmp_path / "letters.toml")
+    scenario = config.load(path, ["duration_s=6"])
+    (tmp_path / "letters.toml").write_text(SCENARIO.replace("= 12", "= 6"), encoding="utf-8")
+
+    async def run() -> str:
+        async with fanet_mw.launch(scenario, leave_out=(1, 3)) as swarm:
+            process = await asyncio.create_subprocess_exec(
+                sys.executable, str(EXAMPLES / "node.py"), str(path), swarm.radio.endpoint, stdout=subprocess.PIPE
+            )
+            async with fanet_mw.join(scenario, node=3, radio=swarm.radio) as node:
+                message = await node.receive()
+                assert (await node.send(b"welcome", port=7, to=message.origin)).ok
+                await asyncio.sleep(2)
+                assert 1 in node.neighbors
+            out, _ = await process.communicate()
+            assert process.returncode == 0
+        return out.decode()
+
+    said = asyncio.run(run())
+    assert "acknowledged=(3,)" in said
+    assert "3 b'welcome'" in said
+
+
+async def test_without_a_router_it_is_said_and_the_loss_of_one_ends_who_waits(tmp_path: Path) -> None:
+    path = _text(tmp_path / "letters.toml")
+    with pytest.raises(fanet_mw.BusError, match="no Zenoh router"):
+        async with fanet_mw.join(path, node=1, radio=fanet_mw.Emulated("tcp/127.0.0.1:9", patience_s=0.3)):
+            pass
+    with pytest.raises(fanet_mw.ConfigError, match=r"node = 9: must be in \[1, nodes.count = 5\]"):
+        async with fanet_mw.join(path, node=9):
+            pass
+    endpoint = free_endpoint()
+    with Bus.serve(endpoint) as router:
+        keeper = ClockKeeper(router, Topics("letters"), time_scale=1.0, expected=("agent-1",))
+        clock = asyncio.ensure_future(keeper.start(timeout_s=60))
+        async with fanet_mw.join(path, node=1, radio=fanet_mw.Emulated(endpoint, patience_s=60)) as node:
+            await clock
+            router.close()
+            with pytest.raises(fanet_mw.BusError, match="is gone"):
+                await asyncio.wait_for(node.receive(), 20)
+
+
+def test_the_example_of_a_test_passes_in_an_empty_folder(tmp_path: Path) -> None:
+    copy = tmp_path / "test_greeting.py"
+    copy.write_text((EXAMPLES / "test_greeting.py").read_text(encoding="utf-8"), encoding="utf-8")
+    command = [sys.executable, "-m", "pytest", "-q", "-p", "fanet_mw.testing.plugin", "-p", "no:cacheprovider"]
+    done = subprocess.run([*command, str(copy)], cwd=tmp_path, capture_output=True, text=True, check=False)
+    assert done.returncode == 0, done.stdout
+    assert "1 passed" in done.stdout
+
+
+@pytest.mark.parametrize("path", sorted(EXAMPLES.glob("*.py")), ids=lambda path: path.name)
+def test_examples_are_short_and_use_public_names_only(path: Path) -> None:
+    text = path.read_text(encoding="utf-8")
+    tree = ast.parse(text)
+    for node in ast.walk(tree):
+        if isinstance(node, ast.Import | ast.ImportFrom):
+            modules = [alias.name for alias in node.names] if isinstance(node, ast.Import) else [str(node.module)]
+            assert not [module for module in modules if module.partition(".")[0] in ("agents", "emulator", "sim")]
+            assert not [module for module in modules if module.startswith("fanet_mw.")]
+        if isinstance(node, ast.Attribute):
+            assert not node.attr.startswith("_")
+            if isinstance(node.value, ast.Name) and node.value.id == "fanet_mw":
+                assert node.attr in fanet_mw.__all__
+    code = [line for line in text.splitlines() if line.strip() and not line.startswith('"""')]
+    assert len(code) <= 15

@@ -1,8 +1,10 @@
 """Parts of another package, installed beside ours, in virtual time and in every process: examples/swarm-parts."""
 
+import ast
 import json
 import os
 import pickle
+import re
 import subprocess
 import sys
 from pathlib import Path
@@ -28,6 +30,21 @@ def installed(tmp_path_factory: pytest.TempPathFactory) -> Path:
     pip = [sys.executable, "-m", "pip", "install", "--quiet", "--no-deps", "--no-build-isolation", "--no-index"]
     subprocess.run([*pip, "--target", str(target), str(EXAMPLE)], check=True, timeout=60)
     return target
+
+
+def test_the_examples_import_what_is_documented_and_nothing_private() -> None:
+    page = (ROOT / "docs" / "how-to" / "extend.md").read_text()
+    files = re.findall(r"`((?:fanet_mw|sim|emulator)[./][\w./]+)`", page)
+    named = {name.removesuffix(".py").replace("/", ".") for name in files}
+    found = set()
+    for path in (ROOT / "examples").rglob("*.py"):
+        for node in ast.walk(ast.parse(path.read_text())):
+            if isinstance(node, ast.ImportFrom) and (node.module or "").startswith(("fanet_mw", "sim", "emulator")):
+                assert not [alias.name for alias in node.names if alias.name.startswith("_")], path
+                found.add(node.module)
+    assert "fanet_mw.node.contract" in found
+    allowed = {module for module in found for name in named if module == name or module.startswith(f"{name}.")}
+    assert found - allowed - {"fanet_mw"} == set()
 
 
 def run(installed: Path, *command: str, cwd: Path) -> subprocess.CompletedProcess[str]:

@@ -25,10 +25,11 @@ COMMANDS: Final = (
     ("launch", "quick", "--duration", "9"),
     ("simulate", "town", "--duration", "10", "--set", "warmup_s=2", "drain_s=2"),
 )  # fmt: skip
-"""What is tried in each; `town` has buildings, which only pybullet has."""
+"""What is tried in each; `quick` and `town` ask for pybullet, `town` has buildings besides."""
 _FIRST: Final = "`simulate quick`, first time"
 MACHINE: Final = ("Python", "packages", "MB", "`fanet --version`", _FIRST, "again")
 """The columns that depend on the machine and on what the registries offer today."""
+_CRASHED: Final = -1
 _SAYS_WHICH: Final = 2
 """The exit code of a command that names what it lacks."""
 
@@ -92,8 +93,9 @@ def _out(place: Path, *command: str) -> str:
 
 def _timed(command: list[str], work: Path, environment: dict[str, str]) -> tuple[float, int]:
     began = time.monotonic()
-    ended = subprocess.run(command, cwd=work, env=environment, capture_output=True, check=False, timeout=600)
-    return time.monotonic() - began, ended.returncode
+    ended = subprocess.run(command, cwd=work, env=environment, capture_output=True, text=True, check=False, timeout=600)
+    crashed = "Traceback" in ended.stderr
+    return time.monotonic() - began, _CRASHED if crashed else ended.returncode
 
 
 def _megabytes(place: Path) -> float:

@@ -7,7 +7,7 @@ from collections.abc import Callable, Mapping
 from pathlib import Path
 from typing import Final, NamedTuple
 
-from tests.tables import emulator, flight, protocol
+from tests.tables import emulator, flight, installations, protocol
 from tests.tables.markdown import Rows, Tolerance
 
 DOCUMENTS: Final = Path(__file__).parents[2] / "docs"
@@ -42,5 +42,8 @@ TABLES: Final[Mapping[str, Table]] = {
     ),
     "clock-errors": Table("explanation/time.md", protocol.clock_errors, Tolerance(relative=0.2)),
     "flight": Table("results/flight.md", flight.measured, Tolerance(absolute=0.02, relative=0.02)),
+    "installations": Table(
+        "results/installations.md", installations.installations, Tolerance(relative=0.1), installations.MACHINE
+    ),
     "clocks": Table("explanation/time.md", protocol.clocks, Tolerance(absolute=0.02, relative=0.2)),
 }

@@ -21,6 +21,9 @@ _SURE_OF_TAKEN_M: Final = 30.0
 """The same where somebody has been confirmed already."""
 _GATE_TAKEN: Final = 6.0
 """The gate where somebody has been confirmed already: most likely that one again, but two may lie side by side."""
+_SAMPLES: Final = 6
+_REPORTERS: Final = 2
+"""Fewer received powers, or by fewer nodes, do not tell whose phone it is."""
 _SAME_PERSON_M: Final = 12.0
 """Sightings nearer to each other than this are of one person."""
 _OLD_SIGHTING_NS: Final = 5 * S
@@ -124,6 +127,19 @@ class Finds:
             find.filter.seen(east_m, north_m, sigma_m=sigma_m)
             find.sightings += 1
         return best[1]
+
+    def borne_out(self, survivor: int) -> bool:
+        """Whether what was heard of a phone suffices to say that its owner is who was seen; who is not is forgotten."""
+        find = self.known[survivor]
+        place = find.filter.estimate()
+        if place is None or not find.filter.is_seen:
+            return False
+        deficit = find.filter.deficit(place.east_m, place.north_m)
+        if deficit > _GATE:
+            find.filter.unsee()
+            find.sightings = 0
+            return False
+        return find.filter.samples >= _SAMPLES and len(find.reporters) >= _REPORTERS
 
     def _surprise(self, find: Find, by: Enu, at: Enu) -> float:
         """How little the power that we hear of a phone fits somebody at a place: the squared deviation in sigmas."""

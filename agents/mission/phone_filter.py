@@ -129,9 +129,18 @@ class PhoneFilter:
             before.north_variance_m2 * (1 - gain),
         )
 
+    def unsee(self) -> None:
+        """Forget the sightings: they were of somebody else."""
+        self._seen = None
+
     @property
     def is_seen(self) -> bool:
         return self._seen is not None
+
+    @property
+    def samples(self) -> int:
+        """How many received powers have been taken in."""
+        return self._count
 
     # --- the estimate ---------------------------------------------------------------------------------------------
 
@@ -163,7 +172,7 @@ class PhoneFilter:
 
     def deficit(self, east_m: float, north_m: float) -> float:
         """How much less likely a place is than the best one: twice the difference of the logarithms."""
-        self.estimate()
+        self._catch_up()
         if self._middle is None or not self._totals:
             return 0.0
         i = round((east_m - self._middle.east) / _CELL_M) + _HALF_CELLS

@@ -189,6 +189,8 @@ class Searcher:
             self._adopt(now_ns)
         plans, self._planner.to_tell = self._planner.to_tell, []
         self.packets += [plan.encode_frame(self._node) for plan in plans]
+        for survivor in self.finds.open():
+            self._confirm(survivor, now_ns)
         self._tell_finds(now_ns)
         self._bid(now_ns)
         self._choose(now_ns)
@@ -353,8 +355,10 @@ class Searcher:
     def _confirm(self, survivor: int, now_ns: int) -> None:
         """A survivor was seen at close range: announce it when its place is sure."""
         find = self.finds.known[survivor]
-        place = find.filter.estimate()
+        place = find.filter.estimate() if find.sightings else None
         if find.confirmed is not None or place is None or find.sightings < _SIGHTINGS or place.sigma_m > _SURE_M:
+            return
+        if not self.finds.borne_out(survivor):
             return
         found = Found(now_ns // US, survivor, *place, self._node, confirmed=True)
         self.finds.told(found, now_ns=now_ns)

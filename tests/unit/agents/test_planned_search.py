@@ -316,3 +316,33 @@ def test_a_camera_looks_at_the_ground_where_its_angles_lead(
     looked = ground_place(Enu(east, north, up), bearing_rad=bearing, elevation_rad=elevation)
     assert looked is not None
     assert math.hypot(looked[0] - east - along, looked[1] - north - across) < 1e-6 * (1 + abs(east) + abs(north))
+
+
+def test_who_was_seen_is_taken_for_the_owner_of_a_phone_only_when_enough_was_heard_of_it() -> None:
+    finds, truth = Finds(MODEL), Enu(0, 0, 0)
+
+    def hear(node: int, east: float, north: float) -> None:
+        at = Enu(east, north, 50)
+        finds.report(Survivor(0, 1, node, at, rssi_dbm(truth, at)), now_ns=0, own=True)
+
+    for north in (-60, -30, 0):
+        hear(1, 40, north)
+    assert finds.seen(Enu(2, 3, 0), by=Enu(40, 0, 50), sigma_m=2, now_ns=S) == 1
+    assert not finds.borne_out(1), "three powers by one node could be of anybody"
+    for north in (-60, -30, 0):
+        hear(2, -60, north)
+    assert finds.borne_out(1)
+
+
+def test_a_sighting_that_later_powers_contradict_is_forgotten() -> None:
+    finds, truth = Finds(MODEL), Enu(150, 0, 0)
+    for count, (node, east, north) in enumerate(
+        (node, east, north) for node, east in ((1, 90.0), (2, 210.0)) for north in (-60, -30, 0, 30, 60)
+    ):
+        at = Enu(east, north, 50)
+        finds.report(Survivor(0, 1, node, at, rssi_dbm(truth, at)), now_ns=0, own=True)
+        if count == 0:
+            finds.known[1].filter.seen(-60, 0, sigma_m=2)
+            finds.known[1].sightings = 2
+    assert not finds.borne_out(1)
+    assert finds.known[1].sightings == 0

@@ -40,6 +40,10 @@ _OF_MESSENGER: Final = {
 """What of the messenger a packet is for that begins with this message."""
 
 
+INNER_ID: Final = slice(wire.HEADER_BYTES + 7, wire.HEADER_BYTES + 10)
+"""Where a packet has the message id of its first inner frame."""
+
+
 class Onboard:
     """The applications of one node."""
 
@@ -76,6 +80,11 @@ class Onboard:
             for port in application.ports:
                 self._at_port.setdefault(port, []).append(application)
         self._messenger = Messenger(node, self._listening)
+        known = (*self._listeners, *_OF_MESSENGER)
+        self.wanted = (
+            None if self._to_all else frozenset(message.to_bytes(3, "little") for message in known if message >= 0)
+        )
+        """Ids of the messages that anyone listens to, as in a frame: most packets are for nobody; None: any."""
         self._on_fix = _overriding(applications, "on_fix")
         self._on_sensor = _overriding(applications, "on_sensor")
         self._on_hello = _overriding(applications, "on_hello")

@@ -10,7 +10,7 @@ from typing import Any, Final, NamedTuple
 from agents.autopilot import Autopilot
 from agents.avoidance import CollisionAvoidance
 from agents.dead_reckoning import DeadReckoning
-from agents.onboard import Onboard
+from agents.onboard import INNER_ID, Onboard
 from agents.rescue import Rescue
 from agents.search import PlannedSearch
 from agents.steady_fix import SteadyFix
@@ -158,8 +158,9 @@ class Uav(Actor):
 
     def wake(self, now_ns: int) -> None:
         self._node.wake(now_ns)
-        self._onboard.wake(now_ns)
-        self._say_hello(now_ns)
+        if self._own_wake_ns is not None and self._own_wake_ns <= now_ns:
+            self._onboard.wake(now_ns)
+            self._say_hello(now_ns)
         self._settle(now_ns)
 
     def nudge(self, now_ns: int) -> None:
@@ -215,8 +216,10 @@ class Uav(Actor):
         node, onboard = self._node, self._onboard
         if node.deliveries:
             deliveries, node.deliveries = node.deliveries, []
+            wanted = onboard.wanted
             for packet in deliveries:
-                onboard.deliver(packet, now_ns)
+                if wanted is None or packet.frame[INNER_ID] in wanted:
+                    onboard.deliver(packet, now_ns)
         called = onboard.called or bool(node.fates)
         if called:
             onboard.settle(now_ns)

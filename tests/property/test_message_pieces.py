@@ -211,6 +211,12 @@ def test_a_head_that_cannot_be_is_malformed(key: str) -> None:
         decode_piece(HEADER + encode_piece(GOOD._replace(**{key: IMPOSSIBLE[key]}), bytes(500), node=3))
 
 
+@pytest.mark.parametrize("length", [499, 501])
+def test_data_has_the_length_that_its_head_says(length: int) -> None:
+    with pytest.raises(MalformedFrameError):
+        decode_piece(HEADER + encode_piece(GOOD, bytes(length), node=3))
+
+
 def test_pieces_that_contradict_each_other_are_malformed() -> None:
     receiver = Receiver(NodeId(1), lambda _: True, random=random.Random(1))
     for size, malformed in ((1500, False), (1400, True)):

@@ -254,6 +254,11 @@ def test_a_message_that_nobody_confirms_is_sent_again_until_its_lifetime_is_over
     assert post.told[-1] == Status(post.handle, Fate.EXPIRED, 5 * S, nodes=(OTHER,), last=True)
 
 
+def test_a_mavlink_message_that_is_to_be_confirmed_is_sent_again(make_scenario: MakeScenario) -> None:
+    post = Post(mavlink.Encoder(OWN).heartbeat(), destination=OTHER, confirm=True)
+    assert len(live(uav(make_scenario, post), 10 * S)) >= 2
+
+
 def test_what_is_not_to_be_confirmed_is_sent_once(make_scenario: MakeScenario) -> None:
     post = Post(destination=BROADCAST)
     frames = live(uav(make_scenario, post), 10 * S)

@@ -112,7 +112,7 @@ class Watch:
         self.poses: list[Poses] = []
 
     def __call__(self, swarm: SwarmRun) -> None:
-        self.bus = Bus.join(swarm._endpoint)
+        self.bus = Bus.join(swarm.endpoint)
         self.bus.subscribe(Topics("verdict").pose, lambda _, payload: self.poses.extend(topics.decode(payload)))  # type: ignore[arg-type]
 
     def jump_m(self) -> float:

@@ -25,7 +25,7 @@ from agents.mission.planner import STATUS_S, Planner, pattern_of
 from fanet_mw.rng import stream
 from fanet_mw.scenario import Scenario
 from fanet_mw.trace import Approaching, Arrived, Confirmed, Detected, Planned, Record
-from fanet_mw.units import MS, US, Enu, NodeId, S, seconds_to_ns
+from fanet_mw.units import MAX_NODES, MS, US, Enu, NodeId, S, seconds_to_ns
 from fanet_mw.wire.inner import Survivor
 from fanet_mw.wire.search import Bid, Bids, Found, Search, Status, Told, encode_bids
 
@@ -124,22 +124,8 @@ class Searcher:
         self._report_ns = seconds_to_ns(mission.report_interval_s)
         self._random = stream(scenario.seed, "mission", node).random
         self._heights = scenario.nodes.altitude_m
-        model = PhoneModel(
-            mission.phone_power_dbm,
-            mission.phone_exponent,
-            mission.shadowing_db,
-            _OFFSET_DB,
-            mission.detection_dbm,
-            scenario.world.area_m / 2,
-        )
-        self._fitted = fitted(
-            scenario.nodes.count,
-            area_m=scenario.world.area_m,
-            seen_m=_ground_range_m(model, scenario.nodes.altitude_m),
-            reach_m=scenario.radio.range_m,
-            height_m=scenario.nodes.altitude_m,
-            speed_m_s=scenario.mobility.speed_m_s,
-        )
+        model = phone_model(scenario)
+        self._fitted = formation(scenario, scenario.nodes.count)
         self._planner = Planner(node, expected=scenario.nodes.count, deploy_speed_m_s=0.9 * mission.approach_speed_m_s)
         self._auction = Auction(node)
         self.finds = Finds(model)
@@ -655,6 +641,36 @@ class Searcher:
             if plane is not None:
                 planes.append(plane)
         return planes
+
+
+def phone_model(scenario: Scenario) -> PhoneModel:
+    """How the phones of a scenario are heard."""
+    mission = scenario.mission
+    return PhoneModel(
+        mission.phone_power_dbm,
+        mission.phone_exponent,
+        mission.shadowing_db,
+        _OFFSET_DB,
+        mission.detection_dbm,
+        scenario.world.area_m / 2,
+    )
+
+
+def formation(scenario: Scenario, count: int) -> Pattern | None:
+    """The formation in which so many UAVs search the area of a scenario; None when they are too few."""
+    return fitted(
+        count,
+        area_m=scenario.world.area_m,
+        seen_m=_ground_range_m(phone_model(scenario), scenario.nodes.altitude_m),
+        reach_m=scenario.radio.range_m,
+        height_m=scenario.nodes.altitude_m,
+        speed_m_s=scenario.mobility.speed_m_s,
+    )
+
+
+def least_nodes(scenario: Scenario) -> int:
+    """How many UAVs the search in lines needs in the area of a scenario."""
+    return next(count for count in range(1, MAX_NODES + 1) if formation(scenario, count) is not None)
 
 
 def _ground_range_m(model: PhoneModel, height_m: float) -> float:

@@ -7,6 +7,7 @@ from importlib.resources import files
 from pathlib import Path
 from typing import NamedTuple
 
+from agents.mission.searcher import formation, least_nodes
 from fanet_mw.errors import ConfigError
 from fanet_mw.scenario import Scenario, config
 
@@ -32,8 +33,20 @@ def shipped() -> list[Entry]:
 def find(name: str, overrides: Iterable[str] = ()) -> Scenario:
     """The scenario of a file (anything with a slash or ending in .toml), else the shipped one of that name."""
     if _is_file(name):
-        return config.load(Path(name), overrides)
-    return config.parse(_shipped(name).text, source=f"scenario {name}", name=name, overrides=overrides)
+        return _searchable(config.load(Path(name), overrides), name)
+    source = f"scenario {name}"
+    return _searchable(config.parse(_shipped(name).text, source=source, name=name, overrides=overrides), source)
+
+
+def _searchable(scenario: Scenario, source: str) -> Scenario:
+    """A scenario whose UAVs are enough for the search that it asks for; raises ConfigError otherwise."""
+    count, area_m = scenario.nodes.count, scenario.world.area_m
+    if scenario.mission.search == "lines" and formation(scenario, count) is None:
+        raise ConfigError(
+            f"{source}: nodes.count = {count}: mission.search = 'lines' over world.area_m = {area_m:g} needs at least "
+            f"{least_nodes(scenario)} UAVs with radio.range_m = {scenario.radio.range_m:g}"
+        )
+    return scenario
 
 
 def text_of(name: str) -> str:

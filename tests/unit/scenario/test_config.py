@@ -1,5 +1,6 @@
 """Scenario files: every mistake at once, by file, key, value and bound."""
 
+import re
 from pathlib import Path
 
 import pytest
@@ -100,3 +101,12 @@ def test_the_sizes_of_messages_that_a_scenario_is_checked_with_are_those_of_the_
              53009: "CLAIMS", 53011: "LINKS"}  # fmt: skip
     sizes = {f"FANET_{names[spec.msgid]}": wire.OVERHEAD + spec.layout.size for spec in specs}
     assert {**sizes, "positions": len(positions), "COLLISION": len(warning)} == MESSAGE_BYTES
+
+
+def test_a_search_in_lines_by_too_few_uavs_is_refused_with_the_number_that_it_needs() -> None:
+    with pytest.raises(ConfigError, match=r"nodes\.count = 20: .* needs at least (\d+) UAVs") as refused:
+        catalog.find("rescue", ["nodes.count=20", "traffic.sources=19"])
+    least = int(re.search(r"at least (\d+)", str(refused.value))[1])  # type: ignore[index]
+    assert catalog.find("rescue", [f"nodes.count={least}", f"traffic.sources={least - 1}"]).nodes.count == least
+    with pytest.raises(ConfigError, match="needs at least"):
+        catalog.find("rescue", [f"nodes.count={least - 1}", f"traffic.sources={least - 2}"])

@@ -24,6 +24,8 @@ _GATE_TAKEN: Final = 6.0
 _SAMPLES: Final = 6
 _REPORTERS: Final = 2
 """Fewer received powers, or by fewer nodes, do not tell whose phone it is."""
+_SAMPLES_ALONE: Final = 8
+"""As many by one node do: it has passed by, and at the edge of the area nobody else may ever hear that phone."""
 _SAME_PERSON_M: Final = 12.0
 """Sightings nearer to each other than this are of one person."""
 _OLD_SIGHTING_NS: Final = 5 * S
@@ -139,7 +141,8 @@ class Finds:
             find.filter.unsee()
             find.sightings = 0
             return False
-        return find.filter.samples >= _SAMPLES and len(find.reporters) >= _REPORTERS
+        enough = _SAMPLES if len(find.reporters) >= _REPORTERS else _SAMPLES_ALONE
+        return find.filter.samples >= enough
 
     def _surprise(self, find: Find, by: Enu, at: Enu) -> float:
         """How little the power that we hear of a phone fits somebody at a place: the squared deviation in sigmas."""

@@ -334,6 +334,16 @@ def test_who_was_seen_is_taken_for_the_owner_of_a_phone_only_when_enough_was_hea
     assert finds.borne_out(1)
 
 
+def test_who_passes_alone_at_the_edge_of_the_area_hears_enough_to_tell_whose_phone_it_is() -> None:
+    finds, truth = Finds(MODEL), Enu(0, 0, 0)
+    for step in range(8):
+        assert not (step and finds.borne_out(1)), f"{step} powers by one node"
+        at = Enu(13, -100 + 30 * step, 50)
+        finds.report(Survivor(0, 1, 9, at, rssi_dbm(truth, at)), now_ns=0, own=True)
+        finds.known[1].filter.seen(0, 0, sigma_m=2)
+    assert finds.borne_out(1)
+
+
 def test_a_sighting_that_later_powers_contradict_is_forgotten() -> None:
     finds, truth = Finds(MODEL), Enu(150, 0, 0)
     for count, (node, east, north) in enumerate(

@@ -46,6 +46,7 @@ def test_what_is_said_of_a_key_is_what_its_model_holds() -> None:
     assert shape.unit == ""
     assert table("faults", 'kind = "jam"').repeated
     assert not table("radio").repeated
+    assert not table("traffic").repeated, "it may be given once, and then is no array"
     assert bound({"anyOf": [{"const": "all"}, {"type": "integer", "minimum": 0}, {"type": "null"}]}) == (
         '"all"; or whole, >= 0'
     )

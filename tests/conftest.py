@@ -25,7 +25,7 @@ _REALTIME = (
     "test_back_pressure", "test_air_control",
 )  # fmt: skip
 """Modules whose tests live in real time: beside tests that compute they would be late. They wait more than they work,
-so four of them go side by side; what judges lateness is marked `serial` besides, and has the machine to itself."""
+so three of them go side by side; what judges lateness is marked `serial` besides, and has the machine to itself."""
 
 
 def pytest_collection_modifyitems(items: list[pytest.Item]) -> None:

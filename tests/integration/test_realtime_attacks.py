@@ -20,7 +20,9 @@ from sim.scenarios import catalog
 NAMES = Topics("test")
 SMALL = [
     "nodes.count=4", "clusters.count=1", "duration_s=4", "warmup_s=1", "drain_s=1", "clusters.flooding_period_s=0.5",
+    "radio.lead_ms=150",
 ]  # fmt: skip
+"""The lead is long, because here it is not asked whether a machine that runs other tests besides is on time."""
 
 
 class Attacker:
@@ -87,7 +89,7 @@ def test_nonsense_for_the_launcher_is_counted_and_the_result_is_that_of_the_swar
     assert summary["unwritten"] == {}
     assert summary["frames"]["closes"]
     assert summary["frames"]["sent"] > 30
-    assert 0 < summary["pdr"] <= 1, "what was forged counts neither as sent nor as delivered"
+    assert summary["pdr"] > 0.5
     assert {record.node for record in outcome.records} <= {0, 1, 2, 3, 4}
 
 

@@ -27,7 +27,9 @@ def interrupt(out: Path, *arguments: str, number: int = signal.SIGINT) -> tuple[
         stdout=subprocess.PIPE, stderr=subprocess.PIPE, text=True,
     )  # fmt: skip
     end_s = time.monotonic() + 60
-    while not ((out / "air.pcap").exists() and (out / "air.pcap").stat().st_size > 500_000) and time.monotonic() < end_s:
+    while (
+        not ((out / "air.pcap").exists() and (out / "air.pcap").stat().st_size > 500_000) and time.monotonic() < end_s
+    ):
         time.sleep(0.05)
     process.send_signal(number)
     said, err = process.communicate(timeout=60)

@@ -14,9 +14,9 @@ mpl.use("Agg")
 from matplotlib import pyplot as plt  # noqa: E402  (the backend comes first)
 from matplotlib.axes import Axes  # noqa: E402
 
-from sim.world.kinematic import Kinematic  # noqa: E402  (the tree's root is on the path now)
-from sim.world.rotors.engine import Rotors  # noqa: E402
-from sim.world.rotors.power import trimmed_w  # noqa: E402
+from sim.world.engines.kinematic import Kinematic  # noqa: E402  (the tree's root is on the path now)
+from sim.world.engines.rotors.engine import Rotors  # noqa: E402
+from sim.world.engines.rotors.power import trimmed_w  # noqa: E402
 from tests.tables.flight import STEP_S, TRIALS, Trial, around, in_gusts, stepped  # noqa: E402
 
 OUT = ROOT / "docs" / "results" / "flight"

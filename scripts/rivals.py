@@ -20,9 +20,9 @@ from fanet_mw.units import S
 from sim.results.files import finish
 from sim.run.virtual import simulate
 from sim.scenarios import catalog
-from sim.world.engine import Rows
-from sim.world.guidance import Guidance
-from sim.world.layout import positions
+from sim.world.engines.contract import Rows
+from sim.world.mobility.guidance import Guidance
+from sim.world.mobility.layout import positions
 
 
 def reached(at: Rows, range_m: float) -> int:

@@ -35,7 +35,7 @@ from sim.cli.sweep import sweep
 from sim.results import report
 from sim.run.running import locate, running
 from sim.scenarios import catalog
-from sim.world.layout import positions
+from sim.world.mobility.layout import positions
 
 if TYPE_CHECKING:
     from sim.run.outcome import Outcome  # needs numpy, which a machine without the emulator has not

@@ -35,7 +35,7 @@ from fanet_mw.scenario import Scenario
 from fanet_mw.units import MS, Enu, NodeId, S, seconds_to_ns
 from fanet_mw.wire.places import rounded
 from sim.cli.frame_chance import chance_of
-from sim.world.layout import positions
+from sim.world.mobility.layout import positions
 
 
 def judge(

@@ -21,7 +21,7 @@ from fanet_mw.trace import Approaching, Arrived, BoundStated, Delivered, Detecte
 from fanet_mw.units import MS, S
 from sim.figures.style import SERIES, applied, canvas, save
 from sim.report.html import Block, Commands, Heading, Picture, Rows, Text
-from sim.world.layout import positions
+from sim.world.mobility.layout import positions
 
 _WINDOWS = 40
 """Steps of the delivery ratio over time."""

@@ -9,9 +9,9 @@ import numpy.typing as npt
 from agents.traffic import sources_of, targets_of
 from fanet_mw.scenario.model import Scenario
 from fanet_mw.units import S
-from sim.world.engine import Rows
-from sim.world.guidance import Guidance
-from sim.world.layout import positions
+from sim.world.engines.contract import Rows
+from sim.world.mobility.guidance import Guidance
+from sim.world.mobility.layout import positions
 
 
 def parts(places: Rows, range_m: float) -> npt.NDArray[np.int64]:

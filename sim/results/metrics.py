@@ -22,7 +22,7 @@ from sim.results.clocks import clock_errors
 from sim.results.mission import mission
 from sim.results.packets import OTHER_APPS, Application, packets_of, targets_by_source
 from sim.run.outcome import Outcome
-from sim.world.separation import separation
+from sim.world.incidents.separation import separation
 
 
 def summarize(outcome: Outcome, *, trace_sha256: str) -> dict[str, Any]:

@@ -20,8 +20,8 @@ from fanet_mw.scenario import Scenario
 from fanet_mw.trace import Approaching, Arrived, Collided, Confirmed, Detected, Posed, ProcessEnded, Record
 from fanet_mw.units import S
 from sim.run.outcome import Outcome
+from sim.world.environment.survivors import place
 from sim.world.sensors.phone import REFERENCE_LOSS_DB
-from sim.world.survivors import place
 
 _CELL_M: Final = 25.0
 _NEARLY_ALL: Final = 0.95

@@ -36,8 +36,8 @@ from sim.run.processes import Processes, describe
 from sim.run.router import ROUTER, expected_names
 from sim.run.running import registered
 from sim.world.__main__ import run as run_world
-from sim.world.flight import FlightRecorder
-from sim.world.layout import positions
+from sim.world.flight_recorder import FlightRecorder
+from sim.world.mobility.layout import positions
 
 _AGENT_NICE: Final = 10
 """The niceness of UAVs: all of them wait for the emulator, which goes first when all cores are in use."""

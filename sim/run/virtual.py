@@ -22,7 +22,7 @@ from fanet_mw.units import MS, NodeId, S
 from sim.results.clocks import true_delays
 from sim.results.links import LinkTotals
 from sim.run.outcome import Outcome
-from sim.world.layout import positions
+from sim.world.mobility.layout import positions
 from sim.world.world import World
 
 EPOCH_UNIX_NS: Final = 1_735_689_600 * S

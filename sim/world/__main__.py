@@ -6,7 +6,7 @@ from fanet_mw.hosts import interrupts, loop, service
 from fanet_mw.hosts.bus import JOIN_PATIENCE_S
 from fanet_mw.hosts.realtime import run_actor
 from fanet_mw.scenario import Scenario
-from sim.world.flight import Flight
+from sim.world.flight_recorder import Flight
 from sim.world.world import World
 
 

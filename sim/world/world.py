@@ -18,25 +18,25 @@ from fanet_mw.rng import stream_seed
 from fanet_mw.scenario import Scenario
 from fanet_mw.trace import Collided, Posed
 from fanet_mw.units import NodeId, S
-from sim.world.energy import Energy
-from sim.world.engine import Engine
-from sim.world.flight import Flight
-from sim.world.guidance import Guidance
-from sim.world.kinematic import Kinematic
-from sim.world.layout import positions
-from sim.world.no_fly import NoFly
-from sim.world.obstacles import Obstacles, obstacles
-from sim.world.rotors.engine import Rotors
-from sim.world.rotors.vehicle import VEHICLES
+from sim.world.engines.contract import Engine
+from sim.world.engines.energy import Energy
+from sim.world.engines.kinematic import Kinematic
+from sim.world.engines.rotors.engine import Rotors
+from sim.world.engines.rotors.vehicle import VEHICLES
+from sim.world.environment.obstacles import Obstacles, obstacles
+from sim.world.environment.solids import Solids
+from sim.world.environment.survivors import Survivors
+from sim.world.environment.wind import Wind
+from sim.world.flight_recorder import Flight
+from sim.world.incidents.no_fly import NoFly
+from sim.world.incidents.separation import Separation
+from sim.world.mobility.guidance import Guidance
+from sim.world.mobility.layout import positions
 from sim.world.sensors.contract import Truth
 from sim.world.sensors.suite import Suite, sensors_of
-from sim.world.separation import Separation
-from sim.world.solids import Solids
-from sim.world.survivors import Survivors
-from sim.world.wind import Wind
 
 if TYPE_CHECKING:
-    from sim.world.sight import Sight
+    from sim.world.environment.line_of_sight import Sight
 
 _TRACED_NS: Final = S
 """How often positions go into the trace."""
@@ -57,14 +57,14 @@ def make_engine(scenario: Scenario, solid: Obstacles | None = None) -> Engine:
         random = np.random.Generator(np.random.PCG64(stream_seed(scenario.seed, "wind")))
         wind = Wind(random, scenario.nodes.count, mean_m_s=world.wind_m_s, w20_m_s=world.gusts_m_s)
         return Rotors(VEHICLES[world.vehicle], wind=wind, solids=Solids(solid))
-    from sim.world.physics import Physics
+    from sim.world.engines.pybullet import Physics
 
     return Physics(physics_hz=world.physics_hz, obstacles=solid)
 
 
 def _sight(scenario: Scenario, engine: Engine, solid: Obstacles) -> "Sight":
     """Imported when wanted: it brings the emulator's geometry, and numba with it."""
-    from sim.world.sight import Sight
+    from sim.world.environment.line_of_sight import Sight
 
     return Sight(scenario, engine, top_m=solid.top_m)
 

@@ -32,7 +32,7 @@ from sim.results.bounds import against_bounds
 from sim.results.packets import packets_of
 from sim.run.outcome import Outcome
 from sim.run.virtual import actors_of
-from sim.world.layout import positions
+from sim.world.mobility.layout import positions
 
 
 class Result(NamedTuple):

@@ -7,15 +7,15 @@ import pytest
 
 from fanet_mw.units import Enu
 from sim.scenarios import catalog
-from sim.world.engine import Engine, Rows
-from sim.world.guidance import Guidance
-from sim.world.kinematic import Kinematic
-from sim.world.obstacles import Box, Obstacles
-from sim.world.physics import Physics
-from sim.world.rotors.engine import Rotors
-from sim.world.rotors.vehicle import CRAZYFLIE, IRIS
+from sim.world.engines.contract import Engine, Rows
+from sim.world.engines.kinematic import Kinematic
+from sim.world.engines.pybullet import Physics
+from sim.world.engines.rotors.engine import Rotors
+from sim.world.engines.rotors.vehicle import CRAZYFLIE, IRIS
+from sim.world.environment.obstacles import Box, Obstacles
+from sim.world.environment.survivors import place
+from sim.world.mobility.guidance import Guidance
 from sim.world.sensors.phone import PhoneSensor
-from sim.world.survivors import place
 
 FAR_AWAY = Obstacles(hills=None, boxes=(Box(400, 400, 30, 30, 60),))
 

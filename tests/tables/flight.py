@@ -6,13 +6,13 @@ from typing import NamedTuple
 
 import numpy as np
 
-from sim.world.engine import Engine, Rows, Values
-from sim.world.kinematic import Kinematic
-from sim.world.rotors.battery import Batteries
-from sim.world.rotors.engine import Rotors
-from sim.world.rotors.power import trimmed_w
-from sim.world.rotors.vehicle import CRAZYFLIE, IRIS, Vehicle
-from sim.world.wind import Wind
+from sim.world.engines.contract import Engine, Rows, Values
+from sim.world.engines.kinematic import Kinematic
+from sim.world.engines.rotors.battery import Batteries
+from sim.world.engines.rotors.engine import Rotors
+from sim.world.engines.rotors.power import trimmed_w
+from sim.world.engines.rotors.vehicle import CRAZYFLIE, IRIS, Vehicle
+from sim.world.environment.wind import Wind
 from tests.tables.markdown import Rows as TableRows
 
 STEP_S = 0.05

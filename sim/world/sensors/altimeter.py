@@ -11,8 +11,8 @@ from typing import Final
 from fanet_mw.bus.messages import Altimeter, Message
 from fanet_mw.scenario.model import Scenario
 from fanet_mw.units import S
+from sim.world.environment.solids import Solids
 from sim.world.sensors.contract import Drift, Sensor, Truth, generator
-from sim.world.solids import Solids
 
 DRIFT_S: Final = 300.0
 

@@ -23,10 +23,10 @@ import numpy.typing as npt
 from fanet_mw.bus.messages import Camera, Message, Person
 from fanet_mw.scenario.model import Scenario
 from fanet_mw.units import S
-from sim.world.engine import Rows, Values
+from sim.world.engines.contract import Rows, Values
+from sim.world.environment.solids import Solids
+from sim.world.environment.survivors import Survivors
 from sim.world.sensors.contract import Sensor, Truth, angles, generator, shaken
-from sim.world.solids import Solids
-from sim.world.survivors import Survivors
 
 PERSON_M: Final = math.sqrt(1.7 * 0.5)
 _EYE_M: Final = 0.3

@@ -20,8 +20,8 @@ from fanet_mw.bus.messages import Message, WifiScan
 from fanet_mw.rng import stream_seed
 from fanet_mw.scenario.model import Scenario
 from fanet_mw.units import seconds_to_ns
+from sim.world.environment.survivors import Survivors
 from sim.world.sensors.contract import Sensor, Truth
-from sim.world.survivors import Survivors
 
 REFERENCE_LOSS_DB: Final = 40.05
 """Free-space loss at 1 m and 2.4 GHz."""

@@ -22,9 +22,9 @@ import numpy as np
 from fanet_mw.bus.messages import Echo, Message, Radar
 from fanet_mw.scenario.model import Scenario
 from fanet_mw.units import S
-from sim.world.engine import Values
+from sim.world.engines.contract import Values
+from sim.world.environment.solids import Solids
 from sim.world.sensors.contract import Sensor, Truth, angles, generator
-from sim.world.solids import Solids
 
 ELEVATION_RAD: Final = math.radians(20)
 """The scan sees as far up and down as this."""

@@ -5,8 +5,10 @@ from collections.abc import Iterator
 from fanet_mw.bus.messages import Message
 from fanet_mw.bus.topics import Topics
 from fanet_mw.scenario.model import PROTOCOLS, Scenario
-from sim.world.energy import Energy
-from sim.world.engine import Flags
+from sim.world.engines.contract import Flags
+from sim.world.engines.energy import Energy
+from sim.world.environment.solids import Solids
+from sim.world.environment.survivors import Survivors
 from sim.world.sensors.altimeter import AltimeterSensor
 from sim.world.sensors.battery import BatterySensor
 from sim.world.sensors.camera import CameraSensor
@@ -16,8 +18,6 @@ from sim.world.sensors.inertial import InertialSensor
 from sim.world.sensors.phone import PhoneSensor
 from sim.world.sensors.radar import RadarSensor
 from sim.world.sensors.voice import VoiceSensor
-from sim.world.solids import Solids
-from sim.world.survivors import Survivors
 
 
 def sensors_of(scenario: Scenario, survivors: Survivors, solids: Solids, energy: Energy | None = None) -> list[Sensor]:

@@ -24,10 +24,10 @@ import numpy as np
 from fanet_mw.bus.messages import Call, Message, Voice
 from fanet_mw.scenario.model import Scenario
 from fanet_mw.units import S
-from sim.world.engine import Values
+from sim.world.engines.contract import Values
+from sim.world.environment.solids import Solids
+from sim.world.environment.survivors import Survivors
 from sim.world.sensors.contract import Sensor, Truth, angles, generator, shaken
-from sim.world.solids import Solids
-from sim.world.survivors import Survivors
 
 AIR_DB_PER_M: Final = 0.005
 WALL_DB: Final = 20.0

@@ -6,7 +6,7 @@ from fanet_mw.graph.topology import within_range
 from fanet_mw.planner.contention_window import hellos_ns, too_short
 from fanet_mw.units import MS, Enu, NodeId
 from sim.scenarios import catalog
-from sim.world.layout import positions
+from sim.world.mobility.layout import positions
 
 LINE = within_range({NodeId(i): Enu(200.0 * i, 0.0, 0.0) for i in range(1, 8)}, range_m=250)
 

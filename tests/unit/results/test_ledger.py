@@ -15,7 +15,7 @@ from fanet_mw.units import NodeId
 from sim.results import ledger
 from sim.run.outcome import Outcome
 from sim.run.virtual import simulate
-from sim.world.layout import positions
+from sim.world.mobility.layout import positions
 from sim.world.world import World
 
 Keep = Callable[[int, TxRequest], bool]

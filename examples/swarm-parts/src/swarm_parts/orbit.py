@@ -7,7 +7,7 @@ import numpy.typing as npt
 from pydantic import BaseModel, Field
 
 from fanet_mw.scenario import Scenario
-from sim.world.guidance import Track
+from sim.world.mobility.contract import Track
 
 Rows = npt.NDArray[np.float64]
 

@@ -1,0 +1,1 @@
+"""What moves the bodies: one module per value of `world.engine` behind `contract.py`, and batteries."""

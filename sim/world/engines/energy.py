@@ -1,0 +1,58 @@
+"""The batteries of a swarm: drained by what flying takes, empty in the end.
+
+An engine that knows rotors says what they take. For the others it is what steady flight at that airspeed and climb
+would take (`rotors/power.py`), by a table over both; acceleration costs them nothing. Who stands on the ground needs
+the avionics.
+"""
+
+from typing import Final
+
+import numpy as np
+
+from fanet_mw.rng import stream
+from fanet_mw.scenario import Scenario
+from sim.world.engines.contract import Engine, Flags, Values
+from sim.world.engines.rotors.battery import Batteries
+from sim.world.engines.rotors.power import trimmed_w
+from sim.world.engines.rotors.vehicle import VEHICLES, Vehicle
+
+_FASTEST_M_S: Final = 30.0
+_CELLS: Final = 61
+_CLIMBS_M_S: Final = np.array([0.0, 2.0, 5.0, 10.0])
+
+
+class Energy:
+    """Batteries and what empties them."""
+
+    def __init__(self, scenario: Scenario) -> None:
+        world = scenario.world
+        self._vehicle = VEHICLES[world.vehicle]
+        random = stream(scenario.seed, "charge")
+        charge = np.array([random.uniform(*world.charge) for _ in scenario.node_ids])
+        self.batteries = Batteries(self._vehicle.battery, charge)
+        self._table = power_table(self._vehicle)
+
+    def pass_time(self, seconds: float, engine: Engine, flies: Flags) -> list[int]:
+        """Drain the batteries; returns the rows of which the battery is now empty and was not."""
+        power = engine.power_w()
+        if power is None:
+            power = self._steady_w(engine.velocities())
+        before = self.batteries.empty
+        self.batteries.drain(np.where(flies, power, self._vehicle.avionics_w), seconds)
+        return np.flatnonzero(self.batteries.empty & ~before).tolist()
+
+    def _steady_w(self, velocity: Values) -> Values:
+        speed = np.minimum(np.linalg.norm(velocity[:, :2], axis=1), _FASTEST_M_S) * (_CELLS - 1) / _FASTEST_M_S
+        climb = np.interp(velocity[:, 2], _CLIMBS_M_S, np.arange(len(_CLIMBS_M_S)))
+        i = np.minimum(climb.astype(np.int64), len(_CLIMBS_M_S) - 2)
+        j = np.minimum(speed.astype(np.int64), _CELLS - 2)
+        v, u, table = climb - i, speed - j, self._table
+        low = table[i, j] * (1 - u) + table[i, j + 1] * u
+        high = table[i + 1, j] * (1 - u) + table[i + 1, j + 1] * u
+        return np.asarray(low * (1 - v) + high * v)
+
+
+def power_table(vehicle: Vehicle) -> Values:
+    """Electrical power in steady flight, by climb (rows) and horizontal speed."""
+    speeds = np.linspace(0.0, _FASTEST_M_S, _CELLS)
+    return np.stack([trimmed_w(vehicle, speeds, np.full_like(speeds, climb)) for climb in _CLIMBS_M_S.tolist()])

@@ -1,0 +1,77 @@
+"""A cheap engine: point masses with limited acceleration. For protocol work, where only distances matter.
+
+Does not model: attitude, drag, and gravity but for wrecks. Bodies are spheres of `RADIUS_M` that notice contact but
+do not bounce.
+"""
+
+from typing import Final
+
+import numpy as np
+
+from sim.world.engines.contacts import Contacts
+from sim.world.engines.contract import Engine, Flags, Rows
+from sim.world.environment.solids import Solids
+
+ACCELERATION_M_S2: Final = 5.0
+GRAVITY_M_S2: Final = 9.81
+RADIUS_M: Final = 0.25
+
+
+class Kinematic(Engine):
+    """Velocity follows the wish as fast as the acceleration allows."""
+
+    name = "kinematic"
+
+    def __init__(self, solids: Solids | None = None) -> None:
+        self._solids = solids if solids is not None and solids.any else None
+        self._at = np.zeros((0, 3))
+        self._velocity = np.zeros((0, 3))
+        self._contacts = Contacts(RADIUS_M, self._solids)
+        self._wrecks: list[int] = []
+
+    def reset(self, positions: Rows, velocities: Rows | None = None) -> None:
+        self._at = positions.copy()
+        self._velocity = np.zeros_like(positions) if velocities is None else velocities.copy()
+        self._wrecks = []
+        self._contacts.reset()
+
+    def advance(self, dt_s: float, wanted_m_s: Rows) -> None:
+        change = wanted_m_s - self._velocity
+        size = np.linalg.norm(change, axis=1, keepdims=True)
+        limit = ACCELERATION_M_S2 * dt_s
+        change *= np.minimum(1.0, limit / np.maximum(size, 1e-12))
+        before = self._velocity
+        if self._wrecks:
+            change[self._wrecks] = [0.0, 0.0, -GRAVITY_M_S2 * dt_s]
+        self._velocity = before + change
+        came_from = self._at
+        self._at = came_from + (before + self._velocity) * (dt_s / 2)
+        below = self._at[:, 2] < 0
+        self._at[below, 2] = 0.0
+        self._velocity[below] = 0.0
+        if self._solids is not None:
+            self._stop_at_walls(came_from, self._solids)
+        self._contacts.notice(self._at)
+
+    def blocked(self, first: Rows, second: Rows) -> Flags:
+        return super().blocked(first, second) if self._solids is None else self._solids.blocked(first, second)
+
+    def positions(self) -> Rows:
+        return self._at
+
+    def velocities(self) -> Rows:
+        return self._velocity
+
+    def fall(self, row: int) -> None:
+        self._wrecks.append(row)
+
+    def contacts(self) -> list[tuple[int, int]]:
+        return self._contacts.take()
+
+    def _stop_at_walls(self, came_from: Rows, solids: Solids) -> None:
+        """Who would be within something solid is put back where it came from, or on the ground, and stands still."""
+        inside = solids.gap_m(self._at) <= 0
+        if inside.any():
+            self._at[inside] = came_from[inside]
+            self._at[inside, 2] = np.maximum(self._at[inside, 2], solids.ground_m(self._at[inside]))
+            self._velocity[inside] = 0.0

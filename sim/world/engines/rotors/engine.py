@@ -1,0 +1,166 @@
+"""Multirotors as rigid bodies under four rotors each, all at once in numpy: the engine `rotors`.
+
+    m v' = R (sum of thrusts) z - drag - m g z          J w' = torques - w x J w          q' = q (0, w) / 2
+    motors: first-order lag towards the wanted speed, faster up than down; symplectic Euler at `STEP_HZ`
+
+The battery gives what the rotors take (`power.py`); one that is empty stops them. Whoever reaches the ground or a
+wall is stopped there and stands upright. Not modeled: ground effect, downwash on others below, blade flapping, the
+bounce.
+"""
+
+from typing import Final
+
+import numpy as np
+
+from sim.world.engines.contacts import Contacts
+from sim.world.engines.contract import Engine, Flags, Rows, Values
+from sim.world.engines.rotors.flight_control import FlightControl, allocation, body_up, cross, level_attitude, times
+from sim.world.engines.rotors.power import electrical_w, rotor_power_w
+from sim.world.engines.rotors.vehicle import GRAVITY_M_S2, Vehicle, hover_rad_s
+from sim.world.environment.solids import Solids
+from sim.world.environment.wind import Wind
+
+STEP_HZ: Final = 200
+_DT_S: Final = 1 / STEP_HZ
+_LEAST_SHARE: Final = 0.1
+"""Of the greatest rotor speed: motors idle, they do not stop in flight."""
+_TUMBLE_PER_S: Final = 2.0
+"""How fast a body without power stops turning."""
+
+
+class Rotors(Engine):
+    """A swarm of one type of vehicle."""
+
+    name = "rotors"
+
+    def __init__(self, vehicle: Vehicle, *, wind: Wind | None = None, solids: Solids | None = None) -> None:
+        self.vehicle = vehicle
+        self._wind = wind
+        self._solids = solids if solids is not None and solids.any else None
+        self._contacts = Contacts(vehicle.arm_m, self._solids)
+        self._allocation = allocation(vehicle)
+        self._inertia = np.array(vehicle.inertia_kg_m2)[:, None]
+        self.reset(np.zeros((0, 3)))
+
+    def reset(self, positions: Rows, velocities: Rows | None = None) -> None:
+        count = len(positions)
+        self._at = positions.T.astype(np.float64, copy=True)
+        self._velocity = np.zeros((3, count)) if velocities is None else velocities.T.astype(np.float64, copy=True)
+        hover = hover_rad_s(self.vehicle)
+        drag = self._drag_n(self._velocity, np.full(count, 4 * hover), self._velocity)
+        lift = drag + np.array([[0.0], [0.0], [self.vehicle.mass_kg * GRAVITY_M_S2]])
+        self._attitude = level_attitude(lift / np.sqrt((lift**2).sum(axis=0)))
+        self._rates = np.zeros((3, count))
+        self._speed = np.full((4, count), hover)
+        self._control = FlightControl(self.vehicle, drag / self.vehicle.mass_kg)
+        self._air = np.zeros((3, count))
+        self._power_w = np.zeros(count)
+        self._dead = np.zeros(count, bool)
+        self._left_s = 0.0
+        self._contacts.reset()
+
+    def advance(self, dt_s: float, wanted_m_s: Rows) -> None:
+        if self._wind is not None:
+            self._air = np.ascontiguousarray(self._wind.advance(dt_s, self._at.T, self._velocity.T).T)
+        self._left_s += dt_s
+        wanted = np.ascontiguousarray(wanted_m_s.T)
+        while self._left_s >= _DT_S - 1e-9:
+            self._left_s -= _DT_S
+            self._step(wanted)
+        self._contacts.notice(self._at.T)
+        self._power_w = self._electrical()
+
+    def _step(self, wanted: Values) -> None:
+        vehicle, control = self.vehicle, self._control
+        force = control.thrust_vector(wanted, self._velocity, _DT_S)
+        thrust = control.rotor_thrusts(force, self._attitude, self._rates)
+        self._turn_rotors(thrust)
+        up = body_up(self._attitude)
+        airflow = self._velocity - self._air
+        through = (up * airflow).sum(axis=0)
+        across = airflow - up * through
+        lift = vehicle.thrust_n_s2 * self._speed**2 - vehicle.inflow_n_s2_m * self._speed * through
+        np.maximum(lift, 0.0, out=lift)
+        total, *torque = self._allocation @ lift
+        drag = self._drag_n(across, self._speed.sum(axis=0), airflow)
+        acceleration = (up * total - drag) / vehicle.mass_kg
+        acceleration[2] -= GRAVITY_M_S2
+        turning = (np.stack(torque) - cross(self._rates, self._inertia * self._rates)) / self._inertia
+        turning[:, self._dead] = -_TUMBLE_PER_S * self._rates[:, self._dead]
+        before = self._at.copy()
+        self._velocity = self._velocity + acceleration * _DT_S
+        self._at = before + self._velocity * _DT_S
+        self._rates = self._rates + turning * _DT_S
+        self._turn_bodies()
+        self._stop(before)
+
+    def _drag_n(self, across: Values, rotors_rad_s: Values, airflow: Values) -> Values:
+        """Drag of the rotors by the air across them, and of the frame."""
+        size = np.sqrt((airflow**2).sum(axis=0))
+        rotors = self.vehicle.rotor_drag_n_s2_m * rotors_rad_s * across
+        return np.asarray(rotors + self.vehicle.frame_drag_kg_m * size * airflow)
+
+    def _turn_rotors(self, thrust: Values) -> None:
+        vehicle = self.vehicle
+        least = _LEAST_SHARE * vehicle.max_rad_s
+        wanted = np.sqrt(np.maximum(thrust, 0.0) / vehicle.thrust_n_s2)
+        np.clip(wanted, least, vehicle.max_rad_s, out=wanted)
+        driven = np.clip(wanted + vehicle.lead * (wanted - self._speed), 0.0, 1.2 * vehicle.max_rad_s)
+        driven[:, self._dead] = 0.0
+        slow = np.where(driven > self._speed, _DT_S / vehicle.motor_up_s, _DT_S / vehicle.motor_down_s)
+        self._speed = self._speed + (1 - np.exp(-slow)) * (driven - self._speed)
+        np.minimum(self._speed, vehicle.max_rad_s, out=self._speed)
+
+    def _turn_bodies(self) -> None:
+        half = np.vstack([np.zeros_like(self._rates[:1]), 0.5 * _DT_S * self._rates])
+        attitude = self._attitude + times(self._attitude, half)
+        self._attitude = attitude / np.sqrt((attitude**2).sum(axis=0))
+
+    def _stop(self, before: Values) -> None:
+        """Nobody passes the ground or a wall."""
+        if self._solids is None:
+            if self._at[2].min(initial=1.0) >= 0:
+                return
+            inside, floor = self._at[2] < 0, 0.0
+            self._at[2, inside] = floor
+        else:
+            gap = self._solids.gap_m(self._at.T)
+            inside = gap <= 0
+            if not inside.any():
+                return
+            self._at[:, inside] = before[:, inside]
+            self._at[2, inside] = np.maximum(self._at[2, inside], self._solids.ground_m(self._at[:, inside].T))
+        self._velocity[:, inside] = 0.0
+        self._rates[:, inside] = 0.0
+        self._attitude[:, inside] = [[1.0], [0.0], [0.0], [0.0]]
+
+    def _electrical(self) -> Values:
+        """What the batteries give now; 20 times a second is often enough for them."""
+        up, airflow, vehicle = body_up(self._attitude), self._velocity - self._air, self.vehicle
+        through = (up * airflow).sum(axis=0)
+        across = np.sqrt(((airflow - up * through) ** 2).sum(axis=0))
+        lift = np.maximum((vehicle.thrust_n_s2 * self._speed - vehicle.inflow_n_s2_m * through) * self._speed, 0.0)
+        mechanical = rotor_power_w(vehicle, self._speed, lift, across, through).sum(axis=0)
+        return np.where(self._dead, 0.0, electrical_w(self.vehicle, mechanical))
+
+    def blocked(self, first: Rows, second: Rows) -> Flags:
+        return super().blocked(first, second) if self._solids is None else self._solids.blocked(first, second)
+
+    def fall(self, row: int) -> None:
+        self._dead[row] = True
+
+    def positions(self) -> Rows:
+        return np.ascontiguousarray(self._at.T)
+
+    def velocities(self) -> Rows:
+        return np.ascontiguousarray(self._velocity.T)
+
+    def tilts_rad(self) -> Values:
+        """By how much each body leans."""
+        return np.asarray(np.arccos(np.clip(body_up(self._attitude)[2], -1.0, 1.0)))
+
+    def power_w(self) -> Values:
+        return self._power_w
+
+    def contacts(self) -> list[tuple[int, int]]:
+        return self._contacts.take()

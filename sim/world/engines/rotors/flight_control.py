@@ -1,0 +1,120 @@
+"""The control loops on board, each inside the next: rates, attitude, velocity. `mobility/guidance.py` holds positions.
+
+    velocity   a = k (wanted - v) + integral, within what the tilt limit gives; thrust direction and size from a + g
+    attitude   rates = 2 k_q sign(q_w) q_xyz of the quaternion error (Brescianini, Hehn and D'Andrea, ETH, 2013)
+    rates      torque = J k_r (wanted - rates) + rates x J rates
+    mixer      thrust and torques to the thrust of each rotor, by the inverse of the allocation matrix
+
+Gains follow from the vehicle's rate gain, each loop three times as slow as the one inside it. The nose stays north
+of east by nothing: yaw 0. Arrays are [components, UAVs].
+"""
+
+import math
+from typing import Final
+
+import numpy as np
+
+from sim.world.engines.contract import Values
+from sim.world.engines.rotors.vehicle import GRAVITY_M_S2, Vehicle
+
+_RATIO: Final = 3.0
+"""How much slower a loop is than the one inside it."""
+_INTEGRAL_PER_S: Final = 0.3
+_MOST_INTEGRAL_M_S2: Final = 4.0
+_MOST_ERROR_M_S: Final = 0.5
+"""The integral is for winds and drag, not for steps: larger errors count as this."""
+_MOST_RATE_RAD_S: Final = 6.0
+_LEAST_LIFT: Final = 0.2
+"""Of the weight: thrust never falls below, so that the vehicle can always turn."""
+_THRUST_RESERVE: Final = 0.9
+"""Of the greatest thrust: the rest is for attitude."""
+_YAW_SHARE: Final = 0.3
+"""Yaw is slower: it has only the rotors' torques."""
+
+
+class FlightControl:
+    """The controllers of all UAVs of one type."""
+
+    def __init__(self, vehicle: Vehicle, trim_m_s2: Values) -> None:
+        """`trim_m_s2`: acceleration against the drag of the flight in which the control takes over [3, UAVs]."""
+        self._vehicle = vehicle
+        self._inertia = np.array(vehicle.inertia_kg_m2)[:, None]
+        rate = vehicle.rate_per_s
+        self._rate_gain = np.array([rate, rate, rate * _YAW_SHARE])[:, None]
+        attitude = rate / _RATIO
+        self._attitude_gain = np.array([attitude, attitude, attitude * _YAW_SHARE])[:, None]
+        self.velocity_per_s = attitude / _RATIO
+        self._integral = trim_m_s2.copy()
+        self._mixer = np.linalg.inv(allocation(vehicle))
+        self._max_n = 4 * vehicle.thrust_n_s2 * vehicle.max_rad_s**2
+        self._tan_tilt = math.tan(math.radians(vehicle.tilt_deg))
+
+    def thrust_vector(self, wanted: Values, velocity: Values, dt_s: float) -> Values:
+        """The force that the rotors are to give [N], east, north, up, within tilt and thrust."""
+        error = wanted - velocity
+        mass, gravity = self._vehicle.mass_kg, GRAVITY_M_S2
+        acceleration = self.velocity_per_s * error + self._integral
+        lift = np.clip(acceleration[2] + gravity, _LEAST_LIFT * gravity, _THRUST_RESERVE * self._max_n / mass)
+        size = np.sqrt(acceleration[0] ** 2 + acceleration[1] ** 2)
+        room = np.sqrt(np.maximum((_THRUST_RESERVE * self._max_n / mass) ** 2 - lift**2, 0.0))
+        limit = np.minimum(lift * self._tan_tilt, room)
+        scale = np.minimum(1.0, limit / np.maximum(size, 1e-9))
+        free = scale >= 1.0  # who is at its limit stops integrating
+        grown = _INTEGRAL_PER_S * self.velocity_per_s * dt_s * np.clip(error, -_MOST_ERROR_M_S, _MOST_ERROR_M_S)
+        self._integral[:2] += np.where(free, grown[:2], 0.0)
+        self._integral[2] += grown[2]
+        np.clip(self._integral, -_MOST_INTEGRAL_M_S2, _MOST_INTEGRAL_M_S2, out=self._integral)
+        return np.asarray(mass * np.stack([acceleration[0] * scale, acceleration[1] * scale, lift]))
+
+    def rotor_thrusts(self, force: Values, attitude: Values, rates: Values) -> Values:
+        """The thrust wanted of each rotor [4, UAVs] for a force, at an attitude (quaternion w, x, y, z)."""
+        size = np.sqrt((force**2).sum(axis=0))
+        wanted = level_attitude(force / size)
+        error = times(conjugate(attitude), wanted)
+        target = 2 * self._attitude_gain * np.sign(error[0] + 1e-12) * error[1:]
+        np.clip(target, -_MOST_RATE_RAD_S, _MOST_RATE_RAD_S, out=target)
+        torque = self._inertia * self._rate_gain * (target - rates) + cross(rates, self._inertia * rates)
+        # Thrust along the body's own axis lifts less while it leans elsewhere than wanted.
+        along = np.maximum((body_up(attitude) * force).sum(axis=0), 0.3 * size)
+        return np.asarray(self._mixer @ np.vstack([along, torque]))
+
+
+def allocation(vehicle: Vehicle) -> Values:
+    """Thrust and torques about x, y, z of the body, by the thrust of each rotor [4, 4]."""
+    x = np.array([rotor[0] for rotor in vehicle.rotors_m])
+    y = np.array([rotor[1] for rotor in vehicle.rotors_m])
+    return np.stack([np.ones(4), y, -x, vehicle.torque_m * np.array(vehicle.spins, dtype=np.float64)])
+
+
+def level_attitude(up: Values) -> Values:
+    """The attitude whose body axis z is `up` (unit vectors) and that is turned from level by the shortest way."""
+    w = np.sqrt(np.maximum((1 + up[2]) / 2, 1e-9))
+    return np.stack([w, -up[1] / (2 * w), up[0] / (2 * w), np.zeros_like(w)])
+
+
+def body_up(q: Values) -> Values:
+    """The body's axis z, in east, north, up."""
+    w, x, y, z = q
+    return np.stack([2 * (x * z + w * y), 2 * (y * z - w * x), 1 - 2 * (x * x + y * y)])
+
+
+def times(a: Values, b: Values) -> Values:
+    """Hamilton's product of quaternions."""
+    aw, ax, ay, az = a
+    bw, bx, by, bz = b
+    return np.stack(
+        [
+            aw * bw - ax * bx - ay * by - az * bz,
+            aw * bx + ax * bw + ay * bz - az * by,
+            aw * by - ax * bz + ay * bw + az * bx,
+            aw * bz + ax * by - ay * bx + az * bw,
+        ]
+    )
+
+
+def conjugate(q: Values) -> Values:
+    return np.stack([q[0], -q[1], -q[2], -q[3]])
+
+
+def cross(a: Values, b: Values) -> Values:
+    return np.stack([a[1] * b[2] - a[2] * b[1], a[2] * b[0] - a[0] * b[2], a[0] * b[1] - a[1] * b[0]])

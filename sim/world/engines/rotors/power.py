@@ -1,0 +1,70 @@
+"""What flying costs: mechanical power of a rotor by momentum theory, and electrical power of a vehicle.
+
+    induced velocity   v_i = v_h^2 / sqrt(V_xy^2 + (V_z + v_i)^2),  v_h^2 = T / (2 rho A)       (Glauert)
+    induced power      1.15 T v_i;  climbing takes T V_z more
+    profile power      (k_m k_f w^3 - 1.15 T0 v_h0) (1 + 4.65 mu^2),  mu = V_xy / (w R);  T0, v_h0: in still air
+    electrical power   sum over rotors / drive efficiency + avionics
+
+The profile power is what the measured torque in still air leaves beside the induced power, and grows with the
+advance ratio (Bramwell, Helicopter Dynamics, 2nd ed., 2001). Leishman, Principles of Helicopter Aerodynamics, 2006,
+for the rest. V_z is the air's velocity through the rotor from above: positive in a climb. Not modeled: the vortex
+ring state of a fast descent, where the rotor is taken to need what it needs in hover.
+"""
+
+import math
+from typing import Final
+
+import numpy as np
+
+from sim.world.engines.contract import Values
+from sim.world.engines.rotors.vehicle import AIR_KG_M3, GRAVITY_M_S2, Vehicle
+
+INDUCED_LOSS: Final = 1.15
+_PROFILE_GROWTH: Final = 4.65
+_ROUNDS: Final = 12
+_FASTEST_M_S: Final = 60.0
+
+
+def induced_m_s(thrust_n: Values, across_m_s: Values, through_m_s: Values, *, disc_m2: float) -> Values:
+    """Glauert's induced velocity, by a damped fixed-point iteration; descents are taken as hover."""
+    hover2 = np.maximum(thrust_n, 0.0) / (2 * AIR_KG_M3 * disc_m2)
+    through = np.maximum(through_m_s, 0.0)
+    found = np.sqrt(hover2)
+    for _ in range(_ROUNDS):
+        found = 0.5 * (found + hover2 / np.maximum(np.sqrt(across_m_s**2 + (through + found) ** 2), 1e-9))
+    return np.asarray(found)
+
+
+def rotor_power_w(vehicle: Vehicle, speed_rad_s: Values, thrust_n: Values, across: Values, through: Values) -> Values:
+    """Mechanical power of a rotor."""
+    disc = math.pi * vehicle.rotor_radius_m**2
+    still_n = vehicle.thrust_n_s2 * speed_rad_s**2
+    still_v = np.sqrt(still_n / (2 * AIR_KG_M3 * disc))
+    profile = np.maximum(vehicle.torque_m * still_n * speed_rad_s - INDUCED_LOSS * still_n * still_v, 0.0)
+    mu = across / np.maximum(speed_rad_s * vehicle.rotor_radius_m, 1.0)
+    induced = INDUCED_LOSS * thrust_n * induced_m_s(thrust_n, across, through, disc_m2=disc)
+    return np.asarray(induced + thrust_n * np.maximum(through, 0.0) + profile * (1 + _PROFILE_GROWTH * mu**2))
+
+
+def electrical_w(vehicle: Vehicle, mechanical_w: Values) -> Values:
+    """Power taken from the battery for the mechanical power of all rotors together."""
+    return np.asarray(mechanical_w / vehicle.drive_efficiency + vehicle.avionics_w)
+
+
+def trimmed_w(vehicle: Vehicle, airspeed_m_s: Values, climb_m_s: Values) -> Values:
+    """Electrical power in steady flight: the rotors carry weight and drag, and nothing accelerates."""
+    speed = np.minimum(np.asarray(airspeed_m_s, dtype=np.float64), _FASTEST_M_S)
+    weight_n = vehicle.mass_kg * GRAVITY_M_S2
+    rotor = np.full_like(speed, math.sqrt(weight_n / (4 * vehicle.thrust_n_s2)))
+    lean = np.zeros_like(speed)
+    for _ in range(_ROUNDS):
+        frame_n = vehicle.frame_drag_kg_m * speed**2
+        rotors_n = (
+            4 * vehicle.rotor_drag_n_s2_m * rotor * speed * np.cos(lean)
+        )  # across the body, so that it lifts, too
+        lean = np.arcsin(np.minimum((rotors_n + frame_n * np.cos(lean)) / weight_n, 0.95))
+        thrust_n = (weight_n * np.cos(lean) + frame_n * np.sin(lean)) / 4
+        inflow = vehicle.inflow_n_s2_m * (speed * np.sin(lean) + climb_m_s * np.cos(lean))
+        rotor = (inflow + np.sqrt(inflow**2 + 4 * vehicle.thrust_n_s2 * thrust_n)) / (2 * vehicle.thrust_n_s2)
+    across, through = speed * np.cos(lean), speed * np.sin(lean) + climb_m_s * np.cos(lean)
+    return electrical_w(vehicle, 4 * rotor_power_w(vehicle, rotor, thrust_n, across, through))

@@ -1,0 +1,34 @@
+"""Line of sight between nodes: which pairs that could hear each other have something solid between them.
+
+Only pairs within the radio's reach are asked for, and only those of which one end is below the highest obstacle: above
+it nothing can stand in the way. Not modeled: diffraction over an edge, the Fresnel zone, how thick an obstacle is;
+survivors' phones, which are heard through walls.
+"""
+
+from array import array
+
+import numpy as np
+
+from emulator.channel.propagation import reach_m
+from emulator.channel.spatial import neighbors
+from fanet_mw.bus.messages import Obstructions
+from fanet_mw.scenario import Scenario
+from sim.world.engines.contract import Engine, Rows
+
+
+class Sight:
+    """Asks the engine."""
+
+    def __init__(self, scenario: Scenario, engine: Engine, *, top_m: float) -> None:
+        self._reach_m = reach_m(scenario.radio)
+        self._engine = engine
+        self._top_m = top_m
+
+    def obstructions(self, at: Rows, now_ns: int) -> Obstructions:
+        """The blocked pairs among nodes at `at` [nodes, 3]."""
+        found, _ = neighbors(at, self._reach_m)
+        found = found[found[:, 0] < found[:, 1]]
+        found = found[np.minimum(at[found[:, 0], 2], at[found[:, 1], 2]) < self._top_m]
+        if len(found):
+            found = found[self._engine.blocked(at[found[:, 0]], at[found[:, 1]])]
+        return Obstructions(now_ns, array("H", (found + 1).ravel().tolist()))

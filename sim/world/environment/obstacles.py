@@ -1,0 +1,180 @@
+"""What stands in the world: hills and buildings, from the scenario and its seed. ENU metres; no physics here.
+
+Seeded hills are a sum of a few cosine waves, scaled to [0, `terrain_m`]. Buildings are upright boxes from the plain
+at 0 to their height above the ground at their middle; seeded ones are aligned with the axes and keep clear of every
+start. Both may come from files instead (`heightmap.py`, `footprints.py`). Not modeled: streets, bridges, trees,
+anything with a hole.
+"""
+
+import math
+from collections.abc import Iterator
+from pathlib import Path
+from random import Random
+from typing import Final, NamedTuple
+
+import numpy as np
+
+from fanet_mw.errors import ConfigError
+from fanet_mw.rng import stream
+from fanet_mw.scenario import Scenario, World
+from sim.world.engines.contract import Rows
+from sim.world.environment import footprints, heightmap
+
+_CLEAR_M: Final = 5.0
+"""Distance between a seeded building and a UAV at its start."""
+_TRIES: Final = 200
+_CELLS: Final = 96
+"""Grid cells of the hills per side, at most."""
+_FILE_CELLS: Final = 255
+"""The same for hills from a file: pybullet takes no more."""
+_WAVES: Final = 8
+
+
+class Box(NamedTuple):
+    """One building: its middle, its extents, and its roof above 0."""
+
+    east: float
+    north: float
+    width: float
+    depth: float
+    roof: float
+    yaw: float = 0.0
+    """Angle by which it is turned, from east to north [rad]."""
+
+    def near(self, places: Rows, *, margin_m: float) -> bool:
+        """Whether any place is within the box, or closer to it than the margin."""
+        east, north = places[:, 0] - self.east, places[:, 1] - self.north
+        along = math.cos(self.yaw) * east + math.sin(self.yaw) * north
+        across = math.cos(self.yaw) * north - math.sin(self.yaw) * east
+        return bool(
+            (
+                (np.abs(along) < self.width / 2 + margin_m)
+                & (np.abs(across) < self.depth / 2 + margin_m)
+                & (places[:, 2] < self.roof + margin_m)
+            ).any()
+        )
+
+
+class Hills(NamedTuple):
+    """Heights above 0 at the corners of a square grid, centered at the origin; row by row to the north."""
+
+    heights: Rows
+    cell_m: float
+
+    def at(self, east: float, north: float) -> float:
+        """Height of the nearest grid point."""
+        side = self.heights.shape[0]
+        row, column = (min(side - 1, max(0, round(value / self.cell_m + (side - 1) / 2))) for value in (north, east))
+        return float(self.heights[row, column])
+
+
+class Obstacles(NamedTuple):
+    """Everything solid but the plain."""
+
+    hills: Hills | None
+    boxes: tuple[Box, ...]
+
+    @property
+    def top_m(self) -> float:
+        """No obstacle reaches higher."""
+        hill = float(self.hills.heights.max()) if self.hills else 0.0
+        return max([hill, *(box.roof for box in self.boxes)])
+
+
+def terrain(scenario: Scenario) -> Hills | None:
+    """The hills of a scenario, from its file or its seed; None for a plain."""
+    world = scenario.world
+    if world.heightmap:
+        return _hills_of_file(scenario)
+    return _hills(world, stream(scenario.seed, "terrain")) if world.terrain_m else None
+
+
+def obstacles(scenario: Scenario, starts: Rows) -> Obstacles:
+    """The obstacles of a scenario whose UAVs start at `starts` [nodes, 3]; ConfigError when one is in the way."""
+    world = scenario.world
+    hills = terrain(scenario)
+    if hills is not None:
+        key = f"world.heightmap = {world.heightmap}" if world.heightmap else f"world.terrain_m = {world.terrain_m:g}"
+        for node, (east, north, up) in enumerate(starts.tolist(), 1):
+            if up < hills.at(east, north):
+                raise ConfigError(
+                    f"node {node} starts at {up:g} m, below a hill of {hills.at(east, north):.0f} m; "
+                    f"{key} must leave room for nodes.altitude_m"
+                )
+    if world.buildings_geojson:
+        return Obstacles(hills, tuple(_of_file(world, hills, starts)))
+    if isinstance(world.buildings, int):
+        random = stream(scenario.seed, "buildings")
+        return Obstacles(hills, tuple(_seeded(world, random, hills, starts) for _ in range(world.buildings)))
+    boxes = []
+    for east, north, width, depth, height in world.buildings:
+        box = Box(east, north, width, depth, height + (hills.at(east, north) if hills else 0.0))
+        if box.near(starts, margin_m=0.0):
+            raise ConfigError(f"world.buildings: a node starts within the building at [{east:g}, {north:g}]")
+        boxes.append(box)
+    return Obstacles(hills, tuple(boxes))
+
+
+def _of_file(world: World, hills: Hills | None, starts: Rows) -> Iterator[Box]:
+    """Buildings of the scenario's GeoJSON file of which the middle lies in the area."""
+    height_m = sum(world.building_height_m) / 2
+    found = footprints.read(Path(world.buildings_geojson), origin_deg=world.origin_deg, height_m=height_m)
+    inside = [b for b in found if max(abs(b.east), abs(b.north)) <= world.area_m / 2]
+    if not inside:
+        raise ConfigError(
+            f"world.buildings_geojson: none of the {len(found)} buildings of {world.buildings_geojson} lies within "
+            f"world.area_m = {world.area_m:g}; is world.origin_deg right?"
+        )
+    for east, north, width, depth, yaw, height in inside:
+        box = Box(east, north, width, depth, height + (hills.at(east, north) if hills else 0.0), yaw)
+        if box.near(starts, margin_m=0.0):
+            raise ConfigError(
+                f"world.buildings_geojson: a node starts within the building at [{east:.0f}, {north:.0f}]"
+            )
+        yield box
+
+
+def _hills_of_file(scenario: Scenario) -> Hills:
+    """The file's heights on a square grid over the area; beyond the file its edge goes on."""
+    world = scenario.world
+    heights, cell_m = heightmap.read(
+        Path(world.heightmap), white_m=world.heightmap_white_m, pixel_m=world.heightmap_pixel_m
+    )
+    rows, columns = heights.shape
+    for side, count in (("east", columns), ("north", rows)):
+        if (count - 1) * cell_m < world.area_m - cell_m:
+            raise ConfigError(
+                f"world.heightmap: {world.heightmap} covers {(count - 1) * cell_m:g} m to the {side}, "
+                f"which must be >= world.area_m = {world.area_m:g}"
+            )
+    cells = max(8, min(_FILE_CELLS, math.ceil(world.area_m / cell_m)))
+    axis = np.linspace(-world.area_m / 2, world.area_m / 2, cells + 1)
+    east, north = np.meshgrid(axis, axis)
+    return Hills(heightmap.sample(heights, cell_m, east, north), world.area_m / cells)
+
+
+def _seeded(world: World, random: Random, hills: Hills | None, starts: Rows) -> Box:
+    half = world.area_m / 2
+    for _ in range(_TRIES):
+        east, north = random.uniform(-half, half), random.uniform(-half, half)
+        width, depth = random.uniform(*world.building_size_m), random.uniform(*world.building_size_m)
+        roof = random.uniform(*world.building_height_m) + (hills.at(east, north) if hills else 0.0)
+        box = Box(east, north, width, depth, roof)
+        if not box.near(starts, margin_m=_CLEAR_M):
+            return box
+    raise ConfigError(
+        f"world.buildings = {world.buildings}: no place found for one, clear of every start by {_CLEAR_M:g} m"
+    )
+
+
+def _hills(world: World, random: Random) -> Hills:
+    cells = max(8, min(_CELLS, math.ceil(4 * world.area_m / world.terrain_scale_m)))
+    axis = np.linspace(-world.area_m / 2, world.area_m / 2, cells + 1)
+    east, north = np.meshgrid(axis, axis)
+    surface = np.zeros_like(east)
+    for _ in range(_WAVES):
+        heading, phase = random.uniform(0, 2 * math.pi), random.uniform(0, 2 * math.pi)
+        per_m = 2 * math.pi / (world.terrain_scale_m * random.uniform(0.7, 1.4))
+        surface += np.cos(per_m * (math.cos(heading) * east + math.sin(heading) * north) + phase)
+    surface -= surface.min()
+    return Hills(np.asarray(surface * (world.terrain_m / max(float(surface.max()), 1e-9))), world.area_m / cells)

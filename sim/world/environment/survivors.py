@@ -1,0 +1,57 @@
+"""Where the survivors are, and which of them are buried. Ids run from 1."""
+
+import math
+from collections.abc import Callable
+from random import Random
+
+import numpy as np
+
+from fanet_mw.rng import stream
+from fanet_mw.scenario.model import Scenario
+from fanet_mw.units import Enu
+from sim.world.engines.contract import Flags, Rows, Values
+from sim.world.environment.obstacles import obstacles
+from sim.world.mobility.layout import positions
+
+
+def place(scenario: Scenario) -> list[Enu]:
+    """The true positions, on the plain: as listed, or uniform over the area or over the floors of its buildings."""
+    mission = scenario.mission
+    if mission.survivor_positions_m:
+        return [Enu(east, north, 0.0) for east, north in mission.survivor_positions_m]
+    random = stream(scenario.seed, "survivors")
+    if mission.survivors_in == "buildings" and mission.survivors:
+        return _in_buildings(scenario, random)
+    half = scenario.world.area_m / 2
+    return [Enu(random.uniform(-half, half), random.uniform(-half, half), 0.0) for _ in range(mission.survivors)]
+
+
+def _in_buildings(scenario: Scenario, random: Random) -> list[Enu]:
+    """A building for each, larger ones more often, and a place within it."""
+    boxes = obstacles(scenario, np.array(positions(scenario), dtype=np.float64)).boxes
+    chosen = random.choices(boxes, weights=[box.width * box.depth for box in boxes], k=scenario.mission.survivors)
+    places = []
+    for box in chosen:
+        along, across = (side * random.uniform(-0.5, 0.5) for side in (box.width, box.depth))
+        cos, sin = math.cos(box.yaw), math.sin(box.yaw)
+        places.append(Enu(box.east + cos * along - sin * across, box.north + sin * along + cos * across, 0.0))
+    return places
+
+
+class Survivors:
+    """The survivors of a run, as sensors need them; row i is survivor i + 1."""
+
+    places: Rows
+    """Positions, on the ground."""
+    buried: Flags
+    """Who lies under rubble: a phone and a voice come through it weakened, nothing is seen."""
+
+    def __init__(self, scenario: Scenario, ground_m: Callable[[Rows], Values] | None = None) -> None:
+        """`ground_m`: heights of the ground at places [n, 3]; None: a plain at 0."""
+        count = scenario.mission.survivors
+        self.places = np.array(place(scenario), dtype=np.float64).reshape(-1, 3)
+        if ground_m is not None and count:
+            self.places[:, 2] = ground_m(self.places)
+        self.buried = np.zeros(count, bool)
+        random = stream(scenario.seed, "buried")
+        self.buried[random.sample(range(count), round(scenario.mission.buried * count))] = True

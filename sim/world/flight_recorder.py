@@ -1,0 +1,80 @@
+"""How a swarm was flying when it was last heard of: what a world that starts again goes on from.
+
+The poses and setpoints are on the bus anyway. The launcher keeps the newest of each and hands them to the next world;
+what is not plausible is not kept, so that a world starts again as it did the first time rather than not at all.
+"""
+
+import threading
+from collections.abc import Callable, Mapping
+from typing import Final, NamedTuple
+
+import numpy as np
+
+from fanet_mw.bus import topics
+from fanet_mw.bus.messages import Message, Poses, Setpoint
+from fanet_mw.bus.topics import Topics, node_of
+from fanet_mw.errors import MalformedFrameError
+from fanet_mw.hosts.bus import OnSample
+from fanet_mw.scenario import Scenario
+from sim.world.engines.contract import Rows
+
+_FARTHEST: Final = 1e6
+"""Magnitude of a coordinate [m] or a velocity [m/s] that a swarm may have."""
+
+
+class Flight(NamedTuple):
+    """The state of all bodies, in the order of their ids, and where they were sent."""
+
+    positions: Rows
+    velocities: Rows
+    setpoints: Mapping[int, Setpoint]
+    """The last one of each node that had any."""
+
+
+class FlightRecorder:
+    """Hears the poses and setpoints of a swarm; keeps the newest of each."""
+
+    def __init__(self, scenario: Scenario, subscribe: Callable[[str, OnSample], None], names: Topics) -> None:
+        self._ids = list(scenario.node_ids)
+        self._lock = threading.Lock()  # the bus calls on threads of its own
+        self._poses = b""
+        self._setpoints: dict[int, bytes] = {}
+        subscribe(names.pose, self._hear_poses)
+        subscribe(names.all_setpoints, self._hear_setpoint)
+
+    def _hear_poses(self, _topic: str, payload: bytes) -> None:
+        with self._lock:
+            self._poses = payload
+
+    def _hear_setpoint(self, topic: str, payload: bytes) -> None:
+        node = node_of(topic)
+        if node in self._ids:
+            with self._lock:
+                self._setpoints[node] = payload
+
+    def last(self) -> Flight | None:
+        """The flight as last heard; None before the first poses, and when they are none of this swarm's."""
+        with self._lock:
+            poses, setpoints = self._poses, dict(self._setpoints)
+        heard = [message for message in _decoded(poses) if isinstance(message, Poses)]
+        if not heard or list(heard[-1].ids) != self._ids or len(heard[-1].states) != 6 * len(self._ids):
+            return None
+        states = np.array(heard[-1].states, dtype=np.float64).reshape(-1, 6)
+        if not (np.abs(states) <= _FARTHEST).all():  # false for what is not a number, too
+            return None
+        sent: dict[int, Setpoint] = {}
+        for node in sorted(setpoints):
+            for message in _decoded(setpoints[node]):
+                if (
+                    isinstance(message, Setpoint)
+                    and np.isfinite([*message.position, message.speed_m_s, *message.velocity]).all()
+                ):
+                    sent[node] = message
+        return Flight(states[:, :3].copy(), states[:, 3:].copy(), sent)
+
+
+def _decoded(payload: bytes) -> list[Message]:
+    try:
+        return topics.decode(payload)
+    except MalformedFrameError:
+        return []

@@ -1,0 +1,44 @@
+"""Mobility by formation: the whole layout moves as one and keeps its shape."""
+
+import numpy as np
+import numpy.typing as npt
+
+from fanet_mw.scenario import Scenario
+from sim.world.engines.contract import Rows
+from sim.world.mobility.contract import Track
+
+
+class Formation:
+    """The whole layout moves as one: from the middle of the area once round it, then again.
+
+    The way is a rectangle on which the formation's edges touch the area's, so that every part of it is overflown when
+    the layout is at least half as large as the area.
+    """
+
+    def __init__(self, starts: Rows, scenario: Scenario) -> None:
+        self._starts = starts
+        self._speed = scenario.mobility.speed_m_s
+        room = np.maximum(0.0, scenario.world.area_m / 2 - np.abs(starts[:, :2]).max(axis=0))
+        east, north = float(room[0]), float(room[1])
+        ring = [(east, 0.0), (east, north), (-east, north), (-east, -north), (east, -north), (east, 0.0)]
+        self._way = np.array([(0.0, 0.0), *ring])
+        self._legs = np.linalg.norm(np.diff(self._way, axis=0), axis=1)
+        self._ring_m = float(self._legs[1:].sum())
+
+    def track(self, t_s: float) -> Track:
+        offset, velocity = self._offset(self._speed * t_s)
+        places = self._starts.copy()
+        places[:, :2] += offset
+        velocities = np.zeros_like(places)
+        velocities[:, :2] = velocity
+        return Track(places, velocities)
+
+    def _offset(self, travelled_m: float) -> tuple[npt.NDArray[np.float64], npt.NDArray[np.float64]]:
+        if travelled_m > self._legs[0] and self._ring_m > 0:
+            travelled_m = self._legs[0] + (travelled_m - self._legs[0]) % self._ring_m
+        for leg, length in enumerate(self._legs):
+            if travelled_m <= length and length > 0:
+                direction = (self._way[leg + 1] - self._way[leg]) / length
+                return self._way[leg] + travelled_m * direction, self._speed * direction
+            travelled_m -= length
+        return self._way[-1], np.zeros(2)

@@ -1,0 +1,56 @@
+"""Where the nodes stand at the beginning. Node 1, the leader, is the first of each layout."""
+
+import math
+from typing import Final
+
+from fanet_mw.rng import stream
+from fanet_mw.scenario import Scenario, grid_columns
+from fanet_mw.units import Enu
+
+ON_GROUND_M: Final = 0.1
+"""Height of a UAV's middle that stands on the ground."""
+
+
+def positions(scenario: Scenario) -> list[Enu]:
+    """The start of every node, in order of id: the layout about the base, in the air or on the ground."""
+    places = _layout(scenario)
+    east, north = scenario.world.base_m
+    if east or north:
+        places = [Enu(at.east + east, at.north + north, at.up) for at in places]
+    if not scenario.nodes.on_ground:
+        return places
+    from sim.world.environment.obstacles import terrain  # brings numpy, which not every command needs
+
+    ground = terrain(scenario)
+    return [
+        Enu(at.east, at.north, ground.at(at.east, at.north) + ON_GROUND_M if ground else ON_GROUND_M) for at in places
+    ]
+
+
+def _layout(scenario: Scenario) -> list[Enu]:
+    """Every node's place about the origin."""
+    nodes = scenario.nodes
+    if nodes.layout == "grid":
+        columns = nodes.columns or grid_columns(nodes.count)
+        rows = math.ceil(nodes.count / columns)
+        west, south = -(columns - 1) * nodes.spacing_m / 2, -(rows - 1) * nodes.spacing_m / 2
+        return [
+            Enu(west + (i % columns) * nodes.spacing_m, south + (i // columns) * nodes.spacing_m, nodes.altitude_m)
+            for i in range(nodes.count)
+        ]
+    if nodes.layout == "line":
+        west = -(nodes.count - 1) * nodes.spacing_m / 2
+        return [Enu(west + i * nodes.spacing_m, 0.0, nodes.altitude_m) for i in range(nodes.count)]
+    if nodes.layout == "disc":
+        return _disc(scenario)
+    return [Enu(*place) for place in nodes.positions_m]
+
+
+def _disc(scenario: Scenario) -> list[Enu]:
+    """Uniform over a disc."""
+    random = stream(scenario.seed, "layout")
+    places = []
+    for _ in range(scenario.nodes.count):
+        radius, angle = scenario.nodes.radius_m * math.sqrt(random.random()), 2 * math.pi * random.random()
+        places.append(Enu(radius * math.cos(angle), radius * math.sin(angle), scenario.nodes.altitude_m))
+    return places

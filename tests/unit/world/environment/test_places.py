@@ -1,0 +1,310 @@
+"""Where things are: survivors, buildings and heights from files, no-fly areas; and what is refused by name."""
+
+import json
+import math
+import struct
+import zlib
+from collections.abc import Callable
+from pathlib import Path
+from typing import Any
+
+import numpy as np
+import pytest
+
+from fanet_mw.errors import ConfigError
+from fanet_mw.mavlink import Geodetic, to_geodetic
+from fanet_mw.scenario import Scenario, config
+from fanet_mw.units import Enu
+from sim.world.engines.contract import Engine
+from sim.world.engines.kinematic import Kinematic
+from sim.world.engines.pybullet import Physics
+from sim.world.engines.rotors.engine import Rotors
+from sim.world.engines.rotors.vehicle import IRIS
+from sim.world.environment import footprints, heightmap
+from sim.world.environment.obstacles import Box, Hills, Obstacles, obstacles
+from sim.world.environment.solids import Solids
+from sim.world.environment.survivors import Survivors, place
+from sim.world.incidents.no_fly import NoFly
+from sim.world.mobility.layout import positions
+
+MakeScenario = Callable[..., Scenario]
+PARIS = Geodetic(48.8566, 2.3522, 0.0)
+
+
+# --- survivors --------------------------------------------------------------------------------------------------------
+
+
+def test_survivors_are_where_the_list_says(make_scenario: MakeScenario) -> None:
+    scenario = make_scenario(**{"mission.survivors": 2, "mission.survivor_positions_m": ((10, -20), (300, 40))})
+    assert place(scenario) == [Enu(10, -20, 0), Enu(300, 40, 0)]
+
+
+def test_survivors_in_buildings_are_within_walls(make_scenario: MakeScenario) -> None:
+    scenario = make_scenario(
+        **{"mission.survivors": 40, "mission.survivors_in": "buildings", "world.buildings": 6, "world.area_m": 900}
+    )
+    boxes = obstacles(scenario, np.array(positions(scenario))).boxes
+    homes = [[i for i, b in enumerate(boxes) if b.near(np.array([at]), margin_m=0)] for at in place(scenario)]
+    assert all(homes)
+    assert len({home[0] for home in homes}) > 3
+    assert place(scenario) == place(scenario)
+
+
+def test_survivors_stand_on_the_hills_and_a_share_of_them_is_buried(make_scenario: MakeScenario) -> None:
+    scenario = make_scenario(
+        **{"mission.survivors": 20, "mission.buried": 0.3, "world.terrain_m": 40, "nodes.altitude_m": 90}
+    )
+    solids = Solids(obstacles(scenario, np.array(positions(scenario))))
+    found = Survivors(scenario, solids.ground_m)
+    assert found.buried.sum() == 6
+    assert found.places[:, 2].max() > 10
+    assert np.abs(solids.gap_m(found.places)).max() < 1e-9
+
+
+@pytest.mark.parametrize(
+    ("keys", "named"),
+    [
+        (
+            {"mission.survivors": 3, "mission.survivor_positions_m": ((1, 2),)},
+            "has 1 entries; .* mission.survivors = 3",
+        ),
+        (
+            {"mission.survivors": 1, "mission.survivor_positions_m": ((900, 2),), "world.area_m": 1000},
+            r"survivor_positions_m\.0 = \[900, 2\] must be within \+-world.area_m / 2 = 500",
+        ),
+        ({"mission.survivors": 1, "mission.survivors_in": "buildings"}, "needs world.buildings"),
+    ],
+)
+def test_places_that_cannot_be_are_refused_by_name(
+    make_scenario: MakeScenario, keys: dict[str, Any], named: str
+) -> None:
+    with pytest.raises(ConfigError, match=named):
+        make_scenario(**keys)
+
+
+# --- no-fly areas -----------------------------------------------------------------------------------------------------
+
+
+def test_entries_into_a_no_fly_area_are_counted_once_each() -> None:
+    area = NoFly([(100, 0, 30)], np.array([[0.0, 0, 50], [50, 0, 50]]))
+    for east in (60, 80, 100, 120, 140, 100):
+        area.watch(np.array([[0.0, 0, 50], [east, 0, 50]]))
+    assert area.entries == 2
+
+
+def test_a_start_within_a_no_fly_area_is_refused() -> None:
+    with pytest.raises(ConfigError, match=r"world.no_fly_m.1: node 2 starts within it"):
+        NoFly([(900, 0, 30), (50, 0, 30)], np.array([[0.0, 0, 50], [50, 0, 50]]))
+
+
+# --- heights from files -----------------------------------------------------------------------------------------------
+
+
+def slope(tmp_path: Path, *, columns: int = 61, rows: int = 41, cell_m: float = 20.0) -> Path:
+    """Rises by 0.1 m a metre to the east and by 0.05 to the north, from 200 m above the sea."""
+    lines = [f"ncols {columns}", f"nrows {rows}", "xllcorner 350000", "yllcorner 4100000", f"cellsize {cell_m}"]
+    for row in range(rows):  # the northernmost first
+        north = (rows - 1 - row) * cell_m
+        lines.append(" ".join(f"{200 + 0.1 * column * cell_m + 0.05 * north:.3f}" for column in range(columns)))
+    path = tmp_path / "slope.asc"
+    path.write_text("\n".join(lines) + "\n")
+    return path
+
+
+def test_an_ascii_grid_rises_where_the_file_does(make_scenario: MakeScenario, tmp_path: Path) -> None:
+    path = slope(tmp_path)
+    scenario = make_scenario(
+        **{"world.heightmap": str(path), "world.area_m": 800, "nodes.count": 2, "nodes.altitude_m": 200}
+    )
+    solids = Solids(obstacles(scenario, np.array(positions(scenario))))
+    middle, east, north = solids.ground_m(np.array([[0.0, 0, 0], [100, 0, 0], [0, 100, 0]])).tolist()
+    assert middle == pytest.approx(0.1 * 600 + 0.05 * 400, abs=0.01)
+    assert east - middle == pytest.approx(10, abs=0.01)
+    assert north - middle == pytest.approx(5, abs=0.01)
+
+
+def test_a_path_is_taken_from_the_scenario_files_folder(tmp_path: Path) -> None:
+    slope(tmp_path)
+    file = tmp_path / "s.toml"
+    file.write_text(
+        "duration_s = 5\n[clusters]\ncount = 1\n"
+        '[nodes]\ncount = 2\naltitude_m = 200\n[world]\narea_m = 800\nheightmap = "slope.asc"\n'
+    )
+    scenario = config.load(file)
+    assert obstacles(scenario, np.array(positions(scenario))).hills is not None
+
+
+@pytest.mark.parametrize(
+    ("text", "named"),
+    [
+        ("", "neither an ASCII grid"),
+        ("ncols 2\nnrows 2\ncellsize 10\n1 2 3\n", "3 heights, not 2 x 2"),
+        ("ncols 2\nnrows 2\ncellsize 10\nNODATA_value -9\n1 2 3 -9\n", "1 cells have no data"),
+        ("ncols 2\nnrows 2\ncellsize 0\n1 2 3 4\n", "cell size > 0"),
+        ("ncols 2\nnrows 2\ncellsize 10\n1 2 3 nan\n", "finite heights"),
+        ("ncols 2\nnrows 2\ncellsize 10\n1 2 3 4\n", r"covers 10 m to the east, which must be >= world.area_m = 800"),
+    ],
+)
+def test_a_heightmap_that_is_none_is_refused_by_name(
+    make_scenario: MakeScenario, tmp_path: Path, text: str, named: str
+) -> None:
+    path = tmp_path / "bad.asc"
+    path.write_text(text)
+    scenario = make_scenario(**{"world.heightmap": str(path), "world.area_m": 800})
+    with pytest.raises(ConfigError, match=named):
+        obstacles(scenario, np.array(positions(scenario)))
+    with pytest.raises(ConfigError, match="cannot be read"):
+        heightmap.read(tmp_path / "none.asc", white_m=1, pixel_m=1)
+
+
+def png(values: np.ndarray, kind: int, depth: int = 8) -> bytes:
+    """A grayscale picture of which every line has the same filter (PNG specification, 9.2)."""
+    step = depth // 8
+    raw = values.astype(">u2" if step == 2 else np.uint8).tobytes()
+    width = values.shape[1] * step
+    lines, above = b"", bytes(width)
+    for i in range(len(values)):
+        line, coded = raw[i * width : (i + 1) * width], bytearray()
+        for x in range(width):
+            a, b, c = (line[x - step] if x >= step else 0), above[x], (above[x - step] if x >= step else 0)
+            p = a + b - c
+            paeth = min((a, b, c), key=lambda v: abs(p - v))
+            coded.append((line[x] - (0, a, b, (a + b) // 2, paeth)[kind]) % 256)
+        lines, above = lines + bytes([kind]) + bytes(coded), line
+
+    def chunk(name: bytes, body: bytes) -> bytes:
+        return struct.pack(">I", len(body)) + name + body + struct.pack(">I", zlib.crc32(name + body))
+
+    head = struct.pack(">IIBBBBB", values.shape[1], values.shape[0], depth, 0, 0, 0, 0)
+    return b"\x89PNG\r\n\x1a\n" + chunk(b"IHDR", head) + chunk(b"IDAT", zlib.compress(lines)) + chunk(b"IEND", b"")
+
+
+@pytest.mark.parametrize("kind", [0, 1, 2, 3, 4])
+@pytest.mark.parametrize("depth", [8, 16])
+def test_a_picture_of_any_filter_and_depth_gives_its_heights(tmp_path: Path, kind: int, depth: int) -> None:
+    white = 2**depth - 1
+    values = np.random.default_rng(1).integers(0, white + 1, (7, 5))
+    values[0, 0], values[1, 1] = 0, white
+    path = tmp_path / "hills.png"
+    path.write_bytes(png(values, kind, depth))
+    heights, cell_m = heightmap.read(path, white_m=80.0, pixel_m=5.0)
+    assert cell_m == 5.0
+    assert heights[::-1] == pytest.approx(values / white * 80.0)
+
+
+def test_a_picture_with_colors_is_refused(tmp_path: Path) -> None:
+    path = tmp_path / "colors.png"
+    data = bytearray(png(np.zeros((2, 2), int), 0))
+    data[25] = 2  # color type RGB
+    path.write_bytes(bytes(data))
+    with pytest.raises(ConfigError, match="color type 2"):
+        heightmap.read(path, white_m=1, pixel_m=1)
+
+
+# --- buildings from files ---------------------------------------------------------------------------------------------
+
+
+def geojson(tmp_path: Path, *buildings: tuple[list[tuple[float, float]], dict[str, Any]]) -> Path:
+    """Buildings given by their corners in metres about Paris."""
+    features = []
+    for corners, properties in buildings:
+        ring = [to_geodetic(Enu(east, north, 0.0), PARIS) for east, north in (*corners, corners[0])]
+        polygon = {"type": "Polygon", "coordinates": [[[g.lon_deg, g.lat_deg] for g in ring]]}
+        features.append({"type": "Feature", "properties": properties, "geometry": polygon})
+    features.append({"type": "Feature", "properties": {}, "geometry": {"type": "Point", "coordinates": [2.35, 48.85]}})
+    path = tmp_path / "town.geojson"
+    path.write_text(json.dumps({"type": "FeatureCollection", "features": features}))
+    return path
+
+
+def turned(corners: list[tuple[float, float]], degrees: float, about: tuple[float, float]) -> list[tuple[float, float]]:
+    cos, sin = math.cos(math.radians(degrees)), math.sin(math.radians(degrees))
+    return [(about[0] + cos * x - sin * y, about[1] + sin * x + cos * y) for x, y in corners]
+
+
+HOUSE = [(-20.0, -5.0), (20.0, -5.0), (20.0, 5.0), (0.0, 5.0), (0.0, 4.0), (-18.0, 4.0), (-20.0, 2.0)]
+
+
+def test_a_building_is_the_smallest_rectangle_about_its_outline(tmp_path: Path) -> None:
+    path = geojson(
+        tmp_path,
+        (turned(HOUSE, 30, (100, 50)), {"height": "12 m"}),
+        (turned(HOUSE, 0, (-80, 0)), {"building:levels": 4}),
+        (turned(HOUSE, 0, (0, 90)), {}),
+    )
+    first, second, third = footprints.read(path, origin_deg=(PARIS.lat_deg, PARIS.lon_deg), height_m=19.0)
+    assert (first.east, first.north) == pytest.approx((100, 50), abs=0.05)
+    assert (first.width, first.depth, math.degrees(first.yaw)) == pytest.approx((40, 10, 30), abs=0.05)
+    assert (first.height, second.height, third.height) == (12.0, 12.0, 19.0)
+
+
+@pytest.mark.parametrize("engine", ["kinematic", "pybullet", "rotors"])
+def test_a_turned_building_hides_and_is_hit_where_it_stands(
+    make_scenario: MakeScenario, tmp_path: Path, engine: str
+) -> None:
+    path = geojson(tmp_path, (turned(HOUSE, 90, (0, 0)), {"height": 40}))
+    scenario = make_scenario(
+        **{"world.buildings_geojson": str(path), "nodes.count": 1, "nodes.layout": "explicit",
+           "nodes.positions_m": ((-60, 0, 20),), "world.area_m": 500},
+    )  # fmt: skip
+    solid = obstacles(scenario, np.array(positions(scenario)))
+    made: Engine
+    if engine == "pybullet":
+        made = Physics(physics_hz=240, obstacles=solid)
+    else:
+        made = Kinematic(Solids(solid)) if engine == "kinematic" else Rotors(IRIS, solids=Solids(solid))
+    made.reset(np.array([[-60.0, 0, 20]]))
+    first = np.array([[-60.0, 0, 20], [-60, 18, 20], [-60, 22, 20], [-60, 0, 41]])
+    assert made.blocked(first, first + np.array([120.0, 0, 0])).tolist() == [True, True, False, False]
+    for _ in range(200):
+        made.advance(0.05, np.array([[8.0, 0, 0]]))
+    assert made.contacts() == [(0, 1)]
+    assert -6.5 < made.positions()[0, 0] < -4.5, "its wall is at -5 m now"
+    made.close()
+
+
+@pytest.mark.parametrize(
+    ("text", "named"),
+    [
+        ("{", "is no JSON"),
+        ("[]", "no GeoJSON of buildings"),
+        ('{"type": "FeatureCollection", "features": []}', "holds no Polygon"),
+        ('{"type": "Polygon", "coordinates": [[[0, 0], [1, 1]]]}', "four positions"),
+        ('{"type": "Polygon", "coordinates": [[[200, 0], [1, 1], [1, 2], [0, 0]]]}', "longitude and latitude"),
+    ],
+)
+def test_a_file_without_buildings_is_refused_by_name(tmp_path: Path, text: str, named: str) -> None:
+    path = tmp_path / "bad.geojson"
+    path.write_text(text)
+    with pytest.raises(ConfigError, match=named):
+        footprints.read(path, origin_deg=None, height_m=10)
+
+
+def test_buildings_far_from_the_origin_and_on_a_start_are_refused(make_scenario: MakeScenario, tmp_path: Path) -> None:
+    path = str(geojson(tmp_path, (turned(HOUSE, 0, (0, 0)), {"height": 90})))
+    far = make_scenario(**{"world.buildings_geojson": path, "world.origin_deg": (10.0, 10.0)})
+    with pytest.raises(ConfigError, match=r"is world\.origin_deg right"):
+        obstacles(far, np.array(positions(far)))
+    there = make_scenario(**{"world.buildings_geojson": path, "nodes.count": 1})
+    with pytest.raises(ConfigError, match="a node starts within the building"):
+        obstacles(there, np.array(positions(there)))
+
+
+# --- rays -------------------------------------------------------------------------------------------------------------
+
+
+def test_rays_of_numpy_and_of_pybullet_agree() -> None:
+    axis = np.linspace(-200, 200, 41)
+    east, north = np.meshgrid(axis, axis)
+    hills = Hills(np.maximum(0.0, 30 - 0.002 * ((east - 60) ** 2 + north**2)), 10.0)
+    solid = Obstacles(hills, (Box(-60, 0, 40, 20, 35, 0.5), Box(-20, 90, 20, 20, 60)))
+    solids, physics = Solids(solid), Physics(physics_hz=240, obstacles=solid)
+    physics.reset(np.array([[0.0, 0, 300]]))
+    random = np.random.default_rng(3)
+    first = random.uniform([-190, -190, 1], [190, 190, 70], (800, 3))
+    second = random.uniform([-190, -190, 1], [190, 190, 70], (800, 3))
+    free = (solids.gap_m(first) > 1) & (solids.gap_m(second) > 1)
+    ours, theirs = solids.blocked(first[free], second[free]), physics.blocked(first[free], second[free])
+    assert 100 < ours.sum() < free.sum() - 100
+    assert (ours != theirs).mean() < 0.01, "only where a ray grazes a hill, of which the planes are bent differently"
+    physics.close()

@@ -1,0 +1,182 @@
+"""What UAVs do when their own computers fly them: each kind of setpoint, the ground, and a crash."""
+
+from collections.abc import Callable
+from typing import Any
+
+import numpy as np
+import pytest
+
+from fanet_mw.bus.messages import Gps, Message, Poses, Setpoint, SetpointKind
+from fanet_mw.bus.radio_control import Cut
+from fanet_mw.bus.topics import Topics
+from fanet_mw.scenario import Scenario
+from fanet_mw.trace import Collided
+from fanet_mw.units import Enu, S
+from sim.world.flight_recorder import Flight as FlightState
+from sim.world.world import World
+
+MakeScenario = Callable[..., Scenario]
+NAMES = Topics("m")
+STILL = Enu(0.0, 0.0, 0.0)
+
+
+class Flying:
+    """A world, its clock, and what it has said."""
+
+    def __init__(self, make_scenario: MakeScenario, **keys: Any) -> None:
+        given = {"nodes.count": 2, "nodes.spacing_m": 100, "mobility.model": "onboard", "world.area_m": 1000}
+        self.world = World(make_scenario(**given | keys), "m")
+        self.said: list[tuple[str, Message]] = []
+        self.now_ns = 0
+        self.world.start(0)
+
+    def ask(self, node: int, kind: SetpointKind, place: Enu = STILL, *, speed_m_s: float = 5.0, v: Enu = STILL) -> None:
+        self.world.receive(NAMES.setpoint(node), Setpoint(self.now_ns, place, speed_m_s, kind, v), self.now_ns)
+
+    def fly(self, seconds: float) -> "Flying":
+        until_ns = self.now_ns + round(seconds * S)
+        while (wake_ns := self.world.next_wake_ns()) is not None and wake_ns <= until_ns:
+            self.world.wake(wake_ns)
+            self.said += self.world.outbox
+            self.world.outbox.clear()
+        self.now_ns = until_ns
+        return self
+
+    def at(self, node: int) -> np.ndarray:
+        return self._state(node)[:3]
+
+    def velocity(self, node: int) -> np.ndarray:
+        return self._state(node)[3:]
+
+    def _state(self, node: int) -> np.ndarray:
+        poses = [message for _, message in self.said if isinstance(message, Poses)][-1]
+        return np.array(poses.states[6 * node - 6 : 6 * node])
+
+    @property
+    def collisions(self) -> list[tuple[int, int]]:
+        return [(r.node, r.other) for r in self.world.records if isinstance(r, Collided)]
+
+
+ENGINES = pytest.mark.parametrize("engine", ["kinematic", "pybullet"])
+
+
+@ENGINES
+def test_who_is_asked_nothing_stays_where_it_started(make_scenario: MakeScenario, engine: str) -> None:
+    flying = Flying(make_scenario, **{"world.engine": engine})
+    flying.fly(5)
+    assert flying.at(1) == pytest.approx([-50, 0, 50], abs=0.2)
+
+
+@ENGINES
+def test_a_velocity_is_flown_until_it_is_not_renewed_and_then_the_uav_stops(
+    make_scenario: MakeScenario, engine: str
+) -> None:
+    flying = Flying(make_scenario, **{"world.engine": engine})
+    for _ in range(10):
+        flying.ask(1, SetpointKind.VELOCITY, v=Enu(0.0, 4.0, 1.0))
+        flying.fly(0.5)
+    assert flying.velocity(1) == pytest.approx([0, 4, 1], abs=0.3)
+    flying.fly(6)
+    assert flying.velocity(1) == pytest.approx([0, 0, 0], abs=0.2)
+    assert 20 < flying.at(1)[1] < 30, "five seconds of four metres, and one more until it counts as lost"
+
+
+def test_hold_stops_on_the_spot(make_scenario: MakeScenario) -> None:
+    flying = Flying(make_scenario)
+    flying.ask(1, SetpointKind.POSITION, Enu(200.0, 0.0, 50.0), speed_m_s=10.0)
+    flying.fly(10)
+    place = flying.at(1).copy()
+    flying.ask(1, SetpointKind.HOLD)
+    flying.fly(10)
+    assert flying.at(1) == pytest.approx(place, abs=0.5), "it comes back to where it was told to hold"
+
+
+@ENGINES
+def test_a_uav_takes_off_flies_and_lands_without_a_collision(make_scenario: MakeScenario, engine: str) -> None:
+    flying = Flying(make_scenario, **{"world.engine": engine, "nodes.on_ground": True, "world.crash": "falls"})
+    flying.fly(3)
+    assert flying.at(1)[2] < 0.3, "nobody takes off unasked"
+    flying.ask(1, SetpointKind.TAKEOFF, Enu(0.0, 0.0, 30.0), speed_m_s=3.0)
+    flying.fly(20)
+    assert flying.at(1) == pytest.approx([-50, 0, 30], abs=0.5), "straight up, wherever the setpoint's place is"
+    flying.ask(1, SetpointKind.POSITION, Enu(0.0, 60.0, 30.0), speed_m_s=8.0)
+    flying.fly(20)
+    flying.ask(1, SetpointKind.LAND, speed_m_s=3.0)
+    flying.fly(40)
+    assert flying.at(1) == pytest.approx([0, 60, 0.1], abs=0.5)
+    assert flying.at(2)[2] < 0.3
+    assert flying.collisions == []
+    assert flying.world.report()["crashed"] == 0
+
+
+def test_who_is_told_to_land_while_it_takes_off_lands_and_takes_off_again(make_scenario: MakeScenario) -> None:
+    flying = Flying(make_scenario, **{"nodes.on_ground": True, "world.crash": "falls"})
+    flying.ask(1, SetpointKind.TAKEOFF, Enu(0.0, 0.0, 30.0), speed_m_s=2.0)
+    flying.fly(1.2)
+    assert 0.5 < flying.at(1)[2] < 3
+    flying.ask(1, SetpointKind.LAND, speed_m_s=2.0)
+    flying.fly(15)
+    assert flying.at(1)[2] < 0.35
+    flying.ask(1, SetpointKind.POSITION, Enu(-50.0, 0.0, 20.0), speed_m_s=5.0)
+    flying.fly(15)
+    assert flying.at(1) == pytest.approx([-50, 0, 20], abs=0.5)
+    assert flying.collisions == []
+
+
+def test_a_wreck_falls_its_radio_goes_and_it_senses_nothing_more(make_scenario: MakeScenario) -> None:
+    flying = Flying(make_scenario, **{"world.crash": "falls", "nodes.count": 3, "nodes.telemetry_hz": 1})
+    for node in (1, 2):
+        flying.ask(node, SetpointKind.POSITION, Enu(-50.0, 0.0, 50.0), speed_m_s=10.0)
+    flying.fly(30)
+    assert flying.collisions == [(2, 1)], "and no second time when they meet the ground"
+    assert flying.at(1)[2] == pytest.approx(0, abs=0.3)
+    assert flying.at(2)[2] == pytest.approx(0, abs=0.3)
+    assert flying.at(3)[2] == pytest.approx(50, abs=0.3)
+    cuts = [message for topic, message in flying.said if topic == NAMES.radio_control]
+    assert cuts == [Cut("crash-1", 1), Cut("crash-2", 2)]
+    late = [topic for topic, message in flying.said if isinstance(message, Gps) and message.t_ns > 25 * S]
+    assert set(late) == {NAMES.sensor(3, "gps")}
+    flying.ask(1, SetpointKind.TAKEOFF, Enu(0.0, 0.0, 30.0))
+    flying.fly(10)
+    assert flying.at(1)[2] == pytest.approx(0, abs=0.3), "a wreck does not take off"
+
+
+def test_a_world_that_goes_on_knows_its_wrecks(make_scenario: MakeScenario) -> None:
+    keys = {"nodes.count": 3, "mobility.model": "onboard", "world.crash": "falls", "world.area_m": 1000}
+    at = np.array([[0.0, 0, 0.1], [50, 0, 0.1], [100, 0, 50]])
+    landed = Setpoint(0, STILL, 1.0, SetpointKind.LAND)
+    world = World(make_scenario(**keys), "m", flight=FlightState(at, np.zeros((3, 3)), {2: landed}))
+    assert world.report()["crashed"] == 1, "the first; the second has landed, the third flies"
+
+
+def test_the_radio_of_a_wreck_may_survive(make_scenario: MakeScenario) -> None:
+    flying = Flying(make_scenario, **{"world.crash": "falls", "world.crash_radio": "survives"})
+    flying.ask(2, SetpointKind.POSITION, Enu(-50.0, 0.0, 50.0), speed_m_s=10.0)
+    flying.fly(30)
+    assert flying.world.report()["crashed"] == 2
+    assert not [message for topic, message in flying.said if topic == NAMES.radio_control]
+
+
+def test_without_crashes_a_contact_is_counted_and_all_fly_on(make_scenario: MakeScenario) -> None:
+    flying = Flying(make_scenario)
+    flying.ask(2, SetpointKind.POSITION, Enu(-50.0, 0.0, 50.0), speed_m_s=10.0)
+    flying.fly(30)
+    assert flying.collisions == [(2, 1)]
+    assert flying.at(2)[2] == pytest.approx(50, abs=0.3)
+
+
+def test_the_swarm_starts_at_its_base(make_scenario: MakeScenario) -> None:
+    flying = Flying(make_scenario, **{"world.base_m": (-900.0, 40.0), "nodes.spacing_m": 10})
+    flying.fly(1)
+    assert [flying.at(node)[:2].tolist() for node in (1, 2)] == [[-905.0, 40.0], [-895.0, 40.0]]
+    flying.ask(1, SetpointKind.POSITION, Enu(-890.0, 0.0, 50.0), speed_m_s=10.0)
+    flying.fly(20)
+    assert flying.at(1) == pytest.approx([-890, 0, 50], abs=0.5), "the base may lie outside the area"
+
+
+def test_a_velocity_that_is_no_number_is_counted_and_nobody_moves(make_scenario: MakeScenario) -> None:
+    flying = Flying(make_scenario)
+    flying.ask(1, SetpointKind.VELOCITY, v=Enu(float("nan"), 0.0, 0.0))
+    flying.fly(2)
+    assert flying.world.report()["malformed"] == 1
+    assert flying.at(1) == pytest.approx([-50, 0, 50])

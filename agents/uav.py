@@ -10,9 +10,8 @@ from typing import Any, Final, NamedTuple
 from agents.autopilot import Autopilot
 from agents.avoidance import CollisionAvoidance
 from agents.dead_reckoning import DeadReckoning
+from agents.mission.applications import PlannedSearch, Rescue
 from agents.onboard import INNER_ID, Onboard
-from agents.rescue import Rescue
-from agents.search import PlannedSearch
 from agents.steady_fix import SteadyFix
 from agents.telemetry import Telemetry
 from agents.traffic import Load

@@ -19,12 +19,14 @@ from agents.mission.auction import Auction
 from agents.mission.constraints import avoiding, grown_m, staying_near
 from agents.mission.finds import Find, Finds, ground_place
 from agents.mission.half_planes import HalfPlane, nearest
+from agents.mission.outbox import Outbox, Packet, ReportFormat
 from agents.mission.pattern import Pattern, fitted
 from agents.mission.phone_filter import REFERENCE_LOSS_DB, Estimate, PhoneModel
 from agents.mission.planner import STATUS_S, Planner, pattern_of
+from agents.mission.speed import approach_speed_m_s
 from fanet_mw.rng import stream
 from fanet_mw.scenario import Scenario
-from fanet_mw.trace import Approaching, Arrived, Confirmed, Detected, Planned, Record
+from fanet_mw.trace import Approaching, Arrived, Confirmed, Detected, Planned
 from fanet_mw.units import MAX_NODES, MS, US, Enu, NodeId, S, seconds_to_ns
 from fanet_mw.wire.inner import Survivor
 from fanet_mw.wire.search import Bid, Bids, Found, Search, Status, Told, encode_bids
@@ -114,24 +116,24 @@ class _Response:
 class Searcher:
     """One UAV."""
 
-    def __init__(self, scenario: Scenario, node: NodeId, *, position: Enu) -> None:
+    def __init__(self, scenario: Scenario, node: NodeId, *, position: Enu, outbox: Outbox) -> None:
         mission = scenario.mission
         self._node = node
         self._config = mission
         self._reach_m = scenario.radio.range_m
-        self._most_m_s = mission.approach_speed_m_s
+        self._most_m_s = approach_speed_m_s(scenario, node)
         self._config_speed_m_s = max(0.1, scenario.mobility.speed_m_s)
         self._report_ns = seconds_to_ns(mission.report_interval_s)
         self._random = stream(scenario.seed, "mission", node).random
         self._heights = scenario.nodes.altitude_m
         model = phone_model(scenario)
         self._fitted = formation(scenario, scenario.nodes.count)
-        self._planner = Planner(node, expected=scenario.nodes.count, deploy_speed_m_s=0.9 * mission.approach_speed_m_s)
+        least_m_s, _ = mission.approach_speeds_m_s
+        self._planner = Planner(node, expected=scenario.nodes.count, deploy_speed_m_s=0.9 * least_m_s)
         self._auction = Auction(node)
         self.finds = Finds(model)
-        self.records: list[Record] = []
-        self.packets: list[bytes] = []
-        """Inner frames to flood to everyone, for the host to take."""
+        self._outbox = outbox
+        self._report_format = ReportFormat(scenario, node)
         self.velocity: Enu | None = None
         """A new velocity to fly, for the host to take."""
         self._position, self._own_velocity = position, Enu(0.0, 0.0, 0.0)
@@ -174,7 +176,7 @@ class Searcher:
         if self._planner.review(self._fitted, now_ns=now_ns):
             self._adopt(now_ns)
         plans, self._planner.to_tell = self._planner.to_tell, []
-        self.packets += [plan.encode_frame(self._node) for plan in plans]
+        self._outbox.packets += [Packet(plan.encode_frame(self._node)) for plan in plans]
         for survivor in self.finds.open():
             self._confirm(survivor, now_ns)
         self._tell_finds(now_ns)
@@ -206,12 +208,12 @@ class Searcher:
             report = Survivor(now_ns // US, survivor, self._node, self._position, rssi_dbm)
             find = self.finds.known.get(survivor)
             if find is None or self._node not in find.reporters:
-                self.records.append(Detected(now_ns, self._node, survivor, round(rssi_dbm, 2)))
+                self._outbox.records.append(Detected(now_ns, self._node, survivor, round(rssi_dbm, 2)))
             find = self.finds.report(report, now_ns=now_ns, own=True)
             last_ns = self._told_ns.get(survivor)
             if find.confirmed is None and (last_ns is None or now_ns - last_ns >= self._report_ns):
                 self._told_ns[survivor] = now_ns
-                self.packets.append(report.encode_frame(self._node))
+                self._outbox.packets.append(self._report_format.packet(report))
 
     def altimeter(self, above_ground_m: float | None, *, now_ns: int) -> None:
         """The rangefinder tells how high we are over whatever is below; None: nothing is within its range."""
@@ -250,7 +252,7 @@ class Searcher:
         if find.confirmed is not None and now_ns - self._struck_ns.get(report.survivor, now_ns) > _CONFIRM_AGAIN_NS:
             self._struck_ns[report.survivor] = now_ns
             if self._place is not None and (report.reporter + self._node) % 4 == 0:
-                self.packets.append(find.confirmed.encode_frame(self._node))
+                self._outbox.packets.append(Packet(find.confirmed.encode_frame(self._node)))
 
     def bids(self, bids: Sequence[Bid], *, now_ns: int) -> None:
         """A neighbor passed bids on."""
@@ -309,7 +311,7 @@ class Searcher:
         plan = self._planner.plan
         status = Status(now_ns // US, self._position, self._node, plan.revision if plan else 0, 100)
         self._planner.status(status, now_ns=now_ns)
-        self.packets.append(status.encode_frame(self._node))
+        self._outbox.packets.append(Packet(status.encode_frame(self._node)))
         self._next_status_ns = now_ns + round((0.8 + 0.4 * self._random()) * STATUS_S * S)
 
     def _tell_finds(self, now_ns: int) -> None:
@@ -318,7 +320,7 @@ class Searcher:
                 continue
             found = self.finds.known[survivor].confirmed
             assert found is not None, "only what is confirmed is announced"
-            self.packets.append(found.encode_frame(self._node))
+            self._outbox.packets.append(Packet(found.encode_frame(self._node)))
             if left > 1:
                 self._confirming[survivor] = left - 1, now_ns + _CONFIRM_AGAIN_NS
             else:
@@ -334,7 +336,9 @@ class Searcher:
         if place is None or place.sigma_m > _WORSE * before or place.sigma_m > 60.0:
             return
         self._told_sigma[survivor] = place.sigma_m
-        self.packets.append(Found(now_ns // US, survivor, *place, self._node, confirmed=False).encode_frame(self._node))
+        self._outbox.packets.append(
+            Packet(Found(now_ns // US, survivor, *place, self._node, confirmed=False).encode_frame(self._node))
+        )
 
     # --- finds ----------------------------------------------------------------------------------------------------
 
@@ -348,7 +352,9 @@ class Searcher:
             return
         found = Found(now_ns // US, survivor, *place, self._node, confirmed=True)
         self.finds.told(found, now_ns=now_ns)
-        self.records.append(Confirmed(now_ns, self._node, survivor, round(place.east_m, 2), round(place.north_m, 2)))
+        self._outbox.records.append(
+            Confirmed(now_ns, self._node, survivor, round(place.east_m, 2), round(place.north_m, 2))
+        )
         self._confirming[survivor] = _CONFIRMATIONS, now_ns
         self._strike(survivor, now_ns)
 
@@ -417,7 +423,7 @@ class Searcher:
             place = find.place()
             if place is not None and len(find.reporters) >= self._config.reports_to_approach:
                 response.announced = True
-                self.records.append(
+                self._outbox.records.append(
                     Approaching(
                         now_ns, self._node, response.survivor, len(find.reporters),
                         round(place.east_m, 2), round(place.north_m, 2),
@@ -457,7 +463,9 @@ class Searcher:
         self._place = plan.nodes.index(self._node) if self._node in plan.nodes else None
         if first:
             self._left_from, self._left_ns = self._position, max(now_ns, plan.start_us * US)
-        self.records.append(Planned(now_ns, self._node, plan.revision, -1 if self._place is None else self._place))
+        self._outbox.records.append(
+            Planned(now_ns, self._node, plan.revision, -1 if self._place is None else self._place)
+        )
 
     def _lane(self, now_ns: int) -> tuple[Enu, Enu]:
         """Where our lane wants us now, and how that place moves."""
@@ -560,7 +568,7 @@ class Searcher:
                 return east_m, north_m
             arrived_ns = self._arrived_ns[survivor] = now_ns
             if response is not None and response.survivor == survivor:
-                self.records.append(Arrived(now_ns, self._node, survivor))
+                self._outbox.records.append(Arrived(now_ns, self._node, survivor))
         seen = self.finds.known[survivor].filter.is_seen
         searched_s = (now_ns - arrived_ns) / S
         radius = _RING_M if seen else _RING_M + _SPIRAL_M * searched_s / 20.0

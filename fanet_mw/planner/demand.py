@@ -10,7 +10,7 @@ from typing import NamedTuple
 
 from fanet_mw import wire
 from fanet_mw.bounds import Bounded, DelayBound, Refused
-from fanet_mw.routing.clustered.tdma.urgent import REPORT_BYTES, WARNING_BYTES
+from fanet_mw.routing.clustered.tdma.urgent import WARNING_BYTES, report_bytes
 from fanet_mw.scenario import Scenario, Traffic
 from fanet_mw.units import NodeId, seconds_to_ns
 
@@ -51,7 +51,8 @@ def demands(scenario: Scenario, sources: Sequence[NodeId] | None = None) -> list
         found.append(TrafficClass("warning", WARNING_BYTES, interval_ns, _all(scenario), wire.PRIORITY_SAFETY))
     if scenario.mission.survivors:
         interval_ns = seconds_to_ns(scenario.mission.report_interval_s)
-        found.append(TrafficClass("report", REPORT_BYTES, interval_ns, _all(scenario), wire.PRIORITY_REPORT))
+        priority = wire.PRIORITIES[scenario.mission.report_priority]
+        found.append(TrafficClass("report", report_bytes(scenario), interval_ns, _all(scenario), priority))
     for name, traffic in scenario.traffic_classes.items():
         first = traffic is scenario.traffic
         if traffic.arrivals in ("saturated", "poisson", "trace"):

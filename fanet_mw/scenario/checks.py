@@ -119,7 +119,8 @@ def _too_small_frames(scenario: Scenario) -> Iterator[str]:
         pairs = scenario.nodes.count * (scenario.nodes.count - 1) // 2
         least["links of timetables"] = min(_MOST_LINKS_MESSAGES, -(-pairs // _LINKS)) * size["FANET_LINKS"]
     if scenario.mission.survivors:
-        least["survivor reports"] = size["FANET_SURVIVOR"]
+        padded = scenario.mission.report_bytes - size["FANET_ROUTE"]
+        least["survivor reports"] = max(size["FANET_SURVIVOR"], padded)
     if scenario.mission.collision_horizon_s:
         least["warnings"] = size["COLLISION"]
     for what, inner in least.items():

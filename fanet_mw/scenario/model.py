@@ -70,6 +70,9 @@ class Nodes(Section):
     """`disc`: its radius."""
     columns: Count | None = None
     """Grid columns; by default the widest near-square factorisation in the manner of 9 x 5."""
+    leader_at: Literal["first", "middle"] = "first"
+    """Layouts `grid` and `line`: node 1, the leader, stands at the first place, or at the one nearest to the middle;
+    the others take the remaining places in order."""
     altitude_m: Length = 50.0
     """Height at which the nodes start and fly; every layout but `explicit` uses it."""
     on_ground: bool = False
@@ -342,6 +345,11 @@ class World(Section):
         return round(self.tick_ms * MS)
 
 
+LEAST_REPORT_BYTES: Final = 96
+"""A report of 79 bytes, and the shortest filler."""
+ApproachSpeed = Annotated[float, Field(ge=1e-3, le=1000)]
+
+
 class Mission(Section):
     """Search and rescue: survivors, the sensor that finds their phones, and the rule that moves the UAVs."""
 
@@ -363,6 +371,10 @@ class Mission(Section):
     """`search`: as many UAVs go to a survivor, chosen by auction; the others search on."""
     report_interval_s: Interval = 5.0
     """How often a UAV repeats its report of a survivor it still hears."""
+    report_bytes: Annotated[int, Field(ge=0, le=2304)] = 0
+    """UDP payload of a report on the air, our routing header included; 0: no more than it needs, which is 79 bytes."""
+    report_priority: Literal["safety", "report", "bulk"] = "report"
+    """Which reports go first where several packets wait, and after which time they expire (`routing`)."""
     scan_interval_s: Interval = 1.0
     """How often the Wi-Fi sensor of a UAV looks for phones."""
     phone_power_dbm: Level = 15.0
@@ -373,8 +385,9 @@ class Mission(Section):
     """The sensor hears a phone at this level or above."""
     shadowing_db: Annotated[float, Field(ge=0, le=30)] = 4.0
     """Standard deviation of the shadowing of a phone's signal."""
-    approach_speed_m_s: Annotated[float, Field(ge=1e-3, le=1000)] = 10.0
-    """Speed at which a UAV approaches a survivor."""
+    approach_speed_m_s: ApproachSpeed | tuple[ApproachSpeed, ApproachSpeed] = 10.0
+    """Speed at which a UAV approaches a survivor; as [least, greatest], each UAV has a speed of its own, drawn by the
+    seed."""
     arrival_m: SomeLength = 30.0
     """A UAV that is this near to a survivor has arrived."""
     dwell_s: Duration = 10.0
@@ -385,6 +398,21 @@ class Mission(Section):
     """A UAV that foresees a loss of separation within this time warns the other one, and both avoid; 0: no warnings."""
     collision_repeat_s: Annotated[float, Field(gt=0, le=120)] = 1.0
     """A warning is repeated at this interval until the closest point of approach."""
+
+    @property
+    def approach_speeds_m_s(self) -> tuple[float, float]:
+        """Least and greatest."""
+        given = self.approach_speed_m_s
+        return given if isinstance(given, tuple) else (given, given)
+
+    @model_validator(mode="after")
+    def _report_fits_its_content(self) -> Self:
+        least, most = self.approach_speeds_m_s
+        if least > most:
+            raise ValueError(f"mission.approach_speed_m_s = [{least:g}, {most:g}] must be [least, greatest]")
+        if 0 < self.report_bytes < LEAST_REPORT_BYTES:
+            raise ValueError(f"mission.report_bytes = {self.report_bytes} must be 0 or >= {LEAST_REPORT_BYTES}")
+        return self
 
     @model_validator(mode="after")
     def _survivors_have_positions(self) -> Self:

@@ -9,7 +9,7 @@ from sim.world.mobility.contract import Track
 
 
 class Formation:
-    """The whole layout moves as one: from the middle of the area once round it, then again.
+    """The whole layout moves as one: from the base to the middle of the area, once round it, then again.
 
     The way is a rectangle on which the formation's edges touch the area's, so that every part of it is overflown when
     the layout is at least half as large as the area.
@@ -18,12 +18,16 @@ class Formation:
     def __init__(self, starts: Rows, scenario: Scenario) -> None:
         self._starts = starts
         self._speed = scenario.mobility.speed_m_s
-        room = np.maximum(0.0, scenario.world.area_m / 2 - np.abs(starts[:, :2]).max(axis=0))
+        base = np.array(scenario.world.base_m)
+        room = np.maximum(0.0, scenario.world.area_m / 2 - np.abs(starts[:, :2] - base).max(axis=0))
         east, north = float(room[0]), float(room[1])
         ring = [(east, 0.0), (east, north), (-east, north), (-east, -north), (east, -north), (east, 0.0)]
-        self._way = np.array([(0.0, 0.0), *ring])
+        to_middle = [(0.0, 0.0)] if base.any() else []
+        self._way = np.array([tuple(base), *to_middle, *ring]) - base
+        """Offsets from the start."""
         self._legs = np.linalg.norm(np.diff(self._way, axis=0), axis=1)
-        self._ring_m = float(self._legs[1:].sum())
+        self._approach_m = float(self._legs[: len(to_middle) + 1].sum())
+        self._ring_m = float(self._legs[len(to_middle) + 1 :].sum())
 
     def track(self, t_s: float) -> Track:
         offset, velocity = self._offset(self._speed * t_s)
@@ -34,8 +38,8 @@ class Formation:
         return Track(places, velocities)
 
     def _offset(self, travelled_m: float) -> tuple[npt.NDArray[np.float64], npt.NDArray[np.float64]]:
-        if travelled_m > self._legs[0] and self._ring_m > 0:
-            travelled_m = self._legs[0] + (travelled_m - self._legs[0]) % self._ring_m
+        if travelled_m > self._approach_m and self._ring_m > 0:
+            travelled_m = self._approach_m + (travelled_m - self._approach_m) % self._ring_m
         for leg, length in enumerate(self._legs):
             if travelled_m <= length and length > 0:
                 direction = (self._way[leg + 1] - self._way[leg]) / length

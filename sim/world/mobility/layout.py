@@ -13,7 +13,7 @@ ON_GROUND_M: Final = 0.1
 
 def positions(scenario: Scenario) -> list[Enu]:
     """The start of every node, in order of id: the layout about the base, in the air or on the ground."""
-    places = _layout(scenario)
+    places = _with_leader(_layout(scenario), scenario)
     east, north = scenario.world.base_m
     if east or north:
         places = [Enu(at.east + east, at.north + north, at.up) for at in places]
@@ -25,6 +25,14 @@ def positions(scenario: Scenario) -> list[Enu]:
     return [
         Enu(at.east, at.north, ground.at(at.east, at.north) + ON_GROUND_M if ground else ON_GROUND_M) for at in places
     ]
+
+
+def _with_leader(places: list[Enu], scenario: Scenario) -> list[Enu]:
+    """The places with that of node 1 first, which may be the one in the middle."""
+    if scenario.nodes.leader_at == "first" or scenario.nodes.layout not in ("grid", "line"):
+        return places
+    middle = min(range(len(places)), key=lambda i: (math.hypot(places[i].east, places[i].north), i))
+    return [places[middle], *places[:middle], *places[middle + 1 :]]
 
 
 def _layout(scenario: Scenario) -> list[Enu]:

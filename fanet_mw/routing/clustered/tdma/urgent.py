@@ -8,7 +8,12 @@ from fanet_mw.scenario import Scenario
 
 WARNING_BYTES: Final = wire.HEADER_BYTES + 19 + wire.OVERHEAD
 """MAVLink's COLLISION has 19 bytes (common.xml)."""
-REPORT_BYTES: Final = wire.HEADER_BYTES + wire.SURVIVOR.layout.size + wire.OVERHEAD
+_REPORT_BYTES: Final = wire.HEADER_BYTES + wire.SURVIVOR.layout.size + wire.OVERHEAD
+
+
+def report_bytes(scenario: Scenario) -> int:
+    """How long a packet with a survivor report is."""
+    return scenario.mission.report_bytes or _REPORT_BYTES
 
 
 def reserved(scenario: Scenario) -> Mapping[int, int]:
@@ -17,6 +22,7 @@ def reserved(scenario: Scenario) -> Mapping[int, int]:
     found = {}
     if mission.collision_horizon_s:
         found[wire.PRIORITY_SAFETY] = WARNING_BYTES
-    if mission.survivors:
-        found[wire.PRIORITY_REPORT] = REPORT_BYTES
+    if mission.survivors and mission.report_priority != "bulk":
+        priority = wire.PRIORITIES[mission.report_priority]
+        found[priority] = max(report_bytes(scenario), found.get(priority, 0))
     return found

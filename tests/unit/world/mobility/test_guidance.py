@@ -64,6 +64,22 @@ def test_a_formation_goes_round_the_area_again_and_again_at_its_speed(make_scena
     assert (steps > 30).all(), "it never stops, whatever the round"
 
 
+def test_a_formation_flies_from_its_base_to_the_middle_and_then_goes_round_within_the_area(
+    make_scenario: MakeScenario,
+) -> None:
+    base = np.array([0.0, -1750.0, 0.0])
+    scenario = make_scenario(**{
+        "nodes.count": 3, "mobility.model": "formation", "mobility.speed_m_s": 10, "world.area_m": 1000,
+        "world.base_m": (0, -1750),
+    })  # fmt: skip
+    found = Guidance(STARTS + base, scenario)
+    for t_s in (0, 50, 175):
+        assert found.track(t_s).places == pytest.approx(STARTS + base + [0, 10 * t_s, 0], abs=1e-9)
+    way = np.array([found.track(t_s).places[:, :2] for t_s in range(175, 3000, 5)])
+    assert np.abs(way).max() <= 500 + 1e-6
+    assert (way[:, 0] == 0).all(axis=1).sum() == 1, "it comes to the middle once only"
+
+
 def test_who_crosses_goes_to_the_opposite_point_and_back(make_scenario: MakeScenario) -> None:
     found = guidance(make_scenario, "crossing")
     east = [found.track(t_s).places[1, 0] for t_s in (0, 10, 20, 30, 40, 50)]

@@ -29,3 +29,10 @@ def test_a_disc_is_filled_evenly(make_scenario: MakeScenario) -> None:
 def test_a_line_is_centered(make_scenario: MakeScenario) -> None:
     keys = {"nodes.layout": "line", "nodes.count": 4, "nodes.spacing_m": 100}
     assert [place.east for place in positions(make_scenario(**keys))] == [-150, -50, 50, 150]
+
+
+def test_the_leader_may_stand_in_the_middle_and_the_others_take_the_rest_in_order(make_scenario: MakeScenario) -> None:
+    keys = {"nodes.layout": "grid", "nodes.count": 45, "nodes.columns": 9, "world.base_m": (0, -1750)}
+    first, middle = positions(make_scenario(**keys)), positions(make_scenario(**keys, **{"nodes.leader_at": "middle"}))
+    assert (middle[0].east, middle[0].north) == (0, -1750)
+    assert middle[1:] == [place for place in first if place != middle[0]]

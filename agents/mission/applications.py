@@ -1,8 +1,13 @@
-"""The planned search as an application: what the searcher of this UAV senses, is told, tells and flies."""
+"""Search and rescue as applications: by the paper's rule, or by a plan.
+
+Each hands what its UAV senses and is told to the mission, and empties the mission's outbox into its port.
+"""
 
 from functools import lru_cache
 from typing import Final
 
+from agents.mission.outbox import Outbox
+from agents.mission.paper_rule import PaperRule
 from agents.mission.searcher import Heard, Searcher
 from fanet_mw import mavlink, wire
 from fanet_mw.application import Application, AppPort, Course, Received, SensorReading
@@ -10,7 +15,7 @@ from fanet_mw.bus.messages import Altimeter, Camera, Gps, WifiScan
 from fanet_mw.errors import MalformedFrameError
 from fanet_mw.scenario import Scenario
 from fanet_mw.units import MS, Enu, NodeId, S
-from fanet_mw.wire import BIDS, FOUND, PRIORITY_REPORT, SEARCH, STATUS, SURVIVOR
+from fanet_mw.wire import BIDS, FOUND, SEARCH, STATUS, SURVIVOR
 from fanet_mw.wire.inner import Survivor
 from fanet_mw.wire.search import Found, Search, Status, Told, told_in
 
@@ -21,6 +26,41 @@ _AHEAD_S: Final = 10.0
 _LEAST_M_S: Final = 0.05
 
 
+class Rescue(Application):
+    """One UAV's part in a rescue by the paper's rule."""
+
+    name: Final = "report"
+    listens = (SURVIVOR.msgid,)
+
+    def __init__(self, scenario: Scenario, node: NodeId) -> None:
+        self._outbox = Outbox()
+        self._rule = PaperRule(scenario, node, self._outbox)
+
+    def on_message(self, message: Received, now_ns: int) -> None:
+        report = Survivor.decode_frame(message.frame)
+        if report.reporter != message.origin:
+            raise MalformedFrameError(f"report of {report.reporter} by {message.origin}")
+        self._rule.reported(report, position=self.port.position, now_ns=now_ns)
+        self.port.tap(message.frame)
+        self._outbox.empty(self.port)
+
+    def on_fix(self, fix: Gps, now_ns: int) -> None:
+        self._rule.moved(fix.position, now_ns=now_ns)
+        self._outbox.empty(self.port)
+
+    def on_sensor(self, reading: SensorReading, now_ns: int) -> None:
+        if isinstance(reading, WifiScan):
+            self._rule.scan(reading.heard, position=self.port.position, now_ns=now_ns)
+            self._outbox.empty(self.port)
+
+    def wake(self, now_ns: int) -> None:
+        self._rule.wake(now_ns)
+        self._outbox.empty(self.port)
+
+    def next_wake_ns(self) -> int | None:
+        return self._rule.next_wake_ns()
+
+
 class PlannedSearch(Application):
     """One UAV's part in a search."""
 
@@ -28,7 +68,8 @@ class PlannedSearch(Application):
     listens = (SURVIVOR.msgid, SEARCH.msgid, STATUS.msgid, BIDS.msgid, FOUND.msgid)
 
     def __init__(self, scenario: Scenario, node: NodeId, *, position: Enu) -> None:
-        self._searcher = Searcher(scenario, node, position=position)
+        self._outbox = Outbox()
+        self._searcher = Searcher(scenario, node, position=position, outbox=self._outbox)
         self._bad_positions = 0
         """Hellos whose position is none, or not of now."""
 
@@ -86,16 +127,10 @@ class PlannedSearch(Application):
 
     def _settle(self) -> None:
         """Bring what the searcher put out to where it goes."""
-        searcher, port = self._searcher, self.port
-        for record in searcher.records:
-            port.record(record)
-        searcher.records.clear()
-        packets, searcher.packets = searcher.packets, []
-        for frames in packets:
-            port.send(frames, priority=PRIORITY_REPORT)
-        velocity, searcher.velocity = searcher.velocity, None
+        velocity, self._searcher.velocity = self._searcher.velocity, None
         if velocity is not None:
-            port.fly(_course(port.position, velocity))
+            self._outbox.course = _course(self.port.position, velocity)
+        self._outbox.empty(self.port)
 
 
 def _course(here: Enu, velocity: Enu) -> Course:

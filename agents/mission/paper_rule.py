@@ -1,19 +1,24 @@
 """Search and rescue at one UAV: detect -> report -> on reports of one survivor by enough nodes, approach.
 
 The rule is the paper's (4.1): reports by three or more different nodes change the course. Sans-IO: scans, reports and
-positions go in; survivor reports to send, setpoints and trace records come out.
+positions go in; survivor reports to send, courses and trace records come out.
 """
 
 import math
+from collections.abc import Sequence
 from typing import Final
 
 from agents.localization import Sighting, estimate
+from agents.mission.outbox import Outbox, ReportFormat
+from agents.mission.speed import approach_speed_m_s
 from fanet_mw.application import HOME, Course
-from fanet_mw.scenario import Mission as MissionConfig
-from fanet_mw.trace import Approaching, Arrived, Detected, Record
-from fanet_mw.units import Enu, NodeId, S
+from fanet_mw.scenario import Scenario
+from fanet_mw.trace import Approaching, Arrived, Detected
+from fanet_mw.units import US, Enu, NodeId, S, seconds_to_ns
 from fanet_mw.wire.inner import Survivor
 
+_MISSED_SCANS: Final = 1.5
+"""A phone is taken to be heard until so many intervals of the scan have passed."""
 _RING_M: Final = 20.0
 """UAVs hold on a ring about the survivor, each at an angle of its own, so that they see it from several sides."""
 _GOLDEN_ANGLE: Final = math.pi * (3 - math.sqrt(5))
@@ -21,18 +26,23 @@ _MOVED_M: Final = 10.0
 """A better estimate changes the setpoint only when it moved this far."""
 
 
-class Mission:
+class PaperRule:
     """One UAV's knowledge of survivors, and what it makes of it."""
 
-    def __init__(self, node: NodeId, config: MissionConfig, *, altitude_m: float) -> None:
+    def __init__(self, scenario: Scenario, node: NodeId, outbox: Outbox) -> None:
         self._node = node
-        self._config = config
-        self._altitude_m = altitude_m
-        self.records: list[Record] = []
-        self.reports: list[Survivor] = []
-        self.course: Course | None = None
-        """A new course to fly, for the host to take; None when the old one holds."""
-        self._heard: dict[int, int] = {}
+        self._config = scenario.mission
+        self._altitude_m = scenario.nodes.altitude_m
+        self._speed_m_s = approach_speed_m_s(scenario, node)
+        self._report_ns = seconds_to_ns(self._config.report_interval_s)
+        self._heard_for_ns = seconds_to_ns(_MISSED_SCANS * self._config.scan_interval_s)
+        self._format = ReportFormat(scenario, node)
+        self._outbox = outbox
+        self._detected: set[int] = set()
+        self._measured: dict[int, Survivor] = {}
+        """Of each phone that we hear: what the latest scan measured."""
+        self._due_ns: dict[int, int] = {}
+        """When each of these phones is to be reported next."""
         self._sightings: dict[int, dict[int, Sighting]] = {}
         self._visited: set[int] = set()
         self._target: int | None = None
@@ -41,15 +51,30 @@ class Mission:
 
     # --- what comes in --------------------------------------------------------------------------------------------
 
-    def scan(self, heard: tuple[tuple[int, float], ...], *, position: Enu, now_ns: int) -> None:
-        """Our own receiver hears phones: report each, again only after the report interval."""
+    def scan(self, heard: Sequence[tuple[int, float]], *, position: Enu, now_ns: int) -> None:
+        """Our own receiver hears these phones, and no others; each is reported, again only after the interval."""
+        before, self._measured = self._measured, {}
         for survivor, rssi_dbm in heard:
-            last_ns = self._heard.get(survivor)
-            if last_ns is None:
-                self.records.append(Detected(now_ns, self._node, survivor, round(rssi_dbm, 2)))
-            if last_ns is None or now_ns - last_ns >= self._config.report_interval_s * S:
-                self._heard[survivor] = now_ns
-                self.reports.append(Survivor(now_ns // 1000, survivor, self._node, position, rssi_dbm))
+            if survivor not in self._detected:
+                self._detected.add(survivor)
+                self._outbox.records.append(Detected(now_ns, self._node, survivor, round(rssi_dbm, 2)))
+            self._measured[survivor] = Survivor(now_ns // US, survivor, self._node, position, rssi_dbm)
+            if survivor not in before:
+                self._due_ns[survivor] = max(now_ns, self._due_ns.get(survivor, now_ns))
+        self.wake(now_ns)
+
+    def next_wake_ns(self) -> int | None:
+        """When the next report is due."""
+        return min((self._due_ns[survivor] for survivor in self._measured), default=None)
+
+    def wake(self, now_ns: int) -> None:
+        """Report what is due of the phones that we still hear."""
+        for survivor, measured in list(self._measured.items()):
+            if now_ns - measured.t_us * US > self._heard_for_ns:
+                del self._measured[survivor]  # a receiver that hears nobody says nothing
+            elif now_ns >= self._due_ns[survivor]:
+                self._due_ns[survivor] = now_ns + self._report_ns
+                self._outbox.packets.append(self._format.packet(measured))
 
     def reported(self, report: Survivor, *, position: Enu, now_ns: int) -> None:
         """The network delivered another node's report."""
@@ -71,13 +96,13 @@ class Mission:
             east, north = position.east - self._target_at.east, position.north - self._target_at.north
             if math.hypot(east, north) <= self._config.arrival_m + _RING_M:
                 self._dwell_until_ns = now_ns + round(self._config.dwell_s * S)
-                self.records.append(Arrived(now_ns, self._node, self._target))
+                self._outbox.records.append(Arrived(now_ns, self._node, self._target))
         elif now_ns >= self._dwell_until_ns:
             self._visited.add(self._target)
             self._target = self._dwell_until_ns = None
             self._choose(position, now_ns)
             if self._target is None:
-                self.course = Course(position, HOME)
+                self._outbox.course = Course(position, HOME)
 
     # --- decisions ------------------------------------------------------------------------------------------------
 
@@ -94,8 +119,10 @@ class Mission:
             candidates, key=lambda c: (math.hypot(c[0].east - position.east, c[0].north - position.north), c[1])
         )
         reporters = len(self._sightings[self._target])
-        self.records.append(Approaching(now_ns, self._node, self._target, reporters, *_rounded(self._target_at)))
-        self.course = Course(self._hold_point(), self._config.approach_speed_m_s)
+        self._outbox.records.append(
+            Approaching(now_ns, self._node, self._target, reporters, *_rounded(self._target_at))
+        )
+        self._outbox.course = Course(self._hold_point(), self._speed_m_s)
 
     def _refine(self) -> None:
         assert self._target is not None, "only a target can be refined"
@@ -104,7 +131,7 @@ class Mission:
         better = self._place(self._target)
         if better.minus(self._target_at).norm() > _MOVED_M:
             self._target_at = better
-            self.course = Course(self._hold_point(), self._config.approach_speed_m_s)
+            self._outbox.course = Course(self._hold_point(), self._speed_m_s)
 
     def _place(self, survivor: int) -> Enu:
         sightings = self._sightings[survivor]

@@ -1,0 +1,59 @@
+"""What the mission of one UAV wants done: records for the trace, packets to flood, and a course to fly.
+
+The parts of a mission write into one outbox and know no port; the application empties it after each of its inputs.
+"""
+
+from dataclasses import dataclass, field
+from typing import NamedTuple
+
+from fanet_mw.application import AppPort, Course
+from fanet_mw.scenario import Scenario
+from fanet_mw.trace import Record
+from fanet_mw.units import NodeId
+from fanet_mw.wire import HEADER_BYTES, PRIORITIES, PRIORITY_REPORT, filler
+from fanet_mw.wire.inner import Survivor
+
+
+class Packet(NamedTuple):
+    """Inner frames that are flooded to everyone."""
+
+    frames: bytes
+    priority: int = PRIORITY_REPORT
+
+
+@dataclass
+class Outbox:
+    """One UAV's."""
+
+    records: list[Record] = field(default_factory=list)
+    packets: list[Packet] = field(default_factory=list)
+    course: Course | None = None
+    """A new course to fly; None when the old one holds."""
+
+    def empty(self, port: AppPort) -> None:
+        """Bring everything to where it goes."""
+        for record in self.records:
+            port.record(record)
+        self.records.clear()
+        packets, self.packets = self.packets, []
+        for packet in packets:
+            port.send(packet.frames, priority=packet.priority)
+        course, self.course = self.course, None
+        if course is not None:
+            port.fly(course)
+
+
+class ReportFormat:
+    """How long the packet of a survivor report is and how urgent, as the scenario says."""
+
+    def __init__(self, scenario: Scenario, node: NodeId) -> None:
+        self._node = node
+        self._bytes = scenario.mission.report_bytes
+        self._priority = PRIORITIES[scenario.mission.report_priority]
+
+    def packet(self, report: Survivor) -> Packet:
+        """A report, filled up to its length."""
+        frames = report.encode_frame(self._node)
+        if self._bytes:
+            frames += filler(self._bytes - HEADER_BYTES - len(frames), node=self._node)
+        return Packet(frames, self._priority)

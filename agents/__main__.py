@@ -4,45 +4,24 @@ import json
 import sys
 from collections.abc import Mapping
 from contextlib import AbstractContextManager
-from pathlib import Path
 from typing import NamedTuple
 
 from agents.clocked import make_uav
 from fanet_mw.bus.topics import Topics
 from fanet_mw.errors import ConfigError
 from fanet_mw.hosts import interrupts, loop, service
-from fanet_mw.hosts.bus import JOIN_PATIENCE_S, Bus, config_of
+from fanet_mw.hosts.bus import Bus, config_of
 from fanet_mw.hosts.clock import START_PATIENCE_S
-from fanet_mw.hosts.realtime import RealtimeHost, run_actor
+from fanet_mw.hosts.realtime import Joining, RealtimeHost
 from fanet_mw.radios.field_bus import FieldBus, joined
 from fanet_mw.radios.udp import PORT, UdpRadio
 from fanet_mw.scenario import Scenario
 from fanet_mw.units import Enu, NodeId, S
 
 
-def run(
-    scenario: Scenario,
-    *,
-    node: NodeId,
-    swarm: str,
-    endpoint: str,
-    position: Enu,
-    zenoh_config: Path | None = None,
-    join_patience_s: float = JOIN_PATIENCE_S,
-) -> int:
+def run(scenario: Scenario, joining: Joining, *, node: NodeId, position: Enu) -> int:
     """Run one UAV against a router until the scenario is over; raises BusError."""
-    uav = make_uav(scenario, node, swarm, position=position)
-    loop.run(
-        run_actor(
-            uav,
-            swarm=swarm,
-            endpoint=endpoint,
-            until_ns=scenario.duration_ns,
-            zenoh_config=zenoh_config,
-            scenario=scenario,
-            join_patience_s=join_patience_s,
-        )
-    )
+    service.live(make_uav(scenario, node, joining.swarm, position=position), scenario, joining)
     return 0
 
 
@@ -55,18 +34,14 @@ class OnAir(NamedTuple):
     epoch_unix_s: float | None
 
 
-def fly(
-    scenario: Scenario,
-    on_air: OnAir,
-    *,
-    node: NodeId,
-    swarm: str,
-    endpoint: str | None,
-    position: Enu,
-    zenoh_config: Path | None = None,
-) -> Mapping[str, object]:
-    """Run one UAV on a real radio until the scenario is over; returns its report. Raises BusError."""
-    return loop.run(_fly(scenario, on_air, node, Topics(swarm), joined(endpoint, zenoh_config), position))
+def fly(scenario: Scenario, on_air: OnAir, joining: Joining, *, node: NodeId, position: Enu) -> Mapping[str, object]:
+    """Run one UAV on a real radio until the scenario is over; returns its report. Raises BusError.
+
+    A UAV that was told the epoch joins no router.
+    """
+    endpoint = None if on_air.epoch_unix_s is not None else joining.endpoint
+    router = joined(endpoint, config_of(joining.zenoh_config, f"agent-{node}"))
+    return loop.run(_fly(scenario, on_air, node, Topics(joining.swarm), router, position))
 
 
 async def _fly(
@@ -109,7 +84,7 @@ def main() -> int:
     flags.add_argument("--epoch", type=float, help="unix time of swarm instant 0 [s]: no router, clocks by GPS or NTP")
     given = flags.parse_args()
 
-    def start(scenario: Scenario, swarm: str, endpoint: str) -> int:
+    def start(scenario: Scenario, joining: Joining) -> int:
         node, at = NodeId(given.id), Enu(*given.at)
         if node not in scenario.node_ids:
             raise ConfigError(f"--id {node}: must be in [1, nodes.count = {scenario.nodes.count}]")
@@ -120,21 +95,9 @@ def main() -> int:
                 raise ConfigError(
                     f"--epoch {given.epoch:g}: needs --radio-address; the emulated radio is on the router"
                 )
-            return run(
-                scenario, node=node, swarm=swarm, endpoint=endpoint, position=at, zenoh_config=given.zenoh_config
-            )
+            return run(scenario, joining, node=node, position=at)
         on_air = OnAir(given.radio_address, given.radio_broadcast, given.radio_port, given.epoch)
-        router = None if given.epoch is not None else endpoint
-        report = fly(
-            scenario,
-            on_air,
-            node=node,
-            swarm=swarm,
-            endpoint=router,
-            position=at,
-            zenoh_config=config_of(given.zenoh_config, f"agent-{node}"),
-        )
-        sys.stdout.write(json.dumps(report) + "\n")
+        sys.stdout.write(json.dumps(fly(scenario, on_air, joining, node=node, position=at)) + "\n")
         return 0
 
     return service.serve(given, start)

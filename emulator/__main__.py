@@ -1,51 +1,31 @@
 """The link emulator as a process: `python -m emulator SCENARIO.toml`, or `fanet emulator`."""
 
 import sys
-from functools import partial
 from pathlib import Path
 
 from emulator.capture_file import CaptureFile, unused
 from emulator.kernel.compile import COMPILING_NOTICE, must_compile, warm_up
 from emulator.medium import Medium
-from fanet_mw.hosts import interrupts, loop, service
-from fanet_mw.hosts.bus import JOIN_PATIENCE_S
-from fanet_mw.hosts.realtime import run_actor
+from fanet_mw.hosts import interrupts, service
+from fanet_mw.hosts.realtime import Joining
 from fanet_mw.scenario import Scenario
 
 
-def run(
-    scenario: Scenario,
-    *,
-    swarm: str,
-    endpoint: str,
-    pcap: Path | None = None,
-    receptions: bool = False,
-    zenoh_config: Path | None = None,
-    join_patience_s: float = JOIN_PATIENCE_S,
-) -> int:
+def run(scenario: Scenario, joining: Joining, *, pcap: Path | None = None, receptions: bool = False) -> int:
     """Run the emulator against a router until the scenario is over, with a capture if a file is named.
 
     Raises BusError, and ConfigError when the file cannot be opened.
     """
     warm_up()
-    live = partial(
-        run_actor,
-        swarm=swarm,
-        endpoint=endpoint,
-        until_ns=scenario.duration_ns,
-        zenoh_config=zenoh_config,
-        scenario=scenario,
-        join_patience_s=join_patience_s,
-    )
     if pcap is None:
-        loop.run(live(Medium(scenario, swarm)))
+        service.live(Medium(scenario, joining.swarm), scenario, joining)
         return 0
     with CaptureFile(unused(pcap), scenario.radio, receptions=receptions) as file:
 
         def on_epoch(epoch_unix_ns: int) -> None:
             file.pcap.epoch_unix_ns = epoch_unix_ns
 
-        loop.run(live(Medium(scenario, swarm, capture=file.pcap), on_epoch=on_epoch))
+        service.live(Medium(scenario, joining.swarm, capture=file.pcap), scenario, joining, on_epoch=on_epoch)
     return 0
 
 
@@ -56,17 +36,10 @@ def main() -> int:
     parser.add_argument("--pcap-receptions", action="store_true", help="and every reception, with its RSSI")
     given = parser.parse_args()
 
-    def start(scenario: Scenario, swarm: str, endpoint: str) -> int:
+    def start(scenario: Scenario, joining: Joining) -> int:
         if must_compile():
             sys.stderr.write(f"{COMPILING_NOTICE}\n")
-        return run(
-            scenario,
-            swarm=swarm,
-            endpoint=endpoint,
-            pcap=given.pcap,
-            receptions=given.pcap_receptions,
-            zenoh_config=given.zenoh_config,
-        )
+        return run(scenario, joining, pcap=given.pcap, receptions=given.pcap_receptions)
 
     return service.serve(given, start)
 

@@ -4,7 +4,6 @@ The distribution fanet-mw has four packages at the top level, and other distribu
 (`openai-agents` has `agents`): installed into one environment, the later one overwrites files of the earlier one.
 """
 
-from importlib.metadata import packages_distributions
 from importlib.util import find_spec
 from pathlib import Path
 from typing import Final
@@ -49,5 +48,7 @@ def missing_extra(error: ModuleNotFoundError) -> str | None:
 
 def _owner(package: str) -> str:
     """The other distributions that claim to have installed a package of this name."""
+    from importlib.metadata import packages_distributions  # reads email parsers: only when there is something to say
+
     others = sorted({name for name in packages_distributions().get(package, ()) if name != "fanet-mw"})
     return f": it was installed by {', '.join(others)}" if others else ""

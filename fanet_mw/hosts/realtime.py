@@ -15,7 +15,7 @@ import resource
 import secrets
 from collections.abc import Callable
 from pathlib import Path
-from typing import Any, Final
+from typing import Any, Final, NamedTuple
 
 from fanet_mw.actor import Actor
 from fanet_mw.bus import topics
@@ -328,23 +328,35 @@ def uss_mb() -> float | None:
     return round(sum(int(kb) for kb in private) / 1024, 2)
 
 
+class Joining(NamedTuple):
+    """How a process finds its swarm."""
+
+    swarm: str
+    """The swarm's name on the bus."""
+    endpoint: str
+    """The Zenoh endpoint of its router."""
+    zenoh_config: Path | None = None
+    """Zenoh's own configuration: a file, or a folder with one file for each actor."""
+    patience_s: float = JOIN_PATIENCE_S
+    """How long a router that does not answer is tried."""
+
+
 async def run_actor(
     actor: Actor,
+    joining: Joining,
     *,
-    swarm: str,
-    endpoint: str,
     until_ns: int,
-    zenoh_config: Path | None = None,
     scenario: Scenario | None = None,
     clock_timeout_s: float = START_PATIENCE_S,
-    join_patience_s: float = JOIN_PATIENCE_S,
     on_epoch: Callable[[int], None] = lambda _: None,
     timebase: Timebase = THIS_MACHINE,
 ) -> None:
-    """Join a router, run one actor, leave; `zenoh_config` is a file, or a folder with one file for each actor.
+    """Join a router, run one actor, leave.
 
-    Raises BusError, and ConfigError when the file cannot be used, or the swarm runs another scenario than `scenario`.
+    Raises BusError, and ConfigError when Zenoh's configuration cannot be used, or the swarm runs another scenario than
+    `scenario`.
     """
-    with Bus.join(endpoint, config_of(zenoh_config, actor.name), patience_s=join_patience_s) as bus:
-        host = RealtimeHost(actor, bus, Topics(swarm), timebase)
+    config = config_of(joining.zenoh_config, actor.name)
+    with Bus.join(joining.endpoint, config, patience_s=joining.patience_s) as bus:
+        host = RealtimeHost(actor, bus, Topics(joining.swarm), timebase)
         await host.run(until_ns=until_ns, clock_timeout_s=clock_timeout_s, scenario=scenario, on_epoch=on_epoch)

@@ -2,7 +2,6 @@
 
 import math
 from dataclasses import dataclass
-from pathlib import Path
 from typing import Annotated
 
 from cyclopts import App, Parameter
@@ -22,27 +21,9 @@ from fanet_mw.bus.radio_control import (
 from fanet_mw.errors import ConfigError
 from fanet_mw.units import MAX_NODES, Enu, NodeId, S, seconds_to_ns
 from sim.cli.console import Console
-from sim.cli.options import warn_of
-from sim.run.air_control import change
-from sim.run.running import locate
+from sim.cli.options import Where
 
 app = App(name="air", help="Change the air of a swarm that runs: degrade a link, jam an area, cut a node off, restore.")
-
-
-@Parameter(name="*")
-@dataclass(frozen=True)
-class Where:
-    """Which swarm."""
-
-    connect: str | None = None
-    """Zenoh endpoint of the swarm's router; by default that of a swarm that runs on this machine."""
-    swarm: str | None = None
-    """Name of the swarm; by default the only one there."""
-    zenoh_config: Path | None = None
-    """Zenoh's own configuration, JSON5 (TLS and the like): a file, or a folder of `fanet keys`."""
-
-    def __post_init__(self) -> None:
-        warn_of(self.connect, listens=False)
 
 
 @Parameter(name="*")
@@ -147,10 +128,12 @@ def restore(label: str = "", *, where: Where = Where()) -> int:
 
 
 def _do(control: Control, where: Where) -> int:
+    from sim.run.air_control import change
+
     if not isinstance(control, Restore) and (why := wrong(control, count=MAX_NODES)):
         bound = "node ids from 1" if nodes_of(control) else "see `fanet air --help`"
         raise ConfigError(f"{control}: {why.removeprefix('fault_').replace('_', ' ')} out of bounds ({bound})")
     console = Console(highlight=False)
-    for fault in change(*locate(where.connect, where.swarm), control, zenoh_config=where.zenoh_config):
+    for fault in change(*where.located(), control, zenoh_config=where.zenoh_config):
         console.print(f"{fault.label}: {fault.kind} {'since' if fault.active else 'ended at'} {fault.t_ns / S:.3f} s")
     return 0

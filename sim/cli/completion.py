@@ -5,12 +5,12 @@ from typing import Annotated, TypeAlias
 from cyclopts import Parameter
 from cyclopts.completion import CompletionContext
 
-from sim.scenarios import catalog
+from sim.scenarios.shipped import shipped
 
 
 def scenario_names(context: CompletionContext) -> list[str]:
     """Shipped scenarios; the shell itself offers files."""
-    return [entry.name for entry in catalog.shipped() if entry.name.startswith(context.incomplete)]
+    return [entry.name for entry in shipped() if entry.name.startswith(context.incomplete)]
 
 
 def keys(context: CompletionContext) -> list[str]:

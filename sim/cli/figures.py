@@ -3,13 +3,19 @@
 from pathlib import Path
 from typing import Annotated
 
-from cyclopts import Parameter
+from cyclopts import App, Parameter
 from cyclopts.validators import Number
 from rich.table import Table
 
 from fanet_mw.errors import ConfigError
 from sim.cli.console import Console
 from sim.cli.sweep import carry_out
+
+
+def add_to(app: App) -> None:
+    """Register the commands."""
+    app.command(figures)
+    app.command(report)
 
 
 def figures(

@@ -7,19 +7,18 @@ from collections.abc import Sequence
 from dataclasses import dataclass, replace
 from importlib.util import find_spec
 from pathlib import Path
-from typing import Annotated, Final
+from typing import TYPE_CHECKING, Annotated, Final
 
 from cyclopts import Parameter, Token
 
-from emulator.capture_file import NAME
 from fanet_mw.errors import ConfigError
-from fanet_mw.hosts.bus import exposure
-from fanet_mw.scenario import Scenario
-from fanet_mw.scenario.quantities import in_unit_of
 from sim.cli.completion import keys
 from sim.cli.console import Console
-from sim.cli.out_folder import prepare
-from sim.scenarios import catalog
+from sim.run.running import DEFAULT_ENDPOINT, locate
+
+if TYPE_CHECKING:
+    from fanet_mw.hosts.realtime import Joining
+    from fanet_mw.scenario import Scenario
 
 _err = Console(stderr=True)
 _LEAD_MS: Final = 40
@@ -28,6 +27,8 @@ _LEAD_MS: Final = 40
 
 def _seconds(_type: object, tokens: Sequence[Token]) -> float:
     """A number of seconds, or a time with a unit."""
+    from fanet_mw.scenario.quantities import in_unit_of
+
     text = tokens[0].value
     given = in_unit_of("duration_s", text)
     return float(text) if given is None else given
@@ -54,8 +55,10 @@ class Choice:
     duration: Annotated[float | None, Parameter(converter=_seconds)] = None
     """Simulated time to run [s]; or with a unit, for example 2min."""
 
-    def scenario(self, name: str) -> Scenario:
+    def scenario(self, name: str) -> "Scenario":
         """The scenario with these changes."""
+        from sim.scenarios import catalog
+
         overrides = list(self.set)
         if self.seed is not None:
             overrides.append(f"seed={self.seed}")
@@ -63,7 +66,7 @@ class Choice:
             overrides.append(f"duration_s={self.duration}")
         return catalog.find(name, overrides)
 
-    def realtime_scenario(self, name: str) -> Scenario:
+    def realtime_scenario(self, name: str) -> "Scenario":
         """The same for real processes, which can announce nothing without a lead: where it is 0, one that they need."""
         chosen = self.scenario(name)
         if chosen.radio.lead_ms:
@@ -100,10 +103,14 @@ class Output:
         if self.out is None and (self.pcap or self.pcap_receptions):
             raise ConfigError("--pcap: needs --out DIR, the folder that air.pcap goes to")
         if self.out is not None:
+            from sim.cli.out_folder import prepare
+
             prepare(self.out, force=self.force)
 
     def capture_path(self) -> Path | None:
         """Where the capture goes, if one is wanted."""
+        from emulator.capture_file import NAME
+
         wanted = self.pcap or self.pcap_receptions
         return self.out / NAME if wanted and self.out is not None else None
 
@@ -113,18 +120,40 @@ class Output:
 class Join:
     """How a single service finds its swarm."""
 
-    connect: str = "tcp/127.0.0.1:7447"
+    connect: str = DEFAULT_ENDPOINT
     """Zenoh endpoint of the swarm's router."""
     swarm: str | None = None
     """Name of the swarm; by default the scenario's name."""
     zenoh_config: Path | None = None
     """Zenoh's own configuration, JSON5 (TLS and the like): a file, or a folder of `fanet keys`."""
 
-    def __post_init__(self) -> None:
+    def joining(self, scenario: "Scenario") -> "Joining":
+        """The same for the service itself; says what others can do at the endpoint."""
+        from fanet_mw.hosts.realtime import Joining
+
         warn_of(self.connect, listens=False)
+        return Joining(self.swarm or scenario.name, self.connect, self.zenoh_config)
 
 
-def with_engine(scenario: Scenario) -> Scenario:
+@Parameter(name="*")
+@dataclass(frozen=True)
+class Where:
+    """Which of the swarms that run."""
+
+    connect: str | None = None
+    """Zenoh endpoint of the swarm's router; by default that of a swarm that runs on this machine."""
+    swarm: str | None = None
+    """Name of the swarm; by default the only one there."""
+    zenoh_config: Path | None = None
+    """Zenoh's own configuration, JSON5 (TLS and the like): a file, or a folder of `fanet keys`."""
+
+    def located(self) -> tuple[str, str | None]:
+        """The endpoint and, where it is known, the name of the swarm; says what others can do at the endpoint."""
+        warn_of(self.connect, listens=False)
+        return locate(self.connect, self.swarm)
+
+
+def with_engine(scenario: "Scenario") -> "Scenario":
     """The scenario with a world engine that is installed: where pybullet is not, `kinematic` serves, and says so."""
     world = scenario.world
     if world.engine != "pybullet" or find_spec("pybullet") is not None:
@@ -135,6 +164,8 @@ def with_engine(scenario: Scenario) -> Scenario:
         soft_wrap=True,
         markup=False,
     )
+    from fanet_mw.scenario import Scenario
+
     tree = scenario.model_dump()
     tree["world"]["engine"] = "kinematic"
     return Scenario.model_validate(tree)
@@ -142,5 +173,9 @@ def with_engine(scenario: Scenario) -> Scenario:
 
 def warn_of(endpoint: str | None, *, listens: bool) -> None:
     """Say what others can do at an endpoint that they can reach."""
-    if endpoint is not None and (warning := exposure(endpoint, listens=listens)) is not None:
+    if endpoint is None:
+        return
+    from fanet_mw.hosts.bus import exposure
+
+    if (warning := exposure(endpoint, listens=listens)) is not None:
         _err.print(warning, highlight=False, soft_wrap=True, markup=False)

@@ -1,30 +1,49 @@
-"""`fanet init`, `show`, `check` and `schema`: scenario files for people and for their editors."""
+"""`fanet scenarios`, `init`, `show`, `check`, `schema`: scenario files for people and for their editors."""
 
 import json
 import sys
-import tomllib
 from pathlib import Path
-from typing import Annotated
+from typing import TYPE_CHECKING, Annotated
 
-import tomli_w
 from cyclopts import App, Parameter
+from rich.table import Table
 
 from fanet_mw.errors import ConfigError
-from fanet_mw.scenario import Scenario, config
-from fanet_mw.scenario.commented import SCHEMA_NAME, commented
-from fanet_mw.scenario.reference import json_schema
 from sim.cli.completion import ScenarioName
 from sim.cli.console import Console
 from sim.cli.options import Choice
-from sim.scenarios import catalog
+from sim.scenarios.shipped import shipped
+
+if TYPE_CHECKING:
+    from fanet_mw.scenario import Scenario
 
 Switch = Annotated[bool, Parameter(negative="")]
 
 
 def add_to(app: App) -> None:
     """Register the commands."""
-    for command in (init, show, check, schema):
+    for command in (scenarios, init, show, check, schema):
         app.command(command)
+
+
+def scenarios(*, json_: Annotated[bool, Parameter(name="--json", negative="")] = False) -> int:
+    """List the shipped scenarios.
+
+    Parameters
+    ----------
+    json_
+        Print JSON instead of a table.
+
+    """
+    entries = shipped()
+    if json_:
+        sys.stdout.write(json.dumps([{"name": e.name, "description": e.description} for e in entries], indent=2) + "\n")
+        return 0
+    table = Table("scenario", "what it is", box=None, header_style="bold", padding=(0, 2, 0, 0))
+    for entry in entries:
+        table.add_row(entry.name, entry.description)
+    Console().print(table)
+    return 0
 
 
 def init(
@@ -51,6 +70,12 @@ def init(
         Replace a file that is there.
 
     """
+    import tomllib
+
+    from fanet_mw.scenario import config
+    from fanet_mw.scenario.commented import SCHEMA_NAME, commented
+    from sim.scenarios import catalog
+
     text = catalog.text_of(from_)
     content = commented(tomllib.loads(text), every_key=not short, schema=schema)
     config.parse(content, source=str(file), name="made")
@@ -85,6 +110,8 @@ def show(
         Print JSON instead.
 
     """
+    import tomli_w
+
     chosen = choice.scenario(scenario)
     tree = chosen.model_dump(mode="json", exclude_none=True, exclude_defaults=changed)
     sys.stdout.write(json.dumps(tree, indent=2) + "\n" if json_ else tomli_w.dumps(tree))
@@ -123,7 +150,7 @@ def schema(file: Path | None = None) -> int:
     return 0
 
 
-def _sentence(scenario: Scenario) -> str:
+def _sentence(scenario: "Scenario") -> str:
     protocol = scenario.routing.protocol
     return (
         f"scenario {scenario.name} is right: {scenario.nodes.count} nodes, {scenario.duration_s:g} s, "
@@ -132,6 +159,8 @@ def _sentence(scenario: Scenario) -> str:
 
 
 def _schema_text() -> str:
+    from fanet_mw.scenario.reference import json_schema
+
     return json.dumps(json_schema(), indent=2) + "\n"
 
 

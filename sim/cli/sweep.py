@@ -9,26 +9,27 @@ from collections.abc import Callable, Iterator
 from pathlib import Path
 from typing import TYPE_CHECKING, Annotated, Final
 
-from cyclopts import Parameter
+from cyclopts import App, Parameter
 from cyclopts.validators import Number
-from rich.progress import BarColumn, TextColumn
-from rich.progress import Progress as Bar
 
 from fanet_mw.errors import ConfigError
 from sim.cli.console import Console
-from sim.sweep import spec
-from sim.sweep.spec import Sweep
-from sim.sweep.toml_values import axis
 
 if TYPE_CHECKING:
     from pyarrow import Table
 
     from sim.sweep.run import Plan, Progress, Workers
+    from sim.sweep.spec import Sweep
     from sim.sweep.store import Store
 
 _err = Console(stderr=True)
 _SAY_S: Final = 20.0
 """How often progress is said where nobody watches a bar."""
+
+
+def add_to(app: App) -> None:
+    """Register the command."""
+    app.command(sweep)
 
 
 def sweep(
@@ -81,7 +82,7 @@ def sweep(
 
 def carry_out(
     name: str,
-    wanted: Sweep,
+    wanted: "Sweep",
     *,
     out: Path,
     jobs: int | None,
@@ -128,8 +129,12 @@ def carry_out(
     return 1 if failed else 0
 
 
-def asked(what: str, sets: tuple[str, ...], seeds: int | None, variant: str | None) -> tuple[str, Sweep]:
+def asked(what: str, sets: tuple[str, ...], seeds: int | None, variant: str | None) -> "tuple[str, Sweep]":
     """The sweep that is meant, and its name."""
+    from sim.sweep import spec
+    from sim.sweep.spec import Sweep
+    from sim.sweep.toml_values import axis
+
     name = Path(what).stem
     if spec.is_sweep(what):
         found = spec.find(what).variant(variant)
@@ -156,7 +161,7 @@ def _workers(jobs: int | None, scheduler: str | None, plan: "Plan", *, dry_run: 
     return Cluster(scheduler)
 
 
-def _announcement(name: str, wanted: Sweep, plan: "Plan", workers: int) -> str:
+def _announcement(name: str, wanted: "Sweep", plan: "Plan", workers: int) -> str:
     settings = plan.total // max(1, len(wanted.seed_list()))
     text = f"{name}: {plan.total} runs ({settings} settings x {len(wanted.seed_list())} seeds)"
     if len(plan.todo) < plan.total:
@@ -220,6 +225,9 @@ def _progress(name: str, *, quiet: bool) -> "Iterator[Callable[[Progress], None]
 
         yield line
         return
+    from rich.progress import BarColumn, TextColumn
+    from rich.progress import Progress as Bar
+
     columns = (TextColumn("{task.description}"), BarColumn(), TextColumn("{task.completed}/{task.total}"),
                TextColumn("{task.fields[left]}"))  # fmt: skip
     with Bar(*columns, console=_err, transient=True) as bar:

@@ -24,6 +24,7 @@ from fanet_mw.errors import BusError
 from fanet_mw.hosts import interrupts
 from fanet_mw.hosts.bus import Bus, config_of
 from fanet_mw.hosts.clock import ClockKeeper, SwarmClock
+from fanet_mw.hosts.realtime import Joining
 from fanet_mw.hosts.service import BUS_EXIT_CODE
 from fanet_mw.scenario import Scenario
 from fanet_mw.trace import ProcessEnded, Record, kind_of
@@ -173,13 +174,8 @@ class SwarmRun:
     async def _start_all(self) -> None:
         await self.processes.warm_up()
         self._check_not_over()
-        common = {
-            "scenario": self._scenario,
-            "swarm": self.name,
-            "endpoint": self.endpoint,
-            "join_patience_s": READY_TIMEOUT_S,
-            "zenoh_config": self._zenoh_config,
-        }
+        joining = Joining(self.name, self.endpoint, self._zenoh_config, READY_TIMEOUT_S)
+        common = {"scenario": self._scenario, "joining": joining}
         self.processes.start("emulator", run_emulator, {**common, **self.emulator_options})
         if self._own_world:
             self.processes.start("world", run_world, common)

@@ -7,20 +7,20 @@ import pytest
 from air import EVIL, Fuzzer
 
 from agents.__main__ import run as run_agent
-from fanet_mw.hosts import loop
-from fanet_mw.hosts.realtime import run_actor
+from fanet_mw.hosts import service
+from fanet_mw.hosts.realtime import Joining
 from fanet_mw.scenario import Scenario
 from sim.results.files import finish
 from sim.run.swarm import launch
 from sim.scenarios import catalog
 
 
-def agent_or_fuzzer(*, scenario: Scenario, node: int, swarm: str, endpoint: str, **others: Any) -> int:
+def agent_or_fuzzer(*, scenario: Scenario, joining: Joining, node: int, **others: Any) -> int:
     """What runs in the place of an agent."""
     if node != EVIL:
-        return run_agent(scenario=scenario, node=node, swarm=swarm, endpoint=endpoint, **others)
-    fuzzer = Fuzzer(swarm, scenario.seed, every_ms=10, lead_ms=60)
-    loop.run(run_actor(fuzzer, swarm=swarm, endpoint=endpoint, until_ns=scenario.duration_ns, scenario=scenario))
+        return run_agent(scenario, joining, node=node, **others)
+    fuzzer = Fuzzer(joining.swarm, scenario.seed, every_ms=10, lead_ms=60)
+    service.live(fuzzer, scenario, joining)
     return 0
 
 

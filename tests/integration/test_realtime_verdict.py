@@ -172,10 +172,11 @@ def test_an_agent_that_is_started_again_after_a_step_of_the_clock_takes_part(
 
 def agent_after_a_step(step_s: float, **arguments: Any) -> int:
     """An agent on a machine whose unix clock has been stepped."""
-    from agents import __main__ as agent
+    from agents.__main__ import run
+    from fanet_mw.hosts import service
     from fanet_mw.hosts.timebase import THIS_MACHINE
 
     stepped = THIS_MACHINE._replace(unix_ns=lambda: time.time_ns() + round(step_s * S))
-    run_actor = agent.run_actor
-    agent.run_actor = lambda *given, **named: run_actor(*given, **named, timebase=stepped)  # type: ignore[attr-defined]
-    return agent.run(**arguments)
+    run_actor = service.run_actor
+    service.run_actor = lambda *given, **named: run_actor(*given, **named, timebase=stepped)  # type: ignore[attr-defined]
+    return run(**arguments)

@@ -1,0 +1,188 @@
+"""`fanet simulate`, `launch` and `plan`: a scenario in virtual time, in real time, and before either.
+
+A command parses, shows progress and returns an exit code; what it does is a function elsewhere, imported by it alone.
+"""
+
+import sys
+from collections.abc import Callable, Iterator
+from contextlib import contextmanager, nullcontext
+from pathlib import Path
+from typing import TYPE_CHECKING, Annotated, Any
+
+from cyclopts import Parameter
+
+from sim.cli.completion import ScenarioName
+from sim.cli.console import Console
+from sim.cli.options import Choice, Output, warn_of, with_engine
+
+if TYPE_CHECKING:
+    from cyclopts import App
+
+    from fanet_mw.scenario import Scenario
+    from sim.run.outcome import Outcome
+
+_err = Console(stderr=True)
+
+
+def add_to(app: "App") -> None:
+    """Register the commands."""
+    for command in (simulate, launch, plan):
+        app.command(command)
+
+
+def simulate(scenario: ScenarioName, *, choice: Choice = Choice(), output: Output = Output()) -> int:
+    """Run a scenario in virtual time: deterministic, as fast as it goes.
+
+    Parameters
+    ----------
+    scenario
+        A shipped scenario's name (see `fanet scenarios`) or a .toml file.
+
+    """
+    from emulator.capture_file import CaptureFile
+    from emulator.kernel.compile import COMPILING_NOTICE, must_compile, warm_up
+    from fanet_mw.hosts import interrupts
+    from sim.run.virtual import EPOCH_UNIX_NS
+    from sim.run.virtual import simulate as run
+
+    chosen = with_engine(choice.scenario(scenario))
+    output.prepare()
+    if must_compile():
+        _err.print(COMPILING_NOTICE, highlight=False)
+        warm_up()
+    signals: list[int] = []
+    path = output.capture_path()
+    capture = CaptureFile(path, chosen.radio, receptions=output.pcap_receptions) if path else nullcontext()
+    with _progress(chosen, quiet=output.json) as tell, capture as file, interrupts.handed_to(signals.append):
+        if file is not None:
+            file.pcap.epoch_unix_ns = EPOCH_UNIX_NS
+        outcome = run(chosen, on_progress=tell, capture=file.pcap if file else None, signals=signals)
+    return _finish(outcome, output)
+
+
+def launch(
+    scenario: ScenarioName,
+    *,
+    choice: Choice = Choice(),
+    output: Output = Output(),
+    respawn: Annotated[bool, Parameter(negative="")] = False,
+    no_world: Annotated[bool, Parameter(negative="")] = False,
+    listen: str | None = None,
+    connect: str | None = None,
+    swarm: str | None = None,
+    zenoh_config: Path | None = None,
+) -> int:
+    """Run a scenario in real time: one process per UAV, the link emulator and the world, over Zenoh.
+
+    Parameters
+    ----------
+    scenario
+        A shipped scenario's name (see `fanet scenarios`) or a .toml file.
+    respawn
+        Start a process again when it dies.
+    no_world
+        Start no world: somebody else's process says where everyone is (see docs/reference/bus.md).
+    listen
+        Zenoh endpoint to serve on, for example tcp/127.0.0.1:7447; by default a free port of the loopback interface.
+    connect
+        Zenoh endpoint of an existing router to use instead of serving one.
+    swarm
+        Name of the swarm on the bus; by default the scenario's name.
+    zenoh_config
+        Zenoh's own configuration, JSON5 (TLS, access lists): a file, or a folder of `fanet keys`.
+
+    """
+    import asyncio
+
+    from sim.run.swarm import launch as run
+
+    chosen = with_engine(choice.realtime_scenario(scenario))
+    output.prepare()
+    warn_of(listen, listens=True)
+    warn_of(connect, listens=False)
+    with _progress(chosen, quiet=output.json) as tell:
+        outcome = asyncio.run(
+            run(
+                chosen,
+                swarm=swarm or chosen.name,
+                listen=listen,
+                connect=connect,
+                respawn=respawn,
+                own_world=not no_world,
+                zenoh_config=zenoh_config,
+                emulator_options={"pcap": output.capture_path(), "receptions": output.pcap_receptions},
+                spool_folder=output.out,
+                on_progress=tell,
+                on_event=lambda text: _err.print(text, highlight=False),
+            )
+        )
+    return _finish(outcome, output)
+
+
+def plan(
+    scenario: ScenarioName,
+    *,
+    choice: Choice = Choice(),
+    deadline: float | None = None,
+    search: Annotated[bool, Parameter(negative="")] = False,
+    json: Annotated[bool, Parameter(negative="")] = False,
+) -> int:
+    """Say before take-off whether a clustered scenario is feasible, what it guarantees, and what would make it so.
+
+    Exit code 0: feasible; 1: not feasible; 2: the scenario or a flag is wrong.
+
+    Parameters
+    ----------
+    scenario
+        A shipped scenario's name (see `fanet scenarios`) or a .toml file.
+    deadline
+        Every packet must be with everyone within this time [s]; by default traffic.deadline_s, if that is set.
+    search
+        Find the cluster count, flooding period and slots that meet the deadline with the least airtime per packet.
+    json
+        Print the plan as JSON.
+
+    """
+    from sim.cli.plan import show
+
+    return show(choice.scenario(scenario), deadline=deadline, search=search, as_json=json)
+
+
+@contextmanager
+def _progress(scenario: "Scenario", *, quiet: bool) -> Iterator[Callable[[float], None]]:
+    """A bar of simulated seconds on standard error, only when a person watches."""
+    if quiet or not _err.is_terminal:
+        yield lambda _seconds: None
+        return
+    from rich.progress import BarColumn, Progress, TextColumn, TimeElapsedColumn
+
+    columns = (TextColumn("{task.description}"), BarColumn(), TextColumn("{task.completed:.0f}/{task.total:.0f} s"))
+    with Progress(*columns, TimeElapsedColumn(), console=_err, transient=True) as progress:
+        task = progress.add_task(scenario.name, total=scenario.duration_s)
+        yield lambda seconds: progress.update(task, completed=seconds)
+
+
+def _finish(outcome: "Outcome", output: Output) -> int:
+    """Write and show the result; 0 only when it may be used."""
+    from json import dumps
+
+    from sim.results import report
+    from sim.results.files import finish
+
+    summary: dict[str, Any] = finish(outcome, out=output.out)
+    if output.report and output.out is not None:
+        from sim.report.page import write
+
+        write([output.out], output.out)
+    if output.json:
+        sys.stdout.write(dumps(summary, indent=2) + "\n")
+    else:
+        console = Console()
+        report.show(summary, console)
+        if output.out is not None:
+            console.print(f"written to {output.out}")
+    for name, why in summary["unwritten"].items():
+        _err.print(f"{name} in --out {output.out} ends early: {why}", highlight=False, soft_wrap=True)
+    if summary["unwritten"]:
+        return 1
+    return 0 if summary["valid"] else 1

@@ -1,0 +1,141 @@
+"""`fanet router`, `emulator`, `world` and `agent`: the services of a swarm, each started on its own."""
+
+from pathlib import Path
+from typing import Annotated
+
+from cyclopts import App, Parameter
+
+from fanet_mw.errors import FanetError
+from sim.cli.completion import ScenarioName
+from sim.cli.console import Console
+from sim.cli.options import Choice, Join, Output, warn_of, with_engine
+from sim.run.running import DEFAULT_ENDPOINT
+
+_err = Console(stderr=True)
+
+
+def add_to(app: App) -> None:
+    """Register the commands."""
+    for command in (router, emulator, world, agent):
+        app.command(command)
+
+
+def router(
+    scenario: ScenarioName,
+    *,
+    choice: Choice = Choice(),
+    listen: str = DEFAULT_ENDPOINT,
+    swarm: str | None = None,
+    out: Path | None = None,
+    force: Annotated[bool, Parameter(negative="")] = False,
+    zenoh_config: Path | None = None,
+) -> int:
+    """Serve the bus and keep the swarm clock, for services that are started one by one.
+
+    It says every five seconds who is missing, there twice, or runs another scenario.
+
+    Parameters
+    ----------
+    scenario
+        The scenario that the services will run: it says which of them to wait for.
+    listen
+        Zenoh endpoint to serve on.
+    swarm
+        Name of the swarm on the bus; by default the scenario's name.
+    out
+        Folder for the result of the services, as `fanet launch --out` writes it.
+    force
+        Replace the result of another run in that folder.
+    zenoh_config
+        Zenoh's own configuration, JSON5 (TLS, access lists): a file, or a folder of `fanet keys`.
+
+    """
+    from fanet_mw.hosts import loop
+    from sim.run.router import serve
+
+    chosen = choice.realtime_scenario(scenario)
+    Output(out=out, force=force).prepare()
+    warn_of(listen, listens=True)
+    code: int = loop.run(
+        serve(
+            chosen,
+            swarm=swarm or chosen.name,
+            listen=listen,
+            out=out,
+            zenoh_config=zenoh_config,
+            on_event=lambda text: _err.print(text, highlight=False, soft_wrap=True, markup=False),
+        )
+    )
+    if out is not None:
+        import json
+
+        from sim.results import report
+
+        report.show(json.loads((out / "summary.json").read_text(encoding="utf-8")), Console())
+    return code
+
+
+def emulator(
+    scenario: ScenarioName,
+    *,
+    choice: Choice = Choice(),
+    join: Join = Join(),
+    pcap: Path | None = None,
+    pcap_receptions: Annotated[bool, Parameter(negative="")] = False,
+) -> int:
+    """Run the link emulator alone, against a router.
+
+    Parameters
+    ----------
+    scenario
+        The scenario of the swarm.
+    pcap
+        Capture file for every transmission, for Wireshark; if there is one already, the new one gets a number.
+    pcap_receptions
+        Write every reception too, with its RSSI.
+
+    """
+    from emulator.__main__ import run
+    from emulator.kernel.compile import COMPILING_NOTICE, must_compile
+
+    chosen = choice.realtime_scenario(scenario)
+    if must_compile():
+        _err.print(COMPILING_NOTICE, highlight=False)
+    return run(chosen, join.joining(chosen), pcap=pcap, receptions=pcap_receptions)
+
+
+def world(scenario: ScenarioName, *, choice: Choice = Choice(), join: Join = Join()) -> int:
+    """Run the world alone, against a router.
+
+    Parameters
+    ----------
+    scenario
+        The scenario of the swarm.
+
+    """
+    from sim.world.__main__ import run
+
+    chosen = with_engine(choice.realtime_scenario(scenario))
+    return run(chosen, join.joining(chosen))
+
+
+def agent(scenario: ScenarioName, *, id: int, choice: Choice = Choice(), join: Join = Join()) -> int:  # noqa: A002
+    """Run one UAV alone, against a router.
+
+    Parameters
+    ----------
+    scenario
+        The scenario of the swarm.
+    id
+        Node id, from 1 to nodes.count.
+
+    """
+    from agents.__main__ import run
+    from fanet_mw.units import NodeId
+    from sim.world.mobility.layout import positions
+
+    chosen = choice.realtime_scenario(scenario)
+    if id not in chosen.node_ids:
+        raise FanetError(f"--id {id}: must be in [1, nodes.count = {chosen.nodes.count}]")
+    start = positions(chosen)[id - 1]
+    return run(chosen, join.joining(chosen), node=NodeId(id), position=start)

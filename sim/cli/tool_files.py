@@ -1,0 +1,93 @@
+"""`fanet keys`, `dialect` and `dissector`: files for other programs (Zenoh, MAVLink tools, Wireshark)."""
+
+import os
+import sys
+from pathlib import Path
+from typing import Annotated
+
+from cyclopts import App, Parameter
+
+from fanet_mw.errors import ConfigError
+from sim.cli.completion import ScenarioName
+from sim.cli.console import Console
+from sim.cli.options import Choice
+
+
+def add_to(app: App) -> None:
+    """Register the commands."""
+    for command in (keys, dialect, dissector):
+        app.command(command)
+
+
+def keys(
+    scenario: ScenarioName,
+    *,
+    out: Path,
+    choice: Choice = Choice(),
+    swarm: str | None = None,
+    host: Annotated[tuple[str, ...], Parameter(negative="")] = (),
+    days: int = 365,
+) -> int:
+    """Make certificates and access lists for a swarm: one file per participant, for --zenoh-config. Needs openssl.
+
+    Parameters
+    ----------
+    scenario
+        The scenario of the swarm: it says which UAVs there are.
+    out
+        Folder for router.json5, emulator.json5, world.json5, operator.json5 and agent-1.json5 and so on.
+    swarm
+        Name of the swarm on the bus; by default the scenario's name.
+    host
+        Name or address at which the router is reached, besides localhost; repeatable.
+    days
+        How long the certificates are valid [days].
+
+    """
+    from sim.run.keys import make
+
+    chosen = choice.scenario(scenario)
+    made = make(chosen, out, swarm=swarm or chosen.name, hosts=host, days=days)
+    Console().print(f"{made} files written to {out}; each holds a private key", highlight=False, soft_wrap=True)
+    return 0
+
+
+def dialect(folder: Path | None = None, *, definitions: Annotated[bool, Parameter(negative="")] = False) -> int:
+    """Print the path of our MAVLink dialect, fanet.xml, with the definitions that it includes beside it.
+
+    Parameters
+    ----------
+    folder
+        Where to write them; by default `fanet-mw/message_definitions` in the user's folder of data.
+    definitions
+        Print the folder of definitions instead, which pymavlink wants in MDEF.
+
+    """
+    from fanet_mw.dialect.definitions import write
+
+    data = os.environ.get("XDG_DATA_HOME") or Path.home() / ".local" / "share"
+    path = write(folder or Path(data) / "fanet-mw" / "message_definitions")
+    sys.stdout.write(f"{path.parents[1] if definitions else path}\n")
+    return 0
+
+
+def dissector(folder: Path) -> int:
+    """Install Wireshark's dissector for MAVLink with our messages: writes mavlink.lua.
+
+    Parameters
+    ----------
+    folder
+        Wireshark's folder of personal Lua plugins: see Help, About Wireshark, Folders.
+
+    """
+    import gzip
+    from importlib.resources import files
+
+    path = folder / "mavlink.lua"
+    try:
+        folder.mkdir(parents=True, exist_ok=True)
+        path.write_bytes(gzip.decompress(files("emulator.wireshark").joinpath("mavlink.lua.gz").read_bytes()))
+    except OSError as error:
+        raise ConfigError(f"{path}: cannot be written: {error.strerror}") from error
+    Console().print(f"written to {path}; restart Wireshark", highlight=False, soft_wrap=True)
+    return 0

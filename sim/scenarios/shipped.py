@@ -1,0 +1,36 @@
+"""The shipped scenarios as texts, by name."""
+
+import difflib
+import tomllib
+from importlib.resources import files
+from typing import NamedTuple
+
+from fanet_mw.errors import ConfigError
+
+
+class Entry(NamedTuple):
+    """One shipped scenario."""
+
+    name: str
+    description: str
+    text: str
+
+
+def shipped() -> list[Entry]:
+    """All shipped scenarios, by name."""
+    entries = []
+    for item in sorted(files("sim.scenarios").iterdir(), key=lambda item: item.name):
+        if item.name.endswith(".toml"):
+            text = item.read_text(encoding="utf-8")
+            entries.append(Entry(item.name.removesuffix(".toml"), tomllib.loads(text).get("description", ""), text))
+    return entries
+
+
+def entry(name: str) -> Entry:
+    """The shipped scenario of a name; raises ConfigError when there is none."""
+    entries = {entry.name: entry for entry in shipped()}
+    if name not in entries:
+        close = difflib.get_close_matches(name, entries, n=1)
+        hint = f"did you mean {close[0]}?" if close else f"shipped: {', '.join(entries)}; or give a .toml file"
+        raise ConfigError(f"unknown scenario {name!r}; {hint}")
+    return entries[name]

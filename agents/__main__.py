@@ -7,6 +7,7 @@ from contextlib import AbstractContextManager
 from typing import NamedTuple
 
 from agents.clocked import make_uav
+from agents.mission.chart import NO_CHART, Chart
 from fanet_mw.bus.topics import Topics
 from fanet_mw.errors import ConfigError
 from fanet_mw.hosts import interrupts, loop, service
@@ -19,9 +20,9 @@ from fanet_mw.scenario import Scenario
 from fanet_mw.units import Enu, NodeId, S
 
 
-def run(scenario: Scenario, joining: Joining, *, node: NodeId, position: Enu) -> int:
-    """Run one UAV against a router until the scenario is over; raises BusError."""
-    service.live(make_uav(scenario, node, joining.swarm, position=position), scenario, joining)
+def run(scenario: Scenario, joining: Joining, *, node: NodeId, position: Enu, chart: Chart = NO_CHART) -> int:
+    """Run one UAV, with a map on board, against a router until the scenario is over; raises BusError."""
+    service.live(make_uav(scenario, node, joining.swarm, position=position, chart=chart), scenario, joining)
     return 0
 
 

@@ -12,6 +12,7 @@ from collections.abc import Mapping, Sequence
 from typing import Any, Final
 
 from agents.local_clock import LocalClock
+from agents.mission.chart import NO_CHART, Chart
 from agents.swarm_time import BeaconTime, swarm_time
 from agents.uav import NodeState, Uav
 from fanet_mw import wire
@@ -59,8 +60,9 @@ class ClockedUav(Actor):
         *,
         position: Enu,
         applications: Sequence[Application] = (),
+        chart: Chart = NO_CHART,
     ) -> None:
-        self._uav = Uav(scenario, node, swarm, position=position, applications=applications)
+        self._uav = Uav(scenario, node, swarm, position=position, applications=applications, chart=chart)
         super().__init__(self._uav.name, self._uav.subscriptions)
         self._node = node
         self._tx_topic = Topics(swarm).radio_tx(node)
@@ -236,8 +238,14 @@ class ClockedUav(Actor):
 
 
 def make_uav(
-    scenario: Scenario, node: NodeId, swarm: str, *, position: Enu, applications: Sequence[Application] = ()
+    scenario: Scenario,
+    node: NodeId,
+    swarm: str,
+    *,
+    position: Enu,
+    applications: Sequence[Application] = (),
+    chart: Chart = NO_CHART,
 ) -> Uav | ClockedUav:
-    """A UAV as the scenario has it, with its host's clock or with one of its own, and with a user's applications."""
+    """A UAV as the scenario has it, with its host's clock or one of its own, a user's applications, a map."""
     kind = ClockedUav if scenario.clock.modelled else Uav
-    return kind(scenario, node, swarm, position=position, applications=applications)
+    return kind(scenario, node, swarm, position=position, applications=applications, chart=chart)

@@ -11,6 +11,7 @@ from agents.autopilot import Autopilot
 from agents.avoidance import CollisionAvoidance
 from agents.dead_reckoning import DeadReckoning
 from agents.mission.applications import PlannedSearch, Rescue
+from agents.mission.chart import NO_CHART, Chart
 from agents.onboard import INNER_ID, Onboard
 from agents.steady_fix import SteadyFix
 from agents.telemetry import Telemetry
@@ -68,8 +69,9 @@ class Uav(Actor):
         *,
         position: Enu,
         applications: Sequence[Application] = (),
+        chart: Chart = NO_CHART,
     ) -> None:
-        """`applications` are those of its user, beside what the scenario asks for."""
+        """`applications` are those of its user, beside what the scenario asks for; `chart`: the map on board."""
         topics = Topics(swarm)
         super().__init__(f"agent-{node}", (topics.radio_rx(node), topics.sensors(node)))
         self._id = node
@@ -83,7 +85,7 @@ class Uav(Actor):
         self._autopilot = Autopilot(node, position=position, telemetry_hz=scenario.nodes.telemetry_hz)
         self._reckoning = DeadReckoning()
         self._fixes = SteadyFix(sigma_m=scenario.world.gps_sigma_m, range_m=scenario.radio.range_m)
-        asked_for = _asked_for(scenario, node, self._autopilot, position)
+        asked_for = _asked_for(scenario, node, self._autopilot, position, chart)
         self._built_in = tuple(application.name for application in asked_for)
         """Applications whose counters stand among the UAV's own in its report."""
         carried = (*_foreign(scenario, node), *applications)
@@ -140,10 +142,8 @@ class Uav(Actor):
             reckoned = self._reckoning.velocity(message)
             if reckoned is not None:
                 self._fix(reckoned, now_ns)
-        elif isinstance(message, WifiScan | Camera | Altimeter):
+        elif isinstance(message, WifiScan | Camera | Voice | Radar | Altimeter | Battery):
             self._onboard.sensor(message, now_ns)
-        elif isinstance(message, Voice | Radar | Battery):
-            pass  # on board, but nobody uses it yet
         else:
             self._malformed += 1
         self._settle(now_ns)
@@ -245,12 +245,14 @@ class Uav(Actor):
         self.outbox.append((self._tap_topic, MavlinkTap(now_ns, frames)))
 
 
-def _asked_for(scenario: Scenario, node: NodeId, autopilot: Autopilot, position: Enu) -> Sequence[Application]:
+def _asked_for(
+    scenario: Scenario, node: NodeId, autopilot: Autopilot, position: Enu, chart: Chart
+) -> Sequence[Application]:
     """The applications that a scenario asks for, in the order in which they have their turn."""
     searches = scenario.mission.search != "none"
     applications: list[Application]
     loads = [Load(scenario, node, name) for name in scenario.traffic_classes]
-    rescue = PlannedSearch(scenario, node, position=position) if searches else Rescue(scenario, node)
+    rescue = PlannedSearch(scenario, node, position=position, chart=chart) if searches else Rescue(scenario, node)
     applications = [Telemetry(autopilot), *loads, rescue]
     if scenario.mission.collision_horizon_s:
         applications.append(CollisionAvoidance(scenario, node))

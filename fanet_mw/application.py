@@ -18,7 +18,7 @@ from enum import StrEnum
 from random import Random
 from typing import Any, Final, NamedTuple, Protocol
 
-from fanet_mw.bus.messages import Altimeter, Camera, Gps, WifiScan
+from fanet_mw.bus.messages import Altimeter, Battery, Camera, Gps, Radar, Voice, WifiScan
 from fanet_mw.errors import DropReason
 from fanet_mw.scenario import Scenario
 from fanet_mw.trace import Record
@@ -30,7 +30,7 @@ ANY: Final[Collection[int]] = (-1,)
 HOME: Final = 0.0
 """The speed of a course that sends a UAV back to its formation."""
 
-SensorReading = WifiScan | Camera | Altimeter
+SensorReading = WifiScan | Camera | Voice | Radar | Altimeter | Battery
 """Any reading of a sensor except the position fix; a new kind of sensor is a new member of this union."""
 
 

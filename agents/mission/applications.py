@@ -6,12 +6,13 @@ Each hands what its UAV senses and is told to the mission, and empties the missi
 from functools import lru_cache
 from typing import Final
 
+from agents.mission.chart import NO_CHART, Chart
 from agents.mission.outbox import Outbox
 from agents.mission.paper_rule import PaperRule
 from agents.mission.searcher import Heard, Searcher
 from fanet_mw import mavlink, wire
 from fanet_mw.application import Application, AppPort, Course, Received, SensorReading
-from fanet_mw.bus.messages import Altimeter, Camera, Gps, WifiScan
+from fanet_mw.bus.messages import Altimeter, Camera, Gps, Radar, WifiScan
 from fanet_mw.errors import MalformedFrameError
 from fanet_mw.scenario import Scenario
 from fanet_mw.units import MS, Enu, NodeId, S
@@ -67,9 +68,10 @@ class PlannedSearch(Application):
     name: Final = "report"
     listens = (SURVIVOR.msgid, SEARCH.msgid, STATUS.msgid, BIDS.msgid, FOUND.msgid)
 
-    def __init__(self, scenario: Scenario, node: NodeId, *, position: Enu) -> None:
+    def __init__(self, scenario: Scenario, node: NodeId, *, position: Enu, chart: Chart = NO_CHART) -> None:
+        """`chart`: the map on board."""
         self._outbox = Outbox()
-        self._searcher = Searcher(scenario, node, position=position, outbox=self._outbox)
+        self._searcher = Searcher(scenario, node, position=position, outbox=self._outbox, chart=chart)
         self._bad_positions = 0
         """Hellos whose position is none, or not of now."""
 
@@ -113,6 +115,8 @@ class PlannedSearch(Application):
             self._searcher.camera(people, now_ns=now_ns)
         elif isinstance(reading, Altimeter):
             self._searcher.altimeter(reading.above_ground_m, now_ns=now_ns)
+        elif isinstance(reading, Radar):
+            self._searcher.radar(reading.echoes, now_ns=now_ns)
         self._settle()
 
     def wake(self, now_ns: int) -> None:

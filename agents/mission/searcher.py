@@ -16,14 +16,17 @@ from dataclasses import dataclass
 from typing import Final, NamedTuple, assert_never
 
 from agents.mission.auction import Auction
+from agents.mission.chart import Chart
 from agents.mission.constraints import avoiding, grown_m, staying_near
 from agents.mission.finds import Find, Finds, ground_place
 from agents.mission.half_planes import HalfPlane, nearest
+from agents.mission.obstacles import Obstacles
 from agents.mission.outbox import Outbox, Packet, ReportFormat
 from agents.mission.pattern import Pattern, fitted
 from agents.mission.phone_filter import REFERENCE_LOSS_DB, Estimate, PhoneModel
 from agents.mission.planner import STATUS_S, Planner, pattern_of
 from agents.mission.speed import approach_speed_m_s
+from fanet_mw.bus.messages import Echo
 from fanet_mw.rng import stream
 from fanet_mw.scenario import Scenario
 from fanet_mw.trace import Approaching, Arrived, Confirmed, Detected, Planned
@@ -63,6 +66,8 @@ _FAR_M: Final = 450.0
 """Who is farther from a survivor than this leaves it to others."""
 _AHEAD_M: Final = 250.0
 _STILL: Final = Enu(0.0, 0.0, 0.0)
+_LEAST_M_S: Final = 1.0
+"""Nobody creeps around a corner more slowly than this."""
 _LEASH_M: Final = 58.0
 """How far to the side a UAV of a line may leave its lane."""
 _LAG_M: Final = 140.0
@@ -116,7 +121,7 @@ class _Response:
 class Searcher:
     """One UAV."""
 
-    def __init__(self, scenario: Scenario, node: NodeId, *, position: Enu, outbox: Outbox) -> None:
+    def __init__(self, scenario: Scenario, node: NodeId, *, position: Enu, outbox: Outbox, chart: Chart) -> None:
         mission = scenario.mission
         self._node = node
         self._config = mission
@@ -141,6 +146,7 @@ class Searcher:
         self._scan_ns = 0
         self._above_ground: tuple[float, int] | None = None
         self._neighbors: dict[int, Heard] = {}
+        self._obstacles = Obstacles(chart, scenario.world.no_fly_m)
         self._pattern: Pattern | None = None
         self._place: int | None = None
         self._left_from: Enu | None = None
@@ -220,11 +226,20 @@ class Searcher:
         if above_ground_m is not None:
             self._above_ground = above_ground_m, now_ns
 
+    def radar(self, echoes: Sequence[Echo], *, now_ns: int) -> None:
+        """Our radar shows what is around us."""
+        if "radar" in self._config.avoid_by:
+            neighbors = [heard.now(now_ns) for heard in self._lately_heard(now_ns)]
+            self._obstacles.radar(
+                echoes, at=self._position, velocity=self._own_velocity, neighbors=neighbors, now_ns=now_ns
+            )
+
     def _height_m(self, now_ns: int) -> float:
-        """Over the ground, as far as a rangefinder has told lately; else over the plain."""
-        if self._above_ground is not None and now_ns - self._above_ground[1] <= _RANGED_NS:
+        """Over the ground, as far as a rangefinder has told lately and no roof is below us; else by the map."""
+        ranged = self._above_ground is not None and now_ns - self._above_ground[1] <= _RANGED_NS
+        if ranged and self._above_ground is not None and self._obstacles.roof_m(self._position) is None:
             return self._above_ground[0]
-        return self._position.up
+        return self._position.up - self._obstacles.ground_m(self._position)
 
     def camera(self, people: Sequence[tuple[float, float]], *, now_ns: int) -> None:
         """Our camera shows people at these bearings and elevations [rad]."""
@@ -580,24 +595,41 @@ class Searcher:
         goal, feed = self._goal(now_ns)
         off = goal.minus(self._position)
         wanted = feed.east + _LANE_GAIN * off.east, feed.north + _LANE_GAIN * off.north
+        corner = self._obstacles.way_to(self._position, goal, feed, now_ns=now_ns)
+        if corner is not None:
+            wanted = self._towards(corner, speed_m_s=math.hypot(*wanted))
         speed = math.hypot(*wanted)
         if speed > self._most_m_s:
             wanted = wanted[0] * self._most_m_s / speed, wanted[1] * self._most_m_s / speed
-        planes = self._clear_of_others(now_ns)
+        planes = self._obstacles.planes(self._position, now_ns)
+        planes += self._clear_of_others(now_ns)
         hard = len(planes)
         planes += self._tied(now_ns)
         east, north = nearest(wanted, planes, limit=self._most_m_s, hard=hard) if planes else wanted
-        up = max(-_CLIMB_M_S, min(_CLIMB_M_S, 0.5 * (goal.up - self._height_m(now_ns))))
-        return Enu(east, north, up)
+        velocity = Enu(east, north, 0.0)
+        climb_m = goal.up + self._obstacles.climb_m(self._position, velocity) - self._height_m(now_ns)
+        climb_m = max(climb_m, self._obstacles.least_up_m(self._position, velocity) - self._position.up)
+        return velocity._replace(up=max(-_CLIMB_M_S, min(_CLIMB_M_S, 0.5 * climb_m)))
+
+    def _towards(self, corner: Enu, *, speed_m_s: float) -> tuple[float, float]:
+        """The velocity to a place on the way around an obstacle; near it as slow as the goal itself would have it."""
+        off = corner.minus(self._position)
+        distance = math.hypot(off.east, off.north)
+        speed = min(self._most_m_s, max(speed_m_s, 0.5 * self._most_m_s), max(_LEAST_M_S, distance))
+        return off.east / max(distance, 1e-6) * speed, off.north / max(distance, 1e-6) * speed
+
+    def _lately_heard(self, now_ns: int) -> list[Heard]:
+        """The neighbors whose hellos tell where they are now."""
+        return [heard for _, heard in sorted(self._neighbors.items()) if now_ns - heard.at_ns <= _HEARD_FOR_NS]
 
     def _clear_of_others(self, now_ns: int) -> list[HalfPlane]:
+        """Constraints of all that are heard, or that our radar shows, the nearest one's first."""
         own = self._own_velocity.east, self._own_velocity.north
         planes: list[tuple[float, HalfPlane]] = []
-        for node in sorted(self._neighbors):
-            heard = self._neighbors[node]
+        heard_of = self._lately_heard(now_ns) if "hellos" in self._config.avoid_by else []
+        seen = [Heard(*mover) for mover in self._obstacles.movers(now_ns)]
+        for heard in (*heard_of, *seen):
             age_s = (now_ns - heard.at_ns) / S
-            if now_ns - heard.at_ns > _HEARD_FOR_NS:
-                continue
             offset = heard.now(now_ns).minus(self._position)
             distance = math.hypot(offset.east, offset.north)
             climb = self._own_velocity.up - heard.velocity.up

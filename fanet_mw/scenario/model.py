@@ -358,7 +358,7 @@ class Mission(Section):
     survivor_positions_m: tuple[tuple[Coordinate, Coordinate], ...] = ()
     """East and north of each survivor; empty: seeded places."""
     survivors_in: Literal["area", "buildings"] = "area"
-    """Where seeded places are: anywhere in the area, or within its buildings."""
+    """Where seeded places are: anywhere in the open area, or within its buildings."""
     buried: Annotated[float, Field(ge=0, le=1)] = 0.0
     """Share of the survivors that lie under rubble (`sensors.burial_phone_db`, `sensors.burial_voice_db`)."""
     reports_to_approach: Count = 3
@@ -367,6 +367,8 @@ class Mission(Section):
     """`lines`: UAVs search by a plan that one of them makes and hands out over the air, in two lines abreast that part
     from the middle of the area; of those who find, `responders` go. `none`: the paper's rule, by which everyone goes
     who has heard enough reports."""
+    avoid_by: tuple[Literal["hellos", "radar"], ...] = ("hellos", "radar")
+    """`search`: from what UAVs know whom to keep clear of: the positions in the hellos of others, their own radar."""
     responders: Annotated[int, Field(ge=1, le=1000)] = 3
     """`search`: as many UAVs go to a survivor, chosen by auction; the others search on."""
     report_interval_s: Interval = 5.0

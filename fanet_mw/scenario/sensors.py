@@ -91,6 +91,8 @@ class Sensors(Section):
     """Standard deviation of the slow error along each axis, whose correlation time is 100 s."""
     battery_hz: Rate = 0.0
     """Readings a second of the battery's voltage, current and charge."""
+    map_share: Annotated[float, Field(ge=0, le=1)] = 1.0
+    """Share of the buildings that are on the map which each UAV of a planned search carries; the map has all hills."""
     gps_bias_m: Length = 0.0
     """Standard deviation of a receiver's slow error along each axis."""
     gps_bias_time_s: SomeTime = 300.0

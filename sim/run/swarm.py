@@ -37,6 +37,7 @@ from sim.run.processes import Processes, describe
 from sim.run.router import ROUTER, expected_names
 from sim.run.running import registered
 from sim.world.__main__ import run as run_world
+from sim.world.environment.chart import chart_of
 from sim.world.flight_recorder import FlightRecorder
 from sim.world.mobility.layout import positions
 
@@ -179,10 +180,11 @@ class SwarmRun:
         self.processes.start("emulator", run_emulator, {**common, **self.emulator_options})
         if self._own_world:
             self.processes.start("world", run_world, common)
+        chart = chart_of(self._scenario)
         for node, position in zip(self._scenario.node_ids, positions(self._scenario), strict=True):
             if node in self._leave_out:
                 continue
-            arguments = {**common, "node": NodeId(node), "position": position}
+            arguments = {**common, "node": NodeId(node), "position": position, "chart": chart}
             self.processes.start(f"agent-{node}", run_agent, arguments, nice=_AGENT_NICE)
             await asyncio.sleep(0)  # signals are handled between two of many processes
             self._check_not_over()

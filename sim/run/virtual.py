@@ -22,6 +22,7 @@ from fanet_mw.units import MS, NodeId, S
 from sim.results.clocks import true_delays
 from sim.results.links import LinkTotals
 from sim.run.outcome import Outcome
+from sim.world.environment.chart import chart_of
 from sim.world.mobility.layout import positions
 from sim.world.world import World
 
@@ -48,9 +49,9 @@ def actors_of(
     applications: Applications = no_applications,
 ) -> list[Actor]:
     """Every actor of a swarm: the world first, so that poses stand before anyone transmits."""
-    starts = positions(scenario)
+    starts, chart = positions(scenario), chart_of(scenario)
     uavs = [
-        make_uav(scenario, NodeId(n), swarm, position=starts[n - 1], applications=applications(n))
+        make_uav(scenario, NodeId(n), swarm, position=starts[n - 1], applications=applications(n), chart=chart)
         for n in scenario.node_ids
     ]
     return [World(scenario, swarm), Medium(scenario, swarm, capture=capture), *uavs]

@@ -1,8 +1,9 @@
 """Where the survivors are, and which of them are buried. Ids run from 1."""
 
 import math
-from collections.abc import Callable
+from collections.abc import Callable, Sequence
 from random import Random
+from typing import Final
 
 import numpy as np
 
@@ -10,25 +11,40 @@ from fanet_mw.rng import stream
 from fanet_mw.scenario.model import Scenario
 from fanet_mw.units import Enu
 from sim.world.engines.contract import Flags, Rows, Values
-from sim.world.environment.obstacles import obstacles
+from sim.world.environment.obstacles import Box, obstacles
 from sim.world.mobility.layout import positions
+
+_TRIES: Final = 200
 
 
 def place(scenario: Scenario) -> list[Enu]:
-    """The true positions, on the plain: as listed, or uniform over the area or over the floors of its buildings."""
+    """The true positions, on the plain: as listed, uniform over the open area, or over the floors of its buildings."""
     mission = scenario.mission
     if mission.survivor_positions_m:
         return [Enu(east, north, 0.0) for east, north in mission.survivor_positions_m]
     random = stream(scenario.seed, "survivors")
     if mission.survivors_in == "buildings" and mission.survivors:
         return _in_buildings(scenario, random)
-    half = scenario.world.area_m / 2
-    return [Enu(random.uniform(-half, half), random.uniform(-half, half), 0.0) for _ in range(mission.survivors)]
+    boxes = _boxes(scenario) if scenario.world.has_obstacles and mission.survivors else ()
+    return [_in_the_open(random, scenario.world.area_m / 2, boxes) for _ in range(mission.survivors)]
+
+
+def _in_the_open(random: Random, half_m: float, boxes: Sequence[Box]) -> Enu:
+    """A place that no building stands on; any place where buildings are everywhere."""
+    for _ in range(_TRIES):
+        at = Enu(random.uniform(-half_m, half_m), random.uniform(-half_m, half_m), 0.0)
+        if not any(box.near(np.array([at]), margin_m=0.0) for box in boxes):
+            break
+    return at
+
+
+def _boxes(scenario: Scenario) -> Sequence[Box]:
+    return obstacles(scenario, np.array(positions(scenario), dtype=np.float64)).boxes
 
 
 def _in_buildings(scenario: Scenario, random: Random) -> list[Enu]:
     """A building for each, larger ones more often, and a place within it."""
-    boxes = obstacles(scenario, np.array(positions(scenario), dtype=np.float64)).boxes
+    boxes = _boxes(scenario)
     chosen = random.choices(boxes, weights=[box.width * box.depth for box in boxes], k=scenario.mission.survivors)
     places = []
     for box in chosen:

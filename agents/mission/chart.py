@@ -1,0 +1,115 @@
+"""The map that a UAV carries: heights of the ground, and the buildings that are known before the flight. ENU metres.
+
+Buildings are upright boxes that may be turned about the vertical; the ground is bilinear between the points of a
+square grid about the origin. What is not on the map, a UAV has to notice by itself.
+"""
+
+import math
+from collections.abc import Iterator, Mapping
+from functools import lru_cache
+from typing import Final, NamedTuple
+
+Cell = tuple[int, int]
+"""Column to the east and row to the north of a grid."""
+CELL_M: Final = 5.0
+TILE_M: Final = 50.0
+
+
+class Building(NamedTuple):
+    """One building: its middle, its extents, its roof above 0, and its turn from east to north [rad]."""
+
+    east_m: float
+    north_m: float
+    width_m: float
+    depth_m: float
+    roof_m: float
+    yaw_rad: float = 0.0
+
+    def outside(self, east_m: float, north_m: float) -> tuple[float, float, float]:
+        """Distance of a place from the nearest wall, and the direction (east, north) that leads away from it.
+
+        The distance is negative within the walls.
+        """
+        cos, sin = math.cos(self.yaw_rad), math.sin(self.yaw_rad)
+        off_east, off_north = east_m - self.east_m, north_m - self.north_m
+        along, across = cos * off_east + sin * off_north, cos * off_north - sin * off_east
+        beyond_along, beyond_across = abs(along) - self.width_m / 2, abs(across) - self.depth_m / 2
+        out_along, out_across = max(0.0, beyond_along), max(0.0, beyond_across)
+        distance = math.hypot(out_along, out_across)
+        if distance == 0.0:
+            distance = max(beyond_along, beyond_across)
+            out_along, out_across = (1.0, 0.0) if beyond_along > beyond_across else (0.0, 1.0)
+        length = math.hypot(out_along, out_across)
+        to_along = math.copysign(out_along / length, along)
+        to_across = math.copysign(out_across / length, across)
+        return distance, cos * to_along - sin * to_across, sin * to_along + cos * to_across
+
+
+class Chart(NamedTuple):
+    """What is known of a place."""
+
+    buildings: tuple[Building, ...] = ()
+    heights_m: tuple[tuple[float, ...], ...] = ()
+    """Of the ground, row by row to the north; empty: a plain at 0."""
+    cell_m: float = 1.0
+    """The distance of two points of the heights."""
+
+    def ground_m(self, east_m: float, north_m: float) -> float:
+        """Height of the ground; beyond the heights their edge goes on."""
+        rows = self.heights_m
+        if not rows:
+            return 0.0
+        last = len(rows) - 1
+        column = min(last - 1e-9, max(0.0, east_m / self.cell_m + last / 2))
+        row = min(last - 1e-9, max(0.0, north_m / self.cell_m + last / 2))
+        i, j = int(row), int(column)
+        v, u = row - i, column - j
+        low = rows[i][j] * (1 - u) + rows[i][j + 1] * u
+        high = rows[i + 1][j] * (1 - u) + rows[i + 1][j + 1] * u
+        return low * (1 - v) + high * v
+
+
+NO_CHART: Final = Chart()
+
+
+def cell_of(east_m: float, north_m: float, size_m: float = CELL_M) -> Cell:
+    """The cell of a grid in which a place lies."""
+    return math.floor(east_m / size_m), math.floor(north_m / size_m)
+
+
+def middle_of(cell: Cell) -> tuple[float, float]:
+    """East and north of the middle of a cell."""
+    return (cell[0] + 0.5) * CELL_M, (cell[1] + 0.5) * CELL_M
+
+
+class Charted(NamedTuple):
+    """A chart, made ready for being asked many times: the same for all UAVs that carry it."""
+
+    roofs_m: Mapping[Cell, float]
+    """By cell of `CELL_M`, the highest roof within the margin of its middle."""
+    near: Mapping[Cell, tuple[Building, ...]]
+    """By cell of `TILE_M`, the buildings that somebody there has to watch."""
+
+
+@lru_cache(maxsize=4)
+def charted(chart: Chart, *, margin_m: float, watch_m: float) -> Charted:
+    """Which cells the buildings of a chart take up, with a margin, and which of them are to be watched from where."""
+    roofs: dict[Cell, float] = {}
+    near: dict[Cell, list[Building]] = {}
+    for building in chart.buildings:
+        for cell in _cells_within(building, margin_m, CELL_M):
+            if building.outside(*middle_of(cell))[0] <= margin_m:
+                roofs[cell] = max(roofs.get(cell, -math.inf), building.roof_m)
+        for tile in _cells_within(building, watch_m, TILE_M):
+            near.setdefault(tile, []).append(building)
+    return Charted(roofs, {tile: tuple(found) for tile, found in near.items()})
+
+
+def _cells_within(building: Building, margin_m: float, size_m: float) -> Iterator[Cell]:
+    """The cells of a square about a building."""
+    reach_m = math.hypot(building.width_m, building.depth_m) / 2 + margin_m
+    first = cell_of(building.east_m - reach_m, building.north_m - reach_m, size_m)
+    last = cell_of(building.east_m + reach_m, building.north_m + reach_m, size_m)
+    for column in range(first[0], last[0] + 1):
+        for row in range(first[1], last[1] + 1):
+            yield column, row

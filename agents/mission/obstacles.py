@@ -1,0 +1,244 @@
+"""What stands in the way of one UAV, and how it flies around it: from the map that it carries, and from its radar.
+
+    map            buildings whose roofs are not well below us; areas that nobody may enter, at any height
+    radar          echoes that neither the map nor a neighbor explains, kept for a while; what moves is a UAV
+    way            straight, while that is clear; else the next corner of the shortest way over a grid
+    half-planes    the nearer something is, the slower a UAV may fly towards it
+
+The way is a matter of getting on, the half-planes are what keeps clear. Roofs below are flown over, all else around.
+"""
+
+import math
+from collections.abc import Sequence
+from typing import Final, NamedTuple
+
+from agents.mission.chart import CELL_M, TILE_M, Cell, Chart, cell_of, charted, middle_of
+from agents.mission.half_planes import HalfPlane
+from agents.mission.way import Place, first_corner, is_clear, nearest_free, way_around
+from fanet_mw.bus.messages import Echo
+from fanet_mw.units import Enu, S, seconds_to_ns
+
+OVER_M: Final = 7.0
+"""A roof at least so far below is flown over; so is one that a UAV comes upon in its climb."""
+_CLEAR_M: Final = 6.0
+"""No UAV flies nearer to a wall of its own will."""
+_MARGIN_M: Final = 11.0
+"""Ways keep so far away from walls, so that who flies them is not slowed down by them."""
+_APPROACH_S: Final = 2.5
+"""The distance that is left beyond the clearance is used up no faster than within this time."""
+_WATCH_M: Final = 35.0
+"""Farther away nothing limits a UAV of 10 m/s."""
+_MOST_PLANES: Final = 6
+_LOCAL_M: Final = 150.0
+"""Ways are looked for as far ahead as this."""
+_MOST_CELLS: Final = 3000
+_REPLAN_NS: Final = 1 * S
+_AHEAD_S: Final = 20
+"""A goal within a wall is awaited where it comes out, when that is within this time."""
+_RINGS: Final = 16
+_EXPLAINED_M: Final = 4.0
+"""An echo so near to a wall on the map is that wall's."""
+_NEIGHBOR_M: Final = 15.0
+"""An echo so near to where a neighbor says it is, is that neighbor's."""
+_MOVES_M_S: Final = 2.0
+"""What moves along the ray faster than this is no wall."""
+_ONCE_NS: Final = 3 * S
+_AGAIN_NS: Final = 15 * S
+"""How long an echo is kept for something solid: one might be noise, a second one next to it hardly is."""
+_MOVER_NS: Final = seconds_to_ns(1.2)
+
+
+class Mover(NamedTuple):
+    """Something that flies, as the radar shows it: of its velocity, only what lies along the ray is known."""
+
+    position: Enu
+    velocity: Enu
+    at_ns: int
+
+
+class _Echoed(NamedTuple):
+    top_m: float
+    until_ns: int
+
+
+class Obstacles:
+    """What one UAV knows of obstacles."""
+
+    def __init__(self, chart: Chart, no_fly_m: Sequence[tuple[float, float, float]] = ()) -> None:
+        """`no_fly_m`: areas as (east, north, radius)."""
+        self._chart = chart
+        self._charted = charted(chart, margin_m=_MARGIN_M, watch_m=_WATCH_M)
+        self._no_fly = tuple(no_fly_m)
+        self._echoes: dict[Cell, _Echoed] = {}
+        """Cells in which the radar has seen something."""
+        self._taken: dict[Cell, _Echoed] = {}
+        """The same cells and those within the margin of them."""
+        self._movers: list[Mover] = []
+        self._corner: Place | None = None
+        """Where the way around what is before us leads next."""
+        self._planned_ns: int | None = None
+        self._any = bool(chart.buildings or no_fly_m)
+
+    # --- what comes in --------------------------------------------------------------------------------------------
+
+    def radar(self, echoes: Sequence[Echo], *, at: Enu, velocity: Enu, neighbors: Sequence[Enu], now_ns: int) -> None:
+        """A scan of the radar; `neighbors` are where those that are heard are now."""
+        self._movers = [mover for mover in self._movers if now_ns - mover.at_ns < _MOVER_NS // 2]
+        for echo in echoes:
+            flat, up = echo.range_m * math.cos(echo.elevation_rad), echo.range_m * math.sin(echo.elevation_rad)
+            east, north = math.sin(echo.bearing_rad), math.cos(echo.bearing_rad)
+            place = Enu(at.east + flat * east, at.north + flat * north, at.up + up)
+            if any(place.minus(neighbor).norm() <= _NEIGHBOR_M for neighbor in neighbors):
+                continue
+            level = math.cos(echo.elevation_rad)
+            towards = level * (velocity.east * east + velocity.north * north)
+            towards += velocity.up * math.sin(echo.elevation_rad)
+            if abs(towards - echo.closing_m_s) > _MOVES_M_S:
+                away = (towards - echo.closing_m_s) * level
+                self._movers.append(Mover(place, Enu(away * east, away * north, 0.0), now_ns))
+            elif not self._explained(place):
+                self._keep(place, now_ns)
+
+    def _explained(self, place: Enu) -> bool:
+        """Whether the map says that there is something, or the echo is of the ground."""
+        if place.up <= self.ground_m(place) + _EXPLAINED_M:
+            return True
+        near = self._charted.near.get(cell_of(place.east, place.north, TILE_M), ())
+        return any(
+            place.up <= building.roof_m + _EXPLAINED_M and building.outside(place.east, place.north)[0] <= _EXPLAINED_M
+            for building in near
+        )
+
+    def _keep(self, place: Enu, now_ns: int) -> None:
+        column, row = cell = cell_of(place.east, place.north)
+        again = any(
+            (known := self._echoes.get((column + i, row + j))) is not None and known.until_ns > now_ns
+            for i in (-1, 0, 1)
+            for j in (-1, 0, 1)
+        )
+        fresh = _Echoed(place.up, now_ns + (_AGAIN_NS if again else _ONCE_NS))
+        _put(self._echoes, cell, fresh, now_ns)
+        reach = math.ceil(_MARGIN_M / CELL_M)
+        for i in range(-reach, reach + 1):
+            for j in range(-reach, reach + 1):
+                if math.hypot(i, j) * CELL_M <= _MARGIN_M:
+                    _put(self._taken, (column + i, row + j), fresh, now_ns)
+
+    # --- what it is asked -----------------------------------------------------------------------------------------
+
+    def ground_m(self, place: Enu) -> float:
+        """Height of the ground there, by the map."""
+        return self._chart.ground_m(place.east, place.north) if self._chart.heights_m else 0.0
+
+    def roof_m(self, place: Enu) -> float | None:
+        """The roof below a place, by the map; None where there is none."""
+        return self._charted.roofs_m.get(cell_of(place.east, place.north))
+
+    def least_up_m(self, at: Enu, velocity: Enu) -> float:
+        """Nobody here and on this course sinks below this height; what is no higher is flown over."""
+        if not self._charted.roofs_m:
+            return -math.inf
+        ahead = [
+            self._charted.roofs_m.get(cell_of(at.east + s * velocity.east, at.north + s * velocity.north), -math.inf)
+            for s in (0.0, 1.0, 2.0, 3.0)
+        ]
+        return max((roof for roof in ahead if roof + OVER_M <= at.up), default=-math.inf) + OVER_M
+
+    def climb_m(self, at: Enu, velocity: Enu) -> float:
+        """How much higher the ground is ahead, within the next seconds, than here; 0: it is not."""
+        if not self._chart.heights_m:
+            return 0.0
+        here = self.ground_m(at)
+        return max(
+            0.0,
+            *(
+                self._chart.ground_m(at.east + s * velocity.east, at.north + s * velocity.north) - here
+                for s in (2.0, 4.0, 6.0)
+            ),
+        )
+
+    def movers(self, now_ns: int) -> list[Mover]:
+        """What was seen flying lately, and no neighbor says that it is."""
+        return [mover for mover in self._movers if now_ns - mover.at_ns <= _MOVER_NS]
+
+    def planes(self, at: Enu, now_ns: int) -> list[HalfPlane]:
+        """Constraints on the velocity, the nearest obstacle's first."""
+        found = [
+            building.outside(at.east, at.north)
+            for building in self._charted.near.get(cell_of(at.east, at.north, TILE_M), ())
+            if building.roof_m + OVER_M > at.up
+        ]
+        for east, north, radius in self._no_fly:
+            off_east, off_north = at.east - east, at.north - north
+            distance = max(1e-6, math.hypot(off_east, off_north))
+            found.append((distance - radius, off_east / distance, off_north / distance))
+        for cell, echoed in self._echoes.items():
+            middle = middle_of(cell)
+            off_east, off_north = at.east - middle[0], at.north - middle[1]
+            if abs(off_east) > _WATCH_M or abs(off_north) > _WATCH_M:
+                continue
+            if echoed.until_ns > now_ns and echoed.top_m + OVER_M > at.up:
+                distance = max(1e-6, math.hypot(off_east, off_north))
+                found.append((distance - CELL_M / 2, off_east / distance, off_north / distance))
+        near = sorted(wall for wall in found if wall[0] <= _WATCH_M)[:_MOST_PLANES]
+        return [HalfPlane(east, north, (_CLEAR_M - distance) / _APPROACH_S) for distance, east, north in near]
+
+    def way_to(self, at: Enu, goal: Enu, moves: Enu, *, now_ns: int) -> Enu | None:
+        """Where to fly now in order to come to a goal that moves; None: straight there."""
+        if not self._any and not self._taken:
+            return None
+
+        def taken(cell: Cell) -> bool:
+            return self._is_taken(cell, at.up, now_ns)
+
+        here, there = (at.east, at.north), self._reachable(goal, moves, at.up, now_ns)
+        if there is None:
+            return None
+        distance = math.hypot(there[0] - here[0], there[1] - here[1])
+        if distance > _LOCAL_M:
+            share = _LOCAL_M / distance
+            there = here[0] + share * (there[0] - here[0]), here[1] + share * (there[1] - here[1])
+        if is_clear(here, there, taken):
+            self._planned_ns = self._corner = None
+            moved = there != (goal.east, goal.north) and distance <= _LOCAL_M
+            return Enu(there[0], there[1], goal.up) if moved else None
+        if self._planned_ns is None or self._at_corner(here) or now_ns - self._planned_ns >= _REPLAN_NS:
+            end = nearest_free(there, taken, within=_RINGS)
+            way = [] if end is None else way_around(here, end, taken, most_cells=_MOST_CELLS)
+            self._planned_ns, self._corner = now_ns, first_corner(here, way, taken)
+        corner = self._corner
+        return None if corner is None else Enu(corner[0], corner[1], goal.up)
+
+    def _at_corner(self, here: Place) -> bool:
+        corner = self._corner
+        return corner is not None and math.hypot(corner[0] - here[0], corner[1] - here[1]) <= CELL_M
+
+    def _reachable(self, goal: Enu, moves: Enu, up_m: float, now_ns: int) -> Place | None:
+        """The goal, or where it comes out of what it is in, or what is free next to it."""
+        for seconds in range(_AHEAD_S + 1):
+            place = goal.east + seconds * moves.east, goal.north + seconds * moves.north
+            if not self._is_taken(cell_of(*place), up_m, now_ns):
+                return place
+            if not (moves.east or moves.north):
+                break
+        cell = nearest_free((goal.east, goal.north), lambda cell: self._is_taken(cell, up_m, now_ns), within=_RINGS)
+        return None if cell is None else middle_of(cell)
+
+    def _is_taken(self, cell: Cell, up_m: float, now_ns: int) -> bool:
+        roof_m = self._charted.roofs_m.get(cell)
+        if roof_m is not None and roof_m + OVER_M > up_m:
+            return True
+        if self._no_fly:
+            east, north = middle_of(cell)
+            if any(math.hypot(east - e, north - n) <= radius + _MARGIN_M for e, n, radius in self._no_fly):
+                return True
+        echoed = self._taken.get(cell)
+        return echoed is not None and echoed.until_ns > now_ns and echoed.top_m + OVER_M > up_m
+
+
+def _put(cells: dict[Cell, _Echoed], cell: Cell, fresh: _Echoed, now_ns: int) -> None:
+    """Note an echo; a higher or longer-lived one that still holds is kept."""
+    before = cells.get(cell)
+    if before is not None and before.until_ns > now_ns:
+        fresh = _Echoed(max(before.top_m, fresh.top_m), max(before.until_ns, fresh.until_ns))
+    cells[cell] = fresh

@@ -1,0 +1,105 @@
+"""The shortest way around what is in the way: A* over a grid of cells, of which some are taken.
+
+Hart, Nilsson and Raphael, "A Formal Basis for the Heuristic Determination of Minimum Cost Paths", 1968.
+"""
+
+import heapq
+import math
+from collections.abc import Callable
+from typing import Final
+
+from agents.mission.chart import CELL_M, Cell, cell_of, middle_of
+
+_STEPS: Final = tuple(
+    (east, north, math.hypot(east, north)) for east in (-1, 0, 1) for north in (-1, 0, 1) if east or north
+)
+_SAMPLE_M: Final = 0.8 * CELL_M
+"""A straight way is looked at as often as this."""
+_ESCAPE: Final = 4.0
+"""Cells about the start that are taken cost so much more: whoever is too near to a wall may still leave."""
+_ESCAPE_CELLS: Final = 4
+
+Place = tuple[float, float]
+"""East and north."""
+
+
+def is_clear(start: Place, goal: Place, taken: Callable[[Cell], bool]) -> bool:
+    """Whether no cell on the straight way is taken."""
+    east, north = goal[0] - start[0], goal[1] - start[1]
+    steps = max(1, math.ceil(math.hypot(east, north) / _SAMPLE_M))
+    before: Cell | None = None
+    for step in range(steps + 1):
+        share = step / steps
+        cell = cell_of(start[0] + share * east, start[1] + share * north)
+        if cell != before and taken(cell):
+            return False
+        before = cell
+    return True
+
+
+def nearest_free(goal: Place, taken: Callable[[Cell], bool], *, within: int) -> Cell | None:
+    """The cell nearest to a place that is not taken; None: there is none within so many cells."""
+    column, row = cell_of(*goal)
+    for ring in range(within + 1):
+        found = [
+            (math.hypot(middle_of((c, r))[0] - goal[0], middle_of((c, r))[1] - goal[1]), (c, r))
+            for c in range(column - ring, column + ring + 1)
+            for r in range(row - ring, row + ring + 1)
+            if max(abs(c - column), abs(r - row)) == ring and not taken((c, r))
+        ]
+        if found:
+            return min(found)[1]
+    return None
+
+
+def way_around(start: Place, goal: Cell, taken: Callable[[Cell], bool], *, most_cells: int) -> list[Cell]:
+    """The cells of the shortest way, the start's first; empty when there is none among so many cells."""
+    begin = cell_of(*start)
+    costs: dict[Cell, float] = {begin: 0.0}
+    came_from: dict[Cell, Cell] = {}
+    waiting: list[tuple[float, Cell]] = [(0.0, begin)]
+    done: set[Cell] = set()
+    while waiting and len(done) < most_cells:
+        _, cell = heapq.heappop(waiting)
+        if cell == goal:
+            return _traced(came_from, cell)
+        if cell in done:
+            continue
+        done.add(cell)
+        for east, north, length in _STEPS:
+            other = cell[0] + east, cell[1] + north
+            if other in done:
+                continue
+            if taken(other):
+                if max(abs(other[0] - begin[0]), abs(other[1] - begin[1])) > _ESCAPE_CELLS:
+                    continue
+                length *= _ESCAPE
+            cost = costs[cell] + length
+            if cost < costs.get(other, math.inf):
+                costs[other] = cost
+                came_from[other] = cell
+                ahead = math.hypot(other[0] - goal[0], other[1] - goal[1])
+                heapq.heappush(waiting, (cost + ahead, other))
+    return []
+
+
+def _traced(came_from: dict[Cell, Cell], cell: Cell) -> list[Cell]:
+    way = [cell]
+    while cell in came_from:
+        cell = came_from[cell]
+        way.append(cell)
+    return way[::-1]
+
+
+def first_corner(start: Place, way: list[Cell], taken: Callable[[Cell], bool]) -> Place | None:
+    """The farthest place of a way that is in sight of its start, or its next one."""
+    if len(way) < 2:
+        return None
+    low, high = 1, len(way) - 1
+    while low < high:  # what is in sight from the start of a shortest way is a beginning of it
+        middle = (low + high + 1) // 2
+        if is_clear(start, middle_of(way[middle]), taken):
+            low = middle
+        else:
+            high = middle - 1
+    return middle_of(way[low])

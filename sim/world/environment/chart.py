@@ -1,0 +1,22 @@
+"""The map that UAVs carry in a scenario: its hills, and the share of its buildings that is known before the flight."""
+
+import numpy as np
+
+from agents.mission.chart import NO_CHART, Building, Chart
+from fanet_mw.rng import stream
+from fanet_mw.scenario import Scenario
+from sim.world.environment.obstacles import obstacles
+from sim.world.mobility.layout import positions
+
+
+def chart_of(scenario: Scenario) -> Chart:
+    """The map; which buildings are missing from it is drawn by the seed."""
+    if not scenario.world.has_obstacles:
+        return NO_CHART
+    hills, boxes = obstacles(scenario, np.array(positions(scenario), dtype=np.float64))
+    known = round(scenario.sensors.map_share * len(boxes))
+    rows = sorted(stream(scenario.seed, "map").sample(range(len(boxes)), known))
+    buildings = tuple(Building(*boxes[row]) for row in rows)
+    if hills is None:
+        return Chart(buildings)
+    return Chart(buildings, tuple(tuple(row) for row in hills.heights.tolist()), hills.cell_m)

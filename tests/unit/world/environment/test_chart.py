@@ -1,0 +1,41 @@
+"""The map that UAVs carry shows what stands in the world, as far as it is known."""
+
+from collections.abc import Callable
+
+import numpy as np
+import pytest
+
+from agents.mission.chart import NO_CHART
+from fanet_mw.scenario import Scenario
+from sim.world.environment.chart import chart_of
+from sim.world.environment.obstacles import obstacles
+from sim.world.environment.solids import Solids
+from sim.world.mobility.layout import positions
+
+MakeScenario = Callable[..., Scenario]
+KEYS = {"world.area_m": 800, "world.buildings": 20, "world.terrain_m": 15.0, "nodes.altitude_m": 100}
+
+
+def test_the_map_has_the_ground_and_the_walls_of_the_world(make_scenario: MakeScenario) -> None:
+    scenario = make_scenario(**KEYS)
+    solids = Solids(obstacles(scenario, np.array(positions(scenario))))
+    chart = chart_of(scenario)
+    places = np.random.default_rng(1).uniform(-390, 390, (200, 3))
+    places[:, 2] = 20.0
+    ground = [chart.ground_m(east, north) for east, north, _ in places.tolist()]
+    assert ground == pytest.approx(solids.ground_m(places).tolist())
+    inside = [
+        any(b.roof_m > 20 and b.outside(east, north)[0] < 0 for b in chart.buildings)
+        for east, north, _ in places.tolist()
+    ]
+    ground_gap = places[:, 2] - solids.ground_m(places)
+    assert inside == [gap == 0 and over > 0 for gap, over in zip(solids.gap_m(places), ground_gap, strict=True)]
+    assert any(inside)
+
+
+def test_some_of_the_buildings_may_be_missing_from_the_map(make_scenario: MakeScenario) -> None:
+    whole = chart_of(make_scenario(**KEYS))
+    part = chart_of(make_scenario(**KEYS, **{"sensors.map_share": 0.75}))
+    assert len(part.buildings) == 15
+    assert set(part.buildings) < set(whole.buildings)
+    assert chart_of(make_scenario()) is NO_CHART

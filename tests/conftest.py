@@ -11,9 +11,11 @@ from fanet_mw.scenario import Scenario, config
 pytest_plugins = ["fanet_mw.testing.plugin"]
 """The fixtures that we ship: found by itself only where the package is installed anew."""
 
-settings.register_profile(
-    "default", deadline=None, max_examples=60
-)  # first calls compile; timing belongs in benchmarks
+settings.register_profile("default", deadline=None, max_examples=60, derandomize=True)
+"""The same examples in every run: what is refused is refused for everybody, and again after the same command. There is
+no deadline, because first calls compile."""
+settings.register_profile("explore", deadline=None, max_examples=300)
+"""New examples in each run, and more of them: for `scripts/test --all`."""
 settings.load_profile("default")
 settings.register_profile(
     "mutants", deadline=None, derandomize=True, database=None, phases=(Phase.explicit, Phase.generate)

@@ -77,7 +77,6 @@ messages: st.SearchStrategy[Message] = st.one_of(
         instants,
         st.lists(st.tuples(nodes, nodes), max_size=5),
     ),
-    st.builds(Setpoint, instants, vectors, doubles),
     st.builds(Setpoint, instants, vectors, doubles, st.sampled_from(SetpointKind), vectors),
     st.builds(Camera, instants, st.lists(st.builds(Person, *[finite] * 3), max_size=4).map(tuple)),
     st.builds(Voice, instants, st.lists(st.builds(Call, *[finite] * 4), max_size=4).map(tuple)),

@@ -8,6 +8,7 @@ the routing protocol behind it decides what happens next, and sends through the 
 
 from collections import Counter
 from collections.abc import Callable, Mapping, Sequence
+from itertools import zip_longest
 from typing import Final
 
 from fanet_mw import wire
@@ -197,18 +198,20 @@ class Node:
         return False
 
     def _hear_bundle(self, reception: Reception, now_ns: int) -> None:
-        """Several packets in one frame: each as if it had come alone; those that are passed on go together again."""
+        """Several packets in one frame: each as if it had come alone; those that are passed on go together again, each
+        repetition in its own turn.
+        """
         try:
             packets = wire.unbundle(reception.frame)
         except MalformedFrameError:
             self.port.dropped[DropReason.MALFORMED] += 1
             return
-        relays: list[Relay] = []
+        relays: list[Sequence[Relay]] = []
         for frame in packets:
             self._reader.look(frame, alone=True)
-            relays += self._hear_one(reception._replace(frame=frame), now_ns)
-        if relays:
-            self.port.relay_together(relays)
+            relays.append(self._hear_one(reception._replace(frame=frame), now_ns))
+        for together in zip_longest(*relays):
+            self.port.relay_together([relay for relay in together if relay is not None])
 
     def _hear_one(self, reception: Reception, now_ns: int) -> Sequence[Relay]:
         """One packet of several that came in a frame; returned is what of it is passed on."""

@@ -29,10 +29,6 @@ class CallRelease(TurnRelease):
         """Somebody else has sent this packet (`seen.key_of`)."""
         self._queue.remove(key)
 
-    def holds(self, key: int) -> bool:
-        """Whether this packet is queued."""
-        return key in self._queue
-
     def _turn(self, earliest_ns: int) -> OwnTurn | None:
         """The first call from an instant on, under whichever timetable is in force then."""
         for index, plan in enumerate(self._plans):

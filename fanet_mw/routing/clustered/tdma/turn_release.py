@@ -43,6 +43,10 @@ class TurnRelease(ABC):
             self._arm(now_ns)
         return evicted
 
+    def holds(self, key: int) -> bool:
+        """Whether this packet (`seen.key_of`) is queued."""
+        return key in self._queue
+
     def expire(self, *, before_us: int) -> list[Packet]:
         return self._queue.expire(before_us=before_us)
 

@@ -163,16 +163,17 @@ class Promises:
         return None if own is None or self.bound_ns() is None else least_interval_ns(own, deadline_ns=deadline_ns)
 
     def likely_ns(self) -> int | None:
-        """Within which time `LIKELY_SHARE` of the nodes have a packet of this node, where links lose frames; None: no
-        such time is known, or more packets are waiting than a superframe lets out.
+        """Within which time `LIKELY_SHARE` of the nodes have the newest packet of this node, where links lose frames;
+        None: no such time is known.
         """
         plan = self._plans.newest
-        if plan is None or plan.odds is None or len(self._roots) > len(plan.roots) or not plan.roots:
+        if plan is None or plan.odds is None or not plan.roots:
             return None
         if self._lease.leads or plan.table.uncovered[self._port.node] or not self._in_step():
             return None  # schedules go before the leader's own packets
         found_ns = plan.likely_ns(
             self._port.node,
+            waiting=len(self._roots),
             interval_ns=self._interval_ns,
             hello_ns=seconds_to_ns(self._port.scenario.routing.hello_interval_s),
         )

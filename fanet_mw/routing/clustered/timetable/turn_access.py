@@ -136,12 +136,19 @@ class TurnAccess:
         return packet
 
     def answer(self, packet: Packet, *, now_ns: int) -> None:
-        """In a turn for neighbors alone, if the node has one and the packet fits."""
+        """In a turn for neighbors alone, if the node has one and the packet fits.
+
+        What still waits for a turn to be flooded in is no answer: who hears a packet outside of its turns does not
+        relay it, nor its flood afterwards, which would end there.
+        """
+        key = key_of(packet.header.origin, packet.header.seq)
+        if self._roots.holds(key):
+            return
         plan = self._plans.at(now_ns)
         crowded = len(self._calls) >= _MOST_ANSWERS
         if plan is None or not plan.calls or crowded or len(packet.frame) > plan.frame_bytes:
             self._floods.contend_again(packet, now_ns=now_ns)
-        elif not self._calls.holds(key_of(packet.header.origin, packet.header.seq)):
+        elif not self._calls.holds(key):
             self._calls.push(packet, now_ns=now_ns)
 
     def hello_start_ns(self, start_ns: int, *, size: int) -> int:

@@ -131,10 +131,11 @@ class Plan(NamedTuple):
         """Whether this node lets its packets out itself."""
         return node in self.table.spans
 
-    def likely_ns(self, node: NodeId, *, interval_ns: int, hello_ns: int) -> int | None:
+    def likely_ns(self, node: NodeId, *, waiting: int, interval_ns: int, hello_ns: int) -> int | None:
         """Within which time `LIKELY_SHARE` of the copies of this node's packets arrive; None: the odds are worse.
 
-        The longest wait, behind a join too, which takes a turn of ours when a link has changed; the flood; and as many
+        The longest wait, or that of the last of so many that are `waiting`, if it is longer, as after several joins;
+        behind one more join, which takes a turn of ours when a link has changed; the flood; and as many
         rounds of repair as it takes: a hello, as late as it may be, which waits for a turn; an answer, which may wait
         for the next turn but one. Half of what may be missing is left for what the odds do not know.
         """
@@ -144,6 +145,11 @@ class Plan(NamedTuple):
         if flood_ns is None or rounds is None or not self.calls:
             return None
         call_ns = self.turns.done_ns(self.calls, span=1)[0]
+        superframes, turns = divmod(max(waiting, 1) - 1, len(self.roots))
+        queued_ns = (
+            superframes * self.turns.period_ns + self.turns.done_ns(self.roots, span=self.table.spans[node])[turns]
+        )
+        flood_ns = max(flood_ns, queued_ns)
         flood_ns += self.turns.period_ns // len(self.roots)
         round_ns = _BUSY * (round(_LATE_HELLO * hello_ns) + 3 * call_ns)
         return flood_ns + (RIPE_NS if rounds else 0) + rounds * round_ns

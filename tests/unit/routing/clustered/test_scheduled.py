@@ -11,6 +11,7 @@ from fanet_mw import wire
 from fanet_mw.bus.messages import Reception
 from fanet_mw.errors import DropReason
 from fanet_mw.node.node import Node
+from fanet_mw.node.packet import Packet
 from fanet_mw.routing import make_protocol
 from fanet_mw.routing.clustered.clustered import Clustered
 from fanet_mw.routing.clustered.tdma.turns import Turns
@@ -90,6 +91,33 @@ def test_a_flood_of_the_superframe_before_is_relayed_in_this_one(node: Node) -> 
     access_of(node)._plans.in_order = [planned(late)]
     hear_in_turn(node, AFTER, 1, superframe=11)
     assert relays(node) == [1100 + 40 + 2 * 2]
+
+
+def test_what_comes_together_goes_on_together_in_each_of_our_turns_of_it(node: Node) -> None:
+    access_of(node)._plans.in_order = [planned((Turn(5, ROOT, ROOT, 0), Turn(8, US, ROOT, 0), Turn(10, US, ROOT, 0)))]
+    end_ns = TURNS.start_ns(5, frame_start_ns=1000 * MS) + MS
+    frames = [
+        Header(end_ns // 1000, seq, ROOT, BROADCAST, ROOT, Kind.DATA, 9, 0, 3, FLAG_FLOOD).encode() + filler(40)
+        for seq in (1, 2)
+    ]
+    node.hear(Reception(wire.bundle(frames), ROOT, end_ns, -60.0), end_ns)
+    sent = [(r.start_ns / MS, [wire.decode_header(f).seq for f in wire.unbundle(r.frame)]) for r in node.requests]
+    assert sent == [(1040 + 8 * 2, [1, 2]), (1040 + 10 * 2, [1, 2])]
+
+
+def test_a_packet_that_waits_for_its_turn_answers_nobody(node: Node) -> None:
+    """Who hears it out of turn would not relay it, nor its flood, of which it would be a copy."""
+    access, now_ns = access_of(node), 1050 * MS
+    access.use_turns(now_ns)
+    header = Header(now_ns // 1000, 1, US, BROADCAST, US, Kind.DATA, 9, 0, PRIORITY_BULK, 0)
+    packet = Packet(header, header.encode() + filler(40))
+    access.forward(packet, start_ns=now_ns, now_ns=now_ns)
+    access.answer(packet, now_ns=now_ns)
+    assert node.requests == []
+    access.wake(1064 * MS)
+    assert [request.start_ns for request in node.requests] == [1064 * MS], "the flood"
+    access.answer(packet, now_ns=1500 * MS)
+    assert len(node.requests) == 2
 
 
 @pytest.mark.parametrize(("told_ns", "is_relayed"), [(5 * MS, True), (5 * MS + 1, False), (30 * MS, False)])

@@ -21,8 +21,8 @@ from sim.results.bounds import against_bounds, likely
 from sim.results.clocks import clock_errors
 from sim.results.mission import mission
 from sim.results.packets import OTHER_APPS, Application, packets_of, targets_by_source
+from sim.results.separation import separation
 from sim.run.outcome import Outcome
-from sim.world.incidents.separation import separation
 
 
 def summarize(outcome: Outcome, *, trace_sha256: str) -> dict[str, Any]:

@@ -28,12 +28,12 @@ from sim.world.environment.solids import Solids
 from sim.world.environment.survivors import Survivors
 from sim.world.environment.wind import Wind
 from sim.world.flight_recorder import Flight
-from sim.world.incidents.no_fly import NoFly
-from sim.world.incidents.separation import Separation
+from sim.world.incidents.incidents import Incidents
 from sim.world.mobility.guidance import Guidance
 from sim.world.mobility.layout import positions
 from sim.world.sensors.contract import Truth
 from sim.world.sensors.suite import Suite, sensors_of
+from sim.world.ticks import Ticks
 
 if TYPE_CHECKING:
     from sim.world.environment.line_of_sight import Sight
@@ -77,10 +77,7 @@ class World(Actor):
         topics = Topics(swarm)
         super().__init__("world", (topics.all_setpoints,))
         self._scenario = scenario
-        self._count = scenario.nodes.count
-        self._pose_topic = topics.pose
-        self._obstruction_topic = topics.obstruction
-        self._fault_topic = topics.radio_control
+        self._topics = topics
         self._ids = array("H", scenario.node_ids)
         starts = np.array(positions(scenario), dtype=np.float64)
         solid = obstacles(scenario, starts) if scenario.world.has_obstacles else None
@@ -98,61 +95,46 @@ class World(Actor):
         self._energy = Energy(scenario) if drained else None
         survivors = Survivors(scenario, solids.ground_m)
         self._suite = Suite(scenario, sensors_of(scenario, survivors, solids, self._energy), topics)
-        self._flies = np.ones(self._count, bool)
+        self._flies = np.ones(len(self._ids), bool)
         """Which UAVs have not crashed."""
         if flight is not None and scenario.world.crash == "falls":
             self._find_wrecks(solids)
-        self._tick_ns: int | None = None
-        self._last_ns = 0
-        self._ticks = 0
-        self._skipped = 0
-        """Ticks that came too late for anybody to use them."""
-        self._collisions = 0
-        self._no_fly = NoFly(scenario.world.no_fly_m, starts)
-        self._separation = (
-            Separation(scenario.mission.collision_distance_m) if scenario.mission.collision_distance_m else None
-        )
+        self._ticks = Ticks()
+        self._incidents = Incidents(scenario, starts)
         self._moves = scenario.mobility.model != "static" or scenario.mission.survivors > 0
         self._malformed = 0
 
     # --- the actor contract ---------------------------------------------------------------------------------------
 
     def start(self, now_ns: int) -> None:
-        self._last_ns = now_ns
         self._publish(now_ns, now_ns - 1)
-        self._tick_ns = now_ns + self._period_ns
+        self._ticks.begin(now_ns, period_ns=self._period_ns)
 
     def receive(self, topic: str, message: Message, now_ns: int) -> None:
         node = node_of(topic)
         if (
             not isinstance(message, Setpoint)
-            or not 1 <= node <= self._count
+            or not 1 <= node <= len(self._ids)
             or not np.isfinite([*message.position, message.speed_m_s, *message.velocity]).all()
         ):
             self._malformed += 1
         else:
-            if self._guidance.still:  # time stood still until now
-                self._last_ns = max(self._last_ns, now_ns - self._scenario.world.tick_ns)
-                self._tick_ns = now_ns + self._scenario.world.tick_ns
+            if self._guidance.still:
+                self._ticks.resume(now_ns, tick_ns=self._scenario.world.tick_ns)
             self._guidance.obey(node, message, at=self._engine.positions()[node - 1], t_s=now_ns / S)
 
     def wake(self, now_ns: int) -> None:
-        if self._tick_ns is None or now_ns < self._tick_ns:
+        due_ns, before_ns = self._ticks.next_ns, self._ticks.last_ns
+        if due_ns is None or now_ns < due_ns:
             return
-        due_ns, before_ns = self._tick_ns, self._last_ns
         if not self._guidance.still:
-            self._move(due_ns)
-        self._last_ns = due_ns
+            self._move(before_ns, due_ns)
+        self._ticks.last_ns = due_ns
         self._publish(due_ns, before_ns)
-        self._ticks += 1
-        self._tick_ns = due_ns + self._period_ns
-        behind = (now_ns - self._tick_ns) // self._period_ns
-        if behind > 0:  # a stalled host: skip instants nobody can use any more, keep the phase
-            self._tick_ns += behind * self._period_ns
-            self._skipped += behind
+        self._ticks.follow(due_ns, now_ns, period_ns=self._period_ns)
 
     def next_wake_ns(self) -> int | None:
-        return self._tick_ns
+        return self._ticks.next_ns
 
     def stop(self, now_ns: int) -> None:
         self._engine.close()
@@ -161,13 +143,13 @@ class World(Actor):
         return {
             "kind": "world",
             "engine": self._engine.name,
-            "ticks": self._ticks,
-            "skipped_ticks": self._skipped,
-            "collisions": self._collisions,
+            "ticks": self._ticks.count,
+            "skipped_ticks": self._ticks.skipped,
+            "collisions": self._incidents.collisions,
             "crashed": int((~self._flies).sum()),
-            "no_fly_entries": self._no_fly.entries,
+            "no_fly_entries": self._incidents.no_fly.entries,
             "least_charge": None if self._energy is None else round(float(self._energy.batteries.charge.min()), 4),
-            "separation": {} if self._separation is None else self._separation.report(),
+            "separation": self._incidents.separation.report(),
             "malformed": self._malformed,
         }
 
@@ -178,17 +160,16 @@ class World(Actor):
         tick_ns = self._scenario.world.tick_ns
         return max(tick_ns, _STILL_NS) if self._guidance.still else tick_ns
 
-    def _move(self, now_ns: int) -> None:
+    def _move(self, last_ns: int, now_ns: int) -> None:
         engine = self._engine
-        elapsed_s = (now_ns - self._last_ns) / S
+        elapsed_s = (now_ns - last_ns) / S
         steps = max(1, round(elapsed_s / _CONTROL_S))
         for step in range(steps):
-            t_s = self._last_ns / S + step * elapsed_s / steps
+            t_s = last_ns / S + step * elapsed_s / steps
             before = engine.positions().copy()
             engine.advance(elapsed_s / steps, self._guidance.wanted(t_s, before, engine.velocities()))
-            if self._separation is not None:
-                self._separation.watch(before, engine.positions())
-        self._no_fly.watch(engine.positions())
+            self._incidents.separation.watch(before, engine.positions())
+        self._incidents.no_fly.watch(engine.positions())
         if self._energy is not None:
             motors = self._flies & ~self._guidance.grounded(engine.positions())
             for row in self._energy.pass_time(elapsed_s, engine, motors):
@@ -209,7 +190,7 @@ class World(Actor):
         touching = [node for node in (first, second) if node and self._flies[node - 1]]
         if not touching or (first == 0 and self._guidance.may_touch_down(second)):
             return
-        self._collisions += 1
+        self._incidents.collisions += 1
         self.records.append(Collided(now_ns, second, first))
         if self._scenario.world.crash == "falls":
             for node in touching:
@@ -222,15 +203,15 @@ class World(Actor):
         self._flies[node - 1] = False
         self._engine.fall(node - 1)
         if radio_dies:
-            self.outbox.append((self._fault_topic, Cut(f"crash-{node}", NodeId(node))))
+            self.outbox.append((self._topics.radio_control, Cut(f"crash-{node}", NodeId(node))))
 
     def _publish(self, now_ns: int, before_ns: int) -> None:
         """Poses, and the sensors whose instant lies in (before, now]."""
         at, velocity = self._engine.positions(), self._engine.velocities()
         if self._sight is not None:  # before the poses, which bring it into force
-            self.outbox.append((self._obstruction_topic, self._sight.obstructions(at, now_ns)))
+            self.outbox.append((self._topics.obstruction, self._sight.obstructions(at, now_ns)))
         states = array("d", np.hstack([at, velocity]).astype(np.float64).tobytes())
-        self.outbox.append((self._pose_topic, Poses(now_ns, self._ids, states)))
+        self.outbox.append((self._topics.pose, Poses(now_ns, self._ids, states)))
         if self._moves and now_ns // _TRACED_NS > before_ns // _TRACED_NS:
             for node, (east, north, up) in zip(self._ids, at.tolist(), strict=True):
                 if self._flies[node - 1]:

@@ -1,0 +1,35 @@
+"""`separation` of `summary.json`: how near UAVs came to each other, and what they knew of it beforehand."""
+
+from typing import Any
+
+import numpy as np
+
+from fanet_mw.trace import ConflictForeseen, Delivered, Warned
+from fanet_mw.units import MS
+from sim.run.outcome import Outcome
+
+
+def separation(outcome: Outcome) -> dict[str, Any]:
+    """What the world saw, and what the UAVs foresaw; empty when nobody looked."""
+    seen = outcome.reports.get("world", {}).get("separation")
+    if not seen:
+        return {}
+    foreseen = [r for r in outcome.records if type(r) is ConflictForeseen]
+    about = {(r.node, r.seq): r.other for r in outcome.records if type(r) is Warned}
+    delays_ms = [
+        r.delay_ns / MS for r in outcome.records if type(r) is Delivered and about.get((r.origin, r.seq)) == r.node
+    ]
+    ahead_s = sorted(r.closest_ms / 1000 for r in foreseen)
+    return {
+        **seen,
+        "foreseen": len(foreseen),
+        "told": sum(r.told for r in foreseen),
+        "ahead_s": {"least": ahead_s[0], "p50": ahead_s[len(ahead_s) // 2]} if ahead_s else {},
+        "warnings": len(about),
+        "reached_the_other": round(len(delays_ms) / len(about), 6) if about else None,
+        "to_the_other_ms": {
+            "p50": round(float(np.percentile(delays_ms, 50)), 3),
+            "p95": round(float(np.percentile(delays_ms, 95)), 3),
+            "max": round(max(delays_ms), 3),
+        } if delays_ms else {},
+    }  # fmt: skip

@@ -1,0 +1,16 @@
+"""What should not happen in flight and is counted: contacts, losses of separation, entries into no-fly areas."""
+
+from fanet_mw.scenario import Scenario
+from sim.world.engines.contract import Rows
+from sim.world.incidents.no_fly import NoFly
+from sim.world.incidents.separation import Separation
+
+
+class Incidents:
+    """The incidents of one run."""
+
+    def __init__(self, scenario: Scenario, starts: Rows) -> None:
+        """Raises ConfigError when a UAV would start in a no-fly area."""
+        self.collisions = 0
+        self.no_fly = NoFly(scenario.world.no_fly_m, starts)
+        self.separation = Separation(scenario.mission.collision_distance_m)

@@ -7,9 +7,10 @@ from functools import lru_cache
 from typing import Final
 
 from agents.mission.chart import NO_CHART, Chart
+from agents.mission.motion import Motion
 from agents.mission.outbox import Outbox
 from agents.mission.paper_rule import PaperRule
-from agents.mission.searcher import Heard, Searcher
+from agents.mission.searcher import Searcher
 from fanet_mw import mavlink, wire
 from fanet_mw.application import Application, AppPort, Course, Received, SensorReading
 from fanet_mw.bus.messages import Altimeter, Camera, Gps, Radar, WifiScan
@@ -89,13 +90,13 @@ class PlannedSearch(Application):
 
     def on_hello(self, frame: bytes, now_ns: int) -> None:
         """A neighbor's hello says where it flies, and passes on what it knows."""
-        origin, heard, messages = _hello(frame)
+        origin, motion, messages = _hello(frame)
         if origin == self.port.node:
             raise MalformedFrameError(f"a hello in the name of {origin}, who heard it")
-        if heard.at_ns > now_ns + _FUTURE_NS:
+        if motion.at_ns > now_ns + _FUTURE_NS:
             self._bad_positions += 1
             return
-        self._searcher.hello(origin, heard, now_ns=now_ns)
+        self._searcher.hello(origin, motion, now_ns=now_ns)
         for told in messages:
             self._searcher.told(told, now_ns=now_ns)
         self._settle()
@@ -160,8 +161,8 @@ def _speaker(told: Told) -> int | None:
 
 
 @lru_cache(maxsize=512)
-def _hello(frame: bytes) -> tuple[int, Heard, tuple[Told, ...]]:
+def _hello(frame: bytes) -> tuple[int, Motion, tuple[Told, ...]]:
     """Who says it, how that one flies, and what it tells; raises MalformedFrameError. Cached: many hear the same."""
     origin = wire.decode_header(frame).origin
     motion = mavlink.kinematics_of(frame)
-    return origin, Heard(motion.position, motion.velocity, motion.t_ms * MS), tuple(told_in(frame))
+    return origin, Motion(motion.position, motion.velocity, motion.t_ms * MS), tuple(told_in(frame))

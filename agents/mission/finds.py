@@ -156,6 +156,11 @@ class Finds:
         """The survivors that wait to be confirmed, in order of id."""
         return sorted(survivor for survivor, find in self.known.items() if find.confirmed is None)
 
+    def is_confirmed(self, survivor: int) -> bool:
+        """Whether somebody has confirmed a survivor."""
+        find = self.known.get(survivor)
+        return find is not None and find.confirmed is not None
+
     def news(self, *, now_ns: int) -> list[Survivor]:
         """The latest reports to pass on to neighbors, newest first."""
         fresh = [

@@ -75,6 +75,11 @@ class Pattern(NamedTuple):
         place -= 2 * self.lanes
         return int(2 * place >= self.relays) if place < self.relays else (place - self.relays) % 2
 
+    def line(self, place: int) -> range:
+        """The places of the line that a place belongs to."""
+        first = self.line_of(place) * self.lanes
+        return range(first, first + self.lanes)
+
     def line_north(self, line: int, swept_s: float) -> float:
         """Where a line is."""
         return self._north(swept_s) * (1 if line == 0 else -1)

@@ -1,0 +1,110 @@
+"""What one UAV tells of finds: its estimates while it responds, and confirmations until everyone has heard of them.
+
+seen often enough at close range, place sure   -> confirmed: told three times, and with the hellos of a while
+somebody still reports a confirmed survivor    -> some of those who know tell it again
+"""
+
+import math
+from typing import Final
+
+from agents.mission.finds import Finds
+from agents.mission.outbox import Outbox, Packet
+from fanet_mw.trace import Confirmed
+from fanet_mw.units import US, NodeId, S
+from fanet_mw.wire.inner import Survivor
+from fanet_mw.wire.search import Found
+
+_SIGHTINGS: Final = 2
+_SURE_M: Final = 3.5
+"""A find is confirmed when its place is known to this standard deviation."""
+_TELLINGS: Final = 3
+_AGAIN_NS: Final = 7 * S
+_WORSE: Final = 0.8
+"""An estimate is told again when its standard deviation has shrunk to this share."""
+_USEFUL_M: Final = 60.0
+"""An estimate with a larger standard deviation is not worth telling."""
+_PASSED_ON_NS: Final = 12 * S
+"""Hellos pass a confirmation on for so long."""
+_PASSED_ON: Final = 3
+"""Confirmations of one hello."""
+_TELLERS: Final = 4
+"""Of those who know that a reported survivor is confirmed, one in so many says so."""
+
+
+class Announcing:
+    """One UAV's."""
+
+    def __init__(self, node: NodeId, finds: Finds, outbox: Outbox) -> None:
+        self._node = node
+        self._finds, self._outbox = finds, outbox
+        self._told_sigma_m: dict[int, float] = {}
+        self._tellings: dict[int, tuple[int, int]] = {}
+        """Of our own confirmations: how often they are still to be told, and when next."""
+        self._struck_ns: dict[int, int] = {}
+        """When we confirmed each survivor, or heard that it is confirmed."""
+
+    def confirm(self, survivor: int, now_ns: int) -> bool:
+        """Confirm a survivor that was seen at close range, once its place is sure; whether that is news."""
+        find = self._finds.known[survivor]
+        place = find.filter.estimate() if find.sightings else None
+        if find.confirmed is not None or place is None or find.sightings < _SIGHTINGS or place.sigma_m > _SURE_M:
+            return False
+        if not self._finds.borne_out(survivor):
+            return False
+        found = Found(now_ns // US, survivor, *place, self._node, confirmed=True)
+        self._finds.told(found, now_ns=now_ns)
+        east_m, north_m = round(place.east_m, 2), round(place.north_m, 2)
+        self._outbox.records.append(Confirmed(now_ns, self._node, survivor, east_m, north_m))
+        self._tellings[survivor] = _TELLINGS, now_ns
+        self.struck(survivor, now_ns)
+        return True
+
+    def struck(self, survivor: int, now_ns: int) -> None:
+        """A survivor is confirmed, by us or by another."""
+        self._struck_ns[survivor] = now_ns
+
+    def tell(self, task: int | None, now_ns: int) -> None:
+        """Tell the confirmations that are due, and the estimate of the survivor to whom we fly."""
+        for survivor, (left, next_ns) in sorted(self._tellings.items()):
+            if now_ns < next_ns:
+                continue
+            found = self._finds.known[survivor].confirmed
+            assert found is not None, "only what is confirmed is announced"
+            self._flood(found)
+            if left > 1:
+                self._tellings[survivor] = left - 1, now_ns + _AGAIN_NS
+            else:
+                del self._tellings[survivor]
+        if task is not None:
+            self._tell_estimate(task, now_ns)
+
+    def reported(self, report: Survivor, now_ns: int) -> None:
+        """Another node reports a survivor: it may not know yet that it is confirmed."""
+        confirmed = self._finds.known[report.survivor].confirmed
+        if confirmed is None or now_ns - self._struck_ns.get(report.survivor, now_ns) <= _AGAIN_NS:
+            return
+        self._struck_ns[report.survivor] = now_ns
+        if (report.reporter + self._node) % _TELLERS == 0:
+            self._flood(confirmed)
+
+    def hello_frames(self, now_ns: int) -> bytes:
+        """Inner frames for the next hello: what was confirmed lately."""
+        recent = [
+            (struck_ns, survivor)
+            for survivor, struck_ns in self._struck_ns.items()
+            if now_ns - struck_ns < _PASSED_ON_NS
+        ]
+        latest = [self._finds.known[survivor].confirmed for _, survivor in sorted(recent, reverse=True)[:_PASSED_ON]]
+        return b"".join(found.encode_frame(self._node) for found in latest if found is not None)
+
+    def _tell_estimate(self, survivor: int, now_ns: int) -> None:
+        """A responder shares its estimate when that has become clearly better."""
+        place = self._finds.known[survivor].filter.estimate()
+        before_m = self._told_sigma_m.get(survivor, math.inf)
+        if place is None or place.sigma_m > _WORSE * before_m or place.sigma_m > _USEFUL_M:
+            return
+        self._told_sigma_m[survivor] = place.sigma_m
+        self._flood(Found(now_ns // US, survivor, *place, self._node, confirmed=False))
+
+    def _flood(self, found: Found) -> None:
+        self._outbox.packets.append(Packet(found.encode_frame(self._node)))

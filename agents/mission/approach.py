@@ -1,0 +1,46 @@
+"""How a survivor is approached: straight to the estimate, then about it until somebody is seen."""
+
+import math
+from typing import Final
+
+from agents.mission.finds import Finds
+from agents.mission.motion import Navigation
+from agents.mission.outbox import Outbox
+from agents.mission.phone_filter import Estimate
+from fanet_mw.trace import Arrived
+from fanet_mw.units import NodeId, S
+
+_SPIRAL_M: Final = 30.0
+"""Distance of the turns of the spiral that is flown around an estimate which nobody is seen at."""
+_RING_M: Final = 14.0
+_GOLDEN_ANGLE: Final = math.pi * (3 - math.sqrt(5))
+
+
+class Approach:
+    """Where one UAV flies near survivors, and when it came to each."""
+
+    def __init__(self, node: NodeId, finds: Finds, navigation: Navigation, outbox: Outbox, *, arrival_m: float) -> None:
+        self._node = node
+        self._finds, self._navigation = finds, navigation
+        self._outbox = outbox
+        self._arrival_m = arrival_m
+        self.arrived_ns: dict[int, int] = {}
+        """When we came to each survivor."""
+
+    def point(self, survivor: int, place: Estimate, now_ns: int, *, responding: bool) -> tuple[float, float]:
+        """East and north to fly to: each UAV is at an angle of its own, on a spiral while nobody is seen.
+
+        `responding`: whether this survivor is our task, and not only one that we pass.
+        """
+        arrived_ns = self.arrived_ns.get(survivor)
+        if arrived_ns is None:
+            if place.distance_m(self._navigation.position) > self._arrival_m:
+                return place.east_m, place.north_m
+            arrived_ns = self.arrived_ns[survivor] = now_ns
+            if responding:
+                self._outbox.records.append(Arrived(now_ns, self._node, survivor))
+        seen = self._finds.known[survivor].filter.is_seen
+        searched_s = (now_ns - arrived_ns) / S
+        radius = _RING_M if seen else _RING_M + _SPIRAL_M * searched_s / 20.0
+        angle = self._node * _GOLDEN_ANGLE + (0.0 if seen else searched_s / 3.0)
+        return place.east_m + radius * math.cos(angle), place.north_m + radius * math.sin(angle)

@@ -1,0 +1,120 @@
+"""Our place in the formation: where the plan wants us at every instant, and how far from there we may go.
+
+A UAV of a line or of the chain holds the swarm together: it stays near its lane. A follower may go anywhere near its
+line. Who has no place yet waits where it is.
+"""
+
+from typing import Final
+
+from agents.mission.motion import Navigation
+from agents.mission.pattern import Pattern
+from agents.mission.phone_filter import Estimate
+from agents.mission.planner import pattern_of
+from fanet_mw.units import MS, US, Enu, NodeId, S
+from fanet_mw.wire.search import Search
+
+STILL: Final = Enu(0.0, 0.0, 0.0)
+_FREE_REACH: Final = 0.84
+"""Share of the reach within which a follower stays of its line, so that it is heard there wherever it goes."""
+_ASIDE_M: Final = 70.0
+"""How far aside of the leash a survivor may be to be looked at still."""
+_AHEAD_M: Final = 250.0
+_LEASH_M: Final = 58.0
+"""How far to the side a UAV of a line may leave its lane."""
+_LAG_M: Final = 140.0
+"""How far it may fall behind its line."""
+
+
+class FormationPlace:
+    """One UAV's."""
+
+    def __init__(self, node: NodeId, navigation: Navigation, *, reach_m: float) -> None:
+        self._node = node
+        self._navigation = navigation
+        self._most_m = _FREE_REACH * reach_m
+        self.plan: Search | None = None
+        self.pattern: Pattern | None = None
+        self.place: int | None = None
+        self._left_from: Enu | None = None
+        self._left_ns = 0
+
+    def adopt(self, plan: Search, now_ns: int) -> None:
+        """Fly by a plan from now on."""
+        first = self.place is None
+        self.plan, self.pattern = plan, pattern_of(plan)
+        self.place = plan.nodes.index(self._node) if self._node in plan.nodes else None
+        if first:
+            self._left_from, self._left_ns = self._navigation.position, max(now_ns, plan.start_us * US)
+
+    # --- where the plan wants us ----------------------------------------------------------------------------------
+
+    @property
+    def is_free(self) -> bool:
+        """True for a UAV that may go anywhere, because the swarm holds together without it."""
+        return self.pattern is None or self.place is None or self.pattern.kind(self.place) == "follower"
+
+    @property
+    def searches(self) -> bool:
+        """True for a UAV that has a lane of its own to search."""
+        return self.pattern is not None and self.place is not None and self.pattern.kind(self.place) == "line"
+
+    def is_taken_up(self, now_ns: int) -> bool:
+        """Whether everyone has had time to take up the formation."""
+        return self.plan is not None and now_ns >= _taken_up_ns(self.plan)
+
+    def lane(self, now_ns: int) -> tuple[Enu, Enu]:
+        """Where our lane wants us now, and how that place moves."""
+        plan, pattern, place = self.plan, self.pattern, self.place
+        if plan is None or pattern is None or place is None:
+            return self._left_from or self._navigation.position, STILL
+        arrival_ns = _taken_up_ns(plan)
+        if now_ns >= arrival_ns or self._left_from is None:
+            swept_s = (now_ns - arrival_ns) / S
+            return pattern.at(place, swept_s), pattern.velocity(place, swept_s)
+        goal, start, span_ns = pattern.at(place, 0.0), self._left_from, arrival_ns - self._left_ns
+        if now_ns <= self._left_ns or span_ns <= 0:
+            return start, STILL
+        share, per_s = (now_ns - self._left_ns) / span_ns, S / span_ns
+        way = goal.minus(start)
+        return (
+            Enu(start.east + share * way.east, start.north + share * way.north, start.up + share * way.up),
+            Enu(way.east * per_s, way.north * per_s, way.up * per_s),
+        )
+
+    # --- how far from there we may go -----------------------------------------------------------------------------
+
+    def leads_by(self, estimate: Estimate | None, lane: Enu, moves: Enu) -> bool:
+        """Whether a survivor is near enough to our lane to be looked at without leaving the formation."""
+        if estimate is None or abs(estimate.east_m - lane.east) > _LEASH_M + _ASIDE_M:
+            return False
+        ahead_m = (estimate.north_m - lane.north) * (1 if moves.north >= 0 else -1)
+        return -_LAG_M <= ahead_m <= _AHEAD_M
+
+    def bounded(self, east: float, north: float, lane: Enu, moves: Enu) -> tuple[Enu, Enu]:
+        """The place nearest to a wanted one that our lane allows, and how it moves."""
+        if self.is_free:
+            return Enu(east, north, lane.up), STILL
+        east = lane.east + max(-_LEASH_M, min(_LEASH_M, east - lane.east))
+        sign = 1 if moves.north >= 0 else -1
+        behind_m = (lane.north - north) * sign
+        if behind_m <= 0:  # still ahead: the line brings us there
+            return Enu(east, lane.north, lane.up), moves
+        if behind_m > _LAG_M:
+            return Enu(east, lane.north - sign * _LAG_M, lane.up), moves
+        return Enu(east, north, lane.up), STILL
+
+    def holds_together(self, estimate: Estimate | None, now_ns: int, *, within_s: float) -> bool:
+        """Whether somebody at a survivor would be in reach of our line, for some seconds from that time on."""
+        plan, pattern, place = self.plan, self.pattern, self.place
+        if estimate is None or plan is None or pattern is None or place is None or not self.is_taken_up(now_ns):
+            return False
+        line = pattern.line_of(place)
+        at_s = (now_ns - _taken_up_ns(plan)) / S
+        return all(
+            abs(estimate.north_m - pattern.line_north(line, at_s + ahead_s)) <= self._most_m
+            for ahead_s in (within_s, within_s + 5.0)
+        )
+
+
+def _taken_up_ns(plan: Search) -> int:
+    return plan.start_us * US + plan.deploy_ds * 100 * MS

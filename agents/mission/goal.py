@@ -1,0 +1,55 @@
+"""Where a searching UAV wants to be now: at a survivor as far as its place in the formation lets it, or in its lane."""
+
+from typing import Final
+
+from agents.mission.approach import Approach
+from agents.mission.finds import Finds
+from agents.mission.formation_place import FormationPlace
+from agents.mission.motion import Navigation
+from agents.mission.tasks import FAR_M, VAGUE_M
+from fanet_mw.units import Enu
+
+_SHARED_M: Final = 35.0
+"""An estimate so near to the border of two lanes belongs to both."""
+
+
+class Goal:
+    """One UAV's."""
+
+    def __init__(self, finds: Finds, navigation: Navigation, formation: FormationPlace, approach: Approach) -> None:
+        self._finds, self._navigation = finds, navigation
+        self._formation, self._approach = formation, approach
+
+    def at(self, task: int | None, now_ns: int) -> tuple[Enu, Enu]:
+        """The place to fly to and how it moves. `task`: the survivor whom we have won, if any."""
+        formation = self._formation
+        lane, moves = formation.lane(now_ns)
+        survivor = task
+        if not formation.is_free:
+            place = None if task is None else self._finds.known[task].place()
+            if task is None or not formation.leads_by(place, lane, moves):
+                survivor = self._in_lane(lane, moves, now_ns)
+        place = None if survivor is None else self._finds.known[survivor].place()
+        if survivor is None or place is None:
+            return lane, moves
+        east, north = self._approach.point(survivor, place, now_ns, responding=survivor == task)
+        return formation.bounded(east, north, lane, moves)
+
+    def _in_lane(self, lane: Enu, moves: Enu, now_ns: int) -> int | None:
+        """The nearest survivor of those that our lane leads by; we look at it as we pass, within the formation."""
+        formation, here = self._formation, self._navigation.position
+        pattern = formation.pattern
+        if pattern is None or not formation.searches or not formation.is_taken_up(now_ns):
+            return None
+        best: tuple[float, int] | None = None
+        for survivor in self._finds.open():
+            find = self._finds.known[survivor]
+            estimate = find.place() if find.filter.near(here, within_m=FAR_M) else None
+            if estimate is None or estimate.sigma_m > VAGUE_M:
+                continue
+            if abs(estimate.east_m - lane.east) > 0.5 * pattern.lane_m + _SHARED_M:
+                continue
+            if formation.leads_by(estimate, lane, moves):
+                candidate = estimate.distance_m(here), survivor
+                best = candidate if best is None else min(best, candidate)
+        return None if best is None else best[1]

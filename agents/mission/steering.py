@@ -1,0 +1,163 @@
+"""The velocity to fly from one position fix to the next: the wanted one, changed as little as constraints allow.
+
+Constraints are half-planes of velocities. Hard ones keep a UAV clear of others and are never given up; soft ones keep
+it in reach of those that hold the swarm together with it, and the last ones are given up when not all can be met.
+"""
+
+import math
+from typing import Final, Protocol
+
+from agents.mission.constraints import avoiding, grown_m, staying_near
+from agents.mission.formation_place import FormationPlace
+from agents.mission.half_planes import HalfPlane, Velocity, nearest
+from agents.mission.motion import Motion, Navigation, Neighbors
+from agents.mission.obstacles import Obstacles
+from fanet_mw.units import Enu, S
+
+_LANE_GAIN: Final = 0.4
+"""How fast a deviation from the wanted place is made good [1/s]."""
+_CLIMB_M_S: Final = 2.5
+_LEAST_M_S: Final = 1.0
+"""Nobody creeps around a corner more slowly than this."""
+_LEVEL_M: Final = 4.0
+"""Heights farther apart than twice this are different levels: nobody there is in the way, once both keep theirs."""
+_CLEARANCE_M: Final = 10.0
+_HORIZON_S: Final = 6.0
+_WATCH_M: Final = 150.0
+_TETHER: Final = 0.95
+"""Share of the radio's reach at which a tether ends."""
+_TETHER_S: Final = 4.0
+
+
+class Constraint(Protocol):
+    """Something that limits the velocities that we may fly."""
+
+    def planes(self, now_ns: int) -> list[HalfPlane]:
+        """The half-planes of the velocities that it allows now, the most important first."""
+        ...
+
+
+class Steering:
+    """One UAV's."""
+
+    def __init__(
+        self,
+        navigation: Navigation,
+        obstacles: Obstacles,
+        *,
+        most_m_s: float,
+        hard: list[Constraint],
+        soft: list[Constraint],
+    ) -> None:
+        self._navigation, self._obstacles = navigation, obstacles
+        self._most_m_s = most_m_s
+        self._hard, self._soft = hard, soft
+
+    def velocity(self, goal: Enu, feed: Enu, now_ns: int) -> Enu:
+        """What to fly to a place that moves itself."""
+        here, obstacles = self._navigation.position, self._obstacles
+        off = goal.minus(here)
+        wanted = feed.east + _LANE_GAIN * off.east, feed.north + _LANE_GAIN * off.north
+        corner = obstacles.way_to(here, goal, feed, now_ns=now_ns)
+        if corner is not None:
+            wanted = self._towards(corner, speed_m_s=math.hypot(*wanted))
+        speed = math.hypot(*wanted)
+        if speed > self._most_m_s:
+            wanted = wanted[0] * self._most_m_s / speed, wanted[1] * self._most_m_s / speed
+        planes = [plane for constraint in self._hard for plane in constraint.planes(now_ns)]
+        hard = len(planes)
+        planes += [plane for constraint in self._soft for plane in constraint.planes(now_ns)]
+        east, north = nearest(wanted, planes, limit=self._most_m_s, hard=hard) if planes else wanted
+        velocity = Enu(east, north, 0.0)
+        climb_m = goal.up + obstacles.climb_m(here, velocity) - self._navigation.height_m(now_ns)
+        climb_m = max(climb_m, obstacles.least_up_m(here, velocity) - here.up)
+        return velocity._replace(up=max(-_CLIMB_M_S, min(_CLIMB_M_S, 0.5 * climb_m)))
+
+    def _towards(self, corner: Enu, *, speed_m_s: float) -> Velocity:
+        """The velocity to a place on the way around an obstacle; near it as slow as the goal itself would have it."""
+        off = corner.minus(self._navigation.position)
+        distance = math.hypot(off.east, off.north)
+        speed = min(self._most_m_s, max(speed_m_s, 0.5 * self._most_m_s), max(_LEAST_M_S, distance))
+        return off.east / max(distance, 1e-6) * speed, off.north / max(distance, 1e-6) * speed
+
+
+class ClearOfObstacles:
+    """Walls, areas that nobody may enter, and what the radar shows."""
+
+    def __init__(self, navigation: Navigation, obstacles: Obstacles) -> None:
+        self._navigation, self._obstacles = navigation, obstacles
+
+    def planes(self, now_ns: int) -> list[HalfPlane]:
+        return self._obstacles.planes(self._navigation.position, now_ns)
+
+
+class ClearOfOthers:
+    """Collision avoidance: ORCA on the received positions of neighbors, with a clearance that grows with their age, and
+    on what the radar shows flying.
+    """
+
+    def __init__(self, navigation: Navigation, neighbors: Neighbors, obstacles: Obstacles) -> None:
+        self._navigation, self._neighbors, self._obstacles = navigation, neighbors, obstacles
+
+    def planes(self, now_ns: int) -> list[HalfPlane]:
+        here, flown = self._navigation.position, self._navigation.velocity
+        planes: list[tuple[float, HalfPlane]] = []
+        seen = [Motion(*mover) for mover in self._obstacles.movers(now_ns)]
+        for motion in (*self._neighbors.all(now_ns=now_ns), *seen):
+            offset = motion.now(now_ns).minus(here)
+            distance = math.hypot(offset.east, offset.north)
+            climb = flown.up - motion.velocity.up
+            apart_soon = abs(offset.up - climb * 3.0)
+            if distance > _WATCH_M or (abs(offset.up) > 2 * _LEVEL_M and apart_soon > _LEVEL_M):
+                continue
+            plane = avoiding(
+                offset,
+                (flown.east, flown.north),
+                (motion.velocity.east, motion.velocity.north),
+                clearance_m=_CLEARANCE_M + grown_m((now_ns - motion.at_ns) / S),
+                horizon_s=_HORIZON_S,
+                share=0.5,
+            )
+            planes.append((distance, plane))
+        return [plane for _, plane in sorted(planes)]
+
+
+class InReach:
+    """Coherence: who is in a line or in the chain stays in reach of its neighbors there, a follower of its line."""
+
+    def __init__(
+        self, navigation: Navigation, neighbors: Neighbors, formation: FormationPlace, *, reach_m: float
+    ) -> None:
+        self._navigation, self._neighbors = navigation, neighbors
+        self._formation = formation
+        self._tether_m = _TETHER * reach_m
+
+    def planes(self, now_ns: int) -> list[HalfPlane]:
+        plan, pattern, place = self._formation.plan, self._formation.pattern, self._formation.place
+        if plan is None or pattern is None or place is None or not self._formation.is_taken_up(now_ns):
+            return []
+        planes = []
+        for other in pattern.tethers(place) or self._nearest(pattern.line(place), now_ns):
+            motion = self._neighbors.motion(plan.nodes[other], now_ns=now_ns)
+            if motion is None:
+                continue
+            plane = staying_near(
+                motion.now(now_ns).minus(self._navigation.position),
+                (motion.velocity.east, motion.velocity.north),
+                tether_m=self._tether_m,
+                within_s=_TETHER_S,
+            )
+            if plane is not None:
+                planes.append(plane)
+        return planes
+
+    def _nearest(self, places: range, now_ns: int) -> tuple[int, ...]:
+        """Of these places the one whose holder is nearest to us; none when nobody there was heard lately."""
+        plan = self._formation.plan
+        assert plan is not None, "who has a place has a plan"
+        near = [
+            (motion.now(now_ns).minus(self._navigation.position).norm(), other)
+            for other in places
+            if (motion := self._neighbors.motion(plan.nodes[other], now_ns=now_ns)) is not None
+        ]
+        return (min(near)[1],) if near else ()

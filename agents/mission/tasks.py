@@ -1,0 +1,169 @@
+"""Which survivor one UAV goes to: it bids where it would be among the best, and flies the task that it has won.
+
+enough reporters   an auction for as many responders as the scenario wants
+too few            an auction for one that has not reported, who fetches a further bearing
+found nobody       a responder takes its bid back after a while
+"""
+
+import math
+from collections.abc import Iterable
+from typing import Final
+
+from agents.mission.approach import Approach
+from agents.mission.auction import Auction
+from agents.mission.finds import Find, Finds
+from agents.mission.formation_place import FormationPlace
+from agents.mission.motion import Navigation
+from agents.mission.outbox import Outbox
+from fanet_mw.scenario import Scenario
+from fanet_mw.trace import Approaching
+from fanet_mw.units import NodeId, S
+from fanet_mw.wire.search import Bid
+
+VAGUE_M: Final = 50.0
+"""An estimate whose standard deviation is larger leads nobody off its lane."""
+FAR_M: Final = 450.0
+"""Who is farther from a survivor than this leaves it to others."""
+_SCOUT_AFTER_NS: Final = 4 * S
+"""How long a survivor may be short of reporters before somebody is sent to be another one."""
+_RETURN_AFTER_NS: Final = 45 * S
+"""A responder that has found nobody for so long takes its bid back."""
+_AGAIN_NS: Final = 20 * S
+"""Who has taken its bid back does not bid again for so long."""
+_LONG_AGO_NS: Final = -(10**18)
+_HANDOVER_S: Final = 15.0
+"""What a responder needs for its present survivor once it is there."""
+
+
+class Tasks:
+    """One UAV's."""
+
+    def __init__(
+        self,
+        scenario: Scenario,
+        node: NodeId,
+        *,
+        finds: Finds,
+        navigation: Navigation,
+        formation: FormationPlace,
+        approach: Approach,
+        outbox: Outbox,
+        speed_m_s: float,
+    ) -> None:
+        self._node = node
+        self._config = scenario.mission
+        self._cruise_m_s = max(0.1, scenario.mobility.speed_m_s)
+        self._finds, self._navigation, self._formation = finds, navigation, formation
+        self._approach = approach
+        self._outbox = outbox
+        self._speed_m_s = speed_m_s
+        self._auction = Auction(node)
+        self._taken_back_ns: dict[int, int] = {}
+        self._announced = False
+        self.survivor: int | None = None
+        """To whom we fly; None: to nobody."""
+
+    def merge(self, bids: Iterable[Bid], *, now_ns: int) -> None:
+        """A neighbor passed bids on."""
+        open_bids = (bid for bid in bids if not self._finds.is_confirmed(bid.survivor))
+        self._auction.merge(open_bids, now_ns=now_ns)
+
+    def told(self, *, now_ns: int) -> list[Bid]:
+        """The bids to pass on."""
+        return self._auction.told(self._finds.open(), now_ns=now_ns)
+
+    def close(self, survivor: int, *, now_ns: int) -> None:
+        """A survivor needs nobody any more."""
+        self._auction.close(survivor)
+        if self.survivor == survivor:
+            self.survivor = None
+            self.choose(now_ns)
+
+    def bid(self, now_ns: int) -> None:
+        """Bid where we would be among the best."""
+        if self._formation.pattern is None:
+            return
+        for survivor in self._finds.open():
+            find = self._finds.known[survivor]
+            if self._auction.has_bid(survivor) or not find.filter.near(self._navigation.position, within_m=FAR_M):
+                continue
+            if not self._is_reported(find) and (
+                self._node in find.reporters or now_ns - find.first_ns < _SCOUT_AFTER_NS
+            ):
+                continue
+            if now_ns - self._taken_back_ns.get(survivor, _LONG_AGO_NS) < _AGAIN_NS:
+                continue
+            eta_s = self._eta_s(survivor, now_ns)
+            if eta_s is None:
+                continue
+            if self._auction.would_win(survivor, eta_s=eta_s, count=self._wanted(find), now_ns=now_ns):
+                self._auction.bid(survivor, eta_s=eta_s, now_ns=now_ns)
+
+    def choose(self, now_ns: int) -> None:
+        """Fly the task that we have won and can be done with first; none: back to the lane."""
+        if self.survivor is not None:
+            self._reconsider(self.survivor, now_ns)
+        if self.survivor is None:
+            won = [
+                (self._distance_m(survivor), survivor)
+                for survivor in self._finds.open()
+                if self._wins(survivor, self._finds.known[survivor], now_ns)
+            ]
+            if won:
+                self.survivor, self._announced = min(won)[1], False
+        if self.survivor is not None and not self._announced:
+            self._announce(self.survivor, now_ns)
+
+    def _reconsider(self, survivor: int, now_ns: int) -> None:
+        """Give a task up that another does, or at which we have found nobody or would be lost to the swarm."""
+        find = self._finds.known[survivor]
+        lost = not self._wins(survivor, find, now_ns)
+        arrived_ns = self._approach.arrived_ns.get(survivor)
+        late = arrived_ns is not None and now_ns - arrived_ns > _RETURN_AFTER_NS
+        if not late and self._formation.is_free:
+            late = not self._formation.holds_together(find.place(), now_ns, within_s=-5.0)
+        if late:
+            self._auction.withdraw(survivor, now_ns=now_ns)
+            self._taken_back_ns[survivor] = now_ns
+        if lost or late:
+            self.survivor = None
+
+    def _announce(self, survivor: int, now_ns: int) -> None:
+        """Say in the trace that we approach, once a place is known and enough have reported."""
+        find = self._finds.known[survivor]
+        place = find.place()
+        if place is None or not self._is_reported(find):
+            return
+        self._announced = True
+        east_m, north_m = round(place.east_m, 2), round(place.north_m, 2)
+        self._outbox.records.append(Approaching(now_ns, self._node, survivor, len(find.reporters), east_m, north_m))
+
+    def _is_reported(self, find: Find) -> bool:
+        return len(find.reporters) >= self._config.reports_to_approach
+
+    def _wanted(self, find: Find) -> int:
+        """How many UAVs a survivor needs now."""
+        return self._config.responders if self._is_reported(find) else 1
+
+    def _wins(self, survivor: int, find: Find, now_ns: int) -> bool:
+        return self._node in self._auction.winners(survivor, count=self._wanted(find), now_ns=now_ns)
+
+    def _distance_m(self, survivor: int) -> float:
+        place = self._finds.known[survivor].place()
+        return math.inf if place is None else place.distance_m(self._navigation.position)
+
+    def _eta_s(self, survivor: int, now_ns: int) -> float | None:
+        """When we would be with a survivor; None when our place in the formation forbids it."""
+        formation, here = self._formation, self._navigation.position
+        place = self._finds.known[survivor].place()
+        if place is None or (place.sigma_m > VAGUE_M and not formation.is_free):
+            return None
+        busy_s = 0.0 if self.survivor is None else _HANDOVER_S + self._distance_m(self.survivor) / self._speed_m_s
+        eta_s = busy_s + place.distance_m(here) / self._speed_m_s
+        if formation.is_free:
+            return eta_s if formation.holds_together(place, now_ns, within_s=eta_s) else None
+        lane, moves = formation.lane(now_ns)
+        if not formation.is_taken_up(now_ns) or not formation.leads_by(place, lane, moves):
+            return None
+        ahead_m = abs(place.north_m - here.north) if moves.norm() else 0.0
+        return max(eta_s, ahead_m / self._cruise_m_s)

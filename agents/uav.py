@@ -239,6 +239,8 @@ class Uav(Actor):
         setpoint = Setpoint(now_ns, course.position, course.speed_m_s)
         if course.velocity is not None:
             setpoint = setpoint._replace(kind=SetpointKind.VELOCITY, velocity=course.velocity)
+        elif course.land:
+            setpoint = setpoint._replace(kind=SetpointKind.LAND)
         self.outbox.append((self._setpoint_topic, setpoint))
 
     def _tap(self, frames: bytes, now_ns: int) -> None:

@@ -41,6 +41,8 @@ class Course(NamedTuple):
     speed_m_s: float
     velocity: Enu | None = None
     """If given, the UAV flies at this velocity until the next command; the position is where that leads."""
+    land: bool = False
+    """True: it sinks straight down where it is, at the speed of the course, and stops its motors on the ground."""
 
 
 class Received(NamedTuple):

@@ -149,6 +149,36 @@ class Posed(NamedTuple):
     up_m: float
 
 
+class FlightModeChanged(NamedTuple):
+    """The flight controller of a UAV began to do something else: `goto`, `velocity`, `hold`, `land`, `failsafe`..."""
+
+    t_ns: int
+    node: int
+    mode: str
+
+
+class MissionModeChanged(NamedTuple):
+    """A UAV of a planned search decided to do something else: `search`, `respond`, `return` or `land`."""
+
+    t_ns: int
+    node: int
+    mode: str
+    survivor: int = 0
+    """The survivor that it responds to; 0: none."""
+
+
+class Sighted(NamedTuple):
+    """A camera or a microphone array noticed somebody; `survivor` is who that was taken for, 0: nobody known."""
+
+    t_ns: int
+    node: int
+    sensor: str
+    survivor: int
+    east_m: float
+    """The place on the ground, as the UAV computed it."""
+    north_m: float
+
+
 class Collided(NamedTuple):
     """Two bodies touched; `other` 0 is the ground."""
 
@@ -256,6 +286,9 @@ Record = (
     | Confirmed
     | Planned
     | Posed
+    | FlightModeChanged
+    | MissionModeChanged
+    | Sighted
     | Collided
     | ConflictForeseen
     | Warned
@@ -281,6 +314,9 @@ _KINDS: Final[dict[str, type[Any]]] = {
     "confirmed": Confirmed,
     "planned": Planned,
     "posed": Posed,
+    "flight_mode_changed": FlightModeChanged,
+    "mission_mode_changed": MissionModeChanged,
+    "sighted": Sighted,
     "collided": Collided,
     "conflict_foreseen": ConflictForeseen,
     "warned": Warned,
@@ -352,7 +388,7 @@ def parse(text: str) -> Record:
 
 __all__ = [
     "Approaching", "Arrived", "BoundStated", "ClockSampled", "Collided", "Confirmed", "ConflictForeseen",
-    "ConflictOver", "DeadlineLost", "DeadlineMet", "Delivered", "Detected", "DropReason", "Dropped", "Generated",
-    "LetOut", "LikelyStated", "Planned", "Posed", "ProcessEnded", "RadioFault", "Record", "RoleChanged", "Warned",
-    "kind_of", "line", "parse",
+    "ConflictOver", "DeadlineLost", "DeadlineMet", "Delivered", "Detected", "DropReason", "Dropped",
+    "FlightModeChanged", "Generated", "LetOut", "LikelyStated", "MissionModeChanged", "Planned", "Posed",
+    "ProcessEnded", "RadioFault", "Record", "RoleChanged", "Sighted", "Warned", "kind_of", "line", "parse",
 ]  # fmt: skip

@@ -4,6 +4,7 @@
     planner:    the lowest id that has been heard of lately; it plans once all have been heard of, or after PATIENCE_S
     lost nodes: whoever holds a place and was not heard of for LOST_S is replaced: by a follower when its place is in a
                 line or in the chain, because those places hold the swarm together and sweep the area
+    leavers:    the same for whoever says that its battery only just takes it home, at once
 
 The first assignment minimizes the sum of the squared distances flown. Ways on which everyone leaves and arrives at the
 same instants then do not cross, and UAVs that were near each other stay so.
@@ -31,6 +32,8 @@ class _Member(NamedTuple):
     position: Enu
     heard_ns: int
     revision: int
+    leaves: bool
+    """True for a node that flies home: it holds no place any more, and plans no more."""
 
 
 class Planner:
@@ -54,12 +57,15 @@ class Planner:
         """A UAV, we ourselves perhaps, said where it is."""
         before = self._members.get(status.node)
         if before is None or status.t_us * US >= before.heard_ns - S:
-            self._members[status.node] = _Member(status.position, min(now_ns, status.t_us * US), status.revision)
+            self._members[status.node] = _Member(
+                status.position, min(now_ns, status.t_us * US), status.revision, leaves=status.charge == 0
+            )
 
     def alive(self, node: int, position: Enu, *, now_ns: int) -> None:
         """A neighbor was heard at a place."""
         before = self._members.get(node)
-        self._members[node] = _Member(position, now_ns, before.revision if before else 0)
+        revision, leaves = (before.revision, before.leaves) if before else (0, False)
+        self._members[node] = _Member(position, now_ns, revision, leaves=leaves)
 
     def planned(self, plan: Search) -> bool:
         """A plan came over the air; whether it replaces the one we have."""
@@ -90,7 +96,12 @@ class Planner:
         return False
 
     def _leads(self, now_ns: int) -> bool:
-        return all(node >= self._node or now_ns - member.heard_ns > _LOST_NS for node, member in self._members.items())
+        """Whether we are the one to plan: of those that stay, nobody with a lower id was heard of lately."""
+        me = self._members.get(self._node)
+        return not (me is not None and me.leaves) and all(
+            node >= self._node or member.leaves or now_ns - member.heard_ns > _LOST_NS
+            for node, member in self._members.items()
+        )
 
     def _adopt(self, plan: Search, now_ns: int) -> None:
         self.plan = plan
@@ -112,7 +123,7 @@ class Planner:
             self.to_tell.append(self.plan)
 
     def _first(self, pattern: Pattern, now_ns: int) -> Search:
-        nodes = sorted(self._members)[: pattern.places]
+        nodes = sorted(node for node, member in self._members.items() if not member.leaves)[: pattern.places]
         places = list(range(pattern.places))
         goals = [pattern.at(place, 0.0) for place in places]
         costs = [[_distance2(self._members[node].position, goal) for goal in goals] for node in nodes]
@@ -131,7 +142,9 @@ class Planner:
     def _mended(self, plan: Search, now_ns: int) -> Search | None:
         """The plan without those who are lost and with those who are new; None when nothing changed."""
         pattern = pattern_of(plan)
-        alive = {node for node, member in self._members.items() if now_ns - member.heard_ns <= _LOST_NS}
+        alive = {
+            node for node, member in self._members.items() if now_ns - member.heard_ns <= _LOST_NS and not member.leaves
+        }
         alive.add(self._node)
         if 2 * len(alive) <= sum(1 for node in plan.nodes if node):
             return None  # we are the smaller part of a swarm that has come apart, and shall meet the others again

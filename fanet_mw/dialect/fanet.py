@@ -2305,7 +2305,7 @@ class MAVLink(object):
         up                        : Where it is. [m] (type:float)
         node                      : Which node. (type:uint16_t)
         revision                  : The plan it flies by; 0: none. (type:uint16_t)
-        charge                    : What is left in its battery. [%] (type:uint8_t)
+        charge                    : What it may spend of its battery, above the way home and a reserve; 0: it flies home. [%] (type:uint8_t)
         version                   : 1. (type:uint8_t)
 
         """
@@ -2321,7 +2321,7 @@ class MAVLink(object):
         up                        : Where it is. [m] (type:float)
         node                      : Which node. (type:uint16_t)
         revision                  : The plan it flies by; 0: none. (type:uint16_t)
-        charge                    : What is left in its battery. [%] (type:uint8_t)
+        charge                    : What it may spend of its battery, above the way home and a reserve; 0: it flies home. [%] (type:uint8_t)
         version                   : 1. (type:uint8_t)
 
         """

@@ -103,7 +103,7 @@ class Status(NamedTuple):
     node: int
     revision: int
     charge: int
-    """Percent."""
+    """Percent of the battery that may be spent yet, above the way home and a reserve; 0: the UAV flies home."""
 
     def encode_frame(self, node: int) -> bytes:
         payload = STATUS.layout.pack(self.t_us, *self.position, *self[2:], VERSION)

@@ -18,7 +18,7 @@ from fanet_mw.bus.link_stats import LinkStats
 from fanet_mw.bus.messages import MavlinkTap
 from fanet_mw.errors import MalformedFrameError
 from fanet_mw.scenario import Scenario
-from fanet_mw.trace import Collided, Posed, ProcessEnded, RadioFault, Record
+from fanet_mw.trace import Collided, FlightModeChanged, Posed, ProcessEnded, RadioFault, Record
 from fanet_mw.units import S
 
 _SLACK_NS: Final = 10 * S
@@ -30,6 +30,7 @@ _MOST_RSSI_MDBM: Final = 400_000
 _SPEAKERS: Final[dict[type[Any], str | None]] = {
     Posed: "world",
     Collided: "world",
+    FlightModeChanged: "world",
     RadioFault: "emulator",
     ProcessEnded: None,
 }

@@ -16,7 +16,7 @@ from fanet_mw.bus.radio_control import Cut
 from fanet_mw.bus.topics import Topics, node_of
 from fanet_mw.rng import stream_seed
 from fanet_mw.scenario import Scenario
-from fanet_mw.trace import Collided, Posed
+from fanet_mw.trace import Collided, FlightModeChanged, Posed
 from fanet_mw.units import NodeId, S
 from sim.world.engines.contract import Engine
 from sim.world.engines.energy import Energy
@@ -44,6 +44,8 @@ _STILL_NS: Final = S
 """How often a world in which nothing moves says so."""
 _WRECK_M: Final = 0.5
 """Nobody flies so near to the ground or a wall."""
+_EMERGENCY_CHARGE: Final = 0.05
+"""At this share of its charge a flight controller lands where it is: PX4's BAT_EMERGEN_THR."""
 _CONTROL_S: Final = 0.05
 """Guidance runs at least this often within a tick."""
 
@@ -174,8 +176,15 @@ class World(Actor):
             motors = self._flies & ~self._guidance.grounded(engine.positions())
             for row in self._energy.pass_time(elapsed_s, engine, motors):
                 self._crash(row + 1, radio_dies=True)
+            for row in np.flatnonzero(motors & (self._energy.batteries.charge <= _EMERGENCY_CHARGE)).tolist():
+                self._guidance.land_at_once(row + 1)
+        self._record_modes(now_ns)
         for first, second in engine.contacts():
             self._contact(first, second, now_ns)
+
+    def _record_modes(self, now_ns: int) -> None:
+        changes, self._guidance.changes = self._guidance.changes, []
+        self.records += [FlightModeChanged(now_ns, node, mode.value) for node, mode in changes]
 
     def _find_wrecks(self, solids: Solids) -> None:
         """In a world that goes on: who lies on the ground and was not told to is a wreck."""
@@ -202,6 +211,7 @@ class World(Actor):
             return
         self._flies[node - 1] = False
         self._engine.fall(node - 1)
+        self._guidance.fell(node)
         if radio_dies:
             self.outbox.append((self._topics.radio_control, Cut(f"crash-{node}", NodeId(node))))
 

@@ -2,10 +2,14 @@
 
 A place is tracked with its own velocity fed forward; near others, a push away is added and closing speed taken out,
 so that UAVs sent to one point settle around it.
+
+What a flight controller does by itself, whatever it is asked: it holds when velocities are not renewed, brakes before
+the geofence, and lands at once when its battery is nearly empty.
 """
 
 import math
 from collections.abc import Callable
+from enum import StrEnum
 from typing import Final, assert_never
 
 import numpy as np
@@ -34,11 +38,29 @@ FLOOR_M: Final = 5.0
 _HOLD_M_S: Final = 5.0
 """Who holds comes back to its place at this speed at most."""
 _LEAST_CLIMB_M_S: Final = 0.5
+_FORCED_M_S: Final = 2.0
 _TOUCHDOWN_M_S: Final = 0.5
 """Speed at which a landing meets the ground; ArduPilot's LAND_SPEED, too."""
 _FLARE_PER_S: Final = 0.5
 """Sinking speed for each metre of height."""
 _ON_GROUND_M: Final = 0.3
+FENCE_M: Final = 50.0
+"""The geofence lies so far outside the area; nobody who flies at a velocity leaves it."""
+
+
+class FlightMode(StrEnum):
+    """What a flight controller is doing."""
+
+    TRACK = "track"
+    """It follows the mobility model."""
+    GOTO = "goto"
+    VELOCITY = "velocity"
+    HOLD = "hold"
+    TAKEOFF = "takeoff"
+    LAND = "land"
+    FAILSAFE = "failsafe"
+    """Velocities were not renewed, and it holds; or its battery is nearly empty, and it lands."""
+    FALLEN = "fallen"
 
 
 class Guidance:
@@ -70,6 +92,11 @@ class Guidance:
         """Speeds of those rows that land, or have landed."""
         self._grounded = set(range(len(starts))) if scenario.nodes.on_ground else set[int]()
         """Rows that have not taken off yet, or that are taking off."""
+        self._forced: set[int] = set()
+        """Rows that obey nobody: they land, because their batteries are nearly empty, or are wrecks."""
+        self._modes: dict[int, FlightMode] = {}
+        self.changes: list[tuple[int, FlightMode]] = []
+        """Nodes that changed their mode, with the new one, for the host to take."""
 
     @property
     def still(self) -> bool:
@@ -81,6 +108,8 @@ class Guidance:
         """Take a setpoint of a UAV that is `at` [3] at an instant."""
         here = Enu(*at.tolist())
         row = node - 1
+        if row in self._forced:
+            return
         kind, place, speed_m_s = setpoint.kind, setpoint.position, setpoint.speed_m_s
         if kind is not SetpointKind.LAND and self._landings.pop(row, None) is not None:
             self._grounded.add(row)  # it may stand on the ground, until it is seen clear of it
@@ -89,19 +118,46 @@ class Guidance:
             self.steer(node, place, speed_m_s=speed_m_s)
             if speed_m_s <= 0 and self._onboard:
                 self._hold(row, here)
+            self._enter(
+                row, FlightMode.GOTO if speed_m_s > 0 else FlightMode.HOLD if self._onboard else FlightMode.TRACK
+            )
         elif kind is SetpointKind.VELOCITY:
             self._setpoints.pop(row, None)
             self._velocities[row] = setpoint.velocity, t_s + VELOCITY_LASTS_NS / S
+            self._enter(row, FlightMode.VELOCITY)
         elif kind is SetpointKind.HOLD:
             self._hold(row, here)
+            self._enter(row, FlightMode.HOLD)
         elif kind is SetpointKind.TAKEOFF:
             self._grounded.add(row)  # until it is clear of the ground
             self.steer(node, Enu(here.east, here.north, place.up), speed_m_s=max(_LEAST_CLIMB_M_S, speed_m_s))
+            self._enter(row, FlightMode.TAKEOFF)
         elif kind is SetpointKind.LAND:
             self._setpoints.pop(row, None)
             self._landings[row] = max(_TOUCHDOWN_M_S, speed_m_s)
+            self._enter(row, FlightMode.LAND)
         else:
             assert_never(kind)
+
+    def land_at_once(self, node: int) -> None:
+        """The battery of this UAV is nearly empty: it lands where it is, and obeys nobody any more."""
+        row = node - 1
+        if row not in self._forced:
+            self._forced.add(row)
+            self._velocities.pop(row, None)
+            self._setpoints.pop(row, None)
+            self._landings[row] = _FORCED_M_S
+            self._enter(row, FlightMode.FAILSAFE)
+
+    def fell(self, node: int) -> None:
+        """Take a UAV for a wreck, which obeys nobody."""
+        self._forced.add(node - 1)
+        self._enter(node - 1, FlightMode.FALLEN)
+
+    def _enter(self, row: int, mode: FlightMode) -> None:
+        if self._modes.get(row) is not mode:
+            self._modes[row] = mode
+            self.changes.append((row + 1, mode))
 
     def may_touch_down(self, node: int) -> bool:
         """Whether this UAV touches the ground on purpose."""
@@ -147,6 +203,7 @@ class Guidance:
         wish *= np.minimum(1.0, limit / np.maximum(speed, 1e-9))[:, None]
         for row, (velocity_m_s, _) in self._velocities.items():
             wish[row] = velocity_m_s
+            self._fence(wish[row], at[row])
         if self._landings or self._grounded:
             self._near_the_ground(wish, at)
         return _keep_clear(wish, at, self._see_m) if len(at) > 1 and self._see_m else wish
@@ -156,6 +213,16 @@ class Guidance:
         for row in [row for row, (_, until_s) in self._velocities.items() if t_s >= until_s]:
             del self._velocities[row]
             self._hold(row, Enu(*at[row].tolist()))
+            self._enter(row, FlightMode.FAILSAFE)
+
+    def _fence(self, wish: Values, at: Values) -> None:
+        """Take out of a velocity [3] what would carry a UAV over the geofence; from outside of it, bring it back."""
+        for axis, half in ((0, self._half_east), (1, self._half_north)):
+            outwards = math.copysign(1.0, at[axis])
+            left_m = half + FENCE_M - abs(float(at[axis]))
+            most = math.sqrt(2 * _BRAKE_M_S2 * left_m) if left_m > 0 else -_HOLD_M_S
+            if wish[axis] * outwards > most:
+                wish[axis] = most * outwards
 
     def _near_the_ground(self, wish: Rows, at: Rows) -> None:
         """Sink straight down, the slower the nearer the ground; forget who has taken off."""

@@ -140,6 +140,32 @@ def test_only_the_lowest_id_that_is_alive_plans() -> None:
     assert not planner_with(45, node=2).review(formation(), now_ns=S)
 
 
+def test_who_flies_home_holds_no_place_any_more_from_when_it_says_so() -> None:
+    planner, pattern = planner_with(45), formation()
+    planner.review(pattern, now_ns=S)
+    before = planner.plan
+    assert before is not None
+    leaver, later_ns = before.nodes[3], 20 * S
+    planner.status(Status(later_ns // US, Enu(0, 0, 50), leaver, 1, 0), now_ns=later_ns)
+    planner.alive(leaver, Enu(0, 0, 50), now_ns=later_ns)  # its hellos are heard still
+    assert planner.review(pattern, now_ns=later_ns)
+    after = planner.plan
+    assert after is not None
+    assert leaver not in after.nodes
+    assert after.nodes[3] in before.nodes[-pattern.followers :]
+
+
+def test_a_planner_that_flies_home_leaves_planning_to_the_next() -> None:
+    first, second = planner_with(45, node=1), planner_with(45, node=2)
+    gone = Status(S // US, Enu(0, 0, 50), 1, 0, 0)
+    for planner in (first, second):
+        planner.status(gone, now_ns=S)
+    assert not first.review(formation(), now_ns=S)
+    assert second.review(formation(), now_ns=S)
+    assert second.plan is not None
+    assert 1 not in second.plan.nodes
+
+
 def test_the_smaller_part_of_a_swarm_that_came_apart_makes_no_plan_of_its_own() -> None:
     planner, pattern = planner_with(45), formation()
     planner.review(pattern, now_ns=S)

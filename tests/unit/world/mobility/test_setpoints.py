@@ -10,7 +10,7 @@ from fanet_mw.bus.messages import Gps, Message, Poses, Setpoint, SetpointKind
 from fanet_mw.bus.radio_control import Cut
 from fanet_mw.bus.topics import Topics
 from fanet_mw.scenario import Scenario
-from fanet_mw.trace import Collided
+from fanet_mw.trace import Collided, FlightModeChanged
 from fanet_mw.units import Enu, S
 from sim.world.flight_recorder import Flight as FlightState
 from sim.world.world import World
@@ -51,6 +51,10 @@ class Flying:
     def _state(self, node: int) -> np.ndarray:
         poses = [message for _, message in self.said if isinstance(message, Poses)][-1]
         return np.array(poses.states[6 * node - 6 : 6 * node])
+
+    @property
+    def modes(self) -> list[tuple[int, str]]:
+        return [(r.node, r.mode) for r in self.world.records if isinstance(r, FlightModeChanged)]
 
     @property
     def collisions(self) -> list[tuple[int, int]]:
@@ -139,6 +143,7 @@ def test_a_wreck_falls_its_radio_goes_and_it_senses_nothing_more(make_scenario: 
     flying.ask(1, SetpointKind.TAKEOFF, Enu(0.0, 0.0, 30.0))
     flying.fly(10)
     assert flying.at(1)[2] == pytest.approx(0, abs=0.3), "a wreck does not take off"
+    assert flying.modes == [(1, "goto"), (2, "goto"), (1, "fallen"), (2, "fallen")]
 
 
 def test_a_world_that_goes_on_knows_its_wrecks(make_scenario: MakeScenario) -> None:
@@ -180,3 +185,42 @@ def test_a_velocity_that_is_no_number_is_counted_and_nobody_moves(make_scenario:
     flying.fly(2)
     assert flying.world.report()["malformed"] == 1
     assert flying.at(1) == pytest.approx([-50, 0, 50])
+
+
+def test_the_trace_tells_what_each_flight_controller_does_from_when(make_scenario: MakeScenario) -> None:
+    flying = Flying(make_scenario)
+    flying.ask(1, SetpointKind.VELOCITY, v=Enu(0.0, 4.0, 0.0))
+    flying.fly(0.5)
+    flying.ask(1, SetpointKind.VELOCITY, v=Enu(0.0, 3.0, 0.0))
+    flying.ask(2, SetpointKind.POSITION, Enu(100, 0, 50))
+    flying.fly(3)
+    flying.ask(2, SetpointKind.LAND)
+    flying.fly(1)
+    assert flying.modes == [(1, "velocity"), (2, "goto"), (1, "failsafe"), (2, "land")]
+    assert flying.velocity(1) == pytest.approx([0, 0, 0], abs=0.5), "who is asked nothing any more has stopped"
+
+
+@ENGINES
+def test_nobody_who_flies_at_a_velocity_leaves_the_geofence(make_scenario: MakeScenario, engine: str) -> None:
+    flying = Flying(make_scenario, **{"world.engine": engine, "world.area_m": 200})
+    farthest = 0.0
+    for _ in range(60):
+        flying.ask(1, SetpointKind.VELOCITY, v=Enu(-10.0, 8.0, 0.0))
+        flying.fly(0.5)
+        farthest = max(farthest, *np.abs(flying.at(1)[:2]).tolist())
+    assert 140 < farthest < 150.5, "50 m outside of the area"
+    assert flying.at(1)[:2] == pytest.approx([-150, 150], abs=3)
+
+
+def test_a_flight_controller_lands_when_its_battery_is_nearly_empty_whatever_it_is_asked(
+    make_scenario: MakeScenario,
+) -> None:
+    flying = Flying(
+        make_scenario, **{"world.charge": (0.053, 0.053), "sensors.battery_hz": 1, "nodes.altitude_m": 20.0}
+    )
+    for _ in range(80):
+        flying.ask(1, SetpointKind.VELOCITY, v=Enu(0.0, 2.0, 0.0))
+        flying.fly(0.5)
+    assert (1, "failsafe") in flying.modes
+    assert flying.at(1)[2] < 0.5
+    assert flying.collisions == [], "it landed, and did not fall"

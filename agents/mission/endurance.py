@@ -1,0 +1,50 @@
+"""How long a UAV may stay: what the battery gives above the way home and a reserve.
+
+rate      share of the charge that a second of flight takes, from the readings of the last while
+needed    rate x (way home / speed + height / sinking speed), and a fifth more for wind and waiting
+margin    charge - reserve - needed;  at 0 a UAV flies home, whatever it is doing
+"""
+
+import math
+from collections import deque
+from typing import Final
+
+from fanet_mw.units import Enu, S
+
+_WINDOW_NS: Final = 20 * S
+_LEAST_WINDOW_NS: Final = 5 * S
+_DETOUR: Final = 1.2
+_SINK_M_S: Final = 1.0
+
+
+class Endurance:
+    """The battery of one UAV, as its readings tell it."""
+
+    def __init__(self, home: Enu, *, speed_m_s: float, reserve: float) -> None:
+        self._home = home
+        self._speed_m_s = speed_m_s
+        self._reserve = reserve
+        self._readings: deque[tuple[int, float]] = deque()
+
+    def read(self, charge: float, *, now_ns: int) -> None:
+        """A reading: the share of the capacity that is left."""
+        self._readings.append((now_ns, charge))
+        while now_ns - self._readings[0][0] > _WINDOW_NS:
+            self._readings.popleft()
+
+    def margin(self, here: Enu) -> float:
+        """The share of the capacity that may be spent here still; 1 while the battery says nothing."""
+        if not self._readings:
+            return 1.0
+        charge = self._readings[-1][1]
+        return max(0.0, min(1.0, charge - self._reserve - self._rate_per_s() * self._home_s(here)))
+
+    def _rate_per_s(self) -> float:
+        (first_ns, first), (last_ns, last) = self._readings[0], self._readings[-1]
+        if last_ns - first_ns < _LEAST_WINDOW_NS:
+            return 0.0
+        return max(0.0, first - last) * S / (last_ns - first_ns)
+
+    def _home_s(self, here: Enu) -> float:
+        away_m = math.hypot(here.east - self._home.east, here.north - self._home.north)
+        return _DETOUR * (away_m / self._speed_m_s + max(0.0, here.up) / _SINK_M_S)

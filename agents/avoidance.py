@@ -12,6 +12,7 @@ from fanet_mw import mavlink, wire
 from fanet_mw.application import Application, AppPort, Course, Received
 from fanet_mw.bus.messages import Gps
 from fanet_mw.errors import MalformedFrameError
+from fanet_mw.node.arrival import decoded, packet_of
 from fanet_mw.routing.clustered.roles.position_updates import Motion
 from fanet_mw.scenario import Scenario
 from fanet_mw.trace import Warned
@@ -33,8 +34,8 @@ class CollisionAvoidance(Application):
     def on_hello(self, frame: bytes, now_ns: int) -> None:
         """Take in where a neighbor flies, from its hello."""
         try:
-            origin = NodeId(wire.decode_header(frame).origin)
-            heard = mavlink.kinematics_of(frame)
+            origin = packet_of(frame).origin
+            heard = decoded(frame, mavlink.kinematics_of)
         except MalformedFrameError:
             self._bad_positions += 1
             return

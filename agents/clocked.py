@@ -3,17 +3,17 @@
     host: true time  |  own clock (`local_clock`)  |  swarm time as this node believes it (`swarm_time`)  |  UAV
 
 The UAV lives in swarm time as it believes it; receptions and statuses reach it as stamped by its radio's own clock. Its
-requests leave in true time, and so do its trace records, because delays are measured across nodes. Time beacons are
-added to hellos here, so that protocols know nothing of clocks. A clock that turns out to have been ahead stands still
-until swarm time has caught up. Until a node has swarm time no schedule reaches it: it owns no slot, and contends.
+requests leave in true time, and so do its trace records, because delays are measured across nodes. A clock that turns
+out to have been ahead stands still until swarm time has caught up. Until a node has swarm time no schedule reaches it:
+it owns no slot, and contends.
 """
 
-from collections.abc import Mapping, Sequence
+from collections.abc import Callable, Mapping, Sequence
 from typing import Any, Final
 
 from agents.local_clock import LocalClock
 from agents.mission.chart import NO_CHART, Chart
-from agents.swarm_time import BeaconTime, swarm_time
+from agents.swarm_time import SwarmTime, swarm_time
 from agents.uav import NodeState, Uav
 from fanet_mw import wire
 from fanet_mw.actor import Actor
@@ -29,13 +29,12 @@ from fanet_mw.bus.messages import (
     Radar,
     Reception,
     Setpoint,
-    TxOutcome,
     TxRequest,
     TxStatus,
     Voice,
     WifiScan,
 )
-from fanet_mw.bus.topics import Topics
+from fanet_mw.node.node import AnnouncedHello
 from fanet_mw.scenario import Scenario
 from fanet_mw.trace import ClockSampled, Record
 from fanet_mw.units import US, Enu, NodeId, S
@@ -45,8 +44,20 @@ _SAMPLE_NS: Final = S
 """The interval at which the true error is recorded."""
 _ROUNDING_NS: Final = 2 * US
 """An instant that has gone to the host and back may differ by this much; a wake-up within it counts as due."""
-_HELLOS: Final = 8
-"""The number of hellos whose status is awaited."""
+
+
+class _TimeInHellos:
+    """Adds swarm time to the hellos of one UAV (`agents.uav.HelloTime`)."""
+
+    def __init__(self, time: SwarmTime, local_now_ns: Callable[[], int]) -> None:
+        self._time = time
+        self._local_now_ns = local_now_ns
+
+    def frames(self) -> bytes:
+        return self._time.hello_frames(self._local_now_ns())
+
+    def announced(self, hello: AnnouncedHello) -> None:
+        self._time.announced(hello)
 
 
 class ClockedUav(Actor):
@@ -62,20 +73,26 @@ class ClockedUav(Actor):
         applications: Sequence[Application] = (),
         chart: Chart = NO_CHART,
     ) -> None:
-        self._uav = Uav(scenario, node, swarm, position=position, applications=applications, chart=chart)
-        super().__init__(self._uav.name, self._uav.subscriptions)
-        self._node = node
-        self._tx_topic = Topics(swarm).radio_tx(node)
         self._clock = LocalClock(scenario.clock, seed=scenario.seed, node=node)
         self._time = swarm_time(scenario, node)
+        self._uav = Uav(
+            scenario,
+            node,
+            swarm,
+            position=position,
+            applications=applications,
+            chart=chart,
+            hello_time=_TimeInHellos(self._time, self._local_now_ns) if self._time.in_hellos else None,
+        )
+        super().__init__(self._uav.name, self._uav.subscriptions)
+        self._node = node
         self._stamp_ns = scenario.clock.stamp_ns
-        self._most_bytes = scenario.radio.max_frame_bytes
         self._until_ns = scenario.duration_ns
+        self._input_ns = 0
+        """The true instant of the input that is being handled."""
         self._shown_ns = 0
         """Swarm time as it was last given to the UAV; it never goes back."""
         self._sample_ns = 0
-        self._hellos: dict[int, int] = {}
-        """The requests of this UAV that are hellos, with their numbers."""
         self._withheld = 0
         """The number of schedules that came before there was swarm time."""
 
@@ -84,13 +101,13 @@ class ClockedUav(Actor):
     def start(self, now_ns: int) -> None:
         self._uav.outbox, self._uav.records = [], []
         self._sample_ns = -(-now_ns // _SAMPLE_NS) * _SAMPLE_NS
-        self._clock.pass_time(now_ns, until_ns=self._until_ns)
+        self._begin(now_ns)
         self._time.start(self._clock.local_ns(now_ns))
         self._uav.start(self._now(now_ns))
         self._hand_over(now_ns)
 
     def receive(self, topic: str, message: Message, now_ns: int) -> None:
-        self._clock.pass_time(now_ns, until_ns=self._until_ns)
+        self._begin(now_ns)
         translated = self._translated(message, now_ns)
         if translated is not None:
             self._uav.receive(topic, translated, self._now(now_ns))
@@ -98,7 +115,7 @@ class ClockedUav(Actor):
         self._hand_over(now_ns, known)
 
     def wake(self, now_ns: int) -> None:
-        self._clock.pass_time(now_ns, until_ns=self._until_ns)
+        self._begin(now_ns)
         self._time.pass_time(self._clock.local_ns(now_ns))
         while self._sample_ns <= now_ns:
             self._sample(self._sample_ns)
@@ -110,7 +127,7 @@ class ClockedUav(Actor):
         self._hand_over(now_ns)
 
     def nudge(self, now_ns: int) -> None:
-        self._clock.pass_time(now_ns, until_ns=self._until_ns)
+        self._begin(now_ns)
         self._uav.nudge(self._now(now_ns))
         self._hand_over(now_ns)
 
@@ -142,6 +159,15 @@ class ClockedUav(Actor):
 
     # --- instants -------------------------------------------------------------------------------------------------
 
+    def _begin(self, now_ns: int) -> None:
+        """An input has come at this true instant."""
+        self._input_ns = now_ns
+        self._clock.pass_time(now_ns, until_ns=self._until_ns)
+
+    def _local_now_ns(self) -> int:
+        """What the own clock shows while an input is being handled."""
+        return self._clock.local_ns(self._input_ns)
+
     def _now(self, now_ns: int) -> int:
         """Swarm time now, as the UAV is given it."""
         swarm_ns = self._time.line.swarm_ns(self._clock.local_ns(now_ns))
@@ -162,7 +188,7 @@ class ClockedUav(Actor):
         if isinstance(message, Reception):
             ended_ns = self._stamped_ns(message.end_ns)
             kind = wire.peek_kind(message.frame)
-            if kind == Kind.HELLO and isinstance(self._time, BeaconTime):
+            if kind == Kind.HELLO:
                 self._time.on_hello(message.frame, ended_ns=ended_ns, local_ns=self._clock.local_ns(now_ns))
             elif kind == Kind.SCHEDULE and not self._time.synced:
                 self._withheld += 1
@@ -170,12 +196,9 @@ class ClockedUav(Actor):
             return message._replace(end_ns=self._time.line.swarm_ns(ended_ns))
         if isinstance(message, TxStatus):
             ended_ns = self._stamped_ns(message.end_ns)
-            hello = self._hellos.pop(message.seq, None)
-            if hello is None:
-                return message._replace(end_ns=self._time.line.swarm_ns(ended_ns))
-            if message.outcome is TxOutcome.SENT and isinstance(self._time, BeaconTime):
-                self._time.hello_sent(hello, ended_ns=ended_ns)
-            return None
+            if self._time.on_status(message, ended_ns=ended_ns):
+                return None
+            return message._replace(end_ns=self._time.line.swarm_ns(ended_ns))
         if isinstance(message, Gps):
             self._time.fix(self._stamped_ns(message.t_ns), message.t_ns)
         if isinstance(message, Gps | WifiScan | Camera | Voice | Radar | Altimeter | Inertial | Battery):
@@ -208,22 +231,7 @@ class ClockedUav(Actor):
         start_ns = self._true_ns(request.start_ns)
         if 0 < now_ns - start_ns <= _ROUNDING_NS:
             start_ns = now_ns
-        request = request._replace(start_ns=start_ns)
-        if isinstance(self._time, BeaconTime) and wire.peek_kind(request.frame) == Kind.HELLO:
-            return self._with_time(request, self._time, now_ns)
-        return request
-
-    def _with_time(self, request: TxRequest, time: BeaconTime, now_ns: int) -> TxRequest:
-        """Add to a hello when the previous one ended, and ask for a status that tells when this one ends."""
-        seen = wire.peek(request.frame)
-        assert seen is not None, "our own frames begin with a header"
-        while len(self._hellos) >= _HELLOS:
-            del self._hellos[next(iter(self._hellos))]
-        self._hellos[request.seq] = seen[1]
-        frame = request.frame + time.beacon(self._node, self._clock.local_ns(now_ns))
-        if len(frame) > self._most_bytes:
-            frame = request.frame
-        return request._replace(frame=frame, wants_status=True)
+        return request._replace(start_ns=start_ns)
 
     def _sample(self, at_ns: int) -> None:
         """Record the true error, and let the protocol know how wrong clocks may be."""

@@ -149,7 +149,8 @@ class Onboard:
         for application in listeners:
             self._guard(application.on_message, message, now_ns)
 
-    def hello(self, frame: bytes, now_ns: int) -> None:
+    def on_hello(self, frame: bytes, now_ns: int) -> None:
+        """A neighbor's hello."""
         self._call(now_ns)
         for application in self._on_hello:
             self._guard(application.on_hello, frame, now_ns)

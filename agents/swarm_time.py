@@ -8,8 +8,10 @@ from abc import ABC, abstractmethod
 from collections.abc import Mapping
 from typing import Final
 
-from fanet_mw import wire
+from fanet_mw.bus.messages import TxOutcome, TxStatus
 from fanet_mw.errors import MalformedFrameError
+from fanet_mw.node.arrival import decoded, packet_of
+from fanet_mw.node.node import AnnouncedHello
 from fanet_mw.rng import stream
 from fanet_mw.scenario import Clock, Scenario
 from fanet_mw.timesync.clock_fit import EXACT, ClockFit, Line, Oscillator, Pair
@@ -18,6 +20,8 @@ from fanet_mw.units import NodeId, S, seconds_to_ns
 from fanet_mw.wire.inner import TimeBeacon
 
 _SIGMAS: Final = 4
+_HELLOS: Final = 8
+"""The number of hellos of which the radio may yet have to tell when they ended."""
 _LIGHT_M_PER_S: Final = 299_792_458
 _PPM: Final = 1e-6
 
@@ -25,7 +29,7 @@ _PPM: Final = 1e-6
 class SwarmTime(ABC):
     """A way to swarm time; until something better is known, the own clock is taken for it."""
 
-    sends_beacons: bool = False
+    in_hellos: bool = False
     """True if hellos carry swarm time."""
 
     @property
@@ -56,6 +60,20 @@ class SwarmTime(ABC):
 
     def fix(self, local_ns: int, gps_ns: int) -> None:  # noqa: B027
         """Take in a position fix, which gives the true time at an own instant."""
+
+    def on_hello(self, frame: bytes, *, ended_ns: int, local_ns: int) -> None:  # noqa: B027
+        """Take in a neighbor's hello, which ended at that instant."""
+
+    def hello_frames(self, local_ns: int) -> bytes:
+        """What goes into the hello that is said now."""
+        return b""
+
+    def announced(self, hello: AnnouncedHello) -> None:  # noqa: B027
+        """A hello of this node was announced to the radio."""
+
+    def on_status(self, status: TxStatus, *, ended_ns: int) -> bool:
+        """Take in how a transmission ended, and when; True if it was a hello whose end had to be known here."""
+        return False
 
     def report(self) -> Mapping[str, object]:
         """The state, as JSON values."""
@@ -109,10 +127,11 @@ class GpsTime(SwarmTime):
 class BeaconTime(SwarmTime):
     """`clock.sync = "beacons"`: a `TimeSync`, and its beacons in frames."""
 
-    sends_beacons = True
+    in_hellos = True
 
     def __init__(self, scenario: Scenario, node: NodeId) -> None:
         clock, radio = scenario.clock, scenario.radio
+        self._node = node
         self._sync = TimeSync(
             Settings(
                 node=node,
@@ -124,6 +143,8 @@ class BeaconTime(SwarmTime):
                 leader=scenario.leader,
             )
         )
+        self._announced: dict[int, int] = {}
+        """The numbers of the node's hellos whose end is not known yet, by transmit request."""
         self._malformed = 0
 
     @property
@@ -149,22 +170,27 @@ class BeaconTime(SwarmTime):
     def pass_time(self, local_ns: int) -> None:
         self._sync.pass_time(local_ns)
 
-    def hello_sent(self, hello: int, *, ended_ns: int) -> None:
-        """A hello of this node has left the antenna, and ended at that instant."""
-        self._sync.hello_sent(hello, ended_ns=ended_ns)
-
-    def beacon(self, node: NodeId, local_ns: int) -> bytes:
-        """The time beacon for the next hello."""
+    def hello_frames(self, local_ns: int) -> bytes:
+        """The time beacon, which says when the node's last hello ended."""
         beacon = self._sync.beacon(local_ns)
-        return b"" if beacon is None else beacon.encode_frame(node)
+        return b"" if beacon is None else beacon.encode_frame(self._node)
+
+    def announced(self, hello: AnnouncedHello) -> None:
+        while len(self._announced) >= _HELLOS:
+            del self._announced[next(iter(self._announced))]
+        self._announced[hello.request] = hello.number
+
+    def on_status(self, status: TxStatus, *, ended_ns: int) -> bool:
+        hello = self._announced.pop(status.seq, None)
+        if hello is not None and status.outcome is TxOutcome.SENT:
+            self._sync.hello_sent(hello, ended_ns=ended_ns)
+        return hello is not None
 
     def on_hello(self, frame: bytes, *, ended_ns: int, local_ns: int) -> None:
         """Take in a neighbor's hello. Its header names the sender; the radio's source is not passed on by every bus."""
-        beacon = None
         try:
-            header = wire.decode_header(frame)
-            if any(msgid == wire.TIME.msgid for msgid, _ in wire.inner_frames(frame)):
-                beacon = TimeBeacon.decode_frame(frame)
+            header = packet_of(frame).header
+            beacon = decoded(frame, TimeBeacon.in_hello)
         except MalformedFrameError:
             self._malformed += 1
             return

@@ -5,7 +5,7 @@ tap. Everything that decides is in the parts; this file only says what goes wher
 """
 
 from collections.abc import Mapping, Sequence
-from typing import Any, Final, NamedTuple
+from typing import Any, Final, NamedTuple, Protocol
 
 from agents.autopilot import Autopilot
 from agents.avoidance import CollisionAvoidance
@@ -16,7 +16,6 @@ from agents.onboard import INNER_ID, Onboard
 from agents.steady_fix import SteadyFix
 from agents.telemetry import Telemetry
 from agents.traffic import Load
-from fanet_mw import wire
 from fanet_mw.actor import Actor
 from fanet_mw.application import Application, Course
 from fanet_mw.bus.messages import (
@@ -37,7 +36,7 @@ from fanet_mw.bus.messages import (
 )
 from fanet_mw.bus.topics import Topics
 from fanet_mw.extensions import load
-from fanet_mw.node.node import Node
+from fanet_mw.node.node import AnnouncedHello, Node
 from fanet_mw.rng import stream
 from fanet_mw.routing import make_protocol
 from fanet_mw.scenario import Scenario
@@ -47,6 +46,16 @@ _HELLO_JITTER: Final = 0.1
 """A hello varies by this share of its interval, so that neighbors in step do not stay so (RFC 3626, 3.4)."""
 _LIFETIME_HELLOS: Final = 4
 """A node that has not been heard for so many hello intervals is no neighbor any more."""
+
+
+class HelloTime(Protocol):
+    """What adds swarm time to the hellos of a node."""
+
+    def frames(self) -> bytes:
+        """The inner frames for the hello that is said now; empty while there is no time to tell."""
+
+    def announced(self, hello: AnnouncedHello) -> None:
+        """That hello was announced to the radio, which will tell when it has ended."""
 
 
 class NodeState(NamedTuple):
@@ -70,8 +79,11 @@ class Uav(Actor):
         position: Enu,
         applications: Sequence[Application] = (),
         chart: Chart = NO_CHART,
+        hello_time: HelloTime | None = None,
     ) -> None:
-        """`applications` are those of its user, beside what the scenario asks for; `chart`: the map on board."""
+        """`applications` are those of its user, beside what the scenario asks for; `chart`: the map on board;
+        `hello_time`: what its hellos say of the time.
+        """
         topics = Topics(swarm)
         super().__init__(f"agent-{node}", (topics.radio_rx(node), topics.sensors(node)))
         self._id = node
@@ -97,6 +109,7 @@ class Uav(Actor):
             fly=self._steer,
             tap=self._tap,
         )
+        self._hello_time = hello_time
         self._hello_ns = seconds_to_ns(scenario.routing.hello_interval_s)
         self._hello_random = stream(scenario.seed, "hello", node).random
         self._next_hello_ns: int | None = None
@@ -126,11 +139,8 @@ class Uav(Actor):
                 self._heard_late += 1
             if node.hear(message, now_ns):
                 return True  # a copy, and nothing came of it, as of most
-            onboard = self._onboard
-            if wire.peek_kind(message.frame) == wire.Kind.HELLO:
-                self._heard_ns[message.src] = now_ns
-                if onboard.hears_hellos:
-                    onboard.hello(message.frame, now_ns)
+            if node.hellos:
+                self._on_hellos(now_ns)
             return not self._settle(now_ns) and node.timeless
         if isinstance(message, TxStatus):
             self._node.status(message, now_ns=now_ns)
@@ -199,11 +209,22 @@ class Uav(Actor):
 
     # --- hellos ---------------------------------------------------------------------------------------------------
 
+    def _on_hellos(self, now_ns: int) -> None:
+        hellos, self._node.hellos = self._node.hellos, []
+        for hello in hellos:
+            self._heard_ns[hello.origin] = now_ns
+            if self._onboard.hears_hellos:
+                self._onboard.on_hello(hello.frame, now_ns)
+
     def _say_hello(self, now_ns: int) -> None:
         if self._next_hello_ns is None or self._next_hello_ns - self._lead_ns > now_ns:
             return
         inner = self._autopilot.beacon_frames(now_ns) + self._onboard.hello_frames(now_ns)
-        self._node.say_hello(inner, start_ns=max(self._next_hello_ns, now_ns), now_ns=now_ns)
+        time, start_ns = self._hello_time, max(self._next_hello_ns, now_ns)
+        if time is None:
+            self._node.say_hello(inner, start_ns=start_ns, now_ns=now_ns)
+        else:
+            time.announced(self._node.say_hello(inner, start_ns=start_ns, now_ns=now_ns, time=time.frames()))
         vary = 1 + _HELLO_JITTER * (2 * self._hello_random() - 1)
         step_ns = int(self._hello_ns * vary * self._node.hello_share(now_ns))
         self._next_hello_ns = max(self._next_hello_ns + step_ns, now_ns)

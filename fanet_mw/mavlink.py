@@ -17,7 +17,7 @@ from pymavlink.dialects.v20 import common
 from fanet_mw.dialect import fanet
 from fanet_mw.errors import LocalProtocolError, MalformedFrameError
 from fanet_mw.units import MAX_NODES, MS, US, Enu, NodeId
-from fanet_mw.wire import COMPONENT, frames, inner_frames, system_id
+from fanet_mw.wire import COMPONENT, Packed, frames, inner_frames, system_id
 
 common.mavlink_map.update(fanet.mavlink_map)  # one parser for both dialects
 
@@ -316,9 +316,9 @@ def decode(data: bytes) -> list[Any]:
         raise MalformedFrameError(f"not MAVLink: {error}") from error
 
 
-def _only(frame: bytes, message_id: int) -> Any:  # noqa: ANN401  (pymavlink has no types)
-    """The first inner frame of a radio frame that is this message, decoded; raises MalformedFrameError."""
-    for found, inner in inner_frames(frame):
+def _only(packed: Packed, message_id: int) -> Any:  # noqa: ANN401  (pymavlink has no types)
+    """The first inner frame of a packet that is this message, decoded; raises MalformedFrameError."""
+    for found, inner in inner_frames(packed):
         if found == message_id:
             return decode(inner)[0]
     raise MalformedFrameError(f"no message {message_id} in the frame")
@@ -342,9 +342,9 @@ def kinematics(message: Any, origin: Geodetic = ORIGIN) -> Kinematics:  # noqa: 
     return Kinematics(to_enu(place, origin), velocity, yaw, message.time_boot_ms)
 
 
-def kinematics_of(frame: bytes, origin: Geodetic = ORIGIN) -> Kinematics:
-    """What the GLOBAL_POSITION_INT in a radio frame says; raises MalformedFrameError."""
-    return kinematics(_only(frame, common.MAVLINK_MSG_ID_GLOBAL_POSITION_INT), origin)
+def kinematics_of(packed: Packed, origin: Geodetic = ORIGIN) -> Kinematics:
+    """What the GLOBAL_POSITION_INT in a packet says; raises MalformedFrameError."""
+    return kinematics(_only(packed, common.MAVLINK_MSG_ID_GLOBAL_POSITION_INT), origin)
 
 
 class Collision(NamedTuple):

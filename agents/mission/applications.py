@@ -3,7 +3,6 @@
 Each hands what its UAV senses and is told to the mission, and empties the mission's outbox into its port.
 """
 
-from functools import lru_cache
 from typing import Final
 
 from agents.mission.chart import NO_CHART, Chart
@@ -11,10 +10,11 @@ from agents.mission.motion import Motion
 from agents.mission.outbox import Outbox
 from agents.mission.paper_rule import PaperRule
 from agents.mission.searcher import Searcher
-from fanet_mw import mavlink, wire
+from fanet_mw import mavlink
 from fanet_mw.application import Application, AppPort, Course, Received, SensorReading
 from fanet_mw.bus.messages import Altimeter, Camera, Gps, Radar, WifiScan
 from fanet_mw.errors import MalformedFrameError
+from fanet_mw.node.arrival import decoded, packet_of
 from fanet_mw.scenario import Scenario
 from fanet_mw.units import MS, Enu, NodeId, S
 from fanet_mw.wire import BIDS, FOUND, SEARCH, STATUS, SURVIVOR
@@ -160,9 +160,8 @@ def _speaker(told: Told) -> int | None:
     return None if not isinstance(told, Found) or told.confirmed else told.node
 
 
-@lru_cache(maxsize=512)
 def _hello(frame: bytes) -> tuple[int, Motion, tuple[Told, ...]]:
-    """Who says it, how that one flies, and what it tells; raises MalformedFrameError. Cached: many hear the same."""
-    origin = wire.decode_header(frame).origin
-    motion = mavlink.kinematics_of(frame)
-    return origin, Motion(motion.position, motion.velocity, motion.t_ms * MS), tuple(told_in(frame))
+    """Who says it, how that one flies, and what it tells; raises MalformedFrameError."""
+    heard = decoded(frame, mavlink.kinematics_of)
+    motion = Motion(heard.position, heard.velocity, heard.t_ms * MS)
+    return packet_of(frame).origin, motion, decoded(frame, told_in)

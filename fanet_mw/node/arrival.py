@@ -1,4 +1,4 @@
-"""A frame as whoever hears it finds it: which packet, in which phase, and its header when somebody asks.
+"""A frame as whoever hears it finds it: which packet, in which phase, and what is in it when somebody asks.
 
 A broadcast is one object of bytes to all who hear it in virtual time, and they hear it one after another: what the
 first of them has read serves the others. Nothing here depends on who reads. In real time every frame is read once.
@@ -11,12 +11,15 @@ from fanet_mw import wire
 from fanet_mw.errors import MalformedFrameError
 from fanet_mw.node import duplicates
 from fanet_mw.node.packet import Packet
+from fanet_mw.wire import Content
 
 PHASES: Final = {0: duplicates.DELIVERED, wire.FLAG_FLOOD: duplicates.FLOODED, wire.FLAG_TO_HEAD: duplicates.CARRIED}
 """Which bit says that a packet was handled, by the phase flags of the frame that brought it."""
 _new: Final = tuple.__new__  # for what is made once per frame
 BUNDLE: Final = 1 << 30
 """The phase of a frame with several packets in it: no node has ever handled that."""
+_LATEST: Final = 64
+"""Packets of which is kept what was decoded; more hellos than one handover of a radio brings."""
 
 
 def name_of(frame: bytes) -> int:
@@ -68,23 +71,57 @@ shared: Final = Reader()
 T = TypeVar("T")
 
 
-class Memo:
-    """What has been decoded of the latest packet that somebody asked about; values are immutable."""
+class _Inside:
+    """What has been decoded of one packet; values are immutable."""
 
     def __init__(self) -> None:
-        self._packet: Packet | None = None
-        self._found: dict[Callable[[bytes], Any], Any] = {}
+        self.content: Content | None = None
+        self.messages: dict[Callable[[Content], Any], Any] = {}
+        """By decoder, what it made of the content."""
 
-    def of(self, packet: Packet, decode: Callable[[bytes], T]) -> T:
-        """What `decode` makes of the packet's bytes; raises what it raises, each time."""
-        if packet is not self._packet:
-            self._packet = packet
-            self._found.clear()
-        elif decode in self._found:
-            return self._found[decode]  # type: ignore[no-any-return]
-        found = self._found[decode] = decode(packet.frame)
+
+class Decoded:
+    """What has been decoded of the latest packets that somebody asked about.
+
+    The inner frames of a packet are found and checked once, and each of its messages is decoded once, whoever asks: the
+    clock, the protocol and the applications of a node, and all nodes that hear the same bytes.
+    """
+
+    def __init__(self) -> None:
+        self._frame = b""
+        self._inside = _Inside()
+        """Of that frame."""
+        self._latest: dict[bytes, _Inside] = {}
+        """Of each of the latest packets, the oldest first."""
+
+    def of(self, frame: bytes, decode: Callable[[Content], T]) -> T:
+        """What `decode` makes of a packet, routing header first; raises what it raises, each time."""
+        if frame is not self._frame:
+            self._look(frame)
+        inside = self._inside
+        if decode in inside.messages:
+            return inside.messages[decode]  # type: ignore[no-any-return]
+        if inside.content is None:
+            inside.content = Content.of(frame)
+        found = inside.messages[decode] = decode(inside.content)
         return found
 
+    def _look(self, frame: bytes) -> None:
+        """Take up another packet, or one of the latest again: a radio may hand over several frames to each node."""
+        known = self._latest.get(frame)
+        if known is None:
+            known = self._latest[frame] = _Inside()
+            if len(self._latest) > _LATEST:
+                del self._latest[next(iter(self._latest))]
+        self._frame, self._inside = frame, known
 
-decoded: Final = Memo().of
+
+decoded: Final = Decoded().of
 """For all nodes of this process: a hello that forty hear is decoded once."""
+
+
+def packet_of(frame: bytes) -> Packet:
+    """The packet in a frame, its header decoded; raises MalformedFrameError."""
+    if frame is not shared.frame:
+        shared.look(frame)
+    return shared.packet or shared.read()

@@ -9,7 +9,7 @@ the routing protocol behind it decides what happens next, and sends through the 
 from collections import Counter
 from collections.abc import Callable, Mapping, Sequence
 from itertools import zip_longest
-from typing import Final
+from typing import Final, NamedTuple
 
 from fanet_mw import wire
 from fanet_mw.bus.messages import Reception, TxRequest, TxStatus
@@ -31,6 +31,15 @@ _NONE: Final[Sequence[Relay]] = ()
 _new: Final = tuple.__new__  # for what is made once per frame
 
 
+class AnnouncedHello(NamedTuple):
+    """A hello of this node that was announced to the radio."""
+
+    request: int
+    """The number of the transmit request."""
+    number: int
+    """The sequence number of the hello."""
+
+
 class Node:
     """One protocol instance."""
 
@@ -41,6 +50,8 @@ class Node:
         self.scenario = scenario
         self.deliveries: list[Packet] = []
         """Packets for the application of this node."""
+        self.hellos: list[Packet] = []
+        """Hellos of neighbors, for what else their receivers read in them than routing does."""
         self.receptions = 0
         self._duplicates = 0
         self._lifetimes_ns = [scenario.routing.lifetime_ns(priority) for priority in range(256)]
@@ -151,20 +162,28 @@ class Node:
         self._protocol.originate(packet, due_ns=due_ns, now_ns=now_ns)
         return seq
 
-    def say_hello(self, inner: bytes, *, start_ns: int, now_ns: int) -> None:
-        """Broadcast our hello one hop: position frames of the application, then what the protocol adds."""
+    def say_hello(self, inner: bytes, *, start_ns: int, now_ns: int, time: bytes | None = None) -> AnnouncedHello:
+        """Broadcast this node's hello one hop: the frames of its applications, what the protocol adds, and the time.
+
+        `time` is left out where there is no room for it; whoever gives it, though it be empty, gets the status of the
+        transmission.
+        """
         start_ns = self._protocol.hello_start_ns(start_ns)
-        room = self.scenario.radio.max_frame_bytes - wire.HEADER_BYTES - len(inner)
+        most = self.scenario.radio.max_frame_bytes - wire.HEADER_BYTES
+        inner += self._protocol.hello_inner(most - len(inner), now_ns=now_ns)
+        if time is not None and len(inner) + len(time) <= most:
+            inner += time
         packet = self._own.make(
             Kind.HELLO,
-            inner + self._protocol.hello_inner(room, now_ns=now_ns),
+            inner,
             destination=BROADCAST,
             priority=wire.PRIORITY_CONTROL,
             flags=0,
             hop_limit=1,
             born_ns=start_ns,
         )
-        self.port.transmit(packet.frame, BROADCAST, start_ns=start_ns)
+        request = self.port.transmit(packet.frame, BROADCAST, start_ns=start_ns, wants_status=time is not None)
+        return AnnouncedHello(request, packet.header.seq)
 
     def hello_share(self, now_ns: int) -> float:
         """After which part of the hello interval the next hello should go."""
@@ -243,6 +262,7 @@ class Node:
         if kind == _HELLO:
             self._seen.put(name, bits)
             self._protocol.hello(packet, reception, now_ns=now_ns)
+            self.hellos.append(packet)
             return _NONE
         end_ns = reception.end_ns
         age_ns = end_ns - origin_us * US

@@ -10,12 +10,11 @@ from typing import Final, NamedTuple, Self
 
 from fanet_mw.errors import MalformedFrameError
 from fanet_mw.units import MAX_NODES, NodeId
-from fanet_mw.wire import CLAIMS, OVERHEAD, VERSION, decode_every, encode_inner
+from fanet_mw.wire import CLAIMS, OVERHEAD, VERSION, Packed, decode_every, encode_inner
 
 CAPACITY: Final = 16
 """Entries of one message; more neighbors need a further message."""
 MESSAGE_BYTES: Final = OVERHEAD + CLAIMS.layout.size
-MOST_SLOTS: Final = 254
 NO_SLOT: Final = 255
 MOST_LOTS: Final = 3
 _HEARS_US: Final = 4
@@ -75,10 +74,10 @@ class Claims(NamedTuple):
         )  # fmt: skip
 
     @classmethod
-    def decode_frames(cls, frame: bytes) -> Self | None:
+    def decode_frames(cls, packed: Packed) -> Self | None:
         """The claims in a hello; None when it has none. Raises MalformedFrameError."""
         heard: list[HeardNeighbor] = []
-        messages = decode_every(CLAIMS, frame)
+        messages = decode_every(CLAIMS, packed)
         if not messages:
             return None
         for node, *lists, slot, length, crowd, lots, count, version in messages:

@@ -10,7 +10,7 @@ from typing import Final, NamedTuple, Self
 
 from fanet_mw.errors import MalformedFrameError
 from fanet_mw.serial import newer
-from fanet_mw.wire import DIGEST, OVERHEAD, VERSION, decode_every, encode_inner
+from fanet_mw.wire import DIGEST, OVERHEAD, VERSION, Packed, decode_every, encode_inner
 
 WINDOW: Final = 33
 """The packets of one origin that an entry covers: the newest and the 32 before it."""
@@ -86,10 +86,10 @@ class Digest(NamedTuple):
         )  # fmt: skip
 
     @classmethod
-    def decode_frames(cls, frame: bytes) -> Self | None:
+    def decode_frames(cls, packed: Packed) -> Self | None:
         """The digest in a hello; None when it has none. Raises MalformedFrameError."""
         holdings: list[Holding] = []
-        messages = decode_every(DIGEST, frame)
+        messages = decode_every(DIGEST, packed)
         for fields in messages:
             *lists, count, complete, version = fields
             if version != VERSION or count > CAPACITY or complete > 1:

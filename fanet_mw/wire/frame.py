@@ -6,7 +6,7 @@ MalformedFrameError. Layouts: docs/reference/air-format.md.
 """
 
 import struct
-from collections.abc import Iterator, Sequence
+from collections.abc import Iterable, Iterator, Sequence
 from enum import IntEnum
 from functools import lru_cache
 from types import MappingProxyType
@@ -170,12 +170,6 @@ def fields_of(frame: bytes) -> Fields | None:
     return fields if fields[0] == _ROUTE_MARK and fields[1] == _ROUTE_ID else None
 
 
-def peek(frame: bytes) -> tuple[int, int, int] | None:
-    """(origin, seq, flags), unchecked; None when these bytes cannot begin with a routing header."""
-    fields = fields_of(frame)
-    return None if fields is None else (fields[4], fields[3], fields[11])
-
-
 def peek_kind(frame: bytes) -> int | None:
     """The kind of a packet, unchecked; None when these bytes cannot begin with a routing header."""
     whole = len(frame) >= HEADER_BYTES and frame[:3] == _ROUTE_MARK and frame[7:10] == _ROUTE_ID
@@ -275,10 +269,30 @@ def renumbered(frame: bytes, seq: int) -> bytes:
     return frame[:4] + bytes((seq,)) + frame[5:covered] + _CRC.pack(crc)
 
 
-def inner_frames(frame: bytes) -> Iterator[tuple[int, bytes]]:
-    """(message id, whole MAVLink frame) of each inner frame, in order; raises MalformedFrameError at a broken one.
+class Content(NamedTuple):
+    """The inner frames of a packet, found and checked: decoders take it in place of the packet."""
 
-    The CRC is checked only of messages of this dialect; for others it would need the message's definition.
+    inner: tuple[tuple[int, bytes], ...]
+    """(message id, whole MAVLink frame) of each, in order."""
+
+    @classmethod
+    def of(cls, frame: bytes) -> "Content":
+        """The content of a packet, routing header first; raises MalformedFrameError unless all of it is sound."""
+        return cls(tuple(_found_in(frame)))
+
+
+Packed = bytes | Content
+"""A packet, routing header first, or what has been found in it already."""
+
+
+def inner_frames(packed: Packed) -> Iterable[tuple[int, bytes]]:
+    """(message id, whole MAVLink frame) of each inner frame, in order; raises MalformedFrameError at a broken one."""
+    return packed.inner if isinstance(packed, Content) else _found_in(packed)
+
+
+def _found_in(frame: bytes) -> Iterator[tuple[int, bytes]]:
+    """The inner frames of a packet. The CRC is checked only of messages of this dialect; for others it would need the
+    message's definition.
     """
     for inner in frames(frame, start=HEADER_BYTES):
         msgid = _message_id(inner)
@@ -291,10 +305,10 @@ def inner_frames(frame: bytes) -> Iterator[tuple[int, bytes]]:
         yield msgid, inner
 
 
-def decode_every(spec: Spec, frame: bytes) -> list[tuple[Any, ...]]:
+def decode_every(spec: Spec, packed: Packed) -> list[tuple[Any, ...]]:
     """The fields of each inner frame with this message; raises MalformedFrameError."""
     found = []
-    for msgid, inner in inner_frames(frame):
+    for msgid, inner in inner_frames(packed):
         if msgid == spec.msgid:
             if inner[1] != spec.layout.size:
                 raise MalformedFrameError(f"message {msgid} of {inner[1]} bytes, not {spec.layout.size}")
@@ -302,17 +316,17 @@ def decode_every(spec: Spec, frame: bytes) -> list[tuple[Any, ...]]:
     return found
 
 
-def fields_of_each(frame: bytes) -> Iterator[tuple[Spec, tuple[Any, ...]]]:
+def fields_of_each(packed: Packed) -> Iterator[tuple[Spec, tuple[Any, ...]]]:
     """The fields of each inner frame that is one of our messages; raises MalformedFrameError."""
-    for msgid, inner in inner_frames(frame):
+    for msgid, inner in inner_frames(packed):
         spec = _OURS.get(msgid)
         if spec is not None and inner[1] == spec.layout.size:
             yield spec, spec.layout.unpack_from(inner, 10)
 
 
-def decode_first(spec: Spec, frame: bytes) -> tuple[Any, ...]:
+def decode_first(spec: Spec, packed: Packed) -> tuple[Any, ...]:
     """The fields of the first inner frame with this message; raises MalformedFrameError."""
-    found = decode_every(spec, frame)
+    found = decode_every(spec, packed)
     if not found:
         raise MalformedFrameError(f"no message {spec.msgid} in the frame")
     return found[0]

@@ -18,8 +18,10 @@ from fanet_mw.wire import (
     SURVIVOR,
     TIME,
     VERSION,
+    Packed,
     decode_first,
     encode_inner,
+    inner_frames,
 )
 
 CAPACITY: Final = 56
@@ -68,8 +70,8 @@ class Beacon(NamedTuple):
         )
 
     @classmethod
-    def decode_frame(cls, frame: bytes) -> Self:
-        term, of, head, seq, cluster, epoch, slot, leader, role, hops, version = decode_first(BEACON, frame)
+    def decode_frame(cls, packed: Packed) -> Self:
+        term, of, head, seq, cluster, epoch, slot, leader, role, hops, version = decode_first(BEACON, packed)
         beacon = cls(of, head, seq, cluster, epoch, slot, role, hops, term, leader)
         _check(version, beacon.node)
         if beacon.role > Role.HEAD or ANY_NODE in (beacon.head, beacon.leader):
@@ -128,8 +130,8 @@ class Schedule(NamedTuple):
         )
 
     @classmethod
-    def decode_frame(cls, frame: bytes) -> Self:
-        fields = decode_first(SCHEDULE, frame)
+    def decode_frame(cls, packed: Packed) -> Self:
+        fields = decode_first(SCHEDULE, packed)
         part, parts, count, version = fields[-4:]
         nodes, assigned = fields[7 : 7 + CAPACITY], fields[7 + CAPACITY : 7 + 2 * CAPACITY]
         if count > CAPACITY or part >= parts:
@@ -167,8 +169,8 @@ class Join(NamedTuple):
         return encode_inner(JOIN, payload, node=node)
 
     @classmethod
-    def decode_frame(cls, frame: bytes) -> Self:
-        *numbers, node, instead_of, version = decode_first(JOIN, frame)
+    def decode_frame(cls, packed: Packed) -> Self:
+        *numbers, node, instead_of, version = decode_first(JOIN, packed)
         _check(version, node)
         if instead_of == ANY_NODE:
             raise MalformedFrameError(f"join of {node} instead of {instead_of}")
@@ -190,8 +192,8 @@ class Survivor(NamedTuple):
         return encode_inner(SURVIVOR, payload, node=node)
 
     @classmethod
-    def decode_frame(cls, frame: bytes) -> Self:
-        return cls.checked(decode_first(SURVIVOR, frame))
+    def decode_frame(cls, packed: Packed) -> Self:
+        return cls.checked(decode_first(SURVIVOR, packed))
 
     @classmethod
     def checked(cls, fields: tuple[Any, ...]) -> Self:
@@ -221,14 +223,20 @@ class TimeBeacon(NamedTuple):
         return encode_inner(TIME, TIME.layout.pack(*self, VERSION), node=node)
 
     @classmethod
-    def decode_frame(cls, frame: bytes) -> Self:
+    def decode_frame(cls, packed: Packed) -> Self:
         """Decode a beacon; raises MalformedFrameError. Only a beacon of the reference itself has 0 hops."""
-        *fields, version = decode_first(TIME, frame)
+        *fields, version = decode_first(TIME, packed)
         beacon = cls(*fields)
         _check(version, beacon.node, t_us=beacon.t_ns // US)
         if not 0 < beacon.reference < ANY_NODE or (beacon.reference == beacon.node) != (beacon.hops == 0):
             raise MalformedFrameError(f"time of node {beacon.reference}, {beacon.hops} hops from {beacon.node}")
         return beacon
+
+    @classmethod
+    def in_hello(cls, hello: Packed) -> Self | None:
+        """The beacon in a hello; None when it has none. Raises MalformedFrameError."""
+        has_time = any(message == TIME.msgid for message, _ in inner_frames(hello))
+        return cls.decode_frame(hello) if has_time else None
 
 
 def _within(east: float, north: float, up: float, *, most: float) -> Enu:

@@ -12,7 +12,7 @@ from typing import Final, NamedTuple, Self
 
 from fanet_mw.errors import MalformedFrameError
 from fanet_mw.units import NodeId
-from fanet_mw.wire import ANY_NODE, LINKS, VERSION, decode_every, encode_inner
+from fanet_mw.wire import ANY_NODE, LINKS, VERSION, Packed, decode_every, encode_inner
 
 CAPACITY: Final = 36
 """Entries of one message."""
@@ -84,11 +84,11 @@ class Links(NamedTuple):
         )  # fmt: skip
 
     @classmethod
-    def decode_frames(cls, frame: bytes) -> Self | None:
+    def decode_frames(cls, packed: Packed) -> Self | None:
         """All links in a packet; None when it has none. Raises MalformedFrameError."""
         found: list[Link] = []
         names: set[tuple[int, ...]] = set()
-        for term, node, epoch, *lists, part, parts, count, version in decode_every(LINKS, frame):
+        for term, node, epoch, *lists, part, parts, count, version in decode_every(LINKS, packed):
             if version != VERSION or count > CAPACITY or part >= parts or not 0 < node < ANY_NODE:
                 raise MalformedFrameError(f"links of version {version}, node {node}, part {part}, {count} entries")
             names.add((node, term, epoch, part, parts))

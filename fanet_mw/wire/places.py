@@ -8,7 +8,7 @@ from typing import Final, NamedTuple, Self
 
 from fanet_mw.errors import MalformedFrameError
 from fanet_mw.units import Enu
-from fanet_mw.wire import PLACES, VERSION, decode_every, encode_inner
+from fanet_mw.wire import PLACES, VERSION, Packed, decode_every, encode_inner
 
 CAPACITY: Final = 28
 """Entries of one message; two messages hold the members of one schedule part."""
@@ -42,11 +42,11 @@ class Places(NamedTuple):
         return PLACES.layout.pack(*flat, *leader, first, len(chunk), VERSION)
 
     @classmethod
-    def decode_frames(cls, frame: bytes) -> Self:
+    def decode_frames(cls, packed: Packed) -> Self:
         """All places in a packet; raises MalformedFrameError when there are none, or when they are out of order."""
         found: list[Enu] = []
         leader: Enu | None = None
-        for *values, first, count, version in decode_every(PLACES, frame):
+        for *values, first, count, version in decode_every(PLACES, packed):
             if version != VERSION or not 0 < count <= CAPACITY or first != len(found):
                 raise MalformedFrameError(f"places of version {version}: {count} from {first} on, after {len(found)}")
             east, north, up = (values[at : at + count] for at in (0, CAPACITY, 2 * CAPACITY))

@@ -18,6 +18,7 @@ from fanet_mw.wire.frame import (
     STATUS,
     SURVIVOR,
     VERSION,
+    Packed,
     decode_first,
     encode_inner,
     fields_of_each,
@@ -64,9 +65,9 @@ class Search(NamedTuple):
         return encode_inner(SEARCH, SEARCH.layout.pack(*self[:9], *self.nodes, *unused, *self[10:], VERSION), node=node)
 
     @classmethod
-    def decode_frame(cls, frame: bytes) -> Self:
+    def decode_frame(cls, packed: Packed) -> Self:
         """The first of a frame; raises MalformedFrameError for a plan that nobody could fly."""
-        return cls.checked(decode_first(SEARCH, frame))
+        return cls.checked(decode_first(SEARCH, packed))
 
     @classmethod
     def checked(cls, fields: tuple[Any, ...]) -> Self:
@@ -110,9 +111,9 @@ class Status(NamedTuple):
         return encode_inner(STATUS, payload, node=node)
 
     @classmethod
-    def decode_frame(cls, frame: bytes) -> Self:
+    def decode_frame(cls, packed: Packed) -> Self:
         """The first of a frame; raises MalformedFrameError."""
-        return cls.checked(decode_first(STATUS, frame))
+        return cls.checked(decode_first(STATUS, packed))
 
     @classmethod
     def checked(cls, fields: tuple[Any, ...]) -> Self:
@@ -188,9 +189,9 @@ class Found(NamedTuple):
         return encode_inner(FOUND, FOUND.layout.pack(*self, VERSION), node=node)
 
     @classmethod
-    def decode_frame(cls, frame: bytes) -> Self:
+    def decode_frame(cls, packed: Packed) -> Self:
         """The first of a frame; raises MalformedFrameError, for what is no covariance too."""
-        return cls.checked(decode_first(FOUND, frame))
+        return cls.checked(decode_first(FOUND, packed))
 
     @classmethod
     def checked(cls, fields: tuple[Any, ...]) -> Self:
@@ -228,6 +229,6 @@ _CHECKED: Final[Mapping[int, Callable[[tuple[Any, ...]], Told]]] = {
 }
 
 
-def told_in(frame: bytes) -> list[Told]:
+def told_in(packed: Packed) -> tuple[Told, ...]:
     """Every message of a search in a frame, in order; raises MalformedFrameError."""
-    return [_CHECKED[spec.msgid](fields) for spec, fields in fields_of_each(frame) if spec.msgid in _CHECKED]
+    return tuple(_CHECKED[spec.msgid](fields) for spec, fields in fields_of_each(packed) if spec.msgid in _CHECKED)

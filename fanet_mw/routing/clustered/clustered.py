@@ -147,10 +147,10 @@ class Clustered(RoutingProtocol):
 
     def hello(self, packet: Packet, reception: Reception, *, now_ns: int) -> None:
         parts, count = self.parts, self._port.scenario.nodes.count
-        beacon = decoded(packet, Beacon.decode_frame)
+        beacon = decoded(packet.frame, Beacon.decode_frame)
         if beacon.node != reception.src or beacon.head > count or beacon.leader > count:
             raise MalformedFrameError(f"beacon of {beacon.node}, head {beacon.head}, leader {beacon.leader}")
-        digest = decoded(packet, Digest.decode_frames) if parts.repair else None
+        digest = decoded(packet.frame, Digest.decode_frames) if parts.repair else None
         neighbor = Neighbor(reception.src, now_ns, reception.rssi_dbm, beacon)
         parts.neighbors.heard(neighbor)
         parts.roles.on_hello(neighbor, born_ns=packet.header.origin_us * US, now_ns=now_ns)
@@ -160,7 +160,7 @@ class Clustered(RoutingProtocol):
         for held in parts.uplink.released(now_ns=now_ns):
             parts.access.forward(held, start_ns=now_ns + self._lead_ns, now_ns=now_ns)
         if parts.two_hops is not None:
-            claims = decoded(packet, Claims.decode_frames)
+            claims = decoded(packet.frame, Claims.decode_frames)
             if claims is not None and any(heard.node > count for heard in claims.heard):
                 raise MalformedFrameError("claims of nodes that are not there")
             if claims is not None and claims.node == reception.src:

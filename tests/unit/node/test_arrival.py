@@ -7,8 +7,7 @@ from hypothesis import strategies as st
 from fanet_mw import wire
 from fanet_mw.errors import MalformedFrameError
 from fanet_mw.node import duplicates
-from fanet_mw.node.arrival import Memo, Reader
-from fanet_mw.node.packet import Packet
+from fanet_mw.node.arrival import Decoded, Reader
 
 FLOODED = wire.Header(5, 7, 3, 0xFFFF, 3, 0, 32, 0, 3, wire.FLAG_FLOOD)
 
@@ -27,6 +26,10 @@ FRAMES = [
     spoiled(FLOODED.encode(), 12),
     b"",
 ]
+
+
+def inner_frames(content: wire.Content) -> int:
+    return len(content.inner)
 
 
 def what(reader: Reader, frame: bytes) -> object:
@@ -62,8 +65,28 @@ def test_a_frame_without_a_packet_is_named_each_time(frame: bytes) -> None:
 
 
 def test_what_was_decoded_of_one_packet_is_not_taken_for_another_s() -> None:
-    memo = Memo()
-    one, other = (Packet(FLOODED, frame) for frame in (b"one", b"other"))
-    assert memo.of(one, len) == 3
-    assert memo.of(other, bytes.upper) == b"OTHER"
-    assert memo.of(other, len) == 5
+    made = Decoded()
+    one, other = (FLOODED.encode() + wire.filler(size) for size in (17, 400))
+    assert [made.of(frame, inner_frames) for frame in (one, other, one)] == [1, 2, 1]
+    assert made.of(other, lambda content: content.inner[0][0]) == wire.CHUNK.msgid
+
+
+def test_a_packet_is_decoded_once_whatever_was_decoded_in_between() -> None:
+    """A radio that hands over several frames at once gives all of them to one node before the next has its turn."""
+    made, found = Decoded(), []
+    batch = [FLOODED.encode() + wire.filler(size) for size in range(20, 30)]
+    for _ in range(3):
+        for frame in batch:
+            made.of(frame, found.append)
+    assert len(found) == len(batch)
+    for size in range(200, 300):
+        made.of(FLOODED.encode() + wire.filler(size), found.append)
+    made.of(batch[0], found.append)
+    assert len(found) == len(batch) + 100 + 1, "what is old is forgotten"
+
+
+def test_a_broken_packet_is_named_to_each_who_asks() -> None:
+    made, frame = Decoded(), FLOODED.encode() + wire.filler(20)[:-1]
+    for _ in range(2):
+        with pytest.raises(MalformedFrameError):
+            made.of(frame, inner_frames)

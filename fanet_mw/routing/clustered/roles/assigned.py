@@ -98,12 +98,12 @@ class AssignedRoles:
     def on_control(self, packet: Packet, src: NodeId, *, now_ns: int) -> bool:
         kind, ours = packet.header.kind, packet.header.origin == self._port.node
         if kind == Kind.JOIN:
-            join = decoded(packet, Join.decode_frame)
+            join = decoded(packet.frame, Join.decode_frame)
             self._on_join(packet, join, src, now_ns)
             # The join of a node that has a place only tells where it is, and need not be relayed by everyone.
             return bool(join.instead_of) or not self.parts.membership.lists(packet.header.origin)
         if kind == Kind.SCHEDULE and not ours:
-            self.parts.check.check(decoded(packet, Schedule.decode_frame), now_ns)
+            self.parts.check.check(decoded(packet.frame, Schedule.decode_frame), now_ns)
             self._on_schedule(packet, now_ns=now_ns)
         elif kind == Kind.LINKS and not ours and self.parts.links is not None:
             self._timetabling.on_links(packet, now_ns=now_ns)
@@ -114,7 +114,7 @@ class AssignedRoles:
         if join.node != header.origin or join.instead_of > self._port.scenario.nodes.count:
             raise MalformedFrameError(f"join of {join.node} instead of {join.instead_of} by {header.origin}")
         if self._leader is not None:
-            told = decoded(packet, Links.decode_frames) if parts.links is not None else None
+            told = decoded(packet.frame, Links.decode_frames) if parts.links is not None else None
             self._leader.joined(join, born_ns=born_ns, now_ns=now_ns)
             if told is not None:
                 self._leader.measured(NodeId(join.node), told.links)
@@ -127,7 +127,7 @@ class AssignedRoles:
 
     def _on_schedule(self, packet: Packet, *, now_ns: int) -> None:
         """An announcement of a leader, perhaps of this node."""
-        schedule, parts = decoded(packet, Schedule.decode_frame), self.parts
+        schedule, parts = decoded(packet.frame, Schedule.decode_frame), self.parts
         places = self._timetabling.read(packet, schedule)
         if schedule.leader != packet.header.origin:
             raise MalformedFrameError(f"schedule of {schedule.leader} by {packet.header.origin}")
@@ -151,7 +151,7 @@ class AssignedRoles:
     def on_impersonation(self, packet: Packet, *, now_ns: int) -> None:
         """A schedule in the leader's name: it announces a later one (as of link states in OSPF, RFC 2328, 13.4)."""
         if packet.header.kind == Kind.SCHEDULE and self._leader is not None:
-            schedule = decoded(packet, Schedule.decode_frame)
+            schedule = decoded(packet.frame, Schedule.decode_frame)
             self.parts.check.check(schedule, now_ns)
             if Authority(schedule.term, schedule.leader) == self.parts.lease.authority:
                 self._leader.outbid(schedule.epoch, now_ns=now_ns)

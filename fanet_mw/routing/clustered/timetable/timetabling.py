@@ -130,7 +130,7 @@ class FromPlaces:
     # --- at every node --------------------------------------------------------------------------------------------
 
     def read(self, packet: Packet, schedule: Schedule) -> Places | None:
-        return decoded(packet, Places.decode_frames) if schedule.members else None
+        return decoded(packet.frame, Places.decode_frames) if schedule.members else None
 
     def on_schedule(self, packet: Packet, schedule: Schedule, places: Places | None, *, now_ns: int) -> None:
         """Take in the places, and plan when all of an epoch have come."""
@@ -150,7 +150,7 @@ class FromPlaces:
 
     def on_links(self, packet: Packet, *, now_ns: int) -> None:
         """A part of the links of an assignment, which may come before the schedule does."""
-        told = decoded(packet, Links.decode_frames)
+        told = decoded(packet.frame, Links.decode_frames)
         if told is None or told.node != packet.header.origin:
             raise MalformedFrameError(f"links of an assignment by {packet.header.origin}")
         if any(max(link.a, link.b) > self._port.scenario.nodes.count for link in told.links):

@@ -27,10 +27,6 @@ class HostError(FanetError):
     """The root of the errors that hosts raise."""
 
 
-class LateError(HostError):
-    """Strict real time was asked for and the lateness went above its bound."""
-
-
 class BusError(HostError, ConnectionError):
     """The Zenoh session could not be opened, or was lost."""
 

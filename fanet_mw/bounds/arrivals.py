@@ -15,7 +15,6 @@ from itertools import count
 from math import lcm
 from typing import NamedTuple, Protocol
 
-from fanet_mw.bounds.slot import SlotServer
 from fanet_mw.errors import LocalProtocolError
 
 
@@ -70,17 +69,6 @@ class Periodic(NamedTuple):
     def repeat(self) -> tuple[int, int]:
         return self.jitter_ns, self.interval_ns
 
-    def delayed(self, *, least_ns: int, most_ns: int) -> "Periodic":
-        """The flow behind something that delays each packet by between least and most: its jitter grows."""
-        return Periodic(self.interval_ns, self.jitter_ns + most_ns - least_ns)
-
-
-def token_bucket(*, burst: int, interval_ns: int) -> Periodic:
-    """At most `burst` packets at once and one per interval in the long run: the staircase floor(burst + t/interval)."""
-    if burst < 1:
-        raise LocalProtocolError(f"burst = {burst} must be >= 1 packet")
-    return Periodic(interval_ns, (burst - 1) * interval_ns)
-
 
 class Total(NamedTuple):
     """The sum of several sources into one queue, in any phase to each other."""
@@ -104,42 +92,3 @@ class Total(NamedTuple):
             return None
         known = [pattern for pattern in found if pattern is not None]
         return max((onset for onset, _ in known), default=0), lcm(*(length for _, length in known))
-
-
-class Limited(NamedTuple):
-    """The output of the slot `through`, fed by `source`, each packet then delayed by up to `jitter_ns` more.
-
-    A slot lets at most k frames out per period whatever burst went in, so the lesser of both curves holds.
-    """
-
-    source: Arrivals
-    through: SlotServer
-    jitter_ns: int = 0
-
-    @property
-    def rate(self) -> Fraction:
-        return min(self.source.rate, Fraction(self.through.frames, self.through.period_ns))
-
-    @property
-    def burst(self) -> Fraction:
-        slot_rate = Fraction(self.through.frames, self.through.period_ns)
-        if self.source.rate <= slot_rate:
-            return self.source.burst
-        return self.slot_burst
-
-    @property
-    def slot_burst(self) -> Fraction:
-        """The largest n - rate * span(n) of the slot alone; it repeats every k, except that span(1) is 0."""
-        server = self.through
-        rate = Fraction(server.frames, server.period_ns)
-        return max(
-            n - rate * (server.least_span_ns(n) - self.jitter_ns if n > 1 else -self.jitter_ns)
-            for n in range(1, 3 * server.frames + 1)
-        )
-
-    def spans(self) -> Iterator[int]:
-        for n, span_ns in enumerate(self.source.spans(), start=1):
-            yield max(span_ns, self.through.least_span_ns(n) - self.jitter_ns)
-
-    def repeat(self) -> tuple[int, int] | None:
-        return None

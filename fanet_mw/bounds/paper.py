@@ -11,7 +11,6 @@ periodic. When C p_c > S p no Q exists: the equations give no number, so there i
 always C p_c = S p, so they accept any load, even a single packet that is longer than the period.
 """
 
-from collections.abc import Iterable
 from fractions import Fraction
 from math import ceil, floor
 from typing import Final
@@ -59,13 +58,3 @@ def cluster_estimate(
         if m * period_ns <= last * interval_ns:
             return Bounded(worst_ns)
     return Refused(f"Q in equation (3) lies beyond {_SLOTS_EXAMINED} slots")
-
-
-def path_estimate(clusters: Iterable[DelayBound]) -> DelayBound:
-    """Equation (1): the sum over the clusters on the path; refused if one of the clusters is."""
-    total_ns = 0
-    for outcome in clusters:
-        if isinstance(outcome, Refused):
-            return outcome
-        total_ns += outcome.delay_ns
-    return Bounded(total_ns)

@@ -1,4 +1,4 @@
-"""One slot per period that sends whole frames in FIFO order: the service that it guarantees, and the exact bound.
+"""One slot per period that sends whole frames in FIFO order: the service that it guarantees.
 
 |<------------- P ------------->|
 |   S   |                       |   S   |      a frame of airtime C starts only if it also ends within the slot
@@ -17,7 +17,6 @@ slot, loss, clock error (subtract the guard time from S).
 from fractions import Fraction
 from typing import NamedTuple, Protocol
 
-from fanet_mw.bounds.delay_bound import Bounded, DelayBound, Refused
 from fanet_mw.errors import LocalProtocolError
 
 
@@ -87,36 +86,3 @@ class SlotServer(NamedTuple):
             return 0
         turns, rest_ns = divmod(left_ns, self.period_ns)
         return turns * self.frames + min(self.frames, rest_ns // self.airtime_ns)
-
-    def least_span_ns(self, n: int) -> int:
-        """The least time from the end of one frame to the end of the (n-1)-th after it: how bursty the output is.
-
-        Up to k frames follow each other directly. More frames need several slots: the last frames of one slot, the
-        first of another, and whole slots in between.
-        """
-        slots = -(-n // self.frames)
-        if slots == 1:
-            return (n - 1) * self.airtime_ns
-        outer = n - (slots - 2) * self.frames
-        return (slots - 1) * self.period_ns - self.slot_ns + (outer - 1) * self.airtime_ns
-
-
-def single_slot_bound(server: SlotServer, *, interval_ns: int) -> DelayBound:
-    """The worst delay, from arrival to end of airtime, of packets that arrive every `interval_ns` = p in any phase.
-
-    It is the maximum over q of completion(q) - (q-1) p, for all q of the busy period (Davis et al. 2007, "Controller
-    Area Network (CAN) schedulability analysis: refuted, revisited and revised"). Stable iff k p >= P; then q and q + k
-    differ by P - k p <= 0, so q = 1..k hold the maximum; and p >= P/k >= C makes the terms fall from q = 1 on. What
-    remains is P - S + 2 C for every p. It is a supremum: arrivals 1 ns after the last start stay 1 ns below it.
-    """
-    server.check()
-    if interval_ns <= 0:
-        raise LocalProtocolError(f"interval_ns = {interval_ns} must be > 0")
-    if not server.frames:
-        return Refused(f"airtime {server.airtime_ns} ns > slot {server.slot_ns} ns: no frame ever fits")
-    if server.frames * interval_ns < server.period_ns:
-        return Refused(
-            f"unstable: {server.frames} frames fit a slot every {server.period_ns} ns, "
-            f"{server.period_ns / interval_ns:.3f} arrive (one every {interval_ns} ns)"
-        )
-    return Bounded(server.completion_ns(1))

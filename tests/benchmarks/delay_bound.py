@@ -10,24 +10,22 @@ from pathlib import Path
 from random import Random
 
 sys.path.append(str(Path(__file__).parents[1] / "property"))
+sys.path.append(str(Path(__file__).parents[1] / "validation"))
 
+from access_bound import ContendingTraffic, access_bound
+from single_slot_bound import single_slot_bound
 from slot_simulator import Slot, delays, network
+from tandem_bounds import Flow, Hop, path_bounds
 
 from fanet_mw.airtime import OVERHEAD_BYTES, frame_ns
 from fanet_mw.bounds import (
     Bounded,
-    ContendingTraffic,
     Dcf,
-    Flow,
-    Hop,
     Periodic,
     SlotServer,
     Total,
-    access_bound,
     delay_fifo,
     paper,
-    path_bounds,
-    single_slot_bound,
 )
 from fanet_mw.rng import stream
 from fanet_mw.units import MS, US

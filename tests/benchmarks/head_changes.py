@@ -8,7 +8,12 @@ minute is not counted. Received power falls with 30 log10 d. No losses: every he
 import math
 import statistics
 import sys
+from pathlib import Path
 from typing import NamedTuple
+
+sys.path.append(str(Path(__file__).parents[1] / "property"))
+
+from mobic import aggregate_mobility_db2, by_mobility
 
 from fanet_mw.graph.topology import within_range
 from fanet_mw.rng import stream
@@ -17,10 +22,8 @@ from fanet_mw.routing.clustered.clustering import (
     Maintenance,
     Swarm,
     Weights,
-    aggregate_mobility_db2,
     by_degree,
     by_id,
-    by_mobility,
     heads_of,
 )
 from fanet_mw.routing.clustered.clustering.election import Score

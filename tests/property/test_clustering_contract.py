@@ -5,13 +5,13 @@ import math
 import pytest
 from hypothesis import given
 from hypothesis import strategies as st
+from mobic import MOBIC, aggregate_mobility_db2, by_mobility
 
 from fanet_mw.graph.topology import symmetric, within_range
 from fanet_mw.rng import stream
 from fanet_mw.routing.clustered.clustering import (
     HIGHEST_DEGREE,
     LOWEST_ID,
-    MOBIC,
     AffinityPropagation,
     Balanced,
     Cluster,
@@ -21,10 +21,7 @@ from fanet_mw.routing.clustered.clustering import (
     Maintenance,
     Swarm,
     Weights,
-    aggregate_mobility_db2,
-    backup_head,
     by_id,
-    by_mobility,
     heads_of,
     link_lifetime_s,
 )
@@ -110,14 +107,6 @@ def test_heads_are_what_the_method_promises(name: str, swarm: Swarm) -> None:
 
 
 @given(swarms())
-def test_a_backup_is_a_member_but_not_the_head(swarm: Swarm) -> None:
-    for cluster in LOWEST_ID.divide(swarm):
-        backup = backup_head(cluster, swarm)
-        assert (backup is None) == (len(cluster.members) == 1)
-        assert backup is None or (backup in cluster.members and backup != cluster.head)
-
-
-@given(swarms())
 def test_heads_that_stand_and_do_not_meet_are_kept_by_infinite_hysteresis(swarm: Swarm) -> None:
     before = LOWEST_ID.divide(swarm._replace(previous=()))
     after = Elected(by_mobility, keep=math.inf).divide(swarm._replace(previous=before))
@@ -160,13 +149,6 @@ def test_a_head_is_kept_while_no_candidate_is_better_by_the_margin() -> None:
     mobility = {1: 1.0, 2: 3.0, 3: 9.0}
     assert heads_of(Elected(by_mobility, keep=2.5).divide(line(3, mobility=mobility, previous=before))) == (2,)
     assert heads_of(Elected(by_mobility, keep=1.5).divide(line(3, mobility=mobility, previous=before))) == (1, 3)
-
-
-def test_the_backup_is_the_member_that_hears_most_of_the_others() -> None:
-    swarm = line(5, spacing_m=120.0)
-    cluster = Cluster(NodeId(3), tuple(NodeId(n) for n in range(1, 6)))
-    assert backup_head(cluster, swarm) == 2
-    assert backup_head(Cluster(NodeId(3), (NodeId(3),)), swarm) is None
 
 
 def test_affinity_finds_the_middle_of_two_groups() -> None:

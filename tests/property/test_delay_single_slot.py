@@ -3,9 +3,10 @@
 import pytest
 from hypothesis import example, given, settings
 from hypothesis import strategies as st
+from single_slot_bound import single_slot_bound
 from slot_simulator import Slot, delays
 
-from fanet_mw.bounds import Bounded, Periodic, Refused, SlotServer, delay_fifo, paper, single_slot_bound
+from fanet_mw.bounds import Bounded, Periodic, Refused, SlotServer, delay_fifo, paper
 from fanet_mw.errors import LocalProtocolError
 from fanet_mw.units import seconds_to_ns
 
@@ -135,8 +136,3 @@ def test_with_the_paper_s_own_slot_the_estimate_is_one_period_whatever_the_load(
     """
     found = paper.cluster_estimate(airtime_ns=c, slot_ns=None, period_ns=period * p, interval_ns=p)
     assert found == Bounded(period * p)
-
-
-def test_the_path_is_the_sum_of_its_clusters() -> None:
-    assert paper.path_estimate([Bounded(3), Bounded(4)]) == Bounded(7)
-    assert paper.path_estimate([Bounded(3), Refused("no Q"), Bounded(4)]) == Refused("no Q")

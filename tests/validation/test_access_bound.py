@@ -1,10 +1,11 @@
 """The bound on access to the head, against the emulator: bursts of acknowledged unicasts from all members at once."""
 
 import pytest
+from access_bound import ContendingTraffic, access_bound
 from medium_driver import disc, medium, poses
 
 from fanet_mw.airtime import DETECT_NS, OVERHEAD_BYTES, airtime_ns
-from fanet_mw.bounds import Bounded, ContendingTraffic, Dcf, Refused, access_bound
+from fanet_mw.bounds import Bounded, Dcf, Refused
 from fanet_mw.bus.messages import TxOutcome, TxRequest, TxStatus
 from fanet_mw.bus.topics import Topics
 from fanet_mw.scenario import Radio

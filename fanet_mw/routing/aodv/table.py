@@ -104,6 +104,3 @@ class Table:
             route.seq = following(route.seq)
         route.active = False
         route.ends_ns = now_ns + DELETE_PERIOD_NS
-
-    def count_active(self, *, now_ns: int) -> int:
-        return sum(1 for destination in sorted(self._routes) if self.active(destination, now_ns=now_ns))

@@ -1,7 +1,7 @@
 """Who leads whom. One contract (`Clustering`), several methods; the leader uses the one that `clusters.method` names.
 
-`bisection` needs positions only; `election` ranks nodes (lowest-ID, highest degree, WCA, MOBIC, lasting degree) and
-keeps heads; `affinity` lets neighbors vote; `maintenance` carries clusters on over time.
+`bisection` needs positions only; `election` ranks nodes (lowest-ID, highest degree, WCA, lasting degree) and keeps
+heads; `affinity` lets neighbors vote; `maintenance` carries clusters on over time.
 """
 
 from fanet_mw.routing.clustered.clustering.affinity import AffinityPropagation
@@ -10,23 +10,19 @@ from fanet_mw.routing.clustered.clustering.contract import Cluster, Clustering, 
 from fanet_mw.routing.clustered.clustering.election import (
     HIGHEST_DEGREE,
     LOWEST_ID,
-    MOBIC,
     Elected,
     LastingDegree,
     Weights,
-    backup_head,
     by_degree,
     by_id,
-    by_mobility,
     succession,
 )
 from fanet_mw.routing.clustered.clustering.maintenance import Maintenance
-from fanet_mw.routing.clustered.clustering.mobility import aggregate_mobility_db2, link_lifetime_s
+from fanet_mw.routing.clustered.clustering.mobility import link_lifetime_s
 
 __all__ = [
     "HIGHEST_DEGREE",
     "LOWEST_ID",
-    "MOBIC",
     "AffinityPropagation",
     "Balanced",
     "Cluster",
@@ -37,12 +33,9 @@ __all__ = [
     "Promise",
     "Swarm",
     "Weights",
-    "aggregate_mobility_db2",
-    "backup_head",
     "balanced",
     "by_degree",
     "by_id",
-    "by_mobility",
     "heads_of",
     "link_lifetime_s",
     "succession",

@@ -6,7 +6,6 @@ alone (lower is better; equal scores: lower id):
     lowest-ID        Ephremides, Wieselthier & Baker 1987      the id
     highest degree   Gerla & Tsai 1995                         most neighbors
     WCA              Chatterjee, Das & Turgut 2002             w1 |d - d0| + w2 distances + w3 mobility + w4 energy used
-    MOBIC            Basu, Khan & Little 2001                  aggregate local mobility
     lasting degree   ours                                      neighbors, by how long they will be in range
 
 Hysteresis: a head that stands is counted `keep` better than its score. With infinity only a better head in range
@@ -36,11 +35,6 @@ def by_id(node: NodeId, swarm: Swarm) -> float:
 def by_degree(node: NodeId, swarm: Swarm) -> float:
     """Highest degree."""
     return -float(len(swarm.adjacency[node]))
-
-
-def by_mobility(node: NodeId, swarm: Swarm) -> float:
-    """MOBIC."""
-    return swarm.mobility.get(node, 0.0)
 
 
 class Weights(NamedTuple):
@@ -103,7 +97,6 @@ class Elected(NamedTuple):
 
 LOWEST_ID: Final = Elected(by_id)
 HIGHEST_DEGREE: Final = Elected(by_degree)
-MOBIC: Final = Elected(by_mobility)
 
 
 def _elect(adjacency: Adjacency, ranks: Mapping[NodeId, tuple[float, float]], truce: Collection[Pair]) -> list[NodeId]:
@@ -139,14 +132,3 @@ def succession(cluster: Cluster, swarm: Swarm) -> tuple[NodeId, ...]:
         return node not in near, -sum(1 for n in swarm.adjacency[node] if n in inside), node
 
     return (cluster.head, *sorted((node for node in cluster.members if node != cluster.head), key=rank))
-
-
-def backup_head(cluster: Cluster, swarm: Swarm, score: Score = by_id) -> NodeId | None:
-    """Who takes over when the head dies: the member that hears most of the others; by score, then id, when equal."""
-    others = [node for node in cluster.members if node != cluster.head]
-    inside = frozenset(others)
-
-    def rank(node: NodeId) -> tuple[int, float, NodeId]:
-        return -sum(1 for n in swarm.adjacency[node] if n in inside), score(node, swarm), node
-
-    return min(others, key=rank, default=None)

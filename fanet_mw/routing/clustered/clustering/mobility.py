@@ -1,20 +1,9 @@
-"""How nodes move relative to each other: what MOBIC hears in received powers, and how long a link will last."""
+"""How nodes move relative to each other: how long a link will last."""
 
 import math
-from collections.abc import Iterable
 
 from fanet_mw.routing.clustered.clustering.contract import Swarm
 from fanet_mw.units import Enu, NodeId
-
-
-def aggregate_mobility_db2(powers_dbm: Iterable[tuple[float, float]]) -> float:
-    """MOBIC's M of one node [dB^2]: the mean square of the relative mobility to each neighbor (Basu et al. 2001).
-
-    Each pair is (previous, new) received power of two successive hellos of one neighbor. Their ratio, new - previous
-    in dB, is positive when it comes nearer. Mean square and not variance: the deviation is from 0, from not moving.
-    """
-    squares = [(new - old) ** 2 for old, new in powers_dbm]
-    return math.fsum(squares) / len(squares) if squares else 0.0
 
 
 def link_lifetime_s(swarm: Swarm, a: NodeId, b: NodeId, *, range_m: float) -> float:

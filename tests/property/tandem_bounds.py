@@ -12,11 +12,12 @@ there is no bound.
 Assumed: FIFO at each head; all frames of a slot have its airtime; no loss and no retransmission.
 """
 
-from collections.abc import Mapping, Sequence
+from collections.abc import Iterator, Mapping, Sequence
+from fractions import Fraction
 from itertools import pairwise
 from typing import Final, NamedTuple
 
-from fanet_mw.bounds.arrivals import Arrivals, Limited, Periodic, Total
+from fanet_mw.bounds.arrivals import Arrivals, Periodic, Total
 from fanet_mw.bounds.delay_bound import Bounded, DelayBound, Refused
 from fanet_mw.bounds.network import backlog, delay_fifo
 from fanet_mw.bounds.slot import SlotServer
@@ -25,6 +26,58 @@ from fanet_mw.errors import LocalProtocolError
 _ROUNDS: Final = 500
 _HOPELESS_NS: Final = 86_400 * 10**9
 """A jitter of a day counts as divergence."""
+
+
+def least_span_ns(server: SlotServer, n: int) -> int:
+    """The least time from the end of one frame to the end of the (n-1)-th after it: how bursty the output is.
+
+    Up to k frames follow each other directly. More frames need several slots: the last frames of one slot, the
+    first of another, and whole slots in between.
+    """
+    slots = -(-n // server.frames)
+    if slots == 1:
+        return (n - 1) * server.airtime_ns
+    outer = n - (slots - 2) * server.frames
+    return (slots - 1) * server.period_ns - server.slot_ns + (outer - 1) * server.airtime_ns
+
+
+class Limited(NamedTuple):
+    """The output of the slot `through`, fed by `source`, each packet then delayed by up to `jitter_ns` more.
+
+    A slot lets at most k frames out per period whatever burst went in, so the lesser of both curves holds.
+    """
+
+    source: Arrivals
+    through: SlotServer
+    jitter_ns: int = 0
+
+    @property
+    def rate(self) -> Fraction:
+        return min(self.source.rate, Fraction(self.through.frames, self.through.period_ns))
+
+    @property
+    def burst(self) -> Fraction:
+        slot_rate = Fraction(self.through.frames, self.through.period_ns)
+        if self.source.rate <= slot_rate:
+            return self.source.burst
+        return self.slot_burst
+
+    @property
+    def slot_burst(self) -> Fraction:
+        """The largest n - rate * span(n) of the slot alone; it repeats every k, except that span(1) is 0."""
+        server = self.through
+        rate = Fraction(server.frames, server.period_ns)
+        return max(
+            n - rate * (least_span_ns(server, n) - self.jitter_ns if n > 1 else -self.jitter_ns)
+            for n in range(1, 3 * server.frames + 1)
+        )
+
+    def spans(self) -> Iterator[int]:
+        for n, span_ns in enumerate(self.source.spans(), start=1):
+            yield max(span_ns, least_span_ns(self.through, n) - self.jitter_ns)
+
+    def repeat(self) -> tuple[int, int] | None:
+        return None
 
 
 class Hop(NamedTuple):
@@ -92,9 +145,8 @@ def _inputs(flows: Sequence[Flow], hops: Mapping[int, Hop], delays: Mapping[int,
             if isinstance(delay, Refused):
                 break
             hop = hops[here]
-            at = at.delayed(
-                least_ns=hop.server.airtime_ns + hop.relay_least_ns, most_ns=delay.delay_ns + hop.relay_most_ns
-            )
+            least_ns, most_ns = hop.server.airtime_ns + hop.relay_least_ns, delay.delay_ns + hop.relay_most_ns
+            at = Periodic(at.interval_ns, at.jitter_ns + most_ns - least_ns)
             relayed[following].setdefault(here, []).append(at)
     inputs: dict[int, Arrivals] = {}
     for name in hops:

@@ -12,7 +12,7 @@ from agents.mission.paper_rule import PaperRule
 from agents.mission.searcher import Searcher
 from fanet_mw import mavlink
 from fanet_mw.application import Application, AppPort, Course, Received, SensorReading
-from fanet_mw.bus.messages import Altimeter, Camera, Gps, Radar, WifiScan
+from fanet_mw.bus.messages import Altimeter, Battery, Camera, Gps, Radar, Voice, WifiScan
 from fanet_mw.errors import MalformedFrameError
 from fanet_mw.node.arrival import decoded, packet_of
 from fanet_mw.scenario import Scenario
@@ -116,6 +116,11 @@ class PlannedSearch(Application):
             self._searcher.camera(people, now_ns=now_ns)
         elif isinstance(reading, Altimeter):
             self._searcher.altimeter(reading.above_ground_m, now_ns=now_ns)
+        elif isinstance(reading, Voice):
+            calls = [(call.bearing_rad, call.elevation_rad, call.snr_db) for call in reading.calls]
+            self._searcher.voice(calls, now_ns=now_ns)
+        elif isinstance(reading, Battery):
+            self._searcher.battery(reading.charge, now_ns=now_ns)
         elif isinstance(reading, Radar):
             self._searcher.radar(reading.echoes, now_ns=now_ns)
         self._settle()

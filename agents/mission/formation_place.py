@@ -46,6 +46,10 @@ class FormationPlace:
         if first:
             self._left_from, self._left_ns = self._navigation.position, max(now_ns, plan.start_us * US)
 
+    def leave(self) -> None:
+        """Hold no place any more, whatever the plan says yet."""
+        self.place = None
+
     # --- where the plan wants us ----------------------------------------------------------------------------------
 
     @property

@@ -17,8 +17,9 @@ from agents.mission.announcing import Announcing
 from agents.mission.approach import Approach
 from agents.mission.chart import Chart
 from agents.mission.finds import Finds, ground_place
-from agents.mission.formation_place import FormationPlace
+from agents.mission.formation_place import STILL, FormationPlace
 from agents.mission.goal import Goal
+from agents.mission.homeward import Homeward
 from agents.mission.motion import Motion, Navigation, Neighbors
 from agents.mission.obstacles import Obstacles
 from agents.mission.outbox import Outbox, Packet, ReportFormat
@@ -31,7 +32,7 @@ from agents.mission.tasks import Tasks
 from fanet_mw.bus.messages import Echo
 from fanet_mw.rng import stream
 from fanet_mw.scenario import Scenario
-from fanet_mw.trace import Detected, Planned
+from fanet_mw.trace import Detected, MissionModeChanged, Planned, Sighted
 from fanet_mw.units import MAX_NODES, US, Enu, NodeId, S, seconds_to_ns
 from fanet_mw.wire.inner import Survivor
 from fanet_mw.wire.search import Bids, Found, Search, Status, Told, encode_bids
@@ -87,6 +88,13 @@ class Searcher:
             ],
             soft=[InReach(navigation, neighbors, place, reach_m=reach_m)],
         )
+        self._homeward = Homeward(
+            position, navigation, outbox,
+            speed_m_s=speed_m_s, height_m=scenario.nodes.altitude_m, reserve=mission.reserve_charge,
+        )  # fmt: skip
+        self._voice_rad = math.radians(scenario.sensors.voice_sigma_deg)
+        self._mode: tuple[str, int] | None = None
+        """What we do, and for which survivor, as the trace has it."""
         self.velocity: Enu | None = None
         """A new velocity to fly, for the host to take."""
         self._scan_ns = 0
@@ -118,16 +126,44 @@ class Searcher:
         for survivor in self._finds.open():
             self._confirm(survivor, now_ns)
         self._announcing.tell(self._tasks.survivor, now_ns)
-        self._tasks.bid(now_ns)
-        self._tasks.choose(now_ns)
+        if not self._homeward.leaves:
+            self._tasks.bid(now_ns)
+            self._tasks.choose(now_ns)
+        self._record_mode(now_ns)
+
+    def _record_mode(self, now_ns: int) -> None:
+        """Write into the trace what we do, when that has changed."""
+        survivor = self._tasks.survivor or 0
+        mode = (
+            "land" if self._homeward.lands
+            else "return" if self._homeward.leaves
+            else "respond" if survivor
+            else "search" if self._formation.is_taken_up(now_ns)
+            else "deploy" if self._formation.place is not None
+            else "wait"
+        )  # fmt: skip
+        if self._mode != (mode, survivor):
+            self._mode = mode, survivor
+            self._outbox.records.append(MissionModeChanged(now_ns, self._node, mode, survivor))
 
     # --- our own sensors ------------------------------------------------------------------------------------------
 
     def fix(self, position: Enu, velocity: Enu, *, now_ns: int) -> None:
         """A position fix: where we are, and then how to fly on."""
         self._navigation.fix(position, velocity, now_ns=now_ns)
-        goal, feed = self._goal.at(self._tasks.survivor, now_ns)
-        self.velocity = self._steering.velocity(goal, feed, now_ns)
+        if self._homeward.leaves:
+            goal, feed = self._homeward.goal(), STILL
+        else:
+            goal, feed = self._goal.at(self._tasks.survivor, now_ns)
+        self.velocity = None if self._homeward.lands else self._steering.velocity(goal, feed, now_ns)
+
+    def battery(self, charge: float, *, now_ns: int) -> None:
+        """The battery says what is left; who has to leave hands its place and its task on at once."""
+        if self._homeward.battery(charge, now_ns=now_ns):
+            self._tasks.hand_on(now_ns)
+            self._formation.leave()
+            self._say_status(now_ns)
+            self._record_mode(now_ns)
 
     def scan(self, heard: Sequence[tuple[int, float]], *, now_ns: int) -> None:
         """Our own receiver hears these phones, and no others."""
@@ -161,16 +197,29 @@ class Searcher:
 
     def camera(self, people: Sequence[tuple[float, float]], *, now_ns: int) -> None:
         """Our camera shows people at these bearings and elevations [rad]."""
-        for bearing_rad, elevation_rad in people:
-            here = self._navigation.position._replace(up=self._navigation.height_m(now_ns))
-            looked = ground_place(here, bearing_rad=bearing_rad, elevation_rad=elevation_rad)
-            if looked is None or looked[2] > 2 * _CLOSE_M:
-                continue
-            sigma_m = max(1.0, _ANGLE_RAD * looked[2] * looked[2] / max(1.0, here.up))
-            at = Enu(looked[0], looked[1], 0.0)
-            survivor = self._finds.seen(at, by=here, sigma_m=sigma_m, now_ns=now_ns)
-            if survivor is not None and looked[2] <= _CLOSE_M:
-                self._confirm(survivor, now_ns)
+        for direction in people:
+            self._notice("camera", direction, sigma_rad=_ANGLE_RAD, now_ns=now_ns)
+
+    def voice(self, calls: Sequence[tuple[float, float, float]], *, now_ns: int) -> None:
+        """Our microphones make out calls at these bearings and elevations [rad], so far above noise [dB]."""
+        for bearing_rad, elevation_rad, snr_db in calls:
+            sigma_rad = max(_ANGLE_RAD, self._voice_rad * math.pow(10.0, -snr_db / 20))
+            self._notice("voice", (bearing_rad, elevation_rad), sigma_rad=sigma_rad, now_ns=now_ns)
+
+    def _notice(self, sensor: str, direction: tuple[float, float], *, sigma_rad: float, now_ns: int) -> None:
+        """A sensor that names nobody has noticed somebody on the ground."""
+        here = self._navigation.position._replace(up=self._navigation.height_m(now_ns))
+        looked = ground_place(here, bearing_rad=direction[0], elevation_rad=direction[1])
+        if looked is None or looked[2] > 2 * _CLOSE_M:
+            return
+        sigma_m = max(1.0, sigma_rad * looked[2] * looked[2] / max(1.0, here.up))
+        at = Enu(looked[0], looked[1], 0.0)
+        survivor = self._finds.seen(at, by=here, sigma_m=sigma_m, now_ns=now_ns)
+        self._outbox.records.append(
+            Sighted(now_ns, self._node, sensor, survivor or 0, round(at.east, 2), round(at.north, 2))
+        )
+        if survivor is not None and looked[2] <= _CLOSE_M:
+            self._confirm(survivor, now_ns)
 
     # --- what others tell -----------------------------------------------------------------------------------------
 
@@ -213,7 +262,9 @@ class Searcher:
 
     def _say_status(self, now_ns: int) -> None:
         plan = self._planner.plan
-        status = Status(now_ns // US, self._navigation.position, self._node, plan.revision if plan else 0, 100)
+        status = Status(
+            now_ns // US, self._navigation.position, self._node, plan.revision if plan else 0, self._homeward.percent
+        )
         self._planner.status(status, now_ns=now_ns)
         self._outbox.packets.append(Packet(status.encode_frame(self._node)))
         self._next_status_ns = now_ns + round((0.8 + 0.4 * self._random()) * STATUS_S * S)
@@ -226,6 +277,8 @@ class Searcher:
         plan = self._planner.plan
         assert plan is not None, "there is a plan to adopt"
         self._formation.adopt(plan, now_ns)
+        if self._homeward.leaves:
+            self._formation.leave()
         place = self._formation.place
         self._outbox.records.append(Planned(now_ns, self._node, plan.revision, -1 if place is None else place))
 

@@ -79,6 +79,12 @@ class Tasks:
             self.survivor = None
             self.choose(now_ns)
 
+    def hand_on(self, now_ns: int) -> None:
+        """Take all our bids back: whoever is next best goes instead of us."""
+        for survivor in self._finds.open():
+            self._auction.withdraw(survivor, now_ns=now_ns)
+        self.survivor = None
+
     def bid(self, now_ns: int) -> None:
         """Bid where we would be among the best."""
         if self._formation.pattern is None:

@@ -1,0 +1,53 @@
+"""When a UAV gives its part in the mission up, and how it comes home: above the others, then straight down."""
+
+import math
+from typing import Final
+
+from agents.mission.endurance import Endurance
+from agents.mission.motion import Navigation
+from agents.mission.outbox import Outbox
+from fanet_mw.application import Course
+from fanet_mw.units import Enu
+
+_HIGHER_M: Final = 18.0
+"""Who flies home does so above lanes, relays and followers."""
+_HOME_M: Final = 4.0
+_LAND_M_S: Final = 1.5
+
+
+class Homeward:
+    """One UAV's."""
+
+    def __init__(
+        self, home: Enu, navigation: Navigation, outbox: Outbox, *, speed_m_s: float, height_m: float, reserve: float
+    ) -> None:
+        """`height_m`: of the lanes, over the ground; `reserve`: the share of the charge to land with."""
+        self._home = home._replace(up=height_m + _HIGHER_M)
+        self._navigation, self._outbox = navigation, outbox
+        self._endurance = Endurance(home, speed_m_s=speed_m_s, reserve=reserve)
+        self.leaves = False
+        """True from when it flies home."""
+        self.lands = False
+
+    def battery(self, charge: float, *, now_ns: int) -> bool:
+        """A reading of the battery; True when it is time to leave."""
+        self._endurance.read(charge, now_ns=now_ns)
+        if self.leaves or self._endurance.margin(self._navigation.position) > 0.0:
+            return False
+        self.leaves = True
+        return True
+
+    @property
+    def percent(self) -> int:
+        """What may be spent of the battery yet, as a status tells it: 0 only for who flies home."""
+        if self.leaves:
+            return 0
+        return max(1, round(100 * self._endurance.margin(self._navigation.position)))
+
+    def goal(self) -> Enu:
+        """Where to fly; once we are there, we land."""
+        here = self._navigation.position
+        if not self.lands and math.hypot(here.east - self._home.east, here.north - self._home.north) <= _HOME_M:
+            self.lands = True
+            self._outbox.course = Course(here, _LAND_M_S, land=True)
+        return self._home

@@ -1,0 +1,168 @@
+"""What one UAV of a planned search does with its battery, its tasks and its other sensors: timelines."""
+
+import math
+from collections.abc import Callable
+
+import pytest
+
+from agents.mission.chart import NO_CHART
+from agents.mission.motion import Motion
+from agents.mission.outbox import Outbox
+from agents.mission.searcher import Searcher, formation
+from fanet_mw.bus.messages import Echo
+from fanet_mw.scenario import Scenario
+from fanet_mw.trace import Confirmed, MissionModeChanged, Sighted
+from fanet_mw.units import MS, US, Enu, NodeId, S
+from fanet_mw.wire import HEADER_BYTES
+from fanet_mw.wire.inner import Survivor
+from fanet_mw.wire.search import Bid, Bids, Search, Status, Told, told_in
+
+HOME = Enu(0.0, -100.0, 65.0)
+STILL = Enu(0.0, 0.0, 0.0)
+
+
+class Flight:
+    """A searcher, its clock, and what it has told and recorded."""
+
+    def __init__(self, make_scenario: Callable[..., Scenario], node: int = 7) -> None:
+        keys = {
+            "nodes.count": 20, "nodes.altitude_m": 65, "mission.survivors": 3, "mission.search": "lines",
+            "mobility.model": "onboard", "world.area_m": 1000, "radio.range_m": 250, "sensors.battery_hz": 1,
+            "sensors.camera_hz": 2,
+        }  # fmt: skip
+        scenario = make_scenario(**keys)
+        self.outbox = Outbox()
+        self.searcher = Searcher(scenario, NodeId(node), position=HOME, outbox=self.outbox, chart=NO_CHART)
+        self.searcher.start(0)
+        self.at, self.now_ns = HOME, 0
+        pattern = formation(scenario, 20)
+        assert pattern is not None
+        self.plan = Search(
+            S // US, pattern.half_width_m, pattern.first_m, pattern.last_m, 65.0, 7.5, 100, 1, 1,
+            tuple(range(1, 21)), pattern.lanes, pattern.relays, pattern.followers,
+        )  # fmt: skip
+        self.searcher.told(self.plan, now_ns=0)
+
+    def fly(self, seconds: float, *, charge: Callable[[float], float] | None = None) -> None:
+        """Fly as it wants to; `charge` is what its battery says, by the second."""
+        until_ns = self.now_ns + round(seconds * S)
+        while self.now_ns < until_ns:
+            self.now_ns += 200 * MS
+            velocity = self.searcher.velocity or STILL
+            self.at = Enu(
+                self.at.east + 0.2 * velocity.east, self.at.north + 0.2 * velocity.north, self.at.up + 0.2 * velocity.up
+            )
+            self.searcher.fix(self.at, velocity, now_ns=self.now_ns)
+            if charge is not None and self.now_ns % S == 0:
+                self.searcher.battery(charge(self.now_ns / S), now_ns=self.now_ns)
+            self.searcher.wake(self.now_ns)
+
+    @property
+    def told(self) -> list[Told]:
+        return [message for packet in self.outbox.packets for message in told_in(bytes(HEADER_BYTES) + packet.frames)]
+
+    @property
+    def modes(self) -> list[str]:
+        return [r.mode for r in self.outbox.records if isinstance(r, MissionModeChanged)]
+
+
+def test_who_has_just_enough_left_says_so_flies_home_and_lands(make_scenario: Callable[..., Scenario]) -> None:
+    flight = Flight(make_scenario)
+    flight.fly(60, charge=lambda t_s: 0.9 - 0.001 * t_s)
+    assert flight.modes == ["deploy", "search"]
+    away_m = math.hypot(flight.at.east - HOME.east, flight.at.north - HOME.north)
+    assert away_m > 100
+    flight.fly(60, charge=lambda t_s: 0.30 - 0.001 * t_s)
+    assert flight.modes == ["deploy", "search", "return", "land"]
+    assert math.hypot(flight.at.east - HOME.east, flight.at.north - HOME.north) < 5
+    course = flight.outbox.course
+    assert course is not None
+    assert course.land
+    charges = [message.charge for message in flight.told if isinstance(message, Status)]
+    assert min(charges[:3]) > 50
+    assert charges[-1] == 0
+
+
+def test_who_flies_home_takes_its_bids_back_so_that_another_goes(make_scenario: Callable[..., Scenario]) -> None:
+    flight = Flight(make_scenario, node=20)  # a follower
+    other = Flight(make_scenario, node=19)
+    for each in (flight, other):
+        each.fly(20, charge=lambda _: 0.9)
+        for reporter in (1, 2, 3):
+            place = Enu(flight.at.east + 60 * reporter - 120, flight.at.north + 30.0 * (reporter % 2), 65.0)
+            each.searcher.told(Survivor(each.now_ns // US, 1, reporter, place, -75.0), now_ns=each.now_ns)
+    flight.fly(3, charge=lambda _: 0.9)
+    assert flight.modes[-1] == "respond"
+    flight.fly(1, charge=lambda _: 0.1)
+    assert flight.modes[-1] == "return"
+    bids = [
+        m for m in told_in(bytes(HEADER_BYTES) + flight.searcher.hello_frames(flight.now_ns)) if isinstance(m, Bids)
+    ]
+    (bid,) = [bid for message in bids for bid in message.bids if bid.bidder == 20]
+    assert bid.eta_ds == 0xFFFF, "it is withdrawn"
+
+
+def test_a_responder_that_falls_silent_is_replaced(make_scenario: Callable[..., Scenario]) -> None:
+    flight = Flight(make_scenario, node=20)
+    flight.fly(20)
+    now_ns = flight.now_ns
+    for reporter in (1, 2, 3):
+        place = Enu(flight.at.east + 60 * reporter - 120, flight.at.north + 30.0 * (reporter % 2), 65.0)
+        flight.searcher.told(Survivor(now_ns // US, 1, reporter, place, -75.0), now_ns=now_ns)
+    flight.searcher.told(Bids((Bid(1, 2, 1, 1), Bid(1, 3, 1, 1), Bid(1, 4, 1, 1, 9))), now_ns=now_ns)
+    flight.fly(5)
+    assert flight.modes[-1] == "search", "three others are nearer"
+    for second in range(6, 10):  # two of them go on saying so
+        flight.searcher.told(Bids(tuple(Bid(1, bidder, 1, 1) for bidder in (2, 3))), now_ns=now_ns + second * S)
+        flight.fly(1)
+    assert flight.modes[-1] == "respond"
+
+
+@pytest.mark.parametrize("sensor", ["camera", "voice"])
+def test_somebody_who_is_seen_or_heard_at_close_range_is_confirmed(
+    make_scenario: Callable[..., Scenario], sensor: str
+) -> None:
+    flight = Flight(make_scenario, node=20)
+    flight.fly(12)
+    victim = flight.at
+    for step in range(12):
+        around = Enu(victim.east + 60 * math.cos(step), victim.north + 60 * math.sin(step), 65.0)
+        slant = math.hypot(60, 65)
+        report = Survivor(flight.now_ns // US, 2, 1 + step % 4, around, 15 - 40.05 - 30 * math.log10(slant))
+        flight.searcher.told(report, now_ns=flight.now_ns)
+    for _ in range(30):
+        here = flight.at
+        flight.searcher.scan(
+            [(2, 15 - 40.05 - 30 * math.log10(here.minus(victim._replace(up=0)).norm()))], now_ns=flight.now_ns
+        )
+        east, north = victim.east - here.east, victim.north - here.north
+        bearing, elevation = math.atan2(east, north), -math.atan2(here.up, math.hypot(east, north))
+        if sensor == "camera":
+            flight.searcher.camera([(bearing, elevation)], now_ns=flight.now_ns)
+        else:
+            flight.searcher.voice([(bearing, elevation, 20.0)], now_ns=flight.now_ns)
+        flight.fly(1)
+    found = [r for r in flight.outbox.records if isinstance(r, Confirmed)]
+    assert [r.survivor for r in found] == [2]
+    assert math.hypot(found[0].east_m - victim.east, found[0].north_m - victim.north) < 3
+    assert {r.sensor for r in flight.outbox.records if isinstance(r, Sighted)} == {sensor}
+
+
+def test_a_neighbor_that_is_only_seen_by_radar_is_avoided_too(make_scenario: Callable[..., Scenario]) -> None:
+    heard, seen, alone = (Flight(make_scenario) for _ in range(3))
+    for flight in (heard, seen, alone):
+        flight.fly(4)
+    velocity = heard.searcher.velocity or STILL
+    speed = math.hypot(velocity.east, velocity.north)
+    assert speed > 1
+    ahead = Enu(velocity.east / speed, velocity.north / speed, 0.0)
+    other = Enu(heard.at.east + 50 * ahead.east, heard.at.north + 50 * ahead.north, heard.at.up)
+    back = Enu(-8 * ahead.east, -8 * ahead.north, 0.0)
+    heard.searcher.hello(3, Motion(other, back, heard.now_ns), now_ns=heard.now_ns)
+    echo = Echo(50.0, math.atan2(ahead.east, ahead.north) % (2 * math.pi), 0.0, speed + 8, 15.0)
+    seen.searcher.radar([echo], now_ns=seen.now_ns)
+    for flight in (heard, seen, alone):
+        flight.fly(0.4)
+    flown = [flight.searcher.velocity or STILL for flight in (heard, seen, alone)]
+    assert flown[0].minus(flown[2]).norm() > 0.5
+    assert flown[1].minus(flown[2]).norm() > 0.5

@@ -19,20 +19,14 @@ from fanet_mw import wire
 from fanet_mw.actor import Actor
 from fanet_mw.application import Application
 from fanet_mw.bus.messages import (
-    Altimeter,
-    Battery,
-    Camera,
     Gps,
-    Inertial,
     MavlinkTap,
     Message,
-    Radar,
     Reception,
+    SensorReading,
     Setpoint,
     TxRequest,
     TxStatus,
-    Voice,
-    WifiScan,
 )
 from fanet_mw.node.node import AnnouncedHello
 from fanet_mw.scenario import Scenario
@@ -201,7 +195,7 @@ class ClockedUav(Actor):
             return message._replace(end_ns=self._time.line.swarm_ns(ended_ns))
         if isinstance(message, Gps):
             self._time.fix(self._stamped_ns(message.t_ns), message.t_ns)
-        if isinstance(message, Gps | WifiScan | Camera | Voice | Radar | Altimeter | Inertial | Battery):
+        if isinstance(message, Gps | SensorReading):
             return message._replace(t_ns=self._time.line.swarm_ns(self._stamped_ns(message.t_ns)))
         return message
 

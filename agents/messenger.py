@@ -3,18 +3,19 @@
     plain MAVLink frames to one node or all         -> one packet, as it is
     bytes, a set of nodes, or to be confirmed       -> pieces, receipts (`fanet_mw.delivery`)
 
-The sender is told of everything that its `follows` names. What is told waits until the input that caused it has been
-handled, so that no application is called while it calls.
+What becomes of them is told in `statuses.py`.
 """
 
-from collections import Counter, deque
-from collections.abc import Callable, Collection, Mapping
+from collections import Counter
+from collections.abc import Mapping, Sequence
 from typing import Any, Final, NamedTuple
 
+from agents.listeners import Listeners
+from agents.statuses import Statuses
 from fanet_mw import wire
 from fanet_mw.application import Application, Data, Destination, Fate, Received, Status
 from fanet_mw.delivery.receiver import Receiver, Whole
-from fanet_mw.delivery.sender import EXPIRED, Packet, Sender
+from fanet_mw.delivery.sender import Packet, Sender
 from fanet_mw.errors import DropReason, LocalProtocolError
 from fanet_mw.node.node import Node
 from fanet_mw.node.packet import Packet as RoutedPacket
@@ -22,10 +23,8 @@ from fanet_mw.node.plausible import CONTROL, RESTART_STEP_NS
 from fanet_mw.rng import stream
 from fanet_mw.units import BROADCAST, MAX_NODES, MS, US, NodeId, S, earliest, seconds_to_ns
 from fanet_mw.wire.message import (
-    DELIVERED,
     MAVLINK_PORT,
     MOST_LIFETIME_MS,
-    NO_LISTENER,
     RECEIPT_BYTES,
     Piece,
     decode_piece,
@@ -33,26 +32,26 @@ from fanet_mw.wire.message import (
     encode_receipts,
 )
 
-_MOST_WATCHED: Final = 8192
-"""Packets of which is remembered whose they are."""
 _MOST_PORT: Final = 0xFFFF
 _RECEIPT_APP: Final = "receipt"
 
 
-class _Watched(NamedTuple):
-    """Whose packet it is, and what the node is to be asked about it."""
+class Submission(NamedTuple):
+    """What an application hands over to be sent (`AppPort.send`)."""
 
-    application: Application
-    handle: int
-    first: bool
-    confirmed: bool
+    content: bytes | Data
+    destination: Destination
+    priority: int
+    confirm: bool
+    lifetime_ns: int | None
+    deadline_ns: int | None
+    born_ns: int
 
 
 class Messenger:
     """The messages of one node's applications."""
 
-    def __init__(self, node: Node, listeners: Callable[[int, int], Collection[Application]]) -> None:
-        """`listeners`: who listens, by port and MAVLink message id."""
+    def __init__(self, node: Node, listeners: Listeners) -> None:
         scenario = node.scenario
         clustered = scenario.routing.protocol == "clustered"
         wait_ns = S + (2 * seconds_to_ns(scenario.clusters.flooding_period_s) if clustered else 0)
@@ -63,65 +62,53 @@ class Messenger:
         self._receiver = Receiver(node.node, self._has_listener, random=stream(scenario.seed, "receipts", node.node))
         self._in_time_ns: int | None = None
         """When the last message with a deadline was taken."""
-        self._owners: dict[int, Application] = {}
-        """By handle: who sent a message that is to be confirmed."""
-        self._watched: dict[int, _Watched] = {}
-        """By sequence number."""
-        self._statuses: deque[tuple[Application, Status]] = deque()
-        self.counts: Counter[str] = Counter()
-        """What became of messages in pieces, by fate, and how many were sent and handed over."""
+        self._statuses = Statuses(node)
+        self._counts: Counter[str] = Counter()
+        """How many messages in pieces were sent and handed over."""
 
     def start(self, now_ns: int) -> None:
         self._sender.start(CONTROL | now_ns // RESTART_STEP_NS % CONTROL)
 
     # --- out ------------------------------------------------------------------------------------------------------
 
-    def send(
-        self,
-        application: Application,
-        content: bytes | Data,
-        *,
-        destination: Destination,
-        priority: int,
-        confirm: bool,
-        lifetime_ns: int | None,
-        deadline_ns: int | None,
-        born_ns: int,
-        now_ns: int,
-    ) -> int:
+    def send(self, application: Application, submission: Submission, *, now_ns: int) -> int:
+        """Send what an application has handed over; returns the handle that statuses name."""
+        content, destination, priority, confirm, lifetime_ns, deadline_ns, born_ns = submission
         port, data = (MAVLINK_PORT, content) if isinstance(content, bytes) else content
         to, targets = self._whom(destination)
         plain = isinstance(content, bytes) and not confirm and not targets and lifetime_ns is None
         named = 0 if len(targets) < 2 else len(targets)
         if not plain:
             self._check(content, port, data, named)
+        if confirm and self._sender.full:
+            return self._refused(application, DropReason.QUEUE_FULL, now_ns)
         if deadline_ns is not None:
             in_time, interval_ns = self._judge(deadline_ns, born_ns)
             if not in_time:
                 return self._refused(application, DropReason.ADMISSION, now_ns, interval_ns=interval_ns)
         if plain:
             return self._plain(application, data, to, priority=priority, born_ns=born_ns, now_ns=now_ns)
-        self.counts["sent"] += 1
+        self._counts["sent"] += 1
         own_ns = self._node.scenario.routing.lifetime_ns(priority) if lifetime_ns is None else lifetime_ns
         lifetime_ms, born_us = max(1, min(MOST_LIFETIME_MS, own_ns // MS)), born_ns // US
-        if not confirm:
+        packets: Sequence[Packet] = ()
+        if confirm:
+            everyone = to == BROADCAST and not targets
+            handle = self._sender.confirmed(
+                data, port=port, targets=None if everyone else targets or (to,), priority=priority, born_us=born_us,
+                lifetime_ms=lifetime_ms,
+            )  # fmt: skip
+            self._statuses.own(handle, application)
+        else:
             handle, packets = self._sender.unconfirmed(
                 data, port=port, destination=to, targets=targets if named else (), priority=priority,
                 born_us=born_us, lifetime_ms=lifetime_ms,
             )  # fmt: skip
-            self._tell(application, Status(handle, Fate.ADMITTED, now_ns))
-            for packet in packets:
-                self._originate(application, packet, confirmed=False, born_ns=born_ns, now_ns=now_ns)
-            return handle
-        if self._sender.full:
-            return self._refused(application, DropReason.QUEUE_FULL, now_ns)
-        handle = self._sender.confirmed(
-            data, port=port, targets=None if to == BROADCAST and not targets else targets or (to,), priority=priority,
-            born_us=born_us, lifetime_ms=lifetime_ms,
-        )  # fmt: skip
-        self._owners[handle] = application
-        self._tell(application, Status(handle, Fate.ADMITTED, now_ns))
-        self._send_due(now_ns)
+        self._statuses.tell(application, Status(handle, Fate.ADMITTED, now_ns))
+        for packet in packets:
+            self._originate(application, packet, confirmed=False, born_ns=born_ns, now_ns=now_ns)
+        if confirm:
+            self._send_due(now_ns)
         return handle
 
     def _whom(self, destination: Destination) -> tuple[NodeId, tuple[NodeId, ...]]:
@@ -162,7 +149,9 @@ class Messenger:
         self, application: Application, reason: DropReason, now_ns: int, *, interval_ns: int | None = None
     ) -> int:
         handle = self._sender.take_number()
-        self._tell(application, Status(handle, Fate.REFUSED, now_ns, reason, last=True, interval_ns=interval_ns))
+        self._statuses.tell(
+            application, Status(handle, Fate.REFUSED, now_ns, reason, last=True, interval_ns=interval_ns)
+        )
         return handle
 
     def _plain(
@@ -173,32 +162,24 @@ class Messenger:
             watch=bool(application.follows),
         )  # fmt: skip
         if application.follows:
-            self._tell(application, Status(seq, Fate.ADMITTED, now_ns))
-            self._watch(seq, _Watched(application, seq, first=True, confirmed=False))
+            self._statuses.tell(application, Status(seq, Fate.ADMITTED, now_ns))
+            self._statuses.watch(seq, application, seq, first=True, confirmed=False)
         return seq
 
     def _originate(
         self, application: Application, packet: Packet, *, confirmed: bool, born_ns: int, now_ns: int
     ) -> None:
+        watched = packet.first or not confirmed
         seq = self._node.send(
             packet.inner, destination=packet.destination, priority=packet.priority, app=application.name,
-            born_ns=born_ns, now_ns=now_ns, watch=packet.first or not confirmed,
+            born_ns=born_ns, now_ns=now_ns, watch=watched,
         )  # fmt: skip
-        if packet.first or not confirmed:
-            self._watch(seq, _Watched(application, packet.number, packet.first, confirmed))
-
-    def _watch(self, seq: int, watched: _Watched) -> None:
-        self._watched[seq] = watched
-        if len(self._watched) > _MOST_WATCHED:
-            self._unwatch(next(iter(self._watched)))
-
-    def _unwatch(self, seq: int) -> None:
-        del self._watched[seq]
-        self._node.watched.discard(seq)
+        if watched:
+            self._statuses.watch(seq, application, packet.number, first=packet.first, confirmed=confirmed)
 
     def _send_due(self, now_ns: int) -> None:
         for packet in self._sender.due(now_ns):
-            owner = self._owners.get(packet.number)
+            owner = self._statuses.owner(packet.number)
             if owner is not None:
                 self._originate(owner, packet, confirmed=True, born_ns=now_ns, now_ns=now_ns)
 
@@ -215,62 +196,24 @@ class Messenger:
             self._sender.receipt(packet.origin, receipt, now_ns)
 
     def _has_listener(self, piece: Piece) -> bool:
-        return bool(self._listeners(piece.head.port, _message_id(piece.data)))
+        return bool(self._of(piece.head.port, piece.data))
+
+    def _of(self, port: int, data: bytes) -> Sequence[Application]:
+        """Those that listen to a message: by its port, or by the id of the MAVLink frame that it is."""
+        return self._listeners.of_message(_message_id(data)) if port == MAVLINK_PORT else self._listeners.of_port(port)
 
     def arrived(self) -> list[tuple[Application, Received]]:
         """Messages to hand over now, each to all that listen to it."""
-        found = []
-        for whole in self._receiver.arrived:
-            message = _received(whole)
-            self.counts["received"] += 1
-            found += [(a, message) for a in self._listeners(whole.head.port, _message_id(whole.data))]
+        if not self._receiver.arrived:
+            return []
+        arrived = [(whole, _received(whole)) for whole in self._receiver.arrived]
         self._receiver.arrived.clear()
-        return found
-
-    # --- what became of it ----------------------------------------------------------------------------------------
-
-    def _tell(self, application: Application, status: Status) -> None:
-        if status.handle & CONTROL:
-            self.counts[status.fate.value] += 1
-        if status.fate in application.follows:
-            self._statuses.append((application, status))
+        self._counts["received"] += len(arrived)
+        return [(a, message) for whole, message in arrived for a in self._of(whole.head.port, whole.data)]
 
     def statuses(self, now_ns: int) -> list[tuple[Application, Status]]:
         """What is to be told now; what an application does about it is told of later."""
-        for seq, t_ns, reason in self._node.fates:
-            self._fate(seq, t_ns, reason)
-        self._node.fates.clear()
-        for number, outcome, targets, last in self._sender.told:
-            owner = self._owners.get(number)
-            if owner is None:
-                continue
-            fate = {EXPIRED: Fate.EXPIRED, DELIVERED: Fate.ACKNOWLEDGED, NO_LISTENER: Fate.UNWANTED}.get(outcome)
-            self._tell(owner, Status(number, fate or Fate.EXPIRED, now_ns, nodes=targets, last=last))
-            if last:
-                del self._owners[number]
-        self._sender.told.clear()
-        found = list(self._statuses)
-        self._statuses.clear()
-        return found
-
-    def _fate(self, seq: int, t_ns: int, reason: DropReason | None) -> None:
-        """The node let a packet out, or dropped it."""
-        watched = self._watched.get(seq)
-        if watched is None:
-            return
-        application, handle, first, confirmed = watched
-        if reason is None:
-            if first and (not confirmed or handle in self._owners):  # else it is over: nobody waits to hear of it
-                self._tell(application, Status(handle, Fate.LET_OUT, t_ns))
-            return
-        self._unwatch(seq)
-        if confirmed:
-            return  # it is sent again
-        fate = {DropReason.ADMISSION: Fate.REFUSED, DropReason.EXPIRED: Fate.EXPIRED}.get(reason, Fate.DROPPED)
-        deadline_s = self._node.scenario.traffic.deadline_s
-        refused = fate is Fate.REFUSED and deadline_s is not None
-        interval_ns = self._node.least_interval_ns(seconds_to_ns(deadline_s or 0)) if refused else None
-        self._tell(application, Status(handle, fate, t_ns, reason, last=True, interval_ns=interval_ns))
+        return self._statuses.take(self._sender.told, now_ns)
 
     # --- time -----------------------------------------------------------------------------------------------------
 
@@ -285,20 +228,21 @@ class Messenger:
                 )
 
     def next_wake_ns(self) -> int | None:
-        if self._statuses or self._node.fates or self._sender.told:
+        if self._sender.told or self._statuses.pending:
             return 0  # at once
         return earliest(self._sender.next_wake_ns(), self._receiver.next_wake_ns())
 
     def report(self) -> Mapping[str, Any]:
         """Counters, for people; nothing when no application has sent or got anything by way of here."""
-        if not self.counts:
+        counts = self._counts + self._statuses.counts
+        if not counts:
             return {}
         more = {
             "pieces_repeated": self._sender.repeated,
             "pieces_not_taken": self._receiver.not_taken,
             "given_up_here": self._receiver.expired,
         }
-        return {**dict(sorted(self.counts.items())), **more}
+        return {**dict(sorted(counts.items())), **more}
 
 
 def _message_id(frames: bytes) -> int:

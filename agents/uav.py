@@ -19,20 +19,15 @@ from agents.traffic import Load
 from fanet_mw.actor import Actor
 from fanet_mw.application import Application, Course
 from fanet_mw.bus.messages import (
-    Altimeter,
-    Battery,
-    Camera,
     Gps,
     Inertial,
     MavlinkTap,
     Message,
-    Radar,
     Reception,
+    SensorReading,
     Setpoint,
     SetpointKind,
     TxStatus,
-    Voice,
-    WifiScan,
 )
 from fanet_mw.bus.topics import Topics
 from fanet_mw.extensions import load
@@ -148,11 +143,10 @@ class Uav(Actor):
         elif isinstance(message, Gps):
             self._reckoning.fix(message)
             self._fix(message, now_ns)
-        elif isinstance(message, Inertial):
-            reckoned = self._reckoning.velocity(message)
+        elif isinstance(message, SensorReading):
+            reckoned = self._reckoning.velocity(message) if isinstance(message, Inertial) else None
             if reckoned is not None:
                 self._fix(reckoned, now_ns)
-        elif isinstance(message, WifiScan | Camera | Voice | Radar | Altimeter | Battery):
             self._onboard.sensor(message, now_ns)
         else:
             self._malformed += 1
@@ -240,15 +234,15 @@ class Uav(Actor):
             for packet in deliveries:
                 if wanted is None or packet.frame[INNER_ID] in wanted:
                     onboard.deliver(packet, now_ns)
-        called = onboard.called or bool(node.fates)
-        if called:
+        called = onboard.called
+        if called or node.fates:
+            called = True
             onboard.settle(now_ns)
             onboard.called = False
             self._own_wake_ns = self._next_own_ns()
         if node.requests:
-            outbox, topic = self.outbox, self._tx_topic
-            for request in node.requests:
-                outbox.append((topic, request))
+            topic = self._tx_topic
+            self.outbox += [(topic, request) for request in node.requests]
             node.requests.clear()
         return called
 

@@ -19,10 +19,19 @@ if TYPE_CHECKING:
         Data,
         Fate,
         Received,
-        SensorReading,
         Status,
     )
-    from fanet_mw.bus.messages import Gps, WifiScan
+    from fanet_mw.bus.messages import (
+        Altimeter,
+        Battery,
+        Camera,
+        Gps,
+        Inertial,
+        Radar,
+        SensorReading,
+        Voice,
+        WifiScan,
+    )
     from fanet_mw.errors import BusError, ConfigError, DropReason, FanetError, MalformedFrameError
     from fanet_mw.scenario import Scenario
     from fanet_mw.scenario.config import load as load_scenario
@@ -35,9 +44,11 @@ __version__ = "0.1.0"
 _HOMES: Final = {
     "agents.joined": ("Emulated", "Message", "Node", "NodeClosedError", "OnAir", "Sent", "join"),
     "fanet_mw.application": (
-        "ANY", "HOME", "AppPort", "Application", "Course", "Data", "Fate", "Received", "SensorReading", "Status",
+        "ANY", "HOME", "AppPort", "Application", "Course", "Data", "Fate", "Received", "Status",
     ),
-    "fanet_mw.bus.messages": ("Gps", "WifiScan"),
+    "fanet_mw.bus.messages": (
+        "Altimeter", "Battery", "Camera", "Gps", "Inertial", "Radar", "SensorReading", "Voice", "WifiScan",
+    ),
     "fanet_mw.errors": ("BusError", "ConfigError", "DropReason", "FanetError", "MalformedFrameError"),
     "fanet_mw.scenario": ("Scenario",),
     "fanet_mw.units": ("BROADCAST", "Enu", "NodeId"),
@@ -48,10 +59,11 @@ _HOMES: Final = {
 _HOME_OF: Final = {name: module for module, names in _HOMES.items() for name in names}
 
 __all__ = [
-    "ANY", "AppPort", "Application", "BROADCAST", "BusError", "ConfigError", "Course", "Data", "DropReason", "Emulated",
-    "Enu", "FanetError", "Fate", "Gps", "HOME", "Launched", "MalformedFrameError", "Message", "Node", "NodeClosedError",
-    "NodeId", "OnAir", "Received", "Result", "Scenario", "SensorReading", "Sent", "Status", "VirtualSwarm", "WifiScan",
-    "__version__", "join", "launch", "load_scenario", "simulate",
+    "Altimeter", "ANY", "Application", "AppPort", "Battery", "BROADCAST", "BusError", "Camera", "ConfigError", "Course",
+    "Data", "DropReason", "Emulated", "Enu", "FanetError", "Fate", "Gps", "HOME", "Inertial", "Launched",
+    "MalformedFrameError", "Message", "Node", "NodeClosedError", "NodeId", "OnAir", "Radar", "Received", "Result",
+    "Scenario", "SensorReading", "Sent", "Status", "VirtualSwarm", "Voice", "WifiScan", "__version__", "join", "launch",
+    "load_scenario", "simulate",
 ]  # fmt: skip
 
 

@@ -18,7 +18,7 @@ from enum import StrEnum
 from random import Random
 from typing import Any, Final, NamedTuple, Protocol
 
-from fanet_mw.bus.messages import Altimeter, Battery, Camera, Gps, Radar, Voice, WifiScan
+from fanet_mw.bus.messages import Gps, SensorReading
 from fanet_mw.errors import DropReason
 from fanet_mw.scenario import Scenario
 from fanet_mw.trace import Record
@@ -29,9 +29,6 @@ ANY: Final[Collection[int]] = (-1,)
 """Stands for all ids or ports, except those of load whose content does not matter."""
 HOME: Final = 0.0
 """The speed of a course that sends a UAV back to its formation."""
-
-SensorReading = WifiScan | Camera | Voice | Radar | Altimeter | Battery
-"""Any reading of a sensor except the position fix; a new kind of sensor is a new member of this union."""
 
 
 class Course(NamedTuple):
@@ -195,7 +192,7 @@ class Application:
         """Take in a position fix of the vehicle's receiver."""
 
     def on_sensor(self, reading: SensorReading, now_ns: int) -> None:
-        """Take in a reading of another sensor."""
+        """Take in a reading of any other sensor that the scenario puts on board."""
 
     def on_hello(self, frame: bytes, now_ns: int) -> None:
         """Take in a neighbor's hello, routing header first; it says where that neighbor flies."""

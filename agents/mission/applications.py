@@ -11,8 +11,8 @@ from agents.mission.outbox import Outbox
 from agents.mission.paper_rule import PaperRule
 from agents.mission.searcher import Searcher
 from fanet_mw import mavlink
-from fanet_mw.application import Application, AppPort, Course, Received, SensorReading
-from fanet_mw.bus.messages import Altimeter, Battery, Camera, Gps, Radar, Voice, WifiScan
+from fanet_mw.application import Application, AppPort, Course, Received
+from fanet_mw.bus.messages import Altimeter, Battery, Camera, Gps, Radar, SensorReading, Voice, WifiScan
 from fanet_mw.errors import MalformedFrameError
 from fanet_mw.node.arrival import decoded, packet_of
 from fanet_mw.scenario import Scenario

@@ -252,6 +252,9 @@ class Report:
     json: str
 
 
+SensorReading = WifiScan | Camera | Voice | Radar | Altimeter | Inertial | Battery
+"""Any reading of a sensor other than the position fix; a new kind of sensor is one more member of this union."""
+
 Message = (
     TxRequest
     | Reception
@@ -260,13 +263,7 @@ Message = (
     | Obstructions
     | Setpoint
     | Gps
-    | WifiScan
-    | Camera
-    | Voice
-    | Radar
-    | Altimeter
-    | Inertial
-    | Battery
+    | SensorReading
     | MavlinkTap
     | TraceBatch
     | Clock

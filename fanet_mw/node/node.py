@@ -12,7 +12,7 @@ from itertools import zip_longest
 from typing import Final, NamedTuple
 
 from fanet_mw import wire
-from fanet_mw.bus.messages import Reception, TxRequest, TxStatus
+from fanet_mw.bus.messages import Reception, TxStatus
 from fanet_mw.errors import DropReason, MalformedFrameError
 from fanet_mw.node import arrival, duplicates
 from fanet_mw.node.contract import Port, RoutingProtocol
@@ -54,13 +54,19 @@ class Node:
         """Hellos of neighbors, for what else their receivers read in them than routing does."""
         self.receptions = 0
         self._duplicates = 0
-        self._lifetimes_ns = [scenario.routing.lifetime_ns(priority) for priority in range(256)]
+        self._lifetimes_ns = [scenario.routing.lifetime_ns(wire.PRIORITY_BULK)] * 256
         """By priority, whatever the air says."""
+        for priority in wire.PRIORITIES.values():
+            self._lifetimes_ns[priority] = scenario.routing.lifetime_ns(priority)
         self._reader = arrival.shared
         self._seen = duplicates.Seen()
         self._plausible = Plausible(node, scenario)
         self._own = OwnPackets(node, self._seen, most_bytes=scenario.radio.max_frame_bytes)
         self.port = NodePort(node, scenario, self._seen, self._own, position=position)
+        self.requests = self.port.requests
+        """Transmissions that the actor is to take to the radio."""
+        self.fates = self.port.fates
+        """What became of watched packets: (number, instant, why it was dropped; None: it was let out)."""
         protocol = self._protocol = make_protocol(self.port)
         self.next_wake_ns = protocol.next_wake_ns
         """The protocol's own method: every wake-up is followed by this question."""
@@ -70,15 +76,6 @@ class Node:
         """None: this protocol does not care for copies, and most receptions are copies."""
 
     # --- what goes out, and what is known of the node (its actor reads and writes them) ---------------------------
-
-    @property
-    def requests(self) -> list[TxRequest]:
-        """Transmissions that the actor is to take to the radio."""
-        return self.port.requests
-
-    @requests.setter
-    def requests(self, requests: list[TxRequest]) -> None:
-        self.port.requests = requests
 
     @property
     def records(self) -> list[Record]:
@@ -103,11 +100,6 @@ class Node:
     def watched(self) -> set[int]:
         """Sequence numbers of own packets whose fate is of interest."""
         return self.port.watched
-
-    @property
-    def fates(self) -> list[tuple[int, int, DropReason | None]]:
-        """What became of these: (number, instant, why it was dropped; None: it was let out)."""
-        return self.port.fates
 
     def moved(self, position: Enu, velocity: Enu) -> None:
         """The node knows itself to be here, and to move at so many m/s."""

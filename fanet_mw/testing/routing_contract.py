@@ -191,7 +191,8 @@ class _Bench:
                 self.node.status(TxStatus(request.seq, TxOutcome.RETRY_LIMIT, done_ns, 7), now_ns=self.now_ns)
 
     def _drained(self) -> list[TxRequest]:
-        found, self.node.requests = list(self.node.requests), []
+        found = list(self.node.requests)
+        self.node.requests.clear()
         return found
 
 

@@ -107,7 +107,7 @@ def run(scenario: Scenario, given: dict[int, list[Letter]]) -> tuple[dict[int, C
             most_bytes = max(most_bytes, messenger._receiver.kept_bytes)
             assert messenger._sender._kept_bytes < sender.MOST_BYTES + LONGEST
             assert messenger._receiver.kept_bytes <= receiver.MOST_BYTES
-            assert len(messenger._watched) <= 8192
+            assert len(messenger._statuses._watched) <= 8192
             assert len(messenger._receiver._done) <= 8192
     host.stop()
     return mails, {"most_bytes": most_bytes, "reports": [uav.report() for uav in uavs]}

@@ -120,7 +120,8 @@ class Swarm:
 
     def _drain(self, name: NodeId) -> None:
         node = self.nodes[name]
-        requests, node.requests = node.requests, []
+        requests = list(node.requests)
+        node.requests.clear()
         for request in requests:
             self._push(max(self.now_ns, request.start_ns), name, node, request)
         for delivery in node.deliveries:

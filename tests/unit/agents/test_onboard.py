@@ -7,8 +7,8 @@ import pytest
 
 from agents.uav import Uav
 from fanet_mw import mavlink
-from fanet_mw.application import Application, Course, Data, Fate, Received, SensorReading, Status
-from fanet_mw.bus.messages import Gps, MavlinkTap, Reception, Setpoint, TxRequest, WifiScan
+from fanet_mw.application import Application, Course, Data, Fate, Received, Status
+from fanet_mw.bus.messages import Gps, MavlinkTap, Reception, SensorReading, Setpoint, TxRequest, WifiScan
 from fanet_mw.bus.topics import Topics
 from fanet_mw.errors import DropReason, LocalProtocolError, MalformedFrameError
 from fanet_mw.scenario import Scenario

@@ -1,0 +1,55 @@
+"""Who on board is called for what: worked out once, so that no application is asked that has nothing to say."""
+
+from collections.abc import Iterable, Sequence
+from typing import NamedTuple, Self
+
+from fanet_mw.application import ANY, Application
+from fanet_mw.wire import CHUNK
+
+
+class Callbacks(NamedTuple):
+    """For each of these methods, the applications that have it of their own, in their order."""
+
+    on_fix: tuple[Application, ...]
+    on_sensor: tuple[Application, ...]
+    on_hello: tuple[Application, ...]
+    permits: tuple[Application, ...]
+    hello_frames: tuple[Application, ...]
+    next_wake_ns: tuple[Application, ...]
+
+    @classmethod
+    def of(cls, applications: Sequence[Application]) -> Self:
+        def overriding(method: str) -> tuple[Application, ...]:
+            inherited = getattr(Application, method)
+            return tuple(a for a in applications if getattr(type(a), method) is not inherited)
+
+        return cls(*[overriding(method) for method in cls._fields])
+
+
+class Listeners:
+    """Which applications a message is for."""
+
+    def __init__(self, applications: Sequence[Application]) -> None:
+        self._to_message: dict[int, list[Application]] = {}
+        self._to_port: dict[int, list[Application]] = {}
+        self._to_every_message = [a for a in applications if a.listens == ANY]
+        self._to_every_port = [a for a in applications if a.ports == ANY]
+        for application in applications:
+            for message_id in application.listens if application.listens != ANY else ():
+                self._to_message.setdefault(message_id, []).append(application)
+            for port in application.ports if application.ports != ANY else ():
+                self._to_port.setdefault(port, []).append(application)
+
+    def of_message(self, message_id: int) -> Sequence[Application]:
+        """Those that listen to a MAVLink message; load is for those alone that name its id."""
+        named = self._to_message.get(message_id, [])
+        return named if message_id == CHUNK.msgid else [*named, *self._to_every_message]
+
+    def of_port(self, port: int) -> Sequence[Application]:
+        return [*self._to_port.get(port, ()), *self._to_every_port]
+
+    def wanted(self, also: Iterable[int]) -> frozenset[bytes] | None:
+        """Ids of the messages that anyone listens to and those of `also`, as they stand in a frame; None: any."""
+        if self._to_every_message:
+            return None
+        return frozenset(message_id.to_bytes(3, "little") for message_id in (*self._to_message, *also))

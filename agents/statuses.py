@@ -1,0 +1,116 @@
+"""What became of the messages of a node's applications, and who is to be told.
+
+    a packet is let out, or dropped in this node  ->  `Node.fates`, for packets that are watched
+    a message is acknowledged, or expires         ->  `Sender.told`
+
+Each application is told of the fates that its `follows` names, after the input that caused them has been handled, so
+that no application is called while it calls.
+"""
+
+from collections import Counter, deque
+from typing import Final, NamedTuple
+
+from fanet_mw.application import Application, Fate, Status
+from fanet_mw.delivery.sender import EXPIRED, Told
+from fanet_mw.errors import DropReason
+from fanet_mw.node.node import Node
+from fanet_mw.node.plausible import CONTROL
+from fanet_mw.units import seconds_to_ns
+from fanet_mw.wire.message import DELIVERED, NO_LISTENER
+
+_MOST_WATCHED: Final = 8192
+"""The number of packets of which is remembered whose they are."""
+_OUTCOMES: Final = {EXPIRED: Fate.EXPIRED, DELIVERED: Fate.ACKNOWLEDGED, NO_LISTENER: Fate.UNWANTED}
+_REASONS: Final = {DropReason.ADMISSION: Fate.REFUSED, DropReason.EXPIRED: Fate.EXPIRED}
+"""The fates of packets that were dropped for these reasons; for any other reason it is DROPPED."""
+
+
+class _Watched(NamedTuple):
+    """Whose packet it is, and what it belongs to."""
+
+    application: Application
+    handle: int
+    first: bool
+    """True for the first packet of its message."""
+    confirmed: bool
+    """True if it is a piece of a message that is to be confirmed: such a piece is sent again when it is dropped."""
+
+
+class Statuses:
+    """The statuses of one node's messages."""
+
+    def __init__(self, node: Node) -> None:
+        self._node = node
+        self._owners: dict[int, Application] = {}
+        """By handle: who sent a message that is to be confirmed and is not over."""
+        self._watched: dict[int, _Watched] = {}
+        """By sequence number of the packet."""
+        self._waiting: deque[tuple[Application, Status]] = deque()
+        self.counts: Counter[str] = Counter()
+        """What became of messages in pieces, by fate."""
+
+    def tell(self, application: Application, status: Status) -> None:
+        if status.handle & CONTROL:
+            self.counts[status.fate.value] += 1
+        if status.fate in application.follows:
+            self._waiting.append((application, status))
+
+    def own(self, handle: int, application: Application) -> None:
+        """Note who has sent a message that is to be confirmed."""
+        self._owners[handle] = application
+
+    def owner(self, handle: int) -> Application | None:
+        """Who sent a message that is to be confirmed; None when that message is over."""
+        return self._owners.get(handle)
+
+    def watch(self, seq: int, application: Application, handle: int, *, first: bool, confirmed: bool) -> None:
+        """Note whose message a packet carries, or a piece of."""
+        self._watched[seq] = _Watched(application, handle, first, confirmed)
+        if len(self._watched) > _MOST_WATCHED:
+            self._unwatch(next(iter(self._watched)))
+
+    def _unwatch(self, seq: int) -> None:
+        del self._watched[seq]
+        self._node.watched.discard(seq)
+
+    @property
+    def pending(self) -> bool:
+        return bool(self._waiting or self._node.fates)
+
+    def take(self, told: list[Told], now_ns: int) -> list[tuple[Application, Status]]:
+        """What is to be told now, `told` being what the sender knows; both lists of news are emptied."""
+        if self._node.fates:
+            for seq, t_ns, reason in self._node.fates:
+                self._packet_fate(seq, t_ns, reason)
+            self._node.fates.clear()
+        for number, outcome, targets, last in told:
+            owner = self._owners.get(number)
+            if owner is None:
+                continue
+            fate = _OUTCOMES.get(outcome, Fate.EXPIRED)
+            self.tell(owner, Status(number, fate, now_ns, nodes=targets, last=last))
+            if last:
+                del self._owners[number]
+        told.clear()
+        found = list(self._waiting)
+        self._waiting.clear()
+        return found
+
+    def _packet_fate(self, seq: int, t_ns: int, reason: DropReason | None) -> None:
+        """The node let a packet out, or dropped it."""
+        watched = self._watched.get(seq)
+        if watched is None:
+            return
+        application, handle, first, confirmed = watched
+        if reason is None:
+            if first and (not confirmed or handle in self._owners):  # else it is over: nobody waits to hear of it
+                self.tell(application, Status(handle, Fate.LET_OUT, t_ns))
+            return
+        self._unwatch(seq)
+        if confirmed:
+            return  # it is sent again
+        fate = _REASONS.get(reason, Fate.DROPPED)
+        deadline_s = self._node.scenario.traffic.deadline_s
+        refused = fate is Fate.REFUSED and deadline_s is not None
+        interval_ns = self._node.least_interval_ns(seconds_to_ns(deadline_s or 0)) if refused else None
+        self.tell(application, Status(handle, fate, t_ns, reason, last=True, interval_ns=interval_ns))

@@ -1,15 +1,11 @@
 """Parts of another package, installed beside ours, in virtual time and in every process: examples/swarm-parts."""
 
-import ast
 import json
-import os
 import pickle
-import re
-import subprocess
-import sys
 from pathlib import Path
 
 import pytest
+from installed import Installed
 
 from fanet_mw import extensions
 from fanet_mw.errors import ConfigError
@@ -23,48 +19,8 @@ ROOT = Path(__file__).parents[2]
 EXAMPLE = ROOT / "examples" / "swarm-parts"
 
 
-@pytest.fixture(scope="module")
-def installed(tmp_path_factory: pytest.TempPathFactory) -> Path:
-    """The example, built and installed as any package is, without a network."""
-    target = tmp_path_factory.mktemp("site")
-    pip = [sys.executable, "-m", "pip", "install", "--quiet", "--no-deps", "--no-build-isolation", "--no-index"]
-    subprocess.run([*pip, "--target", str(target), str(EXAMPLE)], check=True, timeout=60)
-    return target
-
-
-def test_the_examples_import_what_is_documented_and_nothing_private() -> None:
-    page = (ROOT / "docs" / "how-to" / "extend.md").read_text()
-    files = re.findall(r"`((?:fanet_mw|sim|emulator)[./][\w./]+)`", page)
-    named = {name.removesuffix(".py").replace("/", ".") for name in files}
-    found = set()
-    for path in (ROOT / "examples").rglob("*.py"):
-        for node in ast.walk(ast.parse(path.read_text())):
-            if isinstance(node, ast.ImportFrom) and (node.module or "").startswith(("fanet_mw", "sim", "emulator")):
-                assert not [alias.name for alias in node.names if alias.name.startswith("_")], path
-                found.add(node.module)
-    assert "fanet_mw.node.contract" in found
-    allowed = {module for module in found for name in named if module == name or module.startswith(f"{name}.")}
-    assert found - allowed - {"fanet_mw"} == set()
-
-
-def run(installed: Path, *command: str, cwd: Path) -> subprocess.CompletedProcess[str]:
-    environment = {**os.environ, "PYTHONPATH": os.pathsep.join((str(installed), str(ROOT)))}
-    return subprocess.run(
-        [sys.executable, *command], cwd=cwd, env=environment, capture_output=True, text=True, timeout=110, check=False
-    )
-
-
-def test_a_protocol_of_another_package_keeps_the_contract(installed: Path, tmp_path: Path) -> None:
-    tests = f"{EXAMPLE / 'tests' / 'test_gossip3.py'}::TestGossip3"
-    ended = run(
-        installed, "-m", "pytest", "-q", "-p", "no:cacheprovider", "--rootdir", str(tmp_path), tests, cwd=tmp_path
-    )
-    assert ended.returncode == 0, ended.stdout + ended.stderr
-    assert "15 passed" in ended.stdout
-
-
 @pytest.mark.slow
-def test_a_protocol_that_breaks_the_contract_is_told(installed: Path, tmp_path: Path) -> None:
+def test_a_protocol_that_breaks_the_contract_is_told(installed: Installed, tmp_path: Path) -> None:
     """One that never ends a wake-up, and one that takes a packet and relays nothing."""
     (tmp_path / "broken.py").write_text(
         "from swarm_parts.gossip3 import Gossip3\n"
@@ -80,14 +36,14 @@ def test_a_protocol_that_breaks_the_contract_is_told(installed: Path, tmp_path: 
     )
     chosen = "wake_up or (Silent and nearly_all and all)"
     options = ["-q", "-p", "no:cacheprovider", "--rootdir", str(tmp_path), "-k", chosen, "-o", "pythonpath=."]
-    ended = run(installed, "-m", "pytest", *options, "test_broken.py", cwd=tmp_path)
+    ended = installed.run(installed.python, "-m", "pytest", *options, "test_broken.py", cwd=tmp_path)
     assert "TestRestless::test_a_wake_up_that_has_come_is_done" in ended.stdout
     assert "TestSilent::test_a_connected_swarm_at_rest_gets_nearly_all[all]" in ended.stdout
 
 
-def test_five_parts_of_another_package_serve_a_run(installed: Path, tmp_path: Path) -> None:
-    simulate = ["-m", "fanet_mw", "simulate", str(EXAMPLE / "scenario.toml"), "--out", str(tmp_path / "out"), "--json"]
-    ended = run(installed, *simulate, cwd=tmp_path)
+def test_five_parts_of_another_package_serve_a_run(installed: Installed, tmp_path: Path) -> None:
+    scenario = str(EXAMPLE / "scenario.toml")
+    ended = installed.run(installed.fanet, "simulate", scenario, "--out", "out", "--json", cwd=tmp_path)
     assert ended.returncode == 0, ended.stderr
     summary = json.loads(ended.stdout)
     assert summary["pdr"] > 0.9
@@ -114,17 +70,17 @@ def test_five_parts_of_another_package_serve_a_run(installed: Path, tmp_path: Pa
     ],
 )
 def test_what_is_wrong_with_a_part_is_said_before_a_run(
-    installed: Path, monkeypatch: pytest.MonkeyPatch, changes: list[str], said: str
+    installed: Installed, monkeypatch: pytest.MonkeyPatch, changes: list[str], said: str
 ) -> None:
-    monkeypatch.syspath_prepend(installed)
+    monkeypatch.syspath_prepend(installed.site)
     extensions.load.cache_clear()
     with pytest.raises(ConfigError) as caught:
         config.load(EXAMPLE / "scenario.toml", changes)
     assert said in str(caught.value)
 
 
-def test_clusters_may_be_made_by_another_package(installed: Path, monkeypatch: pytest.MonkeyPatch) -> None:
-    monkeypatch.syspath_prepend(installed)
+def test_clusters_may_be_made_by_another_package(installed: Installed, monkeypatch: pytest.MonkeyPatch) -> None:
+    monkeypatch.syspath_prepend(installed.site)
     extensions.load.cache_clear()
     keys = ["clusters.method=cells", "clusters.options.cell_m=300", "duration_s=15", "warmup_s=8", "drain_s=3"]
     summary = finish(

@@ -369,7 +369,7 @@ class Mission(Section):
     who has heard enough reports."""
     avoid_by: tuple[Literal["hellos", "radar"], ...] = ("hellos", "radar")
     """`search`: from what UAVs know whom to keep clear of: the positions in the hellos of others, their own radar."""
-    reserve_charge: Annotated[float, Field(ge=0, lt=1)] = 0.15
+    reserve_charge: Annotated[float, Field(ge=0, le=1)] = 0.15
     """`search`: who would come home with less of its battery than this flies home, lands, and hands its place and its
     task on; needs `sensors.battery_hz`."""
     responders: Annotated[int, Field(ge=1, le=1000)] = 3

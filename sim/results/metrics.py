@@ -63,7 +63,7 @@ def summarize(outcome: Outcome, *, trace_sha256: str) -> dict[str, Any]:
         "likely": likely(sent),
         "clock": clock_errors(outcome),
         "admission": _admission(outcome),
-        "mission": mission(outcome),
+        "mission": mission(outcome.scenario, outcome.records),
         "separation": separation(outcome),
         "processes": {
             "ready_s": round(outcome.ready_s, 3),

@@ -10,7 +10,7 @@ Positions are the true ones, once a second (`Posed`).
 
 import math
 import statistics
-from collections.abc import Iterable, Iterator
+from collections.abc import Iterable, Iterator, Sequence
 from typing import Any, Final
 
 import numpy as np
@@ -19,7 +19,6 @@ import numpy.typing as npt
 from fanet_mw.scenario import Scenario
 from fanet_mw.trace import Approaching, Arrived, Collided, Confirmed, Detected, Posed, ProcessEnded, Record
 from fanet_mw.units import S
-from sim.run.outcome import Outcome
 from sim.world.environment.survivors import place
 from sim.world.sensors.phone import REFERENCE_LOSS_DB
 
@@ -31,9 +30,8 @@ _MISTAKEN_M: Final = 25.0
 Rows = npt.NDArray[np.float64]
 
 
-def mission(outcome: Outcome) -> dict[str, Any]:
+def mission(scenario: Scenario, records: Sequence[Record]) -> dict[str, Any]:
     """The table `mission` of the summary."""
-    records, scenario = outcome.records, outcome.scenario
     truth = place(scenario)
     first: dict[int, int] = {}
     errors: list[float] = []
@@ -73,13 +71,13 @@ def _median(values: list[float]) -> float | None:
 
 def _flown(scenario: Scenario, records: Iterable[Record]) -> dict[str, Any]:
     """Coverage and coherence; None where the trace has no positions."""
-    covered = _Covered(scenario)
+    covered = Covered(scenario)
     together = instants = 0
     nearly_all_ns: int | None = None
     for t_ns, at in _instants(records):
         instants += 1
         together += _is_one(at, scenario.radio.range_m)
-        covered.add(at)
+        covered.add(at.tolist())
         if nearly_all_ns is None and covered.share >= _NEARLY_ALL:
             nearly_all_ns = t_ns
     return {
@@ -121,7 +119,7 @@ def _is_one(at: Rows, reach_m: float) -> bool:
         reached = further
 
 
-class _Covered:
+class Covered:
     """The cells of the area that have been overflown."""
 
     def __init__(self, scenario: Scenario) -> None:
@@ -136,8 +134,9 @@ class _Covered:
     def share(self) -> float:
         return float(self._seen.mean())
 
-    def add(self, at: Rows) -> None:
-        for east, north, up in at.tolist():
+    def add(self, at: Iterable[tuple[float, float, float]]) -> None:
+        """UAVs are at these places, or have been."""
+        for east, north, up in at:
             ground2 = self._range_m**2 - up**2
             if ground2 <= 0:
                 continue

@@ -8,7 +8,6 @@ from fanet_mw.scenario import Scenario
 from fanet_mw.trace import Confirmed, Posed, ProcessEnded, Record
 from fanet_mw.units import S
 from sim.results.mission import mission
-from sim.run.outcome import Outcome
 
 KEYS: dict[str, Any] = {
     "nodes": {"count": 3}, "clusters": {"count": 1}, "world": {"area_m": 500.0}, "radio": {"range_m": 250.0},
@@ -17,8 +16,7 @@ KEYS: dict[str, Any] = {
 
 
 def measured(records: Sequence[Record]) -> dict[str, Any]:
-    outcome = Outcome(scenario=Scenario(**KEYS), mode="virtual", wall_s=1.0, records=list(records), reports={})
-    return mission(outcome)
+    return mission(Scenario(**KEYS), records)
 
 
 def at(t_s: int, *easts: float) -> list[Record]:

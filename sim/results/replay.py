@@ -1,0 +1,113 @@
+"""A mission again, from the files of its run alone: where everyone was, what each did, what had been covered.
+
+position      `posed`, once a second; in between on a straight line
+flight        `flight_mode_changed`: what the flight controller did; from `fallen` on it is a wreck
+mission       `mission_mode_changed`: what the UAV had decided to do, and for which survivor; `planned`: its place
+sensors       `detected`, `sighted`
+finds         `approaching`, `arrived`, `confirmed`
+"""
+
+import tomllib
+from bisect import bisect_right
+from collections import defaultdict
+from collections.abc import Mapping, Sequence
+from pathlib import Path
+from typing import Any, NamedTuple, Self, TypeVar
+
+from fanet_mw.errors import ConfigError
+from fanet_mw.scenario import Scenario
+from fanet_mw.trace import FlightModeChanged, MissionModeChanged, Planned, Posed, Record, parse
+from fanet_mw.units import Enu, NodeId, S
+from sim.results.mission import Covered, mission
+
+R = TypeVar("R", FlightModeChanged, MissionModeChanged, Planned)
+
+
+class State(NamedTuple):
+    """One UAV at one instant."""
+
+    position: Enu
+    flight: str
+    """The mode of its flight controller; empty: nothing was asked of it yet."""
+    mission: str
+    """What it had decided to do; empty: it takes no part in a planned search."""
+    survivor: int
+    """To whom it flew; 0: to nobody."""
+    place: int
+    """Its place in the plan; -1: none."""
+
+
+class Replay:
+    """A run that is over."""
+
+    def __init__(self, scenario: Scenario, records: Sequence[Record]) -> None:
+        """`records` in the order of the trace."""
+        self.scenario, self.records = scenario, records
+        self._posed: dict[int, list[Posed]] = defaultdict(list)
+        self._flight: dict[int, list[FlightModeChanged]] = defaultdict(list)
+        self._mission: dict[int, list[MissionModeChanged]] = defaultdict(list)
+        self._planned: dict[int, list[Planned]] = defaultdict(list)
+        for record in records:
+            if isinstance(record, Posed):
+                self._posed[record.node].append(record)
+            elif isinstance(record, FlightModeChanged):
+                self._flight[record.node].append(record)
+            elif isinstance(record, MissionModeChanged):
+                self._mission[record.node].append(record)
+            elif isinstance(record, Planned):
+                self._planned[record.node].append(record)
+
+    @classmethod
+    def read(cls, folder: Path) -> Self:
+        """From what `fanet simulate --out` or `fanet launch --out` has written; raises ConfigError."""
+        try:
+            keys = tomllib.loads((folder / "scenario.toml").read_text(encoding="utf-8"))
+            lines = (folder / "trace.jsonl").read_text(encoding="utf-8").splitlines()
+        except (OSError, ValueError) as error:
+            raise ConfigError(f"{folder}: cannot be replayed: {error}") from error
+        return cls(Scenario.model_validate(keys), [parse(line) for line in lines])
+
+    def at(self, t_s: float) -> Mapping[NodeId, State]:
+        """Everyone at an instant; a UAV that was a wreck by then is where it was last seen flying."""
+        t_ns = round(t_s * S)
+        found = {}
+        for node, posed in sorted(self._posed.items()):
+            flight = _last(self._flight[node], t_ns)
+            decided = _last(self._mission[node], t_ns)
+            planned = _last(self._planned[node], t_ns)
+            found[NodeId(node)] = State(
+                _between(posed, t_ns),
+                flight.mode if flight else "",
+                decided.mode if decided else "",
+                decided.survivor if decided else 0,
+                planned.place if planned else -1,
+            )
+        return found
+
+    def coverage(self, t_s: float) -> float:
+        """The share of the area that had been covered by an instant."""
+        covered = Covered(self.scenario)
+        for record in self.records:
+            if isinstance(record, Posed) and record.t_ns <= t_s * S:
+                covered.add([(record.east_m, record.north_m, record.up_m)])
+        return covered.share
+
+    def mission(self) -> Mapping[str, Any]:
+        """The table `mission` of the summary, computed anew."""
+        return mission(self.scenario, self.records)
+
+
+def _last(records: Sequence[R], t_ns: int) -> R | None:
+    """The latest of some records of one UAV up to an instant."""
+    index = bisect_right(records, t_ns, key=lambda record: record.t_ns)
+    return records[index - 1] if index else None
+
+
+def _between(posed: Sequence[Posed], t_ns: int) -> Enu:
+    """Where a UAV was between two of its positions, or at the first or the last one."""
+    after = bisect_right(posed, t_ns, key=lambda record: record.t_ns)
+    first, second = posed[max(0, after - 1)], posed[min(after, len(posed) - 1)]
+    span_ns = second.t_ns - first.t_ns
+    share = min(1.0, max(0.0, (t_ns - first.t_ns) / span_ns)) if span_ns > 0 else 0.0
+    place = [a + share * (b - a) for a, b in zip(first[2:], second[2:], strict=True)]
+    return Enu(*place)

@@ -14,9 +14,6 @@ from fanet_mw.units import US, NodeId, S
 from fanet_mw.wire.inner import Survivor
 from fanet_mw.wire.search import Found
 
-_SIGHTINGS: Final = 2
-_SURE_M: Final = 3.5
-"""A find is confirmed when its place is known to this standard deviation."""
 _TELLINGS: Final = 3
 _AGAIN_NS: Final = 7 * S
 _WORSE: Final = 0.8
@@ -43,21 +40,16 @@ class Announcing:
         self._struck_ns: dict[int, int] = {}
         """When we confirmed each survivor, or heard that it is confirmed."""
 
-    def confirm(self, survivor: int, now_ns: int) -> bool:
-        """Confirm a survivor that was seen at close range, once its place is sure; whether that is news."""
-        find = self._finds.known[survivor]
-        place = find.filter.estimate() if find.sightings else None
-        if find.confirmed is not None or place is None or find.sightings < _SIGHTINGS or place.sigma_m > _SURE_M:
-            return False
-        if not self._finds.borne_out(survivor):
-            return False
+    def confirm(self, survivor: int, now_ns: int) -> None:
+        """The owner of this phone was seen, and is sure to be the one: everyone is to know."""
+        place = self._finds.known[survivor].filter.estimate()
+        assert place is not None, "who was seen has a place"
         found = Found(now_ns // US, survivor, *place, self._node, confirmed=True)
         self._finds.told(found, now_ns=now_ns)
         east_m, north_m = round(place.east_m, 2), round(place.north_m, 2)
         self._outbox.records.append(Confirmed(now_ns, self._node, survivor, east_m, north_m))
         self._tellings[survivor] = _TELLINGS, now_ns
         self.struck(survivor, now_ns)
-        return True
 
     def struck(self, survivor: int, now_ns: int) -> None:
         """A survivor is confirmed, by us or by another."""

@@ -12,6 +12,8 @@ from fanet_mw.units import NodeId, S
 
 _SPIRAL_M: Final = 30.0
 """Distance of the turns of the spiral that is flown around an estimate which nobody is seen at."""
+_IN_VIEW_M: Final = 40.0
+"""From a circle of this radius a camera still shows who is in its middle."""
 _RING_M: Final = 14.0
 _GOLDEN_ANGLE: Final = math.pi * (3 - math.sqrt(5))
 
@@ -28,7 +30,9 @@ class Approach:
         """When we came to each survivor."""
 
     def point(self, survivor: int, place: Estimate, now_ns: int, *, responding: bool) -> tuple[float, float]:
-        """East and north to fly to: each UAV is at an angle of its own, on a spiral while nobody is seen.
+        """East and north to fly to: on a spiral, each UAV at an angle of its own, that widens while nobody is in view.
+
+        A circle about who is seen gives received powers from new places, by which it shows whose phone that is.
 
         `responding`: whether this survivor is our task, and not only one that we pass.
         """
@@ -41,6 +45,7 @@ class Approach:
                 self._outbox.records.append(Arrived(now_ns, self._node, survivor))
         seen = self._finds.known[survivor].filter.is_seen
         searched_s = (now_ns - arrived_ns) / S
-        radius = _RING_M if seen else _RING_M + _SPIRAL_M * searched_s / 20.0
-        angle = self._node * _GOLDEN_ANGLE + (0.0 if seen else searched_s / 3.0)
+        radius = _RING_M + _SPIRAL_M * searched_s / 20.0
+        radius = min(_IN_VIEW_M, radius) if seen else radius
+        angle = self._node * _GOLDEN_ANGLE + searched_s / 4.0
         return place.east_m + radius * math.cos(angle), place.north_m + radius * math.sin(angle)

@@ -7,28 +7,11 @@ import math
 from dataclasses import dataclass, field
 from typing import Final
 
-from agents.mission.phone_filter import REFERENCE_LOSS_DB, Estimate, PhoneFilter, PhoneModel
+from agents.mission.phone_filter import Estimate, PhoneFilter, PhoneModel
 from fanet_mw.units import US, Enu, S
 from fanet_mw.wire.inner import Survivor
 from fanet_mw.wire.search import Found
 
-_GATE: Final = 16.0
-"""A sighting less likely than this by what was heard of a phone is not of its owner: twice a difference of logarithms.
-Above 11.8, the 99.7 % of chi-square with 2 degrees: the shadowing of neighboring samples is not independent."""
-_VAGUE_M: Final = 80.0
-"""A phone whose place has a larger standard deviation than this could be anybody's."""
-_SURE_OF_TAKEN_M: Final = 30.0
-"""The same where somebody has been confirmed already."""
-_GATE_TAKEN: Final = 6.0
-"""The gate where somebody has been confirmed already: most likely that one again, but two may lie side by side."""
-_SAMPLES: Final = 6
-_REPORTERS: Final = 2
-"""Fewer received powers, or by fewer nodes, do not tell whose phone it is."""
-_SAMPLES_ALONE: Final = 8
-"""As many by one node do: it has passed by, and at the edge of the area nobody else may ever hear that phone."""
-_SAME_PERSON_M: Final = 12.0
-"""Sightings nearer to each other than this are of one person."""
-_OLD_SIGHTING_NS: Final = 5 * S
 _PASSED_ON: Final = 5
 """Reports of one hello."""
 _FRESH_NS: Final = 8 * S
@@ -44,10 +27,6 @@ class Find:
     latest: dict[int, Survivor] = field(default_factory=dict)
     """The newest report of each node."""
     first_ns: int = 0
-    own_heard_ns: int | None = None
-    """When our own receiver last heard the phone."""
-    own_rssi_dbm: float = 0.0
-    sightings: int = 0
     told: Found | None = None
     """The best estimate that another node has told."""
     confirmed: Found | None = None
@@ -70,13 +49,11 @@ class Finds:
         self._model = model
         self.known: dict[int, Find] = {}
 
-    def report(self, report: Survivor, *, now_ns: int, own: bool) -> Find:
+    def report(self, report: Survivor, *, now_ns: int) -> Find:
         """A received power that we or another node measured."""
         find = self.known.get(report.survivor)
         if find is None:
             find = self.known[report.survivor] = Find(PhoneFilter(self._model), first_ns=now_ns)
-        if own:
-            find.own_heard_ns, find.own_rssi_dbm = now_ns, report.rssi_dbm
         before = find.latest.get(report.reporter)
         if before is None or report.t_us > before.t_us:
             find.latest[report.reporter] = report
@@ -98,59 +75,6 @@ class Finds:
         if find.told is None or _estimate(found).sigma_m < _estimate(find.told).sigma_m:
             find.told = found
         return False
-
-    def seen(self, at: Enu, *, by: Enu, sigma_m: float, now_ns: int) -> int | None:
-        """Somebody was seen on the ground, by a camera that names nobody; the survivor who that is taken to be."""
-        east_m, north_m = at.east, at.north
-        best: tuple[float, int] | None = None
-        taken = any(
-            find.confirmed is not None and _estimate(find.confirmed).distance_m(at) <= _SAME_PERSON_M
-            for find in self.known.values()
-        )
-        gate = _GATE_TAKEN if taken else _GATE
-        for survivor, find in self.known.items():
-            if find.confirmed is not None or find.own_heard_ns is None or now_ns - find.own_heard_ns > _OLD_SIGHTING_NS:
-                continue
-            place = find.place()
-            if place is None or place.sigma_m > (_SURE_OF_TAKEN_M if taken else _VAGUE_M):
-                continue
-            if find.filter.is_seen:
-                if place.distance_m(at) > _SAME_PERSON_M:
-                    continue
-                score = 0.0
-            else:
-                score = find.filter.deficit(east_m, north_m) + self._surprise(find, by, at)
-            if score <= gate:
-                best = (score, survivor) if best is None else min(best, (score, survivor))
-        if best is None:
-            return None
-        find = self.known[best[1]]
-        if find.confirmed is None:
-            find.filter.seen(east_m, north_m, sigma_m=sigma_m)
-            find.sightings += 1
-        return best[1]
-
-    def borne_out(self, survivor: int) -> bool:
-        """Whether what was heard of a phone suffices to say that its owner is who was seen; who is not is forgotten."""
-        find = self.known[survivor]
-        place = find.filter.estimate()
-        if place is None or not find.filter.is_seen:
-            return False
-        deficit = find.filter.deficit(place.east_m, place.north_m)
-        if deficit > _GATE:
-            find.filter.unsee()
-            find.sightings = 0
-            return False
-        enough = _SAMPLES if len(find.reporters) >= _REPORTERS else _SAMPLES_ALONE
-        return find.filter.samples >= enough
-
-    def _surprise(self, find: Find, by: Enu, at: Enu) -> float:
-        """How little the power that we hear of a phone fits somebody at a place: the squared deviation in sigmas."""
-        model = self._model
-        distance_m = max(1.0, by.minus(at).norm())
-        expected_dbm = model.power_dbm - REFERENCE_LOSS_DB - 10 * model.exponent * math.log10(distance_m)
-        variance = max(model.shadowing_db, 1.0) ** 2 + model.offset_db**2
-        return (find.own_rssi_dbm - expected_dbm) ** 2 / variance
 
     def open(self) -> list[int]:
         """The survivors that wait to be confirmed, in order of id."""

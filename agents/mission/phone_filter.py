@@ -6,7 +6,7 @@
 The offset b (burial, antenna, battery) is integrated out in closed form, so a cell needs only the sums of the residuals
 and of their squares. A histogram filter as in Thrun, Burgard, Fox: Probabilistic Robotics, 2005, chapter 4: no starting
 point, and the mirror image that a straight flight leaves open stays in the posterior until somebody resolves it.
-A camera's or voice's sighting is a direct measurement of the place; from then on the estimate is a Kalman filter's.
+Once the owner has been seen, the place is that of the sightings.
 """
 
 import math
@@ -84,13 +84,15 @@ class PhoneFilter:
         """Places and received powers; None: nothing was heard there."""
         self._pending: list[tuple[Enu, float | None]] = []
         """What was heard since somebody last wanted to know."""
+        self._best = 0.0
+        """The greatest of them within the area."""
         self._sums: list[float] = []
         self._squares: list[float] = []
         self._count = 0
         self._taken: dict[int, list[Enu]] = {}
         self._estimate: Estimate | None = None
         self._seen: Estimate | None = None
-        """What direct sightings make of it."""
+        """Where the owner has been seen."""
 
     # --- measurements ---------------------------------------------------------------------------------------------
 
@@ -114,24 +116,9 @@ class PhoneFilter:
         self._silent_at.append(position)
         self._pending.append((position, None))
 
-    def seen(self, east_m: float, north_m: float, *, sigma_m: float) -> None:
-        """A direct sighting of the place, by a camera say."""
-        before, variance = self._seen, sigma_m * sigma_m
-        if before is None:
-            self._seen = Estimate(east_m, north_m, variance, 0.0, variance)
-            return
-        gain = before.east_variance_m2 / (before.east_variance_m2 + variance)
-        self._seen = Estimate(
-            before.east_m + gain * (east_m - before.east_m),
-            before.north_m + gain * (north_m - before.north_m),
-            before.east_variance_m2 * (1 - gain),
-            0.0,
-            before.north_variance_m2 * (1 - gain),
-        )
-
-    def unsee(self) -> None:
-        """Forget the sightings: they were of somebody else."""
-        self._seen = None
+    def sighted(self, place: Estimate | None) -> None:
+        """A camera shows the owner at this place; None: nobody who is in view is the owner."""
+        self._seen = place
 
     @property
     def is_seen(self) -> bool:
@@ -146,9 +133,12 @@ class PhoneFilter:
 
     def estimate(self) -> Estimate | None:
         """Mean and covariance; None before anything was measured."""
-        if self._seen is None:
-            self._catch_up()
-        return self._seen or self._estimate
+        return self._seen or self.heard_from()
+
+    def heard_from(self) -> Estimate | None:
+        """The same by received powers alone."""
+        self._catch_up()
+        return self._estimate
 
     def _catch_up(self) -> None:
         """Take in what has been heard since the last time; lay the grid anew when its middle was a bad guess."""
@@ -179,7 +169,7 @@ class PhoneFilter:
         j = round((north_m - self._middle.north) / _CELL_M) + _HALF_CELLS
         if not (0 <= i <= 2 * _HALF_CELLS and 0 <= j <= 2 * _HALF_CELLS):
             return math.inf
-        return max(self._totals) - self._totals[j * (2 * _HALF_CELLS + 1) + i]
+        return self._best - self._totals[j * (2 * _HALF_CELLS + 1) + i]
 
     def near(self, place: Enu, *, within_m: float) -> bool:
         """Whether the phone was first heard no farther from a place; cheap, and True of what was only seen."""
@@ -243,7 +233,7 @@ class PhoneFilter:
         self._totals = scores
         width = 2 * _HALF_CELLS + 1
         inside = self._inside(width)
-        best = max(score for score, possible in zip(scores, inside, strict=True) if possible)
+        self._best = best = max(score for score, possible in zip(scores, inside, strict=True) if possible)
         total = mean_i = mean_j = ii = ij = jj = 0.0
         exp = math.exp
         for at, score in enumerate(scores):

@@ -20,6 +20,7 @@ from agents.mission.finds import Finds, ground_place
 from agents.mission.formation_place import STILL, FormationPlace
 from agents.mission.goal import Goal
 from agents.mission.homeward import Homeward
+from agents.mission.identities import Identities
 from agents.mission.motion import Motion, Navigation, Neighbors
 from agents.mission.obstacles import Obstacles
 from agents.mission.outbox import Outbox, Packet, ReportFormat
@@ -67,6 +68,7 @@ class Searcher:
         self._planner = Planner(node, expected=scenario.nodes.count, deploy_speed_m_s=_DEPLOY * least_m_s)
         self._finds = finds = Finds(phone_model(scenario))
         self._obstacles = obstacles = Obstacles(chart, scenario.world.no_fly_m)
+        self._identities = Identities(finds)
         self._navigation = navigation = Navigation(position, obstacles)
         self._neighbors = neighbors = Neighbors()
         self._watches_radar = "radar" in mission.avoid_by
@@ -123,8 +125,7 @@ class Searcher:
             self._adopt(now_ns)
         plans, self._planner.to_tell = self._planner.to_tell, []
         self._outbox.packets += [Packet(plan.encode_frame(self._node)) for plan in plans]
-        for survivor in self._finds.open():
-            self._confirm(survivor, now_ns)
+        self._identify(now_ns)
         self._announcing.tell(self._tasks.survivor, now_ns)
         if not self._homeward.leaves:
             self._tasks.bid(now_ns)
@@ -178,7 +179,7 @@ class Searcher:
             find = self._finds.known.get(survivor)
             if find is None or self._node not in find.reporters:
                 self._outbox.records.append(Detected(now_ns, self._node, survivor, round(rssi_dbm, 2)))
-            find = self._finds.report(report, now_ns=now_ns, own=True)
+            find = self._finds.report(report, now_ns=now_ns)
             last_ns = self._reported_ns.get(survivor)
             if find.confirmed is None and (last_ns is None or now_ns - last_ns >= self._report_ns):
                 self._reported_ns[survivor] = now_ns
@@ -199,12 +200,14 @@ class Searcher:
         """Our camera shows people at these bearings and elevations [rad]."""
         for direction in people:
             self._notice("camera", direction, sigma_rad=_ANGLE_RAD, now_ns=now_ns)
+        self._identify(now_ns)
 
     def voice(self, calls: Sequence[tuple[float, float, float]], *, now_ns: int) -> None:
         """Our microphones make out calls at these bearings and elevations [rad], so far above noise [dB]."""
         for bearing_rad, elevation_rad, snr_db in calls:
             sigma_rad = max(_ANGLE_RAD, self._voice_rad * math.pow(10.0, -snr_db / 20))
             self._notice("voice", (bearing_rad, elevation_rad), sigma_rad=sigma_rad, now_ns=now_ns)
+        self._identify(now_ns)
 
     def _notice(self, sensor: str, direction: tuple[float, float], *, sigma_rad: float, now_ns: int) -> None:
         """A sensor that names nobody has noticed somebody on the ground."""
@@ -214,12 +217,10 @@ class Searcher:
             return
         sigma_m = max(1.0, sigma_rad * looked[2] * looked[2] / max(1.0, here.up))
         at = Enu(looked[0], looked[1], 0.0)
-        survivor = self._finds.seen(at, by=here, sigma_m=sigma_m, now_ns=now_ns)
+        survivor = self._identities.seen(at, sigma_m=sigma_m, close=looked[2] <= _CLOSE_M, now_ns=now_ns)
         self._outbox.records.append(
             Sighted(now_ns, self._node, sensor, survivor or 0, round(at.east, 2), round(at.north, 2))
         )
-        if survivor is not None and looked[2] <= _CLOSE_M:
-            self._confirm(survivor, now_ns)
 
     # --- what others tell -----------------------------------------------------------------------------------------
 
@@ -233,7 +234,7 @@ class Searcher:
         match message:
             case Survivor():
                 if message.reporter != self._node:
-                    self._finds.report(message, now_ns=now_ns, own=False)
+                    self._finds.report(message, now_ns=now_ns)
                     if self._formation.place is not None:
                         self._announcing.reported(message, now_ns)
             case Search():
@@ -269,8 +270,10 @@ class Searcher:
         self._outbox.packets.append(Packet(status.encode_frame(self._node)))
         self._next_status_ns = now_ns + round((0.8 + 0.4 * self._random()) * STATUS_S * S)
 
-    def _confirm(self, survivor: int, now_ns: int) -> None:
-        if self._announcing.confirm(survivor, now_ns):
+    def _identify(self, now_ns: int) -> None:
+        """Confirm those of whom it is sure whose phones they carry."""
+        for survivor in self._identities.review(now_ns):
+            self._announcing.confirm(survivor, now_ns)
             self._tasks.close(survivor, now_ns=now_ns)
 
     def _adopt(self, now_ns: int) -> None:

@@ -10,14 +10,13 @@ from hypothesis import strategies as st
 from agents.mission.assignment import assign
 from agents.mission.auction import Auction
 from agents.mission.constraints import avoiding, staying_near
-from agents.mission.finds import Finds, ground_place
+from agents.mission.finds import ground_place
 from agents.mission.half_planes import HalfPlane, nearest
 from agents.mission.pattern import Pattern, fitted
 from agents.mission.phone_filter import REFERENCE_LOSS_DB, PhoneFilter, PhoneModel
 from agents.mission.planner import Planner
 from fanet_mw.units import US, Enu, NodeId, S
-from fanet_mw.wire.inner import Survivor
-from fanet_mw.wire.search import WITHDRAWN, Bid, Found, Search, Status
+from fanet_mw.wire.search import WITHDRAWN, Bid, Search, Status
 
 MODEL = PhoneModel(power_dbm=15, exponent=3, shadowing_db=4, offset_db=1, threshold_dbm=-90)
 REACH_M = 250.0
@@ -318,22 +317,6 @@ def test_the_same_place_counts_once_for_a_node() -> None:
     assert phone.heard(2, Enu(5, 5, 50), -60)
 
 
-def test_somebody_seen_is_the_owner_of_the_phone_that_was_heard_there() -> None:
-    finds = Finds(MODEL)
-    for survivor, east in ((1, 0.0), (2, 160.0)):
-        for node in range(4):
-            at = Enu(east + 40 * node - 60, 30, 50)
-            report = Survivor(0, survivor, node + 1, at, rssi_dbm(Enu(east, 0, 0), at))
-            finds.report(report, now_ns=0, own=True)
-
-    def seen(east: float, north: float) -> int | None:
-        return finds.seen(Enu(east, north, 0), by=Enu(80, 30, 50), sigma_m=2, now_ns=S)
-
-    assert (seen(155, 5), seen(3, -4), seen(900, 900)) == (2, 1, None)
-    finds.told(Found(0, 1, 3, -4, 4, 0, 4, 9, confirmed=True), now_ns=S)
-    assert seen(3, -4) is None, "a survivor that was struck off is no news"
-
-
 @given(st.floats(-1000, 1000), st.floats(-1000, 1000), st.floats(20, 100), st.floats(-80, 80), st.floats(-80, 80))
 def test_a_camera_looks_at_the_ground_where_its_angles_lead(
     east: float, north: float, up: float, along: float, across: float
@@ -342,43 +325,3 @@ def test_a_camera_looks_at_the_ground_where_its_angles_lead(
     looked = ground_place(Enu(east, north, up), bearing_rad=bearing, elevation_rad=elevation)
     assert looked is not None
     assert math.hypot(looked[0] - east - along, looked[1] - north - across) < 1e-6 * (1 + abs(east) + abs(north))
-
-
-def test_who_was_seen_is_taken_for_the_owner_of_a_phone_only_when_enough_was_heard_of_it() -> None:
-    finds, truth = Finds(MODEL), Enu(0, 0, 0)
-
-    def hear(node: int, east: float, north: float) -> None:
-        at = Enu(east, north, 50)
-        finds.report(Survivor(0, 1, node, at, rssi_dbm(truth, at)), now_ns=0, own=True)
-
-    for north in (-60, -30, 0):
-        hear(1, 40, north)
-    assert finds.seen(Enu(2, 3, 0), by=Enu(40, 0, 50), sigma_m=2, now_ns=S) == 1
-    assert not finds.borne_out(1), "three powers by one node could be of anybody"
-    for north in (-60, -30, 0):
-        hear(2, -60, north)
-    assert finds.borne_out(1)
-
-
-def test_who_passes_alone_at_the_edge_of_the_area_hears_enough_to_tell_whose_phone_it_is() -> None:
-    finds, truth = Finds(MODEL), Enu(0, 0, 0)
-    for step in range(8):
-        assert not (step and finds.borne_out(1)), f"{step} powers by one node"
-        at = Enu(13, -100 + 30 * step, 50)
-        finds.report(Survivor(0, 1, 9, at, rssi_dbm(truth, at)), now_ns=0, own=True)
-        finds.known[1].filter.seen(0, 0, sigma_m=2)
-    assert finds.borne_out(1)
-
-
-def test_a_sighting_that_later_powers_contradict_is_forgotten() -> None:
-    finds, truth = Finds(MODEL), Enu(150, 0, 0)
-    for count, (node, east, north) in enumerate(
-        (node, east, north) for node, east in ((1, 90.0), (2, 210.0)) for north in (-60, -30, 0, 30, 60)
-    ):
-        at = Enu(east, north, 50)
-        finds.report(Survivor(0, 1, node, at, rssi_dbm(truth, at)), now_ns=0, own=True)
-        if count == 0:
-            finds.known[1].filter.seen(-60, 0, sigma_m=2)
-            finds.known[1].sightings = 2
-    assert not finds.borne_out(1)
-    assert finds.known[1].sightings == 0

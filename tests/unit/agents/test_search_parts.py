@@ -15,7 +15,7 @@ from agents.mission.motion import Motion, Navigation, Neighbors
 from agents.mission.obstacles import Obstacles
 from agents.mission.outbox import Outbox
 from agents.mission.pattern import fitted
-from agents.mission.phone_filter import REFERENCE_LOSS_DB, PhoneModel
+from agents.mission.phone_filter import REFERENCE_LOSS_DB, Estimate, PhoneModel
 from agents.mission.steering import ClearOfOthers, InReach, Steering
 from agents.mission.tasks import Tasks
 from fanet_mw.scenario import config
@@ -73,7 +73,7 @@ class Board:
                 at = Enu(truth.east + (40 if node % 2 else -60), truth.north + step + node, UP_M)
                 rssi_dbm = MODEL.power_dbm - REFERENCE_LOSS_DB - 30 * math.log10(at.minus(truth).norm())
                 report = Survivor(now_ns // US, survivor, node, at, rssi_dbm)
-                self.finds.report(report, now_ns=now_ns, own=False)
+                self.finds.report(report, now_ns=now_ns)
 
 
 def lane_of(node: int, at_ns: int) -> Enu:
@@ -181,8 +181,8 @@ def test_around_an_estimate_the_spiral_widens_until_somebody_is_seen() -> None:
         return math.hypot(east - place.east_m, north - place.north_m)
 
     assert (round(radius_m(0)), round(radius_m(20)), round(radius_m(40))) == (14, 44, 74)
-    board.finds.known[1].filter.seen(0, 0, sigma_m=2)
-    assert round(radius_m(41)) == 14
+    board.finds.known[1].filter.sighted(Estimate(0, 0, 4, 0, 4))
+    assert round(math.hypot(*board.approach.point(1, Estimate(0, 0, 4, 0, 4), 41 * S, responding=True))) == 40
 
 
 # --- announcing ---------------------------------------------------------------------------------------------------
@@ -194,22 +194,20 @@ def confirmed(board: Board) -> list[Found]:
     return [message for message in told if isinstance(message, Found) and message.confirmed]
 
 
-def seen_twice() -> Board:
+def seen() -> Board:
     board = Board(FOLLOWER, Enu(0, 0, UP_M))
     for node in range(1, 5):
         for east in (-60, 0, 60):
             at = Enu(east, 20.0 * node, UP_M)
             rssi_dbm = MODEL.power_dbm - REFERENCE_LOSS_DB - 30 * math.log10(at.norm())
-            board.finds.report(Survivor(0, 1, node, at, rssi_dbm), now_ns=0, own=True)
-    for _ in range(2):
-        assert board.finds.seen(Enu(1, 2, 0), by=Enu(0, 20, UP_M), sigma_m=2, now_ns=0) == 1
+            board.finds.report(Survivor(0, 1, node, at, rssi_dbm), now_ns=0)
+    board.finds.known[1].filter.sighted(Estimate(1, 2, 4, 0, 4))
     return board
 
 
 def test_a_confirmation_is_told_three_times_and_with_hellos_for_a_while() -> None:
-    board = seen_twice()
-    assert board.announcing.confirm(1, 0)
-    assert not board.announcing.confirm(1, 0), "once is enough"
+    board = seen()
+    board.announcing.confirm(1, 0)
     for second in range(30):
         board.announcing.tell(None, second * S)
     assert len(confirmed(board)) == 3
@@ -219,7 +217,7 @@ def test_a_confirmation_is_told_three_times_and_with_hellos_for_a_while() -> Non
 
 
 def test_who_still_reports_a_confirmed_survivor_is_told_by_one_in_four() -> None:
-    board = seen_twice()
+    board = seen()
     board.announcing.confirm(1, 0)
     report = Survivor(0, 1, 0, Enu(0, 0, UP_M), -70.0)
     for reporter in range(10, 14):

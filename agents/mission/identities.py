@@ -1,0 +1,202 @@
+"""Whose phone is it? A camera or a voice shows people and names nobody; a receiver names phones and shows nobody.
+
+    sightings near each other        -> one person, whose place is a Kalman filter's
+    people x phones, all at once     -> the assignment that makes what was heard of all phones together most likely
+    sure enough                      -> the owner is named: every other assignment of this person is less likely by far
+
+The cost of a pair is how much less likely the phone's powers are from the person's place than from the best place:
+twice a difference of logarithms, as chi-square with 2 degrees for the true pair. Two people side by side can be told
+apart only by many powers, so who is not sure yet waits and measures on; after a while less is asked for.
+"""
+
+import math
+from collections.abc import Sequence
+from dataclasses import dataclass
+from typing import Final
+
+from agents.mission.assignment import assign
+from agents.mission.finds import Finds
+from agents.mission.phone_filter import Estimate
+from fanet_mw.units import Enu, S
+
+_SAME_PERSON_M: Final = 12.0
+"""Sightings nearer to each other than this are of one person."""
+_SAME_SIGMAS: Final = 2.5
+"""So are sightings that are nearer than so many of their standard deviations, as those by a voice may be."""
+_GATE: Final = 16.0
+"""A person is rather nobody's whose phone was heard than the owner of one that this place makes so unlikely.
+Above 11.8, the 99.7 % of chi-square with 2 degrees: the shadowing of neighboring samples is not independent."""
+_VAGUE_M: Final = 80.0
+"""A phone whose place has a larger standard deviation than this could be anybody's."""
+_NEAR_M: Final = 400.0
+"""Phones that were first heard farther from a person are not that person's."""
+_FORGOTTEN_NS: Final = 60 * S
+_FALSE_ALARM_NS: Final = 10 * S
+"""A person that was seen once only, and not again within this time, was none."""
+_SIGHTINGS: Final = 2
+"""A person is confirmed after so many sightings from close by."""
+_SURE_M: Final = 3.5
+"""The largest standard deviation of a confirmed place."""
+_SAMPLES: Final = 6
+_REPORTERS: Final = 2
+"""Fewer received powers, or by fewer nodes, do not tell whose phone it is."""
+_SAMPLES_ALONE: Final = 8
+"""As many by one node do: it has passed by, and at the edge of the area nobody else may ever hear that phone."""
+_MARGIN: Final = 9.0
+"""By how much the next best assignment must cost more: it is then 90 times less likely."""
+_IMPOSSIBLE: Final = 1e6
+_LEAST_MARGIN: Final = 2.0
+_PATIENT_NS: Final = 15 * S
+_IMPATIENT_NS: Final = 50 * S
+"""From the first sighting on: until then the whole margin is asked for, from then on the least one."""
+_TAKEN_GATE: Final = 6.0
+_TAKEN_SIGHTINGS: Final = 20
+"""Where somebody has been confirmed a second person may lie: so many further sightings there, and a phone that fits."""
+_TAKEN_SIGMA_M: Final = 30.0
+
+
+@dataclass
+class Person:
+    """Somebody on the ground."""
+
+    place: Estimate
+    first_ns: int
+    last_ns: int
+    sightings: int = 1
+    close: int = 0
+    """How many of the sightings were from close by."""
+    owner_of: int | None = None
+    """The survivor whose phone this person was last taken to carry."""
+    taken: int | None = None
+    """How often the person had been seen when somebody was confirmed there; None: nobody was."""
+
+    def seen(self, at: Enu, variance_m2: float, now_ns: int) -> None:
+        """One more sighting: a Kalman filter with the same variance along each axis."""
+        before = self.place
+        gain = before.east_variance_m2 / (before.east_variance_m2 + variance_m2)
+        self.place = Estimate(
+            before.east_m + gain * (at.east - before.east_m),
+            before.north_m + gain * (at.north - before.north_m),
+            before.east_variance_m2 * (1 - gain),
+            0.0,
+            before.north_variance_m2 * (1 - gain),
+        )
+        self.sightings += 1
+        self.last_ns = now_ns
+
+
+class Identities:
+    """The people whom one UAV has seen, and whose phones they carry."""
+
+    def __init__(self, finds: Finds) -> None:
+        self._finds = finds
+        self._people: list[Person] = []
+
+    def seen(self, at: Enu, *, sigma_m: float, close: bool, now_ns: int) -> int | None:
+        """A sensor shows somebody; `close`: from so near that it is certainly a person.
+
+        Returns the survivor whose phone that person was last taken to carry.
+        """
+        near = min(self._people, key=lambda person: person.place.distance_m(at), default=None)
+        variance = sigma_m * sigma_m
+        if near is None or near.place.distance_m(at) > max(_SAME_PERSON_M, _SAME_SIGMAS * sigma_m):
+            near = Person(Estimate(at.east, at.north, variance, 0.0, variance), now_ns, now_ns)
+            self._people.append(near)
+        else:
+            near.seen(at, variance, now_ns)
+        near.close += close
+        return near.owner_of
+
+    def review(self, now_ns: int) -> list[int]:
+        """Assign phones to people anew; the survivors who may be confirmed now, in order of id."""
+        self._people = [person for person in self._people if _is_remembered(person, now_ns)]
+        for survivor in self._finds.open():
+            self._finds.known[survivor].filter.sighted(None)
+        people = [person for person in self._people if self._may_be_named(person, now_ns)]
+        phones = self._phones(people)
+        if not people or not phones:
+            return []
+        costs = [[self._cost(person, phone) for phone in phones] for person in people]
+        nobody = [_GATE if person.taken is None else _TAKEN_GATE for person in people]
+        least, chosen = _assigned(costs, nobody)
+        sure = []
+        for row, (person, column) in enumerate(zip(people, chosen, strict=True)):
+            person.owner_of = None if column is None else phones[column]
+            if column is None:
+                continue
+            survivor = phones[column]
+            self._finds.known[survivor].filter.sighted(person.place)
+            if self._is_confirmable(person, survivor):
+                margin = self._next_best(costs, nobody, row, column, person) - least
+                if margin >= _asked_for(person, now_ns):
+                    sure.append(survivor)
+        return sorted(sure)
+
+    def _may_be_named(self, person: Person, now_ns: int) -> bool:
+        """False where somebody has been confirmed, until further sightings say that a second person lies there."""
+        at = Enu(person.place.east_m, person.place.north_m, 0.0)
+        taken = any(
+            find.confirmed is not None
+            and (place := find.place()) is not None
+            and place.distance_m(at) <= _SAME_PERSON_M
+            for find in self._finds.known.values()
+        )
+        if taken and person.taken is None:
+            person.taken, person.first_ns = person.sightings, now_ns
+        return person.taken is None or person.sightings - person.taken >= _TAKEN_SIGHTINGS
+
+    def _next_best(
+        self, costs: Sequence[Sequence[float]], nobody: Sequence[float], row: int, column: int, person: Person
+    ) -> float:
+        """The least cost if this person carries another phone, or at a place that is taken, none."""
+        others = [list(one) for one in costs]
+        others[row][column] = _IMPOSSIBLE
+        bound = list(nobody)
+        bound[row] += _MARGIN if person.taken is None else 0.0
+        return _assigned(others, bound)[0]
+
+    def _phones(self, people: Sequence[Person]) -> list[int]:
+        """The open survivors whose phones one of these people may carry."""
+        places = [Enu(person.place.east_m, person.place.north_m, 0.0) for person in people]
+        return [
+            survivor
+            for survivor in self._finds.open()
+            if self._finds.known[survivor].reporters
+            and any(self._finds.known[survivor].filter.near(place, within_m=_NEAR_M) for place in places)
+        ]
+
+    def _cost(self, person: Person, survivor: int) -> float:
+        place = person.place
+        return min(_IMPOSSIBLE, self._finds.known[survivor].filter.deficit(place.east_m, place.north_m))
+
+    def _is_confirmable(self, person: Person, survivor: int) -> bool:
+        """Whether enough was seen of a person, and enough heard of a phone."""
+        find = self._finds.known[survivor]
+        enough = _SAMPLES if len(find.reporters) >= _REPORTERS else _SAMPLES_ALONE
+        heard = find.filter.heard_from()
+        return (
+            person.close >= _SIGHTINGS
+            and person.place.sigma_m <= _SURE_M
+            and find.filter.samples >= enough
+            and heard is not None
+            and heard.sigma_m <= (_VAGUE_M if person.taken is None else _TAKEN_SIGMA_M)
+        )
+
+
+def _is_remembered(person: Person, now_ns: int) -> bool:
+    return now_ns - person.last_ns <= (_FORGOTTEN_NS if person.sightings > 1 else _FALSE_ALARM_NS)
+
+
+def _asked_for(person: Person, now_ns: int) -> float:
+    """The margin that is asked for: less and less, the longer a person has been seen."""
+    share = (now_ns - person.first_ns - _PATIENT_NS) / (_IMPATIENT_NS - _PATIENT_NS)
+    return _MARGIN - (_MARGIN - _LEAST_MARGIN) * min(1.0, max(0.0, share))
+
+
+def _assigned(costs: Sequence[Sequence[float]], nobody: Sequence[float]) -> tuple[float, list[int | None]]:
+    """The least total, and the phone of each person; `nobody`: what it costs that a person carries none of them."""
+    phones, people = len(costs[0]), len(costs)
+    table = [[*row, *(nobody[i] if i == j else _IMPOSSIBLE for j in range(people))] for i, row in enumerate(costs)]
+    chosen = assign(table)
+    total = math.fsum(table[i][column] for i, column in enumerate(chosen))
+    return total, [column if column < phones else None for column in chosen]

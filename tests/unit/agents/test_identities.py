@@ -1,0 +1,181 @@
+"""Whose phone is it: one UAV's camera shows people, its receiver and its neighbors' name phones."""
+
+import math
+import random
+from collections.abc import Iterator
+from typing import Final
+
+from agents.mission.finds import Finds
+from agents.mission.identities import Identities
+from agents.mission.phone_filter import REFERENCE_LOSS_DB, PhoneModel
+from fanet_mw.units import US, Enu, S
+from fanet_mw.wire.inner import Survivor
+from fanet_mw.wire.search import Found
+
+MODEL: Final = PhoneModel(power_dbm=15, exponent=3, shadowing_db=4, offset_db=1, threshold_dbm=-90)
+UP_M: Final = 65.0
+LANE_M: Final = 177.0
+SIDE_M: Final = 62.0
+"""How far to the side a camera sees."""
+CIRCLE_M: Final = 40.0
+
+
+def mean_dbm(truth: Enu, at: Enu) -> float:
+    return MODEL.power_dbm - REFERENCE_LOSS_DB - 30 * math.log10(at.minus(truth).norm())
+
+
+class Uav:
+    """What one UAV knows."""
+
+    def __init__(self) -> None:
+        self.finds = Finds(MODEL)
+        self.identities = Identities(self.finds)
+        self.named: dict[int, Enu] = {}
+
+    def hear(self, survivor: int, node: int, at: Enu, rssi_dbm: float, *, now_ns: int = 0) -> None:
+        self.finds.report(Survivor(now_ns // US, survivor, node, at, rssi_dbm), now_ns=now_ns)
+
+    def see(self, *people: Enu, now_ns: int) -> list[int]:
+        """An image from close by; who may be confirmed, is."""
+        for at in people:
+            self.identities.seen(at, sigma_m=2, close=True, now_ns=now_ns)
+        sure = self.identities.review(now_ns)
+        for survivor in sure:
+            place = self.finds.known[survivor].place()
+            assert place is not None
+            self.finds.told(Found(now_ns // US, survivor, *place, 1, confirmed=True), now_ns=now_ns)
+            self.named[survivor] = Enu(place.east_m, place.north_m, 0)
+        return sure
+
+
+class Pass:
+    """Three UAVs fly north in lanes beside each other; the middle one circles about whom it has not confirmed yet."""
+
+    def __init__(self, seed: int, *, apart_m: float) -> None:
+        self._random = random.Random(f"pass/{seed}")
+        angle, east = self._random.uniform(0, 2 * math.pi), self._random.uniform(-80, 80)
+        half = Enu(apart_m / 2 * math.cos(angle), apart_m / 2 * math.sin(angle), 0)
+        self.truth = {1: Enu(east + half.east, half.north, 0), 2: Enu(east - half.east, -half.north, 0)}
+        self._shadowing: dict[tuple[int, int, int], float] = {}
+        self.uav = Uav()
+
+    def fly(self) -> None:
+        here, step_m = Enu(0, -250, UP_M), 5.0
+        for step in range(150):
+            now_ns, line = step * S // 2, -250 + 3.75 * step
+            goal = self._goal(line, step)
+            off = goal.minus(here)
+            share = min(1.0, step_m / max(1e-9, off.norm()))
+            here = Enu(here.east + share * off.east, here.north + share * off.north, UP_M)
+            if step % 2 == 0:
+                self._listen((here, Enu(LANE_M, line, UP_M), Enu(-LANE_M, line, UP_M)), now_ns)
+            self.uav.see(*self._image(here), now_ns=now_ns)
+
+    def _goal(self, line: float, step: int) -> Enu:
+        finds = self.uav.finds
+        places = [finds.known[survivor].place() for survivor in finds.open()]
+        near = [
+            place for place in places if place is not None and place.sigma_m < 50 and abs(place.north_m - line) < 140
+        ]
+        if not near:
+            return Enu(0, line, UP_M)
+        east = near[0].east_m + CIRCLE_M * math.cos(step / 8)
+        north = near[0].north_m + CIRCLE_M * math.sin(step / 8)
+        return Enu(max(-58.0, min(58.0, east)), max(line - 140, min(line, north)), UP_M)
+
+    def _listen(self, places: tuple[Enu, ...], now_ns: int) -> None:
+        for survivor, truth in self.truth.items():
+            for node, at in enumerate(places, start=1):
+                cell = survivor, math.floor(at.east / 25), math.floor(at.north / 25)
+                shadowing_db = self._shadowing.setdefault(cell, self._random.gauss(0, MODEL.shadowing_db))
+                rssi_dbm = mean_dbm(truth, at) + shadowing_db
+                if rssi_dbm >= MODEL.threshold_dbm:
+                    self.uav.hear(survivor, node, at, rssi_dbm, now_ns=now_ns)
+                elif node == 1 and survivor in self.uav.finds.open():
+                    self.uav.finds.known[survivor].filter.silent(at)
+
+    def _image(self, here: Enu) -> Iterator[Enu]:
+        for truth in self.truth.values():
+            if max(abs(truth.east - here.east), abs(truth.north - here.north)) < SIDE_M and self._random.random() < 0.8:
+                yield Enu(truth.east + self._random.gauss(0, 1.5), truth.north + self._random.gauss(0, 1.5), 0)
+
+
+def test_two_who_lie_60_m_apart_are_not_taken_for_each_other() -> None:
+    right = wrong = 0
+    for seed in range(20):
+        passed = Pass(seed, apart_m=60)
+        passed.fly()
+        for survivor, place in passed.uav.named.items():
+            if place.minus(passed.truth[survivor]).norm() < 25:
+                right += 1
+            else:
+                wrong += 1
+    assert wrong <= 2
+    assert right >= 36
+
+
+def test_somebody_seen_is_the_owner_of_the_phone_that_was_heard_there() -> None:
+    uav, truth = Uav(), {1: Enu(0, 0, 0), 2: Enu(160, 0, 0)}
+    for survivor, at in truth.items():
+        for node in range(1, 5):
+            for north in (-60, 0, 60):
+                place = Enu(at.east + 40 * node - 100, north, UP_M)
+                uav.hear(survivor, node, place, mean_dbm(at, place))
+    assert uav.see(Enu(155, 5, 0), Enu(3, -4, 0), Enu(900, 900, 0), now_ns=0) == [], "nobody is sure by one image"
+    assert uav.see(Enu(155, 5, 0), Enu(3, -4, 0), Enu(900, 900, 0), now_ns=S) == [1, 2]
+    assert uav.named[2].minus(truth[2]).norm() < 10
+    assert uav.see(Enu(155, 5, 0), now_ns=2 * S) == [], "a survivor that was struck off is no news"
+
+
+def test_few_powers_by_one_node_do_not_tell_whose_phone_it_is() -> None:
+    uav = Uav()
+    for count in range(8):
+        assert uav.see(Enu(0, 0, 0), now_ns=count * S) == [], f"{count} powers by one node"
+        at = Enu(13, -100 + 30 * count, UP_M)
+        uav.hear(1, 9, at, mean_dbm(Enu(0, 0, 0), at))
+    assert uav.see(Enu(0, 0, 0), now_ns=9 * S) == [1]
+
+
+def test_the_powers_of_several_nodes_tell_sooner() -> None:
+    uav = Uav()
+    for node, east in ((1, 40), (2, -60)):
+        for north in (-60, 0, 60):
+            assert uav.see(Enu(2, 3, 0), now_ns=0) == []
+            at = Enu(east, north, UP_M)
+            uav.hear(1, node, at, mean_dbm(Enu(0, 0, 0), at))
+    assert uav.see(Enu(2, 3, 0), now_ns=S) == [1]
+
+
+def test_while_two_phones_fit_one_person_nobody_is_named_until_waiting_longer_is_of_no_use() -> None:
+    uav = Uav()
+    for survivor, east in ((1, 0.0), (2, 4.0)):
+        for node in range(1, 5):
+            for north in (-60, 0, 60):
+                at = Enu(40.0 * node - 100, north, UP_M)
+                uav.hear(survivor, node, at, mean_dbm(Enu(east, 0, 0), at))
+    assert not any(uav.see(Enu(0, 0, 0), now_ns=second * S) for second in range(50))
+
+
+def test_a_sighting_that_was_not_repeated_is_forgotten_and_names_nobody() -> None:
+    uav = Uav()
+    for node in range(1, 5):
+        for north in (-60, 0, 60):
+            at = Enu(40.0 * node - 100, north, UP_M)
+            uav.hear(1, node, at, mean_dbm(Enu(0, 0, 0), at))
+    uav.see(Enu(0, 0, 0), now_ns=0)
+    assert uav.finds.known[1].filter.is_seen
+    uav.see(now_ns=11 * S)
+    assert not uav.finds.known[1].filter.is_seen
+
+
+def test_where_somebody_is_confirmed_a_second_person_is_named_only_after_many_more_sightings() -> None:
+    uav = Uav()
+    for survivor in (1, 2):
+        for node in range(1, 5):
+            for north in (-60, 0, 60):
+                at = Enu(40.0 * node - 100, north, UP_M)
+                uav.hear(survivor, node, at, mean_dbm(Enu(0, 0, 0), at))
+    uav.finds.told(Found(0, 1, 1.0, 1.0, 4.0, 0.0, 4.0, 9, confirmed=True), now_ns=0)
+    named = [second for second in range(90) if uav.see(Enu(0, 0, 0), now_ns=second * S)]
+    assert uav.named.keys() == {2}
+    assert named[0] >= 20

@@ -60,4 +60,4 @@ def _run(radio: Mapping[str, object]) -> None:
 if __name__ == "__main__":
     if must_compile():
         sys.stderr.write(f"{COMPILING_NOTICE}\n")
-    warm_up()
+        warm_up()

@@ -27,7 +27,13 @@ def agent_or_fuzzer(*, scenario: Scenario, joining: Joining, node: int, **others
 def test_near_misses_off_a_real_time_air_end_no_process_and_close_the_books(monkeypatch: pytest.MonkeyPatch) -> None:
     monkeypatch.setattr("sim.run.swarm.run_agent", agent_or_fuzzer)
     times = ["duration_s=5", "warmup_s=1", "drain_s=1"]
-    settings = ["clusters.relay=cds", "clusters.flooding_period_s=0.5", "clusters.repair_s=5", "clock.sync=beacons"]
+    settings = [
+        "radio.lead_ms=150",
+        "clusters.relay=cds",
+        "clusters.flooding_period_s=0.5",
+        "clusters.repair_s=5",
+        "clock.sync=beacons",
+    ]
     scenario = catalog.find("quick", [*times, *settings])
     outcome = asyncio.run(launch(scenario, swarm="test"))
     summary = finish(outcome, out=None)

@@ -107,21 +107,21 @@ def test_a_digest_that_is_ahead_by_half_of_all_numbers_costs_nothing() -> None:
         holdings = tuple(Holding(node, ahead, 0xFFFF_FFFF) for node in range(1, 10))
         return hello(t_ns, seq, beacon(), Digest(holdings, complete=True).encode_frames(EVIL))
 
-    began = time.perf_counter()
+    began = time.process_time()
     summary, _ = attacked(scenario("clusters.repair_s=20"), every(100, lie))
     assert summary["pdr"] > 0.97
-    assert time.perf_counter() - began < 30
+    assert time.process_time() - began < 30
 
 
 def test_sequence_numbers_of_the_far_future_are_refused_and_cost_nothing() -> None:
     def leap(t_ns: int, seq: int) -> bytes:
         return packet(wire.filler(100), by=EVIL, t_ns=t_ns, seq=0x4000_0000 + 77 * seq, origin=1 + seq % 9)
 
-    began = time.perf_counter()
+    began = time.process_time()
     summary, reports = attacked(scenario("clusters.repair_s=20"), every(50, leap))
     assert dropped(reports, "forged") > 100
     assert summary["pdr"] > 0.97
-    assert time.perf_counter() - began < 30
+    assert time.process_time() - began < 30
 
 
 def test_a_join_of_a_head_from_255_hops_away_ends_nobody() -> None:
@@ -146,12 +146,12 @@ def test_ghosts_do_not_join() -> None:
         inner = Join(origin, Enu(seq, seq, 50), Enu(0, 0, 0)).encode_frame(origin)
         return packet(inner, by=EVIL, t_ns=t_ns, seq=CONTROL + seq, origin=origin, kind=Kind.JOIN)
 
-    began = time.perf_counter()
+    began = time.process_time()
     summary, reports = attacked(scenario(), every(2, ghost))
     assert dropped(reports, "unknown_node") > 5000
     assert reports["agent-1"]["epoch"] <= 5
     assert summary["pdr"] > 0.9
-    assert time.perf_counter() - began < 45
+    assert time.process_time() - began < 45
 
 
 @pytest.mark.parametrize("relay", ["cds", "mpr", "heads", "claimed"])

@@ -39,15 +39,18 @@ async def emulator(
     with Bus.serve(endpoint) as bus:
         bus.subscribe(Topics(swarm).report("emulator"), lambda _, payload: reports.append(payload))
         keeper = ClockKeeper(bus, Topics(swarm), time_scale=time_scale, expected=["emulator"])
-        host = asyncio.create_task(run_actor(Medium(scenario, swarm), Joining(swarm, endpoint), until_ns=60 * S))
-        clock = SwarmClock(await keeper.start(timeout_s=10))
+        host = asyncio.create_task(run_actor(Medium(scenario, swarm), Joining(swarm, endpoint), until_ns=1000 * S))
+        clock = SwarmClock(await keeper.start(timeout_s=60))
         await asyncio.sleep(clock.wait_s(10 * MS))
         try:
             yield endpoint, clock
         finally:
             keeper.stop()
             await host
-            await asyncio.sleep(0.1)
+            for _ in range(600):  # the last report is on its way
+                if reports and b'"final": true' in reports[-1]:
+                    break
+                await asyncio.sleep(0.1)
 
 
 async def command(*tokens: str) -> int:

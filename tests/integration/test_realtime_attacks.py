@@ -52,19 +52,17 @@ class Attacker:
         self._thread.join()
 
 
-def attacked(puts: list[tuple[str, list[Message]]], *settings: str) -> tuple[Outcome, float]:
-    """A run under attack, and how long it took from its start to its end [s]."""
+def attacked(puts: list[tuple[str, list[Message]]], *settings: str) -> Outcome:
+    """A run under attack."""
     endpoint = free_endpoint()
-    began = time.monotonic()
     with Attacker(endpoint, puts) as attacker:
         scenario = catalog.find("quick", [*SMALL, *settings])
-        outcome = asyncio.run(launch(scenario, swarm="test", listen=endpoint, on_started=attacker.start))
-    return outcome, time.monotonic() - began
+        return asyncio.run(launch(scenario, swarm="test", listen=endpoint, on_started=attacker.start))
 
 
 def test_a_forged_clock_that_is_stopped_stops_nobody() -> None:
     """Without an access list anyone may put on the clock's topic, but only its keeper's answer counts."""
-    outcome, _ = attacked([(NAMES.clock, [Clock(0, 1.0, ClockState.STOPPED), Clock(5, 50.0, ClockState.RUNNING)])])
+    outcome = attacked([(NAMES.clock, [Clock(0, 1.0, ClockState.STOPPED), Clock(5, 50.0, ClockState.RUNNING)])])
     assert {report["final"] for report in outcome.reports.values()} == {True}
     assert max(record.t_ns for record in outcome.records if isinstance(record, Delivered)) > 2.5 * S
     assert outcome.aborted is None
@@ -79,7 +77,7 @@ def test_nonsense_for_the_launcher_is_counted_and_the_result_is_that_of_the_swar
         (NAMES.trace("agent-77"), [TraceBatch((Generated(S, 77, 1, "traffic", 5),))]),
         (NAMES.mavlink(3), [MavlinkTap(2**63 - 1, b""), MavlinkTap(S, b"no frame")]),
     ]
-    outcome, _ = attacked(nonsense)
+    outcome = attacked(nonsense)
     summary = finish(outcome, out=tmp_path)
     assert set(summary["heard"]["why"]) == {
         "report: shape", "trace: node", "trace: survivor", "trace: unknown actor", "telemetry: instant",
@@ -103,7 +101,7 @@ def test_a_put_longer_than_anyone_means_ends_where_it_arrives() -> None:
         time.sleep(0.5)
         for size in (1_000, 5_000_000, MAX_PUT_BYTES + 1, 40_000_000, 2_000):
             sender.put("x", bytes(size), reliable=True)
-        for _ in range(200):
+        for _ in range(1200):
             if len(heard) >= 6:
                 break
             time.sleep(0.05)

@@ -20,7 +20,7 @@ ROOT = Path(__file__).parents[2]
 SMALL = [
     "--set", "nodes.count=2", "nodes.spacing_m=100", "clusters.count=1", "world.engine=kinematic",
     "mission.survivors=0", "traffic.sources=1", "traffic.interval_s=0.2", "warmup_s=1", "drain_s=1",
-    "mobility.model=static", "radio.late_limit=1", "routing.protocol=flooding", "--duration", "4",
+    "mobility.model=static", "radio.late_limit=1", "radio.lead_ms=150", "routing.protocol=flooding", "--duration", "4",
 ]  # fmt: skip
 
 
@@ -65,10 +65,10 @@ def test_a_world_and_a_reader_that_know_zenoh_alone(processes: Processes, tmp_pa
     assert summary["pdr"] > 0.5, err
     assert summary["absent"] == {}, "no report is asked of a world of somebody else"
     reader.send_signal(signal.SIGINT)
-    heard = json.loads(reader.communicate(timeout=20)[0])
+    heard = json.loads(reader.communicate(timeout=60)[0])
     assert heard["2"]["frames"] > 5
     assert heard["2"]["bytes"] > 256 * 5
-    assert world.wait(timeout=20) == 0, world.communicate()[1]
+    assert world.wait(timeout=60) == 0, world.communicate()[1]
 
 
 def _router(endpoint: str) -> Bus:
@@ -99,7 +99,7 @@ def test_a_router_names_who_is_wrong_and_writes_what_the_right_ones_did(processe
     assert summary["pdr"] > 0.5
     assert summary["absent"] == {}
     assert "traffic" in out
-    assert [service.wait(timeout=20) for service in services] == [0, 0, 0, 0]
+    assert [service.wait(timeout=60) for service in services] == [0, 0, 0, 0]
 
 
 def _until(router: "subprocess.Popen[str]", wanted: str) -> list[str]:

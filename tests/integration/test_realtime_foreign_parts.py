@@ -14,7 +14,8 @@ def test_every_process_of_a_swarm_finds_the_parts(tmp_path: Path) -> None:
     path = os.pathsep.join((str(EXAMPLE / "src"), str(ROOT)))
     changes = ["routing.protocol=swarm_parts.gossip3:Gossip3", "mobility.model=swarm_parts.orbit:Orbit",
                "radio.channel=swarm_parts.rain:Rain", "applications.0.use=swarm_parts.roll_call:RollCall",
-               "nodes.count=4", "traffic.sources=3", "warmup_s=1", "drain_s=2", "radio.late_limit=1"]  # fmt: skip
+               "nodes.count=4", "traffic.sources=3", "warmup_s=1", "drain_s=2", "radio.late_limit=1",
+               "radio.lead_ms=150"]  # fmt: skip
     launch = [sys.executable, "-m", "fanet_mw", "launch", str(EXAMPLE / "scenario.toml"), "--set", *changes]
     ended = subprocess.run(
         [*launch, "--duration", "6", "--json"], cwd=tmp_path, env={**os.environ, "PYTHONPATH": path},

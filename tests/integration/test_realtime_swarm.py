@@ -23,13 +23,16 @@ from fanet_mw import tlog
 from fanet_mw.errors import BusError
 from fanet_mw.scenario import Scenario
 from fanet_mw.trace import ProcessEnded
-from fanet_mw.units import NodeId
+from fanet_mw.units import NodeId, S
 from sim.results.files import finish
 from sim.run.outcome import Outcome
 from sim.run.swarm import SwarmRun, launch
 from sim.scenarios import catalog
 
-FAST = ["duration_s=5", "warmup_s=2", "drain_s=1", "clusters.flooding_period_s=0.5"]
+FAST = ["duration_s=5", "warmup_s=2", "drain_s=1", "clusters.flooding_period_s=0.5", "radio.lead_ms=150"]
+"""The lead is long, because these tests ask what happens and not whether a busy machine is on time."""
+PATIENCE_S = 90
+"""How long to wait for what ends soon by itself: longer than any machine needs, shorter than a test may take."""
 
 
 def scenario(*overrides: str) -> Scenario:
@@ -75,7 +78,7 @@ def _nothing_left_behind() -> Iterator[None]:
 @pytest.mark.parametrize("relay", ["scheduled", "claimed"])
 def test_turns_announced_ahead_are_kept_by_real_processes(relay: str) -> None:
     """Collision-free floods leave no time between hops but the lead: what is late is lost."""
-    keys = ["nodes.count=9", "nodes.layout=grid", "traffic.sources=8", "clusters.count=8", "radio.lead_ms=40"]
+    keys = ["nodes.count=9", "nodes.layout=grid", "traffic.sources=8", "clusters.count=8", "radio.lead_ms=100"]
     times = ["duration_s=11", "warmup_s=7.5", "drain_s=1", f"clusters.relay={relay}"]
     summary = finish(run(catalog.find("clusters", [*keys, *times]))[0], out=None)
     assert summary["frames"]["closes"]
@@ -119,16 +122,11 @@ def test_a_killed_agent_is_started_again_with_respawn_and_takes_part() -> None:
     assert report["role"] != "isolated", "it has learned its place from the schedule"
 
 
-def test_without_the_emulator_the_run_ends_within_three_seconds_with_a_partial_result() -> None:
-    killed: list[float] = []
-
-    def act(swarm: SwarmRun) -> None:
-        killed.append(time.monotonic())
-        kill("emulator")(swarm)
-
-    outcome, events = run(scenario("duration_s=60"), at_s=1.5, act=act)
-    assert time.monotonic() - killed[0] < 5
+def test_without_the_emulator_the_run_ends_at_once_with_a_partial_result() -> None:
+    outcome, events = run(scenario("duration_s=1000"), at_s=1.5, act=kill("emulator"))
     assert outcome.aborted is not None
+    assert outcome.ended_ns is not None
+    assert outcome.ended_ns < 100 * S
     assert "emulator ended with signal SIGKILL" in outcome.aborted
     assert outcome.aborted in events
     assert not finish(outcome, out=None)["lateness"]["valid"]
@@ -146,7 +144,7 @@ def test_ctrl_c_ends_everything_cleanly_with_a_partial_result() -> None:
             break
     time.sleep(1.5)
     process.send_signal(signal.SIGINT)
-    out, err = process.communicate(timeout=15)
+    out, err = process.communicate(timeout=PATIENCE_S)
     assert process.returncode == 1
     assert b"interrupted by SIGINT" in err
     assert b"Traceback" not in err
@@ -172,7 +170,7 @@ def at_start(number: int, *, after_s: float) -> tuple[int, str]:
     wait_until_signals_are_handled(process.pid)
     time.sleep(after_s)
     os.killpg(process.pid, number)
-    _, err = process.communicate(timeout=30)
+    _, err = process.communicate(timeout=PATIENCE_S)
     return process.returncode, err
 
 
@@ -231,7 +229,7 @@ def test_who_has_to_compile_says_so_first_and_can_be_interrupted(service: str, t
     assert process.stderr is not None
     assert "compiling the emulator's kernel, once" in process.stderr.readline()
     process.send_signal(signal.SIGINT)
-    _, err = process.communicate(timeout=30)
+    _, err = process.communicate(timeout=PATIENCE_S)
     assert (process.returncode, err) == (130, "")
 
 
@@ -258,7 +256,7 @@ def test_a_launched_swarm_is_found_by_other_commands(tmp_path: Path, monkeypatch
         done = subprocess.run(command(*arguments), capture_output=True, text=True, check=False, timeout=60)
         assert (done.returncode, done.stderr) == (0, ""), arguments
     process.send_signal(signal.SIGTERM)
-    process.communicate(timeout=30)
+    process.communicate(timeout=PATIENCE_S)
     assert list((tmp_path / "fanet-mw").iterdir()) == []
 
 
@@ -314,9 +312,9 @@ def test_services_started_one_by_one_make_a_swarm() -> None:
         for service in services
     ]
     for child in children:
-        _, err = child.communicate(timeout=60)
+        _, err = child.communicate(timeout=PATIENCE_S)
         assert child.returncode == 0, err.decode()
-    router.communicate(timeout=15)
+    router.communicate(timeout=PATIENCE_S)
     assert router.returncode == 0
 
 

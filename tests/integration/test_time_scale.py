@@ -14,7 +14,7 @@ from fanet_mw.bus.messages import Report, TxRequest
 from fanet_mw.bus.topics import Topics
 from fanet_mw.hosts.bus import Bus
 from fanet_mw.trace import Generated
-from fanet_mw.units import BROADCAST, MS, S
+from fanet_mw.units import BROADCAST, S
 from sim.results.files import finish
 from sim.run.swarm import launch
 from sim.run.virtual import simulate
@@ -27,26 +27,26 @@ pytestmark = pytest.mark.serial
 async def test_a_lead_is_swarm_time_so_that_a_slow_clock_gives_slow_processes_more_of_it(
     time_scale: float, *, late: bool
 ) -> None:
-    """Requests announced 30 ms ahead reach the medium 60 ms of wall time later."""
+    """Requests announced 1 s ahead reach the medium 2 s of wall time later: with the slow clock 2 s of it are left."""
     reports: list[bytes] = []
     names = Topics("scaled")
     async with emulator("scaled", reports, time_scale=time_scale) as (endpoint, clock):
         with Bus.join(endpoint) as bus:
+            start_ns = clock.now_ns() + S
+            await asyncio.sleep(2)
             for seq in range(10):
-                start_ns = clock.now_ns() + 30 * MS
-                await asyncio.sleep(0.06)
                 request = TxRequest(seq, start_ns, b"frame", BROADCAST, wants_status=False)
                 bus.put(names.radio_tx(1), topics.encode([request]))
-            await asyncio.sleep(0.2)
+            await asyncio.sleep(0.5)
     (last,) = topics.decode(reports[-1])
     assert isinstance(last, Report)
     found = json.loads(last.json)["late"]
     assert found["frames"] == 10
     if late:
         assert found["late_frames"] == 10
-        assert 25 < found["max_ms"] < 1000
-    else:  # 15 ms of swarm time after they were announced; one or two may meet a busy machine
-        assert found["late_frames"] <= 2
+        assert found["max_ms"] > 990
+    else:
+        assert found["late_frames"] == 0
 
 
 @pytest.mark.parametrize("time_scale", [0.5, 2.0])
@@ -58,7 +58,7 @@ async def test_a_swarm_of_processes_lives_by_its_clock(tmp_path: Path, time_scal
         "world.engine=kinematic",
         "duration_s=3",
     ]
-    changes += ["warmup_s=1", "drain_s=0.5", "traffic.interval_s=0.25", "radio.lead_ms=40"]
+    changes += ["warmup_s=1", "drain_s=0.5", "traffic.interval_s=0.25", "radio.lead_ms=400"]
     changes.append(f"time_scale={time_scale}")
     scenario = catalog.find("quick", changes)
     pcap = tmp_path / "air.pcap"
@@ -66,7 +66,7 @@ async def test_a_swarm_of_processes_lives_by_its_clock(tmp_path: Path, time_scal
     outcome = await launch(scenario, swarm="scaled", emulator_options={"pcap": pcap, "receptions": False})
     summary, virtual = finish(outcome, out=tmp_path), finish(simulate(scenario), out=None)
     assert summary["time_scale"] == time_scale
-    assert 3 / time_scale <= summary["wall_s"] < 3 / time_scale + 2
+    assert summary["wall_s"] >= 3 / time_scale
     assert summary["frames"]["closes"]
     assert summary["aborted"] is None
     assert summary["generated"] == virtual["generated"], "as much happens in a swarm second as ever"

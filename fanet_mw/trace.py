@@ -367,6 +367,11 @@ def kind_of(record: Record) -> str:
     return _NAMES[type(record)]
 
 
+def name_of(kind: type[Record]) -> str:
+    """The name of a kind, as in the trace file."""
+    return _NAMES[kind]
+
+
 def line(record: Record) -> str:
     """A record as one JSON array, without newline: `["delivered", t_ns, node, ...]` in the order of fields."""
     if type(record) is Delivered:  # nine lines in ten are such; formatting is four times as fast as json.dumps
@@ -390,5 +395,6 @@ __all__ = [
     "Approaching", "Arrived", "BoundStated", "ClockSampled", "Collided", "Confirmed", "ConflictForeseen",
     "ConflictOver", "DeadlineLost", "DeadlineMet", "Delivered", "Detected", "DropReason", "Dropped",
     "FlightModeChanged", "Generated", "LetOut", "LikelyStated", "MissionModeChanged", "Planned", "Posed",
-    "ProcessEnded", "RadioFault", "Record", "RoleChanged", "Sighted", "Warned", "kind_of", "line", "parse",
+    "ProcessEnded", "RadioFault", "Record", "RoleChanged", "Sighted", "Warned", "kind_of", "line", "name_of",
+    "parse",
 ]  # fmt: skip

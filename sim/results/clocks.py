@@ -12,6 +12,7 @@ import numpy.typing as npt
 
 from fanet_mw.trace import ClockSampled, Delivered, Generated, Record
 from fanet_mw.units import US, S
+from sim.results.stored import of
 from sim.run.outcome import Outcome
 
 
@@ -34,7 +35,7 @@ def errors_ns(samples: Sequence[ClockSampled]) -> list[tuple[ClockSampled, int]]
 
 def clock_errors(outcome: Outcome) -> dict[str, Any]:
     """`clock` of `summary.json`; empty when clocks are exact."""
-    samples = [record for record in outcome.records if type(record) is ClockSampled]
+    samples = [*of(outcome.records, ClockSampled)]
     if not samples:
         return {}
     start_ns, end_ns = outcome.scenario.traffic_window_ns

@@ -4,14 +4,14 @@ hand-over ......... let out ......... end of the frame ......... receipt
 |  lead  |  queue  |      air, relays included      |  handover  |
 """
 
-from collections.abc import Iterable, Mapping, Sequence
+import math
+from collections.abc import Sequence
 from typing import Final
 
 import numpy as np
 
-from fanet_mw.trace import Delivered
 from fanet_mw.units import MS
-from sim.results.packets import Name, Sent
+from sim.results.packets import Application, Sent
 
 PARTS: Final = ("lead", "queue", "air", "handover")
 
@@ -26,20 +26,22 @@ def summed_up(delays_ns: Sequence[int]) -> dict[str, float | None]:
     return {name: round(float(value), 3) for name, value in named.items()}
 
 
-def parts(delivered: Iterable[Delivered], sent: Mapping[Name, Sent], *, lead_ns: int) -> dict[str, float | None]:
+def parts(app: Application, *, lead_ns: int) -> dict[str, float | None]:
     """The mean of each part [ms], over the deliveries of packets that are known to have left their origin."""
-    rows = [_row(record, sent[record.origin, record.seq], lead_ns) for record in delivered]
-    known = [row for row in rows if row is not None]
-    if not known:
+    waited = np.array([_waited_ns(sent) for sent in app.sent.values()], dtype=np.float64)
+    deliveries = app.deliveries
+    waited_ns = waited[np.asarray(deliveries.packet)] if len(deliveries) else waited[:0]
+    known = ~np.isnan(waited_ns)
+    if not known.any():
         return dict.fromkeys(PARTS)
-    means = np.asarray(known, dtype=np.float64).mean(axis=0) / MS
-    return {name: round(float(mean), 3) for name, mean in zip(PARTS, means, strict=True)}
+    waited_ns = waited_ns[known]
+    lead_part_ns = np.minimum(lead_ns, waited_ns)
+    handover_ns = np.asarray(deliveries.handover_ns, dtype=np.float64)[known]
+    air_ns = np.asarray(deliveries.delay_ns, dtype=np.float64)[known] - waited_ns - handover_ns
+    columns = lead_part_ns, waited_ns - lead_part_ns, air_ns, handover_ns
+    return {name: round(float(column.mean()) / MS, 3) for name, column in zip(PARTS, columns, strict=True)}
 
 
-def _row(record: Delivered, sent: Sent, lead_ns: int) -> tuple[int, int, int, int] | None:
-    if sent.out_ns is None:
-        return None
-    waited_ns = sent.out_ns - sent.born_ns
-    lead_part_ns = min(lead_ns, waited_ns)
-    air_ns = record.delay_ns - waited_ns - record.handover_ns
-    return lead_part_ns, waited_ns - lead_part_ns, air_ns, record.handover_ns
+def _waited_ns(sent: Sent) -> float:
+    """From the hand-over of a packet until it was let out; not a number when that is not known."""
+    return math.nan if sent.out_ns is None else float(sent.out_ns - sent.born_ns)

@@ -6,31 +6,26 @@ the summary's `unwritten` with the reason, and does not affect the others.
 
 import hashlib
 import json
-from collections.abc import Callable, Iterable, Iterator
+from collections.abc import Callable, Iterable
 from functools import partial
 from pathlib import Path
 from typing import Any
 
 import tomli_w
 
-from fanet_mw import tlog, trace
+from fanet_mw import tlog
 from fanet_mw.errors import ConfigError
 from fanet_mw.trace import Record
 from fanet_mw.whole_file import write_items
 from sim.results.links import described
 from sim.results.metrics import summarize
+from sim.results.stored import lines
 from sim.run.outcome import Outcome
-
-
-def trace_lines(records: Iterable[Record]) -> Iterator[bytes]:
-    """The lines of the trace file, each one JSON array."""
-    for record in records:
-        yield f"{trace.line(record)}\n".encode()
 
 
 def trace_bytes(records: Iterable[Record]) -> bytes:
     """The whole trace file."""
-    return b"".join(trace_lines(records))
+    return b"".join(lines(records))
 
 
 def finish(outcome: Outcome, *, out: Path | None) -> dict[str, Any]:
@@ -44,7 +39,7 @@ def finish(outcome: Outcome, *, out: Path | None) -> dict[str, Any]:
         except OSError as error:
             raise ConfigError(f"--out {out}: cannot be written: {error.strerror}") from error
     digest = hashlib.sha256()
-    for line in trace_lines(outcome.records):
+    for line in lines(outcome.records):
         digest.update(line)
     summary: dict[str, Any] = {}
     try:
@@ -67,7 +62,7 @@ def _write(outcome: Outcome, summary: dict[str, Any], out: Path) -> dict[str, st
         "scenario.toml": lambda path: write_items(path, [tomli_w.dumps(resolved).encode()]),
         "reports.json": lambda path: write_items(path, _json_lines(dict(outcome.reports))),
         "links.json": lambda path: write_items(path, f"[\n{links}\n]\n".encode().splitlines(keepends=True)),
-        "trace.jsonl": lambda path: write_items(path, trace_lines(outcome.records)),
+        "trace.jsonl": lambda path: write_items(path, lines(outcome.records)),
         "mavlink.tlog": lambda path: tlog.write(path, outcome.taps, epoch_us=outcome.epoch_unix_ns // 1000),
     }
     failed = {name: _try(partial(write, out / name)) for name, write in writers.items()}

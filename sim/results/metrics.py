@@ -22,6 +22,7 @@ from sim.results.clocks import clock_errors
 from sim.results.mission import mission
 from sim.results.packets import OTHER_APPS, Application, packets_of, targets_by_source
 from sim.results.separation import separation
+from sim.results.stored import of
 from sim.run.outcome import Outcome
 
 
@@ -94,8 +95,8 @@ def _packets(outcome: Outcome, packets: Mapping[str, Application]) -> dict[str, 
             "repeated": app.repeated,
             "unknown": app.unknown,
             "pdr": _ratio(len(app.deliveries), app.wanted),
-            "delay_ms": delays.summed_up([record.delay_ns for record in app.deliveries]),
-            "delay_parts_ms": delays.parts(app.deliveries, app.sent, lead_ns=lead_ns),
+            "delay_ms": delays.summed_up(app.deliveries.delay_ns),
+            "delay_parts_ms": delays.parts(app, lead_ns=lead_ns),
         }
         for name, app in packets.items()
     }
@@ -104,7 +105,7 @@ def _packets(outcome: Outcome, packets: Mapping[str, Application]) -> dict[str, 
     result[first]["worst_nodes"] = _worst_nodes(
         Counter(node for node, _ in traffic.sent),
         targets_by_source(outcome),
-        Counter(record.node for record in traffic.deliveries),
+        Counter(traffic.deliveries.node),
     )
     return result
 
@@ -146,9 +147,9 @@ def _admission(outcome: Outcome) -> dict[str, Any]:
     deadline_s = outcome.scenario.traffic.deadline_s
     if deadline_s is None:
         return {}
-    said = [record for record in outcome.records if isinstance(record, DeadlineMet | DeadlineLost)]
+    said = [*of(outcome.records, DeadlineMet, DeadlineLost)]
     last = {record.node: isinstance(record, DeadlineMet) for record in said}
-    reasons = (record.reason for record in outcome.records if type(record) is Dropped)
+    reasons = (record.reason for record in of(outcome.records, Dropped))
     return {
         "deadline_ms": round(deadline_s * 1000, 3),
         "refused": sum(reason == DropReason.ADMISSION for reason in reasons),

@@ -10,7 +10,7 @@ Positions are the true ones, once a second (`Posed`).
 
 import math
 import statistics
-from collections.abc import Iterable, Iterator, Sequence
+from collections.abc import Collection, Iterable, Iterator
 from typing import Any, Final
 
 import numpy as np
@@ -19,6 +19,7 @@ import numpy.typing as npt
 from fanet_mw.scenario import Scenario
 from fanet_mw.trace import Approaching, Arrived, Collided, Confirmed, Detected, Posed, ProcessEnded, Record
 from fanet_mw.units import S
+from sim.results.stored import of
 from sim.world.environment.survivors import place
 from sim.world.sensors.phone import REFERENCE_LOSS_DB
 
@@ -30,13 +31,13 @@ _MISTAKEN_M: Final = 25.0
 Rows = npt.NDArray[np.float64]
 
 
-def mission(scenario: Scenario, records: Sequence[Record]) -> dict[str, Any]:
+def mission(scenario: Scenario, records: Collection[Record]) -> dict[str, Any]:
     """The table `mission` of the summary."""
     truth = place(scenario)
     first: dict[int, int] = {}
     errors: list[float] = []
     confirmed: dict[int, Confirmed] = {}
-    for record in records:
+    for record in of(records, Approaching, Confirmed):
         if type(record) is Approaching:
             first.setdefault(record.node, record.t_ns)
             if 1 <= record.survivor <= len(truth):  # else only the air has told of it
@@ -50,9 +51,9 @@ def mission(scenario: Scenario, records: Sequence[Record]) -> dict[str, Any]:
     right = [s for s in confirmed if error_m[s] <= _MISTAKEN_M]
     return {
         "survivors": scenario.mission.survivors,
-        "detected": len({r.survivor for r in records if type(r) is Detected}),
-        "approached": len({r.survivor for r in records if type(r) is Approaching}),
-        "reached": len({r.survivor for r in records if type(r) is Arrived}),
+        "detected": len({r.survivor for r in of(records, Detected)}),
+        "approached": len({r.survivor for r in of(records, Approaching)}),
+        "reached": len({r.survivor for r in of(records, Arrived)}),
         "confirmed": len(right),
         "mistaken": len(confirmed) - len(right),
         "time_to_confirm_s": sorted(round(confirmed[s].t_ns / S, 3) for s in right),
@@ -60,7 +61,7 @@ def mission(scenario: Scenario, records: Sequence[Record]) -> dict[str, Any]:
         "time_to_approach_s": sorted(round(t_ns / S, 3) for t_ns in first.values()),
         "localization_error_m": _median(errors),
         "confirmed_error_m": _median(list(error_m.values())),
-        "collisions": sum(1 for r in records if type(r) is Collided),
+        "collisions": sum(1 for _ in of(records, Collided)),
         **_flown(scenario, records),
     }
 
@@ -92,10 +93,9 @@ def _instants(records: Iterable[Record]) -> Iterator[tuple[int, Rows]]:
     dead: set[int] = set()
     rows: list[tuple[float, float, float]] = []
     t_ns = 0
-    for record in records:
-        if type(record) is ProcessEnded:
-            dead.add(record.node)
+    for record in of(records, ProcessEnded, Posed):
         if type(record) is not Posed:
+            dead.add(record.node)
             continue
         if record.t_ns != t_ns and rows:
             yield t_ns, np.array(rows)

@@ -6,12 +6,14 @@ node sent, or none at the instant that its header states, is `unknown` and no de
 record is lost.
 """
 
+from array import array
 from collections.abc import Mapping
 from dataclasses import dataclass, field, replace
 from typing import Final
 
 from agents.traffic import targets_of
 from fanet_mw.trace import BoundStated, Delivered, Generated, LetOut, LikelyStated
+from sim.results.stored import of
 from sim.run.outcome import Outcome
 
 OTHER_APPS: Final = ("report", "warning")
@@ -34,13 +36,34 @@ class Sent:
 
 
 @dataclass(slots=True)
+class Deliveries:
+    """Deliveries in columns of one length: an hour of a large swarm has millions of them."""
+
+    packet: "array[int]" = field(default_factory=lambda: array("I"))
+    """The packet's place among those that its application sent."""
+    node: "array[int]" = field(default_factory=lambda: array("H"))
+    delay_ns: "array[int]" = field(default_factory=lambda: array("q"))
+    handover_ns: "array[int]" = field(default_factory=lambda: array("q"))
+
+    def __len__(self) -> int:
+        return len(self.node)
+
+    def add(self, packet: int, record: Delivered) -> None:
+        self.packet.append(packet)
+        self.node.append(record.node)
+        self.delay_ns.append(record.delay_ns)
+        self.handover_ns.append(record.handover_ns)
+
+
+@dataclass(slots=True)
 class Application:
     """The packets of one application and their deliveries, all nodes together."""
 
     sent: dict[Name, Sent] = field(default_factory=dict)
+    """By name, in the order in which they were generated."""
     wanted: int = 0
     """The number of packets times the nodes for which each was meant."""
-    deliveries: list[Delivered] = field(default_factory=list)
+    deliveries: Deliveries = field(default_factory=Deliveries)
     repeated: int = 0
     unknown: int = 0
     """Deliveries of packets that no application is known to have sent, whatever they claimed: counted once, here with
@@ -54,45 +77,42 @@ def packets_of(outcome: Outcome) -> Mapping[str, Application]:
     """
     classes = [*outcome.scenario.traffic_classes]
     found = {app: Application() for app in (*classes, *OTHER_APPS)}
-    app_of: dict[Name, Application] = {}
+    app_of: dict[Name, tuple[Application, int]] = {}  # and the packet's place there
     meant_for: dict[Name, frozenset[int]] = {}  # the targets of packets of traffic
     targets = {name: targets_by_source(outcome, name) for name in classes}
     others = outcome.scenario.nodes.count - 1
-    for record in outcome.records:
-        if type(record) is Generated:
-            app = app_of[record.node, record.seq] = found.setdefault(record.app, Application())
-            app.sent[record.node, record.seq] = Sent(record.t_ns)
-            if record.app in targets:
-                meant_for[record.node, record.seq] = targets[record.app][record.node]
-                app.wanted += len(targets[record.app][record.node])
-            elif record.app in OTHER_APPS:
-                app.wanted += others
+    for born in of(outcome.records, Generated):
+        app, name = found.setdefault(born.app, Application()), (born.node, born.seq)
+        app_of[name] = app, len(app.sent)
+        app.sent[name] = Sent(born.t_ns)
+        if born.app in targets:
+            meant_for[name] = targets[born.app][born.node]
+            app.wanted += len(targets[born.app][born.node])
+        elif born.app in OTHER_APPS:
+            app.wanted += others
+    for known in of(outcome.records, LetOut, BoundStated, LikelyStated):
+        # In real time it may come before the packet's own record, at one instant.
+        name = known.node, known.seq
+        if name in app_of:
+            app, _ = app_of[name]
+            app.sent[name] = _known(app.sent[name], known)
     had: dict[Name, int] = {}  # a bit for each node: there are as many deliveries as records, and far fewer packets
     exact = not outcome.scenario.clock.modelled  # else delays are true ones, whatever the header said
-    for record in outcome.records:
-        # In real time it may come before the packet's own record, at one instant.
-        if isinstance(record, LetOut | BoundStated | LikelyStated):
-            name = record.node, record.seq
-            if name in app_of:
-                app_of[name].sent[name] = _known(app_of[name].sent[name], record)
-        if type(record) is not Delivered:
-            continue
-        sender = app_of.get((record.origin, record.seq))
-        if sender is None or (
-            exact and record.t_ns - record.delay_ns != sender.sent[record.origin, record.seq].born_ns
-        ):
+    for record in of(outcome.records, Delivered):
+        name = record.origin, record.seq
+        sender, place = app_of.get(name, (None, 0))
+        if sender is None or (exact and record.t_ns - record.delay_ns != sender.sent[name].born_ns):
             found[classes[0]].unknown += 1
             continue
-        wanted_by = meant_for.get((record.origin, record.seq))
+        wanted_by = meant_for.get(name)
         if record.node == record.origin or (wanted_by is not None and record.node not in wanted_by):
             continue
-        name = record.origin, record.seq
         before, bit = had.get(name, 0), 1 << record.node
         if before & bit:
             sender.repeated += 1
         else:
             had[name] = before | bit
-            sender.deliveries.append(record)
+            sender.deliveries.add(place, record)
     return found
 
 

@@ -6,6 +6,7 @@ import numpy as np
 
 from fanet_mw.trace import ConflictForeseen, Delivered, Warned
 from fanet_mw.units import MS
+from sim.results.stored import of
 from sim.run.outcome import Outcome
 
 
@@ -14,11 +15,10 @@ def separation(outcome: Outcome) -> dict[str, Any]:
     seen = outcome.reports.get("world", {}).get("separation")
     if not seen:
         return {}
-    foreseen = [r for r in outcome.records if type(r) is ConflictForeseen]
-    about = {(r.node, r.seq): r.other for r in outcome.records if type(r) is Warned}
-    delays_ms = [
-        r.delay_ns / MS for r in outcome.records if type(r) is Delivered and about.get((r.origin, r.seq)) == r.node
-    ]
+    foreseen = [*of(outcome.records, ConflictForeseen)]
+    about = {(r.node, r.seq): r.other for r in of(outcome.records, Warned)}
+    delivered = of(outcome.records, Delivered) if about else ()
+    delays_ms = [r.delay_ns / MS for r in delivered if about.get((r.origin, r.seq)) == r.node]
     ahead_s = sorted(r.closest_ms / 1000 for r in foreseen)
     return {
         **seen,

@@ -9,7 +9,6 @@ from typing import Any, Self
 from fanet_mw.bus.topics import Topics
 from fanet_mw.hosts.bus import Bus
 from fanet_mw.scenario import Scenario
-from sim.results.clocks import true_delays
 from sim.results.files import finish
 from sim.run.collector import Collector
 from sim.run.outcome import Outcome
@@ -42,12 +41,11 @@ class Collection:
     def finish(self, *, epoch_unix_ns: int, ready_s: float) -> int:
         """Write the result; 0 when it may be used, else 1."""
         collector = self._collector
-        records = collector.records()
         outcome = Outcome(
             scenario=self._scenario,
             mode="realtime",
             wall_s=time.monotonic() - self._began_s - ready_s,
-            records=true_delays(records) if self._scenario.clock.modelled else records,
+            records=collector.records(),
             reports=collector.reports(),
             taps=collector.taps(),
             links=collector.links(),

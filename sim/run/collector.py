@@ -4,19 +4,16 @@
                                   whatever fails is counted by what was wrong, and goes no further
 
 Memory holds the last valid report of each actor and the sums of the links, independently of the length of the run:
-trace records and telemetry go to temporary files and are read when the run is over. Puts of one actor that exceed its
-allowance are counted as `excess` before they are decoded, so that a flood costs neither time nor disk space.
+trace records and telemetry go to temporary files and are read from there when the run is over. Puts of one actor that
+exceed its allowance are counted as `excess` before they are decoded: a flood costs neither time nor disk space.
 """
 
-import struct
 import threading
 from collections import Counter
-from collections.abc import Callable
-from operator import attrgetter
+from collections.abc import Callable, Collection, Iterable
 from pathlib import Path
 from typing import Any, Final
 
-from fanet_mw import trace
 from fanet_mw.bus import topics
 from fanet_mw.bus.link_stats import LinkStats
 from fanet_mw.bus.messages import MavlinkTap, Message, Report, TraceBatch
@@ -24,9 +21,10 @@ from fanet_mw.bus.topics import Topics
 from fanet_mw.errors import MalformedFrameError
 from fanet_mw.hosts.bus import OnSample
 from fanet_mw.scenario import Scenario
-from fanet_mw.trace import Record, kind_of
+from fanet_mw.trace import Record
 from fanet_mw.units import S
 from sim.results.links import LinkTotals
+from sim.results.stored import RecordSpools, encoded_tap, taps_of
 from sim.run.input_checks import InputChecks
 from sim.run.spool import Spool
 
@@ -35,7 +33,6 @@ BURST_BYTES: Final = 16 << 20
 BYTES_PER_S: Final = 1 << 20
 """The bytes per second that one actor may put for long; two hundred times what a UAV of `rescue` puts."""
 _LONGEST_WHY: Final = 120
-_INSTANT: Final = struct.Struct("<q")
 Subscribe = Callable[[str, OnSample], None]
 
 
@@ -64,10 +61,11 @@ class Collector:
         self, scenario: Scenario, subscribe: Subscribe, names: Topics, *, now_ns: Callable[[], int], folder: Path | None
     ) -> None:
         self._checks = InputChecks(scenario)
+        self._true_delays = scenario.clock.modelled
         self._now_ns = now_ns
         self._lock = threading.Lock()  # Zenoh calls from several threads
         self._allowance = Allowance(burst=BURST_BYTES, per_s=BYTES_PER_S)
-        self._records = Spool(folder)
+        self._records = RecordSpools(folder)
         self._taps = Spool(folder)
         self._reports: dict[str, dict[str, Any]] = {}
         self._links = LinkTotals()
@@ -118,15 +116,15 @@ class Collector:
     def _take_records(self, name: str, message: Message) -> str | None:
         if not isinstance(message, TraceBatch):
             return "message type"
-        lines = []
+        good = []
         for record in message.records:
             why = self._checks.record(name, record)
             if why is None:
-                lines.append(trace.line(record))
+                good.append(record)
             else:
                 self._refused[f"trace: {why}"] += 1
-        if lines and not self._records.append("\n".join(lines).encode()):
-            self._refused["trace: disk"] += len(lines)
+        if lost := self._records.append(good):
+            self._refused["trace: disk"] += lost
         return None
 
     def _take_report(self, name: str, message: Message) -> str | None:
@@ -145,7 +143,7 @@ class Collector:
         if not isinstance(message, MavlinkTap):
             return "message type"
         why = self._checks.tap(message)
-        if why is None and not self._taps.append(_INSTANT.pack(message.t_ns) + message.data):
+        if why is None and not self._taps.append(encoded_tap(message.t_ns, message.data)):
             return "disk"
         return why
 
@@ -159,13 +157,14 @@ class Collector:
 
     # --- results, when the run is over ----------------------------------------------------------------------------
 
-    def records(self) -> list[Record]:
-        """All trace records, by instant, node and kind."""
+    def records(self, further: Iterable[Record] = ()) -> Collection[Record]:
+        """All trace records and some further ones, by instant, node and kind; with true delays where clocks drift.
+
+        They stay on disk, and stay readable when the collector is closed.
+        """
         with self._lock:
-            found = [trace.parse(line) for item in self._records.items() for line in item.decode().split("\n")]
-        for key in (kind_of, attrgetter("node"), attrgetter("t_ns")):  # a sort keeps the order of the one before it
-            found.sort(key=key)
-        return found
+            self._records.append(further)
+            return self._records.records(true_delays=self._true_delays)
 
     def reports(self) -> dict[str, dict[str, Any]]:
         """The last valid report of each actor, by name."""
@@ -188,11 +187,10 @@ class Collector:
         with self._lock:
             return self._links
 
-    def taps(self) -> list[tuple[int, bytes]]:
-        """The telemetry of all UAVs, by instant."""
+    def taps(self) -> Collection[tuple[int, bytes]]:
+        """The telemetry of all UAVs, by instant; it stays on disk, too."""
         with self._lock:
-            taps = [(_INSTANT.unpack_from(item)[0], item[_INSTANT.size :]) for item in self._taps.items()]
-        return sorted(taps, key=lambda tap: tap[0])
+            return taps_of(self._taps)
 
     def figures(self) -> dict[str, Any]:
         """The number of puts received, and of items refused (records, reports, taps), by what was wrong."""

@@ -1,6 +1,6 @@
 """The result of a run, whichever host ran it: the input of metrics and files."""
 
-from collections.abc import Mapping
+from collections.abc import Collection, Mapping
 from dataclasses import dataclass, field
 from typing import Any, Literal
 
@@ -16,11 +16,12 @@ class Outcome:
     scenario: Scenario
     mode: Literal["virtual", "realtime"]
     wall_s: float
-    records: list[Record]
-    """The trace records by instant; within one instant as they were made (virtual) or by node (real time)."""
+    records: Collection[Record]
+    """The trace records by instant; within one instant as they were made (virtual) or by node (real time). They are in
+    memory (virtual), or on disk and decoded anew each time (real time): `sim.results.stored.of` reads some kinds."""
     reports: Mapping[str, Mapping[str, Any]]
     """The last report of each actor, by its name."""
-    taps: list[tuple[int, bytes]] = field(default_factory=list)
+    taps: Collection[tuple[int, bytes]] = ()
     """Pairs (instant ns, MAVLink bytes) for the `.tlog`."""
     links: LinkTotals = field(default_factory=LinkTotals)
     """What each link has carried."""

@@ -2,20 +2,26 @@
 
     file = (length, bytes)*
 
-An item is appended whole or not at all. A full disk ends the spool and not the run: what the spool has stays readable.
+Items that are appended together are written whole or not at all. A full disk ends the spool and not the run: what the
+spool has stays readable. The file is gone when it is closed, or when nothing refers to the spool any more.
 """
 
+import heapq
 import os
 import struct
 import tempfile
-from collections.abc import Iterator
+import weakref
+from collections.abc import Callable, Iterator
+from itertools import pairwise
 from pathlib import Path
-from typing import Final
+from typing import Any, Final
 
 from fanet_mw.errors import ConfigError
 
 _LENGTH: Final = struct.Struct("<I")
-_BUFFER: Final = 1 << 20
+_BLOCK_BYTES: Final = 1 << 18
+_SORTED_BYTES: Final = 1 << 23
+"""The bytes of items that are sorted in memory at once."""
 
 
 class Spool:
@@ -27,17 +33,23 @@ class Spool:
         except OSError as error:
             where = folder if folder is not None else "the folder of temporary files (see TMPDIR)"
             raise ConfigError(f"{where}: no file can be made there: {error.strerror}") from error
+        self._close = weakref.finalize(self, self._file.close)
         self._write = os.pwrite
+        self.folder = folder
         self.size = 0
         """The bytes of the file that belong to whole items."""
+        self.count = 0
+        """The number of items."""
         self.failure: str | None = None
         """Why no more items are accepted; None while they are."""
 
-    def append(self, item: bytes) -> bool:
-        """Write an item at the end; returns True if it is kept."""
+    def append(self, *items: bytes) -> bool:
+        """Write items at the end; returns True if they are kept."""
+        if not items:
+            return True
         if self.failure is not None:
             return False
-        data = _LENGTH.pack(len(item)) + item
+        data = b"".join(part for item in items for part in (_LENGTH.pack(len(item)), item))
         try:
             written = self._write(self._file.fileno(), data, self.size)
         except OSError as error:
@@ -47,18 +59,66 @@ class Spool:
             self.failure = "no space left for the whole of an item"
             return False
         self.size += written
+        self.count += len(items)
         return True
 
-    def items(self) -> Iterator[bytes]:
-        """The items in the order in which they were appended; may be read repeatedly."""
-        with open(os.dup(self._file.fileno()), "rb", buffering=_BUFFER) as file:  # noqa: PTH123  (it has no path)
-            file.seek(0)
-            left = self.size
-            while left:
-                (length,) = _LENGTH.unpack(file.read(_LENGTH.size))
-                yield file.read(length)
-                left -= _LENGTH.size + length
+    def items(self, start: int = 0, end: int | None = None) -> Iterator[bytes]:
+        """The items in the order in which they were appended, or those between two sizes that the spool once had.
+
+        They may be read repeatedly, and by several readers in turns.
+        """
+        end = self.size if end is None else end
+        unread, at, block = start, 0, b""
+        while unread < end or at < len(block):
+            if len(block) - at >= _LENGTH.size:
+                (length,) = _LENGTH.unpack_from(block, at)
+                item_end = at + _LENGTH.size + length
+                if item_end <= len(block):
+                    yield block[at + _LENGTH.size : item_end]
+                    at = item_end
+                    continue
+                wanted = item_end - len(block)
+            else:
+                wanted = _LENGTH.size
+            more = os.pread(self._file.fileno(), min(max(wanted, _BLOCK_BYTES), end - unread), unread)
+            unread += len(more)
+            block, at = block[at:] + more, 0
 
     def close(self) -> None:
         """Free the disk space."""
-        self._file.close()
+        self._close()
+
+
+def in_order(
+    source: Spool, key: Callable[[bytes], Any], *, change: Callable[[bytes], bytes] = lambda item: item
+) -> Spool | None:
+    """A new spool with the items in the order of their keys, or of their appending where keys are equal, each changed.
+
+    At most some megabytes of them are in memory at once. Returns None when the disk has no room for it.
+    """
+    runs, ends = Spool(source.folder), [0]
+    for portion in _portions(source.items(), _SORTED_BYTES):
+        portion.sort(key=key)
+        if not runs.append(*portion):
+            return None
+        ends.append(runs.size)
+    merged = heapq.merge(*(runs.items(start, end) for start, end in pairwise(ends)), key=key)
+    result = Spool(source.folder)
+    for portion in _portions(map(change, merged), _BLOCK_BYTES):
+        if not result.append(*portion):
+            return None
+    return result
+
+
+def _portions(items: Iterator[bytes], most_bytes: int) -> Iterator[list[bytes]]:
+    """The items in lists of about so many bytes."""
+    portion: list[bytes] = []
+    size = 0
+    for item in items:
+        portion.append(item)
+        size += len(item)
+        if size >= most_bytes:
+            yield portion
+            portion, size = [], 0
+    if portion:
+        yield portion

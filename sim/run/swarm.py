@@ -27,9 +27,8 @@ from fanet_mw.hosts.clock import ClockKeeper, SwarmClock
 from fanet_mw.hosts.realtime import Joining
 from fanet_mw.hosts.service import BUS_EXIT_CODE
 from fanet_mw.scenario import Scenario
-from fanet_mw.trace import ProcessEnded, Record, kind_of
+from fanet_mw.trace import ProcessEnded, Record
 from fanet_mw.units import NodeId, S
-from sim.results.clocks import true_delays
 from sim.run import limits
 from sim.run.collector import Collector
 from sim.run.outcome import Outcome
@@ -141,7 +140,7 @@ class SwarmRun:
             scenario=self._scenario,
             mode="realtime",
             wall_s=wall_s,
-            records=self._records(),
+            records=collector.records(self._obituaries),
             reports=collector.reports(),
             taps=collector.taps(),
             links=collector.links(),
@@ -154,11 +153,6 @@ class SwarmRun:
             absent={name: why for name, why in collector.absent().items() if self._own_world or name != "world"},
             stall_ms=self._stall_s * 1000,
         )
-
-    def _records(self) -> list[Record]:
-        records = [*self._collector.records(), *self._obituaries]
-        records = true_delays(records) if self._scenario.clock.modelled else records
-        return sorted(records, key=lambda r: (r.t_ns, r.node, kind_of(r)))
 
     def interrupt(self, number: int) -> None:
         """End the run early because of a signal."""

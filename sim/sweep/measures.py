@@ -11,6 +11,7 @@ from fanet_mw.trace import Approaching, Detected
 from fanet_mw.units import S
 from sim.results.connectivity import connectivity
 from sim.results.packets import first_class_of
+from sim.results.stored import of
 from sim.run.outcome import Outcome
 
 Value = float | list[float] | None
@@ -25,13 +26,7 @@ DELAY_EDGES_S: Final = tuple(
 
 def delay_counts(outcome: Outcome) -> list[float]:
     """Deliveries of application packets by delay: one count per edge of `DELAY_EDGES_S`, and one for all beyond."""
-    delays_s = (
-        np.asarray(
-            [record.delay_ns for record in first_class_of(outcome).deliveries],
-            dtype=np.float64,
-        )
-        / S
-    )
+    delays_s = np.asarray(first_class_of(outcome).deliveries.delay_ns, dtype=np.float64) / S
     counts = np.bincount(np.searchsorted(DELAY_EDGES_S, delays_s), minlength=len(DELAY_EDGES_S) + 1)
     return [float(count) for count in counts]
 
@@ -58,9 +53,8 @@ def first_approach_s(outcome: Outcome) -> list[float]:
 
 def _first_of_each(outcome: Outcome, kind: type[Approaching] | type[Detected]) -> list[float]:
     first: dict[int, int] = {}
-    for record in outcome.records:
-        if isinstance(record, kind):
-            first.setdefault(record.node, record.t_ns)
+    for record in of(outcome.records, kind):
+        first.setdefault(record.node, record.t_ns)
     return sorted(t_ns / S for t_ns in first.values())
 
 

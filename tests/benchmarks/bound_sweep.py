@@ -28,7 +28,7 @@ from fanet_mw.planner import Plan, plan
 from fanet_mw.scenario import Scenario, config
 from fanet_mw.trace import Record
 from fanet_mw.units import MS, Enu, NodeId, S
-from sim.results.bounds import against_bounds
+from sim.results.bounds import against_bounds, delays_under_bound
 from sim.results.packets import packets_of
 from sim.run.outcome import Outcome
 from sim.run.virtual import actors_of
@@ -155,10 +155,7 @@ def measure(seed: int) -> Result | None:
         deliveries=bound["deliveries"],
         broken=bound["violations"],
         broken_paper=sum(
-            record.delay_ns > scenario.clusters.flooding_period_s * S
-            for app in found.values()
-            for record in app.deliveries
-            if app.sent[record.origin, record.seq].bound_ns is not None
+            int((delays_under_bound(app)[0] > scenario.clusters.flooding_period_s * S).sum()) for app in found.values()
         ),
         wanted=wanted,
         within=bound["deliveries"] - bound["violations"],

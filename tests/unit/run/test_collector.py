@@ -146,7 +146,7 @@ def test_a_record_that_its_speaker_cannot_mean_is_counted_and_goes_no_further(
     good = RadioFault(S, 3, 0, "cut", "x", active=True) if name == "emulator" else None
     good = good or (Collided(S, 1, 0) if name == "world" else Generated(S, 3, 1, "traffic", 5))
     assert ear.say(NAMES.trace(name), TraceBatch((good, record))) == {f"trace: {why}": 1}
-    assert ear.collector.records() == [good]
+    assert list(ear.collector.records()) == [good]
 
 
 @pytest.mark.parametrize(
@@ -162,7 +162,7 @@ def test_a_line_that_is_no_record_is_undecodable(ear: Ear, line: str) -> None:
     body = line.encode() or b"\n"
     ear.put(NAMES.trace("agent-3"), bytes([9]) + struct.pack("<I", len(body)) + body)
     assert ear.why == {"trace: undecodable": 1}
-    assert ear.collector.records() == []
+    assert list(ear.collector.records()) == []
 
 
 def test_a_report_without_keys_is_counted_and_the_last_valid_one_stands(ear: Ear, genuine: Outcome) -> None:
@@ -297,12 +297,12 @@ def test_a_flood_of_one_actor_stops_at_its_allowance_and_leaves_the_others_their
         ear.put(NAMES.trace("agent-3"), flood)
     excess = ear.why["trace: excess"]
     assert (200 - excess) * len(flood) <= BURST_BYTES
-    assert ear.collector._records.size <= BURST_BYTES
+    assert ear.collector._records.size <= 1.1 * BURST_BYTES, "a line is a little longer than what was put"
     ear.say(NAMES.trace("agent-4"), TraceBatch((Generated(S, 4, 1, "traffic", 5),)))
     ear.now_ns += 2 * S * len(flood) // BYTES_PER_S
     ear.put(NAMES.trace("agent-3"), flood)
     assert ear.why == {"trace: excess": excess}, "what was said slowly enough is heard again"
-    assert ear.collector.records()[-1].node == 4
+    assert list(ear.collector.records())[-1].node == 4
 
 
 def test_a_full_disk_under_the_spool_ends_the_trace_and_not_the_run(ear: Ear) -> None:
@@ -317,7 +317,7 @@ def test_a_full_disk_under_the_spool_ends_the_trace_and_not_the_run(ear: Ear) ->
         room -= written
         return written
 
-    ear.collector._records._write = write
+    ear.collector._records._others._write = write
     for i in range(100):
         ear.say(NAMES.trace("agent-3"), TraceBatch((Generated(S, 3, i, "traffic", 5),)))
     kept = ear.collector.records()

@@ -11,13 +11,10 @@ import contextlib
 import signal
 import socket
 import time
-from collections import Counter
 from collections.abc import Callable, Collection, Mapping
 from pathlib import Path
 from typing import Any, Final
 
-from agents.__main__ import run as run_agent
-from emulator.__main__ import run as run_emulator
 from emulator.kernel.compile import COMPILING_NOTICE, must_compile
 from fanet_mw.bus.topics import Topics
 from fanet_mw.errors import BusError
@@ -25,35 +22,26 @@ from fanet_mw.hosts import interrupts
 from fanet_mw.hosts.bus import Bus, config_of
 from fanet_mw.hosts.clock import ClockKeeper, SwarmClock
 from fanet_mw.hosts.realtime import Joining
-from fanet_mw.hosts.service import BUS_EXIT_CODE
 from fanet_mw.scenario import Scenario
-from fanet_mw.trace import ProcessEnded, Record
-from fanet_mw.units import NodeId, S
+from fanet_mw.units import S
 from sim.run import limits
 from sim.run.collector import Collector
+from sim.run.deaths import Deaths
 from sim.run.outcome import Outcome
 from sim.run.processes import Processes, describe
 from sim.run.router import ROUTER, expected_names
 from sim.run.running import registered
-from sim.world.__main__ import run as run_world
-from sim.world.environment.chart import chart_of
+from sim.run.services import Services
 from sim.world.flight_recorder import FlightRecorder
-from sim.world.mobility.layout import positions
 
-_AGENT_NICE: Final = 10
-"""The niceness of UAVs: all of them wait for the emulator, which goes first when all cores are in use."""
 READY_TIMEOUT_S: Final = 300.0
 """How long to wait until all are up: on a busy machine 47 processes take a minute, and a compilation comes on top."""
 WORD_EVERY_S: Final = 10.0
 """How often it is reported which processes are being waited for."""
-_MAX_LATE_STARTS: Final = 3
-"""How often a process that has found no router is started again before the swarm's time begins."""
 _GRACE_S: Final = 5.0
 """How long to wait for last reports after the end of the swarm's time."""
 _LAST_WORDS_S: Final = 1.0
 """How long to wait, after the end of all processes, for what they sent last: it may still be on the bus."""
-_MAX_RESPAWNS: Final = 5
-"""How often a process of one name is started again: one that cannot live is not started for ever."""
 _PROGRESS_S: Final = 0.25
 Tell = Callable[[str], None]
 
@@ -69,48 +57,25 @@ class SwarmRun:
     """One run in real time."""
 
     def __init__(
-        self,
-        scenario: Scenario,
-        bus: Bus,
-        *,
-        swarm: str,
-        endpoint: str,
-        respawn: bool,
-        tell: Tell,
-        own_world: bool = True,
-        spool_folder: Path | None = None,
-        zenoh_config: Path | None = None,
-        leave_out: Collection[int] = (),
+        self, services: Services, bus: Bus, *, respawn: bool, tell: Tell, spool_folder: Path | None = None
     ) -> None:
-        names = Topics(swarm)
-        self._own_world = own_world
-        """False when a foreign world tells where the UAVs are; no report of it is expected."""
-        self.emulator_options: dict[str, Any] = {}
-        """Additional arguments of the emulator's process."""
-        self._scenario = scenario
-        self._leave_out = frozenset(leave_out)
-        """Nodes whose processes somebody else starts."""
-        self.name = swarm
-        self.endpoint = endpoint
-        self._zenoh_config = zenoh_config
-        self._respawn = respawn
+        scenario, self.joining = services.scenario, services.joining
+        names = Topics(self.joining.swarm)
+        self._services = services
         self._tell = tell
         self._collector = Collector(scenario, bus.subscribe, names, now_ns=time.monotonic_ns, folder=spool_folder)
         self._recorder = FlightRecorder(scenario, bus.subscribe, names) if respawn else None
         self._keeper = ClockKeeper(
             bus, names, time_scale=scenario.time_scale, expected=expected_names(scenario), scenario=scenario
         )
-        self.processes = Processes(self._process_ended, title=f"fanet {swarm}")
+        self.processes = Processes(self._process_ended, title=f"fanet {names.swarm}")
+        self._deaths = Deaths(respawn=respawn)
         self._clock: SwarmClock | None = None
         self._over = asyncio.Event()
         self._ending = False
         self._aborted: str | None = None
-        self._ended: list[tuple[str, int]] = []
-        self._obituaries: list[Record] = []
-        self._respawns: dict[str, int] = {}
         self._stall_s = 0.0
         """The longest time for which this process did nothing although it should have."""
-        self._late_starts: Counter[str] = Counter()
         self._signal: int | None = None
 
     async def run(self, on_progress: Callable[[float], None]) -> Outcome:
@@ -133,24 +98,24 @@ class SwarmRun:
 
     def _outcome(self, *, wall_s: float, ready_s: float, ended_ns: int | None) -> Outcome:
         """The outcome with what was collected; an incomplete trace is reported."""
-        collector = self._collector
+        collector, foreign = self._collector, set() if self._services.own_world else {"world"}
         if (failure := collector.disk_failure()) is not None:
             self._tell(f"the trace is incomplete: its temporary file could not be written: {failure}")
         return Outcome(
-            scenario=self._scenario,
+            scenario=self._services.scenario,
             mode="realtime",
             wall_s=wall_s,
-            records=collector.records(self._obituaries),
+            records=collector.records(self._deaths.records),
             reports=collector.reports(),
             taps=collector.taps(),
             links=collector.links(),
-            ended=self._ended,
+            ended=self._deaths.ended,
             aborted=self._aborted,
             ended_ns=ended_ns,
             ready_s=ready_s,
             epoch_unix_ns=self._keeper.clock.epoch_unix_ns if self._keeper.clock else 0,
             heard=collector.figures(),
-            absent={name: why for name, why in collector.absent().items() if self._own_world or name != "world"},
+            absent={name: why for name, why in collector.absent().items() if name not in foreign},
             stall_ms=self._stall_s * 1000,
         )
 
@@ -169,17 +134,8 @@ class SwarmRun:
     async def _start_all(self) -> None:
         await self.processes.warm_up()
         self._check_not_over()
-        joining = Joining(self.name, self.endpoint, self._zenoh_config, READY_TIMEOUT_S)
-        common = {"scenario": self._scenario, "joining": joining}
-        self.processes.start("emulator", run_emulator, {**common, **self.emulator_options})
-        if self._own_world:
-            self.processes.start("world", run_world, common)
-        chart = chart_of(self._scenario)
-        for node, position in zip(self._scenario.node_ids, positions(self._scenario), strict=True):
-            if node in self._leave_out:
-                continue
-            arguments = {**common, "node": NodeId(node), "position": position, "chart": chart}
-            self.processes.start(f"agent-{node}", run_agent, arguments, nice=_AGENT_NICE)
+        for name, entry, arguments, nice in self._services.each():
+            self.processes.start(name, entry, arguments, nice=nice)
             await asyncio.sleep(0)  # signals are handled between two of many processes
             self._check_not_over()
 
@@ -195,10 +151,8 @@ class SwarmRun:
         start = asyncio.ensure_future(self._keeper.start(timeout_s=READY_TIMEOUT_S))
         over = asyncio.ensure_future(self._over.wait())
         while not await _any_done(start, over, timeout_s=WORD_EVERY_S):
-            presence = self._keeper.presence
-            self._tell(
-                f"waiting for {len(presence.missing())} of {len(expected_names(self._scenario))}: {presence.sentence()}"
-            )
+            presence, expected = self._keeper.presence, expected_names(self._services.scenario)
+            self._tell(f"waiting for {len(presence.missing())} of {len(expected)}: {presence.sentence()}")
         over.cancel()
         if not start.done():
             start.cancel()
@@ -211,7 +165,7 @@ class SwarmRun:
     async def _follow(self, on_progress: Callable[[float], None]) -> None:
         """Wait until the swarm's time is over or the run is aborted."""
         assert self._clock is not None, "the clock was started"
-        while self._clock.wait_s(self._scenario.duration_ns) > 0 and not self._over.is_set():
+        while self._clock.wait_s(self._services.scenario.duration_ns) > 0 and not self._over.is_set():
             on_progress(max(0.0, self._clock.now_ns() / S))
             began_s = time.monotonic()
             with contextlib.suppress(TimeoutError):
@@ -222,7 +176,7 @@ class SwarmRun:
         """End all processes, by the clock or by order, and wait for last reports."""
         self._over.set()
         await self._end_processes()
-        dead = {name for name, _ in self._ended} | (set() if self._own_world else {"world"})
+        dead = {name for name, _ in self._deaths.ended} | (set() if self._services.own_world else {"world"})
         end_s = time.monotonic() + _LAST_WORDS_S
         while self._collector.unfinished() - dead and time.monotonic() < end_s:  # noqa: ASYNC110  (other threads fill it)
             await asyncio.sleep(_LAST_WORDS_S / 20)
@@ -239,24 +193,20 @@ class SwarmRun:
     def _process_ended(self, name: str, exit_code: int) -> None:
         if self._ending or (exit_code == 0 and (self._over.is_set() or self.time_is_over())):
             return
-        waits = self._clock is None and not self._over.is_set()
-        if waits and exit_code == BUS_EXIT_CODE and self._late_starts[name] < _MAX_LATE_STARTS:
-            self._late_starts[name] += 1
+        if self._clock is None and not self._over.is_set() and self._deaths.may_try_again(name, exit_code):
             self._tell(f"{name} ended with {describe(exit_code)} before the start; started again")
             self.processes.restart(name)
             return
         now_ns = self._now_ns()
-        self._ended.append((name, exit_code))
         node = int(name.removeprefix("agent-")) if name.startswith("agent-") else 0
-        self._obituaries.append(ProcessEnded(now_ns, node, name, exit_code))
+        self._deaths.note(name, exit_code, node=node, now_ns=now_ns)
         what = f"{name} ended with {describe(exit_code)} at {now_ns / S:.1f} s"
         if self._over.is_set():
             if exit_code == -(self._signal or 0):
                 return  # the signal that interrupted this process was meant for all
             self._tell(f"{what}, while the swarm was ending")
             return
-        self._respawns[name] = self._respawns.get(name, 0) + 1
-        if self._respawn and self._respawns[name] <= _MAX_RESPAWNS:
+        if self._deaths.may_respawn(name):
             self._tell(f"{what}; started again")
             if name == "world" and self._recorder is not None:
                 self.processes.restart(name, flight=self._recorder.last())
@@ -269,10 +219,10 @@ class SwarmRun:
 
     def _now_ns(self) -> int:
         """The swarm instant, limited to the swarm's time."""
-        return min(max(0, self._clock.now_ns()), self._scenario.duration_ns) if self._clock else 0
+        return min(max(0, self._clock.now_ns()), self._services.scenario.duration_ns) if self._clock else 0
 
     def time_is_over(self) -> bool:
-        return self._clock is not None and self._clock.wait_s(self._scenario.duration_ns) <= 0.05
+        return self._clock is not None and self._clock.wait_s(self._services.scenario.duration_ns) <= 0.05
 
 
 async def _any_done(*futures: asyncio.Future[Any], timeout_s: float) -> bool:
@@ -323,19 +273,9 @@ async def launch(
     bus, endpoint = _bus(listen, connect, zenoh_config)
     with bus, registered(swarm, endpoint) as known:
         on_event(f"swarm {swarm} on {endpoint}" + ("" if known else "; other commands must be told so: --connect"))
-        run = SwarmRun(
-            scenario,
-            bus,
-            swarm=swarm,
-            endpoint=endpoint,
-            respawn=respawn,
-            own_world=own_world,
-            tell=on_event,
-            spool_folder=spool_folder,
-            zenoh_config=zenoh_config,
-            leave_out=leave_out,
-        )
-        run.emulator_options.update(emulator_options or {})
+        joining = Joining(swarm, endpoint, zenoh_config, READY_TIMEOUT_S)
+        services = Services(scenario, joining, own_world, frozenset(leave_out), emulator_options or {})
+        run = SwarmRun(services, bus, respawn=respawn, tell=on_event, spool_folder=spool_folder)
         loop = asyncio.get_running_loop()
         signals = interrupts.SIGNALS if heed_signals else ()
         for number in signals:

@@ -204,10 +204,8 @@ def late_agent(*, node: int, **arguments: Any) -> int:
 def test_an_agent_that_is_late_to_start_is_waited_for_and_one_that_found_no_router_is_started_again(
     monkeypatch: pytest.MonkeyPatch,
 ) -> None:
-    from sim.run import swarm as module
-
-    monkeypatch.setattr(module, "run_agent", late_agent)
-    monkeypatch.setattr(module, "WORD_EVERY_S", 1.0)
+    monkeypatch.setattr("sim.run.services.run_agent", late_agent)
+    monkeypatch.setattr("sim.run.swarm.WORD_EVERY_S", 1.0)
     name = f"late-{uuid.uuid4().hex}"
     try:
         outcome, events = run(scenario(), swarm=name)

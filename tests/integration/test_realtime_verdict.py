@@ -113,7 +113,7 @@ class Watch:
         self.poses: list[Poses] = []
 
     def __call__(self, swarm: SwarmRun) -> None:
-        self.bus = Bus.join(swarm.endpoint)
+        self.bus = Bus.join(swarm.joining.endpoint)
         self.bus.subscribe(Topics("verdict").pose, lambda _, payload: self.poses.extend(topics.decode(payload)))  # type: ignore[arg-type]
 
     def jump_m(self) -> float:
@@ -159,7 +159,7 @@ def test_an_agent_that_is_started_again_after_a_step_of_the_clock_takes_part(
     step_s: float, monkeypatch: pytest.MonkeyPatch
 ) -> None:
     """Its process reads a unix clock that is off by the step; the swarm's time is handed to it."""
-    monkeypatch.setattr("sim.run.swarm.run_agent", partial(agent_after_a_step, step_s))
+    monkeypatch.setattr("sim.run.services.run_agent", partial(agent_after_a_step, step_s))
     outcome, summary = run(scenario("duration_s=6"), (2.0, send(signal.SIGKILL, "agent-4")), respawn=True)
     assert [name for name, _ in outcome.ended] == ["agent-4"], "once, because it was killed"
     assert about(summary, "agent-4 ended")

@@ -1,0 +1,42 @@
+"""The processes of a swarm that ended before their time, and which of them may be started again."""
+
+from collections import Counter
+from typing import Final
+
+from fanet_mw.hosts.service import BUS_EXIT_CODE
+from fanet_mw.trace import ProcessEnded
+
+_MAX_LATE_STARTS: Final = 3
+"""How often a process that has found no router is started again before the swarm's time begins."""
+_MAX_RESPAWNS: Final = 5
+"""How often a process of one name is started again: one that cannot live is not started for ever."""
+
+
+class Deaths:
+    """The processes that died during one run."""
+
+    def __init__(self, *, respawn: bool) -> None:
+        self.ended: list[tuple[str, int]] = []
+        """Name and exit code of each process that died, in order."""
+        self.records: list[ProcessEnded] = []
+        """The same for the trace."""
+        self._respawn = respawn
+        self._respawns: Counter[str] = Counter()
+        self._late_starts: Counter[str] = Counter()
+
+    def may_try_again(self, name: str, exit_code: int) -> bool:
+        """Before the swarm's time begins: whether this process only found no router and is to look for it again."""
+        if exit_code != BUS_EXIT_CODE or self._late_starts[name] >= _MAX_LATE_STARTS:
+            return False
+        self._late_starts[name] += 1
+        return True
+
+    def note(self, name: str, exit_code: int, *, node: int, now_ns: int) -> None:
+        """A process died; `node`: of which UAV, 0 if it was the emulator or the world."""
+        self.ended.append((name, exit_code))
+        self.records.append(ProcessEnded(now_ns, node, name, exit_code))
+
+    def may_respawn(self, name: str) -> bool:
+        """Whether this process is to be started again; each question counts as one start."""
+        self._respawns[name] += 1
+        return self._respawn and self._respawns[name] <= _MAX_RESPAWNS

@@ -3,11 +3,9 @@
 from collections import Counter
 from typing import Any, Final
 
-import numpy as np
-
 from emulator.kernel import state as s
 from fanet_mw.errors import DropReason
-from fanet_mw.units import MS, S
+from fanet_mw.units import MS
 
 _REASON_OF: Final = {
     s.NO_RECEIVER: DropReason.NO_RECEIVER,
@@ -42,11 +40,6 @@ class Accounts:
         self.late_frames = 0
         self._max_late_ns = 0
         self._lateness = [0] * (len(_LATENESS_STEPS) + 1)
-        self._baseline = np.zeros(s.GLOBALS, np.int64)
-        self._busy_baseline_ns = 0
-        self._bytes_baseline = 0
-        self._measured_from_ns = 0
-        self._end: tuple[s.Ints, int, int, int] | None = None
 
     def drop(self, reason: DropReason) -> None:
         self.dropped[reason] += 1
@@ -63,31 +56,10 @@ class Accounts:
         """Count a frame that nobody received, when nothing refers to it any more."""
         self.dropped[_REASON_OF[verdict]] += 1
 
-    def measure_from(self, g: s.Ints, *, busy_ns: int, now_ns: int) -> None:
-        """The warm-up is over: statistics of the air begin here."""
-        self._baseline = g.copy()
-        self._busy_baseline_ns = busy_ns
-        self._bytes_baseline = self.delivered_bytes
-        self._measured_from_ns = now_ns
-
-    def measure_until(self, g: s.Ints, *, busy_ns: int, now_ns: int) -> None:
-        """The measurement is over: statistics of the air end here, because what follows only drains."""
-        self._end = g.copy(), busy_ns, self.delivered_bytes, now_ns
-
-    def air(self, g: s.Ints, *, busy_ns: int, now_ns: int, stations: int) -> dict[str, float | None]:
-        """Statistics of the air from `measure_from` to `measure_until`, or until now when that was not called."""
-        g, busy_ns, delivered_bytes, now_ns = self._end or (g, busy_ns, self.delivered_bytes, now_ns)
-        d = (g - self._baseline).tolist()
-        span_ns = max(1, now_ns - self._measured_from_ns)
-        landed = sum(d[s.RECEIVED_COPIES : s.CUT_COPIES + 1])
-        payload_bits = 8 * (delivered_bytes - self._bytes_baseline)
-        return {
-            "pdr": _ratio(d[s.RECEIVED_COPIES], landed),
-            "busy": round((busy_ns - self._busy_baseline_ns) / (span_ns * stations), 6),
-            "mean_retries": _ratio(d[s.RETRIES], d[s.UNICASTS_ENDED]),
-            "attempt_failure": _ratio(d[s.ATTEMPTS_FAILED], d[s.ATTEMPTS_MADE]),
-            "throughput_mbps": round(payload_bits / (span_ns / S) / 1e6, 6),
-        }
+    def lost_on_bus(self, count: int) -> None:
+        """Count requests that were sent and never came, as a gap in their numbers shows."""
+        self.sent += count
+        self.dropped[DropReason.BUS] += count
 
     def copies(self, g: s.Ints) -> dict[str, Any]:
         """The ledger at receivers: the copies that went on the air in range of a receiver, and how each ended."""
@@ -125,7 +97,3 @@ class Accounts:
             if seen >= wanted and index < len(_LATENESS_STEPS):
                 return float(_LATENESS_STEPS[index])
         return round(self._max_late_ns / MS, 3)
-
-
-def _ratio(part: int, whole: int) -> float | None:
-    return round(part / whole, 6) if whole else None

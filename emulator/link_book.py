@@ -11,6 +11,7 @@ import numpy as np
 from emulator.kernel import state as s
 from emulator.kernel.state import Ints
 from fanet_mw.bus.link_stats import COUNTS, LinkStats
+from fanet_mw.units import S
 
 _ROWS = slice(s.RSSI_SUM, s.N_CUT + 1)
 """The rows of a link that are counts: the sum of RSSI, then one per name in COUNTS."""
@@ -24,10 +25,16 @@ class LinkBook:
         self._keys: list[Ints] = []
         self._counts: list[Ints] = []
         self._since_ns = 0
+        self.next_ns: int | None = None
+        """The instant of the next report; None while the air is silent."""
 
     def begin(self, now_ns: int) -> None:
         """Start the time that the first report covers."""
         self._since_ns = now_ns
+
+    def plan(self, now_ns: int) -> None:
+        """Plan the next report for the next full second."""
+        self.next_ns = (now_ns // S + 1) * S
 
     def take(self, lk: Ints) -> None:
         """Move the counts of these links into the book."""

@@ -12,13 +12,14 @@ always C p_c = S p, so they accept any load, even a single packet that is longer
 """
 
 from fractions import Fraction
-from math import ceil, floor
+from math import ceil, gcd
 from typing import Final
 
 from fanet_mw.bounds.delay_bound import Bounded, DelayBound, Refused
 from fanet_mw.errors import LocalProtocolError
 
-_SLOTS_EXAMINED: Final = 1_000_000
+_SLOTS_EXAMINED: Final = 100_000
+"""A busy period of more slots than this is not followed to its end."""
 
 
 def paper_slot(*, airtime_ns: int, interval_ns: int, period_ns: int) -> Fraction:
@@ -36,8 +37,10 @@ def cluster_estimate(
 ) -> DelayBound:
     """WD_c of equation (3); `slot_ns` None stands for the paper's own S.
 
-    All q with the same ceiling share w(q), so only the first of each is examined: the others are smaller by multiples
-    of p. The estimate is refused when no Q exists, or when the busy period is longer than a million slots.
+    The paper's own S serves exactly p_c/p packets a slot. Then Q is the first m p_c / p that is an integer, and the
+    worst q is the one that misses its slot by least: WD_c = p_c + p - gcd(p, p_c), whatever the airtime. For another S
+    all q with the same ceiling share w(q), so only the first of each is examined: the others are smaller by multiples
+    of p. The estimate is refused when no Q exists, or when the busy period is longer than `_SLOTS_EXAMINED` slots.
     """
     if min(airtime_ns, period_ns, interval_ns) <= 0 or (slot_ns is not None and slot_ns <= 0):
         raise LocalProtocolError(f"{airtime_ns=} {slot_ns=} {period_ns=} {interval_ns=} must all be > 0")
@@ -47,11 +50,12 @@ def cluster_estimate(
         return Refused(
             f"no Q in equation (3): slot {float(slot):.0f} ns < (airtime/interval) period = {float(own):.0f} ns"
         )
-    per_slot = slot / airtime_ns
-    worst_ns = 0
+    if slot == own:
+        return Bounded(period_ns + interval_ns - gcd(period_ns, interval_ns))
+    packets, slots = (slot / airtime_ns).as_integer_ratio()
+    worst_ns = last = 0
     for m in range(1, _SLOTS_EXAMINED + 1):
-        first = floor((m - 1) * per_slot) + 1
-        last = floor(m * per_slot)
+        first, last = last + 1, m * packets // slots
         if first > last:  # no q has this ceiling, because S < C
             continue
         worst_ns = max(worst_ns, m * period_ns - (first - 1) * interval_ns)

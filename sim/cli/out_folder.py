@@ -3,18 +3,20 @@
 Looked at first, because a run may take an hour and its result has nowhere else to go.
 """
 
+import contextlib
 import tempfile
+from collections.abc import Sequence
 from pathlib import Path
 from typing import Final
 
 from emulator.capture_file import NAME as CAPTURE
 from emulator.capture_file import captures
 from fanet_mw.errors import ConfigError
+from sim.report import names
 
 FILES: Final = ("summary.json", "scenario.toml", "reports.json", "links.json", "trace.jsonl", "mavlink.tlog")
-"""What a run writes, besides captures."""
-PAGES: Final = ("report.html", "report.md")
-"""What `--report` adds."""
+"""What a run writes, besides captures and the files of its page."""
+_MOST_SAID: Final = 8
 
 
 def prepare(out: Path, *, force: bool) -> None:
@@ -26,15 +28,22 @@ def prepare(out: Path, *, force: bool) -> None:
         out.mkdir(parents=True, exist_ok=True)
         with tempfile.TemporaryFile(dir=out) as file:
             file.write(b"a run would be lost")
-        used = [
-            path for path in (*(out / name for name in (*FILES, *PAGES)), *captures(out / CAPTURE)) if path.exists()
-        ]
+        named = (out / name for name in (*FILES, *names.PAGES))
+        used = [path for path in (*named, *captures(out / CAPTURE), *names.pictures(out)) if path.exists()]
         if used and not force:
             raise ConfigError(
-                f"--out {out}: holds the result of another run ({', '.join(path.name for path in used)}); "
+                f"--out {out}: holds the result of another run ({_said(used)}); "
                 "choose another folder, or replace it with --force"
             )
         for path in used:
             path.unlink()
+        with contextlib.suppress(OSError):  # it is not there, or holds a file of somebody else
+            (out / names.PICTURES).rmdir()
     except OSError as error:
         raise ConfigError(f"--out {out}: cannot be written: {error.strerror}") from error
+
+
+def _said(paths: Sequence[Path]) -> str:
+    """The names of some files, and how many others there are."""
+    others = len(paths) - _MOST_SAID
+    return ", ".join(path.name for path in paths[:_MOST_SAID]) + (f" and {others} more" if others > 0 else "")

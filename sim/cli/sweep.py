@@ -2,6 +2,7 @@
 
 import contextlib
 import json as json_module
+import math
 import os
 import sys
 import time
@@ -122,7 +123,9 @@ def carry_out(
         sys.stdout.write(f"{json_module.dumps(answer)}\n")
     else:
         took = time.monotonic() - began
-        Console().print(f"{len(statuses)} rows in {out / TABLE}, {len(plan.todo)} of them new, in {took:.0f} s",
+        cpu_s = math.fsum(done.cpu_s for task in plan.todo if (done := store.get(task.key)) is not None)
+        spent = f"in {took:.0f} s ({cpu_s:.0f} s of CPU)"
+        Console().print(f"{len(statuses)} rows in {out / TABLE}, {len(plan.todo)} of them new, {spent}",
                         highlight=False, soft_wrap=True)  # fmt: skip
     if failed:
         _say_failures(table)

@@ -4,14 +4,20 @@ A claim is one or more statements. A statement is a quantity with one value per 
 which the claim has it. It holds when the whole 95 % interval of its mean is on that side, fails when the whole interval
 is on the other, and is open when the threshold lies within. A claim agrees when all its statements hold, differs when
 all fail, and is partly so otherwise.
+
+A reason says why a verdict is what it is, and is judged in the same way: it rests on statements over the same runs, an
+experiment that would come out otherwise if the reason were wrong. It counts as shown when all of them hold.
 """
 
-from collections.abc import Sequence
+from collections.abc import Mapping, Sequence
 from dataclasses import dataclass
 from enum import StrEnum
 from typing import Any, Literal
 
 from sim.figures.statistics import Interval, interval
+
+Values = Sequence[float] | Mapping[int, float]
+"""One value per seed, or the value of each seed."""
 
 
 class Verdict(StrEnum):
@@ -57,6 +63,57 @@ class Statement:
         bound = f"{self.side} {self.threshold:g}{f' {self.unit}' if self.unit else ''}"
         return f"{self.what}: {self.interval.text(self.unit)}, claimed {bound}: {self.finding}"
 
+    def plain(self) -> dict[str, Any]:
+        """As plain values, for JSON."""
+        found = self.interval
+        return {
+            "what": self.what,
+            "mean": found.mean,
+            "low": found.low,
+            "high": found.high,
+            "seeds": found.runs,
+            "side": self.side,
+            "threshold": self.threshold,
+            "unit": self.unit,
+            "finding": self.finding.value,
+            "text": self.text(),
+        }
+
+
+def above(what: str, values: Values, threshold: float, unit: str = "") -> Statement:
+    """The statement that a quantity is above a threshold."""
+    return Statement(what, _listed(values), "above", threshold, unit)
+
+
+def below(what: str, values: Values, threshold: float, unit: str = "") -> Statement:
+    """The statement that a quantity is below a threshold."""
+    return Statement(what, _listed(values), "below", threshold, unit)
+
+
+def _listed(values: Values) -> Sequence[float]:
+    return list(values.values()) if isinstance(values, Mapping) else values
+
+
+@dataclass(frozen=True, slots=True)
+class Reason:
+    """Why a verdict is what it is, and the experiment that shows so."""
+
+    text: str
+    statements: Sequence[Statement]
+
+    @property
+    def shown(self) -> bool:
+        """True when every statement holds; a reason without statements is shown by nothing."""
+        return {statement.finding for statement in self.statements} == {Finding.HOLDS}
+
+    def plain(self) -> dict[str, Any]:
+        """As plain values, for JSON."""
+        return {
+            "text": self.text,
+            "shown": self.shown,
+            "statements": [statement.plain() for statement in self.statements],
+        }
+
 
 @dataclass(frozen=True, slots=True)
 class Claim:
@@ -66,8 +123,7 @@ class Claim:
     claim: str
     """What the paper says."""
     statements: Sequence[Statement]
-    why: str = ""
-    """What makes the difference, or why it is so: an experiment of this sweep, or a mechanism with its place."""
+    reasons: Sequence[Reason] = ()
 
     @property
     def verdict(self) -> Verdict:
@@ -82,20 +138,6 @@ class Claim:
             "figure": self.figure,
             "claim": self.claim,
             "verdict": self.verdict.value,
-            "why": self.why,
-            "statements": [
-                {
-                    "what": statement.what,
-                    "mean": statement.interval.mean,
-                    "low": statement.interval.low,
-                    "high": statement.interval.high,
-                    "seeds": statement.interval.runs,
-                    "side": statement.side,
-                    "threshold": statement.threshold,
-                    "unit": statement.unit,
-                    "finding": statement.finding.value,
-                    "text": statement.text(),
-                }
-                for statement in self.statements
-            ],
+            "statements": [statement.plain() for statement in self.statements],
+            "reasons": [reason.plain() for reason in self.reasons],
         }

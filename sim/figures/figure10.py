@@ -1,9 +1,9 @@
 """Figure 10: the paper's method against clusters and flooding period. Claims: what is best, what is too often."""
 
-from collections.abc import Mapping
+from collections.abc import Mapping, Sequence
 from typing import Final
 
-from sim.figures.claims import Claim, Statement
+from sim.figures.claims import Claim, Reason, above
 from sim.figures.recipe import Drawing, Recipe, point
 from sim.figures.runs import Runs, best, differences, pooled
 from sim.figures.style import SERIES, canvas, line
@@ -62,41 +62,75 @@ def claims(runs: Runs) -> list[Claim]:
     return [*_best(runs), *_too_often(runs)]
 
 
+def _over_periods(runs: Runs, case: str, clusters: int, interval_s: float) -> Mapping[int, float]:
+    """The PDR of each seed, its mean over all flooding periods."""
+    periods = runs.levels("clusters.flooding_period_s")
+    return pooled(*(_pdr(runs, case, clusters, period_s, interval_s) for period_s in periods))
+
+
 def _best(runs: Runs) -> list[Claim]:
-    clusters, periods = runs.levels("clusters.count"), runs.levels("clusters.flooding_period_s")
+    clusters = runs.levels("clusters.count")
     intervals = list(reversed(runs.levels("traffic.interval_s")))
-    found = []
-    for case, pace in _PACES.items():
-        statements = []
-        for interval_s in intervals:
-            over = {
-                count: pooled(*(_pdr(runs, case, count, period_s, interval_s) for period_s in periods))
-                for count in clusters
-            }
-            many = best(*(over[count] for count in clusters if count >= _MANY))
-            few = best(*(over[count] for count in clusters if count < _MANY))
-            statements.append(
-                Statement(
+    few_of, many_of = ([count for count in clusters if (count >= _MANY) == wanted] for wanted in (False, True))
+
+    def lead(case: str, interval_s: float) -> dict[int, float]:
+        """The best PDR of many clusters minus the best of few."""
+        over = {count: _over_periods(runs, case, count, interval_s) for count in clusters}
+        many, few = best(*(over[count] for count in many_of)), best(*(over[count] for count in few_of))
+        return {seed: many[seed] - few[seed] for seed in many}
+
+    def spreading_gains(counts: Sequence[int], interval_s: float) -> list[float]:
+        spread, burst = (
+            pooled(*(_over_periods(runs, case, count, interval_s) for count in counts)) for case in ("spread", "burst")
+        )
+        return differences(spread, burst)
+
+    bursts = Reason(
+        "A head that lets out all it has as soon as its slot begins floods a burst, in which the copies of one "
+        "packet collide with those of the next. Few clusters have long queues and so long bursts; the same packets "
+        "arrive when they are spread over the same slots.",
+        [
+            above(
+                f"every {interval_s:g} s, fewer than {_MANY} clusters: PDR by spreading minus by bursts",
+                spreading_gains(few_of, interval_s),
+                0.0,
+            )
+            for interval_s in intervals
+        ],
+    )
+    gone = Reason(
+        "Spread over its slot a queue is no burst, and what clusters gained is gone.",
+        [
+            above(
+                f"every {interval_s:g} s: lead of many clusters by bursts minus by spreading",
+                differences(lead("burst", interval_s), lead("spread", interval_s)),
+                0.0,
+            )
+            for interval_s in intervals
+        ],
+    )
+    return [
+        Claim(
+            10,
+            f"The PDR is best at 22 or 44 clusters. (Packets let out {pace}.)",
+            [
+                above(
                     f"every {interval_s:g} s: best of {_MANY} or more clusters minus best of fewer, all periods",
-                    differences(many, few),
-                    "above",
+                    lead(case, interval_s),
                     0.0,
                 )
-            )
-        why = (
-            "A head that lets out all it has at the beginning of its slot floods a burst, and the copies of one packet "
-            "collide with those of the next; many clusters have short queues, and so short bursts."
-            if case == "burst"
-            else "Spread over its slot, a queue is no burst: little is left of the effect of clusters."
+                for interval_s in intervals
+            ],
+            [bursts if case == "burst" else gone],
         )
-        found.append(Claim(10, f"The PDR is best at 22 or 44 clusters. (Packets let out {pace}.)", statements, why))
-    return found
+        for case, pace in _PACES.items()
+    ]
 
 
 def _too_often(runs: Runs) -> list[Claim]:
     clusters, periods = runs.levels("clusters.count"), runs.levels("clusters.flooding_period_s")
-    statements = []
-    for interval_s in reversed(runs.levels("traffic.interval_s")):
+
+    def seldom_minus_often(interval_s: float) -> list[float]:
         often, seldom = (
             pooled(
                 *(
@@ -108,21 +142,20 @@ def _too_often(runs: Runs) -> list[Claim]:
             )
             for wanted in (True, False)
         )
-        statements.append(
-            Statement(
-                f"every {interval_s:g} s: PDR with periods of 1 s and more minus with less, mean of all clusters",
-                differences(seldom, often),
-                "above",
-                _LOW,
-            )
-        )
+        return differences(seldom, often)
+
     return [
         Claim(
             10,
             "The PDR is low when clusters flood more often than every second.",
-            statements,
-            "How often slots come decides how long packets wait, and how many are let out together; the air has to "
-            "carry the same number of packets a second either way.",
+            [
+                above(
+                    f"every {interval_s:g} s: PDR with periods of 1 s and more minus with less, mean of all clusters",
+                    seldom_minus_often(interval_s),
+                    _LOW,
+                )
+                for interval_s in reversed(runs.levels("traffic.interval_s"))
+            ],
         )
     ]
 

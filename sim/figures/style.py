@@ -91,6 +91,13 @@ def line(axes: Axes, look: Look, xs: Sequence[float], intervals: Sequence[Interv
     )  # fmt: skip
 
 
+def band(axes: Axes, look: Look, xs: Sequence[float], intervals: Sequence[Interval], *, least: float = 0.0) -> None:
+    """The intervals about a line as a band; nothing where a mean is of one run."""
+    if all(item.runs > 1 for item in intervals):
+        low, high = [max(least, item.low) for item in intervals], [item.high for item in intervals]
+        axes.fill_between(xs, low, high, color=look.color, alpha=0.15, linewidth=0)
+
+
 def save(figure: Figure, folder: Path, name: str) -> list[Path]:
     """Write PNG and SVG; the same figure gives the same bytes."""
     paths = [folder / f"{name}.png", folder / f"{name}.svg"]

@@ -1,7 +1,7 @@
 """The page of an evaluation: settings beside the paper's, each figure with claims, findings and verdicts, commands."""
 
 import json
-from collections.abc import Sequence
+from collections.abc import Mapping, Sequence
 from pathlib import Path
 from typing import Any, Final
 
@@ -88,7 +88,12 @@ def _overview(figures: Sequence[tuple[Path, dict[str, Any]]]) -> list[Block]:
 
 def _figure(folder: Path, about: dict[str, Any]) -> list[Block]:
     rows = [
-        (claim["claim"], "\n".join(one["text"] for one in claim["statements"]), claim["verdict"], claim["why"])
+        (
+            claim["claim"],
+            "\n".join(one["text"] for one in claim["statements"]),
+            claim["verdict"],
+            "\n".join(map(_reason, claim["reasons"])),
+        )
         for claim in about["claims"]
     ]
     name = about["name"]
@@ -99,6 +104,13 @@ def _figure(folder: Path, about: dict[str, Any]) -> list[Block]:
     if rows:
         blocks.append(Rows(("claim", "findings", "verdict", "why"), rows))
     return blocks
+
+
+def _reason(reason: Mapping[str, Any]) -> str:
+    """Why a verdict is what it is, with its experiment; what the runs do not show is said to be not shown."""
+    evidence = "; ".join(one["text"] for one in reason["statements"])
+    doubt = "" if reason["shown"] else "Supposed, but not shown by these runs: "
+    return f"{doubt}{reason['text']} ({evidence}.)"
 
 
 def _commands(figures: Sequence[tuple[Path, dict[str, Any]]]) -> list[Block]:

@@ -21,6 +21,7 @@ from fanet_mw.trace import Approaching, Arrived, BoundStated, Delivered, Detecte
 from fanet_mw.units import MS, S
 from sim.figures.style import SERIES, applied, canvas, save
 from sim.report.html import Block, Commands, Heading, Picture, Rows, Text
+from sim.report.names import KINDS, PICTURES
 from sim.world.mobility.layout import positions
 
 _WINDOWS = 40
@@ -84,7 +85,7 @@ def blocks_of_run(folder: Path, out: Path) -> list[Block]:
     except ValueError as error:
         raise ConfigError(f"{folder / 'trace.jsonl'}: {error}") from error
     links = json.loads((folder / "links.json").read_text(encoding="utf-8")) if (folder / "links.json").exists() else []
-    pictures = out / "pictures"
+    pictures = out / PICTURES
     pictures.mkdir(parents=True, exist_ok=True)
     name = f"{summary['scenario']}-{summary['seed']}"
     blocks: list[Block] = [
@@ -93,13 +94,14 @@ def blocks_of_run(folder: Path, out: Path) -> list[Block]:
         Text("The result may be used." if summary["valid"] else f"NOT VALID: {'; '.join(summary['invalid_because'])}."),
         _figures_of(summary),
     ]
-    for draw, kind, caption in (
-        (partial(_delays, story), "delays", "Delays of the load against the bound that each packet's origin stated."),
-        (partial(_delivery, story), "delivery", "Delivery ratio by the instant a packet was born, and per receiver."),
-        (partial(_map, story, links), "links", "Links by the share of copies received; nodes where they started."),
-        (partial(_slots, story), "slots", "When packets were let out first, by place in the flooding period."),
-        (partial(_mission, story), "mission", "What UAVs did for survivors."),
-    ):
+    drawn = (
+        (partial(_delays, story), "Delays of the load against the bound that each packet's origin stated."),
+        (partial(_delivery, story), "Delivery ratio by the instant a packet was born, and per receiver."),
+        (partial(_map, story, links), "Links by the share of copies received; nodes where they started."),
+        (partial(_slots, story), "When packets were let out first, by place in the flooding period."),
+        (partial(_mission, story), "What UAVs did for survivors."),
+    )
+    for kind, (draw, caption) in zip(KINDS, drawn, strict=True):
         with applied():
             figure = draw()
             if figure is not None:

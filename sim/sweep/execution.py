@@ -16,7 +16,7 @@ from sim.sweep.tasks import Task
 
 @dataclass(frozen=True, slots=True)
 class Finished:
-    """What one run came to. `wall_s` depends on the machine; nothing else does."""
+    """What one run came to. `wall_s` and `cpu_s` depend on the machine; nothing else does."""
 
     key: str
     code: str
@@ -27,6 +27,8 @@ class Finished:
     """What was measured besides, as JSON."""
     error: str | None = None
     """Why there is no summary: the last line of the traceback, and below it the whole."""
+    cpu_s: float = 0.0
+    """Processor time of the run, which a busy machine lengthens less than its wall time."""
 
     @property
     def failed(self) -> bool:
@@ -35,7 +37,12 @@ class Finished:
 
 def carry_out(task: Task) -> Finished:
     """Simulate, summarize and measure one run."""
-    began = time.perf_counter()
+    began, began_cpu = time.perf_counter(), time.process_time()
+
+    def ended(**came_to: str) -> Finished:
+        wall_s, cpu_s = time.perf_counter() - began, time.process_time() - began_cpu
+        return Finished(task.key, code(), wall_s, cpu_s=cpu_s, **came_to)
+
     try:
         scenario = config.build(task.tree)
         outcome = simulate(scenario)
@@ -44,9 +51,5 @@ def carry_out(task: Task) -> Finished:
         measured: dict[str, Value] = {name: MEASURES[name](outcome) for name in task.measure}
     except Exception as error:  # noqa: BLE001 one run of many: the others go on, and the table names this one
         lines = error.args[0] if isinstance(error, FanetError) and error.args else traceback.format_exc()
-        return Finished(
-            task.key, code(), time.perf_counter() - began, error=f"{type(error).__name__}: {error}\n{lines}"
-        )
-    return Finished(
-        task.key, code(), time.perf_counter() - began, summary=json.dumps(summary), measured=json.dumps(measured)
-    )
+        return ended(error=f"{type(error).__name__}: {error}\n{lines}")
+    return ended(summary=json.dumps(summary), measured=json.dumps(measured))

@@ -36,6 +36,24 @@ def wanted(outcome: Outcome) -> float:
     return float(first_class_of(outcome).wanted)
 
 
+def leader_pdr(outcome: Outcome) -> float | None:
+    """Of the packets that others sent to the leader or to everyone, the share that reached it."""
+    leader, sent = outcome.scenario.leader, first_class_of(outcome).sent
+    meant = sum(origin != leader for origin, _ in sent)
+    return len(_at_leader_s(outcome)) / meant if meant else None
+
+
+def leader_delay_s(outcome: Outcome) -> float | None:
+    """The mean delay of what reached the leader [s]."""
+    delays_s = _at_leader_s(outcome)
+    return math.fsum(delays_s) / len(delays_s) if delays_s else None
+
+
+def _at_leader_s(outcome: Outcome) -> list[float]:
+    leader = outcome.scenario.leader
+    return [record.delay_ns / S for record in first_class_of(outcome).deliveries if record.node == leader]
+
+
 def connected(outcome: Outcome) -> float:
     """The share of (source, target) pairs that a multi-hop path connected, on average over the measured window."""
     return connectivity(outcome.scenario)
@@ -61,6 +79,8 @@ def _first_of_each(outcome: Outcome, kind: type[Approaching] | type[Detected]) -
 MEASURES: Final[Mapping[str, Callable[[Outcome], Value]]] = {
     "delay_counts": delay_counts,
     "wanted": wanted,
+    "leader_pdr": leader_pdr,
+    "leader_delay_s": leader_delay_s,
     "connected": connected,
     "first_detected_s": first_detected_s,
     "first_approach_s": first_approach_s,

@@ -28,7 +28,7 @@ from sim.sweep.tasks import Task
 TABLE: Final = "runs.parquet"
 _SCHEMA: Final = pa.schema(
     [
-        (field.name, pa.float64() if field.name == "wall_s" else pa.string())
+        (field.name, pa.float64() if field.type is float else pa.string())
         for field in fields(Finished)
     ]
 )  # fmt: skip

@@ -1,5 +1,7 @@
 """One slot: the bound is never violated, is reached to the nanosecond, and refuses exactly what grows without limit."""
 
+from fractions import Fraction
+
 import pytest
 from hypothesis import example, given, settings
 from hypothesis import strategies as st
@@ -136,3 +138,23 @@ def test_with_the_paper_s_own_slot_the_estimate_is_one_period_whatever_the_load(
     """
     found = paper.cluster_estimate(airtime_ns=c, slot_ns=None, period_ns=period * p, interval_ns=p)
     assert found == Bounded(period * p)
+
+
+@settings(max_examples=150)
+@given(st.integers(1, 30), st.integers(1, 60), st.integers(1, 60))
+def test_with_the_paper_s_own_slot_the_equations_are_followed_to_the_letter_for_any_periods(c, period, p) -> None:
+    slot = paper.paper_slot(airtime_ns=c, interval_ns=p, period_ns=period)
+    found = paper.cluster_estimate(airtime_ns=c, slot_ns=None, period_ns=period, interval_ns=p)
+    assert found == Bounded(q_by_q(c, slot, period, p))
+
+
+def test_the_estimate_ends_soon_whatever_the_periods() -> None:
+    """With periods that share no factor the equations run through as many slots as an interval has nanoseconds."""
+    period, p = 500_000_000, 18_181_819
+    assert paper.cluster_estimate(airtime_ns=1, slot_ns=None, period_ns=period, interval_ns=p) == Bounded(
+        period + p - 1
+    )
+    barely = Fraction(period, p) + Fraction(1, 10**15)
+    found = paper.cluster_estimate(airtime_ns=1, slot_ns=barely, period_ns=period, interval_ns=p)
+    assert isinstance(found, Refused)
+    assert "beyond 100000 slots" in found.reason

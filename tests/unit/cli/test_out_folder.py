@@ -10,7 +10,8 @@ import pytest
 from fanet_mw import tlog
 from fanet_mw.errors import ConfigError
 from sim.cli.app import app
-from sim.cli.out_folder import FILES, PAGES, prepare
+from sim.cli.out_folder import FILES, prepare
+from sim.report.names import PAGES
 
 SHORT = ("--set", "duration_s=1", "--set", "warmup_s=0", "--set", "drain_s=0", "--json")
 
@@ -70,3 +71,21 @@ def test_one_file_of_another_run_is_enough_to_refuse(tmp_path: Path, name: str) 
         prepare(tmp_path, force=False)
     prepare(tmp_path, force=True)
     assert list(tmp_path.iterdir()) == []
+
+
+def test_force_removes_the_pictures_of_the_earlier_page_and_nothing_else_beside_them(tmp_path: Path) -> None:
+    for seed in ("1", "2"):
+        assert fanet("simulate", "quick", "--seed", seed, "--report", "--force", "--out", str(tmp_path)) == 0
+        pictures = tmp_path / "pictures"
+        assert {path.name.split("-")[1] for path in pictures.iterdir()} == {seed}, (
+            "each page has its own pictures alone"
+        )
+    (pictures / "mine.png").touch()
+    prepare(tmp_path, force=True)
+    assert [path.name for path in pictures.iterdir()] == ["mine.png"]
+    (pictures / "mine.png").unlink()
+    (pictures / "quick-1-delays.svg").touch()
+    with pytest.raises(ConfigError, match=r"holds the result of another run \(quick-1-delays\.svg\)"):
+        prepare(tmp_path, force=False)
+    prepare(tmp_path, force=True)
+    assert not pictures.exists()

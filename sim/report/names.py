@@ -1,0 +1,18 @@
+"""The names of the files that make a page, so that they can be told from anything else in a folder."""
+
+from pathlib import Path
+from typing import Final
+
+PAGES: Final = ("report.html", "report.md")
+PICTURES: Final = "pictures"
+"""The folder of a run's pictures, beside the page."""
+KINDS: Final = ("delays", "delivery", "links", "slots", "mission")
+"""What the pictures of a run show; each is a file `SCENARIO-SEED-KIND` in both formats."""
+FORMATS: Final = (".png", ".svg")
+
+
+def pictures(folder: Path) -> list[Path]:
+    """The pictures of runs in a page's folder."""
+    kinds = tuple(f"-{kind}" for kind in KINDS)
+    found = sorted((folder / PICTURES).glob("*"))
+    return [path for path in found if path.suffix in FORMATS and path.stem.endswith(kinds)]

@@ -64,7 +64,7 @@ def figures(
         if not draw_only:
             found = spec.find(recipe.sweep).variant(variant)
             code |= carry_out(recipe.sweep, found, out=runs, jobs=jobs, scheduler=scheduler)
-        verdicts += [(recipe.name, claim) for claim in render(recipe, read(runs), out)]
+        verdicts += [(recipe.name, claim) for claim in render(recipe, read(runs), out, variant=variant)]
     console = Console()
     table = Table("figure", "claim", "verdict", box=None, header_style="bold", padding=(0, 2, 0, 0))
     for name, claim in verdicts:

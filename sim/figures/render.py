@@ -12,8 +12,8 @@ from sim.figures.runs import Runs
 from sim.figures.style import applied, save, save_data
 
 
-def render(recipe: Recipe, table: Table, folder: Path) -> list[Claim]:
-    """Draw a figure and judge its claims; returns them."""
+def render(recipe: Recipe, table: Table, folder: Path, *, variant: str = "quick") -> list[Claim]:
+    """Draw a figure from the runs of a variant of its sweep and judge its claims; returns them."""
     runs = Runs(table)
     if not runs.rows:
         raise ConfigError(f"{recipe.name}: the sweep has no run that ended well")
@@ -29,6 +29,7 @@ def render(recipe: Recipe, table: Table, folder: Path) -> list[Claim]:
             "title": recipe.title,
             "caption": recipe.caption,
             "sweep": recipe.sweep,
+            "variant": variant,
             "runs": len(runs.rows),
             "failed": runs.failed,
             "seeds": len({row["seed"] for row in runs.rows}),

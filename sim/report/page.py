@@ -55,15 +55,19 @@ def _blocks(folders: Sequence[Path], out: Path) -> tuple[str, list[Block]]:
     for folder in folders:
         if folder not in runs and not _figures(folder):
             raise ConfigError(f"{folder}: holds neither figures (fanet figures) nor a run (fanet simulate --out)")
-    blocks: list[Block] = []
-    if figures:
-        blocks += [*_overview(figures), Heading("Settings"), _SETTINGS]
-        for folder, about in figures:
-            blocks += _figure(folder, about)
-        blocks += _commands(figures)
+    blocks = evaluation(folders) if figures else []
     for folder in runs:
         blocks += blocks_of_run(folder, out)
     return _TITLE if figures else "Runs" if len(runs) > 1 else "A run", blocks
+
+
+def evaluation(folders: Sequence[Path]) -> list[Block]:
+    """The page of all figures in these folders: verdicts, settings, each figure with its claims, commands."""
+    figures = [found for folder in folders for found in _figures(folder)]
+    blocks: list[Block] = [*_overview(figures), Heading("Settings"), _SETTINGS]
+    for folder, about in figures:
+        blocks += _figure(folder, about)
+    return [*blocks, *_commands(figures)]
 
 
 def _figures(folder: Path) -> list[tuple[Path, dict[str, Any]]]:
@@ -99,8 +103,12 @@ def _figure(folder: Path, about: dict[str, Any]) -> list[Block]:
     name = about["name"]
     head = f"{name.capitalize().replace('-', ' ')}: {about['title']}" if name.startswith("figure") else about["title"]
     failed = f", {about['failed']} runs failed and are left out" if about["failed"] else ""
-    made = f"{about['runs']} runs, {about['seeds']} seeds{failed}; code {', '.join(about['code'])}."
-    blocks: list[Block] = [Heading(head), Picture(folder / f"{name}.png", about["caption"]), Text(made)]
+    made = f"Variant {about['variant']}: {about['runs']} runs, {about['seeds']} seeds{failed}"
+    blocks: list[Block] = [
+        Heading(head),
+        Picture(folder / f"{name}.png", about["caption"]),
+        Text(f"{made}; code {', '.join(about['code'])}."),
+    ]
     if rows:
         blocks.append(Rows(("claim", "findings", "verdict", "why"), rows))
     return blocks
@@ -119,7 +127,10 @@ def _commands(figures: Sequence[tuple[Path, dict[str, Any]]]) -> list[Block]:
         "fanet figures all --full --out figures",
         "fanet report figures",
     ]
-    lines += [f"fanet sweep {about['sweep']} --variant quick    # the runs of {about['name']}" for _, about in figures]
+    lines += [
+        f"fanet sweep {about['sweep']} --variant {about['variant']}    # the runs of {about['name']}"
+        for _, about in figures
+    ]
     return [
         Heading("Commands"),
         Commands(lines),

@@ -69,6 +69,21 @@ def first_approach_s(outcome: Outcome) -> list[float]:
     return _first_of_each(outcome, Approaching)
 
 
+def enough_heard_s(outcome: Outcome) -> float | None:
+    """When as many UAVs as the mission asks for had heard the same phone [s]: nobody can turn before, whatever the
+    network. None: that never came to be.
+    """
+    enough = outcome.scenario.mission.reports_to_approach
+    who: dict[int, set[int]] = {}
+    for record in outcome.records:
+        if isinstance(record, Detected):
+            heard = who.setdefault(record.survivor, set())
+            heard.add(record.node)
+            if len(heard) == enough:
+                return record.t_ns / S
+    return None
+
+
 def _first_of_each(outcome: Outcome, kind: type[Approaching] | type[Detected]) -> list[float]:
     first: dict[int, int] = {}
     for record in of(outcome.records, kind):
@@ -84,6 +99,7 @@ MEASURES: Final[Mapping[str, Callable[[Outcome], Value]]] = {
     "connected": connected,
     "first_detected_s": first_detected_s,
     "first_approach_s": first_approach_s,
+    "enough_heard_s": enough_heard_s,
 }
 
 

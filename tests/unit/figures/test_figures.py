@@ -5,13 +5,14 @@ import json
 import math
 import re
 import statistics
+from dataclasses import replace
 from pathlib import Path
 
 import pytest
 
 from fanet_mw.errors import ConfigError
 from sim.figures.all_figures import FIGURES, chosen
-from sim.figures.claims import Claim, Finding, Statement, Verdict
+from sim.figures.claims import Claim, Finding, Reason, Statement, Verdict, above, below
 from sim.figures.render import render
 from sim.figures.runs import Runs, best, differences, pooled
 from sim.figures.statistics import interval, quantile_975
@@ -69,6 +70,25 @@ def test_a_claim_agrees_when_all_holds_differs_when_all_fails_and_is_partly_so_o
     assert Claim(8, "it", [fails, fails]).verdict is Verdict.DIFFERS
     for mixed in ([holds, fails], [holds, is_open], [fails, is_open], [is_open]):
         assert Claim(8, "it", mixed).verdict is Verdict.PARTLY
+
+
+def test_a_reason_is_shown_only_when_every_statement_of_its_experiment_holds() -> None:
+    holds, fails, is_open = (above("it", values, 1.0) for values in ([2.0, 2.0], [0.0, 0.0], {1: 0.0, 2: 2.0}))
+    assert Reason("so", [holds, holds]).shown
+    for others in ([fails], [is_open], [holds, fails], [holds, is_open], []):
+        assert not Reason("so", others).shown
+    assert below("it", {1: 0.0, 2: 0.5}, 1.0, "s").text() == "it: 0.25 s [-2.93, 3.43], claimed below 1 s: open"
+
+
+def test_a_page_says_of_a_reason_what_shows_it_or_that_nothing_does(nine, tmp_path) -> None:
+    table, _, _ = nine
+    reasons = [Reason("Air.", [above("air", [2.0, 2.0], 1.0)]), Reason("Luck.", [above("luck", [0.0, 2.0], 1.0)])]
+    claims = [Claim(9, "It falls.", [above("it", [2.0, 2.0], 1.0)], reasons)]
+    render(replace(FIGURES["9"], claims=lambda _: claims), table, tmp_path)
+    _, markdown = (path.read_text() for path in write([tmp_path], tmp_path))
+    assert "Air. (air: 2 [2, 2], claimed above 1: holds.)" in markdown
+    assert "Supposed, but not shown by these runs: Luck. (luck: 1 [" in markdown
+    assert markdown.count("not shown") == 1
 
 
 def test_differences_are_taken_seed_by_seed() -> None:

@@ -10,6 +10,7 @@ from contextlib import contextmanager
 from pathlib import Path
 
 import pytest
+from distributed import Client
 
 from fanet_mw.results import read
 from sim.sweep import spec
@@ -49,9 +50,11 @@ def finished(out: Path) -> int:
     return len(list((out / "finished").glob("*.parquet")))
 
 
-def wait_until(condition: Callable[[], bool], patience_s: float = 60) -> None:
+def wait_until(condition: Callable[[], bool], process: subprocess.Popen[str], patience_s: float = 240) -> None:
+    """Until something holds; a process that ends before fails the test with its last words."""
     end = time.monotonic() + patience_s
     while not condition():
+        assert process.poll() is None, process.communicate()
         assert time.monotonic() < end, "it did not come to that"
         time.sleep(0.02)
 
@@ -91,7 +94,7 @@ def test_a_sweep_that_is_killed_three_times_ends_as_one_that_was_not(file, tmp_p
     complete(file, whole, "--jobs", "2")
     for count in (1, 3, 5):
         process = sweep(file, killed, "--jobs", "1")
-        wait_until(lambda count=count: finished(killed) >= count)
+        wait_until(lambda count=count: finished(killed) >= count, process)
         process.kill()
         process.communicate()
         left = finished(killed)
@@ -107,7 +110,7 @@ def test_a_sweep_that_is_killed_three_times_ends_as_one_that_was_not(file, tmp_p
 @pytest.mark.slow
 def test_an_interrupted_sweep_says_how_to_go_on_and_has_a_table(file, tmp_path) -> None:
     process = sweep(file, tmp_path / "out", "--jobs", "1")
-    wait_until(lambda: finished(tmp_path / "out") >= 2)
+    wait_until(lambda: finished(tmp_path / "out") >= 2, process)
     process.send_signal(signal.SIGINT)
     _, said = process.communicate()
     assert process.returncode == 130
@@ -128,6 +131,8 @@ def dask(workers: int) -> Iterator[tuple[str, list[subprocess.Popen[bytes]]]]:
         for _ in range(workers):
             worker = [sys.executable, "-m", "distributed.cli.dask_worker", address, "--nthreads", "1", "--no-dashboard"]
             started.append(subprocess.Popen([*worker, "--no-nanny"], **quiet))
+        with Client(address, timeout="120s", set_as_default=False) as client:
+            client.wait_for_workers(workers, timeout=120)
         yield address, started[1:]
     finally:
         for process in started:
@@ -140,7 +145,7 @@ def test_two_dask_workers_give_the_rows_of_the_pool_and_killing_one_loses_nothin
     complete(file, tmp_path / "pool", "--jobs", "2")
     with dask(2) as (address, workers):
         process = sweep(file, tmp_path / "dask", "--scheduler", address)
-        wait_until(lambda: finished(tmp_path / "dask") >= 2)
+        wait_until(lambda: finished(tmp_path / "dask") >= 2, process)
         workers[0].kill()
         _, said = process.communicate()
         assert process.returncode == 0, said

@@ -58,12 +58,12 @@ class Statement:
             return Finding.OPEN
         return Finding.HOLDS if above == (self.side == "above") else Finding.FAILS
 
-    def text(self) -> str:
-        """For people, with the figures."""
+    def text(self, verb: str = "claimed") -> str:
+        """For people, with the figures; the verb says whose threshold it is."""
         bound = f"{self.side} {self.threshold:g}{f' {self.unit}' if self.unit else ''}"
-        return f"{self.what}: {self.interval.text(self.unit)}, claimed {bound}: {self.finding}"
+        return f"{self.what}: {self.interval.text(self.unit)}, {verb} {bound}: {self.finding}"
 
-    def plain(self) -> dict[str, Any]:
+    def plain(self, verb: str = "claimed") -> dict[str, Any]:
         """As plain values, for JSON."""
         found = self.interval
         return {
@@ -76,7 +76,7 @@ class Statement:
             "threshold": self.threshold,
             "unit": self.unit,
             "finding": self.finding.value,
-            "text": self.text(),
+            "text": self.text(verb),
         }
 
 
@@ -111,7 +111,7 @@ class Reason:
         return {
             "text": self.text,
             "shown": self.shown,
-            "statements": [statement.plain() for statement in self.statements],
+            "statements": [statement.plain("expected") for statement in self.statements],
         }
 
 

@@ -81,11 +81,14 @@ def draw(runs: Runs) -> Drawing:
     paper, ours = paper_bound_s(), max(runs.per_seed("bound.worst_ms", case="ours").values(), default=None)
     for axes in (histogram, cdf):
         if paper is not None:
-            axes.axvline(paper, color=LOOKS["paper"].color, linewidth=0.9, label=f"the paper's bound, {paper:.2g} s")
+            axes.axvline(
+                paper, color=LOOKS["paper"].color, linestyle=LOOKS["paper"].dash, linewidth=0.9,
+                label=f"the paper's estimate, {paper:.2g} s",
+            )  # fmt: skip
         if ours is not None:
             axes.axvline(ours / 1e3, color=LOOKS["ours"].color, linewidth=0.9, label=f"our bound, {ours / 1e3:.2g} s")
         axes.set_xscale("log")
-        axes.set_xlim(2e-3, 60)
+        axes.set_xlim(2e-3, 20)
         axes.set_xlabel("end-to-end delay [s]")
     histogram.set_title("(a) histogram")
     histogram.set_ylabel("share of packets x targets, per class")
@@ -198,8 +201,10 @@ FIGURE: Final = Recipe(
     "figure-11",
     "Delays of flooding, of the paper's method and of the timetable",
     "fig11",
-    "44 sources, 1024 B every 0.1 s to everyone. The paper's method: 8 clusters, flooding period 0.5 s. Shares are of "
-    "all packets x targets, so that a curve ends at the delivery ratio: what is lost has no delay.",
+    "44 sources, 1024 B every 0.1 s to everyone. The paper's method: 8 clusters, flooding period 0.5 s; its estimate "
+    "is equation (3) for one cluster. Our bound is the greatest that a packet's origin stated. Shares are of all "
+    "packets x targets, so that a curve ends at the delivery ratio: what is lost has no delay. Bands: 95 % of the "
+    "mean.",
     draw,
     claims,
 )

@@ -107,8 +107,11 @@ def save(figure: Figure, folder: Path, name: str) -> list[Path]:
 
 
 def save_data(rows: Iterable[Mapping[str, Any]], path: Path) -> None:
-    """What is drawn, as a table of text beside the picture."""
-    rows = list(rows)
+    """What is drawn, as a table of text beside the picture, in seven digits."""
+    rows = [
+        {name: float(f"{value:.7g}") if isinstance(value, float) else value for name, value in row.items()}
+        for row in rows
+    ]
     names = list(dict.fromkeys(name for row in rows for name in row))
     with path.open("w", newline="", encoding="utf-8") as file:
         writer = csv.DictWriter(file, names, lineterminator="\n")

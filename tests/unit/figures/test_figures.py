@@ -86,7 +86,7 @@ def test_a_page_says_of_a_reason_what_shows_it_or_that_nothing_does(nine, tmp_pa
     claims = [Claim(9, "It falls.", [above("it", [2.0, 2.0], 1.0)], reasons)]
     render(replace(FIGURES["9"], claims=lambda _: claims), table, tmp_path)
     _, markdown = (path.read_text() for path in write([tmp_path], tmp_path))
-    assert "Air. (air: 2 [2, 2], claimed above 1: holds.)" in markdown
+    assert "Air. (air: 2 [2, 2], expected above 1: holds.)" in markdown
     assert "Supposed, but not shown by these runs: Luck. (luck: 1 [" in markdown
     assert markdown.count("not shown") == 1
 

@@ -50,8 +50,8 @@ def leader_delay_s(outcome: Outcome) -> float | None:
 
 
 def _at_leader_s(outcome: Outcome) -> list[float]:
-    leader = outcome.scenario.leader
-    return [record.delay_ns / S for record in first_class_of(outcome).deliveries if record.node == leader]
+    leader, found = outcome.scenario.leader, first_class_of(outcome).deliveries
+    return [delay_ns / S for node, delay_ns in zip(found.node, found.delay_ns, strict=True) if node == leader]
 
 
 def connected(outcome: Outcome) -> float:
@@ -70,17 +70,14 @@ def first_approach_s(outcome: Outcome) -> list[float]:
 
 
 def enough_heard_s(outcome: Outcome) -> float | None:
-    """When as many UAVs as the mission asks for had heard the same phone [s]: nobody can turn before, whatever the
-    network. None: that never came to be.
-    """
+    """When as many UAVs as the mission asks for had heard the same phone [s]; nobody can turn before that instant."""
     enough = outcome.scenario.mission.reports_to_approach
     who: dict[int, set[int]] = {}
-    for record in outcome.records:
-        if isinstance(record, Detected):
-            heard = who.setdefault(record.survivor, set())
-            heard.add(record.node)
-            if len(heard) == enough:
-                return record.t_ns / S
+    for record in of(outcome.records, Detected):
+        heard = who.setdefault(record.survivor, set())
+        heard.add(record.node)
+        if len(heard) == enough:
+            return record.t_ns / S
     return None
 
 

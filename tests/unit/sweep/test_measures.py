@@ -1,0 +1,66 @@
+"""What a run of a sweep measures besides its summary, on traces written by hand."""
+
+from collections.abc import Sequence
+
+import pytest
+
+from fanet_mw.trace import Approaching, Delivered, Detected, Generated, Record
+from fanet_mw.units import MS, S
+from sim.run.outcome import Outcome
+from sim.scenarios import catalog
+from sim.sweep.measures import DELAY_EDGES_S, MEASURES
+
+SETTINGS = ["nodes.count=4", "traffic.sources=all"]
+
+
+def measured(name: str, records: Sequence[Record]) -> object:
+    return MEASURES[name](Outcome(catalog.find("flooding", SETTINGS), "virtual", 0.0, records, {}))
+
+
+def sent(node: int, seq: int) -> Generated:
+    return Generated(0, node, seq, "traffic", 100)
+
+
+def arrived(origin: int, seq: int, *, at: int, delay_ns: int) -> Delivered:
+    return Delivered(delay_ns, at, origin, seq, delay_ns, 1)
+
+
+PACKETS = [
+    sent(1, 1), sent(2, 1), sent(2, 2), sent(3, 1),
+    arrived(2, 1, at=1, delay_ns=20 * MS), arrived(2, 1, at=3, delay_ns=30 * MS), arrived(3, 1, at=1, delay_ns=40 * MS),
+    arrived(1, 1, at=2, delay_ns=2 * S),
+]  # fmt: skip
+
+
+def test_the_leader_counts_what_others_sent_and_it_received() -> None:
+    assert measured("leader_pdr", PACKETS) == pytest.approx(2 / 3)
+    assert measured("leader_delay_s", PACKETS) == pytest.approx(0.03)
+    assert measured("leader_pdr", PACKETS[:1]) is None
+    assert measured("leader_delay_s", PACKETS[:2]) is None
+
+
+def test_every_delivery_is_in_the_class_of_its_delay() -> None:
+    counts = measured("delay_counts", PACKETS)
+    assert isinstance(counts, list)
+    assert (len(counts), sum(counts)) == (len(DELAY_EDGES_S) + 1, 4)
+    for delay_s in (0.02, 0.03, 0.04, 2.0):
+        place = next(place for place, edge in enumerate(DELAY_EDGES_S) if edge >= delay_s * 0.999_999)
+        assert counts[place] == 1, delay_s
+    assert measured("wanted", PACKETS) == 4 * 3
+
+
+HEARD = [
+    Detected(10 * S, 2, 7, -80.0), Detected(12 * S, 3, 8, -80.0), Detected(13 * S, 2, 7, -79.0),
+    Detected(14 * S, 3, 7, -80.0), Approaching(15 * S, 4, 7, 3, 0.0, 0.0), Detected(16 * S, 4, 7, -80.0),
+    Approaching(18 * S, 4, 8, 3, 0.0, 0.0), Approaching(17 * S, 2, 7, 3, 0.0, 0.0),
+]  # fmt: skip
+
+
+def test_enough_have_heard_when_three_different_uavs_have_heard_the_same_phone() -> None:
+    assert measured("enough_heard_s", HEARD) == 16
+    assert measured("enough_heard_s", HEARD[:5]) is None
+
+
+def test_each_uav_counts_once_when_it_first_heard_and_first_turned() -> None:
+    assert measured("first_detected_s", HEARD) == [10, 12, 16]
+    assert measured("first_approach_s", HEARD) == [15, 17]

@@ -19,6 +19,8 @@ from sim.world.engines.rotors.engine import Rotors  # noqa: E402
 from sim.world.engines.rotors.power import trimmed_w  # noqa: E402
 from tests.tables.flight import STEP_S, TRIALS, Trial, around, in_gusts, stepped  # noqa: E402
 
+NOMINAL_V = 3.7
+"""Of a cell."""
 OUT = ROOT / "docs" / "results" / "flight"
 
 
@@ -42,7 +44,8 @@ def _gusts(axes: Axes, trial: Trial) -> None:
         axes.plot(t_s, off[:, axis], label=name, linewidth=0.9)
     title = f"Hover in wind of {trial.mean_wind_m_s:g} m/s, gusts of W20 = {trial.w20_m_s:g} m/s"
     axes.set(title=title, xlabel="time [s]", ylabel="off its place [m]")
-    axes.legend(loc="upper right")
+    axes.legend(loc="upper center", ncols=3)
+    axes.margins(y=0.2)
 
 
 def _eight(axes: Axes, trial: Trial) -> None:
@@ -60,11 +63,26 @@ def _power(axes: Axes, trial: Trial) -> None:
     speed = np.linspace(0.0, 16.0, 81)
     power = trimmed_w(trial.vehicle, speed, np.zeros_like(speed))
     (line,) = axes.plot(speed, power, label="power")
-    axes.set(title="Power and energy in steady flight", xlabel="airspeed [m/s]", ylabel="power [W]", ylim=(0, None))
+    axes.set(title="Power and energy in steady flight", xlabel="airspeed [m/s]", ylabel="power [W]")
+    least, most = (_hover_w(trial, minutes) for minutes in reversed(trial.published_range_min))
+    middle, half = (least + most) / 2, (most - least) / 2
+    bar = axes.errorbar(0.0, middle, yerr=half, fmt="o", color="tab:blue", capsize=4, label="hover, published")
+    axes.set_ylim(0, 1.35 * max(float(power.max()), most))
     beside = axes.twinx()
     (other,) = beside.plot(speed[15:], power[15:] / speed[15:], color="tab:orange", label="energy per km")
-    beside.set(ylabel="energy [kJ/km]", ylim=(0, None))
-    axes.legend(handles=[line, other], loc="lower center")
+    handles = [line, bar, other]
+    if trial.published_kj_km is not None:
+        published = beside.axhline(trial.published_kj_km, color="tab:orange", linestyle=":")
+        published.set_label("measured, by mass")
+        handles.append(published)
+    beside.set(ylabel="energy [kJ/km]", ylim=(0, 1.35 * float(power[15] / speed[15])))
+    beside.legend(handles=handles, loc="upper center", ncols=2, fontsize="small", framealpha=1.0)
+
+
+def _hover_w(trial: Trial, minutes: float) -> float:
+    """The mean power that empties the battery in so many minutes."""
+    battery = trial.vehicle.battery
+    return NOMINAL_V * battery.cells * battery.capacity_ah * 60 / minutes
 
 
 def main() -> None:

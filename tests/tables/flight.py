@@ -33,11 +33,15 @@ class Trial(NamedTuple):
     """Half the width of the figure of eight; it is a quarter as high."""
     round_s: float
     published_min: str
+    published_range_min: tuple[float, float]
+    """The same as figures, at this mass."""
+    published_kj_km: float | None = None
+    """What was measured in flight on another vehicle, scaled to this mass."""
 
 
 TRIALS = (
-    Trial(IRIS, 5.0, 5.0, 8.0, 40.0, 32.0, "16 to 22 at 1.28 kg, so 12.6 to 17.4 at 1.5 kg"),
-    Trial(CRAZYFLIE, 2.0, 2.0, 3.0, 4.0, 16.0, "7"),
+    Trial(IRIS, 5.0, 5.0, 8.0, 40.0, 32.0, "16 to 22 at 1.28 kg, so 12.6 to 17.4 at 1.5 kg", (12.6, 17.4), 21.5),
+    Trial(CRAZYFLIE, 2.0, 2.0, 3.0, 4.0, 16.0, "7", (7.0, 7.0)),
 )
 
 

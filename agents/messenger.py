@@ -15,11 +15,11 @@ from agents.statuses import Statuses
 from fanet_mw import wire
 from fanet_mw.application import Application, Data, Destination, Fate, Received, Status
 from fanet_mw.delivery.receiver import Receiver, Whole
-from fanet_mw.delivery.sender import Packet, Sender
+from fanet_mw.delivery.sender import PieceToSend, Sender
 from fanet_mw.errors import DropReason, LocalProtocolError
+from fanet_mw.node.header_check import CONTROL, RESTART_STEP_NS
 from fanet_mw.node.node import Node
-from fanet_mw.node.packet import Packet as RoutedPacket
-from fanet_mw.node.plausible import CONTROL, RESTART_STEP_NS
+from fanet_mw.node.packet import Packet
 from fanet_mw.rng import stream
 from fanet_mw.units import BROADCAST, MAX_NODES, MS, US, NodeId, S, earliest, seconds_to_ns
 from fanet_mw.wire.message import (
@@ -91,7 +91,7 @@ class Messenger:
         self._counts["sent"] += 1
         own_ns = self._node.scenario.routing.lifetime_ns(priority) if lifetime_ns is None else lifetime_ns
         lifetime_ms, born_us = max(1, min(MOST_LIFETIME_MS, own_ns // MS)), born_ns // US
-        packets: Sequence[Packet] = ()
+        packets: Sequence[PieceToSend] = ()
         if confirm:
             everyone = to == BROADCAST and not targets
             handle = self._sender.confirmed(
@@ -167,7 +167,7 @@ class Messenger:
         return seq
 
     def _originate(
-        self, application: Application, packet: Packet, *, confirmed: bool, born_ns: int, now_ns: int
+        self, application: Application, packet: PieceToSend, *, confirmed: bool, born_ns: int, now_ns: int
     ) -> None:
         watched = packet.first or not confirmed
         seq = self._node.send(
@@ -185,12 +185,12 @@ class Messenger:
 
     # --- in -------------------------------------------------------------------------------------------------------
 
-    def piece(self, packet: RoutedPacket, now_ns: int) -> None:
+    def piece(self, packet: Packet, now_ns: int) -> None:
         """A packet with a piece of a message; raises MalformedFrameError."""
         piece = decode_piece(packet.frame)
         self._receiver.hear(packet.origin, piece, packet.frame, priority=packet.header.priority, now_ns=now_ns)
 
-    def receipts(self, packet: RoutedPacket, now_ns: int) -> None:
+    def receipts(self, packet: Packet, now_ns: int) -> None:
         """A packet with receipts; raises MalformedFrameError."""
         for receipt in decode_receipts(packet.frame):
             self._sender.receipt(packet.origin, receipt, now_ns)

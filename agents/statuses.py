@@ -13,8 +13,8 @@ from typing import Final, NamedTuple
 from fanet_mw.application import Application, Fate, Status
 from fanet_mw.delivery.sender import EXPIRED, Told
 from fanet_mw.errors import DropReason
+from fanet_mw.node.header_check import CONTROL
 from fanet_mw.node.node import Node
-from fanet_mw.node.plausible import CONTROL
 from fanet_mw.units import seconds_to_ns
 from fanet_mw.wire.message import DELIVERED, NO_LISTENER
 

@@ -10,8 +10,8 @@ from typing import Final
 
 from fanet_mw.bus.messages import TxOutcome, TxStatus
 from fanet_mw.errors import MalformedFrameError
-from fanet_mw.node.arrival import decoded, packet_of
 from fanet_mw.node.node import AnnouncedHello
+from fanet_mw.node.reader import decoded, packet_of
 from fanet_mw.rng import stream
 from fanet_mw.scenario import Clock, Scenario
 from fanet_mw.timesync.clock_fit import EXACT, ClockFit, Line, Oscillator, Pair

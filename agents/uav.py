@@ -138,7 +138,7 @@ class Uav(Actor):
                 self._on_hellos(now_ns)
             return not self._settle(now_ns) and node.timeless
         if isinstance(message, TxStatus):
-            self._node.status(message, now_ns=now_ns)
+            self._node.on_status(message, now_ns=now_ns)
             self._onboard.radio_done(message, now_ns)
         elif isinstance(message, Gps):
             self._reckoning.fix(message)

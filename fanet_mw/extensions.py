@@ -32,7 +32,7 @@ _NOT_EVERYWHERE: Final = ("numpy", "numba")
 """Modules that a companion computer lacks. A part that needs one runs, and is checked, elsewhere."""
 
 
-class Table(dict[str, Any]):
+class Options(dict[str, Any]):
     """The options of a part. Like a whole scenario they are immutable, so that they can be part of a cache's key."""
 
     def __hash__(self) -> int:  # type: ignore[override]  # a dict has none, because a dict changes
@@ -41,8 +41,8 @@ class Table(dict[str, Any]):
     def __setitem__(self, key: str, value: object) -> None:
         raise TypeError(f"options do not change; {key} = {value!r} was to be set")
 
-    def __reduce__(self) -> tuple[type["Table"], tuple[dict[str, Any]]]:
-        return Table, (dict(self),)
+    def __reduce__(self) -> tuple[type["Options"], tuple[dict[str, Any]]]:
+        return Options, (dict(self),)
 
 
 def installed(key: str) -> dict[str, EntryPoint]:
@@ -127,14 +127,14 @@ class OptionsOf:
         table, field = self._key.split(".")
         name = info.data.get(field)
         if name is None:
-            return Table(options)  # the name itself is wrong, which has been reported
+            return Options(options)  # the name itself is wrong, which has been reported
         model = None if name in self._ours else _model(self._key, name)
         if model is None:
             if options and name in self._ours:
                 raise ValueError(f"{table}.options: {field} = {name!r} is one of ours and has no options")
-            return Table(options)
+            return Options(options)
         try:
-            return Table(model.model_validate(options).model_dump(mode="json", exclude_none=True))
+            return Options(model.model_validate(options).model_dump(mode="json", exclude_none=True))
         except ValidationError as error:
             wrong = (f"{table}.options.{_path(item['loc'])}: {item['msg']}" for item in error.errors())
             raise ValueError("; ".join(wrong)) from error

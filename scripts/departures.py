@@ -19,7 +19,7 @@ from fanet_mw.node.packet import Packet
 from fanet_mw.routing.aodv import Aodv
 from fanet_mw.routing.aodv import parameters as p
 from fanet_mw.routing.aodv.messages import RREP, RouteReply, RouteRequest
-from fanet_mw.routing.aodv.table import Route, Table
+from fanet_mw.routing.aodv.table import AodvRoute, AodvTable
 from fanet_mw.routing.olsr import Olsr
 from fanet_mw.routing.olsr import parameters as olsr
 from fanet_mw.serial import later
@@ -44,10 +44,10 @@ class Hellos(Aodv):
         self._broadcast_ns = -1
 
 
-class StaleTable(Table):
+class StaleTable(AodvTable):
     """A route that broke keeps its sequence number, so a node that has not heard of it may answer with it."""
 
-    def invalidate(self, route: Route, *, now_ns: int, seq: int | None = None) -> None:
+    def invalidate(self, route: AodvRoute, *, now_ns: int, seq: int | None = None) -> None:
         route.active = False
         route.ends_ns = now_ns + p.DELETE_PERIOD_NS
 

@@ -5,7 +5,7 @@ import sys
 from collections.abc import Sequence
 from pathlib import Path
 
-from fanet_mw.scenario.reference import REQUIRED, Key, Table, tables
+from fanet_mw.scenario.reference import REQUIRED, Key, KeyTable, tables
 
 FOLDER = Path(__file__).resolve().parent.parent / "docs" / "reference" / "scenario"
 """Of the pages of tables; the page above them has its name and stands beside it."""
@@ -47,7 +47,7 @@ def pages() -> dict[Path, str]:
     return {FOLDER.with_suffix(".md"): "\n".join(index), **found}
 
 
-def _section(table: Table) -> list[str]:
+def _section(table: KeyTable) -> list[str]:
     head = [table.meaning, "", "| key | unit | bound | default | meaning |", "|---|---|---|---|---|"]
     return [*head, *(_row(key) for key in table.keys), ""]
 

@@ -14,7 +14,7 @@ from fanet_mw import mavlink
 from fanet_mw.application import Application, AppPort, Course, Received
 from fanet_mw.bus.messages import Altimeter, Battery, Camera, Gps, Radar, SensorReading, Voice, WifiScan
 from fanet_mw.errors import MalformedFrameError
-from fanet_mw.node.arrival import decoded, packet_of
+from fanet_mw.node.reader import decoded, packet_of
 from fanet_mw.scenario import Scenario
 from fanet_mw.units import MS, Enu, NodeId, S
 from fanet_mw.wire import BIDS, FOUND, SEARCH, STATUS, SURVIVOR

@@ -5,10 +5,10 @@ superframe, `turn_gaps` that of single turns. `arrivals` and `network` are the p
 queue fed by bursts. `access` holds the constants of the MAC, `guard` is the guard time of a slot.
 """
 
-from fanet_mw.bounds.access import Dcf
 from fanet_mw.bounds.arrivals import Arrivals, Periodic, Total
 from fanet_mw.bounds.delay_bound import Bounded, DelayBound, Refused
 from fanet_mw.bounds.guard import guard_ns
+from fanet_mw.bounds.mac import Dcf
 from fanet_mw.bounds.network import backlog, delay_any_order, delay_fifo
 from fanet_mw.bounds.slot import Server, SlotServer
 from fanet_mw.bounds.turn_gaps import TurnServer

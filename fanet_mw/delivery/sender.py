@@ -35,7 +35,7 @@ _NAMED: Final = 32
 """Of a message for everyone, at most so many that still lack something are named when it is repeated."""
 
 
-class Packet(NamedTuple):
+class PieceToSend(NamedTuple):
     """What the node is to send: one piece of a message."""
 
     number: int
@@ -143,7 +143,7 @@ class Sender:
     def unconfirmed(
         self, data: bytes, *, port: int, destination: NodeId, targets: tuple[NodeId, ...], priority: int,
         born_us: int, lifetime_ms: int,
-    ) -> tuple[int, Sequence[Packet]]:  # fmt: skip
+    ) -> tuple[int, Sequence[PieceToSend]]:  # fmt: skip
         """A message that nobody is to confirm: its number, and all its packets."""
         number = self.take_number()
         stride, pieces = self._division(data, port, len(targets))
@@ -152,7 +152,7 @@ class Sender:
             head = Head(born_us, number, 0, len(data), lifetime_ms, port, 0, stride, piece, pieces, 0)
             part = data[piece * stride : (piece + 1) * stride]
             inner = wire_message.encode_piece(head, part, node=self._node, targets=targets)
-            packets.append(Packet(number, inner, destination, priority, piece == 0))
+            packets.append(PieceToSend(number, inner, destination, priority, piece == 0))
         return number, packets
 
     def confirmed(
@@ -233,7 +233,7 @@ class Sender:
 
     # --- out ------------------------------------------------------------------------------------------------------
 
-    def due(self, now_ns: int) -> list[Packet]:
+    def due(self, now_ns: int) -> list[PieceToSend]:
         """What the node is to send now."""
         while self._timers and self._timers[0][0] <= now_ns:
             _, number = heapq.heappop(self._timers)
@@ -248,18 +248,18 @@ class Sender:
                 message.again_ns = 0
                 self._window = max(_LEAST_WINDOW, self._window // 2)
                 heapq.heappush(self._ready, (message.priority, number))
-        packets: list[Packet] = []
+        packets: list[PieceToSend] = []
         while self._ready and self._under_way < self._window:
             message = self._messages.get(heapq.heappop(self._ready)[1])
             if message is not None:
                 packets += self._round(message, now_ns)
         return packets
 
-    def _round(self, message: _Outgoing, now_ns: int) -> list[Packet]:
+    def _round(self, message: _Outgoing, now_ns: int) -> list[PieceToSend]:
         """Send what is lacking; a target that has every piece is asked again by the last one."""
         whole, last = (1 << message.pieces) - 1, 1 << (message.pieces - 1)
         wanted = {target: (whole & ~held) or last for target, held in message.lacking.items()}
-        packets: list[Packet] = []
+        packets: list[PieceToSend] = []
         if len(wanted) <= _FEW:
             for target, bits in wanted.items():
                 packets += self._packets(message, bits, target, ())
@@ -289,10 +289,12 @@ class Sender:
             most_ns = max(most_ns, wait_ns)
         return most_ns << min(message.rounds - 1, _MOST_DOUBLINGS)
 
-    def _packets(self, message: _Outgoing, bits: int, destination: NodeId, named: tuple[NodeId, ...]) -> list[Packet]:
+    def _packets(
+        self, message: _Outgoing, bits: int, destination: NodeId, named: tuple[NodeId, ...]
+    ) -> list[PieceToSend]:
         open_before = [number for number in message.flow.open if number < message.number]
         previous = open_before[-1] if open_before else 0
-        packets: list[Packet] = []
+        packets: list[PieceToSend] = []
         for piece in range(message.pieces):
             if not bits >> piece & 1:
                 continue
@@ -302,7 +304,7 @@ class Sender:
             )  # fmt: skip
             part = message.data[piece * message.stride : (piece + 1) * message.stride]
             inner = wire_message.encode_piece(head, part, node=self._node, targets=named)
-            packets.append(Packet(message.number, inner, destination, message.priority, first=False))
+            packets.append(PieceToSend(message.number, inner, destination, message.priority, first=False))
         return packets
 
     def next_wake_ns(self) -> int | None:

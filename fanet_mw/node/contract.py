@@ -105,19 +105,19 @@ class RoutingProtocol(ABC):
         """When a hello may go that is due at `start_ns`."""
         return start_ns
 
-    def hello(self, packet: Packet, reception: Reception, *, now_ns: int) -> None:  # noqa: B027
+    def on_hello(self, packet: Packet, reception: Reception, *, now_ns: int) -> None:  # noqa: B027
         """A neighbor's hello."""
 
-    def impersonated(self, packet: Packet, *, now_ns: int) -> None:  # noqa: B027
+    def on_impersonation(self, packet: Packet, *, now_ns: int) -> None:  # noqa: B027
         """Somebody sent a packet in our name that we do not know of; it goes no further."""
 
-    def overheard(self, key: int, *, now_ns: int) -> None:  # noqa: B027
-        """Another copy, in the same phase, of a packet that was handled before (`seen.key_of`).
+    def on_copy(self, key: int, *, now_ns: int) -> None:  # noqa: B027
+        """Another copy, in the same phase, of a packet that was handled before (`duplicates.key_of`).
 
         It may call off what is planned; nothing may become due sooner, because nobody asks again.
         """
 
-    def status(self, status: TxStatus, *, now_ns: int) -> None:  # noqa: B027
+    def on_status(self, status: TxStatus, *, now_ns: int) -> None:  # noqa: B027
         """How a transmission ended that asked for it."""
 
     def wake(self, now_ns: int) -> None:  # noqa: B027

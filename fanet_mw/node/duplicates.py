@@ -24,7 +24,7 @@ def key_of(origin: int, seq: int) -> int:
     return origin * _SPREAD + seq
 
 
-class Seen:
+class DuplicateSet:
     """Bits per packet key."""
 
     def __init__(self, capacity: int = 32_768) -> None:

@@ -25,7 +25,7 @@ class Neighbors:
         self._lifetime_ns = lifetime_ns
         self._by_id: dict[NodeId, Neighbor] = {}
 
-    def heard(self, neighbor: Neighbor) -> None:
+    def on_hello(self, neighbor: Neighbor) -> None:
         self._by_id[neighbor.node] = neighbor
 
     def forget(self, node: NodeId) -> None:

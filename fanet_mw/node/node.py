@@ -14,12 +14,13 @@ from typing import Final, NamedTuple
 from fanet_mw import wire
 from fanet_mw.bus.messages import Reception, TxStatus
 from fanet_mw.errors import DropReason, MalformedFrameError
-from fanet_mw.node import arrival, duplicates
+from fanet_mw.node import duplicates
 from fanet_mw.node.contract import Port, RoutingProtocol
+from fanet_mw.node.header_check import HeaderCheck
 from fanet_mw.node.own_packets import OwnPackets
 from fanet_mw.node.packet import Packet, Relay
-from fanet_mw.node.plausible import Plausible
 from fanet_mw.node.port import NodePort
+from fanet_mw.node.reader import BUNDLE, shared_reader
 from fanet_mw.scenario import Scenario
 from fanet_mw.trace import Delivered, Generated, Record
 from fanet_mw.units import BROADCAST, US, Enu, NodeId
@@ -53,16 +54,16 @@ class Node:
         self.hellos: list[Packet] = []
         """Hellos of neighbors, for what else their receivers read in them than routing does."""
         self.receptions = 0
-        self._duplicates = 0
+        self._copies = 0
         self._lifetimes_ns = [scenario.routing.lifetime_ns(wire.PRIORITY_BULK)] * 256
         """By priority, whatever the air says."""
         for priority in wire.PRIORITIES.values():
             self._lifetimes_ns[priority] = scenario.routing.lifetime_ns(priority)
-        self._reader = arrival.shared
-        self._seen = duplicates.Seen()
-        self._plausible = Plausible(node, scenario)
-        self._own = OwnPackets(node, self._seen, most_bytes=scenario.radio.max_frame_bytes)
-        self.port = NodePort(node, scenario, self._seen, self._own, position=position)
+        self._reader = shared_reader
+        self._duplicates = duplicates.DuplicateSet()
+        self._header_check = HeaderCheck(node, scenario)
+        self._own = OwnPackets(node, self._duplicates, most_bytes=scenario.radio.max_frame_bytes)
+        self.port = NodePort(node, scenario, self._duplicates, self._own, position=position)
         self.requests = self.port.requests
         """Transmissions that the actor is to take to the radio."""
         self.fates = self.port.fates
@@ -72,7 +73,7 @@ class Node:
         """The protocol's own method: every wake-up is followed by this question."""
         self.timeless = type(protocol).next_wake_ns is RoutingProtocol.next_wake_ns
         """This protocol never asks to be woken: no reception changes when the node is due."""
-        self._overheard = None if type(protocol).overheard is RoutingProtocol.overheard else protocol.overheard
+        self._on_copy = None if type(protocol).on_copy is RoutingProtocol.on_copy else protocol.on_copy
         """None: this protocol does not care for copies, and most receptions are copies."""
 
     # --- what goes out, and what is known of the node (its actor reads and writes them) ---------------------------
@@ -184,7 +185,7 @@ class Node:
     def hear(self, reception: Reception, now_ns: int) -> bool:
         """One reception, from anyone. True: a copy of what was handled before; nothing came of it."""
         self.receptions += 1
-        reader, frame, handled = self._reader, reception.frame, self._seen
+        reader, frame, handled = self._reader, reception.frame, self._duplicates
         if frame is not reader.frame:
             reader.look(frame)
         name, phase = reader.name, reader.phase
@@ -192,11 +193,11 @@ class Node:
         if known is None:
             known = handled.old.get(name, 0)
         if known & phase:
-            self._duplicates += 1
-            if self._overheard is not None:
-                self._overheard(reader.key, now_ns=now_ns)
+            self._copies += 1
+            if self._on_copy is not None:
+                self._on_copy(reader.key, now_ns=now_ns)
             return True
-        if phase == arrival.BUNDLE:
+        if phase == BUNDLE:
             self._hear_bundle(reception, now_ns)
             return False
         try:
@@ -227,11 +228,11 @@ class Node:
     def _hear_one(self, reception: Reception, now_ns: int) -> Sequence[Relay]:
         """One packet of several that came in a frame; returned is what of it is passed on."""
         reader = self._reader
-        known = self._seen.bits(reader.name)
+        known = self._duplicates.bits(reader.name)
         if known & reader.phase:
-            self._duplicates += 1
-            if self._overheard is not None:
-                self._overheard(reader.key, now_ns=now_ns)
+            self._copies += 1
+            if self._on_copy is not None:
+                self._on_copy(reader.key, now_ns=now_ns)
             return _NONE
         try:
             return self._first_copy(reader.packet or reader.read(), reception, known, now_ns)
@@ -247,19 +248,19 @@ class Node:
         name, bits = reader.name, before | reader.phase
         _, _, origin_us, seq, origin, destination, _, kind, _, hops, priority, _, _, _ = reader.fields
         known = bool(before) or (kind == _DATA and self._own.handed_on(origin, seq))
-        why = self._plausible.why_not(reader.fields, known=known, src=reception.src, end_ns=reception.end_ns)
+        why = self._header_check.why_not(reader.fields, known=known, src=reception.src, end_ns=reception.end_ns)
         if why is not None:
             self._disbelieve(why, packet, now_ns)
             return _NONE
         if kind == _HELLO:
-            self._seen.put(name, bits)
-            self._protocol.hello(packet, reception, now_ns=now_ns)
+            self._duplicates.put(name, bits)
+            self._protocol.on_hello(packet, reception, now_ns=now_ns)
             self.hellos.append(packet)
             return _NONE
         end_ns = reception.end_ns
         age_ns = end_ns - origin_us * US
         if age_ns > self._lifetimes_ns[priority]:
-            self._seen.put(name, bits)
+            self._duplicates.put(name, bits)
             self.port.drop(DropReason.EXPIRED, packet, now_ns=now_ns)
             return _NONE
         to_us = destination == BROADCAST or destination == self.node
@@ -270,17 +271,17 @@ class Node:
             self.port.records.append(
                 _new(Delivered, (now_ns, self.node, origin, seq, age_ns + late_ns, hops + 1, late_ns))
             )
-        self._seen.put(name, bits)
+        self._duplicates.put(name, bits)
         return self._protocol.receive(packet, reception, now_ns=now_ns) or _NONE
 
     def _disbelieve(self, why: DropReason, packet: Packet, now_ns: int) -> None:
         """Counted, and neither delivered nor passed on."""
         self.port.dropped[why] += 1
         if why is DropReason.OWN:
-            self._protocol.impersonated(packet, now_ns=now_ns)
+            self._protocol.on_impersonation(packet, now_ns=now_ns)
 
-    def status(self, status: TxStatus, *, now_ns: int) -> None:
-        self._protocol.status(status, now_ns=now_ns)
+    def on_status(self, status: TxStatus, *, now_ns: int) -> None:
+        self._protocol.on_status(status, now_ns=now_ns)
 
     def wake(self, now_ns: int) -> None:
         self._protocol.wake(now_ns)
@@ -307,5 +308,5 @@ class Node:
         }
 
     def _drops(self) -> dict[str, int]:
-        dropped = self.port.dropped + Counter({DropReason.DUPLICATE: self._duplicates})
+        dropped = self.port.dropped + Counter({DropReason.DUPLICATE: self._copies})
         return {reason: dropped[reason] for reason in sorted(dropped)}

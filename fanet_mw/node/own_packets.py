@@ -9,10 +9,10 @@ from typing import Final
 from fanet_mw import wire
 from fanet_mw.errors import LocalProtocolError
 from fanet_mw.node import duplicates
-from fanet_mw.node.arrival import PHASES, name_of
-from fanet_mw.node.duplicates import Seen
+from fanet_mw.node.duplicates import DuplicateSet
+from fanet_mw.node.header_check import CONTROL, RESTART_STEP_NS
 from fanet_mw.node.packet import Packet
-from fanet_mw.node.plausible import CONTROL, RESTART_STEP_NS
+from fanet_mw.node.reader import PHASES, name_of
 from fanet_mw.units import US, NodeId
 from fanet_mw.wire import Header, Kind
 
@@ -22,9 +22,9 @@ _new: Final = tuple.__new__  # for what is made once per frame
 class OwnPackets:
     """Makes the packets of one node."""
 
-    def __init__(self, node: NodeId, seen: Seen, *, most_bytes: int) -> None:
+    def __init__(self, node: NodeId, duplicate_set: DuplicateSet, *, most_bytes: int) -> None:
         self._node = node
-        self._seen = seen
+        self._duplicates = duplicate_set
         self._most_bytes = most_bytes
         """What a frame may be long (`radio.max_frame_bytes`)."""
         self._first_seq, self._next_seq = 0, {False: 0, True: CONTROL}
@@ -52,7 +52,7 @@ class OwnPackets:
             Header, (born_ns // US, seq, node, destination, node, kind, hop_limit, hops, priority, flags)
         )  # fmt: skip
         frame = header.encode() + inner
-        self._seen.put(name_of(frame), duplicates.DELIVERED | PHASES[flags & wire.PHASE_MASK])
+        self._duplicates.put(name_of(frame), duplicates.DELIVERED | PHASES[flags & wire.PHASE_MASK])
         return _new(Packet, (header, frame))
 
     def handed_on(self, origin: int, seq: int) -> bool:

@@ -11,10 +11,10 @@ from typing import Final
 from fanet_mw import wire
 from fanet_mw.bus.messages import TxRequest
 from fanet_mw.errors import DropReason
-from fanet_mw.node.arrival import PHASES, name_of
-from fanet_mw.node.duplicates import Seen
+from fanet_mw.node.duplicates import DuplicateSet
 from fanet_mw.node.own_packets import OwnPackets
 from fanet_mw.node.packet import Packet, Relay
+from fanet_mw.node.reader import PHASES, name_of
 from fanet_mw.rng import stream
 from fanet_mw.scenario import Scenario
 from fanet_mw.trace import Dropped, LetOut, Record
@@ -29,7 +29,9 @@ _new: Final = tuple.__new__  # for what is made once per frame
 class NodePort:
     """The port of one node (`contract.Port`)."""
 
-    def __init__(self, node: NodeId, scenario: Scenario, seen: Seen, own: OwnPackets, *, position: Enu) -> None:
+    def __init__(
+        self, node: NodeId, scenario: Scenario, duplicate_set: DuplicateSet, own: OwnPackets, *, position: Enu
+    ) -> None:
         self.node = node
         self.scenario = scenario
         self.position = position
@@ -43,7 +45,7 @@ class NodePort:
         """Sequence numbers of own packets whose fate is of interest."""
         self.fates: list[tuple[int, int, DropReason | None]] = []
         """What became of these: (number, instant, why it was dropped; None: it was let out)."""
-        self._seen = seen
+        self._duplicates = duplicate_set
         self._own = own
         self._held = own.held
 
@@ -58,7 +60,7 @@ class NodePort:
         return seq
 
     def mark(self, packet: Packet, *, flags: int) -> None:
-        self._seen.mark(name_of(packet.frame), PHASES[flags])
+        self._duplicates.mark(name_of(packet.frame), PHASES[flags])
 
     def transmit_together(self, packets: Sequence[Packet], *, flags: int, at_ns: Sequence[int]) -> None:
         for packet in packets:
@@ -147,7 +149,7 @@ class NodePort:
         self.records.append(Dropped(now_ns, self.node, reason, packet.header.origin, packet.header.seq))
 
     def forget(self, packet: Packet) -> None:
-        self._seen.forget(name_of(packet.frame))
+        self._duplicates.forget(name_of(packet.frame))
 
     def record(self, record: Record) -> None:
         self.records.append(record)

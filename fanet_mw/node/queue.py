@@ -44,7 +44,7 @@ class TxQueue:
         return len(self._entries)
 
     def __contains__(self, key: object) -> bool:
-        """Whether a packet with this key (`seen.key_of`) is queued."""
+        """Whether a packet with this key (`duplicates.key_of`) is queued."""
         return any(_key(entry[2]) == key for entry in self._entries)
 
     def remove(self, key: int) -> None:

@@ -2,7 +2,7 @@
 
 Every node within two hops of a station can freeze its backoff, by its frames or by the acknowledgements to them:
 unicasts of its own and forwarded packets with all attempts, relays of floods, hellos. Their periods limit how many
-there are in a time w; the bound is the least w that holds them all, each at its cost by `bounds.access`. Flows that
+there are in a time w; the bound is the least w that holds them all, each at its cost by `bounds.mac`. Flows that
 wait gain jitter, so the bound of each hop enters that of the next; if it grows beyond the flooding period, there is no
 bound.
 """

@@ -201,7 +201,7 @@ def converged_slots(scenario: Scenario, adjacency: Adjacency, turns: Turns) -> d
         for node, own in claims.items():
             hello = own.step(now)
             for neighbor in adjacency[node]:
-                claims[neighbor].hear(hello, now_ns=now)
+                claims[neighbor].on_hello(hello, now_ns=now)
         claimed = {node: (own.own.slot, own.own.length) for node, own in claims.items()}
         if now > 4 * _LISTEN and claimed == before:
             break

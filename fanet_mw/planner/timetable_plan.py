@@ -20,7 +20,7 @@ from fanet_mw.bounds import (
 )
 from fanet_mw.planner.flood import FloodCost
 from fanet_mw.planner.head_slot import ClassLoad, ClusterPlan
-from fanet_mw.routing.clustered.tdma.own_bound import Own
+from fanet_mw.routing.clustered.tdma.own_bound import OwnBound
 from fanet_mw.routing.clustered.tdma.turns import Turns
 from fanet_mw.routing.clustered.timetable.list_scheduling import Effort
 from fanet_mw.routing.clustered.timetable.timetable import Timetable, timetable
@@ -87,7 +87,7 @@ def judge(
     table, turns = found.table, found.turns
     offsets = tuple(table.offsets_of(NodeId(candidate.head)))
     span = table.spans.get(candidate.head, 1)
-    root = _Root(Own(turns, offsets, span, found.together, lead_ns + receipt_ns), lead_ns, jitter_ns, control)
+    root = _Root(OwnBound(turns, offsets, span, found.together, lead_ns + receipt_ns), lead_ns, jitter_ns, control)
     relays = sum(1 for turn in table.turns if turn.root == candidate.head and turn.instance == 0)
     packets = sum(s.sources * turns.period_ns / s.interval_ns for s in candidate.shares)
     packets += control if packets else 0
@@ -108,7 +108,7 @@ def judge(
 class _Root(NamedTuple):
     """One root of a timetable, and the arrivals at its queue."""
 
-    own: Own
+    own: OwnBound
     lead_ns: int
     jitter_ns: int
     """By how much a packet may reach the root late."""

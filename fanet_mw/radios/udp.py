@@ -16,7 +16,7 @@ from typing import Any, Final, NamedTuple
 
 from fanet_mw.bus.messages import Reception, TxOutcome, TxRequest, TxStatus
 from fanet_mw.errors import BusError, DropReason, MalformedFrameError
-from fanet_mw.node.duplicates import Seen, key_of
+from fanet_mw.node.duplicates import DuplicateSet, key_of
 from fanet_mw.radios.datagram import Datagram, DatagramKind
 from fanet_mw.units import BROADCAST, NodeId, S
 
@@ -65,7 +65,7 @@ class UdpRadio:
         self._waiting: dict[tuple[NodeId, int], asyncio.Event] = {}
         """The unicasts whose acknowledgement is awaited, by destination and sequence number."""
         self._tasks: set[asyncio.Task[None]] = set()
-        self._seen = Seen(capacity=8192)
+        self._seen = DuplicateSet(capacity=8192)
         self._transport: asyncio.DatagramTransport | None = None
         self._listener: asyncio.DatagramTransport | None = None
         self.counts: Counter[str] = Counter()

@@ -27,7 +27,7 @@ class Assessment:
         self._pending[key] = 1, packet
         heapq.heappush(self._due, (due_ns, key))
 
-    def overheard(self, key: int, *, now_ns: int) -> None:
+    def on_copy(self, key: int, *, now_ns: int) -> None:
         """Count a copy that another node has relayed."""
         pending = self._pending.get(key)
         if pending is None:

@@ -117,7 +117,7 @@ class Routed(RoutingProtocol):
         else:
             self._route_transit(packet, reception, start_ns=now_ns + self._lead_ns, now_ns=now_ns)
 
-    def status(self, status: TxStatus, *, now_ns: int) -> None:
+    def on_status(self, status: TxStatus, *, now_ns: int) -> None:
         data = self._unicasts.pop(status.seq, None)
         hop = self._controls.pop(status.seq, None)
         if status.outcome not in REASON_OF:

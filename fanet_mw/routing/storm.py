@@ -50,8 +50,8 @@ class CounterBased(FloodingProtocol):
         self._assessment.first_copy(packet, due_ns=now_ns + int(self._random() * self._assess_ns))
         return ()
 
-    def overheard(self, key: int, *, now_ns: int) -> None:
-        self._assessment.overheard(key, now_ns=now_ns)
+    def on_copy(self, key: int, *, now_ns: int) -> None:
+        self._assessment.on_copy(key, now_ns=now_ns)
 
     def next_wake_ns(self) -> int | None:
         return self._assessment.next_wake_ns()

@@ -11,7 +11,7 @@ from typing import Any, Final
 
 import tomli_w
 
-from fanet_mw.scenario.reference import REQUIRED, Key, Table, tables
+from fanet_mw.scenario.reference import REQUIRED, Key, KeyTable, tables
 
 _WIDTH: Final = 100
 SCHEMA_NAME: Final = "fanet-scenario.schema.json"
@@ -38,14 +38,14 @@ def commented(tree: Mapping[str, Any], *, every_key: bool = True, schema: bool =
     return "\n".join(lines).strip() + "\n"
 
 
-def _of_kind(kinds: list[Table], given: Mapping[str, Any]) -> Table:
+def _of_kind(kinds: list[KeyTable], given: Mapping[str, Any]) -> KeyTable:
     """The table whose kind the given values name; the first when they name none."""
     return next(
         (table for table in kinds if table.heading and table.heading == f'kind = "{given.get("kind")}"'), kinds[0]
     )
 
 
-def _table(table: Table, given: Mapping[str, Any], *, every_key: bool = True) -> Iterator[str]:
+def _table(table: KeyTable, given: Mapping[str, Any], *, every_key: bool = True) -> Iterator[str]:
     keys = [key for key in table.keys if every_key or key.name in given]
     if table.path and (keys or given):
         yield from ("", *_comment(table.meaning), f"[{table.path}]")
@@ -62,7 +62,7 @@ def _entries(path: str, given: list[Any] | tuple[Any, ...]) -> Iterator[str]:
         yield from ("", f"[[{path}]]", tomli_w.dumps(entry).rstrip())
 
 
-def _outline(table: Table) -> Iterator[str]:
+def _outline(table: KeyTable) -> Iterator[str]:
     """What an entry of an array of tables would be, all of it behind `#`."""
     yield from ("", *_comment(table.meaning), f"# [[{table.path}]]")
     for key in table.keys:

@@ -11,7 +11,7 @@ from typing import Annotated, Any, Final, Literal, Self
 from pydantic import AfterValidator, Field, model_validator
 
 from fanet_mw.bus.radio_control import Control
-from fanet_mw.extensions import Named, OptionsOf, Table
+from fanet_mw.extensions import Named, Options, OptionsOf
 from fanet_mw.scenario.applications import ForeignApplication
 from fanet_mw.scenario.checks import disagreements
 from fanet_mw.scenario.clock import Clock
@@ -144,7 +144,7 @@ class Routing(Section):
     """How packets find their way: one hop only (`direct`), a relay by every node (`flooding`), with a probability
     (`gossip`) or by those that heard few copies (`counter`), the time-divided floods of cluster heads (`clustered`), or
     a route found on demand, by link states, by distance vectors or by positions; or as another package does it."""
-    options: Annotated[dict[str, Any], OptionsOf("routing.protocol", PROTOCOLS)] = Field(default_factory=Table)
+    options: Annotated[dict[str, Any], OptionsOf("routing.protocol", PROTOCOLS)] = Field(default_factory=Options)
     """The table of a protocol that another package brings, as that package documents it."""
     address_resolution: Literal["none", "rfc826", "ns3"] = "none"
     """`aodv`, `olsr`, `dsdv`, `geographic`: a node asks for a neighbor's address before its first unicast to it, as IP
@@ -228,7 +228,7 @@ class Clusters(Section):
     method: Annotated[str, Named("clusters.method", METHODS)] = "balanced"
     """How the leader divides the swarm. All but `balanced` make as many clusters as the topology asks for, whatever
     `count` says: every member hears its head."""
-    options: Annotated[dict[str, Any], OptionsOf("clusters.method", METHODS)] = Field(default_factory=Table)
+    options: Annotated[dict[str, Any], OptionsOf("clusters.method", METHODS)] = Field(default_factory=Options)
     """The table of a method that another package brings, as that package documents it."""
     reassign_s: Duration = 10.0
     """The leader makes new clusters for a swarm that has moved at most this often; 0: only when nodes come or go."""
@@ -253,7 +253,7 @@ class Mobility(Section):
     """`formation` sweeps the area keeping the layout; `random_waypoint` is the statistical model, without pause;
     `crossing` flies everyone through the middle of the area to the point opposite its start, and back.
     `onboard`: the world decides nothing, keeps nobody clear of others, and flies what each UAV's computer asks for."""
-    options: Annotated[dict[str, Any], OptionsOf("mobility.model", MOBILITY_MODELS)] = Field(default_factory=Table)
+    options: Annotated[dict[str, Any], OptionsOf("mobility.model", MOBILITY_MODELS)] = Field(default_factory=Options)
     """The table of a model that another package brings, as that package documents it."""
     speed_m_s: Speed = 7.5
     """Cruising speed."""

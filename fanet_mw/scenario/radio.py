@@ -9,7 +9,7 @@ from typing import Annotated, Any, Final, Literal, Self, get_args
 
 from pydantic import Field, model_validator
 
-from fanet_mw.extensions import Named, OptionsOf, Table
+from fanet_mw.extensions import Named, Options, OptionsOf
 from fanet_mw.scenario.sections import Decibels, Length, Level, Section, SomeLength
 from fanet_mw.units import MS
 
@@ -33,7 +33,7 @@ class Radio(Section):
 
     channel: Annotated[str, Named("radio.channel", CHANNELS)] = "range"
     """The path loss model: see docs/explanation/emulator.md for equations, sources and ranges of validity."""
-    options: Annotated[dict[str, Any], OptionsOf("radio.channel", CHANNELS)] = Field(default_factory=Table)
+    options: Annotated[dict[str, Any], OptionsOf("radio.channel", CHANNELS)] = Field(default_factory=Options)
     """The table of a channel that another package brings, as that package documents it."""
     range_m: SomeLength = 250.0
     """`range`: decode and carrier-sense limit; frames are equally strong within it, silent beyond."""

@@ -27,7 +27,7 @@ class Key(NamedTuple):
     meaning: str
 
 
-class Table(NamedTuple):
+class KeyTable(NamedTuple):
     """One table of a scenario file."""
 
     path: str
@@ -58,7 +58,7 @@ def json_schema() -> dict[str, Any]:
     }
 
 
-def tables() -> list[Table]:
+def tables() -> list[KeyTable]:
     """Every table of a scenario file, the keys above all tables first."""
     schema = json_schema()
     return list(_tables("", schema, schema["$defs"], meaning="One file is one scenario.", repeated=False))
@@ -71,7 +71,7 @@ def dotted_keys() -> list[str]:
 
 def _tables(
     path: str, model: Schema, models: Mapping[str, Schema], *, meaning: str, repeated: bool, heading: str = ""
-) -> Iterator[Table]:
+) -> Iterator[KeyTable]:
     inner: list[tuple[str, str, str, set[bool]]] = []
     keys = []
     needed = model.get("required", ())
@@ -87,7 +87,7 @@ def _tables(
             continue
         default = REQUIRED if name in needed else schema.get("default")
         keys.append(Key(name, _unit(name, schema), bound(schema), default, schema.get("description", "")))
-    yield Table(path, heading, repeated, meaning, tuple(keys))
+    yield KeyTable(path, heading, repeated, meaning, tuple(keys))
     for inner_path, model_name, said, forms in inner:
         one = models[model_name]
         kind = one["properties"].get("kind", {}).get("const")

@@ -188,7 +188,7 @@ class _Bench:
             self.requests.append((self.now_ns, request))
             if request.wants_status:
                 done_ns = max(self.now_ns, request.start_ns) + _AIRTIME_NS
-                self.node.status(TxStatus(request.seq, TxOutcome.RETRY_LIMIT, done_ns, 7), now_ns=self.now_ns)
+                self.node.on_status(TxStatus(request.seq, TxOutcome.RETRY_LIMIT, done_ns, 7), now_ns=self.now_ns)
 
     def _drained(self) -> list[TxRequest]:
         found = list(self.node.requests)

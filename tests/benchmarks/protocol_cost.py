@@ -86,7 +86,7 @@ def metered(control: Counter[str], nodes: list[Node]) -> Iterator[None]:
 def memory_bytes(node: Node) -> int:
     """Of all that the node's protocol and its duplicate suppression reach."""
     done = {id(node), id(node.records), id(node.scenario)}
-    left, total = [node._protocol, node._seen], 0
+    left, total = [node._protocol, node._duplicates], 0
     while left:
         item = left.pop()
         if id(item) in done or isinstance(item, _SHARED):

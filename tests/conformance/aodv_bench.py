@@ -5,7 +5,7 @@ from collections.abc import Callable
 from rival_bench import Bench
 
 from fanet_mw.routing.aodv.messages import RERR, RREP, RREQ, UNKNOWN_SEQUENCE, RouteError, RouteReply, RouteRequest
-from fanet_mw.routing.aodv.table import Route
+from fanet_mw.routing.aodv.table import AodvRoute
 from fanet_mw.routing.control import Family, type_of
 from fanet_mw.scenario import Scenario
 
@@ -51,7 +51,7 @@ def errors(found: Bench, node: int | None = None) -> list[tuple[int, RouteError]
     return [(sent.dst, RouteError.decode(body)) for sent, body in found.controls(RERR, node=node)]
 
 
-def route(found: Bench, node: int, destination: int) -> Route | None:
+def route(found: Bench, node: int, destination: int) -> AodvRoute | None:
     return found.protocol(node)._table.entry(destination, now_ns=found.now_ns)
 
 

@@ -145,7 +145,7 @@ class Bench:
         elif isinstance(message, Reception):
             self.nodes[node].hear(message, now_ns=self.now_ns)
         else:
-            self.nodes[node].status(message, now_ns=self.now_ns)
+            self.nodes[node].on_status(message, now_ns=self.now_ns)
 
     def _transmit(self, node: int, request: TxRequest) -> None:
         self.sent.append(Sent(self.now_ns, node, request.dst, request.frame))

@@ -129,7 +129,7 @@ class GraphRadio:
                 self._drain(self.nodes[other])
         if request.wants_status and self.nodes.get(node.node) is node:
             outcome = TxOutcome.ACKED if heard else TxOutcome.RETRY_LIMIT
-            node.status(TxStatus(request.seq, outcome, end_ns, 1), now_ns=self.now_ns)
+            node.on_status(TxStatus(request.seq, outcome, end_ns, 1), now_ns=self.now_ns)
             self._drain(node)
 
 

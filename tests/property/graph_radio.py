@@ -112,7 +112,7 @@ class Swarm:
         elif isinstance(what, Reception):
             node.hear(what, now_ns=t_ns)
         elif isinstance(what, TxStatus):
-            node.status(what, now_ns=t_ns)
+            node.on_status(what, now_ns=t_ns)
         else:
             node.say_hello(b"", start_ns=t_ns, now_ns=t_ns)
             self._push(t_ns + int(_HELLO_NS * (0.9 + 0.2 * self._random())), name, node, None)

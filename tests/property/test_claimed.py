@@ -16,7 +16,7 @@ from test_slots_with_reuse import longest_chain
 from fanet_mw import wire
 from fanet_mw.bus.messages import Reception
 from fanet_mw.graph.topology import components, two_hop
-from fanet_mw.routing.clustered.claimed.access import ClaimedAccess
+from fanet_mw.routing.clustered.claimed.claimed_access import ClaimedAccess
 from fanet_mw.routing.clustered.claimed.claiming import Claiming
 from fanet_mw.routing.clustered.clustered import Clustered
 from fanet_mw.scenario import config

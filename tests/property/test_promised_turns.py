@@ -10,8 +10,8 @@ from hypothesis import strategies as st
 
 from fanet_mw.node.packet import Packet
 from fanet_mw.node.queue import TxQueue
-from fanet_mw.routing.clustered.tdma.own_bound import BURST, Own
-from fanet_mw.routing.clustered.tdma.root_release import Following, RootRelease
+from fanet_mw.routing.clustered.tdma.own_bound import BURST, OwnBound
+from fanet_mw.routing.clustered.tdma.root_release import RootRelease, TurnsInForce
 from fanet_mw.routing.clustered.tdma.turns import Turns
 from fanet_mw.units import MS, NodeId
 from fanet_mw.wire import PRIORITY_BULK, PRIORITY_CONTROL, PRIORITY_REPORT, PRIORITY_SAFETY, Header, Kind
@@ -25,18 +25,18 @@ SIZES = {PRIORITY_CONTROL: 70, PRIORITY_SAFETY: 60, PRIORITY_REPORT: 80, PRIORIT
 class Case(NamedTuple):
     """Two timetables, the instant of the change, and (instant, class) of what comes."""
 
-    plans: tuple[Following, Following]
+    plans: tuple[TurnsInForce, TurnsInForce]
     lead_ns: int
     arrivals: list[tuple[int, int]]
 
 
 @st.composite
-def followings(draw: st.DrawFn, valid_ns: int) -> Following:
+def followings(draw: st.DrawFn, valid_ns: int) -> TurnsInForce:
     per_frame = draw(st.integers(6, 40))
     turns = Turns(valid_ns, (40 + 2 * per_frame + draw(st.integers(0, 9))) * MS, 40 * MS, 2 * MS, per_frame)
     offsets = draw(st.sets(st.integers(0, per_frame - 1), min_size=1, max_size=3))
     together = draw(st.integers(1, 3))
-    return Following(
+    return TurnsInForce(
         valid_ns, turns, tuple(sorted(offsets)), together * BULK_BYTES + sum(ROOMS.values()), draw(st.integers(1, 30))
     )
 
@@ -98,8 +98,8 @@ def drive(case: Case) -> Run:
 @example(
     Case(
         (
-            Following(0, Turns(0, 100 * MS, 40 * MS, 2 * MS, 30), (5,), 340, 3),
-            Following(900 * MS, Turns(900 * MS, 100 * MS, 40 * MS, 2 * MS, 30), (9,), 340, 3),
+            TurnsInForce(0, Turns(0, 100 * MS, 40 * MS, 2 * MS, 30), (5,), 340, 3),
+            TurnsInForce(900 * MS, Turns(900 * MS, 100 * MS, 40 * MS, 2 * MS, 30), (9,), 340, 3),
         ),
         0,
         [(0, PRIORITY_BULK), (0, PRIORITY_REPORT), (1 * MS, PRIORITY_REPORT), (2 * MS, PRIORITY_SAFETY)],
@@ -122,7 +122,7 @@ def test_who_finds_fewer_than_a_burst_of_its_class_waiting_keeps_the_bound_of_a_
     reports = [(n * gap_ns // BURST * BURST, PRIORITY_REPORT) for n in range(12)]
     bulk = [(n * 3 * MS, PRIORITY_BULK) for n in range(50)]
     run = drive(single._replace(arrivals=sorted(reports + bulk)))
-    bound_ns = Own(plan.turns, plan.offsets, plan.span, 1, case.lead_ns).burst_ns(per_turn=1)
+    bound_ns = OwnBound(plan.turns, plan.offsets, plan.span, 1, case.lead_ns).burst_ns(per_turn=1)
     classes = [priority for _, priority in sorted(reports + bulk)]
     delays = [run.through_ns[s] - run.born_ns[s] for s, priority in enumerate(classes) if priority == PRIORITY_REPORT]
     assert max(delays) <= bound_ns

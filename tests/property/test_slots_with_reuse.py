@@ -8,7 +8,7 @@ from hypothesis import strategies as st
 from fanet_mw.errors import LocalProtocolError
 from fanet_mw.graph.topology import components, levels, symmetric, two_hop, within_range
 from fanet_mw.rng import stream
-from fanet_mw.routing.clustered.claimed.slot_claims import Claim, Hello, SlotClaims
+from fanet_mw.routing.clustered.claimed.slot_claims import SlotClaim, SlotClaims, SlotHello
 from fanet_mw.units import Enu, NodeId, S
 
 LISTEN = 2
@@ -102,7 +102,7 @@ class Air:
                 hello = self.nodes[node].step(now_ns)
                 for neighbor in self.adjacency[node]:
                     if self._rng.random() >= self._loss:
-                        self.nodes[neighbor].hear(hello, now_ns=now_ns)
+                        self.nodes[neighbor].on_hello(hello, now_ns=now_ns)
             self.superframe += 1
 
     @property
@@ -212,7 +212,7 @@ def test_a_node_that_lengthens_its_superframe_keeps_a_part_of_its_turns() -> Non
     node = SlotClaims(NodeId(3), now_ns=0, listen_ns=0, lifetime_ns=100 * S, sized_to=64)
     before = node.step(0).own
     for n in range(10, 20):
-        node.hear(Hello(Claim(NodeId(n), None), ()), now_ns=0)
+        node.on_hello(SlotHello(SlotClaim(NodeId(n), None), ()), now_ns=0)
     after = node.step(S).own
     assert (before.length, after.length) == (1, 16)
     assert after.slot is not None
@@ -220,9 +220,9 @@ def test_a_node_that_lengthens_its_superframe_keeps_a_part_of_its_turns() -> Non
 
 
 def test_two_claims_of_different_lengths_meet_where_the_shorter_repeats() -> None:
-    assert Claim(NodeId(1), 1, length=4).meets(Claim(NodeId(2), 13, length=16))
-    assert not Claim(NodeId(1), 1, length=4).meets(Claim(NodeId(2), 14, length=16))
-    assert not Claim(NodeId(1), None, length=4).meets(Claim(NodeId(2), 14, length=16))
+    assert SlotClaim(NodeId(1), 1, length=4).meets(SlotClaim(NodeId(2), 13, length=16))
+    assert not SlotClaim(NodeId(1), 1, length=4).meets(SlotClaim(NodeId(2), 14, length=16))
+    assert not SlotClaim(NodeId(1), None, length=4).meets(SlotClaim(NodeId(2), 14, length=16))
 
 
 @pytest.mark.parametrize("keys", [{"sized_to": 12}, {"sized_to": 0}, {"sized_to": 8, "slots": 8}], ids=str)
@@ -238,8 +238,8 @@ def test_of_two_rivals_the_lower_id_keeps_the_slot_unless_priority_says_otherwis
             for n in (1, 2)
         )
         hellos = one.step(0), two.step(0)  # both claim slot 0 before they hear each other
-        one.hear(hellos[1], now_ns=0)
-        two.hear(hellos[0], now_ns=0)
+        one.on_hello(hellos[1], now_ns=0)
+        two.on_hello(hellos[0], now_ns=0)
         one.step(S)
         two.step(S)
         return one.slot, two.slot
@@ -251,9 +251,9 @@ def test_of_two_rivals_the_lower_id_keeps_the_slot_unless_priority_says_otherwis
 def test_a_node_that_finds_no_slot_free_stays_silent_until_one_is() -> None:
     third = SlotClaims(NodeId(3), now_ns=0, listen_ns=0, lifetime_ns=4 * S, slots=2)
     for n in (1, 2):
-        third.hear(Hello(Claim(NodeId(n), n - 1), ()), now_ns=0)
+        third.on_hello(SlotHello(SlotClaim(NodeId(n), n - 1), ()), now_ns=0)
     assert third.step(0).own.slot is None
-    third.hear(Hello(Claim(NodeId(2), 1), ()), now_ns=3 * S)
+    third.on_hello(SlotHello(SlotClaim(NodeId(2), 1), ()), now_ns=3 * S)
     assert third.step(5 * S).own.slot == 0
 
 
@@ -263,12 +263,14 @@ def test_a_joiner_listens_before_it_claims() -> None:
 
 
 @given(
-    st.lists(st.builds(Claim, st.integers(0, 5).map(NodeId), st.none() | st.integers(-3, 9)), min_size=1, max_size=6)
+    st.lists(
+        st.builds(SlotClaim, st.integers(0, 5).map(NodeId), st.none() | st.integers(-3, 9)), min_size=1, max_size=6
+    )
 )
 def test_whatever_comes_off_the_air_raises_nothing(claims) -> None:
     node = SlotClaims(NodeId(1), now_ns=0, listen_ns=0, lifetime_ns=4 * S)
     for at, claim in enumerate(claims):
-        node.hear(Hello(claim, tuple(claims)), now_ns=at)
+        node.on_hello(SlotHello(claim, tuple(claims)), now_ns=at)
         slot = node.step(at).own.slot
         assert slot is None or slot >= 0
 

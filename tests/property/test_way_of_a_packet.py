@@ -21,7 +21,7 @@ from fanet_mw.routing.clustered.clustered import Clustered
 from fanet_mw.routing.clustered.tdma.turns import Turns
 from fanet_mw.routing.clustered.timetable.timetable import Timetable, Turn
 from fanet_mw.routing.clustered.timetable.turn_access import TurnAccess
-from fanet_mw.routing.clustered.timetable.turn_plan import Fitted, Plan
+from fanet_mw.routing.clustered.timetable.turn_plan import Fitted, TurnPlan
 from fanet_mw.scenario import Scenario, config
 from fanet_mw.units import BROADCAST, MS, Enu, NodeId, S
 from fanet_mw.wire import FLAG_FLOOD, PRIORITY_BULK, Header, Kind, filler
@@ -113,7 +113,9 @@ def scheduled() -> dict[str, Way]:
     assert isinstance(protocol, Clustered)
     access = protocol.parts.access
     assert isinstance(access, TurnAccess)
-    access.follow(Plan.of(us, 0, Fitted(turns, table, together=1, frame_bytes=1024, whole=True, enough=True)), now_ns=0)
+    access.follow(
+        TurnPlan.of(us, 0, Fitted(turns, table, together=1, frame_bytes=1024, whole=True, enough=True)), now_ns=0
+    )
     over = way(lambda: send(node, 0))
     out = way(lambda: node.wake(64 * MS - 2 * MS))
     heard = way(lambda: hear(node, turns.start_ns(5, frame_start_ns=1000 * MS) + MS, origin=3))

@@ -55,7 +55,7 @@ class SeenRequests:
 
 
 @dataclass(slots=True)
-class Search:
+class RouteSearch:
     """The search for one destination."""
 
     destination: NodeId
@@ -89,22 +89,22 @@ class Discovery:
     """All searches of one node."""
 
     def __init__(self) -> None:
-        self._searches: dict[NodeId, Search] = {}
+        self._searches: dict[NodeId, RouteSearch] = {}
 
     def __contains__(self, destination: NodeId) -> bool:
         return destination in self._searches
 
-    def begin(self, destination: NodeId, *, last_hops: int | None, now_ns: int) -> Search:
+    def begin(self, destination: NodeId, *, last_hops: int | None, now_ns: int) -> RouteSearch:
         """Start a search; `last_hops` is the hop count of a former route."""
         ttl = TTL_START if last_hops is None else last_hops + TTL_INCREMENT
-        search = Search(destination, ttl if ttl <= TTL_THRESHOLD else NET_DIAMETER, now_ns)
+        search = RouteSearch(destination, ttl if ttl <= TTL_THRESHOLD else NET_DIAMETER, now_ns)
         self._searches[destination] = search
         return search
 
     def end(self, destination: NodeId) -> None:
         self._searches.pop(destination, None)
 
-    def due(self, now_ns: int) -> list[Search]:
+    def due(self, now_ns: int) -> list[RouteSearch]:
         """The searches whose waiting is over, by destination."""
         return [self._searches[node] for node in sorted(self._searches) if self._searches[node].due_ns <= now_ns]
 

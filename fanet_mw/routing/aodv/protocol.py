@@ -17,7 +17,7 @@ from fanet_mw.node.contract import Port
 from fanet_mw.node.packet import Packet
 from fanet_mw.routing import control
 from fanet_mw.routing.aodv import parameters as p
-from fanet_mw.routing.aodv.discovery import Discovery, RateLimit, Search, SeenRequests
+from fanet_mw.routing.aodv.discovery import Discovery, RateLimit, RouteSearch, SeenRequests
 from fanet_mw.routing.aodv.messages import (
     DESTINATION_ONLY,
     GRATUITOUS,
@@ -32,7 +32,7 @@ from fanet_mw.routing.aodv.messages import (
     most_unreachable,
 )
 from fanet_mw.routing.aodv.neighbors import HelloNeighbors
-from fanet_mw.routing.aodv.table import Route, Table
+from fanet_mw.routing.aodv.table import AodvRoute, AodvTable
 from fanet_mw.routing.control import Family
 from fanet_mw.routing.routed import Routed
 from fanet_mw.routing.waiting import WaitingRoom
@@ -48,7 +48,7 @@ class Aodv(Routed):
     def __init__(self, port: Port) -> None:
         super().__init__(port)
         routing = port.scenario.routing
-        self._table = Table()
+        self._table = AodvTable()
         self._discovery = Discovery()
         self._requests = SeenRequests()
         self._hellos = HelloNeighbors()
@@ -98,7 +98,7 @@ class Aodv(Routed):
         self._hellos.on_packet(reception.src, now_ns=now_ns)
         self._keep(packet.origin, reception.src, now_ns=now_ns)
 
-    def _use(self, route: Route, *, now_ns: int) -> None:
+    def _use(self, route: AodvRoute, *, now_ns: int) -> None:
         """Keep this route and the route to its next hop active, because a data packet uses them (6.2)."""
         self._keep(route.destination, route.next_hop, now_ns=now_ns)
 
@@ -122,7 +122,7 @@ class Aodv(Routed):
         search = self._discovery.begin(destination, last_hops=known.hops if known else None, now_ns=now_ns)
         self._ask(search, now_ns=now_ns)
 
-    def _ask(self, search: Search, *, now_ns: int) -> None:
+    def _ask(self, search: RouteSearch, *, now_ns: int) -> None:
         """Originate a RREQ (6.3), or wait until the rate limit allows it."""
         free_ns = self._rreq_limit.free_ns(now_ns)
         if free_ns > now_ns:
@@ -146,7 +146,7 @@ class Aodv(Routed):
         self._broadcast(RREQ, request.encode(), ttl=search.ttl, now_ns=now_ns)
         search.sent(now_ns)
 
-    def _repeat(self, search: Search, *, now_ns: int) -> None:
+    def _repeat(self, search: RouteSearch, *, now_ns: int) -> None:
         """A search has had no answer in time: widen it, or give it up (6.3)."""
         if search.exhausted:
             self._discovery.end(search.destination)
@@ -223,7 +223,7 @@ class Aodv(Routed):
         onward = request._replace(flags=flags, hop_count=hops, destination_seq=seq)
         self._broadcast(RREQ, onward.encode(), ttl=ttl, now_ns=now_ns)
 
-    def _may_answer_for(self, route: Route, request: RouteRequest) -> bool:
+    def _may_answer_for(self, route: AodvRoute, request: RouteRequest) -> bool:
         """True if a route is at least as new as the request asks, so that an intermediate node may answer (6.6)."""
         if request.flags & DESTINATION_ONLY or not route.seq_valid:
             return False
@@ -236,7 +236,7 @@ class Aodv(Routed):
         reply = RouteReply(0, self._port.node, self._seq, request.originator, p.MY_ROUTE_TIMEOUT_NS // MS)
         self._send_reply(reply, NodeId(request.originator), now_ns=now_ns)
 
-    def _answer_for(self, route: Route, request: RouteRequest, *, now_ns: int) -> None:
+    def _answer_for(self, route: AodvRoute, request: RouteRequest, *, now_ns: int) -> None:
         """Answer as a node that has a route (6.6.2), and tell the destination of the originator (6.6.3)."""
         reverse = self._table.active(NodeId(request.originator), now_ns=now_ns)
         if reverse is None:
@@ -337,7 +337,7 @@ class Aodv(Routed):
                 broken.append(route)
         self._report_broken(broken, now_ns=now_ns)
 
-    def _report_broken(self, broken: list[Route], *, now_ns: int) -> None:
+    def _report_broken(self, broken: list[AodvRoute], *, now_ns: int) -> None:
         """Send a RERR about the routes that have precursors: unicast to a single precursor, else broadcast (6.11)."""
         reported = [route for route in broken if route.precursors]
         precursors = sorted({node for route in reported for node in route.precursors})

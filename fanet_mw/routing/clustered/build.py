@@ -14,47 +14,53 @@ from typing import Final, NamedTuple
 from fanet_mw.node.contract import Port
 from fanet_mw.node.neighbors import LIFETIME_HELLOS, Neighbors
 from fanet_mw.node.queue import TxQueue, sooner_us
-from fanet_mw.routing.clustered.claimed.access import ClaimedAccess
+from fanet_mw.routing.clustered.claimed.claimed_access import ClaimedAccess
+from fanet_mw.routing.clustered.claimed.claimed_release import ClaimedRelease
 from fanet_mw.routing.clustered.claimed.claiming import Claiming, geometry, turn_bytes
 from fanet_mw.routing.clustered.claimed.own_turns import OwnTurns
-from fanet_mw.routing.clustered.claimed.turn_queue import OwnRelease
 from fanet_mw.routing.clustered.clustered import Clustered, Parts
 from fanet_mw.routing.clustered.contract import ScheduledAccess
 from fanet_mw.routing.clustered.forwarding.floods import Floods
 from fanet_mw.routing.clustered.forwarding.gradient import Gradient
 from fanet_mw.routing.clustered.forwarding.repair import Repair
 from fanet_mw.routing.clustered.forwarding.uplink import Uplink
-from fanet_mw.routing.clustered.relaying.by_turn import ByTurn
-from fanet_mw.routing.clustered.relaying.chosen import Choice, Chosen, DominatingSet, HeadsFirst, MultipointRelays
-from fanet_mw.routing.clustered.relaying.contending import Contending
+from fanet_mw.routing.clustered.relaying.claimed import ClaimedRelaying
+from fanet_mw.routing.clustered.relaying.contending import ContendingRelaying
+from fanet_mw.routing.clustered.relaying.neighbor_knowledge import (
+    DominatingSet,
+    HeadsFirst,
+    MultipointRelays,
+    NeighborKnowledgeRelaying,
+    RelayChoice,
+)
 from fanet_mw.routing.clustered.relaying.neighborhood import Neighborhood
-from fanet_mw.routing.clustered.relaying.pipelined import Pipelined
-from fanet_mw.routing.clustered.relaying.rules import All, Counter, Gossip, Rule
+from fanet_mw.routing.clustered.relaying.rules import CounterRule, GossipRule, RelayAll, Rule
+from fanet_mw.routing.clustered.relaying.scheduled import ScheduledRelaying
 from fanet_mw.routing.clustered.roles.absent import NoRoles
 from fanet_mw.routing.clustered.roles.assigned import AssignedRoles, RoleParts
-from fanet_mw.routing.clustered.roles.failover import Upkeep
-from fanet_mw.routing.clustered.roles.failure_detector import Silence
+from fanet_mw.routing.clustered.roles.failover import Failover
+from fanet_mw.routing.clustered.roles.failure_detector import FailureDetector
 from fanet_mw.routing.clustered.roles.joining import Joining
 from fanet_mw.routing.clustered.roles.leader import Leader
 from fanet_mw.routing.clustered.roles.lease import Lease
+from fanet_mw.routing.clustered.roles.liveness import Liveness
 from fanet_mw.routing.clustered.roles.membership import Membership
-from fanet_mw.routing.clustered.roles.position_updates import Whereabouts
+from fanet_mw.routing.clustered.roles.position_updates import PositionUpdates
 from fanet_mw.routing.clustered.roles.schedule_check import ScheduleCheck
-from fanet_mw.routing.clustered.roles.schedule_refresh import Refresh
-from fanet_mw.routing.clustered.roles.signs_of_life import Signs
+from fanet_mw.routing.clustered.roles.schedule_refresh import ScheduleRefresh
 from fanet_mw.routing.clustered.tdma.admission import Admission
 from fanet_mw.routing.clustered.tdma.call_release import CallRelease
 from fanet_mw.routing.clustered.tdma.contention import Contention
 from fanet_mw.routing.clustered.tdma.root_release import RootRelease
 from fanet_mw.routing.clustered.tdma.slot_access import SlotAccess
-from fanet_mw.routing.clustered.tdma.slot_release import Release
+from fanet_mw.routing.clustered.tdma.slot_release import SlotRelease
 from fanet_mw.routing.clustered.tdma.urgent import reserved
 from fanet_mw.routing.clustered.timetable.link_quality import LinkQuality
-from fanet_mw.routing.clustered.timetable.plans import Plans
 from fanet_mw.routing.clustered.timetable.promises import Promises
 from fanet_mw.routing.clustered.timetable.timetabling import FromPlaces, NoTimetable, Timetabling
 from fanet_mw.routing.clustered.timetable.turn_access import TurnAccess
 from fanet_mw.routing.clustered.timetable.turn_plan import leader_load
+from fanet_mw.routing.clustered.timetable.turn_plans import TurnPlans
 from fanet_mw.units import MS, seconds_to_ns
 
 _STORE_PACKETS: Final = 4096
@@ -125,16 +131,16 @@ def _ground(port: Port) -> _Ground:
 
 
 def _by_all(ground: _Ground) -> Clustered:
-    return _in_slots(ground, All())
+    return _in_slots(ground, RelayAll())
 
 
 def _by_gossip(ground: _Ground) -> Clustered:
-    return _in_slots(ground, Gossip(ground.port.scenario.clusters, ground.neighbors, ground.random))
+    return _in_slots(ground, GossipRule(ground.port.scenario.clusters, ground.neighbors, ground.random))
 
 
 def _by_counter(ground: _Ground) -> Clustered:
-    rule = Counter(ground.port.scenario.clusters, ground.random)
-    return _in_slots(ground, rule, rule.open_until.overheard)
+    rule = CounterRule(ground.port.scenario.clusters, ground.random)
+    return _in_slots(ground, rule, rule.open_until.on_copy)
 
 
 def _by_set(ground: _Ground) -> Clustered:
@@ -163,29 +169,31 @@ def _in_slots(ground: _Ground, rule: Rule, *on_copy: Callable[..., object]) -> C
     parts = _role_parts(ground, _membership(ground), takes_slot=True)
     access = _slots(ground, parts.membership)
     roles = _roles(ground, parts, access, NoTimetable())
-    relaying = Contending(ground.port, rule, ground.contention)
+    relaying = ContendingRelaying(ground.port, rule, ground.contention)
     whole = Parts(
         neighbors=ground.neighbors, gradient=ground.gradient, uplink=ground.uplink, repair=ground.repair,
         floods=ground.floods, roles=roles, access=access, relaying=relaying, two_hops=None,
     )  # fmt: skip
-    return _protocol(ground, whole, *on_copy, parts.refresh.overheard)
+    return _protocol(ground, whole, *on_copy, parts.refresh.on_copy)
 
 
-def _by_choice(ground: _Ground, membership: Membership, choice: Choice) -> Clustered:
+def _by_choice(ground: _Ground, membership: Membership, choice: RelayChoice) -> Clustered:
     parts = _role_parts(ground, membership, takes_slot=True)
     access = _slots(ground, membership)
     roles = _roles(ground, parts, access, NoTimetable())
-    relaying = Chosen(ground.port, choice, Contending(ground.port, All(), ground.contention))
+    relaying = NeighborKnowledgeRelaying(
+        ground.port, choice, ContendingRelaying(ground.port, RelayAll(), ground.contention)
+    )
     whole = Parts(
         neighbors=ground.neighbors, gradient=ground.gradient, uplink=ground.uplink, repair=ground.repair,
         floods=ground.floods, roles=roles, access=access, relaying=relaying, two_hops=relaying,
     )  # fmt: skip
-    return _protocol(ground, whole, parts.refresh.overheard)
+    return _protocol(ground, whole, parts.refresh.on_copy)
 
 
 def _slots(ground: _Ground, membership: Membership) -> SlotAccess:
     scenario = ground.port.scenario
-    release = Release(ground.queue(), scenario.clusters, lead_ns=scenario.radio.lead_ns)
+    release = SlotRelease(ground.queue(), scenario.clusters, lead_ns=scenario.radio.lead_ns)
     return SlotAccess(ground.port, release, membership=membership, uplink=ground.uplink, floods=ground.floods)
 
 
@@ -194,7 +202,7 @@ def _slots(ground: _Ground, membership: Membership) -> SlotAccess:
 
 def _by_timetable(ground: _Ground) -> Clustered:
     port, scenario = ground.port, ground.port.scenario
-    plans = Plans()
+    plans = TurnPlans()
     ground.contention.turns_at = plans.turns_at
     ground.contention.most_jitter_ns = round(scenario.clusters.contention_ms * MS * _JITTER)
     parts = _role_parts(ground, _membership(ground), takes_slot=False)
@@ -209,13 +217,13 @@ def _by_timetable(ground: _Ground) -> Clustered:
     timetabling = FromPlaces(
         port, lease=parts.lease, membership=parts.membership, refresh=parts.refresh, promises=promises, access=access
     )
-    relaying = ByTurn(port, plans, Contending(port, All(), ground.contention))
+    relaying = ScheduledRelaying(port, plans, ContendingRelaying(port, RelayAll(), ground.contention))
     whole = Parts(
         neighbors=ground.neighbors, gradient=ground.gradient, uplink=ground.uplink, repair=ground.repair,
         floods=ground.floods, roles=_roles(ground, parts, access, timetabling), access=access, relaying=relaying,
         two_hops=None, promises=promises,
     )  # fmt: skip
-    return _protocol(ground, whole, parts.refresh.overheard, calls.overheard)
+    return _protocol(ground, whole, parts.refresh.on_copy, calls.on_copy)
 
 
 def _admission(port: Port) -> Admission | None:
@@ -239,29 +247,29 @@ def _role_parts(ground: _Ground, membership: Membership, *, takes_slot: bool) ->
     hears of a silent node only tells the leader.
     """
     port, scenario = ground.port, ground.port.scenario
-    signs = Signs()
-    lease = Lease(port.node, period_ns=scenario.clusters.period_ns, signs=signs)
+    liveness = Liveness()
+    lease = Lease(port.node, period_ns=scenario.clusters.period_ns, liveness=liveness)
     links = LinkQuality(port.node, hello_ns=ground.hello_ns) if scenario.measures_links else None
-    updates = Whereabouts(range_m=scenario.clusters.link_m or scenario.radio.range_m)
+    updates = PositionUpdates(range_m=scenario.clusters.link_m or scenario.radio.range_m)
     return RoleParts(
         membership=membership,
         lease=lease,
-        failover=Upkeep(
-            membership=membership, gradient=ground.gradient, signs=signs, lease=lease, node=port.node,
+        failover=Failover(
+            membership=membership, gradient=ground.gradient, liveness=liveness, lease=lease, node=port.node,
             hello_ns=ground.hello_ns, takes_slot=takes_slot,
         ),
         joining=Joining(port, updates, links, ground.random),
-        refresh=Refresh(port.stream("refresh").random),
+        refresh=ScheduleRefresh(port.stream("refresh").random),
         check=ScheduleCheck(port, membership),
-        detector=None if takes_slot else Silence(signs, hello_ns=ground.hello_ns),
+        detector=None if takes_slot else FailureDetector(liveness, hello_ns=ground.hello_ns),
         links=links,
-        signs=signs,
+        liveness=liveness,
     )  # fmt: skip
 
 
 def _roles(ground: _Ground, parts: RoleParts, access: ScheduledAccess, timetabling: Timetabling) -> AssignedRoles:
     make_leader = partial(
-        Leader, scenario=ground.port.scenario, signs=parts.signs, needs_every_link=timetabling.needs_every_link
+        Leader, scenario=ground.port.scenario, liveness=parts.liveness, needs_every_link=timetabling.needs_every_link
     )
     return AssignedRoles(
         ground.port, parts, gradient=ground.gradient, access=access, timetabling=timetabling, make_leader=make_leader
@@ -280,10 +288,10 @@ def _by_claims(ground: _Ground) -> Clustered:
     frame_bytes = scenario.radio.max_frame_bytes if scenario.routing.aggregate else 0
     access = ClaimedAccess(
         port, claiming=claiming, turn_bytes=size, gradient=ground.gradient, uplink=ground.uplink,
-        queue=OwnRelease(ground.queue(), own, lead_ns=scenario.radio.lead_ns, frame_bytes=frame_bytes),
+        queue=ClaimedRelease(ground.queue(), own, lead_ns=scenario.radio.lead_ns, frame_bytes=frame_bytes),
         floods=ground.floods, contention=ground.contention,
     )  # fmt: skip
-    relaying = Pipelined(port, claiming, access, Contending(port, All(), ground.contention))
+    relaying = ClaimedRelaying(port, claiming, access, ContendingRelaying(port, RelayAll(), ground.contention))
     whole = Parts(
         neighbors=ground.neighbors, gradient=ground.gradient, uplink=ground.uplink, repair=ground.repair,
         floods=ground.floods, roles=NoRoles(port), access=access, relaying=relaying, two_hops=access,
@@ -292,7 +300,7 @@ def _by_claims(ground: _Ground) -> Clustered:
 
 
 def _protocol(ground: _Ground, whole: Parts, *on_copy: Callable[..., object]) -> Clustered:
-    repaired = () if ground.repair is None else (ground.repair.overheard,)
+    repaired = () if ground.repair is None else (ground.repair.on_copy,)
     return Clustered(ground.port, whole, [*on_copy, *repaired])
 
 

@@ -13,10 +13,10 @@ from typing import NamedTuple
 
 from fanet_mw.bus.messages import Reception, TxOutcome, TxStatus
 from fanet_mw.errors import DropReason, MalformedFrameError
-from fanet_mw.node.arrival import decoded
 from fanet_mw.node.contract import Port, RoutingProtocol
 from fanet_mw.node.neighbors import Neighbor, Neighbors
 from fanet_mw.node.packet import Packet, Relay
+from fanet_mw.node.reader import decoded
 from fanet_mw.routing.clustered.contract import Access, Relaying, Roles, TwoHops
 from fanet_mw.routing.clustered.forwarding.floods import Floods
 from fanet_mw.routing.clustered.forwarding.gradient import Gradient
@@ -102,16 +102,16 @@ class Clustered(RoutingProtocol):
     def least_interval_ns(self, deadline_ns: int) -> int | None:
         return None if self.parts.promises is None else self.parts.promises.least_interval_ns(deadline_ns)
 
-    def overheard(self, key: int, *, now_ns: int) -> None:
+    def on_copy(self, key: int, *, now_ns: int) -> None:
         for on_copy in self._on_copy:
             on_copy(key, now_ns=now_ns)
 
-    def impersonated(self, packet: Packet, *, now_ns: int) -> None:
+    def on_impersonation(self, packet: Packet, *, now_ns: int) -> None:
         self.parts.roles.on_impersonation(packet, now_ns=now_ns)
 
-    def status(self, status: TxStatus, *, now_ns: int) -> None:
+    def on_status(self, status: TxStatus, *, now_ns: int) -> None:
         parts = self.parts
-        failed = parts.uplink.ended(status)
+        failed = parts.uplink.on_status(status)
         if failed is None:
             return
         if status.outcome is TxOutcome.RETRY_LIMIT:
@@ -145,18 +145,18 @@ class Clustered(RoutingProtocol):
         self._hello_bytes = HEADER_BYTES + _POSITION_BYTES + len(inner)
         return inner
 
-    def hello(self, packet: Packet, reception: Reception, *, now_ns: int) -> None:
+    def on_hello(self, packet: Packet, reception: Reception, *, now_ns: int) -> None:
         parts, count = self.parts, self._port.scenario.nodes.count
         beacon = decoded(packet.frame, Beacon.decode_frame)
         if beacon.node != reception.src or beacon.head > count or beacon.leader > count:
             raise MalformedFrameError(f"beacon of {beacon.node}, head {beacon.head}, leader {beacon.leader}")
         digest = decoded(packet.frame, Digest.decode_frames) if parts.repair else None
         neighbor = Neighbor(reception.src, now_ns, reception.rssi_dbm, beacon)
-        parts.neighbors.heard(neighbor)
+        parts.neighbors.on_hello(neighbor)
         parts.roles.on_hello(neighbor, born_ns=packet.header.origin_us * US, now_ns=now_ns)
-        parts.gradient.hear(neighbor, now_ns=now_ns)
+        parts.gradient.on_hello(neighbor, now_ns=now_ns)
         if parts.repair and digest:
-            parts.repair.compare(digest, now_ns=now_ns)
+            parts.repair.on_digest(digest, now_ns=now_ns)
         for held in parts.uplink.released(now_ns=now_ns):
             parts.access.forward(held, start_ns=now_ns + self._lead_ns, now_ns=now_ns)
         if parts.two_hops is not None:

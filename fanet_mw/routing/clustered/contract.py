@@ -14,7 +14,7 @@ from typing import Protocol
 from fanet_mw.bus.messages import Reception
 from fanet_mw.node.neighbors import Neighbor
 from fanet_mw.node.packet import Packet, Relay
-from fanet_mw.routing.clustered.forwarding.gradient import Route
+from fanet_mw.routing.clustered.forwarding.gradient import RouteToHead
 from fanet_mw.units import NodeId
 from fanet_mw.wire import Kind
 from fanet_mw.wire.claims import Claims
@@ -51,7 +51,7 @@ class Roles(Protocol):
     def before_hello(self, now_ns: int) -> None:
         """The node is about to say hello: what goes with the hellos' rhythm is done now."""
 
-    def beacon(self, route: Route | None, *, now_ns: int) -> Beacon:
+    def beacon(self, route: RouteToHead | None, *, now_ns: int) -> Beacon:
         """What the hello says of the node's role, and of its route to a head."""
 
     def hello_share(self, now_ns: int) -> float:

@@ -20,7 +20,7 @@ from fanet_mw.node.packet import Packet
 from fanet_mw.routing import control
 from fanet_mw.routing.control import Family
 from fanet_mw.routing.dsdv.messages import FULL, INCREMENTAL, PER_ENTRY, Advertised, Update
-from fanet_mw.routing.dsdv.table import PERIODIC_UPDATE_NS, Table
+from fanet_mw.routing.dsdv.table import PERIODIC_UPDATE_NS, DsdvTable
 from fanet_mw.routing.routed import Routed
 from fanet_mw.routing.waiting import WaitingRoom
 from fanet_mw.units import NodeId, S, earliest, seconds_to_ns
@@ -37,7 +37,7 @@ class Dsdv(Routed):
     def __init__(self, port: Port) -> None:
         super().__init__(port)
         routing = port.scenario.routing
-        self._table = Table(port.node)
+        self._table = DsdvTable(port.node)
         self._room = WaitingRoom(capacity=routing.queue_frames, hold_ns=seconds_to_ns(routing.lifetime_s))
         self._most = control.capacity(port.scenario.radio.max_frame_bytes) // PER_ENTRY
         self._full_ns: int | None = None

@@ -23,7 +23,7 @@ _WEIGHT: Final = 7 / 8
 
 
 @dataclass(slots=True)
-class Route:
+class DsdvRoute:
     """The route to one destination, as it is used and as it was last advertised."""
 
     next_hop: NodeId
@@ -39,12 +39,12 @@ class Route:
     """When the change is to be advertised; None when it can wait for the next full dump."""
 
 
-class Table:
+class DsdvTable:
     """All routes of one node."""
 
     def __init__(self, node: NodeId) -> None:
         self._node = node
-        self._routes: dict[NodeId, Route] = {}
+        self._routes: dict[NodeId, DsdvRoute] = {}
         self.seq = 0
         """This node's own sequence number, which is even."""
         self.own_due_ns: int | None = None
@@ -76,7 +76,7 @@ class Table:
             return
         elif route is None or route.metric == INFINITE:
             if route is None or newer(advertised.seq, route.seq):
-                self._routes[destination] = Route(sender, metric, advertised.seq, now_ns, due_ns=now_ns)
+                self._routes[destination] = DsdvRoute(sender, metric, advertised.seq, now_ns, due_ns=now_ns)
         elif newer(advertised.seq, route.seq):
             route.next_hop, route.seq, route.renewed_ns = sender, advertised.seq, now_ns
             self._update_metric(route, metric, now_ns=now_ns)
@@ -86,7 +86,7 @@ class Table:
             route.next_hop = sender
             self._update_metric(route, metric, now_ns=now_ns)
 
-    def _update_metric(self, route: Route, metric: int, *, now_ns: int) -> None:
+    def _update_metric(self, route: DsdvRoute, metric: int, *, now_ns: int) -> None:
         route.metric = metric
         if metric == route.advertised_metric:
             route.due_ns = None  # a newer number alone is no change: the next full dump carries it
@@ -102,7 +102,7 @@ class Table:
             self._break(route, seq=following(route.seq), now_ns=now_ns)
         return bool(over)
 
-    def _break(self, route: Route, *, seq: int, now_ns: int) -> None:
+    def _break(self, route: DsdvRoute, *, seq: int, now_ns: int) -> None:
         route.metric, route.seq, route.renewed_ns, route.due_ns = INFINITE, seq, now_ns, now_ns
 
     def tidy(self, now_ns: int) -> None:

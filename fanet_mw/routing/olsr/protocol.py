@@ -35,7 +35,7 @@ from fanet_mw.routing.olsr.messages import (
     TopologyControl,
     encode_time,
 )
-from fanet_mw.routing.olsr.routes import Route, routing_table
+from fanet_mw.routing.olsr.routes import OlsrRoute, routing_table
 from fanet_mw.routing.olsr.state import Repositories
 from fanet_mw.routing.routed import Routed
 from fanet_mw.serial import following
@@ -62,7 +62,7 @@ class Olsr(Routed):
         self._advertised: list[NodeId] = []
         self._tc_until_ns = -1
         """A node whose last selector is gone advertises that until this instant, for TOP_HOLD_TIME (9.3)."""
-        self._routes: dict[NodeId, Route] = {}
+        self._routes: dict[NodeId, OlsrRoute] = {}
         self._routes_version = -1
         self._routes_end_ns = -1
 
@@ -85,7 +85,7 @@ class Olsr(Routed):
     def _relays(self, packet: Packet, reception: Reception, *, now_ns: int) -> bool:
         return self.willingness != p.WILL_NEVER and self._state.is_selector(reception.src, now_ns=now_ns)
 
-    def _route(self, destination: NodeId, *, now_ns: int) -> Route | None:
+    def _route(self, destination: NodeId, *, now_ns: int) -> OlsrRoute | None:
         """The entry of the routing table, which is computed anew when its inputs have changed (10)."""
         state = self._state
         if self._routes_version != state.version or now_ns > self._routes_end_ns:

@@ -7,7 +7,7 @@ from fanet_mw.routing.olsr.parameters import WILL_NEVER
 from fanet_mw.units import NodeId
 
 
-class Route(NamedTuple):
+class OlsrRoute(NamedTuple):
     """An entry of the routing table."""
 
     next_hop: NodeId
@@ -19,17 +19,17 @@ def routing_table(
     neighbors: Mapping[NodeId, Sequence[NodeId]],
     willingness: Mapping[NodeId, int],
     topology: Sequence[tuple[NodeId, NodeId]],
-) -> dict[NodeId, Route]:
+) -> dict[NodeId, OlsrRoute]:
     """The shortest known routes (10): to neighbors, to 2-hop neighbors, then over the topology set hop by hop.
 
     `topology` holds pairs (last hop, destination). Of equally short routes the one over the lowest ids is taken.
     """
-    routes = {neighbor: Route(neighbor, 1) for neighbor in sorted(neighbors)}
+    routes = {neighbor: OlsrRoute(neighbor, 1) for neighbor in sorted(neighbors)}
     for neighbor in sorted(neighbors):
         if willingness[neighbor] != WILL_NEVER:
             for far in neighbors[neighbor]:
                 if far != node and far not in routes:
-                    routes[far] = Route(neighbor, 2)
+                    routes[far] = OlsrRoute(neighbor, 2)
     onward: dict[NodeId, list[NodeId]] = {}
     for last, destination in topology:
         onward.setdefault(last, []).append(destination)
@@ -40,7 +40,7 @@ def routing_table(
         for last in sorted(ring):
             for destination in onward.get(last, ()):
                 if destination != node and destination not in routes:
-                    routes[destination] = Route(routes[last].next_hop, hops)
+                    routes[destination] = OlsrRoute(routes[last].next_hop, hops)
                     wider.append(destination)
         ring = wider
     return routes

@@ -254,8 +254,8 @@ def test_neighbors_are_avoided_while_they_are_heard_at_their_level() -> None:
     navigation, neighbors = Navigation(Enu(0, 0, UP_M), OPEN), Neighbors()
     navigation.fix(Enu(0, 0, UP_M), Enu(5, 0, 0), now_ns=0)
     clear = ClearOfOthers(navigation, neighbors, OPEN)
-    neighbors.heard(2, Motion(Enu(60, 0, UP_M), Enu(-5, 0, 0), 0))
-    neighbors.heard(3, Motion(Enu(60, 0, UP_M + 12), Enu(0, 0, 0), 0))
+    neighbors.on_hello(2, Motion(Enu(60, 0, UP_M), Enu(-5, 0, 0), 0))
+    neighbors.on_hello(3, Motion(Enu(60, 0, UP_M + 12), Enu(0, 0, 0), 0))
     assert len(clear.planes(S)) == 1
     assert clear.planes(7 * S) == []
 
@@ -266,6 +266,6 @@ def test_a_uav_of_a_line_is_tied_to_those_beside_it_and_a_follower_to_the_neares
         board = Board(node, lane_of(node, now_ns))
         for other in range(1, COUNT + 1):
             if other != node:
-                board.neighbors.heard(other, Motion(lane_of(other, now_ns), Enu(0, 0, 0), now_ns))
+                board.neighbors.on_hello(other, Motion(lane_of(other, now_ns), Enu(0, 0, 0), now_ns))
         tied = InReach(board.navigation, board.neighbors, board.place, reach_m=REACH_M)
         assert len(tied.planes(now_ns)) == ties

@@ -1,7 +1,7 @@
 """What a guard time must hold: both clocks' errors, their drift until the next setting, flight, and the last frame."""
 
 from fanet_mw.bounds import guard_ns
-from fanet_mw.bounds.access import Dcf
+from fanet_mw.bounds.mac import Dcf
 from fanet_mw.units import MS, US, S
 
 QUIET = {"clock_error_ns": 0, "drift_ppm": 0.0, "resync_ns": 0, "range_m": 0.0, "overhang_ns": 0}

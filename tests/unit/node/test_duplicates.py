@@ -10,7 +10,7 @@ packets = st.tuples(st.integers(0, 0xFFFF), st.integers(0, 0xFFFF_FFFF))
 
 
 def test_phases_of_one_packet_are_remembered_apart() -> None:
-    memory = duplicates.Seen()
+    memory = duplicates.DuplicateSet()
     key = duplicates.key_of(origin=3, seq=9)
     memory.mark(key, duplicates.CARRIED)
     assert memory.bits(key) & duplicates.CARRIED
@@ -20,7 +20,7 @@ def test_phases_of_one_packet_are_remembered_apart() -> None:
 
 
 def test_the_last_capacity_packets_are_known_and_memory_stays_bounded() -> None:
-    memory = duplicates.Seen(capacity=100)
+    memory = duplicates.DuplicateSet(capacity=100)
     for seq in range(10_000):
         memory.mark(duplicates.key_of(origin=1, seq=seq), duplicates.DELIVERED)
     assert all(memory.bits(duplicates.key_of(origin=1, seq=seq)) for seq in range(9_900, 10_000))
@@ -31,14 +31,14 @@ def test_the_last_capacity_packets_are_known_and_memory_stays_bounded() -> None:
 @pytest.mark.parametrize("name", ["mark", "put"])
 def test_a_packet_is_known_for_as_many_newer_ones_as_there_is_room_for(name: str) -> None:
     """At every moment, and not only where a generation is just full."""
-    memory = duplicates.Seen(capacity=10)
+    memory = duplicates.DuplicateSet(capacity=10)
     for seq in range(55):
         getattr(memory, name)(duplicates.key_of(origin=1, seq=seq), duplicates.FLOODED)
         assert all(memory.bits(duplicates.key_of(origin=1, seq=known)) for known in range(max(0, seq - 10), seq + 1))
 
 
 def test_what_the_older_generation_knows_is_kept_when_more_becomes_known() -> None:
-    memory = duplicates.Seen(capacity=4)
+    memory = duplicates.DuplicateSet(capacity=4)
     first = duplicates.key_of(origin=1, seq=0)
     memory.mark(first, duplicates.CARRIED)
     for seq in range(1, 5):
@@ -51,7 +51,7 @@ def test_what_the_older_generation_knows_is_kept_when_more_becomes_known() -> No
 
 
 def test_origins_do_not_share_sequences() -> None:
-    memory = duplicates.Seen()
+    memory = duplicates.DuplicateSet()
     memory.mark(duplicates.key_of(origin=1, seq=5), duplicates.DELIVERED)
     assert memory.bits(duplicates.key_of(origin=2, seq=5)) == 0
 

@@ -5,7 +5,7 @@ import pytest
 from fanet_mw import wire
 from fanet_mw.bus.messages import Reception
 from fanet_mw.errors import DropReason, LocalProtocolError
-from fanet_mw.node.duplicates import Seen
+from fanet_mw.node.duplicates import DuplicateSet
 from fanet_mw.node.node import Node
 from fanet_mw.node.packet import Packet, Relay
 from fanet_mw.routing import make_protocol
@@ -53,7 +53,7 @@ def send(node: Node, **change: int) -> int:
 
 
 def test_a_copy_is_known_though_a_generation_of_other_packets_came_in_between(node: Node) -> None:
-    node._seen = Seen(capacity=10)
+    node._duplicates = DuplicateSet(capacity=10)
     assert not hear(node, frame(seq=100))
     for seq in range(200, 210):
         assert not hear(node, frame(seq=seq))

@@ -9,7 +9,7 @@ import pytest
 
 from fanet_mw.scenario import config
 from fanet_mw.scenario.commented import SCHEMA_NAME, commented
-from fanet_mw.scenario.reference import Table, bound, dotted_keys, json_schema, tables
+from fanet_mw.scenario.reference import KeyTable, bound, dotted_keys, json_schema, tables
 from sim.scenarios import catalog
 
 ROOT = Path(__file__).parents[3]
@@ -20,12 +20,12 @@ DIMENSIONLESS = {
 """Keys of numbers that are pure: factors, exponents; shares are known by their bound."""
 
 
-def table(path: str, heading: str = "") -> Table:
+def table(path: str, heading: str = "") -> KeyTable:
     return TABLES[path, heading]
 
 
 @pytest.mark.parametrize("of", TABLES.values(), ids=lambda of: of.title)
-def test_every_key_says_what_it_means_and_every_measure_has_a_unit(of: Table) -> None:
+def test_every_key_says_what_it_means_and_every_measure_has_a_unit(of: KeyTable) -> None:
     assert of.meaning
     assert [key.name for key in of.keys if len(key.meaning) < 10] == []
     assert [key.name for key in of.keys if not key.bound or key.bound == "any"] == []

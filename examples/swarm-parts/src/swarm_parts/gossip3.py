@@ -64,7 +64,7 @@ class Gossip3(RoutingProtocol):
         self._silent[key] = now_ns + round(self._options.patience_ms * MS), packet
         self._copies[key] = 0
 
-    def overheard(self, key: int, *, now_ns: int) -> None:
+    def on_copy(self, key: int, *, now_ns: int) -> None:
         if key in self._copies:
             self._copies[key] += 1
 

@@ -14,7 +14,7 @@ from typing import Final
 from fanet_mw.node.contract import Port
 from fanet_mw.node.neighbors import LIFETIME_HELLOS
 from fanet_mw.routing.clustered.claimed.own_turns import OwnTurns, Share, draws
-from fanet_mw.routing.clustered.claimed.slot_claims import Claim, Hello, SlotClaims
+from fanet_mw.routing.clustered.claimed.slot_claims import SlotClaim, SlotClaims, SlotHello
 from fanet_mw.routing.clustered.relaying.neighborhood import Neighborhood
 from fanet_mw.routing.clustered.tdma.turns import Turns, turn_ns
 from fanet_mw.scenario import Scenario
@@ -40,7 +40,7 @@ class Change(Enum):
     LOST = "it has none any more"
 
 
-class Load:
+class ClaimedLoad:
     """How many lots a node wants: by what it had to send, against the turns of its claim."""
 
     def __init__(self, now_ns: int) -> None:
@@ -75,7 +75,7 @@ class Claiming:
             port.node, lifetime_ns=self._lifetime_ns, rank=lambda _, standing: _rank(standing.slot)
         )
         self._longest = longest_superframe(own.turns)
-        self._load = Load(0)
+        self._load = ClaimedLoad(0)
         self._claims = self._new_claims(0)
         self._known_ns = 0
         self._claimed_ns: int | None = None
@@ -102,7 +102,7 @@ class Claiming:
     def start(self, now_ns: int) -> None:
         """The node is up; it listens."""
         self._claims = self._new_claims(now_ns)
-        self._load = Load(now_ns)
+        self._load = ClaimedLoad(now_ns)
         self._known_ns = now_ns + _LISTEN * self._hello_ns
 
     # --- once per hello -------------------------------------------------------------------------------------------
@@ -130,18 +130,18 @@ class Claiming:
     def on_claims(self, claims: Claims, *, now_ns: int) -> None:
         """What a neighbor's hello says."""
         heard = tuple(self.claim_of(h.node, h.standing) for h in claims.heard)
-        self._claims.hear(Hello(self.claim_of(claims.node, claims.own), heard), now_ns=now_ns)
-        self._news |= self.near.hear(claims, now_ns=now_ns)
+        self._claims.on_hello(SlotHello(self.claim_of(claims.node, claims.own), heard), now_ns=now_ns)
+        self._news |= self.near.on_claims(claims, now_ns=now_ns)
 
-    def claim_of(self, node: NodeId, standing: SlotStatus) -> Claim:
+    def claim_of(self, node: NodeId, standing: SlotStatus) -> SlotClaim:
         """As `slot_claims` knows it. What no superframe can hold is no claim: it came off the air."""
         slot, length = standing.slot, standing.length
         fixed = self._port.scenario.clusters.slots
         if fixed:
-            return Claim(node, slot if length == fixed else None)
+            return SlotClaim(node, slot if length == fixed else None)
         if length > self._longest or length & (length - 1):
-            return Claim(node, None, crowd=standing.crowd)
-        return Claim(node, slot, length=length, crowd=standing.crowd)
+            return SlotClaim(node, None, crowd=standing.crowd)
+        return SlotClaim(node, slot, length=length, crowd=standing.crowd)
 
     # --- in between -----------------------------------------------------------------------------------------------
 

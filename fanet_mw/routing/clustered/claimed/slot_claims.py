@@ -32,7 +32,7 @@ _PATIENCE: Final = 8
 """Superframes for which a shorter one must have been possible: a neighbor whose hellos were lost is soon back."""
 
 
-class Claim(NamedTuple):
+class SlotClaim(NamedTuple):
     """Who says it owns which slot; None while it listens or found none free."""
 
     node: NodeId
@@ -44,22 +44,22 @@ class Claim(NamedTuple):
     crowd: int = 1
     """Nodes within two hops of the claimant, itself included."""
 
-    def meets(self, other: "Claim") -> bool:
+    def meets(self, other: "SlotClaim") -> bool:
         """Both would send in the same turn."""
         if self.slot is None or other.slot is None:
             return False
         step = gcd(self.length, other.length)
         return (self.slot - other.slot) % step == 0 if step else self.slot == other.slot
 
-    def beats(self, other: "Claim") -> bool:
+    def beats(self, other: "SlotClaim") -> bool:
         return (self.priority, self.node) < (other.priority, other.node)
 
 
-class Hello(NamedTuple):
+class SlotHello(NamedTuple):
     """What a node says about slots once per superframe."""
 
-    own: Claim
-    heard: tuple[Claim, ...]
+    own: SlotClaim
+    heard: tuple[SlotClaim, ...]
     """The claims of its neighbors, by id."""
 
 
@@ -86,10 +86,10 @@ class SlotClaims:
         self._lifetime_ns = lifetime_ns
         self._slots = slots
         self._sized_to = sized_to
-        self._own = Claim(node, None, priority, 1 if sized_to else 0)
+        self._own = SlotClaim(node, None, priority, 1 if sized_to else 0)
         self._roomy = 0
         """Superframes in a row for which a shorter one would have done."""
-        self._hellos: dict[NodeId, tuple[int, Hello]] = {}
+        self._hellos: dict[NodeId, tuple[int, SlotHello]] = {}
         self.repairs = 0
         """How often a slot was given up to a stronger rival."""
 
@@ -98,21 +98,21 @@ class SlotClaims:
         return self._own.slot
 
     @property
-    def own(self) -> Claim:
+    def own(self) -> SlotClaim:
         return self._own
 
-    def hear(self, hello: Hello, *, now_ns: int) -> None:
+    def on_hello(self, hello: SlotHello, *, now_ns: int) -> None:
         """A neighbor's hello. Claims of slots that cannot be are ignored: they come off the air."""
         if hello.own.node != self._own.node and all(self._possible(claim) for claim in (hello.own, *hello.heard)):
             self._hellos[hello.own.node] = now_ns, hello
 
-    def _possible(self, claim: Claim) -> bool:
+    def _possible(self, claim: SlotClaim) -> bool:
         if claim.slot is not None and claim.slot < 0:
             return False
         most = self._sized_to or 0
         return 0 <= claim.length <= most and not claim.length & (claim.length - 1)
 
-    def step(self, now_ns: int) -> Hello:
+    def step(self, now_ns: int) -> SlotHello:
         """Once per superframe: forget the silent, settle clashes, and say so."""
         horizon_ns = now_ns - self._lifetime_ns
         self._hellos = {node: entry for node, entry in self._hellos.items() if entry[0] >= horizon_ns}
@@ -124,7 +124,7 @@ class SlotClaims:
         elif any(rival.beats(self._own) for rival in self.rivals() if rival.meets(self._own)):
             self.repairs += 1
             self._own = self._own._replace(slot=self._free(self._own))
-        return Hello(self._own, tuple(self._hellos[node][1].own for node in sorted(self._hellos)))
+        return SlotHello(self._own, tuple(self._hellos[node][1].own for node in sorted(self._hellos)))
 
     def _size(self, most: int) -> None:
         """A longer superframe at once, with the slot kept; a shorter one after a while, if a slot is free in it."""
@@ -145,7 +145,7 @@ class SlotClaims:
             if slot is not None:
                 self._own, self._roomy = shorter, 0
 
-    def _free(self, claim: Claim) -> int | None:
+    def _free(self, claim: SlotClaim) -> int | None:
         """The lowest slot in which a claim of this length would meet nobody."""
         taken = [rival for rival in self.rivals() if rival.slot is not None]
         if not claim.length:
@@ -154,7 +154,7 @@ class SlotClaims:
         possible = (claim._replace(slot=slot) for slot in range(claim.length))
         return next((own.slot for own in possible if not any(own.meets(rival) for rival in taken)), None)
 
-    def rivals(self) -> Iterator[Claim]:
+    def rivals(self) -> Iterator[SlotClaim]:
         """Claims within two hops. What a neighbor says of itself is newer than what others say of it."""
         for node in sorted(self._hellos):
             hello = self._hellos[node][1]

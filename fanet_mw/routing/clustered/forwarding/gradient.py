@@ -18,7 +18,7 @@ _FORGET: Final = 4
 """After this many times as long no node states a dead head any more: a head stated then has restarted, from 0."""
 
 
-class Route(NamedTuple):
+class RouteToHead(NamedTuple):
     """The next hop towards a head; at the head itself the next hop is the head and hops is 0."""
 
     head: NodeId
@@ -43,7 +43,7 @@ class Gradient:
         self._stale_ns = _STALE * hello_ns
         self._own_head = _NO_HEAD
         self._seq = 0
-        self._route: Route | None = None
+        self._route: RouteToHead | None = None
         self._news: dict[int, tuple[int, int]] = {}
         """The newest sequence number of each head, and since when; a node that states a dead head brings no news."""
 
@@ -52,15 +52,15 @@ class Gradient:
         if head == self._own_head:
             return
         self._own_head = head
-        self._route = Route(head, self._seq, 0, self._node, now_ns) if head == self._node else None
+        self._route = RouteToHead(head, self._seq, 0, self._node, now_ns) if head == self._node else None
 
     def advance(self, now_ns: int) -> None:
         """Advance the head's own sequence number, once per hello."""
         if self._own_head == self._node:
             self._seq = (self._seq + 1) & 0xFFFF
-            self._route = Route(self._node, self._seq, 0, self._node, now_ns)
+            self._route = RouteToHead(self._node, self._seq, 0, self._node, now_ns)
 
-    def hear(self, neighbor: Neighbor, *, now_ns: int) -> None:
+    def on_hello(self, neighbor: Neighbor, *, now_ns: int) -> None:
         """Take in a neighbor's hello, which may bring a better route."""
         beacon = neighbor.beacon
         if self._own_head == self._node:
@@ -73,7 +73,7 @@ class Gradient:
         fresh_ns = self._heard(beacon.head, beacon.head_seq, now_ns)
         if fresh_ns + self._stale_ns < now_ns:
             return
-        offered = Route(NodeId(beacon.head), beacon.head_seq, beacon.hops_to_head + 1, neighbor.node, fresh_ns)
+        offered = RouteToHead(NodeId(beacon.head), beacon.head_seq, beacon.hops_to_head + 1, neighbor.node, fresh_ns)
         if route is None or self._better(offered, route):
             self._route = offered
 
@@ -86,7 +86,7 @@ class Gradient:
             return now_ns
         return known[1]
 
-    def _better(self, offered: Route, route: Route) -> bool:
+    def _better(self, offered: RouteToHead, route: RouteToHead) -> bool:
         if offered.head != route.head:
             return offered.head == self._own_head
         if newer(offered.head_seq, route.head_seq):
@@ -100,13 +100,13 @@ class Gradient:
         known = self._news.get(head)
         return None if known is None else known[1]
 
-    def flooded(self, head: NodeId, *, parent: NodeId, hops: int, now_ns: int) -> None:
+    def on_flood_of_head(self, head: NodeId, *, parent: NodeId, hops: int, now_ns: int) -> None:
         """Take a flood from the head as a route back, until hellos bring a route."""
         route = self.route(now_ns=now_ns)
         if hops >= UNREACHABLE - 1:
             return  # the head is farther than a hello can state
         if head == self._own_head != self._node and (route is None or route.head != head):
-            self._route = Route(head, 0, hops, parent, now_ns)
+            self._route = RouteToHead(head, 0, hops, parent, now_ns)
 
     def lose(self, neighbor: NodeId) -> None:
         """Drop a neighbor to which the link has failed."""
@@ -114,7 +114,7 @@ class Gradient:
         if self._route is not None and self._route.parent == neighbor:
             self._route = None
 
-    def route(self, *, now_ns: int) -> Route | None:
+    def route(self, *, now_ns: int) -> RouteToHead | None:
         """The current route; None when there is none or its news is stale."""
         route = self._route
         if route is not None and route.parent != self._node and route.fresh_ns + self._stale_ns < now_ns:

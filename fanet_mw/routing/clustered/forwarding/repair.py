@@ -109,7 +109,7 @@ class Repair:
 
     # --- what a neighbor lacks ------------------------------------------------------------------------------------
 
-    def compare(self, digest: Digest, *, now_ns: int) -> None:
+    def on_digest(self, digest: Digest, *, now_ns: int) -> None:
         """Plan to send what the neighbor lacks."""
         told, held = {holding.origin: holding for holding in digest.holdings}, self._holdings
         unlike = [origin for origin in self._stored if told.get(origin) != held[origin]]  # few: the rest is quick
@@ -131,7 +131,7 @@ class Repair:
         self._pending[key] = due_ns
         heapq.heappush(self._due, (due_ns, key))
 
-    def overheard(self, key: int, *, now_ns: int) -> None:
+    def on_copy(self, key: int, *, now_ns: int) -> None:
         """Somebody else sent it: those near us have it now."""
         if self._pending.pop(key, None) is not None:
             self._put_off(key, now_ns)

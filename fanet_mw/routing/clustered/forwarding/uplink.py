@@ -59,7 +59,7 @@ class Uplink:
         if evicted is not None:
             self._port.drop(DropReason.QUEUE_FULL, evicted, now_ns=now_ns)
 
-    def ended(self, status: TxStatus) -> Attempt | None:
+    def on_status(self, status: TxStatus) -> Attempt | None:
         """A transmission has ended; returned is an attempt that has failed. A parent that did not acknowledge is none
         any more.
         """

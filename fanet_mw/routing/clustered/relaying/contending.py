@@ -15,7 +15,7 @@ _CONTROL_JITTER_NS: Final = 100 * MS
 _NOTHING: Final[Mapping[str, object]] = {}
 
 
-class Contending:
+class ContendingRelaying:
     """The relays of one node that go as soon as they may contend."""
 
     def __init__(self, port: Port, rule: Rule, contention: Contention) -> None:

@@ -33,7 +33,7 @@ class Neighborhood:
         self._belongs: bool | None = None
         """Whether this node is a relay of the dominating set; None when it must be computed anew."""
 
-    def hear(self, claims: Claims, *, now_ns: int) -> bool:
+    def on_claims(self, claims: Claims, *, now_ns: int) -> bool:
         """Take in a neighbor's claims; True if they say something new."""
         if claims.node == self._node:
             return False

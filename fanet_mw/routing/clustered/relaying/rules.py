@@ -27,7 +27,7 @@ class Rule(Protocol):
         """Take in a new packet; True: it is relayed now. False: it is not, or not yet."""
 
 
-class All:
+class RelayAll:
     """Every packet is relayed."""
 
     def __init__(self) -> None:
@@ -37,7 +37,7 @@ class All:
         return True
 
 
-class Gossip:
+class GossipRule:
     """A packet is relayed with a probability that the number of neighbors decides."""
 
     def __init__(self, clusters: Clusters, neighbors: Neighbors, random: Callable[[], float]) -> None:
@@ -50,7 +50,7 @@ class Gossip:
         return self._random() * self._neighbors.count(now_ns=now_ns) <= self._degree
 
 
-class Counter:
+class CounterRule:
     """A packet is relayed after a while, unless enough others have relayed it by then."""
 
     def __init__(self, clusters: Clusters, random: Callable[[], float]) -> None:

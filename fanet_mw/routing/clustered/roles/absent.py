@@ -5,7 +5,7 @@ from collections.abc import Mapping
 from fanet_mw.node.contract import Port
 from fanet_mw.node.neighbors import Neighbor
 from fanet_mw.node.packet import Packet
-from fanet_mw.routing.clustered.forwarding.gradient import UNREACHABLE, Route
+from fanet_mw.routing.clustered.forwarding.gradient import UNREACHABLE, RouteToHead
 from fanet_mw.units import NodeId
 from fanet_mw.wire.inner import Beacon, Role
 
@@ -41,7 +41,7 @@ class NoRoles:
     def before_hello(self, now_ns: int) -> None:
         """Nothing goes with the rhythm of the hellos."""
 
-    def beacon(self, route: Route | None, *, now_ns: int) -> Beacon:
+    def beacon(self, route: RouteToHead | None, *, now_ns: int) -> Beacon:
         return Beacon(
             node=self._port.node,
             head=route.head if route else 0,

@@ -9,21 +9,21 @@ from typing import NamedTuple, Protocol
 
 from fanet_mw.bounds.guard import slot_guard_ns
 from fanet_mw.errors import MalformedFrameError
-from fanet_mw.node.arrival import decoded
 from fanet_mw.node.contract import Port
 from fanet_mw.node.neighbors import Neighbor
 from fanet_mw.node.packet import Packet
+from fanet_mw.node.reader import decoded
 from fanet_mw.routing.clustered.contract import ScheduledAccess
-from fanet_mw.routing.clustered.forwarding.gradient import UNREACHABLE, Gradient, Route
-from fanet_mw.routing.clustered.roles.failover import Upkeep
-from fanet_mw.routing.clustered.roles.failure_detector import Silence
+from fanet_mw.routing.clustered.forwarding.gradient import UNREACHABLE, Gradient, RouteToHead
+from fanet_mw.routing.clustered.roles.failover import Failover
+from fanet_mw.routing.clustered.roles.failure_detector import FailureDetector
 from fanet_mw.routing.clustered.roles.joining import Joining
 from fanet_mw.routing.clustered.roles.leader import Leader
 from fanet_mw.routing.clustered.roles.lease import Authority, Lease
+from fanet_mw.routing.clustered.roles.liveness import Liveness
 from fanet_mw.routing.clustered.roles.membership import Membership
 from fanet_mw.routing.clustered.roles.schedule_check import ScheduleCheck
-from fanet_mw.routing.clustered.roles.schedule_refresh import Refresh
-from fanet_mw.routing.clustered.roles.signs_of_life import Signs
+from fanet_mw.routing.clustered.roles.schedule_refresh import ScheduleRefresh
 from fanet_mw.routing.clustered.roles.states import Action
 from fanet_mw.routing.clustered.timetable.link_quality import LinkQuality
 from fanet_mw.routing.clustered.timetable.timetabling import Timetabling
@@ -44,15 +44,15 @@ class RoleParts(NamedTuple):
 
     membership: Membership
     lease: Lease
-    failover: Upkeep
+    failover: Failover
     joining: Joining
-    refresh: Refresh
+    refresh: ScheduleRefresh
     check: ScheduleCheck
-    detector: Silence | None
+    detector: FailureDetector | None
     """None: a silent neighbor is nobody's business but that of its cluster."""
     links: LinkQuality | None
     """None: links are not measured."""
-    signs: Signs
+    liveness: Liveness
 
 
 class AssignedRoles:
@@ -91,7 +91,7 @@ class AssignedRoles:
     # --- what the air brings --------------------------------------------------------------------------------------
 
     def on_sign_of_life(self, node: int, *, born_ns: int, now_ns: int) -> None:
-        actions = self.parts.failover.lives(node, born_ns=min(born_ns, now_ns), now_ns=now_ns)
+        actions = self.parts.failover.on_sign_of_life(node, born_ns=min(born_ns, now_ns), now_ns=now_ns)
         if actions:
             self._do(actions, now_ns)
 
@@ -115,15 +115,15 @@ class AssignedRoles:
             raise MalformedFrameError(f"join of {join.node} instead of {join.instead_of} by {header.origin}")
         if self._leader is not None:
             told = decoded(packet.frame, Links.decode_frames) if parts.links is not None else None
-            self._leader.joined(join, born_ns=born_ns, now_ns=now_ns)
+            self._leader.on_join(join, born_ns=born_ns, now_ns=now_ns)
             if told is not None:
-                self._leader.measured(NodeId(join.node), told.links)
+                self._leader.on_links(NodeId(join.node), told.links)
         if join.instead_of:
             if parts.detector is not None:
-                parts.detector.said(NodeId(join.instead_of), now_ns=now_ns)
-            self._do(parts.failover.stands_in(join, born_ns=born_ns, now_ns=now_ns), now_ns)
+                parts.detector.on_report(NodeId(join.instead_of), now_ns=now_ns)
+            self._do(parts.failover.on_stand_in(join, born_ns=born_ns, now_ns=now_ns), now_ns)
         if join.node == parts.membership.head:
-            self._gradient.flooded(NodeId(join.node), parent=src, hops=header.hops + 1, now_ns=now_ns)
+            self._gradient.on_flood_of_head(NodeId(join.node), parent=src, hops=header.hops + 1, now_ns=now_ns)
 
     def _on_schedule(self, packet: Packet, *, now_ns: int) -> None:
         """An announcement of a leader, perhaps of this node."""
@@ -132,14 +132,14 @@ class AssignedRoles:
         if schedule.leader != packet.header.origin:
             raise MalformedFrameError(f"schedule of {schedule.leader} by {packet.header.origin}")
         before = parts.membership.version
-        actions = parts.failover.announced(
+        actions = parts.failover.on_schedule(
             schedule,
             guard_ns=slot_guard_ns(self._port.scenario, clock_error_ns=self._port.clock_error_ns),
             born_ns=min(packet.header.origin_us * US, now_ns),
             now_ns=now_ns,
         )
         if parts.membership.version != before:
-            parts.check.renewed(now_ns)
+            parts.check.on_new_schedule(now_ns)
         authority = Authority(schedule.term, schedule.leader)
         if authority == parts.lease.authority and schedule.epoch == self._epoch_followed:
             parts.refresh.keep(packet, schedule.part, authority, schedule.epoch, now_ns=now_ns)
@@ -154,23 +154,23 @@ class AssignedRoles:
             schedule = decoded(packet.frame, Schedule.decode_frame)
             self.parts.check.check(schedule, now_ns)
             if Authority(schedule.term, schedule.leader) == self.parts.lease.authority:
-                self._leader.outbid(schedule.epoch, now_ns=now_ns)
+                self._leader.on_outbid(schedule.epoch, now_ns=now_ns)
 
     def on_hello(self, neighbor: Neighbor, *, born_ns: int, now_ns: int) -> None:
         parts = self.parts
         if parts.detector is not None:
-            parts.detector.heard(neighbor.node, now_ns=now_ns)
+            parts.detector.on_hello(neighbor.node, now_ns=now_ns)
         if parts.links is not None:
-            parts.links.hello(neighbor.node, rssi_dbm=neighbor.rssi_dbm, now_ns=now_ns)
+            parts.links.on_hello(neighbor.node, rssi_dbm=neighbor.rssi_dbm, now_ns=now_ns)
         self.on_sign_of_life(neighbor.node, born_ns=born_ns, now_ns=now_ns)
         if parts.lease.fresh(now_ns):
-            parts.refresh.compare(neighbor.beacon, now_ns=now_ns)
+            parts.refresh.on_beacon(neighbor.beacon, now_ns=now_ns)
 
     def on_flooding(self, due_ns: int) -> None:
         self.parts.joining.on_flooding(due_ns)
 
     def on_parent_lost(self, parent: NodeId, *, now_ns: int) -> None:
-        self.parts.failover.given_up(parent, now_ns=now_ns)
+        self.parts.failover.on_unreachable(parent, now_ns=now_ns)
 
     # --- the node's part in the swarm -----------------------------------------------------------------------------
 
@@ -230,21 +230,21 @@ class AssignedRoles:
         if leader is None:
             parts.joining.update_if_outdated(listed=parts.membership.nodes_listed, now_ns=now_ns)
         elif parts.links is not None and parts.links.outdated(now_ns=now_ns):
-            leader.measured(self._port.node, parts.links.tell(now_ns=now_ns))
-        if parts.detector is not None and parts.joining.may_tell(now_ns):
-            self._tell_silence(parts.detector, now_ns)
+            leader.on_links(self._port.node, parts.links.tell(now_ns=now_ns))
+        if parts.detector is not None and parts.joining.may_update(now_ns):
+            self._report_silent_neighbor(parts.detector, now_ns)
 
-    def _tell_silence(self, detector: Silence, now_ns: int) -> None:
+    def _report_silent_neighbor(self, detector: FailureDetector, now_ns: int) -> None:
         """Let the leader know of a neighbor that has fallen silent; one that lives will hear it too, and object."""
-        silent = detector.next_silent(self.parts.membership.lists, now_ns=now_ns)
+        silent = detector.next_suspect(self.parts.membership.lists, now_ns=now_ns)
         if silent is None:
             return
-        detector.said(silent, now_ns=now_ns)
+        detector.on_report(silent, now_ns=now_ns)
         if self._leader is not None:
-            self._leader.suspect(silent, self._port.node, self.parts.joining.motion(now_ns), now_ns=now_ns)
+            self._leader.on_suspicion(silent, self._port.node, self.parts.joining.motion(now_ns), now_ns=now_ns)
         self._join(now_ns, instead_of=silent)
 
-    def beacon(self, route: Route | None, *, now_ns: int) -> Beacon:
+    def beacon(self, route: RouteToHead | None, *, now_ns: int) -> Beacon:
         membership, lease = self.parts.membership, self.parts.lease
         term, leader = lease.authority if lease.fresh(now_ns) and lease.authority else (0, 0)
         return Beacon(

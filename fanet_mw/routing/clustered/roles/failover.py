@@ -11,8 +11,8 @@ from typing import Final
 
 from fanet_mw.routing.clustered.forwarding.gradient import Gradient
 from fanet_mw.routing.clustered.roles.lease import Authority, Lease
+from fanet_mw.routing.clustered.roles.liveness import Liveness
 from fanet_mw.routing.clustered.roles.membership import Membership
-from fanet_mw.routing.clustered.roles.signs_of_life import Signs
 from fanet_mw.routing.clustered.roles.states import Action, Event, State, step
 from fanet_mw.units import MS, NodeId
 from fanet_mw.wire.inner import Join, Schedule
@@ -26,7 +26,7 @@ _AGAIN_HELLOS: Final = 2.0
 _OBJECT_NS: Final = 500 * MS
 
 
-class Upkeep:
+class Failover:
     """The state of one node in the swarm, and the events that change it."""
 
     def __init__(
@@ -34,7 +34,7 @@ class Upkeep:
         *,
         membership: Membership,
         gradient: Gradient,
-        signs: Signs,
+        liveness: Liveness,
         lease: Lease,
         node: NodeId,
         hello_ns: int,
@@ -48,13 +48,13 @@ class Upkeep:
         self._node = node
         self._membership = membership
         self._gradient = gradient
-        self._signs = signs
+        self._liveness = liveness
         self._lease = lease
         self._hello_ns = hello_ns
         self._since_ns = 0
         """When this node began to follow its present head."""
         self._named = NodeId(0)
-        self._given_up_ns = -1
+        self._unreachable_ns = -1
         self._object_ns = 0
         self._watch_ns: int | None = None
 
@@ -72,7 +72,7 @@ class Upkeep:
 
     # --- receiving ------------------------------------------------------------------------------------------------
 
-    def announced(self, schedule: Schedule, *, guard_ns: int, born_ns: int, now_ns: int) -> list[Action]:
+    def on_schedule(self, schedule: Schedule, *, guard_ns: int, born_ns: int, now_ns: int) -> list[Action]:
         """Handle a leader's announcement: the first copy, or this node's own."""
         authority, leads = Authority(schedule.term, schedule.leader), self.state is State.LEADING
         own = self._lease.authority
@@ -98,7 +98,7 @@ class Upkeep:
             actions.append(self._take(event, now_ns))
         return actions
 
-    def stands_in(self, join: Join, *, born_ns: int, now_ns: int) -> list[Action]:
+    def on_stand_in(self, join: Join, *, born_ns: int, now_ns: int) -> list[Action]:
         """Handle a node's statement that it stands in for a head; in a timetable, that some node is silent."""
         member = self._membership
         if not self._takes_slot and (join.instead_of == self._node or join.instead_of != member.head):
@@ -108,7 +108,7 @@ class Upkeep:
             return []  # it is of another cluster or epoch, or it is a head that objects
         if self.state is State.HEAD:
             return [self._take(Event.HEAD_REPLACED, now_ns)]
-        sign_ns = self._signs.last_ns(member.head) or 0
+        sign_ns = self._liveness.last_ns(member.head) or 0
         if join.node == member.head or (current < rank and (member.head == self._node or sign_ns > born_ns)):
             return []
         if self._takes_slot:
@@ -123,19 +123,19 @@ class Upkeep:
         self._object_ns = now_ns + _OBJECT_NS
         return [self._take(Event.SAID_SILENT, now_ns)]
 
-    def lives(self, node: int, *, born_ns: int, now_ns: int) -> list[Action]:
+    def on_sign_of_life(self, node: int, *, born_ns: int, now_ns: int) -> list[Action]:
         """Handle a sign of life of a node."""
-        self._signs.heard(node, born_ns=born_ns)
+        self._liveness.on_sign_of_life(node, born_ns=born_ns)
         member = self._membership
         if node != member.named_head or born_ns <= self._since_ns:
             return []
         replaced = self.state is State.ACTING or (self.state is State.MEMBER and member.head != node)
         return [self._take(Event.HEAD_BACK, now_ns)] if replaced else []
 
-    def given_up(self, node: NodeId, *, now_ns: int) -> None:
+    def on_unreachable(self, node: NodeId, *, now_ns: int) -> None:
         """Note that the MAC could not reach this neighbor."""
         if node == self._membership.head and self.state is State.MEMBER:
-            self._given_up_ns = now_ns
+            self._unreachable_ns = now_ns
             self._watch_ns = now_ns
 
     # --- time -----------------------------------------------------------------------------------------------------
@@ -170,8 +170,8 @@ class Upkeep:
         if news_ns is None or news_ns < self._since_ns:
             self._watch_ns = now_ns + self._hello_ns
             return []  # this node has not been near the head since it follows it
-        sign_ns = max(news_ns, self._signs.last_ns(member.head) or 0)
-        hellos = _GIVEN_UP_HELLOS if self._given_up_ns > sign_ns else SILENT_HELLOS
+        sign_ns = max(news_ns, self._liveness.last_ns(member.head) or 0)
+        hellos = _GIVEN_UP_HELLOS if self._unreachable_ns > sign_ns else SILENT_HELLOS
         due_ns = sign_ns + int((hellos + (rank - current - 1) * _TURN_HELLOS) * self._hello_ns)
         if now_ns < due_ns:
             self._watch_ns = due_ns

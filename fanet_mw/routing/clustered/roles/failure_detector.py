@@ -12,7 +12,7 @@ from collections.abc import Callable
 from typing import Final
 
 from fanet_mw.routing.clustered.roles.failover import SILENT_HELLOS
-from fanet_mw.routing.clustered.roles.signs_of_life import Signs
+from fanet_mw.routing.clustered.roles.liveness import Liveness
 from fanet_mw.units import NodeId, S
 
 _AGAIN_NS: Final = 10 * S
@@ -20,36 +20,36 @@ _AGAIN_NS: Final = 10 * S
 _FORGOTTEN_NS: Final = 60 * S
 
 
-class Silence:
+class FailureDetector:
     """One node's watch over its neighbors."""
 
-    def __init__(self, signs: Signs, *, hello_ns: int) -> None:
-        self._signs = signs
+    def __init__(self, liveness: Liveness, *, hello_ns: int) -> None:
+        self._liveness = liveness
         self._silent_ns = int(SILENT_HELLOS * hello_ns)
         self._heard_ns: dict[NodeId, int] = {}
-        self._said_ns: dict[NodeId, int] = {}
+        self._reported_ns: dict[NodeId, int] = {}
 
-    def heard(self, node: NodeId, *, now_ns: int) -> None:
+    def on_hello(self, node: NodeId, *, now_ns: int) -> None:
         """A neighbor's hello."""
         self._heard_ns[node] = now_ns
-        self._said_ns.pop(node, None)
+        self._reported_ns.pop(node, None)
 
-    def said(self, node: NodeId, *, now_ns: int) -> None:
+    def on_report(self, node: NodeId, *, now_ns: int) -> None:
         """Somebody, perhaps we, told the leader that this node is silent."""
         if node in self._heard_ns:
-            self._said_ns[node] = now_ns
+            self._reported_ns[node] = now_ns
 
-    def next_silent(self, lists: Callable[[NodeId], bool], *, now_ns: int) -> NodeId | None:
+    def next_suspect(self, lists: Callable[[NodeId], bool], *, now_ns: int) -> NodeId | None:
         """A neighbor of which the leader should be told now; `lists`: whether the schedule names a node."""
         for node in sorted(self._heard_ns):
             quiet_ns = now_ns - self._heard_ns[node]
             if quiet_ns < self._silent_ns:
                 continue
-            sign_ns, said_ns = self._signs.last_ns(node) or 0, self._said_ns.get(node)
-            objected = said_ns is not None and sign_ns > said_ns
+            sign_ns, reported_ns = self._liveness.last_ns(node) or 0, self._reported_ns.get(node)
+            objected = reported_ns is not None and sign_ns > reported_ns
             if objected or quiet_ns > _FORGOTTEN_NS or not lists(node):
                 del self._heard_ns[node]
-                self._said_ns.pop(node, None)
-            elif now_ns - sign_ns >= self._silent_ns and (said_ns is None or now_ns - said_ns >= _AGAIN_NS):
+                self._reported_ns.pop(node, None)
+            elif now_ns - sign_ns >= self._silent_ns and (reported_ns is None or now_ns - reported_ns >= _AGAIN_NS):
                 return node
         return None

@@ -9,7 +9,7 @@ from collections.abc import Callable
 from typing import Final
 
 from fanet_mw.node.contract import Port
-from fanet_mw.routing.clustered.roles.position_updates import Motion, Whereabouts
+from fanet_mw.routing.clustered.roles.position_updates import Motion, PositionUpdates
 from fanet_mw.routing.clustered.timetable.link_quality import LinkQuality
 from fanet_mw.units import MS, S
 from fanet_mw.wire.inner import Join
@@ -27,7 +27,7 @@ class Joining:
     """The joins of one node."""
 
     def __init__(
-        self, port: Port, updates: Whereabouts, links: LinkQuality | None, random: Callable[[], float]
+        self, port: Port, updates: PositionUpdates, links: LinkQuality | None, random: Callable[[], float]
     ) -> None:
         self._port = port
         self._updates = updates
@@ -51,17 +51,17 @@ class Joining:
 
     def on_flooding(self, due_ns: int) -> None:
         """A packet of the node goes to everyone: a sign of life."""
-        self._updates.flooded(due_ns)
+        self._updates.on_flooding(due_ns)
 
-    def may_tell(self, now_ns: int) -> bool:
+    def may_update(self, now_ns: int) -> bool:
         """Whether the last join is long enough ago for another."""
-        return self._updates.may_tell(now_ns)
+        return self._updates.may_update(now_ns)
 
     def update_if_outdated(self, *, listed: int, now_ns: int) -> None:
         """Join soon if the leader must be told something new; `listed` nodes may all have to at the same time."""
         if self.due_ns is None and (
             self._updates.outdated(self._port.position, now_ns=now_ns)
-            or (self._links is not None and self._updates.may_tell(now_ns) and self._links.outdated(now_ns=now_ns))
+            or (self._links is not None and self._updates.may_update(now_ns) and self._links.outdated(now_ns=now_ns))
         ):
             self.due_ns = now_ns + int(self._random() * _UPDATE_NS * (1 + listed))
 
@@ -69,7 +69,7 @@ class Joining:
         """The inner frames of a join that goes now; `again`: another follows if no schedule names the node."""
         self.due_ns = now_ns + _REJOIN_NS + int(self._random() * _WINDOW_NS) if again else None
         motion = self.motion(now_ns)
-        self._updates.told(motion)
+        self._updates.on_update(motion)
         node = self._port.node
         inner = Join(node, motion.position, motion.velocity, instead_of).encode_frame(node)
         links = self._links.tell(now_ns=now_ns) if self._links is not None else ()

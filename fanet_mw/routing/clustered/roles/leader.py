@@ -15,8 +15,8 @@ from fanet_mw.graph.topology import Adjacency, within_range
 from fanet_mw.routing.clustered.clustering import Cluster, Swarm, succession
 from fanet_mw.routing.clustered.clustering.division import Division, drift
 from fanet_mw.routing.clustered.roles.lease import Authority
+from fanet_mw.routing.clustered.roles.liveness import Liveness
 from fanet_mw.routing.clustered.roles.position_updates import LOST_NS, Motion
-from fanet_mw.routing.clustered.roles.signs_of_life import Signs
 from fanet_mw.routing.clustered.timetable.link_state import LinkState, adjacency, worth_a_change
 from fanet_mw.routing.clustered.timetable.turn_plan import measured_period_ns
 from fanet_mw.scenario import Scenario
@@ -54,7 +54,7 @@ class _StandIn(NamedTuple):
     node: NodeId
     since_ns: int
     """When the leader learned of it."""
-    said_ns: int
+    reported_ns: int
     """When it was reported; a node that has generated something later is alive."""
 
 
@@ -82,7 +82,7 @@ class Leader:
         authority: Authority,
         *,
         scenario: Scenario,
-        signs: Signs,
+        liveness: Liveness,
         needs_every_link: bool,
         epoch: int,
         elected: bool,
@@ -91,7 +91,7 @@ class Leader:
         """With `needs_every_link` a timetable is made from the assignment, which then depends on more than clusters."""
         clusters = scenario.clusters
         self._authority = authority
-        self._signs = signs
+        self._liveness = liveness
         self._period_ns = clusters.period_ns
         self._reassign_ns = seconds_to_ns(clusters.reassign_s)
         self._range_m = clusters.link_m or scenario.radio.range_m
@@ -113,7 +113,7 @@ class Leader:
         self._announced_ns = now_ns
         self._not_before_ns = now_ns + ANSWER_NS if elected else now_ns
 
-    def joined(self, join: Join, *, born_ns: int, now_ns: int) -> None:
+    def on_join(self, join: Join, *, born_ns: int, now_ns: int) -> None:
         """Take in a node's place, or that it stands in. The leader is a member of no cluster (paper, 4.1)."""
         node, silent = NodeId(join.node), NodeId(join.instead_of)
         if node == self._authority.leader:
@@ -125,20 +125,20 @@ class Leader:
         if known is None:
             self._due_ns = max(now_ns + SETTLE_NS, self._not_before_ns)
         if silent != node:
-            self.suspect(silent, node, self._motions[node], now_ns=now_ns)
+            self.on_suspicion(silent, node, self._motions[node], now_ns=now_ns)
 
-    def measured(self, node: NodeId, links: Sequence[Link]) -> None:
+    def on_links(self, node: NodeId, links: Sequence[Link]) -> None:
         """Take in how well a node, perhaps the leader itself, hears its neighbors."""
         if self._links is not None:
-            self._links.told(node, links)
+            self._links.on_report(node, links)
 
-    def outbid(self, epoch: int, *, now_ns: int) -> None:
+    def on_outbid(self, epoch: int, *, now_ns: int) -> None:
         """Handle a schedule in this leader's name that it has not made: announce a later epoch soon."""
         if 0 < ((epoch - self._epoch) & 0xFFFF) < 0x8000 and self._assigned.parts:
             self._epoch, self._outbid = epoch, True
             self._due_ns = min(self._due_ns, now_ns + SETTLE_NS)
 
-    def suspect(self, silent: NodeId, by: NodeId, there: Motion, *, now_ns: int) -> None:
+    def on_suspicion(self, silent: NodeId, by: NodeId, there: Motion, *, now_ns: int) -> None:
         """Note that a node is reported silent by a node whose place is given; it has some time to object."""
         if silent in self._motions and (not self._by_links or self._near(silent, there)):
             known = self._stand_ins.get(silent, _StandIn(by, now_ns, there.at_ns))
@@ -180,9 +180,9 @@ class Leader:
     def _forget(self, now_ns: int) -> None:
         """Forget nodes without a sign of life for long, and reported nodes that have not objected in time."""
         for node in sorted(self._motions):
-            last_ns = max(self._signs.last_ns(node) or 0, self._motions[node].at_ns)
+            last_ns = max(self._liveness.last_ns(node) or 0, self._motions[node].at_ns)
             stand_in = self._stand_ins.get(node)
-            if stand_in is not None and last_ns > stand_in.said_ns:
+            if stand_in is not None and last_ns > stand_in.reported_ns:
                 del self._stand_ins[node]  # the node has objected
                 stand_in = None
             if now_ns - last_ns > LOST_NS or (

@@ -9,7 +9,7 @@ off for a while and elected itself never deposes the leader of all others; and a
 
 from typing import Final, NamedTuple
 
-from fanet_mw.routing.clustered.roles.signs_of_life import Signs
+from fanet_mw.routing.clustered.roles.liveness import Liveness
 from fanet_mw.units import NodeId, S
 
 _PERIODS: Final = 4
@@ -37,10 +37,10 @@ class Authority(NamedTuple):
 class Lease:
     """One node's allegiance to a leader."""
 
-    def __init__(self, node: NodeId, *, period_ns: int, signs: Signs) -> None:
+    def __init__(self, node: NodeId, *, period_ns: int, liveness: Liveness) -> None:
         self._node = node
         self._silence_ns = silence_ns(period_ns)
-        self._signs = signs
+        self._liveness = liveness
         self.authority: Authority | None = None
         self._until_ns = 0
         self._stand_ns = 0
@@ -89,6 +89,6 @@ class Lease:
         """True if this node must take office: the leader is silent, and no node with a lower id has done so in time."""
         if now_ns < self._stand_ns:
             return False
-        lower = self._signs.alive_below(self._node, since_ns=now_ns - self._silence_ns)
+        lower = self._liveness.alive_below(self._node, since_ns=now_ns - self._silence_ns)
         self._stand_ns = self._until_ns + min(lower, _TURNS) * _TURN_NS
         return now_ns >= self._stand_ns

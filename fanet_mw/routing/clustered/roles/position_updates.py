@@ -32,7 +32,7 @@ class Motion(NamedTuple):
         return Enu(here.east + v.east * seconds, here.north + v.north * seconds, here.up + v.up * seconds)
 
 
-class Whereabouts:
+class PositionUpdates:
     """What the leader believes of one node, as that node knows it."""
 
     def __init__(self, *, range_m: float) -> None:
@@ -40,22 +40,22 @@ class Whereabouts:
         self._told: Motion | None = None
         self._flooded_ns = 0
 
-    def told(self, motion: Motion) -> None:
+    def on_update(self, motion: Motion) -> None:
         """A join carried this."""
         self._told = motion
         self._flooded_ns = motion.at_ns
 
-    def flooded(self, now_ns: int) -> None:
+    def on_flooding(self, now_ns: int) -> None:
         """A packet of ours goes to everyone: a sign of life."""
         self._flooded_ns = now_ns
 
-    def may_tell(self, now_ns: int) -> bool:
+    def may_update(self, now_ns: int) -> bool:
         """Whether the last join is long enough ago for another."""
         return self._told is None or now_ns - self._told.at_ns >= _LEAST_NS
 
     def outdated(self, position: Enu, *, now_ns: int) -> bool:
         """Whether it is time to tell."""
-        if self._told is None or not self.may_tell(now_ns):
+        if self._told is None or not self.may_update(now_ns):
             return False
         off_m = position.minus(self._told.position_at(now_ns)).norm()
         return off_m > self._off_m or now_ns - self._flooded_ns > _QUIET_NS

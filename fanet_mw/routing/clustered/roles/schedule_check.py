@@ -28,7 +28,7 @@ class ScheduleCheck:
         self._renewed_ns = 0
         """When the schedule that the node follows last changed."""
 
-    def renewed(self, now_ns: int) -> None:
+    def on_new_schedule(self, now_ns: int) -> None:
         """The node follows another schedule."""
         self._renewed_ns = now_ns
 

@@ -20,7 +20,7 @@ _ASSESS_NS: Final = 200 * MS
 _AGAIN_NS: Final = 900 * MS
 
 
-class Refresh:
+class ScheduleRefresh:
     """The newest announcement at one node, and when to send it again."""
 
     def __init__(self, random: Callable[[], float]) -> None:
@@ -38,7 +38,7 @@ class Refresh:
             self._kept_ns = now_ns  # not at each repetition, which with short periods would leave no time in between
         self._packets[part] = packet
 
-    def compare(self, beacon: Beacon, *, now_ns: int) -> None:
+    def on_beacon(self, beacon: Beacon, *, now_ns: int) -> None:
         """Compare the schedule that a neighbor follows, as its beacon states."""
         if self._version is None or self._due_ns is not None or now_ns - self._kept_ns < _FLOOD_OVER_NS:
             return
@@ -48,7 +48,7 @@ class Refresh:
         if behind or (theirs == authority and 0 < ((epoch - beacon.epoch) & 0xFFFF) < 0x8000):
             self._due_ns = now_ns + int(self._random() * _ASSESS_NS)
 
-    def overheard(self, key: int, *, now_ns: int) -> None:
+    def on_copy(self, key: int, *, now_ns: int) -> None:
         """Note that another node has sent the announcement again."""
         if self._due_ns is not None and any(key == _key(packet) for packet in self._packets.values()):
             self._due_ns, self._kept_ns = None, now_ns + _AGAIN_NS - _FLOOD_OVER_NS

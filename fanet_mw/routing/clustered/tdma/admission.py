@@ -12,7 +12,7 @@ and goes on at the rate that the turns carry: late is better than never. More ur
 
 from typing import Final
 
-from fanet_mw.routing.clustered.tdma.own_bound import Own
+from fanet_mw.routing.clustered.tdma.own_bound import OwnBound
 from fanet_mw.trace import DeadlineLost, DeadlineMet
 from fanet_mw.units import US, NodeId
 
@@ -55,7 +55,7 @@ class Admission:
         """No two packets that are let in are closer."""
         return max(self._interval_ns, self._least_ns)
 
-    def follow(self, own: Own | None, *, now_ns: int) -> DeadlineMet | DeadlineLost | None:
+    def follow(self, own: OwnBound | None, *, now_ns: int) -> DeadlineMet | DeadlineLost | None:
         """A timetable is in force; None: one without a bound for us. What it says of the deadline, if that is new."""
         least_ns = None if own is None else least_interval_ns(own, deadline_ns=self._deadline_ns - _TOLERANCE_NS)
         self._least_ns = least_ns or (0 if own is None else carried_interval_ns(own))
@@ -78,12 +78,12 @@ class Admission:
         return True
 
 
-def carried_interval_ns(own: Own) -> int:
+def carried_interval_ns(own: OwnBound) -> int:
     """The shortest interval at which no more packets come than are let out."""
     return -(-own.turns.period_ns // (own.together * len(own.roots)))
 
 
-def least_interval_ns(own: Own, *, deadline_ns: int) -> int | None:
+def least_interval_ns(own: OwnBound, *, deadline_ns: int) -> int | None:
     """The shortest interval at which no packet takes longer than this to everyone; None: there is none.
 
     Of a busy period, what the q-th turn lets out has come (q - 1) `together` intervals later (`Turns.worst_ns`).

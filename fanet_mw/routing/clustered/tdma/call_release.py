@@ -2,16 +2,16 @@
 
 from collections.abc import Sequence
 
-from fanet_mw.routing.clustered.tdma.root_release import Following
+from fanet_mw.routing.clustered.tdma.root_release import TurnsInForce
 from fanet_mw.routing.clustered.tdma.turn_release import OwnTurn, TurnRelease
 
 
 class CallRelease(TurnRelease):
     """The queue of answers, and the plan of one node's calls."""
 
-    _plans: Sequence[Following] = ()
+    _plans: Sequence[TurnsInForce] = ()
 
-    def follow(self, plans: Sequence[Following], *, now_ns: int) -> None:
+    def follow(self, plans: Sequence[TurnsInForce], *, now_ns: int) -> None:
         """New calls; in order of the instants from which they hold."""
         self._plans = plans
         self._arm(now_ns)
@@ -25,8 +25,8 @@ class CallRelease(TurnRelease):
         self._arm(now_ns)
         return turn.start_ns
 
-    def overheard(self, key: int, *, now_ns: int) -> None:
-        """Somebody else has sent this packet (`seen.key_of`)."""
+    def on_copy(self, key: int, *, now_ns: int) -> None:
+        """Somebody else has sent this packet (`duplicates.key_of`)."""
         self._queue.remove(key)
 
     def _turn(self, earliest_ns: int) -> OwnTurn | None:

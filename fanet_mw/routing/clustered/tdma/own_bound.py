@@ -17,7 +17,7 @@ BURST: Final = 3
 """Packets of a class without a least interval that may wait at once, the last one included, and still have a bound."""
 
 
-class Own(NamedTuple):
+class OwnBound(NamedTuple):
     """A node's part of a timetable: its turns, and for how long its floods last."""
 
     turns: Turns

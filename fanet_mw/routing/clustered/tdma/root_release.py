@@ -18,7 +18,7 @@ from fanet_mw.units import NodeId
 from fanet_mw.wire import PRIORITY_BULK, PRIORITY_CONTROL, Kind
 
 
-class Following(NamedTuple):
+class TurnsInForce(NamedTuple):
     """A timetable in force from an instant on, as far as a root needs it."""
 
     valid_ns: int
@@ -39,9 +39,9 @@ class RootRelease(TurnRelease):
         self._node = node
         self.reserved: Mapping[int, int] = dict(sorted(reserved.items()))
         """By priority, the bytes of each turn that bulk leaves free."""
-        self._plans: Sequence[Following] = ()
+        self._plans: Sequence[TurnsInForce] = ()
 
-    def follow(self, plans: Sequence[Following], *, now_ns: int) -> None:
+    def follow(self, plans: Sequence[TurnsInForce], *, now_ns: int) -> None:
         """New turns; in order of the instants from which they hold."""
         self._plans = plans
         self._arm(now_ns)

@@ -12,7 +12,7 @@ from fanet_mw.node.packet import Packet
 from fanet_mw.routing.clustered.forwarding.floods import Floods
 from fanet_mw.routing.clustered.forwarding.uplink import Uplink
 from fanet_mw.routing.clustered.roles.membership import Membership
-from fanet_mw.routing.clustered.tdma.slot_release import Release, Tenure
+from fanet_mw.routing.clustered.tdma.slot_release import SlotRelease, Tenure
 from fanet_mw.units import US
 from fanet_mw.wire import Kind
 
@@ -22,7 +22,9 @@ _NOTHING: Final[Mapping[str, object]] = {}
 class SlotAccess:
     """One node's queue for the slot of its cluster, while it is head; its way to a head while it is not."""
 
-    def __init__(self, port: Port, release: Release, *, membership: Membership, uplink: Uplink, floods: Floods) -> None:
+    def __init__(
+        self, port: Port, release: SlotRelease, *, membership: Membership, uplink: Uplink, floods: Floods
+    ) -> None:
         self._port = port
         self._release = release
         self._membership = membership

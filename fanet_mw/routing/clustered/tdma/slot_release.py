@@ -24,7 +24,7 @@ class Tenure(NamedTuple):
     slot: int
 
 
-class Release:
+class SlotRelease:
     """The head's transmission plan."""
 
     def __init__(self, queue: TxQueue, clusters: Clusters, *, lead_ns: int) -> None:

@@ -44,7 +44,7 @@ class TurnRelease(ABC):
         return evicted
 
     def holds(self, key: int) -> bool:
-        """Whether this packet (`seen.key_of`) is queued."""
+        """Whether this packet (`duplicates.key_of`) is queued."""
         return key in self._queue
 
     def expire(self, *, before_us: int) -> list[Packet]:

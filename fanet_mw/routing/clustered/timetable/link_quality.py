@@ -49,7 +49,7 @@ class LinkQuality:
         """The node is up."""
         self._start_ns = now_ns
 
-    def hello(self, neighbor: NodeId, *, rssi_dbm: float, now_ns: int) -> None:
+    def on_hello(self, neighbor: NodeId, *, rssi_dbm: float, now_ns: int) -> None:
         """A neighbor's hello came in."""
         self._heard.setdefault(neighbor, deque()).append((now_ns, rssi_dbm))
 

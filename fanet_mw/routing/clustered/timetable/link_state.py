@@ -28,7 +28,7 @@ class LinkState:
     def __init__(self) -> None:
         self._told: dict[NodeId, dict[NodeId, Link]] = {}
 
-    def told(self, node: NodeId, links: Iterable[Link]) -> None:
+    def on_report(self, node: NodeId, links: Iterable[Link]) -> None:
         """How well a node hears whom; what others claim to know of its links does not count."""
         self._told[node] = {link.a: link for link in links if link.b == node}
 

@@ -55,7 +55,7 @@ class Effort(NamedTuple):
     """Ways to fill each turn."""
 
 
-class Swarm:
+class FloodNetwork:
     """Who hears and who disturbs whom, as bit sets over row numbers."""
 
     def __init__(self, positions: Sequence[tuple[NodeId, Enu]], geometry: Geometry) -> None:
@@ -112,7 +112,7 @@ class Swarm:
 class Flood:
     """One packet on its way."""
 
-    def __init__(self, swarm: Swarm, root: int, way: list[int]) -> None:
+    def __init__(self, swarm: FloodNetwork, root: int, way: list[int]) -> None:
         self.root = root
         self.goal, self.hops = swarm.part(root)
         self.sent: list[tuple[int, int]] = []
@@ -182,7 +182,7 @@ _Choice = tuple[int, list[_Offer], _Turn]
 class Packing:
     """Fills the turns of one superframe."""
 
-    def __init__(self, swarm: Swarm, geometry: Geometry, effort: Effort) -> None:
+    def __init__(self, swarm: FloodNetwork, geometry: Geometry, effort: Effort) -> None:
         self._disturbs = swarm.disturbs
         self._turns = geometry.turns
         self._hop_turns = geometry.hop_turns

@@ -13,11 +13,11 @@ from fanet_mw.node.packet import Packet
 from fanet_mw.routing.clustered.roles.leader import HEARD_NS
 from fanet_mw.routing.clustered.roles.lease import Lease
 from fanet_mw.routing.clustered.tdma.admission import Admission, least_interval_ns
-from fanet_mw.routing.clustered.tdma.own_bound import Own
+from fanet_mw.routing.clustered.tdma.own_bound import OwnBound
 from fanet_mw.routing.clustered.tdma.root_release import RootRelease
 from fanet_mw.routing.clustered.tdma.turns import clocks_fit, receipt_ns
-from fanet_mw.routing.clustered.timetable.plans import Plans
-from fanet_mw.routing.clustered.timetable.turn_plan import LIKELY_SHARE, Plan
+from fanet_mw.routing.clustered.timetable.turn_plan import LIKELY_SHARE, TurnPlan
+from fanet_mw.routing.clustered.timetable.turn_plans import TurnPlans
 from fanet_mw.trace import BoundStated, LikelyStated
 from fanet_mw.units import MS, US, NodeId, seconds_to_ns
 from fanet_mw.wire import PRIORITY_BULK, PRIORITY_REPORT, PRIORITY_SAFETY
@@ -29,7 +29,7 @@ class Promises:
     """The bounds and likely delays of one node's packets under its timetables."""
 
     def __init__(
-        self, port: Port, *, plans: Plans, roots: RootRelease, lease: Lease, admission: Admission | None
+        self, port: Port, *, plans: TurnPlans, roots: RootRelease, lease: Lease, admission: Admission | None
     ) -> None:
         self._port = port
         self._plans = plans
@@ -40,7 +40,7 @@ class Promises:
         self._interval_ns = seconds_to_ns(port.scenario.traffic.interval_s)
         self._bounds_ns: list[Mapping[int, int]] = []
         """Of each timetable, the bound of each class (by priority) of the node's packets; a missing class has none."""
-        self._ahead: tuple[Plan, int] | None = None
+        self._ahead: tuple[TurnPlan, int] | None = None
         """The timetable looked at last, and how long before its end that must be announced."""
         self.announced_ns = 0
         """When the leader made the latest announcement that is known of the timetable that is followed."""
@@ -62,24 +62,24 @@ class Promises:
         self._admit(None if self._lease.leads else own, now_ns=now_ns)
         self._bounds_ns = [*self._bounds_ns[superseded:], self.class_bounds_ns(own)]
 
-    def _admit(self, own: Own | None, *, now_ns: int) -> None:
+    def _admit(self, own: OwnBound | None, *, now_ns: int) -> None:
         record = None if self._admission is None else self._admission.follow(own, now_ns=now_ns)
         if record is not None:
             self._port.record(record)
 
-    def own(self) -> Own | None:
+    def own(self) -> OwnBound | None:
         """The node's part of the newest timetable, if that gives its packets a bound: not if frames may be lost."""
         plan = None if self._port.scenario.measures_links else self._plans.newest
         if plan is None or not plan.roots or not plan.whole or plan.table.uncovered[self._port.node]:
             return None
         return self._own_of(self._port.node, plan)
 
-    def _own_of(self, node: NodeId, plan: Plan) -> Own:
+    def _own_of(self, node: NodeId, plan: TurnPlan) -> OwnBound:
         offsets = plan.roots if node == self._port.node else tuple(plan.table.offsets_of(node))
         around_ns = self._lead_ns + receipt_ns(self._port.scenario)
-        return Own(plan.turns, offsets, plan.table.spans[node], plan.together, around_ns)
+        return OwnBound(plan.turns, offsets, plan.table.spans[node], plan.together, around_ns)
 
-    def class_bounds_ns(self, own: Own | None) -> Mapping[int, int]:
+    def class_bounds_ns(self, own: OwnBound | None) -> Mapping[int, int]:
         """By priority; none for what is repaired after it was lost."""
         scenario = self._port.scenario
         if own is None or scenario.clusters.repair_s:
@@ -96,7 +96,7 @@ class Promises:
         in_force = self._plans.in_order[self._plans.superseded(now_ns) :]
         return max((self._ahead_ns(plan) for plan in in_force), default=0)
 
-    def _ahead_ns(self, plan: Plan) -> int:
+    def _ahead_ns(self, plan: TurnPlan) -> int:
         """How long before this timetable ends its end is announced.
 
         All have heard of it after a superframe and a flood; what any node has promised until then must be through.

@@ -22,7 +22,7 @@ from types import MappingProxyType
 from typing import NamedTuple
 
 from fanet_mw.routing.clustered.timetable.delivery_odds import Odds, odds
-from fanet_mw.routing.clustered.timetable.list_scheduling import Effort, Flood, Geometry, Packing, Swarm
+from fanet_mw.routing.clustered.timetable.list_scheduling import Effort, Flood, FloodNetwork, Geometry, Packing
 from fanet_mw.routing.clustered.timetable.redundant_scheduling import Network, RedundantPacking, Wave, enough_for
 from fanet_mw.units import Enu, NodeId
 from fanet_mw.wire.links import Link
@@ -83,7 +83,7 @@ def timetable(
     whole, geometry = geometry.turns, geometry._replace(turns=geometry.turns // blocks)
     if not geometry.turns:
         return None
-    swarm = Swarm(positions, geometry)
+    swarm = FloodNetwork(positions, geometry)
     head_of = dict(heads)
     ordered = _in_order(roots, dict(positions))
     floods = [Flood(swarm, swarm.row[root], swarm.way(root, head_of.get(root, root))) for root, _ in ordered]

@@ -10,16 +10,16 @@ from collections.abc import Mapping
 from typing import Final, Protocol
 
 from fanet_mw.errors import MalformedFrameError
-from fanet_mw.node.arrival import decoded
 from fanet_mw.node.contract import Port
 from fanet_mw.node.packet import Packet
+from fanet_mw.node.reader import decoded
 from fanet_mw.routing.clustered.roles.leader import Leader
 from fanet_mw.routing.clustered.roles.lease import Authority, Lease
 from fanet_mw.routing.clustered.roles.membership import Membership, Version
-from fanet_mw.routing.clustered.roles.schedule_refresh import Refresh
+from fanet_mw.routing.clustered.roles.schedule_refresh import ScheduleRefresh
 from fanet_mw.routing.clustered.timetable.promises import Promises
 from fanet_mw.routing.clustered.timetable.turn_access import TurnAccess
-from fanet_mw.routing.clustered.timetable.turn_plan import Fitted, Plan, fit, fit_measured
+from fanet_mw.routing.clustered.timetable.turn_plan import Fitted, TurnPlan, fit, fit_measured
 from fanet_mw.units import US, Enu, NodeId
 from fanet_mw.wire.inner import Schedule
 from fanet_mw.wire.links import Link, Links, frames_of
@@ -89,7 +89,7 @@ class FromPlaces:
         *,
         lease: Lease,
         membership: Membership,
-        refresh: Refresh,
+        refresh: ScheduleRefresh,
         promises: Promises,
         access: TurnAccess,
     ) -> None:
@@ -203,7 +203,7 @@ class FromPlaces:
         head_of = {node: heads[cluster] for node, cluster in sorted(cluster_of.items())}
         found = self._fit(schedule, at, head_of, measured)
         # None: not one packet of each head fits; `fanet plan` says so
-        plan = None if found is None else Plan.of(self._port.node, schedule.start_us * US, found)
+        plan = None if found is None else TurnPlan.of(self._port.node, schedule.start_us * US, found)
         self._access.follow(plan, now_ns=now_ns)
 
     def _fit(

@@ -1,4 +1,4 @@
-"""Access by a timetable: a node lets its packets out in its own turns, and relays find theirs (`relaying/by_turn.py`).
+"""Access by a timetable: a node lets its packets out in its own turns; relays find theirs (`relaying/scheduled.py`).
 
 Until a timetable gives the node turns it brings packets to a head, as with slots. What has no turn contends in the
 window at the beginning of each superframe: hellos, joins, unicasts to a head, and what neighbors lack; over lossy
@@ -15,11 +15,11 @@ from fanet_mw.node.packet import Packet
 from fanet_mw.routing.clustered.forwarding.floods import Floods
 from fanet_mw.routing.clustered.tdma.call_release import CallRelease
 from fanet_mw.routing.clustered.tdma.contention import Contention
-from fanet_mw.routing.clustered.tdma.root_release import Following, RootRelease
+from fanet_mw.routing.clustered.tdma.root_release import RootRelease, TurnsInForce
 from fanet_mw.routing.clustered.tdma.slot_access import SlotAccess
-from fanet_mw.routing.clustered.timetable.plans import Plans
 from fanet_mw.routing.clustered.timetable.promises import Promises
-from fanet_mw.routing.clustered.timetable.turn_plan import Plan
+from fanet_mw.routing.clustered.timetable.turn_plan import TurnPlan
+from fanet_mw.routing.clustered.timetable.turn_plans import TurnPlans
 from fanet_mw.units import US, earliest, seconds_to_ns
 from fanet_mw.wire import Kind
 
@@ -34,7 +34,7 @@ class TurnAccess:
         self,
         port: Port,
         *,
-        plans: Plans,
+        plans: TurnPlans,
         roots: RootRelease,
         calls: CallRelease,
         slots: SlotAccess,
@@ -58,7 +58,7 @@ class TurnAccess:
 
     # --- timetables and roles -------------------------------------------------------------------------------------
 
-    def follow(self, plan: Plan | None, *, now_ns: int) -> None:
+    def follow(self, plan: TurnPlan | None, *, now_ns: int) -> None:
         """Take up a timetable that comes into force later; None: there is none that fits."""
         superseded = self._plans.superseded(now_ns)
         self._plans.follow(plan, now_ns=now_ns)
@@ -75,11 +75,11 @@ class TurnAccess:
         plans, node = self._plans.in_order, self._port.node
         roots = [(plan, plan.table.spans.get(node, 1)) for plan in plans]
         self._roots.follow(
-            [Following(plan.valid_ns, plan.turns, plan.roots, plan.frame_bytes, span) for plan, span in roots],
+            [TurnsInForce(plan.valid_ns, plan.turns, plan.roots, plan.frame_bytes, span) for plan, span in roots],
             now_ns=now_ns,
         )
         self._calls.follow(
-            [Following(plan.valid_ns, plan.turns, plan.calls, plan.frame_bytes, 1) for plan in plans], now_ns=now_ns
+            [TurnsInForce(plan.valid_ns, plan.turns, plan.calls, plan.frame_bytes, 1) for plan in plans], now_ns=now_ns
         )
 
     def serve(self, now_ns: int) -> None:

@@ -80,7 +80,7 @@ class Fitted(NamedTuple):
     """Of a timetable for lossy links: how likely packets arrive; None: the table reckons with no loss."""
 
 
-class Plan(NamedTuple):
+class TurnPlan(NamedTuple):
     """A timetable in force from an instant on, as one node sees it."""
 
     valid_ns: int

@@ -17,7 +17,7 @@ from fanet_mw.routing.clustered.clustered import Clustered
 from fanet_mw.routing.clustered.tdma.turns import Turns
 from fanet_mw.routing.clustered.timetable.timetable import Timetable, Turn
 from fanet_mw.routing.clustered.timetable.turn_access import TurnAccess
-from fanet_mw.routing.clustered.timetable.turn_plan import Fitted, Plan
+from fanet_mw.routing.clustered.timetable.turn_plan import Fitted, TurnPlan
 from fanet_mw.scenario import Scenario
 from fanet_mw.trace import BoundStated
 from fanet_mw.units import BROADCAST, MS, Enu, NodeId
@@ -37,9 +37,9 @@ FLOODS = (
 MakeScenario = Callable[..., Scenario]
 
 
-def planned(turns: tuple[Turn, ...], *, valid_ns: int = 0, unreached: tuple[NodeId, ...] = ()) -> Plan:
+def planned(turns: tuple[Turn, ...], *, valid_ns: int = 0, unreached: tuple[NodeId, ...] = ()) -> TurnPlan:
     table = Timetable(turns, {ROOT: 5, US: 3}, {ROOT: (), US: unreached}, len(turns))
-    return Plan.of(US, valid_ns, Fitted(TURNS, table, together=1, frame_bytes=1024, whole=True, enough=True))
+    return TurnPlan.of(US, valid_ns, Fitted(TURNS, table, together=1, frame_bytes=1024, whole=True, enough=True))
 
 
 @pytest.fixture

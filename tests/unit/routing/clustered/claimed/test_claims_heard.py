@@ -6,10 +6,10 @@ from fanet_mw import wire
 from fanet_mw.bus.messages import Reception
 from fanet_mw.node.node import Node
 from fanet_mw.routing import make_protocol
-from fanet_mw.routing.clustered.claimed.access import ClaimedAccess
+from fanet_mw.routing.clustered.claimed.claimed_access import ClaimedAccess
 from fanet_mw.routing.clustered.claimed.claiming import Claiming
 from fanet_mw.routing.clustered.claimed.own_turns import Share, draws
-from fanet_mw.routing.clustered.claimed.slot_claims import Claim, Hello, SlotClaims
+from fanet_mw.routing.clustered.claimed.slot_claims import SlotClaim, SlotClaims, SlotHello
 from fanet_mw.routing.clustered.clustered import Clustered
 from fanet_mw.units import BROADCAST, MS, Enu, NodeId, S
 from fanet_mw.wire import Header, Kind
@@ -72,7 +72,7 @@ def test_a_shorter_superframe_waits_until_it_has_been_possible_for_a_while() -> 
     """Five neighbors leave: six nodes need eight slots, one needs one, but their hellos may only have been lost."""
     claims = SlotClaims(NodeId(1), now_ns=0, listen_ns=0, lifetime_ns=3 * S, sized_to=16)
     for other in range(2, 7):
-        claims.hear(Hello(Claim(NodeId(other), other, 0, 8, 6), ()), now_ns=0)
+        claims.on_hello(SlotHello(SlotClaim(NodeId(other), other, 0, 8, 6), ()), now_ns=0)
     lengths = [claims.step(second * S).own.length for second in range(14)]
     assert lengths[:4] == [8] * 4
     assert lengths.count(8) == 4 + 7, "the eighth superframe in a row decides"

@@ -7,8 +7,8 @@ from fanet_mw.graph.topology import within_range
 from fanet_mw.routing.clustered.clustering import Cluster, Swarm, heads_of
 from fanet_mw.routing.clustered.clustering.division import Division, carried_on, cost, drift
 from fanet_mw.routing.clustered.roles.lease import Authority, Lease
-from fanet_mw.routing.clustered.roles.position_updates import Motion, Whereabouts
-from fanet_mw.routing.clustered.roles.signs_of_life import Signs
+from fanet_mw.routing.clustered.roles.liveness import Liveness
+from fanet_mw.routing.clustered.roles.position_updates import Motion, PositionUpdates
 from fanet_mw.units import Enu, NodeId, S
 
 RANGE_M = 250.0
@@ -95,9 +95,9 @@ def test_a_swarm_that_moves_as_one_does_not_drift() -> None:
 
 
 def test_who_flies_on_straight_tells_nothing_and_who_turns_does_once_it_is_off() -> None:
-    told = Whereabouts(range_m=250)
-    told.told(Motion(Enu(0, 0, 0), Enu(10, 0, 0), 0))
-    told.flooded(10 * S)
+    told = PositionUpdates(range_m=250)
+    told.on_update(Motion(Enu(0, 0, 0), Enu(10, 0, 0), 0))
+    told.on_flooding(10 * S)
     assert not told.outdated(Enu(100, 0, 0), now_ns=10 * S)
     assert not told.outdated(Enu(100, 25, 0), now_ns=10 * S)
     assert told.outdated(Enu(100, 26, 0), now_ns=10 * S)
@@ -105,8 +105,8 @@ def test_who_flies_on_straight_tells_nothing_and_who_turns_does_once_it_is_off()
 
 
 def test_who_is_quiet_shows_that_it_lives() -> None:
-    told = Whereabouts(range_m=250)
-    told.told(Motion(Enu(0, 0, 0), Enu(0, 0, 0), 0))
+    told = PositionUpdates(range_m=250)
+    told.on_update(Motion(Enu(0, 0, 0), Enu(0, 0, 0), 0))
     assert not told.outdated(Enu(0, 0, 0), now_ns=20 * S)
     assert told.outdated(Enu(0, 0, 0), now_ns=20 * S + 1)
 
@@ -118,14 +118,14 @@ authorities = st.builds(Authority, st.integers(0, 5), st.integers(1, 5))
 
 @given(st.lists(st.tuples(authorities, st.integers(0, 3)), min_size=1))
 def test_while_all_are_heard_the_senior_of_them_is_obeyed(heard: list[tuple[Authority, int]]) -> None:
-    lease = Lease(NodeId(9), period_ns=S, signs=Signs())
+    lease = Lease(NodeId(9), period_ns=S, liveness=Liveness())
     for authority, delay_s in heard:
         lease.accept(authority, born_ns=10 * S - delay_s * S, now_ns=10 * S)
     assert lease.authority == min(authority for authority, _ in heard)
 
 
 def test_old_news_of_a_leader_keep_nobody_obedient() -> None:
-    lease = Lease(NodeId(9), period_ns=S, signs=Signs())
+    lease = Lease(NodeId(9), period_ns=S, liveness=Liveness())
     assert lease.accept(Authority(0, 1), born_ns=10 * S, now_ns=10 * S)
     assert not lease.accept(Authority(3, 2), born_ns=14 * S, now_ns=14 * S)
     assert not lease.accept(Authority(0, 1), born_ns=9 * S, now_ns=15 * S)

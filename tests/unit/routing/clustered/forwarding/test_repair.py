@@ -37,7 +37,7 @@ def sent(made: Repair, now_ns: int) -> list[int]:
 
 def test_what_a_neighbor_lacks_is_sent_after_the_assessment() -> None:
     made = holder(1, 2, 3)
-    made.compare(Digest((Holding(7, 3, 0b10),), complete=True), now_ns=LATER)
+    made.on_digest(Digest((Holding(7, 3, 0b10),), complete=True), now_ns=LATER)
     assert made.next_wake_ns() == LATER + 100 * MS
     assert sent(made, LATER + 99 * MS) == []
     assert sent(made, LATER + 100 * MS) == [2]
@@ -47,36 +47,36 @@ def test_what_a_neighbor_lacks_is_sent_after_the_assessment() -> None:
 
 def test_a_flood_that_may_still_be_under_way_is_not_repaired() -> None:
     made = holder(1)
-    made.compare(NOTHING, now_ns=400 * MS)
+    made.on_digest(NOTHING, now_ns=400 * MS)
     assert made.next_wake_ns() is None
-    made.compare(NOTHING, now_ns=500 * MS)
+    made.on_digest(NOTHING, now_ns=500 * MS)
     assert made.next_wake_ns() is not None
 
 
 def test_a_packet_that_is_to_be_flooded_yet_waits_for_that() -> None:
     made = repair()
     made.hold(packet(1), flooded=False, expect_ns=6 * S, now_ns=0)
-    made.compare(NOTHING, now_ns=5 * S)
+    made.on_digest(NOTHING, now_ns=5 * S)
     assert made.next_wake_ns() is None
     made.hold(packet(1), flooded=True, expect_ns=0, now_ns=5 * S)
-    made.compare(NOTHING, now_ns=5 * S + 600 * MS)
+    made.on_digest(NOTHING, now_ns=5 * S + 600 * MS)
     assert made.next_wake_ns() is not None
 
 
 def test_a_copy_overheard_in_time_makes_it_unnecessary() -> None:
     made = holder(1)
-    made.compare(NOTHING, now_ns=LATER)
-    made.overheard(key_of(origin=7, seq=1), now_ns=LATER + 50 * MS)
+    made.on_digest(NOTHING, now_ns=LATER)
+    made.on_copy(key_of(origin=7, seq=1), now_ns=LATER + 50 * MS)
     assert sent(made, LATER + 1 * S) == []
 
 
 def test_the_same_packet_is_not_sent_again_before_the_neighbor_could_say_that_it_came() -> None:
     made = holder(1)
-    made.compare(NOTHING, now_ns=LATER)
+    made.on_digest(NOTHING, now_ns=LATER)
     assert sent(made, LATER + 100 * MS) == [1]
-    made.compare(NOTHING, now_ns=LATER + 500 * MS)
+    made.on_digest(NOTHING, now_ns=LATER + 500 * MS)
     assert made.next_wake_ns() is None
-    made.compare(NOTHING, now_ns=LATER + 1100 * MS)
+    made.on_digest(NOTHING, now_ns=LATER + 1100 * MS)
     assert made.next_wake_ns() is not None
 
 
@@ -84,19 +84,19 @@ def test_one_hello_sets_off_a_bounded_number_of_repairs() -> None:
     made = repair()
     for origin in range(1, 60):
         made.hold(packet(1, origin=origin), flooded=True, expect_ns=0, now_ns=0)
-    made.compare(NOTHING, now_ns=LATER)
+    made.on_digest(NOTHING, now_ns=LATER)
     assert len(sent(made, LATER + 1 * S)) == 32
 
 
 def test_an_incomplete_digest_says_nothing_of_origins_it_does_not_name() -> None:
     made = holder(1)
-    made.compare(Digest((), complete=False), now_ns=LATER)
+    made.on_digest(Digest((), complete=False), now_ns=LATER)
     assert made.next_wake_ns() is None
 
 
 def test_old_packets_and_the_oldest_beyond_the_capacity_are_forgotten() -> None:
     made = holder(1, 2, 3, capacity=2)
-    made.compare(NOTHING, now_ns=LATER)
+    made.on_digest(NOTHING, now_ns=LATER)
     assert sorted(sent(made, LATER + 1 * S)) == [2, 3]
     assert made.digest(now_ns=21 * S).holdings == ()
 

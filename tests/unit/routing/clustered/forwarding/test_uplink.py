@@ -66,7 +66,7 @@ def beside_a_head(make_scenario: MakeScenario) -> Node:
 
 def ends(node: Node, outcome: TxOutcome) -> None:
     """The transmission that was asked for last has ended so."""
-    node.status(TxStatus(node.requests[-1].seq, outcome, 9 * MS, 7), now_ns=9 * MS)
+    node.on_status(TxStatus(node.requests[-1].seq, outcome, 9 * MS, 7), now_ns=9 * MS)
 
 
 def test_a_packet_that_a_parent_does_not_take_is_tried_three_times_and_dropped(beside_a_head: Node) -> None:

@@ -6,8 +6,8 @@ import pytest
 
 from fanet_mw.routing.clustered.roles.leader import OBJECTION_NS, SETTLE_NS, Leader
 from fanet_mw.routing.clustered.roles.lease import Authority
+from fanet_mw.routing.clustered.roles.liveness import Liveness
 from fanet_mw.routing.clustered.roles.position_updates import LOST_NS, Motion
-from fanet_mw.routing.clustered.roles.signs_of_life import Signs
 from fanet_mw.scenario import Scenario
 from fanet_mw.units import MS, Enu, NodeId, S
 from fanet_mw.wire.inner import Join, Schedule
@@ -21,16 +21,16 @@ class Desk:
     """A leader and its signs of life."""
 
     def __init__(self, scenario: Scenario, *, epoch: int = 0) -> None:
-        self.signs = Signs()
+        self.liveness = Liveness()
         self.leader = Leader(
-            Authority(0, 1), scenario=scenario, signs=self.signs, epoch=epoch, elected=False, now_ns=0,
+            Authority(0, 1), scenario=scenario, liveness=self.liveness, epoch=epoch, elected=False, now_ns=0,
             needs_every_link=scenario.clusters.relay == "scheduled",
         )  # fmt: skip
 
     def join(self, node: int, east_m: float, *, born_ns: int, instead_of: int = 0) -> None:
         join = Join(node, Enu(east_m, 0.0, 50.0), STILL, instead_of)
-        self.signs.heard(node, born_ns=born_ns)
-        self.leader.joined(join, born_ns=born_ns, now_ns=born_ns)
+        self.liveness.on_sign_of_life(node, born_ns=born_ns)
+        self.leader.on_join(join, born_ns=born_ns, now_ns=born_ns)
 
     def announce(self) -> tuple[int, Sequence[Schedule]]:
         """The next announcement, and when."""
@@ -83,7 +83,7 @@ def test_a_node_without_a_sign_for_long_is_forgotten(scenario: Scenario) -> None
     desk = Desk(scenario)
     desk.join(2, 100, born_ns=1 * S)
     desk.join(3, 200, born_ns=1 * S)
-    desk.signs.heard(3, born_ns=40 * S)
+    desk.liveness.on_sign_of_life(3, born_ns=40 * S)
     assert desk.announced_at(1 * S + LOST_NS) == {2, 3}
     assert desk.announced_at(4 * S + LOST_NS) == {3}
 
@@ -98,7 +98,7 @@ def test_a_head_that_somebody_stands_in_for_is_gone_unless_it_shows_that_it_live
     assert desk.announced_at(5 * S) == {2, 3, 4}
     desk.join(4, 400, born_ns=6 * S, instead_of=3)
     if objects:
-        desk.signs.heard(3, born_ns=6 * S + 1)
+        desk.liveness.on_sign_of_life(3, born_ns=6 * S + 1)
     assert desk.announced_at(6 * S + OBJECTION_NS + 2 * S) == ({2, 3, 4} if objects else {2, 4})
 
 

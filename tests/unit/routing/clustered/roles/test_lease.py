@@ -3,20 +3,20 @@
 import pytest
 
 from fanet_mw.routing.clustered.roles.lease import Authority, Lease
-from fanet_mw.routing.clustered.roles.signs_of_life import Signs
+from fanet_mw.routing.clustered.roles.liveness import Liveness
 from fanet_mw.units import NodeId, S
 
 LEADER = Authority(5, 9)
 
 
 @pytest.fixture
-def signs() -> Signs:
-    return Signs()
+def liveness() -> Liveness:
+    return Liveness()
 
 
 @pytest.fixture
-def lease(signs: Signs) -> Lease:
-    made = Lease(NodeId(5), period_ns=S, signs=signs)
+def lease(liveness: Liveness) -> Lease:
+    made = Lease(NodeId(5), period_ns=S, liveness=liveness)
     made.start(0)
     return made
 
@@ -50,11 +50,11 @@ def test_an_older_announcement_that_comes_later_shortens_nothing(lease: Lease) -
 
 @pytest.mark.parametrize(("alive", "waits_s"), [((), 0), ((7, 8), 0), ((2,), 1), ((2, 3), 2), ((1, 2, 3, 4), 3)])
 def test_the_lowest_id_that_lives_stands_at_once_and_others_in_their_turn(
-    lease: Lease, signs: Signs, alive: tuple[int, ...], waits_s: int
+    lease: Lease, liveness: Liveness, alive: tuple[int, ...], waits_s: int
 ) -> None:
     lease.accept(LEADER, born_ns=10 * S, now_ns=10 * S)
     for node in alive:
-        signs.heard(node, born_ns=13 * S)
+        liveness.on_sign_of_life(node, born_ns=13 * S)
     assert not lease.must_stand(14 * S - 1)
     stands = [second for second in range(5) if lease.must_stand((14 + second) * S)]
     assert stands[0] == waits_s

@@ -2,10 +2,10 @@
 
 from fanet_mw.node.neighbors import Neighbors
 from fanet_mw.routing.clustered.forwarding.gradient import Gradient
-from fanet_mw.routing.clustered.roles.failover import Upkeep
+from fanet_mw.routing.clustered.roles.failover import Failover
 from fanet_mw.routing.clustered.roles.lease import Lease
+from fanet_mw.routing.clustered.roles.liveness import Liveness
 from fanet_mw.routing.clustered.roles.membership import Membership
-from fanet_mw.routing.clustered.roles.signs_of_life import Signs
 from fanet_mw.routing.clustered.roles.states import Action, Event
 from fanet_mw.units import Enu, NodeId, S
 from fanet_mw.wire.inner import Join, Member, Schedule
@@ -57,18 +57,18 @@ def test_the_head_comes_first_in_the_succession_wherever_it_is_listed() -> None:
 
 def test_a_replaced_head_that_shows_between_two_parts_of_a_new_schedule_is_followed_as_the_old_one_named_it() -> None:
     """Above 56 nodes a schedule has several parts, and anything may happen before the last of them has come."""
-    node, signs = NodeId(4), Signs()
-    member, lease = Membership(node), Lease(node, period_ns=S, signs=signs)
+    node, liveness = NodeId(4), Liveness()
+    member, lease = Membership(node), Lease(node, period_ns=S, liveness=liveness)
     gradient = Gradient(node=node, neighbors=Neighbors(lifetime_ns=4 * S), hello_ns=S)
-    upkeep = Upkeep(
-        membership=member, gradient=gradient, signs=signs, lease=lease, node=node, hello_ns=S, takes_slot=True
+    failover = Failover(
+        membership=member, gradient=gradient, liveness=liveness, lease=lease, node=node, hello_ns=S, takes_slot=True
     )
-    upkeep.start(0, leads=False)
-    assert upkeep.announced(schedule(2, 3, 4), guard_ns=0, born_ns=S, now_ns=S)
-    assert upkeep.stands_in(Join(3, Enu(0, 0, 0), instead_of=2), born_ns=2 * S, now_ns=2 * S) == [Action.FOLLOW]
+    failover.start(0, leads=False)
+    assert failover.on_schedule(schedule(2, 3, 4), guard_ns=0, born_ns=S, now_ns=S)
+    assert failover.on_stand_in(Join(3, Enu(0, 0, 0), instead_of=2), born_ns=2 * S, now_ns=2 * S) == [Action.FOLLOW]
     assert member.head == 3
-    upkeep.announced(schedule(7, 8, epoch=2, parts=2), guard_ns=0, born_ns=3 * S, now_ns=3 * S)
-    assert upkeep.lives(2, born_ns=3 * S, now_ns=3 * S) == [Action.FOLLOW]
+    failover.on_schedule(schedule(7, 8, epoch=2, parts=2), guard_ns=0, born_ns=3 * S, now_ns=3 * S)
+    assert failover.on_sign_of_life(2, born_ns=3 * S, now_ns=3 * S) == [Action.FOLLOW]
     assert member.head == 2
-    upkeep.announced(schedule(3, 4, epoch=2, part=1, parts=2), guard_ns=0, born_ns=4 * S, now_ns=4 * S)
+    failover.on_schedule(schedule(3, 4, epoch=2, part=1, parts=2), guard_ns=0, born_ns=4 * S, now_ns=4 * S)
     assert member.head == 7

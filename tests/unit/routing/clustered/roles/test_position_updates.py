@@ -2,15 +2,15 @@
 
 import pytest
 
-from fanet_mw.routing.clustered.roles.position_updates import Motion, Whereabouts
+from fanet_mw.routing.clustered.roles.position_updates import Motion, PositionUpdates
 from fanet_mw.units import Enu, S
 
 HERE, STILL = Enu(0.0, 0.0, 50.0), Enu(0.0, 0.0, 0.0)
 
 
-def told(velocity: Enu = STILL) -> Whereabouts:
-    found = Whereabouts(range_m=250.0)
-    found.told(Motion(HERE, velocity, 0))
+def told(velocity: Enu = STILL) -> PositionUpdates:
+    found = PositionUpdates(range_m=250.0)
+    found.on_update(Motion(HERE, velocity, 0))
     return found
 
 
@@ -28,7 +28,7 @@ def test_who_is_a_tenth_of_the_range_off_tells(east_m: float, tells: bool) -> No
 def test_two_tellings_are_some_seconds_apart() -> None:
     known = told()
     assert not known.outdated(Enu(1000.0, 0.0, 50.0), now_ns=5 * S - 1)
-    assert not known.may_tell(5 * S - 1)
+    assert not known.may_update(5 * S - 1)
     assert known.outdated(Enu(1000.0, 0.0, 50.0), now_ns=5 * S)
 
 
@@ -36,9 +36,9 @@ def test_who_has_flooded_nothing_for_long_tells_that_it_lives() -> None:
     known = told()
     assert not known.outdated(HERE, now_ns=20 * S)
     assert known.outdated(HERE, now_ns=20 * S + 1)
-    known.flooded(15 * S)
+    known.on_flooding(15 * S)
     assert not known.outdated(HERE, now_ns=35 * S)
 
 
 def test_who_has_never_told_does_not_begin_here() -> None:
-    assert not Whereabouts(range_m=250.0).outdated(HERE, now_ns=100 * S)
+    assert not PositionUpdates(range_m=250.0).outdated(HERE, now_ns=100 * S)

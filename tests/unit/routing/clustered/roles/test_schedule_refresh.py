@@ -5,7 +5,7 @@ import pytest
 from fanet_mw.node.duplicates import key_of
 from fanet_mw.node.packet import Packet
 from fanet_mw.routing.clustered.roles.lease import Authority
-from fanet_mw.routing.clustered.roles.schedule_refresh import Refresh
+from fanet_mw.routing.clustered.roles.schedule_refresh import ScheduleRefresh
 from fanet_mw.units import MS, S
 from fanet_mw.wire import Header, Kind
 from fanet_mw.wire.inner import Beacon, Role
@@ -15,8 +15,8 @@ PACKET = Packet(Header(0, 3, 1, 0xFFFF, 1, Kind.SCHEDULE, 32, 0, 0, 1), b"schedu
 
 
 @pytest.fixture
-def refresh() -> Refresh:
-    made = Refresh(lambda: 0.5)
+def refresh() -> ScheduleRefresh:
+    made = ScheduleRefresh(lambda: 0.5)
     made.keep(PACKET, 0, OURS, EPOCH, now_ns=10 * S)
     return made
 
@@ -37,22 +37,22 @@ def follows(term: int, leader: int, epoch: int) -> Beacon:
         (follows(4, 1, 1), False),  # a senior one: it will tell us
     ],
 )
-def test_who_follows_less_than_we_do_gets_the_newest(refresh: Refresh, beacon: Beacon, lacks: bool) -> None:
-    refresh.compare(beacon, now_ns=11 * S)
+def test_who_follows_less_than_we_do_gets_the_newest(refresh: ScheduleRefresh, beacon: Beacon, lacks: bool) -> None:
+    refresh.on_beacon(beacon, now_ns=11 * S)
     assert (refresh.next_wake_ns() == 11 * S + 100 * MS) == lacks
     assert refresh.due(now_ns=12 * S) == ([PACKET] if lacks else [])
 
 
-def test_a_flood_is_given_time_to_arrive_by_itself(refresh: Refresh) -> None:
-    refresh.compare(follows(5, 1, 6), now_ns=10 * S + 499 * MS)
+def test_a_flood_is_given_time_to_arrive_by_itself(refresh: ScheduleRefresh) -> None:
+    refresh.on_beacon(follows(5, 1, 6), now_ns=10 * S + 499 * MS)
     assert refresh.next_wake_ns() is None
 
 
-def test_what_another_has_sent_meanwhile_is_not_sent_again(refresh: Refresh) -> None:
-    refresh.compare(follows(5, 1, 6), now_ns=11 * S)
-    refresh.overheard(key_of(1, 3), now_ns=11 * S + 50 * MS)
+def test_what_another_has_sent_meanwhile_is_not_sent_again(refresh: ScheduleRefresh) -> None:
+    refresh.on_beacon(follows(5, 1, 6), now_ns=11 * S)
+    refresh.on_copy(key_of(1, 3), now_ns=11 * S + 50 * MS)
     assert refresh.due(now_ns=12 * S) == []
-    refresh.compare(follows(5, 1, 6), now_ns=11 * S + 900 * MS)
+    refresh.on_beacon(follows(5, 1, 6), now_ns=11 * S + 900 * MS)
     assert refresh.next_wake_ns() is None, "it has just been sent"
-    refresh.compare(follows(5, 1, 6), now_ns=12 * S)
+    refresh.on_beacon(follows(5, 1, 6), now_ns=12 * S)
     assert refresh.next_wake_ns() is not None

@@ -4,7 +4,7 @@ import pytest
 
 from fanet_mw.node.packet import Packet
 from fanet_mw.node.queue import TxQueue
-from fanet_mw.routing.clustered.tdma.root_release import Following, RootRelease
+from fanet_mw.routing.clustered.tdma.root_release import RootRelease, TurnsInForce
 from fanet_mw.routing.clustered.tdma.turns import Turns
 from fanet_mw.units import MS, NodeId
 from fanet_mw.wire import PRIORITY_BULK, PRIORITY_CONTROL, PRIORITY_REPORT, PRIORITY_SAFETY, Header, Kind
@@ -18,7 +18,7 @@ def packet(seq: int, size: int = 100, *, priority: int = PRIORITY_BULK, kind: Ki
     return Packet(Header(seq, seq, ME, 0xFFFF, ME, kind, 32, 0, priority, 0), bytes(size))
 
 
-def root(*plans: Following, reserved: dict[int, int] | None = None) -> RootRelease:
+def root(*plans: TurnsInForce, reserved: dict[int, int] | None = None) -> RootRelease:
     release = RootRelease(ME, TxQueue(capacity=100), reserved=reserved or {}, lead_ns=LEAD_NS)
     release.follow(plans, now_ns=0)
     return release
@@ -35,14 +35,14 @@ def let_out(release: RootRelease, *, until_ms: int) -> list[tuple[list[int], flo
 
 
 def test_each_turn_is_used_once() -> None:
-    release = root(Following(0, TURNS, (3, 10), 100, 2))
+    release = root(TurnsInForce(0, TURNS, (3, 10), 100, 2))
     for seq in range(4):
         release.push(packet(seq), now_ns=0)
     assert let_out(release, until_ms=1000) == [([0], 46), ([1], 60), ([2], 146), ([3], 160)]
 
 
 def test_as_many_go_together_as_a_turn_holds() -> None:
-    release = root(Following(0, TURNS, (3,), 250, 2))
+    release = root(TurnsInForce(0, TURNS, (3,), 250, 2))
     for seq, size in enumerate((100, 100, 100, 200, 60)):
         release.push(packet(seq, size), now_ns=0)
     assert let_out(release, until_ms=1000) == [([0, 1], 46), ([2], 146), ([3], 246), ([4], 346)]
@@ -50,20 +50,20 @@ def test_as_many_go_together_as_a_turn_holds() -> None:
 
 @pytest.mark.parametrize(("now_ms", "start_ms"), [(41, 46), (41.5, 146)])
 def test_a_turn_that_cannot_be_announced_in_time_is_not_taken(now_ms: float, start_ms: float) -> None:
-    release = root(Following(0, TURNS, (3,), 100, 2))
+    release = root(TurnsInForce(0, TURNS, (3,), 100, 2))
     release.push(packet(0), now_ns=round(now_ms * MS))
     assert let_out(release, until_ms=1000) == [([0], start_ms)]
 
 
 def test_a_plan_counts_from_the_instant_at_which_it_is_in_force() -> None:
-    release = root(Following(500 * MS, TURNS, (3,), 100, 2))
+    release = root(TurnsInForce(500 * MS, TURNS, (3,), 100, 2))
     release.push(packet(0), now_ns=0)
     assert let_out(release, until_ms=1000) == [([0], 546)]
 
 
 def test_a_plan_ends_where_the_next_one_begins() -> None:
     """At 60 ms the old plan's next turn would be at 146 ms; from 100 ms on there is another one."""
-    release = root(Following(0, TURNS, (3,), 100, 2), Following(100 * MS, TURNS, (10,), 200, 2))
+    release = root(TurnsInForce(0, TURNS, (3,), 100, 2), TurnsInForce(100 * MS, TURNS, (10,), 200, 2))
     release.push(packet(0), now_ns=60 * MS)
     release.push(packet(1), now_ns=60 * MS)
     assert let_out(release, until_ms=1000) == [([0, 1], 160)]
@@ -72,7 +72,7 @@ def test_a_plan_ends_where_the_next_one_begins() -> None:
 @pytest.mark.parametrize(("change_ms", "start_ms"), [(50, 46), (49, 60)])
 def test_a_turn_whose_flood_would_outlive_its_timetable_is_not_used(change_ms: int, start_ms: float) -> None:
     """The flood of turn 3 lasts two turns, from 46 to 50 ms."""
-    release = root(Following(0, TURNS, (3,), 100, 2), Following(change_ms * MS, TURNS, (10,), 100, 2))
+    release = root(TurnsInForce(0, TURNS, (3,), 100, 2), TurnsInForce(change_ms * MS, TURNS, (10,), 100, 2))
     release.push(packet(0), now_ns=0)
     assert let_out(release, until_ms=1000) == [([0], start_ms)]
 
@@ -81,7 +81,7 @@ ROOMS = {PRIORITY_SAFETY: 40, PRIORITY_REPORT: 50}
 
 
 def test_reports_and_warnings_ride_beside_bulk_and_never_in_its_place() -> None:
-    release = root(Following(0, TURNS, (3,), 190, 2), reserved=ROOMS)
+    release = root(TurnsInForce(0, TURNS, (3,), 190, 2), reserved=ROOMS)
     for seq, (size, priority) in enumerate(
         [(100, PRIORITY_BULK), (100, PRIORITY_BULK)] + [(50, PRIORITY_REPORT)] * 3 + [(40, PRIORITY_SAFETY)]
     ):
@@ -90,7 +90,7 @@ def test_reports_and_warnings_ride_beside_bulk_and_never_in_its_place() -> None:
 
 
 def test_the_room_that_bulk_leaves_is_for_the_most_urgent() -> None:
-    release = root(Following(0, TURNS, (3,), 190, 2), reserved=ROOMS)
+    release = root(TurnsInForce(0, TURNS, (3,), 190, 2), reserved=ROOMS)
     for seq, priority in enumerate([PRIORITY_REPORT, PRIORITY_REPORT, PRIORITY_REPORT, PRIORITY_SAFETY]):
         release.push(packet(seq, 40, priority=priority), now_ns=0)
     assert let_out(release, until_ms=1000) == [([3, 0, 1, 2], 46)]
@@ -98,14 +98,14 @@ def test_the_room_that_bulk_leaves_is_for_the_most_urgent() -> None:
 
 @pytest.mark.parametrize(("size", "priority"), [(51, PRIORITY_REPORT), (60, PRIORITY_CONTROL)])
 def test_what_has_no_room_of_its_own_overtakes_no_bulk(size: int, priority: int) -> None:
-    release = root(Following(0, TURNS, (3,), 190, 2), reserved=ROOMS)
+    release = root(TurnsInForce(0, TURNS, (3,), 190, 2), reserved=ROOMS)
     release.push(packet(0, 150), now_ns=0)
     release.push(packet(1, size, priority=priority), now_ns=0)
     assert let_out(release, until_ms=1000) == [([0], 46), ([1], 146)]
 
 
 def test_announcements_go_before_bulk_and_a_newer_one_in_place_of_an_older() -> None:
-    release = root(Following(0, TURNS, (3,), 190, 2), reserved=ROOMS)
+    release = root(TurnsInForce(0, TURNS, (3,), 190, 2), reserved=ROOMS)
     release.push(packet(0), now_ns=0)
     release.push(packet(1, 90, priority=PRIORITY_CONTROL, kind=Kind.SCHEDULE), now_ns=0)
     assert [old.header.seq for old in release.outdated(before_us=2)] == [1]

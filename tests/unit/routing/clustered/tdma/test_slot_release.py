@@ -8,7 +8,7 @@ from hypothesis import strategies as st
 
 from fanet_mw.node.packet import Packet
 from fanet_mw.node.queue import TxQueue, sooner_us
-from fanet_mw.routing.clustered.tdma.slot_release import Release, Tenure
+from fanet_mw.routing.clustered.tdma.slot_release import SlotRelease, Tenure
 from fanet_mw.routing.clustered.tdma.slots import Superframe
 from fanet_mw.scenario import Clusters, Routing
 from fanet_mw.units import MS, US, S
@@ -34,7 +34,7 @@ def test_every_packet_leaves_once_in_its_own_slot_at_least_a_gap_apart(
     arrivals_ms: list[int], cluster: int, pacing: str
 ) -> None:
     clusters = Clusters(pacing=pacing, flooding_period_s=1)
-    release, membership = Release(TxQueue(capacity=100), clusters, lead_ns=LEAD_NS), member_of(cluster)
+    release, membership = SlotRelease(TxQueue(capacity=100), clusters, lead_ns=LEAD_NS), member_of(cluster)
     out: list[tuple[Packet, int]] = []
 
     def run(until_ns: int) -> None:
@@ -58,7 +58,7 @@ def test_every_packet_leaves_once_in_its_own_slot_at_least_a_gap_apart(
 )
 def test_a_slot_is_divided_among_what_is_queued_or_used_at_once(pacing: str, count: int, gap_us: int) -> None:
     """A slot of 248 ms; floods farther apart than 40 ms do not meet anyway."""
-    release = Release(TxQueue(capacity=100), Clusters(pacing=pacing, flooding_period_s=1), lead_ns=LEAD_NS)
+    release = SlotRelease(TxQueue(capacity=100), Clusters(pacing=pacing, flooding_period_s=1), lead_ns=LEAD_NS)
     tenure = member_of(1)
     for seq in range(count):
         release.push(packet(seq), tenure, now_ns=0)

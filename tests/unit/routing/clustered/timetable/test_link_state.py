@@ -59,7 +59,7 @@ def test_a_grade_keeps_the_share_within_what_its_steps_allow(chance: float) -> N
 
 def heard(quality: LinkQuality, count: int, *, rssi: list[float], until_ns: int) -> Link | None:
     for hello in range(count):
-        quality.hello(NodeId(2), rssi_dbm=rssi[hello % len(rssi)], now_ns=until_ns - hello * S // 2)
+        quality.on_hello(NodeId(2), rssi_dbm=rssi[hello % len(rssi)], now_ns=until_ns - hello * S // 2)
     found = quality.links(now_ns=until_ns)
     return found[0] if found else None
 
@@ -92,7 +92,7 @@ def test_what_a_steady_link_loses_is_not_its_own_loss_unless_it_loses_most() -> 
 
 def test_a_neighbor_that_fell_silent_is_forgotten_after_the_window() -> None:
     quality = LinkQuality(NodeId(1), hello_ns=S)
-    quality.hello(NodeId(2), rssi_dbm=-70, now_ns=S)
+    quality.on_hello(NodeId(2), rssi_dbm=-70, now_ns=S)
     assert quality.links(now_ns=(WINDOW + 1) * S)
     assert not quality.links(now_ns=(WINDOW + 1) * S + 1)
 
@@ -100,7 +100,7 @@ def test_a_neighbor_that_fell_silent_is_forgotten_after_the_window() -> None:
 def test_links_are_told_when_there_is_an_estimate_and_again_when_one_has_changed() -> None:
     quality = LinkQuality(NodeId(1), hello_ns=S)
     for second in range(30):
-        quality.hello(NodeId(2), rssi_dbm=-80 + second % 3, now_ns=second * S)
+        quality.on_hello(NodeId(2), rssi_dbm=-80 + second % 3, now_ns=second * S)
     assert not quality.outdated(now_ns=FIRST * S - 1)
     assert not quality.tell(now_ns=FIRST * S - 1)
     assert quality.outdated(now_ns=30 * S)
@@ -118,8 +118,8 @@ def link(a: int, b: int, chance: float, dbm: int = -78) -> Link:
 
 def test_a_pair_is_as_good_as_both_ends_say_on_average() -> None:
     state = LinkState()
-    state.told(NodeId(1), [link(2, 1, 0.9)])
-    state.told(NodeId(2), [link(1, 2, 0.7)])
+    state.on_report(NodeId(1), [link(2, 1, 0.9)])
+    state.on_report(NodeId(2), [link(1, 2, 0.7)])
     (pair,) = state.between([NodeId(1), NodeId(2)])
     assert (pair.a, pair.b) == (1, 2)
     assert pair.chance == pytest.approx(0.8, abs=0.01)
@@ -127,22 +127,22 @@ def test_a_pair_is_as_good_as_both_ends_say_on_average() -> None:
 
 def test_a_direction_in_which_nothing_is_heard_is_no_link_but_may_disturb() -> None:
     state = LinkState()
-    state.told(NodeId(1), [link(2, 1, 0.9, -70)])
-    state.told(NodeId(2), [])
+    state.on_report(NodeId(1), [link(2, 1, 0.9, -70)])
+    state.on_report(NodeId(2), [])
     assert state.between([NodeId(1), NodeId(2)]) == (Link(NodeId(1), NodeId(2), 0, -70),)
     assert adjacency(state.between([NodeId(1), NodeId(2)]), [NodeId(1), NodeId(2)]) == {1: (), 2: ()}
 
 
 def test_nobody_speaks_for_another_and_a_node_that_has_not_told_is_known_by_its_neighbors() -> None:
     state = LinkState()
-    state.told(NodeId(1), [link(2, 1, 0.9), link(2, 3, 0.9)])
+    state.on_report(NodeId(1), [link(2, 1, 0.9), link(2, 3, 0.9)])
     assert [(pair.a, pair.b) for pair in state.between([NodeId(1), NodeId(2), NodeId(3)])] == [(1, 2)]
     assert state.known([NodeId(1), NodeId(2)]) == 1
 
 
 def test_usable_links_are_drawn_to_their_mean_and_others_are_left_alone() -> None:
     state = LinkState()
-    state.told(NodeId(1), [link(2, 1, 0.9), link(3, 1, 0.7), link(4, 1, 0.1), link(5, 1, 0.995)])
+    state.on_report(NodeId(1), [link(2, 1, 0.9), link(3, 1, 0.7), link(4, 1, 0.1), link(5, 1, 0.995)])
     found = {pair.b: pair.chance for pair in state.between([NodeId(node) for node in range(1, 6)])}
     assert found[2] == pytest.approx(0.8 + 0.03, abs=0.01)
     assert found[3] == pytest.approx(0.8 - 0.03, abs=0.01)

@@ -22,8 +22,8 @@ from fanet_mw.bounds.turn_gaps import TurnServer
 from fanet_mw.errors import DropReason
 from fanet_mw.node.contract import Port
 from fanet_mw.node.packet import Packet
+from fanet_mw.routing.clustered.claimed.claimed_release import ClaimedRelease
 from fanet_mw.routing.clustered.claimed.claiming import Change, Claiming
-from fanet_mw.routing.clustered.claimed.turn_queue import OwnRelease
 from fanet_mw.routing.clustered.forwarding.floods import Floods
 from fanet_mw.routing.clustered.forwarding.gradient import Gradient
 from fanet_mw.routing.clustered.forwarding.uplink import Uplink
@@ -45,7 +45,7 @@ class ClaimedAccess:
         port: Port,
         *,
         claiming: Claiming,
-        queue: OwnRelease,
+        queue: ClaimedRelease,
         turn_bytes: int,
         gradient: Gradient,
         uplink: Uplink,

@@ -6,7 +6,7 @@
     sequence number                     not beyond those that the time since swarm instant 0 has room for
 
 Not here: proof of origin. A relay may still invent a packet in the name of a node behind it; what it cannot do is keep
-out that node's own packets, because a packet is known by its content and not by its name alone (`arrival.Reader`).
+out that node's own packets, because a packet is known by its content and not by its name alone (`reader.Reader`).
 """
 
 from typing import Final
@@ -27,7 +27,7 @@ _BURST: Final = 100_000
 _MOST_HOPS: Final = 255
 
 
-class Plausible:
+class HeaderCheck:
     """What one node believes of headers."""
 
     def __init__(self, node: NodeId, scenario: Scenario) -> None:

@@ -26,7 +26,7 @@ _LEARN: Final = 4
 """Hello intervals after which the two hops are known: one for the neighbors, one for theirs, and two may be lost."""
 
 
-class Choice(Protocol):
+class RelayChoice(Protocol):
     """Which nodes relay, once the two hops are known."""
 
     near: Neighborhood
@@ -97,10 +97,10 @@ class HeadsFirst:
         return self._membership.is_head or self.near.dominates(own_rank=0.0, now_ns=now_ns)
 
 
-class Chosen:
+class NeighborKnowledgeRelaying:
     """The relays of one node where hellos decide who relays data; control goes on as `otherwise` says."""
 
-    def __init__(self, port: Port, choice: Choice, otherwise: Relaying) -> None:
+    def __init__(self, port: Port, choice: RelayChoice, otherwise: Relaying) -> None:
         self._node = port.node
         self._learn_ns = _LEARN * seconds_to_ns(port.scenario.routing.hello_interval_s)
         self._choice = choice
@@ -122,7 +122,7 @@ class Chosen:
         return Claims(self._node, SlotStatus(), self._choice.near.heard(now_ns=now_ns))
 
     def on_claims(self, claims: Claims, beacon: Beacon, *, now_ns: int) -> None:
-        self._choice.near.hear(claims, now_ns=now_ns)
+        self._choice.near.on_claims(claims, now_ns=now_ns)
         self._choice.on_beacon(beacon)
 
     def decided(self, now_ns: int) -> Sequence[Relay]:

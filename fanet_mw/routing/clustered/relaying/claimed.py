@@ -6,13 +6,13 @@ from fanet_mw.bus.messages import Reception
 from fanet_mw.errors import DropReason
 from fanet_mw.node.contract import Port
 from fanet_mw.node.packet import Packet, Relay
-from fanet_mw.routing.clustered.claimed.access import ClaimedAccess
+from fanet_mw.routing.clustered.claimed.claimed_access import ClaimedAccess
 from fanet_mw.routing.clustered.claimed.claiming import Claiming
 from fanet_mw.routing.clustered.contract import Relaying
 from fanet_mw.wire import Kind
 
 
-class Pipelined:
+class ClaimedRelaying:
     """The relays of one node, which wait behind its own packets; what is no data goes on as `otherwise` says."""
 
     def __init__(self, port: Port, claiming: Claiming, access: ClaimedAccess, otherwise: Relaying) -> None:

@@ -11,16 +11,16 @@ from fanet_mw.errors import DropReason
 from fanet_mw.node.contract import Port
 from fanet_mw.node.packet import Packet, Relay
 from fanet_mw.routing.clustered.contract import Relaying
-from fanet_mw.routing.clustered.timetable.plans import Plans
-from fanet_mw.routing.clustered.timetable.turn_plan import Plan
+from fanet_mw.routing.clustered.timetable.turn_plan import TurnPlan
+from fanet_mw.routing.clustered.timetable.turn_plans import TurnPlans
 from fanet_mw.units import NodeId
 from fanet_mw.wire import Kind
 
 
-class ByTurn:
+class ScheduledRelaying:
     """The relays of one node in the turns of its timetables."""
 
-    def __init__(self, port: Port, plans: Plans, otherwise: Relaying) -> None:
+    def __init__(self, port: Port, plans: TurnPlans, otherwise: Relaying) -> None:
         self._port = port
         self._plans = plans
         self._otherwise = otherwise
@@ -45,7 +45,7 @@ class ByTurn:
         return self._in_turn(packet, plan, heard, reception, now_ns)
 
     def _in_turn(
-        self, packet: Packet, plan: Plan, heard: tuple[int, NodeId, int], reception: Reception, now_ns: int
+        self, packet: Packet, plan: TurnPlan, heard: tuple[int, NodeId, int], reception: Reception, now_ns: int
     ) -> Sequence[Relay]:
         """In the turns of this flood that are the node's and still to come."""
         offset, root, instance = heard

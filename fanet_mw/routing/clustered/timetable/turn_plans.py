@@ -1,20 +1,20 @@
 """The timetables that a node follows: one in force, perhaps others that come into force later."""
 
 from fanet_mw.routing.clustered.tdma.turns import Turns
-from fanet_mw.routing.clustered.timetable.turn_plan import Plan
+from fanet_mw.routing.clustered.timetable.turn_plan import TurnPlan
 
 
-class Plans:
+class TurnPlans:
     """Timetables of one node, by the instant from which each holds."""
 
     def __init__(self) -> None:
-        self.in_order: list[Plan] = []
+        self.in_order: list[TurnPlan] = []
 
     @property
-    def newest(self) -> Plan | None:
+    def newest(self) -> TurnPlan | None:
         return self.in_order[-1] if self.in_order else None
 
-    def at(self, t_ns: int) -> Plan | None:
+    def at(self, t_ns: int) -> TurnPlan | None:
         """The newest timetable that is in force at an instant."""
         for plan in reversed(self.in_order):
             if plan.valid_ns <= t_ns:
@@ -30,6 +30,6 @@ class Plans:
         """How many of the timetables, the oldest first, are no longer in force."""
         return sum(plan.valid_ns <= now_ns for plan in self.in_order[1:])
 
-    def follow(self, plan: Plan | None, *, now_ns: int) -> None:
+    def follow(self, plan: TurnPlan | None, *, now_ns: int) -> None:
         """Take up a newer timetable, and forget those that no longer hold; None: follow none."""
         self.in_order = [] if plan is None else [*self.in_order[self.superseded(now_ns) :], plan]

@@ -4,7 +4,7 @@ import pytest
 
 from fanet_mw import wire
 from fanet_mw.errors import DropReason
-from fanet_mw.node.plausible import CONTROL, Plausible
+from fanet_mw.node.header_check import CONTROL, HeaderCheck
 from fanet_mw.units import BROADCAST, NodeId, S
 from fanet_mw.wire import FLAG_FLOOD, PRIORITY_BULK, Header, Kind
 from tests.conftest import MakeScenario
@@ -19,67 +19,67 @@ RELAYED = FIRST._replace(origin=FAR, hops=1)
 
 
 @pytest.fixture
-def plausible(make_scenario: MakeScenario) -> Plausible:
-    return Plausible(OURS, make_scenario(**{"nodes.count": 5}))
+def plausible(make_scenario: MakeScenario) -> HeaderCheck:
+    return HeaderCheck(OURS, make_scenario(**{"nodes.count": 5}))
 
 
-def judged(plausible: Plausible, header: Header, *, src: NodeId = NEIGHBOR, known: bool = False) -> DropReason | None:
+def judged(plausible: HeaderCheck, header: Header, *, src: NodeId = NEIGHBOR, known: bool = False) -> DropReason | None:
     fields = wire.fields_of(header.encode())
     assert fields is not None
     return plausible.why_not(fields, known=known, src=src, end_ns=NOW_NS)
 
 
 @pytest.mark.parametrize("header", [FIRST, RELAYED, RELAYED._replace(hops=200, hop_limit=55)], ids=str)
-def test_what_can_be_true_is_believed(plausible: Plausible, header: Header) -> None:
+def test_what_can_be_true_is_believed(plausible: HeaderCheck, header: Header) -> None:
     assert judged(plausible, header) is None
 
 
 @pytest.mark.parametrize("field", ["origin", "prev_hop", "destination"])
-def test_the_last_node_is_one_and_the_next_is_none(plausible: Plausible, field: str) -> None:
+def test_the_last_node_is_one_and_the_next_is_none(plausible: HeaderCheck, field: str) -> None:
     last, none = RELAYED._replace(**{field: 5}), RELAYED._replace(**{field: 6})
     assert judged(plausible, last, src=NodeId(last.prev_hop)) is None
     assert judged(plausible, none, src=NodeId(none.prev_hop)) is DropReason.UNKNOWN_NODE
 
 
-def test_a_packet_in_our_own_name_is_ours_only_if_we_have_made_it(plausible: Plausible) -> None:
+def test_a_packet_in_our_own_name_is_ours_only_if_we_have_made_it(plausible: HeaderCheck) -> None:
     header = RELAYED._replace(origin=OURS)
     assert judged(plausible, header) is DropReason.OWN
     assert judged(plausible, header, known=True) is None, "we know it from the phase before"
 
 
-def test_the_transmitter_is_whom_the_radio_names(plausible: Plausible) -> None:
+def test_the_transmitter_is_whom_the_radio_names(plausible: HeaderCheck) -> None:
     assert judged(plausible, FIRST, src=FAR) is DropReason.FORGED
     assert judged(plausible, RELAYED, src=FAR) is DropReason.FORGED
 
 
-def test_only_its_origin_sends_a_packet_that_has_made_no_hop(plausible: Plausible) -> None:
+def test_only_its_origin_sends_a_packet_that_has_made_no_hop(plausible: HeaderCheck) -> None:
     assert judged(plausible, RELAYED._replace(hops=0)) is DropReason.FORGED
 
 
-def test_a_hello_is_passed_on_by_nobody(plausible: Plausible) -> None:
+def test_a_hello_is_passed_on_by_nobody(plausible: HeaderCheck) -> None:
     assert judged(plausible, FIRST._replace(kind=Kind.HELLO)) is None
     assert judged(plausible, RELAYED._replace(kind=Kind.HELLO)) is DropReason.FORGED
 
 
-def test_hops_made_and_hops_left_are_255_together_at_most(plausible: Plausible) -> None:
+def test_hops_made_and_hops_left_are_255_together_at_most(plausible: HeaderCheck) -> None:
     assert judged(plausible, RELAYED._replace(hops=55, hop_limit=200)) is None
     assert judged(plausible, RELAYED._replace(hops=56, hop_limit=200)) is DropReason.FORGED
 
 
 def test_a_birth_lies_no_further_ahead_than_clocks_may_differ(
-    plausible: Plausible, make_scenario: MakeScenario
+    plausible: HeaderCheck, make_scenario: MakeScenario
 ) -> None:
     assert judged(plausible, FIRST._replace(origin_us=NOW_US + 100_000)) is None
     assert judged(plausible, FIRST._replace(origin_us=NOW_US + 100_001)) is DropReason.FORGED
     clocks = {"clock.offset_ms": 20, "clock.drift_ppm": 100, "clock.sync": "beacons", "duration_s": 100}
-    drifting = Plausible(OURS, make_scenario(**{"nodes.count": 5, **clocks}))
+    drifting = HeaderCheck(OURS, make_scenario(**{"nodes.count": 5, **clocks}))
     most_us = 100_000 + 2 * (20_000 + 100 * 100) + 1_000_000
     assert judged(drifting, FIRST._replace(origin_us=NOW_US + most_us)) is None
     assert judged(drifting, FIRST._replace(origin_us=NOW_US + most_us + 1)) is DropReason.FORGED
 
 
 @pytest.mark.parametrize("apart", [0, CONTROL], ids=["data", "control"])
-def test_a_number_is_one_that_the_time_so_far_has_room_for(plausible: Plausible, apart: int) -> None:
+def test_a_number_is_one_that_the_time_so_far_has_room_for(plausible: HeaderCheck, apart: int) -> None:
     most = NOW_US // 100 + 100_000
     assert judged(plausible, FIRST._replace(seq=apart + most)) is None
     assert judged(plausible, FIRST._replace(seq=apart + most + 1)) is DropReason.FORGED

@@ -7,13 +7,13 @@ died. Bounded by the number of nodes.
 from fanet_mw.units import NodeId
 
 
-class Signs:
+class Liveness:
     """The latest sign of life of each node."""
 
     def __init__(self) -> None:
         self._born_ns: dict[int, int] = {}
 
-    def heard(self, node: int, *, born_ns: int) -> None:
+    def on_sign_of_life(self, node: int, *, born_ns: int) -> None:
         """Something of this node came in that it generated at `born_ns`."""
         if born_ns > self._born_ns.get(node, -1):
             self._born_ns[node] = born_ns

@@ -66,7 +66,7 @@ class Reader:
         return packet
 
 
-shared: Final = Reader()
+shared_reader: Final = Reader()
 """For all nodes of this process."""
 T = TypeVar("T")
 
@@ -122,6 +122,6 @@ decoded: Final = Decoded().of
 
 def packet_of(frame: bytes) -> Packet:
     """The packet in a frame, its header decoded; raises MalformedFrameError."""
-    if frame is not shared.frame:
-        shared.look(frame)
-    return shared.packet or shared.read()
+    if frame is not shared_reader.frame:
+        shared_reader.look(frame)
+    return shared_reader.packet or shared_reader.read()

@@ -6,7 +6,7 @@ from fanet_mw.routing.clustered.claimed.own_turns import OwnTurns
 from fanet_mw.routing.clustered.tdma.turn_release import OwnTurn, TurnRelease
 
 
-class OwnRelease(TurnRelease):
+class ClaimedRelease(TurnRelease):
     """What waits for our turns: own packets and relays, most urgent first."""
 
     def __init__(self, queue: TxQueue, own: OwnTurns, *, lead_ns: int, frame_bytes: int) -> None:

@@ -7,7 +7,7 @@ from hypothesis import strategies as st
 from fanet_mw import wire
 from fanet_mw.errors import MalformedFrameError
 from fanet_mw.node import duplicates
-from fanet_mw.node.arrival import Decoded, Reader
+from fanet_mw.node.reader import Decoded, Reader
 
 FLOODED = wire.Header(5, 7, 3, 0xFFFF, 3, 0, 32, 0, 3, wire.FLAG_FLOOD)
 

@@ -103,8 +103,8 @@ def draw(runs: Runs) -> Drawing:
         lower.set_xscale("log")
         for axes in (upper, lower):
             axes.set_ylim(0, 47)
-    for row in (since_start, since_heard):
-        row[0].set_ylabel("UAVs that have turned (of 45)")
+    for first in (since_start[0], since_heard[0]):
+        first.set_ylabel("UAVs that have turned (of 45)")
     since_heard[0].legend(loc="lower right")
     return Drawing(figure, data)
 

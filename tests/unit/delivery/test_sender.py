@@ -1,0 +1,218 @@
+"""The sending side of messages, hand-driven: what goes out when, to whom, and what the application is told."""
+
+from fanet_mw import wire
+from fanet_mw.delivery.sender import EXPIRED, Packet, Sender, Told
+from fanet_mw.units import BROADCAST, MS, US, NodeId, S
+from fanet_mw.wire.message import DELIVERED, MISSING, NO_LISTENER, Piece, Receipt, decode_piece
+
+OWN, A, B, C = NodeId(1), NodeId(2), NodeId(3), NodeId(4)
+HEADER = wire.Header(5, 1, OWN, BROADCAST, OWN, 0, 32, 0, 3, 0).encode()
+WAIT_NS = 2 * S
+"""Patience with a target that has never sent a receipt."""
+BORN_NS = S
+
+
+def made() -> Sender:
+    sender = Sender(OWN, (OWN, A, B, C), most_bytes=400, wait_ns=WAIT_NS)
+    sender.start(1)
+    return sender
+
+
+def send(
+    sender: Sender,
+    data: bytes = b"x",
+    *,
+    to: tuple[NodeId, ...] | None = (A,),
+    port: int = 5,
+    lifetime_ms: int = 60_000,
+) -> int:
+    return sender.confirmed(data, port=port, targets=to, priority=3, born_us=BORN_NS // US, lifetime_ms=lifetime_ms)
+
+
+def piece(packet: Packet) -> Piece:
+    return decode_piece(HEADER + packet.inner)
+
+
+def pieces(packets: list[Packet]) -> list[int]:
+    return [piece(packet).head.piece for packet in packets]
+
+
+def delivered(sender: Sender, number: int, node: NodeId, at_ns: int) -> None:
+    sender.receipt(node, Receipt(0, number, DELIVERED), at_ns)
+
+
+def test_without_a_receipt_a_message_is_sent_again_and_patience_doubles_up_to_eight_times() -> None:
+    sender, at_ns = made(), BORN_NS
+    send(sender)
+    assert len(sender.due(at_ns)) == 1
+    for wait_ns in (WAIT_NS, 2 * WAIT_NS, 4 * WAIT_NS, 8 * WAIT_NS, 8 * WAIT_NS):
+        assert sender.next_wake_ns() == at_ns + wait_ns
+        assert sender.due(at_ns + wait_ns - 1) == []
+        at_ns += wait_ns
+        assert len(sender.due(at_ns)) == 1
+    assert sender.repeated == 5
+
+
+def test_a_message_is_given_up_at_the_end_of_its_lifetime_and_neither_sooner_nor_later() -> None:
+    sender = made()
+    number = send(sender, to=(A, B), lifetime_ms=500)
+    sender.due(BORN_NS)
+    delivered(sender, number, A, BORN_NS + 100 * MS)
+    end_ns = BORN_NS + 500 * MS
+    assert sender.next_wake_ns() == end_ns
+    sender.due(end_ns - 1)
+    assert sender.told == [Told(number, DELIVERED, (A,), last=False)]
+    assert sender.due(end_ns) == []
+    assert sender.told[1:] == [Told(number, EXPIRED, (B,), last=True)]
+    assert sender.next_wake_ns() is None
+    delivered(sender, number, B, end_ns + 1)
+    assert len(sender.told) == 2, "a receipt that comes afterwards changes nothing"
+
+
+def test_a_message_that_was_never_let_out_is_given_up_as_well() -> None:
+    sender = made()
+    for _ in range(40):  # more than the window lets out
+        send(sender, lifetime_ms=500)
+    out = sender.due(BORN_NS)
+    assert len(out) == 32
+    sender.due(BORN_NS + 500 * MS)
+    assert [told.outcome for told in sender.told] == [EXPIRED] * 40
+    assert send(sender) == 41
+    assert len(sender.due(BORN_NS + 500 * MS)) == 1, "the window is free again"
+
+
+def test_only_what_is_missing_is_sent_again() -> None:
+    sender = made()
+    number = send(sender, bytes(1000))
+    first = sender.due(BORN_NS)
+    assert pieces(first) == [0, 1, 2, 3]
+    assert [packet.first for packet in first] == [True, False, False, False]
+    sender.receipt(A, Receipt(0b1011, number, MISSING), BORN_NS + 100 * MS)
+    again = sender.due(BORN_NS + WAIT_NS)
+    assert pieces(again) == [2]
+    assert not again[0].first
+
+
+def test_a_target_that_has_every_piece_is_asked_again_by_the_last_one() -> None:
+    sender = made()
+    number = send(sender, bytes(1000))
+    sender.due(BORN_NS)
+    sender.receipt(A, Receipt(0b1111, number, MISSING), BORN_NS + 100 * MS)
+    assert pieces(sender.due(BORN_NS + WAIT_NS)) == [3]
+
+
+def test_a_receipt_teaches_how_long_to_wait_for_the_next() -> None:
+    """RFC 6298: 400 ms smoothed and 200 of variation, so 1200 ms; then half of both differences."""
+    sender = made()
+    first = send(sender)
+    sender.due(BORN_NS)
+    delivered(sender, first, A, BORN_NS + 400 * MS)
+    at_ns = BORN_NS + S
+    second = send(sender)
+    sender.due(at_ns)
+    assert sender.next_wake_ns() == at_ns + 1200 * MS
+    delivered(sender, second, A, at_ns + 800 * MS)
+    at_ns += 2 * S
+    send(sender)
+    sender.due(at_ns)
+    smooth_ns, varies_ns = 400 * MS + 400 * MS // 8, 200 * MS + (400 - 200) * MS // 4
+    assert sender.next_wake_ns() == at_ns + smooth_ns + 4 * varies_ns
+
+
+def test_a_receipt_after_a_repetition_teaches_nothing_because_nobody_knows_to_which_copy_it_is() -> None:
+    sender = made()
+    first = send(sender)
+    sender.due(BORN_NS)
+    sender.due(BORN_NS + WAIT_NS)
+    delivered(sender, first, A, BORN_NS + WAIT_NS + MS)
+    at_ns = BORN_NS + 2 * WAIT_NS
+    send(sender)
+    sender.due(at_ns)
+    assert sender.next_wake_ns() == at_ns + WAIT_NS
+
+
+def test_two_targets_are_sent_to_one_by_one_and_three_together() -> None:
+    sender = made()
+    send(sender, to=(A, B))
+    assert [(packet.destination, piece(packet).targets) for packet in sender.due(BORN_NS)] == [(A, None), (B, None)]
+    third = send(sender, to=(A, B, C))
+    assert [(packet.destination, piece(packet).targets) for packet in sender.due(BORN_NS)] == [(BROADCAST, None)]
+    sender.receipt(A, Receipt(0, third, DELIVERED), BORN_NS + MS)
+    again = [packet for packet in sender.due(BORN_NS + WAIT_NS) if packet.number == third]
+    assert [packet.destination for packet in again] == [B, C]
+
+
+def test_a_part_of_the_swarm_is_named_in_each_packet() -> None:
+    sender = Sender(OWN, [NodeId(n) for n in range(1, 9)], most_bytes=400, wait_ns=WAIT_NS)
+    send(sender, to=(A, B, C))
+    assert [(p.destination, piece(p).targets) for p in sender.due(BORN_NS)] == [(BROADCAST, frozenset((A, B, C)))]
+
+
+def test_a_message_names_the_one_before_it_in_its_flow_as_long_as_that_is_open() -> None:
+    sender = made()
+    first, other_port = send(sender, lifetime_ms=500), send(sender, port=6)
+    second = send(sender)
+    before = {packet.number: piece(packet).head.previous for packet in sender.due(BORN_NS)}
+    assert before == {first: 0, other_port: 0, second: first}
+    sender.due(BORN_NS + 500 * MS)  # the first has expired
+    again = {packet.number: piece(packet).head.previous for packet in sender.due(BORN_NS + WAIT_NS)}
+    assert again == {other_port: 0, second: 0}, "it is passed over"
+
+
+def test_a_repetition_halves_the_window_and_a_confirmed_message_widens_it_by_one() -> None:
+    sender = made()
+    numbers = [send(sender) for _ in range(100)]
+    assert len(sender.due(BORN_NS)) == 32
+    after_timeout = sender.due(BORN_NS + WAIT_NS)
+    assert len(after_timeout) == 2, "every one of the 32 has halved it, down to the least"
+    for number in numbers[:2]:
+        delivered(sender, number, A, BORN_NS + WAIT_NS + MS)
+    assert len(sender.due(BORN_NS + WAIT_NS + MS)) == 4
+
+
+def test_who_has_nobody_that_listens_is_told_apart_and_is_not_asked_again() -> None:
+    sender = made()
+    number = send(sender, to=(A, B))
+    sender.due(BORN_NS)
+    sender.receipt(A, Receipt(0, number, NO_LISTENER), BORN_NS + MS)
+    assert sender.told == [Told(number, NO_LISTENER, (A,), last=False)]
+    assert [packet.destination for packet in sender.due(BORN_NS + WAIT_NS)] == [B]
+
+
+def test_the_most_urgent_message_goes_first() -> None:
+    sender = made()
+    for priority in (3, 1, 2):
+        sender.confirmed(b"x", port=5, targets=(A,), priority=priority, born_us=1_000_000, lifetime_ms=60_000)
+    assert [packet.priority for packet in sender.due(BORN_NS)] == [1, 2, 3]
+
+
+def test_numbers_go_on_from_the_first_and_flows_are_told_apart() -> None:
+    sender = Sender(OWN, (OWN, A, B, C), most_bytes=400, wait_ns=WAIT_NS)
+    sender.start(70_000)
+    assert [send(sender), send(sender, to=(B,)), send(sender)] == [70_000, 70_001, 70_002]
+    flows = {packet.number: piece(packet).head.flow for packet in sender.due(BORN_NS)}
+    assert flows[70_000] == flows[70_002] != flows[70_001]
+
+
+def test_receipts_that_overtake_each_other_add_up() -> None:
+    sender = made()
+    number = send(sender, bytes(1000))
+    sender.due(BORN_NS)
+    for held in (0b0110, 0b0010):
+        sender.receipt(A, Receipt(held, number, MISSING), BORN_NS + 100 * MS)
+    assert pieces(sender.due(BORN_NS + WAIT_NS)) == [0, 3]
+
+
+def test_together_go_the_pieces_that_any_target_lacks_and_who_lacks_some_is_named() -> None:
+    sender = Sender(OWN, [NodeId(n) for n in range(1, 9)], most_bytes=400, wait_ns=WAIT_NS)
+    number = send(sender, bytes(900), to=None)
+    first = sender.due(BORN_NS)
+    assert {piece(packet).targets for packet in first} == {None}
+    every = (1 << len(first)) - 1
+    for node in range(2, 6):
+        delivered(sender, number, NodeId(node), BORN_NS + MS)
+    for node, lacks in ((6, 0), (7, 1), (8, 1)):
+        sender.receipt(NodeId(node), Receipt(every & ~(1 << lacks), number, MISSING), BORN_NS + MS)
+    again = sender.due(BORN_NS + WAIT_NS)
+    assert pieces(again) == [0, 1]
+    assert {piece(packet).targets for packet in again} == {frozenset((6, 7, 8))}

@@ -3,21 +3,17 @@
 import json
 import sys
 from collections.abc import Mapping
-from contextlib import AbstractContextManager
-from typing import NamedTuple
 
+from agents.attached import OnAir
 from agents.clocked import make_uav
 from agents.mission.chart import NO_CHART, Chart
-from fanet_mw.bus.topics import Topics
 from fanet_mw.errors import ConfigError
 from fanet_mw.hosts import interrupts, loop, service
-from fanet_mw.hosts.bus import Bus, config_of
 from fanet_mw.hosts.clock import START_PATIENCE_S
-from fanet_mw.hosts.realtime import Joining, RealtimeHost
-from fanet_mw.radios.field_bus import FieldBus, joined
-from fanet_mw.radios.udp import PORT, UdpRadio
+from fanet_mw.hosts.realtime import Joining
+from fanet_mw.radios.udp import PORT
 from fanet_mw.scenario import Scenario
-from fanet_mw.units import Enu, NodeId, S
+from fanet_mw.units import Enu, NodeId
 
 
 def run(scenario: Scenario, joining: Joining, *, node: NodeId, position: Enu, chart: Chart = NO_CHART) -> int:
@@ -26,48 +22,15 @@ def run(scenario: Scenario, joining: Joining, *, node: NodeId, position: Enu, ch
     return 0
 
 
-class OnAir(NamedTuple):
-    """A real interface, and the unix time of swarm instant 0 for a UAV without a router [s]."""
-
-    address: str
-    broadcast: str
-    port: int
-    epoch_unix_s: float | None
+def fly(scenario: Scenario, on_air: OnAir, *, node: NodeId) -> Mapping[str, object]:
+    """Run one UAV on a real radio until the scenario is over; returns its report. Raises BusError."""
+    return loop.run(_fly(scenario, on_air, node))
 
 
-def fly(scenario: Scenario, on_air: OnAir, joining: Joining, *, node: NodeId, position: Enu) -> Mapping[str, object]:
-    """Run one UAV on a real radio until the scenario is over; returns its report. Raises BusError.
-
-    A UAV that was told the epoch joins no router.
-    """
-    endpoint = None if on_air.epoch_unix_s is not None else joining.endpoint
-    router = joined(endpoint, config_of(joining.zenoh_config, f"agent-{node}"))
-    return loop.run(_fly(scenario, on_air, node, Topics(joining.swarm), router, position))
-
-
-async def _fly(
-    scenario: Scenario,
-    on_air: OnAir,
-    node: NodeId,
-    names: Topics,
-    router: AbstractContextManager[Bus | None],
-    position: Enu,
-) -> Mapping[str, object]:
-    epoch_unix_ns = None if on_air.epoch_unix_s is None else round(on_air.epoch_unix_s * S)
-    uav = make_uav(scenario, node, names.swarm, position=position)
-    with router as inner:
-        bus = FieldBus(names, node, inner=inner, epoch_unix_ns=epoch_unix_ns)
-        host = RealtimeHost(uav, bus, names)
-        radio = UdpRadio(
-            node, address=on_air.address, broadcast=on_air.broadcast, port=on_air.port,
-            max_frame_bytes=scenario.radio.max_frame_bytes, now_ns=host.now_ns, on_message=bus.on_radio,
-        )  # fmt: skip
-        bus.use(radio)
-        await radio.open()
-        try:
-            await host.run(until_ns=scenario.duration_ns, clock_timeout_s=START_PATIENCE_S)
-        finally:
-            radio.close()
+async def _fly(scenario: Scenario, on_air: OnAir, node: NodeId) -> Mapping[str, object]:
+    uav = make_uav(scenario, node, on_air.swarm or scenario.name, position=on_air.position)
+    async with on_air.opened(uav, scenario, node) as (host, radio):
+        await host.run(until_ns=scenario.duration_ns, clock_timeout_s=START_PATIENCE_S)
     return {**uav.report(), "radio": dict(sorted(radio.counts.items()))}
 
 
@@ -97,8 +60,12 @@ def main() -> int:
                     f"--epoch {given.epoch:g}: needs --radio-address; the emulated radio is on the router"
                 )
             return run(scenario, joining, node=node, position=at)
-        on_air = OnAir(given.radio_address, given.radio_broadcast, given.radio_port, given.epoch)
-        sys.stdout.write(json.dumps(fly(scenario, on_air, joining, node=node, position=at)) + "\n")
+        on_air = OnAir(
+            given.radio_address, given.radio_broadcast, given.radio_port, epoch_unix_s=given.epoch,
+            endpoint=None if given.epoch is not None else joining.endpoint, swarm=joining.swarm,
+            zenoh_config=joining.zenoh_config, position=at,
+        )  # fmt: skip
+        sys.stdout.write(json.dumps(fly(scenario, on_air, node=node)) + "\n")
         return 0
 
     return service.serve(given, start)

@@ -10,8 +10,10 @@ from collections.abc import AsyncIterator, Callable, Collection, Mapping, Sequen
 from pathlib import Path
 from typing import Any, Final, TypeVar
 
+from agents.attached import Drive, Emulated, NodeClosedError
 from agents.clocked import ClockedUav
-from agents.joined import Drive, Emulated, Mailbox, Node, NodeClosedError
+from agents.joined import Node
+from agents.mailbox import Mailbox
 from agents.uav import NodeState, Uav
 from fanet_mw.application import Application
 from fanet_mw.bus.radio_control import Cut, Degrade, Restore

@@ -20,6 +20,7 @@ from fanet_mw.bus.topics import Topics
 from fanet_mw.hosts.bus import Bus
 from fanet_mw.hosts.clock import ClockKeeper
 from fanet_mw.scenario import config
+from fanet_mw.testing.plugin import LaunchSwarm
 from sim.run.swarm import free_endpoint
 
 __all__ = ["network"]
@@ -99,14 +100,14 @@ def test_the_same_messages_arrive_in_virtual_time_over_zenoh_and_over_udp(tmp_pa
 
 
 def test_the_example_of_a_node_joins_from_its_wheel_and_is_answered_and_leaves_with_the_swarm(
-    tmp_path: Path, installed: Installed
+    tmp_path: Path, installed: Installed, real_swarm: LaunchSwarm
 ) -> None:
     path = _text(tmp_path / "letters.toml")
     scenario = config.load(path, ["duration_s=6"])
     (tmp_path / "letters.toml").write_text(SCENARIO.replace("= 12", "= 6"), encoding="utf-8")
 
     async def run() -> str:
-        async with fanet_mw.launch(scenario, leave_out=(1, 3)) as swarm:
+        async with real_swarm(scenario, leave_out=(1, 3)) as swarm:
             process = await asyncio.create_subprocess_exec(
                 installed.python, str(EXAMPLES / "my-message" / "node.py"), str(path), swarm.radio.endpoint,
                 stdout=subprocess.PIPE, cwd=tmp_path, env=installed.environment,

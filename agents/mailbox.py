@@ -1,0 +1,104 @@
+"""The application between a node and a program that has joined it: what is sent waits here, and so does what came.
+
+node.send(...)   ->  to_send  ->  port.send, when the host wakes the UAV  ->  what became of it, to who waits
+a message        ->  got      ->  node.receive()
+"""
+
+import asyncio
+from collections import deque
+from collections.abc import Callable, Collection
+from typing import Final, NamedTuple
+
+from fanet_mw.application import ANY, Application, Fate, Received, Status
+from fanet_mw.errors import DropReason, LocalProtocolError
+from fanet_mw.units import MS
+
+_MOST_UNREAD: Final = 4096
+
+
+class Sent(NamedTuple):
+    """What became of a message."""
+
+    fate: Fate
+    """The last that is known of it."""
+    acknowledged: tuple[int, ...] = ()
+    """Nodes whose application has it."""
+    lacking: tuple[int, ...] = ()
+    """Nodes that have not acknowledged it in its lifetime, or have nobody who listens."""
+    reason: DropReason | None = None
+    interval_ms: float | None = None
+    """Of a message that was refused: how far apart such messages must be; None: unknown."""
+
+    @property
+    def ok(self) -> bool:
+        """True when all have acknowledged it; of a message that nobody was to confirm: when it was let out."""
+        return not self.lacking and self.fate in (Fate.ACKNOWLEDGED, Fate.LET_OUT)
+
+
+class Message(NamedTuple):
+    """A message of another node."""
+
+    origin: int
+    data: bytes
+    port: int | None
+    """The port it was sent to; None: `data` are MAVLink frames."""
+    priority: int
+    hops: int
+    delay_ms: float
+    """From the other application's hand-over; as exact as the clocks of the two agree."""
+
+
+class Mailbox(Application):
+    """The application between a node and the program that has joined it."""
+
+    name = "joined"
+    ports = ANY
+    follows = (
+        Fate.REFUSED, Fate.LET_OUT, Fate.ACKNOWLEDGED, Fate.UNWANTED, Fate.EXPIRED, Fate.DROPPED,
+    )  # fmt: skip
+
+    def __init__(self, messages: Collection[int] = ()) -> None:
+        """`messages`: ids of the MAVLink messages that the program wants, or ANY."""
+        self.listens = messages
+        self.to_send: deque[tuple[Callable[[], int], asyncio.Future[Sent], bool]] = deque()
+        """Messages that wait for the host: how to send each, who waits for what became of it, and whether it is to be
+        confirmed."""
+        self._open: dict[int, tuple[asyncio.Future[Sent], bool, list[int], list[int]]] = {}
+        self.got: deque[Message] = deque(maxlen=_MOST_UNREAD)
+        self.news = asyncio.Event()
+        self.lost = 0
+        """Messages that nobody read in time."""
+
+    def next_wake_ns(self) -> int | None:
+        return 0 if self.to_send else None
+
+    def wake(self, now_ns: int) -> None:
+        while self.to_send:
+            send, future, confirm = self.to_send.popleft()
+            if future.cancelled():
+                continue
+            try:
+                self._open[send()] = future, confirm, [], []
+            except LocalProtocolError as error:
+                future.set_exception(error)
+
+    def on_message(self, message: Received, now_ns: int) -> None:
+        self.lost += len(self.got) == _MOST_UNREAD
+        port = message.port or None
+        delay_ms = max(0.0, (now_ns - message.born_ns) / MS)
+        self.got.append(Message(message.origin, message.data, port, message.priority, message.hops, delay_ms))
+        self.news.set()
+
+    def on_status(self, status: Status, now_ns: int) -> None:
+        found = self._open.get(status.handle)
+        if found is None:
+            return
+        future, confirm, has, lacks = found
+        (has if status.fate is Fate.ACKNOWLEDGED else lacks).extend(status.nodes)
+        if status.last or (status.fate is Fate.LET_OUT and not confirm):
+            del self._open[status.handle]
+            if not future.done():
+                interval_ms = None if status.interval_ns is None else status.interval_ns / MS
+                future.set_result(
+                    Sent(status.fate, tuple(sorted(has)), tuple(sorted(lacks)), status.reason, interval_ms)
+                )

@@ -26,8 +26,8 @@ _REALTIME = (
     "test_realtime", "test_host_realtime", "test_hosts", "test_radios", "test_real_radio", "test_time_scale",
     "test_back_pressure", "test_air_control",
 )  # fmt: skip
-"""Modules whose tests live in real time: beside tests that compute they would be late. They wait more than they work,
-so three of them go side by side; what judges lateness is marked `serial` besides, and has the machine to itself."""
+"""Modules whose tests live in real time. They wait more than they work, so four of them go side by side; none of them
+asks how late this machine is: frames are announced long ahead, and what ends soon by itself is waited for."""
 
 
 def pytest_collection_modifyitems(items: list[pytest.Item]) -> None:

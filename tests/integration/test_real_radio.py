@@ -46,7 +46,7 @@ protocol = "flooding"
 [clusters]
 count = 1
 [radio]
-lead_ms = 5
+lead_ms = 100
 [mission]
 reports_to_approach = 3
 """
@@ -188,7 +188,7 @@ async def test_the_same_mission_messages_arrive_over_real_sockets_as_in_emulatio
     delivered = [r for r in records if isinstance(r, Delivered) and (r.origin, r.seq) in traffic]
     assert len(traffic) == COUNT * 3
     assert len(delivered) == len(traffic) * (COUNT - 1)
-    assert max(r.delay_ns for r in delivered) < 500 * MS
+    assert max(r.delay_ns for r in delivered) < 2 * S
 
 
 def test_without_a_router_the_swarm_starts_at_the_epoch_that_all_were_given(network: list[str], tmp_path: Path) -> None:

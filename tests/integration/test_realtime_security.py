@@ -179,7 +179,6 @@ async def test_an_agent_cannot_answer_for_the_keeper_of_the_clock(keys: Path) ->
         await asyncio.wait_for(listener.stopped.wait(), 60)
 
 
-@pytest.mark.serial
 def test_a_swarm_of_processes_works_with_keys_and_access_lists(keys: Path) -> None:
     outcome = asyncio.run(launch(catalog.find("quick", SMALL), swarm="test", zenoh_config=keys))
     summary = finish(outcome, out=None)

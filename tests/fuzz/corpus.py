@@ -13,7 +13,26 @@ from typing import Any, Final, NamedTuple
 
 from fanet_mw import wire
 from fanet_mw.bus import topics
-from fanet_mw.bus.messages import Clock, ClockState, Message, Obstructions, Report, TraceBatch, TxRequest
+from fanet_mw.bus.messages import (
+    Altimeter,
+    Battery,
+    Call,
+    Camera,
+    Clock,
+    ClockState,
+    Echo,
+    Inertial,
+    Message,
+    Obstructions,
+    Person,
+    Radar,
+    Report,
+    Setpoint,
+    SetpointKind,
+    TraceBatch,
+    TxRequest,
+    Voice,
+)
 from fanet_mw.bus.radio_control import Cut, Degrade, Jam, Restore
 from fanet_mw.bus.topics import Topics
 from fanet_mw.errors import MalformedFrameError
@@ -153,6 +172,15 @@ _BY_HAND: Final[tuple[Message, ...]] = (
     Jam("jam", Enu(1.0, 2.0, 3.0), 100.0, -60.0, for_ns=S),
     Cut("cut", NodeId(3), for_ns=S),
     Restore("cut"),
+    Setpoint(S, Enu(1.0, 2.0, 3.0), 5.0),
+    Setpoint(S, Enu(1.0, 2.0, 3.0), 5.0, SetpointKind.VELOCITY, Enu(1.0, 0.0, -1.0)),
+    Camera(S, (Person(1.0, -0.5, 30.0), Person(2.0, -0.4, 40.0))),
+    Voice(S, (Call(1.0, -0.5, 30.0, 6.0),)),
+    Radar(S, (Echo(100.0, 1.0, -0.5, 3.0, 20.0), Echo(200.0, 2.0, 0.1, -1.0, 10.0))),
+    Altimeter(S, 50.0, None),
+    Altimeter(S, 50.0, 49.0),
+    Inertial(S, Enu(1.0, 2.0, 3.0)),
+    Battery(S, 15.0, 20.0, 0.5),
 )
 
 

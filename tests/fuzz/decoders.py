@@ -165,7 +165,7 @@ def _made(message: Any) -> Any:
 
 def _of_the_bus(found: Corpus) -> Iterator[Decoder]:
     checks = InputChecks(corpus.scenario_of("all", "duration_s=30"))
-    said = {kind: [put for put in found.puts if put[0] in topics.codes_of(kind)] for kind in _CHECKED}
+    said = {kind: [put for put in found.puts if put[0] == code] for kind, code in topics.CODES.items()}
 
     def put(pick: Random) -> bytes:
         first = mutations.put_changed(pick.choice(found.puts), pick)
@@ -192,6 +192,8 @@ def _of_the_bus(found: Corpus) -> Iterator[Decoder]:
         return None
 
     yield Decoder("put", topics.decode, put)
+    for kind in topics.CODES:
+        yield Decoder(f"put of {kind.__name__}", topics.decode, of(kind))
     for kind in _CHECKED:
         yield Decoder(f"{kind.__name__}, checked", checked, of(kind))
     lines = [line.encode() for line in found.lines]

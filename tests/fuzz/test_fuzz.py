@@ -1,6 +1,11 @@
 """A few seconds of both fuzzers (`scripts/fuzz` is the long run), and that they would notice."""
 
+import ast
+import re
+import sys
+from pathlib import Path
 from random import Random
+from types import FrameType
 
 import air
 import corpus
@@ -10,6 +15,8 @@ from decoders import Decoder, Wrong
 
 from fanet_mw.errors import MalformedFrameError
 
+ROOT = Path(__file__).parents[2]
+PACKAGES = ("fanet_mw", "agents", "emulator", "sim")
 INPUTS = 300
 TELLING = ("aodv", "olsr", "dsdv", "geographic", "all", "relay-counter", "measured", "claimed")
 """Swarms that say, together, every kind of message."""
@@ -32,6 +39,40 @@ def test_no_near_miss_of_anything_valid_is_more_than_one_error(every: list[Decod
 def test_most_decoders_are_brought_beyond_their_checksums(every: list[Decoder]) -> None:
     values = [decoders.feed(decoder, 50, Random(decoder.name))[0].values for decoder in every]
     assert sum(count > 0 for count in values) >= len(every) - 2, dict(zip(every, values, strict=True))
+
+
+def decode_functions() -> set[tuple[str, str]]:
+    """File and qualified name of every function of ours that, by its name, decodes what others send."""
+    found = set()
+    for path in (path for package in PACKAGES for path in (ROOT / package).rglob("*.py")):
+        text = path.read_text()
+        if path.parent == ROOT / "fanet_mw/dialect" or not re.search(r"def _?decode(_|\()", text):
+            continue  # the dialect is generated: a parser of pymavlink
+        for scope in ast.walk(ast.parse(text)):
+            if isinstance(scope, ast.Module | ast.ClassDef):
+                within = f"{scope.name}." if isinstance(scope, ast.ClassDef) else ""
+                functions = [item for item in scope.body if isinstance(item, ast.FunctionDef)]
+                names = [one.name for one in functions if re.match("_?decode(_|$)", one.name)]
+                found |= {(str(path), within + name) for name in names}
+    return {(path, name) for path, name in found if name != "decode_time"}  # of a number that is decoded already
+
+
+def test_every_decode_function_of_ours_is_fed(every: list[Decoder]) -> None:
+    called: set[tuple[str, str]] = set()
+
+    def note(frame: FrameType, event: str, _argument: object) -> None:
+        if event == "call" and "decode" in frame.f_code.co_name:
+            called.add((frame.f_code.co_filename, frame.f_code.co_qualname))
+
+    sys.setprofile(note)
+    try:
+        for decoder in every:
+            decoders.feed(decoder, 30, Random(decoder.name))
+    finally:
+        sys.setprofile(None)
+    wanted = decode_functions()
+    assert len(wanted) > 40
+    assert wanted - called == set()
 
 
 def raises(data: bytes) -> object:

@@ -17,8 +17,9 @@ Plan = Sequence[tuple[int, bytes]]
 class Attacker(Actor):
     """Sends a plan by the station of a node; hears nothing."""
 
-    def __init__(self, node: NodeId, swarm: str, plan: Plan) -> None:
+    def __init__(self, node: NodeId, swarm: str, plan: Plan, *, ahead_ns: int = 20 * MS) -> None:
         super().__init__(f"agent-{node}", ())
+        self._ahead_ns = ahead_ns
         self._node = node
         self._topic = Topics(swarm).radio_tx(node)
         self._plan = sorted(plan)
@@ -31,10 +32,10 @@ class Attacker(Actor):
         raise AssertionError("it hears nothing")
 
     def next_wake_ns(self) -> int | None:
-        return self._plan[self._sent][0] - 20 * MS if self._sent < len(self._plan) else None
+        return self._plan[self._sent][0] - self._ahead_ns if self._sent < len(self._plan) else None
 
     def wake(self, now_ns: int) -> None:
-        while self._sent < len(self._plan) and self._plan[self._sent][0] - 20 * MS <= now_ns:
+        while self._sent < len(self._plan) and self._plan[self._sent][0] - self._ahead_ns <= now_ns:
             t_ns, frame = self._plan[self._sent]
             self.outbox.append(
                 (self._topic, TxRequest(self._sent, max(t_ns, now_ns), frame, BROADCAST, wants_status=False))

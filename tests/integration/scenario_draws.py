@@ -210,18 +210,18 @@ class EndlessError(Exception):
 
 @contextmanager
 def _alarm(limit_s: float) -> Iterator[None]:
-    """Raises EndlessError in whatever runs for longer than this."""
+    """Raises EndlessError in whatever uses more processor time than this."""
 
     def ring(_signal: int, _frame: FrameType | None) -> None:
         raise EndlessError(f"still running after {limit_s:g} s")
 
-    before = signal.signal(signal.SIGALRM, ring)
-    signal.setitimer(signal.ITIMER_REAL, limit_s)
+    before = signal.signal(signal.SIGPROF, ring)
+    signal.setitimer(signal.ITIMER_PROF, limit_s)
     try:
         yield
     finally:
-        signal.setitimer(signal.ITIMER_REAL, 0)
-        signal.signal(signal.SIGALRM, before)
+        signal.setitimer(signal.ITIMER_PROF, 0)
+        signal.signal(signal.SIGPROF, before)
 
 
 def run(

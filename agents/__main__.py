@@ -10,15 +10,15 @@ from agents.mission.chart import NO_CHART, Chart
 from fanet_mw.errors import ConfigError
 from fanet_mw.hosts import interrupts, loop, service
 from fanet_mw.hosts.clock import START_PATIENCE_S
-from fanet_mw.hosts.realtime import Joining
+from fanet_mw.hosts.realtime import SwarmAddress
 from fanet_mw.radios.udp import PORT
 from fanet_mw.scenario import Scenario
 from fanet_mw.units import Enu, NodeId
 
 
-def run(scenario: Scenario, joining: Joining, *, node: NodeId, position: Enu, chart: Chart = NO_CHART) -> int:
+def run(scenario: Scenario, address: SwarmAddress, *, node: NodeId, position: Enu, chart: Chart = NO_CHART) -> int:
     """Run one UAV, with a map on board, against a router until the scenario is over; raises BusError."""
-    service.live(make_uav(scenario, node, joining.swarm, position=position, chart=chart), scenario, joining)
+    service.live(make_uav(scenario, node, address.swarm, position=position, chart=chart), scenario, address)
     return 0
 
 
@@ -48,7 +48,7 @@ def main() -> int:
     flags.add_argument("--epoch", type=float, help="unix time of swarm instant 0 [s]: no router, clocks by GPS or NTP")
     given = flags.parse_args()
 
-    def start(scenario: Scenario, joining: Joining) -> int:
+    def start(scenario: Scenario, address: SwarmAddress) -> int:
         node, at = NodeId(given.id), Enu(*given.at)
         if node not in scenario.node_ids:
             raise ConfigError(f"--id {node}: must be in [1, nodes.count = {scenario.nodes.count}]")
@@ -59,11 +59,11 @@ def main() -> int:
                 raise ConfigError(
                     f"--epoch {given.epoch:g}: needs --radio-address; the emulated radio is on the router"
                 )
-            return run(scenario, joining, node=node, position=at)
+            return run(scenario, address, node=node, position=at)
         on_air = OnAir(
             given.radio_address, given.radio_broadcast, given.radio_port, epoch_unix_s=given.epoch,
-            endpoint=None if given.epoch is not None else joining.endpoint, swarm=joining.swarm,
-            zenoh_config=joining.zenoh_config, position=at,
+            endpoint=None if given.epoch is not None else address.endpoint, swarm=address.swarm,
+            zenoh_config=address.zenoh_config, position=at,
         )  # fmt: skip
         sys.stdout.write(json.dumps(fly(scenario, on_air, node=node)) + "\n")
         return 0

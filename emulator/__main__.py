@@ -7,25 +7,25 @@ from emulator.capture_file import CaptureFile, unused
 from emulator.kernel.compile import COMPILING_NOTICE, must_compile, warm_up
 from emulator.medium import Medium
 from fanet_mw.hosts import interrupts, service
-from fanet_mw.hosts.realtime import Joining
+from fanet_mw.hosts.realtime import SwarmAddress
 from fanet_mw.scenario import Scenario
 
 
-def run(scenario: Scenario, joining: Joining, *, pcap: Path | None = None, receptions: bool = False) -> int:
+def run(scenario: Scenario, address: SwarmAddress, *, pcap: Path | None = None, receptions: bool = False) -> int:
     """Run the emulator against a router until the scenario is over, with a capture if a file is named.
 
     Raises BusError, and ConfigError when the file cannot be opened.
     """
     warm_up()
     if pcap is None:
-        service.live(Medium(scenario, joining.swarm), scenario, joining)
+        service.live(Medium(scenario, address.swarm), scenario, address)
         return 0
     with CaptureFile(unused(pcap), scenario.radio, receptions=receptions) as file:
 
         def on_epoch(epoch_unix_ns: int) -> None:
             file.pcap.epoch_unix_ns = epoch_unix_ns
 
-        service.live(Medium(scenario, joining.swarm, capture=file.pcap), scenario, joining, on_epoch=on_epoch)
+        service.live(Medium(scenario, address.swarm, capture=file.pcap), scenario, address, on_epoch=on_epoch)
     return 0
 
 
@@ -36,10 +36,10 @@ def main() -> int:
     parser.add_argument("--pcap-receptions", action="store_true", help="and every reception, with its RSSI")
     given = parser.parse_args()
 
-    def start(scenario: Scenario, joining: Joining) -> int:
+    def start(scenario: Scenario, address: SwarmAddress) -> int:
         if must_compile():
             sys.stderr.write(f"{COMPILING_NOTICE}\n")
-        return run(scenario, joining, pcap=given.pcap, receptions=given.pcap_receptions)
+        return run(scenario, address, pcap=given.pcap, receptions=given.pcap_receptions)
 
     return service.serve(given, start)
 

@@ -11,10 +11,10 @@ import numpy.typing as npt
 
 from emulator.arrays import MOST_ASKED, arrays_of
 from emulator.faults import Faults
-from emulator.geometry import Geometry
 from emulator.kernel import kernel
 from emulator.kernel import state as s
 from emulator.link_book import LinkBook
+from emulator.placement import Placement
 from fanet_mw.airtime import OVERHEAD_BYTES, airtime_ns
 from fanet_mw.bus.link_stats import LinkStats
 from fanet_mw.scenario import Scenario
@@ -32,8 +32,8 @@ class Air:
         self._radio = scenario.radio
         self._faults = faults
         self.book = LinkBook(stations)
-        self._geometry = Geometry(scenario, stations=stations)
-        self.arrays = arrays_of(scenario, self._geometry.links(spare=0), stations=stations, capture=capture)
+        self._placement = Placement(scenario, stations=stations)
+        self.arrays = arrays_of(scenario, self._placement.links(spare=0), stations=stations, capture=capture)
         # These views are the same memory by the buffer protocol, which reads a few numbers faster than numpy does.
         self._counts = self.arrays.g.data
         self._asked_bytes = self.arrays.asked.data.cast("B")
@@ -47,11 +47,11 @@ class Air:
 
     def obstruct(self, pairs: npt.NDArray[np.int64]) -> None:
         """Set the pairs of stations [n, 2] between which something stands; it counts from the next `place` on."""
-        self._geometry.obstruct(pairs)
+        self._placement.obstruct(pairs)
 
     def place(self, at: npt.NDArray[np.float64]) -> None:
         """Take over new positions [m], one row per station; frames on the way are carried over to the new links."""
-        if self._geometry.place(at):
+        if self._placement.place(at):
             self.relink()
 
     def relink(self) -> None:
@@ -60,8 +60,8 @@ class Air:
         self._take_in()
         self.book.take(a.lk)
         spare = int(a.lk[s.UNDERWAY].sum())
-        links = self._geometry.links(spare=spare)
-        a.sf[s.NOISE] = self._faults.apply(links, self._geometry.at)
+        links = self._placement.links(spare=spare)
+        a.sf[s.NOISE] = self._faults.apply(links, self._placement.at)
         a.g[s.REACH_NS] = max(a.g[s.REACH_NS] if spare else 0, links.longest_ns)
         room = 4 * (links.ints.shape[1] + a.st.shape[1]) + 64
         if a.hr.shape[0] < room + a.g[s.HR_N]:

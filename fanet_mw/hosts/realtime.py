@@ -328,7 +328,7 @@ def uss_mb() -> float | None:
     return round(sum(int(kb) for kb in private) / 1024, 2)
 
 
-class Joining(NamedTuple):
+class SwarmAddress(NamedTuple):
     """How a process finds its swarm."""
 
     swarm: str
@@ -343,7 +343,7 @@ class Joining(NamedTuple):
 
 async def run_actor(
     actor: Actor,
-    joining: Joining,
+    address: SwarmAddress,
     *,
     until_ns: int,
     scenario: Scenario | None = None,
@@ -356,7 +356,7 @@ async def run_actor(
     Raises BusError, and ConfigError when Zenoh's configuration cannot be used, or the swarm runs another scenario than
     `scenario`.
     """
-    config = config_of(joining.zenoh_config, actor.name)
-    with Bus.join(joining.endpoint, config, patience_s=joining.patience_s) as bus:
-        host = RealtimeHost(actor, bus, Topics(joining.swarm), timebase)
+    config = config_of(address.zenoh_config, actor.name)
+    with Bus.join(address.endpoint, config, patience_s=address.patience_s) as bus:
+        host = RealtimeHost(actor, bus, Topics(address.swarm), timebase)
         await host.run(until_ns=until_ns, clock_timeout_s=clock_timeout_s, scenario=scenario, on_epoch=on_epoch)

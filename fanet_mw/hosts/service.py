@@ -15,7 +15,7 @@ from fanet_mw.actor import Actor
 from fanet_mw.errors import ConfigError, FanetError
 from fanet_mw.hosts import interrupts, loop
 from fanet_mw.hosts.bus import exposure
-from fanet_mw.hosts.realtime import Joining, run_actor
+from fanet_mw.hosts.realtime import SwarmAddress, run_actor
 from fanet_mw.scenario import Scenario, config
 
 BUS_EXIT_CODE: Final = 3
@@ -35,14 +35,14 @@ def parser(program: str, description: str) -> argparse.ArgumentParser:
     return flags
 
 
-def serve(given: argparse.Namespace, run: Callable[[Scenario, Joining], int]) -> int:
-    """Load the scenario and `run(scenario, joining)`; a foreseen error becomes one message and an exit code."""
+def serve(given: argparse.Namespace, run: Callable[[Scenario, SwarmAddress], int]) -> int:
+    """Load the scenario and `run(scenario, address)`; a foreseen error becomes one message and an exit code."""
     interrupts.install()
     try:
         scenario = config.load(given.scenario, given.set)
         if (warning := exposure(given.connect, listens=False)) is not None:
             sys.stderr.write(f"{warning}\n")
-        return run(scenario, Joining(given.swarm or scenario.name, given.connect, given.zenoh_config))
+        return run(scenario, SwarmAddress(given.swarm or scenario.name, given.connect, given.zenoh_config))
     except FanetError as error:
         sys.stderr.write(f"{error}\n")
         return 2 if isinstance(error, ConfigError) else BUS_EXIT_CODE
@@ -51,7 +51,7 @@ def serve(given: argparse.Namespace, run: Callable[[Scenario, Joining], int]) ->
 
 
 def live(
-    actor: Actor, scenario: Scenario, joining: Joining, *, on_epoch: Callable[[int], None] = lambda _: None
+    actor: Actor, scenario: Scenario, address: SwarmAddress, *, on_epoch: Callable[[int], None] = lambda _: None
 ) -> None:
     """Run one actor against a router until the scenario is over; raises BusError."""
-    loop.run(run_actor(actor, joining, until_ns=scenario.duration_ns, scenario=scenario, on_epoch=on_epoch))
+    loop.run(run_actor(actor, address, until_ns=scenario.duration_ns, scenario=scenario, on_epoch=on_epoch))

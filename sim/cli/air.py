@@ -21,7 +21,7 @@ from fanet_mw.bus.radio_control import (
 from fanet_mw.errors import ConfigError
 from fanet_mw.units import MAX_NODES, Enu, NodeId, S, seconds_to_ns
 from sim.cli.console import Console
-from sim.cli.options import Where
+from sim.cli.options import SwarmFlags
 
 app = App(name="air", help="Change the air of a swarm that runs: degrade a link, jam an area, cut a node off, restore.")
 
@@ -50,7 +50,7 @@ def degrade(
     loss_share: float = 0.0,
     one_way: Annotated[bool, Parameter(negative="")] = False,
     life: Life = Life(),
-    where: Where = Where(),
+    where: SwarmFlags = SwarmFlags(),
 ) -> int:
     """Make a link weaker, or let it lose frames.
 
@@ -80,7 +80,7 @@ def jam(
     *,
     noise_dbm: float | None = None,
     life: Life = Life(),
-    where: Where = Where(),
+    where: SwarmFlags = SwarmFlags(),
 ) -> int:
     """Jam the receivers in a circle, at any height.
 
@@ -102,7 +102,7 @@ def jam(
 
 
 @app.command
-def cut(node: int, *, life: Life = Life(), where: Where = Where()) -> int:
+def cut(node: int, *, life: Life = Life(), where: SwarmFlags = SwarmFlags()) -> int:
     """Switch a node's radio off.
 
     Parameters
@@ -115,7 +115,7 @@ def cut(node: int, *, life: Life = Life(), where: Where = Where()) -> int:
 
 
 @app.command
-def restore(label: str = "", *, where: Where = Where()) -> int:
+def restore(label: str = "", *, where: SwarmFlags = SwarmFlags()) -> int:
     """End a fault, or all of them.
 
     Parameters
@@ -127,7 +127,7 @@ def restore(label: str = "", *, where: Where = Where()) -> int:
     return _do(Restore(label), where)
 
 
-def _do(control: Control, where: Where) -> int:
+def _do(control: Control, where: SwarmFlags) -> int:
     from sim.run.air_control import change
 
     if not isinstance(control, Restore) and (why := wrong(control, count=MAX_NODES)):

@@ -17,7 +17,7 @@ from sim.cli.console import Console
 from sim.run.running import DEFAULT_ENDPOINT, locate
 
 if TYPE_CHECKING:
-    from fanet_mw.hosts.realtime import Joining
+    from fanet_mw.hosts.realtime import SwarmAddress
     from fanet_mw.scenario import Scenario
 
 _err = Console(stderr=True)
@@ -36,7 +36,7 @@ def _seconds(_type: object, tokens: Sequence[Token]) -> float:
 
 @Parameter(name="*")
 @dataclass(frozen=True)
-class Choice:
+class ScenarioFlags:
     """What to run: a scenario and what to change in it."""
 
     set: Annotated[
@@ -77,7 +77,7 @@ class Choice:
 
 @Parameter(name="*")
 @dataclass(frozen=True)
-class Output:
+class OutputFlags:
     """Where the result goes."""
 
     out: Path | None = None
@@ -117,7 +117,7 @@ class Output:
 
 @Parameter(name="*")
 @dataclass(frozen=True)
-class Join:
+class ServiceFlags:
     """How a single service finds its swarm."""
 
     connect: str = DEFAULT_ENDPOINT
@@ -127,17 +127,17 @@ class Join:
     zenoh_config: Path | None = None
     """Zenoh's own configuration, JSON5 (TLS and the like): a file, or a folder of `fanet keys`."""
 
-    def joining(self, scenario: "Scenario") -> "Joining":
+    def address(self, scenario: "Scenario") -> "SwarmAddress":
         """The same for the service itself; says what others can do at the endpoint."""
-        from fanet_mw.hosts.realtime import Joining
+        from fanet_mw.hosts.realtime import SwarmAddress
 
         warn_of(self.connect, listens=False)
-        return Joining(self.swarm or scenario.name, self.connect, self.zenoh_config)
+        return SwarmAddress(self.swarm or scenario.name, self.connect, self.zenoh_config)
 
 
 @Parameter(name="*")
 @dataclass(frozen=True)
-class Where:
+class SwarmFlags:
     """Which of the swarms that run."""
 
     connect: str | None = None

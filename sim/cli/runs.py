@@ -13,7 +13,7 @@ from cyclopts import Parameter
 
 from sim.cli.completion import ScenarioName
 from sim.cli.console import Console
-from sim.cli.options import Choice, Output, warn_of, with_engine
+from sim.cli.options import OutputFlags, ScenarioFlags, warn_of, with_engine
 
 if TYPE_CHECKING:
     from cyclopts import App
@@ -30,7 +30,9 @@ def add_to(app: "App") -> None:
         app.command(command)
 
 
-def simulate(scenario: ScenarioName, *, choice: Choice = Choice(), output: Output = Output()) -> int:
+def simulate(
+    scenario: ScenarioName, *, choice: ScenarioFlags = ScenarioFlags(), output: OutputFlags = OutputFlags()
+) -> int:
     """Run a scenario in virtual time: deterministic, as fast as it goes.
 
     Parameters
@@ -63,8 +65,8 @@ def simulate(scenario: ScenarioName, *, choice: Choice = Choice(), output: Outpu
 def launch(
     scenario: ScenarioName,
     *,
-    choice: Choice = Choice(),
-    output: Output = Output(),
+    choice: ScenarioFlags = ScenarioFlags(),
+    output: OutputFlags = OutputFlags(),
     respawn: Annotated[bool, Parameter(negative="")] = False,
     no_world: Annotated[bool, Parameter(negative="")] = False,
     listen: str | None = None,
@@ -122,7 +124,7 @@ def launch(
 def plan(
     scenario: ScenarioName,
     *,
-    choice: Choice = Choice(),
+    choice: ScenarioFlags = ScenarioFlags(),
     deadline: float | None = None,
     search: Annotated[bool, Parameter(negative="")] = False,
     json: Annotated[bool, Parameter(negative="")] = False,
@@ -162,7 +164,7 @@ def _progress(scenario: "Scenario", *, quiet: bool) -> Iterator[Callable[[float]
         yield lambda seconds: progress.update(task, completed=seconds)
 
 
-def _finish(outcome: "Outcome", output: Output) -> int:
+def _finish(outcome: "Outcome", output: OutputFlags) -> int:
     """Write and show the result; 0 only when it may be used."""
     from json import dumps
 

@@ -11,7 +11,7 @@ from rich.table import Table
 from fanet_mw.errors import ConfigError
 from sim.cli.completion import ScenarioName
 from sim.cli.console import Console
-from sim.cli.options import Choice
+from sim.cli.options import ScenarioFlags
 from sim.scenarios.shipped import shipped
 
 if TYPE_CHECKING:
@@ -94,7 +94,7 @@ def init(
 def show(
     scenario: ScenarioName,
     *,
-    choice: Choice = Choice(),
+    choice: ScenarioFlags = ScenarioFlags(),
     changed: Switch = False,
     json_: Annotated[bool, Parameter(name="--json", negative="")] = False,
 ) -> int:
@@ -118,7 +118,7 @@ def show(
     return 0
 
 
-def check(file: ScenarioName, *, choice: Choice = Choice()) -> int:
+def check(file: ScenarioName, *, choice: ScenarioFlags = ScenarioFlags()) -> int:
     """Say whether a scenario file is right; name every mistake with its key, value and bound.
 
     Exit code 0: it is right; 2: it is not.

@@ -9,7 +9,7 @@ from cyclopts.validators import Number
 from rich.table import Table
 
 from sim.cli.console import Console
-from sim.cli.options import Where
+from sim.cli.options import SwarmFlags
 from sim.run.running import running
 
 
@@ -23,7 +23,7 @@ def links(
     *,
     node: int | None = None,
     reports: Annotated[int | None, Parameter(validator=Number(gte=1))] = None,
-    where: Where = Where(),
+    where: SwarmFlags = SwarmFlags(),
 ) -> int:
     """Show the links of a swarm that runs, the busiest first, renewed every second.
 

@@ -10,7 +10,7 @@ from cyclopts import App, Parameter
 from fanet_mw.errors import ConfigError
 from sim.cli.completion import ScenarioName
 from sim.cli.console import Console
-from sim.cli.options import Choice
+from sim.cli.options import ScenarioFlags
 
 
 def add_to(app: App) -> None:
@@ -23,7 +23,7 @@ def keys(
     scenario: ScenarioName,
     *,
     out: Path,
-    choice: Choice = Choice(),
+    choice: ScenarioFlags = ScenarioFlags(),
     swarm: str | None = None,
     host: Annotated[tuple[str, ...], Parameter(negative="")] = (),
     days: int = 365,

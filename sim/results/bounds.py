@@ -14,12 +14,12 @@ import numpy as np
 import numpy.typing as npt
 
 from fanet_mw.units import MS
-from sim.results.packets import Application
+from sim.results.packets import AppPackets
 
 Column = npt.NDArray[np.int64]
 
 
-def against_bounds(applications: Mapping[str, Application]) -> dict[str, Any]:
+def against_bounds(applications: Mapping[str, AppPackets]) -> dict[str, Any]:
     """`bound` of `summary.json`: everything together, and by application."""
     promised = {name: app for name, app in applications.items() if _promises(app)}
     if not promised:
@@ -30,7 +30,7 @@ def against_bounds(applications: Mapping[str, Application]) -> dict[str, Any]:
     }
 
 
-def likely(applications: Mapping[str, Application]) -> dict[str, Any]:
+def likely(applications: Mapping[str, AppPackets]) -> dict[str, Any]:
     """`likely` of `summary.json`: statements of (delay, share), compared with the copies of the packets they are about.
 
     within_share = deliveries within the delay stated for their packet / (packets with a statement x their targets)
@@ -57,11 +57,11 @@ def likely(applications: Mapping[str, Application]) -> dict[str, Any]:
     }
 
 
-def _promises(app: Application) -> bool:
+def _promises(app: AppPackets) -> bool:
     return any(sent.bound_ns is not None for sent in app.sent.values())
 
 
-def _judged(apps: list[Application]) -> dict[str, Any]:
+def _judged(apps: list[AppPackets]) -> dict[str, Any]:
     bounds = [sent.bound_ns for app in apps for sent in app.sent.values()]
     stated = [bound_ns for bound_ns in bounds if bound_ns is not None]
     wanted = sum(app.wanted for app in apps)
@@ -81,14 +81,14 @@ def _judged(apps: list[Application]) -> dict[str, Any]:
     }
 
 
-def delays_under_bound(app: Application) -> tuple[Column, Column]:
+def delays_under_bound(app: AppPackets) -> tuple[Column, Column]:
     """The delays of all deliveries whose packet had a bound, and those bounds."""
     delays_ns, bounds_ns = _beside(app, [-1 if sent.bound_ns is None else sent.bound_ns for sent in app.sent.values()])
     promised = bounds_ns >= 0
     return delays_ns[promised], bounds_ns[promised]
 
 
-def _beside(app: Application, of_packets: list[int]) -> tuple[Column, Column]:
+def _beside(app: AppPackets, of_packets: list[int]) -> tuple[Column, Column]:
     """The delay of each delivery, and beside it the figure of its packet."""
     figures = np.array(of_packets, dtype=np.int64)
     places = np.asarray(app.deliveries.packet, dtype=np.int64)

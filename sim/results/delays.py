@@ -11,7 +11,7 @@ from typing import Final
 import numpy as np
 
 from fanet_mw.units import MS
-from sim.results.packets import Application, Sent
+from sim.results.packets import AppPackets, SentPacket
 
 PARTS: Final = ("lead", "queue", "air", "handover")
 
@@ -26,7 +26,7 @@ def summed_up(delays_ns: Sequence[int]) -> dict[str, float | None]:
     return {name: round(float(value), 3) for name, value in named.items()}
 
 
-def parts(app: Application, *, lead_ns: int) -> dict[str, float | None]:
+def parts(app: AppPackets, *, lead_ns: int) -> dict[str, float | None]:
     """The mean of each part [ms], over the deliveries of packets that are known to have left their origin."""
     waited = np.array([_waited_ns(sent) for sent in app.sent.values()], dtype=np.float64)
     deliveries = app.deliveries
@@ -42,6 +42,6 @@ def parts(app: Application, *, lead_ns: int) -> dict[str, float | None]:
     return {name: round(float(column.mean()) / MS, 3) for name, column in zip(PARTS, columns, strict=True)}
 
 
-def _waited_ns(sent: Sent) -> float:
+def _waited_ns(sent: SentPacket) -> float:
     """From the hand-over of a packet until it was let out; not a number when that is not known."""
     return math.nan if sent.out_ns is None else float(sent.out_ns - sent.born_ns)

@@ -20,7 +20,7 @@ from sim.results import delays, ledger, validity
 from sim.results.bounds import against_bounds, likely
 from sim.results.clocks import clock_errors
 from sim.results.mission import mission
-from sim.results.packets import OTHER_APPS, Application, packets_of, targets_by_source
+from sim.results.packets import OTHER_APPS, AppPackets, packets_of, targets_by_source
 from sim.results.separation import separation
 from sim.results.stored import of
 from sim.run.outcome import Outcome
@@ -85,7 +85,7 @@ def _messages(outcome: Outcome) -> dict[str, int]:
     return dict(sorted(total.items()))
 
 
-def _packets(outcome: Outcome, packets: Mapping[str, Application]) -> dict[str, dict[str, Any]]:
+def _packets(outcome: Outcome, packets: Mapping[str, AppPackets]) -> dict[str, dict[str, Any]]:
     """Generated, delivered, PDR and delay of each application."""
     lead_ns = outcome.scenario.radio.lead_ns
     result: dict[str, dict[str, Any]] = {

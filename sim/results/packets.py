@@ -23,7 +23,7 @@ Name = tuple[int, int]
 
 
 @dataclass(frozen=True, slots=True)
-class Sent:
+class SentPacket:
     """One packet at its origin."""
 
     born_ns: int
@@ -56,10 +56,10 @@ class Deliveries:
 
 
 @dataclass(slots=True)
-class Application:
+class AppPackets:
     """The packets of one application and their deliveries, all nodes together."""
 
-    sent: dict[Name, Sent] = field(default_factory=dict)
+    sent: dict[Name, SentPacket] = field(default_factory=dict)
     """By name, in the order in which they were generated."""
     wanted: int = 0
     """The number of packets times the nodes for which each was meant."""
@@ -70,21 +70,21 @@ class Application:
     the first application."""
 
 
-def packets_of(outcome: Outcome) -> Mapping[str, Application]:
+def packets_of(outcome: Outcome) -> Mapping[str, AppPackets]:
     """By application: classes of traffic, those of `OTHER_APPS`, then those of users as they began to send.
 
     To which nodes a packet of a user's application is meant to go is not in the trace: its `wanted` stays 0.
     """
     classes = [*outcome.scenario.traffic_classes]
-    found = {app: Application() for app in (*classes, *OTHER_APPS)}
-    app_of: dict[Name, tuple[Application, int]] = {}  # and the packet's place there
+    found = {app: AppPackets() for app in (*classes, *OTHER_APPS)}
+    app_of: dict[Name, tuple[AppPackets, int]] = {}  # and the packet's place there
     meant_for: dict[Name, frozenset[int]] = {}  # the targets of packets of traffic
     targets = {name: targets_by_source(outcome, name) for name in classes}
     others = outcome.scenario.nodes.count - 1
     for born in of(outcome.records, Generated):
-        app, name = found.setdefault(born.app, Application()), (born.node, born.seq)
+        app, name = found.setdefault(born.app, AppPackets()), (born.node, born.seq)
         app_of[name] = app, len(app.sent)
-        app.sent[name] = Sent(born.t_ns)
+        app.sent[name] = SentPacket(born.t_ns)
         if born.app in targets:
             meant_for[name] = targets[born.app][born.node]
             app.wanted += len(targets[born.app][born.node])
@@ -116,12 +116,12 @@ def packets_of(outcome: Outcome) -> Mapping[str, Application]:
     return found
 
 
-def first_class_of(outcome: Outcome) -> Application:
+def first_class_of(outcome: Outcome) -> AppPackets:
     """The first class of traffic."""
     return packets_of(outcome)[next(iter(outcome.scenario.traffic_classes))]
 
 
-def _known(sent: Sent, record: LetOut | BoundStated | LikelyStated) -> Sent:
+def _known(sent: SentPacket, record: LetOut | BoundStated | LikelyStated) -> SentPacket:
     match record:
         case LetOut():
             return replace(sent, out_ns=record.t_ns)

@@ -71,7 +71,7 @@ class Launched:
     def __init__(self, scenario: Scenario, swarm: SwarmRun) -> None:
         self.scenario = scenario
         self.processes = swarm.processes
-        self.radio = Emulated(endpoint=swarm.joining.endpoint, swarm=swarm.joining.swarm, patience_s=READY_TIMEOUT_S)
+        self.radio = Emulated(endpoint=swarm.address.endpoint, swarm=swarm.address.swarm, patience_s=READY_TIMEOUT_S)
         """How a node that was left out joins: `join(swarm.scenario, node=3, radio=swarm.radio)`."""
         self.result: Result | None = None
         """Once the block is left."""

@@ -5,7 +5,7 @@ from typing import Any, Final, NamedTuple
 
 from agents.__main__ import run as run_agent
 from emulator.__main__ import run as run_emulator
-from fanet_mw.hosts.realtime import Joining
+from fanet_mw.hosts.realtime import SwarmAddress
 from fanet_mw.scenario import Scenario
 from fanet_mw.units import NodeId
 from sim.run.processes import Entry
@@ -30,7 +30,7 @@ class Services(NamedTuple):
     """What the launcher of one swarm starts."""
 
     scenario: Scenario
-    joining: Joining
+    address: SwarmAddress
     own_world: bool = True
     """False when a foreign world tells where the UAVs are; no report of it is expected."""
     leave_out: frozenset[int] = frozenset()
@@ -40,7 +40,7 @@ class Services(NamedTuple):
 
     def each(self) -> Iterator[Service]:
         """The emulator, the world, and the UAVs by id."""
-        common = {"scenario": self.scenario, "joining": self.joining}
+        common = {"scenario": self.scenario, "address": self.address}
         yield Service("emulator", run_emulator, {**common, **self.emulator_options})
         if self.own_world:
             yield Service("world", run_world, common)

@@ -21,7 +21,7 @@ from fanet_mw.errors import BusError
 from fanet_mw.hosts import interrupts
 from fanet_mw.hosts.bus import Bus, config_of
 from fanet_mw.hosts.clock import ClockKeeper, SwarmClock
-from fanet_mw.hosts.realtime import Joining
+from fanet_mw.hosts.realtime import SwarmAddress
 from fanet_mw.scenario import Scenario
 from fanet_mw.units import S
 from sim.run import limits
@@ -59,8 +59,8 @@ class SwarmRun:
     def __init__(
         self, services: Services, bus: Bus, *, respawn: bool, tell: Tell, spool_folder: Path | None = None
     ) -> None:
-        scenario, self.joining = services.scenario, services.joining
-        names = Topics(self.joining.swarm)
+        scenario, self.address = services.scenario, services.address
+        names = Topics(self.address.swarm)
         self._services = services
         self._tell = tell
         self._collector = Collector(scenario, bus.subscribe, names, now_ns=time.monotonic_ns, folder=spool_folder)
@@ -273,8 +273,8 @@ async def launch(
     bus, endpoint = _bus(listen, connect, zenoh_config)
     with bus, registered(swarm, endpoint) as known:
         on_event(f"swarm {swarm} on {endpoint}" + ("" if known else "; other commands must be told so: --connect"))
-        joining = Joining(swarm, endpoint, zenoh_config, READY_TIMEOUT_S)
-        services = Services(scenario, joining, own_world, frozenset(leave_out), emulator_options or {})
+        address = SwarmAddress(swarm, endpoint, zenoh_config, READY_TIMEOUT_S)
+        services = Services(scenario, address, own_world, frozenset(leave_out), emulator_options or {})
         run = SwarmRun(services, bus, respawn=respawn, tell=on_event, spool_folder=spool_folder)
         loop = asyncio.get_running_loop()
         signals = interrupts.SIGNALS if heed_signals else ()

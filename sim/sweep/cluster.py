@@ -14,7 +14,7 @@ from sim.sweep.provenance import code
 from sim.sweep.tasks import Task
 
 
-class Cluster:
+class DaskCluster:
     """The workers behind one scheduler."""
 
     def __init__(self, address: str) -> None:

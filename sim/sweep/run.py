@@ -35,7 +35,7 @@ class Progress:
     left_s: float
 
 
-class Plan:
+class SweepPlan:
     """The runs of a sweep, and which of them are still to do."""
 
     def __init__(self, tasks: Sequence[Task], store: Store, *, retry: bool = False) -> None:
@@ -55,7 +55,7 @@ def _wanted(done: Finished | None, *, retry: bool) -> bool:
 
 
 def run(
-    plan: Plan,
+    plan: SweepPlan,
     store: Store,
     workers: Workers,
     varied: Sequence[str],

@@ -68,7 +68,7 @@ class Case(_Table):
     grid: Axes = {}
 
 
-class Variant(_Table):
+class SweepVariant(_Table):
     """What a variant of the sweep replaces: the seeds, single keys of `set`, single axes of the grid, the cases."""
 
     seeds: Seeds | None = None
@@ -101,15 +101,15 @@ class Sweep(_Table):
     case: tuple[Case, ...] = ()
     measure: tuple[str, ...] = ()
     """What is measured besides the summary; see `sim/sweep/measures.py`."""
-    quick: Variant | None = None
-    full: Variant | None = None
+    quick: SweepVariant | None = None
+    full: SweepVariant | None = None
 
     def variant(self, name: str | None) -> "Sweep":
         """The sweep with what the variant replaces; None: as it stands."""
         if name is None:
             return self
         chosen = getattr(self, name, None) if name in VARIANTS else None
-        if not isinstance(chosen, Variant):
+        if not isinstance(chosen, SweepVariant):
             has = [known for known in VARIANTS if getattr(self, known) is not None]
             raise ConfigError(f"--variant {name}: the sweep has {' and '.join(has) or 'no variants'}")
         cases = self.case

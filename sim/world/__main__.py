@@ -1,15 +1,15 @@
 """The world as a process: `python -m sim.world.__main__ SCENARIO.toml`, or `fanet world`."""
 
 from fanet_mw.hosts import interrupts, service
-from fanet_mw.hosts.realtime import Joining
+from fanet_mw.hosts.realtime import SwarmAddress
 from fanet_mw.scenario import Scenario
 from sim.world.flight_recorder import Flight
 from sim.world.world import World
 
 
-def run(scenario: Scenario, joining: Joining, *, flight: Flight | None = None) -> int:
+def run(scenario: Scenario, address: SwarmAddress, *, flight: Flight | None = None) -> int:
     """Run the world against a router until the scenario is over, on from `flight` if given; raises BusError."""
-    service.live(World(scenario, joining.swarm, flight=flight), scenario, joining)
+    service.live(World(scenario, address.swarm, flight=flight), scenario, address)
     return 0
 
 

@@ -18,7 +18,7 @@ from fanet_mw.bus.topics import Topics
 from fanet_mw.hosts.bus import Bus
 from fanet_mw.hosts.clock import ClockKeeper
 from fanet_mw.hosts.lateness import Histogram
-from fanet_mw.hosts.realtime import Joining, run_actor
+from fanet_mw.hosts.realtime import SwarmAddress, run_actor
 from fanet_mw.units import S
 from sim.run.processes import Processes
 from sim.run.swarm import Collector, free_endpoint
@@ -63,7 +63,7 @@ class Talker(Actor):
 
 
 def talk(*, node: int, rate_hz: float, endpoint: str) -> int:
-    asyncio.run(run_actor(Talker(node, rate_hz), Joining("bench", endpoint), until_ns=RUN_S * S))
+    asyncio.run(run_actor(Talker(node, rate_hz), SwarmAddress("bench", endpoint), until_ns=RUN_S * S))
     return 0
 
 

@@ -24,7 +24,7 @@ from fanet_mw.bus.topics import Topics
 from fanet_mw.hosts import loop
 from fanet_mw.hosts.bus import Bus
 from fanet_mw.hosts.clock import ClockKeeper, ClockListener
-from fanet_mw.hosts.realtime import Joining, run_actor
+from fanet_mw.hosts.realtime import SwarmAddress, run_actor
 from fanet_mw.scenario import Scenario, config
 from fanet_mw.units import MS, NodeId, S
 from sim.run.processes import Processes
@@ -100,7 +100,7 @@ _AIR_NS: Final = 192_000 + -(-8 * (SIZE + 64) * 1000 // 11_000) * 1000 + 334
 
 
 def ping(*, node: int, every_ns: int, endpoint: str) -> int:
-    loop.run(run_actor(Pinger(node, every_ns), Joining("relay", endpoint), until_ns=RUN_S * S))
+    loop.run(run_actor(Pinger(node, every_ns), SwarmAddress("relay", endpoint), until_ns=RUN_S * S))
     return 0
 
 
@@ -138,7 +138,7 @@ async def measure(rate: float) -> dict[str, list[int]]:
         expected = ["emulator", "world", "relay", *(f"agent-{node}" for node in nodes)]
         keeper = ClockKeeper(bus, NAMES, time_scale=1.0, expected=expected)
         processes = Processes(lambda _name, _code: None)
-        common = {"scenario": chosen, "joining": Joining("relay", endpoint)}
+        common = {"scenario": chosen, "address": SwarmAddress("relay", endpoint)}
         processes.start("emulator", run_emulator, common)
         processes.start("world", run_world, common)
         processes.start("relay", relay, {"endpoint": endpoint})

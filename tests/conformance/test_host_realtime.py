@@ -24,7 +24,7 @@ from fanet_mw.errors import BusError
 from fanet_mw.hosts.bus import Bus
 from fanet_mw.hosts.clock import ClockKeeper, ClockListener, SwarmClock
 from fanet_mw.hosts.lateness import Histogram
-from fanet_mw.hosts.realtime import Joining, run_actor
+from fanet_mw.hosts.realtime import SwarmAddress, run_actor
 from fanet_mw.hosts.timebase import THIS_MACHINE, Timebase
 from fanet_mw.trace import ProcessEnded
 from fanet_mw.units import MS, NodeId, S
@@ -121,7 +121,7 @@ async def run(actor: Actor, *, until_ns: int, stop_after_s: float | None = None,
     with Bus.serve(endpoint) as bus:
         observer = Observer(bus)
         keeper = ClockKeeper(bus, NAMES, time_scale=1.0, expected=[actor.name])
-        host = asyncio.create_task(run_actor(actor, Joining("host", endpoint), until_ns=until_ns))
+        host = asyncio.create_task(run_actor(actor, SwarmAddress("host", endpoint), until_ns=until_ns))
         clock = SwarmClock(await keeper.start(timeout_s=_PATIENCE_S))
         await asyncio.sleep(clock.wait_s(50 * MS))
         if say:
@@ -192,7 +192,7 @@ async def test_what_was_on_its_way_at_the_end_is_counted_or_still_heard(
     with Bus.serve(endpoint) as bus:
         observer = Observer(bus)
         keeper = ClockKeeper(bus, NAMES, time_scale=1.0, expected=[actor.name])
-        host = asyncio.create_task(run_actor(actor, Joining("host", endpoint), until_ns=until_ns))
+        host = asyncio.create_task(run_actor(actor, SwarmAddress("host", endpoint), until_ns=until_ns))
         clock = SwarmClock(await keeper.start(timeout_s=_PATIENCE_S))
         await asyncio.sleep(clock.wait_s(until_ns + 30 * MS))
         bus.put(NAMES.pose, topics.encode([Reception(b"last", NodeId(2), until_ns, -60.0)]))
@@ -270,7 +270,7 @@ async def test_a_host_whose_router_dies_ends_soon(
     endpoint, process = router
     with Bus.join(endpoint) as bus:
         keeper = ClockKeeper(bus, NAMES, time_scale=1.0, expected=["ticker"])
-        host = asyncio.create_task(run_actor(Ticker(), Joining("host", endpoint), until_ns=1000 * S))
+        host = asyncio.create_task(run_actor(Ticker(), SwarmAddress("host", endpoint), until_ns=1000 * S))
         if started:
             await keeper.start(timeout_s=_PATIENCE_S)
         await asyncio.sleep(0.6)
@@ -361,7 +361,9 @@ async def test_an_actor_that_starts_after_a_step_of_the_clock_joins_the_swarm_wh
         keeper = ClockKeeper(bus, NAMES, time_scale=1.0, expected=[])
         clock = SwarmClock(await keeper.start(timeout_s=_PATIENCE_S))
         await asyncio.sleep(clock.wait_s(700 * MS))
-        host = asyncio.create_task(run_actor(actor, Joining("host", endpoint), until_ns=1000 * S, timebase=stepped))
+        host = asyncio.create_task(
+            run_actor(actor, SwarmAddress("host", endpoint), until_ns=1000 * S, timebase=stepped)
+        )
         while actor.wakes < 5 and not host.done():  # noqa: ASYNC110  (real time passes)
             await asyncio.sleep(0.01)
         assert 700 * MS < actor.next_ns < clock.now_ns() + 100 * MS

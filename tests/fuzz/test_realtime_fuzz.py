@@ -8,19 +8,19 @@ from air import EVIL, Fuzzer
 
 from agents.__main__ import run as run_agent
 from fanet_mw.hosts import service
-from fanet_mw.hosts.realtime import Joining
+from fanet_mw.hosts.realtime import SwarmAddress
 from fanet_mw.scenario import Scenario
 from sim.results.files import finish
 from sim.run.swarm import launch
 from sim.scenarios import catalog
 
 
-def agent_or_fuzzer(*, scenario: Scenario, joining: Joining, node: int, **others: Any) -> int:
+def agent_or_fuzzer(*, scenario: Scenario, address: SwarmAddress, node: int, **others: Any) -> int:
     """What runs in the place of an agent."""
     if node != EVIL:
-        return run_agent(scenario, joining, node=node, **others)
-    fuzzer = Fuzzer(joining.swarm, scenario.seed, every_ms=10, lead_ms=60)
-    service.live(fuzzer, scenario, joining)
+        return run_agent(scenario, address, node=node, **others)
+    fuzzer = Fuzzer(address.swarm, scenario.seed, every_ms=10, lead_ms=60)
+    service.live(fuzzer, scenario, address)
     return 0
 
 

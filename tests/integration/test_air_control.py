@@ -18,7 +18,7 @@ from fanet_mw.bus.topics import Topics
 from fanet_mw.errors import FanetError
 from fanet_mw.hosts.bus import Bus
 from fanet_mw.hosts.clock import ClockKeeper, SwarmClock
-from fanet_mw.hosts.realtime import Joining, run_actor
+from fanet_mw.hosts.realtime import SwarmAddress, run_actor
 from fanet_mw.units import BROADCAST, MS, NodeId, S
 from sim.cli.app import app
 from sim.results.files import finish
@@ -39,7 +39,7 @@ async def emulator(
     with Bus.serve(endpoint) as bus:
         bus.subscribe(Topics(swarm).report("emulator"), lambda _, payload: reports.append(payload))
         keeper = ClockKeeper(bus, Topics(swarm), time_scale=time_scale, expected=["emulator"])
-        host = asyncio.create_task(run_actor(Medium(scenario, swarm), Joining(swarm, endpoint), until_ns=1000 * S))
+        host = asyncio.create_task(run_actor(Medium(scenario, swarm), SwarmAddress(swarm, endpoint), until_ns=1000 * S))
         clock = SwarmClock(await keeper.start(timeout_s=60))
         await asyncio.sleep(clock.wait_s(10 * MS))
         try:

@@ -190,7 +190,7 @@ def test_a_launcher_that_is_terminated_while_it_starts_says_so_in_its_exit_code(
 def late_agent(*, node: int, **arguments: Any) -> int:
     """Node 2 finds no router when it is started for the first time, as on a machine that has other things to do; node 3
     takes its time."""
-    there = Path(tempfile.gettempdir()) / f"{arguments['joining'].swarm}-agent-2"
+    there = Path(tempfile.gettempdir()) / f"{arguments['address'].swarm}-agent-2"
     if node == 2 and not there.exists():
         there.touch()
         raise BusError("no Zenoh router")

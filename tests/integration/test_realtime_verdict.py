@@ -113,7 +113,7 @@ class Watch:
         self.poses: list[Poses] = []
 
     def __call__(self, swarm: SwarmRun) -> None:
-        self.bus = Bus.join(swarm.joining.endpoint)
+        self.bus = Bus.join(swarm.address.endpoint)
         self.bus.subscribe(Topics("verdict").pose, lambda _, payload: self.poses.extend(topics.decode(payload)))  # type: ignore[arg-type]
 
     def jump_m(self) -> float:

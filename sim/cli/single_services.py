@@ -8,7 +8,7 @@ from cyclopts import App, Parameter
 from fanet_mw.errors import FanetError
 from sim.cli.completion import ScenarioName
 from sim.cli.console import Console
-from sim.cli.options import Choice, Join, Output, warn_of, with_engine
+from sim.cli.options import OutputFlags, ScenarioFlags, ServiceFlags, warn_of, with_engine
 from sim.run.running import DEFAULT_ENDPOINT
 
 _err = Console(stderr=True)
@@ -23,7 +23,7 @@ def add_to(app: App) -> None:
 def router(
     scenario: ScenarioName,
     *,
-    choice: Choice = Choice(),
+    choice: ScenarioFlags = ScenarioFlags(),
     listen: str = DEFAULT_ENDPOINT,
     swarm: str | None = None,
     out: Path | None = None,
@@ -54,7 +54,7 @@ def router(
     from sim.run.router import serve
 
     chosen = choice.realtime_scenario(scenario)
-    Output(out=out, force=force).prepare()
+    OutputFlags(out=out, force=force).prepare()
     warn_of(listen, listens=True)
     code: int = loop.run(
         serve(
@@ -78,8 +78,8 @@ def router(
 def emulator(
     scenario: ScenarioName,
     *,
-    choice: Choice = Choice(),
-    join: Join = Join(),
+    choice: ScenarioFlags = ScenarioFlags(),
+    join: ServiceFlags = ServiceFlags(),
     pcap: Path | None = None,
     pcap_receptions: Annotated[bool, Parameter(negative="")] = False,
 ) -> int:
@@ -101,10 +101,12 @@ def emulator(
     chosen = choice.realtime_scenario(scenario)
     if must_compile():
         _err.print(COMPILING_NOTICE, highlight=False)
-    return run(chosen, join.joining(chosen), pcap=pcap, receptions=pcap_receptions)
+    return run(chosen, join.address(chosen), pcap=pcap, receptions=pcap_receptions)
 
 
-def world(scenario: ScenarioName, *, choice: Choice = Choice(), join: Join = Join()) -> int:
+def world(
+    scenario: ScenarioName, *, choice: ScenarioFlags = ScenarioFlags(), join: ServiceFlags = ServiceFlags()
+) -> int:
     """Run the world alone, against a router.
 
     Parameters
@@ -116,10 +118,16 @@ def world(scenario: ScenarioName, *, choice: Choice = Choice(), join: Join = Joi
     from sim.world.__main__ import run
 
     chosen = with_engine(choice.realtime_scenario(scenario))
-    return run(chosen, join.joining(chosen))
+    return run(chosen, join.address(chosen))
 
 
-def agent(scenario: ScenarioName, *, id: int, choice: Choice = Choice(), join: Join = Join()) -> int:  # noqa: A002
+def agent(
+    scenario: ScenarioName,
+    *,
+    id: int,  # noqa: A002
+    choice: ScenarioFlags = ScenarioFlags(),
+    join: ServiceFlags = ServiceFlags(),
+) -> int:
     """Run one UAV alone, against a router.
 
     Parameters
@@ -138,4 +146,4 @@ def agent(scenario: ScenarioName, *, id: int, choice: Choice = Choice(), join: J
     if id not in chosen.node_ids:
         raise FanetError(f"--id {id}: must be in [1, nodes.count = {chosen.nodes.count}]")
     start = positions(chosen)[id - 1]
-    return run(chosen, join.joining(chosen), node=NodeId(id), position=start)
+    return run(chosen, join.address(chosen), node=NodeId(id), position=start)

@@ -8,7 +8,7 @@ from emulator.channel.shadowing import Shadowing
 from fanet_mw.scenario import Scenario
 
 
-class Geometry:
+class Placement:
     """Positions and obstructions in force; at first no station is within reach of another."""
 
     def __init__(self, scenario: Scenario, *, stations: int) -> None:

@@ -4,6 +4,7 @@
     connected   share of the time in which all living UAVs were one component at the radio's reach
     confirmed   survivors of whom a UAV said that it saw them at close range, and where they truly are: within 25 m; the
                 others are mistaken. The error is that of the place it told first, of both
+    nearest     of each living UAV once a second: how far the nearest other one is
 
 Positions are the true ones, once a second (`Posed`).
 """
@@ -29,6 +30,8 @@ _MISTAKEN_M: Final = 25.0
 """Whoever announces a survivor farther than this from the true place has taken somebody else for that one."""
 
 Rows = npt.NDArray[np.float64]
+Values = npt.NDArray[np.float64]
+Flags = npt.NDArray[np.bool_]
 
 
 def mission(scenario: Scenario, records: Collection[Record]) -> dict[str, Any]:
@@ -75,9 +78,14 @@ def _flown(scenario: Scenario, records: Iterable[Record]) -> dict[str, Any]:
     covered = Covered(scenario)
     together = instants = 0
     nearly_all_ns: int | None = None
+    nearest: list[Values] = []
     for t_ns, at in _instants(records):
         instants += 1
-        together += _is_one(at, scenario.radio.range_m)
+        apart = np.linalg.norm(at[:, None] - at[None], axis=2)
+        together += _is_one(apart <= scenario.radio.range_m)
+        if len(at) > 1:
+            np.fill_diagonal(apart, math.inf)
+            nearest.append(apart.min(axis=0))
         covered.add(at.tolist())
         if nearly_all_ns is None and covered.share >= _NEARLY_ALL:
             nearly_all_ns = t_ns
@@ -85,7 +93,14 @@ def _flown(scenario: Scenario, records: Iterable[Record]) -> dict[str, Any]:
         "coverage": round(covered.share, 6) if instants else None,
         "covered_95_s": None if nearly_all_ns is None else round(nearly_all_ns / S, 3),
         "connected": round(together / instants, 6) if instants else None,
+        "nearest_m": _spread(np.concatenate(nearest)) if nearest else None,
     }
+
+
+def _spread(distances_m: Values) -> dict[str, float]:
+    """The least distance, that of the hundredth part, and the median."""
+    least, hundredth, median = np.quantile(distances_m, (0.0, 0.01, 0.5)).tolist()
+    return {"least": round(least, 2), "p1": round(hundredth, 2), "p50": round(median, 2)}
 
 
 def _instants(records: Iterable[Record]) -> Iterator[tuple[int, Rows]]:
@@ -107,13 +122,12 @@ def _instants(records: Iterable[Record]) -> Iterator[tuple[int, Rows]]:
         yield t_ns, np.array(rows)
 
 
-def _is_one(at: Rows, reach_m: float) -> bool:
-    """Whether everyone reaches everyone, over hops of at most the radio's reach."""
-    near = np.linalg.norm(at[:, None] - at[None], axis=2) <= reach_m
-    reached = np.zeros(len(at), bool)
+def _is_one(near: Flags) -> bool:
+    """Whether everyone reaches everyone over hops, given who reaches whom."""
+    reached = np.zeros(len(near), bool)
     reached[0] = True
     while True:
-        further = near[reached].any(axis=0)
+        further: Flags = near[reached].any(axis=0)
         if (further == reached).all():
             return bool(reached.all())
         reached = further

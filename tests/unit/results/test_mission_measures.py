@@ -55,3 +55,10 @@ def test_without_positions_nothing_is_claimed_of_the_flight() -> None:
 def test_a_survivor_announced_where_somebody_else_is_does_not_count() -> None:
     found = measured([Confirmed(7 * S, 1, 1, -100.0, 0.0), Confirmed(9 * S, 2, 1, 100.0, 0.0)])
     assert (found["confirmed"], found["mistaken"], found["time_to_confirm_s"]) == (0, 1, [])
+
+
+def test_the_nearest_other_uav_is_looked_for_once_a_second_among_the_living() -> None:
+    records = [record for t_s in range(1, 100) for record in at(t_s, 0, 60, 160)]
+    found = measured([*records, *at(100, 0, 6, 160), ProcessEnded(100 * S, 2, "agent-2", 1), *at(101, 0, 1, 160)])
+    assert found["nearest_m"] == {"least": 6.0, "p1": 60.0, "p50": 60.0}
+    assert measured(at(1, 0))["nearest_m"] is None

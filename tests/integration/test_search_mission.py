@@ -1,0 +1,142 @@
+"""A whole planned search in small: 12 UAVs, 500 x 500 m, three survivors; what it is led by, and what it survives."""
+
+from array import array
+from collections.abc import Callable
+from typing import Final
+
+import pytest
+
+from fanet_mw.actor import Actor
+from fanet_mw.bus.messages import Message, Obstructions, Poses
+from fanet_mw.bus.topics import Topics
+from fanet_mw.hosts.virtual import VirtualHost
+from fanet_mw.trace import Confirmed, Planned, Record
+from fanet_mw.units import S
+from sim.results.mission import mission
+from sim.run.outcome import Outcome
+from sim.run.virtual import actors_of
+from sim.scenarios.catalog import find
+
+KEYS: Final = (
+    "nodes.count=12", "nodes.spacing_m=100", "nodes.telemetry_hz=0", "world.area_m=500", "mission.survivors=3",
+    "traffic.arrivals=none", "clusters.count=2", "clusters.flooding_period_s=1", "seed=1",
+)  # fmt: skip
+
+
+class Around(Actor):
+    """One UAV, and something between it and the bus; its output is its own."""
+
+    def __init__(self, inner: Actor, *topics: str) -> None:
+        self._inner = inner
+        super().__init__(inner.name, (*inner.subscriptions, *topics))
+
+    @property
+    def outbox(self) -> list[tuple[str, Message]]:  # type: ignore[override]
+        return self._inner.outbox
+
+    @outbox.setter
+    def outbox(self, value: list[tuple[str, Message]]) -> None:
+        self._inner.outbox = value
+
+    @property
+    def records(self) -> list[Record]:  # type: ignore[override]
+        return self._inner.records
+
+    @records.setter
+    def records(self, value: list[Record]) -> None:
+        self._inner.records = value
+
+    def start(self, now_ns: int) -> None:
+        self._inner.start(now_ns)
+
+    def receive(self, topic: str, message: Message, now_ns: int) -> bool | None:
+        return self._inner.receive(topic, message, now_ns)
+
+    def wake(self, now_ns: int) -> None:
+        self._inner.wake(now_ns)
+
+    def next_wake_ns(self) -> int | None:
+        return self._inner.next_wake_ns()
+
+    def stop(self, now_ns: int) -> None:
+        self._inner.stop(now_ns)
+
+    def report(self) -> dict[str, object]:
+        return dict(self._inner.report())
+
+
+def flown(wrap: Callable[[Actor, Topics], Actor], *, seconds: int) -> Outcome:
+    """The mission in which each UAV is wrapped."""
+    scenario = find("rescue", [*KEYS, f"duration_s={seconds}"])
+    world, medium, *uavs = actors_of(scenario, scenario.name)
+    records: list[Record] = []
+    names = Topics(scenario.name)
+    actors = [world, medium, *(wrap(uav, names) for uav in uavs)]
+    host = VirtualHost(actors, on_records=records.extend)
+    host.start()
+    host.run(scenario.duration_ns)
+    host.stop()
+    reports = {actor.name: actor.report() for actor in actors}
+    return Outcome(scenario=scenario, mode="virtual", wall_s=1.0, records=records, reports=reports)
+
+
+class Told(Around):
+    """A UAV that is told what only the world knows: as it is, or turned around and far away."""
+
+    def __init__(self, inner: Actor, names: Topics, *, poisoned: bool) -> None:
+        super().__init__(inner, names.pose, names.obstruction)
+        self._poisoned = poisoned
+
+    def receive(self, topic: str, message: Message, now_ns: int) -> bool | None:
+        if self._poisoned and isinstance(message, Poses):
+            message = message._replace(states=array("d", [1e5 - 3 * value for value in message.states]))
+        elif self._poisoned and isinstance(message, Obstructions):
+            message = message._replace(pairs=array("H", [1, 2]))
+        return self._inner.receive(topic, message, now_ns)
+
+
+def test_a_whole_mission_goes_as_it_does_when_the_worlds_truth_is_poisoned_for_every_uav() -> None:
+    clean, poisoned = (
+        flown(lambda uav, names, lie=lie: Told(uav, names, poisoned=lie), seconds=40)  # type: ignore[misc]
+        for lie in (False, True)
+    )
+    assert sum(isinstance(record, Confirmed) for record in poisoned.records) >= 2
+    assert poisoned.records == clean.records
+    refused = [report["bus_malformed"] for name, report in poisoned.reports.items() if name.startswith("agent-")]
+    assert min(refused) > 100, "every UAV was told, and took in nothing"  # type: ignore[type-var]
+
+
+class Lost(Around):
+    """A UAV whose computer stops in mid-flight: it hears, says and commands nothing any more."""
+
+    def __init__(self, inner: Actor, names: Topics, *, at_ns: int) -> None:
+        super().__init__(inner)
+        self._at_ns = at_ns
+
+    def receive(self, topic: str, message: Message, now_ns: int) -> bool | None:
+        return self._inner.receive(topic, message, now_ns) if now_ns < self._at_ns else True
+
+    def wake(self, now_ns: int) -> None:
+        if now_ns < self._at_ns:
+            self._inner.wake(now_ns)
+
+    def next_wake_ns(self) -> int | None:
+        wanted_ns = self._inner.next_wake_ns()
+        return wanted_ns if wanted_ns is not None and wanted_ns < self._at_ns else None
+
+
+@pytest.mark.slow
+@pytest.mark.timeout(900)
+def test_what_a_lost_uav_would_have_searched_is_searched_by_another() -> None:
+    """The holder of a corner lane is lost when the sweep begins; nobody else would come near that corner."""
+    before = flown(lambda uav, _: uav, seconds=20)
+    plans = [record for record in before.records if isinstance(record, Planned)]
+    corner = next(record.node for record in plans if record.place == 0 and record.node != 1)
+    after = flown(
+        lambda uav, names: Lost(uav, names, at_ns=16 * S) if uav.name == f"agent-{corner}" else uav, seconds=150
+    )
+    takers = [r for r in after.records if isinstance(r, Planned) and r.place == 0 and r.node != corner]
+    assert takers, "a follower was given the place"
+    found = mission(after.scenario, after.records)
+    assert found["coverage"] >= 0.99
+    assert found["confirmed"] == 3

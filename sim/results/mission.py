@@ -127,7 +127,7 @@ def _is_one(near: Flags) -> bool:
     reached = np.zeros(len(near), bool)
     reached[0] = True
     while True:
-        further: Flags = near[reached].any(axis=0)
+        further: Flags = np.asarray(near[reached].any(axis=0))
         if (further == reached).all():
             return bool(reached.all())
         reached = further

@@ -8,9 +8,10 @@ from fanet_mw.planner.demand import ClassPlan, TrafficClass, demands
 from fanet_mw.planner.feasibility import Plan, Site, evaluate
 from fanet_mw.planner.head_slot import ClusterPlan
 from fanet_mw.planner.loss import Loss, loss
+from fanet_mw.planner.lossy_plan import LossyPlan, plan_lossy
 from fanet_mw.planner.optimum import Optimum, optimum
 from fanet_mw.planner.search import ScenarioChange, cheapest_change, plan, with_capacity
-from fanet_mw.planner.text import describe, describe_change, describe_loss, describe_optimum
+from fanet_mw.planner.text import describe, describe_change, describe_loss, describe_lossy, describe_optimum
 from fanet_mw.planner.variant import Variant, vary
 
 __all__ = [
@@ -18,6 +19,7 @@ __all__ = [
     "ClassPlan",
     "ClusterPlan",
     "Loss",
+    "LossyPlan",
     "Optimum",
     "Plan",
     "Site",
@@ -28,11 +30,13 @@ __all__ = [
     "describe",
     "describe_change",
     "describe_loss",
+    "describe_lossy",
     "describe_optimum",
     "evaluate",
     "loss",
     "optimum",
     "plan",
+    "plan_lossy",
     "vary",
     "with_capacity",
 ]

@@ -10,9 +10,11 @@ from fanet_mw.planner.demand import ClassPlan
 from fanet_mw.planner.feasibility import Plan
 from fanet_mw.planner.head_slot import ClusterPlan
 from fanet_mw.planner.loss import Loss
+from fanet_mw.planner.lossy_plan import Drawn, LossyPlan
 from fanet_mw.planner.optimum import Optimum
 from fanet_mw.planner.search import ScenarioChange
 from fanet_mw.planner.timetable_plan import TimetablePlan
+from fanet_mw.routing.clustered.timetable.turn_plan import LIKELY_SHARE
 from fanet_mw.units import MS, S
 
 _SHOWN: Final = 8
@@ -37,6 +39,35 @@ def describe_loss(found: Loss | None) -> str:
         f"a packet misses a node with probability {found.mean:.2g} at most on average, {found.worst:.2g} at worst "
         f"(node {found.root} to node {found.node}), repairs not counted",
     )
+
+
+def describe_lossy(found: LossyPlan) -> str:
+    """A plan over links that lose frames, as text."""
+    scenario = found.scenario
+    lines = [
+        f"{'FEASIBLE' if found.feasible else 'NOT FEASIBLE'}  {scenario.name}: {scenario.nodes.count} nodes, "
+        "floods repeated over lossy links",
+        *(item("problem", problem) for problem in found.problems),
+        item("bound", "none: a packet may be lost for good"),
+    ]
+    for number, drawn in enumerate(found.draws, start=1):
+        label = "likely" if number == 1 else ""
+        swarm = f" (draw {number} of {len(found.draws)})" if len(found.draws) > 1 else ""
+        lines.append(item(label, _likely(drawn) + swarm))
+    fitted = next((drawn.fitted for drawn in found.draws if drawn.fitted is not None), None)
+    if fitted is not None:
+        lines += _superframe(
+            TimetablePlan(fitted.turns, fitted.table.used, len(fitted.table.roots()), fitted.table, fitted.together)
+        )
+    return "\n".join([*lines, *(item("note", note) for note in found.notes)])
+
+
+def _likely(drawn: Drawn) -> str:
+    if not drawn.known_ns:
+        return "no source states a delay"
+    known_ns, share = drawn.known_ns, f"{LIKELY_SHARE:g} of the nodes have a packet"
+    delays = f"{known_ns[-1] / S:.1f} s (the median source: {known_ns[len(known_ns) // 2] / S:.1f} s)"
+    return f"{share} within {delays}, {drawn.links} links"
 
 
 def describe_change(change: ScenarioChange | None, found: Plan) -> str:

@@ -5,7 +5,7 @@ Exit codes: 0 feasible, 1 not feasible, 2 the scenario or a flag is wrong (as wi
 
 import json
 import math
-from typing import Any
+from typing import Any, Final
 
 from agents.traffic import sources_of
 from fanet_mw.bounds import Bounded, DelayBound, Refused
@@ -14,28 +14,36 @@ from fanet_mw.graph.topology import within_range
 from fanet_mw.planner import (
     ClassPlan,
     Loss,
+    LossyPlan,
     Optimum,
     Plan,
     ScenarioChange,
     cheapest_change,
+    demands,
     describe,
     describe_change,
     describe_loss,
+    describe_lossy,
     describe_optimum,
     loss,
     optimum,
     plan,
+    plan_lossy,
     with_capacity,
 )
 from fanet_mw.planner.claimed_turns import ClaimedPlan
 from fanet_mw.planner.timetable_plan import TimetablePlan
 from fanet_mw.routing.clustered.timetable.timetable import Timetable
-from fanet_mw.routing.clustered.timetable.turn_plan import links
+from fanet_mw.routing.clustered.timetable.turn_plan import LIKELY_SHARE, links
 from fanet_mw.scenario import Scenario
 from fanet_mw.units import MS, Enu, NodeId, S, seconds_to_ns
 from fanet_mw.wire.places import rounded
+from sim.cli.expected_links import expected_links
 from sim.cli.frame_chance import chance_of
 from sim.world.mobility.layout import positions
+
+_DRAWS: Final = 3
+"""Draws of shadowing for which a plan is made; each takes up to some seconds."""
 
 
 def judge(
@@ -53,6 +61,8 @@ def judge(
     wanted_s = scenario.traffic.deadline_s if deadline_s is None else deadline_s
     deadline_ns = None if wanted_s is None else seconds_to_ns(wanted_s)
     sources = [NodeId(node) for node in sources_of(scenario)]
+    if scenario.measures_links:
+        return _judge_lossy(scenario, at, sources, deadline_ns=deadline_ns)
     found = plan(scenario, at, sources=sources, deadline_ns=deadline_ns)
     if isinstance(found, Refused):
         return describe(found), {"feasible": False, "problems": [found.reason]}, False
@@ -71,6 +81,44 @@ def judge(
         text.append(describe_optimum(best, deadline_ns=deadline_ns))
         content["search"] = None if best is None else _optimum_json(best)
     return "\n".join(text), content, found.feasible
+
+
+def _judge_lossy(
+    scenario: Scenario, at: dict[NodeId, Enu], sources: list[NodeId], *, deadline_ns: int | None
+) -> tuple[str, dict[str, Any], bool]:
+    """Over links that lose frames. Nothing better is searched for: one such plan takes seconds."""
+    classes = demands(scenario, sources)
+    if isinstance(classes, Refused):
+        return describe(classes), {"feasible": False, "problems": [classes.reason]}, False
+    application = next((c for c in classes if c.name == "application"), None)
+    if application is None:
+        reason = "nobody sends the application's traffic, of which alone a delay is stated over links that lose frames"
+        return describe(Refused(reason)), {"feasible": False, "problems": [reason]}, False
+    count = _DRAWS if scenario.radio.shadowing_db else 1
+    draws = [expected_links(scenario, at, draw=draw) for draw in range(count)]
+    found = plan_lossy(scenario, at, draws, application, deadline_ns=deadline_ns)
+    return describe_lossy(found), _lossy_json(found), found.feasible
+
+
+def _lossy_json(found: LossyPlan) -> dict[str, Any]:
+    return {
+        "scenario": found.scenario.name,
+        "feasible": found.feasible,
+        "proven": False,
+        "deadline_ms": None if found.deadline_ns is None else found.deadline_ns / MS,
+        "likely_share": LIKELY_SHARE,
+        "likely_ms": None if found.worst_ns is None else found.worst_ns / MS,
+        "draws": [
+            {
+                "links": drawn.links,
+                "fits": drawn.fitted is not None,
+                "likely_ms": {node: None if ns is None else ns / MS for node, ns in drawn.likely_ns.items()},
+            }
+            for drawn in found.draws
+        ],
+        "problems": list(found.problems),
+        "notes": list(found.notes),
+    }
 
 
 def _places(scenario: Scenario) -> dict[NodeId, Enu]:

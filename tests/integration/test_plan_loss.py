@@ -2,6 +2,8 @@
 
 import pytest
 
+from fanet_mw.trace import Delivered, Generated, LikelyStated
+from fanet_mw.units import MS
 from sim.cli.plan import judge
 from sim.results.files import finish
 from sim.run.virtual import simulate
@@ -23,10 +25,40 @@ def test_no_more_is_lost_than_stated(spacing_m: float) -> None:
 
 
 def test_where_no_probability_can_be_given_it_says_so() -> None:
-    text, plan, _ = judge(catalog.find("clusters", ["radio.channel=log_distance", "radio.fading=nakagami"]))
-    assert plan.get("loss") is None
-    text, plan, _ = judge(
-        catalog.find("clusters", [*LINE, "radio.fading=nakagami"]),
-    )
+    text, plan, _ = judge(catalog.find("clusters", [*LINE, "radio.fading=nakagami", 'clusters.links="places"']))
     assert plan["loss"] is None
     assert "no probability" in text
+
+
+# --- links that are measured in flight ----------------------------------------------------------------------------
+
+SMALL = ["nodes.count=12", "clusters.count=11", "traffic.sources=11", "radio.channel=log_distance"]
+
+
+@pytest.mark.parametrize("loss", ["radio.fading=rician", "radio.shadowing_db=4"])
+def test_over_lossy_links_a_plan_promises_a_likely_delay_and_no_bound(loss: str) -> None:
+    text, plan, feasible = judge(catalog.find("clusters", [*SMALL, loss]))
+    assert feasible
+    assert "at most" not in text
+    assert "0.99 of the nodes have a packet within" in text
+    flown = simulate(catalog.find("clusters", [*SMALL, loss, "duration_s=45", "warmup_s=24", "drain_s=8"]))
+    born = {(r.node, r.seq): r.t_ns for r in flown.records if isinstance(r, Generated)}
+    delays = [r.t_ns - born[r.origin, r.seq] for r in flown.records if isinstance(r, Delivered)]
+    assert sum(delay_ns <= plan["likely_ms"] * MS for delay_ns in delays) >= 0.99 * 11 * len(born)
+    stated = [record.delay_ns / MS for record in flown.records if isinstance(record, LikelyStated)]
+    assert 0.5 * max(stated) <= plan["likely_ms"] <= 2 * max(stated), "about what the nodes state themselves"
+
+
+def test_a_plan_says_when_repeated_frames_find_no_turns() -> None:
+    crowded = catalog.find("clusters", [*SMALL, "radio.fading=rician", "traffic.interval_s=0.02"])
+    _, plan, feasible = judge(crowded)
+    assert not feasible
+    assert plan["likely_ms"] is None
+    (problem,) = plan["problems"]
+    assert "the turns do not hold the load with its repeated frames" in problem
+
+
+def test_a_deadline_is_held_against_the_likely_delay() -> None:
+    lossy = catalog.find("clusters", [*SMALL, "radio.fading=rician"])
+    assert not judge(lossy, deadline_s=0.1)[2]
+    assert judge(lossy, deadline_s=60.0)[2]

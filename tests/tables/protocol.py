@@ -9,7 +9,7 @@ from scripts.rivals import connectivity
 from sim.results.files import finish
 from sim.run.virtual import simulate
 from sim.scenarios import catalog
-from tests.benchmarks import clock_sync, collision_warnings, protocol_cost
+from tests.benchmarks import clock_sync, collision_warnings, false_assumptions, protocol_cost
 from tests.tables.markdown import Rows
 
 _SPEEDS: Final = (0, 10, 20)
@@ -135,6 +135,16 @@ def rivals() -> Rows:
 def cost() -> Rows:
     """What each protocol costs a node."""
     return protocol_cost.rows(60.0)
+
+
+def assumptions() -> Rows:
+    """What timetables do when what they assume is false."""
+    return false_assumptions.swarms()
+
+
+def phones() -> Rows:
+    """How far off a phone's place is when its power is not what is assumed."""
+    return false_assumptions.phones()
 
 
 def clock_errors() -> Rows:

@@ -1,0 +1,129 @@
+"""What becomes of timetables and of phones' places when what nodes take for true is false: `false_assumptions.py`.
+
+Scenario `clusters`, 30 s, seed 1: the channel and the world follow the scenario, some or all nodes are told another
+one. Phones: one in the field beside two lanes 150 m apart, heard every 30 m with 4 dB of shadowing, 40 draws; its
+power is another one than the receiver takes it to be.
+"""
+
+import math
+import random
+import statistics
+from collections.abc import Callable, Mapping, Sequence
+from typing import Any, Final
+
+from agents.clocked import make_uav
+from agents.localization import Sighting, estimate
+from agents.mission.phone_filter import REFERENCE_LOSS_DB, PhoneFilter, PhoneModel
+from agents.traffic import sources_of
+from emulator.medium import Medium
+from fanet_mw.hosts.virtual import VirtualHost
+from fanet_mw.trace import Record
+from fanet_mw.units import Enu, NodeId
+from sim.results.bounds import against_bounds
+from sim.results.packets import packets_of
+from sim.run.outcome import Outcome
+from sim.scenarios import catalog
+from sim.world.mobility.layout import positions
+from sim.world.world import World
+
+Told = Callable[[int], Sequence[str]]
+"""Which settings a node is told beside the true ones."""
+_SEEDS: Final = (1,)
+_RARELY: Final = ("traffic.interval_s=4",)
+_CLOCKS: Final = ("clock.sync=beacons", "clock.drift_ppm=20", "clock.offset_ms=20")
+CASES: Final[Mapping[str, tuple[Sequence[str], Told]]] = {
+    "nothing": ((), lambda _: ()),
+    "five nodes send four times as often as the others know": (
+        (), lambda node: ("traffic.interval_s=0.25",) if node in (5, 15, 25, 35, 45) else (),
+    ),
+    "all nodes plan for four times the load that comes": (_RARELY, lambda _: ("traffic.interval_s=1",)),
+    "all nodes take the swarm for 60, it is 45": ((), lambda _: ("nodes.count=60",)),
+    "`link_m` 300 m, the range is 250 m": ((), lambda _: ("clusters.link_m=300",)),
+    "`interference_m` 250 m, frames disturb farther": (
+        ("radio.channel=log_distance",), lambda _: ("clusters.interference_m=250",),
+    ),
+    "stamps of 1 us, clocks by beacons": ((*_CLOCKS, "clock.timestamp_us=1"), lambda _: ()),
+    "stamps of 100 us": ((*_CLOCKS, "clock.timestamp_us=100"), lambda _: ()),
+    "stamps of 1000 us": ((*_CLOCKS, "clock.timestamp_us=1000"), lambda _: ()),
+}  # fmt: skip
+
+
+def flown(settings: Sequence[str], told: Told) -> Outcome:
+    """A run in which each node has been told what `told` says."""
+    scenario = catalog.find("clusters", ["duration_s=30", *settings])
+    sources = f"traffic.sources={sources_of(scenario)}"
+    starts = positions(scenario)
+    believed = {n: catalog.find("clusters", ["duration_s=30", *settings, sources, *told(n)]) for n in scenario.node_ids}
+    uavs = [make_uav(believed[n], NodeId(n), scenario.name, position=starts[n - 1]) for n in scenario.node_ids]
+    records: list[Record] = []
+    host = VirtualHost(
+        [World(scenario, scenario.name), Medium(scenario, scenario.name), *uavs], on_records=records.extend
+    )
+    host.start()
+    host.run(scenario.duration_ns)
+    host.stop()
+    return Outcome(scenario=scenario, mode="virtual", wall_s=0.0, records=records, reports={})
+
+
+def swarm_row(name: str, settings: Sequence[str], told: Told) -> list[str]:
+    """PDR, stated share, share within the bound, broken: the mean and the sum over the seeds."""
+    bounds: list[dict[str, Any]] = []
+    pdr = []
+    for seed in _SEEDS:
+        found = packets_of(flown([*settings, f"seed={seed}"], told))
+        pdr.append(sum(len(app.deliveries) for app in found.values()) / sum(app.wanted for app in found.values()))
+        bounds.append(against_bounds(found))
+    stated = statistics.fmean(bound.get("stated_share", 0.0) for bound in bounds)
+    within = statistics.fmean(bound.get("within_share", 0.0) for bound in bounds)
+    broken = sum(bound.get("violations", 0) for bound in bounds)
+    return [name, f"{statistics.fmean(pdr):.3f}", f"{stated:.3f}", f"{within:.3f}", f"{broken}"]
+
+
+def swarms() -> list[list[str]]:
+    """The table of timetables, header first."""
+    head = ["what is false", "PDR", "packets with a bound", "within it, of packets x targets", "broken"]
+    return [head, *(swarm_row(name, settings, told) for name, (settings, told) in CASES.items())]
+
+
+_PHONE: Final = PhoneModel(
+    power_dbm=15.0, exponent=3.0, shadowing_db=4.0, offset_db=1.0, threshold_dbm=-90.0, half_m=math.inf
+)
+
+
+def phone_errors_m(offset_db: float, draw: int) -> tuple[float, float] | None:
+    """How far the filter of the planned search, and the least squares of the paper's rule, are from the phone."""
+    drawn = random.Random(draw)
+    phone = Enu(drawn.uniform(-40, 40), drawn.uniform(30, 90), 0.0)
+    search, heard = PhoneFilter(_PHONE), []
+    for lane in (0, 1):
+        for step in range(-8, 9):
+            here = Enu(30.0 * step, 150.0 * lane, 50.0)
+            lost_db = REFERENCE_LOSS_DB + 10 * _PHONE.exponent * math.log10(here.minus(phone).norm())
+            rssi_dbm = _PHONE.power_dbm + offset_db - lost_db + drawn.gauss(0.0, _PHONE.shadowing_db)
+            if rssi_dbm < _PHONE.threshold_dbm:
+                search.silent(here)
+            elif search.heard(lane, here, rssi_dbm):
+                heard.append(Sighting(here, rssi_dbm))
+    found = search.estimate()
+    if found is None or not heard:
+        return None
+    fitted = estimate(heard, phone_power_dbm=_PHONE.power_dbm, exponent=_PHONE.exponent)
+    return found.distance_m(phone), math.hypot(fitted.east - phone.east, fitted.north - phone.north)
+
+
+def phones() -> list[list[str]]:
+    """The table of phones, header first."""
+    rows = [
+        ["the phone's power against what is assumed", "filter: median error [m]", "least squares: median error [m]"]
+    ]
+    for offset_db in (0, -3, -6, 3, 6):
+        errors = [found for draw in range(40) if (found := phone_errors_m(offset_db, draw)) is not None]
+        medians = [statistics.median(error) for error in zip(*errors, strict=True)]
+        rows.append([f"{offset_db:+d} dB", *(f"{median:.0f}" for median in medians)])
+    return rows
+
+
+if __name__ == "__main__":
+    for table in (phones, swarms):
+        for row in table():
+            print("|", " | ".join(row), "|", flush=True)

@@ -38,7 +38,7 @@ from fanet_mw.trace import (
 )
 from fanet_mw.units import S
 from sim.results.files import finish
-from sim.run.collector import BURST_BYTES, BYTES_PER_S, Collector
+from sim.run.collector import BURST_BYTES, BYTES_PER_S, Allowance, Collector
 from sim.run.outcome import Outcome
 from sim.run.spool import Spool
 from sim.run.virtual import simulate
@@ -179,6 +179,21 @@ def test_a_report_without_keys_is_counted_and_the_last_valid_one_stands(ear: Ear
     assert "agent-3" not in absent
 
 
+@pytest.mark.parametrize("value", ["[[[[[[[]]]]]]]", "1e999", "NaN", str(2**63)])
+def test_a_report_holds_nothing_that_json_of_others_cannot(ear: Ear, genuine: Outcome, value: str) -> None:
+    content = json.dumps({**genuine.reports["agent-3"], "more": 0}).replace('"more": 0', f'"more": {value}')
+    assert ear.say(NAMES.report("agent-3"), Report("agent-3", S, content)) == {"report: shape": 1}
+    assert ear.collector.absent()["agent-3"] == "malformed: a value beyond its bounds"
+
+
+def test_an_actor_is_done_when_it_has_sent_its_last_report(ear: Ear, genuine: Outcome) -> None:
+    content = dict(genuine.reports["agent-3"])
+    for final in (False, True):
+        assert "agent-3" in ear.collector.unfinished()
+        ear.say(NAMES.report("agent-3"), Report("agent-3", S, json.dumps({**content, "final": final})))
+    assert "agent-3" not in ear.collector.unfinished()
+
+
 def places(content: Any, path: tuple[str, ...] = ()) -> Iterator[tuple[str, ...]]:
     """The path of every value in a report."""
     for key, value in content.items() if isinstance(content, dict) else ():
@@ -303,6 +318,13 @@ def test_a_flood_of_one_actor_stops_at_its_allowance_and_leaves_the_others_their
     ear.put(NAMES.trace("agent-3"), flood)
     assert ear.why == {"trace: excess": excess}, "what was said slowly enough is heard again"
     assert list(ear.collector.records())[-1].node == 4
+
+
+def test_silence_saves_up_no_more_than_a_burst() -> None:
+    allowance = Allowance(burst=100, per_s=10)
+    assert allowance.take("agent-1", 100, now_ns=0)
+    assert not allowance.take("agent-1", 101, now_ns=3600 * S)
+    assert allowance.take("agent-1", 100, now_ns=3600 * S)
 
 
 def test_a_full_disk_under_the_spool_ends_the_trace_and_not_the_run(ear: Ear) -> None:

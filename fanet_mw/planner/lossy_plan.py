@@ -11,7 +11,7 @@ from typing import Final, NamedTuple
 
 from fanet_mw.planner.demand import TrafficClass
 from fanet_mw.routing.clustered.tdma.turns import receipt_ns
-from fanet_mw.routing.clustered.timetable.turn_plan import Fitted, Places, Plan, fit_measured
+from fanet_mw.routing.clustered.timetable.turn_plan import Fitted, Places, TurnPlan, fit_measured
 from fanet_mw.scenario import Scenario
 from fanet_mw.units import MS, Enu, NodeId, S, seconds_to_ns
 from fanet_mw.wire.links import Link, frames_of
@@ -95,7 +95,7 @@ def _drawn(scenario: Scenario, places: Places, links: tuple[Link, ...], sources:
 
 def _likely_ns(scenario: Scenario, fitted: Fitted, node: NodeId) -> int | None:
     """What the node will state, application to application, of a packet that finds its queue empty."""
-    plan = Plan.of(node, 0, fitted)
+    plan = TurnPlan.of(node, 0, fitted)
     if not plan.roots or fitted.table.uncovered[node]:
         return None
     likely_ns = plan.likely_ns(

@@ -27,7 +27,7 @@ _RSSI_UNKNOWN_DBM: Final = 0.0
 _RECEIVED: Final = 1
 MOVED_NS: Final = 10 * S
 """A node that has been silent at its address for this long may be accepted from another address."""
-_MOST_ADDRESSES: Final = 4096
+MOST_ADDRESSES: Final = 4096
 _SEQ_MASK: Final = 0xFFFF_FFFF
 Address = tuple[str, int]
 
@@ -191,7 +191,7 @@ class UdpRadio:
         now_ns, known = self._now_ns(), self._addresses.get(node)
         if known is not None and known.address != address and now_ns - known.heard_ns < MOVED_NS:
             return False
-        if known is None and len(self._addresses) >= _MOST_ADDRESSES:
+        if known is None and len(self._addresses) >= MOST_ADDRESSES:
             del self._addresses[min(self._addresses, key=lambda other: (self._addresses[other].heard_ns, other))]
         self._addresses[node] = _Known(address, now_ns)
         return True

@@ -15,7 +15,7 @@ from fanet_mw.bus.messages import Message, Reception, TxOutcome, TxRequest, TxSt
 from fanet_mw.bus.topics import Topics, node_of
 from fanet_mw.hosts.virtual import VirtualHost
 from fanet_mw.radios.datagram import Datagram, DatagramKind
-from fanet_mw.radios.udp import MOVED_NS, UdpRadio
+from fanet_mw.radios.udp import MOST_ADDRESSES, MOVED_NS, UdpRadio
 from fanet_mw.scenario import config
 from fanet_mw.units import BROADCAST, MS, NodeId
 from sim.world.world import World
@@ -235,3 +235,26 @@ async def test_one_datagram_does_not_redirect_a_node_s_unicasts_and_only_its_own
     now_ns = MOVED_NS
     hear(3, elsewhere)
     assert await addresses() == [elsewhere], "it was silent at its old address, and has moved"
+
+
+def silent_radio(now_ns: Callable[[], int]) -> UdpRadio:
+    """A radio that is never opened."""
+    return UdpRadio(
+        NodeId(1), address="127.7.0.9", broadcast="127.255.255.255", port=24563, max_frame_bytes=300, now_ns=now_ns,
+        on_message=lambda _: None,
+    )  # fmt: skip
+
+
+async def test_a_request_whose_instant_has_passed_goes_at_once_and_counts_as_late() -> None:
+    radio = silent_radio(lambda: 10 * MS)
+    radio.request(request_of(1, at_ms=10, dst=BROADCAST))
+    assert radio.counts["late"] == 0
+    radio.request(request_of(2, at_ms=9, dst=BROADCAST))
+    assert radio.counts["late"] == 1
+
+
+async def test_forged_senders_cannot_fill_the_memory_with_addresses() -> None:
+    radio = silent_radio(lambda: 0)
+    for node in range(2, MOST_ADDRESSES + 100):
+        radio._on_datagram(Datagram(DatagramKind.FRAME, NodeId(node), BROADCAST, 1, b"x").encode(), ("127.7.0.2", 1))
+    assert len(radio._addresses) == MOST_ADDRESSES

@@ -71,6 +71,20 @@ def test_a_file_of_a_dead_process_is_ignored_and_removed(folder: Path) -> None:
     assert not file.exists()
 
 
+def test_a_launcher_that_has_died_and_is_not_yet_waited_for_is_gone(folder: Path) -> None:
+    with registered("rescue", "tcp/127.0.0.1:1"):
+        (file,) = folder.iterdir()
+        zombie = subprocess.Popen([sys.executable, "-c", "input()"], stdin=subprocess.PIPE)
+        entry = Running(**json.loads(file.read_text()))
+        started = Path(f"/proc/{zombie.pid}/stat").read_text().rpartition(")")[2].split()[19]
+        file.write_text(json.dumps(entry._replace(pid=zombie.pid, started=started)._asdict()))
+        assert [swarm.pid for swarm in running()] == [zombie.pid]
+        zombie.kill()
+        os.waitid(os.P_PID, zombie.pid, os.WEXITED | os.WNOWAIT)
+        assert running() == []
+        zombie.communicate()
+
+
 def test_a_process_id_that_is_used_again_is_not_the_swarm(folder: Path) -> None:
     with registered("rescue", "tcp/127.0.0.1:1"):
         (file,) = folder.iterdir()

@@ -128,7 +128,7 @@ def _places(scenario: Scenario) -> dict[NodeId, Enu]:
 
 
 def _loss(scenario: Scenario, superframe: TimetablePlan, table: Timetable, at: dict[NodeId, Enu]) -> Loss | None:
-    """Of what has turns; a way to a head that contends is not in it."""
+    """The loss of packets that have turns; a way to a head that contends is not in it."""
     chance = chance_of(scenario, at)
     if chance is None:
         return None

@@ -15,7 +15,7 @@ from sim.world.mobility.layout import positions
 
 
 def parts(places: Rows, range_m: float) -> npt.NDArray[np.int64]:
-    """Of each node the number of its connected part; equal numbers are connected over links of `range_m`."""
+    """The number of each node's connected part; nodes of equal numbers are connected over links of `range_m`."""
     linked = np.linalg.norm(places[:, None] - places[None], axis=2) <= range_m
     part = np.arange(len(places))
     while True:

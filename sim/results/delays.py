@@ -43,5 +43,5 @@ def parts(app: AppPackets, *, lead_ns: int) -> dict[str, float | None]:
 
 
 def _waited_ns(sent: SentPacket) -> float:
-    """From the hand-over of a packet until it was let out; not a number when that is not known."""
+    """The time from the hand-over of a packet until it was let out; not a number when that is not known."""
     return math.nan if sent.out_ns is None else float(sent.out_ns - sent.born_ns)

@@ -32,7 +32,7 @@ class State(NamedTuple):
     mission: str
     """What it had decided to do; empty: it takes no part in a planned search."""
     survivor: int
-    """To whom it flew; 0: to nobody."""
+    """The survivor to whom it flew; 0 when it flew to none."""
     place: int
     """Its place in the plan; -1: none."""
 

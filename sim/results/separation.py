@@ -11,7 +11,7 @@ from sim.run.outcome import Outcome
 
 
 def separation(outcome: Outcome) -> dict[str, Any]:
-    """What the world saw, and what the UAVs foresaw; empty when nobody looked."""
+    """What the world saw, and what the UAVs foresaw; empty when nothing was watched."""
     seen = outcome.reports.get("world", {}).get("separation")
     if not seen:
         return {}

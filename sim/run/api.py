@@ -122,7 +122,7 @@ async def launch(
 
 
 class _Time:
-    """The time of a virtual swarm, which begins when somebody first waits."""
+    """The time of a virtual swarm, which begins when a task first waits for it."""
 
     def __init__(self, scenario: Scenario, applications: Callable[[int], Sequence[Application]]) -> None:
         self.scenario = scenario
@@ -165,7 +165,7 @@ async def breathe() -> None:
 
 
 class _VirtualDrive:
-    """The time of a node in a virtual swarm: whoever waits lets it pass."""
+    """The time of a node in a virtual swarm; it passes while a task waits for it."""
 
     def __init__(self, time: _Time, node: int) -> None:
         self._time = time
@@ -198,7 +198,7 @@ class _VirtualDrive:
 
 
 class VirtualSwarm:
-    """A whole swarm in virtual time: it passes while somebody waits for something, and not otherwise."""
+    """A whole swarm in virtual time, which passes only while a task waits for something."""
 
     def __init__(
         self,

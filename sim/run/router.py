@@ -74,7 +74,7 @@ async def serve(
 
 
 async def _say_who_is_missing(keeper: ClockKeeper, tell: Tell) -> None:
-    """Every few seconds while anything is wrong with who is there, before the start and during the run."""
+    """Say every few seconds which services are missing or there twice, before the start and during the run."""
     while True:
         await asyncio.sleep(WORD_EVERY_S)
         with contextlib.suppress(BusError):

@@ -37,7 +37,7 @@ def wanted(outcome: Outcome) -> float:
 
 
 def leader_pdr(outcome: Outcome) -> float | None:
-    """Of the packets that others sent to the leader or to everyone, the share that reached it."""
+    """The share of the packets sent by others to the leader, or to everyone, that reached it."""
     leader, sent = outcome.scenario.leader, first_class_of(outcome).sent
     meant = sum(origin != leader for origin, _ in sent)
     return len(_at_leader_s(outcome)) / meant if meant else None
@@ -60,12 +60,12 @@ def connected(outcome: Outcome) -> float:
 
 
 def first_detected_s(outcome: Outcome) -> list[float]:
-    """Of each UAV that heard a survivor's phone: when it first did [s]."""
+    """The instants at which UAVs first heard a survivor's phone, for those that did [s]."""
     return _first_of_each(outcome, Detected)
 
 
 def first_approach_s(outcome: Outcome) -> list[float]:
-    """Of each UAV that changed course towards a survivor: when it first did [s]."""
+    """The instants at which UAVs first changed course towards a survivor, for those that did [s]."""
     return _first_of_each(outcome, Approaching)
 
 

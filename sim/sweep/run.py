@@ -18,7 +18,7 @@ _PUBLISH_S: Final = 15.0
 
 
 class Workers(Protocol):
-    """Whoever carries out runs: processes of this machine, or a cluster."""
+    """What carries out runs: processes of this machine, or a cluster."""
 
     workers: int
 

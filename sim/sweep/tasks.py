@@ -19,7 +19,7 @@ class Task:
     """One run, as plain values that any process on any machine can be handed."""
 
     key: str
-    """Of the resolved scenario and the measures: equal keys are equal runs."""
+    """A hash of the resolved scenario and the measures: equal keys are equal runs."""
     case: str
     seed: int
     tree: Mapping[str, Any]

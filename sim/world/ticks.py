@@ -10,7 +10,7 @@ class Ticks:
         self.last_ns = 0
         self.count = 0
         self.skipped = 0
-        """How many ticks came too late for anybody to use them."""
+        """How many ticks came too late to be of use."""
 
     def begin(self, now_ns: int, *, period_ns: int) -> None:
         """Start to count, with the first tick one period ahead."""
@@ -23,7 +23,7 @@ class Ticks:
         self.next_ns = now_ns + tick_ns
 
     def follow(self, due_ns: int, now_ns: int, *, period_ns: int) -> None:
-        """Plan the tick after the one at `due_ns`; a stalled host skips instants that nobody can use any more."""
+        """Plan the tick after the one at `due_ns`; a stalled host skips instants that are of no use any more."""
         self.count += 1
         self.next_ns = due_ns + period_ns
         behind = (now_ns - self.next_ns) // period_ns

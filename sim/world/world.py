@@ -43,7 +43,7 @@ _TRACED_NS: Final = S
 _STILL_NS: Final = S
 """How often a world in which nothing moves says so."""
 _WRECK_M: Final = 0.5
-"""Nobody flies so near to the ground or a wall."""
+"""The distance from the ground or a wall below which a UAV is not in flight."""
 _EMERGENCY_CHARGE: Final = 0.05
 """At this share of its charge a flight controller lands where it is: PX4's BAT_EMERGEN_THR."""
 _CONTROL_S: Final = 0.05
@@ -187,7 +187,7 @@ class World(Actor):
         self.records += [FlightModeChanged(now_ns, node, mode.value) for node, mode in changes]
 
     def _find_wrecks(self, solids: Solids) -> None:
-        """In a world that goes on: who lies on the ground and was not told to is a wreck."""
+        """Take for wrecks, in a world that goes on, the UAVs that lie on the ground and were not told to."""
         at = self._engine.positions()
         for row in np.flatnonzero(solids.gap_m(at) <= _WRECK_M).tolist():
             if not self._guidance.may_touch_down(row + 1):
@@ -206,7 +206,7 @@ class World(Actor):
                 self._crash(node, radio_dies=self._scenario.world.crash_radio == "dies")
 
     def _crash(self, node: int, *, radio_dies: bool) -> None:
-        """From now on it falls: it touched something, or its battery is empty."""
+        """Let a UAV fall from now on, because it has touched something or its battery is empty."""
         if not self._flies[node - 1]:
             return
         self._flies[node - 1] = False

@@ -1,4 +1,4 @@
-"""Who touches whom, told once for each contact: bodies are spheres; the ground, walls and hillsides are 0."""
+"""Which bodies touch each other, told once for each contact; the ground, walls and hillsides are body 0."""
 
 from typing import Final
 
@@ -8,7 +8,7 @@ from sim.world.engines.contract import Rows
 from sim.world.environment.solids import Solids
 
 _CROWD: Final = 400
-"""Above this many nodes contacts between bodies are not looked for: it is quadratic, and such swarms are for radio."""
+"""Above this many nodes contacts between bodies are not looked for, because the search is quadratic."""
 
 
 class Contacts:

@@ -69,7 +69,7 @@ class Kinematic(Engine):
         return self._contacts.take()
 
     def _stop_at_walls(self, came_from: Rows, solids: Solids) -> None:
-        """Who would be within something solid is put back where it came from, or on the ground, and stands still."""
+        """Put a body that would be within something solid back where it came from, or on the ground, at rest."""
         inside = solids.gap_m(self._at) <= 0
         if inside.any():
             self._at[inside] = came_from[inside]

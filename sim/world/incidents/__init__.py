@@ -1,1 +1,1 @@
-"""What should not happen in flight and is counted: UAVs too near to each other, UAVs where nobody may fly."""
+"""What should not happen in flight and is counted: UAVs that come too near to each other, UAVs in no-fly areas."""

@@ -1,4 +1,4 @@
-"""Areas that nobody may enter: how often somebody did. Keeping out of them is the business of who flies on board."""
+"""Counts how often UAVs enter areas that they may not enter. The UAVs themselves are to keep out of them."""
 
 from collections.abc import Sequence
 
@@ -12,7 +12,7 @@ class NoFly:
     """Upright cylinders without a top."""
 
     def __init__(self, areas: Sequence[tuple[float, float, float]], starts: Rows) -> None:
-        """Areas as (east, north, radius) [m]; ConfigError when somebody would start in one."""
+        """Areas as (east, north, radius) [m]; raises ConfigError when a UAV would start in one."""
         self._areas = np.array(areas, dtype=np.float64).reshape(-1, 3)
         self._within = np.zeros((len(starts), len(self._areas)), bool)
         self.entries = 0

@@ -15,7 +15,7 @@ class Separation:
     """The least distance of any two, and how often two came nearer than they should."""
 
     def __init__(self, distance_m: float) -> None:
-        """`distance_m`: the least distance that any two should keep; 0: nobody looks."""
+        """`distance_m`: the least distance that any two should keep; at 0 nothing is watched."""
         self._distance_m = distance_m
         self._least_m: float | None = None
         self._near: frozenset[tuple[int, int]] = frozenset()
@@ -39,7 +39,7 @@ class Separation:
         self._near = near
 
     def report(self) -> Mapping[str, Any]:
-        """`least_m` is None while nothing has moved; the report is empty when nobody looks."""
+        """`least_m` is None while nothing has moved; the report is empty when nothing is watched."""
         if not self._distance_m:
             return {}
         return {"least_m": None if self._least_m is None else round(self._least_m, 2), "losses": self._losses}

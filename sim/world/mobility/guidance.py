@@ -36,7 +36,7 @@ _ROUNDS: Final = 4
 FLOOR_M: Final = 5.0
 """No position is flown to below this height."""
 _HOLD_M_S: Final = 5.0
-"""Who holds comes back to its place at this speed at most."""
+"""The greatest speed at which a UAV that holds its position comes back to it."""
 _LEAST_CLIMB_M_S: Final = 0.5
 _FORCED_M_S: Final = 2.0
 _TOUCHDOWN_M_S: Final = 0.5
@@ -71,7 +71,7 @@ class Guidance:
         self._ground_m = ground_m or (lambda places: np.zeros(len(places)))
         model = scenario.mobility.model
         self._onboard = model == "onboard"
-        """Whether UAVs are flown by their own computers: the world then keeps nobody clear of others."""
+        """True when UAVs are flown by their own computers; the world then keeps none of them clear of others."""
         self._see_m = 0.0 if self._onboard else scenario.mobility.see_m
         half = scenario.world.area_m / 2
         reach = np.maximum(half, np.abs(starts[:, :2]).max(axis=0)) if self._onboard else (half, half)
@@ -93,14 +93,14 @@ class Guidance:
         self._grounded = set(range(len(starts))) if scenario.nodes.on_ground else set[int]()
         """Rows that have not taken off yet, or that are taking off."""
         self._forced: set[int] = set()
-        """Rows that obey nobody: they land, because their batteries are nearly empty, or are wrecks."""
+        """Rows that obey no setpoint: they land, because their batteries are nearly empty, or are wrecks."""
         self._modes: dict[int, FlightMode] = {}
         self.changes: list[tuple[int, FlightMode]] = []
         """Nodes that changed their mode, with the new one, for the host to take."""
 
     @property
     def still(self) -> bool:
-        """Nothing moves and nothing was asked to."""
+        """True when nothing moves and no setpoint is in force."""
         asked = self._setpoints or self._velocities or self._landings
         return self._model is None and not self._onboard and not asked
 
@@ -140,7 +140,7 @@ class Guidance:
             assert_never(kind)
 
     def land_at_once(self, node: int) -> None:
-        """The battery of this UAV is nearly empty: it lands where it is, and obeys nobody any more."""
+        """The battery of this UAV is nearly empty: it lands where it is, and obeys no further setpoint."""
         row = node - 1
         if row not in self._forced:
             self._forced.add(row)
@@ -150,7 +150,7 @@ class Guidance:
             self._enter(row, FlightMode.FAILSAFE)
 
     def fell(self, node: int) -> None:
-        """Take a UAV for a wreck, which obeys nobody."""
+        """Take a UAV for a wreck, which obeys no setpoint."""
         self._forced.add(node - 1)
         self._enter(node - 1, FlightMode.FALLEN)
 
@@ -209,7 +209,7 @@ class Guidance:
         return _keep_clear(wish, at, self._see_m) if len(at) > 1 and self._see_m else wish
 
     def _expire(self, t_s: float, at: Rows) -> None:
-        """Who flies at a velocity that was not renewed in time stops."""
+        """Let each UAV hold its position whose velocity setpoint was not renewed in time."""
         for row in [row for row, (_, until_s) in self._velocities.items() if t_s >= until_s]:
             del self._velocities[row]
             self._hold(row, Enu(*at[row].tolist()))
@@ -225,7 +225,7 @@ class Guidance:
                 wish[axis] = most * outwards
 
     def _near_the_ground(self, wish: Rows, at: Rows) -> None:
-        """Sink straight down, the slower the nearer the ground; forget who has taken off."""
+        """Sink straight down, the slower the nearer the ground; forget the UAVs that have taken off."""
         height = at[:, 2] - self._ground_m(at)
         for row, speed_m_s in self._landings.items():
             sink = min(speed_m_s, max(_TOUCHDOWN_M_S, _FLARE_PER_S * float(height[row])))

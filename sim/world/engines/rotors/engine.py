@@ -23,7 +23,7 @@ from sim.world.environment.wind import Wind
 STEP_HZ: Final = 200
 _DT_S: Final = 1 / STEP_HZ
 _LEAST_SHARE: Final = 0.1
-"""Of the greatest rotor speed: motors idle, they do not stop in flight."""
+"""The least share of the greatest rotor speed: motors idle in flight, they do not stop."""
 _TUMBLE_PER_S: Final = 2.0
 """How fast a body without power stops turning."""
 
@@ -117,7 +117,7 @@ class Rotors(Engine):
         self._attitude = attitude / np.sqrt((attitude**2).sum(axis=0))
 
     def _stop(self, before: Values) -> None:
-        """Nobody passes the ground or a wall."""
+        """Stop the bodies that have reached the ground or a wall."""
         if self._solids is None:
             if self._at[2].min(initial=1.0) >= 0:
                 return
@@ -156,7 +156,7 @@ class Rotors(Engine):
         return np.ascontiguousarray(self._velocity.T)
 
     def tilts_rad(self) -> Values:
-        """By how much each body leans."""
+        """The angle between each body's axis and the vertical."""
         return np.asarray(np.arccos(np.clip(body_up(self._attitude)[2], -1.0, 1.0)))
 
     def power_w(self) -> Values:

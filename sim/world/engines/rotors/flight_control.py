@@ -25,9 +25,9 @@ _MOST_ERROR_M_S: Final = 0.5
 """The integral is for winds and drag, not for steps: larger errors count as this."""
 _MOST_RATE_RAD_S: Final = 6.0
 _LEAST_LIFT: Final = 0.2
-"""Of the weight: thrust never falls below, so that the vehicle can always turn."""
+"""The share of the weight below which thrust never falls, so that the vehicle can always turn."""
 _THRUST_RESERVE: Final = 0.9
-"""Of the greatest thrust: the rest is for attitude."""
+"""The share of the greatest thrust that lift may take; the rest is for attitude."""
 _YAW_SHARE: Final = 0.3
 """Yaw is slower: it has only the rotors' torques."""
 
@@ -59,7 +59,7 @@ class FlightControl:
         room = np.sqrt(np.maximum((_THRUST_RESERVE * self._max_n / mass) ** 2 - lift**2, 0.0))
         limit = np.minimum(lift * self._tan_tilt, room)
         scale = np.minimum(1.0, limit / np.maximum(size, 1e-9))
-        free = scale >= 1.0  # who is at its limit stops integrating
+        free = scale >= 1.0  # a loop at its limit stops integrating
         grown = _INTEGRAL_PER_S * self.velocity_per_s * dt_s * np.clip(error, -_MOST_ERROR_M_S, _MOST_ERROR_M_S)
         self._integral[:2] += np.where(free, grown[:2], 0.0)
         self._integral[2] += grown[2]

@@ -19,7 +19,7 @@ class Cell(NamedTuple):
     cells: int
     capacity_ah: float
     resistance_ohm: float
-    """Of all cells in series."""
+    """The resistance of all cells in series."""
 
 
 class Vehicle(NamedTuple):

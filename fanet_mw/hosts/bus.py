@@ -196,13 +196,14 @@ class Bus:
         self._session.declare_queryable(topic, on_query)
 
     def ask(self, topic: str, on_sample: OnSample) -> None:
-        """Query a topic; answers come as samples."""
+        """Query a topic; answers come as samples. On a closed session nobody is asked."""
 
         def on_reply(reply: zenoh.Reply) -> None:
             if reply.ok is not None:
                 on_sample(topic, reply.ok.payload.to_bytes())
 
-        self._session.get(topic, on_reply, timeout=2.0)
+        if not self._session.is_closed():
+            self._session.get(topic, on_reply, timeout=2.0)
 
     def connected(self) -> bool:
         """True if a client has its router."""

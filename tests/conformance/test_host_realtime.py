@@ -401,6 +401,19 @@ async def test_whoever_comes_late_gets_the_clock_that_runs() -> None:
         assert now_ns > 0
 
 
+async def test_a_hint_that_comes_when_the_session_is_closed_raises_nothing() -> None:
+    """As a forged clock does, again and again, at the end of a run."""
+    endpoint = free_endpoint()
+    with Bus.serve(endpoint):
+        with Bus.join(endpoint) as own:
+            listener = ClockListener(own, NAMES)
+        raised: list[object] = []
+        asyncio.get_running_loop().set_exception_handler(lambda _, context: raised.append(context))
+        listener._on_hint(NAMES.clock, b"")
+        await asyncio.sleep(0.1)
+    assert raised == []
+
+
 async def test_a_swarm_that_is_not_complete_is_not_started_and_names_who_is_missing() -> None:
     endpoint = free_endpoint()
     with Bus.serve(endpoint) as bus, Bus.join(endpoint) as one:

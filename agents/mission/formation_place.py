@@ -44,7 +44,7 @@ class FormationPlace:
         self.plan, self.pattern = plan, pattern_of(plan)
         self.place = plan.nodes.index(self._node) if self._node in plan.nodes else None
         if first:
-            self._left_from, self._left_ns = self._navigation.position, max(now_ns, plan.start_us * US)
+            self._left_from, self._left_ns = self._navigation.over_ground(now_ns), max(now_ns, plan.start_us * US)
 
     def leave(self) -> None:
         """Hold no place any more, whatever the plan says yet."""
@@ -67,10 +67,10 @@ class FormationPlace:
         return self.plan is not None and now_ns >= _taken_up_ns(self.plan)
 
     def lane(self, now_ns: int) -> tuple[Enu, Enu]:
-        """Where our lane wants us now, and how that place moves."""
+        """Where our lane wants us now, at a height over the ground, and how that place moves."""
         plan, pattern, place = self.plan, self.pattern, self.place
         if plan is None or pattern is None or place is None:
-            return self._left_from or self._navigation.position, STILL
+            return self._left_from or self._navigation.over_ground(now_ns), STILL
         arrival_ns = _taken_up_ns(plan)
         if now_ns >= arrival_ns or self._left_from is None:
             swept_s = (now_ns - arrival_ns) / S

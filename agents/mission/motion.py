@@ -56,6 +56,10 @@ class Navigation:
         if above_ground_m is not None:
             self._above_ground = above_ground_m, now_ns
 
+    def over_ground(self, now_ns: int) -> Enu:
+        """Where we are, with the height over the ground in place of that above 0."""
+        return self.position._replace(up=self.height_m(now_ns))
+
     def height_m(self, now_ns: int) -> float:
         """Over the ground, as far as a rangefinder has told lately and no roof is below us; else by the map."""
         ranged = self._above_ground is not None and now_ns - self._above_ground[1] <= _RANGED_NS

@@ -5,7 +5,7 @@ from collections.abc import Callable
 
 import pytest
 
-from agents.mission.chart import NO_CHART
+from agents.mission.chart import NO_CHART, Chart
 from agents.mission.motion import Motion
 from agents.mission.outbox import Outbox
 from agents.mission.searcher import Searcher, formation
@@ -24,7 +24,15 @@ STILL = Enu(0.0, 0.0, 0.0)
 class Flight:
     """A searcher, its clock, and what it has told and recorded."""
 
-    def __init__(self, make_scenario: Callable[..., Scenario], node: int = 7) -> None:
+    def __init__(
+        self,
+        make_scenario: Callable[..., Scenario],
+        node: int = 7,
+        *,
+        chart: Chart = NO_CHART,
+        planned: bool = True,
+        home: Enu = HOME,
+    ) -> None:
         keys = {
             "nodes.count": 20, "nodes.altitude_m": 65, "mission.survivors": 3, "mission.search": "lines",
             "mobility.model": "onboard", "world.area_m": 1000, "radio.range_m": 250, "sensors.battery_hz": 1,
@@ -32,16 +40,17 @@ class Flight:
         }  # fmt: skip
         scenario = make_scenario(**keys)
         self.outbox = Outbox()
-        self.searcher = Searcher(scenario, NodeId(node), position=HOME, outbox=self.outbox, chart=NO_CHART)
+        self.searcher = Searcher(scenario, NodeId(node), position=home, outbox=self.outbox, chart=chart)
         self.searcher.start(0)
-        self.at, self.now_ns = HOME, 0
+        self.at, self.now_ns = home, 0
         pattern = formation(scenario, 20)
         assert pattern is not None
         self.plan = Search(
             S // US, pattern.half_width_m, pattern.first_m, pattern.last_m, 65.0, 7.5, 100, 1, 1,
             tuple(range(1, 21)), pattern.lanes, pattern.relays, pattern.followers,
         )  # fmt: skip
-        self.searcher.told(self.plan, now_ns=0)
+        if planned:
+            self.searcher.told(self.plan, now_ns=0)
 
     def fly(self, seconds: float, *, charge: Callable[[float], float] | None = None) -> None:
         """Fly as it wants to; `charge` is what its battery says, by the second."""
@@ -166,3 +175,15 @@ def test_a_neighbor_that_is_only_seen_by_radar_is_avoided_too(make_scenario: Cal
     flown = [flight.searcher.velocity or STILL for flight in (heard, seen, alone)]
     assert flown[0].minus(flown[2]).norm() > 0.5
     assert flown[1].minus(flown[2]).norm() > 0.5
+
+
+@pytest.mark.parametrize(
+    ("planned", "seconds", "highest_m"), [(False, 12, 66.0), (True, 40, 72.0)], ids=["waiting", "in its place"]
+)
+def test_heights_are_over_the_ground_with_and_without_a_plan(
+    make_scenario: Callable[..., Scenario], planned: bool, seconds: int, highest_m: float
+) -> None:
+    plateau = Chart((), ((30.0, 30.0), (30.0, 30.0)), 2000.0)
+    flight = Flight(make_scenario, chart=plateau, planned=planned, home=HOME._replace(up=95.0))
+    flight.fly(seconds)
+    assert 64.0 < flight.at.up - 30.0 < highest_m, "lanes are at 65 m, relays 6 m higher"

@@ -74,7 +74,7 @@ class Neighbors:
     def __init__(self) -> None:
         self._motions: dict[int, Motion] = {}
 
-    def heard(self, node: int, motion: Motion) -> None:
+    def on_hello(self, node: int, motion: Motion) -> None:
         """A hello said how its sender flies."""
         self._motions[node] = motion
 

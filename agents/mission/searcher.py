@@ -226,7 +226,7 @@ class Searcher:
 
     def hello(self, origin: int, motion: Motion, *, now_ns: int) -> None:
         """A neighbor's hello told how it flies."""
-        self._neighbors.heard(origin, motion)
+        self._neighbors.on_hello(origin, motion)
         self._planner.alive(origin, motion.position, now_ns=now_ns)
 
     def told(self, message: Told, *, now_ns: int) -> None:

@@ -20,7 +20,7 @@ from fanet_mw.node.packet import Packet
 from fanet_mw.routing import control
 from fanet_mw.routing.control import BodyReader, Family, check_node, type_of
 from fanet_mw.routing.resolution import Knowledge, Outgoing, Resolver
-from fanet_mw.units import BROADCAST, NodeId
+from fanet_mw.units import BROADCAST, NodeId, earliest
 from fanet_mw.wire import Kind
 
 REASON_OF: Final = {
@@ -82,10 +82,25 @@ class Routed(RoutingProtocol):
 
     def _on_failure(self, packet: Packet, next_hop: NodeId, outcome: TxOutcome, *, now_ns: int) -> None:
         """Handle a data packet that the MAC has given up: drop it, or find another way."""
-        self._port.drop(REASON_OF[outcome], packet, now_ns=now_ns)
+        self._drop_failed(packet, outcome, now_ns=now_ns)
 
     def _on_control_failure(self, next_hop: NodeId, outcome: TxOutcome, *, now_ns: int) -> None:
         """Handle a unicast control message that the MAC has given up."""
+
+    def _on_unresolved(self, out: Outgoing, *, now_ns: int) -> None:
+        """Handle a frame whose next hop has no known address: drop it, or find another way."""
+        self._drop_unresolved(out, now_ns=now_ns)
+
+    def _due_ns(self) -> int | None:
+        """When this protocol wants to be woken, addresses aside."""
+        return None
+
+    def _on_wake(self, now_ns: int) -> None:
+        """Do what is due now, addresses aside."""
+
+    def _held(self) -> int:
+        """The packets that wait in this protocol for a route."""
+        return 0
 
     # --- the contract ---------------------------------------------------------------------------------------------
 
@@ -129,15 +144,18 @@ class Routed(RoutingProtocol):
             self._on_control_failure(hop, status.outcome, now_ns=now_ns)
 
     def next_wake_ns(self) -> int | None:
-        return None if self._addresses is None else self._addresses.next_ns()
+        due_ns = self._due_ns()
+        return due_ns if self._addresses is None else earliest(due_ns, self._addresses.next_ns())
 
     def wake(self, now_ns: int) -> None:
         if self._addresses is not None:
             for out in self._addresses.expire(now_ns=now_ns):
                 self._on_unresolved(out, now_ns=now_ns)
+        self._on_wake(now_ns)
 
     def waiting(self) -> int:
-        return len(self._unicasts) + (0 if self._addresses is None else self._addresses.waiting())
+        unresolved = 0 if self._addresses is None else self._addresses.waiting()
+        return len(self._unicasts) + unresolved + self._held()
 
     # --- what a protocol uses -------------------------------------------------------------------------------------
 
@@ -169,8 +187,12 @@ class Routed(RoutingProtocol):
         elif (refused := self._addresses.hold(out, start_ns=start_ns, now_ns=now_ns)) is not None:
             self._on_unresolved(refused, now_ns=now_ns)
 
-    def _on_unresolved(self, out: Outgoing, *, now_ns: int) -> None:
-        """Drop a frame whose next hop has no known address; as in ns-3, the protocol is not told."""
+    def _drop_failed(self, packet: Packet, outcome: TxOutcome, *, now_ns: int) -> None:
+        """Drop a data packet that the MAC has given up."""
+        self._port.drop(REASON_OF[outcome], packet, now_ns=now_ns)
+
+    def _drop_unresolved(self, out: Outgoing, *, now_ns: int) -> None:
+        """Drop a frame whose next hop has no known address, as ns-3 does."""
         self._port.drop(DropReason.UNRESOLVED, out.packet, now_ns=now_ns)
 
     def _ask_address(self, neighbor: NodeId, start_ns: int, now_ns: int) -> None:

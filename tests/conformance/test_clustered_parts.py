@@ -84,15 +84,15 @@ def test_a_relay_is_never_in_the_past_nor_beyond_the_hop_limit(node: Node) -> No
 
 
 def test_what_a_relaying_rule_leaves_open_is_decided_when_it_says(node: Node) -> None:
-    relaying = protocol_of(node).parts.relaying
+    parts = protocol_of(node).parts
     for seq in range(1, 9):
-        relaying.on_flood(packet(seq), heard(packet(seq)), at_once=False, now_ns=NOW_NS)
-    open_before, decided = relaying.waiting(), []
-    while (wake_ns := relaying.next_wake_ns()) is not None:
+        parts.relaying.on_flood(packet(seq), heard(packet(seq)), at_once=False, now_ns=NOW_NS)
+    open_before, decided = parts.contending.waiting(), []
+    while (wake_ns := parts.contending.next_wake_ns()) is not None:
         assert wake_ns >= NOW_NS
-        decided += relaying.decided(wake_ns)
+        decided += parts.contending.decided(wake_ns)
     assert len(decided) == open_before
-    assert relaying.waiting() == 0
+    assert parts.contending.waiting() == 0
 
 
 def test_roles_name_the_node_itself_and_bear_the_word_of_others(node: Node) -> None:

@@ -109,7 +109,7 @@ class Aodv(Routed):
             self._table.extend(self._table.active(near, now_ns=now_ns), ends_ns=ends_ns)
 
     def _on_failure(self, packet: Packet, next_hop: NodeId, outcome: TxOutcome, *, now_ns: int) -> None:
-        super()._on_failure(packet, next_hop, outcome, now_ns=now_ns)
+        self._drop_failed(packet, outcome, now_ns=now_ns)
         if outcome is TxOutcome.RETRY_LIMIT:
             self._link_broke(next_hop, now_ns=now_ns)
 
@@ -362,17 +362,10 @@ class Aodv(Routed):
 
     # --- time -----------------------------------------------------------------------------------------------------
 
-    def next_wake_ns(self) -> int | None:
-        return earliest(
-            self._hello_ns,
-            self._discovery.next_ns(),
-            self._hellos.next_ns(),
-            self._room.next_end_ns(),
-            super().next_wake_ns(),
-        )
+    def _due_ns(self) -> int | None:
+        return earliest(self._hello_ns, self._discovery.next_ns(), self._hellos.next_ns(), self._room.next_end_ns())
 
-    def wake(self, now_ns: int) -> None:
-        super().wake(now_ns)
+    def _on_wake(self, now_ns: int) -> None:
         for packet in self._room.expire(now_ns=now_ns):
             self._port.drop(DropReason.EXPIRED, packet, now_ns=now_ns)
         for neighbor in self._hellos.lost(now_ns):
@@ -385,8 +378,8 @@ class Aodv(Routed):
 
     # --- reporting ------------------------------------------------------------------------------------------------
 
-    def waiting(self) -> int:
-        return super().waiting() + len(self._room)
+    def _held(self) -> int:
+        return len(self._room)
 
     def report(self) -> Mapping[str, object]:
         return {"control_sent": self.control_sent, "waiting": self.waiting(), "sequence": self._seq}

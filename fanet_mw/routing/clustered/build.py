@@ -172,7 +172,7 @@ def _in_slots(ground: _Ground, rule: Rule, *on_copy: Callable[..., object]) -> C
     relaying = ContendingRelaying(ground.port, rule, ground.contention)
     whole = Parts(
         neighbors=ground.neighbors, gradient=ground.gradient, uplink=ground.uplink, repair=ground.repair,
-        floods=ground.floods, roles=roles, access=access, relaying=relaying, two_hops=None,
+        floods=ground.floods, roles=roles, access=access, relaying=relaying, contending=relaying, two_hops=None,
     )  # fmt: skip
     return _protocol(ground, whole, *on_copy, parts.refresh.on_copy)
 
@@ -181,12 +181,12 @@ def _by_choice(ground: _Ground, membership: Membership, choice: RelayChoice) -> 
     parts = _role_parts(ground, membership, takes_slot=True)
     access = _slots(ground, membership)
     roles = _roles(ground, parts, access, NoTimetable())
-    relaying = NeighborKnowledgeRelaying(
-        ground.port, choice, ContendingRelaying(ground.port, RelayAll(), ground.contention)
-    )
+    contending = ContendingRelaying(ground.port, RelayAll(), ground.contention)
+    relaying = NeighborKnowledgeRelaying(ground.port, choice, contending)
     whole = Parts(
         neighbors=ground.neighbors, gradient=ground.gradient, uplink=ground.uplink, repair=ground.repair,
-        floods=ground.floods, roles=roles, access=access, relaying=relaying, two_hops=relaying,
+        floods=ground.floods, roles=roles, access=access, relaying=relaying, contending=contending,
+        two_hops=relaying,
     )  # fmt: skip
     return _protocol(ground, whole, parts.refresh.on_copy)
 
@@ -217,11 +217,12 @@ def _by_timetable(ground: _Ground) -> Clustered:
     timetabling = FromPlaces(
         port, lease=parts.lease, membership=parts.membership, refresh=parts.refresh, promises=promises, access=access
     )
-    relaying = ScheduledRelaying(port, plans, ContendingRelaying(port, RelayAll(), ground.contention))
+    contending = ContendingRelaying(port, RelayAll(), ground.contention)
+    relaying = ScheduledRelaying(port, plans, contending)
     whole = Parts(
         neighbors=ground.neighbors, gradient=ground.gradient, uplink=ground.uplink, repair=ground.repair,
         floods=ground.floods, roles=_roles(ground, parts, access, timetabling), access=access, relaying=relaying,
-        two_hops=None, promises=promises,
+        contending=contending, two_hops=None, promises=promises,
     )  # fmt: skip
     return _protocol(ground, whole, parts.refresh.on_copy, calls.on_copy)
 
@@ -291,10 +292,12 @@ def _by_claims(ground: _Ground) -> Clustered:
         queue=ClaimedRelease(ground.queue(), own, lead_ns=scenario.radio.lead_ns, frame_bytes=frame_bytes),
         floods=ground.floods, contention=ground.contention,
     )  # fmt: skip
-    relaying = ClaimedRelaying(port, claiming, access, ContendingRelaying(port, RelayAll(), ground.contention))
+    contending = ContendingRelaying(port, RelayAll(), ground.contention)
+    relaying = ClaimedRelaying(port, claiming, access, contending)
     whole = Parts(
         neighbors=ground.neighbors, gradient=ground.gradient, uplink=ground.uplink, repair=ground.repair,
-        floods=ground.floods, roles=NoRoles(port), access=access, relaying=relaying, two_hops=access,
+        floods=ground.floods, roles=NoRoles(port), access=access, relaying=relaying, contending=contending,
+        two_hops=access,
     )  # fmt: skip
     return _protocol(ground, whole)
 

@@ -22,6 +22,7 @@ from fanet_mw.routing.clustered.forwarding.floods import Floods
 from fanet_mw.routing.clustered.forwarding.gradient import Gradient
 from fanet_mw.routing.clustered.forwarding.repair import Repair
 from fanet_mw.routing.clustered.forwarding.uplink import MOST_TRIES, Uplink
+from fanet_mw.routing.clustered.relaying.contending import ContendingRelaying
 from fanet_mw.routing.clustered.timetable.promises import Promises
 from fanet_mw.units import BROADCAST, US, NodeId, earliest
 from fanet_mw.wire import FLAG_FLOOD, FLAG_TO_HEAD, HEADER_BYTES, Kind
@@ -44,6 +45,8 @@ class Parts(NamedTuple):
     roles: Roles
     access: Access
     relaying: Relaying
+    contending: ContendingRelaying
+    """Relays outside of turns; `relaying` may be the same part, or leave to it what it does not decide itself."""
     two_hops: TwoHops | None
     """None: hellos say nothing of neighbors."""
     promises: Promises | None = None
@@ -172,13 +175,13 @@ class Clustered(RoutingProtocol):
         parts = self.parts
         repair_ns = parts.repair.next_wake_ns() if parts.repair else None
         return earliest(
-            parts.roles.next_wake_ns(), parts.access.next_wake_ns(), parts.relaying.next_wake_ns(), repair_ns
+            parts.roles.next_wake_ns(), parts.access.next_wake_ns(), parts.contending.next_wake_ns(), repair_ns
         )
 
     def wake(self, now_ns: int) -> None:
         parts = self.parts
         parts.roles.wake(now_ns)
-        for relay in parts.relaying.decided(now_ns):
+        for relay in parts.contending.decided(now_ns):
             self._port.relay_together([relay])
         for packet in parts.repair.due(now_ns=now_ns) if parts.repair else ():
             parts.access.answer(packet, now_ns=now_ns)
@@ -188,7 +191,7 @@ class Clustered(RoutingProtocol):
     # --- for people -----------------------------------------------------------------------------------------------
 
     def waiting(self) -> int:
-        return len(self.parts.uplink) + self.parts.access.waiting() + self.parts.relaying.waiting()
+        return len(self.parts.uplink) + self.parts.access.waiting() + self.parts.contending.waiting()
 
     def report(self) -> Mapping[str, object]:
         parts = self.parts

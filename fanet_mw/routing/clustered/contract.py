@@ -124,15 +124,6 @@ class Relaying(Protocol):
         every node passes it on, and soon.
         """
 
-    def decided(self, now_ns: int) -> Sequence[Relay]:
-        """Packets whose relay was open until now."""
-
-    def next_wake_ns(self) -> int | None:
-        """When the next decision is due."""
-
-    def waiting(self) -> int:
-        """Packets whose relay is still open."""
-
     def report(self) -> Mapping[str, object]:
         """JSON-able state."""
 

@@ -65,7 +65,7 @@ class Dsdv(Routed):
             self._send(packet, next_hop, start_ns=start_ns, now_ns=now_ns)
 
     def _on_failure(self, packet: Packet, next_hop: NodeId, outcome: TxOutcome, *, now_ns: int) -> None:
-        super()._on_failure(packet, next_hop, outcome, now_ns=now_ns)
+        self._drop_failed(packet, outcome, now_ns=now_ns)
         if outcome is TxOutcome.RETRY_LIMIT and self._table.lose(next_hop, now_ns=now_ns):
             self._plan(now_ns)
 
@@ -99,11 +99,10 @@ class Dsdv(Routed):
 
     # --- time -------------------------------------------------------------------------------------------------------
 
-    def next_wake_ns(self) -> int | None:
-        return earliest(self._full_ns, self._news_ns, self._room.next_end_ns(), super().next_wake_ns())
+    def _due_ns(self) -> int | None:
+        return earliest(self._full_ns, self._news_ns, self._room.next_end_ns())
 
-    def wake(self, now_ns: int) -> None:
-        super().wake(now_ns)
+    def _on_wake(self, now_ns: int) -> None:
         for packet in self._room.expire(now_ns=now_ns):
             self._port.drop(DropReason.EXPIRED, packet, now_ns=now_ns)
         if self._full_ns is not None and now_ns >= self._full_ns:
@@ -118,8 +117,8 @@ class Dsdv(Routed):
 
     # --- reporting --------------------------------------------------------------------------------------------------
 
-    def waiting(self) -> int:
-        return super().waiting() + len(self._room)
+    def _held(self) -> int:
+        return len(self._room)
 
     def report(self) -> Mapping[str, object]:
         return {"control_sent": self.control_sent, "waiting": self.waiting(), "routes": self._table.count()}

@@ -107,7 +107,7 @@ class Geographic(Routed):
             self._locations.forget(out.next_hop)
             self._carry(out.packet, now_ns=now_ns)
         else:
-            super()._on_unresolved(out, now_ns=now_ns)
+            self._drop_unresolved(out, now_ns=now_ns)
 
     def _on_acknowledged(self, packet: Packet, next_hop: NodeId) -> None:
         self._port.forget(packet)
@@ -158,11 +158,10 @@ class Geographic(Routed):
 
     # --- time -------------------------------------------------------------------------------------------------------
 
-    def next_wake_ns(self) -> int | None:
-        return earliest(self._beacon_ns, self._retry_ns, super().next_wake_ns())
+    def _due_ns(self) -> int | None:
+        return earliest(self._beacon_ns, self._retry_ns)
 
-    def wake(self, now_ns: int) -> None:
-        super().wake(now_ns)
+    def _on_wake(self, now_ns: int) -> None:
         if self._beacon_ns is not None and now_ns >= self._beacon_ns:
             beacon = PositionBeacon(self._port.position, self._locations.in_use())
             self._send_control(BEACON, beacon.encode(), start_ns=self._jittered(now_ns, self._jitter_ns), now_ns=now_ns)
@@ -172,8 +171,8 @@ class Geographic(Routed):
 
     # --- reporting --------------------------------------------------------------------------------------------------
 
-    def waiting(self) -> int:
-        return super().waiting() + len(self._room)
+    def _held(self) -> int:
+        return len(self._room)
 
     def report(self) -> Mapping[str, object]:
         return {"control_sent": self.control_sent, "waiting": self.waiting(), "carried": len(self._room)}

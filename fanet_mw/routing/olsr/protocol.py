@@ -39,7 +39,7 @@ from fanet_mw.routing.olsr.routes import OlsrRoute, routing_table
 from fanet_mw.routing.olsr.state import Repositories
 from fanet_mw.routing.routed import Routed
 from fanet_mw.serial import following
-from fanet_mw.units import BROADCAST, NodeId
+from fanet_mw.units import BROADCAST, NodeId, earliest
 
 _HELLO_VTIME: Final = encode_time(p.NEIGHB_HOLD_TIME_NS)
 _HELLO_HTIME: Final = encode_time(p.HELLO_INTERVAL_NS)
@@ -167,14 +167,10 @@ class Olsr(Routed):
 
     # --- time -------------------------------------------------------------------------------------------------------
 
-    def next_wake_ns(self) -> int | None:
-        if self._hello_ns is None or self._tc_ns is None:
-            return None
-        ours_ns, addresses_ns = min(self._hello_ns, self._tc_ns), super().next_wake_ns()
-        return ours_ns if addresses_ns is None else min(ours_ns, addresses_ns)
+    def _due_ns(self) -> int | None:
+        return earliest(self._hello_ns, self._tc_ns)
 
-    def wake(self, now_ns: int) -> None:
-        super().wake(now_ns)
+    def _on_wake(self, now_ns: int) -> None:
         if self._hello_ns is not None and now_ns >= self._hello_ns:
             self._state.tidy(now_ns)
             self._send_hello(now_ns)

@@ -1,13 +1,12 @@
 """The queue of one node in claimed slots: own packets and relays, most urgent first, in the turns that are its own."""
 
-from fanet_mw.node.packet import Packet
 from fanet_mw.node.queue import TxQueue
 from fanet_mw.routing.clustered.claimed.own_turns import OwnTurns
 from fanet_mw.routing.clustered.tdma.turn_release import OwnTurn, TurnRelease
 
 
 class ClaimedRelease(TurnRelease):
-    """What waits for our turns: own packets and relays, most urgent first."""
+    """What waits for the node's turns."""
 
     def __init__(self, queue: TxQueue, own: OwnTurns, *, lead_ns: int, frame_bytes: int) -> None:
         super().__init__(queue, lead_ns=lead_ns)
@@ -18,14 +17,13 @@ class ClaimedRelease(TurnRelease):
         start_ns = self._own.next_start_ns(not_before_ns=earliest_ns)
         return None if start_ns is None else OwnTurn(start_ns, self._frame_bytes)
 
-    def due(self, *, now_ns: int) -> list[tuple[list[Packet], int]]:
-        """Turns may have come and gone since the last look. Who is woken late still uses a turn that is ahead."""
+    def _look_again(self, now_ns: int) -> None:
+        """Take the first turn that is the node's own now; a node that is woken late still uses one that is ahead."""
         planned = self._next
         self._arm(now_ns)
         if planned is not None and planned.start_ns >= now_ns:
             later_ns = planned.start_ns if self._next is None else self._next.start_ns
             self._next = self._turn(min(planned.start_ns, later_ns))
-        return super().due(now_ns=now_ns)
 
     def reserve(self, *, not_before_ns: int) -> int | None:
         """A turn for something that is not queued."""

@@ -1,6 +1,7 @@
 """Relays in claimed turns: many floods at once, each passed on as the relay's next turn comes (pipelined)."""
 
 from collections.abc import Mapping, Sequence
+from typing import Final
 
 from fanet_mw.bus.messages import Reception
 from fanet_mw.errors import DropReason
@@ -10,6 +11,8 @@ from fanet_mw.routing.clustered.claimed.claimed_access import ClaimedAccess
 from fanet_mw.routing.clustered.claimed.claiming import Claiming
 from fanet_mw.routing.clustered.contract import Relaying
 from fanet_mw.wire import Kind
+
+_NOTHING: Final[Mapping[str, object]] = {}
 
 
 class ClaimedRelaying:
@@ -22,7 +25,7 @@ class ClaimedRelaying:
         self._otherwise = otherwise
 
     def start(self, now_ns: int) -> None:
-        self._otherwise.start(now_ns)
+        """No packet is known yet."""
 
     def on_flood(self, packet: Packet, reception: Reception, *, at_once: bool, now_ns: int) -> Sequence[Relay]:
         header = packet.header
@@ -35,14 +38,5 @@ class ClaimedRelaying:
                 self._access.let_out(packet, now_ns=now_ns)
         return ()
 
-    def decided(self, now_ns: int) -> Sequence[Relay]:
-        return self._otherwise.decided(now_ns)
-
-    def next_wake_ns(self) -> int | None:
-        return self._otherwise.next_wake_ns()
-
-    def waiting(self) -> int:
-        return self._otherwise.waiting()
-
     def report(self) -> Mapping[str, object]:
-        return self._otherwise.report()
+        return _NOTHING

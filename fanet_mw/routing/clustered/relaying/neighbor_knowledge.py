@@ -25,6 +25,8 @@ from fanet_mw.wire.inner import Beacon, Role
 _LEARN: Final = 4
 """Hello intervals after which the two hops are known: one for the neighbors, one for theirs, and two may be lost."""
 
+_NOTHING: Final[Mapping[str, object]] = {}
+
 
 class RelayChoice(Protocol):
     """Which nodes relay, once the two hops are known."""
@@ -109,7 +111,6 @@ class NeighborKnowledgeRelaying:
 
     def start(self, now_ns: int) -> None:
         self._known_ns = now_ns + self._learn_ns
-        self._otherwise.start(now_ns)
 
     def on_flood(self, packet: Packet, reception: Reception, *, at_once: bool, now_ns: int) -> Sequence[Relay]:
         is_data = packet.header.kind == Kind.DATA
@@ -125,14 +126,5 @@ class NeighborKnowledgeRelaying:
         self._choice.near.on_claims(claims, now_ns=now_ns)
         self._choice.on_beacon(beacon)
 
-    def decided(self, now_ns: int) -> Sequence[Relay]:
-        return self._otherwise.decided(now_ns)
-
-    def next_wake_ns(self) -> int | None:
-        return self._otherwise.next_wake_ns()
-
-    def waiting(self) -> int:
-        return self._otherwise.waiting()
-
     def report(self) -> Mapping[str, object]:
-        return self._otherwise.report()
+        return _NOTHING

@@ -28,7 +28,7 @@ class ScheduledRelaying:
         """Packets whose turn had begun when the node heard of them."""
 
     def start(self, now_ns: int) -> None:
-        self._otherwise.start(now_ns)
+        """No packet is known yet."""
 
     def on_flood(self, packet: Packet, reception: Reception, *, at_once: bool, now_ns: int) -> Sequence[Relay]:
         plan = self._plans.at(reception.end_ns)
@@ -62,14 +62,5 @@ class ScheduledRelaying:
             self._port.drop(DropReason.MISSED_TURN, packet, now_ns=now_ns)
         return [Relay(packet, start_ns) for start_ns in ahead_ns]
 
-    def decided(self, now_ns: int) -> Sequence[Relay]:
-        return self._otherwise.decided(now_ns)
-
-    def next_wake_ns(self) -> int | None:
-        return self._otherwise.next_wake_ns()
-
-    def waiting(self) -> int:
-        return self._otherwise.waiting()
-
     def report(self) -> Mapping[str, object]:
-        return {**self._otherwise.report(), "missed_turns": self._missed}
+        return {"missed_turns": self._missed}

@@ -29,6 +29,9 @@ class TurnRelease(ABC):
     def _turn(self, earliest_ns: int) -> OwnTurn | None:
         """The first turn of the node from an instant on."""
 
+    def _look_again(self, now_ns: int) -> None:  # noqa: B027  (most turns stay as they were)
+        """Plan anew where turns may have come and gone since the last look."""
+
     def __len__(self) -> int:
         return len(self._queue)
 
@@ -60,6 +63,7 @@ class TurnRelease(ABC):
 
     def due(self, *, now_ns: int) -> list[tuple[list[Packet], int]]:
         """Packets to announce now, those of one frame together, with its instant."""
+        self._look_again(now_ns)
         released = []
         while self._next is not None and self._next.start_ns - self._lead_ns <= now_ns and len(self._queue):
             released.append((self._fill(self._next.frame_bytes), self._next.start_ns))

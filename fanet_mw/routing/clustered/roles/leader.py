@@ -16,7 +16,8 @@ from fanet_mw.routing.clustered.clustering import Cluster, Swarm, succession
 from fanet_mw.routing.clustered.clustering.division import Division, drift
 from fanet_mw.routing.clustered.roles.lease import Authority
 from fanet_mw.routing.clustered.roles.liveness import Liveness
-from fanet_mw.routing.clustered.roles.position_updates import LOST_NS, Motion
+from fanet_mw.routing.clustered.roles.position_updates import Motion
+from fanet_mw.routing.clustered.roles.roster import Roster, sure_m
 from fanet_mw.routing.clustered.timetable.link_state import LinkState, adjacency, worth_a_change
 from fanet_mw.routing.clustered.timetable.turn_plan import measured_period_ns
 from fanet_mw.scenario import Scenario
@@ -28,10 +29,6 @@ SETTLE_NS: Final = 700 * MS
 """The quiet time after the last join before the clusters are computed."""
 OBJECTION_NS: Final = 2 * S
 """The time in which a head that is said to be silent may object; meanwhile a stand-in serves its cluster."""
-_MISSED_NS: Final = 4 * S
-"""About this long a node has been silent when that is reported."""
-_SURE: Final = 0.9
-"""The share of the range within which a link is certain, because places are accurate to a tenth of the range."""
 _OBJECTION_PERIODS: Final = 4
 """The same with a timetable, in periods: the report waits for a contention window, the objection for a turn."""
 ANSWER_NS: Final = 3500 * MS
@@ -46,16 +43,6 @@ _MOST: Final = 0.9
 """The share of nodes whose links must be known before measured links are used."""
 _DRIFT: Final = 0.03
 """The share of links that must have changed before a timetable is made anew."""
-
-
-class _StandIn(NamedTuple):
-    """The node that serves a cluster in place of its silent head, or that has reported a silent node."""
-
-    node: NodeId
-    since_ns: int
-    """When the leader learned of it."""
-    reported_ns: int
-    """When it was reported; a node that has generated something later is alive."""
 
 
 class _Assigned(NamedTuple):
@@ -91,18 +78,19 @@ class Leader:
         """With `needs_every_link` a timetable is made from the assignment, which then depends on more than clusters."""
         clusters = scenario.clusters
         self._authority = authority
-        self._liveness = liveness
         self._period_ns = clusters.period_ns
         self._reassign_ns = seconds_to_ns(clusters.reassign_s)
         self._range_m = clusters.link_m or scenario.radio.range_m
         self._by_links = needs_every_link
-        self._objection_ns = max(OBJECTION_NS, _OBJECTION_PERIODS * clusters.period_ns if self._by_links else 0)
+        self._roster = Roster(
+            liveness,
+            objection_ns=max(OBJECTION_NS, _OBJECTION_PERIODS * clusters.period_ns if needs_every_link else 0),
+            sure_m=sure_m(self._range_m) if needs_every_link else None,
+        )
         self._division = Division(
             clusters.method, count=clusters.count, range_m=self._range_m, options=clusters.options
         )
         self._epoch = epoch
-        self._motions: dict[NodeId, Motion] = {}
-        self._stand_ins: dict[NodeId, _StandIn] = {}
         self._links = LinkState() if scenario.measures_links else None
         self._measured_ns = measured_period_ns(scenario)
         """How often an assignment is announced whose links have been measured: once per superframe."""
@@ -118,14 +106,14 @@ class Leader:
         node, silent = NodeId(join.node), NodeId(join.instead_of)
         if node == self._authority.leader:
             return
-        known = self._motions.get(node)
-        if known is not None and known.at_ns >= born_ns:
+        if not self._roster.is_news(node, born_ns):
             return
-        self._motions[node] = Motion(join.position, join.velocity, born_ns)
-        if known is None:
+        if node not in self._roster:
             self._due_ns = max(now_ns + SETTLE_NS, self._not_before_ns)
+        motion = Motion(join.position, join.velocity, born_ns)
+        self._roster.on_join(node, motion)
         if silent != node:
-            self.on_suspicion(silent, node, self._motions[node], now_ns=now_ns)
+            self.on_suspicion(silent, node, motion, now_ns=now_ns)
 
     def on_links(self, node: NodeId, links: Sequence[Link]) -> None:
         """Take in how well a node, perhaps the leader itself, hears its neighbors."""
@@ -140,17 +128,9 @@ class Leader:
 
     def on_suspicion(self, silent: NodeId, by: NodeId, there: Motion, *, now_ns: int) -> None:
         """Note that a node is reported silent by a node whose place is given; it has some time to object."""
-        if silent in self._motions and (not self._by_links or self._near(silent, there)):
-            known = self._stand_ins.get(silent, _StandIn(by, now_ns, there.at_ns))
-            self._stand_ins[silent] = known._replace(node=by)
-            self._due_ns = min(self._due_ns, max(known.since_ns + self._objection_ns, now_ns))
-
-    def _near(self, node: NodeId, there: Motion) -> bool:
-        """True if the two should have heard each other all the time; a node that has flown away is not silent."""
-        known = self._motions[node]
-        instants = (there.at_ns - _MISSED_NS, there.at_ns)
-        apart = (known.position_at(t_ns).minus(there.position_at(t_ns)).norm() for t_ns in instants)
-        return max(apart) <= _SURE * self._range_m
+        until_ns = self._roster.on_report(silent, by, there, now_ns=now_ns)
+        if until_ns is not None:
+            self._due_ns = min(self._due_ns, max(until_ns, now_ns))
 
     def next_wake_ns(self) -> int:
         return self._due_ns
@@ -162,8 +142,8 @@ class Leader:
         """
         if now_ns < self._due_ns:
             return []
-        self._forget(now_ns)
-        if self._motions and now_ns >= self._not_before_ns:
+        self._roster.forget(now_ns)
+        if self._roster.nodes and now_ns >= self._not_before_ns:
             self._renew(here, notice_ns, now_ns)
         self._due_ns = now_ns + (self._measured_ns if self._assigned.measured else self._period_ns)
         if now_ns < self._not_before_ns:
@@ -177,24 +157,11 @@ class Leader:
         term, leader = self._authority
         return Schedule(now_ns // US, period_us, period_us, 0, leader, 1, 0, 1, (), term)
 
-    def _forget(self, now_ns: int) -> None:
-        """Forget nodes without a sign of life for long, and reported nodes that have not objected in time."""
-        for node in sorted(self._motions):
-            last_ns = max(self._liveness.last_ns(node) or 0, self._motions[node].at_ns)
-            stand_in = self._stand_ins.get(node)
-            if stand_in is not None and last_ns > stand_in.reported_ns:
-                del self._stand_ins[node]  # the node has objected
-                stand_in = None
-            if now_ns - last_ns > LOST_NS or (
-                stand_in is not None and now_ns >= stand_in.since_ns + self._objection_ns
-            ):
-                del self._motions[node]
-
     def _renew(self, here: Motion, notice_ns: int, now_ns: int) -> None:
         """Make another epoch, if there is a reason."""
         before = self._assigned
-        changed = self._outbid or sorted(self._motions) != sorted(before.nodes)
-        rests = not self._reassign_ns or self._stand_ins or now_ns < before.start_ns + self._reassign_ns
+        changed = self._outbid or sorted(self._roster.nodes) != sorted(before.nodes)
+        rests = not self._reassign_ns or self._roster.stand_ins or now_ns < before.start_ns + self._reassign_ns
         measured = self._measured()
         if not changed and rests and not (measured and not before.measured):
             return
@@ -206,9 +173,8 @@ class Leader:
         members = {node: place for node, place in places.items() if node != self._authority.leader}
         links = within_range(places, range_m=self._range_m) if not measured else adjacency(measured, places)
         near = within_range(members, range_m=self._range_m) if not measured else adjacency(measured, members)
-        swarm = Swarm(members, near, velocities=self._velocities())
-        stand_ins = {head: self._stand_ins[head].node for head in sorted(self._stand_ins)}
-        clusters = self._division.renew(before.clusters, swarm, stand_ins, now_ns=now_ns)
+        swarm = Swarm(members, near, velocities=self._roster.velocities())
+        clusters = self._division.renew(before.clusters, swarm, self._roster.stand_ins, now_ns=now_ns)
         same = [(c.head, sorted(c.members)) for c in clusters] == [(c.head, sorted(c.members)) for c in before.clusters]
         if measured:
             moved = worth_a_change(before.measured, measured)
@@ -216,7 +182,7 @@ class Leader:
             moved = self._by_links and drift(before.links, links) > _DRIFT
         if not changed and same and not moved:
             return
-        self._stand_ins = {head: who for head, who in self._stand_ins.items() if head in self._motions}
+        self._roster.forget_reports()
         ordered = [Cluster(cluster.head, succession(cluster, swarm)) for cluster in clusters]
         self._epoch, self._outbid = (self._epoch + 1) & 0xFFFF or 1, False
         self._assigned = _Assigned(ordered, places, links, start_ns, self._parts(ordered, start_ns), measured)
@@ -225,18 +191,15 @@ class Leader:
         """The links to plan with; empty until most nodes have reported theirs: neighbors know the links of the rest."""
         if self._links is None:
             return ()
-        nodes = [*self._motions, NodeId(self._authority.leader)]
+        nodes = [*self._roster.nodes, NodeId(self._authority.leader)]
         known = self._assigned.measured or self._links.known(nodes) >= _MOST * len(nodes)
         return self._links.between(nodes) if known else ()
 
     def _places(self, here: Motion, start_ns: int) -> dict[NodeId, Enu]:
         """The places of all nodes in the middle of the time for which the assignment is made."""
         t_ns = start_ns + self._reassign_ns // 2
-        motions = self._motions | {NodeId(self._authority.leader): here}
-        return {node: motions[node].position_at(t_ns) for node in sorted(motions)}
-
-    def _velocities(self) -> Mapping[NodeId, Enu]:
-        return {node: self._motions[node].velocity for node in sorted(self._motions)}
+        places = self._roster.places(t_ns) | {NodeId(self._authority.leader): here.position_at(t_ns)}
+        return {node: places[node] for node in sorted(places)}
 
     def _parts(self, clusters: list[Cluster], start_ns: int) -> list[Schedule]:
         """The parts of the schedule; its superframes begin when all nodes should have received it."""

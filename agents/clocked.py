@@ -41,7 +41,7 @@ _ROUNDING_NS: Final = 2 * US
 
 
 class _TimeInHellos:
-    """Adds swarm time to the hellos of one UAV (`agents.uav.HelloTime`)."""
+    """Adds swarm time to the hellos of one UAV (`agents.hellos.HelloTime`)."""
 
     def __init__(self, time: SwarmTime, local_now_ns: Callable[[], int]) -> None:
         self._time = time

@@ -5,11 +5,12 @@ tap. Everything that decides is in the parts; this file only says what goes wher
 """
 
 from collections.abc import Mapping, Sequence
-from typing import Any, Final, NamedTuple, Protocol
+from typing import Any, NamedTuple
 
 from agents.autopilot import Autopilot
 from agents.avoidance import CollisionAvoidance
 from agents.dead_reckoning import DeadReckoning
+from agents.hellos import Hellos, HelloTime
 from agents.mission.applications import PlannedSearch, Rescue
 from agents.mission.chart import NO_CHART, Chart
 from agents.onboard import INNER_ID, Onboard
@@ -31,26 +32,10 @@ from fanet_mw.bus.messages import (
 )
 from fanet_mw.bus.topics import Topics
 from fanet_mw.extensions import load
-from fanet_mw.node.node import AnnouncedHello, Node
-from fanet_mw.rng import stream
+from fanet_mw.node.node import Node
 from fanet_mw.routing import make_protocol
 from fanet_mw.scenario import Scenario
-from fanet_mw.units import Enu, NodeId, earliest, seconds_to_ns
-
-_HELLO_JITTER: Final = 0.1
-"""A hello varies by this share of its interval, so that neighbors in step do not stay so (RFC 3626, 3.4)."""
-_LIFETIME_HELLOS: Final = 4
-"""A node that has not been heard for so many hello intervals is no neighbor any more."""
-
-
-class HelloTime(Protocol):
-    """What adds swarm time to the hellos of a node."""
-
-    def frames(self) -> bytes:
-        """The inner frames for the hello that is said now; empty while there is no time to tell."""
-
-    def announced(self, hello: AnnouncedHello) -> None:
-        """That hello was announced to the radio, which will tell when it has ended."""
+from fanet_mw.units import Enu, NodeId, earliest
 
 
 class NodeState(NamedTuple):
@@ -60,6 +45,14 @@ class NodeState(NamedTuple):
     bound_ns: int | None
     clusters: Mapping[NodeId, tuple[NodeId, ...]]
     """By head, the nodes of each cluster, the head first, as far as the node knows."""
+
+
+class _Topics(NamedTuple):
+    """Where the messages of a UAV go."""
+
+    transmit: str
+    setpoint: str
+    tap: str
 
 
 class Uav(Actor):
@@ -82,10 +75,7 @@ class Uav(Actor):
         topics = Topics(swarm)
         super().__init__(f"agent-{node}", (topics.radio_rx(node), topics.sensors(node)))
         self._id = node
-        self._tx_topic = topics.radio_tx(node)
-        self._setpoint_topic = topics.setpoint(node)
-        self._tap_topic = topics.mavlink(node)
-        self._lead_ns = scenario.radio.lead_ns
+        self._topics = _Topics(topics.radio_tx(node), topics.setpoint(node), topics.mavlink(node))
         self._prompt_ns = scenario.radio.handover_ns + scenario.radio.lead_ns
         """After the end of a frame: who hears of it later than this is too late for what comes a lead after it."""
         self._node = Node(node, scenario, make_protocol, position=position)
@@ -104,14 +94,9 @@ class Uav(Actor):
             fly=self._steer,
             tap=self._tap,
         )
-        self._hello_time = hello_time
-        self._hello_ns = seconds_to_ns(scenario.routing.hello_interval_s)
-        self._hello_random = stream(scenario.seed, "hello", node).random
-        self._next_hello_ns: int | None = None
+        self._hellos = Hellos(scenario, self._node, hello_time)
         self._own_wake_ns: int | None = None
         """When an application or a hello is due; changes whenever an application has been called."""
-        self._heard_ns: dict[NodeId, int] = {}
-        """When a hello of each other node was heard last."""
         self._malformed = 0
         self._heard_late = 0
         """Receptions that were handed over too late."""
@@ -119,8 +104,7 @@ class Uav(Actor):
     # --- the actor contract ---------------------------------------------------------------------------------------
 
     def start(self, now_ns: int) -> None:
-        if self._hello_ns:
-            self._next_hello_ns = now_ns + self._lead_ns + int(self._hello_random() * self._hello_ns)
+        self._hellos.start(now_ns)
         self._node.records = self.records
         self._onboard.start(now_ns)
         self._node.start(now_ns)
@@ -176,9 +160,7 @@ class Uav(Actor):
 
     def state(self, now_ns: int) -> NodeState:
         """What the node knows of the network."""
-        lifetime_ns = _LIFETIME_HELLOS * self._hello_ns
-        self._heard_ns = {node: t_ns for node, t_ns in self._heard_ns.items() if now_ns - t_ns <= lifetime_ns}
-        return NodeState(tuple(sorted(self._heard_ns)), self._node.bound_ns(), self._node.clusters())
+        return NodeState(self._hellos.neighbors(now_ns), self._node.bound_ns(), self._node.clusters())
 
     def know_clock_error(self, error_ns: int) -> None:
         """The greatest error of any clock in the swarm, as far as this node has heard; 0: they are exact."""
@@ -206,22 +188,14 @@ class Uav(Actor):
     def _on_hellos(self, now_ns: int) -> None:
         hellos, self._node.hellos = self._node.hellos, []
         for hello in hellos:
-            self._heard_ns[hello.origin] = now_ns
+            self._hellos.on_hello(hello.origin, now_ns)
             if self._onboard.hears_hellos:
                 self._onboard.on_hello(hello.frame, now_ns)
 
     def _say_hello(self, now_ns: int) -> None:
-        if self._next_hello_ns is None or self._next_hello_ns - self._lead_ns > now_ns:
-            return
-        inner = self._autopilot.beacon_frames(now_ns) + self._onboard.hello_frames(now_ns)
-        time, start_ns = self._hello_time, max(self._next_hello_ns, now_ns)
-        if time is None:
-            self._node.say_hello(inner, start_ns=start_ns, now_ns=now_ns)
-        else:
-            time.announced(self._node.say_hello(inner, start_ns=start_ns, now_ns=now_ns, time=time.frames()))
-        vary = 1 + _HELLO_JITTER * (2 * self._hello_random() - 1)
-        step_ns = int(self._hello_ns * vary * self._node.hello_share(now_ns))
-        self._next_hello_ns = max(self._next_hello_ns + step_ns, now_ns)
+        due_ns = self._hellos.due_ns()
+        if due_ns is not None and due_ns <= now_ns:
+            self._hellos.say(self._autopilot.beacon_frames(now_ns) + self._onboard.hello_frames(now_ns), now_ns)
 
     # --- after every input ----------------------------------------------------------------------------------------
 
@@ -241,14 +215,13 @@ class Uav(Actor):
             onboard.called = False
             self._own_wake_ns = self._next_own_ns()
         if node.requests:
-            topic = self._tx_topic
+            topic = self._topics.transmit
             self.outbox += [(topic, request) for request in node.requests]
             node.requests.clear()
         return called
 
     def _next_own_ns(self) -> int | None:
-        hello_ns = None if self._next_hello_ns is None else self._next_hello_ns - self._lead_ns
-        return earliest(self._onboard.next_wake_ns(), hello_ns)
+        return earliest(self._onboard.next_wake_ns(), self._hellos.due_ns())
 
     def _steer(self, course: Course, now_ns: int) -> None:
         setpoint = Setpoint(now_ns, course.position, course.speed_m_s)
@@ -256,10 +229,10 @@ class Uav(Actor):
             setpoint = setpoint._replace(kind=SetpointKind.VELOCITY, velocity=course.velocity)
         elif course.land:
             setpoint = setpoint._replace(kind=SetpointKind.LAND)
-        self.outbox.append((self._setpoint_topic, setpoint))
+        self.outbox.append((self._topics.setpoint, setpoint))
 
     def _tap(self, frames: bytes, now_ns: int) -> None:
-        self.outbox.append((self._tap_topic, MavlinkTap(now_ns, frames)))
+        self.outbox.append((self._topics.tap, MavlinkTap(now_ns, frames)))
 
 
 def _asked_for(

@@ -2,7 +2,7 @@
 
 A message that is to be confirmed waits for the one before it in its flow. What is kept is bounded in bytes, per sender
 and together, and in messages; what does not fit is not taken, and its sender, who hears nothing, sends it again.
-Pieces that contradict each other are counted as malformed by whoever calls.
+The caller counts pieces that contradict each other as malformed.
 """
 
 from collections.abc import Callable
@@ -15,7 +15,7 @@ from fanet_mw.units import MS, US, NodeId, earliest
 from fanet_mw.wire.message import DELIVERED, GIVEN_UP, MISSING, NO_LISTENER, Head, Piece, Receipt
 
 MOST_BYTES: Final = 4 << 20
-"""Of pieces of all senders together."""
+"""The most bytes of pieces that are kept, of all senders together."""
 MOST_BYTES_EACH: Final = 1 << 20
 """Of one sender."""
 MOST_MESSAGES: Final = 4096
@@ -23,8 +23,8 @@ MOST_MESSAGES: Final = 4096
 MOST_MESSAGES_EACH: Final = 512
 """Of one sender."""
 RECEIPT_NS: Final = 20 * MS
-"""A receipt waits this long for others to the same node, and up to `_SPREAD_NS` longer: who heard the same broadcast
-must not answer at the same instant."""
+"""A receipt waits this long for others to the same node, and up to `_SPREAD_NS` longer: nodes that heard the same
+broadcast must not answer at the same instant."""
 _SPREAD_NS: Final = 80 * MS
 _MOST_DONE: Final = 8192
 """Messages of which is remembered that they were handed over."""
@@ -77,11 +77,11 @@ class Receiver:
         self._counts: dict[NodeId, int] = {}
         """Of messages in `_incoming`, by sender."""
         self._done: dict[tuple[NodeId, int], int] = {}
-        """What was told of a message in the end, for those whose sender has not heard of it."""
+        """The last receipt of each message whose sender may not have heard of it."""
         self._last: dict[tuple[NodeId, int], int] = {}
         """Of each flow, the number of the message that was handed over last."""
         self._receipts: dict[NodeId, dict[int, tuple[Receipt, int]]] = {}
-        """To whom, and of which messages, with the priority of each."""
+        """By node to which receipts are due, the messages and the priority of each."""
         self._receipts_ns: int | None = None
         self._sweep_ns: int | None = None
         self.arrived: list[Whole] = []
@@ -201,7 +201,7 @@ class Receiver:
     # --- out ------------------------------------------------------------------------------------------------------
 
     def due(self, now_ns: int) -> list[tuple[NodeId, list[Receipt], int]]:
-        """Receipts to send now: to whom, which, and the most urgent priority among their messages."""
+        """The receipts to send now: for each node its receipts, and the most urgent priority among their messages."""
         if self._sweep_ns is not None and self._sweep_ns <= now_ns:
             self._sweep(now_ns)
         if self._receipts_ns is None or now_ns < self._receipts_ns:

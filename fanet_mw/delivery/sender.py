@@ -2,11 +2,11 @@
 
     sent -> every target has it -> acknowledged
          -> no word in time     -> the missing pieces again, and twice the patience
-         -> lifetime over       -> expired: who has not confirmed it is named
+         -> lifetime over       -> expired: the nodes that have not confirmed it are named
 
 How long to wait for a receipt follows from those that came (RFC 6298). The pieces under way of all messages together
 are bounded by a window, which shrinks when something has to be repeated (half) and grows with each message that was
-confirmed (by one). What is kept has a bound too: a message that does not fit is refused by whoever asks `full` first.
+confirmed (by one). What is kept has a bound too: the caller asks `full` first, and refuses a message that does not fit.
 """
 
 import heapq
@@ -30,7 +30,7 @@ _LEAST_WAIT_NS: Final = 300 * MS
 _MOST_DOUBLINGS: Final = 3
 _MOST_FLOWS: Final = 1024
 _FEW: Final = 2
-"""So many targets that still lack something are sent to one by one; more of them together."""
+"""Up to so many targets that still lack something are sent to one by one; more of them are sent to together."""
 _NAMED: Final = 32
 """Of a message for everyone, at most so many that still lack something are named when it is repeated."""
 
@@ -53,7 +53,7 @@ class Told(NamedTuple):
     outcome: int
     """As in a receipt, or `EXPIRED`."""
     targets: tuple[NodeId, ...]
-    """Who said so; of a message that expired: who has not confirmed it."""
+    """The targets that said so; of a message that expired, those that have not confirmed it."""
     last: bool
     """True when nothing more will be told of this message."""
 
@@ -83,7 +83,7 @@ class _Outgoing:
     everyone: bool
     """True for a message for everyone."""
     lacking: dict[NodeId, int]
-    """Who has not confirmed it yet, and which pieces each of them has, as bits."""
+    """By target that has not confirmed it yet, the pieces that the target has, as bits."""
     again_ns: int = 0
     """When to send again what is lacking; 0: it waits for its turn to be sent."""
     sent_ns: int = 0

@@ -28,7 +28,7 @@ class Port(Protocol):
     clock_error_ns: int
     """The greatest error of any clock in the swarm, as far as the node has heard; 0: they are exact."""
     velocity: Enu
-    """How fast it last knew itself to move [m/s]."""
+    """The velocity at which the node last knew itself to move [m/s]."""
 
     def transmit(self, frame: bytes, dst: NodeId, *, start_ns: int, wants_status: bool = False) -> int:
         """Announce a transmission; returns the request's sequence number."""
@@ -51,10 +51,10 @@ class Port(Protocol):
     def announce(
         self, kind: Kind, inner: bytes, *, now_ns: int, flags: int, hop_limit: int, destination: NodeId = BROADCAST
     ) -> Packet:
-        """Make a control packet of our own, next sequence number, marked as handled here."""
+        """Make a control packet of this node, with its next sequence number, marked as handled here."""
 
     def forwarded(self, packet: Packet, *, flags: int) -> bytes:
-        """The bytes of a packet for its next hop: one hop more, our id as previous hop."""
+        """The bytes of a packet for its next hop: with one hop more, and this node as previous hop."""
 
     def drop(self, reason: DropReason, packet: Packet, *, now_ns: int) -> None: ...
 
@@ -62,7 +62,7 @@ class Port(Protocol):
         """Know copies of a packet in the phase of these flags that come from now on."""
 
     def forget(self, packet: Packet) -> None:
-        """Treat a later copy of this packet as new: it was not ours to handle yet, or its custody has passed on."""
+        """Treat a later copy of a packet as new: this node was not to handle it yet, or its custody has passed on."""
 
     def record(self, record: Record) -> None: ...
 
@@ -98,7 +98,7 @@ class RoutingProtocol(ABC):
         return b""
 
     def hello_share(self, *, now_ns: int) -> float:
-        """After which part of the hello interval the next hello should go."""
+        """The part of the hello interval after which the next hello should go."""
         return 1.0
 
     def hello_start_ns(self, start_ns: int) -> int:
@@ -106,10 +106,10 @@ class RoutingProtocol(ABC):
         return start_ns
 
     def on_hello(self, packet: Packet, reception: Reception, *, now_ns: int) -> None:  # noqa: B027
-        """A neighbor's hello."""
+        """Take in a neighbor's hello."""
 
     def on_impersonation(self, packet: Packet, *, now_ns: int) -> None:  # noqa: B027
-        """Somebody sent a packet in our name that we do not know of; it goes no further."""
+        """Take in a packet that another node sent in the name of this one; it goes no further."""
 
     def on_copy(self, key: int, *, now_ns: int) -> None:  # noqa: B027
         """Another copy, in the same phase, of a packet that was handled before (`duplicates.key_of`).
@@ -118,16 +118,16 @@ class RoutingProtocol(ABC):
         """
 
     def on_status(self, status: TxStatus, *, now_ns: int) -> None:  # noqa: B027
-        """How a transmission ended that asked for it."""
+        """Take in how a transmission ended; only those that asked for it are told of."""
 
     def wake(self, now_ns: int) -> None:  # noqa: B027
-        """An instant named by `next_wake_ns` has come."""
+        """Act at an instant that `next_wake_ns` has named."""
 
     def next_wake_ns(self) -> int | None:
         return None
 
     def waiting(self) -> int:
-        """Packets held inside the protocol."""
+        """The number of packets that wait in the protocol."""
         return 0
 
     def bound_ns(self) -> int | None:

@@ -30,7 +30,7 @@ class DuplicateSet:
     def __init__(self, capacity: int = 32_768) -> None:
         self._capacity = capacity
         self.young: dict[int, int] = {}
-        """The newer generation, for whoever asks at every reception: what it has of a key is all that is known."""
+        """The newer generation, open to a caller that asks at every reception: it holds all that is known of a key."""
         self.old: dict[int, int] = {}
         """The older one."""
 

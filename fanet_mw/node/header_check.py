@@ -1,6 +1,6 @@
-"""What a routing header cannot truly say, whoever sent it; asked of every first copy, before anything comes of it.
+"""What a routing header cannot truly say, whichever node sent it: the check of every first copy, before it has effects.
 
-    origin, transmitter, destination    nodes that there are; the transmitter is the one whom the radio names
+    origin, transmitter, destination    nodes that there are; the transmitter is the one that the radio names
     hops                                0 at the origin alone; with those still allowed, no more than 255
     instant of birth                    not still to come
     sequence number                     not beyond those that the time since swarm instant 0 has room for
@@ -21,14 +21,14 @@ RESTART_STEP_NS: Final = 100 * US
 CONTROL: Final = 0x8000_0000
 """Control packets are numbered apart, from here on: then data packets have no gaps, and what is missing shows."""
 _AHEAD_NS: Final = 100 * MS
-"""By so much a birth may lie ahead where all clocks are exact: hosts take their time from each other over a bus."""
+"""How far a birth may lie ahead where all clocks are exact: hosts take their time from each other over a bus."""
 _BURST: Final = 100_000
 """Numbers that a node may be ahead of one per `RESTART_STEP_NS`: ten seconds of the densest traffic."""
 _MOST_HOPS: Final = 255
 
 
 class HeaderCheck:
-    """What one node believes of headers."""
+    """The check of headers at one node."""
 
     def __init__(self, node: NodeId, scenario: Scenario) -> None:
         clock = scenario.clock
@@ -38,7 +38,7 @@ class HeaderCheck:
         self._ahead_ns = _AHEAD_NS + (2 * (clock.offset_ns + drift_ns) + S if clock.modelled else 0)
 
     def why_not(self, fields: Fields, *, known: bool, src: NodeId, end_ns: int) -> DropReason | None:
-        """Why this header, of a frame that `src` transmitted until `end_ns`, is not to be believed; None: it is.
+        """The reason why the header of a frame that `src` sent until `end_ns` is not believed; None: it is believed.
 
         `known`: the packet was handled before, in another phase.
         """

@@ -1,4 +1,4 @@
-"""Who is heard directly, and what they said last. A neighbor expires when its hellos stop."""
+"""The nodes that are heard directly, with the last hello of each. A neighbor expires when its hellos stop."""
 
 from typing import Final, NamedTuple
 
@@ -29,15 +29,15 @@ class Neighbors:
         self._by_id[neighbor.node] = neighbor
 
     def forget(self, node: NodeId) -> None:
-        """The link failed: do not wait for the lifetime to run out."""
+        """Forget a neighbor whose link has failed, before its lifetime is over."""
         self._by_id.pop(node, None)
 
     def count(self, *, now_ns: int) -> int:
-        """How many are not yet expired."""
+        """The number of neighbors that have not expired."""
         horizon_ns = now_ns - self._lifetime_ns
         return sum(1 for neighbor in self._by_id.values() if neighbor.heard_ns >= horizon_ns)
 
     def alive(self, *, now_ns: int) -> list[Neighbor]:
-        """Neighbors not yet expired, by id."""
+        """The neighbors that have not expired, by id."""
         horizon_ns = now_ns - self._lifetime_ns
         return [self._by_id[node] for node in sorted(self._by_id) if self._by_id[node].heard_ns >= horizon_ns]

@@ -158,7 +158,7 @@ class Node:
     def say_hello(self, inner: bytes, *, start_ns: int, now_ns: int, time: bytes | None = None) -> AnnouncedHello:
         """Broadcast this node's hello one hop: the frames of its applications, what the protocol adds, and the time.
 
-        `time` is left out where there is no room for it; whoever gives it, though it be empty, gets the status of the
+        `time` is left out where there is no room for it. A caller that gives it, even empty, gets the status of the
         transmission.
         """
         start_ns = self._protocol.hello_start_ns(start_ns)

@@ -1,7 +1,7 @@
-"""A frame as whoever hears it finds it: which packet, in which phase, and what is in it when somebody asks.
+"""Reads frames off the air: which packet a frame brings, in which phase, and, when asked, what the packet holds.
 
-A broadcast is one object of bytes to all who hear it in virtual time, and they hear it one after another: what the
-first of them has read serves the others. Nothing here depends on who reads. In real time every frame is read once.
+In virtual time a broadcast is one object of bytes for all nodes that hear it, one after another: what the first of them
+has read serves the others. Nothing here depends on the node that reads. In real time every frame is read once.
 """
 
 from collections.abc import Callable
@@ -43,9 +43,9 @@ class Reader:
         self.phase = 0
         """The bit of its packet's phase, unchecked; 0 when these bytes can have none; BUNDLE: it has several."""
         self.packet: Packet | None = None
-        """The packet in the frame, once somebody has asked for it."""
+        """The packet in the frame, once `read` has been called."""
         self.fields = wire.NO_FIELDS
-        """What lies where its header has its fields, unchecked until somebody has asked for the packet."""
+        """The values at the places of the header's fields, unchecked until `read` has been called."""
 
     def look(self, frame: bytes, *, alone: bool = False) -> None:
         """Take up another frame. `alone`: it is one packet of a bundle, whatever its flags say of more."""
@@ -67,7 +67,7 @@ class Reader:
 
 
 shared_reader: Final = Reader()
-"""For all nodes of this process."""
+"""The reader of all nodes of this process."""
 T = TypeVar("T")
 
 
@@ -81,10 +81,10 @@ class _Inside:
 
 
 class Decoded:
-    """What has been decoded of the latest packets that somebody asked about.
+    """What has been decoded of the latest packets.
 
-    The inner frames of a packet are found and checked once, and each of its messages is decoded once, whoever asks: the
-    clock, the protocol and the applications of a node, and all nodes that hear the same bytes.
+    The inner frames of a packet are found and checked once, and each of its messages is decoded once, for the
+    clock, the protocol and the applications of a node, and for all nodes that hear the same bytes.
     """
 
     def __init__(self) -> None:
@@ -117,7 +117,7 @@ class Decoded:
 
 
 decoded: Final = Decoded().of
-"""For all nodes of this process: a hello that forty hear is decoded once."""
+"""The decoder of all nodes of this process: a hello that forty of them hear is decoded once."""
 
 
 def packet_of(frame: bytes) -> Packet:

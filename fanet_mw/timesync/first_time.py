@@ -1,6 +1,6 @@
 """Which statement of swarm time a node believes while it has no time of its own.
 
-    a neighbor states the time -> who states the same? -> enough, and more than contradict -> believed
+    a neighbor states the time -> which others state the same? -> enough, and more than contradict -> believed
 
 The leader's statement of its own time is believed at once. Any other statement needs a second neighbor that agrees, or
 a while in which no more neighbors contradict it than agree. So two honest neighbors outvote a liar that is the first to

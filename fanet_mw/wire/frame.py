@@ -317,7 +317,7 @@ def decode_every(spec: Spec, packed: Packed) -> list[tuple[Any, ...]]:
 
 
 def fields_of_each(packed: Packed) -> Iterator[tuple[Spec, tuple[Any, ...]]]:
-    """The fields of each inner frame that is one of our messages; raises MalformedFrameError."""
+    """The fields of each inner frame with a message of this dialect; raises MalformedFrameError."""
     for msgid, inner in inner_frames(packed):
         spec = _OURS.get(msgid)
         if spec is not None and inner[1] == spec.layout.size:

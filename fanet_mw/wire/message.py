@@ -107,7 +107,7 @@ class Piece(NamedTuple):
 
     head: Head
     targets: frozenset[int] | None
-    """Who is meant to have it; None: whoever the packet's destination is."""
+    """The nodes that are meant to have it; None: those that the packet's destination names."""
     data: bytes
 
 

@@ -1,6 +1,6 @@
 """The inner messages of a planned search: the plan, how each UAV is, bids for tasks, and where survivors are.
 
-As all of our dialect: by struct, total on any bytes, checked for what no sender of ours would say.
+Like the rest of this dialect they are coded by struct; decoders are total, and refuse what no sender would say.
 """
 
 import math

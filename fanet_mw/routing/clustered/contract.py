@@ -1,6 +1,6 @@
 """What the parts of the clustered protocol promise each other. `build.py` chooses one of each by `clusters.relay`.
 
-    Clustered  ->  Roles       who leads, who heads a cluster, who is a member
+    Clustered  ->  Roles       which node leads, heads a cluster, is a member
                ->  Access      when a packet that is to be flooded from here goes on the air, and what contends
                ->  Relaying    whether and when a flood that began elsewhere is passed on
                ->  TwoHops     what hellos say of the nodes within two hops, where a rule needs it
@@ -40,7 +40,7 @@ class Roles(Protocol):
         """A neighbor's hello, which it generated at `born_ns`."""
 
     def on_impersonation(self, packet: Packet, *, now_ns: int) -> None:
-        """Somebody else sent a packet in the name of this node."""
+        """Take in a packet that another node sent in the name of this one."""
 
     def on_flooding(self, due_ns: int) -> None:
         """The node's application has a packet flooded to everyone from an instant on."""

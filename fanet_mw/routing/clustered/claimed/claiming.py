@@ -22,11 +22,11 @@ from fanet_mw.units import MS, NodeId, S, seconds_to_ns
 from fanet_mw.wire.claims import MOST_LOTS, Claims, SlotStatus
 
 _LISTEN: Final = 3
-"""Hello intervals before the first claim: neighbors and theirs are known after two, when none is lost."""
+"""The number of hello intervals before the first claim: the two hops around are known after two if no hello is lost."""
 _LONGEST: Final = 128
-"""Slots of the longest superframe; crowds beyond leave some without."""
+"""The number of slots of the longest superframe; in a larger crowd some nodes find no slot."""
 _SAID: Final = 3
-"""Hellos after which everyone within two hops knows how many lots a node has."""
+"""The number of hellos after which all nodes within two hops know how many lots a node has."""
 IDLE: Final = 0.25
 """A node that needs less than this share of its claimed turns draws no lots."""
 _LEAST_FRAME: Final = 256
@@ -52,7 +52,7 @@ class ClaimedLoad:
         self._pushed += 1
 
     def lots(self, *, waiting: int, turns_per_s: float, now_ns: int) -> int:
-        """For the next hello; asked once per hello."""
+        """The number of lots to state in the next hello; asked once per hello."""
         turns = turns_per_s * (now_ns - self._since_ns) / S
         wanted = (self._pushed + waiting) / turns if turns > 0 else 0.0
         self._pushed, self._since_ns = 0, now_ns
@@ -60,7 +60,7 @@ class ClaimedLoad:
         return self._said[-1]
 
     def drawn(self) -> int:
-        """The lots that we may draw with: no more than anyone believes we have."""
+        """The number of lots to draw with: no more than any node believes this one to have."""
         return min(self._said)
 
 
@@ -81,11 +81,11 @@ class Claiming:
         self._claimed_ns: int | None = None
         """When the node's claim last changed."""
         self._news = False
-        """A hello said what the node has not drawn with yet."""
+        """True if a hello has brought news that the node has not drawn with yet."""
 
     @property
     def _lifetime_ns(self) -> int:
-        """So long after its last hello a neighbor is gone, and so is its claim."""
+        """The time after its last hello at which a neighbor, and its claim, is forgotten."""
         return int(LIFETIME_HELLOS * self._hello_ns)
 
     def _new_claims(self, now_ns: int) -> SlotClaims:
@@ -108,7 +108,7 @@ class Claiming:
     # --- once per hello -------------------------------------------------------------------------------------------
 
     def settle(self, now_ns: int) -> Change:
-        """Settle the node's claim; what `standing` says then holds until the next hello."""
+        """Settle the node's claim; what `standing` states then holds until the next hello."""
         claim = self._claims.step(now_ns).own
         before, length = self.own.share, self._port.scenario.clusters.slots or claim.length
         self.own.share = None if claim.slot is None else Share(claim.slot, length)
@@ -119,7 +119,7 @@ class Claiming:
         return Change.WON if before is None else Change.LOST
 
     def standing(self, *, waiting: int, now_ns: int) -> SlotStatus:
-        """What the hello says of the node's own slots, with so many packets waiting."""
+        """The statement of the node's next hello about its own slots, with so many packets waiting."""
         claim = self._claims.own
         turns_per_s = len(self.own.claimed()) * S / self.own.turns.period_ns
         lots = self._load.lots(waiting=waiting, turns_per_s=turns_per_s, now_ns=now_ns)
@@ -128,13 +128,13 @@ class Claiming:
         return SlotStatus(claim.slot, self._port.scenario.clusters.slots or claim.length, claim.crowd, lots)
 
     def on_claims(self, claims: Claims, *, now_ns: int) -> None:
-        """What a neighbor's hello says."""
+        """Take in the claims that a neighbor's hello states."""
         heard = tuple(self.claim_of(h.node, h.standing) for h in claims.heard)
         self._claims.on_hello(SlotHello(self.claim_of(claims.node, claims.own), heard), now_ns=now_ns)
         self._news |= self.near.on_claims(claims, now_ns=now_ns)
 
     def claim_of(self, node: NodeId, standing: SlotStatus) -> SlotClaim:
-        """As `slot_claims` knows it. What no superframe can hold is no claim: it came off the air."""
+        """The claim in the terms of `slot_claims`. What no superframe can hold is no claim: it came off the air."""
         slot, length = standing.slot, standing.length
         fixed = self._port.scenario.clusters.slots
         if fixed:
@@ -146,11 +146,11 @@ class Claiming:
     # --- in between -----------------------------------------------------------------------------------------------
 
     def push(self) -> None:
-        """Another packet waits for the node's turns."""
+        """Note that another packet waits for the node's turns."""
         self._load.push()
 
     def draw(self, now_ns: int) -> None:
-        """Know again which turns nobody claims, and who draws for them; only a node that draws needs to."""
+        """Learn which turns no node claims now, and which nodes draw for them; only a node that draws needs it."""
         lots = self._load.drawn()
         if not lots:
             self.own.draws = None
@@ -161,7 +161,7 @@ class Claiming:
             self.own.draws = draws(self._port.node, lots, shares, ((n, s.lots) for n, s in said))
 
     def relays(self, now_ns: int) -> bool:
-        """Whether a flood needs this node as a relay."""
+        """True if floods need this node as a relay."""
         if self.own.share is None:
             return False
         slot = self.own.share.slot
@@ -180,7 +180,7 @@ class Claiming:
 
 
 def _rank(slot: int | None) -> float:
-    """A node that holds a slot relays rather than one that does not."""
+    """The rank of a neighbor: one that holds a slot is to relay rather than one that holds none."""
     return 0.0 if slot is None else 1.0
 
 
@@ -191,7 +191,7 @@ def turn_bytes(scenario: Scenario) -> int:
 
 
 def longest_superframe(turns: Turns) -> int:
-    """Slots of the longest superframe: a power of two that fits a period."""
+    """The number of slots of the longest superframe: a power of two that fits a period."""
     return 1 << (min(_LONGEST, max(1, turns.per_frame)).bit_length() - 1)
 
 

@@ -6,7 +6,7 @@
 
 A hello carries the sender's claim and those of the neighbors it hears, so each node knows the claims within two hops
 one or two superframes later. Of two that claim one slot, the stronger keeps it: lower priority value, then lower id.
-A joiner listens before it claims; one who leaves is forgotten when its hellos stop.
+A node that joins listens before it claims; a node that leaves is forgotten when its hellos stop.
 
 Without losses all claims are free of clashes within `listen + 2 d + 1` superframes after the topology last changed,
 where d is the longest chain of ever weaker rivals, two hops apart at most: the strongest of each chain never yields,
@@ -33,7 +33,7 @@ _PATIENCE: Final = 8
 
 
 class SlotClaim(NamedTuple):
-    """Who says it owns which slot; None while it listens or found none free."""
+    """The slot that a node says it owns; None while it listens, or has found none free."""
 
     node: NodeId
     slot: int | None

@@ -1,4 +1,4 @@
-"""Who leads whom. One contract (`Clustering`), several methods; the leader uses the one that `clusters.method` names.
+"""How nodes are divided into clusters: one contract (`Clustering`), several methods; `clusters.method` names one.
 
 `bisection` needs positions only; `election` ranks nodes (lowest-ID, highest degree, WCA, lasting degree) and keeps
 heads; `affinity` lets neighbors vote; `maintenance` carries clusters on over time.

@@ -1,6 +1,6 @@
 """How the leader divides the nodes it knows, and when it does so anew. Pure functions of what it knows.
 
-What stands is first carried on: members that are gone leave, a head that is gone is replaced by who stands in for it,
+What stands is first carried on: members that are gone leave, a head that is gone is replaced by its stand-in,
 newcomers go to the nearest head. Then it is weighed against a new division by what it costs: hops from each member to
 its head, and members above the fair share. The new one is taken only when what stands costs `_WORSE` times as much, and
 then heads, and their slots, are kept where they are nearly as good.
@@ -96,7 +96,7 @@ def _distance(head: NodeId, members: Sequence[NodeId], adjacency: Adjacency) -> 
 
 
 def carried_on(standing: Sequence[Cluster], swarm: Swarm, stand_ins: Mapping[NodeId, NodeId]) -> list[Cluster]:
-    """The standing clusters without those who are gone and with those who are new."""
+    """The standing clusters without the nodes that are gone and with those that are new."""
     here = swarm.adjacency
     clusters = []
     for cluster in standing:

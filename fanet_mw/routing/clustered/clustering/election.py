@@ -125,7 +125,7 @@ def _gather(swarm: Swarm, heads: list[NodeId]) -> list[Cluster]:
 
 
 def succession(cluster: Cluster, swarm: Swarm) -> tuple[NodeId, ...]:
-    """The head, then who stands in for it: those who hear the head first, since they notice first that it is gone."""
+    """The head, then its stand-ins: first those that hear the head, because they notice that it is gone."""
     near, inside = frozenset(swarm.adjacency[cluster.head]), frozenset(cluster.members)
 
     def rank(node: NodeId) -> tuple[bool, int, NodeId]:

@@ -29,16 +29,16 @@ class Floods:
         self._hop_limit = port.scenario.routing.hop_limit
 
     def keep(self, packet: Packet, *, flooded: bool, now_ns: int) -> None:
-        """Be able to repair this packet, if it is for everyone."""
+        """Keep a packet that is for all nodes, so that it can be repaired."""
         if self._repair and packet.header.kind == Kind.DATA and packet.header.destination == BROADCAST:
             self._repair.hold(packet, flooded=flooded, expect_ns=now_ns + self._expect_ns, now_ns=now_ns)
 
     def control(self, kind: Kind, inner: bytes, *, now_ns: int) -> Packet:
-        """A control packet of our own, for everyone."""
+        """Make a control packet of this node for all nodes."""
         return self._port.announce(kind, inner, now_ns=now_ns, flags=FLAG_FLOOD, hop_limit=self._hop_limit)
 
     def contend_control(self, kind: Kind, inner: bytes, *, now_ns: int) -> Packet:
-        """A control packet of our own, sent as soon as it may contend."""
+        """Make a control packet of this node, and send it as soon as it may contend."""
         packet = self.control(kind, inner, now_ns=now_ns)
         self._port.transmit(packet.frame, BROADCAST, start_ns=self._contention.start_ns(now_ns=now_ns))
         return packet
@@ -50,7 +50,7 @@ class Floods:
             self._port.transmit_together([packet], flags=FLAG_FLOOD, at_ns=(start_ns,))
 
     def begin(self, packets: Sequence[Packet], *, start_ns: int, again_ns: Sequence[int] = ()) -> None:
-        """The floods of several packets begin here, in one frame, which is repeated at later instants."""
+        """Begin the floods of several packets, in one frame, which is repeated at later instants."""
         for packet in packets:
             self.keep(packet, flooded=True, now_ns=start_ns)
         self._port.transmit_together(packets, flags=FLAG_FLOOD, at_ns=(start_ns, *again_ns))
@@ -61,7 +61,7 @@ class Floods:
         self._port.transmit_together(goes, flags=FLAG_FLOOD, at_ns=(start_ns,))
 
     def _goes_on(self, packet: Packet) -> bool:
-        """Whether a packet is not yet as far as it may go; one that is counts as flooded here all the same."""
+        """True if a packet may go farther; one that may not counts as flooded here all the same."""
         if packet.header.origin == self._port.node or packet.header.hop_limit > 1:
             return True
         self._port.mark(packet, flags=FLAG_FLOOD)

@@ -61,7 +61,7 @@ class Repair:
         self._turn = 0
         self.repaired = 0
 
-    # --- what we hold ---------------------------------------------------------------------------------------------
+    # --- what the node holds ------------------------------------------------------------------------------------------
 
     def hold(self, packet: Packet, *, flooded: bool, expect_ns: int, now_ns: int) -> None:
         """Keep a data packet that came by, or an own one; one not yet flooded should have been by `expect_ns`."""
@@ -96,7 +96,7 @@ class Repair:
                 del self._stored[origin]
 
     def digest(self, *, now_ns: int, most: int = _MOST_ORIGINS) -> Digest:
-        """What our hello says: everything, or the next part of it; of at most so many origins."""
+        """The digest for this node's hello: of everything, or of the next part; of at most so many origins."""
         most = min(most, _MOST_ORIGINS)
         self._forget(now_ns)
         origins = sorted(self._stored)
@@ -132,7 +132,7 @@ class Repair:
         heapq.heappush(self._due, (due_ns, key))
 
     def on_copy(self, key: int, *, now_ns: int) -> None:
-        """Somebody else sent it: those near us have it now."""
+        """Note that another node has sent a packet: the nodes around have it now."""
         if self._pending.pop(key, None) is not None:
             self._put_off(key, now_ns)
 

@@ -26,7 +26,7 @@ class Attempt(NamedTuple):
     packet: Packet
     parent: NodeId
     tries: int
-    """This one included."""
+    """The number of parents tried at this node, this one included."""
 
 
 class Uplink:
@@ -38,9 +38,9 @@ class Uplink:
         routing = port.scenario.routing
         self._held = TxQueue(capacity=routing.queue_frames, sooner_us=sooner_us(routing))
         self._lifetime_ns = routing.lifetime_ns(-1)
-        """Of the class that lives longest; the queue knows of those that expire sooner."""
+        """The lifetime of the class that lives longest; the queue knows of those that expire sooner."""
         self._under_way: dict[int, Attempt] = {}
-        """By sequence number of the transmit request."""
+        """The attempts that have not ended, by sequence number of the transmit request."""
 
     def __len__(self) -> int:
         return len(self._held) + len(self._under_way)
@@ -60,8 +60,9 @@ class Uplink:
             self._port.drop(DropReason.QUEUE_FULL, evicted, now_ns=now_ns)
 
     def on_status(self, status: TxStatus) -> Attempt | None:
-        """A transmission has ended; returned is an attempt that has failed. A parent that did not acknowledge is none
-        any more.
+        """Take in how a transmission ended; returns the attempt if it has failed.
+
+        A parent that did not acknowledge is given up.
         """
         attempt = self._under_way.pop(status.seq, None)
         if attempt is None or status.outcome is TxOutcome.ACKED:
@@ -71,7 +72,7 @@ class Uplink:
         return attempt
 
     def released(self, *, now_ns: int) -> list[Packet]:
-        """What was held and has not expired, if there is a way now."""
+        """Take out the packets that were held and have not expired, if there is a way now."""
         self.expire(now_ns=now_ns)
         return self.drain() if len(self._held) and self._gradient.route(now_ns=now_ns) is not None else []
 
@@ -81,5 +82,5 @@ class Uplink:
             self._port.drop(DropReason.EXPIRED, packet, now_ns=now_ns)
 
     def drain(self) -> list[Packet]:
-        """Give up what is held: it goes another way."""
+        """Give up what is held, because it goes another way."""
         return self._held.drain()

@@ -25,7 +25,7 @@ class ScheduledRelaying:
         self._plans = plans
         self._otherwise = otherwise
         self._missed = 0
-        """Packets whose turn had begun when the node heard of them."""
+        """The number of packets whose turn had begun when the node heard of them."""
 
     def start(self, now_ns: int) -> None:
         """No packet is known yet."""
@@ -47,7 +47,7 @@ class ScheduledRelaying:
     def _in_turn(
         self, packet: Packet, plan: TurnPlan, heard: tuple[int, NodeId, int], reception: Reception, now_ns: int
     ) -> Sequence[Relay]:
-        """In the turns of this flood that are the node's and still to come."""
+        """The relays in those turns of this flood that are the node's and still to come."""
         offset, root, instance = heard
         own = plan.mine.get((root, instance), ())
         if not own or packet.header.hop_limit <= 1:

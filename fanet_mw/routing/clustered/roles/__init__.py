@@ -1,1 +1,1 @@
-"""Who leads the swarm, who heads a cluster, who is a member, and what becomes of them when nodes fall silent."""
+"""Which node leads the swarm, heads a cluster, or is a member, and what becomes of it when nodes fall silent."""

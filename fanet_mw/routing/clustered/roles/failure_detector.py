@@ -1,11 +1,12 @@
 """Which neighbors have fallen silent, where that cuts others off: in a timetable a dead relay loses all behind it.
 
-    no hello of it for 4 intervals, and nothing that it generated -> with our next hello a join that says so, unless
-    another has said it -> it objects, and stays; or the leader makes a timetable without it
+    no hello of a neighbor for 4 intervals, and nothing that it generated -> a join that says so, with the node's next
+    hello, unless another node has said so -> the neighbor objects, and stays; or the leader plans without it
 
-A neighbor that flew away looks the same from here: then it objects, and nothing more is said of it until its hellos
-are heard again. Where its objection does not arrive it is said again every 10 s, for a minute; where packets of it
-still arrive, never. A word is a join, and a node floods one of those in 5 s at most. Bounded by the number of nodes.
+A neighbor that flew away looks the same to this node: then the neighbor objects, and is not reported again until its
+hellos are heard again. Where its objection does not arrive it is reported again every 10 s, for a minute; where packets
+of it still arrive, never. A report is a join, and a node floods one of those in 5 s at most. The number of nodes bounds
+what is remembered.
 """
 
 from collections.abc import Callable
@@ -16,7 +17,7 @@ from fanet_mw.routing.clustered.roles.liveness import Liveness
 from fanet_mw.units import NodeId, S
 
 _AGAIN_NS: Final = 10 * S
-"""Whoever still is in the schedule then was not heard of by the leader: it is said again."""
+"""A neighbor that is still in the schedule after this time is reported again: the report may not have arrived."""
 _FORGOTTEN_NS: Final = 60 * S
 
 
@@ -30,17 +31,17 @@ class FailureDetector:
         self._reported_ns: dict[NodeId, int] = {}
 
     def on_hello(self, node: NodeId, *, now_ns: int) -> None:
-        """A neighbor's hello."""
+        """Note a neighbor's hello."""
         self._heard_ns[node] = now_ns
         self._reported_ns.pop(node, None)
 
     def on_report(self, node: NodeId, *, now_ns: int) -> None:
-        """Somebody, perhaps we, told the leader that this node is silent."""
+        """Note that a node, perhaps this one, has reported a node to the leader as silent."""
         if node in self._heard_ns:
             self._reported_ns[node] = now_ns
 
     def next_suspect(self, lists: Callable[[NodeId], bool], *, now_ns: int) -> NodeId | None:
-        """A neighbor of which the leader should be told now; `lists`: whether the schedule names a node."""
+        """A neighbor that should be reported now, or None; `lists` says whether the schedule names a node."""
         for node in sorted(self._heard_ns):
             quiet_ns = now_ns - self._heard_ns[node]
             if quiet_ns < self._silent_ns:

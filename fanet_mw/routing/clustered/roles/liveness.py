@@ -1,4 +1,4 @@
-"""Signs of life: when each node last generated something that reached us. Any packet is one, whoever relayed it.
+"""When each node last gave a sign of life: any packet that it generated is one, whichever node relayed it.
 
 A packet counts from the instant it was generated, not from its arrival: it may have waited for a slot while its origin
 died. Bounded by the number of nodes.
@@ -14,16 +14,16 @@ class Liveness:
         self._born_ns: dict[int, int] = {}
 
     def on_sign_of_life(self, node: int, *, born_ns: int) -> None:
-        """Something of this node came in that it generated at `born_ns`."""
+        """Note a packet that a node generated at `born_ns`."""
         if born_ns > self._born_ns.get(node, -1):
             self._born_ns[node] = born_ns
 
     def last_ns(self, node: int) -> int | None:
-        """When the node last showed that it lives; None: never."""
+        """When a node last generated something; None: nothing of it has come in."""
         return self._born_ns.get(node)
 
     def alive_below(self, node: int, *, since_ns: int) -> int:
-        """How many nodes with a lower id have shown a sign since."""
+        """The number of nodes with a lower id that have generated something since."""
         return sum(1 for other, born_ns in self._born_ns.items() if other < node and born_ns >= since_ns)
 
     def forget(self, node: NodeId) -> None:

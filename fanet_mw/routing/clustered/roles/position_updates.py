@@ -1,8 +1,8 @@
 """When a node tells the leader where it is: dead reckoning, as in IEEE 1278.1 (distributed interactive simulation).
 
-The leader carries the position last told on along the velocity last told. A node tells it anew when it is farther than
-a share of the radio range from where the leader must believe it to be, or when it has flooded nothing for so long that
-the leader might take it for dead. So a swarm that flies straight, or hovers, costs nothing.
+The leader extrapolates the last position with the last velocity that it was told. A node sends an update when it is
+farther than a share of the radio range from where the leader must believe it to be, or when it has flooded nothing for
+so long that the leader might take it for dead. So a swarm that flies straight, or hovers, costs nothing.
 """
 
 from typing import Final, NamedTuple
@@ -10,12 +10,12 @@ from typing import Final, NamedTuple
 from fanet_mw.units import Enu, S
 
 _SHARE: Final = 0.1
-"""Of the radio range."""
+"""The share of the radio range by which dead reckoning may err."""
 _LEAST_NS: Final = 5 * S
-"""Between two tellings: each is a flood."""
+"""The least time between two updates, because each is a flood."""
 _QUIET_NS: Final = 20 * S
 LOST_NS: Final = 45 * S
-"""The leader forgets a node after this long without a sign: two tellings and a little."""
+"""The time without a sign of life after which the leader forgets a node: two updates and a little."""
 
 
 class Motion(NamedTuple):
@@ -26,14 +26,14 @@ class Motion(NamedTuple):
     at_ns: int
 
     def position_at(self, t_ns: int) -> Enu:
-        """Where it is at an instant if it flew on straight."""
+        """Where the node is at an instant if it flew on straight."""
         seconds = (t_ns - self.at_ns) / S
         here, v = self.position, self.velocity
         return Enu(here.east + v.east * seconds, here.north + v.north * seconds, here.up + v.up * seconds)
 
 
 class PositionUpdates:
-    """What the leader believes of one node, as that node knows it."""
+    """What the leader believes of one node, as that node knows, and when that has to be corrected."""
 
     def __init__(self, *, range_m: float) -> None:
         self._off_m = _SHARE * range_m
@@ -41,20 +41,20 @@ class PositionUpdates:
         self._flooded_ns = 0
 
     def on_update(self, motion: Motion) -> None:
-        """A join carried this."""
+        """Note that a join told this motion."""
         self._told = motion
         self._flooded_ns = motion.at_ns
 
     def on_flooding(self, now_ns: int) -> None:
-        """A packet of ours goes to everyone: a sign of life."""
+        """Note that a packet of this node goes to all nodes, which is a sign of life."""
         self._flooded_ns = now_ns
 
     def may_update(self, now_ns: int) -> bool:
-        """Whether the last join is long enough ago for another."""
+        """True if the last join is long enough ago for another."""
         return self._told is None or now_ns - self._told.at_ns >= _LEAST_NS
 
     def outdated(self, position: Enu, *, now_ns: int) -> bool:
-        """Whether it is time to tell."""
+        """True if it is time for another update."""
         if self._told is None or not self.may_update(now_ns):
             return False
         off_m = position.minus(self._told.position_at(now_ns)).norm()

@@ -14,7 +14,7 @@ from fanet_mw.routing.clustered.roles.position_updates import LOST_NS, Motion
 from fanet_mw.units import Enu, NodeId, S
 
 _MISSED_NS: Final = 4 * S
-"""About this long a node has been silent when that is reported."""
+"""The time for which a node has about been silent when that is reported."""
 _SURE: Final = 0.9
 """The share of the range within which a link is certain, because places are accurate to a tenth of the range."""
 

@@ -95,7 +95,7 @@ TRANSITIONS: Final[Mapping[tuple[State, Event], Row]] = {
 
 
 def step(state: State, event: Event) -> Row:
-    """The row of the table; that there is one is our invariant, whatever the air brings."""
+    """The row of the table; that there is one is an invariant, whatever the air brings."""
     row = TRANSITIONS.get((state, event))
     assert row is not None, f"{state} has no transition for: {event}"
     return row

@@ -27,12 +27,12 @@ class Admission:
         self._node = node
         self._deadline_ns = deadline_ns
         self._interval_ns = interval_ns
-        """At which the application says it sends."""
+        """The interval at which the application says it sends."""
         self._met: bool | None = None
         self._least_ns = 0
         self._next_ns: int | None = None
         self._expected_after_ns = expected_ns
-        """So long after its start a node should have a bound."""
+        """The time after its start at which a node should have a bound."""
         self._expected_ns: int | None = None
 
     def start(self, now_ns: int) -> None:
@@ -56,7 +56,7 @@ class Admission:
         return max(self._interval_ns, self._least_ns)
 
     def follow(self, own: OwnBound | None, *, now_ns: int) -> DeadlineMet | DeadlineLost | None:
-        """A timetable is in force; None: one without a bound for us. What it says of the deadline, if that is new."""
+        """Take up the bound of a new timetable; None: it has none for the node. Returns what is new of the deadline."""
         least_ns = None if own is None else least_interval_ns(own, deadline_ns=self._deadline_ns - _TOLERANCE_NS)
         self._least_ns = least_ns or (0 if own is None else carried_interval_ns(own))
         bound_ns = own and own.worst_ns(interval_ns=self.interval_ns)

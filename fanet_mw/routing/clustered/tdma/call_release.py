@@ -12,7 +12,7 @@ class CallRelease(TurnRelease):
     _plans: Sequence[TurnsInForce] = ()
 
     def follow(self, plans: Sequence[TurnsInForce], *, now_ns: int) -> None:
-        """New calls; in order of the instants from which they hold."""
+        """Take over new calls, given in the order of the instants from which they hold."""
         self._plans = plans
         self._arm(now_ns)
 
@@ -26,7 +26,7 @@ class CallRelease(TurnRelease):
         return turn.start_ns
 
     def on_copy(self, key: int, *, now_ns: int) -> None:
-        """Somebody else has sent this packet (`duplicates.key_of`)."""
+        """Give up a packet (`duplicates.key_of`) that another node has sent."""
         self._queue.remove(key)
 
     def _turn(self, earliest_ns: int) -> OwnTurn | None:

@@ -6,7 +6,8 @@
 Every class has room of its own in each turn (`root_release.py`), so no class waits for another, and nothing that
 comes later overtakes a packet within its class. A class that sends at intervals is bounded over its busy period
 (`Turns.worst_ns`); any other one for packets that find fewer than `BURST` of their class waiting: a token bucket of
-that depth and of the rate that the turns carry admits all of them. Whoever finds more is let out later, unbounded.
+that depth and of the rate that the turns carry admits all of them. A packet that finds more of its class waiting is let
+out later, and has no bound.
 """
 
 from typing import Final, NamedTuple
@@ -24,9 +25,9 @@ class OwnBound(NamedTuple):
     roots: tuple[int, ...]
     span: int
     together: int = 1
-    """Packets of bulk that one of its turns lets out."""
+    """The number of packets of bulk that one of its turns lets out."""
     around_ns: int = 0
-    """What comes before a turn and after a flood: the lead, the handover of receptions, and the receipt."""
+    """The time before a turn and after a flood: the lead, the handover of receptions, and the receipt."""
 
     def worst_ns(self, *, interval_ns: int) -> int | None:
         """The bound of bulk that comes no more often; None: more comes than is let out."""

@@ -24,15 +24,15 @@ class TurnsInForce(NamedTuple):
     valid_ns: int
     turns: Turns
     offsets: tuple[int, ...]
-    """Which turns are ours, ascending."""
+    """The node's turns, ascending."""
     frame_bytes: int
-    """What goes into one."""
+    """The bytes that one turn holds."""
     span: int
-    """Turns from ours until everyone has what it let out."""
+    """The number of turns from one of the node's own until all nodes have what it let out."""
 
 
 class RootRelease(TurnRelease):
-    """The plan of one node's own turns."""
+    """The queue of one node, let out in its own turns."""
 
     def __init__(self, node: NodeId, queue: TxQueue, *, reserved: Mapping[int, int], lead_ns: int) -> None:
         super().__init__(queue, lead_ns=lead_ns)
@@ -42,19 +42,19 @@ class RootRelease(TurnRelease):
         self._plans: Sequence[TurnsInForce] = ()
 
     def follow(self, plans: Sequence[TurnsInForce], *, now_ns: int) -> None:
-        """New turns; in order of the instants from which they hold."""
+        """Take over new turns, given in the order of the instants from which they hold."""
         self._plans = plans
         self._arm(now_ns)
 
     def has_turn(self, *, now_ns: int) -> bool:
-        """Whether a turn of ours lies ahead, under any timetable that is known."""
+        """True if a turn of this node lies ahead under any timetable that is known."""
         return self._turn(max(now_ns + self._lead_ns, self._free_ns)) is not None
 
     def push(self, packet: Packet, *, now_ns: int) -> Packet | None:
         return self._push(packet, self._rank(packet), now_ns)
 
     def outdated(self, *, before_us: int) -> list[Packet]:
-        """Take out the announcements of ours that were made before an instant [swarm us] and still wait."""
+        """Take out the node's announcements that were made before an instant [swarm us] and still wait."""
         return self._queue.take_older(before_us=before_us, rank=PRIORITY_CONTROL)
 
     def through_ns(self, packet: Packet, *, now_ns: int) -> int | None:
@@ -111,9 +111,9 @@ class RootRelease(TurnRelease):
         return None if following is None else following[0]
 
     def _upcoming(self, earliest_ns: int) -> Iterator[tuple[OwnTurn, int]]:
-        """Our turns from an instant on, each with the instant at which its flood is over; endless while there are any.
+        """The node's turns from an instant on, each with the instant at which its flood is over.
 
-        Each is one of the timetable that is in force then.
+        Each is one of the timetable that is in force then. The turns are endless if there is one.
         """
         for index, (valid_ns, turns, offsets, size, span) in enumerate(self._plans):
             if not offsets:
@@ -123,7 +123,7 @@ class RootRelease(TurnRelease):
             while True:
                 start_ns = turns.next_start_ns(offsets, not_before_ns=at_ns)
                 offset = turns.turn_at(start_ns)
-                assert offset is not None, "our turns are turns"
+                assert offset is not None, "a turn of this node is one of the superframe"
                 end_ns = start_ns + turns.flood_ns(offset, span=span)
                 if until_ns is not None and end_ns > until_ns:
                     break

@@ -18,14 +18,14 @@ _SPREAD_CAP_NS: Final = 40 * MS
 
 
 class Tenure(NamedTuple):
-    """Which slot of which superframe is, or was, ours."""
+    """The slot of a superframe that a head has, or had when it last was head."""
 
     superframe: Superframe
     slot: int
 
 
 class SlotRelease:
-    """The head's transmission plan."""
+    """The queue of one head, let out in its slot."""
 
     def __init__(self, queue: TxQueue, clusters: Clusters, *, lead_ns: int) -> None:
         self._queue = queue
@@ -37,7 +37,7 @@ class SlotRelease:
         self._free_ns = 0
         """One gap after the last release: nothing leaves before, though the queue was empty meanwhile."""
         self._next_ns: int | None = None
-        """The instant of the next release; None while nothing is queued or we own no slot."""
+        """The instant of the next release; None while nothing is queued or the node owns no slot."""
 
     def __len__(self) -> int:
         return len(self._queue)
@@ -57,7 +57,7 @@ class SlotRelease:
         return self._queue.expire(before_us=before_us)
 
     def drain(self) -> list[Packet]:
-        """Give everything up: it goes another way."""
+        """Give up all that is queued, because it goes another way."""
         self._next_ns = self._slot = None
         return self._queue.drain()
 

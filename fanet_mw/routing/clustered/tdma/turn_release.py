@@ -12,7 +12,7 @@ class OwnTurn(NamedTuple):
 
     start_ns: int
     frame_bytes: int
-    """What it holds; 0: one packet, however long."""
+    """The bytes that it holds; 0: one packet, however long."""
 
 
 class TurnRelease(ABC):
@@ -54,7 +54,7 @@ class TurnRelease(ABC):
         return self._queue.expire(before_us=before_us)
 
     def drain(self) -> list[Packet]:
-        """Give everything up: it goes another way."""
+        """Give up all that is queued, because it goes another way."""
         self._next = None
         return self._queue.drain()
 

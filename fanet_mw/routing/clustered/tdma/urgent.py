@@ -1,4 +1,4 @@
-"""Packets that are more urgent than bulk: how long the ones we know are, and the room that turns reserve for them."""
+"""Packets that are more urgent than bulk: how long the known ones are, and the room that turns reserve for them."""
 
 from collections.abc import Mapping
 from typing import Final

@@ -16,7 +16,7 @@ from fanet_mw.units import NodeId
 from fanet_mw.wire.links import CAPACITY, MESSAGES, Link, grade_of, power_of
 
 WINDOW: Final = 24
-"""Hello intervals."""
+"""The length of the window, in hello intervals."""
 FIRST: Final = 8
 """Hello intervals after the start for the first estimate."""
 FAST: Final = 3
@@ -50,11 +50,11 @@ class LinkQuality:
         self._start_ns = now_ns
 
     def on_hello(self, neighbor: NodeId, *, rssi_dbm: float, now_ns: int) -> None:
-        """A neighbor's hello came in."""
+        """Note a neighbor's hello."""
         self._heard.setdefault(neighbor, deque()).append((now_ns, rssi_dbm))
 
     def links(self, *, now_ns: int) -> tuple[Link, ...]:
-        """To us from each neighbor, by id; of more than can be told, the best."""
+        """The links from each neighbor to this node, by id; the best ones if there are more than one message holds."""
         horizon_ns = now_ns - WINDOW * self._hello_ns
         found = []
         for neighbor in sorted(self._heard):

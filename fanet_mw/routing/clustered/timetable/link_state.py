@@ -23,17 +23,17 @@ _CHANGE: Final = 0.1
 
 
 class LinkState:
-    """The newest word of every node."""
+    """The newest report of every node."""
 
     def __init__(self) -> None:
         self._told: dict[NodeId, dict[NodeId, Link]] = {}
 
     def on_report(self, node: NodeId, links: Iterable[Link]) -> None:
-        """How well a node hears whom; what others claim to know of its links does not count."""
+        """Take in how well a node hears its neighbors; what others claim to know of its links does not count."""
         self._told[node] = {link.a: link for link in links if link.b == node}
 
     def known(self, nodes: Collection[NodeId]) -> int:
-        """How many of these nodes have told."""
+        """The number of these nodes that have reported their links."""
         return sum(1 for node in nodes if node in self._told)
 
     def between(self, nodes: Collection[NodeId]) -> tuple[Link, ...]:

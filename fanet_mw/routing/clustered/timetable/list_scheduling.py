@@ -21,42 +21,42 @@ from fanet_mw.units import Enu, NodeId
 _RECEIVER: Final = 100
 """What it is worth that one more node gets a packet, in turns of its flood's age."""
 _ONLY: Final = 50
-"""And that no other holder could have served it."""
+"""What it is worth besides that no other holder of the packet could have served that node."""
 _NOISE: Final = 50
 _WINDOW: Final = 24
-"""Floods under way at once, besides those that one hop after the other keeps on the way: more costs time for little.
+"""The number of floods that are under way at once, besides those that a relay at every hop keeps on their way.
 
-Twice as many with several tries.
+More of them cost computing time and gain little. With several tries twice as many are under way.
 """
 _TRIAL: Final = 64
 _HOPE: Final = 1.15
-"""A load is given up when, after so many turns with the window full, the rest would have to be this much faster."""
+"""A load is given up when, after `_TRIAL` turns with the window full, the rest would have to be this much faster."""
 
 
 class Geometry(NamedTuple):
-    """What a table is computed for."""
+    """The geometry for which a timetable is computed."""
 
     link_m: float
-    """Nodes no farther apart hear each other."""
+    """Nodes that are no farther apart hear each other."""
     interference_m: float
-    """A transmitter no farther from a receiver destroys what that receives."""
+    """A transmitter that is no farther from a receiver destroys what the receiver hears."""
     turns: int
-    """Turns of one superframe."""
+    """The number of turns of one superframe."""
     hop_turns: int
-    """Turns from hearing a packet to the first in which it can be relayed (1: the next)."""
+    """The number of turns from the one that brings a packet to the first that can relay it; 1: the next turn can."""
 
 
 class Effort(NamedTuple):
-    """How hard to pack."""
+    """How hard the turns are packed."""
 
     pace: float = 1.0
     """Floods begin within this share of the superframe."""
     tries: int = 1
-    """Ways to fill each turn."""
+    """The number of ways that are tried to fill each turn."""
 
 
 class FloodNetwork:
-    """Who hears and who disturbs whom, as bit sets over row numbers."""
+    """Which nodes hear, and which disturb, each other: bit sets over the nodes' row numbers."""
 
     def __init__(self, positions: Sequence[tuple[NodeId, Enu]], geometry: Geometry) -> None:
         self.nodes = [node for node, _ in positions]
@@ -72,7 +72,7 @@ class FloodNetwork:
         return tuple(self.nodes[row] for row in rows(bits))
 
     def part(self, root: int) -> tuple[int, int]:
-        """All that a flood of this row can reach, itself included, and after how many hops."""
+        """The rows that a flood of this row can reach, itself included, and the number of hops that it takes."""
         if root not in self._parts:
             found = frontier = 1 << root
             hops = -1
@@ -87,7 +87,9 @@ class FloodNetwork:
         return self._parts[root]
 
     def way(self, node: NodeId, head: NodeId) -> list[int]:
-        """Rows of a shortest way to the head, both ends included, the lowest first; empty for a head or without one."""
+        """The rows of a shortest way to the head, both ends included, the lowest first among equals; empty for a head
+        and for a node without one.
+        """
         start, end = self.row[node], self.row.get(head)
         if end is None or start == end:
             return []
@@ -110,19 +112,19 @@ class FloodNetwork:
 
 
 class Flood:
-    """One packet on its way."""
+    """The flood of one packet, as far as the timetable has brought it."""
 
     def __init__(self, swarm: FloodNetwork, root: int, way: list[int]) -> None:
         self.root = root
         self.goal, self.hops = swarm.part(root)
         self.sent: list[tuple[int, int]] = []
-        """(offset, row), in order."""
+        """The transmissions of this flood as (offset, row), in order."""
         self._hears = swarm.hears
         self._way = way
-        """Who must send first, in this order."""
+        """The rows that must send first, in this order."""
         self._has = 1 << root
         self._ready = {root: 0}
-        """From which offset on each holder can send."""
+        """By holder of the packet, the offset from which on it can send."""
         self._offers: list[tuple[int, int, int, int]] | None = None
 
     @property
@@ -130,11 +132,11 @@ class Flood:
         return self._has == self.goal and bool(self.sent)
 
     def age(self, offset: int) -> int:
-        """Turns since it began."""
+        """The number of turns since this flood began."""
         return offset - self.sent[0][0] if self.sent else 0
 
     def offers(self) -> list[tuple[int, int, int, int]]:
-        """(from which offset on, worth, row, for whom) of every holder that somebody around waits for."""
+        """(first offset, worth, row, receivers) of every holder of the packet around which some node lacks it."""
         if self._offers is None:
             self._offers = self._look()
         return self._offers
@@ -155,7 +157,7 @@ class Flood:
         return found
 
     def send(self, offset: int, row: int, receivers: int, *, hop_turns: int) -> None:
-        """A row sends in a turn, and these have the packet."""
+        """Note that a row sends in a turn, and that these rows have the packet then."""
         self.sent.append((offset, row))
         self._has |= receivers
         for other in rows(receivers):
@@ -164,7 +166,7 @@ class Flood:
 
 
 class _Turn(NamedTuple):
-    """What is in a turn: bit sets of who sends, who is meant, who hears somebody, and who hears more than one."""
+    """The content of a turn, as bit sets of the rows that send, are meant, hear one sender, and hear more than one."""
 
     sending: int = 0
     meant: int = 0
@@ -174,13 +176,13 @@ class _Turn(NamedTuple):
 
 _EMPTY: Final = _Turn()
 _Offer = tuple[int, int, int, int]
-"""(worth, minus the flood's number, row, for whom)."""
+"""An offer: its worth, minus the flood's number, the row, its receivers."""
 _Choice = tuple[int, list[_Offer], _Turn]
-"""(worth of all, who sends, the turn then)."""
+"""A choice: the worth of all its offers, these offers, and the turn with them."""
 
 
 class Packing:
-    """Fills the turns of one superframe."""
+    """Fills the turns of one superframe with transmissions of floods."""
 
     def __init__(self, swarm: FloodNetwork, geometry: Geometry, effort: Effort) -> None:
         self._disturbs = swarm.disturbs
@@ -191,7 +193,7 @@ class Packing:
         self._filled = [_EMPTY] * geometry.turns
 
     def place(self, floods: Sequence[Flood]) -> bool:
-        """Give every flood its turns; False when there are not enough."""
+        """Give every flood its turns; returns False when there are not enough turns."""
         turns, count, begun, offset = self._turns, len(floods), 0, 0
         hops = max((flood.hops for flood in floods), default=0)
         window = _WINDOW * (2 if self._tries > 1 else 1) + self._hop_turns * hops * count // turns
@@ -235,7 +237,7 @@ class Packing:
                 del under_way[-number]
 
     def _offers(self, offset: int, under_way: dict[int, Flood]) -> list[_Offer]:
-        """Who could send if nobody else began in this turn."""
+        """The offers that would be possible in this turn if no other flood used it."""
         there = self._filled[offset % self._turns]
         following = self._filled[(offset + 1) % self._turns].sending
         barred = self._filled[(offset - 1) % self._turns].deaf | there.sending | there.disturbed
@@ -260,7 +262,7 @@ class Packing:
         return [offers[index] for _, index in sorted(keyed, reverse=True)]
 
     def _choose(self, offers: Sequence[_Offer], there: _Turn, following: int) -> _Choice:
-        """One offer after the other, if it disturbs none before; of one flood no receiver twice."""
+        """Take one offer after the other if it disturbs none taken before; no receiver gets the same packet twice."""
         sending, meant, disturbed, deaf = there
         disturbs = self._disturbs
         chosen: list[_Offer] = []
@@ -289,7 +291,7 @@ class Packing:
 
 
 def _will_be_late(left: int, turns: int, *, done: int, within: int) -> bool:
-    """Whether floods end too slowly: `done` of them `within` so many turns in which the window was full."""
+    """True if floods end too slowly: `done` of them ended `within` so many turns in which the window was full."""
     return within >= _TRIAL and left * within > _HOPE * done * turns
 
 

@@ -2,12 +2,12 @@
 
     dose of a node    sum of -ln(loss) over the copies of a packet that were meant for it
     enough            -ln(epsilon): all those copies are lost with a probability of epsilon
-    holder            the root, and whoever has had enough: it may relay, several times if its neighbors need it
+    holder            the root, and each node that has had its dose: it may relay, several times if others need it
     call              one frame of a node to its neighbors, in a turn of its own: a hello, or the answer to one
 
-Turns are filled one after the other as in `packing.py`, by the same rules but one: a neighbor of a sender that somebody
-else in the turn disturbs is left out, and served later, as long as half of what the frame is worth remains; a call is
-for all. Whether a node disturbs a link depends on how strong that link is (`Network`).
+Turns are filled one after the other as in `list_scheduling.py`, by the same rules but one: a neighbor of a sender that
+another sender in the turn disturbs is left out, and served later, as long as half of what the frame is worth remains; a
+call is for all neighbors. Whether a node disturbs a link depends on how strong that link is (`Network`).
 
 Not modeled: that a relay may lack the packet although it has had its dose (`planner/loss.py` reckons with it).
 """
@@ -23,19 +23,19 @@ from fanet_mw.wire.links import NEPERS, Link
 _RECEIVER: Final = 100
 """What it is worth that a node gets all of its dose, in turns of its flood's age."""
 _ONLY: Final = 50
-"""And that no other holder could have served it."""
+"""What it is worth besides that no other holder of the packet could have served that node."""
 _WINDOW: Final = 24
-"""Floods under way at once."""
+"""The number of floods that are under way at once."""
 _CHANCES: Final = (0.5, 0.25, 0.1)
-"""Links below the first are used only if some node would be cut off without them, and so on."""
+"""Shares of frames that arrive; links below the first are used only if a node were cut off without them, and so on."""
 _SINR_DB: Final = 11
-"""A frame this much stronger than another in the same turn survives it: 8 dB at 11 Mb/s, and 3 dB to be sure."""
+"""A frame that is this much stronger than another in its turn survives it: 8 dB at 11 Mb/s, and 3 dB to be sure."""
 _DECADE_DB: Final = 30
-"""By how much power falls over a decade of distance."""
+"""The decibels by which power falls over a decade of distance."""
 
 
 class Network:
-    """Who hears whom how well, and who disturbs which link, as bit sets over row numbers."""
+    """How well nodes hear each other, and which nodes spoil which link: bit sets over the nodes' row numbers."""
 
     def __init__(
         self, positions: Sequence[tuple[NodeId, Enu]], geometry: Geometry, measured: Sequence[Link], *, margin_db: float
@@ -54,7 +54,7 @@ class Network:
         self.senses = self._links(known, least=0.0)
         self.hears, chance = self._connected(known)
         self.dose: dict[tuple[int, int], int] = {}
-        """By (sender, receiver), in grades."""
+        """By (sender, receiver) the grade of the link."""
         for link in known:
             if link.chance >= chance:
                 a, b = self.row[link.a], self.row[link.b]
@@ -71,7 +71,7 @@ class Network:
         return found
 
     def _connected(self, known: Sequence[Link]) -> tuple[list[int], float]:
-        """The best links that keep together what is together, and from which share on a link is one of them."""
+        """The best links that keep connected what is connected, and the least share of frames that arrives on them."""
         choices = [(self._links(known, least=least), least) for least in _CHANCES]
         whole = [reach(choices[-1][0], row) for row in range(len(self.nodes))]
         for hears, least in choices:
@@ -80,7 +80,7 @@ class Network:
         raise AssertionError("the last choice is the whole")
 
     def _who_disturbs(self, at: Sequence[Enu], interference_m: float, margin_db: float) -> dict[tuple[int, int], int]:
-        """By link: the rows whose frames spoil it."""
+        """By link the rows whose frames spoil it."""
         weakest = min((dbm for dbm in self._dbm.values()), default=0)
         apart = [[here.minus(there).norm() for there in at] for here in at]
         found = {}
@@ -108,7 +108,7 @@ class Network:
 
 
 def reach(hears: Sequence[int], root: int) -> int:
-    """All that a flood of this row can reach, itself included."""
+    """The rows that a flood of this row can reach, itself included."""
     found = frontier = 1 << root
     while frontier:
         near = 0
@@ -120,30 +120,30 @@ def reach(hears: Sequence[int], root: int) -> int:
 
 
 class _Offer(NamedTuple):
-    """A holder that somebody around waits for."""
+    """A holder of a packet around which some node lacks part of its dose."""
 
     ready: int
-    """From which offset on it can send."""
+    """The offset from which on the holder can send."""
     worth: int
     row: int
     gains: tuple[tuple[int, int], ...]
-    """(receiver, what its copy is worth)."""
+    """Each receiver, and what a copy is worth to it."""
 
 
 class Wave:
-    """One packet on its way; a call is a wave that ends with its first frame."""
+    """The flood of one packet over links that lose frames; a call is a wave that ends with its first frame."""
 
     def __init__(self, network: Network, root: int, *, enough: int, call: bool = False) -> None:
         self.root = root
         self.call = call
         self.sent: list[tuple[int, int]] = []
-        """(offset, row), in order."""
+        """The transmissions of this wave as (offset, row), in order."""
         self.goal = network.hears[root] | 1 << root if call else reach(network.hears, root)
         self._network = network
         self._enough = enough
         self._has = 1 << root
         self._missing: dict[int, int] = {}
-        """What is left of the dose of whoever has had some of it."""
+        """By row that has had part of its dose, what is left of it."""
         self._ready = {root: 0}
         self._offers: list[_Offer] | None = None
 
@@ -152,7 +152,7 @@ class Wave:
         return bool(self.sent) and (self.call or self._has == self.goal)
 
     def age(self, offset: int) -> int:
-        """Turns since it began."""
+        """The number of turns since this wave began."""
         return offset - self.sent[0][0] if self.sent else 0
 
     def offers(self) -> list[_Offer]:
@@ -178,7 +178,7 @@ class Wave:
         return gain + (_ONLY if network.hears[other] & self._has == 1 << row else 0)
 
     def send(self, offset: int, row: int, receivers: Sequence[int], *, hop_turns: int) -> None:
-        """A row sends in a turn, and these get a copy."""
+        """Note that a row sends in a turn, and that these rows get a copy."""
         self.sent.append((offset, row))
         for other in receivers:
             missing = self._missing[other] = self._missing.get(other, self._enough) - self._network.dose[row, other]
@@ -189,7 +189,7 @@ class Wave:
 
 
 class _Turn(NamedTuple):
-    """What is in a turn, as bit sets: who sends, who must not, and who may be deaf for some time after it."""
+    """The content of a turn, as bit sets of the rows that send, must not send, and may be deaf for a while after it."""
 
     sending: int = 0
     barred: int = 0
@@ -197,7 +197,7 @@ class _Turn(NamedTuple):
 
 
 class RedundantPacking:
-    """Fills the turns of one superframe."""
+    """Fills the turns of one superframe with transmissions of waves."""
 
     def __init__(self, network: Network, geometry: Geometry, *, pace: float = 1.0) -> None:
         """`pace`: waves begin within this share of the superframe."""
@@ -208,7 +208,7 @@ class RedundantPacking:
         self._filled = [_Turn()] * geometry.turns
 
     def place(self, waves: Sequence[Wave]) -> bool:
-        """Give every wave its turns; False when there are not enough."""
+        """Give every wave its turns; returns False when there are not enough turns."""
         turns, count, begun, offset = self._turns, len(waves), 0, 0
         under_way: dict[int, Wave] = {}
         while begun < count or under_way:
@@ -256,7 +256,7 @@ class RedundantPacking:
         self._filled[turn] = there._replace(deaf=self._deaf(there.sending))
 
     def _receivers(self, offer: _Offer, out: int, sending: int) -> tuple[list[int], int]:
-        """Who of those that wait gets the frame undisturbed, and what that is worth."""
+        """The waiting rows that get the frame undisturbed, and what that is worth."""
         network = self._network
         found, worth = [], 0
         for other, gain in offer.gains:
@@ -266,7 +266,7 @@ class RedundantPacking:
         return found, worth
 
     def _deaf(self, sending: int) -> int:
-        """Who hears a frame that another spoils; it waits for EIFS then (IEEE 802.11-2020, 10.3.7)."""
+        """The rows that hear a frame which another one spoils; they wait for EIFS then (IEEE 802.11-2020, 10.3.7)."""
         network, found = self._network, 0
         for row in rows(sending):
             for other in rows(network.senses[row] & ~sending & ~found):

@@ -1,18 +1,17 @@
-"""Collision-free floods: which node sends whose packet in which turn of the superframe. A pure function of positions.
+"""Collision-free floods: which node sends which root's packet in which turn. A pure function of positions.
 
     superframe:  | contention window | turn 0 | turn 1 | ... | turn N-1 |
     flood of h:    h in its root turn, then relays that reach everyone, each in a turn of its own, once
 
 Each frame is meant for some of its sender's neighbors: those that lack the packet. Two nodes share a turn only if they
 do not hear each other and none of the nodes that one is meant for is within interference range of the other (the
-protocol model of Gupta and Kumar, 2000). Who is meant by neither may be deaf in that turn; it does not send in the
-next one, because a station waits for EIFS after a frame that it could not decode (IEEE 802.11-2020, 10.3.7).
+protocol model of Gupta and Kumar, 2000). A node that is meant by neither may be deaf in that turn; it does not send in
+the next one, because a station waits for EIFS after a frame that it could not decode (IEEE 802.11-2020, 10.3.7).
 
-The turns are filled one after the other (`packing.py`), so that floods follow each other through the swarm like waves.
-That a packet crosses the whole swarm in one superframe comes from the order of turns, as in Djukic and Valaee (ToN
-17(3), 2009). Every node computes the same table from the same positions; nothing else is agreed upon.
-
-Not modeled: links that positions do not tell (obstacles); use a shorter `link_m` for a margin.
+The turns are filled one after the other (`list_scheduling.py`), so that floods follow each other through the swarm
+like waves. That a packet crosses the whole swarm in one superframe comes from the order of turns, as in Djukic and
+Valaee (ToN 17(3), 2009). Every node computes the same table from the same positions; nothing else is agreed upon. Not
+modeled: links that positions do not tell (obstacles); use a shorter `link_m` for a margin.
 """
 
 from collections import Counter
@@ -117,7 +116,7 @@ def redundant_timetable(
 
     Every node gets so many copies of each packet that it misses all of them with a probability of at most `epsilon`,
     if their senders have it; and each node has so many `calls`, turns of its own in which all its neighbors hear it.
-    With a greater `margin_db` those who send in the same turn are farther apart.
+    With a greater `margin_db` the nodes that send in the same turn are farther apart.
     """
     if not geometry.turns:
         return None

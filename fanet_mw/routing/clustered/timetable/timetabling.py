@@ -55,7 +55,7 @@ class Timetabling(Protocol):
 
 
 class NoTimetable:
-    """A schedule says nothing but who heads which cluster, and when its slot is."""
+    """A schedule says nothing but which node heads which cluster, and when its slot is."""
 
     needs_every_link = False
 
@@ -69,10 +69,10 @@ class NoTimetable:
         return None
 
     def on_schedule(self, packet: Packet, schedule: Schedule, places: Places | None, *, now_ns: int) -> None:
-        """The roles have taken all that there is."""
+        """There is nothing more to take: the roles have taken it."""
 
     def on_links(self, packet: Packet, *, now_ns: int) -> None:
-        """Links are of no use here."""
+        """Links are of no use without a timetable."""
 
     def notice_ns(self, now_ns: int) -> int:
         return 0

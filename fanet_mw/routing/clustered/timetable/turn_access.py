@@ -138,8 +138,8 @@ class TurnAccess:
     def answer(self, packet: Packet, *, now_ns: int) -> None:
         """In a turn for neighbors alone, if the node has one and the packet fits.
 
-        What still waits for a turn to be flooded in is no answer: who hears a packet outside of its turns does not
-        relay it, nor its flood afterwards, which would end there.
+        What still waits for a turn to be flooded in is no answer: a node that hears a packet outside of its turns
+        relays neither that copy nor its flood afterwards, which would end there.
         """
         key = key_of(packet.header.origin, packet.header.seq)
         if self._roots.holds(key):

@@ -1,4 +1,4 @@
-"""What the turns of a superframe are given to: how many packets of whom, how many of them in a frame. Pure functions.
+"""How the turns of a superframe are shared: the packets of each root, and how many of them in a frame. Pure functions.
 
     first     a little more turns than each node's load needs, so that a backlog drains
     else      as many as it needs; with several of its packets in a frame if they fit: longer turns, fewer preambles
@@ -6,7 +6,7 @@
     else      turns for heads only: members' packets contend on their way to them, and have no bound either
 
 A member's packet has turns of its own on a shortest way to its head, and the head passes it on at once: the head's turn
-lies right behind, so nothing waits there. Everyone computes the same from the same schedule and places.
+lies right behind, so nothing waits there. Every node computes the same timetable from the same schedule and places.
 """
 
 import math
@@ -31,53 +31,54 @@ from fanet_mw.wire.places import CAPACITY as PLACES_CAPACITY
 _SCHEDULE_BYTES: Final = SCHEDULE.layout.size + OVERHEAD
 _PLACES_BYTES: Final = PLACES.layout.size + OVERHEAD
 _FEWER: Final = 0.95
-"""When the turns do not suffice for the load, try this much of it, and so on."""
+"""When the turns do not suffice for the load, this share of it is tried next, and so on."""
 _EASY: Final = (Effort(), Effort(pace=0.9))
 _HARD: Final = Effort(pace=0.8, tries=8)
-"""For a load that does not fit otherwise."""
+"""The packing for a load that does not fit otherwise."""
 
 _REDUNDANCY: Final = ((9, 0.01), (7, 0.03), (5, 0.05), (4, 0.05), (3, 0.05), (3, 0.1), (3, 0.3))
-"""With measured links, what to try, best first: the margin against interference [dB], and the share of packets of which
-a node may lose all copies. Interference that positions do not tell costs more than frames that are sent once less."""
+"""The redundancies to try with measured links, the best first: the margin against interference [dB], and the share of
+packets of which a node may lose all copies. Interference that positions do not tell costs more than frames that are
+sent once less."""
 _PACES: Final = (1.0, 0.9)
 _MOST_PERIODS: Final = 4
-"""Flooding periods of a superframe with measured links."""
+"""The most flooding periods in a superframe with measured links."""
 _LOAD: Final = 0.9
-"""Of the root turns of a node with measured links, its packets use so many: what else it has to say finds a turn."""
+"""With measured links a node's packets use this share of its root turns, so that its other messages find a turn."""
 _CALLS_PER_S: Final = 3
 _MOST_DIGESTS: Final = 4
 _HELLO_BYTES: Final = 200
-"""A hello without its digest."""
+"""The size of a hello without its digest."""
 
 LIKELY_SHARE: Final = 0.99
-"""Of the copies: what a node states a delay for when links lose frames."""
+"""The share of copies for which a node states a delay when links lose frames."""
 _LATE_HELLO: Final = 1.1
-"""Hello intervals between two hellos at most."""
+"""The most hello intervals between two hellos."""
 _BUSY: Final = 2
-"""How much longer a round of repair takes than when nobody else lacks anything: answers queue."""
+"""The factor by which a round of repair takes longer than when only one packet is lacking, because answers queue."""
 
 _BLOCK: Final = 300
-"""Packets of a block at least; fewer are packed less densely, more take long."""
+"""The fewest packets in a block: fewer are packed less densely, more take long to pack."""
 
 Places = tuple[tuple[NodeId, Enu], ...]
-"""Where the nodes are [m], ascending."""
+"""The positions of the nodes [m], by ascending id."""
 
 
 class Fitted(NamedTuple):
-    """A timetable and the turns that it is for."""
+    """A timetable, and the turns that it fills."""
 
     turns: Turns
     table: Timetable
     together: int
-    """Packets that a root lets out in one of its turns."""
+    """The number of packets that a root lets out in one of its turns."""
     frame_bytes: int
-    """What one turn holds."""
+    """The bytes that one turn holds."""
     whole: bool
-    """Whether every node lets out its own packets; else heads do it for their members."""
+    """True if every node lets out its own packets; otherwise heads let out those of their members."""
     enough: bool
-    """Whether as many packets are let out as come."""
+    """True if as many packets are let out as come."""
     odds: Odds | None = None
-    """Of a timetable for lossy links: how likely packets arrive; None: the table reckons with no loss."""
+    """How likely packets arrive by a timetable for lossy links; None: the timetable reckons with no loss."""
 
 
 class TurnPlan(NamedTuple):
@@ -87,15 +88,15 @@ class TurnPlan(NamedTuple):
     turns: Turns
     table: Timetable
     mine: Mapping[tuple[NodeId, int], tuple[int, ...]]
-    """Our turns for each (root, instance) of others."""
+    """The node's turns for each (root, instance) of other nodes."""
     heard: Mapping[tuple[int, NodeId], tuple[int, NodeId, int]]
-    """(turn, sender) -> (offset, root, instance)."""
+    """By (turn, sender), the (offset, root, instance) of the flood that is heard then."""
     roots: tuple[int, ...]
-    """The turns in which we let packets out."""
+    """The turns in which the node lets packets out."""
     again: Mapping[int, tuple[int, ...]]
-    """By root turn: the later turns in which we repeat what was let out."""
+    """By root turn, the later turns in which the node repeats what it let out."""
     calls: tuple[int, ...]
-    """The turns in which we send what is for our neighbors alone."""
+    """The turns in which the node sends what is for its neighbors alone."""
     together: int
     frame_bytes: int
     whole: bool
@@ -128,14 +129,14 @@ class TurnPlan(NamedTuple):
         )
 
     def has_turns(self, node: NodeId) -> bool:
-        """Whether this node lets its packets out itself."""
+        """True if this node lets its packets out itself."""
         return node in self.table.spans
 
     def likely_ns(self, node: NodeId, *, waiting: int, interval_ns: int, hello_ns: int) -> int | None:
         """Within which time `LIKELY_SHARE` of the copies of this node's packets arrive; None: the odds are worse.
 
         The longest wait, or that of the last of so many that are `waiting`, if it is longer, as after several joins;
-        behind one more join, which takes a turn of ours when a link has changed; the flood; and as many
+        behind one more join, which takes a turn of the node when a link has changed; the flood; and as many
         rounds of repair as it takes: a hello, as late as it may be, which waits for a turn; an answer, which may wait
         for the next turn but one. Half of what may be missing is left for what the odds do not know.
         """
@@ -156,7 +157,7 @@ class TurnPlan(NamedTuple):
 
 
 class _Wish(NamedTuple):
-    """Turns for so many packets of each root, and how many share a turn."""
+    """The turns for so many packets of each root, and how many packets share a turn."""
 
     roots: tuple[NodeId, ...]
     together: int
@@ -174,7 +175,7 @@ def largest_frame(scenario: Scenario, *, together: int = 1) -> int:
 
 
 def schedule_bytes(scenario: Scenario) -> int:
-    """A schedule part with its places."""
+    """The size of a part of a schedule with its places."""
     members = min(scenario.nodes.count, CAPACITY)
     return HEADER_BYTES + _SCHEDULE_BYTES + _PLACES_BYTES * -(-members // PLACES_CAPACITY)
 
@@ -188,7 +189,7 @@ def superframe(scenario: Scenario, *, origin_ns: int = 0, period_ns: int | None 
 
 
 def links(scenario: Scenario, turns: Turns) -> Geometry:
-    """What a timetable of this scenario is computed for."""
+    """The geometry for which a timetable of this scenario is computed."""
     clusters, radio = scenario.clusters, scenario.radio
     wait_ns = radio.lead_ns + radio.handover_ns
     return Geometry(
@@ -304,7 +305,7 @@ def least_interval_ns(scenario: Scenario, places: Places, head_of: Mapping[NodeI
 
 
 def most_together(scenario: Scenario) -> int:
-    """Packets of bulk that a frame holds besides what is reserved."""
+    """The number of packets of bulk that a frame holds besides what is reserved."""
     room = scenario.radio.max_frame_bytes - sum(reserved(scenario).values())
     return max(1, room // scenario.traffic.payload_bytes)
 
@@ -333,7 +334,7 @@ def _lasts(table: Timetable) -> int:
 
 
 def _wishes(scenario: Scenario, head_of: Mapping[NodeId, NodeId], leader: NodeId, period_ns: int) -> Iterator[_Wish]:
-    """What to try, best first."""
+    """The ways to try, the best first."""
     own = leader_load(scenario) if leader == scenario.leader else 1
     control = (leader,) * schedule_parts(scenario)
     senders = [*sorted(head_of), *([leader] if own else [])]
@@ -389,5 +390,5 @@ def leader_load(scenario: Scenario) -> int:
 
 
 def schedule_parts(scenario: Scenario) -> int:
-    """Turns that the leader's schedules take of each superframe."""
+    """The number of turns that the leader's schedules take of each superframe."""
     return max(1, -(-(scenario.nodes.count - 1) // CAPACITY))

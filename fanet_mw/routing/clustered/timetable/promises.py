@@ -171,6 +171,8 @@ class Promises:
             return None
         if self._lease.leads or plan.table.uncovered[self._port.node] or not self._in_step():
             return None  # schedules go before the leader's own packets
+        if len(plan.table.spans) < self._port.scenario.nodes.count:
+            return None  # a swarm in parts, or one that is not complete: somebody is in no turn of this timetable
         found_ns = plan.likely_ns(
             self._port.node,
             waiting=len(self._roots),

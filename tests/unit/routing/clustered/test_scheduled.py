@@ -15,6 +15,7 @@ from fanet_mw.node.packet import Packet
 from fanet_mw.routing import make_protocol
 from fanet_mw.routing.clustered.clustered import Clustered
 from fanet_mw.routing.clustered.tdma.turns import Turns
+from fanet_mw.routing.clustered.timetable.delivery_odds import Odds
 from fanet_mw.routing.clustered.timetable.timetable import Timetable, Turn
 from fanet_mw.routing.clustered.timetable.turn_access import TurnAccess
 from fanet_mw.routing.clustered.timetable.turn_plan import Fitted, TurnPlan
@@ -267,3 +268,15 @@ def test_hellos_keep_out_of_the_turns(node: Node, due_ms: int, earliest_ms: int,
     node.say_hello(b"", start_ns=due_ms * MS, now_ns=due_ms * MS)
     (request,) = node.requests
     assert earliest_ms * MS <= request.start_ns <= latest_ms * MS
+
+
+@pytest.mark.parametrize(("nodes", "states"), [(5, True), (4, False)])
+def test_a_likely_delay_is_stated_only_when_all_of_the_swarm_are_in_the_timetable(
+    node: Node, nodes: int, states: bool
+) -> None:
+    """The swarm has five nodes; after a split a part of it makes a timetable of its own."""
+    plan = planned(FLOODS)
+    table = plan.table._replace(spans={NodeId(n): 3 for n in range(1, nodes + 1)})
+    odds = Odds({US: (0.0,)})
+    access_of(node)._plans.in_order = [plan._replace(table=table, odds=odds, calls=(20,))]
+    assert (access_of(node).report()["likely_ms"] is not None) == states

@@ -89,6 +89,13 @@ def test_reports_and_warnings_ride_beside_bulk_and_never_in_its_place() -> None:
     assert let_out(release, until_ms=1000) == [([5, 2, 0], 46), ([3, 1], 146), ([4], 246)]
 
 
+def test_a_frame_is_no_longer_than_its_turn_whatever_rides_in_it() -> None:
+    release = root(TurnsInForce(0, TURNS, (3,), 190, 2), reserved=ROOMS)
+    for seq, (size, priority) in enumerate([(40, PRIORITY_SAFETY), (50, PRIORITY_REPORT)] + [(60, PRIORITY_BULK)] * 3):
+        release.push(packet(seq, size, priority=priority), now_ns=0)
+    assert let_out(release, until_ms=1000) == [([0, 1, 2], 46), ([3, 4], 146)]
+
+
 def test_the_room_that_bulk_leaves_is_for_the_most_urgent() -> None:
     release = root(TurnsInForce(0, TURNS, (3,), 190, 2), reserved=ROOMS)
     for seq, priority in enumerate([PRIORITY_REPORT, PRIORITY_REPORT, PRIORITY_REPORT, PRIORITY_SAFETY]):

@@ -14,6 +14,9 @@ FIGURES: Final[Mapping[str, Recipe]] = {
     "11": figure11.FIGURE,
     "12": figure12.FIGURE,
     "load": beyond.LOAD,
+    "size": beyond.SIZE,
+    "clocks": beyond.CLOCKS,
+    "age": beyond.AGE,
     "ablation": beyond.ABLATION,
 }
 """`all` are these, in this order."""

@@ -95,7 +95,7 @@ def blocks_of_run(folder: Path, out: Path) -> list[Block]:
         _figures_of(summary),
     ]
     drawn = (
-        (partial(_delays, story), "Delays of the load against the bound that each packet's origin stated."),
+        (partial(_delays, story), "Delays of the load; beside them, where the origins stated bounds, those."),
         (partial(_delivery, story), "Delivery ratio by the instant a packet was born, and per receiver."),
         (partial(_map, story, links), "Links by the share of copies received; nodes where they started."),
         (partial(_slots, story), "When packets were let out first, by place in the flooding period."),
@@ -167,7 +167,7 @@ def _delays(story: _Story) -> Any:  # noqa: ANN401 a matplotlib figure, or None
     axes.set_xlabel("end-to-end delay [ms]")
     axes.set_ylabel("share of packets x targets")
     axes.set_ylim(0, 1.05)
-    axes.legend(loc="lower right")
+    axes.legend(loc="lower left", bbox_to_anchor=(0, 1.0), ncols=2)
     return figure
 
 
@@ -222,7 +222,7 @@ def _map(story: _Story, links: Sequence[Mapping[str, Any]]) -> Any:  # noqa: ANN
     axes.set_xlabel("east [m]")
     axes.set_ylabel("north [m]")
     axes.legend(loc="upper left", bbox_to_anchor=(0, 1.14), ncols=2)
-    figure.colorbar(lines, ax=axes, label="copies received / copies in range")
+    figure.colorbar(lines, ax=axes, shrink=0.8, label="copies received / copies in range")
     return figure
 
 
@@ -231,7 +231,7 @@ def _slots(story: _Story) -> Any:  # noqa: ANN401
         return None
     figure, (axes,) = canvas(1, width=6.5, height=4.0)
     period_ns = story.scenario.clusters.period_ns
-    axes.scatter([one.t_ns % period_ns / MS for one in story.let_out], [one.node for one in story.let_out], s=5,
+    axes.scatter([one.t_ns % period_ns / MS for one in story.let_out], [one.node for one in story.let_out], s=14,
                  color=_BLUE, alpha=0.5, linewidths=0)  # fmt: skip
     axes.set_xlabel(f"place in the flooding period of {period_ns / MS:g} ms [ms]")
     axes.set_ylabel("origin (node id)")

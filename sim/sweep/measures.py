@@ -6,6 +6,7 @@ from typing import Final
 
 import numpy as np
 
+from agents.traffic import sources_of, targets_of
 from fanet_mw.errors import ConfigError
 from fanet_mw.trace import Approaching, Detected
 from fanet_mw.units import S
@@ -54,6 +55,36 @@ def _at_leader_s(outcome: Outcome) -> list[float]:
     return [delay_ns / S for node, delay_ns in zip(found.node, found.delay_ns, strict=True) if node == leader]
 
 
+def age_s(outcome: Outcome) -> float:
+    """The mean age of information [s]: how long ago the newest packet was born that a node has of another one.
+
+    The mean is over the window in which packets are born and over all pairs (source, node that it sends to); before
+    the first packet arrives the information is taken to be of the beginning of the window.
+    """
+    start_ns, end_ns = outcome.scenario.traffic_window_ns
+    app = first_class_of(outcome)
+    sent = [(origin, packet.born_ns) for (origin, _), packet in app.sent.items()]
+    arrivals: dict[tuple[int, int], list[tuple[int, int]]] = {}
+    for source in sources_of(outcome.scenario):
+        for target in targets_of(outcome.scenario, source):
+            arrivals[source, target] = []
+    for packet, node, delay_ns in zip(app.deliveries.packet, app.deliveries.node, app.deliveries.delay_ns, strict=True):
+        origin, born_ns = sent[packet]
+        arrivals[origin, node].append((born_ns + delay_ns, born_ns))
+    ages_s = [_mean_age_ns(sorted(of_pair), start_ns, end_ns) / S for of_pair in arrivals.values()]
+    return math.fsum(ages_s) / len(ages_s) if ages_s else 0.0
+
+
+def _mean_age_ns(arrivals: Iterable[tuple[int, int]], start_ns: int, end_ns: int) -> float:
+    """Of pairs (arrival, birth) in the order of arrivals: the mean over the window of now minus the latest birth."""
+    area, since_ns, latest_ns = 0.0, start_ns, start_ns
+    for at_ns, born_ns in (*arrivals, (end_ns, end_ns)):
+        until_ns = min(max(at_ns, start_ns), end_ns)
+        area += (until_ns - since_ns) * ((since_ns + until_ns) / 2 - latest_ns)
+        since_ns, latest_ns = until_ns, max(latest_ns, born_ns)
+    return area / (end_ns - start_ns)
+
+
 def connected(outcome: Outcome) -> float:
     """The share of (source, target) pairs that a multi-hop path connected, on average over the measured window."""
     return connectivity(outcome.scenario)
@@ -93,6 +124,7 @@ MEASURES: Final[Mapping[str, Callable[[Outcome], Value]]] = {
     "wanted": wanted,
     "leader_pdr": leader_pdr,
     "leader_delay_s": leader_delay_s,
+    "age_s": age_s,
     "connected": connected,
     "first_detected_s": first_detected_s,
     "first_approach_s": first_approach_s,

@@ -13,12 +13,12 @@ from sim.sweep.measures import DELAY_EDGES_S, MEASURES
 SETTINGS = ["nodes.count=4", "traffic.sources=all"]
 
 
-def measured(name: str, records: Sequence[Record]) -> object:
-    return MEASURES[name](Outcome(catalog.find("flooding", SETTINGS), "virtual", 0.0, records, {}))
+def measured(name: str, records: Sequence[Record], *settings: str) -> object:
+    return MEASURES[name](Outcome(catalog.find("flooding", [*SETTINGS, *settings]), "virtual", 0.0, records, {}))
 
 
-def sent(node: int, seq: int) -> Generated:
-    return Generated(0, node, seq, "traffic", 100)
+def sent(node: int, seq: int, *, t_ns: int = 0) -> Generated:
+    return Generated(t_ns, node, seq, "traffic", 100)
 
 
 def arrived(origin: int, seq: int, *, at: int, delay_ns: int) -> Delivered:
@@ -64,3 +64,14 @@ def test_enough_have_heard_when_three_different_uavs_have_heard_the_same_phone()
 def test_each_uav_counts_once_when_it_first_heard_and_first_turned() -> None:
     assert measured("first_detected_s", HEARD) == [10, 12, 16]
     assert measured("first_approach_s", HEARD) == [15, 17]
+
+
+def test_the_age_of_information_is_that_of_the_newest_packet_on_average_over_time() -> None:
+    """Born at 1 s, there at 2 s; born at 5 s, there at 6 s: (2 + 12 + 12) s^2 in 10 s. What comes late changes nothing."""
+    settings = ["traffic.sources=[2]", "traffic.destination=1", "warmup_s=0", "duration_s=10", "drain_s=0"]
+    packets: list[Record] = [sent(2, 1, t_ns=1 * S), sent(2, 2, t_ns=5 * S)]
+    packets += [arrived(2, 1, at=1, delay_ns=S), arrived(2, 2, at=1, delay_ns=S)]
+    assert measured("age_s", packets, *settings) == pytest.approx(2.6)
+    late = [sent(2, 3, t_ns=4 * S), *packets, Delivered(8 * S, 1, 2, 3, 4 * S, 1)]
+    assert measured("age_s", late, *settings) == pytest.approx(2.6)
+    assert measured("age_s", packets[:2], *settings) == pytest.approx(5.0)

@@ -17,6 +17,8 @@ _HIGH: Final = 0.95
 _IDLE: Final = 0.2
 """A busy share of the air below this leaves room for everyone."""
 _HARDLY_MS: Final = 5.0
+_APART_M_S: Final = 0.25
+"""The lines of one panel are drawn so far beside each other."""
 _NAMES: Final = {case: LOOKS[case].label for case in ("aodv", "olsr")}
 """The paper's protocols."""
 
@@ -30,16 +32,16 @@ def draw(runs: Runs) -> Drawing:
     figure, (pdr, delay, rest) = canvas(3)
     data = []
     speeds = runs.levels(_SPEED)
-    for case in ("aodv", "olsr", "flooding", "ours"):
+    for number, case in enumerate(("aodv", "olsr", "flooding", "ours")):
         for axes, column, unit in ((pdr, "leader_pdr", ""), (delay, "leader_delay_s", "s")):
             found = [runs.of(column, case=case, **{_AT: speed}) for speed in speeds]
-            line(axes, LOOKS[case], speeds, found)
+            line(axes, LOOKS[case], speeds, found, shift=(number - 1) * _APART_M_S)
             data += [
                 point(one, panel=column, unit=unit, series=case, speed_m_s=speed)
                 for one, speed in zip(found, speeds, strict=True)
             ]
     limit = [runs.of("connected", case="aodv", **{_AT: speed}) for speed in speeds]
-    line(pdr, LOOKS["limit"], speeds, limit)
+    line(pdr, LOOKS["limit"], speeds, limit, shift=-2 * _APART_M_S)
     data += [point(one, panel="connected", series="limit", speed_m_s=at) for one, at in zip(limit, speeds, strict=True)]
     for case in _NAMES:
         found = [runs.of("pdr", case=f"{case}, formation", **{_AT: speed}) for speed in speeds]

@@ -81,12 +81,12 @@ def canvas(
     return figure, list(panels.flat)
 
 
-def line(axes: Axes, look: Look, xs: Sequence[float], intervals: Sequence[Interval]) -> None:
-    """Means with their intervals, as one line."""
+def line(axes: Axes, look: Look, xs: Sequence[float], intervals: Sequence[Interval], *, shift: float = 0.0) -> None:
+    """Means with their intervals, as one line; a shift keeps the bars of several lines apart."""
     low = [0.0 if item.runs < 2 else item.mean - item.low for item in intervals]
     high = [0.0 if item.runs < 2 else item.high - item.mean for item in intervals]
     axes.errorbar(
-        xs, [item.mean for item in intervals], yerr=[low, high], label=look.label, color=look.color,
+        [x + shift for x in xs], [item.mean for item in intervals], yerr=[low, high], label=look.label, color=look.color,
         marker=look.marker or None, linestyle=look.dash,
     )  # fmt: skip
 

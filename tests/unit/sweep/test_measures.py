@@ -21,8 +21,8 @@ def sent(node: int, seq: int, *, t_ns: int = 0) -> Generated:
     return Generated(t_ns, node, seq, "traffic", 100)
 
 
-def arrived(origin: int, seq: int, *, at: int, delay_ns: int) -> Delivered:
-    return Delivered(delay_ns, at, origin, seq, delay_ns, 1)
+def arrived(origin: int, seq: int, *, at: int, delay_ns: int, born_ns: int = 0) -> Delivered:
+    return Delivered(born_ns + delay_ns, at, origin, seq, delay_ns, 1)
 
 
 PACKETS = [
@@ -67,11 +67,13 @@ def test_each_uav_counts_once_when_it_first_heard_and_first_turned() -> None:
 
 
 def test_the_age_of_information_is_that_of_the_newest_packet_on_average_over_time() -> None:
-    """Born at 1 s, there at 2 s; born at 5 s, there at 6 s: (2 + 12 + 12) s^2 in 10 s. What comes late changes nothing."""
+    """Born at 1 s, there at 2 s; born at 5 s, there at 6 s: (2 + 12 + 12) s^2 in 10 s; a late one changes nothing."""
     settings = ["traffic.sources=[2]", "traffic.destination=1", "warmup_s=0", "duration_s=10", "drain_s=0"]
-    packets: list[Record] = [sent(2, 1, t_ns=1 * S), sent(2, 2, t_ns=5 * S)]
-    packets += [arrived(2, 1, at=1, delay_ns=S), arrived(2, 2, at=1, delay_ns=S)]
-    assert measured("age_s", packets, *settings) == pytest.approx(2.6)
-    late = [sent(2, 3, t_ns=4 * S), *packets, Delivered(8 * S, 1, 2, 3, 4 * S, 1)]
-    assert measured("age_s", late, *settings) == pytest.approx(2.6)
-    assert measured("age_s", packets[:2], *settings) == pytest.approx(5.0)
+    born = [sent(2, 1, t_ns=1 * S), sent(2, 2, t_ns=4 * S), sent(2, 3, t_ns=5 * S)]
+    came = [
+        arrived(2, 1, at=1, delay_ns=S, born_ns=1 * S), arrived(2, 3, at=1, delay_ns=S, born_ns=5 * S),
+    ]  # fmt: skip
+    late = arrived(2, 2, at=1, delay_ns=4 * S, born_ns=4 * S)
+    assert measured("age_s", [*born, *came], *settings) == pytest.approx(2.6)
+    assert measured("age_s", [*born, *came, late], *settings) == pytest.approx(2.6)
+    assert measured("age_s", born, *settings) == pytest.approx(5.0)

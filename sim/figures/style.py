@@ -86,8 +86,8 @@ def line(axes: Axes, look: Look, xs: Sequence[float], intervals: Sequence[Interv
     low = [0.0 if item.runs < 2 else item.mean - item.low for item in intervals]
     high = [0.0 if item.runs < 2 else item.high - item.mean for item in intervals]
     axes.errorbar(
-        [x + shift for x in xs], [item.mean for item in intervals], yerr=[low, high], label=look.label, color=look.color,
-        marker=look.marker or None, linestyle=look.dash,
+        [x + shift for x in xs], [item.mean for item in intervals], yerr=[low, high], label=look.label,
+        color=look.color, marker=look.marker or None, linestyle=look.dash,
     )  # fmt: skip
 
 

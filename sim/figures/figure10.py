@@ -54,7 +54,8 @@ def draw(runs: Runs) -> Drawing:
         axes.set_xlabel("clusters")
         axes.set_ylabel("packet delivery ratio")
         axes.set_ylim(0, 1.05)
-    panels[0].legend(loc="lower left")
+    handles, labels = panels[0].get_legend_handles_labels()
+    figure.legend(handles, labels, loc="outside upper center", ncols=len(labels))
     return Drawing(figure, data)
 
 

@@ -48,13 +48,14 @@ def sensors_of(scenario: Scenario, survivors: Survivors, solids: Solids, energy:
 
 def uses_fixes(scenario: Scenario) -> bool:
     """Whether anybody uses position fixes."""
-    moves = scenario.mobility.model != "static" or scenario.mission.survivors > 0
+    moves = scenario.mobility.model != "static"
     protocol = scenario.routing.protocol
     by_places = protocol == "geographic" or (protocol == "clustered" and moves) or protocol not in PROTOCOLS
     return (
         scenario.nodes.telemetry_hz > 0
         or scenario.clock.sync == "gps"
         or scenario.mission.collision_horizon_s > 0
+        or scenario.mission.survivors > 0
         or by_places
     )
 

@@ -344,3 +344,11 @@ def test_directions_and_angles_are_inverse() -> None:
     assert direction(bearing_rad=0.0, elevation_rad=-math.pi / 2) == pytest.approx(Enu(0, 0, -1), abs=1e-12)
     assert issubclass(Voice, tuple)
     assert issubclass(Radar, tuple)
+
+
+def test_a_rescue_has_position_fixes_whatever_protocol_carries_its_reports(make_scenario: MakeScenario) -> None:
+    for protocol in ("flooding", "counter", "aodv", "clustered"):
+        keys = {"nodes.count": 2, "nodes.telemetry_hz": 0, "routing.protocol": protocol, "mission.survivors": 1}
+        scenario = make_scenario(**keys)
+        kinds = [sensor.kind for sensor in sensors_of(scenario, Survivors(scenario), PLAIN)]
+        assert "gps" in kinds, protocol

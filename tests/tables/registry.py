@@ -7,7 +7,7 @@ from collections.abc import Callable, Mapping
 from pathlib import Path
 from typing import Final, NamedTuple
 
-from tests.tables import emulator, flight, installations, missions, protocol
+from tests.tables import emulator, flight, installations, mission, missions, protocol
 from tests.tables.markdown import Rows, Tolerance
 
 DOCUMENTS: Final = Path(__file__).parents[2] / "docs"
@@ -43,6 +43,7 @@ TABLES: Final[Mapping[str, Table]] = {
         "results/cost.md", protocol.cost, Tolerance(absolute=0.02, relative=0.1), ("CPU per frame [us]",)
     ),
     "clock-errors": Table("explanation/time.md", protocol.clock_errors, Tolerance(relative=0.2)),
+    "mission-network": Table("results/mission.md", mission.over_networks, Tolerance(absolute=0.05, relative=0.1)),
     "flight": Table("results/flight.md", flight.measured, Tolerance(absolute=0.02, relative=0.02)),
     "places": Table("results/missions.md", missions.places, Tolerance(absolute=0.05, relative=0.02)),
     "keeping-clear": Table("results/missions.md", missions.keeping_clear, Tolerance(absolute=0.05, relative=0.02)),

@@ -25,7 +25,7 @@ class Case(NamedTuple):
 
 
 PLACES: Final[Mapping[str, Case]] = {
-    "`town`": Case("town", (), (1, 2, 10)),
+    "`town`": Case("town", (), (1, 2, 3, 9, 10, 11)),
     "`town`, batteries of 18 to 60 % at first": Case("town", ("sensors.battery_hz=1", "world.charge=[0.18,0.6]"), (1,)),
 }
 CLEAR: Final[Mapping[str, Case]] = {

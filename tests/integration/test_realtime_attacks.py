@@ -100,7 +100,7 @@ def test_nonsense_for_the_launcher_is_counted_and_the_result_is_that_of_the_swar
 
 
 def test_attacks_over_the_air_end_no_process_and_are_refused_and_the_books_close() -> None:
-    """Four at once."""
+    """Four at once; each alone, in both modes, is a row of docs/results/attacks.md."""
     names = [
         "survivor reports of 1e10 dBm, as everybody", "digests of sequences far ahead",
         "sequence numbers of the far future", "joins of heads 255 hops away",

@@ -7,7 +7,7 @@ from collections.abc import Callable, Mapping
 from pathlib import Path
 from typing import Final, NamedTuple
 
-from tests.tables import emulator, flight, installations, mission, missions, protocol
+from tests.tables import attacks, emulator, flight, installations, mission, missions, protocol
 from tests.tables.markdown import Rows, Tolerance
 
 DOCUMENTS: Final = Path(__file__).parents[2] / "docs"
@@ -50,5 +50,9 @@ TABLES: Final[Mapping[str, Table]] = {
     "installations": Table(
         "results/installations.md", installations.installations, Tolerance(relative=0.1), installations.MACHINE
     ),
+    "attacks": Table(
+        "results/attacks.md", attacks.over_the_air, Tolerance(absolute=0.02, relative=0.2), attacks.MACHINE
+    ),
+    "faults": Table("results/attacks.md", attacks.on_the_bus_and_to_processes, Tolerance(), attacks.MACHINE),
     "clocks": Table("explanation/time.md", protocol.clocks, Tolerance(absolute=0.02, relative=0.2)),
 }

@@ -9,7 +9,7 @@ from scripts.rivals import connectivity
 from sim.results.files import finish
 from sim.run.virtual import simulate
 from sim.scenarios import catalog
-from tests.benchmarks import clock_sync, collision_warnings, false_assumptions, protocol_cost
+from tests.benchmarks import clock_sync, collision_warnings, false_assumptions, message_cost, protocol_cost
 from tests.tables.markdown import Rows
 
 _SPEEDS: Final = (0, 10, 20)
@@ -145,6 +145,11 @@ def assumptions() -> Rows:
 def phones() -> Rows:
     """How far off a phone's place is when its power is not what is assumed."""
     return false_assumptions.phones()
+
+
+def cost_of_messages() -> Rows:
+    """What a message costs beside a packet of load."""
+    return message_cost.rows(1000)
 
 
 def clock_errors() -> Rows:

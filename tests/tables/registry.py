@@ -42,6 +42,9 @@ TABLES: Final[Mapping[str, Table]] = {
     "protocol-cost": Table(
         "results/cost.md", protocol.cost, Tolerance(absolute=0.02, relative=0.1), ("CPU per frame [us]",)
     ),
+    "message-cost": Table(
+        "results/cost.md", protocol.cost_of_messages, Tolerance(absolute=0.02, relative=0.02), ("CPU [us]",)
+    ),
     "clock-errors": Table("explanation/time.md", protocol.clock_errors, Tolerance(relative=0.2)),
     "mission-network": Table("results/mission.md", mission.over_networks, Tolerance(absolute=0.05, relative=0.1)),
     "flight": Table("results/flight.md", flight.measured, Tolerance(absolute=0.02, relative=0.02)),

@@ -41,7 +41,8 @@ def vary(scenario: Scenario, settings: Mapping[str, Value]) -> Variant | None:
         *path, last = key.split(".")
         table = tree
         for part in path:
-            table = table[part]
+            inner = table[part]
+            table = inner[0] if isinstance(inner, list) else inner  # the first of several classes of traffic
         old = table.get(last)
         if old == value:
             continue

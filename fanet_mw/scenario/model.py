@@ -8,7 +8,7 @@ import math
 from collections.abc import Mapping
 from typing import Annotated, Any, Final, Literal, Self
 
-from pydantic import AfterValidator, Field, model_validator
+from pydantic import AfterValidator, Field, SerializerFunctionWrapHandler, model_serializer, model_validator
 
 from fanet_mw.bus.radio_control import Control
 from fanet_mw.extensions import Named, Options, OptionsOf
@@ -461,7 +461,7 @@ class Scenario(Section):
     faults: tuple[AnyFault, ...] = ()
     """What happens to the air, and when; by message too (`fanet air`)."""
     further_traffic: tuple[Traffic, ...] = ()
-    """Classes of traffic beside the first one; in a file, write `[[traffic]]` several times instead."""
+    """Classes of traffic beside the first one: in a file, the second and every later `[[traffic]]`."""
 
     @model_validator(mode="before")
     @classmethod
@@ -471,6 +471,15 @@ class Scenario(Section):
             return tree
         first, *others = tree["traffic"] or [{"arrivals": "none"}]
         return {**tree, "traffic": first, "further_traffic": [*others, *tree.get("further_traffic", ())]}
+
+    @model_serializer(mode="wrap")
+    def _as_in_a_file(self, write: SerializerFunctionWrapHandler) -> dict[str, Any]:
+        """All classes of traffic as one array, if there are several."""
+        tree: dict[str, Any] = write(self)
+        others = tree.pop("further_traffic", ())
+        if others:
+            tree["traffic"] = [tree.get("traffic", {}), *others]
+        return tree
 
     @property
     def traffic_classes(self) -> Mapping[str, Traffic]:

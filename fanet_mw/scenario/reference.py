@@ -51,6 +51,9 @@ def json_schema() -> dict[str, Any]:
     schema = _single_lines(Scenario.model_json_schema())
     assert isinstance(schema, dict), "the schema of a model is an object"
     del schema["description"]
+    keys = schema["properties"]
+    one = keys.pop("further_traffic")["items"]  # how a file says it: the same table several times
+    keys["traffic"] = {"anyOf": [one, {"type": "array", "items": one}]}
     return {
         "$schema": "https://json-schema.org/draft/2020-12/schema",
         **schema,

@@ -4,10 +4,14 @@ from pathlib import Path
 from typing import Any
 
 import pytest
+import tomli_w
 
 import fanet_mw
 from fanet_mw.errors import ConfigError
+from fanet_mw.planner.variant import vary
 from fanet_mw.scenario import Scenario, config
+from fanet_mw.scenario.commented import commented
+from fanet_mw.scenario.reference import json_schema
 
 TWO = """
 duration_s = 20
@@ -83,3 +87,27 @@ def test_a_trace_is_read_from_a_file_beside_the_scenario(tmp_path: Path) -> None
     (tmp_path / "load.csv").write_text("0.5,100\nsoon,200\n", encoding="utf-8")
     with pytest.raises(ConfigError, match="line 2: 'soon,200' must be seconds,bytes"):
         read(tmp_path, text)
+
+
+def test_several_classes_are_written_as_they_are_read_and_the_schema_knows_both_forms(tmp_path: Path) -> None:
+    found = read(tmp_path, TWO)
+    for tree in (
+        found.model_dump(mode="json", exclude_none=True),
+        found.model_dump(mode="json", exclude_none=True, exclude_defaults=True),
+    ):
+        assert [entry["name"] for entry in tree["traffic"]] == ["app_1", "app_2"]
+        assert "further_traffic" not in tree
+        assert read(tmp_path, tomli_w.dumps(tree)) == found
+    assert read(tmp_path, commented(tree)) == found
+    one = read(tmp_path, TWO.partition("[[traffic]]")[0])
+    assert one.model_dump()["traffic"]["payload_bytes"] == 1024
+    keys = json_schema()["properties"]
+    assert "further_traffic" not in keys
+    one_table, several = keys["traffic"]["anyOf"]
+    assert several == {"type": "array", "items": one_table} == {"type": "array", "items": {"$ref": "#/$defs/Traffic"}}
+
+
+def test_a_change_of_the_traffic_is_one_of_its_first_class(tmp_path: Path) -> None:
+    found = vary(read(tmp_path, TWO), {"traffic.interval_s": 4.0})
+    assert found is not None
+    assert [traffic.interval_s for traffic in found.scenario.traffic_classes.values()] == [4.0, 0.5]

@@ -18,7 +18,16 @@ from fanet_mw.bus.link_stats import LinkStats
 from fanet_mw.bus.messages import MavlinkTap
 from fanet_mw.errors import MalformedFrameError
 from fanet_mw.scenario import Scenario
-from fanet_mw.trace import Collided, FlightModeChanged, Posed, ProcessEnded, RadioFault, Record
+from fanet_mw.trace import (
+    Collided,
+    FlightModeChanged,
+    MissionModeChanged,
+    Posed,
+    ProcessEnded,
+    RadioFault,
+    Record,
+    Sighted,
+)
 from fanet_mw.units import S
 
 _SLACK_NS: Final = 10 * S
@@ -35,6 +44,8 @@ _SPEAKERS: Final[dict[type[Any], str | None]] = {
     ProcessEnded: None,
 }
 """The only actor that may send a kind of record; None: no actor may. All other kinds are sent by the node they name."""
+_ABOUT_NOBODY: Final = (MissionModeChanged, Sighted)
+"""The kinds of record in which survivor 0 stands for none."""
 _ABOUT_NODES: Final = ("origin", "other", "reference")
 """The fields of records that name a node, or 0."""
 
@@ -163,7 +174,8 @@ class InputChecks:
             return "instant"
         if any(not 0 <= getattr(record, field, 0) <= self._nodes for field in _ABOUT_NODES):
             return "node"
-        if not 1 <= getattr(record, "survivor", 1) <= max(1, self._survivors):
+        least = 0 if kind in _ABOUT_NOBODY else 1
+        if not least <= getattr(record, "survivor", 1) <= max(1, self._survivors):
             return "survivor"
         return None
 

@@ -30,11 +30,13 @@ from fanet_mw.trace import (
     Detected,
     Dropped,
     Generated,
+    MissionModeChanged,
     Posed,
     ProcessEnded,
     RadioFault,
     Record,
     RoleChanged,
+    Sighted,
 )
 from fanet_mw.units import S
 from sim.results.files import finish
@@ -132,6 +134,8 @@ def test_what_genuine_actors_say_passes_and_gives_the_result_of_the_run(ear: Ear
         ("agent-3", Approaching(S, 3, 3, 3, 1.0, 1.0), "survivor"),
         ("agent-3", Detected(S, 3, 0, -50.0), "survivor"),
         ("agent-3", Arrived(S, 3, -1), "survivor"),
+        ("agent-3", Sighted(S, 3, "camera", 3, 1.0, 1.0), "survivor"),
+        ("agent-3", MissionModeChanged(S, 3, "respond", -1), "survivor"),
         ("agent-3", RoleChanged(2**62, 3, "head", 1, 3), "instant"),
         ("agent-3", Dropped(-(2**62), 3, "expired", 1, 1), "instant"),
         ("agent-3", Collided(S, 3, 4), "speaker"),
@@ -147,6 +151,12 @@ def test_a_record_that_its_speaker_cannot_mean_is_counted_and_goes_no_further(
     good = good or (Collided(S, 1, 0) if name == "world" else Generated(S, 3, 1, "traffic", 5))
     assert ear.say(NAMES.trace(name), TraceBatch((good, record))) == {f"trace: {why}": 1}
     assert list(ear.collector.records()) == [good]
+
+
+def test_a_sighting_of_nobody_known_and_a_mode_for_nobody_pass(ear: Ear) -> None:
+    said = (Sighted(S, 3, "camera", 0, 1.0, 1.0), MissionModeChanged(S, 3, "search"))
+    assert ear.say(NAMES.trace("agent-3"), TraceBatch(said)) == {}
+    assert sorted(ear.collector.records(), key=repr) == sorted(said, key=repr)
 
 
 @pytest.mark.parametrize(

@@ -11,21 +11,23 @@ from attacker import Attacker
 
 from agents.__main__ import run as run_agent
 from fanet_mw.hosts import service
-from fanet_mw.hosts.realtime import Joining
+from fanet_mw.hosts.realtime import SwarmAddress
 from fanet_mw.scenario import Scenario
 from fanet_mw.units import MS
-from sim.run import swarm
+from sim.run import services, swarm
 from sim.run.outcome import Outcome
 
 AHEAD_NS = 100 * MS
 
 
-def agent_or_attacker(names: tuple[str, ...], *, scenario: Scenario, joining: Joining, node: int, **others: Any) -> int:
+def agent_or_attacker(
+    names: tuple[str, ...], *, scenario: Scenario, address: SwarmAddress, node: int, **others: Any
+) -> int:
     """What runs in the place of an agent; the attacks of these names, all at once."""
     if node != EVIL:
-        return run_agent(scenario, joining, node=node, **others)
+        return run_agent(scenario, address, node=node, **others)
     plan = [frame for name in names for frame in ATTACKS[name].plan()]
-    service.live(Attacker(EVIL, joining.swarm, plan, ahead_ns=AHEAD_NS), scenario, joining)
+    service.live(Attacker(EVIL, address.swarm, plan, ahead_ns=AHEAD_NS), scenario, address)
     return 0
 
 
@@ -37,9 +39,9 @@ def attacked_in_real_time(scenario: Scenario, *names: str) -> Outcome:
 
 @contextmanager
 def _in_place_of_agents(names: tuple[str, ...]) -> Iterator[None]:
-    genuine = swarm.run_agent
-    swarm.run_agent = partial(agent_or_attacker, names)  # type: ignore[assignment]
+    genuine = services.run_agent
+    services.run_agent = partial(agent_or_attacker, names)  # type: ignore[assignment]
     try:
         yield
     finally:
-        swarm.run_agent = genuine
+        services.run_agent = genuine

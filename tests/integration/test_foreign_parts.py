@@ -9,7 +9,7 @@ from installed import Installed
 
 from fanet_mw import extensions
 from fanet_mw.errors import ConfigError
-from fanet_mw.extensions import Table
+from fanet_mw.extensions import Options
 from fanet_mw.scenario import config
 from sim.results.files import finish
 from sim.run.virtual import simulate
@@ -90,9 +90,9 @@ def test_clusters_may_be_made_by_another_package(installed: Installed, monkeypat
 
 
 def test_a_scenario_with_options_is_a_key_of_a_cache_and_goes_to_other_processes_whole() -> None:
-    options = Table({"fanout": 3})
+    options = Options({"fanout": 3})
 
-    assert hash(options) == hash(Table({"fanout": 3})) != hash(Table({"fanout": 4}))
+    assert hash(options) == hash(Options({"fanout": 3})) != hash(Options({"fanout": 4}))
     assert pickle.loads(pickle.dumps(options)) == options
     with pytest.raises(TypeError, match="options do not change"):
         options["fanout"] = 4

@@ -1,7 +1,7 @@
 """The sending side of messages, hand-driven: what goes out when, to whom, and what the application is told."""
 
 from fanet_mw import wire
-from fanet_mw.delivery.sender import EXPIRED, Packet, Sender, Told
+from fanet_mw.delivery.sender import EXPIRED, PieceToSend, Sender, Told
 from fanet_mw.units import BROADCAST, MS, US, NodeId, S
 from fanet_mw.wire.message import DELIVERED, MISSING, NO_LISTENER, Piece, Receipt, decode_piece
 
@@ -29,11 +29,11 @@ def send(
     return sender.confirmed(data, port=port, targets=to, priority=3, born_us=BORN_NS // US, lifetime_ms=lifetime_ms)
 
 
-def piece(packet: Packet) -> Piece:
+def piece(packet: PieceToSend) -> Piece:
     return decode_piece(HEADER + packet.inner)
 
 
-def pieces(packets: list[Packet]) -> list[int]:
+def pieces(packets: list[PieceToSend]) -> list[int]:
     return [piece(packet).head.piece for packet in packets]
 
 

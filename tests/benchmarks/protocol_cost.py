@@ -22,6 +22,7 @@ from agents.uav import Uav
 from fanet_mw import wire
 from fanet_mw.airtime import OVERHEAD_BYTES
 from fanet_mw.node.node import Node
+from fanet_mw.node.port import NodePort
 from fanet_mw.scenario import Scenario
 from fanet_mw.wire import Kind
 from sim.results.files import finish
@@ -55,12 +56,12 @@ class Spent(NamedTuple):
 @contextmanager
 def metered(control: Counter[str], nodes: list[Node]) -> Iterator[None]:
     """Count control bytes at every transmit request, and time every call into a UAV."""
-    transmit, receive, wake, init = Node.transmit, Uav.receive, Uav.wake, Node.__init__
+    transmit, receive, wake, init = NodePort.transmit, Uav.receive, Uav.wake, Node.__init__
 
-    def counted(node: Node, frame: bytes, *args: Any, **keys: Any) -> int:
+    def counted(port: NodePort, frame: bytes, *args: Any, **keys: Any) -> int:
         data = wire.decode_header(frame).kind == Kind.DATA
         control["bytes"] += wire.HEADER_BYTES if data else len(frame) + OVERHEAD_BYTES
-        return transmit(node, frame, *args, **keys)
+        return transmit(port, frame, *args, **keys)
 
     def timed(call: Callable[..., None]) -> Callable[..., None]:
         def run(*args: Any) -> None:
@@ -75,7 +76,7 @@ def metered(control: Counter[str], nodes: list[Node]) -> Iterator[None]:
         nodes.append(node)
 
     with (
-        patch.object(Node, "transmit", counted),
+        patch.object(NodePort, "transmit", counted),
         patch.object(Node, "__init__", kept),
         patch.object(Uav, "receive", timed(receive)),
         patch.object(Uav, "wake", timed(wake)),

@@ -16,6 +16,7 @@ _AT: Final = "mission__report_interval_s"
 _SLOW_S, _FAST_S = 1.0, 0.1
 _EARLY_S: Final = 55.0
 _MANY: Final = 30
+_NEARLY_ALL: Final = 43
 _FEW: Final = 5
 _WINDOW_S: Final = (50.0, 70.0)
 _MOST: Final = 0.5
@@ -140,6 +141,16 @@ def claims(runs: Runs) -> list[Claim]:
             12,
             "Later the proposed method is ahead.",
             [above("UAVs that have turned by the end, the paper's method minus flooding", more, 0.0)],
+            [
+                Reason(
+                    "Under both the news reaches everyone in the end: whoever has not turned yet is told again by the "
+                    "next report, and nobody is left by whom the other could be ahead.",
+                    [
+                        above("flooding: UAVs at the end", seen(_at_end, "flooding", _SLOW_S), _NEARLY_ALL),
+                        above("the paper's method: UAVs at the end", seen(_at_end, "paper", _SLOW_S), _NEARLY_ALL),
+                    ],
+                )
+            ],
         ),
         Claim(
             12,

@@ -72,6 +72,8 @@ class Searcher:
         self._navigation = navigation = Navigation(position, obstacles)
         self._neighbors = neighbors = Neighbors()
         self._watches_radar = "radar" in mission.avoid_by
+        self._avoided = neighbors if "hellos" in mission.avoid_by else Neighbors()
+        """Those that are avoided where their hellos say that they are; an echo of one of them tells nothing new."""
         self._formation = place = FormationPlace(node, navigation, reach_m=reach_m)
         approach = Approach(node, finds, navigation, outbox, arrival_m=mission.arrival_m)
         self._tasks = Tasks(
@@ -86,7 +88,7 @@ class Searcher:
             most_m_s=speed_m_s,
             hard=[
                 ClearOfObstacles(navigation, obstacles),
-                ClearOfOthers(navigation, neighbors if "hellos" in mission.avoid_by else Neighbors(), obstacles),
+                ClearOfOthers(navigation, self._avoided, obstacles),
             ],
             soft=[InReach(navigation, neighbors, place, reach_m=reach_m)],
         )
@@ -193,7 +195,7 @@ class Searcher:
         """Our radar shows what is around us."""
         if self._watches_radar:
             own = self._navigation
-            others = [motion.now(now_ns) for motion in self._neighbors.all(now_ns=now_ns)]
+            others = [motion.now(now_ns) for motion in self._avoided.all(now_ns=now_ns)]
             self._obstacles.radar(echoes, at=own.position, velocity=own.velocity, neighbors=others, now_ns=now_ns)
 
     def camera(self, people: Sequence[tuple[float, float]], *, now_ns: int) -> None:

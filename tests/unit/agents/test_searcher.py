@@ -1,7 +1,7 @@
 """What one UAV of a planned search does with its battery, its tasks and its other sensors: timelines."""
 
 import math
-from collections.abc import Callable
+from collections.abc import Callable, Sequence
 
 import pytest
 
@@ -32,11 +32,12 @@ class Flight:
         chart: Chart = NO_CHART,
         planned: bool = True,
         home: Enu = HOME,
+        avoid_by: Sequence[str] = ("hellos", "radar"),
     ) -> None:
         keys = {
             "nodes.count": 20, "nodes.altitude_m": 65, "mission.survivors": 3, "mission.search": "lines",
             "mobility.model": "onboard", "world.area_m": 1000, "radio.range_m": 250, "sensors.battery_hz": 1,
-            "sensors.camera_hz": 2,
+            "sensors.camera_hz": 2, "mission.avoid_by": avoid_by,
         }  # fmt: skip
         scenario = make_scenario(**keys)
         self.outbox = Outbox()
@@ -157,24 +158,39 @@ def test_somebody_who_is_seen_or_heard_at_close_range_is_confirmed(
     assert {r.sensor for r in flight.outbox.records if isinstance(r, Sighted)} == {sensor}
 
 
-def test_a_neighbor_that_is_only_seen_by_radar_is_avoided_too(make_scenario: Callable[..., Scenario]) -> None:
-    heard, seen, alone = (Flight(make_scenario) for _ in range(3))
-    for flight in (heard, seen, alone):
-        flight.fly(4)
-    velocity = heard.searcher.velocity or STILL
+def oncoming(flight: Flight) -> tuple[Motion, Echo]:
+    """A UAV 50 m ahead that flies towards this one, as it says itself and as the radar shows it."""
+    velocity = flight.searcher.velocity or STILL
     speed = math.hypot(velocity.east, velocity.north)
     assert speed > 1
     ahead = Enu(velocity.east / speed, velocity.north / speed, 0.0)
-    other = Enu(heard.at.east + 50 * ahead.east, heard.at.north + 50 * ahead.north, heard.at.up)
+    other = Enu(flight.at.east + 50 * ahead.east, flight.at.north + 50 * ahead.north, flight.at.up)
     back = Enu(-8 * ahead.east, -8 * ahead.north, 0.0)
-    heard.searcher.hello(3, Motion(other, back, heard.now_ns), now_ns=heard.now_ns)
     echo = Echo(50.0, math.atan2(ahead.east, ahead.north) % (2 * math.pi), 0.0, speed + 8, 15.0)
-    seen.searcher.radar([echo], now_ns=seen.now_ns)
-    for flight in (heard, seen, alone):
+    return Motion(other, back, flight.now_ns), echo
+
+
+@pytest.mark.parametrize("avoid_by", [("hellos", "radar"), ("hellos",), ("radar",), ()])
+@pytest.mark.parametrize("by", [("hellos", "radar"), ("hellos",), ("radar",)])
+def test_another_uav_is_avoided_by_what_the_scenario_leaves_of_hellos_and_radar(
+    make_scenario: Callable[..., Scenario], avoid_by: Sequence[str], by: Sequence[str]
+) -> None:
+    """`by`: what tells of the other UAV."""
+    met, alone = (Flight(make_scenario, avoid_by=avoid_by) for _ in range(2))
+    for flight in (met, alone):
+        flight.fly(4)
+    motion, echo = oncoming(met)
+    if "hellos" in by:
+        met.searcher.hello(3, motion, now_ns=met.now_ns)
+    if "radar" in by:
+        met.searcher.radar([echo], now_ns=met.now_ns)
+    for flight in (met, alone):
         flight.fly(0.4)
-    flown = [flight.searcher.velocity or STILL for flight in (heard, seen, alone)]
-    assert flown[0].minus(flown[2]).norm() > 0.5
-    assert flown[1].minus(flown[2]).norm() > 0.5
+    off_m_s = (met.searcher.velocity or STILL).minus(alone.searcher.velocity or STILL).norm()
+    if set(avoid_by) & set(by):
+        assert off_m_s > 0.5
+    else:
+        assert off_m_s == 0.0
 
 
 @pytest.mark.parametrize(

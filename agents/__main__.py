@@ -6,7 +6,7 @@ from collections.abc import Mapping
 
 from agents.attached import OnAir
 from agents.clocked import make_uav
-from agents.mission.chart import NO_CHART, Chart
+from agents.mission.navigation.onboard_map import NO_MAP, OnboardMap
 from fanet_mw.errors import ConfigError
 from fanet_mw.hosts import interrupts, loop, service
 from fanet_mw.hosts.clock import START_PATIENCE_S
@@ -16,9 +16,11 @@ from fanet_mw.scenario import Scenario
 from fanet_mw.units import Enu, NodeId
 
 
-def run(scenario: Scenario, address: SwarmAddress, *, node: NodeId, position: Enu, chart: Chart = NO_CHART) -> int:
+def run(
+    scenario: Scenario, address: SwarmAddress, *, node: NodeId, position: Enu, onboard_map: OnboardMap = NO_MAP
+) -> int:
     """Run one UAV, with a map on board, against a router until the scenario is over; raises BusError."""
-    service.live(make_uav(scenario, node, address.swarm, position=position, chart=chart), scenario, address)
+    service.live(make_uav(scenario, node, address.swarm, position=position, onboard_map=onboard_map), scenario, address)
     return 0
 
 

@@ -12,7 +12,7 @@ from collections.abc import Callable, Mapping, Sequence
 from typing import Any, Final
 
 from agents.local_clock import LocalClock
-from agents.mission.chart import NO_CHART, Chart
+from agents.mission.navigation.onboard_map import NO_MAP, OnboardMap
 from agents.swarm_time import SwarmTime, swarm_time
 from agents.uav import NodeState, Uav
 from fanet_mw import wire
@@ -65,7 +65,7 @@ class ClockedUav(Actor):
         *,
         position: Enu,
         applications: Sequence[Application] = (),
-        chart: Chart = NO_CHART,
+        onboard_map: OnboardMap = NO_MAP,
     ) -> None:
         self._clock = LocalClock(scenario.clock, seed=scenario.seed, node=node)
         self._time = swarm_time(scenario, node)
@@ -75,7 +75,7 @@ class ClockedUav(Actor):
             swarm,
             position=position,
             applications=applications,
-            chart=chart,
+            onboard_map=onboard_map,
             hello_time=_TimeInHellos(self._time, self._local_now_ns) if self._time.in_hellos else None,
         )
         super().__init__(self._uav.name, self._uav.subscriptions)
@@ -246,8 +246,8 @@ def make_uav(
     *,
     position: Enu,
     applications: Sequence[Application] = (),
-    chart: Chart = NO_CHART,
+    onboard_map: OnboardMap = NO_MAP,
 ) -> Uav | ClockedUav:
     """A UAV as the scenario has it, with its host's clock or one of its own, a user's applications, a map."""
     kind = ClockedUav if scenario.clock.modelled else Uav
-    return kind(scenario, node, swarm, position=position, applications=applications, chart=chart)
+    return kind(scenario, node, swarm, position=position, applications=applications, onboard_map=onboard_map)

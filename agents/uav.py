@@ -12,7 +12,7 @@ from agents.avoidance import CollisionAvoidance
 from agents.dead_reckoning import DeadReckoning
 from agents.hellos import Hellos, HelloTime
 from agents.mission.applications import PlannedSearch, Rescue
-from agents.mission.chart import NO_CHART, Chart
+from agents.mission.navigation.onboard_map import NO_MAP, OnboardMap
 from agents.onboard import INNER_ID, Onboard
 from agents.steady_fix import SteadyFix
 from agents.telemetry import Telemetry
@@ -66,10 +66,10 @@ class Uav(Actor):
         *,
         position: Enu,
         applications: Sequence[Application] = (),
-        chart: Chart = NO_CHART,
+        onboard_map: OnboardMap = NO_MAP,
         hello_time: HelloTime | None = None,
     ) -> None:
-        """`applications` are those of its user, beside what the scenario asks for; `chart`: the map on board;
+        """`applications` are those of its user, beside what the scenario asks for; `onboard_map`: the map on board;
         `hello_time`: what its hellos say of the time.
         """
         topics = Topics(swarm)
@@ -82,7 +82,7 @@ class Uav(Actor):
         self._autopilot = Autopilot(node, position=position, telemetry_hz=scenario.nodes.telemetry_hz)
         self._reckoning = DeadReckoning()
         self._fixes = SteadyFix(sigma_m=scenario.world.gps_sigma_m, range_m=scenario.radio.range_m)
-        asked_for = _asked_for(scenario, node, self._autopilot, position, chart)
+        asked_for = _asked_for(scenario, node, self._autopilot, position, onboard_map)
         self._built_in = tuple(application.name for application in asked_for)
         """Applications whose counters stand among the UAV's own in its report."""
         carried = (*_foreign(scenario, node), *applications)
@@ -236,13 +236,17 @@ class Uav(Actor):
 
 
 def _asked_for(
-    scenario: Scenario, node: NodeId, autopilot: Autopilot, position: Enu, chart: Chart
+    scenario: Scenario, node: NodeId, autopilot: Autopilot, position: Enu, onboard_map: OnboardMap
 ) -> Sequence[Application]:
     """The applications that a scenario asks for, in the order in which they have their turn."""
     searches = scenario.mission.search != "none"
     applications: list[Application]
     loads = [Load(scenario, node, name) for name in scenario.traffic_classes]
-    rescue = PlannedSearch(scenario, node, position=position, chart=chart) if searches else Rescue(scenario, node)
+    rescue = (
+        PlannedSearch(scenario, node, position=position, onboard_map=onboard_map)
+        if searches
+        else Rescue(scenario, node)
+    )
     applications = [Telemetry(autopilot), *loads, rescue]
     if scenario.mission.collision_horizon_s:
         applications.append(CollisionAvoidance(scenario, node))

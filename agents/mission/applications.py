@@ -5,8 +5,8 @@ Each hands what its UAV senses and is told to the mission, and empties the missi
 
 from typing import Final
 
-from agents.mission.chart import NO_CHART, Chart
-from agents.mission.motion import Motion
+from agents.mission.navigation.motion import Motion
+from agents.mission.navigation.onboard_map import NO_MAP, OnboardMap
 from agents.mission.outbox import Outbox
 from agents.mission.paper_rule import PaperRule
 from agents.mission.searcher import Searcher
@@ -69,10 +69,10 @@ class PlannedSearch(Application):
     name: Final = "report"
     listens = (SURVIVOR.msgid, SEARCH.msgid, STATUS.msgid, BIDS.msgid, FOUND.msgid)
 
-    def __init__(self, scenario: Scenario, node: NodeId, *, position: Enu, chart: Chart = NO_CHART) -> None:
-        """`chart`: the map on board."""
+    def __init__(self, scenario: Scenario, node: NodeId, *, position: Enu, onboard_map: OnboardMap = NO_MAP) -> None:
+        """`onboard_map`: the map on board."""
         self._outbox = Outbox()
-        self._searcher = Searcher(scenario, node, position=position, outbox=self._outbox, chart=chart)
+        self._searcher = Searcher(scenario, node, position=position, outbox=self._outbox, onboard_map=onboard_map)
         self._bad_positions = 0
         """Hellos whose position is none, or not of now."""
 

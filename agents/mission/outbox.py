@@ -14,7 +14,7 @@ from fanet_mw.wire import HEADER_BYTES, PRIORITIES, PRIORITY_REPORT, filler
 from fanet_mw.wire.inner import Survivor
 
 
-class Packet(NamedTuple):
+class OutgoingPacket(NamedTuple):
     """Inner frames that are flooded to everyone."""
 
     frames: bytes
@@ -26,7 +26,7 @@ class Outbox:
     """One UAV's."""
 
     records: list[Record] = field(default_factory=list)
-    packets: list[Packet] = field(default_factory=list)
+    packets: list[OutgoingPacket] = field(default_factory=list)
     course: Course | None = None
     """A new course to fly; None when the old one holds."""
 
@@ -51,9 +51,9 @@ class ReportFormat:
         self._bytes = scenario.mission.report_bytes
         self._priority = PRIORITIES[scenario.mission.report_priority]
 
-    def packet(self, report: Survivor) -> Packet:
+    def packet(self, report: Survivor) -> OutgoingPacket:
         """A report, filled up to its length."""
         frames = report.encode_frame(self._node)
         if self._bytes:
             frames += filler(self._bytes - HEADER_BYTES - len(frames), node=self._node)
-        return Packet(frames, self._priority)
+        return OutgoingPacket(frames, self._priority)

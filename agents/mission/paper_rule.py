@@ -8,9 +8,9 @@ import math
 from collections.abc import Sequence
 from typing import Final
 
-from agents.localization import Sighting, estimate
+from agents.mission.finding.localization import Sighting, estimate
+from agents.mission.flight.approach_speed import approach_speed_m_s
 from agents.mission.outbox import Outbox, ReportFormat
-from agents.mission.speed import approach_speed_m_s
 from fanet_mw.application import HOME, Course
 from fanet_mw.scenario import Scenario
 from fanet_mw.trace import Approaching, Arrived, Detected

@@ -13,23 +13,23 @@ import math
 from collections.abc import Sequence
 from typing import Final, assert_never
 
-from agents.mission.announcing import Announcing
-from agents.mission.approach import Approach
-from agents.mission.chart import Chart
-from agents.mission.finds import Finds, ground_place
-from agents.mission.formation_place import STILL, FormationPlace
-from agents.mission.goal import Goal
-from agents.mission.homeward import Homeward
-from agents.mission.identities import Identities
-from agents.mission.motion import Motion, Navigation, Neighbors
-from agents.mission.obstacles import Obstacles
-from agents.mission.outbox import Outbox, Packet, ReportFormat
-from agents.mission.pattern import Pattern, fitted
-from agents.mission.phone_filter import REFERENCE_LOSS_DB, PhoneModel
-from agents.mission.planner import STATUS_S, Planner
-from agents.mission.speed import approach_speed_m_s
-from agents.mission.steering import ClearOfObstacles, ClearOfOthers, InReach, Steering
-from agents.mission.tasks import Tasks
+from agents.mission.finding.announcing import Announcing
+from agents.mission.finding.finds import Finds, ground_place
+from agents.mission.finding.identities import Identities
+from agents.mission.finding.phone_filter import REFERENCE_LOSS_DB, PhoneModel
+from agents.mission.flight.approach_speed import approach_speed_m_s
+from agents.mission.flight.goal import Goal
+from agents.mission.flight.return_home import ReturnHome
+from agents.mission.flight.velocity_choice import ClearOfObstacles, ClearOfOthers, InReach, VelocityChoice
+from agents.mission.formation.formation_place import STILL, FormationPlace
+from agents.mission.formation.formation_planner import STATUS_S, FormationPlanner
+from agents.mission.formation.pattern import Pattern, fitted
+from agents.mission.navigation.known_obstacles import KnownObstacles
+from agents.mission.navigation.motion import Motion, Navigation, NeighborMotions
+from agents.mission.navigation.onboard_map import OnboardMap
+from agents.mission.outbox import Outbox, OutgoingPacket, ReportFormat
+from agents.mission.tasking.approach import Approach
+from agents.mission.tasking.bidding import Bidding
 from fanet_mw.bus.messages import Echo
 from fanet_mw.rng import stream
 from fanet_mw.scenario import Scenario
@@ -54,7 +54,9 @@ _DEPLOY: Final = 0.9
 class Searcher:
     """One UAV."""
 
-    def __init__(self, scenario: Scenario, node: NodeId, *, position: Enu, outbox: Outbox, chart: Chart) -> None:
+    def __init__(
+        self, scenario: Scenario, node: NodeId, *, position: Enu, outbox: Outbox, onboard_map: OnboardMap
+    ) -> None:
         mission, reach_m = scenario.mission, scenario.radio.range_m
         self._node = node
         self._scan_for_ns = _MISSED_SCANS * mission.scan_interval_s * S
@@ -65,24 +67,24 @@ class Searcher:
         self._outbox = outbox
         least_m_s, _ = mission.approach_speeds_m_s
         speed_m_s = approach_speed_m_s(scenario, node)
-        self._planner = Planner(node, expected=scenario.nodes.count, deploy_speed_m_s=_DEPLOY * least_m_s)
+        self._planner = FormationPlanner(node, expected=scenario.nodes.count, deploy_speed_m_s=_DEPLOY * least_m_s)
         self._finds = finds = Finds(phone_model(scenario))
-        self._obstacles = obstacles = Obstacles(chart, scenario.world.no_fly_m)
+        self._obstacles = obstacles = KnownObstacles(onboard_map, scenario.world.no_fly_m)
         self._identities = Identities(finds)
         self._navigation = navigation = Navigation(position, obstacles)
-        self._neighbors = neighbors = Neighbors()
+        self._neighbors = neighbors = NeighborMotions()
         self._watches_radar = "radar" in mission.avoid_by
-        self._avoided = neighbors if "hellos" in mission.avoid_by else Neighbors()
+        self._avoided = neighbors if "hellos" in mission.avoid_by else NeighborMotions()
         """Those that are avoided where their hellos say that they are; an echo of one of them tells nothing new."""
         self._formation = place = FormationPlace(node, navigation, reach_m=reach_m)
         approach = Approach(node, finds, navigation, outbox, arrival_m=mission.arrival_m)
-        self._tasks = Tasks(
+        self._bidding = Bidding(
             scenario, node, finds=finds, navigation=navigation, formation=place, approach=approach, outbox=outbox,
             speed_m_s=speed_m_s,
         )  # fmt: skip
         self._announcing = Announcing(node, finds, outbox)
         self._goal = Goal(finds, navigation, place, approach)
-        self._steering = Steering(
+        self._velocity_choice = VelocityChoice(
             navigation,
             obstacles,
             most_m_s=speed_m_s,
@@ -92,7 +94,7 @@ class Searcher:
             ],
             soft=[InReach(navigation, neighbors, place, reach_m=reach_m)],
         )
-        self._homeward = Homeward(
+        self._return_home = ReturnHome(
             position, navigation, outbox,
             speed_m_s=speed_m_s, height_m=scenario.nodes.altitude_m, reserve=mission.reserve_charge,
         )  # fmt: skip
@@ -126,20 +128,20 @@ class Searcher:
         if self._planner.review(self._fitted, now_ns=now_ns):
             self._adopt(now_ns)
         plans, self._planner.to_tell = self._planner.to_tell, []
-        self._outbox.packets += [Packet(plan.encode_frame(self._node)) for plan in plans]
+        self._outbox.packets += [OutgoingPacket(plan.encode_frame(self._node)) for plan in plans]
         self._identify(now_ns)
-        self._announcing.tell(self._tasks.survivor, now_ns)
-        if not self._homeward.leaves:
-            self._tasks.bid(now_ns)
-            self._tasks.choose(now_ns)
+        self._announcing.tell(self._bidding.survivor, now_ns)
+        if not self._return_home.leaves:
+            self._bidding.bid(now_ns)
+            self._bidding.choose(now_ns)
         self._record_mode(now_ns)
 
     def _record_mode(self, now_ns: int) -> None:
         """Write into the trace what we do, when that has changed."""
-        survivor = self._tasks.survivor or 0
+        survivor = self._bidding.survivor or 0
         mode = (
-            "land" if self._homeward.lands
-            else "return" if self._homeward.leaves
+            "land" if self._return_home.lands
+            else "return" if self._return_home.leaves
             else "respond" if survivor
             else "search" if self._formation.is_taken_up(now_ns)
             else "deploy" if self._formation.place is not None
@@ -154,16 +156,16 @@ class Searcher:
     def fix(self, position: Enu, velocity: Enu, *, now_ns: int) -> None:
         """A position fix: where we are, and then how to fly on."""
         self._navigation.fix(position, velocity, now_ns=now_ns)
-        if self._homeward.leaves:
-            goal, feed = self._homeward.goal(), STILL
+        if self._return_home.leaves:
+            goal, feed = self._return_home.goal(), STILL
         else:
-            goal, feed = self._goal.at(self._tasks.survivor, now_ns)
-        self.velocity = None if self._homeward.lands else self._steering.velocity(goal, feed, now_ns)
+            goal, feed = self._goal.at(self._bidding.survivor, now_ns)
+        self.velocity = None if self._return_home.lands else self._velocity_choice.velocity(goal, feed, now_ns)
 
     def battery(self, charge: float, *, now_ns: int) -> None:
         """The battery says what is left; who has to leave hands its place and its task on at once."""
-        if self._homeward.battery(charge, now_ns=now_ns):
-            self._tasks.hand_on(now_ns)
+        if self._return_home.battery(charge, now_ns=now_ns):
+            self._bidding.hand_on(now_ns)
             self._formation.leave()
             self._say_status(now_ns)
             self._record_mode(now_ns)
@@ -245,11 +247,11 @@ class Searcher:
             case Status():
                 self._planner.status(message, now_ns=now_ns)
             case Bids():
-                self._tasks.merge(message.bids, now_ns=now_ns)
+                self._bidding.merge(message.bids, now_ns=now_ns)
             case Found():
                 if self._finds.told(message, now_ns=now_ns):
                     self._announcing.struck(message.survivor, now_ns)
-                    self._tasks.close(message.survivor, now_ns=now_ns)
+                    self._bidding.close(message.survivor, now_ns=now_ns)
             case _:
                 assert_never(message)
 
@@ -258,7 +260,7 @@ class Searcher:
     def hello_frames(self, now_ns: int) -> bytes:
         """Inner frames for the next hello: the latest reports, the best bids, what was found lately."""
         frames = b"".join(report.encode_frame(self._node) for report in self._finds.news(now_ns=now_ns))
-        bids = self._tasks.told(now_ns=now_ns)
+        bids = self._bidding.told(now_ns=now_ns)
         if bids:
             frames += encode_bids(bids, node=self._node)
         return frames + self._announcing.hello_frames(now_ns)
@@ -266,23 +268,23 @@ class Searcher:
     def _say_status(self, now_ns: int) -> None:
         plan = self._planner.plan
         status = Status(
-            now_ns // US, self._navigation.position, self._node, plan.revision if plan else 0, self._homeward.percent
+            now_ns // US, self._navigation.position, self._node, plan.revision if plan else 0, self._return_home.percent
         )
         self._planner.status(status, now_ns=now_ns)
-        self._outbox.packets.append(Packet(status.encode_frame(self._node)))
+        self._outbox.packets.append(OutgoingPacket(status.encode_frame(self._node)))
         self._next_status_ns = now_ns + round((0.8 + 0.4 * self._random()) * STATUS_S * S)
 
     def _identify(self, now_ns: int) -> None:
         """Confirm those of whom it is sure whose phones they carry."""
         for survivor in self._identities.review(now_ns):
             self._announcing.confirm(survivor, now_ns)
-            self._tasks.close(survivor, now_ns=now_ns)
+            self._bidding.close(survivor, now_ns=now_ns)
 
     def _adopt(self, now_ns: int) -> None:
         plan = self._planner.plan
         assert plan is not None, "there is a plan to adopt"
         self._formation.adopt(plan, now_ns)
-        if self._homeward.leaves:
+        if self._return_home.leaves:
             self._formation.leave()
         place = self._formation.place
         self._outbox.records.append(Planned(now_ns, self._node, plan.revision, -1 if place is None else place))

@@ -140,11 +140,11 @@ def agent(
     """
     from agents.__main__ import run
     from fanet_mw.units import NodeId
-    from sim.world.environment.chart import chart_of
+    from sim.world.environment.map_on_board import map_on_board
     from sim.world.mobility.layout import positions
 
     chosen = choice.realtime_scenario(scenario)
     if id not in chosen.node_ids:
         raise FanetError(f"--id {id}: must be in [1, nodes.count = {chosen.nodes.count}]")
     start = positions(chosen)[id - 1]
-    return run(chosen, join.address(chosen), node=NodeId(id), position=start, chart=chart_of(chosen))
+    return run(chosen, join.address(chosen), node=NodeId(id), position=start, onboard_map=map_on_board(chosen))

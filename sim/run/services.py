@@ -10,7 +10,7 @@ from fanet_mw.scenario import Scenario
 from fanet_mw.units import NodeId
 from sim.run.processes import Entry
 from sim.world.__main__ import run as run_world
-from sim.world.environment.chart import chart_of
+from sim.world.environment.map_on_board import map_on_board
 from sim.world.mobility.layout import positions
 
 _AGENT_NICE: Final = 10
@@ -44,8 +44,8 @@ class Services(NamedTuple):
         yield Service("emulator", run_emulator, {**common, **self.emulator_options})
         if self.own_world:
             yield Service("world", run_world, common)
-        chart = chart_of(self.scenario)
+        onboard_map = map_on_board(self.scenario)
         for node, position in zip(self.scenario.node_ids, positions(self.scenario), strict=True):
             if node not in self.leave_out:
-                arguments = {**common, "node": NodeId(node), "position": position, "chart": chart}
+                arguments = {**common, "node": NodeId(node), "position": position, "onboard_map": onboard_map}
                 yield Service(f"agent-{node}", run_agent, arguments, _AGENT_NICE)

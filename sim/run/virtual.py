@@ -22,7 +22,7 @@ from fanet_mw.units import MS, NodeId, S
 from sim.results.clocks import true_delays
 from sim.results.links import LinkTotals
 from sim.run.outcome import Outcome
-from sim.world.environment.chart import chart_of
+from sim.world.environment.map_on_board import map_on_board
 from sim.world.mobility.layout import positions
 from sim.world.world import World
 
@@ -49,9 +49,11 @@ def actors_of(
     applications: Applications = no_applications,
 ) -> list[Actor]:
     """Every actor of a swarm: the world first, so that poses stand before anyone transmits."""
-    starts, chart = positions(scenario), chart_of(scenario)
+    starts, onboard_map = positions(scenario), map_on_board(scenario)
     uavs = [
-        make_uav(scenario, NodeId(n), swarm, position=starts[n - 1], applications=applications(n), chart=chart)
+        make_uav(
+            scenario, NodeId(n), swarm, position=starts[n - 1], applications=applications(n), onboard_map=onboard_map
+        )
         for n in scenario.node_ids
     ]
     return [World(scenario, swarm), Medium(scenario, swarm, capture=capture), *uavs]

@@ -12,8 +12,8 @@ from collections.abc import Mapping
 from typing import Any, Final, NamedTuple
 
 from agents.clocked import make_uav
-from agents.localization import Sighting, estimate
-from agents.mission.phone_filter import REFERENCE_LOSS_DB, PhoneFilter, PhoneModel
+from agents.mission.finding.localization import Sighting, estimate
+from agents.mission.finding.phone_filter import REFERENCE_LOSS_DB, PhoneFilter, PhoneModel
 from agents.traffic import sources_of
 from emulator.medium import Medium
 from fanet_mw.application import Application, Data

@@ -2,11 +2,11 @@
 
 from typing import Final
 
-from agents.mission.approach import Approach
-from agents.mission.finds import Finds
-from agents.mission.formation_place import FormationPlace
-from agents.mission.motion import Navigation
-from agents.mission.tasks import FAR_M, VAGUE_M
+from agents.mission.finding.finds import Finds
+from agents.mission.formation.formation_place import FormationPlace
+from agents.mission.navigation.motion import Navigation
+from agents.mission.tasking.approach import Approach
+from agents.mission.tasking.bidding import FAR_M, VAGUE_M
 from fanet_mw.units import Enu
 
 _SHARED_M: Final = 35.0

@@ -2,7 +2,7 @@
 
 from typing import Final, NamedTuple
 
-from agents.mission.obstacles import Obstacles
+from agents.mission.navigation.known_obstacles import KnownObstacles
 from fanet_mw.units import Enu, S, seconds_to_ns
 
 _FIX_GAIN: Final = 0.15
@@ -33,7 +33,7 @@ class Motion(NamedTuple):
 class Navigation:
     """Our own motion: position fixes smoothed by dead reckoning, and the height that a rangefinder and the map tell."""
 
-    def __init__(self, position: Enu, obstacles: Obstacles) -> None:
+    def __init__(self, position: Enu, obstacles: KnownObstacles) -> None:
         self.position = position
         self._obstacles = obstacles
         self.velocity = Enu(0.0, 0.0, 0.0)
@@ -68,7 +68,7 @@ class Navigation:
         return self.position.up - self._obstacles.ground_m(self.position)
 
 
-class Neighbors:
+class NeighborMotions:
     """The motion of each neighbor, as its latest hello told it."""
 
     def __init__(self) -> None:

@@ -12,9 +12,9 @@ import math
 from collections.abc import Sequence
 from typing import Final, NamedTuple
 
-from agents.mission.chart import CELL_M, TILE_M, Cell, Chart, cell_of, charted, middle_of
-from agents.mission.half_planes import HalfPlane
-from agents.mission.way import Place, first_corner, is_clear, nearest_free, way_around
+from agents.mission.navigation.half_planes import HalfPlane
+from agents.mission.navigation.onboard_map import CELL_M, TILE_M, Cell, OnboardMap, cell_of, indexed, middle_of
+from agents.mission.navigation.shortest_way import Place, first_corner, is_clear, nearest_free, way_around
 from fanet_mw.bus.messages import Echo
 from fanet_mw.units import Enu, S, seconds_to_ns
 
@@ -61,13 +61,13 @@ class _Echoed(NamedTuple):
     until_ns: int
 
 
-class Obstacles:
+class KnownObstacles:
     """What one UAV knows of obstacles."""
 
-    def __init__(self, chart: Chart, no_fly_m: Sequence[tuple[float, float, float]] = ()) -> None:
+    def __init__(self, onboard_map: OnboardMap, no_fly_m: Sequence[tuple[float, float, float]] = ()) -> None:
         """`no_fly_m`: areas as (east, north, radius)."""
-        self._chart = chart
-        self._charted = charted(chart, margin_m=_MARGIN_M, watch_m=_WATCH_M)
+        self._map = onboard_map
+        self._index = indexed(onboard_map, margin_m=_MARGIN_M, watch_m=_WATCH_M)
         self._no_fly = tuple(no_fly_m)
         self._echoes: dict[Cell, _Echoed] = {}
         """Cells in which the radar has seen something."""
@@ -77,7 +77,7 @@ class Obstacles:
         self._corner: Place | None = None
         """Where the way around what is before us leads next."""
         self._planned_ns: int | None = None
-        self._any = bool(chart.buildings or no_fly_m)
+        self._any = bool(onboard_map.buildings or no_fly_m)
 
     # --- what comes in --------------------------------------------------------------------------------------------
 
@@ -103,7 +103,7 @@ class Obstacles:
         """Whether the map says that there is something, or the echo is of the ground."""
         if place.up <= self.ground_m(place) + _EXPLAINED_M:
             return True
-        near = self._charted.near.get(cell_of(place.east, place.north, TILE_M), ())
+        near = self._index.near.get(cell_of(place.east, place.north, TILE_M), ())
         return any(
             place.up <= building.roof_m + _EXPLAINED_M and building.outside(place.east, place.north)[0] <= _EXPLAINED_M
             for building in near
@@ -128,31 +128,31 @@ class Obstacles:
 
     def ground_m(self, place: Enu) -> float:
         """Height of the ground there, by the map."""
-        return self._chart.ground_m(place.east, place.north) if self._chart.heights_m else 0.0
+        return self._map.ground_m(place.east, place.north) if self._map.heights_m else 0.0
 
     def roof_m(self, place: Enu) -> float | None:
         """The roof below a place, by the map; None where there is none."""
-        return self._charted.roofs_m.get(cell_of(place.east, place.north))
+        return self._index.roofs_m.get(cell_of(place.east, place.north))
 
     def least_up_m(self, at: Enu, velocity: Enu) -> float:
         """Nobody here and on this course sinks below this height; what is no higher is flown over."""
-        if not self._charted.roofs_m:
+        if not self._index.roofs_m:
             return -math.inf
         ahead = [
-            self._charted.roofs_m.get(cell_of(at.east + s * velocity.east, at.north + s * velocity.north), -math.inf)
+            self._index.roofs_m.get(cell_of(at.east + s * velocity.east, at.north + s * velocity.north), -math.inf)
             for s in (0.0, 1.0, 2.0, 3.0)
         ]
         return max((roof for roof in ahead if roof + OVER_M <= at.up), default=-math.inf) + OVER_M
 
     def climb_m(self, at: Enu, velocity: Enu) -> float:
         """How much higher the ground is ahead, within the next seconds, than here; 0: it is not."""
-        if not self._chart.heights_m:
+        if not self._map.heights_m:
             return 0.0
         here = self.ground_m(at)
         return max(
             0.0,
             *(
-                self._chart.ground_m(at.east + s * velocity.east, at.north + s * velocity.north) - here
+                self._map.ground_m(at.east + s * velocity.east, at.north + s * velocity.north) - here
                 for s in (2.0, 4.0, 6.0)
             ),
         )
@@ -165,7 +165,7 @@ class Obstacles:
         """Constraints on the velocity, the nearest obstacle's first."""
         found = [
             building.outside(at.east, at.north)
-            for building in self._charted.near.get(cell_of(at.east, at.north, TILE_M), ())
+            for building in self._index.near.get(cell_of(at.east, at.north, TILE_M), ())
             if building.roof_m + OVER_M > at.up
         ]
         for east, north, radius in self._no_fly:
@@ -225,7 +225,7 @@ class Obstacles:
         return None if cell is None else middle_of(cell)
 
     def _is_taken(self, cell: Cell, up_m: float, now_ns: int) -> bool:
-        roof_m = self._charted.roofs_m.get(cell)
+        roof_m = self._index.roofs_m.get(cell)
         if roof_m is not None and roof_m + OVER_M > up_m:
             return True
         if self._no_fly:

@@ -2,21 +2,21 @@
 
 import numpy as np
 
-from agents.mission.chart import NO_CHART, Building, Chart
+from agents.mission.navigation.onboard_map import NO_MAP, Building, OnboardMap
 from fanet_mw.rng import stream
 from fanet_mw.scenario import Scenario
 from sim.world.environment.obstacles import obstacles
 from sim.world.mobility.layout import positions
 
 
-def chart_of(scenario: Scenario) -> Chart:
+def map_on_board(scenario: Scenario) -> OnboardMap:
     """The map; which buildings are missing from it is drawn by the seed."""
     if not scenario.world.has_obstacles:
-        return NO_CHART
+        return NO_MAP
     hills, boxes = obstacles(scenario, np.array(positions(scenario), dtype=np.float64))
     known = round(scenario.sensors.map_share * len(boxes))
     rows = sorted(stream(scenario.seed, "map").sample(range(len(boxes)), known))
     buildings = tuple(Building(*boxes[row]) for row in rows)
     if hills is None:
-        return Chart(buildings)
-    return Chart(buildings, tuple(tuple(row) for row in hills.heights.tolist()), hills.cell_m)
+        return OnboardMap(buildings)
+    return OnboardMap(buildings, tuple(tuple(row) for row in hills.heights.tolist()), hills.cell_m)

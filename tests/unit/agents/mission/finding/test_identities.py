@@ -5,9 +5,9 @@ import random
 from collections.abc import Iterator
 from typing import Final
 
-from agents.mission.finds import Finds
-from agents.mission.identities import Identities
-from agents.mission.phone_filter import REFERENCE_LOSS_DB, PhoneModel
+from agents.mission.finding.finds import Finds
+from agents.mission.finding.identities import Identities
+from agents.mission.finding.phone_filter import REFERENCE_LOSS_DB, PhoneModel
 from fanet_mw.units import US, Enu, S
 from fanet_mw.wire.inner import Survivor
 from fanet_mw.wire.search import Found

@@ -45,7 +45,7 @@ class Building(NamedTuple):
         return distance, cos * to_along - sin * to_across, sin * to_along + cos * to_across
 
 
-class Chart(NamedTuple):
+class OnboardMap(NamedTuple):
     """What is known of a place."""
 
     buildings: tuple[Building, ...] = ()
@@ -69,7 +69,7 @@ class Chart(NamedTuple):
         return low * (1 - v) + high * v
 
 
-NO_CHART: Final = Chart()
+NO_MAP: Final = OnboardMap()
 
 
 def cell_of(east_m: float, north_m: float, size_m: float = CELL_M) -> Cell:
@@ -82,8 +82,8 @@ def middle_of(cell: Cell) -> tuple[float, float]:
     return (cell[0] + 0.5) * CELL_M, (cell[1] + 0.5) * CELL_M
 
 
-class Charted(NamedTuple):
-    """A chart, made ready for being asked many times: the same for all UAVs that carry it."""
+class MapIndex(NamedTuple):
+    """A map, made ready for being asked many times: the same for all UAVs that carry it."""
 
     roofs_m: Mapping[Cell, float]
     """By cell of `CELL_M`, the highest roof within the margin of its middle."""
@@ -92,17 +92,17 @@ class Charted(NamedTuple):
 
 
 @lru_cache(maxsize=4)
-def charted(chart: Chart, *, margin_m: float, watch_m: float) -> Charted:
-    """Which cells the buildings of a chart take up, with a margin, and which of them are to be watched from where."""
+def indexed(onboard_map: OnboardMap, *, margin_m: float, watch_m: float) -> MapIndex:
+    """Which cells the buildings of a map take up, with a margin, and which of them are to be watched from where."""
     roofs: dict[Cell, float] = {}
     near: dict[Cell, list[Building]] = {}
-    for building in chart.buildings:
+    for building in onboard_map.buildings:
         for cell in _cells_within(building, margin_m, CELL_M):
             if building.outside(*middle_of(cell))[0] <= margin_m:
                 roofs[cell] = max(roofs.get(cell, -math.inf), building.roof_m)
         for tile in _cells_within(building, watch_m, TILE_M):
             near.setdefault(tile, []).append(building)
-    return Charted(roofs, {tile: tuple(found) for tile, found in near.items()})
+    return MapIndex(roofs, {tile: tuple(found) for tile, found in near.items()})
 
 
 def _cells_within(building: Building, margin_m: float, size_m: float) -> Iterator[Cell]:

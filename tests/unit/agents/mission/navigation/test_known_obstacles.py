@@ -8,10 +8,10 @@ import pytest
 from hypothesis import assume, given, settings
 from hypothesis import strategies as st
 
-from agents.mission.chart import NO_CHART, Building, Chart, cell_of, middle_of
-from agents.mission.half_planes import nearest
-from agents.mission.obstacles import Obstacles
-from agents.mission.way import is_clear, nearest_free, way_around
+from agents.mission.navigation.half_planes import nearest
+from agents.mission.navigation.known_obstacles import KnownObstacles
+from agents.mission.navigation.onboard_map import NO_MAP, Building, OnboardMap, cell_of, middle_of
+from agents.mission.navigation.shortest_way import is_clear, nearest_free, way_around
 from fanet_mw.bus.messages import Echo
 from fanet_mw.units import MS, Enu, S
 
@@ -24,7 +24,9 @@ def gap_m(buildings: Sequence[Building], at: Enu) -> float:
     return min((building.outside(at.east, at.north)[0] for building in buildings), default=math.inf)
 
 
-def flown(obstacles: Obstacles, start: Enu, goal: Enu, *, seconds: int, seen: Sequence[Building] = ()) -> list[Enu]:
+def flown(
+    obstacles: KnownObstacles, start: Enu, goal: Enu, *, seconds: int, seen: Sequence[Building] = ()
+) -> list[Enu]:
     """The places of a UAV of 10 m/s and 5 m/s2 that wants to go straight to a goal; its radar shows walls `seen`."""
     at, velocity, places = start, STILL, [start]
     for step in range(5 * seconds):
@@ -60,20 +62,20 @@ def echoes_of(walls: Sequence[Building], at: Enu, velocity: Enu) -> list[Echo]:
 
 
 def test_a_tower_on_the_map_is_flown_around() -> None:
-    places = flown(Obstacles(Chart((TOWER,))), Enu(-100, 3, 60), Enu(100, -3, 60), seconds=40)
+    places = flown(KnownObstacles(OnboardMap((TOWER,))), Enu(-100, 3, 60), Enu(100, -3, 60), seconds=40)
     assert min(gap_m([TOWER], place) for place in places) > 4.0
     assert places[-1].minus(Enu(100, -3, 60)).norm() < 5.0
 
 
 def test_a_tower_that_is_not_on_the_map_is_seen_by_radar_and_flown_around() -> None:
-    places = flown(Obstacles(NO_CHART), Enu(-100, 3, 60), Enu(100, -3, 60), seconds=40, seen=[TOWER])
+    places = flown(KnownObstacles(NO_MAP), Enu(-100, 3, 60), Enu(100, -3, 60), seconds=40, seen=[TOWER])
     assert min(gap_m([TOWER], place) for place in places) > 2.5
     assert places[-1].minus(Enu(100, -3, 60)).norm() < 5.0
 
 
 def test_roofs_well_below_are_flown_over_and_nobody_sinks_onto_them() -> None:
     low = TOWER._replace(roof_m=40.0)
-    obstacles = Obstacles(Chart((low,)))
+    obstacles = KnownObstacles(OnboardMap((low,)))
     at, velocity = Enu(-15.0, 0.0, 60.0), Enu(8.0, 0.0, 0.0)
     assert obstacles.planes(at, 0) == []
     assert obstacles.way_to(at, Enu(100, 0, 60), STILL, now_ns=0) is None
@@ -83,13 +85,13 @@ def test_roofs_well_below_are_flown_over_and_nobody_sinks_onto_them() -> None:
 
 def test_nobody_flies_into_an_area_that_is_forbidden_however_high() -> None:
     area = (0.0, 10.0, 50.0)
-    places = flown(Obstacles(NO_CHART, [area]), Enu(-150, 0, 500), Enu(150, 0, 500), seconds=45)
+    places = flown(KnownObstacles(NO_MAP, [area]), Enu(-150, 0, 500), Enu(150, 0, 500), seconds=45)
     assert min(math.hypot(place.east - area[0], place.north - area[1]) for place in places) > 50.0
     assert places[-1].minus(Enu(150, 0, 500)).norm() < 5.0
 
 
 def test_a_goal_within_a_tower_is_awaited_where_it_comes_out() -> None:
-    obstacles = Obstacles(Chart((TOWER,)))
+    obstacles = KnownObstacles(OnboardMap((TOWER,)))
     there = obstacles.way_to(Enu(60, 0, 60), Enu(0, 0, 60), Enu(5.0, 0.0, 0.0), now_ns=0)
     assert there is not None
     assert there.east > 20
@@ -112,7 +114,7 @@ boxes = st.builds(
 def test_whatever_stands_there_nobody_hits_it(buildings: list[Building]) -> None:
     start, goal = Enu(-120, 0, 60), Enu(120, 0, 60)
     assume(min(gap_m(buildings, start), gap_m(buildings, goal)) > 12)
-    places = flown(Obstacles(Chart(tuple(buildings))), start, goal, seconds=25)
+    places = flown(KnownObstacles(OnboardMap(tuple(buildings))), start, goal, seconds=25)
     assert min(gap_m(buildings, place) for place in places) > 2.5
 
 
@@ -138,21 +140,21 @@ def test_of_two_ways_the_shorter_one_is_taken() -> None:
 def test_what_flies_and_says_nothing_is_a_mover_and_what_a_neighbor_explains_is_not() -> None:
     at, velocity = Enu(0, 0, 60), Enu(10.0, 0.0, 0.0)
     oncoming = Echo(60.0, math.pi / 2, 0.0, 18.0, 15.0)  # in the east, closing faster than we fly
-    obstacles = Obstacles(NO_CHART)
+    obstacles = KnownObstacles(NO_MAP)
     obstacles.radar([oncoming], at=at, velocity=velocity, neighbors=(), now_ns=S)
     (mover,) = obstacles.movers(S)
     assert mover.position.minus(Enu(60, 0, 60)).norm() < 1e-6
     assert mover.velocity.minus(Enu(-8, 0, 0)).norm() < 1e-6
     assert obstacles.planes(at, S) == [], "it is no wall"
     assert obstacles.movers(3 * S) == [], "and it has flown on by now"
-    obstacles = Obstacles(NO_CHART)
+    obstacles = KnownObstacles(NO_MAP)
     obstacles.radar([oncoming], at=at, velocity=velocity, neighbors=[Enu(58, 3, 62)], now_ns=S)
     assert obstacles.movers(S) == []
 
 
 def test_a_single_echo_is_soon_forgotten_and_a_repeated_one_is_kept() -> None:
     at, echo = Enu(0, 0, 60), Echo(25.0, 0.0, 0.0, 0.0, 15.0)
-    obstacles = Obstacles(NO_CHART)
+    obstacles = KnownObstacles(NO_MAP)
     obstacles.radar([echo], at=at, velocity=STILL, neighbors=(), now_ns=0)
     assert len(obstacles.planes(at, 2 * S)) == 1
     assert obstacles.planes(at, 4 * S) == []
@@ -163,7 +165,7 @@ def test_a_single_echo_is_soon_forgotten_and_a_repeated_one_is_kept() -> None:
 
 def test_a_hill_ahead_is_climbed_before_it_is_reached() -> None:
     rows = tuple(tuple(30.0 if column >= 3 else 0.0 for column in range(5)) for _ in range(5))
-    obstacles = Obstacles(Chart((), rows, 50.0))
+    obstacles = KnownObstacles(OnboardMap((), rows, 50.0))
     at = Enu(-25.0, 0.0, 60.0)
     assert obstacles.ground_m(Enu(25.0, 0.0, 0.0)) == pytest.approx(15.0)
     assert obstacles.climb_m(at, Enu(10.0, 0.0, 0.0)) == pytest.approx(21.0)

@@ -5,7 +5,7 @@ import math
 from hypothesis import given
 from hypothesis import strategies as st
 
-from agents.localization import REFERENCE_LOSS_DB, Sighting, estimate
+from agents.mission.finding.localization import REFERENCE_LOSS_DB, Sighting, estimate
 from fanet_mw.units import Enu
 
 POWER_DBM, EXPONENT = 15.0, 3.0

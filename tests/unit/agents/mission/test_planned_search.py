@@ -7,14 +7,14 @@ from collections.abc import Sequence
 from hypothesis import given, settings
 from hypothesis import strategies as st
 
-from agents.mission.assignment import assign
-from agents.mission.auction import Auction
-from agents.mission.constraints import avoiding, staying_near
-from agents.mission.finds import ground_place
-from agents.mission.half_planes import HalfPlane, nearest
-from agents.mission.pattern import Pattern, fitted
-from agents.mission.phone_filter import REFERENCE_LOSS_DB, PhoneFilter, PhoneModel
-from agents.mission.planner import Planner
+from agents.mission.finding.finds import ground_place
+from agents.mission.finding.phone_filter import REFERENCE_LOSS_DB, PhoneFilter, PhoneModel
+from agents.mission.flight.constraints import avoiding, staying_near
+from agents.mission.formation.formation_planner import FormationPlanner
+from agents.mission.formation.pattern import Pattern, fitted
+from agents.mission.hungarian import assign
+from agents.mission.navigation.half_planes import HalfPlane, nearest
+from agents.mission.tasking.auction import Auction
 from fanet_mw.units import US, Enu, NodeId, S
 from fanet_mw.wire.search import WITHDRAWN, Bid, Search, Status
 
@@ -95,8 +95,8 @@ def test_too_few_have_no_formation() -> None:
 # --- the plan -----------------------------------------------------------------------------------------------------
 
 
-def planner_with(nodes: int, *, node: int = 1) -> Planner:
-    made = Planner(NodeId(node), expected=nodes, deploy_speed_m_s=9)
+def planner_with(nodes: int, *, node: int = 1) -> FormationPlanner:
+    made = FormationPlanner(NodeId(node), expected=nodes, deploy_speed_m_s=9)
     for other in range(1, nodes + 1):
         place = Enu(200.0 * ((other - 1) % 9 - 4), 200.0 * ((other - 1) // 9 - 2), 50)
         made.status(Status(0, place, other, 0, 100), now_ns=0)
@@ -175,7 +175,7 @@ def test_the_smaller_part_of_a_swarm_that_came_apart_makes_no_plan_of_its_own() 
 
 
 def test_of_two_plans_the_newer_one_counts_and_of_equal_ones_that_of_the_lower_id() -> None:
-    listener = Planner(NodeId(9), expected=9, deploy_speed_m_s=9)
+    listener = FormationPlanner(NodeId(9), expected=9, deploy_speed_m_s=9)
 
     def plan(revision: int, planner: int) -> Search:
         return Search(1, 100.0, 10.0, 50.0, 50.0, 7.5, 10, revision, planner, (1, 2, 3, 4), 2, 0, 0)

@@ -7,11 +7,11 @@ it in reach of those that hold the swarm together with it, and the last ones are
 import math
 from typing import Final, Protocol
 
-from agents.mission.constraints import avoiding, grown_m, staying_near
-from agents.mission.formation_place import FormationPlace
-from agents.mission.half_planes import HalfPlane, Velocity, nearest
-from agents.mission.motion import Motion, Navigation, Neighbors
-from agents.mission.obstacles import Obstacles
+from agents.mission.flight.constraints import avoiding, grown_m, staying_near
+from agents.mission.formation.formation_place import FormationPlace
+from agents.mission.navigation.half_planes import HalfPlane, Velocity, nearest
+from agents.mission.navigation.known_obstacles import KnownObstacles
+from agents.mission.navigation.motion import Motion, Navigation, NeighborMotions
 from fanet_mw.units import Enu, S
 
 _LANE_GAIN: Final = 0.4
@@ -37,13 +37,13 @@ class Constraint(Protocol):
         ...
 
 
-class Steering:
+class VelocityChoice:
     """One UAV's."""
 
     def __init__(
         self,
         navigation: Navigation,
-        obstacles: Obstacles,
+        obstacles: KnownObstacles,
         *,
         most_m_s: float,
         hard: list[Constraint],
@@ -84,7 +84,7 @@ class Steering:
 class ClearOfObstacles:
     """Walls, areas that nobody may enter, and what the radar shows."""
 
-    def __init__(self, navigation: Navigation, obstacles: Obstacles) -> None:
+    def __init__(self, navigation: Navigation, obstacles: KnownObstacles) -> None:
         self._navigation, self._obstacles = navigation, obstacles
 
     def planes(self, now_ns: int) -> list[HalfPlane]:
@@ -96,7 +96,7 @@ class ClearOfOthers:
     on what the radar shows flying.
     """
 
-    def __init__(self, navigation: Navigation, neighbors: Neighbors, obstacles: Obstacles) -> None:
+    def __init__(self, navigation: Navigation, neighbors: NeighborMotions, obstacles: KnownObstacles) -> None:
         self._navigation, self._neighbors, self._obstacles = navigation, neighbors, obstacles
 
     def planes(self, now_ns: int) -> list[HalfPlane]:
@@ -126,7 +126,7 @@ class InReach:
     """Coherence: who is in a line or in the chain stays in reach of its neighbors there, a follower of its line."""
 
     def __init__(
-        self, navigation: Navigation, neighbors: Neighbors, formation: FormationPlace, *, reach_m: float
+        self, navigation: Navigation, neighbors: NeighborMotions, formation: FormationPlace, *, reach_m: float
     ) -> None:
         self._navigation, self._neighbors = navigation, neighbors
         self._formation = formation

@@ -8,7 +8,7 @@ import math
 from collections.abc import Callable
 from typing import Final
 
-from agents.mission.chart import CELL_M, Cell, cell_of, middle_of
+from agents.mission.navigation.onboard_map import CELL_M, Cell, cell_of, middle_of
 
 _STEPS: Final = tuple(
     (east, north, math.hypot(east, north)) for east in (-1, 0, 1) for north in (-1, 0, 1) if east or north

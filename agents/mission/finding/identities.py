@@ -14,9 +14,9 @@ from collections.abc import Sequence
 from dataclasses import dataclass
 from typing import Final
 
-from agents.mission.assignment import assign
-from agents.mission.finds import Finds
-from agents.mission.phone_filter import Estimate
+from agents.mission.finding.finds import Finds
+from agents.mission.finding.phone_filter import Estimate
+from agents.mission.hungarian import assign
 from fanet_mw.units import Enu, S
 
 _SAME_PERSON_M: Final = 12.0
@@ -56,7 +56,7 @@ _TAKEN_SIGMA_M: Final = 30.0
 
 
 @dataclass
-class Person:
+class PersonTrack:
     """Somebody on the ground."""
 
     place: Estimate
@@ -90,7 +90,7 @@ class Identities:
 
     def __init__(self, finds: Finds) -> None:
         self._finds = finds
-        self._people: list[Person] = []
+        self._people: list[PersonTrack] = []
 
     def seen(self, at: Enu, *, sigma_m: float, close: bool, now_ns: int) -> int | None:
         """A sensor shows somebody; `close`: from so near that it is certainly a person.
@@ -100,7 +100,7 @@ class Identities:
         near = min(self._people, key=lambda person: person.place.distance_m(at), default=None)
         variance = sigma_m * sigma_m
         if near is None or near.place.distance_m(at) > max(_SAME_PERSON_M, _SAME_SIGMAS * sigma_m):
-            near = Person(Estimate(at.east, at.north, variance, 0.0, variance), now_ns, now_ns)
+            near = PersonTrack(Estimate(at.east, at.north, variance, 0.0, variance), now_ns, now_ns)
             self._people.append(near)
         else:
             near.seen(at, variance, now_ns)
@@ -132,7 +132,7 @@ class Identities:
                     sure.append(survivor)
         return sorted(sure)
 
-    def _may_be_named(self, person: Person, now_ns: int) -> bool:
+    def _may_be_named(self, person: PersonTrack, now_ns: int) -> bool:
         """False where somebody has been confirmed, until further sightings say that a second person lies there."""
         at = Enu(person.place.east_m, person.place.north_m, 0.0)
         taken = any(
@@ -146,7 +146,7 @@ class Identities:
         return person.taken is None or person.sightings - person.taken >= _TAKEN_SIGHTINGS
 
     def _next_best(
-        self, costs: Sequence[Sequence[float]], nobody: Sequence[float], row: int, column: int, person: Person
+        self, costs: Sequence[Sequence[float]], nobody: Sequence[float], row: int, column: int, person: PersonTrack
     ) -> float:
         """The least cost if this person carries another phone, or at a place that is taken, none."""
         others = [list(one) for one in costs]
@@ -155,7 +155,7 @@ class Identities:
         bound[row] += _MARGIN if person.taken is None else 0.0
         return _assigned(others, bound)[0]
 
-    def _phones(self, people: Sequence[Person]) -> list[int]:
+    def _phones(self, people: Sequence[PersonTrack]) -> list[int]:
         """The open survivors whose phones one of these people may carry."""
         places = [Enu(person.place.east_m, person.place.north_m, 0.0) for person in people]
         return [
@@ -165,11 +165,11 @@ class Identities:
             and any(self._finds.known[survivor].filter.near(place, within_m=_NEAR_M) for place in places)
         ]
 
-    def _cost(self, person: Person, survivor: int) -> float:
+    def _cost(self, person: PersonTrack, survivor: int) -> float:
         place = person.place
         return min(_IMPOSSIBLE, self._finds.known[survivor].filter.deficit(place.east_m, place.north_m))
 
-    def _is_confirmable(self, person: Person, survivor: int) -> bool:
+    def _is_confirmable(self, person: PersonTrack, survivor: int) -> bool:
         """Whether enough was seen of a person, and enough heard of a phone."""
         find = self._finds.known[survivor]
         enough = _SAMPLES if len(find.reporters) >= _REPORTERS else _SAMPLES_ALONE
@@ -183,11 +183,11 @@ class Identities:
         )
 
 
-def _is_remembered(person: Person, now_ns: int) -> bool:
+def _is_remembered(person: PersonTrack, now_ns: int) -> bool:
     return now_ns - person.last_ns <= (_FORGOTTEN_NS if person.sightings > 1 else _FALSE_ALARM_NS)
 
 
-def _asked_for(person: Person, now_ns: int) -> float:
+def _asked_for(person: PersonTrack, now_ns: int) -> float:
     """The margin that is asked for: less and less, the longer a person has been seen."""
     share = (now_ns - person.first_ns - _PATIENT_NS) / (_IMPATIENT_NS - _PATIENT_NS)
     return _MARGIN - (_MARGIN - _LEAST_MARGIN) * min(1.0, max(0.0, share))

@@ -4,9 +4,9 @@ from typing import Any
 
 import pytest
 
+from agents.mission.flight.approach_speed import approach_speed_m_s
 from agents.mission.outbox import Outbox
 from agents.mission.paper_rule import PaperRule
-from agents.mission.speed import approach_speed_m_s
 from fanet_mw.application import HOME
 from fanet_mw.errors import ConfigError
 from fanet_mw.scenario import Scenario, config

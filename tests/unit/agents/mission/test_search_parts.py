@@ -4,20 +4,20 @@ import math
 
 import pytest
 
-from agents.mission.announcing import Announcing
-from agents.mission.approach import Approach
-from agents.mission.chart import NO_CHART
-from agents.mission.finds import Finds
-from agents.mission.formation_place import FormationPlace
-from agents.mission.goal import Goal
-from agents.mission.half_planes import HalfPlane
-from agents.mission.motion import Motion, Navigation, Neighbors
-from agents.mission.obstacles import Obstacles
+from agents.mission.finding.announcing import Announcing
+from agents.mission.finding.finds import Finds
+from agents.mission.finding.phone_filter import REFERENCE_LOSS_DB, Estimate, PhoneModel
+from agents.mission.flight.goal import Goal
+from agents.mission.flight.velocity_choice import ClearOfOthers, InReach, VelocityChoice
+from agents.mission.formation.formation_place import FormationPlace
+from agents.mission.formation.pattern import fitted
+from agents.mission.navigation.half_planes import HalfPlane
+from agents.mission.navigation.known_obstacles import KnownObstacles
+from agents.mission.navigation.motion import Motion, Navigation, NeighborMotions
+from agents.mission.navigation.onboard_map import NO_MAP
 from agents.mission.outbox import Outbox
-from agents.mission.pattern import fitted
-from agents.mission.phone_filter import REFERENCE_LOSS_DB, Estimate, PhoneModel
-from agents.mission.steering import ClearOfOthers, InReach, Steering
-from agents.mission.tasks import Tasks
+from agents.mission.tasking.approach import Approach
+from agents.mission.tasking.bidding import Bidding
 from fanet_mw.scenario import config
 from fanet_mw.trace import Approaching, Arrived, Confirmed
 from fanet_mw.units import US, Enu, NodeId, S
@@ -42,7 +42,7 @@ def a_plan() -> Search:
     )  # fmt: skip
 
 
-OPEN = Obstacles(NO_CHART)
+OPEN = KnownObstacles(NO_MAP)
 PLAN = a_plan()
 TAKEN_UP_NS = 60 * S
 FOLLOWER, LINE = NodeId(COUNT), NodeId(5)
@@ -54,12 +54,12 @@ class Board:
     def __init__(self, node: NodeId, at: Enu, *, planned: bool = True) -> None:
         self.out = Outbox()
         self.finds = Finds(MODEL)
-        self.navigation, self.neighbors = Navigation(at, OPEN), Neighbors()
+        self.navigation, self.neighbors = Navigation(at, OPEN), NeighborMotions()
         self.place = FormationPlace(node, self.navigation, reach_m=REACH_M)
         if planned:
             self.place.adopt(PLAN, 0)
         self.approach = Approach(node, self.finds, self.navigation, self.out, arrival_m=30)
-        self.tasks = Tasks(
+        self.tasks = Bidding(
             SCENARIO, node, finds=self.finds, navigation=self.navigation, formation=self.place,
             approach=self.approach, outbox=self.out, speed_m_s=10.0,
         )  # fmt: skip
@@ -245,13 +245,13 @@ def test_a_velocity_obeys_hard_constraints_and_gives_soft_ones_up() -> None:
         def planes(self, now_ns: int) -> list[HalfPlane]:
             return [away]
 
-    steering = Steering(Navigation(Enu(0, 0, UP_M), OPEN), OPEN, most_m_s=10, hard=[Wall(2)], soft=[Tether()])
+    steering = VelocityChoice(Navigation(Enu(0, 0, UP_M), OPEN), OPEN, most_m_s=10, hard=[Wall(2)], soft=[Tether()])
     flown = steering.velocity(Enu(1000, 0, UP_M), Enu(0, 0, 0), 0)
     assert flown.east == pytest.approx(2)
 
 
 def test_neighbors_are_avoided_while_they_are_heard_at_their_level() -> None:
-    navigation, neighbors = Navigation(Enu(0, 0, UP_M), OPEN), Neighbors()
+    navigation, neighbors = Navigation(Enu(0, 0, UP_M), OPEN), NeighborMotions()
     navigation.fix(Enu(0, 0, UP_M), Enu(5, 0, 0), now_ns=0)
     clear = ClearOfOthers(navigation, neighbors, OPEN)
     neighbors.on_hello(2, Motion(Enu(60, 0, UP_M), Enu(-5, 0, 0), 0))

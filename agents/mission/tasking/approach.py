@@ -3,10 +3,10 @@
 import math
 from typing import Final
 
-from agents.mission.finds import Finds
-from agents.mission.motion import Navigation
+from agents.mission.finding.finds import Finds
+from agents.mission.finding.phone_filter import Estimate
+from agents.mission.navigation.motion import Navigation
 from agents.mission.outbox import Outbox
-from agents.mission.phone_filter import Estimate
 from fanet_mw.trace import Arrived
 from fanet_mw.units import NodeId, S
 

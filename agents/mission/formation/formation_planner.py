@@ -12,8 +12,8 @@ same instants then do not cross, and UAVs that were near each other stay so.
 
 from typing import Final, NamedTuple
 
-from agents.mission.assignment import assign
-from agents.mission.pattern import Pattern
+from agents.mission.formation.pattern import Pattern
+from agents.mission.hungarian import assign
 from fanet_mw.units import US, Enu, NodeId, S
 from fanet_mw.wire.search import Search, Status
 
@@ -36,7 +36,7 @@ class _Member(NamedTuple):
     """True for a node that flies home: it holds no place any more, and plans no more."""
 
 
-class Planner:
+class FormationPlanner:
     """One node's part in planning. Any node can be the planner; all but one only listen."""
 
     def __init__(self, node: NodeId, *, expected: int, deploy_speed_m_s: float) -> None:

@@ -7,8 +7,8 @@ somebody still reports a confirmed survivor    -> some of those who know tell it
 import math
 from typing import Final
 
-from agents.mission.finds import Finds
-from agents.mission.outbox import Outbox, Packet
+from agents.mission.finding.finds import Finds
+from agents.mission.outbox import Outbox, OutgoingPacket
 from fanet_mw.trace import Confirmed
 from fanet_mw.units import US, NodeId, S
 from fanet_mw.wire.inner import Survivor
@@ -99,4 +99,4 @@ class Announcing:
         self._flood(Found(now_ns // US, survivor, *place, self._node, confirmed=False))
 
     def _flood(self, found: Found) -> None:
-        self._outbox.packets.append(Packet(found.encode_frame(self._node)))
+        self._outbox.packets.append(OutgoingPacket(found.encode_frame(self._node)))

@@ -3,8 +3,8 @@
 import math
 from typing import Final
 
-from agents.mission.endurance import Endurance
-from agents.mission.motion import Navigation
+from agents.mission.flight.endurance import Endurance
+from agents.mission.navigation.motion import Navigation
 from agents.mission.outbox import Outbox
 from fanet_mw.application import Course
 from fanet_mw.units import Enu
@@ -15,7 +15,7 @@ _HOME_M: Final = 4.0
 _LAND_M_S: Final = 1.5
 
 
-class Homeward:
+class ReturnHome:
     """One UAV's."""
 
     def __init__(

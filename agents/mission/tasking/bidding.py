@@ -9,12 +9,12 @@ import math
 from collections.abc import Iterable
 from typing import Final
 
-from agents.mission.approach import Approach
-from agents.mission.auction import Auction
-from agents.mission.finds import Find, Finds
-from agents.mission.formation_place import FormationPlace
-from agents.mission.motion import Navigation
+from agents.mission.finding.finds import Find, Finds
+from agents.mission.formation.formation_place import FormationPlace
+from agents.mission.navigation.motion import Navigation
 from agents.mission.outbox import Outbox
+from agents.mission.tasking.approach import Approach
+from agents.mission.tasking.auction import Auction
 from fanet_mw.scenario import Scenario
 from fanet_mw.trace import Approaching
 from fanet_mw.units import NodeId, S
@@ -35,7 +35,7 @@ _HANDOVER_S: Final = 15.0
 """What a responder needs for its present survivor once it is there."""
 
 
-class Tasks:
+class Bidding:
     """One UAV's."""
 
     def __init__(

@@ -5,8 +5,8 @@ from collections.abc import Callable, Sequence
 
 import pytest
 
-from agents.mission.chart import NO_CHART, Chart
-from agents.mission.motion import Motion
+from agents.mission.navigation.motion import Motion
+from agents.mission.navigation.onboard_map import NO_MAP, OnboardMap
 from agents.mission.outbox import Outbox
 from agents.mission.searcher import Searcher, formation
 from fanet_mw.bus.messages import Echo
@@ -29,7 +29,7 @@ class Flight:
         make_scenario: Callable[..., Scenario],
         node: int = 7,
         *,
-        chart: Chart = NO_CHART,
+        onboard_map: OnboardMap = NO_MAP,
         planned: bool = True,
         home: Enu = HOME,
         avoid_by: Sequence[str] = ("hellos", "radar"),
@@ -41,7 +41,7 @@ class Flight:
         }  # fmt: skip
         scenario = make_scenario(**keys)
         self.outbox = Outbox()
-        self.searcher = Searcher(scenario, NodeId(node), position=home, outbox=self.outbox, chart=chart)
+        self.searcher = Searcher(scenario, NodeId(node), position=home, outbox=self.outbox, onboard_map=onboard_map)
         self.searcher.start(0)
         self.at, self.now_ns = home, 0
         pattern = formation(scenario, 20)
@@ -199,7 +199,7 @@ def test_another_uav_is_avoided_by_what_the_scenario_leaves_of_hellos_and_radar(
 def test_heights_are_over_the_ground_with_and_without_a_plan(
     make_scenario: Callable[..., Scenario], planned: bool, seconds: int, highest_m: float
 ) -> None:
-    plateau = Chart((), ((30.0, 30.0), (30.0, 30.0)), 2000.0)
-    flight = Flight(make_scenario, chart=plateau, planned=planned, home=HOME._replace(up=95.0))
+    plateau = OnboardMap((), ((30.0, 30.0), (30.0, 30.0)), 2000.0)
+    flight = Flight(make_scenario, onboard_map=plateau, planned=planned, home=HOME._replace(up=95.0))
     flight.fly(seconds)
     assert 64.0 < flight.at.up - 30.0 < highest_m, "lanes are at 65 m, relays 6 m higher"

@@ -6,10 +6,10 @@ line. Who has no place yet waits where it is.
 
 from typing import Final
 
-from agents.mission.motion import Navigation
-from agents.mission.pattern import Pattern
-from agents.mission.phone_filter import Estimate
-from agents.mission.planner import pattern_of
+from agents.mission.finding.phone_filter import Estimate
+from agents.mission.formation.formation_planner import pattern_of
+from agents.mission.formation.pattern import Pattern
+from agents.mission.navigation.motion import Navigation
 from fanet_mw.units import MS, US, Enu, NodeId, S
 from fanet_mw.wire.search import Search
 

@@ -2,7 +2,7 @@
 
 import pytest
 
-from agents.mission.endurance import Endurance
+from agents.mission.flight.endurance import Endurance
 from fanet_mw.units import Enu, S
 
 HOME = Enu(0.0, 0.0, 50.0)

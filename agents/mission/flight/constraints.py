@@ -8,7 +8,7 @@ velocity; the older they are, the larger the clearance that is asked for, becaus
 import math
 from typing import Final
 
-from agents.mission.half_planes import HalfPlane, Velocity
+from agents.mission.navigation.half_planes import HalfPlane, Velocity
 from fanet_mw.units import Enu
 
 _TURN_M_S2: Final = 1.0

@@ -7,7 +7,7 @@ import math
 from dataclasses import dataclass, field
 from typing import Final
 
-from agents.mission.phone_filter import Estimate, PhoneFilter, PhoneModel
+from agents.mission.finding.phone_filter import Estimate, PhoneFilter, PhoneModel
 from fanet_mw.units import US, Enu, S
 from fanet_mw.wire.inner import Survivor
 from fanet_mw.wire.search import Found

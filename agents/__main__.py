@@ -4,9 +4,9 @@ import json
 import sys
 from collections.abc import Mapping
 
-from agents.attached import OnAir
-from agents.clocked import make_uav
+from agents.clock.clocked_uav import make_uav
 from agents.mission.navigation.onboard_map import NO_MAP, OnboardMap
+from agents.program.attached import OnAir
 from fanet_mw.errors import ConfigError
 from fanet_mw.hosts import interrupts, loop, service
 from fanet_mw.hosts.clock import START_PATIENCE_S

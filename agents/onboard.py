@@ -2,16 +2,16 @@
 
 a message, a reading, a hello  ->  those that listen to it, in the order of the applications (`listeners.py`)
 what one sends                 ->  the node, at once (`messenger.py`)
-a course that one commands     ->  the vehicle, when all have had the same input (`steering.py`)
+a course that one commands     ->  the vehicle, when all have had the same input (`arbitration.py`)
 """
 
 from collections.abc import Callable, Iterable, Mapping, Sequence
 from random import Random
 from typing import Any, Final
 
+from agents.course_arbitration import CourseArbitration
 from agents.listeners import Callbacks, Listeners
 from agents.messenger import Messenger, Submission
-from agents.steering import Steering
 from fanet_mw import wire
 from fanet_mw.application import Application, Course, Data, Destination, Fate, Received, Status
 from fanet_mw.bus.messages import Gps, SensorReading, TxStatus
@@ -63,7 +63,7 @@ class Onboard:
         self.wanted = self._listeners.wanted(also=_OF_MESSENGER)
         """Message ids of packets that are for anyone on board, as in a frame: most are for nobody; None: any."""
         self._messenger = Messenger(node, self._listeners)
-        self.steering = Steering(applications, self._callbacks.permits, fly)
+        self.arbitration = CourseArbitration(applications, self._callbacks.permits, fly)
         self._with_radio: dict[int, tuple[Application, int]] = {}
         """By transmit request: the application whose packet's first frame it is, and the packet's handle."""
 
@@ -181,7 +181,7 @@ class Onboard:
             self._guard(application.on_message, message, now_ns)
         for application, status in self._messenger.statuses(now_ns):
             application.on_status(status, now_ns)
-        self.steering.settle(now_ns)
+        self.arbitration.settle(now_ns)
 
 
 class _Port:
@@ -219,7 +219,7 @@ class _Port:
         return self._onboard.send(self._application, submission)
 
     def fly(self, course: Course) -> None:
-        self._onboard.steering.command(self._application, course)
+        self._onboard.arbitration.command(self._application, course)
 
     def tap(self, frames: bytes) -> None:
         self._onboard.tap(frames, self._onboard.now_ns)

@@ -7,16 +7,16 @@ tap. Everything that decides is in the parts; this file only says what goes wher
 from collections.abc import Mapping, Sequence
 from typing import Any, NamedTuple
 
-from agents.autopilot import Autopilot
-from agents.avoidance import CollisionAvoidance
-from agents.dead_reckoning import DeadReckoning
-from agents.hellos import Hellos, HelloTime
+from agents.applications.autopilot import Autopilot
+from agents.applications.collision_avoidance import CollisionAvoidance
+from agents.applications.telemetry import Telemetry
+from agents.applications.traffic import Load
+from agents.hello_schedule import HelloSchedule, HelloTime
 from agents.mission.applications import PlannedSearch, Rescue
 from agents.mission.navigation.onboard_map import NO_MAP, OnboardMap
 from agents.onboard import INNER_ID, Onboard
-from agents.steady_fix import SteadyFix
-from agents.telemetry import Telemetry
-from agents.traffic import Load
+from agents.positioning.dead_reckoning import DeadReckoning
+from agents.positioning.steady_fix import SteadyFix
 from fanet_mw.actor import Actor
 from fanet_mw.application import Application, Course
 from fanet_mw.bus.messages import (
@@ -94,7 +94,7 @@ class Uav(Actor):
             fly=self._steer,
             tap=self._tap,
         )
-        self._hellos = Hellos(scenario, self._node, hello_time)
+        self._hellos = HelloSchedule(scenario, self._node, hello_time)
         self._own_wake_ns: int | None = None
         """When an application or a hello is due; changes whenever an application has been called."""
         self._malformed = 0

@@ -9,9 +9,9 @@ from importlib import import_module
 from typing import TYPE_CHECKING, Any, Final
 
 if TYPE_CHECKING:
-    from agents.attached import Emulated, NodeClosedError, OnAir
-    from agents.joined import Node, join
-    from agents.mailbox import Message, Sent
+    from agents.program.attached import Emulated, NodeClosedError, OnAir
+    from agents.program.joined import Node, join
+    from agents.program.mailbox import Message, Sent
     from fanet_mw.application import (
         ANY,
         HOME,
@@ -44,9 +44,9 @@ if TYPE_CHECKING:
 __version__ = "0.1.0"
 
 _HOMES: Final = {
-    "agents.attached": ("Emulated", "NodeClosedError", "OnAir"),
-    "agents.joined": ("Node", "join"),
-    "agents.mailbox": ("Message", "Sent"),
+    "agents.program.attached": ("Emulated", "NodeClosedError", "OnAir"),
+    "agents.program.joined": ("Node", "join"),
+    "agents.program.mailbox": ("Message", "Sent"),
     "fanet_mw.application": (
         "ANY", "HOME", "AppPort", "Application", "Course", "Data", "Fate", "Received", "Status",
     ),

@@ -22,7 +22,7 @@ from typing import Final, NamedTuple
 
 from fanet_mw.serial import newer
 from fanet_mw.timesync.clock_fit import EXACT, ClockFit, Line, Oscillator, Pair
-from fanet_mw.timesync.first_time import FirstTime
+from fanet_mw.timesync.first_belief import FirstBelief
 from fanet_mw.units import MS, NodeId, S
 from fanet_mw.wire.inner import TimeBeacon
 
@@ -98,7 +98,7 @@ class TimeSync:
         """Another reference that may be followed: its id, its pairs so far, and since when it has been considered."""
         self._neighbors: dict[NodeId, _Neighbor] = {}
         self._doubt_ns = int(_DOUBT_HELLOS * own.hello_ns)
-        self._first = FirstTime(
+        self._first = FirstBelief(
             own.oscillator,
             leader=own.leader,
             wait_ns=self._doubt_ns,
@@ -278,7 +278,7 @@ class TimeSync:
         """Take in a pair from a neighbor that follows the same reference."""
         steps = self._fit.steps
         if self._fit.line is None:
-            self._fit.add(pair)  # `FirstTime` has believed it
+            self._fit.add(pair)  # `FirstBelief` has believed it
             return
         agrees = self._fit.agrees(pair)
         if not agrees:

@@ -1,4 +1,4 @@
-"""The `fanet air` commands: parsing and printing; what they do is in `sim.run.air_control`."""
+"""The `fanet air` commands: parsing and printing; what they do is in `sim.run.bus.air_control`."""
 
 import math
 from dataclasses import dataclass
@@ -128,7 +128,7 @@ def restore(label: str = "", *, where: SwarmFlags = SwarmFlags()) -> int:
 
 
 def _do(control: Control, where: SwarmFlags) -> int:
-    from sim.run.air_control import change
+    from sim.run.bus.air_control import change
 
     if not isinstance(control, Restore) and (why := wrong(control, count=MAX_NODES)):
         bound = "node ids from 1" if nodes_of(control) else "see `fanet air --help`"

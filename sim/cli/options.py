@@ -14,7 +14,7 @@ from cyclopts import Parameter, Token
 from fanet_mw.errors import ConfigError
 from sim.cli.completion import keys
 from sim.cli.console import Console
-from sim.run.running import DEFAULT_ENDPOINT, locate
+from sim.run.bus.running_swarms import DEFAULT_ENDPOINT, locate
 
 if TYPE_CHECKING:
     from fanet_mw.hosts.realtime import SwarmAddress

@@ -7,7 +7,7 @@ import json
 import math
 from typing import Any, Final
 
-from agents.traffic import sources_of
+from agents.applications.traffic import sources_of
 from fanet_mw.bounds import Bounded, DelayBound, Refused
 from fanet_mw.errors import ConfigError
 from fanet_mw.graph.topology import within_range

@@ -96,7 +96,7 @@ def launch(
     """
     import asyncio
 
-    from sim.run.swarm import launch as run
+    from sim.run.launcher.swarm import launch as run
 
     chosen = with_engine(choice.realtime_scenario(scenario))
     output.prepare()

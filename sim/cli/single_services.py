@@ -9,7 +9,7 @@ from fanet_mw.errors import FanetError
 from sim.cli.completion import ScenarioName
 from sim.cli.console import Console
 from sim.cli.options import OutputFlags, ScenarioFlags, ServiceFlags, warn_of, with_engine
-from sim.run.running import DEFAULT_ENDPOINT
+from sim.run.bus.running_swarms import DEFAULT_ENDPOINT
 
 _err = Console(stderr=True)
 
@@ -51,7 +51,7 @@ def router(
 
     """
     from fanet_mw.hosts import loop
-    from sim.run.router import serve
+    from sim.run.bus.router import serve
 
     chosen = choice.realtime_scenario(scenario)
     OutputFlags(out=out, force=force).prepare()

@@ -10,7 +10,7 @@ from rich.table import Table
 
 from sim.cli.console import Console
 from sim.cli.options import SwarmFlags
-from sim.run.running import running
+from sim.run.bus.running_swarms import running
 
 
 def add_to(app: App) -> None:

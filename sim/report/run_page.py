@@ -12,7 +12,7 @@ from typing import Any
 from matplotlib.axes import Axes
 from matplotlib.collections import LineCollection
 
-from agents.traffic import targets_of
+from agents.applications.traffic import targets_of
 from fanet_mw import trace
 from fanet_mw.errors import ConfigError
 from fanet_mw.scenario import config

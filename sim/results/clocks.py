@@ -12,7 +12,7 @@ import numpy.typing as npt
 
 from fanet_mw.trace import ClockSampled, Delivered, Generated, Record
 from fanet_mw.units import US, S
-from sim.results.stored import of
+from sim.run.collecting.stored_records import of
 from sim.run.outcome import Outcome
 
 

@@ -6,7 +6,7 @@ No protocol that delivers at once can exceed it; one that carries packets for a 
 import numpy as np
 import numpy.typing as npt
 
-from agents.traffic import sources_of, targets_of
+from agents.applications.traffic import sources_of, targets_of
 from fanet_mw.scenario.model import Scenario
 from fanet_mw.units import S
 from sim.world.engines.contract import Rows

@@ -19,7 +19,7 @@ from fanet_mw.trace import Record
 from fanet_mw.whole_file import write_items
 from sim.results.links import described
 from sim.results.metrics import summarize
-from sim.results.stored import lines
+from sim.run.collecting.stored_records import lines
 from sim.run.outcome import Outcome
 
 

@@ -20,7 +20,7 @@ import numpy.typing as npt
 from fanet_mw.scenario import Scenario
 from fanet_mw.trace import Approaching, Arrived, Collided, Confirmed, Detected, Posed, ProcessEnded, Record
 from fanet_mw.units import S
-from sim.results.stored import of
+from sim.run.collecting.stored_records import of
 from sim.world.environment.survivors import place
 from sim.world.sensors.phone import REFERENCE_LOSS_DB
 

@@ -11,9 +11,9 @@ from collections.abc import Mapping
 from dataclasses import dataclass, field, replace
 from typing import Final
 
-from agents.traffic import targets_of
+from agents.applications.traffic import targets_of
 from fanet_mw.trace import BoundStated, Delivered, Generated, LetOut, LikelyStated
-from sim.results.stored import of
+from sim.run.collecting.stored_records import of
 from sim.run.outcome import Outcome
 
 OTHER_APPS: Final = ("report", "warning")

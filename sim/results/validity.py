@@ -11,8 +11,8 @@ virtual time nothing disturbs a run.
 from collections.abc import Iterator, Mapping
 from typing import Any, Final, NamedTuple
 
+from sim.run.launcher.processes import describe
 from sim.run.outcome import Outcome
-from sim.run.processes import describe
 
 LOST: Final = 0.0025
 """The limit for all that the machine took from the air: requests lost on the bus or dropped as too late and turns

@@ -10,10 +10,10 @@ from collections.abc import AsyncIterator, Callable, Collection, Mapping, Sequen
 from pathlib import Path
 from typing import Any, Final, TypeVar
 
-from agents.attached import Drive, Emulated, NodeClosedError
-from agents.clocked import ClockedUav
-from agents.joined import Node
-from agents.mailbox import Mailbox
+from agents.clock.clocked_uav import ClockedUav
+from agents.program.attached import Drive, Emulated, NodeClosedError
+from agents.program.joined import Node
+from agents.program.mailbox import Mailbox
 from agents.uav import NodeState, Uav
 from fanet_mw.application import Application
 from fanet_mw.bus.radio_control import Cut, Degrade, Restore
@@ -21,9 +21,9 @@ from fanet_mw.errors import ConfigError
 from fanet_mw.scenario import Scenario
 from fanet_mw.trace import Delivered
 from fanet_mw.units import MS, NodeId, S, seconds_to_ns
+from sim.run.launcher.swarm import READY_TIMEOUT_S, SwarmRun
+from sim.run.launcher.swarm import launch as launch_processes
 from sim.run.result import Result
-from sim.run.swarm import READY_TIMEOUT_S, SwarmRun
-from sim.run.swarm import launch as launch_processes
 from sim.run.virtual import Observed
 from sim.run.virtual import simulate as run_virtual
 from sim.scenarios import catalog

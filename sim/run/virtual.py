@@ -7,7 +7,7 @@ from contextlib import contextmanager
 from signal import Signals
 from typing import Final
 
-from agents.clocked import make_uav
+from agents.clock.clocked_uav import make_uav
 from emulator.medium import Medium
 from emulator.pcap import Capture
 from fanet_mw.actor import Actor

@@ -8,7 +8,7 @@ import math
 from collections.abc import Iterable
 from typing import Final
 
-from agents.traffic import sources_of
+from agents.applications.traffic import sources_of
 from fanet_mw.scenario.model import Scenario
 
 _START_S: Final = 0.3

@@ -6,13 +6,13 @@ from typing import Final
 
 import numpy as np
 
-from agents.traffic import sources_of, targets_of
+from agents.applications.traffic import sources_of, targets_of
 from fanet_mw.errors import ConfigError
 from fanet_mw.trace import Approaching, Detected
 from fanet_mw.units import S
 from sim.results.connectivity import connectivity
 from sim.results.packets import first_class_of
-from sim.results.stored import of
+from sim.run.collecting.stored_records import of
 from sim.run.outcome import Outcome
 
 Value = float | list[float] | None

@@ -13,7 +13,7 @@ from multiprocessing.connection import Connection, wait
 from multiprocessing.context import SpawnProcess
 from typing import Final
 
-from sim.run.children import die_with_parent
+from sim.run.launcher.children import die_with_parent
 from sim.sweep.execution import Finished, carry_out
 from sim.sweep.provenance import code
 from sim.sweep.tasks import Task

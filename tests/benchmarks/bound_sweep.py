@@ -22,8 +22,8 @@ from itertools import pairwise
 from pathlib import Path
 from typing import Any, Final, NamedTuple
 
-from agents.clocked import make_uav
-from agents.traffic import sources_of
+from agents.applications.traffic import sources_of
+from agents.clock.clocked_uav import make_uav
 from fanet_mw.actor import Actor
 from fanet_mw.bus.messages import Message
 from fanet_mw.graph.topology import components, within_range

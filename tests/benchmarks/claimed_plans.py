@@ -7,7 +7,7 @@ Scenario `clusters` (grid 9 x 5, 44 sources of 1024 B) and the same on a disc of
 
 import sys
 
-from agents.traffic import sources_of
+from agents.applications.traffic import sources_of
 from fanet_mw.planner import Plan, plan
 from fanet_mw.units import NodeId
 from sim.results.files import finish

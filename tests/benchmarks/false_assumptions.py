@@ -11,10 +11,10 @@ import statistics
 from collections.abc import Mapping
 from typing import Any, Final, NamedTuple
 
-from agents.clocked import make_uav
+from agents.applications.traffic import sources_of
+from agents.clock.clocked_uav import make_uav
 from agents.mission.finding.localization import Sighting, estimate
 from agents.mission.finding.phone_filter import REFERENCE_LOSS_DB, PhoneFilter, PhoneModel
-from agents.traffic import sources_of
 from emulator.medium import Medium
 from fanet_mw.application import Application, Data
 from fanet_mw.hosts.virtual import VirtualHost

@@ -20,8 +20,8 @@ from fanet_mw.hosts.clock import ClockKeeper
 from fanet_mw.hosts.lateness import Histogram
 from fanet_mw.hosts.realtime import SwarmAddress, run_actor
 from fanet_mw.units import S
-from sim.run.processes import Processes
-from sim.run.swarm import Collector, free_endpoint
+from sim.run.launcher.processes import Processes
+from sim.run.launcher.swarm import Collector, free_endpoint
 
 NAMES = Topics("bench")
 AGENTS = 45

@@ -9,7 +9,7 @@ import statistics
 import sys
 from collections import Counter
 
-from agents.traffic import sources_of
+from agents.applications.traffic import sources_of
 from fanet_mw.planner.timetable_plan import table_for
 from fanet_mw.routing.clustered.timetable.timetable import Timetable
 from fanet_mw.scenario import Scenario

@@ -18,7 +18,7 @@ from fanet_mw.hosts.bus import OnSample
 from fanet_mw.trace import Delivered, Generated, LetOut, Record
 from fanet_mw.units import MS, S
 from sim.results.files import finish
-from sim.run.collector import Collector
+from sim.run.collecting.collector import Collector
 from sim.run.outcome import Outcome
 from sim.scenarios import catalog
 

@@ -7,7 +7,7 @@ import pytest
 from hypothesis import HealthCheck, given, settings
 from hypothesis import strategies as st
 
-from agents.clocked import ClockedUav
+from agents.clock.clocked_uav import ClockedUav
 from agents.uav import Uav
 from emulator.medium import Medium
 from fanet_mw import wire

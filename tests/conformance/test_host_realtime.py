@@ -28,7 +28,7 @@ from fanet_mw.hosts.realtime import SwarmAddress, run_actor
 from fanet_mw.hosts.timebase import THIS_MACHINE, Timebase
 from fanet_mw.trace import ProcessEnded
 from fanet_mw.units import MS, NodeId, S
-from sim.run.swarm import free_endpoint
+from sim.run.launcher.swarm import free_endpoint
 
 NAMES = Topics("host")
 ROUTER = """

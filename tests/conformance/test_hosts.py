@@ -13,7 +13,7 @@ from fanet_mw.hosts.clock import ClockKeeper
 from fanet_mw.hosts.realtime import RealtimeHost
 from fanet_mw.hosts.virtual import VirtualHost
 from fanet_mw.units import MS
-from sim.run.swarm import free_endpoint
+from sim.run.launcher.swarm import free_endpoint
 
 NAMES = Topics("contract")
 DURATION_NS = 600 * MS

@@ -40,7 +40,7 @@ from fanet_mw.wire.links import Links
 from fanet_mw.wire.places import Places
 from fanet_mw.wire.search import Found as FoundMessage
 from fanet_mw.wire.search import Search, Status, checked_bids
-from sim.run.input_checks import InputChecks
+from sim.run.collecting.bus_checks import BusChecks
 
 SLOW_S: Final = 0.5
 """Of processor time, the most that one input may cost; usual are microseconds."""
@@ -164,7 +164,7 @@ def _made(message: Any) -> Any:
 
 
 def _of_the_bus(found: Corpus) -> Iterator[Decoder]:
-    checks = InputChecks(corpus.scenario_of("all", "duration_s=30"))
+    checks = BusChecks(corpus.scenario_of("all", "duration_s=30"))
     said = {kind: [put for put in found.puts if put[0] == code] for kind, code in topics.CODES.items()}
 
     def put(pick: Random) -> bytes:

@@ -11,7 +11,7 @@ from fanet_mw.hosts import service
 from fanet_mw.hosts.realtime import SwarmAddress
 from fanet_mw.scenario import Scenario
 from sim.results.files import finish
-from sim.run.swarm import launch
+from sim.run.launcher.swarm import launch
 from sim.scenarios import catalog
 
 
@@ -25,7 +25,7 @@ def agent_or_fuzzer(*, scenario: Scenario, address: SwarmAddress, node: int, **o
 
 
 def test_near_misses_off_a_real_time_air_end_no_process_and_close_the_books(monkeypatch: pytest.MonkeyPatch) -> None:
-    monkeypatch.setattr("sim.run.services.run_agent", agent_or_fuzzer)
+    monkeypatch.setattr("sim.run.launcher.services.run_agent", agent_or_fuzzer)
     times = ["duration_s=5", "warmup_s=1", "drain_s=1"]
     settings = [
         "radio.lead_ms=150",

@@ -10,7 +10,7 @@ from typing import Final, NamedTuple
 
 from attacker import Plan, packet
 
-from agents.autopilot import Autopilot
+from agents.applications.autopilot import Autopilot
 from fanet_mw import wire
 from fanet_mw.scenario import Scenario
 from fanet_mw.units import MS, Enu, NodeId, S

@@ -22,8 +22,8 @@ from fanet_mw.hosts.realtime import SwarmAddress, run_actor
 from fanet_mw.units import BROADCAST, MS, NodeId, S
 from sim.cli.app import app
 from sim.results.files import finish
-from sim.run import air_control
-from sim.run.swarm import free_endpoint
+from sim.run.bus import air_control
+from sim.run.launcher.swarm import free_endpoint
 from sim.run.virtual import simulate
 from sim.scenarios import catalog
 

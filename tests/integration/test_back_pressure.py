@@ -21,7 +21,7 @@ from fanet_mw.hosts.inbox import BOUND
 from fanet_mw.hosts.realtime import RealtimeHost
 from fanet_mw.scenario import Scenario
 from fanet_mw.units import BROADCAST, MS, S
-from sim.run.swarm import free_endpoint
+from sim.run.launcher.swarm import free_endpoint
 
 NAMES = Topics("flood")
 FLOODED = 20_000

@@ -5,7 +5,7 @@ from typing import Any
 
 import pytest
 
-from agents.clocked import ClockedUav, make_uav
+from agents.clock.clocked_uav import ClockedUav, make_uav
 from agents.uav import Uav
 from fanet_mw.bounds.guard import slot_guard_ns
 from fanet_mw.bus.messages import Reception

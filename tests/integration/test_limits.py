@@ -7,7 +7,7 @@ import sys
 import pytest
 
 from fanet_mw.errors import ConfigError
-from sim.run import limits
+from sim.run.launcher import limits
 
 
 @pytest.mark.parametrize(

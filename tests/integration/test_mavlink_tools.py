@@ -10,7 +10,7 @@ from pathlib import Path
 import pymavlink
 import pytest
 
-from agents.autopilot import Autopilot
+from agents.applications.autopilot import Autopilot
 from fanet_mw import tlog
 from fanet_mw.dialect import definitions
 from fanet_mw.errors import ConfigError

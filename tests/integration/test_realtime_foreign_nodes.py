@@ -14,7 +14,7 @@ import pytest
 
 from fanet_mw.bus.topics import Topics
 from fanet_mw.hosts.bus import Bus
-from sim.run.swarm import free_endpoint
+from sim.run.launcher.swarm import free_endpoint
 
 ROOT = Path(__file__).parents[2]
 SMALL = [

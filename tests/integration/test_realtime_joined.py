@@ -21,7 +21,7 @@ from fanet_mw.hosts.bus import Bus
 from fanet_mw.hosts.clock import ClockKeeper
 from fanet_mw.scenario import config
 from fanet_mw.testing.plugin import LaunchSwarm
-from sim.run.swarm import free_endpoint
+from sim.run.launcher.swarm import free_endpoint
 
 __all__ = ["network"]
 SCENARIO = """

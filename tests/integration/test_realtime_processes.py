@@ -17,8 +17,8 @@ import pytest
 from fanet_mw.bus.topics import Topics
 from fanet_mw.errors import BusError
 from fanet_mw.hosts.bus import Bus
-from sim.run.processes import Processes
-from sim.run.swarm import free_endpoint
+from sim.run.launcher.processes import Processes
+from sim.run.launcher.swarm import free_endpoint
 
 MARK = "FANET_TEST_MARK"
 SMALL = "nodes = {count = 2}\nclusters = {count = 1}\nduration_s = %s\nwarmup_s = 0\ndrain_s = 0\n"

@@ -25,8 +25,8 @@ from fanet_mw.scenario import Scenario
 from fanet_mw.trace import ProcessEnded
 from fanet_mw.units import NodeId, S
 from sim.results.files import finish
+from sim.run.launcher.swarm import SwarmRun, launch
 from sim.run.outcome import Outcome
-from sim.run.swarm import SwarmRun, launch
 from sim.scenarios import catalog
 
 FAST = ["duration_s=5", "warmup_s=2", "drain_s=1", "clusters.flooding_period_s=0.5", "radio.lead_ms=150"]
@@ -202,8 +202,8 @@ def late_agent(*, node: int, **arguments: Any) -> int:
 def test_an_agent_that_is_late_to_start_is_waited_for_and_one_that_found_no_router_is_started_again(
     monkeypatch: pytest.MonkeyPatch,
 ) -> None:
-    monkeypatch.setattr("sim.run.services.run_agent", late_agent)
-    monkeypatch.setattr("sim.run.swarm.WORD_EVERY_S", 1.0)
+    monkeypatch.setattr("sim.run.launcher.services.run_agent", late_agent)
+    monkeypatch.setattr("sim.run.launcher.swarm.WORD_EVERY_S", 1.0)
     name = f"late-{uuid.uuid4().hex}"
     try:
         outcome, events = run(scenario(), swarm=name)
@@ -315,7 +315,7 @@ def test_services_started_one_by_one_make_a_swarm() -> None:
 
 
 def test_a_swarm_that_does_not_come_up_names_who_is_missing(monkeypatch: pytest.MonkeyPatch) -> None:
-    from sim.run import swarm as module
+    from sim.run.launcher import swarm as module
 
     monkeypatch.setattr(module, "READY_TIMEOUT_S", 1.0)
     monkeypatch.setattr(module, "expected_names", lambda _: ["emulator", "nobody"])

@@ -22,8 +22,8 @@ from fanet_mw.hosts.bus import Bus
 from fanet_mw.scenario import Scenario
 from fanet_mw.units import S
 from sim.results.files import finish
+from sim.run.launcher.swarm import SwarmRun, launch
 from sim.run.outcome import Outcome
-from sim.run.swarm import SwarmRun, launch
 from sim.scenarios import catalog
 
 SHORT = ["duration_s=4", "warmup_s=1", "drain_s=0.5", "clusters.flooding_period_s=0.5", "world.engine=kinematic",
@@ -159,7 +159,7 @@ def test_an_agent_that_is_started_again_after_a_step_of_the_clock_takes_part(
     step_s: float, monkeypatch: pytest.MonkeyPatch
 ) -> None:
     """Its process reads a unix clock that is off by the step; the swarm's time is handed to it."""
-    monkeypatch.setattr("sim.run.services.run_agent", partial(agent_after_a_step, step_s))
+    monkeypatch.setattr("sim.run.launcher.services.run_agent", partial(agent_after_a_step, step_s))
     outcome, summary = run(scenario("duration_s=6"), (2.0, send(signal.SIGKILL, "agent-4")), respawn=True)
     assert [name for name, _ in outcome.ended] == ["agent-4"], "once, because it was killed"
     assert about(summary, "agent-4 ended")

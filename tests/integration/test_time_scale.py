@@ -16,7 +16,7 @@ from fanet_mw.hosts.bus import Bus
 from fanet_mw.trace import Generated
 from fanet_mw.units import BROADCAST, S
 from sim.results.files import finish
-from sim.run.swarm import launch
+from sim.run.launcher.swarm import launch
 from sim.run.virtual import simulate
 from sim.scenarios import catalog
 

@@ -4,7 +4,7 @@ import pytest
 from hypothesis import given, settings
 from hypothesis import strategies as st
 
-from agents.traffic import sources_of
+from agents.applications.traffic import sources_of
 from fanet_mw import wire
 from fanet_mw.bounds import Bounded, Refused
 from fanet_mw.graph.topology import within_range

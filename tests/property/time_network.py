@@ -9,7 +9,7 @@ import math
 from collections.abc import Mapping, Sequence
 from random import Random
 
-from agents.local_clock import LocalClock
+from agents.clock.local_clock import LocalClock
 from fanet_mw.scenario import Clock
 from fanet_mw.timesync.clock_fit import Oscillator
 from fanet_mw.timesync.ftsp import Settings, TimeSync

@@ -29,7 +29,7 @@ def test_a_folder_that_cannot_be_written_is_found_before_the_run(
         pytest.fail("the run has begun")
 
     monkeypatch.setattr("sim.run.virtual.simulate", run)
-    monkeypatch.setattr("sim.run.swarm.launch", run)
+    monkeypatch.setattr("sim.run.launcher.swarm.launch", run)
     (tmp_path / "file").touch()
     for out in (tmp_path / "file", tmp_path / "file" / "below", Path("/proc/nowhere")):
         with pytest.raises(ConfigError, match=f"--out {out}: cannot be written: "):

@@ -5,7 +5,7 @@ from typing import Any
 
 import pytest
 
-from agents.clocked import make_uav
+from agents.clock.clocked_uav import make_uav
 from emulator.medium import Medium
 from fanet_mw.actor import Actor
 from fanet_mw.bus.messages import Message, TxRequest

@@ -5,7 +5,7 @@ from pathlib import Path
 
 import pytest
 
-from agents.autopilot import Autopilot
+from agents.applications.autopilot import Autopilot
 from fanet_mw import wire
 from fanet_mw.errors import ConfigError
 from fanet_mw.mavlink import Encoder

@@ -14,7 +14,7 @@ import pytest
 from hypothesis import given
 from hypothesis import strategies as st
 
-from agents.autopilot import Autopilot
+from agents.applications.autopilot import Autopilot
 from fanet_mw import mavlink, tlog, wire
 from fanet_mw.errors import LocalProtocolError, MalformedFrameError
 from fanet_mw.mavlink import Attitude, BatteryState, Encoder, Geodetic, Ned

@@ -1,0 +1,87 @@
+"""Collision avoidance as an application: it feeds a conflict monitor, and sends the monitor's warnings to all nodes.
+
+While it avoids another UAV, it objects to the courses of other applications.
+"""
+
+import math
+from collections.abc import Mapping
+from typing import Any, Final
+
+from agents.applications.conflicts import ConflictMonitor
+from fanet_mw import mavlink, wire
+from fanet_mw.application import Application, AppPort, Course, Received
+from fanet_mw.bus.messages import Gps
+from fanet_mw.errors import MalformedFrameError
+from fanet_mw.node.reader import decoded, packet_of
+from fanet_mw.routing.clustered.roles.position_updates import Motion
+from fanet_mw.scenario import Scenario
+from fanet_mw.trace import Warned
+from fanet_mw.units import MS, NodeId
+
+
+class CollisionAvoidance(Application):
+    """Warns other UAVs of collisions, and avoids them."""
+
+    name: Final = "warning"
+    listens = (mavlink.COLLISION_ID,)
+
+    def __init__(self, scenario: Scenario, node: NodeId) -> None:
+        self._monitor = ConflictMonitor(scenario, node)
+        self._encoder = mavlink.Encoder(node)
+        self._bad_positions = 0
+        """The number of hellos whose position is missing, or not of the present."""
+
+    def on_hello(self, frame: bytes, now_ns: int) -> None:
+        """Take in where a neighbor flies, from its hello."""
+        try:
+            origin = packet_of(frame).origin
+            heard = decoded(frame, mavlink.kinematics_of)
+        except MalformedFrameError:
+            self._bad_positions += 1
+            return
+        if not self._monitor.on_hello(origin, Motion(heard.position, heard.velocity, heard.t_ms * MS), now_ns=now_ns):
+            self._bad_positions += 1
+
+    def on_message(self, message: Received, now_ns: int) -> None:
+        """Take in a warning of another UAV, which may be for this one."""
+        warning = mavlink.collision_of(message.frame)
+        self._monitor.on_warning(message.origin, warning, self._motion(now_ns), born_ns=message.born_ns, now_ns=now_ns)
+        self.port.tap(message.frame)
+        self._hand_over(now_ns)
+
+    def on_fix(self, fix: Gps, now_ns: int) -> None:
+        self._monitor.on_fix(self._motion(now_ns))
+        self._hand_over(now_ns)
+
+    def permits(self, course: Course, now_ns: int) -> bool:
+        return self._monitor.permits(course)
+
+    def report(self) -> Mapping[str, Any]:
+        return {"bad_positions": self._bad_positions}
+
+    def _motion(self, now_ns: int) -> Motion:
+        return Motion(self.port.position, self.port.velocity, now_ns)
+
+    def _hand_over(self, now_ns: int) -> None:
+        """Pass on what the monitor has put out: records, warnings, and a course."""
+        monitor, port = self._monitor, self.port
+        _record(monitor, port)
+        warnings, monitor.warnings = monitor.warnings, []
+        for other, approach in warnings:
+            inner = self._encoder.collision(
+                other,
+                closest_s=approach.closest_s,
+                altitude_m=abs(approach.apart.up),
+                horizontal_m=math.hypot(approach.apart.east, approach.apart.north),
+            )
+            handle = port.send(inner, priority=wire.PRIORITY_SAFETY)
+            port.record(Warned(now_ns, port.node, other, handle))
+        if monitor.course is not None:
+            port.fly(monitor.course)
+            monitor.course = None
+
+
+def _record(monitor: ConflictMonitor, port: AppPort) -> None:
+    for record in monitor.records:
+        port.record(record)
+    monitor.records.clear()

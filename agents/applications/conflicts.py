@@ -1,0 +1,220 @@
+"""Collision avoidance of one UAV: which UAVs it is in conflict with, which to warn, and how to fly until that is past.
+
+    own fixes, others' hellos     -> closest approach too near and too soon -> warn the other, change height
+    a warning that names this UAV -> the same, even if the other UAV is not received
+    far enough, sideways          -> the course as before
+
+Heights need no agreement, only ids: for each other UAV a UAV goes one level up if its own id is the lower one, else one
+down. So two always part, of three in conflict with each other no two share a level, and a warning need not say which
+way its sender goes. A level is the distance to be kept. Sans-IO.
+
+Both are assumed to fly on sideways as they did. Not modeled: turns that the other UAV has planned, and conflicts that
+the change of height itself causes until the next hello shows them.
+"""
+
+import math
+from dataclasses import dataclass
+from typing import Final, NamedTuple
+
+from fanet_mw.application import HOME, Course
+from fanet_mw.closest_approach import ClosestApproach, closest
+from fanet_mw.mavlink import Collision
+from fanet_mw.routing.clustered.roles.position_updates import Motion
+from fanet_mw.scenario import Scenario
+from fanet_mw.trace import ConflictForeseen, ConflictOver, Record
+from fanet_mw.units import MS, Enu, NodeId, S, seconds_to_ns
+
+_LIFETIME_HELLOS: Final = 3.5
+"""The position of another UAV is used for this many hello intervals."""
+_FUTURE_NS: Final = S
+"""A position from further in the future than this is invalid, because clocks agree better than that."""
+_CLEAR: Final = 1.5
+"""A conflict is over when the two will stay this many times farther apart sideways than they must."""
+_PAST_NS: Final = 3 * S
+"""The time after the closest approach to a UAV known only by its warning, after which the conflict is over."""
+_CLIMB_M_S: Final = 4.0
+"""The comfortable climb rate of a small multirotor."""
+_LEVELS: Final = 2
+"""The most levels up or down, for which `nodes.altitude_m` has room."""
+_AHEAD_S: Final = 10.0
+"""How far ahead setpoints lie: the farther, the less does the error of a fix turn the course that others receive."""
+_SOON_S: Final = 2.0
+"""The time in which a height or a goal is approached when it is near."""
+_LEAST_M_S: Final = 0.5
+_EVER_S: Final = 1e6
+
+
+class Alert(NamedTuple):
+    """A warning for another UAV."""
+
+    other: NodeId
+    approach: ClosestApproach
+
+
+@dataclass
+class _Threat:
+    """One other UAV that this UAV avoids."""
+
+    until_ns: int
+    """When the conflict will be past, as far as is known without receiving the other UAV."""
+    warned_ns: int | None = None
+    """When either of the two last warned the other."""
+
+
+@dataclass
+class _Avoidance:
+    """The height and velocity that the UAV flew when avoidance began."""
+
+    up_m: float
+    velocity: Enu
+
+
+class ConflictMonitor:
+    """Detects conflicts of one UAV with others, and avoids them."""
+
+    def __init__(self, scenario: Scenario, node: NodeId) -> None:
+        mission = scenario.mission
+        self._node = node
+        self._horizon_s = mission.collision_horizon_s
+        self._distance_m = mission.collision_distance_m
+        self._clear_m = _CLEAR * mission.collision_distance_m
+        self._repeat_ns = seconds_to_ns(mission.collision_repeat_s)
+        self._lifetime_ns = round(_LIFETIME_HELLOS * scenario.routing.hello_interval_s * S)
+        self.records: list[Record] = []
+        self.warnings: list[Alert] = []
+        self.course: Course | None = None
+        """A new course to fly, to be taken by the host."""
+        self._others: dict[NodeId, Motion] = {}
+        self._threats: dict[NodeId, _Threat] = {}
+        self._avoidance: _Avoidance | None = None
+        self._wanted: Course | None = None
+        """The mission's course; None when the UAV flies in formation."""
+
+    # --- input ----------------------------------------------------------------------------------------------------
+
+    def on_hello(self, node: NodeId, motion: Motion, *, now_ns: int) -> bool:
+        """Take in where another UAV flies, from its hello; False when that is too old to be used, or in the future."""
+        if not now_ns - self._lifetime_ns <= motion.at_ns <= now_ns + _FUTURE_NS:
+            return False
+        self._others[node] = motion
+        return True
+
+    def on_warning(self, origin: NodeId, warning: Collision, own: Motion, *, born_ns: int, now_ns: int) -> None:
+        """Take in the warning of another UAV, and avoid that UAV if the warning names this one."""
+        left_ns = born_ns + round(min(warning.closest_s, _EVER_S) * S) - now_ns
+        if warning.other != self._node or origin == self._node or left_ns > seconds_to_ns(self._horizon_s):
+            return
+        if warning.horizontal_m > self._clear_m:
+            return
+        threat = self._threats.get(origin)
+        if threat is None:
+            if left_ns <= 0:
+                return  # the approach was past before the warning came
+            threat = self._avoid(origin, own, now_ns + left_ns)
+            distance_m = math.hypot(warning.altitude_m, warning.horizontal_m)
+            self._record_conflict(origin, left_ns, distance_m, told=True, now_ns=now_ns)
+        threat.warned_ns = max(born_ns, threat.warned_ns or 0)
+        threat.until_ns = max(threat.until_ns, now_ns + left_ns)
+        self._fly(own)
+
+    def on_fix(self, own: Motion) -> None:
+        """Take in a fix of this UAV, and examine all other UAVs."""
+        now_ns = own.at_ns
+        self._others = {n: m for n, m in self._others.items() if now_ns - m.at_ns <= self._lifetime_ns}
+        for node in sorted(self._others):
+            self._examine(node, own)
+        for node in sorted(self._threats):
+            if self._is_over(node, own):
+                del self._threats[node]
+                self.records.append(ConflictOver(now_ns, self._node, node))
+        self._fly(own)
+
+    def permits(self, course: Course) -> bool:
+        """Note the course that the mission has chosen; True when it may be flown now."""
+        self._wanted = None if course.speed_m_s == HOME else course
+        return self._avoidance is None
+
+    # --- conflicts ------------------------------------------------------------------------------------------------
+
+    def _examine(self, node: NodeId, own: Motion) -> None:
+        """Examine one other UAV: is there a conflict, and is a warning due?"""
+        now_ns = own.at_ns
+        threat = self._threats.get(node)
+        approach = min((self._approach(node, course) for course in self._courses(own)), key=lambda a: a.distance_m)
+        if threat is not None:  # the conflict may be solved by height already
+            if 0 < approach.closest_s < self._horizon_s and approach.distance_m < self._clear_m:
+                threat.until_ns = now_ns + round(approach.closest_s * S)
+                self._warn(node, threat, approach, now_ns)
+        elif approach.closest_s > 0 and approach.distance_m < self._distance_m:
+            left_ns = round(approach.closest_s * S)
+            threat = self._avoid(node, own, now_ns + left_ns)
+            self._record_conflict(node, left_ns, approach.distance_m, told=False, now_ns=now_ns)
+            self._warn(node, threat, approach, now_ns)
+
+    def _approach(self, node: NodeId, own: Motion) -> ClosestApproach:
+        other = self._others[node]
+        apart = other.position_at(own.at_ns).minus(own.position)
+        return closest(apart, other.velocity.minus(own.velocity), within_s=self._horizon_s)
+
+    def _courses(self, own: Motion) -> list[Motion]:
+        """The courses to examine: the own one; while avoiding, level flight at the present and at the former height."""
+        if self._avoidance is None:
+            return [own]
+        level = own._replace(velocity=_level(own.velocity))
+        here = own.position
+        return [level, level._replace(position=Enu(here.east, here.north, self._avoidance.up_m))]
+
+    def _record_conflict(self, node: NodeId, left_ns: int, distance_m: float, *, told: bool, now_ns: int) -> None:
+        record = ConflictForeseen(now_ns, self._node, node, round(left_ns / MS), round(distance_m, 2), told)
+        self.records.append(record)
+
+    def _warn(self, node: NodeId, threat: _Threat, approach: ClosestApproach, now_ns: int) -> None:
+        """Warn the other UAV, unless either of the two has warned a moment ago: both warnings would say the same."""
+        if threat.warned_ns is None or now_ns - threat.warned_ns >= self._repeat_ns:
+            threat.warned_ns = now_ns
+            self.warnings.append(Alert(node, approach))
+
+    def _is_over(self, node: NodeId, own: Motion) -> bool:
+        other = self._others.get(node)
+        if other is None:
+            return own.at_ns > self._threats[node].until_ns + _PAST_NS
+        sideways = _level(other.position_at(own.at_ns).minus(own.position))
+        approach = closest(sideways, _level(other.velocity.minus(own.velocity)), within_s=_EVER_S)
+        return approach.distance_m > self._clear_m
+
+    # --- avoiding -------------------------------------------------------------------------------------------------
+
+    def _avoid(self, node: NodeId, own: Motion, until_ns: int) -> _Threat:
+        if self._avoidance is None:
+            self._avoidance = _Avoidance(own.position.up, _level(own.velocity))
+        threat = self._threats[node] = _Threat(until_ns)
+        return threat
+
+    def _fly(self, own: Motion) -> None:
+        """Choose the next setpoint: on as before at the height that keeps distance, or back to the course."""
+        before = self._avoidance
+        if before is None:
+            return
+        if not self._threats:
+            self._avoidance = None
+            self.course = self._wanted or Course(own.position, HOME)
+            return
+        levels = sum(1 if node > self._node else -1 for node in self._threats)
+        level_m = before.up_m + max(-_LEVELS, min(_LEVELS, levels)) * self._distance_m
+        climb_m_s = max(-_CLIMB_M_S, min(_CLIMB_M_S, (level_m - own.position.up) / _SOON_S))
+        velocity = (self._sideways(own.position) or before.velocity)._replace(up=climb_m_s)
+        ahead = Motion(own.position, velocity, 0).position_at(round(_AHEAD_S * S))
+        self.course = Course(ahead, max(_LEAST_M_S, velocity.norm()))
+
+    def _sideways(self, here: Enu) -> Enu | None:
+        """The horizontal velocity towards the mission's goal; None without a goal."""
+        if self._wanted is None:
+            return None
+        way = _level(self._wanted.position.minus(here))
+        speed_m_s = min(self._wanted.speed_m_s, way.norm() / _SOON_S)
+        scale = speed_m_s / max(way.norm(), 1e-9)
+        return Enu(way.east * scale, way.north * scale, 0.0)
+
+
+def _level(vector: Enu) -> Enu:
+    return Enu(vector.east, vector.north, 0.0)

@@ -1,0 +1,27 @@
+"""Telemetry as an application: what the flight controller says of itself, on the node's MAVLink tap."""
+
+from typing import Final
+
+from agents.applications.autopilot import Autopilot
+from fanet_mw.application import Application, AppPort
+
+
+class Telemetry(Application):
+    """One UAV's telemetry."""
+
+    name: Final = "telemetry"
+
+    def __init__(self, autopilot: Autopilot) -> None:
+        self._autopilot = autopilot
+
+    def start(self, port: AppPort, now_ns: int) -> None:
+        super().start(port, now_ns)
+        self._autopilot.start(now_ns)
+
+    def wake(self, now_ns: int) -> None:
+        frames = self._autopilot.telemetry(now_ns)
+        if frames:
+            self.port.tap(frames)
+
+    def next_wake_ns(self) -> int | None:
+        return self._autopilot.next_due_ns()

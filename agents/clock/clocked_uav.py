@@ -1,0 +1,253 @@
+"""A UAV with a clock of its own: every instant between it and its host is translated.
+
+    host: true time  |  own clock (`local_clock`)  |  swarm time as this node believes it (`swarm_time`)  |  UAV
+
+The UAV lives in swarm time as it believes it; receptions and statuses reach it as stamped by its radio's own clock. Its
+requests leave in true time, and so do its trace records, because delays are measured across nodes. A clock that turns
+out to have been ahead stands still until swarm time has caught up. Until a node has swarm time no schedule reaches it:
+it owns no slot, and contends.
+"""
+
+from collections.abc import Callable, Mapping, Sequence
+from typing import Any, Final
+
+from agents.clock.local_clock import LocalClock
+from agents.clock.swarm_time import SwarmTime, swarm_time
+from agents.mission.navigation.onboard_map import NO_MAP, OnboardMap
+from agents.uav import NodeState, Uav
+from fanet_mw import wire
+from fanet_mw.actor import Actor
+from fanet_mw.application import Application
+from fanet_mw.bus.messages import (
+    Gps,
+    MavlinkTap,
+    Message,
+    Reception,
+    SensorReading,
+    Setpoint,
+    TxRequest,
+    TxStatus,
+)
+from fanet_mw.node.node import AnnouncedHello
+from fanet_mw.scenario import Scenario
+from fanet_mw.trace import ClockSampled, Record
+from fanet_mw.units import US, Enu, NodeId, S
+from fanet_mw.wire import Kind
+
+_SAMPLE_NS: Final = S
+"""The interval at which the true error is recorded."""
+_ROUNDING_NS: Final = 2 * US
+"""An instant that has gone to the host and back may differ by this much; a wake-up within it counts as due."""
+
+
+class _TimeInHellos:
+    """Adds swarm time to the hellos of one UAV (`agents.hello_schedule.HelloTime`)."""
+
+    def __init__(self, time: SwarmTime, local_now_ns: Callable[[], int]) -> None:
+        self._time = time
+        self._local_now_ns = local_now_ns
+
+    def frames(self) -> bytes:
+        return self._time.hello_frames(self._local_now_ns())
+
+    def announced(self, hello: AnnouncedHello) -> None:
+        self._time.announced(hello)
+
+
+class ClockedUav(Actor):
+    """One UAV behind a clock of its own."""
+
+    def __init__(
+        self,
+        scenario: Scenario,
+        node: NodeId,
+        swarm: str,
+        *,
+        position: Enu,
+        applications: Sequence[Application] = (),
+        onboard_map: OnboardMap = NO_MAP,
+    ) -> None:
+        self._clock = LocalClock(scenario.clock, seed=scenario.seed, node=node)
+        self._time = swarm_time(scenario, node)
+        self._uav = Uav(
+            scenario,
+            node,
+            swarm,
+            position=position,
+            applications=applications,
+            onboard_map=onboard_map,
+            hello_time=_TimeInHellos(self._time, self._local_now_ns) if self._time.in_hellos else None,
+        )
+        super().__init__(self._uav.name, self._uav.subscriptions)
+        self._node = node
+        self._stamp_ns = scenario.clock.stamp_ns
+        self._until_ns = scenario.duration_ns
+        self._input_ns = 0
+        """The true instant of the input that is being handled."""
+        self._shown_ns = 0
+        """Swarm time as it was last given to the UAV; it never goes back."""
+        self._sample_ns = 0
+        self._withheld = 0
+        """The number of schedules that came before there was swarm time."""
+
+    # --- the actor contract ---------------------------------------------------------------------------------------
+
+    def start(self, now_ns: int) -> None:
+        self._uav.outbox, self._uav.records = [], []
+        self._sample_ns = -(-now_ns // _SAMPLE_NS) * _SAMPLE_NS
+        self._begin(now_ns)
+        self._time.start(self._clock.local_ns(now_ns))
+        self._uav.start(self._now(now_ns))
+        self._hand_over(now_ns)
+
+    def receive(self, topic: str, message: Message, now_ns: int) -> None:
+        self._begin(now_ns)
+        translated = self._translated(message, now_ns)
+        if translated is not None:
+            self._uav.receive(topic, translated, self._now(now_ns))
+        known = {translated.end_ns: message.end_ns} if isinstance(translated, Reception) else {}  # type: ignore[union-attr]
+        self._hand_over(now_ns, known)
+
+    def wake(self, now_ns: int) -> None:
+        self._begin(now_ns)
+        self._time.pass_time(self._clock.local_ns(now_ns))
+        while self._sample_ns <= now_ns:
+            self._sample(self._sample_ns)
+            self._sample_ns += _SAMPLE_NS
+        wanted_ns, shown_ns = self._uav.next_wake_ns(), self._now(now_ns)
+        if wanted_ns is not None and wanted_ns <= shown_ns + _ROUNDING_NS:
+            self._shown_ns = max(shown_ns, wanted_ns)
+            self._uav.wake(self._shown_ns)
+        self._hand_over(now_ns)
+
+    def nudge(self, now_ns: int) -> None:
+        self._begin(now_ns)
+        self._uav.nudge(self._now(now_ns))
+        self._hand_over(now_ns)
+
+    def state(self, now_ns: int) -> NodeState:
+        """What the node knows of the network."""
+        return self._uav.state(self._now(now_ns))
+
+    def next_wake_ns(self) -> int | None:
+        wanted_ns = self._uav.next_wake_ns()
+        if wanted_ns is None:
+            return self._sample_ns
+        return min(self._sample_ns, self._true_ns(wanted_ns))
+
+    def stop(self, now_ns: int) -> None:
+        self._uav.stop(self._now(now_ns))
+        self._hand_over(now_ns)
+
+    def report(self) -> Mapping[str, Any]:
+        local_ns = self._clock.local_ns(self._sample_ns - _SAMPLE_NS)
+        bound_ns = self._time.error_ns(local_ns)
+        clock = {
+            "synced": self._time.synced,
+            "bound_us": None if bound_ns is None else bound_ns / US,
+            "worst_us": self._time.worst_ns(local_ns) / US,
+            "withheld": self._withheld,
+            **self._time.report(),
+        }
+        return {**self._uav.report(), "clock": clock}
+
+    # --- instants -------------------------------------------------------------------------------------------------
+
+    def _begin(self, now_ns: int) -> None:
+        """An input has come at this true instant."""
+        self._input_ns = now_ns
+        self._clock.pass_time(now_ns, until_ns=self._until_ns)
+
+    def _local_now_ns(self) -> int:
+        """What the own clock shows while an input is being handled."""
+        return self._clock.local_ns(self._input_ns)
+
+    def _now(self, now_ns: int) -> int:
+        """Swarm time now, as the UAV is given it."""
+        swarm_ns = self._time.line.swarm_ns(self._clock.local_ns(now_ns))
+        self._shown_ns = max(self._shown_ns, swarm_ns)
+        return self._shown_ns
+
+    def _true_ns(self, swarm_ns: int) -> int:
+        return self._clock.true_ns(self._time.line.local_ns(swarm_ns))
+
+    def _stamped_ns(self, true_ns: int) -> int:
+        """What the radio's clock shows at that instant."""
+        return self._clock.local_ns(true_ns) // self._stamp_ns * self._stamp_ns
+
+    # --- in -------------------------------------------------------------------------------------------------------
+
+    def _translated(self, message: Message, now_ns: int) -> Message | None:
+        """A message as the UAV is to receive it; None when it is to receive nothing."""
+        if isinstance(message, Reception):
+            ended_ns = self._stamped_ns(message.end_ns)
+            kind = wire.peek_kind(message.frame)
+            if kind == Kind.HELLO:
+                self._time.on_hello(message.frame, ended_ns=ended_ns, local_ns=self._clock.local_ns(now_ns))
+            elif kind == Kind.SCHEDULE and not self._time.synced:
+                self._withheld += 1
+                return None
+            return message._replace(end_ns=self._time.line.swarm_ns(ended_ns))
+        if isinstance(message, TxStatus):
+            ended_ns = self._stamped_ns(message.end_ns)
+            if self._time.on_status(message, ended_ns=ended_ns):
+                return None
+            return message._replace(end_ns=self._time.line.swarm_ns(ended_ns))
+        if isinstance(message, Gps):
+            self._time.fix(self._stamped_ns(message.t_ns), message.t_ns)
+        if isinstance(message, Gps | SensorReading):
+            return message._replace(t_ns=self._time.line.swarm_ns(self._stamped_ns(message.t_ns)))
+        return message
+
+    # --- out ------------------------------------------------------------------------------------------------------
+
+    def _hand_over(self, now_ns: int, known: Mapping[int, int] | None = None) -> None:
+        """Take over what the UAV has put out; `known` maps instants given to the UAV to their true instants."""
+        uav = self._uav
+        for topic, message in uav.outbox:
+            if type(message) is TxRequest:
+                self.outbox.append((topic, self._request(message, now_ns)))
+            elif isinstance(message, Setpoint | MavlinkTap):
+                self.outbox.append((topic, message._replace(t_ns=now_ns)))
+            else:
+                self.outbox.append((topic, message))
+        uav.outbox.clear()
+        if uav.records:
+            at = {self._shown_ns: now_ns, **(known or {})}
+            self.records += [self._recorded(record, at) for record in uav.records]
+            uav.records.clear()
+
+    def _recorded(self, record: Record, at: Mapping[int, int]) -> Record:
+        true_ns = at.get(record.t_ns)
+        return record._replace(t_ns=self._true_ns(record.t_ns) if true_ns is None else true_ns)
+
+    def _request(self, request: TxRequest, now_ns: int) -> TxRequest:
+        start_ns = self._true_ns(request.start_ns)
+        if 0 < now_ns - start_ns <= _ROUNDING_NS:
+            start_ns = now_ns
+        return request._replace(start_ns=start_ns)
+
+    def _sample(self, at_ns: int) -> None:
+        """Record the true error, and let the protocol know how wrong clocks may be."""
+        local_ns = self._clock.local_ns(at_ns)
+        bound_ns = self._time.error_ns(local_ns)
+        reference, hops = self._time.place(local_ns)
+        ahead_ns = self._time.line.swarm_ns(local_ns) - at_ns
+        self.records.append(
+            ClockSampled(at_ns, self._node, ahead_ns, -1 if bound_ns is None else bound_ns, reference, hops)
+        )
+        self._uav.know_clock_error(self._time.worst_ns(local_ns))
+
+
+def make_uav(
+    scenario: Scenario,
+    node: NodeId,
+    swarm: str,
+    *,
+    position: Enu,
+    applications: Sequence[Application] = (),
+    onboard_map: OnboardMap = NO_MAP,
+) -> Uav | ClockedUav:
+    """A UAV as the scenario has it, with its host's clock or one of its own, a user's applications, a map."""
+    kind = ClockedUav if scenario.clock.modelled else Uav
+    return kind(scenario, node, swarm, position=position, applications=applications, onboard_map=onboard_map)

@@ -1,0 +1,70 @@
+"""When a UAV says hello, and whom it has heard say hello lately."""
+
+from typing import Final, Protocol
+
+from fanet_mw.node.node import AnnouncedHello, Node
+from fanet_mw.rng import stream
+from fanet_mw.scenario import Scenario
+from fanet_mw.units import NodeId, seconds_to_ns
+
+_JITTER: Final = 0.1
+"""A hello varies by this share of its interval, so that neighbors in step do not stay so (RFC 3626, 3.4)."""
+_LIFETIME_HELLOS: Final = 4
+"""A node that has not been heard for so many hello intervals is no neighbor any more."""
+
+
+class HelloTime(Protocol):
+    """What adds swarm time to the hellos of a node."""
+
+    def frames(self) -> bytes:
+        """The inner frames for the hello that is said now; empty while there is no time to tell."""
+
+    def announced(self, hello: AnnouncedHello) -> None:
+        """That hello was announced to the radio, which will tell when it has ended."""
+
+
+class HelloSchedule:
+    """The hellos of one UAV, and those that it hears."""
+
+    def __init__(self, scenario: Scenario, node: Node, time: HelloTime | None) -> None:
+        """`time`: what the hellos say of the time; None: nothing."""
+        self._node = node
+        self._time = time
+        self._lead_ns = scenario.radio.lead_ns
+        self._interval_ns = seconds_to_ns(scenario.routing.hello_interval_s)
+        self._random = stream(scenario.seed, "hello", node.node).random
+        self._next_ns: int | None = None
+        """When the next hello goes; None: none does."""
+        self._heard_ns: dict[NodeId, int] = {}
+        """When a hello of each other node was heard last."""
+
+    def start(self, now_ns: int) -> None:
+        """The UAV is up: its first hello comes at a random instant of the first interval."""
+        if self._interval_ns:
+            self._next_ns = now_ns + self._lead_ns + int(self._random() * self._interval_ns)
+
+    def due_ns(self) -> int | None:
+        """When the next hello has to be announced to the radio."""
+        return None if self._next_ns is None else self._next_ns - self._lead_ns
+
+    def say(self, inner: bytes, now_ns: int) -> None:
+        """Say the hello that is due, with these frames before what the protocol and the clock add."""
+        assert self._next_ns is not None, "a hello is said when it is due"
+        start_ns, time = max(self._next_ns, now_ns), self._time
+        if time is None:
+            self._node.say_hello(inner, start_ns=start_ns, now_ns=now_ns)
+        else:
+            time.announced(self._node.say_hello(inner, start_ns=start_ns, now_ns=now_ns, time=time.frames()))
+        vary = 1 + _JITTER * (2 * self._random() - 1)
+        step_ns = int(self._interval_ns * vary * self._node.hello_share(now_ns))
+        self._next_ns = max(self._next_ns + step_ns, now_ns)
+
+    def on_hello(self, sender: NodeId, now_ns: int) -> None:
+        """Take in that a neighbor has said hello."""
+        self._heard_ns[sender] = now_ns
+
+    def neighbors(self, now_ns: int) -> tuple[NodeId, ...]:
+        """The nodes heard lately, by id."""
+        lifetime_ns = _LIFETIME_HELLOS * self._interval_ns
+        self._heard_ns = {node: t_ns for node, t_ns in self._heard_ns.items() if now_ns - t_ns <= lifetime_ns}
+        return tuple(sorted(self._heard_ns))

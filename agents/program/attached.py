@@ -1,0 +1,188 @@
+"""How the node of a program takes part in a swarm: over the emulated radio, or on a real one.
+
+    Emulated   Zenoh session -> host -> UAV
+    OnAir      UDP socket, and a router that keeps the clock or an epoch -> host -> UAV
+
+The task that runs the host ends with the block; when the host ends first (the time is over, the router is gone, the UAV
+raised), whoever waits for the node is told.
+"""
+
+import asyncio
+import contextlib
+from collections.abc import AsyncIterator, Mapping, Sequence
+from dataclasses import dataclass
+from pathlib import Path
+from typing import Any, Final, Protocol, TypeVar
+
+from agents.clock.clocked_uav import ClockedUav, make_uav
+from agents.uav import NodeState, Uav
+from fanet_mw.application import Application
+from fanet_mw.bus.topics import Topics
+from fanet_mw.errors import BusError, ConfigError
+from fanet_mw.hosts.bus import Bus, config_of
+from fanet_mw.hosts.clock import START_PATIENCE_S
+from fanet_mw.hosts.realtime import RealtimeHost
+from fanet_mw.radios.field_bus import FieldBus, joined
+from fanet_mw.radios.udp import PORT, UdpRadio
+from fanet_mw.scenario import Scenario
+from fanet_mw.units import Enu, NodeId, S
+
+T = TypeVar("T")
+_POLL_S: Final = 0.01
+_PATIENCE_S: Final = 10.0
+"""Longer than for a person at a terminal: on a busy machine a handshake may take seconds."""
+_ORIGIN: Final = Enu(0.0, 0.0, 0.0)
+
+
+class NodeClosedError(BusError):
+    """The node's time in the swarm is over: nothing is sent or received any more."""
+
+
+class Drive(Protocol):
+    """What moves the time of a joined node."""
+
+    def nudge(self) -> None:
+        """The UAV has something to do."""
+
+    def now_ns(self) -> int: ...
+
+    def state(self) -> NodeState:
+        """What the node knows of the network."""
+
+    def report(self) -> Mapping[str, Any]:
+        """The counters of the UAV."""
+
+    async def wait(self, future: asyncio.Future[T]) -> T:
+        """Wait for something that the host brings about; raises when it cannot come any more."""
+
+
+class Radio(Protocol):
+    """How a node is joined to a swarm."""
+
+    def attach(
+        self, scenario: Scenario, node: NodeId, applications: Sequence[Application]
+    ) -> contextlib.AbstractAsyncContextManager[Drive]: ...
+
+
+class _RealTime:
+    """Real time: the host runs in a task of its own."""
+
+    def __init__(self, uav: Uav | ClockedUav, host: RealtimeHost, task: asyncio.Task[None]) -> None:
+        self._uav = uav
+        self._host = host
+        self._task = task
+
+    def nudge(self) -> None:
+        self._host.nudge()
+
+    def now_ns(self) -> int:
+        return self._host.now_ns()
+
+    def state(self) -> NodeState:
+        return self._uav.state(self._host.now_ns())
+
+    def report(self) -> Mapping[str, Any]:
+        return self._uav.report()
+
+    async def wait(self, future: asyncio.Future[T]) -> T:
+        try:
+            await asyncio.wait((future, self._task), return_when=asyncio.FIRST_COMPLETED)
+            if future.done():
+                return future.result()
+        finally:
+            future.cancel()
+        if not self._task.cancelled():
+            self._task.result()  # raises what ended the host
+        raise NodeClosedError("the swarm's time is over")
+
+
+@contextlib.asynccontextmanager
+async def _running(uav: Uav | ClockedUav, host: RealtimeHost, scenario: Scenario) -> AsyncIterator[Drive]:
+    """A host in a task; yields when its UAV has been started, and ends it whatever happens."""
+    task = asyncio.ensure_future(
+        host.run(until_ns=scenario.duration_ns, clock_timeout_s=START_PATIENCE_S, scenario=scenario)
+    )
+    try:
+        while not host.running:
+            if task.done():
+                task.result()
+                raise NodeClosedError("the swarm's time was over before the node had joined")
+            await asyncio.wait((task,), timeout=_POLL_S)
+        yield _RealTime(uav, host, task)
+    finally:
+        task.cancel()
+        with contextlib.suppress(asyncio.CancelledError, BusError):
+            await task
+
+
+@dataclass(frozen=True)
+class Emulated:
+    """The emulated radio of a swarm whose Zenoh router listens on an endpoint."""
+
+    endpoint: str = "tcp/127.0.0.1:7447"
+    swarm: str | None = None
+    """By default the scenario's name."""
+    zenoh_config: Path | None = None
+    patience_s: float = _PATIENCE_S
+    """How long the router is waited for."""
+    position: Enu = _ORIGIN
+    """Where the node is until its first fix."""
+
+    @contextlib.asynccontextmanager
+    async def attach(
+        self, scenario: Scenario, node: NodeId, applications: Sequence[Application]
+    ) -> AsyncIterator[Drive]:
+        swarm = self.swarm or scenario.name
+        uav = make_uav(scenario, node, swarm, position=self.position, applications=applications)
+        file = config_of(self.zenoh_config, uav.name)
+        bus = await asyncio.to_thread(Bus.join, self.endpoint, file, patience_s=self.patience_s)
+        with bus:
+            async with _running(uav, RealtimeHost(uav, bus, Topics(swarm)), scenario) as drive:
+                yield drive
+
+
+@dataclass(frozen=True)
+class OnAir:
+    """A real radio: UDP broadcasts on an ad hoc interface."""
+
+    address: str
+    broadcast: str
+    port: int = PORT
+    epoch_unix_s: float | None = None
+    """Unix time of swarm instant 0, for a node without a router; clocks agree by GPS or NTP."""
+    endpoint: str | None = None
+    """Zenoh endpoint of a router that keeps the swarm's clock; None: there is no router."""
+    swarm: str | None = None
+    zenoh_config: Path | None = None
+    position: Enu = _ORIGIN
+
+    @contextlib.asynccontextmanager
+    async def attach(
+        self, scenario: Scenario, node: NodeId, applications: Sequence[Application]
+    ) -> AsyncIterator[Drive]:
+        uav = make_uav(scenario, node, self.swarm or scenario.name, position=self.position, applications=applications)
+        async with self.opened(uav, scenario, node) as (host, _), _running(uav, host, scenario) as drive:
+            yield drive
+
+    @contextlib.asynccontextmanager
+    async def opened(
+        self, uav: Uav | ClockedUav, scenario: Scenario, node: NodeId
+    ) -> AsyncIterator[tuple[RealtimeHost, UdpRadio]]:
+        """The host of a UAV and its radio, which is open within the block; the caller runs the host."""
+        if (self.epoch_unix_s is None) == (self.endpoint is None):
+            raise ConfigError("a real radio needs epoch_unix_s or endpoint, and not both: one of them keeps the clock")
+        names = Topics(self.swarm or scenario.name)
+        epoch_unix_ns = None if self.epoch_unix_s is None else round(self.epoch_unix_s * S)
+        with joined(self.endpoint, config_of(self.zenoh_config, uav.name)) as inner:
+            bus = FieldBus(names, node, inner=inner, epoch_unix_ns=epoch_unix_ns)
+            host = RealtimeHost(uav, bus, names)
+            radio = UdpRadio(
+                node, address=self.address, broadcast=self.broadcast, port=self.port,
+                max_frame_bytes=scenario.radio.max_frame_bytes, now_ns=host.now_ns, on_message=bus.on_radio,
+            )  # fmt: skip
+            bus.use(radio)
+            await radio.open()
+            try:
+                yield host, radio
+            finally:
+                radio.close()

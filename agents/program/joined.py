@@ -1,0 +1,173 @@
+"""A node of a swarm in a program of one's own: `async with join(scenario, node=3) as node:`.
+
+    join -> the UAV of that id, and a mailbox among its applications -> a host (`attached.py`)
+    node.send(...)          mailbox -> port.send; the host is told to look, and what became of it comes back
+    async for message       what the mailbox was given
+
+Over Zenoh, over UDP or in virtual time: which, is said by one argument.
+"""
+
+import asyncio
+import contextlib
+from collections.abc import AsyncIterator, Collection, Iterable, Mapping, Sequence
+from pathlib import Path
+from typing import Any, Final, Self
+
+from agents.program.attached import Drive, Emulated, NodeClosedError, Radio
+from agents.program.mailbox import Mailbox, Message, Sent
+from fanet_mw import mavlink
+from fanet_mw.application import Application, Data
+from fanet_mw.errors import ConfigError, LocalProtocolError
+from fanet_mw.scenario import Scenario, config
+from fanet_mw.units import BROADCAST, MS, Enu, NodeId, S, seconds_to_ns
+from fanet_mw.wire import PRIORITIES
+
+ALL: Final = "all"
+
+
+class Node:
+    """A node that a program has joined."""
+
+    def __init__(self, scenario: Scenario, node: NodeId, drive: Drive, mailbox: Mailbox) -> None:
+        self.id = node
+        self.scenario = scenario
+        self._drive = drive
+        self._mailbox = mailbox
+
+    async def send(
+        self,
+        content: object,
+        *,
+        to: int | Iterable[int] | str = ALL,
+        port: int | None = None,
+        priority: str = "bulk",
+        confirm: bool | None = None,
+        lifetime_s: float | None = None,
+        deadline_s: float | None = None,
+    ) -> Sent:
+        """Send bytes to a port, or a MAVLink message (of pymavlink, or as frames), and wait for what becomes of it.
+
+        By default a message to all is let out and no more; any other is confirmed: sent again until all its targets
+        have it, or `lifetime_s` is over. Raises ConfigError (a ValueError) for what cannot be sent, NodeClosedError
+        when the node's time is over, and BusError when the router is gone.
+        """
+        if priority not in PRIORITIES:
+            raise ConfigError(f"priority = {priority!r} must be one of {', '.join(PRIORITIES)}")
+        destination = _destination(to)
+        confirmed = destination != BROADCAST if confirm is None else confirm
+        body = _body(content, port, self.id)
+        future: asyncio.Future[Sent] = asyncio.get_running_loop().create_future()
+
+        def send() -> int:
+            return self._mailbox.port.send(
+                body,
+                destination=destination,
+                priority=PRIORITIES[priority],
+                confirm=confirmed,
+                lifetime_ns=None if lifetime_s is None else seconds_to_ns(lifetime_s),
+                deadline_ns=None if deadline_s is None else seconds_to_ns(deadline_s),
+            )
+
+        self._mailbox.to_send.append((send, future, confirmed))
+        self._drive.nudge()
+        try:
+            return await self._drive.wait(future)
+        except LocalProtocolError as error:
+            raise ConfigError(str(error)) from error
+
+    async def receive(self) -> Message:
+        """The next message; raises NodeClosedError when there will be none, BusError when the router is gone."""
+        mailbox = self._mailbox
+        while not mailbox.got:
+            mailbox.news.clear()
+            await self._drive.wait(asyncio.ensure_future(mailbox.news.wait()))
+        return mailbox.got.popleft()
+
+    def __aiter__(self) -> Self:
+        return self
+
+    async def __anext__(self) -> Message:
+        try:
+            return await self.receive()
+        except NodeClosedError:
+            raise StopAsyncIteration from None
+
+    @property
+    def now_s(self) -> float:
+        """Swarm time."""
+        return self._drive.now_ns() / S
+
+    @property
+    def neighbors(self) -> tuple[int, ...]:
+        """Nodes whose hellos are heard."""
+        return self._drive.state().neighbors
+
+    @property
+    def bound_ms(self) -> float | None:
+        """Within which delay everyone has the next bulk packet of this node; None: the network states none."""
+        bound_ns = self._drive.state().bound_ns
+        return None if bound_ns is None else bound_ns / MS
+
+    @property
+    def clusters(self) -> Mapping[int, tuple[int, ...]]:
+        """By head, the nodes of each cluster, as far as this node knows."""
+        return {int(head): tuple(nodes) for head, nodes in self._drive.state().clusters.items()}
+
+    @property
+    def position(self) -> Enu:
+        """The last position fix."""
+        return self._mailbox.port.position
+
+    @property
+    def lost(self) -> int:
+        """Messages that were let go of because nobody read them."""
+        return self._mailbox.lost
+
+    def report(self) -> Mapping[str, Any]:
+        """The node's counters, as they are in the results of a run."""
+        return self._drive.report()
+
+
+def _destination(to: int | Iterable[int] | str) -> NodeId | Collection[NodeId]:
+    if isinstance(to, str):
+        if to != ALL:
+            raise ConfigError(f"to = {to!r} must be {ALL!r}, a node id or several")
+        return BROADCAST
+    return NodeId(to) if isinstance(to, int) else tuple(NodeId(node) for node in to)
+
+
+def _body(content: object, port: int | None, node: NodeId) -> bytes | Data:
+    if port is not None:
+        if not isinstance(content, bytes | bytearray | memoryview):
+            raise ConfigError(f"content for port {port} must be bytes, not {type(content).__name__}")
+        return Data(port, bytes(content))
+    if isinstance(content, bytes | bytearray | memoryview):
+        return bytes(content)
+    try:
+        return mavlink.packed(content, node)
+    except LocalProtocolError as error:
+        raise ConfigError(str(error)) from error
+
+
+@contextlib.asynccontextmanager
+async def join(
+    scenario: Scenario | str | Path,
+    *,
+    node: int,
+    radio: Radio | None = None,
+    messages: Collection[int] = (),
+    applications: Sequence[Application] = (),
+) -> AsyncIterator[Node]:
+    """Be one node of a swarm. `radio`: `Emulated(...)` (the default), `OnAir(...)`, or a swarm in virtual time.
+
+    The node is given all that is sent to ports, and MAVLink messages whose ids are in `messages` (or ANY). Yields when
+    the node takes part. Raises ConfigError for a scenario or an id that is wrong, and BusError when the router cannot
+    be had. Leaving the block, or being cancelled in it, ends the node.
+    """
+    known = scenario if isinstance(scenario, Scenario) else config.load(Path(scenario))
+    if node not in known.node_ids:
+        raise ConfigError(f"node = {node}: must be in [1, nodes.count = {known.nodes.count}]")
+    mailbox = Mailbox(messages)
+    how = Emulated() if radio is None else radio
+    async with how.attach(known, NodeId(node), [mailbox, *applications]) as drive:
+        yield Node(known, NodeId(node), drive, mailbox)

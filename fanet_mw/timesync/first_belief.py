@@ -1,0 +1,47 @@
+"""Which statement of swarm time a node believes while it has no time of its own.
+
+    a neighbor states the time -> which others state the same? -> enough, and more than contradict -> believed
+
+The leader's statement of its own time is believed at once. Any other statement needs a second neighbor that agrees, or
+a while in which no more neighbors contradict it than agree. So two honest neighbors outvote a liar that is the first to
+speak. Not detected: a liar that is the only neighbor, and liars that outnumber the honest neighbors. Both are believed
+until others contradict them (`clock_fit`).
+"""
+
+from typing import Final
+
+from fanet_mw.timesync.clock_fit import Oscillator, Pair, alike
+from fanet_mw.units import NodeId
+
+_ENOUGH: Final = 2
+"""How many neighbors must agree."""
+
+
+class FirstBelief:
+    """What the neighbors have stated while nothing was believed."""
+
+    def __init__(self, oscillator: Oscillator, *, leader: NodeId, wait_ns: int, memory_ns: int) -> None:
+        self._oscillator = oscillator
+        self._leader = leader
+        self._wait_ns = wait_ns
+        """How long a single statement waits for a second one."""
+        self._memory_ns = memory_ns
+        """How long a statement counts."""
+        self._stated: dict[NodeId, tuple[int, Pair]] = {}
+        self._since_ns: int | None = None
+
+    def believes(self, src: NodeId, reference: int, pair: Pair, *, local_ns: int) -> bool:
+        """True if the node should follow this reference from now on, as this neighbor states its time."""
+        if self._since_ns is None:
+            self._since_ns = local_ns
+        horizon_ns = pair.local_ns - self._memory_ns
+        self._stated = {node: stated for node, stated in self._stated.items() if stated[1].local_ns >= horizon_ns}
+        self._stated[src] = reference, pair
+        if src == reference == self._leader:
+            return True
+        statements = self._stated.values()
+        agreeing = sum(of == reference and alike(other, pair, self._oscillator) for of, other in statements)
+        contradicting = len(self._stated) - agreeing
+        if local_ns - self._since_ns >= self._wait_ns:
+            return agreeing >= contradicting
+        return agreeing >= _ENOUGH and agreeing > contradicting

@@ -1,0 +1,1 @@
+"""The bus of a swarm as its operator meets it: router, certificates, rights, running swarms, changes of the air."""

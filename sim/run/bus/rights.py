@@ -1,0 +1,103 @@
+"""The rights of each participant of a swarm, as an access list of Zenoh's router: what is not allowed is denied.
+
+    agent-N    puts its requests, setpoint, telemetry, trace and report; subscribes to its receptions and sensors
+    emulator   puts receptions, links, trace and report; subscribes to requests, poses, obstructions, changes of the air
+    world      puts poses, obstructions, sensors, radios of crashed UAVs, trace, report; subscribes to setpoints
+    operator   puts changes of the air; subscribes to links, traces, reports and telemetry
+
+All but the operator subscribe to the clock, query it, and declare that they are alive. The launcher is the router
+itself: its own puts (the clock) pass no access list. Participants are identified by the common names of their
+certificates. A put that is denied disappears without a message to its sender.
+"""
+
+from typing import Any, Final, NamedTuple
+
+from fanet_mw.bus.topics import ROOT, Topics
+from fanet_mw.scenario import Scenario
+from sim.run.bus.air_control import OPERATOR
+
+_INTO: Final = "ingress"
+_OUT_OF: Final = "egress"
+
+
+class Rights(NamedTuple):
+    """What one participant may do, by key expressions."""
+
+    puts: tuple[str, ...] = ()
+    subscribes: tuple[str, ...] = ()
+    queries: tuple[str, ...] = ()
+    alive: tuple[str, ...] = ()
+    """Liveliness tokens that it may declare."""
+    watches: tuple[str, ...] = ()
+    """Liveliness tokens that it may watch."""
+
+
+def rights(scenario: Scenario, names: Topics) -> dict[str, Rights]:
+    """The rights of all participants of a swarm except the router, by name."""
+
+    def actor(name: str, puts: tuple[str, ...], subscribes: tuple[str, ...]) -> Rights:
+        return Rights(
+            puts=(*puts, names.trace(name), names.report(name)),
+            subscribes=(*subscribes, names.clock),
+            queries=(names.clock, names.scenario),
+            alive=(f"{names.alive(name)}/**",),
+        )
+
+    def agent(node: int) -> Rights:
+        return actor(
+            f"agent-{node}",
+            (names.radio_tx(node), names.setpoint(node), names.mavlink(node)),
+            (names.radio_rx(node), names.sensors(node)),
+        )
+
+    return {
+        "emulator": actor(
+            "emulator",
+            (names.radio_rx("*"), names.radio_links),
+            (names.all_tx, names.pose, names.obstruction, names.radio_control),
+        ),
+        "world": actor(
+            "world", (names.pose, names.obstruction, names.all_sensors, names.radio_control), (names.all_setpoints,)
+        ),
+        **{f"agent-{node}": agent(node) for node in scenario.node_ids},
+        OPERATOR: Rights(
+            puts=(names.radio_control,),
+            subscribes=(names.radio_links, names.all_traces, names.all_reports, names.mavlink("*")),
+            watches=(f"{ROOT}/*/alive/**",),
+        ),
+    }
+
+
+def access_control(participants: dict[str, Rights]) -> dict[str, Any]:
+    """The section `access_control` of the router's configuration."""
+    everything = (f"{ROOT}/**",)
+    rules: list[dict[str, Any]] = [
+        # Without this rule a client's publisher never learns that there are subscribers, and sends nothing.
+        _rule("know-of-others", _OUT_OF, ("declare_subscriber", "declare_queryable"), everything)
+    ]
+    policies = []
+    for name, may in participants.items():
+        own = [
+            _rule(f"{name}-says", _INTO, ("put",), may.puts),
+            _rule(f"{name}-listens", _INTO, ("declare_subscriber",), may.subscribes),
+            _rule(f"{name}-hears", _OUT_OF, ("put",), may.subscribes),
+            _rule(f"{name}-asks", _INTO, ("query",), may.queries),
+            _rule(f"{name}-is-answered", _OUT_OF, ("reply",), may.queries),
+            _rule(f"{name}-lives", _INTO, ("liveliness_token",), may.alive),
+            _rule(f"{name}-looks", _INTO, ("liveliness_query", "declare_liveliness_subscriber"), may.watches),
+            _rule(f"{name}-sees", _OUT_OF, ("liveliness_token",), may.watches),
+        ]
+        own = [rule for rule in own if rule["key_exprs"]]
+        rules += own
+        policies.append({"rules": ["know-of-others", *(rule["id"] for rule in own)], "subjects": [name]})
+    return {
+        "enabled": True,
+        "default_permission": "deny",
+        "rules": rules,
+        "subjects": [{"id": name, "cert_common_names": [name]} for name in participants],
+        "policies": policies,
+    }
+
+
+def _rule(name: str, flow: str, messages: tuple[str, ...], keys: tuple[str, ...]) -> dict[str, Any]:
+    return {"id": name, "permission": "allow", "flows": [flow], "messages": list(messages), "key_exprs": list(keys)}

@@ -1,0 +1,84 @@
+"""`fanet router`: the bus and the swarm clock for services that are started one by one, and what they did, if asked."""
+
+import asyncio
+import contextlib
+import time
+from collections.abc import Callable
+from pathlib import Path
+from typing import Final
+
+from fanet_mw.bus.topics import Topics
+from fanet_mw.errors import BusError
+from fanet_mw.hosts.bus import Bus, config_of
+from fanet_mw.hosts.clock import START_PATIENCE_S, ClockKeeper, SwarmClock
+from fanet_mw.scenario import Scenario
+from sim.run.bus.running_swarms import registered
+
+ROUTER: Final = "router"
+"""The name of the router's configuration in a folder of configurations."""
+_STOP_HEARD_S: Final = 0.3
+"""The time between telling services to stop and closing the bus on which they receive it."""
+WORD_EVERY_S: Final = 5.0
+"""The interval at which the router says who is missing or there twice."""
+_LAST_WORDS_S: Final = 3.0
+"""How long the router waits for last reports after the end of the swarm's time."""
+Tell = Callable[[str], None]
+
+
+def expected_names(scenario: Scenario) -> list[str]:
+    """Names of all actors of a swarm."""
+    return ["emulator", "world", *(f"agent-{node}" for node in scenario.node_ids)]
+
+
+async def serve(
+    scenario: Scenario,
+    *,
+    swarm: str,
+    listen: str,
+    on_event: Tell,
+    out: Path | None = None,
+    zenoh_config: Path | None = None,
+) -> int:
+    """Serve the bus and the clock until the scenario is over; with `out`, collect and write what the services did.
+
+    Returns the exit code: 0, or 1 when a result was asked for and may not be used. Raises BusError when it cannot
+    listen on the endpoint.
+    """
+    with contextlib.ExitStack() as held:
+        bus = held.enter_context(Bus.serve(listen, config_of(zenoh_config, ROUTER)))
+        held.enter_context(registered(swarm, listen))
+        names, expected = Topics(swarm), expected_names(scenario)
+        collection = None
+        if out is not None:
+            from sim.run.collecting.collection import (
+                Collection,  # the figures of a result need numpy, a router does not
+            )
+
+            collection = held.enter_context(Collection(scenario, bus, names, out))
+        keeper = ClockKeeper(bus, names, time_scale=scenario.time_scale, expected=expected, scenario=scenario)
+        on_event(f"serving {listen}, waiting for {len(keeper.missing())} services of swarm {swarm}")
+        teller = asyncio.ensure_future(_say_who_is_missing(keeper, on_event))
+        began_s = time.monotonic()
+        try:
+            running = await keeper.start(timeout_s=START_PATIENCE_S)
+            clock, ready_s = SwarmClock(running), time.monotonic() - began_s
+            on_event("all are there: the clock runs")
+            await asyncio.sleep(clock.wait_s(scenario.duration_ns) + 1)
+            if collection is not None:
+                await collection.last_words(_LAST_WORDS_S)
+        finally:  # interrupted or not, no service goes on running on a bus that ends
+            teller.cancel()
+            keeper.stop()
+            time.sleep(_STOP_HEARD_S)  # noqa: ASYNC251  (nothing else runs here, and a cancelled task cannot await)
+        if collection is None:
+            return 0
+        return collection.finish(epoch_unix_ns=running.epoch_unix_ns, ready_s=ready_s)
+
+
+async def _say_who_is_missing(keeper: ClockKeeper, tell: Tell) -> None:
+    """Say every few seconds which services are missing or there twice, before the start and during the run."""
+    while True:
+        await asyncio.sleep(WORD_EVERY_S)
+        with contextlib.suppress(BusError):
+            if said := keeper.presence.sentence():
+                tell(said)

@@ -1,0 +1,230 @@
+"""Checks of what a run's collector receives: the border between the bus and the metrics.
+
+    sender -> the kinds it may send -> the nodes and survivors it names (they exist) -> the instant (within the run)
+
+Each check returns a word for what is wrong, or None. Reports have shapes: the keys that metrics read, with types. Not
+modeled: authentication, which is for the router's access list (docs/how-to/security.md).
+"""
+
+import json
+import math
+from collections.abc import Mapping
+from typing import Annotated, Any, Final, Literal
+
+from pydantic import BaseModel, ConfigDict, Field, ValidationError
+
+from fanet_mw import wire
+from fanet_mw.bus.link_stats import LinkStats
+from fanet_mw.bus.messages import MavlinkTap
+from fanet_mw.errors import MalformedFrameError
+from fanet_mw.scenario import Scenario
+from fanet_mw.trace import (
+    Collided,
+    FlightModeChanged,
+    MissionModeChanged,
+    Posed,
+    ProcessEnded,
+    RadioFault,
+    Record,
+    Sighted,
+)
+from fanet_mw.units import S
+
+_SLACK_NS: Final = 10 * S
+"""How far outside the scenario's time an instant may lie: processes start before it and end after it."""
+_DEEPEST: Final = 6
+"""The most levels of nesting in a report's JSON."""
+_MOST_RSSI_MDBM: Final = 400_000
+"""The greatest magnitude of the mean RSSI of a link [1/1000 dBm]."""
+_SPEAKERS: Final[dict[type[Any], str | None]] = {
+    Posed: "world",
+    Collided: "world",
+    FlightModeChanged: "world",
+    RadioFault: "emulator",
+    ProcessEnded: None,
+}
+"""The only actor that may send a kind of record; None: no actor may. All other kinds are sent by the node they name."""
+_ABOUT_NOBODY: Final = (MissionModeChanged, Sighted)
+"""The kinds of record in which survivor 0 stands for none."""
+_ABOUT_NODES: Final = ("origin", "other", "reference")
+"""The fields of records that name a node, or 0."""
+
+Count = Annotated[int, Field(ge=0, le=2**53)]
+Number = Annotated[float, Field(ge=-1e18, le=1e18)]
+Share = Annotated[float, Field(ge=0, le=1)]
+Reasons = dict[str, Count]
+
+
+class _Host(BaseModel):
+    model_config = ConfigDict(extra="allow", strict=True)
+    stall_ms: Number = 0.0
+    unread_receptions: Count = 0
+
+
+class _Shape(BaseModel):
+    """The keys that are read must be present; whatever else a report holds is kept."""
+
+    model_config = ConfigDict(extra="allow", strict=True)
+    final: bool = False
+    host: _Host | None = None
+
+
+class _Frames(_Shape):
+    sent: Count
+    delivered: Count
+    in_flight: Count
+    dropped: Reasons
+
+
+class _Requests(_Shape):
+    all: Count
+    before_restart: Count
+
+
+class _Copies(_Shape):
+    on_air: Count
+    received: Count
+    lost: Reasons
+
+
+class _Air(_Shape):
+    pdr: Share | None
+    busy: Number
+    mean_retries: Number | None
+    attempt_failure: Share | None
+    throughput_mbps: Number
+
+
+class _Late(_Shape):
+    late_frames: Count
+    frames: Count
+    p50_ms: Number
+    p99_ms: Number
+    max_ms: Number
+
+
+class _Emulator(_Shape):
+    kind: Literal["emulator"]
+    frames: _Frames
+    requests: dict[str, _Requests]
+    copies: _Copies
+    air: _Air
+    late: _Late
+    poses: Count
+    controls: Count
+    refused: Reasons
+    handed: Reasons
+
+
+class _Separation(_Shape):
+    least_m: Number | None = None
+    losses: Count = 0
+
+
+class _World(_Shape):
+    kind: Literal["world"]
+    engine: str
+    ticks: Count
+    skipped_ticks: Count = 0
+    collisions: Count
+    crashed: Count = 0
+    no_fly_entries: Count = 0
+    least_charge: Number | None = None
+    separation: _Separation
+    malformed: Count
+
+
+class _Agent(_Shape):
+    kind: Literal["agent"]
+    node: Count
+    generated: Count
+    bus_malformed: Count
+    frames_sent: Count
+    receptions: Count
+    heard_late: Count = 0
+    dropped: Reasons
+    missed_turns: Count | None = None
+    bound_ms: Number | None = None
+
+
+_SHAPES: Final[dict[str, type[_Shape]]] = {"emulator": _Emulator, "world": _World}
+
+
+class BusChecks:
+    """The checks for one scenario."""
+
+    def __init__(self, scenario: Scenario) -> None:
+        self._nodes = scenario.nodes.count
+        self._survivors = scenario.mission.survivors
+        self._until_ns = scenario.duration_ns + _SLACK_NS
+        self.node_of: Mapping[str, int] = {"emulator": 0, "world": 0, **{f"agent-{n}": n for n in scenario.node_ids}}
+        """The node of each actor of the swarm, by the actor's name; 0 for an actor that is not a node."""
+
+    def record(self, name: str, record: Record) -> str | None:
+        """What is wrong with a trace record that came from the actor of this name."""
+        kind = type(record)
+        if kind in _SPEAKERS:
+            if _SPEAKERS[kind] != name:
+                return "speaker"
+            if not 0 <= record.node <= self._nodes:
+                return "node"
+        elif record.node != self.node_of[name] or not record.node:
+            return "speaker" if 1 <= record.node <= self._nodes else "node"
+        if not -_SLACK_NS <= record.t_ns <= self._until_ns:
+            return "instant"
+        if any(not 0 <= getattr(record, field, 0) <= self._nodes for field in _ABOUT_NODES):
+            return "node"
+        least = 0 if kind in _ABOUT_NOBODY else 1
+        if not least <= getattr(record, "survivor", 1) <= max(1, self._survivors):
+            return "survivor"
+        return None
+
+    def tap(self, tap: MavlinkTap) -> str | None:
+        """What is wrong with telemetry; a log can hold only whole frames, stamped within the run."""
+        if not 0 <= tap.t_ns <= self._until_ns:
+            return "instant"
+        try:
+            for _ in wire.frames(tap.data):
+                pass
+        except MalformedFrameError:
+            return "frame"
+        return None
+
+    def links(self, stats: LinkStats) -> str | None:
+        """What is wrong with a report of links."""
+        if not -_SLACK_NS <= stats.t_ns <= self._until_ns:
+            return "instant"
+        if any(not 1 <= node <= self._nodes for node in stats.ends):
+            return "node"
+        for row in stats.rows():
+            if abs(row.rssi_sum_mdbm) > _MOST_RSSI_MDBM * row.received:
+                return "rssi"
+        return None
+
+    def report(self, name: str, text: str) -> tuple[dict[str, Any], str | None]:
+        """The content of a report, and what is wrong with it; if something is, the content is empty."""
+        try:
+            content = json.loads(text)
+        except (ValueError, RecursionError):
+            return {}, "no JSON"
+        if not isinstance(content, dict) or not _tame(content, _DEEPEST):
+            return {}, "a value beyond its bounds"
+        shape = _SHAPES.get(name, _Agent)
+        try:
+            shape.model_validate(content)
+        except ValidationError as error:
+            first = error.errors(include_url=False, include_context=False, include_input=False)[0]
+            return {}, f"{'.'.join(map(str, first['loc'])) or 'keys'}: {first['msg']}"
+        if shape is _Agent and content["node"] != self.node_of[name]:
+            return {}, "node: another's"
+        return content, None
+
+
+def _tame(value: object, depth: int) -> bool:
+    """True for JSON of bounded depth, 64-bit integers and finite numbers."""
+    if isinstance(value, dict | list):
+        inner = value.values() if isinstance(value, dict) else value
+        return depth > 0 and all(_tame(item, depth - 1) for item in inner)
+    if isinstance(value, int):
+        return -(2**63) <= value < 2**63
+    return not isinstance(value, float) or math.isfinite(value)

@@ -1,0 +1,58 @@
+"""The result of a swarm whose services were started one by one: what the router heard of them, as files."""
+
+import asyncio
+import time
+from pathlib import Path
+from types import TracebackType
+from typing import Any, Self
+
+from fanet_mw.bus.topics import Topics
+from fanet_mw.hosts.bus import Bus
+from fanet_mw.scenario import Scenario
+from sim.results.files import finish
+from sim.run.collecting.collector import Collector
+from sim.run.outcome import Outcome
+
+
+class Collection:
+    """Collects while the swarm runs, writes in the end."""
+
+    def __init__(self, scenario: Scenario, bus: Bus, names: Topics, out: Path) -> None:
+        self._scenario = scenario
+        self._out = out
+        self._began_s = time.monotonic()
+        self._collector = Collector(scenario, bus.subscribe, names, now_ns=time.monotonic_ns, folder=out)
+        self.summary: dict[str, Any] = {}
+
+    def __enter__(self) -> Self:
+        return self
+
+    def __exit__(
+        self, kind: type[BaseException] | None, error: BaseException | None, trace: TracebackType | None
+    ) -> None:
+        self._collector.close()
+
+    async def last_words(self, patience_s: float) -> None:
+        """Wait until everyone has sent its last report, or patience ends."""
+        end_s = time.monotonic() + patience_s
+        while self._collector.unfinished() and time.monotonic() < end_s:  # noqa: ASYNC110  (other threads fill it)
+            await asyncio.sleep(0.05)
+
+    def finish(self, *, epoch_unix_ns: int, ready_s: float) -> int:
+        """Write the result; 0 when it may be used, else 1."""
+        collector = self._collector
+        outcome = Outcome(
+            scenario=self._scenario,
+            mode="realtime",
+            wall_s=time.monotonic() - self._began_s - ready_s,
+            records=collector.records(),
+            reports=collector.reports(),
+            taps=collector.taps(),
+            links=collector.links(),
+            ready_s=ready_s,
+            epoch_unix_ns=epoch_unix_ns,
+            heard=collector.figures(),
+            absent=collector.absent(),
+        )
+        self.summary = finish(outcome, out=self._out)
+        return 0 if self.summary["valid"] else 1

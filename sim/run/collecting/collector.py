@@ -1,0 +1,209 @@
+"""What a run in real time collects from the bus: traces, reports, telemetry and link counts of the swarm's own actors.
+
+    put -> from a known actor? -> within its allowance? -> decoded -> each item valid? -> spool on disk, or last report
+                                  whatever fails is counted by what was wrong, and goes no further
+
+Memory holds the last valid report of each actor and the sums of the links, independently of the length of the run:
+trace records and telemetry go to temporary files and are read from there when the run is over. Puts of one actor that
+exceed its allowance are counted as `excess` before they are decoded: a flood costs neither time nor disk space.
+"""
+
+import threading
+from collections import Counter
+from collections.abc import Callable, Collection, Iterable
+from pathlib import Path
+from typing import Any, Final
+
+from fanet_mw.bus import topics
+from fanet_mw.bus.link_stats import LinkStats
+from fanet_mw.bus.messages import MavlinkTap, Message, Report, TraceBatch
+from fanet_mw.bus.topics import Topics
+from fanet_mw.errors import MalformedFrameError
+from fanet_mw.hosts.bus import OnSample
+from fanet_mw.scenario import Scenario
+from fanet_mw.trace import Record
+from fanet_mw.units import S
+from sim.results.links import LinkTotals
+from sim.run.collecting.bus_checks import BusChecks
+from sim.run.collecting.spool import Spool
+from sim.run.collecting.stored_records import RecordSpools, encoded_tap, taps_of
+
+BURST_BYTES: Final = 16 << 20
+"""The bytes that one actor may put at once; ten hours of a UAV's trace in `rescue`."""
+BYTES_PER_S: Final = 1 << 20
+"""The bytes per second that one actor may put for long; two hundred times what a UAV of `rescue` puts."""
+_LONGEST_WHY: Final = 120
+Subscribe = Callable[[str, OnSample], None]
+
+
+class Allowance:
+    """A token bucket of bytes for each name."""
+
+    def __init__(self, *, burst: int, per_s: int) -> None:
+        self._burst = burst
+        self._per_s = per_s
+        self._left: dict[str, tuple[int, int]] = {}
+        """The bytes left of each name, and when that was."""
+
+    def take(self, name: str, size: int, *, now_ns: int) -> bool:
+        """True if so many bytes of this name may pass now."""
+        left, then_ns = self._left.get(name, (self._burst, now_ns))
+        left = min(self._burst, left + (now_ns - then_ns) * self._per_s // S)
+        fits = size <= left
+        self._left[name] = (left - size if fits else left, now_ns)
+        return fits
+
+
+class Collector:
+    """Collects from a swarm; `now_ns` is a monotonic clock, `folder` the place of temporary files."""
+
+    def __init__(
+        self, scenario: Scenario, subscribe: Subscribe, names: Topics, *, now_ns: Callable[[], int], folder: Path | None
+    ) -> None:
+        self._checks = BusChecks(scenario)
+        self._true_delays = scenario.clock.modelled
+        self._now_ns = now_ns
+        self._lock = threading.Lock()  # Zenoh calls from several threads
+        self._allowance = Allowance(burst=BURST_BYTES, per_s=BYTES_PER_S)
+        self._records = RecordSpools(folder)
+        self._taps = Spool(folder)
+        self._reports: dict[str, dict[str, Any]] = {}
+        self._links = LinkTotals()
+        self._refused: Counter[str] = Counter()
+        self._why_no_report: dict[str, str] = {}
+        self._puts = 0
+        for expression, what, take in (
+            (names.all_traces, "trace", self._take_records),
+            (names.all_reports, "report", self._take_report),
+            (names.mavlink("*"), "telemetry", self._take_tap),
+            (names.radio_links, "links", self._take_links),
+        ):
+            subscribe(expression, self._hearer(what, take))
+
+    # --- receiving, on threads of the bus -------------------------------------------------------------------------
+
+    def _hearer(self, what: str, take: Callable[[str, Message], str | None]) -> OnSample:
+        def hear(topic: str, payload: bytes) -> None:
+            with self._lock:
+                self._puts += 1
+                why = self._hear(what, topic, payload, take)
+                if why is not None:
+                    self._refused[f"{what}: {why}"] += 1
+
+        return hear
+
+    def _hear(self, what: str, topic: str, payload: bytes, take: Callable[[str, Message], str | None]) -> str | None:
+        """Take in one put; returns what was wrong with it, or with the last of its items that were wrong."""
+        last = topic.rpartition("/")[2]
+        name = {"telemetry": f"agent-{last}", "links": "emulator"}.get(what, last)
+        if name not in self._checks.node_of:
+            return "unknown actor"
+        if not self._allowance.take(f"{what}/{name}", len(payload), now_ns=self._now_ns()):
+            return "excess"
+        try:
+            messages = topics.decode(payload)
+        except MalformedFrameError:
+            return "undecodable"
+        wrong: str | None = None
+        for message in messages:
+            why = take(name, message)
+            if why is not None:
+                if wrong is not None:
+                    self._refused[f"{what}: {wrong}"] += 1
+                wrong = why
+        return wrong
+
+    def _take_records(self, name: str, message: Message) -> str | None:
+        if not isinstance(message, TraceBatch):
+            return "message type"
+        good = []
+        for record in message.records:
+            why = self._checks.record(name, record)
+            if why is None:
+                good.append(record)
+            else:
+                self._refused[f"trace: {why}"] += 1
+        if lost := self._records.append(good):
+            self._refused["trace: disk"] += lost
+        return None
+
+    def _take_report(self, name: str, message: Message) -> str | None:
+        if not isinstance(message, Report):
+            return "message type"
+        if message.name != name:
+            return "speaker"
+        content, why = self._checks.report(name, message.json)
+        if why is not None:
+            self._why_no_report[name] = f"malformed: {why[:_LONGEST_WHY]}"
+            return "shape"
+        self._reports[name] = content
+        return None
+
+    def _take_tap(self, name: str, message: Message) -> str | None:
+        if not isinstance(message, MavlinkTap):
+            return "message type"
+        why = self._checks.tap(message)
+        if why is None and not self._taps.append(encoded_tap(message.t_ns, message.data)):
+            return "disk"
+        return why
+
+    def _take_links(self, _name: str, message: Message) -> str | None:
+        if not isinstance(message, LinkStats):
+            return "message type"
+        why = self._checks.links(message)
+        if why is None:
+            self._links.add(message)
+        return why
+
+    # --- results, when the run is over ----------------------------------------------------------------------------
+
+    def records(self, further: Iterable[Record] = ()) -> Collection[Record]:
+        """All trace records and some further ones, by instant, node and kind; with true delays where clocks drift.
+
+        They stay on disk, and stay readable when the collector is closed.
+        """
+        with self._lock:
+            self._records.append(further)
+            return self._records.records(true_delays=self._true_delays)
+
+    def reports(self) -> dict[str, dict[str, Any]]:
+        """The last valid report of each actor, by name."""
+        with self._lock:
+            return {name: self._reports[name] for name in sorted(self._reports)}
+
+    def unfinished(self) -> set[str]:
+        """The actors that have not yet sent their last report."""
+        with self._lock:
+            return {name for name in self._checks.node_of if not self._reports.get(name, {}).get("final")}
+
+    def absent(self) -> dict[str, str]:
+        """Why there is no report, by the actor's name."""
+        with self._lock:
+            missing = [name for name in self._checks.node_of if name not in self._reports]
+            return {name: self._why_no_report.get(name, "no report was heard") for name in missing}
+
+    def links(self) -> LinkTotals:
+        """What each link has carried."""
+        with self._lock:
+            return self._links
+
+    def taps(self) -> Collection[tuple[int, bytes]]:
+        """The telemetry of all UAVs, by instant; it stays on disk, too."""
+        with self._lock:
+            return taps_of(self._taps)
+
+    def figures(self) -> dict[str, Any]:
+        """The number of puts received, and of items refused (records, reports, taps), by what was wrong."""
+        with self._lock:
+            why = dict(sorted(self._refused.items()))
+            return {"puts": self._puts, "malformed": sum(why.values()), "why": why}
+
+    def disk_failure(self) -> str | None:
+        """Why trace or telemetry is incomplete; None when both are complete."""
+        return self._records.failure or self._taps.failure
+
+    def close(self) -> None:
+        """Free the disk space."""
+        with self._lock:
+            self._records.close()
+            self._taps.close()

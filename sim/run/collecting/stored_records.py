@@ -1,0 +1,178 @@
+"""Collections on disk, for results that are too large for memory, and how a trace is read wherever it is.
+
+Whoever reads a trace asks for the kinds of records that it needs: of a trace on disk, only those are decoded.
+"""
+
+import heapq
+import struct
+from collections.abc import Callable, Collection, Iterable, Iterator
+from pathlib import Path
+from typing import Any, Final, TypeVar, get_args, overload
+
+from fanet_mw import trace
+from fanet_mw.trace import Delivered, Generated, Record
+from sim.run.collecting.spool import Spool, in_order
+
+T = TypeVar("T")
+A = TypeVar("A", bound=Record)
+B = TypeVar("B", bound=Record)
+C = TypeVar("C", bound=Record)
+_KINDS: Final[tuple[type[Record], ...]] = tuple(sorted(get_args(Record), key=trace.name_of))
+_CODES: Final = {kind: code for code, kind in enumerate(_KINDS)}
+_KEY: Final = struct.Struct("<qHB")
+"""The front of a stored record: its instant, its node, and the place of its kind among the names of all."""
+_INSTANT: Final = struct.Struct("<q")
+
+
+class Stored(Collection[T]):
+    """The items of a spool as values; each iteration reads and decodes them anew."""
+
+    def __init__(self, spool: Spool, decode: Callable[[bytes], T]) -> None:
+        self._spool = spool
+        self._decode = decode
+
+    def __len__(self) -> int:
+        return self._spool.count
+
+    def __iter__(self) -> Iterator[T]:
+        return map(self._decode, self._spool.items())
+
+    def __contains__(self, value: object) -> bool:
+        return any(item == value for item in self)
+
+
+# --- telemetry --------------------------------------------------------------------------------------------------------
+
+
+def encoded_tap(t_ns: int, frames: bytes) -> bytes:
+    return _INSTANT.pack(t_ns) + frames
+
+
+def _decoded_tap(item: bytes) -> tuple[int, bytes]:
+    return _INSTANT.unpack_from(item)[0], item[_INSTANT.size :]
+
+
+def taps_of(spool: Spool) -> Collection[tuple[int, bytes]]:
+    """The telemetry in a spool of `encoded_tap`, by instant; in memory only if the disk has no room to sort it."""
+    ordered = in_order(spool, _INSTANT.unpack_from)
+    if ordered is None:
+        return sorted(map(_decoded_tap, spool.items()), key=lambda tap: tap[0])
+    return Stored(ordered, _decoded_tap)
+
+
+# --- traces -----------------------------------------------------------------------------------------------------------
+
+
+class RecordSpools:
+    """Trace records on disk: deliveries, which are nine in ten, and all others, so that these can be read alone."""
+
+    def __init__(self, folder: Path | None = None) -> None:
+        self._deliveries = Spool(folder)
+        self._others = Spool(folder)
+
+    def append(self, records: Iterable[Record]) -> int:
+        """Write records at the end; returns how many of them are not kept."""
+        deliveries: list[bytes] = []
+        others: list[bytes] = []
+        for record in records:
+            (deliveries if type(record) is Delivered else others).append(_encoded(record))
+        parts = ((self._deliveries, deliveries), (self._others, others))
+        return sum(len(items) for spool, items in parts if not spool.append(*items))
+
+    @property
+    def size(self) -> int:
+        """The bytes on disk."""
+        return self._deliveries.size + self._others.size
+
+    @property
+    def failure(self) -> str | None:
+        """Why no more records are accepted; None while they are."""
+        return self._deliveries.failure or self._others.failure
+
+    def close(self) -> None:
+        """Free the disk space."""
+        self._deliveries.close()
+        self._others.close()
+
+    def records(self, *, true_delays: bool) -> Collection[Record]:
+        """All of them by instant, node and kind; in memory only if the disk has no room to sort them.
+
+        With `true_delays` the delay of a delivery counts from the true instant of generation, where that is recorded.
+        """
+        born: dict[tuple[int, int], int] = {}
+        if true_delays:
+            generated = (one for one in map(_decoded, self._others.items()) if type(one) is Generated)
+            born = {(one.node, one.seq): one.t_ns for one in generated}
+
+        def truly(item: bytes) -> bytes:
+            record = _decoded(item)
+            assert type(record) is Delivered, "it was among deliveries"
+            born_ns = born.get((record.origin, record.seq))
+            return item if born_ns is None else _encoded(record._replace(delay_ns=record.t_ns - born_ns))
+
+        change = truly if born else lambda item: item
+        deliveries = in_order(self._deliveries, _KEY.unpack_from, change=change)
+        others = in_order(self._others, _KEY.unpack_from)
+        if deliveries is None or others is None:
+            items = [*map(change, self._deliveries.items()), *self._others.items()]
+            return [_decoded(item) for item in sorted(items, key=_KEY.unpack_from)]
+        return StoredRecords(deliveries, others)
+
+
+class StoredRecords(Collection[Record]):
+    """Trace records on disk, in order."""
+
+    def __init__(self, deliveries: Spool, others: Spool) -> None:
+        self._deliveries = deliveries
+        self._others = others
+
+    def __len__(self) -> int:
+        return self._deliveries.count + self._others.count
+
+    def __iter__(self) -> Iterator[Record]:
+        return map(_decoded, self._items())
+
+    def __contains__(self, value: object) -> bool:
+        return any(record == value for record in self)
+
+    def of(self, kinds: tuple[type[Record], ...]) -> Iterator[Record]:
+        if kinds == (Delivered,):
+            return map(_decoded, self._deliveries.items())
+        items = self._items() if Delivered in kinds else self._others.items()
+        wanted = {_CODES[kind] for kind in kinds}
+        code_at = _KEY.size - 1
+        return (_decoded(item) for item in items if item[code_at] in wanted)
+
+    def lines(self) -> Iterator[bytes]:
+        return (item[_KEY.size :] + b"\n" for item in self._items())
+
+    def _items(self) -> Iterator[bytes]:
+        return heapq.merge(self._deliveries.items(), self._others.items(), key=_KEY.unpack_from)
+
+
+def _encoded(record: Record) -> bytes:
+    return _KEY.pack(record.t_ns, record.node, _CODES[type(record)]) + trace.line(record).encode()
+
+
+def _decoded(item: bytes) -> Record:
+    return trace.parse(item[_KEY.size :].decode())
+
+
+@overload
+def of(records: Iterable[Record], kind: type[A], /) -> Iterator[A]: ...
+@overload
+def of(records: Iterable[Record], kind: type[A], other: type[B], /) -> Iterator[A | B]: ...
+@overload
+def of(records: Iterable[Record], kind: type[A], other: type[B], third: type[C], /) -> Iterator[A | B | C]: ...
+def of(records: Iterable[Record], *kinds: type[Any]) -> Iterator[Any]:
+    """The records of some kinds, in the order of the trace."""
+    if isinstance(records, StoredRecords):
+        return records.of(kinds)
+    return (record for record in records if type(record) in kinds)
+
+
+def lines(records: Iterable[Record]) -> Iterator[bytes]:
+    """The lines of the trace file, each one JSON array."""
+    if isinstance(records, StoredRecords):
+        return records.lines()
+    return (f"{trace.line(record)}\n".encode() for record in records)

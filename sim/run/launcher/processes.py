@@ -1,0 +1,162 @@
+"""The processes of a swarm: forked from one warmed-up server, watched, and ended without leaving any behind.
+
+Children ignore Ctrl-C, because the launcher decides, and die with their parent however it ends.
+"""
+
+import asyncio
+import atexit
+import contextlib
+import multiprocessing
+import os
+import signal
+import sys
+from collections.abc import Callable, Mapping
+from multiprocessing import forkserver, resource_tracker
+from multiprocessing.context import ForkServerContext, ForkServerProcess
+from typing import Any, Final, NamedTuple
+
+from fanet_mw.errors import FanetError, HostError
+from fanet_mw.hosts.service import BUS_EXIT_CODE
+from sim.run.launcher.children import die_with_parent
+from sim.run.launcher.process_title import entitle
+
+_PRELOAD: Final = ["agents.__main__", "emulator.__main__", "sim.world.__main__"]
+_BLOCKED: Final = (signal.SIGINT, signal.SIGTERM)
+Entry = Callable[..., int]
+
+
+class ChildRecipe(NamedTuple):
+    """How to start a child: `entry(**arguments)`, with `nice` added to the launcher's niceness."""
+
+    entry: Entry
+    arguments: Mapping[str, Any]
+    nice: int
+    name: str
+    title: str
+    """What `ps` shows as the child's command line."""
+
+
+def _child(recipe: ChildRecipe) -> None:
+    """Run a child: its preparations, its work, its exit code."""
+    signal.signal(signal.SIGINT, signal.SIG_IGN)
+    signal.pthread_sigmask(signal.SIG_UNBLOCK, _BLOCKED)  # the launcher's SIGTERM ends it
+    die_with_parent()
+    entitle(recipe.name, recipe.title)
+    try:
+        os.nice(recipe.nice)
+        code = recipe.entry(**recipe.arguments)
+    except FanetError as error:
+        sys.stderr.write(f"{error}\n")
+        code = BUS_EXIT_CODE
+    sys.exit(code)
+
+
+def _nothing() -> None:
+    pass
+
+
+def _start_server() -> None:
+    """Start the server from which children are forked, with both signals blocked in it and its children.
+
+    Ctrl-C, or the end of a service of the system, reaches all of them. A child ignores Ctrl-C only from `_child` on,
+    and the server only after its imports: until then each would end with a traceback of its own.
+    """
+    resource_tracker.ensure_running()  # otherwise the server starts the tracker, which unblocks SIGINT
+    before = signal.pthread_sigmask(signal.SIG_BLOCK, _BLOCKED)
+    try:
+        forkserver.ensure_running()
+    finally:
+        signal.pthread_sigmask(signal.SIG_SETMASK, before)
+
+
+def describe(exit_code: int) -> str:
+    """An exit code in words; a signal is given by its name."""
+    return f"signal {signal.Signals(-exit_code).name}" if exit_code < 0 else f"exit code {exit_code}"
+
+
+class Processes:
+    """Children by name, each of which can be started again."""
+
+    def __init__(self, on_end: Callable[[str, int], None], *, title: str = "fanet") -> None:
+        self._title = title
+        """What `ps` shows as the command line of each child, in front of its name."""
+        self._context: ForkServerContext = multiprocessing.get_context("forkserver")
+        self._context.set_forkserver_preload(_PRELOAD)
+        self._on_end = on_end
+        self._loop = asyncio.get_running_loop()
+        self._running: dict[str, ForkServerProcess] = {}
+        self._recipes: dict[str, ChildRecipe] = {}
+        self._empty = asyncio.Event()
+
+    async def warm_up(self) -> None:
+        """Wait until the server has imported what children need; otherwise the first `start` would block the loop."""
+        first = self._context.Process(target=_nothing)
+
+        def run() -> None:
+            _start_server()
+            with contextlib.suppress(OSError, EOFError):  # the next `start` reports the error
+                first.start()
+                first.join()
+                first.close()
+
+        await asyncio.to_thread(run)
+
+    def start(self, name: str, entry: Entry, arguments: Mapping[str, Any], *, nice: int = 0) -> None:
+        """Start a child; `entry(**arguments)` must be importable and picklable. With `nice` it lets others go first."""
+        recipe = self._recipes[name] = ChildRecipe(entry, arguments, nice, name, f"{self._title} {name}")
+        _start_server()
+        process = self._context.Process(target=_child, args=(recipe,), name=name)
+        try:
+            process.start()
+        except (OSError, EOFError) as error:
+            raise HostError(f"{name} cannot be started: {error}") from error
+        self._running[name] = process
+        self._empty.clear()
+        self._loop.add_reader(process.sentinel, self._ended, name)
+
+    def restart(self, name: str, **more: object) -> None:
+        """Start a child that has ended again, with its former arguments except for those in `more`."""
+        recipe = self._recipes[name]
+        self.start(name, recipe.entry, {**recipe.arguments, **more}, nice=recipe.nice)
+
+    def pid(self, name: str) -> int:
+        pid = self._running[name].pid
+        assert pid is not None, "a running child has a pid"
+        return pid
+
+    def names(self) -> list[str]:
+        return list(self._running)
+
+    def _ended(self, name: str) -> None:
+        process = self._running.pop(name)
+        self._loop.remove_reader(process.sentinel)
+        process.join()
+        code = process.exitcode or 0
+        process.close()
+        if not self._running:
+            self._empty.set()
+        self._on_end(name, code)
+
+    async def wait(self, timeout_s: float) -> bool:
+        """Wait until all children have ended by themselves; returns False when some have not in time."""
+        try:
+            await asyncio.wait_for(self._empty.wait(), timeout_s)
+        except TimeoutError:
+            return False
+        return True
+
+    async def end_all(self) -> None:
+        """Ask all children to end, then kill those that have not; none is left running."""
+        for send, patience_s in (("terminate", 2.0), ("kill", 5.0)):
+            for process in list(self._running.values()):
+                getattr(process, send)()
+            if not self._running or await self.wait(patience_s):
+                return
+
+
+@atexit.register
+def _end_servers() -> None:
+    """End multiprocessing's helper processes with this one; by themselves they end some tens of milliseconds later."""
+    # There is no public way to do this; CPython's own tests use these calls.
+    forkserver._forkserver._stop()  # type: ignore[attr-defined]  # noqa: SLF001
+    resource_tracker._resource_tracker._stop()  # type: ignore[attr-defined]  # noqa: SLF001

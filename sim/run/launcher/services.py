@@ -1,0 +1,51 @@
+"""The processes of a swarm: which of them the launcher starts, and with what arguments."""
+
+from collections.abc import Iterator, Mapping
+from typing import Any, Final, NamedTuple
+
+from agents.__main__ import run as run_agent
+from emulator.__main__ import run as run_emulator
+from fanet_mw.hosts.realtime import SwarmAddress
+from fanet_mw.scenario import Scenario
+from fanet_mw.units import NodeId
+from sim.run.launcher.processes import Entry
+from sim.world.__main__ import run as run_world
+from sim.world.environment.map_on_board import map_on_board
+from sim.world.mobility.layout import positions
+
+_AGENT_NICE: Final = 10
+"""The niceness of UAVs: all of them wait for the emulator, which goes first when all cores are in use."""
+
+
+class Service(NamedTuple):
+    """One process: `entry(**arguments)`, with `nice` added to the launcher's niceness."""
+
+    name: str
+    entry: Entry
+    arguments: Mapping[str, Any]
+    nice: int = 0
+
+
+class Services(NamedTuple):
+    """What the launcher of one swarm starts."""
+
+    scenario: Scenario
+    address: SwarmAddress
+    own_world: bool = True
+    """False when a foreign world tells where the UAVs are; no report of it is expected."""
+    leave_out: frozenset[int] = frozenset()
+    """Nodes whose processes somebody else starts."""
+    emulator_options: Mapping[str, Any] = {}
+    """Additional arguments of the emulator's process."""
+
+    def each(self) -> Iterator[Service]:
+        """The emulator, the world, and the UAVs by id."""
+        common = {"scenario": self.scenario, "address": self.address}
+        yield Service("emulator", run_emulator, {**common, **self.emulator_options})
+        if self.own_world:
+            yield Service("world", run_world, common)
+        onboard_map = map_on_board(self.scenario)
+        for node, position in zip(self.scenario.node_ids, positions(self.scenario), strict=True):
+            if node not in self.leave_out:
+                arguments = {**common, "node": NodeId(node), "position": position, "onboard_map": onboard_map}
+                yield Service(f"agent-{node}", run_agent, arguments, _AGENT_NICE)

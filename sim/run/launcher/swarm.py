@@ -1,0 +1,288 @@
+"""A swarm as real processes: router and clock here; the emulator, the world and every UAV in a process of its own.
+
+    start all -> wait until all are up -> start the clock -> collect traces, reports and taps -> all end -> outcome
+
+When a UAV's process dies that is reported and the others carry on. A run needs the emulator and the world, so the end
+of either ends it; with `respawn` any of them is started again and finds its place by the clock.
+"""
+
+import asyncio
+import contextlib
+import signal
+import socket
+import time
+from collections.abc import Callable, Collection, Mapping
+from pathlib import Path
+from typing import Any, Final
+
+from emulator.kernel.compile import COMPILING_NOTICE, must_compile
+from fanet_mw.bus.topics import Topics
+from fanet_mw.errors import BusError
+from fanet_mw.hosts import interrupts
+from fanet_mw.hosts.bus import Bus, config_of
+from fanet_mw.hosts.clock import ClockKeeper, SwarmClock
+from fanet_mw.hosts.realtime import SwarmAddress
+from fanet_mw.scenario import Scenario
+from fanet_mw.units import S
+from sim.run.bus.router import ROUTER, expected_names
+from sim.run.bus.running_swarms import registered
+from sim.run.collecting.collector import Collector
+from sim.run.launcher import limits
+from sim.run.launcher.deaths import Deaths
+from sim.run.launcher.processes import Processes, describe
+from sim.run.launcher.services import Services
+from sim.run.outcome import Outcome
+from sim.world.flight_recorder import FlightRecorder
+
+READY_TIMEOUT_S: Final = 300.0
+"""How long to wait until all are up: on a busy machine 47 processes take a minute, and a compilation comes on top."""
+WORD_EVERY_S: Final = 10.0
+"""How often it is reported which processes are being waited for."""
+_GRACE_S: Final = 5.0
+"""How long to wait for last reports after the end of the swarm's time."""
+_LAST_WORDS_S: Final = 1.0
+"""How long to wait, after the end of all processes, for what they sent last: it may still be on the bus."""
+_PROGRESS_S: Final = 0.25
+Tell = Callable[[str], None]
+
+
+def free_endpoint(protocol: str = "tcp") -> str:
+    """An endpoint on the loopback interface with a port that is free now."""
+    with socket.socket() as probe:
+        probe.bind(("127.0.0.1", 0))
+        return f"{protocol}/127.0.0.1:{probe.getsockname()[1]}"
+
+
+class SwarmRun:
+    """One run in real time."""
+
+    def __init__(
+        self, services: Services, bus: Bus, *, respawn: bool, tell: Tell, spool_folder: Path | None = None
+    ) -> None:
+        scenario, self.address = services.scenario, services.address
+        names = Topics(self.address.swarm)
+        self._services = services
+        self._tell = tell
+        self._collector = Collector(scenario, bus.subscribe, names, now_ns=time.monotonic_ns, folder=spool_folder)
+        self._recorder = FlightRecorder(scenario, bus.subscribe, names) if respawn else None
+        self._keeper = ClockKeeper(
+            bus, names, time_scale=scenario.time_scale, expected=expected_names(scenario), scenario=scenario
+        )
+        self.processes = Processes(self._process_ended, title=f"fanet {names.swarm}")
+        self._deaths = Deaths(respawn=respawn)
+        self._clock: SwarmClock | None = None
+        self._over = asyncio.Event()
+        self._ending = False
+        self._aborted: str | None = None
+        self._stall_s = 0.0
+        """The longest time for which this process did nothing although it should have."""
+        self._signal: int | None = None
+
+    async def run(self, on_progress: Callable[[float], None]) -> Outcome:
+        """Start, run, collect. In any case no process and no temporary file is left."""
+        with contextlib.closing(self._collector):
+            began = time.monotonic()
+            try:
+                await self._start_all()
+                ready_s = await self._start_clock(began)
+                run_began = time.monotonic()
+                await self._follow(on_progress)
+                ended_ns = None if self._aborted is None else self._now_ns()
+                wall_s = time.monotonic() - run_began
+                await self._wind_up()
+            finally:
+                self._over.set()
+                self._ending = True
+                await self.processes.end_all()
+            return self._outcome(wall_s=wall_s, ready_s=ready_s, ended_ns=ended_ns)
+
+    def _outcome(self, *, wall_s: float, ready_s: float, ended_ns: int | None) -> Outcome:
+        """The outcome with what was collected; an incomplete trace is reported."""
+        collector, foreign = self._collector, set() if self._services.own_world else {"world"}
+        if (failure := collector.disk_failure()) is not None:
+            self._tell(f"the trace is incomplete: its temporary file could not be written: {failure}")
+        return Outcome(
+            scenario=self._services.scenario,
+            mode="realtime",
+            wall_s=wall_s,
+            records=collector.records(self._deaths.records),
+            reports=collector.reports(),
+            taps=collector.taps(),
+            links=collector.links(),
+            ended=self._deaths.ended,
+            aborted=self._aborted,
+            ended_ns=ended_ns,
+            ready_s=ready_s,
+            epoch_unix_ns=self._keeper.clock.epoch_unix_ns if self._keeper.clock else 0,
+            heard=collector.figures(),
+            absent={name: why for name, why in collector.absent().items() if name not in foreign},
+            stall_ms=self._stall_s * 1000,
+        )
+
+    def interrupt(self, number: int) -> None:
+        """End the run early because of a signal."""
+        self._signal = number
+        self.abort(f"interrupted by {signal.Signals(number).name}")
+
+    def abort(self, why: str) -> None:
+        """End the run early; what has been collected becomes a partial result."""
+        if self._aborted is None and not self._over.is_set():
+            self._aborted = why
+            self._tell(why)
+        self._over.set()
+
+    async def _start_all(self) -> None:
+        await self.processes.warm_up()
+        self._check_not_over()
+        for name, entry, arguments, nice in self._services.each():
+            self.processes.start(name, entry, arguments, nice=nice)
+            await asyncio.sleep(0)  # signals are handled between two of many processes
+            self._check_not_over()
+
+    def _check_not_over(self) -> None:
+        """Raise if the swarm was told to end before its time began, because then there is nothing to report."""
+        if self._signal is not None:
+            raise KeyboardInterrupt(self._signal)
+        if self._over.is_set():
+            raise BusError(self._aborted or "ended before the swarm was up")
+
+    async def _start_clock(self, began: float) -> float:
+        """Wait for all participants, then start the clock; returns how long that took [s]."""
+        start = asyncio.ensure_future(self._keeper.start(timeout_s=READY_TIMEOUT_S))
+        over = asyncio.ensure_future(self._over.wait())
+        while not await _any_done(start, over, timeout_s=WORD_EVERY_S):
+            presence, expected = self._keeper.presence, expected_names(self._services.scenario)
+            self._tell(f"waiting for {len(presence.missing())} of {len(expected)}: {presence.sentence()}")
+        over.cancel()
+        if not start.done():
+            start.cancel()
+            self._check_not_over()
+        self._clock = SwarmClock(start.result())
+        ready_s = time.monotonic() - began
+        self._tell(f"{len(self.processes.names())} processes up after {ready_s:.1f} s")
+        return ready_s
+
+    async def _follow(self, on_progress: Callable[[float], None]) -> None:
+        """Wait until the swarm's time is over or the run is aborted."""
+        assert self._clock is not None, "the clock was started"
+        while self._clock.wait_s(self._services.scenario.duration_ns) > 0 and not self._over.is_set():
+            on_progress(max(0.0, self._clock.now_ns() / S))
+            began_s = time.monotonic()
+            with contextlib.suppress(TimeoutError):
+                await asyncio.wait_for(self._over.wait(), _PROGRESS_S)
+            self._stall_s = max(self._stall_s, time.monotonic() - began_s - _PROGRESS_S)
+
+    async def _wind_up(self) -> None:
+        """End all processes, by the clock or by order, and wait for last reports."""
+        self._over.set()
+        await self._end_processes()
+        dead = {name for name, _ in self._deaths.ended} | (set() if self._services.own_world else {"world"})
+        end_s = time.monotonic() + _LAST_WORDS_S
+        while self._collector.unfinished() - dead and time.monotonic() < end_s:  # noqa: ASYNC110  (other threads fill it)
+            await asyncio.sleep(_LAST_WORDS_S / 20)
+
+    async def _end_processes(self) -> None:
+        if self._aborted is not None:
+            self._keeper.stop()
+        if not await self.processes.wait(_GRACE_S):
+            late = self.processes.names()
+            self._keeper.stop()
+            if not await self.processes.wait(_GRACE_S / 2):
+                self._tell(f"{len(late)} processes did not end by themselves: {', '.join(late[:5])}")
+
+    def _process_ended(self, name: str, exit_code: int) -> None:
+        if self._ending or (exit_code == 0 and (self._over.is_set() or self.time_is_over())):
+            return
+        if self._clock is None and not self._over.is_set() and self._deaths.may_try_again(name, exit_code):
+            self._tell(f"{name} ended with {describe(exit_code)} before the start; started again")
+            self.processes.restart(name)
+            return
+        now_ns = self._now_ns()
+        node = int(name.removeprefix("agent-")) if name.startswith("agent-") else 0
+        self._deaths.note(name, exit_code, node=node, now_ns=now_ns)
+        what = f"{name} ended with {describe(exit_code)} at {now_ns / S:.1f} s"
+        if self._over.is_set():
+            if exit_code == -(self._signal or 0):
+                return  # the signal that interrupted this process was meant for all
+            self._tell(f"{what}, while the swarm was ending")
+            return
+        if self._deaths.may_respawn(name):
+            self._tell(f"{what}; started again")
+            if name == "world" and self._recorder is not None:
+                self.processes.restart(name, flight=self._recorder.last())
+            else:
+                self.processes.restart(name)
+        elif node and self._clock is not None:
+            self._tell(f"{what}; the others carry on")
+        else:
+            self.abort(f"{what}; the run cannot go on without it")
+
+    def _now_ns(self) -> int:
+        """The swarm instant, limited to the swarm's time."""
+        return min(max(0, self._clock.now_ns()), self._services.scenario.duration_ns) if self._clock else 0
+
+    def time_is_over(self) -> bool:
+        return self._clock is not None and self._clock.wait_s(self._services.scenario.duration_ns) <= 0.05
+
+
+async def _any_done(*futures: asyncio.Future[Any], timeout_s: float) -> bool:
+    done, _ = await asyncio.wait(futures, timeout=timeout_s, return_when=asyncio.FIRST_COMPLETED)
+    return bool(done)
+
+
+def _bus(listen: str | None, connect: str | None, zenoh_config: Path | None) -> tuple[Bus, str]:
+    """The session of the launcher, and the endpoint to which its children connect: TLS by default with keys for all."""
+    config = config_of(zenoh_config, ROUTER)
+    if connect is not None:
+        return Bus.join(connect, config), connect
+    keys_for_all = zenoh_config is not None and zenoh_config.is_dir()
+    endpoint = listen or free_endpoint("tls" if keys_for_all else "tcp")
+    return Bus.serve(endpoint, config), endpoint
+
+
+async def launch(
+    scenario: Scenario,
+    *,
+    swarm: str,
+    listen: str | None = None,
+    connect: str | None = None,
+    respawn: bool = False,
+    own_world: bool = True,
+    emulator_options: Mapping[str, Any] | None = None,
+    spool_folder: Path | None = None,
+    zenoh_config: Path | None = None,
+    on_progress: Callable[[float], None] = lambda _: None,
+    on_event: Tell = lambda _: None,
+    on_started: Callable[[SwarmRun], None] = lambda _: None,
+    leave_out: Collection[int] = (),
+    heed_signals: bool = True,
+) -> Outcome:
+    """Run a scenario as real processes. `on_started` receives the swarm while it runs, for tests and tools.
+
+    The nodes of `leave_out` are waited for and not started: a program of the user's own joins in their place.
+    Without `own_world` the swarm waits for a foreign world, which declares the liveliness token of `world`.
+    `zenoh_config` is Zenoh's own configuration: a file for all processes, or a folder with one file for each. What is
+    collected waits in temporary files in `spool_folder`, by default where the system keeps such files.
+
+    Raises BusError when the bus cannot be used or the swarm does not come up, ConfigError when a limit of the machine
+    is too low, and KeyboardInterrupt with its number when a signal comes before there is anything to report.
+    """
+    limits.prepare(processes=len(expected_names(scenario)))
+    if must_compile():
+        on_event(COMPILING_NOTICE)
+    bus, endpoint = _bus(listen, connect, zenoh_config)
+    with bus, registered(swarm, endpoint) as known:
+        on_event(f"swarm {swarm} on {endpoint}" + ("" if known else "; other commands must be told so: --connect"))
+        address = SwarmAddress(swarm, endpoint, zenoh_config, READY_TIMEOUT_S)
+        services = Services(scenario, address, own_world, frozenset(leave_out), emulator_options or {})
+        run = SwarmRun(services, bus, respawn=respawn, tell=on_event, spool_folder=spool_folder)
+        loop = asyncio.get_running_loop()
+        signals = interrupts.SIGNALS if heed_signals else ()
+        for number in signals:
+            loop.add_signal_handler(number, run.interrupt, number)
+        on_started(run)
+        try:
+            return await run.run(on_progress)
+        finally:
+            for number in signals:
+                loop.remove_signal_handler(number)

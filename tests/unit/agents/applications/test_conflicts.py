@@ -1,0 +1,153 @@
+"""The conflict monitor of one UAV, as timelines: two on one line, 200 m apart, closing at 20 m/s."""
+
+from typing import Any
+
+import pytest
+
+from agents.applications.conflicts import ConflictMonitor
+from fanet_mw.application import HOME, Course
+from fanet_mw.mavlink import Collision
+from fanet_mw.routing.clustered.roles.position_updates import Motion
+from fanet_mw.trace import ConflictForeseen, ConflictOver
+from fanet_mw.units import MS, Enu, NodeId, S
+
+EAST, WEST = Enu(10, 0, 0), Enu(-10, 0, 0)
+OTHER = NodeId(7)
+
+
+@pytest.fixture
+def monitor(make_scenario):
+    def make(node: int = 3, **keys: Any) -> ConflictMonitor:
+        wanted = {"nodes.count": 9, "mission.collision_horizon_s": 12, "mission.collision_distance_m": 15}
+        return ConflictMonitor(make_scenario(**wanted, **keys), NodeId(node))
+
+    return make
+
+
+def at(east: float, up: float, velocity: Enu, now_ns: int = 0) -> Motion:
+    return Motion(Enu(east, 0, up), velocity, now_ns)
+
+
+def test_who_foresees_a_conflict_warns_and_the_lower_id_goes_up(monitor) -> None:
+    for node, up in ((3, 90.0), (9, 10.0)):
+        uav = monitor(node)
+        uav.on_hello(OTHER, at(200, 50, WEST), now_ns=0)
+        uav.on_fix(at(0, 50, EAST))
+        (record,) = uav.records
+        assert record == ConflictForeseen(0, node, OTHER, 10_000, 0.0, told=False)
+        ((other, approach),) = uav.warnings
+        assert (other, approach.closest_s) == (OTHER, 10.0)
+        assert uav.course is not None
+        assert uav.course.position == Enu(100, 0, up)
+
+
+def test_a_warning_is_repeated_after_its_interval_and_not_when_the_other_has_just_said_it(monitor) -> None:
+    uav = monitor()
+    said = []
+    for tenth in range(40):
+        now_ns = tenth * 100 * MS
+        uav.on_hello(OTHER, at(200 - 1.0 * tenth, 50, WEST, now_ns), now_ns=now_ns)
+        if tenth == 15:
+            uav.on_warning(OTHER, Collision(3, 8.5, 0.0, 0.0), at(15, 50, EAST, now_ns), born_ns=now_ns, now_ns=now_ns)
+        uav.on_fix(at(1.0 * tenth, 50, EAST, now_ns))
+        said += [tenth] * len(uav.warnings)
+        uav.warnings = []
+    assert said == [0, 10, 25, 35]
+
+
+def test_a_uav_that_passes_far_enough_is_no_conflict(monitor) -> None:
+    uav = monitor()
+    uav.on_hello(OTHER, Motion(Enu(200, 16, 50), WEST, 0), now_ns=0)
+    uav.on_fix(at(0, 50, EAST))
+    uav.on_hello(OTHER, at(200, 66, WEST), now_ns=0)
+    uav.on_fix(at(0, 50, EAST, 1))
+    uav.on_hello(OTHER, at(300, 50, WEST), now_ns=0)
+    uav.on_fix(at(0, 50, EAST, 2))
+    assert uav.records == uav.warnings == []
+    assert uav.course is None
+
+
+def test_a_warning_that_names_us_is_heeded_though_we_hear_nothing_of_its_sender(monitor) -> None:
+    uav = monitor()
+    uav.on_warning(OTHER, Collision(4, 8.0, 0.0, 3.0), at(0, 50, EAST), born_ns=0, now_ns=S)
+    assert uav.course is None, "it was about another"
+    uav.on_warning(OTHER, Collision(3, 8.0, 4.0, 3.0), at(0, 50, EAST), born_ns=0, now_ns=S)
+    assert uav.records == [ConflictForeseen(S, 3, OTHER, 7000, 5.0, told=True)]
+    assert uav.course is not None
+    assert uav.warnings == []
+    for second in range(2, 13):
+        uav.on_fix(at(10 * second, 50, EAST, second * S))
+    assert uav.records[-1] == ConflictOver(12 * S, 3, OTHER)
+    assert uav.course.speed_m_s == HOME
+
+
+@pytest.mark.parametrize("closest_s", [13.1, 1e30, 0.0])
+def test_a_warning_of_what_is_past_or_beyond_the_horizon_is_ignored(monitor, closest_s) -> None:
+    uav = monitor()
+    uav.on_warning(OTHER, Collision(3, closest_s, 0.0, 0.0), at(0, 50, EAST), born_ns=0, now_ns=S)
+    assert uav.course is None
+
+
+def test_a_conflict_is_over_when_the_two_have_passed_and_the_mission_goes_on(monitor) -> None:
+    uav = monitor()
+    goal = Course(Enu(500, 0, 50), 10.0)
+    assert uav.permits(goal)
+    for second in range(14):
+        now_ns = second * S
+        uav.on_hello(OTHER, at(200 - 10 * second, 42, WEST, now_ns), now_ns=now_ns)
+        uav.on_fix(at(10 * second, 50 + min(15, 4 * second), EAST, now_ns))
+    (over,) = [r for r in uav.records if isinstance(r, ConflictOver)]
+    assert 11 * S < over.t_ns <= 12 * S
+    assert uav.course == goal
+
+
+def test_the_mission_s_course_waits_until_the_conflict_is_over(monitor) -> None:
+    uav = monitor()
+    uav.on_hello(OTHER, at(200, 50, WEST), now_ns=0)
+    uav.on_fix(at(0, 50, EAST))
+    assert not uav.permits(Course(Enu(0, 90, 50), 10.0))
+    uav.on_fix(at(0, 50, EAST, 1))
+    assert uav.course is not None
+    assert uav.course.position == Enu(0, 100, 90), "towards the goal, and up"
+
+
+def test_of_two_others_the_one_above_and_the_one_below_leave_the_middle_level(monitor) -> None:
+    uav = monitor(5)
+    for node, north in ((3, 0.0), (7, 5.0)):
+        uav.on_hello(NodeId(node), Motion(Enu(200, north, 50), WEST, 0), now_ns=0)
+    uav.on_fix(at(0, 50, EAST))
+    assert uav.course is not None
+    assert uav.course.position.up == 50
+
+
+@pytest.mark.parametrize("age_s", [3.6, -1.1])
+def test_a_position_that_is_old_or_of_the_future_is_refused(monitor, age_s) -> None:
+    now_ns = 10 * S
+    assert not monitor().on_hello(OTHER, at(0, 50, WEST, now_ns - round(age_s * S)), now_ns=now_ns)
+
+
+def test_many_at_once_are_parted_by_two_levels_at_most(monitor) -> None:
+    """Node 1 of five that come from different sides: `nodes.altitude_m` has room for two levels of 15 m."""
+    uav = monitor(1)
+    for other in range(2, 7):
+        uav.on_hello(NodeId(other), Motion(Enu(200, 0, 50 + 0.1 * other), WEST, 0), now_ns=0)
+    uav.on_fix(at(0, 50, EAST))
+    assert len([r for r in uav.records if isinstance(r, ConflictForeseen)]) == 5
+    now_ns, up_m = 0, 50.0
+    for _ in range(60):  # as it climbs
+        now_ns += S // 2
+        uav.on_fix(at(0, up_m, EAST, now_ns))
+        if uav.course is None or uav.course.speed_m_s == HOME:
+            break
+        climb_m = uav.course.position.up - up_m
+        up_m += climb_m / 20
+        assert up_m <= 80.01
+    assert uav.course is not None
+
+
+def test_who_is_near_but_flies_away_is_no_conflict(monitor) -> None:
+    uav = monitor()
+    uav.on_hello(OTHER, at(12, 50, EAST), now_ns=0)
+    uav.on_fix(at(0, 50, WEST))
+    assert uav.records == []
+    assert uav.warnings == []

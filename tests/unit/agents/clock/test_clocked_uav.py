@@ -1,0 +1,70 @@
+"""A UAV behind a clock of its own, hand-driven: the instants it is given, and what waits until it has swarm time."""
+
+from collections.abc import Callable
+from typing import Any
+
+from agents.clock.clocked_uav import ClockedUav
+from fanet_mw.bus.messages import Reception, TxRequest
+from fanet_mw.bus.topics import Topics
+from fanet_mw.scenario import Scenario
+from fanet_mw.units import BROADCAST, MS, US, Enu, NodeId, S
+from fanet_mw.wire import FLAG_FLOOD, PRIORITY_CONTROL, Header, Kind
+from fanet_mw.wire.inner import Member, Schedule
+
+NAMES = Topics("c")
+MakeScenario = Callable[..., Scenario]
+
+
+def clocked(make_scenario: MakeScenario, **keys: Any) -> ClockedUav:
+    given = {"nodes.count": 3, "clock.sync": "beacons", "clock.offset_ms": 5, "clock.drift_ppm": 20}
+    made = ClockedUav(make_scenario(**given | keys), NodeId(2), "c", position=Enu(0.0, 0.0, 50.0))
+    made.start(0)
+    return made
+
+
+def schedule(at_ns: int) -> Reception:
+    members = (Member(3, 0, is_head=True), Member(2, 0, is_head=False))
+    inner = Schedule(0, 5_000_000, 5_000_000, 1, 1, 1, 0, 1, members, 0).encode_frame(1)
+    header = Header(at_ns // US, 9, 1, BROADCAST, 1, Kind.SCHEDULE, 8, 0, PRIORITY_CONTROL, FLAG_FLOOD)
+    return Reception(header.encode() + inner, NodeId(1), at_ns, -60.0)
+
+
+def test_without_swarm_time_no_schedule_reaches_a_node(make_scenario: MakeScenario) -> None:
+    made = clocked(make_scenario)
+    made.receive(NAMES.radio_rx(NodeId(2)), schedule(1 * S), 1 * S)
+    report = made.report()
+    assert report["clock"]["withheld"] == 1
+    assert report["leader"] == 0
+    exact = clocked(make_scenario, **{"clock.sync": "none"})
+    exact.receive(NAMES.radio_rx(NodeId(2)), schedule(1 * S), 1 * S)
+    assert exact.report()["leader"] == 1, "who takes its own clock for swarm time believes it"
+
+
+def test_stamps_are_as_coarse_as_the_radio_s_clock(make_scenario: MakeScenario) -> None:
+    made = clocked(make_scenario, **{"clock.timestamp_us": 50})
+    stamps = {made._stamped_ns(1 * S + step * US) for step in range(1000)}
+    assert len(stamps) in (20, 21)
+    assert all(stamp_ns % (50 * US) == 0 for stamp_ns in stamps)
+
+
+def test_swarm_time_as_a_node_is_told_it_never_goes_back(make_scenario: MakeScenario) -> None:
+    """Its clock is found to be ahead when a reference with another time is followed."""
+    made = clocked(make_scenario)
+    shown = [made._now(1 * S)]
+    made._time._sync._fit.replace(made._time.line._replace(offset_ns=-20 * MS))  # type: ignore[attr-defined]
+    shown += [made._now(1 * S + step * MS) for step in range(0, 60, 5)]
+    assert shown == sorted(shown)
+    assert len(set(shown[:4])) == 1, "it stands still until swarm time has come up with it"
+    assert shown[-1] > shown[0]
+
+
+def test_what_it_announces_leaves_in_true_time(make_scenario: MakeScenario) -> None:
+    made = clocked(make_scenario, **{"radio.lead_ms": 20, "clock.sync": "none", "traffic.arrivals": "none"})
+    leads = []
+    while len(leads) < 5:
+        wake_ns = made.next_wake_ns()
+        assert wake_ns is not None
+        made.wake(wake_ns)
+        leads += [message.start_ns - wake_ns for _, message in made.outbox if isinstance(message, TxRequest)]
+        made.outbox.clear()
+    assert all(abs(lead_ns - 20 * MS) <= 3 * US for lead_ns in leads), "whatever its own clock shows"

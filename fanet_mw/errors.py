@@ -84,3 +84,7 @@ class DropReason(StrEnum):
     """The packet came so late that the turn in which it was to be relayed had begun; it was not relayed."""
     ADMISSION = "admission"
     """The packet came too soon for the node's bound to meet `traffic.deadline_s`, and was refused at its origin."""
+    BOUND_LOST = "bound_lost"
+    """The packet could no longer be everywhere within the bound that its origin had stated for it, because the turns
+    that it waited for were given up, or went to the announcements of a node that took office; it was not let out.
+    """

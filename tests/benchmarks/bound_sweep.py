@@ -26,14 +26,16 @@ from agents.applications.traffic import sources_of
 from agents.clock.clocked_uav import make_uav
 from fanet_mw.actor import Actor
 from fanet_mw.bus.messages import Message
+from fanet_mw.errors import DropReason
 from fanet_mw.graph.topology import components, within_range
 from fanet_mw.hosts.virtual import VirtualHost
 from fanet_mw.planner import Plan, plan
 from fanet_mw.scenario import Scenario, config
-from fanet_mw.trace import Record
+from fanet_mw.trace import Dropped, Record
 from fanet_mw.units import Enu, NodeId, S
 from sim.results.bounds import Column, delays_under_bound, likely
 from sim.results.packets import packets_of
+from sim.results.stored import of
 from sim.run.outcome import Outcome
 from sim.run.virtual import actors_of
 from sim.world.mobility.layout import positions
@@ -74,6 +76,8 @@ class Result(NamedTuple):
     likely: int = 0
     """The same of the packets that had a likely delay instead."""
     within_likely: int = 0
+    given_up: int = 0
+    """Packets that had a bound, and were dropped at their origin because they could no longer keep it."""
     cpu_s: float = 0.0
 
 
@@ -189,7 +193,8 @@ def measure(seed: int) -> Result:
     if drawn is None:
         return Result(seed, None, {}, cpu_s=time.process_time() - begun_s)
     kind, scenario, restarts = drawn
-    found = packets_of(flown(scenario, restarts))
+    outcome = flown(scenario, restarts)
+    found = packets_of(outcome)
     classes = {name: class_of(*delays_under_bound(app)) for name, app in found.items()}
     classes = {name: of for name, of in classes.items() if of.deliveries}
     period_ns = scenario.clusters.flooding_period_s * S
@@ -206,6 +211,7 @@ def measure(seed: int) -> Result:
         wanted=sum(app.wanted for app in found.values()),
         stated=targets * sum(packet.bound_ns is not None for packet in sent),
         likely=with_likely,
+        given_up=sum(record.reason is DropReason.BOUND_LOST for record in of(outcome.records, Dropped)),
         within_likely=round(likely(found)["within_share"] * with_likely) if with_likely else 0,
         cpu_s=time.process_time() - begun_s,
         classes=classes,
@@ -245,6 +251,7 @@ def told(kind: str, found: Sequence[Result]) -> None:
     paper, hit = sum(result.broken_paper for result in found), sum(result.broken_paper > 0 for result in found)
     print(f"{kind}: {len(found)} swarms of {min(sizes)} to {max(sizes)} nodes, {total} deliveries under a bound")
     print(f"  bound (b) broken {sum(result.broken for result in found)} times")
+    print(f"  given up by their origin, because they would have come late: {sum(r.given_up for r in found)} packets")
     print(f"  within their bound: {within} of {wanted} packets x targets ({100 * within / wanted:.2f} %)")
     print(f"  of packets with a bound: {within} of {stated} ({100 * within / max(1, stated):.2f} %)")
     likely, within_likely = sum(result.likely for result in found), sum(result.within_likely for result in found)

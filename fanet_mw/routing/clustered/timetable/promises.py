@@ -3,6 +3,9 @@
 A bound is stated for a packet when the packet is accepted: only then are queue and turns known. It is stated if it will
 be kept whatever comes later: until the packet is through no other timetable may come into force, of which the leader
 gives notice in time. Every class of packets has room of its own in a turn, so each has a bound of its own.
+
+What nobody gives notice of is that another leader prevails: two parts of a swarm have met. The node then keeps the
+turns in which it is to let out what it promised. A promised packet that would come late all the same is not sent.
 """
 
 from collections.abc import Mapping
@@ -38,8 +41,11 @@ class Promises:
         self._admission = admission
         self._lead_ns = port.scenario.radio.lead_ns
         self._interval_ns = seconds_to_ns(port.scenario.traffic.interval_s)
-        self._bounds_ns: list[Mapping[int, int]] = []
-        """Of each timetable, the bound of each class (by priority) of the node's packets; a missing class has none."""
+        self._bounds_ns: list[tuple[TurnPlan, Mapping[int, int]]] = []
+        """Each timetable, and the bound of each class (by priority) of the node's packets; a missing class has none."""
+        self._promised: dict[int, tuple[int, int]] = {}
+        """Of the packets that a bound was stated for and that still wait, by sequence number: when the flood of each is
+        over as long as the node keeps its turns, and when it must be."""
         self._ahead: tuple[TurnPlan, int] | None = None
         """The timetable looked at last, and how long before its end that must be announced."""
         self.announced_ns = 0
@@ -52,15 +58,17 @@ class Promises:
 
     # --- timetables -----------------------------------------------------------------------------------------------
 
-    def follow(self, *, superseded: int, now_ns: int) -> None:
-        """The newest timetable is another one, or there is none; so many of those before it no longer hold."""
+    def follow(self, *, now_ns: int) -> None:
+        """The newest timetable is another one, or there is none."""
         if self._plans.newest is None:
             self._bounds_ns = []
             self._admit(None, now_ns=now_ns)
             return
         own = self.own()
         self._admit(None if self._lease.leads else own, now_ns=now_ns)
-        self._bounds_ns = [*self._bounds_ns[superseded:], self.class_bounds_ns(own)]
+        *before, newest = self._plans.in_order
+        kept = [(plan, bounds_ns) for plan, bounds_ns in self._bounds_ns if any(plan is other for other in before)]
+        self._bounds_ns = [*kept, (newest, self.class_bounds_ns(own))]
 
     def _admit(self, own: OwnBound | None, *, now_ns: int) -> None:
         record = None if self._admission is None else self._admission.follow(own, now_ns=now_ns)
@@ -120,7 +128,7 @@ class Promises:
     def greatest_bound_ns(self, packet: Packet, *, now_ns: int) -> int | None:
         """The greatest bound of packets of this class under the timetables in force; None: under one there is none."""
         priority = packet.header.priority
-        bounds = [bounds_ns.get(priority) for bounds_ns in self._bounds_ns[self._plans.superseded(now_ns) :]]
+        bounds = [bounds_ns.get(priority) for _, bounds_ns in self._bounds_ns[self._plans.superseded(now_ns) :]]
         known = [bound_ns for bound_ns in bounds if bound_ns is not None]
         if not known or len(known) < len(bounds) or not self._in_step():
             return None
@@ -134,12 +142,34 @@ class Promises:
         if bound_ns is not None and through_ns is not None and newest is not None:
             had_ns = through_ns + receipt_ns(self._port.scenario)
             known_ns = self.announced_ns + newest.turns.period_ns + self._ahead_ns(newest)  # until then none is newer
-            if had_ns <= min(packet.header.origin_us * US + bound_ns, known_ns):
+            due_ns = packet.header.origin_us * US + bound_ns
+            if had_ns <= min(due_ns, known_ns):
                 self._port.record(BoundStated(now_ns, self._port.node, packet.header.seq, bound_ns))
+                self._promised[packet.header.seq] = through_ns, due_ns - receipt_ns(self._port.scenario)
+                self._forget_overdue(now_ns)
         likely_ns = self.likely_ns() if packet.header.priority == PRIORITY_BULK else None
         if likely_ns is not None and newest is not None and newest.valid_ns <= now_ns:
             record = LikelyStated(now_ns, self._port.node, packet.header.seq, likely_ns, LIKELY_SHARE)
             self._port.record(record)
+
+    def kept_until_ns(self, now_ns: int) -> int:
+        """Until when the node keeps its turns, so that what it promised can go in them; 0: nothing promised waits."""
+        self._forget_overdue(now_ns)
+        return max((through_ns for through_ns, _ in self._promised.values()), default=0)
+
+    def _forget_overdue(self, now_ns: int) -> None:
+        """Forget the oldest promises about packets that have expired, or had to go for others in a full queue."""
+        while self._promised and self._promised[oldest := next(iter(self._promised))][1] < now_ns:
+            del self._promised[oldest]
+
+    def keeps(self, packet: Packet, *, through_ns: int | None) -> bool:
+        """True if a packet that stops waiting comes in time, because its flood is over at an instant, or if nothing was
+        promised of it. None: nobody can say when its flood will be over.
+        """
+        if packet.header.origin != self._port.node:
+            return True
+        _, due_ns = self._promised.pop(packet.header.seq, (0, None))
+        return due_ns is None or (through_ns is not None and through_ns <= due_ns)
 
     # --- time and people ------------------------------------------------------------------------------------------
 
@@ -155,7 +185,7 @@ class Promises:
         """The bound of the node's bulk, application to application, under the newest timetable; None: no bound."""
         if not self._bounds_ns or self._lease.leads or not self._in_step():
             return None
-        return self._bounds_ns[-1].get(PRIORITY_BULK)
+        return self._bounds_ns[-1][1].get(PRIORITY_BULK)
 
     def least_interval_ns(self, deadline_ns: int) -> int | None:
         """The least interval between packets of the node that meets a deadline; None: there is none, or no bound."""
@@ -188,9 +218,10 @@ class Promises:
     def report(self) -> Mapping[str, object]:
         """JSON-able state."""
         bound_ns, likely_ns = self.bound_ns(), self.likely_ns()
+        bounds_ns = self._bounds_ns[-1][1] if self._bounds_ns else {}
         return {
             "likely_ms": None if likely_ns is None else likely_ns / MS,
             "likely_share": None if likely_ns is None else LIKELY_SHARE,
             "bound_ms": None if bound_ns is None else bound_ns / MS,
-            "bounds_ms": {_CLASSES[p]: ns / MS for p, ns in self._bounds_ns[-1].items()} if self._bounds_ns else {},
+            "bounds_ms": {_CLASSES[p]: ns / MS for p, ns in bounds_ns.items()},
         }

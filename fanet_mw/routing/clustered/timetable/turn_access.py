@@ -5,7 +5,7 @@ window at the beginning of each superframe: hellos, joins, unicasts to a head, a
 links hellos and answers have turns of their own, the calls.
 """
 
-from collections.abc import Mapping
+from collections.abc import Mapping, Sequence
 from typing import Final
 
 from fanet_mw.errors import DropReason
@@ -59,16 +59,35 @@ class TurnAccess:
     # --- timetables and roles -------------------------------------------------------------------------------------
 
     def follow(self, plan: TurnPlan | None, *, now_ns: int) -> None:
-        """Take up a timetable that comes into force later; None: there is none that fits."""
-        superseded = self._plans.superseded(now_ns)
+        """Take up a timetable that comes into force later, or holds already: that of another leader, which this node
+        follows only when what it promised under the one before has gone. None: there is none that fits.
+        """
+        if plan is not None:
+            plan = plan._replace(valid_ns=max(plan.valid_ns, self._promises.kept_until_ns(now_ns)))
         self._plans.follow(plan, now_ns=now_ns)
-        self._promises.follow(superseded=superseded, now_ns=now_ns)
+        self._promises.follow(now_ns=now_ns)
         self.use_turns(now_ns)
         if plan is None:
             self._calls.drain()  # what neighbors lack they will say again
-        stranded = [] if self._roots.has_turn(now_ns=now_ns) else self._roots.drain()
+        stranded = [] if self._roots.has_turn(now_ns=now_ns) else self._stranded(now_ns)
         for packet in [*stranded, *self._slots.drain()]:
             self.forward(packet, start_ns=now_ns + self._lead_ns, now_ns=now_ns)
+
+    def _stranded(self, now_ns: int) -> list[Packet]:
+        """Take out the packets whose turns are gone, to go another way; those that a bound was stated for are dropped,
+        because any other way takes as long as it takes.
+        """
+        return self._kept(self._roots.drain(), through_ns=None, now_ns=now_ns)
+
+    def _kept(self, packets: Sequence[Packet], *, through_ns: int | None, now_ns: int) -> list[Packet]:
+        """Those of some packets that stop waiting that break no promise; the others are dropped."""
+        kept = []
+        for packet in packets:
+            if self._promises.keeps(packet, through_ns=through_ns):
+                kept.append(packet)
+            else:
+                self._port.drop(DropReason.BOUND_LOST, packet, now_ns=now_ns)
+        return kept
 
     def use_turns(self, now_ns: int) -> None:
         """Let packets out in the turns of the timetables that are followed."""
@@ -175,12 +194,22 @@ class TurnAccess:
         for packet in self._roots.expire(before_us=(now_ns - self._lifetime_ns) // US):
             self._port.drop(DropReason.EXPIRED, packet, now_ns=now_ns)
         for packets, start_ns in self._roots.due(now_ns=now_ns):
-            self._floods.begin(packets, start_ns=start_ns, again_ns=self._repetitions(start_ns))
+            kept = self._kept(packets, through_ns=self._through_ns(start_ns), now_ns=now_ns)
+            if kept:
+                self._floods.begin(kept, start_ns=start_ns, again_ns=self._repetitions(start_ns))
         if len(self._roots) and not self._roots.has_turn(now_ns=now_ns):
-            for packet in self._roots.drain():  # that was the node's last turn: the next timetable has none for it
+            for packet in self._stranded(now_ns):  # that was the node's last turn: the next timetable has none for it
                 self.forward(packet, start_ns=now_ns + self._lead_ns, now_ns=now_ns)
         for packets, start_ns in self._calls.due(now_ns=now_ns):
             self._floods.answer(packets, start_ns=start_ns)
+
+    def _through_ns(self, start_ns: int) -> int | None:
+        """When the flood is over that begins in one of the node's turns; None: no timetable is in force."""
+        plan = self._plans.at(start_ns)
+        turn = None if plan is None else plan.turns.turn_at(start_ns)
+        if plan is None or turn is None:
+            return None
+        return start_ns + plan.turns.flood_ns(turn, span=plan.table.spans.get(self._port.node, 1))
 
     def _repetitions(self, start_ns: int) -> list[int]:
         """When a frame that is let out at an instant is repeated."""

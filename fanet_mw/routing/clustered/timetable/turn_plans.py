@@ -31,5 +31,11 @@ class TurnPlans:
         return sum(plan.valid_ns <= now_ns for plan in self.in_order[1:])
 
     def follow(self, plan: TurnPlan | None, *, now_ns: int) -> None:
-        """Take up a newer timetable, and forget those that no longer hold; None: follow none."""
-        self.in_order = [] if plan is None else [*self.in_order[self.superseded(now_ns) :], plan]
+        """Take up a newer timetable, and forget those that no longer hold, or would hold from later on than it does:
+        those of a leader that another one prevails over. None: follow none.
+        """
+        if plan is None:
+            self.in_order = []
+            return
+        before = (older for older in self.in_order[self.superseded(now_ns) :] if older.valid_ns < plan.valid_ns)
+        self.in_order = [*before, plan]

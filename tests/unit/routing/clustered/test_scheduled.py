@@ -182,14 +182,14 @@ def informed(node: Node, *, told_ms: int) -> TurnAccess:
     """The node follows a timetable, and heard an announcement of it that was made at an instant."""
     access = access_of(node)
     access._promises.announced_ns = told_ms * MS
-    access._promises.follow(superseded=0, now_ns=told_ms * MS)
+    access._promises.follow(now_ns=told_ms * MS)
     access.use_turns(told_ms * MS)
     return access
 
 
-def promised(node: Node, *, at_ms: int) -> list[BoundStated]:
+def promised(node: Node, *, at_ms: int, size: int = 40) -> list[BoundStated]:
     node.send(
-        filler(40), destination=BROADCAST, priority=PRIORITY_BULK, app="test", born_ns=at_ms * MS, now_ns=at_ms * MS
+        filler(size), destination=BROADCAST, priority=PRIORITY_BULK, app="test", born_ns=at_ms * MS, now_ns=at_ms * MS
     )
     return [record for record in node.records if isinstance(record, BoundStated)]
 
@@ -238,6 +238,64 @@ def test_turns_are_used_until_a_timetable_without_any_comes_into_force(node: Nod
     assert [start_ms for start_ms in relays(node) if start_ms > 60] == [64, 164, 264, 964]
     assert len(access._roots) == 0, "what has no turn any more goes another way"
     assert node.report()["waiting"] == 2
+
+
+def test_what_was_promised_keeps_its_turn_when_another_leader_s_timetable_holds_at_once(node: Node) -> None:
+    """Two parts of a swarm meet: the timetable of the leader that prevails holds already, and has no turn for us."""
+    access = informed(node, told_ms=10_000)
+    assert promised(node, at_ms=11_520)
+    access.follow(planned(FLOODS[:5], valid_ns=11_000 * MS), now_ns=11_530 * MS)
+    node.send(
+        filler(40), destination=BROADCAST, priority=PRIORITY_BULK, app="test", born_ns=11_540 * MS, now_ns=11_540 * MS
+    )
+    while (wake_ns := access._roots.next_wake_ns()) is not None:
+        node.wake(wake_ns)
+    assert relays(node) == [11_564.0], "both fit into that turn"
+    assert len(promised(node, at_ms=11_600)) == 1, "nothing more is promised"
+    assert access._roots.next_wake_ns() is None, "the turns are those of the other timetable now"
+
+
+def test_a_timetable_of_another_leader_takes_the_place_of_one_that_is_still_to_come(node: Node) -> None:
+    access = informed(node, told_ms=0)
+    access.follow(planned(FLOODS, valid_ns=2000 * MS), now_ns=100 * MS)
+    access.follow(planned(FLOODS[:5], valid_ns=50 * MS), now_ns=200 * MS)
+    assert [plan.valid_ns // MS for plan in access._plans.in_order] == [0, 50]
+    assert not access._roots.has_turn(now_ns=200 * MS)
+
+
+def test_a_packet_whose_turns_are_gone_is_dropped_if_a_bound_was_stated_for_it(node: Node) -> None:
+    """No timetable fits any more: what was promised would come late, the rest waits for a way to a head."""
+    access = informed(node, told_ms=10_000)
+    for _ in range(2):
+        node.send(
+            filler(900),
+            destination=BROADCAST,
+            priority=PRIORITY_BULK,
+            app="test",
+            born_ns=11_520 * MS,
+            now_ns=11_520 * MS,
+            watch=True,
+        )
+    assert [record.seq for record in node.records if isinstance(record, BoundStated)] == [0]
+    access.follow(None, now_ns=11_530 * MS)
+    assert node.dropped == {DropReason.BOUND_LOST: 1}
+    assert node.fates == [(0, 11_530 * MS, DropReason.BOUND_LOST)], "its application is told"
+    assert node.report()["waiting"] == 1
+
+
+def test_a_packet_that_would_come_after_its_bound_is_dropped_in_its_turn(node: Node) -> None:
+    """The node takes office after it stated the bound, and its announcement takes the place of bulk in its turn."""
+    access = informed(node, told_ms=10_000)
+    assert promised(node, at_ms=11_520, size=200)
+    access._promises._lease.take_office(11_530 * MS)
+    access.flood_control(Kind.SCHEDULE, filler(900), now_ns=11_530 * MS)
+    node.send(
+        filler(40), destination=BROADCAST, priority=PRIORITY_BULK, app="test", born_ns=11_540 * MS, now_ns=11_540 * MS
+    )
+    for _ in range(2):
+        node.wake(access._roots.next_wake_ns() or 0)
+    assert node.dropped == {DropReason.BOUND_LOST: 1}
+    assert relays(node) == [11_664.0], "nothing was promised of the other one, so it goes late"
 
 
 def test_a_leader_promises_nothing_for_bulk(node: Node) -> None:

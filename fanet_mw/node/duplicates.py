@@ -1,5 +1,7 @@
-"""What a node has already handled of each packet, as bits by (origin, sequence). Bounded: two generations of keys.
+"""What a node has already handled of each packet, as bits under the packet's key. Bounded: two generations of keys.
 
+A node's key is a hash of all that the origin wrote (`reader.name_of`), so that a forged packet under the same origin
+and sequence number takes the place of none. Queues, and radios for their datagrams, tell packets apart by `key_of`.
 A key is forgotten after at least `capacity` newer ones, so a packet comes back as new only if its duplicates are
 older than that; the packet lifetime ends it long before.
 """
@@ -15,17 +17,17 @@ CARRIED: Final = 4
 
 
 _SPREAD: Final = (1 << 32) + 40_503
-"""Above 2^32, so that no two packets have the same key; not 2^32, because a dict looks for a number by its low bits:
-the packets that all origins send at about the same time have about the same sequence number."""
+"""Above 2^32, so that no two pairs of origin and sequence number give the same key; not 2^32, because a dict looks for
+a number by its low bits: the packets that all origins send at about the same time have about the same number."""
 
 
 def key_of(origin: int, seq: int) -> int:
-    """One number per packet; `seq` has 32 bits."""
+    """One number for each pair of origin and sequence number; `seq` has 32 bits."""
     return origin * _SPREAD + seq
 
 
 class DuplicateSet:
-    """Bits per packet key."""
+    """The bits of each key."""
 
     def __init__(self, capacity: int = 32_768) -> None:
         self._capacity = capacity

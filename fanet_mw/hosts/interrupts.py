@@ -3,6 +3,9 @@
 Python handles SIGINT only if it was not ignored when the process started, and a shell script starts `command &` with
 SIGINT ignored. Each entry point therefore calls `install`: from then on both signals raise KeyboardInterrupt with the
 signal's number; `hosts.loop.run` cancels its coroutine instead, so that nothing is interrupted half-way.
+
+A signal that comes during an import may be lost: a library that tries an import, and carries on whatever happens, takes
+the KeyboardInterrupt for a failure of that import. What starts after the imports therefore calls `raise_again`.
 """
 
 import gc
@@ -14,16 +17,25 @@ from types import FrameType
 from typing import Final, NoReturn
 
 SIGNALS: Final = (signal.SIGINT, signal.SIGTERM)
+_raised: Final[list[int]] = []
 
 
 def _raise(number: int, _frame: FrameType | None) -> NoReturn:
+    _raised.append(number)
     raise KeyboardInterrupt(number)
 
 
 def install() -> None:
     """Handle both signals from here on, even if the process was started with them ignored."""
+    _raised.clear()
     for number in SIGNALS:
         signal.signal(number, _raise)
+
+
+def raise_again() -> None:
+    """Raise KeyboardInterrupt if one was raised since `install`: whoever comes here has not heard of it."""
+    if _raised:
+        raise KeyboardInterrupt(_raised[0])
 
 
 def installed() -> bool:
@@ -33,7 +45,10 @@ def installed() -> bool:
 
 @contextmanager
 def handed_to(on_signal: Callable[[int], None]) -> Iterator[None]:
-    """Call `on_signal` with the number of the first signal that comes; any further signal raises KeyboardInterrupt."""
+    """Call `on_signal` with the number of the first signal that comes; any further signal raises KeyboardInterrupt.
+
+    Raises KeyboardInterrupt if one was raised before and got lost.
+    """
 
     def first(number: int, _frame: FrameType | None) -> None:
         install()
@@ -43,6 +58,7 @@ def handed_to(on_signal: Callable[[int], None]) -> Iterator[None]:
     for number in SIGNALS:
         signal.signal(number, first)
     try:
+        raise_again()
         yield
     finally:
         for number, handler in zip(SIGNALS, before, strict=True):
@@ -59,6 +75,10 @@ def leave(code: int) -> NoReturn:
     """End the process without a final garbage collection over everything that is imported.
 
     With numba that collection takes a fifth of a second, and several seconds on a machine whose cores are busy.
+
+    CPython ends `python -m` with SIGINT, whatever the code, once a KeyboardInterrupt has left a text that `exec` runs,
+    as `namedtuple` and `dataclass` do during imports; the next such text makes it forget.
     """
+    exec("")  # noqa: S102
     gc.freeze()
     sys.exit(code)

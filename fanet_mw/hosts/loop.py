@@ -31,6 +31,7 @@ async def _cancelled_by_signals(main: Coroutine[Any, Any, T]) -> T:
     for number in interrupts.SIGNALS:
         loop.add_signal_handler(number, on_signal, number)
     try:
+        interrupts.raise_again()
         return await task
     except asyncio.CancelledError:
         if not caught:

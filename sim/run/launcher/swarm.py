@@ -282,6 +282,8 @@ async def launch(
             loop.add_signal_handler(number, run.interrupt, number)
         on_started(run)
         try:
+            if heed_signals:
+                interrupts.raise_again()
             return await run.run(on_progress)
         finally:
             for number in signals:

@@ -149,7 +149,7 @@ async def test_one_wake_up_is_one_put_per_topic_and_every_record_arrives_once() 
     actor = Ticker()
     observer = await run(actor, until_ns=1400 * MS)
     said = [messages for topic, messages in observer.puts if topic == NAMES.mavlink(7)]
-    assert actor.wakes > 3
+    assert actor.wakes > 10
     assert len(said) == actor.wakes
     assert {len(messages) for messages in said} == {3}
     assert observer.codes() == list(range(1, actor.wakes + 1))
@@ -169,12 +169,13 @@ class AsksForThePast(Ticker):
 
 async def test_an_instant_that_was_past_when_it_was_asked_for_is_not_the_hosts_lateness() -> None:
     actor = AsksForThePast()
+    began_s = time.monotonic()
     observer = await run(actor, until_ns=600 * MS)
-    host = await observer.last_report()
+    host, took_ms = await observer.last_report(), 1000 * (time.monotonic() - began_s)
     assert actor.wakes > 3
-    assert host["asked_past_ms"] >= 10_000
-    assert host["wake_lateness_ms"]["max"] < 9000
-    assert host["stall_ms"] < 9000
+    assert 10_000 <= host["asked_past_ms"] < 10_500 + host["stall_ms"]
+    assert host["wake_lateness_ms"]["max"] < 500 + host["stall_ms"]
+    assert host["stall_ms"] < max(500, took_ms), "what lay ten seconds back held nobody up"
 
 
 class Accounts(Ticker):
@@ -213,16 +214,18 @@ class HoldsUp(Ticker):
 
 
 async def test_a_host_that_could_do_nothing_for_a_while_says_for_how_long() -> None:
+    began_s = time.monotonic()
     observer = await run(HoldsUp(), until_ns=1000 * MS)
-    host = await observer.last_report()
-    assert 250 < host["stall_ms"] < 100_000, "in milliseconds"
+    host, took_ms = await observer.last_report(), 1000 * (time.monotonic() - began_s)
+    assert 250 < host["stall_ms"] < max(1000, took_ms)
 
 
 async def test_a_stopped_clock_ends_the_actor_early_and_settles_it() -> None:
     actor = Ticker()
+    began_s = time.monotonic()
     observer = await run(actor, until_ns=1000 * S, stop_after_s=0.3)
     assert actor.stopped_ns is not None
-    assert 0.3 * S < actor.stopped_ns < 1000 * S
+    assert 0.3 * S < actor.stopped_ns < max(3.0, time.monotonic() - began_s) * S
     assert observer.reports()[-1]["final"] is True
 
 
@@ -364,9 +367,10 @@ async def test_an_actor_that_starts_after_a_step_of_the_clock_joins_the_swarm_wh
         host = asyncio.create_task(
             run_actor(actor, SwarmAddress("host", endpoint), until_ns=1000 * S, timebase=stepped)
         )
-        while actor.wakes < 5 and not host.done():  # noqa: ASYNC110  (real time passes)
+        while actor.wakes < 6 and not host.done():  # noqa: ASYNC110  (real time passes)
             await asyncio.sleep(0.01)
         assert 700 * MS < actor.next_ns < clock.now_ns() + 100 * MS
+        assert actor.wakes > 5
         keeper.stop()
         await host
         await observer.last_report()

@@ -3,7 +3,6 @@ arrive as in emulation. Needs the right to make namespaces; skipped, with the re
 """
 
 import asyncio
-import itertools
 import json
 import os
 import subprocess
@@ -11,6 +10,7 @@ import sys
 import time
 from collections.abc import Iterator
 from pathlib import Path
+from typing import NamedTuple
 
 import pytest
 
@@ -52,7 +52,22 @@ reports_to_approach = 3
 """
 
 
-_COUNTER = itertools.count()
+class Network(NamedTuple):
+    """Namespaces joined by a bridge, with a subnet of their own: tests that run side by side share one route table."""
+
+    names: list[str]
+    prefix: str
+
+    def address(self, node: int) -> str:
+        return f"{self.prefix}.{node}"
+
+    @property
+    def bridge(self) -> str:
+        return f"{self.prefix}.254"
+
+    @property
+    def broadcast(self) -> str:
+        return f"{self.prefix}.255"
 
 
 def sh(*command: str) -> None:
@@ -60,42 +75,44 @@ def sh(*command: str) -> None:
 
 
 @pytest.fixture
-def network() -> Iterator[list[str]]:
-    """Names of five namespaces, addresses 10.77.0.1-5, on a bridge at 10.77.0.254."""
-    tag = f"fn{os.getpid() % 1000}{next(_COUNTER)}"  # what is deleted lingers for a moment: no name twice
-    names = [f"{tag}n{i}" for i in range(1, COUNT + 1)]
+def network() -> Iterator[Network]:
+    """Five namespaces, addresses .1 to .5 of a /24 subnet, on a bridge with its address .254."""
+    number = int.from_bytes(os.urandom(2)) % 2**14  # what is deleted lingers for a moment: no name and no subnet twice
+    tag, prefix = f"fn{number}", f"10.{64 + (number >> 8)}.{number & 255}"
+    network = Network([f"{tag}n{i}" for i in range(1, COUNT + 1)], prefix)
     bridge = f"{tag}b"
     try:
         try:
             sh("ip", "link", "add", bridge, "type", "bridge")
-            sh("ip", "addr", "add", "10.77.0.254/24", "dev", bridge)
+            sh("ip", "addr", "add", f"{network.bridge}/24", "dev", bridge)
             sh("ip", "link", "set", bridge, "up")
-            for i, name in enumerate(names, start=1):
+            for i, name in enumerate(network.names, start=1):
+                own = f"{network.address(i)}/24"
                 sh("ip", "netns", "add", name)
                 sh("ip", "link", "add", f"{tag}v{i}", "type", "veth", "peer", "name", "wlan0", "netns", name)
                 sh("ip", "link", "set", f"{tag}v{i}", "master", bridge, "up")
-                sh("ip", "-n", name, "addr", "add", f"10.77.0.{i}/24", "broadcast", "10.77.0.255", "dev", "wlan0")
+                sh("ip", "-n", name, "addr", "add", own, "broadcast", network.broadcast, "dev", "wlan0")
                 sh("ip", "-n", name, "link", "set", "wlan0", "up")
         except (OSError, subprocess.CalledProcessError) as error:
             said = getattr(error, "stderr", "") or str(error)
             pytest.skip(f"network namespaces are not permitted here: {said.strip()}")
-        yield names
+        yield network
     finally:
-        for name in names:
+        for name in network.names:
             subprocess.run(["ip", "netns", "del", name], check=False, capture_output=True)
         subprocess.run(["ip", "link", "del", bridge], check=False, capture_output=True)
 
 
-def fly(names: list[str], scenario: Path, *more: str) -> list[subprocess.Popen[str]]:
+def fly(network: Network, scenario: Path, *more: str) -> list[subprocess.Popen[str]]:
     return [
         subprocess.Popen(
             [
                 "ip", "netns", "exec", name, sys.executable, "-m", "agents", str(scenario), "--id", str(node),
-                "--radio-address", f"10.77.0.{node}", "--radio-broadcast", "10.77.0.255", *more,
+                "--radio-address", network.address(node), "--radio-broadcast", network.broadcast, *more,
             ],
             stdout=subprocess.PIPE, stderr=subprocess.PIPE, text=True,
         )
-        for node, name in enumerate(names, start=1)
+        for node, name in enumerate(network.names, start=1)
     ]  # fmt: skip
 
 
@@ -153,15 +170,15 @@ def scan(now_ns: int) -> WifiScan:
     return WifiScan(now_ns, ((PHONE, -60.0),))
 
 
-async def with_a_router(names: list[str], path: Path) -> list[Record]:
+async def with_a_router(network: Network, path: Path) -> list[Record]:
     """The launcher's part: clock and sensors over Zenoh, frames over the interfaces."""
     topic_names = Topics("field")
     batches: list[bytes] = []
-    endpoint = "tcp/10.77.0.254:17447"
+    endpoint = f"tcp/{network.bridge}:17447"
     with Bus.serve(endpoint) as bus:
         bus.subscribe(topic_names.all_traces, lambda _, payload: batches.append(payload))
         keeper = ClockKeeper(bus, topic_names, time_scale=1.0, expected=[f"agent-{n}" for n in range(1, COUNT + 1)])
-        processes = fly(names, path, "--connect", endpoint)
+        processes = fly(network, path, "--connect", endpoint)
         try:
             clock = SwarmClock(await keeper.start(timeout_s=30))
             for node in (1, 2, 3):
@@ -171,13 +188,14 @@ async def with_a_router(names: list[str], path: Path) -> list[Record]:
         finally:
             for process in processes:
                 process.kill()
+                process.communicate()
     assert all(report["radio"]["malformed"] == 0 for report in reports if "malformed" in report["radio"])  # type: ignore[index, operator]
     decoded = [message for payload in batches for message in topics.decode(payload)]
     return [record for message in decoded if isinstance(message, TraceBatch) for record in message.records]
 
 
 async def test_the_same_mission_messages_arrive_over_real_sockets_as_in_emulation(
-    network: list[str], tmp_path: Path
+    network: Network, tmp_path: Path
 ) -> None:
     path = tmp_path / "field.toml"
     path.write_text(SCENARIO)
@@ -188,13 +206,13 @@ async def test_the_same_mission_messages_arrive_over_real_sockets_as_in_emulatio
     delivered = [r for r in records if isinstance(r, Delivered) and (r.origin, r.seq) in traffic]
     assert len(traffic) == COUNT * 3
     assert len(delivered) == len(traffic) * (COUNT - 1)
-    assert max(r.delay_ns for r in delivered) < 2 * S
+    assert max(r.delay_ns for r in delivered) < 500 * MS
 
 
-def test_without_a_router_the_swarm_starts_at_the_epoch_that_all_were_given(network: list[str], tmp_path: Path) -> None:
+def test_without_a_router_the_swarm_starts_at_the_epoch_that_all_were_given(network: Network, tmp_path: Path) -> None:
     path = tmp_path / "field.toml"
     path.write_text(SCENARIO)
-    epoch = str(time.time_ns() / S + 4.0)
+    epoch = str(time.time_ns() / S + 10.0)
     reports = finished(fly(network, path, "--epoch", epoch))
     for report in reports:
         assert report["generated"] == 3

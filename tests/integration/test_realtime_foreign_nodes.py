@@ -62,7 +62,7 @@ def test_a_world_and_a_reader_that_know_zenoh_alone(processes: Processes, tmp_pa
     reader = processes.start(str(examples / "reader.py"), endpoint, "foreign", "60")
     out, err = launch.communicate(timeout=100)
     summary = json.loads(out)
-    assert summary["pdr"] > 0, err
+    assert summary["pdr"] > 0.5, err
     assert summary["absent"] == {}, "no report is asked of a world of somebody else"
     reader.send_signal(signal.SIGINT)
     heard = json.loads(reader.communicate(timeout=60)[0])
@@ -96,7 +96,7 @@ def test_a_router_names_who_is_wrong_and_writes_what_the_right_ones_did(processe
     out, err = router.communicate(timeout=60)
     assert router.returncode in (0, 1), err  # 1: this machine did not hold real time
     summary = json.loads((tmp_path / "out" / "summary.json").read_text())
-    assert summary["pdr"] > 0
+    assert summary["pdr"] > 0.5
     assert summary["absent"] == {}
     assert "traffic" in out
     assert [service.wait(timeout=60) for service in services] == [0, 0, 0, 0]

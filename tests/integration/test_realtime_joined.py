@@ -13,7 +13,7 @@ from pathlib import Path
 import pytest
 from correspondent import Correspondent
 from installed import EXAMPLES, Installed
-from test_real_radio import COUNT, network
+from test_real_radio import COUNT, Network, network
 
 import fanet_mw
 from fanet_mw.bus.topics import Topics
@@ -75,16 +75,16 @@ async def over_zenoh(path: Path) -> Got:
     return {item for mail in mails for item in mail.got}
 
 
-def on_air(path: Path, names: list[str]) -> Got:
+def on_air(path: Path, network: Network) -> Got:
     epoch = str(time.time() + 4)  # noqa: TID251  (a real clock)
     script = str(Path(__file__).with_name("correspondent.py"))
     processes = [
         subprocess.Popen(
-            ["ip", "netns", "exec", name, sys.executable, script, str(path), str(node), f"10.77.0.{node}",
-             "10.77.0.255", epoch],
+            ["ip", "netns", "exec", name, sys.executable, script, str(path), str(node), network.address(node),
+             network.broadcast, epoch],
             stdout=subprocess.PIPE, stderr=subprocess.PIPE, text=True,
         )
-        for node, name in enumerate(names, start=1)
+        for node, name in enumerate(network.names, start=1)
     ]  # fmt: skip
     ended = [process.communicate(timeout=60) for process in processes]
     assert [process.returncode for process in processes] == [0] * COUNT, [err for _, err in ended]
@@ -92,7 +92,7 @@ def on_air(path: Path, names: list[str]) -> Got:
 
 
 @pytest.mark.slow
-def test_the_same_messages_arrive_in_virtual_time_over_zenoh_and_over_udp(tmp_path: Path, network: list[str]) -> None:
+def test_the_same_messages_arrive_in_virtual_time_over_zenoh_and_over_udp(tmp_path: Path, network: Network) -> None:
     path = _text(tmp_path / "letters.toml")
     expected = in_virtual_time(path)
     assert on_air(path, network) == expected

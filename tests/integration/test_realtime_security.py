@@ -184,9 +184,9 @@ def test_a_swarm_of_processes_works_with_keys_and_access_lists(keys: Path) -> No
     summary = finish(outcome, out=None)
     assert summary["absent"] == {}
     assert summary["heard"]["malformed"] == 0
-    assert summary["frames"]["sent"] > 5
+    assert summary["frames"]["sent"] > 30
     assert summary["frames"]["closes"]
-    assert summary["pdr"] > 0
+    assert summary["pdr"] > 0.5
 
 
 def test_a_file_that_is_no_configuration_is_one_message(tmp_path: Path) -> None:

@@ -81,7 +81,7 @@ def test_turns_announced_ahead_are_kept_by_real_processes(relay: str) -> None:
     times = ["duration_s=11", "warmup_s=7.5", "drain_s=1", f"clusters.relay={relay}"]
     summary = finish(run(catalog.find("clusters", [*keys, *times]))[0], out=None)
     assert summary["frames"]["closes"]
-    assert summary["pdr"] > 0
+    assert summary["pdr"] > 0.9
     assert summary["bound"].get("violations", 0) == 0
 
 
@@ -90,14 +90,14 @@ def test_a_swarm_of_processes_delivers_and_accounts_for_every_frame(tmp_path: Pa
     summary = finish(outcome, out=tmp_path / "out")
     assert summary["mode"] == "realtime"
     assert summary["frames"]["closes"]
-    assert summary["frames"]["sent"] > 30
-    assert summary["pdr"] > 0
+    assert summary["frames"]["sent"] > 100
+    assert summary["pdr"] > 0.5
     frames = summary["frames"]
     assert summary["lateness"]["frames"] >= frames["sent"] - frames["dropped"].get("bus", 0)
     assert {report["host"]["malformed"] for report in outcome.reports.values()} == {0}
     assert json.loads((tmp_path / "out/summary.json").read_text())["trace_sha256"] == summary["trace_sha256"]
     frames = list(tlog.read(tmp_path / "out/mavlink.tlog"))
-    assert len(frames) > 5
+    assert len(frames) > 50
 
 
 def test_a_killed_agent_is_named_and_the_others_carry_on() -> None:

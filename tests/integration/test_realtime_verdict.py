@@ -78,13 +78,13 @@ def test_a_run_whose_emulator_was_killed_and_started_again_is_not_valid_and_says
     outcome, summary = run(scenario("duration_s=8"), (1.5, send(signal.SIGKILL, "emulator")), respawn=True)
     assert about(summary, "emulator ended")
     missing = summary["frames"]["unaccounted"]
-    assert missing > 0
+    assert missing > 20
     assert about(summary, "frames unaccounted") == (
         f"frames unaccounted for: {missing} of {summary['frames']['sent']}, limit 0"
     )
     assert not summary["frames"]["closes"]
     assert outcome.aborted is None
-    assert outcome.reports["emulator"]["frames"]["delivered"] > 0, "frames flow again"
+    assert outcome.reports["emulator"]["frames"]["delivered"] > 20, "frames flow again"
     assert summary["frames"]["in_flight"] < 20, "what nobody knows of is not called in flight"
 
 
@@ -165,9 +165,10 @@ def test_an_agent_that_is_started_again_after_a_step_of_the_clock_takes_part(
     assert about(summary, "agent-4 ended")
     assert outcome.reports["agent-4"]["final"]
     again = outcome.reports["agent-4"]["host"]
-    assert again["asked_past_ms"] < 5000, "half of the step"
+    assert again["asked_past_ms"] < 200 + again["stall_ms"]
     frames = summary["frames"]
     assert frames["closes"]
+    assert frames["dropped"].get("late", 0) < 20, "it does not send for instants that are long past"
 
 
 def agent_after_a_step(step_s: float, **arguments: Any) -> int:

@@ -14,7 +14,7 @@ from fanet_mw.bus.messages import Report, TxRequest
 from fanet_mw.bus.topics import Topics
 from fanet_mw.hosts.bus import Bus
 from fanet_mw.trace import Generated
-from fanet_mw.units import BROADCAST, S
+from fanet_mw.units import BROADCAST, MS, S
 from sim.results.files import finish
 from sim.run.launcher.swarm import launch
 from sim.run.virtual import simulate
@@ -36,13 +36,14 @@ async def test_a_lead_is_swarm_time_so_that_a_slow_clock_gives_slow_processes_mo
                 request = TxRequest(seq, start_ns, b"frame", BROADCAST, wants_status=False)
                 bus.put(names.radio_tx(1), topics.encode([request]))
             await asyncio.sleep(0.5)
+            lag_ms = (clock.now_ns() - start_ns) / MS
     (last,) = topics.decode(reports[-1])
     assert isinstance(last, Report)
     found = json.loads(last.json)["late"]
     assert found["frames"] == 10
     if late:
         assert found["late_frames"] == 10
-        assert found["max_ms"] > 990
+        assert 990 < found["max_ms"] < lag_ms
     else:
         assert found["late_frames"] == 0
 
@@ -64,11 +65,11 @@ async def test_a_swarm_of_processes_lives_by_its_clock(tmp_path: Path, time_scal
     outcome = await launch(scenario, swarm="scaled", emulator_options={"pcap": pcap, "receptions": False})
     summary, virtual = finish(outcome, out=tmp_path), finish(simulate(scenario), out=None)
     assert summary["time_scale"] == time_scale
-    assert summary["wall_s"] >= 3 / time_scale
+    assert 3 / time_scale <= summary["wall_s"] < 3 / time_scale + 2 + outcome.stall_ms / 1000
     assert summary["frames"]["closes"]
     assert summary["aborted"] is None
     assert summary["generated"] == virtual["generated"], "as much happens in a swarm second as ever"
-    assert summary["pdr"] > 0
+    assert summary["pdr"] > 0.9
     generated = [record.t_ns for record in outcome.records if isinstance(record, Generated)]
     assert 1 * S <= min(generated) < max(generated) < 2.5 * S
     host = outcome.reports["agent-1"]["host"]

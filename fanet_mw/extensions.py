@@ -80,7 +80,7 @@ def load(key: str, name: str) -> Any:  # noqa: ANN401  (whatever the contract of
     return found
 
 
-class Named:
+class PartName:
     """The annotation of a key that holds the name of a part: an own part, or one that can be loaded."""
 
     def __init__(self, key: str, ours: Sequence[str]) -> None:

@@ -7,8 +7,8 @@ from pathlib import Path
 from typing import Any
 
 from fanet_mw.bus import layouts
+from fanet_mw.bus.codecs import CODES
 from fanet_mw.bus.messages import ClockState, SetpointKind, TxOutcome
-from fanet_mw.bus.topics import CODES
 
 DOCUMENT = Path(__file__).resolve().parent.parent / "docs" / "reference" / "bus.md"
 HEAD = """# The bus

@@ -12,8 +12,8 @@ from fanet_mw import mavlink, wire
 from fanet_mw.application import Application, AppPort, Course, Received
 from fanet_mw.bus.messages import Gps
 from fanet_mw.errors import MalformedFrameError
+from fanet_mw.motion import Motion
 from fanet_mw.node.reader import decoded, packet_of
-from fanet_mw.routing.clustered.roles.position_updates import Motion
 from fanet_mw.scenario import Scenario
 from fanet_mw.trace import Warned
 from fanet_mw.units import MS, NodeId

@@ -19,7 +19,7 @@ from typing import Final, NamedTuple
 from fanet_mw.application import HOME, Course
 from fanet_mw.closest_approach import ClosestApproach, closest
 from fanet_mw.mavlink import Collision
-from fanet_mw.routing.clustered.roles.position_updates import Motion
+from fanet_mw.motion import Motion
 from fanet_mw.scenario import Scenario
 from fanet_mw.trace import ConflictForeseen, ConflictOver, Record
 from fanet_mw.units import MS, Enu, NodeId, S, seconds_to_ns

@@ -5,7 +5,6 @@ Each hands what its UAV senses and is told to the mission, and empties the missi
 
 from typing import Final
 
-from agents.mission.navigation.motion import Motion
 from agents.mission.navigation.onboard_map import NO_MAP, OnboardMap
 from agents.mission.outbox import Outbox
 from agents.mission.paper_rule import PaperRule
@@ -14,12 +13,13 @@ from fanet_mw import mavlink
 from fanet_mw.application import Application, AppPort, Course, Received
 from fanet_mw.bus.messages import Altimeter, Battery, Camera, Gps, Radar, SensorReading, Voice, WifiScan
 from fanet_mw.errors import MalformedFrameError
+from fanet_mw.motion import Motion
 from fanet_mw.node.reader import decoded, packet_of
 from fanet_mw.scenario import Scenario
 from fanet_mw.units import MS, Enu, NodeId, S
 from fanet_mw.wire import BIDS, FOUND, SEARCH, STATUS, SURVIVOR
 from fanet_mw.wire.inner import Survivor
-from fanet_mw.wire.search import Found, Search, Status, Told, told_in
+from fanet_mw.wire.search import Found, Search, SearchStatus, Told, told_in
 
 _FUTURE_NS: Final = S
 """A position from further ahead is none: clocks agree better than that."""
@@ -160,7 +160,7 @@ def _speaker(told: Told) -> int | None:
         return told.reporter
     if isinstance(told, Search):
         return told.planner
-    if isinstance(told, Status):
+    if isinstance(told, SearchStatus):
         return told.node
     return None if not isinstance(told, Found) or told.confirmed else told.node
 

@@ -25,18 +25,20 @@ from agents.mission.formation.formation_place import STILL, FormationPlace
 from agents.mission.formation.formation_planner import STATUS_S, FormationPlanner
 from agents.mission.formation.pattern import Pattern, fitted
 from agents.mission.navigation.known_obstacles import KnownObstacles
-from agents.mission.navigation.motion import Motion, Navigation, NeighborMotions
+from agents.mission.navigation.navigation import Navigation
+from agents.mission.navigation.neighbor_motions import NeighborMotions
 from agents.mission.navigation.onboard_map import OnboardMap
 from agents.mission.outbox import Outbox, OutgoingPacket, ReportFormat
 from agents.mission.tasking.approach import Approach
 from agents.mission.tasking.bidding import Bidding
 from fanet_mw.bus.messages import Echo
+from fanet_mw.motion import Motion
 from fanet_mw.rng import stream
 from fanet_mw.scenario import Scenario
 from fanet_mw.trace import Detected, MissionModeChanged, Planned, Sighted
 from fanet_mw.units import MAX_NODES, US, Enu, NodeId, S, seconds_to_ns
 from fanet_mw.wire.inner import Survivor
-from fanet_mw.wire.search import Bids, Found, Search, Status, Told, encode_bids
+from fanet_mw.wire.search import Bids, Found, Search, SearchStatus, Told, encode_bids
 
 _OFFSET_DB: Final = 1.0
 """How much one phone's power is taken to differ from another's: standard deviation."""
@@ -197,7 +199,7 @@ class Searcher:
         """Our radar shows what is around us."""
         if self._watches_radar:
             own = self._navigation
-            others = [motion.now(now_ns) for motion in self._avoided.all(now_ns=now_ns)]
+            others = [motion.position_at(now_ns) for motion in self._avoided.all(now_ns=now_ns)]
             self._obstacles.radar(echoes, at=own.position, velocity=own.velocity, neighbors=others, now_ns=now_ns)
 
     def camera(self, people: Sequence[tuple[float, float]], *, now_ns: int) -> None:
@@ -244,7 +246,7 @@ class Searcher:
             case Search():
                 if self._planner.planned(message):
                     self._adopt(now_ns)
-            case Status():
+            case SearchStatus():
                 self._planner.status(message, now_ns=now_ns)
             case Bids():
                 self._bidding.merge(message.bids, now_ns=now_ns)
@@ -267,7 +269,7 @@ class Searcher:
 
     def _say_status(self, now_ns: int) -> None:
         plan = self._planner.plan
-        status = Status(
+        status = SearchStatus(
             now_ns // US, self._navigation.position, self._node, plan.revision if plan else 0, self._return_home.percent
         )
         self._planner.status(status, now_ns=now_ns)

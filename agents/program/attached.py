@@ -56,7 +56,7 @@ class Drive(Protocol):
         """Wait for something that the host brings about; raises when it cannot come any more."""
 
 
-class Radio(Protocol):
+class Attachment(Protocol):
     """How a node is joined to a swarm."""
 
     def attach(

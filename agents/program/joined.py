@@ -13,7 +13,7 @@ from collections.abc import AsyncIterator, Collection, Iterable, Mapping, Sequen
 from pathlib import Path
 from typing import Any, Final, Self
 
-from agents.program.attached import Drive, Emulated, NodeClosedError, Radio
+from agents.program.attached import Attachment, Drive, Emulated, NodeClosedError
 from agents.program.mailbox import Mailbox, Message, Sent
 from fanet_mw import mavlink
 from fanet_mw.application import Application, Data
@@ -154,7 +154,7 @@ async def join(
     scenario: Scenario | str | Path,
     *,
     node: int,
-    radio: Radio | None = None,
+    radio: Attachment | None = None,
     messages: Collection[int] = (),
     applications: Sequence[Application] = (),
 ) -> AsyncIterator[Node]:

@@ -1,6 +1,6 @@
 """The byte layout of every message on the bus, for the reference page: names for the fields of the codecs' structs.
 
-The structs are those that encode and decode (`topics.HEADS`); a struct of another length than its names is refused.
+The structs are those that encode and decode (`codecs.HEADS`); a struct of another length than its names is refused.
 """
 
 import re
@@ -9,9 +9,9 @@ from collections.abc import Iterator
 from typing import Any, Final, NamedTuple
 
 from fanet_mw.bus import messages as m
+from fanet_mw.bus.codecs import CODES, HEADS
 from fanet_mw.bus.link_stats import COUNTS, LOSSES, LinkStats
 from fanet_mw.bus.radio_control import Cut, Degrade, Jam, Restore
-from fanet_mw.bus.topics import CODES, HEADS
 
 TYPES: Final = {
     "B": "uint8", "H": "uint16", "I": "uint32", "Q": "uint64", "q": "int64", "f": "float32", "d": "float64",
@@ -19,7 +19,7 @@ TYPES: Final = {
 """Names of the codes of `struct`."""
 
 
-class Named(NamedTuple):
+class Names(NamedTuple):
     """What the codecs do not say: names of the fields, and what follows them."""
 
     topic: str
@@ -40,36 +40,36 @@ class Field(NamedTuple):
 
 _VECTOR: Final = "east_m north_m up_m"
 _MOVES: Final = "east_m_s north_m_s up_m_s"
-NAMED: Final[dict[type[Any], Named]] = {
-    m.TxRequest: Named("radio/<id>/tx", "seq start_ns dst wants_status", "the frame, MAVLink, to the end"),
-    m.Reception: Named("radio/<id>/rx", "src end_ns rssi_dbm", "the frame, MAVLink, to the end"),
-    m.TxStatus: Named("radio/<id>/rx", "seq outcome end_ns attempts"),
-    m.Poses: Named(
+NAMED: Final[dict[type[Any], Names]] = {
+    m.TxRequest: Names("radio/<id>/tx", "seq start_ns dst wants_status", "the frame, MAVLink, to the end"),
+    m.Reception: Names("radio/<id>/rx", "src end_ns rssi_dbm", "the frame, MAVLink, to the end"),
+    m.TxStatus: Names("radio/<id>/rx", "seq outcome end_ns attempts"),
+    m.Poses: Names(
         "world/pose", "t_ns count", f"`count` x uint16: ids, ascending; `count` x 6 float64: {_VECTOR} {_MOVES}",
     ),
-    m.Obstructions: Named("world/obstruction", "t_ns count", "`count` x uint16: pairs of node ids, smaller first"),
-    m.Setpoint: Named("world/<id>/setpoint", f"t_ns {_VECTOR} speed_m_s kind {_MOVES}"),
-    m.Gps: Named("world/<id>/sensor/gps", f"t_ns {_VECTOR} {_MOVES}"),
-    m.WifiScan: Named("world/<id>/sensor/wifi", "t_ns count", row="survivor rssi_dbm"),
-    m.MavlinkTap: Named("mavlink/<id>", "t_ns", "MAVLink frames to the end"),
-    m.TraceBatch: Named("trace/<name>", "", "records, UTF-8: one JSON array per line"),
-    m.Clock: Named("clock", "epoch_unix_ns time_scale state epoch_mono_ns machine"),
-    m.Report: Named("report/<name>", "t_ns", "UTF-8: the name, a line feed, a JSON object"),
-    Degrade: Named("radio/control", "src dst both loss_db loss_share for_ns", "the label, UTF-8"),
-    Jam: Named("radio/control", f"{_VECTOR} radius_m noise_dbm for_ns", "the label, UTF-8"),
-    Cut: Named("radio/control", "node for_ns", "the label, UTF-8"),
-    Restore: Named("radio/control", "", "the label, UTF-8; empty: all faults"),
-    LinkStats: Named(
+    m.Obstructions: Names("world/obstruction", "t_ns count", "`count` x uint16: pairs of node ids, smaller first"),
+    m.Setpoint: Names("world/<id>/setpoint", f"t_ns {_VECTOR} speed_m_s kind {_MOVES}"),
+    m.Gps: Names("world/<id>/sensor/gps", f"t_ns {_VECTOR} {_MOVES}"),
+    m.WifiScan: Names("world/<id>/sensor/wifi", "t_ns count", row="survivor rssi_dbm"),
+    m.MavlinkTap: Names("mavlink/<id>", "t_ns", "MAVLink frames to the end"),
+    m.TraceBatch: Names("trace/<name>", "", "records, UTF-8: one JSON array per line"),
+    m.Clock: Names("clock", "epoch_unix_ns time_scale state epoch_mono_ns machine"),
+    m.Report: Names("report/<name>", "t_ns", "UTF-8: the name, a line feed, a JSON object"),
+    Degrade: Names("radio/control", "src dst both loss_db loss_share for_ns", "the label, UTF-8"),
+    Jam: Names("radio/control", f"{_VECTOR} radius_m noise_dbm for_ns", "the label, UTF-8"),
+    Cut: Names("radio/control", "node for_ns", "the label, UTF-8"),
+    Restore: Names("radio/control", "", "the label, UTF-8; empty: all faults"),
+    LinkStats: Names(
         "radio/links", "t_ns span_ns count",
         f"`count` x 2 uint16: source, destination; `count` x {COUNTS} uint32: received, then lost by "
         f"{', '.join(LOSSES)}; `count` x int64: sum of RSSI [1/1000 dBm]",
     ),
-    m.Camera: Named("world/<id>/sensor/camera", "t_ns count", row="bearing_rad elevation_rad pixels"),
-    m.Voice: Named("world/<id>/sensor/voice", "t_ns count", row="bearing_rad elevation_rad level_db snr_db"),
-    m.Radar: Named("world/<id>/sensor/radar", "t_ns count", row="range_m bearing_rad elevation_rad closing_m_s snr_db"),
-    m.Altimeter: Named("world/<id>/sensor/altimeter", "t_ns up_m above_ground_m"),
-    m.Inertial: Named("world/<id>/sensor/inertial", f"t_ns {_MOVES}"),
-    m.Battery: Named("world/<id>/sensor/battery", "t_ns voltage_v current_a charge"),
+    m.Camera: Names("world/<id>/sensor/camera", "t_ns count", row="bearing_rad elevation_rad pixels"),
+    m.Voice: Names("world/<id>/sensor/voice", "t_ns count", row="bearing_rad elevation_rad level_db snr_db"),
+    m.Radar: Names("world/<id>/sensor/radar", "t_ns count", row="range_m bearing_rad elevation_rad closing_m_s snr_db"),
+    m.Altimeter: Names("world/<id>/sensor/altimeter", "t_ns up_m above_ground_m"),
+    m.Inertial: Names("world/<id>/sensor/inertial", f"t_ns {_MOVES}"),
+    m.Battery: Names("world/<id>/sensor/battery", "t_ns voltage_v current_a charge"),
 }  # fmt: skip
 
 

@@ -1,4 +1,4 @@
-"""The messages on the bus, as typed values; their bytes are defined in `fanet_mw.bus.topics`.
+"""The messages on the bus, as typed values; their bytes are defined in `fanet_mw.bus.codecs`.
 
 The virtual host hands these objects over as they are; the real-time host encodes them per topic. Every message is to be
 treated as immutable: in the virtual host the receiver holds the sender's object.

@@ -142,4 +142,4 @@ HEADS: Final[dict[type[Any], tuple[struct.Struct, ...]]] = {
     Gps: (_GPS,), WifiScan: (_SCAN, _HEARD), Camera: (_SCAN, _PERSON), Voice: (_SCAN, _CALL), Radar: (_SCAN, _ECHO),
     Altimeter: (_ALTIMETER,), Inertial: (_INERTIAL,), Battery: (_BATTERY,),
 }  # fmt: skip
-"""The structs of each kind of reading, as in `topics.HEADS`."""
+"""The structs of each kind of reading, as in `codecs.HEADS`."""

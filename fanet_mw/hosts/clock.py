@@ -12,7 +12,7 @@ import math
 from collections.abc import Iterable
 from typing import Final
 
-from fanet_mw.bus import topics
+from fanet_mw.bus import codecs
 from fanet_mw.bus.messages import Clock, ClockState
 from fanet_mw.bus.topics import Topics
 from fanet_mw.errors import BusError, MalformedFrameError
@@ -92,7 +92,7 @@ class ClockKeeper:
         bus.watch(names.all_alive, on_change)
 
     def _current(self) -> bytes | None:
-        return topics.encode([self.clock]) if self.clock else None
+        return codecs.encode([self.clock]) if self.clock else None
 
     def _seen(self, topic: str, alive: bool) -> None:
         self.presence.seen(topic, alive=alive)
@@ -125,7 +125,7 @@ class ClockKeeper:
 
     def _publish(self, clock: Clock) -> None:
         self.clock = clock
-        self._bus.put(self._names.clock, topics.encode([clock]), reliable=True)
+        self._bus.put(self._names.clock, codecs.encode([clock]), reliable=True)
 
 
 class ClockListener:
@@ -173,7 +173,7 @@ class ClockListener:
 
     def _on_answer(self, payload: bytes) -> None:
         try:
-            messages = topics.decode(payload)
+            messages = codecs.decode(payload)
         except MalformedFrameError:
             return
         for message in messages:

@@ -17,7 +17,7 @@ from collections import deque
 from collections.abc import Callable
 from typing import Final, NamedTuple
 
-from fanet_mw.bus import topics
+from fanet_mw.bus import codecs
 from fanet_mw.bus.link_stats import LinkStats
 from fanet_mw.bus.messages import Message, Report, TraceBatch
 from fanet_mw.errors import MalformedFrameError
@@ -34,7 +34,7 @@ PORTION_BYTES: Final = 1 << 18
 """The bytes of one portion, not counting its last message."""
 _MAX_TOPICS: Final = 8192
 """The number of topics that have a quota of their own; all further topics share one."""
-_FOR_COLLECTORS: Final = topics.codes_of(TraceBatch, Report, LinkStats)
+_FOR_COLLECTORS: Final = codecs.codes_of(TraceBatch, Report, LinkStats)
 """The codes of messages that no actor receives: to decode their text would take an actor's time."""
 
 
@@ -53,7 +53,7 @@ class _Put(NamedTuple):
     topic: str
     payload: bytes
     usage: _Usage
-    items: deque[topics.Item]
+    items: deque[codecs.Item]
 
 
 class Inbox:
@@ -121,7 +121,7 @@ class Inbox:
             self._close(put)
             return 0
         try:
-            message = topics.decode_item(put.payload, item)
+            message = codecs.decode_item(put.payload, item)
         except MalformedFrameError:
             self._close(put, malformed=True)
         else:
@@ -134,7 +134,7 @@ class Inbox:
         """The put with its messages located but not decoded; None when it is malformed or not meant for an actor."""
         put = _Put(topic, payload, usage, deque())
         try:
-            put.items.extend(topics.items(payload))
+            put.items.extend(codecs.items(payload))
         except MalformedFrameError:
             self._close(put, malformed=True)
             return None

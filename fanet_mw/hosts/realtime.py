@@ -18,7 +18,7 @@ from pathlib import Path
 from typing import Any, Final, NamedTuple
 
 from fanet_mw.actor import Actor
-from fanet_mw.bus import topics
+from fanet_mw.bus import codecs
 from fanet_mw.bus.messages import Message, Reception, Report, TraceBatch
 from fanet_mw.bus.topics import Topics
 from fanet_mw.errors import ConfigError
@@ -280,7 +280,7 @@ class RealtimeHost:
                 by_topic.setdefault(topic, []).append(message)
             actor.outbox.clear()
             for topic, messages in by_topic.items():
-                self._bus.put(topic, topics.encode(messages))
+                self._bus.put(topic, codecs.encode(messages))
             self._puts += len(by_topic)
         if actor.records:
             self._records += actor.records
@@ -292,12 +292,12 @@ class RealtimeHost:
         if self._records:
             batch = TraceBatch(tuple(self._records))
             self._records.clear()
-            self._bus.put(self._names.trace(self._actor.name), topics.encode([batch]), reliable=True)
+            self._bus.put(self._names.trace(self._actor.name), codecs.encode([batch]), reliable=True)
 
     def _publish_report(self, *, final: bool) -> None:
         content = {**self._actor.report(), "final": final, "host": self._figures(final=final)}
         report = Report(self._actor.name, self.now_ns(), json.dumps(content))
-        self._bus.put(self._names.report(self._actor.name), topics.encode([report]), reliable=True)
+        self._bus.put(self._names.report(self._actor.name), codecs.encode([report]), reliable=True)
 
     def _figures(self, *, final: bool) -> dict[str, Any]:
         usage = resource.getrusage(resource.RUSAGE_SELF)

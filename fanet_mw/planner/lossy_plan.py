@@ -11,6 +11,7 @@ from typing import Final, NamedTuple
 
 from fanet_mw.planner.demand import TrafficClass
 from fanet_mw.routing.clustered.tdma.turns import receipt_ns
+from fanet_mw.routing.clustered.timetable.likely_delay import likely_delay_ns
 from fanet_mw.routing.clustered.timetable.turn_plan import Fitted, Places, TurnPlan, fit_measured
 from fanet_mw.scenario import Scenario
 from fanet_mw.units import MS, Enu, NodeId, S, seconds_to_ns
@@ -98,7 +99,8 @@ def _likely_ns(scenario: Scenario, fitted: Fitted, node: NodeId) -> int | None:
     plan = TurnPlan.of(node, 0, fitted)
     if not plan.roots or fitted.table.uncovered[node]:
         return None
-    likely_ns = plan.likely_ns(
+    likely_ns = likely_delay_ns(
+        plan,
         node,
         waiting=1,
         interval_ns=seconds_to_ns(scenario.traffic.interval_s),

@@ -14,7 +14,7 @@ from fanet_mw.planner.lossy_plan import Drawn, LossyPlan
 from fanet_mw.planner.optimum import Optimum
 from fanet_mw.planner.search import ScenarioChange
 from fanet_mw.planner.timetable_plan import TimetablePlan
-from fanet_mw.routing.clustered.timetable.turn_plan import LIKELY_SHARE
+from fanet_mw.routing.clustered.timetable.likely_delay import LIKELY_SHARE
 from fanet_mw.units import MS, S
 
 _SHOWN: Final = 8

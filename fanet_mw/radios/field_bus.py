@@ -10,7 +10,7 @@ from collections.abc import Iterator
 from pathlib import Path
 from typing import Protocol
 
-from fanet_mw.bus import topics
+from fanet_mw.bus import codecs
 from fanet_mw.bus.messages import Clock, ClockState, Message, Reception, TxRequest, TxStatus
 from fanet_mw.bus.topics import Topics
 from fanet_mw.hosts.bus import Bus, OnSample
@@ -44,7 +44,7 @@ class FieldBus:
     def on_radio(self, message: Reception | TxStatus) -> None:
         """Pass a message of the radio to the node."""
         if self._on_rx is not None:
-            self._on_rx(self._rx_topic, topics.encode([message]))
+            self._on_rx(self._rx_topic, codecs.encode([message]))
 
     # --- the interface of `Bus` -----------------------------------------------------------------------------------
 
@@ -70,7 +70,7 @@ class FieldBus:
 
     def ask(self, topic: str, on_sample: OnSample) -> None:
         if topic == self._clock_topic and self._clock is not None:
-            on_sample(topic, topics.encode([self._clock]))
+            on_sample(topic, codecs.encode([self._clock]))
         elif self._inner is not None:
             self._inner.ask(topic, on_sample)
 
@@ -81,7 +81,7 @@ class FieldBus:
 
 def _decoded(payload: bytes) -> list[Message]:
     """The messages of the own node; one that cannot be decoded is a bug of this program, and raises."""
-    return list(topics.decode(payload))
+    return list(codecs.decode(payload))
 
 
 @contextlib.contextmanager

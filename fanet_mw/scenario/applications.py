@@ -4,14 +4,14 @@ from typing import Annotated, Any, Literal
 
 from pydantic import Field
 
-from fanet_mw.extensions import Named, OptionsOf
+from fanet_mw.extensions import OptionsOf, PartName
 from fanet_mw.scenario.sections import Id, Section
 
 
 class ForeignApplication(Section):
     """An application of another package (`docs/how-to/extend.md`), on board of some or all UAVs."""
 
-    use: Annotated[str, Named("applications.use", ())]
+    use: Annotated[str, PartName("applications.use", ())]
     """The application: an entry point, or module and class."""
     nodes: Literal["all"] | tuple[Id, ...] = "all"
     """Ids of the nodes that carry it, or `all`."""

@@ -11,7 +11,7 @@ from typing import Annotated, Any, Final, Literal, Self
 from pydantic import AfterValidator, Field, SerializerFunctionWrapHandler, model_serializer, model_validator
 
 from fanet_mw.bus.radio_control import Control
-from fanet_mw.extensions import Named, Options, OptionsOf
+from fanet_mw.extensions import Options, OptionsOf, PartName
 from fanet_mw.scenario.applications import ForeignApplication
 from fanet_mw.scenario.checks import disagreements
 from fanet_mw.scenario.clock import Clock
@@ -140,7 +140,7 @@ class Traffic(Section):
 class Routing(Section):
     """The protocol above the radio."""
 
-    protocol: Annotated[str, Named("routing.protocol", PROTOCOLS)] = "clustered"
+    protocol: Annotated[str, PartName("routing.protocol", PROTOCOLS)] = "clustered"
     """How packets find their way: one hop only (`direct`), a relay by every node (`flooding`), with a probability
     (`gossip`) or by those that heard few copies (`counter`), the time-divided floods of cluster heads (`clustered`), or
     a route found on demand, by link states, by distance vectors or by positions; or as another package does it."""
@@ -225,7 +225,7 @@ class Clusters(Section):
     """`counter`: a node that has heard so many copies does not relay."""
     assess_ms: Milliseconds = 100.0
     """`counter`: copies are counted for U(0, assess_ms)."""
-    method: Annotated[str, Named("clusters.method", METHODS)] = "balanced"
+    method: Annotated[str, PartName("clusters.method", METHODS)] = "balanced"
     """How the leader divides the swarm. All but `balanced` make as many clusters as the topology asks for, whatever
     `count` says: every member hears its head."""
     options: Annotated[dict[str, Any], OptionsOf("clusters.method", METHODS)] = Field(default_factory=Options)
@@ -249,7 +249,7 @@ class Clusters(Section):
 class Mobility(Section):
     """What a UAV does when the mission asks nothing of it."""
 
-    model: Annotated[str, Named("mobility.model", MOBILITY_MODELS)] = "static"
+    model: Annotated[str, PartName("mobility.model", MOBILITY_MODELS)] = "static"
     """`formation` sweeps the area keeping the layout; `random_waypoint` is the statistical model, without pause;
     `crossing` flies everyone through the middle of the area to the point opposite its start, and back.
     `onboard`: the world decides nothing, keeps nobody clear of others, and flies what each UAV's computer asks for."""

@@ -9,7 +9,7 @@ from typing import Annotated, Any, Final, Literal, Self, get_args
 
 from pydantic import Field, model_validator
 
-from fanet_mw.extensions import Named, Options, OptionsOf
+from fanet_mw.extensions import Options, OptionsOf, PartName
 from fanet_mw.scenario.sections import Decibels, Length, Level, Section, SomeLength
 from fanet_mw.units import MS
 
@@ -31,7 +31,7 @@ def is_ofdm(rate_mbps: float) -> bool:
 class Radio(Section):
     """The radio, its MAC and the channel. Defaults are the reference set-up: 802.11b, DSSS 11 Mb/s, long preamble."""
 
-    channel: Annotated[str, Named("radio.channel", CHANNELS)] = "range"
+    channel: Annotated[str, PartName("radio.channel", CHANNELS)] = "range"
     """The path loss model: see docs/explanation/emulator.md for equations, sources and ranges of validity."""
     options: Annotated[dict[str, Any], OptionsOf("radio.channel", CHANNELS)] = Field(default_factory=Options)
     """The table of a channel that another package brings, as that package documents it."""

@@ -32,7 +32,7 @@ Destination = int | Literal["all"]
 _AIRTIME_NS: Final = 1 * MS
 
 
-class Result(NamedTuple):
+class ContractRun(NamedTuple):
     """What one run gave."""
 
     outcome: Any
@@ -66,7 +66,7 @@ class RoutingContract:
             }
         )  # fmt: skip
 
-    def run(self, destination: Destination, *, moving: bool) -> Result:
+    def run(self, destination: Destination, *, moving: bool) -> ContractRun:
         """One run, remembered."""
         return _run(json.dumps(self.scenario(destination, moving=moving).model_dump(mode="json")))
 
@@ -137,14 +137,14 @@ class RoutingContract:
 
 
 @lru_cache(maxsize=16)
-def _run(scenario_json: str) -> Result:
+def _run(scenario_json: str) -> ContractRun:
     return _fresh_run(config.build(json.loads(scenario_json)))
 
 
-def _fresh_run(scenario: Scenario) -> Result:
+def _fresh_run(scenario: Scenario) -> ContractRun:
     """Simulated by the layers above this one, which are imported by name."""
     outcome = import_module("sim.run.virtual").simulate(scenario)
-    return Result(outcome, import_module("sim.results.files").finish(outcome, out=None))
+    return ContractRun(outcome, import_module("sim.results.files").finish(outcome, out=None))
 
 
 class _Bench:

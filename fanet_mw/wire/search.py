@@ -96,7 +96,7 @@ class Search(NamedTuple):
         return plan
 
 
-class Status(NamedTuple):
+class SearchStatus(NamedTuple):
     """FANET_STATUS: where a UAV is and how it is."""
 
     t_us: int
@@ -218,12 +218,12 @@ class Found(NamedTuple):
         return found
 
 
-Told = Survivor | Search | Status | Bids | Found
+Told = Survivor | Search | SearchStatus | Bids | Found
 """What searching UAVs tell each other."""
 _CHECKED: Final[Mapping[int, Callable[[tuple[Any, ...]], Told]]] = {
     SURVIVOR.msgid: Survivor.checked,
     SEARCH.msgid: Search.checked,
-    STATUS.msgid: Status.checked,
+    STATUS.msgid: SearchStatus.checked,
     BIDS.msgid: checked_bids,
     FOUND.msgid: Found.checked,
 }

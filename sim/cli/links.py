@@ -10,7 +10,7 @@ from rich.console import Console
 from rich.live import Live
 from rich.table import Table
 
-from fanet_mw.bus import topics
+from fanet_mw.bus import codecs
 from fanet_mw.bus.link_stats import LOSSES, LinkRow, LinkStats
 from fanet_mw.bus.topics import Topics
 from fanet_mw.errors import MalformedFrameError
@@ -52,7 +52,7 @@ def _reports(bus: Bus, names: Topics) -> Iterator[LinkStats]:
     bus.subscribe(names.radio_links, lambda _, payload: heard.put(payload))
     while True:
         try:
-            messages = topics.decode(heard.get(timeout=_LOOK_S))
+            messages = codecs.decode(heard.get(timeout=_LOOK_S))
         except MalformedFrameError:
             continue
         except queue.Empty:

@@ -23,7 +23,7 @@ from sim.results.mission import Covered, mission
 R = TypeVar("R", FlightModeChanged, MissionModeChanged, Planned)
 
 
-class State(NamedTuple):
+class UavState(NamedTuple):
     """One UAV at one instant."""
 
     position: Enu
@@ -67,7 +67,7 @@ class Replay:
             raise ConfigError(f"{folder}: cannot be replayed: {error}") from error
         return cls(Scenario.model_validate(keys), [parse(line) for line in lines])
 
-    def at(self, t_s: float) -> Mapping[NodeId, State]:
+    def at(self, t_s: float) -> Mapping[NodeId, UavState]:
         """Everyone at an instant; a UAV that was a wreck by then is where it was last seen flying."""
         t_ns = round(t_s * S)
         found = {}
@@ -75,7 +75,7 @@ class Replay:
             flight = _last(self._flight[node], t_ns)
             decided = _last(self._mission[node], t_ns)
             planned = _last(self._planned[node], t_ns)
-            found[NodeId(node)] = State(
+            found[NodeId(node)] = UavState(
                 _between(posed, t_ns),
                 flight.mode if flight else "",
                 decided.mode if decided else "",

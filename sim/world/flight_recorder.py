@@ -10,7 +10,7 @@ from typing import Final, NamedTuple
 
 import numpy as np
 
-from fanet_mw.bus import topics
+from fanet_mw.bus import codecs
 from fanet_mw.bus.messages import Message, Poses, Setpoint
 from fanet_mw.bus.topics import Topics, node_of
 from fanet_mw.errors import MalformedFrameError
@@ -75,6 +75,6 @@ class FlightRecorder:
 
 def _decoded(payload: bytes) -> list[Message]:
     try:
-        return topics.decode(payload)
+        return codecs.decode(payload)
     except MalformedFrameError:
         return []

@@ -11,7 +11,7 @@ import time
 from contextlib import closing
 from pathlib import Path
 
-from fanet_mw.bus import topics
+from fanet_mw.bus import codecs
 from fanet_mw.bus.messages import TraceBatch
 from fanet_mw.bus.topics import Topics
 from fanet_mw.hosts.bus import OnSample
@@ -55,7 +55,7 @@ def main(minutes: float) -> None:
                         if origin != node
                     ]  # fmt: skip
                     deliveries += len(records) - 2
-                    put(NAMES.trace(f"agent-{node}"), topics.encode([TraceBatch(tuple(records))]))
+                    put(NAMES.trace(f"agent-{node}"), codecs.encode([TraceBatch(tuple(records))]))
             collected_mb, collected_s = rss_mb(), time.process_time()
             outcome = Outcome(
                 scenario=scenario, mode="realtime", wall_s=60 * minutes, records=collector.records(), reports={},

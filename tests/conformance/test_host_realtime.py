@@ -17,7 +17,7 @@ from hypothesis import given
 from hypothesis import strategies as st
 
 from fanet_mw.actor import Actor
-from fanet_mw.bus import topics
+from fanet_mw.bus import codecs
 from fanet_mw.bus.messages import Clock, ClockState, MavlinkTap, Message, Reception, Report, TraceBatch
 from fanet_mw.bus.topics import Topics
 from fanet_mw.errors import BusError
@@ -95,7 +95,7 @@ class Observer:
     def __init__(self, bus: Bus) -> None:
         self.puts: list[tuple[str, list[Message]]] = []
         for expression in (NAMES.all_traces, NAMES.all_reports, NAMES.mavlink("*")):
-            bus.subscribe(expression, lambda topic, payload: self.puts.append((topic, topics.decode(payload))))
+            bus.subscribe(expression, lambda topic, payload: self.puts.append((topic, codecs.decode(payload))))
 
     def reports(self) -> list[dict[str, object]]:
         return [json.loads(m.json) for _, messages in self.puts for m in messages if isinstance(m, Report)]
@@ -196,7 +196,7 @@ async def test_what_was_on_its_way_at_the_end_is_counted_or_still_heard(
         host = asyncio.create_task(run_actor(actor, SwarmAddress("host", endpoint), until_ns=until_ns))
         clock = SwarmClock(await keeper.start(timeout_s=_PATIENCE_S))
         await asyncio.sleep(clock.wait_s(until_ns + 30 * MS))
-        bus.put(NAMES.pose, topics.encode([Reception(b"last", NodeId(2), until_ns, -60.0)]))
+        bus.put(NAMES.pose, codecs.encode([Reception(b"last", NodeId(2), until_ns, -60.0)]))
         await host
         figures = await observer.last_report()
     assert figures["unread_receptions"] == 1
@@ -239,7 +239,7 @@ async def test_what_is_no_message_is_counted_and_changes_nothing() -> None:
 
 @pytest.mark.parametrize("actor", [Fails(), FailsOnMessage(hears=(NAMES.pose,))], ids=["wake", "receive"])
 async def test_an_actor_that_raises_ends_its_host_at_once_and_its_records_survive_it(actor: Ticker) -> None:
-    message = topics.encode([MavlinkTap(0, b"")])
+    message = codecs.encode([MavlinkTap(0, b"")])
     with pytest.raises(RuntimeError, match=r"third wake-up|first message"):
         await run(actor, until_ns=1000 * S, say=message if actor.subscriptions else b"")
     observer = actor.heard[-1]

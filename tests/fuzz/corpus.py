@@ -12,7 +12,7 @@ from collections.abc import Sequence
 from typing import Any, Final, NamedTuple
 
 from fanet_mw import wire
-from fanet_mw.bus import topics
+from fanet_mw.bus import codecs
 from fanet_mw.bus.messages import (
     Altimeter,
     Battery,
@@ -43,7 +43,7 @@ from fanet_mw.routing import control
 from fanet_mw.trace import Record
 from fanet_mw.units import BROADCAST, Enu, NodeId, S
 from fanet_mw.wire.message import DELIVERED, MISSING, Head, Receipt, encode_piece, encode_receipts
-from fanet_mw.wire.search import Bid, Found, Search, Status, encode_bids
+from fanet_mw.wire.search import Bid, Found, Search, SearchStatus, encode_bids
 from sim.run.virtual import actors_of
 from sim.scenarios import catalog
 
@@ -101,7 +101,7 @@ def recorded(*, seconds: float = 10, swarms: Sequence[str] = tuple(SETTINGS)) ->
             frames[message.frame] = None
         kept = puts[type(message)]
         if len(kept) < 200:
-            kept[topics.encode([message])] = None
+            kept[codecs.encode([message])] = None
     header = wire.Header(12, 1, 3, BROADCAST, 3, wire.Kind.DATA, 8, 0, wire.PRIORITY_SAFETY, wire.FLAG_FLOOD).encode()
     warning = Encoder(NodeId(3), component=wire.COMPONENT).collision(
         NodeId(2), closest_s=3.0, altitude_m=2.0, horizontal_m=9.0
@@ -109,7 +109,7 @@ def recorded(*, seconds: float = 10, swarms: Sequence[str] = tuple(SETTINGS)) ->
     for inner in (warning, *_not_recorded()):
         frames[header + inner] = None
     for message in _BY_HAND:
-        puts[type(message)][topics.encode([message])] = None
+        puts[type(message)][codecs.encode([message])] = None
     rare_first = sorted(frames, key=_commonness(list(frames)).__getitem__)
     return Corpus(
         frames=rare_first,
@@ -155,7 +155,7 @@ def _not_recorded() -> list[bytes]:
     covariance = {"east_variance_m2": 90.0, "covariance_m2": 3.0, "north_variance_m2": 40.0}
     return [
         Search(7, 100.0, 0.0, 400.0, 50.0, 10.0, 30, 1, 1, (1, 2, 3, 4, 5, 0, 7), 3, 1, 0).encode_frame(1),
-        Status(7, Enu(1.0, 2.0, 3.0), 4, 1, 80).encode_frame(4),
+        SearchStatus(7, Enu(1.0, 2.0, 3.0), 4, 1, 80).encode_frame(4),
         encode_bids([Bid(3, 4, 200, 7), Bid(5, 6, 0xFFFF, 8, 2)], node=4),
         Found(7, 3, 10.0, 20.0, node=4, confirmed=False, **covariance).encode_frame(4),
         encode_piece(head, bytes(range(200)), node=3),

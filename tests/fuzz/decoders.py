@@ -22,7 +22,7 @@ import mutations
 from corpus import Corpus
 
 from fanet_mw import mavlink, tlog, trace, wire
-from fanet_mw.bus import topics
+from fanet_mw.bus import codecs
 from fanet_mw.bus.link_stats import LinkStats
 from fanet_mw.bus.messages import MavlinkTap, Report, TraceBatch
 from fanet_mw.errors import MalformedFrameError
@@ -39,7 +39,7 @@ from fanet_mw.wire.inner import Beacon, Join, Schedule, Survivor, TimeBeacon
 from fanet_mw.wire.links import Links
 from fanet_mw.wire.places import Places
 from fanet_mw.wire.search import Found as FoundMessage
-from fanet_mw.wire.search import Search, Status, checked_bids
+from fanet_mw.wire.search import Search, SearchStatus, checked_bids
 from sim.run.collecting.bus_checks import BusChecks
 
 SLOW_S: Final = 0.5
@@ -99,7 +99,7 @@ def _of_the_air(found: Corpus) -> Iterator[Decoder]:
         _there_and_back(pieces.decode_receipts, lambda m: pieces.encode_receipts(m, node=3)),
         of(wire.RECEIPT.msgid),
     )
-    for kind, spec in ((Search, wire.SEARCH), (Status, wire.STATUS), (FoundMessage, wire.FOUND)):
+    for kind, spec in ((Search, wire.SEARCH), (SearchStatus, wire.STATUS), (FoundMessage, wire.FOUND)):
         yield Decoder(kind.__name__, _there_and_back(kind.decode_frame, _encode_frame), of(spec.msgid))
     yield Decoder("Bids", lambda data: checked_bids(wire.decode_first(wire.BIDS, data)), of(wire.BIDS.msgid))
     yield Decoder("Places", Places.decode_frames, of(wire.PLACES.msgid))
@@ -165,7 +165,7 @@ def _made(message: Any) -> Any:
 
 def _of_the_bus(found: Corpus) -> Iterator[Decoder]:
     checks = BusChecks(corpus.scenario_of("all", "duration_s=30"))
-    said = {kind: [put for put in found.puts if put[0] == code] for kind, code in topics.CODES.items()}
+    said = {kind: [put for put in found.puts if put[0] == code] for kind, code in codecs.CODES.items()}
 
     def put(pick: Random) -> bytes:
         first = mutations.put_changed(pick.choice(found.puts), pick)
@@ -176,7 +176,7 @@ def _of_the_bus(found: Corpus) -> Iterator[Decoder]:
 
     def checked(data: bytes) -> object:
         """What the collector of a run asks of each message, and what it says."""
-        for message in topics.decode(data):
+        for message in codecs.decode(data):
             if isinstance(message, TraceBatch):
                 for record in message.records:
                     for name in ("agent-3", "emulator", "world"):
@@ -191,9 +191,9 @@ def _of_the_bus(found: Corpus) -> Iterator[Decoder]:
                     assert not content or wrong is None
         return None
 
-    yield Decoder("put", topics.decode, put)
-    for kind in topics.CODES:
-        yield Decoder(f"put of {kind.__name__}", topics.decode, of(kind))
+    yield Decoder("put", codecs.decode, put)
+    for kind in codecs.CODES:
+        yield Decoder(f"put of {kind.__name__}", codecs.decode, of(kind))
     for kind in _CHECKED:
         yield Decoder(f"{kind.__name__}, checked", checked, of(kind))
     lines = [line.encode() for line in found.lines]
@@ -208,7 +208,7 @@ _CHECKED: Final = (TraceBatch, MavlinkTap, LinkStats, Report)
 
 
 def _of_telemetry(found: Corpus, folder: Path) -> Iterator[Decoder]:
-    taps = [put[13:] for put in found.puts if put[0] in topics.codes_of(MavlinkTap)]
+    taps = [put[13:] for put in found.puts if put[0] in codecs.codes_of(MavlinkTap)]
     path = folder / "mutated.tlog"
 
     def read(data: bytes) -> object:

@@ -25,7 +25,7 @@ from pydantic.fields import FieldInfo
 
 from fanet_mw.actor import Actor
 from fanet_mw.errors import ConfigError
-from fanet_mw.extensions import Named
+from fanet_mw.extensions import PartName
 from fanet_mw.hosts.virtual import VirtualHost
 from fanet_mw.scenario import Scenario, config
 from fanet_mw.scenario.sections import Section
@@ -130,7 +130,7 @@ def _value(key: Key, pick: random.Random) -> Any:
     if key.name == "radio.rate_mbps" or key.name == "radio.ack_rate_mbps":
         return pick.choice([1.0, 2.0, 5.5, 11.0, 6.0, 24.0, 54.0])
     for item in key.metadata:
-        if isinstance(item, Named):
+        if isinstance(item, PartName):
             return pick.choice(item.ours)
     value = _of(key.annotation, key.metadata, pick)
     if type(value) is type(key.default) is float and value > 0 and pick.random() < 0.5:

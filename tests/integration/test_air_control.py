@@ -11,7 +11,7 @@ import pytest
 
 from emulator.kernel.compile import warm_up
 from emulator.medium import Medium
-from fanet_mw.bus import topics
+from fanet_mw.bus import codecs
 from fanet_mw.bus.messages import Poses, Report, TxRequest
 from fanet_mw.bus.radio_control import Control, Cut, Restore
 from fanet_mw.bus.topics import Topics
@@ -69,7 +69,7 @@ async def test_a_node_is_cut_off_and_restored_by_command(capsys: pytest.CaptureF
     assert said[:2] == ["node-3: cut since", "link-1-2: degrade since"]
     assert said[2] == "jam: jam since"
     assert said[-1] == "node-3: cut ended at"
-    (last,) = topics.decode(reports[-1])
+    (last,) = codecs.decode(reports[-1])
     assert isinstance(last, Report)
     assert json.loads(last.json)["controls"] == 4
 
@@ -81,7 +81,7 @@ async def test_what_the_emulator_refuses_is_said_and_counted(control: Control, m
     async with emulator("air-test", reports) as (endpoint, _):
         with pytest.raises(FanetError, match=r"did not confirm within 1\.2 s: refused"):
             await asyncio.to_thread(air_control.change, endpoint, None, control)
-    (last,) = topics.decode(reports[-1])
+    (last,) = codecs.decode(reports[-1])
     assert isinstance(last, Report)
     assert sum(json.loads(last.json)["refused"].values()) == 1
 
@@ -123,8 +123,8 @@ async def test_links_are_shown_as_they_are_told(capsys: pytest.CaptureFixture[st
             while not shown.done():
                 poses = Poses(0, array("H", [1, 2, 3]), states)
                 request = TxRequest(seq, clock.now_ns() + 10 * MS, bytes(100), BROADCAST, wants_status=False)
-                bus.put(names.pose, topics.encode([poses]))
-                bus.put(names.radio_tx(1), topics.encode([request]))
+                bus.put(names.pose, codecs.encode([poses]))
+                bus.put(names.radio_tx(1), codecs.encode([request]))
                 bus.put(names.radio_links, b"garbage")
                 seq += 1
                 await asyncio.sleep(0.05)

@@ -12,7 +12,7 @@ from test_air_control import emulator
 
 from emulator.medium import ANNOUNCED, Medium
 from fanet_mw.actor import Actor
-from fanet_mw.bus import topics
+from fanet_mw.bus import codecs
 from fanet_mw.bus.messages import MavlinkTap, Message, Report, TxOutcome, TxRequest, TxStatus
 from fanet_mw.bus.topics import Topics
 from fanet_mw.hosts.bus import Bus
@@ -28,7 +28,7 @@ FLOODED = 20_000
 """Requests of one node within a second of swarm time: more than any node of ours asks for."""
 FLOOD = """
 import sys, time
-from fanet_mw.bus import topics
+from fanet_mw.bus import codecs
 from fanet_mw.hosts.bus import Bus
 from fanet_mw.bus.messages import TxRequest
 from fanet_mw.bus.topics import Topics
@@ -37,10 +37,10 @@ with Bus.join(sys.argv[1]) as bus:
     topic, began_ns, count = Topics("flood").radio_tx(1), int(sys.argv[2]), int(sys.argv[3])
     for seq in range(count - 1):  # one every 50 us of swarm time, less than any radio needs for a frame
         request = TxRequest(seq, began_ns + seq * 50_000, b"flood", BROADCAST, wants_status=False)
-        bus.put(topic, topics.encode([request]))
+        bus.put(topic, codecs.encode([request]))
     time.sleep(1)  # the bus has room again
 with Bus.join(sys.argv[1]) as bus:  # another session, on which nothing waits: this one arrives, and shows what did not
-    bus.put(topic, topics.encode([TxRequest(count - 1, 0, b"flood", BROADCAST, wants_status=False)]), reliable=True)
+    bus.put(topic, codecs.encode([TxRequest(count - 1, 0, b"flood", BROADCAST, wants_status=False)]), reliable=True)
     time.sleep(0.2)
 """
 
@@ -55,7 +55,7 @@ async def test_a_flood_from_one_node_is_counted_leaves_the_others_alone_and_ends
                 calm = 0
                 while flood.poll() is None:
                     request = TxRequest(calm, clock.now_ns() + 30 * MS, b"calm", BROADCAST, wants_status=False)
-                    bus.put(NAMES.radio_tx(2), topics.encode([request]))
+                    bus.put(NAMES.radio_tx(2), codecs.encode([request]))
                     calm += 1
                     await asyncio.sleep(0.05)
             finally:
@@ -87,7 +87,7 @@ async def test_a_host_that_is_held_up_drops_what_its_inbox_cannot_hold_and_says_
 
             def put(node: int, seq: int) -> None:
                 request = TxRequest(seq, start_ns, b"x", BROADCAST, wants_status=False)
-                bus.put(NAMES.radio_tx(node), topics.encode([request]), reliable=True)
+                bus.put(NAMES.radio_tx(node), codecs.encode([request]), reliable=True)
 
             for seq in range(3000):
                 put(1, seq)
@@ -110,7 +110,7 @@ async def test_a_host_that_is_held_up_drops_what_its_inbox_cannot_hold_and_says_
 
 def told(reports: list[bytes]) -> dict[str, Any]:
     """The last report."""
-    (last,) = topics.decode(reports[-1])
+    (last,) = codecs.decode(reports[-1])
     assert isinstance(last, Report)
     content: dict[str, Any] = json.loads(last.json)
     return content
@@ -164,7 +164,7 @@ class Drowning(Actor):
 
 async def test_input_without_end_keeps_nobody_from_its_timers_nor_from_its_end() -> None:
     endpoint = free_endpoint()
-    actor, put = Drowning(), topics.encode([MavlinkTap(0, b"")])
+    actor, put = Drowning(), codecs.encode([MavlinkTap(0, b"")])
     with Bus.serve(endpoint) as bus, Bus.join(endpoint) as own:
         host = RealtimeHost(actor, own, NAMES)
         actor.again = lambda: host._from_thread(NAMES.pose, put)

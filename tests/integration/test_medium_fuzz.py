@@ -11,7 +11,7 @@ from itertools import islice
 import pytest
 
 from emulator.medium import Medium
-from fanet_mw.bus import topics
+from fanet_mw.bus import codecs
 from fanet_mw.bus.messages import (
     Clock,
     ClockState,
@@ -57,7 +57,7 @@ class Fuzz:
             node = rng.randrange(1, 10)
             dice = rng.random()
             if dice < 0.05:
-                data = topics.encode([self._control()])
+                data = codecs.encode([self._control()])
                 yield NAMES.radio_control, data if dice < 0.03 else self._mutated(data)
             else:
                 yield NAMES.radio_tx(node) if dice < 0.9 else rng.choice(STRANGE_TOPICS), self._payload(node)
@@ -72,7 +72,7 @@ class Fuzz:
         batch: list[Message] = [self._request(node) for _ in range(1 if dice < 0.8 else rng.randrange(4))]
         if dice > 0.9:
             batch.append(self._other())
-        data = topics.encode(batch)
+        data = codecs.encode(batch)
         return data if dice < 0.5 or not data else self._mutated(data)
 
     def _request(self, node: int) -> TxRequest:

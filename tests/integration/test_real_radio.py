@@ -15,7 +15,7 @@ from typing import NamedTuple
 import pytest
 
 from fanet_mw.actor import Actor
-from fanet_mw.bus import topics
+from fanet_mw.bus import codecs
 from fanet_mw.bus.messages import Message, TraceBatch, WifiScan
 from fanet_mw.bus.topics import Topics
 from fanet_mw.hosts.bus import Bus
@@ -183,14 +183,14 @@ async def with_a_router(network: Network, path: Path) -> list[Record]:
             clock = SwarmClock(await keeper.start(timeout_s=30))
             for node in (1, 2, 3):
                 await asyncio.sleep(clock.wait_s(heard_ns(node)))
-                bus.put(topic_names.sensor(node, "wifi"), topics.encode([scan(clock.now_ns())]))
+                bus.put(topic_names.sensor(node, "wifi"), codecs.encode([scan(clock.now_ns())]))
             reports = await asyncio.to_thread(finished, processes)
         finally:
             for process in processes:
                 process.kill()
                 process.communicate()
     assert all(report["radio"]["malformed"] == 0 for report in reports if "malformed" in report["radio"])  # type: ignore[index, operator]
-    decoded = [message for payload in batches for message in topics.decode(payload)]
+    decoded = [message for payload in batches for message in codecs.decode(payload)]
     return [record for message in decoded if isinstance(message, TraceBatch) for record in message.records]
 
 

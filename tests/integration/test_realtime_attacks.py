@@ -9,7 +9,7 @@ from typing import Self
 import air_attacks
 from realtime_attacks import attacked_in_real_time
 
-from fanet_mw.bus import topics
+from fanet_mw.bus import codecs
 from fanet_mw.bus.messages import Clock, ClockState, MavlinkTap, Message, Report, TraceBatch
 from fanet_mw.bus.topics import Topics
 from fanet_mw.hosts.bus import MAX_PUT_BYTES, Bus
@@ -46,7 +46,7 @@ class Attacker:
 
     def __init__(self, endpoint: str, puts: list[tuple[str, list[Message]]], *, every_s: float = 0.3) -> None:
         self._endpoint = endpoint
-        self._puts = [(topic, topics.encode(messages)) for topic, messages in puts]
+        self._puts = [(topic, codecs.encode(messages)) for topic, messages in puts]
         self._every_s = every_s
         self._over = threading.Event()
         self._thread = threading.Thread(target=self._run)

@@ -12,7 +12,7 @@ from pathlib import Path
 
 import pytest
 
-from fanet_mw.bus import topics
+from fanet_mw.bus import codecs
 from fanet_mw.bus.messages import (
     Clock,
     ClockState,
@@ -117,7 +117,7 @@ def test_an_agent_is_heard_on_its_own_topics_and_on_no_other(keys: Path) -> None
 
         def say() -> None:
             for topic, message in {**NOT_OURS, **OURS}.items():
-                bus["agent-1"].put(topic, topics.encode([message]), reliable=True)
+                bus["agent-1"].put(topic, codecs.encode([message]), reliable=True)
 
         let_through = {
             NAMES.radio_tx(1): "emulator", NAMES.setpoint(1): "world", NAMES.mavlink(1): "operator",
@@ -136,7 +136,7 @@ def test_an_agent_hears_what_is_for_it_and_nothing_of_the_others(keys: Path) -> 
         bus["agent-1"].subscribe("fanet/test/**", lambda topic, _: heard.append(("", topic)))
         bus["agent-1"].subscribe(NAMES.sensors(1), lambda topic, _: heard.append(("", topic)))
         time.sleep(SETTLE_S)
-        payload = topics.encode([MavlinkTap(S, b"")])
+        payload = codecs.encode([MavlinkTap(S, b"")])
         says = {
             "emulator": (NAMES.radio_rx(1), NAMES.radio_rx(2), NAMES.trace("emulator"), NAMES.report("emulator")),
             "world": (NAMES.pose, NAMES.sensor(1, "gps"), NAMES.sensor(2, "gps"), NAMES.report("world")),
@@ -169,7 +169,7 @@ async def test_an_agent_cannot_answer_for_the_keeper_of_the_clock(keys: Path) ->
     forged = Clock(123, 2.0, ClockState.STOPPED)
     with sessions(keys, "agent-1", "agent-2") as bus:
         keeper = ClockKeeper(bus["router"], NAMES, time_scale=1.0, expected=())
-        bus["agent-1"].answer(NAMES.clock, lambda: topics.encode([forged]))
+        bus["agent-1"].answer(NAMES.clock, lambda: codecs.encode([forged]))
         await asyncio.sleep(SETTLE_S)
         listener = ClockListener(bus["agent-2"], NAMES)
         started = await keeper.start(timeout_s=60)

@@ -15,7 +15,7 @@ from typing import Any
 import numpy as np
 import pytest
 
-from fanet_mw.bus import topics
+from fanet_mw.bus import codecs
 from fanet_mw.bus.messages import Poses
 from fanet_mw.bus.topics import Topics
 from fanet_mw.hosts.bus import Bus
@@ -114,7 +114,7 @@ class Watch:
 
     def __call__(self, swarm: SwarmRun) -> None:
         self.bus = Bus.join(swarm.address.endpoint)
-        self.bus.subscribe(Topics("verdict").pose, lambda _, payload: self.poses.extend(topics.decode(payload)))  # type: ignore[arg-type]
+        self.bus.subscribe(Topics("verdict").pose, lambda _, payload: self.poses.extend(codecs.decode(payload)))  # type: ignore[arg-type]
 
     def jump_m(self) -> float:
         """The farthest that a UAV was from where it had been in the poses before."""

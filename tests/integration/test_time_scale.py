@@ -9,7 +9,7 @@ from pathlib import Path
 import pytest
 from test_air_control import emulator
 
-from fanet_mw.bus import topics
+from fanet_mw.bus import codecs
 from fanet_mw.bus.messages import Report, TxRequest
 from fanet_mw.bus.topics import Topics
 from fanet_mw.hosts.bus import Bus
@@ -34,10 +34,10 @@ async def test_a_lead_is_swarm_time_so_that_a_slow_clock_gives_slow_processes_mo
             await asyncio.sleep(2)
             for seq in range(10):
                 request = TxRequest(seq, start_ns, b"frame", BROADCAST, wants_status=False)
-                bus.put(names.radio_tx(1), topics.encode([request]))
+                bus.put(names.radio_tx(1), codecs.encode([request]))
             await asyncio.sleep(0.5)
             lag_ms = (clock.now_ns() - start_ns) / MS
-    (last,) = topics.decode(reports[-1])
+    (last,) = codecs.decode(reports[-1])
     assert isinstance(last, Report)
     found = json.loads(last.json)["late"]
     assert found["frames"] == 10

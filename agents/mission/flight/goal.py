@@ -4,7 +4,7 @@ from typing import Final
 
 from agents.mission.finding.finds import Finds
 from agents.mission.formation.formation_place import FormationPlace
-from agents.mission.navigation.motion import Navigation
+from agents.mission.navigation.navigation import Navigation
 from agents.mission.tasking.approach import Approach
 from agents.mission.tasking.bidding import FAR_M, VAGUE_M
 from fanet_mw.units import Enu

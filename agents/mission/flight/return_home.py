@@ -4,7 +4,7 @@ import math
 from typing import Final
 
 from agents.mission.flight.endurance import Endurance
-from agents.mission.navigation.motion import Navigation
+from agents.mission.navigation.navigation import Navigation
 from agents.mission.outbox import Outbox
 from fanet_mw.application import Course
 from fanet_mw.units import Enu

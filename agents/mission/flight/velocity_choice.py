@@ -11,7 +11,9 @@ from agents.mission.flight.constraints import avoiding, grown_m, staying_near
 from agents.mission.formation.formation_place import FormationPlace
 from agents.mission.navigation.half_planes import HalfPlane, Velocity, nearest
 from agents.mission.navigation.known_obstacles import KnownObstacles
-from agents.mission.navigation.motion import Motion, Navigation, NeighborMotions
+from agents.mission.navigation.navigation import Navigation
+from agents.mission.navigation.neighbor_motions import NeighborMotions
+from fanet_mw.motion import Motion
 from fanet_mw.units import Enu, S
 
 _LANE_GAIN: Final = 0.4
@@ -104,7 +106,7 @@ class ClearOfOthers:
         planes: list[tuple[float, HalfPlane]] = []
         seen = [Motion(*mover) for mover in self._obstacles.movers(now_ns)]
         for motion in (*self._neighbors.all(now_ns=now_ns), *seen):
-            offset = motion.now(now_ns).minus(here)
+            offset = motion.position_at(now_ns).minus(here)
             distance = math.hypot(offset.east, offset.north)
             climb = flown.up - motion.velocity.up
             apart_soon = abs(offset.up - climb * 3.0)
@@ -142,7 +144,7 @@ class InReach:
             if motion is None:
                 continue
             plane = staying_near(
-                motion.now(now_ns).minus(self._navigation.position),
+                motion.position_at(now_ns).minus(self._navigation.position),
                 (motion.velocity.east, motion.velocity.north),
                 tether_m=self._tether_m,
                 within_s=_TETHER_S,
@@ -156,7 +158,7 @@ class InReach:
         plan = self._formation.plan
         assert plan is not None, "who has a place has a plan"
         near = [
-            (motion.now(now_ns).minus(self._navigation.position).norm(), other)
+            (motion.position_at(now_ns).minus(self._navigation.position).norm(), other)
             for other in places
             if (motion := self._neighbors.motion(plan.nodes[other], now_ns=now_ns)) is not None
         ]

@@ -9,7 +9,7 @@ from typing import Final
 from agents.mission.finding.phone_filter import Estimate
 from agents.mission.formation.formation_planner import pattern_of
 from agents.mission.formation.pattern import Pattern
-from agents.mission.navigation.motion import Navigation
+from agents.mission.navigation.navigation import Navigation
 from fanet_mw.units import MS, US, Enu, NodeId, S
 from fanet_mw.wire.search import Search
 

@@ -15,7 +15,7 @@ from typing import Final, NamedTuple
 from agents.mission.formation.pattern import Pattern
 from agents.mission.hungarian import assign
 from fanet_mw.units import US, Enu, NodeId, S
-from fanet_mw.wire.search import Search, Status
+from fanet_mw.wire.search import Search, SearchStatus
 
 STATUS_S: Final = 12.0
 """How often a UAV says how it is."""
@@ -53,7 +53,7 @@ class FormationPlanner:
 
     # --- what comes in --------------------------------------------------------------------------------------------
 
-    def status(self, status: Status, *, now_ns: int) -> None:
+    def status(self, status: SearchStatus, *, now_ns: int) -> None:
         """A UAV, we ourselves perhaps, said where it is."""
         before = self._members.get(status.node)
         if before is None or status.t_us * US >= before.heard_ns - S:

@@ -5,7 +5,7 @@ from typing import Final
 
 from agents.mission.finding.finds import Finds
 from agents.mission.finding.phone_filter import Estimate
-from agents.mission.navigation.motion import Navigation
+from agents.mission.navigation.navigation import Navigation
 from agents.mission.outbox import Outbox
 from fanet_mw.trace import Arrived
 from fanet_mw.units import NodeId, S

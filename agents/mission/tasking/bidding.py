@@ -11,7 +11,7 @@ from typing import Final
 
 from agents.mission.finding.finds import Find, Finds
 from agents.mission.formation.formation_place import FormationPlace
-from agents.mission.navigation.motion import Navigation
+from agents.mission.navigation.navigation import Navigation
 from agents.mission.outbox import Outbox
 from agents.mission.tasking.approach import Approach
 from agents.mission.tasking.auction import Auction

@@ -10,7 +10,7 @@ from collections.abc import Callable
 from pathlib import Path
 from typing import Final
 
-from fanet_mw.bus import topics
+from fanet_mw.bus import codecs
 from fanet_mw.bus.messages import TraceBatch
 from fanet_mw.bus.radio_control import Control
 from fanet_mw.bus.topics import ROOT, Topics
@@ -55,7 +55,7 @@ def change(endpoint: str, swarm: str | None, control: Control, *, zenoh_config: 
         done: list[RadioFault] = []
         confirmed = threading.Event()
         bus.subscribe(names.trace("emulator"), _watch(control, done, confirmed))
-        bus.put(names.radio_control, topics.encode([control]), reliable=True)
+        bus.put(names.radio_control, codecs.encode([control]), reliable=True)
         if not confirmed.wait(CONFIRM_TIMEOUT_S):
             raise FanetError(
                 f"the emulator did not confirm within {CONFIRM_TIMEOUT_S:g} s: refused (see `refused` in its report), "
@@ -69,7 +69,7 @@ def _watch(control: Control, done: list[RadioFault], confirmed: threading.Event)
 
     def on_sample(_topic: str, payload: bytes) -> None:
         try:
-            batches = [message for message in topics.decode(payload) if isinstance(message, TraceBatch)]
+            batches = [message for message in codecs.decode(payload) if isinstance(message, TraceBatch)]
         except MalformedFrameError:
             return
         faults = [record for batch in batches for record in batch.records if isinstance(record, RadioFault)]

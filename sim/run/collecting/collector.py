@@ -14,7 +14,7 @@ from collections.abc import Callable, Collection, Iterable
 from pathlib import Path
 from typing import Any, Final
 
-from fanet_mw.bus import topics
+from fanet_mw.bus import codecs
 from fanet_mw.bus.link_stats import LinkStats
 from fanet_mw.bus.messages import MavlinkTap, Message, Report, TraceBatch
 from fanet_mw.bus.topics import Topics
@@ -101,7 +101,7 @@ class Collector:
         if not self._allowance.take(f"{what}/{name}", len(payload), now_ns=self._now_ns()):
             return "excess"
         try:
-            messages = topics.decode(payload)
+            messages = codecs.decode(payload)
         except MalformedFrameError:
             return "undecodable"
         wrong: str | None = None

@@ -7,7 +7,7 @@ from typing import Any
 
 import pytest
 
-from fanet_mw.bus import layouts, topics
+from fanet_mw.bus import codecs, layouts
 from fanet_mw.bus import messages as m
 from fanet_mw.bus.radio_control import Cut, Degrade
 from fanet_mw.units import Enu, NodeId
@@ -39,8 +39,8 @@ def flat(message: Any) -> list[float]:
 
 @pytest.mark.parametrize("message", SAMPLES, ids=lambda message: type(message).__name__)
 def test_a_reader_by_the_reference_reads_what_was_sent(message: Any) -> None:
-    data = topics.encode([message])
-    assert struct.unpack_from("<BI", data) == (topics.CODES[type(message)], len(data) - 5)
+    data = codecs.encode([message])
+    assert struct.unpack_from("<BI", data) == (codecs.CODES[type(message)], len(data) - 5)
     fields = layouts.head(type(message))
     read = [struct.unpack_from(f"<{CODES[field.kind]}", data, 5 + field.offset)[0] for field in fields]
     assert sorted(read) == sorted(flat(message))
@@ -50,14 +50,14 @@ def test_a_reader_by_the_reference_reads_what_was_sent(message: Any) -> None:
 
 
 def test_every_message_has_its_layout() -> None:
-    assert set(layouts.NAMED) == set(topics.CODES) == set(topics.HEADS)
+    assert set(layouts.NAMED) == set(codecs.CODES) == set(codecs.HEADS)
     for kind in layouts.kinds():
         assert layouts.head(kind) or layouts.NAMED[kind].rest
         assert bool(layouts.row(kind)) == bool(layouts.NAMED[kind].row)
 
 
 def test_a_struct_that_was_changed_without_its_names_is_refused(monkeypatch: pytest.MonkeyPatch) -> None:
-    monkeypatch.setitem(topics.HEADS, m.Gps, (struct.Struct("<q7d"),))
+    monkeypatch.setitem(codecs.HEADS, m.Gps, (struct.Struct("<q7d"),))
     with pytest.raises(ValueError, match="8 fields, 7 are named"):
         layouts.head(m.Gps)
 

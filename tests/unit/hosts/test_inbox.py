@@ -6,12 +6,12 @@ from array import array
 from hypothesis import given
 from hypothesis import strategies as st
 
-from fanet_mw.bus import topics
+from fanet_mw.bus import codecs
 from fanet_mw.bus.messages import MavlinkTap, Message, Poses, Report, TraceBatch
 from fanet_mw.bus.radio_control import Restore
 from fanet_mw.hosts.inbox import BOUND, BOUND_BYTES, PORTION, Inbox
 
-TAP = topics.encode([MavlinkTap(1, b"x")])
+TAP = codecs.encode([MavlinkTap(1, b"x")])
 
 
 def delivered(inbox: Inbox, *, most: int = PORTION) -> list[str]:
@@ -89,7 +89,7 @@ def test_a_put_of_many_messages_is_handed_over_in_turns() -> None:
 
 def test_a_turn_ends_after_so_many_bytes() -> None:
     inbox = Inbox()
-    long = topics.encode([MavlinkTap(1, b"x" * 100_000)])
+    long = codecs.encode([MavlinkTap(1, b"x" * 100_000)])
     for _ in range(9):
         inbox.offer("a", long)
     assert len(delivered(inbox)) == 3
@@ -116,20 +116,20 @@ def test_what_waits_is_bounded_in_bytes_whatever_it_says() -> None:
 
 def test_more_messages_in_a_put_than_anyone_means_are_malformed() -> None:
     inbox = Inbox()
-    inbox.offer("a", topics.encode([Restore("")] * topics.MAX_ITEMS))
-    inbox.offer("a", topics.encode([Restore("")] * (topics.MAX_ITEMS + 1)))
+    inbox.offer("a", codecs.encode([Restore("")] * codecs.MAX_ITEMS))
+    inbox.offer("a", codecs.encode([Restore("")] * (codecs.MAX_ITEMS + 1)))
     heard = 0
     while found := delivered(inbox):
         assert len(found) <= PORTION
         heard += len(found)
-    assert heard == topics.MAX_ITEMS
+    assert heard == codecs.MAX_ITEMS
     assert (inbox.taken, inbox.malformed) == (1, 1)
 
 
 def test_text_for_collectors_is_not_decoded_for_an_actor() -> None:
     inbox = Inbox()
-    inbox.offer("a", topics.encode([Report("x", 1, "{}")]))
-    inbox.offer("a", topics.encode([TraceBatch(())]))
+    inbox.offer("a", codecs.encode([Report("x", 1, "{}")]))
+    inbox.offer("a", codecs.encode([TraceBatch(())]))
     assert delivered(inbox) == []
     assert inbox.malformed == 2
 
@@ -138,7 +138,7 @@ def test_two_threads_at_its_two_ends_lose_nothing() -> None:
     """What the bus delivers while the actor takes it."""
     inbox = Inbox(bound=64)
     heard: list[Message] = []
-    puts = [topics.encode([Poses(i, array("H"), array("d"))]) for i in range(20_000)]
+    puts = [codecs.encode([Poses(i, array("H"), array("d"))]) for i in range(20_000)]
 
     def bus() -> None:
         for payload in puts:

@@ -8,7 +8,7 @@ from typing import Any
 import numpy as np
 import pytest
 
-from fanet_mw.bus import topics
+from fanet_mw.bus import codecs
 from fanet_mw.bus.messages import Message, Poses, Setpoint
 from fanet_mw.bus.topics import Topics
 from fanet_mw.hosts.bus import OnSample
@@ -29,7 +29,7 @@ class Ear:
         self.recorder = FlightRecorder(scenario, self._hears.__setitem__, NAMES)
 
     def say(self, topic: str, *messages: Message) -> None:
-        self.say_bytes(topic, topics.encode(messages))
+        self.say_bytes(topic, codecs.encode(messages))
 
     def say_bytes(self, topic: str, payload: bytes) -> None:
         expression = NAMES.pose if topic == NAMES.pose else NAMES.all_setpoints

@@ -8,8 +8,9 @@ a link has changed               the same, where links are measured: joins carry
 from collections.abc import Callable
 from typing import Final
 
+from fanet_mw.motion import Motion
 from fanet_mw.node.contract import Port
-from fanet_mw.routing.clustered.roles.position_updates import Motion, PositionUpdates
+from fanet_mw.routing.clustered.roles.position_updates import PositionUpdates
 from fanet_mw.routing.clustered.timetable.link_quality import LinkQuality
 from fanet_mw.units import MS, S
 from fanet_mw.wire.inner import Join

@@ -12,11 +12,11 @@ from types import MappingProxyType
 from typing import Final, NamedTuple
 
 from fanet_mw.graph.topology import Adjacency, within_range
+from fanet_mw.motion import Motion
 from fanet_mw.routing.clustered.clustering import Cluster, Swarm, succession
 from fanet_mw.routing.clustered.clustering.division import Division, drift
 from fanet_mw.routing.clustered.roles.lease import Authority
 from fanet_mw.routing.clustered.roles.liveness import Liveness
-from fanet_mw.routing.clustered.roles.position_updates import Motion
 from fanet_mw.routing.clustered.roles.roster import Roster, sure_m
 from fanet_mw.routing.clustered.timetable.link_state import LinkState, adjacency, worth_a_change
 from fanet_mw.routing.clustered.timetable.turn_plan import measured_period_ns

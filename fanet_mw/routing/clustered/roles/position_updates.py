@@ -5,8 +5,9 @@ farther than a share of the radio range from where the leader must believe it to
 so long that the leader might take it for dead. So a swarm that flies straight, or hovers, costs nothing.
 """
 
-from typing import Final, NamedTuple
+from typing import Final
 
+from fanet_mw.motion import Motion
 from fanet_mw.units import Enu, S
 
 _SHARE: Final = 0.1
@@ -16,20 +17,6 @@ _LEAST_NS: Final = 5 * S
 _QUIET_NS: Final = 20 * S
 LOST_NS: Final = 45 * S
 """The time without a sign of life after which the leader forgets a node: two updates and a little."""
-
-
-class Motion(NamedTuple):
-    """Where a node was at an instant, and how fast it moved [m/s]."""
-
-    position: Enu
-    velocity: Enu
-    at_ns: int
-
-    def position_at(self, t_ns: int) -> Enu:
-        """Where the node is at an instant if it flew on straight."""
-        seconds = (t_ns - self.at_ns) / S
-        here, v = self.position, self.velocity
-        return Enu(here.east + v.east * seconds, here.north + v.north * seconds, here.up + v.up * seconds)
 
 
 class PositionUpdates:

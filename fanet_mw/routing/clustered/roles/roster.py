@@ -9,8 +9,9 @@ A node has objected when it has generated something since it was said to be sile
 from collections.abc import Mapping
 from typing import Final, NamedTuple
 
+from fanet_mw.motion import Motion
 from fanet_mw.routing.clustered.roles.liveness import Liveness
-from fanet_mw.routing.clustered.roles.position_updates import LOST_NS, Motion
+from fanet_mw.routing.clustered.roles.position_updates import LOST_NS
 from fanet_mw.units import Enu, NodeId, S
 
 _MISSED_NS: Final = 4 * S

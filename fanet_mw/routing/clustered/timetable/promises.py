@@ -19,7 +19,8 @@ from fanet_mw.routing.clustered.tdma.admission import Admission, least_interval_
 from fanet_mw.routing.clustered.tdma.own_bound import OwnBound
 from fanet_mw.routing.clustered.tdma.root_release import RootRelease
 from fanet_mw.routing.clustered.tdma.turns import clocks_fit, receipt_ns
-from fanet_mw.routing.clustered.timetable.turn_plan import LIKELY_SHARE, TurnPlan
+from fanet_mw.routing.clustered.timetable.likely_delay import LIKELY_SHARE, likely_delay_ns
+from fanet_mw.routing.clustered.timetable.turn_plan import TurnPlan
 from fanet_mw.routing.clustered.timetable.turn_plans import TurnPlans
 from fanet_mw.trace import BoundStated, LikelyStated
 from fanet_mw.units import MS, US, NodeId, seconds_to_ns
@@ -203,7 +204,8 @@ class Promises:
             return None  # schedules go before the leader's own packets
         if len(plan.table.spans) < self._port.scenario.nodes.count:
             return None  # a swarm in parts, or one that is not complete: somebody is in no turn of this timetable
-        found_ns = plan.likely_ns(
+        found_ns = likely_delay_ns(
+            plan,
             self._port.node,
             waiting=len(self._roots),
             interval_ns=self._interval_ns,

@@ -14,7 +14,6 @@ from collections.abc import Iterator, Mapping
 from itertools import islice
 from typing import Final, NamedTuple, Self
 
-from fanet_mw.routing.clustered.forwarding.repair import RIPE_NS
 from fanet_mw.routing.clustered.tdma.turns import Turns, turn_ns
 from fanet_mw.routing.clustered.tdma.urgent import reserved
 from fanet_mw.routing.clustered.timetable.delivery_odds import Odds
@@ -49,13 +48,6 @@ _CALLS_PER_S: Final = 3
 _MOST_DIGESTS: Final = 4
 _HELLO_BYTES: Final = 200
 """The size of a hello without its digest."""
-
-LIKELY_SHARE: Final = 0.99
-"""The share of copies for which a node states a delay when links lose frames."""
-_LATE_HELLO: Final = 1.1
-"""The most hello intervals between two hellos."""
-_BUSY: Final = 2
-"""The factor by which a round of repair takes longer than when only one packet is lacking, because answers queue."""
 
 _BLOCK: Final = 300
 """The fewest packets in a block: fewer are packed less densely, more take long to pack."""
@@ -131,29 +123,6 @@ class TurnPlan(NamedTuple):
     def has_turns(self, node: NodeId) -> bool:
         """True if this node lets its packets out itself."""
         return node in self.table.spans
-
-    def likely_ns(self, node: NodeId, *, waiting: int, interval_ns: int, hello_ns: int) -> int | None:
-        """Within which time `LIKELY_SHARE` of the copies of this node's packets arrive; None: the odds are worse.
-
-        The longest wait, or that of the last of so many that are `waiting`, if it is longer, as after several joins;
-        behind one more join, which takes a turn of the node when a link has changed; the flood; and as many
-        rounds of repair as it takes: a hello, as late as it may be, which waits for a turn; an answer, which may wait
-        for the next turn but one. Half of what may be missing is left for what the odds do not know.
-        """
-        assert self.odds is not None, "whoever asks has a timetable for lossy links"
-        flood_ns = self.turns.worst_ns(self.roots, span=self.table.spans[node], interval_ns=interval_ns)
-        rounds = self.odds.rounds(node, missed=(1 - LIKELY_SHARE) / 2)
-        if flood_ns is None or rounds is None or not self.calls:
-            return None
-        call_ns = self.turns.done_ns(self.calls, span=1)[0]
-        superframes, turns = divmod(max(waiting, 1) - 1, len(self.roots))
-        queued_ns = (
-            superframes * self.turns.period_ns + self.turns.done_ns(self.roots, span=self.table.spans[node])[turns]
-        )
-        flood_ns = max(flood_ns, queued_ns)
-        flood_ns += self.turns.period_ns // len(self.roots)
-        round_ns = _BUSY * (round(_LATE_HELLO * hello_ns) + 3 * call_ns)
-        return flood_ns + (RIPE_NS if rounds else 0) + rounds * round_ns
 
 
 class _Wish(NamedTuple):

@@ -7,7 +7,7 @@ import pytest
 from agents.applications.conflicts import ConflictMonitor
 from fanet_mw.application import HOME, Course
 from fanet_mw.mavlink import Collision
-from fanet_mw.routing.clustered.roles.position_updates import Motion
+from fanet_mw.motion import Motion
 from fanet_mw.trace import ConflictForeseen, ConflictOver
 from fanet_mw.units import MS, Enu, NodeId, S
 

@@ -16,7 +16,7 @@ from agents.mission.hungarian import assign
 from agents.mission.navigation.half_planes import HalfPlane, nearest
 from agents.mission.tasking.auction import Auction
 from fanet_mw.units import US, Enu, NodeId, S
-from fanet_mw.wire.search import WITHDRAWN, Bid, Search, Status
+from fanet_mw.wire.search import WITHDRAWN, Bid, Search, SearchStatus
 
 MODEL = PhoneModel(power_dbm=15, exponent=3, shadowing_db=4, offset_db=1, threshold_dbm=-90)
 REACH_M = 250.0
@@ -99,7 +99,7 @@ def planner_with(nodes: int, *, node: int = 1) -> FormationPlanner:
     made = FormationPlanner(NodeId(node), expected=nodes, deploy_speed_m_s=9)
     for other in range(1, nodes + 1):
         place = Enu(200.0 * ((other - 1) % 9 - 4), 200.0 * ((other - 1) // 9 - 2), 50)
-        made.status(Status(0, place, other, 0, 100), now_ns=0)
+        made.status(SearchStatus(0, place, other, 0, 100), now_ns=0)
     return made
 
 
@@ -126,7 +126,7 @@ def test_the_place_of_a_lost_uav_in_a_line_goes_to_a_follower() -> None:
     lost, later_ns = before.nodes[3], 90 * S
     for node in range(1, 46):
         if node != lost:
-            planner.status(Status(later_ns // US, Enu(0, 0, 50), node, 1, 100), now_ns=later_ns)
+            planner.status(SearchStatus(later_ns // US, Enu(0, 0, 50), node, 1, 100), now_ns=later_ns)
     assert planner.review(pattern, now_ns=later_ns)
     after = planner.plan
     assert after is not None
@@ -145,7 +145,7 @@ def test_who_flies_home_holds_no_place_any_more_from_when_it_says_so() -> None:
     before = planner.plan
     assert before is not None
     leaver, later_ns = before.nodes[3], 20 * S
-    planner.status(Status(later_ns // US, Enu(0, 0, 50), leaver, 1, 0), now_ns=later_ns)
+    planner.status(SearchStatus(later_ns // US, Enu(0, 0, 50), leaver, 1, 0), now_ns=later_ns)
     planner.alive(leaver, Enu(0, 0, 50), now_ns=later_ns)  # its hellos are heard still
     assert planner.review(pattern, now_ns=later_ns)
     after = planner.plan
@@ -156,7 +156,7 @@ def test_who_flies_home_holds_no_place_any_more_from_when_it_says_so() -> None:
 
 def test_a_planner_that_flies_home_leaves_planning_to_the_next() -> None:
     first, second = planner_with(45, node=1), planner_with(45, node=2)
-    gone = Status(S // US, Enu(0, 0, 50), 1, 0, 0)
+    gone = SearchStatus(S // US, Enu(0, 0, 50), 1, 0, 0)
     for planner in (first, second):
         planner.status(gone, now_ns=S)
     assert not first.review(formation(), now_ns=S)
@@ -170,7 +170,7 @@ def test_the_smaller_part_of_a_swarm_that_came_apart_makes_no_plan_of_its_own() 
     planner.review(pattern, now_ns=S)
     later_ns = 90 * S
     for node in range(1, 20):
-        planner.status(Status(later_ns // US, Enu(0, 0, 50), node, 1, 100), now_ns=later_ns)
+        planner.status(SearchStatus(later_ns // US, Enu(0, 0, 50), node, 1, 100), now_ns=later_ns)
     assert not planner.review(pattern, now_ns=later_ns)
 
 

@@ -13,11 +13,13 @@ from agents.mission.formation.formation_place import FormationPlace
 from agents.mission.formation.pattern import fitted
 from agents.mission.navigation.half_planes import HalfPlane
 from agents.mission.navigation.known_obstacles import KnownObstacles
-from agents.mission.navigation.motion import Motion, Navigation, NeighborMotions
+from agents.mission.navigation.navigation import Navigation
+from agents.mission.navigation.neighbor_motions import NeighborMotions
 from agents.mission.navigation.onboard_map import NO_MAP
 from agents.mission.outbox import Outbox
 from agents.mission.tasking.approach import Approach
 from agents.mission.tasking.bidding import Bidding
+from fanet_mw.motion import Motion
 from fanet_mw.scenario import config
 from fanet_mw.trace import Approaching, Arrived, Confirmed
 from fanet_mw.units import US, Enu, NodeId, S

@@ -5,17 +5,17 @@ from collections.abc import Callable, Sequence
 
 import pytest
 
-from agents.mission.navigation.motion import Motion
 from agents.mission.navigation.onboard_map import NO_MAP, OnboardMap
 from agents.mission.outbox import Outbox
 from agents.mission.searcher import Searcher, formation
 from fanet_mw.bus.messages import Echo
+from fanet_mw.motion import Motion
 from fanet_mw.scenario import Scenario
 from fanet_mw.trace import Confirmed, MissionModeChanged, Sighted
 from fanet_mw.units import MS, US, Enu, NodeId, S
 from fanet_mw.wire import HEADER_BYTES
 from fanet_mw.wire.inner import Survivor
-from fanet_mw.wire.search import Bid, Bids, Search, Status, Told, told_in
+from fanet_mw.wire.search import Bid, Bids, Search, SearchStatus, Told, told_in
 
 HOME = Enu(0.0, -100.0, 65.0)
 STILL = Enu(0.0, 0.0, 0.0)
@@ -88,7 +88,7 @@ def test_who_has_just_enough_left_says_so_flies_home_and_lands(make_scenario: Ca
     course = flight.outbox.course
     assert course is not None
     assert course.land
-    charges = [message.charge for message in flight.told if isinstance(message, Status)]
+    charges = [message.charge for message in flight.told if isinstance(message, SearchStatus)]
     assert min(charges[:3]) > 50
     assert charges[-1] == 0
 

@@ -16,7 +16,7 @@ from typing import Any
 
 import pytest
 
-from fanet_mw.bus import topics
+from fanet_mw.bus import codecs
 from fanet_mw.bus.link_stats import COUNTS, LinkStats
 from fanet_mw.bus.messages import MavlinkTap, Message, Report, TraceBatch
 from fanet_mw.bus.topics import Topics
@@ -70,7 +70,7 @@ class Ear:
         self._hear[topic.rpartition("/")[0]](topic, payload)
 
     def say(self, topic: str, *messages: Message) -> dict[str, int]:
-        self.put(topic, topics.encode(messages))
+        self.put(topic, codecs.encode(messages))
         return self.why
 
     @property
@@ -317,7 +317,7 @@ def test_who_is_not_of_the_swarm_is_not_heard(ear: Ear, topic: str) -> None:
 
 
 def test_a_flood_of_one_actor_stops_at_its_allowance_and_leaves_the_others_theirs(ear: Ear) -> None:
-    flood = topics.encode([TraceBatch(tuple(Generated(S, 3, i, "traffic" * 20, 5) for i in range(4_000)))])
+    flood = codecs.encode([TraceBatch(tuple(Generated(S, 3, i, "traffic" * 20, 5) for i in range(4_000)))])
     for _ in range(200):  # 140 MB
         ear.put(NAMES.trace("agent-3"), flood)
     excess = ear.why["trace: excess"]

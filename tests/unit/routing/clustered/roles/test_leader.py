@@ -4,10 +4,11 @@ from collections.abc import Callable, Sequence
 
 import pytest
 
+from fanet_mw.motion import Motion
 from fanet_mw.routing.clustered.roles.leader import OBJECTION_NS, SETTLE_NS, Leader
 from fanet_mw.routing.clustered.roles.lease import Authority
 from fanet_mw.routing.clustered.roles.liveness import Liveness
-from fanet_mw.routing.clustered.roles.position_updates import LOST_NS, Motion
+from fanet_mw.routing.clustered.roles.position_updates import LOST_NS
 from fanet_mw.scenario import Scenario
 from fanet_mw.units import MS, Enu, NodeId, S
 from fanet_mw.wire.inner import Join, Schedule

@@ -2,7 +2,8 @@
 
 import pytest
 
-from fanet_mw.routing.clustered.roles.position_updates import Motion, PositionUpdates
+from fanet_mw.motion import Motion
+from fanet_mw.routing.clustered.roles.position_updates import PositionUpdates
 from fanet_mw.units import Enu, S
 
 HERE, STILL = Enu(0.0, 0.0, 50.0), Enu(0.0, 0.0, 0.0)

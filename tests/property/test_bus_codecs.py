@@ -7,7 +7,7 @@ import pytest
 from hypothesis import given
 from hypothesis import strategies as st
 
-from fanet_mw.bus import topics
+from fanet_mw.bus import codecs, topics
 from fanet_mw.bus.link_stats import COUNTS, LinkStats
 from fanet_mw.bus.messages import (
     Altimeter,
@@ -109,22 +109,22 @@ messages: st.SearchStrategy[Message] = st.one_of(
 
 @given(st.lists(messages, max_size=6))
 def test_a_batch_is_decoded_as_it_was_encoded(batch: list[Message]) -> None:
-    assert topics.decode(topics.encode(batch)) == batch
+    assert codecs.decode(codecs.encode(batch)) == batch
 
 
 @given(st.binary(max_size=200))
 def test_garbage_is_one_error_or_messages(data: bytes) -> None:
     with suppress(MalformedFrameError):
-        topics.decode(data)
+        codecs.decode(data)
 
 
 @given(st.lists(messages, min_size=1, max_size=3), st.data())
 def test_a_changed_byte_is_one_error_or_other_messages(batch: list[Message], data: st.DataObject) -> None:
-    mutated = bytearray(topics.encode(batch))
+    mutated = bytearray(codecs.encode(batch))
     at = data.draw(st.integers(0, len(mutated) - 1))
     mutated[at] ^= data.draw(st.integers(1, 255))
     with suppress(MalformedFrameError):
-        topics.decode(bytes(mutated))
+        codecs.decode(bytes(mutated))
 
 
 @pytest.mark.parametrize(
@@ -141,7 +141,7 @@ def test_a_changed_byte_is_one_error_or_other_messages(batch: list[Message], dat
 )
 def test_a_reading_that_is_no_number_is_malformed(reading: Message) -> None:
     with pytest.raises(MalformedFrameError):
-        topics.decode(topics.encode([reading]))
+        codecs.decode(codecs.encode([reading]))
 
 
 def test_the_node_of_a_topic_is_its_fourth_part() -> None:
@@ -156,4 +156,4 @@ def test_the_node_of_a_topic_is_its_fourth_part() -> None:
 def test_a_trace_nested_deeper_than_a_parser_goes_is_malformed() -> None:
     body = b"[" * 200_000
     with pytest.raises(MalformedFrameError):
-        topics.decode(bytes([9]) + len(body).to_bytes(4, "little") + body)
+        codecs.decode(bytes([9]) + len(body).to_bytes(4, "little") + body)

@@ -1,0 +1,29 @@
+"""Where the neighbors of a UAV are and how they fly, by their hellos."""
+
+from typing import Final
+
+from fanet_mw.motion import Motion
+from fanet_mw.units import seconds_to_ns
+
+_HEARD_FOR_NS: Final = seconds_to_ns(6.0)
+"""The motion of a neighbor that was not heard for so long is not known any more."""
+
+
+class NeighborMotions:
+    """The motion of each neighbor, as its latest hello told it."""
+
+    def __init__(self) -> None:
+        self._motions: dict[int, Motion] = {}
+
+    def on_hello(self, node: int, motion: Motion) -> None:
+        """A hello said how its sender flies."""
+        self._motions[node] = motion
+
+    def motion(self, node: int, *, now_ns: int) -> Motion | None:
+        """How a neighbor flies; None when it was not heard lately."""
+        motion = self._motions.get(node)
+        return None if motion is None or now_ns - motion.at_ns > _HEARD_FOR_NS else motion
+
+    def all(self, *, now_ns: int) -> list[Motion]:
+        """The motions of those that were heard lately, in order of id."""
+        return [motion for _, motion in sorted(self._motions.items()) if now_ns - motion.at_ns <= _HEARD_FOR_NS]

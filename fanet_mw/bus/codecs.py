@@ -1,0 +1,303 @@
+"""The bytes of the messages on the bus. This is the only module that knows them, with `sensor_codecs.py`.
+
+One put on the bus carries a batch: each message is one kind byte, a 32-bit length and its body, little endian.
+Decoding is total: any bytes give messages or MalformedFrameError, nothing else.
+"""
+
+import struct
+from array import array
+from collections.abc import Callable, Iterable
+from typing import Any, Final, NamedTuple
+
+from fanet_mw import trace
+from fanet_mw.bus import sensor_codecs
+from fanet_mw.bus.link_stats import COUNTS, LinkStats
+from fanet_mw.bus.messages import (
+    Altimeter,
+    Battery,
+    Camera,
+    Clock,
+    ClockState,
+    Gps,
+    Inertial,
+    MavlinkTap,
+    Message,
+    Obstructions,
+    Poses,
+    Radar,
+    Reception,
+    Report,
+    Setpoint,
+    SetpointKind,
+    TraceBatch,
+    TxOutcome,
+    TxRequest,
+    TxStatus,
+    Voice,
+    WifiScan,
+)
+from fanet_mw.bus.radio_control import Cut, Degrade, Jam, Restore
+from fanet_mw.errors import MalformedFrameError
+from fanet_mw.units import Enu, NodeId
+
+# --- bodies: one encoder and one decoder per message type, beside each other -------------------------------------
+
+_TX = struct.Struct("<IqHB")
+_RX = struct.Struct("<Hqf")
+_STATUS = struct.Struct("<IBqB")
+_SETPOINT = struct.Struct("<q4dB3d")
+_POSES = struct.Struct("<qI")
+_OBSTRUCTIONS = struct.Struct("<qI")
+_CLOCK = struct.Struct("<qdBqQ")
+_INSTANT = struct.Struct("<q")
+_DEGRADE = struct.Struct("<HHBddq")
+_JAM = struct.Struct("<5dq")
+_CUT = struct.Struct("<Hq")
+_LINKS = struct.Struct("<qqI")
+
+
+def _encode_tx(m: TxRequest) -> bytes:
+    return _TX.pack(m.seq & 0xFFFF_FFFF, m.start_ns, m.dst, m.wants_status) + m.frame
+
+
+def _decode_tx(body: bytes) -> TxRequest:
+    seq, start_ns, dst, wants_status = _TX.unpack_from(body)
+    return TxRequest(seq, start_ns, body[_TX.size :], NodeId(dst), bool(wants_status))
+
+
+def _encode_rx(m: Reception) -> bytes:
+    return _RX.pack(m.src, m.end_ns, m.rssi_dbm) + m.frame
+
+
+def _decode_rx(body: bytes) -> Reception:
+    src, end_ns, rssi_dbm = _RX.unpack_from(body)
+    return Reception(body[_RX.size :], NodeId(src), end_ns, rssi_dbm)
+
+
+def _encode_status(m: TxStatus) -> bytes:
+    return _STATUS.pack(m.seq & 0xFFFF_FFFF, m.outcome, m.end_ns, m.attempts)
+
+
+def _decode_status(body: bytes) -> TxStatus:
+    seq, outcome, end_ns, attempts = _STATUS.unpack(body)
+    return TxStatus(seq, TxOutcome(outcome), end_ns, attempts)
+
+
+def _encode_poses(m: Poses) -> bytes:
+    return _POSES.pack(m.t_ns, len(m.ids)) + m.ids.tobytes() + m.states.tobytes()
+
+
+def _decode_poses(body: bytes) -> Poses:
+    t_ns, count = _POSES.unpack_from(body)
+    ids, states = array("H"), array("d")
+    split = _POSES.size + 2 * count
+    if len(body) != split + 48 * count:
+        raise ValueError("length")
+    ids.frombytes(body[_POSES.size : split])
+    states.frombytes(body[split:])
+    return Poses(t_ns, ids, states)
+
+
+def _encode_obstructions(m: Obstructions) -> bytes:
+    return _OBSTRUCTIONS.pack(m.t_ns, len(m.pairs)) + m.pairs.tobytes()
+
+
+def _decode_obstructions(body: bytes) -> Obstructions:
+    t_ns, count = _OBSTRUCTIONS.unpack_from(body)
+    pairs = array("H")
+    if len(body) != _OBSTRUCTIONS.size + 2 * count or count % 2:
+        raise ValueError("length")
+    pairs.frombytes(body[_OBSTRUCTIONS.size :])
+    return Obstructions(t_ns, pairs)
+
+
+def _encode_setpoint(m: Setpoint) -> bytes:
+    return _SETPOINT.pack(m.t_ns, *m.position, m.speed_m_s, m.kind, *m.velocity)
+
+
+def _decode_setpoint(body: bytes) -> Setpoint:
+    t_ns, east, north, up, speed_m_s, kind, *velocity = _SETPOINT.unpack(body)
+    return Setpoint(t_ns, Enu(east, north, up), speed_m_s, SetpointKind(kind), Enu(*velocity))
+
+
+def _encode_tap(m: MavlinkTap) -> bytes:
+    return _INSTANT.pack(m.t_ns) + m.data
+
+
+def _decode_tap(body: bytes) -> MavlinkTap:
+    return MavlinkTap(_INSTANT.unpack_from(body)[0], body[_INSTANT.size :])
+
+
+def _encode_trace(m: TraceBatch) -> bytes:
+    return "\n".join(trace.line(record) for record in m.records).encode()
+
+
+def _decode_trace(body: bytes) -> TraceBatch:
+    return TraceBatch(tuple(trace.parse(text) for text in body.decode().splitlines()))
+
+
+def _encode_clock(m: Clock) -> bytes:
+    return _CLOCK.pack(m.epoch_unix_ns, m.time_scale, m.state, m.epoch_mono_ns, m.machine)
+
+
+def _decode_clock(body: bytes) -> Clock:
+    epoch_unix_ns, time_scale, state, epoch_mono_ns, machine = _CLOCK.unpack(body)
+    if not 0 < time_scale <= 100:
+        raise ValueError("time_scale")
+    return Clock(epoch_unix_ns, time_scale, ClockState(state), epoch_mono_ns, machine)
+
+
+def _encode_report(m: Report) -> bytes:
+    return _INSTANT.pack(m.t_ns) + f"{m.name}\n{m.json}".encode()
+
+
+def _decode_report(body: bytes) -> Report:
+    name, _, text = body[_INSTANT.size :].decode().partition("\n")
+    return Report(name, _INSTANT.unpack_from(body)[0], text)
+
+
+def _encode_degrade(m: Degrade) -> bytes:
+    return _DEGRADE.pack(m.src, m.dst, m.both, m.loss_db, m.loss_share, m.for_ns) + m.label.encode()
+
+
+def _decode_degrade(body: bytes) -> Degrade:
+    src, dst, both, loss_db, loss_share, for_ns = _DEGRADE.unpack_from(body)
+    label = body[_DEGRADE.size :].decode()
+    return Degrade(label, NodeId(src), NodeId(dst), bool(both), loss_db, loss_share, for_ns)
+
+
+def _encode_jam(m: Jam) -> bytes:
+    return _JAM.pack(*m.center, m.radius_m, m.noise_dbm, m.for_ns) + m.label.encode()
+
+
+def _decode_jam(body: bytes) -> Jam:
+    east, north, up, radius_m, noise_dbm, for_ns = _JAM.unpack_from(body)
+    return Jam(body[_JAM.size :].decode(), Enu(east, north, up), radius_m, noise_dbm, for_ns)
+
+
+def _encode_cut(m: Cut) -> bytes:
+    return _CUT.pack(m.node, m.for_ns) + m.label.encode()
+
+
+def _decode_cut(body: bytes) -> Cut:
+    node, for_ns = _CUT.unpack_from(body)
+    return Cut(body[_CUT.size :].decode(), NodeId(node), for_ns)
+
+
+def _encode_restore(m: Restore) -> bytes:
+    return m.label.encode()
+
+
+def _decode_restore(body: bytes) -> Restore:
+    return Restore(body.decode())
+
+
+def _encode_links(m: LinkStats) -> bytes:
+    head = _LINKS.pack(m.t_ns, m.span_ns, len(m.rssi_sums_mdbm))
+    return head + m.ends.tobytes() + m.counts.tobytes() + m.rssi_sums_mdbm.tobytes()
+
+
+def _decode_links(body: bytes) -> LinkStats:
+    t_ns, span_ns, links = _LINKS.unpack_from(body)
+    ends, counts, sums = array("H"), array("I"), array("q")
+    a = _LINKS.size
+    b = a + 4 * links
+    c = b + 4 * COUNTS * links
+    if len(body) != c + 8 * links:
+        raise ValueError("length")
+    ends.frombytes(body[a:b])
+    counts.frombytes(body[b:c])
+    sums.frombytes(body[c:])
+    return LinkStats(t_ns, span_ns, ends, counts, sums)
+
+
+_CODECS: Final[dict[int, tuple[type[Any], Callable[[Any], bytes], Callable[[bytes], Message]]]] = {
+    1: (TxRequest, _encode_tx, _decode_tx),
+    2: (Reception, _encode_rx, _decode_rx),
+    3: (TxStatus, _encode_status, _decode_status),
+    4: (Poses, _encode_poses, _decode_poses),
+    5: (Setpoint, _encode_setpoint, _decode_setpoint),
+    6: (Gps, sensor_codecs.encode_gps, sensor_codecs.decode_gps),
+    7: (WifiScan, sensor_codecs.encode_scan, sensor_codecs.decode_scan),
+    8: (MavlinkTap, _encode_tap, _decode_tap),
+    9: (TraceBatch, _encode_trace, _decode_trace),
+    10: (Clock, _encode_clock, _decode_clock),
+    11: (Report, _encode_report, _decode_report),
+    12: (Degrade, _encode_degrade, _decode_degrade),
+    13: (Jam, _encode_jam, _decode_jam),
+    14: (Cut, _encode_cut, _decode_cut),
+    15: (Restore, _encode_restore, _decode_restore),
+    16: (LinkStats, _encode_links, _decode_links),
+    17: (Obstructions, _encode_obstructions, _decode_obstructions),
+    18: (Camera, sensor_codecs.encode_camera, sensor_codecs.decode_camera),
+    19: (Voice, sensor_codecs.encode_voice, sensor_codecs.decode_voice),
+    20: (Radar, sensor_codecs.encode_radar, sensor_codecs.decode_radar),
+    21: (Altimeter, sensor_codecs.encode_altimeter, sensor_codecs.decode_altimeter),
+    22: (Inertial, sensor_codecs.encode_inertial, sensor_codecs.decode_inertial),
+    23: (Battery, sensor_codecs.encode_battery, sensor_codecs.decode_battery),
+}
+HEADS: Final[dict[type[Any], tuple[struct.Struct, ...]]] = {
+    TxRequest: (_TX,), Reception: (_RX,), TxStatus: (_STATUS,), Poses: (_POSES,), Setpoint: (_SETPOINT,),
+    MavlinkTap: (_INSTANT,), TraceBatch: (), Clock: (_CLOCK,), Report: (_INSTANT,), Degrade: (_DEGRADE,),
+    Jam: (_JAM,), Cut: (_CUT,), Restore: (), LinkStats: (_LINKS,), Obstructions: (_OBSTRUCTIONS,),
+    **sensor_codecs.HEADS,
+}  # fmt: skip
+"""The structs of each kind: that of its head, and that of each row where rows of one kind follow."""
+CODES: Final = {kind: code for code, (kind, _, _) in _CODECS.items()}
+_CODE_OF: Final = {kind: (code, encode) for code, (kind, encode, _) in _CODECS.items()}
+_ITEM: Final = struct.Struct("<BI")
+MAX_ITEMS: Final = 16_384
+"""The most messages of one put: several times what the busiest medium hands over at once."""
+
+
+def encode(messages: Iterable[Message]) -> bytes:
+    """The bytes of one put that carries these messages, in order."""
+    parts = []
+    for message in messages:
+        code, encoder = _CODE_OF[type(message)]
+        body = encoder(message)
+        parts.append(_ITEM.pack(code, len(body)))
+        parts.append(body)
+    return b"".join(parts)
+
+
+class Item(NamedTuple):
+    """The position of one message in a put, not yet decoded."""
+
+    code: int
+    start: int
+    end: int
+
+
+def codes_of(*kinds: type[Any]) -> frozenset[int]:
+    """The codes of these kinds of messages."""
+    return frozenset(_CODE_OF[kind][0] for kind in kinds)
+
+
+def items(data: bytes) -> list[Item]:
+    """The messages of one put, undecoded; raises MalformedFrameError where they are cut off or over MAX_ITEMS."""
+    found: list[Item] = []
+    at = 0
+    while at < len(data):
+        if at + _ITEM.size > len(data) or len(found) == MAX_ITEMS:
+            raise MalformedFrameError(f"bus message malformed at byte {at}: cut off, or the {MAX_ITEMS + 1}th of a put")
+        code, length = _ITEM.unpack_from(data, at)
+        start = at + _ITEM.size
+        at = start + length
+        if at > len(data):
+            raise MalformedFrameError(f"bus message malformed at byte {start}: length beyond the end")
+        found.append(Item(code, start, at))
+    return found
+
+
+def decode_item(data: bytes, item: Item) -> Message:
+    """One message of a put; raises MalformedFrameError for bytes that `encode` could not have made."""
+    try:
+        return _CODECS[item.code][2](data[item.start : item.end])
+    except (struct.error, ValueError, KeyError, OverflowError, RecursionError) as error:
+        raise MalformedFrameError(f"bus message malformed at byte {item.start}: {error}") from error
+
+
+def decode(data: bytes) -> list[Message]:
+    """The messages of one put; raises MalformedFrameError for bytes that `encode` could not have made."""
+    return [decode_item(data, item) for item in items(data)]

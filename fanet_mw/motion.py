@@ -1,0 +1,19 @@
+"""A motion: where something is at an instant, and how fast it moves. Pure geometry."""
+
+from typing import NamedTuple
+
+from fanet_mw.units import Enu, S
+
+
+class Motion(NamedTuple):
+    """A position, the velocity there [m/s], and the instant of both."""
+
+    position: Enu
+    velocity: Enu
+    at_ns: int
+
+    def position_at(self, t_ns: int) -> Enu:
+        """The position at another instant, by dead reckoning: straight on with the same velocity."""
+        seconds = (t_ns - self.at_ns) / S
+        here, v = self.position, self.velocity
+        return Enu(here.east + v.east * seconds, here.north + v.north * seconds, here.up + v.up * seconds)

@@ -123,9 +123,13 @@ class Collector:
                 good.append(record)
             else:
                 self._refused[f"trace: {why}"] += 1
-        if lost := self._records.append(good):
-            self._refused["trace: disk"] += lost
+        self._keep(good)
         return None
+
+    def _keep(self, records: Iterable[Record]) -> None:
+        """Write trace records; those for which the disk has no room are counted."""
+        if lost := self._records.append(records):
+            self._refused["trace: disk"] += lost
 
     def _take_report(self, name: str, message: Message) -> str | None:
         if not isinstance(message, Report):
@@ -163,7 +167,7 @@ class Collector:
         They stay on disk, and stay readable when the collector is closed.
         """
         with self._lock:
-            self._records.append(further)
+            self._keep(further)
             return self._records.records(true_delays=self._true_delays)
 
     def reports(self) -> dict[str, dict[str, Any]]:

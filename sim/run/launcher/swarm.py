@@ -99,13 +99,14 @@ class SwarmRun:
     def _outcome(self, *, wall_s: float, ready_s: float, ended_ns: int | None) -> Outcome:
         """The outcome with what was collected; an incomplete trace is reported."""
         collector, foreign = self._collector, set() if self._services.own_world else {"world"}
+        records = collector.records(self._deaths.records)
         if (failure := collector.disk_failure()) is not None:
             self._tell(f"the trace is incomplete: its temporary file could not be written: {failure}")
         return Outcome(
             scenario=self._services.scenario,
             mode="realtime",
             wall_s=wall_s,
-            records=collector.records(self._deaths.records),
+            records=records,
             reports=collector.reports(),
             taps=collector.taps(),
             links=collector.links(),

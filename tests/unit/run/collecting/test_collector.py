@@ -358,6 +358,14 @@ def test_a_full_disk_under_the_spool_ends_the_trace_and_not_the_run(ear: Ear) ->
     assert ear.collector.disk_failure() == "no space left for the whole of an item"
 
 
+def test_deaths_for_which_the_disk_has_no_room_are_counted_as_lost(ear: Ear) -> None:
+    ear.say(NAMES.trace("agent-3"), TraceBatch((Generated(S, 3, 1, "traffic", 5),)))
+    ear.collector._records._others._write = lambda *_: 0
+    assert len(ear.collector.records([ProcessEnded(S, 4, "agent-4", -9)])) == 1
+    assert ear.why["trace: disk"] == 1
+    assert ear.collector.disk_failure() is not None
+
+
 def test_a_folder_that_takes_no_file_is_one_message(tmp_path: Path) -> None:
     with pytest.raises(ConfigError, match="none: no file can be made there: No such file or directory"):
         Spool(tmp_path / "none")

@@ -137,7 +137,7 @@ class PlannedSearch(Application):
 
     def _settle(self) -> None:
         """Bring what the searcher put out to where it goes."""
-        velocity, self._searcher.velocity = self._searcher.velocity, None
+        velocity = self._searcher.take_velocity()
         if velocity is not None:
             self._outbox.course = _course(self.port.position, velocity)
         self._outbox.empty(self.port)

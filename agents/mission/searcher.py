@@ -1,12 +1,12 @@
 """One UAV's part in a planned search: it keeps its lane, reports, bids, responds, confirms, and keeps clear of others.
 
-    plan over the air   -> a lane: where to be at every instant of swarm time              planner, formation_place
-    phones in reach     -> reports: flooded, and passed from neighbor to neighbor with hellos     finds
-    enough reporters    -> an auction; winners leave their lanes as far as the swarm's coherence lets them     tasks
-    too few reporters   -> the auction names one that has not reported, who fetches a further bearing
-    seen at close range -> confirmed, announced, struck off; responders return to their lanes     announcing
+    plan over the air   -> a lane: where to be at every instant of swarm time                   formation
+    phones in reach     -> reports: flooded, and passed from neighbor to neighbor with hellos   finding.phone_reception
+    enough reporters    -> an auction; winners leave their lanes as far as the formation holds  tasking
+    too few reporters   -> the auction names one that has not reported, for a further bearing   tasking
+    seen at close range -> confirmed, announced, struck off; responders return to their lanes   finding.announcing
 
-Everything it knows it has sensed or was told over the air. Each fix gives one velocity (goal, steering).
+Everything that a UAV knows it has sensed or was told over the air. Each fix gives one velocity (flight).
 """
 
 import math
@@ -14,107 +14,94 @@ from collections.abc import Sequence
 from typing import Final, assert_never
 
 from agents.mission.finding.announcing import Announcing
-from agents.mission.finding.finds import Finds, ground_place
+from agents.mission.finding.finds import Finds
 from agents.mission.finding.identities import Identities
 from agents.mission.finding.phone_filter import REFERENCE_LOSS_DB, PhoneModel
+from agents.mission.finding.phone_reception import PhoneReception
+from agents.mission.finding.sightings import Sightings
 from agents.mission.flight.approach_speed import approach_speed_m_s
+from agents.mission.flight.flight import Flight
 from agents.mission.flight.goal import Goal
 from agents.mission.flight.return_home import ReturnHome
 from agents.mission.flight.velocity_choice import ClearOfObstacles, ClearOfOthers, InReach, VelocityChoice
-from agents.mission.formation.formation_place import STILL, FormationPlace
-from agents.mission.formation.formation_planner import STATUS_S, FormationPlanner
+from agents.mission.formation.formation_place import FormationPlace
+from agents.mission.formation.formation_planner import FormationPlanner
 from agents.mission.formation.pattern import Pattern, fitted
+from agents.mission.formation.plan_exchange import PlanExchange
+from agents.mission.mode_record import ModeRecord
 from agents.mission.navigation.known_obstacles import KnownObstacles
 from agents.mission.navigation.navigation import Navigation
 from agents.mission.navigation.neighbor_motions import NeighborMotions
 from agents.mission.navigation.onboard_map import OnboardMap
-from agents.mission.outbox import Outbox, OutgoingPacket, ReportFormat
+from agents.mission.navigation.radar_watch import RadarWatch
+from agents.mission.outbox import Outbox
 from agents.mission.tasking.approach import Approach
 from agents.mission.tasking.bidding import Bidding
 from fanet_mw.bus.messages import Echo
 from fanet_mw.motion import Motion
 from fanet_mw.rng import stream
 from fanet_mw.scenario import Scenario
-from fanet_mw.trace import Detected, MissionModeChanged, Planned, Sighted
-from fanet_mw.units import MAX_NODES, US, Enu, NodeId, S, seconds_to_ns
+from fanet_mw.units import MAX_NODES, Enu, NodeId, S
 from fanet_mw.wire.inner import Survivor
 from fanet_mw.wire.search import Bids, Found, Search, SearchStatus, Told, encode_bids
 
 _OFFSET_DB: Final = 1.0
-"""How much one phone's power is taken to differ from another's: standard deviation."""
+"""The standard deviation by which the power of one phone is taken to differ from that of another."""
 _REVIEW_NS: Final = 1 * S
-_MISSED_SCANS: Final = 1.5
-"""A receiver that hears nobody says nothing: after so many intervals of the scan that is what silence means."""
-_CLOSE_M: Final = 100.0
-"""Slant range of a sighting that confirms."""
-_ANGLE_RAD: Final = 0.03
-"""Standard deviation of where a camera looks, attitude included."""
 _DEPLOY: Final = 0.9
 """Share of its greatest speed at which the slowest UAV takes up its place."""
 
 
 class Searcher:
-    """One UAV."""
+    """The parts of one UAV's search, and the order in which they see what the UAV senses and hears."""
 
     def __init__(
         self, scenario: Scenario, node: NodeId, *, position: Enu, outbox: Outbox, onboard_map: OnboardMap
     ) -> None:
-        mission, reach_m = scenario.mission, scenario.radio.range_m
-        self._node = node
-        self._scan_for_ns = _MISSED_SCANS * mission.scan_interval_s * S
-        self._report_ns = seconds_to_ns(mission.report_interval_s)
-        self._report_format = ReportFormat(scenario, node)
+        mission, reach_m, speed_m_s = scenario.mission, scenario.radio.range_m, approach_speed_m_s(scenario, node)
         self._random = stream(scenario.seed, "mission", node).random
-        self._fitted = formation(scenario, scenario.nodes.count)
-        self._outbox = outbox
-        least_m_s, _ = mission.approach_speeds_m_s
-        speed_m_s = approach_speed_m_s(scenario, node)
-        self._planner = FormationPlanner(node, expected=scenario.nodes.count, deploy_speed_m_s=_DEPLOY * least_m_s)
         self._finds = finds = Finds(phone_model(scenario))
-        self._obstacles = obstacles = KnownObstacles(onboard_map, scenario.world.no_fly_m)
-        self._identities = Identities(finds)
+        obstacles = KnownObstacles(onboard_map, scenario.world.no_fly_m)
         self._navigation = navigation = Navigation(position, obstacles)
         self._neighbors = neighbors = NeighborMotions()
-        self._watches_radar = "radar" in mission.avoid_by
-        self._avoided = neighbors if "hellos" in mission.avoid_by else NeighborMotions()
-        """Those that are avoided where their hellos say that they are; an echo of one of them tells nothing new."""
-        self._formation = place = FormationPlace(node, navigation, reach_m=reach_m)
+        self._radar = RadarWatch(navigation, obstacles, neighbors, mission.avoid_by)
+        self._place = place = FormationPlace(node, navigation, reach_m=reach_m)
+        least_m_s, _ = mission.approach_speeds_m_s
+        planner = FormationPlanner(node, expected=scenario.nodes.count, deploy_speed_m_s=_DEPLOY * least_m_s)
+        self._plans = PlanExchange(
+            node, planner, place, navigation, outbox,
+            pattern=formation(scenario, scenario.nodes.count), random=self._random,
+        )  # fmt: skip
+        self._reception = PhoneReception(scenario, node, finds, navigation, outbox)
+        self._identities = Identities(finds)
+        self._sightings = Sightings(scenario, node, self._identities, navigation, outbox)
+        self._announcing = Announcing(node, finds, outbox)
         approach = Approach(node, finds, navigation, outbox, arrival_m=mission.arrival_m)
         self._bidding = Bidding(
             scenario, node, finds=finds, navigation=navigation, formation=place, approach=approach, outbox=outbox,
             speed_m_s=speed_m_s,
         )  # fmt: skip
-        self._announcing = Announcing(node, finds, outbox)
-        self._goal = Goal(finds, navigation, place, approach)
-        self._velocity_choice = VelocityChoice(
-            navigation,
-            obstacles,
-            most_m_s=speed_m_s,
-            hard=[
-                ClearOfObstacles(navigation, obstacles),
-                ClearOfOthers(navigation, self._avoided, obstacles),
-            ],
-            soft=[InReach(navigation, neighbors, place, reach_m=reach_m)],
-        )
         self._return_home = ReturnHome(
             position, navigation, outbox,
             speed_m_s=speed_m_s, height_m=scenario.nodes.altitude_m, reserve=mission.reserve_charge,
         )  # fmt: skip
-        self._voice_rad = math.radians(scenario.sensors.voice_sigma_deg)
-        self._mode: tuple[str, int] | None = None
-        """What we do, and for which survivor, as the trace has it."""
-        self.velocity: Enu | None = None
-        """A new velocity to fly, for the host to take."""
-        self._scan_ns = 0
-        self._reported_ns: dict[int, int] = {}
+        velocity_choice = VelocityChoice(
+            navigation,
+            obstacles,
+            most_m_s=speed_m_s,
+            hard=[ClearOfObstacles(navigation, obstacles), ClearOfOthers(navigation, self._radar.avoided, obstacles)],
+            soft=[InReach(navigation, neighbors, place, reach_m=reach_m)],
+        )
+        self._flight = Flight(navigation, Goal(finds, navigation, place, approach), velocity_choice, self._return_home)
+        self._mode = ModeRecord(node, place, self._return_home, outbox)
+        self._node = node
         self._next_review_ns: int | None = None
-        self._next_status_ns = 0
 
     # --- time -----------------------------------------------------------------------------------------------------
 
     def start(self, now_ns: int) -> None:
         self._next_review_ns = now_ns + round(self._random() * _REVIEW_NS)
-        self._next_status_ns = now_ns + round(self._random() * 2 * S)
+        self._plans.start(now_ns)
 
     def next_wake_ns(self) -> int | None:
         return self._next_review_ns
@@ -123,131 +110,86 @@ class Searcher:
         if self._next_review_ns is None or now_ns < self._next_review_ns:
             return
         self._next_review_ns = now_ns + _REVIEW_NS
-        if now_ns - self._scan_ns > self._scan_for_ns:
-            self.scan((), now_ns=now_ns)
-        if now_ns >= self._next_status_ns:
-            self._say_status(now_ns)
-        if self._planner.review(self._fitted, now_ns=now_ns):
-            self._adopt(now_ns)
-        plans, self._planner.to_tell = self._planner.to_tell, []
-        self._outbox.packets += [OutgoingPacket(plan.encode_frame(self._node)) for plan in plans]
+        self._reception.review(now_ns)
+        self._plans.review(self._return_home.percent, now_ns)
         self._identify(now_ns)
         self._announcing.tell(self._bidding.survivor, now_ns)
         if not self._return_home.leaves:
             self._bidding.bid(now_ns)
             self._bidding.choose(now_ns)
-        self._record_mode(now_ns)
+        self._mode.review(self._bidding.survivor, now_ns)
 
-    def _record_mode(self, now_ns: int) -> None:
-        """Write into the trace what we do, when that has changed."""
-        survivor = self._bidding.survivor or 0
-        mode = (
-            "land" if self._return_home.lands
-            else "return" if self._return_home.leaves
-            else "respond" if survivor
-            else "search" if self._formation.is_taken_up(now_ns)
-            else "deploy" if self._formation.place is not None
-            else "wait"
-        )  # fmt: skip
-        if self._mode != (mode, survivor):
-            self._mode = mode, survivor
-            self._outbox.records.append(MissionModeChanged(now_ns, self._node, mode, survivor))
+    @property
+    def velocity(self) -> Enu | None:
+        """The velocity to fly that has been chosen and not been taken yet; None: there is none."""
+        return self._flight.velocity
 
-    # --- our own sensors ------------------------------------------------------------------------------------------
+    def take_velocity(self) -> Enu | None:
+        """The same, which is then no longer new."""
+        velocity, self._flight.velocity = self._flight.velocity, None
+        return velocity
+
+    # --- what its own sensors say ---------------------------------------------------------------------------------
 
     def fix(self, position: Enu, velocity: Enu, *, now_ns: int) -> None:
-        """A position fix: where we are, and then how to fly on."""
-        self._navigation.fix(position, velocity, now_ns=now_ns)
-        if self._return_home.leaves:
-            goal, feed = self._return_home.goal(), STILL
-        else:
-            goal, feed = self._goal.at(self._bidding.survivor, now_ns)
-        self.velocity = None if self._return_home.lands else self._velocity_choice.velocity(goal, feed, now_ns)
+        """The receiver gives a position and a velocity: the UAV chooses how to fly on."""
+        self._flight.fix(position, velocity, self._bidding.survivor, now_ns=now_ns)
 
     def battery(self, charge: float, *, now_ns: int) -> None:
-        """The battery says what is left; who has to leave hands its place and its task on at once."""
+        """The battery says what is left; a UAV that has to leave hands its place and its task on at once."""
         if self._return_home.battery(charge, now_ns=now_ns):
             self._bidding.hand_on(now_ns)
-            self._formation.leave()
-            self._say_status(now_ns)
-            self._record_mode(now_ns)
+            self._plans.leave()
+            self._plans.say_status(self._return_home.percent, now_ns)
+            self._mode.review(self._bidding.survivor, now_ns)
 
     def scan(self, heard: Sequence[tuple[int, float]], *, now_ns: int) -> None:
-        """Our own receiver hears these phones, and no others."""
-        self._scan_ns = now_ns
-        here = self._navigation.position
-        ours = {survivor for survivor, _ in heard}
-        for survivor in self._finds.open():
-            if survivor not in ours:
-                self._finds.known[survivor].filter.silent(here)
-        for survivor, rssi_dbm in heard:
-            report = Survivor(now_ns // US, survivor, self._node, here, rssi_dbm)
-            find = self._finds.known.get(survivor)
-            if find is None or self._node not in find.reporters:
-                self._outbox.records.append(Detected(now_ns, self._node, survivor, round(rssi_dbm, 2)))
-            find = self._finds.report(report, now_ns=now_ns)
-            last_ns = self._reported_ns.get(survivor)
-            if find.confirmed is None and (last_ns is None or now_ns - last_ns >= self._report_ns):
-                self._reported_ns[survivor] = now_ns
-                self._outbox.packets.append(self._report_format.packet(report))
+        """The receiver hears these phones with these powers [dBm], and no others."""
+        self._reception.scan(heard, now_ns=now_ns)
 
     def altimeter(self, above_ground_m: float | None, *, now_ns: int) -> None:
-        """The rangefinder tells how high we are over whatever is below; None: nothing is within its range."""
+        """The rangefinder tells the height over whatever is below; None: nothing is within its range."""
         self._navigation.altimeter(above_ground_m, now_ns=now_ns)
 
     def radar(self, echoes: Sequence[Echo], *, now_ns: int) -> None:
-        """Our radar shows what is around us."""
-        if self._watches_radar:
-            own = self._navigation
-            others = [motion.position_at(now_ns) for motion in self._avoided.all(now_ns=now_ns)]
-            self._obstacles.radar(echoes, at=own.position, velocity=own.velocity, neighbors=others, now_ns=now_ns)
+        """The radar shows these echoes."""
+        self._radar.scan(echoes, now_ns=now_ns)
 
     def camera(self, people: Sequence[tuple[float, float]], *, now_ns: int) -> None:
-        """Our camera shows people at these bearings and elevations [rad]."""
-        for direction in people:
-            self._notice("camera", direction, sigma_rad=_ANGLE_RAD, now_ns=now_ns)
+        """The camera shows people at these bearings and elevations [rad]."""
+        self._sightings.camera(people, now_ns=now_ns)
         self._identify(now_ns)
 
     def voice(self, calls: Sequence[tuple[float, float, float]], *, now_ns: int) -> None:
-        """Our microphones make out calls at these bearings and elevations [rad], so far above noise [dB]."""
-        for bearing_rad, elevation_rad, snr_db in calls:
-            sigma_rad = max(_ANGLE_RAD, self._voice_rad * math.pow(10.0, -snr_db / 20))
-            self._notice("voice", (bearing_rad, elevation_rad), sigma_rad=sigma_rad, now_ns=now_ns)
+        """The microphones make out calls at these bearings and elevations [rad], so far above noise [dB]."""
+        self._sightings.voice(calls, now_ns=now_ns)
         self._identify(now_ns)
 
-    def _notice(self, sensor: str, direction: tuple[float, float], *, sigma_rad: float, now_ns: int) -> None:
-        """A sensor that names nobody has noticed somebody on the ground."""
-        here = self._navigation.position._replace(up=self._navigation.height_m(now_ns))
-        looked = ground_place(here, bearing_rad=direction[0], elevation_rad=direction[1])
-        if looked is None or looked[2] > 2 * _CLOSE_M:
-            return
-        sigma_m = max(1.0, sigma_rad * looked[2] * looked[2] / max(1.0, here.up))
-        at = Enu(looked[0], looked[1], 0.0)
-        survivor = self._identities.seen(at, sigma_m=sigma_m, close=looked[2] <= _CLOSE_M, now_ns=now_ns)
-        self._outbox.records.append(
-            Sighted(now_ns, self._node, sensor, survivor or 0, round(at.east, 2), round(at.north, 2))
-        )
+    def _identify(self, now_ns: int) -> None:
+        """Confirm the survivors whose phones are surely those of people that were seen."""
+        for survivor in self._identities.review(now_ns):
+            self._announcing.confirm(survivor, now_ns)
+            self._bidding.close(survivor, now_ns=now_ns)
 
     # --- what others tell -----------------------------------------------------------------------------------------
 
     def hello(self, origin: int, motion: Motion, *, now_ns: int) -> None:
-        """A neighbor's hello told how it flies."""
+        """A neighbor's hello tells how it flies."""
         self._neighbors.on_hello(origin, motion)
-        self._planner.alive(origin, motion.position, now_ns=now_ns)
+        self._plans.on_hello(origin, motion.position, now_ns=now_ns)
 
     def told(self, message: Told, *, now_ns: int) -> None:
-        """Another node told something, to its neighbors or to everyone."""
+        """Another node tells something, to its neighbors or to all nodes."""
         match message:
             case Survivor():
                 if message.reporter != self._node:
                     self._finds.report(message, now_ns=now_ns)
-                    if self._formation.place is not None:
+                    if self._place.place is not None:
                         self._announcing.reported(message, now_ns)
             case Search():
-                if self._planner.planned(message):
-                    self._adopt(now_ns)
+                self._plans.on_plan(message, now_ns=now_ns)
             case SearchStatus():
-                self._planner.status(message, now_ns=now_ns)
+                self._plans.on_status(message, now_ns=now_ns)
             case Bids():
                 self._bidding.merge(message.bids, now_ns=now_ns)
             case Found():
@@ -257,7 +199,7 @@ class Searcher:
             case _:
                 assert_never(message)
 
-    # --- what we tell ---------------------------------------------------------------------------------------------
+    # --- what it tells --------------------------------------------------------------------------------------------
 
     def hello_frames(self, now_ns: int) -> bytes:
         """Inner frames for the next hello: the latest reports, the best bids, what was found lately."""
@@ -266,30 +208,6 @@ class Searcher:
         if bids:
             frames += encode_bids(bids, node=self._node)
         return frames + self._announcing.hello_frames(now_ns)
-
-    def _say_status(self, now_ns: int) -> None:
-        plan = self._planner.plan
-        status = SearchStatus(
-            now_ns // US, self._navigation.position, self._node, plan.revision if plan else 0, self._return_home.percent
-        )
-        self._planner.status(status, now_ns=now_ns)
-        self._outbox.packets.append(OutgoingPacket(status.encode_frame(self._node)))
-        self._next_status_ns = now_ns + round((0.8 + 0.4 * self._random()) * STATUS_S * S)
-
-    def _identify(self, now_ns: int) -> None:
-        """Confirm those of whom it is sure whose phones they carry."""
-        for survivor in self._identities.review(now_ns):
-            self._announcing.confirm(survivor, now_ns)
-            self._bidding.close(survivor, now_ns=now_ns)
-
-    def _adopt(self, now_ns: int) -> None:
-        plan = self._planner.plan
-        assert plan is not None, "there is a plan to adopt"
-        self._formation.adopt(plan, now_ns)
-        if self._return_home.leaves:
-            self._formation.leave()
-        place = self._formation.place
-        self._outbox.records.append(Planned(now_ns, self._node, plan.revision, -1 if place is None else place))
 
 
 def phone_model(scenario: Scenario) -> PhoneModel:

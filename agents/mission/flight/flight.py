@@ -1,0 +1,29 @@
+"""How a searching UAV flies on from one position fix to the next: to its goal or home, as constraints allow."""
+
+from agents.mission.flight.goal import Goal
+from agents.mission.flight.return_home import ReturnHome
+from agents.mission.flight.velocity_choice import VelocityChoice
+from agents.mission.formation.formation_place import STILL
+from agents.mission.navigation.navigation import Navigation
+from fanet_mw.units import Enu
+
+
+class Flight:
+    """The velocity of one UAV."""
+
+    def __init__(
+        self, navigation: Navigation, goal: Goal, velocity_choice: VelocityChoice, return_home: ReturnHome
+    ) -> None:
+        self._navigation, self._goal = navigation, goal
+        self._velocity_choice, self._return_home = velocity_choice, return_home
+        self.velocity: Enu | None = None
+        """A new velocity to fly, for the application to take; None: there is no new one."""
+
+    def fix(self, position: Enu, velocity: Enu, survivor: int | None, *, now_ns: int) -> None:
+        """Choose a velocity at a position fix; `survivor` is the one to whom this UAV goes, if any."""
+        self._navigation.fix(position, velocity, now_ns=now_ns)
+        if self._return_home.leaves:
+            goal, feed = self._return_home.goal(), STILL
+        else:
+            goal, feed = self._goal.at(survivor, now_ns)
+        self.velocity = None if self._return_home.lands else self._velocity_choice.velocity(goal, feed, now_ns)

@@ -1,0 +1,93 @@
+"""How the plan of a search comes to be: every UAV says where it is, one of them plans, all fly by the newest plan."""
+
+from collections.abc import Callable
+from typing import Final
+
+from agents.mission.formation.formation_place import FormationPlace
+from agents.mission.formation.formation_planner import STATUS_S, FormationPlanner
+from agents.mission.formation.pattern import Pattern
+from agents.mission.navigation.navigation import Navigation
+from agents.mission.outbox import Outbox, OutgoingPacket
+from fanet_mw.trace import Planned
+from fanet_mw.units import US, Enu, NodeId, S
+from fanet_mw.wire.search import Search, SearchStatus
+
+_FIRST_STATUS_S: Final = 2
+"""A UAV says for the first time where it is at a random instant within this time after its start."""
+
+
+class PlanExchange:
+    """The part of one UAV in the exchange of statuses and plans."""
+
+    def __init__(
+        self,
+        node: NodeId,
+        planner: FormationPlanner,
+        place: FormationPlace,
+        navigation: Navigation,
+        outbox: Outbox,
+        *,
+        pattern: Pattern | None,
+        random: Callable[[], float],
+    ) -> None:
+        """`pattern`: the formation to plan, for a UAV that has to; None: the UAVs are too few for one."""
+        self._node = node
+        self._planner, self._place = planner, place
+        self._navigation, self._outbox = navigation, outbox
+        self._pattern = pattern
+        self._random = random
+        self._next_status_ns = 0
+        self._flies_home = False
+        """True for a UAV that takes no place any more, whatever the plan says."""
+
+    def start(self, now_ns: int) -> None:
+        """Choose when to say a status first."""
+        self._next_status_ns = now_ns + round(self._random() * _FIRST_STATUS_S * S)
+
+    def review(self, percent: int, now_ns: int) -> None:
+        """Say a status if one is due, plan if that is this UAV's to do, and hand new plans to the outbox."""
+        if now_ns >= self._next_status_ns:
+            self.say_status(percent, now_ns)
+        if self._planner.review(self._pattern, now_ns=now_ns):
+            self._adopt(now_ns)
+        plans, self._planner.to_tell = self._planner.to_tell, []
+        self._outbox.packets += [OutgoingPacket(plan.encode_frame(self._node)) for plan in plans]
+
+    def say_status(self, percent: int, now_ns: int) -> None:
+        """Say where this UAV is, which plan it has, and what percentage of its battery it may spend yet."""
+        plan = self._planner.plan
+        status = SearchStatus(
+            now_ns // US, self._navigation.position, self._node, plan.revision if plan else 0, percent
+        )
+        self._planner.status(status, now_ns=now_ns)
+        self._outbox.packets.append(OutgoingPacket(status.encode_frame(self._node)))
+        self._next_status_ns = now_ns + round((0.8 + 0.4 * self._random()) * STATUS_S * S)
+
+    def leave(self) -> None:
+        """Give the place in the formation up for good."""
+        self._flies_home = True
+        self._place.leave()
+
+    # --- what others say ------------------------------------------------------------------------------------------
+
+    def on_hello(self, node: int, position: Enu, *, now_ns: int) -> None:
+        """A neighbor's hello says where it is."""
+        self._planner.alive(node, position, now_ns=now_ns)
+
+    def on_status(self, status: SearchStatus, *, now_ns: int) -> None:
+        """Another UAV says its status."""
+        self._planner.status(status, now_ns=now_ns)
+
+    def on_plan(self, plan: Search, *, now_ns: int) -> None:
+        """Another UAV tells a plan: it is flown by if it is newer than the plan in force."""
+        if self._planner.planned(plan):
+            self._adopt(now_ns)
+
+    def _adopt(self, now_ns: int) -> None:
+        plan = self._planner.plan
+        assert plan is not None, "there is a plan to adopt"
+        self._place.adopt(plan, now_ns)
+        if self._flies_home:
+            self._place.leave()
+        place = self._place.place
+        self._outbox.records.append(Planned(now_ns, self._node, plan.revision, -1 if place is None else place))

@@ -62,7 +62,7 @@ class Searcher:
         self._random = stream(scenario.seed, "mission", node).random
         self._finds = finds = Finds(phone_model(scenario))
         obstacles = KnownObstacles(onboard_map, scenario.world.no_fly_m)
-        self._navigation = navigation = Navigation(position, obstacles)
+        navigation = Navigation(position, obstacles)
         self._neighbors = neighbors = NeighborMotions()
         self._radar = RadarWatch(navigation, obstacles, neighbors, mission.avoid_by)
         self._place = place = FormationPlace(node, navigation, reach_m=reach_m)
@@ -73,8 +73,7 @@ class Searcher:
             pattern=formation(scenario, scenario.nodes.count), random=self._random,
         )  # fmt: skip
         self._reception = PhoneReception(scenario, node, finds, navigation, outbox)
-        self._identities = Identities(finds)
-        self._sightings = Sightings(scenario, node, self._identities, navigation, outbox)
+        self._sightings = Sightings(scenario, node, Identities(finds), navigation, outbox)
         self._announcing = Announcing(node, finds, outbox)
         approach = Approach(node, finds, navigation, outbox, arrival_m=mission.arrival_m)
         self._bidding = Bidding(
@@ -149,7 +148,7 @@ class Searcher:
 
     def altimeter(self, above_ground_m: float | None, *, now_ns: int) -> None:
         """The rangefinder tells the height over whatever is below; None: nothing is within its range."""
-        self._navigation.altimeter(above_ground_m, now_ns=now_ns)
+        self._flight.altimeter(above_ground_m, now_ns=now_ns)
 
     def radar(self, echoes: Sequence[Echo], *, now_ns: int) -> None:
         """The radar shows these echoes."""
@@ -167,7 +166,7 @@ class Searcher:
 
     def _identify(self, now_ns: int) -> None:
         """Confirm the survivors whose phones are surely those of people that were seen."""
-        for survivor in self._identities.review(now_ns):
+        for survivor in self._sightings.review(now_ns):
             self._announcing.confirm(survivor, now_ns)
             self._bidding.close(survivor, now_ns=now_ns)
 

@@ -39,6 +39,10 @@ class Sightings:
             sigma_rad = max(_ANGLE_RAD, self._voice_rad * math.pow(10.0, -snr_db / 20))
             self._sighted("voice", (bearing_rad, elevation_rad), sigma_rad=sigma_rad, now_ns=now_ns)
 
+    def review(self, now_ns: int) -> list[int]:
+        """The survivors who may be confirmed now, because their phones are surely those of people that were seen."""
+        return self._identities.review(now_ns)
+
     def _sighted(self, sensor: str, direction: tuple[float, float], *, sigma_rad: float, now_ns: int) -> None:
         """A sensor shows somebody in a direction: a place on the ground, if that is not too far away."""
         here = self._navigation.over_ground(now_ns)

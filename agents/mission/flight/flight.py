@@ -19,6 +19,10 @@ class Flight:
         self.velocity: Enu | None = None
         """A new velocity to fly, for the application to take; None: there is no new one."""
 
+    def altimeter(self, above_ground_m: float | None, *, now_ns: int) -> None:
+        """The rangefinder tells the height over whatever is below; None: nothing is within its range."""
+        self._navigation.altimeter(above_ground_m, now_ns=now_ns)
+
     def fix(self, position: Enu, velocity: Enu, survivor: int | None, *, now_ns: int) -> None:
         """Choose a velocity at a position fix; `survivor` is the one to whom this UAV goes, if any."""
         self._navigation.fix(position, velocity, now_ns=now_ns)

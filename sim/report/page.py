@@ -3,7 +3,7 @@
 import json
 from collections.abc import Mapping, Sequence
 from pathlib import Path
-from typing import Any, Final
+from typing import Any, Final, NamedTuple
 
 from fanet_mw.errors import ConfigError
 from sim.report.html import Block, Commands, Heading, Picture, Rows, Text, as_html, as_markdown
@@ -76,11 +76,38 @@ def _blocks(folders: Sequence[Path], out: Path) -> tuple[str, list[Block]]:
 
 def evaluation(folders: Sequence[Path]) -> list[Block]:
     """The page of all figures in these folders: verdicts, settings, each figure with its claims, commands."""
-    figures = [found for folder in folders for found in _figures(folder)]
-    blocks: list[Block] = [*_overview(figures), Heading("Settings"), _SETTINGS]
-    for folder, about in figures:
-        blocks += _figure(folder, about)
-    return [*blocks, *_commands(figures)]
+    pages = figure_pages(folders)
+    blocks = overview(folders)
+    for page in pages:
+        blocks += [Heading(page.title), *page.blocks]
+    return [*blocks, *commands(folders)]
+
+
+class FigurePage(NamedTuple):
+    """What there is to say of one figure."""
+
+    name: str
+    title: str
+    blocks: list[Block]
+
+
+def overview(folders: Sequence[Path]) -> list[Block]:
+    """The verdicts of all claims, and the settings."""
+    return [*_overview(_all(folders)), Heading("Settings"), _SETTINGS]
+
+
+def figure_pages(folders: Sequence[Path]) -> list[FigurePage]:
+    """Each figure with its claims, in the order of the paper."""
+    return [FigurePage(about["name"], _title(about), _figure(folder, about)) for folder, about in _all(folders)]
+
+
+def commands(folders: Sequence[Path]) -> list[Block]:
+    """The commands by which the figures were made."""
+    return _commands(_all(folders))
+
+
+def _all(folders: Sequence[Path]) -> list[tuple[Path, dict[str, Any]]]:
+    return [found for folder in folders for found in _figures(folder)]
 
 
 def _figures(folder: Path) -> list[tuple[Path, dict[str, Any]]]:
@@ -113,18 +140,21 @@ def _figure(folder: Path, about: dict[str, Any]) -> list[Block]:
         )
         for claim in about["claims"]
     ]
-    name = about["name"]
-    head = f"{name.capitalize().replace('-', ' ')}: {about['title']}" if name.startswith("figure") else about["title"]
     failed = f", {about['failed']} runs failed and are left out" if about["failed"] else ""
     made = f"Variant {about['variant']}: {about['runs']} runs, {about['seeds']} seeds{failed}"
     blocks: list[Block] = [
-        Heading(head),
-        Picture(folder / f"{name}.png", about["caption"]),
+        Picture(folder / f"{about['name']}.png", about["caption"]),
         Text(f"{made}; code {', '.join(about['code'])}."),
     ]
     if rows:
         blocks.append(Rows(("claim", "findings", "verdict", "why"), rows))
     return blocks
+
+
+def _title(about: Mapping[str, Any]) -> str:
+    name: str = about["name"]
+    title: str = about["title"]
+    return f"{name.capitalize().replace('-', ' ')}: {title}" if name.startswith("figure") else title
 
 
 def _reason(reason: Mapping[str, Any]) -> str:

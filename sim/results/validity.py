@@ -4,8 +4,8 @@
               for, and (in real time) each measure of how the machine disturbed the run is within its limit
 
 The limits come from runs that were disturbed on purpose and compared with virtual time: within them the delivery ratio
-differs by no more than between two seeds (`tests/benchmarks/disturbed_runs.py`, table in docs/reference/results.md). In
-virtual time nothing disturbs a run.
+differs by no more than between two seeds (`tests/benchmarks/disturbed_runs.py`, table in docs/reference/validity.md).
+In virtual time nothing disturbs a run.
 """
 
 from collections.abc import Iterator, Mapping

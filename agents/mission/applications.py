@@ -22,9 +22,9 @@ from fanet_mw.wire.inner import Survivor
 from fanet_mw.wire.search import Found, Search, SearchStatus, Told, told_in
 
 _FUTURE_NS: Final = S
-"""A position from further ahead is none: clocks agree better than that."""
+"""A position of an instant further ahead is not believed: clocks agree better than that."""
 _AHEAD_S: Final = 10.0
-"""How far ahead a course lies: the farther, the less a fix's error turns it."""
+"""A course leads to a point this far ahead: the farther that is, the less the error of a fix turns the course."""
 _LEAST_M_S: Final = 0.05
 
 
@@ -64,17 +64,17 @@ class Rescue(Application):
 
 
 class PlannedSearch(Application):
-    """One UAV's part in a search."""
+    """The planned search at one UAV: what it senses and hears goes to a searcher, what that decides goes out."""
 
     name: Final = "report"
     listens = (SURVIVOR.msgid, SEARCH.msgid, STATUS.msgid, BIDS.msgid, FOUND.msgid)
 
     def __init__(self, scenario: Scenario, node: NodeId, *, position: Enu, onboard_map: OnboardMap = NO_MAP) -> None:
-        """`onboard_map`: the map on board."""
+        """`onboard_map` is the map that the UAV carries."""
         self._outbox = Outbox()
         self._searcher = Searcher(scenario, node, position=position, outbox=self._outbox, onboard_map=onboard_map)
         self._bad_positions = 0
-        """Hellos whose position is none, or not of now."""
+        """The number of hellos whose position is missing, or not of the present."""
 
     def start(self, port: AppPort, now_ns: int) -> None:
         super().start(port, now_ns)
@@ -144,7 +144,7 @@ class PlannedSearch(Application):
 
 
 def _course(here: Enu, velocity: Enu) -> Course:
-    """Fly on at a velocity; the point to fly to lies far ahead."""
+    """The course that flies on at a velocity: its point lies far ahead."""
     speed = velocity.norm()
     if speed < _LEAST_M_S:
         return Course(here, _LEAST_M_S)
@@ -155,7 +155,7 @@ def _course(here: Enu, velocity: Enu) -> Course:
 
 
 def _speaker(told: Told) -> int | None:
-    """Who alone may flood this message; None: it may be passed on by anyone."""
+    """The only node that may flood this message; None: any node may pass it on."""
     if isinstance(told, Survivor):
         return told.reporter
     if isinstance(told, Search):
@@ -166,7 +166,7 @@ def _speaker(told: Told) -> int | None:
 
 
 def _hello(frame: bytes) -> tuple[int, Motion, tuple[Told, ...]]:
-    """Who says it, how that one flies, and what it tells; raises MalformedFrameError."""
+    """The sender of a hello, its motion, and what it tells; raises MalformedFrameError."""
     heard = decoded(frame, mavlink.kinematics_of)
     motion = Motion(heard.position, heard.velocity, heard.t_ms * MS)
     return packet_of(frame).origin, motion, decoded(frame, told_in)

@@ -23,7 +23,7 @@ class OutgoingPacket(NamedTuple):
 
 @dataclass
 class Outbox:
-    """One UAV's."""
+    """Everything that the mission of one UAV has decided since the last input and that has not left it yet."""
 
     records: list[Record] = field(default_factory=list)
     packets: list[OutgoingPacket] = field(default_factory=list)
@@ -31,7 +31,7 @@ class Outbox:
     """A new course to fly; None when the old one holds."""
 
     def empty(self, port: AppPort) -> None:
-        """Bring everything to where it goes."""
+        """Hand the records, the packets and the course to the port."""
         for record in self.records:
             port.record(record)
         self.records.clear()
@@ -44,7 +44,7 @@ class Outbox:
 
 
 class ReportFormat:
-    """How long the packet of a survivor report is and how urgent, as the scenario says."""
+    """The length and the priority of survivor reports, as the scenario says."""
 
     def __init__(self, scenario: Scenario, node: NodeId) -> None:
         self._node = node
@@ -52,7 +52,7 @@ class ReportFormat:
         self._priority = PRIORITIES[scenario.mission.report_priority]
 
     def packet(self, report: Survivor) -> OutgoingPacket:
-        """A report, filled up to its length."""
+        """The packet of a report, filled up to its length."""
         frames = report.encode_frame(self._node)
         if self._bytes:
             frames += filler(self._bytes - HEADER_BYTES - len(frames), node=self._node)

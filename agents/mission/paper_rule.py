@@ -27,7 +27,7 @@ _MOVED_M: Final = 10.0
 
 
 class PaperRule:
-    """One UAV's knowledge of survivors, and what it makes of it."""
+    """The reports and scans of one UAV, and the survivor that it has chosen to approach."""
 
     def __init__(self, scenario: Scenario, node: NodeId, outbox: Outbox) -> None:
         self._node = node
@@ -40,7 +40,7 @@ class PaperRule:
         self._outbox = outbox
         self._detected: set[int] = set()
         self._measured: dict[int, Survivor] = {}
-        """Of each phone that we hear: what the latest scan measured."""
+        """The latest received power of each phone that the receiver hears."""
         self._due_ns: dict[int, int] = {}
         """When each of these phones is to be reported next."""
         self._sightings: dict[int, dict[int, Sighting]] = {}
@@ -52,7 +52,7 @@ class PaperRule:
     # --- what comes in --------------------------------------------------------------------------------------------
 
     def scan(self, heard: Sequence[tuple[int, float]], *, position: Enu, now_ns: int) -> None:
-        """Our own receiver hears these phones, and no others; each is reported, again only after the interval."""
+        """Take in the phones that the receiver hears; each is reported, and again only after the interval."""
         before, self._measured = self._measured, {}
         for survivor, rssi_dbm in heard:
             if survivor not in self._detected:
@@ -64,20 +64,20 @@ class PaperRule:
         self.wake(now_ns)
 
     def next_wake_ns(self) -> int | None:
-        """When the next report is due."""
+        """The instant at which the next report is due."""
         return min((self._due_ns[survivor] for survivor in self._measured), default=None)
 
     def wake(self, now_ns: int) -> None:
-        """Report what is due of the phones that we still hear."""
+        """Make the reports that are due of phones that are still heard."""
         for survivor, measured in list(self._measured.items()):
             if now_ns - measured.t_us * US > self._heard_for_ns:
-                del self._measured[survivor]  # a receiver that hears nobody says nothing
+                del self._measured[survivor]  # a receiver that hears no phone says nothing
             elif now_ns >= self._due_ns[survivor]:
                 self._due_ns[survivor] = now_ns + self._report_ns
                 self._outbox.packets.append(self._format.packet(measured))
 
     def reported(self, report: Survivor, *, position: Enu, now_ns: int) -> None:
-        """The network delivered another node's report."""
+        """Take in a report of another node."""
         sightings = self._sightings.setdefault(report.survivor, {})
         known = sightings.get(report.reporter)
         if known is not None and report.rssi_dbm <= known.rssi_dbm:
@@ -89,7 +89,7 @@ class PaperRule:
             self._refine()
 
     def moved(self, position: Enu, *, now_ns: int) -> None:
-        """A position fix: arrived yet? stayed long enough?"""
+        """Take in a position fix: it tells whether the UAV has arrived, and whether it has stayed long enough."""
         if self._target is None:
             return
         if self._dwell_until_ns is None:
@@ -107,7 +107,7 @@ class PaperRule:
     # --- decisions ------------------------------------------------------------------------------------------------
 
     def _choose(self, position: Enu, now_ns: int) -> None:
-        """Take the nearest survivor that enough different nodes have reported and that we have not visited."""
+        """Take the nearest survivor that enough different nodes have reported and that this UAV has not visited."""
         candidates = [
             (self._place(survivor), survivor)
             for survivor in sorted(self._sightings)

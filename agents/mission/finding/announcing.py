@@ -17,31 +17,31 @@ from fanet_mw.wire.search import Found
 _TELLINGS: Final = 3
 _AGAIN_NS: Final = 7 * S
 _WORSE: Final = 0.8
-"""An estimate is told again when its standard deviation has shrunk to this share."""
+"""A UAV tells its estimate again when the standard deviation has shrunk to this share."""
 _USEFUL_M: Final = 60.0
-"""An estimate with a larger standard deviation is not worth telling."""
+"""An estimate whose standard deviation is larger is not worth telling."""
 _PASSED_ON_NS: Final = 12 * S
 """Hellos pass a confirmation on for so long."""
 _PASSED_ON: Final = 3
-"""Confirmations of one hello."""
+"""A hello carries at most so many confirmations."""
 _TELLERS: Final = 4
-"""Of those who know that a reported survivor is confirmed, one in so many says so."""
+"""One in so many of the UAVs that know a reported survivor to be confirmed says so."""
 
 
 class Announcing:
-    """One UAV's."""
+    """What one UAV tells of finds, and when."""
 
     def __init__(self, node: NodeId, finds: Finds, outbox: Outbox) -> None:
         self._node = node
         self._finds, self._outbox = finds, outbox
         self._told_sigma_m: dict[int, float] = {}
         self._tellings: dict[int, tuple[int, int]] = {}
-        """Of our own confirmations: how often they are still to be told, and when next."""
+        """For each survivor that this UAV has confirmed: how often that is still to be told, and when next."""
         self._struck_ns: dict[int, int] = {}
-        """When we confirmed each survivor, or heard that it is confirmed."""
+        """When this UAV confirmed each survivor, or heard that it is confirmed."""
 
     def confirm(self, survivor: int, now_ns: int) -> None:
-        """The owner of this phone was seen, and is sure to be the one: everyone is to know."""
+        """Tell all nodes that the owner of this phone has been seen and is surely the one."""
         place = self._finds.known[survivor].filter.estimate()
         assert place is not None, "who was seen has a place"
         found = Found(now_ns // US, survivor, *place, self._node, confirmed=True)
@@ -52,11 +52,11 @@ class Announcing:
         self.struck(survivor, now_ns)
 
     def struck(self, survivor: int, now_ns: int) -> None:
-        """A survivor is confirmed, by us or by another."""
+        """Note that a survivor is confirmed, by this UAV or by another."""
         self._struck_ns[survivor] = now_ns
 
     def tell(self, task: int | None, now_ns: int) -> None:
-        """Tell the confirmations that are due, and the estimate of the survivor to whom we fly."""
+        """Tell the confirmations that are due, and the estimate of the survivor to whom this UAV flies."""
         for survivor, (left, next_ns) in sorted(self._tellings.items()):
             if now_ns < next_ns:
                 continue
@@ -71,7 +71,7 @@ class Announcing:
             self._tell_estimate(task, now_ns)
 
     def reported(self, report: Survivor, now_ns: int) -> None:
-        """Another node reports a survivor: it may not know yet that it is confirmed."""
+        """Note that another node reports a survivor: it may not know yet that the survivor is confirmed."""
         confirmed = self._finds.known[report.survivor].confirmed
         if confirmed is None or now_ns - self._struck_ns.get(report.survivor, now_ns) <= _AGAIN_NS:
             return
@@ -80,7 +80,7 @@ class Announcing:
             self._flood(confirmed)
 
     def hello_frames(self, now_ns: int) -> bytes:
-        """Inner frames for the next hello: what was confirmed lately."""
+        """The inner frames that tell in the next hello what was confirmed lately."""
         recent = [
             (struck_ns, survivor)
             for survivor, struck_ns in self._struck_ns.items()
@@ -90,7 +90,7 @@ class Announcing:
         return b"".join(found.encode_frame(self._node) for found in latest if found is not None)
 
     def _tell_estimate(self, survivor: int, now_ns: int) -> None:
-        """A responder shares its estimate when that has become clearly better."""
+        """Tell the estimate of a responder when it has become clearly better."""
         place = self._finds.known[survivor].filter.estimate()
         before_m = self._told_sigma_m.get(survivor, math.inf)
         if place is None or place.sigma_m > _WORSE * before_m or place.sigma_m > _USEFUL_M:

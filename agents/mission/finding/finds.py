@@ -1,4 +1,4 @@
-"""What one UAV knows of the survivors: who reported each, where each is estimated to be, and who is confirmed.
+"""What one UAV knows of the survivors: which nodes reported each, where each is, and which are confirmed.
 
 heard by a phone's signal -> reported by enough different nodes -> seen at close range -> confirmed: struck off
 """
@@ -13,14 +13,14 @@ from fanet_mw.wire.inner import Survivor
 from fanet_mw.wire.search import Found
 
 _PASSED_ON: Final = 5
-"""Reports of one hello."""
+"""A hello carries at most so many reports."""
 _FRESH_NS: Final = 8 * S
-"""Reports younger than this are passed on by those who only heard of them."""
+"""A node that did not make a report itself passes it on while it is younger than this."""
 
 
 @dataclass
 class Find:
-    """One survivor."""
+    """What one UAV knows of one survivor."""
 
     filter: PhoneFilter
     reporters: set[int] = field(default_factory=set)
@@ -32,7 +32,7 @@ class Find:
     confirmed: Found | None = None
 
     def place(self) -> Estimate | None:
-        """The better of what we have measured and what another node has told."""
+        """The better one of the estimate from this UAV's samples and the best that another node has told."""
         if self.confirmed is not None:
             return _estimate(self.confirmed)
         own = self.filter.estimate()
@@ -50,7 +50,7 @@ class Finds:
         self.known: dict[int, Find] = {}
 
     def report(self, report: Survivor, *, now_ns: int) -> Find:
-        """A received power that we or another node measured."""
+        """Take in a received power that this UAV or another node has measured."""
         find = self.known.get(report.survivor)
         if find is None:
             find = self.known[report.survivor] = Find(PhoneFilter(self._model), first_ns=now_ns)
@@ -63,7 +63,7 @@ class Finds:
         return find
 
     def told(self, found: Found, *, now_ns: int) -> bool:
-        """Another node's estimate or confirmation; whether the survivor is struck off by it."""
+        """Take in an estimate or a confirmation of another node; True if it strikes the survivor off."""
         find = self.known.get(found.survivor)
         if find is None:
             find = self.known[found.survivor] = Find(PhoneFilter(self._model), first_ns=now_ns)
@@ -81,7 +81,7 @@ class Finds:
         return sorted(survivor for survivor, find in self.known.items() if find.confirmed is None)
 
     def is_confirmed(self, survivor: int) -> bool:
-        """Whether somebody has confirmed a survivor."""
+        """True if a node has confirmed the survivor."""
         find = self.known.get(survivor)
         return find is not None and find.confirmed is not None
 
@@ -102,7 +102,7 @@ def _estimate(found: Found) -> Estimate:
 
 
 def ground_place(at: Enu, *, bearing_rad: float, elevation_rad: float) -> tuple[float, float, float] | None:
-    """East and north of the ground at which a sensor looks, and the slant range; None above the horizon."""
+    """East and north of the ground in the direction of a sensor, and the slant range; None above the horizon."""
     if elevation_rad >= -0.05:
         return None
     along_m = at.up / math.tan(-elevation_rad)

@@ -6,7 +6,7 @@
 
 The cost of a pair is how much less likely the phone's powers are from the person's place than from the best place:
 twice a difference of logarithms, as chi-square with 2 degrees for the true pair. Two people side by side can be told
-apart only by many powers, so who is not sure yet waits and measures on; after a while less is asked for.
+apart only by many powers, so a UAV that is not sure yet waits and measures on; after a while less is asked for.
 """
 
 import math
@@ -22,56 +22,56 @@ from fanet_mw.units import Enu, S
 _SAME_PERSON_M: Final = 12.0
 """Sightings nearer to each other than this are of one person."""
 _SAME_SIGMAS: Final = 2.5
-"""So are sightings that are nearer than so many of their standard deviations, as those by a voice may be."""
+"""Sightings are of one person, too, that are nearer than so many of their standard deviations: a voice's are wide."""
 _GATE: Final = 16.0
-"""A person is rather nobody's whose phone was heard than the owner of one that this place makes so unlikely.
+"""A person carries none of the phones that were heard, rather than one that the person's place makes so unlikely.
 Above 11.8, the 99.7 % of chi-square with 2 degrees: the shadowing of neighboring samples is not independent."""
 _VAGUE_M: Final = 80.0
-"""A phone whose place has a larger standard deviation than this could be anybody's."""
+"""A phone whose place has a larger standard deviation than this could be that of any person."""
 _NEAR_M: Final = 400.0
 """Phones that were first heard farther from a person are not that person's."""
 _FORGOTTEN_NS: Final = 60 * S
 _FALSE_ALARM_NS: Final = 10 * S
-"""A person that was seen once only, and not again within this time, was none."""
+"""A sighting that no other follows within this time was a false alarm."""
 _SIGHTINGS: Final = 2
 """A person is confirmed after so many sightings from close by."""
 _SURE_M: Final = 3.5
 """The largest standard deviation of a confirmed place."""
 _SAMPLES: Final = 6
 _REPORTERS: Final = 2
-"""Fewer received powers, or by fewer nodes, do not tell whose phone it is."""
+"""Fewer received powers than `_SAMPLES`, or by fewer nodes than this, do not tell whose phone it is."""
 _SAMPLES_ALONE: Final = 8
-"""As many by one node do: it has passed by, and at the edge of the area nobody else may ever hear that phone."""
+"""So many powers received by one node are enough: at the edge of the area no other may ever hear that phone."""
 _MARGIN: Final = 9.0
-"""By how much the next best assignment must cost more: it is then 90 times less likely."""
+"""The next best assignment must cost so much more: it is then 90 times less likely."""
 _IMPOSSIBLE: Final = 1e6
 _LEAST_MARGIN: Final = 2.0
 _PATIENT_NS: Final = 15 * S
 _IMPATIENT_NS: Final = 50 * S
-"""From the first sighting on: until then the whole margin is asked for, from then on the least one."""
+"""Times since the first sighting: before `_PATIENT_NS` the whole margin is asked for, after this one the least."""
 _TAKEN_GATE: Final = 6.0
 _TAKEN_SIGHTINGS: Final = 20
-"""Where somebody has been confirmed a second person may lie: so many further sightings there, and a phone that fits."""
+"""A second person beside a confirmed one is believed after so many further sightings, and with a phone that fits."""
 _TAKEN_SIGMA_M: Final = 30.0
 
 
 @dataclass
 class PersonTrack:
-    """Somebody on the ground."""
+    """One person on the ground, as the sightings so far show that person."""
 
     place: Estimate
     first_ns: int
     last_ns: int
     sightings: int = 1
     close: int = 0
-    """How many of the sightings were from close by."""
+    """The number of sightings from close by."""
     owner_of: int | None = None
     """The survivor whose phone this person was last taken to carry."""
     taken: int | None = None
-    """How often the person had been seen when somebody was confirmed there; None: nobody was."""
+    """The number of sightings when a survivor was confirmed at this place; None: none has been."""
 
     def seen(self, at: Enu, variance_m2: float, now_ns: int) -> None:
-        """One more sighting: a Kalman filter with the same variance along each axis."""
+        """Take in one more sighting, by a Kalman filter with the same variance along each axis."""
         before = self.place
         gain = before.east_variance_m2 / (before.east_variance_m2 + variance_m2)
         self.place = Estimate(
@@ -93,7 +93,7 @@ class Identities:
         self._people: list[PersonTrack] = []
 
     def seen(self, at: Enu, *, sigma_m: float, close: bool, now_ns: int) -> int | None:
-        """A sensor shows somebody; `close`: from so near that it is certainly a person.
+        """Take in that a sensor shows a person; `close`: from so near that it certainly is one.
 
         Returns the survivor whose phone that person was last taken to carry.
         """
@@ -108,7 +108,7 @@ class Identities:
         return near.owner_of
 
     def review(self, now_ns: int) -> list[int]:
-        """Assign phones to people anew; the survivors who may be confirmed now, in order of id."""
+        """Assign phones to people anew; returns the survivors who may be confirmed now, in order of id."""
         self._people = [person for person in self._people if _is_remembered(person, now_ns)]
         for survivor in self._finds.open():
             self._finds.known[survivor].filter.sighted(None)
@@ -133,7 +133,7 @@ class Identities:
         return sorted(sure)
 
     def _may_be_named(self, person: PersonTrack, now_ns: int) -> bool:
-        """False where somebody has been confirmed, until further sightings say that a second person lies there."""
+        """False where a survivor has been confirmed, until further sightings show that a second person lies there."""
         at = Enu(person.place.east_m, person.place.north_m, 0.0)
         taken = any(
             find.confirmed is not None
@@ -148,7 +148,7 @@ class Identities:
     def _next_best(
         self, costs: Sequence[Sequence[float]], nobody: Sequence[float], row: int, column: int, person: PersonTrack
     ) -> float:
-        """The least cost if this person carries another phone, or at a place that is taken, none."""
+        """The least cost if this person carries another phone or, at a place that is taken, no phone."""
         others = [list(one) for one in costs]
         others[row][column] = _IMPOSSIBLE
         bound = list(nobody)
@@ -170,7 +170,7 @@ class Identities:
         return min(_IMPOSSIBLE, self._finds.known[survivor].filter.deficit(place.east_m, place.north_m))
 
     def _is_confirmable(self, person: PersonTrack, survivor: int) -> bool:
-        """Whether enough was seen of a person, and enough heard of a phone."""
+        """True if enough has been seen of a person and enough been heard of a phone."""
         find = self._finds.known[survivor]
         enough = _SAMPLES if len(find.reporters) >= _REPORTERS else _SAMPLES_ALONE
         heard = find.filter.heard_from()
@@ -188,13 +188,13 @@ def _is_remembered(person: PersonTrack, now_ns: int) -> bool:
 
 
 def _asked_for(person: PersonTrack, now_ns: int) -> float:
-    """The margin that is asked for: less and less, the longer a person has been seen."""
+    """The margin that is asked for, which shrinks the longer a person has been seen."""
     share = (now_ns - person.first_ns - _PATIENT_NS) / (_IMPATIENT_NS - _PATIENT_NS)
     return _MARGIN - (_MARGIN - _LEAST_MARGIN) * min(1.0, max(0.0, share))
 
 
 def _assigned(costs: Sequence[Sequence[float]], nobody: Sequence[float]) -> tuple[float, list[int | None]]:
-    """The least total, and the phone of each person; `nobody`: what it costs that a person carries none of them."""
+    """The least total, and the phone of each person; `nobody` has the cost of each person's carrying none of them."""
     phones, people = len(costs[0]), len(costs)
     table = [[*row, *(nobody[i] if i == j else _IMPOSSIBLE for j in range(people))] for i, row in enumerate(costs)]
     chosen = assign(table)

@@ -19,7 +19,7 @@ _MAX_STEP_M: Final = 80.0
 
 
 class Sighting(NamedTuple):
-    """One node heard the phone from `position` at `rssi_dbm`."""
+    """A reception of the phone by one node at a position."""
 
     position: Enu
     rssi_dbm: float

@@ -5,7 +5,7 @@
 
 The offset b (burial, antenna, battery) is integrated out in closed form, so a cell needs only the sums of the residuals
 and of their squares. A histogram filter as in Thrun, Burgard, Fox: Probabilistic Robotics, 2005, chapter 4: no starting
-point, and the mirror image that a straight flight leaves open stays in the posterior until somebody resolves it.
+point, and the mirror image that a straight flight leaves open stays in the posterior until a sample resolves it.
 Once the owner has been seen, the place is that of the sightings.
 """
 
@@ -25,16 +25,16 @@ _OFF_CENTER_M: Final = 120.0
 _DOUBT: Final = 1.5
 """Samples near each other share shadowing, so that each counts for less than an independent one."""
 _SILENCE_M: Final = 450.0
-"""Silence farther away than this from where a phone was heard tells nothing."""
+"""Silence at a place farther than this from where a phone was heard tells nothing."""
 _NEVER: Final = 0.02
-"""Some phones are not heard however near: a receiver misses them, or rubble lies between."""
+"""This share of phones is not heard however near: a receiver misses them, or rubble lies between."""
 _STEP_M: Final = 5.0
 _SAME_PLACE_M: Final = 25.0
 """Two samples of one node nearer than this share their shadowing, and count as one."""
 
 
 class Estimate(NamedTuple):
-    """A place on the ground, with covariance."""
+    """An estimated place on the ground, with its covariance."""
 
     east_m: float
     north_m: float
@@ -50,7 +50,7 @@ class Estimate(NamedTuple):
         return math.sqrt(mean + math.hypot(half, self.covariance_m2))
 
     def distance_m(self, place: Enu) -> float:
-        """On the ground."""
+        """The distance of a place from this one, along the ground."""
         return math.hypot(self.east_m - place.east, self.north_m - place.north)
 
 
@@ -65,11 +65,11 @@ class PhoneModel(NamedTuple):
     threshold_dbm: float
     """The least power that is heard."""
     half_m: float = math.inf
-    """Nobody is farther east, west, north or south of the middle than this."""
+    """No survivor is farther east, west, north or south of the middle than this."""
 
 
 class PhoneFilter:
-    """One phone."""
+    """The posterior of one phone's place."""
 
     def __init__(self, model: PhoneModel) -> None:
         self._model = model
@@ -77,13 +77,13 @@ class PhoneFilter:
         self._middle: Enu | None = None
         self._silent_at: list[Enu] = []
         self._scores: list[float] = []
-        """Twice the logarithm of how likely silence was, per cell."""
+        """For each cell, twice the logarithm of how likely the silence was."""
         self._totals: list[float] = []
-        """The posterior: twice its logarithm, up to a constant."""
+        """For each cell, twice the logarithm of the posterior, up to a constant."""
         self._samples: list[tuple[Enu, float | None]] = []
-        """Places and received powers; None: nothing was heard there."""
+        """The places of samples with the received powers; None: nothing was heard there."""
         self._pending: list[tuple[Enu, float | None]] = []
-        """What was heard since somebody last wanted to know."""
+        """The samples that the cells do not reckon with yet; they are taken in when an estimate is asked for."""
         self._best = 0.0
         """The greatest of them within the area."""
         self._sums: list[float] = []
@@ -92,12 +92,12 @@ class PhoneFilter:
         self._taken: dict[int, list[Enu]] = {}
         self._estimate: Estimate | None = None
         self._seen: Estimate | None = None
-        """Where the owner has been seen."""
+        """The place at which the owner has been seen."""
 
     # --- measurements ---------------------------------------------------------------------------------------------
 
     def heard(self, reporter: int, position: Enu, rssi_dbm: float) -> bool:
-        """A received power at a place; False when it tells nothing new."""
+        """Take in a power received at a place; False when it tells nothing new."""
         taken = self._taken.setdefault(reporter, [])
         if any(_ground_m(p, position) < _SAME_PLACE_M for p in taken):
             return False
@@ -108,7 +108,7 @@ class PhoneFilter:
         return True
 
     def silent(self, position: Enu) -> None:
-        """Nothing was heard at a place of our own."""
+        """Take in that the receiver of this UAV heard nothing at a place."""
         if self._middle is None or not self.near(position, within_m=_SILENCE_M):
             return
         if any(_ground_m(p, position) < _SAME_PLACE_M for p in self._silent_at):
@@ -117,7 +117,7 @@ class PhoneFilter:
         self._pending.append((position, None))
 
     def sighted(self, place: Estimate | None) -> None:
-        """A camera shows the owner at this place; None: nobody who is in view is the owner."""
+        """Take in where a camera shows the owner; None: no person in view is the owner."""
         self._seen = place
 
     @property
@@ -126,17 +126,17 @@ class PhoneFilter:
 
     @property
     def samples(self) -> int:
-        """How many received powers have been taken in."""
+        """The number of received powers that have been taken in."""
         return self._count
 
     # --- the estimate ---------------------------------------------------------------------------------------------
 
     def estimate(self) -> Estimate | None:
-        """Mean and covariance; None before anything was measured."""
+        """The mean and the covariance of the place; None before anything was measured."""
         return self._seen or self.heard_from()
 
     def heard_from(self) -> Estimate | None:
-        """The same by received powers alone."""
+        """The same estimate by received powers alone, without sightings."""
         self._catch_up()
         return self._estimate
 
@@ -172,7 +172,7 @@ class PhoneFilter:
         return self._best - self._totals[j * (2 * _HALF_CELLS + 1) + i]
 
     def near(self, place: Enu, *, within_m: float) -> bool:
-        """Whether the phone was first heard no farther from a place; cheap, and True of what was only seen."""
+        """True if the phone was first heard within a distance of a place, or has only been seen; cheap to ask."""
         middle = self._middle
         return middle is None or _ground_m(middle, place) <= within_m
 
@@ -198,7 +198,7 @@ class PhoneFilter:
                 at += 1
 
     def _rule_out(self, position: Enu) -> None:
-        """Cells from which the phone would have been heard become less likely."""
+        """Make the cells less likely from which the phone would have been heard."""
         assert self._middle is not None, "the grid lies around the first sample"
         scores, table, most, sqrt = self._scores, self._silence, len(self._silence) - 1, math.sqrt
         west = self._middle.east - _HALF_CELLS * _CELL_M - position.east
@@ -213,7 +213,7 @@ class PhoneFilter:
                 at += 1
 
     def _inside(self, width: int) -> list[bool]:
-        """Which cells are in the area; all of them when none is."""
+        """The cells that are in the area; all cells when none is."""
         assert self._middle is not None, "the grid lies around a sample"
         half = self._model.half_m + _CELL_M / 2
         east = [abs(self._middle.east + (i - _HALF_CELLS) * _CELL_M) <= half for i in range(width)]

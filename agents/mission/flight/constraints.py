@@ -12,12 +12,12 @@ from agents.mission.navigation.half_planes import HalfPlane, Velocity
 from fanet_mw.units import Enu
 
 _TURN_M_S2: Final = 1.0
-"""How fast another UAV's velocity is taken to change, on average, since it was last heard."""
+"""The acceleration that another UAV is assumed to have flown with, on average, since it was last heard."""
 _MOST_GROWTH_M: Final = 12.0
 
 
 def grown_m(age_s: float) -> float:
-    """How much farther from its extrapolated place another UAV may be, after so long without word from it [m]."""
+    """How far from its extrapolated place another UAV may be after so long without a word from it [m]."""
     return min(_MOST_GROWTH_M, 0.5 * _TURN_M_S2 * age_s * age_s)
 
 
@@ -26,7 +26,7 @@ def avoiding(
 ) -> HalfPlane:
     """The half-plane of velocities that avoid one other body within the horizon.
 
-    `offset`: from us to it. `share`: of the change that is ours; 0.5 when it avoids as well, 1 when it does not.
+    `offset` leads from this UAV to the body. `share` is this UAV's share of the change: 0.5 if both avoid, else 1.
     """
     px, py = offset.east, offset.north
     vx, vy = velocity[0] - other_velocity[0], velocity[1] - other_velocity[1]
@@ -57,9 +57,9 @@ def avoiding(
 
 
 def staying_near(offset: Enu, other_velocity: Velocity, *, tether_m: float, within_s: float) -> HalfPlane | None:
-    """The half-plane of velocities that do not carry us out of reach of another within a time; None when it is near.
+    """The half-plane of velocities that keep this UAV in reach of another for a time; None when that one is near.
 
-    Both may part; each answers for half of what is left of the tether.
+    Both UAVs may fly apart, so each of them may use half of what is left of the tether.
     """
     distance = math.hypot(offset.east, offset.north)
     if distance < 0.3 * tether_m:

@@ -1,4 +1,4 @@
-"""How long a UAV may stay: what the battery gives above the way home and a reserve.
+"""The endurance of a UAV: what the battery gives above the way home and a reserve.
 
 rate      share of the charge that a second of flight takes, from the readings of the last while
 needed    rate x (way home / speed + height / sinking speed), and a fifth more for wind and waiting
@@ -27,13 +27,13 @@ class Endurance:
         self._readings: deque[tuple[int, float]] = deque()
 
     def read(self, charge: float, *, now_ns: int) -> None:
-        """A reading: the share of the capacity that is left."""
+        """Take in a reading: the share of the capacity that is left."""
         self._readings.append((now_ns, charge))
         while now_ns - self._readings[0][0] > _WINDOW_NS:
             self._readings.popleft()
 
     def margin(self, here: Enu) -> float:
-        """The share of the capacity that may be spent here still; 1 while the battery says nothing."""
+        """The share of the capacity that may still be spent before the UAV flies home; 1 before the first reading."""
         if not self._readings:
             return 1.0
         charge = self._readings[-1][1]

@@ -10,18 +10,18 @@ from fanet_mw.application import Course
 from fanet_mw.units import Enu
 
 _HIGHER_M: Final = 18.0
-"""Who flies home does so above lanes, relays and followers."""
+"""A UAV flies home so much above the lanes: relays and followers are below it."""
 _HOME_M: Final = 4.0
 _LAND_M_S: Final = 1.5
 
 
 class ReturnHome:
-    """One UAV's."""
+    """The return of one UAV: when it leaves, and the way that it then flies."""
 
     def __init__(
         self, home: Enu, navigation: Navigation, outbox: Outbox, *, speed_m_s: float, height_m: float, reserve: float
     ) -> None:
-        """`height_m`: of the lanes, over the ground; `reserve`: the share of the charge to land with."""
+        """`height_m` is that of the lanes over the ground; `reserve` is the share of the charge to land with."""
         self._home = home._replace(up=height_m + _HIGHER_M)
         self._navigation, self._outbox = navigation, outbox
         self._endurance = Endurance(home, speed_m_s=speed_m_s, reserve=reserve)
@@ -30,7 +30,7 @@ class ReturnHome:
         self.lands = False
 
     def battery(self, charge: float, *, now_ns: int) -> bool:
-        """A reading of the battery; True when it is time to leave."""
+        """Take in a reading of the battery; True when it is time to leave."""
         self._endurance.read(charge, now_ns=now_ns)
         if self.leaves or self._endurance.margin(self._navigation.position) > 0.0:
             return False
@@ -39,13 +39,15 @@ class ReturnHome:
 
     @property
     def percent(self) -> int:
-        """What may be spent of the battery yet, as a status tells it: 0 only for who flies home."""
+        """The percentage of the battery that may still be spent, as a status tells it; 0 only for a UAV that flies
+        home.
+        """
         if self.leaves:
             return 0
         return max(1, round(100 * self._endurance.margin(self._navigation.position)))
 
     def goal(self) -> Enu:
-        """Where to fly; once we are there, we land."""
+        """The place to fly to; a UAV that has reached it is told to land."""
         here = self._navigation.position
         if not self.lands and math.hypot(here.east - self._home.east, here.north - self._home.north) <= _HOME_M:
             self.lands = True

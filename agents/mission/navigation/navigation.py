@@ -1,4 +1,4 @@
-"""Where we are and how we fly, by our own receivers; and where our neighbors are, by their hellos."""
+"""Where a UAV is and how it flies, by its own receivers."""
 
 from typing import Final
 
@@ -7,13 +7,13 @@ from fanet_mw.motion import Motion
 from fanet_mw.units import Enu, S
 
 _FIX_GAIN: Final = 0.15
-"""Weight of a position fix against dead reckoning by its velocity."""
+"""The weight of a position fix against dead reckoning by its velocity."""
 _RANGED_NS: Final = 1 * S
-"""A height over the ground is used for so long."""
+"""A height that the rangefinder has told is used for so long."""
 
 
 class Navigation:
-    """Our own motion: position fixes smoothed by dead reckoning, and the height that a rangefinder and the map tell."""
+    """A UAV's own motion: fixes smoothed by dead reckoning, and the height that a rangefinder and the map tell."""
 
     def __init__(self, position: Enu, obstacles: KnownObstacles) -> None:
         self.position = position
@@ -23,7 +23,7 @@ class Navigation:
         self._above_ground: tuple[float, int] | None = None
 
     def fix(self, position: Enu, velocity: Enu, *, now_ns: int) -> None:
-        """The receiver gave a position and a velocity."""
+        """Take in a position and a velocity that the receiver gives."""
         if self._fix_ns is None:
             self.position = position
         else:
@@ -34,16 +34,16 @@ class Navigation:
         self._fix_ns, self.velocity = now_ns, velocity
 
     def altimeter(self, above_ground_m: float | None, *, now_ns: int) -> None:
-        """The rangefinder tells how high we are over whatever is below; None: nothing is within its range."""
+        """Take in the height over whatever is below; None: nothing is within the rangefinder's range."""
         if above_ground_m is not None:
             self._above_ground = above_ground_m, now_ns
 
     def over_ground(self, now_ns: int) -> Enu:
-        """Where we are, with the height over the ground in place of that above 0."""
+        """The position, with the height over the ground in place of that above 0."""
         return self.position._replace(up=self.height_m(now_ns))
 
     def height_m(self, now_ns: int) -> float:
-        """Over the ground, as far as a rangefinder has told lately and no roof is below us; else by the map."""
+        """The height over the ground: by the rangefinder if it told lately and no roof is below, else by the map."""
         ranged = self._above_ground is not None and now_ns - self._above_ground[1] <= _RANGED_NS
         if ranged and self._above_ground is not None and self._obstacles.roof_m(self.position) is None:
             return self._above_ground[0]

@@ -16,14 +16,14 @@ class NeighborMotions:
         self._motions: dict[int, Motion] = {}
 
     def on_hello(self, node: int, motion: Motion) -> None:
-        """A hello said how its sender flies."""
+        """Take in how the sender of a hello flies."""
         self._motions[node] = motion
 
     def motion(self, node: int, *, now_ns: int) -> Motion | None:
-        """How a neighbor flies; None when it was not heard lately."""
+        """The last known motion of a neighbor; None when it was not heard lately."""
         motion = self._motions.get(node)
         return None if motion is None or now_ns - motion.at_ns > _HEARD_FOR_NS else motion
 
     def all(self, *, now_ns: int) -> list[Motion]:
-        """The motions of those that were heard lately, in order of id."""
+        """The motions of the neighbors that were heard lately, in order of id."""
         return [motion for _, motion in sorted(self._motions.items()) if now_ns - motion.at_ns <= _HEARD_FOR_NS]

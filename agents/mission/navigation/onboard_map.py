@@ -26,7 +26,7 @@ class Building(NamedTuple):
     yaw_rad: float = 0.0
 
     def outside(self, east_m: float, north_m: float) -> tuple[float, float, float]:
-        """Distance of a place from the nearest wall, and the direction (east, north) that leads away from it.
+        """The distance of a place from the nearest wall, and the direction (east, north) that leads away from it.
 
         The distance is negative within the walls.
         """
@@ -46,16 +46,16 @@ class Building(NamedTuple):
 
 
 class OnboardMap(NamedTuple):
-    """What is known of a place."""
+    """The ground and the buildings that a UAV knows before its flight."""
 
     buildings: tuple[Building, ...] = ()
     heights_m: tuple[tuple[float, ...], ...] = ()
-    """Of the ground, row by row to the north; empty: a plain at 0."""
+    """The heights of the ground, row by row to the north; empty: a plain at 0."""
     cell_m: float = 1.0
     """The distance of two points of the heights."""
 
     def ground_m(self, east_m: float, north_m: float) -> float:
-        """Height of the ground; beyond the heights their edge goes on."""
+        """The height of the ground at a place; beyond the heights their edge goes on."""
         rows = self.heights_m
         if not rows:
             return 0.0
@@ -83,17 +83,17 @@ def middle_of(cell: Cell) -> tuple[float, float]:
 
 
 class MapIndex(NamedTuple):
-    """A map, made ready for being asked many times: the same for all UAVs that carry it."""
+    """A map made ready for quick answers; all UAVs that carry the same map share it."""
 
     roofs_m: Mapping[Cell, float]
-    """By cell of `CELL_M`, the highest roof within the margin of its middle."""
+    """The highest roof within the margin of the middle of each cell of `CELL_M`."""
     near: Mapping[Cell, tuple[Building, ...]]
-    """By cell of `TILE_M`, the buildings that somebody there has to watch."""
+    """The buildings that a UAV in each cell of `TILE_M` has to watch."""
 
 
 @lru_cache(maxsize=4)
 def indexed(onboard_map: OnboardMap, *, margin_m: float, watch_m: float) -> MapIndex:
-    """Which cells the buildings of a map take up, with a margin, and which of them are to be watched from where."""
+    """The cells that the buildings of a map take up, with a margin, and the buildings to be watched from each tile."""
     roofs: dict[Cell, float] = {}
     near: dict[Cell, list[Building]] = {}
     for building in onboard_map.buildings:

@@ -18,14 +18,14 @@ class RadarWatch:
         neighbors: NeighborMotions,
         avoid_by: Sequence[str],
     ) -> None:
-        """`avoid_by`: by `hellos`, by `radar`, or by both."""
+        """`avoid_by` names what the UAV avoids others by: `hellos`, `radar`, or both."""
         self._navigation, self._obstacles = navigation, obstacles
         self._looks = "radar" in avoid_by
         self.avoided = neighbors if "hellos" in avoid_by else NeighborMotions()
         """The neighbors that the UAV avoids by their hellos; none of them if hellos are not used."""
 
     def scan(self, echoes: Sequence[Echo], *, now_ns: int) -> None:
-        """The radar shows these echoes."""
+        """Take in the echoes of a scan."""
         if self._looks:
             own = self._navigation
             others = [motion.position_at(now_ns) for motion in self.avoided.all(now_ns=now_ns)]

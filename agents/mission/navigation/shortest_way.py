@@ -14,17 +14,17 @@ _STEPS: Final = tuple(
     (east, north, math.hypot(east, north)) for east in (-1, 0, 1) for north in (-1, 0, 1) if east or north
 )
 _SAMPLE_M: Final = 0.8 * CELL_M
-"""A straight way is looked at as often as this."""
+"""The distance of the points at which a straight way is checked."""
 _ESCAPE: Final = 4.0
-"""Cells about the start that are taken cost so much more: whoever is too near to a wall may still leave."""
+"""A taken cell next to the start costs so much more: a UAV that is too near to a wall may still leave."""
 _ESCAPE_CELLS: Final = 4
 
 Place = tuple[float, float]
-"""East and north."""
+"""East and north of a place [m]."""
 
 
 def is_clear(start: Place, goal: Place, taken: Callable[[Cell], bool]) -> bool:
-    """Whether no cell on the straight way is taken."""
+    """True if no cell on the straight way is taken."""
     east, north = goal[0] - start[0], goal[1] - start[1]
     steps = max(1, math.ceil(math.hypot(east, north) / _SAMPLE_M))
     before: Cell | None = None
@@ -38,7 +38,7 @@ def is_clear(start: Place, goal: Place, taken: Callable[[Cell], bool]) -> bool:
 
 
 def nearest_free(goal: Place, taken: Callable[[Cell], bool], *, within: int) -> Cell | None:
-    """The cell nearest to a place that is not taken; None: there is none within so many cells."""
+    """The nearest cell to a place that is not taken; None: there is none within so many cells."""
     column, row = cell_of(*goal)
     for ring in range(within + 1):
         found = [

@@ -1,4 +1,4 @@
-"""How a survivor is approached: straight to the estimate, then about it until somebody is seen."""
+"""The approach to a survivor: straight to the estimate, then about it until a person is seen."""
 
 import math
 from typing import Final
@@ -11,15 +11,15 @@ from fanet_mw.trace import Arrived
 from fanet_mw.units import NodeId, S
 
 _SPIRAL_M: Final = 30.0
-"""Distance of the turns of the spiral that is flown around an estimate which nobody is seen at."""
+"""The distance of the turns of the spiral that is flown around an estimate at which no person is seen."""
 _IN_VIEW_M: Final = 40.0
-"""From a circle of this radius a camera still shows who is in its middle."""
+"""From a circle of this radius a camera still shows a person in its middle."""
 _RING_M: Final = 14.0
 _GOLDEN_ANGLE: Final = math.pi * (3 - math.sqrt(5))
 
 
 class Approach:
-    """Where one UAV flies near survivors, and when it came to each."""
+    """The places to which one UAV flies near survivors, and the instants at which it came to each."""
 
     def __init__(self, node: NodeId, finds: Finds, navigation: Navigation, outbox: Outbox, *, arrival_m: float) -> None:
         self._node = node
@@ -27,14 +27,14 @@ class Approach:
         self._outbox = outbox
         self._arrival_m = arrival_m
         self.arrived_ns: dict[int, int] = {}
-        """When we came to each survivor."""
+        """The instant at which this UAV came to each survivor."""
 
     def point(self, survivor: int, place: Estimate, now_ns: int, *, responding: bool) -> tuple[float, float]:
-        """East and north to fly to: on a spiral, each UAV at an angle of its own, that widens while nobody is in view.
+        """East and north of the place to fly to: on a spiral, at an angle of the UAV's own, until a person is in view.
 
-        A circle about who is seen gives received powers from new places, by which it shows whose phone that is.
+        A circle about a person in view gives received powers from new places, which show whose phone it is.
 
-        `responding`: whether this survivor is our task, and not only one that we pass.
+        `responding`: True if this survivor is the UAV's task, and not only one that it passes.
         """
         arrived_ns = self.arrived_ns.get(survivor)
         if arrived_ns is None:

@@ -1,4 +1,4 @@
-"""Who goes: bids that neighbors pass on with their hellos until all who matter agree on the same winners.
+"""Which UAVs go: neighbors pass bids on with their hellos until all that are concerned agree on the same winners.
 
     a task needs n UAVs; of the bids known for it, the n with the earliest times of arrival win, ties to the lower id
 
@@ -15,7 +15,7 @@ from fanet_mw.units import NodeId, S
 from fanet_mw.wire.search import MOST_BIDS, WITHDRAWN, Bid
 
 _FORGOTTEN_NS: Final = 15 * S
-"""A bid that its bidder has not stood by for so long counts no more."""
+"""A bid that its bidder has not confirmed for so long counts no more."""
 _OLDEST_S: Final = 255
 
 
@@ -26,7 +26,7 @@ class _Known(NamedTuple):
 
 
 class Auction:
-    """What one node knows of all bids."""
+    """The bids that one node knows, its own and those of others."""
 
     def __init__(self, node: NodeId) -> None:
         self._node = node
@@ -34,17 +34,17 @@ class Auction:
         self._serial = 0
 
     def bid(self, survivor: int, *, eta_s: float, now_ns: int) -> None:
-        """Place our bid, in place of an earlier one."""
+        """Make a bid of this node, in place of an earlier one."""
         self._place(survivor, max(0, min(WITHDRAWN - 1, round(10 * eta_s))), now_ns)
 
     def withdraw(self, survivor: int, *, now_ns: int) -> None:
-        """Take our bid back, if there is one."""
+        """Take the bid of this node back, if there is one."""
         mine = self._bids.get(survivor, {}).get(self._node)
         if mine is not None and mine.eta_ds != WITHDRAWN:
             self._place(survivor, WITHDRAWN, now_ns)
 
     def merge(self, bids: Iterable[Bid], *, now_ns: int) -> None:
-        """What another node knows. Our own bids we know best, unless we have started anew since."""
+        """Take in the bids that another node knows. A node knows its own best, unless it has started anew since."""
         for bid in bids:
             stood_ns = now_ns - bid.age_s * S
             if stood_ns < now_ns - _FORGOTTEN_NS:
@@ -57,11 +57,11 @@ class Auction:
                 of_task[bid.bidder] = _Known(bid.eta_ds, bid.serial, stood_ns)
 
     def close(self, survivor: int) -> None:
-        """The task is done."""
+        """Forget the bids for a task that is done."""
         self._bids.pop(survivor, None)
 
     def has_bid(self, survivor: int) -> bool:
-        """Whether our own bid stands."""
+        """True while this node has a bid for a task."""
         mine = self._bids.get(survivor, {}).get(self._node)
         return mine is not None and mine.eta_ds != WITHDRAWN
 
@@ -75,7 +75,7 @@ class Auction:
         return [bidder for _, bidder in sorted(standing)[:count]]
 
     def would_win(self, survivor: int, *, eta_s: float, count: int, now_ns: int) -> bool:
-        """Whether a bid of ours would be among the best."""
+        """True if a bid of this node would be among the best."""
         before = self.winners(survivor, count=count, now_ns=now_ns)
         if len(before) < count:
             return True
@@ -83,7 +83,7 @@ class Auction:
         return (round(10 * eta_s), self._node) < (self._bids[survivor][worst].eta_ds, worst)
 
     def told(self, tasks: Iterable[int], *, now_ns: int) -> list[Bid]:
-        """The bids to pass on: our own first, then the best of each open task, as many as one message holds."""
+        """The bids to pass on: the node's own first, then the best of each open task, as many as one message holds."""
         own: list[Bid] = []
         others: list[tuple[int, Bid]] = []
         for survivor in tasks:
@@ -104,5 +104,5 @@ class Auction:
         self._bids.setdefault(survivor, {})[self._node] = _Known(eta_ds, self._serial, now_ns)
 
     def _counts(self, bidder: int, known: _Known, now_ns: int) -> bool:
-        """True for a bid that is ours or that its bidder has stood by lately."""
+        """True for a bid of this node, or one that its bidder has confirmed lately."""
         return bidder == self._node or now_ns - known.stood_ns <= _FORGOTTEN_NS

@@ -1,48 +1,68 @@
-"""Measured tables of planned searches in difficult places. Each run costs a minute or so; more seeds take longer."""
+"""Measured tables of planned searches: in difficult places, and how near UAVs come to each other.
 
+A mission costs a minute of CPU or more, so those that were flown are kept (`kept.py`) and the tables made of them.
+`python -m tests.tables.missions --seconds 600 places` flies as many that are still missing as fit into ten minutes.
+"""
+
+import argparse
 import statistics
+import time
 from collections.abc import Iterator, Mapping, Sequence
-from typing import Any, Final, NamedTuple
+from typing import Final, NamedTuple
 
 import numpy as np
 
+from fanet_mw.scenario import Scenario
 from fanet_mw.trace import Collided, FlightModeChanged, Posed, Record
 from fanet_mw.units import S
 from sim.results.files import finish
 from sim.run.virtual import simulate
 from sim.scenarios import catalog
+from tests.tables.kept import KEPT, Kept, OutOfTime, Run
 from tests.tables.markdown import Rows
 
 _NEAR_M: Final = (10.0, 20.0, 50.0)
+_TWENTY: Final = tuple(range(1, 21))
 
 
 class Case(NamedTuple):
-    """A scenario with some keys, and the seeds with which it was measured."""
+    """A scenario with some keys, and the seeds with which it is measured."""
 
     scenario: str
     settings: tuple[str, ...]
     seeds: tuple[int, ...]
 
+    def with_seed(self, seed: int) -> Scenario:
+        return catalog.find(self.scenario, [*self.settings, f"seed={seed}"])
+
 
 PLACES: Final[Mapping[str, Case]] = {
-    "`town`": Case("town", (), (1, 2, 3, 9, 10, 11)),
-    "`town`, batteries of 18 to 60 % at first": Case("town", ("sensors.battery_hz=1", "world.charge=[0.18,0.6]"), (1,)),
+    "`town`": Case("town", (), _TWENTY),
+    "`rescue`": Case("rescue", (), _TWENTY),
+    "`hills`": Case("hills", (), _TWENTY),
+    "`night`": Case("night", (), _TWENTY),
+    "`town`, batteries of 18 to 60 % at first": Case(
+        "town", ("sensors.battery_hz=1", "world.charge=[0.18,0.6]"), (1, 2, 3)
+    ),
 }
 CLEAR: Final[Mapping[str, Case]] = {
-    "hellos of neighbors and radar": Case("town", (), (1,)),
-    "radar alone": Case("town", ('mission.avoid_by=["radar"]',), (1,)),
-    "neither": Case("town", ("mission.avoid_by=[]",), (1,)),
+    "hellos of neighbors and radar": Case("town", (), (1, 2, 3, 4, 5)),
+    "radar alone": Case("town", ('mission.avoid_by=["radar"]',), (1, 2, 3, 4, 5)),
+    "neither": Case("town", ("mission.avoid_by=[]",), (1, 2, 3, 4, 5)),
 }
-Run = Mapping[str, Any]
 
 
-def run(case: Case, seed: int) -> Run:
-    """What one run came to."""
-    outcome = simulate(catalog.find(case.scenario, [*case.settings, f"seed={seed}"]))
+def fly(scenario: Scenario) -> Run:
+    """What one mission comes to."""
+    began_s = time.process_time()
+    outcome = simulate(scenario)
     world, records = outcome.reports["world"], outcome.records
+    summary = finish(outcome, out=None)
     nearest = np.concatenate(list(_nearest_m(records)))
     return {
-        **finish(outcome, out=None)["mission"],
+        **summary["mission"],
+        "pdr": summary["pdr"],
+        "reports": summary.get("reports", {}).get("pdr"),
         "solid": sum(1 for record in records if type(record) is Collided and not record.other),
         "no_fly": world["no_fly_entries"],
         "least_m": world["separation"].get("least_m"),
@@ -50,7 +70,14 @@ def run(case: Case, seed: int) -> Run:
         "near": [float((nearest <= limit).mean()) for limit in _NEAR_M],
         "landed": len({r.node for r in records if type(r) is FlightModeChanged and r.mode == "land"}),
         "fell": len({r.node for r in records if type(r) is FlightModeChanged and r.mode == "fallen"}),
+        "simulated_s": summary["simulated_s"],
+        "cpu_s": time.process_time() - began_s,
     }
+
+
+def flown(case: Case, kept: Kept) -> list[Run]:
+    """What the missions of a case came to, seed by seed."""
+    return [kept.of(case.with_seed(seed)) for seed in case.seeds]
 
 
 def _nearest_m(records: Sequence[Record]) -> Iterator[np.ndarray]:
@@ -111,11 +138,38 @@ def clear_row(name: str, runs: Sequence[Run]) -> list[str]:
     ]
 
 
-def places() -> Rows:
-    """Searches in a town, and with weak batteries."""
-    return [PLACES_HEAD, *(places_row(n, [run(c, seed) for seed in c.seeds]) for n, c in PLACES.items())]
+def places(kept: Kept | None = None) -> Rows:
+    """Searches over open ground, in a town, over hills, by night, and with weak batteries."""
+    kept = kept or Kept(KEPT, fly)
+    return [PLACES_HEAD, *(places_row(name, flown(case, kept)) for name, case in PLACES.items())]
 
 
-def keeping_clear() -> Rows:
+def keeping_clear(kept: Kept | None = None) -> Rows:
     """How near UAVs come to each other in a town, with and without what the network delivers."""
-    return [CLEAR_HEAD, *(clear_row(n, [run(c, seed) for seed in c.seeds]) for n, c in CLEAR.items())]
+    kept = kept or Kept(KEPT, fly)
+    return [CLEAR_HEAD, *(clear_row(name, flown(case, kept)) for name, case in CLEAR.items())]
+
+
+def main() -> None:
+    parser = argparse.ArgumentParser(description=__doc__, formatter_class=argparse.RawDescriptionHelpFormatter)
+    parser.add_argument("tables", nargs="+", choices=["places", "keeping-clear"])
+    parser.add_argument("--seconds", type=float, help="begin no mission that would end later; default: fly all")
+    parser.add_argument("--only", help="only cases whose name has this in it")
+    asked = parser.parse_args()
+    kept = Kept(KEPT, fly, seconds=asked.seconds)
+    cases = {"places": PLACES, "keeping-clear": CLEAR}
+    for name, case in ((n, c) for table in asked.tables for n, c in cases[table].items() if (asked.only or "") in n):
+        for seed in case.seeds:
+            try:
+                found = kept.of(case.with_seed(seed))
+            except OutOfTime:
+                return
+            print(
+                f"{name}, seed {seed}: {found['confirmed']} of {found['survivors']} confirmed, "
+                f"{found['collisions']} contacts, {found['simulated_s'] / found['cpu_s']:.1f} x real time",
+                flush=True,
+            )
+
+
+if __name__ == "__main__":
+    main()

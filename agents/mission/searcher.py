@@ -28,6 +28,7 @@ from agents.mission.formation.formation_place import FormationPlace
 from agents.mission.formation.formation_planner import FormationPlanner
 from agents.mission.formation.pattern import Pattern, fitted
 from agents.mission.formation.plan_exchange import PlanExchange
+from agents.mission.formation.shape import Demands, ShapeName
 from agents.mission.mode_record import ModeRecord
 from agents.mission.navigation.known_obstacles import KnownObstacles
 from agents.mission.navigation.navigation import Navigation
@@ -41,9 +42,9 @@ from fanet_mw.bus.messages import Echo
 from fanet_mw.motion import Motion
 from fanet_mw.rng import stream
 from fanet_mw.scenario import Scenario
-from fanet_mw.units import MAX_NODES, Enu, NodeId, S
+from fanet_mw.units import Enu, NodeId, S
 from fanet_mw.wire.inner import Survivor
-from fanet_mw.wire.search import Bids, Found, Search, SearchStatus, Told, encode_bids
+from fanet_mw.wire.search import MOST_PLACES, Bids, Found, Search, SearchStatus, Told, encode_bids
 
 _OFFSET_DB: Final = 1.0
 """The standard deviation by which the power of one phone is taken to differ from that of another."""
@@ -224,19 +225,21 @@ def phone_model(scenario: Scenario) -> PhoneModel:
 
 def formation(scenario: Scenario, count: int) -> Pattern | None:
     """The formation in which so many UAVs search the area of a scenario; None when they are too few."""
-    return fitted(
-        count,
+    demands = Demands(
         area_m=scenario.world.area_m,
         seen_m=_ground_range_m(phone_model(scenario), scenario.nodes.altitude_m),
         reach_m=scenario.radio.range_m,
         height_m=scenario.nodes.altitude_m,
         speed_m_s=scenario.mobility.speed_m_s,
     )
+    search = scenario.mission.search
+    shape = ShapeName.LINES if search == "none" else ShapeName[search.upper()]
+    return fitted(count, demands, shape=shape, sectors_wanted=scenario.clusters.count)
 
 
-def least_nodes(scenario: Scenario) -> int:
-    """How many UAVs the search in lines needs in the area of a scenario."""
-    return next(count for count in range(1, MAX_NODES + 1) if formation(scenario, count) is not None)
+def least_nodes(scenario: Scenario) -> int | None:
+    """How many UAVs a planned search needs in the area of a scenario; None when no plan can name so many."""
+    return next((count for count in range(1, MOST_PLACES + 1) if formation(scenario, count) is not None), None)
 
 
 def _ground_range_m(model: PhoneModel, height_m: float) -> float:

@@ -363,10 +363,12 @@ class Mission(Section):
     """Share of the survivors that lie under rubble (`sensors.burial_phone_db`, `sensors.burial_voice_db`)."""
     reports_to_approach: Count = 3
     """A UAV approaches when this many different nodes have reported the same survivor (paper, 4.1)."""
-    search: Literal["none", "lines"] = "none"
-    """`lines`: UAVs search by a plan that one of them makes and hands out over the air, in two lines abreast that part
-    from the middle of the area; of those who find, `responders` go. `none`: the paper's rule, by which everyone goes
-    who has heard enough reports."""
+    search: Literal["none", "lines", "spiral", "sectors"] = "none"
+    """UAVs search by a plan that one of them makes and hands out over the air; of those who find, `responders` go.
+    `lines`: two lines abreast part from the middle of the area, with a chain between them. `spiral`: arms abreast turn
+    about the middle, or a single one winds outward; any number of UAVs will do. `sectors`: a team abreast for each of
+    `clusters.count` sectors, not held together. `none`: the paper's rule, by which everyone goes who has heard enough
+    reports."""
     avoid_by: tuple[Literal["hellos", "radar"], ...] = ("hellos", "radar")
     """`search`: from what UAVs know whom to keep clear of: the positions in the hellos of others, their own radar."""
     reserve_charge: Annotated[float, Field(ge=0, le=1)] = 0.15

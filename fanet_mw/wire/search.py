@@ -25,13 +25,18 @@ from fanet_mw.wire.frame import (
 )
 from fanet_mw.wire.inner import FARTHEST_M, MOST_SURVIVORS, Survivor
 
-MOST_PLACES: Final = 80
+MOST_PLACES: Final = 79
 """Places of a formation that one message can hand out."""
 MOST_BIDS: Final = 12
 """Bids of one message."""
 WITHDRAWN: Final = 0xFFFF
 """The time of arrival of a bid that is taken back."""
 _MOST_VARIANCE_M2: Final = 1e10
+_LINES: Final = 0
+_SPIRAL: Final = 1
+_LAST_SHAPE: Final = 2
+_LEAST_M: Final = 1.0
+"""Lengths of a formation that may not vanish are at least this."""
 _FASTEST_M_S: Final = 1000.0
 
 
@@ -57,6 +62,9 @@ class Search(NamedTuple):
     lanes: int
     relays: int
     followers: int
+    shape: int = 0
+    """0: lines, 1: spiral, 2: sectors."""
+    teams: int = 2
 
     def encode_frame(self, node: int) -> bytes:
         if len(self.nodes) > MOST_PLACES:
@@ -72,11 +80,16 @@ class Search(NamedTuple):
     @classmethod
     def checked(cls, fields: tuple[Any, ...]) -> Self:
         """The plan of these fields; raises MalformedFrameError."""
-        lanes, relays, followers, version = fields[-4:]
-        places = 2 * lanes + relays + followers
-        _refuse_unless(version == VERSION and lanes >= 2 and places <= MOST_PLACES, f"a plan of {places} places")
+        lanes, relays, followers, shape, teams, version = fields[-6:]
+        places = teams * lanes + relays + followers
+        in_lines = shape == _LINES and teams == 2 and lanes >= 2
+        other = _LINES < shape <= _LAST_SHAPE and teams >= 1 and lanes >= 1 and relays == 0
+        _refuse_unless(
+            version == VERSION and (in_lines or other) and places <= MOST_PLACES,
+            f"a plan of {places} places in {teams} teams, shape {shape}",
+        )
         nodes = fields[9 : 9 + places]
-        plan = cls._make((*fields[:9], nodes, lanes, relays, followers))
+        plan = cls._make((*fields[:9], nodes, lanes, relays, followers, shape, teams))
         named = [node for node in nodes if node]
         _refuse_unless(
             plan.start_us <= LATEST_US
@@ -89,7 +102,8 @@ class Search(NamedTuple):
         lengths = (plan.half_width_m, plan.first_m, plan.last_m, plan.height_m)
         _refuse_unless(
             all(0 <= length <= FARTHEST_M for length in lengths)
-            and plan.last_m - plan.first_m >= 1.0
+            and plan.last_m - plan.first_m >= (0.0 if shape == _SPIRAL else _LEAST_M)
+            and (shape == _LINES or (plan.first_m >= _LEAST_M and plan.half_width_m >= _LEAST_M))
             and 0.1 <= plan.speed_m_s <= _FASTEST_M_S,
             f"a formation of {lengths} m at {plan.speed_m_s} m/s",
         )

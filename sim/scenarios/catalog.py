@@ -5,6 +5,7 @@ from pathlib import Path
 
 from fanet_mw.errors import ConfigError
 from fanet_mw.scenario import Scenario, config
+from fanet_mw.wire.search import MOST_PLACES
 from sim.scenarios.shipped import Entry, entry, shipped
 
 __all__ = ["Entry", "find", "shipped", "text_of"]
@@ -20,15 +21,18 @@ def find(name: str, overrides: Iterable[str] = ()) -> Scenario:
 
 def _searchable(scenario: Scenario, source: str) -> Scenario:
     """A scenario whose UAVs are enough for the search that it asks for; raises ConfigError otherwise."""
-    if scenario.mission.search != "lines":
+    search = scenario.mission.search
+    if search == "none":
         return scenario
     from agents.mission.searcher import formation, least_nodes
 
     count, area_m = scenario.nodes.count, scenario.world.area_m
     if formation(scenario, count) is None:
+        least = least_nodes(scenario)
         raise ConfigError(
-            f"{source}: nodes.count = {count}: mission.search = 'lines' over world.area_m = {area_m:g} needs at least "
-            f"{least_nodes(scenario)} UAVs with radio.range_m = {scenario.radio.range_m:g}"
+            f"{source}: nodes.count = {count}: mission.search = {search!r} over world.area_m = {area_m:g} needs "
+            f"{f'more than {MOST_PLACES}' if least is None else f'at least {least}'} UAVs with radio.range_m = "
+            f"{scenario.radio.range_m:g}{f'; a plan names at most {MOST_PLACES}' if least is None else ''}"
         )
     return scenario
 

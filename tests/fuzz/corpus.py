@@ -155,6 +155,8 @@ def _not_recorded() -> list[bytes]:
     covariance = {"east_variance_m2": 90.0, "covariance_m2": 3.0, "north_variance_m2": 40.0}
     return [
         Search(7, 100.0, 0.0, 400.0, 50.0, 10.0, 30, 1, 1, (1, 2, 3, 4, 5, 0, 7), 3, 1, 0).encode_frame(1),
+        Search(7, 500.0, 50.0, 450.0, 50.0, 10.0, 30, 1, 1, (1, 2, 3, 4, 5, 0), 5, 0, 1, 1, 1).encode_frame(1),
+        Search(7, 500.0, 10.0, 480.0, 50.0, 10.0, 30, 1, 1, (1, 2, 3, 4, 5, 0, 7), 1, 0, 3, 2, 4).encode_frame(1),
         SearchStatus(7, Enu(1.0, 2.0, 3.0), 4, 1, 80).encode_frame(4),
         encode_bids([Bid(3, 4, 200, 7), Bid(5, 6, 0xFFFF, 8, 2)], node=4),
         Found(7, 3, 10.0, 20.0, node=4, confirmed=False, **covariance).encode_frame(4),

@@ -2,7 +2,7 @@
 
 from array import array
 from collections.abc import Callable
-from typing import Final
+from typing import Any, Final
 
 import pytest
 
@@ -14,7 +14,7 @@ from fanet_mw.trace import Confirmed, Planned, Record
 from fanet_mw.units import S
 from sim.results.mission import mission
 from sim.run.outcome import Outcome
-from sim.run.virtual import actors_of
+from sim.run.virtual import actors_of, simulate
 from sim.scenarios.catalog import find
 
 KEYS: Final = (
@@ -80,6 +80,10 @@ def flown(wrap: Callable[[Actor, Topics], Actor], *, seconds: int) -> Outcome:
     return Outcome(scenario=scenario, mode="virtual", wall_s=1.0, records=records, reports=reports)
 
 
+def mission_of(outcome: Outcome) -> dict[str, Any]:
+    return mission(outcome.scenario, outcome.records)
+
+
 class Told(Around):
     """A UAV that is told what only the world knows: as it is, or turned around and far away."""
 
@@ -104,6 +108,14 @@ def test_a_whole_mission_goes_as_it_does_when_the_worlds_truth_is_poisoned_for_e
     assert poisoned.records == clean.records
     refused = [report["bus_malformed"] for name, report in poisoned.reports.items() if name.startswith("agent-")]
     assert min(refused) > 100, "every UAV was told, and took in nothing"  # type: ignore[type-var]
+
+
+def test_three_uavs_confirm_by_a_spiral_what_lines_would_need_twelve_for() -> None:
+    few = ["nodes.count=3", "clusters.count=1", "traffic.sources=2", "world.area_m=300", "mission.search=spiral"]
+    found = mission_of(simulate(find("rescue", [*KEYS, *few, "duration_s=110"])))
+    assert found["coverage"] == found["connected"] == 1.0
+    assert found["confirmed"] == found["survivors"]
+    assert not found["mistaken"] + found["collisions"]
 
 
 class Lost(Around):
@@ -137,6 +149,6 @@ def test_what_a_lost_uav_would_have_searched_is_searched_by_another() -> None:
     )
     takers = [r for r in after.records if isinstance(r, Planned) and r.place == 0 and r.node != corner]
     assert takers, "a follower was given the place"
-    found = mission(after.scenario, after.records)
+    found = mission_of(after)
     assert found["coverage"] >= 0.99
     assert found["confirmed"] == 3

@@ -3,7 +3,7 @@
 from typing import Final
 
 from agents.mission.finding.finds import Finds
-from agents.mission.formation.formation_place import FormationPlace
+from agents.mission.formation.formation_place import FormationPlace, along
 from agents.mission.navigation.navigation import Navigation
 from agents.mission.tasking.approach import Approach
 from agents.mission.tasking.bidding import FAR_M, VAGUE_M
@@ -47,7 +47,8 @@ class Goal:
             estimate = find.place() if find.filter.near(here, within_m=FAR_M) else None
             if estimate is None or estimate.sigma_m > VAGUE_M:
                 continue
-            if abs(estimate.east_m - lane.east) > 0.5 * pattern.lane_m + _SHARED_M:
+            _, aside_m = along(moves, estimate.east_m - lane.east, estimate.north_m - lane.north)
+            if abs(aside_m) > 0.5 * pattern.shape.lane_m + _SHARED_M:
                 continue
             if formation.leads_by(estimate, lane, moves):
                 candidate = estimate.distance_m(here), survivor

@@ -139,7 +139,7 @@ class InReach:
         if plan is None or pattern is None or place is None or not self._formation.is_taken_up(now_ns):
             return []
         planes = []
-        for other in pattern.tethers(place) or self._nearest(pattern.line(place), now_ns):
+        for other in pattern.shape.tethers(place) or self._nearest(pattern.line(place), now_ns):
             motion = self._neighbors.motion(plan.nodes[other], now_ns=now_ns)
             if motion is None:
                 continue

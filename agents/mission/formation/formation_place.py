@@ -89,35 +89,58 @@ class FormationPlace:
 
     def leads_by(self, estimate: Estimate | None, lane: Enu, moves: Enu) -> bool:
         """Whether a survivor is near enough to our lane to be looked at without leaving the formation."""
-        if estimate is None or abs(estimate.east_m - lane.east) > _LEASH_M + _ASIDE_M:
+        if estimate is None:
             return False
-        ahead_m = (estimate.north_m - lane.north) * (1 if moves.north >= 0 else -1)
-        return -_LAG_M <= ahead_m <= _AHEAD_M
+        ahead_m, aside_m = along(moves, estimate.east_m - lane.east, estimate.north_m - lane.north)
+        return abs(aside_m) <= _LEASH_M + _ASIDE_M and -_LAG_M <= ahead_m <= _AHEAD_M
 
     def bounded(self, east: float, north: float, lane: Enu, moves: Enu) -> tuple[Enu, Enu]:
         """The place nearest to a wanted one that our lane allows, and how it moves."""
         if self.is_free:
             return Enu(east, north, lane.up), STILL
-        east = lane.east + max(-_LEASH_M, min(_LEASH_M, east - lane.east))
-        sign = 1 if moves.north >= 0 else -1
-        behind_m = (lane.north - north) * sign
-        if behind_m <= 0:  # still ahead: the line brings us there
-            return Enu(east, lane.north, lane.up), moves
-        if behind_m > _LAG_M:
-            return Enu(east, lane.north - sign * _LAG_M, lane.up), moves
-        return Enu(east, north, lane.up), STILL
+        ahead_m, aside_m = along(moves, east - lane.east, north - lane.north)
+        aside_m = max(-_LEASH_M, min(_LEASH_M, aside_m))
+        if ahead_m >= 0:  # still ahead: the line brings us there
+            return _beside(lane, moves, 0.0, aside_m), moves
+        if ahead_m < -_LAG_M:
+            return _beside(lane, moves, -_LAG_M, aside_m), moves
+        beside = _beside(lane, moves, 0.0, aside_m)
+        return (beside._replace(east=east) if _leads_east_or_west(moves) else beside._replace(north=north)), STILL
 
     def holds_together(self, estimate: Estimate | None, now_ns: int, *, within_s: float) -> bool:
         """Whether somebody at a survivor would be in reach of our line, for some seconds from that time on."""
         plan, pattern, place = self.plan, self.pattern, self.place
         if estimate is None or plan is None or pattern is None or place is None or not self.is_taken_up(now_ns):
             return False
-        line = pattern.line_of(place)
-        at_s = (now_ns - _taken_up_ns(plan)) / S
+        shape, at_s = pattern.shape, (now_ns - _taken_up_ns(plan)) / S
+        team = shape.team_of(place)
         return all(
-            abs(estimate.north_m - pattern.line_north(line, at_s + ahead_s)) <= self._most_m
+            shape.apart_m(team, estimate.east_m, estimate.north_m, at_s + ahead_s) <= self._most_m
             for ahead_s in (within_s, within_s + 5.0)
         )
+
+
+def along(moves: Enu, east_m: float, north_m: float) -> tuple[float, float]:
+    """An offset as metres ahead and to the right of a lane, which leads the way it moves: north while it stands.
+
+    Lanes lead along the axes but for a few degrees.
+    """
+    if _leads_east_or_west(moves):
+        return (east_m, -north_m) if moves.east > 0 else (-east_m, north_m)
+    return (north_m, east_m) if moves.north >= 0 else (-north_m, -east_m)
+
+
+def _leads_east_or_west(moves: Enu) -> bool:
+    return abs(moves.east) > abs(moves.north)
+
+
+def _beside(lane: Enu, moves: Enu, ahead_m: float, aside_m: float) -> Enu:
+    """The place so far ahead and to the right of a lane."""
+    if _leads_east_or_west(moves):
+        sign = 1 if moves.east > 0 else -1
+        return Enu(lane.east + sign * ahead_m, lane.north - sign * aside_m, lane.up)
+    sign = 1 if moves.north >= 0 else -1
+    return Enu(lane.east + sign * aside_m, lane.north + sign * ahead_m, lane.up)
 
 
 def _taken_up_ns(plan: Search) -> int:

@@ -13,6 +13,7 @@ same instants then do not cross, and UAVs that were near each other stay so.
 from typing import Final, NamedTuple
 
 from agents.mission.formation.pattern import Pattern
+from agents.mission.formation.shape import Dimensions, ShapeName
 from agents.mission.hungarian import assign
 from fanet_mw.units import US, Enu, NodeId, S
 from fanet_mw.wire.search import Search, SearchStatus
@@ -133,11 +134,13 @@ class FormationPlanner:
             holders[place] = node
         holders = _filled(holders, pattern)
         farthest_m = max(costs[row][place] for row, place in enumerate(chosen)) ** 0.5
-        return Search(
-            (now_ns + _NOTICE_NS) // US, pattern.half_width_m, pattern.first_m, pattern.last_m, pattern.height_m,
-            pattern.speed_m_s, round(10 * max(1.0, farthest_m / self._deploy_speed)), 1, self._node, tuple(holders),
-            pattern.lanes, pattern.relays, pattern.followers,
-        )  # fmt: skip
+        return plan_of(
+            pattern,
+            tuple(holders),
+            planner=self._node,
+            start_us=(now_ns + _NOTICE_NS) // US,
+            deploy_ds=round(10 * max(1.0, farthest_m / self._deploy_speed)),
+        )
 
     def _mended(self, plan: Search, now_ns: int) -> Search | None:
         """The plan without those who are lost and with those who are new; None when nothing changed."""
@@ -159,26 +162,33 @@ class FormationPlanner:
         return plan._replace(revision=plan.revision + 1, planner=self._node, nodes=tuple(holders))
 
 
+def plan_of(pattern: Pattern, nodes: tuple[int, ...], *, planner: int, start_us: int, deploy_ds: int) -> Search:
+    """The first plan that hands a formation out to these nodes, place by place."""
+    made = pattern.dimensions
+    return Search(
+        start_us, made.half_width_m, made.first_m, made.last_m, made.height_m, made.speed_m_s, deploy_ds, 1, planner,
+        nodes, made.lanes, made.relays, made.followers, made.shape, made.teams,
+    )  # fmt: skip
+
+
 def pattern_of(plan: Search) -> Pattern:
     """The formation that a plan names."""
     return Pattern(
-        plan.lanes, plan.relays, plan.followers, plan.half_width_m, plan.first_m, plan.last_m, plan.height_m,
-        plan.speed_m_s,
+        Dimensions(
+            plan.lanes, plan.relays, plan.followers, plan.half_width_m, plan.first_m, plan.last_m, plan.height_m,
+            plan.speed_m_s, ShapeName(plan.shape), plan.teams,
+        )
     )  # fmt: skip
 
 
 def _filled(holders: list[int], pattern: Pattern) -> list[int]:
-    """Vacant places of lines and chain go to the nearest followers."""
+    """Vacant places that sweep the area or hold the swarm together go to the nearest followers."""
     filled = list(holders)
-    for place in range(2 * pattern.lanes + pattern.relays):
+    for place in range(pattern.dimensions.fixed):
         if filled[place]:
             continue
         goal = pattern.at(place, 0.0)
-        spare = [
-            (_distance2(pattern.at(other, 0.0), goal), other)
-            for other in range(2 * pattern.lanes + pattern.relays, pattern.places)
-            if filled[other]
-        ]
+        spare = [(_distance2(pattern.at(other, 0.0), goal), other) for other in pattern.followers if filled[other]]
         if spare:
             _, other = min(spare)
             filled[place], filled[other] = filled[other], 0

@@ -10,7 +10,7 @@ from collections.abc import Iterable
 from typing import Final
 
 from agents.mission.finding.finds import Find, Finds
-from agents.mission.formation.formation_place import FormationPlace
+from agents.mission.formation.formation_place import FormationPlace, along
 from agents.mission.navigation.navigation import Navigation
 from agents.mission.outbox import Outbox
 from agents.mission.tasking.approach import Approach
@@ -171,5 +171,5 @@ class Bidding:
         lane, moves = formation.lane(now_ns)
         if not formation.is_taken_up(now_ns) or not formation.leads_by(place, lane, moves):
             return None
-        ahead_m = abs(place.north_m - here.north) if moves.norm() else 0.0
-        return max(eta_s, ahead_m / self._cruise_m_s)
+        ahead_m, _ = along(moves, place.east_m - here.east, place.north_m - here.north)
+        return max(eta_s, abs(ahead_m) / self._cruise_m_s) if moves.norm() else eta_s

@@ -110,3 +110,11 @@ def test_a_search_in_lines_by_too_few_uavs_is_refused_with_the_number_that_it_ne
     assert catalog.find("rescue", [f"nodes.count={least}", f"traffic.sources={least - 1}"]).nodes.count == least
     with pytest.raises(ConfigError, match="needs at least"):
         catalog.find("rescue", [f"nodes.count={least - 1}", f"traffic.sources={least - 2}"])
+
+
+def test_an_area_that_no_plan_can_name_enough_uavs_for_is_refused_and_a_spiral_searches_it_with_any() -> None:
+    wide = ["nodes.count=45", "world.area_m=9000"]
+    for search in ("lines", "sectors"):
+        with pytest.raises(ConfigError, match=r"needs more than 79 UAVs .* a plan names at most 79"):
+            catalog.find("rescue", [*wide, f"mission.search={search}"])
+    assert catalog.find("rescue", [*wide, "mission.search=spiral"]).mission.search == "spiral"

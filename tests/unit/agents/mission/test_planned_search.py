@@ -12,6 +12,7 @@ from agents.mission.finding.phone_filter import REFERENCE_LOSS_DB, PhoneFilter, 
 from agents.mission.flight.constraints import avoiding, staying_near
 from agents.mission.formation.formation_planner import FormationPlanner
 from agents.mission.formation.pattern import Pattern, fitted
+from agents.mission.formation.shape import Demands
 from agents.mission.hungarian import assign
 from agents.mission.navigation.half_planes import HalfPlane, nearest
 from agents.mission.tasking.auction import Auction
@@ -20,10 +21,11 @@ from fanet_mw.wire.search import WITHDRAWN, Bid, Search, SearchStatus
 
 MODEL = PhoneModel(power_dbm=15, exponent=3, shadowing_db=4, offset_db=1, threshold_dbm=-90)
 REACH_M = 250.0
+DEMANDS = Demands(area_m=2500, seen_m=137, reach_m=REACH_M, height_m=50, speed_m_s=7.5)
 
 
 def formation(count: int = 45) -> Pattern:
-    made = fitted(count, area_m=2500, seen_m=137, reach_m=REACH_M, height_m=50, speed_m_s=7.5)
+    made = fitted(count, DEMANDS)
     assert made is not None
     return made
 
@@ -62,7 +64,7 @@ def is_one(places: Sequence[Enu]) -> bool:
 def test_the_formation_is_in_one_piece_during_the_whole_sweep_and_nobody_meets() -> None:
     pattern = formation()
     assert pattern.places == 45
-    for second in range(0, 2 * round(pattern.sweep_s) + 20, 2):
+    for second in range(0, 2 * round(pattern.shape.sweep_s) + 20, 2):
         places = [pattern.at(place, second) for place in range(pattern.places)]
         assert is_one(places), second
         assert min(a.minus(b).norm() for a, b in itertools.combinations(places, 2)) > 8.0
@@ -70,9 +72,9 @@ def test_the_formation_is_in_one_piece_during_the_whole_sweep_and_nobody_meets()
 
 def test_tied_places_stay_in_reach_of_each_other_once_the_chain_is_straight() -> None:
     pattern = formation()
-    for second in range(45, round(pattern.sweep_s) + 120, 5):
+    for second in range(45, round(pattern.shape.sweep_s) + 120, 5):
         for place in range(pattern.places):
-            for other in pattern.tethers(place):
+            for other in pattern.shape.tethers(place):
                 apart = pattern.at(place, second).minus(pattern.at(other, second)).norm()
                 assert apart <= 0.95 * REACH_M, (second, place, other)
 
@@ -81,15 +83,15 @@ def test_every_spot_of_the_area_comes_within_range_of_a_lane() -> None:
     pattern = formation()
     tracks = [
         pattern.at(place, 0.5 * step)
-        for place in range(2 * pattern.lanes)
-        for step in range(0, 2 * round(pattern.sweep_s) + 1, 8)
+        for place in range(2 * pattern.dimensions.lanes)
+        for step in range(0, 2 * round(pattern.shape.sweep_s) + 1, 8)
     ]
     for east, north in itertools.product(range(-1240, 1250, 155), repeat=2):
         assert any(math.hypot(track.east - east, track.north - north) <= 137 for track in tracks), (east, north)
 
 
 def test_too_few_have_no_formation() -> None:
-    assert fitted(20, area_m=2500, seen_m=137, reach_m=REACH_M, height_m=50, speed_m_s=7.5) is None
+    assert fitted(20, DEMANDS) is None
 
 
 # --- the plan -----------------------------------------------------------------------------------------------------
@@ -132,7 +134,7 @@ def test_the_place_of_a_lost_uav_in_a_line_goes_to_a_follower() -> None:
     assert after is not None
     assert lost not in after.nodes
     assert after.revision == before.revision + 1
-    assert after.nodes[3] in before.nodes[-pattern.followers :]
+    assert after.nodes[3] in before.nodes[pattern.followers.start :]
 
 
 def test_only_the_lowest_id_that_is_alive_plans() -> None:
@@ -151,7 +153,7 @@ def test_who_flies_home_holds_no_place_any_more_from_when_it_says_so() -> None:
     after = planner.plan
     assert after is not None
     assert leaver not in after.nodes
-    assert after.nodes[3] in before.nodes[-pattern.followers :]
+    assert after.nodes[3] in before.nodes[pattern.followers.start :]
 
 
 def test_a_planner_that_flies_home_leaves_planning_to_the_next() -> None:

@@ -10,7 +10,9 @@ from agents.mission.finding.phone_filter import REFERENCE_LOSS_DB, Estimate, Pho
 from agents.mission.flight.goal import Goal
 from agents.mission.flight.velocity_choice import ClearOfOthers, InReach, VelocityChoice
 from agents.mission.formation.formation_place import FormationPlace
+from agents.mission.formation.formation_planner import plan_of
 from agents.mission.formation.pattern import fitted
+from agents.mission.formation.shape import Demands
 from agents.mission.navigation.half_planes import HalfPlane
 from agents.mission.navigation.known_obstacles import KnownObstacles
 from agents.mission.navigation.navigation import Navigation
@@ -36,12 +38,9 @@ SCENARIO = config.build(
 
 
 def a_plan() -> Search:
-    pattern = fitted(COUNT, area_m=2500, seen_m=131, reach_m=REACH_M, height_m=UP_M, speed_m_s=7.5)
+    pattern = fitted(COUNT, Demands(area_m=2500, seen_m=131, reach_m=REACH_M, height_m=UP_M, speed_m_s=7.5))
     assert pattern is not None
-    return Search(
-        10_000_000, pattern.half_width_m, pattern.first_m, pattern.last_m, UP_M, 7.5, 500, 1, 1,
-        tuple(range(1, COUNT + 1)), pattern.lanes, pattern.relays, pattern.followers,
-    )  # fmt: skip
+    return plan_of(pattern, tuple(range(1, COUNT + 1)), planner=1, start_us=10_000_000, deploy_ds=500)
 
 
 OPEN = KnownObstacles(NO_MAP)

@@ -5,6 +5,7 @@ from collections.abc import Callable, Sequence
 
 import pytest
 
+from agents.mission.formation.formation_planner import plan_of
 from agents.mission.navigation.onboard_map import NO_MAP, OnboardMap
 from agents.mission.outbox import Outbox
 from agents.mission.searcher import Searcher, formation
@@ -15,7 +16,7 @@ from fanet_mw.trace import Confirmed, MissionModeChanged, Sighted
 from fanet_mw.units import MS, US, Enu, NodeId, S
 from fanet_mw.wire import HEADER_BYTES
 from fanet_mw.wire.inner import Survivor
-from fanet_mw.wire.search import Bid, Bids, Search, SearchStatus, Told, told_in
+from fanet_mw.wire.search import Bid, Bids, SearchStatus, Told, told_in
 
 HOME = Enu(0.0, -100.0, 65.0)
 STILL = Enu(0.0, 0.0, 0.0)
@@ -46,10 +47,7 @@ class Flight:
         self.at, self.now_ns = home, 0
         pattern = formation(scenario, 20)
         assert pattern is not None
-        self.plan = Search(
-            S // US, pattern.half_width_m, pattern.first_m, pattern.last_m, 65.0, 7.5, 100, 1, 1,
-            tuple(range(1, 21)), pattern.lanes, pattern.relays, pattern.followers,
-        )  # fmt: skip
+        self.plan = plan_of(pattern, tuple(range(1, 21)), planner=1, start_us=S // US, deploy_ds=100)
         if planned:
             self.searcher.told(self.plan, now_ns=0)
 

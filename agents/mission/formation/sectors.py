@@ -1,0 +1,99 @@
+"""The area in sectors, each swept by a team abreast from the side that is nearest to the middle.
+
++-------+-------+     sectors lie in rows; a team spans its own and sweeps it outward and back
+| o-o-o | o-o-o |     teams of a row move in step, side by side, and stay one piece; the rows part from each other
+|  ^    |  ^    |     and meet again in the middle
++-------+-------+
+|  v    |  v    |     nobody is needed for relays between the rows: those UAVs follow their teams, free for finds
+| o-o-o | o-o-o |
++-------+-------+
+"""
+
+import math
+
+from agents.mission.formation.shape import (
+    EDGE_M,
+    FIRST_M,
+    FOLLOW_M,
+    FOLLOWER_HIGHER_M,
+    Demands,
+    Dimensions,
+    ShapeName,
+    swept_m,
+)
+from fanet_mw.units import Enu
+
+
+class Sectors:
+    """The teams of one search by sectors."""
+
+    def __init__(self, formation: Dimensions) -> None:
+        self._formation = formation
+        rows, columns = rows_of(formation.teams), formation.teams // rows_of(formation.teams)
+        self._rows, self._columns = rows, columns
+        self._width_m = 2 * formation.half_width_m / columns
+        self._depth_m = 2 * formation.half_width_m / rows
+
+    @property
+    def lane_m(self) -> float:
+        return self._width_m / self._formation.lanes
+
+    @property
+    def sweep_s(self) -> float:
+        return (self._formation.last_m - self._formation.first_m) / self._formation.speed_m_s
+
+    def at(self, place: int, swept_s: float) -> Enu:
+        formation = self._formation
+        if place < formation.fixed:
+            team, lane = divmod(place, formation.lanes)
+            share = (lane + 0.5) / formation.lanes
+            return self._at(team, share, swept_m(formation, swept_s), formation.height_m)
+        team, share = formation.follower(place)
+        behind_m = max(swept_m(formation, swept_s) - FOLLOW_M, formation.first_m * 0.5)
+        return self._at(team, share, behind_m, formation.height_m + FOLLOWER_HIGHER_M)
+
+    def _at(self, team: int, share: float, along_m: float, up_m: float) -> Enu:
+        row, column = divmod(team, self._columns)
+        half = self._formation.half_width_m
+        southern, east = -half + row * self._depth_m, -half + (column + share) * self._width_m
+        outward_is_north = 2 * row + 1 >= self._rows
+        return Enu(east, southern + along_m if outward_is_north else southern + self._depth_m - along_m, up_m)
+
+    def tethers(self, place: int) -> tuple[int, ...]:
+        formation = self._formation
+        if place >= formation.fixed:
+            return ()
+        team, lane = divmod(place, formation.lanes)
+        column = team % self._columns
+        found = [place - 1] if lane > 0 or column > 0 else []
+        found += [place + 1] if lane < formation.lanes - 1 or column < self._columns - 1 else []
+        return tuple(found)
+
+    def team_of(self, place: int) -> int:
+        formation = self._formation
+        return place // formation.lanes if place < formation.fixed else formation.follower(place)[0]
+
+    def apart_m(self, team: int, east_m: float, north_m: float, swept_s: float) -> float:
+        lanes = self._formation.lanes
+        places = (self.at(team * lanes + lane, swept_s) for lane in range(lanes))
+        return min(math.hypot(place.east - east_m, place.north - north_m) for place in places)
+
+
+def rows_of(teams: int) -> int:
+    """The rows in which so many sectors lie: as many as columns, or the nearest fewer that leave no sector over."""
+    return next(rows for rows in range(math.isqrt(teams), 0, -1) if teams % rows == 0)
+
+
+def fitted(count: int, teams: int, demands: Demands) -> Dimensions | None:
+    """A team abreast for each of so many sectors of a square area; None when the UAVs are too few for that."""
+    rows = rows_of(teams)
+    depth_m, width_m = demands.area_m / rows, demands.area_m * rows / teams
+    lanes = math.ceil(width_m / demands.apart_m(demands.reach_m))
+    followers = count - teams * lanes
+    if followers < 0:
+        return None
+    last_m = depth_m - min(EDGE_M, depth_m / 4)
+    return Dimensions(
+        lanes, 0, followers, demands.area_m / 2, min(FIRST_M, last_m / 2), last_m, demands.height_m, demands.speed_m_s,
+        ShapeName.SECTORS, teams,
+    )  # fmt: skip

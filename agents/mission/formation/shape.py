@@ -1,0 +1,136 @@
+"""What a search formation is: how many places of which kind, and the contract of the shapes in which it is flown.
+
+    lines      two lines abreast part from the middle of the area; a chain between them keeps the swarm in one piece
+    spiral     arms abreast turn about the middle, or one arm winds outward from it; any number of UAVs will do
+    sectors    a team for each sector, abreast; more UAVs are free for finds, but the swarm comes apart
+
+In all of them places of teams come first (team 0 lane by lane, team 1, ...), then relays, then followers. Every place
+moves in straight pieces without jumps. Pure geometry: metres, seconds.
+"""
+
+from enum import IntEnum
+from typing import Final, NamedTuple, Protocol
+
+from fanet_mw.units import Enu
+
+FOLLOWER_HIGHER_M: Final = 12.0
+"""Places of different kinds fly at heights of their own, so that a follower may cross a line."""
+FOLLOW_M: Final = 110.0
+"""How far behind its line a follower flies."""
+_WIDE: Final = 0.9
+"""Places that are to hear each other are at most this share of the radio's reach apart."""
+_LANES: Final = 1.35
+"""The distance of two lanes as a multiple of the range of the phones' receiver."""
+EDGE_M: Final = 25.0
+"""How near to the edge of the area lines turn: a camera sees that far."""
+FIRST_M: Final = 16.0
+"""How far from the middle lines begin: apart enough not to be in each other's way, and nothing lies behind them."""
+_TURN_S: Final = 10.0
+"""How long lines stay where they turn, so that whoever has fallen behind has seen the edge of the area too."""
+_BACK: Final = 1.2
+"""The way back is flown so much faster than the sweep: where survivors are is known by then."""
+
+
+class ShapeName(IntEnum):
+    """The shapes by the numbers that they have on the air; their names are those of the key `mission.search`."""
+
+    LINES = 0
+    SPIRAL = 1
+    SECTORS = 2
+
+
+class Demands(NamedTuple):
+    """What a formation has to do: sweep a square area, in reach of each other."""
+
+    area_m: float
+    seen_m: float
+    """How far to the side, on the ground, a UAV in its lane finds a phone."""
+    reach_m: float
+    """Of the radio."""
+    height_m: float
+    speed_m_s: float
+
+    def apart_m(self, reach_m: float) -> float:
+        """How far apart lanes are at most, if neighbors hear each other from so far."""
+        return min(_WIDE * reach_m, _LANES * self.seen_m)
+
+    @property
+    def hop_m(self) -> float:
+        """How far apart two places are at most that pass on what the swarm says."""
+        return _WIDE * self.reach_m
+
+
+class Dimensions(NamedTuple):
+    """A formation in numbers, as the plan hands it out."""
+
+    lanes: int
+    """Places of each team."""
+    relays: int
+    followers: int
+    half_width_m: float
+    """Lines: the outermost lanes are this far from the middle. Others: half the width of the area."""
+    first_m: float
+    """How far from where it begins each line is at first; of a spiral, the innermost lane from the middle."""
+    last_m: float
+    """How far it is when the sweep turns; of a spiral, the outermost lane."""
+    height_m: float
+    speed_m_s: float
+    shape: ShapeName = ShapeName.LINES
+    teams: int = 2
+
+    @property
+    def fixed(self) -> int:
+        """How many places sweep the area and hold the swarm together: all but the followers."""
+        return self.teams * self.lanes + self.relays
+
+    @property
+    def places(self) -> int:
+        return self.fixed + self.followers
+
+    def follower(self, place: int) -> tuple[int, float]:
+        """The team of a follower, and where it flies along its line, from 0 to 1; each line is divided evenly."""
+        which = place - self.fixed
+        team = which % self.teams
+        of_team = (self.followers + self.teams - 1 - team) // self.teams
+        return team, (which // self.teams + 0.5) / of_team
+
+
+class Shape(Protocol):
+    """Where the places of one formation are."""
+
+    @property
+    def sweep_s(self) -> float:
+        """From the beginning of a sweep to its turn."""
+        ...
+
+    @property
+    def lane_m(self) -> float:
+        """The distance of two lanes."""
+        ...
+
+    def at(self, place: int, swept_s: float) -> Enu:
+        """Where a place is when the sweep has lasted so long; before 0 it is where the sweep begins."""
+        ...
+
+    def tethers(self, place: int) -> tuple[int, ...]:
+        """The places that this one must stay in reach of, so that the formation holds together; none for a follower."""
+        ...
+
+    def team_of(self, place: int) -> int:
+        """The team that a place belongs to; of a relay, the nearer one."""
+        ...
+
+    def apart_m(self, team: int, east_m: float, north_m: float, swept_s: float) -> float:
+        """How far a spot is from the line of a team then."""
+        ...
+
+
+def swept_m(formation: Dimensions, swept_s: float) -> float:
+    """How far a line is from where it begins: out at the speed of the sweep, back faster, again and again."""
+    if swept_s <= 0:
+        return formation.first_m
+    out_s = (formation.last_m - formation.first_m) / formation.speed_m_s
+    along_s = swept_s % (out_s + _TURN_S + out_s / _BACK)
+    if along_s <= out_s:
+        return formation.first_m + along_s * formation.speed_m_s
+    return formation.last_m - max(0.0, along_s - out_s - _TURN_S) * formation.speed_m_s * _BACK

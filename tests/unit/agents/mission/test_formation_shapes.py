@@ -1,0 +1,149 @@
+"""The shapes in which a search is flown: laws that hold for any number of UAVs, and what each of them promises."""
+
+import itertools
+import math
+from collections.abc import Sequence
+
+import pytest
+from hypothesis import given
+from hypothesis import strategies as st
+
+from agents.mission.formation.formation_planner import pattern_of, plan_of
+from agents.mission.formation.pattern import Pattern, fitted
+from agents.mission.formation.sectors import rows_of
+from agents.mission.formation.shape import Demands, ShapeName
+from fanet_mw.errors import MalformedFrameError
+from fanet_mw.units import Enu
+from fanet_mw.wire import HEADER_BYTES
+from fanet_mw.wire.search import MOST_PLACES, Search
+
+REACH_M, SEEN_M, SPEED_M_S = 250.0, 131.0, 7.5
+
+
+def demands(area_m: float) -> Demands:
+    return Demands(area_m=area_m, seen_m=SEEN_M, reach_m=REACH_M, height_m=65, speed_m_s=SPEED_M_S)
+
+
+def formed(shape: ShapeName, count: int = 45, area_m: float = 2500, sectors: int = 4) -> Pattern:
+    made = fitted(count, demands(area_m), shape=shape, sectors_wanted=sectors)
+    assert made is not None
+    return made
+
+
+def pieces(places: Sequence[Enu]) -> int:
+    """Into how many pieces a swarm falls whose radios reach 250 m."""
+    left, found = set(range(len(places))), 0
+    while left:
+        found, waiting = found + 1, [left.pop()]
+        while waiting:
+            here = places[waiting.pop()]
+            near = {other for other in left if places[other].minus(here).norm() <= REACH_M}
+            left -= near
+            waiting += near
+    return found
+
+
+anyone = st.builds(
+    lambda shape, count, area_m, sectors: fitted(count, demands(area_m), shape=shape, sectors_wanted=sectors),
+    st.sampled_from(ShapeName), st.integers(1, 120), st.floats(200, 3000), st.integers(1, 9),
+).filter(lambda made: made is not None)  # fmt: skip
+
+
+@given(anyone, st.floats(0, 2000))
+def test_nobody_jumps_and_whoever_sweeps_flies_no_faster_than_a_way_back(pattern: Pattern, swept_s: float) -> None:
+    for place in range(pattern.places):
+        step = pattern.at(place, swept_s + 0.1).minus(pattern.at(place, swept_s)).norm()
+        most_m_s = SPEED_M_S * (1.2 if pattern.kind(place) == "line" else 3.0)
+        assert step <= 0.1 * most_m_s + 1e-6, (place, pattern.kind(place))
+
+
+@given(anyone, st.floats(0, 2000))
+def test_neighbors_of_a_line_stay_in_reach_of_each_other(pattern: Pattern, swept_s: float) -> None:
+    for place in range(pattern.dimensions.fixed - pattern.dimensions.relays):
+        for other in set(pattern.shape.tethers(place)) & set(pattern.line(place)):
+            apart = pattern.at(place, swept_s).minus(pattern.at(other, swept_s)).norm()
+            assert apart <= 0.9 * REACH_M + 1e-6, (place, other)
+
+
+@given(anyone)
+def test_a_plan_names_no_more_than_it_can_hold_and_is_the_same_formation_after_the_air(pattern: Pattern) -> None:
+    assert pattern.places <= MOST_PLACES
+    plan = plan_of(pattern, tuple(range(1, pattern.places + 1)), planner=1, start_us=7, deploy_ds=10)
+    heard = pattern_of(Search.decode_frame(bytes(HEADER_BYTES) + plan.encode_frame(1)))
+    for place in range(pattern.places):
+        assert heard.at(place, 30.0).minus(pattern.at(place, 30.0)).norm() < 0.1
+        assert heard.shape.tethers(place) == pattern.shape.tethers(place)
+
+
+@pytest.mark.parametrize("shape", ShapeName)
+@pytest.mark.parametrize(("count", "area_m"), [(45, 2500), (20, 1000)])
+def test_one_sweep_brings_a_lane_near_every_spot_of_the_area(shape: ShapeName, count: int, area_m: float) -> None:
+    pattern = formed(shape, count, area_m)
+    lanes = range(pattern.dimensions.fixed - pattern.dimensions.relays)
+    sweep_s = pattern.shape.sweep_s
+    tracks = [pattern.at(place, 4.0 * step) for place in lanes for step in range(math.ceil(sweep_s / 4.0) + 1)]
+    half = round(area_m / 2) - 5
+    for east, north in itertools.product(range(-half, half + 1, half // 8), repeat=2):
+        assert any(math.hypot(at.east - east, at.north - north) <= SEEN_M for at in tracks), (east, north)
+
+
+@pytest.mark.parametrize("count", [1, 2, 3, 5, 8])
+def test_a_spiral_of_a_few_winds_outward_until_all_is_seen_and_is_one_piece_all_the_time(count: int) -> None:
+    pattern = formed(ShapeName.SPIRAL, count, 1000)
+    sweep_s = pattern.shape.sweep_s
+    track = [[pattern.at(place, 2.0 * step) for place in range(count)] for step in range(math.ceil(sweep_s / 2.0) + 1)]
+    assert all(pieces(places) == 1 for places in track)
+    flown = [at for places in track for at in places]
+    for east, north in itertools.product(range(-495, 500, 90), repeat=2):
+        assert any(math.hypot(at.east - east, at.north - north) <= SEEN_M for at in flown), (east, north)
+    assert all(max(abs(at.east), abs(at.north)) <= 500 for at in flown)
+
+
+def test_a_spiral_of_few_has_seen_the_middle_first() -> None:
+    pattern = formed(ShapeName.SPIRAL, 2, 1000)
+    eighth_s = pattern.shape.sweep_s / 8
+    early = [pattern.at(place, step) for place in range(2) for step in range(int(eighth_s))]
+    assert max(max(abs(at.east), abs(at.north)) for at in early) < 250
+
+
+def test_arms_of_a_spiral_turn_as_one_piece_and_nobody_meets() -> None:
+    pattern = formed(ShapeName.SPIRAL)
+    assert pattern.dimensions.teams == 5
+    for second in range(0, 600, 3):
+        places = [pattern.at(place, second) for place in range(pattern.places)]
+        assert pieces(places) == 1, second
+        assert min(a.minus(b).norm() for a, b in itertools.combinations(places, 2)) > 8.0, second
+
+
+def test_teams_of_four_sectors_part_in_two_rows_and_meet_again_and_nobody_meets() -> None:
+    pattern = formed(ShapeName.SECTORS)
+    seen = []
+    for second in range(0, 2 * round(pattern.shape.sweep_s) + 20, 3):
+        places = [pattern.at(place, second) for place in range(pattern.places)]
+        seen.append(pieces(places))
+        assert min(a.minus(b).norm() for a, b in itertools.combinations(places, 2)) > 8.0, second
+    assert [number for number, _ in itertools.groupby(seen)] == [1, 2, 1, 2]
+
+
+def test_sectors_leave_more_uavs_free_than_lines_do() -> None:
+    assert len(formed(ShapeName.SECTORS).followers) > len(formed(ShapeName.LINES).followers)
+
+
+@pytest.mark.parametrize(("teams", "rows"), [(1, 1), (2, 1), (4, 2), (6, 2), (7, 1), (9, 3)])
+def test_sectors_lie_in_rows_that_leave_none_over(teams: int, rows: int) -> None:
+    assert rows_of(teams) == rows
+
+
+@pytest.mark.parametrize(
+    "impossible",
+    [
+        {"shape": 3}, {"teams": 3}, {"shape": 1, "teams": 0}, {"shape": 2, "relays": 1}, {"shape": 1, "first_m": 0.5},
+        {"shape": 2, "half_width_m": 0.5}, {"shape": 2, "teams": 40}, {"lanes": 1},
+    ],
+)  # fmt: skip
+def test_a_formation_that_nobody_could_fly_is_refused(impossible: dict[str, float]) -> None:
+    plan = Search(7, 100.0, 16.0, 400.0, 65.0, 7.5, 30, 1, 1, (1, 2, 3, 4), 2, 0, 0)
+    for possible in (plan, plan._replace(shape=1), plan._replace(shape=2, teams=1, lanes=4)):
+        assert Search.decode_frame(bytes(HEADER_BYTES) + possible.encode_frame(1)) == possible
+    with pytest.raises(MalformedFrameError):
+        Search.decode_frame(bytes(HEADER_BYTES) + plan._replace(**impossible).encode_frame(1))  # type: ignore[arg-type]

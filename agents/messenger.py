@@ -8,12 +8,13 @@ What becomes of them is told in `statuses.py`.
 
 from collections import Counter
 from collections.abc import Mapping, Sequence
-from typing import Any, Final, NamedTuple
+from typing import Any, Final
 
 from agents.listeners import Listeners
 from agents.statuses import Statuses
+from agents.submission import Submission
 from fanet_mw import wire
-from fanet_mw.application import Application, Data, Destination, Fate, Received, Status
+from fanet_mw.application import Application, Fate, Received, Status
 from fanet_mw.delivery.receiver import Receiver, Whole
 from fanet_mw.delivery.sender import PieceToSend, Sender
 from fanet_mw.errors import DropReason, LocalProtocolError
@@ -21,7 +22,7 @@ from fanet_mw.node.header_check import CONTROL, RESTART_STEP_NS
 from fanet_mw.node.node import Node
 from fanet_mw.node.packet import Packet
 from fanet_mw.rng import stream
-from fanet_mw.units import BROADCAST, MAX_NODES, MS, US, NodeId, S, earliest, seconds_to_ns
+from fanet_mw.units import BROADCAST, MS, US, NodeId, S, earliest, seconds_to_ns
 from fanet_mw.wire.message import (
     MAVLINK_PORT,
     MOST_LIFETIME_MS,
@@ -32,20 +33,7 @@ from fanet_mw.wire.message import (
     encode_receipts,
 )
 
-_MOST_PORT: Final = 0xFFFF
 _RECEIPT_APP: Final = "receipt"
-
-
-class Submission(NamedTuple):
-    """What an application hands over to be sent (`AppPort.send`)."""
-
-    content: bytes | Data
-    destination: Destination
-    priority: int
-    confirm: bool
-    lifetime_ns: int | None
-    deadline_ns: int | None
-    born_ns: int
 
 
 class Messenger:
@@ -73,13 +61,10 @@ class Messenger:
 
     def send(self, application: Application, submission: Submission, *, now_ns: int) -> int:
         """Send what an application has handed over; returns the handle that statuses name."""
-        content, destination, priority, confirm, lifetime_ns, deadline_ns, born_ns = submission
-        port, data = (MAVLINK_PORT, content) if isinstance(content, bytes) else content
-        to, targets = self._whom(destination)
-        plain = isinstance(content, bytes) and not confirm and not targets and lifetime_ns is None
-        named = 0 if len(targets) < 2 else len(targets)
+        port, data, to, targets, priority, confirm, lifetime_ns, deadline_ns, born_ns = submission
+        plain = port == MAVLINK_PORT and not confirm and not targets and lifetime_ns is None
         if not plain:
-            self._check(content, port, data, named)
+            self._check(port, data, len(targets))
         if confirm and self._sender.full:
             return self._refused(application, DropReason.QUEUE_FULL, now_ns)
         if deadline_ns is not None:
@@ -101,8 +86,8 @@ class Messenger:
             self._statuses.own(handle, application)
         else:
             handle, packets = self._sender.unconfirmed(
-                data, port=port, destination=to, targets=targets if named else (), priority=priority,
-                born_us=born_us, lifetime_ms=lifetime_ms,
+                data, port=port, destination=to, targets=targets, priority=priority, born_us=born_us,
+                lifetime_ms=lifetime_ms,
             )  # fmt: skip
         self._statuses.tell(application, Status(handle, Fate.ADMITTED, now_ns))
         for packet in packets:
@@ -111,21 +96,8 @@ class Messenger:
             self._send_due(now_ns)
         return handle
 
-    def _whom(self, destination: Destination) -> tuple[NodeId, tuple[NodeId, ...]]:
-        """The destination of the packets, and the nodes that are named one by one."""
-        own, most = self._node.node, self._node.scenario.nodes.count
-        if isinstance(destination, int):
-            if destination != BROADCAST and not 0 < destination <= MAX_NODES:
-                raise LocalProtocolError(f"destination = {destination} must be a node id, or BROADCAST")
-            return NodeId(destination), ()
-        nodes = tuple(sorted({NodeId(node) for node in destination} - {own}))
-        if not nodes or not 0 < nodes[0] <= nodes[-1] <= most:
-            raise LocalProtocolError(f"destination = {sorted(destination)} must be ids of other nodes <= {most}")
-        return (nodes[0], ()) if len(nodes) == 1 else (BROADCAST, nodes)
-
-    def _check(self, content: bytes | Data, port: int, data: bytes, named: int) -> None:
-        if isinstance(content, Data) and not 0 < port <= _MOST_PORT:
-            raise LocalProtocolError(f"port = {port} must be in [1, {_MOST_PORT}]")
+    def _check(self, port: int, data: bytes, named: int) -> None:
+        """Raise LocalProtocolError for more bytes than a message can have."""
         one_piece = self._room - wire.OVERHEAD - wire.MESSAGE.layout.size - named * 3
         most = one_piece if port == MAVLINK_PORT else self._sender.most_bytes(named)
         if len(data) > most:

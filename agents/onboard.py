@@ -11,9 +11,10 @@ from typing import Any, Final
 
 from agents.course_arbitration import CourseArbitration
 from agents.listeners import Callbacks, Listeners
-from agents.messenger import Messenger, Submission
+from agents.messenger import Messenger
+from agents.submission import Sending, Submission, positive, priority_of
 from fanet_mw import wire
-from fanet_mw.application import Application, Course, Data, Destination, Fate, Received, Status
+from fanet_mw.application import Application, Course, Destination, Fate, Received, Status
 from fanet_mw.bus.messages import Gps, SensorReading, TxStatus
 from fanet_mw.errors import DropReason, LocalProtocolError, MalformedFrameError
 from fanet_mw.node.node import Node
@@ -190,6 +191,7 @@ class _Port:
     def __init__(self, onboard: Onboard, application: Application) -> None:
         self._onboard = onboard
         self._application = application
+        self._sending = Sending(onboard.node.node, onboard.node.scenario.nodes.count)
         self.node: NodeId = onboard.node.node
         self.scenario: Scenario = onboard.node.scenario
         self.record: Callable[[Record], None] = onboard.node.records.append
@@ -204,10 +206,10 @@ class _Port:
 
     def send(
         self,
-        content: bytes | Data,
+        content: object,
         *,
         destination: Destination = BROADCAST,
-        priority: int = wire.PRIORITY_BULK,
+        priority: str | int = wire.PRIORITY_BULK,
         confirm: bool = False,
         lifetime_ns: int | None = None,
         deadline_ns: int | None = None,
@@ -215,10 +217,17 @@ class _Port:
     ) -> int:
         now_ns = self._onboard.now_ns
         born_ns = now_ns if born_ns is None else min(born_ns, now_ns)
-        submission = Submission(content, destination, priority, confirm, lifetime_ns, deadline_ns, born_ns)
+        port, data = self._sending.content(content)
+        to, targets = self._sending.whom(destination)
+        submission = Submission(
+            port, data, to, targets, priority_of(priority), confirm, positive("lifetime_ns", lifetime_ns),
+            positive("deadline_ns", deadline_ns), born_ns,
+        )  # fmt: skip
         return self._onboard.send(self._application, submission)
 
     def fly(self, course: Course) -> None:
+        if not isinstance(course, Course):
+            raise LocalProtocolError(f"course = {course!r} must be a Course")
         self._onboard.arbitration.command(self._application, course)
 
     def tap(self, frames: bytes) -> None:

@@ -34,12 +34,12 @@ if TYPE_CHECKING:
         Voice,
         WifiScan,
     )
-    from fanet_mw.errors import BusError, ConfigError, DropReason, FanetError, MalformedFrameError
+    from fanet_mw.errors import BusError, ConfigError, DropReason, FanetError, LocalProtocolError, MalformedFrameError
     from fanet_mw.scenario import Scenario
-    from fanet_mw.scenario.config import load as load_scenario
     from fanet_mw.units import BROADCAST, Enu, NodeId
     from sim.run.api import Launched, VirtualSwarm, launch, simulate
     from sim.run.result import Result
+    from sim.scenarios.catalog import find as load_scenario
 
 __version__ = "0.1.0"
 
@@ -53,7 +53,9 @@ _HOMES: Final = {
     "fanet_mw.bus.messages": (
         "Altimeter", "Battery", "Camera", "Gps", "Inertial", "Radar", "SensorReading", "Voice", "WifiScan",
     ),
-    "fanet_mw.errors": ("BusError", "ConfigError", "DropReason", "FanetError", "MalformedFrameError"),
+    "fanet_mw.errors": (
+        "BusError", "ConfigError", "DropReason", "FanetError", "LocalProtocolError", "MalformedFrameError",
+    ),
     "fanet_mw.scenario": ("Scenario",),
     "fanet_mw.units": ("BROADCAST", "Enu", "NodeId"),
     "sim.run.api": ("Launched", "VirtualSwarm", "launch", "simulate"),
@@ -65,15 +67,15 @@ _HOME_OF: Final = {name: module for module, names in _HOMES.items() for name in 
 __all__ = [
     "Altimeter", "ANY", "Application", "AppPort", "Battery", "BROADCAST", "BusError", "Camera", "ConfigError", "Course",
     "Data", "DropReason", "Emulated", "Enu", "FanetError", "Fate", "Gps", "HOME", "Inertial", "Launched",
-    "MalformedFrameError", "Message", "Node", "NodeClosedError", "NodeId", "OnAir", "Radar", "Received", "Result",
-    "Scenario", "SensorReading", "Sent", "Status", "VirtualSwarm", "Voice", "WifiScan", "__version__", "join", "launch",
-    "load_scenario", "simulate",
+    "LocalProtocolError", "MalformedFrameError", "Message", "Node", "NodeClosedError", "NodeId", "OnAir", "Radar",
+    "Received", "Result", "Scenario", "SensorReading", "Sent", "Status", "VirtualSwarm", "Voice", "WifiScan",
+    "__version__", "join", "launch", "load_scenario", "simulate",
 ]  # fmt: skip
 
 
 def __getattr__(name: str) -> Any:  # noqa: ANN401  (whatever the name stands for)
     if name == "load_scenario":
-        value = import_module("fanet_mw.scenario.config").load
+        value = import_module("sim.scenarios.catalog").find
     elif name in _HOME_OF:
         value = getattr(import_module(_HOME_OF[name]), name)
     else:

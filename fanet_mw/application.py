@@ -64,6 +64,15 @@ class Received(NamedTuple):
         """What was sent: the bytes, or the MAVLink frames."""
         return self.frame[HEADER_BYTES:] if self.content is None else self.content
 
+    def mavlink(self) -> list[Any]:
+        """Its MAVLink messages, as objects of pymavlink; none if it was sent to a port.
+
+        Raises MalformedFrameError, which `on_message` may let pass.
+        """
+        from fanet_mw.mavlink import decode  # pymavlink takes its time, and most messages are read without it
+
+        return decode(self.data) if self.content is None else []
+
 
 class Data(NamedTuple):
     """Bytes for the application that listens on a numbered port."""
@@ -133,23 +142,25 @@ class AppPort(Protocol):
 
     def send(
         self,
-        content: bytes | Data,
+        content: object,
         *,
         destination: Destination = BROADCAST,
-        priority: int = PRIORITY_BULK,
+        priority: str | int = PRIORITY_BULK,
         confirm: bool = False,
         lifetime_ns: int | None = None,
         deadline_ns: int | None = None,
         born_ns: int | None = None,
     ) -> int:
-        """Send whole MAVLink frames, or bytes to a port; returns the handle that statuses name.
+        """Send a message of pymavlink, whole MAVLink frames as bytes, or `Data`, which are bytes to a port.
 
+        Returned is the handle that statuses name. The priority is "safety", "report" or "bulk" (or 1 to 3).
         A message that is to be confirmed is sent again until each of its targets has it, and messages to the same
         targets, on one port and of one priority, are then handed over in order. Its lifetime is by default that of its
         priority in the scenario. A message with a deadline is refused if the network states that it cannot be kept.
         `born_ns` is when the application meant to send, by default now. Of plain MAVLink frames the handle is the
-        packet's sequence number. Raises LocalProtocolError when the content cannot be sent at all: frames that do not
-        fit one packet, more bytes than 64 packets hold, a destination that is not in the scenario.
+        packet's sequence number. Raises LocalProtocolError when it cannot be sent at all: content that is none of the
+        three, frames that do not fit one packet, more bytes than 64 packets hold, a destination that is not another
+        node of the scenario.
         """
 
     def fly(self, course: Course) -> None:

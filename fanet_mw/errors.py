@@ -16,7 +16,7 @@ class ProtocolError(FanetError):
 
 
 class LocalProtocolError(ProtocolError):
-    """The caller broke a rule of the core: a bug of this project, raised at once."""
+    """The caller broke a rule of a contract: a bug of the program that calls, raised at once."""
 
 
 class MalformedFrameError(ProtocolError):

@@ -291,7 +291,7 @@ def packed(message: object, node: NodeId) -> bytes:
     """A message of pymavlink as the frame of a node; raises LocalProtocolError for anything else."""
     pack = getattr(message, "pack", None)
     if pack is None:
-        raise LocalProtocolError(f"{type(message).__name__} is no MAVLink message of pymavlink")
+        raise LocalProtocolError(f"content must be bytes or a message of pymavlink, not {type(message).__name__}")
     return bytes(pack(common.MAVLink(None, srcSystem=system_id(node), srcComponent=COMPONENT)))
 
 

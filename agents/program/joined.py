@@ -9,18 +9,19 @@ Over Zenoh, over UDP or in virtual time: which, is said by one argument.
 
 import asyncio
 import contextlib
+import math
 from collections.abc import AsyncIterator, Collection, Iterable, Mapping, Sequence
 from pathlib import Path
 from typing import Any, Final, Self
 
+import fanet_mw
 from agents.program.attached import Attachment, Drive, Emulated, NodeClosedError
 from agents.program.mailbox import Mailbox, Message, Sent
-from fanet_mw import mavlink
+from agents.submission import Sending, priority_of
 from fanet_mw.application import Application, Data
 from fanet_mw.errors import ConfigError, LocalProtocolError
-from fanet_mw.scenario import Scenario, config
+from fanet_mw.scenario import Scenario
 from fanet_mw.units import BROADCAST, MS, Enu, NodeId, S, seconds_to_ns
-from fanet_mw.wire import PRIORITIES
 
 ALL: Final = "all"
 
@@ -31,6 +32,7 @@ class Node:
     def __init__(self, scenario: Scenario, node: NodeId, drive: Drive, mailbox: Mailbox) -> None:
         self.id = node
         self.scenario = scenario
+        self._sending = Sending(node, scenario.nodes.count)
         self._drive = drive
         self._mailbox = mailbox
 
@@ -51,21 +53,26 @@ class Node:
         have it, or `lifetime_s` is over. Raises ConfigError (a ValueError) for what cannot be sent, NodeClosedError
         when the node's time is over, and BusError when the router is gone.
         """
-        if priority not in PRIORITIES:
-            raise ConfigError(f"priority = {priority!r} must be one of {', '.join(PRIORITIES)}")
+        body = content if port is None else Data(port, content)  # type: ignore[arg-type]  # it is checked at once
         destination = _destination(to)
+        try:  # before any time passes
+            self._sending.content(body)
+            self._sending.whom(destination)
+            rank = priority_of(priority)
+        except LocalProtocolError as error:
+            raise ConfigError(str(error)) from error
         confirmed = destination != BROADCAST if confirm is None else confirm
-        body = _body(content, port, self.id)
+        lifetime_ns, deadline_ns = _in_ns("lifetime_s", lifetime_s), _in_ns("deadline_s", deadline_s)
         future: asyncio.Future[Sent] = asyncio.get_running_loop().create_future()
 
         def send() -> int:
             return self._mailbox.port.send(
                 body,
                 destination=destination,
-                priority=PRIORITIES[priority],
+                priority=rank,
                 confirm=confirmed,
-                lifetime_ns=None if lifetime_s is None else seconds_to_ns(lifetime_s),
-                deadline_ns=None if deadline_s is None else seconds_to_ns(deadline_s),
+                lifetime_ns=lifetime_ns,
+                deadline_ns=deadline_ns,
             )
 
         self._mailbox.to_send.append((send, future, confirmed))
@@ -129,24 +136,22 @@ class Node:
 
 
 def _destination(to: int | Iterable[int] | str) -> NodeId | Collection[NodeId]:
-    if isinstance(to, str):
-        if to != ALL:
-            raise ConfigError(f"to = {to!r} must be {ALL!r}, a node id or several")
+    if isinstance(to, int):
+        return NodeId(to)
+    if to == ALL:
         return BROADCAST
-    return NodeId(to) if isinstance(to, int) else tuple(NodeId(node) for node in to)
+    if isinstance(to, str) or not isinstance(to, Iterable):
+        raise ConfigError(f"to = {to!r} must be {ALL!r}, a node id or several")
+    return tuple(NodeId(node) for node in to)
 
 
-def _body(content: object, port: int | None, node: NodeId) -> bytes | Data:
-    if port is not None:
-        if not isinstance(content, bytes | bytearray | memoryview):
-            raise ConfigError(f"content for port {port} must be bytes, not {type(content).__name__}")
-        return Data(port, bytes(content))
-    if isinstance(content, bytes | bytearray | memoryview):
-        return bytes(content)
-    try:
-        return mavlink.packed(content, node)
-    except LocalProtocolError as error:
-        raise ConfigError(str(error)) from error
+def _in_ns(name: str, seconds: float | None) -> int | None:
+    """A duration as people write it; raises ConfigError for one that is none."""
+    if seconds is None:
+        return None
+    if not isinstance(seconds, int | float) or not 0 < seconds < math.inf:
+        raise ConfigError(f"{name} = {seconds!r} must be a number of seconds above 0")
+    return max(1, seconds_to_ns(seconds))
 
 
 @contextlib.asynccontextmanager
@@ -164,7 +169,7 @@ async def join(
     the node takes part. Raises ConfigError for a scenario or an id that is wrong, and BusError when the router cannot
     be had. Leaving the block, or being cancelled in it, ends the node.
     """
-    known = scenario if isinstance(scenario, Scenario) else config.load(Path(scenario))
+    known = scenario if isinstance(scenario, Scenario) else fanet_mw.load_scenario(scenario)
     if node not in known.node_ids:
         raise ConfigError(f"node = {node}: must be in [1, nodes.count = {known.nodes.count}]")
     mailbox = Mailbox(messages)

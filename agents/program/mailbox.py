@@ -7,8 +7,9 @@ a message        ->  got      ->  node.receive()
 import asyncio
 from collections import deque
 from collections.abc import Callable, Collection
-from typing import Final, NamedTuple
+from typing import Any, Final, NamedTuple
 
+from fanet_mw import mavlink
 from fanet_mw.application import ANY, Application, Fate, Received, Status
 from fanet_mw.errors import DropReason, LocalProtocolError
 from fanet_mw.units import MS
@@ -46,6 +47,13 @@ class Message(NamedTuple):
     hops: int
     delay_ms: float
     """From the other application's hand-over; as exact as the clocks of the two agree."""
+
+    def mavlink(self) -> list[Any]:
+        """Its MAVLink messages, as objects of pymavlink; none if it was sent to a port.
+
+        Raises MalformedFrameError for frames that make no sense.
+        """
+        return mavlink.decode(self.data) if self.port is None else []
 
 
 class Mailbox(Application):

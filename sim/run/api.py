@@ -39,7 +39,7 @@ _TURNS: Final = 4
 
 def scenario_of(given: Scenario | str | Path, *, seed: int | None = None, overrides: Sequence[str] = ()) -> Scenario:
     """A scenario as a program names it, with another seed and other values (`KEY=VALUE`); raises ConfigError."""
-    found = given if isinstance(given, Scenario) else catalog.find(str(given), overrides)
+    found = given if isinstance(given, Scenario) else catalog.find(given, overrides)
     if isinstance(given, Scenario) and overrides:
         raise ConfigError("overrides are for scenarios that are named; this one is built already")
     return found if seed is None else Scenario.model_validate({**found.model_dump(), "seed": seed})

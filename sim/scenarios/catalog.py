@@ -11,10 +11,13 @@ from sim.scenarios.shipped import Entry, entry, shipped
 __all__ = ["Entry", "find", "shipped", "text_of"]
 
 
-def find(name: str, overrides: Iterable[str] = ()) -> Scenario:
-    """The scenario of a file (anything with a slash or ending in .toml), else the shipped one of that name."""
-    if _is_file(name):
-        return _searchable(config.load(Path(name), overrides), name)
+def find(name: str | Path, overrides: Iterable[str] = ()) -> Scenario:
+    """The scenario of a file (a Path, or text that has a slash or ends in .toml), else the shipped one of that name.
+
+    `overrides` are `KEY=VALUE`. Raises ConfigError with every mistake.
+    """
+    if isinstance(name, Path) or _is_file(name):
+        return _searchable(config.load(Path(name), overrides), str(name))
     source = f"scenario {name}"
     return _searchable(config.parse(entry(name).text, source=source, name=name, overrides=overrides), source)
 

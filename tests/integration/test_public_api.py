@@ -3,11 +3,11 @@
 import asyncio
 import subprocess
 import sys
+from typing import Any
 
 import pytest
 
 import fanet_mw
-from fanet_mw import mavlink
 from fanet_mw.dialect import fanet
 from fanet_mw.testing.plugin import MakeSwarm
 
@@ -44,8 +44,9 @@ async def test_to_several_to_all_and_mavlink(swarm: MakeSwarm) -> None:
         got = {message.port: message for message in [await nodes[4].receive() for _ in range(3)]}
         assert (got[7].data, got[8].data) == (bytes(5000), b"all")
         assert got[None].origin == 2
-        (heard,) = mavlink.decode(got[None].data)
-        assert heard.get_type() == "FANET_SURVIVOR"
+        (heard,) = got[None].mavlink()
+        assert (heard.get_type(), heard.survivor) == ("FANET_SURVIVOR", 1)
+        assert got[7].mavlink() == []
 
 
 async def test_a_node_knows_its_neighbors_and_its_clusters(swarm: MakeSwarm) -> None:
@@ -73,13 +74,20 @@ async def test_faults_and_who_is_out_of_reach(swarm: MakeSwarm) -> None:
 
 
 @pytest.mark.parametrize(
-    "options", [{"port": 0}, {"to": "everyone"}, {"to": 0}, {"to": ()}, {"port": 70_000}, {"priority": "urgent"}, {}]
-)
-async def test_what_cannot_be_sent_is_said_with_its_value(swarm: MakeSwarm, options: dict[str, object]) -> None:
+    "options",
+    [
+        {"port": 0}, {"port": 70_000}, {"port": "7"}, {"port": None}, {"to": "everyone"}, {"to": 0}, {"to": 1},
+        {"to": 77}, {"to": 3.5}, {"to": ()}, {"to": (2, 77)}, {"priority": "urgent"}, {"lifetime_s": -1},
+        {"deadline_s": float("nan")}, {"deadline_s": "1 s"}, {"content": "text"}, {"content": object(), "port": None},
+    ],
+)  # fmt: skip
+async def test_what_cannot_be_sent_is_said_with_its_value_before_time_passes(
+    swarm: MakeSwarm, options: dict[str, Any]
+) -> None:
     async with swarm("quick", overrides=QUIET) as s:
-        content = object() if not options else bytes(5)
-        with pytest.raises(fanet_mw.ConfigError, match=r"must be|is no MAVLink message"):
-            await s.node(1).send(content, **{"port": 7, **options} if options else {})  # type: ignore[arg-type]
+        with pytest.raises(fanet_mw.ConfigError, match=r"must be"):
+            await s.node(1).send(**{"content": bytes(5), "port": 7, **options})
+        assert s.now_s == 0
 
 
 async def test_the_end_of_the_swarms_time_ends_who_listens_and_who_sends(swarm: MakeSwarm) -> None:
@@ -104,10 +112,10 @@ async def test_tasks_that_wait_for_each_other_let_time_pass(swarm: MakeSwarm) ->
         task.cancel()
 
 
-async def test_join_takes_a_swarm_in_virtual_time_as_its_radio() -> None:
-    swarm = fanet_mw.VirtualSwarm("quick", overrides=QUIET)
+async def test_join_takes_a_scenario_by_its_name_and_a_swarm_in_virtual_time_as_its_radio() -> None:
+    swarm = fanet_mw.VirtualSwarm("quick")
     async with (
-        fanet_mw.join(swarm.scenario, node=2, radio=swarm) as a,
+        fanet_mw.join("quick", node=2, radio=swarm) as a,
         fanet_mw.join(swarm.scenario, node=3, radio=swarm) as b,
     ):
         await a.send(b"x", port=9, to=3)
@@ -115,6 +123,9 @@ async def test_join_takes_a_swarm_in_virtual_time_as_its_radio() -> None:
         with pytest.raises(fanet_mw.ConfigError, match="before time passes"):
             async with fanet_mw.join(swarm.scenario, node=4, radio=swarm):
                 pass
+    with pytest.raises(fanet_mw.ConfigError, match="unknown scenario 'quik'; did you mean quick"):
+        async with fanet_mw.join("quik", node=2, radio=swarm):
+            pass
 
 
 class Beacon(fanet_mw.Application):

@@ -1,6 +1,7 @@
 """Children of a launcher: whichever process is killed, its end is reported by name and no process is left running."""
 
 import asyncio
+import multiprocessing
 import os
 import re
 import signal
@@ -17,7 +18,7 @@ import pytest
 from fanet_mw.bus.topics import Topics
 from fanet_mw.errors import BusError
 from fanet_mw.hosts.bus import Bus
-from sim.run.launcher.processes import Processes
+from sim.run.launcher.processes import Processes, end_servers
 from sim.run.launcher.swarm import free_endpoint
 
 MARK = "FANET_TEST_MARK"
@@ -112,6 +113,14 @@ def crash() -> int:
 
 def lose_the_bus() -> int:
     raise BusError("the router is gone")
+
+
+def test_a_child_leaves_the_helper_processes_of_multiprocessing_to_its_parent() -> None:
+    """From Python 3.13 on, children run what was registered for the exit; here it is called as they call it."""
+    child = multiprocessing.get_context("forkserver").Process(target=end_servers)
+    child.start()
+    child.join(PATIENCE_S)
+    assert child.exitcode == 0
 
 
 async def test_every_end_is_told_with_its_name_and_exit_code() -> None:

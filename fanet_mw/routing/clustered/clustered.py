@@ -24,7 +24,7 @@ from fanet_mw.routing.clustered.forwarding.repair import Repair
 from fanet_mw.routing.clustered.forwarding.uplink import MOST_TRIES, Uplink
 from fanet_mw.routing.clustered.relaying.contending import ContendingRelaying
 from fanet_mw.routing.clustered.timetable.promises import Promises
-from fanet_mw.units import BROADCAST, US, NodeId, earliest
+from fanet_mw.units import BROADCAST, US, NodeId
 from fanet_mw.wire import FLAG_FLOOD, FLAG_TO_HEAD, HEADER_BYTES, Kind
 from fanet_mw.wire.claims import MESSAGE_BYTES, Claims
 from fanet_mw.wire.digest import Digest, capacity
@@ -61,6 +61,9 @@ class Clustered(RoutingProtocol):
         super().__init__(port)
         self.parts = parts
         self._on_copy = tuple(on_copy)
+        timed = (parts.roles, parts.access, parts.contending, parts.repair)
+        self._asks = tuple(part.next_wake_ns for part in timed if part is not None)
+        """When the parts want to be woken: asked after every reception."""
         self._lead_ns = port.scenario.radio.lead_ns
         self._hello_bytes = 0
         """About how long the last hello was."""
@@ -172,11 +175,12 @@ class Clustered(RoutingProtocol):
     # --- time -----------------------------------------------------------------------------------------------------
 
     def next_wake_ns(self) -> int | None:
-        parts = self.parts
-        repair_ns = parts.repair.next_wake_ns() if parts.repair else None
-        return earliest(
-            parts.roles.next_wake_ns(), parts.access.next_wake_ns(), parts.contending.next_wake_ns(), repair_ns
-        )
+        first_ns = None
+        for ask in self._asks:
+            wake_ns = ask()
+            if wake_ns is not None and (first_ns is None or wake_ns < first_ns):
+                first_ns = wake_ns
+        return first_ns
 
     def wake(self, now_ns: int) -> None:
         parts = self.parts

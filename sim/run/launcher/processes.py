@@ -155,8 +155,10 @@ class Processes:
 
 
 @atexit.register
-def _end_servers() -> None:
+def end_servers() -> None:
     """End multiprocessing's helper processes with this one; by themselves they end some tens of milliseconds later."""
+    if multiprocessing.parent_process() is not None:
+        return  # from Python 3.13 on, children come by here too; the helpers are their parent's
     # There is no public way to do this; CPython's own tests use these calls.
     forkserver._forkserver._stop()  # type: ignore[attr-defined]  # noqa: SLF001
     resource_tracker._resource_tracker._stop()  # type: ignore[attr-defined]  # noqa: SLF001

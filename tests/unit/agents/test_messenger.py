@@ -4,7 +4,8 @@ from collections.abc import Callable
 from typing import Any
 
 from agents.listeners import Listeners
-from agents.messenger import Messenger, Submission
+from agents.messenger import Messenger
+from agents.submission import Sending, Submission
 from fanet_mw import mavlink
 from fanet_mw.application import Application, Data, Destination, Fate, Status
 from fanet_mw.errors import DropReason
@@ -59,7 +60,10 @@ class Desk:
         confirm: bool = False,
         deadline_ns: int | None = None,
     ) -> int:
-        submission = Submission(content, to, PRIORITY_BULK, confirm, None, deadline_ns, at_ns)
+        sending = Sending(OWN, self.node.scenario.nodes.count)
+        submission = Submission(
+            *sending.content(content), *sending.whom(to), PRIORITY_BULK, confirm, None, deadline_ns, at_ns
+        )
         return self.messenger.send(self.application, submission, now_ns=at_ns)
 
     def told(self, now_ns: int = S) -> list[Status]:

@@ -4,10 +4,11 @@ from collections.abc import Callable
 from typing import Any
 
 import pytest
+from pymavlink.dialects.v20 import common
 
 from agents.uav import Uav
-from fanet_mw import mavlink
-from fanet_mw.application import Application, Course, Data, Fate, Received, Status
+from fanet_mw import mavlink, wire
+from fanet_mw.application import Application, AppPort, Course, Data, Fate, Received, Status
 from fanet_mw.bus.messages import Gps, MavlinkTap, Reception, SensorReading, Setpoint, TxRequest, WifiScan
 from fanet_mw.bus.topics import Topics
 from fanet_mw.errors import DropReason, LocalProtocolError, MalformedFrameError
@@ -205,7 +206,7 @@ class Post(Application):
     ports = (5,)
     follows = tuple(Fate)
 
-    def __init__(self, content: bytes | Data = HELLO, *, times: int = 1, **options: Any) -> None:
+    def __init__(self, content: object = HELLO, *, times: int = 1, **options: Any) -> None:
         self._content, self._options, self._times, self._due_ns = content, options, times, S
         self.told: list[Status] = []
         self.got: list[bytes] = []
@@ -288,17 +289,50 @@ def test_messages_that_cannot_be_kept_are_refused(make_scenario: MakeScenario) -
     [
         (Data(0, b""), {}),
         (Data(70_000, b""), {}),
+        (Data("5", b""), {}),
+        (Data(5, "text"), {}),
+        (b"hello", {}),
+        (mavlink.Encoder(OWN).heartbeat()[:-1], {}),
+        (b"", {}),
+        ("text", {}),
         (Data(5, bytes(200_000)), {}),
         (Data(5, b""), {"destination": (OWN,)}),
         (Data(5, b""), {"destination": (9, 2)}),
         (Data(5, b""), {"destination": 0}),
+        (Data(5, b""), {"destination": 9}),
+        (Data(5, b""), {"destination": OWN}),
+        (Data(5, b""), {"destination": "all"}),
+        (Data(5, b""), {"destination": None}),
+        (Data(5, b""), {"priority": "urgent"}),
+        (Data(5, b""), {"priority": wire.PRIORITY_CONTROL}),
+        (Data(5, b""), {"lifetime_ns": 0}),
+        (Data(5, b""), {"deadline_ns": -1}),
         (mavlink.Encoder(OWN).heartbeat() * 200, {"confirm": True}),
     ],
 )
 def test_what_cannot_be_sent_at_all_is_a_mistake_of_the_application(
-    make_scenario: MakeScenario, content: bytes | Data, options: dict[str, Any]
+    make_scenario: MakeScenario, content: object, options: dict[str, Any]
 ) -> None:
     made = uav(make_scenario, post := Post(content, **options))
     made.wake(S)
     assert post.error is not None
     assert "must be" in str(post.error)
+    assert made.outbox == []
+
+
+def test_a_message_of_pymavlink_is_sent_as_its_frame_and_a_priority_by_its_name(make_scenario: MakeScenario) -> None:
+    message = common.MAVLink_statustext_message(5, b"found")
+    (frame,) = live(uav(make_scenario, Post(message, priority="report")), 2 * S)
+    header = wire.decode_header(frame.frame)
+    assert header.priority == wire.PRIORITY_REPORT
+    (heard,) = mavlink.decode(frame.frame[wire.HEADER_BYTES :])
+    assert (heard.get_type(), heard.get_srcSystem(), heard.text) == ("STATUSTEXT", OWN, "found")
+
+
+def test_a_course_is_a_course(make_scenario: MakeScenario) -> None:
+    class Pilot(Application):
+        def start(self, port: AppPort, now_ns: int) -> None:
+            port.fly((1, 2, 3))  # type: ignore[arg-type]
+
+    with pytest.raises(LocalProtocolError, match=r"course = \(1, 2, 3\) must be a Course"):
+        uav(make_scenario, Pilot())

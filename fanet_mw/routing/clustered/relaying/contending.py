@@ -23,6 +23,8 @@ class ContendingRelaying:
         self._rule = rule
         self._contention = contention
         self._jitter_ns = port.scenario.routing.jitter_ns
+        self.next_wake_ns = rule.open_until.next_wake_ns
+        """The method of what is open: it is asked after every reception."""
 
     def start(self, now_ns: int) -> None:
         """No packet is known yet."""
@@ -41,13 +43,10 @@ class ContendingRelaying:
 
     def decided(self, now_ns: int) -> Sequence[Relay]:
         packets = self._rule.open_until.decided(now_ns=now_ns)
-        return [self._relay(packet, 0, now_ns) for packet in packets]
+        return [self._relay(packet, 0, now_ns) for packet in packets] if packets else ()
 
     def _relay(self, packet: Packet, jitter_ns: int, now_ns: int) -> Relay:
         return Relay(packet, self._contention.start_ns(now_ns=now_ns, jitter_ns=jitter_ns))
-
-    def next_wake_ns(self) -> int | None:
-        return self._rule.open_until.next_wake_ns()
 
     def waiting(self) -> int:
         return len(self._rule.open_until)

@@ -27,7 +27,7 @@ from fanet_mw.routing.clustered.roles.schedule_refresh import ScheduleRefresh
 from fanet_mw.routing.clustered.roles.states import Action
 from fanet_mw.routing.clustered.timetable.link_quality import LinkQuality
 from fanet_mw.routing.clustered.timetable.timetabling import Timetabling
-from fanet_mw.units import US, NodeId, earliest
+from fanet_mw.units import US, NodeId
 from fanet_mw.wire import Kind
 from fanet_mw.wire.inner import Beacon, Join, Schedule
 from fanet_mw.wire.links import Links
@@ -267,12 +267,17 @@ class AssignedRoles:
 
     def next_wake_ns(self) -> int | None:
         parts, leader = self.parts, self._leader
-        role_ns = leader.next_wake_ns() if leader else parts.failover.next_wake_ns()
-        return earliest(parts.joining.due_ns, role_ns, parts.refresh.next_wake_ns())
+        first_ns = leader.next_wake_ns() if leader else parts.failover.next_wake_ns()
+        for due_ns in (parts.joining.due_ns, parts.refresh.due_ns):
+            if due_ns is not None and (first_ns is None or due_ns < first_ns):
+                first_ns = due_ns
+        return first_ns
 
     def wake(self, now_ns: int) -> None:
         parts = self.parts
-        self._do(parts.failover.wake(now_ns), now_ns)
+        actions = parts.failover.wake(now_ns)
+        if actions:
+            self._do(actions, now_ns)
         if parts.joining.due_ns is not None and now_ns >= parts.joining.due_ns:
             self._join(now_ns)
         leader = self._leader

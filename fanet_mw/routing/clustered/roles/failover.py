@@ -143,7 +143,7 @@ class Failover:
     def next_wake_ns(self) -> int | None:
         if self.state is State.LEADING:
             return None
-        stand_ns = self._lease.next_wake_ns()
+        stand_ns = self._lease.stand_ns
         return stand_ns if self._watch_ns is None or stand_ns < self._watch_ns else self._watch_ns
 
     def wake(self, now_ns: int) -> list[Action]:

@@ -43,11 +43,12 @@ class Lease:
         self._liveness = liveness
         self.authority: Authority | None = None
         self._until_ns = 0
-        self._stand_ns = 0
+        self.stand_ns = 0
+        """When the node is to look whether it must take office."""
 
     def start(self, now_ns: int) -> None:
         """Begin to wait for a leader, because none has been heard yet."""
-        self._until_ns = self._stand_ns = now_ns + _FIRST_NS + self._silence_ns
+        self._until_ns = self.stand_ns = now_ns + _FIRST_NS + self._silence_ns
 
     @property
     def leads(self) -> bool:
@@ -72,7 +73,7 @@ class Lease:
         if self.authority is not None and authority > self.authority and self.valid(now_ns):
             return False
         self._until_ns = max(until_ns, self._until_ns if authority == self.authority else 0)
-        self._stand_ns = self._until_ns
+        self.stand_ns = self._until_ns
         self.authority = authority
         return True
 
@@ -82,13 +83,10 @@ class Lease:
         self._until_ns = _FOREVER_NS
         return self.authority
 
-    def next_wake_ns(self) -> int:
-        return self._stand_ns
-
     def must_stand(self, now_ns: int) -> bool:
         """True if this node must take office: the leader is silent, and no node with a lower id has done so in time."""
-        if now_ns < self._stand_ns:
+        if now_ns < self.stand_ns:
             return False
         lower = self._liveness.alive_below(self._node, since_ns=now_ns - self._silence_ns)
-        self._stand_ns = self._until_ns + min(lower, _TURNS) * _TURN_NS
-        return now_ns >= self._stand_ns
+        self.stand_ns = self._until_ns + min(lower, _TURNS) * _TURN_NS
+        return now_ns >= self.stand_ns

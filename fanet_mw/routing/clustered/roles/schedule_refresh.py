@@ -29,7 +29,8 @@ class ScheduleRefresh:
         self._packets: dict[int, Packet] = {}
         """The packets of the announcement, by part."""
         self._kept_ns = 0
-        self._due_ns: int | None = None
+        self.due_ns: int | None = None
+        """When it is to be sent again; None: not at all."""
 
     def keep(self, packet: Packet, part: int, authority: Authority, epoch: int, *, now_ns: int) -> None:
         """Keep an announcement that this node follows, or its own."""
@@ -40,27 +41,24 @@ class ScheduleRefresh:
 
     def on_beacon(self, beacon: Beacon, *, now_ns: int) -> None:
         """Compare the schedule that a neighbor follows, as its beacon states."""
-        if self._version is None or self._due_ns is not None or now_ns - self._kept_ns < _FLOOD_OVER_NS:
+        if self._version is None or self.due_ns is not None or now_ns - self._kept_ns < _FLOOD_OVER_NS:
             return
         authority, epoch = self._version
         theirs = Authority(beacon.term, beacon.leader)
         behind = not beacon.leader or theirs > authority
         if behind or (theirs == authority and 0 < ((epoch - beacon.epoch) & 0xFFFF) < 0x8000):
-            self._due_ns = now_ns + int(self._random() * _ASSESS_NS)
+            self.due_ns = now_ns + int(self._random() * _ASSESS_NS)
 
     def on_copy(self, key: int, *, now_ns: int) -> None:
         """Note that another node has sent the announcement again."""
-        if self._due_ns is not None and any(key == _key(packet) for packet in self._packets.values()):
-            self._due_ns, self._kept_ns = None, now_ns + _AGAIN_NS - _FLOOD_OVER_NS
-
-    def next_wake_ns(self) -> int | None:
-        return self._due_ns
+        if self.due_ns is not None and any(key == _key(packet) for packet in self._packets.values()):
+            self.due_ns, self._kept_ns = None, now_ns + _AGAIN_NS - _FLOOD_OVER_NS
 
     def due(self, *, now_ns: int) -> list[Packet]:
         """The packets to flood once more now."""
-        if self._due_ns is None or now_ns < self._due_ns:
+        if self.due_ns is None or now_ns < self.due_ns:
             return []
-        self._due_ns, self._kept_ns = None, now_ns + _AGAIN_NS - _FLOOD_OVER_NS
+        self.due_ns, self._kept_ns = None, now_ns + _AGAIN_NS - _FLOOD_OVER_NS
         return [self._packets[part] for part in sorted(self._packets)]
 
 

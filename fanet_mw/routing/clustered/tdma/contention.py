@@ -15,8 +15,9 @@ class Contention:
         self._lead_ns = lead_ns
         self._jitter = jitter
         self._window = window
-        self.turns_at: Callable[[int], Turns | None] = lambda _: None
-        """The superframe in force at an instant; None: there is none, and a frame may go at any time."""
+        self.turns_at: Callable[[int], Turns | None] | None = None
+        """The superframe in force at an instant, or None when there is none: then a frame may go at any time. Where
+        there never is one, this is None itself."""
         self.most_jitter_ns: int | None = None
         """No jitter is longer; None: any."""
 
@@ -24,11 +25,12 @@ class Contention:
         """When a frame that is ready now may go, with a jitter of up to `jitter_ns`."""
         if self.most_jitter_ns is not None:
             jitter_ns = min(jitter_ns, self.most_jitter_ns)
-        return self.not_before(now_ns + self._lead_ns + int(self._jitter() * jitter_ns))
+        start_ns = now_ns + self._lead_ns + int(self._jitter() * jitter_ns)
+        return start_ns if self.turns_at is None else self.not_before(start_ns)
 
     def not_before(self, start_ns: int) -> int:
         """When a frame that is due at an instant may go: then, if no turns are about, else in a window."""
-        turns = self.turns_at(start_ns)
+        turns = None if self.turns_at is None else self.turns_at(start_ns)
         return start_ns if turns is None else turns.contending_ns(start_ns, self._window)
 
     def by_chance(self, share: float) -> bool:

@@ -27,6 +27,8 @@ class SlotAccess:
     ) -> None:
         self._port = port
         self._release = release
+        self.next_wake_ns = release.next_wake_ns
+        """The method of the release: it is asked after every reception."""
         self._membership = membership
         self._uplink = uplink
         self._floods = floods
@@ -92,9 +94,6 @@ class SlotAccess:
         return [*self._release.drain(), *self.drain_uplink()]
 
     # --- time -----------------------------------------------------------------------------------------------------
-
-    def next_wake_ns(self) -> int | None:
-        return self._release.next_wake_ns()
 
     def wake(self, now_ns: int) -> None:
         horizon_us = now_ns // US - self._lifetime_us

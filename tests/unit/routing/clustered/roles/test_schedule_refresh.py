@@ -39,13 +39,13 @@ def follows(term: int, leader: int, epoch: int) -> Beacon:
 )
 def test_who_follows_less_than_we_do_gets_the_newest(refresh: ScheduleRefresh, beacon: Beacon, lacks: bool) -> None:
     refresh.on_beacon(beacon, now_ns=11 * S)
-    assert (refresh.next_wake_ns() == 11 * S + 100 * MS) == lacks
+    assert (refresh.due_ns == 11 * S + 100 * MS) == lacks
     assert refresh.due(now_ns=12 * S) == ([PACKET] if lacks else [])
 
 
 def test_a_flood_is_given_time_to_arrive_by_itself(refresh: ScheduleRefresh) -> None:
     refresh.on_beacon(follows(5, 1, 6), now_ns=10 * S + 499 * MS)
-    assert refresh.next_wake_ns() is None
+    assert refresh.due_ns is None
 
 
 def test_what_another_has_sent_meanwhile_is_not_sent_again(refresh: ScheduleRefresh) -> None:
@@ -53,6 +53,6 @@ def test_what_another_has_sent_meanwhile_is_not_sent_again(refresh: ScheduleRefr
     refresh.on_copy(key_of(1, 3), now_ns=11 * S + 50 * MS)
     assert refresh.due(now_ns=12 * S) == []
     refresh.on_beacon(follows(5, 1, 6), now_ns=11 * S + 900 * MS)
-    assert refresh.next_wake_ns() is None, "it has just been sent"
+    assert refresh.due_ns is None, "it has just been sent"
     refresh.on_beacon(follows(5, 1, 6), now_ns=12 * S)
-    assert refresh.next_wake_ns() is not None
+    assert refresh.due_ns is not None

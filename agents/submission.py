@@ -1,0 +1,93 @@
+"""What an application hands over to be sent, checked before anything is done with it.
+
+What can never be sent is a mistake of the program, whatever the network does: it is named with its value and its bound
+by a LocalProtocolError, in the call that made it.
+"""
+
+from collections.abc import Collection, Mapping
+from typing import Final, NamedTuple
+
+from fanet_mw import mavlink, wire
+from fanet_mw.application import Data, Destination
+from fanet_mw.errors import LocalProtocolError, MalformedFrameError
+from fanet_mw.units import BROADCAST, NodeId
+from fanet_mw.wire.message import MAVLINK_PORT
+
+_MOST_PORT: Final = 0xFFFF
+_PRIORITIES: Final[Mapping[str | int, int]] = {
+    key: number for name, number in wire.PRIORITIES.items() for key in (name, number)
+}
+"""By name, and by number."""
+
+
+class Submission(NamedTuple):
+    """A message that can be sent, if it is not too long."""
+
+    port: int
+    """The numbered port; `MAVLINK_PORT`: `data` are MAVLink frames."""
+    data: bytes
+    to: NodeId
+    """The destination of the packets."""
+    targets: tuple[NodeId, ...]
+    """The nodes that are named one by one; none for a message to one node or to all."""
+    priority: int
+    confirm: bool
+    lifetime_ns: int | None
+    deadline_ns: int | None
+    born_ns: int
+
+
+class Sending(NamedTuple):
+    """The node that sends, and the swarm that it sends to."""
+
+    node: NodeId
+    nodes: int
+
+    def content(self, content: object) -> tuple[int, bytes]:
+        """The port and the bytes: of a message for a port, of MAVLink frames, or of a message of pymavlink."""
+        if isinstance(content, Data):
+            port, data = content
+            if not isinstance(port, int) or not 0 < port <= _MOST_PORT:
+                raise LocalProtocolError(f"port = {port!r} must be in [1, {_MOST_PORT}]")
+            if not isinstance(data, bytes | bytearray | memoryview):
+                raise LocalProtocolError(f"content for port {port} must be bytes, not {type(data).__name__}")
+            return port, bytes(data)
+        if not isinstance(content, bytes | bytearray | memoryview):
+            return MAVLINK_PORT, mavlink.packed(content, self.node)
+        frames = bytes(content)
+        try:
+            whole = sum(1 for _ in wire.frames(frames))
+        except MalformedFrameError as error:
+            raise LocalProtocolError(f"bytes without a port must be MAVLink 2 frames: {error}") from error
+        if not whole:
+            raise LocalProtocolError("bytes without a port must be MAVLink 2 frames, at least one")
+        return MAVLINK_PORT, frames
+
+    def whom(self, destination: Destination) -> tuple[NodeId, tuple[NodeId, ...]]:
+        """The destination of the packets, and the nodes that are named one by one."""
+        if destination == BROADCAST:
+            return BROADCAST, ()
+        nodes = (destination,) if isinstance(destination, int) else destination
+        if not isinstance(nodes, Collection) or not all(isinstance(node, int) for node in nodes):
+            raise LocalProtocolError(f"destination = {destination!r} must be a node id, several, or BROADCAST")
+        others = sorted({NodeId(node) for node in nodes} - {self.node})
+        if not others or not 0 < others[0] <= others[-1] <= self.nodes:
+            known = f"BROADCAST, or ids in [1, {self.nodes}] (nodes.count) of nodes other than {self.node}"
+            raise LocalProtocolError(f"destination = {destination!r} must be {known}")
+        return (others[0], ()) if len(others) == 1 else (BROADCAST, tuple(others))
+
+
+def priority_of(priority: str | int) -> int:
+    """The number of a priority that an application may use, given by name or number."""
+    number = _PRIORITIES.get(priority)
+    if number is None:
+        names = ", ".join(f"{name} ({number})" for name, number in wire.PRIORITIES.items())
+        raise LocalProtocolError(f"priority = {priority!r} must be one of {names}")
+    return number
+
+
+def positive(name: str, duration_ns: int | None) -> int | None:
+    """A duration that leaves time for something."""
+    if duration_ns is not None and duration_ns <= 0:
+        raise LocalProtocolError(f"{name} = {duration_ns} must be above 0")
+    return duration_ns

@@ -30,7 +30,7 @@ class Air:
 
     def __init__(self, scenario: Scenario, *, stations: int, faults: Faults, capture: bool = False) -> None:
         self._radio = scenario.radio
-        self._faults = faults
+        self.faults = faults
         self.book = LinkBook(stations)
         self._placement = Placement(scenario, stations=stations)
         self.arrays = arrays_of(scenario, self._placement.links(spare=0), stations=stations, capture=capture)
@@ -61,7 +61,7 @@ class Air:
         self.book.take(a.lk)
         spare = int(a.lk[s.UNDERWAY].sum())
         links = self._placement.links(spare=spare)
-        a.sf[s.NOISE] = self._faults.apply(links, self._placement.at)
+        a.sf[s.NOISE] = self.faults.apply(links, self._placement.at)
         a.g[s.REACH_NS] = max(a.g[s.REACH_NS] if spare else 0, links.longest_ns)
         room = 4 * (links.ints.shape[1] + a.st.shape[1]) + 64
         if a.hr.shape[0] < room + a.g[s.HR_N]:

@@ -52,9 +52,9 @@ class Medium(Actor):
         self._handover_ns = radio.handover_ns
         self._rx_topics = [topics.radio_rx(node) for node in nodes]
         self._station_of = {topics.radio_tx(node): node - 1 for node in nodes}
-        self._faults = Faults(radio, stations=self._count, planned=scenario.planned_faults)
+        faults = Faults(radio, stations=self._count, planned=scenario.planned_faults)
         self._capture = capture
-        self._air = Air(scenario, stations=self._count, faults=self._faults, capture=capture is not None)
+        self._air = Air(scenario, stations=self._count, faults=faults, capture=capture is not None)
         self._accounts = Accounts()
         self._measurement = Measurement(scenario.traffic_window_ns)
         self._numbers = RequestNumbers(self._count)
@@ -82,7 +82,7 @@ class Medium(Actor):
             self._obstruct(message)
         elif topic == self._topics.radio_control and isinstance(message, Degrade | Jam | Cut | Restore):
             self.wake(now_ns)
-            why = self._faults.obey(message, self._now_ns)
+            why = self._air.faults.obey(message, self._now_ns)
             self._accounts.controls += why is None
             self._take_in_faults(why)
         else:
@@ -197,9 +197,9 @@ class Medium(Actor):
         sample_ns = self._measurement.next_ns()
         if sample_ns is not None and sample_ns <= due_ns:
             self._measurement.pass_time(due_ns, self._sample())
-        fault_ns = self._faults.next_ns()
+        fault_ns = self._air.faults.next_ns()
         if fault_ns is not None and fault_ns <= due_ns:
-            self._take_in_faults(*self._faults.pass_time(due_ns))
+            self._take_in_faults(*self._air.faults.pass_time(due_ns))
         book = self._air.book
         if book.next_ns is not None and book.next_ns <= due_ns:
             if self._report_links(due_ns) or self._slots.in_flight:
@@ -209,7 +209,7 @@ class Medium(Actor):
         self._due_ns = self._next_due_ns()
 
     def _next_due_ns(self) -> int | None:
-        return earliest(self._measurement.next_ns(), self._faults.next_ns(), self._air.book.next_ns)
+        return earliest(self._measurement.next_ns(), self._air.faults.next_ns(), self._air.book.next_ns)
 
     def _sample(self) -> Sample:
         arrays, now_ns = self._air.arrays, self._now_ns
@@ -227,9 +227,9 @@ class Medium(Actor):
         for why in refused:
             if why is not None:
                 self._accounts.refused[why] += 1
-        if self._faults.records:
-            self.records += self._faults.records
-            self._faults.records.clear()
+        if self._air.faults.records:
+            self.records += self._air.faults.records
+            self._air.faults.records.clear()
             self._air.relink()
             self._due_ns = self._next_due_ns()
 

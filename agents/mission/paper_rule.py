@@ -34,7 +34,6 @@ class PaperRule:
         self._config = scenario.mission
         self._altitude_m = scenario.nodes.altitude_m
         self._speed_m_s = approach_speed_m_s(scenario, node)
-        self._report_ns = seconds_to_ns(self._config.report_interval_s)
         self._heard_for_ns = seconds_to_ns(_MISSED_SCANS * self._config.scan_interval_s)
         self._format = ReportFormat(scenario, node)
         self._outbox = outbox
@@ -73,7 +72,7 @@ class PaperRule:
             if now_ns - measured.t_us * US > self._heard_for_ns:
                 del self._measured[survivor]  # a receiver that hears no phone says nothing
             elif now_ns >= self._due_ns[survivor]:
-                self._due_ns[survivor] = now_ns + self._report_ns
+                self._due_ns[survivor] = now_ns + seconds_to_ns(self._config.report_interval_s)
                 self._outbox.packets.append(self._format.packet(measured))
 
     def reported(self, report: Survivor, *, position: Enu, now_ns: int) -> None:

@@ -14,6 +14,7 @@ from collections.abc import Collection, Sequence
 from dataclasses import dataclass, field
 from typing import Final, NamedTuple
 
+from fanet_mw.delivery.round_trips import RoundTrips
 from fanet_mw.units import BROADCAST, MS, US, NodeId
 from fanet_mw.wire import message as wire_message
 from fanet_mw.wire.message import MAVLINK_PORT, MOST_PIECES, Head, Receipt
@@ -26,7 +27,6 @@ EXPIRED: Final = -1
 _WINDOW: Final = 32
 """Pieces under way, at most: ten kilobytes and more, and no flood of packets."""
 _LEAST_WINDOW: Final = 2
-_LEAST_WAIT_NS: Final = 300 * MS
 _MOST_DOUBLINGS: Final = 3
 _MOST_FLOWS: Final = 1024
 _FEW: Final = 2
@@ -102,7 +102,7 @@ class Sender:
         self._node = node
         self._everyone = tuple(NodeId(other) for other in everyone if other != node)
         self._most_bytes = most_bytes
-        self._wait_ns = wait_ns
+        self._round_trips = RoundTrips(wait_ns)
         self._messages: dict[int, _Outgoing] = {}
         self._flows: dict[tuple[tuple[NodeId, ...], int, int], _Flow] = {}
         self._next_flow = 0
@@ -114,8 +114,6 @@ class Sender:
         self._kept_bytes = 0
         self._under_way = 0
         self._window = _WINDOW
-        self._rtt_ns: dict[NodeId, tuple[int, int]] = {}
-        """Of each target, the smoothed time until its receipt, and how much that varies."""
         self.told: list[Told] = []
         """What has become of messages since this list was emptied last."""
         self.repeated = 0
@@ -204,7 +202,7 @@ class Sender:
         if message is None or origin not in message.lacking:
             return
         if message.rounds == 1:  # else nobody knows to which copy the receipt is
-            self._measured(origin, now_ns - message.sent_ns)
+            self._round_trips.measured(origin, now_ns - message.sent_ns)
         if receipt.outcome == wire_message.MISSING:
             message.lacking[origin] |= receipt.held & ((1 << message.pieces) - 1)
             return
@@ -213,16 +211,6 @@ class Sender:
         if not message.lacking:
             self._window = min(_WINDOW, self._window + 1)
             self._close(message)
-
-    def _measured(self, target: NodeId, took_ns: int) -> None:
-        """RFC 6298, section 2."""
-        known = self._rtt_ns.get(target)
-        if known is None:
-            self._rtt_ns[target] = took_ns, took_ns // 2
-            return
-        smooth_ns, varies_ns = known
-        varies_ns += (abs(smooth_ns - took_ns) - varies_ns) // 4
-        self._rtt_ns[target] = smooth_ns + (took_ns - smooth_ns) // 8, varies_ns
 
     def _close(self, message: _Outgoing) -> None:
         del self._messages[message.number]
@@ -282,11 +270,7 @@ class Sender:
         return packets
 
     def _patience_ns(self, message: _Outgoing) -> int:
-        most_ns = 0
-        for target in message.lacking:
-            known = self._rtt_ns.get(target)
-            wait_ns = self._wait_ns if known is None else max(_LEAST_WAIT_NS, known[0] + 4 * known[1])
-            most_ns = max(most_ns, wait_ns)
+        most_ns = max(map(self._round_trips.wait_ns, message.lacking), default=0)
         return most_ns << min(message.rounds - 1, _MOST_DOUBLINGS)
 
     def _packets(

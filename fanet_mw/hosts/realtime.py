@@ -11,11 +11,10 @@ host, and with it the process.
 import asyncio
 import gc
 import json
-import resource
 import secrets
 from collections.abc import Callable
 from pathlib import Path
-from typing import Any, Final, NamedTuple
+from typing import Final, NamedTuple
 
 from fanet_mw.actor import Actor
 from fanet_mw.bus import codecs
@@ -24,14 +23,14 @@ from fanet_mw.bus.topics import Topics
 from fanet_mw.errors import ConfigError
 from fanet_mw.hosts.bus import JOIN_PATIENCE_S, Bus, HostBus, config_of
 from fanet_mw.hosts.clock import START_PATIENCE_S, ClockListener, SwarmClock
+from fanet_mw.hosts.host_figures import HostFigures
 from fanet_mw.hosts.inbox import Inbox
-from fanet_mw.hosts.lateness import Histogram
 from fanet_mw.hosts.presence import few
 from fanet_mw.hosts.timebase import THIS_MACHINE, Timebase
 from fanet_mw.scenario import Scenario
 from fanet_mw.scenario.identity import as_json, differences, fingerprint
 from fanet_mw.trace import Record
-from fanet_mw.units import MS, S
+from fanet_mw.units import S
 
 _LOOK_EVERY_S: Final = 0.5
 """How often records are published and the router is checked; a killed process loses the records of this time."""
@@ -40,6 +39,15 @@ _ON_ITS_WAY_S: Final = 0.1
 _LOOKS_PER_REPORT: Final = 2
 _SCENARIO_S: Final = 1.0
 """How long a process waits to be told which scenario the swarm runs."""
+
+
+class _WakeUp(NamedTuple):
+    """A wake-up that the actor has requested, and the timer that is set for it."""
+
+    asked_ns: int
+    due_ns: int
+    """The instant from which the wake-up counts as late: not before the call at which it was requested."""
+    timer: asyncio.TimerHandle
 
 
 class RealtimeHost:
@@ -56,22 +64,12 @@ class RealtimeHost:
         self._failure: asyncio.Future[None] = self._loop.create_future()
         self._clock: SwarmClock | None = None
         self._running = False
-        self._timer: asyncio.TimerHandle | None = None
-        self._timer_ns: int | None = None
-        """The wake-up that the actor has requested and the timer is set for."""
-        self._due_ns = 0
-        """The instant from which that wake-up counts as late."""
+        self._wake_up: _WakeUp | None = None
+        """The wake-up that the actor has requested; None: it has requested none."""
         self._call_ns = 0
         """The instant that the actor was given at its last call."""
-        self._asked_past_ns = 0
-        """How far an instant lay in the past at most when the actor requested it."""
-        self._stall_ns = 0
-        """The longest time for which the loop did nothing although it should have."""
-        self._unread = 0
-        """How many receptions came after the end."""
         self._records: list[Record] = []
-        self._lateness = Histogram()
-        self._puts = 0
+        self._figures = HostFigures()
 
     async def run(
         self,
@@ -161,7 +159,7 @@ class RealtimeHost:
             while (left_s := self._clock.wait_s(until_ns)) > 0:
                 wait_s, began_s = min(left_s, _LOOK_EVERY_S), self._loop.time()
                 await asyncio.wait((stopped, self._failure), timeout=wait_s, return_when=asyncio.FIRST_COMPLETED)
-                self._stall_ns = max(self._stall_ns, round((self._loop.time() - began_s - wait_s) * S))
+                self._figures.stalled(round((self._loop.time() - began_s - wait_s) * S))
                 if self._failure.done():
                     break
                 if stopped.done():
@@ -179,9 +177,9 @@ class RealtimeHost:
     def _halt(self) -> None:
         """Make no more calls of the actor from the loop."""
         self._running = False
-        if self._timer is not None:
-            self._timer.cancel()
-            self._timer = None
+        if self._wake_up is not None:
+            self._wake_up.timer.cancel()
+            self._wake_up = None
 
     async def _finish(self, until_ns: int) -> None:
         self._halt()
@@ -196,7 +194,7 @@ class RealtimeHost:
 
     def _receive_last(self, topic: str, message: Message, now_ns: int) -> None:
         """Count what was on its way at the end; an actor that accounts for it (`hears_out`) still receives it."""
-        self._unread += isinstance(message, Reception)
+        self._figures.unread += isinstance(message, Reception)
         if self._actor.hears_out:
             self._actor.receive(topic, message, now_ns)
 
@@ -243,28 +241,26 @@ class RealtimeHost:
 
     def _arm(self) -> None:
         wake_ns = self._actor.next_wake_ns()
-        if wake_ns == self._timer_ns:
-            return
-        if self._timer is not None:
-            self._timer.cancel()
-        self._timer_ns, self._timer = wake_ns, None
+        if self._wake_up is not None:
+            if wake_ns == self._wake_up.asked_ns:
+                return
+            self._wake_up.timer.cancel()
+            self._wake_up = None
         if wake_ns is None:
             return
         assert self._clock is not None, "the clock is running"
-        self._due_ns = max(wake_ns, self._call_ns)
-        self._asked_past_ns = max(self._asked_past_ns, self._call_ns - wake_ns)
-        self._timer = self._loop.call_later(self._clock.wait_s(wake_ns), self._wake)
+        self._figures.asked(wake_ns, call_ns=self._call_ns)
+        timer = self._loop.call_later(self._clock.wait_s(wake_ns), self._wake)
+        self._wake_up = _WakeUp(wake_ns, max(wake_ns, self._call_ns), timer)
 
     def _wake(self) -> None:
         self._guard(self._wake_actor)
 
     def _wake_actor(self) -> None:
-        due_ns, now_ns = self._timer_ns, self.now_ns()
-        self._timer = self._timer_ns = None
-        if due_ns is not None and now_ns >= due_ns:  # otherwise the loop's clock is a little fast: arm again
-            late_ns = now_ns - self._due_ns
-            self._lateness.add(late_ns)
-            self._stall_ns = max(self._stall_ns, late_ns)
+        wake_up, now_ns = self._wake_up, self.now_ns()
+        self._wake_up = None
+        if wake_up is not None and now_ns >= wake_up.asked_ns:  # else the loop's clock is a little fast: arm again
+            self._figures.woken(now_ns - wake_up.due_ns)
             self._call_ns = now_ns
             self._actor.wake(now_ns)
         self._publish_and_arm()
@@ -281,7 +277,7 @@ class RealtimeHost:
             actor.outbox.clear()
             for topic, messages in by_topic.items():
                 self._bus.put(topic, codecs.encode(messages))
-            self._puts += len(by_topic)
+            self._figures.puts += len(by_topic)
         if actor.records:
             self._records += actor.records
             actor.records.clear()
@@ -295,37 +291,18 @@ class RealtimeHost:
             self._bus.put(self._names.trace(self._actor.name), codecs.encode([batch]), reliable=True)
 
     def _publish_report(self, *, final: bool) -> None:
-        content = {**self._actor.report(), "final": final, "host": self._figures(final=final)}
+        content = {
+            **self._actor.report(),
+            "final": final,
+            "host": {**self._figures.summary(final=final), **self._inbox.figures()},
+        }
         report = Report(self._actor.name, self.now_ns(), json.dumps(content))
         self._bus.put(self._names.report(self._actor.name), codecs.encode([report]), reliable=True)
-
-    def _figures(self, *, final: bool) -> dict[str, Any]:
-        usage = resource.getrusage(resource.RUSAGE_SELF)
-        return {
-            "wake_lateness_ms": self._lateness.summary(),
-            "asked_past_ms": round(self._asked_past_ns / MS, 3),
-            "stall_ms": round(self._stall_ns / MS, 3),
-            "cpu_s": round(usage.ru_utime + usage.ru_stime, 3),
-            "uss_mb": uss_mb() if final else None,  # reading it holds up the process for more than a millisecond
-            "unread_receptions": self._unread,
-            "puts": self._puts,
-            **self._inbox.figures(),
-        }
 
 
 def _settle(answer: "asyncio.Future[bytes]", payload: bytes) -> None:
     if not answer.done():
         answer.set_result(payload)
-
-
-def uss_mb() -> float | None:
-    """The memory that this process shares with no other [MB]; None where /proc does not tell."""
-    try:
-        text = Path("/proc/self/smaps_rollup").read_text(encoding="ascii")
-    except OSError:
-        return None
-    private = [line.split()[1] for line in text.splitlines() if line.startswith("Private_")]
-    return round(sum(int(kb) for kb in private) / 1024, 2)
 
 
 class SwarmAddress(NamedTuple):

@@ -62,6 +62,7 @@ def test_an_interrupt_that_an_import_took_for_its_failure_ends_what_starts_next(
         assert interrupts.exit_code(again.value) == 128 + number
         loop.run(nothing())
     finally:
+        interrupts.install()  # which forgets the interrupt: it must not end what a later test of this process runs
         for one, handler in zip(interrupts.SIGNALS, before, strict=True):
             signal.signal(one, handler)
 
@@ -75,5 +76,6 @@ def test_an_interrupt_that_got_lost_ends_a_simulation_before_it_starts() -> None
         with pytest.raises(KeyboardInterrupt), interrupts.handed_to(lambda _: None):
             pytest.fail("nothing is started")
     finally:
+        interrupts.install()  # which forgets the interrupt: it must not end what a later test of this process runs
         for one, handler in zip(interrupts.SIGNALS, before, strict=True):
             signal.signal(one, handler)

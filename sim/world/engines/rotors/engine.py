@@ -29,7 +29,11 @@ _TUMBLE_PER_S: Final = 2.0
 
 
 class Rotors(Engine):
-    """A swarm of one type of vehicle."""
+    """A swarm of one type of vehicle.
+
+    Eight of its sixteen attributes are the state of all bodies, one array for each quantity with a column for a body,
+    because numpy is fast only with arrays of this kind.
+    """
 
     name = "rotors"
 

@@ -1,4 +1,4 @@
-"""Which course a UAV flies of those that its applications command.
+"""The choice of the course that a UAV flies, of those that its applications command.
 
 A course is flown if no other application objects, once all have had the same input; of several courses of one
 application the last counts.
@@ -10,7 +10,7 @@ from fanet_mw.application import Application, Course
 
 
 class CourseArbitration:
-    """The courses of one UAV."""
+    """The courses that the applications of one UAV command, and the one that is flown."""
 
     def __init__(
         self,
@@ -18,12 +18,12 @@ class CourseArbitration:
         judges: Sequence[Application],
         fly: Callable[[Course, int], None],
     ) -> None:
-        """`applications` in the order in which their courses count; `judges` are those that may object."""
+        """`applications` stand in the order in which their courses count; `judges` are those that may object."""
         self._applications = tuple(applications)
         self._judges = tuple(judges)
         self._fly = fly
         self._commanded: dict[str, Course] = {}
-        """What was commanded since the last input, by application."""
+        """The courses that were commanded since the last input, by application."""
 
     def command(self, application: Application, course: Course) -> None:
         self._commanded[application.name] = course

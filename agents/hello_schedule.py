@@ -1,4 +1,4 @@
-"""When a UAV says hello, and whom it has heard say hello lately."""
+"""The instants at which a UAV says hello, and the neighbors that it has heard say hello lately."""
 
 from typing import Final, Protocol
 
@@ -20,31 +20,31 @@ class HelloTime(Protocol):
         """The inner frames for the hello that is said now; empty while there is no time to tell."""
 
     def announced(self, hello: AnnouncedHello) -> None:
-        """That hello was announced to the radio, which will tell when it has ended."""
+        """Take in that the hello was announced to the radio, which will tell when it has ended."""
 
 
 class HelloSchedule:
     """The hellos of one UAV, and those that it hears."""
 
     def __init__(self, scenario: Scenario, node: Node, time: HelloTime | None) -> None:
-        """`time`: what the hellos say of the time; None: nothing."""
+        """`time` adds swarm time to the hellos; None: they say nothing of it."""
         self._node = node
         self._time = time
         self._lead_ns = scenario.radio.lead_ns
         self._interval_ns = seconds_to_ns(scenario.routing.hello_interval_s)
         self._random = stream(scenario.seed, "hello", node.node).random
         self._next_ns: int | None = None
-        """When the next hello goes; None: none does."""
+        """The instant of the next hello; None: the UAV says none."""
         self._heard_ns: dict[NodeId, int] = {}
-        """When a hello of each other node was heard last."""
+        """The instant at which a hello of each other node was heard last."""
 
     def start(self, now_ns: int) -> None:
-        """The UAV is up: its first hello comes at a random instant of the first interval."""
+        """Choose the instant of the first hello, at random within the first interval."""
         if self._interval_ns:
             self._next_ns = now_ns + self._lead_ns + int(self._random() * self._interval_ns)
 
     def due_ns(self) -> int | None:
-        """When the next hello has to be announced to the radio."""
+        """The instant at which the next hello has to be announced to the radio."""
         return None if self._next_ns is None else self._next_ns - self._lead_ns
 
     def say(self, inner: bytes, now_ns: int) -> None:

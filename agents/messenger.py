@@ -1,9 +1,9 @@
-"""The messages of a node's applications: what they send goes into packets, what packets bring goes to who listens.
+"""The messages of a node's applications: what they send goes into packets, what packets bring to the listeners.
 
     plain MAVLink frames to one node or all         -> one packet, as it is
     bytes, a set of nodes, or to be confirmed       -> pieces, receipts (`fanet_mw.delivery`)
 
-What becomes of them is told in `statuses.py`.
+`statuses.py` tells the applications what becomes of their messages.
 """
 
 from collections import Counter
@@ -49,10 +49,10 @@ class Messenger:
         self._sender = Sender(node.node, scenario.node_ids, most_bytes=self._room, wait_ns=wait_ns)
         self._receiver = Receiver(node.node, self._has_listener, random=stream(scenario.seed, "receipts", node.node))
         self._in_time_ns: int | None = None
-        """When the last message with a deadline was taken."""
+        """The instant at which the last message with a deadline was accepted."""
         self._statuses = Statuses(node)
         self._counts: Counter[str] = Counter()
-        """How many messages in pieces were sent and handed over."""
+        """The numbers of messages in pieces that were sent, and that were handed over."""
 
     def start(self, now_ns: int) -> None:
         self._sender.start(CONTROL | now_ns // RESTART_STEP_NS % CONTROL)
@@ -104,7 +104,7 @@ class Messenger:
             raise LocalProtocolError(f"message of {len(data)} bytes must be <= {most} (radio.max_frame_bytes)")
 
     def _judge(self, deadline_ns: int, born_ns: int) -> tuple[bool, int | None]:
-        """Whether a message can be there in time, and the least interval between such messages, where that is known.
+        """True if a message can arrive in time, and the least interval between such messages, where that is known.
 
         Where the network states no bound, every message is taken. Messages that are taken are at least the interval
         apart, which is what the bound assumes.
@@ -158,12 +158,12 @@ class Messenger:
     # --- in -------------------------------------------------------------------------------------------------------
 
     def piece(self, packet: Packet, now_ns: int) -> None:
-        """A packet with a piece of a message; raises MalformedFrameError."""
+        """Take in a packet with a piece of a message; raises MalformedFrameError."""
         piece = decode_piece(packet.frame)
         self._receiver.hear(packet.origin, piece, packet.frame, priority=packet.header.priority, now_ns=now_ns)
 
     def receipts(self, packet: Packet, now_ns: int) -> None:
-        """A packet with receipts; raises MalformedFrameError."""
+        """Take in a packet with receipts; raises MalformedFrameError."""
         for receipt in decode_receipts(packet.frame):
             self._sender.receipt(packet.origin, receipt, now_ns)
 
@@ -171,11 +171,11 @@ class Messenger:
         return bool(self._of(piece.head.port, piece.data))
 
     def _of(self, port: int, data: bytes) -> Sequence[Application]:
-        """Those that listen to a message: by its port, or by the id of the MAVLink frame that it is."""
+        """The applications that listen to a message, by its port or by the id of its MAVLink frame."""
         return self._listeners.of_message(_message_id(data)) if port == MAVLINK_PORT else self._listeners.of_port(port)
 
     def arrived(self) -> list[tuple[Application, Received]]:
-        """Messages to hand over now, each to all that listen to it."""
+        """The messages to hand over now, each with an application that listens to it."""
         if not self._receiver.arrived:
             return []
         arrived = [(whole, _received(whole)) for whole in self._receiver.arrived]
@@ -184,7 +184,7 @@ class Messenger:
         return [(a, message) for whole, message in arrived for a in self._of(whole.head.port, whole.data)]
 
     def statuses(self, now_ns: int) -> list[tuple[Application, Status]]:
-        """What is to be told now; what an application does about it is told of later."""
+        """The statuses to be told now; what an application does about them is told later."""
         return self._statuses.take(self._sender.told, now_ns)
 
     # --- time -----------------------------------------------------------------------------------------------------
@@ -205,7 +205,7 @@ class Messenger:
         return earliest(self._sender.next_wake_ns(), self._receiver.next_wake_ns())
 
     def report(self) -> Mapping[str, Any]:
-        """Counters, for people; nothing when no application has sent or got anything by way of here."""
+        """The counters of messages, for people; empty when no application has sent or received any."""
         counts = self._counts + self._statuses.counts
         if not counts:
             return {}

@@ -1,8 +1,8 @@
-"""The applications of one node: who is given what comes in, and where what they put out goes.
+"""The applications of one node: which of them is given what comes in, and where what they put out goes.
 
 a message, a reading, a hello  ->  those that listen to it, in the order of the applications (`listeners.py`)
 what one sends                 ->  the node, at once (`messenger.py`)
-a course that one commands     ->  the vehicle, when all have had the same input (`arbitration.py`)
+a course that one commands     ->  the vehicle, when all have had the same input (`course_arbitration.py`)
 """
 
 from collections.abc import Callable, Iterable, Mapping, Sequence
@@ -30,13 +30,13 @@ _OF_MESSENGER: Final = {
     wire.TARGETS.msgid: lambda messenger: messenger.piece,
     wire.RECEIPT.msgid: lambda messenger: messenger.receipts,
 }
-"""By the message that a packet begins with: the method of the messenger that takes such packets."""
+"""The method of the messenger that takes a packet, by the id of the message with which the packet begins."""
 INNER_ID: Final = slice(wire.HEADER_BYTES + 7, wire.HEADER_BYTES + 10)
-"""Where a packet has the message id of its first inner frame."""
+"""The place of the message id of the first inner frame in a packet."""
 
 
 class Onboard:
-    """The applications of one node."""
+    """The applications of one node, their inputs and what they put out."""
 
     def __init__(
         self,
@@ -47,7 +47,7 @@ class Onboard:
         fly: Callable[[Course, int], None],
         tap: Callable[[bytes, int], None],
     ) -> None:
-        """`vehicle` tells position and velocity; `fly` and `tap` are told what, and at which instant."""
+        """`vehicle` tells position and velocity; `fly` and `tap` take a course or frames, and an instant."""
         names = [application.name for application in applications]
         if len(set(names)) < len(names):
             raise LocalProtocolError(f"applications {names} of node {node.node}: each name must be there once")
@@ -57,16 +57,17 @@ class Onboard:
         self.now_ns = 0
         """The instant of the input that is being handled."""
         self.called = False
-        """Set whenever an application has been called: it may have commanded a course, or want another wake-up."""
+        """True once an application has been called: it may have commanded a course, or want another wake-up."""
         self._applications = tuple(applications)
         self._callbacks = Callbacks.of(applications)
         self._listeners = Listeners(applications)
         self.wanted = self._listeners.wanted(also=_OF_MESSENGER)
-        """Message ids of packets that are for anyone on board, as in a frame: most are for nobody; None: any."""
+        """The message ids, as in a frame, that any application wants; most packets have none of them. None: every
+        id."""
         self._messenger = Messenger(node, self._listeners)
         self.arbitration = CourseArbitration(applications, self._callbacks.permits, fly)
         self._with_radio: dict[int, tuple[Application, int]] = {}
-        """By transmit request: the application whose packet's first frame it is, and the packet's handle."""
+        """For the transmit request of a packet's first frame, the application that sent the packet and its handle."""
 
     @property
     def hears_hellos(self) -> bool:
@@ -79,11 +80,11 @@ class Onboard:
             application.start(_Port(self, application), now_ns)
 
     def messages(self) -> Mapping[str, Any]:
-        """Counters of messages in pieces; nothing when there were none."""
+        """The counters of messages in pieces; empty when there were none."""
         return self._messenger.report()
 
     def report(self, names: Iterable[str]) -> Mapping[str, Any]:
-        """The reports of these applications, by their names; those that have nothing to say are left out."""
+        """The reports of these applications by their names, without those that are empty."""
         wanted = set(names)
         found = {a.name: dict(a.report()) for a in self._applications if a.name in wanted}
         return {name: report for name, report in found.items() if report}
@@ -94,7 +95,7 @@ class Onboard:
         self.now_ns, self.called = now_ns, True
 
     def deliver(self, packet: Packet, now_ns: int) -> None:
-        """Give a packet for this node to those that listen to it; most are for nobody."""
+        """Give a packet for this node to the applications that listen to it; for most packets there are none."""
         frame = packet.frame
         message_id = int.from_bytes(frame[INNER_ID], "little")
         if message_id in _OF_MESSENGER:
@@ -114,7 +115,7 @@ class Onboard:
             self._guard(application.on_message, message, now_ns)
 
     def on_hello(self, frame: bytes, now_ns: int) -> None:
-        """A neighbor's hello."""
+        """Give a neighbor's hello to the applications that listen to hellos."""
         self._call(now_ns)
         for application in self._callbacks.on_hello:
             self._guard(application.on_hello, frame, now_ns)
@@ -136,7 +137,7 @@ class Onboard:
             application.on_sensor(reading, now_ns)
 
     def radio_done(self, status: TxStatus, now_ns: int) -> None:
-        """Tell the application whose packet's first frame it was how a transmit request ended."""
+        """Tell the application that sent a packet how the transmit request of its first frame ended."""
         found = self._with_radio.pop(status.seq, None)
         if found is None:
             return
@@ -147,13 +148,13 @@ class Onboard:
             application.on_status(Status(handle, fate, now_ns), now_ns)
 
     def hello_frames(self, now_ns: int) -> bytes:
-        """What applications add to the hello that goes out now."""
+        """The inner frames that applications add to the hello that goes out now."""
         return b"".join(application.hello_frames(now_ns) for application in self._callbacks.hello_frames)
 
     # --- time -----------------------------------------------------------------------------------------------------
 
     def wake(self, now_ns: int) -> None:
-        """Wake those whose instant has come."""
+        """Wake the applications whose instant has come."""
         self._call(now_ns)
         for application in self._callbacks.next_wake_ns:
             due_ns = application.next_wake_ns()

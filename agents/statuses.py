@@ -1,4 +1,4 @@
-"""What became of the messages of a node's applications, and who is to be told.
+"""What became of the messages of a node's applications, and which application is to be told.
 
     a packet is let out, or dropped in this node  ->  `Node.fates`, for packets that are watched
     a message is acknowledged, or expires         ->  `Sender.told`
@@ -19,14 +19,14 @@ from fanet_mw.units import seconds_to_ns
 from fanet_mw.wire.message import DELIVERED, NO_LISTENER
 
 _MOST_WATCHED: Final = 8192
-"""The number of packets of which is remembered whose they are."""
+"""The number of packets whose application is remembered."""
 _OUTCOMES: Final = {EXPIRED: Fate.EXPIRED, DELIVERED: Fate.ACKNOWLEDGED, NO_LISTENER: Fate.UNWANTED}
 _REASONS: Final = {DropReason.ADMISSION: Fate.REFUSED, DropReason.EXPIRED: Fate.EXPIRED}
-"""The fates of packets that were dropped for these reasons; for any other reason it is DROPPED."""
+"""The fates of packets that were dropped for these reasons; for any other reason the fate is DROPPED."""
 
 
 class _Watched(NamedTuple):
-    """Whose packet it is, and what it belongs to."""
+    """The application and the message that a packet belongs to."""
 
     application: Application
     handle: int
@@ -37,17 +37,17 @@ class _Watched(NamedTuple):
 
 
 class Statuses:
-    """The statuses of one node's messages."""
+    """The statuses of one node's messages, until they are told."""
 
     def __init__(self, node: Node) -> None:
         self._node = node
         self._owners: dict[int, Application] = {}
-        """By handle: who sent a message that is to be confirmed and is not over."""
+        """The application that sent each message that is to be confirmed and is not over, by the message's handle."""
         self._watched: dict[int, _Watched] = {}
-        """By sequence number of the packet."""
+        """The packets of which the application wants to hear, by sequence number."""
         self._waiting: deque[tuple[Application, Status]] = deque()
         self.counts: Counter[str] = Counter()
-        """What became of messages in pieces, by fate."""
+        """The numbers of messages in pieces, by their fates."""
 
     def tell(self, application: Application, status: Status) -> None:
         if status.handle & CONTROL:
@@ -56,15 +56,15 @@ class Statuses:
             self._waiting.append((application, status))
 
     def own(self, handle: int, application: Application) -> None:
-        """Note who has sent a message that is to be confirmed."""
+        """Note the application that has sent a message that is to be confirmed."""
         self._owners[handle] = application
 
     def owner(self, handle: int) -> Application | None:
-        """Who sent a message that is to be confirmed; None when that message is over."""
+        """The application that sent a message that is to be confirmed; None when that message is over."""
         return self._owners.get(handle)
 
     def watch(self, seq: int, application: Application, handle: int, *, first: bool, confirmed: bool) -> None:
-        """Note whose message a packet carries, or a piece of."""
+        """Note which application's message a packet carries, whole or a piece of it."""
         self._watched[seq] = _Watched(application, handle, first, confirmed)
         if len(self._watched) > _MOST_WATCHED:
             self._unwatch(next(iter(self._watched)))
@@ -78,7 +78,7 @@ class Statuses:
         return bool(self._waiting or self._node.fates)
 
     def take(self, told: list[Told], now_ns: int) -> list[tuple[Application, Status]]:
-        """What is to be told now, `told` being what the sender knows; both lists of news are emptied."""
+        """The statuses to be told now; `told` is the news of the sender. Both lists of news are emptied."""
         if self._node.fates:
             for seq, t_ns, reason in self._node.fates:
                 self._packet_fate(seq, t_ns, reason)
@@ -97,13 +97,15 @@ class Statuses:
         return found
 
     def _packet_fate(self, seq: int, t_ns: int, reason: DropReason | None) -> None:
-        """The node let a packet out, or dropped it."""
+        """Take in that the node let a packet out, or dropped it."""
         watched = self._watched.get(seq)
         if watched is None:
             return
         application, handle, first, confirmed = watched
         if reason is None:
-            if first and (not confirmed or handle in self._owners):  # else it is over: nobody waits to hear of it
+            if first and (
+                not confirmed or handle in self._owners
+            ):  # else it is over: no application waits to hear of it
                 self.tell(application, Status(handle, Fate.LET_OUT, t_ns))
             return
         self._unwatch(seq)

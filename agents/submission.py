@@ -17,7 +17,7 @@ _MOST_PORT: Final = 0xFFFF
 _PRIORITIES: Final[Mapping[str | int, int]] = {
     key: number for name, number in wire.PRIORITIES.items() for key in (name, number)
 }
-"""By name, and by number."""
+"""The priorities that an application may name, by name and by number."""
 
 
 class Submission(NamedTuple):
@@ -29,7 +29,7 @@ class Submission(NamedTuple):
     to: NodeId
     """The destination of the packets."""
     targets: tuple[NodeId, ...]
-    """The nodes that are named one by one; none for a message to one node or to all."""
+    """The nodes that are named one by one; empty for a message to one node or to all."""
     priority: int
     confirm: bool
     lifetime_ns: int | None

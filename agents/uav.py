@@ -44,11 +44,11 @@ class NodeState(NamedTuple):
     neighbors: tuple[NodeId, ...]
     bound_ns: int | None
     clusters: Mapping[NodeId, tuple[NodeId, ...]]
-    """By head, the nodes of each cluster, the head first, as far as the node knows."""
+    """The nodes of each cluster as far as the node knows, by head; the head is the first of them."""
 
 
 class _Topics(NamedTuple):
-    """Where the messages of a UAV go."""
+    """The topics of the messages that a UAV receives and sends."""
 
     transmit: str
     setpoint: str
@@ -56,7 +56,7 @@ class _Topics(NamedTuple):
 
 
 class Uav(Actor):
-    """One UAV."""
+    """The node and the applications of one UAV as an actor."""
 
     def __init__(
         self,
@@ -77,14 +77,15 @@ class Uav(Actor):
         self._id = node
         self._topics = _Topics(topics.radio_tx(node), topics.setpoint(node), topics.mavlink(node))
         self._prompt_ns = scenario.radio.handover_ns + scenario.radio.lead_ns
-        """After the end of a frame: who hears of it later than this is too late for what comes a lead after it."""
+        """A reception later than this after its frame's end is too late for what has to follow a lead after the
+        frame."""
         self._node = Node(node, scenario, make_protocol, position=position)
         self._autopilot = Autopilot(node, position=position, telemetry_hz=scenario.nodes.telemetry_hz)
         self._reckoning = DeadReckoning()
         self._fixes = SteadyFix(sigma_m=scenario.world.gps_sigma_m, range_m=scenario.radio.range_m)
         asked_for = _asked_for(scenario, node, self._autopilot, position, onboard_map)
         self._built_in = tuple(application.name for application in asked_for)
-        """Applications whose counters stand among the UAV's own in its report."""
+        """The applications whose counters stand among the UAV's own in its report."""
         carried = (*_foreign(scenario, node), *applications)
         self._own = tuple(application.name for application in carried)
         self._onboard = Onboard(
@@ -96,10 +97,10 @@ class Uav(Actor):
         )
         self._hellos = HelloSchedule(scenario, self._node, hello_time)
         self._own_wake_ns: int | None = None
-        """When an application or a hello is due; changes whenever an application has been called."""
+        """The instant at which an application or a hello is due; it changes when an application has been called."""
         self._malformed = 0
         self._heard_late = 0
-        """Receptions that were handed over too late."""
+        """The number of receptions that were handed over too late."""
 
     # --- the actor contract ---------------------------------------------------------------------------------------
 
@@ -138,7 +139,7 @@ class Uav(Actor):
         return False
 
     def _fix(self, fix: Gps, now_ns: int) -> None:
-        """Where we are, by GPS or in place of it."""
+        """Take in a position of this UAV, from GPS or from what stands in for it."""
         self._autopilot.fix(fix)
         self._node.moved(self._fixes.position(fix), fix.velocity)
         self._onboard.fix(fix, now_ns)
@@ -159,7 +160,7 @@ class Uav(Actor):
         return own_ns if node_ns is None or (own_ns is not None and own_ns < node_ns) else node_ns
 
     def state(self, now_ns: int) -> NodeState:
-        """What the node knows of the network."""
+        """The network as the node knows it."""
         return NodeState(self._hellos.neighbors(now_ns), self._node.bound_ns(), self._node.clusters())
 
     def know_clock_error(self, error_ns: int) -> None:

@@ -35,7 +35,7 @@ _RARELY_NS: Final = 10 * S
 
 @dataclass
 class _Stream:
-    """One message, its interval, and when it is due next."""
+    """One kind of message, its interval, and the instant at which it is due next."""
 
     encode: Callable[[int], bytes]
     interval_ns: int
@@ -51,11 +51,13 @@ class Autopilot:
         self._home = position
         self._acceleration = _STILL
         self._yaw: float | None = None
-        """Unknown until the UAV has flown; a yaw of 0 would also shorten a hello, as MAVLink drops trailing zeros."""
+        """The heading; it is unknown until the UAV has flown. 0 would also shorten a hello: MAVLink drops trailing
+        zeros."""
         self._fix_ns: int | None = None
         self._encoder = Encoder(node, component=AUTOPILOT_COMPONENT)
         self._beacons = Encoder(node, component=AUTOPILOT_COMPONENT)
-        """Numbers the frames that go over the air apart from telemetry, so that in either of them a gap is a loss."""
+        """The number of frames that went over the air; they are counted apart from telemetry, so that a gap is a
+        loss."""
         self._streams = self._plan(node, telemetry_hz) if telemetry_hz else []
         self._due_ns = min((stream.due_ns for stream in self._streams), default=None)
 

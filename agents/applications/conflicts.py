@@ -37,7 +37,7 @@ _CLIMB_M_S: Final = 4.0
 _LEVELS: Final = 2
 """The most levels up or down, for which `nodes.altitude_m` has room."""
 _AHEAD_S: Final = 10.0
-"""How far ahead setpoints lie: the farther, the less does the error of a fix turn the course that others receive."""
+"""Setpoints lie so far ahead: the farther, the less the error of a fix turns the course that others receive."""
 _SOON_S: Final = 2.0
 """The time in which a height or a goal is approached when it is near."""
 _LEAST_M_S: Final = 0.5
@@ -56,9 +56,9 @@ class _Threat:
     """One other UAV that this UAV avoids."""
 
     until_ns: int
-    """When the conflict will be past, as far as is known without receiving the other UAV."""
+    """The instant at which the conflict will be past, as far as is known without receiving the other UAV."""
     warned_ns: int | None = None
-    """When either of the two last warned the other."""
+    """The instant at which either of the two last warned the other."""
 
 
 @dataclass
@@ -137,7 +137,7 @@ class ConflictMonitor:
     # --- conflicts ------------------------------------------------------------------------------------------------
 
     def _examine(self, node: NodeId, own: Motion) -> None:
-        """Examine one other UAV: is there a conflict, and is a warning due?"""
+        """Examine one other UAV: if it is in conflict with this one, avoid it, and warn it when a warning is due."""
         now_ns = own.at_ns
         threat = self._threats.get(node)
         approach = min((self._approach(node, course) for course in self._courses(own)), key=lambda a: a.distance_m)

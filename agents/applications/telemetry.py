@@ -7,7 +7,7 @@ from fanet_mw.application import Application, AppPort
 
 
 class Telemetry(Application):
-    """One UAV's telemetry."""
+    """The telemetry frames of one UAV, at their rates."""
 
     name: Final = "telemetry"
 

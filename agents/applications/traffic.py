@@ -21,7 +21,7 @@ _REFUSED_NS: Final = MS
 
 
 def sources_of(scenario: Scenario, name: str | None = None) -> Sequence[int]:
-    """Ids of the nodes that generate a class of traffic, ascending; by default the first class."""
+    """The ids of the nodes that generate a class of traffic, ascending; by default the first class."""
     name, traffic = _class_of(scenario, name)
     eligible = [node for node in scenario.node_ids if node != traffic.destination]
     if traffic.arrivals == "none":
@@ -39,7 +39,7 @@ def sources_of(scenario: Scenario, name: str | None = None) -> Sequence[int]:
 
 
 def targets_of(scenario: Scenario, source: int, name: str | None = None) -> Sequence[int]:
-    """Ids of the nodes at which a packet of `source` is meant to arrive, of one class or of the first."""
+    """The ids of the nodes for which a packet of `source` is meant, of one class or of the first."""
     name, traffic = _class_of(scenario, name)
     if traffic.destination != "all":
         return [traffic.destination]
@@ -54,7 +54,7 @@ def _class_of(scenario: Scenario, name: str | None) -> tuple[str, Traffic]:
 
 
 def _use(scenario: Scenario, name: str, use: str) -> str:
-    """The name of a random stream: of the first class, whatever it is called, that of a single one."""
+    """The name of a random stream; the first class, whatever it is called, has that of a single one."""
     return use if name == next(iter(scenario.traffic_classes)) else f"{use} {name}"
 
 
@@ -72,25 +72,25 @@ class TrafficGenerator:
         self._random: Random = stream(scenario.seed, _use(scenario, name, "traffic"), node)
         self._on_ns, self._off_ns = seconds_to_ns(traffic.on_s), seconds_to_ns(traffic.off_s)
         self._active_until_ns = 0
-        """Arrivals `on_off`: when the period of activity ends."""
+        """The end of the period of activity, for arrivals `on_off`."""
         self._packets = sorted((start_ns + seconds_to_ns(at_s) // US * US, size) for at_s, size in traffic.packets)
-        """Arrivals `trace`: what is still to come."""
+        """The packets that are still to come, for arrivals `trace`."""
         self._bytes = traffic.payload_bytes
         self._next_ns: int | None = None
         self._owed = 1
-        """Packets that are born at `next_ns`."""
+        """The number of packets that are born at `next_ns`."""
         if node in sources_of(scenario, name):
             self._next_ns = start_ns + self._first_gap_ns(start_ns)
             self._owed = self.depth if self.saturated else 1
 
     @property
     def next_bytes(self) -> int:
-        """How long the packet of `next_ns` is."""
+        """The length of the packet that is born at `next_ns`."""
         return self._packets[0][1] if self._packets else self._bytes
 
     @property
     def depth(self) -> int:
-        """Packets a saturated source keeps outstanding: one in service, and what is served within two leads."""
+        """The packets that a saturated source keeps outstanding: one in service, and those served within two leads."""
         return 1 + 2 * self._lead_ms
 
     @property
@@ -98,7 +98,7 @@ class TrafficGenerator:
         return self._kind == "saturated"
 
     def _first_gap_ns(self, start_ns: int) -> int:
-        """A CBR source starts at a random phase of its interval; a saturated one at once."""
+        """The time until the first packet: a random phase of the interval, or 0 for a saturated source."""
         if self._kind == "trace":
             return self._packets[0][0] - start_ns
         if self._kind == "on_off":
@@ -117,7 +117,7 @@ class TrafficGenerator:
         return round(self._random.expovariate(1 / mean_ns)) // US * US if mean_ns else 0
 
     def _following_ns(self, born_ns: int) -> int | None:
-        """The packet after the one of an instant."""
+        """The instant of the packet after the one that is born at an instant."""
         if self._kind == "trace":
             del self._packets[0]
             return self._packets[0][0] if self._packets else None
@@ -132,7 +132,7 @@ class TrafficGenerator:
         return born_ns + (self._interval_ns if self._kind == "cbr" else self._poisson_ns())
 
     def start(self, now_ns: int) -> None:
-        """What should have been born before now never was: the process has only just been started."""
+        """Leave out what should have been born before now: the process has only just been started."""
         if self._next_ns is None or now_ns <= self._next_ns:
             return
         if self.saturated:
@@ -143,17 +143,17 @@ class TrafficGenerator:
 
     @property
     def owed(self) -> int:
-        """How many packets are born at `next_ns`."""
+        """The number of packets that are born at `next_ns`."""
         return self._owed
 
     def next_ns(self) -> int | None:
-        """When the next packet is born; None when there will be none (or, saturated, none by itself)."""
+        """The instant of the next packet; None when there will be none (or, for a saturated source, none by itself)."""
         if self._next_ns is None or self._next_ns >= self._end_ns:
             return None
         return self._next_ns
 
     def advance(self) -> None:
-        """The packet of `next_ns` was sent."""
+        """Go on to the next packet: that of `next_ns` was sent."""
         assert self._next_ns is not None, "only a source that has a next packet can send it"
         if self.saturated:
             self._next_ns, self._owed = None, 0  # from here on, one packet for each that ends
@@ -161,7 +161,7 @@ class TrafficGenerator:
             self._next_ns = self._following_ns(self._next_ns)
 
     def ended(self, *, refused: bool, now_ns: int) -> bool:
-        """A packet of a saturated source has left, or was given up; True: the next one follows at once.
+        """Take in that a packet of a saturated source has left, or was given up; True: the next one follows at once.
 
         After one that the radio refused it comes a moment later, and is asked for by `next_ns`.
         """
@@ -186,7 +186,8 @@ class Load(Application):
         self._priority = PRIORITIES[traffic.priority]
         first = name == next(iter(scenario.traffic_classes))
         self._deadline_ns = None if traffic.deadline_s is None or first else seconds_to_ns(traffic.deadline_s)
-        """The first class's is policed by the protocol, which has been told of it."""
+        """The deadline of packets; that of the first class is policed by the protocol, which knows it from the
+        scenario."""
         self.follows = (Fate.SENT, Fate.TURNED_AWAY) if self._traffic.saturated else ()
         self._generated = 0
 

@@ -126,7 +126,7 @@ class ClockedUav(Actor):
         self._hand_over(now_ns)
 
     def state(self, now_ns: int) -> NodeState:
-        """What the node knows of the network."""
+        """The network as the node knows it."""
         return self._uav.state(self._now(now_ns))
 
     def next_wake_ns(self) -> int | None:
@@ -154,12 +154,12 @@ class ClockedUav(Actor):
     # --- instants -------------------------------------------------------------------------------------------------
 
     def _begin(self, now_ns: int) -> None:
-        """An input has come at this true instant."""
+        """Begin to handle an input that has come at this true instant."""
         self._input_ns = now_ns
         self._clock.pass_time(now_ns, until_ns=self._until_ns)
 
     def _local_now_ns(self) -> int:
-        """What the own clock shows while an input is being handled."""
+        """The instant that the own clock shows while an input is being handled."""
         return self._clock.local_ns(self._input_ns)
 
     def _now(self, now_ns: int) -> int:
@@ -172,7 +172,7 @@ class ClockedUav(Actor):
         return self._clock.true_ns(self._time.line.local_ns(swarm_ns))
 
     def _stamped_ns(self, true_ns: int) -> int:
-        """What the radio's clock shows at that instant."""
+        """The instant that the radio's clock shows at a true instant."""
         return self._clock.local_ns(true_ns) // self._stamp_ns * self._stamp_ns
 
     # --- in -------------------------------------------------------------------------------------------------------

@@ -48,7 +48,7 @@ class LocalClock:
             self._walk.append(_Second(last.true_ns + S, _shown(last, last.true_ns + S), rate))
 
     def local_ns(self, true_ns: int) -> int:
-        """What the clock shows at a true instant."""
+        """The instant that the clock shows at a true instant."""
         index = max(0, min(len(self._walk) - 1, true_ns // S))
         return _shown(self._walk[index], true_ns)
 

@@ -49,14 +49,14 @@ class SwarmTime(ABC):
         return self.error_ns(local_ns) or 0
 
     def place(self, local_ns: int) -> tuple[int, int]:
-        """(the node whose clock is followed, hops to it); 0 and 0 when no node's clock is followed."""
+        """The node whose clock is followed, and the hops to it; 0 and 0 when no node's clock is followed."""
         return 0, 0
 
     def start(self, local_ns: int) -> None:  # noqa: B027
-        """The node has started."""
+        """Take in that the node has started."""
 
     def pass_time(self, local_ns: int) -> None:  # noqa: B027
-        """Time has passed."""
+        """Take in that time has passed."""
 
     def fix(self, local_ns: int, gps_ns: int) -> None:  # noqa: B027
         """Take in a position fix, which gives the true time at an own instant."""
@@ -65,11 +65,11 @@ class SwarmTime(ABC):
         """Take in a neighbor's hello, which ended at that instant."""
 
     def hello_frames(self, local_ns: int) -> bytes:
-        """What goes into the hello that is said now."""
+        """The inner frames for the hello that is said now."""
         return b""
 
     def announced(self, hello: AnnouncedHello) -> None:  # noqa: B027
-        """A hello of this node was announced to the radio."""
+        """Take in that a hello of this node was announced to the radio."""
 
     def on_status(self, status: TxStatus, *, ended_ns: int) -> bool:
         """Take in how a transmission ended, and when; True if it was a hello whose end had to be known here."""
@@ -201,7 +201,7 @@ class BeaconTime(SwarmTime):
 
 
 def oscillator(clock: Clock, *, others: int) -> Oscillator:
-    """What a data sheet says of the own clock, and of the clock that it follows if that drifts too."""
+    """The bounds that a data sheet gives for the own clock, and for the clock that it follows if that drifts too."""
     rate = (1 + others) * clock.drift_ppm * _PPM
     return Oscillator(rate=rate, wander=clock.wander_ppm * _PPM, stamp_ns=clock.stamp_ns)
 

@@ -25,7 +25,7 @@ class DeadReckoning:
         self._fix_ns: int | None = None
 
     def fix(self, fix: Gps) -> None:
-        """GPS has told a position."""
+        """Take in a position that GPS has told."""
         if self._at is None:
             self._at = fix.position
         else:
@@ -35,7 +35,7 @@ class DeadReckoning:
         self._t_ns = self._fix_ns = fix.t_ns
 
     def velocity(self, reading: Inertial) -> Gps | None:
-        """A velocity was measured without GPS; the fix that stands in for GPS while that is out, else None."""
+        """Take in a velocity measured without GPS; returns a fix in place of GPS's while GPS is out, else None."""
         if self._at is None or self._fix_ns is None or reading.t_ns - self._fix_ns <= _OUT_NS:
             return None
         self._at, self._t_ns = self._moved(reading.velocity, reading.t_ns), reading.t_ns

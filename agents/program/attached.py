@@ -4,7 +4,7 @@
     OnAir      UDP socket, and a router that keeps the clock or an epoch -> host -> UAV
 
 The task that runs the host ends with the block; when the host ends first (the time is over, the router is gone, the UAV
-raised), whoever waits for the node is told.
+raised), every task that waits for the node is told.
 """
 
 import asyncio
@@ -30,7 +30,7 @@ from fanet_mw.units import Enu, NodeId, S
 T = TypeVar("T")
 _POLL_S: Final = 0.01
 _PATIENCE_S: Final = 10.0
-"""Longer than for a person at a terminal: on a busy machine a handshake may take seconds."""
+"""A program waits longer than a person at a terminal: on a busy machine a handshake may take seconds."""
 _ORIGIN: Final = Enu(0.0, 0.0, 0.0)
 
 
@@ -42,12 +42,12 @@ class Drive(Protocol):
     """What moves the time of a joined node."""
 
     def nudge(self) -> None:
-        """The UAV has something to do."""
+        """Let the UAV look at what has been handed to it."""
 
     def now_ns(self) -> int: ...
 
     def state(self) -> NodeState:
-        """What the node knows of the network."""
+        """The network as the node knows it."""
 
     def report(self) -> Mapping[str, Any]:
         """The counters of the UAV."""
@@ -121,12 +121,12 @@ class Emulated:
 
     endpoint: str = "tcp/127.0.0.1:7447"
     swarm: str | None = None
-    """By default the scenario's name."""
+    """The name of the swarm; by default that of the scenario."""
     zenoh_config: Path | None = None
     patience_s: float = _PATIENCE_S
-    """How long the router is waited for."""
+    """The time for which the router is waited for."""
     position: Enu = _ORIGIN
-    """Where the node is until its first fix."""
+    """The position of the node until its first fix."""
 
     @contextlib.asynccontextmanager
     async def attach(
@@ -149,9 +149,9 @@ class OnAir:
     broadcast: str
     port: int = PORT
     epoch_unix_s: float | None = None
-    """Unix time of swarm instant 0, for a node without a router; clocks agree by GPS or NTP."""
+    """The Unix time of swarm instant 0, for a node without a router; clocks agree by GPS or NTP."""
     endpoint: str | None = None
-    """Zenoh endpoint of a router that keeps the swarm's clock; None: there is no router."""
+    """The Zenoh endpoint of a router that keeps the swarm's clock; None: there is no router."""
     swarm: str | None = None
     zenoh_config: Path | None = None
     position: Enu = _ORIGIN

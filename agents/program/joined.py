@@ -4,7 +4,7 @@
     node.send(...)          mailbox -> port.send; the host is told to look, and what became of it comes back
     async for message       what the mailbox was given
 
-Over Zenoh, over UDP or in virtual time: which, is said by one argument.
+One argument says whether that is over Zenoh, over UDP or in virtual time.
 """
 
 import asyncio
@@ -101,23 +101,23 @@ class Node:
 
     @property
     def now_s(self) -> float:
-        """Swarm time."""
+        """The swarm time [s]."""
         return self._drive.now_ns() / S
 
     @property
     def neighbors(self) -> tuple[int, ...]:
-        """Nodes whose hellos are heard."""
+        """The nodes whose hellos are heard."""
         return self._drive.state().neighbors
 
     @property
     def bound_ms(self) -> float | None:
-        """Within which delay everyone has the next bulk packet of this node; None: the network states none."""
+        """The delay within which all nodes have the next bulk packet of this node; None: the network states none."""
         bound_ns = self._drive.state().bound_ns
         return None if bound_ns is None else bound_ns / MS
 
     @property
     def clusters(self) -> Mapping[int, tuple[int, ...]]:
-        """By head, the nodes of each cluster, as far as this node knows."""
+        """The nodes of each cluster as far as this node knows, by head."""
         return {int(head): tuple(nodes) for head, nodes in self._drive.state().clusters.items()}
 
     @property
@@ -127,7 +127,7 @@ class Node:
 
     @property
     def lost(self) -> int:
-        """Messages that were let go of because nobody read them."""
+        """The number of messages that were discarded because the program did not read them."""
         return self._mailbox.lost
 
     def report(self) -> Mapping[str, Any]:

@@ -1,6 +1,6 @@
 """The application between a node and a program that has joined it: what is sent waits here, and so does what came.
 
-node.send(...)   ->  to_send  ->  port.send, when the host wakes the UAV  ->  what became of it, to who waits
+node.send(...)   ->  to_send  ->  port.send, when the host wakes the UAV  ->  what became of it, to the sender
 a message        ->  got      ->  node.receive()
 """
 
@@ -21,18 +21,18 @@ class Sent(NamedTuple):
     """What became of a message."""
 
     fate: Fate
-    """The last that is known of it."""
+    """The last known fate of the message."""
     acknowledged: tuple[int, ...] = ()
-    """Nodes whose application has it."""
+    """The nodes at which an application has the message."""
     lacking: tuple[int, ...] = ()
-    """Nodes that have not acknowledged it in its lifetime, or have nobody who listens."""
+    """The nodes that have not acknowledged it in its lifetime, or have no application that listens."""
     reason: DropReason | None = None
     interval_ms: float | None = None
-    """Of a message that was refused: how far apart such messages must be; None: unknown."""
+    """The least interval of such messages, if this one was refused; None: unknown."""
 
     @property
     def ok(self) -> bool:
-        """True when all have acknowledged it; of a message that nobody was to confirm: when it was let out."""
+        """True when all have acknowledged it, or it was let out and is not to be confirmed."""
         return not self.lacking and self.fate in (Fate.ACKNOWLEDGED, Fate.LET_OUT)
 
 
@@ -46,7 +46,7 @@ class Message(NamedTuple):
     priority: int
     hops: int
     delay_ms: float
-    """From the other application's hand-over; as exact as the clocks of the two agree."""
+    """The time since the other application handed it over, as exact as the clocks of the two nodes agree."""
 
     def mavlink(self) -> list[Any]:
         """Its MAVLink messages, as objects of pymavlink; none if it was sent to a port.
@@ -69,13 +69,13 @@ class Mailbox(Application):
         """`messages`: ids of the MAVLink messages that the program wants, or ANY."""
         self.listens = messages
         self.to_send: deque[tuple[Callable[[], int], asyncio.Future[Sent], bool]] = deque()
-        """Messages that wait for the host: how to send each, who waits for what became of it, and whether it is to be
+        """Messages that wait for the host: how to send each, the future for what becomes of it, and whether it is to be
         confirmed."""
         self._open: dict[int, tuple[asyncio.Future[Sent], bool, list[int], list[int]]] = {}
         self.got: deque[Message] = deque(maxlen=_MOST_UNREAD)
         self.news = asyncio.Event()
         self.lost = 0
-        """Messages that nobody read in time."""
+        """The number of messages that the program did not read in time."""
 
     def next_wake_ns(self) -> int | None:
         return 0 if self.to_send else None

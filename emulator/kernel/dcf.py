@@ -49,6 +49,7 @@ from emulator.kernel.state import (
     ENDS,
     EVERYONE,
     FADING,
+    FAILURES,
     FATE,
     FATE_HALF_DUPLEX,
     FATE_OPEN,
@@ -57,6 +58,7 @@ from emulator.kernel.state import (
     HEAD,
     HR_N,
     HS_N,
+    KEEPS_WINDOW,
     LAST_END,
     LIFETIME_NS,
     LINK_DST,
@@ -312,10 +314,27 @@ def acknowledged(g: Ints, p: Ints, st: Ints, fr: Ints, out: Ints, s: int, t: int
     """End the frame of a station that has received the ACK for it."""
     f = st[WAITING, s]
     st[WAITING, s] = -1
-    st[CW, s] = p[CW_MIN]
+    reset_window(p, st, s)
     take_head(st, fr, s)
     draw(st, s)
     done(g, fr, out, f, DONE_ACKED, t)
+
+
+@jit
+def reset_window(p: Ints, st: Ints, s: int) -> None:
+    """Begin anew with the least window."""
+    st[CW, s] = p[CW_MIN]
+    st[FAILURES, s] = 0
+
+
+@jit
+def widen_window(p: Ints, st: Ints, s: int) -> None:
+    """Double the window after a failure; where it outlives frames, begin anew after so many failures in a row."""
+    if p[KEEPS_WINDOW] == 1 and st[FAILURES, s] == p[MAX_ATTEMPTS]:
+        reset_window(p, st, s)
+    else:
+        st[FAILURES, s] += 1
+        st[CW, s] = min(2 * st[CW, s] + 1, p[CW_MAX])
 
 
 @jit
@@ -333,13 +352,14 @@ def ack_timeout(g: Ints, p: Ints, st: Ints, fr: Ints, lk: Ints, hs: Ints, out: I
     st[WAITING, s] = -1
     st[RESUME_FROM, s] = t
     g[ATTEMPTS_FAILED] += 1
+    widen_window(p, st, s)
     if fr[ATTEMPTS, f] >= p[MAX_ATTEMPTS]:
-        st[CW, s] = p[CW_MIN]
+        if p[KEEPS_WINDOW] == 0:
+            reset_window(p, st, s)
         take_head(st, fr, s)
         done(g, fr, out, f, DONE_RETRY, t)
     else:
         g[RETRIES] += 1
-        st[CW, s] = min(2 * st[CW, s] + 1, p[CW_MAX])
     draw(st, s)
     arm(g, p, st, hs, s)
 

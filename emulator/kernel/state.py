@@ -25,6 +25,7 @@ Reals = npt.NDArray[np.float64]
     BASE,  # instant from which backoff slots count while the medium is idle
     SCHEDULED,  # instant of the pending access, -1 none; an access event of another instant is stale
     CW,  # contention window
+    FAILURES,  # failed attempts since the last ACK, or since CW was reset for them (only with KEEPS_WINDOW)
     FRESH,  # 1: the frame waiting for access has drawn no backoff (immediate access)
     TX_FRAME,  # frame slot on the air, -1 none
     TX_KIND,  # NOTHING, DATA, ACK
@@ -58,7 +59,7 @@ Reals = npt.NDArray[np.float64]
     FADE_B,  # its second state
     ON_AIR_LIST,  # not indexed by station: the first ON_AIR_N entries are the stations that transmit
     STATION_ROWS,
-) = range(37)
+) = range(38)
 NOTHING: Final = 0
 DATA: Final = 1
 ACK: Final = 2
@@ -192,13 +193,14 @@ DELIVERED, NO_RECEIVER, COLLIDED, DEAF, WEAK, GIVEN_UP, NO_ROOM, EXPIRED, DEGRAD
     EIFS_FROM_FRAME,  # 1, as ns-3: EIFS begins at the end of a bad frame, not when the medium is idle after it
     SENSES_SUMS,  # 1, as ns-3: signals too weak to be sensed are sensed together
     OVERLOOKS,  # 1, as ns-3: interference that begins within a detection window is overlooked
+    KEEPS_WINDOW,  # 1, as ns-3: CW is reset at the failure after MAX_ATTEMPTS in a row, not when a frame is given up
     INTERFERENCE,  # 0: any overlap destroys a frame; 1: loss by SINR and error rate
     CAPTURE,  # 1: every start of a transmission is reported
     EXTENSION_NS,  # signal extension at the end of each frame (OFDM at 2.4 GHz)
     TAKE_OVER,  # 1: a later frame that is TAKE_OVER_RATIO times as strong as the locked one takes the receiver
     FADING,  # 0 none, else the number of the law (fading.py)
     PARAMETERS,
-) = range(23)
+) = range(24)
 (
     DETECT_RATIO,
     HEADER_BITS_PER_NS,

@@ -18,7 +18,7 @@ OFDM_RATES_MBPS: Final = (6.0, 9.0, 12.0, 18.0, 24.0, 36.0, 48.0, 54.0)
 RATES_MBPS: Final = {"b": DSSS_RATES_MBPS, "g": DSSS_RATES_MBPS + OFDM_RATES_MBPS, "a": OFDM_RATES_MBPS}
 """The rates of each `radio.standard`."""
 CHANNELS: Final = ("range", "log_distance", "friis", "two_ray", "air_to_air", "air_to_ground", "uma_av")
-Ns3Point = Literal["difs", "eifs", "sums", "onset"]
+Ns3Point = Literal["difs", "eifs", "sums", "onset", "window"]
 """A point in which ns-3.44 differs from IEEE 802.11."""
 MANDATORY_OFDM_MBPS: Final = (6.0, 12.0, 24.0)  # 17.1.1
 
@@ -90,7 +90,7 @@ class Radio(Section):
     """`capture`: how much stronger the later frame must be."""
     access: Literal["standard", "ns3"] | tuple[Ns3Point, ...] = "standard"
     """`standard`: as IEEE 802.11 has it; `ns3`: as ns-3.44 does in every point in which it differs; or a list of such
-    points: `difs`, `eifs`, `sums`, `onset` (docs/explanation/emulator.md)."""
+    points: `difs`, `eifs`, `sums`, `onset`, `window` (docs/explanation/emulator.md)."""
     cw_min: Annotated[int, Field(ge=1, le=1023)] = 31
     """The first contention window, in slots. By default 31, and 15 with OFDM rates."""
     cw_max: Annotated[int, Field(ge=1, le=32767)] = 1023

@@ -49,7 +49,7 @@ Numbers(std::string text)
 
 static struct
 {
-    uint64_t generated = 0, sent = 0, delivered = 0, received = 0, attempts = 0, failed = 0;
+    uint64_t generated = 0, sent = 0, delivered = 0, received = 0, attempts = 0, failed = 0, given_up = 0;
 } g_counts;
 
 class Station : public Object
@@ -143,6 +143,12 @@ AttemptFailed(Mac48Address)
     ++g_counts.failed;
 }
 
+static void
+GivenUp(Mac48Address)
+{
+    ++g_counts.given_up;
+}
+
 static Settings
 Parse(int argc, char** argv)
 {
@@ -225,6 +231,7 @@ Radios(const NodeContainer& nodes, const Settings& s)
         Ptr<WifiNetDevice> device = DynamicCast<WifiNetDevice>(devices.Get(i));
         device->GetPhy()->TraceConnectWithoutContext("PhyTxBegin", MakeBoundCallback(&TransmissionBegins, i));
         device->GetRemoteStationManager()->TraceConnectWithoutContext("MacTxDataFailed", MakeCallback(&AttemptFailed));
+        device->GetRemoteStationManager()->TraceConnectWithoutContext("MacTxFinalDataFailed", MakeCallback(&GivenUp));
     }
     return devices;
 }
@@ -270,12 +277,13 @@ main(int argc, char** argv)
         Simulator::Destroy();
         return 0;
     }
+    const double ended = g_counts.attempts - g_counts.failed + g_counts.given_up; // acknowledged, or given up
     const double targets = s.Unicast() || s.topology == "hidden" ? 1 : s.nodes - 1;
     std::printf("{\"cpu_s\": %.3f, \"sent\": %lu, \"pdr\": %.6f, \"air.pdr\": %.6f, \"air.throughput_mbps\": %.6f, "
                 "\"air.attempt_failure\": %.6f, \"air.mean_retries\": %.6f}\n",
                 cpu_s, g_counts.sent, g_counts.delivered / (targets * g_counts.generated),
                 g_counts.received / (targets * g_counts.attempts), g_counts.received * 8e-6 * PAYLOAD / s.duration,
-                double(g_counts.failed) / g_counts.attempts, double(g_counts.attempts) / g_counts.sent - 1);
+                double(g_counts.failed) / g_counts.attempts, (g_counts.failed - g_counts.given_up) / std::max(1.0, ended));
     stations.clear();
     Simulator::Destroy();
     return 0;

@@ -193,6 +193,26 @@ def test_the_window_is_the_least_again_after_an_ack_and_after_giving_up(
     assert len(set(drawn)) > 3, "what follows a frame of our own waits for a backoff"
 
 
+def test_as_ns3_has_it_the_window_outlives_the_frame_and_is_the_least_again_one_failure_later(
+    make_scenario: MakeScenario,
+) -> None:
+    """Three attempts fail: 63, 127, 255 slots. A broadcast and the next unicast are drawn from the last window; the
+    first failure of that unicast, the fourth in a row, resets it: 31 and 63 slots.
+    """
+    after_failures, later = [], []
+    for seed in range(1, 25):
+        keys = {"nodes.count": 3, "radio.max_attempts": 3, "radio.access": ["window"], "seed": seed}
+        air = Air(make_scenario(**keys), [0, 400, 150])
+        air.send(1, 1 * MS, dst=2)
+        air.send(1, 1 * MS, payload=SHORT)
+        air.send(1, 1 * MS, dst=2)
+        first_ns, short_ns, last_ns = [end_ns for _, _, end_ns, _ in statuses(air.run())]
+        after_failures.append(slots_behind(short_ns - SHORT_NS, first_ns + DIFS_NS))
+        later.append(slots_behind(last_ns, short_ns + 3 * (DIFS_NS + FRAME_NS + TIMEOUT_NS)))
+    assert 127 < max(after_failures) <= 255
+    assert 127 < max(later) <= 255 + 31 + 63
+
+
 def test_an_ack_for_another_is_none_for_us(make_scenario: MakeScenario) -> None:
     """Node 1 asks node 2, who is not there; node 3 acknowledges to node 4 just then, heard by node 1, as node 4 is not.
 

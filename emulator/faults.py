@@ -20,7 +20,7 @@ import numpy.typing as npt
 
 from emulator.channel.propagation import LinkTable, milliwatt, noise_mw
 from emulator.kernel import state as s
-from fanet_mw.bus.radio_control import Control, Cut, Degrade, Fault, Jam, Restore, wrong
+from fanet_mw.bus.radio_control import EVERY, Control, Cut, Degrade, Fault, Jam, Restore, wrong
 from fanet_mw.scenario import Radio
 from fanet_mw.trace import RadioFault
 
@@ -116,7 +116,9 @@ class Faults:
         noise = np.full(self._stations, noise_mw(self._radio))
         faults = [item.fault for item in self._standing.values()]
         for fault in faults:
-            if isinstance(fault, Degrade):
+            if isinstance(fault, Degrade) and fault.src == EVERY:
+                self._degrade_those(links, np.arange(links.count), fault)
+            elif isinstance(fault, Degrade):
                 self._degrade(links, fault.src - 1, fault.dst - 1, fault)
                 if fault.both:
                     self._degrade(links, fault.dst - 1, fault.src - 1, fault)
@@ -131,21 +133,21 @@ class Faults:
         return noise
 
     def _degrade(self, links: LinkTable, src: int, dst: int, fault: Degrade) -> None:
+        """Degrade the link between two stations; there is none when they are out of reach of each other."""
         first, end = links.ptr[src], links.ptr[src + 1]
-        found = np.flatnonzero(links.ints[s.LINK_DST, first:end] == dst)
-        if not len(found):
-            return  # the two stations are out of reach of each other
-        link = int(first + found[0])
-        power_mw = links.reals[s.LINK_POWER, link] * milliwatt(-fault.loss_db)
-        if not links.ints[s.AUDIBLE, link]:
-            links.reals[s.LINK_POWER, link] = power_mw
-            return
-        audible = fault.loss_db == 0 or power_mw >= milliwatt(self._radio.sensitivity_dbm)
-        links.ints[s.AUDIBLE, link] = audible
-        links.ints[s.FAULT, link] = s.FATE_DEGRADED
-        links.reals[s.SPARED, link] *= 1 - fault.loss_share
-        unheard = not audible and self._radio.channel == "range"  # in this model any overlap destroys a frame
-        links.reals[s.LINK_POWER, link] = 0.0 if unheard else power_mw
+        self._degrade_those(links, first + np.flatnonzero(links.ints[s.LINK_DST, first:end] == dst), fault)
+
+    def _degrade_those(self, links: LinkTable, chosen: npt.NDArray[np.intp], fault: Degrade) -> None:
+        """Degrade these links of the table."""
+        power_mw = links.reals[s.LINK_POWER, chosen] * milliwatt(-fault.loss_db)
+        heard = links.ints[s.AUDIBLE, chosen] != 0
+        audible = heard & ((fault.loss_db == 0) | (power_mw >= milliwatt(self._radio.sensitivity_dbm)))
+        if self._radio.channel == "range":  # in this model any overlap destroys a frame
+            power_mw[heard & ~audible] = 0.0
+        links.reals[s.LINK_POWER, chosen] = power_mw
+        links.ints[s.AUDIBLE, chosen] = audible
+        links.ints[s.FAULT, chosen[heard]] = s.FATE_DEGRADED
+        links.reals[s.SPARED, chosen[heard]] *= 1 - fault.loss_share
 
     def _jam(self, links: LinkTable, at: npt.NDArray[np.float64], fault: Jam) -> npt.NDArray[np.float64]:
         """Mark the links into the jammed area; returns what is added to the noise at each station [mW]."""

@@ -18,8 +18,15 @@ MAX_RADIUS_M: Final = 1e7
 MAX_FOR_NS: Final = 1_000_000 * S
 
 
+EVERY: Final = NodeId(0)
+"""As both ends of a degraded link: every link there is."""
+
+
 class Degrade(NamedTuple):
-    """The link from `src` to `dst` is weaker, or loses a share of its frames (ACKs too), or both."""
+    """The link from `src` to `dst` is weaker, or loses a share of its frames (ACKs too), or both.
+
+    With 0 as both ends that is so of every link.
+    """
 
     label: str
     src: NodeId
@@ -65,8 +72,8 @@ Control = Degrade | Jam | Cut | Restore
 
 
 def link_label(src: int, dst: int) -> str:
-    """The label of a degraded link that was given none."""
-    return f"link-{src}-{dst}"
+    """The label of a degraded link, or of all links, that was given none."""
+    return f"link-{src}-{dst}" if src or dst else "links"
 
 
 def node_label(node: int) -> str:
@@ -81,7 +88,7 @@ JAM_LABEL: Final = "jam"
 def nodes_of(fault: Fault) -> tuple[int, ...]:
     """The nodes that a fault names."""
     if isinstance(fault, Degrade):
-        return fault.src, fault.dst
+        return () if fault.src == fault.dst == EVERY else (fault.src, fault.dst)
     return (fault.node,) if isinstance(fault, Cut) else ()
 
 
@@ -95,7 +102,8 @@ def wrong(fault: Fault, *, count: int) -> str | None:
     if not 0 <= fault.for_ns <= MAX_FOR_NS:
         return "fault_value"
     if isinstance(fault, Degrade):
-        fine = 0 <= fault.loss_db <= MAX_LOSS_DB and 0 <= fault.loss_share <= 1 and fault.src != fault.dst
+        a_link = fault.src != fault.dst or fault.src == EVERY
+        fine = 0 <= fault.loss_db <= MAX_LOSS_DB and 0 <= fault.loss_share <= 1 and a_link
     elif isinstance(fault, Jam):
         noise_dbm = fault.noise_dbm
         fine = (

@@ -8,7 +8,7 @@ from __future__ import annotations  # `Scenario` imports this module: to it, the
 from collections.abc import Iterator, Sequence
 from typing import TYPE_CHECKING, Final
 
-from fanet_mw.bus.radio_control import Degrade, Restore, nodes_of
+from fanet_mw.bus.radio_control import EVERY, Degrade, Restore, nodes_of
 from fanet_mw.units import MS
 
 if TYPE_CHECKING:
@@ -196,6 +196,6 @@ def _impossible_faults(scenario: Scenario) -> Sequence[str]:
         unknown = [] if isinstance(control, Restore) else [node for node in nodes_of(control) if node > count]
         if unknown:
             found.append(f"faults.{index} names node {unknown[0]}, which must be <= nodes.count = {count}")
-        if isinstance(control, Degrade) and control.src == control.dst:
+        if isinstance(control, Degrade) and control.src == control.dst != EVERY:
             found.append(f"faults.{index}: src = dst = {control.src} is no link")
     return found

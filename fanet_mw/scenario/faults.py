@@ -1,11 +1,12 @@
 """The entries of a scenario's `[[faults]]`: controls of the air at an instant, in people's units."""
 
 import math
-from typing import Annotated, Literal
+from typing import Annotated, Literal, Self
 
-from pydantic import Field
+from pydantic import Field, model_validator
 
 from fanet_mw.bus.radio_control import (
+    EVERY,
     JAM_LABEL,
     MAX_LABEL,
     MAX_LOSS_DB,
@@ -39,13 +40,13 @@ class FaultSection(Section):
 
 
 class DegradeFault(FaultSection):
-    """A link is weaker or loses frames."""
+    """A link, or every link, is weaker or loses frames."""
 
     kind: Literal["degrade"]
-    """`degrade`: a link is weaker or loses frames."""
-    src: Id
-    """Node id of one end of the link."""
-    dst: Id
+    """`degrade`: a link, or every link, is weaker or loses frames."""
+    src: Id | None = None
+    """Node id of one end of the link; with neither end every link is degraded."""
+    dst: Id | None = None
     """Node id of the other end."""
     both: bool = True
     """Also the other direction."""
@@ -54,9 +55,15 @@ class DegradeFault(FaultSection):
     loss_share: Annotated[float, Field(ge=0, le=1)] = 0.0
     """Share that is lost of the frames that would have been received."""
 
+    @model_validator(mode="after")
+    def _ends_are_two_or_none(self) -> Self:
+        if (self.src is None) != (self.dst is None):
+            raise ValueError("src and dst must both be given, for a link, or neither, for every link")
+        return self
+
     def control(self) -> Control:
-        label = self.label or link_label(self.src, self.dst)
-        ends = NodeId(self.src), NodeId(self.dst)
+        ends = NodeId(self.src or EVERY), NodeId(self.dst or EVERY)
+        label = self.label or link_label(*ends)
         return Degrade(label, *ends, self.both, self.loss_db, self.loss_share, self.for_ns)
 
 

@@ -266,6 +266,7 @@ def test_a_scenarios_faults_come_at_their_instants(make_scenario: MakeScenario) 
     [
         ({"at_s": 1, "kind": "cut", "node": 99}, "faults.0 names node 99, which must be <= nodes.count"),
         ({"at_s": 1, "kind": "degrade", "src": 2, "dst": 2}, "src = dst = 2 is no link"),
+        ({"at_s": 1, "kind": "degrade", "src": 2}, "src and dst must both be given"),
         ({"at_s": 1, "kind": "degrade", "src": 1, "dst": 2, "loss_share": 2}, "faults.0.degrade.loss_share = 2"),
         ({"at_s": 1, "kind": "storm"}, "'degrade', 'jam', 'cut', 'restore'"),
     ],
@@ -273,6 +274,24 @@ def test_a_scenarios_faults_come_at_their_instants(make_scenario: MakeScenario) 
 def test_a_fault_that_cannot_be_is_one_sentence(fault: dict[str, object], said: str) -> None:
     with pytest.raises(ConfigError, match=said.replace(".", r"\.")):
         config.build({"nodes": {"count": 9}, "faults": [fault]})
+
+
+@pytest.mark.parametrize("channel", ["range", "log_distance"])
+def test_a_fault_of_every_link_is_that_of_each(make_scenario: MakeScenario, channel: str) -> None:
+    """The dice fall alike: the same frames are lost as when each pair is named."""
+
+    def heard(faults: list[dict[str, object]]) -> list[object]:
+        changes = {"nodes.count": 4, "radio.channel": channel, "faults": faults}
+        air = Air(make_scenario(**changes), [0, 60, 120, 180])
+        for i in range(100):
+            air.send(1 + i % 4, i * 2 * MS)
+        return [*receptions(air.run()), lost(air)]
+
+    of_all = {"at_s": 0, "kind": "degrade", "loss_share": 0.3, "loss_db": 3}
+    pairs = [{**of_all, "src": a, "dst": b} for a in range(1, 5) for b in range(a + 1, 5)]
+    everyone, one_by_one = heard([of_all]), heard(pairs)
+    assert everyone == one_by_one
+    assert 0 < everyone[-1]["degraded"] < 300
 
 
 @pytest.mark.parametrize("channel", ["range", "log_distance"])

@@ -6,11 +6,13 @@ from typing import Final
 from sim.figures.claims import Claim, Reason, above
 from sim.figures.recipe import Drawing, Recipe, point
 from sim.figures.runs import Runs, best, differences, pooled
-from sim.figures.style import SERIES, canvas, line
+from sim.figures.style import SERIES, beside, canvas, legend_above, line, ticks_at
 
 _MANY: Final = 22
 _SELDOM_S: Final = 1.0
 _LOW: Final = 0.05
+_APART: Final = 0.04
+"""The marks of two lines at one number of clusters stand so far apart, as a share of it."""
 _PACES: Final = {"burst": "at once (the paper)", "spread": "over the slot (default)"}
 
 
@@ -31,7 +33,8 @@ def draw(runs: Runs) -> Drawing:
     clusters = runs.levels("clusters.count")
     for number, (case, interval_s) in enumerate((case, at) for case in _PACES for at in intervals):
         axes = panels[number]
-        for look, period_s in zip(SERIES, runs.levels("clusters.flooding_period_s"), strict=False):
+        periods = runs.levels("clusters.flooding_period_s")
+        for place, (look, period_s) in enumerate(zip(SERIES, periods, strict=False)):
             found = [
                 runs.of(
                     "pdr",
@@ -42,20 +45,19 @@ def draw(runs: Runs) -> Drawing:
                 )
                 for count in clusters
             ]
-            line(axes, look._replace(label=f"flooding period {period_s:g} s"), clusters, found)
+            xs = [beside(count, place, len(periods), log=True, apart=_APART) for count in clusters]
+            line(axes, look._replace(label=f"flooding period {period_s:g} s"), xs, found, most=1.0)
             data += [
                 point(one, pacing=case, interval_s=interval_s, flooding_period_s=period_s, clusters=count)
                 for one, count in zip(found, clusters, strict=True)
             ]
         axes.set_title(f"({'abcd'[number]}) a packet every {interval_s:g} s, {_PACES[case]}")
         axes.set_xscale("log", base=2)
-        axes.set_xticks(clusters, [str(count) for count in clusters])
-        axes.minorticks_off()
+        ticks_at(axes.xaxis, {count: str(count) for count in clusters})
         axes.set_xlabel("clusters")
         axes.set_ylabel("packet delivery ratio")
         axes.set_ylim(0, 1.05)
-    handles, labels = panels[0].get_legend_handles_labels()
-    figure.legend(handles, labels, loc="outside upper center", ncols=len(labels))
+    legend_above(figure, panels[0])
     return Drawing(figure, data)
 
 

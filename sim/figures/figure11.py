@@ -12,7 +12,7 @@ from sim.figures.claims import Claim, Reason, above, below
 from sim.figures.recipe import Drawing, Recipe, point
 from sim.figures.runs import Quantity, Row, Runs, differences
 from sim.figures.statistics import Interval, interval
-from sim.figures.style import LOOKS, band, canvas
+from sim.figures.style import LOOKS, band, canvas, legend_above, plain_log
 from sim.sweep.measures import DELAY_EDGES_S
 
 _CASES: Final = ("flooding", "paper", "ours")
@@ -68,7 +68,7 @@ def draw(runs: Runs) -> Drawing:
             continue
         means = [one.mean for one in arrived]
         cdf.plot(DELAY_EDGES_S, means, color=look.color, linestyle=look.dash, label=look.label)
-        band(cdf, look, DELAY_EDGES_S, arrived)
+        band(cdf, look, DELAY_EDGES_S, arrived, most=1.0)
         drawn = means[::_CLASSES]
         histogram.stairs(
             [later - earlier for earlier, later in pairwise([0.0, *drawn])], [0.0, *DELAY_EDGES_S[::_CLASSES]],
@@ -89,13 +89,14 @@ def draw(runs: Runs) -> Drawing:
             axes.axvline(ours / 1e3, color=LOOKS["ours"].color, linewidth=0.9, label=f"our bound, {ours / 1e3:.2g} s")
         axes.set_xscale("log")
         axes.set_xlim(2e-3, 20)
+        plain_log(axes.xaxis)
         axes.set_xlabel("end-to-end delay [s]")
     histogram.set_title("(a) histogram")
     histogram.set_ylabel("share of packets x targets, per class")
     cdf.set_title("(b) what has arrived by then")
     cdf.set_ylabel("share of packets x targets")
     cdf.set_ylim(0, 1.05)
-    cdf.legend(loc="upper left", bbox_to_anchor=(1.0, 1.0))
+    legend_above(figure, cdf)
     return Drawing(figure, data)
 
 

@@ -8,7 +8,7 @@ from sim.figures.claims import Claim, Reason, above, below
 from sim.figures.recipe import Drawing, Recipe, point
 from sim.figures.runs import Quantity, Row, Runs, differences
 from sim.figures.statistics import interval
-from sim.figures.style import LOOKS, band, canvas
+from sim.figures.style import LOOKS, band, canvas, legend_above, plain_log
 
 _CASES: Final = ("flooding", "paper", "ours")
 _INTERVAL: Final = "mission.report_interval_s"
@@ -93,7 +93,7 @@ def draw(runs: Runs) -> Drawing:
                 ]
             counts = [interval([_after(at)(row) for row in rows]) for at in _SINCE_S]
             lower.plot(_SINCE_S, [one.mean for one in counts], color=look.color, linestyle=look.dash, label=look.label)
-            band(lower, look, _SINCE_S, counts)
+            band(lower, look, _SINCE_S, counts, most=runs.rows[0]["nodes"])
             data += [
                 point(one, app_2_interval_s=interval_s, series=case, since_heard_s=at)
                 for one, at in zip(counts, _SINCE_S, strict=True)
@@ -102,11 +102,12 @@ def draw(runs: Runs) -> Drawing:
         upper.set_xlabel("time since the start [s]; a line is a seed")
         lower.set_xlabel("time since three had heard a phone [s]")
         lower.set_xscale("log")
+        plain_log(lower.xaxis)
         for axes in (upper, lower):
             axes.set_ylim(0, 47)
     for first in (since_start[0], since_heard[0]):
         first.set_ylabel("UAVs that have turned (of 45)")
-    since_heard[0].legend(loc="lower right")
+    legend_above(figure, since_heard[0])
     return Drawing(figure, data)
 
 

@@ -1,11 +1,12 @@
 """Figure 8: routing protocols of the field against speed. Claims of the paper: 4, on AODV and OLSR."""
 
+import math
 from typing import Final
 
 from sim.figures.claims import Claim, Reason, above, below
 from sim.figures.recipe import Drawing, Recipe, point
 from sim.figures.runs import Quantity, Row, Runs, differences, pooled
-from sim.figures.style import LOOKS, canvas, line
+from sim.figures.style import LOOKS, beside, canvas, legend_above, line, plain_log, ticks_at
 
 _SPEED: Final = "mobility.speed_m_s"
 _AT: Final = "mobility__speed_m_s"
@@ -17,8 +18,8 @@ _HIGH: Final = 0.95
 _IDLE: Final = 0.2
 """A busy share of the air below this leaves room for everyone."""
 _HARDLY_MS: Final = 5.0
-_APART_M_S: Final = 0.25
-"""The lines of one panel are drawn so far beside each other."""
+_APART_M_S: Final = 0.3
+"""The marks of two lines at one speed stand so far apart."""
 _NAMES: Final = {case: LOOKS[case].label for case in ("aodv", "olsr")}
 """The paper's protocols."""
 
@@ -32,32 +33,42 @@ def draw(runs: Runs) -> Drawing:
     figure, (pdr, delay, rest) = canvas(3)
     data = []
     speeds = runs.levels(_SPEED)
-    for number, case in enumerate(("aodv", "olsr", "flooding", "ours")):
+
+    def places(number: int, of: int) -> list[float]:
+        return [beside(speed, number, of, log=False, apart=_APART_M_S) for speed in speeds]
+
+    drawn = ("limit", "aodv", "olsr", "flooding", "ours")
+    for number, case in enumerate(drawn[1:], 1):
         for axes, column, unit in ((pdr, "leader_pdr", ""), (delay, "leader_delay_s", "s")):
             found = [runs.of(column, case=case, **{_AT: speed}) for speed in speeds]
-            line(axes, LOOKS[case], speeds, found, shift=(number - 1) * _APART_M_S)
+            line(axes, LOOKS[case], places(number, len(drawn)), found, most=math.inf if unit else 1.0)
             data += [
                 point(one, panel=column, unit=unit, series=case, speed_m_s=speed)
                 for one, speed in zip(found, speeds, strict=True)
             ]
     limit = [runs.of("connected", case="aodv", **{_AT: speed}) for speed in speeds]
-    line(pdr, LOOKS["limit"], speeds, limit, shift=-2 * _APART_M_S)
+    line(pdr, LOOKS["limit"], places(0, len(drawn)), limit, most=1.0)
     data += [point(one, panel="connected", series="limit", speed_m_s=at) for one, at in zip(limit, speeds, strict=True)]
-    for case in _NAMES:
+    for number, case in enumerate(_NAMES):
         found = [runs.of("pdr", case=f"{case}, formation", **{_AT: speed}) for speed in speeds]
-        line(rest, LOOKS[case], speeds, found)
+        line(rest, LOOKS[case], places(number, len(_NAMES)), found, most=1.0)
         data += [
             point(one, panel="pdr, formation", series=case, speed_m_s=at) for one, at in zip(found, speeds, strict=True)
         ]
-    for axes, title in ((pdr, "(a) random waypoints"), (delay, "(b) random waypoints"), (rest, "(c) rigid formation")):
+    for axes, title in (
+        (pdr, "(a) random waypoints: what arrives"),
+        (delay, "(b) random waypoints: how late"),
+        (rest, "(c) rigid formation: what arrives"),
+    ):
         axes.set_title(title)
         axes.set_xlabel("speed [m/s]")
         axes.set_ylabel("packet delivery ratio at the leader" if axes is not delay else "mean delay [s]")
+        ticks_at(axes.xaxis, {speed: f"{speed:g}" for speed in speeds})
     for axes in (pdr, rest):
         axes.set_ylim(0, 1.05)
     delay.set_yscale("log")
-    pdr.legend(loc="lower left")
-    rest.legend(loc="lower left")
+    plain_log(delay.yaxis)
+    legend_above(figure, pdr)
     return Drawing(figure, data)
 
 

@@ -5,7 +5,7 @@ from typing import Final
 from sim.figures.claims import Claim, Statement
 from sim.figures.recipe import Drawing, Recipe, point
 from sim.figures.runs import Row, Runs, differences
-from sim.figures.style import SERIES, canvas, line
+from sim.figures.style import SERIES, canvas, legend_above, line, ticks_at
 
 _FALLS: Final = 0.02
 _MOSTLY: Final = 0.5
@@ -26,7 +26,7 @@ def draw(runs: Runs) -> Drawing:
         named = look._replace(label=f"a packet every {interval_s:g} s")
         for axes, quantity, panel in ((pdr, "pdr", "pdr"), (lost, _by_collision, "lost by collision")):
             found = [runs.of(quantity, traffic__interval_s=interval_s, traffic__sources=count) for count in sources]
-            line(axes, named, sources, found)
+            line(axes, named, sources, found, most=1.0)
             data += [
                 point(one, panel=panel, interval_s=interval_s, sources=count)
                 for one, count in zip(found, sources, strict=True)
@@ -38,7 +38,8 @@ def draw(runs: Runs) -> Drawing:
     for axes in (pdr, lost):
         axes.set_xlabel("sources (of 45 nodes)")
         axes.set_ylim(0, 1.05)
-    pdr.legend(loc="lower left")
+        ticks_at(axes.xaxis, {count: str(count) for count in sources})
+    legend_above(figure, pdr)
     return Drawing(figure, data)
 
 

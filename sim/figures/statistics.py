@@ -21,6 +21,10 @@ class Interval(NamedTuple):
     high: float
     runs: int
 
+    def scaled(self, factor: float) -> "Interval":
+        """In another unit."""
+        return Interval(self.mean * factor, self.low * factor, self.high * factor, self.runs)
+
     def text(self, unit: str = "") -> str:
         """For people, for example `0.91 s [0.88, 0.94]`."""
         unit = f" {unit}" if unit else ""

@@ -4,6 +4,7 @@ Colors are those of Okabe and Ito (2008). No line is told by its color alone: ea
 """
 
 import csv
+import math
 from collections.abc import Iterable, Mapping, Sequence
 from contextlib import AbstractContextManager
 from pathlib import Path
@@ -11,7 +12,9 @@ from typing import Any, Final, NamedTuple
 
 import matplotlib as mpl
 from matplotlib.axes import Axes
+from matplotlib.axis import Axis
 from matplotlib.figure import Figure
+from matplotlib.ticker import FixedLocator, FuncFormatter, LogLocator, NullLocator
 
 from sim.figures.statistics import Interval
 
@@ -45,6 +48,8 @@ SERIES: Final = (
 )
 """For lines that are levels of a setting, in their order."""
 
+_LONG_AXIS: Final = 2_000.0
+"""An axis whose ends are farther apart than this, as a ratio, is labelled by decades."""
 _PARAMETERS: Final[Mapping[str, Any]] = {
     "figure.dpi": 110,
     "savefig.dpi": 150,
@@ -81,20 +86,74 @@ def canvas(
     return figure, list(panels.flat)
 
 
-def line(axes: Axes, look: Look, xs: Sequence[float], intervals: Sequence[Interval], *, shift: float = 0.0) -> None:
-    """Means with their intervals, as one line; a shift keeps the bars of several lines apart."""
-    low = [0.0 if item.runs < 2 else item.mean - item.low for item in intervals]
-    high = [0.0 if item.runs < 2 else item.high - item.mean for item in intervals]
+def line(
+    axes: Axes,
+    look: Look,
+    xs: Sequence[float],
+    intervals: Sequence[Interval],
+    *,
+    least: float = 0.0,
+    most: float = math.inf,
+) -> None:
+    """Means with their intervals, as one line; a bar ends at the least and the greatest value that there can be."""
     axes.errorbar(
-        [x + shift for x in xs], [item.mean for item in intervals], yerr=[low, high], label=look.label,
-        color=look.color, marker=look.marker or None, linestyle=look.dash,
+        xs, [item.mean for item in intervals], yerr=reaches(intervals, least=least, most=most), label=look.label,
+        color=look.color, marker=look.marker or None, linestyle=look.dash, elinewidth=1.0,
     )  # fmt: skip
 
 
-def band(axes: Axes, look: Look, xs: Sequence[float], intervals: Sequence[Interval], *, least: float = 0.0) -> None:
-    """The intervals about a line as a band; nothing where a mean is of one run."""
+def reaches(
+    intervals: Sequence[Interval], *, least: float = 0.0, most: float = math.inf
+) -> tuple[list[float], list[float]]:
+    """How far the bars of these means reach down and up, within what there can be; of one run there is no bar."""
+    down = [0.0 if item.runs < 2 else item.mean - max(least, item.low) for item in intervals]
+    up = [0.0 if item.runs < 2 else min(most, item.high) - item.mean for item in intervals]
+    return down, up
+
+
+def beside(place: float, number: int, of: int, *, log: bool, apart: float) -> float:
+    """Where the marks of one of several lines stand, so that their bars do not cover each other.
+
+    `apart` is the distance to the next line: a difference, or on a logarithmic axis a share.
+    """
+    steps = number - (of - 1) / 2
+    return place * math.pow(1 + apart, steps) if log else place + apart * steps
+
+
+def ticks_at(axis: Axis, places: Mapping[float, str]) -> None:
+    """Ticks where something was measured, and nowhere else."""
+    axis.set_major_locator(FixedLocator(list(places)))
+    axis.set_major_formatter(FuncFormatter(lambda at, _: places[min(places, key=lambda place: abs(place - at))]))
+    axis.set_minor_locator(NullLocator())
+
+
+def plain_log(axis: Axis) -> None:
+    """A logarithmic axis with its numbers written out: 1, 2, 5, 10, 20 and so on, or only decades if it is long."""
+    low, high = axis.get_view_interval()
+    subs = (1.0, 2.0, 5.0) if high / low < _LONG_AXIS else (1.0,)
+    axis.set_major_locator(LogLocator(subs=subs))
+    axis.set_major_formatter(FuncFormatter(lambda at, _: f"{at:g}"))
+    axis.set_minor_locator(NullLocator())
+
+
+def legend_above(figure: Figure, axes: Axes) -> None:
+    """One legend for all panels, above them: it covers nothing."""
+    handles, labels = axes.get_legend_handles_labels()
+    figure.legend(handles, labels, loc="outside upper center", ncols=len(labels))
+
+
+def band(
+    axes: Axes,
+    look: Look,
+    xs: Sequence[float],
+    intervals: Sequence[Interval],
+    *,
+    least: float = 0.0,
+    most: float = math.inf,
+) -> None:
+    """The intervals about a line as a band, within what there can be; nothing where a mean is of one run."""
     if all(item.runs > 1 for item in intervals):
-        low, high = [max(least, item.low) for item in intervals], [item.high for item in intervals]
+        low, high = [max(least, item.low) for item in intervals], [min(most, item.high) for item in intervals]
         axes.fill_between(xs, low, high, color=look.color, alpha=0.15, linewidth=0)
 
 

@@ -34,7 +34,7 @@ def figures(
     Parameters
     ----------
     which
-        8, 9, 10, 11, 12, load, size, clocks, age, ablation, or all, which is the default.
+        8, 9, 10, 11, 12, load, size, clocks, age, ablation, reports, mission, realtime, or all, the default.
     quick
         Few seeds and short runs, all figures within 15 minutes on two cores; the default.
     full

@@ -4,7 +4,7 @@ from collections.abc import Mapping, Sequence
 from typing import Final
 
 from fanet_mw.errors import ConfigError
-from sim.figures import beyond, figure8, figure9, figure10, figure11, figure12
+from sim.figures import beyond, figure8, figure9, figure10, figure11, figure12, realtime, rescue
 from sim.figures.recipe import Recipe
 
 FIGURES: Final[Mapping[str, Recipe]] = {
@@ -18,6 +18,9 @@ FIGURES: Final[Mapping[str, Recipe]] = {
     "clocks": beyond.CLOCKS,
     "age": beyond.AGE,
     "ablation": beyond.ABLATION,
+    "reports": rescue.REPORTS,
+    "mission": rescue.MISSION,
+    "realtime": realtime.REALTIME,
 }
 """`all` are these, in this order."""
 

@@ -11,7 +11,8 @@ from sim.report.run_page import blocks_of_run, is_run
 
 _TITLE: Final = "Reliable Flying IoT Networks for UAV Disaster Rescue Operations, recreated"
 _ORDER: Final = (
-    "figure-8", "figure-9", "figure-10", "figure-11", "figure-12", "load", "size", "clocks", "age", "ablation"
+    "figure-8", "figure-9", "figure-10", "figure-11", "figure-12", "load", "size", "clocks", "age", "ablation",
+    "reports", "mission", "realtime",
 )  # fmt: skip
 _SETTINGS: Final = Rows(
     ("quantity", "the paper (Tables 1, 2)", "here", "why it differs"),

@@ -13,6 +13,10 @@ from fanet_mw.scenario.model import Scenario
 
 _START_S: Final = 0.3
 """Setting up and summing up."""
+_START_UP_S: Final = 3.0
+"""In real time: until the processes begin to start, and from their end to the summary."""
+_PER_PROCESS_S: Final = 0.1
+"""In real time: start and end of one process."""
 _PER_NODE_S: Final = 1.5e-3
 """CPU seconds per node and simulated second: hellos, fixes, timers."""
 _PER_BODY_S: Final = 3e-3
@@ -39,6 +43,11 @@ def guess_s(scenario: Scenario) -> float:
     bodies = _PER_BODY_S * count if scenario.world.engine == "pybullet" else 0.0
     idle = _START_S + scenario.duration_s * (_PER_NODE_S * count + bodies)
     return idle + (end_ns - start_ns) / 1e9 * work_s
+
+
+def launch_s(scenario: Scenario) -> float:
+    """Seconds that one run in real time will take: its own, and those in which its processes start."""
+    return scenario.duration_s / scenario.time_scale + _START_UP_S + _PER_PROCESS_S * scenario.nodes.count
 
 
 class TimeLeft:

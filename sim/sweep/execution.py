@@ -1,13 +1,16 @@
 """One run of a sweep, in whatever process it is handed to: it returns what the run came to, and never raises."""
 
+import asyncio
 import json
+import os
 import time
 import traceback
 from dataclasses import dataclass
 
-from fanet_mw.errors import FanetError
-from fanet_mw.scenario import config
+from fanet_mw.errors import FanetError, HostError
+from fanet_mw.scenario import Scenario, config
 from sim.results.files import finish
+from sim.run.outcome import Outcome
 from sim.run.virtual import simulate
 from sim.sweep.measures import MEASURES, Value
 from sim.sweep.provenance import code
@@ -35,17 +38,32 @@ class Finished:
         return self.summary is None
 
 
+def _launched(scenario: Scenario) -> Outcome:
+    """Run a scenario as processes; only a run in real time needs the bus and its packages."""
+    from sim.run.swarm import launch
+
+    outcome = asyncio.run(launch(scenario, swarm=f"{scenario.name}-sweep", heed_signals=False))
+    if outcome.aborted is not None:
+        raise HostError(outcome.aborted)
+    return outcome
+
+
+def _cpu_s() -> float:
+    """Processor time of this process and of its children that have ended."""
+    return sum(os.times()[:4])
+
+
 def carry_out(task: Task) -> Finished:
-    """Simulate, summarize and measure one run."""
-    began, began_cpu = time.perf_counter(), time.process_time()
+    """Simulate or launch, summarize and measure one run."""
+    began, began_cpu = time.perf_counter(), _cpu_s()
 
     def ended(**came_to: str) -> Finished:
-        wall_s, cpu_s = time.perf_counter() - began, time.process_time() - began_cpu
+        wall_s, cpu_s = time.perf_counter() - began, _cpu_s() - began_cpu
         return Finished(task.key, code(), wall_s, cpu_s=cpu_s, **came_to)
 
     try:
         scenario = config.build(task.tree)
-        outcome = simulate(scenario)
+        outcome = _launched(scenario) if task.realtime else simulate(scenario)
         summary = finish(outcome, out=None)
         del summary["wall_s"], summary["unwritten"]
         measured: dict[str, Value] = {name: MEASURES[name](outcome) for name in task.measure}

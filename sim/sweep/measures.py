@@ -11,7 +11,7 @@ from fanet_mw.errors import ConfigError
 from fanet_mw.trace import Approaching, Detected
 from fanet_mw.units import S
 from sim.results.connectivity import connectivity
-from sim.results.packets import first_class_of
+from sim.results.packets import AppPackets, first_class_of, packets_of
 from sim.run.collecting.stored_records import of
 from sim.run.outcome import Outcome
 
@@ -62,27 +62,56 @@ def age_s(outcome: Outcome) -> float:
     the first packet arrives the information is taken to be of the beginning of the window.
     """
     start_ns, end_ns = outcome.scenario.traffic_window_ns
-    app = first_class_of(outcome)
-    sent = [(origin, packet.born_ns) for (origin, _), packet in app.sent.items()]
-    arrivals: dict[tuple[int, int], list[tuple[int, int]]] = {}
-    for source in sources_of(outcome.scenario):
-        for target in targets_of(outcome.scenario, source):
-            arrivals[source, target] = []
-    for packet, node, delay_ns in zip(app.deliveries.packet, app.deliveries.node, app.deliveries.delay_ns, strict=True):
-        origin, born_ns = sent[packet]
-        arrivals[origin, node].append((born_ns + delay_ns, born_ns))
-    ages_s = [_mean_age_ns(sorted(of_pair), start_ns, end_ns) / S for of_pair in arrivals.values()]
+    heard = _heard_of(first_class_of(outcome))
+    ages_s = [
+        _age_area(heard.get((source, target), ()), start_ns, end_ns) / (end_ns - start_ns) / S
+        for source in sources_of(outcome.scenario)
+        for target in targets_of(outcome.scenario, source)
+    ]
     return math.fsum(ages_s) / len(ages_s) if ages_s else 0.0
 
 
-def _mean_age_ns(arrivals: Iterable[tuple[int, int]], start_ns: int, end_ns: int) -> float:
-    """Of pairs (arrival, birth) in the order of arrivals: the mean over the window of now minus the latest birth."""
+def report_age_s(outcome: Outcome) -> float | None:
+    """The mean age of what UAVs know of the phones that others hear [s]; None when nobody reported twice.
+
+    It is how long ago the newest report was born that a UAV has of another one, on average over all pairs and over the
+    time from a reporter's first report to its last; before the first arrives, the information is of that instant.
+    """
+    reports = packets_of(outcome)["report"]
+    heard = _heard_of(reports)
+    born_ns: dict[int, list[int]] = {}
+    for (origin, _), packet in reports.sent.items():
+        born_ns.setdefault(origin, []).append(packet.born_ns)
+    area, length_ns = 0.0, 0
+    for origin, instants_ns in born_ns.items():
+        first_ns, last_ns = min(instants_ns), max(instants_ns)
+        for node in outcome.scenario.node_ids:
+            if node != origin:
+                area += _age_area(heard.get((origin, node), ()), first_ns, last_ns)
+                length_ns += last_ns - first_ns
+    return area / length_ns / S if length_ns else None
+
+
+def _heard_of(app: AppPackets) -> dict[tuple[int, int], list[tuple[int, int]]]:
+    """By (origin, receiver) the pairs (arrival, birth) of what was delivered, in the order of arrivals."""
+    sent = [(origin, packet.born_ns) for (origin, _), packet in app.sent.items()]
+    heard: dict[tuple[int, int], list[tuple[int, int]]] = {}
+    for packet, node, delay_ns in zip(app.deliveries.packet, app.deliveries.node, app.deliveries.delay_ns, strict=True):
+        origin, born_ns = sent[packet]
+        heard.setdefault((origin, node), []).append((born_ns + delay_ns, born_ns))
+    for of_pair in heard.values():
+        of_pair.sort()
+    return heard
+
+
+def _age_area(arrivals: Iterable[tuple[int, int]], start_ns: int, end_ns: int) -> float:
+    """Of pairs (arrival, birth) in the order of arrivals: the integral of now minus the latest birth [ns^2]."""
     area, since_ns, latest_ns = 0.0, start_ns, start_ns
     for at_ns, born_ns in (*arrivals, (end_ns, end_ns)):
         until_ns = min(max(at_ns, start_ns), end_ns)
         area += (until_ns - since_ns) * ((since_ns + until_ns) / 2 - latest_ns)
         since_ns, latest_ns = until_ns, max(latest_ns, born_ns)
-    return area / (end_ns - start_ns)
+    return area
 
 
 def connected(outcome: Outcome) -> float:
@@ -125,6 +154,7 @@ MEASURES: Final[Mapping[str, Callable[[Outcome], Value]]] = {
     "leader_pdr": leader_pdr,
     "leader_delay_s": leader_delay_s,
     "age_s": age_s,
+    "report_age_s": report_age_s,
     "connected": connected,
     "first_detected_s": first_detected_s,
     "first_approach_s": first_approach_s,

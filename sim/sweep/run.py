@@ -8,8 +8,8 @@ from typing import Final, Protocol
 import pyarrow as pa
 
 from fanet_mw.scenario import config
-from sim.sweep.cost import TimeLeft, guess_s
-from sim.sweep.execution import Finished
+from sim.sweep.cost import TimeLeft, guess_s, launch_s
+from sim.sweep.execution import Finished, carry_out
 from sim.sweep.store import Store
 from sim.sweep.tasks import Task
 
@@ -43,11 +43,16 @@ class SweepPlan:
         distinct = {task.key: task for task in tasks}
         self.total = len(distinct)
         self.todo = [task for key, task in distinct.items() if _wanted(store.get(key), retry=retry)]
-        self.guesses_s = {task.key: guess_s(config.build(task.tree)) for task in self.todo}
+        self.guesses_s = {task.key: _guess_s(task) for task in self.todo}
 
     def seconds(self, workers: int) -> float:
         """How long it will take, about."""
         return TimeLeft(self.guesses_s.values(), workers=workers).seconds()
+
+
+def _guess_s(task: Task) -> float:
+    scenario = config.build(task.tree)
+    return launch_s(scenario) if task.realtime else guess_s(scenario)
 
 
 def _wanted(done: Finished | None, *, retry: bool) -> bool:
@@ -62,7 +67,7 @@ def run(
     *,
     on_progress: Callable[[Progress], None] = lambda _: None,
 ) -> pa.Table:
-    """Carry out what is to do, the longest runs first, and return the table.
+    """Carry out what is to do, the longest runs first and those in real time last, and return the table.
 
     However it ends, the table has been written with what is finished.
     """
@@ -78,7 +83,7 @@ def run(
     on_progress(Progress(count, plan.total, failed, left.seconds()))
     published = time.monotonic()
     try:
-        for done in workers.carry_out(todo) if todo else ():
+        for done in _ended(todo, workers):
             store.add(done)
             count += 1
             failed += done.failed
@@ -90,3 +95,13 @@ def run(
     finally:
         table = store.publish(plan.tasks, varied)
     return table
+
+
+def _ended(todo: Sequence[Task], workers: Workers) -> Iterator[Finished]:
+    """What each task came to; runs in real time have the machine for themselves, one after the other."""
+    virtual = [task for task in todo if not task.realtime]
+    if virtual:
+        yield from workers.carry_out(virtual)
+    for task in todo:
+        if task.realtime:
+            yield carry_out(task)

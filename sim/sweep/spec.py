@@ -9,6 +9,7 @@
     [[case]]                            # each with the whole grid; a case may have [case.grid] of its own
     name = "flooding"
     set.routing.protocol = "flooding"
+    realtime = true                     # as processes in real time; by default in virtual time
     [quick]                             # a variant replaces what it names
     seeds = 2
 
@@ -66,6 +67,8 @@ class Case(_Table):
     name: Annotated[str, Field(min_length=1, max_length=64)]
     set: Changes = {}
     grid: Axes = {}
+    realtime: bool = False
+    """True for runs as processes in real time: on this machine, one at a time, after all others."""
 
 
 class SweepVariant(_Table):
@@ -83,6 +86,7 @@ class Setting(_Table):
 
     case: str
     changes: dict[str, Any]
+    realtime: bool = False
 
     def overrides(self) -> list[str]:
         """The changes as `--set` wants them."""
@@ -142,7 +146,8 @@ class Sweep(_Table):
         for case in self.case or (Case(name="-"),):
             axes = {**self.grid, **case.grid}
             for values in itertools.product(*axes.values()):
-                yield Setting(case=case.name, changes={**self.set, **case.set, **dict(zip(axes, values, strict=True))})
+                changes = {**self.set, **case.set, **dict(zip(axes, values, strict=True))}
+                yield Setting(case=case.name, changes=changes, realtime=case.realtime)
 
     def count(self) -> int:
         """How many runs there are."""

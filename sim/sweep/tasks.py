@@ -11,7 +11,7 @@ from fanet_mw.errors import ConfigError
 from fanet_mw.scenario.model import Scenario
 from sim.scenarios import catalog
 from sim.sweep import measures
-from sim.sweep.spec import MOST_RUNS, Sweep
+from sim.sweep.spec import MOST_RUNS, Setting, Sweep
 
 
 @dataclass(frozen=True, slots=True)
@@ -27,6 +27,8 @@ class Task:
     measure: tuple[str, ...]
     command: str
     """Repeats this run alone."""
+    realtime: bool = False
+    """True for a run as processes in real time, which needs the machine for itself."""
 
     def value(self, key: str) -> object:
         """The resolved value of a dotted scenario key; None where the scenario leaves it unset."""
@@ -48,12 +50,15 @@ def tasks_of(sweep: Sweep) -> list[Task]:
         for seed in sweep.seed_list():
             try:
                 scenario = catalog.find(sweep.base, [*overrides, f"seed={seed}"])
+                if setting.realtime and not scenario.radio.lead_ms:
+                    raise ConfigError("radio.lead_ms = 0 is for virtual time: must be > 0 in real time, for example 20")
             except ConfigError as error:
                 mistakes.setdefault(str(error), []).append(f"case {setting.case}, {', '.join(overrides)}")
                 break
             sets = [f"--set {shlex.quote(override)}" for override in overrides]
-            command = " ".join(["fanet simulate", shlex.quote(sweep.base), *sets, f"--seed {seed}"])
-            tasks.append(_task(scenario, setting.case, sweep.measure, command))
+            verb = "launch" if setting.realtime else "simulate"
+            command = " ".join([f"fanet {verb}", shlex.quote(sweep.base), *sets, f"--seed {seed}"])
+            tasks.append(_task(scenario, setting, sweep.measure, command))
     if mistakes:
         raise ConfigError("\n".join(f"{error} ({_first_of(settings)})" for error, settings in mistakes.items()))
     return tasks
@@ -65,8 +70,9 @@ def _first_of(settings: Sequence[str]) -> str:
     return f"{settings[0]}{f'; and in {others} other settings' if others else ''}"
 
 
-def _task(scenario: Scenario, case: str, measure: tuple[str, ...], command: str) -> Task:
+def _task(scenario: Scenario, setting: Setting, measure: tuple[str, ...], command: str) -> Task:
     tree = scenario.model_dump(mode="json", exclude_none=True)
     named = {key: value for key, value in tree.items() if key != "description"}
-    text = json.dumps([named, sorted(measure)], sort_keys=True)
-    return Task(hashlib.sha256(text.encode()).hexdigest()[:16], case, scenario.seed, tree, measure, command)
+    text = json.dumps([named, sorted(measure), *(["realtime"] if setting.realtime else [])], sort_keys=True)
+    key = hashlib.sha256(text.encode()).hexdigest()[:16]
+    return Task(key, setting.case, scenario.seed, tree, measure, command, setting.realtime)

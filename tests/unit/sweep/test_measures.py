@@ -77,3 +77,12 @@ def test_the_age_of_information_is_that_of_the_newest_packet_on_average_over_tim
     assert measured("age_s", [*born, *came], *settings) == pytest.approx(2.6)
     assert measured("age_s", [*born, *came, late], *settings) == pytest.approx(2.6)
     assert measured("age_s", born, *settings) == pytest.approx(5.0)
+
+
+def test_the_age_of_reports_runs_from_a_reporters_first_to_its_last_over_all_others() -> None:
+    """Node 1 hears that of 1 s at 2 s and that of 5 s at 6 s: (0.5 + 12 + 17.5) s^2 in 10 s; 3 and 4 nothing: 50."""
+    born = [Generated(t_s * S, 2, seq, "report", 100) for seq, t_s in enumerate((1, 5, 11), 1)]
+    came = [arrived(2, 1, at=1, delay_ns=S, born_ns=1 * S), arrived(2, 2, at=1, delay_ns=S, born_ns=5 * S)]
+    assert measured("report_age_s", [*born, *came]) == pytest.approx((30 + 50 + 50) / 30)
+    assert measured("report_age_s", born[:1]) is None, "one report has no time in which it grows old"
+    assert measured("report_age_s", PACKETS) is None

@@ -66,6 +66,17 @@ def test_the_command_of_a_run_names_every_change_and_the_seed() -> None:
     )
 
 
+def test_a_run_in_real_time_is_another_run_with_the_command_that_launches_it() -> None:
+    virtual, real = tasks_of(
+        spec.parse('base = "quick"\ncase = [{name = "virtual"}, {name = "real", realtime = true}]', source="test")
+    )
+    assert virtual.tree == real.tree
+    assert virtual.key != real.key
+    assert (virtual.command, real.command) == ("fanet simulate quick --seed 1", "fanet launch quick --seed 1")
+    with pytest.raises(ConfigError, match="lead_ms = 0 is for virtual time"):
+        tasks_of(spec.parse('base = "flooding"\ncase = [{name = "real", realtime = true}]', source="test"))
+
+
 @pytest.mark.parametrize(
     ("text", "mistake"),
     [

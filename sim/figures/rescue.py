@@ -1,0 +1,165 @@
+"""Beyond the paper: how old survivor reports are, and how long a search takes as the network gets worse."""
+
+import re
+from typing import Final
+
+from sim.figures.claims import Claim, Reason, above, below
+from sim.figures.curves import Panel, curves
+from sim.figures.recipe import Recipe
+from sim.figures.runs import Quantity, Row, Runs, differences
+
+_LOSS: Final = re.compile(r"loss_share = ([0-9.e-]+)")
+_RIVALS: Final = {"paper": "the paper's method", "flooding": "plain flooding"}
+_HALF: Final = 0.5
+_MOST: Final = 0.8
+_HARDLY_S: Final = 5.0
+
+
+def loss_share(faults: str) -> float:
+    """The share of frames that every link loses, from the scenario's faults as TOML."""
+    found = _LOSS.search(faults)
+    return float(found[1]) if found else 0.0
+
+
+def confirmed_s(row: Row, share: float) -> float:
+    """When this share of the survivors had been confirmed; the end of the run, if they never were [s]."""
+    times = sorted(row["mission.time_to_confirm_s"] or ())
+    wanted = max(1, round(share * row["mission.survivors"]))
+    return float(times[wanted - 1] if len(times) >= wanted else row["duration_s"])
+
+
+def _half_s(row: Row) -> float:
+    return confirmed_s(row, _HALF)
+
+
+def _all_s(row: Row) -> float:
+    return confirmed_s(row, 1.0)
+
+
+def claims_reports(runs: Runs) -> list[Claim]:
+    intervals = list(reversed(runs.levels("mission.report_interval_s")))
+
+    def lead(quantity: Quantity, rival: str, interval_s: float) -> list[float]:
+        """By how much a quantity is greater by fanet-mw than by a rival."""
+        ours, theirs = (
+            runs.per_seed(quantity, case=case, mission__report_interval_s=interval_s) for case in ("ours", rival)
+        )
+        return differences(ours, theirs)
+
+    seldom_s = intervals[0]
+    waits = Reason(
+        "Flooding is at once and loses some reports, fanet-mw waits for slots and repairs: for the age of what is "
+        "repeated anyway a lost report costs one interval, which is less than the wait. Repair is for what is said "
+        "once.",
+        [
+            above(
+                f"every {seldom_s:g} s: median delay of reports, fanet-mw minus plain flooding",
+                lead("reports.delay_ms.p50", "flooding", seldom_s),
+                0.0,
+                "ms",
+            ),
+            above(
+                f"every {seldom_s:g} s: reports delivered, fanet-mw minus plain flooding",
+                lead("reports.pdr", "flooding", seldom_s),
+                0.0,
+            ),
+        ],
+    )
+    return [
+        Claim(
+            0,
+            f"(Beyond the paper) Reports by fanet-mw are younger than by {name}.",
+            [
+                below(
+                    f"every {interval_s:g} s: age by fanet-mw minus by {name}",
+                    lead("report_age_s", rival, interval_s),
+                    0.0,
+                    "s",
+                )
+                for interval_s in intervals
+            ],
+            [waits] if rival == "flooding" else (),
+        )
+        for rival, name in _RIVALS.items()
+    ]
+
+
+def claims_mission(runs: Runs) -> list[Claim]:
+    of_share = {loss_share(faults): faults for faults in runs.levels("faults")}
+
+    def at(quantity: Quantity, case: str, share: float) -> dict[int, float]:
+        return runs.per_seed(quantity, case=case, faults=of_share[share])
+
+    def slower(quantity: Quantity, share: float) -> list[float]:
+        return differences(at(quantity, "ours", share), at(quantity, "ours", 0.0))
+
+    return [
+        Claim(
+            0,
+            "(Beyond the paper) Without a network the search takes longer.",
+            [
+                above("until half are confirmed: no network minus a good one", slower(_half_s, 1.0), 0.0, "s"),
+                above("until all are confirmed: no network minus a good one", slower(_all_s, 1.0), 0.0, "s"),
+            ],
+        ),
+        Claim(
+            0,
+            "(Beyond the paper) Links that lose half of all frames hardly delay it.",
+            [
+                below("until half are confirmed: half lost minus none", slower(_half_s, _HALF), _HARDLY_S, "s"),
+                below("until all are confirmed: half lost minus none", slower(_all_s, _HALF), _HARDLY_S, "s"),
+            ],
+        ),
+        Claim(
+            0,
+            "(Beyond the paper) Where most frames are lost fanet-mw delivers the most reports.",
+            [
+                above(
+                    f"{_MOST:.0%} lost: reports delivered, fanet-mw minus {name}",
+                    differences(at("reports.pdr", "ours", _MOST), at("reports.pdr", rival, _MOST)),
+                    0.0,
+                )
+                for rival, name in _RIVALS.items()
+            ],
+        ),
+    ]
+
+
+REPORTS: Final = Recipe(
+    "reports",
+    "Age of survivor reports",
+    "reports",
+    "45 UAVs fly in formation over 16 survivors, each reports the phones that it hears to everyone, as often as the "
+    "horizontal axis says, beside 1024 B of each every second. Age: how long ago the newest report was made that a UAV "
+    "has of another one, mean over time and pairs, from a reporter's first report to its last.",
+    curves(
+        "mission.report_interval_s",
+        "a report of each UAV every [s]",
+        [
+            Panel("report_age_s", "mean age of reports [s]", log=True),
+            Panel("reports.pdr", "reports delivered, share", share=True),
+            Panel("reports.delay_ms.p50", "median delay of reports [s]", log=True, factor=1e-3),
+        ],
+    ),
+    claims_reports,
+)
+MISSION: Final = Recipe(
+    "mission",
+    "Time of the mission against the network's quality",
+    "mission",
+    "A small planned search: 12 UAVs, 500 x 500 m, 6 survivors, 80 s, 1024 B of each UAV to everyone every s. Every "
+    "link loses this share of the frames that would have been received; at 1 every UAV is alone. Who is not confirmed "
+    "counts as confirmed at the end.",
+    curves(
+        "faults",
+        "share of frames that every link loses",
+        [
+            Panel(_half_s, "until half of the survivors are confirmed [s]"),
+            Panel(_all_s, "until all are confirmed [s]"),
+            Panel("reports.pdr", "reports delivered, share", share=True),
+        ],
+        value=loss_share,
+        even=True,
+    ),
+    claims_mission,
+)

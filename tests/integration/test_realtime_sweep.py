@@ -1,0 +1,48 @@
+"""A sweep with a case in real time: its runs are launched as processes after the others, and are rows beside them."""
+
+from collections.abc import Iterator, Sequence
+from pathlib import Path
+
+from fanet_mw.results import read
+from sim.sweep import spec
+from sim.sweep.execution import Finished, carry_out
+from sim.sweep.run import SweepPlan, run
+from sim.sweep.store import Store
+from sim.sweep.tasks import Task, tasks_of
+
+FILE = """
+base = "flooding"
+set = {duration_s = 2, drain_s = 0.5, nodes.count = 3, traffic.sources = 2, radio.lead_ms = 100}
+case = [{name = "real", realtime = true}, {name = "virtual"}]
+"""
+
+
+class OneByOne:
+    """Carries runs out in this process, and notes which."""
+
+    workers = 1
+
+    def __init__(self) -> None:
+        self.ran: list[str] = []
+
+    def carry_out(self, tasks: Sequence[Task]) -> Iterator[Finished]:
+        for task in tasks:
+            self.ran.append(task.case)
+            yield carry_out(task)
+
+
+def test_runs_in_real_time_are_rows_beside_those_in_virtual_time_and_are_not_repeated(tmp_path: Path) -> None:
+    sweep, store, workers, counts = spec.parse(FILE, source="test"), Store(tmp_path), OneByOne(), []
+    with store.alone():
+        for _ in range(2):
+            store.read()
+            plan = SweepPlan(tasks_of(sweep), store)
+            run(plan, store, workers, sweep.varied())
+            counts.append(len(plan.todo))
+    real, virtual = read(tmp_path).to_pylist()
+    assert (counts, workers.ran) == ([2, 0], ["virtual"]), "what is in real time is no worker's"
+    assert (real["case"], real["status"], real["error"]) == ("real", "ok", None)
+    assert real["command"].startswith("fanet launch flooding ")
+    assert real["generated"] == virtual["generated"] > 0, "the births of a seed are the same"
+    assert '"mode": "realtime"' in real["summary"]
+    assert '"mode": "virtual"' in virtual["summary"]

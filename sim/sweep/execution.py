@@ -40,7 +40,7 @@ class Finished:
 
 def _launched(scenario: Scenario) -> Outcome:
     """Run a scenario as processes; only a run in real time needs the bus and its packages."""
-    from sim.run.swarm import launch
+    from sim.run.launcher.swarm import launch
 
     outcome = asyncio.run(launch(scenario, swarm=f"{scenario.name}-sweep", heed_signals=False))
     if outcome.aborted is not None:

@@ -61,7 +61,7 @@ _HOMES: Final = {
     "sim.run.api": ("Launched", "VirtualSwarm", "launch", "simulate"),
     "sim.run.result": ("Result",),
 }  # fmt: skip
-"""Where each name is at home. The packages above this one are named here and imported by nothing else in it."""
+"""The module of each public name. The packages above this one are named here and imported by nothing else in it."""
 _HOME_OF: Final = {name: module for module, names in _HOMES.items() for name in names}
 
 __all__ = [

@@ -5,7 +5,7 @@ An actor never sleeps, reads a clock, opens a socket or starts a thread. A host 
     start(now)  once, before anything else
     receive(topic, message, now)  for every message on a subscribed topic
     wake(now)   at or after the instant that `next_wake_ns()` named, whichever host runs it
-    nudge(now)  at any instant, when somebody outside has given a part of it something to do
+    nudge(now)  at any instant, when a program outside has given a part of it something to do
     stop(now)   once, last; then `report()` says how it went
 
 After every call, or after several at one instant, the host takes all of `outbox` and `records`, and asks

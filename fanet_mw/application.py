@@ -50,7 +50,7 @@ class Received(NamedTuple):
     """The id of this node, or BROADCAST."""
     priority: int
     born_ns: int
-    """When the application handed it over, by the origin's clock; never later than now."""
+    """The instant at which the application handed it over, by the origin's clock; never later than now."""
     hops: int
     frame: bytes
     """The packet as the radio delivered it, routing header first; of several packets the one that came last."""

@@ -10,7 +10,7 @@ from fanet_mw.units import Enu
 
 
 class ClosestApproach(NamedTuple):
-    """How near two bodies will come to each other, and when."""
+    """The closest approach of two bodies: when it is, and how they then lie to each other."""
 
     closest_s: float
     """The time until then, from now; 0 when they are nearest now."""

@@ -2,7 +2,8 @@
 
     queue -> access (DIFS or EIFS, backoff with freezing) -> frame -> ACK or timeout -> next attempt or done
 
-The countdown itself is in `backoff`; how frames end is counted in `ending`.
+The countdown, and EIFS in place of DIFS after a failed reception, are in `backoff.py`; how frames end is counted in
+`ending.py`.
 """
 
 from emulator.channel.fading import gain

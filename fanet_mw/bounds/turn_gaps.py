@@ -27,7 +27,7 @@ class TurnServer:
     """The starts of the turns, ascending within one period."""
     lead_ns: int = 0
     _apart_ns: tuple[int, ...] = field(init=False, repr=False, compare=False)
-    """At index n: the greatest distance of two turns with n - 1 turns between them, for n below `frames`."""
+    """The greatest distance of two turns with n - 1 turns between them, at index n, for n below `frames`."""
 
     def __post_init__(self) -> None:
         k, starts = self.frames, self.starts_ns

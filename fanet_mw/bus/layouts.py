@@ -24,10 +24,10 @@ class Names(NamedTuple):
 
     topic: str
     fields: str
-    """Of the head, in order."""
+    """The names of the fields of the head, in order."""
     rest: str = ""
     row: str = ""
-    """Fields of each row, where rows follow the head."""
+    """The names of the fields of each row, where rows follow the head."""
 
 
 class Field(NamedTuple):

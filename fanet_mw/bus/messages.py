@@ -98,7 +98,7 @@ class SetpointKind(IntEnum):
 
 
 VELOCITY_LASTS_NS: Final = 1 * S
-"""How long a velocity setpoint lasts: a UAV whose computer has died must not fly on for ever."""
+"""A velocity setpoint lasts for this long: a UAV whose computer has died must not fly on for ever."""
 
 
 class Setpoint(NamedTuple):
@@ -173,7 +173,7 @@ class Echo(NamedTuple):
     """From north, clockwise."""
     elevation_rad: float
     closing_m_s: float
-    """How fast the range shrinks."""
+    """The speed at which the range shrinks."""
     snr_db: float
 
 
@@ -189,9 +189,9 @@ class Altimeter(NamedTuple):
 
     t_ns: int
     up_m: float
-    """By the barometer: noisy, with a slow drift."""
+    """The height by the barometer, which is noisy and drifts slowly."""
     above_ground_m: float | None
-    """By the rangefinder that looks down; None: nothing is within its range."""
+    """The height by the rangefinder that looks down; None: nothing is within its range."""
 
 
 class Inertial(NamedTuple):

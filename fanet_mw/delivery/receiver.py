@@ -19,7 +19,7 @@ MOST_BYTES: Final = 4 << 20
 MOST_BYTES_EACH: Final = 1 << 20
 """Of one sender."""
 MOST_MESSAGES: Final = 4096
-"""Of all senders together, that are not whole or wait for one before them."""
+"""The most messages, of all senders together, that are not whole or wait for one before them."""
 MOST_MESSAGES_EACH: Final = 512
 """Of one sender."""
 RECEIPT_NS: Final = 20 * MS
@@ -73,15 +73,15 @@ class Receiver:
         self._random = random
         self._incoming: dict[tuple[NodeId, int], _Incoming] = {}
         self._bytes: dict[NodeId, int] = {}
-        """Of pieces kept, by sender."""
+        """The bytes of the pieces that are kept, by sender."""
         self._counts: dict[NodeId, int] = {}
-        """Of messages in `_incoming`, by sender."""
+        """The number of messages in `_incoming`, by sender."""
         self._done: dict[tuple[NodeId, int], int] = {}
         """The last receipt of each message whose sender may not have heard of it."""
         self._last: dict[tuple[NodeId, int], int] = {}
-        """Of each flow, the number of the message that was handed over last."""
+        """The number of the message that was handed over last, by flow."""
         self._receipts: dict[NodeId, dict[int, tuple[Receipt, int]]] = {}
-        """By node to which receipts are due, the messages and the priority of each."""
+        """The messages to be acknowledged and the priority of each, by the node to which the receipts are due."""
         self._receipts_ns: int | None = None
         self._sweep_ns: int | None = None
         self.arrived: list[Whole] = []

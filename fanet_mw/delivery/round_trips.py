@@ -1,4 +1,4 @@
-"""How long to wait for the receipt of a target: the retransmission timeout of RFC 6298, section 2."""
+"""The time to wait for the receipt of a target: the retransmission timeout of RFC 6298, section 2."""
 
 from typing import Final
 

@@ -32,7 +32,7 @@ _MOST_FLOWS: Final = 1024
 _FEW: Final = 2
 """Up to so many targets that still lack something are sent to one by one; more of them are sent to together."""
 _NAMED: Final = 32
-"""Of a message for everyone, at most so many that still lack something are named when it is repeated."""
+"""A message for all nodes that is repeated names at most so many nodes that still lack something."""
 
 
 class PieceToSend(NamedTuple):
@@ -51,7 +51,7 @@ class Told(NamedTuple):
 
     number: int
     outcome: int
-    """As in a receipt, or `EXPIRED`."""
+    """The outcome as a receipt states it, or `EXPIRED`."""
     targets: tuple[NodeId, ...]
     """The targets that said so; of a message that expired, those that have not confirmed it."""
     last: bool
@@ -83,9 +83,9 @@ class _Outgoing:
     everyone: bool
     """True for a message for everyone."""
     lacking: dict[NodeId, int]
-    """By target that has not confirmed it yet, the pieces that the target has, as bits."""
+    """The pieces that each target has, as bits, for the targets that have not confirmed the message yet."""
     again_ns: int = 0
-    """When to send again what is lacking; 0: it waits for its turn to be sent."""
+    """The instant at which to send again what is lacking; 0: it waits for its turn to be sent."""
     sent_ns: int = 0
     rounds: int = 0
 
@@ -201,7 +201,7 @@ class Sender:
         message = self._messages.get(receipt.number)
         if message is None or origin not in message.lacking:
             return
-        if message.rounds == 1:  # else nobody knows to which copy the receipt is
+        if message.rounds == 1:  # else it is not known which copy the receipt answers
             self._round_trips.measured(origin, now_ns - message.sent_ns)
         if receipt.outcome == wire_message.MISSING:
             message.lacking[origin] |= receipt.held & ((1 << message.pieces) - 1)
@@ -292,7 +292,7 @@ class Sender:
         return packets
 
     def next_wake_ns(self) -> int | None:
-        """When something is to be sent again, or expires."""
+        """The instant at which something is to be sent again, or expires."""
         timers = self._timers
         while timers:
             t_ns, number = timers[0]

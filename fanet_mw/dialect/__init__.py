@@ -1,1 +1,1 @@
-"""Our MAVLink dialect: fanet.xml and the module generated from it."""
+"""The MAVLink dialect of fanet-mw: fanet.xml and the module generated from it."""

@@ -19,7 +19,7 @@ import zenoh
 from fanet_mw.errors import BusError, ConfigError
 
 JOIN_PATIENCE_S: Final = 2.5
-"""How long to wait for a router by default; a user who has mistyped an endpoint learns of it soon."""
+"""The time for which a router is waited for by default; a user who has mistyped an endpoint learns of it soon."""
 MAX_PUT_BYTES: Final = 16 << 20
 """A longer put is dropped where it first arrives: by default Zenoh would collect up to 1 GiB of one put in memory."""
 LOST_AFTER_S: Final = 2.0
@@ -196,7 +196,7 @@ class Bus:
         self._session.declare_queryable(topic, on_query)
 
     def ask(self, topic: str, on_sample: OnSample) -> None:
-        """Query a topic; answers come as samples. On a closed session nobody is asked."""
+        """Query a topic; answers come as samples. On a closed session no query is made."""
 
         def on_reply(reply: zenoh.Reply) -> None:
             if reply.ok is not None:

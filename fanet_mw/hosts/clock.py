@@ -131,7 +131,7 @@ class ClockKeeper:
 class ClockListener:
     """Follows the swarm clock, on the loop's thread.
 
-    Anyone may put something on the clock's topic, so a put is only a hint to ask the keeper, and only an answer counts:
+    Any process may put something on the clock's topic, so a put is a hint to ask the keeper, and only an answer counts:
     a put that says the clock has stopped stops nothing. A forger that also answers in the keeper's place does; an
     access list prevents that.
     """

@@ -1,7 +1,7 @@
-"""Who of a swarm is present, by liveliness tokens, and what is wrong with it.
+"""The processes of a swarm that are present, by liveliness tokens, and what is wrong with them.
 
-fanet/<swarm>/alive/<name>/<fingerprint>/<instance>    a process of ours: which scenario, and which of several
-fanet/<swarm>/alive/<name>                             a process of somebody else, taken at its word
+fanet/<swarm>/alive/<name>/<fingerprint>/<instance>    a process of fanet-mw: which scenario, and which of several
+fanet/<swarm>/alive/<name>                             a process of another program, taken at its word
 """
 
 from collections.abc import Iterable
@@ -18,17 +18,17 @@ def few(names: Iterable[str]) -> str:
 
 
 class Presence:
-    """Who is there of those that are expected; without a fingerprint every scenario is taken for the right one."""
+    """The processes that are expected and those that are present; without a fingerprint any scenario is right."""
 
     def __init__(self, names: Topics, expected: Iterable[str], *, fingerprint: str | None = None) -> None:
         self._prefix = names.alive("")
         self._fingerprint = fingerprint
         self._expected = tuple(expected)
         self._tokens: dict[str, set[str]] = {}
-        """The rest of each token, by name."""
+        """The rest of each token, by the name of the process."""
 
     def seen(self, topic: str, *, alive: bool) -> None:
-        """A token has appeared or gone."""
+        """Take in that a token has appeared or gone."""
         name, _, rest = topic.removeprefix(self._prefix).partition("/")
         tokens = self._tokens.setdefault(name, set())
         if alive:
@@ -37,27 +37,27 @@ class Presence:
             tokens.discard(rest)
 
     def missing(self) -> list[str]:
-        """Those that are expected and not present with this scenario."""
+        """The processes that are expected and not present with this scenario."""
         return sorted(name for name in self._expected if not self._right(name))
 
     def twice(self) -> list[str]:
-        """Those that are present more than once."""
+        """The processes that are present more than once."""
         return sorted(name for name in self._tokens if len(self._right(name)) > 1)
 
     def of_another_scenario(self) -> list[str]:
-        """Those that run something else under the name of this swarm."""
+        """The processes that run another scenario under the name of this swarm."""
         return sorted(name for name, tokens in self._tokens.items() if len(self._right(name)) < len(tokens))
 
     def unexpected(self) -> list[str]:
-        """Those that this scenario has no place for."""
+        """The processes for which this scenario has no place."""
         return sorted(name for name, tokens in self._tokens.items() if tokens and name not in self._expected)
 
     def complete(self) -> bool:
-        """Everyone is there, and nobody twice."""
+        """True if all expected processes are present, each of them once."""
         return not self.missing() and not self.twice()
 
     def sentence(self) -> str:
-        """What is wrong, for people; empty when nothing is."""
+        """A sentence for people on what is wrong; empty when nothing is."""
         parts = {
             "missing": self.missing(),
             "there twice": self.twice(),
@@ -67,7 +67,7 @@ class Presence:
         return "; ".join(f"{what}: {few(names)}" for what, names in parts.items() if names)
 
     def _right(self, name: str) -> set[str]:
-        """The tokens of a name with this scenario, or of which nobody knows the scenario."""
+        """The tokens of a name that state this scenario, or state none."""
         tokens = self._tokens.get(name, set())
         if self._fingerprint is None:
             return tokens

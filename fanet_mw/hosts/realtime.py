@@ -131,7 +131,7 @@ class RealtimeHost:
 
     @property
     def running(self) -> bool:
-        """Whether the actor has been started, and is still called."""
+        """True once the actor has been started, until it is called no more."""
         return self._running
 
     def nudge(self) -> None:
@@ -306,7 +306,7 @@ def _settle(answer: "asyncio.Future[bytes]", payload: bytes) -> None:
 
 
 class SwarmAddress(NamedTuple):
-    """How a process finds its swarm."""
+    """The address at which a process finds its swarm."""
 
     swarm: str
     """The swarm's name on the bus."""
@@ -315,7 +315,7 @@ class SwarmAddress(NamedTuple):
     zenoh_config: Path | None = None
     """Zenoh's own configuration: a file, or a folder with one file for each actor."""
     patience_s: float = JOIN_PATIENCE_S
-    """How long a router that does not answer is tried."""
+    """The time for which a router that does not answer is tried."""
 
 
 async def run_actor(

@@ -1,4 +1,4 @@
-"""The contract between a node and a routing protocol. Every protocol, ours or a rival, is one class behind it.
+"""The contract between a node and a routing protocol. Every protocol is one class behind it.
 
 The node owns identity, sequence numbers, duplicate suppression, the header and the counters. The protocol decides
 what happens to a packet next, by calling its port. Both are sans-IO: instants are handed in.
@@ -24,7 +24,7 @@ class Port(Protocol):
     node: NodeId
     scenario: Scenario
     position: Enu
-    """Where the node last knew itself to be."""
+    """The position at which the node last knew itself to be."""
     clock_error_ns: int
     """The greatest error of any clock in the swarm, as far as the node has heard; 0: they are exact."""
     velocity: Enu
@@ -79,22 +79,22 @@ class RoutingProtocol(ABC):
         self._port = port
 
     def start(self, now_ns: int) -> None:  # noqa: B027  (stateless protocols have nothing to start)
-        """The node is up."""
+        """Begin: the node is up."""
 
     @abstractmethod
     def originate(self, packet: Packet, *, due_ns: int, now_ns: int) -> None:
-        """A packet of this node's application; its first frame may go from `due_ns` on, one lead after its birth."""
+        """Take a packet of this node's application; its first frame may go from `due_ns`, one lead after its birth."""
 
     @abstractmethod
     def receive(self, packet: Packet, reception: Reception, *, now_ns: int) -> Sequence[Relay] | None:
-        """The first copy of a packet in its phase. Delivery to the application is the node's business.
+        """Take in the first copy of a packet in its phase. The node delivers it to the application.
 
-        Returned is what is passed on because of it, if anything: the node sends that, together with what else came
-        in the same frame. Anything else a protocol sends through its port.
+        Returns what is passed on because of it, if anything: the node sends that, together with what else came
+        in the same frame. A protocol sends anything else through its port.
         """
 
     def hello_inner(self, room: int, *, now_ns: int) -> bytes:
-        """What this protocol adds to the node's hello, in at most so many bytes."""
+        """The inner frames that this protocol adds to the node's hello, in at most so many bytes."""
         return b""
 
     def hello_share(self, *, now_ns: int) -> float:
@@ -102,7 +102,7 @@ class RoutingProtocol(ABC):
         return 1.0
 
     def hello_start_ns(self, start_ns: int) -> int:
-        """When a hello may go that is due at `start_ns`."""
+        """The instant from which a hello may go that is due at `start_ns`."""
         return start_ns
 
     def on_hello(self, packet: Packet, reception: Reception, *, now_ns: int) -> None:  # noqa: B027
@@ -112,9 +112,9 @@ class RoutingProtocol(ABC):
         """Take in a packet that another node sent in the name of this one; it goes no further."""
 
     def on_copy(self, key: int, *, now_ns: int) -> None:  # noqa: B027
-        """Another copy, in the same phase, of a packet that was handled before (`duplicates.key_of`).
+        """Take in another copy, in the same phase, of a packet that was handled before (`duplicates.key_of`).
 
-        It may call off what is planned; nothing may become due sooner, because nobody asks again.
+        It may call off what is planned; nothing may become due sooner, because the node does not ask again.
         """
 
     def on_status(self, status: TxStatus, *, now_ns: int) -> None:  # noqa: B027
@@ -131,15 +131,15 @@ class RoutingProtocol(ABC):
         return 0
 
     def bound_ns(self) -> int | None:
-        """Within which delay everyone has the next packet of this node; None: no bound is stated."""
+        """The delay within which all nodes have the next packet of this node; None: no bound is stated."""
         return None
 
     def clusters(self) -> Mapping[NodeId, tuple[NodeId, ...]]:
-        """By head, the nodes of each cluster, the head first, as far as this node knows; empty: there are none."""
+        """The nodes of each cluster by head, the head first, as far as this node knows; empty: there are none."""
         return {}
 
     def least_interval_ns(self, deadline_ns: int) -> int | None:
-        """The least interval between packets of this node at which everyone has each within this delay; None: unknown,
+        """The least interval between packets of this node that meets this delay at all nodes; None: unknown,
         or there is none.
         """
         return None

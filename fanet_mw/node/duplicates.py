@@ -48,7 +48,7 @@ class DuplicateSet:
         self.young[key] = bits
 
     def forget(self, key: int) -> None:
-        """As if this packet had never been heard."""
+        """Treat this packet as one that has never been heard."""
         self.young.pop(key, None)
         self.old.pop(key, None)
 

@@ -54,13 +54,13 @@ class Node:
         self.node = node
         self.scenario = scenario
         self.deliveries: list[Packet] = []
-        """Packets for the application of this node."""
+        """The packets for the applications of this node."""
         self.hellos: list[Packet] = []
-        """Hellos of neighbors, for what else their receivers read in them than routing does."""
+        """The hellos of neighbors, in which the applications and the clock read more than routing does."""
         self.receptions = 0
         self._copies = 0
         self._lifetimes_ns = [scenario.routing.lifetime_ns(wire.PRIORITY_BULK)] * 256
-        """By priority, whatever the air says."""
+        """The lifetime of a packet by its priority; the air may state any of 256."""
         for priority in wire.PRIORITIES.values():
             self._lifetimes_ns[priority] = scenario.routing.lifetime_ns(priority)
         self._reader = shared_reader
@@ -69,22 +69,23 @@ class Node:
         self._own = OwnPackets(node, self._duplicates, most_bytes=scenario.radio.max_frame_bytes)
         self.port = NodePort(node, scenario, self._duplicates, self._own, position=position)
         self.requests = self.port.requests
-        """Transmissions that the actor is to take to the radio."""
+        """The transmissions that the actor is to take to the radio."""
         self.fates = self.port.fates
         """What became of watched packets: (number, instant, why it was dropped; None: it was let out)."""
         protocol = self._protocol = make_protocol(self.port)
         self.next_wake_ns = protocol.next_wake_ns
-        """The protocol's own method: every wake-up is followed by this question."""
+        """The protocol's own method, because every wake-up is followed by this question."""
         self.timeless = type(protocol).next_wake_ns is RoutingProtocol.next_wake_ns
-        """This protocol never asks to be woken: no reception changes when the node is due."""
+        """True for a protocol that never asks to be woken: no reception changes the instant at which the node is
+        due."""
         self._on_copy = None if type(protocol).on_copy is RoutingProtocol.on_copy else protocol.on_copy
-        """None: this protocol does not care for copies, and most receptions are copies."""
+        """The protocol's handler of copies; None for a protocol that ignores copies, as most receptions are copies."""
 
     # --- what goes out, and what is known of the node (its actor reads and writes them) ---------------------------
 
     @property
     def records(self) -> list[Record]:
-        """Trace records, in order."""
+        """The trace records that the actor has not taken yet, in order."""
         return self.port.records
 
     @records.setter
@@ -93,31 +94,31 @@ class Node:
 
     @property
     def frames_sent(self) -> int:
-        """How many transmissions have been requested: the sequence number of the next request."""
+        """The number of transmissions that have been requested, which is the sequence number of the next request."""
         return self.port.frames_sent
 
     @property
     def dropped(self) -> Counter[str]:
-        """What has ended here, by reason."""
+        """The number of packets that have ended in this node, by reason."""
         return self.port.dropped
 
     @property
     def watched(self) -> set[int]:
-        """Sequence numbers of own packets whose fate is of interest."""
+        """The sequence numbers of own packets whose fate is of interest."""
         return self.port.watched
 
     def moved(self, position: Enu, velocity: Enu) -> None:
-        """The node knows itself to be here, and to move at so many m/s."""
+        """Take in where the node knows itself to be, and how fast it moves."""
         self.port.position, self.port.velocity = position, velocity
 
     def know_clock_error(self, error_ns: int) -> None:
-        """The greatest error of any clock in the swarm, as far as this node has heard; 0: they are exact."""
+        """Take in the greatest error of any clock in the swarm, as far as this node has heard; 0: they are exact."""
         self.port.clock_error_ns = error_ns
 
     # --- from the host's side -------------------------------------------------------------------------------------
 
     def start(self, now_ns: int) -> None:
-        """The node is up; one that starts again later must not reuse the names of its earlier packets."""
+        """Begin; a node that starts again later must not reuse the names of its earlier packets."""
         self._own.start(now_ns)
         self._protocol.start(now_ns)
 
@@ -183,11 +184,11 @@ class Node:
         return AnnouncedHello(request, packet.header.seq)
 
     def hello_share(self, now_ns: int) -> float:
-        """After which part of the hello interval the next hello should go."""
+        """The part of the hello interval after which the next hello should go."""
         return self._protocol.hello_share(now_ns=now_ns)
 
     def hear(self, reception: Reception, now_ns: int) -> bool:
-        """One reception, from anyone. True: a copy of what was handled before; nothing came of it."""
+        """Take in a reception. True: it was a copy of what was handled before, and nothing came of it."""
         self.receptions += 1
         reader, frame, handled = self._reader, reception.frame, self._duplicates
         if frame is not reader.frame:
@@ -214,7 +215,7 @@ class Node:
         return False
 
     def _hear_bundle(self, reception: Reception, now_ns: int) -> None:
-        """Several packets in one frame: each as if it had come alone; those that are passed on go together again, each
+        """Take in several packets of one frame, each as if it had come alone; those passed on go together again, each
         repetition in its own turn.
         """
         try:
@@ -230,7 +231,7 @@ class Node:
             self.port.relay_together([relay for relay in together if relay is not None])
 
     def _hear_one(self, reception: Reception, now_ns: int) -> Sequence[Relay]:
-        """One packet of several that came in a frame; returned is what of it is passed on."""
+        """Take in one packet of several that came in a frame; returns what of it is passed on."""
         reader = self._reader
         known = self._duplicates.bits(reader.name)
         if known & reader.phase:
@@ -245,7 +246,7 @@ class Node:
             return _NONE
 
     def _first_copy(self, packet: Packet, reception: Reception, before: int, now_ns: int) -> Sequence[Relay]:
-        """The packet that the reader has before it; `before`: what was known of it without this copy. Returned is
+        """Take in the packet that the reader has before it; `before` is what was known of it without this copy. Returns
         what of it is passed on.
         """
         reader = self._reader
@@ -279,7 +280,7 @@ class Node:
         return self._protocol.receive(packet, reception, now_ns=now_ns) or _NONE
 
     def _disbelieve(self, why: DropReason, packet: Packet, now_ns: int) -> None:
-        """Counted, and neither delivered nor passed on."""
+        """Count a packet that is neither delivered nor passed on."""
         self.port.dropped[why] += 1
         if why is DropReason.OWN:
             self._protocol.on_impersonation(packet, now_ns=now_ns)
@@ -291,11 +292,11 @@ class Node:
         self._protocol.wake(now_ns)
 
     def bound_ns(self) -> int | None:
-        """Within which delay everyone has the next packet of this node; None: the protocol states none."""
+        """The delay within which all nodes have the next packet of this node; None: the protocol states none."""
         return self._protocol.bound_ns()
 
     def clusters(self) -> Mapping[NodeId, tuple[NodeId, ...]]:
-        """By head, the nodes of each cluster, as far as this node knows."""
+        """The nodes of each cluster as far as this node knows, by head."""
         return self._protocol.clusters()
 
     def least_interval_ns(self, deadline_ns: int) -> int | None:
@@ -303,7 +304,7 @@ class Node:
         return self._protocol.least_interval_ns(deadline_ns)
 
     def report(self) -> Mapping[str, object]:
-        """JSON-able counters and the protocol's state."""
+        """The counters of the node and the state of its protocol, as JSON values."""
         return {
             "frames_sent": self.port.frames_sent,
             "receptions": self.receptions,

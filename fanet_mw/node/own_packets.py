@@ -56,5 +56,5 @@ class OwnPackets:
         return _new(Packet, (header, frame))
 
     def handed_on(self, origin: int, seq: int) -> bool:
-        """Whether the node has given data this name since its start: custody of it has passed on, and may come back."""
+        """True if the node has given data this name since its start: custody of it has passed on, and may come back."""
         return origin == self._node and self._first_seq <= seq < self._next_seq[False]

@@ -19,7 +19,7 @@ _ALIKE: Final[Mapping[int, int]] = MappingProxyType({})
 
 
 def sooner_us(routing: Routing) -> Mapping[int, int]:
-    """By priority, how much sooner than `routing.lifetime_s` a class expires."""
+    """The time by which a class expires sooner than `routing.lifetime_s`, by priority."""
     whole_ns = routing.lifetime_ns(-1)
     return {p: (whole_ns - routing.lifetime_ns(p)) // US for p in (PRIORITY_SAFETY, PRIORITY_REPORT)}
 
@@ -44,7 +44,7 @@ class TxQueue:
         return len(self._entries)
 
     def __contains__(self, key: object) -> bool:
-        """Whether a packet with this key (`duplicates.key_of`) is queued."""
+        """True if a packet with this key (`duplicates.key_of`) is queued."""
         return any(_key(entry[2]) == key for entry in self._entries)
 
     def remove(self, key: int) -> None:

@@ -25,8 +25,8 @@ _LATEST: Final = 64
 def name_of(frame: bytes) -> int:
     """One number per packet, the same at every hop: of all that its origin wrote, not of its sequence number alone.
 
-    So nobody takes the place of a packet by sending another one under its origin and number. The hash is Python's own,
-    keyed anew for each process (SipHash), so that nobody can aim at it; no order of anything depends on it.
+    So no node takes the place of a packet by sending another one under its origin and number. The hash is Python's own,
+    keyed anew for each process (SipHash), so that no forger can aim at it; no order of anything depends on it.
     """
     return hash(frame[wire.END_TO_END] + frame[wire.HEADER_BYTES :])
 
@@ -77,7 +77,7 @@ class _Inside:
     def __init__(self) -> None:
         self.content: Content | None = None
         self.messages: dict[Callable[[Content], Any], Any] = {}
-        """By decoder, what it made of the content."""
+        """The result of each decoder for the content, by decoder."""
 
 
 class Decoded:
@@ -90,7 +90,7 @@ class Decoded:
     def __init__(self) -> None:
         self._frame = b""
         self._inside = _Inside()
-        """Of that frame."""
+        """What was read inside that frame."""
         self._latest: dict[bytes, _Inside] = {}
         """Of each of the latest packets, the oldest first."""
 

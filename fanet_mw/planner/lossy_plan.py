@@ -2,7 +2,7 @@
 
     links as the channel makes them expect -> the timetable with repeated frames -> (delay, share) per source
 
-No link has been measured before take-off, so whoever plans says what to expect of each: its mean over fading, and with
+No link has been measured before take-off, so the caller says what to expect of each: its mean over fading, and with
 shadowing, which is drawn once for a place, several swarms with other draws. The verdict is that of the worst of them.
 """
 
@@ -33,7 +33,7 @@ class Drawn(NamedTuple):
     fitted: Fitted | None
     """The timetable with repeated frames; None: none fits, and one by places flies, which states nothing."""
     likely_ns: Mapping[NodeId, int | None]
-    """By source; None: its packets miss too many."""
+    """The likely delay of each source; None: its packets miss too many nodes."""
 
     @property
     def silent(self) -> list[NodeId]:

@@ -111,7 +111,7 @@ class _Root(NamedTuple):
     own: OwnBound
     lead_ns: int
     jitter_ns: int
-    """By how much a packet may reach the root late."""
+    """The time by which a packet may reach the root late."""
     control: int
 
     @property

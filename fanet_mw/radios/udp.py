@@ -161,7 +161,7 @@ class UdpRadio:
     # --- receive --------------------------------------------------------------------------------------------------
 
     def _on_datagram(self, data: bytes, address: Address) -> None:
-        """Take in one datagram, whoever sent it."""
+        """Take in one datagram, which any process may have sent."""
         try:
             datagram = Datagram.decode(data)
         except MalformedFrameError:

@@ -64,17 +64,17 @@ from fanet_mw.routing.clustered.timetable.turn_plans import TurnPlans
 from fanet_mw.units import MS, seconds_to_ns
 
 _STORE_PACKETS: Final = 4096
-"""Packets kept for repair; 4 MB at 1024 B."""
+"""The most packets that a node keeps for repair; they take 4 MB at 1024 B."""
 _JITTER: Final = 0.25
-"""Of the contention window: the most that a relay waits there. A flood whose relays wait for longer than the window
+"""The share of the contention window that a relay waits at most. A flood whose relays wait longer than the window
 lasts goes one hop a superframe."""
 _JOINED_NS: Final = 7500 * MS
-"""After its start a node should be in a timetable by then, and three superframes: joins take 3 s, a join may be lost,
-the leader waits a moment for more, and a timetable is announced ahead."""
+"""A node should be in a timetable so long and three superframes after its start: joins take 3 s, may be lost, and
+the leader waits a moment for more and announces a timetable ahead."""
 
 
 class _Ground(NamedTuple):
-    """What every kind of the protocol stands on."""
+    """The parts that the protocol has with every value of `clusters.relay`."""
 
     port: Port
     random: Callable[[], float]
@@ -91,17 +91,17 @@ class _Ground(NamedTuple):
 
     @property
     def lifetime_ns(self) -> int:
-        """Of what a neighbor said in its last hello."""
+        """The lifetime of what a neighbor said in its last hello."""
         return int(LIFETIME_HELLOS * self.hello_ns)
 
     def queue(self) -> TxQueue:
-        """For packets that wait to be let out, most urgent first."""
+        """A queue for packets that wait to be let out, most urgent first."""
         routing = self.port.scenario.routing
         return TxQueue(capacity=routing.queue_frames, sooner_us=sooner_us(routing))
 
 
 def make_clustered(port: Port) -> Clustered:
-    """The protocol as the port's scenario has it."""
+    """The protocol of a node, as the port's scenario has it."""
     return RELAYS[port.scenario.clusters.relay](_ground(port))
 
 
@@ -228,7 +228,7 @@ def _by_timetable(ground: _Ground) -> Clustered:
 
 
 def _admission(port: Port) -> Admission | None:
-    """Where the application states a deadline; a leader whose packets have no turns promises nothing."""
+    """The admission of packets by a deadline; None without a deadline, and for a leader whose packets have no turns."""
     scenario = port.scenario
     if scenario.traffic.deadline_s is None or (port.node == scenario.leader and not leader_load(scenario)):
         return None
@@ -244,8 +244,8 @@ def _admission(port: Port) -> Admission | None:
 
 
 def _role_parts(ground: _Ground, membership: Membership, *, takes_slot: bool) -> RoleParts:
-    """`takes_slot`: a node that stands in for a head serves its slot, and nobody else need be watched; else whoever
-    hears of a silent node only tells the leader.
+    """The parts of roles. With `takes_slot` a node that stands in for a head serves its slot, and only heads are
+    watched; without it, a node that notices a silent neighbor only tells the leader.
     """
     port, scenario = ground.port, ground.port.scenario
     liveness = Liveness()

@@ -1,4 +1,4 @@
-"""The clustered protocol at one node: says which of its parts hears of what, and decides nothing itself.
+"""The clustered protocol at one node: it says which of its parts hears of what, and decides nothing itself.
 
     a packet of the application   access: let out here, or brought to a head as acknowledged unicast (TO_HEAD)
     a packet on its way to a head access: the same
@@ -35,7 +35,7 @@ _POSITION_BYTES = 61
 
 
 class Parts(NamedTuple):
-    """What a node's protocol is made of."""
+    """The parts of which the protocol of a node is made."""
 
     neighbors: Neighbors
     gradient: Gradient
@@ -48,9 +48,9 @@ class Parts(NamedTuple):
     contending: ContendingRelaying
     """Relays outside of turns; `relaying` may be the same part, or leave to it what it does not decide itself."""
     two_hops: TwoHops | None
-    """None: hellos say nothing of neighbors."""
+    """The neighbors' neighbors, from hellos; None: hellos say nothing of neighbors."""
     promises: Promises | None = None
-    """None: this access has no bound to state."""
+    """The bounds and likely delays of the node's packets; None: this access has no bound to state."""
 
 
 class Clustered(RoutingProtocol):
@@ -63,10 +63,10 @@ class Clustered(RoutingProtocol):
         self._on_copy = tuple(on_copy)
         timed = (parts.roles, parts.access, parts.contending, parts.repair)
         self._asks = tuple(part.next_wake_ns for part in timed if part is not None)
-        """When the parts want to be woken: asked after every reception."""
+        """The methods that tell when a part wants to be woken; they are called after every reception."""
         self._lead_ns = port.scenario.radio.lead_ns
         self._hello_bytes = 0
-        """About how long the last hello was."""
+        """The approximate length of the last hello."""
 
     def start(self, now_ns: int) -> None:
         for part in (self.parts.roles, self.parts.access, self.parts.relaying):

@@ -62,7 +62,7 @@ class Roles(Protocol):
     def wake(self, now_ns: int) -> None: ...
 
     def clusters(self) -> Mapping[NodeId, tuple[NodeId, ...]]:
-        """By head, the nodes of each cluster, the head first, as far as the node knows."""
+        """The nodes of each cluster by head, the head first, as far as the node knows."""
 
     def report(self) -> Mapping[str, object]:
         """JSON-able state."""
@@ -75,7 +75,7 @@ class Access(Protocol):
         """The node is up."""
 
     def admits(self, packet: Packet, *, due_ns: int) -> bool:
-        """Whether a packet of the node's application, due at `due_ns`, is taken; a packet that is taken counts."""
+        """True if a packet of the node's application, due at `due_ns`, is taken; a packet that is taken counts."""
 
     def originate(self, packet: Packet, *, due_ns: int, now_ns: int) -> None:
         """Let out a packet of the node's application, or bring it to a node that will."""
@@ -90,7 +90,7 @@ class Access(Protocol):
         """Send what a neighbor lacks."""
 
     def hello_start_ns(self, start_ns: int, *, size: int) -> int:
-        """When a hello of about so many bytes may go that is due at `start_ns`."""
+        """The instant from which a hello of about so many bytes may go that is due at `start_ns`."""
 
     def next_wake_ns(self) -> int | None: ...
 

@@ -64,7 +64,7 @@ class ClaimedAccess:
         self._lifetime_ns = seconds_to_ns(port.scenario.routing.lifetime_s)
 
     def start(self, now_ns: int) -> None:
-        """No join: nobody assigns anything."""
+        """Begin without a join, because no leader assigns anything."""
         self._claiming.start(now_ns)
 
     # --- letting out ----------------------------------------------------------------------------------------------

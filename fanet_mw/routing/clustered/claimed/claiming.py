@@ -41,7 +41,7 @@ class Change(Enum):
 
 
 class ClaimedLoad:
-    """How many lots a node wants: by what it had to send, against the turns of its claim."""
+    """The number of lots that a node wants, by what it had to send against the turns of its claim."""
 
     def __init__(self, now_ns: int) -> None:
         self._pushed = 0
@@ -79,7 +79,7 @@ class Claiming:
         self._claims = self._new_claims(0)
         self._known_ns = 0
         self._claimed_ns: int | None = None
-        """When the node's claim last changed."""
+        """The instant at which the node's claim last changed."""
         self._news = False
         """True if a hello has brought news that the node has not drawn with yet."""
 
@@ -123,7 +123,7 @@ class Claiming:
         claim = self._claims.own
         turns_per_s = len(self.own.claimed()) * S / self.own.turns.period_ns
         lots = self._load.lots(waiting=waiting, turns_per_s=turns_per_s, now_ns=now_ns)
-        self._news = True  # somebody may have fallen silent
+        self._news = True  # a neighbor may have fallen silent
         self.draw(now_ns)
         return SlotStatus(claim.slot, self._port.scenario.clusters.slots or claim.length, claim.crowd, lots)
 

@@ -17,7 +17,7 @@ power of two not below the crowd (a node and all within two hops of it) of anyon
 slot a of A and slot b of B meet if a = b modulo the shorter length. A slot is always free for everyone: each of its
 n rivals takes 1/length <= 1/(n+1) of all turns, so together less than all. After Kanzaki et al., "Dynamic TDMA slot
 assignment in ad hoc networks" (AINA 2003). A crowd takes two superframes to be known, so the law gains four.
-Lengthening keeps a part of the turns, and so clashes with nobody; shortening waits until it has been possible a while.
+Lengthening keeps a part of the turns, and so clashes with no claim; shortening waits until it was possible for a while.
 """
 
 from collections.abc import Iterable, Iterator
@@ -91,7 +91,7 @@ class SlotClaims:
         """Superframes in a row for which a shorter one would have done."""
         self._hellos: dict[NodeId, tuple[int, SlotHello]] = {}
         self.repairs = 0
-        """How often a slot was given up to a stronger rival."""
+        """The number of slots that were given up to a stronger rival."""
 
     @property
     def slot(self) -> int | None:
@@ -146,7 +146,7 @@ class SlotClaims:
                 self._own, self._roomy = shorter, 0
 
     def _free(self, claim: SlotClaim) -> int | None:
-        """The lowest slot in which a claim of this length would meet nobody."""
+        """The lowest slot in which a claim of this length would meet no other."""
         taken = [rival for rival in self.rivals() if rival.slot is not None]
         if not claim.length:
             slot = lowest_free(rival.slot for rival in taken if rival.slot is not None)

@@ -74,7 +74,7 @@ class AffinityPropagation(NamedTuple):
                 r[i][k] = self.damping * r[i][k] + (1 - self.damping) * fresh
 
     def _update_availability(self, r: dict[NodeId, _Row], a: dict[NodeId, _Row]) -> None:
-        for k in r:  # the rows are symmetric: who is near k is who k is near to
+        for k in r:  # the rows are symmetric: the nodes that k is near to are those that are near k
             support = math.fsum(max(0.0, r[i][k]) for i in r[k] if i != k)
             for i in r[k]:
                 fresh = support if i == k else min(0.0, r[k][k] + support - max(0.0, r[i][k]))

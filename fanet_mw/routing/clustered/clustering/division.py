@@ -40,7 +40,7 @@ class Division:
     def __init__(
         self, method: str, *, count: int, range_m: float, options: Mapping[str, Any] = MappingProxyType({})
     ) -> None:
-        """A method that is none of ours is that of another package, made of the same arguments."""
+        """A method that is not of this package is one of another, made of the same arguments."""
         scores: dict[str, Score] = {"lowest_id": by_id, "highest_degree": by_degree}
         scores["wca"] = Weights(range_m).__call__
         scores["lasting_degree"] = LastingDegree(range_m).__call__
@@ -56,7 +56,7 @@ class Division:
         )
 
     def divide(self, swarm: Swarm, *, now_ns: int) -> list[Cluster]:
-        """A new division; `swarm.previous` stands."""
+        """Divide the swarm; `swarm.previous` is the division that stands."""
         if self._over_time is None:
             return self._once.divide(swarm)
         self._over_time.clusters = list(swarm.previous)
@@ -75,14 +75,14 @@ class Division:
         return in_their_slots(fresh, kept, swarm.adjacency)
 
     def _keeps_promise(self, kept: Sequence[Cluster], fresh: int, adjacency: Adjacency) -> bool:
-        """As many clusters as there should be, or, where the method promises it, every member hears its head."""
+        """True if the clusters are as many as asked for, or, where the method promises it, all hear their heads."""
         if self._count is not None:
             return len(kept) == fresh
         return all(m == cluster.head or m in adjacency[cluster.head] for cluster in kept for m in cluster.members)
 
 
 def cost(clusters: Sequence[Cluster], adjacency: Adjacency, *, fair: int) -> float:
-    """Transmissions that bring a packet of each member to its head, and one for each member above the fair share."""
+    """The transmissions that bring a packet of each member to its head, and one per member above the fair share."""
     total = 0
     for cluster in clusters:
         total += _distance(cluster.head, cluster.members, adjacency) + max(0, len(cluster.members) - fair)
@@ -90,7 +90,7 @@ def cost(clusters: Sequence[Cluster], adjacency: Adjacency, *, fair: int) -> flo
 
 
 def _distance(head: NodeId, members: Sequence[NodeId], adjacency: Adjacency) -> int:
-    """Hops to the head, over all members; as many as there are nodes where there is no way."""
+    """The hops to the heads, summed over all members; a member without a way counts as many as there are nodes."""
     hops = levels(adjacency, head)
     return sum(hops.get(member, len(adjacency)) for member in members)
 

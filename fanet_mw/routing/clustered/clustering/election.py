@@ -6,7 +6,7 @@ alone (lower is better; equal scores: lower id):
     lowest-ID        Ephremides, Wieselthier & Baker 1987      the id
     highest degree   Gerla & Tsai 1995                         most neighbors
     WCA              Chatterjee, Das & Turgut 2002             w1 |d - d0| + w2 distances + w3 mobility + w4 energy used
-    lasting degree   ours                                      neighbors, by how long they will be in range
+    lasting degree   (new here)                                neighbors, by how long they will be in range
 
 Hysteresis: a head that stands is counted `keep` better than its score. With infinity only a better head in range
 deposes it (least cluster change, Chiang et al. 1997); pairs under `truce` may meanwhile hear each other. Members keep
@@ -24,23 +24,23 @@ from fanet_mw.units import NodeId
 
 Score = Callable[[NodeId, Swarm], float]
 Pair = tuple[NodeId, NodeId]
-"""Two heads, the lower id first."""
+"""A pair of heads, the lower id first."""
 
 
 def by_id(node: NodeId, swarm: Swarm) -> float:
-    """Lowest-ID."""
+    """The score of lowest-ID."""
     return float(node)
 
 
 def by_degree(node: NodeId, swarm: Swarm) -> float:
-    """Highest degree."""
+    """The score of highest degree."""
     return -float(len(swarm.adjacency[node]))
 
 
 class Weights(NamedTuple):
     """WCA's combined weight. Distances count in units of `range_m`, so that the terms are of one size.
 
-    The paper's weights are 0.7, 0.2, 0.05, 0.05; its fourth term is the time spent as head, for which we take the
+    The paper's weights are 0.7, 0.2, 0.05, 0.05; its fourth term is the time spent as head, here replaced by the
     energy used. `ideal_degree` is the number of members a head can serve.
     """
 
@@ -64,7 +64,7 @@ class Weights(NamedTuple):
 
 
 class LastingDegree(NamedTuple):
-    """How many neighbors a head would keep, each counted by the part of the horizon it will be in range."""
+    """The number of neighbors that a head would keep, each counted by the part of the horizon it will be in range."""
 
     range_m: float
     horizon_s: float = 30.0
@@ -110,7 +110,7 @@ def _elect(adjacency: Adjacency, ranks: Mapping[NodeId, tuple[float, float]], tr
 
 
 def _gather(swarm: Swarm, heads: list[NodeId]) -> list[Cluster]:
-    """Each member stays with the head it had, or joins the best one it hears."""
+    """Put each member to the head that it had, or to the best one that it hears."""
     before = {member: cluster.head for cluster in swarm.previous for member in cluster.members}
     place = {head: index for index, head in enumerate(heads)}
     members: dict[NodeId, list[NodeId]] = {head: [head] for head in heads}

@@ -2,8 +2,8 @@
 
 Each step divides the swarm anew with the standing heads kept (least cluster change). Two heads that come into range are
 under truce for the contention interval: often they only pass each other (cluster contention interval, Basu et al.
-2001). One that still hears the other after it steps down by score. Ours: a `patient` head stays on beyond that while
-it has a member that hears no other head, for which a new head would have to be made.
+2001). A head that still hears the other after that steps down by score. A `patient` head stays on beyond that while
+it has a member that hears no other head, for which a new head would have to be made (new here).
 """
 
 from fanet_mw.routing.clustered.clustering.contract import Cluster, Swarm
@@ -23,7 +23,7 @@ class Maintenance:
         self.clusters: list[Cluster] = []
 
     def step(self, swarm: Swarm, *, now_ns: int) -> list[Cluster]:
-        """The clusters from now on; `swarm.previous` is ours to fill in."""
+        """The clusters from now on; `swarm.previous` is filled in here."""
         members = {cluster.head: cluster.members for cluster in self.clusters if cluster.head in swarm.adjacency}
         meeting = [(a, b) for a in sorted(members) for b in swarm.adjacency[a] if b in members and a < b]
         self._met_ns = {pair: self._met_ns.get(pair, now_ns) for pair in meeting}
@@ -42,6 +42,6 @@ class Maintenance:
 
     @staticmethod
     def _needed(head: NodeId, members: dict[NodeId, tuple[NodeId, ...]], swarm: Swarm) -> bool:
-        """Whether a member that still hears this head hears no other."""
+        """True if a member that still hears this head hears no other."""
         mine = (n for n in members[head] if n in swarm.adjacency and head in swarm.adjacency[n])
         return any(not any(n in members and n != head for n in swarm.adjacency[member]) for member in mine)

@@ -1,4 +1,4 @@
-"""How nodes move relative to each other: how long a link will last."""
+"""The motion of nodes relative to each other: the time for which a link will last."""
 
 import math
 
@@ -7,7 +7,7 @@ from fanet_mw.units import Enu, NodeId
 
 
 def link_lifetime_s(swarm: Swarm, a: NodeId, b: NodeId, *, range_m: float) -> float:
-    """When two nodes will leave each other's range, if both fly on straight [s]; infinite at equal velocities.
+    """The time until two nodes leave each other's range, if both fly on straight [s]; infinite at equal velocities.
 
     Link expiration time after Su, Lee & Gerla 2001: the greater root of |offset + t drift| = range.
     """

@@ -26,11 +26,11 @@ class RouteToHead(NamedTuple):
     hops: int
     parent: NodeId
     fresh_ns: int
-    """When the head's sequence number last advanced."""
+    """The instant at which the head's sequence number last advanced."""
 
 
 def newer(a: int, b: int) -> bool:
-    """Whether 16-bit sequence `a` comes after `b` (RFC 1982 serial numbers)."""
+    """True if 16-bit sequence `a` comes after `b` (RFC 1982 serial numbers)."""
     return 0 < ((a - b) & 0xFFFF) < 0x8000
 
 
@@ -78,7 +78,9 @@ class Gradient:
             self._route = offered
 
     def _heard(self, head: int, seq: int, now_ns: int) -> int:
-        """Since when a head's sequence is known to be at least this; the same news by another way is not fresher."""
+        """The instant since which a head's sequence is known to be at least this; the same news by another way is not
+        fresher.
+        """
         known = self._news.get(head)
         forgotten = known is None or known[1] + _FORGET * self._stale_ns < now_ns
         if known is None or forgotten or newer(seq, known[0]):
@@ -96,7 +98,7 @@ class Gradient:
         return offered.head_seq == route.head_seq and offered.hops < route.hops
 
     def news_ns(self, head: NodeId) -> int | None:
-        """When this head's sequence last advanced in received hellos; None when it never did."""
+        """The instant at which this head's sequence last advanced in received hellos; None when it never did."""
         known = self._news.get(head)
         return None if known is None else known[1]
 

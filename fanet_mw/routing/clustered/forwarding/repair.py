@@ -56,7 +56,7 @@ class Repair:
         self._stored: dict[int, int] = {}
         """The number of packets of each origin in the store."""
         self._pending: dict[int, int] = {}
-        """When each packet is to be sent, by key."""
+        """The instant at which each packet is to be sent, by key."""
         self._due: list[tuple[int, int]] = []
         self._turn = 0
         self.repaired = 0

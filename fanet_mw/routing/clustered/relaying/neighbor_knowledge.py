@@ -40,7 +40,7 @@ class RelayChoice(Protocol):
         """A neighbor said what it is."""
 
     def relays(self, sender: NodeId, *, now_ns: int) -> bool:
-        """Whether the node relays what `sender` transmitted."""
+        """True if the node relays what `sender` transmitted."""
 
 
 class MultipointRelays:
@@ -100,7 +100,7 @@ class HeadsFirst:
 
 
 class NeighborKnowledgeRelaying:
-    """The relays of one node where hellos decide who relays data; control goes on as `otherwise` says."""
+    """The relays of one node where hellos decide which nodes relay data; control goes on as `otherwise` says."""
 
     def __init__(self, port: Port, choice: RelayChoice, otherwise: Relaying) -> None:
         self._node = port.node

@@ -31,7 +31,7 @@ class Neighborhood:
         self._entries: dict[NodeId, _Entry] = {}
         self._relays: tuple[NodeId, ...] = ()
         self._belongs: bool | None = None
-        """Whether this node is a relay of the dominating set; None when it must be computed anew."""
+        """True if this node is a relay of the dominating set; None when that must be computed anew."""
 
     def on_claims(self, claims: Claims, *, now_ns: int) -> bool:
         """Take in a neighbor's claims; True if they say something new."""

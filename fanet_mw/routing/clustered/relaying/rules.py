@@ -4,7 +4,7 @@
 `gossip`   each one with probability min(1, degree / neighbors)     (after GOSSIP1: Haas, Halpern, Li, ToN 14(3), 2006)
 `counter`  after a random assessment delay, unless enough copies were heard by then    (Ni et al., MobiCom 1999, 3.2)
 
-`counter` adapts to density by itself: in a thin swarm nobody hears enough copies to stay silent, in a crowd most do.
+`counter` adapts to density by itself: in a thin swarm no node hears enough copies to stay silent, in a crowd most do.
 """
 
 from collections.abc import Callable

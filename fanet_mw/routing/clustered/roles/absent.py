@@ -1,4 +1,4 @@
-"""No roles: nobody leads, nobody assigns anything, and every node lets out its own packets."""
+"""No roles: no node leads or assigns anything, and every node lets out its own packets."""
 
 from collections.abc import Mapping
 
@@ -17,10 +17,10 @@ class NoRoles:
         self._port = port
 
     def start(self, now_ns: int) -> None:
-        """There is nobody to join."""
+        """Do nothing: there is no leader to join."""
 
     def on_sign_of_life(self, node: int, *, born_ns: int, now_ns: int) -> None:
-        """Nobody watches over others."""
+        """Do nothing: no node watches over others."""
 
     def on_control(self, packet: Packet, src: NodeId, *, now_ns: int) -> bool:
         """No node of such a swarm sends control packets: they are relayed like data, and mean nothing."""
@@ -33,10 +33,10 @@ class NoRoles:
         """There is no leader in whose name anything could be announced."""
 
     def on_flooding(self, due_ns: int) -> None:
-        """Nobody needs to know that the node lives."""
+        """Do nothing: no other node needs to know that this one lives."""
 
     def on_parent_lost(self, parent: NodeId, *, now_ns: int) -> None:
-        """No parent is anybody's head."""
+        """Do nothing: no parent is the head of a node."""
 
     def before_hello(self, now_ns: int) -> None:
         """Nothing goes with the rhythm of the hellos."""

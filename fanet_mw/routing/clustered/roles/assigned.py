@@ -40,7 +40,7 @@ class MakeLeader(Protocol):
 
 
 class RoleParts(NamedTuple):
-    """What the roles of a node are made of."""
+    """The parts of which the roles of a node are made."""
 
     membership: Membership
     lease: Lease
@@ -49,9 +49,9 @@ class RoleParts(NamedTuple):
     refresh: ScheduleRefresh
     check: ScheduleCheck
     detector: FailureDetector | None
-    """None: a silent neighbor is nobody's business but that of its cluster."""
+    """The failure detector; None: a silent neighbor concerns only its cluster."""
     links: LinkQuality | None
-    """None: links are not measured."""
+    """The quality of the node's links; None: links are not measured."""
     liveness: Liveness
 
 
@@ -100,7 +100,7 @@ class AssignedRoles:
         if kind == Kind.JOIN:
             join = decoded(packet.frame, Join.decode_frame)
             self._on_join(packet, join, src, now_ns)
-            # The join of a node that has a place only tells where it is, and need not be relayed by everyone.
+            # The join of a node that has a place only tells where it is, and need not be relayed by all nodes.
             return bool(join.instead_of) or not self.parts.membership.lists(packet.header.origin)
         if kind == Kind.SCHEDULE and not ours:
             self.parts.check.check(decoded(packet.frame, Schedule.decode_frame), now_ns)
@@ -126,7 +126,7 @@ class AssignedRoles:
             self._gradient.on_flood_of_head(NodeId(join.node), parent=src, hops=header.hops + 1, now_ns=now_ns)
 
     def _on_schedule(self, packet: Packet, *, now_ns: int) -> None:
-        """An announcement of a leader, perhaps of this node."""
+        """Take in an announcement of a leader, perhaps of this node."""
         schedule, parts = decoded(packet.frame, Schedule.decode_frame), self.parts
         places = self._timetabling.read(packet, schedule)
         if schedule.leader != packet.header.origin:
@@ -149,7 +149,9 @@ class AssignedRoles:
         self._timetabling.on_schedule(packet, schedule, places, now_ns=now_ns)
 
     def on_impersonation(self, packet: Packet, *, now_ns: int) -> None:
-        """A schedule in the leader's name: it announces a later one (as of link states in OSPF, RFC 2328, 13.4)."""
+        """Answer a schedule in this leader's name by announcing a later one (as of link states in OSPF, RFC 2328,
+        13.4).
+        """
         if packet.header.kind == Kind.SCHEDULE and self._leader is not None:
             schedule = decoded(packet.frame, Schedule.decode_frame)
             self.parts.check.check(schedule, now_ns)

@@ -22,7 +22,7 @@ SILENT_HELLOS: Final = 4.0
 _GIVEN_UP_HELLOS: Final = 2.0
 _TURN_HELLOS: Final = 0.5
 _AGAIN_HELLOS: Final = 2.0
-"""How many hellos apart a stand-in announces itself, until a new schedule confirms it or the head objects."""
+"""A stand-in announces itself each time after so many hellos, until a new schedule confirms it or the head objects."""
 _OBJECT_NS: Final = 500 * MS
 
 
@@ -52,7 +52,7 @@ class Failover:
         self._lease = lease
         self._hello_ns = hello_ns
         self._since_ns = 0
-        """When this node began to follow its present head."""
+        """The instant at which this node began to follow its present head."""
         self._named = NodeId(0)
         self._unreachable_ns = -1
         self._object_ns = 0

@@ -1,4 +1,4 @@
-"""When a node tells everyone where it is, and what it says then: a join, which also asks the leader for a place.
+"""The join of a node: a flood that tells where the node is, and asks the leader for a place.
 
 no place yet                     at a random instant, and again until a schedule names the node
 farther from where it was told   with the next hello, a little spread (`position_updates.py`)
@@ -35,10 +35,10 @@ class Joining:
         self._links = links
         self._random = random
         self.due_ns: int | None = None
-        """When the node joins next; None: it has no reason to."""
+        """The instant at which the node joins next; None: it has no reason to."""
 
     def start(self, now_ns: int) -> None:
-        """The node is up and belongs to nobody."""
+        """Begin: the node is up and belongs to no cluster."""
         self.due_ns = now_ns + _FIRST_NS + int(self._random() * _WINDOW_NS)
 
     def ask_for_a_place(self, now_ns: int) -> None:
@@ -55,7 +55,7 @@ class Joining:
         self._updates.on_flooding(due_ns)
 
     def may_update(self, now_ns: int) -> bool:
-        """Whether the last join is long enough ago for another."""
+        """True if the last join is long enough ago for another."""
         return self._updates.may_update(now_ns)
 
     def update_if_outdated(self, *, listed: int, now_ns: int) -> None:
@@ -77,5 +77,5 @@ class Joining:
         return inner + Links(node, links).encode_frames() if links else inner
 
     def motion(self, now_ns: int) -> Motion:
-        """Where the node is now, and how fast it moves."""
+        """The present motion of the node."""
         return Motion(self._port.position, self._port.velocity, now_ns)

@@ -93,7 +93,7 @@ class Leader:
         self._epoch = epoch
         self._links = LinkState() if scenario.measures_links else None
         self._measured_ns = measured_period_ns(scenario)
-        """How often an assignment is announced whose links have been measured: once per superframe."""
+        """The interval at which an assignment is announced whose links have been measured: one superframe."""
         self._outbid = False
         """True if another node has announced an epoch in this leader's name, so that the next epoch must be later."""
         self._assigned = _Assigned()

@@ -15,9 +15,9 @@ from fanet_mw.units import NodeId, S
 _PERIODS: Final = 4
 _LEAST_NS: Final = 4 * S
 _FIRST_NS: Final = 8 * S
-"""How long a node waits for a leader at its start: joins take 3 s, and their assignment another 2 s."""
+"""A node waits for a leader so long at its start: joins take 3 s, and their assignment another 2 s."""
 _TURN_NS: Final = 1 * S
-"""How long a node waits for each node with a lower id to take office first."""
+"""A node waits so long for each node with a lower id to take office first."""
 _TURNS: Final = 3
 _FOREVER_NS: Final = 1 << 62
 
@@ -44,7 +44,7 @@ class Lease:
         self.authority: Authority | None = None
         self._until_ns = 0
         self.stand_ns = 0
-        """When the node is to look whether it must take office."""
+        """The instant at which the node is to check whether it must take office."""
 
     def start(self, now_ns: int) -> None:
         """Begin to wait for a leader, because none has been heard yet."""

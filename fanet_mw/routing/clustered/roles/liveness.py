@@ -1,4 +1,4 @@
-"""When each node last gave a sign of life: any packet that it generated is one, whichever node relayed it.
+"""The last sign of life of each node: any packet that it generated is one, whichever node relayed it.
 
 A packet counts from the instant it was generated, not from its arrival: it may have waited for a slot while its origin
 died. Bounded by the number of nodes.
@@ -19,7 +19,7 @@ class Liveness:
             self._born_ns[node] = born_ns
 
     def last_ns(self, node: int) -> int | None:
-        """When a node last generated something; None: nothing of it has come in."""
+        """The instant at which a node last generated something; None: nothing of it has come in."""
         return self._born_ns.get(node)
 
     def alive_below(self, node: int, *, since_ns: int) -> int:

@@ -165,5 +165,5 @@ class Membership:
 
 
 def newer(version: Version, than: Version) -> bool:
-    """Whether a version of the same authority is a later one (16-bit serial numbers, RFC 1982)."""
+    """True if a version of the same authority is a later one (16-bit serial numbers, RFC 1982)."""
     return 0 < ((version.epoch - than.epoch) & 0xFFFF) < 0x8000

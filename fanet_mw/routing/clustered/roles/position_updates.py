@@ -1,4 +1,4 @@
-"""When a node tells the leader where it is: dead reckoning, as in IEEE 1278.1 (distributed interactive simulation).
+"""Position updates to the leader: dead reckoning, as in IEEE 1278.1 (distributed interactive simulation).
 
 The leader extrapolates the last position with the last velocity that it was told. A node sends an update when it is
 farther than a share of the radio range from where the leader must believe it to be, or when it has flooded nothing for

@@ -25,9 +25,9 @@ class _Report(NamedTuple):
 
     by: NodeId
     since_ns: int
-    """When the leader learned of it."""
+    """The instant at which the leader learned of it."""
     reported_ns: int
-    """When it was reported; a node that has generated something later is alive."""
+    """The instant at which it was reported; a node that has generated something later is alive."""
 
 
 class Roster:
@@ -100,14 +100,14 @@ class Roster:
         self._reports = {silent: report for silent, report in self._reports.items() if silent in self._motions}
 
     def places(self, t_ns: int) -> dict[NodeId, Enu]:
-        """Where the nodes are at an instant if they fly on straight, by id."""
+        """The places of the nodes at an instant if they fly on straight, by id."""
         return {node: self._motions[node].position_at(t_ns) for node in sorted(self._motions)}
 
     def velocities(self) -> Mapping[NodeId, Enu]:
-        """How the nodes fly [m/s], by id."""
+        """The velocities of the nodes [m/s], by id."""
         return {node: self._motions[node].velocity for node in sorted(self._motions)}
 
 
 def sure_m(range_m: float) -> float:
-    """How near two nodes must be for a link to be certain."""
+    """The distance within which a link between two nodes is certain."""
     return _SURE * range_m

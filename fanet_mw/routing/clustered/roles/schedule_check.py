@@ -26,7 +26,7 @@ class ScheduleCheck:
         self._port = port
         self._membership = membership
         self._renewed_ns = 0
-        """When the schedule that the node follows last changed."""
+        """The instant at which the schedule that the node follows last changed."""
 
     def on_new_schedule(self, now_ns: int) -> None:
         """The node follows another schedule."""

@@ -30,7 +30,7 @@ class ScheduleRefresh:
         """The packets of the announcement, by part."""
         self._kept_ns = 0
         self.due_ns: int | None = None
-        """When it is to be sent again; None: not at all."""
+        """The instant at which it is to be sent again; None: never."""
 
     def keep(self, packet: Packet, part: int, authority: Authority, epoch: int, *, now_ns: int) -> None:
         """Keep an announcement that this node follows, or its own."""

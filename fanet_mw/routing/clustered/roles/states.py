@@ -13,7 +13,7 @@ class State(StrEnum):
     """What a node is at the moment."""
 
     SEEKING = "seeking"
-    """In no schedule."""
+    """The node is in no schedule."""
     MEMBER = "member"
     HEAD = "head"
     """The head that the schedule names."""
@@ -52,7 +52,7 @@ class Action(StrEnum):
 
 
 class Row(NamedTuple):
-    """Where a transition leads, and what is done on the way."""
+    """The state to which a transition leads, and what is done on the way."""
 
     state: State
     action: Action

@@ -40,7 +40,7 @@ class Admission:
         self._expected_ns = now_ns + self._expected_after_ns
 
     def next_wake_ns(self) -> int | None:
-        """When it has to be said that there still is no bound; None: it has been said, or there was one."""
+        """The instant at which to record that there still is no bound; None: it is recorded, or there was one."""
         return self._expected_ns
 
     def wake(self, now_ns: int) -> DeadlineLost | None:
@@ -70,7 +70,7 @@ class Admission:
         return record(now_ns, self._node, bound_ns or 0, self._deadline_ns, self.interval_ns)
 
     def admits(self, born_ns: int) -> bool:
-        """Whether a packet generated at this instant may be let in; it then counts."""
+        """True if a packet generated at this instant may be let in; it then counts."""
         if self._next_ns is not None and born_ns < self._next_ns - _TOLERANCE_NS:
             return False
         start_ns = born_ns if self._next_ns is None else max(born_ns, self._next_ns)

@@ -1,4 +1,4 @@
-"""When a frame that has no turn may go: at once after a random jitter, or in the contention window of a superframe."""
+"""The start of a frame that has no turn: at once after a random jitter, or in the contention window of a superframe."""
 
 from collections.abc import Callable
 
@@ -22,14 +22,14 @@ class Contention:
         """No jitter is longer; None: any."""
 
     def start_ns(self, *, now_ns: int, jitter_ns: int = 0) -> int:
-        """When a frame that is ready now may go, with a jitter of up to `jitter_ns`."""
+        """The instant from which a frame that is ready now may go, with a jitter of up to `jitter_ns`."""
         if self.most_jitter_ns is not None:
             jitter_ns = min(jitter_ns, self.most_jitter_ns)
         start_ns = now_ns + self._lead_ns + int(self._jitter() * jitter_ns)
         return start_ns if self.turns_at is None else self.not_before(start_ns)
 
     def not_before(self, start_ns: int) -> int:
-        """When a frame that is due at an instant may go: then, if no turns are about, else in a window."""
+        """The instant from which a frame that is due may go: at once if there are no turns, else in a window."""
         turns = None if self.turns_at is None else self.turns_at(start_ns)
         return start_ns if turns is None else turns.contending_ns(start_ns, self._window)
 

@@ -38,7 +38,7 @@ class RootRelease(TurnRelease):
         super().__init__(queue, lead_ns=lead_ns)
         self._node = node
         self.reserved: Mapping[int, int] = dict(sorted(reserved.items()))
-        """By priority, the bytes of each turn that bulk leaves free."""
+        """The bytes of each turn that bulk leaves free, by priority."""
         self._plans: Sequence[TurnsInForce] = ()
 
     def follow(self, plans: Sequence[TurnsInForce], *, now_ns: int) -> None:
@@ -58,7 +58,7 @@ class RootRelease(TurnRelease):
         return self._queue.take_older(before_us=before_us, rank=PRIORITY_CONTROL)
 
     def through_ns(self, packet: Packet, *, now_ns: int) -> int | None:
-        """When the flood of a packet that was just pushed is over at the latest; None: nobody can say.
+        """The instant by which the flood of a packet that was just pushed is over; None: it is not known.
 
         What comes later does not count: it finds room of its own, or waits behind.
         """
@@ -85,7 +85,7 @@ class RootRelease(TurnRelease):
         return turn.frame_bytes - sum(self.reserved.values())
 
     def _rank(self, packet: Packet) -> int:
-        """Where a packet waits: what has no room of its own in a turn waits like bulk, and overtakes none of it.
+        """The rank at which a packet waits: one without room of its own in a turn waits like bulk, and overtakes none.
 
         Only a leader's announcements go before everything; a leader promises no bound.
         """

@@ -14,7 +14,7 @@ from fanet_mw.scenario import Clusters
 from fanet_mw.units import MS
 
 _SPREAD_CAP_NS: Final = 40 * MS
-"""Beyond this distance two floods no longer meet (some hops x lead + jitter + airtime); more would only add delay."""
+"""Two floods this far apart no longer meet (some hops x lead + jitter + airtime); more would only add delay."""
 
 
 class Tenure(NamedTuple):

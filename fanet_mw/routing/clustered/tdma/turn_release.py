@@ -47,7 +47,7 @@ class TurnRelease(ABC):
         return evicted
 
     def holds(self, key: int) -> bool:
-        """Whether this packet (`duplicates.key_of`) is queued."""
+        """True if this packet (`duplicates.key_of`) is queued."""
         return key in self._queue
 
     def expire(self, *, before_us: int) -> list[Packet]:

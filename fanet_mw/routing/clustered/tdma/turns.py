@@ -35,7 +35,7 @@ class Turns(NamedTuple):
         return t_ns - (t_ns - self.origin_ns) % self.period_ns
 
     def start_ns(self, offset: int, *, frame_start_ns: int) -> int:
-        """When the `offset`-th turn from a superframe's beginning starts; offsets may reach into later ones."""
+        """The start of the `offset`-th turn from a superframe's beginning; offsets may reach into later ones."""
         later, turn = divmod(offset, self.per_frame)
         return frame_start_ns + later * self.period_ns + self.contention_ns + turn * self.turn_ns
 
@@ -56,7 +56,9 @@ class Turns(NamedTuple):
         raise AssertionError("offsets are turns of one superframe, so one of the next lies ahead")
 
     def contending_ns(self, start_ns: int, random: Callable[[], float]) -> int:
-        """When a frame that is due at `start_ns` may contend: then, or at a random instant of the next window."""
+        """The instant from which a frame due at `start_ns` may contend: then, or at a random instant of the next
+        window.
+        """
         open_ns = max(1, self.contention_ns - _TAIL_NS)
         frame_ns = self.frame_start_ns(start_ns)
         if start_ns - frame_ns < open_ns:
@@ -93,14 +95,14 @@ class Turns(NamedTuple):
         ]
 
     def flood_ns(self, offset: int, *, span: int) -> int:
-        """How long a flood of `span` turns takes from the `offset`-th on, contention windows in between included."""
+        """The duration of a flood of `span` turns from the `offset`-th on, contention windows in between included."""
         return (
             self.start_ns(offset + span - 1, frame_start_ns=0) + self.turn_ns - self.start_ns(offset, frame_start_ns=0)
         )
 
 
 def turn_ns(scenario: Scenario, *, payload_bytes: int) -> int:
-    """How long a turn must be for frames of this size; the slack is for flight, detection and clock errors."""
+    """The length of a turn for frames of this size; the slack is for flight, detection and clock errors."""
     radio = scenario.radio
     slack_ns = round(scenario.clusters.turn_slack_us * US)
     timing = Timing.of(radio)
@@ -116,7 +118,7 @@ def receipt_ns(scenario: Scenario) -> int:
 
 
 def clocks_fit(scenario: Scenario, *, clock_error_ns: int) -> bool:
-    """Whether turns stay apart when no clock is farther than this from the swarm's; exact clocks always fit.
+    """True if turns stay apart when no clock is farther than this from the swarm's; exact clocks always fit.
 
     Where clocks are not exact, an error of 0 is one that the node has not heard of yet.
     """

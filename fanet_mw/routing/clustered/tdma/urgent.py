@@ -12,12 +12,12 @@ _REPORT_BYTES: Final = wire.HEADER_BYTES + wire.SURVIVOR.layout.size + wire.OVER
 
 
 def report_bytes(scenario: Scenario) -> int:
-    """How long a packet with a survivor report is."""
+    """The length of a packet with a survivor report."""
     return scenario.mission.report_bytes or _REPORT_BYTES
 
 
 def reserved(scenario: Scenario) -> Mapping[int, int]:
-    """By priority, the bytes of each turn that bulk must leave free: one packet of each urgent class that there is."""
+    """The bytes of each turn that bulk must leave free, by priority: one packet of each urgent class that there is."""
     mission = scenario.mission
     found = {}
     if mission.collision_horizon_s:

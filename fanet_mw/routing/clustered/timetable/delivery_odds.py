@@ -1,9 +1,9 @@
-"""How likely a packet is with everyone when its flood is over, and after so many rounds of repair: a simulation.
+"""The share of nodes that have a packet when its flood is over, and after so many rounds of repair: a simulation.
 
-    flood    each frame of the table is drawn for each of its receivers, in order: who has the packet by then, sends it
+    flood    each frame of the table is drawn for each of its receivers, in order: a node that has the packet, sends it
     round    a node that lacks it says so in its hello, and a neighbor answers in a turn of its own
 
-A frame that somebody in the same turn disturbs is lost. `_TRIALS` floods of each root are drawn side by side, as the
+A frame that another in the same turn disturbs is lost. `_TRIALS` floods of each root are drawn side by side, as the
 bits of integers, from one named random stream: the same everywhere. Losses are independent from frame to frame, as
 `LinkQuality` measured them. Of a round the best neighbor alone counts, which must hear the hello and be heard. Not
 modeled: that many ask at once, so that an answer waits for the next turn but one.
@@ -21,17 +21,17 @@ from fanet_mw.wire.links import NEPERS
 
 _TRIALS: Final = 256
 _DIGITS: Final = 8
-"""Of a probability, in binary."""
+"""The binary digits of a probability."""
 ROUNDS: Final = 6
 Sent = tuple[int, int]
 """(offset, row)."""
 
 
 class Odds(NamedTuple):
-    """What to expect of a timetable for lossy links."""
+    """The deliveries to be expected of a timetable for lossy links."""
 
     missed: Mapping[NodeId, tuple[float, ...]]
-    """Per root: the share of nodes that lack its packet after no round of repair, after one, and so on."""
+    """The share of nodes that lack the packet of each root after no round of repair, after one, and so on."""
 
     @property
     def mean(self) -> float:
@@ -39,12 +39,12 @@ class Odds(NamedTuple):
         return fsum(row[0] for row in self.missed.values()) / len(self.missed)
 
     def rounds(self, root: NodeId, *, missed: float) -> int | None:
-        """After how many rounds no more than this share is missing; None: more than are reckoned with."""
+        """The number of rounds after which no more than this share is missing; None: more than are reckoned with."""
         return next((count for count, share in enumerate(self.missed[root]) if share <= missed), None)
 
 
 def odds(network: Network, floods: Sequence[tuple[NodeId, Sequence[Sent]]], *, turns: int, hop_turns: int) -> Odds:
-    """Of the floods of a table: the root of each, and its frames in order."""
+    """The odds of the floods of a table: `floods` has the root of each, and its frames in order."""
     together: dict[int, int] = {}
     for _, sent in floods:
         for offset, row in sent:
@@ -79,7 +79,7 @@ def _flood(
     turns: int,
     hop_turns: int,
 ) -> list[float]:
-    """Per row: the share of trials in which it lacks the packet."""
+    """The share of trials in which each row lacks the packet."""
     everywhere = (1 << _TRIALS) - 1
     has = [0] * len(network.nodes)
     has[root] = everywhere
@@ -119,7 +119,7 @@ class _Draw:
         self._bits = stream(0, "odds", 0).getrandbits
 
     def bits(self, chance: int) -> int:
-        """One bit per trial; from the last binary digit to the first, a 1 is or, a 0 is and."""
+        """Draw one bit for each trial; from the last binary digit to the first, a 1 is or, a 0 is and."""
         found = 0
         for digit in range(_DIGITS):
             drawn = self._bits(_TRIALS)

@@ -1,4 +1,4 @@
-"""How well a node hears each neighbor, measured from hellos: the share that arrives, and their mean power.
+"""The quality of a node's links, measured from hellos: the share that arrives, and their mean power.
 
     hellos heard of the last 24 intervals, over those that should have come  ->  (heard + 1/2) / (due + 1), mean RSSI
 
@@ -87,7 +87,7 @@ class LinkQuality:
         return links
 
     def outdated(self, *, now_ns: int) -> bool:
-        """Whether the leader should be told: there is a first estimate, or a link has changed."""
+        """True if the leader should be told: there is a first estimate, or a link has changed."""
         if now_ns - self._start_ns < FIRST * self._hello_ns:
             return False
         now = {link.a: link.chance for link in self.links(now_ns=now_ns)}

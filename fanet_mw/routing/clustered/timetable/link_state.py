@@ -75,7 +75,7 @@ def adjacency(links: Sequence[Link], nodes: Iterable[NodeId]) -> dict[NodeId, tu
 
 
 def worth_a_change(before: Sequence[Link], now: Sequence[Link]) -> bool:
-    """Whether links have changed so much that a timetable made for the earlier ones should be replaced."""
+    """True if links have changed so much that a timetable made for the earlier ones should be replaced."""
     chances: Mapping[tuple[NodeId, NodeId], float] = {(link.a, link.b): link.chance for link in before}
     later = {(link.a, link.b): link.chance for link in now}
     pairs = sorted(chances.keys() | later.keys())

@@ -1,10 +1,10 @@
 """Turns filled one after the other with as many transmissions as do not disturb each other: list scheduling of floods.
 
     turn by turn:  of all floods under way, which holder of a packet can send it now, and how many lack it around?
-                   most first, while nobody already chosen is disturbed; an old flood goes before a young one
+                   most first, while no frame already chosen is disturbed; an old flood goes before a young one
 
 Floods begin evenly over the superframe, or a little faster when turns are scarce. Each node sends a packet at most
-once, to all its neighbors that lack it. A neighbor that only this node can serve counts half more: who leaves it
+once, to all its neighbors that lack it. A neighbor that only this node can serve counts half more: one that leaves it
 behind has to come back for it. With more `tries` each turn is filled several times, with some noise on the order, and
 the fullest is taken. After the last turn the superframe begins again: the end of late floods goes around early ones.
 
@@ -124,7 +124,7 @@ class Flood:
         """The rows that must send first, in this order."""
         self._has = 1 << root
         self._ready = {root: 0}
-        """By holder of the packet, the offset from which on it can send."""
+        """The offset from which each holder of the packet can send."""
         self._offers: list[tuple[int, int, int, int]] | None = None
 
     @property
@@ -144,7 +144,7 @@ class Flood:
     def _look(self) -> list[tuple[int, int, int, int]]:
         hears, has = self._hears, self._has
         if not self.sent and self._has == self.goal:
-            return [(0, 0, self.root, 0)]  # nobody else in this part of the swarm; it speaks all the same
+            return [(0, 0, self.root, 0)]  # the only node in this part of the swarm; it speaks all the same
         while self._way and not hears[self._way[0]] & ~has:
             self._way.pop(0)
         found = []

@@ -4,7 +4,7 @@ A bound is stated for a packet when the packet is accepted: only then are queue 
 be kept whatever comes later: until the packet is through no other timetable may come into force, of which the leader
 gives notice in time. Every class of packets has room of its own in a turn, so each has a bound of its own.
 
-What nobody gives notice of is that another leader prevails: two parts of a swarm have met. The node then keeps the
+No node gives notice that another leader prevails, when two parts of a swarm have met. The node then keeps the
 turns in which it is to let out what it promised. A promised packet that would come late all the same is not sent.
 """
 
@@ -43,24 +43,24 @@ class Promises:
         self._lead_ns = port.scenario.radio.lead_ns
         self._interval_ns = seconds_to_ns(port.scenario.traffic.interval_s)
         self._bounds_ns: list[tuple[TurnPlan, Mapping[int, int]]] = []
-        """Each timetable, and the bound of each class (by priority) of the node's packets; a missing class has none."""
+        """The bound of each class (by priority) of the node's packets in each timetable; a missing class has none."""
         self._promised: dict[int, tuple[int, int]] = {}
-        """Of the packets that a bound was stated for and that still wait, by sequence number: when the flood of each is
+        """The packets that a bound was stated for and that still wait, by sequence number: when the flood of each is
         over as long as the node keeps its turns, and when it must be."""
         self._ahead: tuple[TurnPlan, int] | None = None
         """The timetable looked at last, and how long before its end that must be announced."""
         self.announced_ns = 0
-        """When the leader made the latest announcement that is known of the timetable that is followed."""
+        """The instant of the leader's latest known announcement of the timetable that is followed."""
 
     def start(self, now_ns: int) -> None:
-        """The node is up; it has no bound yet."""
+        """Begin: the node is up, and has no bound yet."""
         if self._admission is not None:
             self._admission.start(now_ns)
 
     # --- timetables -----------------------------------------------------------------------------------------------
 
     def follow(self, *, now_ns: int) -> None:
-        """The newest timetable is another one, or there is none."""
+        """Take in that the newest timetable is another one, or that there is none."""
         if self._plans.newest is None:
             self._bounds_ns = []
             self._admit(None, now_ns=now_ns)
@@ -89,7 +89,7 @@ class Promises:
         return OwnBound(plan.turns, offsets, plan.table.spans[node], plan.together, around_ns)
 
     def class_bounds_ns(self, own: OwnBound | None) -> Mapping[int, int]:
-        """By priority; none for what is repaired after it was lost."""
+        """The bounds by priority; a class that is repaired after losses has none."""
         scenario = self._port.scenario
         if own is None or scenario.clusters.repair_s:
             return {}
@@ -101,12 +101,14 @@ class Promises:
         return found if bulk_ns is None else {**found, PRIORITY_BULK: bulk_ns}
 
     def notice_ns(self, now_ns: int) -> int:
-        """How long ahead another timetable must be announced for every promise under those in force to be kept."""
+        """The time ahead at which another timetable must be announced, for every promise under those in force to be
+        kept.
+        """
         in_force = self._plans.in_order[self._plans.superseded(now_ns) :]
         return max((self._ahead_ns(plan) for plan in in_force), default=0)
 
     def _ahead_ns(self, plan: TurnPlan) -> int:
-        """How long before this timetable ends its end is announced.
+        """The time before the end of this timetable at which that end must be announced.
 
         All have heard of it after a superframe and a flood; what any node has promised until then must be through.
         """
@@ -122,7 +124,7 @@ class Promises:
     # --- packets --------------------------------------------------------------------------------------------------
 
     def admits(self, packet: Packet, *, due_ns: int) -> bool:
-        """Whether a packet of the application may be let in without harm to the deadline of those before it."""
+        """True if a packet of the application may be let in without harm to the deadline of those before it."""
         policed = self._admission if packet.header.priority == PRIORITY_BULK else None
         return policed is None or policed.admits(due_ns)
 
@@ -154,7 +156,9 @@ class Promises:
             self._port.record(record)
 
     def kept_until_ns(self, now_ns: int) -> int:
-        """Until when the node keeps its turns, so that what it promised can go in them; 0: nothing promised waits."""
+        """The instant until which the node keeps its turns, for what it promised to go in them; 0: nothing promised
+        waits.
+        """
         self._forget_overdue(now_ns)
         return max((through_ns for through_ns, _ in self._promised.values()), default=0)
 
@@ -165,7 +169,7 @@ class Promises:
 
     def keeps(self, packet: Packet, *, through_ns: int | None) -> bool:
         """True if a packet that stops waiting comes in time, because its flood is over at an instant, or if nothing was
-        promised of it. None: nobody can say when its flood will be over.
+        promised of it. None: the end of its flood is not known.
         """
         if packet.header.origin != self._port.node:
             return True
@@ -194,7 +198,7 @@ class Promises:
         return None if own is None or self.bound_ns() is None else least_interval_ns(own, deadline_ns=deadline_ns)
 
     def likely_ns(self) -> int | None:
-        """Within which time `LIKELY_SHARE` of the nodes have the newest packet of this node, where links lose frames;
+        """The time within which `LIKELY_SHARE` of the nodes have this node's newest packet, where links lose frames;
         None: no such time is known.
         """
         plan = self._plans.newest
@@ -203,7 +207,7 @@ class Promises:
         if self._lease.leads or plan.table.uncovered[self._port.node] or not self._in_step():
             return None  # schedules go before the leader's own packets
         if len(plan.table.spans) < self._port.scenario.nodes.count:
-            return None  # a swarm in parts, or one that is not complete: somebody is in no turn of this timetable
+            return None  # a swarm in parts, or one that is not complete: some node is in no turn of this timetable
         found_ns = likely_delay_ns(
             plan,
             self._port.node,
@@ -214,11 +218,11 @@ class Promises:
         return None if found_ns is None else found_ns + self._lead_ns + receipt_ns(self._port.scenario)
 
     def _in_step(self) -> bool:
-        """Whether the turns' slack holds what is known of the swarm's clocks."""
+        """True if the turns' slack allows for what is known of the swarm's clocks."""
         return clocks_fit(self._port.scenario, clock_error_ns=self._port.clock_error_ns)
 
     def report(self) -> Mapping[str, object]:
-        """JSON-able state."""
+        """The state, as JSON values."""
         bound_ns, likely_ns = self.bound_ns(), self.likely_ns()
         bounds_ns = self._bounds_ns[-1][1] if self._bounds_ns else {}
         return {

@@ -9,6 +9,8 @@ Turns are filled one after the other as in `list_scheduling.py`, by the same rul
 another sender in the turn disturbs is left out, and served later, as long as half of what the frame is worth remains; a
 call is for all neighbors. Whether a node disturbs a link depends on how strong that link is (`Network`).
 
+A node sends its repetitions in flight by `turn_access.py` (its own packets) and `relaying/scheduled.py` (relays).
+
 Not modeled: that a relay may lack the packet although it has had its dose (`planner/loss.py` reckons with it).
 """
 
@@ -35,7 +37,7 @@ _DECADE_DB: Final = 30
 
 
 class Network:
-    """How well nodes hear each other, and which nodes spoil which link: bit sets over the nodes' row numbers."""
+    """The quality of links, and the nodes that spoil each link, as bit sets over the nodes' row numbers."""
 
     def __init__(
         self, positions: Sequence[tuple[NodeId, Enu]], geometry: Geometry, measured: Sequence[Link], *, margin_db: float
@@ -54,7 +56,7 @@ class Network:
         self.senses = self._links(known, least=0.0)
         self.hears, chance = self._connected(known)
         self.dose: dict[tuple[int, int], int] = {}
-        """By (sender, receiver) the grade of the link."""
+        """The grade of each link, by (sender, receiver)."""
         for link in known:
             if link.chance >= chance:
                 a, b = self.row[link.a], self.row[link.b]
@@ -80,7 +82,7 @@ class Network:
         raise AssertionError("the last choice is the whole")
 
     def _who_disturbs(self, at: Sequence[Enu], interference_m: float, margin_db: float) -> dict[tuple[int, int], int]:
-        """By link the rows whose frames spoil it."""
+        """The rows whose frames spoil each link."""
         weakest = min((dbm for dbm in self._dbm.values()), default=0)
         apart = [[here.minus(there).norm() for there in at] for here in at]
         found = {}
@@ -143,7 +145,7 @@ class Wave:
         self._enough = enough
         self._has = 1 << root
         self._missing: dict[int, int] = {}
-        """By row that has had part of its dose, what is left of it."""
+        """What is left of the dose of each row that has had part of it."""
         self._ready = {root: 0}
         self._offers: list[_Offer] | None = None
 
@@ -163,7 +165,7 @@ class Wave:
     def _look(self) -> list[_Offer]:
         network, has = self._network, self._has
         if not self.sent and self.goal == has:
-            return [_Offer(0, 0, self.root, ())]  # nobody else in this part of the swarm; it speaks all the same
+            return [_Offer(0, 0, self.root, ())]  # the only node in this part of the swarm; it speaks all the same
         found = []
         for row, ready in self._ready.items():
             lacking = network.hears[row] & ~has

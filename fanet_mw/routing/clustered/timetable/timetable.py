@@ -193,7 +193,7 @@ def _repeated(
 
 
 def _spans(turns: Sequence[Turn]) -> dict[NodeId, int]:
-    """Of turns in order: the longest of each root."""
+    """The longest span of each root's floods; `turns` are in order."""
     begun: dict[tuple[NodeId, int], int] = {}
     spans: dict[NodeId, int] = {}
     for turn in turns:

@@ -30,10 +30,10 @@ _LINKS_PART: Final = 1 << 16
 
 
 class Timetabling(Protocol):
-    """What goes with a leader's schedule, and what a node makes of it besides its role."""
+    """The additions to a leader's schedule, and the timetable that a node makes of both."""
 
     needs_every_link: bool
-    """A node that falls silent, or a link that is lost, cuts others off: the leader is told, and plans anew."""
+    """True if a node that falls silent, or a link that is lost, cuts others off: the leader is told, and plans anew."""
 
     def addition(self, part: Schedule, leader: Leader) -> bytes:
         """The inner frames that a part of the schedule is announced with."""
@@ -42,16 +42,16 @@ class Timetabling(Protocol):
         """The inner frames of the packets of links that follow a part of the schedule."""
 
     def read(self, packet: Packet, schedule: Schedule) -> Places | None:
-        """What came with a part of a schedule; raises MalformedFrameError."""
+        """Read what came with a part of a schedule; raises MalformedFrameError."""
 
     def on_schedule(self, packet: Packet, schedule: Schedule, places: Places | None, *, now_ns: int) -> None:
-        """A part of a schedule that the roles have taken in, and what came with it."""
+        """Take in what came with a part of a schedule that the roles have taken in."""
 
     def on_links(self, packet: Packet, *, now_ns: int) -> None:
-        """A packet of links that followed a schedule; raises MalformedFrameError."""
+        """Take in a packet of links that followed a schedule; raises MalformedFrameError."""
 
     def notice_ns(self, now_ns: int) -> int:
-        """How long ahead the leader must announce another schedule."""
+        """The time ahead at which the leader must announce another schedule."""
 
 
 class NoTimetable:
@@ -69,10 +69,10 @@ class NoTimetable:
         return None
 
     def on_schedule(self, packet: Packet, schedule: Schedule, places: Places | None, *, now_ns: int) -> None:
-        """There is nothing more to take: the roles have taken it."""
+        """Do nothing: the roles have taken in all there is."""
 
     def on_links(self, packet: Packet, *, now_ns: int) -> None:
-        """Links are of no use without a timetable."""
+        """Do nothing: links are of no use without a timetable."""
 
     def notice_ns(self, now_ns: int) -> int:
         return 0
@@ -105,7 +105,7 @@ class FromPlaces:
         self._version: Version | None = None
         self._planned: Version | None = None
         self._announced_ns: dict[Version, int] = {}
-        """When the leader made the latest announcement of the newest schedule, and of the one that is followed."""
+        """The instants of the leader's latest announcements of the newest schedule, and of the one that is followed."""
 
     # --- at the leader --------------------------------------------------------------------------------------------
 
@@ -149,7 +149,7 @@ class FromPlaces:
         self._plan_if_complete(now_ns)
 
     def on_links(self, packet: Packet, *, now_ns: int) -> None:
-        """A part of the links of an assignment, which may come before the schedule does."""
+        """Take in a part of the links of an assignment, which may come before the schedule does."""
         told = decoded(packet.frame, Links.decode_frames)
         if told is None or told.node != packet.header.origin:
             raise MalformedFrameError(f"links of an assignment by {packet.header.origin}")
@@ -179,7 +179,7 @@ class FromPlaces:
         return len(self._schedules) >= first.parts and self._has_links()
 
     def _has_links(self) -> bool:
-        """Whether all parts of the links of the schedule's version have come, where links are measured."""
+        """True if all parts of the links of the schedule's version have come, or links are not measured."""
         if not self._port.scenario.measures_links:
             return True
         first = next(iter(self._measured.values()), None)
@@ -198,7 +198,7 @@ class FromPlaces:
                 if member.is_head:
                     heads[member.cluster] = NodeId(member.node)
         if not heads.keys() >= set(cluster_of.values()):
-            return  # a cluster without a head: no leader of ours makes one
+            return  # a cluster without a head: no leader makes one
         measured = tuple(link for part in sorted(self._measured) for link in self._measured[part].links)
         head_of = {node: heads[cluster] for node, cluster in sorted(cluster_of.items())}
         found = self._fit(schedule, at, head_of, measured)

@@ -2,7 +2,8 @@
 
 Until a timetable gives the node turns it brings packets to a head, as with slots. What has no turn contends in the
 window at the beginning of each superframe: hellos, joins, unicasts to a head, and what neighbors lack; over lossy
-links hellos and answers have turns of their own, the calls.
+links hellos and answers have turns of their own, the calls, and a frame is repeated in the later turns that
+`redundant_scheduling.py` has found for it.
 """
 
 from collections.abc import Mapping, Sequence
@@ -155,7 +156,7 @@ class TurnAccess:
         return packet
 
     def answer(self, packet: Packet, *, now_ns: int) -> None:
-        """In a turn for neighbors alone, if the node has one and the packet fits.
+        """Send an answer to neighbors in a turn for them alone, if the node has one and the packet fits.
 
         What still waits for a turn to be flooded in is no answer: a node that hears a packet outside of its turns
         relays neither that copy nor its flood afterwards, which would end there.
@@ -204,7 +205,7 @@ class TurnAccess:
             self._floods.answer(packets, start_ns=start_ns)
 
     def _through_ns(self, start_ns: int) -> int | None:
-        """When the flood is over that begins in one of the node's turns; None: no timetable is in force."""
+        """The end of the flood that begins in one of the node's turns; None: no timetable is in force."""
         plan = self._plans.at(start_ns)
         turn = None if plan is None else plan.turns.turn_at(start_ns)
         if plan is None or turn is None:
@@ -212,7 +213,7 @@ class TurnAccess:
         return start_ns + plan.turns.flood_ns(turn, span=plan.table.spans.get(self._port.node, 1))
 
     def _repetitions(self, start_ns: int) -> list[int]:
-        """When a frame that is let out at an instant is repeated."""
+        """The instants at which a frame is repeated that is let out at an instant."""
         plan = self._plans.at(start_ns)
         turn = None if plan is None else plan.turns.turn_at(start_ns)
         if plan is None or turn is None:

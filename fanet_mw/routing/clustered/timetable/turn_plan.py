@@ -1,4 +1,4 @@
-"""How the turns of a superframe are shared: the packets of each root, and how many of them in a frame. Pure functions.
+"""The division of a superframe's turns: the packets of each root, and how many of them share a frame. Pure functions.
 
     first     a little more turns than each node's load needs, so that a backlog drains
     else      as many as it needs; with several of its packets in a frame if they fit: longer turns, fewer preambles
@@ -30,7 +30,7 @@ from fanet_mw.wire.places import CAPACITY as PLACES_CAPACITY
 _SCHEDULE_BYTES: Final = SCHEDULE.layout.size + OVERHEAD
 _PLACES_BYTES: Final = PLACES.layout.size + OVERHEAD
 _FEWER: Final = 0.95
-"""When the turns do not suffice for the load, this share of it is tried next, and so on."""
+"""The share of the load that is tried next when the turns do not suffice for it, and so on."""
 _EASY: Final = (Effort(), Effort(pace=0.9))
 _HARD: Final = Effort(pace=0.8, tries=8)
 """The packing for a load that does not fit otherwise."""
@@ -43,7 +43,7 @@ _PACES: Final = (1.0, 0.9)
 _MOST_PERIODS: Final = 4
 """The most flooding periods in a superframe with measured links."""
 _LOAD: Final = 0.9
-"""With measured links a node's packets use this share of its root turns, so that its other messages find a turn."""
+"""The share of its root turns that a node's packets use with measured links: its other messages need turns, too."""
 _CALLS_PER_S: Final = 3
 _MOST_DIGESTS: Final = 4
 _HELLO_BYTES: Final = 200
@@ -70,7 +70,7 @@ class Fitted(NamedTuple):
     enough: bool
     """True if as many packets are let out as come."""
     odds: Odds | None = None
-    """How likely packets arrive by a timetable for lossy links; None: the timetable reckons with no loss."""
+    """The odds of a timetable for lossy links; None: the timetable reckons with no loss."""
 
 
 class TurnPlan(NamedTuple):
@@ -82,11 +82,11 @@ class TurnPlan(NamedTuple):
     mine: Mapping[tuple[NodeId, int], tuple[int, ...]]
     """The node's turns for each (root, instance) of other nodes."""
     heard: Mapping[tuple[int, NodeId], tuple[int, NodeId, int]]
-    """By (turn, sender), the (offset, root, instance) of the flood that is heard then."""
+    """The (offset, root, instance) of the flood that is heard in each turn from each sender."""
     roots: tuple[int, ...]
     """The turns in which the node lets packets out."""
     again: Mapping[int, tuple[int, ...]]
-    """By root turn, the later turns in which the node repeats what it let out."""
+    """The later turns in which the node repeats what it let out in each root turn."""
     calls: tuple[int, ...]
     """The turns in which the node sends what is for its neighbors alone."""
     together: int

@@ -27,7 +27,7 @@ class TurnPlans:
         return None if plan is None else plan.turns
 
     def superseded(self, now_ns: int) -> int:
-        """How many of the timetables, the oldest first, are no longer in force."""
+        """The number of the timetables, the oldest first, that are no longer in force."""
         return sum(plan.valid_ns <= now_ns for plan in self.in_order[1:])
 
     def follow(self, plan: TurnPlan | None, *, now_ns: int) -> None:

@@ -158,13 +158,21 @@ class Attitude(NamedTuple):
 
 
 class BatteryState(NamedTuple):
-    """The state of a battery."""
+    """The state of a battery whose cells are not measured one by one."""
 
-    cells_v: tuple[float, ...]
+    voltage_v: float
     current_a: float
     consumed_mah: int
     remaining_percent: int
-    remaining_s: int
+
+
+def _battery_fields(battery: BatteryState | None) -> tuple[int, int, int, int]:
+    """Voltage [mV], current [cA], consumed charge [mAh] and what remains [%], or what MAVLink says for unknown."""
+    if battery is None:
+        return _UNKNOWN_U16, -1, -1, -1
+    millivolts = max(0, min(_UNKNOWN_U16 - 1, round(1000 * battery.voltage_v)))
+    centiamperes = max(0, min(_UNKNOWN_I16, round(100 * battery.current_a)))
+    return millivolts, centiamperes, battery.consumed_mah, battery.remaining_percent
 
 
 class Encoder:
@@ -221,37 +229,31 @@ class Encoder:
         """ATTITUDE; the rates are zero, because they are not known here."""
         return self._pack(common.MAVLink_attitude_message(_boot_ms(now_ns), *attitude, 0.0, 0.0, 0.0))
 
-    def sys_status(self, battery: BatteryState) -> bytes:
-        """SYS_STATUS: the battery, and the sensors present, enabled and healthy, of which GPS is the only one."""
+    def sys_status(self, battery: BatteryState | None) -> bytes:
+        """SYS_STATUS: the battery, and the sensors present, enabled and healthy, of which GPS is the only one.
+
+        None: nothing measures the battery.
+        """
         gps = common.MAV_SYS_STATUS_SENSOR_GPS
+        millivolts, centiamperes, _, percent = _battery_fields(battery)
         return self._pack(
-            common.MAVLink_sys_status_message(
-                gps,
-                gps,
-                gps,
-                0,
-                round(1000 * math.fsum(battery.cells_v)),
-                round(100 * battery.current_a),
-                battery.remaining_percent,
-                *(0,) * 6,
-            )
+            common.MAVLink_sys_status_message(gps, gps, gps, 0, millivolts, centiamperes, percent, *(0,) * 6)
         )
 
-    def battery_status(self, battery: BatteryState) -> bytes:
-        """BATTERY_STATUS of the one battery."""
-        millivolts = [round(1000 * volts) for volts in battery.cells_v]
+    def battery_status(self, battery: BatteryState | None) -> bytes:
+        """BATTERY_STATUS of the one battery, with its voltage in place of that of its first cell."""
+        millivolts, centiamperes, consumed_mah, percent = _battery_fields(battery)
         return self._pack(
             common.MAVLink_battery_status_message(
                 0,
                 common.MAV_BATTERY_FUNCTION_ALL,
                 common.MAV_BATTERY_TYPE_LIPO,
                 _UNKNOWN_I16,
-                millivolts + [_UNKNOWN_U16] * (10 - len(millivolts)),
-                round(100 * battery.current_a),
-                battery.consumed_mah,
+                [millivolts, *(_UNKNOWN_U16,) * 9],
+                centiamperes,
+                consumed_mah,
                 -1,
-                battery.remaining_percent,
-                battery.remaining_s,
+                percent,
             )
         )
 

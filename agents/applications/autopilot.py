@@ -1,7 +1,7 @@
 """The flight controller of a UAV as seen over MAVLink: the last fix, and telemetry frames at their rates. Sans-IO.
 
 Position and velocity are the receiver's. Attitude is inferred: a multirotor leans so that thrust and gravity add up to
-its acceleration, and faces where it flies. The battery is a clock: full at the epoch, empty after `ENDURANCE_NS`.
+its acceleration, and faces where it flies. The battery is as its sensor reads it; without one nothing is known of it.
 """
 
 import math
@@ -9,7 +9,7 @@ from collections.abc import Callable
 from dataclasses import dataclass
 from typing import Final
 
-from fanet_mw.bus.messages import Gps
+from fanet_mw.bus.messages import Battery, Gps
 from fanet_mw.mavlink import AUTOPILOT_COMPONENT, Attitude, BatteryState, Encoder
 from fanet_mw.units import Enu, NodeId, S
 
@@ -18,14 +18,9 @@ MAX_TILT: Final = math.radians(35)
 """The usual lean limit of a multirotor's position controller; noise in the velocity must not look like acrobatics."""
 TURNING_M_S: Final = 0.5
 """Below this speed the course is noise, and the heading is kept."""
-ENDURANCE_NS: Final = 25 * 60 * S
-"""The flight time of a small multirotor."""
 
 _STILL: Final = Enu(0.0, 0.0, 0.0)
-_CELLS: Final = 4
-_FULL_V: Final = 4.2
-_EMPTY_V: Final = 3.5
-_CAPACITY_MAH: Final = 5000
+_HOUR_NS: Final = 3600 * S
 
 # No stream comes more often than this; `telemetry_hz` also bounds each stream, and sets the rate of the position.
 _EVERY_NS: Final = 1 * S
@@ -54,6 +49,9 @@ class Autopilot:
         """The heading; it is unknown until the UAV has flown. 0 would also shorten a hello: MAVLink drops trailing
         zeros."""
         self._fix_ns: int | None = None
+        self._battery: BatteryState | None = None
+        self._read_ns: int | None = None
+        self._consumed_mah = 0.0
         self._encoder = Encoder(node, component=AUTOPILOT_COMPONENT)
         self._beacons = Encoder(node, component=AUTOPILOT_COMPONENT)
         """The number of frames that went over the air; they are counted apart from telemetry, so that a gap is a
@@ -72,8 +70,8 @@ class Autopilot:
             (_EVERY_NS, lambda now_ns: encoder.attitude(self.attitude, now_ns=now_ns)),
             (_EVERY_NS, self._gps_raw),
             (_EVERY_NS, lambda _: encoder.extended_sys_state()),
-            (_SELDOM_NS, lambda now_ns: encoder.sys_status(_battery(now_ns))),
-            (_RARELY_NS, lambda now_ns: encoder.battery_status(_battery(now_ns))),
+            (_SELDOM_NS, lambda _: encoder.sys_status(self._battery)),
+            (_RARELY_NS, lambda _: encoder.battery_status(self._battery)),
             (_RARELY_NS, lambda _: encoder.home_position(self._home)),
         ]
         return [_Stream(encode, max(interval_ns, base_ns), due_ns) for interval_ns, encode in wanted]
@@ -97,6 +95,14 @@ class Autopilot:
         self.position, self.velocity, self._fix_ns = gps.position, gps.velocity, gps.t_ns
         if math.hypot(gps.velocity.east, gps.velocity.north) >= TURNING_M_S:
             self._yaw = math.atan2(gps.velocity.east, gps.velocity.north)
+
+    def battery(self, reading: Battery) -> None:
+        """Take in what the sensor of the battery reads; what has been consumed is counted from its first reading."""
+        if self._read_ns is not None:
+            self._consumed_mah += max(0, reading.t_ns - self._read_ns) / _HOUR_NS * 1000 * reading.current_a
+        self._read_ns = reading.t_ns
+        percent = math.ceil(100 * min(1.0, max(0.0, reading.charge)))
+        self._battery = BatteryState(reading.voltage_v, reading.current_a, round(self._consumed_mah), percent)
 
     # --- out ------------------------------------------------------------------------------------------------------
 
@@ -142,15 +148,3 @@ class Autopilot:
     def _gps_raw(self, now_ns: int) -> bytes:
         fix_ns = now_ns if self._fix_ns is None else self._fix_ns
         return self._encoder.gps_raw(self.position, self.velocity, has_fix=self._fix_ns is not None, fix_ns=fix_ns)
-
-
-def _battery(now_ns: int) -> BatteryState:
-    """The state of a battery that drains evenly; its voltage falls with the charge."""
-    left = max(0.0, 1 - now_ns / ENDURANCE_NS)
-    return BatteryState(
-        cells_v=(_EMPTY_V + (_FULL_V - _EMPTY_V) * left,) * _CELLS,
-        current_a=_CAPACITY_MAH / 1000 * 3600 * S / ENDURANCE_NS,
-        consumed_mah=round(_CAPACITY_MAH * (1 - left)),
-        remaining_percent=math.ceil(100 * left),
-        remaining_s=math.ceil(left * ENDURANCE_NS / S),
-    )

@@ -4,6 +4,7 @@ from typing import Final
 
 from agents.applications.autopilot import Autopilot
 from fanet_mw.application import Application, AppPort
+from fanet_mw.bus.messages import Battery, SensorReading
 
 
 class Telemetry(Application):
@@ -17,6 +18,10 @@ class Telemetry(Application):
     def start(self, port: AppPort, now_ns: int) -> None:
         super().start(port, now_ns)
         self._autopilot.start(now_ns)
+
+    def on_sensor(self, reading: SensorReading, now_ns: int) -> None:
+        if isinstance(reading, Battery):
+            self._autopilot.battery(reading)
 
     def wake(self, now_ns: int) -> None:
         frames = self._autopilot.telemetry(now_ns)

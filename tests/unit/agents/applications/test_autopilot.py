@@ -8,9 +8,9 @@ import pytest
 from hypothesis import given
 from hypothesis import strategies as st
 
-from agents.applications.autopilot import ENDURANCE_NS, GRAVITY_M_S2, MAX_TILT, Autopilot
+from agents.applications.autopilot import GRAVITY_M_S2, MAX_TILT, Autopilot
 from fanet_mw import mavlink
-from fanet_mw.bus.messages import Gps
+from fanet_mw.bus.messages import Battery, Gps
 from fanet_mw.mavlink import Attitude
 from fanet_mw.units import MS, Enu, NodeId, S
 
@@ -213,10 +213,29 @@ def test_it_never_leans_more_than_a_multirotor_does(before: Enu, after: Enu) -> 
 # --- battery ------------------------------------------------------------------------------------------------------
 
 
-def test_the_battery_runs_down_to_nothing_and_no_further() -> None:
+def told_of_the_battery(autopilot: Autopilot, now_ns: int) -> dict[str, Any]:
+    found = {m.get_type(): m.to_dict() for m in mavlink.decode(autopilot.telemetry(now_ns))}
+    return {**found["SYS_STATUS"], **found["BATTERY_STATUS"]}
+
+
+def test_nothing_is_told_of_a_battery_that_nothing_measures() -> None:
+    told = told_of_the_battery(make(telemetry_hz=1.0), S)
+    assert (told["voltage_battery"], told["current_battery"], told["battery_remaining"]) == (65535, -1, -1)
+    assert (told["voltages"], told["current_consumed"]) == ([65535] * 10, -1)
+
+
+def test_a_battery_is_told_as_its_sensor_reads_it_and_what_was_drawn_from_it_adds_up() -> None:
     autopilot = make(telemetry_hz=1.0)
-    seen = []
-    for share in (0.0, 0.5, 1.0, 2.0):
-        messages = mavlink.decode(autopilot.telemetry(int(share * ENDURANCE_NS) + S))
-        seen += [m.battery_remaining for m in messages if m.get_type() == "BATTERY_STATUS"]
-    assert seen == [100, 50, 0, 0]
+    for second, charge in ((0, 0.8), (1800, 0.504), (3600, 0.2)):
+        autopilot.battery(Battery(second * S, voltage_v=14.8, current_a=3.0, charge=charge))
+    told = told_of_the_battery(autopilot, 3600 * S)
+    assert (told["voltage_battery"], told["voltages"][0], told["voltages"][1]) == (14800, 14800, 65535)
+    assert (told["current_battery"], told["battery_remaining"], told["current_consumed"]) == (300, 20, 3000)
+
+
+@pytest.mark.parametrize(("charge", "percent"), [(1.2, 100), (0.001, 1), (0.0, 0), (-0.1, 0)])
+def test_a_battery_is_empty_only_when_nothing_is_left(charge: float, percent: int) -> None:
+    autopilot = make(telemetry_hz=1.0)
+    autopilot.battery(Battery(0, voltage_v=70.0, current_a=400.0, charge=charge))
+    told = told_of_the_battery(autopilot, S)
+    assert (told["battery_remaining"], told["voltage_battery"], told["current_battery"]) == (percent, 65534, 32767)

@@ -1,7 +1,8 @@
 """What a mission came to, from the trace: who was confirmed when and where, what was covered, whether the swarm held.
 
     coverage    share of the area that came within the nominal range of a phone's receiver of a UAV, a cell at a time
-    connected   share of the time in which all living UAVs were one component at the radio's reach
+    connected   share of the time in which all UAVs of the search were one component at the radio's reach: those that
+                live, have not crashed, and do not fly home or stand there, because they hold no place any more
     confirmed   survivors of whom a UAV said that it saw them at close range, and where they truly are: within 25 m; the
                 others are mistaken. The error is that of the place it told first, of both
     nearest     of each living UAV once a second: how far the nearest other one is
@@ -18,12 +19,26 @@ import numpy as np
 import numpy.typing as npt
 
 from fanet_mw.scenario import Scenario
-from fanet_mw.trace import Approaching, Arrived, Collided, Confirmed, Detected, Posed, ProcessEnded, Record
+from fanet_mw.trace import (
+    Approaching,
+    Arrived,
+    Collided,
+    Confirmed,
+    Detected,
+    FlightModeChanged,
+    MissionModeChanged,
+    Posed,
+    ProcessEnded,
+    Record,
+)
 from fanet_mw.units import S
 from sim.run.collecting.stored_records import of
 from sim.world.environment.survivors import place
 from sim.world.sensors.phone import REFERENCE_LOSS_DB
 
+_HOMEWARD: Final = frozenset({"return", "land"})
+"""What a UAV does that has left the search."""
+_WRECKED: Final = "fallen"
 _CELL_M: Final = 25.0
 _NEARLY_ALL: Final = 0.95
 _MISTAKEN_M: Final = 25.0
@@ -79,10 +94,10 @@ def _flown(scenario: Scenario, records: Iterable[Record]) -> dict[str, Any]:
     together = instants = 0
     nearly_all_ns: int | None = None
     nearest: list[Values] = []
-    for t_ns, at in _instants(records):
+    for t_ns, at, searching in _instants(records):
         instants += 1
         apart = np.linalg.norm(at[:, None] - at[None], axis=2)
-        together += _is_one(apart <= scenario.radio.range_m)
+        together += _is_one(apart[np.ix_(searching, searching)] <= scenario.radio.range_m)
         if len(at) > 1:
             np.fill_diagonal(apart, math.inf)
             nearest.append(apart.min(axis=0))
@@ -103,27 +118,37 @@ def _spread(distances_m: Values) -> dict[str, float]:
     return {"least": round(least, 2), "p1": round(hundredth, 2), "p50": round(median, 2)}
 
 
-def _instants(records: Iterable[Record]) -> Iterator[tuple[int, Rows]]:
-    """The instants of the trace that have positions, and those of the UAVs that live then."""
+def _instants(records: Iterable[Record]) -> Iterator[tuple[int, Rows, Flags]]:
+    """The instants of the trace that have positions, those of the UAVs that live then, and which of them search."""
     dead: set[int] = set()
+    wrecked: set[int] = set()
+    homeward: set[int] = set()
     rows: list[tuple[float, float, float]] = []
+    searching: list[bool] = []
     t_ns = 0
-    for record in of(records, ProcessEnded, Posed):
-        if type(record) is not Posed:
+    for record in of(records, ProcessEnded, MissionModeChanged, FlightModeChanged, Posed):
+        if type(record) is ProcessEnded:
             dead.add(record.node)
-            continue
-        if record.t_ns != t_ns and rows:
-            yield t_ns, np.array(rows)
-            rows = []
-        t_ns = record.t_ns
-        if record.node not in dead:
-            rows.append((record.east_m, record.north_m, record.up_m))
+        elif type(record) is FlightModeChanged:
+            wrecked |= {record.node} if record.mode == _WRECKED else set()
+        elif type(record) is MissionModeChanged:
+            homeward = homeward | {record.node} if record.mode in _HOMEWARD else homeward - {record.node}
+        elif type(record) is Posed:
+            if record.t_ns != t_ns and rows:
+                yield t_ns, np.array(rows), np.array(searching)
+                rows, searching = [], []
+            t_ns = record.t_ns
+            if record.node not in dead:
+                rows.append((record.east_m, record.north_m, record.up_m))
+                searching.append(record.node not in homeward and record.node not in wrecked)
     if rows:
-        yield t_ns, np.array(rows)
+        yield t_ns, np.array(rows), np.array(searching)
 
 
 def _is_one(near: Flags) -> bool:
-    """Whether everyone reaches everyone over hops, given who reaches whom."""
+    """Whether everyone reaches everyone over hops, given who reaches whom; True of nobody."""
+    if not len(near):
+        return True
     reached = np.zeros(len(near), bool)
     reached[0] = True
     while True:

@@ -4,8 +4,10 @@ import math
 from collections.abc import Sequence
 from typing import Any
 
+import pytest
+
 from fanet_mw.scenario import Scenario
-from fanet_mw.trace import Confirmed, Posed, ProcessEnded, Record
+from fanet_mw.trace import Confirmed, FlightModeChanged, MissionModeChanged, Posed, ProcessEnded, Record
 from fanet_mw.units import S
 from sim.results.mission import mission
 
@@ -31,6 +33,19 @@ def test_a_swarm_is_connected_while_everyone_reaches_everyone_over_hops() -> Non
 def test_the_dead_need_no_connection() -> None:
     found = measured([ProcessEnded(S, 3, "agent-3", 1), *at(2, 0, 240, 900)])
     assert found["connected"] == 1.0
+
+
+@pytest.mark.parametrize("gone", [MissionModeChanged(S, 3, "return", 0), FlightModeChanged(S, 3, "fallen")])
+def test_who_has_left_the_search_or_has_fallen_need_not_be_in_reach(
+    gone: MissionModeChanged | FlightModeChanged,
+) -> None:
+    away = at(2, 0, 240, 900)
+    assert measured(away)["connected"] == 0.0
+    assert measured([gone, *away])["connected"] == 1.0
+    assert measured([gone, *away])["nearest_m"]["least"] == 240.0, "it is in the way of others all the same"
+    assert measured([gone, *at(2, 0, 900, 910)])["connected"] == 0.0
+    back = MissionModeChanged(2 * S, 3, "search", 0)
+    assert measured([gone, back, *away])["connected"] == (1.0 if gone.mode == "fallen" else 0.0), "a wreck stays one"
 
 
 def test_coverage_is_the_share_of_the_area_within_range_of_a_receiver() -> None:

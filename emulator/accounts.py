@@ -34,9 +34,9 @@ class Accounts:
         self.refused: Counter[str] = Counter()
         """Input that was hostile or misdirected, by its kind; none of it became a frame."""
         self.poses = 0
-        """How many sets of positions were accepted."""
+        """The number of sets of positions that were accepted."""
         self.controls = 0
-        """How many changes of the air were carried out."""
+        """The number of changes of the air that were carried out."""
         self.late_frames = 0
         self._max_late_ns = 0
         self._lateness = [0] * (len(_LATENESS_STEPS) + 1)
@@ -53,7 +53,7 @@ class Accounts:
         self._lateness[index] += 1
 
     def lost(self, verdict: int) -> None:
-        """Count a frame that nobody received, when nothing refers to it any more."""
+        """Count a frame that no node received, when nothing refers to it any more."""
         self.dropped[_REASON_OF[verdict]] += 1
 
     def lost_on_bus(self, count: int) -> None:
@@ -78,7 +78,7 @@ class Accounts:
         }
 
     def lateness(self) -> dict[str, float]:
-        """How late requests came, over all of them; a request in time counts as 0 ms late."""
+        """The lateness of all requests; a request in time counts as 0 ms late."""
         return {
             "late_frames": self.late_frames,
             "frames": self.sent,

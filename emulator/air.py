@@ -39,7 +39,7 @@ class Air:
         self._asked_bytes = self.arrays.asked.data.cast("B")
         out_bytes = self.arrays.out.data.cast("B")
         self._out_rows = [out_bytes[: count * _ROW_BYTES] for count in range(len(self.arrays.out) + 1)]
-        """At index n: the first n rows of `out`, as bytes."""
+        """The first n rows of `out` as bytes, at index n."""
         self._airtime: dict[int, int] = {}
         self.next_output_ns = s.NEVER
         """A lower bound of the next instant at which `advance` returns rows; NEVER when nothing is planned."""
@@ -79,7 +79,7 @@ class Air:
         return self.book.close(now_ns)
 
     def slots(self) -> int:
-        """How many frame slots there are."""
+        """The number of frame slots."""
         return int(self.arrays.fr.shape[1])
 
     def grow(self) -> None:

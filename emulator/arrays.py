@@ -18,9 +18,9 @@ from fanet_mw.rng import stream_seed
 from fanet_mw.scenario import Radio, Scenario
 
 MOST_ASKED: Final = 256
-"""How many requests may wait to be handed to the kernel."""
+"""At most so many requests may wait to be handed to the kernel."""
 _SLOTS: Final = 1000
-"""How many frame slots there are at first. The number is no power of two: with a power of two the rows of one frame
+"""The number of frame slots at first. It is no power of two: with a power of two the rows of one frame
 would compete for the same few lines of the processor's cache."""
 
 

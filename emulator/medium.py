@@ -27,7 +27,7 @@ from fanet_mw.units import BROADCAST, MS, NodeId, earliest
 TOO_LATE_NS: Final = 50 * MS
 """A request later than this is dropped, because by then its slot belongs to another node."""
 ANNOUNCED: Final = 1024
-"""How many requests of one node may wait for their instant, beyond what its MAC queue holds."""
+"""So many requests of one node may wait for their instant, beyond what its MAC queue holds."""
 _new: Final = tuple.__new__
 _RECEPTION, _FREE, _DELIVERED, _NEVER = s.OUT_RECEPTION, s.OUT_FREE, s.DELIVERED, s.NEVER
 _NO_RECEPTION: Final = Reception(b"", NodeId(0), 0, 0.0)

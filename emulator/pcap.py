@@ -1,4 +1,4 @@
-"""A capture of what goes over the air: pcap with nanoseconds, radiotap, 802.11, LLC/SNAP, IPv4, UDP, our frame.
+"""A capture of what goes over the air: pcap with nanoseconds, radiotap, 802.11, LLC/SNAP, IPv4, UDP, the frame.
 
 There is one record per transmission attempt, stamped with the instant of its first bit: data (with the retry bit and
 the number of retries so far) and ACKs. On request there is also one per frame handed to a station, stamped with the

@@ -1,4 +1,4 @@
-"""Where the stations are, what stands between them, and the links that follow from both."""
+"""The places of the stations, what stands between them, and the links that follow from both."""
 
 import numpy as np
 import numpy.typing as npt

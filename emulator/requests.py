@@ -17,9 +17,9 @@ class RequestNumbers:
     def __init__(self, stations: int) -> None:
         self._next: list[int | None] = [None] * stations
         self._made = [0] * stations
-        """How many requests each node has made, including those that a gap in its numbers shows to be lost."""
+        """The number of requests that each node has made, with those that a gap in its numbers shows to be lost."""
         self._before = [0] * stations
-        """How many of them were made by the node before its process was restarted."""
+        """The number of requests that each node had made before its process was restarted."""
 
     def take_in(self, station: int, seq: int) -> int:
         """Count a request of this number; returns how many requests before it the bus has lost."""
@@ -58,12 +58,12 @@ class FrameSlots:
         self.free = list(range(slots - 1, -1, -1))
         """The slots without a request; the last one is used first."""
         self.held = [0] * len(self._nodes)
-        """How many requests of each station have not ended."""
+        """The number of requests of each station that have not ended."""
         self.most_held = most_held
 
     @property
     def in_flight(self) -> int:
-        """How many requests have not ended."""
+        """The number of requests that have not ended."""
         return len(self.requests) - len(self.free)
 
     def take(self, station: int, request: TxRequest) -> int:

@@ -140,7 +140,7 @@ class Planned(NamedTuple):
 
 
 class Posed(NamedTuple):
-    """Where a UAV truly was."""
+    """A UAV truly was at this place."""
 
     t_ns: int
     node: int
@@ -168,7 +168,7 @@ class MissionModeChanged(NamedTuple):
 
 
 class Sighted(NamedTuple):
-    """A camera or a microphone array noticed somebody; `survivor` is who that was taken for, 0: nobody known."""
+    """A camera or a microphone array noticed a person; `survivor` is the one it was taken for, 0: none known."""
 
     t_ns: int
     node: int
@@ -228,7 +228,7 @@ class ProcessEnded(NamedTuple):
 
 
 class ClockSampled(NamedTuple):
-    """How far a node's swarm time was off at a true instant."""
+    """A node's swarm time was off by so much at a true instant."""
 
     t_ns: int
     node: int

@@ -42,7 +42,7 @@ def log_success_per_bit(rate_mbps: float) -> Reals:
 
 
 def header_rates(rate_mbps: float) -> tuple[float, float]:
-    """How the header of a frame is sent: the rate [Mb/s] of its modulation, and its mean number of bits per ns.
+    """The rate [Mb/s] of the modulation of a frame's header, and its mean number of bits per ns.
 
     DSSS: preamble and header are sent at 1 Mb/s. OFDM: 24 bits of SIGNAL at 6 Mb/s follow 16 us of training.
     """

@@ -38,7 +38,7 @@ _SCHEMES: Final = {
     48.0: ("64-qam", 2, _TWO_THIRDS),
     54.0: ("64-qam", 3, _THREE_QUARTERS),
 }
-"""By rate [Mb/s]: modulation, information bits per step of the code, spectrum (IEEE 802.11-2020, table 17-4)."""
+"""Modulation, information bits per step of the code and spectrum of each rate [Mb/s] (802.11-2020, table 17-4)."""
 
 _SHARE_AND_SCALE: Final = {"bpsk": (1 / 2, 1), "qpsk": (1 / 2, 2), "16-qam": (3 / 8, 10), "64-qam": (7 / 24, 42)}
 """Share and scale in p = share x erfc(sqrt(SINR / scale)), the uncoded error rate, by modulation."""

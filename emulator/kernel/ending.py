@@ -1,4 +1,4 @@
-"""How frames and copies end: each is counted at once, and reported when nothing refers to the frame any more."""
+"""The ends of frames and copies: each is counted at once, and reported when nothing refers to the frame any more."""
 
 from emulator.kernel.jit import jit
 from emulator.kernel.state import (
@@ -58,7 +58,7 @@ def release(g: Ints, fr: Ints, out: Ints, f: int, t: int) -> None:
 
 @jit
 def verdict(fr: Ints, f: int) -> int:
-    """How a frame ended for its receivers; for a broadcast that none received, why most copies were lost."""
+    """The end of a frame for its receivers; of a broadcast that none received, the reason of most losses."""
     outcome = fr[OUTCOME, f]
     most = max(fr[LOST_COLLISION, f], fr[LOST_HALF_DUPLEX, f], fr[LOST_WEAK, f])
     if fr[RECEIVED, f] > 0:

@@ -94,7 +94,7 @@ def take_in(g: Ints, p: Ints, st: Ints, fr: Ints, hs: Ints, asked: Ints, bound: 
 
 @jit
 def first_wait(p: Ints, st: Ints, s: int, t: int) -> int:
-    """How long a frame that is queued at `t` waits at least, unless a frame of another station ends first."""
+    """The least wait of a frame that is queued at `t`, unless a frame of another station ends first."""
     if p[DIFS_FIRST] == 0 or st[HEAD, s] >= 0 or st[TX_KIND, s] != NOTHING:
         return 0
     return int(p[DIFS_NS]) if slots_left(p, st, s, t) == 0 else 0

@@ -33,7 +33,7 @@ def install() -> None:
 
 
 def raise_again() -> None:
-    """Raise KeyboardInterrupt if one was raised since `install`: whoever comes here has not heard of it."""
+    """Raise KeyboardInterrupt if one was raised since `install`: code that calls this has not heard of it."""
     if _raised:
         raise KeyboardInterrupt(_raised[0])
 

@@ -21,7 +21,7 @@ RESTART_STEP_NS: Final = 100 * US
 CONTROL: Final = 0x8000_0000
 """Control packets are numbered apart, from here on: then data packets have no gaps, and what is missing shows."""
 _AHEAD_NS: Final = 100 * MS
-"""How far a birth may lie ahead where all clocks are exact: hosts take their time from each other over a bus."""
+"""A birth may lie so far ahead where all clocks are exact: hosts take their time from each other over a bus."""
 _BURST: Final = 100_000
 """Numbers that a node may be ahead of one per `RESTART_STEP_NS`: ten seconds of the densest traffic."""
 _MOST_HOPS: Final = 255

@@ -1,4 +1,4 @@
-"""Whether the hellos of a superframe fit its contention window: nodes whose hellos are lost are taken for dead.
+"""The contention window of a superframe, and if its hellos fit: nodes whose hellos are lost are taken for dead.
 
 Everything except floods of data contends there, and hellos are nearly all of it. Two hellos destroy each other at a
 common neighbor, so the hellos of all nodes within two hops count, each with DIFS and a mean backoff. This is an

@@ -1,4 +1,4 @@
-"""How many packets per second can reach every node, whatever the protocol: an upper bound by counting at receivers.
+"""The packets per second that can reach every node, whatever the protocol: an upper bound by counting at receivers.
 
 Every node needs a copy of each packet. F: airtime of its frame; D: DIFS, for which a sender finds its medium idle first
 (IEEE 802.11-2020, 10.3.4.2). A station either sends or receives, and it receives one frame at a time on any channel:

@@ -61,7 +61,7 @@ class ClusterPlan(NamedTuple):
 
 
 def work_ns(shares: Sequence[ClassLoad], *, period_ns: int) -> int:
-    """How much of one flooding period all floods together take."""
+    """The part of one flooding period that all floods together take."""
     return ceil(sum(s.sources * s.flood.spacing_ns * period_ns / s.interval_ns for s in shares))
 
 

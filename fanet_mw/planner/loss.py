@@ -1,4 +1,4 @@
-"""How likely a packet misses a node under a timetable: the other half of a bound, as (delay, probability).
+"""The chance that a packet misses a node under a timetable: the other half of a bound, as (delay, probability).
 
 The timetable says which nodes send in the same turn, so the probability of each copy is that of its link against those
 senders. A packet reaches a node at least when every frame on one way to it survives; frames are lost independently, so

@@ -18,7 +18,7 @@ from fanet_mw.routing.clustered.timetable.likely_delay import LIKELY_SHARE
 from fanet_mw.units import MS, S
 
 _SHOWN: Final = 8
-"""How many heads are listed, the fullest first."""
+"""At most so many heads are listed, the fullest first."""
 _WIDTH: Final = 100
 _LABEL: Final = 14
 

@@ -52,7 +52,7 @@ class AddressEntry:
 
     knowledge: Knowledge
     since_ns: int
-    """When the address became known, or was given up."""
+    """The instant at which the address became known, or was given up."""
     due_ns: int = 0
     """While waiting: when the next request is sent, or the address is given up."""
     retries: int = 0
@@ -68,7 +68,7 @@ class Resolver:
         self._ask = ask
         self._entries: dict[NodeId, AddressEntry] = {}
         self._due_ns: int | None = None
-        """When the first of the waiting entries is due."""
+        """The instant at which the first of the waiting entries is due."""
 
     def knowledge(self, neighbor: NodeId, *, now_ns: int) -> Knowledge | None:
         """The state of a neighbor's address; None when nothing is known."""

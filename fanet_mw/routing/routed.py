@@ -92,7 +92,7 @@ class Routed(RoutingProtocol):
         self._drop_unresolved(out, now_ns=now_ns)
 
     def _due_ns(self) -> int | None:
-        """When this protocol wants to be woken, addresses aside."""
+        """The instant at which this protocol wants to be woken, addresses aside."""
         return None
 
     def _on_wake(self, now_ns: int) -> None:

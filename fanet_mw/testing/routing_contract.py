@@ -43,7 +43,7 @@ class RoutingContract:
     """Subclass it in a test module, and say which protocol."""
 
     protocol: ClassVar[str]
-    """As `routing.protocol` names it: an entry point, or MODULE:CLASS."""
+    """The protocol as `routing.protocol` names it: an entry point, or MODULE:CLASS."""
     options: ClassVar[Mapping[str, object]] = {}
     """The table `[routing.options]`."""
     least_delivered: ClassVar[float] = 0.9
@@ -100,7 +100,7 @@ class RoutingContract:
     # --- one node, driven by hand ---------------------------------------------------------------------------------
 
     def test_what_the_air_brings_never_raises(self) -> None:
-        """Whole frames, cut ones, and ones with bits turned over; from neighbors and from nobody."""
+        """Frames come whole, cut, and with bits turned over; from neighbors and from unknown nodes."""
         random = Random(1)
         bench = _Bench(self.scenario(3, moving=False))
         for frame in _hostile(random, 400):

@@ -16,7 +16,7 @@ from typing import Final, NamedTuple
 from fanet_mw.units import S
 
 PAIRS: Final = 32
-"""How many pairs are kept, the latest."""
+"""The number of pairs that are kept, the latest ones."""
 WINDOW_NS: Final = 30 * S
 """Older pairs are dropped, because rates wander."""
 _SIGMAS: Final = 4.0
@@ -31,7 +31,7 @@ class Pair(NamedTuple):
     offset_ns: int
     error_ns: int
     rate: float = 0.0
-    """How fast that error may have grown since, as the sender of the pair states it (parts)."""
+    """The rate at which that error may have grown since, as the sender of the pair states it (parts)."""
     source: int = 0
     """Which node stated the pair."""
 
@@ -147,9 +147,9 @@ class ClockFit:
         self._against: deque[Pair] = deque(maxlen=PAIRS + 1)
         self.line: Line | None = None
         self.outliers = 0
-        """How many pairs were left out."""
+        """The number of pairs that were left out."""
         self.steps = 0
-        """How many times contradicting pairs have replaced the line."""
+        """The number of times that contradicting pairs have replaced the line."""
 
     def __len__(self) -> int:
         return len(self._pairs)

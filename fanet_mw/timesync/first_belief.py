@@ -14,7 +14,7 @@ from fanet_mw.timesync.clock_fit import Oscillator, Pair, alike
 from fanet_mw.units import NodeId
 
 _ENOUGH: Final = 2
-"""How many neighbors must agree."""
+"""The number of neighbors that must agree."""
 
 
 class FirstBelief:
@@ -24,9 +24,9 @@ class FirstBelief:
         self._oscillator = oscillator
         self._leader = leader
         self._wait_ns = wait_ns
-        """How long a single statement waits for a second one."""
+        """A single statement waits so long for a second one."""
         self._memory_ns = memory_ns
-        """How long a statement counts."""
+        """A statement counts for so long."""
         self._stated: dict[NodeId, tuple[int, Pair]] = {}
         self._since_ns: int | None = None
 

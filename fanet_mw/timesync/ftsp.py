@@ -27,7 +27,7 @@ from fanet_mw.units import MS, NodeId, S
 from fanet_mw.wire.inner import TimeBeacon
 
 _LISTEN_HELLOS: Final = 2.5
-"""How long the leader listens at its start, because a swarm that already has a time keeps it."""
+"""The leader listens so long at its start, because a swarm that already has a time keeps it."""
 _SILENT_HELLOS: Final = 16
 """A node that has had no news of a reference for this long becomes the reference; the lower its id, the sooner."""
 _STAGGER_HELLOS: Final = 0.5
@@ -35,15 +35,15 @@ _STAGGERED: Final = 32
 _FRESH_HELLOS: Final = 4.5
 """A neighbor whose round has not advanced for this long has lost the reference."""
 _SETTLED: Final = 8
-"""How many pairs a node with a lower id collects before it takes over from the reference."""
+"""A node with a lower id collects so many pairs before it takes over from the reference."""
 _PROVEN: Final = 2
-"""How many pairs it takes to follow another reference."""
+"""It takes so many pairs to follow another reference."""
 _HASTY: Final = 4
 """Pairs of one neighbor that are closer together than a hello interval divided by this are not counted."""
 _DOUBT_HELLOS: Final = 1.5
-"""How long a node without a time waits for a second neighbor that states the same; each states it once per hello."""
+"""A node without a time waits so long for a second neighbor to state the same; each states it once per hello."""
 _STAMPS: Final = 4
-"""Of how many hellos of each neighbor the end is remembered."""
+"""The ends of so many hellos of each neighbor are remembered."""
 _NEIGHBORS: Final = 256
 _WORST_NS: Final = 20 * MS
 """A greater error than this means a node without a time, or nonsense; guard times do not allow for it."""
@@ -53,7 +53,7 @@ _U32: Final = 0xFFFF_FFFF
 
 
 class Settings(NamedTuple):
-    """What does not change while a node runs."""
+    """The settings of a node's synchronization, which do not change while it runs."""
 
     node: NodeId
     leads: bool
@@ -69,7 +69,7 @@ class Settings(NamedTuple):
 
     @property
     def hop_ns(self) -> int:
-        """What one hop adds to the error of a pair: half the flight time is assumed, and two stamps are rounded."""
+        """The error that a hop adds to that of a pair: half the flight time is assumed, two stamps are rounded."""
         return self.flight_ns // 2 + self.oscillator.stamp_ns
 
 
@@ -141,7 +141,7 @@ class TimeSync:
         return value_ns if value_ns > own_ns and local_ns - stated_at_ns < _WORST_LIFE_NS else own_ns
 
     def hops(self, local_ns: int) -> int | None:
-        """Hops from the reference; None when no neighbor knows the reference."""
+        """The hops from the reference; None when no neighbor knows the reference."""
         if self.is_reference:
             return 0
         near = (n.hops for n in self._neighbors.values() if n.trusted and self._is_fresh(n, local_ns))
@@ -157,14 +157,14 @@ class TimeSync:
     # --- sending --------------------------------------------------------------------------------------------------
 
     def start(self, local_ns: int) -> None:
-        """The node has started."""
+        """Take in that the node has started."""
         self._news_ns = local_ns
         self._arm(local_ns)
         if self._own.leads:
             self._claim_ns = local_ns + int(_LISTEN_HELLOS * self._own.hello_ns)
 
     def hello_sent(self, hello: int, *, ended_ns: int) -> None:
-        """A hello of this node has left the antenna."""
+        """Take in that a hello of this node has left the antenna."""
         self._sent = (hello, ended_ns)
 
     def beacon(self, local_ns: int) -> TimeBeacon | None:

@@ -32,7 +32,7 @@ class SlotStatus(NamedTuple):
     crowd: int = 1
     """The number of nodes within two hops, including the node itself."""
     lots: int = 0
-    """The number of lots that the node draws in each turn that nobody claims."""
+    """The number of lots that the node draws in each turn that no node claims."""
 
 
 class HeardNeighbor(NamedTuple):

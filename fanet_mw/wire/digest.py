@@ -21,7 +21,7 @@ _SEQ_MASK: Final = 0xFFFF_FFFF
 
 
 def capacity(room: int) -> int:
-    """How many holdings fit into so many bytes; there is always room for one message (checked with the scenario)."""
+    """The holdings that fit into so many bytes; there is always room for one message (checked with the scenario)."""
     return max(1, room // MESSAGE_BYTES) * CAPACITY
 
 

@@ -38,7 +38,7 @@ PRIORITY_SAFETY: Final = 1
 PRIORITY_REPORT: Final = 2
 PRIORITY_BULK: Final = 3
 PRIORITIES: Final = MappingProxyType({"safety": PRIORITY_SAFETY, "report": PRIORITY_REPORT, "bulk": PRIORITY_BULK})
-"""Of applications' packets, by the name that people give them."""
+"""The priorities of applications' packets, by the names that people give them."""
 
 OVERHEAD: Final = 12
 """The bytes of a MAVLink 2 frame around its payload: 10 in front, 2 of CRC behind."""

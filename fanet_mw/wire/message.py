@@ -27,7 +27,7 @@ from fanet_mw.wire.frame import (
 )
 
 MOST_PIECES: Final = 64
-"""As many as a receipt has bits for."""
+"""The most pieces of a message: a receipt has so many bits."""
 MAVLINK_PORT: Final = 0
 """The port of messages that are MAVLink messages themselves."""
 MOST_LIFETIME_MS: Final = 3_600_000
@@ -39,7 +39,7 @@ _CHUNK_HEAD: Final = struct.Struct("<HBB")
 _CHUNK_DATA: Final = 240
 _CHUNK_OVERHEAD: Final = OVERHEAD + _CHUNK_HEAD.size
 _PAYLOAD_AT: Final = 10
-"""Where a MAVLink 2 frame has its payload."""
+"""The place of the payload in a MAVLink 2 frame."""
 
 
 class Head(NamedTuple):
@@ -117,7 +117,7 @@ def targets_bytes(count: int) -> int:
 
 
 def room_for_data(size: int) -> int:
-    """How many bytes of data fit into chunks of so many bytes together."""
+    """The bytes of data that fit into chunks of so many bytes together."""
     whole, rest = divmod(size, _CHUNK_OVERHEAD + _CHUNK_DATA)
     return max(0, whole * _CHUNK_DATA + max(0, rest - _CHUNK_OVERHEAD))
 

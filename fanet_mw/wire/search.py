@@ -74,7 +74,7 @@ class Search(NamedTuple):
 
     @classmethod
     def decode_frame(cls, packed: Packed) -> Self:
-        """The first of a frame; raises MalformedFrameError for a plan that nobody could fly."""
+        """The first plan in a frame; raises MalformedFrameError for a plan that no swarm could fly."""
         return cls.checked(decode_first(SEARCH, packed))
 
     @classmethod
@@ -153,7 +153,7 @@ class Bid(NamedTuple):
     eta_ds: int
     serial: int
     age_s: int = 0
-    """How long ago the bidder last stood by it."""
+    """The time since the bidder last confirmed it."""
 
 
 def encode_bids(bids: Sequence[Bid], *, node: int) -> bytes:

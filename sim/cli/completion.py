@@ -1,4 +1,4 @@
-"""What the shell offers where a word of ours is wanted: scenarios by name, and keys of a scenario for `--set`."""
+"""The words that the shell offers: scenarios by name, and keys of a scenario for `--set`."""
 
 from typing import Annotated, TypeAlias
 

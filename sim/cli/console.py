@@ -1,4 +1,6 @@
-"""Printing for people, and what happens when nobody reads on: `fanet ... | head` ends as every Unix tool does."""
+"""Printing for people, and the end of a command whose reader has gone: `fanet ... | head` ends as any Unix tool
+does.
+"""
 
 import os
 import sys

@@ -2,7 +2,7 @@
 
     mean power (path loss; shadowing of another seed than the run's) -> gains of fading -> mean success of a frame
 
-Frames are those of the application, nobody else sends: in turns nobody within reach does. Not in it: obstacles.
+Frames are those of the application, and no other node sends: in turns none within reach does. Not in it: obstacles.
 """
 
 import math

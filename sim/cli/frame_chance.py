@@ -1,4 +1,4 @@
-"""The chance of a frame on a link against noise and whoever sends in the same turn, by the emulator's own error rates.
+"""The chance of a frame on a link against noise and other senders of its turn, by the emulator's own error rates.
 
 Interference lasts for the whole frame, which is the worst case. Fading and shadowing have no chance per frame that is
 independent of the last one's (shadowing), or would have to be averaged over draws (fading): both are refused.

@@ -19,7 +19,7 @@ from fanet_mw.units import S
 from sim.run.bus.air_control import OPERATOR, find_swarm
 
 _LOOK_S: Final = 0.5
-"""How often the router is looked for while nothing comes."""
+"""The interval at which the router is looked for while nothing comes."""
 
 
 def watch(

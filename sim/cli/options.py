@@ -108,7 +108,7 @@ class OutputFlags:
             prepare(self.out, force=self.force)
 
     def capture_path(self) -> Path | None:
-        """Where the capture goes, if one is wanted."""
+        """The path of the capture, if one is wanted."""
         from emulator.capture_file import NAME
 
         wanted = self.pcap or self.pcap_receptions

@@ -37,7 +37,7 @@ def prepare(out: Path, *, force: bool) -> None:
             )
         for path in used:
             path.unlink()
-        with contextlib.suppress(OSError):  # it is not there, or holds a file of somebody else
+        with contextlib.suppress(OSError):  # it is not there, or holds a file of another program
             (out / names.PICTURES).rmdir()
     except OSError as error:
         raise ConfigError(f"--out {out}: cannot be written: {error.strerror}") from error

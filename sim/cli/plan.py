@@ -123,7 +123,7 @@ def _lossy_json(found: LossyPlan) -> dict[str, Any]:
 
 
 def _places(scenario: Scenario) -> dict[NodeId, Enu]:
-    """Where the nodes start; in whole metres, as the leader will tell them."""
+    """The places at which the nodes start, in whole metres, as the leader will tell them."""
     start = zip(scenario.node_ids, positions(scenario), strict=True)
     return {NodeId(node): rounded(place) if scenario.clusters.relay == "scheduled" else place for node, place in start}
 

@@ -25,7 +25,7 @@ if TYPE_CHECKING:
 
 _err = Console(stderr=True)
 _SAY_S: Final = 20.0
-"""How often progress is said where nobody watches a bar."""
+"""The interval at which progress is printed where no terminal shows a bar."""
 
 
 def add_to(app: App) -> None:

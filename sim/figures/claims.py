@@ -21,7 +21,7 @@ Values = Sequence[float] | Mapping[int, float]
 
 
 class Verdict(StrEnum):
-    """Of a claim."""
+    """The verdict of a claim."""
 
     AGREES = "agrees"
     PARTLY = "partly"
@@ -29,7 +29,7 @@ class Verdict(StrEnum):
 
 
 class Finding(StrEnum):
-    """Of a statement."""
+    """The finding of a statement."""
 
     HOLDS = "holds"
     FAILS = "fails"

@@ -17,7 +17,7 @@ class Panel(NamedTuple):
 
     quantity: Quantity
     label: str
-    """Of the vertical axis, with its unit."""
+    """The label of the vertical axis, with its unit."""
     log: bool = False
     factor: float = 1.0
     """What the quantity is multiplied by for its unit on the axis."""

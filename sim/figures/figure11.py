@@ -54,7 +54,7 @@ def _share_within(limit_s: float, *, of_all: bool) -> Callable[[Row], float]:
 
 
 def _arrived(runs: Runs, case: str) -> list[Interval]:
-    """By each edge of the classes of delay, the share of packets x targets that has arrived."""
+    """The share of packets x targets that has arrived by each edge of the classes of delay."""
     sums = [[had / row["wanted"] for had in accumulate(row["delay_counts"])] for row in runs.where(case=case)]
     return [interval(column) for column in zip(*sums, strict=True)][: len(DELAY_EDGES_S)]
 

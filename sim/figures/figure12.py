@@ -25,37 +25,37 @@ _AT_ONCE_S: Final = 0.1
 _SECONDS_S: Final = 5.0
 _FREE: Final = 0.5
 _SINCE_S: Final = tuple(math.pow(10.0, step / 10) for step in range(-30, 19))
-"""From a millisecond to more than a minute."""
+"""The edges of the classes of time, from a millisecond to more than a minute."""
 
 
 def _times(row: Row) -> list[float]:
-    """When each UAV that did changed course [s]."""
+    """The instants at which UAVs changed course [s]."""
     return list(row["first_approach_s"] or ())
 
 
 def _by(limit_s: float) -> Callable[[Row], float]:
-    """How many UAVs have changed course by then."""
+    """The number of UAVs that have changed course by an instant."""
     return lambda row: float(sum(time_s <= limit_s for time_s in _times(row)))
 
 
 def _at_end(row: Row) -> float:
-    """How many UAVs have changed course when the run ends."""
+    """The number of UAVs that have changed course when the run ends."""
     return float(len(_times(row)))
 
 
 def _heard(row: Row) -> float:
-    """How many UAVs have heard a phone."""
+    """The number of UAVs that have heard a phone."""
     return float(len(row["first_detected_s"] or ()))
 
 
 def _half_s(row: Row) -> float | None:
-    """When half of the swarm has changed course; None: it never has."""
+    """The instant by which half of the swarm has changed course; None: it never has."""
     times, half = sorted(_times(row)), int(row["nodes"]) // 2
     return times[half - 1] if len(times) >= half else None
 
 
 def _wait_s(row: Row) -> float | None:
-    """From when enough UAVs have heard the same phone until half of the swarm has turned: what the network takes."""
+    """The time from when enough UAVs have heard the same phone until half of the swarm has turned."""
     half_s, heard_s = _half_s(row), row["enough_heard_s"]
     return None if half_s is None or heard_s is None else half_s - heard_s
 
@@ -66,7 +66,7 @@ def _in_window(row: Row) -> float | None:
 
 
 def _after(limit_s: float) -> Callable[[Row], float]:
-    """How many UAVs have changed course so long after enough had heard a phone; without such an instant: none."""
+    """The number of UAVs that have changed course so long after enough had heard a phone; 0 if that never was."""
     return lambda row: _by((row["enough_heard_s"] or 0.0) + limit_s)(row)
 
 

@@ -25,7 +25,7 @@ _NAMES: Final = {case: LOOKS[case].label for case in ("aodv", "olsr")}
 
 
 def _below_limit(row: Row) -> float | None:
-    """How far the PDR is below the share of pairs that any path connects."""
+    """The difference of the share of pairs that any path connects and the PDR."""
     return None if row["pdr"] is None else float(row["connected"] - row["pdr"])
 
 

@@ -12,7 +12,7 @@ _MOSTLY: Final = 0.5
 
 
 def _by_collision(row: Row) -> float | None:
-    """Of the copies that receivers lost, the share that collided."""
+    """The share of the copies lost by receivers that collided."""
     lost = {key: value or 0.0 for key, value in row.items() if key.startswith("copies.lost.")}
     total = sum(lost.values())
     return lost.get("copies.lost.collision", 0.0) / total if total else None

@@ -23,7 +23,7 @@ class Recipe:
     """One figure."""
 
     name: str
-    """Of its files, for example `figure-9`."""
+    """The name of its files, for example `figure-9`."""
     title: str
     sweep: str
     """The shipped sweep that it is made of."""

@@ -35,7 +35,7 @@ class Runs:
         return found
 
     def of(self, quantity: Quantity, **settings: object) -> Interval:
-        """Mean and interval over the seeds."""
+        """The mean and its interval over the seeds."""
         return interval(list(self.per_seed(quantity, **settings).values()))
 
     def levels(self, key: str, **settings: object) -> list[Any]:

@@ -34,7 +34,9 @@ class Interval(NamedTuple):
 
 
 def quantile_975(freedom: int) -> float:
-    """Of Student's t; beyond 30 degrees of freedom between the table's last and the normal one, by 1/freedom."""
+    """The quantile of Student's t; beyond 30 degrees of freedom between the table's last and the normal's, by
+    1/freedom.
+    """
     if freedom <= len(_T_975):
         return _T_975[freedom - 1]
     last = len(_T_975)

@@ -20,7 +20,7 @@ from sim.figures.statistics import Interval
 
 
 class Look(NamedTuple):
-    """How one line is drawn, in every figure in which it is."""
+    """The look of one line, in every figure in which it is drawn."""
 
     label: str
     color: str
@@ -38,7 +38,7 @@ LOOKS: Final[Mapping[str, Look]] = {
     "counter": Look("counter-based", "#E69F00", "v", (0, (3, 1, 1, 1))),
     "limit": Look("a path exists", "#000000", "", (0, (1, 2))),
 }
-"""By case of a sweep."""
+"""The look of each case of a sweep."""
 SERIES: Final = (
     Look("", "#0072B2", "o", "-"),
     Look("", "#D55E00", "s", "--"),

@@ -40,7 +40,7 @@ class _Story:
 
     scenario: Scenario
     sent: dict[tuple[int, int], int] = field(default_factory=dict)
-    """Of each packet of the load, its instant."""
+    """The instant at which each packet of the load was generated."""
     bounds: dict[tuple[int, int], int] = field(default_factory=dict)
     delivered: list[Delivered] = field(default_factory=list)
     let_out: list[LetOut] = field(default_factory=list)

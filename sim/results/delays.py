@@ -17,7 +17,7 @@ PARTS: Final = ("lead", "queue", "air", "handover")
 
 
 def summed_up(delays_ns: Sequence[int]) -> dict[str, float | None]:
-    """Mean, percentiles and maximum of some delays [ms]; None for each when there are no delays."""
+    """The mean, percentiles and maximum of some delays [ms]; None for each when there are no delays."""
     if not delays_ns:
         return dict.fromkeys(("mean", "p50", "p95", "p99", "max"))
     values = np.asarray(delays_ns, dtype=np.float64) / MS

@@ -1,4 +1,4 @@
-"""What a mission came to, from the trace: who was confirmed when and where, what was covered, whether the swarm held.
+"""The outcome of a mission, from the trace: survivors confirmed, area covered, coherence and nearness of the swarm.
 
     coverage    share of the area that came within the nominal range of a phone's receiver of a UAV, a cell at a time
     connected   share of the time in which all UAVs of the search were one component at the radio's reach: those that
@@ -42,7 +42,7 @@ _WRECKED: Final = "fallen"
 _CELL_M: Final = 25.0
 _NEARLY_ALL: Final = 0.95
 _MISTAKEN_M: Final = 25.0
-"""Whoever announces a survivor farther than this from the true place has taken somebody else for that one."""
+"""A UAV that announces a survivor farther than this from the true place has taken another person for that one."""
 
 Rows = npt.NDArray[np.float64]
 Values = npt.NDArray[np.float64]
@@ -146,7 +146,7 @@ def _instants(records: Iterable[Record]) -> Iterator[tuple[int, Rows, Flags]]:
 
 
 def _is_one(near: Flags) -> bool:
-    """Whether everyone reaches everyone over hops, given who reaches whom; True of nobody."""
+    """True if all UAVs reach each other over hops, given which of them reach which; True without UAVs."""
     if not len(near):
         return True
     reached = np.zeros(len(near), bool)

@@ -17,7 +17,7 @@ from sim.run.collecting.stored_records import of
 from sim.run.outcome import Outcome
 
 OTHER_APPS: Final = ("report", "warning")
-"""Applications of ours beside the classes of traffic."""
+"""The built-in applications beside the classes of traffic."""
 Name = tuple[int, int]
 """The name of a packet: (origin, sequence number)."""
 
@@ -28,7 +28,7 @@ class SentPacket:
 
     born_ns: int
     out_ns: int | None = None
-    """When the packet's first frame could contend; None when the packet never left its origin."""
+    """The instant at which the packet's first frame could contend; None when the packet never left its origin."""
     bound_ns: int | None = None
     """The delay that the origin promised when it accepted the packet; None when it promised none."""
     likely: tuple[int, float] | None = None
@@ -60,7 +60,7 @@ class AppPackets:
     """The packets of one application and their deliveries, all nodes together."""
 
     sent: dict[Name, SentPacket] = field(default_factory=dict)
-    """By name, in the order in which they were generated."""
+    """The packets by name, in the order in which they were generated."""
     wanted: int = 0
     """The number of packets times the nodes for which each was meant."""
     deliveries: Deliveries = field(default_factory=Deliveries)
@@ -71,7 +71,7 @@ class AppPackets:
 
 
 def packets_of(outcome: Outcome) -> Mapping[str, AppPackets]:
-    """By application: classes of traffic, those of `OTHER_APPS`, then those of users as they began to send.
+    """The packets by application: classes of traffic, those of `OTHER_APPS`, then those of users as they began to send.
 
     To which nodes a packet of a user's application is meant to go is not in the trace: its `wanted` stays 0.
     """

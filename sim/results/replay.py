@@ -59,7 +59,7 @@ class Replay:
 
     @classmethod
     def read(cls, folder: Path) -> Self:
-        """From what `fanet simulate --out` or `fanet launch --out` has written; raises ConfigError."""
+        """The replay of what `fanet simulate --out` or `fanet launch --out` has written; raises ConfigError."""
         try:
             keys = tomllib.loads((folder / "scenario.toml").read_text(encoding="utf-8"))
             lines = (folder / "trace.jsonl").read_text(encoding="utf-8").splitlines()
@@ -104,7 +104,7 @@ def _last(records: Sequence[R], t_ns: int) -> R | None:
 
 
 def _between(posed: Sequence[Posed], t_ns: int) -> Enu:
-    """Where a UAV was between two of its positions, or at the first or the last one."""
+    """The position of a UAV between two of its records, or at the first or the last one."""
     after = bisect_right(posed, t_ns, key=lambda record: record.t_ns)
     first, second = posed[max(0, after - 1)], posed[min(after, len(posed) - 1)]
     span_ns = second.t_ns - first.t_ns

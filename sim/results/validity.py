@@ -25,7 +25,7 @@ SKIPPED_TICKS: Final = 0.02
 """The limit for skipped ticks of the world."""
 _PARTS: Final = frozenset({"lost_on_bus", "dropped_late", "missed_turns", "copies_lost"})
 _NAMED: Final = 5
-"""How many names a sentence lists; of further ones it gives the number."""
+"""A sentence lists at most so many names, and gives the number of further ones."""
 
 
 class Measure(NamedTuple):

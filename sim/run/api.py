@@ -32,7 +32,7 @@ T = TypeVar("T")
 OfUser = Callable[[int], Sequence[Application]] | Mapping[int, Sequence[Application]]
 """The applications of a user: by node, or what makes them for a node."""
 _STEP_NS: Final = 10 * MS
-"""How far virtual time goes between two looks at what the program wants."""
+"""Virtual time advances so far between two looks at what the program wants."""
 _TURNS: Final = 4
 """So many turns of the event loop are enough for a chain of tasks that wait for each other."""
 
@@ -72,7 +72,7 @@ class Launched:
         self.scenario = scenario
         self.processes = swarm.processes
         self.radio = Emulated(endpoint=swarm.address.endpoint, swarm=swarm.address.swarm, patience_s=READY_TIMEOUT_S)
-        """How a node that was left out joins: `join(swarm.scenario, node=3, radio=swarm.radio)`."""
+        """The radio by which a node that was left out joins: `join(swarm.scenario, node=3, radio=swarm.radio)`."""
         self.result: Result | None = None
         """Once the block is left."""
         self._swarm = swarm
@@ -159,7 +159,7 @@ class _Time:
 
 
 async def breathe() -> None:
-    """Let other tasks run: who has been told something may do something before time goes on."""
+    """Let other tasks run: a task that has been told something may act before time goes on."""
     for _ in range(_TURNS):
         await asyncio.sleep(0)
 

@@ -35,15 +35,15 @@ class Outcome:
     epoch_unix_ns: int = 0
     """The unix time of swarm instant 0; a fixed one in virtual time, so that the same run gives the same files."""
     ready_s: float = 0.0
-    """In real time: how long it took until all processes were up."""
+    """The time until all processes were up, in real time."""
     heard: Mapping[str, Any] = field(default_factory=dict)
-    """In real time: the puts that the launcher received, and what of them was refused, by what was wrong."""
+    """The puts that the launcher received, and what of them was refused, by what was wrong; in real time only."""
     absent: Mapping[str, str] = field(default_factory=dict)
-    """In real time: why there is no report, by the actor's name."""
+    """The reason why there is no report of an actor, by the actor's name; in real time only."""
     stall_ms: float = 0.0
-    """In real time: the longest time for which the launcher, and with it the bus, could do nothing."""
+    """The longest time for which the launcher, and with it the bus, could do nothing; in real time only."""
 
     @property
     def simulated_ns(self) -> int:
-        """How much swarm time has passed."""
+        """The swarm time that has passed."""
         return self.scenario.duration_ns if self.ended_ns is None else self.ended_ns

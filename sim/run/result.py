@@ -22,7 +22,7 @@ class Result:
 
     @cached_property
     def trace(self) -> Mapping[str, Mapping[str, Sequence[Any]]]:
-        """By kind of record, its fields as columns of one length: `trace["delivered"]["delay_ns"]`."""
+        """The fields of each kind of record as columns of one length: `trace["delivered"]["delay_ns"]`."""
         columns: dict[str, dict[str, list[Any]]] = {}
         for record in self.outcome.records:
             fields = columns.setdefault(kind_of(record), {name: [] for name in record._fields})

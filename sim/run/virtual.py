@@ -48,7 +48,7 @@ def actors_of(
     capture: Capture | None = None,
     applications: Applications = no_applications,
 ) -> list[Actor]:
-    """Every actor of a swarm: the world first, so that poses stand before anyone transmits."""
+    """Every actor of a swarm: the world first, so that poses stand before any node transmits."""
     starts, onboard_map = positions(scenario), map_on_board(scenario)
     uavs = [
         make_uav(

@@ -30,7 +30,7 @@ class DaskCluster:
             raise
 
     def _checked(self) -> int:
-        """How many workers there are; raises ConfigError for what would make rows differ."""
+        """The number of workers; raises ConfigError for what would make rows differ."""
         self._client.wait_for_workers(1, timeout=30)
         workers = self._client.scheduler_info(n_workers=-1)["workers"]
         for name, worker in workers.items():

@@ -1,4 +1,4 @@
-"""How long a run will take, before it has run: a rough guess from what its scenario puts on the air.
+"""The time that a run will take: a rough guess from what its scenario puts on the air.
 
 The time is that of the copies of frames at receivers, mostly. The guess is good to a factor of two or so; as runs of a
 sweep end, what is left is told from how much the guesses were off.

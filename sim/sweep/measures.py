@@ -105,7 +105,7 @@ def _heard_of(app: AppPackets) -> dict[tuple[int, int], list[tuple[int, int]]]:
 
 
 def _age_area(arrivals: Iterable[tuple[int, int]], start_ns: int, end_ns: int) -> float:
-    """Of pairs (arrival, birth) in the order of arrivals: the integral of now minus the latest birth [ns^2]."""
+    """The integral of now minus the latest birth [ns^2], for pairs (arrival, birth) in the order of arrivals."""
     area, since_ns, latest_ns = 0.0, start_ns, start_ns
     for at_ns, born_ns in (*arrivals, (end_ns, end_ns)):
         until_ns = min(max(at_ns, start_ns), end_ns)
@@ -130,7 +130,7 @@ def first_approach_s(outcome: Outcome) -> list[float]:
 
 
 def enough_heard_s(outcome: Outcome) -> float | None:
-    """When as many UAVs as the mission asks for had heard the same phone [s]; nobody can turn before that instant."""
+    """The instant [s] by which enough UAVs for the mission's rule had heard the same phone; none turns before it."""
     enough = outcome.scenario.mission.reports_to_approach
     who: dict[int, set[int]] = {}
     for record in of(outcome.records, Detected):

@@ -27,7 +27,7 @@ class Workers(Protocol):
 
 @dataclass(frozen=True, slots=True)
 class Progress:
-    """How far a sweep has come."""
+    """The progress of a sweep."""
 
     done: int
     total: int
@@ -46,7 +46,7 @@ class SweepPlan:
         self.guesses_s = {task.key: _guess_s(task) for task in self.todo}
 
     def seconds(self, workers: int) -> float:
-        """How long it will take, about."""
+        """The time that it will take, about."""
         return TimeLeft(self.guesses_s.values(), workers=workers).seconds()
 
 

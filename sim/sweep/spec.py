@@ -150,7 +150,7 @@ class Sweep(_Table):
                 yield Setting(case=case.name, changes=changes, realtime=case.realtime)
 
     def count(self) -> int:
-        """How many runs there are."""
+        """The number of runs."""
         points = sum(1 for _ in itertools.islice(self.settings(), MOST_RUNS + 1))
         return points * len(self.seed_list())
 

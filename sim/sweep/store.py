@@ -79,7 +79,7 @@ class Store:
     def _merge(self) -> None:
         old = self._files
         self._files = [self._write(self._finished.values())]
-        for path in old:  # the new file holds them all; if we die here, both say the same
+        for path in old:  # the new file holds them all; if the process dies here, both say the same
             path.unlink()
 
     def _write(self, rows: Iterable[Finished]) -> Path:
@@ -97,7 +97,7 @@ class Store:
 
     @contextlib.contextmanager
     def alone(self) -> Iterator[None]:
-        """Nobody else writes here meanwhile; raises ConfigError when somebody does."""
+        """Keep other processes from writing here meanwhile; raises ConfigError when one does so already."""
         try:
             self.folder.mkdir(parents=True, exist_ok=True)
             lock = os.open(self.folder / ".lock", os.O_CREAT | os.O_RDWR)

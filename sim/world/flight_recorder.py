@@ -1,4 +1,4 @@
-"""How a swarm was flying when it was last heard of: what a world that starts again goes on from.
+"""The last known flight of a swarm, from which a world that starts again goes on.
 
 The poses and setpoints are on the bus anyway. The launcher keeps the newest of each and hands them to the next world;
 what is not plausible is not kept, so that a world starts again as it did the first time rather than not at all.

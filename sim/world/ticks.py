@@ -10,7 +10,7 @@ class Ticks:
         self.last_ns = 0
         self.count = 0
         self.skipped = 0
-        """How many ticks came too late to be of use."""
+        """The number of ticks that came too late to be of use."""
 
     def begin(self, now_ns: int, *, period_ns: int) -> None:
         """Start to count, with the first tick one period ahead."""

@@ -1,6 +1,6 @@
 """The world as an actor: setpoints in, poses and sensor readings out, once per tick.
 
-t = 0            poses and fixes, so that links stand before anyone transmits
+t = 0            poses and fixes, so that links stand before any node transmits
 every tick       guidance -> engine -> obstructions, when anything can obstruct -> poses -> sensors that are due
 """
 
@@ -39,9 +39,9 @@ if TYPE_CHECKING:
     from sim.world.environment.line_of_sight import Sight
 
 _TRACED_NS: Final = S
-"""How often positions go into the trace."""
+"""The interval at which positions go into the trace."""
 _STILL_NS: Final = S
-"""How often a world in which nothing moves says so."""
+"""The interval at which a world in which nothing moves says so."""
 _WRECK_M: Final = 0.5
 """The distance from the ground or a wall below which a UAV is not in flight."""
 _EMERGENCY_CHARGE: Final = 0.05

@@ -62,7 +62,7 @@ class Aodv(Routed):
         self._rreq_id = 0
         self._hello_ns: int | None = None
         self._broadcast_ns = -p.HELLO_INTERVAL_NS
-        """When this node last sent a broadcast, which takes the place of a hello (6.9)."""
+        """The instant at which this node last sent a broadcast, which takes the place of a hello (6.9)."""
         self._in_use_until_ns = -1
 
     def start(self, now_ns: int) -> None:

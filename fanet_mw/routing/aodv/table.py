@@ -20,7 +20,7 @@ class AodvRoute:
     next_hop: NodeId
     hops: int
     ends_ns: int
-    """When an active entry expires, or an inactive one is deleted."""
+    """The instant at which an active entry expires, or an inactive one is deleted."""
     seq: int = 0
     seq_valid: bool = False
     active: bool = True

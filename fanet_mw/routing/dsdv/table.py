@@ -30,13 +30,13 @@ class DsdvRoute:
     metric: int
     seq: int
     renewed_ns: int
-    """When the sequence number last grew."""
+    """The instant at which the sequence number last grew."""
     settling_ns: float = MAX_SETTLING_NS / 2
     """The weighted average of the settling time."""
     advertised_metric: int = -1
     """The metric that was last advertised; -1 when none was."""
     due_ns: int | None = None
-    """When the change is to be advertised; None when it can wait for the next full dump."""
+    """The instant at which the change is to be advertised; None when it can wait for the next full dump."""
 
 
 class DsdvTable:
@@ -48,7 +48,8 @@ class DsdvTable:
         self.seq = 0
         """This node's own sequence number, which is even."""
         self.own_due_ns: int | None = None
-        """When to advertise a newer number, because another node has called this node unreachable; None if not."""
+        """The instant to advertise a newer number at, after another node called this one unreachable; None if none
+        did."""
 
     def next_hop(self, destination: NodeId) -> NodeId | None:
         route = self._routes.get(destination)
@@ -106,7 +107,7 @@ class DsdvTable:
         route.metric, route.seq, route.renewed_ns, route.due_ns = INFINITE, seq, now_ns, now_ns
 
     def tidy(self, now_ns: int) -> None:
-        """Break the routes that nobody renews, and delete the broken ones after the same time."""
+        """Break the routes that no node renews, and delete the broken ones after the same time."""
         for destination in sorted(self._routes):
             route = self._routes[destination]
             if route.renewed_ns + HOLD_NS <= now_ns:

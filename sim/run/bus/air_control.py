@@ -21,7 +21,7 @@ from fanet_mw.trace import RadioFault
 OPERATOR: Final = "operator"
 """The name under which access lists know the commands of a person."""
 CONFIRM_TIMEOUT_S: Final = 5.0
-"""How long to wait for the confirmation; emulators publish their trace twice a second."""
+"""A confirmation is waited for so long; emulators publish their trace twice a second."""
 _DISCOVER_S: Final = 1.0
 
 

@@ -19,9 +19,9 @@ ROUTER: Final = "router"
 _STOP_HEARD_S: Final = 0.3
 """The time between telling services to stop and closing the bus on which they receive it."""
 WORD_EVERY_S: Final = 5.0
-"""The interval at which the router says who is missing or there twice."""
+"""The interval at which the router says which participants are missing or there twice."""
 _LAST_WORDS_S: Final = 3.0
-"""How long the router waits for last reports after the end of the swarm's time."""
+"""The router waits so long for last reports after the end of the swarm's time."""
 Tell = Callable[[str], None]
 
 

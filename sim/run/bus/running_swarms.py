@@ -29,7 +29,7 @@ class Running(NamedTuple):
     pid: int
     """The process id of its launcher or router."""
     started: str
-    """When that process began, in the kernel's count, because a process id may be used again."""
+    """The time at which that process began, in the kernel's count, because a process id may be used again."""
 
 
 def _folder() -> Path:
@@ -47,7 +47,7 @@ def _ours(folder: Path) -> bool:
 
 
 def _started(pid: int) -> str:
-    """When a process began; empty when it is gone or a zombie."""
+    """The time at which a process began; empty when it is gone or a zombie."""
     try:
         fields = Path(f"/proc/{pid}/stat").read_text(encoding="utf-8").rpartition(")")[2].split()
     except OSError:

@@ -31,7 +31,7 @@ from fanet_mw.trace import (
 from fanet_mw.units import S
 
 _SLACK_NS: Final = 10 * S
-"""How far outside the scenario's time an instant may lie: processes start before it and end after it."""
+"""An instant may lie so far outside the scenario's time: processes start before it and end after it."""
 _DEEPEST: Final = 6
 """The most levels of nesting in a report's JSON."""
 _MOST_RSSI_MDBM: Final = 400_000

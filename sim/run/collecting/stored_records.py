@@ -1,6 +1,6 @@
 """Collections on disk, for results that are too large for memory, and how a trace is read wherever it is.
 
-Whoever reads a trace asks for the kinds of records that it needs: of a trace on disk, only those are decoded.
+A reader of a trace asks for the kinds of records that it needs: of a trace on disk, only those are decoded.
 """
 
 import heapq

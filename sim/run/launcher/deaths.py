@@ -7,9 +7,9 @@ from fanet_mw.hosts.service import BUS_EXIT_CODE
 from fanet_mw.trace import ProcessEnded
 
 _MAX_LATE_STARTS: Final = 3
-"""How often a process that has found no router is started again before the swarm's time begins."""
+"""A process that has found no router is started again so often before the swarm's time begins."""
 _MAX_RESPAWNS: Final = 5
-"""How often a process of one name is started again: one that cannot live is not started for ever."""
+"""A process of one name is started again so often: one that cannot live is not started for ever."""
 
 
 class Deaths:
@@ -37,6 +37,6 @@ class Deaths:
         self.records.append(ProcessEnded(now_ns, node, name, exit_code))
 
     def may_respawn(self, name: str) -> bool:
-        """Whether this process is to be started again; each question counts as one start."""
+        """True if this process is to be started again; each question counts as one start."""
         self._respawns[name] += 1
         return self._respawn and self._respawns[name] <= _MAX_RESPAWNS

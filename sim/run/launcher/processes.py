@@ -26,7 +26,7 @@ Entry = Callable[..., int]
 
 
 class ChildRecipe(NamedTuple):
-    """How to start a child: `entry(**arguments)`, with `nice` added to the launcher's niceness."""
+    """The way to start a child: `entry(**arguments)`, with `nice` added to the launcher's niceness."""
 
     entry: Entry
     arguments: Mapping[str, Any]

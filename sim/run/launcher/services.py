@@ -34,7 +34,7 @@ class Services(NamedTuple):
     own_world: bool = True
     """False when a foreign world tells where the UAVs are; no report of it is expected."""
     leave_out: frozenset[int] = frozenset()
-    """Nodes whose processes somebody else starts."""
+    """The nodes whose processes the user starts."""
     emulator_options: Mapping[str, Any] = {}
     """Additional arguments of the emulator's process."""
 

@@ -35,13 +35,13 @@ from sim.run.outcome import Outcome
 from sim.world.flight_recorder import FlightRecorder
 
 READY_TIMEOUT_S: Final = 300.0
-"""How long to wait until all are up: on a busy machine 47 processes take a minute, and a compilation comes on top."""
+"""All must be up within this time: on a busy machine 47 processes take a minute, and a compilation comes on top."""
 WORD_EVERY_S: Final = 10.0
-"""How often it is reported which processes are being waited for."""
+"""The interval at which the processes that are being waited for are reported."""
 _GRACE_S: Final = 5.0
-"""How long to wait for last reports after the end of the swarm's time."""
+"""Last reports are waited for so long after the end of the swarm's time."""
 _LAST_WORDS_S: Final = 1.0
-"""How long to wait, after the end of all processes, for what they sent last: it may still be on the bus."""
+"""What processes sent last is waited for so long after the end of all of them: it may still be on the bus."""
 _PROGRESS_S: Final = 0.25
 Tell = Callable[[str], None]
 

@@ -8,7 +8,7 @@ from sim.world.engines.contract import Rows
 from sim.world.environment.solids import Solids
 
 _CROWD: Final = 400
-"""Above this many nodes contacts between bodies are not looked for, because the search is quadratic."""
+"""Contacts between more bodies than this are not looked for, because the search is quadratic."""
 
 
 class Contacts:

@@ -43,7 +43,7 @@ class Engine(ABC):
         """Pairs of nodes that began to touch since the last call, smaller id first; the ground and obstacles are 0."""
 
     def blocked(self, first: Rows, second: Rows) -> Flags:
-        """Whether an obstacle stands between each `first` and `second` [n, 3]; bodies and the plain do not count."""
+        """True where an obstacle stands between `first` and `second` [n, 3]; bodies and the plain do not count."""
         return np.zeros(len(first), bool)
 
     def power_w(self) -> Values | None:

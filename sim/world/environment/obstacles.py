@@ -42,7 +42,7 @@ class Box(NamedTuple):
     """Angle by which it is turned, from east to north [rad]."""
 
     def near(self, places: Rows, *, margin_m: float) -> bool:
-        """Whether any place is within the box, or closer to it than the margin."""
+        """True if any place is within the box, or closer to it than the margin."""
         east, north = places[:, 0] - self.east, places[:, 1] - self.north
         along = math.cos(self.yaw) * east + math.sin(self.yaw) * north
         across = math.cos(self.yaw) * north - math.sin(self.yaw) * east

@@ -32,7 +32,7 @@ class Solids:
 
     @property
     def any(self) -> bool:
-        """Whether anything stands there."""
+        """True if there is anything solid."""
         return bool(len(self._middle)) or self._hills is not None
 
     def ground_m(self, places: Rows) -> Values:
@@ -67,14 +67,14 @@ class Solids:
         return gap
 
     def blocked(self, first: Rows, second: Rows) -> Flags:
-        """Whether something stands between each `first` and `second` [n, 3]."""
+        """True where something stands between `first` and `second` [n, 3]."""
         way = second - first
         length = np.linalg.norm(way, axis=1)
         direction = way / np.maximum(length, 1e-9)[:, None]
         return np.asarray(self.first_hit_m(first, direction, length) < length)
 
     def first_hit_m(self, origin: Rows, direction: Rows, range_m: Values | float) -> Values:
-        """How far each ray [n, 3] of unit direction goes before it meets something; inf: nothing within its range."""
+        """The distance at which each ray [n, 3] of unit direction meets something; inf: nothing within its range."""
         reach = np.broadcast_to(np.asarray(range_m, dtype=np.float64), (len(origin),))
         hit = np.full(len(origin), math.inf)
         if len(origin) == 0:

@@ -1,4 +1,4 @@
-"""Where the survivors are, and which of them are buried. Ids run from 1."""
+"""The places of the survivors, and which of them are buried. Ids run from 1."""
 
 import math
 from collections.abc import Callable, Sequence
@@ -60,7 +60,7 @@ class Survivors:
     places: Rows
     """Positions, on the ground."""
     buried: Flags
-    """Who lies under rubble: a phone and a voice come through it weakened, nothing is seen."""
+    """The survivors under rubble: a phone and a voice come through it weakened, nothing is seen."""
 
     def __init__(self, scenario: Scenario, ground_m: Callable[[Rows], Values] | None = None) -> None:
         """`ground_m`: heights of the ground at places [n, 3]; None: a plain at 0."""

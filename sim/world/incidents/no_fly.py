@@ -16,7 +16,7 @@ class NoFly:
         self._areas = np.array(areas, dtype=np.float64).reshape(-1, 3)
         self._within = np.zeros((len(starts), len(self._areas)), bool)
         self.entries = 0
-        """How often a UAV came into an area."""
+        """The number of times that a UAV came into an area."""
         rows, columns = np.nonzero(self._inside(starts))
         if len(rows):
             raise ConfigError(f"world.no_fly_m.{columns[0]}: node {rows[0] + 1} starts within it")

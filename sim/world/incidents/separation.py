@@ -1,4 +1,4 @@
-"""How near UAVs truly come to each other, by which collision warnings are judged.
+"""The true distances of UAVs, by which collision warnings are judged.
 
 Between two steps of the engine bodies are taken to fly straight, so nothing passes between them unseen.
 """

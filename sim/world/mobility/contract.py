@@ -6,19 +6,19 @@ from sim.world.engines.contract import Rows
 
 
 class Track(NamedTuple):
-    """Where each UAV should be now, and how that place moves."""
+    """The place at which each UAV should be now, and how that place moves."""
 
     places: Rows
     velocities: Rows
 
 
 class MobilityModel(Protocol):
-    """Where UAVs fly while no setpoint says otherwise.
+    """A mobility model: where UAVs fly while no setpoint says otherwise.
 
     Another package may bring one (`fanet_mw.extensions`): a class that takes the places [n, 3] where the UAVs start,
     and the scenario.
     """
 
     def track(self, t_s: float) -> Track:
-        """Where everyone should be at a swarm instant [s], asked in order; the same calls give the same places."""
+        """The places of all UAVs at a swarm instant [s], asked in order; the same calls give the same places."""
         ...

@@ -45,7 +45,7 @@ _FLARE_PER_S: Final = 0.5
 """Sinking speed for each metre of height."""
 _ON_GROUND_M: Final = 0.3
 FENCE_M: Final = 50.0
-"""The geofence lies so far outside the area; nobody who flies at a velocity leaves it."""
+"""The geofence lies so far outside the area; no UAV that flies at a velocity leaves it."""
 
 
 class FlightMode(StrEnum):
@@ -77,7 +77,7 @@ class Guidance:
         reach = np.maximum(half, np.abs(starts[:, :2]).max(axis=0)) if self._onboard else (half, half)
         self._half_east, self._half_north = float(reach[0]), float(reach[1])
         self._starts = starts.copy()
-        """Where each UAV holds while neither a mobility model nor a setpoint moves it."""
+        """The place at which each UAV holds while neither a mobility model nor a setpoint moves it."""
         self._model: MobilityModel | None = (
             Formation(starts, scenario) if model == "formation"
             else RandomWaypoint(starts, scenario) if model == "random_waypoint"
@@ -160,7 +160,7 @@ class Guidance:
             self.changes.append((row + 1, mode))
 
     def may_touch_down(self, node: int) -> bool:
-        """Whether this UAV touches the ground on purpose."""
+        """True if this UAV touches the ground on purpose."""
         return node - 1 in self._landings or node - 1 in self._grounded
 
     def grounded(self, at: Rows) -> Flags:
@@ -186,7 +186,7 @@ class Guidance:
         self._setpoints[node - 1] = inside, speed_m_s
 
     def track(self, t_s: float) -> Track:
-        """Where everyone should be, setpoints not considered."""
+        """The places at which all UAVs should be, setpoints not considered."""
         return self._model.track(t_s) if self._model else Track(self._starts, np.zeros_like(self._starts))
 
     def wanted(self, t_s: float, at: Rows, velocity: Rows) -> Rows:

@@ -1,4 +1,4 @@
-"""Where the nodes stand at the beginning. Node 1, the leader, is the first of each layout."""
+"""The places of the nodes at the beginning. Node 1, the leader, is the first of each layout."""
 
 import math
 from typing import Final

@@ -1,4 +1,4 @@
-"""The battery's state, as a power module and its coulomb counter tell it; they err by less than anybody acts on."""
+"""The battery's state, as a power module and its coulomb counter tell it; their errors are negligible here."""
 
 from collections.abc import Iterator, Sequence
 

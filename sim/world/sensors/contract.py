@@ -1,7 +1,7 @@
 """The contract of a sensor: the truth of one instant goes in, the readings of those UAVs that are due come out.
 
 A sensor adds its own error to the truth, from random streams of its own, so that a sensor more or less on board
-changes no other one's readings. Whoever hears a reading learns nothing else of the truth.
+changes no other one's readings. A UAV that gets a reading learns nothing else of the truth.
 """
 
 import math
@@ -32,7 +32,7 @@ class Sensor(ABC):
     """The last part of its topics."""
     period_ns: int
     spread = True
-    """Whether the UAVs' instants are spread over the period, so that readings do not all come at once."""
+    """True if the UAVs' instants are spread over the period, so that readings do not all come at once."""
 
     @abstractmethod
     def read(self, truth: Truth, rows: Sequence[int]) -> Iterator[tuple[int, Message]]:
@@ -47,7 +47,7 @@ class Sensor(ABC):
 
 
 def _due(now_ns: int, before_ns: int, period_ns: int, phase_ns: int) -> bool:
-    """Whether an instant of a period (shifted by a phase) lies in (before, now]."""
+    """True if an instant of a period (shifted by a phase) lies in (before, now]."""
     return (now_ns - phase_ns) // period_ns > (before_ns - phase_ns) // period_ns
 
 

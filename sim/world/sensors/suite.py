@@ -23,7 +23,7 @@ from sim.world.sensors.voice import VoiceSensor
 def sensors_of(scenario: Scenario, survivors: Survivors, solids: Solids, energy: Energy | None = None) -> list[Sensor]:
     """The sensors that a scenario asks for, in the order in which their readings go out.
 
-    `energy`: the batteries; None: nobody has any, and none is told of.
+    `energy` has the batteries; None: UAVs have none, and are told of none.
     """
     config = scenario.sensors
     found: list[Sensor] = []
@@ -47,7 +47,7 @@ def sensors_of(scenario: Scenario, survivors: Survivors, solids: Solids, energy:
 
 
 def uses_fixes(scenario: Scenario) -> bool:
-    """Whether anybody uses position fixes."""
+    """True if any application uses position fixes."""
     moves = scenario.mobility.model != "static"
     protocol = scenario.routing.protocol
     by_places = protocol == "geographic" or (protocol == "clustered" and moves) or protocol not in PROTOCOLS

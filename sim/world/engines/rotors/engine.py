@@ -3,7 +3,7 @@
     m v' = R (sum of thrusts) z - drag - m g z          J w' = torques - w x J w          q' = q (0, w) / 2
     motors: first-order lag towards the wanted speed, faster up than down; symplectic Euler at `STEP_HZ`
 
-The battery gives what the rotors take (`power.py`); one that is empty stops them. Whoever reaches the ground or a
+The battery gives what the rotors take (`power.py`); one that is empty stops them. A body that reaches the ground or a
 wall is stopped there and stands upright. Not modeled: ground effect, downwash on others below, blade flapping, the
 bounce.
 """
@@ -25,7 +25,7 @@ _DT_S: Final = 1 / STEP_HZ
 _LEAST_SHARE: Final = 0.1
 """The least share of the greatest rotor speed: motors idle in flight, they do not stop."""
 _TUMBLE_PER_S: Final = 2.0
-"""How fast a body without power stops turning."""
+"""The rate at which a body without power stops turning."""
 
 
 class Rotors(Engine):

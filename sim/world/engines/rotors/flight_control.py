@@ -18,7 +18,7 @@ from sim.world.engines.contract import Values
 from sim.world.engines.rotors.vehicle import GRAVITY_M_S2, Vehicle
 
 _RATIO: Final = 3.0
-"""How much slower a loop is than the one inside it."""
+"""A loop is slower than the one inside it by this factor."""
 _INTEGRAL_PER_S: Final = 0.3
 _MOST_INTEGRAL_M_S2: Final = 4.0
 _MOST_ERROR_M_S: Final = 0.5

@@ -48,7 +48,8 @@ class Vehicle(NamedTuple):
     """Time constant of a rotor that speeds up."""
     motor_down_s: float
     lead: float
-    """By how much of the wanted change a motor is driven beyond it, so that it follows 1 + lead times as fast."""
+    """The share of the wanted change by which a motor is driven beyond it, so that it follows 1 + lead times as
+    fast."""
     drive_efficiency: float
     """Mechanical power of the rotors over electrical power of the motors."""
     avionics_w: float

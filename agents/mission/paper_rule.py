@@ -41,7 +41,7 @@ class PaperRule:
         self._measured: dict[int, Survivor] = {}
         """The latest received power of each phone that the receiver hears."""
         self._due_ns: dict[int, int] = {}
-        """When each of these phones is to be reported next."""
+        """The instant at which each of these phones is to be reported next."""
         self._sightings: dict[int, dict[int, Sighting]] = {}
         self._visited: set[int] = set()
         self._target: int | None = None

@@ -211,7 +211,7 @@ class Searcher:
 
 
 def phone_model(scenario: Scenario) -> PhoneModel:
-    """How the phones of a scenario are heard."""
+    """The reception of the phones of a scenario."""
     mission = scenario.mission
     return PhoneModel(
         mission.phone_power_dbm,
@@ -243,6 +243,6 @@ def least_nodes(scenario: Scenario) -> int | None:
 
 
 def _ground_range_m(model: PhoneModel, height_m: float) -> float:
-    """How far to the side a phone on the ground is heard, without shadowing."""
+    """The distance to the side at which a phone on the ground is heard, without shadowing."""
     slant = 10 ** ((model.power_dbm - REFERENCE_LOSS_DB - model.threshold_dbm) / (10 * model.exponent))
     return math.sqrt(max(1.0, slant * slant - height_m * height_m))

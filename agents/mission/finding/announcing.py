@@ -1,7 +1,7 @@
 """What one UAV tells of finds: its estimates while it responds, and confirmations until everyone has heard of them.
 
 seen often enough at close range, place sure   -> confirmed: told three times, and with the hellos of a while
-somebody still reports a confirmed survivor    -> some of those who know tell it again
+a UAV still reports a confirmed survivor      -> some of those that know of it tell it again
 """
 
 import math

@@ -44,7 +44,7 @@ class Sightings:
         return self._identities.review(now_ns)
 
     def _sighted(self, sensor: str, direction: tuple[float, float], *, sigma_rad: float, now_ns: int) -> None:
-        """A sensor shows somebody in a direction: a place on the ground, if that is not too far away."""
+        """Take in that a sensor shows a person in a direction, if the place on the ground is not too far away."""
         here = self._navigation.over_ground(now_ns)
         looked = ground_place(here, bearing_rad=direction[0], elevation_rad=direction[1])
         if looked is None or looked[2] > 2 * _CLOSE_M:

@@ -1,4 +1,4 @@
-"""How fast a UAV flies to a survivor."""
+"""The speed at which a UAV flies to a survivor."""
 
 from fanet_mw.rng import stream
 from fanet_mw.scenario import Scenario

@@ -1,4 +1,4 @@
-"""Where a searching UAV wants to be now: at a survivor as far as its place in the formation lets it, or in its lane."""
+"""The goal of a searching UAV: a survivor, as far as its place in the formation lets it, or its lane."""
 
 from typing import Final
 
@@ -14,14 +14,14 @@ _SHARED_M: Final = 35.0
 
 
 class Goal:
-    """One UAV's."""
+    """The place that one UAV flies to, from what it has found and its place in the formation."""
 
     def __init__(self, finds: Finds, navigation: Navigation, formation: FormationPlace, approach: Approach) -> None:
         self._finds, self._navigation = finds, navigation
         self._formation, self._approach = formation, approach
 
     def at(self, task: int | None, now_ns: int) -> tuple[Enu, Enu]:
-        """The place to fly to and how it moves. `task`: the survivor whom we have won, if any."""
+        """The place to fly to and how it moves; `task` is the survivor that this UAV has won, if any."""
         formation = self._formation
         lane, moves = formation.lane(now_ns)
         survivor = task
@@ -36,7 +36,7 @@ class Goal:
         return formation.bounded(east, north, lane, moves)
 
     def _in_lane(self, lane: Enu, moves: Enu, now_ns: int) -> int | None:
-        """The nearest survivor of those that our lane leads by; we look at it as we pass, within the formation."""
+        """The nearest survivor that the lane of the UAV leads by: it looks at it as it passes, in formation."""
         formation, here = self._formation, self._navigation.position
         pattern = formation.pattern
         if pattern is None or not formation.searches or not formation.is_taken_up(now_ns):

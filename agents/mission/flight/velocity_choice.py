@@ -17,12 +17,12 @@ from fanet_mw.motion import Motion
 from fanet_mw.units import Enu, S
 
 _LANE_GAIN: Final = 0.4
-"""How fast a deviation from the wanted place is made good [1/s]."""
+"""A deviation from the wanted place is made good at this rate [1/s]."""
 _CLIMB_M_S: Final = 2.5
 _LEAST_M_S: Final = 1.0
-"""Nobody creeps around a corner more slowly than this."""
+"""A UAV flies around a corner no more slowly than this."""
 _LEVEL_M: Final = 4.0
-"""Heights farther apart than twice this are different levels: nobody there is in the way, once both keep theirs."""
+"""Heights farther apart than twice this are different levels: a UAV there is not in the way, once both keep theirs."""
 _CLEARANCE_M: Final = 10.0
 _HORIZON_S: Final = 6.0
 _WATCH_M: Final = 150.0
@@ -32,7 +32,7 @@ _TETHER_S: Final = 4.0
 
 
 class Constraint(Protocol):
-    """Something that limits the velocities that we may fly."""
+    """Something that limits the velocities that a UAV may fly."""
 
     def planes(self, now_ns: int) -> list[HalfPlane]:
         """The half-planes of the velocities that it allows now, the most important first."""
@@ -40,7 +40,7 @@ class Constraint(Protocol):
 
 
 class VelocityChoice:
-    """One UAV's."""
+    """The choice of one UAV's velocity, under constraints that must hold and others that should."""
 
     def __init__(
         self,
@@ -56,7 +56,7 @@ class VelocityChoice:
         self._hard, self._soft = hard, soft
 
     def velocity(self, goal: Enu, feed: Enu, now_ns: int) -> Enu:
-        """What to fly to a place that moves itself."""
+        """The velocity to fly to a place that moves itself."""
         here, obstacles = self._navigation.position, self._obstacles
         off = goal.minus(here)
         wanted = feed.east + _LANE_GAIN * off.east, feed.north + _LANE_GAIN * off.north
@@ -84,7 +84,7 @@ class VelocityChoice:
 
 
 class ClearOfObstacles:
-    """Walls, areas that nobody may enter, and what the radar shows."""
+    """The constraints by walls, by areas that no UAV may enter, and by what the radar shows."""
 
     def __init__(self, navigation: Navigation, obstacles: KnownObstacles) -> None:
         self._navigation, self._obstacles = navigation, obstacles
@@ -125,7 +125,7 @@ class ClearOfOthers:
 
 
 class InReach:
-    """Coherence: who is in a line or in the chain stays in reach of its neighbors there, a follower of its line."""
+    """Coherence: a UAV in a line or in the chain stays in reach of its neighbors there, a follower of its line."""
 
     def __init__(
         self, navigation: Navigation, neighbors: NeighborMotions, formation: FormationPlace, *, reach_m: float
@@ -154,7 +154,7 @@ class InReach:
         return planes
 
     def _nearest(self, places: range, now_ns: int) -> tuple[int, ...]:
-        """Of these places the one whose holder is nearest to us; none when nobody there was heard lately."""
+        """The one of these places whose holder is nearest to this UAV; none when no holder was heard lately."""
         plan = self._formation.plan
         assert plan is not None, "who has a place has a plan"
         near = [

@@ -1,7 +1,7 @@
-"""Our place in the formation: where the plan wants us at every instant, and how far from there we may go.
+"""A UAV's place in the formation: where the plan wants it at every instant, and how far from there it may go.
 
 A UAV of a line or of the chain holds the swarm together: it stays near its lane. A follower may go anywhere near its
-line. Who has no place yet waits where it is.
+line. A UAV that has no place yet waits where it is.
 """
 
 from typing import Final
@@ -15,18 +15,18 @@ from fanet_mw.wire.search import Search
 
 STILL: Final = Enu(0.0, 0.0, 0.0)
 _FREE_REACH: Final = 0.84
-"""Share of the reach within which a follower stays of its line, so that it is heard there wherever it goes."""
+"""The share of the reach within which a follower stays of its line, so that it is heard there wherever it goes."""
 _ASIDE_M: Final = 70.0
-"""How far aside of the leash a survivor may be to be looked at still."""
+"""A survivor so far beyond the leash is still looked at from the end of the leash."""
 _AHEAD_M: Final = 250.0
 _LEASH_M: Final = 58.0
-"""How far to the side a UAV of a line may leave its lane."""
+"""A UAV of a line may leave its lane so far to the side."""
 _LAG_M: Final = 140.0
-"""How far it may fall behind its line."""
+"""A UAV may fall so far behind its line."""
 
 
 class FormationPlace:
-    """One UAV's."""
+    """The place of one UAV in the plan that it flies by."""
 
     def __init__(self, node: NodeId, navigation: Navigation, *, reach_m: float) -> None:
         self._node = node
@@ -50,7 +50,7 @@ class FormationPlace:
         """Hold no place any more, whatever the plan says yet."""
         self.place = None
 
-    # --- where the plan wants us ----------------------------------------------------------------------------------
+    # --- where the plan wants the UAV ----------------------------------------------------------------------------
 
     @property
     def is_free(self) -> bool:
@@ -63,11 +63,11 @@ class FormationPlace:
         return self.pattern is not None and self.place is not None and self.pattern.kind(self.place) == "line"
 
     def is_taken_up(self, now_ns: int) -> bool:
-        """Whether everyone has had time to take up the formation."""
+        """True once all UAVs have had time to take up the formation."""
         return self.plan is not None and now_ns >= _taken_up_ns(self.plan)
 
     def lane(self, now_ns: int) -> tuple[Enu, Enu]:
-        """Where our lane wants us now, at a height over the ground, and how that place moves."""
+        """The present place in the UAV's lane, at a height over the ground, and how that place moves."""
         plan, pattern, place = self.plan, self.pattern, self.place
         if plan is None or pattern is None or place is None:
             return self._left_from or self._navigation.over_ground(now_ns), STILL
@@ -85,22 +85,22 @@ class FormationPlace:
             Enu(way.east * per_s, way.north * per_s, way.up * per_s),
         )
 
-    # --- how far from there we may go -----------------------------------------------------------------------------
+    # --- how far from there it may go -----------------------------------------------------------------------------
 
     def leads_by(self, estimate: Estimate | None, lane: Enu, moves: Enu) -> bool:
-        """Whether a survivor is near enough to our lane to be looked at without leaving the formation."""
+        """True if a survivor is near enough to the lane to be looked at without leaving the formation."""
         if estimate is None:
             return False
         ahead_m, aside_m = along(moves, estimate.east_m - lane.east, estimate.north_m - lane.north)
         return abs(aside_m) <= _LEASH_M + _ASIDE_M and -_LAG_M <= ahead_m <= _AHEAD_M
 
     def bounded(self, east: float, north: float, lane: Enu, moves: Enu) -> tuple[Enu, Enu]:
-        """The place nearest to a wanted one that our lane allows, and how it moves."""
+        """The place nearest to a wanted one that the lane allows, and how it moves."""
         if self.is_free:
             return Enu(east, north, lane.up), STILL
         ahead_m, aside_m = along(moves, east - lane.east, north - lane.north)
         aside_m = max(-_LEASH_M, min(_LEASH_M, aside_m))
-        if ahead_m >= 0:  # still ahead: the line brings us there
+        if ahead_m >= 0:  # still ahead: the line brings the UAV there
             return _beside(lane, moves, 0.0, aside_m), moves
         if ahead_m < -_LAG_M:
             return _beside(lane, moves, -_LAG_M, aside_m), moves
@@ -108,7 +108,7 @@ class FormationPlace:
         return (beside._replace(east=east) if _leads_east_or_west(moves) else beside._replace(north=north)), STILL
 
     def holds_together(self, estimate: Estimate | None, now_ns: int, *, within_s: float) -> bool:
-        """Whether somebody at a survivor would be in reach of our line, for some seconds from that time on."""
+        """True if a UAV at a survivor would be in reach of its line, for some seconds from that time on."""
         plan, pattern, place = self.plan, self.pattern, self.place
         if estimate is None or plan is None or pattern is None or place is None or not self.is_taken_up(now_ns):
             return False
@@ -121,9 +121,9 @@ class FormationPlace:
 
 
 def along(moves: Enu, east_m: float, north_m: float) -> tuple[float, float]:
-    """An offset as metres ahead and to the right of a lane, which leads the way it moves: north while it stands.
+    """The metres ahead and to the right of a lane by which an offset leads; a lane leads the way it moves, or north.
 
-    Lanes lead along the axes but for a few degrees.
+    Lanes lead along the axes, within a few degrees.
     """
     if _leads_east_or_west(moves):
         return (east_m, -north_m) if moves.east > 0 else (-east_m, north_m)

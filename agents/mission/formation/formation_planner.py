@@ -1,10 +1,10 @@
-"""The plan of the search: who takes which place of the formation, made by one node and handed out over the air.
+"""The plan of the search: which UAV takes which place of the formation, made by one node and told over the air.
 
     every node: says where it is, at once and then every STATUS_S
     planner:    the lowest id that has been heard of lately; it plans once all have been heard of, or after PATIENCE_S
-    lost nodes: whoever holds a place and was not heard of for LOST_S is replaced: by a follower when its place is in a
+    lost nodes: a UAV of a place that was not heard of for LOST_S is replaced, by a follower if its place is in a
                 line or in the chain, because those places hold the swarm together and sweep the area
-    leavers:    the same for whoever says that its battery only just takes it home, at once
+    leavers:    a node that says that its battery only just takes it home is replaced at once
 
 The first assignment minimizes the sum of the squared distances flown. Ways on which everyone leaves and arrives at the
 same instants then do not cross, and UAVs that were near each other stay so.
@@ -19,12 +19,12 @@ from fanet_mw.units import US, Enu, NodeId, S
 from fanet_mw.wire.search import Search, SearchStatus
 
 STATUS_S: Final = 12.0
-"""How often a UAV says how it is."""
+"""The interval at which a UAV says its status."""
 _LOST_NS: Final = 70 * S
 _PATIENCE_NS: Final = 14 * S
-"""How long the first plan waits for those who have not been heard of."""
+"""The first plan waits so long for UAVs that have not been heard of."""
 _NOTICE_NS: Final = 7 * S
-"""From the first telling of a plan to its beginning: a flood through the slots of all clusters."""
+"""The time from the first telling of a plan to its beginning: a flood through the slots of all clusters."""
 _REPEAT_NS: Final = 6 * S
 _REPEATS: Final = 3
 
@@ -48,14 +48,14 @@ class FormationPlanner:
         self._began_ns: int | None = None
         self.plan: Search | None = None
         self.to_tell: list[Search] = []
-        """Plans to be flooded, for the host to take."""
+        """The plans to be flooded, until they are taken."""
         self._told_ns: int | None = None
         self._tellings_left = 0
 
     # --- what comes in --------------------------------------------------------------------------------------------
 
     def status(self, status: SearchStatus, *, now_ns: int) -> None:
-        """A UAV, we ourselves perhaps, said where it is."""
+        """Take in the status of a UAV, this one or another."""
         before = self._members.get(status.node)
         if before is None or status.t_us * US >= before.heard_ns - S:
             self._members[status.node] = _Member(
@@ -63,13 +63,13 @@ class FormationPlanner:
             )
 
     def alive(self, node: int, position: Enu, *, now_ns: int) -> None:
-        """A neighbor was heard at a place."""
+        """Take in that a neighbor was heard at a place."""
         before = self._members.get(node)
         revision, leaves = (before.revision, before.leaves) if before else (0, False)
         self._members[node] = _Member(position, now_ns, revision, leaves=leaves)
 
     def planned(self, plan: Search) -> bool:
-        """A plan came over the air; whether it replaces the one we have."""
+        """Take in a plan that came over the air; True if it replaces the plan in force."""
         mine = self.plan
         if mine is not None and (plan.revision, -plan.planner) <= (mine.revision, -mine.planner):
             return False
@@ -79,7 +79,7 @@ class FormationPlanner:
     # --- decisions ------------------------------------------------------------------------------------------------
 
     def review(self, pattern: Pattern | None, *, now_ns: int) -> bool:
-        """Called about every second. Make a plan, mend it, or tell it again; whether there is a new one."""
+        """Make a plan, mend it, or tell it again, about once a second; True if there is a new one."""
         if self._began_ns is None:
             self._began_ns = now_ns
         if self._leads(now_ns):
@@ -97,7 +97,7 @@ class FormationPlanner:
         return False
 
     def _leads(self, now_ns: int) -> bool:
-        """Whether we are the one to plan: of those that stay, nobody with a lower id was heard of lately."""
+        """True if this node is to plan: of those that stay, none with a lower id was heard of lately."""
         me = self._members.get(self._node)
         return not (me is not None and me.leaves) and all(
             node >= self._node or member.leaves or now_ns - member.heard_ns > _LOST_NS
@@ -110,7 +110,7 @@ class FormationPlanner:
         self._told_ns, self._tellings_left = now_ns, _REPEATS
 
     def _tell_again(self, now_ns: int) -> None:
-        """A plan is told several times, and then to whoever says that it flies by an older one."""
+        """Tell a plan several times, and after that to any node that says that it flies by an older one."""
         if self.plan is None or self._told_ns is None or now_ns - self._told_ns < _REPEAT_NS:
             return
         behind = any(
@@ -143,14 +143,14 @@ class FormationPlanner:
         )
 
     def _mended(self, plan: Search, now_ns: int) -> Search | None:
-        """The plan without those who are lost and with those who are new; None when nothing changed."""
+        """The plan without the UAVs that are lost and with those that are new; None when nothing changed."""
         pattern = pattern_of(plan)
         alive = {
             node for node, member in self._members.items() if now_ns - member.heard_ns <= _LOST_NS and not member.leaves
         }
         alive.add(self._node)
         if 2 * len(alive) <= sum(1 for node in plan.nodes if node):
-            return None  # we are the smaller part of a swarm that has come apart, and shall meet the others again
+            return None  # this is the smaller part of a swarm that has come apart, and it will meet the others again
         holders = [node if node in alive else 0 for node in plan.nodes]
         newcomers = sorted(alive - set(holders))
         for place, holder in enumerate(holders):

@@ -30,7 +30,7 @@ _BUNCHED_M: Final = 280.0
 _STRAIGHT_M: Final = 300.0
 """The chain is straight when the lines have flown so far."""
 _SIDE_M: Final = 65.0
-"""How near to the edge the outermost lanes are: they may be left sideways."""
+"""The outermost lanes are so near to the edge: they may be left sideways."""
 _LEAST_LANES: Final = 2
 
 

@@ -29,12 +29,12 @@ class Pattern:
 
     @property
     def places(self) -> int:
-        """How many places there are: team by team, then relays, then followers."""
+        """The number of places: team by team, then relays, then followers."""
         return self.dimensions.places
 
     @property
     def followers(self) -> range:
-        """The places of those that the swarm holds together without."""
+        """The places of the UAVs without which the swarm holds together."""
         return range(self.dimensions.fixed, self.dimensions.places)
 
     def line(self, place: int) -> range:
@@ -49,11 +49,11 @@ class Pattern:
         return "relay" if place < self.dimensions.fixed else "follower"
 
     def at(self, place: int, swept_s: float) -> Enu:
-        """Where a place is when the sweep has lasted so long; before 0 it is where the sweep begins."""
+        """The position of a place when the sweep has lasted so long; before 0 it is where the sweep begins."""
         return self.shape.at(place, swept_s)
 
     def velocity(self, place: int, swept_s: float) -> Enu:
-        """How a place moves then."""
+        """The velocity of a place then."""
         if swept_s < 0:
             return Enu(0.0, 0.0, 0.0)
         early = max(0.0, swept_s - _STEP_S)
@@ -64,7 +64,9 @@ class Pattern:
 def fitted(
     count: int, demands: Demands, *, shape: ShapeName = ShapeName.LINES, sectors_wanted: int = 1
 ) -> Pattern | None:
-    """The formation of a shape for so many UAVs; None when they are too few. Whom no message holds has no place."""
+    """The formation of a shape for so many UAVs; None when they are too few. UAVs beyond a message's room have no
+    place.
+    """
     count = min(count, MOST_PLACES)
     match shape:
         case ShapeName.LINES:

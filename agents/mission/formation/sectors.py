@@ -4,7 +4,7 @@
 | o-o-o | o-o-o |     teams of a row move in step, side by side, and stay one piece; the rows part from each other
 |  ^    |  ^    |     and meet again in the middle
 +-------+-------+
-|  v    |  v    |     nobody is needed for relays between the rows: those UAVs follow their teams, free for finds
+|  v    |  v    |     no UAV is needed as a relay between the rows: those UAVs follow their teams, free for finds
 | o-o-o | o-o-o |
 +-------+-------+
 """

@@ -16,17 +16,17 @@ from fanet_mw.units import Enu
 FOLLOWER_HIGHER_M: Final = 12.0
 """Places of different kinds fly at heights of their own, so that a follower may cross a line."""
 FOLLOW_M: Final = 110.0
-"""How far behind its line a follower flies."""
+"""A follower flies so far behind its line."""
 _WIDE: Final = 0.9
 """Places that are to hear each other are at most this share of the radio's reach apart."""
 _LANES: Final = 1.35
 """The distance of two lanes as a multiple of the range of the phones' receiver."""
 EDGE_M: Final = 25.0
-"""How near to the edge of the area lines turn: a camera sees that far."""
+"""Lines turn so near to the edge of the area: a camera sees that far."""
 FIRST_M: Final = 16.0
-"""How far from the middle lines begin: apart enough not to be in each other's way, and nothing lies behind them."""
+"""Lines begin so far from the middle: apart enough not to be in each other's way, and nothing lies behind them."""
 _TURN_S: Final = 10.0
-"""How long lines stay where they turn, so that whoever has fallen behind has seen the edge of the area too."""
+"""Lines stay so long where they turn, so that a UAV that has fallen behind has seen the edge of the area too."""
 _BACK: Final = 1.2
 """The way back is flown so much faster than the sweep: where survivors are is known by then."""
 
@@ -44,19 +44,19 @@ class Demands(NamedTuple):
 
     area_m: float
     seen_m: float
-    """How far to the side, on the ground, a UAV in its lane finds a phone."""
+    """A UAV in its lane finds a phone so far to the side, on the ground."""
     reach_m: float
-    """Of the radio."""
+    """The reach of the radio."""
     height_m: float
     speed_m_s: float
 
     def apart_m(self, reach_m: float) -> float:
-        """How far apart lanes are at most, if neighbors hear each other from so far."""
+        """The greatest distance of two lanes, if neighbors hear each other from so far."""
         return min(_WIDE * reach_m, _LANES * self.seen_m)
 
     @property
     def hop_m(self) -> float:
-        """How far apart two places are at most that pass on what the swarm says."""
+        """The greatest distance of two places that pass on what the swarm says."""
         return _WIDE * self.reach_m
 
 
@@ -64,15 +64,16 @@ class Dimensions(NamedTuple):
     """A formation in numbers, as the plan hands it out."""
 
     lanes: int
-    """Places of each team."""
+    """The number of places of each team."""
     relays: int
     followers: int
     half_width_m: float
     """Lines: the outermost lanes are this far from the middle. Others: half the width of the area."""
     first_m: float
-    """How far from where it begins each line is at first; of a spiral, the innermost lane from the middle."""
+    """The distance of each line from its beginning at first; of a spiral, that of the innermost lane from the
+    middle."""
     last_m: float
-    """How far it is when the sweep turns; of a spiral, the outermost lane."""
+    """The same distance when the sweep turns; of a spiral, that of the outermost lane."""
     height_m: float
     speed_m_s: float
     shape: ShapeName = ShapeName.LINES
@@ -80,7 +81,7 @@ class Dimensions(NamedTuple):
 
     @property
     def fixed(self) -> int:
-        """How many places sweep the area and hold the swarm together: all but the followers."""
+        """The number of places that sweep the area and hold the swarm together: all but the followers."""
         return self.teams * self.lanes + self.relays
 
     @property
@@ -96,11 +97,11 @@ class Dimensions(NamedTuple):
 
 
 class Shape(Protocol):
-    """Where the places of one formation are."""
+    """The positions of the places of one formation."""
 
     @property
     def sweep_s(self) -> float:
-        """From the beginning of a sweep to its turn."""
+        """The time from the beginning of a sweep to its turn."""
         ...
 
     @property
@@ -109,7 +110,7 @@ class Shape(Protocol):
         ...
 
     def at(self, place: int, swept_s: float) -> Enu:
-        """Where a place is when the sweep has lasted so long; before 0 it is where the sweep begins."""
+        """The position of a place when the sweep has lasted so long; before 0 it is where the sweep begins."""
         ...
 
     def tethers(self, place: int) -> tuple[int, ...]:
@@ -121,12 +122,12 @@ class Shape(Protocol):
         ...
 
     def apart_m(self, team: int, east_m: float, north_m: float, swept_s: float) -> float:
-        """How far a spot is from the line of a team then."""
+        """The distance of a spot from the line of a team then."""
         ...
 
 
 def swept_m(formation: Dimensions, swept_s: float) -> float:
-    """How far a line is from where it begins: out at the speed of the sweep, back faster, again and again."""
+    """The distance of a line from its beginning: out at the speed of the sweep, back faster, again and again."""
     if swept_s <= 0:
         return formation.first_m
     out_s = (formation.last_m - formation.first_m) / formation.speed_m_s

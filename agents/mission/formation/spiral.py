@@ -21,22 +21,22 @@ from fanet_mw.units import Enu
 _BEHIND_S: Final = 15.0
 """A follower is where its arm was so long ago."""
 _ARMS_M: Final = 60.0
-"""How far apart the innermost lanes of the arms are at least, along their square."""
+"""The least distance of the innermost lanes of two arms, along their square."""
 
 
 class Spiral:
-    """One spiral."""
+    """The arms of one spiral."""
 
     def __init__(self, formation: Dimensions) -> None:
         self._formation = formation
         lanes, first_m = formation.lanes, formation.first_m
         self._outer_m = first_m * (2 * lanes - 1)
-        """Half-side of the square of the outermost lane during the first turn."""
+        """The half-side of the square of the outermost lane during the first turn."""
         self._pitch_m = 2 * first_m * lanes
-        """How much farther out every lane is after each turn that winds outward."""
+        """Every lane is so much farther out after each turn that winds outward."""
         rounds = (formation.last_m / first_m + 1) / (2 * lanes)
         self._winds = max(0, round(rounds) - 1)
-        """How many turns wind outward, between the first and the last, which do not."""
+        """The number of turns that wind outward, between the first and the last, which do not."""
 
     @property
     def lane_m(self) -> float:
@@ -97,7 +97,7 @@ class Spiral:
         return 8 * self._outer_m * first + outward + 8 * (self._outer_m + self._pitch_m * wound) * (level - first)
 
     def _turned(self, swept_s: float) -> float:
-        """How many turns have been flown; back from the end of a spiral that winds outward, and so on."""
+        """The turns that have been flown; from the end of a spiral that winds outward they go back, and so on."""
         way_m = swept_s * self._formation.speed_m_s
         if not self._winds:
             return way_m / (8 * self._outer_m)

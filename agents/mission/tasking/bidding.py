@@ -1,8 +1,8 @@
-"""Which survivor one UAV goes to: it bids where it would be among the best, and flies the task that it has won.
+"""The survivor to whom one UAV goes: it bids where it would be among the best, and flies the task that it has won.
 
 enough reporters   an auction for as many responders as the scenario wants
-too few            an auction for one that has not reported, who fetches a further bearing
-found nobody       a responder takes its bid back after a while
+too few            an auction for one that has not reported, which fetches a further bearing
+nobody found       a responder takes its bid back after a while
 """
 
 import math
@@ -23,20 +23,20 @@ from fanet_mw.wire.search import Bid
 VAGUE_M: Final = 50.0
 """An estimate whose standard deviation is larger leads nobody off its lane."""
 FAR_M: Final = 450.0
-"""Who is farther from a survivor than this leaves it to others."""
+"""A UAV that is farther from a survivor than this leaves it to others."""
 _SCOUT_AFTER_NS: Final = 4 * S
-"""How long a survivor may be short of reporters before somebody is sent to be another one."""
+"""A survivor may be short of reporters for so long before a UAV is sent to be another one."""
 _RETURN_AFTER_NS: Final = 45 * S
-"""A responder that has found nobody for so long takes its bid back."""
+"""A responder that has not found the survivor for so long takes its bid back."""
 _AGAIN_NS: Final = 20 * S
-"""Who has taken its bid back does not bid again for so long."""
+"""A UAV that has taken its bid back does not bid again for so long."""
 _LONG_AGO_NS: Final = -(10**18)
 _HANDOVER_S: Final = 15.0
-"""What a responder needs for its present survivor once it is there."""
+"""The time that a responder needs for its present survivor once it is there."""
 
 
 class Bidding:
-    """One UAV's."""
+    """The bids of one UAV, and the task that it flies."""
 
     def __init__(
         self,
@@ -61,10 +61,10 @@ class Bidding:
         self._taken_back_ns: dict[int, int] = {}
         self._announced = False
         self.survivor: int | None = None
-        """To whom we fly; None: to nobody."""
+        """The survivor to whom this UAV flies; None: it flies to none."""
 
     def merge(self, bids: Iterable[Bid], *, now_ns: int) -> None:
-        """A neighbor passed bids on."""
+        """Take in bids that a neighbor has passed on."""
         open_bids = (bid for bid in bids if not self._finds.is_confirmed(bid.survivor))
         self._auction.merge(open_bids, now_ns=now_ns)
 
@@ -73,20 +73,20 @@ class Bidding:
         return self._auction.told(self._finds.open(), now_ns=now_ns)
 
     def close(self, survivor: int, *, now_ns: int) -> None:
-        """A survivor needs nobody any more."""
+        """Forget the bids for a survivor that needs no UAV any more."""
         self._auction.close(survivor)
         if self.survivor == survivor:
             self.survivor = None
             self.choose(now_ns)
 
     def hand_on(self, now_ns: int) -> None:
-        """Take all our bids back: whoever is next best goes instead of us."""
+        """Take all bids of this UAV back: the next best one goes instead."""
         for survivor in self._finds.open():
             self._auction.withdraw(survivor, now_ns=now_ns)
         self.survivor = None
 
     def bid(self, now_ns: int) -> None:
-        """Bid where we would be among the best."""
+        """Bid where this UAV would be among the best."""
         if self._formation.pattern is None:
             return
         for survivor in self._finds.open():
@@ -106,7 +106,7 @@ class Bidding:
                 self._auction.bid(survivor, eta_s=eta_s, now_ns=now_ns)
 
     def choose(self, now_ns: int) -> None:
-        """Fly the task that we have won and can be done with first; none: back to the lane."""
+        """Fly the won task that can be done first; without one, fly back to the lane."""
         if self.survivor is not None:
             self._reconsider(self.survivor, now_ns)
         if self.survivor is None:
@@ -121,7 +121,7 @@ class Bidding:
             self._announce(self.survivor, now_ns)
 
     def _reconsider(self, survivor: int, now_ns: int) -> None:
-        """Give a task up that another does, or at which we have found nobody or would be lost to the swarm."""
+        """Give a task up that another does, at which none was found, or which would lose this UAV to the swarm."""
         find = self._finds.known[survivor]
         lost = not self._wins(survivor, find, now_ns)
         arrived_ns = self._approach.arrived_ns.get(survivor)
@@ -135,7 +135,7 @@ class Bidding:
             self.survivor = None
 
     def _announce(self, survivor: int, now_ns: int) -> None:
-        """Say in the trace that we approach, once a place is known and enough have reported."""
+        """Say in the trace that this UAV approaches, once a place is known and enough have reported."""
         find = self._finds.known[survivor]
         place = find.place()
         if place is None or not self._is_reported(find):
@@ -148,7 +148,7 @@ class Bidding:
         return len(find.reporters) >= self._config.reports_to_approach
 
     def _wanted(self, find: Find) -> int:
-        """How many UAVs a survivor needs now."""
+        """The number of UAVs that a survivor needs now."""
         return self._config.responders if self._is_reported(find) else 1
 
     def _wins(self, survivor: int, find: Find, now_ns: int) -> bool:
@@ -159,7 +159,7 @@ class Bidding:
         return math.inf if place is None else place.distance_m(self._navigation.position)
 
     def _eta_s(self, survivor: int, now_ns: int) -> float | None:
-        """When we would be with a survivor; None when our place in the formation forbids it."""
+        """The time until this UAV would be at a survivor; None when its place in the formation forbids that."""
         formation, here = self._formation, self._navigation.position
         place = self._finds.known[survivor].place()
         if place is None or (place.sigma_m > VAGUE_M and not formation.is_free):

@@ -52,14 +52,26 @@ def _table(table: KeyTable, given: Mapping[str, Any], *, every_key: bool = True)
     for key in keys:
         yield from ("", *_comment(_sentence(key))) if every_key else _comment(_sentence(key))
         if key.name in given:
-            yield tomli_w.dumps({key.name: given[key.name]}).rstrip()
+            yield _assignment(key.name, given[key.name])
         else:
             yield f"# {key.name} = {_default(key)}"
 
 
 def _entries(path: str, given: list[Any] | tuple[Any, ...]) -> Iterator[str]:
     for entry in given:
-        yield from ("", f"[[{path}]]", tomli_w.dumps(entry).rstrip())
+        yield from ("", f"[[{path}]]", *(_assignment(name, value) for name, value in entry.items()))
+
+
+def _assignment(name: str, value: object) -> str:
+    """A key and its value, on lines that may stand in any table: a table within one is written inline."""
+    if isinstance(value, Mapping):
+        inside = ", ".join(_assignment(str(key), inner) for key, inner in value.items())
+        return f"{_bare_or_quoted(name)} = {{{inside}}}"
+    return tomli_w.dumps({name: value}).rstrip()
+
+
+def _bare_or_quoted(name: str) -> str:
+    return tomli_w.dumps({name: 0}).removesuffix(" = 0\n")
 
 
 def _outline(table: KeyTable) -> Iterator[str]:

@@ -58,6 +58,29 @@ def build(tree: Mapping[str, Any], *, source: str = "scenario") -> Scenario:
         raise ConfigError("\n".join(f"{source}: {text}" for text in dict.fromkeys(lines))) from error
 
 
+def departures(scenario: Scenario) -> dict[str, Any]:
+    """What a scenario has that is not the default: its tree of plain values, which builds the same scenario again.
+
+    A default that follows from another key is none where that key has changed it: a rate of 11 Mb/s is the default, but
+    not of 802.11g.
+    """
+    whole = scenario.model_dump(mode="json", exclude_none=True)
+    tree = scenario.model_dump(mode="json", exclude_none=True, exclude_defaults=True)
+    try:
+        again = build({"name": scenario.name, **tree}).model_dump(mode="json", exclude_none=True)
+    except ConfigError:
+        return whole
+    for key, value in whole.items():
+        if value == again.get(key):
+            continue
+        if isinstance(value, dict):
+            others = again.get(key, {})
+            tree[key] = {k: v for k, v in value.items() if k in tree.get(key, {}) or v != others.get(k)}
+        else:
+            tree[key] = value
+    return tree
+
+
 def _from_folder(tree: dict[str, Any], folder: Path) -> None:
     """Make the paths of other files in a tree independent of the current folder."""
     traffic = tree.get("traffic")

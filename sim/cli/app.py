@@ -5,6 +5,7 @@ wanted, so a module of commands imports at its top only what `--help` needs.
 """
 
 import sys
+from collections.abc import Sequence
 
 from cyclopts import App
 
@@ -29,26 +30,50 @@ for commands in (scenario_files, sweep, figures, runs, single_services, swarms, 
 app.register_install_completion_command()
 
 
+def changes_last(words: Sequence[str]) -> list[str]:
+    """The words of a command line with what is set at its end: there it takes no word that is none of it.
+
+    `--set` takes the word behind it and all further ones with `=`.
+    """
+    changes: list[str] = []
+    rest: list[str] = []
+    taking, first = False, False
+    for word in words:
+        if word == "--set":
+            taking = first = True
+        elif taking and not word.startswith("-") and (first or "=" in word):
+            changes.append(word)
+            first = False
+        else:
+            taking = False
+            rest.append(word)
+    return [*rest, "--set", *changes] if changes and "--" not in words else list(words)
+
+
+def refused(why: str) -> int:
+    """Say why a request could not be met; returns the exit code for that."""
+    from rich.markup import escape
+
+    Console(stderr=True).print(f"[bold red]fanet:[/] {escape(why)}", highlight=False, soft_wrap=True)
+    return 2
+
+
 def main() -> None:
     """The console script."""
     interrupts.install()
     try:
-        code = app(result_action="return_value")
+        code = app(changes_last(sys.argv[1:]), result_action="return_value")
         sys.stdout.flush()
     except BrokenPipeError:
         nobody_reads()
     except FanetError as error:
-        Console(stderr=True).print(f"[bold red]fanet:[/] {error}", highlight=False, soft_wrap=True)
-        code = 2
+        code = refused(str(error))
     except ModuleNotFoundError as error:
-        from rich.markup import escape
-
         from fanet_mw.installation import missing_extra
 
         if (why := missing_extra(error)) is None:
             raise
-        Console(stderr=True).print(f"[bold red]fanet:[/] {escape(why)}", highlight=False, soft_wrap=True)
-        code = 2
+        code = refused(why)
     except KeyboardInterrupt as interrupt:
         code = interrupts.exit_code(interrupt)
     interrupts.leave(code if isinstance(code, int) else 0)

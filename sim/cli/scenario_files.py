@@ -112,8 +112,10 @@ def show(
     """
     import tomli_w
 
+    from fanet_mw.scenario.config import departures
+
     chosen = choice.scenario(scenario)
-    tree = chosen.model_dump(mode="json", exclude_none=True, exclude_defaults=changed)
+    tree = departures(chosen) if changed else chosen.model_dump(mode="json", exclude_none=True)
     sys.stdout.write(json.dumps(tree, indent=2) + "\n" if json_ else tomli_w.dumps(tree))
     return 0
 

@@ -8,9 +8,13 @@ from collections.abc import Sequence
 
 import pytest
 import scenario_draws
+import tomli_w
+from hypothesis import example, given, settings
+from hypothesis import strategies as st
 
 from fanet_mw.errors import ConfigError
 from fanet_mw.scenario import Scenario, config
+from fanet_mw.scenario.commented import commented
 from sim.scenarios import catalog
 
 
@@ -23,6 +27,17 @@ def test_a_random_valid_scenario_ends_wakes_within_bounds_and_its_ledger_closes(
 @pytest.mark.timeout(3600)
 def test_a_thousand_random_valid_scenarios_end() -> None:
     assert [text for seed in range(1000) if (text := scenario_draws.check(seed))] == []
+
+
+@settings(max_examples=6, deadline=None)
+@example(24)  # a rate that is the default, but not that of its standard
+@given(st.integers(0, 10**6))
+def test_a_scenario_that_is_shown_whole_or_by_its_departures_or_commented_is_read_back_as_itself(seed: int) -> None:
+    shown, _ = scenario_draws.scenario(seed)
+    whole, departures = shown.model_dump(mode="json", exclude_none=True), config.departures(shown)
+    texts = [tomli_w.dumps(whole), tomli_w.dumps(departures), commented(whole), commented(departures, every_key=False)]
+    for text in texts:
+        assert config.parse(text, source="shown", name=shown.name) == shown
 
 
 SATURATED = (

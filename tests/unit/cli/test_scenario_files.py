@@ -7,7 +7,7 @@ from pathlib import Path
 import pytest
 
 from fanet_mw.errors import ConfigError
-from sim.cli.app import app
+from sim.cli.app import app, changes_last, refused
 from sim.scenarios import catalog
 
 
@@ -58,6 +58,27 @@ def test_set_is_repeatable_too(capsys: pytest.CaptureFixture[str]) -> None:
     assert fanet("show", "quick", "--set", "nodes.count=12", "--set", "seed=4", "--json") == 0
     shown = json.loads(capsys.readouterr().out)
     assert (shown["nodes"]["count"], shown["seed"]) == (12, 4)
+
+
+@pytest.mark.parametrize(
+    "line",
+    ["quick --set nodes.count=12 seed=4 --json", "--set nodes.count=12 seed=4 quick --json",
+     "--json --set nodes.count=12 quick --set=seed=4", "--set nodes.count=12 --json --set seed=4 -- quick"],
+)  # fmt: skip
+def test_what_is_set_may_stand_before_the_scenario(line: str, capsys: pytest.CaptureFixture[str]) -> None:
+    assert fanet("show", *changes_last(line.split())) == 0
+    shown = json.loads(capsys.readouterr().out)
+    assert (shown["nodes"]["count"], shown["seed"]) == (12, 4)
+
+
+def test_words_that_set_nothing_are_refused_by_name() -> None:
+    with pytest.raises(ConfigError, match=r"'nodes\.count': must be KEY=VALUE"):
+        fanet(*changes_last(["show", "--set", "nodes.count", "quick"]))
+
+
+def test_what_an_error_says_is_printed_as_it_is(capsys: pytest.CaptureFixture[str]) -> None:
+    assert refused("[bold]x = 3 must be in [1, 2]") == 2
+    assert capsys.readouterr().err == "fanet: [bold]x = 3 must be in [1, 2]\n"
 
 
 @pytest.mark.parametrize(

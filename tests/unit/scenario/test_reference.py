@@ -65,6 +65,13 @@ def test_a_commented_file_is_the_scenario_that_it_was_made_from(entry: catalog.E
         assert missing == []
 
 
+def test_options_of_foreign_parts_stand_in_a_commented_file_as_tables_within_their_table() -> None:
+    options = {"p": 0.6, "a key": {"deep": [1, {"x": "y"}]}}
+    tree = {"routing": {"options": options}, "applications": [{"use": "a:B", "options": options}, {"use": "c"}]}
+    read = tomllib.loads(commented(tree))
+    assert (read["routing"], read["applications"]) == (tree["routing"], tree["applications"])
+
+
 def test_every_default_in_a_commented_file_is_taken_when_it_is_uncommented() -> None:
     lines = commented({}).splitlines()
     unset = "(unset)"

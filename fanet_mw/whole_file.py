@@ -16,7 +16,7 @@ def write_items(path: Path, items: Iterable[bytes]) -> int:
     """
     with path.open("wb", buffering=0) as file:
         done = 0
-        for batch in _batches(items):
+        for batch in batches(items, least_bytes=_BATCH_BYTES):
             data = b"".join(batch)
             written = 0
             try:
@@ -31,13 +31,14 @@ def write_items(path: Path, items: Iterable[bytes]) -> int:
     return done
 
 
-def _batches(items: Iterable[bytes]) -> Iterator[list[bytes]]:
+def batches(items: Iterable[bytes], *, least_bytes: int) -> Iterator[list[bytes]]:
+    """The items in lists that hold at least so many bytes each; only the last one may hold less."""
     batch: list[bytes] = []
     size = 0
     for item in items:
         batch.append(item)
         size += len(item)
-        if size >= _BATCH_BYTES:
+        if size >= least_bytes:
             yield batch
             batch, size = [], 0
     if batch:

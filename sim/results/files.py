@@ -6,7 +6,7 @@ the summary's `unwritten` with the reason, and does not affect the others.
 
 import hashlib
 import json
-from collections.abc import Callable, Iterable
+from collections.abc import Callable
 from functools import partial
 from pathlib import Path
 from typing import Any
@@ -15,17 +15,11 @@ import tomli_w
 
 from fanet_mw import tlog
 from fanet_mw.errors import ConfigError
-from fanet_mw.trace import Record
 from fanet_mw.whole_file import write_items
 from sim.results.links import described
 from sim.results.metrics import summarize
 from sim.run.collecting.stored_records import lines
 from sim.run.outcome import Outcome
-
-
-def trace_bytes(records: Iterable[Record]) -> bytes:
-    """The whole trace file."""
-    return b"".join(lines(records))
 
 
 def finish(outcome: Outcome, *, out: Path | None) -> dict[str, Any]:

@@ -18,8 +18,8 @@ from typing import Final, NamedTuple
 
 from fanet_mw.errors import ConfigError
 from fanet_mw.scenario import Scenario
-from sim.results.files import trace_bytes
 from sim.results.links import described
+from sim.run.collecting.stored_records import lines
 from sim.run.virtual import simulate
 from sim.scenarios import catalog
 
@@ -118,7 +118,7 @@ def hashes(scenario: Scenario) -> dict[str, str]:
     """What a run gives, by part."""
     outcome = simulate(scenario)
     parts = {
-        "trace": trace_bytes(outcome.records),
+        "trace": b"".join(lines(outcome.records)),
         "reports": json.dumps(dict(outcome.reports), sort_keys=True).encode(),
         "taps": repr(outcome.taps).encode(),
         "links": json.dumps(list(described(outcome.links.rows()))).encode(),

@@ -13,7 +13,8 @@ from fanet_mw.bus.topics import Topics
 from fanet_mw.routing.clustered.tdma.turns import clocks_fit
 from fanet_mw.trace import Delivered, Generated
 from fanet_mw.units import MS, US, Enu, NodeId
-from sim.results.files import finish, trace_bytes
+from sim.results.files import finish
+from sim.run.collecting.stored_records import lines
 from sim.run.outcome import Outcome
 from sim.run.virtual import simulate
 from sim.scenarios import catalog
@@ -75,7 +76,7 @@ def test_delays_in_the_trace_are_true_although_no_two_clocks_agree() -> None:
 def test_the_same_scenario_and_seed_give_the_same_trace() -> None:
     settings = ("clock.sync=beacons", "clock.offset_ms=50", "clock.wander_ppm=0.05", "duration_s=10", "warmup_s=5")
     scenario = catalog.find("clusters", [*GRID, *settings])
-    assert trace_bytes(simulate(scenario).records) == trace_bytes(simulate(scenario).records)
+    assert list(lines(simulate(scenario).records)) == list(lines(simulate(scenario).records))
 
 
 def test_exact_clocks_put_nothing_between_a_uav_and_its_host(make_scenario: MakeScenario) -> None:

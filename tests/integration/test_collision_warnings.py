@@ -8,7 +8,8 @@ from fanet_mw import mavlink
 from fanet_mw.errors import ConfigError
 from fanet_mw.scenario.config import build
 from fanet_mw.trace import ConflictForeseen, ConflictOver, Warned
-from sim.results.files import finish, trace_bytes
+from sim.results.files import finish
+from sim.run.collecting.stored_records import lines
 from sim.run.outcome import Outcome
 from sim.run.virtual import simulate
 from sim.scenarios import catalog
@@ -47,7 +48,7 @@ def test_two_that_meet_head_on_hit_without_warnings_and_pass_clear_with_them() -
     assert warned["warnings"]["pdr"] == warned["separation"]["reached_the_other"] == 1
     heard = [m for _, data in outcome.taps for m in mavlink.decode(data) if m.get_type() == "COLLISION"]
     assert len(heard) == len(said)
-    assert trace_bytes(outcome.records) == trace_bytes(flown(PAIR)[0].records)
+    assert list(lines(outcome.records)) == list(lines(flown(PAIR)[0].records))
 
 
 def test_who_does_not_hear_the_other_is_told_of_it_over_a_third() -> None:

@@ -13,7 +13,8 @@ import pytest
 from rich.console import Console
 
 from sim.results import report
-from sim.results.files import finish, trace_bytes
+from sim.results.files import finish
+from sim.run.collecting.stored_records import lines
 from sim.run.virtual import simulate
 from sim.scenarios import catalog
 
@@ -78,8 +79,8 @@ def test_a_signal_ends_a_run_at_its_next_tenth_of_a_second_and_before_the_first_
     part, whole = simulate(chosen, on_progress=progress, signals=signals), simulate(chosen)
     assert part.ended_ns == 6_100_000_000
     assert whole.ended_ns is None
-    until = trace_bytes(part.records)
-    assert trace_bytes(whole.records).startswith(until), "up to there it is the same run"
+    until = b"".join(lines(part.records))
+    assert b"".join(lines(whole.records)).startswith(until), "up to there it is the same run"
     summary = finish(part, out=None)
     assert (summary["simulated_s"], summary["valid"]) == (6.1, False)
     console = Console(file=io.StringIO(), width=200)

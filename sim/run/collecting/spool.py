@@ -17,6 +17,7 @@ from pathlib import Path
 from typing import Any, Final
 
 from fanet_mw.errors import ConfigError
+from fanet_mw.whole_file import batches
 
 _LENGTH: Final = struct.Struct("<I")
 _BLOCK_BYTES: Final = 1 << 18
@@ -97,28 +98,14 @@ def in_order(
     At most some megabytes of them are in memory at once. Returns None when the disk has no room for it.
     """
     runs, ends = Spool(source.folder), [0]
-    for portion in _portions(source.items(), _SORTED_BYTES):
+    for portion in batches(source.items(), least_bytes=_SORTED_BYTES):
         portion.sort(key=key)
         if not runs.append(*portion):
             return None
         ends.append(runs.size)
     merged = heapq.merge(*(runs.items(start, end) for start, end in pairwise(ends)), key=key)
     result = Spool(source.folder)
-    for portion in _portions(map(change, merged), _BLOCK_BYTES):
+    for portion in batches(map(change, merged), least_bytes=_BLOCK_BYTES):
         if not result.append(*portion):
             return None
     return result
-
-
-def _portions(items: Iterator[bytes], most_bytes: int) -> Iterator[list[bytes]]:
-    """The items in lists of about so many bytes."""
-    portion: list[bytes] = []
-    size = 0
-    for item in items:
-        portion.append(item)
-        size += len(item)
-        if size >= most_bytes:
-            yield portion
-            portion, size = [], 0
-    if portion:
-        yield portion

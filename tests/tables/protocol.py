@@ -83,6 +83,34 @@ def promises() -> Rows:
     return rows
 
 
+def lossy() -> Rows:
+    """Scenario `clusters` over links that lose frames: timetables from measured links, and one from places beside it.
+
+    `stated`: the share of packets with a likely delay, and the longest that any node stated; `within`: how many of
+    their copies came within it.
+    """
+    head = ["`KEY`", "seed", "PDR with places, 30 s", "PDR measured", "median / p95 delay [ms]"]
+    rows = [[*head, "stated: share / at worst [s]", "within"]]
+    for key in ("radio.shadowing_db=4", "radio.fading=rician"):
+        for seed in _SEEDS:
+            keys = ("radio.channel=log_distance", key, f"seed={seed}")
+            found = _summary("clusters", "duration_s=60", *keys)
+            places = _summary("clusters", "duration_s=30", "clusters.links=places", *keys)
+            delay_ms, likely = found["delay_ms"], found["likely"]
+            rows.append(
+                [
+                    f"`{key}`",
+                    f"{seed}",
+                    f"{places['pdr']:.3f}",
+                    f"{found['pdr']:.3f}",
+                    f"{delay_ms['p50']:.0f} / {delay_ms['p95']:.0f}",
+                    f"{likely['stated_share']:.2f} / {likely['worst_ms'] / 1000:.1f}",
+                    f"{likely['within_share']:.4f}",
+                ]
+            )
+    return rows
+
+
 def _bound_cells(keys: Sequence[str]) -> list[str]:
     """PDR, share within the bound, the worst delay and the bound, and how often it was broken."""
     found = [_summary("clusters", "duration_s=30", f"seed={seed}", *keys) for seed in _SEEDS]

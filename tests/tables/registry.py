@@ -34,6 +34,7 @@ TABLES: Final[Mapping[str, Table]] = {
     "error-rates": Table("explanation/channel.md", emulator.error_rates, Tolerance(absolute=0.05)),
     "bounds": Table("explanation/timetable.md", protocol.bounds, Tolerance(absolute=0.002, relative=0.05)),
     "promises": Table("explanation/timetable.md", protocol.promises, Tolerance(absolute=0.02, relative=0.1)),
+    "lossy": Table("explanation/lossy-links.md", protocol.lossy, Tolerance(absolute=0.02, relative=0.1)),
     "assumptions": Table("explanation/lossy-links.md", protocol.assumptions, Tolerance(absolute=0.02, relative=0.1)),
     "phones": Table("explanation/lossy-links.md", protocol.phones, Tolerance(absolute=1, relative=0.1)),
     "warnings": Table("explanation/protocol.md", protocol.warnings, Tolerance(absolute=0.1, relative=0.3)),

@@ -107,6 +107,7 @@ class AssignedRoles:
             self._on_schedule(packet, now_ns=now_ns)
         elif kind == Kind.LINKS and not ours and self.parts.links is not None:
             self._timetabling.on_links(packet, now_ns=now_ns)
+            self.parts.joining.on_links_announced()
         return kind == Kind.SCHEDULE
 
     def _on_join(self, packet: Packet, join: Join, src: NodeId, now_ns: int) -> None:

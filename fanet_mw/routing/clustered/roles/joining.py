@@ -2,7 +2,8 @@
 
 no place yet                     at a random instant, and again until a schedule names the node
 farther from where it was told   with the next hello, a little spread (`position_updates.py`)
-a link has changed               the same, where links are measured: joins carry them
+links are measured               the same, as soon as there is an estimate, and when a link has changed: in joins;
+                                 again until the leader announces links, because joins get lost like any flood
 """
 
 from collections.abc import Callable
@@ -34,6 +35,9 @@ class Joining:
         self._updates = updates
         self._links = links
         self._random = random
+        self._has_told_links = False
+        self._links_are_announced = False
+        """True if the leader that the node follows has announced measured links, which it does when it knows enough."""
         self.due_ns: int | None = None
         """The instant at which the node joins next; None: it has no reason to."""
 
@@ -43,8 +47,13 @@ class Joining:
 
     def ask_for_a_place(self, now_ns: int) -> None:
         """The node has lost its place, or follows another leader: it joins soon, if it was not about to."""
+        self._links_are_announced = False
         if self.due_ns is None:
             self.due_ns = now_ns + int(self._random() * _WINDOW_NS)
+
+    def on_links_announced(self) -> None:
+        """The leader makes timetables from measured links: it has heard of those of most nodes."""
+        self._links_are_announced = True
 
     def rest(self) -> None:
         """The node has a place, or leads."""
@@ -62,9 +71,15 @@ class Joining:
         """Join soon if the leader must be told something new; `listed` nodes may all have to at the same time."""
         if self.due_ns is None and (
             self._updates.outdated(self._port.position, now_ns=now_ns)
-            or (self._links is not None and self._updates.may_update(now_ns) and self._links.outdated(now_ns=now_ns))
+            or (self._links is not None and self._must_tell(self._links, now_ns))
         ):
             self.due_ns = now_ns + int(self._random() * _UPDATE_NS * (1 + listed))
+
+    def _must_tell(self, links: LinkQuality, now_ns: int) -> bool:
+        """True if the leader lacks the links of this node, or has others than those of now."""
+        if not self._has_told_links:
+            return links.has_estimate(now_ns=now_ns)  # however short a time ago the node joined without them
+        return self._updates.may_update(now_ns) and (not self._links_are_announced or links.outdated(now_ns=now_ns))
 
     def join(self, *, instead_of: int, again: bool, now_ns: int) -> bytes:
         """The inner frames of a join that goes now; `again`: another follows if no schedule names the node."""
@@ -74,6 +89,7 @@ class Joining:
         node = self._port.node
         inner = Join(node, motion.position, motion.velocity, instead_of).encode_frame(node)
         links = self._links.tell(now_ns=now_ns) if self._links is not None else ()
+        self._has_told_links = self._has_told_links or bool(links)
         return inner + Links(node, links).encode_frames() if links else inner
 
     def motion(self, now_ns: int) -> Motion:

@@ -43,7 +43,7 @@ class LinkQuality:
 
     def hello_share(self, *, now_ns: int) -> float:
         """After which part of the hello interval the next hello should go."""
-        return 1 / FAST if now_ns - self._start_ns < FIRST * self._hello_ns else 1.0
+        return 1.0 if self.has_estimate(now_ns=now_ns) else 1 / FAST
 
     def start(self, now_ns: int) -> None:
         """The node is up."""
@@ -78,9 +78,13 @@ class LinkQuality:
             return _STEADY
         return (len(heard) + 0.5) / (max(due, len(heard)) + 1)
 
+    def has_estimate(self, *, now_ns: int) -> bool:
+        """True as soon as some hellos of each neighbor should have come."""
+        return now_ns - self._start_ns >= FIRST * self._hello_ns
+
     def tell(self, *, now_ns: int) -> tuple[Link, ...]:
         """The links for a join; none before there is an estimate."""
-        if now_ns - self._start_ns < FIRST * self._hello_ns:
+        if not self.has_estimate(now_ns=now_ns):
             return ()
         links = self.links(now_ns=now_ns)
         self._told = {link.a: link.chance for link in links}
@@ -88,7 +92,7 @@ class LinkQuality:
 
     def outdated(self, *, now_ns: int) -> bool:
         """True if the leader should be told: there is a first estimate, or a link has changed."""
-        if now_ns - self._start_ns < FIRST * self._hello_ns:
+        if not self.has_estimate(now_ns=now_ns):
             return False
         now = {link.a: link.chance for link in self.links(now_ns=now_ns)}
         return any(abs(now.get(node, 0.0) - self._told.get(node, 0.0)) > _CHANGED for node in now.keys() | self._told)

@@ -1,7 +1,7 @@
 """The receiving side: pieces become messages, each is handed over once, and its sender is told.
 
 A message that is to be confirmed waits for the one before it in its flow. What is kept is bounded in bytes, per sender
-and together, and in messages; what does not fit is not taken, and its sender, who hears nothing, sends it again.
+and together, and in messages; what does not fit is not taken, and its sender, which hears nothing, sends it again.
 The caller counts pieces that contradict each other as malformed.
 """
 

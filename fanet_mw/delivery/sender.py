@@ -142,7 +142,7 @@ class Sender:
         self, data: bytes, *, port: int, destination: NodeId, targets: tuple[NodeId, ...], priority: int,
         born_us: int, lifetime_ms: int,
     ) -> tuple[int, Sequence[PieceToSend]]:  # fmt: skip
-        """A message that nobody is to confirm: its number, and all its packets."""
+        """A message that is not to be confirmed: its number, and all its packets."""
         number = self.take_number()
         stride, pieces = self._division(data, port, len(targets))
         packets = []

@@ -1,10 +1,10 @@
 """Claimed slots, judged before take-off: which turns each node will have, and whether its load fits them.
 
-    positions -> who hears whom -> the protocol's own claims, run without losses -> slots, superframes, turns by lot
-              -> the protocol's own rule of relays                             -> who sends how much
+    positions -> adjacency -> the protocol's own claims, run without losses -> slots, superframes, turns by lot
+              -> the protocol's own rule of relays                           -> the load of each node
 
 A relay sends its own packets and those of all others, any other node only its own; every second hello takes a turn too.
-Of the turns that nobody within two hops claims, a node that draws lots wins the share of its lots among all lots drawn
+Of the turns that no node within two hops claims, one that draws lots wins the share of its lots among all lots drawn
 within two hops, on average. The plan is feasible if each node's load fits the turns that it claims and wins. This is a
 statement about rates: nothing bounds a delay end to end when packets queue. A packet that meets no queue takes at most
 hops x hop_ns.

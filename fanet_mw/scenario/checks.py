@@ -31,7 +31,7 @@ _LINKS: Final = 36
 _MOST_LINKS_MESSAGES: Final = 4
 """FANET_LINKS of one frame."""
 _TELLS_NEIGHBORS: Final = ("heads", "cds", "mpr", "claimed")
-"""Relay rules for which a hello says whom its sender hears."""
+"""Relay rules for which a hello says which nodes its sender hears."""
 _RIVAL_FRAME_BYTES: Final = 256
 """Control messages of a fixed length must fit one frame; longer ones are divided."""
 

@@ -31,7 +31,7 @@ class Clock(Section):
     gps_sigma_ns: Annotated[float, Field(ge=0, le=1e9)] = 100.0
     """`gps`: standard deviation of the time of one fix; a receiver without a timing output has some 100 ns to 1 us."""
     limit_s: SomeTime = 5.0
-    """A swarm time farther from the own clock than this is not believed, whoever says it."""
+    """A swarm time farther from the own clock than this is not believed, whichever node says it."""
 
     @model_validator(mode="after")
     def _a_walk_has_bounds(self) -> Self:

@@ -22,7 +22,7 @@ def fingerprint(scenario: Scenario) -> str:
 
 
 def differences(ours: Mapping[str, Any], theirs: Mapping[str, Any], path: str = "") -> Iterator[tuple[str, Any, Any]]:
-    """(dotted key, our value, their value) of all that differs between two trees of plain values."""
+    """(dotted key, value here, value there) of all that differs between two trees of plain values."""
     for key in sorted({*ours, *theirs}):
         here, there = ours.get(key), theirs.get(key)
         if isinstance(here, Mapping) and isinstance(there, Mapping):

@@ -93,12 +93,12 @@ class Nodes(Section):
 
 
 class Traffic(Section):
-    """The application load: who sends how much, how often, to whom. Several classes: `[[traffic]]` for each."""
+    """The application load: which nodes send how much, how often, to which. Several classes: `[[traffic]]` for each."""
 
     name: Annotated[str, Field(pattern=r"^[A-Za-z0-9_-]{0,64}$")] = ""
     """What results call a class of traffic; empty: `traffic` for the first one, `traffic_2` and so on."""
     payload_bytes: Annotated[int, Field(ge=64, le=2304)] = 1024
-    """UDP payload on the air, our routing header included."""
+    """UDP payload on the air, the routing header included."""
     interval_s: Annotated[float, Field(ge=1e-4, le=MOST_S)] = 1.0
     """From one packet of a source to its next. At least 0.1 ms: packets are named by numbers of which a node has one
     for each 0.1 ms."""
@@ -148,7 +148,7 @@ class Routing(Section):
     """The table of a protocol that another package brings, as that package documents it."""
     address_resolution: Literal["none", "rfc826", "ns3"] = "none"
     """`aodv`, `olsr`, `dsdv`, `geographic`: a node asks for a neighbor's address before its first unicast to it, as IP
-    does, by the rules of RFC 826 or by ns-3's. `none`: a node id is an address, and nobody needs to ask."""
+    does, by the rules of RFC 826 or by ns-3's. `none`: a node id is an address, and no node needs to ask."""
     jitter_ms: Milliseconds = 10.0
     """A relay waits U(0, jitter) after a reception."""
     hop_limit: Annotated[int, Field(ge=1, le=255)] = 32
@@ -200,8 +200,8 @@ class Clusters(Section):
     pacing: Literal["burst", "spread"] = "spread"
     """`burst` releases at `release_gap_ms`; `spread` divides the slot evenly among the queued packets."""
     relay: Literal["all", "gossip", "counter", "heads", "cds", "mpr", "scheduled", "claimed"] = "all"
-    """Who relays a flooded packet: every node; each with probability min(1, gossip_degree / neighbors); each that has
-    heard fewer than `counter` copies after U(0, assess_ms); heads and who connects them; a connected dominating set;
+    """Relays of a flooded packet: all nodes; each with probability min(1, gossip_degree / neighbors); each that has
+    heard fewer than `counter` copies after U(0, assess_ms); heads and what connects them; a connected dominating set;
     multipoint relays; those that a collision-free timetable names, each in a turn of its own; or a connected
     dominating set in slots that nodes agree on over the air."""
     contention_ms: Milliseconds = 40.0
@@ -251,8 +251,8 @@ class Mobility(Section):
 
     model: Annotated[str, PartName("mobility.model", MOBILITY_MODELS)] = "static"
     """`formation` sweeps the area keeping the layout; `random_waypoint` is the statistical model, without pause;
-    `crossing` flies everyone through the middle of the area to the point opposite its start, and back.
-    `onboard`: the world decides nothing, keeps nobody clear of others, and flies what each UAV's computer asks for."""
+    `crossing` flies each UAV through the middle of the area to the point opposite its start, and back.
+    `onboard`: the world decides nothing, keeps no UAV clear of others, and flies what each UAV's computer asks for."""
     options: Annotated[dict[str, Any], OptionsOf("mobility.model", MOBILITY_MODELS)] = Field(default_factory=Options)
     """The table of a model that another package brings, as that package documents it."""
     speed_m_s: Speed = 7.5
@@ -315,7 +315,7 @@ class World(Section):
     origin_deg: tuple[Annotated[float, Field(ge=-90, le=90)], Annotated[float, Field(ge=-180, le=180)]] | None = None
     """Latitude and longitude that become the origin; unset: the middle of the buildings of the file."""
     no_fly_m: tuple[tuple[Coordinate, Coordinate, SomeLength], ...] = ()
-    """Areas that nobody may enter, each as [east, north, radius]; the world counts who does."""
+    """Areas that no UAV may enter, each as [east, north, radius]; the world counts entries."""
     gps_hz: Annotated[float, Field(ge=1e-6, le=1000)] = 5.0
     """Position fixes of each UAV per second."""
     gps_sigma_m: Annotated[float, Field(ge=0, le=1000)] = 1.5
@@ -364,22 +364,22 @@ class Mission(Section):
     reports_to_approach: Count = 3
     """A UAV approaches when this many different nodes have reported the same survivor (paper, 4.1)."""
     search: Literal["none", "lines", "spiral", "sectors"] = "none"
-    """UAVs search by a plan that one of them makes and hands out over the air; of those who find, `responders` go.
+    """UAVs search by a plan that one of them makes and hands out over the air; of those that find, `responders` go.
     `lines`: two lines abreast part from the middle of the area, with a chain between them. `spiral`: arms abreast turn
     about the middle, or a single one winds outward; any number of UAVs will do. `sectors`: a team abreast for each of
-    `clusters.count` sectors, not held together. `none`: the paper's rule, by which everyone goes who has heard enough
+    `clusters.count` sectors, not held together. `none`: the paper's rule, by which every UAV goes that has heard enough
     reports."""
     avoid_by: tuple[Literal["hellos", "radar"], ...] = ("hellos", "radar")
-    """`search`: from what UAVs know whom to keep clear of: the positions in the hellos of others, their own radar."""
+    """`search`: what UAVs keep clear of others by: the positions in the hellos of others, their own radar."""
     reserve_charge: Annotated[float, Field(ge=0, le=1)] = 0.15
-    """`search`: who would come home with less of its battery than this flies home, lands, and hands its place and its
+    """`search`: a UAV that would come home with less of its battery than this flies home, lands, and hands place and
     task on; needs `sensors.battery_hz`."""
     responders: Annotated[int, Field(ge=1, le=1000)] = 3
     """`search`: as many UAVs go to a survivor, chosen by auction; the others search on."""
     report_interval_s: Interval = 5.0
     """How often a UAV repeats its report of a survivor it still hears."""
     report_bytes: Annotated[int, Field(ge=0, le=2304)] = 0
-    """UDP payload of a report on the air, our routing header included; 0: no more than it needs, which is 79 bytes."""
+    """UDP payload of a report on the air, the routing header included; 0: no more than it needs, which is 79 bytes."""
     report_priority: Literal["safety", "report", "bulk"] = "report"
     """Which reports go first where several packets wait, and after which time they expire (`routing`)."""
     scan_interval_s: Interval = 1.0
@@ -400,7 +400,7 @@ class Mission(Section):
     dwell_s: Duration = 10.0
     """How long a UAV stays with a survivor before it turns to the next one it knows of."""
     collision_distance_m: Annotated[float, Field(ge=0, le=1000)] = 0.0
-    """UAVs nearer to each other have lost separation, which the world counts; 0: nobody looks."""
+    """UAVs nearer to each other have lost separation, which the world counts; 0: it is not looked for."""
     collision_horizon_s: Annotated[float, Field(ge=0, le=120)] = 0.0
     """A UAV that foresees a loss of separation within this time warns the other one, and both avoid; 0: no warnings."""
     collision_repeat_s: Annotated[float, Field(gt=0, le=120)] = 1.0

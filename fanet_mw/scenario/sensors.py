@@ -42,7 +42,7 @@ class Sensors(Section):
     camera_sigma_deg: Angle = 1.0
     """Error of a direction, along each of two axes."""
     camera_false_per_hour: Annotated[float, Field(ge=0, le=1e6)] = 0.0
-    """People that one camera sees where nobody is."""
+    """People that one camera sees where there are none."""
     voice_hz: Rate = 0.0
     """How often a microphone array looks for voices."""
     voice_level_db: Level = 88.0

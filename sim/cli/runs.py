@@ -83,7 +83,7 @@ def launch(
     respawn
         Start a process again when it dies.
     no_world
-        Start no world: somebody else's process says where everyone is (see docs/reference/bus.md).
+        Start no world: another program says where all UAVs are (see docs/reference/bus.md).
     listen
         Zenoh endpoint to serve on, for example tcp/127.0.0.1:7447; by default a free port of the loopback interface.
     connect

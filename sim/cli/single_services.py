@@ -32,7 +32,7 @@ def router(
 ) -> int:
     """Serve the bus and keep the swarm clock, for services that are started one by one.
 
-    It says every five seconds who is missing, there twice, or runs another scenario.
+    It says every five seconds which services are missing, there twice, or run another scenario.
 
     Parameters
     ----------

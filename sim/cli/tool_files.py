@@ -53,7 +53,7 @@ def keys(
 
 
 def dialect(folder: Path | None = None, *, definitions: Annotated[bool, Parameter(negative="")] = False) -> int:
-    """Print the path of our MAVLink dialect, fanet.xml, with the definitions that it includes beside it.
+    """Print the path of fanet-mw's MAVLink dialect, fanet.xml, with the definitions that it includes beside it.
 
     Parameters
     ----------
@@ -72,7 +72,7 @@ def dialect(folder: Path | None = None, *, definitions: Annotated[bool, Paramete
 
 
 def dissector(folder: Path) -> int:
-    """Install Wireshark's dissector for MAVLink with our messages: writes mavlink.lua.
+    """Install Wireshark's dissector for MAVLink with the messages of fanet-mw: writes mavlink.lua.
 
     Parameters
     ----------

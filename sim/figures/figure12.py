@@ -1,4 +1,6 @@
-"""Figure 12: how soon UAVs turn towards survivors, by network and load. Claims: who is first, who hardly changes."""
+"""Figure 12: how soon UAVs turn towards survivors, by network and load. Claims: which is first, which hardly
+changes.
+"""
 
 import math
 from collections.abc import Callable

@@ -1,4 +1,4 @@
-"""Whose phone is it? A camera or a voice shows people and names nobody; a receiver names phones and shows nobody.
+"""Whose phone is it? A camera or a voice shows people and names none of them; a receiver names phones and shows none.
 
     sightings near each other        -> one person, whose place is a Kalman filter's
     people x phones, all at once     -> the assignment that makes what was heard of all phones together most likely

@@ -2,7 +2,7 @@
 
 enough reporters   an auction for as many responders as the scenario wants
 too few            an auction for one that has not reported, which fetches a further bearing
-nobody found       a responder takes its bid back after a while
+not found          a responder takes its bid back after a while
 """
 
 import math
@@ -21,7 +21,7 @@ from fanet_mw.units import NodeId, S
 from fanet_mw.wire.search import Bid
 
 VAGUE_M: Final = 50.0
-"""An estimate whose standard deviation is larger leads nobody off its lane."""
+"""An estimate whose standard deviation is larger leads no UAV off its lane."""
 FAR_M: Final = 450.0
 """A UAV that is farther from a survivor than this leaves it to others."""
 _SCOUT_AFTER_NS: Final = 4 * S

@@ -1,7 +1,7 @@
 """The batteries of a swarm: drained by what flying takes, empty in the end.
 
 An engine that knows rotors says what they take. For the others it is what steady flight at that airspeed and climb
-would take (`rotors/power.py`), by a table over both; acceleration costs them nothing. Who stands on the ground needs
+would take (`rotors/power.py`), by a table over both; acceleration costs them nothing. A UAV on the ground needs
 the avionics.
 """
 

@@ -1,6 +1,6 @@
-"""How one node comes to turns of its own: it listens, claims a slot free within two hops, and draws for spare turns.
+"""The way of a node to turns of its own: it listens, claims a slot free within two hops, and draws for spare turns.
 
-Its hellos say what it claims and what its neighbors claim (`slot_claims.py`); turns that nobody within two hops claims
+Its hellos say what it claims and what its neighbors claim (`slot_claims.py`); turns that no node within two hops claims
 go by hash to the node with most to send (`own_turns.py`). What the hellos say decides the relays too: a connected
 dominating set, which each node finds for itself, among the nodes that hold a slot.
 """

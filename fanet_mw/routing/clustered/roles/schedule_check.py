@@ -13,7 +13,7 @@ from fanet_mw.wire.inner import Schedule
 
 _START_NS: Final = 60 * S
 _START_PERIODS: Final = 100
-"""A schedule that starts later than this minute and so many periods after it comes was made by nobody: one of turns is
+"""A schedule that starts later than this minute and so many periods after it comes is forged: one of turns is
 announced as long ahead as the bounds under the one before need, and those are some superframes."""
 _EPOCHS: Final = 16
 """Epochs that may have been missed besides those for which there was time since the last."""

@@ -22,7 +22,7 @@ from fanet_mw.node.header_check import CONTROL, RESTART_STEP_NS
 from fanet_mw.node.node import Node
 from fanet_mw.node.packet import Packet
 from fanet_mw.rng import stream
-from fanet_mw.units import BROADCAST, MS, US, NodeId, S, earliest, seconds_to_ns
+from fanet_mw.units import BROADCAST, MS, US, NodeId, S, seconds_to_ns
 from fanet_mw.wire.message import (
     MAVLINK_PORT,
     MOST_LIFETIME_MS,
@@ -174,6 +174,10 @@ class Messenger:
         """The applications that listen to a message, by its port or by the id of its MAVLink frame."""
         return self._listeners.of_message(_message_id(data)) if port == MAVLINK_PORT else self._listeners.of_port(port)
 
+    def has_news(self) -> bool:
+        """Whether there is something to hand over, or to tell of a message that was sent."""
+        return bool(self._receiver.arrived or self._sender.told or self._statuses.waiting or self._node.fates)
+
     def arrived(self) -> list[tuple[Application, Received]]:
         """The messages to hand over now, each with an application that listens to it."""
         if not self._receiver.arrived:
@@ -200,9 +204,10 @@ class Messenger:
                 )
 
     def next_wake_ns(self) -> int | None:
-        if self._sender.told or self._statuses.pending:
+        if self._sender.told or self._statuses.waiting or self._node.fates:
             return 0  # at once
-        return earliest(self._sender.next_wake_ns(), self._receiver.next_wake_ns())
+        send_ns, receive_ns = self._sender.next_wake_ns(), self._receiver.next_wake_ns()
+        return send_ns if receive_ns is None or (send_ns is not None and send_ns < receive_ns) else receive_ns
 
     def report(self) -> Mapping[str, Any]:
         """The counters of messages, for people; empty when no application has sent or received any."""

@@ -22,7 +22,7 @@ from fanet_mw.node.packet import Packet
 from fanet_mw.rng import stream
 from fanet_mw.scenario import Scenario
 from fanet_mw.trace import Record
-from fanet_mw.units import BROADCAST, US, Enu, NodeId, earliest
+from fanet_mw.units import BROADCAST, US, Enu, NodeId
 
 _RADIO_FATES: Final = frozenset((Fate.SENT, Fate.TURNED_AWAY))
 _OF_MESSENGER: Final = {
@@ -165,8 +165,12 @@ class Onboard:
             self._messenger.wake(now_ns)
 
     def next_wake_ns(self) -> int | None:
-        timed = self._callbacks.next_wake_ns
-        return earliest(self._messenger.next_wake_ns(), *[application.next_wake_ns() for application in timed])
+        first_ns = self._messenger.next_wake_ns()
+        for timed in self._callbacks.next_wake_ns:
+            wake_ns = timed.next_wake_ns()
+            if wake_ns is not None and (first_ns is None or wake_ns < first_ns):
+                first_ns = wake_ns
+        return first_ns
 
     # --- out ------------------------------------------------------------------------------------------------------
 
@@ -179,10 +183,11 @@ class Onboard:
 
     def settle(self, now_ns: int) -> None:
         """Hand over messages that have become whole, tell of those that were sent, and fly as was commanded."""
-        for application, message in self._messenger.arrived():
-            self._guard(application.on_message, message, now_ns)
-        for application, status in self._messenger.statuses(now_ns):
-            application.on_status(status, now_ns)
+        if self._messenger.has_news():  # most inputs bring none
+            for application, message in self._messenger.arrived():
+                self._guard(application.on_message, message, now_ns)
+            for application, status in self._messenger.statuses(now_ns):
+                application.on_status(status, now_ns)
         self.arbitration.settle(now_ns)
 
 

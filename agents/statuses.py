@@ -45,7 +45,8 @@ class Statuses:
         """The application that sent each message that is to be confirmed and is not over, by the message's handle."""
         self._watched: dict[int, _Watched] = {}
         """The packets of which the application wants to hear, by sequence number."""
-        self._waiting: deque[tuple[Application, Status]] = deque()
+        self.waiting: deque[tuple[Application, Status]] = deque()
+        """What is to be told."""
         self.counts: Counter[str] = Counter()
         """The numbers of messages in pieces, by their fates."""
 
@@ -53,7 +54,7 @@ class Statuses:
         if status.handle & CONTROL:
             self.counts[status.fate.value] += 1
         if status.fate in application.follows:
-            self._waiting.append((application, status))
+            self.waiting.append((application, status))
 
     def own(self, handle: int, application: Application) -> None:
         """Note the application that has sent a message that is to be confirmed."""
@@ -73,10 +74,6 @@ class Statuses:
         del self._watched[seq]
         self._node.watched.discard(seq)
 
-    @property
-    def pending(self) -> bool:
-        return bool(self._waiting or self._node.fates)
-
     def take(self, told: list[Told], now_ns: int) -> list[tuple[Application, Status]]:
         """The statuses to be told now; `told` is the news of the sender. Both lists of news are emptied."""
         if self._node.fates:
@@ -92,8 +89,8 @@ class Statuses:
             if last:
                 del self._owners[number]
         told.clear()
-        found = list(self._waiting)
-        self._waiting.clear()
+        found = list(self.waiting)
+        self.waiting.clear()
         return found
 
     def _packet_fate(self, seq: int, t_ns: int, reason: DropReason | None) -> None:

@@ -64,6 +64,8 @@ class PaperRule:
 
     def next_wake_ns(self) -> int | None:
         """The instant at which the next report is due."""
+        if not self._measured:
+            return None  # as for most nodes, most of the time
         return min((self._due_ns[survivor] for survivor in self._measured), default=None)
 
     def wake(self, now_ns: int) -> None:

@@ -29,6 +29,8 @@ class SlotRelease:
 
     def __init__(self, queue: TxQueue, clusters: Clusters, *, lead_ns: int) -> None:
         self._queue = queue
+        self.expire = queue.expire
+        """The queue's own method: it is asked at every wake-up."""
         self._spread = clusters.pacing == "spread"
         self._least_gap_ns = max(1, round(clusters.release_gap_ms * MS))
         self._lead_ns = lead_ns
@@ -52,9 +54,6 @@ class SlotRelease:
     def more(self, size: int) -> list[Packet]:
         """Packets that fit into what a frame released now has left [bytes]."""
         return self._queue.pop_fitting(size)
-
-    def expire(self, *, before_us: int) -> list[Packet]:
-        return self._queue.expire(before_us=before_us)
 
     def drain(self) -> list[Packet]:
         """Give up all that is queued, because it goes another way."""

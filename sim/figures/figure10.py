@@ -132,21 +132,63 @@ def _best(runs: Runs) -> list[Claim]:
 
 def _too_often(runs: Runs) -> list[Claim]:
     clusters, periods = runs.levels("clusters.count"), runs.levels("clusters.flooding_period_s")
+    intervals = list(reversed(runs.levels("traffic.interval_s")))
+    often_s, most = periods[0], clusters[-1]
+    slot_ms = often_s * 1e3 / most
 
-    def seldom_minus_often(interval_s: float) -> list[float]:
+    def seldom_minus_often(case: str, counts: Sequence[int], interval_s: float) -> dict[int, float]:
         often, seldom = (
             pooled(
                 *(
-                    _pdr(runs, "burst", count, period_s, interval_s)
-                    for count in clusters
+                    _pdr(runs, case, count, period_s, interval_s)
+                    for count in counts
                     for period_s in periods
                     if (period_s < _SELDOM_S) == wanted
                 )
             )
             for wanted in (True, False)
         )
-        return differences(seldom, often)
+        return {seed: seldom[seed] - often[seed] for seed in seldom}
 
+    few = [count for count in clusters if count < _MANY]
+    bursts = Reason(
+        "The longer the period, the more packets a head has when its slot begins, and the longer its burst: what "
+        "flooding seldom takes is given back when the same packets are spread over the same slots.",
+        [
+            above(
+                f"every {interval_s:g} s, fewer than {_MANY} clusters: PDR gained by flooding seldom, spreading minus "
+                "bursts",
+                differences(
+                    seldom_minus_often("spread", few, interval_s), seldom_minus_often("burst", few, interval_s)
+                ),
+                0.0,
+            )
+            for interval_s in intervals
+        ],
+    )
+    meet = Reason(
+        f"Without bursts it is too often: {most} slots in {often_s:g} s are {slot_ms:.3g} ms each, shorter than a "
+        "flood lasts, so that floods of heads that follow each other meet.",
+        [
+            above(
+                f"every {intervals[0]:g} s, {most} clusters, spreading: PDR with 1 s and more minus with less",
+                seldom_minus_often("spread", [most], intervals[0]),
+                0.0,
+            ),
+            above(
+                f"every {intervals[0]:g} s, {most} clusters, spreading: mean time of a packet on the air",
+                runs.per_seed(
+                    "delay_parts_ms.air",
+                    case="spread",
+                    clusters__count=most,
+                    clusters__flooding_period_s=often_s,
+                    traffic__interval_s=intervals[0],
+                ),
+                slot_ms,
+                "ms",
+            ),
+        ],
+    )
     return [
         Claim(
             10,
@@ -154,11 +196,12 @@ def _too_often(runs: Runs) -> list[Claim]:
             [
                 above(
                     f"every {interval_s:g} s: PDR with periods of 1 s and more minus with less, mean of all clusters",
-                    seldom_minus_often(interval_s),
+                    seldom_minus_often("burst", clusters, interval_s),
                     _LOW,
                 )
-                for interval_s in reversed(runs.levels("traffic.interval_s"))
+                for interval_s in intervals
             ],
+            [bursts, meet],
         )
     ]
 

@@ -9,8 +9,11 @@ from functools import partial
 from pathlib import Path
 from typing import Any
 
+from matplotlib import colormaps
 from matplotlib.axes import Axes
 from matplotlib.collections import LineCollection
+from matplotlib.colors import ListedColormap
+from matplotlib.ticker import MaxNLocator
 
 from agents.applications.traffic import targets_of
 from fanet_mw import trace
@@ -19,13 +22,15 @@ from fanet_mw.scenario import config
 from fanet_mw.scenario.model import Scenario
 from fanet_mw.trace import Approaching, Arrived, BoundStated, Delivered, Detected, Generated, LetOut, RoleChanged
 from fanet_mw.units import MS, S
-from sim.figures.style import SERIES, applied, canvas, save
+from sim.figures.style import SERIES, applied, canvas, legend_above, save
 from sim.report.html import Block, Commands, Heading, Picture, Rows, Text
 from sim.report.names import KINDS, PICTURES
 from sim.world.mobility.layout import positions
 
 _WINDOWS = 40
 """Steps of the delivery ratio over time."""
+_SHARES = ListedColormap([colormaps["viridis"](step / 255) for step in range(200)])
+"""From dark violet for links that lose all to green: the yellow end of the map would be lost on white."""
 _BLUE, _RED, _GREEN, _PINK, _ORANGE = (look.color for look in SERIES)
 
 
@@ -105,6 +110,7 @@ def blocks_of_run(folder: Path, out: Path) -> list[Block]:
         with applied():
             figure = draw()
             if figure is not None:
+                blocks.append(Heading(kind.capitalize(), 3))
                 save(figure, pictures, f"{name}-{kind}")
                 blocks.append(Picture(pictures / f"{name}-{kind}.png", caption))
     if summary["mode"] == "realtime":
@@ -166,8 +172,9 @@ def _delays(story: _Story) -> Any:  # noqa: ANN401 a matplotlib figure, or None
         _steps(axes, bounds, len(story.sent), "bound stated by the origin", _RED, "--")
     axes.set_xlabel("end-to-end delay [ms]")
     axes.set_ylabel("share of packets x targets")
+    axes.set_xlim(left=0)
     axes.set_ylim(0, 1.05)
-    axes.legend(loc="lower left", bbox_to_anchor=(0, 1.0), ncols=2)
+    legend_above(figure, axes)
     return figure
 
 
@@ -194,6 +201,7 @@ def _delivery(story: _Story) -> Any:  # noqa: ANN401
     nodes = sorted(of_node)
     per_node.bar(nodes, [of_node[node][0] / of_node[node][1] for node in nodes], color=_BLUE)
     per_node.set_xlabel("receiver (node id)")
+    per_node.xaxis.set_major_locator(MaxNLocator(integer=True))
     for axes in (over_time, per_node):
         axes.set_ylabel("packet delivery ratio")
         axes.set_ylim(0, 1.05)
@@ -203,12 +211,14 @@ def _delivery(story: _Story) -> Any:  # noqa: ANN401
 def _map(story: _Story, links: Sequence[Mapping[str, Any]]) -> Any:  # noqa: ANN401
     if not links:
         return None
-    figure, (axes,) = canvas(1, width=6.5, height=4.6)
     places = positions(story.scenario)
+    width_m, height_m = (max(at[axis] for at in places) - min(at[axis] for at in places) for axis in (0, 1))
+    shape = min(1.0, max(0.35, height_m / width_m if width_m else 1.0))
+    figure, (axes,) = canvas(1, width=6.5, height=1.4 + 4.4 * shape)
     known = [link for link in links if link["copies"]]
     ends = [[places[link[end] - 1][:2] for end in ("src", "dst")] for link in known]
     shares = [link["received"] / link["copies"] for link in known]
-    lines = LineCollection(ends, cmap="viridis", linewidths=1.1, alpha=0.8)
+    lines = LineCollection(ends, cmap=_SHARES, linewidths=1.3)
     lines.set_array(shares)
     lines.set_clim(0, 1)
     axes.add_collection(lines)
@@ -221,8 +231,8 @@ def _map(story: _Story, links: Sequence[Mapping[str, Any]]) -> Any:  # noqa: ANN
     axes.set_aspect("equal")
     axes.set_xlabel("east [m]")
     axes.set_ylabel("north [m]")
-    axes.legend(loc="upper left", bbox_to_anchor=(0, 1.14), ncols=2)
-    figure.colorbar(lines, ax=axes, shrink=0.8, label="copies received / copies in range")
+    legend_above(figure, axes)
+    figure.colorbar(lines, ax=axes, fraction=0.05, label="copies received / copies in range")
     return figure
 
 
@@ -235,6 +245,7 @@ def _slots(story: _Story) -> Any:  # noqa: ANN401
                  color=_BLUE, alpha=0.5, linewidths=0)  # fmt: skip
     axes.set_xlabel(f"place in the flooding period of {period_ns / MS:g} ms [ms]")
     axes.set_ylabel("origin (node id)")
+    axes.yaxis.set_major_locator(MaxNLocator(integer=True))
     axes.set_xlim(0, period_ns / MS)
     return figure
 
@@ -254,6 +265,9 @@ def _mission(story: _Story) -> Any:  # noqa: ANN401
         axes.plot(times, range(1, len(times) + 1), color=color, marker=marker, markersize=3, label=label,
                   drawstyle="steps-post")  # fmt: skip
     axes.set_xlabel("time [s]")
+    axes.set_xlim(0, story.scenario.duration_s)
     axes.set_ylabel("UAVs that have done so")
-    axes.legend(loc="best")
+    axes.set_ylim(bottom=0)
+    axes.yaxis.set_major_locator(MaxNLocator(integer=True))
+    legend_above(figure, axes)
     return figure

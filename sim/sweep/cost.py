@@ -11,19 +11,25 @@ from typing import Final
 from agents.applications.traffic import sources_of
 from fanet_mw.scenario.model import Scenario
 
-_START_S: Final = 0.3
+_START_S: Final = 0.05
 """Setting up and summing up."""
 _START_UP_S: Final = 3.0
 """In real time: until the processes begin to start, and from their end to the summary."""
 _PER_PROCESS_S: Final = 0.1
 """In real time: start and end of one process."""
-_PER_NODE_S: Final = 1.5e-3
-"""CPU seconds per node and simulated second: hellos, fixes, timers."""
+_PER_HELLO_S: Final = 0.25e-3
+"""CPU seconds per hello, with what neighbors do about it."""
+_PER_FLIGHT_S: Final = 0.6e-3
+"""CPU seconds per node that flies, and simulated second: guidance, fixes, links."""
+_PER_SEARCHER_S: Final = 3.3e-3
+"""The same for a node of a planned search."""
 _PER_BODY_S: Final = 3e-3
 """The same for a body of the physics engine."""
-_PER_FRAME_S: Final = 40e-6
+_PER_FRAME_S: Final = 30e-6
 """CPU seconds per frame on the air, with its copies at some eight receivers."""
-_PER_TURN_S: Final = 250e-6
+_PER_HEADS_FRAME_S: Final = 60e-6
+"""The same where heads queue packets for their slots."""
+_PER_TURN_S: Final = 85e-6
 """CPU seconds per packet and node in a timetable: turns, room and bounds are computed for each."""
 _MOST_FRAMES: Final = 80
 """Frames per node and second when the channel is full: 11 Mb/s, shared by some nine in reach."""
@@ -31,18 +37,32 @@ _MOST_FRAMES: Final = 80
 
 def guess_s(scenario: Scenario) -> float:
     """CPU seconds that one run will take on a present core."""
-    count, traffic = scenario.nodes.count, scenario.traffic
-    saturated = traffic.arrivals == "saturated"
-    packets = math.inf if saturated else len(sources_of(scenario)) / traffic.interval_s
-    relays = count if traffic.destination == "all" and scenario.routing.protocol != "direct" else 5
-    frames = min(packets * relays, _MOST_FRAMES * count)
+    count, clustered = scenario.nodes.count, scenario.routing.protocol == "clustered"
+    by_timetable = clustered and scenario.clusters.relay == "scheduled"
+    classes = scenario.traffic_classes
+    packets = math.fsum(_packets(scenario, name) for name in classes)
+    to_all = any(traffic.destination == "all" for traffic in classes.values())
+    everyone = to_all and scenario.routing.protocol != "direct"
+    frames = min(packets * (count if everyone else 5), _MOST_FRAMES * count)
     start_ns, end_ns = scenario.traffic_window_ns
-    work_s = frames * _PER_FRAME_S
-    if scenario.routing.protocol == "clustered" and scenario.clusters.relay == "scheduled":
+    work_s = frames * (_PER_HEADS_FRAME_S if clustered and not by_timetable else _PER_FRAME_S)
+    if by_timetable:
         work_s += min(packets, _MOST_FRAMES * 10) * count * _PER_TURN_S
-    bodies = _PER_BODY_S * count if scenario.world.engine == "pybullet" else 0.0
-    idle = _START_S + scenario.duration_s * (_PER_NODE_S * count + bodies)
+    hello_s = scenario.routing.hello_interval_s
+    per_node = _PER_HELLO_S / hello_s if hello_s else 0.0
+    per_node += _PER_FLIGHT_S if scenario.mobility.model != "static" else 0.0
+    per_node += _PER_SEARCHER_S if scenario.mission.search != "none" else 0.0
+    per_node += _PER_BODY_S if scenario.world.engine == "pybullet" else 0.0
+    idle = _START_S + scenario.duration_s * per_node * count
     return idle + (end_ns - start_ns) / 1e9 * work_s
+
+
+def _packets(scenario: Scenario, name: str) -> float:
+    """Packets of a class per second."""
+    traffic = scenario.traffic_classes[name]
+    if traffic.arrivals == "saturated":
+        return math.inf
+    return len(sources_of(scenario, name)) / traffic.interval_s
 
 
 def launch_s(scenario: Scenario) -> float:

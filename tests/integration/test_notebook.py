@@ -10,7 +10,6 @@ from nbclient import NotebookClient
 EXAMPLE = Path(__file__).parents[2] / "examples" / "sweep"
 
 
-@pytest.mark.slow
 @pytest.mark.filterwarnings("ignore")  # of the kernel's own machinery
 def test_the_example_notebook_runs_from_start_to_end(tmp_path: Path) -> None:
     for name in ("relays.toml", "relays.ipynb"):

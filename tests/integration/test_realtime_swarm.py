@@ -85,6 +85,25 @@ def test_turns_announced_ahead_are_kept_by_real_processes(relay: str) -> None:
     assert summary["bound"].get("violations", 0) == 0
 
 
+@pytest.mark.slow
+def test_links_are_measured_and_a_timetable_made_of_them_by_real_processes() -> None:
+    """Hellos are counted, told in joins, put together by the leader and announced; what each process then states holds
+    wherever the machine was on time, which the verdict says.
+    """
+    keys = ["nodes.count=6", "nodes.layout=grid", "nodes.columns=3", "clusters.count=5", "traffic.sources=5"]
+    lossy = ["radio.channel=log_distance", "radio.fading=rician", "routing.hello_interval_s=0.4", "radio.lead_ms=100"]
+    times = ["duration_s=25", "warmup_s=17", "drain_s=5", "traffic.payload_bytes=200", "seed=3"]
+    outcome, _ = run(catalog.find("clusters", [*keys, *lossy, *times]))
+    summary = finish(outcome, out=None)
+    stated_ms = {name: report["likely_ms"] for name, report in outcome.reports.items() if name.startswith("agent-")}
+    assert sorted(name for name, ms in stated_ms.items() if ms is not None) == [f"agent-{n}" for n in range(2, 7)]
+    assert summary["bound"] == {}, "no bound is stated where frames are lost"
+    assert summary["frames"]["closes"]
+    assert summary["pdr"] > 0.5
+    assert summary["likely"]["stated_share"] > 0.5
+    assert not summary["valid"] or summary["likely"]["within_share"] >= summary["likely"]["share"]
+
+
 def test_a_swarm_of_processes_delivers_and_accounts_for_every_frame(tmp_path: Path) -> None:
     outcome, _ = run(scenario())
     summary = finish(outcome, out=tmp_path / "out")

@@ -37,7 +37,7 @@ clock.
 3. Subscribe to what you hear, then declare the liveliness token `alive/<name>`. Processes of fanet-mw declare
    `alive/<name>/<fingerprint>/<instance>` instead: the router names those that are missing, there twice, or of
    another scenario.
-4. Ask `clock` every half second until the answer is a `Clock` in state RUNNING; puts on `clock` are only hints to ask
+4. Ask `clock` every half second until a `ClockEpoch` in state RUNNING is the answer; puts there are only hints to ask
    again. Swarm instant = (unix time - `epoch_unix_ns`) x `time_scale`; on the machine of the keeper (`machine` says
    which) monotonic time and `epoch_mono_ns` are better.
 5. When the clock is STOPPED or the scenario's duration is over, send a last report and leave.

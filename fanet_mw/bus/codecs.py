@@ -16,7 +16,7 @@ from fanet_mw.bus.messages import (
     Altimeter,
     Battery,
     Camera,
-    Clock,
+    ClockEpoch,
     ClockState,
     Gps,
     Inertial,
@@ -136,15 +136,15 @@ def _decode_trace(body: bytes) -> TraceBatch:
     return TraceBatch(tuple(trace.parse(text) for text in body.decode().splitlines()))
 
 
-def _encode_clock(m: Clock) -> bytes:
+def _encode_clock(m: ClockEpoch) -> bytes:
     return _CLOCK.pack(m.epoch_unix_ns, m.time_scale, m.state, m.epoch_mono_ns, m.machine)
 
 
-def _decode_clock(body: bytes) -> Clock:
+def _decode_clock(body: bytes) -> ClockEpoch:
     epoch_unix_ns, time_scale, state, epoch_mono_ns, machine = _CLOCK.unpack(body)
     if not 0 < time_scale <= 100:
         raise ValueError("time_scale")
-    return Clock(epoch_unix_ns, time_scale, ClockState(state), epoch_mono_ns, machine)
+    return ClockEpoch(epoch_unix_ns, time_scale, ClockState(state), epoch_mono_ns, machine)
 
 
 def _encode_report(m: Report) -> bytes:
@@ -221,7 +221,7 @@ _CODECS: Final[dict[int, tuple[type[Any], Callable[[Any], bytes], Callable[[byte
     7: (WifiScan, sensor_codecs.encode_scan, sensor_codecs.decode_scan),
     8: (MavlinkTap, _encode_tap, _decode_tap),
     9: (TraceBatch, _encode_trace, _decode_trace),
-    10: (Clock, _encode_clock, _decode_clock),
+    10: (ClockEpoch, _encode_clock, _decode_clock),
     11: (Report, _encode_report, _decode_report),
     12: (Degrade, _encode_degrade, _decode_degrade),
     13: (Jam, _encode_jam, _decode_jam),
@@ -238,7 +238,7 @@ _CODECS: Final[dict[int, tuple[type[Any], Callable[[Any], bytes], Callable[[byte
 }
 HEADS: Final[dict[type[Any], tuple[struct.Struct, ...]]] = {
     TxRequest: (_TX,), Reception: (_RX,), TxStatus: (_STATUS,), Poses: (_POSES,), Setpoint: (_SETPOINT,),
-    MavlinkTap: (_INSTANT,), TraceBatch: (), Clock: (_CLOCK,), Report: (_INSTANT,), Degrade: (_DEGRADE,),
+    MavlinkTap: (_INSTANT,), TraceBatch: (), ClockEpoch: (_CLOCK,), Report: (_INSTANT,), Degrade: (_DEGRADE,),
     Jam: (_JAM,), Cut: (_CUT,), Restore: (), LinkStats: (_LINKS,), Obstructions: (_OBSTRUCTIONS,),
     **sensor_codecs.HEADS,
 }  # fmt: skip

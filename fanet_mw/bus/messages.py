@@ -231,7 +231,7 @@ class ClockState(IntEnum):
     STOPPED = 2
 
 
-class Clock(NamedTuple):
+class ClockEpoch(NamedTuple):
     """The keeper of the swarm clock -> every host: swarm instant = (clock - epoch) x scale."""
 
     epoch_unix_ns: int
@@ -266,7 +266,7 @@ Message = (
     | SensorReading
     | MavlinkTap
     | TraceBatch
-    | Clock
+    | ClockEpoch
     | Report
     | Degrade
     | Jam

@@ -13,7 +13,7 @@ from collections.abc import Iterable
 from typing import Final
 
 from fanet_mw.bus import codecs
-from fanet_mw.bus.messages import Clock, ClockState
+from fanet_mw.bus.messages import ClockEpoch, ClockState
 from fanet_mw.bus.topics import Topics
 from fanet_mw.errors import BusError, MalformedFrameError
 from fanet_mw.hosts.bus import Bus, HostBus
@@ -35,7 +35,7 @@ START_PATIENCE_S: Final = 3600.0
 class SwarmClock:
     """The swarm instant as this process reads it."""
 
-    def __init__(self, clock: Clock, timebase: Timebase = THIS_MACHINE) -> None:
+    def __init__(self, clock: ClockEpoch, timebase: Timebase = THIS_MACHINE) -> None:
         self.epoch_unix_ns = clock.epoch_unix_ns
         """The unix time of swarm instant 0."""
         self._mono_ns = timebase.mono_ns
@@ -78,7 +78,7 @@ class ClockKeeper:
         self._all_there = asyncio.Event()
         if self.presence.complete():
             self._all_there.set()
-        self.clock: Clock | None = None
+        self.clock: ClockEpoch | None = None
         loop = asyncio.get_running_loop()
         bus.answer(names.clock, self._current)
         if scenario is not None:
@@ -105,7 +105,7 @@ class ClockKeeper:
         """The participants that are not present yet."""
         return self.presence.missing()
 
-    async def start(self, *, timeout_s: float) -> Clock:
+    async def start(self, *, timeout_s: float) -> ClockEpoch:
         """Wait for all participants, then start; raises BusError naming those that did not come."""
         try:
             await asyncio.wait_for(self._all_there.wait(), timeout_s)
@@ -114,16 +114,16 @@ class ClockKeeper:
             raise BusError(f"{len(names)} of the swarm did not come up within {timeout_s:g} s: {why}") from None
         unix_ns = self._timebase.unix_ns() + _START_DELAY_NS
         mono_ns = self._timebase.mono_ns() + _START_DELAY_NS
-        self._publish(Clock(unix_ns, self._time_scale, ClockState.RUNNING, mono_ns, self._timebase.machine))
+        self._publish(ClockEpoch(unix_ns, self._time_scale, ClockState.RUNNING, mono_ns, self._timebase.machine))
         assert self.clock is not None, "just published"
         return self.clock
 
     def stop(self) -> None:
         """Stop the clock, so that every process ends at once."""
-        clock = self.clock or Clock(0, self._time_scale, ClockState.STOPPED)
+        clock = self.clock or ClockEpoch(0, self._time_scale, ClockState.STOPPED)
         self._publish(clock._replace(state=ClockState.STOPPED))
 
-    def _publish(self, clock: Clock) -> None:
+    def _publish(self, clock: ClockEpoch) -> None:
         self.clock = clock
         self._bus.put(self._names.clock, codecs.encode([clock]), reliable=True)
 
@@ -141,7 +141,7 @@ class ClockListener:
         self._bus = bus
         self._names = names
         self._loop = asyncio.get_running_loop()
-        self._running: asyncio.Future[Clock] = self._loop.create_future()
+        self._running: asyncio.Future[ClockEpoch] = self._loop.create_future()
         self.stopped = asyncio.Event()
         self._asked_s = -math.inf
         self._asks_again: asyncio.TimerHandle | None = None
@@ -177,7 +177,7 @@ class ClockListener:
         except MalformedFrameError:
             return
         for message in messages:
-            if isinstance(message, Clock):
+            if isinstance(message, ClockEpoch):
                 if message.state is ClockState.STOPPED:
                     self.stopped.set()
                 if not self._running.done():

@@ -11,7 +11,7 @@ from pathlib import Path
 from typing import Protocol
 
 from fanet_mw.bus import codecs
-from fanet_mw.bus.messages import Clock, ClockState, Message, Reception, TxRequest, TxStatus
+from fanet_mw.bus.messages import ClockEpoch, ClockState, Message, Reception, TxRequest, TxStatus
 from fanet_mw.bus.topics import Topics
 from fanet_mw.hosts.bus import Bus, OnSample
 from fanet_mw.units import NodeId
@@ -32,7 +32,7 @@ class FieldBus:
         self._clock_topic = names.clock
         self._report_topic = names.report(f"agent-{node}")
         self._inner = inner
-        self._clock = None if epoch_unix_ns is None else Clock(epoch_unix_ns, 1.0, ClockState.RUNNING)
+        self._clock = None if epoch_unix_ns is None else ClockEpoch(epoch_unix_ns, 1.0, ClockState.RUNNING)
         self._on_rx: OnSample | None = None
         self._radio: RadioPort | None = None
         self.reports: list[bytes] = []

@@ -24,7 +24,7 @@ from sim.results.links import LinkTotals
 from sim.run.outcome import Outcome
 from sim.world.environment.map_on_board import map_on_board
 from sim.world.mobility.layout import positions
-from sim.world.world import World
+from sim.world.world import WorldActor
 
 EPOCH_UNIX_NS: Final = 1_735_689_600 * S
 """2025-01-01T00:00:00Z, the instant of swarm instant 0 in logs that want unix time. It is not the time of the run, so
@@ -56,7 +56,7 @@ def actors_of(
         )
         for n in scenario.node_ids
     ]
-    return [World(scenario, swarm), Medium(scenario, swarm, capture=capture), *uavs]
+    return [WorldActor(scenario, swarm), Medium(scenario, swarm, capture=capture), *uavs]
 
 
 def simulate(

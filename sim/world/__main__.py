@@ -3,13 +3,13 @@
 from fanet_mw.hosts import interrupts, service
 from fanet_mw.hosts.realtime import SwarmAddress
 from fanet_mw.scenario import Scenario
-from sim.world.flight_recorder import Flight
-from sim.world.world import World
+from sim.world.flight_recorder import SwarmFlight
+from sim.world.world import WorldActor
 
 
-def run(scenario: Scenario, address: SwarmAddress, *, flight: Flight | None = None) -> int:
+def run(scenario: Scenario, address: SwarmAddress, *, flight: SwarmFlight | None = None) -> int:
     """Run the world against a router until the scenario is over, on from `flight` if given; raises BusError."""
-    service.live(World(scenario, address.swarm, flight=flight), scenario, address)
+    service.live(WorldActor(scenario, address.swarm, flight=flight), scenario, address)
     return 0
 
 

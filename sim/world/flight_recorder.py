@@ -22,7 +22,7 @@ _FARTHEST: Final = 1e6
 """Magnitude of a coordinate [m] or a velocity [m/s] that a swarm may have."""
 
 
-class Flight(NamedTuple):
+class SwarmFlight(NamedTuple):
     """The state of all bodies, in the order of their ids, and where they were sent."""
 
     positions: Rows
@@ -52,7 +52,7 @@ class FlightRecorder:
             with self._lock:
                 self._setpoints[node] = payload
 
-    def last(self) -> Flight | None:
+    def last(self) -> SwarmFlight | None:
         """The flight as last heard; None before the first poses, and when they are none of this swarm's."""
         with self._lock:
             poses, setpoints = self._poses, dict(self._setpoints)
@@ -70,7 +70,7 @@ class FlightRecorder:
                     and np.isfinite([*message.position, message.speed_m_s, *message.velocity]).all()
                 ):
                     sent[node] = message
-        return Flight(states[:, :3].copy(), states[:, 3:].copy(), sent)
+        return SwarmFlight(states[:, :3].copy(), states[:, 3:].copy(), sent)
 
 
 def _decoded(payload: bytes) -> list[Message]:

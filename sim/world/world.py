@@ -27,7 +27,7 @@ from sim.world.environment.obstacles import Obstacles, obstacles
 from sim.world.environment.solids import Solids
 from sim.world.environment.survivors import Survivors
 from sim.world.environment.wind import Wind
-from sim.world.flight_recorder import Flight
+from sim.world.flight_recorder import SwarmFlight
 from sim.world.incidents.incidents import Incidents
 from sim.world.mobility.guidance import Guidance
 from sim.world.mobility.layout import positions
@@ -71,10 +71,10 @@ def _sight(scenario: Scenario, engine: Engine, solid: Obstacles) -> "Sight":
     return Sight(scenario, engine, top_m=solid.top_m)
 
 
-class World(Actor):
+class WorldActor(Actor):
     """Bodies, survivors and sensors of one swarm."""
 
-    def __init__(self, scenario: Scenario, swarm: str, *, flight: Flight | None = None) -> None:
+    def __init__(self, scenario: Scenario, swarm: str, *, flight: SwarmFlight | None = None) -> None:
         """`flight`: how the swarm was flying when the world before this one ended; None: it starts."""
         topics = Topics(swarm)
         super().__init__("world", (topics.all_setpoints,))

@@ -25,7 +25,7 @@ from sim.results.packets import packets_of
 from sim.run.outcome import Outcome
 from sim.scenarios import catalog
 from sim.world.mobility.layout import positions
-from sim.world.world import World
+from sim.world.world import WorldActor
 
 _SEEDS: Final = (1,)
 _RARELY: Final = ("traffic.interval_s=4",)
@@ -104,7 +104,7 @@ def flown(case: Case, *, seed: int) -> Outcome:
     ]
     records: list[Record] = []
     host = VirtualHost(
-        [World(scenario, scenario.name), Medium(scenario, scenario.name), *uavs], on_records=records.extend
+        [WorldActor(scenario, scenario.name), Medium(scenario, scenario.name), *uavs], on_records=records.extend
     )
     host.start()
     host.run(scenario.duration_ns)

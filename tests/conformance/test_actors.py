@@ -33,7 +33,7 @@ from fanet_mw.trace import Generated
 from fanet_mw.units import MS, Enu, NodeId, S
 from fanet_mw.wire.inner import Join, Member, Schedule, Survivor, TimeBeacon
 from sim.scenarios import catalog
-from sim.world.world import World
+from sim.world.world import WorldActor
 
 NAMES = Topics("contract")
 SCENARIO = catalog.find("quick", ["world.engine=kinematic"])
@@ -51,7 +51,7 @@ MAKERS: list[Callable[[Scenario], Actor]] = [
     lambda scenario: ClockedUav(clocked(scenario, "beacons"), NodeId(1), "contract", position=Enu(0, 0, 50)),
     lambda scenario: ClockedUav(clocked(scenario, "gps"), NodeId(1), "contract", position=Enu(0, 0, 50)),
     lambda scenario: Medium(scenario, "contract"),
-    lambda scenario: World(scenario, "contract"),
+    lambda scenario: WorldActor(scenario, "contract"),
 ]
 
 anything = st.floats(allow_nan=True, allow_infinity=True)

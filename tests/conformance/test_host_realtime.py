@@ -18,7 +18,7 @@ from hypothesis import strategies as st
 
 from fanet_mw.actor import Actor
 from fanet_mw.bus import codecs
-from fanet_mw.bus.messages import Clock, ClockState, MavlinkTap, Message, Reception, Report, TraceBatch
+from fanet_mw.bus.messages import ClockEpoch, ClockState, MavlinkTap, Message, Reception, Report, TraceBatch
 from fanet_mw.bus.topics import Topics
 from fanet_mw.errors import BusError
 from fanet_mw.hosts.bus import Bus
@@ -315,9 +315,9 @@ class Machine:
     def step(self, seconds: float) -> None:
         self.unix_ns += round(seconds * S)
 
-    def clock(self) -> Clock:
+    def clock(self) -> ClockEpoch:
         """What a keeper on this machine publishes when swarm instant 0 is now."""
-        return Clock(self.unix_ns, 1.0, ClockState.RUNNING, self.mono_ns, self.timebase.machine)
+        return ClockEpoch(self.unix_ns, 1.0, ClockState.RUNNING, self.mono_ns, self.timebase.machine)
 
 
 STEPS = pytest.mark.parametrize("step_s", [-3600.0, -10.0, 10.0, 3600.0])

@@ -19,7 +19,7 @@ from fanet_mw.radios.datagram import Datagram, DatagramKind
 from fanet_mw.radios.udp import MOST_ADDRESSES, MOVED_NS, UdpRadio
 from fanet_mw.scenario import config
 from fanet_mw.units import BROADCAST, MS, NodeId
-from sim.world.world import World
+from sim.world.world import WorldActor
 
 NODES = (NodeId(1), NodeId(2), NodeId(3))
 UNTIL_NS = 700 * MS
@@ -61,7 +61,7 @@ def emulated(requests: Requests) -> Heard:
         if isinstance(message, Reception | TxStatus):
             heard[node_of(topic)].append(message)
 
-    actors = [World(SCENARIO, "radios"), Medium(SCENARIO, "radios"), Asker(requests)]
+    actors = [WorldActor(SCENARIO, "radios"), Medium(SCENARIO, "radios"), Asker(requests)]
     host = VirtualHost(actors, listeners=[(names.radio_rx("*"), note)])
     host.start()
     host.run(UNTIL_NS)

@@ -18,7 +18,7 @@ from fanet_mw.bus.messages import (
     Battery,
     Call,
     Camera,
-    Clock,
+    ClockEpoch,
     ClockState,
     Echo,
     Inertial,
@@ -168,7 +168,7 @@ def _not_recorded() -> list[bytes]:
 
 
 _BY_HAND: Final[tuple[Message, ...]] = (
-    Clock(1_735_689_600 * S, 1.0, ClockState.RUNNING, 5 * S, 77),
+    ClockEpoch(1_735_689_600 * S, 1.0, ClockState.RUNNING, 5 * S, 77),
     Obstructions(S, array("H", [1, 2, 3, 4])),
     Degrade("link", NodeId(1), NodeId(2), both=True, loss_db=10.0, loss_share=0.5, for_ns=S),
     Jam("jam", Enu(1.0, 2.0, 3.0), 100.0, -60.0, for_ns=S),

@@ -13,7 +13,7 @@ import pytest
 from emulator.medium import Medium
 from fanet_mw.bus import codecs
 from fanet_mw.bus.messages import (
-    Clock,
+    ClockEpoch,
     ClockState,
     MavlinkTap,
     Message,
@@ -96,7 +96,7 @@ class Fuzz:
         if kind == 3:
             return TraceBatch((ProcessEnded(1, 2, "x", 3),))
         if kind == 4:
-            return Clock(0, 1.0, ClockState.STOPPED)
+            return ClockEpoch(0, 1.0, ClockState.STOPPED)
         scale = rng.choice((0.0, 100.0, 300.0, 1e6, 1e7, 1e9, 1e300, float("inf"), float("nan")))
         ids = array("H", [rng.randrange(0, 12) if rng.random() < 0.02 else i for i in range(1, 10)])
         return Poses(self.now_ns, ids, array("d", [scale * rng.uniform(-1, 1) for _ in range(54)]))

@@ -15,7 +15,7 @@ from fanet_mw.hosts.virtual import VirtualHost
 from fanet_mw.scenario import Scenario
 from fanet_mw.units import BROADCAST, NodeId, S
 from sim.world.mobility.layout import positions
-from sim.world.world import World
+from sim.world.world import WorldActor
 
 MakeScenario = Callable[..., Scenario]
 COUNT: Final = 12
@@ -97,7 +97,7 @@ def run(scenario: Scenario, given: dict[int, list[Letter]]) -> tuple[dict[int, C
         Uav(scenario, NodeId(node), "m", position=places[node - 1], applications=[mails[node]])
         for node in scenario.node_ids
     ]
-    host = VirtualHost([World(scenario, "m"), Medium(scenario, "m"), *uavs])
+    host = VirtualHost([WorldActor(scenario, "m"), Medium(scenario, "m"), *uavs])
     host.start()
     most_bytes = 0
     for second in range(1, int(scenario.duration_s) + 1):

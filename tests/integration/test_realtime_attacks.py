@@ -10,7 +10,7 @@ import air_attacks
 from realtime_attacks import attacked_in_real_time
 
 from fanet_mw.bus import codecs
-from fanet_mw.bus.messages import Clock, ClockState, MavlinkTap, Message, Report, TraceBatch
+from fanet_mw.bus.messages import ClockEpoch, ClockState, MavlinkTap, Message, Report, TraceBatch
 from fanet_mw.bus.topics import Topics
 from fanet_mw.hosts.bus import MAX_PUT_BYTES, Bus
 from fanet_mw.trace import Approaching, Delivered, Generated
@@ -29,7 +29,7 @@ SMALL = [
 
 
 FORGED_CLOCKS: list[tuple[str, list[Message]]] = [
-    (NAMES.clock, [Clock(0, 1.0, ClockState.STOPPED), Clock(5, 50.0, ClockState.RUNNING)]),
+    (NAMES.clock, [ClockEpoch(0, 1.0, ClockState.STOPPED), ClockEpoch(5, 50.0, ClockState.RUNNING)]),
 ]
 NONSENSE: list[tuple[str, list[Message]]] = [
     (NAMES.report("agent-3"), [Report("agent-3", S, '{"kind": "agent", "node": 3}')]),

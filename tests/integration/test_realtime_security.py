@@ -14,7 +14,7 @@ import pytest
 
 from fanet_mw.bus import codecs
 from fanet_mw.bus.messages import (
-    Clock,
+    ClockEpoch,
     ClockState,
     Gps,
     MavlinkTap,
@@ -86,7 +86,7 @@ OURS: dict[str, Message] = {
 }
 """What agent 1 may put."""
 NOT_OURS: dict[str, Message] = {
-    NAMES.clock: Clock(0, 1.0, ClockState.STOPPED),
+    NAMES.clock: ClockEpoch(0, 1.0, ClockState.STOPPED),
     NAMES.radio_control: Jam("jam", Enu(0, 0, 0), 100.0, -50.0),
     NAMES.pose: Poses(S, array("H"), array("d")),
     NAMES.obstruction: Setpoint(S, Enu(1, 2, 3), 5.0),
@@ -166,7 +166,7 @@ def test_who_has_no_key_of_this_swarm_is_not_let_in(keys: Path, tmp_path: Path) 
 
 
 async def test_an_agent_cannot_answer_for_the_keeper_of_the_clock(keys: Path) -> None:
-    forged = Clock(123, 2.0, ClockState.STOPPED)
+    forged = ClockEpoch(123, 2.0, ClockState.STOPPED)
     with sessions(keys, "agent-1", "agent-2") as bus:
         keeper = ClockKeeper(bus["router"], NAMES, time_scale=1.0, expected=())
         bus["agent-1"].answer(NAMES.clock, lambda: codecs.encode([forged]))

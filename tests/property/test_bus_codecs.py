@@ -14,7 +14,7 @@ from fanet_mw.bus.messages import (
     Battery,
     Call,
     Camera,
-    Clock,
+    ClockEpoch,
     ClockState,
     Echo,
     Gps,
@@ -88,7 +88,9 @@ messages: st.SearchStrategy[Message] = st.one_of(
     st.builds(WifiScan, instants, st.lists(st.tuples(u32, singles), max_size=5).map(tuple)),
     st.builds(MavlinkTap, instants, st.binary(max_size=50)),
     st.builds(TraceBatch, st.lists(records, max_size=5).map(tuple)),
-    st.builds(Clock, instants, st.floats(0.01, 100), st.sampled_from(ClockState), instants, st.integers(0, 2**64 - 1)),
+    st.builds(
+        ClockEpoch, instants, st.floats(0.01, 100), st.sampled_from(ClockState), instants, st.integers(0, 2**64 - 1)
+    ),
     st.builds(Degrade, words, nodes, nodes, st.booleans(), doubles, doubles, instants),
     st.builds(Jam, words, vectors, doubles, doubles, instants),
     st.builds(Cut, words, nodes, instants),

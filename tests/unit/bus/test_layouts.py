@@ -20,7 +20,7 @@ SAMPLES = [
     m.TxStatus(8, m.TxOutcome.RETRY_LIMIT, 77, 6),
     m.Setpoint(5, Enu(1, 2, 3), 4.5, m.SetpointKind.VELOCITY, Enu(6, 7, 8)),
     m.Gps(5, Enu(1, 2, 3), Enu(4, 5, 6)),
-    m.Clock(10, 2.0, m.ClockState.RUNNING, 11, 12),
+    m.ClockEpoch(10, 2.0, m.ClockState.RUNNING, 11, 12),
     m.Altimeter(1, 50.0, 40.0),
     m.Battery(1, 15.2, 8.0, 0.5),
     Degrade("link", NodeId(1), NodeId(2), both=True, loss_db=3.0, loss_share=0.25, for_ns=9),

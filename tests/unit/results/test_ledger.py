@@ -16,7 +16,7 @@ from sim.results import ledger
 from sim.run.outcome import Outcome
 from sim.run.virtual import simulate
 from sim.world.mobility.layout import positions
-from sim.world.world import World
+from sim.world.world import WorldActor
 
 Keep = Callable[[int, TxRequest], bool]
 
@@ -51,7 +51,7 @@ class LossyMedium(Medium):
 def run(scenario: Scenario, keep: Keep) -> Mapping[str, Any]:
     starts = positions(scenario)
     uavs = [make_uav(scenario, NodeId(node), "lossy", position=starts[node - 1]) for node in scenario.node_ids]
-    actors: list[Actor] = [World(scenario, "lossy"), LossyMedium(scenario, keep), *uavs]
+    actors: list[Actor] = [WorldActor(scenario, "lossy"), LossyMedium(scenario, keep), *uavs]
     host = VirtualHost(actors)
     host.start()
     host.run(scenario.duration_ns)

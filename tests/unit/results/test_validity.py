@@ -14,7 +14,7 @@ from sim.results import validity
 from sim.results.metrics import summarize
 from sim.results.report import show
 from sim.run.outcome import Outcome
-from sim.world.world import World
+from sim.world.world import WorldActor
 
 SENT = 4000
 """Requests of each of the two nodes."""
@@ -225,7 +225,7 @@ def test_a_reception_is_late_beyond_a_handover_and_a_lead(make_scenario: Any, af
 
 def test_a_world_that_was_held_up_says_how_many_ticks_nobody_got(make_scenario: Any) -> None:
     keys = {"mobility.model": "formation", "mobility.speed_m_s": 5, "world.engine": "kinematic", "world.tick_ms": 100}
-    world = World(make_scenario(**keys), "late")
+    world = WorldActor(make_scenario(**keys), "late")
     world.start(0)
     world.wake(100 * MS)
     assert world.report()["skipped_ticks"] == 0

@@ -14,8 +14,8 @@ from fanet_mw.bus.topics import Topics
 from fanet_mw.hosts.bus import OnSample
 from fanet_mw.scenario import Scenario
 from fanet_mw.units import MS, Enu, S
-from sim.world.flight_recorder import Flight, FlightRecorder
-from sim.world.world import World
+from sim.world.flight_recorder import FlightRecorder, SwarmFlight
+from sim.world.world import WorldActor
 
 NAMES = Topics("flight")
 TICK_NS = 100 * MS
@@ -45,7 +45,7 @@ def scenario(request: pytest.FixtureRequest, make_scenario: Any) -> Scenario:
     return scenario
 
 
-def fly(world: World, ear: Ear, *, from_ns: int, until_ns: int) -> list[np.ndarray]:
+def fly(world: WorldActor, ear: Ear, *, from_ns: int, until_ns: int) -> list[np.ndarray]:
     """Let a world run; returns the positions of every tick."""
     flown = []
     world.start(from_ns)
@@ -65,18 +65,18 @@ def fly(world: World, ear: Ear, *, from_ns: int, until_ns: int) -> list[np.ndarr
 
 def test_a_world_that_starts_again_goes_on_where_it_was_and_to_where_its_uavs_were_sent(scenario: Scenario) -> None:
     ear, sent = Ear(scenario), Setpoint(10 * S, Enu(-60.0, 90.0, 55.0), 6.0)
-    first = World(scenario, "flight")
+    first = WorldActor(scenario, "flight")
     first.receive(NAMES.setpoint(3), sent, 0)
     ear.say(NAMES.setpoint(3), sent)
     before = fly(first, ear, from_ns=0, until_ns=20 * S)
     assert np.linalg.norm(before[-1] - before[0], axis=1).min() > 50, "far from where they started"
 
-    second = World(scenario, "flight", flight=ear.recorder.last())
+    second = WorldActor(scenario, "flight", flight=ear.recorder.last())
     after = fly(second, ear, from_ns=22 * S, until_ns=60 * S)
     assert np.linalg.norm(after[0] - before[-1], axis=1).max() < 1
     steps = [np.linalg.norm(b - a, axis=1).max() for a, b in pairwise(after)]
     assert max(steps) < 20 * TICK_NS / S, "nobody jumps; 14 m/s is the most that is flown to catch up"
-    untouched = fly(World(scenario, "flight"), Ear(scenario), from_ns=0, until_ns=60 * S)
+    untouched = fly(WorldActor(scenario, "flight"), Ear(scenario), from_ns=0, until_ns=60 * S)
     assert np.linalg.norm(after[-1][:2] - untouched[-1][:2], axis=1).max() < 3, "back on the formation's track"
     assert np.linalg.norm(after[-1][2] - np.array(sent.position)) < 3, "where it was sent before the world ended"
 
@@ -110,5 +110,5 @@ def test_setpoints_that_make_no_sense_are_left_out(make_scenario: Any) -> None:
     ear.say(NAMES.setpoint(77), Setpoint(0, Enu(1, 2, 3), 4.0))
     ear.say_bytes(NAMES.setpoint(4), b"garbage")
     flight = ear.recorder.last()
-    assert isinstance(flight, Flight)
+    assert isinstance(flight, SwarmFlight)
     assert list(flight.setpoints) == [2]

@@ -12,20 +12,20 @@ from fanet_mw.bus.topics import Topics
 from fanet_mw.scenario import Scenario
 from fanet_mw.trace import Collided
 from fanet_mw.units import MS, Enu, S
-from sim.world.world import World
+from sim.world.world import WorldActor
 
 NAMES = Topics("w")
 MakeScenario = Callable[..., Scenario]
 
 
-def world(make_scenario: MakeScenario, **keys: Any) -> World:
+def world(make_scenario: MakeScenario, **keys: Any) -> WorldActor:
     given = {"nodes.count": 4, "world.engine": "kinematic", "nodes.telemetry_hz": 1, "nodes.spacing_m": 100}
-    made = World(make_scenario(**given | keys), "w")
+    made = WorldActor(make_scenario(**given | keys), "w")
     made.start(0)
     return made
 
 
-def advance(made: World, until_ns: int) -> list[tuple[int, str, Any]]:
+def advance(made: WorldActor, until_ns: int) -> list[tuple[int, str, Any]]:
     """(instant, topic, message) of what it says, woken just when it asks to be."""
     found = [(0, topic, message) for topic, message in made.outbox]
     made.outbox.clear()
@@ -36,7 +36,7 @@ def advance(made: World, until_ns: int) -> list[tuple[int, str, Any]]:
     return found
 
 
-def steer(made: World, node: int, place: Enu, *, speed_m_s: float = 8.0, now_ns: int = 0) -> None:
+def steer(made: WorldActor, node: int, place: Enu, *, speed_m_s: float = 8.0, now_ns: int = 0) -> None:
     made.receive(NAMES.setpoint(node), Setpoint(now_ns, place, speed_m_s), now_ns)
 
 

@@ -28,7 +28,7 @@ from sim.world.engines.rotors.vehicle import (
     hover_rad_s,
 )
 from sim.world.environment.wind import Wind, intensities_m_s, lengths_m
-from sim.world.world import World
+from sim.world.world import WorldActor
 
 MakeScenario = Callable[..., Scenario]
 EVERY = pytest.mark.parametrize("vehicle", VEHICLES.values(), ids=list(VEHICLES))
@@ -226,7 +226,7 @@ def test_wind_needs_the_rotors(make_scenario: MakeScenario) -> None:
 @pytest.mark.parametrize("engine", ["kinematic", "rotors"])
 def test_a_uav_whose_battery_is_empty_falls(make_scenario: MakeScenario, engine: str) -> None:
     keys = {"world.engine": engine, "world.charge": (0.01, 0.01), "sensors.battery_hz": 1, "mobility.model": "onboard"}
-    world = World(make_scenario(**{"nodes.count": 1, **keys}), "b")
+    world = WorldActor(make_scenario(**{"nodes.count": 1, **keys}), "b")
     world.start(0)
     told: list[Battery] = []
     while (wake_ns := world.next_wake_ns()) is not None and wake_ns <= 20 * S:

@@ -15,7 +15,7 @@ from sim.world.engines.pybullet import Physics
 from sim.world.environment.line_of_sight import Sight
 from sim.world.environment.obstacles import Box, Obstacles, obstacles
 from sim.world.mobility.layout import positions
-from sim.world.world import World
+from sim.world.world import WorldActor
 from tests.unit.emulator.hand_driven import NAMES, Air, receptions
 
 MakeScenario = Callable[..., Scenario]
@@ -126,7 +126,7 @@ def test_a_start_within_an_obstacle_is_refused(make_scenario: MakeScenario) -> N
             obstacles(scenario, np.array(positions(scenario)))
 
 
-def parted(make_scenario: MakeScenario, **keys: Any) -> tuple[Scenario, World]:
+def parted(make_scenario: MakeScenario, **keys: Any) -> tuple[Scenario, WorldActor]:
     """Nodes 1 and 3 on either side of a tower, node 2 above its roof."""
     scenario = make_scenario(
         **PYBULLET,
@@ -137,7 +137,7 @@ def parted(make_scenario: MakeScenario, **keys: Any) -> tuple[Scenario, World]:
             **keys,
         },
     )
-    return scenario, World(scenario, "test")
+    return scenario, WorldActor(scenario, "test")
 
 
 def test_the_world_tells_who_is_parted_before_it_tells_the_poses(make_scenario: MakeScenario) -> None:

@@ -12,8 +12,8 @@ from fanet_mw.bus.topics import Topics
 from fanet_mw.scenario import Scenario
 from fanet_mw.trace import Collided, FlightModeChanged
 from fanet_mw.units import Enu, S
-from sim.world.flight_recorder import Flight as FlightState
-from sim.world.world import World
+from sim.world.flight_recorder import SwarmFlight
+from sim.world.world import WorldActor
 
 MakeScenario = Callable[..., Scenario]
 NAMES = Topics("m")
@@ -25,7 +25,7 @@ class Flying:
 
     def __init__(self, make_scenario: MakeScenario, **keys: Any) -> None:
         given = {"nodes.count": 2, "nodes.spacing_m": 100, "mobility.model": "onboard", "world.area_m": 1000}
-        self.world = World(make_scenario(**given | keys), "m")
+        self.world = WorldActor(make_scenario(**given | keys), "m")
         self.said: list[tuple[str, Message]] = []
         self.now_ns = 0
         self.world.start(0)
@@ -150,7 +150,7 @@ def test_a_world_that_goes_on_knows_its_wrecks(make_scenario: MakeScenario) -> N
     keys = {"nodes.count": 3, "mobility.model": "onboard", "world.crash": "falls", "world.area_m": 1000}
     at = np.array([[0.0, 0, 0.1], [50, 0, 0.1], [100, 0, 50]])
     landed = Setpoint(0, STILL, 1.0, SetpointKind.LAND)
-    world = World(make_scenario(**keys), "m", flight=FlightState(at, np.zeros((3, 3)), {2: landed}))
+    world = WorldActor(make_scenario(**keys), "m", flight=SwarmFlight(at, np.zeros((3, 3)), {2: landed}))
     assert world.report()["crashed"] == 1, "the first; the second has landed, the third flies"
 
 

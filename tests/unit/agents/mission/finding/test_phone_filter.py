@@ -1,0 +1,59 @@
+"""Where a phone is, by received powers and by silence; and where a camera looks."""
+
+import math
+
+from hypothesis import given
+from hypothesis import strategies as st
+
+from agents.mission.finding.finds import ground_place
+from agents.mission.finding.phone_filter import REFERENCE_LOSS_DB, PhoneFilter, PhoneModel
+from fanet_mw.units import Enu
+
+MODEL = PhoneModel(power_dbm=15, exponent=3, shadowing_db=4, offset_db=1, threshold_dbm=-90)
+
+
+def rssi_dbm(place: Enu, at: Enu) -> float:
+    return MODEL.power_dbm - REFERENCE_LOSS_DB - 30 * math.log10(at.minus(place).norm())
+
+
+def test_two_that_pass_on_either_side_find_the_phone_and_know_how_well() -> None:
+    truth, phone = Enu(60, 10, 0), PhoneFilter(MODEL)
+    for north in range(-120, 121, 30):
+        for node, east in ((1, 0), (2, 180)):
+            phone.heard(node, Enu(east, north, 50), rssi_dbm(truth, Enu(east, north, 50)))
+    place = phone.estimate()
+    assert place is not None
+    assert place.distance_m(truth) < 12
+    assert 5 < place.sigma_m < 40
+
+
+def test_one_that_passes_straight_leaves_the_side_open_and_silence_elsewhere_settles_it() -> None:
+    truth, phone = Enu(80, 0, 0), PhoneFilter(MODEL)
+    for north in range(-90, 91, 30):
+        phone.heard(1, Enu(0, north, 50), rssi_dbm(truth, Enu(0, north, 50)))
+    open_sides = phone.estimate()
+    assert open_sides is not None
+    assert abs(open_sides.east_m) < 25
+    assert open_sides.east_variance_m2 > 50**2
+    for north in range(-90, 91, 30):
+        phone.silent(Enu(-120, north, 50))
+    settled = phone.estimate()
+    assert settled is not None
+    assert settled.east_m > 40
+
+
+def test_the_same_place_counts_once_for_a_node() -> None:
+    phone = PhoneFilter(MODEL)
+    assert phone.heard(1, Enu(0, 0, 50), -70)
+    assert not phone.heard(1, Enu(5, 5, 50), -60)
+    assert phone.heard(2, Enu(5, 5, 50), -60)
+
+
+@given(st.floats(-1000, 1000), st.floats(-1000, 1000), st.floats(20, 100), st.floats(-80, 80), st.floats(-80, 80))
+def test_a_camera_looks_at_the_ground_where_its_angles_lead(
+    east: float, north: float, up: float, along: float, across: float
+) -> None:
+    bearing, elevation = math.atan2(along, across), -math.atan2(up, math.hypot(along, across))
+    looked = ground_place(Enu(east, north, up), bearing_rad=bearing, elevation_rad=elevation)
+    assert looked is not None
+    assert math.hypot(looked[0] - east - along, looked[1] - north - across) < 1e-6 * (1 + abs(east) + abs(north))

@@ -1,0 +1,153 @@
+"""The formation in lines, and the plan that gives each UAV a place in it."""
+
+import itertools
+import math
+from collections.abc import Sequence
+
+from agents.mission.formation.formation_planner import FormationPlanner
+from agents.mission.formation.pattern import Pattern, fitted
+from agents.mission.formation.shape import Demands
+from fanet_mw.units import US, Enu, NodeId, S
+from fanet_mw.wire.search import Search, SearchStatus
+
+REACH_M = 250.0
+DEMANDS = Demands(area_m=2500, seen_m=137, reach_m=REACH_M, height_m=50, speed_m_s=7.5)
+
+
+def formation(count: int = 45) -> Pattern:
+    made = fitted(count, DEMANDS)
+    assert made is not None
+    return made
+
+
+def is_one(places: Sequence[Enu]) -> bool:
+    reached, waiting = {0}, [0]
+    while waiting:
+        here = places[waiting.pop()]
+        further = [i for i, place in enumerate(places) if i not in reached and place.minus(here).norm() <= REACH_M]
+        reached.update(further)
+        waiting += further
+    return len(reached) == len(places)
+
+
+def test_the_formation_is_in_one_piece_during_the_whole_sweep_and_nobody_meets() -> None:
+    pattern = formation()
+    assert pattern.places == 45
+    for second in range(0, 2 * round(pattern.shape.sweep_s) + 20, 2):
+        places = [pattern.at(place, second) for place in range(pattern.places)]
+        assert is_one(places), second
+        assert min(a.minus(b).norm() for a, b in itertools.combinations(places, 2)) > 8.0
+
+
+def test_tied_places_stay_in_reach_of_each_other_once_the_chain_is_straight() -> None:
+    pattern = formation()
+    for second in range(45, round(pattern.shape.sweep_s) + 120, 5):
+        for place in range(pattern.places):
+            for other in pattern.shape.tethers(place):
+                apart = pattern.at(place, second).minus(pattern.at(other, second)).norm()
+                assert apart <= 0.95 * REACH_M, (second, place, other)
+
+
+def test_every_spot_of_the_area_comes_within_range_of_a_lane() -> None:
+    pattern = formation()
+    tracks = [
+        pattern.at(place, 0.5 * step)
+        for place in range(2 * pattern.dimensions.lanes)
+        for step in range(0, 2 * round(pattern.shape.sweep_s) + 1, 8)
+    ]
+    for east, north in itertools.product(range(-1240, 1250, 155), repeat=2):
+        assert any(math.hypot(track.east - east, track.north - north) <= 137 for track in tracks), (east, north)
+
+
+def test_too_few_have_no_formation() -> None:
+    assert fitted(20, DEMANDS) is None
+
+
+def planner_with(nodes: int, *, node: int = 1) -> FormationPlanner:
+    made = FormationPlanner(NodeId(node), expected=nodes, deploy_speed_m_s=9)
+    for other in range(1, nodes + 1):
+        place = Enu(200.0 * ((other - 1) % 9 - 4), 200.0 * ((other - 1) // 9 - 2), 50)
+        made.status(SearchStatus(0, place, other, 0, 100), now_ns=0)
+    return made
+
+
+def test_a_plan_gives_everyone_a_place_and_the_swarm_stays_in_one_piece_on_the_way() -> None:
+    planner, pattern = planner_with(45), formation()
+    assert planner.review(pattern, now_ns=S)
+    plan = planner.plan
+    assert plan is not None
+    assert sorted(plan.nodes) == list(range(1, 46))
+    for share in (0.0, 0.25, 0.5, 0.75, 1.0):
+        places = []
+        for place, node in enumerate(plan.nodes):
+            start = Enu(200.0 * ((node - 1) % 9 - 4), 200.0 * ((node - 1) // 9 - 2), 50)
+            way = pattern.at(place, 0.0).minus(start)
+            places.append(Enu(start.east + share * way.east, start.north + share * way.north, 50))
+        assert is_one(places), share
+
+
+def test_the_place_of_a_lost_uav_in_a_line_goes_to_a_follower() -> None:
+    planner, pattern = planner_with(45), formation()
+    planner.review(pattern, now_ns=S)
+    before = planner.plan
+    assert before is not None
+    lost, later_ns = before.nodes[3], 90 * S
+    for node in range(1, 46):
+        if node != lost:
+            planner.status(SearchStatus(later_ns // US, Enu(0, 0, 50), node, 1, 100), now_ns=later_ns)
+    assert planner.review(pattern, now_ns=later_ns)
+    after = planner.plan
+    assert after is not None
+    assert lost not in after.nodes
+    assert after.revision == before.revision + 1
+    assert after.nodes[3] in before.nodes[pattern.followers.start :]
+
+
+def test_only_the_lowest_id_that_is_alive_plans() -> None:
+    assert not planner_with(45, node=2).review(formation(), now_ns=S)
+
+
+def test_who_flies_home_holds_no_place_any_more_from_when_it_says_so() -> None:
+    planner, pattern = planner_with(45), formation()
+    planner.review(pattern, now_ns=S)
+    before = planner.plan
+    assert before is not None
+    leaver, later_ns = before.nodes[3], 20 * S
+    planner.status(SearchStatus(later_ns // US, Enu(0, 0, 50), leaver, 1, 0), now_ns=later_ns)
+    planner.alive(leaver, Enu(0, 0, 50), now_ns=later_ns)  # its hellos are heard still
+    assert planner.review(pattern, now_ns=later_ns)
+    after = planner.plan
+    assert after is not None
+    assert leaver not in after.nodes
+    assert after.nodes[3] in before.nodes[pattern.followers.start :]
+
+
+def test_a_planner_that_flies_home_leaves_planning_to_the_next() -> None:
+    first, second = planner_with(45, node=1), planner_with(45, node=2)
+    gone = SearchStatus(S // US, Enu(0, 0, 50), 1, 0, 0)
+    for planner in (first, second):
+        planner.status(gone, now_ns=S)
+    assert not first.review(formation(), now_ns=S)
+    assert second.review(formation(), now_ns=S)
+    assert second.plan is not None
+    assert 1 not in second.plan.nodes
+
+
+def test_the_smaller_part_of_a_swarm_that_came_apart_makes_no_plan_of_its_own() -> None:
+    planner, pattern = planner_with(45), formation()
+    planner.review(pattern, now_ns=S)
+    later_ns = 90 * S
+    for node in range(1, 20):
+        planner.status(SearchStatus(later_ns // US, Enu(0, 0, 50), node, 1, 100), now_ns=later_ns)
+    assert not planner.review(pattern, now_ns=later_ns)
+
+
+def test_of_two_plans_the_newer_one_counts_and_of_equal_ones_that_of_the_lower_id() -> None:
+    listener = FormationPlanner(NodeId(9), expected=9, deploy_speed_m_s=9)
+
+    def plan(revision: int, planner: int) -> Search:
+        return Search(1, 100.0, 10.0, 50.0, 50.0, 7.5, 10, revision, planner, (1, 2, 3, 4), 2, 0, 0)
+
+    assert [listener.planned(plan(*which)) for which in ((1, 4), (1, 5), (1, 3), (2, 8), (1, 1), (2, 8))] == [
+        True, False, True, True, False, False,
+    ]  # fmt: skip

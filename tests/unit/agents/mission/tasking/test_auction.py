@@ -1,0 +1,46 @@
+"""The auction: nodes that have heard the same bids name the same winners."""
+
+from hypothesis import given
+from hypothesis import strategies as st
+
+from agents.mission.tasking.auction import Auction
+from fanet_mw.units import NodeId, S
+from fanet_mw.wire.search import WITHDRAWN, Bid
+
+bids = st.lists(
+    st.builds(Bid, st.just(1), st.integers(2, 9), st.integers(0, 500) | st.just(WITHDRAWN), st.integers(0, 4)),
+    max_size=12, unique_by=lambda bid: (bid.bidder, bid.serial),
+)  # fmt: skip
+
+
+@given(bids, st.randoms(use_true_random=False))
+def test_who_has_heard_the_same_bids_in_any_order_names_the_same_winners(heard: list[Bid], random: object) -> None:
+    first, second = Auction(NodeId(1)), Auction(NodeId(1))
+    first.merge(heard, now_ns=S)
+    for bid in sorted(heard, key=lambda _: random.random()):  # type: ignore[attr-defined]
+        second.merge([bid], now_ns=S)
+    assert first.winners(1, count=3, now_ns=S) == second.winners(1, count=3, now_ns=S)
+
+
+def test_exactly_as_many_win_as_the_task_needs_and_ties_go_to_the_lower_id() -> None:
+    auction = Auction(NodeId(5))
+    auction.merge([Bid(1, 9, 40, 1), Bid(1, 2, 40, 1), Bid(1, 3, 10, 1)], now_ns=0)
+    auction.bid(1, eta_s=4.0, now_ns=0)
+    assert auction.winners(1, count=3, now_ns=0) == [3, 2, 5]
+    assert not auction.would_win(1, eta_s=9.0, count=2, now_ns=0)
+
+
+def test_a_winner_that_falls_silent_makes_room_for_the_next() -> None:
+    auction = Auction(NodeId(5))
+    auction.merge([Bid(1, 2, 10, 1), Bid(1, 3, 20, 1)], now_ns=0)
+    auction.merge([Bid(1, 3, 20, 1)], now_ns=12 * S)
+    assert auction.winners(1, count=1, now_ns=12 * S) == [2]
+    assert auction.winners(1, count=1, now_ns=20 * S) == [3]
+
+
+def test_a_bid_that_is_taken_back_no_longer_wins() -> None:
+    auction = Auction(NodeId(5))
+    auction.bid(1, eta_s=1.0, now_ns=0)
+    auction.withdraw(1, now_ns=0)
+    assert auction.winners(1, count=1, now_ns=0) == []
+    assert [bid.eta_ds for bid in auction.told([1], now_ns=0)] == [WITHDRAWN]

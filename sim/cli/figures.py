@@ -50,6 +50,7 @@ def figures(
 
     """
     from sim.figures.all_figures import chosen
+    from sim.figures.claims import BEYOND
     from sim.figures.render import render
     from sim.results.read import read
     from sim.sweep import spec
@@ -68,7 +69,7 @@ def figures(
     console = Console()
     table = Table("figure", "claim", "verdict", box=None, header_style="bold", padding=(0, 2, 0, 0))
     for name, claim in verdicts:
-        table.add_row(name, claim.claim, claim.verdict.value)
+        table.add_row(name, claim.claim if claim.figure else f"{BEYOND}{claim.claim}", claim.verdict.value)
         for statement in claim.statements:
             table.add_row("", f"[dim]{statement.text()}[/]", "")
     console.print(table)

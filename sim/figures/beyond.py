@@ -52,13 +52,13 @@ def claims_load(runs: Runs) -> list[Claim]:
         )
         for at in reversed(runs.levels("traffic.interval_s"))
     ]
-    return [Claim(0, "(Beyond the paper) The timetable delivers more than every rival, at every load.", leads)]
+    return [Claim(0, "The timetable delivers more than every rival, at every load.", leads)]
 
 
 def claims_size(runs: Runs) -> list[Claim]:
     largest = runs.levels("nodes.count")[-1]
     arrives = above(f"{largest} nodes: PDR of fanet-mw", runs.per_seed("pdr", case="ours", nodes__count=largest), _ALL)
-    return [Claim(0, "(Beyond the paper) Claimed slots deliver at every size.", [arrives])]
+    return [Claim(0, "Claimed slots deliver at every size.", [arrives])]
 
 
 def claims_clocks(runs: Runs) -> list[Claim]:
@@ -70,8 +70,7 @@ def claims_clocks(runs: Runs) -> list[Claim]:
     return [
         Claim(
             0,
-            f"(Beyond the paper) With clocks that are wrong by up to {worst:g} ms the timetable delivers all, once "
-            "hellos carry the time.",
+            f"With clocks that are wrong by up to {worst:g} ms the timetable delivers all, once hellos carry the time.",
             [above("hellos carry the time: PDR", at_worst("slack 150 us, hellos carry the time"), _ALL)],
             [
                 Reason(
@@ -100,7 +99,7 @@ def claims_age(runs: Runs) -> list[Claim]:
     return [
         Claim(
             0,
-            "(Beyond the paper) At its best interval each method's positions are older than the timetable's.",
+            "At its best interval each method's positions are older than the timetable's.",
             [
                 above(
                     f"{case}: least age minus the timetable's", differences(youngest(case), youngest("ours")), 0.0, "s"
@@ -144,7 +143,7 @@ def claims_ablation(runs: Runs) -> list[Claim]:
         return differences(runs.per_seed(quantity, case=case), runs.per_seed(quantity, case=before))
 
     def said(text: str, *statements: Statement) -> Claim:
-        return Claim(0, f"(Beyond the paper) {text}", statements)
+        return Claim(0, text, statements)
 
     repaired, table = runs.per_seed("pdr", case="+ repair"), runs.per_seed("pdr", case="timetable instead")
     return [

@@ -12,10 +12,12 @@ experiment that would come out otherwise if the reason were wrong. It counts as 
 from collections.abc import Mapping, Sequence
 from dataclasses import dataclass
 from enum import StrEnum
-from typing import Any, Literal
+from typing import Any, Final, Literal
 
 from sim.figures.statistics import Interval, interval
 
+BEYOND: Final = "(Beyond the paper) "
+"""What people are shown before a claim that is not the paper's; its figure is 0."""
 Values = Sequence[float] | Mapping[int, float]
 """One value per seed, or the value of each seed."""
 

@@ -21,6 +21,7 @@ _LONG: Final = 0.01
 _MOST: Final = 0.5
 _NEARLY: Final = 0.9
 _ALL: Final = 0.999
+_STATED: Final = 0.99
 _OFTEN: Final = 0.3
 _PERIOD_S: Final = 0.5
 _INTERVAL_S: Final = 0.1
@@ -57,6 +58,12 @@ def _arrived(runs: Runs, case: str) -> list[Interval]:
     """The share of packets x targets that has arrived by each edge of the classes of delay."""
     sums = [[had / row["wanted"] for had in accumulate(row["delay_counts"])] for row in runs.where(case=case)]
     return [interval(column) for column in zip(*sums, strict=True)][: len(DELAY_EDGES_S)]
+
+
+def _kept(row: Row) -> float | None:
+    """Of packets x targets for which a bound was stated, the share that arrived within it."""
+    stated = row["bound.stated_share"]
+    return float(row["bound.within_share"] / stated) if stated else None
 
 
 def draw(runs: Runs) -> Drawing:
@@ -180,7 +187,7 @@ def claims(runs: Runs) -> list[Claim]:
         ),
         Claim(
             0,
-            "(Beyond the paper) With the timetable most packets arrive within 0.5 s.",
+            "With the timetable most packets arrive within 0.5 s.",
             [above("fanet-mw: packets x targets within 0.5 s", seen(of_all, "ours"), _MOST)],
             [
                 Reason(
@@ -188,9 +195,8 @@ def claims(runs: Runs) -> list[Claim]:
                     "stated when it was accepted.",
                     [
                         above("fanet-mw: delivery ratio", seen("pdr", "ours"), _ALL),
-                        above(
-                            "fanet-mw: packets x targets within their bound", seen("bound.within_share", "ours"), _ALL
-                        ),
+                        above("fanet-mw: packets x targets with a bound", seen("bound.stated_share", "ours"), _STATED),
+                        above("fanet-mw: of these within their bound", seen(_kept, "ours"), _ALL),
                     ],
                 )
             ],

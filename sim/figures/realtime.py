@@ -58,7 +58,7 @@ def claims(runs: Runs) -> list[Claim]:
     return [
         Claim(
             0,
-            "(Beyond the paper) Real time gives what virtual time says.",
+            "Real time gives what virtual time says.",
             [
                 statement
                 for protocol, name in _PROTOCOLS.items()
@@ -70,7 +70,7 @@ def claims(runs: Runs) -> list[Claim]:
         ),
         Claim(
             0,
-            "(Beyond the paper) Frames are announced in time.",
+            "Frames are announced in time.",
             [
                 below(
                     f"{name}: share of frames that were late",

@@ -68,7 +68,7 @@ def claims_reports(runs: Runs) -> list[Claim]:
     return [
         Claim(
             0,
-            f"(Beyond the paper) Reports by fanet-mw are younger than by {name}.",
+            f"Reports by fanet-mw are younger than by {name}.",
             [
                 below(
                     f"every {interval_s:g} s: age by fanet-mw minus by {name}",
@@ -96,7 +96,7 @@ def claims_mission(runs: Runs) -> list[Claim]:
     return [
         Claim(
             0,
-            "(Beyond the paper) Without a network the search takes longer.",
+            "Without a network the search takes longer.",
             [
                 above("until half are confirmed: no network minus a good one", slower(_half_s, 1.0), 0.0, "s"),
                 above("until all are confirmed: no network minus a good one", slower(_all_s, 1.0), 0.0, "s"),
@@ -104,7 +104,7 @@ def claims_mission(runs: Runs) -> list[Claim]:
         ),
         Claim(
             0,
-            "(Beyond the paper) Links that lose half of all frames hardly delay it.",
+            "Links that lose half of all frames hardly delay it.",
             [
                 below("until half are confirmed: half lost minus none", slower(_half_s, _HALF), _HARDLY_S, "s"),
                 below("until all are confirmed: half lost minus none", slower(_all_s, _HALF), _HARDLY_S, "s"),
@@ -112,7 +112,7 @@ def claims_mission(runs: Runs) -> list[Claim]:
         ),
         Claim(
             0,
-            "(Beyond the paper) Where most frames are lost fanet-mw delivers the most reports.",
+            "Where most frames are lost fanet-mw delivers the most reports.",
             [
                 above(
                     f"{_MOST:.0%} lost: reports delivered, fanet-mw minus {name}",

@@ -6,6 +6,7 @@ from pathlib import Path
 from typing import Any, Final, NamedTuple
 
 from fanet_mw.errors import ConfigError
+from sim.figures.claims import BEYOND
 from sim.report.html import Block, Commands, Heading, Picture, Rows, Text, as_html, as_markdown
 from sim.report.run_page import blocks_of_run, is_run
 
@@ -118,23 +119,29 @@ def _figures(folder: Path) -> list[tuple[Path, dict[str, Any]]]:
 
 
 def _overview(figures: Sequence[tuple[Path, dict[str, Any]]]) -> list[Block]:
-    claims = [claim for _, about in figures for claim in about["claims"] if claim["figure"]]
-    counts = [sum(claim["verdict"] == verdict for claim in claims) for verdict in ("agrees", "partly", "differs")]
-    return [
+    claims = [(about["name"], claim) for _, about in figures for claim in about["claims"]]
+    papers = [(str(one["figure"]), one["claim"], one["verdict"]) for _, one in claims if one["figure"]]
+    ours = [(name, one["claim"], one["verdict"]) for name, one in claims if not one["figure"]]
+    counts = [sum(verdict == wanted for _, _, verdict in papers) for wanted in ("agrees", "partly", "differs")]
+    blocks: list[Block] = [
         Text(
-            f"Of {len(claims)} claims: {counts[0]} agree, {counts[1]} partly, {counts[2]} differ. "
+            f"Of {len(papers)} claims: {counts[0]} agree, {counts[1]} partly, {counts[2]} differ. "
             "Each verdict is made by code: a claim is one or more quantities with a threshold each; it agrees when the "
             "whole 95 % interval of every quantity is on the claimed side, differs when every one is wholly on the "
             "other side, and is partly so otherwise."
         ),
-        Rows(("figure", "claim", "verdict"), [(str(one["figure"]), one["claim"], one["verdict"]) for one in claims]),
+        Rows(("figure", "claim", "verdict"), papers),
     ]
+    if ours:
+        blocks.append(Text("Beyond the paper, what might be said of fanet-mw, judged in the same way:"))
+        blocks.append(Rows(("figure", "statement", "verdict"), ours))
+    return blocks
 
 
 def _figure(folder: Path, about: dict[str, Any]) -> list[Block]:
     rows = [
         (
-            claim["claim"],
+            claim["claim"] if claim["figure"] else f"{BEYOND}{claim['claim']}",
             "\n".join(one["text"] for one in claim["statements"]),
             claim["verdict"],
             "\n".join(map(_reason, claim["reasons"])),

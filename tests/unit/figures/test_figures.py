@@ -179,6 +179,20 @@ def test_failed_runs_are_in_no_figure(nine) -> None:
     assert (len(runs.rows), runs.failed) == (len(status) - 1, 1)
 
 
+def test_what_is_said_beyond_the_paper_is_told_apart_from_its_claims(nine, tmp_path) -> None:
+    table, _, _ = nine
+    holds = [above("it", [2.0, 2.0], 1.0)]
+    render(
+        replace(FIGURES["9"], claims=lambda _: [Claim(9, "It falls.", holds), Claim(0, "Ours stays.", holds)]),
+        table,
+        tmp_path,
+    )
+    _, markdown = (path.read_text() for path in write([tmp_path], tmp_path))
+    assert "Of 1 claims: 1 agree, 0 partly, 0 differ." in markdown
+    assert "| figure-9 | Ours stays. | agrees |" in markdown
+    assert "| (Beyond the paper) Ours stays. |" in markdown
+
+
 def test_a_page_needs_nothing_else_and_has_every_verdict(nine) -> None:
     _, folder, claims = nine
     html, markdown = (path.read_text() for path in write([folder], folder))

@@ -47,7 +47,7 @@ class Drawn(NamedTuple):
 
 
 class LossyPlan(NamedTuple):
-    """The verdict."""
+    """The verdict over all draws of the channel."""
 
     scenario: Scenario
     draws: tuple[Drawn, ...]

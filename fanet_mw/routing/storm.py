@@ -18,7 +18,7 @@ from fanet_mw.units import MS
 
 
 class Gossip(FloodingProtocol):
-    """Relays at random."""
+    """Flooding in which each node relays with a probability."""
 
     stream_name: ClassVar[str] = "storm"
 

@@ -33,7 +33,7 @@ _AIRTIME_NS: Final = 1 * MS
 
 
 class ContractRun(NamedTuple):
-    """What one run gave."""
+    """The outcome of one run and its summary."""
 
     outcome: Any
     summary: Mapping[str, Any]

@@ -86,7 +86,7 @@ class Head(NamedTuple):
 
 
 class Receipt(NamedTuple):
-    """FANET_RECEIPT."""
+    """FANET_RECEIPT: what a target has of a message."""
 
     held: int
     number: int

@@ -78,7 +78,7 @@ class ScenarioFlags:
 @Parameter(name="*")
 @dataclass(frozen=True)
 class OutputFlags:
-    """Where the result goes."""
+    """The options for the result of a run: where it goes, and in what form."""
 
     out: Path | None = None
     """Folder for scenario.toml, summary.json, reports.json, links.json, trace.jsonl and mavlink.tlog."""

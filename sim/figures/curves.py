@@ -13,7 +13,7 @@ _APART: Final = 0.025
 
 
 class Panel(NamedTuple):
-    """One pair of axes."""
+    """One pair of axes: the quantity drawn, and its label."""
 
     quantity: Quantity
     label: str

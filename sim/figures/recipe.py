@@ -20,7 +20,7 @@ class Drawing(NamedTuple):
 
 @dataclass(frozen=True, slots=True)
 class Recipe:
-    """One figure."""
+    """One figure: its sweep, its drawing and the claims about it."""
 
     name: str
     """The name of its files, for example `figure-9`."""

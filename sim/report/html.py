@@ -29,14 +29,14 @@ class Heading:
 
 @dataclass(frozen=True, slots=True)
 class Text:
-    """A paragraph."""
+    """A paragraph of the page."""
 
     text: str
 
 
 @dataclass(frozen=True, slots=True)
 class Commands:
-    """Lines for a shell."""
+    """Lines to be typed into a shell."""
 
     lines: Sequence[str]
 

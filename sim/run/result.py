@@ -10,7 +10,7 @@ from sim.run.outcome import Outcome
 
 
 class Result:
-    """One finished run."""
+    """One finished run, as programs and notebooks read it."""
 
     def __init__(self, outcome: Outcome) -> None:
         self.outcome = outcome

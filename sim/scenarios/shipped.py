@@ -9,7 +9,7 @@ from fanet_mw.errors import ConfigError
 
 
 class Entry(NamedTuple):
-    """One shipped scenario."""
+    """One shipped scenario: its name and what it is."""
 
     name: str
     description: str

@@ -21,7 +21,7 @@ _STEP_S: Final = 0.05
 
 
 class Pattern:
-    """One formation."""
+    """A formation in numbers, and the positions of its places over time."""
 
     def __init__(self, dimensions: Dimensions) -> None:
         self.dimensions = dimensions

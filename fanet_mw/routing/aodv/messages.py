@@ -26,7 +26,7 @@ _ENTRY: Final = struct.Struct("<HI")
 
 
 class RouteRequest(NamedTuple):
-    """RREQ (5.1)."""
+    """A route request, RREQ (5.1)."""
 
     flags: int
     hop_count: int
@@ -92,7 +92,7 @@ def most_unreachable(capacity: int) -> int:
 
 
 class RouteError(NamedTuple):
-    """RERR (5.3)."""
+    """A route error, RERR (5.3)."""
 
     unreachable: tuple[Unreachable, ...]
 

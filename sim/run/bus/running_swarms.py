@@ -77,7 +77,7 @@ def registered(swarm: str, endpoint: str) -> Iterator[bool]:
 def _create(folder: Path, pid: int) -> tuple[int, str]:
     folder.mkdir(mode=0o700, parents=True, exist_ok=True)
     if not _ours(folder):
-        raise PermissionError(f"{folder}: it is not ours alone")
+        raise PermissionError(f"{folder}: it is not of this user alone")
     return tempfile.mkstemp(prefix=f"{pid}-", suffix=".json", dir=folder)
 
 

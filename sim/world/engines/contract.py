@@ -16,7 +16,7 @@ Flags = npt.NDArray[np.bool_]
 
 
 class Engine(ABC):
-    """Moves bodies."""
+    """What moves the bodies of a swarm, and says where they are."""
 
     name: str
 

@@ -17,7 +17,7 @@ from sim.world.engines.contract import Engine, Rows
 
 
 class Sight:
-    """Asks the engine."""
+    """The lines of sight between bodies, as the engine sees them."""
 
     def __init__(self, scenario: Scenario, engine: Engine, *, top_m: float) -> None:
         self._reach_m = reach_m(scenario.radio)

@@ -18,7 +18,7 @@ _MOST_STEPS: Final = 2000
 
 
 class Solids:
-    """Hills and buildings."""
+    """The hills and buildings of a world, as bodies cannot pass them."""
 
     def __init__(self, obstacles: Obstacles | None) -> None:
         boxes = obstacles.boxes if obstacles else ()

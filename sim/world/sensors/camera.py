@@ -41,7 +41,7 @@ def recognized_share(pixels: Values, *, cycles_for_half: float) -> Values:
 
 
 class CameraSensor(Sensor):
-    """One camera per UAV."""
+    """The cameras of all UAVs, one for each."""
 
     kind = "camera"
 

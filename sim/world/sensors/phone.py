@@ -32,7 +32,7 @@ _CELL_M: Final = 25.0
 
 
 class PhoneSensor(Sensor):
-    """One receiver per UAV."""
+    """The receivers of phones of all UAVs, one for each."""
 
     kind = "wifi"
 

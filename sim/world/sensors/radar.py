@@ -47,7 +47,7 @@ def detected_share(snr: Values, *, false_alarm: float) -> Values:
 
 
 class RadarSensor(Sensor):
-    """One radar per UAV."""
+    """The radars of all UAVs, one for each."""
 
     kind = "radar"
 

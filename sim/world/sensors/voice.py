@@ -55,7 +55,7 @@ def power_sum_db(first_db: Values | float, second_db: Values) -> Values:
 
 
 class VoiceSensor(Sensor):
-    """One array per UAV."""
+    """The microphone arrays of all UAVs, one for each."""
 
     kind = "voice"
 

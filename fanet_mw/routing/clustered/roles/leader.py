@@ -46,7 +46,7 @@ _DRIFT: Final = 0.03
 
 
 class _Assigned(NamedTuple):
-    """The present assignment."""
+    """The assignment that the leader announces at present."""
 
     clusters: Sequence[Cluster] = ()
     places: Mapping[NodeId, Enu] = MappingProxyType({})
@@ -62,7 +62,7 @@ class _Assigned(NamedTuple):
 
 
 class Leader:
-    """Computes schedules from joins."""
+    """The part of a node that leads: it makes schedules of the joins that it hears."""
 
     def __init__(
         self,

@@ -38,7 +38,7 @@ class Event(StrEnum):
 
 
 class Action(StrEnum):
-    """What it does then."""
+    """What a node does on a transition of its state."""
 
     FOLLOW = "follow the head"
     SERVE = "own the slot"

@@ -22,7 +22,7 @@ _TAIL_NS: Final = 5 * MS
 
 
 class Turns(NamedTuple):
-    """The geometry."""
+    """The geometry of a superframe: its contention window, and turns of equal length after it."""
 
     origin_ns: int
     period_ns: int

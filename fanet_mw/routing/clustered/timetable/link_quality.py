@@ -31,7 +31,7 @@ _CHANGED: Final = 0.3
 
 
 class LinkQuality:
-    """One node's measurements."""
+    """The links of one node as its neighbors' hellos show them."""
 
     def __init__(self, node: NodeId, *, hello_ns: int) -> None:
         self._node = node

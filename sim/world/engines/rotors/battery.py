@@ -18,7 +18,7 @@ _CELL_V: Final = np.array([3.27, 3.61, 3.69, 3.73, 3.80, 3.87, 4.02, 4.20])
 
 
 class Batteries:
-    """One battery per UAV."""
+    """The batteries of all UAVs, one for each."""
 
     def __init__(self, cell: Cell, charge: Values) -> None:
         """`charge`: share of the capacity that each holds at first."""

@@ -14,7 +14,7 @@ AIR_KG_M3: Final = 1.225
 
 
 class Cell(NamedTuple):
-    """Battery of a vehicle."""
+    """The battery of a type of vehicle."""
 
     cells: int
     capacity_ah: float

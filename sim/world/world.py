@@ -193,6 +193,7 @@ class WorldActor(Actor):
             if not self._guidance.may_touch_down(row + 1):
                 self._flies[row] = False
                 self._engine.fall(row)
+                self._guidance.fell(row + 1)
 
     def _contact(self, first: int, second: int, now_ns: int) -> None:
         """Two bodies touch, of which the ground and obstacles are 0: a landing, a wreck, or a collision."""

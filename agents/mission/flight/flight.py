@@ -26,8 +26,10 @@ class Flight:
     def fix(self, position: Enu, velocity: Enu, survivor: int | None, *, now_ns: int) -> None:
         """Choose a velocity at a position fix; `survivor` is the one to whom this UAV goes, if any."""
         self._navigation.fix(position, velocity, now_ns=now_ns)
-        if self._return_home.leaves:
-            goal, feed = self._return_home.goal(), STILL
-        else:
+        if not self._return_home.leaves:
             goal, feed = self._goal.at(survivor, now_ns)
-        self.velocity = None if self._return_home.lands else self._velocity_choice.velocity(goal, feed, now_ns)
+            self.velocity = self._velocity_choice.velocity(goal, feed, now_ns)
+        elif self._return_home.land_if_there():
+            self.velocity = None
+        else:
+            self.velocity = self._velocity_choice.velocity(self._return_home.goal, STILL, now_ns)

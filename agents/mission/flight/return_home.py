@@ -46,10 +46,19 @@ class ReturnHome:
             return 0
         return max(1, round(100 * self._endurance.margin(self._navigation.position)))
 
+    @property
     def goal(self) -> Enu:
-        """The place to fly to; a UAV that has reached it is told to land."""
-        here = self._navigation.position
-        if not self.lands and math.hypot(here.east - self._home.east, here.north - self._home.north) <= _HOME_M:
-            self.lands = True
-            self._outbox.course = Course(here, _LAND_M_S, land=True)
+        """The place above its base to which the UAV flies."""
         return self._home
+
+    def land_if_there(self) -> bool:
+        """Command the landing of a UAV that has come to its goal; True once it lands.
+
+        A setpoint may be lost on its way to the flight controller: each call says it again.
+        """
+        here = self._navigation.position
+        if math.hypot(here.east - self._home.east, here.north - self._home.north) <= _HOME_M:
+            self.lands = True
+        if self.lands:
+            self._outbox.course = Course(here, _LAND_M_S, land=True)
+        return self.lands

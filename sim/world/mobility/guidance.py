@@ -143,16 +143,21 @@ class Guidance:
         """The battery of this UAV is nearly empty: it lands where it is, and obeys no further setpoint."""
         row = node - 1
         if row not in self._forced:
-            self._forced.add(row)
-            self._velocities.pop(row, None)
-            self._setpoints.pop(row, None)
+            self._obey_no_more(row)
             self._landings[row] = _FORCED_M_S
             self._enter(row, FlightMode.FAILSAFE)
 
     def fell(self, node: int) -> None:
         """Take a UAV for a wreck, which obeys no setpoint."""
-        self._forced.add(node - 1)
-        self._enter(node - 1, FlightMode.FALLEN)
+        row = node - 1
+        self._obey_no_more(row)
+        self._landings.pop(row, None)
+        self._enter(row, FlightMode.FALLEN)
+
+    def _obey_no_more(self, row: int) -> None:
+        self._forced.add(row)
+        self._velocities.pop(row, None)
+        self._setpoints.pop(row, None)
 
     def _enter(self, row: int, mode: FlightMode) -> None:
         if self._modes.get(row) is not mode:

@@ -86,6 +86,9 @@ def test_who_has_just_enough_left_says_so_flies_home_and_lands(make_scenario: Ca
     course = flight.outbox.course
     assert course is not None
     assert course.land
+    flight.outbox.course = None
+    flight.fly(0.4)
+    assert flight.outbox.course is not None, "a setpoint may be lost: the landing is commanded again at each fix"
     charges = [message.charge for message in flight.told if isinstance(message, SearchStatus)]
     assert min(charges[:3]) > 50
     assert charges[-1] == 0

@@ -146,12 +146,29 @@ def test_a_wreck_falls_its_radio_goes_and_it_senses_nothing_more(make_scenario: 
     assert flying.modes == [(1, "goto"), (2, "goto"), (1, "fallen"), (2, "fallen")]
 
 
+def test_a_wreck_that_flew_by_velocities_stays_a_wreck(make_scenario: MakeScenario) -> None:
+    """Its velocity ends half a second later, after which a UAV that flies holds its position, as a failsafe."""
+    flying = Flying(make_scenario, **{"world.crash": "falls"})
+    flying.ask(2, SetpointKind.POSITION, Enu(-50.0, 0.0, 50.0), speed_m_s=10.0)
+    for _ in range(150):
+        flying.ask(1, SetpointKind.VELOCITY, v=Enu(0.1, 0.0, 0.0))
+        flying.fly(0.1)
+    flying.fly(10)
+    assert flying.modes == [(2, "goto"), (1, "velocity"), (1, "fallen"), (2, "fallen")]
+
+
 def test_a_world_that_goes_on_knows_its_wrecks(make_scenario: MakeScenario) -> None:
     keys = {"nodes.count": 3, "mobility.model": "onboard", "world.crash": "falls", "world.area_m": 1000}
     at = np.array([[0.0, 0, 0.1], [50, 0, 0.1], [100, 0, 50]])
     landed = Setpoint(0, STILL, 1.0, SetpointKind.LAND)
     world = WorldActor(make_scenario(**keys), "m", flight=SwarmFlight(at, np.zeros((3, 3)), {2: landed}))
     assert world.report()["crashed"] == 1, "the first; the second has landed, the third flies"
+    world.start(0)
+    takeoff = Setpoint(0, Enu(0.0, 0.0, 30.0), 3.0, SetpointKind.TAKEOFF)
+    world.receive(NAMES.setpoint(1), takeoff, 0)
+    world.wake(world.next_wake_ns() or 0)
+    modes = [(r.node, r.mode) for r in world.records if isinstance(r, FlightModeChanged)]
+    assert sorted(modes) == [(1, "fallen"), (2, "land")], "a wreck does not take off"
 
 
 def test_the_radio_of_a_wreck_may_survive(make_scenario: MakeScenario) -> None:

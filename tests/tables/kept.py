@@ -1,12 +1,14 @@
 """Missions that are kept when they were flown, so that a table of hours can be measured in pieces.
 
-    runs/missions.jsonl    one line per mission: the key of its scenario, the code that flew it, what it came to
+    runs/missions.jsonl    one line per mission: its scenario and seed, the key of both with every setting, the code
+                           that flew it, and what it came to
 
 A line that is there is not flown again, whichever code wrote it: remove the file to measure all of it anew. A line that
 was half written when the machine stopped is left out.
 """
 
 import contextlib
+import hashlib
 import json
 import time
 from collections.abc import Callable, Iterator, Mapping
@@ -44,14 +46,17 @@ class Kept:
             self._runs[key] = self._fly(scenario)
             self._longest_s = max(self._longest_s, time.monotonic() - began_s)
             self._path.parent.mkdir(parents=True, exist_ok=True)
+            broken = self._path.exists() and not self._path.read_text(encoding="utf-8").endswith("\n")
             with self._path.open("a", encoding="utf-8") as file:
-                file.write(json.dumps({"key": key, "code": code(), "run": self._runs[key]}) + "\n")
+                named = {"scenario": scenario.name, "seed": scenario.seed, "key": key, "code": code()}
+                file.write("\n" * broken + json.dumps({**named, "run": self._runs[key]}) + "\n")
         return self._runs[key]
 
 
 def key_of(scenario: Scenario) -> str:
-    """The scenario whole, but for its description: equal keys are equal missions."""
-    return json.dumps(scenario.model_dump(mode="json", exclude_defaults=True, exclude={"description"}), sort_keys=True)
+    """A hash of the scenario whole, but for its description: equal keys are equal missions."""
+    told = scenario.model_dump(mode="json", exclude_defaults=True, exclude={"description"})
+    return hashlib.sha256(json.dumps(told, sort_keys=True).encode()).hexdigest()[:16]
 
 
 def _lines(path: Path) -> Iterator[Mapping[str, Any]]:

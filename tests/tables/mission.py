@@ -1,88 +1,86 @@
 """How a planned search fares over other protocols, over a network that loses frames, and over none."""
 
-import itertools
 import statistics
 from collections.abc import Mapping, Sequence
-from functools import cache
-from typing import Any, Final
+from typing import Final
 
-from fanet_mw.scenario import Scenario
-from sim.results.files import finish
-from sim.run.virtual import simulate
-from sim.scenarios.catalog import find
+from tests.tables.kept import KEPT, Kept, Run
 from tests.tables.markdown import Rows
+from tests.tables.missions import Case, flown, fly
 
-_SEEDS: Final = (1,)
-_SMALL: Final = (
+_FEW_UAVS: Final = (
     "nodes.count=12", "nodes.spacing_m=100", "nodes.telemetry_hz=0", "world.area_m=500", "mission.survivors=6",
     "duration_s=80",
 )  # fmt: skip
 """A search that takes seconds of CPU, with an area of a twenty-fifth of that of `rescue`."""
 _PROTOCOLS: Final = {
+    "ours, as `rescue` has it": (),
     "plain flooding": ("routing.protocol=flooding",),
     "the paper's protocol": (
         "clusters.count=4", "clusters.flooding_period_s=5", "clusters.relay=all", "clusters.pacing=burst",
         "clusters.repair_s=0",
     ),
-    "ours, as `rescue` has it": (),
 }  # fmt: skip
-_LOSSES: Final = (0.0, 0.5, 0.8)
-_OFF: Final = 1.0
-_CASES: Final = (
-    *((name, keys, loss) for name, keys in _PROTOCOLS.items() for loss in _LOSSES),
-    ("none: the network is off", (), _OFF),
-    ("ours, and hellos are not used to avoid others", ("mission.avoid_by=[]",), 0.0),
-)
 
 
-def over_networks() -> Rows:
-    """Scenario `rescue` in small: every link loses a share of the frames that would have been received."""
-    rows = [
-        [
-            "protocol", "frames lost", "confirmed of 6", "mistaken", "half confirmed after [s]", "reports delivered",
-            "area covered", "connected", "contacts", "nearest UAV: least / 1 % / median [m]",
-        ]
+def _cases(keys: tuple[str, ...], seeds: tuple[int, ...], losses: tuple[float, ...]) -> Mapping[str, Case]:
+    return {
+        f"{name} | {loss:.0%}": Case("rescue", (*keys, *protocol), seeds, loss)
+        for loss in losses
+        for name, protocol in _PROTOCOLS.items()
+    } | {"none: the network is off | 100%": Case("rescue", keys, seeds, 1.0)}
+
+
+SMALL: Final = {
+    **_cases(_FEW_UAVS, (1, 2), (0.0, 0.5, 0.8)),
+    "ours, and hellos are not used to avoid others | 0%": Case("rescue", (*_FEW_UAVS, "mission.avoid_by=[]"), (1, 2)),
+}
+WHOLE: Final = _cases(("duration_s=240",), (1,), (0.0, 0.8))
+
+
+def over_networks(kept: Kept | None = None) -> Rows:
+    """Scenario `rescue` in small."""
+    return _table(SMALL, kept or Kept(KEPT, fly))
+
+
+def over_networks_whole(kept: Kept | None = None) -> Rows:
+    """Scenario `rescue` as it is, until the sweep is over."""
+    return _table(WHOLE, kept or Kept(KEPT, fly))
+
+
+def _table(cases: Mapping[str, Case], kept: Kept) -> Rows:
+    head = [
+        "protocol", "frames lost", "seeds", "confirmed", "mistaken", "half confirmed after [s]", "last find [s]",
+        "reports delivered", "area covered", "95 % covered after [s]", "connected", "contacts",
+        "nearest UAV: least / 1 % / median [m]",
     ]  # fmt: skip
-    for name, keys, loss in _CASES:
-        found = [_mission(keys, loss, seed) for seed in _SEEDS]
-        rows.append([name, f"{loss:.0%}", *_cells(found)])
-    return rows
+    return [head, *([*name.split(" | "), *_cells(flown(case, kept))] for name, case in cases.items())]
 
 
-def _cells(found: Sequence[Mapping[str, Any]]) -> Sequence[str]:
-    """What several seeds came to, on average; of the distances, over all."""
-    half_s = [one["half_s"] for one in found if one["half_s"] is not None]
+def _cells(runs: Sequence[Run]) -> Sequence[str]:
+    """What several seeds came to, on average; of contacts and the least distance, over all."""
 
     def mean(key: str) -> float:
-        return statistics.fmean(one[key] for one in found)
+        return statistics.fmean(run[key] for run in runs)
 
+    def instant(found: Sequence[float | None]) -> str:
+        known = [instant_s for instant_s in found if instant_s is not None]
+        return f"{statistics.fmean(known):.0f}" if len(known) == len(found) else "not in each"
+
+    times_s = [run["time_to_confirm_s"] for run in runs]
+    half = [run["survivors"] // 2 for run in runs]
     return [
-        f"{mean('confirmed'):.1f}",
-        f"{mean('mistaken'):.1f}",
-        f"{statistics.fmean(half_s):.0f}" if len(half_s) == len(found) else "never in some seeds",
-        f"{mean('reports'):.2f}",
+        f"{len(runs)}",
+        f"{sum(run['confirmed'] for run in runs)} of {sum(run['survivors'] for run in runs)}",
+        f"{sum(run['mistaken'] for run in runs)}",
+        instant([found[at - 1] if len(found) >= at else None for found, at in zip(times_s, half, strict=True)]),
+        instant([max(found, default=None) for found in times_s]),
+        f"{statistics.fmean(run['reports'] or 0.0 for run in runs):.2f}",
         f"{mean('coverage'):.2f}",
+        instant([run["covered_95_s"] for run in runs]),
         f"{mean('connected'):.2f}",
-        f"{sum(one['collisions'] for one in found)}",
-        f"{min(one['least'] for one in found):.1f} / {mean('p1'):.0f} / {mean('p50'):.0f}",
+        f"{sum(run['collisions'] for run in runs)}",
+        f"{min(run['nearest_m']['least'] for run in runs):.1f} / "
+        f"{statistics.fmean(run['nearest_m']['p1'] for run in runs):.0f} / "
+        f"{statistics.fmean(run['nearest_m']['p50'] for run in runs):.0f}",
     ]
-
-
-def degraded(scenario: Scenario, loss: float) -> Scenario:
-    """The scenario with a share of the frames lost on every link, from the beginning to the end."""
-    pairs = itertools.combinations(scenario.node_ids, 2)
-    faults = [{"kind": "degrade", "at_s": 0, "src": a, "dst": b, "loss_share": loss} for a, b in pairs] if loss else []
-    return Scenario.model_validate({**scenario.model_dump(), "faults": faults})
-
-
-@cache
-def _mission(keys: tuple[str, ...], loss: float, seed: int) -> Mapping[str, Any]:
-    summary = finish(simulate(degraded(find("rescue", [*_SMALL, *keys, f"seed={seed}"]), loss)), out=None)
-    mission, times = summary["mission"], summary["mission"]["time_to_confirm_s"]
-    half = mission["survivors"] // 2
-    return {
-        **mission,
-        **mission["nearest_m"],
-        "half_s": times[half - 1] if len(times) >= half else None,
-        "reports": summary["reports"]["pdr"],
-    }

@@ -1,10 +1,10 @@
 """Measured tables of planned searches: in difficult places, and how near UAVs come to each other.
 
 A mission costs a minute of CPU or more, so those that were flown are kept (`kept.py`) and the tables made of them.
-`python -m tests.tables.missions --seconds 600 places` flies as many that are still missing as fit into ten minutes.
+`python -m tests.tables.pieces --seconds 600 places` flies as many that are still missing as fit into ten minutes.
 """
 
-import argparse
+import itertools
 import statistics
 import time
 from collections.abc import Iterator, Mapping, Sequence
@@ -12,17 +12,18 @@ from typing import Final, NamedTuple
 
 import numpy as np
 
+from agents.mission.searcher import formation, least_nodes
 from fanet_mw.scenario import Scenario
 from fanet_mw.trace import Collided, FlightModeChanged, Posed, Record
 from fanet_mw.units import S
 from sim.results.files import finish
+from sim.results.mission import Covered
 from sim.run.virtual import simulate
 from sim.scenarios import catalog
-from tests.tables.kept import KEPT, Kept, OutOfTime, Run
+from tests.tables.kept import KEPT, Kept, Run
 from tests.tables.markdown import Rows
 
 _NEAR_M: Final = (10.0, 20.0, 50.0)
-_TWENTY: Final = tuple(range(1, 21))
 
 
 class Case(NamedTuple):
@@ -31,24 +32,44 @@ class Case(NamedTuple):
     scenario: str
     settings: tuple[str, ...]
     seeds: tuple[int, ...]
+    loss: float = 0.0
+    """Every link loses this share of the frames from the beginning to the end."""
 
     def with_seed(self, seed: int) -> Scenario:
-        return catalog.find(self.scenario, [*self.settings, f"seed={seed}"])
+        return degraded(catalog.find(self.scenario, [*self.settings, f"seed={seed}"]), self.loss)
+
+
+def degraded(scenario: Scenario, loss: float) -> Scenario:
+    """The scenario with a share of the frames lost on every link, from the beginning to the end."""
+    pairs = itertools.combinations(scenario.node_ids, 2)
+    faults = [{"kind": "degrade", "at_s": 0, "src": a, "dst": b, "loss_share": loss} for a, b in pairs] if loss else []
+    return Scenario.model_validate({**scenario.model_dump(), "faults": faults}) if loss else scenario
 
 
 PLACES: Final[Mapping[str, Case]] = {
-    "`town`": Case("town", (), _TWENTY),
-    "`rescue`": Case("rescue", (), _TWENTY),
-    "`hills`": Case("hills", (), _TWENTY),
-    "`night`": Case("night", (), _TWENTY),
+    "`town`": Case("town", (), tuple(range(1, 21))),
+    "`hills`": Case("hills", (), (1, 2)),
+    "`night`": Case("night", (), (1, 2)),
     "`town`, batteries of 18 to 60 % at first": Case(
         "town", ("sensors.battery_hz=1", "world.charge=[0.18,0.6]"), (1, 2, 3)
     ),
 }
+_SMALL: Final = (
+    "nodes.count=20", "nodes.spacing_m=100", "nodes.telemetry_hz=0", "clusters.count=4", "traffic.interval_s=4",
+    "world.area_m=1000", "mission.survivors=8", "duration_s=150",
+)  # fmt: skip
+"""`rescue` over a sixth of its area."""
+SHAPES: Final[Mapping[str, Case]] = {
+    **{f"`{shape}`, 20 UAVs": Case("rescue", (*_SMALL, f"mission.search={shape}"), (1, 2))
+       for shape in ("lines", "spiral", "sectors")},
+    "`spiral`, 6 UAVs": Case("rescue", (
+        *_SMALL, "mission.search=spiral", "nodes.count=6", "clusters.count=1", "traffic.sources=5", "duration_s=300",
+    ), (1, 2)),
+}  # fmt: skip
 CLEAR: Final[Mapping[str, Case]] = {
-    "hellos of neighbors and radar": Case("town", (), (1, 2, 3, 4, 5)),
-    "radar alone": Case("town", ('mission.avoid_by=["radar"]',), (1, 2, 3, 4, 5)),
-    "neither": Case("town", ("mission.avoid_by=[]",), (1, 2, 3, 4, 5)),
+    "hellos of neighbors and radar": Case("town", (), (1, 2, 3)),
+    "radar alone": Case("town", ('mission.avoid_by=["radar"]',), (1, 2, 3)),
+    "neither": Case("town", ("mission.avoid_by=[]",), (1, 2, 3)),
 }
 
 
@@ -70,6 +91,7 @@ def fly(scenario: Scenario) -> Run:
         "near": [float((nearest <= limit).mean()) for limit in _NEAR_M],
         "landed": len({r.node for r in records if type(r) is FlightModeChanged and r.mode == "land"}),
         "fell": len({r.node for r in records if type(r) is FlightModeChanged and r.mode == "fallen"}),
+        "covered_50_s": _half_covered_s(scenario, records),
         "simulated_s": summary["simulated_s"],
         "cpu_s": time.process_time() - began_s,
     }
@@ -78,6 +100,17 @@ def fly(scenario: Scenario) -> Run:
 def flown(case: Case, kept: Kept) -> list[Run]:
     """What the missions of a case came to, seed by seed."""
     return [kept.of(case.with_seed(seed)) for seed in case.seeds]
+
+
+def _half_covered_s(scenario: Scenario, records: Sequence[Record]) -> float | None:
+    """When half of the area had come within range of a UAV."""
+    covered = Covered(scenario)
+    for record in records:
+        if type(record) is Posed:
+            covered.add([(record.east_m, record.north_m, record.up_m)])
+            if covered.share >= 0.5:
+                return record.t_ns / S
+    return None
 
 
 def _nearest_m(records: Sequence[Record]) -> Iterator[np.ndarray]:
@@ -144,32 +177,45 @@ def places(kept: Kept | None = None) -> Rows:
     return [PLACES_HEAD, *(places_row(name, flown(case, kept)) for name, case in PLACES.items())]
 
 
+SHAPES_HEAD: Final = [
+    "search, UAVs", "fewest UAVs", "teams x lanes + relays + followers", "a sweep [s]", "half covered after [s]",
+    "95 % covered after [s]", "connected [%]", "confirmed", "last find [s]", "contacts",
+]  # fmt: skip
+
+
+def shapes_row(name: str, case: Case, runs: Sequence[Run]) -> list[str]:
+    """One line of the table of shapes: of the formation, and of the missions that were flown in it."""
+    scenario = case.with_seed(case.seeds[0])
+    pattern = formation(scenario, scenario.nodes.count)
+    assert pattern is not None, "the catalog refuses searches without a formation"
+    made = pattern.dimensions
+    last_s = [max(found["time_to_confirm_s"], default=0.0) for found in runs]
+
+    def median(key: str) -> str:
+        found = [run[key] for run in runs if run[key] is not None]
+        return f"{statistics.median(found):.0f}" if len(found) == len(runs) else "not in each"
+
+    return [
+        name,
+        str(least_nodes(scenario)),
+        f"{made.teams} x {made.lanes} + {made.relays} + {made.followers}",
+        f"{pattern.shape.sweep_s:.0f}",
+        median("covered_50_s"),
+        median("covered_95_s"),
+        f"{100 * statistics.fmean(found['connected'] for found in runs):.1f}",
+        f"{sum(found['confirmed'] for found in runs)} of {sum(found['survivors'] for found in runs)}",
+        f"{statistics.median(last_s):.0f}",
+        f"{sum(found['collisions'] for found in runs)}",
+    ]
+
+
+def shapes(kept: Kept | None = None) -> Rows:
+    """Searches over the same square kilometre in all shapes."""
+    kept = kept or Kept(KEPT, fly)
+    return [SHAPES_HEAD, *(shapes_row(name, case, flown(case, kept)) for name, case in SHAPES.items())]
+
+
 def keeping_clear(kept: Kept | None = None) -> Rows:
     """How near UAVs come to each other in a town, with and without what the network delivers."""
     kept = kept or Kept(KEPT, fly)
     return [CLEAR_HEAD, *(clear_row(name, flown(case, kept)) for name, case in CLEAR.items())]
-
-
-def main() -> None:
-    parser = argparse.ArgumentParser(description=__doc__, formatter_class=argparse.RawDescriptionHelpFormatter)
-    parser.add_argument("tables", nargs="+", choices=["places", "keeping-clear"])
-    parser.add_argument("--seconds", type=float, help="begin no mission that would end later; default: fly all")
-    parser.add_argument("--only", help="only cases whose name has this in it")
-    asked = parser.parse_args()
-    kept = Kept(KEPT, fly, seconds=asked.seconds)
-    cases = {"places": PLACES, "keeping-clear": CLEAR}
-    for name, case in ((n, c) for table in asked.tables for n, c in cases[table].items() if (asked.only or "") in n):
-        for seed in case.seeds:
-            try:
-                found = kept.of(case.with_seed(seed))
-            except OutOfTime:
-                return
-            print(
-                f"{name}, seed {seed}: {found['confirmed']} of {found['survivors']} confirmed, "
-                f"{found['collisions']} contacts, {found['simulated_s'] / found['cpu_s']:.1f} x real time",
-                flush=True,
-            )
-
-
-if __name__ == "__main__":
-    main()

@@ -1,0 +1,42 @@
+"""Flies the missions of long tables piece by piece: `python -m tests.tables.pieces --seconds 600 TABLE ...`.
+
+What was flown is kept (`kept.py`); once all of a table is there, `scripts/tables TABLE` writes it at once.
+"""
+
+import argparse
+from collections.abc import Mapping
+from typing import Final
+
+from tests.tables.kept import KEPT, Kept, OutOfTime
+from tests.tables.mission import SMALL, WHOLE
+from tests.tables.missions import CLEAR, PLACES, SHAPES, Case, fly
+
+TABLES: Final[Mapping[str, Mapping[str, Case]]] = {
+    "places": PLACES, "shapes": SHAPES, "keeping-clear": CLEAR, "mission-network": SMALL,
+    "mission-network-whole": WHOLE,
+}  # fmt: skip
+
+
+def main() -> None:
+    parser = argparse.ArgumentParser(description=__doc__, formatter_class=argparse.RawDescriptionHelpFormatter)
+    parser.add_argument("tables", nargs="+", choices=list(TABLES))
+    parser.add_argument("--seconds", type=float, help="begin no mission that would end later; by default fly all")
+    parser.add_argument("--only", default="", help="only cases whose name has this in it")
+    asked = parser.parse_args()
+    kept = Kept(KEPT, fly, seconds=asked.seconds)
+    cases = ((name, case) for table in asked.tables for name, case in TABLES[table].items() if asked.only in name)
+    for name, case in cases:
+        for seed in case.seeds:
+            try:
+                found = kept.of(case.with_seed(seed))
+            except OutOfTime:
+                return
+            print(
+                f"{name}, seed {seed}: {found['confirmed']} of {found['survivors']} confirmed, "
+                f"{found['collisions']} contacts, {found['simulated_s'] / found['cpu_s']:.1f} x real time",
+                flush=True,
+            )
+
+
+if __name__ == "__main__":
+    main()

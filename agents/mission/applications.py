@@ -17,7 +17,7 @@ from fanet_mw.motion import Motion
 from fanet_mw.node.reader import decoded, packet_of
 from fanet_mw.scenario import Scenario
 from fanet_mw.units import MS, Enu, NodeId, S
-from fanet_mw.wire import BIDS, FOUND, SEARCH, STATUS, SURVIVOR
+from fanet_mw.wire import BIDS, COVERED, FOUND, SEARCH, STATUS, SURVIVOR
 from fanet_mw.wire.inner import Survivor
 from fanet_mw.wire.search import Found, Search, SearchStatus, Told, told_in
 
@@ -67,7 +67,7 @@ class PlannedSearch(Application):
     """The planned search at one UAV: what it senses and hears goes to a searcher, what that decides goes out."""
 
     name: Final = "report"
-    listens = (SURVIVOR.msgid, SEARCH.msgid, STATUS.msgid, BIDS.msgid, FOUND.msgid)
+    listens = (SURVIVOR.msgid, SEARCH.msgid, STATUS.msgid, BIDS.msgid, FOUND.msgid, COVERED.msgid)
 
     def __init__(self, scenario: Scenario, node: NodeId, *, position: Enu, onboard_map: OnboardMap = NO_MAP) -> None:
         """`onboard_map` is the map that the UAV carries."""

@@ -14,6 +14,7 @@ from collections.abc import Sequence
 from typing import Final, assert_never
 
 from agents.mission.finding.announcing import Announcing
+from agents.mission.finding.coverage_map import CoverageMap
 from agents.mission.finding.finds import Finds
 from agents.mission.finding.identities import Identities
 from agents.mission.finding.phone_filter import REFERENCE_LOSS_DB, PhoneModel
@@ -26,6 +27,7 @@ from agents.mission.flight.return_home import ReturnHome
 from agents.mission.flight.velocity_choice import ClearOfObstacles, ClearOfOthers, InReach, VelocityChoice
 from agents.mission.formation.formation_place import FormationPlace
 from agents.mission.formation.formation_planner import FormationPlanner
+from agents.mission.formation.gaps import Gaps
 from agents.mission.formation.pattern import Pattern, fitted
 from agents.mission.formation.plan_exchange import PlanExchange
 from agents.mission.formation.shape import Demands, ShapeName
@@ -44,7 +46,7 @@ from fanet_mw.rng import stream
 from fanet_mw.scenario import Scenario
 from fanet_mw.units import Enu, NodeId, S
 from fanet_mw.wire.inner import Survivor
-from fanet_mw.wire.search import MOST_PLACES, Bids, Found, Search, SearchStatus, Told, encode_bids
+from fanet_mw.wire.search import MOST_PLACES, Bids, Covered, Found, Search, SearchStatus, Told, encode_bids
 
 _OFFSET_DB: Final = 1.0
 """The standard deviation by which the power of one phone is taken to differ from that of another."""
@@ -73,7 +75,8 @@ class Searcher:
             node, planner, place, navigation, outbox,
             pattern=formation(scenario, scenario.nodes.count), random=self._random,
         )  # fmt: skip
-        self._reception = PhoneReception(scenario, node, finds, navigation, outbox)
+        coverage = coverage_map(scenario)
+        self._reception = PhoneReception(scenario, node, finds, navigation, outbox, coverage)
         self._sightings = Sightings(scenario, node, Identities(finds), navigation, outbox)
         self._announcing = Announcing(node, finds, outbox)
         approach = Approach(node, finds, navigation, outbox, arrival_m=mission.arrival_m)
@@ -92,7 +95,9 @@ class Searcher:
             hard=[ClearOfObstacles(navigation, obstacles), ClearOfOthers(navigation, self._radar.avoided, obstacles)],
             soft=[InReach(navigation, neighbors, place, reach_m=reach_m)],
         )
-        self._flight = Flight(navigation, Goal(finds, navigation, place, approach), velocity_choice, self._return_home)
+        gaps = None if coverage is None else Gaps(coverage, place)
+        goal = Goal(finds, navigation, place, approach, gaps)
+        self._flight = Flight(navigation, goal, velocity_choice, self._return_home)
         self._mode = ModeRecord(node, place, self._return_home, outbox)
         self._node = node
         self._next_review_ns: int | None = None
@@ -196,18 +201,20 @@ class Searcher:
                 if self._finds.told(message, now_ns=now_ns):
                     self._announcing.struck(message.survivor, now_ns)
                     self._bidding.close(message.survivor, now_ns=now_ns)
+            case Covered():
+                self._reception.on_covered(message)
             case _:
                 assert_never(message)
 
     # --- what it tells --------------------------------------------------------------------------------------------
 
     def hello_frames(self, now_ns: int) -> bytes:
-        """Inner frames for the next hello: the latest reports, the best bids, what was found lately."""
+        """Inner frames for the next hello: the latest reports, the best bids, what was found and searched lately."""
         frames = b"".join(report.encode_frame(self._node) for report in self._finds.news(now_ns=now_ns))
         bids = self._bidding.told(now_ns=now_ns)
         if bids:
             frames += encode_bids(bids, node=self._node)
-        return frames + self._announcing.hello_frames(now_ns)
+        return frames + self._announcing.hello_frames(now_ns) + self._reception.hello_frames(now_ns)
 
 
 def phone_model(scenario: Scenario) -> PhoneModel:
@@ -235,6 +242,12 @@ def formation(scenario: Scenario, count: int) -> Pattern | None:
     search = scenario.mission.search
     shape = ShapeName.LINES if search == "none" else ShapeName[search.upper()]
     return fitted(count, demands, shape=shape, sectors_wanted=scenario.clusters.count)
+
+
+def coverage_map(scenario: Scenario) -> CoverageMap | None:
+    """An empty map of what has been searched; None: the UAVs of this scenario share none."""
+    seen_m = _ground_range_m(phone_model(scenario), scenario.nodes.altitude_m)
+    return CoverageMap(area_m=scenario.world.area_m, seen_m=seen_m) if scenario.mission.coverage_map else None
 
 
 def least_nodes(scenario: Scenario) -> int | None:

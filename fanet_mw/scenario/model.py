@@ -369,6 +369,9 @@ class Mission(Section):
     about the middle, or a single one winds outward; any number of UAVs will do. `sectors`: a team abreast for each of
     `clusters.count` sectors, not held together. `none`: the paper's rule, by which every UAV goes that has heard enough
     reports."""
+    coverage_map: bool = False
+    """`search`: whether UAVs tell their neighbors every 4 s which cells of the area have been searched, so that those
+    who are free search at once what a lost UAV, or one that responds, has left out; 143 B more in such a hello."""
     avoid_by: tuple[Literal["hellos", "radar"], ...] = ("hellos", "radar")
     """`search`: what UAVs keep clear of others by: the positions in the hellos of others, their own radar."""
     reserve_charge: Annotated[float, Field(ge=0, le=1)] = 0.15

@@ -12,6 +12,7 @@ from fanet_mw.units import Enu
 from fanet_mw.wire.frame import (
     ANY_NODE,
     BIDS,
+    COVERED,
     FOUND,
     LATEST_US,
     SEARCH,
@@ -29,6 +30,9 @@ MOST_PLACES: Final = 79
 """Places of a formation that one message can hand out."""
 MOST_BIDS: Final = 12
 """Bids of one message."""
+COVERED_SIDE: Final = 32
+"""Rows and columns of cells in which the area is searched."""
+_COVERED_BYTES: Final = COVERED_SIDE * COVERED_SIDE // 8
 WITHDRAWN: Final = 0xFFFF
 """The time of arrival of a bid that is taken back."""
 _MOST_VARIANCE_M2: Final = 1e10
@@ -232,7 +236,30 @@ class Found(NamedTuple):
         return found
 
 
-Told = Survivor | Search | SearchStatus | Bids | Found
+class Covered(NamedTuple):
+    """FANET_COVERED: the cells of the area that have been searched, as far as its sender knows."""
+
+    cells: int
+    """Bit `COVERED_SIDE * row + column` is that of a cell, from the south-western corner of the area."""
+
+    def encode_frame(self, node: int) -> bytes:
+        cells = self.cells.to_bytes(_COVERED_BYTES, "little")
+        return encode_inner(COVERED, COVERED.layout.pack(*cells, VERSION), node=node)
+
+    @classmethod
+    def decode_frame(cls, packed: Packed) -> Self:
+        """The first of a frame; raises MalformedFrameError."""
+        return cls.checked(decode_first(COVERED, packed))
+
+    @classmethod
+    def checked(cls, fields: tuple[Any, ...]) -> Self:
+        """The cells of these fields; raises MalformedFrameError."""
+        *cells, version = fields
+        _refuse_unless(version == VERSION, f"covered cells of version {version}")
+        return cls(int.from_bytes(cells, "little"))
+
+
+Told = Survivor | Search | SearchStatus | Bids | Found | Covered
 """What searching UAVs tell each other."""
 _CHECKED: Final[Mapping[int, Callable[[tuple[Any, ...]], Told]]] = {
     SURVIVOR.msgid: Survivor.checked,
@@ -240,6 +267,7 @@ _CHECKED: Final[Mapping[int, Callable[[tuple[Any, ...]], Told]]] = {
     STATUS.msgid: SearchStatus.checked,
     BIDS.msgid: checked_bids,
     FOUND.msgid: Found.checked,
+    COVERED.msgid: Covered.checked,
 }
 
 

@@ -43,7 +43,7 @@ from fanet_mw.routing import control
 from fanet_mw.trace import Record
 from fanet_mw.units import BROADCAST, Enu, NodeId, S
 from fanet_mw.wire.message import DELIVERED, MISSING, Head, Receipt, encode_piece, encode_receipts
-from fanet_mw.wire.search import Bid, Found, Search, SearchStatus, encode_bids
+from fanet_mw.wire.search import Bid, Covered, Found, Search, SearchStatus, encode_bids
 from sim.run.virtual import actors_of
 from sim.scenarios import catalog
 
@@ -160,6 +160,7 @@ def _not_recorded() -> list[bytes]:
         SearchStatus(7, Enu(1.0, 2.0, 3.0), 4, 1, 80).encode_frame(4),
         encode_bids([Bid(3, 4, 200, 7), Bid(5, 6, 0xFFFF, 8, 2)], node=4),
         Found(7, 3, 10.0, 20.0, node=4, confirmed=False, **covariance).encode_frame(4),
+        Covered(0x8001 << 1000 | 5).encode_frame(4),
         encode_piece(head, bytes(range(200)), node=3),
         encode_piece(head._replace(piece=1), bytes(100), node=3, targets=range(1, 40)),
         encode_piece(head._replace(size=len(text), port=0, pieces=1, stride=1000), text, node=3, targets=(4,)),

@@ -38,8 +38,8 @@ from fanet_mw.wire.digest import Digest
 from fanet_mw.wire.inner import Beacon, Join, Schedule, Survivor, TimeBeacon
 from fanet_mw.wire.links import Links
 from fanet_mw.wire.places import Places
+from fanet_mw.wire.search import Covered, Search, SearchStatus, checked_bids
 from fanet_mw.wire.search import Found as FoundMessage
-from fanet_mw.wire.search import Search, SearchStatus, checked_bids
 from sim.run.collecting.bus_checks import BusChecks
 
 SLOW_S: Final = 0.5
@@ -99,7 +99,12 @@ def _of_the_air(found: Corpus) -> Iterator[Decoder]:
         _there_and_back(pieces.decode_receipts, lambda m: pieces.encode_receipts(m, node=3)),
         of(wire.RECEIPT.msgid),
     )
-    for kind, spec in ((Search, wire.SEARCH), (SearchStatus, wire.STATUS), (FoundMessage, wire.FOUND)):
+    for kind, spec in (
+        (Search, wire.SEARCH),
+        (SearchStatus, wire.STATUS),
+        (FoundMessage, wire.FOUND),
+        (Covered, wire.COVERED),
+    ):
         yield Decoder(kind.__name__, _there_and_back(kind.decode_frame, _encode_frame), of(spec.msgid))
     yield Decoder("Bids", lambda data: checked_bids(wire.decode_first(wire.BIDS, data)), of(wire.BIDS.msgid))
     yield Decoder("Places", Places.decode_frames, of(wire.PLACES.msgid))

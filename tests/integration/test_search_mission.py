@@ -1,7 +1,7 @@
 """A whole planned search in small: 12 UAVs, 500 x 500 m, three survivors; what it is led by, and what it survives."""
 
 from array import array
-from collections.abc import Callable
+from collections.abc import Callable, Sequence
 from typing import Any, Final
 
 import pytest
@@ -65,9 +65,9 @@ class Around(Actor):
         return dict(self._inner.report())
 
 
-def flown(wrap: Callable[[Actor, Topics], Actor], *, seconds: int) -> Outcome:
+def flown(wrap: Callable[[Actor, Topics], Actor], *, seconds: int, keys: Sequence[str] = ()) -> Outcome:
     """The mission in which each UAV is wrapped."""
-    scenario = find("rescue", [*KEYS, f"duration_s={seconds}"])
+    scenario = find("rescue", [*KEYS, *keys, f"duration_s={seconds}"])
     world, medium, *uavs = actors_of(scenario, scenario.name)
     records: list[Record] = []
     names = Topics(scenario.name)
@@ -152,3 +152,22 @@ def test_what_a_lost_uav_would_have_searched_is_searched_by_another() -> None:
     found = mission_of(after)
     assert found["coverage"] >= 0.99
     assert found["confirmed"] == 3
+
+
+@pytest.mark.slow
+@pytest.mark.timeout(900)
+def test_who_shares_what_has_been_searched_searches_the_lanes_of_lost_uavs_before_they_are_given_up() -> None:
+    """The outermost two of a line are lost before the sweep; the plan gives their places away after 70 s of silence."""
+    wide = ("nodes.count=20", "traffic.sources=19", "world.area_m=1000")
+    plans = [r for r in flown(lambda uav, _: uav, seconds=20, keys=wide).records if isinstance(r, Planned)]
+    names = {f"agent-{plan.node}" for plan in plans if plan.place in (0, 5)}
+    assert len(names) == 2
+
+    def covered(share: bool) -> float:
+        keys = (*wide, f"mission.coverage_map={str(share).lower()}")
+        after = flown(
+            lambda uav, topics: Lost(uav, topics, at_ns=32 * S) if uav.name in names else uav, seconds=98, keys=keys
+        )
+        return float(mission_of(after)["coverage"])
+
+    assert covered(share=True) >= covered(share=False) + 0.02

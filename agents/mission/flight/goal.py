@@ -3,7 +3,8 @@
 from typing import Final
 
 from agents.mission.finding.finds import Finds
-from agents.mission.formation.formation_place import FormationPlace, along
+from agents.mission.formation.formation_place import STILL, FormationPlace, along
+from agents.mission.formation.gaps import Gaps
 from agents.mission.navigation.navigation import Navigation
 from agents.mission.tasking.approach import Approach
 from agents.mission.tasking.bidding import FAR_M, VAGUE_M
@@ -16,9 +17,18 @@ _SHARED_M: Final = 35.0
 class Goal:
     """The place that one UAV flies to, from what it has found and its place in the formation."""
 
-    def __init__(self, finds: Finds, navigation: Navigation, formation: FormationPlace, approach: Approach) -> None:
+    def __init__(
+        self,
+        finds: Finds,
+        navigation: Navigation,
+        formation: FormationPlace,
+        approach: Approach,
+        gaps: Gaps | None,
+    ) -> None:
+        """`gaps`: what the formation has left out, for UAVs that share what has been searched."""
         self._finds, self._navigation = finds, navigation
         self._formation, self._approach = formation, approach
+        self._gaps = gaps
 
     def at(self, task: int | None, now_ns: int) -> tuple[Enu, Enu]:
         """The place to fly to and how it moves; `task` is the survivor that this UAV has won, if any."""
@@ -31,9 +41,17 @@ class Goal:
                 survivor = self._in_lane(lane, moves, now_ns)
         place = None if survivor is None else self._finds.known[survivor].place()
         if survivor is None or place is None:
-            return lane, moves
+            gap = self._gap(now_ns)
+            return (lane, moves) if gap is None else (Enu(*gap, lane.up), STILL)
         east, north = self._approach.point(survivor, place, now_ns, responding=survivor == task)
         return formation.bounded(east, north, lane, moves)
+
+    def _gap(self, now_ns: int) -> tuple[float, float] | None:
+        """What the formation has left out, for a UAV that is free to go there; None: nothing, or we have a place."""
+        formation = self._formation
+        if self._gaps is None or not formation.is_free or formation.place is None:
+            return None
+        return self._gaps.nearest(self._navigation.position, now_ns)
 
     def _in_lane(self, lane: Enu, moves: Enu, now_ns: int) -> int | None:
         """The nearest survivor that the lane of the UAV leads by: it looks at it as it passes, in formation."""

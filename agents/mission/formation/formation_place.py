@@ -109,15 +109,24 @@ class FormationPlace:
 
     def holds_together(self, estimate: Estimate | None, now_ns: int, *, within_s: float) -> bool:
         """True if a UAV at a survivor would be in reach of its line, for some seconds from that time on."""
-        plan, pattern, place = self.plan, self.pattern, self.place
-        if estimate is None or plan is None or pattern is None or place is None or not self.is_taken_up(now_ns):
+        return estimate is not None and self.keeps_line(estimate.east_m, estimate.north_m, now_ns, within_s=within_s)
+
+    def keeps_line(self, east_m: float, north_m: float, now_ns: int, *, within_s: float) -> bool:
+        """The same of a spot."""
+        pattern, place, at_s = self.pattern, self.place, self.swept_s(now_ns)
+        if pattern is None or place is None or at_s is None:
             return False
-        shape, at_s = pattern.shape, (now_ns - _taken_up_ns(plan)) / S
+        shape = pattern.shape
         team = shape.team_of(place)
         return all(
-            shape.apart_m(team, estimate.east_m, estimate.north_m, at_s + ahead_s) <= self._most_m
+            shape.apart_m(team, east_m, north_m, at_s + ahead_s) <= self._most_m
             for ahead_s in (within_s, within_s + 5.0)
         )
+
+    def swept_s(self, now_ns: int) -> float | None:
+        """How long the formation has been sweeping; None before everyone has had time to take it up."""
+        plan = self.plan
+        return (now_ns - _taken_up_ns(plan)) / S if plan is not None and self.is_taken_up(now_ns) else None
 
 
 def along(moves: Enu, east_m: float, north_m: float) -> tuple[float, float]:

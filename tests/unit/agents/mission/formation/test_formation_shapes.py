@@ -99,6 +99,16 @@ def test_a_spiral_of_a_few_winds_outward_until_all_is_seen_and_is_one_piece_all_
     assert all(max(abs(at.east), abs(at.north)) <= 500 for at in flown)
 
 
+def test_the_outermost_lane_of_a_spiral_flies_at_the_speed_of_the_sweep_and_no_lane_faster() -> None:
+    pattern = formed(ShapeName.SPIRAL, 2, 1000)
+    fastest = [
+        max(pattern.velocity(place, second + 0.5).norm() for place in range(2))
+        for second in range(int(pattern.shape.sweep_s) - 1)
+    ]
+    assert max(fastest) <= SPEED_M_S + 1e-6
+    assert min(fastest) > 0.6 * SPEED_M_S
+
+
 def test_a_spiral_of_few_has_seen_the_middle_first() -> None:
     pattern = formed(ShapeName.SPIRAL, 2, 1000)
     eighth_s = pattern.shape.sweep_s / 8

@@ -1,0 +1,71 @@
+"""Which cells of the area have been searched, as far as one UAV knows.
+
+    flown over        cells whose middles came within the range of its own receiver
+    told by others    with hellos, every `TELL_NS`; a cell that anyone has searched stays searched
+
+Maps are merged by a bitwise or, which is idempotent, commutative and associative: they spread from neighbor to neighbor
+in any order, and copies do no harm.
+"""
+
+import math
+from collections.abc import Iterator
+from typing import Final
+
+from fanet_mw.units import Enu, S
+from fanet_mw.wire.search import COVERED_SIDE, Covered
+
+TELL_NS: Final = 4 * S
+
+
+class CoverageMap:
+    """The map of one UAV."""
+
+    def __init__(self, *, area_m: float, seen_m: float) -> None:
+        self._half_m = area_m / 2
+        self._cell_m = area_m / COVERED_SIDE
+        self.seen_m = max(seen_m, self._cell_m)
+        """How far a receiver searches."""
+        self.cells = 0
+        self._told_ns: int | None = None
+
+    def fly_over(self, position: Enu) -> None:
+        """The UAV is at a place: its receiver searches what is around."""
+        self.cells |= self.around(position, self.seen_m)
+
+    def merge(self, told: Covered) -> None:
+        """A neighbor tells what has been searched."""
+        self.cells |= told.cells
+
+    def news(self, now_ns: int) -> Covered | None:
+        """What to tell with a hello; None: it is not time yet."""
+        if self._told_ns is not None and now_ns - self._told_ns < TELL_NS:
+            return None
+        self._told_ns = now_ns
+        return Covered(self.cells)
+
+    def around(self, position: Enu, within_m: float) -> int:
+        """The cells whose middles are within so many metres of a place."""
+        found = 0
+        columns, rows = self._span(position.east, within_m), self._span(position.north, within_m)
+        for row in rows:
+            north_m = self._middle_m(row) - position.north
+            for column in columns:
+                if math.hypot(self._middle_m(column) - position.east, north_m) <= within_m:
+                    found |= 1 << (COVERED_SIDE * row + column)
+        return found
+
+    def _span(self, middle_m: float, within_m: float) -> range:
+        first = math.floor((middle_m - within_m + self._half_m) / self._cell_m)
+        last = math.floor((middle_m + within_m + self._half_m) / self._cell_m)
+        return range(max(0, first), min(COVERED_SIDE - 1, last) + 1)
+
+    def _middle_m(self, index: int) -> float:
+        return (index + 0.5) * self._cell_m - self._half_m
+
+    def middles(self, cells: int) -> Iterator[tuple[float, float]]:
+        """East and north of the middles of these cells."""
+        while cells:
+            lowest = cells & -cells
+            row, column = divmod(lowest.bit_length() - 1, COVERED_SIDE)
+            yield self._middle_m(column), self._middle_m(row)
+            cells ^= lowest

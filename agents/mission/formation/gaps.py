@@ -1,0 +1,54 @@
+"""What the formation has left out: cells that it has passed, by the plan, and that nobody is known to have searched."""
+
+import math
+from typing import Final
+
+from agents.mission.finding.coverage_map import CoverageMap
+from agents.mission.formation.formation_place import FormationPlace
+from fanet_mw.units import Enu, S
+
+_EXPECT_NS: Final = 4 * S
+"""How often what the formation has passed is added up; no place flies farther than a cell or so meanwhile."""
+_LATE_S: Final = 18.0
+"""What was passed less than this ago may have been searched without the UAV having been told."""
+_LANE: Final = 0.5
+"""A lane is to have searched this share of the distance of two lanes to either side."""
+_NEAR_M: Final = 450.0
+"""Nobody flies farther than this to a gap: what is known of places farther away is older."""
+
+
+class Gaps:
+    """The gaps that one UAV knows of."""
+
+    def __init__(self, coverage: CoverageMap, formation: FormationPlace) -> None:
+        self._coverage, self._formation = coverage, formation
+        self._expected = 0
+        """The cells that the formation has passed."""
+        self._expected_ns: int | None = None
+
+    def nearest(self, here: Enu, now_ns: int) -> tuple[float, float] | None:
+        """East and north of the middle of the nearest gap from which the line of the UAV is in reach; None: none is."""
+        self._expect(now_ns)
+        coverage, formation = self._coverage, self._formation
+        gaps = [
+            (math.hypot(east - here.east, north - here.north), east, north)
+            for east, north in coverage.middles(self._expected & ~coverage.cells)
+        ]
+        near = sorted(gap for gap in gaps if gap[0] <= _NEAR_M and formation.keeps_line(*gap[1:], now_ns, within_s=0.0))
+        if not near:
+            return None
+        _, east, north = near[0]
+        around = [gap for gap in near if math.hypot(gap[1] - east, gap[2] - north) <= coverage.seen_m]
+        return math.fsum(gap[1] for gap in around) / len(around), math.fsum(gap[2] for gap in around) / len(around)
+
+    def _expect(self, now_ns: int) -> None:
+        """Add what the formation has passed since the last time."""
+        pattern, swept_s = self._formation.pattern, self._formation.swept_s(now_ns)
+        if pattern is None or swept_s is None or swept_s < _LATE_S:
+            return
+        if self._expected_ns is not None and now_ns - self._expected_ns < _EXPECT_NS:
+            return
+        self._expected_ns = now_ns
+        for place in range(pattern.dimensions.teams * pattern.dimensions.lanes):
+            at = pattern.at(place, swept_s - _LATE_S)
+            self._expected |= self._coverage.around(at, _LANE * pattern.shape.lane_m)

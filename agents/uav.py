@@ -216,8 +216,9 @@ class Uav(Actor):
             onboard.called = False
             self._own_wake_ns = self._next_own_ns()
         if node.requests:
-            topic = self._topics.transmit
-            self.outbox += [(topic, request) for request in node.requests]
+            outbox, topic = self.outbox, self._topics.transmit
+            for request in node.requests:  # mostly one
+                outbox.append((topic, request))
             node.requests.clear()
         return called
 

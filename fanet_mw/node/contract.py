@@ -43,6 +43,9 @@ class Port(Protocol):
         comes. Copies of the packet in that phase that come back are known.
         """
 
+    def relay(self, relay: Relay) -> None:
+        """Pass a flooded packet on, one hop more, in a frame of its own."""
+
     def relay_together(self, relays: Sequence[Relay]) -> None:
         """Pass flooded packets on, one hop more each, in as few frames as they fit; a frame goes at the first instant
         of those in it.

@@ -211,7 +211,7 @@ class Node:
             self.port.dropped[DropReason.MALFORMED] += 1
             return False
         for relay in relays:
-            self.port.relay_together((relay,))
+            self.port.relay(relay)
         return False
 
     def _hear_bundle(self, reception: Reception, now_ns: int) -> None:

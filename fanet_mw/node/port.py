@@ -73,11 +73,11 @@ class NodePort:
         self.mark(packet, flags=flags)
         return self.transmit(self._begun(packet, flags), dst, start_ns=start_ns, wants_status=True)
 
+    def relay(self, relay: Relay) -> None:
+        packet, start_ns = relay
+        self.transmit(self.forwarded(packet, flags=wire.FLAG_FLOOD), BROADCAST, start_ns=start_ns)
+
     def relay_together(self, relays: Sequence[Relay]) -> None:
-        if len(relays) == 1:  # as most
-            ((packet, start_ns),) = relays
-            self.transmit(self.forwarded(packet, flags=wire.FLAG_FLOOD), BROADCAST, start_ns=start_ns)
-            return
         self._share([(start_ns, self.forwarded(packet, flags=wire.FLAG_FLOOD)) for packet, start_ns in relays])
 
     def forwarded(self, packet: Packet, *, flags: int) -> bytes:

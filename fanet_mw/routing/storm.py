@@ -58,7 +58,7 @@ class CounterBased(FloodingProtocol):
 
     def wake(self, now_ns: int) -> None:
         for packet in self._assessment.decided(now_ns=now_ns):
-            self._port.relay_together([Relay(packet, now_ns + self._lead_ns)])
+            self._port.relay(Relay(packet, now_ns + self._lead_ns))
 
     def waiting(self) -> int:
         return len(self._assessment)

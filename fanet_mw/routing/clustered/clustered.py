@@ -186,7 +186,7 @@ class Clustered(RoutingProtocol):
         parts = self.parts
         parts.roles.wake(now_ns)
         for relay in parts.contending.decided(now_ns):
-            self._port.relay_together([relay])
+            self._port.relay(relay)
         for packet in parts.repair.due(now_ns=now_ns) if parts.repair else ():
             parts.access.answer(packet, now_ns=now_ns)
         parts.uplink.expire(now_ns=now_ns)

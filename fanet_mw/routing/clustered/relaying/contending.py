@@ -12,6 +12,7 @@ from fanet_mw.routing.clustered.tdma.contention import Contention
 from fanet_mw.units import MS
 
 _CONTROL_JITTER_NS: Final = 100 * MS
+_new: Final = tuple.__new__  # for what is made once per frame
 _NOTHING: Final[Mapping[str, object]] = {}
 
 
@@ -46,7 +47,7 @@ class ContendingRelaying:
         return [self._relay(packet, 0, now_ns) for packet in packets] if packets else ()
 
     def _relay(self, packet: Packet, jitter_ns: int, now_ns: int) -> Relay:
-        return Relay(packet, self._contention.start_ns(now_ns=now_ns, jitter_ns=jitter_ns))
+        return _new(Relay, (packet, self._contention.start_ns(now_ns=now_ns, jitter_ns=jitter_ns)))
 
     def waiting(self) -> int:
         return len(self._rule.open_until)

@@ -25,6 +25,7 @@ def figures(
     out: Path = Path("figures"),
     jobs: Annotated[int | None, Parameter(validator=Number(gte=1))] = None,
     scheduler: str | None = None,
+    retry: Annotated[bool, Parameter(negative="")] = False,
     draw_only: Annotated[bool, Parameter(negative="")] = False,
 ) -> int:
     """Recreate the paper's figures 8 to 12, and figures beyond it, and say which of its claims hold.
@@ -45,6 +46,8 @@ def figures(
         Processes of this machine; by default one per core.
     scheduler
         A Dask scheduler whose workers carry out the runs.
+    retry
+        Repeat runs that failed, among them those in real time for which the machine was too busy.
     draw_only
         Draw from the runs that are finished, and run nothing.
 
@@ -64,7 +67,7 @@ def figures(
         runs = out / "sweeps" / f"{recipe.sweep}-{variant}"
         if not draw_only:
             found = spec.find(recipe.sweep).variant(variant)
-            code |= carry_out(recipe.sweep, found, out=runs, jobs=jobs, scheduler=scheduler)
+            code |= carry_out(recipe.sweep, found, out=runs, jobs=jobs, scheduler=scheduler, retry=retry)
         verdicts += [(recipe.name, claim) for claim in render(recipe, read(runs), out, variant=variant)]
     console = Console()
     table = Table("figure", "claim", "verdict", box=None, header_style="bold", padding=(0, 2, 0, 0))

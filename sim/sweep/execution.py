@@ -42,10 +42,7 @@ def _launched(scenario: Scenario) -> Outcome:
     """Run a scenario as processes; only a run in real time needs the bus and its packages."""
     from sim.run.launcher.swarm import launch
 
-    outcome = asyncio.run(launch(scenario, swarm=f"{scenario.name}-sweep", heed_signals=False))
-    if outcome.aborted is not None:
-        raise HostError(outcome.aborted)
-    return outcome
+    return asyncio.run(launch(scenario, swarm=f"{scenario.name}-sweep", heed_signals=False))
 
 
 def _cpu_s() -> float:
@@ -65,6 +62,8 @@ def carry_out(task: Task) -> Finished:
         scenario = config.build(task.tree)
         outcome = _launched(scenario) if task.realtime else simulate(scenario)
         summary = finish(outcome, out=None)
+        if task.realtime and not summary["valid"]:
+            raise HostError(f"not valid: {'; '.join(summary['invalid_because'])}")
         del summary["wall_s"], summary["unwritten"]
         measured: dict[str, Value] = {name: MEASURES[name](outcome) for name in task.measure}
     except Exception as error:  # noqa: BLE001 one run of many: the others go on, and the table names this one

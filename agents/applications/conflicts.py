@@ -10,6 +10,8 @@ way its sender goes. A level is the distance to be kept. Sans-IO.
 
 Both are assumed to fly on sideways as they did. Not modeled: turns that the other UAV has planned, and conflicts that
 the change of height itself causes until the next hello shows them.
+
+In a planned search UAVs keep clear of each other by their velocities instead: `agents/mission/flight/constraints.py`.
 """
 
 import math

@@ -47,7 +47,7 @@ class Goal:
         return formation.bounded(east, north, lane, moves)
 
     def _gap(self, now_ns: int) -> tuple[float, float] | None:
-        """What the formation has left out, for a UAV that is free to go there; None: nothing, or we have a place."""
+        """What the formation has left out, for a UAV that is free to go there; None: nothing, or it has a place."""
         formation = self._formation
         if self._gaps is None or not formation.is_free or formation.place is None:
             return None

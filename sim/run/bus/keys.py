@@ -85,7 +85,7 @@ class _Authority:
         key, certificate = self._folder / f"{file}.key", self._folder / f"{file}.pem"
         command = ["openssl", *_NEW_KEY, "-days", self._days, "-subj", f"/CN={name}"]
         try:
-            subprocess.run(  # noqa: S603  (no shell, and every argument is ours or was checked by openssl)
+            subprocess.run(  # noqa: S603  (no shell, and every argument is made here or was checked by openssl)
                 [*command, "-keyout", str(key), "-out", str(certificate), *more],
                 check=True,
                 capture_output=True,

@@ -25,6 +25,8 @@ class Panel(NamedTuple):
     """True for what lies between 0 and 1."""
     least: float = 0.0
     """Where a linear axis begins."""
+    most: float = math.inf
+    """The greatest value that there can be, if it is no share."""
 
 
 def curves(
@@ -51,7 +53,7 @@ def curves(
                 at = {key: runs.of(panel.quantity, case=case, **{setting.replace(".", "__"): key}) for key in levels}
                 found = [(value(key), one.scaled(panel.factor)) for key, one in at.items() if one.runs]
                 xs = [beside(places[x], number, len(cases), log=not even, apart=_APART) for x, _ in found]
-                line(axes, _look(case, number), xs, [one for _, one in found], most=1.0 if panel.share else math.inf)
+                line(axes, _look(case, number), xs, [one for _, one in found], most=1.0 if panel.share else panel.most)
                 data += [point(one, panel=panel.label, series=case, at=x) for x, one in found]
             if not even:
                 axes.set_xscale("log")

@@ -13,6 +13,8 @@ _RIVALS: Final = {"paper": "the paper's method", "flooding": "plain flooding"}
 _HALF: Final = 0.5
 _MOST: Final = 0.8
 _HARDLY_S: Final = 5.0
+_END_S: Final = 80.0
+"""The length of a run, at which a search counts as ended."""
 
 
 def loss_share(faults: str) -> float:
@@ -120,6 +122,7 @@ def claims_mission(runs: Runs) -> list[Claim]:
                     0.0,
                 )
                 for rival, name in _RIVALS.items()
+                if runs.where(case=rival)
             ],
         ),
     ]
@@ -154,8 +157,8 @@ MISSION: Final = Recipe(
         "faults",
         "share of frames that every link loses",
         [
-            Panel(_half_s, "until half of the survivors are confirmed [s]"),
-            Panel(_all_s, "until all are confirmed [s]"),
+            Panel(_half_s, "until half of the survivors are confirmed [s]", most=_END_S),
+            Panel(_all_s, "until all are confirmed [s]", most=_END_S),
             Panel("reports.pdr", "reports delivered, share", share=True),
         ],
         value=loss_share,

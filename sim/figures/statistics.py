@@ -11,6 +11,7 @@ _T_975: Final = (
 )  # fmt: skip
 """Quantile 0.975 of Student's t for 1 to 30 degrees of freedom."""
 _NORMAL_975: Final = 1.960
+_IN_FULL: Final = 999.5
 
 
 class Interval(NamedTuple):
@@ -29,8 +30,13 @@ class Interval(NamedTuple):
         """For people, for example `0.91 s [0.88, 0.94]`."""
         unit = f" {unit}" if unit else ""
         if math.isinf(self.low):
-            return f"{self.mean:.3g}{unit} [one run]"
-        return f"{self.mean:.3g}{unit} [{self.low:.3g}, {self.high:.3g}]"
+            return f"{_said(self.mean)}{unit} [one run]"
+        return f"{_said(self.mean)}{unit} [{_said(self.low)}, {_said(self.high)}]"
+
+
+def _said(value: float) -> str:
+    """Three digits, and no power of ten for what people say in full."""
+    return f"{value:.0f}" if _IN_FULL <= abs(value) < math.inf else f"{value:.3g}"
 
 
 def quantile_975(freedom: int) -> float:

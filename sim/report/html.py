@@ -12,6 +12,7 @@ body { font: 16px/1.5 system-ui, sans-serif; color: #1a1a1a; max-width: 72rem; m
 h1 { font-size: 1.7rem; } h2 { font-size: 1.3rem; margin-top: 2.5rem; border-bottom: 1px solid #ccc; }
 table { border-collapse: collapse; margin: .8rem 0; font-size: .93rem; }
 th, td { text-align: left; vertical-align: top; padding: .3rem .7rem; border-bottom: 1px solid #ddd; }
+td div { min-width: 16rem; margin-bottom: .5rem; }
 th { background: #f3f3f3; } figure { margin: 1rem 0; } figure img { max-width: 100%; height: auto; }
 figcaption { color: #444; font-size: .93rem; } code, pre { background: #f5f5f5; font-size: .9rem; }
 pre { padding: .7rem; overflow-x: auto; } .agrees { color: #00543d; font-weight: 600; }
@@ -90,7 +91,9 @@ def _html(block: Block) -> str:
 
 def _cell(text: str) -> str:
     kind = f' class="{text}"' if text in _VERDICTS else ""
-    return f"<td{kind}>{html.escape(text).replace(chr(10), '<br>')}</td>"
+    lines = html.escape(text).split("\n")
+    inside = lines[0] if len(lines) == 1 else "".join(f"<div>{line}</div>" for line in lines)
+    return f"<td{kind}>{inside}</td>"
 
 
 def as_markdown(title: str, blocks: Iterable[Block], folder: Path) -> str:

@@ -40,6 +40,8 @@ def test_an_interval_is_that_of_student() -> None:
     assert 3 - found.low == pytest.approx(1.963, abs=1e-3)
     assert interval([7.0]).low == -math.inf
     assert math.isnan(interval([]).mean)
+    assert interval([1280.4, 1280.4]).text("ms") == "1280 ms [1280, 1280]"
+    assert interval([0.01234]).text() == "0.0123 [one run]"
 
 
 def test_quantiles_fall_towards_the_normal_one() -> None:

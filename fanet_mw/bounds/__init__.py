@@ -2,7 +2,7 @@
 
 `paper` holds the paper's equations (2)-(4) to the letter, for comparison. `slot` is the service of one slot per
 superframe, `turn_gaps` that of single turns. `arrivals` and `network` are the parts of network calculus that bound a
-queue fed by bursts. `access` holds the constants of the MAC, `guard` is the guard time of a slot.
+queue fed by bursts. `mac` holds the constants of the MAC, `guard` is the guard time of a slot.
 """
 
 from fanet_mw.bounds.arrivals import Arrivals, Periodic, Total

@@ -1,8 +1,8 @@
 """The plan of the search: which UAV takes which place of the formation, made by one node and told over the air.
 
     every node: says where it is, at once and then every STATUS_S
-    planner:    the lowest id that has been heard of lately; it plans once all have been heard of, or after PATIENCE_S
-    lost nodes: a UAV of a place that was not heard of for LOST_S is replaced, by a follower if its place is in a
+    planner:    the lowest id that has been heard of lately; it plans once all have been heard of, or after _PATIENCE_NS
+    lost nodes: a UAV of a place that was not heard of for _LOST_NS is replaced, by a follower if its place is in a
                 line or in the chain, because those places hold the swarm together and sweep the area
     leavers:    a node that says that its battery only just takes it home is replaced at once
 

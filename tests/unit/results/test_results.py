@@ -2,6 +2,7 @@
 
 import json
 import os
+import re
 import subprocess
 import sys
 from pathlib import Path
@@ -97,3 +98,13 @@ def test_a_limit_of_the_size_of_files_costs_the_long_ones_only(tmp_path: Path) -
     assert done.returncode == 1
     assert json.loads((tmp_path / "out/summary.json").read_text())["unwritten"]["trace.jsonl"] == "File too large"
     assert (tmp_path / "out/trace.jsonl").read_bytes().endswith(b"]\n")
+
+
+def test_every_figure_of_a_summary_is_defined_in_the_reference(outcome: Outcome) -> None:
+    page = (Path(__file__).parents[3] / "docs/reference/results.md").read_text()
+    rows = [line.split("|")[1] for line in page.splitlines() if line.startswith("| `")]
+    defined = set(re.findall(r"`([\w.]+)`", " ".join(rows)))
+    summary = finish(outcome, out=None)
+    figures = {*summary} | {f"mission.{name}" for name in summary["mission"]}
+    whole = {"mission", "air"}  # their figures have rows of their own
+    assert figures - defined - whole == set()

@@ -142,13 +142,13 @@ class LinkTable:
         power_dbm = received_dbm(distance, at[found[:, 0]], at[found[:, 1]], radio)
         if shadowing is not None:
             power_dbm = power_dbm - shadowing.loss_db(at, found, distance)
-        hidden = np.zeros(len(found), bool)
+        obstructed = np.zeros(len(found), bool)
         if blocked is not None and len(blocked):
-            hidden = np.isin(pair_codes(found, len(at)), blocked)
+            obstructed = np.isin(pair_codes(found, len(at)), blocked)
         if radio.channel == "range":
-            kept = ~hidden
+            kept = ~obstructed
         else:
-            power_dbm = power_dbm - radio.obstruction_loss_db * hidden
+            power_dbm = power_dbm - radio.obstruction_loss_db * obstructed
             kept = power_dbm >= radio.interference_floor_dbm - _ROUNDING_DB
         if not kept.all():
             found, distance, power_dbm = found[kept], distance[kept], power_dbm[kept]

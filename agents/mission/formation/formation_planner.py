@@ -10,6 +10,7 @@ The first assignment minimizes the sum of the squared distances flown. Ways on w
 same instants then do not cross, and UAVs that were near each other stay so.
 """
 
+from itertools import zip_longest
 from typing import Final, NamedTuple
 
 from agents.mission.formation.pattern import Pattern
@@ -182,7 +183,11 @@ def pattern_of(plan: Search) -> Pattern:
 
 
 def _filled(holders: list[int], pattern: Pattern) -> list[int]:
-    """Vacant places that sweep the area or hold the swarm together go to the nearest followers."""
+    """Give vacant places that sweep the area or hold the swarm together to the nearest followers.
+
+    When there are no followers any more, those farther out in the line move up: it stays in one piece, and is shorter
+    at its end.
+    """
     filled = list(holders)
     for place in range(pattern.dimensions.fixed):
         if filled[place]:
@@ -192,6 +197,11 @@ def _filled(holders: list[int], pattern: Pattern) -> list[int]:
         if spare:
             _, other = min(spare)
             filled[place], filled[other] = filled[other], 0
+        else:
+            outward = pattern.shape.outward(place)
+            left = [filled[other] for other in outward if filled[other]]
+            for other, node in zip_longest(outward, left, fillvalue=0):
+                filled[other] = node
     return filled
 
 

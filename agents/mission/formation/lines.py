@@ -79,6 +79,13 @@ class Lines:
             found.append(place + 1 if place < 2 * lanes + relays - 1 else lanes + middle)
         return tuple(found)
 
+    def outward(self, place: int) -> range:
+        lanes = self._formation.lanes
+        if place >= 2 * lanes:
+            return range(place, place + 1)
+        first = place // lanes * lanes
+        return range(place, first + lanes) if place - first >= lanes // 2 else range(place, first - 1, -1)
+
     def team_of(self, place: int) -> int:
         formation = self._formation
         if place < 2 * formation.lanes:

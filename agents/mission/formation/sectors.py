@@ -69,6 +69,13 @@ class Sectors:
         found += [place + 1] if lane < formation.lanes - 1 or column < self._columns - 1 else []
         return tuple(found)
 
+    def outward(self, place: int) -> range:
+        if place >= self._formation.fixed:
+            return range(place, place + 1)
+        row = self._columns * self._formation.lanes
+        first = place // row * row
+        return range(place, first + row) if 2 * (place - first) >= row else range(place, first - 1, -1)
+
     def team_of(self, place: int) -> int:
         formation = self._formation
         return place // formation.lanes if place < formation.fixed else formation.follower(place)[0]

@@ -117,6 +117,10 @@ class Shape(Protocol):
         """The places that this one must stay in reach of, so that the formation holds together; none for a follower."""
         ...
 
+    def outward(self, place: int) -> range:
+        """The places of its line from this one to the outermost: who is lost is replaced by the next in this order."""
+        ...
+
     def team_of(self, place: int) -> int:
         """The team that a place belongs to; of a relay, the nearer one."""
         ...

@@ -70,6 +70,10 @@ class Spiral:
             found += sorted(other * formation.lanes for other in around)
         return tuple(found)
 
+    def outward(self, place: int) -> range:
+        lanes = self._formation.lanes
+        return range(place, (place // lanes + 1) * lanes if place < self._formation.fixed else place + 1)
+
     def team_of(self, place: int) -> int:
         formation = self._formation
         return place // formation.lanes if place < formation.fixed else formation.follower(place)[0]

@@ -4,9 +4,11 @@ import itertools
 import math
 from collections.abc import Sequence
 
-from agents.mission.formation.formation_planner import FormationPlanner
+import pytest
+
+from agents.mission.formation.formation_planner import FormationPlanner, plan_of
 from agents.mission.formation.pattern import Pattern, fitted
-from agents.mission.formation.shape import Demands
+from agents.mission.formation.shape import Demands, ShapeName
 from fanet_mw.units import US, Enu, NodeId, S
 from fanet_mw.wire.search import Search, SearchStatus
 
@@ -101,6 +103,36 @@ def test_the_place_of_a_lost_uav_in_a_line_goes_to_a_follower() -> None:
     assert lost not in after.nodes
     assert after.revision == before.revision + 1
     assert after.nodes[3] in before.nodes[pattern.followers.start :]
+
+
+@pytest.mark.parametrize(
+    ("shape", "count", "lost", "line_after"),
+    [
+        (ShapeName.SPIRAL, 5, [1], [0, 2, 3, 4, None]),
+        (ShapeName.SPIRAL, 5, [0, 1], [2, 3, 4, None, None]),
+        (ShapeName.SPIRAL, 5, [4], [0, 1, 2, 3, None]),
+        (ShapeName.LINES, 38, [3], [None, 0, 1, 2, 4]),
+        (ShapeName.LINES, 38, [7], [0, 1, 2, 3, 4, 5, 6, 8, 9, 10, 11, 12, 13, None]),
+        (ShapeName.SECTORS, 28, [2], [None, 0, 1, 3]),
+        (ShapeName.SECTORS, 28, [9], [0, 1, 2, 3, 4, 5, 6, 7, 8, 10, 11, 12, 13, None]),
+    ],
+)
+def test_without_followers_a_line_closes_up_from_its_end_and_stays_in_one_piece(
+    shape: ShapeName, count: int, lost: list[int], line_after: list[int | None]
+) -> None:
+    """`line_after`: who holds the first places of a line, named by the place held before."""
+    pattern = fitted(count, DEMANDS, shape=shape, sectors_wanted=4)
+    assert pattern is not None
+    assert not pattern.followers
+    left = [place + 1 for place in range(count) if place not in lost]
+    planner, later_ns = planner_with(count, node=left[0]), 90 * S
+    planner.planned(plan_of(pattern, tuple(range(1, count + 1)), planner=1, start_us=0, deploy_ds=10))
+    for node in left:
+        planner.status(SearchStatus(later_ns // US, Enu(0, 0, 50), node, 1, 100), now_ns=later_ns)
+    assert planner.review(pattern, now_ns=later_ns)
+    assert planner.plan is not None
+    assert list(planner.plan.nodes[: len(line_after)]) == [0 if before is None else before + 1 for before in line_after]
+    assert sorted(node for node in planner.plan.nodes if node) == left
 
 
 def test_only_the_lowest_id_that_is_alive_plans() -> None:

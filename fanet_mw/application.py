@@ -46,12 +46,14 @@ class Received(NamedTuple):
     """One message as the application of another node sent it."""
 
     origin: NodeId
+    """The node whose application has sent it."""
     destination: NodeId
     """The id of this node, or BROADCAST."""
     priority: int
     born_ns: int
     """The instant at which the application handed it over, by the origin's clock; never later than now."""
     hops: int
+    """The number of transmissions that it took to get here."""
     frame: bytes
     """The packet as the radio delivered it, routing header first; of several packets the one that came last."""
     port: int = 0
@@ -109,10 +111,14 @@ class Status(NamedTuple):
     """What became of the message with this handle."""
 
     handle: int
+    """What `AppPort.send` returned."""
     fate: Fate
     t_ns: int
+    """When it became so."""
     reason: DropReason | None = None
+    """Why it was refused or dropped."""
     nodes: tuple[NodeId, ...] = ()
+    """The nodes of which the fate is told."""
     last: bool = False
     """True if this is the last status of the message."""
     interval_ns: int | None = None
@@ -188,6 +194,7 @@ class Application:
     follows: Collection[Fate] = ()
     """The fates of its messages that are reported to it."""
     port: AppPort
+    """What the node offers, from `start` on."""
 
     def start(self, port: AppPort, now_ns: int) -> None:
         """The node has started."""

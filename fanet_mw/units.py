@@ -8,6 +8,7 @@ MS: Final = 1_000_000
 S: Final = 1_000_000_000
 
 NodeId = NewType("NodeId", int)
+"""The id of a node: 1 to the number of nodes, and its MAVLink system id as far as that reaches."""
 
 MAX_NODES: Final = 65_534
 BROADCAST: Final = NodeId(0xFFFF)

@@ -120,6 +120,7 @@ class Emulated:
     """The emulated radio of a swarm whose Zenoh router listens on an endpoint."""
 
     endpoint: str = "tcp/127.0.0.1:7447"
+    """The Zenoh endpoint of the router."""
     swarm: str | None = None
     """The name of the swarm; by default that of the scenario."""
     zenoh_config: Path | None = None
@@ -146,8 +147,11 @@ class OnAir:
     """A real radio: UDP broadcasts on an ad hoc interface."""
 
     address: str
+    """The IPv4 address of the interface."""
     broadcast: str
+    """The broadcast address of its network."""
     port: int = PORT
+    """The UDP port of all nodes."""
     epoch_unix_s: float | None = None
     """The Unix time of swarm instant 0, for a node without a router; clocks agree by GPS or NTP."""
     endpoint: str | None = None

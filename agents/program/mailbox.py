@@ -27,6 +27,7 @@ class Sent(NamedTuple):
     lacking: tuple[int, ...] = ()
     """The nodes that have not acknowledged it in its lifetime, or have no application that listens."""
     reason: DropReason | None = None
+    """Why it was refused or dropped; None: it was not, or the network cannot tell."""
     interval_ms: float | None = None
     """The least interval of such messages, if this one was refused; None: unknown."""
 
@@ -40,11 +41,15 @@ class Message(NamedTuple):
     """A message of another node."""
 
     origin: int
+    """The node whose application has sent it."""
     data: bytes
+    """The bytes that were sent to a port, or MAVLink frames."""
     port: int | None
     """The port it was sent to; None: `data` are MAVLink frames."""
     priority: int
+    """1: safety, 2: report, 3: bulk."""
     hops: int
+    """The number of transmissions that it took to get here."""
     delay_ms: float
     """The time since the other application handed it over, as exact as the clocks of the two nodes agree."""
 

@@ -71,6 +71,7 @@ class Launched:
     def __init__(self, scenario: Scenario, swarm: SwarmRun) -> None:
         self.scenario = scenario
         self.processes = swarm.processes
+        """Its processes, by name."""
         self.radio = Emulated(endpoint=swarm.address.endpoint, swarm=swarm.address.swarm, patience_s=READY_TIMEOUT_S)
         """The radio by which a node that was left out joins: `join(swarm.scenario, node=3, radio=swarm.radio)`."""
         self.result: Result | None = None

@@ -175,7 +175,7 @@ class Messenger:
         return self._listeners.of_message(_message_id(data)) if port == MAVLINK_PORT else self._listeners.of_port(port)
 
     def has_news(self) -> bool:
-        """Whether there is something to hand over, or to tell of a message that was sent."""
+        """True if there is something to hand over, or to tell of a message that was sent."""
         return bool(self._receiver.arrived or self._sender.told or self._statuses.waiting or self._node.fates)
 
     def arrived(self) -> list[tuple[Application, Received]]:

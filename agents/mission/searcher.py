@@ -251,7 +251,7 @@ def coverage_map(scenario: Scenario) -> CoverageMap | None:
 
 
 def least_nodes(scenario: Scenario) -> int | None:
-    """How many UAVs a planned search needs in the area of a scenario; None when no plan can name so many."""
+    """The number of UAVs that a planned search needs in the area of a scenario; None when no plan can name so many."""
     return next((count for count in range(1, MOST_PLACES + 1) if formation(scenario, count) is not None), None)
 
 

@@ -57,7 +57,7 @@ class Drive(Protocol):
 
 
 class Attachment(Protocol):
-    """How a node is joined to a swarm."""
+    """The way in which a node is joined to a swarm."""
 
     def attach(
         self, scenario: Scenario, node: NodeId, applications: Sequence[Application]

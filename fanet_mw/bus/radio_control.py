@@ -19,7 +19,7 @@ MAX_FOR_NS: Final = 1_000_000 * S
 
 
 EVERY: Final = NodeId(0)
-"""As both ends of a degraded link: every link there is."""
+"""A degraded link with both ends of this id is every link there is."""
 
 
 class Degrade(NamedTuple):

@@ -29,7 +29,7 @@ _ASK_EVERY_S: Final = 0.5
 _ASK_AGAIN_S: Final = 0.05
 """The least time between two questions to the keeper."""
 START_PATIENCE_S: Final = 3600.0
-"""How long a service that is started by hand waits for the others. A router that goes away is noticed in seconds."""
+"""A service that is started by hand waits so long for the others. A router that goes away is noticed in seconds."""
 
 
 class SwarmClock:

@@ -33,12 +33,12 @@ from fanet_mw.trace import Record
 from fanet_mw.units import S
 
 _LOOK_EVERY_S: Final = 0.5
-"""How often records are published and the router is checked; a killed process loses the records of this time."""
+"""Records are published and the router is checked at this interval; a killed process loses the records of one."""
 _ON_ITS_WAY_S: Final = 0.1
-"""How long the medium waits at the end for requests that are on the bus; nodes wait twice that for its last copies."""
+"""The medium waits so long at the end for requests that are on the bus; nodes wait twice that for its last copies."""
 _LOOKS_PER_REPORT: Final = 2
 _SCENARIO_S: Final = 1.0
-"""How long a process waits to be told which scenario the swarm runs."""
+"""A process waits so long to be told which scenario the swarm runs."""
 
 
 class _WakeUp(NamedTuple):

@@ -17,8 +17,8 @@ CARRIED: Final = 4
 
 
 _SPREAD: Final = (1 << 32) + 40_503
-"""Above 2^32, so that no two pairs of origin and sequence number give the same key; not 2^32, because a dict looks for
-a number by its low bits: the packets that all origins send at about the same time have about the same number."""
+"""The factor is above 2^32, so that no two pairs of origin and sequence number give one key. It is not 2^32, because a
+dict looks for a number by its low bits: packets that all origins send at about one time have about the same number."""
 
 
 def key_of(origin: int, seq: int) -> int:

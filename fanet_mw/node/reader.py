@@ -92,7 +92,7 @@ class Decoded:
         self._inside = _Inside()
         """What was read inside that frame."""
         self._latest: dict[bytes, _Inside] = {}
-        """Of each of the latest packets, the oldest first."""
+        """What was read inside each of the latest packets, the oldest first."""
 
     def of(self, frame: bytes, decode: Callable[[Content], T]) -> T:
         """What `decode` makes of a packet, routing header first; raises what it raises, each time."""

@@ -19,5 +19,5 @@ class ForeignApplication(Section):
     """The table of the application, as its package documents it."""
 
     def on(self, node: int) -> bool:
-        """Whether a node carries it."""
+        """True if a node carries it."""
         return self.nodes == "all" or node in self.nodes

@@ -41,7 +41,7 @@ class Clock(Section):
 
     @property
     def modelled(self) -> bool:
-        """Whether anything stands between a node and its host's clock."""
+        """True if anything stands between a node and its host's clock."""
         return self.sync != "none" or bool(self.offset_ms or self.drift_ppm)
 
     @property

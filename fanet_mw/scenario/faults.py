@@ -49,7 +49,7 @@ class DegradeFault(FaultSection):
     dst: Id | None = None
     """Node id of the other end."""
     both: bool = True
-    """Also the other direction."""
+    """The fault is on the other direction too."""
     loss_db: Annotated[float, Field(ge=0, le=MAX_LOSS_DB)] = 0.0
     """Added to the path loss."""
     loss_share: Annotated[float, Field(ge=0, le=1)] = 0.0

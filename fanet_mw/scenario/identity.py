@@ -1,4 +1,4 @@
-"""Whether two processes run the same scenario: a fingerprint of every value, and which keys differ."""
+"""The identity of a scenario that two processes run: a fingerprint of every value, and which keys differ."""
 
 import hashlib
 import json

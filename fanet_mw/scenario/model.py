@@ -37,7 +37,7 @@ from fanet_mw.scenario.sensors import Sensors
 from fanet_mw.units import MAX_NODES, MS, NodeId, seconds_to_ns
 
 _REPAIR_S: Final = 10.0
-"""Of packets that floods over measured links leave out."""
+"""The time for which packets are repaired that floods over measured links leave out."""
 
 
 def _none_or_interval(hello_s: float) -> float:
@@ -180,7 +180,7 @@ class Routing(Section):
         return round(self.jitter_ms * MS)
 
     def lifetime_ns(self, priority: int) -> int:
-        """How long a packet of this priority (`wire.PRIORITY_...`) lives."""
+        """The lifetime of a packet of this priority (`wire.PRIORITY_...`)."""
         own_s = {1: self.safety_lifetime_s, 2: self.report_lifetime_s}.get(priority, 0.0)
         return seconds_to_ns(own_s or self.lifetime_s)
 
@@ -337,7 +337,7 @@ class World(Section):
 
     @property
     def has_obstacles(self) -> bool:
-        """Whether anything but a plain can stand between two nodes."""
+        """True if anything but a plain can stand between two nodes."""
         return bool(self.buildings or self.buildings_geojson or self.heightmap) or self.terrain_m > 0
 
     @property
@@ -503,7 +503,7 @@ class Scenario(Section):
 
     @property
     def measures_links(self) -> bool:
-        """Whether timetables are made from measured links (`clusters.links`)."""
+        """True if timetables are made from measured links (`clusters.links`)."""
         chosen, lossy = self.clusters.links, self.radio.shadowing_db > 0 or self.radio.fading != "none"
         wanted = chosen == "measured" or (chosen == "auto" and lossy)
         return wanted and self.clusters.relay == "scheduled" and self.routing.hello_interval_s > 0
@@ -515,12 +515,12 @@ class Scenario(Section):
 
     @property
     def saturated(self) -> bool:
-        """Whether a class of traffic always has one more packet to send."""
+        """True if a class of traffic always has one more packet to send."""
         return any(traffic.arrivals == "saturated" for traffic in self.traffic_classes.values())
 
     @property
     def mac_lifetime_ns(self) -> int:
-        """How long a frame may wait in the MAC queue (`radio.lifetime_ms`)."""
+        """The time for which a frame may wait in the MAC queue (`radio.lifetime_ms`)."""
         unset_ms = _FOREVER_MS if self.saturated else _LIFETIME_MS
         return round((self.radio.lifetime_ms or unset_ms) * MS)
 

@@ -42,7 +42,7 @@ _SUFFIXES: Final[Mapping[str, tuple[str, Mapping[str, str]]]] = {
     "_kg": ("kg", {"g": "1e-3", "kg": "1"}),
     "_c": ("°C", {"C": "1", "°C": "1"}),
 }
-"""By the end of a key's name, the longest first: its unit, and what the units of the same dimension are worth."""
+"""The unit by the end of a key's name, the longest first, and what the units of the same dimension are worth."""
 _QUANTITY: Final = re.compile(r"([+-]?(?:\d+\.?\d*|\.\d+)(?:[eE][+-]?\d+)?)\s*([a-zA-Zµ°][a-zA-Zµ°/²0-9]*)")
 
 

@@ -24,7 +24,7 @@ MANDATORY_OFDM_MBPS: Final = (6.0, 12.0, 24.0)  # 17.1.1
 
 
 def is_ofdm(rate_mbps: float) -> bool:
-    """Whether a rate is sent by OFDM (clauses 17 and 18 of IEEE 802.11-2020) and not by DSSS."""
+    """True if a rate is sent by OFDM (clauses 17 and 18 of IEEE 802.11-2020) and not by DSSS."""
     return rate_mbps in OFDM_RATES_MBPS
 
 

@@ -31,7 +31,7 @@ class KeyTable(NamedTuple):
     """One table of a scenario file."""
 
     path: str
-    """As in the file, for example `radio`; empty for the keys above all tables."""
+    """The path as in the file, for example `radio`; empty for the keys above all tables."""
     heading: str
     """What tells it from other tables of the same path, for example `kind = "jam"`."""
     repeated: bool
@@ -41,7 +41,7 @@ class KeyTable(NamedTuple):
 
     @property
     def title(self) -> str:
-        """As it is written in a file."""
+        """The title of a table as it is written in a file."""
         brackets = f"[[{self.path}]]" if self.repeated else f"[{self.path}]"
         return f"{brackets} {self.heading}".strip() if self.path else "Top level"
 
@@ -116,7 +116,7 @@ def _references(schema: Schema, *, many: bool = False) -> Iterator[tuple[str, bo
 
 
 def _unit(name: str, schema: Schema) -> str:
-    """Of a key that holds numbers: the unit that its name ends in, unless the model says another."""
+    """The unit of a key that holds numbers: that in which its name ends, unless the model says another."""
     unit = schema.get("unit", unit_of(name))
     return str(unit) if "number" in (types := set(_types(schema))) or "integer" in types else ""
 
@@ -131,7 +131,7 @@ def _types(schema: Schema) -> Iterator[str]:
 
 
 def bound(schema: Schema) -> str:
-    """In words, which values a schema allows."""
+    """The values that a schema allows, in words."""
     if "anyOf" in schema:
         return "; or ".join(bound(part) for part in schema["anyOf"] if part.get("type") != "null")
     if "const" in schema:

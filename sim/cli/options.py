@@ -118,7 +118,7 @@ class OutputFlags:
 @Parameter(name="*")
 @dataclass(frozen=True)
 class ServiceFlags:
-    """How a single service finds its swarm."""
+    """The options by which a single service finds its swarm."""
 
     connect: str = DEFAULT_ENDPOINT
     """Zenoh endpoint of the swarm's router."""

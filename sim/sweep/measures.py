@@ -93,7 +93,7 @@ def report_age_s(outcome: Outcome) -> float | None:
 
 
 def _heard_of(app: AppPackets) -> dict[tuple[int, int], list[tuple[int, int]]]:
-    """By (origin, receiver) the pairs (arrival, birth) of what was delivered, in the order of arrivals."""
+    """The pairs (arrival, birth) of what was delivered, by (origin, receiver), in the order of arrivals."""
     sent = [(origin, packet.born_ns) for (origin, _), packet in app.sent.items()]
     heard: dict[tuple[int, int], list[tuple[int, int]]] = {}
     for packet, node, delay_ns in zip(app.deliveries.packet, app.deliveries.node, app.deliveries.delay_ns, strict=True):

@@ -24,7 +24,7 @@ class CoverageMap:
         self._half_m = area_m / 2
         self._cell_m = area_m / COVERED_SIDE
         self.seen_m = max(seen_m, self._cell_m)
-        """How far a receiver searches."""
+        """The distance to which a receiver searches."""
         self.cells = 0
         self._told_ns: int | None = None
 

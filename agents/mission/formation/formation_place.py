@@ -124,7 +124,7 @@ class FormationPlace:
         )
 
     def swept_s(self, now_ns: int) -> float | None:
-        """How long the formation has been sweeping; None before everyone has had time to take it up."""
+        """The time for which the formation has been sweeping; None before all UAVs have had time to take it up."""
         plan = self.plan
         return (now_ns - _taken_up_ns(plan)) / S if plan is not None and self.is_taken_up(now_ns) else None
 

@@ -69,7 +69,7 @@ class Roles(Protocol):
 
 
 class Access(Protocol):
-    """When what a node has to send goes on the air."""
+    """The access of a node to the air: when what it has to send goes out."""
 
     def start(self, now_ns: int) -> None:
         """The node is up."""

@@ -1,4 +1,4 @@
-"""How nodes are divided into clusters: one contract (`Clustering`), several methods; `clusters.method` names one.
+"""The division of nodes into clusters: one contract (`Clustering`), several methods; `clusters.method` names one.
 
 `bisection` needs positions only; `election` ranks nodes (lowest-ID, highest degree, WCA, lasting degree) and keeps
 heads; `affinity` lets neighbors vote; `maintenance` carries clusters on over time.

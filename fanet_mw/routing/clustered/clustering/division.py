@@ -1,4 +1,4 @@
-"""How the leader divides the nodes it knows, and when it does so anew. Pure functions of what it knows.
+"""The division of the nodes that the leader knows, and when it is renewed. Pure functions of what the leader knows.
 
 What stands is first carried on: members that are gone leave, a head that is gone is replaced by its stand-in,
 newcomers go to the nearest head. Then it is weighed against a new division by what it costs: hops from each member to

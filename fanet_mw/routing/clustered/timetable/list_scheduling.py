@@ -47,7 +47,7 @@ class Geometry(NamedTuple):
 
 
 class Effort(NamedTuple):
-    """How hard the turns are packed."""
+    """The effort with which turns are packed."""
 
     pace: float = 1.0
     """Floods begin within this share of the superframe."""

@@ -21,7 +21,7 @@ TABLE: Final = Path(__file__).parent.parent / "validation" / "ns3" / "unicast_lo
 SENDERS: Final = (2, 10, 44)
 INTERVALS_S: Final = (0.01, 0.02, 0.05, 0.1)
 RUNS: Final = 5
-DURATION_S: Final = 20
+DURATION_S: Final = 10
 _HEAD: Final = ("chan", "arr", "nsrc", "interval", "runs", "pdr", "pdr_sd", "mean_retries", "mean_retries_sd")
 
 

@@ -191,7 +191,7 @@ def _unicast(row: Row) -> Case:
     return Case(
         f"unicast {sources} senders every {interval_s:g} s",
         "contention_unicast",
-        (f"nodes.count={sources + 1}", "traffic.arrivals=cbr", f"traffic.interval_s={interval_s}", "duration_s=20"),
+        (f"nodes.count={sources + 1}", "traffic.arrivals=cbr", f"traffic.interval_s={interval_s}", "duration_s=10"),
         (_figure(row, "pdr", "pdr"), _figure(row, "mean_retries", "air.mean_retries", relative=0.05)),
         seeds=3,
     )

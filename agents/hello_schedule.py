@@ -10,7 +10,7 @@ from fanet_mw.units import NodeId, seconds_to_ns
 _JITTER: Final = 0.1
 """A hello varies by this share of its interval, so that neighbors in step do not stay so (RFC 3626, 3.4)."""
 _LIFETIME_HELLOS: Final = 4
-"""A node that has not been heard for so many hello intervals is no neighbor any more."""
+"""The hello intervals without a word after which a node is no neighbor any more."""
 
 
 class HelloTime(Protocol):

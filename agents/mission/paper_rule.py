@@ -18,7 +18,7 @@ from fanet_mw.units import US, Enu, NodeId, S, seconds_to_ns
 from fanet_mw.wire.inner import Survivor
 
 _MISSED_SCANS: Final = 1.5
-"""A phone is taken to be heard until so many intervals of the scan have passed."""
+"""The intervals of the scan for which a phone is still taken to be heard."""
 _RING_M: Final = 20.0
 """UAVs hold on a ring about the survivor, each at an angle of its own, so that they see it from several sides."""
 _GOLDEN_ANGLE: Final = math.pi * (3 - math.sqrt(5))

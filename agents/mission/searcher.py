@@ -130,7 +130,7 @@ class Searcher:
         return self._flight.velocity
 
     def take_velocity(self) -> Enu | None:
-        """The same, which is then no longer new."""
+        """Return the chosen velocity, and mark it as taken."""
         velocity, self._flight.velocity = self._flight.velocity, None
         return velocity
 

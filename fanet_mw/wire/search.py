@@ -130,7 +130,7 @@ class SearchStatus(NamedTuple):
 
     @classmethod
     def decode_frame(cls, packed: Packed) -> Self:
-        """The first of a frame; raises MalformedFrameError."""
+        """The first FANET_STATUS in a frame; raises MalformedFrameError."""
         return cls.checked(decode_first(STATUS, packed))
 
     @classmethod
@@ -208,7 +208,7 @@ class Found(NamedTuple):
 
     @classmethod
     def decode_frame(cls, packed: Packed) -> Self:
-        """The first of a frame; raises MalformedFrameError, for what is no covariance too."""
+        """The first FANET_FOUND in a frame; raises MalformedFrameError, for what is no covariance too."""
         return cls.checked(decode_first(FOUND, packed))
 
     @classmethod
@@ -248,7 +248,7 @@ class Covered(NamedTuple):
 
     @classmethod
     def decode_frame(cls, packed: Packed) -> Self:
-        """The first of a frame; raises MalformedFrameError."""
+        """The first FANET_COVERED in a frame; raises MalformedFrameError."""
         return cls.checked(decode_first(COVERED, packed))
 
     @classmethod

@@ -34,7 +34,7 @@ class Life:
     label: str | None = None
     """What `restore` calls it; by default made from its kind and nodes. A new fault ends an old one of its label."""
     for_s: Annotated[float, Parameter(name="--for")] = 0.0
-    """Swarm seconds; 0: until it is restored [s]."""
+    """How long the fault lasts [swarm s]; 0: until `fanet air restore`."""
 
     @property
     def for_ns(self) -> int:
@@ -121,7 +121,7 @@ def restore(label: str = "", *, where: SwarmFlags = SwarmFlags()) -> int:
     Parameters
     ----------
     label
-        Of the fault: the one given with it, or link-SRC-DST, node-ID, jam. By default all.
+        Label of the fault that ends: the one given with it, or link-SRC-DST, node-ID, jam. Without it all end.
 
     """
     return _do(Restore(label), where)

@@ -20,7 +20,7 @@ _ABLATION_PANELS: Final[Sequence[tuple[str, Sequence[str], float]]] = (
     ("95th percentile of the delay [s]", ("delay_ms.p95", _URGENT_P95), 1e-3),
     ("share of time the air is busy", ("air.busy",), 1.0),
 )
-"""Of each panel the label, the quantities of the load and of urgent packets, and the factor for the unit."""
+"""The label of each panel, its quantities (of the load; of urgent packets), and the factor for its unit."""
 _RIVALS: Final = ("paper", "flooding", "gossip", "counter")
 _ALL: Final = 0.99
 

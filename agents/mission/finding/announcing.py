@@ -21,11 +21,11 @@ _WORSE: Final = 0.8
 _USEFUL_M: Final = 60.0
 """An estimate whose standard deviation is larger is not worth telling."""
 _PASSED_ON_NS: Final = 12 * S
-"""Hellos pass a confirmation on for so long."""
+"""How long hellos pass a confirmation on."""
 _PASSED_ON: Final = 3
-"""A hello carries at most so many confirmations."""
+"""The most confirmations in one hello."""
 _TELLERS: Final = 4
-"""One in so many of the UAVs that know a reported survivor to be confirmed says so."""
+"""Of the UAVs that know a reported survivor to be confirmed, one in this many says so."""
 
 
 class Announcing:

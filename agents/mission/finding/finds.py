@@ -13,7 +13,7 @@ from fanet_mw.wire.inner import Survivor
 from fanet_mw.wire.search import Found
 
 _PASSED_ON: Final = 5
-"""A hello carries at most so many reports."""
+"""The most reports in one hello."""
 _FRESH_NS: Final = 8 * S
 """A node that did not make a report itself passes it on while it is younger than this."""
 

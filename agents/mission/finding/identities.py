@@ -22,10 +22,11 @@ from fanet_mw.units import Enu, S
 _SAME_PERSON_M: Final = 12.0
 """Sightings nearer to each other than this are of one person."""
 _SAME_SIGMAS: Final = 2.5
-"""Sightings are of one person, too, that are nearer than so many of their standard deviations: a voice's are wide."""
+"""Sightings are of one person, too, that are nearer than this many standard deviations: those of voices are wide."""
 _GATE: Final = 16.0
-"""A person carries none of the phones that were heard, rather than one that the person's place makes so unlikely.
-Above 11.8, the 99.7 % of chi-square with 2 degrees: the shadowing of neighboring samples is not independent."""
+"""The cost above which a person is taken to carry none of the phones that were heard, rather than one that the place
+makes unlikely. It is above 11.8, the 99.7 % of chi-square with 2 degrees, because the shadowing of neighboring samples
+is not independent."""
 _VAGUE_M: Final = 80.0
 """A phone whose place has a larger standard deviation than this could be that of any person."""
 _NEAR_M: Final = 400.0
@@ -34,7 +35,7 @@ _FORGOTTEN_NS: Final = 60 * S
 _FALSE_ALARM_NS: Final = 10 * S
 """A sighting that no other follows within this time was a false alarm."""
 _SIGHTINGS: Final = 2
-"""A person is confirmed after so many sightings from close by."""
+"""The sightings from close by after which a person is confirmed."""
 _SURE_M: Final = 3.5
 """The largest standard deviation of a confirmed place."""
 _SAMPLES: Final = 6
@@ -51,7 +52,7 @@ _IMPATIENT_NS: Final = 50 * S
 """Times since the first sighting: before `_PATIENT_NS` the whole margin is asked for, after this one the least."""
 _TAKEN_GATE: Final = 6.0
 _TAKEN_SIGHTINGS: Final = 20
-"""A second person beside a confirmed one is believed after so many further sightings, and with a phone that fits."""
+"""The further sightings after which a second person beside a confirmed one is believed, if a phone fits."""
 _TAKEN_SIGMA_M: Final = 30.0
 
 

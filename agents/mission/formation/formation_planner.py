@@ -23,7 +23,7 @@ STATUS_S: Final = 12.0
 """The interval at which a UAV says its status."""
 _LOST_NS: Final = 70 * S
 _PATIENCE_NS: Final = 14 * S
-"""The first plan waits so long for UAVs that have not been heard of."""
+"""How long the first plan waits for UAVs that have not been heard of."""
 _NOTICE_NS: Final = 7 * S
 """The time from the first telling of a plan to its beginning: a flood through the slots of all clusters."""
 _REPEAT_NS: Final = 6 * S

@@ -17,7 +17,7 @@ _SHAPES: Final[Mapping[ShapeName, Callable[[Dimensions], Shape]]] = {
     ShapeName.SECTORS: Sectors,
 }
 _STEP_S: Final = 0.05
-"""The velocity of a place is taken over so long."""
+"""The time over which the velocity of a place is taken."""
 
 
 class Pattern:

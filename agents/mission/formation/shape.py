@@ -26,7 +26,7 @@ EDGE_M: Final = 25.0
 FIRST_M: Final = 16.0
 """Lines begin so far from the middle: apart enough not to be in each other's way, and nothing lies behind them."""
 _TURN_S: Final = 10.0
-"""Lines stay so long where they turn, so that a UAV that has fallen behind has seen the edge of the area too."""
+"""How long lines stay where they turn, so that a UAV that has fallen behind has seen the edge of the area too."""
 _BACK: Final = 1.2
 """The way back is flown so much faster than the sweep: where survivors are is known by then."""
 

@@ -19,7 +19,7 @@ from agents.mission.formation.shape import FOLLOWER_HIGHER_M, Demands, Dimension
 from fanet_mw.units import Enu
 
 _BEHIND_S: Final = 15.0
-"""A follower is where its arm was so long ago."""
+"""How long ago its arm was where a follower is."""
 _ARMS_M: Final = 60.0
 """The least distance of the innermost lanes of two arms, along their square."""
 

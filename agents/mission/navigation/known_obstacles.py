@@ -44,7 +44,7 @@ _MOVES_M_S: Final = 2.0
 """An echo that moves along the ray faster than this is no wall."""
 _ONCE_NS: Final = 3 * S
 _AGAIN_NS: Final = 15 * S
-"""An echo counts as solid for so long: a first one might be noise, a second one next to it hardly is."""
+"""How long an echo counts as solid: a first one might be noise, a second one next to it hardly is."""
 _MOVER_NS: Final = seconds_to_ns(1.2)
 
 

@@ -9,7 +9,7 @@ from fanet_mw.units import Enu, S
 _FIX_GAIN: Final = 0.15
 """The weight of a position fix against dead reckoning by its velocity."""
 _RANGED_NS: Final = 1 * S
-"""A height that the rangefinder has told is used for so long."""
+"""How long a height that the rangefinder has told is used."""
 
 
 class Navigation:

@@ -6,7 +6,7 @@ from fanet_mw.motion import Motion
 from fanet_mw.units import seconds_to_ns
 
 _HEARD_FOR_NS: Final = seconds_to_ns(6.0)
-"""The motion of a neighbor that was not heard for so long is not known any more."""
+"""How long after the last word of a neighbor its motion is still taken as known."""
 
 
 class NeighborMotions:

@@ -96,7 +96,7 @@ def first_corner(start: Place, way: list[Cell], taken: Callable[[Cell], bool]) -
     if len(way) < 2:
         return None
     low, high = 1, len(way) - 1
-    while low < high:  # what is in sight from the start of a shortest way is a beginning of it
+    while low < high:  # along a shortest way, what is out of sight stays out of sight: bisect
         middle = (low + high + 1) // 2
         if is_clear(start, middle_of(way[middle]), taken):
             low = middle

@@ -15,7 +15,7 @@ from fanet_mw.units import NodeId, S
 from fanet_mw.wire.search import MOST_BIDS, WITHDRAWN, Bid
 
 _FORGOTTEN_NS: Final = 15 * S
-"""A bid that its bidder has not confirmed for so long counts no more."""
+"""How long a bid counts that its bidder does not confirm."""
 _OLDEST_S: Final = 255
 
 

@@ -25,11 +25,11 @@ VAGUE_M: Final = 50.0
 FAR_M: Final = 450.0
 """A UAV that is farther from a survivor than this leaves it to others."""
 _SCOUT_AFTER_NS: Final = 4 * S
-"""A survivor may be short of reporters for so long before a UAV is sent to be another one."""
+"""How long a survivor may be short of reporters before a UAV is sent to be another one."""
 _RETURN_AFTER_NS: Final = 45 * S
-"""A responder that has not found the survivor for so long takes its bid back."""
+"""How long a responder looks for a survivor in vain before it takes its bid back."""
 _AGAIN_NS: Final = 20 * S
-"""A UAV that has taken its bid back does not bid again for so long."""
+"""How long a UAV that has taken its bid back does not bid again."""
 _LONG_AGO_NS: Final = -(10**18)
 _HANDOVER_S: Final = 15.0
 """The time that a responder needs for its present survivor once it is there."""

@@ -1,8 +1,8 @@
 """The first phase of a packet, TO_HEAD: acknowledged unicast along the gradient, from parent to parent to a head.
 
 A packet is under way to a parent that has yet to acknowledge it, or held because there is no way, until it expires.
-What a parent does not take tries the parent of that moment, and is dropped after `MOST_TRIES`; what is held in between
-counts anew.
+A packet that its parent does not acknowledge goes to the parent that is known by then, and is dropped after
+`MOST_TRIES` of them; one that was held in between counts them anew.
 """
 
 from typing import Final, NamedTuple

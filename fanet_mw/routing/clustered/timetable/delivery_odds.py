@@ -119,7 +119,9 @@ class _Draw:
         self._bits = stream(0, "odds", 0).getrandbits
 
     def bits(self, chance: int) -> int:
-        """Draw one bit for each trial; from the last binary digit to the first, a 1 is or, a 0 is and."""
+        """Draw one bit for each trial: from the last binary digit of the chance up, a 1 takes the OR with fresh random
+        bits, a 0 the AND.
+        """
         found = 0
         for digit in range(_DIGITS):
             drawn = self._bits(_TRIALS)

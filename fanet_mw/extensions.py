@@ -102,7 +102,7 @@ class PartName:
             except ModuleNotFoundError:
                 return name  # this machine does not run it
             except ValueError as error:
-                close = difflib.get_close_matches(name, self.ours, n=1)
+                close = difflib.get_close_matches(name, [*self.ours, *installed(self._key)], n=1)
                 hint = (
                     f"; did you mean {close[0]}?" if close else f"; ours: {', '.join(self.ours)}" if self.ours else ""
                 )
@@ -136,8 +136,16 @@ class OptionsOf:
         try:
             return Options(model.model_validate(options).model_dump(mode="json", exclude_none=True))
         except ValidationError as error:
-            wrong = (f"{table}.options.{_path(item['loc'])}: {item['msg']}" for item in error.errors())
+            wrong = (_mistake(f"{table}.options.{_path(item['loc'])}", item, model) for item in error.errors())
             raise ValueError("; ".join(wrong)) from error
+
+
+def _mistake(key: str, item: Mapping[str, Any], model: type[BaseModel]) -> str:
+    """One mistake in a table of options as `key = value: bound`."""
+    if item["type"] == "extra_forbidden":
+        return f"{key}: unknown option; known: {', '.join(model.model_fields) or 'none'}"
+    message = str(item["msg"]).removeprefix("Value error, ")
+    return f"{key} = {item['input']!r}: {message[:1].lower()}{message[1:]}"
 
 
 def _model(key: str, name: str) -> type[BaseModel] | None:

@@ -183,6 +183,7 @@ class OnAir:
             radio = UdpRadio(
                 node, address=self.address, broadcast=self.broadcast, port=self.port,
                 max_frame_bytes=scenario.radio.max_frame_bytes, now_ns=host.now_ns, on_message=bus.on_radio,
+                hears=lambda: host.running,
             )  # fmt: skip
             bus.use(radio)
             await radio.open()

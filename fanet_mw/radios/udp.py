@@ -52,13 +52,16 @@ class UdpRadio:
         now_ns: Callable[[], int],
         on_message: Callable[[Reception | TxStatus], None],
         port: int = PORT,
+        hears: Callable[[], bool] = lambda: True,
     ) -> None:
+        """`hears` is False while the node has no time yet, or none any more: then nothing that comes is taken in."""
         self._node = node
         self._address = (address, port)
         self._broadcast = (broadcast, port)
         self._max_frame_bytes = max_frame_bytes
         self._now_ns = now_ns
         self._on_message = on_message
+        self._hears = hears
         self._loop = asyncio.get_running_loop()
         self._addresses: dict[NodeId, _Known] = {}
         """The address from which each node is heard."""
@@ -162,6 +165,9 @@ class UdpRadio:
 
     def _on_datagram(self, data: bytes, address: Address) -> None:
         """Take in one datagram, which any process may have sent."""
+        if not self._hears():
+            self.counts["not_running"] += 1
+            return
         try:
             datagram = Datagram.decode(data)
         except MalformedFrameError:

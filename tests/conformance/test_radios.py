@@ -256,6 +256,21 @@ async def test_a_request_whose_instant_has_passed_goes_at_once_and_counts_as_lat
     assert radio.counts["late"] == 1
 
 
+async def test_what_comes_before_the_node_has_a_time_is_counted_and_not_taken_in() -> None:
+    now_ns: list[int] = []
+    told: list[Reception | TxStatus] = []
+    radio = UdpRadio(
+        NodeId(1), address="127.7.0.9", broadcast="127.255.255.255", port=24563, max_frame_bytes=300,
+        now_ns=lambda: now_ns[-1], on_message=told.append, hears=lambda: bool(now_ns),
+    )  # fmt: skip
+    for seq in (1, 2):
+        heard = Datagram(DatagramKind.FRAME, NodeId(2), BROADCAST, seq, b"x").encode()
+        radio._on_datagram(heard, ("127.7.0.2", 1))
+        now_ns.append(5)
+    assert radio.counts == {"not_running": 1, "received": 1}
+    assert told == [Reception(b"x", NodeId(2), 5, 0.0)]
+
+
 async def test_forged_senders_cannot_fill_the_memory_with_addresses() -> None:
     radio = silent_radio(lambda: 0)
     for node in range(2, MOST_ADDRESSES + 100):

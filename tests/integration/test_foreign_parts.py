@@ -56,13 +56,14 @@ def test_five_parts_of_another_package_serve_a_run(installed: Installed, tmp_pat
 @pytest.mark.parametrize(
     ("changes", "said"),
     [
-        (["routing.options.p=2"], "routing.options.p: Input should be less than or equal to 1"),
-        (["routing.options.q=0.5"], "routing.options.q: Extra inputs are not permitted"),
-        (["routing.protocol=gossip4"], "(installed: gossip3), nor MODULE:CLASS"),
+        (["routing.options.p=2"], "routing.options.p = 2: input should be less than or equal to 1"),
+        (["routing.options.q=0.5"], "routing.options.q: unknown option; known: p, "),
+        (["routing.protocol=gossip4"], "(installed: gossip3), nor MODULE:CLASS; did you mean gossip?"),
+        (["mobility.model=orbt"], "did you mean orbit?"),
         (["routing.protocol=swarm_parts.gossip3:Gossip4"], "has no attribute 'Gossip4'"),
         (
             ["applications.0.options.every_s=0"],
-            "applications.options.every_s: Input should be greater than or equal to",
+            "applications.options.every_s = 0: input should be greater than or equal to 0.1",
         ),
         (["applications.0.use=rolls"], "(installed: roll_call), nor MODULE:CLASS"),
         (["applications.0.nodes=[99]"], "applications.0.nodes names node 99, which must be <= nodes.count = 16"),

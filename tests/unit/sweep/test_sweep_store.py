@@ -80,6 +80,17 @@ def test_a_sweep_that_is_ended_three_times_and_taken_up_again_is_byte_for_byte_a
     assert (tmp_path / TABLE).read_bytes() == (whole / TABLE).read_bytes()
 
 
+def test_what_is_half_written_is_removed_and_what_is_not_ours_is_left_alone(tmp_path) -> None:
+    parts = tmp_path / "finished"
+    parts.mkdir()
+    for name in ("half.tmp", "notes.txt"):
+        (parts / name).write_bytes(b"PAR1 half written")
+    store = Store(tmp_path)
+    store.read()
+    assert [path.name for path in parts.iterdir()] == ["notes.txt"]
+    assert store.codes() == set()
+
+
 def test_progress_counts_what_was_finished_before(sweep, tmp_path) -> None:
     with pytest.raises(KeyboardInterrupt):
         go(tmp_path, sweep, OneByOne(dies_after=3))

@@ -34,7 +34,7 @@ class Correspondent(fanet_mw.Application):
 
     def wake(self, now_ns: int) -> None:
         to, size = self.to_send.pop()
-        self.due_ns = now_ns + 300_000_000
+        self.due_ns += 300_000_000  # a process that began late catches up
         text = f"{self.node} to {to}: ".encode() + bytes([65 + self.node]) * size
         self.port.send(fanet_mw.Data(5, text), destination=to, confirm=True)
 

@@ -76,7 +76,7 @@ async def over_zenoh(path: Path) -> Got:
 
 
 def on_air(path: Path, network: Network) -> Got:
-    epoch = str(time.time() + 4)  # noqa: TID251  (a real clock)
+    epoch = str(time.time() + 10)  # noqa: TID251  (a real clock)
     script = str(Path(__file__).with_name("correspondent.py"))
     processes = [
         subprocess.Popen(

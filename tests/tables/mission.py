@@ -35,11 +35,7 @@ SMALL: Final = {
     **_cases(_FEW_UAVS, (1,), (0.0, 0.5, 0.8)),
     "ours, and hellos are not used to avoid others | 0%": Case("rescue", (*_FEW_UAVS, "mission.avoid_by=[]"), (1,)),
 }
-_NOT_FLOWN: Final = "the paper's protocol | 80%"
-"""Nobody has taken the minutes yet that this mission needs at full size."""
-WHOLE: Final = {
-    name: case for name, case in _cases(("duration_s=240",), (1,), (0.0, 0.8)).items() if name != _NOT_FLOWN
-}  # fmt: skip
+WHOLE: Final = _cases(("duration_s=240",), (1,), (0.0, 0.8))
 
 
 def over_networks(kept: Kept | None = None) -> Rows:

@@ -221,6 +221,7 @@ def test_a_run_has_a_page_with_its_delays_links_and_mission(scenario: str, tmp_p
 
 
 @pytest.mark.slow
+@pytest.mark.timeout(600)
 @pytest.mark.parametrize("name", sorted(set(FIGURES) - {"9", "realtime"}))
 def test_every_figure_is_drawn_from_its_shipped_sweep(name: str, tmp_path: Path) -> None:
     recipe = FIGURES[name]

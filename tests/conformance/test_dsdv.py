@@ -57,6 +57,24 @@ def test_a_line_of_five_converges_by_news_long_before_the_next_period_and_carrie
     assert found.deliveries == [(5, 1, seq, 4)]
 
 
+def test_a_packet_ends_at_its_hop_limit_with_a_reason(bench: MakeBench) -> None:
+    found = bench(**{"routing.hop_limit": 3})
+    found.advance(60 * S)
+    found.send(1, 5)
+    found.advance(1 * S)
+    assert not found.deliveries
+    assert {node: one.dropped["hop_limit"] for node, one in found.nodes.items()} == {1: 0, 2: 0, 3: 0, 4: 1, 5: 0}
+
+
+def test_control_of_another_protocol_is_malformed_whatever_it_says(bench: MakeBench) -> None:
+    found = bench(2)
+    tell(found, 2, (9, 1, 10), kind=type_of(Family.OLSR, INCREMENTAL))
+    assert way(found, 9) is None
+    assert found.nodes[1].dropped["malformed"] == 1
+    tell(found, 2, (9, 1, 10))
+    assert way(found, 9) is not None
+
+
 def test_3_1_a_full_dump_goes_every_period_with_every_route_and_a_number_grown_by_two(bench: MakeBench) -> None:
     found = bench(3)
     found.advance(4 * PERIODIC_UPDATE_NS)

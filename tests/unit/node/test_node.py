@@ -119,6 +119,8 @@ def test_a_bundle_is_one_reception_of_several_packets(node: Node) -> None:
     assert node.report()["receptions"] == 1
     (request,) = node.requests
     assert len(wire.unbundle(request.frame)) == 3, "what they make it send goes together again"
+    hear(node, wire.bundle([frame(seq=2), frame(seq=3), frame(seq=4)]))
+    assert node.report()["dropped"] == {DropReason.DUPLICATE: 2}, "each packet by itself"
 
 
 @pytest.mark.parametrize("starts_ms", [(20, 30), (30, 20)])

@@ -120,3 +120,15 @@ def test_announcements_go_before_bulk_and_a_newer_one_in_place_of_an_older() -> 
     assert release.outdated(before_us=2) == []
     release.push(packet(3, 50, priority=PRIORITY_REPORT), now_ns=0)
     assert let_out(release, until_ms=1000) == [([2, 3], 46), ([0], 146)]
+
+
+def test_when_bulk_will_be_through_counts_on_the_room_that_it_has_beside_the_others() -> None:
+    """Both would fit a turn now; a warning and a report that are yet to come may take their rooms."""
+    release = root(TurnsInForce(0, TURNS, (3,), 190, 2), reserved=ROOMS)
+    through_ms = []
+    for seq in range(2):
+        one = packet(seq, 60)
+        release.push(one, now_ns=0)
+        through_ms.append((release.through_ns(one, now_ns=0) or 0) / MS)
+    assert through_ms == [50, 150]
+    assert let_out(release, until_ms=1000) == [([0, 1], 46)]

@@ -30,6 +30,14 @@ ANNOUNCED: Final = 1024
 """So many requests of one node may wait for their instant, beyond what its MAC queue holds."""
 _new: Final = tuple.__new__
 _RECEPTION, _FREE, _DELIVERED, _NEVER = s.OUT_RECEPTION, s.OUT_FREE, s.DELIVERED, s.NEVER
+_OUTCOME_OF: Final[Mapping[DropReason, TxOutcome]] = {
+    DropReason.BACKLOG: TxOutcome.QUEUE_FULL,
+    DropReason.LATE: TxOutcome.LATE,
+    DropReason.MALFORMED: TxOutcome.REFUSED,
+    DropReason.TOO_LARGE: TxOutcome.REFUSED,
+    DropReason.NO_RECEIVER: TxOutcome.REFUSED,
+}
+"""The status of a request that is not taken in, by the reason of its drop."""
 _NO_RECEPTION: Final = Reception(b"", NodeId(0), 0, 0.0)
 _FARTHEST_M: Final = 1e7
 """The greatest coordinate; larger ones would overflow the cells in which neighbors are looked for."""
@@ -184,8 +192,7 @@ class Medium(Actor):
     def _refuse(self, station: int, request: TxRequest, reason: DropReason, now_ns: int) -> None:
         self._accounts.drop(reason)
         if request.wants_status:
-            outcome = TxOutcome.QUEUE_FULL if reason is DropReason.BACKLOG else TxOutcome.LATE
-            status = TxStatus(request.seq, outcome, now_ns, 0)
+            status = TxStatus(request.seq, _OUTCOME_OF[reason], now_ns, 0)
             self.outbox.append((self._rx_topics[station], status))
 
     # --- time -----------------------------------------------------------------------------------------------------

@@ -59,6 +59,8 @@ class DropReason(StrEnum):
     """The frame was lost to noise from a jammer (`[[faults]]`, `fanet air jam`)."""
     BACKLOG = "backlog"
     """The request was announced while the medium already held as many requests of that node as it accepts."""
+    REFUSED = "refused"
+    """The radio can never send such a frame: it said so in the status of a unicast."""
     BUS = "bus"
     """The request was put on the bus and never reached the other side (a gap in the sequence)."""
     # the node

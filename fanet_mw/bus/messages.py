@@ -53,6 +53,9 @@ class TxOutcome(IntEnum):
     QUEUE_FULL = 3
     LIFETIME = 4
     LATE = 5
+    """The request came so long after its instant that it was dropped."""
+    REFUSED = 6
+    """The radio can never send this: no such destination, no bytes or too many, or an absurd instant."""
 
 
 class TxStatus(NamedTuple):

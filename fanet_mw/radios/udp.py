@@ -110,17 +110,17 @@ class UdpRadio:
         """Send a frame at its instant; if that has passed, at once, and counted as late."""
         self.counts["sent"] += 1
         if not 0 < len(request.frame) <= self._max_frame_bytes:
-            self._drop(DropReason.TOO_LARGE if request.frame else DropReason.MALFORMED, request)
+            self._refuse(DropReason.TOO_LARGE if request.frame else DropReason.MALFORMED, request)
             return
         wait_ns = request.start_ns - self._now_ns()
         if wait_ns < 0:
             self.counts["late"] += 1
         self._loop.call_later(max(0, wait_ns) / S, self._transmit, request)
 
-    def _drop(self, reason: DropReason, request: TxRequest) -> None:
+    def _refuse(self, reason: DropReason, request: TxRequest) -> None:
         self.counts[reason] += 1
         if request.wants_status:
-            self._on_message(TxStatus(request.seq, TxOutcome.LATE, self._now_ns(), 0))
+            self._on_message(TxStatus(request.seq, TxOutcome.REFUSED, self._now_ns(), 0))
 
     def _transmit(self, request: TxRequest) -> None:
         if request.dst == BROADCAST:

@@ -28,6 +28,7 @@ REASON_OF: Final = {
     TxOutcome.QUEUE_FULL: DropReason.MAC_QUEUE_FULL,
     TxOutcome.LIFETIME: DropReason.MAC_LIFETIME,
     TxOutcome.LATE: DropReason.LATE,
+    TxOutcome.REFUSED: DropReason.REFUSED,
 }
 """The reason for which a packet is dropped, by the outcome of its unicast."""
 

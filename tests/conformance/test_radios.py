@@ -170,7 +170,7 @@ def test_a_frame_that_is_too_large_is_told_and_not_sent(run: Callable[[Requests]
     heard = run([(1, request_of(0, at_ms=10, size=2305, status=True))])
     assert receptions(heard, 2) == []
     (status,) = statuses(heard, 1)
-    assert status.outcome not in (TxOutcome.SENT, TxOutcome.ACKED)
+    assert status.outcome is TxOutcome.REFUSED
 
 
 # --- what only a real radio has ---------------------------------------------------------------------------------

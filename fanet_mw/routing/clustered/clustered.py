@@ -122,7 +122,9 @@ class Clustered(RoutingProtocol):
             return
         if status.outcome is TxOutcome.RETRY_LIMIT:
             parts.roles.on_parent_lost(failed.parent, now_ns=now_ns)
-        if failed.tries >= MOST_TRIES:
+        if status.outcome is TxOutcome.REFUSED:
+            self._port.drop(DropReason.REFUSED, failed.packet, now_ns=now_ns)
+        elif failed.tries >= MOST_TRIES:
             self._port.drop(DropReason.RETRY_LIMIT, failed.packet, now_ns=now_ns)
         else:
             parts.access.forward(failed.packet, start_ns=now_ns + self._lead_ns, now_ns=now_ns, tries=failed.tries)

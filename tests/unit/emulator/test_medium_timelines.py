@@ -2,6 +2,7 @@
 
 from array import array
 from collections.abc import Callable
+from typing import Any
 
 import pytest
 from hand_driven import NAMES, PAYLOAD, Air, receptions, statuses
@@ -152,6 +153,18 @@ def test_late_requests_are_counted_and_very_late_ones_dropped(make_scenario: Mak
     assert report["late"]["late_frames"] == 2
     assert report["frames"]["dropped"] == {"late": 1}
     assert [outcome for _, outcome, _, _ in statuses(heard)] == [TxOutcome.LATE, TxOutcome.SENT]
+
+
+@pytest.mark.parametrize(
+    "wrong", [{"dst": 77}, {"payload": bytes(5000)}, {"payload": b""}, {"at_ns": 2**62}],
+    ids=["no such node", "too long", "empty", "absurd instant"],
+)  # fmt: skip
+def test_a_request_that_can_never_be_sent_is_refused_not_called_late(
+    make_scenario: MakeScenario, wrong: dict[str, Any]
+) -> None:
+    air = Air(make_scenario(**{"nodes.count": 2}), [0, 100])
+    air.send(1, **{"at_ns": 1 * MS, **wrong})
+    assert [outcome for _, outcome, _, _ in statuses(air.run())] == [TxOutcome.REFUSED]
 
 
 def test_hostile_requests_are_counted_and_never_raised(make_scenario: MakeScenario) -> None:

@@ -79,6 +79,12 @@ def test_a_packet_that_a_parent_does_not_take_is_tried_three_times_and_dropped(b
     assert dropped(beside_a_head) == [(9 * MS, DropReason.RETRY_LIMIT)]
 
 
+def test_a_packet_that_the_radio_can_never_send_is_not_tried_again(beside_a_head: Node) -> None:
+    ends(beside_a_head, TxOutcome.REFUSED)
+    assert len(beside_a_head.requests) == 1
+    assert dropped(beside_a_head) == [(9 * MS, DropReason.REFUSED)]
+
+
 def test_a_parent_that_does_not_acknowledge_is_given_up_until_it_is_heard_again(beside_a_head: Node) -> None:
     ends(beside_a_head, TxOutcome.RETRY_LIMIT)
     assert len(beside_a_head.requests) == 1

@@ -80,12 +80,12 @@ class PhoneFilter:
         """For each cell, twice the logarithm of how likely the silence was."""
         self._totals: list[float] = []
         """For each cell, twice the logarithm of the posterior, up to a constant."""
+        self._best = 0.0
+        """The greatest of these totals within the area."""
         self._samples: list[tuple[Enu, float | None]] = []
         """The places of samples with the received powers; None: nothing was heard there."""
         self._pending: list[tuple[Enu, float | None]] = []
         """The samples that the cells do not reckon with yet; they are taken in when an estimate is asked for."""
-        self._best = 0.0
-        """The greatest of them within the area."""
         self._sums: list[float] = []
         self._squares: list[float] = []
         self._count = 0
@@ -184,33 +184,18 @@ class PhoneFilter:
         residual_at_1_m = rssi_dbm - expected_at_1_m
         up2 = max(1.0, position.up * position.up)
         sums, squares, log = self._sums, self._squares, math.log
-        west = self._middle.east - _HALF_CELLS * _CELL_M - position.east
-        south = self._middle.north - _HALF_CELLS * _CELL_M - position.north
-        span = range(2 * _HALF_CELLS + 1)
-        east2 = [(west + i * _CELL_M) ** 2 for i in span]
-        at = 0
-        for j in span:
-            rest = (south + j * _CELL_M) ** 2 + up2
-            for i in span:
-                residual = residual_at_1_m + slope * log(east2[i] + rest)
-                sums[at] += residual
-                squares[at] += residual * residual
-                at += 1
+        for cell, distance2 in enumerate(_squared_distances_m2(self._middle, position, up2)):
+            residual = residual_at_1_m + slope * log(distance2)
+            sums[cell] += residual
+            squares[cell] += residual * residual
 
     def _rule_out(self, position: Enu) -> None:
         """Make the cells less likely from which the phone would have been heard."""
         assert self._middle is not None, "the grid lies around the first sample"
         scores, table, most, sqrt = self._scores, self._silence, len(self._silence) - 1, math.sqrt
-        west = self._middle.east - _HALF_CELLS * _CELL_M - position.east
-        south = self._middle.north - _HALF_CELLS * _CELL_M - position.north
-        span = range(2 * _HALF_CELLS + 1)
-        east2 = [(west + i * _CELL_M) ** 2 for i in span]
-        at = 0
-        for j in span:
-            rest = (south + j * _CELL_M) ** 2 + position.up * position.up
-            for i in span:
-                scores[at] += table[min(most, int(sqrt(east2[i] + rest) / _STEP_M))]
-                at += 1
+        up2 = position.up * position.up
+        for cell, distance2 in enumerate(_squared_distances_m2(self._middle, position, up2)):
+            scores[cell] += table[min(most, int(sqrt(distance2) / _STEP_M))]
 
     def _inside(self, width: int) -> list[bool]:
         """The cells that are in the area; all cells when none is."""
@@ -261,6 +246,15 @@ class PhoneFilter:
 
 def _ground_m(a: Enu, b: Enu) -> float:
     return math.hypot(a.east - b.east, a.north - b.north)
+
+
+def _squared_distances_m2(middle: Enu, position: Enu, up2: float) -> list[float]:
+    """The squared distance of every cell of the grid around `middle` from a position; `up2` is that of its height."""
+    west = middle.east - _HALF_CELLS * _CELL_M - position.east
+    south = middle.north - _HALF_CELLS * _CELL_M - position.north
+    span = range(2 * _HALF_CELLS + 1)
+    east2 = [(west + i * _CELL_M) ** 2 for i in span]
+    return [squared + rest for rest in [(south + j * _CELL_M) ** 2 + up2 for j in span] for squared in east2]
 
 
 @lru_cache(maxsize=8)

@@ -116,10 +116,9 @@ class FormationPlace:
         pattern, place, at_s = self.pattern, self.place, self.swept_s(now_ns)
         if pattern is None or place is None or at_s is None:
             return False
-        shape = pattern.shape
-        team = shape.team_of(place)
+        team = pattern.dimensions.team_of(place)
         return all(
-            shape.apart_m(team, east_m, north_m, at_s + ahead_s) <= self._most_m
+            pattern.shape.apart_m(team, east_m, north_m, at_s + ahead_s) <= self._most_m
             for ahead_s in (within_s, within_s + 5.0)
         )
 

@@ -86,14 +86,6 @@ class Lines:
         first = place // lanes * lanes
         return range(place, first + lanes) if place - first >= lanes // 2 else range(place, first - 1, -1)
 
-    def team_of(self, place: int) -> int:
-        formation = self._formation
-        if place < 2 * formation.lanes:
-            return place // formation.lanes
-        if place < formation.fixed:
-            return int(2 * (place - 2 * formation.lanes) >= formation.relays)
-        return formation.follower(place)[0]
-
     def apart_m(self, team: int, east_m: float, north_m: float, swept_s: float) -> float:
         """A line is as wide as the area: what is apart from it is so to the north or south."""
         north = swept_m(self._formation, swept_s)

@@ -39,8 +39,7 @@ class Pattern:
 
     def line(self, place: int) -> range:
         """The places of the line that a place belongs to."""
-        first = self.shape.team_of(place) * self.dimensions.lanes
-        return range(first, first + self.dimensions.lanes)
+        return self.dimensions.line(self.dimensions.team_of(place))
 
     def kind(self, place: int) -> str:
         """`line`, `relay` or `follower`."""

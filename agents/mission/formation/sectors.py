@@ -19,6 +19,7 @@ from agents.mission.formation.shape import (
     Demands,
     Dimensions,
     ShapeName,
+    nearest_m,
     swept_m,
 )
 from fanet_mw.units import Enu
@@ -76,14 +77,8 @@ class Sectors:
         first = place // row * row
         return range(place, first + row) if 2 * (place - first) >= row else range(place, first - 1, -1)
 
-    def team_of(self, place: int) -> int:
-        formation = self._formation
-        return place // formation.lanes if place < formation.fixed else formation.follower(place)[0]
-
     def apart_m(self, team: int, east_m: float, north_m: float, swept_s: float) -> float:
-        lanes = self._formation.lanes
-        places = (self.at(team * lanes + lane, swept_s) for lane in range(lanes))
-        return min(math.hypot(place.east - east_m, place.north - north_m) for place in places)
+        return nearest_m((self.at(place, swept_s) for place in self._formation.line(team)), east_m, north_m)
 
 
 def rows_of(teams: int) -> int:

@@ -8,6 +8,8 @@ In all of them places of teams come first (team 0 lane by lane, team 1, ...), th
 moves in straight pieces without jumps. Pure geometry: metres, seconds.
 """
 
+import math
+from collections.abc import Iterable
 from enum import IntEnum
 from typing import Final, NamedTuple, Protocol
 
@@ -88,6 +90,18 @@ class Dimensions(NamedTuple):
     def places(self) -> int:
         return self.fixed + self.followers
 
+    def line(self, team: int) -> range:
+        """The places of a team, lane by lane."""
+        return range(team * self.lanes, (team + 1) * self.lanes)
+
+    def team_of(self, place: int) -> int:
+        """The team that a place belongs to; of a relay, the nearer one."""
+        if place < self.teams * self.lanes:
+            return place // self.lanes
+        if place < self.fixed:
+            return (place - self.teams * self.lanes) * self.teams // self.relays
+        return self.follower(place)[0]
+
     def follower(self, place: int) -> tuple[int, float]:
         """The team of a follower, and where it flies along its line, from 0 to 1; each line is divided evenly."""
         which = place - self.fixed
@@ -121,13 +135,14 @@ class Shape(Protocol):
         """The places of its line from this one to the outermost: who is lost is replaced by the next in this order."""
         ...
 
-    def team_of(self, place: int) -> int:
-        """The team that a place belongs to; of a relay, the nearer one."""
-        ...
-
     def apart_m(self, team: int, east_m: float, north_m: float, swept_s: float) -> float:
         """The distance of a spot from the line of a team then."""
         ...
+
+
+def nearest_m(places: Iterable[Enu], east_m: float, north_m: float) -> float:
+    """The distance of a spot from the nearest of some places, on the map."""
+    return min(math.hypot(place.east - east_m, place.north - north_m) for place in places)
 
 
 def swept_m(formation: Dimensions, swept_s: float) -> float:

@@ -15,7 +15,7 @@ is enough. The outermost lane flies at the speed of the sweep, the others in pro
 import math
 from typing import Final
 
-from agents.mission.formation.shape import FOLLOWER_HIGHER_M, Demands, Dimensions, ShapeName
+from agents.mission.formation.shape import FOLLOWER_HIGHER_M, Demands, Dimensions, ShapeName, nearest_m
 from fanet_mw.units import Enu
 
 _BEHIND_S: Final = 15.0
@@ -74,14 +74,8 @@ class Spiral:
         lanes = self._formation.lanes
         return range(place, (place // lanes + 1) * lanes if place < self._formation.fixed else place + 1)
 
-    def team_of(self, place: int) -> int:
-        formation = self._formation
-        return place // formation.lanes if place < formation.fixed else formation.follower(place)[0]
-
     def apart_m(self, team: int, east_m: float, north_m: float, swept_s: float) -> float:
-        lanes = self._formation.lanes
-        places = (self.at(team * lanes + lane, swept_s) for lane in range(lanes))
-        return min(math.hypot(place.east - east_m, place.north - north_m) for place in places)
+        return nearest_m((self.at(place, swept_s) for place in self._formation.line(team)), east_m, north_m)
 
     def _at(self, team: int, lane: float, swept_s: float, up_m: float) -> Enu:
         turned = self._turned(swept_s)

@@ -16,34 +16,21 @@ from collections.abc import Callable, Sequence
 from typing import Final, NamedTuple
 
 from fanet_mw.rng import stream
+from fanet_mw.routing.clustered.timetable.turn_filling import (
+    ONLY,
+    RECEIVER,
+    WINDOW,
+    Geometry,
+    reach,
+    rows,
+    turn_by_turn,
+)
 from fanet_mw.units import Enu, NodeId
 
-_RECEIVER: Final = 100
-"""What it is worth that one more node gets a packet, in turns of its flood's age."""
-_ONLY: Final = 50
-"""What it is worth besides that no other holder of the packet could have served that node."""
 _NOISE: Final = 50
-_WINDOW: Final = 24
-"""The number of floods that are under way at once, besides those that a relay at every hop keeps on their way.
-
-More of them cost computing time and gain little. With several tries twice as many are under way.
-"""
 _TRIAL: Final = 64
 _HOPE: Final = 1.15
 """A load is given up when, after `_TRIAL` turns with the window full, the rest would have to be this much faster."""
-
-
-class Geometry(NamedTuple):
-    """The geometry for which a timetable is computed."""
-
-    link_m: float
-    """Nodes that are no farther apart hear each other."""
-    interference_m: float
-    """A transmitter that is no farther from a receiver destroys what the receiver hears."""
-    turns: int
-    """The number of turns of one superframe."""
-    hop_turns: int
-    """The number of turns from the one that brings a packet to the first that can relay it; 1: the next turn can."""
 
 
 class Effort(NamedTuple):
@@ -74,16 +61,7 @@ class FloodNetwork:
     def part(self, root: int) -> tuple[int, int]:
         """The rows that a flood of this row can reach, itself included, and the number of hops that it takes."""
         if root not in self._parts:
-            found = frontier = 1 << root
-            hops = -1
-            while frontier:
-                hops += 1
-                near = 0
-                for row in rows(frontier):
-                    near |= self.hears[row]
-                frontier = near & ~found
-                found |= near
-            self._parts[root] = found, hops
+            self._parts[root] = reach(self.hears, root)
         return self._parts[root]
 
     def way(self, node: NodeId, head: NodeId) -> list[int]:
@@ -153,7 +131,7 @@ class Flood:
             if lacking:
                 mine = 1 << row
                 only = sum(1 for other in rows(lacking) if hears[other] & has == mine)
-                found.append((self._ready[row], _RECEIVER * lacking.bit_count() + _ONLY * only, row, lacking))
+                found.append((self._ready[row], RECEIVER * lacking.bit_count() + ONLY * only, row, lacking))
         return found
 
     def send(self, offset: int, row: int, receivers: int, *, hop_turns: int) -> None:
@@ -194,15 +172,12 @@ class Packing:
 
     def place(self, floods: Sequence[Flood]) -> bool:
         """Give every flood its turns; returns False when there are not enough turns."""
-        turns, count, begun, offset = self._turns, len(floods), 0, 0
+        turns, count = self._turns, len(floods)
         hops = max((flood.hops for flood in floods), default=0)
-        window = _WINDOW * (2 if self._tries > 1 else 1) + self._hop_turns * hops * count // turns
-        under_way: dict[int, Flood] = {}
+        # beside the window, those that a relay at every hop keeps on their way
+        window = WINDOW * (2 if self._tries > 1 else 1) + self._hop_turns * hops * count // turns
         full_from, full_done = 0, 0
-        while begun < count or under_way:
-            while begun < count and len(under_way) < window and offset * count >= int(begun * turns * self._pace):
-                under_way[begun] = floods[begun]
-                begun += 1
+        for offset, begun, under_way in turn_by_turn(floods, turns=turns, window=window, pace=self._pace):
             done = begun - len(under_way)
             if len(under_way) < window:
                 full_from, full_done = offset, done
@@ -216,7 +191,6 @@ class Packing:
                 return False
             if under_way:
                 self._fill(offset, under_way)
-            offset += 1
         return True
 
     def _fill(self, offset: int, under_way: dict[int, Flood]) -> None:
@@ -302,13 +276,3 @@ def _within(at: Sequence[Enu], row: int, reach_m: float) -> int:
         for other, there in enumerate(at)
         if other != row and math.dist((here.east, here.north, here.up), (there.east, there.north, there.up)) <= reach_m
     )
-
-
-def rows(bits: int) -> list[int]:
-    """The rows of a bit set, ascending."""
-    found = []
-    while bits:
-        low = bits & -bits
-        found.append(low.bit_length() - 1)
-        bits ^= low
-    return found

@@ -18,16 +18,18 @@ import math
 from collections.abc import Sequence
 from typing import Final, NamedTuple
 
-from fanet_mw.routing.clustered.timetable.list_scheduling import Geometry, rows
+from fanet_mw.routing.clustered.timetable.turn_filling import (
+    ONLY,
+    RECEIVER,
+    WINDOW,
+    Geometry,
+    reach,
+    rows,
+    turn_by_turn,
+)
 from fanet_mw.units import Enu, NodeId
 from fanet_mw.wire.links import NEPERS, Link
 
-_RECEIVER: Final = 100
-"""What it is worth that a node gets all of its dose, in turns of its flood's age."""
-_ONLY: Final = 50
-"""What it is worth besides that no other holder of the packet could have served that node."""
-_WINDOW: Final = 24
-"""The number of floods that are under way at once."""
 _CHANCES: Final = (0.5, 0.25, 0.1)
 """Shares of frames that arrive; links below the first are used only if a node were cut off without them, and so on."""
 _SINR_DB: Final = 11
@@ -75,9 +77,9 @@ class Network:
     def _connected(self, known: Sequence[Link]) -> tuple[list[int], float]:
         """The best links that keep connected what is connected, and the least share of frames that arrives on them."""
         choices = [(self._links(known, least=least), least) for least in _CHANCES]
-        whole = [reach(choices[-1][0], row) for row in range(len(self.nodes))]
+        whole = [reach(choices[-1][0], row)[0] for row in range(len(self.nodes))]
         for hears, least in choices:
-            if [reach(hears, row) for row in range(len(self.nodes))] == whole:
+            if [reach(hears, row)[0] for row in range(len(self.nodes))] == whole:
                 return hears, least
         raise AssertionError("the last choice is the whole")
 
@@ -109,18 +111,6 @@ class Network:
         return tuple(self.nodes[row] for row in rows(bits))
 
 
-def reach(hears: Sequence[int], root: int) -> int:
-    """The rows that a flood of this row can reach, itself included."""
-    found = frontier = 1 << root
-    while frontier:
-        near = 0
-        for row in rows(frontier):
-            near |= hears[row]
-        frontier = near & ~found
-        found |= near
-    return found
-
-
 class _Offer(NamedTuple):
     """A holder of a packet around which some node lacks part of its dose."""
 
@@ -140,7 +130,7 @@ class Wave:
         self.call = call
         self.sent: list[tuple[int, int]] = []
         """The transmissions of this wave as (offset, row), in order."""
-        self.goal = network.hears[root] | 1 << root if call else reach(network.hears, root)
+        self.goal = network.hears[root] | 1 << root if call else reach(network.hears, root)[0]
         self._network = network
         self._enough = enough
         self._has = 1 << root
@@ -176,8 +166,8 @@ class Wave:
 
     def _gain(self, row: int, other: int) -> int:
         network, enough = self._network, self._enough
-        gain = _RECEIVER * min(self._missing.get(other, enough), network.dose[row, other]) // enough
-        return gain + (_ONLY if network.hears[other] & self._has == 1 << row else 0)
+        gain = RECEIVER * min(self._missing.get(other, enough), network.dose[row, other]) // enough
+        return gain + (ONLY if network.hears[other] & self._has == 1 << row else 0)
 
     def send(self, offset: int, row: int, receivers: Sequence[int], *, hop_turns: int) -> None:
         """Note that a row sends in a turn, and that these rows get a copy."""
@@ -211,17 +201,12 @@ class RedundantPacking:
 
     def place(self, waves: Sequence[Wave]) -> bool:
         """Give every wave its turns; returns False when there are not enough turns."""
-        turns, count, begun, offset = self._turns, len(waves), 0, 0
-        under_way: dict[int, Wave] = {}
-        while begun < count or under_way:
-            while begun < count and len(under_way) < _WINDOW and offset * count >= int(begun * turns * self._pace):
-                under_way[begun] = waves[begun]
-                begun += 1
+        turns, count = self._turns, len(waves)
+        for offset, begun, under_way in turn_by_turn(waves, turns=turns, window=WINDOW, pace=self._pace):
             unbegun = begun < count or any(not wave.sent for wave in under_way.values())
             if offset >= turns and (unbegun or offset > 2 * turns):
                 return False
             self._fill(offset, under_way)
-            offset += 1
         return True
 
     def _fill(self, offset: int, under_way: dict[int, Wave]) -> None:

@@ -17,8 +17,9 @@ from typing import Final, NamedTuple, Self
 from fanet_mw.routing.clustered.tdma.turns import Turns, turn_ns
 from fanet_mw.routing.clustered.tdma.urgent import reserved
 from fanet_mw.routing.clustered.timetable.delivery_odds import Odds
-from fanet_mw.routing.clustered.timetable.list_scheduling import Effort, Geometry
+from fanet_mw.routing.clustered.timetable.list_scheduling import Effort
 from fanet_mw.routing.clustered.timetable.timetable import Timetable, redundant_timetable, timetable
+from fanet_mw.routing.clustered.timetable.turn_filling import Geometry
 from fanet_mw.scenario import Scenario
 from fanet_mw.units import MS, Enu, NodeId, S, seconds_to_ns
 from fanet_mw.wire import DIGEST, HEADER_BYTES, LINKS, OVERHEAD, PLACES, SCHEDULE

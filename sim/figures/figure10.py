@@ -61,8 +61,19 @@ def draw(runs: Runs) -> Drawing:
     return Drawing(figure, data)
 
 
-def claims(runs: Runs) -> list[Claim]:
-    return [*_best(runs), *_too_often(runs)]
+def _intervals(runs: Runs) -> list[float]:
+    """The generation intervals, the longest first."""
+    return list(reversed(runs.levels("traffic.interval_s")))
+
+
+def _few(runs: Runs) -> list[int]:
+    """The numbers of clusters that the claim has to be worse."""
+    return [count for count in runs.levels("clusters.count") if count < _MANY]
+
+
+def _many(runs: Runs) -> list[int]:
+    """The numbers of clusters that the claim has to be best."""
+    return [count for count in runs.levels("clusters.count") if count >= _MANY]
 
 
 def _over_periods(runs: Runs, case: str, clusters: int, interval_s: float) -> Mapping[int, float]:
@@ -71,87 +82,85 @@ def _over_periods(runs: Runs, case: str, clusters: int, interval_s: float) -> Ma
     return pooled(*(_pdr(runs, case, clusters, period_s, interval_s) for period_s in periods))
 
 
-def _best(runs: Runs) -> list[Claim]:
-    clusters = runs.levels("clusters.count")
-    intervals = list(reversed(runs.levels("traffic.interval_s")))
-    few_of, many_of = ([count for count in clusters if (count >= _MANY) == wanted] for wanted in (False, True))
+def _lead_of_many(runs: Runs, case: str, interval_s: float) -> dict[int, float]:
+    """The best PDR of many clusters minus the best of few, seed by seed."""
+    many, few = (
+        best(*(_over_periods(runs, case, count, interval_s) for count in counts))
+        for counts in (_many(runs), _few(runs))
+    )
+    return {seed: many[seed] - few[seed] for seed in many}
 
-    def lead(case: str, interval_s: float) -> dict[int, float]:
-        """The best PDR of many clusters minus the best of few."""
-        over = {count: _over_periods(runs, case, count, interval_s) for count in clusters}
-        many, few = best(*(over[count] for count in many_of)), best(*(over[count] for count in few_of))
-        return {seed: many[seed] - few[seed] for seed in many}
 
-    def spreading_gains(counts: Sequence[int], interval_s: float) -> list[float]:
-        spread, burst = (
-            pooled(*(_over_periods(runs, case, count, interval_s) for count in counts)) for case in ("spread", "burst")
+def _gain_of_spreading(runs: Runs, counts: Sequence[int], interval_s: float) -> list[float]:
+    """The PDR when packets are let out over the slot minus that when they are at once, seed by seed."""
+    spread, burst = (
+        pooled(*(_over_periods(runs, case, count, interval_s) for count in counts)) for case in ("spread", "burst")
+    )
+    return differences(spread, burst)
+
+
+def _gain_of_flooding_seldom(runs: Runs, case: str, counts: Sequence[int], interval_s: float) -> dict[int, float]:
+    """The PDR with periods of a second and more minus that with shorter ones, seed by seed."""
+    periods = runs.levels("clusters.flooding_period_s")
+    seldom, often = (
+        pooled(*(_pdr(runs, case, count, period_s, interval_s) for count in counts for period_s in chosen))
+        for chosen in (
+            [period_s for period_s in periods if period_s >= _SELDOM_S],
+            [period_s for period_s in periods if period_s < _SELDOM_S],
         )
-        return differences(spread, burst)
+    )
+    return {seed: seldom[seed] - often[seed] for seed in seldom}
 
-    bursts = Reason(
+
+def _bursts_collide(runs: Runs) -> Reason:
+    return Reason(
         "A head that lets out all it has as soon as its slot begins floods a burst, in which the copies of one "
         "packet collide with those of the next. Few clusters have long queues and so long bursts; the same packets "
         "arrive when they are spread over the same slots.",
         [
             above(
                 f"every {interval_s:g} s, fewer than {_MANY} clusters: PDR by spreading minus by bursts",
-                spreading_gains(few_of, interval_s),
+                _gain_of_spreading(runs, _few(runs), interval_s),
                 0.0,
             )
-            for interval_s in intervals
+            for interval_s in _intervals(runs)
         ],
     )
-    gone = Reason(
+
+
+def _spreading_levels(runs: Runs) -> Reason:
+    return Reason(
         "Spread over its slot a queue is no burst, and what clusters gained is gone.",
         [
             above(
                 f"every {interval_s:g} s: lead of many clusters by bursts minus by spreading",
-                differences(lead("burst", interval_s), lead("spread", interval_s)),
+                differences(_lead_of_many(runs, "burst", interval_s), _lead_of_many(runs, "spread", interval_s)),
                 0.0,
             )
-            for interval_s in intervals
+            for interval_s in _intervals(runs)
         ],
     )
-    return [
-        Claim(
-            10,
-            f"The PDR is best at 22 or 44 clusters. (Packets let out {pace}.)",
-            [
-                above(
-                    f"every {interval_s:g} s: best of {_MANY} or more clusters minus best of fewer, all periods",
-                    lead(case, interval_s),
-                    0.0,
-                )
-                for interval_s in intervals
-            ],
-            [bursts if case == "burst" else gone],
-        )
-        for case, pace in _PACES.items()
-    ]
 
 
-def _too_often(runs: Runs) -> list[Claim]:
-    clusters, periods = runs.levels("clusters.count"), runs.levels("clusters.flooding_period_s")
-    intervals = list(reversed(runs.levels("traffic.interval_s")))
-    often_s, most = periods[0], clusters[-1]
-    slot_ms = often_s * 1e3 / most
-
-    def seldom_minus_often(case: str, counts: Sequence[int], interval_s: float) -> dict[int, float]:
-        often, seldom = (
-            pooled(
-                *(
-                    _pdr(runs, case, count, period_s, interval_s)
-                    for count in counts
-                    for period_s in periods
-                    if (period_s < _SELDOM_S) == wanted
-                )
+def _many_are_best(runs: Runs, case: str, reason: Reason) -> Claim:
+    return Claim(
+        10,
+        f"The PDR is best at 22 or 44 clusters. (Packets let out {_PACES[case]}.)",
+        [
+            above(
+                f"every {interval_s:g} s: best of {_MANY} or more clusters minus best of fewer, all periods",
+                _lead_of_many(runs, case, interval_s),
+                0.0,
             )
-            for wanted in (True, False)
-        )
-        return {seed: seldom[seed] - often[seed] for seed in seldom}
+            for interval_s in _intervals(runs)
+        ],
+        [reason],
+    )
 
-    few = [count for count in clusters if count < _MANY]
-    bursts = Reason(
+
+def _seldom_is_long_bursts(runs: Runs) -> Reason:
+    few = _few(runs)
+    return Reason(
         "The longer the period, the more packets a head has when its slot begins, and the longer its burst: what "
         "flooding seldom takes is given back when the same packets are spread over the same slots.",
         [
@@ -159,50 +168,62 @@ def _too_often(runs: Runs) -> list[Claim]:
                 f"every {interval_s:g} s, fewer than {_MANY} clusters: PDR gained by flooding seldom, spreading minus "
                 "bursts",
                 differences(
-                    seldom_minus_often("spread", few, interval_s), seldom_minus_often("burst", few, interval_s)
+                    _gain_of_flooding_seldom(runs, "spread", few, interval_s),
+                    _gain_of_flooding_seldom(runs, "burst", few, interval_s),
                 ),
                 0.0,
             )
-            for interval_s in intervals
+            for interval_s in _intervals(runs)
         ],
     )
-    meet = Reason(
+
+
+def _short_slots_meet(runs: Runs) -> Reason:
+    most, often_s, interval_s = _many(runs)[-1], runs.levels("clusters.flooding_period_s")[0], _intervals(runs)[0]
+    slot_ms = often_s * 1e3 / most
+    on_the_air_ms = runs.per_seed(
+        "delay_parts_ms.air",
+        case="spread",
+        clusters__count=most,
+        clusters__flooding_period_s=often_s,
+        traffic__interval_s=interval_s,
+    )
+    where = f"every {interval_s:g} s, {most} clusters, spreading"
+    return Reason(
         f"Without bursts it is too often: {most} slots in {often_s:g} s are {slot_ms:.3g} ms each, shorter than a "
         "flood lasts, so that floods of heads that follow each other meet.",
         [
             above(
-                f"every {intervals[0]:g} s, {most} clusters, spreading: PDR with 1 s and more minus with less",
-                seldom_minus_often("spread", [most], intervals[0]),
+                f"{where}: PDR with 1 s and more minus with less",
+                _gain_of_flooding_seldom(runs, "spread", [most], interval_s),
                 0.0,
             ),
-            above(
-                f"every {intervals[0]:g} s, {most} clusters, spreading: mean time of a packet on the air",
-                runs.per_seed(
-                    "delay_parts_ms.air",
-                    case="spread",
-                    clusters__count=most,
-                    clusters__flooding_period_s=often_s,
-                    traffic__interval_s=intervals[0],
-                ),
-                slot_ms,
-                "ms",
-            ),
+            above(f"{where}: mean time of a packet on the air", on_the_air_ms, slot_ms, "ms"),
         ],
     )
+
+
+def _too_often_is_low(runs: Runs) -> Claim:
+    return Claim(
+        10,
+        "The PDR is low when clusters flood more often than every second.",
+        [
+            above(
+                f"every {interval_s:g} s: PDR with periods of 1 s and more minus with less, mean of all clusters",
+                _gain_of_flooding_seldom(runs, "burst", runs.levels("clusters.count"), interval_s),
+                _LOW,
+            )
+            for interval_s in _intervals(runs)
+        ],
+        [_seldom_is_long_bursts(runs), _short_slots_meet(runs)],
+    )
+
+
+def claims(runs: Runs) -> list[Claim]:
     return [
-        Claim(
-            10,
-            "The PDR is low when clusters flood more often than every second.",
-            [
-                above(
-                    f"every {interval_s:g} s: PDR with periods of 1 s and more minus with less, mean of all clusters",
-                    seldom_minus_often("burst", clusters, interval_s),
-                    _LOW,
-                )
-                for interval_s in intervals
-            ],
-            [bursts, meet],
-        )
+        _many_are_best(runs, "burst", _bursts_collide(runs)),
+        _many_are_best(runs, "spread", _spreading_levels(runs)),
+        _too_often_is_low(runs),
     ]
 
 

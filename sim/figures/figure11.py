@@ -54,6 +54,10 @@ def _share_within(limit_s: float, *, of_all: bool) -> Callable[[Row], float]:
     return share
 
 
+_OF_ALL: Final = _share_within(_WITHIN_S, of_all=True)
+_OF_DELIVERIES: Final = _share_within(_WITHIN_S, of_all=False)
+
+
 def _arrived(runs: Runs, case: str) -> list[Interval]:
     """The share of packets x targets that has arrived by each edge of the classes of delay."""
     sums = [[had / row["wanted"] for had in accumulate(row["delay_counts"])] for row in runs.where(case=case)]
@@ -107,101 +111,100 @@ def draw(runs: Runs) -> Drawing:
     return Drawing(figure, data)
 
 
+def _seen(runs: Runs, quantity: Quantity, case: str) -> dict[int, float]:
+    return runs.per_seed(quantity, case=case)
+
+
+def _flooding_is_faster_on_average(runs: Runs) -> Claim:
+    def longer(quantity: str) -> list[float]:
+        """The paper's method minus flooding, seed by seed."""
+        return differences(_seen(runs, quantity, "paper"), _seen(runs, quantity, "flooding"))
+
+    slots = Reason(
+        "A flooded packet is relayed at once; under the paper's method it waits for its head's slot first.",
+        [above("wait at nodes, the paper's method minus flooding", longer("delay_parts_ms.queue"), 0.0, "ms")],
+    )
+    return Claim(
+        11,
+        "Flooding has the better mean delay.",
+        [above("the paper's method minus flooding", longer("delay_ms.mean"), 0.0, "ms")],
+        [slots],
+    )
+
+
+def _flooding_has_a_tail(runs: Runs) -> Claim:
+    tail = [1 - share for share in _seen(runs, _OF_DELIVERIES, "flooding").values()]
+    losses = Reason(
+        "Flooding loses packets, it does not delay them: a copy is relayed at once or collides. A tail needs queues "
+        "that hold packets for seconds, and flooding has none.",
+        [
+            below("flooding: delivery ratio", _seen(runs, "pdr", "flooding"), _MOST),
+            below("flooding: longest delay", _seen(runs, "delay_ms.max", "flooding"), _WITHIN_S * 1e3, "ms"),
+            below("flooding: wait at nodes", _seen(runs, "delay_parts_ms.queue", "flooding"), 1.0, "ms"),
+        ],
+    )
+    return Claim(
+        11,
+        "Flooding's delays have a long tail.",
+        [above("flooding: deliveries later than 0.5 s", tail, _LONG)],
+        [losses],
+    )
+
+
+def _the_method_is_in_time(runs: Runs) -> Claim:
+    overload = Reason(
+        "Most packets do not arrive at all: the slot holds a period's packets by their airtime on one link, but each "
+        "flood takes the air of every relay. At a tenth of the load the claim is true.",
+        [
+            below("the paper's method: delivery ratio", _seen(runs, "pdr", "paper"), _MOST),
+            above("every 1 s: packets x targets within 0.5 s", _seen(runs, _OF_ALL, "paper, every 1 s"), _MOST),
+        ],
+    )
+    unicast = Reason(
+        "What arrives late is late on its way to a head, by unicast through air that floods keep busy: where every "
+        "node is a head nearly all that arrives does so in time, though no more arrives.",
+        [
+            above("44 clusters: deliveries within 0.5 s", _seen(runs, _OF_DELIVERIES, "paper, 44 clusters"), _NEARLY),
+            below("44 clusters: delivery ratio", _seen(runs, "pdr", "paper, 44 clusters"), _MOST),
+            above("share of unicast frames that fail", _seen(runs, "air.attempt_failure", "paper"), _OFTEN),
+        ],
+    )
+    return Claim(
+        11,
+        "With the proposed method most packets arrive within 0.5 s.",
+        [
+            above("the paper's method: deliveries within 0.5 s", _seen(runs, _OF_DELIVERIES, "paper"), _MOST),
+            above("the paper's method: packets x targets within 0.5 s", _seen(runs, _OF_ALL, "paper"), _MOST),
+        ],
+        [overload, unicast],
+    )
+
+
+def _the_timetable_is_in_time(runs: Runs) -> Claim:
+    turns = Reason(
+        "Turns in which nothing collides carry the whole load, each packet within the bound that was stated when it "
+        "was accepted.",
+        [
+            above("fanet-mw: delivery ratio", _seen(runs, "pdr", "ours"), _ALL),
+            above("fanet-mw: packets x targets with a bound", _seen(runs, "bound.stated_share", "ours"), _STATED),
+            above("fanet-mw: of these within their bound", _seen(runs, _kept, "ours"), _ALL),
+        ],
+    )
+    return Claim(
+        0,
+        "With the timetable most packets arrive within 0.5 s.",
+        [above("fanet-mw: packets x targets within 0.5 s", _seen(runs, _OF_ALL, "ours"), _MOST)],
+        [turns],
+    )
+
+
+_CLAIMS: Final = (
+    _flooding_is_faster_on_average, _flooding_has_a_tail, _the_method_is_in_time, _the_timetable_is_in_time,
+)  # fmt: skip
+
+
 def claims(runs: Runs) -> list[Claim]:
-    of_all, of_deliveries = _share_within(_WITHIN_S, of_all=True), _share_within(_WITHIN_S, of_all=False)
-
-    def seen(quantity: Quantity, case: str) -> dict[int, float]:
-        return runs.per_seed(quantity, case=case)
-
-    tail = [1 - share for share in seen(of_deliveries, "flooding").values()]
-    means = differences(seen("delay_ms.mean", "paper"), seen("delay_ms.mean", "flooding"))
-    return [
-        Claim(
-            11,
-            "Flooding has the better mean delay.",
-            [above("the paper's method minus flooding", means, 0.0, "ms")],
-            [
-                Reason(
-                    "A flooded packet is relayed at once; under the paper's method it waits for its head's slot first.",
-                    [
-                        above(
-                            "wait at nodes, the paper's method minus flooding",
-                            differences(
-                                seen("delay_parts_ms.queue", "paper"), seen("delay_parts_ms.queue", "flooding")
-                            ),
-                            0.0,
-                            "ms",
-                        )
-                    ],
-                )
-            ],
-        ),
-        Claim(
-            11,
-            "Flooding's delays have a long tail.",
-            [above("flooding: deliveries later than 0.5 s", tail, _LONG)],
-            [
-                Reason(
-                    "Flooding loses packets, it does not delay them: a copy is relayed at once or collides. A tail "
-                    "needs queues that hold packets for seconds, and flooding has none.",
-                    [
-                        below("flooding: delivery ratio", seen("pdr", "flooding"), _MOST),
-                        below("flooding: longest delay", seen("delay_ms.max", "flooding"), _WITHIN_S * 1e3, "ms"),
-                        below("flooding: wait at nodes", seen("delay_parts_ms.queue", "flooding"), 1.0, "ms"),
-                    ],
-                )
-            ],
-        ),
-        Claim(
-            11,
-            "With the proposed method most packets arrive within 0.5 s.",
-            [
-                above("the paper's method: deliveries within 0.5 s", seen(of_deliveries, "paper"), _MOST),
-                above("the paper's method: packets x targets within 0.5 s", seen(of_all, "paper"), _MOST),
-            ],
-            [
-                Reason(
-                    "Most packets do not arrive at all: the slot holds a period's packets by their airtime on one "
-                    "link, but each flood takes the air of every relay. At a tenth of the load the claim is true.",
-                    [
-                        below("the paper's method: delivery ratio", seen("pdr", "paper"), _MOST),
-                        above("every 1 s: packets x targets within 0.5 s", seen(of_all, "paper, every 1 s"), _MOST),
-                    ],
-                ),
-                Reason(
-                    "What arrives late is late on its way to a head, by unicast through air that floods keep busy: "
-                    "where every node is a head nearly all that arrives does so in time, though no more arrives.",
-                    [
-                        above(
-                            "44 clusters: deliveries within 0.5 s", seen(of_deliveries, "paper, 44 clusters"), _NEARLY
-                        ),
-                        below("44 clusters: delivery ratio", seen("pdr", "paper, 44 clusters"), _MOST),
-                        above(
-                            "share of unicast frames that fail",
-                            seen("air.attempt_failure", "paper"),
-                            _OFTEN,
-                        ),
-                    ],
-                ),
-            ],
-        ),
-        Claim(
-            0,
-            "With the timetable most packets arrive within 0.5 s.",
-            [above("fanet-mw: packets x targets within 0.5 s", seen(of_all, "ours"), _MOST)],
-            [
-                Reason(
-                    "Turns in which nothing collides carry the whole load, each packet within the bound that was "
-                    "stated when it was accepted.",
-                    [
-                        above("fanet-mw: delivery ratio", seen("pdr", "ours"), _ALL),
-                        above("fanet-mw: packets x targets with a bound", seen("bound.stated_share", "ours"), _STATED),
-                        above("fanet-mw: of these within their bound", seen(_kept, "ours"), _ALL),
-                    ],
-                )
-            ],
-        ),
-    ]
+    return [claim(runs) for claim in _CLAIMS]
 
 
 FIGURE: Final = Recipe(

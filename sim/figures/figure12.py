@@ -113,85 +113,113 @@ def draw(runs: Runs) -> Drawing:
     return Drawing(figure, data)
 
 
-def claims(runs: Runs) -> list[Claim]:
-    def seen(quantity: Quantity, case: str, interval_s: float) -> dict[int, float]:
-        return runs.per_seed(quantity, case=case, **{_AT: interval_s})
+def _seen(runs: Runs, quantity: Quantity, case: str, interval_s: float) -> dict[int, float]:
+    return runs.per_seed(quantity, case=case, **{_AT: interval_s})
 
-    ahead = differences(seen(_half_s, "paper", _SLOW_S), seen(_half_s, "flooding", _SLOW_S))
-    more = differences(seen(_at_end, "paper", _SLOW_S), seen(_at_end, "flooding", _SLOW_S))
-    change = [abs(value) for value in differences(seen(_half_s, "paper", _FAST_S), seen(_half_s, "paper", _SLOW_S))]
-    geometry = Reason(
+
+def _geometry(runs: Runs) -> Reason:
+    return Reason(
         "The instant is one of geometry: nobody turns before three UAVs have heard the same phone, which rests on "
         "where the survivors of a seed are and where the swarm comes from. The network adds to it what slots take.",
         [
-            below("flooding: half turns so much later", seen(_wait_s, "flooding", _SLOW_S), _AT_ONCE_S, "s"),
-            below("the paper's method: half turns so much later", seen(_wait_s, "paper", _SLOW_S), _SECONDS_S, "s"),
+            below("flooding: half turns so much later", _seen(runs, _wait_s, "flooding", _SLOW_S), _AT_ONCE_S, "s"),
+            below(
+                "the paper's method: half turns so much later", _seen(runs, _wait_s, "paper", _SLOW_S), _SECONDS_S, "s"
+            ),
         ],
     )
-    return [
-        Claim(
-            12,
-            "At a packet every second flooding is faster at first: by 50-55 s about 38 UAVs approach, of the proposed "
-            "method fewer than 5.",
-            [
-                above("half of the swarm has turned: the paper's method minus flooding", ahead, 0.0, "s"),
-                above("flooding: UAVs by 55 s", seen(_by(_EARLY_S), "flooding", _SLOW_S), _MANY),
-                below("the paper's method: UAVs by 55 s", seen(_by(_EARLY_S), "paper", _SLOW_S), _FEW),
-            ],
-            [geometry],
-        ),
-        Claim(
-            12,
-            "Later the proposed method is ahead.",
-            [above("UAVs that have turned by the end, the paper's method minus flooding", more, 0.0)],
-            [
-                Reason(
-                    "Under both the news reaches everyone in the end: whoever has not turned yet is told again by the "
-                    "next report, and nobody is left by whom the other could be ahead.",
-                    [
-                        above("flooding: UAVs at the end", seen(_at_end, "flooding", _SLOW_S), _NEARLY_ALL),
-                        above("the paper's method: UAVs at the end", seen(_at_end, "paper", _SLOW_S), _NEARLY_ALL),
-                    ],
-                )
-            ],
-        ),
-        Claim(
-            12,
-            "At a packet every 0.1 s nobody ever approaches under flooding.",
-            [below("flooding: UAVs at the end", seen(_at_end, "flooding", _FAST_S), 1.0)],
-            [
-                Reason(
-                    "Only UAVs that hear a phone send app_2, and few do: the load stays far from what chokes a "
-                    "flood, and the news is there as soon as it can be.",
-                    [
-                        below("UAVs that have heard a phone", seen(_heard, "flooding", _FAST_S), _MANY),
-                        below("flooding: busy share of the air", seen("air.busy", "flooding", _FAST_S), _FREE),
-                        below(
-                            "flooding: half turns so much later", seen(_wait_s, "flooding", _FAST_S), _AT_ONCE_S, "s"
-                        ),
-                    ],
-                )
-            ],
-        ),
-        Claim(
-            12,
-            "The proposed method hardly changes at 0.1 s.",
-            [below("change of the time when half have turned", change, _HARDLY_S, "s")],
-        ),
-        Claim(
-            12,
-            "Under the proposed method most start within 50-70 s.",
-            [
-                above(
-                    f"app_2 every {interval_s:g} s: share of those that turn that do so within 50-70 s",
-                    seen(_in_window, "paper", interval_s),
-                    _MOST,
-                )
-                for interval_s in reversed(runs.levels(_INTERVAL))
-            ],
-            [geometry],
-        ),
-    ]
+
+
+def _flooding_is_first(runs: Runs) -> Claim:
+    ahead = differences(_seen(runs, _half_s, "paper", _SLOW_S), _seen(runs, _half_s, "flooding", _SLOW_S))
+    return Claim(
+        12,
+        "At a packet every second flooding is faster at first: by 50-55 s about 38 UAVs approach, of the proposed "
+        "method fewer than 5.",
+        [
+            above("half of the swarm has turned: the paper's method minus flooding", ahead, 0.0, "s"),
+            above("flooding: UAVs by 55 s", _seen(runs, _by(_EARLY_S), "flooding", _SLOW_S), _MANY),
+            below("the paper's method: UAVs by 55 s", _seen(runs, _by(_EARLY_S), "paper", _SLOW_S), _FEW),
+        ],
+        [_geometry(runs)],
+    )
+
+
+def _the_method_is_ahead_later(runs: Runs) -> Claim:
+    flooding, paper = (_seen(runs, _at_end, case, _SLOW_S) for case in ("flooding", "paper"))
+    nobody_left = Reason(
+        "Under both the news reaches everyone in the end: whoever has not turned yet is told again by the next "
+        "report, and nobody is left by whom the other could be ahead.",
+        [
+            above("flooding: UAVs at the end", flooding, _NEARLY_ALL),
+            above("the paper's method: UAVs at the end", paper, _NEARLY_ALL),
+        ],
+    )
+    return Claim(
+        12,
+        "Later the proposed method is ahead.",
+        [
+            above(
+                "UAVs that have turned by the end, the paper's method minus flooding",
+                differences(paper, flooding),
+                0.0,
+            )
+        ],
+        [nobody_left],
+    )
+
+
+def _flooding_chokes(runs: Runs) -> Claim:
+    few_send = Reason(
+        "Only UAVs that hear a phone send app_2, and few do: the load stays far from what chokes a flood, and the "
+        "news is there as soon as it can be.",
+        [
+            below("UAVs that have heard a phone", _seen(runs, _heard, "flooding", _FAST_S), _MANY),
+            below("flooding: busy share of the air", _seen(runs, "air.busy", "flooding", _FAST_S), _FREE),
+            below("flooding: half turns so much later", _seen(runs, _wait_s, "flooding", _FAST_S), _AT_ONCE_S, "s"),
+        ],
+    )
+    return Claim(
+        12,
+        "At a packet every 0.1 s nobody ever approaches under flooding.",
+        [below("flooding: UAVs at the end", _seen(runs, _at_end, "flooding", _FAST_S), 1.0)],
+        [few_send],
+    )
+
+
+def _the_method_hardly_changes(runs: Runs) -> Claim:
+    change = differences(_seen(runs, _half_s, "paper", _FAST_S), _seen(runs, _half_s, "paper", _SLOW_S))
+    return Claim(
+        12,
+        "The proposed method hardly changes at 0.1 s.",
+        [below("change of the time when half have turned", [abs(value) for value in change], _HARDLY_S, "s")],
+    )
+
+
+def _most_turn_in_the_window(runs: Runs) -> Claim:
+    return Claim(
+        12,
+        "Under the proposed method most start within 50-70 s.",
+        [
+            above(
+                f"app_2 every {interval_s:g} s: share of those that turn that do so within 50-70 s",
+                _seen(runs, _in_window, "paper", interval_s),
+                _MOST,
+            )
+            for interval_s in reversed(runs.levels(_INTERVAL))
+        ],
+        [_geometry(runs)],
+    )
+
+
+_CLAIMS: Final = (
+    _flooding_is_first, _the_method_is_ahead_later, _flooding_chokes, _the_method_hardly_changes,
+    _most_turn_in_the_window,
+)  # fmt: skip
+
+
+def claims(runs: Runs) -> list[Claim]:
+    return [claim(runs) for claim in _CLAIMS]
 
 
 FIGURE: Final = Recipe(

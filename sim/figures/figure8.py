@@ -72,99 +72,127 @@ def draw(runs: Runs) -> Drawing:
     return Drawing(figure, data)
 
 
-def claims(runs: Runs) -> list[Claim]:
+def _seen(runs: Runs, quantity: Quantity, case: str, speed_m_s: float) -> dict[int, float]:
+    return runs.per_seed(quantity, case=case, **{_AT: speed_m_s})
+
+
+def _slow(runs: Runs, quantity: Quantity, case: str) -> dict[int, float]:
+    """The quantity of each seed at the lowest speed."""
+    return _seen(runs, quantity, case, runs.levels(_SPEED)[0])
+
+
+def _fast(runs: Runs, quantity: Quantity, case: str) -> dict[int, float]:
+    """The quantity of each seed at the highest speed."""
+    return _seen(runs, quantity, case, runs.levels(_SPEED)[-1])
+
+
+def _fall(runs: Runs, quantity: Quantity, case: str) -> list[float]:
+    """By how much the quantity is less when all are fast than when all are slow, seed by seed."""
+    return differences(_slow(runs, quantity, case), _fast(runs, quantity, case))
+
+
+def _rise(runs: Runs, quantity: Quantity, case: str) -> list[float]:
+    """By how much the quantity is more when all are fast than when all are slow, seed by seed."""
+    return differences(_fast(runs, quantity, case), _slow(runs, quantity, case))
+
+
+def _span(runs: Runs) -> str:
+    """The lowest and the highest speed, for people."""
     speeds = runs.levels(_SPEED)
-    slow, fast = {_AT: speeds[0]}, {_AT: speeds[-1]}
-    label = f"from {speeds[0]:g} to {speeds[-1]:g} m/s"
+    return f"from {speeds[0]:g} to {speeds[-1]:g} m/s"
 
-    def fall(quantity: Quantity, case: str) -> list[float]:
-        """By how much it is less when all are fast than when all are slow, seed by seed."""
-        return differences(runs.per_seed(quantity, case=case, **slow), runs.per_seed(quantity, case=case, **fast))
 
-    def rise(quantity: Quantity, case: str) -> list[float]:
-        return [-less for less in fall(quantity, case)]
+def _falls_on_waypoints(runs: Runs) -> Claim:
+    apart = Reason(
+        "The swarm comes apart: on the way to its waypoints it spreads over an area in which a range of 250 m no "
+        "longer connects it, whatever the protocol.",
+        [above(f"fall of the share of pairs with a path, {_span(runs)}", _fall(runs, "connected", "aodv"), _SHARP)],
+    )
+    old_routes = Reason(
+        "AODV loses little beyond that, OLSR much: its routes are older than the links.",
+        [
+            below("AODV: PDR lost beyond what geometry takes", _rise(runs, _below_limit, "aodv"), _SHARP),
+            above("OLSR: PDR lost beyond what geometry takes", _rise(runs, _below_limit, "olsr"), _SHARP),
+        ],
+    )
+    return Claim(
+        8,
+        "The PDR of AODV and OLSR drops sharply with speed (nodes on random waypoints).",
+        [
+            above(f"{name}: fall of the PDR {_span(runs)}", _fall(runs, "pdr", case), _SHARP)
+            for case, name in _NAMES.items()
+        ],
+        [apart, old_routes],
+    )
 
-    over = [{case: runs.per_seed("pdr", case=case, **{_AT: speed}) for case in _NAMES} for speed in speeds]
-    ahead = differences(pooled(*(one["aodv"] for one in over)), pooled(*(one["olsr"] for one in over)))
-    return [
-        Claim(
-            8,
-            "The PDR of AODV and OLSR drops sharply with speed (nodes on random waypoints).",
-            [above(f"{name}: fall of the PDR {label}", fall("pdr", case), _SHARP) for case, name in _NAMES.items()],
-            [
-                Reason(
-                    "The swarm comes apart: on the way to its waypoints it spreads over an area in which a range of "
-                    "250 m no longer connects it, whatever the protocol.",
-                    [above(f"fall of the share of pairs with a path, {label}", fall("connected", "aodv"), _SHARP)],
-                ),
-                Reason(
-                    "AODV loses little beyond that, OLSR much: its routes are older than the links.",
-                    [
-                        below("AODV: PDR lost beyond what geometry takes", rise(_below_limit, "aodv"), _SHARP),
-                        above("OLSR: PDR lost beyond what geometry takes", rise(_below_limit, "olsr"), _SHARP),
-                    ],
-                ),
-            ],
-        ),
-        Claim(
-            8,
-            "The PDR drops with speed also in the paper's own mobility, a formation (here a rigid one).",
-            [
-                above(f"{name}, formation: fall of the PDR {label}", fall("pdr", f"{case}, formation"), _SHARP)
-                for case, name in _NAMES.items()
-            ],
-            [
-                Reason(
-                    "Relative motion does harm, not speed: in a rigid formation distances do not change, and neither "
-                    "do routes. To fall with speed, a formation needs clusters that move relative to each other, or "
-                    "UAVs that do so within them; the paper describes neither.",
-                    [
-                        above(
-                            f"{name}, formation: PDR at {speeds[-1]:g} m/s",
-                            runs.per_seed("pdr", case=f"{case}, formation", **fast),
-                            _HIGH,
-                        )
-                        for case, name in _NAMES.items()
-                    ],
-                )
-            ],
-        ),
-        Claim(
-            8,
-            "The PDR is low even when nodes are slow.",
-            [
-                below(f"{name}: PDR at {speeds[0]:g} m/s", runs.per_seed("pdr", case=case, **slow), _LOW)
-                for case, name in _NAMES.items()
-            ],
-            [
-                Reason(
-                    "Nothing is there to lose packets: while a run lasts, the slowest swarm is nearly the grid that it "
-                    "starts as, and a packet a second of each node leaves most of the air free.",
-                    [
-                        above("share of pairs with a path", runs.per_seed("connected", case="aodv", **slow), _HIGH),
-                        below("AODV: busy share of the air", runs.per_seed("air.busy", case="aodv", **slow), _IDLE),
-                    ],
-                )
-            ],
-        ),
-        Claim(8, "AODV's PDR is above OLSR's.", [above("AODV minus OLSR, all speeds", ahead, 0.0)]),
-        Claim(
-            8,
-            "AODV's delay grows with speed.",
-            [above(f"growth of the mean {label}", rise("delay_ms.mean", "aodv"), 0.0, "ms")],
-            [
-                Reason(
-                    "Some packets wait at nodes, for a route; half are as early as before, and time on the air hardly "
-                    "changes.",
-                    [
-                        above("growth of the wait at nodes", rise("delay_parts_ms.queue", "aodv"), 0.0, "ms"),
-                        below("growth of the time on the air", rise("delay_parts_ms.air", "aodv"), _HARDLY_MS, "ms"),
-                        below("growth of the median", rise("delay_ms.p50", "aodv"), _HARDLY_MS, "ms"),
-                    ],
-                )
-            ],
-        ),
-    ]
+
+def _falls_in_formation(runs: Runs) -> Claim:
+    fastest = f"{runs.levels(_SPEED)[-1]:g} m/s"
+    relative_motion = Reason(
+        "Relative motion does harm, not speed: in a rigid formation distances do not change, and neither do routes. "
+        "To fall with speed, a formation needs clusters that move relative to each other, or UAVs that do so within "
+        "them; the paper describes neither.",
+        [
+            above(f"{name}, formation: PDR at {fastest}", _fast(runs, "pdr", f"{case}, formation"), _HIGH)
+            for case, name in _NAMES.items()
+        ],
+    )
+    return Claim(
+        8,
+        "The PDR drops with speed also in the paper's own mobility, a formation (here a rigid one).",
+        [
+            above(f"{name}, formation: fall of the PDR {_span(runs)}", _fall(runs, "pdr", f"{case}, formation"), _SHARP)
+            for case, name in _NAMES.items()
+        ],
+        [relative_motion],
+    )
+
+
+def _is_low_when_slow(runs: Runs) -> Claim:
+    slowest = f"{runs.levels(_SPEED)[0]:g} m/s"
+    nothing_lost = Reason(
+        "Nothing is there to lose packets: while a run lasts, the slowest swarm is nearly the grid that it starts as, "
+        "and a packet a second of each node leaves most of the air free.",
+        [
+            above("share of pairs with a path", _slow(runs, "connected", "aodv"), _HIGH),
+            below("AODV: busy share of the air", _slow(runs, "air.busy", "aodv"), _IDLE),
+        ],
+    )
+    return Claim(
+        8,
+        "The PDR is low even when nodes are slow.",
+        [below(f"{name}: PDR at {slowest}", _slow(runs, "pdr", case), _LOW) for case, name in _NAMES.items()],
+        [nothing_lost],
+    )
+
+
+def _aodv_above_olsr(runs: Runs) -> Claim:
+    aodv, olsr = (pooled(*(_seen(runs, "pdr", case, at) for at in runs.levels(_SPEED))) for case in ("aodv", "olsr"))
+    return Claim(8, "AODV's PDR is above OLSR's.", [above("AODV minus OLSR, all speeds", differences(aodv, olsr), 0.0)])
+
+
+def _delay_grows(runs: Runs) -> Claim:
+    some_wait = Reason(
+        "Some packets wait at nodes, for a route; half are as early as before, and time on the air hardly changes.",
+        [
+            above("growth of the wait at nodes", _rise(runs, "delay_parts_ms.queue", "aodv"), 0.0, "ms"),
+            below("growth of the time on the air", _rise(runs, "delay_parts_ms.air", "aodv"), _HARDLY_MS, "ms"),
+            below("growth of the median", _rise(runs, "delay_ms.p50", "aodv"), _HARDLY_MS, "ms"),
+        ],
+    )
+    return Claim(
+        8,
+        "AODV's delay grows with speed.",
+        [above(f"growth of the mean {_span(runs)}", _rise(runs, "delay_ms.mean", "aodv"), 0.0, "ms")],
+        [some_wait],
+    )
+
+
+_CLAIMS: Final = (_falls_on_waypoints, _falls_in_formation, _is_low_when_slow, _aodv_above_olsr, _delay_grows)
+
+
+def claims(runs: Runs) -> list[Claim]:
+    return [claim(runs) for claim in _CLAIMS]
 
 
 FIGURE: Final = Recipe(

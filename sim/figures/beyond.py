@@ -8,13 +8,14 @@ from sim.figures.claims import Claim, Reason, Statement, above, below
 from sim.figures.curves import Panel, curves
 from sim.figures.recipe import Drawing, Recipe, point
 from sim.figures.runs import Quantity, Row, Runs, best, differences
-from sim.figures.style import SERIES, canvas, legend_above, reaches
+from sim.figures.style import SERIES, Look, canvas, legend_above, reaches
 
 _URGENT_P95: Final = "classes.urgent.delay_ms.p95"
 _CLASSES_OF_LOAD: Final = (
     SERIES[0]._replace(label="the load"),
     SERIES[4]._replace(label="urgent packets"),
 )
+_ALL_PACKETS: Final = Look("all packets", "#888888", "", "-")
 _ABLATION_PANELS: Final[Sequence[tuple[str, Sequence[str], float]]] = (
     ("packet delivery ratio", ("pdr", "classes.urgent.pdr"), 1.0),
     ("95th percentile of the delay [s]", ("delay_ms.p95", _URGENT_P95), 1e-3),
@@ -115,7 +116,8 @@ def draw_ablation(runs: Runs) -> Drawing:
     cases = list(dict.fromkeys(row["case"] for row in runs.rows))
     data = []
     for axes, (label, quantities, factor) in zip(panels, _ABLATION_PANELS, strict=True):
-        for number, (quantity, look) in enumerate(zip(quantities, _CLASSES_OF_LOAD, strict=False)):
+        looks = _CLASSES_OF_LOAD if len(quantities) > 1 else (_ALL_PACKETS,)
+        for number, (quantity, look) in enumerate(zip(quantities, looks, strict=True)):
             found = [runs.of(quantity, case=case).scaled(factor) for case in cases]
             reach = reaches(found, most=1.0 if factor == 1.0 else math.inf)
             height = 0.7 / len(quantities)
@@ -193,7 +195,7 @@ LOAD: Final = Recipe(
     "Against all rivals over load",
     "load",
     "45 nodes on the paper's grid, 44 sources of 1024 B to everyone. fanet-mw: the timetable, all are heads, period "
-    "4 s. Its delay is that of its turns, long at low load and hardly longer at high load.",
+    "4 s. Its delay is that of its turns: who sends seldom has few, and waits longer.",
     curves(
         "traffic.interval_s",
         "load [packets/s], each to 44 others",

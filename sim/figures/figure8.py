@@ -62,7 +62,7 @@ def draw(runs: Runs) -> Drawing:
     ):
         axes.set_title(title)
         axes.set_xlabel("speed [m/s]")
-        axes.set_ylabel("packet delivery ratio at the leader" if axes is not delay else "mean delay [s]")
+        axes.set_ylabel("delivery ratio at the leader" if axes is not delay else "mean delay [s]")
         ticks_at(axes.xaxis, {speed: f"{speed:g}" for speed in speeds})
     for axes in (pdr, rest):
         axes.set_ylim(0, 1.05)

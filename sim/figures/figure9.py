@@ -5,7 +5,7 @@ from typing import Final
 from sim.figures.claims import Claim, Statement
 from sim.figures.recipe import Drawing, Recipe, point
 from sim.figures.runs import Row, Runs, differences
-from sim.figures.style import SERIES, canvas, legend_above, line, ticks_at
+from sim.figures.style import SERIES, canvas, legend_above, line, spaced, ticks_at
 
 _FALLS: Final = 0.02
 _MOSTLY: Final = 0.5
@@ -38,7 +38,7 @@ def draw(runs: Runs) -> Drawing:
     for axes in (pdr, lost):
         axes.set_xlabel("sources (of 45 nodes)")
         axes.set_ylim(0, 1.05)
-        ticks_at(axes.xaxis, {count: str(count) for count in sources})
+        ticks_at(axes.xaxis, {count: str(count) for count in spaced(sources)})
     legend_above(figure, pdr)
     return Drawing(figure, data)
 

@@ -153,8 +153,8 @@ MISSION: Final = Recipe(
         "faults",
         "share of frames that every link loses",
         [
-            Panel(_half_s, "until half of the survivors are confirmed [s]", most=_END_S),
-            Panel(_all_s, "until all are confirmed [s]", most=_END_S),
+            Panel(_half_s, "time until half are confirmed [s]", most=_END_S),
+            Panel(_all_s, "time until all are confirmed [s]", most=_END_S),
             Panel("reports.pdr", "reports delivered, share", share=True),
         ],
         value=loss_share,

@@ -127,6 +127,15 @@ def ticks_at(axis: Axis, places: Mapping[float, str]) -> None:
     axis.set_minor_locator(NullLocator())
 
 
+def spaced(places: Sequence[float], *, least: float = 0.04) -> list[float]:
+    """The places whose labels have room on a linear axis: each at least this share of its length from the last."""
+    kept = list(places[:1])
+    for place in places[1:]:
+        if place - kept[-1] >= least * (places[-1] - places[0]):
+            kept.append(place)
+    return kept
+
+
 def plain_log(axis: Axis) -> None:
     """A logarithmic axis with its numbers written out: 1, 2, 5, 10, 20 and so on, or only decades if it is long."""
     low, high = axis.get_view_interval()

@@ -17,7 +17,7 @@ from sim.figures.render import render
 from sim.figures.rescue import confirmed_s, loss_share
 from sim.figures.runs import Runs, best, differences, pooled
 from sim.figures.statistics import interval, quantile_975
-from sim.figures.style import beside, reaches
+from sim.figures.style import beside, reaches, spaced
 from sim.report.page import write
 from sim.results.files import finish
 from sim.run.virtual import simulate
@@ -113,6 +113,12 @@ def test_a_bar_ends_at_what_there_can_be_and_one_run_has_none() -> None:
 def test_marks_at_one_place_stand_beside_each_other_about_it() -> None:
     assert [beside(10, n, 3, log=False, apart=0.5) for n in range(3)] == [9.5, 10, 10.5]
     assert [beside(10, n, 3, log=True, apart=1.0) for n in range(3)] == [5, 10, 20]
+
+
+def test_ticks_that_would_write_over_each_other_are_left_out() -> None:
+    assert spaced([1, 2, 5, 10, 20, 30, 44]) == [1, 5, 10, 20, 30, 44]
+    assert spaced([1, 2, 3, 50]) == [1, 3, 50]
+    assert spaced([7]) == [7]
 
 
 def test_a_search_that_did_not_confirm_so_many_ended_with_the_run() -> None:

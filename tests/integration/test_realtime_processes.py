@@ -1,7 +1,6 @@
 """Children of a launcher: whichever process is killed, its end is reported by name and no process is left running."""
 
 import asyncio
-import multiprocessing
 import os
 import re
 import signal
@@ -115,12 +114,33 @@ def lose_the_bus() -> int:
     raise BusError("the router is gone")
 
 
-def test_a_child_leaves_the_helper_processes_of_multiprocessing_to_its_parent() -> None:
+def leave() -> int:
+    end_servers()
+    return 0
+
+
+async def test_a_child_leaves_the_helper_processes_of_multiprocessing_to_its_parent() -> None:
     """From Python 3.13 on, children run what was registered for the exit; here it is called as they call it."""
-    child = multiprocessing.get_context("forkserver").Process(target=end_servers)
-    child.start()
-    child.join(PATIENCE_S)
-    assert child.exitcode == 0
+    ended: dict[str, int] = {}
+    processes = Processes(ended.__setitem__)
+    processes.start("child", leave, {})
+    assert await processes.wait(PATIENCE_S)
+    assert ended == {"child": 0}
+
+
+async def test_a_child_that_gives_way_is_nicer_than_others_and_interrupts_none_of_its_kind() -> None:
+    processes = Processes(lambda _name, _code: None)
+    processes.start("emulator", sleeper, {"seconds": 300})
+    processes.start("agent-1", sleeper, {"seconds": 300}, gives_way=True)
+    emulator, agent = processes.pid("emulator"), processes.pid("agent-1")
+    deadline = time.monotonic() + PATIENCE_S
+    while os.sched_getscheduler(agent) != os.SCHED_BATCH and time.monotonic() < deadline:
+        await asyncio.sleep(0.05)
+    assert os.sched_getscheduler(agent) == os.SCHED_BATCH
+    assert os.sched_getscheduler(emulator) == os.SCHED_OTHER
+    niceness = os.getpriority(os.PRIO_PROCESS, emulator)
+    assert os.getpriority(os.PRIO_PROCESS, agent) == min(19, niceness + 10)
+    await processes.end_all()
 
 
 async def test_every_end_is_told_with_its_name_and_exit_code() -> None:

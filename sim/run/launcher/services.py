@@ -1,7 +1,7 @@
 """The processes of a swarm: which of them the launcher starts, and with what arguments."""
 
 from collections.abc import Iterator, Mapping
-from typing import Any, Final, NamedTuple
+from typing import Any, NamedTuple
 
 from agents.__main__ import run as run_agent
 from emulator.__main__ import run as run_emulator
@@ -13,17 +13,15 @@ from sim.world.__main__ import run as run_world
 from sim.world.environment.map_on_board import map_on_board
 from sim.world.mobility.layout import positions
 
-_AGENT_NICE: Final = 10
-"""The niceness of UAVs: all of them wait for the emulator, which goes first when all cores are in use."""
-
 
 class Service(NamedTuple):
-    """One process: `entry(**arguments)`, with `nice` added to the launcher's niceness."""
+    """One process: `entry(**arguments)`."""
 
     name: str
     entry: Entry
     arguments: Mapping[str, Any]
-    nice: int = 0
+    gives_way: bool = False
+    """True for the UAVs: all of them wait for the emulator, which goes first when all cores are in use."""
 
 
 class Services(NamedTuple):
@@ -48,4 +46,4 @@ class Services(NamedTuple):
         for node, position in zip(self.scenario.node_ids, positions(self.scenario), strict=True):
             if node not in self.leave_out:
                 arguments = {**common, "node": NodeId(node), "position": position, "onboard_map": onboard_map}
-                yield Service(f"agent-{node}", run_agent, arguments, _AGENT_NICE)
+                yield Service(f"agent-{node}", run_agent, arguments, gives_way=True)

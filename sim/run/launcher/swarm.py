@@ -135,8 +135,8 @@ class SwarmRun:
     async def _start_all(self) -> None:
         await self.processes.warm_up()
         self._check_not_over()
-        for name, entry, arguments, nice in self._services.each():
-            self.processes.start(name, entry, arguments, nice=nice)
+        for name, entry, arguments, gives_way in self._services.each():
+            self.processes.start(name, entry, arguments, gives_way=gives_way)
             await asyncio.sleep(0)  # signals are handled between two of many processes
             self._check_not_over()
 

@@ -8,9 +8,9 @@ the geofence, and lands at once when its battery is nearly empty.
 """
 
 import math
-from collections.abc import Callable
+from collections.abc import Callable, Mapping
 from enum import StrEnum
-from typing import Final, assert_never
+from typing import Final, NamedTuple, assert_never
 
 import numpy as np
 
@@ -63,8 +63,34 @@ class FlightMode(StrEnum):
     FALLEN = "fallen"
 
 
+class _GoTo(NamedTuple):
+    """Fly to a place and stay there."""
+
+    place: Enu
+    speed_m_s: float
+
+
+class _FlyAt(NamedTuple):
+    """Fly at a velocity, until an instant [s] at which it is to have been renewed."""
+
+    velocity: Enu
+    until_s: float
+
+
+class _Land(NamedTuple):
+    """Sink straight down, and stay on the ground."""
+
+    speed_m_s: float
+
+
+_Command = _GoTo | _FlyAt | _Land
+
+
 class Guidance:
-    """The track of the mobility model, overridden per node by setpoints."""
+    """The track of the mobility model, overridden per node by setpoints.
+
+    The flight of each UAV is its command, its mode, and whether it may still stand on the ground.
+    """
 
     def __init__(self, starts: Rows, scenario: Scenario, *, ground_m: Callable[[Rows], Values] | None = None) -> None:
         """`ground_m`: heights of the ground at places [n, 3]; None: a plain at 0."""
@@ -85,35 +111,29 @@ class Guidance:
             else None if model in MOBILITY_MODELS
             else load("mobility.model", model)(starts.copy(), scenario)
         )  # fmt: skip
-        self._setpoints: dict[int, tuple[Enu, float]] = {}
-        self._velocities: dict[int, tuple[Enu, float]] = {}
-        """Velocity setpoints by row, each with the instant [s] at which it ends."""
-        self._landings: dict[int, float] = {}
-        """Speeds of those rows that land, or have landed."""
+        self._commands: dict[int, _Command] = {}
+        """What each row was told last, the latest at the end; a row that is not here follows the mobility model."""
+        self._modes: dict[int, FlightMode] = {}
+        """What each row does; a row that was never told anything is not here."""
         self._grounded = set(range(len(starts))) if scenario.nodes.on_ground else set[int]()
         """Rows that have not taken off yet, or that are taking off."""
-        self._forced: set[int] = set()
-        """Rows that obey no setpoint: they land, because their batteries are nearly empty, or are wrecks."""
-        self._modes: dict[int, FlightMode] = {}
         self.changes: list[tuple[int, FlightMode]] = []
         """Nodes that changed their mode, with the new one, for the host to take."""
 
     @property
     def still(self) -> bool:
         """True when nothing moves and no setpoint is in force."""
-        asked = self._setpoints or self._velocities or self._landings
-        return self._model is None and not self._onboard and not asked
+        return self._model is None and not self._onboard and not self._commands
 
     def obey(self, node: int, setpoint: Setpoint, *, at: Values, t_s: float) -> None:
         """Take a setpoint of a UAV that is `at` [3] at an instant."""
         here = Enu(*at.tolist())
         row = node - 1
-        if row in self._forced:
+        if not self._obeys(row):
             return
         kind, place, speed_m_s = setpoint.kind, setpoint.position, setpoint.speed_m_s
-        if kind is not SetpointKind.LAND and self._landings.pop(row, None) is not None:
+        if kind is not SetpointKind.LAND and isinstance(self._commands.get(row), _Land):
             self._grounded.add(row)  # it may stand on the ground, until it is seen clear of it
-        self._velocities.pop(row, None)
         if kind is SetpointKind.POSITION:
             self.steer(node, place, speed_m_s=speed_m_s)
             if speed_m_s <= 0 and self._onboard:
@@ -122,8 +142,7 @@ class Guidance:
                 row, FlightMode.GOTO if speed_m_s > 0 else FlightMode.HOLD if self._onboard else FlightMode.TRACK
             )
         elif kind is SetpointKind.VELOCITY:
-            self._setpoints.pop(row, None)
-            self._velocities[row] = setpoint.velocity, t_s + VELOCITY_LASTS_NS / S
+            self._command(row, _FlyAt(setpoint.velocity, t_s + VELOCITY_LASTS_NS / S))
             self._enter(row, FlightMode.VELOCITY)
         elif kind is SetpointKind.HOLD:
             self._hold(row, here)
@@ -133,8 +152,7 @@ class Guidance:
             self.steer(node, Enu(here.east, here.north, place.up), speed_m_s=max(_LEAST_CLIMB_M_S, speed_m_s))
             self._enter(row, FlightMode.TAKEOFF)
         elif kind is SetpointKind.LAND:
-            self._setpoints.pop(row, None)
-            self._landings[row] = max(_TOUCHDOWN_M_S, speed_m_s)
+            self._command(row, _Land(max(_TOUCHDOWN_M_S, speed_m_s)))
             self._enter(row, FlightMode.LAND)
         else:
             assert_never(kind)
@@ -142,22 +160,27 @@ class Guidance:
     def land_at_once(self, node: int) -> None:
         """The battery of this UAV is nearly empty: it lands where it is, and obeys no further setpoint."""
         row = node - 1
-        if row not in self._forced:
-            self._obey_no_more(row)
-            self._landings[row] = _FORCED_M_S
+        if self._obeys(row):
+            self._command(row, _Land(_FORCED_M_S))
             self._enter(row, FlightMode.FAILSAFE)
 
     def fell(self, node: int) -> None:
         """Take a UAV for a wreck, which obeys no setpoint."""
         row = node - 1
-        self._obey_no_more(row)
-        self._landings.pop(row, None)
+        self._command(row, None)
         self._enter(row, FlightMode.FALLEN)
 
-    def _obey_no_more(self, row: int) -> None:
-        self._forced.add(row)
-        self._velocities.pop(row, None)
-        self._setpoints.pop(row, None)
+    def _obeys(self, row: int) -> bool:
+        """False for a wreck, and for a UAV that lands because its battery is nearly empty."""
+        mode = self._modes.get(row)
+        landing = isinstance(self._commands.get(row), _Land)
+        return mode is not FlightMode.FALLEN and not (mode is FlightMode.FAILSAFE and landing)
+
+    def _command(self, row: int, command: _Command | None) -> None:
+        """Let a row do this and nothing that it was told before; None: follow the mobility model."""
+        self._commands.pop(row, None)
+        if command is not None:
+            self._commands[row] = command
 
     def _enter(self, row: int, mode: FlightMode) -> None:
         if self._modes.get(row) is not mode:
@@ -166,29 +189,33 @@ class Guidance:
 
     def may_touch_down(self, node: int) -> bool:
         """True if this UAV touches the ground on purpose."""
-        return node - 1 in self._landings or node - 1 in self._grounded
+        return node - 1 in self._grounded or isinstance(self._commands.get(node - 1), _Land)
 
     def grounded(self, at: Rows) -> Flags:
         """Which UAVs stand on the ground with their motors off: they have landed, or wait for their takeoff."""
         off = np.zeros(len(at), bool)
-        waiting = [row for row in self._grounded if row not in self._setpoints and row not in self._velocities]
-        off[[*self._landings, *waiting]] = True
+        landing = [row for row, command in self._commands.items() if isinstance(command, _Land)]
+        off[[*landing, *self._waiting()]] = True
         return np.asarray(off & (at[:, 2] - self._ground_m(at) <= _ON_GROUND_M))
 
+    def _waiting(self) -> list[int]:
+        """The rows that stand on the ground, and have not been told to take off."""
+        return [row for row in self._grounded if row not in self._commands]
+
     def _hold(self, row: int, here: Enu) -> None:
-        self._setpoints[row] = here, _HOLD_M_S
+        self._command(row, _GoTo(here, _HOLD_M_S))
 
     def steer(self, node: int, place: Enu, *, speed_m_s: float) -> None:
         """Send a UAV somewhere, within the area; a speed of 0 or less sends it back to its track."""
         if speed_m_s <= 0:
-            self._setpoints.pop(node - 1, None)
+            self._command(node - 1, None)
             return
         inside = Enu(
             max(-self._half_east, min(self._half_east, place.east)),
             max(-self._half_north, min(self._half_north, place.north)),
             max(FLOOR_M, min(1000.0, place.up)),
         )
-        self._setpoints[node - 1] = inside, speed_m_s
+        self._command(node - 1, _GoTo(inside, speed_m_s))
 
     def track(self, t_s: float) -> Track:
         """The places at which all UAVs should be, setpoints not considered."""
@@ -200,23 +227,28 @@ class Guidance:
         places, feed = places.copy(), feed.copy()
         limit = np.linalg.norm(feed, axis=1) + 5.0
         self._expire(t_s, at)
-        for row in sorted(self._setpoints):
-            places[row], limit[row] = self._setpoints[row][0], self._setpoints[row][1]
-            feed[row] = 0.0
+        for row, command in self._commands.items():
+            if isinstance(command, _GoTo):
+                places[row], limit[row] = command
+                feed[row] = 0.0
         wish = feed + _GAIN * (places - at)
         speed = np.linalg.norm(wish, axis=1)
         wish *= np.minimum(1.0, limit / np.maximum(speed, 1e-9))[:, None]
-        for row, (velocity_m_s, _) in self._velocities.items():
-            wish[row] = velocity_m_s
-            self._fence(wish[row], at[row])
-        if self._landings or self._grounded:
-            self._near_the_ground(wish, at)
+        landings: dict[int, float] = {}
+        for row, command in self._commands.items():
+            if isinstance(command, _FlyAt):
+                wish[row] = command.velocity
+                self._fence(wish[row], at[row])
+            elif isinstance(command, _Land):
+                landings[row] = command.speed_m_s
+        if landings or self._grounded:
+            self._near_the_ground(wish, at, landings)
         return _keep_clear(wish, at, self._see_m) if len(at) > 1 and self._see_m else wish
 
     def _expire(self, t_s: float, at: Rows) -> None:
         """Let each UAV hold its position whose velocity setpoint was not renewed in time."""
-        for row in [row for row, (_, until_s) in self._velocities.items() if t_s >= until_s]:
-            del self._velocities[row]
+        commands = self._commands.items()
+        for row in [row for row, told in commands if isinstance(told, _FlyAt) and t_s >= told.until_s]:
             self._hold(row, Enu(*at[row].tolist()))
             self._enter(row, FlightMode.FAILSAFE)
 
@@ -229,17 +261,15 @@ class Guidance:
             if wish[axis] * outwards > most:
                 wish[axis] = most * outwards
 
-    def _near_the_ground(self, wish: Rows, at: Rows) -> None:
+    def _near_the_ground(self, wish: Rows, at: Rows, landings: Mapping[int, float]) -> None:
         """Sink straight down, the slower the nearer the ground; forget the UAVs that have taken off."""
         height = at[:, 2] - self._ground_m(at)
-        for row, speed_m_s in self._landings.items():
+        for row, speed_m_s in landings.items():
             sink = min(speed_m_s, max(_TOUCHDOWN_M_S, _FLARE_PER_S * float(height[row])))
             wish[row] = [0.0, 0.0, -sink if height[row] > _ON_GROUND_M else 0.0]
         for row in [row for row in self._grounded if height[row] > _CLEAR_M]:
             self._grounded.discard(row)
-        for row in self._grounded:
-            if row not in self._setpoints and row not in self._velocities and row not in self._landings:
-                wish[row] = 0.0
+        wish[self._waiting()] = 0.0
 
 
 def _keep_clear(wish: Rows, at: Rows, see_m: float) -> Rows:

@@ -220,7 +220,9 @@ class Application:
         return b""
 
     def permits(self, course: Course, now_ns: int) -> bool:
-        """True if a course that another application has commanded may be flown now."""
+        """True if a course that another application has commanded may be flown now. Who objects is asked about the next
+        course too, and so knows what is wanted.
+        """
         return True
 
     def wake(self, now_ns: int) -> None:

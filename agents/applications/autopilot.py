@@ -96,7 +96,7 @@ class Autopilot:
         if math.hypot(gps.velocity.east, gps.velocity.north) >= TURNING_M_S:
             self._yaw = math.atan2(gps.velocity.east, gps.velocity.north)
 
-    def battery(self, reading: Battery) -> None:
+    def on_battery(self, reading: Battery) -> None:
         """Take in what the sensor of the battery reads; what has been consumed is counted from its first reading."""
         if self._read_ns is not None:
             self._consumed_mah += max(0, reading.t_ns - self._read_ns) / _HOUR_NS * 1000 * reading.current_a

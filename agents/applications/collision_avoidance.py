@@ -54,7 +54,8 @@ class CollisionAvoidance(Application):
         self._hand_over(now_ns)
 
     def permits(self, course: Course, now_ns: int) -> bool:
-        return self._monitor.permits(course)
+        self._monitor.on_course(course)
+        return not self._monitor.avoids
 
     def report(self) -> Mapping[str, Any]:
         return {"bad_positions": self._bad_positions}

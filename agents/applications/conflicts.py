@@ -131,10 +131,14 @@ class ConflictMonitor:
                 self.records.append(ConflictOver(now_ns, self._node, node))
         self._fly(own)
 
-    def permits(self, course: Course) -> bool:
-        """Note the course that the mission has chosen; True when it may be flown now."""
+    def on_course(self, course: Course) -> None:
+        """Note the course that the mission has chosen: it is flown when no UAV is to be avoided any more."""
         self._wanted = None if course.speed_m_s == HOME else course
-        return self._avoidance is None
+
+    @property
+    def avoids(self) -> bool:
+        """True while this UAV flies out of the way of others, and nowhere else."""
+        return self._avoidance is not None
 
     # --- conflicts ------------------------------------------------------------------------------------------------
 

@@ -21,7 +21,7 @@ class Telemetry(Application):
 
     def on_sensor(self, reading: SensorReading, now_ns: int) -> None:
         if isinstance(reading, Battery):
-            self._autopilot.battery(reading)
+            self._autopilot.on_battery(reading)
 
     def wake(self, now_ns: int) -> None:
         frames = self._autopilot.telemetry(now_ns)

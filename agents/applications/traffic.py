@@ -160,7 +160,7 @@ class TrafficGenerator:
         else:
             self._next_ns = self._following_ns(self._next_ns)
 
-    def ended(self, *, refused: bool, now_ns: int) -> bool:
+    def on_ended(self, *, refused: bool, now_ns: int) -> bool:
         """Take in that a packet of a saturated source has left, or was given up; True: the next one follows at once.
 
         After one that the radio refused it comes a moment later, and is asked for by `next_ns`.
@@ -208,7 +208,7 @@ class Load(Application):
 
     def on_status(self, status: Status, now_ns: int) -> None:
         """A packet of a saturated source has left, or was given up."""
-        if self._traffic.ended(refused=status.fate is Fate.TURNED_AWAY, now_ns=now_ns):
+        if self._traffic.on_ended(refused=status.fate is Fate.TURNED_AWAY, now_ns=now_ns):
             self._send(now_ns)
 
     def report(self) -> Mapping[str, Any]:

@@ -84,7 +84,7 @@ class PlannedSearch(Application):
         for told in told_in(message.frame):
             if _speaker(told) not in (None, message.origin):
                 raise MalformedFrameError(f"{type(told).__name__} of {_speaker(told)} by {message.origin}")
-            self._searcher.told(told, now_ns=now_ns)
+            self._searcher.on_message(told, now_ns=now_ns)
         self.port.tap(message.frame)
         self._settle()
 
@@ -98,7 +98,7 @@ class PlannedSearch(Application):
             return
         self._searcher.hello(origin, motion, now_ns=now_ns)
         for told in messages:
-            self._searcher.told(told, now_ns=now_ns)
+            self._searcher.on_message(told, now_ns=now_ns)
         self._settle()
 
     def hello_frames(self, now_ns: int) -> bytes:
@@ -120,7 +120,7 @@ class PlannedSearch(Application):
             calls = [(call.bearing_rad, call.elevation_rad, call.snr_db) for call in reading.calls]
             self._searcher.voice(calls, now_ns=now_ns)
         elif isinstance(reading, Battery):
-            self._searcher.battery(reading.charge, now_ns=now_ns)
+            self._searcher.on_battery(reading.charge, now_ns=now_ns)
         elif isinstance(reading, Radar):
             self._searcher.radar(reading.echoes, now_ns=now_ns)
         self._settle()

@@ -140,9 +140,9 @@ class Searcher:
         """The receiver gives a position and a velocity: the UAV chooses how to fly on."""
         self._flight.fix(position, velocity, self._bidding.survivor, now_ns=now_ns)
 
-    def battery(self, charge: float, *, now_ns: int) -> None:
+    def on_battery(self, charge: float, *, now_ns: int) -> None:
         """The battery says what is left; a UAV that has to leave hands its place and its task on at once."""
-        if self._return_home.battery(charge, now_ns=now_ns):
+        if self._return_home.on_battery(charge, now_ns=now_ns):
             self._bidding.hand_on(now_ns)
             self._plans.leave()
             self._plans.say_status(self._return_home.percent, now_ns)
@@ -183,7 +183,7 @@ class Searcher:
         self._neighbors.on_hello(origin, motion)
         self._plans.on_hello(origin, motion.position, now_ns=now_ns)
 
-    def told(self, message: Told, *, now_ns: int) -> None:
+    def on_message(self, message: Told, *, now_ns: int) -> None:
         """Another node tells something, to its neighbors or to all nodes."""
         match message:
             case Survivor():
@@ -198,7 +198,7 @@ class Searcher:
             case Bids():
                 self._bidding.merge(message.bids, now_ns=now_ns)
             case Found():
-                if self._finds.told(message, now_ns=now_ns):
+                if self._finds.on_found(message, now_ns=now_ns):
                     self._announcing.struck(message.survivor, now_ns)
                     self._bidding.close(message.survivor, now_ns=now_ns)
             case Covered():
@@ -211,7 +211,7 @@ class Searcher:
     def hello_frames(self, now_ns: int) -> bytes:
         """Inner frames for the next hello: the latest reports, the best bids, what was found and searched lately."""
         frames = b"".join(report.encode_frame(self._node) for report in self._finds.news(now_ns=now_ns))
-        bids = self._bidding.told(now_ns=now_ns)
+        bids = self._bidding.bids_to_tell(now_ns=now_ns)
         if bids:
             frames += encode_bids(bids, node=self._node)
         return frames + self._announcing.hello_frames(now_ns) + self._reception.hello_frames(now_ns)

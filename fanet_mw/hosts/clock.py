@@ -95,7 +95,7 @@ class ClockKeeper:
         return codecs.encode([self.clock]) if self.clock else None
 
     def _seen(self, topic: str, alive: bool) -> None:
-        self.presence.seen(topic, alive=alive)
+        self.presence.on_token(topic, alive=alive)
         if self.presence.complete():
             self._all_there.set()
         else:

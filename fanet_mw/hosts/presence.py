@@ -27,7 +27,7 @@ class Presence:
         self._tokens: dict[str, set[str]] = {}
         """The rest of each token, by the name of the process."""
 
-    def seen(self, topic: str, *, alive: bool) -> None:
+    def on_token(self, topic: str, *, alive: bool) -> None:
         """Take in that a token has appeared or gone."""
         name, _, rest = topic.removeprefix(self._prefix).partition("/")
         tokens = self._tokens.setdefault(name, set())

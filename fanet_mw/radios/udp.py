@@ -175,7 +175,7 @@ class UdpRadio:
             return
         if datagram.src == self._node:
             return  # this is the node's own broadcast
-        at_home = self._is_at(datagram.src, address)
+        at_home = self._take_address(datagram.src, address)
         if datagram.dst not in (BROADCAST, self._node):
             return
         if datagram.kind is DatagramKind.ACK:
@@ -187,8 +187,8 @@ class UdpRadio:
             return
         self._on_frame(datagram, address)
 
-    def _is_at(self, node: NodeId, address: Address) -> bool:
-        """True if this is the address at which the node is known: the address from which it was heard first.
+    def _take_address(self, node: NodeId, address: Address) -> bool:
+        """Take an address for that of a node, if it is heard there first; False if the node is known at another one.
 
         A node gets another address after it was silent at the old one for a while, as after a restart, so that a single
         datagram redirects nothing. Frames are accepted from any address: otherwise the sender that comes first could

@@ -30,8 +30,8 @@ class FirstBelief:
         self._stated: dict[NodeId, tuple[int, Pair]] = {}
         self._since_ns: int | None = None
 
-    def believes(self, src: NodeId, reference: int, pair: Pair, *, local_ns: int) -> bool:
-        """True if the node should follow this reference from now on, as this neighbor states its time."""
+    def on_statement(self, src: NodeId, reference: int, pair: Pair, *, local_ns: int) -> bool:
+        """Take in a neighbor's statement; True if the node should follow this reference from now on, as stated."""
         if self._since_ns is None:
             self._since_ns = local_ns
         horizon_ns = pair.local_ns - self._memory_ns

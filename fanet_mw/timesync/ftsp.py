@@ -261,7 +261,7 @@ class TimeSync:
 
     def _on_pair(self, neighbor: _Neighbor, beacon: TimeBeacon, pair: Pair, local_ns: int) -> None:
         if self.reference is None:
-            if not self._first.believes(NodeId(beacon.node), beacon.reference, pair, local_ns=local_ns):
+            if not self._first.on_statement(NodeId(beacon.node), beacon.reference, pair, local_ns=local_ns):
                 self.counts["doubted"] += 1
                 self._claim_ns = max(self._claim_ns, local_ns + self._doubt_ns)  # the swarm has a time already
                 return

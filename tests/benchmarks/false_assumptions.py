@@ -148,8 +148,8 @@ def phone_errors_m(offset_db: float, draw: int) -> tuple[float, float] | None:
             lost_db = REFERENCE_LOSS_DB + 10 * _PHONE.exponent * math.log10(here.minus(phone).norm())
             rssi_dbm = _PHONE.power_dbm + offset_db - lost_db + drawn.gauss(0.0, _PHONE.shadowing_db)
             if rssi_dbm < _PHONE.threshold_dbm:
-                search.silent(here)
-            elif search.heard(lane, here, rssi_dbm):
+                search.on_silence(here)
+            elif search.on_rssi(lane, here, rssi_dbm):
                 heard.append(Sighting(here, rssi_dbm))
     found = search.estimate()
     if found is None or not heard:

@@ -45,7 +45,7 @@ class Announcing:
         place = self._finds.known[survivor].filter.estimate()
         assert place is not None, "who was seen has a place"
         found = Found(now_ns // US, survivor, *place, self._node, confirmed=True)
-        self._finds.told(found, now_ns=now_ns)
+        self._finds.on_found(found, now_ns=now_ns)
         east_m, north_m = round(place.east_m, 2), round(place.north_m, 2)
         self._outbox.records.append(Confirmed(now_ns, self._node, survivor, east_m, north_m))
         self._tellings[survivor] = _TELLINGS, now_ns

@@ -59,10 +59,10 @@ class Finds:
             find.latest[report.reporter] = report
         find.reporters.add(report.reporter)
         if find.confirmed is None:
-            find.filter.heard(report.reporter, report.position, report.rssi_dbm)
+            find.filter.on_rssi(report.reporter, report.position, report.rssi_dbm)
         return find
 
-    def told(self, found: Found, *, now_ns: int) -> bool:
+    def on_found(self, found: Found, *, now_ns: int) -> bool:
         """Take in an estimate or a confirmation of another node; True if it strikes the survivor off."""
         find = self.known.get(found.survivor)
         if find is None:

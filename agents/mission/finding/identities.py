@@ -71,7 +71,7 @@ class PersonTrack:
     taken: int | None = None
     """The number of sightings when a survivor was confirmed at this place; None: none has been."""
 
-    def seen(self, at: Enu, variance_m2: float, now_ns: int) -> None:
+    def on_sighting(self, at: Enu, variance_m2: float, now_ns: int) -> None:
         """Take in one more sighting, by a Kalman filter with the same variance along each axis."""
         before = self.place
         gain = before.east_variance_m2 / (before.east_variance_m2 + variance_m2)
@@ -93,7 +93,7 @@ class Identities:
         self._finds = finds
         self._people: list[PersonTrack] = []
 
-    def seen(self, at: Enu, *, sigma_m: float, close: bool, now_ns: int) -> int | None:
+    def on_sighting(self, at: Enu, *, sigma_m: float, close: bool, now_ns: int) -> int | None:
         """Take in that a sensor shows a person; `close`: from so near that it certainly is one.
 
         Returns the survivor whose phone that person was last taken to carry.
@@ -104,7 +104,7 @@ class Identities:
             near = PersonTrack(Estimate(at.east, at.north, variance, 0.0, variance), now_ns, now_ns)
             self._people.append(near)
         else:
-            near.seen(at, variance, now_ns)
+            near.on_sighting(at, variance, now_ns)
         near.close += close
         return near.owner_of
 
@@ -112,7 +112,7 @@ class Identities:
         """Assign phones to people anew; returns the survivors who may be confirmed now, in order of id."""
         self._people = [person for person in self._people if _is_remembered(person, now_ns)]
         for survivor in self._finds.open():
-            self._finds.known[survivor].filter.sighted(None)
+            self._finds.known[survivor].filter.on_sighting(None)
         people = [person for person in self._people if self._may_be_named(person, now_ns)]
         phones = self._phones(people)
         if not people or not phones:
@@ -126,7 +126,7 @@ class Identities:
             if column is None:
                 continue
             survivor = phones[column]
-            self._finds.known[survivor].filter.sighted(person.place)
+            self._finds.known[survivor].filter.on_sighting(person.place)
             if self._is_confirmable(person, survivor):
                 margin = self._next_best(costs, nobody, row, column, person) - least
                 if margin >= _asked_for(person, now_ns):

@@ -96,7 +96,7 @@ class PhoneFilter:
 
     # --- measurements ---------------------------------------------------------------------------------------------
 
-    def heard(self, reporter: int, position: Enu, rssi_dbm: float) -> bool:
+    def on_rssi(self, reporter: int, position: Enu, rssi_dbm: float) -> bool:
         """Take in a power received at a place; False when it tells nothing new."""
         taken = self._taken.setdefault(reporter, [])
         if any(_ground_m(p, position) < _SAME_PLACE_M for p in taken):
@@ -107,7 +107,7 @@ class PhoneFilter:
         self._pending.append((position, rssi_dbm))
         return True
 
-    def silent(self, position: Enu) -> None:
+    def on_silence(self, position: Enu) -> None:
         """Take in that the receiver of this UAV heard nothing at a place."""
         if self._middle is None or not self.near(position, within_m=_SILENCE_M):
             return
@@ -116,7 +116,7 @@ class PhoneFilter:
         self._silent_at.append(position)
         self._pending.append((position, None))
 
-    def sighted(self, place: Estimate | None) -> None:
+    def on_sighting(self, place: Estimate | None) -> None:
         """Take in where a camera shows the owner; None: no person in view is the owner."""
         self._seen = place
 

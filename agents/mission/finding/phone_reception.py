@@ -56,7 +56,7 @@ class PhoneReception:
         in_reach = {survivor for survivor, _ in heard}
         for survivor in self._finds.open():
             if survivor not in in_reach:
-                self._finds.known[survivor].filter.silent(here)
+                self._finds.known[survivor].filter.on_silence(here)
         for survivor, rssi_dbm in heard:
             report = Survivor(now_ns // US, survivor, self._node, here, rssi_dbm)
             find = self._finds.known.get(survivor)

@@ -29,7 +29,7 @@ class ReturnHome:
         """True from when it flies home."""
         self.lands = False
 
-    def battery(self, charge: float, *, now_ns: int) -> bool:
+    def on_battery(self, charge: float, *, now_ns: int) -> bool:
         """Take in a reading of the battery; True when it is time to leave."""
         self._endurance.read(charge, now_ns=now_ns)
         if self.leaves or self._endurance.margin(self._navigation.position) > 0.0:

@@ -63,13 +63,13 @@ class FormationPlanner:
                 status.position, min(now_ns, status.t_us * US), status.revision, leaves=status.charge == 0
             )
 
-    def alive(self, node: int, position: Enu, *, now_ns: int) -> None:
+    def on_neighbor(self, node: int, position: Enu, *, now_ns: int) -> None:
         """Take in that a neighbor was heard at a place."""
         before = self._members.get(node)
         revision, leaves = (before.revision, before.leaves) if before else (0, False)
         self._members[node] = _Member(position, now_ns, revision, leaves=leaves)
 
-    def planned(self, plan: Search) -> bool:
+    def on_plan(self, plan: Search) -> bool:
         """Take in a plan that came over the air; True if it replaces the plan in force."""
         mine = self.plan
         if mine is not None and (plan.revision, -plan.planner) <= (mine.revision, -mine.planner):

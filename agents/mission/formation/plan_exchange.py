@@ -72,7 +72,7 @@ class PlanExchange:
 
     def on_hello(self, node: int, position: Enu, *, now_ns: int) -> None:
         """A neighbor's hello says where it is."""
-        self._planner.alive(node, position, now_ns=now_ns)
+        self._planner.on_neighbor(node, position, now_ns=now_ns)
 
     def on_status(self, status: SearchStatus, *, now_ns: int) -> None:
         """Another UAV says its status."""
@@ -80,7 +80,7 @@ class PlanExchange:
 
     def on_plan(self, plan: Search, *, now_ns: int) -> None:
         """Another UAV tells a plan: it is flown by if it is newer than the plan in force."""
-        if self._planner.planned(plan):
+        if self._planner.on_plan(plan):
             self._adopt(now_ns)
 
     def _adopt(self, now_ns: int) -> None:

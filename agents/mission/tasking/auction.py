@@ -82,7 +82,7 @@ class Auction:
         worst = before[-1]
         return (round(10 * eta_s), self._node) < (self._bids[survivor][worst].eta_ds, worst)
 
-    def told(self, tasks: Iterable[int], *, now_ns: int) -> list[Bid]:
+    def bids_to_tell(self, tasks: Iterable[int], *, now_ns: int) -> list[Bid]:
         """The bids to pass on: the node's own first, then the best of each open task, as many as one message holds."""
         own: list[Bid] = []
         others: list[tuple[int, Bid]] = []

@@ -68,9 +68,9 @@ class Bidding:
         open_bids = (bid for bid in bids if not self._finds.is_confirmed(bid.survivor))
         self._auction.merge(open_bids, now_ns=now_ns)
 
-    def told(self, *, now_ns: int) -> list[Bid]:
+    def bids_to_tell(self, *, now_ns: int) -> list[Bid]:
         """The bids to pass on."""
-        return self._auction.told(self._finds.open(), now_ns=now_ns)
+        return self._auction.bids_to_tell(self._finds.open(), now_ns=now_ns)
 
     def close(self, survivor: int, *, now_ns: int) -> None:
         """Forget the bids for a survivor that needs no UAV any more."""

@@ -76,7 +76,7 @@ class Clustered(RoutingProtocol):
 
     def originate(self, packet: Packet, *, due_ns: int, now_ns: int) -> None:
         parts = self.parts
-        if not parts.access.admits(packet, due_ns=due_ns):
+        if not parts.access.admit(packet, due_ns=due_ns):
             self._port.drop(DropReason.ADMISSION, packet, now_ns=now_ns)
             return
         parts.floods.keep(packet, flooded=False, now_ns=due_ns)

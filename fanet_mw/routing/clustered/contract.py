@@ -74,8 +74,8 @@ class Access(Protocol):
     def start(self, now_ns: int) -> None:
         """The node is up."""
 
-    def admits(self, packet: Packet, *, due_ns: int) -> bool:
-        """True if a packet of the node's application, due at `due_ns`, is taken; a packet that is taken counts."""
+    def admit(self, packet: Packet, *, due_ns: int) -> bool:
+        """Let in a packet of the node's application, due at `due_ns`; False if it is refused."""
 
     def originate(self, packet: Packet, *, due_ns: int, now_ns: int) -> None:
         """Let out a packet of the node's application, or bring it to a node that will."""

@@ -24,8 +24,10 @@ class Deaths:
         self._respawns: Counter[str] = Counter()
         self._late_starts: Counter[str] = Counter()
 
-    def may_try_again(self, name: str, exit_code: int) -> bool:
-        """Before the swarm's time begins: whether this process only found no router and is to look for it again."""
+    def grant_late_start(self, name: str, exit_code: int) -> bool:
+        """Grant another start, before the swarm's time begins, to a process that only found no router. False if it has
+        had them all.
+        """
         if exit_code != BUS_EXIT_CODE or self._late_starts[name] >= _MAX_LATE_STARTS:
             return False
         self._late_starts[name] += 1
@@ -36,7 +38,7 @@ class Deaths:
         self.ended.append((name, exit_code))
         self.records.append(ProcessEnded(now_ns, node, name, exit_code))
 
-    def may_respawn(self, name: str) -> bool:
-        """True if this process is to be started again; each question counts as one start."""
+    def grant_respawn(self, name: str) -> bool:
+        """Grant a process that has died another start; False if it is to stay dead."""
         self._respawns[name] += 1
         return self._respawn and self._respawns[name] <= _MAX_RESPAWNS

@@ -194,7 +194,7 @@ class SwarmRun:
     def _process_ended(self, name: str, exit_code: int) -> None:
         if self._ending or (exit_code == 0 and (self._over.is_set() or self.time_is_over())):
             return
-        if self._clock is None and not self._over.is_set() and self._deaths.may_try_again(name, exit_code):
+        if self._clock is None and not self._over.is_set() and self._deaths.grant_late_start(name, exit_code):
             self._tell(f"{name} ended with {describe(exit_code)} before the start; started again")
             self.processes.restart(name)
             return
@@ -207,7 +207,7 @@ class SwarmRun:
                 return  # the signal that interrupted this process was meant for all
             self._tell(f"{what}, while the swarm was ending")
             return
-        if self._deaths.may_respawn(name):
+        if self._deaths.grant_respawn(name):
             self._tell(f"{what}; started again")
             if name == "world" and self._recorder is not None:
                 self.processes.restart(name, flight=self._recorder.last())

@@ -19,29 +19,29 @@ def token(name: str, scenario: str = "aaaa", instance: str = "1") -> str:
 def test_a_swarm_is_complete_when_everyone_is_there_once() -> None:
     swarm = presence("world", "agent-1")
     assert swarm.missing() == ["agent-1", "world"]
-    swarm.seen(token("agent-1"), alive=True)
+    swarm.on_token(token("agent-1"), alive=True)
     assert not swarm.complete()
-    swarm.seen(token("world"), alive=True)
+    swarm.on_token(token("world"), alive=True)
     assert swarm.complete()
     assert swarm.sentence() == ""
-    swarm.seen(token("world"), alive=False)
+    swarm.on_token(token("world"), alive=False)
     assert swarm.missing() == ["world"]
 
 
 def test_an_id_twice_is_named_until_one_of_them_goes() -> None:
     swarm = presence("agent-1")
     for instance in ("1", "2"):
-        swarm.seen(token("agent-1", instance=instance), alive=True)
+        swarm.on_token(token("agent-1", instance=instance), alive=True)
     assert not swarm.complete()
     assert swarm.sentence() == "there twice: agent-1"
-    swarm.seen(token("agent-1", instance="1"), alive=False)
+    swarm.on_token(token("agent-1", instance="1"), alive=False)
     assert swarm.complete()
 
 
 def test_a_process_with_another_scenario_does_not_count_and_is_named() -> None:
     swarm = presence("agent-1", "agent-2")
-    swarm.seen(token("agent-1", scenario="bbbb"), alive=True)
-    swarm.seen(token("agent-13"), alive=True)
+    swarm.on_token(token("agent-1", scenario="bbbb"), alive=True)
+    swarm.on_token(token("agent-13"), alive=True)
     assert swarm.sentence() == (
         "missing: agent-1, agent-2; with another scenario: agent-1; not of this scenario: agent-13"
     )
@@ -49,7 +49,7 @@ def test_a_process_with_another_scenario_does_not_count_and_is_named() -> None:
 
 def test_a_process_of_somebody_else_is_taken_at_its_word() -> None:
     swarm = presence("world")
-    swarm.seen(NAMES.alive("world"), alive=True)
+    swarm.on_token(NAMES.alive("world"), alive=True)
     assert swarm.complete()
 
 

@@ -14,7 +14,7 @@ def nobody_believed() -> FirstBelief:
 
 def says(first: FirstBelief, src: int, at_ms: int, offset_ns: int = TRUE_NS, *, reference: int = 1) -> bool:
     pair = Pair((at_ms - 1000) * MS, offset_ns, 5 * US)
-    return first.believes(NodeId(src), reference, pair, local_ns=at_ms * MS)
+    return first.on_statement(NodeId(src), reference, pair, local_ns=at_ms * MS)
 
 
 def test_the_leader_s_own_word_of_its_own_time_is_taken_at_once() -> None:

@@ -69,7 +69,7 @@ class ClaimedAccess:
 
     # --- letting out ----------------------------------------------------------------------------------------------
 
-    def admits(self, packet: Packet, *, due_ns: int) -> bool:
+    def admit(self, packet: Packet, *, due_ns: int) -> bool:
         return True
 
     def originate(self, packet: Packet, *, due_ns: int, now_ns: int) -> None:

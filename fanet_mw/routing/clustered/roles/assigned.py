@@ -239,7 +239,7 @@ class AssignedRoles:
 
     def _report_silent_neighbor(self, detector: FailureDetector, now_ns: int) -> None:
         """Let the leader know of a neighbor that has fallen silent; one that lives will hear it too, and object."""
-        silent = detector.next_suspect(self.parts.membership.lists, now_ns=now_ns)
+        silent = detector.find_suspect(self.parts.membership.lists, now_ns=now_ns)
         if silent is None:
             return
         detector.on_report(silent, now_ns=now_ns)

@@ -149,7 +149,7 @@ class Failover:
     def wake(self, now_ns: int) -> list[Action]:
         if self.state is State.LEADING:
             return []
-        if now_ns >= self._lease.stand_ns and self._lease.must_stand(now_ns):
+        if now_ns >= self._lease.stand_ns and self._lease.review(now_ns):
             self._lease.take_office(now_ns)
             return [self._take(Event.LEADER_SILENT, now_ns)]
         if self._watch_ns is None or now_ns < self._watch_ns:

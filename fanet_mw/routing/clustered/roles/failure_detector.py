@@ -40,8 +40,11 @@ class FailureDetector:
         if node in self._heard_ns:
             self._reported_ns[node] = now_ns
 
-    def next_suspect(self, lists: Callable[[NodeId], bool], *, now_ns: int) -> NodeId | None:
-        """A neighbor that should be reported now, or None; `lists` says whether the schedule names a node."""
+    def find_suspect(self, lists: Callable[[NodeId], bool], *, now_ns: int) -> NodeId | None:
+        """Look for a neighbor that should be reported now, and forget those that no longer count.
+
+        None if there is nobody to report. `lists` says whether the schedule names a node.
+        """
         for node in sorted(self._heard_ns):
             quiet_ns = now_ns - self._heard_ns[node]
             if quiet_ns < self._silent_ns:

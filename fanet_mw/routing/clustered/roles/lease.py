@@ -83,8 +83,10 @@ class Lease:
         self._until_ns = _FOREVER_NS
         return self.authority
 
-    def must_stand(self, now_ns: int) -> bool:
-        """True if this node must take office: the leader is silent, and no node with a lower id has done so in time."""
+    def review(self, now_ns: int) -> bool:
+        """Put the own turn to stand off for the nodes with lower ids that are alive; True if it has come: the leader is
+        silent, and none of them has taken office in time.
+        """
         if now_ns < self.stand_ns:
             return False
         lower = self._liveness.alive_below(self._node, since_ns=now_ns - self._silence_ns)

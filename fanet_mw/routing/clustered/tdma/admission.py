@@ -69,8 +69,8 @@ class Admission:
         record = DeadlineMet if self._met else DeadlineLost
         return record(now_ns, self._node, bound_ns or 0, self._deadline_ns, self.interval_ns)
 
-    def admits(self, born_ns: int) -> bool:
-        """True if a packet generated at this instant may be let in; it then counts."""
+    def admit(self, born_ns: int) -> bool:
+        """Let in a packet generated at this instant, if it keeps the interval; False if it is refused."""
         if self._next_ns is not None and born_ns < self._next_ns - _TOLERANCE_NS:
             return False
         start_ns = born_ns if self._next_ns is None else max(born_ns, self._next_ns)

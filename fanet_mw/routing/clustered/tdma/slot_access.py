@@ -39,7 +39,7 @@ class SlotAccess:
     def start(self, now_ns: int) -> None:
         """Nothing waits yet."""
 
-    def admits(self, packet: Packet, *, due_ns: int) -> bool:
+    def admit(self, packet: Packet, *, due_ns: int) -> bool:
         return True
 
     def originate(self, packet: Packet, *, due_ns: int, now_ns: int) -> None:

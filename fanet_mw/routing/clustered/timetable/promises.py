@@ -123,10 +123,10 @@ class Promises:
 
     # --- packets --------------------------------------------------------------------------------------------------
 
-    def admits(self, packet: Packet, *, due_ns: int) -> bool:
-        """True if a packet of the application may be let in without harm to the deadline of those before it."""
+    def admit(self, packet: Packet, *, due_ns: int) -> bool:
+        """Let in a packet of the application, unless it harms the deadline of those before it; False: it is refused."""
         policed = self._admission if packet.header.priority == PRIORITY_BULK else None
-        return policed is None or policed.admits(due_ns)
+        return policed is None or policed.admit(due_ns)
 
     def greatest_bound_ns(self, packet: Packet, *, now_ns: int) -> int | None:
         """The greatest bound of packets of this class under the timetables in force; None: under one there is none."""

@@ -115,8 +115,8 @@ class TurnAccess:
 
     # --- letting out ----------------------------------------------------------------------------------------------
 
-    def admits(self, packet: Packet, *, due_ns: int) -> bool:
-        return self._promises.admits(packet, due_ns=due_ns)
+    def admit(self, packet: Packet, *, due_ns: int) -> bool:
+        return self._promises.admit(packet, due_ns=due_ns)
 
     def originate(self, packet: Packet, *, due_ns: int, now_ns: int) -> None:
         self.forward(packet, start_ns=due_ns, now_ns=now_ns)

@@ -227,7 +227,7 @@ def test_nothing_is_told_of_a_battery_that_nothing_measures() -> None:
 def test_a_battery_is_told_as_its_sensor_reads_it_and_what_was_drawn_from_it_adds_up() -> None:
     autopilot = make(telemetry_hz=1.0)
     for second, charge in ((0, 0.8), (1800, 0.504), (3600, 0.2)):
-        autopilot.battery(Battery(second * S, voltage_v=14.8, current_a=3.0, charge=charge))
+        autopilot.on_battery(Battery(second * S, voltage_v=14.8, current_a=3.0, charge=charge))
     told = told_of_the_battery(autopilot, 3600 * S)
     assert (told["voltage_battery"], told["voltages"][0], told["voltages"][1]) == (14800, 14800, 65535)
     assert (told["current_battery"], told["battery_remaining"], told["current_consumed"]) == (300, 20, 3000)
@@ -236,6 +236,6 @@ def test_a_battery_is_told_as_its_sensor_reads_it_and_what_was_drawn_from_it_add
 @pytest.mark.parametrize(("charge", "percent"), [(1.2, 100), (0.001, 1), (0.0, 0), (-0.1, 0)])
 def test_a_battery_is_empty_only_when_nothing_is_left(charge: float, percent: int) -> None:
     autopilot = make(telemetry_hz=1.0)
-    autopilot.battery(Battery(0, voltage_v=70.0, current_a=400.0, charge=charge))
+    autopilot.on_battery(Battery(0, voltage_v=70.0, current_a=400.0, charge=charge))
     told = told_of_the_battery(autopilot, S)
     assert (told["battery_remaining"], told["voltage_battery"], told["current_battery"]) == (percent, 65534, 32767)

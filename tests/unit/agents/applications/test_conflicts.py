@@ -91,7 +91,8 @@ def test_a_warning_of_what_is_past_or_beyond_the_horizon_is_ignored(monitor, clo
 def test_a_conflict_is_over_when_the_two_have_passed_and_the_mission_goes_on(monitor) -> None:
     uav = monitor()
     goal = Course(Enu(500, 0, 50), 10.0)
-    assert uav.permits(goal)
+    uav.on_course(goal)
+    assert not uav.avoids
     for second in range(14):
         now_ns = second * S
         uav.on_hello(OTHER, at(200 - 10 * second, 42, WEST, now_ns), now_ns=now_ns)
@@ -105,7 +106,8 @@ def test_the_mission_s_course_waits_until_the_conflict_is_over(monitor) -> None:
     uav = monitor()
     uav.on_hello(OTHER, at(200, 50, WEST), now_ns=0)
     uav.on_fix(at(0, 50, EAST))
-    assert not uav.permits(Course(Enu(0, 90, 50), 10.0))
+    uav.on_course(Course(Enu(0, 90, 50), 10.0))
+    assert uav.avoids
     uav.on_fix(at(0, 50, EAST, 1))
     assert uav.course is not None
     assert uav.course.position == Enu(0, 100, 90), "towards the goal, and up"

@@ -49,7 +49,7 @@ class Flight:
         assert pattern is not None
         self.plan = plan_of(pattern, tuple(range(1, 21)), planner=1, start_us=S // US, deploy_ds=100)
         if planned:
-            self.searcher.told(self.plan, now_ns=0)
+            self.searcher.on_message(self.plan, now_ns=0)
 
     def fly(self, seconds: float, *, charge: Callable[[float], float] | None = None) -> None:
         """Fly as it wants to; `charge` is what its battery says, by the second."""
@@ -62,7 +62,7 @@ class Flight:
             )
             self.searcher.fix(self.at, velocity, now_ns=self.now_ns)
             if charge is not None and self.now_ns % S == 0:
-                self.searcher.battery(charge(self.now_ns / S), now_ns=self.now_ns)
+                self.searcher.on_battery(charge(self.now_ns / S), now_ns=self.now_ns)
             self.searcher.wake(self.now_ns)
 
     @property
@@ -101,7 +101,7 @@ def test_who_flies_home_takes_its_bids_back_so_that_another_goes(make_scenario: 
         each.fly(20, charge=lambda _: 0.9)
         for reporter in (1, 2, 3):
             place = Enu(flight.at.east + 60 * reporter - 120, flight.at.north + 30.0 * (reporter % 2), 65.0)
-            each.searcher.told(Survivor(each.now_ns // US, 1, reporter, place, -75.0), now_ns=each.now_ns)
+            each.searcher.on_message(Survivor(each.now_ns // US, 1, reporter, place, -75.0), now_ns=each.now_ns)
     flight.fly(3, charge=lambda _: 0.9)
     assert flight.modes[-1] == "respond"
     flight.fly(1, charge=lambda _: 0.1)
@@ -119,12 +119,12 @@ def test_a_responder_that_falls_silent_is_replaced(make_scenario: Callable[..., 
     now_ns = flight.now_ns
     for reporter in (1, 2, 3):
         place = Enu(flight.at.east + 60 * reporter - 120, flight.at.north + 30.0 * (reporter % 2), 65.0)
-        flight.searcher.told(Survivor(now_ns // US, 1, reporter, place, -75.0), now_ns=now_ns)
-    flight.searcher.told(Bids((Bid(1, 2, 1, 1), Bid(1, 3, 1, 1), Bid(1, 4, 1, 1, 9))), now_ns=now_ns)
+        flight.searcher.on_message(Survivor(now_ns // US, 1, reporter, place, -75.0), now_ns=now_ns)
+    flight.searcher.on_message(Bids((Bid(1, 2, 1, 1), Bid(1, 3, 1, 1), Bid(1, 4, 1, 1, 9))), now_ns=now_ns)
     flight.fly(5)
     assert flight.modes[-1] == "search", "three others are nearer"
     for second in range(6, 10):  # two of them go on saying so
-        flight.searcher.told(Bids(tuple(Bid(1, bidder, 1, 1) for bidder in (2, 3))), now_ns=now_ns + second * S)
+        flight.searcher.on_message(Bids(tuple(Bid(1, bidder, 1, 1) for bidder in (2, 3))), now_ns=now_ns + second * S)
         flight.fly(1)
     assert flight.modes[-1] == "respond"
 
@@ -140,7 +140,7 @@ def test_somebody_who_is_seen_or_heard_at_close_range_is_confirmed(
         around = Enu(victim.east + 60 * math.cos(step), victim.north + 60 * math.sin(step), 65.0)
         slant = math.hypot(60, 65)
         report = Survivor(flight.now_ns // US, 2, 1 + step % 4, around, 15 - 40.05 - 30 * math.log10(slant))
-        flight.searcher.told(report, now_ns=flight.now_ns)
+        flight.searcher.on_message(report, now_ns=flight.now_ns)
     for _ in range(30):
         here = flight.at
         flight.searcher.scan(

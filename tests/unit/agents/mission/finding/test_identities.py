@@ -38,12 +38,12 @@ class Uav:
     def see(self, *people: Enu, now_ns: int) -> list[int]:
         """An image from close by; who may be confirmed, is."""
         for at in people:
-            self.identities.seen(at, sigma_m=2, close=True, now_ns=now_ns)
+            self.identities.on_sighting(at, sigma_m=2, close=True, now_ns=now_ns)
         sure = self.identities.review(now_ns)
         for survivor in sure:
             place = self.finds.known[survivor].place()
             assert place is not None
-            self.finds.told(Found(now_ns // US, survivor, *place, 1, confirmed=True), now_ns=now_ns)
+            self.finds.on_found(Found(now_ns // US, survivor, *place, 1, confirmed=True), now_ns=now_ns)
             self.named[survivor] = Enu(place.east_m, place.north_m, 0)
         return sure
 
@@ -92,7 +92,7 @@ class Pass:
                 if rssi_dbm >= MODEL.threshold_dbm:
                     self.uav.hear(survivor, node, at, rssi_dbm, now_ns=now_ns)
                 elif node == 1 and survivor in self.uav.finds.open():
-                    self.uav.finds.known[survivor].filter.silent(at)
+                    self.uav.finds.known[survivor].filter.on_silence(at)
 
     def _image(self, here: Enu) -> Iterator[Enu]:
         for truth in self.truth.values():
@@ -175,7 +175,7 @@ def test_where_somebody_is_confirmed_a_second_person_is_named_only_after_many_mo
             for north in (-60, 0, 60):
                 at = Enu(40.0 * node - 100, north, UP_M)
                 uav.hear(survivor, node, at, mean_dbm(Enu(0, 0, 0), at))
-    uav.finds.told(Found(0, 1, 1.0, 1.0, 4.0, 0.0, 4.0, 9, confirmed=True), now_ns=0)
+    uav.finds.on_found(Found(0, 1, 1.0, 1.0, 4.0, 0.0, 4.0, 9, confirmed=True), now_ns=0)
     named = [second for second in range(90) if uav.see(Enu(0, 0, 0), now_ns=second * S)]
     assert uav.named.keys() == {2}
     assert named[0] >= 20

@@ -20,7 +20,7 @@ def test_two_that_pass_on_either_side_find_the_phone_and_know_how_well() -> None
     truth, phone = Enu(60, 10, 0), PhoneFilter(MODEL)
     for north in range(-120, 121, 30):
         for node, east in ((1, 0), (2, 180)):
-            phone.heard(node, Enu(east, north, 50), rssi_dbm(truth, Enu(east, north, 50)))
+            phone.on_rssi(node, Enu(east, north, 50), rssi_dbm(truth, Enu(east, north, 50)))
     place = phone.estimate()
     assert place is not None
     assert place.distance_m(truth) < 12
@@ -30,13 +30,13 @@ def test_two_that_pass_on_either_side_find_the_phone_and_know_how_well() -> None
 def test_one_that_passes_straight_leaves_the_side_open_and_silence_elsewhere_settles_it() -> None:
     truth, phone = Enu(80, 0, 0), PhoneFilter(MODEL)
     for north in range(-90, 91, 30):
-        phone.heard(1, Enu(0, north, 50), rssi_dbm(truth, Enu(0, north, 50)))
+        phone.on_rssi(1, Enu(0, north, 50), rssi_dbm(truth, Enu(0, north, 50)))
     open_sides = phone.estimate()
     assert open_sides is not None
     assert abs(open_sides.east_m) < 25
     assert open_sides.east_variance_m2 > 50**2
     for north in range(-90, 91, 30):
-        phone.silent(Enu(-120, north, 50))
+        phone.on_silence(Enu(-120, north, 50))
     settled = phone.estimate()
     assert settled is not None
     assert settled.east_m > 40
@@ -44,9 +44,9 @@ def test_one_that_passes_straight_leaves_the_side_open_and_silence_elsewhere_set
 
 def test_the_same_place_counts_once_for_a_node() -> None:
     phone = PhoneFilter(MODEL)
-    assert phone.heard(1, Enu(0, 0, 50), -70)
-    assert not phone.heard(1, Enu(5, 5, 50), -60)
-    assert phone.heard(2, Enu(5, 5, 50), -60)
+    assert phone.on_rssi(1, Enu(0, 0, 50), -70)
+    assert not phone.on_rssi(1, Enu(5, 5, 50), -60)
+    assert phone.on_rssi(2, Enu(5, 5, 50), -60)
 
 
 @given(st.floats(-1000, 1000), st.floats(-1000, 1000), st.floats(20, 100), st.floats(-80, 80), st.floats(-80, 80))

@@ -126,7 +126,7 @@ def test_without_followers_a_line_closes_up_from_its_end_and_stays_in_one_piece(
     assert not pattern.followers
     left = [place + 1 for place in range(count) if place not in lost]
     planner, later_ns = planner_with(count, node=left[0]), 90 * S
-    planner.planned(plan_of(pattern, tuple(range(1, count + 1)), planner=1, start_us=0, deploy_ds=10))
+    planner.on_plan(plan_of(pattern, tuple(range(1, count + 1)), planner=1, start_us=0, deploy_ds=10))
     for node in left:
         planner.status(SearchStatus(later_ns // US, Enu(0, 0, 50), node, 1, 100), now_ns=later_ns)
     assert planner.review(pattern, now_ns=later_ns)
@@ -146,7 +146,7 @@ def test_who_flies_home_holds_no_place_any_more_from_when_it_says_so() -> None:
     assert before is not None
     leaver, later_ns = before.nodes[3], 20 * S
     planner.status(SearchStatus(later_ns // US, Enu(0, 0, 50), leaver, 1, 0), now_ns=later_ns)
-    planner.alive(leaver, Enu(0, 0, 50), now_ns=later_ns)  # its hellos are heard still
+    planner.on_neighbor(leaver, Enu(0, 0, 50), now_ns=later_ns)  # its hellos are heard still
     assert planner.review(pattern, now_ns=later_ns)
     after = planner.plan
     assert after is not None
@@ -180,6 +180,6 @@ def test_of_two_plans_the_newer_one_counts_and_of_equal_ones_that_of_the_lower_i
     def plan(revision: int, planner: int) -> Search:
         return Search(1, 100.0, 10.0, 50.0, 50.0, 7.5, 10, revision, planner, (1, 2, 3, 4), 2, 0, 0)
 
-    assert [listener.planned(plan(*which)) for which in ((1, 4), (1, 5), (1, 3), (2, 8), (1, 1), (2, 8))] == [
+    assert [listener.on_plan(plan(*which)) for which in ((1, 4), (1, 5), (1, 3), (2, 8), (1, 1), (2, 8))] == [
         True, False, True, True, False, False,
     ]  # fmt: skip

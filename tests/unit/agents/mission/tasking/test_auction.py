@@ -43,4 +43,4 @@ def test_a_bid_that_is_taken_back_no_longer_wins() -> None:
     auction.bid(1, eta_s=1.0, now_ns=0)
     auction.withdraw(1, now_ns=0)
     assert auction.winners(1, count=1, now_ns=0) == []
-    assert [bid.eta_ds for bid in auction.told([1], now_ns=0)] == [WITHDRAWN]
+    assert [bid.eta_ds for bid in auction.bids_to_tell([1], now_ns=0)] == [WITHDRAWN]

@@ -27,36 +27,36 @@ def everyone(_: NodeId) -> bool:
 
 
 def test_a_neighbor_is_silent_after_four_hellos_and_is_told_of_again_after_a_while(detector: FailureDetector) -> None:
-    assert detector.next_suspect(everyone, now_ns=14 * S - 1) is None
-    assert detector.next_suspect(everyone, now_ns=14 * S) == OTHER
+    assert detector.find_suspect(everyone, now_ns=14 * S - 1) is None
+    assert detector.find_suspect(everyone, now_ns=14 * S) == OTHER
     detector.on_report(OTHER, now_ns=14 * S)
-    assert detector.next_suspect(everyone, now_ns=24 * S - 1) is None
-    assert detector.next_suspect(everyone, now_ns=24 * S) == OTHER
+    assert detector.find_suspect(everyone, now_ns=24 * S - 1) is None
+    assert detector.find_suspect(everyone, now_ns=24 * S) == OTHER
 
 
 def test_whose_packets_still_come_over_others_is_not_silent(detector: FailureDetector, liveness: Liveness) -> None:
     for second in range(11, 40):
         liveness.on_sign_of_life(OTHER, born_ns=second * S)
-        assert detector.next_suspect(everyone, now_ns=second * S) is None
+        assert detector.find_suspect(everyone, now_ns=second * S) is None
 
 
 def test_who_objects_is_let_alone_until_it_is_heard_again(detector: FailureDetector, liveness: Liveness) -> None:
     detector.on_report(OTHER, now_ns=14 * S)
     liveness.on_sign_of_life(OTHER, born_ns=15 * S)
-    assert all(detector.next_suspect(everyone, now_ns=second * S) is None for second in range(15, 60))
+    assert all(detector.find_suspect(everyone, now_ns=second * S) is None for second in range(15, 60))
     detector.on_hello(OTHER, now_ns=60 * S)
     liveness.on_sign_of_life(OTHER, born_ns=60 * S)
-    assert detector.next_suspect(everyone, now_ns=64 * S) == OTHER
+    assert detector.find_suspect(everyone, now_ns=64 * S) == OTHER
 
 
 def test_who_is_in_no_schedule_and_who_was_never_heard_concern_nobody(detector: FailureDetector) -> None:
     detector.on_report(NodeId(8), now_ns=12 * S)
-    assert detector.next_suspect(lambda _: False, now_ns=14 * S) is None
-    assert detector.next_suspect(everyone, now_ns=15 * S) is None
+    assert detector.find_suspect(lambda _: False, now_ns=14 * S) is None
+    assert detector.find_suspect(everyone, now_ns=15 * S) is None
 
 
 def test_who_has_been_silent_for_a_minute_is_forgotten_though_nothing_was_said() -> None:
     detector = FailureDetector(Liveness(), hello_ns=S)
     detector.on_hello(NodeId(4), now_ns=0)
-    assert detector.next_suspect(lambda _: True, now_ns=60 * S) == 4
-    assert detector.next_suspect(lambda _: True, now_ns=60 * S + 1) is None
+    assert detector.find_suspect(lambda _: True, now_ns=60 * S) == 4
+    assert detector.find_suspect(lambda _: True, now_ns=60 * S + 1) is None

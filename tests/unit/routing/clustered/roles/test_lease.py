@@ -55,6 +55,6 @@ def test_the_lowest_id_that_lives_stands_at_once_and_others_in_their_turn(
     lease.accept(LEADER, born_ns=10 * S, now_ns=10 * S)
     for node in alive:
         liveness.on_sign_of_life(node, born_ns=13 * S)
-    assert not lease.must_stand(14 * S - 1)
-    stands = [second for second in range(5) if lease.must_stand((14 + second) * S)]
+    assert not lease.review(14 * S - 1)
+    stands = [second for second in range(5) if lease.review((14 + second) * S)]
     assert stands[0] == waits_s

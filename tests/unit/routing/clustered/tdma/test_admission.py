@@ -35,10 +35,10 @@ def test_the_least_interval_meets_the_deadline_and_nothing_shorter_does(own: Own
 def test_packets_that_come_too_soon_are_refused_and_do_not_count() -> None:
     own = OwnBound(Turns(0, 500 * MS, 40 * MS, 2 * MS, 230), (0,), 10)
     admission = Admission(ME, deadline_ns=600 * MS, interval_ns=1 * S, expected_ns=EXPECTED_NS)
-    assert admission.admits(0), "until a timetable is in force everyone may send"
+    assert admission.admit(0), "until a timetable is in force everyone may send"
     assert admission.follow(own, now_ns=0) == DeadlineMet(0, ME, 520 * MS, 600 * MS, 1 * S)
     born = range(1000 * MS, 3001 * MS, 100 * MS)
-    assert [t for t in born if admission.admits(t)] == [1000 * MS, 1500 * MS, 2000 * MS, 2500 * MS, 3000 * MS]
+    assert [t for t in born if admission.admit(t)] == [1000 * MS, 1500 * MS, 2000 * MS, 2500 * MS, 3000 * MS]
 
 
 def test_packets_that_each_come_a_little_too_soon_do_not_add_up() -> None:
@@ -46,7 +46,7 @@ def test_packets_that_each_come_a_little_too_soon_do_not_add_up() -> None:
     own = OwnBound(Turns(0, 500 * MS, 40 * MS, 2 * MS, 230), (0,), 10)
     admission = Admission(ME, deadline_ns=600 * MS, interval_ns=500 * MS, expected_ns=EXPECTED_NS)
     admission.follow(own, now_ns=0)
-    admitted = [admission.admits(number * (500 * MS - 500)) for number in range(10)]
+    admitted = [admission.admit(number * (500 * MS - 500)) for number in range(10)]
     assert admitted[:2] == [True, True]
     assert False in admitted
 
@@ -64,7 +64,7 @@ def test_where_no_rate_meets_the_deadline_what_the_turns_carry_is_let_in() -> No
     admission = Admission(ME, deadline_ns=100 * MS, interval_ns=1 * S, expected_ns=EXPECTED_NS)
     lost = admission.follow(OwnBound(Turns(0, 500 * MS, 40 * MS, 2 * MS, 230), (0, 100), 10), now_ns=0)
     assert isinstance(lost, DeadlineLost)
-    assert [t for t in range(0, 1001 * MS, 50 * MS) if admission.admits(t)] == [0, 250 * MS, 500 * MS, 750 * MS, S]
+    assert [t for t in range(0, 1001 * MS, 50 * MS) if admission.admit(t)] == [0, 250 * MS, 500 * MS, 750 * MS, S]
 
 
 def test_before_there_should_be_a_bound_its_absence_is_not_said_and_then_once() -> None:

@@ -1,0 +1,48 @@
+"""Announcing: a confirmation is told often enough, and by few."""
+
+import math
+
+from search_board import FOLLOWER, MODEL, UP_M, Board
+
+from agents.mission.finding.phone_filter import REFERENCE_LOSS_DB, Estimate
+from fanet_mw.trace import Confirmed
+from fanet_mw.units import Enu, S
+from fanet_mw.wire.inner import Survivor
+from fanet_mw.wire.search import Found, told_in
+
+
+def confirmed(board: Board) -> list[Found]:
+    """The confirmations that were flooded."""
+    told = [message for packet in board.out.packets for message in told_in(bytes(36) + packet.frames)]
+    return [message for message in told if isinstance(message, Found) and message.confirmed]
+
+
+def seen() -> Board:
+    board = Board(FOLLOWER, Enu(0, 0, UP_M))
+    for node in range(1, 5):
+        for east in (-60, 0, 60):
+            at = Enu(east, 20.0 * node, UP_M)
+            rssi_dbm = MODEL.power_dbm - REFERENCE_LOSS_DB - 30 * math.log10(at.norm())
+            board.finds.report(Survivor(0, 1, node, at, rssi_dbm), now_ns=0)
+    board.finds.known[1].filter.on_sighting(Estimate(1, 2, 4, 0, 4))
+    return board
+
+
+def test_a_confirmation_is_told_three_times_and_with_hellos_for_a_while() -> None:
+    board = seen()
+    board.announcing.confirm(1, 0)
+    for second in range(30):
+        board.announcing.tell(None, second * S)
+    assert len(confirmed(board)) == 3
+    assert [type(record) for record in board.out.records] == [Confirmed]
+    assert len(told_in(bytes(36) + board.announcing.hello_frames(11 * S))) == 1
+    assert board.announcing.hello_frames(13 * S) == b""
+
+
+def test_who_still_reports_a_confirmed_survivor_is_told_by_one_in_four() -> None:
+    board = seen()
+    board.announcing.confirm(1, 0)
+    report = Survivor(0, 1, 0, Enu(0, 0, UP_M), -70.0)
+    for reporter in range(10, 14):
+        board.announcing.reported(report._replace(reporter=reporter), reporter * 8 * S)
+    assert len(confirmed(board)) == 1

@@ -1,0 +1,32 @@
+"""The place of a UAV in the formation: taking it up, staying near it."""
+
+import pytest
+from search_board import FOLLOWER, LINE, TAKEN_UP_NS, UP_M, Board
+
+from fanet_mw.units import Enu, S
+
+
+def test_who_has_no_plan_waits_where_it_is_and_may_go_nowhere_for_the_swarm() -> None:
+    board = Board(LINE, Enu(7, 8, UP_M), planned=False)
+    assert board.place.lane(5 * S) == (Enu(7, 8, UP_M), Enu(0, 0, 0))
+    board.hear(1, Enu(20, 20, 0), range(1, 5), now_ns=5 * S)
+    board.tasks.bid(5 * S)
+    assert board.tasks.bids_to_tell(now_ns=5 * S) == []
+
+
+def test_a_place_is_taken_up_on_a_straight_way_that_begins_and_ends_with_the_plan() -> None:
+    board = Board(LINE, Enu(0, -400, UP_M))
+    end = board.place.lane(TAKEN_UP_NS)[0]
+    assert board.place.lane(9 * S)[0] == Enu(0, -400, UP_M), "the plan begins after 10 s"
+    half = board.place.lane(35 * S)[0]
+    assert (half.east, half.north) == pytest.approx((end.east / 2, (end.north - 400) / 2))
+    assert (board.place.is_taken_up(TAKEN_UP_NS - 1), board.place.is_taken_up(TAKEN_UP_NS)) == (False, True)
+
+
+def test_a_uav_of_a_line_stays_near_its_lane_and_a_follower_goes_anywhere() -> None:
+    lane, moves = Enu(0, 500, UP_M), Enu(0, 7.5, 0)
+    line, follower = Board(LINE, lane).place, Board(FOLLOWER, lane).place
+    assert follower.bounded(300, 100, lane, moves)[0] == Enu(300, 100, UP_M)
+    assert line.bounded(300, 450, lane, moves)[0] == Enu(58, 450, UP_M), "aside by the leash"
+    assert line.bounded(0, 100, lane, moves)[0] == Enu(0, 360, UP_M), "behind by the lag"
+    assert line.bounded(20, 700, lane, moves) == (Enu(20, 500, UP_M), moves), "ahead: the line brings it there"

@@ -1,0 +1,77 @@
+"""The parts of one UAV's search that act in time, wired as in a search of 45 UAVs."""
+
+import math
+
+from agents.mission.finding.announcing import Announcing
+from agents.mission.finding.finds import Finds
+from agents.mission.finding.phone_filter import REFERENCE_LOSS_DB, PhoneModel
+from agents.mission.flight.goal import Goal
+from agents.mission.formation.formation_place import FormationPlace
+from agents.mission.formation.formation_planner import plan_of
+from agents.mission.formation.pattern import fitted
+from agents.mission.formation.shape import Demands
+from agents.mission.navigation.known_obstacles import KnownObstacles
+from agents.mission.navigation.navigation import Navigation
+from agents.mission.navigation.neighbor_motions import NeighborMotions
+from agents.mission.navigation.onboard_map import NO_MAP
+from agents.mission.outbox import Outbox
+from agents.mission.tasking.approach import Approach
+from agents.mission.tasking.bidding import Bidding
+from fanet_mw.scenario import config
+from fanet_mw.units import US, Enu, NodeId, S
+from fanet_mw.wire.inner import Survivor
+from fanet_mw.wire.search import Search
+
+MODEL = PhoneModel(power_dbm=15, exponent=3, shadowing_db=4, offset_db=1, threshold_dbm=-90)
+REACH_M = 250.0
+COUNT = 45
+UP_M = 65.0
+SCENARIO = config.build(
+    {"nodes": {"count": COUNT}, "clusters": {"count": 1}, "mission": {"survivors": 3}, "world": {"area_m": 2500}}
+)
+
+
+def a_plan() -> Search:
+    pattern = fitted(COUNT, Demands(area_m=2500, seen_m=131, reach_m=REACH_M, height_m=UP_M, speed_m_s=7.5))
+    assert pattern is not None
+    return plan_of(pattern, tuple(range(1, COUNT + 1)), planner=1, start_us=10_000_000, deploy_ds=500)
+
+
+OPEN = KnownObstacles(NO_MAP)
+PLAN = a_plan()
+TAKEN_UP_NS = 60 * S
+FOLLOWER, LINE = NodeId(COUNT), NodeId(5)
+
+
+class Board:
+    """The parts of one UAV, wired as in a search."""
+
+    def __init__(self, node: NodeId, at: Enu, *, planned: bool = True) -> None:
+        self.out = Outbox()
+        self.finds = Finds(MODEL)
+        self.navigation, self.neighbors = Navigation(at, OPEN), NeighborMotions()
+        self.place = FormationPlace(node, self.navigation, reach_m=REACH_M)
+        if planned:
+            self.place.adopt(PLAN, 0)
+        self.approach = Approach(node, self.finds, self.navigation, self.out, arrival_m=30)
+        self.tasks = Bidding(
+            SCENARIO, node, finds=self.finds, navigation=self.navigation, formation=self.place,
+            approach=self.approach, outbox=self.out, speed_m_s=10.0,
+        )  # fmt: skip
+        self.goal = Goal(self.finds, self.navigation, self.place, self.approach, None)
+        self.announcing = Announcing(node, self.finds, self.out)
+
+    def hear(self, survivor: int, truth: Enu, reporters: range, *, now_ns: int) -> None:
+        """Each of these nodes reports a phone from three places on two sides of it."""
+        for node in reporters:
+            for step in (-60, 0, 60):
+                at = Enu(truth.east + (40 if node % 2 else -60), truth.north + step + node, UP_M)
+                rssi_dbm = MODEL.power_dbm - REFERENCE_LOSS_DB - 30 * math.log10(at.minus(truth).norm())
+                report = Survivor(now_ns // US, survivor, node, at, rssi_dbm)
+                self.finds.report(report, now_ns=now_ns)
+
+
+def lane_of(node: int, at_ns: int) -> Enu:
+    place = FormationPlace(NodeId(node), Navigation(Enu(0, 0, UP_M), OPEN), reach_m=REACH_M)
+    place.adopt(PLAN, 0)
+    return place.lane(at_ns)[0]

@@ -1,0 +1,23 @@
+"""The approach to a survivor, around an estimate of the place."""
+
+import math
+
+from search_board import FOLLOWER, UP_M, Board
+
+from agents.mission.finding.phone_filter import Estimate
+from fanet_mw.units import Enu, S
+
+
+def test_around_an_estimate_the_spiral_widens_until_somebody_is_seen() -> None:
+    board = Board(FOLLOWER, Enu(0, 0, UP_M))
+    board.hear(1, Enu(0, 0, 0), range(1, 5), now_ns=0)
+    place = board.finds.known[1].place()
+    assert place is not None
+
+    def radius_m(second: int) -> float:
+        east, north = board.approach.point(1, place, second * S, responding=True)
+        return math.hypot(east - place.east_m, north - place.north_m)
+
+    assert (round(radius_m(0)), round(radius_m(20)), round(radius_m(40))) == (14, 44, 74)
+    board.finds.known[1].filter.on_sighting(Estimate(0, 0, 4, 0, 4))
+    assert round(math.hypot(*board.approach.point(1, Estimate(0, 0, 4, 0, 4), 41 * S, responding=True))) == 40

@@ -315,11 +315,8 @@ class TimeSync:
         rival[1].add(pair)
         if len(rival[1]) < _PROVEN:
             return
-        if len(self._fit) < _PROVEN or not self._fit.agrees(pair):
-            self.counts["step"] += self._fit.line is not None and not self._fit.agrees(pair)
-            self._fit = rival[1]
-        else:
-            self._fit.add(pair)
+        self.counts["step"] += self._fit.line is not None and not self._fit.agrees(pair)
+        self._fit = rival[1]  # what earlier pairs state of their error holds against the reference that they are of
         self.reference, self.is_reference, self._rival = reference, False, None
         self._news_ns = local_ns
         self._arm(local_ns)

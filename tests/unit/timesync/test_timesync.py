@@ -127,6 +127,19 @@ def test_two_swarms_that_meet_take_the_time_of_the_lower_reference() -> None:
     assert network.worst_us() < 20
 
 
+def test_a_time_that_is_known_badly_at_first_is_not_held_to_be_that_of_the_reference_before() -> None:
+    """Two words within 1 ms contradict nothing, and lie 0.4 ms off; a third one, within 0.3 ms, finds no old line."""
+    sync = follower(9)
+    follow(sync, ahead_ns=0, hellos=20, src=3, reference=3)
+    assert sync.reference == 3
+    follow(sync, ahead_ns=400 * US, hellos=3, src=5, first=21, hops=9, error_ns=MS)
+    hear(sync, 5, 24, 24 * S, said(23 * S + 400 * US, 23, node=5, hops=9, error_ns=300 * US))
+    assert sync.reference == 1
+    stated_ns = sync.error_ns(24 * S)
+    assert stated_ns is not None
+    assert abs(sync.line.swarm_ns(24 * S) - 24 * S - 400 * US) <= stated_ns
+
+
 def test_a_time_farther_than_the_limit_is_counted_and_not_believed() -> None:
     sync = follower()
     follow(sync, ahead_ns=6 * S, hellos=20)

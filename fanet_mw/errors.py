@@ -90,6 +90,8 @@ class DropReason(StrEnum):
     """The frame is longer than the radio's maximum."""
     MISSED_TURN = "missed_turn"
     """The packet came so late that the turn in which it was to be relayed had begun; it was not relayed."""
+    OUT_OF_TURN = "out_of_turn"
+    """The packet was heard in no turn of its flood, and so there was none in which to relay it."""
     ADMISSION = "admission"
     """The packet came too soon for the node's bound to meet `traffic.deadline_s`, and was refused at its origin."""
     BOUND_LOST = "bound_lost"

@@ -36,7 +36,11 @@ def evaluate_claims(site: Site, classes: Sequence[TrafficClass], *, deadline_ns:
         cut_off=cut_off,
         goodput=goodput(site, classes),
         deadline_ns=deadline_ns,
-        problems=(*reachability.problems(cut_off), *_problems(scenario, claims, planned, deadline_ns)),
+        problems=(
+            *reachability.problems(cut_off),
+            *_problems(scenario, claims, planned, deadline_ns),
+            *verdict.clocks_apart(scenario),
+        ),
         notes=(*_notes(claims), *verdict.left_out(scenario)),
     )
 

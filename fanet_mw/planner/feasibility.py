@@ -181,6 +181,7 @@ def evaluate(
     late = () if judged.unfit or judged.cut_off or deadline_ns is None else tuple(verdict.late(summed, deadline_ns))
     cut_off = tuple(reachability.problems(judged.cut_off))
     crowded = tuple(contention_window.too_short(scenario, site.adjacency)) if site.timetable else ()
+    apart = tuple(verdict.clocks_apart(scenario)) if site.timetable else ()
     return Plan(
         scenario=scenario,
         clusters=judged.clusters,
@@ -198,6 +199,7 @@ def evaluate(
             *cut_off,
             *verdict.problems(scenario, judged.clusters, summed, cut_off),
             *crowded,
+            *apart,
             *late,
         ),
         notes=(

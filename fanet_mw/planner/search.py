@@ -12,14 +12,16 @@ from typing import Final, NamedTuple
 
 from fanet_mw.bounds import Refused
 from fanet_mw.graph.topology import Adjacency
+from fanet_mw.planner import verdict
 from fanet_mw.planner.claimed_verdict import evaluate_claims
 from fanet_mw.planner.demand import demands
 from fanet_mw.planner.feasibility import Plan, Site, evaluate, heads_of
 from fanet_mw.planner.goodput_bound import in_turns
 from fanet_mw.planner.variant import Value, Variant, vary
+from fanet_mw.routing.clustered.tdma.turns import turn_slack_ns
 from fanet_mw.routing.clustered.timetable.turn_plan import least_interval_ns, most_together, superframe
 from fanet_mw.scenario import Scenario
-from fanet_mw.units import Enu, NodeId
+from fanet_mw.units import US, Enu, NodeId
 
 _COUNTS: Final = (1, 2, 3, 4, 5, 6, 8, 11, 15, 22, 30, 44, 64)
 _PERIODS: Final = (0.1, 0.2, 0.4, 0.5, 0.7, 1.0, 1.4, 2.0, 3.0, 5.0, 10.0)
@@ -123,8 +125,16 @@ def _turn_options(scenario: Scenario) -> Iterator[dict[str, Value]]:
     counts = dict.fromkeys((clusters.count, scenario.nodes.count - 1))
     windows = dict.fromkeys((radio.cw_min, *(w for w in WINDOWS if w < radio.cw_min)))
     periods = dict.fromkeys((clusters.flooding_period_s, *_TURN_PERIODS_S))
-    for count, window, period_s in product(counts, windows, periods):
-        yield {"clusters.count": count, "radio.cw_min": window, "clusters.flooding_period_s": period_s}
+    for count, window, period_s, clocks in product(counts, windows, periods, _clock_options(scenario)):
+        yield {"clusters.count": count, "radio.cw_min": window, "clusters.flooding_period_s": period_s, **clocks}
+
+
+def _clock_options(scenario: Scenario) -> list[dict[str, Value]]:
+    """What keeps turns apart when the clocks are too far apart for their slack: a time in hellos, or more slack."""
+    needed_ns = verdict.unsynchronized_slack_ns(scenario)
+    if needed_ns <= turn_slack_ns(scenario):
+        return [{}]
+    return [{"clock.sync": "beacons"}, {"clusters.turn_slack_us": needed_ns / US}]
 
 
 def _tightest(scenario: Scenario) -> Iterator[Variant]:
@@ -146,8 +156,9 @@ def _tightest(scenario: Scenario) -> Iterator[Variant]:
 def _claim_options(scenario: Scenario) -> Iterator[dict[str, Value]]:
     windows = dict.fromkeys((scenario.radio.cw_min, *(w for w in WINDOWS if w < scenario.radio.cw_min)))
     together = dict.fromkeys((scenario.routing.aggregate, True))
-    for window, slots, aggregate in product(windows, dict.fromkeys((scenario.clusters.slots, *_SLOTS)), together):
-        yield {"radio.cw_min": window, "clusters.slots": slots, "routing.aggregate": aggregate}
+    numbers = dict.fromkeys((scenario.clusters.slots, *_SLOTS))
+    for window, slots, aggregate, clocks in product(windows, numbers, together, _clock_options(scenario)):
+        yield {"radio.cw_min": window, "clusters.slots": slots, "routing.aggregate": aggregate, **clocks}
     yield from ({"clusters.relay": "scheduled", **turned} for turned in _turn_options(scenario))
 
 

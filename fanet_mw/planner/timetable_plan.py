@@ -4,6 +4,7 @@ The timetable is the one that `clusters.relay = "scheduled"` makes. Known turns 
 the duration of the flood is added, which does not depend on other floods in the swarm.
 """
 
+import math
 from collections.abc import Mapping, Sequence
 from typing import Final, NamedTuple
 
@@ -20,15 +21,20 @@ from fanet_mw.bounds import (
 )
 from fanet_mw.planner.flood import FloodCost
 from fanet_mw.planner.head_slot import ClassLoad, ClusterPlan
+from fanet_mw.planner.variant import vary
 from fanet_mw.routing.clustered.tdma.own_bound import OwnBound
-from fanet_mw.routing.clustered.tdma.turns import Turns
+from fanet_mw.routing.clustered.tdma.turns import Turns, turn_slack_ns
 from fanet_mw.routing.clustered.timetable.list_scheduling import Effort
 from fanet_mw.routing.clustered.timetable.timetable import Timetable, timetable
 from fanet_mw.routing.clustered.timetable.turn_plan import Fitted, Places, fit, links, superframe
 from fanet_mw.scenario import Scenario
-from fanet_mw.units import NodeId
+from fanet_mw.units import US, NodeId
 
 _MOST_TURNS: Final = 20_000
+_LEAST_SLACK_US: Final = 20
+"""Less slack than this leaves nothing for flight and detection."""
+_SPARE_TURNS: Final = (1.0, 1.05)
+"""The turns to try, as multiples of those needed when there is no end of them: the end of the superframe costs some."""
 
 
 class Candidate(NamedTuple):
@@ -70,10 +76,26 @@ def table_for(
     roots = tuple(sorted({scenario.leader, *head_of.values()}))
     table = timetable(places, roots, links(scenario, unlimited), (), Effort(pace=0.0))
     needed = f"{table.used}" if table else f"more than {_MOST_TURNS}"
+    most_us = None if quick or table is None else _most_slack_us(scenario, places, head_of, needed=table.used)
+    slack = "" if most_us is None else f"; with clusters.turn_slack_us of at most {most_us} it has enough"
     return Refused(
         f"one packet of each of {len(roots)} roots needs {needed} turns of {turns.turn_ns / 1e6:.3f} ms, "
-        f"a superframe has {turns.per_frame}"
+        f"a superframe has {turns.per_frame}{slack}"
     )
+
+
+def _most_slack_us(scenario: Scenario, places: Places, head_of: Mapping[NodeId, NodeId], *, needed: int) -> int | None:
+    """The slack with which so many turns fit into a superframe, or a few more; None when less slack does not help."""
+    turns = superframe(scenario)
+    for spare in _SPARE_TURNS:
+        longest_ns = (turns.period_ns - turns.contention_ns) // math.ceil(needed * spare)
+        slack_us = (turn_slack_ns(scenario) - turns.turn_ns + longest_ns) // US
+        if slack_us < _LEAST_SLACK_US:
+            return None
+        variant = vary(scenario, {"clusters.turn_slack_us": float(slack_us)})
+        if variant is not None and fit(variant.scenario, places, head_of) is not None:
+            return slack_us
+    return None
 
 
 def judge(

@@ -1,5 +1,6 @@
 """The sentences of a plan: why it is not feasible, what its bounds assume, and what they leave out."""
 
+import math
 from collections.abc import Iterator, Sequence
 from typing import Final
 
@@ -7,8 +8,9 @@ from fanet_mw import wire
 from fanet_mw.bounds import Bounded, DelayBound, Refused
 from fanet_mw.planner.demand import ClassPlan
 from fanet_mw.planner.head_slot import ClusterPlan
+from fanet_mw.routing.clustered.tdma.turns import least_slack_ns, turn_slack_ns
 from fanet_mw.scenario import Scenario
-from fanet_mw.units import MS, S
+from fanet_mw.units import MS, US, S
 
 _LIFETIMES: Final = {wire.PRIORITY_SAFETY: "safety_lifetime_s", wire.PRIORITY_REPORT: "report_lifetime_s"}
 
@@ -57,9 +59,39 @@ def problems(
             yield problem
 
 
+def clocks_apart(scenario: Scenario) -> Iterator[str]:
+    """A sentence about clocks that nothing synchronizes and that the slack of a turn does not hold."""
+    clock, slack_ns = scenario.clock, turn_slack_ns(scenario)
+    needed_ns = unsynchronized_slack_ns(scenario)
+    if needed_ns > slack_ns:
+        most_us = (needed_ns - least_slack_ns(0)) / 2 / US
+        yield (
+            f"clocks may be {most_us:g} us off by the end, and clusters.turn_slack_us = {slack_ns / US:g} has to be at "
+            f'least {needed_ns / US:g}: with clock.sync = "{clock.sync}" nothing brings them together '
+            f"(clock.offset_ms = {clock.offset_ms:g}, clock.drift_ppm = {clock.drift_ppm:g})"
+        )
+
+
+def unsynchronized_slack_ns(scenario: Scenario) -> int:
+    """The slack that turns need at the end of the run when nothing synchronizes the clocks; 0 when something does, or
+    they are exact.
+    """
+    clock = scenario.clock
+    if clock.sync != "none" or not clock.modelled:
+        return 0
+    drifted_ns = math.ceil(clock.drift_ppm * scenario.duration_ns / 1_000_000)
+    return least_slack_ns(clock.offset_ns + drifted_ns)
+
+
 def left_out(scenario: Scenario) -> Iterator[str]:
     if scenario.radio.channel != "range":
         yield "who hears whom is taken by distance, up to radio.range_m, whatever the channel does"
+    most_ns = (turn_slack_ns(scenario) - least_slack_ns(0)) // 2
+    if scenario.clock.sync != "none" and scenario.clusters.relay in ("scheduled", "claimed"):
+        yield (
+            f"in flight a bound is stated while clocks are known within {max(0, most_ns) / US:g} us "
+            f"(clusters.turn_slack_us = {scenario.clusters.turn_slack_us:g}), and not before"
+        )
     if scenario.clusters.repair_s > 0:
         yield "repairs of lost packets come later than any bound here, and their load is not counted"
 

@@ -63,6 +63,14 @@ def test_clocks_that_only_drift_soon_collide_and_the_summary_says_how_wrong_they
     assert summary["clock"]["synced_after_s"] is None
 
 
+def test_a_slack_of_twice_the_error_and_20_us_keeps_every_packet_in_its_turn() -> None:
+    """1 ms either way, and so up to 2 ms between neighbors, with frames of 1.1 ms."""
+    summary = summary_of("clock.drift_ppm=0", "clock.offset_ms=1", "clusters.turn_slack_us=2020", "duration_s=25",
+                         "warmup_s=10")  # fmt: skip
+    assert summary["clock"]["error_us"]["max"] > 800
+    assert summary["pdr"] == 1
+
+
 def test_delays_in_the_trace_are_true_although_no_two_clocks_agree() -> None:
     """Offsets of up to a second would make delays negative, or seconds long, if nodes measured them."""
     outcome = outcome_of("clock.sync=none", "clusters.turn_slack_us=50", "clock.offset_ms=1000")

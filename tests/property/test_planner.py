@@ -267,6 +267,45 @@ def test_floods_that_do_not_fit_the_turns_are_the_one_problem_named(make_scenari
     assert cheapest_change(scenario, placed(scenario)).plan.feasible
 
 
+def test_a_slack_that_leaves_too_few_turns_is_named_with_the_most_that_fits() -> None:
+    scenario = catalog.find("clusters", ["clusters.turn_slack_us=3000"])
+    (problem,) = plan(scenario, placed(scenario)).problems
+    most_us = int(problem.removesuffix(" it has enough").rsplit(" ", 1)[1])
+    assert f"with clusters.turn_slack_us of at most {most_us}" in problem
+    assert 2500 < most_us < 3000
+    fits = catalog.find("clusters", [f"clusters.turn_slack_us={most_us}"])
+    assert not any("roots needs" in problem for problem in plan(fits, placed(fits)).problems)
+
+
+@pytest.mark.parametrize(
+    ("settings", "needed_us"),
+    [
+        (["clock.offset_ms=1"], "2020"),
+        (["clock.drift_ppm=10"], "1220"),
+        (["clock.offset_ms=1", "clusters.relay=claimed"], "2020"),
+    ],
+)
+def test_clocks_that_nothing_brings_together_need_twice_their_error_and_20_us(
+    settings: list[str], needed_us: str
+) -> None:
+    """After 60 s at 10 ppm they are 600 us off."""
+    scenario = catalog.find("clusters", settings)
+    problem = plan(scenario, placed(scenario)).problems[-1]
+    assert "clusters.turn_slack_us = 50" in problem
+    assert f"at least {needed_us}:" in problem
+    for mend in (f"clusters.turn_slack_us={needed_us}", "clock.sync=beacons"):
+        enough = catalog.find("clusters", [*settings, mend])
+        assert not any("nothing brings them together" in p for p in plan(enough, placed(enough)).problems)
+
+
+def test_a_time_in_hellos_is_proposed_to_clocks_that_are_apart() -> None:
+    scenario = catalog.find("clusters", ["clock.offset_ms=1"])
+    found = cheapest_change(scenario, placed(scenario), sources=[NodeId(node) for node in range(2, 46)])
+    assert found is not None
+    assert found.variant.arguments == ("clock.sync=beacons",)
+    assert any("while clocks are known within 15 us" in note for note in found.plan.notes)
+
+
 def test_of_many_heads_the_fullest_are_listed_and_the_others_counted() -> None:
     scenario = catalog.find("clusters")
     text = describe(plan(scenario, placed(scenario)))

@@ -1,7 +1,8 @@
 """Relays by a timetable: a node that hears a packet in a turn knows whose flood it is, and so its own turn of it.
 
-Which turn it is follows from the end of the reception, whose flood from the turn and the sender. What is heard outside
-of any turn is not relayed if it is data; until a timetable is in force, and for control, another rule decides.
+Which turn it is follows from the end of the reception, whose flood from the turn and the sender. By a clock that is
+behind the sender's a frame may end before its turn begins, earlier by the slack at most. Data that is heard in no turn
+of its flood is counted and not relayed; until a timetable is in force, and for control, another rule decides.
 """
 
 from collections.abc import Mapping, Sequence
@@ -11,6 +12,7 @@ from fanet_mw.errors import DropReason
 from fanet_mw.node.contract import Port
 from fanet_mw.node.packet import Packet, Relay
 from fanet_mw.routing.clustered.contract import Relaying
+from fanet_mw.routing.clustered.tdma.turns import turn_slack_ns
 from fanet_mw.routing.clustered.timetable.turn_plan import TurnPlan
 from fanet_mw.routing.clustered.timetable.turn_plans import TurnPlans
 from fanet_mw.units import NodeId
@@ -24,6 +26,7 @@ class ScheduledRelaying:
         self._port = port
         self._plans = plans
         self._otherwise = otherwise
+        self._slack_ns = turn_slack_ns(port.scenario)
         self._missed = 0
         """The number of packets whose turn had begun when the node heard of them."""
 
@@ -34,25 +37,32 @@ class ScheduledRelaying:
         plan = self._plans.at(reception.end_ns)
         if plan is None:
             return self._otherwise.on_flood(packet, reception, at_once=at_once, now_ns=now_ns)
-        turn = plan.turns.turn_at(reception.end_ns)
-        heard = None if turn is None else plan.heard.get((turn, reception.src))
-        if heard is None:
-            if packet.header.kind == Kind.DATA:
-                return ()
+        foreign = False
+        for instant_ns in (reception.end_ns, reception.end_ns + self._slack_ns):
+            turn = plan.turns.turn_at(instant_ns)
+            heard = None if turn is None else plan.heard.get((turn, reception.src))
+            if heard is None:
+                continue
+            if not plan.whole or packet.header.origin == heard[1] or not plan.has_turns(packet.origin):
+                return self._in_turn(packet, plan, heard, instant_ns, now_ns)
+            foreign = True  # its sender follows another timetable
+        if not foreign and packet.header.kind != Kind.DATA:
             return self._otherwise.on_flood(packet, reception, at_once=at_once, now_ns=now_ns)
-        if plan.whole and packet.header.origin != heard[1] and plan.has_turns(packet.origin):
-            return ()  # its sender follows another timetable
-        return self._in_turn(packet, plan, heard, reception, now_ns)
+        if packet.origin != self._port.node:  # what became of an own packet is not decided by a copy that comes back
+            self._port.drop(DropReason.OUT_OF_TURN, packet, now_ns=now_ns)
+        return ()
 
     def _in_turn(
-        self, packet: Packet, plan: TurnPlan, heard: tuple[int, NodeId, int], reception: Reception, now_ns: int
+        self, packet: Packet, plan: TurnPlan, heard: tuple[int, NodeId, int], heard_ns: int, now_ns: int
     ) -> Sequence[Relay]:
-        """The relays in those turns of this flood that are the node's and still to come."""
+        """The relays in those turns of this flood that are the node's and still to come; `heard_ns` lies in the turn in
+        which it was heard.
+        """
         offset, root, instance = heard
         own = plan.mine.get((root, instance), ())
         if not own or packet.header.hop_limit <= 1:
             return ()
-        frame_ns = plan.turns.frame_start_ns(reception.end_ns) - offset // plan.turns.per_frame * plan.turns.period_ns
+        frame_ns = plan.turns.frame_start_ns(heard_ns) - offset // plan.turns.per_frame * plan.turns.period_ns
         starts_ns = [plan.turns.start_ns(turn, frame_start_ns=frame_ns) for turn in own]
         ahead_ns = [start_ns for start_ns in starts_ns if start_ns >= now_ns]
         if not ahead_ns and (plan.odds is None or own[-1] > offset):

@@ -101,13 +101,17 @@ class Turns(NamedTuple):
         )
 
 
+def turn_slack_ns(scenario: Scenario) -> int:
+    """What a turn is longer than its largest frame: also how far the clocks of two nodes may be apart."""
+    return round(scenario.clusters.turn_slack_us * US)
+
+
 def turn_ns(scenario: Scenario, *, payload_bytes: int) -> int:
     """The length of a turn for frames of this size; the slack is for flight, detection and clock errors."""
     radio = scenario.radio
-    slack_ns = round(scenario.clusters.turn_slack_us * US)
     timing = Timing.of(radio)
     frame_ns = airtime_ns(payload_bytes + OVERHEAD_BYTES, radio, rate_mbps=radio.rate_mbps)
-    return frame_ns + timing.difs_ns + radio.cw_min * timing.slot_ns + slack_ns
+    return frame_ns + timing.difs_ns + radio.cw_min * timing.slot_ns + turn_slack_ns(scenario)
 
 
 def receipt_ns(scenario: Scenario) -> int:
@@ -124,4 +128,9 @@ def clocks_fit(scenario: Scenario, *, clock_error_ns: int) -> bool:
     """
     if not clock_error_ns:
         return not scenario.clock.modelled
-    return 2 * clock_error_ns + _FLIGHT_NS <= round(scenario.clusters.turn_slack_us * US)
+    return least_slack_ns(clock_error_ns) <= turn_slack_ns(scenario)
+
+
+def least_slack_ns(clock_error_ns: int) -> int:
+    """The slack that keeps turns apart when no clock is farther than this from the swarm's."""
+    return 2 * clock_error_ns + _FLIGHT_NS

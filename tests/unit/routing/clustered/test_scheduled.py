@@ -20,7 +20,7 @@ from fanet_mw.routing.clustered.timetable.timetable import Timetable, Turn
 from fanet_mw.routing.clustered.timetable.turn_access import TurnAccess
 from fanet_mw.routing.clustered.timetable.turn_plan import Fitted, TurnPlan
 from fanet_mw.scenario import Scenario
-from fanet_mw.trace import BoundStated
+from fanet_mw.trace import BoundStated, Dropped
 from fanet_mw.units import BROADCAST, MS, Enu, NodeId
 from fanet_mw.wire import FLAG_FLOOD, PRIORITY_BULK, Header, Kind, filler
 
@@ -139,9 +139,25 @@ def test_a_hop_limit_holds_in_turns(node: Node) -> None:
     assert relays(node) == []
 
 
-def test_what_is_heard_in_no_turn_of_its_flood_is_not_relayed(node: Node) -> None:
+def test_what_is_heard_in_no_turn_of_its_flood_is_not_relayed_and_counted(node: Node) -> None:
     hear_in_turn(node, AFTER, 5)
     assert relays(node) == []
+    assert node.dropped[DropReason.OUT_OF_TURN] == 1
+    assert [r.reason for r in node.records if isinstance(r, Dropped)] == [DropReason.OUT_OF_TURN]
+
+
+@pytest.mark.parametrize(("early_us", "is_relayed"), [(0, True), (50, True), (51, False)])
+@pytest.mark.parametrize("turn_before", [(), (Turn(4, ROOT, US, 0),)])
+def test_by_a_clock_that_is_behind_a_frame_ends_before_its_turn_and_is_relayed_within_the_slack(
+    node: Node, early_us: int, *, is_relayed: bool, turn_before: tuple[Turn, ...]
+) -> None:
+    """The frame of the fifth turn ends in the fourth, empty or with another flood of its sender."""
+    access_of(node)._plans.in_order = [planned((*turn_before, *FLOODS))]
+    end_ns = TURNS.start_ns(5, frame_start_ns=1000 * MS) - early_us * 1000
+    header = Header(end_ns // 1000 - 5000, 1, ROOT, BROADCAST, ROOT, Kind.DATA, 9, 0, 3, FLAG_FLOOD)
+    node.hear(Reception(header.encode() + filler(40), ROOT, end_ns, -60.0), end_ns)
+    assert relays(node) == [1056.0] * is_relayed
+    assert node.dropped[DropReason.OUT_OF_TURN] == 1 - is_relayed
 
 
 def test_the_newest_timetable_in_force_counts(node: Node) -> None:
@@ -319,6 +335,12 @@ def test_a_flood_of_whoever_follows_another_timetable_is_not_relayed(node: Node)
         header = Header(end_ns // 1000 - 5000, seq, origin, BROADCAST, ROOT, Kind.DATA, 9, 0, 3, FLAG_FLOOD)
         node.hear(Reception(header.encode() + filler(40), ROOT, end_ns, -60.0), end_ns)
     assert relays(node) == [1056.0], "only that of the root"
+
+
+def test_a_flood_of_another_timetable_is_counted(node: Node) -> None:
+    hear_in_turn(node, ROOT, 14)
+    assert relays(node) == []
+    assert node.dropped[DropReason.OUT_OF_TURN] == 1
 
 
 @pytest.mark.parametrize(("due_ms", "earliest_ms", "latest_ms"), [(1010, 1010, 1010), (1050, 1100, 1135)])

@@ -130,6 +130,17 @@ class Confirmed(NamedTuple):
     north_m: float
 
 
+class Refuted(NamedTuple):
+    """A UAV took a confirmation back, because what it heard of the survivor since contradicts the announced place."""
+
+    t_ns: int
+    node: int
+    survivor: int
+    east_m: float
+    """The place that was announced."""
+    north_m: float
+
+
 class Planned(NamedTuple):
     """A UAV took over a plan of the search, and its place in it; place -1: it has none."""
 
@@ -284,6 +295,7 @@ Record = (
     | Approaching
     | Arrived
     | Confirmed
+    | Refuted
     | Planned
     | Posed
     | FlightModeChanged
@@ -312,6 +324,7 @@ _KINDS: Final[dict[str, type[Any]]] = {
     "approaching": Approaching,
     "arrived": Arrived,
     "confirmed": Confirmed,
+    "refuted": Refuted,
     "planned": Planned,
     "posed": Posed,
     "flight_mode_changed": FlightModeChanged,
@@ -395,6 +408,6 @@ __all__ = [
     "Approaching", "Arrived", "BoundStated", "ClockSampled", "Collided", "Confirmed", "ConflictForeseen",
     "ConflictOver", "DeadlineLost", "DeadlineMet", "Delivered", "Detected", "DropReason", "Dropped",
     "FlightModeChanged", "Generated", "LetOut", "LikelyStated", "MissionModeChanged", "Planned", "Posed",
-    "ProcessEnded", "RadioFault", "Record", "RoleChanged", "Sighted", "Warned", "kind_of", "line", "name_of",
-    "parse",
+    "ProcessEnded", "RadioFault", "Record", "Refuted", "RoleChanged", "Sighted", "Warned", "kind_of", "line",
+    "name_of", "parse",
 ]  # fmt: skip

@@ -19,7 +19,7 @@ from fanet_mw.scenario import Scenario
 from fanet_mw.units import MS, Enu, NodeId, S
 from fanet_mw.wire import BIDS, COVERED, FOUND, SEARCH, STATUS, SURVIVOR
 from fanet_mw.wire.inner import Survivor
-from fanet_mw.wire.search import Found, Search, SearchStatus, Told, told_in
+from fanet_mw.wire.search import Found, Search, SearchStatus, Standing, Told, told_in
 
 _FUTURE_NS: Final = S
 """A position of an instant further ahead is not believed: clocks agree better than that."""
@@ -162,7 +162,7 @@ def _speaker(told: Told) -> int | None:
         return told.planner
     if isinstance(told, SearchStatus):
         return told.node
-    return None if not isinstance(told, Found) or told.confirmed else told.node
+    return None if not isinstance(told, Found) or told.standing is not Standing.ESTIMATED else told.node
 
 
 def _hello(frame: bytes) -> tuple[int, Motion, tuple[Told, ...]]:

@@ -5,6 +5,7 @@
     enough reporters    -> an auction; winners leave their lanes as far as the formation holds  tasking
     too few reporters   -> the auction names one that has not reported, for a further bearing   tasking
     seen at close range -> confirmed, announced, struck off; responders return to their lanes   finding.announcing
+    heard elsewhere     -> refuted, announced, open again for reports and bids                  finding.contradictions
 
 Everything that a UAV knows it has sensed or was told over the air. Each fix gives one velocity (flight).
 """
@@ -16,7 +17,6 @@ from typing import Final, assert_never
 from agents.mission.finding.announcing import Announcing
 from agents.mission.finding.coverage_map import CoverageMap
 from agents.mission.finding.finds import Finds
-from agents.mission.finding.identities import Identities
 from agents.mission.finding.phone_filter import REFERENCE_LOSS_DB, PhoneModel
 from agents.mission.finding.phone_reception import PhoneReception
 from agents.mission.finding.sightings import Sightings
@@ -46,7 +46,7 @@ from fanet_mw.rng import stream
 from fanet_mw.scenario import Scenario
 from fanet_mw.units import Enu, NodeId, S
 from fanet_mw.wire.inner import Survivor
-from fanet_mw.wire.search import MOST_PLACES, Bids, Covered, Found, Search, SearchStatus, Told, encode_bids
+from fanet_mw.wire.search import MOST_PLACES, Bids, Covered, Found, Search, SearchStatus, Standing, Told, encode_bids
 
 _OFFSET_DB: Final = 1.0
 """The standard deviation by which the power of one phone is taken to differ from that of another."""
@@ -77,7 +77,7 @@ class Searcher:
         )  # fmt: skip
         coverage = coverage_map(scenario)
         self._reception = PhoneReception(scenario, node, finds, navigation, outbox, coverage)
-        self._sightings = Sightings(scenario, node, Identities(finds), navigation, outbox)
+        self._sightings = Sightings(scenario, node, finds, navigation, outbox)
         self._announcing = Announcing(node, finds, outbox)
         approach = Approach(node, finds, navigation, outbox, arrival_m=mission.arrival_m)
         self._bidding = Bidding(
@@ -116,6 +116,9 @@ class Searcher:
             return
         self._next_review_ns = now_ns + _REVIEW_NS
         self._reception.review(now_ns)
+        for survivor in self._sightings.contradicted():
+            self._announcing.refute(survivor, now_ns)
+            self._bidding.reopen(survivor)
         self._plans.review(self._return_home.percent, now_ns)
         self._identify(now_ns)
         self._announcing.tell(self._bidding.survivor, now_ns)
@@ -198,13 +201,22 @@ class Searcher:
             case Bids():
                 self._bidding.merge(message.bids, now_ns=now_ns)
             case Found():
-                if self._finds.on_found(message, now_ns=now_ns):
-                    self._announcing.struck(message.survivor, now_ns)
-                    self._bidding.close(message.survivor, now_ns=now_ns)
+                self._on_found(message, now_ns)
             case Covered():
                 self._reception.on_covered(message)
             case _:
                 assert_never(message)
+
+    def _on_found(self, found: Found, now_ns: int) -> None:
+        """Another node estimates the place of a survivor, confirms it there, or takes that back."""
+        if self._finds.on_found(found, now_ns=now_ns):
+            self._announcing.decided(found.survivor, now_ns)
+            if found.standing is Standing.CONFIRMED:
+                self._bidding.close(found.survivor, now_ns=now_ns)
+            else:
+                self._bidding.reopen(found.survivor)
+        elif found.standing is Standing.CONFIRMED and self._finds.known[found.survivor].is_refuted(found):
+            self._announcing.outdated(found, now_ns)
 
     # --- what it tells --------------------------------------------------------------------------------------------
 

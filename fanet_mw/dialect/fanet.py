@@ -1241,8 +1241,8 @@ setattr(MAVLink_fanet_bids_message, "name", mavlink_msg_deprecated_name_property
 
 class MAVLink_fanet_found_message(MAVLink_message):
     """
-    Where a survivor is estimated to be, with covariance; or that it
-    is confirmed there.
+    Where a survivor is estimated to be, with covariance; that it is
+    confirmed there; or that it is not there after all.
     """
 
     id = MAVLINK_MSG_ID_FANET_FOUND
@@ -2417,18 +2417,18 @@ class MAVLink(object):
 
     def fanet_found_encode(self, t_us: int, survivor: int, east: float, north: float, east_variance: float, covariance: float, north_variance: float, node: int, confirmed: int, version: int) -> MAVLink_fanet_found_message:
         """
-        Where a survivor is estimated to be, with covariance; or that it is
-        confirmed there.
+        Where a survivor is estimated to be, with covariance; that it is
+        confirmed there; or that it is not there after all.
 
-        t_us                      : When that was estimated, or confirmed. [us] (type:uint64_t)
+        t_us                      : When that was estimated, confirmed or taken back. [us] (type:uint64_t)
         survivor                  : Which one. (type:uint32_t)
         east                      : Where. [m] (type:float)
         north                     : Where. [m] (type:float)
         east_variance             : Variance of east, in square metres. (type:float)
         covariance                : Covariance of east and north, in square metres. (type:float)
         north_variance            : Variance of north, in square metres. (type:float)
-        node                      : Who estimated it, or confirmed it. (type:uint16_t)
-        confirmed                 : 1: seen or heard at close range; nobody needs to go there any more. (type:uint8_t)
+        node                      : Who estimated it, confirmed it or took it back. (type:uint16_t)
+        confirmed                 : 0: an estimate. 1: seen or heard at close range; nobody needs to go there any more. 2: earlier confirmations within 12 m of there were mistaken; the survivor is searched for again. (type:uint8_t)
         version                   : 1. (type:uint8_t)
 
         """
@@ -2436,18 +2436,18 @@ class MAVLink(object):
 
     def fanet_found_send(self, t_us: int, survivor: int, east: float, north: float, east_variance: float, covariance: float, north_variance: float, node: int, confirmed: int, version: int, force_mavlink1: bool = False) -> None:
         """
-        Where a survivor is estimated to be, with covariance; or that it is
-        confirmed there.
+        Where a survivor is estimated to be, with covariance; that it is
+        confirmed there; or that it is not there after all.
 
-        t_us                      : When that was estimated, or confirmed. [us] (type:uint64_t)
+        t_us                      : When that was estimated, confirmed or taken back. [us] (type:uint64_t)
         survivor                  : Which one. (type:uint32_t)
         east                      : Where. [m] (type:float)
         north                     : Where. [m] (type:float)
         east_variance             : Variance of east, in square metres. (type:float)
         covariance                : Covariance of east and north, in square metres. (type:float)
         north_variance            : Variance of north, in square metres. (type:float)
-        node                      : Who estimated it, or confirmed it. (type:uint16_t)
-        confirmed                 : 1: seen or heard at close range; nobody needs to go there any more. (type:uint8_t)
+        node                      : Who estimated it, confirmed it or took it back. (type:uint16_t)
+        confirmed                 : 0: an estimate. 1: seen or heard at close range; nobody needs to go there any more. 2: earlier confirmations within 12 m of there were mistaken; the survivor is searched for again. (type:uint8_t)
         version                   : 1. (type:uint8_t)
 
         """

@@ -5,6 +5,7 @@ Like the rest of this dialect they are coded by struct; decoders are total, and 
 
 import math
 from collections.abc import Callable, Mapping, Sequence
+from enum import IntEnum
 from typing import Any, Final, NamedTuple, Self
 
 from fanet_mw.errors import LocalProtocolError, MalformedFrameError
@@ -190,8 +191,19 @@ class Bids(NamedTuple):
     bids: tuple[Bid, ...]
 
 
+class Standing(IntEnum):
+    """What a FANET_FOUND says of the place that it names."""
+
+    ESTIMATED = 0
+    CONFIRMED = 1
+    REFUTED = 2
+    """Confirmations there are taken back: what has been heard since contradicts them."""
+
+
 class Found(NamedTuple):
-    """FANET_FOUND: where a survivor is estimated to be, or that it is confirmed there."""
+    """FANET_FOUND: where a survivor is estimated to be, that it is confirmed there, or that it is not there after
+    all.
+    """
 
     t_us: int
     survivor: int
@@ -201,7 +213,7 @@ class Found(NamedTuple):
     covariance_m2: float
     north_variance_m2: float
     node: int
-    confirmed: bool
+    standing: Standing
 
     def encode_frame(self, node: int) -> bytes:
         return encode_inner(FOUND, FOUND.layout.pack(*self, VERSION), node=node)
@@ -214,14 +226,11 @@ class Found(NamedTuple):
     @classmethod
     def checked(cls, fields: tuple[Any, ...]) -> Self:
         """The estimate of these fields; raises MalformedFrameError."""
-        *values, confirmed, version = fields
-        found = cls._make((*values, bool(confirmed)))
+        *values, standing, version = fields
+        _refuse_unless(version == VERSION and standing <= Standing.REFUTED, f"a find of standing {standing}")
+        found = cls._make((*values, Standing(standing)))
         _refuse_unless(
-            version == VERSION
-            and confirmed <= 1
-            and 0 < found.survivor <= MOST_SURVIVORS
-            and 0 < found.node < ANY_NODE
-            and found.t_us <= LATEST_US,
+            0 < found.survivor <= MOST_SURVIVORS and 0 < found.node < ANY_NODE and found.t_us <= LATEST_US,
             f"survivor {found.survivor} found by {found.node}",
         )
         east, north = found.east_variance_m2, found.north_variance_m2

@@ -4,7 +4,9 @@
     connected   share of the time in which all UAVs of the search were one component at the radio's reach: those that
                 live, have not crashed, and do not fly home or stand there, because they hold no place any more
     confirmed   survivors of whom a UAV said that it saw them at close range, and where they truly are: within 25 m; the
-                others are mistaken. The error is that of the place it told first, of both
+                others are mistaken. What was taken back does not count. The error is that of the place it told first,
+                of both
+    reopened    confirmations that were taken back, because what was heard later contradicted them
     nearest     of each living UAV once a second: how far the nearest other one is
 
 Positions are the true ones, once a second (`Posed`).
@@ -18,6 +20,7 @@ from typing import Any, Final
 import numpy as np
 import numpy.typing as npt
 
+from agents.mission.finding.finds import SAME_PLACE_M
 from fanet_mw.scenario import Scenario
 from fanet_mw.trace import (
     Approaching,
@@ -30,6 +33,7 @@ from fanet_mw.trace import (
     Posed,
     ProcessEnded,
     Record,
+    Refuted,
 )
 from fanet_mw.units import S
 from sim.run.collecting.stored_records import of
@@ -54,15 +58,22 @@ def mission(scenario: Scenario, records: Collection[Record]) -> dict[str, Any]:
     truth = place(scenario)
     first: dict[int, int] = {}
     errors: list[float] = []
-    confirmed: dict[int, Confirmed] = {}
-    for record in of(records, Approaching, Confirmed):
+    announced: dict[int, list[Confirmed]] = {}
+    """For each survivor the confirmations that hold, in the order in which they were told."""
+    reopened = 0
+    for record in of(records, Approaching, Confirmed, Refuted):
         if type(record) is Approaching:
             first.setdefault(record.node, record.t_ns)
             if 1 <= record.survivor <= len(truth):  # else only the air has told of it
                 at = truth[record.survivor - 1]
                 errors.append(math.hypot(at.east - record.east_m, at.north - record.north_m))
         elif type(record) is Confirmed and 1 <= record.survivor <= len(truth):
-            confirmed.setdefault(record.survivor, record)
+            announced.setdefault(record.survivor, []).append(record)
+        elif type(record) is Refuted and record.survivor in announced:
+            held = announced[record.survivor]
+            announced[record.survivor] = [one for one in held if not _takes_back(record, one)]
+            reopened += len(announced[record.survivor]) < len(held)
+    confirmed = {survivor: held[0] for survivor, held in announced.items() if held}
     error_m = {
         s: math.hypot(truth[s - 1].east - r.east_m, truth[s - 1].north - r.north_m) for s, r in confirmed.items()
     }
@@ -74,6 +85,7 @@ def mission(scenario: Scenario, records: Collection[Record]) -> dict[str, Any]:
         "reached": len({r.survivor for r in of(records, Arrived)}),
         "confirmed": len(right),
         "mistaken": len(confirmed) - len(right),
+        "reopened": reopened,
         "time_to_confirm_s": sorted(round(confirmed[s].t_ns / S, 3) for s in right),
         "uavs_approaching": len(first),
         "time_to_approach_s": sorted(round(t_ns / S, 3) for t_ns in first.values()),
@@ -82,6 +94,11 @@ def mission(scenario: Scenario, records: Collection[Record]) -> dict[str, Any]:
         "collisions": sum(1 for _ in of(records, Collided)),
         **_flown(scenario, records),
     }
+
+
+def _takes_back(refuted: Refuted, confirmed: Confirmed) -> bool:
+    """True if the refutation is of this confirmation, or of another at the same place."""
+    return math.hypot(refuted.east_m - confirmed.east_m, refuted.north_m - confirmed.north_m) <= SAME_PLACE_M
 
 
 def _median(values: list[float]) -> float | None:

@@ -129,6 +129,8 @@ def _mission_rows(mission: Mapping[str, Any]) -> Iterator[tuple[str, str]]:
     if mission["confirmed"]:
         last_s, error_m = mission["time_to_confirm_s"][-1], mission["confirmed_error_m"]
         yield "confirmed", f"{mission['confirmed']}, the last after {last_s:.0f} s, median error {error_m:.1f} m"
+    if mission["mistaken"] or mission["reopened"]:
+        yield "mistaken", f"{mission['mistaken']} taken for somebody else, {mission['reopened']} taken back"
     if mission["coverage"] is not None:
         yield (
             "search",

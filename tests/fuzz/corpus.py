@@ -43,7 +43,7 @@ from fanet_mw.routing import control
 from fanet_mw.trace import Record
 from fanet_mw.units import BROADCAST, Enu, NodeId, S
 from fanet_mw.wire.message import DELIVERED, MISSING, Head, Receipt, encode_piece, encode_receipts
-from fanet_mw.wire.search import Bid, Covered, Found, Search, SearchStatus, encode_bids
+from fanet_mw.wire.search import Bid, Covered, Found, Search, SearchStatus, Standing, encode_bids
 from sim.run.virtual import actors_of
 from sim.scenarios import catalog
 
@@ -159,7 +159,7 @@ def _not_recorded() -> list[bytes]:
         Search(7, 500.0, 10.0, 480.0, 50.0, 10.0, 30, 1, 1, (1, 2, 3, 4, 5, 0, 7), 1, 0, 3, 2, 4).encode_frame(1),
         SearchStatus(7, Enu(1.0, 2.0, 3.0), 4, 1, 80).encode_frame(4),
         encode_bids([Bid(3, 4, 200, 7), Bid(5, 6, 0xFFFF, 8, 2)], node=4),
-        Found(7, 3, 10.0, 20.0, node=4, confirmed=False, **covariance).encode_frame(4),
+        Found(7, 3, 10.0, 20.0, node=4, standing=Standing.ESTIMATED, **covariance).encode_frame(4),
         Covered(0x8001 << 1000 | 5).encode_frame(4),
         encode_piece(head, bytes(range(200)), node=3),
         encode_piece(head._replace(piece=1), bytes(100), node=3, targets=range(1, 40)),

@@ -47,7 +47,7 @@ def degraded(scenario: Scenario, loss: float) -> Scenario:
 
 
 PLACES: Final[Mapping[str, Case]] = {
-    "`town`": Case("town", (), tuple(range(1, 21))),
+    f"`{name}`": Case(name, (), tuple(range(1, 21))) for name in ("rescue", "town", "hills", "night")
 }
 _SMALL: Final = (
     "nodes.count=20", "nodes.spacing_m=100", "nodes.telemetry_hz=0", "clusters.count=4", "traffic.interval_s=4",
@@ -62,9 +62,9 @@ SHAPES: Final[Mapping[str, Case]] = {
     ), (1, 2)),
 }  # fmt: skip
 CLEAR: Final[Mapping[str, Case]] = {
-    "hellos of neighbors and radar": Case("town", (), (1,)),
-    "radar alone": Case("town", ('mission.avoid_by=["radar"]',), (1,)),
-    "neither": Case("town", ("mission.avoid_by=[]",), (1,)),
+    "hellos of neighbors and radar": Case("town", (), (1, 2, 3, 4)),
+    "radar alone": Case("town", ('mission.avoid_by=["radar"]',), (1, 2, 3, 4)),
+    "neither": Case("town", ("mission.avoid_by=[]",), (1, 2, 3, 4)),
 }
 
 

@@ -1,7 +1,8 @@
-"""What one UAV tells of finds: its estimates while it responds, and confirmations until everyone has heard of them.
+"""What one UAV tells of finds: its estimates while it responds, and its verdicts until everyone has heard of them.
 
 seen often enough at close range, place sure   -> confirmed: told three times, and with the hellos of a while
-a UAV still reports a confirmed survivor      -> some of those that know of it tell it again
+heard since where that place is impossible     -> refuted: told likewise, and the survivor is searched for again
+a UAV speaks as if it knew of no verdict       -> some of those that know it tell it again
 """
 
 import math
@@ -9,10 +10,10 @@ from typing import Final
 
 from agents.mission.finding.finds import Finds
 from agents.mission.outbox import Outbox, OutgoingPacket
-from fanet_mw.trace import Confirmed
+from fanet_mw.trace import Confirmed, Refuted
 from fanet_mw.units import US, NodeId, S
 from fanet_mw.wire.inner import Survivor
-from fanet_mw.wire.search import Found
+from fanet_mw.wire.search import Found, Standing
 
 _TELLINGS: Final = 3
 _AGAIN_NS: Final = 7 * S
@@ -21,11 +22,11 @@ _WORSE: Final = 0.8
 _USEFUL_M: Final = 60.0
 """An estimate whose standard deviation is larger is not worth telling."""
 _PASSED_ON_NS: Final = 12 * S
-"""How long hellos pass a confirmation on."""
+"""How long hellos pass a verdict on."""
 _PASSED_ON: Final = 3
-"""The most confirmations in one hello."""
+"""The most verdicts in one hello."""
 _TELLERS: Final = 4
-"""Of the UAVs that know a reported survivor to be confirmed, one in this many says so."""
+"""Of the UAVs that know a verdict of which another does not seem to know, one in this many tells it."""
 
 
 class Announcing:
@@ -36,33 +37,45 @@ class Announcing:
         self._finds, self._outbox = finds, outbox
         self._told_sigma_m: dict[int, float] = {}
         self._tellings: dict[int, tuple[int, int]] = {}
-        """For each survivor that this UAV has confirmed: how often that is still to be told, and when next."""
-        self._struck_ns: dict[int, int] = {}
-        """When this UAV confirmed each survivor, or heard that it is confirmed."""
+        """For each survivor that this UAV has confirmed or refuted: how often that is still to be told, and when."""
+        self._heard_ns: dict[int, int] = {}
+        """When this UAV confirmed or refuted each survivor, or heard of that."""
 
     def confirm(self, survivor: int, now_ns: int) -> None:
         """Tell all nodes that the owner of this phone has been seen and is surely the one."""
         place = self._finds.known[survivor].filter.estimate()
         assert place is not None, "who was seen has a place"
-        found = Found(now_ns // US, survivor, *place, self._node, confirmed=True)
+        found = Found(now_ns // US, survivor, *place, self._node, Standing.CONFIRMED)
         self._finds.on_found(found, now_ns=now_ns)
         east_m, north_m = round(place.east_m, 2), round(place.north_m, 2)
         self._outbox.records.append(Confirmed(now_ns, self._node, survivor, east_m, north_m))
         self._tellings[survivor] = _TELLINGS, now_ns
-        self.struck(survivor, now_ns)
+        self.decided(survivor, now_ns)
 
-    def struck(self, survivor: int, now_ns: int) -> None:
-        """Note that a survivor is confirmed, by this UAV or by another."""
-        self._struck_ns[survivor] = now_ns
+    def refute(self, survivor: int, now_ns: int) -> None:
+        """Tell all nodes that a confirmed survivor cannot be where it was confirmed."""
+        mistaken = self._finds.known[survivor].confirmed
+        assert mistaken is not None, "only a confirmation is refuted"
+        refuted = mistaken._replace(t_us=now_ns // US, node=self._node, standing=Standing.REFUTED)
+        self._finds.on_found(refuted, now_ns=now_ns)
+        east_m, north_m = round(mistaken.east_m, 2), round(mistaken.north_m, 2)
+        self._outbox.records.append(Refuted(now_ns, self._node, survivor, east_m, north_m))
+        self._tellings[survivor] = _TELLINGS, now_ns
+        self.decided(survivor, now_ns)
+
+    def decided(self, survivor: int, now_ns: int) -> None:
+        """Note that a survivor is confirmed or refuted, by this UAV or by another."""
+        self._heard_ns[survivor] = now_ns
+        self._told_sigma_m.pop(survivor, None)
 
     def tell(self, task: int | None, now_ns: int) -> None:
-        """Tell the confirmations that are due, and the estimate of the survivor to whom this UAV flies."""
+        """Tell the verdicts that are due, and the estimate of the survivor to whom this UAV flies."""
         for survivor, (left, next_ns) in sorted(self._tellings.items()):
             if now_ns < next_ns:
                 continue
-            found = self._finds.known[survivor].confirmed
-            assert found is not None, "only what is confirmed is announced"
-            self._flood(found)
+            verdict = self._finds.known[survivor].verdict
+            assert verdict is not None, "only a verdict is announced"
+            self._flood(verdict)
             if left > 1:
                 self._tellings[survivor] = left - 1, now_ns + _AGAIN_NS
             else:
@@ -72,21 +85,28 @@ class Announcing:
 
     def reported(self, report: Survivor, now_ns: int) -> None:
         """Note that another node reports a survivor: it may not know yet that the survivor is confirmed."""
-        confirmed = self._finds.known[report.survivor].confirmed
-        if confirmed is None or now_ns - self._struck_ns.get(report.survivor, now_ns) <= _AGAIN_NS:
+        if self._finds.is_confirmed(report.survivor):
+            self._remind(report.survivor, report.reporter, now_ns)
+
+    def outdated(self, found: Found, now_ns: int) -> None:
+        """Note that another node tells a confirmation that has been taken back."""
+        self._remind(found.survivor, found.node, now_ns)
+
+    def _remind(self, survivor: int, of_node: int, now_ns: int) -> None:
+        """Tell a verdict again, unless that was done lately or is up to others."""
+        verdict = self._finds.known[survivor].verdict
+        if verdict is None or now_ns - self._heard_ns.get(survivor, now_ns) <= _AGAIN_NS:
             return
-        self._struck_ns[report.survivor] = now_ns
-        if (report.reporter + self._node) % _TELLERS == 0:
-            self._flood(confirmed)
+        self._heard_ns[survivor] = now_ns
+        if (of_node + self._node) % _TELLERS == 0:
+            self._flood(verdict)
 
     def hello_frames(self, now_ns: int) -> bytes:
-        """The inner frames that tell in the next hello what was confirmed lately."""
+        """The inner frames that tell in the next hello what was confirmed or refuted lately."""
         recent = [
-            (struck_ns, survivor)
-            for survivor, struck_ns in self._struck_ns.items()
-            if now_ns - struck_ns < _PASSED_ON_NS
+            (heard_ns, survivor) for survivor, heard_ns in self._heard_ns.items() if now_ns - heard_ns < _PASSED_ON_NS
         ]
-        latest = [self._finds.known[survivor].confirmed for _, survivor in sorted(recent, reverse=True)[:_PASSED_ON]]
+        latest = [self._finds.known[survivor].verdict for _, survivor in sorted(recent, reverse=True)[:_PASSED_ON]]
         return b"".join(found.encode_frame(self._node) for found in latest if found is not None)
 
     def _tell_estimate(self, survivor: int, now_ns: int) -> None:
@@ -96,7 +116,7 @@ class Announcing:
         if place is None or place.sigma_m > _WORSE * before_m or place.sigma_m > _USEFUL_M:
             return
         self._told_sigma_m[survivor] = place.sigma_m
-        self._flood(Found(now_ns // US, survivor, *place, self._node, confirmed=False))
+        self._flood(Found(now_ns // US, survivor, *place, self._node, Standing.ESTIMATED))
 
     def _flood(self, found: Found) -> None:
         self._outbox.packets.append(OutgoingPacket(found.encode_frame(self._node)))

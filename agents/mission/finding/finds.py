@@ -1,21 +1,29 @@
 """What one UAV knows of the survivors: which nodes reported each, where each is, and which are confirmed.
 
 heard by a phone's signal -> reported by enough different nodes -> seen at close range -> confirmed: struck off
+confirmed, and heard since where it cannot be heard from the confirmed place           -> refuted: open again
+
+A confirmation and what refutes it are merged in any order to the same result: a refutation takes back the
+confirmations of the same place that are not younger than it.
 """
 
 import math
 from dataclasses import dataclass, field
-from typing import Final
+from typing import Final, assert_never
 
 from agents.mission.finding.phone_filter import Estimate, PhoneFilter, PhoneModel
 from fanet_mw.units import US, Enu, S
 from fanet_mw.wire.inner import Survivor
-from fanet_mw.wire.search import Found
+from fanet_mw.wire.search import Found, Standing
 
 _PASSED_ON: Final = 5
 """The most reports in one hello."""
 _FRESH_NS: Final = 8 * S
 """A node that did not make a report itself passes it on while it is younger than this."""
+SAME_PLACE_M: Final = 12.0
+"""Two sightings, or two confirmations, nearer to each other than this are of one place."""
+_MOST_REFUTED: Final = 4
+"""The most mistaken places of one survivor that are kept in mind, the youngest ones."""
 
 
 @dataclass
@@ -30,6 +38,21 @@ class Find:
     told: Found | None = None
     """The best estimate that another node has told."""
     confirmed: Found | None = None
+    refuted: list[Found] = field(default_factory=list)
+    """The places at which it was confirmed by mistake, each with the instant of its refutation, oldest first."""
+
+    @property
+    def verdict(self) -> Found | None:
+        """The confirmation that holds, or the latest refutation; None when nobody has announced anything."""
+        return self.confirmed or (self.refuted[-1] if self.refuted else None)
+
+    def is_refuted(self, found: Found) -> bool:
+        """True for a confirmation that has been taken back."""
+        return any(_refutes(refuted, found) for refuted in self.refuted)
+
+    def doubted(self, at: Enu) -> bool:
+        """True at a place at which the survivor was confirmed by mistake."""
+        return any(_estimate(refuted).distance_m(at) <= SAME_PLACE_M for refuted in self.refuted)
 
     def place(self) -> Estimate | None:
         """The better one of the estimate from this UAV's samples and the best that another node has told."""
@@ -58,23 +81,29 @@ class Finds:
         if before is None or report.t_us > before.t_us:
             find.latest[report.reporter] = report
         find.reporters.add(report.reporter)
-        if find.confirmed is None:
-            find.filter.on_rssi(report.reporter, report.position, report.rssi_dbm)
+        find.filter.on_rssi(report.reporter, report.position, report.rssi_dbm)
         return find
 
     def on_found(self, found: Found, *, now_ns: int) -> bool:
-        """Take in an estimate or a confirmation of another node; True if it strikes the survivor off."""
+        """Take in what is told of a survivor; True if it strikes the survivor off, or opens it again."""
         find = self.known.get(found.survivor)
         if find is None:
             find = self.known[found.survivor] = Find(PhoneFilter(self._model), first_ns=now_ns)
-        if found.confirmed:
-            fresh = find.confirmed is None
-            if fresh:
-                find.confirmed = found
-            return fresh
-        if find.told is None or _estimate(found).sigma_m < _estimate(find.told).sigma_m:
-            find.told = found
-        return False
+        match found.standing:
+            case Standing.CONFIRMED:
+                fresh = find.confirmed is None and not find.is_refuted(found)
+                if fresh:
+                    find.confirmed = found
+                return fresh
+            case Standing.REFUTED:
+                return _refute(find, found)
+            case Standing.ESTIMATED:
+                outdated = any(found.t_us <= refuted.t_us for refuted in find.refuted)
+                if not outdated and (find.told is None or _estimate(found).sigma_m < _estimate(find.told).sigma_m):
+                    find.told = found
+                return False
+            case _:
+                assert_never(found.standing)
 
     def open(self) -> list[int]:
         """The survivors that wait to be confirmed, in order of id."""
@@ -95,6 +124,23 @@ class Finds:
         ]
         fresh.sort(key=lambda report: (-report.t_us, report.survivor, report.reporter))
         return fresh[:_PASSED_ON]
+
+
+def _refute(find: Find, refuted: Found) -> bool:
+    """Take in a refutation; True if it opens the survivor again."""
+    if not any(_refutes(known, refuted) for known in find.refuted):
+        find.refuted = sorted([*find.refuted, refuted], key=lambda one: (one.t_us, one.node))[-_MOST_REFUTED:]
+    if find.confirmed is None or not _refutes(refuted, find.confirmed):
+        return False
+    find.confirmed = find.told = None
+    find.filter.on_sighting(None)
+    return True
+
+
+def _refutes(refuted: Found, found: Found) -> bool:
+    """True if a refutation takes back this confirmation, or holds as much as this refutation."""
+    at = Enu(found.east_m, found.north_m, 0.0)
+    return found.t_us <= refuted.t_us and _estimate(refuted).distance_m(at) <= SAME_PLACE_M
 
 
 def _estimate(found: Found) -> Estimate:

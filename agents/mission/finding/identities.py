@@ -14,13 +14,12 @@ from collections.abc import Sequence
 from dataclasses import dataclass
 from typing import Final
 
-from agents.mission.finding.finds import Finds
+from agents.mission.finding.finds import SAME_PLACE_M, Finds
 from agents.mission.finding.phone_filter import Estimate
 from agents.mission.hungarian import assign
 from fanet_mw.units import Enu, S
+from fanet_mw.wire.search import Found
 
-_SAME_PERSON_M: Final = 12.0
-"""Sightings nearer to each other than this are of one person."""
 _SAME_SIGMAS: Final = 2.5
 """Sightings are of one person, too, that are nearer than this many standard deviations: those of voices are wide."""
 _GATE: Final = 16.0
@@ -31,6 +30,8 @@ _VAGUE_M: Final = 80.0
 """A phone whose place has a larger standard deviation than this could be that of any person."""
 _NEAR_M: Final = 400.0
 """Phones that were first heard farther from a person are not that person's."""
+_BESIDE_M: Final = 150.0
+"""People farther from each other than this are not taken for each other."""
 _FORGOTTEN_NS: Final = 60 * S
 _FALSE_ALARM_NS: Final = 10 * S
 """A sighting that no other follows within this time was a false alarm."""
@@ -50,6 +51,8 @@ _LEAST_MARGIN: Final = 2.0
 _PATIENT_NS: Final = 15 * S
 _IMPATIENT_NS: Final = 50 * S
 """Times since the first sighting: before `_PATIENT_NS` the whole margin is asked for, after this one the least."""
+_REFUTED_COST: Final = 9.0
+"""The further cost at a place at which the same survivor was confirmed by mistake: another UAV knows more of it."""
 _TAKEN_GATE: Final = 6.0
 _TAKEN_SIGHTINGS: Final = 20
 """The further sightings after which a second person beside a confirmed one is believed, if a phone fits."""
@@ -100,7 +103,7 @@ class Identities:
         """
         near = min(self._people, key=lambda person: person.place.distance_m(at), default=None)
         variance = sigma_m * sigma_m
-        if near is None or near.place.distance_m(at) > max(_SAME_PERSON_M, _SAME_SIGMAS * sigma_m):
+        if near is None or near.place.distance_m(at) > max(SAME_PLACE_M, _SAME_SIGMAS * sigma_m):
             near = PersonTrack(Estimate(at.east, at.north, variance, 0.0, variance), now_ns, now_ns)
             self._people.append(near)
         else:
@@ -117,7 +120,7 @@ class Identities:
         phones = self._phones(people)
         if not people or not phones:
             return []
-        costs = [[self._cost(person, phone) for phone in phones] for person in people]
+        costs = [[self._cost(person.place, phone) for phone in phones] for person in people]
         nobody = [_GATE if person.taken is None else _TAKEN_GATE for person in people]
         least, chosen = _assigned(costs, nobody)
         sure = []
@@ -133,17 +136,44 @@ class Identities:
                     sure.append(survivor)
         return sorted(sure)
 
+    def against(self, confirmed: Found) -> float:
+        """How much less likely a confirmed pair is than the best assignment without it; 0 or less: it is in the best.
+
+        The people are those who have been seen and those who were confirmed, near the place of this confirmation.
+        """
+        at = Enu(confirmed.east_m, confirmed.north_m, 0.0)
+        named = {
+            survivor: place
+            for survivor, find in sorted(self._finds.known.items())
+            if find.confirmed is not None and (place := find.place()) is not None and place.distance_m(at) <= _BESIDE_M
+        }
+        seen = [
+            person.place
+            for person in self._people
+            if person.close >= _SIGHTINGS and person.place.distance_m(at) <= _BESIDE_M
+            if all(place.distance_m(_enu(person.place)) > SAME_PLACE_M for place in named.values())
+        ]
+        people = [*named.values(), *seen]
+        phones = [*named, *self._open_near(people)]
+        costs = [[self._cost(place, phone) for phone in phones] for place in people]
+        nobody = [_GATE] * len(people)
+        least, _ = _assigned(costs, nobody)
+        row = phones.index(confirmed.survivor)
+        kept = [[cost if column == row else _IMPOSSIBLE for column, cost in enumerate(costs[row])]]
+        only = [_IMPOSSIBLE if at_row == row else cost for at_row, cost in enumerate(nobody)]
+        return _assigned([*costs[:row], *kept, *costs[row + 1 :]], only)[0] - least
+
     def _may_be_named(self, person: PersonTrack, now_ns: int) -> bool:
         """False where a survivor has been confirmed, until further sightings show that a second person lies there."""
-        at = Enu(person.place.east_m, person.place.north_m, 0.0)
+        at = _enu(person.place)
         taken = any(
-            find.confirmed is not None
-            and (place := find.place()) is not None
-            and place.distance_m(at) <= _SAME_PERSON_M
+            find.confirmed is not None and (place := find.place()) is not None and place.distance_m(at) <= SAME_PLACE_M
             for find in self._finds.known.values()
         )
         if taken and person.taken is None:
             person.taken, person.first_ns = person.sightings, now_ns
+        elif not taken and any(find.doubted(at) for find in self._finds.known.values()):
+            person.taken = None
         return person.taken is None or person.sightings - person.taken >= _TAKEN_SIGHTINGS
 
     def _next_best(
@@ -158,17 +188,21 @@ class Identities:
 
     def _phones(self, people: Sequence[PersonTrack]) -> list[int]:
         """The open survivors whose phones one of these people may carry."""
-        places = [Enu(person.place.east_m, person.place.north_m, 0.0) for person in people]
+        return self._open_near([person.place for person in people])
+
+    def _open_near(self, places: Sequence[Estimate]) -> list[int]:
+        """The open survivors whose phones were heard near one of these places."""
         return [
             survivor
             for survivor in self._finds.open()
             if self._finds.known[survivor].reporters
-            and any(self._finds.known[survivor].filter.near(place, within_m=_NEAR_M) for place in places)
+            and any(self._finds.known[survivor].filter.near(_enu(place), within_m=_NEAR_M) for place in places)
         ]
 
-    def _cost(self, person: PersonTrack, survivor: int) -> float:
-        place = person.place
-        return min(_IMPOSSIBLE, self._finds.known[survivor].filter.deficit(place.east_m, place.north_m))
+    def _cost(self, place: Estimate, survivor: int) -> float:
+        find, at = self._finds.known[survivor], _enu(place)
+        doubt = _REFUTED_COST if find.doubted(at) else 0.0
+        return min(_IMPOSSIBLE, find.filter.deficit(at.east, at.north) + doubt)
 
     def _is_confirmable(self, person: PersonTrack, survivor: int) -> bool:
         """True if enough has been seen of a person and enough been heard of a phone."""
@@ -182,6 +216,10 @@ class Identities:
             and heard is not None
             and heard.sigma_m <= (_VAGUE_M if person.taken is None else _TAKEN_SIGMA_M)
         )
+
+
+def _enu(place: Estimate) -> Enu:
+    return Enu(place.east_m, place.north_m, 0.0)
 
 
 def _is_remembered(person: PersonTrack, now_ns: int) -> bool:

@@ -125,6 +125,11 @@ class PhoneFilter:
         return self._seen is not None
 
     @property
+    def pending(self) -> int:
+        """The number of received powers that the estimate does not reckon with yet."""
+        return sum(1 for _, rssi_dbm in self._pending if rssi_dbm is not None)
+
+    @property
     def samples(self) -> int:
         """The number of received powers that have been taken in."""
         return self._count

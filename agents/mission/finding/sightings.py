@@ -4,7 +4,8 @@ import math
 from collections.abc import Sequence
 from typing import Final
 
-from agents.mission.finding.finds import ground_place
+from agents.mission.finding.contradictions import Contradictions
+from agents.mission.finding.finds import Finds, ground_place
 from agents.mission.finding.identities import Identities
 from agents.mission.navigation.navigation import Navigation
 from agents.mission.outbox import Outbox
@@ -21,11 +22,11 @@ _ANGLE_RAD: Final = 0.03
 class Sightings:
     """What the camera and the microphones of one UAV show of people, whom neither of them can name."""
 
-    def __init__(
-        self, scenario: Scenario, node: NodeId, identities: Identities, navigation: Navigation, outbox: Outbox
-    ) -> None:
+    def __init__(self, scenario: Scenario, node: NodeId, finds: Finds, navigation: Navigation, outbox: Outbox) -> None:
         self._node = node
-        self._identities, self._navigation, self._outbox = identities, navigation, outbox
+        self._identities = Identities(finds)
+        self._contradictions = Contradictions(finds, self._identities)
+        self._navigation, self._outbox = navigation, outbox
         self._voice_rad = math.radians(scenario.sensors.voice_sigma_deg)
 
     def camera(self, people: Sequence[tuple[float, float]], *, now_ns: int) -> None:
@@ -42,6 +43,10 @@ class Sightings:
     def review(self, now_ns: int) -> list[int]:
         """The survivors who may be confirmed now, because their phones are surely those of people that were seen."""
         return self._identities.review(now_ns)
+
+    def contradicted(self) -> list[int]:
+        """The survivors whose confirmation what was heard and seen since contradicts."""
+        return self._contradictions.review()
 
     def _sighted(self, sensor: str, direction: tuple[float, float], *, sigma_rad: float, now_ns: int) -> None:
         """Take in that a sensor shows a person in a direction, if the place on the ground is not too far away."""

@@ -29,6 +29,10 @@ class Approach:
         self.arrived_ns: dict[int, int] = {}
         """The instant at which this UAV came to each survivor."""
 
+    def forget(self, survivor: int) -> None:
+        """Take a survivor as one at which this UAV has not been yet: where it came to was not the place."""
+        self.arrived_ns.pop(survivor, None)
+
     def point(self, survivor: int, place: Estimate, now_ns: int, *, responding: bool) -> tuple[float, float]:
         """East and north of the place to fly to: on a spiral, at an angle of the UAV's own, until a person is in view.
 

@@ -79,6 +79,10 @@ class Bidding:
             self.survivor = None
             self.choose(now_ns)
 
+    def reopen(self, survivor: int) -> None:
+        """Take a survivor as one to whom nobody has been yet: its confirmation was taken back."""
+        self._approach.forget(survivor)
+
     def hand_on(self, now_ns: int) -> None:
         """Take all bids of this UAV back: the next best one goes instead."""
         for survivor in self._finds.open():

@@ -7,7 +7,7 @@ from typing import Any
 import pytest
 
 from fanet_mw.scenario import Scenario
-from fanet_mw.trace import Confirmed, FlightModeChanged, MissionModeChanged, Posed, ProcessEnded, Record
+from fanet_mw.trace import Confirmed, FlightModeChanged, MissionModeChanged, Posed, ProcessEnded, Record, Refuted
 from fanet_mw.units import S
 from sim.results.mission import mission
 
@@ -70,6 +70,17 @@ def test_without_positions_nothing_is_claimed_of_the_flight() -> None:
 def test_a_survivor_announced_where_somebody_else_is_does_not_count() -> None:
     found = measured([Confirmed(7 * S, 1, 1, -100.0, 0.0), Confirmed(9 * S, 2, 1, 100.0, 0.0)])
     assert (found["confirmed"], found["mistaken"], found["time_to_confirm_s"]) == (0, 1, [])
+
+
+def test_a_confirmation_that_was_taken_back_counts_for_nothing() -> None:
+    wrong, again = Confirmed(7 * S, 1, 1, -100.0, 0.0), Confirmed(30 * S, 2, 1, 100.0, 0.0)
+    back = Refuted(20 * S, 3, 1, -99.0, 4.0)
+    found = measured([wrong, back, again])
+    assert (found["confirmed"], found["mistaken"], found["reopened"]) == (1, 0, 1)
+    assert found["time_to_confirm_s"] == [30.0]
+    assert measured([wrong, back])["confirmed"] == 0
+    elsewhere = measured([wrong, back._replace(east_m=100.0), again])
+    assert (elsewhere["mistaken"], elsewhere["reopened"]) == (1, 0)
 
 
 def test_the_nearest_other_uav_is_looked_for_once_a_second_among_the_living() -> None:

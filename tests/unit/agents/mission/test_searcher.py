@@ -16,7 +16,7 @@ from fanet_mw.trace import Confirmed, MissionModeChanged, Sighted
 from fanet_mw.units import MS, US, Enu, NodeId, S
 from fanet_mw.wire import HEADER_BYTES
 from fanet_mw.wire.inner import Survivor
-from fanet_mw.wire.search import Bid, Bids, SearchStatus, Told, told_in
+from fanet_mw.wire.search import Bid, Bids, Found, SearchStatus, Standing, Told, told_in
 
 HOME = Enu(0.0, -100.0, 65.0)
 STILL = Enu(0.0, 0.0, 0.0)
@@ -204,3 +204,24 @@ def test_heights_are_over_the_ground_with_and_without_a_plan(
     flight = Flight(make_scenario, onboard_map=plateau, planned=planned, home=HOME._replace(up=95.0))
     flight.fly(seconds)
     assert 64.0 < flight.at.up - 30.0 < highest_m, "lanes are at 65 m, relays 6 m higher"
+
+
+def test_a_survivor_whose_confirmation_is_taken_back_is_searched_for_again(
+    make_scenario: Callable[..., Scenario],
+) -> None:
+    flight = Flight(make_scenario, node=20)  # a follower
+    flight.fly(20)
+    found = Found(
+        flight.now_ns // US, 1, round(flight.at.east), round(flight.at.north), 4.0, 0.0, 4.0, 3, Standing.CONFIRMED
+    )
+    for reporter in (1, 2, 3):
+        place = Enu(flight.at.east + 60 * reporter - 120, flight.at.north + 30.0 * (reporter % 2), 65.0)
+        flight.searcher.on_message(Survivor(flight.now_ns // US, 1, reporter, place, -75.0), now_ns=flight.now_ns)
+    flight.searcher.on_message(found, now_ns=flight.now_ns)
+    flight.fly(3)
+    assert flight.modes[-1] == "search", "it is struck off"
+    refuted = found._replace(t_us=flight.now_ns // US, node=4, standing=Standing.REFUTED)
+    flight.searcher.on_message(refuted, now_ns=flight.now_ns)
+    flight.fly(3)
+    assert flight.modes[-1] == "respond"
+    assert told_in(bytes(HEADER_BYTES) + flight.searcher.hello_frames(flight.now_ns))[-1] == refuted, "it passes it on"

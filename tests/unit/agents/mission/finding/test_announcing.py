@@ -5,16 +5,16 @@ import math
 from search_board import FOLLOWER, MODEL, UP_M, Board
 
 from agents.mission.finding.phone_filter import REFERENCE_LOSS_DB, Estimate
-from fanet_mw.trace import Confirmed
+from fanet_mw.trace import Confirmed, Refuted
 from fanet_mw.units import Enu, S
 from fanet_mw.wire.inner import Survivor
-from fanet_mw.wire.search import Found, told_in
+from fanet_mw.wire.search import Found, Standing, told_in
 
 
 def confirmed(board: Board) -> list[Found]:
     """The confirmations that were flooded."""
     told = [message for packet in board.out.packets for message in told_in(bytes(36) + packet.frames)]
-    return [message for message in told if isinstance(message, Found) and message.confirmed]
+    return [message for message in told if isinstance(message, Found) and message.standing is Standing.CONFIRMED]
 
 
 def seen() -> Board:
@@ -46,3 +46,22 @@ def test_who_still_reports_a_confirmed_survivor_is_told_by_one_in_four() -> None
     for reporter in range(10, 14):
         board.announcing.reported(report._replace(reporter=reporter), reporter * 8 * S)
     assert len(confirmed(board)) == 1
+
+
+def test_a_refutation_is_told_as_a_confirmation_is_and_answers_who_tells_the_confirmation_again() -> None:
+    board = seen()
+    board.announcing.confirm(1, 0)
+    mistaken = board.finds.known[1].confirmed
+    assert mistaken is not None
+    board.announcing.refute(1, S)
+    board.out.packets.clear()
+    for second in range(1, 30):
+        board.announcing.tell(None, second * S)
+    told = [message for packet in board.out.packets for message in told_in(bytes(36) + packet.frames)]
+    assert [message.standing for message in told if isinstance(message, Found)] == [Standing.REFUTED] * 3
+    assert [type(record) for record in board.out.records] == [Confirmed, Refuted]
+    assert board.announcing.hello_frames(12 * S) != b""
+    board.out.packets.clear()
+    for node in range(10, 14):
+        board.announcing.outdated(mistaken._replace(node=node), node * 8 * S)
+    assert len(board.out.packets) == 1

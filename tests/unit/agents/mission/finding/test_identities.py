@@ -2,15 +2,19 @@
 
 import math
 import random
-from collections.abc import Iterator
+from collections.abc import Iterable, Iterator
 from typing import Final
 
+from hypothesis import given
+from hypothesis import strategies as st
+
+from agents.mission.finding.contradictions import Contradictions
 from agents.mission.finding.finds import Finds
 from agents.mission.finding.identities import Identities
 from agents.mission.finding.phone_filter import REFERENCE_LOSS_DB, PhoneModel
 from fanet_mw.units import US, Enu, S
 from fanet_mw.wire.inner import Survivor
-from fanet_mw.wire.search import Found
+from fanet_mw.wire.search import Found, Standing
 
 MODEL: Final = PhoneModel(power_dbm=15, exponent=3, shadowing_db=4, offset_db=1, threshold_dbm=-90)
 UP_M: Final = 65.0
@@ -43,7 +47,7 @@ class Uav:
         for survivor in sure:
             place = self.finds.known[survivor].place()
             assert place is not None
-            self.finds.on_found(Found(now_ns // US, survivor, *place, 1, confirmed=True), now_ns=now_ns)
+            self.finds.on_found(Found(now_ns // US, survivor, *place, 1, Standing.CONFIRMED), now_ns=now_ns)
             self.named[survivor] = Enu(place.east_m, place.north_m, 0)
         return sure
 
@@ -175,7 +179,89 @@ def test_where_somebody_is_confirmed_a_second_person_is_named_only_after_many_mo
             for north in (-60, 0, 60):
                 at = Enu(40.0 * node - 100, north, UP_M)
                 uav.hear(survivor, node, at, mean_dbm(Enu(0, 0, 0), at))
-    uav.finds.on_found(Found(0, 1, 1.0, 1.0, 4.0, 0.0, 4.0, 9, confirmed=True), now_ns=0)
+    uav.finds.on_found(Found(0, 1, 1.0, 1.0, 4.0, 0.0, 4.0, 9, Standing.CONFIRMED), now_ns=0)
     named = [second for second in range(90) if uav.see(Enu(0, 0, 0), now_ns=second * S)]
     assert uav.named.keys() == {2}
     assert named[0] >= 20
+
+
+# --- confirmations that were mistaken -------------------------------------------------------------------------------
+
+
+def mistaken() -> tuple[Uav, Contradictions]:
+    """One UAV that was told that survivor 1 lies where in truth survivor 2 lies; survivor 1 lies 57 m to the east."""
+    uav = Uav()
+    for survivor in (1, 2):
+        for node, east in ((8, 120.0), (9, -60.0)):
+            uav.hear(
+                survivor, node, Enu(east, 200, UP_M), mean_dbm(Enu(57.0 * (survivor == 1), 0, 0), Enu(east, 200, UP_M))
+            )
+    uav.finds.on_found(Found(S // US, 1, 0.0, 0.0, 4.0, 0.0, 4.0, 9, Standing.CONFIRMED), now_ns=S)
+    return uav, Contradictions(uav.finds, uav.identities)
+
+
+def pass_by(uav: Uav, survivors: Iterable[int], *, second: int, sees: Iterable[Enu] = ()) -> None:
+    """The UAV hears both phones while it flies over them."""
+    for step in range(10):
+        at = Enu(4.0 * second - 10, -135 + 30 * step, UP_M)
+        for survivor in survivors:
+            uav.hear(survivor, 1, at, mean_dbm(Enu(57.0 * (survivor == 1), 0, 0), at), now_ns=second * S)
+            uav.hear(
+                survivor,
+                2,
+                at._replace(east=at.east + 120),
+                mean_dbm(Enu(57.0 * (survivor == 1), 0, 0), at._replace(east=at.east + 120)),
+            )
+        uav.see(*sees, now_ns=second * S)
+
+
+def test_a_confirmation_is_contradicted_by_what_is_heard_and_seen_later() -> None:
+    uav, contradictions = mistaken()
+    assert contradictions.review() == [], "what was heard before it does not tell"
+    refuted = []
+    for second in (10, 20, 30):
+        pass_by(uav, (1, 2), second=second, sees=(Enu(0, 0, 0), Enu(57, 0, 0)))
+        for survivor in contradictions.review():
+            found = uav.finds.known[survivor].confirmed
+            assert found is not None
+            uav.finds.on_found(found._replace(t_us=second * S // US, standing=Standing.REFUTED), now_ns=second * S)
+            refuted.append(survivor)
+    assert set(refuted) == {1, 2}, "the second had been taken for the first in turn"
+    for second in range(30, 40):
+        uav.see(Enu(0, 0, 0), Enu(57, 0, 0), now_ns=second * S)
+    assert {survivor: round(place.east) for survivor, place in uav.named.items()} == {1: 57, 2: 0}
+
+
+def test_a_right_confirmation_is_not_contradicted() -> None:
+    uav, contradictions = mistaken()
+    uav.finds.known[1].confirmed = None
+    uav.finds.on_found(Found(2 * S // US, 1, 57.0, 0.0, 4.0, 0.0, 4.0, 9, Standing.CONFIRMED), now_ns=S)
+    pass_by(uav, (1, 2), second=10, sees=(Enu(0, 0, 0), Enu(57, 0, 0)))
+    assert contradictions.review() == []
+
+
+@given(st.permutations(range(4)))
+def test_confirmations_and_refutations_come_to_the_same_in_any_order(order: list[int]) -> None:
+    place = (4.0, 0.0, 4.0)
+    words = [
+        Found(10, 1, 0.0, 0.0, *place, 9, Standing.CONFIRMED),
+        Found(20, 1, 3.0, 0.0, *place, 8, Standing.REFUTED),
+        Found(15, 1, 0.0, 5.0, *place, 7, Standing.CONFIRMED),
+        Found(12, 1, 57.0, 0.0, *place, 6, Standing.CONFIRMED),
+    ]
+    finds = Finds(MODEL)
+    for at in [*order, *order]:  # told twice, as floods and hellos do
+        finds.on_found(words[at], now_ns=S)
+    confirmed = finds.known[1].confirmed
+    assert confirmed is not None
+    assert confirmed.node == 6, "the only one that was not taken back"
+
+
+def test_what_is_confirmed_again_at_the_same_place_after_it_was_taken_back_holds() -> None:
+    finds = Finds(MODEL)
+    told = Found(10, 1, 0.0, 0.0, 4.0, 0.0, 4.0, 9, Standing.CONFIRMED)
+    assert finds.on_found(told, now_ns=S)
+    assert finds.on_found(told._replace(t_us=20, standing=Standing.REFUTED), now_ns=S)
+    assert not finds.on_found(told, now_ns=S)
+    assert finds.on_found(told._replace(t_us=30), now_ns=S)
+    assert finds.is_confirmed(1)

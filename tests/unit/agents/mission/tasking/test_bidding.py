@@ -61,3 +61,5 @@ def test_a_responder_that_finds_nobody_takes_its_bid_back_and_does_not_bid_again
     board.tasks.bid(later_ns)
     assert board.tasks.survivor is None
     assert [bid.eta_ds for bid in board.tasks.bids_to_tell(now_ns=later_ns)] == [0xFFFF]
+    board.tasks.reopen(1)
+    assert board.approach.arrived_ns == {}, "what it came to was not the place"

@@ -2,8 +2,7 @@
 
 from collections.abc import Iterator, Sequence
 from pathlib import Path
-
-import pytest
+from typing import Any, Final
 
 from fanet_mw.results import read
 from sim.sweep import spec
@@ -21,6 +20,8 @@ case = [
     {name = "virtual"},
 ]
 """
+_ATTEMPTS: Final = 3
+"""A machine that does something else may spoil a run in real time; it does not spoil three of them."""
 
 
 class OneByOne:
@@ -37,23 +38,29 @@ class OneByOne:
             yield carry_out(task)
 
 
-def test_runs_in_real_time_are_rows_beside_those_in_virtual_time_and_are_not_repeated(tmp_path: Path) -> None:
-    sweep, store, workers, counts = spec.parse(FILE, source="test"), Store(tmp_path), OneByOne(), []
+def swept(folder: Path) -> tuple[list[int], list[str], list[dict[str, Any]]]:
+    """Carry the sweep out twice: the numbers of runs, what workers ran, and the rows."""
+    sweep, store, workers, counts = spec.parse(FILE, source="test"), Store(folder), OneByOne(), []
     with store.alone():
         for _ in range(2):
             store.read()
             plan = SweepPlan(tasks_of(sweep), store)
             run(plan, store, workers, sweep.varied())
             counts.append(len(plan.todo))
-    real, late, virtual = read(tmp_path).to_pylist()
-    assert (counts, workers.ran) == ([3, 0], ["virtual"]), "what is in real time is no worker's"
+    return counts, workers.ran, read(folder).to_pylist()
+
+
+def test_runs_in_real_time_are_rows_beside_those_in_virtual_time_and_are_not_repeated(tmp_path: Path) -> None:
+    for attempt in range(_ATTEMPTS):
+        counts, ran, (real, late, virtual) = swept(tmp_path / str(attempt))
+        if not (real["error"] or "").startswith("HostError: not valid: "):
+            break
+    assert (counts, ran) == ([3, 0], ["virtual"]), "what is in real time is no worker's"
     assert late["status"] == "failed", "what is not valid is no result"
     assert late["error"].startswith("HostError: not valid: ")
     assert "frames announced too late" in late["error"]
     assert real["case"] == "real"
     assert real["command"].startswith("fanet launch flooding ")
-    if real["status"] == "failed" and real["error"].startswith("HostError: not valid: "):
-        pytest.skip(f"the machine was too busy: {real['error'].splitlines()[0]}")
     assert (real["status"], real["error"]) == ("ok", None)
     assert real["generated"] == virtual["generated"] > 0, "the births of a seed are the same"
     assert '"mode": "realtime"' in real["summary"]

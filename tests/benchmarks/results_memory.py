@@ -19,7 +19,6 @@ from fanet_mw.trace import Delivered, Generated, LetOut, Record
 from fanet_mw.units import MS, S
 from sim.results.files import finish
 from sim.run.collecting.collector import Collector
-from sim.run.outcome import Outcome
 from sim.scenarios import catalog
 
 NAMES = Topics("rescue")
@@ -57,10 +56,7 @@ def main(minutes: float) -> None:
                     deliveries += len(records) - 2
                     put(NAMES.trace(f"agent-{node}"), codecs.encode([TraceBatch(tuple(records))]))
             collected_mb, collected_s = rss_mb(), time.process_time()
-            outcome = Outcome(
-                scenario=scenario, mode="realtime", wall_s=60 * minutes, records=collector.records(), reports={},
-                taps=collector.taps(), links=collector.links(), heard=collector.figures(),
-            )  # fmt: skip
+            outcome = collector.outcome(wall_s=60 * minutes)
         summary = finish(outcome, out=Path(folder) / "out")
     peak_mb, ended_s = resource.getrusage(resource.RUSAGE_SELF).ru_maxrss * 1024 / 1e6, time.process_time()
     assert summary["delivered"] == deliveries, "all of them were taken"

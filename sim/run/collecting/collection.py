@@ -11,14 +11,12 @@ from fanet_mw.hosts.bus import Bus
 from fanet_mw.scenario import Scenario
 from sim.results.files import finish
 from sim.run.collecting.collector import Collector
-from sim.run.outcome import Outcome
 
 
 class Collection:
     """Collects while the swarm runs, writes in the end."""
 
     def __init__(self, scenario: Scenario, bus: Bus, names: Topics, out: Path) -> None:
-        self._scenario = scenario
         self._out = out
         self._began_s = time.monotonic()
         self._collector = Collector(scenario, bus.subscribe, names, now_ns=time.monotonic_ns, folder=out)
@@ -40,19 +38,7 @@ class Collection:
 
     def finish(self, *, epoch_unix_ns: int, ready_s: float) -> int:
         """Write the result; 0 when it may be used, else 1."""
-        collector = self._collector
-        outcome = Outcome(
-            scenario=self._scenario,
-            mode="realtime",
-            wall_s=time.monotonic() - self._began_s - ready_s,
-            records=collector.records(),
-            reports=collector.reports(),
-            taps=collector.taps(),
-            links=collector.links(),
-            ready_s=ready_s,
-            epoch_unix_ns=epoch_unix_ns,
-            heard=collector.figures(),
-            absent=collector.absent(),
-        )
+        wall_s = time.monotonic() - self._began_s - ready_s
+        outcome = self._collector.outcome(wall_s=wall_s, ready_s=ready_s, epoch_unix_ns=epoch_unix_ns)
         self.summary = finish(outcome, out=self._out)
         return 0 if self.summary["valid"] else 1

@@ -27,6 +27,7 @@ from sim.results.links import LinkTotals
 from sim.run.collecting.bus_checks import BusChecks
 from sim.run.collecting.spool import Spool
 from sim.run.collecting.stored_records import RecordSpools, encoded_tap, taps_of
+from sim.run.outcome import Outcome
 
 BURST_BYTES: Final = 16 << 20
 """The bytes that one actor may put at once; ten hours of a UAV's trace in `rescue`."""
@@ -60,6 +61,7 @@ class Collector:
     def __init__(
         self, scenario: Scenario, subscribe: Subscribe, names: Topics, *, now_ns: Callable[[], int], folder: Path | None
     ) -> None:
+        self._scenario = scenario
         self._checks = BusChecks(scenario)
         self._true_delays = scenario.clock.modelled
         self._now_ns = now_ns
@@ -160,6 +162,24 @@ class Collector:
         return why
 
     # --- results, when the run is over ----------------------------------------------------------------------------
+
+    def outcome(
+        self, further: Iterable[Record] = (), *, wall_s: float, ready_s: float = 0.0, epoch_unix_ns: int = 0
+    ) -> Outcome:
+        """The result of the run as far as it was heard, with some further records."""
+        return Outcome(
+            scenario=self._scenario,
+            mode="realtime",
+            wall_s=wall_s,
+            records=self.records(further),
+            reports=self.reports(),
+            taps=self.taps(),
+            links=self.links(),
+            ready_s=ready_s,
+            epoch_unix_ns=epoch_unix_ns,
+            heard=self.figures(),
+            absent=self.absent(),
+        )
 
     def records(self, further: Iterable[Record] = ()) -> Collection[Record]:
         """All trace records and some further ones, by instant, node and kind; with true delays where clocks drift.

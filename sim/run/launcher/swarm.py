@@ -12,6 +12,7 @@ import signal
 import socket
 import time
 from collections.abc import Callable, Collection, Mapping
+from dataclasses import replace
 from pathlib import Path
 from typing import Any, Final
 
@@ -98,25 +99,21 @@ class SwarmRun:
 
     def _outcome(self, *, wall_s: float, ready_s: float, ended_ns: int | None) -> Outcome:
         """The outcome with what was collected; an incomplete trace is reported."""
-        collector, foreign = self._collector, set() if self._services.own_world else {"world"}
-        records = collector.records(self._deaths.records)
-        if (failure := collector.disk_failure()) is not None:
-            self._tell(f"the trace is incomplete: its temporary file could not be written: {failure}")
-        return Outcome(
-            scenario=self._services.scenario,
-            mode="realtime",
+        heard = self._collector.outcome(
+            self._deaths.records,
             wall_s=wall_s,
-            records=records,
-            reports=collector.reports(),
-            taps=collector.taps(),
-            links=collector.links(),
+            ready_s=ready_s,
+            epoch_unix_ns=self._keeper.clock.epoch_unix_ns if self._keeper.clock else 0,
+        )
+        if (failure := self._collector.disk_failure()) is not None:
+            self._tell(f"the trace is incomplete: its temporary file could not be written: {failure}")
+        foreign = set() if self._services.own_world else {"world"}
+        return replace(
+            heard,
             ended=self._deaths.ended,
             aborted=self._aborted,
             ended_ns=ended_ns,
-            ready_s=ready_s,
-            epoch_unix_ns=self._keeper.clock.epoch_unix_ns if self._keeper.clock else 0,
-            heard=collector.figures(),
-            absent={name: why for name, why in collector.absent().items() if name not in foreign},
+            absent={name: why for name, why in heard.absent.items() if name not in foreign},
             stall_ms=self._stall_s * 1000,
         )
 

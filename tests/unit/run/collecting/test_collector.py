@@ -78,11 +78,7 @@ class Ear:
         return dict(self.collector.figures()["why"])
 
     def outcome(self) -> Outcome:
-        collector = self.collector
-        return Outcome(
-            scenario=SCENARIO, mode="realtime", wall_s=1.0, records=collector.records(), reports=collector.reports(),
-            taps=collector.taps(), links=collector.links(), heard=collector.figures(), absent=collector.absent(),
-        )  # fmt: skip
+        return self.collector.outcome(wall_s=1.0)
 
 
 @pytest.fixture

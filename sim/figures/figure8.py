@@ -1,12 +1,15 @@
 """Figure 8: routing protocols of the field against speed. Claims of the paper: 4, on AODV and OLSR."""
 
 import math
-from typing import Final
+from collections.abc import Mapping
+from typing import Any, Final, NamedTuple
+
+from matplotlib.axes import Axes
 
 from sim.figures.claims import Claim, Reason, above, below
 from sim.figures.recipe import Drawing, Recipe, point
 from sim.figures.runs import Quantity, Row, Runs, differences, pooled
-from sim.figures.style import LOOKS, beside, canvas, legend_above, line, plain_log, ticks_at
+from sim.figures.style import LOOKS, Look, beside, canvas, legend_above, line, plain_log, ticks_at
 
 _SPEED: Final = "mobility.speed_m_s"
 _AT: Final = "mobility__speed_m_s"
@@ -29,32 +32,43 @@ def _below_limit(row: Row) -> float | None:
     return None if row["pdr"] is None else float(row["connected"] - row["pdr"])
 
 
+class _Curve(NamedTuple):
+    """One line of a panel: a quantity of one case over the speeds at which the case was run."""
+
+    quantity: Quantity
+    case: str
+    look: Look
+    panel: str
+    unit: str = ""
+    """Of the quantity; one without a unit is a share."""
+
+    def draw(self, runs: Runs, axes: Axes, *, number: int, of: int) -> list[Mapping[str, Any]]:
+        """Draw it as one of several lines; returns the numbers in it."""
+        speeds = runs.levels(_SPEED, case=self.case)
+        found = [runs.of(self.quantity, case=self.case, **{_AT: speed}) for speed in speeds]
+        places = [beside(speed, number, of, log=False, apart=_APART_M_S) for speed in speeds]
+        line(axes, self.look, places, found, most=math.inf if self.unit else 1.0)
+        return [
+            point(one, panel=self.panel, unit=self.unit, series=self.look.label, speed_m_s=speed)
+            for one, speed in zip(found, speeds, strict=True)
+        ]
+
+
 def draw(runs: Runs) -> Drawing:
     figure, (pdr, delay, rest) = canvas(3)
-    data = []
-    speeds = runs.levels(_SPEED)
-
-    def places(number: int, of: int) -> list[float]:
-        return [beside(speed, number, of, log=False, apart=_APART_M_S) for speed in speeds]
-
-    drawn = ("limit", "aodv", "olsr", "flooding", "ours")
-    for number, case in enumerate(drawn[1:], 1):
-        for axes, column, unit in ((pdr, "leader_pdr", ""), (delay, "leader_delay_s", "s")):
-            found = [runs.of(column, case=case, **{_AT: speed}) for speed in speeds]
-            line(axes, LOOKS[case], places(number, len(drawn)), found, most=math.inf if unit else 1.0)
-            data += [
-                point(one, panel=column, unit=unit, series=case, speed_m_s=speed)
-                for one, speed in zip(found, speeds, strict=True)
-            ]
-    limit = [runs.of("connected", case="aodv", **{_AT: speed}) for speed in speeds]
-    line(pdr, LOOKS["limit"], places(0, len(drawn)), limit, most=1.0)
-    data += [point(one, panel="connected", series="limit", speed_m_s=at) for one, at in zip(limit, speeds, strict=True)]
-    for number, case in enumerate(_NAMES):
-        found = [runs.of("pdr", case=f"{case}, formation", **{_AT: speed}) for speed in speeds]
-        line(rest, LOOKS[case], places(number, len(_NAMES)), found, most=1.0)
-        data += [
-            point(one, panel="pdr, formation", series=case, speed_m_s=at) for one, at in zip(found, speeds, strict=True)
-        ]
+    cases = [case for case in (*_NAMES, "flooding", "ours") if runs.where(case=case)]
+    arrives = [_Curve("leader_pdr", case, LOOKS[case], "delivery ratio") for case in cases]
+    panels = {
+        pdr: [_Curve("connected", "aodv", LOOKS["limit"], "delivery ratio"), *arrives],
+        delay: [_Curve("leader_delay_s", case, LOOKS[case], "mean delay", "s") for case in cases],
+        rest: [_Curve("pdr", f"{case}, formation", LOOKS[case], "delivery ratio, formation") for case in _NAMES],
+    }
+    data = [
+        row
+        for axes, lines in panels.items()
+        for number, one in enumerate(lines)
+        for row in one.draw(runs, axes, number=number, of=len(lines))
+    ]
     for axes, title in (
         (pdr, "(a) random waypoints: what arrives"),
         (delay, "(b) random waypoints: how late"),
@@ -63,7 +77,7 @@ def draw(runs: Runs) -> Drawing:
         axes.set_title(title)
         axes.set_xlabel("speed [m/s]")
         axes.set_ylabel("delivery ratio at the leader" if axes is not delay else "mean delay [s]")
-        ticks_at(axes.xaxis, {speed: f"{speed:g}" for speed in speeds})
+        ticks_at(axes.xaxis, {speed: f"{speed:g}" for speed in runs.levels(_SPEED)})
     for axes in (pdr, rest):
         axes.set_ylim(0, 1.05)
     delay.set_yscale("log")

@@ -45,7 +45,12 @@ _SETTINGS: Final = Rows(
             "waypoints; a rigid formation",
             "relative motion not said",
         ),
-        ("robots", "Gazebo, ROS", "pybullet, or point masses with --quick; Zenoh", ""),
+        (
+            "robots",
+            "Gazebo, ROS",
+            "point masses; pybullet by `fanet sweep fig12`, without a variant",
+            "a quarter of the time",
+        ),
         ("runs per point", "not said", "several seeds, 95 % intervals (Student's t)", ""),
     ),
 )
@@ -185,7 +190,15 @@ def _commands(figures: Sequence[tuple[Path, dict[str, Any]]]) -> list[Block]:
     return [
         Heading("Commands"),
         Commands(lines),
+        Rows(
+            ("figure", "variant", "runs", "seeds", "code"),
+            [
+                (about["name"], about["variant"], str(about["runs"]), str(about["seeds"]), ", ".join(about["code"]))
+                for _, about in figures
+            ],
+        ),
         Text(
+            "The code of a figure is the version and a digest of every source file on which a run depends. "
             "Every row of a sweep's runs.parquet has the command that repeats its run alone. Beside each picture are "
             "the numbers in it (CSV), an SVG, and the verdicts as JSON."
         ),

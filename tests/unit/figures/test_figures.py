@@ -24,6 +24,7 @@ from sim.run.virtual import simulate
 from sim.scenarios import catalog
 from sim.sweep import spec
 from sim.sweep.execution import carry_out
+from sim.sweep.provenance import code
 from sim.sweep.table import table_of
 from sim.sweep.tasks import tasks_of
 
@@ -202,7 +203,7 @@ def test_what_is_said_beyond_the_paper_is_told_apart_from_its_claims(nine, tmp_p
 
 
 def test_a_page_needs_nothing_else_and_has_every_verdict(nine) -> None:
-    _, folder, claims = nine
+    table, folder, claims = nine
     html, markdown = (path.read_text() for path in write([folder], folder))
     assert html.count("data:image/png;base64,") == 1
     assert re.findall(r"(?:src|href)=\"(?!data:)", html) == []
@@ -210,6 +211,7 @@ def test_a_page_needs_nothing_else_and_has_every_verdict(nine) -> None:
         assert claim.claim in markdown
         assert f'<td class="{claim.verdict}">{claim.verdict}</td>' in html
     assert "](figure-9.png)" in markdown
+    assert f"| figure-9 | quick | {table.num_rows} | 2 | {code()} |" in markdown
     with pytest.raises(ConfigError, match="holds neither figures"):
         write([folder / "sweeps"], folder)
 

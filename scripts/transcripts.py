@@ -1,8 +1,8 @@
 """Run the commands of docs/tutorial/*.md and write what they print below them; `--check` compares instead.
 
-A block ```console holds commands behind `$ ` and their output. A block ```python whose first line is `# NAME.py` is a
-file of that name. The commands of a page run one after the other in one empty folder. How long something took is not
-compared; pictures (*.svg) are copied beside the page.
+A block ```console holds commands behind `$ ` and their output. A block ```python or ```toml is a file, whose name is in
+its first line, `# NAME.py`. The commands of a page run one after the other in one empty folder. How long something took
+is not compared, and neither are lines that tell progress; pictures (*.svg) are copied beside the page.
 """
 
 import os
@@ -16,8 +16,11 @@ from pathlib import Path
 
 ROOT = Path(__file__).resolve().parent.parent
 PAGES = ROOT / "docs" / "tutorial"
-BLOCK = re.compile(r"^```(console|python)\n(.*?)^```$", re.MULTILINE | re.DOTALL)
-TIMES = re.compile(r"in \d+(?:\.\d+)? s \(\d+(?:\.\d+)? x real time\)")
+BLOCK = re.compile(r"^```(console|python|toml)\n(.*?)^```$", re.MULTILINE | re.DOTALL)
+TIMES = re.compile(
+    r"in \d+(?:\.\d+)? s \((?:\d+(?:\.\d+)? x real time|\d+ s of CPU)\)|^\w+: \d+ of \d+ runs, about .* left\n",
+    re.MULTILINE,
+)
 
 
 def played(text: str, folder: Path) -> str:
@@ -25,7 +28,7 @@ def played(text: str, folder: Path) -> str:
 
     def play(block: re.Match[str]) -> str:
         kind, body = block.groups()
-        if kind == "python":
+        if kind != "console":
             name, _, _ = body.partition("\n")
             (folder / name.removeprefix("# ").strip()).write_text(body, encoding="utf-8")
             return block[0]

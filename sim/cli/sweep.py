@@ -173,7 +173,7 @@ def _announcement(name: str, wanted: "Sweep", plan: "SweepPlan", workers: int) -
         return f"{text}; nothing to do"
     from sim.sweep.cost import spoken
 
-    return f"{text}; about {spoken(plan.seconds(workers))} with {workers} processes"
+    return f"{text}; about {spoken(plan.seconds(workers))} with {workers} process{'' if workers == 1 else 'es'}"
 
 
 def _warn_of_codes(store: "Store", plan: "SweepPlan") -> None:

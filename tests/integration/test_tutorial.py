@@ -19,3 +19,11 @@ def test_a_page_is_played_and_a_changed_output_is_noticed(tmp_path: Path) -> Non
     page = "```python\n# two.py\nprint(1 + 1)\n```\n\n```console\n$ python two.py\n3\n$ cat two.py | head -1\n```\n"
     now = played(page, tmp_path)
     assert now == page.replace("\n3\n", "\n2\n").replace("head -1\n", "head -1\n# two.py\n")
+
+
+def test_a_block_of_toml_is_a_file_and_how_long_a_sweep_took_is_not_compared(tmp_path: Path) -> None:
+    script = runpy.run_path(str(ROOT / "scripts" / "transcripts.py"))
+    page = "```toml\n# some.toml\na = 1\n```\n\n```console\n$ cat some.toml\n```\n"
+    assert script["played"](page, tmp_path).endswith("```console\n$ cat some.toml\n# some.toml\na = 1\n```\n")
+    said = "relays: 15 of 40 runs, about 24 s left\n40 rows, 40 of them new, in 42 s (10 s of CPU)\n"
+    assert script["TIMES"].sub("", said) == "40 rows, 40 of them new, \n"

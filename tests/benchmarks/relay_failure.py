@@ -11,7 +11,7 @@ from collections import Counter
 
 from agents.applications.traffic import sources_of
 from fanet_mw.planner.timetable_plan import table_for
-from fanet_mw.routing.clustered.timetable.timetable import Timetable
+from fanet_mw.routing.clustered.timetable.turn_plan import Fitted
 from fanet_mw.scenario import Scenario
 from fanet_mw.scenario.config import build
 from fanet_mw.trace import Delivered, Generated
@@ -26,9 +26,9 @@ KILLED_S = 20
 def most_used(scenario: Scenario) -> list[NodeId]:
     """Relays by how many floods they pass on, most first; the leader has a lease of its own."""
     at = tuple((NodeId(n), place) for n, place in zip(scenario.node_ids, positions(scenario), strict=True))
-    table = table_for(scenario, at, dict.fromkeys((node for node, _ in at), 1))
-    assert isinstance(table, Timetable)
-    used = Counter(turn.node for turn in table.turns if turn.node not in (turn.root, scenario.leader))
+    fitted = table_for(scenario, at, dict.fromkeys((node for node, _ in at), NodeId(1)))
+    assert isinstance(fitted, Fitted)
+    used = Counter(turn.node for turn in fitted.table.turns if turn.node not in (turn.root, scenario.leader))
     return [node for node, _ in sorted(used.items(), key=lambda item: (-item[1], item[0]))]
 
 

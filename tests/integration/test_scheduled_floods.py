@@ -26,6 +26,14 @@ def test_on_the_grid_every_packet_reaches_everyone_within_the_bound(period_s: fl
     assert summary["frames"]["closes"]
 
 
+def test_a_swarm_that_was_silent_for_a_minute_has_lost_nobody() -> None:
+    """All 45 nodes must tell at once that they live; in seed 2 the first words of three of them got lost."""
+    summary = summary_of("duration_s=54", "warmup_s=50", "seed=2")
+    assert summary["pdr"] >= 0.999
+    assert summary["bound"]["within_share"] >= 0.999
+    assert summary["bound"]["violations"] == 0
+
+
 def test_with_interference_beyond_the_range_too() -> None:
     summary = summary_of("clusters.flooding_period_s=1", "radio.channel=log_distance")
     assert summary["pdr"] >= 0.99

@@ -83,8 +83,10 @@ class Access(Protocol):
     def forward(self, packet: Packet, *, start_ns: int, now_ns: int, tries: int = 0) -> None:
         """Let a packet out here, or bring it one step nearer to a node that will; `tries` were made here before."""
 
-    def flood_control(self, kind: Kind, inner: bytes, *, now_ns: int, urgent: bool = False) -> Packet:
-        """Tell everyone; `urgent`: before data, where there are turns for it."""
+    def flood_control(
+        self, kind: Kind, inner: bytes, *, now_ns: int, urgent: bool = False, patient: bool = False
+    ) -> Packet:
+        """Tell everyone, where there are turns: `urgent`, in one of them; `patient`, in one that nothing else needs."""
 
     def answer(self, packet: Packet, *, now_ns: int) -> None:
         """Send what a neighbor lacks."""

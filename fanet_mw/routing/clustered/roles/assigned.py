@@ -217,7 +217,8 @@ class AssignedRoles:
         """Tell everyone where the node is, and the leader that it wants a place if it has none."""
         again = not self.parts.failover.placed and self._leader is None
         inner = self.parts.joining.join(instead_of=instead_of, again=again, now_ns=now_ns)
-        self._access.flood_control(Kind.JOIN, inner, now_ns=now_ns, urgent=instead_of == self._port.node)
+        urgent, patient = instead_of == self._port.node, not instead_of and not again
+        self._access.flood_control(Kind.JOIN, inner, now_ns=now_ns, urgent=urgent, patient=patient)
 
     def _announce(self, part: Schedule, leader: Leader, *, now_ns: int) -> None:
         """Flood a part of the leader's assignment, which holds for the leader as well."""

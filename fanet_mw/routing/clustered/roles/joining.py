@@ -11,7 +11,7 @@ from typing import Final
 
 from fanet_mw.motion import Motion
 from fanet_mw.node.contract import Port
-from fanet_mw.routing.clustered.roles.position_updates import PositionUpdates
+from fanet_mw.routing.clustered.roles.position_updates import UPDATE_NS, PositionUpdates
 from fanet_mw.routing.clustered.timetable.link_quality import LinkQuality
 from fanet_mw.units import MS, S
 from fanet_mw.wire.inner import Join
@@ -21,8 +21,6 @@ _FIRST_NS: Final = 500 * MS
 _WINDOW_NS: Final = 3 * S
 """Joins are floods: spread, so that a swarm that starts together does not drown in them."""
 _REJOIN_NS: Final = 2 * S
-_UPDATE_NS: Final = 100 * MS
-"""Joins that only tell a new position are spread over this much per node: ten floods a second when all turn at once."""
 
 
 class Joining:
@@ -73,7 +71,7 @@ class Joining:
             self._updates.outdated(self._port.position, now_ns=now_ns)
             or (self._links is not None and self._must_tell(self._links, now_ns))
         ):
-            self.due_ns = now_ns + int(self._random() * _UPDATE_NS * (1 + listed))
+            self.due_ns = now_ns + int(self._random() * UPDATE_NS * (1 + listed))
 
     def _must_tell(self, links: LinkQuality, now_ns: int) -> bool:
         """True if the leader lacks the links of this node, or has others than those of now."""

@@ -17,6 +17,7 @@ from fanet_mw.routing.clustered.clustering import Cluster, Swarm, succession
 from fanet_mw.routing.clustered.clustering.division import Division, drift
 from fanet_mw.routing.clustered.roles.lease import Authority
 from fanet_mw.routing.clustered.roles.liveness import Liveness
+from fanet_mw.routing.clustered.roles.position_updates import lost_ns
 from fanet_mw.routing.clustered.roles.roster import Roster, sure_m
 from fanet_mw.routing.clustered.timetable.link_state import LinkState, adjacency, worth_a_change
 from fanet_mw.routing.clustered.timetable.turn_plan import measured_period_ns
@@ -84,6 +85,7 @@ class Leader:
         self._by_links = needs_every_link
         self._roster = Roster(
             liveness,
+            lost_ns=lost_ns(scenario),
             objection_ns=max(OBJECTION_NS, _OBJECTION_PERIODS * clusters.period_ns if needs_every_link else 0),
             sure_m=sure_m(self._range_m) if needs_every_link else None,
         )

@@ -8,15 +8,30 @@ so long that the leader might take it for dead. So a swarm that flies straight, 
 from typing import Final
 
 from fanet_mw.motion import Motion
-from fanet_mw.units import Enu, S
+from fanet_mw.scenario import Scenario
+from fanet_mw.units import MS, Enu, S, seconds_to_ns
 
 _SHARE: Final = 0.1
 """The share of the radio range by which dead reckoning may err."""
 _LEAST_NS: Final = 5 * S
 """The least time between two updates, because each is a flood."""
 _QUIET_NS: Final = 20 * S
-LOST_NS: Final = 45 * S
-"""The time without a sign of life after which the leader forgets a node: two updates and a little."""
+UPDATE_NS: Final = 100 * MS
+"""Updates are spread over this much per node: ten floods a second when all must be made at once."""
+_HELLO_VARIES: Final = 1.1
+"""An update is due with a hello, and hellos vary by a tenth of their interval."""
+_A_LITTLE_NS: Final = 2 * S
+
+
+def lost_ns(scenario: Scenario) -> int:
+    """The time without a sign of life after which the leader forgets a node: two updates and a little.
+
+    An update waits for 20 s without a flood, the next hello, its part of the spread, and a turn of the node.
+    """
+    routing, clusters = scenario.routing, scenario.clusters
+    hello_ns = round(_HELLO_VARIES * seconds_to_ns(routing.hello_interval_s))
+    update_ns = _QUIET_NS + hello_ns + UPDATE_NS * (1 + scenario.nodes.count) + clusters.period_ns
+    return 2 * update_ns + _A_LITTLE_NS
 
 
 class PositionUpdates:

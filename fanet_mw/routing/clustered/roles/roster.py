@@ -1,6 +1,6 @@
 """What the leader knows of the nodes of its swarm: where they fly by their joins, and which are said to be silent.
 
-    join -> known, until it gives no sign of life for `LOST_NS`
+    join -> known, until it gives no sign of life for so long that two updates of its position have been lost
     a report that a node is silent -> some time to object -> no longer known
 
 A node has objected when it has generated something since it was said to be silent.
@@ -11,7 +11,6 @@ from typing import Final, NamedTuple
 
 from fanet_mw.motion import Motion
 from fanet_mw.routing.clustered.roles.liveness import Liveness
-from fanet_mw.routing.clustered.roles.position_updates import LOST_NS
 from fanet_mw.units import Enu, NodeId, S
 
 _MISSED_NS: Final = 4 * S
@@ -33,11 +32,14 @@ class _Report(NamedTuple):
 class Roster:
     """The nodes that one leader knows, itself not among them."""
 
-    def __init__(self, liveness: Liveness, *, objection_ns: int, sure_m: float | None) -> None:
-        """`objection_ns`: how long a node may object. `sure_m`: a report counts only of a node that was so near to its
-        sender all the time that the two should have heard each other; None: wherever they were.
+    def __init__(self, liveness: Liveness, *, lost_ns: int, objection_ns: int, sure_m: float | None) -> None:
+        """A node is forgotten `lost_ns` after its last sign of life; reported silent it may object for `objection_ns`.
+
+        `sure_m`: a report counts only of a node that was so near to its sender all the time that the two should have
+        heard each other; None: wherever they were.
         """
         self._liveness = liveness
+        self._lost_ns = lost_ns
         self._objection_ns = objection_ns
         self._sure_m = sure_m
         self._motions: dict[NodeId, Motion] = {}
@@ -92,7 +94,9 @@ class Roster:
             if report is not None and last_ns > report.reported_ns:
                 del self._reports[node]  # the node has objected
                 report = None
-            if now_ns - last_ns > LOST_NS or (report is not None and now_ns >= report.since_ns + self._objection_ns):
+            if now_ns - last_ns > self._lost_ns or (
+                report is not None and now_ns >= report.since_ns + self._objection_ns
+            ):
                 del self._motions[node]
 
     def forget_reports(self) -> None:

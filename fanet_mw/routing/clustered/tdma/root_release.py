@@ -8,7 +8,7 @@ not on warnings. A turn is used only if its flood is over before the next timeta
 """
 
 from collections.abc import Iterator, Mapping, Sequence
-from typing import NamedTuple
+from typing import Final, NamedTuple
 
 from fanet_mw.node.packet import Packet
 from fanet_mw.node.queue import TxQueue
@@ -16,6 +16,9 @@ from fanet_mw.routing.clustered.tdma.turn_release import OwnTurn, TurnRelease
 from fanet_mw.routing.clustered.tdma.turns import Turns
 from fanet_mw.units import NodeId
 from fanet_mw.wire import PRIORITY_BULK, PRIORITY_CONTROL, Kind
+
+_LAST: Final = PRIORITY_BULK + 1
+"""The rank of what goes only where every class leaves room."""
 
 
 class TurnsInForce(NamedTuple):
@@ -50,8 +53,9 @@ class RootRelease(TurnRelease):
         """True if a turn of this node lies ahead under any timetable that is known."""
         return self._turn(max(now_ns + self._lead_ns, self._free_ns)) is not None
 
-    def push(self, packet: Packet, *, now_ns: int) -> Packet | None:
-        return self._push(packet, self._rank(packet), now_ns)
+    def push(self, packet: Packet, *, now_ns: int, last: bool = False) -> Packet | None:
+        """Queue a packet, `last` of all; returns the one evicted for it."""
+        return self._push(packet, _LAST if last else self._rank(packet), now_ns)
 
     def outdated(self, *, before_us: int) -> list[Packet]:
         """Take out the node's announcements that were made before an instant [swarm us] and still wait."""

@@ -58,7 +58,9 @@ class SlotAccess:
         if evicted is not None:
             self._port.drop(DropReason.QUEUE_FULL, evicted, now_ns=now_ns)
 
-    def flood_control(self, kind: Kind, inner: bytes, *, now_ns: int, urgent: bool = False) -> Packet:
+    def flood_control(
+        self, kind: Kind, inner: bytes, *, now_ns: int, urgent: bool = False, patient: bool = False
+    ) -> Packet:
         return self._floods.contend_control(kind, inner, now_ns=now_ns)
 
     def answer(self, packet: Packet, *, now_ns: int) -> None:

@@ -131,7 +131,8 @@ class TurnAccess:
             start_ns = self._contention.not_before(start_ns)
             self._slots.forward(packet, start_ns=start_ns, now_ns=now_ns, tries=tries)
 
-    def _let_out(self, packet: Packet, *, now_ns: int) -> None:
+    def _let_out(self, packet: Packet, *, last: bool = False, now_ns: int) -> None:
+        """Queue a packet for the turns of this node; `last`: behind everything that waits or is still to come."""
         newest = self._plans.newest
         assert newest is not None, "a node without a timetable has no turn"
         size = newest.frame_bytes
@@ -139,20 +140,24 @@ class TurnAccess:
         if len(packet.frame) > (room if packet.header.kind == Kind.DATA else size):
             self._port.drop(DropReason.TOO_LARGE, packet, now_ns=now_ns)
             return
-        evicted = self._roots.push(packet, now_ns=now_ns)
+        evicted = self._roots.push(packet, last=last, now_ns=now_ns)
         if evicted is not None:
             self._port.drop(DropReason.QUEUE_FULL, evicted, now_ns=now_ns)
 
-    def flood_control(self, kind: Kind, inner: bytes, *, now_ns: int, urgent: bool = False) -> Packet:
+    def flood_control(
+        self, kind: Kind, inner: bytes, *, now_ns: int, urgent: bool = False, patient: bool = False
+    ) -> Packet:
         plan = self._plans.at(now_ns + self._lead_ns)
-        if plan is None or not plan.roots or (kind is Kind.JOIN and not urgent and plan.odds is None):
-            # Turns are for what the bound is about; a join may contend, and need not where there is no bound. An
-            # announcement does not wait for turns that are still to come into force.
+        bound = plan is not None and plan.odds is None
+        last = kind is Kind.JOIN and not urgent and bound
+        if plan is None or not plan.roots or (last and (not patient or len(self._roots))):
+            # Turns are for what the bound is about: a join has those that nothing else needs, if it can wait for one,
+            # and any where there is no bound. An announcement does not wait for turns that are still to come.
             return self._floods.contend_control(kind, inner, now_ns=now_ns)
         packet = self._floods.control(kind, inner, now_ns=now_ns)
-        for stale in self._roots.outdated(before_us=packet.header.origin_us):
+        for stale in self._roots.outdated(before_us=packet.header.origin_us) if kind is not Kind.JOIN else ():
             self._port.drop(DropReason.EXPIRED, stale, now_ns=now_ns)
-        self._let_out(packet, now_ns=now_ns)
+        self._let_out(packet, last=last, now_ns=now_ns)
         return packet
 
     def answer(self, packet: Packet, *, now_ns: int) -> None:

@@ -121,6 +121,37 @@ def test_a_packet_that_waits_for_its_turn_answers_nobody(node: Node) -> None:
     assert len(node.requests) == 2
 
 
+def test_a_join_that_can_wait_goes_in_a_turn_that_nothing_else_needs(node: Node) -> None:
+    access = access_of(node)
+    access.use_turns(1050 * MS)
+    access.flood_control(Kind.JOIN, filler(40), patient=True, now_ns=1050 * MS)
+    assert node.requests == [], "it does not contend"
+    access.wake(1062 * MS)
+    assert [(r.start_ns / MS, wire.decode_header(r.frame).kind) for r in node.requests] == [(1064, Kind.JOIN)]
+
+
+def test_data_that_comes_later_goes_before_a_join_that_can_wait(node: Node) -> None:
+    access = access_of(node)
+    access.use_turns(1050 * MS)
+    access.flood_control(Kind.JOIN, filler(40), patient=True, now_ns=1050 * MS)
+    node.send(filler(920), destination=BROADCAST, priority=PRIORITY_BULK, app="test", born_ns=1051 * MS, now_ns=0)
+    access.wake(1062 * MS)
+    access.wake(1162 * MS)
+    said = [(r.start_ns / MS, wire.decode_header(r.frame).kind) for r in node.requests]
+    assert said == [(1064, Kind.DATA), (1164, Kind.JOIN)]
+
+
+@pytest.mark.parametrize("patient", [True, False])
+def test_a_join_contends_where_data_waits_or_when_it_must_not_wait(node: Node, *, patient: bool) -> None:
+    access = access_of(node)
+    access.use_turns(1050 * MS)
+    if patient:
+        node.send(filler(40), destination=BROADCAST, priority=PRIORITY_BULK, app="test", born_ns=1050 * MS, now_ns=0)
+    access.flood_control(Kind.JOIN, filler(40), patient=patient, now_ns=1050 * MS)
+    (request,) = node.requests
+    assert TURNS.turn_at(request.start_ns) is None
+
+
 @pytest.mark.parametrize(("told_ns", "is_relayed"), [(5 * MS, True), (5 * MS + 1, False), (30 * MS, False)])
 def test_a_turn_that_has_begun_is_missed_counted_and_not_relayed_late(
     node: Node, told_ns: int, is_relayed: bool

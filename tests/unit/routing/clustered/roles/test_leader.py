@@ -8,7 +8,7 @@ from fanet_mw.motion import Motion
 from fanet_mw.routing.clustered.roles.leader import OBJECTION_NS, SETTLE_NS, Leader
 from fanet_mw.routing.clustered.roles.lease import Authority
 from fanet_mw.routing.clustered.roles.liveness import Liveness
-from fanet_mw.routing.clustered.roles.position_updates import LOST_NS
+from fanet_mw.routing.clustered.roles.position_updates import lost_ns
 from fanet_mw.scenario import Scenario
 from fanet_mw.units import MS, Enu, NodeId, S
 from fanet_mw.wire.inner import Join, Schedule
@@ -85,8 +85,8 @@ def test_a_node_without_a_sign_for_long_is_forgotten(scenario: Scenario) -> None
     desk.join(2, 100, born_ns=1 * S)
     desk.join(3, 200, born_ns=1 * S)
     desk.liveness.on_sign_of_life(3, born_ns=40 * S)
-    assert desk.announced_at(1 * S + LOST_NS) == {2, 3}
-    assert desk.announced_at(4 * S + LOST_NS) == {3}
+    assert desk.announced_at(1 * S + lost_ns(scenario)) == {2, 3}
+    assert desk.announced_at(4 * S + lost_ns(scenario)) == {3}
 
 
 @pytest.mark.parametrize("objects", [True, False])

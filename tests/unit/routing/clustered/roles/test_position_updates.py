@@ -3,8 +3,12 @@
 import pytest
 
 from fanet_mw.motion import Motion
-from fanet_mw.routing.clustered.roles.position_updates import PositionUpdates
-from fanet_mw.units import Enu, S
+from fanet_mw.node.node import Node
+from fanet_mw.routing import make_protocol
+from fanet_mw.routing.clustered.roles.joining import Joining
+from fanet_mw.routing.clustered.roles.position_updates import PositionUpdates, lost_ns
+from fanet_mw.units import MS, Enu, NodeId, S
+from tests.conftest import MakeScenario
 
 HERE, STILL = Enu(0.0, 0.0, 50.0), Enu(0.0, 0.0, 0.0)
 
@@ -24,6 +28,25 @@ def test_who_flies_on_straight_as_it_told_need_not_tell() -> None:
 @pytest.mark.parametrize(("east_m", "tells"), [(24.9, False), (25.1, True)])
 def test_who_is_a_tenth_of_the_range_off_tells(east_m: float, tells: bool) -> None:
     assert told().outdated(Enu(east_m, 0.0, 50.0), now_ns=10 * S) == tells
+
+
+@pytest.mark.parametrize("count", [5, 45, 200])
+def test_an_idle_node_has_told_twice_before_it_is_forgotten_however_large_the_swarm(
+    make_scenario: MakeScenario, count: int
+) -> None:
+    """Its hellos are as rare, and its joins as late, as they can be; the first of the two may be lost."""
+    scenario = make_scenario(**{"nodes.count": count})
+    port = Node(NodeId(2), scenario, make_protocol, position=HERE).port
+    joining = Joining(port, PositionUpdates(range_m=250.0), None, lambda: 0.999)
+    joining.join(instead_of=0, again=False, now_ns=0)
+    told = []
+    for hello in range(1, 400):
+        hello_ns = hello * 1100 * MS
+        if joining.due_ns is not None and joining.due_ns <= hello_ns:
+            told.append(joining.due_ns)
+            joining.join(instead_of=0, again=False, now_ns=joining.due_ns)
+        joining.update_if_outdated(listed=count, now_ns=hello_ns)
+    assert told[1] + scenario.clusters.period_ns < lost_ns(scenario) < told[2]
 
 
 def test_two_tellings_are_some_seconds_apart() -> None:

@@ -3,14 +3,16 @@ changes.
 """
 
 import math
-from collections.abc import Callable
-from typing import Final
+from collections.abc import Callable, Mapping, Sequence
+from typing import Any, Final
+
+from matplotlib.axes import Axes
 
 from sim.figures.claims import Claim, Reason, above, below
 from sim.figures.recipe import Drawing, Recipe, point
 from sim.figures.runs import Quantity, Row, Runs, differences
 from sim.figures.statistics import interval
-from sim.figures.style import LOOKS, band, canvas, legend_above, plain_log
+from sim.figures.style import LOOKS, Look, band, canvas, legend_above, plain_log
 
 _CASES: Final = ("flooding", "paper", "ours")
 _INTERVAL: Final = "mission.report_interval_s"
@@ -28,6 +30,8 @@ _SECONDS_S: Final = 5.0
 _FREE: Final = 0.5
 _SINCE_S: Final = tuple(math.pow(10.0, step / 10) for step in range(-30, 19))
 """The edges of the classes of time, from a millisecond to more than a minute."""
+_STEP_S: Final = 0.5
+"""The distance of instants at which turned UAVs are counted for the mean."""
 
 
 def _times(row: Row) -> list[float]:
@@ -72,36 +76,42 @@ def _after(limit_s: float) -> Callable[[Row], float]:
     return lambda row: _by((row["enough_heard_s"] or 0.0) + limit_s)(row)
 
 
+def _draw_since_start(axes: Axes, look: Look, rows: Sequence[Row]) -> list[Mapping[str, Any]]:
+    """The number of UAVs that have turned by each instant: the mean as a line, each seed as a thin one."""
+    longest_s = max(row["duration_s"] for row in rows)
+    for row in rows:
+        times = sorted(_times(row))
+        axes.step(
+            [0.0, *times, longest_s], [0, *range(1, len(times) + 1), len(times)], where="post",
+            color=look.color, linestyle=look.dash, linewidth=0.7, alpha=0.45,
+        )  # fmt: skip
+    instants = [step * _STEP_S for step in range(round(longest_s / _STEP_S) + 1)]
+    counts = [interval([_by(at)(row) for row in rows]) for at in instants]
+    axes.plot(instants, [one.mean for one in counts], color=look.color, linestyle=look.dash, linewidth=1.8)
+    return [point(one, since_start_s=at) for one, at in zip(counts, instants, strict=True)]
+
+
+def _draw_since_heard(axes: Axes, look: Look, rows: Sequence[Row]) -> list[Mapping[str, Any]]:
+    """The same over the time since enough UAVs had heard the same phone, with the interval of the mean as a band."""
+    counts = [interval([_after(at)(row) for row in rows]) for at in _SINCE_S]
+    axes.plot(_SINCE_S, [one.mean for one in counts], color=look.color, linestyle=look.dash, label=look.label)
+    band(axes, look, _SINCE_S, counts, most=rows[0]["nodes"])
+    return [point(one, since_heard_s=at) for one, at in zip(counts, _SINCE_S, strict=True)]
+
+
 def draw(runs: Runs) -> Drawing:
     intervals = list(reversed(runs.levels(_INTERVAL)))
     figure, panels = canvas(len(intervals), 2, share_y=True, width=3.6, height=2.9)
     since_start, since_heard = panels[: len(intervals)], panels[len(intervals) :]
     data = []
-    longest_s = max(row["duration_s"] for row in runs.rows)
     for upper, lower, letter, interval_s in zip(since_start, since_heard, "abc", intervals, strict=False):
         for case in _CASES:
-            rows, look = runs.where(case=case, **{_AT: interval_s}), LOOKS[case]
-            if not rows:
-                continue
-            for row in rows:
-                times = sorted(_times(row))
-                upper.step(
-                    [0.0, *times, longest_s], [0, *range(1, len(times) + 1), len(times)], where="post",
-                    color=look.color, linestyle=look.dash, linewidth=1.1,
-                )  # fmt: skip
-                data += [
-                    {"app_2_interval_s": interval_s, "series": case, "seed": row["seed"], "turned_s": at}
-                    for at in times
-                ]
-            counts = [interval([_after(at)(row) for row in rows]) for at in _SINCE_S]
-            lower.plot(_SINCE_S, [one.mean for one in counts], color=look.color, linestyle=look.dash, label=look.label)
-            band(lower, look, _SINCE_S, counts, most=runs.rows[0]["nodes"])
-            data += [
-                point(one, app_2_interval_s=interval_s, series=case, since_heard_s=at)
-                for one, at in zip(counts, _SINCE_S, strict=True)
-            ]
+            rows = runs.where(case=case, **{_AT: interval_s})
+            if rows:
+                drawn = [*_draw_since_start(upper, LOOKS[case], rows), *_draw_since_heard(lower, LOOKS[case], rows)]
+                data += [{"app_2_interval_s": interval_s, "series": case, **row} for row in drawn]
         upper.set_title(f"({letter}) app_2 every {interval_s:g} s")
-        upper.set_xlabel("time since the start [s]; a line is a seed")
+        upper.set_xlabel("time since the start [s]")
         lower.set_xlabel("time since three had heard a phone [s]")
         lower.set_xscale("log")
         plain_log(lower.xaxis)
@@ -228,8 +238,8 @@ FIGURE: Final = Recipe(
     "fig12",
     "45 UAVs fly in from a base over 16 survivors; everyone sends app_1 (1024 B every 1 s) to everyone, and whoever "
     "hears a phone reports it as app_2 (512 B every 1, 0.5 or 0.1 s); the paper's method floods every 5 s. Above: "
-    "when each UAV turned. Below: the same since three UAVs had heard the same phone, before which nobody can turn; "
-    "bands: 95 % of the mean.",
+    "UAVs that have turned by then, the mean, and thin each seed. Below: the same since three UAVs had heard the same "
+    "phone, before which nobody can turn; bands: 95 % of the mean.",
     draw,
     claims,
 )

@@ -210,6 +210,9 @@ class _Port:
     def velocity(self) -> Enu:
         return self._onboard.vehicle()[1]
 
+    def clusters(self) -> Mapping[NodeId, tuple[NodeId, ...]]:
+        return self._onboard.node.clusters()
+
     def send(
         self,
         content: object,

@@ -13,6 +13,7 @@ from agents.applications.telemetry import Telemetry
 from agents.applications.traffic import Load
 from agents.hello_schedule import HelloSchedule, HelloTime
 from agents.mission.applications import PlannedSearch, Rescue
+from agents.mission.following.application import FormationFlight
 from agents.mission.navigation.onboard_map import NO_MAP, OnboardMap
 from agents.onboard import INNER_ID, Onboard
 from agents.positioning.dead_reckoning import DeadReckoning
@@ -241,16 +242,18 @@ def _asked_for(
     scenario: Scenario, node: NodeId, autopilot: Autopilot, position: Enu, onboard_map: OnboardMap
 ) -> Sequence[Application]:
     """The applications that a scenario asks for, in the order in which they have their turn."""
-    searches = scenario.mission.search != "none"
+    mission = scenario.mission
     applications: list[Application]
     loads = [Load(scenario, node, name) for name in scenario.traffic_classes]
     rescue = (
         PlannedSearch(scenario, node, position=position, onboard_map=onboard_map)
-        if searches
+        if mission.search != "none"
         else Rescue(scenario, node)
     )
     applications = [Telemetry(autopilot), *loads, rescue]
-    if scenario.mission.collision_horizon_s:
+    if mission.formation != "none":
+        applications.append(FormationFlight(scenario, node, position=position, onboard_map=onboard_map))
+    if mission.collision_horizon_s:
         applications.append(CollisionAvoidance(scenario, node))
     return applications
 

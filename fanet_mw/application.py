@@ -146,6 +146,11 @@ class AppPort(Protocol):
     def velocity(self) -> Enu:
         """The velocity of the last fix [m/s]."""
 
+    def clusters(self) -> Mapping[NodeId, tuple[NodeId, ...]]:
+        """The nodes of each cluster as far as this node knows, by head, which is the first of them; empty where the
+        routing protocol makes no clusters.
+        """
+
     def send(
         self,
         content: object,

@@ -22,6 +22,7 @@ from fanet_mw.wire import COMPONENT, Packed, frames, inner_frames, system_id
 common.mavlink_map.update(fanet.mavlink_map)  # one parser for both dialects
 
 COLLISION_ID: Final = int(common.MAVLINK_MSG_ID_COLLISION)
+GLOBAL_POSITION_ID: Final = int(common.MAVLINK_MSG_ID_GLOBAL_POSITION_INT)
 AUTOPILOT_COMPONENT: Final = 1
 """MAV_COMP_ID_AUTOPILOT1, the sender of telemetry: ground stations take no other component for a vehicle."""
 

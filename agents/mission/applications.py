@@ -5,12 +5,13 @@ Each hands what its UAV senses and is told to the mission, and empties the missi
 
 from typing import Final
 
+from agents.mission.courses import course_at
 from agents.mission.navigation.onboard_map import NO_MAP, OnboardMap
 from agents.mission.outbox import Outbox
 from agents.mission.paper_rule import PaperRule
 from agents.mission.searcher import Searcher
 from fanet_mw import mavlink
-from fanet_mw.application import Application, AppPort, Course, Received
+from fanet_mw.application import Application, AppPort, Received
 from fanet_mw.bus.messages import Altimeter, Battery, Camera, Gps, Radar, SensorReading, Voice, WifiScan
 from fanet_mw.errors import MalformedFrameError
 from fanet_mw.motion import Motion
@@ -23,9 +24,6 @@ from fanet_mw.wire.search import Found, Search, SearchStatus, Standing, Told, to
 
 _FUTURE_NS: Final = S
 """A position of an instant further ahead is not believed: clocks agree better than that."""
-_AHEAD_S: Final = 10.0
-"""A course leads to a point this far ahead: the farther that is, the less the error of a fix turns the course."""
-_LEAST_M_S: Final = 0.05
 
 
 class Rescue(Application):
@@ -139,19 +137,8 @@ class PlannedSearch(Application):
         """Bring what the searcher put out to where it goes."""
         velocity = self._searcher.take_velocity()
         if velocity is not None:
-            self._outbox.course = _course(self.port.position, velocity)
+            self._outbox.course = course_at(self.port.position, velocity)
         self._outbox.empty(self.port)
-
-
-def _course(here: Enu, velocity: Enu) -> Course:
-    """The course that flies on at a velocity: its point lies far ahead."""
-    speed = velocity.norm()
-    if speed < _LEAST_M_S:
-        return Course(here, _LEAST_M_S)
-    ahead = Enu(
-        here.east + velocity.east * _AHEAD_S, here.north + velocity.north * _AHEAD_S, here.up + velocity.up * _AHEAD_S
-    )
-    return Course(ahead, speed, velocity)
 
 
 def _speaker(told: Told) -> int | None:

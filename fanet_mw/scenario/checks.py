@@ -23,9 +23,11 @@ GLOBAL_POSITION_INT, with which every hello begins. The air format itself is not
 scenarios too, and to it frames are bytes."""
 _SCHEDULE_PLACES: Final = 2
 """FANET_PLACES that go with one full FANET_SCHEDULE."""
-_TAKEN: Final = frozenset(("report", "warning", "telemetry", "receipt", "joined"))
+_TAKEN: Final = frozenset(("report", "warning", "telemetry", "receipt", "joined", "formation"))
 """What other applications are called in a trace."""
 _RIVALS: Final = ("aodv", "olsr", "dsdv", "geographic")
+_MOST_CLUSTERS_ABREAST: Final = 7
+"""A circle around one head has room for six others that are no nearer to each other than to it."""
 _LINKS: Final = 36
 """Links of one FANET_LINKS."""
 _MOST_LINKS_MESSAGES: Final = 4
@@ -55,6 +57,7 @@ def disagreements(scenario: Scenario) -> Sequence[str]:
     found += _too_small_frames(scenario)
     found += _unkept_deadline(scenario)
     found += _blind_warnings(scenario)
+    found += _impossible_formation(scenario)
     found += _impossible_faults(scenario)
     found += [
         f"applications.{index}.nodes names node {node}, which must be <= nodes.count = {count}"
@@ -127,6 +130,22 @@ def _too_small_frames(scenario: Scenario) -> Iterator[str]:
         whole = size["FANET_ROUTE"] + inner
         if whole > most:
             yield f"radio.max_frame_bytes = {most} must be >= {whole} for {what}"
+
+
+def _impossible_formation(scenario: Scenario) -> Iterator[str]:
+    """What formation flight by clusters needs."""
+    mission = scenario.mission
+    if mission.formation == "none":
+        return
+    wanted = f"mission.formation = {mission.formation!r} needs"
+    if scenario.mobility.model != "onboard":
+        yield f'{wanted} mobility.model = "onboard", not {scenario.mobility.model!r}'
+    if mission.search != "none":
+        yield f'{wanted} mission.search = "none", not {mission.search!r}'
+    if scenario.routing.protocol != "clustered" or scenario.clusters.relay == "claimed":
+        yield f'{wanted} routing.protocol = "clustered", and a clusters.relay that makes clusters'
+    if scenario.clusters.count > _MOST_CLUSTERS_ABREAST:
+        yield f"{wanted} clusters.count = {scenario.clusters.count} <= {_MOST_CLUSTERS_ABREAST}"
 
 
 def _wrong_for_rivals(scenario: Scenario) -> Sequence[str]:

@@ -369,6 +369,15 @@ class Mission(Section):
     about the middle, or a single one winds outward; any number of UAVs will do. `sectors`: a team abreast for each of
     `clusters.count` sectors, not held together. `none`: the paper's rule, by which every UAV goes that has heard enough
     reports."""
+    formation: Literal["none", "clusters"] = "none"
+    """`clusters`: the members of each cluster fly on a circle around their head, evenly apart, other heads on one
+    around the leader, and the leader, the head with the lowest id, flies `route_m` once `warmup_s` is over; each UAV
+    decides by received positions alone. Needs `mobility.model = "onboard"`, `search = "none"`, at most 7 clusters."""
+    formation_m: Annotated[float, Field(ge=20, le=10_000)] = 200.0
+    """`formation`: the radius of the circle around a head; heads fly 2.2 times as far from the leader."""
+    route_m: tuple[tuple[Coordinate, Coordinate], ...] = ()
+    """`formation`: east and north of the points through which the leader flies at `mobility.speed_m_s`; empty: it
+    stays where it is."""
     coverage_map: bool = False
     """`search`: whether UAVs tell their neighbors every 4 s which cells of the area have been searched, so that those
     who are free search at once what a lost UAV, or one that responds, has left out; 143 B more in such a hello."""

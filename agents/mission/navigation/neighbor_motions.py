@@ -26,4 +26,8 @@ class NeighborMotions:
 
     def all(self, *, now_ns: int) -> list[Motion]:
         """The motions of the neighbors that were heard lately, in order of id."""
-        return [motion for _, motion in sorted(self._motions.items()) if now_ns - motion.at_ns <= _HEARD_FOR_NS]
+        return [motion for _, motion in self.by_node(now_ns=now_ns)]
+
+    def by_node(self, *, now_ns: int) -> list[tuple[int, Motion]]:
+        """The neighbors that were heard lately, and their motions."""
+        return [item for item in sorted(self._motions.items()) if now_ns - item[1].at_ns <= _HEARD_FOR_NS]

@@ -118,3 +118,15 @@ def test_an_area_that_no_plan_can_name_enough_uavs_for_is_refused_and_a_spiral_s
         with pytest.raises(ConfigError, match=r"needs more than 79 UAVs .* a plan names at most 79"):
             catalog.find("rescue", [*wide, f"mission.search={search}"])
     assert catalog.find("rescue", [*wide, "mission.search=spiral"]).mission.search == "spiral"
+
+
+def test_formation_flight_needs_clusters_and_uavs_that_fly_themselves() -> None:
+    for override, wanted in (
+        ("mobility.model=static", 'needs mobility.model = "onboard"'),
+        ("mission.search=lines", 'needs mission.search = "none"'),
+        ("routing.protocol=flooding", 'needs routing.protocol = "clustered"'),
+        ("clusters.relay=claimed", "a clusters.relay that makes clusters"),
+        ("clusters.count=8", "needs clusters.count = 8 <= 7"),
+    ):
+        with pytest.raises(ConfigError, match=wanted):
+            catalog.find("convoy", [override])

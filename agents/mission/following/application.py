@@ -1,0 +1,114 @@
+"""Formation flight by clusters as an application: it takes in received positions, and flies the UAV to its place."""
+
+from typing import Final
+
+from agents.mission.courses import course_at
+from agents.mission.flight.approach_speed import approach_speed_m_s
+from agents.mission.flight.velocity_choice import ClearOfObstacles, ClearOfOthers, VelocityChoice
+from agents.mission.following.route import Route
+from agents.mission.following.station import Station
+from agents.mission.navigation.known_obstacles import KnownObstacles
+from agents.mission.navigation.navigation import Navigation
+from agents.mission.navigation.neighbor_motions import NeighborMotions
+from agents.mission.navigation.onboard_map import NO_MAP, OnboardMap
+from fanet_mw import mavlink
+from fanet_mw.application import Application, AppPort, Received
+from fanet_mw.bus.messages import Altimeter, Gps, SensorReading
+from fanet_mw.errors import MalformedFrameError
+from fanet_mw.motion import Motion
+from fanet_mw.node.reader import decoded, packet_of
+from fanet_mw.scenario import Scenario
+from fanet_mw.units import MS, Enu, NodeId, S, seconds_to_ns
+from fanet_mw.wire import PRIORITY_REPORT
+
+_TELL_NS: Final = S
+"""How often a head floods where it is and how it flies, for heads that do not hear its hellos."""
+_FUTURE_NS: Final = S
+"""A position of an instant further ahead is not believed: clocks agree better than that."""
+
+
+class FormationFlight(Application):
+    """One UAV's part in the formation."""
+
+    name: Final = "formation"
+    listens = (mavlink.GLOBAL_POSITION_ID,)
+
+    def __init__(self, scenario: Scenario, node: NodeId, *, position: Enu, onboard_map: OnboardMap = NO_MAP) -> None:
+        """`onboard_map` is the map that the UAV carries."""
+        obstacles = KnownObstacles(onboard_map, scenario.world.no_fly_m)
+        self._navigation = navigation = Navigation(position, obstacles)
+        self._motions = motions = NeighborMotions()
+        self._height_m = scenario.nodes.altitude_m
+        self._velocity_choice = VelocityChoice(
+            navigation,
+            obstacles,
+            most_m_s=approach_speed_m_s(scenario, node),
+            hard=[ClearOfObstacles(navigation, obstacles), ClearOfOthers(navigation, motions, obstacles)],
+            soft=[],
+        )
+        route = Route(scenario.mission.route_m, speed_m_s=scenario.mobility.speed_m_s)
+        self._station = Station(
+            node, motions, route, radius_m=scenario.mission.formation_m, clusters=lambda: self.port.clusters()
+        )
+        self._begins_ns = seconds_to_ns(scenario.warmup_s)
+        self._encoder = mavlink.Encoder(node)
+        self._next_ns: int | None = None
+        self._bad_positions = 0
+        """The number of positions that are missing in a hello, or not of the present."""
+
+    def start(self, port: AppPort, now_ns: int) -> None:
+        super().start(port, now_ns)
+        self._next_ns = now_ns + round(port.stream("formation").random() * _TELL_NS)
+
+    # --- what it hears --------------------------------------------------------------------------------------------
+
+    def on_message(self, message: Received, now_ns: int) -> None:
+        """A head floods where it is."""
+        self._on_motion(message.origin, message.frame, now_ns)
+        self.port.tap(message.frame)
+
+    def on_hello(self, frame: bytes, now_ns: int) -> None:
+        origin = packet_of(frame).origin
+        if origin == self.port.node:
+            raise MalformedFrameError(f"a hello in the name of {origin}, who heard it")
+        self._on_motion(origin, frame, now_ns)
+
+    def _on_motion(self, node: int, frame: bytes, now_ns: int) -> None:
+        heard = decoded(frame, mavlink.kinematics_of)
+        if heard.t_ms * MS > now_ns + _FUTURE_NS:
+            self._bad_positions += 1
+            return
+        motion, known = (
+            Motion(heard.position, heard.velocity, heard.t_ms * MS),
+            self._motions.motion(node, now_ns=now_ns),
+        )
+        if known is None or known.at_ns < motion.at_ns:  # a flood may be older than the last hello
+            self._motions.on_hello(node, motion)
+
+    def on_sensor(self, reading: SensorReading, now_ns: int) -> None:
+        if isinstance(reading, Altimeter):
+            self._navigation.altimeter(reading.above_ground_m, now_ns=now_ns)
+
+    # --- what it does ---------------------------------------------------------------------------------------------
+
+    def on_fix(self, fix: Gps, now_ns: int) -> None:
+        """Fly on towards the place in the formation, clear of all others; hover until the formation is flown."""
+        self._navigation.fix(fix.position, fix.velocity, now_ns=now_ns)
+        if now_ns < self._begins_ns:
+            return
+        place, moves = self._station.at(self._navigation.position, now_ns)
+        velocity = self._velocity_choice.velocity(place._replace(up=self._height_m), moves, now_ns)
+        self.port.fly(course_at(self.port.position, velocity))
+
+    def wake(self, now_ns: int) -> None:
+        self._next_ns = now_ns + _TELL_NS
+        if self._station.is_head:
+            here, port = self._navigation.position, self.port
+            frames = self._encoder.global_position(here, port.velocity, yaw=None, now_ns=now_ns)
+            port.send(frames, priority=PRIORITY_REPORT)
+
+    def next_wake_ns(self) -> int | None:
+        return self._next_ns
+
+    def report(self) -> dict[str, int]:
+        return {"bad_positions": self._bad_positions}

@@ -1,0 +1,49 @@
+"""A place on a circle around another UAV, evenly between the neighbors on it: geometry.
+
+    a UAV keeps its bearing from the middle, but for a turn towards the wider one of the gaps on its two sides
+
+Nobody hands out places: everyone turns by what it knows of the two beside it, and the gaps even out. Who joins makes
+two gaps of one; where somebody was lost, the two beside that gap turn into it. It is the balanced deployment on a
+circle of Martinez and Bullo (Optimal sensor placement and motion coordination for target tracking, Automatica 42(4),
+2006).
+"""
+
+import math
+from collections.abc import Iterable
+from typing import Final
+
+from fanet_mw.units import Enu
+
+_WIDEST_RAD: Final = math.radians(80.0)
+"""A gap that is wider counts as this: whoever is beyond it may be out of reach, so that its width is not known."""
+_TURN: Final = 0.25
+"""The turn as a share of the difference of the two gaps; a half would go to the middle at once, and swing."""
+_MOST_TURN_RAD: Final = math.radians(12.0)
+_NO_BEARING_M: Final = 1.0
+_GOLDEN_ANGLE: Final = math.pi * (3 - math.sqrt(5))
+
+
+def place_on_ring(middle: Enu, here: Enu, others: Iterable[Enu], *, radius_m: float, node: int) -> Enu:
+    """The place to fly to, at the height of `here`; `others` are those who fly around the same middle.
+
+    `node` tells who stands exactly in the middle where to go.
+    """
+    bearing = _bearing(middle, here)
+    if bearing is None:
+        bearing = node * _GOLDEN_ANGLE
+    ahead = behind = _WIDEST_RAD
+    for other in others:
+        at = _bearing(middle, other)
+        if at is None:
+            continue
+        off = (at - bearing) % (2 * math.pi)
+        ahead, behind = min(ahead, off), min(behind, 2 * math.pi - off)
+    turn = max(-_MOST_TURN_RAD, min(_MOST_TURN_RAD, _TURN * (ahead - behind)))
+    angle = bearing + turn
+    return Enu(middle.east + radius_m * math.sin(angle), middle.north + radius_m * math.cos(angle), here.up)
+
+
+def _bearing(middle: Enu, place: Enu) -> float | None:
+    """Clockwise from north; None in the middle."""
+    east, north = place.east - middle.east, place.north - middle.north
+    return None if math.hypot(east, north) < _NO_BEARING_M else math.atan2(east, north)

@@ -1,0 +1,44 @@
+"""The route of a swarm that flies in formation: way points that its leader passes one after the other."""
+
+import math
+from collections.abc import Sequence
+from typing import Final
+
+from fanet_mw.units import Enu
+
+_PASSED_M: Final = 30.0
+"""A leader that is this near to a way point flies on to the next one."""
+_BRAKING_S: Final = 4.0
+"""The last way point is approached no faster than so that it would be reached after this time."""
+
+
+class Route:
+    """The way points, and how many of them the leader has passed.
+
+    Every head follows how far the leader has come, because it may have to lead in its place.
+    """
+
+    def __init__(self, points: Sequence[tuple[float, float]], *, speed_m_s: float) -> None:
+        self._points = points
+        self._speed_m_s = speed_m_s
+        self._passed = 0
+
+    def led_at(self, leader: Enu) -> None:
+        """Take in where the leader is."""
+        if self._passed < len(self._points) and self._away_m(leader) <= _PASSED_M:
+            self._passed = min(self._passed + 1, len(self._points) - 1)
+
+    def velocity(self, here: Enu) -> Enu:
+        """The velocity at which the leader flies; still at the end, and without a route."""
+        if not self._points:
+            return Enu(0.0, 0.0, 0.0)
+        east, north = self._points[self._passed]
+        away_m, speed = self._away_m(here), self._speed_m_s
+        if self._passed == len(self._points) - 1:
+            speed = min(speed, away_m / _BRAKING_S)
+        share = speed / max(away_m, 1e-6)
+        return Enu(share * (east - here.east), share * (north - here.north), 0.0)
+
+    def _away_m(self, place: Enu) -> float:
+        east, north = self._points[self._passed]
+        return math.hypot(east - place.east, north - place.north)

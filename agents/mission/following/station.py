@@ -1,0 +1,89 @@
+"""Where one UAV of a formation of clusters is to be, and at which velocity that place moves.
+
+    the leader      the head with the lowest id flies the route
+    other heads     on a circle around the leader, so wide that the circles of the clusters do not touch
+    members         on a circle around their head; who is in no cluster, around the nearest head that it hears of
+    who hears none  hovers, the leader too: the others fly on without it
+
+Places come from received positions only: those in the hellos of neighbors, and those that heads flood.
+"""
+
+from collections.abc import Callable, Iterable, Iterator, Mapping
+from typing import Final
+
+from agents.mission.following.ring import place_on_ring
+from agents.mission.following.route import Route
+from agents.mission.navigation.neighbor_motions import NeighborMotions
+from fanet_mw.motion import Motion
+from fanet_mw.units import Enu, NodeId
+
+STILL: Final = Enu(0.0, 0.0, 0.0)
+_APART: Final = 2.2
+"""The distance of two heads in radii of the circle around a head."""
+Clusters = Mapping[NodeId, tuple[NodeId, ...]]
+
+
+class Station:
+    """The place of one UAV."""
+
+    def __init__(
+        self, node: NodeId, motions: NeighborMotions, route: Route, *, radius_m: float, clusters: Callable[[], Clusters]
+    ) -> None:
+        """`clusters` tells the clusters as the node knows them, by head."""
+        self._node = node
+        self._motions = motions
+        self._route = route
+        self._radius_m = radius_m
+        self._clusters = clusters
+
+    @property
+    def is_head(self) -> bool:
+        return self._node in self._clusters()
+
+    def at(self, here: Enu, now_ns: int) -> tuple[Enu, Enu]:
+        """The place, and the velocity at which it moves."""
+        clusters = self._clusters()
+        if not clusters or not self._motions.all(now_ns=now_ns):
+            return here, STILL
+        leader = min(clusters)
+        if leader == self._node:
+            self._route.led_at(here)
+            return here, self._route.velocity(here)
+        lead = self._motions.motion(leader, now_ns=now_ns)
+        if lead is not None:
+            self._route.led_at(lead.position_at(now_ns))
+        is_head = self._node in clusters
+        head = leader if is_head else self._head_of(self._node, here, clusters, now_ns)
+        followed = None if head is None else self._motions.motion(head, now_ns=now_ns)
+        if head is None or followed is None:
+            return here, STILL if lead is None else lead.velocity
+        others = set(clusters) if is_head else set(self._followers(head, clusters, now_ns))
+        radius_m = _APART * self._radius_m if is_head else self._radius_m
+        return self._around(followed, sorted(others - {head, self._node}), radius_m, here, now_ns)
+
+    def _head_of(self, node: int, place: Enu, clusters: Clusters, now_ns: int) -> int | None:
+        """The head of a UAV that is none: that of its cluster, else the nearest one that is heard; None: none is."""
+        own = next((head for head, nodes in clusters.items() if node in nodes), None)
+        if own is not None:
+            return own
+        heard = [
+            (motion.position_at(now_ns).minus(place).norm(), head)
+            for head in clusters
+            if (motion := self._motions.motion(head, now_ns=now_ns)) is not None
+        ]
+        return min(heard)[1] if heard else None
+
+    def _followers(self, head: int, clusters: Clusters, now_ns: int) -> Iterator[int]:
+        """The UAVs that fly around a head, as far as they are heard."""
+        for node, motion in self._motions.by_node(now_ns=now_ns):
+            if node not in clusters and self._head_of(node, motion.position_at(now_ns), clusters, now_ns) == head:
+                yield node
+
+    def _around(
+        self, followed: Motion, others: Iterable[int], radius_m: float, here: Enu, now_ns: int
+    ) -> tuple[Enu, Enu]:
+        motions = [self._motions.motion(node, now_ns=now_ns) for node in others]
+        places = [motion.position_at(now_ns) for motion in motions if motion is not None]
+        middle = followed.position_at(now_ns)
+        place = place_on_ring(middle, here, places, radius_m=radius_m, node=self._node)
+        return place, followed.velocity._replace(up=0.0)

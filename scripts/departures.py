@@ -186,7 +186,7 @@ def main(arguments: Sequence[str]) -> int:
         for name, changed in DEPARTURES[protocol].items():
             if chosen.only and name not in chosen.only:
                 continue
-            with patch.dict(routing.PROTOCOLS, {protocol: changed}):
+            with patch.object(routing, "maker_of", lambda _, changed=changed: changed):
                 for speed in chosen.speeds:
                     sys.stdout.write(f"| {name} {row(protocol, speed, chosen.seeds, chosen.set)}\n")
                     sys.stdout.flush()

@@ -1,34 +1,43 @@
-"""Routing protocols behind the contract of the core, by the name a scenario gives."""
+"""Routing protocols behind the contract of the core, by the name a scenario gives.
+
+A protocol is imported when it is chosen: no node carries the others.
+"""
 
 from collections.abc import Callable, Mapping
+from importlib import import_module
 from typing import Final
 
 from fanet_mw.extensions import load
 from fanet_mw.node.contract import Port, RoutingProtocol
-from fanet_mw.routing.aodv import Aodv
-from fanet_mw.routing.clustered.build import make_clustered
-from fanet_mw.routing.direct import Direct
-from fanet_mw.routing.dsdv import Dsdv
-from fanet_mw.routing.flooding import Flooding
-from fanet_mw.routing.geographic import Geographic
-from fanet_mw.routing.olsr import Olsr
-from fanet_mw.routing.storm import CounterBased, Gossip
 
-PROTOCOLS: Final[Mapping[str, Callable[[Port], RoutingProtocol]]] = {
-    "direct": Direct,
-    "flooding": Flooding,
-    "clustered": make_clustered,
-    "aodv": Aodv,
-    "olsr": Olsr,
-    "dsdv": Dsdv,
-    "gossip": Gossip,
-    "counter": CounterBased,
-    "geographic": Geographic,
+Maker = Callable[[Port], RoutingProtocol]
+MAKERS: Final[Mapping[str, str]] = {
+    "direct": "fanet_mw.routing.direct:Direct",
+    "flooding": "fanet_mw.routing.flooding:Flooding",
+    "clustered": "fanet_mw.routing.clustered.build:make_clustered",
+    "aodv": "fanet_mw.routing.aodv:Aodv",
+    "olsr": "fanet_mw.routing.olsr:Olsr",
+    "dsdv": "fanet_mw.routing.dsdv:Dsdv",
+    "gossip": "fanet_mw.routing.storm:Gossip",
+    "counter": "fanet_mw.routing.storm:CounterBased",
+    "geographic": "fanet_mw.routing.geographic:Geographic",
 }
+"""What makes each of this package's own protocols (`scenario.model.PROTOCOLS`), as MODULE:NAME."""
+
+
+def module_of(name: str) -> str:
+    """The module of the protocol of this name, which need not be imported yet."""
+    return MAKERS[name].partition(":")[0] if name in MAKERS else str(maker_of(name).__module__)
+
+
+def maker_of(name: str) -> Maker:
+    """What makes the protocol of this name; it is imported now."""
+    if name not in MAKERS:
+        return load("routing.protocol", name)  # type: ignore[no-any-return]
+    module, _, made = MAKERS[name].partition(":")
+    return getattr(import_module(module), made)  # type: ignore[no-any-return]
 
 
 def make_protocol(port: Port) -> RoutingProtocol:
     """The protocol that the port's scenario names."""
-    name = port.scenario.routing.protocol
-    made: RoutingProtocol = (PROTOCOLS.get(name) or load("routing.protocol", name))(port)
-    return made
+    return maker_of(port.scenario.routing.protocol)(port)

@@ -13,8 +13,9 @@ from fanet_mw import wire
 from fanet_mw.bus.messages import TxRequest
 from fanet_mw.bus.topics import Topics, node_of
 from fanet_mw.hosts.virtual import VirtualHost
-from fanet_mw.routing import PROTOCOLS, control
+from fanet_mw.routing import MAKERS, control
 from fanet_mw.scenario import Scenario, config
+from fanet_mw.scenario.model import PROTOCOLS
 from fanet_mw.trace import Delivered, Dropped, Generated, Record
 from fanet_mw.units import MS, US
 from sim.results.files import finish
@@ -44,6 +45,10 @@ def scenario_of(protocol: str, *, destination: int | str, moving: bool = False) 
             "mobility": {"model": "random_waypoint" if moving else "static", "speed_m_s": 15},
         }
     )  # fmt: skip
+
+
+def test_each_protocol_that_a_scenario_may_name_can_be_made() -> None:
+    assert tuple(MAKERS) == PROTOCOLS
 
 
 @lru_cache

@@ -10,7 +10,7 @@ import multiprocessing
 import os
 import signal
 import sys
-from collections.abc import Callable, Mapping
+from collections.abc import Callable, Mapping, Sequence
 from multiprocessing import forkserver, resource_tracker
 from multiprocessing.context import ForkServerContext, ForkServerProcess
 from typing import Any, Final, NamedTuple
@@ -92,11 +92,14 @@ def describe(exit_code: int) -> str:
 class Processes:
     """Children by name, each of which can be started again."""
 
-    def __init__(self, on_end: Callable[[str, int], None], *, title: str = "fanet") -> None:
+    def __init__(
+        self, on_end: Callable[[str, int], None], *, title: str = "fanet", preload: Sequence[str] = ()
+    ) -> None:
+        """`preload` names modules that every child needs beside those of the services."""
         self._title = title
         """What `ps` shows as the command line of each child, in front of its name."""
         self._context: ForkServerContext = multiprocessing.get_context("forkserver")
-        self._context.set_forkserver_preload(_PRELOAD)
+        self._context.set_forkserver_preload([*_PRELOAD, *preload])
         self._on_end = on_end
         self._loop = asyncio.get_running_loop()
         self._running: dict[str, ForkServerProcess] = {}

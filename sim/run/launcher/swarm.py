@@ -23,6 +23,7 @@ from fanet_mw.hosts import interrupts
 from fanet_mw.hosts.bus import Bus, config_of
 from fanet_mw.hosts.clock import ClockKeeper, SwarmClock
 from fanet_mw.hosts.realtime import SwarmAddress
+from fanet_mw.routing import module_of
 from fanet_mw.scenario import Scenario
 from fanet_mw.units import S
 from sim.run.bus.router import ROUTER, expected_names
@@ -69,7 +70,8 @@ class SwarmRun:
         self._keeper = ClockKeeper(
             bus, names, time_scale=scenario.time_scale, expected=expected_names(scenario), scenario=scenario
         )
-        self.processes = Processes(self._process_ended, title=f"fanet {names.swarm}")
+        protocol = module_of(scenario.routing.protocol)
+        self.processes = Processes(self._process_ended, title=f"fanet {names.swarm}", preload=[protocol])
         self._deaths = Deaths(respawn=respawn)
         self._clock: SwarmClock | None = None
         self._over = asyncio.Event()

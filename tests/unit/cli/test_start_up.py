@@ -11,6 +11,10 @@ ROOT = Path(__file__).parents[3]
 COMPUTE = ("numpy", "numba", "pybullet", "matplotlib", "pyarrow", "distributed", "emulator", "agents")
 NETWORK = ("zenoh", "asyncio", "pymavlink")
 MODELS = ("pydantic", "fanet_mw.scenario.model")
+RIVALS = tuple(
+    f"fanet_mw.routing.{name}" for name in ("clustered.build", "aodv", "olsr", "dsdv", "storm", "geographic")
+)
+"""The protocols that a scenario with plain flooding does not choose."""
 RUN = (
     "import sys; from fanet_mw.__main__ import main\n"
     "try:\n"
@@ -44,6 +48,7 @@ def imported_by(*arguments: str) -> tuple[set[str], str]:
         (("swarms",), "swarm", (*COMPUTE, *NETWORK, *MODELS)),
         (("check", "quick"), "is right", (*COMPUTE, *NETWORK)),
         (("show", "quick"), "[nodes]", (*COMPUTE, *NETWORK)),
+        (("simulate", "flooding", "--duration", "1", "--set", "drain_s=0"), "delivered", RIVALS),
     ],
     ids=lambda value: " ".join(value) if isinstance(value, tuple) and len(value) < 4 else None,
 )

@@ -30,6 +30,8 @@ _LISTEN_HELLOS: Final = 2.5
 """The leader listens so long at its start, because a swarm that already has a time keeps it."""
 _SILENT_HELLOS: Final = 16
 """A node that has had no news of a reference for this long becomes the reference; the lower its id, the sooner."""
+_FIRST_HELLOS: Final = 32
+"""The same for a node that has had no time yet: the leader's comes about two hello intervals later at each hop."""
 _STAGGER_HELLOS: Final = 0.5
 _STAGGERED: Final = 32
 _FRESH_HELLOS: Final = 4.5
@@ -159,7 +161,7 @@ class TimeSync:
     def start(self, local_ns: int) -> None:
         """Take in that the node has started."""
         self._news_ns = local_ns
-        self._arm(local_ns)
+        self._arm(local_ns, hellos=_FIRST_HELLOS)
         if self._own.leads:
             self._claim_ns = local_ns + int(_LISTEN_HELLOS * self._own.hello_ns)
 
@@ -205,9 +207,9 @@ class TimeSync:
         self.reference, self.is_reference, self._rival = self._own.node, True, None
         self.counts["claimed"] += 1
 
-    def _arm(self, local_ns: int) -> None:
-        hellos = _SILENT_HELLOS + _STAGGER_HELLOS * (self._own.node % _STAGGERED)
-        self._claim_ns = local_ns + int(hellos * self._own.hello_ns)
+    def _arm(self, local_ns: int, *, hellos: int = _SILENT_HELLOS) -> None:
+        staggered = hellos + _STAGGER_HELLOS * (self._own.node % _STAGGERED)
+        self._claim_ns = local_ns + int(staggered * self._own.hello_ns)
 
     # --- receiving ------------------------------------------------------------------------------------------------
 

@@ -87,6 +87,14 @@ def test_without_a_leader_the_lowest_id_becomes_the_reference() -> None:
     assert network.worst_us(reference=2) < 20
 
 
+def test_in_a_long_chain_nobody_takes_its_own_time_before_the_leader_s_has_come() -> None:
+    """Two times would meet in the middle of the chain, and one of them would have to step."""
+    network = Network(line(16), CRYSTAL, seed=4)
+    network.run(60)
+    assert [node for node, member in network.members.items() if member.sync.counts["claimed"]] == [1]
+    assert all(member.sync.reference == 1 for member in network.members.values())
+
+
 def test_when_the_reference_dies_another_carries_its_time_on_without_a_step() -> None:
     network = Network(line(6), CRYSTAL, seed=5)
     network.run(40)

@@ -36,16 +36,15 @@ class TxQueue:
         self._sooner_us = sooner_us
         self._entries: list[tuple[int, int, Packet]] = []
         self._order = 0
-        self._latest_us = max(0, *sooner_us.values()) if sooner_us else 0
-        self._oldest_us = 0
-        """No packet here was generated before this instant."""
+        self._fresh_us = 0
+        """No packet here expires as long as the horizon, before which packets are too old, is not after this."""
 
     def __len__(self) -> int:
         return len(self._entries)
 
     def __contains__(self, key: object) -> bool:
         """True if a packet with this key (`duplicates.key_of`) is queued."""
-        return any(_key(entry[2]) == key for entry in self._entries)
+        return bool(self._entries) and any(_key(entry[2]) == key for entry in self._entries)
 
     def remove(self, key: int) -> None:
         """Give up a packet, if it is queued."""
@@ -57,9 +56,12 @@ class TxQueue:
         `rank` is the priority at which it waits here, by default its own.
         """
         self._order += 1
-        born_us = packet.header.origin_us
-        self._oldest_us = min(self._oldest_us, born_us) if self._entries else born_us
-        insort(self._entries, (packet.header.priority if rank is None else rank, self._order, packet))
+        if rank is None:
+            rank = packet.header.priority
+        fresh_us = packet.header.origin_us - self._sooner_us.get(rank, 0)
+        if not self._entries or fresh_us < self._fresh_us:
+            self._fresh_us = fresh_us
+        insort(self._entries, (rank, self._order, packet))
         return self._entries.pop()[2] if len(self._entries) > self._capacity else None
 
     def pop(self) -> Packet:
@@ -103,7 +105,7 @@ class TxQueue:
 
     def expire(self, *, before_us: int) -> list[Packet]:
         """Take out every packet generated before an instant [swarm us], or that much later if its class is sooner."""
-        if not self._entries or self._oldest_us >= before_us + self._latest_us:
+        if not self._entries or before_us <= self._fresh_us:
             return []  # else every wake-up would look at all of a long queue
         stale: list[tuple[int, int, Packet]] = []
         kept: list[tuple[int, int, Packet]] = []
@@ -111,7 +113,7 @@ class TxQueue:
             late_us = before_us + self._sooner_us.get(entry[0], 0)
             (stale if entry[2].header.origin_us < late_us else kept).append(entry)
         self._entries = kept
-        self._oldest_us = min((entry[2].header.origin_us for entry in kept), default=0)
+        self._fresh_us = min((p.header.origin_us - self._sooner_us.get(rank, 0) for rank, _, p in kept), default=0)
         return [entry[2] for entry in stale]
 
     def drain(self) -> list[Packet]:

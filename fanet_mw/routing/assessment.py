@@ -14,39 +14,42 @@ class Assessment:
 
     def __init__(self, *, enough: int) -> None:
         self._enough = enough
-        self._pending: dict[int, tuple[int, Packet]] = {}
-        """The number of copies heard and the packet, by key."""
+        self.pending: dict[int, tuple[int, Packet]] = {}
+        """The number of copies heard and the packet, by key; a copy of another packet changes nothing here."""
         self._due: list[tuple[int, int]] = []
 
     def __len__(self) -> int:
-        return len(self._pending)
+        return len(self.pending)
 
     def first_copy(self, packet: Packet, *, due_ns: int) -> None:
         """Assess a new packet until `due_ns`."""
-        key = key_of(origin=packet.header.origin, seq=packet.header.seq)
-        self._pending[key] = 1, packet
+        header = packet.header
+        key = key_of(header.origin, header.seq)
+        self.pending[key] = 1, packet
         heapq.heappush(self._due, (due_ns, key))
 
     def on_copy(self, key: int, *, now_ns: int) -> None:
         """Count a copy that another node has relayed."""
-        pending = self._pending.get(key)
+        pending = self.pending.get(key)
         if pending is None:
             return
         copies, packet = pending
         if copies + 1 >= self._enough:
-            del self._pending[key]
+            del self.pending[key]
         else:
-            self._pending[key] = copies + 1, packet
+            self.pending[key] = copies + 1, packet
 
     def next_wake_ns(self) -> int | None:
-        while self._due and self._due[0][1] not in self._pending:
-            heapq.heappop(self._due)  # this packet was decided meanwhile
-        return self._due[0][0] if self._due else None
+        due, pending = self._due, self.pending
+        while due and due[0][1] not in pending:
+            heapq.heappop(due)  # this packet was decided meanwhile
+        return due[0][0] if due else None
 
     def decided(self, *, now_ns: int) -> list[Packet]:
         """The packets whose assessment is over and that too few other nodes have relayed."""
-        relays = []
-        while (due_ns := self.next_wake_ns()) is not None and due_ns <= now_ns:
-            _, key = heapq.heappop(self._due)
-            relays.append(self._pending.pop(key)[1])
+        relays, due = [], self._due
+        while due and due[0][0] <= now_ns:
+            open_ = self.pending.pop(heapq.heappop(due)[1], None)
+            if open_ is not None:  # else this packet was decided meanwhile
+                relays.append(open_[1])
         return relays

@@ -5,7 +5,9 @@
 Data packets of one origin are numbered without gaps, so a missing packet shows.
 """
 
-from collections.abc import Sequence
+from collections.abc import Mapping, Sequence
+from dataclasses import dataclass
+from functools import cached_property
 from typing import Final, NamedTuple, Self
 
 from fanet_mw.errors import MalformedFrameError
@@ -18,6 +20,8 @@ CAPACITY: Final = 24
 """Entries of one message."""
 MESSAGE_BYTES: Final = OVERHEAD + DIGEST.layout.size
 _SEQ_MASK: Final = 0xFFFF_FFFF
+_HALF: Final = 1 << 31
+_new: Final = tuple.__new__  # for what is made once per packet
 
 
 def capacity(room: int) -> int:
@@ -48,28 +52,36 @@ class Holding(NamedTuple):
                 mine &= ~(theirs >> behind) & ((1 << WINDOW - behind) - 1)
             elif not newer(self.newest, other.newest):
                 return []  # the other is so far ahead that its window says nothing about the packets held here
-        if not mine:
-            return []
-        return [(self.newest - back) & _SEQ_MASK for back in range(WINDOW) if mine >> back & 1]
+        missing = []
+        while mine:
+            lowest = mine & -mine
+            missing.append((self.newest - lowest.bit_length() + 1) & _SEQ_MASK)
+            mine ^= lowest
+        return missing
 
     def with_(self, seq: int) -> "Holding":
         """The same holding with this packet added."""
-        ahead = (seq - self.newest) & _SEQ_MASK
-        if ahead == 0:
-            return self
-        if newer(seq, self.newest):
-            held = (self.held << ahead | 1 << (ahead - 1)) & _SEQ_MASK if ahead < WINDOW else 0
-            return Holding(self.origin, seq, held)
-        behind = (self.newest - seq) & _SEQ_MASK
-        return self._replace(held=self.held | 1 << (behind - 1)) if behind < WINDOW else self
+        origin, newest, held = self
+        ahead = (seq - newest) & _SEQ_MASK
+        if 0 < ahead < _HALF:
+            held = (held << ahead | 1 << (ahead - 1)) & _SEQ_MASK if ahead < WINDOW else 0
+            return _new(Holding, (origin, seq, held))
+        behind = (newest - seq) & _SEQ_MASK
+        return _new(Holding, (origin, newest, held | 1 << (behind - 1))) if 0 < behind < WINDOW else self
 
 
-class Digest(NamedTuple):
+@dataclass(frozen=True)
+class Digest:
     """All holdings that one hello states."""
 
     holdings: tuple[Holding, ...]
     complete: bool
     """True if nothing is held of any origin without a holding."""
+
+    @cached_property
+    def by_origin(self) -> Mapping[int, Holding]:
+        """The holdings by origin; a digest that forty nodes hear is arranged once."""
+        return {holding.origin: holding for holding in self.holdings}
 
     def encode_frames(self, node: int) -> bytes:
         """One message per `CAPACITY` holdings, at least one."""

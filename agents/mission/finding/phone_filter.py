@@ -10,7 +10,10 @@ Once the owner has been seen, the place is that of the sightings.
 """
 
 import math
+from collections.abc import Sequence
 from functools import lru_cache
+from itertools import compress
+from operator import add, mul
 from typing import Final, NamedTuple
 
 from fanet_mw.units import Enu
@@ -20,6 +23,8 @@ REFERENCE_LOSS_DB: Final = 40.05
 _CELL_M: Final = 20.0
 _HALF_CELLS: Final = 16
 """The grid reaches this many cells to each side of the place from which the phone was first heard."""
+_WIDTH: Final = 2 * _HALF_CELLS + 1
+_EVERY_CELL: Final = (True,) * (_WIDTH * _WIDTH)
 _OFF_CENTER_M: Final = 120.0
 """The grid is laid anew when the strongest sample is this far from its middle."""
 _DOUBT: Final = 1.5
@@ -155,7 +160,7 @@ class PhoneFilter:
         strongest = max((s for s in self._samples if s[1] is not None), key=lambda s: s[1] or 0.0)[0]
         if not self._sums or _ground_m(self._middle, strongest) > _OFF_CENTER_M:
             self._middle, fresh, self._count = strongest, self._samples, 0
-            cells = (2 * _HALF_CELLS + 1) ** 2
+            cells = _WIDTH * _WIDTH
             self._sums, self._squares, self._scores = [0.0] * cells, [0.0] * cells, [0.0] * cells
         for position, rssi_dbm in fresh:
             if rssi_dbm is None:
@@ -174,7 +179,7 @@ class PhoneFilter:
         j = round((north_m - self._middle.north) / _CELL_M) + _HALF_CELLS
         if not (0 <= i <= 2 * _HALF_CELLS and 0 <= j <= 2 * _HALF_CELLS):
             return math.inf
-        return self._best - self._totals[j * (2 * _HALF_CELLS + 1) + i]
+        return self._best - self._totals[j * _WIDTH + i]
 
     def near(self, place: Enu, *, within_m: float) -> bool:
         """True if the phone was first heard within a distance of a place, or has only been seen; cheap to ask."""
@@ -188,28 +193,31 @@ class PhoneFilter:
         slope = 5 * model.exponent / math.log(10)  # per natural logarithm of the squared distance
         residual_at_1_m = rssi_dbm - expected_at_1_m
         up2 = max(1.0, position.up * position.up)
-        sums, squares, log = self._sums, self._squares, math.log
-        for cell, distance2 in enumerate(_squared_distances_m2(self._middle, position, up2)):
-            residual = residual_at_1_m + slope * log(distance2)
-            sums[cell] += residual
-            squares[cell] += residual * residual
+        log, distances2 = math.log, _squared_distances_m2(self._middle, position, up2)
+        residuals = [residual_at_1_m + slope * log(distance2) for distance2 in distances2]
+        self._sums = list(map(add, self._sums, residuals))
+        self._squares = list(map(add, self._squares, map(mul, residuals, residuals)))
 
     def _rule_out(self, position: Enu) -> None:
         """Make the cells less likely from which the phone would have been heard."""
         assert self._middle is not None, "the grid lies around the first sample"
-        scores, table, most, sqrt = self._scores, self._silence, len(self._silence) - 1, math.sqrt
+        table, most, sqrt = self._silence, len(self._silence) - 1, math.sqrt
         up2 = position.up * position.up
-        for cell, distance2 in enumerate(_squared_distances_m2(self._middle, position, up2)):
-            scores[cell] += table[min(most, int(sqrt(distance2) / _STEP_M))]
+        steps = [int(sqrt(d2) / _STEP_M) for d2 in _squared_distances_m2(self._middle, position, up2)]
+        if max(steps) > most:
+            steps = [min(most, step) for step in steps]
+        self._scores = list(map(add, self._scores, map(table.__getitem__, steps)))
 
-    def _inside(self, width: int) -> list[bool]:
+    def _inside(self) -> Sequence[bool]:
         """The cells that are in the area; all cells when none is."""
         assert self._middle is not None, "the grid lies around a sample"
         half = self._model.half_m + _CELL_M / 2
-        east = [abs(self._middle.east + (i - _HALF_CELLS) * _CELL_M) <= half for i in range(width)]
-        north = [abs(self._middle.north + (j - _HALF_CELLS) * _CELL_M) <= half for j in range(width)]
+        if max(abs(self._middle.east), abs(self._middle.north)) + _HALF_CELLS * _CELL_M <= half:
+            return _EVERY_CELL
+        east = [abs(self._middle.east + (i - _HALF_CELLS) * _CELL_M) <= half for i in range(_WIDTH)]
+        north = [abs(self._middle.north + (j - _HALF_CELLS) * _CELL_M) <= half for j in range(_WIDTH)]
         found = [row and column for row in north for column in east]
-        return found if any(found) else [True] * len(found)
+        return found if any(found) else _EVERY_CELL
 
     def _moments(self) -> Estimate:
         assert self._middle is not None, "only what was heard has moments"
@@ -221,16 +229,15 @@ class PhoneFilter:
             for s, q, silence in zip(self._sums, self._squares, self._scores, strict=True)
         ]
         self._totals = scores
-        width = 2 * _HALF_CELLS + 1
-        inside = self._inside(width)
-        self._best = best = max(score for score, possible in zip(scores, inside, strict=True) if possible)
+        possible = self._inside()
+        self._best = best = max(compress(scores, possible))
         total = mean_i = mean_j = ii = ij = jj = 0.0
-        exp = math.exp
-        for at, score in enumerate(scores):
-            if score < best - 40.0 or not inside[at]:
+        exp, least = math.exp, best - 40.0
+        for at in [at for at, score in enumerate(scores) if score >= least]:
+            if not possible[at]:
                 continue
-            weight = exp(0.5 * (score - best))
-            j, i = divmod(at, width)
+            weight = exp(0.5 * (scores[at] - best))
+            j, i = divmod(at, _WIDTH)
             total += weight
             mean_i += weight * i
             mean_j += weight * j
@@ -257,7 +264,7 @@ def _squared_distances_m2(middle: Enu, position: Enu, up2: float) -> list[float]
     """The squared distance of every cell of the grid around `middle` from a position; `up2` is that of its height."""
     west = middle.east - _HALF_CELLS * _CELL_M - position.east
     south = middle.north - _HALF_CELLS * _CELL_M - position.north
-    span = range(2 * _HALF_CELLS + 1)
+    span = range(_WIDTH)
     east2 = [(west + i * _CELL_M) ** 2 for i in span]
     return [squared + rest for rest in [(south + j * _CELL_M) ** 2 + up2 for j in span] for squared in east2]
 

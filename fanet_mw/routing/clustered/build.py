@@ -19,7 +19,7 @@ from fanet_mw.routing.clustered.claimed.claimed_release import ClaimedRelease
 from fanet_mw.routing.clustered.claimed.claiming import Claiming, geometry, turn_bytes
 from fanet_mw.routing.clustered.claimed.own_turns import OwnTurns
 from fanet_mw.routing.clustered.clustered import Clustered, Parts
-from fanet_mw.routing.clustered.contract import ScheduledAccess
+from fanet_mw.routing.clustered.contract import HearsCopies, ScheduledAccess
 from fanet_mw.routing.clustered.forwarding.floods import Floods
 from fanet_mw.routing.clustered.forwarding.gradient import Gradient
 from fanet_mw.routing.clustered.forwarding.repair import Repair
@@ -140,7 +140,7 @@ def _by_gossip(ground: _Ground) -> Clustered:
 
 def _by_counter(ground: _Ground) -> Clustered:
     rule = CounterRule(ground.port.scenario.clusters, ground.random)
-    return _in_slots(ground, rule, rule.open_until.on_copy)
+    return _in_slots(ground, rule, rule.open_until)
 
 
 def _by_set(ground: _Ground) -> Clustered:
@@ -165,7 +165,7 @@ def _near(ground: _Ground) -> Neighborhood:
     return Neighborhood(ground.port.node, lifetime_ns=ground.lifetime_ns)
 
 
-def _in_slots(ground: _Ground, rule: Rule, *on_copy: Callable[..., object]) -> Clustered:
+def _in_slots(ground: _Ground, rule: Rule, *hear_copies: HearsCopies) -> Clustered:
     parts = _role_parts(ground, _membership(ground), takes_slot=True)
     access = _slots(ground, parts.membership)
     roles = _roles(ground, parts, access, NoTimetable())
@@ -174,7 +174,7 @@ def _in_slots(ground: _Ground, rule: Rule, *on_copy: Callable[..., object]) -> C
         neighbors=ground.neighbors, gradient=ground.gradient, uplink=ground.uplink, repair=ground.repair,
         floods=ground.floods, roles=roles, access=access, relaying=relaying, contending=relaying, two_hops=None,
     )  # fmt: skip
-    return _protocol(ground, whole, *on_copy, parts.refresh.on_copy)
+    return _protocol(ground, whole, *hear_copies, parts.refresh)
 
 
 def _by_choice(ground: _Ground, membership: Membership, choice: RelayChoice) -> Clustered:
@@ -188,7 +188,7 @@ def _by_choice(ground: _Ground, membership: Membership, choice: RelayChoice) -> 
         floods=ground.floods, roles=roles, access=access, relaying=relaying, contending=contending,
         two_hops=relaying,
     )  # fmt: skip
-    return _protocol(ground, whole, parts.refresh.on_copy)
+    return _protocol(ground, whole, parts.refresh)
 
 
 def _slots(ground: _Ground, membership: Membership) -> SlotAccess:
@@ -224,7 +224,7 @@ def _by_timetable(ground: _Ground) -> Clustered:
         floods=ground.floods, roles=_roles(ground, parts, access, timetabling), access=access, relaying=relaying,
         contending=contending, two_hops=None, promises=promises,
     )  # fmt: skip
-    return _protocol(ground, whole, parts.refresh.on_copy, calls.on_copy)
+    return _protocol(ground, whole, parts.refresh, calls)
 
 
 def _admission(port: Port) -> Admission | None:
@@ -302,9 +302,9 @@ def _by_claims(ground: _Ground) -> Clustered:
     return _protocol(ground, whole)
 
 
-def _protocol(ground: _Ground, whole: Parts, *on_copy: Callable[..., object]) -> Clustered:
-    repaired = () if ground.repair is None else (ground.repair.on_copy,)
-    return Clustered(ground.port, whole, [*on_copy, *repaired])
+def _protocol(ground: _Ground, whole: Parts, *hear_copies: HearsCopies) -> Clustered:
+    repaired = () if ground.repair is None else (ground.repair,)
+    return Clustered(ground.port, whole, [*hear_copies, *repaired])
 
 
 RELAYS: Final[Mapping[str, Callable[[_Ground], Clustered]]] = {

@@ -8,8 +8,8 @@
 A packet has these two phases, told apart by the header's flags. Which part is which class is chosen in `build.py`.
 """
 
-from collections.abc import Callable, Mapping, Sequence
-from typing import NamedTuple
+from collections.abc import Mapping, Sequence
+from typing import Final, NamedTuple
 
 from fanet_mw.bus.messages import Reception, TxOutcome, TxStatus
 from fanet_mw.errors import DropReason, MalformedFrameError
@@ -17,7 +17,7 @@ from fanet_mw.node.contract import Port, RoutingProtocol
 from fanet_mw.node.neighbors import Neighbor, Neighbors
 from fanet_mw.node.packet import Packet, Relay
 from fanet_mw.node.reader import decoded
-from fanet_mw.routing.clustered.contract import Access, Relaying, Roles, TwoHops
+from fanet_mw.routing.clustered.contract import Access, HearsCopies, Relaying, Roles, TwoHops
 from fanet_mw.routing.clustered.forwarding.floods import Floods
 from fanet_mw.routing.clustered.forwarding.gradient import Gradient
 from fanet_mw.routing.clustered.forwarding.repair import Repair
@@ -30,7 +30,8 @@ from fanet_mw.wire.claims import MESSAGE_BYTES, Claims
 from fanet_mw.wire.digest import Digest, capacity
 from fanet_mw.wire.inner import Beacon
 
-_POSITION_BYTES = 61
+_DATA: Final = int(Kind.DATA)
+_POSITION_BYTES: Final = 61
 """HEARTBEAT and GLOBAL_POSITION_INT, which the application puts into a hello."""
 
 
@@ -56,11 +57,12 @@ class Parts(NamedTuple):
 class Clustered(RoutingProtocol):
     """Clustered, time-divided flooding at one node."""
 
-    def __init__(self, port: Port, parts: Parts, on_copy: Sequence[Callable[..., object]]) -> None:
-        """`on_copy`: what is to be called with the key of a packet, and `now_ns`, when another copy of it is heard."""
+    def __init__(self, port: Port, parts: Parts, hear_copies: Sequence[HearsCopies]) -> None:
         super().__init__(port)
         self.parts = parts
-        self._on_copy = tuple(on_copy)
+        self._hear_copies = tuple((part.pending, part.on_copy) for part in hear_copies)
+        """For each part that hears of copies, the keys that it waits for and its method: most copies are of no packet
+        that any part waits for."""
         timed = (parts.roles, parts.access, parts.contending, parts.repair)
         self._asks = tuple(part.next_wake_ns for part in timed if part is not None)
         """The methods that tell when a part wants to be woken; they are called after every reception."""
@@ -86,14 +88,14 @@ class Clustered(RoutingProtocol):
 
     def receive(self, packet: Packet, reception: Reception, *, now_ns: int) -> Sequence[Relay]:
         parts, header = self.parts, packet.header
-        flags = header.flags
-        parts.roles.on_sign_of_life(header.origin, born_ns=header.origin_us * US, now_ns=now_ns)
+        origin_us, _, origin, _, _, kind, hop_limit, _, _, flags = header
+        parts.roles.on_sign_of_life(origin, born_ns=origin_us * US, now_ns=now_ns)
         parts.floods.keep(packet, flooded=bool(flags & FLAG_FLOOD), now_ns=now_ns)
         if flags & FLAG_FLOOD:
-            at_once = header.kind != Kind.DATA and parts.roles.on_control(packet, reception.src, now_ns=now_ns)
+            at_once = kind != _DATA and parts.roles.on_control(packet, reception.src, now_ns=now_ns)
             return parts.relaying.on_flood(packet, reception, at_once=at_once, now_ns=now_ns)
         if flags & FLAG_TO_HEAD:
-            if header.hop_limit <= 1:
+            if hop_limit <= 1:
                 self._port.drop(DropReason.HOP_LIMIT, packet, now_ns=now_ns)
             else:
                 parts.access.forward(packet, start_ns=now_ns + self._lead_ns, now_ns=now_ns)
@@ -109,8 +111,9 @@ class Clustered(RoutingProtocol):
         return None if self.parts.promises is None else self.parts.promises.least_interval_ns(deadline_ns)
 
     def on_copy(self, key: int, *, now_ns: int) -> None:
-        for on_copy in self._on_copy:
-            on_copy(key, now_ns=now_ns)
+        for pending, on_copy in self._hear_copies:
+            if key in pending:
+                on_copy(key, now_ns=now_ns)
 
     def on_impersonation(self, packet: Packet, *, now_ns: int) -> None:
         self.parts.roles.on_impersonation(packet, now_ns=now_ns)

@@ -4,11 +4,12 @@
                ->  Access      when a packet that is to be flooded from here goes on the air, and what contends
                ->  Relaying    whether and when a flood that began elsewhere is passed on
                ->  TwoHops     what hellos say of the nodes within two hops, where a rule needs it
+               ->  HearsCopies parts that call off what they plan when another node has sent it
 
 Roles tell an access what a schedule has made of the node; no other part knows of any beside it. Instants are handed in.
 """
 
-from collections.abc import Mapping, Sequence
+from collections.abc import Container, Mapping, Sequence
 from typing import Protocol
 
 from fanet_mw.bus.messages import Reception
@@ -138,3 +139,14 @@ class TwoHops(Protocol):
 
     def on_claims(self, claims: Claims, beacon: Beacon, *, now_ns: int) -> None:
         """What a neighbor's hello says of its neighbors and itself."""
+
+
+class HearsCopies(Protocol):
+    """A part that plans to send packets, and gives up those that another node has sent meanwhile."""
+
+    @property
+    def pending(self) -> Container[int]:
+        """The keys (`duplicates.key_of`) of the packets whose copies matter to it: one object for good."""
+
+    def on_copy(self, key: int, *, now_ns: int) -> None:
+        """Take in that another node has sent such a packet."""

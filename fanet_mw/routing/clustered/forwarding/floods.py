@@ -14,6 +14,7 @@ from fanet_mw.routing.clustered.tdma.contention import Contention
 from fanet_mw.units import BROADCAST, S
 from fanet_mw.wire import FLAG_FLOOD, Kind
 
+_DATA: Final = int(Kind.DATA)
 _UPLINK_NS: Final = 1 * S
 """A packet should be flooded at most one flooding period and this after it was generated; else it may be repaired."""
 
@@ -30,7 +31,8 @@ class Floods:
 
     def keep(self, packet: Packet, *, flooded: bool, now_ns: int) -> None:
         """Keep a packet that is for all nodes, so that it can be repaired."""
-        if self._repair and packet.header.kind == Kind.DATA and packet.header.destination == BROADCAST:
+        header = packet.header
+        if self._repair and header.kind == _DATA and header.destination == BROADCAST:
             self._repair.hold(packet, flooded=flooded, expect_ns=now_ns + self._expect_ns, now_ns=now_ns)
 
     def control(self, kind: Kind, inner: bytes, *, now_ns: int) -> Packet:

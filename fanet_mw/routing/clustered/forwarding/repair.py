@@ -10,8 +10,9 @@ behind, stays lost.
 
 import heapq
 from collections import deque
-from collections.abc import Callable
-from itertools import islice
+from collections.abc import Callable, Sequence
+from itertools import compress
+from operator import ne
 from typing import Final, NamedTuple
 
 from fanet_mw.node.duplicates import key_of
@@ -31,6 +32,7 @@ _PER_HELLO: Final = 32
 """The most packets sent for one hello: 35 ms of airtime at 11 Mb/s and 1024 B."""
 _MOST_ORIGINS: Final = 4 * CAPACITY
 """The most holdings in one hello: four messages, 1028 bytes. Larger swarms state them in turns."""
+_new: Final = tuple.__new__  # for what is made once per packet
 
 
 class _Kept(NamedTuple):
@@ -51,12 +53,12 @@ class Repair:
         self._holdings: dict[int, Holding] = {}
         self._store: dict[int, _Kept] = {}
         """The packets kept, by key."""
-        self._order: deque[int] = deque()
-        """The keys of the store, oldest first."""
+        self._order: deque[tuple[int, int]] = deque()
+        """The keys of the store with the births of their packets [swarm us], in the order in which they came."""
         self._stored: dict[int, int] = {}
         """The number of packets of each origin in the store."""
-        self._pending: dict[int, int] = {}
-        """The instant at which each packet is to be sent, by key."""
+        self.pending: dict[int, int] = {}
+        """The instant at which each packet is to be sent, by key; a copy of another packet changes nothing here."""
         self._due: list[tuple[int, int]] = []
         self._turn = 0
         self.repaired = 0
@@ -65,32 +67,32 @@ class Repair:
 
     def hold(self, packet: Packet, *, flooded: bool, expect_ns: int, now_ns: int) -> None:
         """Keep a data packet that came by, or an own one; one not yet flooded should have been by `expect_ns`."""
-        header = packet.header
-        key = key_of(origin=header.origin, seq=header.seq)
-        holding = self._holdings.get(header.origin)
-        self._holdings[header.origin] = (
-            Holding(header.origin, header.seq, 0) if holding is None else holding.with_(header.seq)
-        )
+        header, store, order = packet.header, self._store, self._order
+        origin, seq = header.origin, header.seq
+        key = key_of(origin, seq)
+        holding = self._holdings.get(origin)
+        self._holdings[origin] = Holding(origin, seq, 0) if holding is None else holding.with_(seq)
         ripe_ns = now_ns + _FLOOD_OVER_NS if flooded else expect_ns
-        known = self._store.get(key)
+        known = store.get(key)
         if known is not None:
-            self._store[key] = _Kept(packet, min(ripe_ns, known.ripe_ns))
+            store[key] = _Kept(packet, min(ripe_ns, known.ripe_ns))
             return
-        self._store[key] = _Kept(packet, ripe_ns)
-        self._order.append(key)
-        self._stored[header.origin] = self._stored.get(header.origin, 0) + 1
-        self._forget(now_ns)
+        store[key] = _new(_Kept, (packet, ripe_ns))
+        order.append((key, header.origin_us))
+        self._stored[origin] = self._stored.get(origin, 0) + 1
+        if len(store) > self._capacity or order[0][1] < (now_ns - self._window_ns) // US:
+            self._forget(now_ns)
 
     def _forget(self, now_ns: int) -> None:
         """Drop what is too old to be repaired, and the oldest beyond the capacity."""
         horizon_us = (now_ns - self._window_ns) // US
         order, store = self._order, self._store
         while order:
-            header = store[order[0]].packet.header
-            if len(store) <= self._capacity and header.origin_us >= horizon_us:
+            key, born_us = order[0]
+            if len(store) <= self._capacity and born_us >= horizon_us:
                 return
-            del store[order.popleft()]
-            origin = header.origin
+            order.popleft()
+            origin = store.pop(key).packet.header.origin
             self._stored[origin] -= 1
             if not self._stored[origin]:
                 del self._stored[origin]
@@ -111,29 +113,29 @@ class Repair:
 
     def on_digest(self, digest: Digest, *, now_ns: int) -> None:
         """Plan to send what the neighbor lacks."""
-        told, held = {holding.origin: holding for holding in digest.holdings}, self._holdings
-        unlike = [origin for origin in self._stored if told.get(origin) != held[origin]]  # few: the rest is quick
-        missing = (
-            key_of(origin=origin, seq=seq)
-            for origin in unlike
-            if digest.complete or origin in told
-            for seq in held[origin].beyond(told.get(origin))
-        )
-        for key in islice((key for key in missing if self._ripe(key, now_ns)), _PER_HELLO):
-            self._plan(key, now_ns)
-
-    def _ripe(self, key: int, now_ns: int) -> bool:
-        kept = self._store.get(key)
-        return kept is not None and kept.ripe_ns <= now_ns and key not in self._pending
+        told, held, origins = digest.by_origin, self._holdings, self._stored
+        planned = 0
+        for origin in compress(origins, map(ne, map(told.get, origins), map(held.__getitem__, origins))):
+            theirs = told.get(origin)
+            if theirs is None and not digest.complete:
+                continue
+            for seq in held[origin].beyond(theirs):
+                key = key_of(origin, seq)
+                kept = self._store.get(key)
+                if kept is not None and kept.ripe_ns <= now_ns and key not in self.pending:
+                    self._plan(key, now_ns)
+                    planned += 1
+                    if planned == _PER_HELLO:
+                        return
 
     def _plan(self, key: int, now_ns: int) -> None:
         due_ns = now_ns + int(self._random() * _ASSESS_NS)
-        self._pending[key] = due_ns
+        self.pending[key] = due_ns
         heapq.heappush(self._due, (due_ns, key))
 
     def on_copy(self, key: int, *, now_ns: int) -> None:
         """Note that another node has sent a packet: the nodes around have it now."""
-        if self._pending.pop(key, None) is not None:
+        if self.pending.pop(key, None) is not None:
             self._put_off(key, now_ns)
 
     def _put_off(self, key: int, now_ns: int) -> None:
@@ -142,16 +144,19 @@ class Repair:
             self._store[key] = kept._replace(ripe_ns=now_ns + _AGAIN_NS)
 
     def next_wake_ns(self) -> int | None:
-        while self._due and self._pending.get(self._due[0][1]) != self._due[0][0]:
-            heapq.heappop(self._due)  # suppressed meanwhile
-        return self._due[0][0] if self._due else None
+        due = self._due
+        while due and self.pending.get(due[0][1]) != due[0][0]:
+            heapq.heappop(due)  # suppressed meanwhile
+        return due[0][0] if due else None
 
-    def due(self, *, now_ns: int) -> list[Packet]:
+    def due(self, *, now_ns: int) -> Sequence[Packet]:
         """Packets to flood once more, now."""
+        if not self._due or self._due[0][0] > now_ns:
+            return ()
         packets = []
         while (due_ns := self.next_wake_ns()) is not None and due_ns <= now_ns:
             _, key = heapq.heappop(self._due)
-            del self._pending[key]
+            del self.pending[key]
             kept = self._store.get(key)
             if kept is not None:
                 packets.append(kept.packet)

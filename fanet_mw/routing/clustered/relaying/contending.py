@@ -31,9 +31,10 @@ class ContendingRelaying:
         """No packet is known yet."""
 
     def on_flood(self, packet: Packet, reception: Reception, *, at_once: bool, now_ns: int) -> Sequence[Relay]:
-        if packet.header.destination == self._port.node:
+        header = packet.header
+        if header.destination == self._port.node:
             return ()
-        if packet.header.hop_limit <= 1:
+        if header.hop_limit <= 1:
             self._port.drop(DropReason.HOP_LIMIT, packet, now_ns=now_ns)
             return ()
         if at_once:

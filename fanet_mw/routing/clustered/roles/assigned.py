@@ -91,7 +91,9 @@ class AssignedRoles:
     # --- what the air brings --------------------------------------------------------------------------------------
 
     def on_sign_of_life(self, node: int, *, born_ns: int, now_ns: int) -> None:
-        actions = self.parts.failover.on_sign_of_life(node, born_ns=min(born_ns, now_ns), now_ns=now_ns)
+        if born_ns > now_ns:
+            born_ns = now_ns
+        actions = self.parts.failover.on_sign_of_life(node, born_ns=born_ns, now_ns=now_ns)
         if actions:
             self._do(actions, now_ns)
 

@@ -127,7 +127,7 @@ class Failover:
         """Handle a sign of life of a node."""
         self._liveness.on_sign_of_life(node, born_ns=born_ns)
         member = self._membership
-        if node != member.named_head or born_ns <= self._since_ns:
+        if born_ns <= self._since_ns or node != member.named_head:
             return []
         replaced = self.state is State.ACTING or (self.state is State.MEMBER and member.head != node)
         return [self._take(Event.HEAD_BACK, now_ns)] if replaced else []

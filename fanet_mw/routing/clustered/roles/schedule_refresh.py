@@ -31,6 +31,8 @@ class ScheduleRefresh:
         self._kept_ns = 0
         self.due_ns: int | None = None
         """The instant at which it is to be sent again; None: never."""
+        self.pending: set[int] = set()
+        """The keys of the packets that are to be sent again; a copy of another packet changes nothing here."""
 
     def keep(self, packet: Packet, part: int, authority: Authority, epoch: int, *, now_ns: int) -> None:
         """Keep an announcement that this node follows, or its own."""
@@ -38,6 +40,7 @@ class ScheduleRefresh:
             self._version, self._packets = (authority, epoch), {}
             self._kept_ns = now_ns  # not at each repetition, which with short periods would leave no time in between
         self._packets[part] = packet
+        self._plan(self.due_ns)
 
     def on_beacon(self, beacon: Beacon, *, now_ns: int) -> None:
         """Compare the schedule that a neighbor follows, as its beacon states."""
@@ -47,19 +50,31 @@ class ScheduleRefresh:
         theirs = Authority(beacon.term, beacon.leader)
         behind = not beacon.leader or theirs > authority
         if behind or (theirs == authority and 0 < ((epoch - beacon.epoch) & 0xFFFF) < 0x8000):
-            self.due_ns = now_ns + int(self._random() * _ASSESS_NS)
+            self._plan(now_ns + int(self._random() * _ASSESS_NS))
+
+    def _plan(self, due_ns: int | None) -> None:
+        """Send all packets of the announcement at this instant; None: do not send them."""
+        self.due_ns = due_ns
+        self.pending.clear()
+        if due_ns is not None:
+            self.pending.update(map(_key, self._packets.values()))
 
     def on_copy(self, key: int, *, now_ns: int) -> None:
         """Note that another node has sent the announcement again."""
-        if self.due_ns is not None and any(key == _key(packet) for packet in self._packets.values()):
-            self.due_ns, self._kept_ns = None, now_ns + _AGAIN_NS - _FLOOD_OVER_NS
+        if key in self.pending:
+            self._over(now_ns)
 
     def due(self, *, now_ns: int) -> list[Packet]:
         """The packets to flood once more now."""
         if self.due_ns is None or now_ns < self.due_ns:
             return []
-        self.due_ns, self._kept_ns = None, now_ns + _AGAIN_NS - _FLOOD_OVER_NS
+        self._over(now_ns)
         return [self._packets[part] for part in sorted(self._packets)]
+
+    def _over(self, now_ns: int) -> None:
+        """Give the flood that another node or this one has begun time to come to its end."""
+        self._plan(None)
+        self._kept_ns = now_ns + _AGAIN_NS - _FLOOD_OVER_NS
 
 
 def _key(packet: Packet) -> int:

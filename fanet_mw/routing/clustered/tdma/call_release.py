@@ -2,6 +2,7 @@
 
 from collections.abc import Sequence
 
+from fanet_mw.node.queue import TxQueue
 from fanet_mw.routing.clustered.tdma.root_release import TurnsInForce
 from fanet_mw.routing.clustered.tdma.turn_release import OwnTurn, TurnRelease
 
@@ -24,6 +25,11 @@ class CallRelease(TurnRelease):
         self._free_ns = turn.start_ns + 1
         self._arm(now_ns)
         return turn.start_ns
+
+    @property
+    def pending(self) -> TxQueue:
+        """The packets whose copies matter here."""
+        return self._queue
 
     def on_copy(self, key: int, *, now_ns: int) -> None:
         """Give up a packet (`duplicates.key_of`) that another node has sent."""

@@ -67,6 +67,19 @@ def test_a_flood_ends_where_it_was_meant_for(make_node: MakeNode, destination: i
     assert len(sent(node)) == relays
 
 
+@pytest.mark.parametrize(("copies", "relays"), [(0, 1), (1, 1), (2, 0)])
+def test_a_relay_that_waits_for_copies_is_given_up_when_enough_have_come(
+    make_node: MakeNode, copies: int, relays: int
+) -> None:
+    node = make_node(**{"clusters.relay": "counter", "clusters.counter": 3, "clusters.assess_ms": 500})
+    hear(node, data(flags=FLAG_FLOOD), filler(40))
+    for number in range(copies):
+        hear(node, data(flags=FLAG_FLOOD), filler(40), at_ns=1 * S + number)
+        hear(node, data(flags=FLAG_FLOOD)._replace(seq=6), filler(40), at_ns=1 * S + number)
+    node.wake(2 * S)
+    assert [header.seq for header in sent(node)].count(5) == relays, "copies of another packet do not count"
+
+
 @pytest.mark.parametrize(("origin", "leader"), [(LEADER, LEADER), (ANOTHER, 0)])
 def test_nobody_announces_for_another_leader(make_node: MakeNode, origin: int, leader: int) -> None:
     node = make_node(**{"clusters.flooding_period_s": 10, "clusters.count": 2})

@@ -56,3 +56,11 @@ def test_what_another_has_sent_meanwhile_is_not_sent_again(refresh: ScheduleRefr
     assert refresh.due_ns is None, "it has just been sent"
     refresh.on_beacon(follows(5, 1, 6), now_ns=12 * S)
     assert refresh.due_ns is not None
+
+
+def test_a_part_that_came_after_the_plan_is_given_up_with_the_others(refresh: ScheduleRefresh) -> None:
+    refresh.on_beacon(follows(5, 1, 6), now_ns=11 * S)
+    second = Packet(PACKET.header._replace(seq=4), b"second part")
+    refresh.keep(second, 1, OURS, EPOCH, now_ns=11 * S + 20 * MS)
+    refresh.on_copy(key_of(1, 4), now_ns=11 * S + 50 * MS)
+    assert refresh.due(now_ns=12 * S) == []

@@ -34,6 +34,7 @@ from fanet_mw.bus.messages import (
 from fanet_mw.bus.topics import Topics
 from fanet_mw.extensions import load
 from fanet_mw.node.node import Node
+from fanet_mw.node.reader import Reader
 from fanet_mw.routing import make_protocol
 from fanet_mw.scenario import Scenario
 from fanet_mw.units import Enu, NodeId, earliest
@@ -69,9 +70,10 @@ class Uav(Actor):
         applications: Sequence[Application] = (),
         onboard_map: OnboardMap = NO_MAP,
         hello_time: HelloTime | None = None,
+        reader: Reader | None = None,
     ) -> None:
         """`applications` are those of its user, beside what the scenario asks for; `onboard_map`: the map on board;
-        `hello_time`: what its hellos say of the time.
+        `hello_time`: what its hellos say of the time; `reader`: that of all nodes of a run.
         """
         topics = Topics(swarm)
         super().__init__(f"agent-{node}", (topics.radio_rx(node), topics.sensors(node)))
@@ -80,7 +82,7 @@ class Uav(Actor):
         self._prompt_ns = scenario.radio.handover_ns + scenario.radio.lead_ns
         """A reception later than this after its frame's end is too late for what has to follow a lead after the
         frame."""
-        self._node = Node(node, scenario, make_protocol, position=position)
+        self._node = Node(node, scenario, make_protocol, position=position, reader=reader)
         self._autopilot = Autopilot(node, position=position, telemetry_hz=scenario.nodes.telemetry_hz)
         self._reckoning = DeadReckoning()
         self._fixes = SteadyFix(sigma_m=scenario.world.gps_sigma_m, range_m=scenario.radio.range_m)

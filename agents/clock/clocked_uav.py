@@ -29,6 +29,7 @@ from fanet_mw.bus.messages import (
     TxStatus,
 )
 from fanet_mw.node.node import AnnouncedHello
+from fanet_mw.node.reader import Reader
 from fanet_mw.scenario import Scenario
 from fanet_mw.trace import ClockSampled, Record
 from fanet_mw.units import US, Enu, NodeId, S
@@ -66,6 +67,7 @@ class ClockedUav(Actor):
         position: Enu,
         applications: Sequence[Application] = (),
         onboard_map: OnboardMap = NO_MAP,
+        reader: Reader | None = None,
     ) -> None:
         self._clock = LocalClock(scenario.clock, seed=scenario.seed, node=node)
         self._time = swarm_time(scenario, node)
@@ -77,6 +79,7 @@ class ClockedUav(Actor):
             applications=applications,
             onboard_map=onboard_map,
             hello_time=_TimeInHellos(self._time, self._local_now_ns) if self._time.in_hellos else None,
+            reader=reader,
         )
         super().__init__(self._uav.name, self._uav.subscriptions)
         self._node = node
@@ -247,7 +250,13 @@ def make_uav(
     position: Enu,
     applications: Sequence[Application] = (),
     onboard_map: OnboardMap = NO_MAP,
+    reader: Reader | None = None,
 ) -> Uav | ClockedUav:
-    """A UAV as the scenario has it, with its host's clock or one of its own, a user's applications, a map."""
+    """A UAV as the scenario has it, with its host's clock or one of its own, a user's applications, a map.
+
+    The nodes of one run share a `reader` of frames.
+    """
     kind = ClockedUav if scenario.clock.modelled else Uav
-    return kind(scenario, node, swarm, position=position, applications=applications, onboard_map=onboard_map)
+    return kind(
+        scenario, node, swarm, position=position, applications=applications, onboard_map=onboard_map, reader=reader
+    )

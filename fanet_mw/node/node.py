@@ -20,7 +20,7 @@ from fanet_mw.node.header_check import HeaderCheck
 from fanet_mw.node.own_packets import OwnPackets
 from fanet_mw.node.packet import Packet, Relay
 from fanet_mw.node.port import NodePort
-from fanet_mw.node.reader import BUNDLE, shared_reader
+from fanet_mw.node.reader import BUNDLE, Reader
 from fanet_mw.scenario import Scenario
 from fanet_mw.trace import Delivered, Generated, Record
 from fanet_mw.units import BROADCAST, US, Enu, NodeId
@@ -49,8 +49,15 @@ class Node:
     """
 
     def __init__(
-        self, node: NodeId, scenario: Scenario, make_protocol: Callable[[Port], RoutingProtocol], *, position: Enu
+        self,
+        node: NodeId,
+        scenario: Scenario,
+        make_protocol: Callable[[Port], RoutingProtocol],
+        *,
+        position: Enu,
+        reader: Reader | None = None,
     ) -> None:
+        """`reader` is the one that the nodes of a run share; None: one of its own."""
         self.node = node
         self.scenario = scenario
         self.deliveries: list[Packet] = []
@@ -63,7 +70,7 @@ class Node:
         """The lifetime of a packet by its priority; the air may state any of 256."""
         for priority in wire.PRIORITIES.values():
             self._lifetimes_ns[priority] = scenario.routing.lifetime_ns(priority)
-        self._reader = shared_reader
+        self._reader = reader or Reader()
         self._duplicates = duplicates.DuplicateSet()
         self._header_check = HeaderCheck(node, scenario)
         self._own = OwnPackets(node, self._duplicates, most_bytes=scenario.radio.max_frame_bytes)

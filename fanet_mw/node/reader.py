@@ -1,10 +1,12 @@
 """Reads frames off the air: which packet a frame brings, in which phase, and, when asked, what the packet holds.
 
 In virtual time a broadcast is one object of bytes for all nodes that hear it, one after another: what the first of them
-has read serves the others. Nothing here depends on the node that reads. In real time every frame is read once.
+has read serves the others. So the nodes of one run share a reader; a node that is alone in its process has its own.
+What is remembered for the whole process depends on the bytes alone, whichever run and thread asks.
 """
 
 from collections.abc import Callable
+from functools import lru_cache
 from typing import Any, Final, TypeVar
 
 from fanet_mw import wire
@@ -32,7 +34,7 @@ def name_of(frame: bytes) -> int:
 
 
 class Reader:
-    """Reads frames; what was read of the latest is at hand."""
+    """Reads frames of one run; what was read of the latest is at hand."""
 
     def __init__(self) -> None:
         self.frame = b""
@@ -66,8 +68,6 @@ class Reader:
         return packet
 
 
-shared_reader: Final = Reader()
-"""The reader of all nodes of this process."""
 T = TypeVar("T")
 
 
@@ -88,17 +88,12 @@ class Decoded:
     """
 
     def __init__(self) -> None:
-        self._frame = b""
-        self._inside = _Inside()
-        """What was read inside that frame."""
-        self._latest: dict[bytes, _Inside] = {}
-        """What was read inside each of the latest packets, the oldest first."""
+        self._inside_of = lru_cache(maxsize=_LATEST)(lambda _: _Inside())
+        """What was read inside a packet, by the packet: a radio may hand over several frames to each node."""
 
     def of(self, frame: bytes, decode: Callable[[Content], T]) -> T:
         """What `decode` makes of a packet, routing header first; raises what it raises, each time."""
-        if frame is not self._frame:
-            self._look(frame)
-        inside = self._inside
+        inside = self._inside_of(frame)
         if decode in inside.messages:
             return inside.messages[decode]  # type: ignore[no-any-return]
         if inside.content is None:
@@ -106,22 +101,14 @@ class Decoded:
         found = inside.messages[decode] = decode(inside.content)
         return found
 
-    def _look(self, frame: bytes) -> None:
-        """Take up another packet, or one of the latest again: a radio may hand over several frames to each node."""
-        known = self._latest.get(frame)
-        if known is None:
-            known = self._latest[frame] = _Inside()
-            if len(self._latest) > _LATEST:
-                del self._latest[next(iter(self._latest))]
-        self._frame, self._inside = frame, known
-
 
 decoded: Final = Decoded().of
 """The decoder of all nodes of this process: a hello that forty of them hear is decoded once."""
 
 
+@lru_cache(maxsize=_LATEST)
 def packet_of(frame: bytes) -> Packet:
     """The packet in a frame, its header decoded; raises MalformedFrameError."""
-    if frame is not shared_reader.frame:
-        shared_reader.look(frame)
-    return shared_reader.packet or shared_reader.read()
+    reader = Reader()
+    reader.look(frame)
+    return reader.read()

@@ -16,6 +16,7 @@ from fanet_mw.bus.link_stats import LinkStats
 from fanet_mw.bus.messages import MavlinkTap, Message
 from fanet_mw.bus.topics import Topics
 from fanet_mw.hosts.virtual import VirtualHost
+from fanet_mw.node.reader import Reader
 from fanet_mw.scenario import Scenario
 from fanet_mw.trace import Record
 from fanet_mw.units import MS, NodeId, S
@@ -49,10 +50,16 @@ def actors_of(
     applications: Applications = no_applications,
 ) -> list[Actor]:
     """Every actor of a swarm: the world first, so that poses stand before any node transmits."""
-    starts, onboard_map = positions(scenario), map_on_board(scenario)
+    starts, onboard_map, reader = positions(scenario), map_on_board(scenario), Reader()
     uavs = [
         make_uav(
-            scenario, NodeId(n), swarm, position=starts[n - 1], applications=applications(n), onboard_map=onboard_map
+            scenario,
+            NodeId(n),
+            swarm,
+            position=starts[n - 1],
+            applications=applications(n),
+            onboard_map=onboard_map,
+            reader=reader,
         )
         for n in scenario.node_ids
     ]

@@ -1,6 +1,8 @@
 """Whole swarms in virtual time: every layer is the real one."""
 
+import sys
 from collections.abc import Callable
+from concurrent.futures import ThreadPoolExecutor
 from typing import Any
 
 import pytest
@@ -41,6 +43,20 @@ def test_the_same_seed_gives_the_same_trace_and_another_seed_another(quick: Outc
     first = finish(quick, out=None)["trace_sha256"]
     assert summary_of(catalog.find("quick"))["trace_sha256"] == first
     assert summary_of(catalog.find("quick", ["seed=2"]))["trace_sha256"] != first
+
+
+def test_runs_in_threads_of_one_process_do_not_touch_each_other(make_scenario: MakeScenario) -> None:
+    keys = {"duration_s": 6, "drain_s": 1, "nodes.count": 6, "traffic.interval_s": 0.1, "world.engine": "kinematic"}
+    scenarios = [make_scenario(**{**keys, "seed": seed}) for seed in (1, 2, 3)]
+    alone = [summary_of(scenario)["trace_sha256"] for scenario in scenarios]
+    before_s = sys.getswitchinterval()
+    sys.setswitchinterval(1e-6)  # threads take turns within the handling of one frame
+    try:
+        with ThreadPoolExecutor(len(scenarios)) as threads:
+            beside = [summary["trace_sha256"] for summary in threads.map(summary_of, scenarios)]
+    finally:
+        sys.setswitchinterval(before_s)
+    assert beside == alone
 
 
 def test_nodes_join_and_the_leader_makes_balanced_clusters(quick: Outcome) -> None:

@@ -22,7 +22,7 @@ MAKERS: Final[Mapping[str, str]] = {
     "counter": "fanet_mw.routing.storm:CounterBased",
     "geographic": "fanet_mw.routing.geographic:Geographic",
 }
-"""What makes each of this package's own protocols (`scenario.model.PROTOCOLS`), as MODULE:NAME."""
+"""What makes each of this package's own protocols (`scenario.routing.PROTOCOLS`), as MODULE:NAME."""
 
 
 def module_of(name: str) -> str:

@@ -15,7 +15,7 @@ from fanet_mw.bus.topics import Topics, node_of
 from fanet_mw.hosts.virtual import VirtualHost
 from fanet_mw.routing import MAKERS, control
 from fanet_mw.scenario import Scenario, config
-from fanet_mw.scenario.model import PROTOCOLS
+from fanet_mw.scenario.routing import PROTOCOLS
 from fanet_mw.trace import Delivered, Dropped, Generated, Record
 from fanet_mw.units import MS, US
 from sim.results.files import finish

@@ -4,7 +4,8 @@ from collections.abc import Iterator
 
 from fanet_mw.bus.messages import Message
 from fanet_mw.bus.topics import Topics
-from fanet_mw.scenario.model import PROTOCOLS, Scenario
+from fanet_mw.scenario import Scenario
+from fanet_mw.scenario.routing import PROTOCOLS
 from sim.world.engines.contract import Flags
 from sim.world.engines.energy import Energy
 from sim.world.environment.solids import Solids

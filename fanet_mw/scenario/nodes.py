@@ -1,0 +1,59 @@
+"""`[nodes]`: how many nodes there are, and where they start."""
+
+import math
+from typing import Annotated, Literal, Self
+
+from pydantic import Field, model_validator
+
+from fanet_mw.scenario.sections import (
+    Coordinate,
+    Count,
+    Length,
+    Rate,
+    Section,
+    SomeLength,
+)
+from fanet_mw.units import MAX_NODES
+
+
+class Nodes(Section):
+    """How many nodes there are and where they start. Node ids run from 1; node 1 is the leader."""
+
+    count: Annotated[int, Field(ge=1, le=MAX_NODES)] = 45
+    """Number of nodes; their ids are 1 to `count`."""
+    layout: Literal["grid", "disc", "line", "explicit"] = "grid"
+    """Where the nodes start: in a `grid`, at random places in a `disc`, in a `line`, or as `positions_m` says."""
+    spacing_m: SomeLength = 200.0
+    """`grid` and `line`: distance from one node to the next."""
+    radius_m: SomeLength = 100.0
+    """`disc`: its radius."""
+    columns: Count | None = None
+    """Grid columns; by default the widest near-square factorisation in the manner of 9 x 5."""
+    leader_at: Literal["first", "middle"] = "first"
+    """Layouts `grid` and `line`: node 1, the leader, stands at the first place, or at the one nearest to the middle;
+    the others take the remaining places in order."""
+    altitude_m: Length = 50.0
+    """Height at which the nodes start and fly; every layout but `explicit` uses it."""
+    on_ground: bool = False
+    """UAVs stand on the ground at the start and take off when told to; else they start at `altitude_m`."""
+    telemetry_hz: Rate = 1.0
+    """Native MAVLink telemetry of each node on its tap; 0 sends none."""
+    positions_m: tuple[tuple[Coordinate, Coordinate, Coordinate], ...] = ()
+    """Layout `explicit`: one [east, north, up] per node."""
+
+    @model_validator(mode="after")
+    def _explicit_has_positions(self) -> Self:
+        if self.layout == "explicit" and len(self.positions_m) != self.count:
+            raise ValueError(
+                f"nodes.positions_m has {len(self.positions_m)} entries; "
+                f'layout = "explicit" needs nodes.count = {self.count}'
+            )
+        return self
+
+
+def grid_columns(count: int) -> int:
+    """Columns of the default grid: the factorisation nearest to 9:5, else the square root rounded up."""
+    wanted = math.sqrt(count * 9 / 5)
+    divisors = [d for d in range(1, count + 1) if count % d == 0 and d * d >= count]
+    best = min(divisors, key=lambda d: abs(d - wanted))
+    return best if best <= 2 * wanted else math.ceil(wanted)

@@ -235,7 +235,9 @@ def test_a_confirmation_is_contradicted_by_what_is_heard_and_seen_later() -> Non
 def test_a_right_confirmation_is_not_contradicted() -> None:
     uav, contradictions = mistaken()
     uav.finds.known[1].confirmed = None
+    contradictions.review()
     uav.finds.on_found(Found(2 * S // US, 1, 57.0, 0.0, 4.0, 0.0, 4.0, 9, Standing.CONFIRMED), now_ns=S)
+    contradictions.review()
     pass_by(uav, (1, 2), second=10, sees=(Enu(0, 0, 0), Enu(57, 0, 0)))
     assert contradictions.review() == []
 

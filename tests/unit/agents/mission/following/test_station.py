@@ -146,6 +146,16 @@ def test_another_head_leads_on_from_where_the_leader_was_lost() -> None:
     assert abs(swarm.away_m(2, (3,))[0] - 2.2 * RADIUS_M) < 4
 
 
+def test_a_leader_that_hears_nobody_any_more_hovers() -> None:
+    swarm = Swarm(*one_cluster(2))
+    swarm.fly(20)
+    swarm.silent.add(1)
+    swarm.fly(10)
+    lost_at = swarm.at[1]
+    swarm.fly(10)
+    assert swarm.at[1] == lost_at
+
+
 def test_a_leader_hovers_at_the_end_of_its_route_and_without_one() -> None:
     places, clusters = one_cluster(2)
     swarm = Swarm(places, clusters, route=((60.0, 0.0),))

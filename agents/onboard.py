@@ -77,7 +77,7 @@ class Onboard:
         self._call(now_ns)
         self._messenger.start(now_ns)
         for application in self._applications:
-            application.start(_Port(self, application), now_ns)
+            application.start(_ApplicationPort(self, application), now_ns)
 
     def messages(self) -> Mapping[str, Any]:
         """The counters of messages in pieces; empty when there were none."""
@@ -191,7 +191,7 @@ class Onboard:
         self.arbitration.settle(now_ns)
 
 
-class _Port:
+class _ApplicationPort:
     """What one application is handed (`fanet_mw.application.AppPort`)."""
 
     def __init__(self, onboard: Onboard, application: Application) -> None:

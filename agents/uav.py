@@ -49,7 +49,7 @@ class NodeState(NamedTuple):
     """The nodes of each cluster as far as the node knows, by head; the head is the first of them."""
 
 
-class _Topics(NamedTuple):
+class _OutTopics(NamedTuple):
     """The topics of the messages that a UAV receives and sends."""
 
     transmit: str
@@ -78,7 +78,7 @@ class Uav(Actor):
         topics = Topics(swarm)
         super().__init__(f"agent-{node}", (topics.radio_rx(node), topics.sensors(node)))
         self._id = node
-        self._topics = _Topics(topics.radio_tx(node), topics.setpoint(node), topics.mavlink(node))
+        self._topics = _OutTopics(topics.radio_tx(node), topics.setpoint(node), topics.mavlink(node))
         self._prompt_ns = scenario.radio.handover_ns + scenario.radio.lead_ns
         """A reception later than this after its frame's end is too late for what has to follow a lead after the
         frame."""

@@ -29,7 +29,7 @@ MAX_FAULTS: Final = 1024
 _KINDS: Final = {Degrade: "degrade", Jam: "jam", Cut: "cut"}
 
 
-class _Standing(NamedTuple):
+class _FaultInForce(NamedTuple):
     """A fault in force; `number` distinguishes it from an ended fault of the same label."""
 
     fault: Fault
@@ -42,7 +42,7 @@ class Faults:
     def __init__(self, radio: Radio, *, stations: int, planned: Iterable[tuple[int, Control]] = ()) -> None:
         self._radio = radio
         self._stations = stations
-        self._standing: dict[str, _Standing] = {}
+        self._standing: dict[str, _FaultInForce] = {}
         self._number = 0
         self._agenda: list[tuple[int, int, Control | None, str, int]] = []
         """A heap of (instant, order, what begins; or the label and number of what ends)."""
@@ -89,7 +89,7 @@ class Faults:
 
     def _begin(self, fault: Fault, now_ns: int) -> None:
         self._number += 1
-        self._standing[fault.label] = _Standing(fault, self._number)
+        self._standing[fault.label] = _FaultInForce(fault, self._number)
         if fault.for_ns:
             self._push(now_ns + fault.for_ns, None, fault.label, self._number)
         self._note(fault, now_ns, active=True)

@@ -68,7 +68,7 @@ class _Flow:
 
 
 @dataclass
-class _Outgoing:
+class _OutgoingMessage:
     """One message that is to be confirmed."""
 
     number: int
@@ -103,7 +103,7 @@ class Sender:
         self._everyone = tuple(NodeId(other) for other in everyone if other != node)
         self._most_bytes = most_bytes
         self._round_trips = RoundTrips(wait_ns)
-        self._messages: dict[int, _Outgoing] = {}
+        self._messages: dict[int, _OutgoingMessage] = {}
         self._flows: dict[tuple[tuple[NodeId, ...], int, int], _Flow] = {}
         self._next_flow = 0
         self._next_number = 1
@@ -164,7 +164,7 @@ class Sender:
         flow.open.append(number)
         named = min(len(whom), _NAMED) if targets is None else len(whom)
         stride, pieces = self._division(data, port, named if len(whom) > 1 else 0)
-        message = _Outgoing(
+        message = _OutgoingMessage(
             number, flow, data, port, priority, stride, pieces, born_us, lifetime_ms, targets is None,
             dict.fromkeys(whom, 0),
         )  # fmt: skip
@@ -212,7 +212,7 @@ class Sender:
             self._window = min(_WINDOW, self._window + 1)
             self._close(message)
 
-    def _close(self, message: _Outgoing) -> None:
+    def _close(self, message: _OutgoingMessage) -> None:
         del self._messages[message.number]
         message.flow.open.remove(message.number)
         self._kept_bytes -= len(message.data)
@@ -243,7 +243,7 @@ class Sender:
                 packets += self._round(message, now_ns)
         return packets
 
-    def _round(self, message: _Outgoing, now_ns: int) -> list[PieceToSend]:
+    def _round(self, message: _OutgoingMessage, now_ns: int) -> list[PieceToSend]:
         """Send what is lacking; a target that has every piece is asked again by the last one."""
         whole, last = (1 << message.pieces) - 1, 1 << (message.pieces - 1)
         wanted = {target: (whole & ~held) or last for target, held in message.lacking.items()}
@@ -269,12 +269,12 @@ class Sender:
         heapq.heappush(self._timers, (message.again_ns, message.number))
         return packets
 
-    def _patience_ns(self, message: _Outgoing) -> int:
+    def _patience_ns(self, message: _OutgoingMessage) -> int:
         most_ns = max(map(self._round_trips.wait_ns, message.lacking), default=0)
         return most_ns << min(message.rounds - 1, _MOST_DOUBLINGS)
 
     def _packets(
-        self, message: _Outgoing, bits: int, destination: NodeId, named: tuple[NodeId, ...]
+        self, message: _OutgoingMessage, bits: int, destination: NodeId, named: tuple[NodeId, ...]
     ) -> list[PieceToSend]:
         open_before = [number for number in message.flow.open if number < message.number]
         previous = open_before[-1] if open_before else 0

@@ -32,7 +32,7 @@ _SEQ_MASK: Final = 0xFFFF_FFFF
 Address = tuple[str, int]
 
 
-class _Known(NamedTuple):
+class _KnownAddress(NamedTuple):
     """The address from which a node is heard, and when it was heard last."""
 
     address: Address
@@ -63,7 +63,7 @@ class UdpRadio:
         self._on_message = on_message
         self._hears = hears
         self._loop = asyncio.get_running_loop()
-        self._addresses: dict[NodeId, _Known] = {}
+        self._addresses: dict[NodeId, _KnownAddress] = {}
         """The address from which each node is heard."""
         self._waiting: dict[tuple[NodeId, int], asyncio.Event] = {}
         """The unicasts whose acknowledgement is awaited, by destination and sequence number."""
@@ -89,7 +89,7 @@ class UdpRadio:
             sock.setsockopt(socket.SOL_SOCKET, socket.SO_BROADCAST, 1)
             sock.settimeout(0)
             sock.bind(address)
-            transport, _ = await self._loop.create_datagram_endpoint(lambda: _Receiver(self._on_datagram), sock=sock)
+            transport, _ = await self._loop.create_datagram_endpoint(lambda: _Endpoint(self._on_datagram), sock=sock)
         except BaseException:
             sock.close()
             raise
@@ -199,7 +199,7 @@ class UdpRadio:
             return False
         if known is None and len(self._addresses) >= MOST_ADDRESSES:
             del self._addresses[min(self._addresses, key=lambda other: (self._addresses[other].heard_ns, other))]
-        self._addresses[node] = _Known(address, now_ns)
+        self._addresses[node] = _KnownAddress(address, now_ns)
         return True
 
     def _on_frame(self, datagram: Datagram, address: Address) -> None:
@@ -216,7 +216,7 @@ class UdpRadio:
             self._on_message(Reception(datagram.frame, datagram.src, self._now_ns(), _RSSI_UNKNOWN_DBM))
 
 
-class _Receiver(asyncio.DatagramProtocol):
+class _Endpoint(asyncio.DatagramProtocol):
     """Passes datagrams on. Errors that the network reports about datagrams sent (no receiver there) are ignored."""
 
     def __init__(self, take: Callable[[bytes, Address], None]) -> None:

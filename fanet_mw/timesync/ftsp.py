@@ -76,7 +76,7 @@ class Settings(NamedTuple):
 
 
 @dataclass(slots=True)
-class _Neighbor:
+class _LastBeacon:
     """The last beacon of a neighbor, and when its hellos ended by the own clock."""
 
     heard_ns: int
@@ -98,7 +98,7 @@ class TimeSync:
         self._fit = ClockFit(own.oscillator)
         self._rival: tuple[int, ClockFit, int] | None = None
         """Another reference that may be followed: its id, its pairs so far, and since when it has been considered."""
-        self._neighbors: dict[NodeId, _Neighbor] = {}
+        self._neighbors: dict[NodeId, _LastBeacon] = {}
         self._doubt_ns = int(_DOUBT_HELLOS * own.hello_ns)
         self._first = FirstBelief(
             own.oscillator,
@@ -150,7 +150,7 @@ class TimeSync:
         least = min(near, default=None)
         return None if least is None else min(255, least + 1)
 
-    def _is_fresh(self, neighbor: _Neighbor, local_ns: int) -> bool:
+    def _is_fresh(self, neighbor: _LastBeacon, local_ns: int) -> bool:
         return neighbor.reference == self.reference and not self._is_stale(neighbor.advanced_ns, local_ns)
 
     def _is_stale(self, news_ns: int, local_ns: int) -> bool:
@@ -225,17 +225,17 @@ class TimeSync:
         if beacon is not None and pair is not None:
             self._on_pair(neighbor, beacon, pair, local_ns)
 
-    def _neighbor(self, src: NodeId, local_ns: int) -> _Neighbor:
+    def _neighbor(self, src: NodeId, local_ns: int) -> _LastBeacon:
         found = self._neighbors.get(src)
         if found is None:
             if len(self._neighbors) >= _NEIGHBORS:
                 silent = min(sorted(self._neighbors), key=lambda node: self._neighbors[node].heard_ns)
                 del self._neighbors[silent]
-            found = self._neighbors[src] = _Neighbor(local_ns)
+            found = self._neighbors[src] = _LastBeacon(local_ns)
         found.heard_ns = local_ns
         return found
 
-    def _pair(self, neighbor: _Neighbor, src: NodeId, beacon: TimeBeacon, local_ns: int) -> Pair | None:
+    def _pair(self, neighbor: _LastBeacon, src: NodeId, beacon: TimeBeacon, local_ns: int) -> Pair | None:
         """Take in the state of a neighbor; returns the pair that its beacon completes, if the pair is admissible."""
         if beacon.node != src:
             self.counts["foreign"] += 1
@@ -261,7 +261,7 @@ class TimeSync:
             source=src,
         )  # fmt: skip
 
-    def _on_pair(self, neighbor: _Neighbor, beacon: TimeBeacon, pair: Pair, local_ns: int) -> None:
+    def _on_pair(self, neighbor: _LastBeacon, beacon: TimeBeacon, pair: Pair, local_ns: int) -> None:
         if self.reference is None:
             if not self._first.on_statement(NodeId(beacon.node), beacon.reference, pair, local_ns=local_ns):
                 self.counts["doubted"] += 1
@@ -276,7 +276,7 @@ class TimeSync:
         elif beacon.reference < self.reference or (not self.is_reference and self._is_stale(self._news_ns, local_ns)):
             self._consider(beacon.reference, pair, local_ns)
 
-    def _follow(self, neighbor: _Neighbor, pair: Pair, local_ns: int) -> None:
+    def _follow(self, neighbor: _LastBeacon, pair: Pair, local_ns: int) -> None:
         """Take in a pair from a neighbor that follows the same reference."""
         steps = self._fit.steps
         if self._fit.line is None:
@@ -293,7 +293,7 @@ class TimeSync:
         if neighbor.hops + 1 == self.hops(local_ns) and agrees:
             self._fit.add(pair)
 
-    def _note_news(self, neighbor: _Neighbor, local_ns: int) -> None:
+    def _note_news(self, neighbor: _LastBeacon, local_ns: int) -> None:
         """Note that the reference was alive a moment ago, if the neighbor is one whose time this node takes."""
         if self.is_reference or neighbor.reference != self.reference or not neighbor.trusted:
             return

@@ -107,7 +107,7 @@ def _median(values: list[float]) -> float | None:
 
 def _flown(scenario: Scenario, records: Iterable[Record]) -> dict[str, Any]:
     """Coverage and coherence; None where the trace has no positions."""
-    covered = Covered(scenario)
+    covered = OverflownCells(scenario)
     together = instants = 0
     nearly_all_ns: int | None = None
     nearest: list[Values] = []
@@ -175,7 +175,7 @@ def _is_one(near: Flags) -> bool:
         reached = further
 
 
-class Covered:
+class OverflownCells:
     """The cells of the area that have been overflown."""
 
     def __init__(self, scenario: Scenario) -> None:

@@ -18,7 +18,7 @@ from fanet_mw.errors import ConfigError
 from fanet_mw.scenario import Scenario
 from fanet_mw.trace import FlightModeChanged, MissionModeChanged, Planned, Posed, Record, parse
 from fanet_mw.units import Enu, NodeId, S
-from sim.results.mission import Covered, mission
+from sim.results.mission import OverflownCells, mission
 
 R = TypeVar("R", FlightModeChanged, MissionModeChanged, Planned)
 
@@ -86,7 +86,7 @@ class Replay:
 
     def coverage(self, t_s: float) -> float:
         """The share of the area that had been covered by an instant."""
-        covered = Covered(self.scenario)
+        covered = OverflownCells(self.scenario)
         for record in self.records:
             if isinstance(record, Posed) and record.t_ns <= t_s * S:
                 covered.add([(record.east_m, record.north_m, record.up_m)])

@@ -17,7 +17,7 @@ from fanet_mw.scenario import Scenario
 from fanet_mw.trace import Collided, FlightModeChanged, Posed, Record
 from fanet_mw.units import S
 from sim.results.files import finish
-from sim.results.mission import Covered
+from sim.results.mission import OverflownCells
 from sim.run.virtual import simulate
 from sim.scenarios import catalog
 from tests.tables.kept import KEPT, Kept, Run
@@ -99,7 +99,7 @@ def flown(case: Case, kept: Kept) -> list[Run]:
 
 def _half_covered_s(scenario: Scenario, records: Sequence[Record]) -> float | None:
     """When half of the area had come within range of a UAV."""
-    covered = Covered(scenario)
+    covered = OverflownCells(scenario)
     for record in records:
         if type(record) is Posed:
             covered.add([(record.east_m, record.north_m, record.up_m)])

@@ -30,7 +30,7 @@ _REPEAT_NS: Final = 6 * S
 _REPEATS: Final = 3
 
 
-class _Member(NamedTuple):
+class _HeardUav(NamedTuple):
     position: Enu
     heard_ns: int
     revision: int
@@ -45,7 +45,7 @@ class FormationPlanner:
         self._node = node
         self._expected = expected
         self._deploy_speed = deploy_speed_m_s
-        self._members: dict[int, _Member] = {}
+        self._members: dict[int, _HeardUav] = {}
         self._began_ns: int | None = None
         self.plan: Search | None = None
         self.to_tell: list[Search] = []
@@ -59,7 +59,7 @@ class FormationPlanner:
         """Take in the status of a UAV, this one or another."""
         before = self._members.get(status.node)
         if before is None or status.t_us * US >= before.heard_ns - S:
-            self._members[status.node] = _Member(
+            self._members[status.node] = _HeardUav(
                 status.position, min(now_ns, status.t_us * US), status.revision, leaves=status.charge == 0
             )
 
@@ -67,7 +67,7 @@ class FormationPlanner:
         """Take in that a neighbor was heard at a place."""
         before = self._members.get(node)
         revision, leaves = (before.revision, before.leaves) if before else (0, False)
-        self._members[node] = _Member(position, now_ns, revision, leaves=leaves)
+        self._members[node] = _HeardUav(position, now_ns, revision, leaves=leaves)
 
     def on_plan(self, plan: Search) -> bool:
         """Take in a plan that came over the air; True if it replaces the plan in force."""

@@ -19,7 +19,7 @@ _FORGOTTEN_NS: Final = 15 * S
 _OLDEST_S: Final = 255
 
 
-class _Known(NamedTuple):
+class _KnownBid(NamedTuple):
     eta_ds: int
     serial: int
     stood_ns: int
@@ -30,7 +30,7 @@ class Auction:
 
     def __init__(self, node: NodeId) -> None:
         self._node = node
-        self._bids: dict[int, dict[int, _Known]] = {}
+        self._bids: dict[int, dict[int, _KnownBid]] = {}
         self._serial = 0
 
     def bid(self, survivor: int, *, eta_s: float, now_ns: int) -> None:
@@ -54,7 +54,7 @@ class Auction:
             if bid.bidder == self._node:
                 self._serial = max(self._serial, bid.serial)
             elif known is None or (bid.serial, stood_ns) > (known.serial, known.stood_ns):
-                of_task[bid.bidder] = _Known(bid.eta_ds, bid.serial, stood_ns)
+                of_task[bid.bidder] = _KnownBid(bid.eta_ds, bid.serial, stood_ns)
 
     def close(self, survivor: int) -> None:
         """Forget the bids for a task that is done."""
@@ -101,8 +101,8 @@ class Auction:
 
     def _place(self, survivor: int, eta_ds: int, now_ns: int) -> None:
         self._serial = (self._serial + 1) & 0xFFFF
-        self._bids.setdefault(survivor, {})[self._node] = _Known(eta_ds, self._serial, now_ns)
+        self._bids.setdefault(survivor, {})[self._node] = _KnownBid(eta_ds, self._serial, now_ns)
 
-    def _counts(self, bidder: int, known: _Known, now_ns: int) -> bool:
+    def _counts(self, bidder: int, known: _KnownBid, now_ns: int) -> bool:
         """True for a bid of this node, or one that its bidder has confirmed lately."""
         return bidder == self._node or now_ns - known.stood_ns <= _FORGOTTEN_NS

@@ -32,7 +32,7 @@ def make(scenario: Scenario, out: Path, *, swarm: str, hosts: Iterable[str] = ()
     try:
         out.mkdir(parents=True, exist_ok=True)
         with tempfile.TemporaryDirectory() as folder, ThreadPoolExecutor() as pool:
-            authority = _Authority(Path(folder), days=days)
+            authority = _CertificateAuthority(Path(folder), days=days)
             settings = list(pool.map(lambda name: authority.settings(name, names), [ROUTER, *participants]))
         settings[0]["access_control"] = access_control(participants)
         for name, content in zip([ROUTER, *participants], settings, strict=True):
@@ -50,7 +50,7 @@ def _subject(host: str) -> str:
         return f"DNS:{host}"
 
 
-class _Authority:
+class _CertificateAuthority:
     """Signs certificates; its files are in a folder that is removed with it."""
 
     def __init__(self, folder: Path, *, days: int) -> None:

@@ -61,7 +61,7 @@ class _Host(BaseModel):
     unread_receptions: Count = 0
 
 
-class _Shape(BaseModel):
+class _Checked(BaseModel):
     """The keys that are read must be present; whatever else a report holds is kept."""
 
     model_config = ConfigDict(extra="allow", strict=True)
@@ -69,25 +69,25 @@ class _Shape(BaseModel):
     host: _Host | None = None
 
 
-class _Frames(_Shape):
+class _Frames(_Checked):
     sent: Count
     delivered: Count
     in_flight: Count
     dropped: Reasons
 
 
-class _Requests(_Shape):
+class _Requests(_Checked):
     all: Count
     before_restart: Count
 
 
-class _Copies(_Shape):
+class _Copies(_Checked):
     on_air: Count
     received: Count
     lost: Reasons
 
 
-class _Air(_Shape):
+class _AirReport(_Checked):
     pdr: Share | None
     busy: Number
     mean_retries: Number | None
@@ -95,7 +95,7 @@ class _Air(_Shape):
     throughput_mbps: Number
 
 
-class _Late(_Shape):
+class _Late(_Checked):
     late_frames: Count
     frames: Count
     p50_ms: Number
@@ -103,12 +103,12 @@ class _Late(_Shape):
     max_ms: Number
 
 
-class _Emulator(_Shape):
+class _Emulator(_Checked):
     kind: Literal["emulator"]
     frames: _Frames
     requests: dict[str, _Requests]
     copies: _Copies
-    air: _Air
+    air: _AirReport
     late: _Late
     poses: Count
     controls: Count
@@ -116,12 +116,12 @@ class _Emulator(_Shape):
     handed: Reasons
 
 
-class _Separation(_Shape):
+class _SeparationReport(_Checked):
     least_m: Number | None = None
     losses: Count = 0
 
 
-class _World(_Shape):
+class _WorldReport(_Checked):
     kind: Literal["world"]
     engine: str
     ticks: Count
@@ -130,11 +130,11 @@ class _World(_Shape):
     crashed: Count = 0
     no_fly_entries: Count = 0
     least_charge: Number | None = None
-    separation: _Separation
+    separation: _SeparationReport
     malformed: Count
 
 
-class _Agent(_Shape):
+class _Agent(_Checked):
     kind: Literal["agent"]
     node: Count
     generated: Count
@@ -147,7 +147,7 @@ class _Agent(_Shape):
     bound_ms: Number | None = None
 
 
-_SHAPES: Final[dict[str, type[_Shape]]] = {"emulator": _Emulator, "world": _World}
+_SHAPES: Final[dict[str, type[_Checked]]] = {"emulator": _Emulator, "world": _WorldReport}
 
 
 class BusChecks:

@@ -13,7 +13,7 @@ from fanet_mw.units import NodeId
 from fanet_mw.wire.claims import Claims, HeardNeighbor, SlotStatus
 
 
-class _Entry(NamedTuple):
+class _HeardClaims(NamedTuple):
     heard_ns: int
     claims: Claims
 
@@ -28,7 +28,7 @@ class Neighborhood:
         self._node = node
         self._lifetime_ns = lifetime_ns
         self._rank = rank
-        self._entries: dict[NodeId, _Entry] = {}
+        self._entries: dict[NodeId, _HeardClaims] = {}
         self._relays: tuple[NodeId, ...] = ()
         self._belongs: bool | None = None
         """True if this node is a relay of the dominating set; None when that must be computed anew."""
@@ -38,7 +38,7 @@ class Neighborhood:
         if claims.node == self._node:
             return False
         known = self._entries.get(claims.node)
-        self._entries[claims.node] = _Entry(now_ns, claims)
+        self._entries[claims.node] = _HeardClaims(now_ns, claims)
         if known is None or _matters(known.claims) != _matters(claims):
             self._belongs = None
         return known is None or known.claims != claims

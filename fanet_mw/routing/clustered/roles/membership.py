@@ -15,7 +15,7 @@ from fanet_mw.units import US, NodeId
 from fanet_mw.wire.inner import Member, Role, Schedule
 
 
-class Standing(NamedTuple):
+class ClusterPlace(NamedTuple):
     """A node's place in its cluster; head 0 means none."""
 
     role: Role = Role.ISOLATED
@@ -33,7 +33,7 @@ class Version(NamedTuple):
     epoch: int
 
 
-_NOWHERE = Standing()
+_NOWHERE = ClusterPlace()
 
 
 class Membership:
@@ -47,7 +47,7 @@ class Membership:
         self.succession: tuple[NodeId, ...] = ()
         """The members of this node's cluster: the head first, then the nodes that stand in for it in this order."""
         self._parts: dict[int, Schedule] = {}
-        self._named: Standing | None = None
+        self._named: ClusterPlace | None = None
         """The last role that a schedule gave; it holds until all relevant parts of a newer schedule have come."""
         self._told = False
         """True if this version has given the node's role."""
@@ -142,7 +142,7 @@ class Membership:
         )
         self.succession = (head, *(NodeId(m.node) for m in own if m.node != head))
         known, self._told = self._told, True
-        self._named = Standing(Role.HEAD if mine.is_head else Role.MEMBER, mine.cluster, head)
+        self._named = ClusterPlace(Role.HEAD if mine.is_head else Role.MEMBER, mine.cluster, head)
         return None if known else Event.NAMED_HEAD if mine.is_head else Event.NAMED_MEMBER
 
     def obey(self) -> None:

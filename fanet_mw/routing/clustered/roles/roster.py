@@ -19,7 +19,7 @@ _SURE: Final = 0.9
 """The share of the range within which a link is certain, because places are accurate to a tenth of the range."""
 
 
-class _Report(NamedTuple):
+class _SilentNode(NamedTuple):
     """That a node is silent; if it is a head, the node that reports it serves its cluster meanwhile."""
 
     by: NodeId
@@ -43,7 +43,7 @@ class Roster:
         self._objection_ns = objection_ns
         self._sure_m = sure_m
         self._motions: dict[NodeId, Motion] = {}
-        self._reports: dict[NodeId, _Report] = {}
+        self._reports: dict[NodeId, _SilentNode] = {}
 
     def __contains__(self, node: NodeId) -> bool:
         return node in self._motions
@@ -74,7 +74,7 @@ class Roster:
         """
         if silent not in self._motions or not self._was_near(silent, there):
             return None
-        known = self._reports.get(silent, _Report(by, now_ns, there.at_ns))
+        known = self._reports.get(silent, _SilentNode(by, now_ns, there.at_ns))
         self._reports[silent] = known._replace(by=by)
         return known.since_ns + self._objection_ns
 

@@ -143,7 +143,7 @@ class Flood:
         self._offers = None
 
 
-class _Turn(NamedTuple):
+class _FilledTurn(NamedTuple):
     """The content of a turn, as bit sets of the rows that send, are meant, hear one sender, and hear more than one."""
 
     sending: int = 0
@@ -152,10 +152,10 @@ class _Turn(NamedTuple):
     deaf: int = 0
 
 
-_EMPTY: Final = _Turn()
+_EMPTY: Final = _FilledTurn()
 _Offer = tuple[int, int, int, int]
 """An offer: its worth, minus the flood's number, the row, its receivers."""
-_Choice = tuple[int, list[_Offer], _Turn]
+_Choice = tuple[int, list[_Offer], _FilledTurn]
 """A choice: the worth of all its offers, these offers, and the turn with them."""
 
 
@@ -235,7 +235,7 @@ class Packing:
         keyed = [(worth + int(random() * _NOISE), index) for index, (worth, _, _, _) in enumerate(offers)]
         return [offers[index] for _, index in sorted(keyed, reverse=True)]
 
-    def _choose(self, offers: Sequence[_Offer], there: _Turn, following: int) -> _Choice:
+    def _choose(self, offers: Sequence[_Offer], there: _FilledTurn, following: int) -> _Choice:
         """Take one offer after the other if it disturbs none taken before; no receiver gets the same packet twice."""
         sending, meant, disturbed, deaf = there
         disturbs = self._disturbs
@@ -261,7 +261,7 @@ class Packing:
             served[number] = served.get(number, 0) | receivers
             total += worth
             chosen.append(offer)
-        return total, chosen, _Turn(sending, meant, disturbed, deaf)
+        return total, chosen, _FilledTurn(sending, meant, disturbed, deaf)
 
 
 def _will_be_late(left: int, turns: int, *, done: int, within: int) -> bool:

@@ -180,7 +180,7 @@ class Wave:
         self._offers = None
 
 
-class _Turn(NamedTuple):
+class _RepeatingTurn(NamedTuple):
     """The content of a turn, as bit sets of the rows that send, must not send, and may be deaf for a while after it."""
 
     sending: int = 0
@@ -197,7 +197,7 @@ class RedundantPacking:
         self._turns = geometry.turns
         self._hop_turns = geometry.hop_turns
         self._pace = pace
-        self._filled = [_Turn()] * geometry.turns
+        self._filled = [_RepeatingTurn()] * geometry.turns
 
     def place(self, waves: Sequence[Wave]) -> bool:
         """Give every wave its turns; returns False when there are not enough turns."""
@@ -236,7 +236,7 @@ class RedundantPacking:
             for other in receivers:
                 barred |= self._network.disturbing(row, other) | 1 << other
                 served[number] = served.get(number, 0) | 1 << other
-            there = _Turn(there.sending | 1 << row, barred)
+            there = _RepeatingTurn(there.sending | 1 << row, barred)
             under_way[number].send(offset, row, receivers, hop_turns=self._hop_turns)
             if under_way[number].done:
                 del under_way[number]

@@ -159,7 +159,7 @@ def _workers(jobs: int | None, scheduler: str | None, plan: "SweepPlan", *, dry_
 
         cores = len(os.sched_getaffinity(0))
         return Pool(max(1, min(jobs or cores, len(plan.todo))))
-    from sim.sweep.cluster import DaskCluster
+    from sim.sweep.dask_cluster import DaskCluster
 
     return DaskCluster(scheduler)
 

@@ -1,4 +1,7 @@
-"""A method is understood in at most two classes: what it calls with `super()` calls no `super()` of the same name."""
+"""A method is understood in at most two classes: what it calls with `super()` calls no `super()` of the same name.
+
+Constructors are left out: each names what it hands on.
+"""
 
 import ast
 from collections.abc import Iterator

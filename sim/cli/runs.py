@@ -58,7 +58,13 @@ def simulate(
     with _progress(chosen, quiet=output.json) as tell, capture as file, interrupts.handed_to(signals.append):
         if file is not None:
             file.pcap.epoch_unix_ns = EPOCH_UNIX_NS
-        outcome = run(chosen, on_progress=tell, capture=file.pcap if file else None, signals=signals)
+        outcome = run(
+            chosen,
+            on_progress=tell,
+            capture=file.pcap if file else None,
+            signals=signals,
+            spool_folder=output.out,
+        )
     return _finish(outcome, output)
 
 

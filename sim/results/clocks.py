@@ -4,7 +4,7 @@ A node knows only its own estimate of swarm time; how long a packet took and how
 """
 
 from collections import defaultdict
-from collections.abc import Mapping, Sequence
+from collections.abc import Collection, Mapping, Sequence
 from typing import Any
 
 import numpy as np
@@ -12,14 +12,15 @@ import numpy.typing as npt
 
 from fanet_mw.trace import ClockSampled, Delivered, Generated, Record
 from fanet_mw.units import US, S
+from sim.run.collecting.overflow import TraceLog
 from sim.run.collecting.stored_records import of
 from sim.run.outcome import Outcome
 
 
-def true_delays(records: Sequence[Record]) -> list[Record]:
+def true_delays(records: TraceLog) -> Collection[Record]:
     """The records with delays from the true instant of generation; a delay stays where that instant is not recorded."""
-    born = {(record.node, record.seq): record.t_ns for record in records if type(record) is Generated}
-    return [_true_delay(record, born) if type(record) is Delivered else record for record in records]
+    born = {(record.node, record.seq): record.t_ns for record in of(records, Generated)}
+    return records.changed(lambda record: _true_delay(record, born))
 
 
 def _true_delay(record: Delivered, born: Mapping[tuple[int, int], int]) -> Delivered:

@@ -4,6 +4,7 @@ import gc
 import time
 from collections.abc import Callable, Iterator, Sequence
 from contextlib import contextmanager
+from pathlib import Path
 from signal import Signals
 from typing import Final
 
@@ -18,10 +19,10 @@ from fanet_mw.bus.topics import Topics
 from fanet_mw.hosts.virtual import VirtualHost
 from fanet_mw.node.reader import Reader
 from fanet_mw.scenario import Scenario
-from fanet_mw.trace import Record
 from fanet_mw.units import MS, NodeId, S
 from sim.results.clocks import true_delays
 from sim.results.links import LinkTotals
+from sim.run.collecting.overflow import TapLog, TraceLog
 from sim.run.outcome import Outcome
 from sim.world.environment.map_on_board import map_on_board
 from sim.world.mobility.layout import positions
@@ -73,14 +74,16 @@ def simulate(
     capture: Capture | None = None,
     signals: Sequence[int] = (),
     applications: Applications = no_applications,
+    spool_folder: Path | None = None,
 ) -> Outcome:
     """Run a scenario to its end, or until `signals` holds a signal's number: then the outcome is what there is so far.
 
     `applications` gives those of the user for each node, beside what the scenario asks for. `on_progress` is told the
-    simulated seconds that have passed. Raises KeyboardInterrupt with the signal's number when that comes before
+    simulated seconds that have passed. What a long run collects is kept in a file without a name in `spool_folder`, by
+    default the folder for temporary files. Raises KeyboardInterrupt with the signal's number when that comes before
     anything has been simulated.
     """
-    observed = Observed(scenario, capture=capture, applications=applications)
+    observed = Observed(scenario, capture=capture, applications=applications, folder=spool_folder)
     began = time.perf_counter()
     with _no_collector():
         _run(observed.host, scenario, on_progress, signals)
@@ -92,12 +95,18 @@ class Observed:
     """The actors of a scenario on their host, and what is heard of them."""
 
     def __init__(
-        self, scenario: Scenario, *, capture: Capture | None = None, applications: Applications = no_applications
+        self,
+        scenario: Scenario,
+        *,
+        capture: Capture | None = None,
+        applications: Applications = no_applications,
+        folder: Path | None = None,
     ) -> None:
+        """What is too long for memory is kept in a nameless file in `folder`, by default that for temporary files."""
         self.scenario = scenario
-        self.records: list[Record] = []
+        self.records = TraceLog(folder)
         self.names = Topics(scenario.name)
-        self._taps: list[tuple[int, bytes]] = []
+        self._taps = TapLog(folder)
         self._links = LinkTotals()
         self.actors = actors_of(scenario, scenario.name, capture=capture, applications=applications)
         self.host = VirtualHost(

@@ -105,7 +105,7 @@ def test_a_whole_mission_goes_as_it_does_when_the_worlds_truth_is_poisoned_for_e
         for lie in (False, True)
     )
     assert sum(isinstance(record, Confirmed) for record in poisoned.records) >= 2
-    assert poisoned.records == clean.records
+    assert list(poisoned.records) == list(clean.records)
     refused = [report["bus_malformed"] for name, report in poisoned.reports.items() if name.startswith("agent-")]
     assert min(refused) > 100, "every UAV was told, and took in nothing"  # type: ignore[type-var]
 

@@ -7,7 +7,7 @@ A mission costs a minute of CPU or more, so those that were flown are kept (`kep
 import itertools
 import statistics
 import time
-from collections.abc import Iterator, Mapping, Sequence
+from collections.abc import Collection, Iterator, Mapping, Sequence
 from typing import Final, NamedTuple
 
 import numpy as np
@@ -97,7 +97,7 @@ def flown(case: Case, kept: Kept) -> list[Run]:
     return [kept.of(case.with_seed(seed)) for seed in case.seeds]
 
 
-def _half_covered_s(scenario: Scenario, records: Sequence[Record]) -> float | None:
+def _half_covered_s(scenario: Scenario, records: Collection[Record]) -> float | None:
     """When half of the area had come within range of a UAV."""
     covered = OverflownCells(scenario)
     for record in records:
@@ -108,7 +108,7 @@ def _half_covered_s(scenario: Scenario, records: Sequence[Record]) -> float | No
     return None
 
 
-def _nearest_m(records: Sequence[Record]) -> Iterator[np.ndarray]:
+def _nearest_m(records: Collection[Record]) -> Iterator[np.ndarray]:
     """Second by second, how far each flying UAV is from the one nearest to it."""
     instants: dict[int, list[tuple[float, float, float]]] = {}
     for record in records:

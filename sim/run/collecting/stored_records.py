@@ -11,6 +11,7 @@ from typing import Any, Final, TypeVar, get_args, overload
 
 from fanet_mw import trace
 from fanet_mw.trace import Delivered, Generated, Record
+from sim.run.collecting.overflow import TraceLog
 from sim.run.collecting.spool import Spool, in_order
 
 T = TypeVar("T")
@@ -168,7 +169,7 @@ def of(records: Iterable[Record], kind: type[A], other: type[B], third: type[C],
 def of(records: Iterable[Record], *kinds: type[Record]) -> Iterator[Record]: ...
 def of(records: Iterable[Record], *kinds: type[Any]) -> Iterator[Any]:
     """The records of some kinds, in the order of the trace."""
-    if isinstance(records, StoredRecords):
+    if isinstance(records, StoredRecords | TraceLog):
         return records.of(kinds)
     return (record for record in records if type(record) in kinds)
 

@@ -8,6 +8,7 @@ from fanet_mw.scenario import Scenario
 from fanet_mw.trace import ClockSampled, Delivered, Generated, Record
 from fanet_mw.units import MS, US, S
 from sim.results.clocks import clock_errors, true_delays
+from sim.run.collecting.overflow import TraceLog
 from sim.run.outcome import Outcome
 
 MakeScenario = Callable[..., Scenario]
@@ -39,5 +40,7 @@ def test_an_error_beyond_its_bound_is_counted_by_however_little(
 
 def test_delays_run_from_the_true_instant_of_generation() -> None:
     believed = Delivered(30 * MS, 2, 1, 7, 3 * MS, 1)
-    found = true_delays([Generated(10 * MS, 1, 7, "traffic", 100), believed, believed._replace(seq=8)])
+    log = TraceLog()
+    log.extend([Generated(10 * MS, 1, 7, "traffic", 100), believed, believed._replace(seq=8)])
+    found = true_delays(log)
     assert [record.delay_ns for record in found if isinstance(record, Delivered)] == [20 * MS, 3 * MS]

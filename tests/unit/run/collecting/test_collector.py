@@ -104,7 +104,7 @@ def replay(ear: Ear, outcome: Outcome) -> None:
     for name, content in outcome.reports.items():
         ear.say(NAMES.report(name), Report(name, END_NS, json.dumps(content)))
     for node in SCENARIO.node_ids:
-        for t_ns, data in outcome.taps[node :: SCENARIO.nodes.count]:
+        for t_ns, data in [*outcome.taps][node :: SCENARIO.nodes.count]:
             ear.say(NAMES.mavlink(node), MavlinkTap(t_ns, data))
 
 

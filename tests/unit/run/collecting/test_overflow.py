@@ -1,0 +1,82 @@
+"""What a run in virtual time collects stays in order and whole, in memory or on disk; memory holds only the latest."""
+
+import tracemalloc
+from pathlib import Path
+
+import pytest
+
+from fanet_mw.errors import DropReason
+from fanet_mw.trace import Delivered, Dropped, Generated, Posed, Record, line
+from sim.run.collecting.overflow import TapLog, TraceLog
+from sim.run.collecting.stored_records import lines, of
+
+MOST = 7
+"""So few records are kept in memory here."""
+
+
+def record(number: int) -> Record:
+    """A record of the trace of all numbers: mostly deliveries, as in a run."""
+    match number % 10:
+        case 0:
+            return Generated(number, 1, number, "load", 1024)
+        case 3:
+            return Posed(number, 2, number / 3, -0.0, 50.0)
+        case 6:
+            return Dropped(number, 3, DropReason.EXPIRED, 1, number)
+        case _:
+            return Delivered(number, 65_534, 1, 2**32 - 1, -number, 255, 2**40)
+
+
+def log_of(count: int, *, folder: Path | None = None, most: int = MOST) -> TraceLog:
+    log = TraceLog(folder, most_in_memory=most)
+    for number in range(count):
+        log.extend([record(number)])
+    return log
+
+
+@pytest.mark.parametrize("count", [0, MOST - 1, MOST, MOST + 1, 5 * MOST, 5 * MOST + 3])
+def test_a_trace_is_read_as_it_was_made_wherever_it_is(count: int) -> None:
+    log, whole = log_of(count), [record(number) for number in range(count)]
+    assert (len(log), list(log), list(log)) == (count, whole, whole)
+    assert b"".join(lines(log)).decode() == "".join(f"{line(one)}\n" for one in whole)
+
+
+@pytest.mark.parametrize("kinds", [(Delivered,), (Posed,), (Posed, Generated), (Delivered, Dropped)])
+def test_a_reader_gets_the_kinds_it_asks_for_in_order(kinds: tuple[type[Record], ...]) -> None:
+    whole = [record(number) for number in range(5 * MOST + 3)]
+    assert list(of(log_of(len(whole)), *kinds)) == [one for one in whole if type(one) in kinds]
+
+
+def test_deliveries_are_changed_wherever_they_are() -> None:
+    changed = log_of(5 * MOST + 3).changed(lambda delivered: delivered._replace(delay_ns=1))
+    expected = [one._replace(delay_ns=1) if type(one) is Delivered else one for one in map(record, range(5 * MOST + 3))]
+    assert list(changed) == expected
+    assert list(of(changed, Delivered)) == [one for one in expected if type(one) is Delivered]
+
+
+def test_where_no_file_can_be_made_everything_stays_in_memory(tmp_path: Path) -> None:
+    log = log_of(5 * MOST, folder=tmp_path / "not there")
+    assert list(log) == [record(number) for number in range(5 * MOST)]
+
+
+def test_telemetry_is_read_as_it_was_heard() -> None:
+    log, whole = TapLog(most_in_memory=MOST), [(number, b"frame %d" % number) for number in range(3 * MOST + 1)]
+    for tap in whole:
+        log.append(tap)
+    assert (len(log), list(log)) == (len(whole), whole)
+    assert whole[3] in log
+
+
+def test_memory_does_not_grow_with_a_run() -> None:
+    tracemalloc.start()
+    try:
+        log = log_of(2_000, most=1_000)
+        before, _ = tracemalloc.get_traced_memory()
+        log.extend(record(number) for number in range(20_000))
+        for number in range(20_000):
+            log.extend([record(number)])
+        after, _ = tracemalloc.get_traced_memory()
+    finally:
+        tracemalloc.stop()
+    assert len(log) == 42_000
+    assert after - before < 1_000_000, "a thousand records are some 300 kB, all of them some 10 MB"

@@ -7,7 +7,7 @@ from collections.abc import Callable, Mapping
 from pathlib import Path
 from typing import Final, NamedTuple
 
-from tests.tables import attacks, emulator, flight, installations, mission, missions, protocol
+from tests.tables import attacks, emulator, flight, formation_flight, installations, mission, missions, protocol
 from tests.tables.markdown import Rows, Tolerance
 
 DOCUMENTS: Final = Path(__file__).parents[2] / "docs"
@@ -52,6 +52,7 @@ TABLES: Final[Mapping[str, Table]] = {
         "results/mission.md", mission.over_networks_whole, Tolerance(absolute=0.05, relative=0.1)
     ),
     "flight": Table("results/flight.md", flight.measured, Tolerance(absolute=0.02, relative=0.02)),
+    "formation-flight": Table("explanation/formation-flight.md", formation_flight.measured, Tolerance(relative=0.05)),
     "places": Table("results/missions.md", missions.places, Tolerance(absolute=0.05, relative=0.02)),
     "shapes": Table("results/missions.md", missions.shapes, Tolerance(absolute=1, relative=0.05)),
     "keeping-clear": Table("results/missions.md", missions.keeping_clear, Tolerance(absolute=0.05, relative=0.02)),

@@ -13,10 +13,14 @@ from emulator.medium import Medium
 from fanet_mw.bus.messages import Poses, TxRequest
 from fanet_mw.bus.topics import Topics
 from fanet_mw.scenario import config
-from fanet_mw.units import BROADCAST, MS, NodeId
+from fanet_mw.units import BROADCAST, MS, US, NodeId
 
 COMPILING_NOTICE: Final = "compiling the emulator's kernel, once: about half a minute"
 """What to tell the user before `warm_up` when `must_compile` is true."""
+
+_MOVE_NS: Final = 50 * US
+"""The shortest frame takes longer than this."""
+_MOVES: Final = 60
 
 
 def must_compile() -> bool:
@@ -40,7 +44,7 @@ def _marker() -> Path:
 
 
 def _run(radio: Mapping[str, object]) -> None:
-    """Let two stations send a few frames, with new poses while one of them is on the air."""
+    """Let two stations send a few frames, with new poses so often that some come while a frame is on the air."""
     scenario = config.build({"nodes": {"count": 2}, "clusters": {"count": 1}, "radio": radio})
     topics = Topics("warm-up")
     medium = Medium(scenario, "warm-up")
@@ -52,7 +56,8 @@ def _run(radio: Mapping[str, object]) -> None:
     medium.receive(topics.pose, poses(0, 100.0), 0)
     medium.receive(topics.radio_tx(1), TxRequest(0, 0, b"x", BROADCAST, wants_status=False), 0)
     medium.receive(topics.radio_tx(1), TxRequest(1, 0, b"x" * 500, NodeId(2), wants_status=True), 0)
-    medium.receive(topics.pose, poses(MS, 120.0), MS)
+    for step in range(1, _MOVES + 1):
+        medium.receive(topics.pose, poses(step * _MOVE_NS, 100.0 + step), step * _MOVE_NS)
     medium.next_wake_ns()
     medium.stop(20 * MS)
 

@@ -35,7 +35,9 @@ class Course(NamedTuple):
     """A command to the flight controller: fly there and hold; a speed of 0 means back to the formation."""
 
     position: Enu
+    """The place to fly to [m]."""
     speed_m_s: float
+    """The speed on the way there."""
     velocity: Enu | None = None
     """If given, the UAV flies at this velocity until the next command; the position is where that leads."""
     land: bool = False
@@ -50,6 +52,7 @@ class Received(NamedTuple):
     destination: NodeId
     """The id of this node, or BROADCAST."""
     priority: int
+    """1: safety, 2: report, 3: bulk; 0 is control traffic."""
     born_ns: int
     """The instant at which the application handed it over, by the origin's clock; never later than now."""
     hops: int
@@ -82,6 +85,7 @@ class Data(NamedTuple):
     port: int
     """The port, 1 to 65535."""
     data: bytes
+    """The bytes, which arrive as they are; they are sent in pieces when they are long."""
 
 
 class Fate(StrEnum):
@@ -113,6 +117,7 @@ class Status(NamedTuple):
     handle: int
     """What `AppPort.send` returned."""
     fate: Fate
+    """What has become of it."""
     t_ns: int
     """When it became so."""
     reason: DropReason | None = None
@@ -133,10 +138,12 @@ class AppPort(Protocol):
     """What a node offers to one of its applications."""
 
     @property
-    def node(self) -> NodeId: ...
+    def node(self) -> NodeId:
+        """The id of this node."""
 
     @property
-    def scenario(self) -> Scenario: ...
+    def scenario(self) -> Scenario:
+        """The scenario that this run follows."""
 
     @property
     def position(self) -> Enu:

@@ -19,10 +19,14 @@ class Enu(NamedTuple):
     """A vector in east, north, up: metres, or metres per second for a velocity."""
 
     east: float
+    """The component to the east."""
     north: float
+    """The component to the north."""
     up: float
+    """The component upwards."""
 
     def minus(self, other: "Enu") -> "Enu":
+        """The vector from another one to this one."""
         return Enu(self.east - other.east, self.north - other.north, self.up - other.up)
 
     def norm(self) -> float:

@@ -124,6 +124,7 @@ class Emulated:
     swarm: str | None = None
     """The name of the swarm; by default that of the scenario."""
     zenoh_config: Path | None = None
+    """Zenoh's own configuration (TLS, access lists): a file, or a folder of `fanet keys`; None: plain TCP."""
     patience_s: float = _PATIENCE_S
     """The time for which the router is waited for."""
     position: Enu = _ORIGIN
@@ -157,8 +158,11 @@ class OnAir:
     endpoint: str | None = None
     """The Zenoh endpoint of a router that keeps the swarm's clock; None: there is no router."""
     swarm: str | None = None
+    """The name of the swarm; by default that of the scenario."""
     zenoh_config: Path | None = None
+    """Zenoh's own configuration (TLS, access lists): a file, or a folder of `fanet keys`; None: plain TCP."""
     position: Enu = _ORIGIN
+    """The position of the node until its first fix."""
 
     @contextlib.asynccontextmanager
     async def attach(

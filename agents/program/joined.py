@@ -31,7 +31,9 @@ class Node:
 
     def __init__(self, scenario: Scenario, node: NodeId, drive: Drive, mailbox: Mailbox) -> None:
         self.id = node
+        """The id of the node in the swarm."""
         self.scenario = scenario
+        """The scenario of the swarm."""
         self._sending = Sending(node, scenario.nodes.count)
         self._drive = drive
         self._mailbox = mailbox

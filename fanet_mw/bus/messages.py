@@ -119,14 +119,18 @@ class Gps(NamedTuple):
     """World -> one UAV: its position and velocity according to its receiver."""
 
     t_ns: int
+    """The swarm instant of the fix."""
     position: Enu
+    """The position [m], with the error of the receiver."""
     velocity: Enu
+    """The velocity [m/s], with the error of the receiver."""
 
 
 class WifiScan(NamedTuple):
     """World -> one UAV: the phones that it receives, strongest first."""
 
     t_ns: int
+    """The swarm instant of the reading."""
     heard: tuple[tuple[int, float], ...]
     """(survivor id, RSSI dBm)."""
 
@@ -146,7 +150,9 @@ class Camera(NamedTuple):
     """World -> one UAV: the people in one image of its downward camera; an image without any is not told."""
 
     t_ns: int
+    """The swarm instant of the reading."""
     people: tuple[Person, ...]
+    """The people in the image, each with bearing and elevation [rad] and size [pixels]."""
 
 
 class Call(NamedTuple):
@@ -165,7 +171,9 @@ class Voice(NamedTuple):
     """World -> one UAV: the voices that its microphones made out; silence is not told."""
 
     t_ns: int
+    """The swarm instant of the reading."""
     calls: tuple[Call, ...]
+    """The voices, each with bearing and elevation [rad], level and signal-to-noise ratio [dB]."""
 
 
 class Echo(NamedTuple):
@@ -184,13 +192,16 @@ class Radar(NamedTuple):
     """World -> one UAV: the returns of one scan, nearest first; a scan without any is not told."""
 
     t_ns: int
+    """The swarm instant of the reading."""
     echoes: tuple[Echo, ...]
+    """The returns, each with range [m], bearing and elevation [rad], closing speed [m/s] and SNR [dB]."""
 
 
 class Altimeter(NamedTuple):
     """World -> one UAV: its height by air pressure, and its height over whatever is below."""
 
     t_ns: int
+    """The swarm instant of the reading."""
     up_m: float
     """The height by the barometer, which is noisy and drifts slowly."""
     above_ground_m: float | None
@@ -201,15 +212,20 @@ class Inertial(NamedTuple):
     """World -> one UAV: its velocity by inertial sensors and optical flow; needs no GPS, and drifts."""
 
     t_ns: int
+    """The swarm instant of the reading."""
     velocity: Enu
+    """The velocity [m/s]."""
 
 
 class Battery(NamedTuple):
     """World -> one UAV: the state of its battery."""
 
     t_ns: int
+    """The swarm instant of the reading."""
     voltage_v: float
+    """The voltage at its terminals."""
     current_a: float
+    """The current that is drawn from it."""
     charge: float
     """Share of the capacity that is left, 0 to 1."""
 

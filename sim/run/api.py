@@ -70,12 +70,13 @@ class Launched:
 
     def __init__(self, scenario: Scenario, swarm: SwarmRun) -> None:
         self.scenario = scenario
+        """The scenario that is run."""
         self.processes = swarm.processes
         """Its processes, by name."""
         self.radio = Emulated(endpoint=swarm.address.endpoint, swarm=swarm.address.swarm, patience_s=READY_TIMEOUT_S)
         """The radio by which a node that was left out joins: `join(swarm.scenario, node=3, radio=swarm.radio)`."""
         self.result: Result | None = None
-        """Once the block is left."""
+        """What came of the run, once the block is left; None before."""
         self._swarm = swarm
 
     def stop(self) -> None:
@@ -210,6 +211,7 @@ class VirtualSwarm:
         overrides: Sequence[str] = (),
     ) -> None:
         self.scenario = scenario_of(scenario, seed=seed, overrides=overrides)
+        """The scenario that is run, with its seed and all overrides."""
         self._time = _Time(self.scenario, _by_node(applications))
         self._nodes: dict[int, Node] = {}
         self._began_s = time.perf_counter()

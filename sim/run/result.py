@@ -14,6 +14,7 @@ class Result:
 
     def __init__(self, outcome: Outcome) -> None:
         self.outcome = outcome
+        """The run as the functions of `sim.results` read it; its shape is no part of the promise."""
 
     @cached_property
     def summary(self) -> Mapping[str, Any]:

@@ -381,6 +381,18 @@ def test_hellos_keep_out_of_the_turns(node: Node, due_ms: int, earliest_ms: int,
     assert earliest_ms * MS <= request.start_ns <= latest_ms * MS
 
 
+def test_a_join_does_not_take_the_place_of_an_announcement_that_waits(node: Node) -> None:
+    """Over lossy links a leader says in its turns which neighbor has fallen silent, too."""
+    access = access_of(node)
+    access._plans.in_order = [planned(FLOODS)._replace(odds=Odds({US: (0.0,)}), calls=(20,))]
+    access.use_turns(1050 * MS)
+    access.flood_control(Kind.SCHEDULE, filler(40), now_ns=1050 * MS)
+    access.flood_control(Kind.JOIN, filler(40), now_ns=1051 * MS)
+    assert access.waiting() == 2
+    access.flood_control(Kind.SCHEDULE, filler(40), now_ns=1052 * MS)
+    assert access.waiting() == 2, "a newer one does"
+
+
 @pytest.mark.parametrize(("nodes", "states"), [(5, True), (4, False)])
 def test_a_likely_delay_is_stated_only_when_all_of_the_swarm_are_in_the_timetable(
     node: Node, nodes: int, states: bool

@@ -9,10 +9,10 @@ from typing import Final
 
 from tests.tables.kept import KEPT, Kept, OutOfTime
 from tests.tables.mission import SMALL, WHOLE
-from tests.tables.missions import CLEAR, PLACES, SHAPES, Case, fly
+from tests.tables.missions import CLEAR, COUNTRY, PLACES, SHAPES, Case, fly
 
 TABLES: Final[Mapping[str, Mapping[str, Case]]] = {
-    "places": PLACES, "shapes": SHAPES, "keeping-clear": CLEAR, "mission-network": SMALL,
+    "places": PLACES, "country": COUNTRY, "shapes": SHAPES, "keeping-clear": CLEAR, "mission-network": SMALL,
     "mission-network-whole": WHOLE,
 }  # fmt: skip
 

@@ -54,6 +54,7 @@ TABLES: Final[Mapping[str, Table]] = {
     "flight": Table("results/flight.md", flight.measured, Tolerance(absolute=0.02, relative=0.02)),
     "formation-flight": Table("explanation/formation-flight.md", formation_flight.measured, Tolerance(relative=0.05)),
     "places": Table("results/missions.md", missions.places, Tolerance(absolute=0.05, relative=0.02)),
+    "country": Table("results/missions.md", missions.country, Tolerance(absolute=0.05, relative=0.02)),
     "shapes": Table("results/missions.md", missions.shapes, Tolerance(absolute=1, relative=0.05)),
     "keeping-clear": Table("results/missions.md", missions.keeping_clear, Tolerance(absolute=0.05, relative=0.02)),
     "installations": Table(

@@ -8,6 +8,8 @@ older than that; the packet lifetime ends it long before.
 
 from typing import Final
 
+from fanet_mw.node.packet import Packet
+
 DELIVERED: Final = 1
 """Handed to the application of this node, or originated by it."""
 FLOODED: Final = 2
@@ -24,6 +26,11 @@ dict looks for a number by its low bits: packets that all origins send at about 
 def key_of(origin: int, seq: int) -> int:
     """One number for each pair of origin and sequence number; `seq` has 32 bits."""
     return origin * _SPREAD + seq
+
+
+def key_of_packet(packet: Packet) -> int:
+    """The key of a packet."""
+    return key_of(packet.header.origin, packet.header.seq)
 
 
 class DuplicateSet:

@@ -9,7 +9,7 @@ from collections.abc import Mapping
 from types import MappingProxyType
 from typing import Final
 
-from fanet_mw.node.duplicates import key_of
+from fanet_mw.node.duplicates import key_of_packet
 from fanet_mw.node.packet import Packet
 from fanet_mw.scenario import Routing
 from fanet_mw.units import US
@@ -22,10 +22,6 @@ def sooner_us(routing: Routing) -> Mapping[int, int]:
     """The time by which a class expires sooner than `routing.lifetime_s`, by priority."""
     whole_ns = routing.lifetime_ns(-1)
     return {p: (whole_ns - routing.lifetime_ns(p)) // US for p in (PRIORITY_SAFETY, PRIORITY_REPORT)}
-
-
-def _key(packet: Packet) -> int:
-    return key_of(origin=packet.header.origin, seq=packet.header.seq)
 
 
 class TxQueue:
@@ -44,11 +40,11 @@ class TxQueue:
 
     def __contains__(self, key: object) -> bool:
         """True if a packet with this key (`duplicates.key_of`) is queued."""
-        return bool(self._entries) and any(_key(entry[2]) == key for entry in self._entries)
+        return bool(self._entries) and any(key_of_packet(entry[2]) == key for entry in self._entries)
 
     def remove(self, key: int) -> None:
         """Give up a packet, if it is queued."""
-        self._entries = [entry for entry in self._entries if _key(entry[2]) != key]
+        self._entries = [entry for entry in self._entries if key_of_packet(entry[2]) != key]
 
     def push(self, packet: Packet, *, rank: int | None = None) -> Packet | None:
         """Add a packet; return the one that had to go for it (perhaps itself), or None.

@@ -131,9 +131,9 @@ def _apply(tree: dict[str, Any], override: str) -> None:
         table = inner
     if isinstance(table, list):
         _entry(table, last, override)
-        table[int(last)] = _value(text.strip())
+        table[int(last)] = one_value(text.strip())
     else:
-        table[last] = _value(text.strip())
+        table[last] = one_value(text.strip())
 
 
 def _entry(entries: list[Any], part: str, override: str) -> Any:  # noqa: ANN401  (a value of a TOML file)
@@ -159,7 +159,8 @@ def _plain(key: str, value: object, problems: list[str], path: str) -> object:
     return value if number is None else number
 
 
-def _value(text: str) -> object:
+def one_value(text: str) -> object:
+    """The value of some TOML text; what is no TOML is a string, so that names need no quotes."""
     try:
         return tomllib.loads(f"value = {text}")["value"]
     except tomllib.TOMLDecodeError:

@@ -2,7 +2,7 @@
 
 import math
 from collections.abc import Callable
-from itertools import accumulate, pairwise
+from itertools import pairwise
 from typing import Final
 
 from fanet_mw.bounds.delay_bound import Bounded
@@ -10,8 +10,7 @@ from fanet_mw.bounds.paper import cluster_estimate
 from fanet_mw.units import S
 from sim.figures.claims import Claim, Reason, above, below
 from sim.figures.recipe import Drawing, Recipe, point
-from sim.figures.runs import Quantity, Row, Runs, differences
-from sim.figures.statistics import Interval, interval
+from sim.figures.runs import Quantity, Row, Runs, arrived, differences
 from sim.figures.style import LOOKS, band, canvas, legend_above, plain_log
 from sim.sweep.measures import DELAY_EDGES_S
 
@@ -58,12 +57,6 @@ _OF_ALL: Final = _share_within(_WITHIN_S, of_all=True)
 _OF_DELIVERIES: Final = _share_within(_WITHIN_S, of_all=False)
 
 
-def _arrived(runs: Runs, case: str) -> list[Interval]:
-    """The share of packets x targets that has arrived by each edge of the classes of delay."""
-    sums = [[had / row["wanted"] for had in accumulate(row["delay_counts"])] for row in runs.where(case=case)]
-    return [interval(column) for column in zip(*sums, strict=True)][: len(DELAY_EDGES_S)]
-
-
 def _kept(row: Row) -> float | None:
     """Of packets x targets for which a bound was stated, the share that arrived within it."""
     stated = row["bound.stated_share"]
@@ -74,12 +67,12 @@ def draw(runs: Runs) -> Drawing:
     figure, (histogram, cdf) = canvas(2)
     data = []
     for case in _CASES:
-        arrived, look = _arrived(runs, case), LOOKS[case]
-        if not arrived:
+        by_edge, look = arrived(runs, case), LOOKS[case]
+        if not by_edge:
             continue
-        means = [one.mean for one in arrived]
+        means = [one.mean for one in by_edge]
         cdf.plot(DELAY_EDGES_S, means, color=look.color, linestyle=look.dash, label=look.label)
-        band(cdf, look, DELAY_EDGES_S, arrived, most=1.0)
+        band(cdf, look, DELAY_EDGES_S, by_edge, most=1.0)
         drawn = means[::_CLASSES]
         histogram.stairs(
             [later - earlier for earlier, later in pairwise([0.0, *drawn])], [0.0, *DELAY_EDGES_S[::_CLASSES]],
@@ -87,7 +80,7 @@ def draw(runs: Runs) -> Drawing:
         )  # fmt: skip
         data += [
             point(one, series=case, delay_s=edge, share=one.mean - before)
-            for edge, one, before in zip(DELAY_EDGES_S, arrived, [0.0, *means], strict=False)
+            for edge, one, before in zip(DELAY_EDGES_S, by_edge, [0.0, *means], strict=False)
         ]
     paper, ours = paper_bound_s(), max(runs.per_seed("bound.worst_ms", case="ours").values(), default=None)
     for axes in (histogram, cdf):

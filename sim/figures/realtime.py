@@ -1,12 +1,10 @@
 """Beyond the paper: the delays of a swarm of processes, laid over those of the same swarm in virtual time."""
 
-from itertools import accumulate
 from typing import Final
 
 from sim.figures.claims import Claim, below
 from sim.figures.recipe import Drawing, Recipe, point
-from sim.figures.runs import Quantity, Runs, differences
-from sim.figures.statistics import Interval, interval
+from sim.figures.runs import Quantity, Runs, arrived, differences
 from sim.figures.style import SERIES, band, canvas, legend_above, plain_log
 from sim.sweep.measures import DELAY_EDGES_S
 
@@ -20,24 +18,18 @@ _APART_MS: Final = 20.0
 _LATE: Final = 0.001
 
 
-def _arrived(runs: Runs, case: str) -> list[Interval]:
-    """By each edge of the classes of delay, the share of packets x targets that has arrived."""
-    sums = [[had / row["wanted"] for had in accumulate(row["delay_counts"])] for row in runs.where(case=case)]
-    return [interval(column) for column in zip(*sums, strict=True)][: len(DELAY_EDGES_S)]
-
-
 def draw(runs: Runs) -> Drawing:
     figure, panels = canvas(len(_PROTOCOLS), share_y=True)
     data = []
     for letter, axes, (protocol, name) in zip("ab", panels, _PROTOCOLS.items(), strict=True):
         for host, look in _HOSTS.items():
-            arrived = _arrived(runs, f"{protocol}, {host}")
-            means = [one.mean for one in arrived]
+            by_edge = arrived(runs, f"{protocol}, {host}")
+            means = [one.mean for one in by_edge]
             axes.plot(DELAY_EDGES_S[: len(means)], means, color=look.color, linestyle=look.dash, label=look.label)
-            band(axes, look, DELAY_EDGES_S[: len(means)], arrived, most=1.0)
+            band(axes, look, DELAY_EDGES_S[: len(means)], by_edge, most=1.0)
             data += [
                 point(one, protocol=protocol, host=host, delay_s=edge)
-                for one, edge in zip(arrived, DELAY_EDGES_S, strict=False)
+                for one, edge in zip(by_edge, DELAY_EDGES_S, strict=False)
             ]
         axes.set_title(f"({letter}) {name}")
         axes.set_xscale("log")

@@ -1,11 +1,13 @@
 """The finished runs of a sweep, looked up by case and settings: one value per seed, in the order of the seeds."""
 
 from collections.abc import Callable, Mapping
+from itertools import accumulate
 from typing import Any
 
 from pyarrow import Table
 
 from sim.figures.statistics import Interval, interval
+from sim.sweep.measures import DELAY_EDGES_S
 
 Row = Mapping[str, Any]
 Quantity = str | Callable[[Row], float | None]
@@ -41,6 +43,12 @@ class Runs:
     def levels(self, key: str, **settings: object) -> list[Any]:
         """The values of a setting that occur, ascending."""
         return sorted({row[key] for row in self.where(**settings) if row[key] is not None})
+
+
+def arrived(runs: Runs, case: str) -> list[Interval]:
+    """The share of packets x targets that has arrived by each edge of the classes of delay."""
+    sums = [[had / row["wanted"] for had in accumulate(row["delay_counts"])] for row in runs.where(case=case)]
+    return [interval(column) for column in zip(*sums, strict=True)][: len(DELAY_EDGES_S)]
 
 
 def differences(left: Mapping[int, float], right: Mapping[int, float]) -> list[float]:

@@ -1,10 +1,10 @@
-"""Values as TOML text and back, as `--set KEY=VALUE` has them. `toml_value` and `one_value` are inverse."""
+"""Values as TOML text and back, as `--set KEY=VALUE` has them. `toml_value` and `config.one_value` are inverse."""
 
 import json
-import tomllib
 from collections.abc import Iterator, Mapping
 
 from fanet_mw.errors import ConfigError
+from fanet_mw.scenario.config import one_value
 
 _OPENING = "[{"
 _CLOSING = "]}"
@@ -25,14 +25,6 @@ def toml_value(value: object) -> str:
             return f"{{{', '.join(f'{key} = {toml_value(item)}' for key, item in value.items())}}}"
         case _:
             raise ConfigError(f"{value!r} is no value of a scenario key")
-
-
-def one_value(text: str) -> object:
-    """The value of some TOML text; what is no TOML is a string, so that names need no quotes."""
-    try:
-        return tomllib.loads(f"value = {text}")["value"]
-    except tomllib.TOMLDecodeError:
-        return text
 
 
 def axis(text: str) -> tuple[str, list[object]]:

@@ -5,10 +5,11 @@ from hypothesis import given
 from hypothesis import strategies as st
 
 from fanet_mw.errors import ConfigError
+from fanet_mw.scenario.config import one_value
 from sim.cli.sweep import asked
 from sim.sweep import spec
 from sim.sweep.tasks import tasks_of
-from sim.sweep.toml_values import axis, one_value, toml_value
+from sim.sweep.toml_values import axis, toml_value
 
 FILE = """
 base = "flooding"

@@ -8,7 +8,7 @@ as in Trickle (RFC 6206). While all nodes agree, nothing is sent.
 from collections.abc import Callable
 from typing import Final
 
-from fanet_mw.node.duplicates import key_of
+from fanet_mw.node.duplicates import key_of_packet
 from fanet_mw.node.packet import Packet
 from fanet_mw.routing.clustered.roles.lease import Authority
 from fanet_mw.units import MS
@@ -57,7 +57,7 @@ class ScheduleRefresh:
         self.due_ns = due_ns
         self.pending.clear()
         if due_ns is not None:
-            self.pending.update(map(_key, self._packets.values()))
+            self.pending.update(map(key_of_packet, self._packets.values()))
 
     def on_copy(self, key: int, *, now_ns: int) -> None:
         """Note that another node has sent the announcement again."""
@@ -75,7 +75,3 @@ class ScheduleRefresh:
         """Give the flood that another node or this one has begun time to come to its end."""
         self._plan(None)
         self._kept_ns = now_ns + _AGAIN_NS - _FLOOD_OVER_NS
-
-
-def _key(packet: Packet) -> int:
-    return key_of(origin=packet.header.origin, seq=packet.header.seq)

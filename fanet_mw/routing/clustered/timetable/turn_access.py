@@ -11,7 +11,7 @@ from typing import Final
 
 from fanet_mw.errors import DropReason
 from fanet_mw.node.contract import Port
-from fanet_mw.node.duplicates import key_of
+from fanet_mw.node.duplicates import key_of_packet
 from fanet_mw.node.packet import Packet
 from fanet_mw.routing.clustered.forwarding.floods import Floods
 from fanet_mw.routing.clustered.tdma.call_release import CallRelease
@@ -166,7 +166,7 @@ class TurnAccess:
         What still waits for a turn to be flooded in is no answer: a node that hears a packet outside of its turns
         relays neither that copy nor its flood afterwards, which would end there.
         """
-        key = key_of(packet.header.origin, packet.header.seq)
+        key = key_of_packet(packet)
         if self._roots.holds(key):
             return
         plan = self._plans.at(now_ns)

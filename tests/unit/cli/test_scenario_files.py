@@ -1,6 +1,10 @@
 """`fanet init`, `show`, `check`, `schema`, completion, and `--set`: what a person does before a run."""
 
 import json
+import os
+import shutil
+import subprocess
+import sys
 import tomllib
 from pathlib import Path
 
@@ -94,3 +98,26 @@ def test_the_shell_completes_commands_scenarios_and_keys(
 ) -> None:
     app._run_complete(words)
     assert offered in capsys.readouterr().out
+
+
+_TYPED = {("simul",): "simulate", ("simulate", "resc"): "rescue", ("simulate", "--set", "clusters.rela"): "relay="}
+
+
+@pytest.mark.skipif(shutil.which("bash") is None, reason="bash is not installed")
+def test_bash_completes_by_the_installed_script(tmp_path: Path) -> None:
+    script = tmp_path / "fanet.bash"
+    script.write_text(app.generate_completion(shell="bash"), encoding="utf-8")
+    completer = tmp_path / "fanet"
+    completer.write_text(f'#!/bin/sh\nexec {sys.executable} -m sim "$@"\n', encoding="utf-8")
+    completer.chmod(0o755)
+    asked = [
+        f"COMP_WORDS=(fanet {' '.join(words)}) COMP_CWORD={len(words)} COMPREPLY=(); $complete; echo ${{COMPREPLY[*]}}"
+        for words in _TYPED
+    ]
+    lines = [f"source {script}", "complete=$(complete -p fanet | sed 's/.*-F *//; s/ .*//')", *asked]
+    environment = {**os.environ, "PATH": f"{tmp_path}:{os.environ['PATH']}"}
+    told = subprocess.run(
+        ["bash", "--norc", "-c", "\n".join(lines)], env=environment, capture_output=True, text=True, check=False
+    )
+    offered = told.stdout.splitlines()
+    assert [word in line for word, line in zip(_TYPED.values(), offered, strict=True)] == [True] * 3, told

@@ -52,6 +52,7 @@ PLACES: Final[Mapping[str, Case]] = {
 COUNTRY: Final[Mapping[str, Case]] = {
     "`rescue`": Case("rescue", (), (1, 2)),
     "`hills`": Case("hills", (), (1,)),
+    "`night`": Case("night", (), (1,)),
 }
 _SMALL: Final = (
     "nodes.count=20", "nodes.spacing_m=100", "nodes.telemetry_hz=0", "clusters.count=4", "traffic.interval_s=4",
@@ -177,7 +178,7 @@ def places(kept: Kept | None = None) -> Rows:
 
 
 def country(kept: Kept | None = None) -> Rows:
-    """The whole rescue over a plain and over hills."""
+    """The whole rescue over a plain, over hills, and with an outage of GPS."""
     kept = kept or Kept(KEPT, fly)
     return [PLACES_HEAD, *(places_row(name, flown(case, kept)) for name, case in COUNTRY.items())]
 

@@ -243,7 +243,7 @@ def test_every_figure_is_drawn_from_its_shipped_sweep(name: str, tmp_path: Path)
     if name == "size":
         changes["nodes.count"] = [9, 16]
     if name in {"11", "clocks"}:  # of which every case must deliver something
-        changes.update({"duration_s": 8, "warmup_s": 5})
+        changes.update({"duration_s": 12, "warmup_s": 8})
     if name == "12":
         changes["world.engine"] = "kinematic"
     table = tiny(recipe.sweep, **changes)

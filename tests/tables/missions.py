@@ -50,7 +50,7 @@ PLACES: Final[Mapping[str, Case]] = {
     "`town`": Case("town", (), tuple(range(1, 21))),
 }
 COUNTRY: Final[Mapping[str, Case]] = {
-    "`rescue`": Case("rescue", (), (1, 2)),
+    "`rescue`": Case("rescue", (), (1, 2, 3)),
     "`hills`": Case("hills", (), (1,)),
     "`night`": Case("night", (), (1,)),
 }

@@ -120,7 +120,7 @@ def hashes(scenario: Scenario) -> dict[str, str]:
     parts = {
         "trace": b"".join(lines(outcome.records)),
         "reports": json.dumps(dict(outcome.reports), sort_keys=True).encode(),
-        "taps": repr(outcome.taps).encode(),
+        "taps": repr([*outcome.taps]).encode(),
         "links": json.dumps(list(described(outcome.links.rows()))).encode(),
     }
     return {part: hashlib.sha256(data).hexdigest()[:24] for part, data in parts.items()}

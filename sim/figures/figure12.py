@@ -25,7 +25,8 @@ _FEW: Final = 5
 _WINDOW_S: Final = (50.0, 70.0)
 _MOST: Final = 0.5
 _HARDLY_S: Final = 5.0
-_AT_ONCE_S: Final = 0.1
+_AT_ONCE_S: Final = 1.0
+"""One period of a report, where the instants themselves are tens of seconds."""
 _SECONDS_S: Final = 5.0
 _FREE: Final = 0.5
 _SINCE_S: Final = tuple(math.pow(10.0, step / 10) for step in range(-30, 19))
@@ -47,6 +48,11 @@ def _by(limit_s: float) -> Callable[[Row], float]:
 def _at_end(row: Row) -> float:
     """The number of UAVs that have changed course when the run ends."""
     return float(len(_times(row)))
+
+
+def _at_end_if_any(row: Row) -> float | None:
+    """The number of UAVs that have changed course when the run ends; None: nobody has, three never heard one phone."""
+    return _at_end(row) or None
 
 
 def _heard(row: Row) -> float:
@@ -157,12 +163,13 @@ def _flooding_is_first(runs: Runs) -> Claim:
 
 def _the_method_is_ahead_later(runs: Runs) -> Claim:
     flooding, paper = (_seen(runs, _at_end, case, _SLOW_S) for case in ("flooding", "paper"))
+    flooded, told = (_seen(runs, _at_end_if_any, case, _SLOW_S) for case in ("flooding", "paper"))
     nobody_left = Reason(
         "Under both the news reaches everyone in the end: whoever has not turned yet is told again by the next "
         "report, and nobody is left by whom the other could be ahead.",
         [
-            above("flooding: UAVs at the end", flooding, _NEARLY_ALL),
-            above("the paper's method: UAVs at the end", paper, _NEARLY_ALL),
+            above("flooding: UAVs at the end, if anybody turns", flooded, _NEARLY_ALL),
+            above("the paper's method: UAVs at the end, if anybody turns", told, _NEARLY_ALL),
         ],
     )
     return Claim(

@@ -81,13 +81,22 @@ class SwarmTime(ABC):
 
 
 class OwnTime(SwarmTime):
-    """`clock.sync = "none"`: nodes do not synchronize, as if every clock were exact."""
+    """`clock.sync = "none"`: nodes follow nobody's clock, and state no error against one.
+
+    They know how far clocks may be off by the end of the run: by how they were set, and by their data sheet.
+    """
 
     line = EXACT
     synced = True
 
+    def __init__(self, *, error_ns: int) -> None:
+        self._error_ns = error_ns
+
     def error_ns(self, local_ns: int) -> int | None:
         return None
+
+    def worst_ns(self, local_ns: int) -> int:
+        return self._error_ns
 
 
 class GpsTime(SwarmTime):
@@ -212,4 +221,4 @@ def swarm_time(scenario: Scenario, node: NodeId) -> SwarmTime:
         return BeaconTime(scenario, node)
     if scenario.clock.sync == "gps":
         return GpsTime(scenario.clock, seed=scenario.seed, node=node)
-    return OwnTime()
+    return OwnTime(error_ns=scenario.clock.unsynchronized_error_ns(scenario.duration_ns))

@@ -34,8 +34,8 @@ class HeaderCheck:
         clock = scenario.clock
         self._node = node
         self._count = scenario.nodes.count
-        drift_ns = round(clock.drift_ppm * 1e-6 * scenario.duration_ns)
-        self._ahead_ns = _AHEAD_NS + (2 * (clock.offset_ns + drift_ns) + S if clock.modelled else 0)
+        error_ns = clock.unsynchronized_error_ns(scenario.duration_ns)
+        self._ahead_ns = _AHEAD_NS + (2 * error_ns + S if clock.modelled else 0)
 
     def why_not(self, fields: Fields, *, known: bool, src: NodeId, end_ns: int) -> DropReason | None:
         """The reason why the header of a frame that `src` sent until `end_ns` is not believed; None: it is believed.

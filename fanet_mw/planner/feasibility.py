@@ -124,7 +124,9 @@ class Site:
 
     @property
     def guard_ns(self) -> int:
-        error_ns = PLANNED_ERROR_NS if self.scenario.clock.sync != "none" else 0
+        clock = self.scenario.clock
+        alone_ns = clock.unsynchronized_error_ns(self.scenario.duration_ns)
+        error_ns = alone_ns if clock.sync == "none" else PLANNED_ERROR_NS
         return slot_guard_ns(self.scenario, clock_error_ns=error_ns)
 
     def flood(self, head: NodeId, payload_bytes: int) -> FloodCost:

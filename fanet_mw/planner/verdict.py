@@ -1,6 +1,5 @@
 """The sentences of a plan: why it is not feasible, what its bounds assume, and what they leave out."""
 
-import math
 from collections.abc import Iterator, Sequence
 from typing import Final
 
@@ -79,8 +78,7 @@ def unsynchronized_slack_ns(scenario: Scenario) -> int:
     clock = scenario.clock
     if clock.sync != "none" or not clock.modelled:
         return 0
-    drifted_ns = math.ceil(clock.drift_ppm * scenario.duration_ns / 1_000_000)
-    return least_slack_ns(clock.offset_ns + drifted_ns)
+    return least_slack_ns(clock.unsynchronized_error_ns(scenario.duration_ns))
 
 
 def left_out(scenario: Scenario) -> Iterator[str]:

@@ -5,6 +5,7 @@
 Without any of it a node's clock is its host's: exact. Not modelled: aging, and temperature other than as a wander.
 """
 
+import math
 from typing import Annotated, Literal, Self
 
 from pydantic import Field, model_validator
@@ -20,7 +21,8 @@ class Clock(Section):
     """`none`: each node takes its own clock for swarm time; `beacons`: hellos carry the time of the node with the
     lowest id, hop by hop; `gps`: each position fix brings the time."""
     offset_ms: Milliseconds = 0.0
-    """A node's clock is off by U(-offset, offset) at the start."""
+    """A node's clock is off by U(-offset, offset) at the start. With `sync = "none"` the nodes know the bound, as the
+    tolerance to which their clocks were set."""
     drift_ppm: Annotated[float, Field(ge=0, le=1000)] = 0.0
     """Bound of the error of its rate, drawn from U(-drift, drift). The nodes know it, as the oscillator's data sheet
     says it; 10 to 20 is usual of a crystal."""
@@ -47,6 +49,10 @@ class Clock(Section):
     @property
     def offset_ns(self) -> int:
         return round(self.offset_ms * MS)
+
+    def unsynchronized_error_ns(self, duration_ns: int) -> int:
+        """How far a clock that nothing synchronizes may be from true time by the end of a run."""
+        return self.offset_ns + math.ceil(self.drift_ppm * duration_ns / 1_000_000)
 
     @property
     def stamp_ns(self) -> int:

@@ -5,11 +5,14 @@ from typing import Any
 
 import pytest
 
+from agents.applications.traffic import sources_of
 from agents.clock.clocked_uav import ClockedUav, make_uav
 from agents.uav import Uav
+from fanet_mw.bounds import Bounded
 from fanet_mw.bounds.guard import slot_guard_ns
 from fanet_mw.bus.messages import Reception
 from fanet_mw.bus.topics import Topics
+from fanet_mw.planner import plan
 from fanet_mw.routing.clustered.tdma.turns import clocks_fit
 from fanet_mw.trace import Delivered, Generated
 from fanet_mw.units import MS, US, Enu, NodeId
@@ -18,12 +21,15 @@ from sim.run.collecting.stored_records import lines
 from sim.run.outcome import Outcome
 from sim.run.virtual import simulate
 from sim.scenarios import catalog
+from sim.world.mobility.layout import positions
 from tests.conftest import MakeScenario
 
 GRID = [
     "nodes.count=15", "traffic.sources=14", "clusters.count=14", "clusters.turn_slack_us=400", "duration_s=60",
     "warmup_s=45", "clock.drift_ppm=20",
 ]  # fmt: skip
+
+IN_STEP = ("clock.drift_ppm=0", "clock.offset_ms=1", "clusters.turn_slack_us=2020", "duration_s=25", "warmup_s=10")
 
 
 @lru_cache
@@ -65,10 +71,22 @@ def test_clocks_that_only_drift_soon_collide_and_the_summary_says_how_wrong_they
 
 def test_a_slack_of_twice_the_error_and_20_us_keeps_every_packet_in_its_turn() -> None:
     """1 ms either way, and so up to 2 ms between neighbors, with frames of 1.1 ms."""
-    summary = summary_of("clock.drift_ppm=0", "clock.offset_ms=1", "clusters.turn_slack_us=2020", "duration_s=25",
-                         "warmup_s=10")  # fmt: skip
+    summary = summary_of(*IN_STEP)
     assert summary["clock"]["error_us"]["max"] > 800
     assert summary["pdr"] == 1
+
+
+def test_a_plan_and_the_nodes_state_the_same_bound_for_clocks_that_nothing_synchronizes_and_the_slack_holds() -> None:
+    bound = summary_of(*IN_STEP)["bound"]
+    assert bound["stated_share"] == 1
+    assert bound["violations"] == 0
+    scenario = catalog.find("clusters", [*GRID, *IN_STEP])
+    placed = dict(zip(scenario.node_ids, positions(scenario), strict=True))
+    found = plan(scenario, placed, sources=sources_of(scenario))
+    assert found.feasible
+    (planned,) = found.classes
+    assert isinstance(planned.bound, Bounded)
+    assert planned.bound.delay_ns / MS == pytest.approx(bound["worst_ms"], abs=0.001)
 
 
 def test_delays_in_the_trace_are_true_although_no_two_clocks_agree() -> None:

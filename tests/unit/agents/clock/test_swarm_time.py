@@ -1,12 +1,17 @@
-"""Swarm time by GPS, and what a data sheet says of clocks."""
+"""Swarm time by GPS, and what is known of clocks that nothing synchronizes, or that have a data sheet."""
 
 from collections.abc import Callable
 
 import pytest
+from hypothesis import example, given
+from hypothesis import strategies as st
 
 from agents.clock.swarm_time import GpsTime, oscillator, swarm_time
+from fanet_mw.planner.verdict import clocks_apart
+from fanet_mw.routing.clustered.tdma.turns import clocks_fit
 from fanet_mw.scenario import Clock, Scenario
 from fanet_mw.units import MS, US, NodeId, S
+from sim.scenarios import catalog
 
 MakeScenario = Callable[..., Scenario]
 OFFSET_NS = 3 * MS
@@ -56,3 +61,23 @@ def test_two_clocks_that_both_drift_run_apart_twice_as_fast(clock: Clock) -> Non
 def test_each_way_is_what_the_scenario_says(make_scenario: MakeScenario, sync: str) -> None:
     scenario = make_scenario(**{"nodes.count": 2, "clock.sync": sync, "clock.drift_ppm": 10})
     assert swarm_time(scenario, NodeId(2)).synced == (sync == "none")
+
+
+@given(
+    offset_us=st.integers(1, 5000),
+    drift_ppm=st.integers(0, 100),
+    at_s=st.integers(0, 60),
+    more_ns=st.integers(-20_000, 20_000),
+)
+@example(offset_us=1000, drift_ppm=20, at_s=0, more_ns=0)
+@example(offset_us=1000, drift_ppm=20, at_s=60, more_ns=-1)
+def test_without_a_common_time_nodes_believe_in_their_turns_exactly_when_the_plan_does(
+    offset_us: int, drift_ppm: int, at_s: int, more_ns: int
+) -> None:
+    """Two clocks of 60 s, each off by as much as it may, and 20 us of flight."""
+    needed_us = 2 * (offset_us + 60 * drift_ppm) + 20
+    keys = [f"clock.offset_ms={offset_us / 1000}", f"clock.drift_ppm={drift_ppm}", "duration_s=60"]
+    scenario = catalog.find("clusters", [*keys, f"clusters.turn_slack_us={needed_us + more_ns / 1000}"])
+    known_ns = swarm_time(scenario, NodeId(1)).worst_ns(at_s * S)
+    assert clocks_fit(scenario, clock_error_ns=known_ns) == (more_ns >= 0)
+    assert (not list(clocks_apart(scenario))) == (more_ns >= 0)

@@ -34,6 +34,10 @@ class Enu(NamedTuple):
         return math.hypot(self.east, self.north, self.up)
 
 
+STILL: Final = Enu(0.0, 0.0, 0.0)
+"""The zero vector: the velocity of what does not move."""
+
+
 def direction(*, bearing_rad: float, elevation_rad: float) -> Enu:
     """The unit vector of a bearing (from north, clockwise) and an elevation above the horizontal."""
     level = math.cos(elevation_rad)

@@ -11,7 +11,7 @@ from typing import Final
 
 from fanet_mw.bus.messages import Battery, Gps
 from fanet_mw.mavlink import AUTOPILOT_COMPONENT, Attitude, BatteryState, Encoder
-from fanet_mw.units import Enu, NodeId, S
+from fanet_mw.units import STILL, Enu, NodeId, S
 
 GRAVITY_M_S2: Final = 9.80665
 MAX_TILT: Final = math.radians(35)
@@ -19,7 +19,6 @@ MAX_TILT: Final = math.radians(35)
 TURNING_M_S: Final = 0.5
 """Below this speed the course is noise, and the heading is kept."""
 
-_STILL: Final = Enu(0.0, 0.0, 0.0)
 _HOUR_NS: Final = 3600 * S
 
 # No stream comes more often than this; `telemetry_hz` also bounds each stream, and sets the rate of the position.
@@ -42,9 +41,9 @@ class Autopilot:
 
     def __init__(self, node: NodeId, *, position: Enu, telemetry_hz: float) -> None:
         self.position = position
-        self.velocity = _STILL
+        self.velocity = STILL
         self._home = position
-        self._acceleration = _STILL
+        self._acceleration = STILL
         self._yaw: float | None = None
         """The heading; it is unknown until the UAV has flown. 0 would also shorten a hello: MAVLink drops trailing
         zeros."""

@@ -8,15 +8,14 @@ from collections.abc import Mapping
 from typing import Any, Final
 
 from agents.applications.conflicts import ConflictMonitor
+from agents.positioning.received_motion import motion_in
 from fanet_mw import mavlink, wire
 from fanet_mw.application import Application, AppPort, Course, Received
 from fanet_mw.bus.messages import Gps
-from fanet_mw.errors import MalformedFrameError
 from fanet_mw.motion import Motion
-from fanet_mw.node.reader import decoded, packet_of
 from fanet_mw.scenario import Scenario
 from fanet_mw.trace import Warned
-from fanet_mw.units import MS, NodeId
+from fanet_mw.units import NodeId
 
 
 class CollisionAvoidance(Application):
@@ -29,17 +28,12 @@ class CollisionAvoidance(Application):
         self._monitor = ConflictMonitor(scenario, node)
         self._encoder = mavlink.Encoder(node)
         self._bad_positions = 0
-        """The number of hellos whose position is missing, or not of the present."""
+        """The number of hellos without a position that can be believed, or with one that is too old."""
 
     def on_hello(self, frame: bytes, now_ns: int) -> None:
         """Take in where a neighbor flies, from its hello."""
-        try:
-            origin = packet_of(frame).origin
-            heard = decoded(frame, mavlink.kinematics_of)
-        except MalformedFrameError:
-            self._bad_positions += 1
-            return
-        if not self._monitor.on_hello(origin, Motion(heard.position, heard.velocity, heard.t_ms * MS), now_ns=now_ns):
+        heard = motion_in(frame, own=self.port.node, now_ns=now_ns)
+        if heard is None or not self._monitor.on_hello(*heard, now_ns=now_ns):
             self._bad_positions += 1
 
     def on_message(self, message: Received, now_ns: int) -> None:

@@ -28,8 +28,6 @@ from fanet_mw.units import MS, Enu, NodeId, S, seconds_to_ns
 
 _LIFETIME_HELLOS: Final = 3.5
 """The position of another UAV is used for this many hello intervals."""
-_FUTURE_NS: Final = S
-"""A position from further in the future than this is invalid, because clocks agree better than that."""
 _CLEAR: Final = 1.5
 """A conflict is over when the two will stay this many times farther apart sideways than they must."""
 _PAST_NS: Final = 3 * S
@@ -95,8 +93,8 @@ class ConflictMonitor:
     # --- input ----------------------------------------------------------------------------------------------------
 
     def on_hello(self, node: NodeId, motion: Motion, *, now_ns: int) -> bool:
-        """Take in where another UAV flies, from its hello; False when that is too old to be used, or in the future."""
-        if not now_ns - self._lifetime_ns <= motion.at_ns <= now_ns + _FUTURE_NS:
+        """Take in where another UAV flies, from its hello; False when that is too old to be used."""
+        if motion.at_ns < now_ns - self._lifetime_ns:
             return False
         self._others[node] = motion
         return True

@@ -10,20 +10,16 @@ from agents.mission.navigation.onboard_map import NO_MAP, OnboardMap
 from agents.mission.outbox import Outbox
 from agents.mission.paper_rule import PaperRule
 from agents.mission.searcher import Searcher
-from fanet_mw import mavlink
+from agents.positioning.received_motion import motion_in
 from fanet_mw.application import Application, AppPort, Received
 from fanet_mw.bus.messages import Altimeter, Battery, Camera, Gps, Radar, SensorReading, Voice, WifiScan
 from fanet_mw.errors import MalformedFrameError
-from fanet_mw.motion import Motion
-from fanet_mw.node.reader import decoded, packet_of
+from fanet_mw.node.reader import decoded
 from fanet_mw.scenario import Scenario
-from fanet_mw.units import MS, Enu, NodeId, S
+from fanet_mw.units import Enu, NodeId
 from fanet_mw.wire import BIDS, COVERED, FOUND, SEARCH, STATUS, SURVIVOR
 from fanet_mw.wire.inner import Survivor
 from fanet_mw.wire.search import Found, Search, SearchStatus, Standing, Told, told_in
-
-_FUTURE_NS: Final = S
-"""A position of an instant further ahead is not believed: clocks agree better than that."""
 
 
 class Rescue(Application):
@@ -72,7 +68,7 @@ class PlannedSearch(Application):
         self._outbox = Outbox()
         self._searcher = Searcher(scenario, node, position=position, outbox=self._outbox, onboard_map=onboard_map)
         self._bad_positions = 0
-        """The number of hellos whose position is missing, or not of the present."""
+        """The number of hellos without a position that can be believed."""
 
     def start(self, port: AppPort, now_ns: int) -> None:
         super().start(port, now_ns)
@@ -88,12 +84,11 @@ class PlannedSearch(Application):
 
     def on_hello(self, frame: bytes, now_ns: int) -> None:
         """A neighbor's hello says where it flies, and passes on what it knows."""
-        origin, motion, messages = _hello(frame)
-        if origin == self.port.node:
-            raise MalformedFrameError(f"a hello in the name of {origin}, who heard it")
-        if motion.at_ns > now_ns + _FUTURE_NS:
+        messages, heard = decoded(frame, told_in), motion_in(frame, own=self.port.node, now_ns=now_ns)
+        if heard is None:
             self._bad_positions += 1
             return
+        origin, motion = heard
         self._searcher.hello(origin, motion, now_ns=now_ns)
         for told in messages:
             self._searcher.on_message(told, now_ns=now_ns)
@@ -150,10 +145,3 @@ def _speaker(told: Told) -> int | None:
     if isinstance(told, SearchStatus):
         return told.node
     return None if not isinstance(told, Found) or told.standing is not Standing.ESTIMATED else told.node
-
-
-def _hello(frame: bytes) -> tuple[int, Motion, tuple[Told, ...]]:
-    """The sender of a hello, its motion, and what it tells; raises MalformedFrameError."""
-    heard = decoded(frame, mavlink.kinematics_of)
-    motion = Motion(heard.position, heard.velocity, heard.t_ms * MS)
-    return packet_of(frame).origin, motion, decoded(frame, told_in)

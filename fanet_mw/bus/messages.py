@@ -14,7 +14,7 @@ from typing import Final, NamedTuple
 from fanet_mw.bus.link_stats import LinkStats
 from fanet_mw.bus.radio_control import Cut, Degrade, Jam, Restore
 from fanet_mw.trace import Record
-from fanet_mw.units import Enu, NodeId, S
+from fanet_mw.units import STILL, Enu, NodeId, S
 
 
 class TxRequest(NamedTuple):
@@ -111,7 +111,7 @@ class Setpoint(NamedTuple):
     position: Enu
     speed_m_s: float
     kind: SetpointKind = SetpointKind.POSITION
-    velocity: Enu = Enu(0.0, 0.0, 0.0)
+    velocity: Enu = STILL
     """VELOCITY: the velocity to fly, over the ground."""
 
 

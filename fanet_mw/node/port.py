@@ -18,7 +18,7 @@ from fanet_mw.node.reader import PHASES, name_of
 from fanet_mw.rng import stream
 from fanet_mw.scenario import Scenario
 from fanet_mw.trace import Dropped, LetOut, Record
-from fanet_mw.units import BROADCAST, Enu, NodeId
+from fanet_mw.units import BROADCAST, STILL, Enu, NodeId
 from fanet_mw.wire import Kind
 
 _MOST_HOPS: Final = 255
@@ -35,7 +35,7 @@ class NodePort:
         self.node = node
         self.scenario = scenario
         self.position = position
-        self.velocity = Enu(0.0, 0.0, 0.0)
+        self.velocity = STILL
         self.clock_error_ns = 0
         self.requests: list[TxRequest] = []
         self.records: list[Record] = []

@@ -8,7 +8,7 @@ from enum import IntEnum
 from typing import Any, Final, NamedTuple, Self
 
 from fanet_mw.errors import LocalProtocolError, MalformedFrameError
-from fanet_mw.units import US, Enu
+from fanet_mw.units import STILL, US, Enu
 from fanet_mw.wire import (
     ANY_NODE,
     BEACON,
@@ -159,7 +159,7 @@ class Join(NamedTuple):
 
     node: int
     position: Enu
-    velocity: Enu = Enu(0.0, 0.0, 0.0)
+    velocity: Enu = STILL
     """The velocity [m/s]."""
     instead_of: int = 0
     """The silent node that this one stands in for if it is that node's head; the node's own id: it objects; 0: none."""

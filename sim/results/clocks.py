@@ -12,8 +12,8 @@ import numpy.typing as npt
 
 from fanet_mw.trace import ClockSampled, Delivered, Generated, Record
 from fanet_mw.units import US, S
-from sim.run.collecting.overflow import TraceLog
-from sim.run.collecting.stored_records import of
+from sim.run.collecting.trace_log import TraceLog
+from sim.run.collecting.trace_reading import of
 from sim.run.outcome import Outcome
 
 

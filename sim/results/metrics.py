@@ -22,7 +22,7 @@ from sim.results.clocks import clock_errors
 from sim.results.mission import mission
 from sim.results.packets import OTHER_APPS, AppPackets, packets_of, targets_by_source
 from sim.results.separation import separation
-from sim.run.collecting.stored_records import of
+from sim.run.collecting.trace_reading import of
 from sim.run.outcome import Outcome
 
 

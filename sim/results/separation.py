@@ -6,7 +6,7 @@ import numpy as np
 
 from fanet_mw.trace import ConflictForeseen, Delivered, Warned
 from fanet_mw.units import MS
-from sim.run.collecting.stored_records import of
+from sim.run.collecting.trace_reading import of
 from sim.run.outcome import Outcome
 
 

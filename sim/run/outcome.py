@@ -19,7 +19,7 @@ class Outcome:
     records: Collection[Record]
     """The trace records by instant; within one instant as they were made (virtual) or by node (real time). They are on
     disk and decoded anew each time they are read; in virtual time, those of the last while are in memory. `of` in
-    `collecting.stored_records` reads those of some kinds."""
+    `collecting.trace_reading` reads those of some kinds."""
     reports: Mapping[str, Mapping[str, Any]]
     """The last report of each actor, by its name."""
     taps: Collection[tuple[int, bytes]] = ()

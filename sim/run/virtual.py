@@ -22,7 +22,8 @@ from fanet_mw.scenario import Scenario
 from fanet_mw.units import MS, NodeId, S
 from sim.results.clocks import true_delays
 from sim.results.links import LinkTotals
-from sim.run.collecting.overflow import TapLog, TraceLog
+from sim.run.collecting.taps import TapLog
+from sim.run.collecting.trace_log import TraceLog
 from sim.run.outcome import Outcome
 from sim.world.environment.map_on_board import map_on_board
 from sim.world.mobility.layout import positions

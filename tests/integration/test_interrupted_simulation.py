@@ -14,7 +14,7 @@ from rich.console import Console
 
 from sim.results import report
 from sim.results.files import finish
-from sim.run.collecting.stored_records import lines
+from sim.run.collecting.trace_reading import lines
 from sim.run.virtual import simulate
 from sim.scenarios import catalog
 

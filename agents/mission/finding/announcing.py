@@ -46,20 +46,20 @@ class Announcing:
         place = self._finds.known[survivor].filter.estimate()
         assert place is not None, "who was seen has a place"
         found = Found(now_ns // US, survivor, *place, self._node, Standing.CONFIRMED)
-        self._finds.on_found(found, now_ns=now_ns)
-        east_m, north_m = round(place.east_m, 2), round(place.north_m, 2)
-        self._outbox.records.append(Confirmed(now_ns, self._node, survivor, east_m, north_m))
-        self._tellings[survivor] = _TELLINGS, now_ns
-        self.decided(survivor, now_ns)
+        self._decide(found, Confirmed, now_ns)
 
     def refute(self, survivor: int, now_ns: int) -> None:
         """Tell all nodes that a confirmed survivor cannot be where it was confirmed."""
         mistaken = self._finds.known[survivor].confirmed
         assert mistaken is not None, "only a confirmation is refuted"
         refuted = mistaken._replace(t_us=now_ns // US, node=self._node, standing=Standing.REFUTED)
-        self._finds.on_found(refuted, now_ns=now_ns)
-        east_m, north_m = round(mistaken.east_m, 2), round(mistaken.north_m, 2)
-        self._outbox.records.append(Refuted(now_ns, self._node, survivor, east_m, north_m))
+        self._decide(refuted, Refuted, now_ns)
+
+    def _decide(self, verdict: Found, record: type[Confirmed | Refuted], now_ns: int) -> None:
+        """Take in a verdict of this UAV, record it, and tell it from now on."""
+        survivor, east_m, north_m = verdict.survivor, round(verdict.east_m, 2), round(verdict.north_m, 2)
+        self._finds.on_found(verdict, now_ns=now_ns)
+        self._outbox.records.append(record(now_ns, self._node, survivor, east_m, north_m))
         self._tellings[survivor] = _TELLINGS, now_ns
         self.decided(survivor, now_ns)
 

@@ -52,16 +52,16 @@ class Find:
 
     def doubted(self, at: Enu) -> bool:
         """True at a place at which the survivor was confirmed by mistake."""
-        return any(_estimate(refuted).distance_m(at) <= SAME_PLACE_M for refuted in self.refuted)
+        return any(estimate_of(refuted).distance_m(at) <= SAME_PLACE_M for refuted in self.refuted)
 
     def place(self) -> Estimate | None:
         """The better one of the estimate from this UAV's samples and the best that another node has told."""
         if self.confirmed is not None:
-            return _estimate(self.confirmed)
+            return estimate_of(self.confirmed)
         own = self.filter.estimate()
         if self.told is None:
             return own
-        told = _estimate(self.told)
+        told = estimate_of(self.told)
         return told if own is None or told.sigma_m < own.sigma_m else own
 
 
@@ -99,7 +99,7 @@ class Finds:
                 return _refute(find, found)
             case Standing.ESTIMATED:
                 outdated = any(found.t_us <= refuted.t_us for refuted in find.refuted)
-                if not outdated and (find.told is None or _estimate(found).sigma_m < _estimate(find.told).sigma_m):
+                if not outdated and (find.told is None or estimate_of(found).sigma_m < estimate_of(find.told).sigma_m):
                     find.told = found
                 return False
             case _:
@@ -139,11 +139,12 @@ def _refute(find: Find, refuted: Found) -> bool:
 
 def _refutes(refuted: Found, found: Found) -> bool:
     """True if a refutation takes back this confirmation, or holds as much as this refutation."""
-    at = Enu(found.east_m, found.north_m, 0.0)
-    return found.t_us <= refuted.t_us and _estimate(refuted).distance_m(at) <= SAME_PLACE_M
+    at = estimate_of(found).at
+    return found.t_us <= refuted.t_us and estimate_of(refuted).distance_m(at) <= SAME_PLACE_M
 
 
-def _estimate(found: Found) -> Estimate:
+def estimate_of(found: Found) -> Estimate:
+    """The place that is told of a survivor."""
     return Estimate(found.east_m, found.north_m, found.east_variance_m2, found.covariance_m2, found.north_variance_m2)
 
 

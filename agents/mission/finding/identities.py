@@ -14,7 +14,7 @@ from collections.abc import Sequence
 from dataclasses import dataclass
 from typing import Final
 
-from agents.mission.finding.finds import SAME_PLACE_M, Finds
+from agents.mission.finding.finds import SAME_PLACE_M, Finds, estimate_of
 from agents.mission.finding.phone_filter import Estimate
 from agents.mission.hungarian import assign
 from fanet_mw.units import Enu, S
@@ -141,7 +141,7 @@ class Identities:
 
         The people are those who have been seen and those who were confirmed, near the place of this confirmation.
         """
-        at = Enu(confirmed.east_m, confirmed.north_m, 0.0)
+        at = estimate_of(confirmed).at
         named = {
             survivor: place
             for survivor, find in sorted(self._finds.known.items())
@@ -151,7 +151,7 @@ class Identities:
             person.place
             for person in self._people
             if person.close >= _SIGHTINGS and person.place.distance_m(at) <= _BESIDE_M
-            if all(place.distance_m(_enu(person.place)) > SAME_PLACE_M for place in named.values())
+            if all(place.distance_m(person.place.at) > SAME_PLACE_M for place in named.values())
         ]
         people = [*named.values(), *seen]
         phones = [*named, *self._open_near(people)]
@@ -165,7 +165,7 @@ class Identities:
 
     def _may_be_named(self, person: PersonTrack, now_ns: int) -> bool:
         """False where a survivor has been confirmed, until further sightings show that a second person lies there."""
-        at = _enu(person.place)
+        at = person.place.at
         taken = any(
             find.confirmed is not None and (place := find.place()) is not None and place.distance_m(at) <= SAME_PLACE_M
             for find in self._finds.known.values()
@@ -196,11 +196,11 @@ class Identities:
             survivor
             for survivor in self._finds.open()
             if self._finds.known[survivor].reporters
-            and any(self._finds.known[survivor].filter.near(_enu(place), within_m=_NEAR_M) for place in places)
+            and any(self._finds.known[survivor].filter.near(place.at, within_m=_NEAR_M) for place in places)
         ]
 
     def _cost(self, place: Estimate, survivor: int) -> float:
-        find, at = self._finds.known[survivor], _enu(place)
+        find, at = self._finds.known[survivor], place.at
         doubt = _REFUTED_COST if find.doubted(at) else 0.0
         return min(_IMPOSSIBLE, find.filter.deficit(at.east, at.north) + doubt)
 
@@ -216,10 +216,6 @@ class Identities:
             and heard is not None
             and heard.sigma_m <= (_VAGUE_M if person.taken is None else _TAKEN_SIGMA_M)
         )
-
-
-def _enu(place: Estimate) -> Enu:
-    return Enu(place.east_m, place.north_m, 0.0)
 
 
 def _is_remembered(person: PersonTrack, now_ns: int) -> bool:

@@ -54,6 +54,11 @@ class Estimate(NamedTuple):
         half = (self.east_variance_m2 - self.north_variance_m2) / 2
         return math.sqrt(mean + math.hypot(half, self.covariance_m2))
 
+    @property
+    def at(self) -> Enu:
+        """The place itself."""
+        return Enu(self.east_m, self.north_m, 0.0)
+
     def distance_m(self, place: Enu) -> float:
         """The distance of a place from this one, along the ground."""
         return math.hypot(self.east_m - place.east, self.north_m - place.north)

@@ -3,9 +3,8 @@
 from agents.mission.flight.goal import Goal
 from agents.mission.flight.return_home import ReturnHome
 from agents.mission.flight.velocity_choice import VelocityChoice
-from agents.mission.formation.formation_place import STILL
 from agents.mission.navigation.navigation import Navigation
-from fanet_mw.units import Enu
+from fanet_mw.units import STILL, Enu
 
 
 class Flight:

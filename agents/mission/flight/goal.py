@@ -3,12 +3,12 @@
 from typing import Final
 
 from agents.mission.finding.finds import Finds
-from agents.mission.formation.formation_place import STILL, FormationPlace, along
+from agents.mission.formation.formation_place import FormationPlace, along
 from agents.mission.formation.gaps import Gaps
 from agents.mission.navigation.navigation import Navigation
 from agents.mission.tasking.approach import Approach
 from agents.mission.tasking.bidding import FAR_M, VAGUE_M
-from fanet_mw.units import Enu
+from fanet_mw.units import STILL, Enu
 
 _SHARED_M: Final = 35.0
 """An estimate so near to the border of two lanes belongs to both."""

@@ -11,20 +11,16 @@ from agents.mission.navigation.known_obstacles import KnownObstacles
 from agents.mission.navigation.navigation import Navigation
 from agents.mission.navigation.neighbor_motions import NeighborMotions
 from agents.mission.navigation.onboard_map import NO_MAP, OnboardMap
+from agents.positioning.received_motion import motion_in
 from fanet_mw import mavlink
 from fanet_mw.application import Application, AppPort, Received
 from fanet_mw.bus.messages import Altimeter, Gps, SensorReading
-from fanet_mw.errors import MalformedFrameError
-from fanet_mw.motion import Motion
-from fanet_mw.node.reader import decoded, packet_of
 from fanet_mw.scenario import Scenario
-from fanet_mw.units import MS, Enu, NodeId, S, seconds_to_ns
+from fanet_mw.units import Enu, NodeId, S, seconds_to_ns
 from fanet_mw.wire import PRIORITY_REPORT
 
 _TELL_NS: Final = S
 """How often a head floods where it is and how it flies, for heads that do not hear its hellos."""
-_FUTURE_NS: Final = S
-"""A position of an instant further ahead is not believed: clocks agree better than that."""
 
 
 class FormationFlight(Application):
@@ -54,7 +50,7 @@ class FormationFlight(Application):
         self._encoder = mavlink.Encoder(node)
         self._next_ns: int | None = None
         self._bad_positions = 0
-        """The number of positions that are missing in a hello, or not of the present."""
+        """The number of hellos and floods without a position that can be believed."""
 
     def start(self, port: AppPort, now_ns: int) -> None:
         super().start(port, now_ns)
@@ -64,24 +60,19 @@ class FormationFlight(Application):
 
     def on_message(self, message: Received, now_ns: int) -> None:
         """A head floods where it is."""
-        self._on_motion(message.origin, message.frame, now_ns)
+        self._on_motion(message.frame, now_ns)
         self.port.tap(message.frame)
 
     def on_hello(self, frame: bytes, now_ns: int) -> None:
-        origin = packet_of(frame).origin
-        if origin == self.port.node:
-            raise MalformedFrameError(f"a hello in the name of {origin}, who heard it")
-        self._on_motion(origin, frame, now_ns)
+        self._on_motion(frame, now_ns)
 
-    def _on_motion(self, node: int, frame: bytes, now_ns: int) -> None:
-        heard = decoded(frame, mavlink.kinematics_of)
-        if heard.t_ms * MS > now_ns + _FUTURE_NS:
+    def _on_motion(self, frame: bytes, now_ns: int) -> None:
+        heard = motion_in(frame, own=self.port.node, now_ns=now_ns)
+        if heard is None:
             self._bad_positions += 1
             return
-        motion, known = (
-            Motion(heard.position, heard.velocity, heard.t_ms * MS),
-            self._motions.motion(node, now_ns=now_ns),
-        )
+        node, motion = heard
+        known = self._motions.motion(node, now_ns=now_ns)
         if known is None or known.at_ns < motion.at_ns:  # a flood may be older than the last hello
             self._motions.on_hello(node, motion)
 

@@ -4,7 +4,7 @@ import math
 from collections.abc import Sequence
 from typing import Final
 
-from fanet_mw.units import Enu
+from fanet_mw.units import STILL, Enu
 
 _PASSED_M: Final = 30.0
 """A leader that is this near to a way point flies on to the next one."""
@@ -31,7 +31,7 @@ class Route:
     def velocity(self, here: Enu) -> Enu:
         """The velocity at which the leader flies; still at the end, and without a route."""
         if not self._points:
-            return Enu(0.0, 0.0, 0.0)
+            return STILL
         east, north = self._points[self._passed]
         away_m, speed = self._away_m(here), self._speed_m_s
         if self._passed == len(self._points) - 1:

@@ -15,9 +15,8 @@ from agents.mission.following.ring import place_on_ring
 from agents.mission.following.route import Route
 from agents.mission.navigation.neighbor_motions import NeighborMotions
 from fanet_mw.motion import Motion
-from fanet_mw.units import Enu, NodeId
+from fanet_mw.units import STILL, Enu, NodeId
 
-STILL: Final = Enu(0.0, 0.0, 0.0)
 _APART: Final = 2.2
 """The distance of two heads in radii of the circle around a head."""
 Clusters = Mapping[NodeId, tuple[NodeId, ...]]

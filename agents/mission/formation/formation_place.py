@@ -10,10 +10,9 @@ from agents.mission.finding.phone_filter import Estimate
 from agents.mission.formation.formation_planner import pattern_of
 from agents.mission.formation.pattern import Pattern
 from agents.mission.navigation.navigation import Navigation
-from fanet_mw.units import MS, US, Enu, NodeId, S
+from fanet_mw.units import MS, STILL, US, Enu, NodeId, S
 from fanet_mw.wire.search import Search
 
-STILL: Final = Enu(0.0, 0.0, 0.0)
 _FREE_REACH: Final = 0.84
 """The share of the reach within which a follower stays of its line, so that it is heard there wherever it goes."""
 _ASIDE_M: Final = 70.0

@@ -8,7 +8,7 @@ from agents.mission.formation.lines import Lines
 from agents.mission.formation.sectors import Sectors
 from agents.mission.formation.shape import Demands, Dimensions, Shape, ShapeName
 from agents.mission.formation.spiral import Spiral
-from fanet_mw.units import Enu
+from fanet_mw.units import STILL, Enu
 from fanet_mw.wire.search import MOST_PLACES
 
 _SHAPES: Final[Mapping[ShapeName, Callable[[Dimensions], Shape]]] = {
@@ -54,7 +54,7 @@ class Pattern:
     def velocity(self, place: int, swept_s: float) -> Enu:
         """The velocity of a place then."""
         if swept_s < 0:
-            return Enu(0.0, 0.0, 0.0)
+            return STILL
         early = max(0.0, swept_s - _STEP_S)
         a, b = self.at(place, early), self.at(place, early + _STEP_S)
         return Enu((b.east - a.east) / _STEP_S, (b.north - a.north) / _STEP_S, (b.up - a.up) / _STEP_S)

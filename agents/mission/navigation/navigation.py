@@ -4,7 +4,7 @@ from typing import Final
 
 from agents.mission.navigation.known_obstacles import KnownObstacles
 from fanet_mw.motion import Motion
-from fanet_mw.units import Enu, S
+from fanet_mw.units import STILL, Enu, S
 
 _FIX_GAIN: Final = 0.15
 """The weight of a position fix against dead reckoning by its velocity."""
@@ -18,7 +18,7 @@ class Navigation:
     def __init__(self, position: Enu, obstacles: KnownObstacles) -> None:
         self.position = position
         self._obstacles = obstacles
-        self.velocity = Enu(0.0, 0.0, 0.0)
+        self.velocity = STILL
         self._fix_ns: int | None = None
         self._above_ground: tuple[float, int] | None = None
 

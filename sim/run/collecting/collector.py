@@ -26,7 +26,8 @@ from fanet_mw.units import S
 from sim.results.links import LinkTotals
 from sim.run.collecting.bus_checks import BusChecks
 from sim.run.collecting.spool import Spool
-from sim.run.collecting.stored_records import RecordSpools, encoded_tap, taps_of
+from sim.run.collecting.stored_records import RecordSpools
+from sim.run.collecting.taps import encoded_tap, taps_of
 from sim.run.outcome import Outcome
 
 BURST_BYTES: Final = 16 << 20

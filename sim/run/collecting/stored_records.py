@@ -1,67 +1,18 @@
-"""Collections on disk, for results that are too large for memory, and how a trace is read wherever it is.
-
-A reader of a trace asks for the kinds of records that it needs: of a trace on disk, only those are decoded.
-"""
+"""The trace of a run in real time: records come from many processes, and are put in order on disk at the end."""
 
 import heapq
 import struct
-from collections.abc import Callable, Collection, Iterable, Iterator
+from collections.abc import Collection, Iterable, Iterator
 from pathlib import Path
-from typing import Any, Final, TypeVar, get_args, overload
+from typing import Final
 
 from fanet_mw import trace
 from fanet_mw.trace import Delivered, Generated, Record
-from sim.run.collecting.overflow import TraceLog
 from sim.run.collecting.spool import Spool, in_order
+from sim.run.collecting.trace_reading import CODES
 
-T = TypeVar("T")
-A = TypeVar("A", bound=Record)
-B = TypeVar("B", bound=Record)
-C = TypeVar("C", bound=Record)
-_KINDS: Final[tuple[type[Record], ...]] = tuple(sorted(get_args(Record), key=trace.name_of))
-_CODES: Final = {kind: code for code, kind in enumerate(_KINDS)}
 _KEY: Final = struct.Struct("<qHB")
 """The front of a stored record: its instant, its node, and the place of its kind among the names of all."""
-_INSTANT: Final = struct.Struct("<q")
-
-
-class Stored(Collection[T]):
-    """The items of a spool as values; each iteration reads and decodes them anew."""
-
-    def __init__(self, spool: Spool, decode: Callable[[bytes], T]) -> None:
-        self._spool = spool
-        self._decode = decode
-
-    def __len__(self) -> int:
-        return self._spool.count
-
-    def __iter__(self) -> Iterator[T]:
-        return map(self._decode, self._spool.items())
-
-    def __contains__(self, value: object) -> bool:
-        return any(item == value for item in self)
-
-
-# --- telemetry --------------------------------------------------------------------------------------------------------
-
-
-def encoded_tap(t_ns: int, frames: bytes) -> bytes:
-    return _INSTANT.pack(t_ns) + frames
-
-
-def _decoded_tap(item: bytes) -> tuple[int, bytes]:
-    return _INSTANT.unpack_from(item)[0], item[_INSTANT.size :]
-
-
-def taps_of(spool: Spool) -> Collection[tuple[int, bytes]]:
-    """The telemetry in a spool of `encoded_tap`, by instant; in memory only if the disk has no room to sort it."""
-    ordered = in_order(spool, _INSTANT.unpack_from)
-    if ordered is None:
-        return sorted(map(_decoded_tap, spool.items()), key=lambda tap: tap[0])
-    return Stored(ordered, _decoded_tap)
-
-
-# --- traces -----------------------------------------------------------------------------------------------------------
 
 
 class RecordSpools:
@@ -140,7 +91,7 @@ class StoredRecords(Collection[Record]):
         if kinds == (Delivered,):
             return map(_decoded, self._deliveries.items())
         items = self._items() if Delivered in kinds else self._others.items()
-        wanted = {_CODES[kind] for kind in kinds}
+        wanted = {CODES[kind] for kind in kinds}
         code_at = _KEY.size - 1
         return (_decoded(item) for item in items if item[code_at] in wanted)
 
@@ -152,30 +103,8 @@ class StoredRecords(Collection[Record]):
 
 
 def _encoded(record: Record) -> bytes:
-    return _KEY.pack(record.t_ns, record.node, _CODES[type(record)]) + trace.line(record).encode()
+    return _KEY.pack(record.t_ns, record.node, CODES[type(record)]) + trace.line(record).encode()
 
 
 def _decoded(item: bytes) -> Record:
     return trace.parse(item[_KEY.size :].decode())
-
-
-@overload
-def of(records: Iterable[Record], kind: type[A], /) -> Iterator[A]: ...
-@overload
-def of(records: Iterable[Record], kind: type[A], other: type[B], /) -> Iterator[A | B]: ...
-@overload
-def of(records: Iterable[Record], kind: type[A], other: type[B], third: type[C], /) -> Iterator[A | B | C]: ...
-@overload
-def of(records: Iterable[Record], *kinds: type[Record]) -> Iterator[Record]: ...
-def of(records: Iterable[Record], *kinds: type[Any]) -> Iterator[Any]:
-    """The records of some kinds, in the order of the trace."""
-    if isinstance(records, StoredRecords | TraceLog):
-        return records.of(kinds)
-    return (record for record in records if type(record) in kinds)
-
-
-def lines(records: Iterable[Record]) -> Iterator[bytes]:
-    """The lines of the trace file, each one JSON array."""
-    if isinstance(records, StoredRecords):
-        return records.lines()
-    return (f"{trace.line(record)}\n".encode() for record in records)

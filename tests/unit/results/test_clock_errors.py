@@ -8,7 +8,7 @@ from fanet_mw.scenario import Scenario
 from fanet_mw.trace import ClockSampled, Delivered, Generated, Record
 from fanet_mw.units import MS, US, S
 from sim.results.clocks import clock_errors, true_delays
-from sim.run.collecting.overflow import TraceLog
+from sim.run.collecting.trace_log import TraceLog
 from sim.run.outcome import Outcome
 
 MakeScenario = Callable[..., Scenario]

@@ -3,7 +3,7 @@
 import math
 
 from fanet_mw.routing.clustered.clustering.contract import Swarm
-from fanet_mw.units import Enu, NodeId
+from fanet_mw.units import STILL, Enu, NodeId
 
 
 def link_lifetime_s(swarm: Swarm, a: NodeId, b: NodeId, *, range_m: float) -> float:
@@ -11,9 +11,8 @@ def link_lifetime_s(swarm: Swarm, a: NodeId, b: NodeId, *, range_m: float) -> fl
 
     Link expiration time after Su, Lee & Gerla 2001: the greater root of |offset + t drift| = range.
     """
-    rest = Enu(0.0, 0.0, 0.0)
     offset = swarm.positions[b].minus(swarm.positions[a])
-    drift = swarm.velocities.get(b, rest).minus(swarm.velocities.get(a, rest))
+    drift = swarm.velocities.get(b, STILL).minus(swarm.velocities.get(a, STILL))
     speed2 = _dot(drift, drift)
     if speed2 <= 0.0:
         return math.inf

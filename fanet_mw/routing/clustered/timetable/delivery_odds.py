@@ -50,18 +50,18 @@ def odds(network: Network, floods: Sequence[tuple[NodeId, Sequence[Sent]]], *, t
         for offset, row in sent:
             together[offset % turns] = together.get(offset % turns, 0) | 1 << row
     chance = {pair: _binary(1 - exp(-grade / NEPERS)) for pair, grade in network.dose.items()}
-    answered = [_answered(network, row) for row in range(len(network.nodes))]
+    answered = [_answered(network, row) for row in range(len(network.nodes.ids))]
     draw = _Draw()
     lacking: dict[NodeId, list[list[float]]] = {}
     for root, sent in floods:
-        missing = _flood(network, network.row[root], sent, together, chance, draw, turns, hop_turns)
+        missing = _flood(network, network.nodes.row[root], sent, together, chance, draw, turns, hop_turns)
         lacking.setdefault(root, []).append(missing)
     return Odds(
         {
             root: tuple(
                 fsum(share * (1 - answered[row]) ** count for missing in every for row, share in enumerate(missing))
                 / len(every)
-                / max(1, len(network.nodes) - 1)
+                / max(1, len(network.nodes.ids) - 1)
                 for count in range(ROUNDS + 1)
             )
             for root, every in sorted(lacking.items())
@@ -81,7 +81,7 @@ def _flood(
 ) -> list[float]:
     """The share of trials in which each row lacks the packet."""
     everywhere = (1 << _TRIALS) - 1
-    has = [0] * len(network.nodes)
+    has = [0] * len(network.nodes.ids)
     has[root] = everywhere
     late: list[tuple[int, int, int]] = []
     """(from which offset on, row, in which trials) it can relay."""

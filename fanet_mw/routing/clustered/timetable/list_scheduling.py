@@ -21,6 +21,8 @@ from fanet_mw.routing.clustered.timetable.turn_filling import (
     RECEIVER,
     WINDOW,
     Geometry,
+    NodeRows,
+    age,
     reach,
     rows,
     turn_by_turn,
@@ -46,17 +48,12 @@ class FloodNetwork:
     """Which nodes hear, and which disturb, each other: bit sets over the nodes' row numbers."""
 
     def __init__(self, positions: Sequence[tuple[NodeId, Enu]], geometry: Geometry) -> None:
-        self.nodes = [node for node, _ in positions]
-        self.row = {node: row for row, node in enumerate(self.nodes)}
-        self.everyone = (1 << len(self.nodes)) - 1
+        self.nodes = NodeRows(node for node, _ in positions)
         self._parts: dict[int, tuple[int, int]] = {}
         at = [place for _, place in positions]
         self.hears = [_within(at, row, geometry.link_m) for row in range(len(at))]
         reach = max(geometry.interference_m, geometry.link_m)
         self.disturbs = self.hears if reach == geometry.link_m else [_within(at, row, reach) for row in range(len(at))]
-
-    def names(self, bits: int) -> tuple[NodeId, ...]:
-        return tuple(self.nodes[row] for row in rows(bits))
 
     def part(self, root: int) -> tuple[int, int]:
         """The rows that a flood of this row can reach, itself included, and the number of hops that it takes."""
@@ -68,7 +65,7 @@ class FloodNetwork:
         """The rows of a shortest way to the head, both ends included, the lowest first among equals; empty for a head
         and for a node without one.
         """
-        start, end = self.row[node], self.row.get(head)
+        start, end = self.nodes.row[node], self.nodes.row.get(head)
         if end is None or start == end:
             return []
         before = {start: start}
@@ -108,10 +105,6 @@ class Flood:
     @property
     def done(self) -> bool:
         return self._has == self.goal and bool(self.sent)
-
-    def age(self, offset: int) -> int:
-        """The number of turns since this flood began."""
-        return offset - self.sent[0][0] if self.sent else 0
 
     def offers(self) -> list[tuple[int, int, int, int]]:
         """(first offset, worth, row, receivers) of every holder of the packet around which some node lacks it."""
@@ -218,7 +211,7 @@ class Packing:
         disturbs = self._disturbs
         found = []
         for number, flood in under_way.items():
-            older = flood.age(offset) // self._hop_turns
+            older = age(flood, offset) // self._hop_turns
             for ready, worth, row, receivers in flood.offers():
                 if (
                     ready <= offset

@@ -23,6 +23,8 @@ from fanet_mw.routing.clustered.timetable.turn_filling import (
     RECEIVER,
     WINDOW,
     Geometry,
+    NodeRows,
+    age,
     reach,
     rows,
     turn_by_turn,
@@ -47,13 +49,11 @@ class Network:
         """`geometry.interference_m` is for pairs that do not hear each other at all, and for a link that is
         `margin_db` above the weakest; more margin keeps them farther apart.
         """
-        self.nodes = [node for node, _ in positions]
-        self.row = {node: row for row, node in enumerate(self.nodes)}
-        known = [link for link in measured if link.a in self.row and link.b in self.row]
+        self.nodes = NodeRows(node for node, _ in positions)
+        row = self.nodes.row
+        known = [link for link in measured if link.a in row and link.b in row]
         self._dbm = {
-            pair: link.power_dbm
-            for link in known
-            for pair in ((self.row[link.a], self.row[link.b]), (self.row[link.b], self.row[link.a]))
+            pair: link.power_dbm for link in known for pair in ((row[link.a], row[link.b]), (row[link.b], row[link.a]))
         }
         self.senses = self._links(known, least=0.0)
         self.hears, chance = self._connected(known)
@@ -61,15 +61,15 @@ class Network:
         """The grade of each link, by (sender, receiver)."""
         for link in known:
             if link.chance >= chance:
-                a, b = self.row[link.a], self.row[link.b]
+                a, b = row[link.a], row[link.b]
                 self.dose[a, b] = self.dose[b, a] = max(1, link.grade)
         self._disturbing = self._who_disturbs([place for _, place in positions], geometry.interference_m, margin_db)
 
     def _links(self, known: Sequence[Link], *, least: float) -> list[int]:
-        found = [0] * len(self.nodes)
+        row, found = self.nodes.row, [0] * len(self.nodes.ids)
         for link in known:
             if link.chance >= least:
-                a, b = self.row[link.a], self.row[link.b]
+                a, b = row[link.a], row[link.b]
                 found[a] |= 1 << b
                 found[b] |= 1 << a
         return found
@@ -77,9 +77,9 @@ class Network:
     def _connected(self, known: Sequence[Link]) -> tuple[list[int], float]:
         """The best links that keep connected what is connected, and the least share of frames that arrives on them."""
         choices = [(self._links(known, least=least), least) for least in _CHANCES]
-        whole = [reach(choices[-1][0], row)[0] for row in range(len(self.nodes))]
+        whole = [reach(choices[-1][0], row)[0] for row in range(len(self.nodes.ids))]
         for hears, least in choices:
-            if [reach(hears, row)[0] for row in range(len(self.nodes))] == whole:
+            if [reach(hears, row)[0] for row in range(len(self.nodes.ids))] == whole:
                 return hears, least
         raise AssertionError("the last choice is the whole")
 
@@ -106,9 +106,6 @@ class Network:
     def disturbing(self, sender: int, receiver: int) -> int:
         """The rows whose frames spoil this link."""
         return self._disturbing[sender, receiver]
-
-    def names(self, bits: int) -> tuple[NodeId, ...]:
-        return tuple(self.nodes[row] for row in rows(bits))
 
 
 class _Offer(NamedTuple):
@@ -142,10 +139,6 @@ class Wave:
     @property
     def done(self) -> bool:
         return bool(self.sent) and (self.call or self._has == self.goal)
-
-    def age(self, offset: int) -> int:
-        """The number of turns since this wave began."""
-        return offset - self.sent[0][0] if self.sent else 0
 
     def offers(self) -> list[_Offer]:
         if self._offers is None:
@@ -215,7 +208,7 @@ class RedundantPacking:
         following = self._filled[(turn + 1) % self._turns].sending
         closed = there.sending | there.barred | deaf
         offers = sorted(
-            (-offer.worth - wave.age(offset) // self._hop_turns, number, offer.row, offer)
+            (-offer.worth - age(wave, offset) // self._hop_turns, number, offer.row, offer)
             for number, wave in under_way.items()
             for offer in wave.offers()
             if offer.ready <= offset and not closed >> offer.row & 1

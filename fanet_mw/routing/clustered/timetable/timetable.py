@@ -23,7 +23,7 @@ from typing import NamedTuple
 from fanet_mw.routing.clustered.timetable.delivery_odds import Odds, odds
 from fanet_mw.routing.clustered.timetable.list_scheduling import Effort, Flood, FloodNetwork, Packing
 from fanet_mw.routing.clustered.timetable.redundant_scheduling import Network, RedundantPacking, Wave, enough_for
-from fanet_mw.routing.clustered.timetable.turn_filling import Geometry
+from fanet_mw.routing.clustered.timetable.turn_filling import Geometry, NodeRows
 from fanet_mw.units import Enu, NodeId
 from fanet_mw.wire.links import Link
 
@@ -86,18 +86,16 @@ def timetable(
     swarm = FloodNetwork(positions, geometry)
     head_of = dict(heads)
     ordered = _in_order(roots, dict(positions))
-    floods = [Flood(swarm, swarm.row[root], swarm.way(root, head_of.get(root, root))) for root, _ in ordered]
+    floods = [Flood(swarm, swarm.nodes.row[root], swarm.way(root, head_of.get(root, root))) for root, _ in ordered]
     if not Packing(swarm, geometry, effort).place(floods):
         return None
     block = [
-        Turn(offset, swarm.nodes[row], root, instance)
+        Turn(offset, swarm.nodes.ids[row], root, instance)
         for flood, (root, instance) in zip(floods, ordered, strict=True)
         for offset, row in flood.sent
     ]
     turns = _repeated(block, Counter(roots), geometry.turns, blocks, whole)
-    uncovered = {
-        root: swarm.names(swarm.everyone & ~flood.goal) for flood, (root, _) in zip(floods, ordered, strict=True)
-    }
+    uncovered = _uncovered(swarm.nodes, ordered, floods)
     return Timetable(turns, _spans(turns), uncovered, len({turn.offset % whole for turn in turns}))
 
 
@@ -126,13 +124,13 @@ def redundant_timetable(
     enough = enough_for(epsilon)
     ordered = _in_order(roots, at)
     called = _in_order([node for node, _ in positions for _ in range(calls)], at)
-    waves = [Wave(network, network.row[root], enough=enough) for root, _ in ordered]
-    lone = [Wave(network, network.row[node], enough=enough, call=True) for node, _ in called]
+    waves = [Wave(network, network.nodes.row[root], enough=enough) for root, _ in ordered]
+    lone = [Wave(network, network.nodes.row[node], enough=enough, call=True) for node, _ in called]
     if not RedundantPacking(network, geometry, pace=pace).place(_interleaved(waves, lone)):
         return None
     turns = tuple(
         sorted(
-            Turn(offset, network.nodes[row], root, instance)
+            Turn(offset, network.nodes.ids[row], root, instance)
             for wave, (root, instance) in zip(waves, ordered, strict=True)
             for offset, row in wave.sent
         )
@@ -140,14 +138,20 @@ def redundant_timetable(
     own: dict[NodeId, list[int]] = {node: [] for node, _ in positions}
     for wave, (node, _) in zip(lone, called, strict=True):
         own[node].append(wave.sent[0][0])
-    everyone = (1 << len(positions)) - 1
-    uncovered = {root: network.names(everyone & ~wave.goal) for wave, (root, _) in zip(waves, ordered, strict=True)}
+    uncovered = _uncovered(network.nodes, ordered, waves)
     used = {turn.offset % geometry.turns for turn in turns} | {offset for at in own.values() for offset in at}
     table = Timetable(
         turns, _spans(turns), uncovered, len(used), {node: tuple(sorted(offsets)) for node, offsets in own.items()}
     )
     floods = [(root, wave.sent) for wave, (root, _) in zip(waves, ordered, strict=True)]
     return table, odds(network, floods, turns=geometry.turns, hop_turns=geometry.hop_turns)
+
+
+def _uncovered(
+    nodes: NodeRows, ordered: Sequence[tuple[NodeId, int]], floods: Sequence[Flood | Wave]
+) -> dict[NodeId, tuple[NodeId, ...]]:
+    """For each root, the nodes that none of its floods can reach."""
+    return {root: nodes.of(nodes.everyone & ~flood.goal) for flood, (root, _) in zip(floods, ordered, strict=True)}
 
 
 def _interleaved(floods: Sequence[Wave], calls: Sequence[Wave]) -> list[Wave]:

@@ -6,8 +6,10 @@
 Sets of nodes are the bits of integers, by the nodes' row numbers.
 """
 
-from collections.abc import Iterator, Sequence
+from collections.abc import Iterable, Iterator, Sequence
 from typing import Final, NamedTuple, Protocol, TypeVar
+
+from fanet_mw.units import NodeId
 
 RECEIVER: Final = 100
 """What it is worth that one more node gets a packet, or all the copies that it needs, in turns of its flood's age."""
@@ -30,11 +32,30 @@ class Geometry(NamedTuple):
     """The number of turns from the one that brings a packet to the first that can relay it; 1: the next turn can."""
 
 
+class NodeRows:
+    """The nodes of a swarm, and the row number of each."""
+
+    def __init__(self, nodes: Iterable[NodeId]) -> None:
+        self.ids = tuple(nodes)
+        self.row = {node: row for row, node in enumerate(self.ids)}
+        self.everyone = (1 << len(self.ids)) - 1
+        """The rows of all of them, as a bit set."""
+
+    def of(self, bits: int) -> tuple[NodeId, ...]:
+        """The nodes of a bit set, in the order of their rows."""
+        return tuple(self.ids[row] for row in rows(bits))
+
+
 class Placed(Protocol):
     """A flood, as far as a scheduler has placed it."""
 
     sent: list[tuple[int, int]]
     """The transmissions of this flood as (offset, row), in order."""
+
+
+def age(flood: Placed, offset: int) -> int:
+    """The number of turns since a flood began; 0 for one that has not begun."""
+    return offset - flood.sent[0][0] if flood.sent else 0
 
 
 AnyFlood = TypeVar("AnyFlood", bound=Placed)

@@ -1,4 +1,4 @@
-"""Traces and telemetry on disk: in order whatever the order of their coming, and read by kinds as in memory."""
+"""Traces on disk: in order whatever the order of their coming, and read by kinds as in memory."""
 
 import os
 import tracemalloc
@@ -13,7 +13,8 @@ from fanet_mw.trace import Approaching, Delivered, Dropped, Generated, LetOut, P
 from fanet_mw.units import MS
 from sim.run.collecting import spool as module
 from sim.run.collecting.spool import Spool, in_order
-from sim.run.collecting.stored_records import RecordSpools, StoredRecords, encoded_tap, lines, of, taps_of
+from sim.run.collecting.stored_records import RecordSpools, StoredRecords
+from sim.run.collecting.trace_reading import lines, of
 
 INSTANTS = st.integers(-5, 20)
 NODES = st.integers(0, 3)
@@ -69,26 +70,12 @@ def test_a_delay_counts_from_the_true_instant_of_generation_where_that_is_known(
 
 
 def test_without_room_on_the_disk_to_sort_them_they_are_sorted_in_memory(monkeypatch: pytest.MonkeyPatch) -> None:
-    spools, taps = RecordSpools(), Spool()
+    spools = RecordSpools()
     records = [Generated(MS * (50 - i), 1, i, "traffic", 9) for i in range(50)]
     spools.append([*records, Delivered(0, 2, 1, 1, 3, 1)])
-    taps.append(encoded_tap(2, b"b"), encoded_tap(1, b"a"))
     monkeypatch.setattr(os, "pwrite", lambda *_: 0)
     assert [*spools.records(true_delays=False)] == [Delivered(0, 2, 1, 1, 3, 1), *reversed(records)]
-    assert [*taps_of(taps)] == [(1, b"a"), (2, b"b")]
     spools.close()
-    taps.close()
-
-
-def test_telemetry_comes_by_instant() -> None:
-    taps = Spool()
-    for t_ns in (5, -1, 3, 3, 2**40):
-        taps.append(encoded_tap(t_ns, str(taps.count).encode()))
-    found = taps_of(taps)
-    taps.close()
-    assert [*found] == [(-1, b"1"), (3, b"2"), (3, b"3"), (5, b"0"), (2**40, b"4")]
-    assert len(found) == 5
-    assert (3, b"3") in found
 
 
 def test_memory_does_not_depend_on_how_much_is_sorted(monkeypatch: pytest.MonkeyPatch) -> None:

@@ -189,19 +189,19 @@ def test_every_node_gets_its_dose_from_holders_undisturbed(links: tuple[Link, ..
     network = Network(GRID, GEOMETRY, links, margin_db=3)
     sending: dict[int, set[int]] = {}
     for turn in table.turns:
-        sending.setdefault(turn.offset % GEOMETRY.turns, set()).add(network.row[turn.node])
+        sending.setdefault(turn.offset % GEOMETRY.turns, set()).add(network.nodes.row[turn.node])
     for node, offsets in table.calls.items():
         assert len(set(offsets)) == 2
         for offset in offsets:
             here = sending.setdefault(offset % GEOMETRY.turns, set())
-            assert network.row[node] not in here
-            here.add(network.row[node])
+            assert network.nodes.row[node] not in here
+            here.add(network.nodes.row[node])
     enough = enough_for(0.05)
     for root, _ in GRID:
-        ready = {network.row[root]: 0}
+        ready = {network.nodes.row[root]: 0}
         dose: dict[int, int] = {}
         for turn in sorted(turn for turn in table.turns if turn.root == root):
-            row, others = network.row[turn.node], sending[turn.offset % GEOMETRY.turns]
+            row, others = network.nodes.row[turn.node], sending[turn.offset % GEOMETRY.turns]
             assert row in ready
             assert ready[row] <= turn.offset
             for other in range(len(GRID)):
@@ -256,9 +256,9 @@ def test_in_a_call_all_neighbors_hear_the_caller(links: tuple[Link, ...]) -> Non
     frames = [(turn.offset, turn.node) for turn in table.turns]
     frames += [(offset, node) for node, offsets in table.calls.items() for offset in offsets]
     for offset, node in frames:
-        sending[offset % GEOMETRY.turns] = sending.get(offset % GEOMETRY.turns, 0) | 1 << network.row[node]
+        sending[offset % GEOMETRY.turns] = sending.get(offset % GEOMETRY.turns, 0) | 1 << network.nodes.row[node]
     for node, offsets in table.calls.items():
-        row = network.row[node]
+        row = network.nodes.row[node]
         for offset in offsets:
             others = sending[offset % GEOMETRY.turns] & ~(1 << row)
             for other in (o for s, o in network.dose if s == row):

@@ -1,4 +1,4 @@
-"""What a run in virtual time collects stays in order and whole, in memory or on disk; memory holds only the latest."""
+"""The trace of a run in virtual time stays in order and whole, in memory or on disk; memory holds only the latest."""
 
 import tracemalloc
 from pathlib import Path
@@ -7,8 +7,8 @@ import pytest
 
 from fanet_mw.errors import DropReason
 from fanet_mw.trace import Delivered, Dropped, Generated, Posed, Record, line
-from sim.run.collecting.overflow import TapLog, TraceLog
-from sim.run.collecting.stored_records import lines, of
+from sim.run.collecting.trace_log import TraceLog
+from sim.run.collecting.trace_reading import lines, of
 
 MOST = 7
 """So few records are kept in memory here."""
@@ -57,14 +57,6 @@ def test_deliveries_are_changed_wherever_they_are() -> None:
 def test_where_no_file_can_be_made_everything_stays_in_memory(tmp_path: Path) -> None:
     log = log_of(5 * MOST, folder=tmp_path / "not there")
     assert list(log) == [record(number) for number in range(5 * MOST)]
-
-
-def test_telemetry_is_read_as_it_was_heard() -> None:
-    log, whole = TapLog(most_in_memory=MOST), [(number, b"frame %d" % number) for number in range(3 * MOST + 1)]
-    for tap in whole:
-        log.append(tap)
-    assert (len(log), list(log)) == (len(whole), whole)
-    assert whole[3] in log
 
 
 def test_memory_does_not_grow_with_a_run() -> None:

@@ -1,0 +1,93 @@
+"""The trace of a run in virtual time: the latest records in memory, those before them on disk, a portion at a time.
+
+    portion = the kind of each record | its deliveries, which are nine in ten | its other records
+
+A reader that asks for some kinds of records decodes no others.
+"""
+
+import pickle
+import struct
+from collections.abc import Callable, Collection, Iterable, Iterator, Sequence
+from pathlib import Path
+from typing import Any, Final
+
+from fanet_mw.trace import Delivered, Record
+from sim.run.collecting.overflow import MOST_IN_MEMORY, Overflow
+from sim.run.collecting.trace_reading import CODES, KINDS
+
+_DELIVERED: Final = CODES[Delivered]
+_ROW: Final = struct.Struct("<qHHIqHq")
+"""A delivery: instant, node, origin, sequence number, delay, hops, handover."""
+Change = Callable[[Delivered], Delivered]
+
+
+class TraceLog(Collection[Record]):
+    """The trace records of a run in the order of their making."""
+
+    def __init__(self, folder: Path | None = None, *, most_in_memory: int = MOST_IN_MEMORY) -> None:
+        self._records = Overflow[Record](_packed, folder, most_in_memory)
+        self._change: Change | None = None
+
+    def extend(self, records: Iterable[Record]) -> None:
+        """Take in records at the end."""
+        self._records.extend(records)
+
+    def changed(self, change: Change) -> "TraceLog":
+        """The same records with every delivery changed, whenever it is read."""
+        other = TraceLog()
+        other._records, other._change = self._records, change
+        return other
+
+    def __len__(self) -> int:
+        return len(self._records)
+
+    def __contains__(self, record: object) -> bool:
+        return any(one == record for one in self)
+
+    def __iter__(self) -> Iterator[Record]:
+        for codes, rows, others in self._portions():
+            delivered, rest = self._deliveries(rows), iter(_unpickled(others))
+            for code in codes:
+                yield next(delivered) if code == _DELIVERED else KINDS[code]._make(next(rest))
+        yield from self._latest()
+
+    def of(self, kinds: tuple[type[Record], ...]) -> Iterator[Record]:
+        """The records of some kinds, in their order."""
+        if Delivered in kinds and len(kinds) > 1:
+            yield from (record for record in self if type(record) in kinds)
+            return
+        wanted = {CODES[kind] for kind in kinds}
+        for codes, rows, others in self._portions():
+            if _DELIVERED in wanted:
+                yield from self._deliveries(rows)
+            elif not wanted.isdisjoint(codes):
+                rest = codes.replace(bytes((_DELIVERED,)), b"")
+                for code, fields in zip(rest, _unpickled(others), strict=True):
+                    if code in wanted:
+                        yield KINDS[code]._make(fields)
+        yield from (record for record in self._latest() if type(record) in kinds)
+
+    def _portions(self) -> Iterator[tuple[bytes, bytes, bytes]]:
+        items = self._records.stored()
+        return zip(items, items, items, strict=True)
+
+    def _deliveries(self, rows: bytes) -> Iterator[Delivered]:
+        found = map(Delivered._make, _ROW.iter_unpack(rows))
+        return found if self._change is None else map(self._change, found)
+
+    def _latest(self) -> Iterator[Record]:
+        change = self._change
+        if change is None:
+            return iter(self._records.latest)
+        return (change(record) if type(record) is Delivered else record for record in self._records.latest)
+
+
+def _packed(records: Sequence[Record]) -> tuple[bytes, bytes, bytes]:
+    codes = bytes(CODES[type(record)] for record in records)
+    rows = b"".join(_ROW.pack(*record) for record in records if type(record) is Delivered)
+    return codes, rows, pickle.dumps([tuple(record) for record in records if type(record) is not Delivered])
+
+
+def _unpickled(data: bytes) -> list[Any]:
+    found: list[Any] = pickle.loads(data)  # noqa: S301  (this process has written it, into a file without a name)
+    return found

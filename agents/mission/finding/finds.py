@@ -4,7 +4,7 @@ heard by a phone's signal -> reported by enough different nodes -> seen at close
 confirmed, and heard since where it cannot be heard from the confirmed place           -> refuted: open again
 
 A confirmation and what refutes it are merged in any order to the same result: a refutation takes back the
-confirmations of the same place that are not younger than it.
+confirmations of the same place, and all estimates, that are not younger than it.
 """
 
 import math
@@ -130,9 +130,11 @@ def _refute(find: Find, refuted: Found) -> bool:
     """Take in a refutation; True if it opens the survivor again."""
     if not any(_refutes(known, refuted) for known in find.refuted):
         find.refuted = sorted([*find.refuted, refuted], key=lambda one: (one.t_us, one.node))[-_MOST_REFUTED:]
+    if find.told is not None and find.told.t_us <= refuted.t_us:
+        find.told = None
     if find.confirmed is None or not _refutes(refuted, find.confirmed):
         return False
-    find.confirmed = find.told = None
+    find.confirmed = None
     find.filter.on_sighting(None)
     return True
 

@@ -242,7 +242,7 @@ def test_a_right_confirmation_is_not_contradicted() -> None:
     assert contradictions.review() == []
 
 
-@given(st.permutations(range(4)))
+@given(st.permutations(range(6)))
 def test_confirmations_and_refutations_come_to_the_same_in_any_order(order: list[int]) -> None:
     place = (4.0, 0.0, 4.0)
     words = [
@@ -250,13 +250,17 @@ def test_confirmations_and_refutations_come_to_the_same_in_any_order(order: list
         Found(20, 1, 3.0, 0.0, *place, 8, Standing.REFUTED),
         Found(15, 1, 0.0, 5.0, *place, 7, Standing.CONFIRMED),
         Found(12, 1, 57.0, 0.0, *place, 6, Standing.CONFIRMED),
+        Found(19, 1, 1.0, 0.0, *place, 5, Standing.ESTIMATED),
+        Found(21, 1, 50.0, 0.0, 90.0, 0.0, 90.0, 4, Standing.ESTIMATED),
     ]
     finds = Finds(MODEL)
     for at in [*order, *order]:  # told twice, as floods and hellos do
         finds.on_found(words[at], now_ns=S)
-    confirmed = finds.known[1].confirmed
+    confirmed, estimate = finds.known[1].confirmed, finds.known[1].told
     assert confirmed is not None
     assert confirmed.node == 6, "the only one that was not taken back"
+    assert estimate is not None
+    assert estimate.node == 4, "an estimate that is not younger than a refutation is part of the mistake"
 
 
 def test_what_is_confirmed_again_at_the_same_place_after_it_was_taken_back_holds() -> None:

@@ -175,3 +175,12 @@ def test_a_gap_beyond_which_nobody_is_heard_counts_as_wide_but_not_as_endless() 
     far = Enu(200 * math.sin(1.5), 200 * math.cos(1.5), 60)
     assert place_on_ring(middle, here, [far], radius_m=200, node=2).minus(here).norm() < 1e-9
     assert place_on_ring(middle, middle, [], radius_m=200, node=2).minus(middle).norm() > 199, "out of the middle"
+
+
+def test_a_leader_flies_through_its_way_points_and_brakes_for_the_last() -> None:
+    route = Route([(100.0, 0.0), (100.0, 200.0)], speed_m_s=8.0)
+    assert route.velocity(Enu(60.0, 0.0, 50.0)) == (8.0, 0.0, 0.0)
+    route.led_at(Enu(75.0, 0.0, 50.0))
+    assert route.velocity(Enu(100.0, 100.0, 50.0)) == (0.0, 8.0, 0.0)
+    assert route.velocity(Enu(100.0, 196.0, 50.0)) == (0.0, 1.0, 0.0)
+    assert route.velocity(Enu(100.0, 200.0, 50.0)) == (0.0, 0.0, 0.0)

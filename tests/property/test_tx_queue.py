@@ -1,0 +1,48 @@
+"""The transmit queue beside a plain list: what goes out, what expires, and what has to go for another, in any order."""
+
+from typing import Final
+
+from hypothesis import given
+from hypothesis import strategies as st
+
+from fanet_mw.node.packet import Packet
+from fanet_mw.node.queue import TxQueue
+from fanet_mw.units import BROADCAST, NodeId
+from fanet_mw.wire import PRIORITY_BULK, PRIORITY_CONTROL, Header, Kind
+
+CAPACITY: Final = 4
+SOONER_US: Final = {1: 30, 2: 10}
+"""Safety and reports live so much shorter than bulk."""
+PUSHES = st.tuples(
+    st.just("push"),
+    st.integers(0, 100),
+    st.integers(PRIORITY_CONTROL, PRIORITY_BULK),
+    st.none() | st.integers(0, PRIORITY_BULK + 1),
+)
+EXPIRIES = st.tuples(st.just("expire"), st.integers(0, 120))
+
+
+def packet(number: int, born_us: int, priority: int) -> Packet:
+    header = Header(born_us, number, NodeId(1), BROADCAST, NodeId(1), Kind.DATA, 8, 0, priority, 0)
+    return Packet(header, header.encode())
+
+
+@given(st.lists(PUSHES | EXPIRIES | st.just(("pop",)), max_size=30))
+def test_a_queue_holds_what_a_sorted_list_would(steps: list[tuple[object, ...]]) -> None:
+    queue, model = TxQueue(capacity=CAPACITY, sooner_us=SOONER_US), list[tuple[int, int, Packet]]()
+    for number, step in enumerate(steps):
+        match step:
+            case ("push", int(born_us), int(priority), rank):
+                one = packet(number, born_us, priority)
+                place = priority if rank is None else rank
+                assert isinstance(place, int)
+                model = sorted([*model, (place, number, one)])
+                expected = model.pop()[2] if len(model) > CAPACITY else None
+                assert queue.push(one, rank=place if rank is not None else None) == expected
+            case ("expire", int(before_us)):
+                stale = [e for e in model if e[2].header.origin_us < before_us + SOONER_US.get(e[0], 0)]
+                model = [e for e in model if e not in stale]
+                assert queue.expire(before_us=before_us) == [e[2] for e in stale]
+            case ("pop",) if model:
+                assert queue.pop() == model.pop(0)[2]
+        assert len(queue) == len(model)

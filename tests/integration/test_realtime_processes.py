@@ -216,6 +216,35 @@ def test_a_launcher_that_is_killed_takes_all_its_processes_with_it(mark: str, tm
     assert eventually(lambda: marked(mark) == []), "children notice that their parent is gone"
 
 
+LAUNCHER_OF_A_SLEEPER = """
+import asyncio, runpy, sys
+from sim.run.launcher.processes import Processes
+
+async def main():
+    processes = Processes(lambda *_: None)
+    processes.start("sleeper", runpy.run_path, {"path_name": sys.argv[1]})
+    await asyncio.sleep(300)
+
+asyncio.run(main())
+"""
+
+
+def test_a_launcher_that_is_killed_takes_a_child_with_it_that_hears_nothing(mark: str, tmp_path: Path) -> None:
+    """No bus tells this child that the launcher has gone."""
+    sleeps = tmp_path / "sleeps.py"
+    sleeps.write_text("import sys, time; print('asleep', file=sys.stderr, flush=True); time.sleep(300)")
+    launcher = subprocess.Popen(
+        [sys.executable, "-c", LAUNCHER_OF_A_SLEEPER, str(sleeps)],
+        stderr=subprocess.PIPE,
+        text=True,
+        env={**os.environ, MARK: mark, "PYTHONPATH": os.pathsep.join(sys.path)},
+    )
+    said(launcher, "asleep")
+    launcher.kill()
+    launcher.communicate()
+    assert eventually(lambda: marked(mark) == [])
+
+
 def ended(process: subprocess.Popen[str]) -> tuple[int, str]:
     """The exit code and the last words of a command that must end."""
     _, err = process.communicate(timeout=PATIENCE_S)

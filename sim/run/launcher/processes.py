@@ -43,6 +43,7 @@ def _child(recipe: ChildRecipe) -> None:
     signal.signal(signal.SIGINT, signal.SIG_IGN)
     signal.pthread_sigmask(signal.SIG_UNBLOCK, _BLOCKED)  # the launcher's SIGTERM ends it
     die_with_parent()
+    _keep_no_server_alive()
     entitle(recipe.name, recipe.title)
     try:
         if recipe.gives_way:
@@ -52,6 +53,19 @@ def _child(recipe: ChildRecipe) -> None:
         sys.stderr.write(f"{error}\n")
         code = BUS_EXIT_CODE
     sys.exit(code)
+
+
+def _keep_no_server_alive() -> None:
+    """Close this child's hold on the server, so that the server ends with the launcher and takes every child with it.
+
+    The server lives until nobody holds the pipe that the launcher keeps open, and it hands each child a copy, so that
+    a child may start children too. No child of a swarm does. With the copy open, a launcher that is killed would leave
+    behind the server and each child that does not notice by itself.
+    """
+    kept = forkserver._forkserver._forkserver_alive_fd  # type: ignore[attr-defined]  # noqa: SLF001
+    if kept is not None:
+        os.close(kept)
+        forkserver._forkserver._forkserver_alive_fd = None  # type: ignore[attr-defined]  # noqa: SLF001
 
 
 def _give_way() -> None:

@@ -36,7 +36,7 @@ def add_to(app: App) -> None:
 def sweep(
     what: str,
     *,
-    set: Annotated[tuple[str, ...], Parameter(name="--set", negative="")] = (),  # noqa: A002
+    set: Annotated[tuple[str, ...], Parameter(name="--set", negative="", consume_multiple=True)] = (),  # noqa: A002
     seeds: Annotated[int | None, Parameter(validator=Number(gte=1))] = None,
     variant: str | None = None,
     out: Path | None = None,
@@ -55,7 +55,7 @@ def sweep(
     what
         A sweep file (TOML with a `base`), a shipped sweep, or a scenario.
     set
-        Scenario key and its value, or its values in turn: KEY=A,B,C; repeatable. Every combination is run.
+        Scenario key and its value, or its values in turn: KEY=A,B,C ...; repeatable. Every combination is run.
     seeds
         Run every setting with seeds 1 to so many.
     variant

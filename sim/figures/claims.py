@@ -102,6 +102,8 @@ class Reason:
 
     text: str
     statements: Sequence[Statement]
+    set_afterwards: str = ""
+    """What of it was chosen after such runs had been seen, so that they are no test of that."""
 
     @property
     def shown(self) -> bool:
@@ -113,6 +115,7 @@ class Reason:
         return {
             "text": self.text,
             "shown": self.shown,
+            "set_afterwards": self.set_afterwards,
             "statements": [statement.plain("expected") for statement in self.statements],
         }
 

@@ -178,7 +178,8 @@ def _reason(reason: Mapping[str, Any]) -> str:
     """Why a verdict is what it is, with its experiment; what the runs do not show is said to be not shown."""
     evidence = "; ".join(one["text"] for one in reason["statements"])
     doubt = "" if reason["shown"] else "Supposed, but not shown by these runs: "
-    return f"{doubt}{reason['text']} ({evidence}.)"
+    chosen = reason.get("set_afterwards")
+    return f"{doubt}{reason['text']} ({evidence}.){f' Set after such runs had been seen: {chosen}' if chosen else ''}"
 
 
 def _commands(figures: Sequence[tuple[Path, dict[str, Any]]]) -> list[Block]:

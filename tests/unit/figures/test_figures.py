@@ -87,11 +87,15 @@ def test_a_reason_is_shown_only_when_every_statement_of_its_experiment_holds() -
 
 def test_a_page_says_of_a_reason_what_shows_it_or_that_nothing_does(nine, tmp_path) -> None:
     table, _, _ = nine
-    reasons = [Reason("Air.", [above("air", [2.0, 2.0], 1.0)]), Reason("Luck.", [above("luck", [0.0, 2.0], 1.0)])]
+    reasons = [
+        Reason("Air.", [above("air", [2.0, 2.0], 1.0)], "the limit."),
+        Reason("Luck.", [above("luck", [0.0, 2.0], 1.0)]),
+    ]
     claims = [Claim(9, "It falls.", [above("it", [2.0, 2.0], 1.0)], reasons)]
     render(replace(FIGURES["9"], claims=lambda _: claims), table, tmp_path)
     _, markdown = (path.read_text() for path in write([tmp_path], tmp_path))
-    assert "Air. (air: 2 [2, 2], expected above 1: holds.)" in markdown
+    assert "Air. (air: 2 [2, 2], expected above 1: holds.) Set after such runs had been seen: the limit." in markdown
+    assert markdown.count("Set after") == 1
     assert "Supposed, but not shown by these runs: Luck. (luck: 1 [" in markdown
     assert markdown.count("not shown") == 1
 

@@ -17,11 +17,11 @@ from fanet_mw.wire.message import DELIVERED, GIVEN_UP, MISSING, NO_LISTENER, Hea
 MOST_BYTES: Final = 4 << 20
 """The most bytes of pieces that are kept, of all senders together."""
 MOST_BYTES_EACH: Final = 1 << 20
-"""Of one sender."""
+"""The most bytes of pieces that are kept of one sender."""
 MOST_MESSAGES: Final = 4096
 """The most messages, of all senders together, that are not whole or wait for one before them."""
 MOST_MESSAGES_EACH: Final = 512
-"""Of one sender."""
+"""The most messages of one sender that are not whole or wait for one before them."""
 RECEIPT_NS: Final = 20 * MS
 """A receipt waits this long for others to the same node, and up to `_SPREAD_NS` longer: nodes that heard the same
 broadcast must not answer at the same instant."""

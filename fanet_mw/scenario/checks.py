@@ -18,9 +18,9 @@ MESSAGE_BYTES: Final = {
     "FANET_ROUTE": 36, "positions": 61, "COLLISION": 31, "FANET_BEACON": 33, "FANET_SCHEDULE": 266,
     "FANET_SURVIVOR": 43, "FANET_DIGEST": 255, "FANET_PLACES": 189, "FANET_CLAIMS": 116, "FANET_LINKS": 240,
 }  # fmt: skip
-"""Of messages on the air, their MAVLink frame included (docs/reference/air-format.md); `positions` are HEARTBEAT and
-GLOBAL_POSITION_INT, with which every hello begins. The air format itself is not known here: the emulator reads
-scenarios too, and to it frames are bytes."""
+"""The lengths of messages on the air, their MAVLink frame included (docs/reference/air-format.md); `positions` are
+HEARTBEAT and GLOBAL_POSITION_INT, with which every hello begins. The air format itself is not known here: the emulator
+reads scenarios too, and to it frames are bytes."""
 _SCHEDULE_PLACES: Final = 2
 """FANET_PLACES that go with one full FANET_SCHEDULE."""
 _TAKEN: Final = frozenset(("report", "warning", "telemetry", "receipt", "joined", "formation"))

@@ -66,7 +66,7 @@ class Sensors(Section):
     radar_resolution_m: SomeLength = 0.5
     """Length of a range cell, the speed of light over twice the bandwidth."""
     radar_snr_db: Level = 21.6
-    """Of a target of 1 m2 at 100 m."""
+    """Signal-to-noise ratio of a target of 1 m2 at 100 m."""
     radar_uav_m2: Annotated[float, Field(gt=0, le=1e6)] = 0.03
     """Radar cross section of a UAV."""
     radar_wall_m2: Annotated[float, Field(gt=0, le=1e6)] = 10.0

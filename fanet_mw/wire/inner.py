@@ -31,7 +31,6 @@ FARTHEST_M: Final = 1e7
 FASTEST_M_S: Final = 1e4
 MOST_DBM: Final = 300.0
 """The greatest received power, of either sign."""
-"""Of a received power, either sign."""
 MOST_SURVIVORS: Final = 10_000
 """The greatest id of a survivor, which limits how much is remembered of them."""
 

@@ -58,7 +58,7 @@ _OF_DELIVERIES: Final = _share_within(_WITHIN_S, of_all=False)
 
 
 def _kept(row: Row) -> float | None:
-    """Of packets x targets for which a bound was stated, the share that arrived within it."""
+    """The share that arrived within its bound, of packets x targets for which a bound was stated."""
     stated = row.get("bound.stated_share")  # a table has no such column when no run stated a bound
     return float(row["bound.within_share"] / stated) if stated else None
 

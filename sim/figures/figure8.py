@@ -40,7 +40,7 @@ class _Curve(NamedTuple):
     look: Look
     panel: str
     unit: str = ""
-    """Of the quantity; one without a unit is a share."""
+    """The unit of the quantity; a quantity without one is a share."""
 
     def draw(self, runs: Runs, axes: Axes, *, number: int, of: int) -> list[Mapping[str, Any]]:
         """Draw it as one of several lines; returns the numbers in it."""
@@ -101,12 +101,12 @@ def _fast(runs: Runs, quantity: Quantity, case: str) -> dict[int, float]:
 
 
 def _fall(runs: Runs, quantity: Quantity, case: str) -> list[float]:
-    """By how much the quantity is less when all are fast than when all are slow, seed by seed."""
+    """The quantity when all are slow minus that when all are fast, seed by seed."""
     return differences(_slow(runs, quantity, case), _fast(runs, quantity, case))
 
 
 def _rise(runs: Runs, quantity: Quantity, case: str) -> list[float]:
-    """By how much the quantity is more when all are fast than when all are slow, seed by seed."""
+    """The quantity when all are fast minus that when all are slow, seed by seed."""
     return differences(_fast(runs, quantity, case), _slow(runs, quantity, case))
 
 

@@ -43,7 +43,7 @@ def claims_reports(runs: Runs) -> list[Claim]:
     intervals = list(reversed(runs.levels("mission.report_interval_s")))
 
     def lead(quantity: Quantity, rival: str, interval_s: float) -> list[float]:
-        """By how much a quantity is greater by fanet-mw than by a rival."""
+        """A quantity of fanet-mw minus that of a rival."""
         ours, theirs = (
             runs.per_seed(quantity, case=case, mission__report_interval_s=interval_s) for case in ("ours", rival)
         )

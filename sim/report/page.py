@@ -56,7 +56,7 @@ _SETTINGS: Final = Rows(
 )
 
 _COLUMNS: Final = ("claim", "findings", "verdict", "why")
-"""Of each figure's claims; the last is left out where no claim needs a reason."""
+"""The columns of the table of a figure's claims; the last is left out where no claim needs a reason."""
 
 
 def write(folders: Sequence[Path], out: Path) -> list[Path]:

@@ -26,7 +26,7 @@ _PASSED_ON_NS: Final = 12 * S
 _PASSED_ON: Final = 3
 """The most verdicts in one hello."""
 _TELLERS: Final = 4
-"""Of the UAVs that know a verdict of which another does not seem to know, one in this many tells it."""
+"""When a UAV speaks as if it knew of no verdict, one in so many of the UAVs that know it tells it."""
 
 
 class Announcing:

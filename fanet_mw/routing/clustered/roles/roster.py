@@ -20,7 +20,7 @@ _SURE: Final = 0.9
 
 
 class _SilentNode(NamedTuple):
-    """That a node is silent; if it is a head, the node that reports it serves its cluster meanwhile."""
+    """A node that was reported silent; if it is a head, the node that reports it serves its cluster meanwhile."""
 
     by: NodeId
     since_ns: int

@@ -45,13 +45,13 @@ class Timetable(NamedTuple):
 
     turns: tuple[Turn, ...]
     spans: Mapping[NodeId, int]
-    """Per root: turns from its own until everyone has its packet, the first and the last included."""
+    """For each root, the turns from its own until all nodes have its packet, the first and the last included."""
     uncovered: Mapping[NodeId, tuple[NodeId, ...]]
-    """Per root: nodes that it cannot reach at all: the swarm is in parts."""
+    """For each root, the nodes that it cannot reach at all because the swarm is in parts."""
     used: int
     """Turns that are in use, of `geometry.turns`."""
     calls: Mapping[NodeId, tuple[int, ...]] = MappingProxyType({})
-    """Per node: turns of its own for a hello, or for a packet that a neighbor lacks."""
+    """For each node, the turns in which it sends to its neighbors alone: a hello, or a packet that a neighbor lacks."""
 
     def roots(self) -> list[Turn]:
         """The turns in which packets are let out; a repetition lets out nothing new."""

@@ -81,7 +81,7 @@ class TurnAccess:
         return self._kept(self._roots.drain(), through_ns=None, now_ns=now_ns)
 
     def _kept(self, packets: Sequence[Packet], *, through_ns: int | None, now_ns: int) -> list[Packet]:
-        """Those of some packets that stop waiting that break no promise; the others are dropped."""
+        """Of packets that no longer wait here, drop those whose stated bound would be broken; returns the others."""
         kept = []
         for packet in packets:
             if self._promises.keeps(packet, through_ns=through_ns):

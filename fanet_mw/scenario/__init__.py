@@ -1,6 +1,12 @@
 """The scenario of a run: its model, the tables it is made of, and how it is read from a TOML file.
 
-Each table is in a file of its name. The model is re-exported here.
+Each table is in the file of its name: `[radio]` in `radio.py`. The model is re-exported here. The other files:
+
+    model.py, sections.py        the whole scenario; what all of its tables have in common
+    checks.py                    what the tables allow together
+    config.py, quantities.py     reading from files and settings; units that a value may be written with
+    commented.py, reference.py   a file with every key explained; what can be said of each key
+    identity.py                  whether two processes run the same scenario
 """
 
 from fanet_mw.scenario.clock import Clock

@@ -20,7 +20,10 @@ missed, each as a share of all requests, and receptions lost on the bus, as a sh
 HEARD_LATE: Final = 0.02
 """The limit for receptions handed to their node later than a handover and a lead after the frame's end."""
 STALL_MS: Final = 500.0
-"""The longest time for which a process may do nothing."""
+"""The longest time for which the emulator, the world or the launcher may do nothing: every UAV depends on them."""
+UAV_STALL_MS: Final = 1000.0
+"""The longest time for which the process of one UAV may do nothing. What it missed counts among `lost` and
+`heard_late`, too, which weigh it by the swarm: one UAV of nine that stands still for 300 ms exceeds `lost`."""
 SKIPPED_TICKS: Final = 0.02
 """The limit for skipped ticks of the world."""
 _PARTS: Final = frozenset({"lost_on_bus", "dropped_late", "missed_turns", "copies_lost"})
@@ -68,13 +71,13 @@ def measures(outcome: Outcome, *, frames: Mapping[str, Any], late_share: float) 
     }
     together = sum(part.value for part in parts.values())
     ticks, skipped = world.get("ticks", 0), world.get("skipped_ticks", 0)
-    stall_ms, stalled = _longest_stall(outcome)
     return {
         "late_frames": Measure("frames announced too late", late_share, outcome.scenario.radio.late_limit),
         **parts,
         "lost": Measure("lost on the bus, dropped as too late and missed, together", together, LOST),
         "heard_late": Measure("receptions handed over too late", _share(late, heard), HEARD_LATE),
-        "stall_ms": Measure("longest standstill of a process", stall_ms, STALL_MS, "ms", f" ({stalled})"),
+        "stall_ms": _standstill("a service", _stalls(outcome, agents=False), STALL_MS),
+        "uav_stall_ms": _standstill("a UAV", _stalls(outcome, agents=True), UAV_STALL_MS),
         "skipped_ticks": Measure("ticks that the world skipped", _share(skipped, ticks + skipped), SKIPPED_TICKS),
     }
 
@@ -145,12 +148,19 @@ def _copies_lost(outcome: Outcome) -> float:
     return _share(lost, handed)
 
 
-def _longest_stall(outcome: Outcome) -> tuple[float, str]:
-    """The longest standstill [ms], and the process that had it."""
-    stalls = {name: (report.get("host") or {}).get("stall_ms", 0.0) for name, report in outcome.reports.items()}
-    stalls["the launcher"] = outcome.stall_ms
-    worst = max(stalls, key=lambda name: stalls[name])
-    return stalls[worst], worst
+def _stalls(outcome: Outcome, *, agents: bool) -> dict[str, float]:
+    """The longest standstill [ms] of each UAV, or of each process that serves all of them, by name."""
+    stalls = {
+        name: (report.get("host") or {}).get("stall_ms", 0.0)
+        for name, report in outcome.reports.items()
+        if (report.get("kind") == "agent") == agents
+    }
+    return stalls if agents else {**stalls, "the launcher": outcome.stall_ms}
+
+
+def _standstill(whose: str, stalls: Mapping[str, float], limit_ms: float) -> Measure:
+    longest = max(stalls, key=lambda name: stalls[name], default="none")
+    return Measure(f"longest standstill of {whose}", stalls.get(longest, 0.0), limit_ms, "ms", f" ({longest})")
 
 
 def _sum(reports: list[Mapping[str, Any]], key: str) -> int:

@@ -97,8 +97,11 @@ MEASURED: dict[str, tuple[float, Callable[[Outcome, float], object]]] = {
         validity.SKIPPED_TICKS,
         lambda outcome, share: put(outcome, "world", "skipped_ticks", value=round(1000 * share / (1 - share))),
     ),
-    "longest standstill of a process": (
-        validity.STALL_MS, lambda outcome, ms: put(outcome, "agent-2", "host", "stall_ms", value=ms)
+    "longest standstill of a service": (
+        validity.STALL_MS, lambda outcome, ms: put(outcome, "emulator", "host", "stall_ms", value=ms)
+    ),
+    "longest standstill of a UAV": (
+        validity.UAV_STALL_MS, lambda outcome, ms: put(outcome, "agent-2", "host", "stall_ms", value=ms)
     ),
 }  # fmt: skip
 
@@ -159,7 +162,7 @@ BROKEN: dict[str, tuple[Change, str]] = {
     ),
     "the launcher stood still": (
         lambda outcome: setattr(outcome, "stall_ms", 5200.0),
-        "longest standstill of a process: 5200 ms (the launcher), limit 500 ms",
+        "longest standstill of a service: 5200 ms (the launcher), limit 500 ms",
     ),
 }  # fmt: skip
 
@@ -202,7 +205,7 @@ def test_every_reason_is_printed(scenario: Scenario, capsys: pytest.CaptureFixtu
 
     outcome = good(scenario)
     outcome.ended.append(("agent-2", -9))
-    put(outcome, "agent-1", "host", "stall_ms", value=900.0)
+    put(outcome, "agent-1", "host", "stall_ms", value=1900.0)
     summary = summarize(outcome, trace_sha256="") | {"air": {}}
     show(summary, Console(width=200))
     printed = capsys.readouterr().out

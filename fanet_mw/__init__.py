@@ -74,12 +74,19 @@ __all__ = [
 
 
 def __getattr__(name: str) -> Any:  # noqa: ANN401  (whatever the name stands for)
-    if name == "load_scenario":
-        value = import_module("sim.scenarios.catalog").find
-    elif name in _HOME_OF:
-        value = getattr(import_module(_HOME_OF[name]), name)
-    else:
+    if name not in __all__:
         raise AttributeError(f"module 'fanet_mw' has no attribute {name!r}")
+    try:
+        if name == "load_scenario":
+            value = import_module("sim.scenarios.catalog").find
+        else:
+            value = getattr(import_module(_HOME_OF[name]), name)
+    except ModuleNotFoundError as error:
+        from fanet_mw.installation import missing_extra
+
+        if (why := missing_extra(error, f"fanet_mw.{name}")) is None:
+            raise
+        raise ModuleNotFoundError(why, name=error.name) from error
     globals()[name] = value
     return value
 

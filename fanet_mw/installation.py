@@ -38,12 +38,12 @@ def damage() -> str | None:
     return None
 
 
-def missing_extra(error: ModuleNotFoundError) -> str | None:
-    """What to install for a missing module; None when no extra of this distribution has it."""
+def missing_extra(error: ModuleNotFoundError, what: str = "this command") -> str | None:
+    """What to install for a missing module that `what` needs; None when no extra of this distribution has it."""
     extra = _EXTRAS.get((error.name or "").partition(".")[0])
     if extra is None:
         return None
-    return f"this command needs {error.name}, which is not installed: pip install 'fanet-mw[{extra}]'"
+    return f"{what} needs {error.name}, which is not installed: pip install 'fanet-mw[{extra}]'"
 
 
 def _owner(package: str) -> str:

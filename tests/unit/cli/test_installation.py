@@ -95,6 +95,19 @@ def test_a_command_that_needs_an_extra_says_which(core_only: Path) -> None:
     )
 
 
+@pytest.mark.parametrize("name", ["simulate", "launch", "VirtualSwarm"])
+def test_a_public_name_that_needs_an_extra_says_which(core_only: Path, name: str) -> None:
+    program = f"import fanet_mw; fanet_mw.join, fanet_mw.Application; fanet_mw.{name}"
+    environment = {**os.environ, "PYTHONPATH": os.pathsep.join(map(str, (core_only, ROOT)))}
+    ended = subprocess.run(
+        [sys.executable, "-c", program], env=environment, capture_output=True, text=True, timeout=60, check=False
+    )
+
+    assert ended.stderr.splitlines()[-1] == (
+        f"ModuleNotFoundError: fanet_mw.{name} needs numpy, which is not installed: pip install 'fanet-mw[emulator]'"
+    )
+
+
 def test_where_pybullet_is_not_installed_kinematic_serves_and_one_sentence_says_so(
     monkeypatch: pytest.MonkeyPatch, capsys: pytest.CaptureFixture[str]
 ) -> None:

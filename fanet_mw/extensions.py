@@ -72,7 +72,8 @@ def load(key: str, name: str) -> Any:  # noqa: ANN401  (whatever the contract of
     except ModuleNotFoundError as error:
         if (error.name or "").partition(".")[0] in _NOT_EVERYWHERE:
             raise
-        raise ValueError(f"{key} = {name!r}: {text} cannot be imported: {error}") from error
+        remedy = "; install it, or put its folder on PYTHONPATH" if error.name == module.partition(".")[0] else ""
+        raise ValueError(f"{key} = {name!r}: {text} cannot be imported: {error}{remedy}") from error
     except (ImportError, AttributeError) as error:
         raise ValueError(f"{key} = {name!r}: {text} cannot be imported: {error}") from error
     if not callable(found):

@@ -61,6 +61,7 @@ def test_five_parts_of_another_package_serve_a_run(installed: Installed, tmp_pat
         (["routing.protocol=gossip4"], "(installed: gossip3), nor MODULE:CLASS; did you mean gossip?"),
         (["mobility.model=orbt"], "did you mean orbit?"),
         (["routing.protocol=swarm_parts.gossip3:Gossip4"], "has no attribute 'Gossip4'"),
+        (["routing.protocol=mine:Gossip"], "No module named 'mine'; install it, or put its folder on PYTHONPATH"),
         (
             ["applications.0.options.every_s=0"],
             "applications.options.every_s = 0: input should be greater than or equal to 0.1",

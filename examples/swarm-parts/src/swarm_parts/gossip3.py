@@ -12,7 +12,7 @@ from fanet_mw.bus.messages import Reception
 from fanet_mw.errors import DropReason
 from fanet_mw.node.contract import Port, RoutingProtocol
 from fanet_mw.node.duplicates import key_of
-from fanet_mw.node.queue import Packet
+from fanet_mw.node.packet import Packet
 from fanet_mw.units import BROADCAST, MS
 from fanet_mw.wire import FLAG_FLOOD
 

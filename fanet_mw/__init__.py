@@ -27,6 +27,7 @@ if TYPE_CHECKING:
         Altimeter,
         Battery,
         Camera,
+        CameraImage,
         Gps,
         Inertial,
         Radar,
@@ -51,7 +52,8 @@ _HOMES: Final = {
         "ANY", "HOME", "AppPort", "Application", "Course", "Data", "Fate", "Received", "Status",
     ),
     "fanet_mw.bus.messages": (
-        "Altimeter", "Battery", "Camera", "Gps", "Inertial", "Radar", "SensorReading", "Voice", "WifiScan",
+        "Altimeter", "Battery", "Camera", "CameraImage", "Gps", "Inertial", "Radar", "SensorReading", "Voice",
+        "WifiScan",
     ),
     "fanet_mw.errors": (
         "BusError", "ConfigError", "DropReason", "FanetError", "LocalProtocolError", "MalformedFrameError",
@@ -65,10 +67,10 @@ _HOMES: Final = {
 _HOME_OF: Final = {name: module for module, names in _HOMES.items() for name in names}
 
 __all__ = [
-    "Altimeter", "ANY", "Application", "AppPort", "Battery", "BROADCAST", "BusError", "Camera", "ConfigError", "Course",
-    "Data", "DropReason", "Emulated", "Enu", "FanetError", "Fate", "Gps", "HOME", "Inertial", "Launched",
-    "LocalProtocolError", "MalformedFrameError", "Message", "Node", "NodeClosedError", "NodeId", "OnAir", "Radar",
-    "Received", "Result", "Scenario", "SensorReading", "Sent", "Status", "VirtualSwarm", "Voice", "WifiScan",
+    "Altimeter", "ANY", "Application", "AppPort", "Battery", "BROADCAST", "BusError", "Camera", "CameraImage",
+    "ConfigError", "Course", "Data", "DropReason", "Emulated", "Enu", "FanetError", "Fate", "Gps", "HOME", "Inertial",
+    "Launched", "LocalProtocolError", "MalformedFrameError", "Message", "Node", "NodeClosedError", "NodeId", "OnAir",
+    "Radar", "Received", "Result", "Scenario", "SensorReading", "Sent", "Status", "VirtualSwarm", "Voice", "WifiScan",
     "__version__", "join", "launch", "load_scenario", "simulate",
 ]  # fmt: skip
 

@@ -37,7 +37,8 @@ PAGES: Final = {
     "api-applications.md": (APPLICATIONS, {
         "Applications": ("Application", "AppPort", "Data", "Received", "Status", "Fate", "Course", "ANY", "HOME"),
         "What a vehicle perceives": (
-            "Gps", "SensorReading", "WifiScan", "Camera", "Voice", "Radar", "Altimeter", "Inertial", "Battery",
+            "Gps", "SensorReading", "WifiScan", "Camera", "CameraImage", "Voice", "Radar", "Altimeter", "Inertial",
+            "Battery",
         ),
     }),
 }  # fmt: skip

@@ -16,6 +16,7 @@ from fanet_mw.bus.messages import (
     Altimeter,
     Battery,
     Camera,
+    CameraImage,
     ClockEpoch,
     ClockState,
     Gps,
@@ -235,6 +236,7 @@ _CODECS: Final[dict[int, tuple[type[Any], Callable[[Any], bytes], Callable[[byte
     21: (Altimeter, sensor_codecs.encode_altimeter, sensor_codecs.decode_altimeter),
     22: (Inertial, sensor_codecs.encode_inertial, sensor_codecs.decode_inertial),
     23: (Battery, sensor_codecs.encode_battery, sensor_codecs.decode_battery),
+    24: (CameraImage, sensor_codecs.encode_image, sensor_codecs.decode_image),
 }
 HEADS: Final[dict[type[Any], tuple[struct.Struct, ...]]] = {
     TxRequest: (_TX,), Reception: (_RX,), TxStatus: (_STATUS,), Poses: (_POSES,), Setpoint: (_SETPOINT,),

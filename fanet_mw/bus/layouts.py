@@ -65,6 +65,9 @@ NAMED: Final[dict[type[Any], Names]] = {
         f"{', '.join(LOSSES)}; `count` x int64: sum of RSSI [1/1000 dBm]",
     ),
     m.Camera: Names("world/<id>/sensor/camera", "t_ns count", row="bearing_rad elevation_rad pixels"),
+    m.CameraImage: Names(
+        "world/<id>/sensor/image", "t_ns width height", "3 bytes for each pixel: red, green, blue; rows from the north",
+    ),
     m.Voice: Names("world/<id>/sensor/voice", "t_ns count", row="bearing_rad elevation_rad level_db snr_db"),
     m.Radar: Names("world/<id>/sensor/radar", "t_ns count", row="range_m bearing_rad elevation_rad closing_m_s snr_db"),
     m.Altimeter: Names("world/<id>/sensor/altimeter", "t_ns up_m above_ground_m"),

@@ -155,6 +155,19 @@ class Camera(NamedTuple):
     """The people in the image, each with bearing and elevation [rad] and size [pixels]."""
 
 
+class CameraImage(NamedTuple):
+    """World -> one UAV: what its downward camera shows, rendered, for a user's own eyes on board."""
+
+    t_ns: int
+    """The swarm instant of the reading."""
+    width: int
+    """Pixels from west to east."""
+    height: int
+    """Pixels from north to south."""
+    rgb: bytes
+    """Red, green and blue of each pixel, row by row from the northwest corner."""
+
+
 class Call(NamedTuple):
     """A voice that a microphone array made out."""
 
@@ -271,7 +284,7 @@ class Report:
     json: str
 
 
-SensorReading = WifiScan | Camera | Voice | Radar | Altimeter | Inertial | Battery
+SensorReading = WifiScan | Camera | CameraImage | Voice | Radar | Altimeter | Inertial | Battery
 """Any reading of a sensor other than the position fix; a new kind of sensor is one more member of this union."""
 
 Message = (

@@ -13,6 +13,7 @@ from fanet_mw.bus.messages import (
     Battery,
     Call,
     Camera,
+    CameraImage,
     Echo,
     Gps,
     Inertial,
@@ -27,6 +28,7 @@ _GPS = struct.Struct("<q6d")
 _SCAN = struct.Struct("<qH")
 _HEARD = struct.Struct("<If")
 _PERSON = struct.Struct("<3d")
+_IMAGE = struct.Struct("<qHH")
 _CALL = struct.Struct("<4d")
 _ECHO = struct.Struct("<5d")
 _ALTIMETER = struct.Struct("<q2d")
@@ -89,6 +91,18 @@ def decode_camera(body: bytes) -> Camera:
     return Camera(t_ns, tuple(Person(*row) for row in rows))
 
 
+def encode_image(m: CameraImage) -> bytes:
+    return _IMAGE.pack(m.t_ns, m.width, m.height) + m.rgb
+
+
+def decode_image(body: bytes) -> CameraImage:
+    t_ns, width, height = _IMAGE.unpack_from(body)
+    rgb = body[_IMAGE.size :]
+    if len(rgb) != 3 * width * height:
+        raise ValueError("length")
+    return CameraImage(t_ns, width, height, rgb)
+
+
 def encode_voice(m: Voice) -> bytes:
     return _encode_rows(m.t_ns, m.calls, _CALL)
 
@@ -140,6 +154,6 @@ def decode_battery(body: bytes) -> Battery:
 
 HEADS: Final[dict[type[Any], tuple[struct.Struct, ...]]] = {
     Gps: (_GPS,), WifiScan: (_SCAN, _HEARD), Camera: (_SCAN, _PERSON), Voice: (_SCAN, _CALL), Radar: (_SCAN, _ECHO),
-    Altimeter: (_ALTIMETER,), Inertial: (_INERTIAL,), Battery: (_BATTERY,),
+    Altimeter: (_ALTIMETER,), Inertial: (_INERTIAL,), Battery: (_BATTERY,), CameraImage: (_IMAGE,),
 }  # fmt: skip
 """The structs of each kind of reading, as in `codecs.HEADS`."""

@@ -9,7 +9,7 @@ fanet/<swarm>/world/obstruction      Obstructions
 fanet/<swarm>/world/<id>/setpoint    Setpoint               UAV -> world
 fanet/<swarm>/world/<id>/sensor/gps  Gps
 fanet/<swarm>/world/<id>/sensor/wifi WifiScan; camera: Camera, voice: Voice, radar: Radar, altimeter: Altimeter,
-inertial: Inertial, battery: Battery
+inertial: Inertial, battery: Battery, image: CameraImage
 fanet/<swarm>/mavlink/<id>           MavlinkTap
 fanet/<swarm>/trace/<id>             TraceBatch             <id> is the actor's name
 fanet/<swarm>/report/<id>            Report                 <id> is the actor's name

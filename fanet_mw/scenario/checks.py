@@ -54,6 +54,9 @@ def disagreements(scenario: Scenario) -> Sequence[str]:
         found.append(f"traffic.name: {', '.join(names)} must be different, and none of {', '.join(sorted(_TAKEN))}")
     if scenario.clock.sync == "beacons" and not scenario.routing.hello_interval_s:
         found.append('clock.sync = "beacons" needs hellos: routing.hello_interval_s > 0')
+    strangers = sorted(node for node in scenario.sensors.image_nodes if node > count)
+    if strangers:
+        found.append(f"sensors.image_nodes: {', '.join(map(str, strangers))} must be <= nodes.count = {count}")
     found += _too_small_frames(scenario)
     found += _unkept_deadline(scenario)
     found += _blind_warnings(scenario)

@@ -11,6 +11,7 @@ from fanet_mw.scenario.sections import (
     Coordinate,
     Decibels,
     Duration,
+    Id,
     Length,
     Level,
     Rate,
@@ -43,6 +44,13 @@ class Sensors(Section):
     """Error of a direction, along each of two axes."""
     camera_false_per_hour: Annotated[float, Field(ge=0, le=1e6)] = 0.0
     """People that one camera sees where there are none."""
+    image_hz: Rate = 0.0
+    """Images a second that are rendered for the applications of a user, with the camera's field of view; pybullet
+    renders them. Each takes tens of milliseconds of the world's time, so that only few UAVs have them in real time."""
+    image_pixels: tuple[Annotated[int, Field(ge=16, le=640)], Annotated[int, Field(ge=16, le=640)]] = (320, 240)
+    """Width and height of an image that is rendered."""
+    image_nodes: tuple[Id, ...] = ()
+    """The UAVs for which images are rendered; none named: all."""
     voice_hz: Rate = 0.0
     """How often a microphone array looks for voices."""
     voice_level_db: Level = 88.0

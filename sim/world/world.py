@@ -96,7 +96,7 @@ class WorldActor(Actor):
         drained = scenario.sensors.battery_hz > 0 or scenario.world.engine == "rotors"
         self._energy = Energy(scenario) if drained else None
         survivors = Survivors(scenario, solids.ground_m)
-        self._suite = Suite(scenario, sensors_of(scenario, survivors, solids, self._energy), topics)
+        self._suite = Suite(scenario, sensors_of(scenario, survivors, solids, self._energy, solid), topics)
         self._flies = np.ones(len(self._ids), bool)
         """Which UAVs have not crashed."""
         if flight is not None and scenario.world.crash == "falls":
@@ -140,6 +140,7 @@ class WorldActor(Actor):
 
     def stop(self, now_ns: int) -> None:
         self._engine.close()
+        self._suite.close()
 
     def report(self) -> Mapping[str, Any]:
         return {

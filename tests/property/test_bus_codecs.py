@@ -14,6 +14,7 @@ from fanet_mw.bus.messages import (
     Battery,
     Call,
     Camera,
+    CameraImage,
     ClockEpoch,
     ClockState,
     Echo,
@@ -79,6 +80,14 @@ messages: st.SearchStrategy[Message] = st.one_of(
     ),
     st.builds(Setpoint, instants, vectors, doubles, st.sampled_from(SetpointKind), vectors),
     st.builds(Camera, instants, st.lists(st.builds(Person, *[finite] * 3), max_size=4).map(tuple)),
+    st.tuples(st.integers(0, 4), st.integers(0, 4)).flatmap(
+        lambda size: st.builds(
+            CameraImage,
+            instants,
+            *map(st.just, size),
+            st.binary(min_size=3 * size[0] * size[1], max_size=3 * size[0] * size[1]),
+        )
+    ),
     st.builds(Voice, instants, st.lists(st.builds(Call, *[finite] * 4), max_size=4).map(tuple)),
     st.builds(Radar, instants, st.lists(st.builds(Echo, *[finite] * 5), max_size=4).map(tuple)),
     st.builds(Altimeter, instants, finite, st.none() | finite),

@@ -38,6 +38,9 @@ class Sensor(ABC):
     def read(self, truth: Truth, rows: Sequence[int]) -> Iterator[tuple[int, Message]]:
         """The readings of the UAVs `rows`, each with its row; a UAV whose sensor has nothing to tell gives none."""
 
+    def close(self) -> None:  # noqa: B027  (only what renders holds anything)
+        """Give back what the sensor holds of the machine; most hold nothing."""
+
     def due(self, count: int, *, now_ns: int, before_ns: int) -> list[int]:
         """The rows of which an instant lies in (before, now]."""
         period_ns = self.period_ns

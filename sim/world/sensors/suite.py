@@ -8,6 +8,7 @@ from fanet_mw.scenario import Scenario
 from fanet_mw.scenario.routing import PROTOCOLS
 from sim.world.engines.contract import Flags
 from sim.world.engines.energy import Energy
+from sim.world.environment.obstacles import Obstacles
 from sim.world.environment.solids import Solids
 from sim.world.environment.survivors import Survivors
 from sim.world.sensors.altimeter import AltimeterSensor
@@ -15,16 +16,24 @@ from sim.world.sensors.battery import BatterySensor
 from sim.world.sensors.camera import CameraSensor
 from sim.world.sensors.contract import Sensor, Truth
 from sim.world.sensors.gps import GpsReceiver
+from sim.world.sensors.image import ImageSensor
 from sim.world.sensors.inertial import InertialSensor
 from sim.world.sensors.phone import PhoneSensor
 from sim.world.sensors.radar import RadarSensor
 from sim.world.sensors.voice import VoiceSensor
 
 
-def sensors_of(scenario: Scenario, survivors: Survivors, solids: Solids, energy: Energy | None = None) -> list[Sensor]:
+def sensors_of(
+    scenario: Scenario,
+    survivors: Survivors,
+    solids: Solids,
+    energy: Energy | None = None,
+    obstacles: Obstacles | None = None,
+) -> list[Sensor]:
     """The sensors that a scenario asks for, in the order in which their readings go out.
 
-    `energy` has the batteries; None: UAVs have none, and are told of none.
+    `energy` has the batteries; None: UAVs have none, and are told of none. `obstacles`: what `solids` are made of, for
+    images of them; None: a plain.
     """
     config = scenario.sensors
     found: list[Sensor] = []
@@ -34,6 +43,8 @@ def sensors_of(scenario: Scenario, survivors: Survivors, solids: Solids, energy:
         found.append(PhoneSensor(scenario, survivors))
     if config.camera_hz and scenario.mission.survivors:
         found.append(CameraSensor(scenario, survivors, solids))
+    if config.image_hz:
+        found.append(ImageSensor(scenario, survivors, obstacles))
     if config.voice_hz and scenario.mission.survivors:
         found.append(VoiceSensor(scenario, survivors, solids))
     if config.radar_hz:
@@ -77,3 +88,8 @@ class Suite:
             if rows:
                 for row, reading in sensor.read(truth, rows):
                     yield topics[row], reading
+
+    def close(self) -> None:
+        """Close every sensor; a second time does nothing."""
+        for sensor, _ in self._sensors:
+            sensor.close()

@@ -1,0 +1,112 @@
+"""What stands in a world as a camera that looks straight down shows it, rendered by pybullet on the processor.
+
+Ground, hills and buildings are of one color each, people lie in orange along east, other UAVs are black discs. Nothing
+on board that belongs to this project reads these images: what finds people in images is the model in
+`sensors/camera.py`. Not modeled: textures, shadows, weather, the dark, motion blur, the lens.
+"""
+
+from collections.abc import Sequence
+from typing import Final
+
+import numpy as np
+import numpy.typing as npt
+
+from sim.world.engines.contract import Rows, Values
+from sim.world.engines.quiet_pybullet import pybullet
+from sim.world.environment.obstacles import Box, Hills, Obstacles
+
+Image = npt.NDArray[np.uint8]
+"""Rows from the north, columns from the west; red, green and blue."""
+_Color = tuple[float, float, float, float]
+_GROUND: Final[_Color] = (0.42, 0.47, 0.32, 1.0)
+_HILL: Final[_Color] = (0.36, 0.42, 0.28, 1.0)
+_BUILDING: Final[_Color] = (0.62, 0.62, 0.66, 1.0)
+_PERSON: Final[_Color] = (1.0, 0.45, 0.0, 1.0)
+_UAV: Final[_Color] = (0.05, 0.05, 0.05, 1.0)
+_PERSON_M: Final = (1.7, 0.5, 0.2)
+"""Length, width and thickness of a person who lies on the ground: as large as the model of the camera takes them."""
+_UAV_RADIUS_M: Final = 0.25
+_UAV_HEIGHT_M: Final = 0.1
+_BEYOND_M: Final = 1000.0
+"""The plain goes on so far beyond the area."""
+_NEAR_M: Final = 0.5
+"""Nothing nearer to the camera than this is shown, such as the UAV that carries it."""
+_SUN: Final = (1.0, -1.0, 4.0)
+
+
+class Scene:
+    """The solids and the people of a world, for cameras at any place above."""
+
+    def __init__(self, obstacles: Obstacles | None, people: Rows, *, area_m: float, uavs: int) -> None:
+        """`people`: the places of those who can be seen from above if nothing stands in between [n, 3]."""
+        self._client = pybullet.connect(pybullet.DIRECT)
+        half = area_m / 2 + _BEYOND_M
+        self._put(self._box_shape((2 * half, 2 * half, 1.0), _GROUND), (0.0, 0.0, -0.5))
+        if obstacles is not None:
+            for box in obstacles.boxes:
+                self._build(box)
+            if obstacles.hills is not None:
+                self._put(self._hills_shape(obstacles.hills), (0.0, 0.0, 0.0))
+        lying = self._box_shape(_PERSON_M, _PERSON) if len(people) else -1
+        for east, north, up in people.tolist():
+            self._put(lying, (east, north, up + _PERSON_M[2] / 2))
+        disc = self._shape(pybullet.GEOM_CYLINDER, _UAV, radius=_UAV_RADIUS_M, length=_UAV_HEIGHT_M)
+        self._uavs = [self._put(disc, (0.0, 0.0, -10.0)) for _ in range(uavs)]
+
+    def move(self, at: Rows) -> None:
+        """Put the UAVs where they are [n, 3]."""
+        for body, place in zip(self._uavs, at.tolist(), strict=True):
+            pybullet.resetBasePositionAndOrientation(body, place, (0.0, 0.0, 0.0, 1.0), physicsClientId=self._client)
+
+    def image(self, eye: Values, *, pixels: tuple[int, int], half_width: float) -> Image:
+        """What a camera at a place shows; `half_width` is the tangent of half its field of view across the width."""
+        width, height = pixels
+        east, north, up = eye.tolist()
+        view = pybullet.computeViewMatrix((east, north, up), (east, north, up - 1.0), (0.0, 1.0, 0.0))
+        near = half_width * _NEAR_M
+        upright = near * height / width
+        lens = pybullet.computeProjectionMatrix(-near, near, -upright, upright, _NEAR_M, max(up, 1.0) + 10.0)
+        found = pybullet.getCameraImage(
+            width, height, view, lens, lightDirection=_SUN, shadow=0, renderer=pybullet.ER_TINY_RENDERER,
+            flags=pybullet.ER_NO_SEGMENTATION_MASK, physicsClientId=self._client,
+        )  # fmt: skip
+        return np.ascontiguousarray(np.reshape(np.asarray(found[2], np.uint8), (height, width, 4))[:, :, :3])
+
+    def close(self) -> None:
+        """Give the renderer back; a second time does nothing."""
+        if self._client >= 0:
+            pybullet.disconnect(physicsClientId=self._client)
+            self._client = -1
+
+    def _build(self, box: Box) -> None:
+        shape = self._box_shape((box.width, box.depth, box.roof), _BUILDING)
+        self._put(shape, (box.east, box.north, box.roof / 2), yaw=box.yaw)
+
+    def _hills_shape(self, hills: Hills) -> int:
+        """The surface between the heights: two triangles for each cell."""
+        side = hills.heights.shape[0]
+        axis = (np.arange(side) - (side - 1) / 2) * hills.cell_m
+        east, north = np.meshgrid(axis, axis)
+        corners = np.stack([east.ravel(), north.ravel(), hills.heights.ravel()], axis=1)
+        slope_north, slope_east = np.gradient(hills.heights, hills.cell_m)
+        upright = np.stack([-slope_east.ravel(), -slope_north.ravel(), np.ones(len(corners))], axis=1)
+        first = (np.arange(side - 1)[:, None] * side + np.arange(side - 1)[None]).ravel()
+        triangles = np.stack([first, first + 1, first + side + 1, first, first + side + 1, first + side], axis=1)
+        return self._shape(
+            pybullet.GEOM_MESH, _HILL, vertices=corners.tolist(), indices=triangles.ravel().tolist(),
+            normals=(upright / np.linalg.norm(upright, axis=1, keepdims=True)).tolist(),
+        )  # fmt: skip
+
+    def _box_shape(self, size_m: Sequence[float], color: _Color) -> int:
+        return self._shape(pybullet.GEOM_BOX, color, halfExtents=[side / 2 for side in size_m])
+
+    def _shape(self, kind: int, color: _Color, **size: object) -> int:
+        return int(pybullet.createVisualShape(kind, rgbaColor=color, physicsClientId=self._client, **size))
+
+    def _put(self, shape: int, at: Sequence[float], *, yaw: float = 0.0) -> int:
+        turned = pybullet.getQuaternionFromEuler((0.0, 0.0, yaw))
+        return int(
+            pybullet.createMultiBody(
+                baseVisualShapeIndex=shape, basePosition=at, baseOrientation=turned, physicsClientId=self._client
+            )
+        )

@@ -93,7 +93,11 @@ def simulate(
 
 
 class Observed:
-    """The actors of a scenario on their host, and what is heard of them."""
+    """The actors of a scenario on their host, and what is heard of them.
+
+    The host holds what is collected, and not this object: so all of it goes, and its files are closed, as soon as nobody
+    holds the outcome any more. The garbage collector, which is off in a run, would find it late.
+    """
 
     def __init__(
         self,
@@ -107,22 +111,23 @@ class Observed:
         self.scenario = scenario
         self.records = TraceLog(folder)
         self.names = Topics(scenario.name)
-        self._taps = TapLog(folder)
-        self._links = LinkTotals()
+        self._taps = taps = TapLog(folder)
+        self._links = links = LinkTotals()
+
+        def tap(_: str, message: Message) -> None:
+            if isinstance(message, MavlinkTap):
+                taps.append((message.t_ns, message.data))
+
+        def add_links(_: str, message: Message) -> None:
+            if isinstance(message, LinkStats):
+                links.add(message)
+
         self.actors = actors_of(scenario, scenario.name, capture=capture, applications=applications)
         self.host = VirtualHost(
             self.actors,
             on_records=self.records.extend,
-            listeners=[(self.names.mavlink("*"), self._tap), (self.names.radio_links, self._add_links)],
+            listeners=[(self.names.mavlink("*"), tap), (self.names.radio_links, add_links)],
         )
-
-    def _tap(self, _: str, message: Message) -> None:
-        if isinstance(message, MavlinkTap):
-            self._taps.append((message.t_ns, message.data))
-
-    def _add_links(self, _: str, message: Message) -> None:
-        if isinstance(message, LinkStats):
-            self._links.add(message)
 
     def outcome(self, *, wall_s: float, cut_short: str) -> Outcome:
         """What there is, once the host has been stopped; `cut_short`: why, if that was before the scenario's end."""

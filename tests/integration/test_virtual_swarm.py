@@ -1,6 +1,8 @@
 """Whole swarms in virtual time: every layer is the real one."""
 
+import gc
 import sys
+import weakref
 from collections.abc import Callable
 from concurrent.futures import ThreadPoolExecutor
 from typing import Any
@@ -57,6 +59,20 @@ def test_runs_in_threads_of_one_process_do_not_touch_each_other(make_scenario: M
     finally:
         sys.setswitchinterval(before_s)
     assert beside == alone
+
+
+def test_what_a_run_has_collected_goes_with_its_outcome_and_waits_for_no_garbage_collector(
+    make_scenario: MakeScenario,
+) -> None:
+    outcome = simulate(make_scenario())
+    assert outcome.records
+    kept = [weakref.ref(log) for log in (outcome.records, outcome.taps, outcome.links)]
+    gc.disable()
+    try:
+        del outcome
+        assert [log() for log in kept] == [None, None, None]
+    finally:
+        gc.enable()
 
 
 def test_nodes_join_and_the_leader_makes_balanced_clusters(quick: Outcome) -> None:

@@ -2,12 +2,15 @@
 
 Scenario `clusters` (9 x 5 grid, collision-free floods, every node a head). At 20 s the radio of a relay falls silent
 for good: in run k that of the k-th most used in the timetable. `cut off`: from then until the last packet was generated
-that missed a node alive; `missed`: copies among the others that never came.
+that missed a node alive; `missed`: copies among the others that never came; `epochs`: timetables and announcements that
+the leader numbered until the end.
 """
 
 import statistics
 import sys
 from collections import Counter
+from collections.abc import Sequence
+from typing import Final, NamedTuple
 
 from agents.applications.traffic import sources_of
 from fanet_mw.planner.timetable_plan import table_for
@@ -21,6 +24,7 @@ from sim.scenarios import catalog
 from sim.world.mobility.layout import positions
 
 KILLED_S = 20
+_SOON_S: Final = 10
 
 
 def most_used(scenario: Scenario) -> list[NodeId]:
@@ -32,8 +36,16 @@ def most_used(scenario: Scenario) -> list[NodeId]:
     return [node for node, _ in sorted(used.items(), key=lambda item: (-item[1], item[0]))]
 
 
-def cut_off(scenario: Scenario, victim: NodeId) -> tuple[float, int, int]:
-    """Seconds until the last loss, copies lost, epochs made after the death."""
+class CutOff(NamedTuple):
+    """What the death of one relay did."""
+
+    cut_off_s: float
+    missed: int
+    epochs: int
+
+
+def cut_off(scenario: Scenario, victim: NodeId) -> CutOff:
+    """A run in which this node falls silent."""
     fault = {"at_s": KILLED_S, "kind": "cut", "node": victim}
     outcome = simulate(build(scenario.model_dump(exclude_none=True) | {"faults": [fault]}))
     begin_ns, end_ns = KILLED_S * S, scenario.traffic_window_ns[1]
@@ -48,24 +60,44 @@ def cut_off(scenario: Scenario, victim: NodeId) -> tuple[float, int, int]:
     missing = {key: others - copies[key] for key in born if copies[key] < others}
     last_ns = max((born[key] for key in missing), default=begin_ns)
     epochs = [report["epoch"] for name, report in outcome.reports.items() if name == f"agent-{scenario.leader}"]
-    return (last_ns - begin_ns) / S, sum(missing.values()), epochs[0]
+    return CutOff((last_ns - begin_ns) / S, sum(missing.values()), epochs[0])
+
+
+def nth(run: int, *, seconds: float, sources: int) -> CutOff:
+    """The death of the `run`-th most used relay, watched for so many seconds."""
+    settings = [f"duration_s={KILLED_S + seconds}", f"seed={run}", f"traffic.sources={sources}"]
+    scenario = catalog.find("clusters", settings)
+    victims = most_used(scenario)
+    return cut_off(scenario, victims[(run - 1) % len(victims)])
+
+
+def row(found: Sequence[CutOff], *, sources: int) -> list[str]:
+    """A row of the table: how long others were cut off, and what they missed."""
+    times = sorted(one.cut_off_s for one in found)
+    soon = sum(time_s <= _SOON_S for time_s in times)
+    return [
+        f"{sources}",
+        f"{statistics.median(times):.1f}",
+        f"{times[0]:.1f}",
+        f"{times[-1]:.1f}",
+        f"{soon} of {len(times)}",
+        f"{statistics.fmean(one.missed for one in found):.0f}",
+        f"{min(one.epochs for one in found)} to {max(one.epochs for one in found)}",
+    ]
+
+
+HEAD: Final = (
+    "sources", "median [s]", "least [s]", "worst [s]", f"within {_SOON_S} s", "copies missed, mean", "epochs"
+)  # fmt: skip
 
 
 def main(runs: int, seconds: float, sources: int) -> None:
     found = []
-    for run in range(runs):
-        settings = [f"duration_s={KILLED_S + seconds}", f"seed={run + 1}", f"traffic.sources={sources}"]
-        scenario = catalog.find("clusters", settings)
-        victims = most_used(scenario)
-        victim = victims[run % len(victims)]
-        found.append(cut_off(scenario, victim))
-        print(
-            f"run {run + 1}: node {victim}, {found[-1][0]:.1f} s, {found[-1][1]} copies, epoch {found[-1][2]}",
-            flush=True,
-        )
-    times = [time_s for time_s, *_ in found]
-    print(f"{runs} runs: median {statistics.median(times):.1f} s, least {min(times):.1f}, worst {max(times):.1f}")
-    print(f"copies missed: mean {statistics.mean(lost for _, lost, _ in found):.0f}")
+    for run in range(1, runs + 1):
+        found.append(nth(run, seconds=seconds, sources=sources))
+        print(f"run {run}: {found[-1]}", flush=True)
+    for cells in (HEAD, row(found, sources=sources)):
+        print(f"| {' | '.join(cells)} |")
 
 
 if __name__ == "__main__":

@@ -9,11 +9,20 @@ from scripts.rivals import connectivity
 from sim.results.files import finish
 from sim.run.virtual import simulate
 from sim.scenarios import catalog
-from tests.benchmarks import clock_sync, collision_warnings, false_assumptions, message_cost, protocol_cost
+from tests.benchmarks import (
+    clock_sync,
+    collision_warnings,
+    false_assumptions,
+    message_cost,
+    protocol_cost,
+    relay_failure,
+)
 from tests.tables.markdown import Rows
 
 _SPEEDS: Final = (0, 10, 20)
 _SEEDS: Final = (1, 2, 3)
+_DEATHS: Final = 20
+"""Relays that fall silent, one per run."""
 _MOST_PER_S: Final = 776
 """Packets of 1024 B a second that can reach all of the 9 x 5 grid (`fanet_mw/planner/goodput_bound.py`)."""
 _LOADED: Final = {
@@ -163,6 +172,18 @@ def rivals() -> Rows:
 def cost() -> Rows:
     """What each protocol costs a node."""
     return protocol_cost.rows(60.0)
+
+
+def dead_relays() -> Rows:
+    """How long a dead relay of a timetable cuts others off, with few sources and with many."""
+    cases = ((10, 50.0), (44, 30.0))
+    rows = [
+        relay_failure.row(
+            [relay_failure.nth(run, seconds=seconds, sources=sources) for run in range(1, _DEATHS + 1)], sources=sources
+        )
+        for sources, seconds in cases
+    ]
+    return [relay_failure.HEAD, *rows]
 
 
 def assumptions() -> Rows:

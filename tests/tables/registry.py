@@ -46,6 +46,7 @@ TABLES: Final[Mapping[str, Table]] = {
     "message-cost": Table(
         "results/cost.md", protocol.cost_of_messages, Tolerance(absolute=0.02, relative=0.02), ("CPU [us]",)
     ),
+    "relay-failure": Table("explanation/roles.md", protocol.dead_relays, Tolerance(absolute=0.1, relative=0.1)),
     "clock-errors": Table("explanation/time.md", protocol.clock_errors, Tolerance(relative=0.2)),
     "mission-network": Table("results/mission.md", mission.over_networks, Tolerance(absolute=0.05, relative=0.1)),
     "mission-network-whole": Table(

@@ -95,8 +95,8 @@ def simulate(
 class Observed:
     """The actors of a scenario on their host, and what is heard of them.
 
-    The host holds what is collected, and not this object: so all of it goes, and its files are closed, as soon as nobody
-    holds the outcome any more. The garbage collector, which is off in a run, would find it late.
+    The host holds what is collected, and not this object: so all of it goes, and its files are closed, as soon as
+    nobody holds the outcome any more. The garbage collector, which is off in a run, would find it late.
     """
 
     def __init__(

@@ -77,7 +77,12 @@ def _blocks(folders: Sequence[Path], out: Path) -> tuple[str, list[Block]]:
     runs = [folder for folder in folders if is_run(folder)]
     for folder in folders:
         if folder not in runs and not _figures(folder):
-            raise ConfigError(f"{folder}: holds neither figures (fanet figures) nor a run (fanet simulate --out)")
+            sweep = (
+                ", but a sweep, whose table fanet_mw.results.read gives" if (folder / "runs.parquet").exists() else ""
+            )
+            raise ConfigError(
+                f"{folder}: holds neither figures (fanet figures) nor a run (fanet simulate --out){sweep}"
+            )
     blocks = evaluation(folders) if figures else []
     for folder in runs:
         blocks += blocks_of_run(folder, out)

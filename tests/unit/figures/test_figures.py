@@ -206,7 +206,7 @@ def test_what_is_said_beyond_the_paper_is_told_apart_from_its_claims(nine, tmp_p
     assert "| (Beyond the paper) Ours stays. |" in markdown
 
 
-def test_a_page_needs_nothing_else_and_has_every_verdict(nine) -> None:
+def test_a_page_needs_nothing_else_and_has_every_verdict(nine, tmp_path) -> None:
     table, folder, claims = nine
     html, markdown = (path.read_text() for path in write([folder], folder))
     assert html.count("data:image/png;base64,") == 1
@@ -216,7 +216,10 @@ def test_a_page_needs_nothing_else_and_has_every_verdict(nine) -> None:
         assert f'<td class="{claim.verdict}">{claim.verdict}</td>' in html
     assert "](figure-9.png)" in markdown
     assert f"| figure-9 | quick | {table.num_rows} | 2 | {code()} |" in markdown
-    with pytest.raises(ConfigError, match="holds neither figures"):
+    (tmp_path / "runs.parquet").touch()
+    with pytest.raises(ConfigError, match=r"but a sweep, whose table fanet_mw\.results\.read gives"):
+        write([tmp_path], tmp_path)
+    with pytest.raises(ConfigError, match=r"holds neither figures .* --out\)$"):
         write([folder / "sweeps"], folder)
 
 

@@ -14,6 +14,7 @@ import matplotlib as mpl
 from matplotlib.axes import Axes
 from matplotlib.axis import Axis
 from matplotlib.figure import Figure
+from matplotlib.layout_engine import ConstrainedLayoutEngine
 from matplotlib.ticker import FixedLocator, FuncFormatter, LogLocator, NullLocator
 
 from sim.figures.statistics import Interval
@@ -81,7 +82,7 @@ def canvas(
     columns: int = 1, rows: int = 1, *, width: float = 4.2, height: float = 3.2, share_y: bool = False
 ) -> tuple[Figure, list[Axes]]:
     """A figure with so many panels, in reading order."""
-    figure = Figure(figsize=(width * columns, height * rows), layout="constrained")
+    figure = Figure(figsize=(width * columns, height * rows), layout=ConstrainedLayoutEngine(w_pad=0.12))
     panels = figure.subplots(rows, columns, squeeze=False, sharey=share_y)
     return figure, list(panels.flat)
 

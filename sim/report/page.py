@@ -48,8 +48,8 @@ _SETTINGS: Final = Rows(
         (
             "robots",
             "Gazebo, ROS",
-            "point masses; pybullet by fanet sweep fig12 without a variant",
-            "a quarter of the time",
+            "point masses, one case in pybullet too; all in pybullet by fanet sweep fig12 without a variant",
+            "three quarters of the time",
         ),
         ("runs per point", "not said", "several seeds, 95 % intervals (Student's t)", ""),
     ),

@@ -15,6 +15,11 @@ BROADCAST: Final = NodeId(0xFFFF)
 """The destination that means every station in range (radio) or every node (routing)."""
 
 
+LIGHT_M_PER_S: Final = 299_792_458
+GOLDEN_ANGLE: Final = math.pi * (3 - math.sqrt(5))
+"""The angle [rad] between the bearings of successive ids that spreads any number of them evenly over a circle."""
+
+
 class Enu(NamedTuple):
     """A vector in east, north, up: metres, or metres per second for a velocity."""
 

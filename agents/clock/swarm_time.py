@@ -16,13 +16,12 @@ from fanet_mw.rng import stream
 from fanet_mw.scenario import Clock, Scenario
 from fanet_mw.timesync.clock_fit import EXACT, ClockFit, Line, Oscillator, Pair
 from fanet_mw.timesync.ftsp import Settings, TimeSync
-from fanet_mw.units import NodeId, S, seconds_to_ns
+from fanet_mw.units import LIGHT_M_PER_S, NodeId, S, seconds_to_ns
 from fanet_mw.wire.inner import TimeBeacon
 
 _SIGMAS: Final = 4
 _HELLOS: Final = 8
 """The number of hellos of which the radio may yet have to tell when they ended."""
-_LIGHT_M_PER_S: Final = 299_792_458
 _PPM: Final = 1e-6
 
 
@@ -147,7 +146,7 @@ class BeaconTime(SwarmTime):
                 leads=node == scenario.leader,
                 hello_ns=seconds_to_ns(scenario.routing.hello_interval_s),
                 oscillator=oscillator(clock, others=1),
-                flight_ns=math.ceil(radio.range_m / _LIGHT_M_PER_S * S),
+                flight_ns=math.ceil(radio.range_m / LIGHT_M_PER_S * S),
                 limit_ns=clock.limit_ns,
                 leader=scenario.leader,
             )

@@ -9,19 +9,17 @@ from collections.abc import Sequence
 from typing import Final
 
 from agents.mission.finding.localization import Sighting, estimate
+from agents.mission.finding.phone_reception import MISSED_SCANS
 from agents.mission.flight.approach_speed import approach_speed_m_s
 from agents.mission.outbox import Outbox, ReportFormat
 from fanet_mw.application import HOME, Course
 from fanet_mw.scenario import Scenario
 from fanet_mw.trace import Approaching, Arrived, Detected
-from fanet_mw.units import US, Enu, NodeId, S, seconds_to_ns
+from fanet_mw.units import GOLDEN_ANGLE, US, Enu, NodeId, S, seconds_to_ns
 from fanet_mw.wire.inner import Survivor
 
-_MISSED_SCANS: Final = 1.5
-"""The intervals of the scan for which a phone is still taken to be heard."""
 _RING_M: Final = 20.0
 """UAVs hold on a ring about the survivor, each at an angle of its own, so that they see it from several sides."""
-_GOLDEN_ANGLE: Final = math.pi * (3 - math.sqrt(5))
 _MOVED_M: Final = 10.0
 """A better estimate changes the setpoint only when it moved this far."""
 
@@ -34,7 +32,7 @@ class PaperRule:
         self._config = scenario.mission
         self._altitude_m = scenario.nodes.altitude_m
         self._speed_m_s = approach_speed_m_s(scenario, node)
-        self._heard_for_ns = seconds_to_ns(_MISSED_SCANS * self._config.scan_interval_s)
+        self._heard_for_ns = seconds_to_ns(MISSED_SCANS * self._config.scan_interval_s)
         self._format = ReportFormat(scenario, node)
         self._outbox = outbox
         self._detected: set[int] = set()
@@ -143,7 +141,7 @@ class PaperRule:
         )
 
     def _hold_point(self) -> Enu:
-        angle = self._node * _GOLDEN_ANGLE
+        angle = self._node * GOLDEN_ANGLE
         return Enu(
             self._target_at.east + _RING_M * math.cos(angle),
             self._target_at.north + _RING_M * math.sin(angle),

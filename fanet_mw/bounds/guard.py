@@ -5,11 +5,10 @@ from typing import Final
 
 from fanet_mw.airtime import OVERHEAD_BYTES, airtime_ns
 from fanet_mw.scenario import Scenario
-from fanet_mw.units import MS, US
+from fanet_mw.units import LIGHT_M_PER_S, MS, US
 
 PLANNED_ERROR_NS: Final = 50 * US
 """The clock error that a plan before take-off assumes of synchronized clocks."""
-_LIGHT_M_PER_S: Final = 299_792_458
 
 
 def guard_ns(*, clock_error_ns: int, drift_ppm: float, resync_ns: int, range_m: float, overhang_ns: int) -> int:
@@ -19,7 +18,7 @@ def guard_ns(*, clock_error_ns: int, drift_ppm: float, resync_ns: int, range_m: 
     until they are set again. The last frame travels `range_m`, and ends `overhang_ns` after the last permitted start.
     """
     drift_ns = ceil(2 * drift_ppm * resync_ns / 1_000_000)
-    return 2 * clock_error_ns + drift_ns + ceil(range_m * 1_000_000_000 / _LIGHT_M_PER_S) + overhang_ns
+    return 2 * clock_error_ns + drift_ns + ceil(range_m * 1_000_000_000 / LIGHT_M_PER_S) + overhang_ns
 
 
 def slot_guard_ns(scenario: Scenario, *, clock_error_ns: int) -> int:

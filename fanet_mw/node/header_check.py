@@ -14,7 +14,7 @@ from typing import Final
 from fanet_mw.errors import DropReason
 from fanet_mw.scenario import Scenario
 from fanet_mw.units import BROADCAST, MS, US, NodeId, S
-from fanet_mw.wire import Fields, Kind
+from fanet_mw.wire import MOST_HOPS, Fields, Kind
 
 RESTART_STEP_NS: Final = 100 * US
 """A node sends fewer packets than one per 0.1 ms, so a later start begins beyond all earlier sequence numbers."""
@@ -24,7 +24,6 @@ _AHEAD_NS: Final = 100 * MS
 """A birth may lie so far ahead where all clocks are exact: hosts take their time from each other over a bus."""
 _BURST: Final = 100_000
 """Numbers that a node may be ahead of one per `RESTART_STEP_NS`: ten seconds of the densest traffic."""
-_MOST_HOPS: Final = 255
 
 
 class HeaderCheck:
@@ -51,7 +50,7 @@ class HeaderCheck:
         if (
             prev_hop != src
             or (origin != prev_hop and (hops == 0 or kind == Kind.HELLO))
-            or hops + hop_limit > _MOST_HOPS
+            or hops + hop_limit > MOST_HOPS
             or origin_us * US > end_ns + self._ahead_ns
             or (seq & ~CONTROL) * RESTART_STEP_NS > origin_us * US + _BURST * RESTART_STEP_NS
         ):

@@ -21,8 +21,6 @@ from fanet_mw.trace import Dropped, LetOut, Record
 from fanet_mw.units import BROADCAST, STILL, Enu, NodeId
 from fanet_mw.wire import Kind
 
-_MOST_HOPS: Final = 255
-"""What the hop count of the header can say."""
 _new: Final = tuple.__new__  # for what is made once per frame
 
 
@@ -83,7 +81,7 @@ class NodePort:
     def forwarded(self, packet: Packet, *, flags: int) -> bytes:
         header = packet.header
         hops = header.hops
-        if hops < _MOST_HOPS:  # a hostile frame may come with all of them
+        if hops < wire.MOST_HOPS:  # a hostile frame may come with all of them
             hops += 1
         return wire.rewrite(packet.frame, self.node, header.hop_limit - 1, hops, flags)
 

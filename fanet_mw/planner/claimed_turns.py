@@ -20,7 +20,7 @@ from fanet_mw.bounds import TurnServer
 from fanet_mw.graph.connected_dominating_set import dominates
 from fanet_mw.graph.topology import Adjacency, two_hop
 from fanet_mw.planner.demand import TrafficClass
-from fanet_mw.routing.clustered.claimed.claiming import IDLE, geometry, longest_superframe, turn_bytes
+from fanet_mw.routing.clustered.claimed.claiming import IDLE, LISTEN_HELLOS, geometry, longest_superframe, turn_bytes
 from fanet_mw.routing.clustered.claimed.own_turns import Share
 from fanet_mw.routing.clustered.claimed.slot_claims import SlotClaims
 from fanet_mw.routing.clustered.tdma.turns import Turns
@@ -30,7 +30,6 @@ from fanet_mw.wire.claims import MOST_LOTS
 
 _ROUNDS: Final = 60
 """Hello intervals in which claims converge; the law needs 2 d + 6, where d is the longest chain of rivals."""
-_LISTEN: Final = 3
 _HELLOS_IN_TURNS: Final = 0.5
 _NARROW: Final = 0.001
 
@@ -193,7 +192,7 @@ def converged_slots(scenario: Scenario, adjacency: Adjacency, turns: Turns) -> d
     slots = scenario.clusters.slots
     sized = None if slots else longest_superframe(turns)
     claims = {
-        node: SlotClaims(node, now_ns=0, listen_ns=_LISTEN, lifetime_ns=2, slots=slots or None, sized_to=sized)
+        node: SlotClaims(node, now_ns=0, listen_ns=LISTEN_HELLOS, lifetime_ns=2, slots=slots or None, sized_to=sized)
         for node in sorted(adjacency)
     }
     before: Mapping[NodeId, object] = {}
@@ -203,7 +202,7 @@ def converged_slots(scenario: Scenario, adjacency: Adjacency, turns: Turns) -> d
             for neighbor in adjacency[node]:
                 claims[neighbor].on_hello(hello, now_ns=now)
         claimed = {node: (own.own.slot, own.own.length) for node, own in claims.items()}
-        if now > 4 * _LISTEN and claimed == before:
+        if now > 4 * LISTEN_HELLOS and claimed == before:
             break
         before = claimed
     return {

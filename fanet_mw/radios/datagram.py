@@ -13,7 +13,7 @@ from fanet_mw.units import BROADCAST, MAX_NODES, NodeId
 _LAYOUT: Final = struct.Struct("!2sBBHHI")
 _MAGIC: Final = b"FN"
 _VERSION: Final = 1
-_SEQ_MASK: Final = 0xFFFF_FFFF
+SEQ_MASK: Final = 0xFFFF_FFFF
 
 
 class DatagramKind(IntEnum):
@@ -33,7 +33,7 @@ class Datagram(NamedTuple):
     frame: bytes = b""
 
     def encode(self) -> bytes:
-        return _LAYOUT.pack(_MAGIC, _VERSION, self.kind, self.src, self.dst, self.seq & _SEQ_MASK) + self.frame
+        return _LAYOUT.pack(_MAGIC, _VERSION, self.kind, self.src, self.dst, self.seq & SEQ_MASK) + self.frame
 
     @classmethod
     def decode(cls, data: bytes) -> Self:

@@ -17,7 +17,7 @@ from typing import Any, Final, NamedTuple
 from fanet_mw.bus.messages import Reception, TxOutcome, TxRequest, TxStatus
 from fanet_mw.errors import BusError, DropReason, MalformedFrameError
 from fanet_mw.node.duplicates import DuplicateSet, key_of
-from fanet_mw.radios.datagram import Datagram, DatagramKind
+from fanet_mw.radios.datagram import SEQ_MASK, Datagram, DatagramKind
 from fanet_mw.units import BROADCAST, NodeId, S
 
 PORT: Final = 14560
@@ -28,7 +28,6 @@ _RECEIVED: Final = 1
 MOVED_NS: Final = 10 * S
 """A node that has been silent at its address for this long may be accepted from another address."""
 MOST_ADDRESSES: Final = 4096
-_SEQ_MASK: Final = 0xFFFF_FFFF
 Address = tuple[str, int]
 
 
@@ -135,7 +134,7 @@ class UdpRadio:
     async def _unicast(self, request: TxRequest) -> None:
         """Repeat a frame until it is acknowledged; to the broadcast address if the other node was never heard."""
         datagram = Datagram(DatagramKind.FRAME, self._node, request.dst, request.seq, request.frame)
-        name = request.dst, request.seq & _SEQ_MASK
+        name = request.dst, request.seq & SEQ_MASK
         acknowledged = self._waiting[name] = asyncio.Event()
         outcome, attempts = TxOutcome.RETRY_LIMIT, 0
         try:

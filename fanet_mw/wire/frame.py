@@ -47,6 +47,8 @@ _CRC: Final = struct.Struct("<H")
 _SIGNED: Final = 1
 """The only incompatibility flag that MAVLink 2 defines; a frame with another flag must not be read."""
 _SIGNATURE: Final = 13
+MOST_HOPS: Final = 255
+"""The most hops that the routing header can say."""
 LATEST_US: Final = (1 << 63) // US - 1
 """The latest instant that a message may name: in nanoseconds it still fits the 64 bits of bus and kernel."""
 
@@ -362,10 +364,12 @@ _OURS: Final = {spec.msgid: spec for spec in SPECS}
 
 # --- application data ---------------------------------------------------------------------------------------------
 
-_CHUNK_HEAD: Final = struct.Struct("<HBB")
-_CHUNK_DATA: Final = 240
-_LEAST_CHUNK: Final = OVERHEAD + _CHUNK_HEAD.size + 1
-_WHOLE_CHUNK: Final = OVERHEAD + _CHUNK_HEAD.size + _CHUNK_DATA
+CHUNK_HEAD: Final = struct.Struct("<HBB")
+"""The front of the payload of a FANET_CHUNK: the length of its data, its number, and how many there are."""
+CHUNK_DATA: Final = 240
+"""The most bytes of data in one FANET_CHUNK."""
+_LEAST_CHUNK: Final = OVERHEAD + CHUNK_HEAD.size + 1
+_WHOLE_CHUNK: Final = OVERHEAD + CHUNK_HEAD.size + CHUNK_DATA
 _MOST: Final = 255 * _WHOLE_CHUNK
 
 
@@ -391,6 +395,6 @@ def filler(size: int, *, node: int = 1) -> bytes:
     chunks = []
     for index, length in enumerate(lengths):
         data = random.randbytes(length - _LEAST_CHUNK + 1).replace(b"\x00", b"\x01")
-        payload = _CHUNK_HEAD.pack(len(data), index, len(lengths)) + data
+        payload = CHUNK_HEAD.pack(len(data), index, len(lengths)) + data
         chunks.append(encode_inner(CHUNK, payload, node=node, seq=index))
     return b"".join(chunks)

@@ -16,6 +16,8 @@ from fanet_mw.errors import MalformedFrameError
 from fanet_mw.wire.frame import (
     ANY_NODE,
     CHUNK,
+    CHUNK_DATA,
+    CHUNK_HEAD,
     LATEST_US,
     MESSAGE,
     OVERHEAD,
@@ -35,9 +37,7 @@ HEAD_BYTES: Final = OVERHEAD + MESSAGE.layout.size
 RECEIPT_BYTES: Final = OVERHEAD + RECEIPT.layout.size
 _TARGETS_BYTES: Final = OVERHEAD + TARGETS.layout.size
 _TARGETS_EACH: Final = 32
-_CHUNK_HEAD: Final = struct.Struct("<HBB")
-_CHUNK_DATA: Final = 240
-_CHUNK_OVERHEAD: Final = OVERHEAD + _CHUNK_HEAD.size
+_CHUNK_OVERHEAD: Final = OVERHEAD + CHUNK_HEAD.size
 _PAYLOAD_AT: Final = 10
 """The place of the payload in a MAVLink 2 frame."""
 
@@ -118,8 +118,8 @@ def targets_bytes(count: int) -> int:
 
 def room_for_data(size: int) -> int:
     """The bytes of data that fit into chunks of so many bytes together."""
-    whole, rest = divmod(size, _CHUNK_OVERHEAD + _CHUNK_DATA)
-    return max(0, whole * _CHUNK_DATA + max(0, rest - _CHUNK_OVERHEAD))
+    whole, rest = divmod(size, _CHUNK_OVERHEAD + CHUNK_DATA)
+    return max(0, whole * CHUNK_DATA + max(0, rest - _CHUNK_OVERHEAD))
 
 
 def encode_piece(head: Head, data: bytes, *, node: int, targets: Collection[int] = ()) -> bytes:
@@ -192,19 +192,19 @@ def _targets_of(inner: bytes) -> tuple[int, ...]:
 
 
 def _chunks(data: bytes, node: int) -> list[bytes]:
-    parts = [data[at : at + _CHUNK_DATA] for at in range(0, len(data), _CHUNK_DATA)]
+    parts = [data[at : at + CHUNK_DATA] for at in range(0, len(data), CHUNK_DATA)]
     return [
-        encode_inner(CHUNK, _CHUNK_HEAD.pack(len(part), index, len(parts)) + part, node=node, seq=index)
+        encode_inner(CHUNK, CHUNK_HEAD.pack(len(part), index, len(parts)) + part, node=node, seq=index)
         for index, part in enumerate(parts)
     ]
 
 
 def _chunk_of(msgid: int, inner: bytes) -> bytes:
     """The data of a chunk; trailing zeros may have been dropped on the way, as MAVLink 2 does."""
-    if msgid != CHUNK.msgid or inner[1] < _CHUNK_HEAD.size:
+    if msgid != CHUNK.msgid or inner[1] < CHUNK_HEAD.size:
         raise MalformedFrameError(f"message {msgid} of {inner[1]} bytes in place of a chunk")
-    length, _, _ = _CHUNK_HEAD.unpack_from(inner, _PAYLOAD_AT)
-    begin = _PAYLOAD_AT + _CHUNK_HEAD.size
-    if length > _CHUNK_DATA or inner[1] - _CHUNK_HEAD.size > length:
+    length, _, _ = CHUNK_HEAD.unpack_from(inner, _PAYLOAD_AT)
+    begin = _PAYLOAD_AT + CHUNK_HEAD.size
+    if length > CHUNK_DATA or inner[1] - CHUNK_HEAD.size > length:
         raise MalformedFrameError(f"chunk of {length} bytes with {inner[1]}")
     return bytes(inner[begin : _PAYLOAD_AT + inner[1]]).ljust(length, b"\0")

@@ -11,14 +11,13 @@ from typing import Final
 
 from fanet_mw.airtime import OVERHEAD_BYTES, Timing
 from fanet_mw.rng import stream, stream_seed
+from fanet_mw.routing.clustered.timetable.link_quality import STEADY
 from fanet_mw.scenario import Scenario
 from fanet_mw.scenario.radio import Radio
 from fanet_mw.units import Enu, NodeId
 from fanet_mw.wire.links import Link, grade_of, power_of
 
 _GAINS: Final = 400
-_STEADY: Final = 0.995
-"""What nodes take for the share of the best links (`link_quality.py`)."""
 _LEAST: Final = 0.02
 """Links below this share are heard too rarely to be known."""
 
@@ -58,7 +57,7 @@ def expected_links(scenario: Scenario, at: Mapping[NodeId, Enu], *, draw: int) -
         heard = (power_dbm >= radio.sensitivity_dbm) & (snr_db >= radio.preamble_snr_db)
         success = np.where(heard, np.exp(logs), 0.0).mean(axis=1)
     return tuple(
-        Link(nodes[a], nodes[b], grade_of(min(_STEADY, float(share))), power_of(float(dbm)))
+        Link(nodes[a], nodes[b], grade_of(min(STEADY, float(share))), power_of(float(dbm)))
         for (a, b), share, dbm in zip(pairs.tolist(), success, mean_dbm, strict=True)
         if share >= _LEAST
     )

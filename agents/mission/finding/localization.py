@@ -10,10 +10,9 @@ import math
 from collections.abc import Sequence
 from typing import Final, NamedTuple
 
+from agents.mission.finding.phone_filter import REFERENCE_LOSS_DB
 from fanet_mw.units import Enu
 
-REFERENCE_LOSS_DB: Final = 40.05
-"""Free-space loss at 1 m and 2.4 GHz."""
 _STEPS: Final = 12
 _MAX_STEP_M: Final = 80.0
 

@@ -16,7 +16,7 @@ from fanet_mw.units import US, NodeId, S, seconds_to_ns
 from fanet_mw.wire.inner import Survivor
 from fanet_mw.wire.search import Covered
 
-_MISSED_SCANS: Final = 1.5
+MISSED_SCANS: Final = 1.5
 """So many intervals of the scan without a word from the receiver mean that it hears no phone."""
 
 
@@ -36,7 +36,7 @@ class PhoneReception:
         self._node = node
         self._finds, self._navigation, self._outbox = finds, navigation, outbox
         self._format = ReportFormat(scenario, node)
-        self._silent_after_ns = _MISSED_SCANS * scenario.mission.scan_interval_s * S
+        self._silent_after_ns = MISSED_SCANS * scenario.mission.scan_interval_s * S
         self._report_every_ns = seconds_to_ns(scenario.mission.report_interval_s)
         self._coverage = coverage
         self._scan_ns = 0

@@ -12,7 +12,7 @@ import math
 from collections.abc import Iterable
 from typing import Final
 
-from fanet_mw.units import Enu
+from fanet_mw.units import GOLDEN_ANGLE, Enu
 
 _WIDEST_RAD: Final = math.radians(80.0)
 """A gap that is wider counts as this: whoever is beyond it may be out of reach, so that its width is not known."""
@@ -20,7 +20,6 @@ _TURN: Final = 0.25
 """The turn as a share of the difference of the two gaps; a half would go to the middle at once, and swing."""
 _MOST_TURN_RAD: Final = math.radians(12.0)
 _NO_BEARING_M: Final = 1.0
-_GOLDEN_ANGLE: Final = math.pi * (3 - math.sqrt(5))
 
 
 def place_on_ring(middle: Enu, here: Enu, others: Iterable[Enu], *, radius_m: float, node: int) -> Enu:
@@ -30,7 +29,7 @@ def place_on_ring(middle: Enu, here: Enu, others: Iterable[Enu], *, radius_m: fl
     """
     bearing = _bearing(middle, here)
     if bearing is None:
-        bearing = node * _GOLDEN_ANGLE
+        bearing = node * GOLDEN_ANGLE
     ahead = behind = _WIDEST_RAD
     for other in others:
         at = _bearing(middle, other)

@@ -8,14 +8,13 @@ from agents.mission.finding.phone_filter import Estimate
 from agents.mission.navigation.navigation import Navigation
 from agents.mission.outbox import Outbox
 from fanet_mw.trace import Arrived
-from fanet_mw.units import NodeId, S
+from fanet_mw.units import GOLDEN_ANGLE, NodeId, S
 
 _SPIRAL_M: Final = 30.0
 """The distance of the turns of the spiral that is flown around an estimate at which no person is seen."""
 _IN_VIEW_M: Final = 40.0
 """From a circle of this radius a camera still shows a person in its middle."""
 _RING_M: Final = 14.0
-_GOLDEN_ANGLE: Final = math.pi * (3 - math.sqrt(5))
 
 
 class Approach:
@@ -51,5 +50,5 @@ class Approach:
         searched_s = (now_ns - arrived_ns) / S
         radius = _RING_M + _SPIRAL_M * searched_s / 20.0
         radius = min(_IN_VIEW_M, radius) if seen else radius
-        angle = self._node * _GOLDEN_ANGLE + searched_s / 4.0
+        angle = self._node * GOLDEN_ANGLE + searched_s / 4.0
         return place.east_m + radius * math.cos(angle), place.north_m + radius * math.sin(angle)

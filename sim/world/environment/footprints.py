@@ -17,9 +17,9 @@ import numpy as np
 from fanet_mw.errors import ConfigError
 from fanet_mw.mavlink import Geodetic, to_enu
 from sim.world.engines.contract import Rows
+from sim.world.environment.given_file import content
 
 LEVEL_M: Final = 3.0
-_MOST_BYTES: Final = 256 * 1024 * 1024
 _LEAST_SIDE_M: Final = 0.1
 _HIGHEST_M: Final = 2000.0
 
@@ -37,12 +37,9 @@ class Footprint(NamedTuple):
 
 def read(path: Path, *, origin_deg: tuple[float, float] | None, height_m: float) -> list[Footprint]:
     """The buildings of a file; raises ConfigError by name."""
+    data = content(path, key="world.buildings_geojson")
     try:
-        if path.stat().st_size > _MOST_BYTES:
-            raise ConfigError(f"world.buildings_geojson: {path} must be at most {_MOST_BYTES // 2**20} MB")
-        tree = json.loads(path.read_text(encoding="utf-8"))
-    except OSError as error:
-        raise ConfigError(f"world.buildings_geojson: {path} cannot be read: {error.strerror}") from error
+        tree = json.loads(data.decode("utf-8"))
     except (UnicodeDecodeError, ValueError, RecursionError) as error:
         raise ConfigError(f"world.buildings_geojson: {path} is no JSON: {error}") from error
     try:

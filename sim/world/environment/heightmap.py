@@ -16,9 +16,9 @@ import numpy.typing as npt
 
 from fanet_mw.errors import ConfigError
 from sim.world.engines.contract import Rows, Values
+from sim.world.environment.given_file import content
 
 Bytes = npt.NDArray[np.uint8]
-_MOST_BYTES: Final = 256 * 1024 * 1024
 _MOST_CELLS: Final = 64_000_000
 _SIGNATURE: Final = b"\x89PNG\r\n\x1a\n"
 _HEADER: Final = ("ncols", "nrows", "xllcorner", "yllcorner", "xllcenter", "yllcenter", "cellsize", "nodata_value")
@@ -26,12 +26,7 @@ _HEADER: Final = ("ncols", "nrows", "xllcorner", "yllcorner", "xllcenter", "yllc
 
 def read(path: Path, *, white_m: float, pixel_m: float) -> tuple[Rows, float]:
     """Heights, the southernmost row first, and the distance of neighboring points [m]; raises ConfigError by name."""
-    try:
-        if path.stat().st_size > _MOST_BYTES:
-            raise ConfigError(f"world.heightmap: {path} must be at most {_MOST_BYTES // 2**20} MB")
-        data = path.read_bytes()
-    except OSError as error:
-        raise ConfigError(f"world.heightmap: {path} cannot be read: {error.strerror}") from error
+    data = content(path, key="world.heightmap")
     try:
         if data.startswith(_SIGNATURE):
             heights, cell_m = _png(data) * white_m, pixel_m

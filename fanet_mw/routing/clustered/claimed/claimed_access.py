@@ -16,7 +16,6 @@ from beyond two hops; clocks that disagree by more than `clusters.turn_slack_us`
 """
 
 from collections.abc import Mapping
-from typing import Final
 
 from fanet_mw.bounds.turn_gaps import TurnServer
 from fanet_mw.errors import DropReason
@@ -25,16 +24,14 @@ from fanet_mw.node.packet import Packet
 from fanet_mw.routing.clustered.claimed.claimed_release import ClaimedRelease
 from fanet_mw.routing.clustered.claimed.claiming import Change, Claiming
 from fanet_mw.routing.clustered.forwarding.floods import Floods
-from fanet_mw.routing.clustered.forwarding.gradient import Gradient
+from fanet_mw.routing.clustered.forwarding.gradient import NO_HEAD, Gradient
 from fanet_mw.routing.clustered.forwarding.uplink import Uplink
 from fanet_mw.routing.clustered.tdma.contention import Contention
 from fanet_mw.routing.clustered.tdma.turns import clocks_fit
-from fanet_mw.units import MS, US, NodeId, seconds_to_ns
+from fanet_mw.units import MS, US, seconds_to_ns
 from fanet_mw.wire import Kind
 from fanet_mw.wire.claims import Claims
 from fanet_mw.wire.inner import Beacon
-
-_NO_HEAD: Final = NodeId(0)
 
 
 class ClaimedAccess:
@@ -117,7 +114,7 @@ class ClaimedAccess:
             for packet in self._uplink.drain():
                 self.let_out(packet, now_ns=now_ns)
         elif change is Change.LOST:
-            self._gradient.join(_NO_HEAD, now_ns=now_ns)
+            self._gradient.join(NO_HEAD, now_ns=now_ns)
             for packet in self._queue.drain():
                 self.forward(packet, start_ns=now_ns + self._lead_ns, now_ns=now_ns)
         standing = self._claiming.standing(waiting=len(self._queue), now_ns=now_ns)

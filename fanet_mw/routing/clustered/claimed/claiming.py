@@ -21,7 +21,7 @@ from fanet_mw.scenario import Scenario
 from fanet_mw.units import MS, NodeId, S, seconds_to_ns
 from fanet_mw.wire.claims import MOST_LOTS, Claims, SlotStatus
 
-_LISTEN: Final = 3
+LISTEN_HELLOS: Final = 3
 """The number of hello intervals before the first claim: the two hops around are known after two if no hello is lost."""
 _LONGEST: Final = 128
 """The number of slots of the longest superframe; in a larger crowd some nodes find no slot."""
@@ -93,7 +93,7 @@ class Claiming:
         return SlotClaims(
             self._port.node,
             now_ns=now_ns,
-            listen_ns=_LISTEN * self._hello_ns,
+            listen_ns=LISTEN_HELLOS * self._hello_ns,
             lifetime_ns=self._lifetime_ns,
             slots=slots or None,
             sized_to=None if slots else self._longest,
@@ -103,7 +103,7 @@ class Claiming:
         """The node is up; it listens."""
         self._claims = self._new_claims(now_ns)
         self._load = ClaimedLoad(now_ns)
-        self._known_ns = now_ns + _LISTEN * self._hello_ns
+        self._known_ns = now_ns + LISTEN_HELLOS * self._hello_ns
 
     # --- once per hello -------------------------------------------------------------------------------------------
 

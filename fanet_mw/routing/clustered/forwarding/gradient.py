@@ -11,7 +11,7 @@ from fanet_mw.node.neighbors import Neighbor, Neighbors
 from fanet_mw.units import NodeId
 
 UNREACHABLE: Final = 255
-_NO_HEAD: Final = NodeId(0)
+NO_HEAD: Final = NodeId(0)
 _STALE: Final = 4
 """The number of hello intervals without a new sequence number of the head after which a route is given up."""
 _FORGET: Final = 4
@@ -41,7 +41,7 @@ class Gradient:
         self._node = node
         self._neighbors = neighbors
         self._stale_ns = _STALE * hello_ns
-        self._own_head = _NO_HEAD
+        self._own_head = NO_HEAD
         self._seq = 0
         self._route: RouteToHead | None = None
         self._news: dict[int, tuple[int, int]] = {}
@@ -66,7 +66,7 @@ class Gradient:
         if self._own_head == self._node:
             return  # this node is a head itself
         route = self.route(now_ns=now_ns)
-        if beacon.hops_to_head >= UNREACHABLE - 1 or beacon.head == _NO_HEAD:
+        if beacon.hops_to_head >= UNREACHABLE - 1 or beacon.head == NO_HEAD:
             if route is not None and route.parent == neighbor.node:
                 self._route = None
             return

@@ -20,13 +20,13 @@ from fanet_mw.node.packet import Packet
 from fanet_mw.units import MS, US
 from fanet_mw.wire.digest import CAPACITY, Digest, Holding
 
-_ASSESS_NS: Final = 200 * MS
+ASSESS_NS: Final = 200 * MS
 """The nodes that could repair the same packet wait for a random time up to this, so that mostly only one does."""
-_FLOOD_OVER_NS: Final = 500 * MS
+FLOOD_OVER_NS: Final = 500 * MS
 """The time after which a flood that was heard is over everywhere."""
-RIPE_NS: Final = _FLOOD_OVER_NS + _ASSESS_NS
+RIPE_NS: Final = FLOOD_OVER_NS + ASSESS_NS
 """The time after a flood within which some node sends what a hello shows to be missing."""
-_AGAIN_NS: Final = 900 * MS
+AGAIN_NS: Final = 900 * MS
 """The time after which a node repairs the same packet again: the neighbor has had a hello to state that it lacks it."""
 _PER_HELLO: Final = 32
 """The most packets sent for one hello: 35 ms of airtime at 11 Mb/s and 1024 B."""
@@ -72,7 +72,7 @@ class Repair:
         key = key_of(origin, seq)
         holding = self._holdings.get(origin)
         self._holdings[origin] = Holding(origin, seq, 0) if holding is None else holding.with_(seq)
-        ripe_ns = now_ns + _FLOOD_OVER_NS if flooded else expect_ns
+        ripe_ns = now_ns + FLOOD_OVER_NS if flooded else expect_ns
         known = store.get(key)
         if known is not None:
             store[key] = _Kept(packet, min(ripe_ns, known.ripe_ns))
@@ -129,7 +129,7 @@ class Repair:
                         return
 
     def _plan(self, key: int, now_ns: int) -> None:
-        due_ns = now_ns + int(self._random() * _ASSESS_NS)
+        due_ns = now_ns + int(self._random() * ASSESS_NS)
         self.pending[key] = due_ns
         heapq.heappush(self._due, (due_ns, key))
 
@@ -141,7 +141,7 @@ class Repair:
     def _put_off(self, key: int, now_ns: int) -> None:
         kept = self._store.get(key)
         if kept is not None:
-            self._store[key] = kept._replace(ripe_ns=now_ns + _AGAIN_NS)
+            self._store[key] = kept._replace(ripe_ns=now_ns + AGAIN_NS)
 
     def next_wake_ns(self) -> int | None:
         due = self._due

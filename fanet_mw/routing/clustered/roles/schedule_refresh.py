@@ -6,18 +6,12 @@ as in Trickle (RFC 6206). While all nodes agree, nothing is sent.
 """
 
 from collections.abc import Callable
-from typing import Final
 
 from fanet_mw.node.duplicates import key_of_packet
 from fanet_mw.node.packet import Packet
+from fanet_mw.routing.clustered.forwarding.repair import AGAIN_NS, ASSESS_NS, FLOOD_OVER_NS
 from fanet_mw.routing.clustered.roles.lease import Authority
-from fanet_mw.units import MS
 from fanet_mw.wire.inner import Beacon
-
-_FLOOD_OVER_NS: Final = 500 * MS
-"""The time after which a flood that was heard is over everywhere."""
-_ASSESS_NS: Final = 200 * MS
-_AGAIN_NS: Final = 900 * MS
 
 
 class ScheduleRefresh:
@@ -44,13 +38,13 @@ class ScheduleRefresh:
 
     def on_beacon(self, beacon: Beacon, *, now_ns: int) -> None:
         """Compare the schedule that a neighbor follows, as its beacon states."""
-        if self._version is None or self.due_ns is not None or now_ns - self._kept_ns < _FLOOD_OVER_NS:
+        if self._version is None or self.due_ns is not None or now_ns - self._kept_ns < FLOOD_OVER_NS:
             return
         authority, epoch = self._version
         theirs = Authority(beacon.term, beacon.leader)
         behind = not beacon.leader or theirs > authority
         if behind or (theirs == authority and 0 < ((epoch - beacon.epoch) & 0xFFFF) < 0x8000):
-            self._plan(now_ns + int(self._random() * _ASSESS_NS))
+            self._plan(now_ns + int(self._random() * ASSESS_NS))
 
     def _plan(self, due_ns: int | None) -> None:
         """Send all packets of the announcement at this instant; None: do not send them."""
@@ -74,4 +68,4 @@ class ScheduleRefresh:
     def _over(self, now_ns: int) -> None:
         """Give the flood that another node or this one has begun time to come to its end."""
         self._plan(None)
-        self._kept_ns = now_ns + _AGAIN_NS - _FLOOD_OVER_NS
+        self._kept_ns = now_ns + AGAIN_NS - FLOOD_OVER_NS

@@ -23,7 +23,7 @@ FAST: Final = 3
 """Hellos per interval until then, so that the estimate is one."""
 _STEADY_HELLOS: Final = 4
 _STEADY_DB: Final = 1.0
-_STEADY: Final = 0.995
+STEADY: Final = 0.995
 """Taken for the share of a link whose power did not vary by more than that over so many hellos, and half of those that
 were due: what such a link loses it loses to collisions, and there are none in turns."""
 _CHANGED: Final = 0.3
@@ -75,7 +75,7 @@ class LinkQuality:
         due = (now_ns - since_ns + (FAST - 1) * fast_ns) // self._hello_ns
         powers = [rssi_dbm for _, rssi_dbm in heard]
         if len(heard) >= max(_STEADY_HELLOS, due / 2) and max(powers) - min(powers) <= _STEADY_DB:
-            return _STEADY
+            return STEADY
         return (len(heard) + 0.5) / (max(due, len(heard)) + 1)
 
     def has_estimate(self, *, now_ns: int) -> bool:

@@ -79,7 +79,7 @@ def test_the_densest_traffic_that_a_scenario_may_ask_for_is_carried_or_counted()
 
 
 @pytest.mark.parametrize("keys", [
-    ("clusters.relay=scheduled", "radio.max_frame_bytes=680"),
+    ("clusters.relay=scheduled", "radio.max_frame_bytes=680", "duration_s=8"),
     ("clusters.relay=scheduled", "clusters.links=measured", "radio.max_frame_bytes=996"),
     ("clusters.relay=cds", "clusters.repair_s=5", "radio.max_frame_bytes=501"),
     ("clusters.relay=claimed", "clusters.repair_s=5", "radio.max_frame_bytes=501"),
@@ -89,7 +89,7 @@ def test_the_densest_traffic_that_a_scenario_may_ask_for_is_carried_or_counted()
 ])  # fmt: skip
 def test_a_swarm_whose_largest_messages_just_fit_a_frame_works(keys: Sequence[str]) -> None:
     size = (
-        "nodes.count=30", "nodes.spacing_m=50", "traffic.payload_bytes=128", "duration_s=8", "warmup_s=2", "drain_s=1",
+        "nodes.count=30", "nodes.spacing_m=50", "traffic.payload_bytes=128", "duration_s=5", "warmup_s=2", "drain_s=1",
     )  # fmt: skip
     summary = scenario_draws.run(catalog.find("quick", [*size, *keys]), limit_s=60)
     assert summary["frames"]["closes"]

@@ -82,7 +82,7 @@ from emulator.kernel.compile import warm_up
 from sim.cli.app import main
 warm_up()  # compiled code is kept in files too
 resource.setrlimit(resource.RLIMIT_FSIZE, (16384, resource.RLIM_INFINITY))
-sys.argv = ["fanet", "simulate", "quick", "--duration", "20", "--out", sys.argv[1]]
+sys.argv = ["fanet", "simulate", "quick", "--duration", "12", "--out", sys.argv[1]]
 main()
 """
 

@@ -31,6 +31,7 @@ from sim.scenarios import catalog
 
 FAST = ["duration_s=5", "warmup_s=2", "drain_s=1", "clusters.flooding_period_s=0.5", "radio.lead_ms=150"]
 """The lead is long, because these tests ask what happens and not whether a busy machine is on time."""
+FEW = ("--set", "nodes.count=3", "--set", "clusters.count=1")
 PATIENCE_S = 90
 """How long to wait for what ends soon by itself: longer than any machine needs, shorter than a test may take."""
 
@@ -154,7 +155,9 @@ def command(*arguments: str) -> list[str]:
 
 
 def test_ctrl_c_ends_everything_cleanly_with_a_partial_result() -> None:
-    process = subprocess.Popen(command("launch", "quick", "--json"), stdout=subprocess.PIPE, stderr=subprocess.PIPE)
+    process = subprocess.Popen(
+        command("launch", "quick", *FEW, "--json"), stdout=subprocess.PIPE, stderr=subprocess.PIPE
+    )
     assert process.stderr is not None
     for line in process.stderr:
         if b"processes up" in line:
@@ -256,7 +259,7 @@ def test_nobody_has_to_compile_twice() -> None:
 def test_a_launched_swarm_is_found_by_other_commands(tmp_path: Path, monkeypatch: pytest.MonkeyPatch) -> None:
     monkeypatch.setenv("XDG_RUNTIME_DIR", str(tmp_path))
     process = subprocess.Popen(
-        command("launch", "quick", "--duration", "60", "--swarm", "test"), stdout=subprocess.DEVNULL,
+        command("launch", "quick", *FEW, "--duration", "60", "--swarm", "test"), stdout=subprocess.DEVNULL,
         stderr=subprocess.PIPE, text=True,
     )  # fmt: skip
     assert process.stderr is not None

@@ -18,7 +18,7 @@ from agents.uav import NodeState, Uav
 from fanet_mw.application import Application
 from fanet_mw.bus.radio_control import Cut, Degrade, Restore
 from fanet_mw.errors import ConfigError
-from fanet_mw.scenario import Scenario
+from fanet_mw.scenario import Scenario, config
 from fanet_mw.trace import Delivered
 from fanet_mw.units import MS, NodeId, S, seconds_to_ns
 from sim.run.launcher.swarm import READY_TIMEOUT_S, SwarmRun
@@ -39,18 +39,46 @@ _TURNS: Final = 4
 
 def scenario_of(given: Scenario | str | Path, *, seed: int | None = None, overrides: Sequence[str] = ()) -> Scenario:
     """A scenario as a program names it, with another seed and other values (`KEY=VALUE`); raises ConfigError."""
-    found = given if isinstance(given, Scenario) else catalog.find(given, overrides)
-    if isinstance(given, Scenario) and overrides:
+    if isinstance(overrides, str):
+        raise ConfigError(f"overrides = {overrides!r}: must be a sequence of KEY=VALUE, not one text")
+    if not isinstance(given, Scenario):
+        return catalog.find(given, overrides if seed is None else [*overrides, f"seed={seed}"])
+    if overrides:
         raise ConfigError("overrides are for scenarios that are named; this one is built already")
-    return found if seed is None else Scenario.model_validate({**found.model_dump(), "seed": seed})
+    return given if seed is None else config.build({**given.model_dump(), "seed": seed})
 
 
-def _by_node(applications: OfUser | None) -> Callable[[int], Sequence[Application]]:
+def _by_node(applications: object, scenario: Scenario) -> Callable[[int], Sequence[Application]]:
+    """What makes the applications of each node, as a user gave it; raises ConfigError for what is none, or is for a
+    node that there is not.
+    """
+    make: Callable[[int], object]
     if applications is None:
         return lambda _: ()
-    if callable(applications):
-        return applications
-    return lambda node: applications.get(node, ())
+    if isinstance(applications, Mapping):
+        _known_nodes("applications", applications, scenario)
+        by_node = applications
+        make = lambda node: by_node.get(node, ())  # noqa: E731
+    elif callable(applications):
+        make = applications
+    else:
+        kind = type(applications).__name__
+        raise ConfigError(f"applications must be a mapping by node, or be called with a node's id, not a {kind}")
+
+    def checked(node: int) -> Sequence[Application]:
+        made = make(node)
+        if not isinstance(made, Sequence) or not all(isinstance(one, Application) for one in made):
+            raise ConfigError(f"applications of node {node} = {made!r}: must be a sequence of Application objects")
+        return made
+
+    return checked
+
+
+def _known_nodes(what: str, nodes: Collection[int], scenario: Scenario) -> None:
+    """Raise ConfigError for a node that the scenario does not have."""
+    for node in nodes:
+        if node not in scenario.node_ids:
+            raise ConfigError(f"{what}: node {node} must be in [1, nodes.count = {scenario.nodes.count}]")
 
 
 def simulate(
@@ -62,7 +90,7 @@ def simulate(
 ) -> Result:
     """Run a scenario in virtual time, with a user's applications on its nodes; the same seed gives the same result."""
     known = scenario_of(scenario, seed=seed, overrides=overrides)
-    return Result(run_virtual(known, applications=_by_node(applications)))
+    return Result(run_virtual(known, applications=_by_node(applications, known)))
 
 
 class Launched:
@@ -101,6 +129,7 @@ async def launch(
     before the scenario's time, the run is ended; raises BusError when the swarm does not come up.
     """
     known = scenario_of(scenario, seed=seed, overrides=overrides)
+    _known_nodes("leave_out", leave_out, known)
     started: asyncio.Future[SwarmRun] = asyncio.get_running_loop().create_future()
     task = asyncio.ensure_future(
         launch_processes(
@@ -212,7 +241,7 @@ class VirtualSwarm:
     ) -> None:
         self.scenario = scenario_of(scenario, seed=seed, overrides=overrides)
         """The scenario that is run, with its seed and all overrides."""
-        self._time = _Time(self.scenario, _by_node(applications))
+        self._time = _Time(self.scenario, _by_node(applications, self.scenario))
         self._nodes: dict[int, Node] = {}
         self._began_s = time.perf_counter()
         self._result: Result | None = None

@@ -166,6 +166,36 @@ def test_a_simulation_gives_its_summary_its_trace_in_columns_and_its_deliveries(
     assert heard == len(result.deliveries)
 
 
+@pytest.mark.parametrize(
+    ("options", "said"),
+    [
+        ({"applications": [fanet_mw.Application()]}, "must be a mapping by node, or be called with a node's id, not a"),
+        ({"applications": lambda _: fanet_mw.Application()}, r"of node 1 = .* must be a sequence of Application"),
+        ({"applications": lambda _: [fanet_mw.Application]}, r"of node 1 = .* must be a sequence of Application"),
+        ({"applications": {10: ()}}, r"applications: node 10 must be in \[1, nodes.count = 9\]"),
+        ({"overrides": "duration_s=5"}, "must be a sequence of KEY=VALUE, not one text"),
+        ({"seed": -1}, "seed = -1: input should be greater than or equal to 0"),
+    ],
+)
+def test_what_cannot_be_simulated_is_said_with_its_value(options: dict[str, Any], said: str) -> None:
+    with pytest.raises(fanet_mw.ConfigError, match=said):
+        fanet_mw.simulate("quick", **options)
+
+
+def test_another_seed_is_that_of_the_scenario_built_or_named() -> None:
+    built = fanet_mw.load_scenario("quick", QUIET)
+    found = [fanet_mw.VirtualSwarm(built, seed=7), fanet_mw.VirtualSwarm("quick", overrides=QUIET, seed=7)]
+    assert [swarm.scenario for swarm in found] == [fanet_mw.load_scenario("quick", [*QUIET, "seed=7"])] * 2
+    with pytest.raises(fanet_mw.ConfigError, match="seed = -1: "):
+        fanet_mw.simulate(built, seed=-1)
+
+
+async def test_a_node_that_there_is_not_cannot_be_left_out() -> None:
+    with pytest.raises(fanet_mw.ConfigError, match=r"leave_out: node 77 must be in \[1, nodes.count = 9\]"):
+        async with fanet_mw.launch("quick", leave_out=[77]):
+            pass
+
+
 def test_importing_fanet_mw_loads_nothing_else_and_all_names_are_there() -> None:
     code = (
         "import sys, fanet_mw; heavy = {'numpy', 'pydantic', 'zenoh', 'pymavlink', 'sim', 'agents'} & set(sys.modules);"

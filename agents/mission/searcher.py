@@ -79,7 +79,7 @@ class Searcher:
         self._reception = PhoneReception(scenario, node, finds, navigation, outbox, coverage)
         self._sightings = Sightings(scenario, node, finds, navigation, outbox)
         self._announcing = Announcing(node, finds, outbox)
-        approach = Approach(node, finds, navigation, outbox, arrival_m=mission.arrival_m)
+        approach = Approach(node, finds, navigation, outbox, arrival_m=mission.arrival_m, speed_m_s=speed_m_s)
         self._bidding = Bidding(
             scenario, node, finds=finds, navigation=navigation, formation=place, approach=approach, outbox=outbox,
             speed_m_s=speed_m_s,

@@ -53,7 +53,7 @@ class Board:
         self.place = FormationPlace(node, self.navigation, reach_m=REACH_M)
         if planned:
             self.place.adopt(PLAN, 0)
-        self.approach = Approach(node, self.finds, self.navigation, self.out, arrival_m=30)
+        self.approach = Approach(node, self.finds, self.navigation, self.out, arrival_m=30, speed_m_s=10.0)
         self.tasks = Bidding(
             SCENARIO, node, finds=self.finds, navigation=self.navigation, formation=self.place,
             approach=self.approach, outbox=self.out, speed_m_s=10.0,

@@ -32,8 +32,8 @@ def _cases(keys: tuple[str, ...], seeds: tuple[int, ...], losses: tuple[float, .
 
 
 SMALL: Final = {
-    **_cases(_FEW_UAVS, (1,), (0.0, 0.5, 0.8)),
-    "ours, and hellos are not used to avoid others | 0%": Case("rescue", (*_FEW_UAVS, "mission.avoid_by=[]"), (1,)),
+    **_cases(_FEW_UAVS, (1, 2), (0.0, 0.5, 0.8)),
+    "ours, and hellos are not used to avoid others | 0%": Case("rescue", (*_FEW_UAVS, "mission.avoid_by=[]"), (1, 2)),
 }
 WHOLE: Final = _cases(("duration_s=240",), (1,), (0.0, 0.8))
 

@@ -50,9 +50,9 @@ PLACES: Final[Mapping[str, Case]] = {
     "`town`": Case("town", (), tuple(range(1, 21))),
 }
 COUNTRY: Final[Mapping[str, Case]] = {
-    "`rescue`": Case("rescue", (), (1, 2, 3)),
-    "`hills`": Case("hills", (), (1,)),
-    "`night`": Case("night", (), (1,)),
+    "`rescue`": Case("rescue", (), tuple(range(1, 13))),
+    "`hills`": Case("hills", (), (1, 2)),
+    "`night`": Case("night", (), (1, 2)),
 }
 _SMALL: Final = (
     "nodes.count=20", "nodes.spacing_m=100", "nodes.telemetry_hz=0", "clusters.count=4", "traffic.interval_s=4",

@@ -259,7 +259,7 @@ class Node:
         reader = self._reader
         name, bits = reader.name, before | reader.phase
         _, _, origin_us, seq, origin, destination, _, kind, _, hops, priority, _, _, _ = reader.fields
-        known = bool(before) or (kind == _DATA and self._own.handed_on(origin, seq))
+        known = bool(before) or (origin == self.node and kind == _DATA and self._own.handed_on(origin, seq))
         why = self._header_check.why_not(reader.fields, known=known, src=reception.src, end_ns=reception.end_ns)
         if why is not None:
             self._disbelieve(why, packet, now_ns)

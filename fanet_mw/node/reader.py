@@ -13,11 +13,14 @@ from fanet_mw import wire
 from fanet_mw.errors import MalformedFrameError
 from fanet_mw.node import duplicates
 from fanet_mw.node.packet import Packet
-from fanet_mw.wire import Content
+from fanet_mw.wire import Content, Kind
 
 PHASES: Final = {0: duplicates.DELIVERED, wire.FLAG_FLOOD: duplicates.FLOODED, wire.FLAG_TO_HEAD: duplicates.CARRIED}
 """Which bit says that a packet was handled, by the phase flags of the frame that brought it."""
 _new: Final = tuple.__new__  # for what is made once per frame
+_HELLO: Final = int(Kind.HELLO)
+_KIND: Final = 7
+"""The place of the kind among the fields of a header (`wire.Fields`)."""
 BUNDLE: Final = 1 << 30
 """The phase of a frame with several packets in it: no node has ever handled that."""
 _LATEST: Final = 64
@@ -64,13 +67,18 @@ class Reader:
         """The packet in the frame; raises MalformedFrameError, each time."""
         if not self.phase:
             raise MalformedFrameError("no routing header, or one of two phases")
-        packet = self.packet = _checked(self.frame)
+        fields = self.fields
+        if fields[_KIND] == _HELLO:  # a node's clock reads it before the node
+            packet = _checked_hello(self.frame)
+        else:
+            packet = _new(Packet, (wire.checked(self.frame, fields), self.frame))
+        self.packet = packet
         return packet
 
 
 @lru_cache(maxsize=_LATEST)
-def _checked(frame: bytes) -> Packet:
-    """The packet in a frame, checked once for a node's clock, which reads a hello before the node, and for the node."""
+def _checked_hello(frame: bytes) -> Packet:
+    """The packet in a hello, checked once for all that read it."""
     return _new(Packet, (wire.checked(frame, wire.fields_of(frame) or wire.NO_FIELDS), frame))
 
 

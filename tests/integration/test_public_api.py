@@ -1,8 +1,10 @@
 """The public interface, as a program and a notebook use it, in virtual time."""
 
 import asyncio
+import re
 import subprocess
 import sys
+from pathlib import Path
 from typing import Any
 
 import pytest
@@ -10,6 +12,8 @@ import pytest
 import fanet_mw
 from fanet_mw.dialect import fanet
 from fanet_mw.testing.plugin import MakeSwarm
+
+ROOT = Path(__file__).parents[2]
 
 SURVIVOR = 53003
 QUIET = [
@@ -194,6 +198,15 @@ async def test_a_node_that_there_is_not_cannot_be_left_out() -> None:
     with pytest.raises(fanet_mw.ConfigError, match=r"leave_out: node 77 must be in \[1, nodes.count = 9\]"):
         async with fanet_mw.launch("quick", leave_out=[77]):
             pass
+
+
+@pytest.mark.parametrize("page", ["README.md", "docs/how-to/send-messages.md"])
+def test_the_program_on_a_page_runs_as_it_stands(page: str, capsys: pytest.CaptureFixture[str]) -> None:
+    [program] = re.findall(
+        r"^```python\n(.*?)^```", (ROOT / page).read_text(encoding="utf-8"), re.DOTALL | re.MULTILINE
+    )
+    exec(compile(program, page, "exec"), {})
+    assert capsys.readouterr().out.strip()
 
 
 def test_importing_fanet_mw_loads_nothing_else_and_all_names_are_there() -> None:

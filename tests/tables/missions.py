@@ -47,7 +47,7 @@ def degraded(scenario: Scenario, loss: float) -> Scenario:
 
 
 PLACES: Final[Mapping[str, Case]] = {
-    "`town`": Case("town", (), tuple(range(1, 21))),
+    "`town`": Case("town", (), tuple(range(3, 11))),
 }
 COUNTRY: Final[Mapping[str, Case]] = {
     "`rescue`": Case("rescue", (), tuple(range(1, 13))),

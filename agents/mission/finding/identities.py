@@ -120,7 +120,7 @@ class Identities:
         phones = self._phones(people)
         if not people or not phones:
             return []
-        costs = [[self._cost(person.place, phone) for phone in phones] for person in people]
+        costs = [[self._cost_of(person, phone) for phone in phones] for person in people]
         nobody = [_GATE if person.taken is None else _TAKEN_GATE for person in people]
         least, chosen = _assigned(costs, nobody)
         sure = []
@@ -199,6 +199,19 @@ class Identities:
             and any(self._finds.known[survivor].filter.near(place.at, within_m=_NEAR_M) for place in places)
         ]
 
+    def _cost_of(self, person: PersonTrack, survivor: int) -> float:
+        """The cost of one pair. Where a survivor is confirmed, only a phone whose place is well known can be that of a
+        second person: any other phone that was heard not far from there would fit as well.
+        """
+        if person.taken is not None and not self._is_heard_within(_TAKEN_SIGMA_M, survivor):
+            return _IMPOSSIBLE
+        return self._cost(person.place, survivor)
+
+    def _is_heard_within(self, sigma_m: float, survivor: int) -> bool:
+        """True if received powers alone tell the place of a phone with at most this standard deviation."""
+        heard = self._finds.known[survivor].filter.heard_from()
+        return heard is not None and heard.sigma_m <= sigma_m
+
     def _cost(self, place: Estimate, survivor: int) -> float:
         find, at = self._finds.known[survivor], place.at
         doubt = _REFUTED_COST if find.doubted(at) else 0.0
@@ -208,13 +221,11 @@ class Identities:
         """True if enough has been seen of a person and enough been heard of a phone."""
         find = self._finds.known[survivor]
         enough = _SAMPLES if len(find.reporters) >= _REPORTERS else _SAMPLES_ALONE
-        heard = find.filter.heard_from()
         return (
             person.close >= _SIGHTINGS
             and person.place.sigma_m <= _SURE_M
+            and self._is_heard_within(_VAGUE_M if person.taken is None else _TAKEN_SIGMA_M, survivor)
             and find.filter.samples >= enough
-            and heard is not None
-            and heard.sigma_m <= (_VAGUE_M if person.taken is None else _TAKEN_SIGMA_M)
         )
 
 

@@ -185,6 +185,20 @@ def test_where_somebody_is_confirmed_a_second_person_is_named_only_after_many_mo
     assert named[0] >= 20
 
 
+def test_somebody_who_is_confirmed_is_not_taken_for_the_owner_of_a_phone_that_was_hardly_heard() -> None:
+    """Whoever circles about a confirmed person sees that person again and again."""
+    uav = Uav()
+    uav.finds.on_found(Found(0, 3, 0.0, 0.0, 4.0, 0.0, 4.0, 9, Standing.CONFIRMED), now_ns=0)
+    for node, at, rssi_dbm in ((4, (84, -12), -88.1), (9, (98, -5), -87.0), (5, (60, -80), -88.1)):
+        uav.hear(7, node, Enu(*at, UP_M), rssi_dbm)
+    for second in range(60):
+        uav.see(Enu(0, 0, 0), now_ns=second * S)
+    place = uav.finds.known[7].place()
+    assert place is not None
+    assert place.sigma_m > 30.0, "three powers do not tell where a phone is"
+    assert not uav.named
+
+
 # --- confirmations that were mistaken -------------------------------------------------------------------------------
 
 

@@ -9,6 +9,7 @@ from fanet_mw.planner.demand import ClassPlan
 from fanet_mw.planner.head_slot import ClusterPlan
 from fanet_mw.routing.clustered.tdma.turns import least_slack_ns, turn_slack_ns
 from fanet_mw.scenario import Scenario
+from fanet_mw.timesync.ftsp import MOST_STATED_NS
 from fanet_mw.units import MS, US, S
 
 _LIFETIMES: Final = {wire.PRIORITY_SAFETY: "safety_lifetime_s", wire.PRIORITY_REPORT: "report_lifetime_s"}
@@ -85,6 +86,8 @@ def left_out(scenario: Scenario) -> Iterator[str]:
     if scenario.radio.channel != "range":
         yield "who hears whom is taken by distance, up to radio.range_m, whatever the channel does"
     most_ns = (turn_slack_ns(scenario) - least_slack_ns(0)) // 2
+    if scenario.clock.sync == "beacons":
+        most_ns = min(most_ns, MOST_STATED_NS)
     if scenario.clock.sync != "none" and scenario.clusters.relay in ("scheduled", "claimed"):
         yield (
             f"in flight a bound is stated while clocks are known within {max(0, most_ns) / US:g} us "

@@ -47,8 +47,9 @@ _DOUBT_HELLOS: Final = 1.5
 _STAMPS: Final = 4
 """The ends of so many hellos of each neighbor are remembered."""
 _NEIGHBORS: Final = 256
-_WORST_NS: Final = 20 * MS
-"""A greater error than this means a node without a time, or nonsense; guard times do not allow for it."""
+MOST_STATED_NS: Final = 20 * MS
+"""Hellos state no greater error than this, whatever it is: more means a node without a time, or nonsense, and guard
+times do not allow for it."""
 _WORST_LIFE_NS: Final = 20 * S
 _PPB: Final = 1e9
 _U32: Final = 0xFFFF_FFFF
@@ -138,7 +139,7 @@ class TimeSync:
 
     def worst_ns(self, local_ns: int) -> int:
         """The greatest bound that any node is known to state, including this node."""
-        own_ns = min(self.error_ns(local_ns) or 0, _WORST_NS)
+        own_ns = min(self.error_ns(local_ns) or 0, MOST_STATED_NS)
         value_ns, stated_at_ns = self._worst
         return value_ns if value_ns > own_ns and local_ns - stated_at_ns < _WORST_LIFE_NS else own_ns
 
@@ -303,7 +304,7 @@ class TimeSync:
             self._arm(local_ns)
 
     def _learn_worst(self, value_ns: int, *, stated_at_ns: int) -> None:
-        value_ns = min(value_ns, _WORST_NS)
+        value_ns = min(value_ns, MOST_STATED_NS)
         if value_ns > self._worst[0] or stated_at_ns - self._worst[1] >= _WORST_LIFE_NS:
             self._worst = (value_ns, stated_at_ns)
 

@@ -13,6 +13,7 @@ from typing import Final, NamedTuple
 
 from fanet_mw.airtime import OVERHEAD_BYTES, Timing, airtime_ns
 from fanet_mw.scenario import Scenario
+from fanet_mw.timesync.ftsp import MOST_STATED_NS
 from fanet_mw.units import MS, US
 
 _FLIGHT_NS: Final = 20 * US
@@ -124,10 +125,13 @@ def receipt_ns(scenario: Scenario) -> int:
 def clocks_fit(scenario: Scenario, *, clock_error_ns: int) -> bool:
     """True if turns stay apart when no clock is farther than this from the swarm's; exact clocks always fit.
 
-    Where clocks are not exact, an error of 0 is one that the node has not heard of yet.
+    Where clocks are not exact, an error of 0 is one that the node has not heard of yet; the greatest that hellos state
+    may be any greater one.
     """
     if not clock_error_ns:
         return not scenario.clock.modelled
+    if scenario.clock.sync == "beacons" and clock_error_ns >= MOST_STATED_NS:
+        return False
     return least_slack_ns(clock_error_ns) <= turn_slack_ns(scenario)
 
 

@@ -28,6 +28,17 @@ def test_the_slack_of_a_turn_holds_two_clocks_that_are_wrong_and_the_flight(
     assert clocks_fit(scenario, clock_error_ns=error_us * US) == fits
 
 
+@pytest.mark.parametrize(
+    ("sync", "error_us", "fits"), [("beacons", 19_999, True), ("beacons", 20_000, False), ("none", 20_000, True)]
+)
+def test_an_error_that_hellos_cut_may_be_any_and_fits_no_slack(
+    make_scenario: MakeScenario, sync: str, error_us: int, fits: bool
+) -> None:
+    """Hellos state 20 ms of every error that is greater, too; of clocks left alone the bound itself is known."""
+    scenario = make_scenario(**KEYS, **{"clock.sync": sync, "clock.offset_ms": 20, "clusters.turn_slack_us": 60_000})
+    assert clocks_fit(scenario, clock_error_ns=error_us * US) == fits
+
+
 @pytest.mark.parametrize(("channel", "times"), [("range", 1), ("log_distance", 2)])
 def test_interference_reaches_twice_as_far_as_reception_where_it_is_a_matter_of_power(
     make_scenario: MakeScenario, channel: str, times: int

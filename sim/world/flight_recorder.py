@@ -17,6 +17,7 @@ from fanet_mw.errors import MalformedFrameError
 from fanet_mw.hosts.bus import OnSample
 from fanet_mw.scenario import Scenario
 from sim.world.engines.contract import Rows
+from sim.world.mobility.guidance import makes_sense
 
 _FARTHEST: Final = 1e6
 """Magnitude of a coordinate [m] or a velocity [m/s] that a swarm may have."""
@@ -65,10 +66,7 @@ class FlightRecorder:
         sent: dict[int, Setpoint] = {}
         for node in sorted(setpoints):
             for message in _decoded(setpoints[node]):
-                if (
-                    isinstance(message, Setpoint)
-                    and np.isfinite([*message.position, message.speed_m_s, *message.velocity]).all()
-                ):
+                if isinstance(message, Setpoint) and makes_sense(message):
                     sent[node] = message
         return SwarmFlight(states[:, :3].copy(), states[:, 3:].copy(), sent)
 

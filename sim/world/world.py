@@ -29,7 +29,7 @@ from sim.world.environment.survivors import Survivors
 from sim.world.environment.wind import Wind
 from sim.world.flight_recorder import SwarmFlight
 from sim.world.incidents.incidents import Incidents
-from sim.world.mobility.guidance import Guidance
+from sim.world.mobility.guidance import Guidance, makes_sense
 from sim.world.mobility.layout import positions
 from sim.world.sensors.contract import Truth
 from sim.world.sensors.suite import Suite, sensors_of
@@ -114,11 +114,7 @@ class WorldActor(Actor):
 
     def receive(self, topic: str, message: Message, now_ns: int) -> None:
         node = node_of(topic)
-        if (
-            not isinstance(message, Setpoint)
-            or not 1 <= node <= len(self._ids)
-            or not np.isfinite([*message.position, message.speed_m_s, *message.velocity]).all()
-        ):
+        if not isinstance(message, Setpoint) or not 1 <= node <= len(self._ids) or not makes_sense(message):
             self._malformed += 1
         else:
             if self._guidance.still:

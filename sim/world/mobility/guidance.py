@@ -25,6 +25,9 @@ from sim.world.mobility.crossing import Crossing
 from sim.world.mobility.formation import Formation
 from sim.world.mobility.random_waypoint import RandomWaypoint
 
+_FARTHEST_M: Final = 1e7
+_FASTEST_M_S: Final = 1e4
+"""Setpoints beyond these make no sense. Their squares must stay numbers, too, or the flight of all UAVs would end."""
 _GAIN: Final = 0.8
 """Position loop [1/s]."""
 _CLEAR_M: Final = 4.0
@@ -84,6 +87,12 @@ class _Land(NamedTuple):
 
 
 _Command = _GoTo | _FlyAt | _Land
+
+
+def makes_sense(setpoint: Setpoint) -> bool:
+    """True if a flight controller can be asked for this; anybody on the bus can put a setpoint."""
+    speeds = (setpoint.speed_m_s, *setpoint.velocity)  # a comparison with what is not a number is false
+    return all(abs(m) <= _FARTHEST_M for m in setpoint.position) and all(abs(v) <= _FASTEST_M_S for v in speeds)
 
 
 class Guidance:

@@ -9,7 +9,7 @@ import numpy as np
 import pytest
 
 from fanet_mw.bus import codecs
-from fanet_mw.bus.messages import Message, Poses, Setpoint
+from fanet_mw.bus.messages import Message, Poses, Setpoint, SetpointKind
 from fanet_mw.bus.topics import Topics
 from fanet_mw.hosts.bus import OnSample
 from fanet_mw.scenario import Scenario
@@ -107,6 +107,7 @@ def test_setpoints_that_make_no_sense_are_left_out(make_scenario: Any) -> None:
     ear.say(NAMES.pose, good())
     ear.say(NAMES.setpoint(2), Setpoint(0, Enu(1, 2, 3), 4.0))
     ear.say(NAMES.setpoint(3), Setpoint(0, Enu(1, float("inf"), 3), 4.0))
+    ear.say(NAMES.setpoint(1), Setpoint(0, Enu(1, 2, 3), 4.0, SetpointKind.VELOCITY, Enu(0, 0, 1e154)))
     ear.say(NAMES.setpoint(77), Setpoint(0, Enu(1, 2, 3), 4.0))
     ear.say_bytes(NAMES.setpoint(4), b"garbage")
     flight = ear.recorder.last()

@@ -62,8 +62,11 @@ def test_a_world_that_was_held_up_skips_instants_and_keeps_its_phase(make_scenar
 
 @pytest.mark.parametrize(
     "setpoint",
-    [(1, Enu(float("nan"), 0.0, 50.0), 5.0), (1, Enu(0.0, 0.0, 50.0), float("inf")), (9, Enu(0.0, 0.0, 50.0), 5.0)],
-)
+    [
+        (1, Enu(float("nan"), 0.0, 50.0), 5.0), (1, Enu(0.0, 0.0, 50.0), float("inf")), (9, Enu(0.0, 0.0, 50.0), 5.0),
+        (1, Enu(0.0, 0.0, 1e154), 5.0), (1, Enu(0.0, 0.0, 50.0), -1e154),
+    ],
+)  # fmt: skip
 def test_a_setpoint_that_is_none_is_counted_and_nobody_moves(
     make_scenario: MakeScenario, setpoint: tuple[int, Enu, float]
 ) -> None:

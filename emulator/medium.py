@@ -22,7 +22,7 @@ from fanet_mw.bus.radio_control import Cut, Degrade, Jam, Restore
 from fanet_mw.bus.topics import Topics
 from fanet_mw.errors import DropReason
 from fanet_mw.scenario import Scenario
-from fanet_mw.units import BROADCAST, MS, NodeId, earliest
+from fanet_mw.units import BROADCAST, FARTHEST_M, MS, NodeId, earliest
 
 TOO_LATE_NS: Final = 50 * MS
 """A request later than this is dropped, because by then its slot belongs to another node."""
@@ -39,7 +39,6 @@ _OUTCOME_OF: Final[Mapping[DropReason, TxOutcome]] = {
 }
 """The status of a request that is not taken in, by the reason of its drop."""
 _NO_RECEPTION: Final = Reception(b"", NodeId(0), 0, 0.0)
-_FARTHEST_M: Final = 1e7
 """The greatest coordinate; larger ones would overflow the cells in which neighbors are looked for."""
 _HORIZON_NS: Final = 60_000 * MS
 """A request further ahead than this is refused: no node plans so far, and the request would only occupy memory."""
@@ -293,7 +292,7 @@ class Medium(Actor):
             return
         states = np.frombuffer(poses.states, np.float64).reshape(-1, 6)
         known = (ids >= 1) & (ids <= self._count)
-        if not known.all() or not (np.abs(states[:, :3]) <= _FARTHEST_M).all():  # false for a NaN too
+        if not known.all() or not (np.abs(states[:, :3]) <= FARTHEST_M).all():  # false for a NaN too
             self._accounts.refused["poses"] += 1
             return
         self._accounts.poses += 1

@@ -18,6 +18,9 @@ BROADCAST: Final = NodeId(0xFFFF)
 LIGHT_M_PER_S: Final = 299_792_458
 GOLDEN_ANGLE: Final = math.pi * (3 - math.sqrt(5))
 """The angle [rad] between the bearings of successive ids that spreads any number of them evenly over a circle."""
+FARTHEST_M: Final = 1e7
+"""The greatest coordinate: no swarm is so large, and its square is still exact."""
+FASTEST_M_S: Final = 1e4
 
 
 class Enu(NamedTuple):
@@ -37,6 +40,10 @@ class Enu(NamedTuple):
     def norm(self) -> float:
         """Euclidean length [m or m/s]."""
         return math.hypot(self.east, self.north, self.up)
+
+    def is_within(self, most: float) -> bool:
+        """True if no component is greater than this, of either sign; false for what is not a number."""
+        return abs(self.east) <= most and abs(self.north) <= most and abs(self.up) <= most
 
 
 STILL: Final = Enu(0.0, 0.0, 0.0)

@@ -65,21 +65,15 @@ class Reader:
 
     def read(self) -> Packet:
         """The packet in the frame; raises MalformedFrameError, each time."""
-        if not self.phase:
-            raise MalformedFrameError("no routing header, or one of two phases")
-        fields = self.fields
-        if fields[_KIND] == _HELLO:  # a node's clock reads it before the node
-            packet = _checked_hello(self.frame)
-        else:
-            packet = _new(Packet, (wire.checked(self.frame, fields), self.frame))
-        self.packet = packet
+        hello = self.phase and self.fields[_KIND] == _HELLO  # a node's clock has read it before the node does
+        packet = self.packet = packet_of(self.frame) if hello else self.checked()
         return packet
 
-
-@lru_cache(maxsize=_LATEST)
-def _checked_hello(frame: bytes) -> Packet:
-    """The packet in a hello, checked once for all that read it."""
-    return _new(Packet, (wire.checked(frame, wire.fields_of(frame) or wire.NO_FIELDS), frame))
+    def checked(self) -> Packet:
+        """The packet in the frame, which nothing remembers; raises MalformedFrameError."""
+        if not self.phase:
+            raise MalformedFrameError("no routing header, or one of two phases")
+        return _new(Packet, (wire.checked(self.frame, self.fields), self.frame))
 
 
 T = TypeVar("T")
@@ -125,4 +119,4 @@ def packet_of(frame: bytes) -> Packet:
     """The packet in a frame, its header decoded; raises MalformedFrameError."""
     reader = Reader()
     reader.look(frame)
-    return reader.read()
+    return reader.checked()

@@ -8,7 +8,7 @@ from enum import IntEnum
 from typing import Any, Final, NamedTuple, Self
 
 from fanet_mw.errors import LocalProtocolError, MalformedFrameError
-from fanet_mw.units import STILL, US, Enu
+from fanet_mw.units import FARTHEST_M, FASTEST_M_S, STILL, US, Enu
 from fanet_mw.wire import (
     ANY_NODE,
     BEACON,
@@ -26,9 +26,6 @@ from fanet_mw.wire import (
 
 CAPACITY: Final = 56
 """Entries of one part of a schedule."""
-FARTHEST_M: Final = 1e7
-"""The greatest coordinate: no swarm is so large, and its square is still exact."""
-FASTEST_M_S: Final = 1e4
 MOST_DBM: Final = 300.0
 """The greatest received power, of either sign."""
 MOST_SURVIVORS: Final = 10_000
@@ -239,6 +236,7 @@ class TimeBeacon(NamedTuple):
 
 
 def _within(east: float, north: float, up: float, *, most: float) -> Enu:
-    if not (abs(east) <= most and abs(north) <= most and abs(up) <= most):  # false for what is not a number
+    found = Enu(east, north, up)
+    if not found.is_within(most):
         raise MalformedFrameError(f"{east}, {north}, {up} must be within {most:g}")
-    return Enu(east, north, up)
+    return found

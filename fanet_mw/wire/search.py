@@ -9,7 +9,7 @@ from enum import IntEnum
 from typing import Any, Final, NamedTuple, Self
 
 from fanet_mw.errors import LocalProtocolError, MalformedFrameError
-from fanet_mw.units import Enu
+from fanet_mw.units import FARTHEST_M, Enu
 from fanet_mw.wire.frame import (
     ANY_NODE,
     BIDS,
@@ -25,7 +25,7 @@ from fanet_mw.wire.frame import (
     encode_inner,
     fields_of_each,
 )
-from fanet_mw.wire.inner import FARTHEST_M, MOST_SURVIVORS, Survivor
+from fanet_mw.wire.inner import MOST_SURVIVORS, Survivor
 
 MOST_PLACES: Final = 79
 """Places of a formation that one message can hand out."""
@@ -144,7 +144,7 @@ class SearchStatus(NamedTuple):
             and 0 < node < ANY_NODE
             and t_us <= LATEST_US
             and charge <= 100
-            and all(abs(axis) <= FARTHEST_M for axis in position),
+            and position.is_within(FARTHEST_M),
             f"status of {node}: {position}, {charge} %",
         )
         return cls(t_us, position, node, revision, charge)

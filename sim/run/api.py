@@ -52,21 +52,16 @@ def _by_node(applications: object, scenario: Scenario) -> Callable[[int], Sequen
     """What makes the applications of each node, as a user gave it; raises ConfigError for what is none, or is for a
     node that there is not.
     """
-    make: Callable[[int], object]
     if applications is None:
         return lambda _: ()
     if isinstance(applications, Mapping):
         _known_nodes("applications", applications, scenario)
-        by_node = applications
-        make = lambda node: by_node.get(node, ())  # noqa: E731
-    elif callable(applications):
-        make = applications
-    else:
+    elif not callable(applications):
         kind = type(applications).__name__
         raise ConfigError(f"applications must be a mapping by node, or be called with a node's id, not a {kind}")
 
     def checked(node: int) -> Sequence[Application]:
-        made = make(node)
+        made = applications.get(node, ()) if isinstance(applications, Mapping) else applications(node)
         if not isinstance(made, Sequence) or not all(isinstance(one, Application) for one in made):
             raise ConfigError(f"applications of node {node} = {made!r}: must be a sequence of Application objects")
         return made

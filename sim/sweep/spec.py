@@ -12,6 +12,9 @@
     realtime = true                     # as processes in real time; by default in virtual time
     [quick]                             # a variant replaces what it names
     seeds = 2
+    [full]
+    like = "quick"                      # a variant of a variant
+    seeds = 10
 
 Keys are those of a scenario, written as tables or quoted with dots. Every run of a sweep has the same seeds in all its
 settings, and a seed draws the same places, births and losses whatever else is set: differences between settings are
@@ -23,7 +26,7 @@ import tomllib
 from collections.abc import Iterator, Mapping, Sequence
 from importlib.resources import files
 from pathlib import Path
-from typing import Annotated, Any, Final
+from typing import Annotated, Any, Final, Literal
 
 from pydantic import BaseModel, BeforeValidator, ConfigDict, Field, ValidationError
 
@@ -74,6 +77,8 @@ class Case(_Table):
 class SweepVariant(_Table):
     """What a variant of the sweep replaces: the seeds, single keys of `set`, single axes of the grid, the cases."""
 
+    like: Literal["quick"] | None = None
+    """The variant of which this one replaces what it names itself."""
     seeds: Seeds | None = None
     set: Changes = {}
     grid: Axes = {}
@@ -116,17 +121,20 @@ class Sweep(_Table):
         if not isinstance(chosen, SweepVariant):
             has = [known for known in VARIANTS if getattr(self, known) is not None]
             raise ConfigError(f"--variant {name}: the sweep has {' and '.join(has) or 'no variants'}")
-        cases = self.case
+        if chosen.like == name:
+            raise ConfigError(f'{name}.like = "{name}": a variant must be like another one')
+        base = self.variant(chosen.like)
+        cases = base.case
         if chosen.cases is not None:
-            unknown = set(chosen.cases) - {case.name for case in self.case}
+            unknown = set(chosen.cases) - {case.name for case in cases}
             if unknown:
                 raise ConfigError(f"{name}.cases: no case is called {', '.join(sorted(unknown))}")
-            cases = tuple(case for case in self.case if case.name in chosen.cases)
+            cases = tuple(case for case in cases if case.name in chosen.cases)
         return self.model_copy(
             update={
-                "seeds": self.seeds if chosen.seeds is None else chosen.seeds,
-                "set": {**self.set, **chosen.set},
-                "grid": {**self.grid, **chosen.grid},
+                "seeds": base.seeds if chosen.seeds is None else chosen.seeds,
+                "set": {**base.set, **chosen.set},
+                "grid": {**base.grid, **chosen.grid},
                 "case": cases,
             }
         )

@@ -18,16 +18,13 @@ from fanet_mw.bus.messages import VELOCITY_LASTS_NS, Setpoint, SetpointKind
 from fanet_mw.extensions import load
 from fanet_mw.scenario import Scenario
 from fanet_mw.scenario.mobility import MOBILITY_MODELS
-from fanet_mw.units import Enu, S
+from fanet_mw.units import FARTHEST_M, FASTEST_M_S, Enu, S
 from sim.world.engines.contract import Flags, Rows, Values
 from sim.world.mobility.contract import MobilityModel, Track
 from sim.world.mobility.crossing import Crossing
 from sim.world.mobility.formation import Formation
 from sim.world.mobility.random_waypoint import RandomWaypoint
 
-_FARTHEST_M: Final = 1e7
-_FASTEST_M_S: Final = 1e4
-"""Setpoints beyond these make no sense. Their squares must stay numbers, too, or the flight of all UAVs would end."""
 _GAIN: Final = 0.8
 """Position loop [1/s]."""
 _CLEAR_M: Final = 4.0
@@ -90,9 +87,12 @@ _Command = _GoTo | _FlyAt | _Land
 
 
 def makes_sense(setpoint: Setpoint) -> bool:
-    """True if a flight controller can be asked for this; anybody on the bus can put a setpoint."""
-    speeds = (setpoint.speed_m_s, *setpoint.velocity)  # a comparison with what is not a number is false
-    return all(abs(m) <= _FARTHEST_M for m in setpoint.position) and all(abs(v) <= _FASTEST_M_S for v in speeds)
+    """True if a flight controller can be asked for this.
+
+    Anybody on the bus can put a setpoint, and one whose square is no number would end the flight of all UAVs.
+    """
+    possible = setpoint.position.is_within(FARTHEST_M) and setpoint.velocity.is_within(FASTEST_M_S)
+    return possible and abs(setpoint.speed_m_s) <= FASTEST_M_S
 
 
 class Guidance:

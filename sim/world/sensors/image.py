@@ -1,7 +1,7 @@
 """A camera that looks straight down, as an image: for those who bring detectors of their own on board.
 
 The field of view is that of `sensors/camera.py`, which says whom the built-in detector finds; here it is rendered
-(`engines/scene.py`). The pixels of a person are as many as the formula there says: ground per pixel = 2 depth tan(fov /
+(`sensors/scene.py`). The pixels of a person are as many as the formula there says: ground per pixel = 2 depth tan(fov /
 2) / width. A gimbal keeps the image's width along east, without any error.
 """
 
@@ -29,7 +29,7 @@ class ImageSensor(Sensor):
             raise ConfigError(
                 f"sensors.image_hz = {config.image_hz:g} needs pybullet to render: pip install 'fanet-mw[pybullet]'"
             )
-        from sim.world.engines.scene import Scene
+        from sim.world.sensors.scene import Scene
 
         self.period_ns = round(S / config.image_hz)
         self._half_width = math.tan(math.radians(config.camera_fov_deg) / 2)

@@ -45,6 +45,17 @@ def test_every_case_is_run_with_every_combination_of_the_grid_and_every_seed() -
     assert len({task.key for task in tasks}) == len(tasks)
 
 
+def test_a_variant_may_be_like_another_one_but_not_like_itself() -> None:
+    more = FILE + '\n[full]\nlike = "quick"\nseeds = 7\n'
+    quick, full = (spec.parse(more, source="test").variant(name) for name in ("quick", "full"))
+    assert list(full.settings()) == list(quick.settings())
+    assert list(full.seed_list()) == [1, 2, 3, 4, 5, 6, 7]
+    itself = FILE.replace("[quick]", '[quick]\nlike = "quick"')
+    assert itself != FILE
+    with pytest.raises(ConfigError, match=r'quick.like = "quick": a variant must be like another one'):
+        spec.parse(itself, source="test").variant("quick")
+
+
 def test_a_variant_replaces_what_it_names_and_nothing_else() -> None:
     tasks = tasks_of(spec.parse(FILE, source="test").variant("quick"))
 

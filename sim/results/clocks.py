@@ -13,13 +13,13 @@ import numpy.typing as npt
 from fanet_mw.trace import ClockSampled, Delivered, Generated, Record
 from fanet_mw.units import US, S
 from sim.run.collecting.trace_log import TraceLog
-from sim.run.collecting.trace_reading import of
+from sim.run.collecting.trace_reading import records_of
 from sim.run.outcome import Outcome
 
 
 def true_delays(records: TraceLog) -> Collection[Record]:
     """The records with delays from the true instant of generation; a delay stays where that instant is not recorded."""
-    born = {(record.node, record.seq): record.t_ns for record in of(records, Generated)}
+    born = {(record.node, record.seq): record.t_ns for record in records_of(records, Generated)}
     return records.changed(lambda record: _true_delay(record, born))
 
 
@@ -36,7 +36,7 @@ def errors_ns(samples: Sequence[ClockSampled]) -> list[tuple[ClockSampled, int]]
 
 def clock_errors(outcome: Outcome) -> dict[str, Any]:
     """`clock` of `summary.json`; empty when clocks are exact."""
-    samples = [*of(outcome.records, ClockSampled)]
+    samples = [*records_of(outcome.records, ClockSampled)]
     if not samples:
         return {}
     start_ns, end_ns = outcome.scenario.traffic_window_ns

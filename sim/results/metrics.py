@@ -22,7 +22,7 @@ from sim.results.clocks import clock_errors
 from sim.results.mission import mission
 from sim.results.packets import OTHER_APPS, AppPackets, packets_of, targets_by_source
 from sim.results.separation import separation
-from sim.run.collecting.trace_reading import of
+from sim.run.collecting.trace_reading import records_of
 from sim.run.outcome import Outcome
 
 
@@ -147,9 +147,9 @@ def _admission(outcome: Outcome) -> dict[str, Any]:
     deadline_s = outcome.scenario.traffic.deadline_s
     if deadline_s is None:
         return {}
-    said = [*of(outcome.records, DeadlineMet, DeadlineLost)]
+    said = [*records_of(outcome.records, DeadlineMet, DeadlineLost)]
     last = {record.node: isinstance(record, DeadlineMet) for record in said}
-    reasons = (record.reason for record in of(outcome.records, Dropped))
+    reasons = (record.reason for record in records_of(outcome.records, Dropped))
     return {
         "deadline_ms": round(deadline_s * 1000, 3),
         "refused": sum(reason == DropReason.ADMISSION for reason in reasons),

@@ -36,7 +36,7 @@ from fanet_mw.trace import (
     Refuted,
 )
 from fanet_mw.units import S
-from sim.run.collecting.trace_reading import of
+from sim.run.collecting.trace_reading import records_of
 from sim.world.environment.survivors import place
 from sim.world.sensors.phone import REFERENCE_LOSS_DB
 
@@ -61,7 +61,7 @@ def mission(scenario: Scenario, records: Collection[Record]) -> dict[str, Any]:
     announced: dict[int, list[Confirmed]] = {}
     """For each survivor the confirmations that hold, in the order in which they were told."""
     reopened = 0
-    for record in of(records, Approaching, Confirmed, Refuted):
+    for record in records_of(records, Approaching, Confirmed, Refuted):
         if type(record) is Approaching:
             first.setdefault(record.node, record.t_ns)
             if 1 <= record.survivor <= len(truth):  # else only the air has told of it
@@ -80,9 +80,9 @@ def mission(scenario: Scenario, records: Collection[Record]) -> dict[str, Any]:
     right = [s for s in confirmed if error_m[s] <= _MISTAKEN_M]
     return {
         "survivors": scenario.mission.survivors,
-        "detected": len({r.survivor for r in of(records, Detected)}),
-        "approached": len({r.survivor for r in of(records, Approaching)}),
-        "reached": len({r.survivor for r in of(records, Arrived)}),
+        "detected": len({r.survivor for r in records_of(records, Detected)}),
+        "approached": len({r.survivor for r in records_of(records, Approaching)}),
+        "reached": len({r.survivor for r in records_of(records, Arrived)}),
         "confirmed": len(right),
         "mistaken": len(confirmed) - len(right),
         "reopened": reopened,
@@ -91,7 +91,7 @@ def mission(scenario: Scenario, records: Collection[Record]) -> dict[str, Any]:
         "time_to_approach_s": sorted(round(t_ns / S, 3) for t_ns in first.values()),
         "localization_error_m": _median(errors),
         "confirmed_error_m": _median(list(error_m.values())),
-        "collisions": sum(1 for _ in of(records, Collided)),
+        "collisions": sum(1 for _ in records_of(records, Collided)),
         **_flown(scenario, records),
     }
 
@@ -143,7 +143,7 @@ def _instants(records: Iterable[Record]) -> Iterator[tuple[int, Rows, Flags]]:
     rows: list[tuple[float, float, float]] = []
     searching: list[bool] = []
     t_ns = 0
-    for record in of(records, ProcessEnded, MissionModeChanged, FlightModeChanged, Posed):
+    for record in records_of(records, ProcessEnded, MissionModeChanged, FlightModeChanged, Posed):
         if type(record) is ProcessEnded:
             dead.add(record.node)
         elif type(record) is FlightModeChanged:

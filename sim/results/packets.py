@@ -13,7 +13,7 @@ from typing import Final
 
 from agents.applications.traffic import targets_of
 from fanet_mw.trace import BoundStated, Delivered, Generated, LetOut, LikelyStated
-from sim.run.collecting.trace_reading import of
+from sim.run.collecting.trace_reading import records_of
 from sim.run.outcome import Outcome
 
 OTHER_APPS: Final = ("report", "warning")
@@ -81,7 +81,7 @@ def packets_of(outcome: Outcome) -> Mapping[str, AppPackets]:
     meant_for: dict[Name, frozenset[int]] = {}  # the targets of packets of traffic
     targets = {name: targets_by_source(outcome, name) for name in classes}
     others = outcome.scenario.nodes.count - 1
-    for born in of(outcome.records, Generated):
+    for born in records_of(outcome.records, Generated):
         app, name = found.setdefault(born.app, AppPackets()), (born.node, born.seq)
         app_of[name] = app, len(app.sent)
         app.sent[name] = SentPacket(born.t_ns)
@@ -90,7 +90,7 @@ def packets_of(outcome: Outcome) -> Mapping[str, AppPackets]:
             app.wanted += len(targets[born.app][born.node])
         elif born.app in OTHER_APPS:
             app.wanted += others
-    for known in of(outcome.records, LetOut, BoundStated, LikelyStated):
+    for known in records_of(outcome.records, LetOut, BoundStated, LikelyStated):
         # In real time it may come before the packet's own record, at one instant.
         name = known.node, known.seq
         if name in app_of:
@@ -98,7 +98,7 @@ def packets_of(outcome: Outcome) -> Mapping[str, AppPackets]:
             app.sent[name] = _known(app.sent[name], known)
     had: dict[Name, int] = {}  # a bit for each node: there are as many deliveries as records, and far fewer packets
     exact = not outcome.scenario.clock.modelled  # else delays are true ones, whatever the header said
-    for record in of(outcome.records, Delivered):
+    for record in records_of(outcome.records, Delivered):
         name = record.origin, record.seq
         sender, place = app_of.get(name, (None, 0))
         if sender is None or (exact and record.t_ns - record.delay_ns != sender.sent[name].born_ns):

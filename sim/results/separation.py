@@ -6,7 +6,7 @@ import numpy as np
 
 from fanet_mw.trace import ConflictForeseen, Delivered, Warned
 from fanet_mw.units import MS
-from sim.run.collecting.trace_reading import of
+from sim.run.collecting.trace_reading import records_of
 from sim.run.outcome import Outcome
 
 
@@ -15,9 +15,9 @@ def separation(outcome: Outcome) -> dict[str, Any]:
     seen = outcome.reports.get("world", {}).get("separation")
     if not seen:
         return {}
-    foreseen = [*of(outcome.records, ConflictForeseen)]
-    about = {(r.node, r.seq): r.other for r in of(outcome.records, Warned)}
-    delivered = of(outcome.records, Delivered) if about else ()
+    foreseen = [*records_of(outcome.records, ConflictForeseen)]
+    about = {(r.node, r.seq): r.other for r in records_of(outcome.records, Warned)}
+    delivered = records_of(outcome.records, Delivered) if about else ()
     delays_ms = [r.delay_ns / MS for r in delivered if about.get((r.origin, r.seq)) == r.node]
     ahead_s = sorted(r.closest_ms / 1000 for r in foreseen)
     return {

@@ -12,7 +12,7 @@ from fanet_mw.trace import Approaching, Detected
 from fanet_mw.units import S
 from sim.results.connectivity import connectivity
 from sim.results.packets import AppPackets, first_class_of, packets_of
-from sim.run.collecting.trace_reading import of
+from sim.run.collecting.trace_reading import records_of
 from sim.run.outcome import Outcome
 
 Value = float | list[float] | None
@@ -133,7 +133,7 @@ def enough_heard_s(outcome: Outcome) -> float | None:
     """The instant [s] by which enough UAVs for the mission's rule had heard the same phone; none turns before it."""
     enough = outcome.scenario.mission.reports_to_approach
     who: dict[int, set[int]] = {}
-    for record in of(outcome.records, Detected):
+    for record in records_of(outcome.records, Detected):
         heard = who.setdefault(record.survivor, set())
         heard.add(record.node)
         if len(heard) == enough:
@@ -143,7 +143,7 @@ def enough_heard_s(outcome: Outcome) -> float | None:
 
 def _first_of_each(outcome: Outcome, kind: type[Approaching] | type[Detected]) -> list[float]:
     first: dict[int, int] = {}
-    for record in of(outcome.records, kind):
+    for record in records_of(outcome.records, kind):
         first.setdefault(record.node, record.t_ns)
     return sorted(t_ns / S for t_ns in first.values())
 

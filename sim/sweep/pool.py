@@ -13,7 +13,7 @@ from multiprocessing.connection import Connection, wait
 from multiprocessing.context import SpawnProcess
 from typing import Final
 
-from sim.run.launcher.children import die_with_parent
+from sim.run.launcher.parent_death import be_killed_with_parent
 from sim.sweep.execution import Finished, carry_out
 from sim.sweep.provenance import code
 from sim.sweep.tasks import Task
@@ -26,7 +26,7 @@ def _work(tasks: Connection) -> None:
     """The whole life of a worker: a task in, what it came to out, until the other end is closed."""
     signal.signal(signal.SIGINT, signal.SIG_IGN)  # the sweep hears it, and ends its workers
     signal.signal(signal.SIGTERM, signal.SIG_DFL)
-    die_with_parent()
+    be_killed_with_parent()
     while True:
         try:
             task: Task = tasks.recv()

@@ -35,7 +35,7 @@ from fanet_mw.trace import Dropped, Record
 from fanet_mw.units import Enu, NodeId, S
 from sim.results.bounds import Column, delays_under_bound, likely
 from sim.results.packets import packets_of
-from sim.run.collecting.trace_reading import of
+from sim.run.collecting.trace_reading import records_of
 from sim.run.outcome import Outcome
 from sim.run.virtual import actors_of
 from sim.world.mobility.layout import positions
@@ -211,7 +211,7 @@ def measure(seed: int) -> Result:
         wanted=sum(app.wanted for app in found.values()),
         stated=targets * sum(packet.bound_ns is not None for packet in sent),
         likely=with_likely,
-        given_up=sum(record.reason is DropReason.BOUND_LOST for record in of(outcome.records, Dropped)),
+        given_up=sum(record.reason is DropReason.BOUND_LOST for record in records_of(outcome.records, Dropped)),
         within_likely=round(likely(found)["within_share"] * with_likely) if with_likely else 0,
         cpu_s=time.process_time() - begun_s,
         classes=classes,

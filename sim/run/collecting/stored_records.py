@@ -1,4 +1,4 @@
-"""The trace of a run in real time: records come from many processes, and are put in order on disk at the end."""
+"""The trace of a run in real time: its records arrive from many processes, and are sorted on disk when the run ends."""
 
 import heapq
 import struct
@@ -12,18 +12,22 @@ from sim.run.collecting.spool import Spool, in_order
 from sim.run.collecting.trace_reading import CODES
 
 _KEY: Final = struct.Struct("<qHB")
-"""The front of a stored record: its instant, its node, and the place of its kind among the names of all."""
+"""The first bytes of a stored record, which are also its sort key: its instant, its node, and the number of its kind
+(`CODES`). The record itself follows as a line of JSON."""
 
 
 class RecordSpools:
-    """Trace records on disk: deliveries, which are nine in ten, and all others, so that these can be read alone."""
+    """Trace records on disk as they arrive: deliveries in one file, all other records in another.
+
+    Nine records in ten are deliveries, so the others are read ten times faster from a file of their own.
+    """
 
     def __init__(self, folder: Path | None = None) -> None:
         self._deliveries = Spool(folder)
         self._others = Spool(folder)
 
     def append(self, records: Iterable[Record]) -> int:
-        """Write records at the end; returns how many of them are not kept."""
+        """Write records at the end; returns the number of those that could not be written."""
         deliveries: list[bytes] = []
         others: list[bytes] = []
         for record in records:
@@ -33,7 +37,7 @@ class RecordSpools:
 
     @property
     def size(self) -> int:
-        """The bytes on disk."""
+        """The number of bytes on disk."""
         return self._deliveries.size + self._others.size
 
     @property
@@ -47,22 +51,24 @@ class RecordSpools:
         self._others.close()
 
     def records(self, *, true_delays: bool) -> Collection[Record]:
-        """All of them by instant, node and kind; in memory only if the disk has no room to sort them.
+        """All records, sorted by instant, node and kind.
 
-        With `true_delays` the delay of a delivery counts from the true instant of generation, where that is recorded.
+        The result is a `StoredRecords`, or a list in memory if the disk has no room for sorted copies. With
+        `true_delays` the delay of a delivery is computed anew, from the true instant at which its packet was generated,
+        if the trace has that instant; otherwise it stays as the receiver measured it by its own clock.
         """
         born: dict[tuple[int, int], int] = {}
         if true_delays:
             generated = (one for one in map(_decoded, self._others.items()) if type(one) is Generated)
             born = {(one.node, one.seq): one.t_ns for one in generated}
 
-        def truly(item: bytes) -> bytes:
+        def with_true_delay(item: bytes) -> bytes:
             record = _decoded(item)
-            assert type(record) is Delivered, "it was among deliveries"
+            assert type(record) is Delivered, "the file of deliveries has no other records"
             born_ns = born.get((record.origin, record.seq))
             return item if born_ns is None else _encoded(record._replace(delay_ns=record.t_ns - born_ns))
 
-        change = truly if born else lambda item: item
+        change = with_true_delay if born else lambda item: item
         deliveries = in_order(self._deliveries, _KEY.unpack_from, change=change)
         others = in_order(self._others, _KEY.unpack_from)
         if deliveries is None or others is None:
@@ -72,7 +78,7 @@ class RecordSpools:
 
 
 class StoredRecords(Collection[Record]):
-    """Trace records on disk, in order."""
+    """Trace records on disk, sorted: one file of deliveries and one of other records, merged while they are read."""
 
     def __init__(self, deliveries: Spool, others: Spool) -> None:
         self._deliveries = deliveries
@@ -87,7 +93,7 @@ class StoredRecords(Collection[Record]):
     def __contains__(self, value: object) -> bool:
         return any(record == value for record in self)
 
-    def of(self, kinds: tuple[type[Record], ...]) -> Iterator[Record]:
+    def of_kinds(self, kinds: tuple[type[Record], ...]) -> Iterator[Record]:
         if kinds == (Delivered,):
             return map(_decoded, self._deliveries.items())
         items = self._items() if Delivered in kinds else self._others.items()

@@ -1,4 +1,8 @@
-"""The telemetry of a run, which MAVLink tools read: pairs (instant ns, MAVLink bytes), in memory or on disk."""
+"""The MAVLink traffic of a run as pairs of an instant and bytes, collected for the file `mavlink.tlog`.
+
+A tap is a copy of MAVLink bytes that a node has produced or delivered (`MavlinkTap` on the bus). The file lets
+MAVLink tools, such as a ground station, replay a run.
+"""
 
 import struct
 from collections.abc import Collection, Iterator, Sequence
@@ -6,11 +10,12 @@ from itertools import chain
 from pathlib import Path
 from typing import Final
 
-from sim.run.collecting.overflow import MOST_IN_MEMORY, Overflow
+from sim.run.collecting.disk_backed_log import MOST_IN_MEMORY, DiskBackedLog
 from sim.run.collecting.spool import Spool, in_order
 
 _INSTANT: Final = struct.Struct("<q")
 Tap = tuple[int, bytes]
+"""The instant [ns] at which a node produced or delivered MAVLink bytes, and those bytes."""
 
 
 def encoded_tap(t_ns: int, frames: bytes) -> bytes:
@@ -26,10 +31,10 @@ def _encoded(taps: Sequence[Tap]) -> list[bytes]:
 
 
 class TapLog(Collection[Tap]):
-    """Telemetry in the order of its making: the latest in memory, what was before that on disk."""
+    """The taps of a run in virtual time, in the order in which they were added; all but the latest are on disk."""
 
     def __init__(self, folder: Path | None = None, *, most_in_memory: int = MOST_IN_MEMORY) -> None:
-        self._taps = Overflow[Tap](_encoded, folder, most_in_memory)
+        self._taps = DiskBackedLog[Tap](_encoded, folder, most_in_memory)
 
     def append(self, tap: Tap) -> None:
         self._taps.extend((tap,))
@@ -45,7 +50,7 @@ class TapLog(Collection[Tap]):
 
 
 class StoredTaps(Collection[Tap]):
-    """The telemetry in a spool of `encoded_tap`; each iteration reads and decodes it anew."""
+    """Taps that are on disk, encoded by `encoded_tap`; each iteration reads the file again."""
 
     def __init__(self, spool: Spool) -> None:
         self._spool = spool
@@ -61,7 +66,10 @@ class StoredTaps(Collection[Tap]):
 
 
 def taps_of(spool: Spool) -> Collection[Tap]:
-    """The telemetry in a spool of `encoded_tap`, by instant; in memory only if the disk has no room to sort it."""
+    """The taps of a run in real time, sorted by instant; `spool` holds them encoded by `encoded_tap`, unsorted.
+
+    They are sorted on disk, or in memory if the disk has no room for a sorted copy.
+    """
     ordered = in_order(spool, _INSTANT.unpack_from)
     if ordered is None:
         return sorted(map(_decoded_tap, spool.items()), key=lambda tap: tap[0])

@@ -1,8 +1,11 @@
-"""The trace of a run in virtual time: the latest records in memory, those before them on disk, a portion at a time.
+"""The trace of a run in virtual time: the latest records are in memory, all records before them in a file on disk.
 
-    portion = the kind of each record | its deliveries, which are nine in ten | its other records
+Records are moved to the file in portions of many thousands. Each portion consists of three byte strings:
 
-A reader that asks for some kinds of records decodes no others.
+    the kind of each record, one byte each | the deliveries, packed in rows | all other records, pickled
+
+Nine records in ten are deliveries. A reader that asks only for deliveries unpickles nothing, and one that asks for
+other kinds only does not decode the deliveries; one that asks for deliveries and other kinds decodes everything.
 """
 
 import pickle
@@ -12,20 +15,21 @@ from pathlib import Path
 from typing import Any, Final
 
 from fanet_mw.trace import Delivered, Record
-from sim.run.collecting.overflow import MOST_IN_MEMORY, Overflow
+from sim.run.collecting.disk_backed_log import MOST_IN_MEMORY, DiskBackedLog
 from sim.run.collecting.trace_reading import CODES, KINDS
 
 _DELIVERED: Final = CODES[Delivered]
 _ROW: Final = struct.Struct("<qHHIqHq")
-"""A delivery: instant, node, origin, sequence number, delay, hops, handover."""
+"""The fields of `Delivered` in their order: instant, node, origin, sequence number, delay, hops, handover."""
 Change = Callable[[Delivered], Delivered]
+"""A function that corrects a delivery, such as its delay, which the receiver measured by its own clock."""
 
 
 class TraceLog(Collection[Record]):
-    """The trace records of a run in the order of their making."""
+    """The trace records of a run, in the order in which they were added."""
 
     def __init__(self, folder: Path | None = None, *, most_in_memory: int = MOST_IN_MEMORY) -> None:
-        self._records = Overflow[Record](_packed, folder, most_in_memory)
+        self._records = DiskBackedLog[Record](_packed, folder, most_in_memory)
         self._change: Change | None = None
 
     def extend(self, records: Iterable[Record]) -> None:
@@ -33,7 +37,7 @@ class TraceLog(Collection[Record]):
         self._records.extend(records)
 
     def changed(self, change: Change) -> "TraceLog":
-        """The same records with every delivery changed, whenever it is read."""
+        """A view of the same stored records that applies `change` to each delivery when it is read."""
         other = TraceLog()
         other._records, other._change = self._records, change
         return other
@@ -51,8 +55,8 @@ class TraceLog(Collection[Record]):
                 yield next(delivered) if code == _DELIVERED else KINDS[code]._make(next(rest))
         yield from self._latest()
 
-    def of(self, kinds: tuple[type[Record], ...]) -> Iterator[Record]:
-        """The records of some kinds, in their order."""
+    def of_kinds(self, kinds: tuple[type[Record], ...]) -> Iterator[Record]:
+        """The records of these kinds, in the order of the trace."""
         if Delivered in kinds and len(kinds) > 1:
             yield from (record for record in self if type(record) in kinds)
             return

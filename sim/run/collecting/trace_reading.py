@@ -1,7 +1,7 @@
-"""How a trace is read wherever it is: whole, by kinds of records, or as the lines of its file.
+"""How the records of a trace are read: all of them, those of some kinds, or as the lines of the trace file.
 
-A reader of a trace asks for the kinds of records that it needs: of a trace on disk, only those are decoded. Stored
-records name their kind by its number in `KINDS`.
+A trace is any iterable of records: a list, or a log on disk. A log on disk can leave most of what was not asked for
+undecoded, so analysis code calls `records_of` and `lines` here rather than iterate over the whole trace.
 """
 
 from collections.abc import Iterable, Iterator
@@ -14,38 +14,39 @@ A = TypeVar("A", bound=Record)
 B = TypeVar("B", bound=Record)
 C = TypeVar("C", bound=Record)
 KINDS: Final[tuple[type[Any], ...]] = tuple(sorted(get_args(Record), key=trace.name_of))
-"""All kinds of records, by name."""
+"""All kinds of records, sorted by name."""
 CODES: Final = {kind: code for code, kind in enumerate(KINDS)}
+"""The number of each kind, its index in `KINDS`, by which a log on disk names the kind of a record."""
 
 
 @runtime_checkable
 class StoredByKind(Protocol):
-    """A trace of which records of some kinds can be read alone."""
+    """A trace that can give the records of some kinds without decoding all the others."""
 
-    def of(self, kinds: tuple[type[Record], ...]) -> Iterator[Record]:
+    def of_kinds(self, kinds: tuple[type[Record], ...]) -> Iterator[Record]:
         """The records of these kinds, in the order of the trace."""
 
 
 @runtime_checkable
 class StoredAsLines(Protocol):
-    """A trace whose records are stored as they stand in the trace file."""
+    """A trace that stores each record as the line of text that the trace file has for it."""
 
     def lines(self) -> Iterator[bytes]:
         """The lines of the trace file."""
 
 
 @overload
-def of(records: Iterable[Record], kind: type[A], /) -> Iterator[A]: ...
+def records_of(records: Iterable[Record], kind: type[A], /) -> Iterator[A]: ...
 @overload
-def of(records: Iterable[Record], kind: type[A], other: type[B], /) -> Iterator[A | B]: ...
+def records_of(records: Iterable[Record], kind: type[A], other: type[B], /) -> Iterator[A | B]: ...
 @overload
-def of(records: Iterable[Record], kind: type[A], other: type[B], third: type[C], /) -> Iterator[A | B | C]: ...
+def records_of(records: Iterable[Record], kind: type[A], other: type[B], third: type[C], /) -> Iterator[A | B | C]: ...
 @overload
-def of(records: Iterable[Record], *kinds: type[Record]) -> Iterator[Record]: ...
-def of(records: Iterable[Record], *kinds: type[Any]) -> Iterator[Any]:
-    """The records of some kinds, in the order of the trace."""
+def records_of(records: Iterable[Record], *kinds: type[Record]) -> Iterator[Record]: ...
+def records_of(records: Iterable[Record], *kinds: type[Any]) -> Iterator[Any]:
+    """The records of these kinds, in the order of the trace."""
     if isinstance(records, StoredByKind):
-        return records.of(kinds)
+        return records.of_kinds(kinds)
     return (record for record in records if type(record) in kinds)
 
 

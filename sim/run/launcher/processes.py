@@ -1,6 +1,7 @@
 """The processes of a swarm: forked from one warmed-up server, watched, and ended without leaving any behind.
 
-Children ignore Ctrl-C, because the launcher decides, and die with their parent however it ends.
+Children ignore Ctrl-C, because the launcher decides when they end. They are killed when the server ends, and the server
+ends with the launcher, however the launcher ends.
 """
 
 import asyncio
@@ -17,7 +18,7 @@ from typing import Any, Final, NamedTuple
 
 from fanet_mw.errors import FanetError, HostError
 from fanet_mw.hosts.service import BUS_EXIT_CODE
-from sim.run.launcher.children import die_with_parent
+from sim.run.launcher.parent_death import be_killed_with_parent
 from sim.run.launcher.process_title import entitle
 
 _PRELOAD: Final = ["agents.__main__", "emulator.__main__", "sim.world.__main__"]
@@ -42,7 +43,7 @@ def _child(recipe: ChildRecipe) -> None:
     """Run a child: its preparations, its work, its exit code."""
     signal.signal(signal.SIGINT, signal.SIG_IGN)
     signal.pthread_sigmask(signal.SIG_UNBLOCK, _BLOCKED)  # the launcher's SIGTERM ends it
-    die_with_parent()
+    be_killed_with_parent()
     _keep_no_server_alive()
     entitle(recipe.name, recipe.title)
     try:

@@ -14,7 +14,7 @@ from fanet_mw.units import MS
 from sim.run.collecting import spool as module
 from sim.run.collecting.spool import Spool, in_order
 from sim.run.collecting.stored_records import RecordSpools, StoredRecords
-from sim.run.collecting.trace_reading import lines, of
+from sim.run.collecting.trace_reading import lines, records_of
 
 INSTANTS = st.integers(-5, 20)
 NODES = st.integers(0, 3)
@@ -54,7 +54,11 @@ def test_records_come_by_instant_node_and_kind_and_else_as_they_came(records: li
     assert len(found) == len(expected)
     assert [*lines(found)] == [*lines(expected)]
     for kinds in ((Delivered,), (Generated,), (Generated, LetOut), (LetOut, Delivered), (Dropped, Posed, Approaching)):
-        assert [*of(found, *kinds)] == [*of(expected, *kinds)] == [one for one in expected if type(one) in kinds]
+        assert (
+            [*records_of(found, *kinds)]
+            == [*records_of(expected, *kinds)]
+            == [one for one in expected if type(one) in kinds]
+        )
 
 
 @given(RECORDS)
@@ -66,7 +70,7 @@ def test_two_readers_do_not_disturb_each_other(records: list[Record]) -> None:
 def test_a_delay_counts_from_the_true_instant_of_generation_where_that_is_known() -> None:
     delivered = [Delivered(10 * MS, 2, 1, seq, 3 * MS, 1) for seq in (7, 8)]
     found = stored([*delivered, Generated(4 * MS, 1, 7, "traffic", 9)], true_delays=True)
-    assert [record.delay_ns for record in of(found, Delivered)] == [6 * MS, 3 * MS]
+    assert [record.delay_ns for record in records_of(found, Delivered)] == [6 * MS, 3 * MS]
 
 
 def test_without_room_on_the_disk_to_sort_them_they_are_sorted_in_memory(monkeypatch: pytest.MonkeyPatch) -> None:

@@ -8,7 +8,7 @@ import pytest
 from fanet_mw.errors import DropReason
 from fanet_mw.trace import Delivered, Dropped, Generated, Posed, Record, line
 from sim.run.collecting.trace_log import TraceLog
-from sim.run.collecting.trace_reading import lines, of
+from sim.run.collecting.trace_reading import lines, records_of
 
 MOST = 7
 """So few records are kept in memory here."""
@@ -44,14 +44,14 @@ def test_a_trace_is_read_as_it_was_made_wherever_it_is(count: int) -> None:
 @pytest.mark.parametrize("kinds", [(Delivered,), (Posed,), (Posed, Generated), (Delivered, Dropped)])
 def test_a_reader_gets_the_kinds_it_asks_for_in_order(kinds: tuple[type[Record], ...]) -> None:
     whole = [record(number) for number in range(5 * MOST + 3)]
-    assert list(of(log_of(len(whole)), *kinds)) == [one for one in whole if type(one) in kinds]
+    assert list(records_of(log_of(len(whole)), *kinds)) == [one for one in whole if type(one) in kinds]
 
 
 def test_deliveries_are_changed_wherever_they_are() -> None:
     changed = log_of(5 * MOST + 3).changed(lambda delivered: delivered._replace(delay_ns=1))
     expected = [one._replace(delay_ns=1) if type(one) is Delivered else one for one in map(record, range(5 * MOST + 3))]
     assert list(changed) == expected
-    assert list(of(changed, Delivered)) == [one for one in expected if type(one) is Delivered]
+    assert list(records_of(changed, Delivered)) == [one for one in expected if type(one) is Delivered]
 
 
 def test_where_no_file_can_be_made_everything_stays_in_memory(tmp_path: Path) -> None:

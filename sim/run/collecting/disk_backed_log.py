@@ -1,6 +1,6 @@
-"""Items of one type that a run collects: in memory while they are few, beyond that on disk, a portion at a time.
+"""A list of items that only grows, and that moves its items from memory to a file on disk whenever they become many.
 
-They are read in the order in which they were made. Where the disk takes no more, what comes then stays in memory.
+It bounds the memory that a long run needs. Once the disk is full, later items stay in memory.
 """
 
 from collections.abc import Callable, Iterable, Iterator, Sequence
@@ -12,17 +12,18 @@ from sim.run.collecting.spool import Spool
 
 T = TypeVar("T")
 MOST_IN_MEMORY: Final = 1 << 17
-"""So many items are kept in memory: of records some 25 MB, a minute of a rescue by 45 UAVs."""
+"""The number of items at which those in memory are moved to disk. So many trace records take about 25 MB, and are
+made in one simulated minute of the scenario `rescue` with 45 UAVs."""
 
 
-class Overflow(Generic[T]):
-    """Items of one type: the latest in memory, those before them on disk."""
+class DiskBackedLog(Generic[T]):
+    """Items of one type in the order of their adding: the latest in memory, all before them on disk."""
 
     def __init__(
         self, pack: Callable[[Sequence[T]], Sequence[bytes]], folder: Path | None, most_in_memory: int
     ) -> None:
-        """`pack` makes of a portion what is stored of it; files are made in `folder`, by default that for temporary
-        files.
+        """`pack` encodes the items that are moved to disk together, as one or several byte strings. The file is made in
+        `folder`, by default in the system's folder for temporary files.
         """
         self._pack = pack
         self._folder = folder
@@ -43,11 +44,11 @@ class Overflow(Generic[T]):
             self._move()
 
     def stored(self) -> Iterator[bytes]:
-        """What was made of the portions on disk, one after another."""
+        """The byte strings that `pack` has made of the items on disk, in their order."""
         return iter(()) if self._spool is None else self._spool.items()
 
     def _move(self) -> None:
-        """Move what is in memory to the disk."""
+        """Move all items in memory to disk; if they cannot be written, they and all later ones stay in memory."""
         try:
             if self._spool is None:
                 self._spool = Spool(self._folder)

@@ -1,9 +1,11 @@
-"""What a node has already handled of each packet, as bits under the packet's key. Bounded: two generations of keys.
+"""The duplicate set: which packets a node has handled already, and in which of their phases.
 
-A node's key is a hash of all that the origin wrote (`reader.name_of`), so that a forged packet under the same origin
-and sequence number takes the place of none. Queues, and radios for their datagrams, tell packets apart by `key_of`.
-A key is forgotten after at least `capacity` newer ones, so a packet comes back as new only if its duplicates are
-older than that; the packet lifetime ends it long before.
+It maps the key of a packet to a set of bits, one for each phase. A node's keys are hashes of all that the packet's
+origin wrote (`reader.hash_of`), so a forged packet with the same origin and sequence number is not taken for the
+genuine one. Queues, and radios for their datagrams, use `key_of` instead, which is origin and sequence number.
+
+Memory is bounded: the keys are kept in two generations, and a key is forgotten after at least `capacity` newer ones.
+A packet that comes back later than that would be handled again, but its lifetime has ended long before.
 """
 
 from typing import Final
@@ -11,16 +13,17 @@ from typing import Final
 from fanet_mw.node.packet import Packet
 
 DELIVERED: Final = 1
-"""Handed to the application of this node, or originated by it."""
+"""The packet was handed to the applications of this node, or this node is its origin."""
 FLOODED: Final = 2
-"""Heard (or sent) in its flooding phase: relayed at most once."""
+"""The packet was received or sent while it is flooded; a node relays it at most once."""
 CARRIED: Final = 4
-"""Forwarded as unicast towards a head: carried at most once, so that no unicast loop survives."""
+"""The packet was forwarded as unicast towards a head; a node does so at most once, so that none goes in circles."""
 
 
 _SPREAD: Final = (1 << 32) + 40_503
-"""The factor is above 2^32, so that no two pairs of origin and sequence number give one key. It is not 2^32, because a
-dict looks for a number by its low bits: packets that all origins send at about one time have about the same number."""
+"""The factor by which `key_of` multiplies the origin. It is above 2^32, so that no two pairs of origin and sequence
+number have the same key. It is not 2^32 itself, because a dict finds a number by its low bits, and packets that all
+origins send at about the same time have about the same sequence number."""
 
 
 def key_of(origin: int, seq: int) -> int:
@@ -34,32 +37,34 @@ def key_of_packet(packet: Packet) -> int:
 
 
 class DuplicateSet:
-    """The bits of each key."""
+    """A map from the key of a packet to the bits of the phases in which it was handled."""
 
     def __init__(self, capacity: int = 32_768) -> None:
         self._capacity = capacity
         self.young: dict[int, int] = {}
-        """The newer generation, open to a caller that asks at every reception: it holds all that is known of a key."""
+        """The newer generation; where it has a key, it has all bits of that key. It is public, so that a node can look
+        into it at each reception without the cost of a call."""
         self.old: dict[int, int] = {}
-        """The older one."""
+        """The older generation, which is dropped when the newer one is full."""
 
     def bits(self, key: int) -> int:
-        """What is known of this packet; 0 for a new one."""
+        """The phases in which this packet was handled; 0 for a new packet."""
         found = self.young.get(key)
         return self.old.get(key, 0) if found is None else found
 
     def put(self, key: int, bits: int) -> None:
-        """Set what is known of a packet; `mark` for a caller that has just asked for `bits`."""
+        """Replace the bits of a packet; `mark` adds to them."""
         if len(self.young) >= self._capacity:
             self.old, self.young = self.young, {}
         self.young[key] = bits
 
     def forget(self, key: int) -> None:
-        """Treat this packet as one that has never been heard."""
+        """Treat this packet as one that was never handled."""
         self.young.pop(key, None)
         self.old.pop(key, None)
 
     def mark(self, key: int, bits: int) -> None:
+        """Add bits to those of a packet."""
         if len(self.young) >= self._capacity:
             self.old, self.young = self.young, {}
         self.young[key] = self.bits(key) | bits

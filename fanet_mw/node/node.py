@@ -42,10 +42,10 @@ class AnnouncedHello(NamedTuple):
 
 
 class Node:
-    """One protocol instance.
+    """One protocol instance: it suppresses duplicates, checks headers, delivers, and asks its routing protocol.
 
-    Five of its eighteen attributes are there for speed, because most receptions are copies: they are methods, lists and
-    facts of its parts that would otherwise be looked up through two objects at each reception.
+    Most receptions are copies, so `hear` must be quick with them. Five of the eighteen attributes exist only for that:
+    they are methods, lists and facts of this node's parts, which `hear` would otherwise reach through two objects.
     """
 
     def __init__(
@@ -57,7 +57,7 @@ class Node:
         position: Enu,
         reader: Reader | None = None,
     ) -> None:
-        """`reader` is the one that the nodes of a run share; None: one of its own."""
+        """`reader`: the reader that all nodes of a run share; None if this node has one to itself."""
         self.node = node
         self.scenario = scenario
         self.deliveries: list[Packet] = []
@@ -78,7 +78,8 @@ class Node:
         self.requests = self.port.requests
         """The transmissions that the actor is to take to the radio."""
         self.fates = self.port.fates
-        """What became of watched packets: (number, instant, why it was dropped; None: it was let out)."""
+        """What became of watched packets: sequence number, instant, and the reason why the packet was dropped, or None
+        if it was released for transmission."""
         protocol = self._protocol = make_protocol(self.port)
         self.next_wake_ns = protocol.next_wake_ns
         """The protocol's own method, because every wake-up is followed by this question."""
@@ -115,17 +116,17 @@ class Node:
         return self.port.watched
 
     def moved(self, position: Enu, velocity: Enu) -> None:
-        """Take in where the node knows itself to be, and how fast it moves."""
+        """Set the node's own position and velocity, as its navigation knows them."""
         self.port.position, self.port.velocity = position, velocity
 
     def know_clock_error(self, error_ns: int) -> None:
-        """Take in the greatest error of any clock in the swarm, as far as this node has heard; 0: they are exact."""
+        """Set the greatest error of any clock in the swarm, as far as this node knows; 0 if all clocks are exact."""
         self.port.clock_error_ns = error_ns
 
     # --- from the host's side -------------------------------------------------------------------------------------
 
     def start(self, now_ns: int) -> None:
-        """Begin; a node that starts again later must not reuse the names of its earlier packets."""
+        """Begin. A node that starts again continues above the sequence numbers of its earlier packets."""
         self._own.start(now_ns)
         self._protocol.start(now_ns)
 
@@ -142,10 +143,10 @@ class Node:
     ) -> int:
         """Send an application payload (whole MAVLink frames); returns the packet's sequence number.
 
-        `born_ns` is when the application meant to hand it over, at most `now_ns`: a process that was woken late loses
-        that much of the lead, and not of the delay that is measured. The first frame may go one lead after it. What
-        becomes of a packet that is to be watched is in `fates`. Raises LocalProtocolError when the frame would exceed
-        `radio.max_frame_bytes`.
+        `born_ns` is the instant at which the application meant to send it, at most `now_ns`. Delay counts from there,
+        and the first frame may go `radio.lead_ms` later: a process that was woken late has less time to announce the
+        frame, but the delay is not measured too short. With `watch`, `fates` will say what became of the packet.
+        Raises LocalProtocolError when the frame would exceed `radio.max_frame_bytes`.
         """
         born_ns = born_ns // US * US  # what the header can say
         scenario = self.scenario
@@ -168,10 +169,10 @@ class Node:
         return seq
 
     def say_hello(self, inner: bytes, *, start_ns: int, now_ns: int, time: bytes | None = None) -> AnnouncedHello:
-        """Broadcast this node's hello one hop: the frames of its applications, what the protocol adds, and the time.
+        """Broadcast a hello to all neighbors: the applications' frames (`inner`), the protocol's, and the time beacon.
 
-        `time` is left out where there is no room for it. A caller that gives it, even empty, gets the status of the
-        transmission.
+        The time beacon `time` is left out if there is no room for it. If it is given, even empty, the radio reports
+        when the hello ended.
         """
         start_ns = self._protocol.hello_start_ns(start_ns)
         most = self.scenario.radio.max_frame_bytes - wire.HEADER_BYTES
@@ -195,15 +196,15 @@ class Node:
         return self._protocol.hello_share(now_ns=now_ns)
 
     def hear(self, reception: Reception, now_ns: int) -> bool:
-        """Take in a reception. True: it was a copy of what was handled before, and nothing came of it."""
+        """Handle a reception; returns True if it was only a copy of a packet that was handled before."""
         self.receptions += 1
         reader, frame, handled = self._reader, reception.frame, self._duplicates
         if frame is not reader.frame:
             reader.look(frame)
-        name, phase = reader.name, reader.phase
-        known = handled.young.get(name)  # as handled.bits(name), without a call for each copy
+        packet_hash, phase = reader.hash, reader.phase
+        known = handled.young.get(packet_hash)  # as handled.bits(packet_hash), without a call for each copy
         if known is None:
-            known = handled.old.get(name, 0)
+            known = handled.old.get(packet_hash, 0)
         if known & phase:
             self._copies += 1
             if self._on_copy is not None:
@@ -222,8 +223,10 @@ class Node:
         return False
 
     def _hear_bundle(self, reception: Reception, now_ns: int) -> None:
-        """Take in several packets of one frame, each as if it had come alone; those passed on go together again, each
-        repetition in its own turn.
+        """Handle each packet of a frame as if it had come alone.
+
+        The relays of these packets are transmitted together again: all first transmissions in one frame, all second
+        ones in another, and so on.
         """
         try:
             packets = wire.unbundle(reception.frame)
@@ -238,9 +241,9 @@ class Node:
             self.port.relay_together([relay for relay in together if relay is not None])
 
     def _hear_one(self, reception: Reception, now_ns: int) -> Sequence[Relay]:
-        """Take in one packet of several that came in a frame; returns what of it is passed on."""
+        """Handle the packet that the reader holds, one of several in a frame; returns its relays."""
         reader = self._reader
-        known = self._duplicates.bits(reader.name)
+        known = self._duplicates.bits(reader.hash)
         if known & reader.phase:
             self._copies += 1
             if self._on_copy is not None:
@@ -253,11 +256,12 @@ class Node:
             return _NONE
 
     def _first_copy(self, packet: Packet, reception: Reception, before: int, now_ns: int) -> Sequence[Relay]:
-        """Take in the packet that the reader has before it; `before` is what was known of it without this copy. Returns
-        what of it is passed on.
+        """Handle a packet that is new in its phase; returns its relays.
+
+        The reader holds the packet; `before` has the bits of the phases in which it was handled before.
         """
         reader = self._reader
-        name, bits = reader.name, before | reader.phase
+        packet_hash, bits = reader.hash, before | reader.phase
         _, _, origin_us, seq, origin, destination, _, kind, _, hops, priority, _, _, _ = reader.fields
         known = bool(before) or (origin == self.node and kind == _DATA and self._own.handed_on(origin, seq))
         why = self._header_check.why_not(reader.fields, known=known, src=reception.src, end_ns=reception.end_ns)
@@ -265,14 +269,14 @@ class Node:
             self._disbelieve(why, packet, now_ns)
             return _NONE
         if kind == _HELLO:
-            self._duplicates.put(name, bits)
+            self._duplicates.put(packet_hash, bits)
             self._protocol.on_hello(packet, reception, now_ns=now_ns)
             self.hellos.append(packet)
             return _NONE
         end_ns = reception.end_ns
         age_ns = end_ns - origin_us * US
         if age_ns > self._lifetimes_ns[priority]:
-            self._duplicates.put(name, bits)
+            self._duplicates.put(packet_hash, bits)
             self.port.drop(DropReason.EXPIRED, packet, now_ns=now_ns)
             return _NONE
         to_us = destination == BROADCAST or destination == self.node
@@ -283,11 +287,11 @@ class Node:
             self.port.records.append(
                 _new(Delivered, (now_ns, self.node, origin, seq, age_ns + late_ns, hops + 1, late_ns))
             )
-        self._duplicates.put(name, bits)
+        self._duplicates.put(packet_hash, bits)
         return self._protocol.receive(packet, reception, now_ns=now_ns) or _NONE
 
     def _disbelieve(self, why: DropReason, packet: Packet, now_ns: int) -> None:
-        """Count a packet that is neither delivered nor passed on."""
+        """Count a packet whose header states the impossible; it is neither delivered nor relayed."""
         self.port.dropped[why] += 1
         if why is DropReason.OWN:
             self._protocol.on_impersonation(packet, now_ns=now_ns)

@@ -12,7 +12,7 @@ from fanet_mw.node import duplicates
 from fanet_mw.node.duplicates import DuplicateSet
 from fanet_mw.node.header_check import CONTROL, RESTART_STEP_NS
 from fanet_mw.node.packet import Packet
-from fanet_mw.node.reader import PHASES, name_of
+from fanet_mw.node.reader import PHASES, hash_of
 from fanet_mw.units import US, NodeId
 from fanet_mw.wire import Header, Kind
 
@@ -52,7 +52,7 @@ class OwnPackets:
             Header, (born_ns // US, seq, node, destination, node, kind, hop_limit, hops, priority, flags)
         )  # fmt: skip
         frame = header.encode() + inner
-        self._duplicates.put(name_of(frame), duplicates.DELIVERED | PHASES[flags & wire.PHASE_MASK])
+        self._duplicates.put(hash_of(frame), duplicates.DELIVERED | PHASES[flags & wire.PHASE_MASK])
         return _new(Packet, (header, frame))
 
     def handed_on(self, origin: int, seq: int) -> bool:

@@ -14,7 +14,7 @@ from fanet_mw.errors import DropReason
 from fanet_mw.node.duplicates import DuplicateSet
 from fanet_mw.node.own_packets import OwnPackets
 from fanet_mw.node.packet import Packet, Relay
-from fanet_mw.node.reader import PHASES, name_of
+from fanet_mw.node.reader import PHASES, hash_of
 from fanet_mw.rng import stream
 from fanet_mw.scenario import Scenario
 from fanet_mw.trace import Dropped, LetOut, Record
@@ -58,7 +58,7 @@ class NodePort:
         return seq
 
     def mark(self, packet: Packet, *, flags: int) -> None:
-        self._duplicates.mark(name_of(packet.frame), PHASES[flags])
+        self._duplicates.mark(hash_of(packet.frame), PHASES[flags])
 
     def transmit_together(self, packets: Sequence[Packet], *, flags: int, at_ns: Sequence[int]) -> None:
         for packet in packets:
@@ -147,7 +147,7 @@ class NodePort:
         self.records.append(Dropped(now_ns, self.node, reason, packet.header.origin, packet.header.seq))
 
     def forget(self, packet: Packet) -> None:
-        self._duplicates.forget(name_of(packet.frame))
+        self._duplicates.forget(hash_of(packet.frame))
 
     def record(self, record: Record) -> None:
         self.records.append(record)

@@ -1,8 +1,10 @@
-"""Reads frames off the air: which packet a frame brings, in which phase, and, when asked, what the packet holds.
+"""Reads received frames: first only what identifies the packet and its phase, then, if a node asks, the whole packet.
 
-In virtual time a broadcast is one object of bytes for all nodes that hear it, one after another: what the first of them
-has read serves the others. So the nodes of one run share a reader; a node that is alone in its process has its own.
-What is remembered for the whole process depends on the bytes alone, whichever run and thread asks.
+Most receptions are copies of packets that the node has handled already, so a node looks a packet up in its duplicate
+set before it decodes it. In virtual time the nodes that hear a broadcast get the same bytes one after another; they
+share one `Reader`, so that a frame is read once and not by each of them. In real time each process has its own.
+The caches of this module belong to the process. They depend on nothing but the bytes of a frame, so several runs and
+threads may share them.
 """
 
 from collections.abc import Callable
@@ -16,61 +18,74 @@ from fanet_mw.node.packet import Packet
 from fanet_mw.wire import Content, Kind
 
 PHASES: Final = {0: duplicates.DELIVERED, wire.FLAG_FLOOD: duplicates.FLOODED, wire.FLAG_TO_HEAD: duplicates.CARRIED}
-"""Which bit says that a packet was handled, by the phase flags of the frame that brought it."""
-_new: Final = tuple.__new__  # for what is made once per frame
+"""The bit of the duplicate set that belongs to the phase flags of a frame. A node handles a packet at most once per
+phase: while it is flooded, while members carry it to their head, and in any other frame."""
+_new: Final = tuple.__new__  # faster than the constructor, for objects that are made once per frame
 _HELLO: Final = int(Kind.HELLO)
 _KIND: Final = 7
-"""The place of the kind among the fields of a header (`wire.Fields`)."""
+"""The index of the packet's kind among the fields of a header (`wire.Fields`)."""
 BUNDLE: Final = 1 << 30
-"""The phase of a frame with several packets in it: no node has ever handled that."""
+"""Stands for the phase of a frame that holds several packets. No duplicate set ever has this bit, so each such frame is
+opened, and its packets are looked up one by one."""
 _LATEST: Final = 64
-"""Packets of which is kept what was decoded; more hellos than one handover of a radio brings."""
+"""The number of packets whose decoded content is cached: more than the hellos that a radio hands over at once."""
 
 
-def name_of(frame: bytes) -> int:
-    """One number per packet, the same at every hop: of all that its origin wrote, not of its sequence number alone.
+def hash_of(frame: bytes) -> int:
+    """A hash that identifies the packet in a frame, the same at every hop.
 
-    So no node takes the place of a packet by sending another one under its origin and number. The hash is Python's own,
-    keyed anew for each process (SipHash), so that no forger can aim at it; no order of anything depends on it.
+    It covers everything that the packet's origin wrote, and not only origin and sequence number: a forged packet with
+    the number of a genuine one gets another hash, so nodes do not take the genuine one for a duplicate. Python keys
+    its hash anew for each process (SipHash), so nobody can forge a packet with a given hash. The hash is only ever
+    compared for equality, so a run does not depend on the key.
     """
     return hash(frame[wire.END_TO_END] + frame[wire.HEADER_BYTES :])
 
 
 class Reader:
-    """Reads frames of one run; what was read of the latest is at hand."""
+    """The frame that was looked at last, and what has been read of it so far.
+
+    `look` reads the header and checks nothing; `read` checks the header and gives the packet.
+    """
 
     def __init__(self) -> None:
         self.frame = b""
-        self.name = 0
-        """`name_of` its packet, unchecked."""
+        self.hash = 0
+        """The hash of the frame's packet (`hash_of`), by which duplicates are found; 0 if it holds several packets."""
         self.key = 0
-        """`duplicates.key_of` its packet, unchecked; 0 when it has none, or several."""
+        """The packet's origin and sequence number as one number (`duplicates.key_of`), by which queues find a packet
+        that was heard again; 0 if the frame holds no packet, or several."""
         self.phase = 0
-        """The bit of its packet's phase, unchecked; 0 when these bytes can have none; BUNDLE: it has several."""
+        """The bit of the packet's phase (`PHASES`); 0 if the phase flags are invalid; BUNDLE for several packets."""
         self.packet: Packet | None = None
-        """The packet in the frame, once `read` has been called."""
+        """The packet in the frame; None until `read` has been called."""
         self.fields = wire.NO_FIELDS
-        """The values at the places of the header's fields, unchecked until `read` has been called."""
+        """The fields of the header, which may be nonsense until `read` has checked them."""
 
     def look(self, frame: bytes, *, alone: bool = False) -> None:
-        """Take up another frame. `alone`: it is one packet of a bundle, whatever its flags say of more."""
+        """Go on to another frame.
+
+        `alone`: these bytes were cut out of a frame with several packets and hold one of them; the flag that says
+        that more packets follow is ignored.
+        """
         self.frame, self.packet = frame, None
         fields = self.fields = wire.fields_of(frame) or wire.NO_FIELDS
         _, _, _, seq, origin, _, _, _, _, _, _, flags, _, _ = fields
         if flags & wire.FLAG_MORE and not alone:
-            self.name, self.key, self.phase = 0, 0, BUNDLE
+            self.hash, self.key, self.phase = 0, 0, BUNDLE
         else:
-            self.name = name_of(frame)
+            self.hash = hash_of(frame)
             self.key, self.phase = duplicates.key_of(origin, seq), PHASES.get(flags & wire.PHASE_MASK, 0)
 
     def read(self) -> Packet:
-        """The packet in the frame; raises MalformedFrameError, each time."""
-        hello = self.phase and self.fields[_KIND] == _HELLO  # a node's clock has read it before the node does
+        """Check the header and return the packet in the frame; raises MalformedFrameError if the check fails."""
+        # a hello comes from the cache of `packet_of`, because the node's clock has asked for the same hello already
+        hello = self.phase and self.fields[_KIND] == _HELLO
         packet = self.packet = packet_of(self.frame) if hello else self.checked()
         return packet
 
     def checked(self) -> Packet:
-        """The packet in the frame, which nothing remembers; raises MalformedFrameError."""
+        """As `read`, but without any cache."""
         if not self.phase:
             raise MalformedFrameError("no routing header, or one of two phases")
         return _new(Packet, (wire.checked(self.frame, self.fields), self.frame))
@@ -80,7 +95,7 @@ T = TypeVar("T")
 
 
 class _Inside:
-    """What has been decoded of one packet; values are immutable."""
+    """The parts of one packet that have been decoded so far. They are immutable, so all readers may share them."""
 
     def __init__(self) -> None:
         self.content: Content | None = None
@@ -89,7 +104,7 @@ class _Inside:
 
 
 class Decoded:
-    """What has been decoded of the latest packets.
+    """A cache of decoded content, for the latest packets.
 
     The inner frames of a packet are found and checked once, and each of its messages is decoded once, for the
     clock, the protocol and the applications of a node, and for all nodes that hear the same bytes.
@@ -97,10 +112,10 @@ class Decoded:
 
     def __init__(self) -> None:
         self._inside_of = lru_cache(maxsize=_LATEST)(lambda _: _Inside())
-        """What was read inside a packet, by the packet: a radio may hand over several frames to each node."""
+        """The decoded parts of a packet, by the packet's bytes; the oldest packet is forgotten first."""
 
     def of(self, frame: bytes, decode: Callable[[Content], T]) -> T:
-        """What `decode` makes of a packet, routing header first; raises what it raises, each time."""
+        """The result of `decode` for the packet in a frame; whatever `decode` raises is raised at every call."""
         inside = self._inside_of(frame)
         if decode in inside.messages:
             return inside.messages[decode]  # type: ignore[no-any-return]
@@ -111,12 +126,12 @@ class Decoded:
 
 
 decoded: Final = Decoded().of
-"""The decoder of all nodes of this process: a hello that forty of them hear is decoded once."""
+"""Decodes a packet through the cache that all nodes of this process share: a hello heard by forty is decoded once."""
 
 
 @lru_cache(maxsize=_LATEST)
 def packet_of(frame: bytes) -> Packet:
-    """The packet in a frame, its header decoded; raises MalformedFrameError."""
+    """The packet in a frame, checked; raises MalformedFrameError. The latest packets are cached."""
     reader = Reader()
     reader.look(frame)
     return reader.checked()

@@ -1,6 +1,8 @@
-"""How a UAV's clock is brought to swarm time: not at all, by time beacons, or by GPS. Own instants in, a line out.
+"""Three ways in which a node learns swarm time: none at all, its neighbors' time beacons, or GPS (`clock.sync`).
 
-Not modeled of GPS: outages (they are modeled by a world without fixes), multipath, errors that last from fix to fix.
+Each takes in instants of the node's own clock, and gives the line that converts such an instant into swarm time. The
+simulated GPS adds independent normal noise to the true time of each fix; multipath, and errors that last over several
+fixes, are not modeled. An outage of GPS is the world's: it then sends no fixes.
 """
 
 import math
@@ -20,69 +22,76 @@ from fanet_mw.units import LIGHT_M_PER_S, NodeId, S, seconds_to_ns
 from fanet_mw.wire.inner import TimeBeacon
 
 _SIGMAS: Final = 4
+"""A fix of GPS is taken to be wrong by at most so many standard deviations."""
 _HELLOS: Final = 8
-"""The number of hellos of which the radio may yet have to tell when they ended."""
+"""The greatest number of announced hellos that are remembered until the radio reports when they ended."""
 _PPM: Final = 1e-6
 
 
 class SwarmTime(ABC):
-    """A way to swarm time; until something better is known, the own clock is taken for it."""
+    """A way in which a node learns swarm time; until it has learned anything, its own clock is used as it is."""
 
     in_hellos: bool = False
     """True if hellos carry swarm time."""
 
     @property
     @abstractmethod
-    def line(self) -> Line: ...
+    def line(self) -> Line:
+        """The line that converts an instant of the node's own clock into swarm time."""
 
     @property
     @abstractmethod
-    def synced(self) -> bool: ...
+    def synced(self) -> bool:
+        """True if the line is known, or if none is needed."""
 
     @abstractmethod
     def error_ns(self, local_ns: int) -> int | None:
-        """The bound of this node's error, as it is stated; None when there is none to state."""
+        """The greatest error that this node's swarm time may have now; None if the node knows no bound of it."""
 
     def worst_ns(self, local_ns: int) -> int:
-        """The greatest error of any node, as far as it is known here."""
+        """The greatest error of any node's swarm time, as far as this node knows.
+
+        A node that learns nothing about others gives the bound of its own error, or 0 if it knows none.
+        """
         return self.error_ns(local_ns) or 0
 
     def place(self, local_ns: int) -> tuple[int, int]:
-        """The node whose clock is followed, and the hops to it; 0 and 0 when no node's clock is followed."""
+        """The reference node, whose clock this node follows, and the hops to it; 0 and 0 if it follows no node."""
         return 0, 0
 
     def start(self, local_ns: int) -> None:  # noqa: B027
-        """Take in that the node has started."""
+        """The node has started."""
 
     def pass_time(self, local_ns: int) -> None:  # noqa: B027
-        """Take in that time has passed."""
+        """Time has passed since the last call of any method."""
 
     def fix(self, local_ns: int, gps_ns: int) -> None:  # noqa: B027
-        """Take in a position fix, which gives the true time at an own instant."""
+        """GPS has given the time `gps_ns` at the instant `local_ns` of the node's own clock."""
 
     def on_hello(self, frame: bytes, *, ended_ns: int, local_ns: int) -> None:  # noqa: B027
-        """Take in a neighbor's hello, which ended at that instant."""
+        """A neighbor's hello was received, which ended at `ended_ns`."""
 
     def hello_frames(self, local_ns: int) -> bytes:
-        """The inner frames for the hello that is said now."""
+        """The inner frames to put into the hello that this node sends now."""
         return b""
 
     def announced(self, hello: AnnouncedHello) -> None:  # noqa: B027
-        """Take in that a hello of this node was announced to the radio."""
+        """A hello of this node was handed to the radio."""
 
     def on_status(self, status: TxStatus, *, ended_ns: int) -> bool:
-        """Take in how a transmission ended, and when; True if it was a hello whose end had to be known here."""
+        """The radio reports that a transmission has ended; returns True if it was a hello that was waited for."""
         return False
 
     def report(self) -> Mapping[str, object]:
-        """The state, as JSON values."""
+        """The counters for the node's report, as JSON values."""
         return {}
 
 
 class OwnTime(SwarmTime):
-    """`clock.sync = "none"`: nodes follow nobody's clock, and state no error against one.
+    """`clock.sync = "none"`: each node uses its own clock, and states no error of it.
 
-    They know how far clocks may be off by the end of the run: by how they were set, and by their data sheet.
+    How far any two clocks may differ by the end of the run is known from the scenario: from the accuracy with which
+    they were set, and from the drift in their data sheet.
     """
 
     line = EXACT
@@ -99,7 +108,7 @@ class OwnTime(SwarmTime):
 
 
 class GpsTime(SwarmTime):
-    """`clock.sync = "gps"`: a line through the last fixes, which also holds between and after them."""
+    """`clock.sync = "gps"`: a line through the latest fixes, by which the node also goes between and after them."""
 
     def __init__(self, clock: Clock, *, seed: int, node: NodeId) -> None:
         self._sigma_ns = clock.gps_sigma_ns
@@ -133,7 +142,7 @@ class GpsTime(SwarmTime):
 
 
 class BeaconTime(SwarmTime):
-    """`clock.sync = "beacons"`: a `TimeSync`, and its beacons in frames."""
+    """`clock.sync = "beacons"`: the algorithm is `TimeSync`; this class brings its beacons into hellos and back."""
 
     in_hellos = True
 
@@ -152,7 +161,7 @@ class BeaconTime(SwarmTime):
             )
         )
         self._announced: dict[int, int] = {}
-        """The numbers of the node's hellos whose end is not known yet, by transmit request."""
+        """The sequence number of each own hello whose end the radio has not reported, by its transmit request."""
         self._malformed = 0
 
     @property
@@ -179,7 +188,7 @@ class BeaconTime(SwarmTime):
         self._sync.pass_time(local_ns)
 
     def hello_frames(self, local_ns: int) -> bytes:
-        """The time beacon, which says when the node's last hello ended."""
+        """The time beacon, which states the swarm time at which this node's previous hello ended."""
         beacon = self._sync.beacon(local_ns)
         return b"" if beacon is None else beacon.encode_frame(self._node)
 
@@ -195,7 +204,10 @@ class BeaconTime(SwarmTime):
         return hello is not None
 
     def on_hello(self, frame: bytes, *, ended_ns: int, local_ns: int) -> None:
-        """Take in a neighbor's hello. Its header names the sender; the radio's source is not passed on by every bus."""
+        """A neighbor's hello was received, which ended at `ended_ns`.
+
+        The sender is read from the frame, because not every radio says from which node it has received a frame.
+        """
         try:
             header = packet_of(frame).header
             beacon = decoded(frame, TimeBeacon.in_hello)
@@ -209,13 +221,15 @@ class BeaconTime(SwarmTime):
 
 
 def oscillator(clock: Clock, *, others: int) -> Oscillator:
-    """The bounds that a data sheet gives for the own clock, and for the clock that it follows if that drifts too."""
+    """The bounds of the clocks' data sheet for one clock against true time (`others=0`), or for two drifting clocks
+    against each other (`others=1`).
+    """
     rate = (1 + others) * clock.drift_ppm * _PPM
     return Oscillator(rate=rate, wander=clock.wander_ppm * _PPM, stamp_ns=clock.stamp_ns)
 
 
 def swarm_time(scenario: Scenario, node: NodeId) -> SwarmTime:
-    """The way to swarm time that the scenario chooses."""
+    """The way to learn swarm time that the scenario has chosen, for one node."""
     if scenario.clock.sync == "beacons":
         return BeaconTime(scenario, node)
     if scenario.clock.sync == "gps":

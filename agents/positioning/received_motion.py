@@ -1,4 +1,7 @@
-"""Where another UAV is and how it flies, by a frame that it has sent: a hello, or a position that it floods."""
+"""Reads the position and velocity of another UAV out of a frame that this UAV has received.
+
+Every UAV puts them into its hellos and into the position messages that it floods through the swarm.
+"""
 
 from typing import Final
 
@@ -9,13 +12,14 @@ from fanet_mw.node.reader import decoded, packet_of
 from fanet_mw.units import MS, NodeId, S
 
 _FUTURE_NS: Final = S
-"""A position of an instant further ahead is not believed, because clocks agree better than that."""
+"""A position whose instant is further in the future than this is rejected: the clocks of a swarm differ by less."""
 
 
 def motion_in(frame: bytes, *, own: NodeId, now_ns: int) -> tuple[NodeId, Motion] | None:
-    """The origin of a frame and the motion of that UAV.
+    """The origin of a frame, and the motion of that UAV at the instant that the frame states.
 
-    None when the frame has no position, one of the future, or the `own` node for its origin.
+    None if the frame is malformed or has no position, if its instant lies too far in the future, or if this UAV itself
+    (`own`) is the origin.
     """
     try:
         origin, heard = packet_of(frame).origin, decoded(frame, mavlink.kinematics_of)

@@ -1,11 +1,15 @@
-"""May this result be used? One function gives the reasons why not, in sentences; `valid` and the exit code follow it.
+"""Decides whether the result of a run may be used. `reasons` lists, in sentences, everything that speaks against it.
 
-    valid  =  the run ended by itself, no process died, every actor's last report is there, every frame is accounted
-              for, and (in real time) each measure of how the machine disturbed the run is within its limit
+A result is valid, and the exit code 0, when all of this holds:
 
-The limits come from runs that were disturbed on purpose and compared with virtual time: within them the delivery ratio
-differs by no more than between two seeds (`tests/benchmarks/disturbed_runs.py`, table in docs/reference/validity.md).
-In virtual time nothing disturbs a run.
+    the run ended by itself, and no process died before its end
+    every actor has sent its last report, and no record of the trace was refused
+    every frame is accounted for
+    in real time: each measure of how the machine disturbed the run is within its limit
+
+In virtual time the machine cannot disturb a run. The limits come from runs in virtual time that were disturbed on
+purpose: within the limits, their delivery ratio is within 0.015 of that of the undisturbed run
+(`tests/benchmarks/disturbed_runs.py`; table in docs/reference/validity.md).
 """
 
 from collections.abc import Iterator, Mapping
@@ -14,31 +18,36 @@ from typing import Any, Final, NamedTuple
 from sim.run.launcher.processes import describe
 from sim.run.outcome import Outcome
 
-LOST: Final = 0.0025
-"""The limit for all that the machine took from the air: requests lost on the bus or dropped as too late and turns
-missed, each as a share of all requests, and receptions lost on the bus, as a share of those handed over."""
-HEARD_LATE: Final = 0.02
-"""The limit for receptions handed to their node later than a handover and a lead after the frame's end."""
-STALL_MS: Final = 500.0
-"""The longest time for which the emulator, the world or the launcher may do nothing: every UAV depends on them."""
-UAV_STALL_MS: Final = 1000.0
-"""The longest time for which the process of one UAV may do nothing. What it missed counts among `lost` and
-`heard_late`, too, which weigh it by the swarm: one UAV of nine that stands still for 300 ms exceeds `lost`."""
-SKIPPED_TICKS: Final = 0.02
-"""The limit for skipped ticks of the world."""
+LOST_LIMIT: Final = 0.0025
+"""The greatest sum of four shares that a slow machine loses: of all transmit requests, those lost on the bus, those
+dropped as too late, and turns to relay that a node missed; of all receptions, those lost on the bus."""
+HEARD_LATE_LIMIT: Final = 0.02
+"""The greatest share of receptions that reach their node later than `radio.handover_ms` plus `radio.lead_ms` after the
+end of the frame."""
+STALL_LIMIT_MS: Final = 500.0
+"""The longest time for which the emulator, the world or the launcher may stand still; each UAV depends on them."""
+UAV_STALL_LIMIT_MS: Final = 1000.0
+"""The longest time for which the process of one UAV may stand still. In a small swarm a shorter standstill is too long
+already, by the frames that it costs: one UAV of nine that stands still for 300 ms exceeds the limit of `lost`."""
+SKIPPED_TICKS_LIMIT: Final = 0.02
+"""The greatest share of the world's ticks that may be skipped."""
 _PARTS: Final = frozenset({"lost_on_bus", "dropped_late", "missed_turns", "copies_lost"})
+"""The measures whose sum is the measure `lost`."""
 _NAMED: Final = 5
-"""A sentence lists at most so many names, and gives the number of further ones."""
+"""A sentence names at most this many processes, and gives the number of the others."""
 
 
 class Measure(NamedTuple):
     """One measure of how the machine disturbed the run, as a share or in milliseconds."""
 
     what: str
+    """What is measured, as the subject of a sentence."""
     value: float
     limit: float
     unit: str = ""
+    """The unit of value and limit; empty for a share."""
     who: str = ""
+    """The process that was measured, in brackets; empty if it was the whole swarm."""
 
     @property
     def exceeded(self) -> bool:
@@ -59,31 +68,31 @@ def measures(outcome: Outcome, *, frames: Mapping[str, Any], late_share: float) 
     late, heard = _sum(agents, "heard_late"), _sum(agents, "receptions")
     parts = {
         "lost_on_bus": Measure(
-            "requests lost on the bus", _share(frames["dropped"].get("bus", 0), frames["sent"]), LOST
+            "requests lost on the bus", _share(frames["dropped"].get("bus", 0), frames["sent"]), LOST_LIMIT
         ),
         "dropped_late": Measure(
-            "requests dropped as too late", _share(frames["dropped"].get("late", 0), frames["sent"]), LOST
+            "requests dropped as too late", _share(frames["dropped"].get("late", 0), frames["sent"]), LOST_LIMIT
         ),
         "missed_turns": Measure(
-            "turns missed, of all requests", _share(_sum(agents, "missed_turns"), frames["sent"]), LOST
+            "turns missed, of all requests", _share(_sum(agents, "missed_turns"), frames["sent"]), LOST_LIMIT
         ),
-        "copies_lost": Measure("receptions lost on the bus", _copies_lost(outcome), LOST),
+        "copies_lost": Measure("receptions lost on the bus", _copies_lost(outcome), LOST_LIMIT),
     }
     together = sum(part.value for part in parts.values())
     ticks, skipped = world.get("ticks", 0), world.get("skipped_ticks", 0)
     return {
         "late_frames": Measure("frames announced too late", late_share, outcome.scenario.radio.late_limit),
         **parts,
-        "lost": Measure("lost on the bus, dropped as too late and missed, together", together, LOST),
-        "heard_late": Measure("receptions handed over too late", _share(late, heard), HEARD_LATE),
-        "stall_ms": _standstill("a service", _stalls(outcome, agents=False), STALL_MS),
-        "uav_stall_ms": _standstill("a UAV", _stalls(outcome, agents=True), UAV_STALL_MS),
-        "skipped_ticks": Measure("ticks that the world skipped", _share(skipped, ticks + skipped), SKIPPED_TICKS),
+        "lost": Measure("lost on the bus, dropped as too late and missed, together", together, LOST_LIMIT),
+        "heard_late": Measure("receptions handed over too late", _share(late, heard), HEARD_LATE_LIMIT),
+        "stall_ms": _standstill("a service", _stalls(outcome, agents=False), STALL_LIMIT_MS),
+        "uav_stall_ms": _standstill("a UAV", _stalls(outcome, agents=True), UAV_STALL_LIMIT_MS),
+        "skipped_ticks": Measure("ticks that the world skipped", _share(skipped, ticks + skipped), SKIPPED_TICKS_LIMIT),
     }
 
 
 def reasons(outcome: Outcome, *, frames: Mapping[str, Any], disturbance: Mapping[str, Measure]) -> list[str]:
-    """The reasons why the result may not be used, gravest first, one sentence each; empty when it may."""
+    """The reasons why the result may not be used, gravest first, one sentence each; empty if it may be used."""
     return [
         *_broken(outcome),
         *_incomplete(outcome),
@@ -123,7 +132,7 @@ def _unaccounted(frames: Mapping[str, Any]) -> Iterator[str]:
 
 
 def _disturbed(disturbance: Mapping[str, Measure]) -> Iterator[str]:
-    """Sentences on exceeded limits; that of the sum of losses appears only when no part exceeds its own limit."""
+    """One sentence for each exceeded limit; the sum `lost` is left out if one of its parts exceeds the limit alone."""
     exceeded = {name: measure for name, measure in disturbance.items() if measure.exceeded}
     if not exceeded.keys().isdisjoint(_PARTS):
         exceeded.pop("lost")
@@ -137,7 +146,10 @@ def _named(names: list[str]) -> str:
 
 
 def _copies_lost(outcome: Outcome) -> float:
-    """The share that never arrived of what the medium handed to the nodes that lived through the run."""
+    """The share of receptions that the emulator sent to a node's process and that never arrived there.
+
+    Nodes whose process died are left out.
+    """
     dead = {name for name, _ in outcome.ended}
     handed = lost = 0
     for node, count in outcome.reports.get("emulator", {}).get("handed", {}).items():
@@ -149,7 +161,7 @@ def _copies_lost(outcome: Outcome) -> float:
 
 
 def _stalls(outcome: Outcome, *, agents: bool) -> dict[str, float]:
-    """The longest standstill [ms] of each UAV, or of each process that serves all of them, by name."""
+    """The longest standstill [ms] of each process, by name: of the UAVs' (`agents`), or of all others."""
     stalls = {
         name: (report.get("host") or {}).get("stall_ms", 0.0)
         for name, report in outcome.reports.items()
@@ -164,7 +176,7 @@ def _standstill(whose: str, stalls: Mapping[str, float], limit_ms: float) -> Mea
 
 
 def _sum(reports: list[Mapping[str, Any]], key: str) -> int:
-    return sum(report.get(key) or 0 for report in reports)  # a key is absent where the protocol has no turns
+    return sum(report.get(key) or 0 for report in reports)  # only protocols with turns report the turns they missed
 
 
 def _share(part: float, whole: float) -> float:

@@ -43,7 +43,7 @@ class Goal:
         if survivor is None or place is None:
             gap = self._gap(now_ns)
             return (lane, moves) if gap is None else (Enu(*gap, lane.up), STILL)
-        east, north = self._approach.point(survivor, place, now_ns, responding=survivor == task)
+        east, north = self._approach.next_point(survivor, place, now_ns, responding=survivor == task)
         return formation.bounded(east, north, lane, moves)
 
     def _gap(self, now_ns: int) -> tuple[float, float] | None:

@@ -1,4 +1,7 @@
-"""The approach to a survivor: straight to the estimate, then about it until a person is seen."""
+"""The approach to a survivor: straight to the estimated place, then on a spiral around it until a person is seen.
+
+Once a camera sees a person there, the UAV flies on a circle around the place, until the survivor is confirmed.
+"""
 
 import math
 from typing import Final
@@ -11,18 +14,20 @@ from fanet_mw.trace import Arrived
 from fanet_mw.units import GOLDEN_ANGLE, NodeId, S
 
 _GROWTH_M_S: Final = 1.5
-"""The radius of the spiral that is flown around an estimate at which no person is seen grows at this speed."""
+"""The speed at which the radius of the spiral grows while no person is seen."""
 _TURN_PER_S: Final = 0.25
-"""The greatest rate at which it turns [rad/s]."""
-_FLOWN: Final = 0.8
-"""The share of its greatest speed at which a UAV flies along the spiral, so that it does not fall behind and cut it."""
+"""The greatest angular speed on spiral and circle [rad/s]."""
+_SPEED_SHARE: Final = 0.8
+"""The share of its greatest speed that a UAV uses on the spiral. The rest is its reserve: a UAV that fell behind the
+point that moves along the spiral would cut across it."""
 _IN_VIEW_M: Final = 40.0
-"""From a circle of this radius a camera still shows a person in its middle."""
-_RING_M: Final = 14.0
+"""The greatest radius of the circle around a person: from there a camera still sees the person in its middle."""
+_FIRST_RADIUS_M: Final = 14.0
+"""The radius at which spiral and circle begin."""
 
 
 class Approach:
-    """The places to which one UAV flies near survivors, and the instants at which it came to each."""
+    """The point to which one UAV flies next when it approaches a survivor, and when it came to each survivor."""
 
     def __init__(
         self,
@@ -39,20 +44,21 @@ class Approach:
         self._finds, self._navigation = finds, navigation
         self._outbox = outbox
         self._arrival_m = arrival_m
-        self._along_m_s = _FLOWN * speed_m_s
+        self._along_m_s = _SPEED_SHARE * speed_m_s
         self.arrived_ns: dict[int, int] = {}
-        """The instant at which this UAV came to each survivor."""
+        """The instant at which this UAV came to the estimated place of each survivor."""
 
     def forget(self, survivor: int) -> None:
-        """Take a survivor as one at which this UAV has not been yet: where it came to was not the place."""
+        """Begin the approach to a survivor anew, because the place to which this UAV came has proved wrong."""
         self.arrived_ns.pop(survivor, None)
 
-    def point(self, survivor: int, place: Estimate, now_ns: int, *, responding: bool) -> tuple[float, float]:
-        """East and north of the place to fly to: on a spiral, at an angle of the UAV's own, until a person is in view.
+    def next_point(self, survivor: int, place: Estimate, now_ns: int, *, responding: bool) -> tuple[float, float]:
+        """East and north of the point to fly to: the estimated `place`, then a point on the spiral or the circle.
 
-        A circle about a person in view gives received powers from new places, which show whose phone it is.
+        Each UAV starts at an angle of its own, so that several are spread around one place. The circle around a
+        person lets the UAV receive phones from many sides, and their powers show whose phone the person has.
 
-        `responding`: True if this survivor is the UAV's task, and not only one that it passes.
+        `responding`: True if this survivor is the UAV's task; False if the UAV only passes it on its way.
         """
         arrived_ns = self.arrived_ns.get(survivor)
         if arrived_ns is None:
@@ -63,16 +69,19 @@ class Approach:
                 self._outbox.records.append(Arrived(now_ns, self._node, survivor))
         seen = self._finds.known[survivor].filter.is_seen
         searched_s = (now_ns - arrived_ns) / S
-        radius = _RING_M + _GROWTH_M_S * searched_s
+        radius = _FIRST_RADIUS_M + _GROWTH_M_S * searched_s
         turned = _TURN_PER_S * searched_s if seen else self._turned_rad(radius)
         radius = min(_IN_VIEW_M, radius) if seen else radius
         angle = self._node * GOLDEN_ANGLE + turned
         return place.east_m + radius * math.cos(angle), place.north_m + radius * math.sin(angle)
 
     def _turned_rad(self, radius: float) -> float:
-        """How far the spiral has turned at a radius: at its rate as long as the UAV can keep up, then at its speed."""
-        widest = max(_RING_M, self._along_m_s / _TURN_PER_S)
+        """The angle by which the spiral has turned when it reaches a radius.
+
+        It turns at `_TURN_PER_S` as long as the UAV can keep up, and farther out as fast as the UAV can fly along it.
+        """
+        widest = max(_FIRST_RADIUS_M, self._along_m_s / _TURN_PER_S)
         if radius <= widest:
-            return _TURN_PER_S * (radius - _RING_M) / _GROWTH_M_S
-        turned = _TURN_PER_S * (widest - _RING_M) / _GROWTH_M_S
+            return _TURN_PER_S * (radius - _FIRST_RADIUS_M) / _GROWTH_M_S
+        turned = _TURN_PER_S * (widest - _FIRST_RADIUS_M) / _GROWTH_M_S
         return turned + self._along_m_s / _GROWTH_M_S * math.log(radius / widest)

@@ -1,10 +1,11 @@
-"""Which velocity each UAV wants: towards its place in the formation, its waypoint or its setpoint, and clear of others.
+"""The simulated flight controllers: the velocity that each UAV should fly now, by its mobility model or its setpoint.
 
-A place is tracked with its own velocity fed forward; near others, a push away is added and closing speed taken out,
-so that UAVs sent to one point settle around it.
+A UAV follows a moving place by a proportional controller, to which the velocity of the place is added (feed-forward).
+When the world keeps UAVs apart, the speed of a UAV towards each near neighbor is capped, and UAVs that are too near are
+pushed apart, so that several UAVs that are sent to one point settle around it.
 
-What a flight controller does by itself, whatever it is asked: it holds when velocities are not renewed, brakes before
-the geofence, and lands at once when its battery is nearly empty.
+Whatever a flight controller is asked to do, it holds its position when velocity setpoints are no longer renewed, brakes
+before the geofence, and lands at once when its battery is nearly empty.
 """
 
 import math
@@ -26,41 +27,48 @@ from sim.world.mobility.formation import Formation
 from sim.world.mobility.random_waypoint import RandomWaypoint
 
 _GAIN: Final = 0.8
-"""Position loop [1/s]."""
+"""The gain of the position controller: velocity by distance from the wanted place [1/s]."""
 _CLEAR_M: Final = 4.0
-"""The distance that UAVs keep; within twice of it they are pushed apart."""
+"""The distance that UAVs keep from each other; UAVs within twice this distance are pushed apart."""
 _BRAKE_M_S2: Final = 2.5
-"""Half of what an engine can do: the other half is for its lag."""
+"""The deceleration with which braking is planned: half of what a UAV can do, because it reacts with a lag."""
 _PUSH_M_S: Final = 4.0
+"""The greatest speed by which one neighbor pushes a UAV away."""
 _ROUNDS: Final = 4
+"""How often the speed towards the worst neighbor is reduced, because reducing one may increase another."""
 FLOOR_M: Final = 5.0
-"""No position is flown to below this height."""
+"""A position or take-off setpoint below this height is raised to it."""
 _HOLD_M_S: Final = 5.0
-"""The greatest speed at which a UAV that holds its position comes back to it."""
+"""The greatest speed at which a UAV that was moved away from the position it holds comes back to it."""
 _LEAST_CLIMB_M_S: Final = 0.5
+"""The speed of a take-off whose setpoint asks for less."""
 _FORCED_M_S: Final = 2.0
+"""The sinking speed of a UAV that lands because its battery is nearly empty."""
 _TOUCHDOWN_M_S: Final = 0.5
-"""Speed at which a landing meets the ground; ArduPilot's LAND_SPEED, too."""
+"""The sinking speed at which a UAV touches the ground, as in ArduPilot (LAND_SPEED)."""
 _FLARE_PER_S: Final = 0.5
-"""Sinking speed for each metre of height."""
+"""Near the ground a landing UAV sinks at most at its height times this."""
 _ON_GROUND_M: Final = 0.3
+"""A UAV below this height stands on the ground."""
 FENCE_M: Final = 50.0
-"""The geofence lies so far outside the area; no UAV that flies at a velocity leaves it."""
+"""The distance of the geofence from the area; a UAV with a velocity setpoint brakes before it reaches the geofence."""
 
 
 class FlightMode(StrEnum):
-    """What a flight controller is doing."""
+    """The flight mode of a UAV: what its flight controller is doing."""
 
     TRACK = "track"
-    """It follows the mobility model."""
+    """The UAV follows the mobility model."""
     GOTO = "goto"
     VELOCITY = "velocity"
     HOLD = "hold"
     TAKEOFF = "takeoff"
     LAND = "land"
     FAILSAFE = "failsafe"
-    """Velocities were not renewed, and it holds; or its battery is nearly empty, and it lands."""
+    """The UAV holds its position because velocity setpoints are no longer renewed, or lands because its battery is
+    nearly empty."""
     FALLEN = "fallen"
+    """The UAV has crashed and obeys nothing."""
 
 
 class _GoTo(NamedTuple):
@@ -71,7 +79,7 @@ class _GoTo(NamedTuple):
 
 
 class _FlyAt(NamedTuple):
-    """Fly at a velocity, until an instant [s] at which it is to have been renewed."""
+    """Fly at a velocity until the instant `until_s`, before which it must be renewed."""
 
     velocity: Enu
     until_s: float
@@ -87,26 +95,28 @@ _Command = _GoTo | _FlyAt | _Land
 
 
 def makes_sense(setpoint: Setpoint) -> bool:
-    """True if a flight controller can be asked for this.
+    """False for a malformed setpoint: one with a coordinate or speed that is not a number or is absurdly great.
 
-    Anybody on the bus can put a setpoint, and one whose square is no number would end the flight of all UAVs.
+    Every process on the bus can send setpoints. Great values would overflow when they are squared, and stop the
+    flight of all UAVs.
     """
     possible = setpoint.position.is_within(FARTHEST_M) and setpoint.velocity.is_within(FASTEST_M_S)
     return possible and abs(setpoint.speed_m_s) <= FASTEST_M_S
 
 
 class Guidance:
-    """The track of the mobility model, overridden per node by setpoints.
+    """The flight controllers of all UAVs, one row of each array for each UAV.
 
-    The flight of each UAV is its command, its mode, and whether it may still stand on the ground.
+    A UAV follows the track of the mobility model until a setpoint commands something else. The state of each UAV is its
+    command, its flight mode, and whether it may still stand on the ground.
     """
 
     def __init__(self, starts: Rows, scenario: Scenario, *, ground_m: Callable[[Rows], Values] | None = None) -> None:
-        """`ground_m`: heights of the ground at places [n, 3]; None: a plain at 0."""
+        """`ground_m` gives the height of the ground below places [n, 3]; None means that the ground is flat, at 0."""
         self._ground_m = ground_m or (lambda places: np.zeros(len(places)))
         model = scenario.mobility.model
         self._onboard = model == "onboard"
-        """True when UAVs are flown by their own computers; the world then keeps none of them clear of others."""
+        """True if the UAVs are flown by their companion computers, which then avoid collisions themselves."""
         self._see_m = 0.0 if self._onboard else scenario.mobility.see_m
         half = scenario.world.area_m / 2
         reach = np.maximum(half, np.abs(starts[:, :2]).max(axis=0)) if self._onboard else (half, half)
@@ -121,13 +131,13 @@ class Guidance:
             else load("mobility.model", model)(starts.copy(), scenario)
         )  # fmt: skip
         self._commands: dict[int, _Command] = {}
-        """What each row was told last, the latest at the end; a row that is not here follows the mobility model."""
+        """The command of each row, the newest command last; a row without a command follows the mobility model."""
         self._modes: dict[int, FlightMode] = {}
-        """What each row does; a row that was never told anything is not here."""
+        """The flight mode of each row that was ever commanded."""
         self._grounded = set(range(len(starts))) if scenario.nodes.on_ground else set[int]()
-        """Rows that have not taken off yet, or that are taking off."""
+        """The rows that may stand on the ground: they have not taken off yet, or are taking off."""
         self.changes: list[tuple[int, FlightMode]] = []
-        """Nodes that changed their mode, with the new one, for the host to take."""
+        """The nodes that have changed their flight mode, each with its new mode, until the caller takes them."""
 
     @property
     def still(self) -> bool:
@@ -135,14 +145,14 @@ class Guidance:
         return self._model is None and not self._onboard and not self._commands
 
     def obey(self, node: int, setpoint: Setpoint, *, at: Values, t_s: float) -> None:
-        """Take a setpoint of a UAV that is `at` [3] at an instant."""
+        """Carry out a setpoint for a UAV that is at the place `at` [3] at the instant `t_s`."""
         here = Enu(*at.tolist())
         row = node - 1
         if not self._obeys(row):
             return
         kind, place, speed_m_s = setpoint.kind, setpoint.position, setpoint.speed_m_s
         if kind is not SetpointKind.LAND and isinstance(self._commands.get(row), _Land):
-            self._grounded.add(row)  # it may stand on the ground, until it is seen clear of it
+            self._grounded.add(row)  # a UAV that was landing may stand on the ground until it has climbed
         if kind is SetpointKind.POSITION:
             self.steer(node, place, speed_m_s=speed_m_s)
             if speed_m_s <= 0 and self._onboard:
@@ -157,7 +167,7 @@ class Guidance:
             self._hold(row, here)
             self._enter(row, FlightMode.HOLD)
         elif kind is SetpointKind.TAKEOFF:
-            self._grounded.add(row)  # until it is clear of the ground
+            self._grounded.add(row)  # until it has climbed clear of the ground
             self.steer(node, Enu(here.east, here.north, place.up), speed_m_s=max(_LEAST_CLIMB_M_S, speed_m_s))
             self._enter(row, FlightMode.TAKEOFF)
         elif kind is SetpointKind.LAND:
@@ -167,26 +177,26 @@ class Guidance:
             assert_never(kind)
 
     def land_at_once(self, node: int) -> None:
-        """The battery of this UAV is nearly empty: it lands where it is, and obeys no further setpoint."""
+        """Land a UAV where it is, because its battery is nearly empty; it obeys no further setpoint."""
         row = node - 1
         if self._obeys(row):
             self._command(row, _Land(_FORCED_M_S))
             self._enter(row, FlightMode.FAILSAFE)
 
     def fell(self, node: int) -> None:
-        """Take a UAV for a wreck, which obeys no setpoint."""
+        """A UAV has crashed; it obeys no further setpoint."""
         row = node - 1
         self._command(row, None)
         self._enter(row, FlightMode.FALLEN)
 
     def _obeys(self, row: int) -> bool:
-        """False for a wreck, and for a UAV that lands because its battery is nearly empty."""
+        """False for a UAV that has crashed, or that lands because its battery is nearly empty."""
         mode = self._modes.get(row)
         landing = isinstance(self._commands.get(row), _Land)
         return mode is not FlightMode.FALLEN and not (mode is FlightMode.FAILSAFE and landing)
 
     def _command(self, row: int, command: _Command | None) -> None:
-        """Let a row do this and nothing that it was told before; None: follow the mobility model."""
+        """Replace the command of a row; None lets it follow the mobility model."""
         self._commands.pop(row, None)
         if command is not None:
             self._commands[row] = command
@@ -197,25 +207,25 @@ class Guidance:
             self.changes.append((row + 1, mode))
 
     def may_touch_down(self, node: int) -> bool:
-        """True if this UAV touches the ground on purpose."""
+        """True if contact with the ground is intended for this UAV, and hence no crash."""
         return node - 1 in self._grounded or isinstance(self._commands.get(node - 1), _Land)
 
     def grounded(self, at: Rows) -> Flags:
-        """Which UAVs stand on the ground with their motors off: they have landed, or wait for their takeoff."""
+        """The UAVs that stand on the ground with their motors off: they have landed, or wait to take off."""
         off = np.zeros(len(at), bool)
         landing = [row for row, command in self._commands.items() if isinstance(command, _Land)]
         off[[*landing, *self._waiting()]] = True
         return np.asarray(off & (at[:, 2] - self._ground_m(at) <= _ON_GROUND_M))
 
     def _waiting(self) -> list[int]:
-        """The rows that stand on the ground, and have not been told to take off."""
+        """The rows that stand on the ground and have no command to take off."""
         return [row for row in self._grounded if row not in self._commands]
 
     def _hold(self, row: int, here: Enu) -> None:
         self._command(row, _GoTo(here, _HOLD_M_S))
 
     def steer(self, node: int, place: Enu, *, speed_m_s: float) -> None:
-        """Send a UAV somewhere, within the area; a speed of 0 or less sends it back to its track."""
+        """Send a UAV to a place, which is clipped to the area; at a speed of 0 or less it goes back to its track."""
         if speed_m_s <= 0:
             self._command(node - 1, None)
             return
@@ -227,11 +237,11 @@ class Guidance:
         self._command(node - 1, _GoTo(inside, speed_m_s))
 
     def track(self, t_s: float) -> Track:
-        """The places at which all UAVs should be, setpoints not considered."""
+        """Where the mobility model wants all UAVs to be; setpoints do not count here."""
         return self._model.track(t_s) if self._model else Track(self._starts, np.zeros_like(self._starts))
 
     def wanted(self, t_s: float, at: Rows, velocity: Rows) -> Rows:
-        """The velocity that each UAV should fly now [m/s]."""
+        """The velocity that each UAV should fly now [m/s], given the places and velocities of all."""
         places, feed = self.track(t_s)
         places, feed = places.copy(), feed.copy()
         limit = np.linalg.norm(feed, axis=1) + 5.0
@@ -255,14 +265,14 @@ class Guidance:
         return _keep_clear(wish, at, self._see_m) if len(at) > 1 and self._see_m else wish
 
     def _expire(self, t_s: float, at: Rows) -> None:
-        """Let each UAV hold its position whose velocity setpoint was not renewed in time."""
+        """Let every UAV hold its position whose velocity setpoint was not renewed in time."""
         commands = self._commands.items()
         for row in [row for row, told in commands if isinstance(told, _FlyAt) and t_s >= told.until_s]:
             self._hold(row, Enu(*at[row].tolist()))
             self._enter(row, FlightMode.FAILSAFE)
 
     def _fence(self, wish: Values, at: Values) -> None:
-        """Take out of a velocity [3] what would carry a UAV over the geofence; from outside of it, bring it back."""
+        """Limit a velocity [3] so that the UAV can brake before the geofence; a UAV beyond it is brought back."""
         for axis, half in ((0, self._half_east), (1, self._half_north)):
             outwards = math.copysign(1.0, at[axis])
             left_m = half + FENCE_M - abs(float(at[axis]))
@@ -271,7 +281,11 @@ class Guidance:
                 wish[axis] = most * outwards
 
     def _near_the_ground(self, wish: Rows, at: Rows, landings: Mapping[int, float]) -> None:
-        """Sink straight down, the slower the nearer the ground; forget the UAVs that have taken off."""
+        """Set the velocities of UAVs that land or stand on the ground.
+
+        Landing UAVs (`landings`: sinking speed by row) sink straight down, more slowly near the ground. UAVs that wait
+        for take-off stand still. A UAV that has climbed clear of the ground leaves `_grounded`.
+        """
         height = at[:, 2] - self._ground_m(at)
         for row, speed_m_s in landings.items():
             sink = min(speed_m_s, max(_TOUCHDOWN_M_S, _FLARE_PER_S * float(height[row])))
@@ -282,9 +296,10 @@ class Guidance:
 
 
 def _keep_clear(wish: Rows, at: Rows, see_m: float) -> Rows:
-    """Slow down towards others so that both can still stop in time, and push away from those that are too near.
+    """Cap each UAV's own speed towards each neighbor within `see_m`, and push UAVs apart that are too near.
 
-    Two that brake at `_BRAKE_M_S2` from v each need v^2 / _BRAKE_M_S2 between them: hence the cap on closing speed.
+    Two UAVs that fly towards each other at v each, and brake at `_BRAKE_M_S2`, need v^2 / _BRAKE_M_S2 to stop. The cap
+    is the v for which this is the gap between them less `_CLEAR_M`.
     """
     apart = at[:, None] - at[None]
     distance = np.sqrt((apart**2).sum(axis=2))

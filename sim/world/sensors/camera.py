@@ -49,8 +49,8 @@ class CameraSensor(Sensor):
         config = scenario.sensors
         width, height = config.camera_pixels
         self.period_ns = round(S / config.camera_hz)
-        self._half_width = math.tan(math.radians(config.camera_fov_deg) / 2)
-        self._half_height = self._half_width * height / width
+        self._tan_half_fov = math.tan(math.radians(config.camera_fov_deg) / 2)
+        self._tan_half_fov_height = self._tan_half_fov * height / width
         self._width = width
         self._cycles = config.camera_cycles
         self._sigma_rad = math.radians(config.camera_sigma_deg)
@@ -66,13 +66,13 @@ class CameraSensor(Sensor):
 
     def pixels(self, depth_m: Values) -> Values:
         """Across a person at a depth below the camera."""
-        return np.asarray(PERSON_M * self._width / (2 * np.maximum(depth_m, 0.1) * self._half_width))
+        return np.asarray(PERSON_M * self._width / (2 * np.maximum(depth_m, 0.1) * self._tan_half_fov))
 
     def _in_view(self, offset: Rows) -> npt.NDArray[np.intp]:
         """The indices of the survivors, at `offset` [n, 3] from the camera, that the image covers."""
         depth = -offset[:, 2]
-        inside = (np.abs(offset[:, 0]) <= depth * self._half_width) & (
-            np.abs(offset[:, 1]) <= depth * self._half_height
+        inside = (np.abs(offset[:, 0]) <= depth * self._tan_half_fov) & (
+            np.abs(offset[:, 1]) <= depth * self._tan_half_fov_height
         )
         return np.flatnonzero(inside & (depth > 0) & ~self._survivors.buried)
 
@@ -96,5 +96,6 @@ class CameraSensor(Sensor):
             x, y = self._random.uniform(-1.0, 1.0, 2).tolist()
             depth_m = np.array([max(0.1, float(at[2]))])
             yield Person(
-                *angles(np.array([x * self._half_width, y * self._half_height, -1.0])), float(self.pixels(depth_m)[0])
+                *angles(np.array([x * self._tan_half_fov, y * self._tan_half_fov_height, -1.0])),
+                float(self.pixels(depth_m)[0]),
             )

@@ -1,8 +1,8 @@
-"""A camera that looks straight down, as an image: for those who bring detectors of their own on board.
+"""Rendered images of a camera that looks straight down, for users who run an image detector of their own on board.
 
-The field of view is that of `sensors/camera.py`, which says whom the built-in detector finds; here it is rendered
-(`sensors/scene.py`). The pixels of a person are as many as the formula there says: ground per pixel = 2 depth tan(fov /
-2) / width. A gimbal keeps the image's width along east, without any error.
+The built-in detector needs no images: `sensors/camera.py` is a model of camera and detector in one. This sensor has the
+same field of view, and shows a person with the same number of pixels: one pixel covers 2 depth tan(fov / 2) / width of
+the ground. The camera hangs in a gimbal without error, so that the width of the image is always along east.
 """
 
 import math
@@ -19,7 +19,7 @@ from sim.world.sensors.contract import Sensor, Truth
 
 
 class ImageSensor(Sensor):
-    """The rendered images of all UAVs, one camera for each."""
+    """One camera with rendered images on each UAV of `sensors.image_nodes`, by default on all UAVs."""
 
     kind = "image"
 
@@ -32,17 +32,17 @@ class ImageSensor(Sensor):
         from sim.world.sensors.scene import Scene
 
         self.period_ns = round(S / config.image_hz)
-        self._half_width = math.tan(math.radians(config.camera_fov_deg) / 2)
+        self._tan_half_fov = math.tan(math.radians(config.camera_fov_deg) / 2)
         self._pixels = config.image_pixels
         self._carriers = frozenset(config.image_nodes or scenario.node_ids)
-        in_sight = survivors.places[~survivors.buried]
-        self._scene = Scene(obstacles, in_sight, area_m=scenario.world.area_m, uavs=scenario.nodes.count)
+        not_buried = survivors.places[~survivors.buried]
+        self._scene = Scene(obstacles, not_buried, area_m=scenario.world.area_m, uavs=scenario.nodes.count)
 
     def read(self, truth: Truth, rows: Sequence[int]) -> Iterator[tuple[int, Message]]:
         width, height = self._pixels
         self._scene.move(truth.at)
         for row in (row for row in rows if row + 1 in self._carriers):
-            image = self._scene.image(truth.at[row], pixels=self._pixels, half_width=self._half_width)
+            image = self._scene.image(truth.at[row], pixels=self._pixels, tan_half_fov=self._tan_half_fov)
             yield row, CameraImage(truth.now_ns, width, height, image.tobytes())
 
     def close(self) -> None:

@@ -1,8 +1,8 @@
-"""What stands in a world as a camera that looks straight down shows it, rendered by pybullet on the processor.
+"""Renders what a camera sees that looks straight down on the world. Pybullet does it on the processor, without a GPU.
 
-Ground, hills and buildings are of one color each, people lie in orange along east, other UAVs are black discs. Nothing
-on board that belongs to this project reads these images: what finds people in images is the model in
-`sensors/camera.py`. Not modeled: textures, shadows, weather, the dark, motion blur, the lens.
+The ground, the hills and the buildings have one color each. People are orange boxes that lie along east, and UAVs are
+black discs. No application of this project reads the images: its own detector is a model that needs none
+(`sensors/camera.py`). Not modeled: textures, shadows, weather, darkness, motion blur, and errors of the lens.
 """
 
 from collections.abc import Sequence
@@ -16,7 +16,7 @@ from sim.world.engines.quiet_pybullet import pybullet
 from sim.world.environment.obstacles import Box, Hills, Obstacles
 
 Image = npt.NDArray[np.uint8]
-"""Rows from the north, columns from the west; red, green and blue."""
+"""Pixels as [row, column, color]: rows from north to south, columns from west to east, colors red, green and blue."""
 _Color = tuple[float, float, float, float]
 _GROUND: Final[_Color] = (0.42, 0.47, 0.32, 1.0)
 _HILL: Final[_Color] = (0.36, 0.42, 0.28, 1.0)
@@ -24,21 +24,22 @@ _BUILDING: Final[_Color] = (0.62, 0.62, 0.66, 1.0)
 _PERSON: Final[_Color] = (1.0, 0.45, 0.0, 1.0)
 _UAV: Final[_Color] = (0.05, 0.05, 0.05, 1.0)
 _PERSON_M: Final = (1.7, 0.5, 0.2)
-"""Length, width and thickness of a person who lies on the ground: as large as the model of the camera takes them."""
+"""Length, width and thickness of a person who lies on the ground, the same size as in `sensors/camera.py`."""
 _UAV_RADIUS_M: Final = 0.25
 _UAV_HEIGHT_M: Final = 0.1
 _BEYOND_M: Final = 1000.0
-"""The plain goes on so far beyond the area."""
+"""The flat ground extends this far beyond the area on each side."""
 _NEAR_M: Final = 0.5
-"""Nothing nearer to the camera than this is shown, such as the UAV that carries it."""
+"""Nothing nearer to the camera than this is rendered, so that the UAV that carries it does not fill the image."""
 _SUN: Final = (1.0, -1.0, 4.0)
+"""The direction in which the sun stands."""
 
 
 class Scene:
-    """The solids and the people of a world, for cameras at any place above."""
+    """The ground, buildings, people and UAVs of a world, which can be rendered from any place above them."""
 
     def __init__(self, obstacles: Obstacles | None, people: Rows, *, area_m: float, uavs: int) -> None:
-        """`people`: the places of those who can be seen from above if nothing stands in between [n, 3]."""
+        """`people`: the places of all people who are not buried [n, 3]."""
         self._client = pybullet.connect(pybullet.DIRECT)
         half = area_m / 2 + _BEYOND_M
         self._put(self._box_shape((2 * half, 2 * half, 1.0), _GROUND), (0.0, 0.0, -0.5))
@@ -54,16 +55,16 @@ class Scene:
         self._uavs = [self._put(disc, (0.0, 0.0, -10.0)) for _ in range(uavs)]
 
     def move(self, at: Rows) -> None:
-        """Put the UAVs where they are [n, 3]."""
+        """Move the UAVs to their places [n, 3]."""
         for body, place in zip(self._uavs, at.tolist(), strict=True):
             pybullet.resetBasePositionAndOrientation(body, place, (0.0, 0.0, 0.0, 1.0), physicsClientId=self._client)
 
-    def image(self, eye: Values, *, pixels: tuple[int, int], half_width: float) -> Image:
-        """What a camera at a place shows; `half_width` is the tangent of half its field of view across the width."""
+    def image(self, eye: Values, *, pixels: tuple[int, int], tan_half_fov: float) -> Image:
+        """The image of a camera at the place `eye`; its field of view is measured across the width of the image."""
         width, height = pixels
         east, north, up = eye.tolist()
         view = pybullet.computeViewMatrix((east, north, up), (east, north, up - 1.0), (0.0, 1.0, 0.0))
-        near = half_width * _NEAR_M
+        near = tan_half_fov * _NEAR_M
         upright = near * height / width
         lens = pybullet.computeProjectionMatrix(-near, near, -upright, upright, _NEAR_M, max(up, 1.0) + 10.0)
         found = pybullet.getCameraImage(
@@ -73,7 +74,7 @@ class Scene:
         return np.ascontiguousarray(np.reshape(np.asarray(found[2], np.uint8), (height, width, 4))[:, :, :3])
 
     def close(self) -> None:
-        """Give the renderer back; a second time does nothing."""
+        """Release the renderer; a second call does nothing."""
         if self._client >= 0:
             pybullet.disconnect(physicsClientId=self._client)
             self._client = -1
@@ -83,7 +84,7 @@ class Scene:
         self._put(shape, (box.east, box.north, box.roof / 2), yaw=box.yaw)
 
     def _hills_shape(self, hills: Hills) -> int:
-        """The surface between the heights: two triangles for each cell."""
+        """The surface through the heights of the grid: two triangles for each of its cells."""
         side = hills.heights.shape[0]
         axis = (np.arange(side) - (side - 1) / 2) * hills.cell_m
         east, north = np.meshgrid(axis, axis)

@@ -79,29 +79,29 @@ MEASURED: dict[str, tuple[float, Callable[[Outcome, float], object]]] = {
     "frames announced too late": (
         0.01, lambda outcome, share: put(outcome, "emulator", "late", "late_frames", value=round(share * 2 * SENT))
     ),
-    "requests lost on the bus": (validity.LOST, lose_requests),
-    "requests dropped as too late": (validity.LOST, lambda outcome, share: lose_requests(outcome, share, "late")),
+    "requests lost on the bus": (validity.LOST_LIMIT, lose_requests),
+    "requests dropped as too late": (validity.LOST_LIMIT, lambda outcome, share: lose_requests(outcome, share, "late")),
     "receptions lost on the bus": (
-        validity.LOST,
+        validity.LOST_LIMIT,
         lambda outcome, share: put(outcome, "agent-2", "receptions", value=HEARD - round(2 * HEARD * share)),
     ),
     "receptions handed over too late": (
-        validity.HEARD_LATE,
+        validity.HEARD_LATE_LIMIT,
         lambda outcome, share: put(outcome, "agent-1", "heard_late", value=round(2 * HEARD * share)),
     ),
     "turns missed, of all requests": (
-        validity.LOST,
+        validity.LOST_LIMIT,
         lambda outcome, share: put(outcome, "agent-1", "missed_turns", value=round(2 * SENT * share)),
     ),
     "ticks that the world skipped": (
-        validity.SKIPPED_TICKS,
+        validity.SKIPPED_TICKS_LIMIT,
         lambda outcome, share: put(outcome, "world", "skipped_ticks", value=round(1000 * share / (1 - share))),
     ),
     "longest standstill of a service": (
-        validity.STALL_MS, lambda outcome, ms: put(outcome, "emulator", "host", "stall_ms", value=ms)
+        validity.STALL_LIMIT_MS, lambda outcome, ms: put(outcome, "emulator", "host", "stall_ms", value=ms)
     ),
     "longest standstill of a UAV": (
-        validity.UAV_STALL_MS, lambda outcome, ms: put(outcome, "agent-2", "host", "stall_ms", value=ms)
+        validity.UAV_STALL_LIMIT_MS, lambda outcome, ms: put(outcome, "agent-2", "host", "stall_ms", value=ms)
     ),
 }  # fmt: skip
 
@@ -124,10 +124,10 @@ def test_each_measure_makes_a_run_invalid_above_its_limit_and_not_below(
 def test_what_is_lost_in_different_ways_adds_up(scenario: Scenario) -> None:
     """Each kind takes copies from those who wait for them: one half of the limit and one more is too much."""
     outcome = good(scenario)
-    lose_requests(outcome, 0.6 * validity.LOST)
-    put(outcome, "agent-1", "missed_turns", value=round(2 * SENT * 0.3 * validity.LOST))
+    lose_requests(outcome, 0.6 * validity.LOST_LIMIT)
+    put(outcome, "agent-1", "missed_turns", value=round(2 * SENT * 0.3 * validity.LOST_LIMIT))
     assert reasons(outcome) == []
-    put(outcome, "agent-1", "missed_turns", value=round(2 * SENT * 0.6 * validity.LOST))
+    put(outcome, "agent-1", "missed_turns", value=round(2 * SENT * 0.6 * validity.LOST_LIMIT))
     assert reasons(outcome) == ["lost on the bus, dropped as too late and missed, together: 0.300%, limit 0.250%"]
 
 

@@ -16,12 +16,12 @@ def test_around_an_estimate_the_spiral_widens_until_somebody_is_seen() -> None:
     assert place is not None
 
     def radius_m(second: int) -> float:
-        east, north = board.approach.point(1, place, second * S, responding=True)
+        east, north = board.approach.next_point(1, place, second * S, responding=True)
         return math.hypot(east - place.east_m, north - place.north_m)
 
     assert (round(radius_m(0)), round(radius_m(20)), round(radius_m(40))) == (14, 44, 74)
     board.finds.known[1].filter.on_sighting(Estimate(0, 0, 4, 0, 4))
-    assert round(math.hypot(*board.approach.point(1, Estimate(0, 0, 4, 0, 4), 41 * S, responding=True))) == 40
+    assert round(math.hypot(*board.approach.next_point(1, Estimate(0, 0, 4, 0, 4), 41 * S, responding=True))) == 40
 
 
 def test_a_uav_can_keep_up_with_the_spiral_that_it_is_to_fly() -> None:
@@ -29,7 +29,7 @@ def test_a_uav_can_keep_up_with_the_spiral_that_it_is_to_fly() -> None:
     board.hear(1, Enu(0, 0, 0), range(1, 5), now_ns=0)
     place = board.finds.known[1].place()
     assert place is not None
-    way = [board.approach.point(1, place, step * S // 10, responding=True) for step in range(451)]
+    way = [board.approach.next_point(1, place, step * S // 10, responding=True) for step in range(451)]
     steps_m = [math.dist(before, after) for before, after in pairwise(way)]
     assert max(steps_m) <= 0.1 * 10.0, "its greatest speed is 10 m/s"
     around = [math.atan2(north - place.north_m, east - place.east_m) for east, north in way]

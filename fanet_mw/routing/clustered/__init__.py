@@ -1,1 +1,1 @@
-"""The paper's clustered protocol and what grew from it: a scenario chooses it by `routing.protocol = "clustered"`."""
+"""The clustered flooding protocol of the paper, and the variants that extend it (`routing.protocol = "clustered"`)."""

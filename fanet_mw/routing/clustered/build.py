@@ -66,15 +66,15 @@ from fanet_mw.units import MS, seconds_to_ns
 _STORE_PACKETS: Final = 4096
 """The most packets that a node keeps for repair; they take 4 MB at 1024 B."""
 _JITTER: Final = 0.25
-"""The share of the contention window that a relay waits at most. A flood whose relays wait longer than the window
-lasts goes one hop a superframe."""
+"""The greatest random wait of a relay, as a share of the contention window. If relays waited longer than the window
+lasts, a flood would advance by only one hop in each superframe."""
 _JOINED_NS: Final = 7500 * MS
-"""A node should be in a timetable so long and three superframes after its start: joins take 3 s, may be lost, and
-the leader waits a moment for more and announces a timetable ahead."""
+"""A node should be in a timetable at the latest three superframes and this duration after its start. A join takes 3 s
+and may be lost once; then the leader waits for further joins, and announces the timetable before it takes effect."""
 
 
 class _Ground(NamedTuple):
-    """The parts that the protocol has with every value of `clusters.relay`."""
+    """The parts that the protocol has whatever `clusters.relay` is."""
 
     port: Port
     random: Callable[[], float]
@@ -91,17 +91,17 @@ class _Ground(NamedTuple):
 
     @property
     def lifetime_ns(self) -> int:
-        """The lifetime of what a neighbor said in its last hello."""
+        """The time after a neighbor's last hello at which what the hello said is forgotten."""
         return int(LIFETIME_HELLOS * self.hello_ns)
 
     def queue(self) -> TxQueue:
-        """A queue for packets that wait to be let out, most urgent first."""
+        """A queue for packets that wait for their first transmission, most urgent first."""
         routing = self.port.scenario.routing
         return TxQueue(capacity=routing.queue_frames, sooner_us=sooner_us(routing))
 
 
 def make_clustered(port: Port) -> Clustered:
-    """The protocol of a node, as the port's scenario has it."""
+    """The clustered protocol of one node, in the variant that the scenario of its port chooses."""
     return RELAYS[port.scenario.clusters.relay](_ground(port))
 
 
@@ -228,7 +228,7 @@ def _by_timetable(ground: _Ground) -> Clustered:
 
 
 def _admission(port: Port) -> Admission | None:
-    """The admission of packets by a deadline; None without a deadline, and for a leader whose packets have no turns."""
+    """The admission control of a node; None without a deadline, and for a leader whose packets have no turns."""
     scenario = port.scenario
     if scenario.traffic.deadline_s is None or (port.node == scenario.leader and not leader_load(scenario)):
         return None
@@ -244,8 +244,10 @@ def _admission(port: Port) -> Admission | None:
 
 
 def _role_parts(ground: _Ground, membership: Membership, *, takes_slot: bool) -> RoleParts:
-    """The parts of roles. With `takes_slot` a node that stands in for a head serves its slot, and only heads are
-    watched; without it, a node that notices a silent neighbor only tells the leader.
+    """The parts that make up the roles of a node.
+
+    With `takes_slot`, nodes watch the heads only, and the node that replaces a silent head uses the head's slot.
+    Without it, nodes watch all neighbors, and one that finds a neighbor silent only tells the leader.
     """
     port, scenario = ground.port, ground.port.scenario
     liveness = Liveness()

@@ -1,11 +1,13 @@
-"""The clustered protocol at one node: it says which of its parts hears of what, and decides nothing itself.
+"""The clustered protocol at one node: it hands each event to the parts of the protocol, and decides nothing itself.
 
-    a packet of the application   access: let out here, or brought to a head as acknowledged unicast (TO_HEAD)
-    a packet on its way to a head access: the same
-    a flooded packet (FLOOD)      roles, if it is control; relaying: passed on, and when
-    a hello                       neighbors, roles, gradient, repair; then what was held for want of a way
+    event                              parts that handle it
+    packet of an own application       access: it floods the packet from here, or sends it towards a head
+    packet on its way to a head        access: the same
+    flooded packet                     roles, if it is a control packet; relaying decides whether and when to pass it on
+    hello                              neighbors, roles, gradient, repair; then access, which may have a route now
 
-A packet has these two phases, told apart by the header's flags. Which part is which class is chosen in `build.py`.
+A packet travels in up to two phases, which the flags of its header tell apart: to a head as acknowledged unicast
+(TO_HEAD), then to all nodes as a flood (FLOOD). `build.py` chooses the class of each part.
 """
 
 from collections.abc import Mapping, Sequence
@@ -32,11 +34,11 @@ from fanet_mw.wire.inner import Beacon
 
 _DATA: Final = int(Kind.DATA)
 _POSITION_BYTES: Final = 61
-"""HEARTBEAT and GLOBAL_POSITION_INT, which the application puts into a hello."""
+"""The length of HEARTBEAT and GLOBAL_POSITION_INT, which the applications put into each hello."""
 
 
 class Parts(NamedTuple):
-    """The parts of which the protocol of a node is made."""
+    """The parts of the protocol at one node."""
 
     neighbors: Neighbors
     gradient: Gradient
@@ -47,11 +49,12 @@ class Parts(NamedTuple):
     access: Access
     relaying: Relaying
     contending: ContendingRelaying
-    """Relays outside of turns; `relaying` may be the same part, or leave to it what it does not decide itself."""
+    """Relaying in contention with other nodes, outside of slots and turns. `relaying` is this part itself, or hands it
+    those packets about which it does not decide."""
     two_hops: TwoHops | None
-    """The neighbors' neighbors, from hellos; None: hellos say nothing of neighbors."""
+    """What hellos say of the neighbors' neighbors; None if hellos say nothing of them."""
     promises: Promises | None = None
-    """The bounds and likely delays of the node's packets; None: this access has no bound to state."""
+    """The delay bounds and likely delays of the node's packets; None if this access states no bound."""
 
 
 class Clustered(RoutingProtocol):
@@ -61,11 +64,11 @@ class Clustered(RoutingProtocol):
         super().__init__(port)
         self.parts = parts
         self._hear_copies = tuple((part.pending, part.on_copy) for part in hear_copies)
-        """For each part that hears of copies, the keys that it waits for and its method: most copies are of no packet
-        that any part waits for."""
+        """For each part that wants to hear of copies: the keys of the packets it waits for, and its handler. The keys
+        are tested here, because most copies belong to packets for which no part waits."""
         timed = (parts.roles, parts.access, parts.contending, parts.repair)
         self._asks = tuple(part.next_wake_ns for part in timed if part is not None)
-        """The methods that tell when a part wants to be woken; they are called after every reception."""
+        """The methods by which the parts tell when they want to be woken; they are called after every reception."""
         self._lead_ns = port.scenario.radio.lead_ns
         self._hello_bytes = 0
         """The approximate length of the last hello."""
@@ -141,7 +144,9 @@ class Clustered(RoutingProtocol):
         return self.parts.roles.hello_share(now_ns)
 
     def hello_inner(self, room: int, *, now_ns: int) -> bytes:
-        """The beacon, the digest of what the node holds, and what it knows of its neighbors, as far as they fit."""
+        """What the protocol adds to a hello: its beacon, the digest of recent packets, and what the node knows of its
+        neighbors, in this order and as far as they fit into `room` bytes.
+        """
         parts = self.parts
         claims = None if parts.two_hops is None else parts.two_hops.claims(now_ns)
         parts.gradient.advance(now_ns)

@@ -1,12 +1,13 @@
-"""What the parts of the clustered protocol promise each other. `build.py` chooses one of each by `clusters.relay`.
+"""The contracts of the parts of the clustered protocol. `build.py` chooses a class for each by `clusters.relay`.
 
-    Clustered  ->  Roles       which node leads, heads a cluster, is a member
-               ->  Access      when a packet that is to be flooded from here goes on the air, and what contends
-               ->  Relaying    whether and when a flood that began elsewhere is passed on
-               ->  TwoHops     what hellos say of the nodes within two hops, where a rule needs it
-               ->  HearsCopies parts that call off what they plan when another node has sent it
+    Roles        whether this node is the leader, a cluster head or a member
+    Access       when this node transmits a packet that it is the first to flood, and what contends for the channel
+    Relaying     whether and when this node passes on a flood that began elsewhere
+    TwoHops      what hellos say of the nodes within two hops; only some relaying rules need it
+    HearsCopies  parts that cancel a transmission when another node has made it
 
-Roles tell an access what a schedule has made of the node; no other part knows of any beside it. Instants are handed in.
+`Clustered` calls all of them. Roles also call a `ScheduledAccess`, to which they give the schedule; no other part knows
+any of its siblings. No part reads a clock: every instant is an argument.
 """
 
 from collections.abc import Container, Mapping, Sequence
@@ -23,130 +24,140 @@ from fanet_mw.wire.inner import Beacon
 
 
 class Roles(Protocol):
-    """What a node is in its swarm, and how that changes."""
+    """The role of a node in its swarm, and how it changes."""
 
     def start(self, now_ns: int) -> None:
-        """The node is up."""
+        """The node has started."""
 
     def on_sign_of_life(self, node: int, *, born_ns: int, now_ns: int) -> None:
-        """A packet came in that a node generated at `born_ns`."""
+        """A packet was received that `node` generated at `born_ns`."""
 
     def on_control(self, packet: Packet, src: NodeId, *, now_ns: int) -> bool:
-        """A flooded packet that is no data, which `src` transmitted; True: every node passes it on at once.
+        """A flooded control packet was received from the neighbor `src`.
 
-        Raises MalformedFrameError for what no node of this swarm sends.
+        Returns True if every node must pass it on at once. Raises MalformedFrameError for content that no node of this
+        swarm sends.
         """
 
     def on_hello(self, neighbor: Neighbor, *, born_ns: int, now_ns: int) -> None:
-        """A neighbor's hello, which it generated at `born_ns`."""
+        """A neighbor's hello was received, which the neighbor generated at `born_ns`."""
 
     def on_impersonation(self, packet: Packet, *, now_ns: int) -> None:
-        """Take in a packet that another node sent in the name of this one."""
+        """A packet was received that names this node as its origin, but that another node has made."""
 
     def on_flooding(self, due_ns: int) -> None:
-        """The node's application has a packet flooded to everyone from an instant on."""
+        """An own application's packet will be flooded to all nodes from the instant `due_ns` on."""
 
     def on_parent_lost(self, parent: NodeId, *, now_ns: int) -> None:
-        """The MAC could not reach this neighbor, which was the way to a head."""
+        """The neighbor `parent`, the next hop to a head, did not acknowledge a unicast frame."""
 
     def before_hello(self, now_ns: int) -> None:
-        """The node is about to say hello: what goes with the hellos' rhythm is done now."""
+        """The node is about to send a hello; roles do now what they do once per hello interval."""
 
     def beacon(self, route: RouteToHead | None, *, now_ns: int) -> Beacon:
-        """What the hello says of the node's role, and of its route to a head."""
+        """The beacon for the node's next hello: its role, and its route to a head."""
 
     def hello_share(self, now_ns: int) -> float:
-        """After which part of the hello interval the next hello should go."""
+        """The share of the hello interval after which the node should send its next hello."""
 
     def next_wake_ns(self) -> int | None: ...
 
     def wake(self, now_ns: int) -> None: ...
 
     def clusters(self) -> Mapping[NodeId, tuple[NodeId, ...]]:
-        """The nodes of each cluster by head, the head first, as far as the node knows."""
+        """The nodes of each cluster by its head, the head first, as far as the node knows."""
 
     def report(self) -> Mapping[str, object]:
-        """JSON-able state."""
+        """The state and the counters of the part, as JSON values."""
 
 
 class Access(Protocol):
-    """The access of a node to the air: when what it has to send goes out."""
+    """The access of a node to the channel: when it transmits what it has to send."""
 
     def start(self, now_ns: int) -> None:
-        """The node is up."""
+        """The node has started."""
 
     def admit(self, packet: Packet, *, due_ns: int) -> bool:
-        """Let in a packet of the node's application, due at `due_ns`; False if it is refused."""
+        """Admission control of an own application's packet, due at `due_ns`; False if the packet is refused."""
 
     def originate(self, packet: Packet, *, due_ns: int, now_ns: int) -> None:
-        """Let out a packet of the node's application, or bring it to a node that will."""
+        """Flood an own application's packet from here, or send it towards a node that will."""
 
     def forward(self, packet: Packet, *, start_ns: int, now_ns: int, tries: int = 0) -> None:
-        """Let a packet out here, or bring it one step nearer to a node that will; `tries` were made here before."""
+        """Flood a packet from here, or send it one hop towards a node that will.
+
+        `tries`: how often this node has tried already.
+        """
 
     def flood_control(
         self, kind: Kind, inner: bytes, *, now_ns: int, urgent: bool = False, patient: bool = False
     ) -> Packet:
-        """Tell everyone, where there are turns: `urgent`, in one of them; `patient`, in one that nothing else needs."""
+        """Flood a control packet to all nodes; without flags it contends for the channel.
+
+        In a timetable, an `urgent` one goes in the node's next turn, and a `patient` one in a turn that is not needed
+        for anything else.
+        """
 
     def answer(self, packet: Packet, *, now_ns: int) -> None:
-        """Send what a neighbor lacks."""
+        """Send a packet again that a neighbor has missed."""
 
     def hello_start_ns(self, start_ns: int, *, size: int) -> int:
-        """The instant from which a hello of about so many bytes may go that is due at `start_ns`."""
+        """The earliest instant at which a hello of about `size` bytes, due at `start_ns`, may be transmitted."""
 
     def next_wake_ns(self) -> int | None: ...
 
     def wake(self, now_ns: int) -> None: ...
 
     def waiting(self) -> int:
-        """Packets that wait here to be let out."""
+        """The number of packets that wait here for their first transmission."""
 
     def report(self) -> Mapping[str, object]:
-        """JSON-able state."""
+        """The state and the counters of the part, as JSON values."""
 
 
 class ScheduledAccess(Access, Protocol):
     """An access whose slots or turns follow from the leader's schedule."""
 
     def serve(self, now_ns: int) -> None:
-        """The node has become head of its cluster: what it holds is let out here."""
+        """The node has become the head of its cluster, so it floods the packets that it holds from here."""
 
     def renew_slot(self) -> None:
-        """The schedule may have given the slot of this head another length, or another guard time."""
+        """The slot of this head may have another length or another guard time in the new schedule."""
 
 
 class Relaying(Protocol):
-    """Which floods that began elsewhere a node passes on."""
+    """Decides which floods that began elsewhere a node passes on."""
 
     def start(self, now_ns: int) -> None:
-        """The node is up."""
+        """The node has started."""
 
     def on_flood(self, packet: Packet, reception: Reception, *, at_once: bool, now_ns: int) -> Sequence[Relay]:
-        """The first copy of a flooded packet; returned is when the node passes it on, mostly once or never. `at_once`:
-        every node passes it on, and soon.
+        """The first copy of a flooded packet was received.
+
+        Returns the relays that the node is to make of it, mostly one or none. `at_once`: every node must pass this
+        packet on, and soon.
         """
 
     def report(self) -> Mapping[str, object]:
-        """JSON-able state."""
+        """The state and the counters of the part, as JSON values."""
 
 
 class TwoHops(Protocol):
-    """What hellos say of the nodes within two hops."""
+    """What a node learns and tells in hellos about the nodes within two hops."""
 
     def claims(self, now_ns: int) -> Claims:
-        """What the node's next hello says; asked once per hello, before anything else is written into it."""
+        """The statement for the node's next hello; it is asked for once per hello, before the hello is written."""
 
     def on_claims(self, claims: Claims, beacon: Beacon, *, now_ns: int) -> None:
-        """What a neighbor's hello says of its neighbors and itself."""
+        """A neighbor's hello was received with this statement about its neighbors and itself."""
 
 
 class HearsCopies(Protocol):
-    """A part that plans to send packets, and gives up those that another node has sent meanwhile."""
+    """A part that plans to send packets, and cancels those that another node has sent in the meantime."""
 
     @property
     def pending(self) -> Container[int]:
-        """The keys (`duplicates.key_of`) of the packets whose copies matter to it: one object for good."""
+        """The keys (`duplicates.key_of`) of the packets whose copies matter to it, always as the same object."""
 
     def on_copy(self, key: int, *, now_ns: int) -> None:
-        """Take in that another node has sent such a packet."""
+        """Another node has sent the packet with this key."""

@@ -1,1 +1,1 @@
-"""Slots that nodes claim over the air, without a leader: `clusters.relay = "claimed"`."""
+"""TDMA slots that the nodes agree on among themselves, without a leader (`clusters.relay = "claimed"`)."""

@@ -1,18 +1,18 @@
-"""Access by claimed slots: the clustered protocol in slots that nodes agree on over the air, without a leader.
+"""Access by claimed slots: each node has TDMA turns of its own, which the nodes agree on in hellos, without a leader.
 
-    listen -> claim a slot free within two hops, say so in hellos -> own packets and relays go in turns of its own
+    listen -> claim a slot that is free within two hops, and say so in hellos -> send in the turns of this slot
 
-Every node that holds a slot lets its packets out itself; one that holds none yet brings them to a neighbor that does,
-as acknowledged unicast in the contention window at the beginning of each period. A period holds as many superframes as
-fit; lengths of superframes and spare turns: `slot_claims.py`, `own_turns.py`.
+A node that holds a slot sends its own packets and its relays in its turns. A node that holds none yet sends its packets
+to a neighbor that does, as acknowledged unicast in the contention window at the beginning of each period. A period
+holds as many superframes as fit; `slot_claims.py` explains their lengths, `own_turns.py` the turns that nobody claims.
 
-Hellos go in a turn of the node or in the contention window, at random: in a turn no other of two hops disturbs them,
-but two that claim one slot and hear each other, or share a neighbor, would never learn of it. The window is short: a
-hello that is lost in it comes in a turn the next time.
+Each hello goes either in a turn of the node or in the contention window, at random. In a turn no node within two hops
+disturbs it; but if all hellos went in turns, two nodes near each other that claim the same slot would always send at
+the same time, and would never learn of each other. A hello that is lost in the crowded window goes in a turn next time.
 
-Bound: a packet that finds none before it leaves within `hop_ms` (report), each hop. There is no bound end to end when
-packets queue: how many come together at a relay depends on all sources and on the way here. Not modeled: interference
-from beyond two hops; clocks that disagree by more than `clusters.turn_slack_us` allows (no bound is stated then).
+A packet that finds no other packet in the queue leaves each hop within the `hop_ms` of the report. There is no bound
+from end to end once packets queue, because the length of a relay's queue depends on all sources. Not handled:
+interference from beyond two hops. No bound is stated if clocks disagree by more than `clusters.turn_slack_us`.
 """
 
 from collections.abc import Mapping
@@ -35,7 +35,7 @@ from fanet_mw.wire.inner import Beacon
 
 
 class ClaimedAccess:
-    """The claimed turns of one node, and its way to a neighbor that has some while it has none."""
+    """The claimed turns of one node; while it has none, its route to a neighbor that has."""
 
     def __init__(
         self,
@@ -61,7 +61,7 @@ class ClaimedAccess:
         self._lifetime_ns = seconds_to_ns(port.scenario.routing.lifetime_s)
 
     def start(self, now_ns: int) -> None:
-        """Begin without a join, because no leader assigns anything."""
+        """Begin to listen; the node joins nothing, because no leader assigns anything."""
         self._claiming.start(now_ns)
 
     # --- letting out ----------------------------------------------------------------------------------------------
@@ -80,7 +80,7 @@ class ClaimedAccess:
             self.let_out(packet, now_ns=now_ns)
 
     def let_out(self, packet: Packet, *, now_ns: int) -> None:
-        """Queue a packet for the turns of this node: one of its own, or one that it relays."""
+        """Queue a packet for the turns of this node, either an own packet or one to relay."""
         if len(packet.frame) > self._turn_bytes:
             self._port.drop(DropReason.TOO_LARGE, packet, now_ns=now_ns)
             return
@@ -107,7 +107,7 @@ class ClaimedAccess:
         return self._contention.not_before(start_ns)
 
     def claims(self, now_ns: int) -> Claims:
-        """Settle the claim, and what follows from it, once per hello."""
+        """Settle the node's claim and what follows from it, once per hello; returns the statement for that hello."""
         change = self._claiming.settle(now_ns)
         if change is Change.WON:
             self._gradient.join(self._port.node, now_ns=now_ns)
@@ -142,7 +142,10 @@ class ClaimedAccess:
         return len(self._queue)
 
     def hop_ns(self) -> int | None:
-        """The longest that a packet may take over this node when none is before it: one turn may go to a hello."""
+        """The longest time that a packet waits for a turn of this node if no other packet waits before it.
+
+        It includes one turn that a hello may take.
+        """
         turns, claimed = self._claiming.own.turns, self._claiming.own.claimed()
         scenario = self._port.scenario
         if not claimed or not clocks_fit(scenario, clock_error_ns=self._port.clock_error_ns):

@@ -1,4 +1,4 @@
-"""The queue of one node in claimed slots: own packets and relays, most urgent first, in the turns that are its own."""
+"""The transmit queue of a node with claimed slots: in each of its turns the most urgent packet goes, own or relayed."""
 
 from fanet_mw.node.queue import TxQueue
 from fanet_mw.routing.clustered.claimed.own_turns import OwnTurns
@@ -6,7 +6,7 @@ from fanet_mw.routing.clustered.tdma.turn_release import OwnTurn, TurnRelease
 
 
 class ClaimedRelease(TurnRelease):
-    """What waits for the node's turns."""
+    """The packets that wait for the node's own turns."""
 
     def __init__(self, queue: TxQueue, own: OwnTurns, *, lead_ns: int, frame_bytes: int) -> None:
         super().__init__(queue, lead_ns=lead_ns)
@@ -18,7 +18,7 @@ class ClaimedRelease(TurnRelease):
         return None if start_ns is None else OwnTurn(start_ns, self._frame_bytes)
 
     def _look_again(self, now_ns: int) -> None:
-        """Take the first turn that is the node's own now; a node that is woken late still uses one that is ahead."""
+        """Choose the node's next turn anew; a turn that has begun before the node was woken is not used."""
         planned = self._next
         self._arm(now_ns)
         if planned is not None and planned.start_ns >= now_ns:
@@ -26,5 +26,5 @@ class ClaimedRelease(TurnRelease):
             self._next = self._turn(min(planned.start_ns, later_ns))
 
     def reserve(self, *, not_before_ns: int) -> int | None:
-        """A turn for something that is not queued."""
+        """Take a turn out of the queue's use, for a frame that is not queued, such as a hello."""
         return self._own.reserve(not_before_ns=max(not_before_ns, self._free_ns))

@@ -1,8 +1,8 @@
-"""The way of a node to turns of its own: it listens, claims a slot free within two hops, and draws for spare turns.
+"""How a node comes to turns of its own: it listens, claims a slot that is free within two hops, and draws for others.
 
-Its hellos say what it claims and what its neighbors claim (`slot_claims.py`); turns that no node within two hops claims
-go by hash to the node with most to send (`own_turns.py`). What the hellos say decides the relays too: a connected
-dominating set, which each node finds for itself, among the nodes that hold a slot.
+Its hellos state what it and its neighbors claim (`slot_claims.py`). Turns that nobody within two hops claims go to a
+node that a hash chooses, more often to one that has more to send (`own_turns.py`). The same hellos decide which nodes
+relay floods: a connected dominating set of nodes that hold a slot, which each node computes for itself.
 """
 
 from collections import deque
@@ -22,18 +22,19 @@ from fanet_mw.units import MS, NodeId, S, seconds_to_ns
 from fanet_mw.wire.claims import MOST_LOTS, Claims, SlotStatus
 
 LISTEN_HELLOS: Final = 3
-"""The number of hello intervals before the first claim: the two hops around are known after two if no hello is lost."""
+"""The number of hello intervals for which a node listens before its first claim. All claims within two hops are known
+after two of them if no hello is lost."""
 _LONGEST: Final = 128
-"""The number of slots of the longest superframe; in a larger crowd some nodes find no slot."""
-_SAID: Final = 3
-"""The number of hellos after which all nodes within two hops know how many lots a node has."""
+"""The number of slots of the longest superframe; with more nodes within two hops, some find no free slot."""
+_HELLOS_UNTIL_KNOWN: Final = 3
+"""The number of hellos after which all nodes within two hops know how many lots a node draws."""
 IDLE: Final = 0.25
-"""A node that needs less than this share of its claimed turns draws no lots."""
+"""A node that uses less than this share of the turns of its claim draws no lots for further turns."""
 _LEAST_FRAME: Final = 256
 
 
 class Change(Enum):
-    """What became of a node's slot since its last hello."""
+    """How the slot of a node has changed since its last hello."""
 
     NONE = "as before"
     WON = "it has a slot now"
@@ -41,12 +42,15 @@ class Change(Enum):
 
 
 class ClaimedLoad:
-    """The number of lots that a node wants, by what it had to send against the turns of its claim."""
+    """The number of lots with which a node draws for unclaimed turns: more lots the more it has to send.
+
+    The load is what the node had to send, compared with the turns of its claim.
+    """
 
     def __init__(self, now_ns: int) -> None:
         self._pushed = 0
         self._since_ns = now_ns
-        self._said: deque[int] = deque([0] * _SAID, maxlen=_SAID)
+        self._said: deque[int] = deque([0] * _HELLOS_UNTIL_KNOWN, maxlen=_HELLOS_UNTIL_KNOWN)
 
     def push(self) -> None:
         self._pushed += 1
@@ -60,12 +64,12 @@ class ClaimedLoad:
         return self._said[-1]
 
     def drawn(self) -> int:
-        """The number of lots to draw with: no more than any node believes this one to have."""
+        """The number of lots to draw with, which no other node believes to be smaller."""
         return min(self._said)
 
 
 class Claiming:
-    """The turns of one node, and what it knows of those of others."""
+    """The claim of one node, and the claims of others as far as it knows them."""
 
     def __init__(self, port: Port, own: OwnTurns) -> None:
         self._port = port
@@ -81,11 +85,11 @@ class Claiming:
         self._claimed_ns: int | None = None
         """The instant at which the node's claim last changed."""
         self._news = False
-        """True if a hello has brought news that the node has not drawn with yet."""
+        """True if hellos have changed something since the node last drew for unclaimed turns."""
 
     @property
     def _lifetime_ns(self) -> int:
-        """The time after its last hello at which a neighbor, and its claim, is forgotten."""
+        """The time after a neighbor's last hello at which the neighbor and its claim are forgotten."""
         return int(LIFETIME_HELLOS * self._hello_ns)
 
     def _new_claims(self, now_ns: int) -> SlotClaims:
@@ -100,7 +104,7 @@ class Claiming:
         )
 
     def start(self, now_ns: int) -> None:
-        """The node is up; it listens."""
+        """The node has started, and listens."""
         self._claims = self._new_claims(now_ns)
         self._load = ClaimedLoad(now_ns)
         self._known_ns = now_ns + LISTEN_HELLOS * self._hello_ns
@@ -108,7 +112,7 @@ class Claiming:
     # --- once per hello -------------------------------------------------------------------------------------------
 
     def settle(self, now_ns: int) -> Change:
-        """Settle the node's claim; what `standing` states then holds until the next hello."""
+        """Make, keep or change the node's claim, which then holds until the next hello."""
         claim = self._claims.step(now_ns).own
         before, length = self.own.share, self._port.scenario.clusters.slots or claim.length
         self.own.share = None if claim.slot is None else Share(claim.slot, length)
@@ -119,7 +123,7 @@ class Claiming:
         return Change.WON if before is None else Change.LOST
 
     def standing(self, *, waiting: int, now_ns: int) -> SlotStatus:
-        """The statement of the node's next hello about its own slots, with so many packets waiting."""
+        """What the node's next hello states about its own slot, while `waiting` packets wait for its turns."""
         claim = self._claims.own
         turns_per_s = len(self.own.claimed()) * S / self.own.turns.period_ns
         lots = self._load.lots(waiting=waiting, turns_per_s=turns_per_s, now_ns=now_ns)
@@ -128,13 +132,13 @@ class Claiming:
         return SlotStatus(claim.slot, self._port.scenario.clusters.slots or claim.length, claim.crowd, lots)
 
     def on_claims(self, claims: Claims, *, now_ns: int) -> None:
-        """Take in the claims that a neighbor's hello states."""
+        """A neighbor's hello was received, with the claims that it states."""
         heard = tuple(self.claim_of(h.node, h.standing) for h in claims.heard)
         self._claims.on_hello(SlotHello(self.claim_of(claims.node, claims.own), heard), now_ns=now_ns)
         self._news |= self.near.on_claims(claims, now_ns=now_ns)
 
     def claim_of(self, node: NodeId, standing: SlotStatus) -> SlotClaim:
-        """The claim in the terms of `slot_claims`. What no superframe can hold is no claim: it came off the air."""
+        """The claim that a received statement makes; none if it names a slot that no superframe can hold."""
         slot, length = standing.slot, standing.length
         fixed = self._port.scenario.clusters.slots
         if fixed:
@@ -146,11 +150,11 @@ class Claiming:
     # --- in between -----------------------------------------------------------------------------------------------
 
     def push(self) -> None:
-        """Note that another packet waits for the node's turns."""
+        """Count a packet that was queued for the node's turns."""
         self._load.push()
 
     def draw(self, now_ns: int) -> None:
-        """Learn which turns no node claims now, and which nodes draw for them; only a node that draws needs it."""
+        """Compute anew which turns nobody claims, and who draws for them; does nothing if this node draws no lots."""
         lots = self._load.drawn()
         if not lots:
             self.own.draws = None
@@ -161,7 +165,7 @@ class Claiming:
             self.own.draws = draws(self._port.node, lots, shares, ((n, s.lots) for n, s in said))
 
     def relays(self, now_ns: int) -> bool:
-        """True if floods need this node as a relay."""
+        """True if this node belongs to the relays of floods."""
         if self.own.share is None:
             return False
         slot = self.own.share.slot
@@ -180,7 +184,7 @@ class Claiming:
 
 
 def _rank(slot: int | None) -> float:
-    """The rank of a neighbor: one that holds a slot is to relay rather than one that holds none."""
+    """The rank of a neighbor as a relay: nodes that hold a slot come before nodes that hold none."""
     return 0.0 if slot is None else 1.0
 
 
@@ -196,7 +200,7 @@ def longest_superframe(turns: Turns) -> int:
 
 
 def geometry(scenario: Scenario, frame_bytes: int) -> Turns:
-    """Periods in which every hello finds a window, from the swarm's beginning."""
+    """The geometry of periods and turns, such that each hello interval has a contention window."""
     period_ns = min(scenario.clusters.period_ns, seconds_to_ns(scenario.routing.hello_interval_s) // 2)
     contention_ns = round(scenario.clusters.contention_ms * MS)
     turn = turn_ns(scenario, payload_bytes=frame_bytes)

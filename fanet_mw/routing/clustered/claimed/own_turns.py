@@ -1,13 +1,14 @@
-"""Which turns of the superframe are a node's own: those of its claim, and of the rest those that it wins by lot.
+"""Which turns of the superframe belong to a node: those of its claim, and those unclaimed turns that it wins by a hash.
 
     period:  | contention window | turn 0 | 1 | 2 | ... | L | L+1 | ...    slot s: turns s, s + L, s + 2L, ...
 
-A turn that no node within two hops claims goes to the node with the highest lot among those within two hops that draw
-for it. Lots are hashes of node, turn and number, so every node can compute those of all others; a node that has more to
-send draws more lots. After Bao and Garcia-Luna-Aceves, "A new approach to channel access scheduling for ad hoc
-networks" (MobiCom 2001). Of two nodes that know each other and each other's number of lots only one can win. A node
-therefore draws with the least number that it has stated in its last hellos; until nodes two hops away know of a change,
-it draws less often than they believe.
+For a turn that no node within two hops claims, nodes draw lots, and the highest lot wins. A lot is a hash of node, turn
+and the number of the lot, so each node can compute the lots of all others; a node that has more to send draws more lots
+(Bao and Garcia-Luna-Aceves, "A new approach to channel access scheduling for ad hoc networks", MobiCom 2001).
+
+Two nodes cannot both win a turn if each knows the other and its number of lots. A node that has just stated another
+number can therefore not use it at once, because nodes two hops away still count with an older one: it draws with the
+least of the numbers that it has stated in its latest hellos.
 """
 
 from collections.abc import Iterable
@@ -19,7 +20,7 @@ from fanet_mw.units import NodeId
 
 
 class Share(NamedTuple):
-    """A claim as turns: `slot`, and every `length`-th turn after it in the same period."""
+    """The turns of a claim: number `slot` of each period, and every `length`-th turn after it."""
 
     slot: int
     length: int
@@ -29,11 +30,11 @@ class Share(NamedTuple):
 
 
 class Draws(NamedTuple):
-    """All that decides whether a node wins a turn that no node claims."""
+    """Everything that decides whether a node wins an unclaimed turn."""
 
     node: NodeId
     lots: int
-    """The number of lots that this node draws per turn; 0 when it draws none."""
+    """The number of lots that this node draws for each turn; 0 if it does not draw."""
     taken: tuple[Share, ...]
     """The claims of all other nodes within two hops."""
     rivals: tuple[tuple[NodeId, int], ...]
@@ -50,9 +51,10 @@ class Draws(NamedTuple):
 def draws(
     node: NodeId, lots: int, claims: Iterable[tuple[NodeId, Share | None]], rivals: Iterable[tuple[NodeId, int]]
 ) -> Draws:
-    """`claims` and `rivals` are those of all other nodes. A rival has the greatest number of lots stated for it.
+    """Everything that decides about unclaimed turns, from the `claims` and the `rivals` of all other nodes.
 
-    A number that is believed too great costs turns; one that is believed too small costs a collision.
+    If hellos state different numbers of lots for one rival, the greatest counts: a number that is too great wastes
+    turns, one that is too small would cause a collision.
     """
     most: dict[NodeId, int] = {}
     for rival, count in rivals:
@@ -62,17 +64,17 @@ def draws(
 
 
 class OwnTurns:
-    """One node's own turns, as far as they are known now."""
+    """The turns of one node, by its present claim and draws."""
 
     def __init__(self, turns: Turns) -> None:
         self.turns = turns
         self.share: Share | None = None
         self.draws: Draws | None = None
         self._reserved_ns = -1
-        """The start of a turn that is already taken for a hello; -1 when there is none."""
+        """The start of the turn that is reserved for a hello; -1 if there is none."""
 
     def next_start_ns(self, *, not_before_ns: int) -> int | None:
-        """The start of this node's first own turn at or after an instant; None without a claim."""
+        """The start of this node's first turn at or after an instant; None without a claim."""
         if self.share is None or self.share.slot >= self.turns.per_frame:
             return None
         turns = self.turns
@@ -97,7 +99,7 @@ class OwnTurns:
         return self.draws.wins(turn, period * self.turns.per_frame + turn)
 
     def reserve(self, *, not_before_ns: int) -> int | None:
-        """Take the next own turn out of what `next_start_ns` returns; only one turn is taken at a time."""
+        """Reserve the node's next turn, which `next_start_ns` then skips; only one turn is reserved at a time."""
         self._reserved_ns = -1
         start_ns = self.next_start_ns(not_before_ns=not_before_ns)
         if start_ns is not None:

@@ -1,23 +1,27 @@
-"""Slots with spatial reuse, agreed over the air: each node claims the lowest slot free within its two hops.
+"""Distributed TDMA slot assignment with spatial reuse: each node claims the lowest slot that is free within two hops.
 
-                    listened long enough          a stronger rival claims it too
+                    listened long enough          a stronger rival claims the same slot
     LISTENING  ------------------------->  HOLDS  ---------------------------->  HOLDS another
-                                             ^            (none free: SILENT)
+                                             ^            (SILENT if none is free)
 
-A hello carries the sender's claim and those of the neighbors it hears, so each node knows the claims within two hops
-one or two superframes later. Of two that claim one slot, the stronger keeps it: lower priority value, then lower id.
-A node that joins listens before it claims; a node that leaves is forgotten when its hellos stop.
+A hello carries the sender's claim and the claims of its neighbors, so each node knows all claims within two hops after
+one or two superframes. If two nodes claim the same slot, the stronger keeps it: the one with the lower priority value,
+or with the lower id if these are equal. A node that joins listens before it claims. A node that leaves is forgotten
+after its last hello.
 
-Without losses all claims are free of clashes within `listen + 2 d + 1` superframes after the topology last changed,
-where d is the longest chain of ever weaker rivals, two hops apart at most: the strongest of each chain never yields,
-its claim is known at two hops after two superframes, and its rivals then yield once. Links must work both ways.
+Without losses, and with links that work both ways, no two claims clash any more `listen + 2 d + 1` superframes after
+the last change of the topology. Here d is the length of the longest chain of nodes, each weaker than the one before and
+within two hops of it: the strongest node of a chain never yields, its claim is known at two hops after two
+superframes, and its rivals then yield once.
 
-**Superframes as long as the neighborhood is crowded** (`sized_to`). A node's slot then repeats every `length` turns, a
-power of two not below the crowd (a node and all within two hops of it) of anyone within two hops. Lengths may differ:
-slot a of A and slot b of B meet if a = b modulo the shorter length. A slot is always free for everyone: each of its
-n rivals takes 1/length <= 1/(n+1) of all turns, so together less than all. After Kanzaki et al., "Dynamic TDMA slot
-assignment in ad hoc networks" (AINA 2003). A crowd takes two superframes to be known, so the law gains four.
-Lengthening keeps a part of the turns, and so clashes with no claim; shortening waits until it was possible for a while.
+**Superframes of variable length** (`sized_to`; after Kanzaki et al., "Dynamic TDMA slot assignment in ad hoc networks",
+AINA 2003). The crowd of a node is the number of nodes within two hops of it, itself included. A node's slot repeats
+every `length` turns, where length is a power of two and at least the crowd of each node within two hops. Lengths may
+differ between nodes: slot a of one node and slot b of another meet if a = b modulo the shorter length. A free slot
+always exists, because each of n rivals takes 1/length <= 1/(n+1) of the turns, together less than all. It takes two
+superframes until a crowd is known, so the time above grows by four superframes. A node that lengthens its superframe
+keeps a part of its turns, so it clashes with nobody. It shortens its superframe only after this was possible for a
+while.
 """
 
 from collections.abc import Iterable, Iterator
@@ -29,23 +33,24 @@ from fanet_mw.errors import LocalProtocolError
 from fanet_mw.units import NodeId
 
 _PATIENCE: Final = 8
-"""Superframes for which a shorter one must have been possible: a neighbor whose hellos were lost is soon back."""
+"""The number of superframes for which a shorter one must have been possible before a node shortens its own: a neighbor
+may only seem to have left because its hellos were lost."""
 
 
 class SlotClaim(NamedTuple):
-    """The slot that a node says it owns; None while it listens, or has found none free."""
+    """The slot that a node claims; None while it listens, or if it has found no free slot."""
 
     node: NodeId
     slot: int | None
     priority: int = 0
-    """Lower is stronger."""
+    """Of two claims, the one with the lower value is stronger."""
     length: int = 0
-    """The slot repeats every so many turns; 0: all superframes are alike."""
+    """The slot repeats after this number of turns; 0 if all superframes have the same, fixed length."""
     crowd: int = 1
-    """Nodes within two hops of the claimant, itself included."""
+    """The number of nodes within two hops of the claimant, itself included."""
 
     def meets(self, other: "SlotClaim") -> bool:
-        """Both would send in the same turn."""
+        """True if both nodes would transmit in the same turn."""
         if self.slot is None or other.slot is None:
             return False
         step = gcd(self.length, other.length)
@@ -56,15 +61,15 @@ class SlotClaim(NamedTuple):
 
 
 class SlotHello(NamedTuple):
-    """What a node says about slots once per superframe."""
+    """The statement about slots that a node sends once per superframe."""
 
     own: SlotClaim
     heard: tuple[SlotClaim, ...]
-    """The claims of its neighbors, by id."""
+    """The claims of the node's neighbors, in the order of their ids."""
 
 
 class SlotClaims:
-    """One node's part: hellos and instants go in, hellos come out."""
+    """The algorithm at one node: it takes in the hellos of neighbors, and gives the node's own once per superframe."""
 
     def __init__(
         self,
@@ -77,7 +82,9 @@ class SlotClaims:
         sized_to: int | None = None,
         priority: int = 0,
     ) -> None:
-        """`slots`: of a fixed superframe; `sized_to`: the longest of superframes by crowd, a power of two."""
+        """`slots`: the number of slots, if superframes have a fixed length. `sized_to`: the greatest length of
+        superframes whose length varies, a power of two. At most one of them is given.
+        """
         if slots is not None and slots < 1:
             raise LocalProtocolError(f"slots = {slots} must be >= 1, or None for no limit")
         if sized_to is not None and (sized_to < 1 or sized_to & (sized_to - 1) or slots is not None):
@@ -88,10 +95,10 @@ class SlotClaims:
         self._sized_to = sized_to
         self._own = SlotClaim(node, None, priority, 1 if sized_to else 0)
         self._roomy = 0
-        """Superframes in a row for which a shorter one would have done."""
+        """The number of superframes in a row for which a shorter one would have been enough."""
         self._hellos: dict[NodeId, tuple[int, SlotHello]] = {}
         self.repairs = 0
-        """The number of slots that were given up to a stronger rival."""
+        """The number of slots that this node has given up to stronger rivals."""
 
     @property
     def slot(self) -> int | None:
@@ -102,7 +109,7 @@ class SlotClaims:
         return self._own
 
     def on_hello(self, hello: SlotHello, *, now_ns: int) -> None:
-        """A neighbor's hello. Claims of slots that cannot be are ignored: they come off the air."""
+        """A neighbor's hello was received. Claims of impossible slots are ignored."""
         if hello.own.node != self._own.node and all(self._possible(claim) for claim in (hello.own, *hello.heard)):
             self._hellos[hello.own.node] = now_ns, hello
 
@@ -113,7 +120,10 @@ class SlotClaims:
         return 0 <= claim.length <= most and not claim.length & (claim.length - 1)
 
     def step(self, now_ns: int) -> SlotHello:
-        """Once per superframe: forget the silent, settle clashes, and say so."""
+        """Forget silent neighbors, give up a slot that a stronger rival claims, and return the next hello.
+
+        To be called once per superframe.
+        """
         horizon_ns = now_ns - self._lifetime_ns
         self._hellos = {node: entry for node, entry in self._hellos.items() if entry[0] >= horizon_ns}
         if self._sized_to is not None:
@@ -127,7 +137,11 @@ class SlotClaims:
         return SlotHello(self._own, tuple(self._hellos[node][1].own for node in sorted(self._hellos)))
 
     def _size(self, most: int) -> None:
-        """A longer superframe at once, with the slot kept; a shorter one after a while, if a slot is free in it."""
+        """Adapt the length of the superframe to the greatest crowd within two hops.
+
+        It is lengthened at once, and the node keeps its slot. It is shortened only after a while, and only if the
+        shorter one has a free slot.
+        """
         crowds = {rival.node: rival.crowd for rival in self.rivals()}
         crowd = 1 + len(crowds)
         wanted = min(most, 1 << (max(crowd, *crowds.values(), 1) - 1).bit_length())
@@ -146,7 +160,7 @@ class SlotClaims:
                 self._own, self._roomy = shorter, 0
 
     def _free(self, claim: SlotClaim) -> int | None:
-        """The lowest slot in which a claim of this length would meet no other."""
+        """The lowest slot in which a claim of this length would meet no other claim; None if there is none."""
         taken = [rival for rival in self.rivals() if rival.slot is not None]
         if not claim.length:
             slot = lowest_free(rival.slot for rival in taken if rival.slot is not None)
@@ -155,7 +169,7 @@ class SlotClaims:
         return next((own.slot for own in possible if not any(own.meets(rival) for rival in taken)), None)
 
     def rivals(self) -> Iterator[SlotClaim]:
-        """Claims within two hops. What a neighbor says of itself is newer than what others say of it."""
+        """The claims of all other nodes within two hops; a neighbor's own statement counts before that of others."""
         for node in sorted(self._hellos):
             hello = self._hellos[node][1]
             yield hello.own

@@ -1,7 +1,8 @@
-"""The division of nodes into clusters: one contract (`Clustering`), several methods; `clusters.method` names one.
+"""Methods that divide nodes into clusters, all behind one contract (`Clustering`); `clusters.method` names one.
 
-`bisection` needs positions only; `election` ranks nodes (lowest-ID, highest degree, WCA, lasting degree) and keeps
-heads; `affinity` lets neighbors vote; `maintenance` carries clusters on over time.
+`bisection` needs positions only. `election` ranks nodes (lowest-ID, highest degree, WCA, lasting degree) and keeps
+heads that are good enough. In `affinity`, neighbors vote for each other. `maintenance` adapts standing clusters step by
+step.
 """
 
 from fanet_mw.routing.clustered.clustering.affinity import AffinityPropagation

@@ -4,10 +4,11 @@
     a(i,k) <- min(0, r(k,k) + sum over i' not in {i,k} of max(0, r(i',k)))   availability: how wanted k is
     a(k,k) <- sum over i' != k of max(0, r(i',k))
 
-s(i,k) = -(distance / range)^2 between neighbors; others exchange no messages, so each member hears its head. s(k,k) is
-the preference: the greater, the more heads. Messages are damped. Frey & Dueck add noise against ties; here each
-preference is lowered by a millionth per rank of id instead, so that the result is a function of the inputs. A node that
-no exemplar is near after the last round becomes one by lowest id. Heads may hear each other.
+The similarity s(i,k) of neighbors is -(distance / range)^2. Only neighbors exchange messages, so each member hears its
+head; two heads may hear each other. The preference s(k,k) sets how many heads there are: the greater, the more.
+Messages are damped. Frey & Dueck add noise to break ties; here each preference is lowered by a millionth per rank of id
+instead, so that the same inputs always give the same result. A node that has no exemplar for a neighbor after the last
+round becomes one itself, the lowest ids first.
 """
 
 import math
@@ -20,14 +21,16 @@ _Row = dict[NodeId, float]
 
 
 class AffinityPropagation(NamedTuple):
-    """The method and its parameters; `preference` is in units of -(range)^2, 0.5 the median of a uniform disk."""
+    """The method and its parameters. `preference` is in units of -(range)^2; 0.5 is the median similarity in a uniform
+    disk.
+    """
 
     range_m: float
     preference: float = -0.5
     damping: float = 0.7
     rounds: int = 200
     settled: int = 15
-    """Stop when the exemplars have not changed for this many rounds."""
+    """The iteration stops when the exemplars have not changed for this many rounds."""
 
     @property
     def promise(self) -> Promise:
@@ -69,12 +72,12 @@ class AffinityPropagation(NamedTuple):
             second = max((totals[k] for k in totals if k != first), default=-math.inf)
             for k in row:
                 rival = second if k == first else totals[first]
-                # alone, without rivals, a node serves itself
+                # a node without neighbors serves itself
                 fresh = row[k] - rival if rival > -math.inf else 1.0
                 r[i][k] = self.damping * r[i][k] + (1 - self.damping) * fresh
 
     def _update_availability(self, r: dict[NodeId, _Row], a: dict[NodeId, _Row]) -> None:
-        for k in r:  # the rows are symmetric: the nodes that k is near to are those that are near k
+        for k in r:  # the rows are symmetric: k is a neighbor of exactly those nodes that are neighbors of k
             support = math.fsum(max(0.0, r[i][k]) for i in r[k] if i != k)
             for i in r[k]:
                 fresh = support if i == k else min(0.0, r[k][k] + support - max(0.0, r[i][k]))
@@ -82,7 +85,7 @@ class AffinityPropagation(NamedTuple):
 
 
 def _gather(swarm: Swarm, similarity: dict[NodeId, _Row], exemplars: frozenset[NodeId]) -> list[Cluster]:
-    """Each node joins the nearest exemplar it hears, or becomes one."""
+    """Put each node into the cluster of the nearest exemplar that it hears; a node that hears none becomes one."""
     heads = set(exemplars)
     for node in sorted(similarity):
         if node not in heads and not any(n in heads for n in swarm.adjacency[node]):

@@ -1,7 +1,7 @@
-"""k balanced clusters by position: recursive bisection along the longer axis, head nearest to the middle.
+"""Divides nodes into k balanced clusters by position: recursive bisection along the longer axis.
 
-Sizes differ by at most one, clusters are contiguous in space, and the result depends on nothing but the positions
-and ids. The paper gives k; its own way of choosing members is not stated.
+The head of a cluster is the node nearest to its middle. Sizes differ by at most one, clusters are contiguous in space,
+and the result depends only on positions and ids. The paper gives k, but not how it chooses the members.
 """
 
 from collections.abc import Mapping
@@ -19,7 +19,8 @@ def balanced(positions: Mapping[NodeId, Enu], *, count: int) -> list[Cluster]:
 
 
 class Balanced(NamedTuple):
-    """`balanced` behind the contract: it sees positions only, so a member may be out of its head's range."""
+    """The method `balanced` behind the contract. It sees positions only, so a member may be out of range of its head.
+    """
 
     clusters: int
 

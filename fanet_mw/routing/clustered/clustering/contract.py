@@ -1,7 +1,7 @@
-"""What every clustering method takes and gives. `tests/property/test_clustering_contract.py` holds all to it.
+"""The contract of clustering methods; `tests/property/test_clustering_contract.py` checks every method against it.
 
-Every node is in exactly one cluster, each cluster has one head, which is its member; the result depends on the inputs
-alone, not on their order. What a method says of its heads beyond that, it promises in `Promise`.
+Each node is in exactly one cluster, and each cluster has one head, which is one of its members. The result depends on
+the inputs alone, and not on their order. A method that guarantees more about its heads says so in a `Promise`.
 """
 
 from collections.abc import Mapping, Sequence
@@ -23,38 +23,40 @@ class Cluster(NamedTuple):
 
 
 class Swarm(NamedTuple):
-    """What is known of the nodes; positions and adjacency have the same keys, the rest may lack some or all."""
+    """What is known of the nodes. Positions and adjacency have the same keys; the other maps may lack some nodes."""
 
     positions: Mapping[NodeId, Enu]
     adjacency: Adjacency
     energy: Mapping[NodeId, float] = _NOTHING
-    """What is left, 0..1; 1 where not known."""
+    """The energy that is left, from 0 to 1; 1 for a node that is missing here."""
     mobility: Mapping[NodeId, float] = _NOTHING
-    """Aggregate local mobility [dB^2], see `mobility.py`; 0 where not known."""
+    """The aggregate local mobility of a node [dB^2]; 0 for a node that is missing here."""
     velocities: Mapping[NodeId, Enu] = _UNKNOWN
-    """[m/s]; at rest where not known."""
+    """Velocities [m/s]; a node that is missing here is at rest."""
     previous: Sequence[Cluster] = ()
-    """The clusters that stand now, for methods that keep heads."""
+    """The present clusters, for methods that keep heads."""
 
 
 class Promise(NamedTuple):
-    """`dominating`: each member hears its head. `independent`: no two heads hear each other."""
+    """What a method guarantees: with `dominating` each member hears its head, with `independent` no two heads hear each
+    other.
+    """
 
     dominating: bool
     independent: bool
 
 
 class Clustering(Protocol):
-    """A way to divide a swarm."""
+    """A method that divides a swarm into clusters."""
 
     @property
     def promise(self) -> Promise: ...
 
     def divide(self, swarm: Swarm) -> list[Cluster]:
-        """The clusters, in an order that the inputs decide."""
+        """The clusters, in an order that depends only on the inputs."""
         ...
 
 
 def heads_of(clusters: Sequence[Cluster]) -> tuple[NodeId, ...]:
-    """The heads, ascending."""
+    """The heads, in ascending order."""
     return tuple(sorted(cluster.head for cluster in clusters))

@@ -1,9 +1,9 @@
-"""The division of the nodes that the leader knows, and when it is renewed. Pure functions of what the leader knows.
+"""The leader's division of the nodes into clusters, and the decision when to divide anew. Pure functions.
 
-What stands is first carried on: members that are gone leave, a head that is gone is replaced by its stand-in,
-newcomers go to the nearest head. Then it is weighed against a new division by what it costs: hops from each member to
-its head, and members above the fair share. The new one is taken only when what stands costs `_WORSE` times as much, and
-then heads, and their slots, are kept where they are nearly as good.
+The present clusters are first carried on: nodes that are gone are removed, a head that is gone is replaced by its
+stand-in, and new nodes join the nearest head. Then they are compared with a new division by cost: the hops from each
+member to its head, and members above the fair share. The new division is taken only if the present one costs `_WORSE`
+times as much. Heads, and their slots, are then kept if they are nearly as good as the new ones.
 """
 
 import math
@@ -31,16 +31,16 @@ from fanet_mw.units import NodeId, S
 
 _WORSE: Final = 1.25
 _CONTENTION_NS: Final = 3 * S
-"""Heads that meet wait this long before one gives way (Basu et al. 2001)."""
+"""Two heads that come into range of each other wait this long before one of them gives way (Basu et al. 2001)."""
 
 
 class Division:
-    """One leader's way of dividing, `clusters.method` of the scenario."""
+    """A clustering method (`clusters.method`), as one leader applies it."""
 
     def __init__(
         self, method: str, *, count: int, range_m: float, options: Mapping[str, Any] = MappingProxyType({})
     ) -> None:
-        """A method that is not of this package is one of another, made of the same arguments."""
+        """A method that is not in this package comes from an extension, and is made with the same arguments."""
         scores: dict[str, Score] = {"lowest_id": by_id, "highest_degree": by_degree}
         scores["wca"] = Weights(range_m).__call__
         scores["lasting_degree"] = LastingDegree(range_m).__call__
@@ -65,7 +65,7 @@ class Division:
     def renew(
         self, standing: Sequence[Cluster], swarm: Swarm, stand_ins: Mapping[NodeId, NodeId], *, now_ns: int
     ) -> list[Cluster]:
-        """The clusters from now on, in order of their slots; what stands, if that is good enough."""
+        """The clusters from now on, in the order of their slots; the standing ones if they are good enough."""
         kept = carried_on(standing, swarm, stand_ins)
         fresh = self.divide(swarm._replace(previous=kept), now_ns=now_ns)
         if kept and self._keeps_promise(kept, len(fresh), swarm.adjacency):
@@ -75,14 +75,18 @@ class Division:
         return in_their_slots(fresh, kept, swarm.adjacency)
 
     def _keeps_promise(self, kept: Sequence[Cluster], fresh: int, adjacency: Adjacency) -> bool:
-        """True if the clusters are as many as asked for, or, where the method promises it, all hear their heads."""
+        """True if the kept clusters are as many as asked for, or, for a method that promises it, all members hear their
+        heads.
+        """
         if self._count is not None:
             return len(kept) == fresh
         return all(m == cluster.head or m in adjacency[cluster.head] for cluster in kept for m in cluster.members)
 
 
 def cost(clusters: Sequence[Cluster], adjacency: Adjacency, *, fair: int) -> float:
-    """The transmissions that bring a packet of each member to its head, and one per member above the fair share."""
+    """The number of transmissions that bring one packet of each member to its head, plus one per member above the fair
+    share.
+    """
     total = 0
     for cluster in clusters:
         total += _distance(cluster.head, cluster.members, adjacency) + max(0, len(cluster.members) - fair)
@@ -90,13 +94,15 @@ def cost(clusters: Sequence[Cluster], adjacency: Adjacency, *, fair: int) -> flo
 
 
 def _distance(head: NodeId, members: Sequence[NodeId], adjacency: Adjacency) -> int:
-    """The hops to the heads, summed over all members; a member without a way counts as many as there are nodes."""
+    """The hops from members to their heads, summed; a member that cannot reach its head counts as many as there are
+    nodes.
+    """
     hops = levels(adjacency, head)
     return sum(hops.get(member, len(adjacency)) for member in members)
 
 
 def carried_on(standing: Sequence[Cluster], swarm: Swarm, stand_ins: Mapping[NodeId, NodeId]) -> list[Cluster]:
-    """The standing clusters without the nodes that are gone and with those that are new."""
+    """The standing clusters, without the nodes that are gone and with the new ones."""
     here = swarm.adjacency
     clusters = []
     for cluster in standing:
@@ -119,7 +125,10 @@ def _nearest_to_all(members: Sequence[NodeId], adjacency: Adjacency) -> NodeId:
 
 
 def in_their_slots(fresh: Sequence[Cluster], kept: Sequence[Cluster], adjacency: Adjacency) -> list[Cluster]:
-    """The new clusters, heads kept where they are nearly as near to their members, and each kept head in its slot."""
+    """The new clusters, each in the slot that its head had before.
+
+    A former head is kept if it is nearly as near to the members as the new head would be.
+    """
     slot_of = {cluster.head: slot for slot, cluster in enumerate(kept)}
     slots: dict[int, Cluster] = {}
     rest = []
@@ -138,7 +147,7 @@ def in_their_slots(fresh: Sequence[Cluster], kept: Sequence[Cluster], adjacency:
 
 
 def drift(before: Adjacency, after: Adjacency) -> float:
-    """The share of links, of both, that only one of them has."""
+    """The share of all links in either graph that only one of them has."""
     links = [{(a, b) for a, near in adjacency.items() for b in near if a < b} for adjacency in (before, after)]
     either = len(links[0] | links[1])
     return len(links[0] ^ links[1]) / either if either else 0.0

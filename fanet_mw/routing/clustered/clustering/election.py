@@ -1,16 +1,17 @@
-"""Heads by rank: the best node without a head becomes one, and takes its neighbors that have none (Gerla & Tsai 1995).
+"""Cluster heads by rank: the best node without a head becomes one, and takes its neighbors that have none (Gerla & Tsai
+1995).
 
-The heads are a maximal independent set, so each node hears a head or is one. What tells the methods apart is the score
-alone (lower is better; equal scores: lower id):
+The heads are a maximal independent set, so each node is a head or hears one. The methods differ only in the score by
+which nodes are ranked (lower is better; of equal scores the lower id):
 
     lowest-ID        Ephremides, Wieselthier & Baker 1987      the id
     highest degree   Gerla & Tsai 1995                         most neighbors
     WCA              Chatterjee, Das & Turgut 2002             w1 |d - d0| + w2 distances + w3 mobility + w4 energy used
     lasting degree   (new here)                                neighbors, by how long they will be in range
 
-Hysteresis: a head that stands is counted `keep` better than its score. With infinity only a better head in range
-deposes it (least cluster change, Chiang et al. 1997); pairs under `truce` may meanwhile hear each other. Members keep
-their head while they hear it.
+Hysteresis: the score of a standing head is improved by `keep`. If `keep` is infinite, a head is deposed only by a
+better head in range (least cluster change, Chiang et al. 1997); pairs of heads under `truce` may hear each other for
+the time being. A member keeps its head as long as it hears it.
 """
 
 import math
@@ -24,24 +25,24 @@ from fanet_mw.units import NodeId
 
 Score = Callable[[NodeId, Swarm], float]
 Pair = tuple[NodeId, NodeId]
-"""A pair of heads, the lower id first."""
+"""Two heads, the lower id first."""
 
 
 def by_id(node: NodeId, swarm: Swarm) -> float:
-    """The score of lowest-ID."""
+    """The score of the method lowest-ID."""
     return float(node)
 
 
 def by_degree(node: NodeId, swarm: Swarm) -> float:
-    """The score of highest degree."""
+    """The score of the method highest degree."""
     return -float(len(swarm.adjacency[node]))
 
 
 class Weights(NamedTuple):
-    """WCA's combined weight. Distances count in units of `range_m`, so that the terms are of one size.
+    """The combined weight of WCA. Distances are divided by `range_m`, so that all terms are of a similar size.
 
-    The paper's weights are 0.7, 0.2, 0.05, 0.05; its fourth term is the time spent as head, here replaced by the
-    energy used. `ideal_degree` is the number of members a head can serve.
+    The weights of the WCA paper are 0.7, 0.2, 0.05, 0.05. Its fourth term, the time spent as head, is replaced here by
+    the energy used. `ideal_degree` is the number of members that a head can serve.
     """
 
     range_m: float
@@ -64,7 +65,9 @@ class Weights(NamedTuple):
 
 
 class LastingDegree(NamedTuple):
-    """The number of neighbors that a head would keep, each counted by the part of the horizon it will be in range."""
+    """The number of neighbors that a head would keep: each counts by the part of the horizon for which it stays in
+    range.
+    """
 
     range_m: float
     horizon_s: float = 30.0
@@ -77,7 +80,7 @@ class LastingDegree(NamedTuple):
 
 
 class Elected(NamedTuple):
-    """A method of this file: a score, and how much better a standing head counts."""
+    """A method of this file: a score, and the improvement of a standing head's score."""
 
     score: Score
     keep: float = 0.0
@@ -100,7 +103,7 @@ HIGHEST_DEGREE: Final = Elected(by_degree)
 
 
 def _elect(adjacency: Adjacency, ranks: Mapping[NodeId, tuple[float, float]], truce: Collection[Pair]) -> list[NodeId]:
-    """The heads, best first."""
+    """The heads, the best first."""
     heads: dict[NodeId, None] = {}
     for node in sorted(adjacency, key=lambda n: (ranks[n], n)):
         heard = (n for n in adjacency[node] if n in heads)
@@ -110,7 +113,7 @@ def _elect(adjacency: Adjacency, ranks: Mapping[NodeId, tuple[float, float]], tr
 
 
 def _gather(swarm: Swarm, heads: list[NodeId]) -> list[Cluster]:
-    """Put each member to the head that it had, or to the best one that it hears."""
+    """Put each member into the cluster of the head that it had, or else of the best head that it hears."""
     before = {member: cluster.head for cluster in swarm.previous for member in cluster.members}
     place = {head: index for index, head in enumerate(heads)}
     members: dict[NodeId, list[NodeId]] = {head: [head] for head in heads}
@@ -125,7 +128,10 @@ def _gather(swarm: Swarm, heads: list[NodeId]) -> list[Cluster]:
 
 
 def succession(cluster: Cluster, swarm: Swarm) -> tuple[NodeId, ...]:
-    """The head, then its stand-ins: first those that hear the head, because they notice that it is gone."""
+    """The head, and then the members in the order in which they stand in for it.
+
+    Members that hear the head come first, because they notice when it is gone.
+    """
     near, inside = frozenset(swarm.adjacency[cluster.head]), frozenset(cluster.members)
 
     def rank(node: NodeId) -> tuple[bool, int, NodeId]:

@@ -1,9 +1,9 @@
-"""Clusters over time: heads stay while they can, and two that meet wait before one gives way.
+"""Adapts clusters over time: heads stay as long as they can, and two heads that meet wait before one gives way.
 
-Each step divides the swarm anew with the standing heads kept (least cluster change). Two heads that come into range are
-under truce for the contention interval: often they only pass each other (cluster contention interval, Basu et al.
-2001). A head that still hears the other after that steps down by score. A `patient` head stays on beyond that while
-it has a member that hears no other head, for which a new head would have to be made (new here).
+Each step divides the swarm anew, with the standing heads kept (least cluster change). Two heads that come into range of
+each other have a truce for a time, because often they only pass each other (cluster contention interval, Basu et al.
+2001). If they still hear each other when it ends, the one with the worse score steps down. With `patient`, such a head
+stays as long as it has a member that hears no other head, because that member would become a head itself (new here).
 """
 
 from fanet_mw.routing.clustered.clustering.contract import Cluster, Swarm
@@ -12,7 +12,7 @@ from fanet_mw.units import NodeId
 
 
 class Maintenance:
-    """The clusters of one swarm, step by step."""
+    """The clusters of one swarm over time."""
 
     def __init__(self, score: Score, *, keep: float, contention_ns: int, patient: bool = False) -> None:
         self._score = score
@@ -23,7 +23,7 @@ class Maintenance:
         self.clusters: list[Cluster] = []
 
     def step(self, swarm: Swarm, *, now_ns: int) -> list[Cluster]:
-        """The clusters from now on; `swarm.previous` is filled in here."""
+        """The clusters from now on; this method fills in `swarm.previous`."""
         members = {cluster.head: cluster.members for cluster in self.clusters if cluster.head in swarm.adjacency}
         meeting = [(a, b) for a in sorted(members) for b in swarm.adjacency[a] if b in members and a < b]
         self._met_ns = {pair: self._met_ns.get(pair, now_ns) for pair in meeting}
@@ -42,6 +42,6 @@ class Maintenance:
 
     @staticmethod
     def _needed(head: NodeId, members: dict[NodeId, tuple[NodeId, ...]], swarm: Swarm) -> bool:
-        """True if a member that still hears this head hears no other."""
+        """True if a member that still hears this head hears no other head."""
         mine = (n for n in members[head] if n in swarm.adjacency and head in swarm.adjacency[n])
         return any(not any(n in members and n != head for n in swarm.adjacency[member]) for member in mine)

@@ -1,4 +1,4 @@
-"""The motion of nodes relative to each other: the time for which a link will last."""
+"""Relative motion of nodes: how long a link between two of them will last."""
 
 import math
 

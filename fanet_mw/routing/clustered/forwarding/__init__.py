@@ -1,1 +1,1 @@
-"""A packet's way to its head and from there to everyone, and the repair of what was lost on it."""
+"""How a packet gets to a cluster head and from there to all nodes, and how lost packets are repaired."""

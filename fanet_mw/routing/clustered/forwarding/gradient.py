@@ -1,8 +1,8 @@
-"""The way to a head: hop counts grow from each head outwards, carried by hellos, kept fresh by the head's sequence.
+"""Routes to cluster heads: hellos carry hop counts that grow from each head outwards (a gradient).
 
-As in DSDV, a route carries the head's own sequence number: newer prevails over shorter, and of equally new routes the
-shorter prevails, so an old route is never chosen through a node that depends on it. A node without a head (the leader),
-or without a way to its own head, joins a neighbor's way to another head, so that the packet reaches some head at least.
+As in DSDV, a route carries a sequence number of its head. A newer number prevails over a shorter route, and of routes
+with the same number the shorter prevails, so that no loop forms. A node without a head (the leader), or without a route
+to its own head, takes a neighbor's route to another head, so that its packets reach some head.
 """
 
 from typing import Final, NamedTuple
@@ -13,9 +13,10 @@ from fanet_mw.units import NodeId
 UNREACHABLE: Final = 255
 NO_HEAD: Final = NodeId(0)
 _STALE: Final = 4
-"""The number of hello intervals without a new sequence number of the head after which a route is given up."""
+"""A route is given up after this number of hello intervals without a new sequence number of its head."""
 _FORGET: Final = 4
-"""After this many times as long no node states a dead head any more: a head stated then has restarted, from 0."""
+"""After this many times that duration, no node states a dead head any more. A head that is stated then has restarted,
+and its sequence number begins at 0."""
 
 
 class RouteToHead(NamedTuple):
@@ -26,7 +27,7 @@ class RouteToHead(NamedTuple):
     hops: int
     parent: NodeId
     fresh_ns: int
-    """The instant at which the head's sequence number last advanced."""
+    """The instant at which the sequence number of the head last advanced."""
 
 
 def newer(a: int, b: int) -> bool:
@@ -45,10 +46,13 @@ class Gradient:
         self._seq = 0
         self._route: RouteToHead | None = None
         self._news: dict[int, tuple[int, int]] = {}
-        """The newest sequence number of each head, and since when; a node that states a dead head brings no news."""
+        """The newest sequence number of each head, and the instant since which it is known. A neighbor that goes on to
+        state a dead head changes nothing here."""
 
     def join(self, head: NodeId, *, now_ns: int) -> None:
-        """Follow the head that the schedule gives, perhaps this node itself; a route to another is second best now."""
+        """Follow the head that the schedule gives, which may be this node itself; a route to another head is only
+        second best.
+        """
         if head == self._own_head:
             return
         self._own_head = head
@@ -61,7 +65,7 @@ class Gradient:
             self._route = RouteToHead(self._node, self._seq, 0, self._node, now_ns)
 
     def on_hello(self, neighbor: Neighbor, *, now_ns: int) -> None:
-        """Take in a neighbor's hello, which may bring a better route."""
+        """A neighbor's hello was received, which may state a better route."""
         beacon = neighbor.beacon
         if self._own_head == self._node:
             return  # this node is a head itself
@@ -78,8 +82,9 @@ class Gradient:
             self._route = offered
 
     def _heard(self, head: int, seq: int, now_ns: int) -> int:
-        """The instant since which a head's sequence is known to be at least this; the same news by another way is not
-        fresher.
+        """Note that a head's sequence number is at least `seq`; returns the instant since which this is known.
+
+        The same number from another neighbor is not fresher.
         """
         known = self._news.get(head)
         forgotten = known is None or known[1] + _FORGET * self._stale_ns < now_ns
@@ -92,32 +97,32 @@ class Gradient:
         if offered.head != route.head:
             return offered.head == self._own_head
         if newer(offered.head_seq, route.head_seq):
-            # The parent may only be late to state it: one step newer by a longer way is no reason to switch.
+            # The parent may only be late to state the new number: that is no reason to switch to a longer route.
             one_step = (offered.head_seq - route.head_seq) & 0xFFFF == 1
             return offered.parent == route.parent or offered.hops <= route.hops or not one_step
         return offered.head_seq == route.head_seq and offered.hops < route.hops
 
     def news_ns(self, head: NodeId) -> int | None:
-        """The instant at which this head's sequence last advanced in received hellos; None when it never did."""
+        """The instant at which this head's sequence number last advanced in received hellos; None if it never did."""
         known = self._news.get(head)
         return None if known is None else known[1]
 
     def on_flood_of_head(self, head: NodeId, *, parent: NodeId, hops: int, now_ns: int) -> None:
-        """Take a flood from the head as a route back, until hellos bring a route."""
+        """Take the reverse way of a head's flood as a route to that head, until hellos state one."""
         route = self.route(now_ns=now_ns)
         if hops >= UNREACHABLE - 1:
-            return  # the head is farther than a hello can state
+            return  # a hello cannot state so many hops
         if head == self._own_head != self._node and (route is None or route.head != head):
             self._route = RouteToHead(head, 0, hops, parent, now_ns)
 
     def lose(self, neighbor: NodeId) -> None:
-        """Drop a neighbor to which the link has failed."""
+        """Drop all routes over a neighbor, because the link to it has failed."""
         self._neighbors.forget(neighbor)
         if self._route is not None and self._route.parent == neighbor:
             self._route = None
 
     def route(self, *, now_ns: int) -> RouteToHead | None:
-        """The current route; None when there is none or its news is stale."""
+        """The current route; None if there is none, or if it is stale."""
         route = self._route
         if route is not None and route.parent != self._node and route.fresh_ns + self._stale_ns < now_ns:
             self._route = route = None

@@ -1,11 +1,12 @@
-"""Anti-entropy: a neighbor's hello states what it holds; of the nodes that hold what it lacks, one sends it once more.
+"""Repair of lost packets by anti-entropy: a hello states what its sender has, and a neighbor sends it what it lacks.
 
-    hello with digest -> packets it lacks -> after U(0, assessment), unless another node has sent it -> flooded again
+    hello with digest -> packets that its sender lacks -> wait U(0, assessment) -> flood them again, unless another node
+                                                                                   has done so in the meantime
 
-Packets wait in a bounded store, so that a swarm that was in parts for a while gets to know what each part knew. A
-packet is repaired only when its own flood should be long over. After epidemic routing (Vahdat and Becker, 2000) and
-Trickle's suppression (RFC 6206). What is lost for more than `window_s`, or is more than 32 packets of its origin
-behind, stays lost.
+Packets are kept in a bounded store, so parts of a swarm that were separated for a while learn each other's packets when
+they meet. A packet is repaired only when its own flood should be over. After epidemic routing (Vahdat and Becker,
+2000), with suppression as in Trickle (RFC 6206). A packet stays lost if it is older than `window_s`, or if its origin
+has sent 32 packets since.
 """
 
 import heapq
@@ -21,30 +22,32 @@ from fanet_mw.units import MS, US
 from fanet_mw.wire.digest import CAPACITY, Digest, Holding
 
 ASSESS_NS: Final = 200 * MS
-"""The nodes that could repair the same packet wait for a random time up to this, so that mostly only one does."""
+"""Nodes that could repair the same packet wait for a random time up to this, so that mostly only one of them does."""
 FLOOD_OVER_NS: Final = 500 * MS
-"""The time after which a flood that was heard is over everywhere."""
+"""The time after which a received flood is over everywhere."""
 RIPE_NS: Final = FLOOD_OVER_NS + ASSESS_NS
 """The time after a flood within which some node sends what a hello shows to be missing."""
 AGAIN_NS: Final = 900 * MS
-"""The time after which a node repairs the same packet again: the neighbor has had a hello to state that it lacks it."""
+"""The time after which a node may repair the same packet again; until then the neighbor has sent a hello that still
+lacks it."""
 _PER_HELLO: Final = 32
-"""The most packets sent for one hello: 35 ms of airtime at 11 Mb/s and 1024 B."""
+"""The greatest number of packets that are sent for one hello: 35 ms of airtime at 11 Mb/s and 1024 B."""
 _MOST_ORIGINS: Final = 4 * CAPACITY
-"""The most holdings in one hello: four messages, 1028 bytes. Larger swarms state them in turns."""
+"""The greatest number of origins in one hello: four messages, 1028 bytes. In larger swarms hellos state them in
+turn."""
 _new: Final = tuple.__new__  # for what is made once per packet
 
 
 class _Kept(NamedTuple):
-    """A packet in the store."""
+    """A packet in the store, and when it may be repaired."""
 
     packet: Packet
     ripe_ns: int
-    """The instant before which the packet is not repaired."""
+    """The instant before which the packet is not repaired, because its flood may not be over."""
 
 
 class Repair:
-    """The store of one node, and its repairs."""
+    """The store of packets of one node, and the repairs that it plans."""
 
     def __init__(self, *, window_ns: int, capacity: int, random: Callable[[], float]) -> None:
         self._window_ns = window_ns
@@ -52,13 +55,14 @@ class Repair:
         self._random = random
         self._holdings: dict[int, Holding] = {}
         self._store: dict[int, _Kept] = {}
-        """The packets kept, by key."""
+        """The stored packets by key."""
         self._order: deque[tuple[int, int]] = deque()
-        """The keys of the store with the births of their packets [swarm us], in the order in which they came."""
+        """The keys in the order in which their packets came, each with the instant of the packet's generation [swarm
+        us]."""
         self._stored: dict[int, int] = {}
-        """The number of packets of each origin in the store."""
+        """The number of stored packets by origin."""
         self.pending: dict[int, int] = {}
-        """The instant at which each packet is to be sent, by key; a copy of another packet changes nothing here."""
+        """The instant at which each packet is to be repaired, by key."""
         self._due: list[tuple[int, int]] = []
         self._turn = 0
         self.repaired = 0
@@ -66,7 +70,7 @@ class Repair:
     # --- what the node holds ------------------------------------------------------------------------------------------
 
     def hold(self, packet: Packet, *, flooded: bool, expect_ns: int, now_ns: int) -> None:
-        """Keep a data packet that came by, or an own one; one not yet flooded should have been by `expect_ns`."""
+        """Store a data packet, received or own. One that has not been flooded yet should have been by `expect_ns`."""
         header, store, order = packet.header, self._store, self._order
         origin, seq = header.origin, header.seq
         key = key_of(origin, seq)
@@ -84,7 +88,7 @@ class Repair:
             self._forget(now_ns)
 
     def _forget(self, now_ns: int) -> None:
-        """Drop what is too old to be repaired, and the oldest beyond the capacity."""
+        """Drop packets that are too old to be repaired, and the oldest ones beyond the capacity."""
         horizon_us = (now_ns - self._window_ns) // US
         order, store = self._order, self._store
         while order:
@@ -98,7 +102,7 @@ class Repair:
                 del self._stored[origin]
 
     def digest(self, *, now_ns: int, most: int = _MOST_ORIGINS) -> Digest:
-        """The digest for this node's hello: of everything, or of the next part; of at most so many origins."""
+        """The digest for this node's hello: of all origins, or of the next `most` of them."""
         most = min(most, _MOST_ORIGINS)
         self._forget(now_ns)
         origins = sorted(self._stored)
@@ -112,7 +116,7 @@ class Repair:
     # --- what a neighbor lacks ------------------------------------------------------------------------------------
 
     def on_digest(self, digest: Digest, *, now_ns: int) -> None:
-        """Plan to send what the neighbor lacks."""
+        """A neighbor's hello was received: plan to send what it lacks."""
         told, held, origins = digest.by_origin, self._holdings, self._stored
         planned = 0
         for origin in compress(origins, map(ne, map(told.get, origins), map(held.__getitem__, origins))):
@@ -134,7 +138,7 @@ class Repair:
         heapq.heappush(self._due, (due_ns, key))
 
     def on_copy(self, key: int, *, now_ns: int) -> None:
-        """Note that another node has sent a packet: the nodes around have it now."""
+        """Another node has sent this packet, so the nodes around have it, and the plan to send it is cancelled."""
         if self.pending.pop(key, None) is not None:
             self._put_off(key, now_ns)
 
@@ -146,11 +150,11 @@ class Repair:
     def next_wake_ns(self) -> int | None:
         due = self._due
         while due and self.pending.get(due[0][1]) != due[0][0]:
-            heapq.heappop(due)  # suppressed meanwhile
+            heapq.heappop(due)  # the repair was cancelled
         return due[0][0] if due else None
 
     def due(self, *, now_ns: int) -> Sequence[Packet]:
-        """Packets to flood once more, now."""
+        """The packets to flood again now."""
         if not self._due or self._due[0][0] > now_ns:
             return ()
         packets = []

@@ -1,8 +1,8 @@
-"""The first phase of a packet, TO_HEAD: acknowledged unicast along the gradient, from parent to parent to a head.
+"""Brings packets to a cluster head as acknowledged unicast, from parent to parent along the gradient (phase TO_HEAD).
 
-A packet is under way to a parent that has yet to acknowledge it, or held because there is no way, until it expires.
-A packet that its parent does not acknowledge goes to the parent that is known by then, and is dropped after
-`MOST_TRIES` of them; one that was held in between counts them anew.
+A packet is either under way, until the parent acknowledges it, or it is held because there is no route, until it
+expires. If a parent does not acknowledge it, the packet goes to the parent that is known by then, and is dropped after
+`MOST_TRIES` parents. The count starts again for a packet that was held.
 """
 
 from typing import Final, NamedTuple
@@ -17,20 +17,20 @@ from fanet_mw.units import US, NodeId
 from fanet_mw.wire import FLAG_TO_HEAD
 
 MOST_TRIES: Final = 3
-"""Parents tried for one packet at one node; below each the MAC makes its own attempts."""
+"""The number of parents that one node tries for one packet; for each of them the MAC makes several attempts."""
 
 
 class Attempt(NamedTuple):
-    """A packet under way to a parent."""
+    """A packet that was sent to a parent, which has not acknowledged it yet."""
 
     packet: Packet
     parent: NodeId
     tries: int
-    """The number of parents tried at this node, this one included."""
+    """The number of parents that this node has tried, this one included."""
 
 
 class Uplink:
-    """What is on its way from one node to a head."""
+    """The packets of one node that are on their way to a head."""
 
     def __init__(self, port: Port, gradient: Gradient) -> None:
         self._port = port
@@ -38,15 +38,15 @@ class Uplink:
         routing = port.scenario.routing
         self._held = TxQueue(capacity=routing.queue_frames, sooner_us=sooner_us(routing))
         self._lifetime_ns = routing.lifetime_ns(-1)
-        """The lifetime of the class that lives longest; the queue knows of those that expire sooner."""
+        """The longest lifetime of all priority classes; packets that expire sooner are known to the queue."""
         self._under_way: dict[int, Attempt] = {}
-        """The attempts that have not ended, by sequence number of the transmit request."""
+        """The unfinished attempts, by the sequence number of their transmit request."""
 
     def __len__(self) -> int:
         return len(self._held) + len(self._under_way)
 
     def send(self, packet: Packet, *, start_ns: int, now_ns: int, tries: int) -> None:
-        """Bring a packet one step nearer to a head, or keep it until there is a way."""
+        """Send a packet to the parent, or hold it until there is a route."""
         route = self._gradient.route(now_ns=now_ns)
         if route is None:
             self._hold(packet, now_ns=now_ns)
@@ -60,10 +60,7 @@ class Uplink:
             self._port.drop(DropReason.QUEUE_FULL, evicted, now_ns=now_ns)
 
     def on_status(self, status: TxStatus) -> Attempt | None:
-        """Take in how a transmission ended; returns the attempt if it has failed.
-
-        A parent that did not acknowledge is given up.
-        """
+        """A transmission has ended; returns the attempt if it was one that failed, whose parent is then given up."""
         attempt = self._under_way.pop(status.seq, None)
         if attempt is None or status.outcome is TxOutcome.ACKED:
             return None
@@ -72,15 +69,15 @@ class Uplink:
         return attempt
 
     def released(self, *, now_ns: int) -> list[Packet]:
-        """Take out the packets that were held and have not expired, if there is a way now."""
+        """Take out the held packets that have not expired, if there is a route now."""
         self.expire(now_ns=now_ns)
         return self.drain() if len(self._held) and self._gradient.route(now_ns=now_ns) is not None else []
 
     def expire(self, *, now_ns: int) -> None:
-        """Drop what was held for longer than it lives."""
+        """Drop held packets whose lifetime is over."""
         for packet in self._held.expire(before_us=(now_ns - self._lifetime_ns) // US):
             self._port.drop(DropReason.EXPIRED, packet, now_ns=now_ns)
 
     def drain(self) -> list[Packet]:
-        """Give up what is held, because it goes another way."""
+        """Take out all held packets, because they will go another way."""
         return self._held.drain()

@@ -1,1 +1,1 @@
-"""Which nodes pass a flooded packet on."""
+"""Relaying rules: which nodes pass on a flooded packet, and when."""

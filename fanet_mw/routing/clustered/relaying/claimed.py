@@ -1,4 +1,4 @@
-"""Relays in claimed turns: many floods at once, each passed on as the relay's next turn comes (pipelined)."""
+"""Relaying in claimed turns: a relay passes each flood on in its next turn, so many floods are under way at once."""
 
 from collections.abc import Mapping, Sequence
 from typing import Final
@@ -16,7 +16,7 @@ _NOTHING: Final[Mapping[str, object]] = {}
 
 
 class ClaimedRelaying:
-    """The relays of one node, which wait behind its own packets; what is no data goes on as `otherwise` says."""
+    """Queues a node's relays behind its own packets. Control packets are relayed by the rule `otherwise`."""
 
     def __init__(self, port: Port, claiming: Claiming, access: ClaimedAccess, otherwise: Relaying) -> None:
         self._port = port
@@ -25,7 +25,7 @@ class ClaimedRelaying:
         self._otherwise = otherwise
 
     def start(self, now_ns: int) -> None:
-        """No packet is known yet."""
+        """The node has started; no packet is known yet."""
 
     def on_flood(self, packet: Packet, reception: Reception, *, at_once: bool, now_ns: int) -> Sequence[Relay]:
         header = packet.header

@@ -1,4 +1,4 @@
-"""Relays that contend: a flooded packet goes on after a random jitter if a rule says so; urgent control always does."""
+"""Relaying in contention: after a random jitter, a packet is passed on if a rule says so; urgent control always is."""
 
 from collections.abc import Mapping, Sequence
 from typing import Final
@@ -17,7 +17,7 @@ _NOTHING: Final[Mapping[str, object]] = {}
 
 
 class ContendingRelaying:
-    """The relays of one node that go as soon as they may contend."""
+    """The relays of one node, which go as soon as they may contend."""
 
     def __init__(self, port: Port, rule: Rule, contention: Contention) -> None:
         self._port = port
@@ -25,10 +25,11 @@ class ContendingRelaying:
         self._contention = contention
         self._jitter_ns = port.scenario.routing.jitter_ns
         self.next_wake_ns = rule.open_until.next_wake_ns
-        """The method of what is open: it is asked after every reception."""
+        """The method that tells when a packet is decided whose relay is still open; it is called after every
+        reception."""
 
     def start(self, now_ns: int) -> None:
-        """No packet is known yet."""
+        """The node has started; no packet is known yet."""
 
     def on_flood(self, packet: Packet, reception: Reception, *, at_once: bool, now_ns: int) -> Sequence[Relay]:
         header = packet.header

@@ -1,11 +1,12 @@
-"""Relays chosen by what hellos say of the two hops around: `heads`, `cds`, `mpr`.
+"""Relaying rules by two-hop knowledge from hellos: `heads`, `cds` and `mpr`.
 
-`heads`  cluster heads, and the nodes that are needed to connect them: a dominating set in which heads come first
-`cds`    the connected dominating set of Wu and Li, each node deciding for itself (`graph/connected_dominating_set.py`)
-`mpr`    the nodes that the last sender chose as multipoint relays; the first copy decides (RFC 3626, 3.4.1 and 8.3.1)
+    heads  the cluster heads relay, and the nodes that are needed to connect them
+    cds    the connected dominating set of Wu and Li relays; each node computes for itself whether it belongs to it
+    mpr    the nodes relay that the last sender chose as its multipoint relays; the first copy decides (RFC 3626)
 
-A node that came up less than four hello intervals ago knows too little and relays. With no relay to spare a loss is a
-loss for all behind it: where relays contend, fewer of them deliver less than `all` does.
+A node that started less than four hello intervals ago knows too little, and relays everything. These rules leave no
+relay to spare, so a frame that a relay loses is lost to all nodes behind it: in contention they deliver less than
+`all`.
 """
 
 from collections.abc import Mapping, Sequence
@@ -23,28 +24,29 @@ from fanet_mw.wire.claims import Claims, SlotStatus
 from fanet_mw.wire.inner import Beacon, Role
 
 _LEARN: Final = 4
-"""Hello intervals after which the two hops are known: one for the neighbors, one for theirs, and two may be lost."""
+"""The number of hello intervals after which two hops are known: one for the neighbors, one for theirs, and two may be
+lost."""
 
 _NOTHING: Final[Mapping[str, object]] = {}
 
 
 class RelayChoice(Protocol):
-    """Which nodes relay, once the two hops are known."""
+    """Decides whether a node relays, once it knows its two hops."""
 
     near: Neighborhood
 
     def before_hello(self, now_ns: int) -> None:
-        """The node's next hello is about to say what this choice asks it to say."""
+        """The node is about to send a hello, into which this choice may put a statement."""
 
     def on_beacon(self, beacon: Beacon) -> None:
-        """A neighbor said what it is."""
+        """A neighbor's beacon was received, which states its role."""
 
     def relays(self, sender: NodeId, *, now_ns: int) -> bool:
-        """True if the node relays what `sender` transmitted."""
+        """True if this node relays what `sender` has transmitted."""
 
 
 class MultipointRelays:
-    """Each node chooses those of its neighbors that relay what it sends."""
+    """Each node chooses which of its neighbors relay what it transmits."""
 
     def __init__(self, near: Neighborhood) -> None:
         self.near = near
@@ -53,30 +55,30 @@ class MultipointRelays:
         self.near.choose_relays(now_ns=now_ns)
 
     def on_beacon(self, beacon: Beacon) -> None:
-        """What a neighbor is makes no difference."""
+        """Nothing depends on a neighbor's role."""
 
     def relays(self, sender: NodeId, *, now_ns: int) -> bool:
         return self.near.chosen_by(sender)
 
 
 class DominatingSet:
-    """A node relays if the connected dominating set needs it."""
+    """A node relays if it belongs to the connected dominating set."""
 
     def __init__(self, near: Neighborhood) -> None:
         self.near = near
 
     def before_hello(self, now_ns: int) -> None:
-        """The set needs no word of the node itself."""
+        """The set needs no statement in hellos."""
 
     def on_beacon(self, beacon: Beacon) -> None:
-        """What a neighbor is makes no difference."""
+        """Nothing depends on a neighbor's role."""
 
     def relays(self, sender: NodeId, *, now_ns: int) -> bool:
         return self.near.dominates(own_rank=0.0, now_ns=now_ns)
 
 
 class HeadsFirst:
-    """Cluster heads relay, and those that the dominating set needs to connect them."""
+    """Cluster heads relay, and those nodes of the dominating set that connect them."""
 
     def __init__(self, node: NodeId, *, lifetime_ns: int, membership: Membership) -> None:
         self._membership = membership
@@ -87,7 +89,7 @@ class HeadsFirst:
         return float(self._is_head.get(node, False))
 
     def before_hello(self, now_ns: int) -> None:
-        """The beacon says of the node whether it is a head."""
+        """Nothing needs to be added to the hello: its beacon states whether the node is a head."""
 
     def on_beacon(self, beacon: Beacon) -> None:
         is_head = beacon.role == Role.HEAD
@@ -100,7 +102,7 @@ class HeadsFirst:
 
 
 class NeighborKnowledgeRelaying:
-    """The relays of one node where hellos decide which nodes relay data; control goes on as `otherwise` says."""
+    """Relays data if hellos have made this node a relay. Control packets are relayed by the rule `otherwise`."""
 
     def __init__(self, port: Port, choice: RelayChoice, otherwise: Relaying) -> None:
         self._node = port.node

@@ -1,10 +1,11 @@
-"""Rules by which a node decides alone whether it passes a flooded packet on.
+"""Rules by which a node decides by itself whether it passes on a flooded packet.
 
-`all`      each one, at once
-`gossip`   each one with probability min(1, degree / neighbors)     (after GOSSIP1: Haas, Halpern, Li, ToN 14(3), 2006)
-`counter`  after a random assessment delay, unless enough copies were heard by then    (Ni et al., MobiCom 1999, 3.2)
+    all      it passes on each packet, at once
+    gossip   it passes on each packet with probability min(1, degree / neighbors)
+    counter  it passes on a packet after a random delay, unless it has heard enough copies by then
 
-`counter` adapts to density by itself: in a thin swarm no node hears enough copies to stay silent, in a crowd most do.
+`gossip` is after GOSSIP1 (Haas, Halpern, Li, ToN 14(3), 2006), `counter` after Ni et al. (MobiCom 1999, 3.2). `counter`
+adapts to the density: in a sparse swarm no node hears enough copies to stay silent, in a dense one most nodes do.
 """
 
 from collections.abc import Callable
@@ -18,17 +19,18 @@ from fanet_mw.units import MS
 
 
 class Rule(Protocol):
-    """One node's decisions; `open_until` is empty for a rule that decides at once."""
+    """The decisions of one node. `open_until` is empty if the rule decides at once."""
 
     open_until: Assessment
-    """Packets whose relay is still open."""
+    """The packets about which it is not decided yet whether they are relayed."""
 
     def relays_now(self, packet: Packet, *, now_ns: int) -> bool:
-        """Take in a new packet; True: it is relayed now. False: it is not, or not yet."""
+        """A new packet was received; returns True if it is relayed now, False if it is not, or if that is still open.
+        """
 
 
 class RelayAll:
-    """Every packet is relayed."""
+    """Every packet is relayed at once."""
 
     def __init__(self) -> None:
         self.open_until = Assessment(enough=1)
@@ -38,7 +40,7 @@ class RelayAll:
 
 
 class GossipRule:
-    """A packet is relayed with a probability that the number of neighbors decides."""
+    """A packet is relayed with a probability that depends on the number of neighbors."""
 
     def __init__(self, clusters: Clusters, neighbors: Neighbors, random: Callable[[], float]) -> None:
         self.open_until = Assessment(enough=1)
@@ -51,7 +53,7 @@ class GossipRule:
 
 
 class CounterRule:
-    """A packet is relayed after a while, unless enough others have relayed it by then."""
+    """A packet is relayed after a random delay, unless enough other nodes have relayed it by then."""
 
     def __init__(self, clusters: Clusters, random: Callable[[], float]) -> None:
         self.open_until = Assessment(enough=clusters.counter)

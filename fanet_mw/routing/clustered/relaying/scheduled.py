@@ -1,8 +1,10 @@
-"""Relays by a timetable: a node that hears a packet in a turn knows whose flood it is, and so its own turn of it.
+"""Relaying by a timetable: the turn in which a packet is received tells which flood it is, and when this node relays
+it.
 
-Which turn it is follows from the end of the reception, whose flood from the turn and the sender. By a clock that is
-behind the sender's a frame may end before its turn begins, earlier by the slack at most. Data that is heard in no turn
-of its flood is counted and not relayed; until a timetable is in force, and for control, another rule decides.
+The turn follows from the instant at which the reception ended; the flood follows from the turn and the sender. If this
+node's clock is behind the sender's, a frame may seem to end before its turn begins, by at most the slack of a turn.
+Data that is received outside of any turn of its flood is counted and not relayed. Control packets, and all packets as
+long as no timetable is in force, are relayed by another rule.
 """
 
 from collections.abc import Mapping, Sequence
@@ -20,7 +22,7 @@ from fanet_mw.wire import Kind
 
 
 class ScheduledRelaying:
-    """The relays of one node in the turns of its timetables."""
+    """The relays of one node, in the turns of its timetables."""
 
     def __init__(self, port: Port, plans: TurnPlans, otherwise: Relaying) -> None:
         self._port = port
@@ -28,10 +30,10 @@ class ScheduledRelaying:
         self._otherwise = otherwise
         self._slack_ns = turn_slack_ns(port.scenario)
         self._missed = 0
-        """The number of packets whose turn had begun when the node heard of them."""
+        """The number of packets that arrived only after the node's turn to relay them had begun."""
 
     def start(self, now_ns: int) -> None:
-        """No packet is known yet."""
+        """The node has started; no packet is known yet."""
 
     def on_flood(self, packet: Packet, reception: Reception, *, at_once: bool, now_ns: int) -> Sequence[Relay]:
         plan = self._plans.at(reception.end_ns)
@@ -45,18 +47,18 @@ class ScheduledRelaying:
                 continue
             if not plan.whole or packet.header.origin == heard[1] or not plan.has_turns(packet.origin):
                 return self._in_turn(packet, plan, heard, instant_ns, now_ns)
-            foreign = True  # its sender follows another timetable
+            foreign = True  # the sender follows another timetable
         if not foreign and packet.header.kind != Kind.DATA:
             return self._otherwise.on_flood(packet, reception, at_once=at_once, now_ns=now_ns)
-        if packet.origin != self._port.node:  # what became of an own packet is not decided by a copy that comes back
+        if packet.origin != self._port.node:  # a copy of an own packet that comes back changes nothing
             self._port.drop(DropReason.OUT_OF_TURN, packet, now_ns=now_ns)
         return ()
 
     def _in_turn(
         self, packet: Packet, plan: TurnPlan, heard: tuple[int, NodeId, int], heard_ns: int, now_ns: int
     ) -> Sequence[Relay]:
-        """The relays in those turns of this flood that are the node's and still to come; `heard_ns` lies in the turn in
-        which it was heard.
+        """The relays of this flood in those turns of the node that are still to come; `heard_ns` lies in the turn of
+        reception.
         """
         offset, root, instance = heard
         own = plan.mine.get((root, instance), ())

@@ -19,8 +19,7 @@ def balanced(positions: Mapping[NodeId, Enu], *, count: int) -> list[Cluster]:
 
 
 class Balanced(NamedTuple):
-    """The method `balanced` behind the contract. It sees positions only, so a member may be out of range of its head.
-    """
+    """The method `balanced` behind the contract. It sees only positions, so a member may be out of its head's range."""
 
     clusters: int
 

@@ -1,1 +1,1 @@
-"""Which node leads the swarm, heads a cluster, or is a member, and what becomes of it when nodes fall silent."""
+"""Roles: which node leads the swarm, which nodes head clusters, and how failed leaders and heads are replaced."""

@@ -1,4 +1,4 @@
-"""No roles: no node leads or assigns anything, and every node lets out its own packets."""
+"""Roles in a swarm without a leader: there are none, and every node floods its own packets."""
 
 from collections.abc import Mapping
 
@@ -11,35 +11,37 @@ from fanet_mw.wire.inner import Beacon, Role
 
 
 class NoRoles:
-    """A node that is nothing but itself. Its beacon says how far it is from a node that lets packets out."""
+    """A node without any role. Its beacon states how many hops it is from a node that holds a slot."""
 
     def __init__(self, port: Port) -> None:
         self._port = port
 
     def start(self, now_ns: int) -> None:
-        """Do nothing: there is no leader to join."""
+        """Nothing is done: there is no leader to join."""
 
     def on_sign_of_life(self, node: int, *, born_ns: int, now_ns: int) -> None:
-        """Do nothing: no node watches over others."""
+        """Nothing is done: no node watches other nodes."""
 
     def on_control(self, packet: Packet, src: NodeId, *, now_ns: int) -> bool:
-        """No node of such a swarm sends control packets: they are relayed like data, and mean nothing."""
+        """Nothing is done: no node of such a swarm sends control packets; if one is received, it is relayed
+        like data.
+        """
         return False
 
     def on_hello(self, neighbor: Neighbor, *, born_ns: int, now_ns: int) -> None:
-        """What a neighbor says of leaders does not count."""
+        """Nothing is done: what a neighbor states about leaders does not count."""
 
     def on_impersonation(self, packet: Packet, *, now_ns: int) -> None:
-        """There is no leader in whose name anything could be announced."""
+        """Nothing is done: there is no leader in whose name anything could be announced."""
 
     def on_flooding(self, due_ns: int) -> None:
-        """Do nothing: no other node needs to know that this one lives."""
+        """Nothing is done: no other node needs a sign of life."""
 
     def on_parent_lost(self, parent: NodeId, *, now_ns: int) -> None:
-        """Do nothing: no parent is the head of a node."""
+        """Nothing is done: parents are no heads here."""
 
     def before_hello(self, now_ns: int) -> None:
-        """Nothing goes with the rhythm of the hellos."""
+        """Nothing is done once per hello."""
 
     def beacon(self, route: RouteToHead | None, *, now_ns: int) -> Beacon:
         return Beacon(

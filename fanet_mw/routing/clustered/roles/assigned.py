@@ -1,7 +1,9 @@
-"""Roles that a leader assigns: nodes join by a flooded JOIN, the leader answers with a flooded SCHEDULE.
+"""Roles that a leader assigns: a node floods a JOIN, and the leader floods a SCHEDULE with the clusters and their
+heads.
 
-What becomes of a node when heads and leaders die, and parts of the swarm meet, is decided in `failover.py` by the table
-of `states.py`; this file carries it out: it joins, announces, and tells the access what the node is now.
+Which state a node takes when heads or leaders fail, or when separated parts of the swarm meet, is decided in
+`failover.py` by the table in `states.py`. This file carries the decisions out: it joins, announces schedules, and tells
+the access what the schedule makes of this node.
 """
 
 from collections.abc import Mapping, Sequence
@@ -34,13 +36,13 @@ from fanet_mw.wire.links import Links
 
 
 class MakeLeader(Protocol):
-    """Makes the leader's part of a node that takes office."""
+    """Makes the object that does the leader's work, for a node that becomes leader."""
 
     def __call__(self, authority: Authority, *, epoch: int, elected: bool, now_ns: int) -> Leader: ...
 
 
 class RoleParts(NamedTuple):
-    """The parts of which the roles of a node are made."""
+    """The parts that make up the roles of a node."""
 
     membership: Membership
     lease: Lease
@@ -49,9 +51,9 @@ class RoleParts(NamedTuple):
     refresh: ScheduleRefresh
     check: ScheduleCheck
     detector: FailureDetector | None
-    """The failure detector; None: a silent neighbor concerns only its cluster."""
+    """The failure detector for all neighbors; None if only heads are watched."""
     links: LinkQuality | None
-    """The quality of the node's links; None: links are not measured."""
+    """The measured quality of the node's links; None if links are not measured."""
     liveness: Liveness
 
 
@@ -76,7 +78,7 @@ class AssignedRoles:
         self._make_leader = make_leader
         self._leader: Leader | None = None
         self._standing = parts.membership.standing
-        """The place of the node as the access knows it."""
+        """The role of the node that the access was last told of."""
 
     def start(self, now_ns: int) -> None:
         leads = self._port.node == self._port.scenario.leader
@@ -88,7 +90,7 @@ class AssignedRoles:
         else:
             self.parts.joining.start(now_ns)
 
-    # --- what the air brings --------------------------------------------------------------------------------------
+    # --- received packets -----------------------------------------------------------------------------------------
 
     def on_sign_of_life(self, node: int, *, born_ns: int, now_ns: int) -> None:
         if born_ns > now_ns:
@@ -102,7 +104,7 @@ class AssignedRoles:
         if kind == Kind.JOIN:
             join = decoded(packet.frame, Join.decode_frame)
             self._on_join(packet, join, src, now_ns)
-            # The join of a node that has a place only tells where it is, and need not be relayed by all nodes.
+            # the join of a node that has a place only updates its position, and need not be relayed by all nodes
             return bool(join.instead_of) or not self.parts.membership.lists(packet.header.origin)
         if kind == Kind.SCHEDULE and not ours:
             self.parts.check.check(decoded(packet.frame, Schedule.decode_frame), now_ns)
@@ -129,7 +131,7 @@ class AssignedRoles:
             self._gradient.on_flood_of_head(NodeId(join.node), parent=src, hops=header.hops + 1, now_ns=now_ns)
 
     def _on_schedule(self, packet: Packet, *, now_ns: int) -> None:
-        """Take in an announcement of a leader, perhaps of this node."""
+        """Handle a leader's announcement, which may be that of this node itself."""
         schedule, parts = decoded(packet.frame, Schedule.decode_frame), self.parts
         places = self._timetabling.read(packet, schedule)
         if schedule.leader != packet.header.origin:
@@ -152,8 +154,9 @@ class AssignedRoles:
         self._timetabling.on_schedule(packet, schedule, places, now_ns=now_ns)
 
     def on_impersonation(self, packet: Packet, *, now_ns: int) -> None:
-        """Answer a schedule in this leader's name by announcing a later one (as of link states in OSPF, RFC 2328,
-        13.4).
+        """A schedule was received in the name of this node, which this node has not made: announce a later one.
+
+        OSPF answers forged link states in the same way (RFC 2328, 13.4).
         """
         if packet.header.kind == Kind.SCHEDULE and self._leader is not None:
             schedule = decoded(packet.frame, Schedule.decode_frame)
@@ -177,16 +180,16 @@ class AssignedRoles:
     def on_parent_lost(self, parent: NodeId, *, now_ns: int) -> None:
         self.parts.failover.on_unreachable(parent, now_ns=now_ns)
 
-    # --- the node's part in the swarm -----------------------------------------------------------------------------
+    # --- the node's role in the swarm -----------------------------------------------------------------------------
 
     @property
     def _epoch_followed(self) -> int:
-        """The newest epoch of the leader that the node obeys; 0: it has only called so far."""
+        """The newest epoch of the leader that this node follows; 0 if it has announced no schedule yet."""
         version = self.parts.membership.version
         return version.epoch if version and version.authority == self.parts.lease.authority else 0
 
     def _do(self, actions: Sequence[Action], now_ns: int) -> None:
-        """Carry out what the table asks for."""
+        """Carry out the actions that the table of states has given."""
         parts = self.parts
         for action in actions:
             if action is Action.CALL:
@@ -216,14 +219,14 @@ class AssignedRoles:
         self._leader = self._make_leader(authority, epoch=self.parts.membership.epoch, elected=elected, now_ns=now_ns)
 
     def _join(self, now_ns: int, *, instead_of: int = 0) -> None:
-        """Tell everyone where the node is, and the leader that it wants a place if it has none."""
+        """Flood a join: it states the node's position to all, and asks the leader for a place if the node has none."""
         again = not self.parts.failover.placed and self._leader is None
         inner = self.parts.joining.join(instead_of=instead_of, again=again, now_ns=now_ns)
         urgent, patient = instead_of == self._port.node, not instead_of and not again
         self._access.flood_control(Kind.JOIN, inner, now_ns=now_ns, urgent=urgent, patient=patient)
 
     def _announce(self, part: Schedule, leader: Leader, *, now_ns: int) -> None:
-        """Flood a part of the leader's assignment, which holds for the leader as well."""
+        """Flood one part of the leader's schedule, and follow it as all other nodes do."""
         inner = part.encode_frame(self._port.node) + self._timetabling.addition(part, leader)
         self._on_schedule(self._access.flood_control(Kind.SCHEDULE, inner, now_ns=now_ns), now_ns=now_ns)
         for links in self._timetabling.links_after(part, leader) if self._leader is not None else ():
@@ -241,7 +244,9 @@ class AssignedRoles:
             self._report_silent_neighbor(parts.detector, now_ns)
 
     def _report_silent_neighbor(self, detector: FailureDetector, now_ns: int) -> None:
-        """Let the leader know of a neighbor that has fallen silent; one that lives will hear it too, and object."""
+        """Flood a report that a neighbor has fallen silent; the leader receives it, and so does a neighbor that
+        lives.
+        """
         silent = detector.find_suspect(self.parts.membership.lists, now_ns=now_ns)
         if silent is None:
             return

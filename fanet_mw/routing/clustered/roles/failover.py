@@ -1,10 +1,11 @@
-"""Finds the events that change a node's state, and takes the rows of `states.TRANSITIONS` for them.
+"""Failover of cluster heads and leaders: finds the events that change a node's state, and looks them up in the table.
 
-    announcements, stand-ins, signs of life, instants -> events -> table -> actions, which `assigned.py` carries out
+    announcements, stand-ins, signs of life, instants -> events -> `states.TRANSITIONS` -> actions for `assigned.py`
 
-A head is silent when no packet that it generated, and no newer sequence number of it in hellos, has come for four hello
-intervals, or for two after the MAC gave it up. The first member in the succession then stands in for it, each further
-one half an interval later. Only members that have had news of the head judge it: others may never have been near it.
+A head counts as silent when for four hello intervals no packet that it generated has arrived, and no newer sequence
+number of it in hellos. Two intervals are enough once the MAC has failed to reach it. Then the first member of the
+succession stands in for it, and each further member half an interval later if none before it has. Only members that
+have had news of the head judge it, because others may never have been near it.
 """
 
 from typing import Final
@@ -18,16 +19,17 @@ from fanet_mw.units import MS, NodeId
 from fanet_mw.wire.inner import Join, Schedule
 
 SILENT_HELLOS: Final = 4.0
-"""The number of hello intervals after which a head, or any neighbor in a timetable, counts as silent."""
+"""The number of hello intervals after which a head is silent; with a timetable, any neighbor."""
 _GIVEN_UP_HELLOS: Final = 2.0
 _TURN_HELLOS: Final = 0.5
 _AGAIN_HELLOS: Final = 2.0
-"""A stand-in announces itself each time after so many hellos, until a new schedule confirms it or the head objects."""
+"""The number of hello intervals after which a stand-in announces itself again, until a schedule confirms it or the head
+objects."""
 _OBJECT_NS: Final = 500 * MS
 
 
 class Failover:
-    """The state of one node in the swarm, and the events that change it."""
+    """The state of one node, and the events that change it."""
 
     def __init__(
         self,
@@ -40,10 +42,10 @@ class Failover:
         hello_ns: int,
         takes_slot: bool,
     ) -> None:
-        """With `takes_slot` a stand-in serves the slot of the silent head; otherwise it only informs the leader."""
+        """With `takes_slot` a stand-in uses the slot of the silent head; without it, it only informs the leader."""
         self.state = State.SEEKING
         self.silent_head = NodeId(0)
-        """The head that this node stands in for, while it does."""
+        """The head for which this node stands in; 0 while it does not."""
         self._takes_slot = takes_slot
         self._node = node
         self._membership = membership
@@ -73,19 +75,19 @@ class Failover:
     # --- receiving ------------------------------------------------------------------------------------------------
 
     def on_schedule(self, schedule: Schedule, *, guard_ns: int, born_ns: int, now_ns: int) -> list[Action]:
-        """Handle a leader's announcement: the first copy, or this node's own."""
+        """Handle a leader's announcement, received for the first time or made by this node."""
         authority, leads = Authority(schedule.term, schedule.leader), self.state is State.LEADING
         own = self._lease.authority
         if schedule.leader == self._node:
             if not leads or authority != own:
-                return []  # the announcement is from before a restart, or from before this node stepped down
+                return []  # the announcement was made before a restart, or before this node stepped down
         elif leads and own is not None and authority > own:
-            return []  # the other leader is junior, and will receive this node's announcements
+            return []  # the other leader is junior, and steps down when it receives this node's announcement
         actions = []
         if not leads or authority != own:
             prevails = own != authority
             if leads:
-                self._lease.authority = None  # the senior leader prevails over this node's own office
+                self._lease.authority = None  # the other leader is senior, so this node is no longer leader
             if not self._lease.accept(authority, born_ns=born_ns, now_ns=now_ns):
                 self._lease.authority = own
                 return []
@@ -99,13 +101,13 @@ class Failover:
         return actions
 
     def on_stand_in(self, join: Join, *, born_ns: int, now_ns: int) -> list[Action]:
-        """Handle a node's statement that it stands in for a head; in a timetable, that some node is silent."""
+        """Handle the statement of a node that it stands in for a head; with a timetable, that some node is silent."""
         member = self._membership
         if not self._takes_slot and (join.instead_of == self._node or join.instead_of != member.head):
             return self._object(join, now_ns)
         rank, current = member.rank(join.node), member.rank(member.head)
         if not rank or current is None or self.state is State.LEADING or join.node == join.instead_of:
-            return []  # it is of another cluster or epoch, or it is a head that objects
+            return []  # the statement is from another cluster or epoch, or it is the objection of a head
         if self.state is State.HEAD:
             return [self._take(Event.HEAD_REPLACED, now_ns)]
         sign_ns = self._liveness.last_ns(member.head) or 0
@@ -116,7 +118,7 @@ class Failover:
         return [self._take(Event.HEAD_REPLACED, now_ns)]
 
     def _object(self, join: Join, now_ns: int) -> list[Action]:
-        """Object if this node is said to be silent; not too often, because each objection is a flood."""
+        """Object if another node states that this node is silent; rarely, because each objection is a flood."""
         called = join.instead_of == self._node != join.node
         if not called or now_ns < self._object_ns or self.state in (State.SEEKING, State.LEADING):
             return []
@@ -124,7 +126,7 @@ class Failover:
         return [self._take(Event.SAID_SILENT, now_ns)]
 
     def on_sign_of_life(self, node: int, *, born_ns: int, now_ns: int) -> list[Action]:
-        """Handle a sign of life of a node."""
+        """A packet was received that a node generated at `born_ns`."""
         self._liveness.on_sign_of_life(node, born_ns=born_ns)
         member = self._membership
         if born_ns <= self._since_ns or node != member.named_head:
@@ -133,7 +135,7 @@ class Failover:
         return [self._take(Event.HEAD_BACK, now_ns)] if replaced else []
 
     def on_unreachable(self, node: NodeId, *, now_ns: int) -> None:
-        """Note that the MAC could not reach this neighbor."""
+        """The MAC has failed to reach this neighbor."""
         if node == self._membership.head and self.state is State.MEMBER:
             self._unreachable_ns = now_ns
             self._watch_ns = now_ns
@@ -169,7 +171,7 @@ class Failover:
         news_ns = self._gradient.news_ns(member.head)
         if news_ns is None or news_ns < self._since_ns:
             self._watch_ns = now_ns + self._hello_ns
-            return []  # this node has not been near the head since it follows it
+            return []  # this node has not been near the head since it began to follow it
         sign_ns = max(news_ns, self._liveness.last_ns(member.head) or 0)
         hellos = _GIVEN_UP_HELLOS if self._unreachable_ns > sign_ns else SILENT_HELLOS
         due_ns = sign_ns + int((hellos + (rank - current - 1) * _TURN_HELLOS) * self._hello_ns)
@@ -182,7 +184,7 @@ class Failover:
     # --- the table ------------------------------------------------------------------------------------------------
 
     def _take(self, event: Event, now_ns: int) -> Action:
-        """Take a row of the table; this is the only place where the state changes."""
+        """Take a row of the table; the state changes nowhere else."""
         before = self.state
         self.state, action = step(before, event)
         member = self._membership
@@ -196,7 +198,7 @@ class Failover:
                 member.follow(self._node)
         if action is Action.FOLLOW:
             if event is not Event.NAMED_MEMBER or self._named != member.named_head:
-                self._since_ns = now_ns  # otherwise what was known of the head still holds
+                self._since_ns = now_ns  # if the head is the same, what is known of it still holds
             self._named = member.named_head
             self._watch_ns = now_ns + self._hello_ns
         return action

@@ -1,12 +1,13 @@
-"""Which neighbors have fallen silent, where that cuts others off: in a timetable a dead relay loses all behind it.
+"""Failure detector for neighbors. It is used with a timetable, where a failed relay cuts off all nodes behind it.
 
-    no hello of a neighbor for 4 intervals, and nothing that it generated -> a join that says so, with the node's next
-    hello, unless another node has said so -> the neighbor objects, and stays; or the leader plans without it
+    no hello for 4 intervals, and no packet that the neighbor generated
+        -> this node floods a join that reports it, unless another node has done so
+        -> the neighbor objects and stays, or the leader makes a new timetable without it
 
-A neighbor that flew away looks the same to this node: then the neighbor objects, and is not reported again until its
-hellos are heard again. Where its objection does not arrive it is reported again every 10 s, for a minute; where packets
-of it still arrive, never. A report is a join, and a node floods one of those in 5 s at most. The number of nodes bounds
-what is remembered.
+A neighbor that has flown away looks silent to this node, too. It will object, and is then not reported again until this
+node has heard a hello of it. If no objection arrives, the neighbor is reported again every 10 s for a minute, but not
+while packets of it still arrive. A node floods at most one join in 5 s, so at most one report. The memory is bounded by
+the number of nodes.
 """
 
 from collections.abc import Callable
@@ -17,12 +18,12 @@ from fanet_mw.routing.clustered.roles.liveness import Liveness
 from fanet_mw.units import NodeId, S
 
 _AGAIN_NS: Final = 10 * S
-"""A neighbor that is still in the schedule after this time is reported again: the report may not have arrived."""
+"""A neighbor that is still in the schedule after this time is reported again, because the report may have been lost."""
 _FORGOTTEN_NS: Final = 60 * S
 
 
 class FailureDetector:
-    """One node's watch over its neighbors."""
+    """Watches the neighbors of one node."""
 
     def __init__(self, liveness: Liveness, *, hello_ns: int) -> None:
         self._liveness = liveness
@@ -31,19 +32,19 @@ class FailureDetector:
         self._reported_ns: dict[NodeId, int] = {}
 
     def on_hello(self, node: NodeId, *, now_ns: int) -> None:
-        """Note a neighbor's hello."""
+        """A hello of a neighbor was received."""
         self._heard_ns[node] = now_ns
         self._reported_ns.pop(node, None)
 
     def on_report(self, node: NodeId, *, now_ns: int) -> None:
-        """Note that a node, perhaps this one, has reported a node to the leader as silent."""
+        """Some node, perhaps this one, has reported a node to the leader as silent."""
         if node in self._heard_ns:
             self._reported_ns[node] = now_ns
 
     def find_suspect(self, lists: Callable[[NodeId], bool], *, now_ns: int) -> NodeId | None:
-        """Look for a neighbor that should be reported now, and forget those that no longer count.
+        """A neighbor that should be reported now, or None. `lists` tells whether the schedule names a node.
 
-        None if there is nobody to report. `lists` says whether the schedule names a node.
+        Neighbors that no longer count are forgotten.
         """
         for node in sorted(self._heard_ns):
             quiet_ns = now_ns - self._heard_ns[node]

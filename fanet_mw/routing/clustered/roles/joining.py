@@ -1,9 +1,9 @@
-"""The join of a node: a flood that tells where the node is, and asks the leader for a place.
+"""Decides when a node joins: it floods a packet that states where it is, and asks the leader for a place.
 
-no place yet                     at a random instant, and again until a schedule names the node
-farther from where it was told   with the next hello, a little spread (`position_updates.py`)
-links are measured               the same, as soon as there is an estimate, and when a link has changed: in joins;
-                                 again until the leader announces links, because joins get lost like any flood
+the node has no place yet             at a random instant, and again until a schedule names the node
+it is not where the leader believes   with the next hello, a little spread over the nodes (`position_updates.py`)
+its links are measured                the same, as soon as there is an estimate, and when a link has changed; again
+                                      until the leader announces links, because any flood may be lost
 """
 
 from collections.abc import Callable
@@ -19,12 +19,13 @@ from fanet_mw.wire.links import Links
 
 _FIRST_NS: Final = 500 * MS
 _WINDOW_NS: Final = 3 * S
-"""Joins are floods: spread, so that a swarm that starts together does not drown in them."""
+"""Joins are spread over this time at random, because all nodes of a swarm may start together, and each join is a
+flood."""
 _REJOIN_NS: Final = 2 * S
 
 
 class Joining:
-    """The joins of one node."""
+    """Decides when one node joins, and makes the join."""
 
     def __init__(
         self, port: Port, updates: PositionUpdates, links: LinkQuality | None, random: Callable[[], float]
@@ -35,38 +36,40 @@ class Joining:
         self._random = random
         self._has_told_links = False
         self._links_are_announced = False
-        """True if the leader that the node follows has announced measured links, which it does when it knows enough."""
+        """True if the leader has announced measured links, which it does when it knows those of most nodes."""
         self.due_ns: int | None = None
-        """The instant at which the node joins next; None: it has no reason to."""
+        """The instant of the node's next join; None if it has no reason to join."""
 
     def start(self, now_ns: int) -> None:
-        """Begin: the node is up and belongs to no cluster."""
+        """The node has started, and belongs to no cluster."""
         self.due_ns = now_ns + _FIRST_NS + int(self._random() * _WINDOW_NS)
 
     def ask_for_a_place(self, now_ns: int) -> None:
-        """The node has lost its place, or follows another leader: it joins soon, if it was not about to."""
+        """The node has lost its place, or follows another leader: it will join soon."""
         self._links_are_announced = False
         if self.due_ns is None:
             self.due_ns = now_ns + int(self._random() * _WINDOW_NS)
 
     def on_links_announced(self) -> None:
-        """The leader makes timetables from measured links: it has heard of those of most nodes."""
+        """The leader makes timetables from measured links, so it has received those of most nodes."""
         self._links_are_announced = True
 
     def rest(self) -> None:
-        """The node has a place, or leads."""
+        """The node has a place, or leads, so it does not ask for one any more."""
         self.due_ns = None
 
     def on_flooding(self, due_ns: int) -> None:
-        """A packet of the node goes to everyone: a sign of life."""
+        """A packet of this node will be flooded to all, which is a sign of life."""
         self._updates.on_flooding(due_ns)
 
     def may_update(self, now_ns: int) -> bool:
-        """True if the last join is long enough ago for another."""
+        """True if the last join was long enough ago for another one."""
         return self._updates.may_update(now_ns)
 
     def update_if_outdated(self, *, listed: int, now_ns: int) -> None:
-        """Join soon if the leader must be told something new; `listed` nodes may all have to at the same time."""
+        """Plan a join if the leader must be told something new; `listed` nodes may all have to do so at the
+        same time.
+        """
         if self.due_ns is None and (
             self._updates.outdated(self._port.position, now_ns=now_ns)
             or (self._links is not None and self._must_tell(self._links, now_ns))
@@ -74,13 +77,15 @@ class Joining:
             self.due_ns = now_ns + int(self._random() * UPDATE_NS * (1 + listed))
 
     def _must_tell(self, links: LinkQuality, now_ns: int) -> bool:
-        """True if the leader lacks the links of this node, or has others than those of now."""
+        """True if the leader has no links of this node, or outdated ones."""
         if not self._has_told_links:
-            return links.has_estimate(now_ns=now_ns)  # however short a time ago the node joined without them
+            return links.has_estimate(now_ns=now_ns)  # even if the node has just joined without them
         return self._updates.may_update(now_ns) and (not self._links_are_announced or links.outdated(now_ns=now_ns))
 
     def join(self, *, instead_of: int, again: bool, now_ns: int) -> bytes:
-        """The inner frames of a join that goes now; `again`: another follows if no schedule names the node."""
+        """The inner frames of a join that is sent now; with `again`, another one follows if no schedule names
+        the node.
+        """
         self.due_ns = now_ns + _REJOIN_NS + int(self._random() * _WINDOW_NS) if again else None
         motion = self.motion(now_ns)
         self._updates.on_update(motion)
@@ -91,5 +96,5 @@ class Joining:
         return inner + Links(node, links).encode_frames() if links else inner
 
     def motion(self, now_ns: int) -> Motion:
-        """The present motion of the node."""
+        """The node's own motion now."""
         return Motion(self._port.position, self._port.velocity, now_ns)

@@ -1,10 +1,11 @@
-"""The leader's work: learn from joins where nodes are, divide them into clusters, announce the schedule.
+"""The leader's work: it learns from joins where nodes are, divides them into clusters, and announces the schedule.
 
-    joins -> no more for a moment -> division -> schedule, once per flooding period
-    a node is new or gone, or the clusters have become too bad -> another epoch, at most one per `clusters.reassign_s`
+    joins -> none for a moment -> clusters -> schedule, announced once per flooding period
+    a node is new or gone, or the clusters have become too bad -> a new epoch, at most one in `clusters.reassign_s`
 
-Joins come in bursts, so an assignment waits until no join has come for a moment. An elected leader knows no nodes yet:
-it calls, and assigns when all have had the time to answer. Positions are extrapolated by dead reckoning.
+Joins come in bursts, so the leader waits until none has come for a moment. An elected leader knows no nodes at first:
+it calls all nodes to join, and divides them when all have had time to answer. Between joins, positions are extrapolated
+by dead reckoning.
 """
 
 from collections.abc import Mapping, Sequence
@@ -27,23 +28,24 @@ from fanet_mw.wire.inner import CAPACITY, Join, Member, Schedule
 from fanet_mw.wire.links import Link
 
 SETTLE_NS: Final = 700 * MS
-"""The quiet time after the last join before the clusters are computed."""
+"""The time without a join after which the clusters are computed."""
 OBJECTION_NS: Final = 2 * S
-"""The time in which a head that is said to be silent may object; meanwhile a stand-in serves its cluster."""
+"""The time that a node has to object when it is reported silent; meanwhile a stand-in serves its cluster."""
 _OBJECTION_PERIODS: Final = 4
-"""The same with a timetable, in periods: the report waits for a contention window, the objection for a turn."""
+"""The same with a timetable, in superframes, because the report waits for a contention window and the objection for a
+turn."""
 ANSWER_NS: Final = 3500 * MS
-"""The time after which the joins that answer a call have come: they are spread over 3 s."""
+"""The time after a call at which the joins that answer it have arrived; nodes spread them over 3 s."""
 _FIRST_CALL_NS: Final = 5 * S
 """The first leader calls only if no node has joined by then."""
 HEARD_NS: Final = 1500 * MS
 """The time after which an announcement has reached all nodes."""
 _ANNOUNCEMENTS: Final = 4
-"""The number of announcements after which an assignment has reached all nodes over links that lose frames."""
+"""The number of announcements after which a schedule has reached all nodes over links that lose frames."""
 _MOST: Final = 0.9
-"""The share of nodes whose links must be known before measured links are used."""
+"""The share of nodes that must have reported their links before measured links are used."""
 _DRIFT: Final = 0.03
-"""The share of links that must have changed before a timetable is made anew."""
+"""The share of links that must have changed before a new timetable is made."""
 
 
 class _Assigned(NamedTuple):
@@ -55,7 +57,7 @@ class _Assigned(NamedTuple):
     start_ns: int = 0
     parts: Sequence[Schedule] = ()
     measured: tuple[Link, ...] = ()
-    """The links from which all nodes compute the timetable; empty when places decide."""
+    """The links from which all nodes compute the timetable; empty if it is computed from positions."""
 
     @property
     def nodes(self) -> list[NodeId]:
@@ -63,7 +65,7 @@ class _Assigned(NamedTuple):
 
 
 class Leader:
-    """The part of a node that leads: it makes schedules of the joins that it hears."""
+    """The leader's work at one node: joins in, schedules out."""
 
     def __init__(
         self,
@@ -76,7 +78,9 @@ class Leader:
         elected: bool,
         now_ns: int,
     ) -> None:
-        """With `needs_every_link` a timetable is made from the assignment, which then depends on more than clusters."""
+        """`needs_every_link`: nodes compute a timetable from the assignment, so a new one is also needed when links
+        change.
+        """
         clusters = scenario.clusters
         self._authority = authority
         self._period_ns = clusters.period_ns
@@ -95,16 +99,17 @@ class Leader:
         self._epoch = epoch
         self._links = LinkState() if scenario.measures_links else None
         self._measured_ns = measured_period_ns(scenario)
-        """The interval at which an assignment is announced whose links have been measured: one superframe."""
+        """The interval of announcements with measured links: one superframe."""
         self._outbid = False
-        """True if another node has announced an epoch in this leader's name, so that the next epoch must be later."""
+        """True if another node has announced an epoch in this leader's name, so that the next epoch must come after
+        it."""
         self._assigned = _Assigned()
         self._due_ns = now_ns if elected else now_ns + _FIRST_CALL_NS
         self._announced_ns = now_ns
         self._not_before_ns = now_ns + ANSWER_NS if elected else now_ns
 
     def on_join(self, join: Join, *, born_ns: int, now_ns: int) -> None:
-        """Take in a node's place, or that it stands in. The leader is a member of no cluster (paper, 4.1)."""
+        """A node has joined, or stands in for a head. The leader itself is in no cluster (paper, 4.1)."""
         node, silent = NodeId(join.node), NodeId(join.instead_of)
         if node == self._authority.leader:
             return
@@ -118,18 +123,20 @@ class Leader:
             self.on_suspicion(silent, node, motion, now_ns=now_ns)
 
     def on_links(self, node: NodeId, links: Sequence[Link]) -> None:
-        """Take in how well a node, perhaps the leader itself, hears its neighbors."""
+        """A node, perhaps the leader itself, has reported how well it hears its neighbors."""
         if self._links is not None:
             self._links.on_report(node, links)
 
     def on_outbid(self, epoch: int, *, now_ns: int) -> None:
-        """Handle a schedule in this leader's name that it has not made: announce a later epoch soon."""
+        """A schedule was received in this leader's name that it has not made: announce a later epoch soon."""
         if 0 < ((epoch - self._epoch) & 0xFFFF) < 0x8000 and self._assigned.parts:
             self._epoch, self._outbid = epoch, True
             self._due_ns = min(self._due_ns, now_ns + SETTLE_NS)
 
     def on_suspicion(self, silent: NodeId, by: NodeId, there: Motion, *, now_ns: int) -> None:
-        """Note that a node is reported silent by a node whose place is given; it has some time to object."""
+        """The node `by`, which flies at `there`, reports that the node `silent` is silent; that node has some time to
+        object.
+        """
         until_ns = self._roster.on_report(silent, by, there, now_ns=now_ns)
         if until_ns is not None:
             self._due_ns = min(self._due_ns, max(until_ns, now_ns))
@@ -138,9 +145,10 @@ class Leader:
         return self._due_ns
 
     def wake(self, here: Motion, *, notice_ns: int = 0, now_ns: int) -> Sequence[Schedule]:
-        """The parts of the schedule to announce now; `here` is the place of the leader itself.
+        """The parts of the schedule to announce now; `here` is the leader's own motion.
 
-        New parts come into force `notice_ns` later at the earliest, and not before all nodes should have received them.
+        A new schedule comes into force `notice_ns` later at the earliest, and only when all nodes should have received
+        it.
         """
         if now_ns < self._due_ns:
             return []
@@ -154,13 +162,13 @@ class Leader:
         return self._assigned.parts or [self._call(now_ns)]
 
     def _call(self, now_ns: int) -> Schedule:
-        """A call to join, while no node is assigned."""
+        """A call to all nodes to join, made while no node is assigned."""
         period_us = self._period_ns // US
         term, leader = self._authority
         return Schedule(now_ns // US, period_us, period_us, 0, leader, 1, 0, 1, (), term)
 
     def _renew(self, here: Motion, notice_ns: int, now_ns: int) -> None:
-        """Make another epoch, if there is a reason."""
+        """Begin a new epoch if there is a reason to."""
         before = self._assigned
         changed = self._outbid or sorted(self._roster.nodes) != sorted(before.nodes)
         rests = not self._reassign_ns or self._roster.stand_ins or now_ns < before.start_ns + self._reassign_ns
@@ -169,7 +177,7 @@ class Leader:
             return
         measured_ns = _ANNOUNCEMENTS * self._measured_ns if before.measured else 0
         notice_ns = max(HEARD_NS, notice_ns, measured_ns)
-        decided_ns = max(now_ns, self._announced_ns + self._period_ns)  # nodes expect no news within a period
+        decided_ns = max(now_ns, self._announced_ns + self._period_ns)  # nodes expect no new schedule within a period
         start_ns = (decided_ns + notice_ns) // self._period_ns * self._period_ns + self._period_ns
         places = self._places(here, start_ns)
         members = {node: place for node, place in places.items() if node != self._authority.leader}
@@ -190,7 +198,9 @@ class Leader:
         self._assigned = _Assigned(ordered, places, links, start_ns, self._parts(ordered, start_ns), measured)
 
     def _measured(self) -> tuple[Link, ...]:
-        """The links to plan with; empty until most nodes have reported theirs: neighbors know the links of the rest."""
+        """The measured links to plan with, or none until most nodes have reported; the others' links are known from
+        neighbors.
+        """
         if self._links is None:
             return ()
         nodes = [*self._roster.nodes, NodeId(self._authority.leader)]
@@ -198,13 +208,13 @@ class Leader:
         return self._links.between(nodes) if known else ()
 
     def _places(self, here: Motion, start_ns: int) -> dict[NodeId, Enu]:
-        """The places of all nodes in the middle of the time for which the assignment is made."""
+        """The positions of all nodes in the middle of the time for which the assignment is made."""
         t_ns = start_ns + self._reassign_ns // 2
         places = self._roster.places(t_ns) | {NodeId(self._authority.leader): here.position_at(t_ns)}
         return {node: places[node] for node in sorted(places)}
 
     def _parts(self, clusters: list[Cluster], start_ns: int) -> list[Schedule]:
-        """The parts of the schedule; its superframes begin when all nodes should have received it."""
+        """The parts of the schedule, whose superframes begin when all nodes should have received it."""
         members = [
             Member(node, index, node == cluster.head)
             for index, cluster in enumerate(clusters)
@@ -229,14 +239,14 @@ class Leader:
 
     @property
     def links(self) -> tuple[Link, ...]:
-        """The measured links of the assignment that is announced."""
+        """The measured links of the present assignment."""
         return self._assigned.measured
 
     @property
     def epoch(self) -> int:
-        """The number of the assignment that is announced."""
+        """The number of the present assignment."""
         return self._epoch
 
     def place(self, node: int) -> Enu:
-        """The place that the announced assignment assumes for a member, or for the leader itself."""
+        """The position that the present assignment assumes for a member, or for the leader itself."""
         return self._assigned.places[NodeId(node)]

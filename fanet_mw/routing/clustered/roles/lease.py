@@ -1,10 +1,11 @@
-"""Which leader a node follows as long as its announcements keep coming, and when the node itself takes office.
-
-Authorities are ordered: the lower term (the swarm second in which the leader took office) prevails, then the lower id.
-So when two parts of a swarm meet, the leader longest in office stays, whichever part is larger; a node that was cut
-off for a while and elected itself never deposes the leader of all others; and a restarted node is junior.
+"""The lease of a leader: a node follows a leader as long as its announcements keep coming, and else elects a new one.
 
     announced -> ... silent for `silence_ns` -> the lowest live id takes office at once, others up to 3 s later -> call
+
+Leaders are ordered: the one with the lower term prevails, which is the second of swarm time in which it took office; of
+equal terms the lower id. When two separated parts of a swarm meet, the leader that has been in office longer stays,
+however large its part is. A node that elected itself while it was cut off therefore never deposes the leader of all
+others, and a restarted leader is the junior one.
 """
 
 from typing import Final, NamedTuple
@@ -15,27 +16,27 @@ from fanet_mw.units import NodeId, S
 _PERIODS: Final = 4
 _LEAST_NS: Final = 4 * S
 _FIRST_NS: Final = 8 * S
-"""A node waits for a leader so long at its start: joins take 3 s, and their assignment another 2 s."""
+"""The time for which a node waits for a leader after its start: joins take 3 s, and the assignment another 2 s."""
 _TURN_NS: Final = 1 * S
-"""A node waits so long for each node with a lower id to take office first."""
+"""The time for which a node lets each live node with a lower id take office first."""
 _TURNS: Final = 3
 _FOREVER_NS: Final = 1 << 62
 
 
 def silence_ns(period_ns: int) -> int:
-    """The age of the newest announcement at which a leader is given up: four superframes, at least 4 s."""
+    """The age of the newest announcement at which a leader is given up: four superframes, and at least 4 s."""
     return max(_PERIODS * period_ns, _LEAST_NS)
 
 
 class Authority(NamedTuple):
-    """A leader in office; of two authorities the lesser prevails, compared as tuples."""
+    """A leader in office. Authorities are compared as tuples, and the lesser prevails."""
 
     term: int
     leader: int
 
 
 class Lease:
-    """One node's allegiance to a leader."""
+    """The leader that one node follows."""
 
     def __init__(self, node: NodeId, *, period_ns: int, liveness: Liveness) -> None:
         self._node = node
@@ -44,32 +45,32 @@ class Lease:
         self.authority: Authority | None = None
         self._until_ns = 0
         self.stand_ns = 0
-        """The instant at which the node is to check whether it must take office."""
+        """The instant at which the node next checks whether it must take office."""
 
     def start(self, now_ns: int) -> None:
-        """Begin to wait for a leader, because none has been heard yet."""
+        """The node has started, has heard of no leader yet, and waits for one."""
         self._until_ns = self.stand_ns = now_ns + _FIRST_NS + self._silence_ns
 
     @property
     def leads(self) -> bool:
-        """True if this node is the leader itself."""
+        """True if this node is the leader."""
         return self.authority is not None and self.authority.leader == self._node
 
     def valid(self, now_ns: int) -> bool:
-        """True while the leader's newest announcement is not older than the silence limit."""
+        """True while the leader's newest announcement is within the silence limit."""
         return self.authority is not None and now_ns <= self._until_ns
 
     def fresh(self, now_ns: int) -> bool:
-        """True while the newest announcement is younger than half the silence limit. A node for which this is False
-        asks its neighbors, so that one lost announcement does not let the limit pass.
+        """True while the newest announcement is within half the silence limit. Otherwise the node asks its neighbors
+        for a newer one, so that a lost announcement does not end the lease.
         """
         return self.authority is not None and now_ns <= self._until_ns - self._silence_ns // 2
 
     def accept(self, authority: Authority, *, born_ns: int, now_ns: int) -> bool:
-        """Consider an announcement made at `born_ns`; True if it is accepted, and its authority holds from now on."""
+        """Consider an announcement made at `born_ns`; returns True if the node follows its leader from now on."""
         until_ns = born_ns + self._silence_ns
         if until_ns < now_ns:
-            return False  # the announcement is so old that its leader may be dead
+            return False  # the announcement is so old that its leader may have failed
         if self.authority is not None and authority > self.authority and self.valid(now_ns):
             return False
         self._until_ns = max(until_ns, self._until_ns if authority == self.authority else 0)
@@ -78,14 +79,16 @@ class Lease:
         return True
 
     def take_office(self, now_ns: int) -> Authority:
-        """Become the leader from now on."""
+        """Become the leader."""
         self.authority = Authority(now_ns // S, self._node)
         self._until_ns = _FOREVER_NS
         return self.authority
 
     def review(self, now_ns: int) -> bool:
-        """Put the own turn to stand off for the nodes with lower ids that are alive; True if it has come: the leader is
-        silent, and none of them has taken office in time.
+        """True if this node must take office now: the leader is silent, and no live node with a lower id has taken
+        office in time.
+
+        Otherwise the next check is set after the turns of those nodes.
         """
         if now_ns < self.stand_ns:
             return False

@@ -1,7 +1,7 @@
-"""The cluster to which a node belongs, by the newest schedule. All parts of an epoch count, in any order.
+"""The cluster of a node by the newest schedule, whose parts may arrive in any order.
 
-A schedule lists the members of a cluster in the order in which they stand in for each other, the head first. A node
-that is in no part of a complete schedule has no role.
+A schedule lists the members of each cluster in the order in which they stand in for each other, the head first. A node
+that is in no part of a complete schedule belongs to no cluster.
 """
 
 from collections.abc import Mapping
@@ -16,7 +16,7 @@ from fanet_mw.wire.inner import Member, Role, Schedule
 
 
 class ClusterPlace(NamedTuple):
-    """A node's place in its cluster; head 0 means none."""
+    """A node's place in its cluster; a head of 0 means that the node belongs to no cluster."""
 
     role: Role = Role.ISOLATED
     cluster: int = 0
@@ -27,7 +27,7 @@ class ClusterPlace(NamedTuple):
 
 
 class Version(NamedTuple):
-    """The name of one assignment."""
+    """The leader and the epoch of a schedule, which identify it."""
 
     authority: Authority
     epoch: int
@@ -37,7 +37,7 @@ _NOWHERE = ClusterPlace()
 
 
 class Membership:
-    """What one node knows of the schedule."""
+    """What one node knows of the newest schedule."""
 
     def __init__(self, node: NodeId) -> None:
         self._node = node
@@ -45,12 +45,13 @@ class Membership:
         self.standing = _NOWHERE
         self.superframe: Superframe | None = None
         self.succession: tuple[NodeId, ...] = ()
-        """The members of this node's cluster: the head first, then the nodes that stand in for it in this order."""
+        """The members of this node's cluster: the head, then the other nodes in the order in which they stand in for
+        it."""
         self._parts: dict[int, Schedule] = {}
         self._named: ClusterPlace | None = None
-        """The last role that a schedule gave; it holds until all relevant parts of a newer schedule have come."""
+        """The node's place by the last schedule that was complete enough to tell; it holds until a newer one is."""
         self._told = False
-        """True if this version has given the node's role."""
+        """True if this version has told the node's place."""
 
     @property
     def epoch(self) -> int:
@@ -66,7 +67,7 @@ class Membership:
 
     @property
     def head(self) -> NodeId:
-        """The node that serves this node's cluster now: the named head, or the node that stands in for it."""
+        """The node that serves this node's cluster now: the head that the schedule names, or its stand-in."""
         return self.standing.head
 
     @property
@@ -79,17 +80,17 @@ class Membership:
 
     @property
     def slot(self) -> int:
-        """The slot of the cluster; the head of cluster k owns slot k."""
+        """The slot of this node's cluster: cluster k has slot k."""
         return self.cluster
 
     @property
     def parts(self) -> int:
-        """The number of parts of this version that have come."""
+        """The number of parts of this version that have arrived."""
         return len(self._parts)
 
     @property
     def named_head(self) -> NodeId:
-        """The head that the schedule names; 0 when none is known."""
+        """The head that the schedule names for this node's cluster; 0 if none is known."""
         return self.succession[0] if self.succession else NodeId(0)
 
     @property
@@ -101,7 +102,7 @@ class Membership:
         return any(member.node == node for part in self._parts.values() for member in part.members)
 
     def clusters(self) -> Mapping[NodeId, tuple[NodeId, ...]]:
-        """The nodes of each cluster that the schedule names, by head; the head is also the first of them."""
+        """The nodes of each cluster by its head; the head is also the first of them."""
         found: dict[int, list[Member]] = {}
         for part in sorted(self._parts):
             for member in self._parts[part].members:
@@ -110,15 +111,18 @@ class Membership:
         return {NodeId(m[0].node): tuple(NodeId(one.node) for one in m) for m in in_order if m[0].is_head}
 
     def rank(self, node: int) -> int | None:
-        """The node's place in the succession of this node's cluster; None when it is not in it."""
+        """The position of a node in the succession of this node's cluster; None if it is not in this cluster."""
         return self.succession.index(NodeId(node)) if node in self.succession else None
 
     def learn(self, schedule: Schedule, *, guard_ns: int) -> Event | None:
-        """Take in one part; returns the role that it gives, once per version; `obey` then takes the role."""
+        """Take in one part of a schedule; returns the event that follows for this node's role, once per version.
+
+        The role changes only with `obey`.
+        """
         version = Version(Authority(schedule.term, schedule.leader), schedule.epoch)
         if version != self.version:
             if self.version and version.authority == self.version.authority and not newer(version, self.version):
-                return None  # the part is of an older epoch, and was still on its way
+                return None  # the part is from an older epoch, and arrived late
             self.version = version
             self._parts = {}
             self._told = False
@@ -135,7 +139,7 @@ class Membership:
         own = [member for member in members if member.cluster == mine.cluster]
         head = next((NodeId(m.node) for m in own if m.is_head), None)
         if head is None:
-            return None  # the head is in a part that has not come yet
+            return None  # the head is in a part that has not arrived yet
         slot_ns = schedule.slot_us * US
         self.superframe = Superframe(
             schedule.start_us * US, schedule.period_us * US, slot_ns, min(guard_ns, max(0, slot_ns - 1))
@@ -146,24 +150,24 @@ class Membership:
         return None if known else Event.NAMED_HEAD if mine.is_head else Event.NAMED_MEMBER
 
     def obey(self) -> None:
-        """Take the role that the schedule gives to this node."""
+        """Take the place that the schedule gives to this node."""
         assert self._named is not None, "only who has been named has a role to take"
         self.standing = self._named
 
     def follow(self, head: NodeId) -> None:
-        """Note that another member, or this node itself, serves the cluster now."""
+        """Another member, or this node itself, serves the cluster from now on."""
         self.standing = self.standing._replace(role=Role.HEAD if head == self._node else Role.MEMBER, head=head)
 
     def resign(self) -> None:
-        """Give up the role until another schedule names this node."""
+        """Give up the place in the cluster until another schedule names this node."""
         self.standing, self.succession, self._named, self._told = _NOWHERE, (), None, False
 
     def forget(self) -> None:
-        """Forget the schedule, so that the next one is new whatever its version."""
+        """Forget the schedule, so that the next one counts as new whatever its version is."""
         self.resign()
         self.version, self._parts = None, {}
 
 
 def newer(version: Version, than: Version) -> bool:
-    """True if a version of the same authority is a later one (16-bit serial numbers, RFC 1982)."""
+    """True if `version` is later than another one of the same leader (16-bit serial numbers, RFC 1982)."""
     return 0 < ((version.epoch - than.epoch) & 0xFFFF) < 0x8000

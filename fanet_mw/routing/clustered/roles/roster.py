@@ -1,9 +1,9 @@
-"""What the leader knows of the nodes of its swarm: where they fly by their joins, and which are said to be silent.
+"""The nodes that the leader knows: their motions, from joins, and which of them are reported silent.
 
-    join -> known, until it gives no sign of life for so long that two updates of its position have been lost
-    a report that a node is silent -> some time to object -> no longer known
+    a node joins              -> known, until it has given no sign of life for so long that two updates must have failed
+    it is reported silent     -> it may object for some time -> forgotten
 
-A node has objected when it has generated something since it was said to be silent.
+Any packet that the node has generated after the report counts as its objection.
 """
 
 from collections.abc import Mapping
@@ -14,29 +14,31 @@ from fanet_mw.routing.clustered.roles.liveness import Liveness
 from fanet_mw.units import Enu, NodeId, S
 
 _MISSED_NS: Final = 4 * S
-"""The time for which a node has about been silent when that is reported."""
+"""About the time for which a node has been silent when it is reported."""
 _SURE: Final = 0.9
-"""The share of the range within which a link is certain, because places are accurate to a tenth of the range."""
+"""The share of the radio range within which two nodes certainly hear each other, given the accuracy of positions."""
 
 
 class _SilentNode(NamedTuple):
-    """A node that was reported silent; if it is a head, the node that reports it serves its cluster meanwhile."""
+    """A report that a node is silent. If the silent node is a head, the reporting node serves its cluster in the
+    meantime.
+    """
 
     by: NodeId
     since_ns: int
-    """The instant at which the leader learned of it."""
+    """The instant at which the leader received the report."""
     reported_ns: int
-    """The instant at which it was reported; a node that has generated something later is alive."""
+    """The instant at which the report was made; if the node has generated a packet after it, it is alive."""
 
 
 class Roster:
-    """The nodes that one leader knows, itself not among them."""
+    """The nodes that one leader knows; the leader itself is not among them."""
 
     def __init__(self, liveness: Liveness, *, lost_ns: int, objection_ns: int, sure_m: float | None) -> None:
-        """A node is forgotten `lost_ns` after its last sign of life; reported silent it may object for `objection_ns`.
+        """A node is forgotten `lost_ns` after its last sign of life, or `objection_ns` after it was reported silent.
 
-        `sure_m`: a report counts only of a node that was so near to its sender all the time that the two should have
-        heard each other; None: wherever they were.
+        `sure_m`: a report counts only if the reported node was all the time within this distance of the reporting one,
+        so that they should have heard each other; None means that every report counts.
         """
         self._liveness = liveness
         self._lost_ns = lost_ns
@@ -50,27 +52,27 @@ class Roster:
 
     @property
     def nodes(self) -> list[NodeId]:
-        """The nodes that are known, in the order of their first joins."""
+        """The known nodes, in the order of their first joins."""
         return list(self._motions)
 
     @property
     def stand_ins(self) -> Mapping[NodeId, NodeId]:
-        """For each node that is said to be silent, by its id, the node that says so."""
+        """For each node that is reported silent, the node that reports it."""
         return {silent: self._reports[silent].by for silent in sorted(self._reports)}
 
     def is_news(self, node: NodeId, born_ns: int) -> bool:
-        """True if nothing as new as this instant is known of a node."""
+        """True if nothing generated at this instant or later is known of a node."""
         known = self._motions.get(node)
         return known is None or known.at_ns < born_ns
 
     def on_join(self, node: NodeId, motion: Motion) -> None:
-        """Note where a node was, and how it flew."""
+        """A node was at a position with a velocity at an instant (`motion`)."""
         self._motions[node] = motion
 
     def on_report(self, silent: NodeId, by: NodeId, there: Motion, *, now_ns: int) -> int | None:
-        """Note that a node is said to be silent by a node whose motion is given.
+        """The node `by`, which flies at `there`, reports that a node is silent.
 
-        Returned is the instant until which it may object; None if the report does not count.
+        Returns the instant until which that node may object; None if the report does not count.
         """
         if silent not in self._motions or not self._was_near(silent, there):
             return None
@@ -79,7 +81,9 @@ class Roster:
         return known.since_ns + self._objection_ns
 
     def _was_near(self, node: NodeId, there: Motion) -> bool:
-        """True if the two should have heard each other all the time; a node that has flown away is not silent."""
+        """True if the reported node was near the reporting one all the time; a node that has flown away is not
+        silent.
+        """
         if self._sure_m is None:
             return True
         known = self._motions[node]
@@ -87,7 +91,9 @@ class Roster:
         return max(known.position_at(t_ns).minus(there.position_at(t_ns)).norm() for t_ns in instants) <= self._sure_m
 
     def forget(self, now_ns: int) -> None:
-        """Forget nodes without a sign of life for long, and reported nodes that have not objected in time."""
+        """Forget nodes that have given no sign of life for too long, or that were reported and have not objected in
+        time.
+        """
         for node in sorted(self._motions):
             last_ns = max(self._liveness.last_ns(node) or 0, self._motions[node].at_ns)
             report = self._reports.get(node)
@@ -100,11 +106,11 @@ class Roster:
                 del self._motions[node]
 
     def forget_reports(self) -> None:
-        """Forget the reports of nodes that are no longer known, because an assignment without them has been made."""
+        """Forget reports about nodes that are no longer known, because an assignment without them has been made."""
         self._reports = {silent: report for silent, report in self._reports.items() if silent in self._motions}
 
     def places(self, t_ns: int) -> dict[NodeId, Enu]:
-        """The places of the nodes at an instant if they fly on straight, by id."""
+        """The positions of all nodes at an instant, if they fly on straight, by id."""
         return {node: self._motions[node].position_at(t_ns) for node in sorted(self._motions)}
 
     def velocities(self) -> Mapping[NodeId, Enu]:
@@ -113,5 +119,5 @@ class Roster:
 
 
 def sure_m(range_m: float) -> float:
-    """The distance within which a link between two nodes is certain."""
+    """The distance within which two nodes certainly hear each other."""
     return _SURE * range_m

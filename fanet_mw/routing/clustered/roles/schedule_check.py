@@ -1,4 +1,4 @@
-"""What no leader of this swarm announces: asked of every schedule off the air before anything comes of it."""
+"""Rejects schedules that no leader of this swarm would announce, such as forged ones, before they have any effect."""
 
 from typing import Final
 
@@ -13,27 +13,27 @@ from fanet_mw.wire.inner import Schedule
 
 _START_NS: Final = 60 * S
 _START_PERIODS: Final = 100
-"""A schedule that starts later than this minute and so many periods after it comes is forged: one of turns is
-announced as long ahead as the bounds under the one before need, and those are some superframes."""
+"""A schedule is forged if it starts later than one minute and this number of periods after its arrival. Timetables are
+announced some superframes ahead, as long as the delay bounds under the present one need."""
 _EPOCHS: Final = 16
-"""Epochs that may have been missed besides those for which there was time since the last."""
+"""The number of epochs that may have been missed, in addition to those for which there was time."""
 
 
 class ScheduleCheck:
-    """What one node believes of schedules."""
+    """The check at one node."""
 
     def __init__(self, port: Port, membership: Membership) -> None:
         self._port = port
         self._membership = membership
         self._renewed_ns = 0
-        """The instant at which the schedule that the node follows last changed."""
+        """The instant at which this node last began to follow another schedule."""
 
     def on_new_schedule(self, now_ns: int) -> None:
-        """The node follows another schedule."""
+        """The node has begun to follow another schedule."""
         self._renewed_ns = now_ns
 
     def check(self, schedule: Schedule, now_ns: int) -> None:
-        """Raise MalformedFrameError for a schedule that cannot be meant."""
+        """Raise MalformedFrameError for a schedule that no leader would announce."""
         scenario, epoch = self._port.scenario, schedule.epoch
         period_ns = scenario.clusters.period_ns
         period_us, slot_us = period_ns // US, period_ns // schedule.clusters // US

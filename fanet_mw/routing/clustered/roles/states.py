@@ -1,7 +1,7 @@
-"""A node's part in running the swarm, as a table: (state, event) -> (state, action). Nothing else changes a state.
+"""The state machine of a node's role, as a table: (state, event) -> (state, action). No other code changes a state.
 
-The diagram in docs/explanation/roles.md is generated from the table by `scripts/generate_state_diagram.py`. What is in
-no row cannot happen: `failover.py`, which finds the events, asks for a row and fails without one.
+`failover.py` finds the events and asks for a row. A combination without a row cannot happen, and would raise. The
+diagram in docs/explanation/roles.md is generated from the table by `scripts/generate_state_diagram.py`.
 """
 
 from collections.abc import Mapping
@@ -10,21 +10,21 @@ from typing import Final, NamedTuple
 
 
 class State(StrEnum):
-    """What a node is at the moment."""
+    """The role of a node at the moment."""
 
     SEEKING = "seeking"
-    """The node is in no schedule."""
+    """The node belongs to no cluster."""
     MEMBER = "member"
     HEAD = "head"
-    """The head that the schedule names."""
+    """The node is the head that the schedule names."""
     ACTING = "acting"
-    """A member that stands in for its silent head, in its slot."""
+    """The node is a member that stands in for its silent head, and uses the head's slot."""
     LEADING = "leading"
-    """The leader: in no cluster once it has announced a schedule of its own."""
+    """The node is the leader; it belongs to no cluster once it has announced a schedule."""
 
 
 class Event(StrEnum):
-    """What can happen to it."""
+    """The events that may change the state of a node."""
 
     NAMED_MEMBER = "schedule names it member"
     NAMED_HEAD = "schedule names it head"
@@ -38,7 +38,7 @@ class Event(StrEnum):
 
 
 class Action(StrEnum):
-    """What a node does on a transition of its state."""
+    """What a node does when its state changes."""
 
     FOLLOW = "follow the head"
     SERVE = "own the slot"
@@ -52,7 +52,7 @@ class Action(StrEnum):
 
 
 class Row(NamedTuple):
-    """The state to which a transition leads, and what is done on the way."""
+    """The new state, and the action of the transition."""
 
     state: State
     action: Action
@@ -95,14 +95,14 @@ TRANSITIONS: Final[Mapping[tuple[State, Event], Row]] = {
 
 
 def step(state: State, event: Event) -> Row:
-    """The row of the table; that there is one is an invariant, whatever the air brings."""
+    """The row of the table for an event; it exists whatever was received from other nodes."""
     row = TRANSITIONS.get((state, event))
     assert row is not None, f"{state} has no transition for: {event}"
     return row
 
 
 def mermaid() -> str:
-    """The table as a mermaid state diagram: one arrow per pair of states, a line per event."""
+    """The table as a Mermaid state diagram: one arrow per pair of states, and a line per event."""
     arrows: dict[tuple[State, State], list[str]] = {}
     for (state, event), row in TRANSITIONS.items():
         arrows.setdefault((state, row.state), []).append(f"{event} / {row.action}")

@@ -1,1 +1,1 @@
-"""Which node may send when: slots of heads, turns of the timetable, and the queues that are let out in them."""
+"""TDMA: when a node may transmit (slots of heads, turns of a timetable), and the queues that are emptied then."""

@@ -1,4 +1,7 @@
-"""A node's calls, its turns for neighbors alone over lossy links: for hellos, and for packets that neighbors lack."""
+"""The queue for a node's calls: turns that over lossy links serve hellos, and packets that neighbors have missed.
+
+A call reaches only the node's neighbors; nobody relays it.
+"""
 
 from collections.abc import Sequence
 
@@ -8,17 +11,17 @@ from fanet_mw.routing.clustered.tdma.turn_release import OwnTurn, TurnRelease
 
 
 class CallRelease(TurnRelease):
-    """The queue of answers, and the plan of one node's calls."""
+    """The queue of packets that neighbors have missed, and the node's next call."""
 
     _plans: Sequence[TurnsInForce] = ()
 
     def follow(self, plans: Sequence[TurnsInForce], *, now_ns: int) -> None:
-        """Take over new calls, given in the order of the instants from which they hold."""
+        """Take over the calls of new timetables, in the order in which they come into force."""
         self._plans = plans
         self._arm(now_ns)
 
     def claim(self, *, not_before_ns: int, now_ns: int) -> int | None:
-        """Take the next call for a frame that is not queued; None: there is none."""
+        """Reserve the next call for a frame that is not queued, such as a hello; None if there is none."""
         turn = self._turn(max(not_before_ns, self._free_ns))
         if turn is None:
             return None
@@ -28,15 +31,15 @@ class CallRelease(TurnRelease):
 
     @property
     def pending(self) -> TxQueue:
-        """The packets whose copies matter here."""
+        """The packets that are cancelled when another node sends a copy."""
         return self._queue
 
     def on_copy(self, key: int, *, now_ns: int) -> None:
-        """Give up a packet (`duplicates.key_of`) that another node has sent."""
+        """Another node has sent this packet (`duplicates.key_of`), so it is removed from the queue."""
         self._queue.remove(key)
 
     def _turn(self, earliest_ns: int) -> OwnTurn | None:
-        """The first call from an instant on, under whichever timetable is in force then."""
+        """The first call from an instant on, by the timetable that is in force then."""
         for index, plan in enumerate(self._plans):
             if plan.offsets:
                 not_before_ns = max(earliest_ns, plan.valid_ns)

@@ -1,4 +1,4 @@
-"""The start of a frame that has no turn: at once after a random jitter, or in the contention window of a superframe."""
+"""When a frame that contends may start: after a random jitter; if turns are in force, only in a contention window."""
 
 from collections.abc import Callable
 
@@ -8,31 +8,31 @@ Random = Callable[[], float]
 
 
 class Contention:
-    """The instants of one node's frames that contend."""
+    """The starts of one node's contending frames."""
 
     def __init__(self, *, lead_ns: int, jitter: Random, window: Random) -> None:
-        """`jitter`, `window`: random numbers for the wait before a frame, and for the instant in a window."""
+        """`jitter` and `window`: random streams for the wait before a frame, and for the instant within a window."""
         self._lead_ns = lead_ns
         self._jitter = jitter
         self._window = window
         self.turns_at: Callable[[int], Turns | None] | None = None
-        """The superframe in force at an instant, or None when there is none: then a frame may go at any time. Where
-        there never is one, this is None itself."""
+        """Gives the superframe that is in force at an instant, or None if none is: then a frame may start at any time.
+        The attribute itself is None in a protocol without turns."""
         self.most_jitter_ns: int | None = None
-        """No jitter is longer; None: any."""
+        """The longest jitter; None if there is no limit."""
 
     def start_ns(self, *, now_ns: int, jitter_ns: int = 0) -> int:
-        """The instant from which a frame that is ready now may go, with a jitter of up to `jitter_ns`."""
+        """The earliest start of a frame that is ready now, with a jitter of up to `jitter_ns`."""
         if self.most_jitter_ns is not None:
             jitter_ns = min(jitter_ns, self.most_jitter_ns)
         start_ns = now_ns + self._lead_ns + int(self._jitter() * jitter_ns)
         return start_ns if self.turns_at is None else self.not_before(start_ns)
 
     def not_before(self, start_ns: int) -> int:
-        """The instant from which a frame that is due may go: at once if there are no turns, else in a window."""
+        """The earliest start of a frame that is due: at once, or in a window if turns are in force."""
         turns = None if self.turns_at is None else self.turns_at(start_ns)
         return start_ns if turns is None else turns.contending_ns(start_ns, self._window)
 
     def by_chance(self, share: float) -> bool:
-        """True so often, at random."""
+        """True with the given probability."""
         return self._window() < share

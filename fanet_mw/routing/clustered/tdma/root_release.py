@@ -1,10 +1,10 @@
-"""A root's queue and when it lets packets out: what a frame holds in each of its turns, one lead ahead.
+"""The transmit queue of a node with turns of its own: which packets go in each turn. Each is announced one lead ahead.
 
     a turn:  | one warning | one report | bulk, in order, as many as fit              | the rest, most urgent first |
                                         | or, in its place, a leader's announcements |
 
-Every class has room of its own, so the wait of one depends on nothing that comes later: not on reports,
-not on warnings. A turn is used only if its flood is over before the next timetable comes into force.
+Each class has room of its own in a turn, so the wait of a bulk packet depends on nothing that comes later, such as
+reports or warnings. A turn is used only if its flood is over before the next timetable comes into force.
 """
 
 from collections.abc import Iterator, Mapping, Sequence
@@ -18,53 +18,53 @@ from fanet_mw.units import NodeId
 from fanet_mw.wire import PRIORITY_BULK, PRIORITY_CONTROL, Kind
 
 _LAST: Final = PRIORITY_BULK + 1
-"""The rank of what goes only where every class leaves room."""
+"""The rank of packets that only use what all classes leave free."""
 
 
 class TurnsInForce(NamedTuple):
-    """A timetable in force from an instant on, as far as a root needs it."""
+    """The turns of a node by one timetable, and the instant from which the timetable is in force."""
 
     valid_ns: int
     turns: Turns
     offsets: tuple[int, ...]
-    """The node's turns, ascending."""
+    """The offsets of the node's turns, ascending."""
     frame_bytes: int
-    """The bytes that one turn holds."""
+    """The number of bytes that one turn can carry."""
     span: int
-    """The number of turns from one of the node's own until all nodes have what it let out."""
+    """The duration of a flood, in turns: from one of the node's turns until all nodes have the packet."""
 
 
 class RootRelease(TurnRelease):
-    """The queue of one node, let out in its own turns."""
+    """The transmit queue of one node, and its own turns."""
 
     def __init__(self, node: NodeId, queue: TxQueue, *, reserved: Mapping[int, int], lead_ns: int) -> None:
         super().__init__(queue, lead_ns=lead_ns)
         self._node = node
         self.reserved: Mapping[int, int] = dict(sorted(reserved.items()))
-        """The bytes of each turn that bulk leaves free, by priority."""
+        """The number of bytes of each turn that bulk must leave free, by priority."""
         self._plans: Sequence[TurnsInForce] = ()
 
     def follow(self, plans: Sequence[TurnsInForce], *, now_ns: int) -> None:
-        """Take over new turns, given in the order of the instants from which they hold."""
+        """Take over the turns of new timetables, in the order in which they come into force."""
         self._plans = plans
         self._arm(now_ns)
 
     def has_turn(self, *, now_ns: int) -> bool:
-        """True if a turn of this node lies ahead under any timetable that is known."""
+        """True if any known timetable gives this node a turn from now on."""
         return self._turn(max(now_ns + self._lead_ns, self._free_ns)) is not None
 
     def push(self, packet: Packet, *, now_ns: int, last: bool = False) -> Packet | None:
-        """Queue a packet, `last` of all; returns the one evicted for it."""
+        """Queue a packet; returns the packet that was evicted for it, if any. With `last` it goes behind all others."""
         return self._push(packet, _LAST if last else self._rank(packet), now_ns)
 
     def outdated(self, *, before_us: int) -> list[Packet]:
-        """Take out the node's announcements that were made before an instant [swarm us] and still wait."""
+        """Take out waiting announcements of this node that were made before an instant [swarm us]."""
         return self._queue.take_older(before_us=before_us, rank=PRIORITY_CONTROL)
 
     def through_ns(self, packet: Packet, *, now_ns: int) -> int | None:
-        """The instant by which the flood of a packet that was just pushed is over; None: it is not known.
+        """The instant at which the flood of a packet that was just queued is over; None if it is not known.
 
-        What comes later does not count: it finds room of its own, or waits behind.
+        Packets that come later do not change it, because they use room of their own or wait behind.
         """
         rank = self._rank(packet)
         waiting = self._queue.waiting(rank)
@@ -83,15 +83,16 @@ class RootRelease(TurnRelease):
         return end_ns
 
     def _room(self, rank: int, turn: OwnTurn) -> int:
-        """The bytes of a turn that a class has for itself."""
+        """The number of bytes of a turn that are reserved for a class."""
         if rank < PRIORITY_BULK:
             return self.reserved.get(rank, 0)
         return turn.frame_bytes - sum(self.reserved.values())
 
     def _rank(self, packet: Packet) -> int:
-        """The rank at which a packet waits: one without room of its own in a turn waits like bulk, and overtakes none.
+        """The rank at which a packet waits. A packet whose class has no room of its own waits like bulk, and overtakes
+        nothing.
 
-        Only a leader's announcements go before everything; a leader promises no bound.
+        Only a leader's announcements go before all others; a leader states no bound.
         """
         header = packet.header
         if header.kind in (Kind.SCHEDULE, Kind.LINKS) and header.origin == self._node:
@@ -117,7 +118,7 @@ class RootRelease(TurnRelease):
     def _upcoming(self, earliest_ns: int) -> Iterator[tuple[OwnTurn, int]]:
         """The node's turns from an instant on, each with the instant at which its flood is over.
 
-        Each is one of the timetable that is in force then. The turns are endless if there is one.
+        Each turn is one of the timetable that is in force then. There is no end of them unless there is no timetable.
         """
         for index, (valid_ns, turns, offsets, size, span) in enumerate(self._plans):
             if not offsets:

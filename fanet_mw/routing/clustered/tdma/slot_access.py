@@ -1,6 +1,7 @@
-"""Access by the slots of heads, as in the paper (3.3): members bring packets to a head, which floods in its own slot.
+"""Access by the slots of heads, as in the paper (3.3): members send packets to a head, which floods them in its own
+slot.
 
-What contends may go at any time: hellos, control packets, relays and the unicasts on the way to a head.
+Everything else contends at any time: hellos, control packets, relays, and unicasts on the way to a head.
 """
 
 from collections.abc import Mapping
@@ -20,7 +21,7 @@ _NOTHING: Final[Mapping[str, object]] = {}
 
 
 class SlotAccess:
-    """One node's queue for the slot of its cluster, while it is head; its way to a head while it is not."""
+    """The queue for the slot of this node's cluster while it is head; its route to a head while it is not."""
 
     def __init__(
         self, port: Port, release: SlotRelease, *, membership: Membership, uplink: Uplink, floods: Floods
@@ -28,7 +29,7 @@ class SlotAccess:
         self._port = port
         self._release = release
         self.next_wake_ns = release.next_wake_ns
-        """The method of the release: it is asked after every reception."""
+        """The method that tells when a queued packet is due; it is called after every reception."""
         self._membership = membership
         self._uplink = uplink
         self._floods = floods
@@ -37,7 +38,7 @@ class SlotAccess:
         """The slot of this node, or the one that it had when it last was head."""
 
     def start(self, now_ns: int) -> None:
-        """Nothing waits yet."""
+        """The node has started, and nothing waits."""
 
     def admit(self, packet: Packet, *, due_ns: int) -> bool:
         return True
@@ -52,7 +53,7 @@ class SlotAccess:
             self._uplink.send(packet, start_ns=start_ns, now_ns=now_ns, tries=tries)
 
     def enqueue(self, packet: Packet, *, now_ns: int) -> None:
-        """Let a packet out in the slot of this head."""
+        """Queue a packet for the slot of this head."""
         assert self._tenure is not None, "a node that queues is head, or was"
         evicted = self._release.push(packet, self._tenure, now_ns=now_ns)
         if evicted is not None:
@@ -69,7 +70,7 @@ class SlotAccess:
     def hello_start_ns(self, start_ns: int, *, size: int) -> int:
         return start_ns
 
-    # --- what a schedule makes of the node ------------------------------------------------------------------------
+    # --- when the schedule changes the node's role ----------------------------------------------------------------
 
     def serve(self, now_ns: int) -> None:
         self.arm(now_ns)
@@ -77,7 +78,7 @@ class SlotAccess:
             self.enqueue(packet, now_ns=now_ns)
 
     def arm(self, now_ns: int) -> None:
-        """Let out what waits here in the slot that the schedule gives this head."""
+        """Plan the release of what waits here, in the slot that the schedule gives to this head."""
         self.renew_slot()
         assert self._tenure is not None, "the slot was renewed just now"
         self._release.arm(self._tenure, now_ns=now_ns)
@@ -88,11 +89,11 @@ class SlotAccess:
         self._tenure = Tenure(superframe, self._membership.slot)
 
     def drain_uplink(self) -> list[Packet]:
-        """Give up what waits for a way to a head: it goes another way."""
+        """Take out all packets that wait for a route to a head, because they will go another way."""
         return self._uplink.drain()
 
     def drain(self) -> list[Packet]:
-        """Give up what waits here, or for a way to a head: it goes another way."""
+        """Take out all packets that wait here, or for a route to a head, because they will go another way."""
         return [*self._release.drain(), *self.drain_uplink()]
 
     # --- time -----------------------------------------------------------------------------------------------------
@@ -105,7 +106,7 @@ class SlotAccess:
             self._floods.begin([packet, *self._release.more(self._room(packet))], start_ns=start_ns)
 
     def _room(self, packet: Packet) -> int:
-        """What a frame with this packet has left for others [bytes]."""
+        """The number of bytes that are left for other packets in a frame with this one."""
         scenario = self._port.scenario
         return scenario.radio.max_frame_bytes - len(packet.frame) if scenario.routing.aggregate else 0
 

@@ -11,7 +11,7 @@ from fanet_mw.errors import LocalProtocolError
 
 
 class Slot(NamedTuple):
-    """One occurrence of a slot: transmissions may start in [start, end)."""
+    """One occurrence of a slot. A transmission may start at `start` or later, and before `end`."""
 
     start_ns: int
     end_ns: int
@@ -37,7 +37,7 @@ class Superframe(NamedTuple):
         return self.period_ns // self.slot_ns
 
     def occurrence(self, slot: int, *, not_before_ns: int) -> Slot:
-        """The current occurrence of `slot` if `not_before_ns` falls into its usable part, else the next one."""
+        """The present occurrence of a slot if `not_before_ns` lies in its usable part, otherwise the next one."""
         offset_ns = self.origin_ns + slot * self.slot_ns
         usable_ns = self.slot_ns - self.guard_ns
         turns = (not_before_ns - offset_ns) // self.period_ns
@@ -47,6 +47,6 @@ class Superframe(NamedTuple):
         return Slot(start_ns, start_ns + usable_ns)
 
     def owner(self, t_ns: int) -> int | None:
-        """The slot whose usable part contains an instant; None within a guard time or the unslotted rest."""
+        """The slot in whose usable part an instant lies; None in a guard time, or in the rest of the superframe."""
         turns, rest = divmod((t_ns - self.origin_ns) % self.period_ns, self.slot_ns)
         return turns if turns < self.slots and rest < self.slot_ns - self.guard_ns else None

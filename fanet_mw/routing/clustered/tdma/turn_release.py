@@ -1,4 +1,6 @@
-"""A queue that is let out in turns, one frame in each, announced one lead ahead; a subclass says whose turns."""
+"""A transmit queue that is emptied in turns, one frame in each, announced one lead ahead. Subclasses know whose
+turns.
+"""
 
 from abc import ABC, abstractmethod
 from typing import NamedTuple
@@ -8,21 +10,21 @@ from fanet_mw.node.queue import TxQueue
 
 
 class OwnTurn(NamedTuple):
-    """A turn to come in which the node may let packets out."""
+    """A future turn in which the node may transmit."""
 
     start_ns: int
     frame_bytes: int
-    """The bytes that it holds; 0: one packet, however long."""
+    """The number of bytes that the turn can carry; 0 means one packet of any length."""
 
 
 class TurnRelease(ABC):
-    """The queue of one node, and the next turn that is planned for it."""
+    """The queue of one node, and the next turn for which a frame is planned."""
 
     def __init__(self, queue: TxQueue, *, lead_ns: int) -> None:
         self._queue = queue
         self._lead_ns = lead_ns
         self._free_ns = 0
-        """Just after the last turn that was used."""
+        """The first instant after the last turn that was used."""
         self._next: OwnTurn | None = None
 
     @abstractmethod
@@ -30,31 +32,31 @@ class TurnRelease(ABC):
         """The first turn of the node from an instant on."""
 
     def _look_again(self, now_ns: int) -> None:  # noqa: B027  (most turns stay as they were)
-        """Plan anew where turns may have come and gone since the last look."""
+        """Plan the next turn anew, if turns may have changed since the last time."""
 
     def __len__(self) -> int:
         return len(self._queue)
 
     def push(self, packet: Packet, *, now_ns: int) -> Packet | None:
-        """Queue a packet; returns the one evicted for it."""
+        """Queue a packet; returns the packet that was evicted for it, if any."""
         return self._push(packet, packet.header.priority, now_ns)
 
     def _push(self, packet: Packet, rank: int, now_ns: int) -> Packet | None:
-        """Queue a packet at a priority."""
+        """Queue a packet at a rank."""
         evicted = self._queue.push(packet, rank=rank)
         if self._next is None:
             self._arm(now_ns)
         return evicted
 
     def holds(self, key: int) -> bool:
-        """True if this packet (`duplicates.key_of`) is queued."""
+        """True if the packet with this key (`duplicates.key_of`) is queued."""
         return key in self._queue
 
     def expire(self, *, before_us: int) -> list[Packet]:
         return self._queue.expire(before_us=before_us)
 
     def drain(self) -> list[Packet]:
-        """Give up all that is queued, because it goes another way."""
+        """Take out all queued packets, because they will go another way."""
         self._next = None
         return self._queue.drain()
 
@@ -62,7 +64,7 @@ class TurnRelease(ABC):
         return None if self._next is None else self._next.start_ns - self._lead_ns
 
     def due(self, *, now_ns: int) -> list[tuple[list[Packet], int]]:
-        """Packets to announce now, those of one frame together, with its instant."""
+        """Take out the packets to announce now: those of one frame together, with the instant of the frame."""
         self._look_again(now_ns)
         released = []
         while self._next is not None and self._next.start_ns - self._lead_ns <= now_ns and len(self._queue):
@@ -74,7 +76,7 @@ class TurnRelease(ABC):
         return released
 
     def _fill(self, size: int) -> list[Packet]:
-        """The packets of one turn: the most urgent, and with it what fits."""
+        """Take out the packets for one turn: the most urgent one, and others that fit into the same frame."""
         first = self._queue.pop()
         return [first, *self._queue.pop_fitting(size - len(first.frame))]
 

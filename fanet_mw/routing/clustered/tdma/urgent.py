@@ -1,4 +1,6 @@
-"""Packets that are more urgent than bulk: how long the known ones are, and the room that turns reserve for them."""
+"""Packets more urgent than bulk: the length of those that are known in advance, and the room that each turn
+reserves.
+"""
 
 from collections.abc import Mapping
 from typing import Final
@@ -17,7 +19,9 @@ def report_bytes(scenario: Scenario) -> int:
 
 
 def reserved(scenario: Scenario) -> Mapping[int, int]:
-    """The bytes of each turn that bulk must leave free, by priority: one packet of each urgent class that there is."""
+    """The number of bytes of each turn that bulk must leave free, by priority: one packet of each urgent class
+    in use.
+    """
     mission = scenario.mission
     found = {}
     if mission.collision_horizon_s:

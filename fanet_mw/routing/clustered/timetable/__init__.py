@@ -1,1 +1,1 @@
-"""The timetable of collision-free floods: how it is computed from positions or measured links."""
+"""Timetables of collision-free floods: computed from positions or from measured links, followed by every node."""

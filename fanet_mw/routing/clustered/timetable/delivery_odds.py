@@ -1,12 +1,14 @@
-"""The share of nodes that have a packet when its flood is over, and after so many rounds of repair: a simulation.
+"""Simulates the floods of a timetable over lossy links: which share of nodes has a packet afterwards, and after
+repairs.
 
-    flood    each frame of the table is drawn for each of its receivers, in order: a node that has the packet, sends it
-    round    a node that lacks it says so in its hello, and a neighbor answers in a turn of its own
+    flood    for each frame of the table and each of its receivers, it is drawn whether the frame arrives
+    repair   a node that lacks the packet says so in its hello, and a neighbor answers in a turn of its own
 
-A frame that another in the same turn disturbs is lost. `_TRIALS` floods of each root are drawn side by side, as the
-bits of integers, from one named random stream: the same everywhere. Losses are independent from frame to frame, as
-`LinkQuality` measured them. Of a round the best neighbor alone counts, which must hear the hello and be heard. Not
-modeled: that many ask at once, so that an answer waits for the next turn but one.
+A frame that is disturbed by another frame in the same turn is lost. `_TRIALS` floods of each root are simulated side by
+side, one in each bit of an integer, with one named random stream, so that all nodes get the same result. Losses of
+different frames are independent, with the shares that `LinkQuality` has measured. In a round of repair only the best
+neighbor counts, which must receive the hello and be received itself. Not modeled: that several nodes ask at once, so
+that an answer waits longer than until the next turn but one.
 """
 
 from collections.abc import Mapping, Sequence
@@ -21,30 +23,33 @@ from fanet_mw.wire.links import NEPERS
 
 _TRIALS: Final = 256
 _DIGITS: Final = 8
-"""The binary digits of a probability."""
+"""The number of binary digits with which probabilities are represented."""
 ROUNDS: Final = 6
 Sent = tuple[int, int]
-"""(offset, row)."""
+"""The offset of a turn, and the row of the node that transmits in it."""
 
 
 class Odds(NamedTuple):
-    """The deliveries to be expected of a timetable for lossy links."""
+    """The deliveries to be expected of a timetable over lossy links."""
 
     missed: Mapping[NodeId, tuple[float, ...]]
-    """The share of nodes that lack the packet of each root after no round of repair, after one, and so on."""
+    """For the packet of each root: the share of nodes that lack it after the flood, after one round of repair, and so
+    on."""
 
     @property
     def mean(self) -> float:
-        """The share of copies that floods alone leave out."""
+        """The share of copies that are missing after the flood alone."""
         return fsum(row[0] for row in self.missed.values()) / len(self.missed)
 
     def rounds(self, root: NodeId, *, missed: float) -> int | None:
-        """The number of rounds after which no more than this share is missing; None: more than are reckoned with."""
+        """The number of rounds of repair after which at most this share is missing; None if no simulated round achieves
+        it.
+        """
         return next((count for count, share in enumerate(self.missed[root]) if share <= missed), None)
 
 
 def odds(network: Network, floods: Sequence[tuple[NodeId, Sequence[Sent]]], *, turns: int, hop_turns: int) -> Odds:
-    """The odds of the floods of a table: `floods` has the root of each, and its frames in order."""
+    """The odds of the floods of a timetable. `floods` has the root of each flood, and its frames in order."""
     together: dict[int, int] = {}
     for _, sent in floods:
         for offset, row in sent:
@@ -79,12 +84,13 @@ def _flood(
     turns: int,
     hop_turns: int,
 ) -> list[float]:
-    """The share of trials in which each row lacks the packet."""
+    """The share of trials in which each row lacks the packet after the flood."""
     everywhere = (1 << _TRIALS) - 1
     has = [0] * len(network.nodes.ids)
     has[root] = everywhere
     late: list[tuple[int, int, int]] = []
-    """(from which offset on, row, in which trials) it can relay."""
+    """Holders that can relay only later: the offset from which on, the row, and the trials in which
+    it has the packet."""
     for offset, row in sent:
         while late and late[0][0] <= offset:
             _, other, trials = late.pop(0)
@@ -101,26 +107,28 @@ def _flood(
 
 
 def _answered(network: Network, row: int) -> float:
-    """The chance that a node's hello is heard by its best neighbor, and the answer by the node."""
+    """The probability that a node's best neighbor receives its hello and the node receives the answer."""
     grades = [network.dose[row, other] for other in rows(network.hears[row])]
     best = 1 - exp(-max(grades, default=0) / NEPERS)
     return best * best
 
 
 def _binary(chance: float) -> int:
-    """A probability in binary digits, rounded down."""
+    """A probability as binary digits, rounded down."""
     return min((1 << _DIGITS) - 1, int(chance * (1 << _DIGITS)))
 
 
 class _Draw:
-    """Random bits that are set with a given probability."""
+    """Draws random bits, each of which is 1 with a given probability."""
 
     def __init__(self) -> None:
         self._bits = stream(0, "odds", 0).getrandbits
 
     def bits(self, chance: int) -> int:
-        """Draw one bit for each trial: from the last binary digit of the chance up, a 1 takes the OR with fresh random
-        bits, a 0 the AND.
+        """Draw one bit for each trial.
+
+        The digits of the probability are taken from the last to the first: a 1 combines the result with fresh random
+        bits by OR, a 0 by AND.
         """
         found = 0
         for digit in range(_DIGITS):

@@ -1,6 +1,7 @@
-"""The delay within which most copies of a node's packets arrive where links lose frames: the flood, then repairs.
+"""The delay within which most copies of a packet arrive over lossy links: the flood, and the repairs after it.
 
-delay = longest wait for a turn + flood + one turn more + ripening + rounds of repair x (hello + its turn + answer)
+delay = longest wait for a turn + flood + one turn + time until repair begins
+        + rounds of repair x (interval of hellos + wait of the hello for its turn + answer)
 """
 
 from typing import Final
@@ -10,21 +11,21 @@ from fanet_mw.routing.clustered.timetable.turn_plan import TurnPlan
 from fanet_mw.units import NodeId
 
 LIKELY_SHARE: Final = 0.99
-"""The share of copies for which a node states a delay when links lose frames."""
+"""The share of copies for which the likely delay is stated."""
 _LATE_HELLO: Final = 1.1
-"""The most hello intervals between two hellos."""
+"""The longest time between two hellos, in hello intervals."""
 _BUSY: Final = 2
-"""The factor by which a round of repair takes longer than when only one packet is lacking, because answers queue."""
+"""The factor by which a round of repair takes longer because answers to other nodes wait in the same queue."""
 
 
 def likely_delay_ns(plan: TurnPlan, node: NodeId, *, waiting: int, interval_ns: int, hello_ns: int) -> int | None:
-    """The time within which `LIKELY_SHARE` of the copies of a node's packets arrive; None if the odds are worse.
+    """The time within which `LIKELY_SHARE` of the copies of a node's packets arrive; None if fewer than that ever do.
 
-    The node waits longest for its turn, or for the turn of the last of so many packets that are `waiting`, if that is
-    later, as after several joins. One more join may take a turn of the node when a link has changed. Then come the
-    flood, and as many rounds of repair as it takes. A round is a hello, as late as it may be, which waits for a turn,
-    and an answer, which may wait for the next turn but one. The odds do not know of everything, so they account for
-    half of the copies that may be missing.
+    The wait for a turn is the longest that can occur, or the wait of the last of `waiting` packets if that is longer,
+    as after several joins; one more join may take a turn of the node when a link has changed. After the flood come as
+    many rounds of repair as needed. In each round the hello is as late as it may be and waits for a turn, and the
+    answer may wait for the next turn but one. Since the odds do not include everything, they account for only half of
+    the copies that may be missing.
     """
     turns, span = plan.turns, plan.table.spans[node]
     assert plan.odds is not None, "whoever asks has a timetable for lossy links"

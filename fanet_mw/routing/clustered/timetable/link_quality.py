@@ -1,10 +1,11 @@
-"""The quality of a node's links, measured from hellos: the share that arrives, and their mean power.
+"""Measures the quality of a node's links from the hellos of its neighbors: the share of hellos received, and their mean
+RSSI.
 
-    hellos heard of the last 24 intervals, over those that should have come  ->  (heard + 1/2) / (due + 1), mean RSSI
+    estimated share = (received + 1/2) / (due + 1), for the hellos of the latest 24 intervals
 
-The estimate is that of Krichevsky and Trofimov: a link of which little is known counts as neither good nor bad. What is
-measured goes to the leader with a join: at first when some hellos should have come, then when a link has changed.
-Not modeled: that a hello may be lost by a collision and not by the link; it then counts as loss all the same.
+This is the estimate of Krichevsky and Trofimov, by which a link of which little is known is neither good nor bad. A
+node sends its estimates to the leader in a join: first when enough hellos should have arrived, later when a link has
+changed. Not modeled: a hello may also be lost by a collision; it then counts as a loss of the link.
 """
 
 from collections import deque
@@ -16,45 +17,45 @@ from fanet_mw.units import NodeId
 from fanet_mw.wire.links import CAPACITY, MESSAGES, Link, grade_of, power_of
 
 WINDOW: Final = 24
-"""The length of the window, in hello intervals."""
+"""The length of the measurement window, in hello intervals."""
 FIRST: Final = 8
-"""Hello intervals after the start for the first estimate."""
+"""The number of hello intervals from the start to the first estimate."""
 FAST: Final = 3
-"""Hellos per interval until then, so that the estimate is one."""
+"""The number of hellos that a node sends per interval until then, so that the first estimate is accurate enough."""
 _STEADY_HELLOS: Final = 4
 _STEADY_DB: Final = 1.0
 STEADY: Final = 0.995
-"""Taken for the share of a link whose power did not vary by more than that over so many hellos, and half of those that
-were due: what such a link loses it loses to collisions, and there are none in turns."""
+"""The share that is assumed for a steady link: one whose RSSI varied by at most `_STEADY_DB` over many hellos, at least
+half of those that were due. Its losses must be collisions, and there are none in turns."""
 _CHANGED: Final = 0.3
-"""A share that differs by this much from what was told is news."""
+"""A link has changed if its share differs by at least this much from what the leader was told."""
 
 
 class LinkQuality:
-    """The links of one node as its neighbors' hellos show them."""
+    """The links from all neighbors to one node, measured by the neighbors' hellos."""
 
     def __init__(self, node: NodeId, *, hello_ns: int) -> None:
         self._node = node
         self._hello_ns = hello_ns
         self._start_ns = 0
         self._heard: dict[NodeId, deque[tuple[int, float]]] = {}
-        """(instant of arrival, RSSI) of the hellos of each neighbor within the window."""
+        """For each neighbor, the instant of arrival and the RSSI of each hello in the window."""
         self._told: dict[NodeId, float] = {}
 
     def hello_share(self, *, now_ns: int) -> float:
-        """After which part of the hello interval the next hello should go."""
+        """The share of the hello interval after which the next hello should be sent."""
         return 1.0 if self.has_estimate(now_ns=now_ns) else 1 / FAST
 
     def start(self, now_ns: int) -> None:
-        """The node is up."""
+        """The node has started."""
         self._start_ns = now_ns
 
     def on_hello(self, neighbor: NodeId, *, rssi_dbm: float, now_ns: int) -> None:
-        """Note a neighbor's hello."""
+        """A neighbor's hello was received."""
         self._heard.setdefault(neighbor, deque()).append((now_ns, rssi_dbm))
 
     def links(self, *, now_ns: int) -> tuple[Link, ...]:
-        """The links from each neighbor to this node, by id; the best ones if there are more than one message holds."""
+        """The links from each neighbor to this node, by id; only the best ones if a message cannot hold all."""
         horizon_ns = now_ns - WINDOW * self._hello_ns
         found = []
         for neighbor in sorted(self._heard):
@@ -79,11 +80,11 @@ class LinkQuality:
         return (len(heard) + 0.5) / (max(due, len(heard)) + 1)
 
     def has_estimate(self, *, now_ns: int) -> bool:
-        """True as soon as some hellos of each neighbor should have come."""
+        """True once some hellos of each neighbor should have arrived."""
         return now_ns - self._start_ns >= FIRST * self._hello_ns
 
     def tell(self, *, now_ns: int) -> tuple[Link, ...]:
-        """The links for a join; none before there is an estimate."""
+        """The links for a join; none as long as there is no estimate."""
         if not self.has_estimate(now_ns=now_ns):
             return ()
         links = self.links(now_ns=now_ns)

@@ -1,10 +1,11 @@
-"""What the leader knows of the links: what each node last told of those to it, put together. Integers and plain values.
+"""The leader's knowledge of all links, put together from what each node has reported about the links to it.
 
-Both directions of a pair are alike (reciprocity), so two measurements of one loss are better than one: their mean
-counts. A direction of which one end says that it hears nothing is no link, but may disturb: it keeps its power, with a
-grade of 0. Where one end has told nothing yet, the word of the other counts for both.
+The two directions of a link are taken to be equally good (reciprocity), so the mean of both measurements counts. If one
+end reports that it receives nothing over a link, there is no link, but the sender may still disturb: the entry keeps
+its power, and gets a grade of 0. If one end has reported nothing yet, the report of the other end counts for both.
 
-Few hellos say little of one link. So the share of a usable link is drawn towards the mean of all of them (shrinkage).
+A single link is known only from few hellos. The share of a usable link is therefore drawn towards the mean of all
+usable links (shrinkage).
 """
 
 from collections.abc import Collection, Iterable, Mapping, Sequence
@@ -14,22 +15,22 @@ from fanet_mw.units import NodeId
 from fanet_mw.wire.links import Link, grade_of
 
 USABLE: Final = 0.5
-"""A link on which at least this share of frames arrives counts for clusters."""
+"""Links over which at least this share of frames arrives are used to form clusters."""
 _STEADY: Final = 0.99
 _OWN: Final = 0.3
-"""The weight of a link's own measurement against that mean."""
+"""The weight of a link's own measurement; the rest of the weight is that of the mean of all links."""
 _CHANGE: Final = 0.1
-"""A timetable is made anew when the shares of all links have changed by this part of their sum."""
+"""A new timetable is made when the shares of all links together have changed by this part of their sum."""
 
 
 class LinkState:
-    """The newest report of every node."""
+    """The newest report of each node about its links."""
 
     def __init__(self) -> None:
         self._told: dict[NodeId, dict[NodeId, Link]] = {}
 
     def on_report(self, node: NodeId, links: Iterable[Link]) -> None:
-        """Take in how well a node hears its neighbors; what others claim to know of its links does not count."""
+        """A node has reported how well it receives its neighbors. Only the receiver of a link can report it."""
         self._told[node] = {link.a: link for link in links if link.b == node}
 
     def known(self, nodes: Collection[NodeId]) -> int:
@@ -37,7 +38,7 @@ class LinkState:
         return sum(1 for node in nodes if node in self._told)
 
     def between(self, nodes: Collection[NodeId]) -> tuple[Link, ...]:
-        """The links among these nodes, one per pair, ascending."""
+        """The links among these nodes, one for each pair, ascending."""
         here = frozenset(nodes)
         pairs = {
             (min(a, b), max(a, b)) for b in here & self._told.keys() for a in self._told[b] if a in here and a != b
@@ -53,7 +54,7 @@ class LinkState:
 
 
 def _shrunk(links: Sequence[Link]) -> tuple[Link, ...]:
-    """Usable links nearer to the mean of usable links; steady ones stay as they are."""
+    """The links with the shares of usable ones drawn towards their mean; steady links stay as they are."""
     usable = [link.chance for link in links if USABLE <= link.chance < _STEADY]
     mean = sum(usable) / max(1, len(usable))
     return tuple(
@@ -75,7 +76,7 @@ def adjacency(links: Sequence[Link], nodes: Iterable[NodeId]) -> dict[NodeId, tu
 
 
 def worth_a_change(before: Sequence[Link], now: Sequence[Link]) -> bool:
-    """True if links have changed so much that a timetable made for the earlier ones should be replaced."""
+    """True if the links have changed so much that the timetable made for the earlier ones should be replaced."""
     chances: Mapping[tuple[NodeId, NodeId], float] = {(link.a, link.b): link.chance for link in before}
     later = {(link.a, link.b): link.chance for link in now}
     pairs = sorted(chances.keys() | later.keys())

@@ -1,14 +1,17 @@
-"""Turns filled one after the other with as many transmissions as do not disturb each other: list scheduling of floods.
+"""List scheduling of floods: turn after turn is filled with as many transmissions as do not disturb each other.
 
-    turn by turn:  of all floods under way, which holder of a packet can send it now, and how many lack it around?
-                   most first, while no frame already chosen is disturbed; an old flood goes before a young one
+    for each turn: list the transmissions that all floods under way could make now, each with the nodes that lack the
+                   packet around its sender; take them in the order of their worth, the oldest flood first among
+                   equals, as long as none disturbs one that is already taken
 
-Floods begin evenly over the superframe, or a little faster when turns are scarce. Each node sends a packet at most
-once, to all its neighbors that lack it. A neighbor that only this node can serve counts half more: one that leaves it
-behind has to come back for it. With more `tries` each turn is filled several times, with some noise on the order, and
-the fullest is taken. After the last turn the superframe begins again: the end of late floods goes around early ones.
+The beginnings of floods are spread evenly over the superframe, or over a part of it when turns are scarce. Each node
+sends a packet at most once, to all its neighbors that lack it. A neighbor that only this node can serve counts half
+more, because nobody else could serve it later. With more `tries` each turn is filled several times with a slightly
+random order, and the fullest result is taken. A flood that is not complete at the last turn continues in the first
+turns of the next superframe, around the floods that begin there.
 
-Integers and one named random stream: the same on every machine. Cost: some 0.5 ms per packet of 45 nodes and try.
+The computation uses integers and one named random stream, so all machines get the same result. It takes about 0.5 ms
+per packet and try for 45 nodes.
 """
 
 import math
@@ -32,20 +35,21 @@ from fanet_mw.units import Enu, NodeId
 _NOISE: Final = 50
 _TRIAL: Final = 64
 _HOPE: Final = 1.15
-"""A load is given up when, after `_TRIAL` turns with the window full, the rest would have to be this much faster."""
+"""After `_TRIAL` turns with the window full, scheduling is given up if the rest would have to go
+faster by this factor."""
 
 
 class Effort(NamedTuple):
-    """The effort with which turns are packed."""
+    """The effort that is spent on filling turns."""
 
     pace: float = 1.0
-    """Floods begin within this share of the superframe."""
+    """The share of the superframe within which floods begin."""
     tries: int = 1
-    """The number of ways that are tried to fill each turn."""
+    """The number of ways in which each turn is filled, of which the best is taken."""
 
 
 class FloodNetwork:
-    """Which nodes hear, and which disturb, each other: bit sets over the nodes' row numbers."""
+    """Which nodes receive, and which disturb, each other: bit sets over the nodes' row numbers."""
 
     def __init__(self, positions: Sequence[tuple[NodeId, Enu]], geometry: Geometry) -> None:
         self.nodes = NodeRows(node for node, _ in positions)
@@ -56,14 +60,14 @@ class FloodNetwork:
         self.disturbs = self.hears if reach == geometry.link_m else [_within(at, row, reach) for row in range(len(at))]
 
     def part(self, root: int) -> tuple[int, int]:
-        """The rows that a flood of this row can reach, itself included, and the number of hops that it takes."""
+        """The rows that a flood from this row can reach, itself included, and the number of hops to the farthest."""
         if root not in self._parts:
             self._parts[root] = reach(self.hears, root)
         return self._parts[root]
 
     def way(self, node: NodeId, head: NodeId) -> list[int]:
-        """The rows of a shortest way to the head, both ends included, the lowest first among equals; empty for a head
-        and for a node without one.
+        """The rows of a shortest way to the head, both ends included, the lowest rows first among equals. It is empty
+        for a head, and for a node without a head.
         """
         start, end = self.nodes.row[node], self.nodes.row.get(head)
         if end is None or start == end:
@@ -87,7 +91,7 @@ class FloodNetwork:
 
 
 class Flood:
-    """The flood of one packet, as far as the timetable has brought it."""
+    """The flood of one packet, as far as it is scheduled."""
 
     def __init__(self, swarm: FloodNetwork, root: int, way: list[int]) -> None:
         self.root = root
@@ -96,10 +100,10 @@ class Flood:
         """The transmissions of this flood as (offset, row), in order."""
         self._hears = swarm.hears
         self._way = way
-        """The rows that must send first, in this order."""
+        """The rows that must transmit first, in this order."""
         self._has = 1 << root
         self._ready = {root: 0}
-        """The offset from which each holder of the packet can send."""
+        """The offset from which each holder of the packet can transmit."""
         self._offers: list[tuple[int, int, int, int]] | None = None
 
     @property
@@ -107,7 +111,9 @@ class Flood:
         return self._has == self.goal and bool(self.sent)
 
     def offers(self) -> list[tuple[int, int, int, int]]:
-        """(first offset, worth, row, receivers) of every holder of the packet around which some node lacks it."""
+        """The possible transmissions of this flood: (first offset, worth, row, receivers) for each holder with a
+        neighbor that lacks the packet.
+        """
         if self._offers is None:
             self._offers = self._look()
         return self._offers
@@ -115,7 +121,7 @@ class Flood:
     def _look(self) -> list[tuple[int, int, int, int]]:
         hears, has = self._hears, self._has
         if not self.sent and self._has == self.goal:
-            return [(0, 0, self.root, 0)]  # the only node in this part of the swarm; it speaks all the same
+            return [(0, 0, self.root, 0)]  # the only node in this part of the swarm; it transmits nevertheless
         while self._way and not hears[self._way[0]] & ~has:
             self._way.pop(0)
         found = []
@@ -128,7 +134,7 @@ class Flood:
         return found
 
     def send(self, offset: int, row: int, receivers: int, *, hop_turns: int) -> None:
-        """Note that a row sends in a turn, and that these rows have the packet then."""
+        """A row transmits in a turn, after which these receivers have the packet."""
         self.sent.append((offset, row))
         self._has |= receivers
         for other in rows(receivers):
@@ -137,7 +143,7 @@ class Flood:
 
 
 class _FilledTurn(NamedTuple):
-    """The content of a turn, as bit sets of the rows that send, are meant, hear one sender, and hear more than one."""
+    """The content of a turn as bit sets: the rows that transmit, are meant, hear one sender, and hear more than one."""
 
     sending: int = 0
     meant: int = 0
@@ -147,13 +153,13 @@ class _FilledTurn(NamedTuple):
 
 _EMPTY: Final = _FilledTurn()
 _Offer = tuple[int, int, int, int]
-"""An offer: its worth, minus the flood's number, the row, its receivers."""
+"""A possible transmission: its worth, minus the number of its flood, its row, and its receivers."""
 _Choice = tuple[int, list[_Offer], _FilledTurn]
-"""A choice: the worth of all its offers, these offers, and the turn with them."""
+"""The sum of the worth of some transmissions, these transmissions, and the turn with them."""
 
 
 class Packing:
-    """Fills the turns of one superframe with transmissions of floods."""
+    """Assigns the turns of one superframe to the transmissions of floods."""
 
     def __init__(self, swarm: FloodNetwork, geometry: Geometry, effort: Effort) -> None:
         self._disturbs = swarm.disturbs
@@ -164,10 +170,10 @@ class Packing:
         self._filled = [_EMPTY] * geometry.turns
 
     def place(self, floods: Sequence[Flood]) -> bool:
-        """Give every flood its turns; returns False when there are not enough turns."""
+        """Schedule all floods; returns False if there are not enough turns."""
         turns, count = self._turns, len(floods)
         hops = max((flood.hops for flood in floods), default=0)
-        # beside the window, those that a relay at every hop keeps on their way
+        # besides the window, the floods that wait for the next hop because relaying takes several turns
         window = WINDOW * (2 if self._tries > 1 else 1) + self._hop_turns * hops * count // turns
         full_from, full_done = 0, 0
         for offset, begun, under_way in turn_by_turn(floods, turns=turns, window=window, pace=self._pace):
@@ -204,7 +210,7 @@ class Packing:
                 del under_way[-number]
 
     def _offers(self, offset: int, under_way: dict[int, Flood]) -> list[_Offer]:
-        """The offers that would be possible in this turn if no other flood used it."""
+        """The transmissions that would be possible in this turn if no other flood used it."""
         there = self._filled[offset % self._turns]
         following = self._filled[(offset + 1) % self._turns].sending
         barred = self._filled[(offset - 1) % self._turns].deaf | there.sending | there.disturbed
@@ -229,7 +235,9 @@ class Packing:
         return [offers[index] for _, index in sorted(keyed, reverse=True)]
 
     def _choose(self, offers: Sequence[_Offer], there: _FilledTurn, following: int) -> _Choice:
-        """Take one offer after the other if it disturbs none taken before; no receiver gets the same packet twice."""
+        """Take transmissions in order, each if it disturbs none taken before; no receiver gets the
+        same packet twice.
+        """
         sending, meant, disturbed, deaf = there
         disturbs = self._disturbs
         chosen: list[_Offer] = []
@@ -258,7 +266,7 @@ class Packing:
 
 
 def _will_be_late(left: int, turns: int, *, done: int, within: int) -> bool:
-    """True if floods end too slowly: `done` of them ended `within` so many turns in which the window was full."""
+    """True if floods end too slowly: `done` of them ended within `within` turns in which the window was full."""
     return within >= _TRIAL and left * within > _HOPE * done * turns
 
 

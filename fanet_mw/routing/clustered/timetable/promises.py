@@ -1,11 +1,13 @@
-"""What one node may promise of its own packets: bounds of delay, admission by a deadline, likely delays with loss.
+"""The delays that a node states for its own packets: bounds, likely delays over lossy links, and admission by a
+deadline.
 
-A bound is stated for a packet when the packet is accepted: only then are queue and turns known. It is stated if it will
-be kept whatever comes later: until the packet is through no other timetable may come into force, of which the leader
-gives notice in time. Every class of packets has room of its own in a turn, so each has a bound of its own.
+A bound is stated when a packet is accepted, because only then are its turn and the queue before it known. It is stated
+only if nothing that comes later can break it: no other timetable may come into force before the packet's flood is over.
+The leader therefore announces each timetable long enough ahead. Each class of packets has room of its own in a turn,
+and so a bound of its own.
 
-No node gives notice that another leader prevails, when two parts of a swarm have met. The node then keeps the
-turns in which it is to let out what it promised. A promised packet that would come late all the same is not sent.
+When two separated parts of a swarm meet, one leader prevails without such notice. A node then keeps the turns in which
+it has promised to send. A packet that would break its stated bound nevertheless is dropped.
 """
 
 from collections.abc import Mapping
@@ -30,7 +32,7 @@ _CLASSES: Final = {PRIORITY_SAFETY: "warning", PRIORITY_REPORT: "report", PRIORI
 
 
 class Promises:
-    """The bounds and likely delays of one node's packets under its timetables."""
+    """The bounds and likely delays of one node's packets, by its timetables."""
 
     def __init__(
         self, port: Port, *, plans: TurnPlans, roots: RootRelease, lease: Lease, admission: Admission | None
@@ -43,24 +45,25 @@ class Promises:
         self._lead_ns = port.scenario.radio.lead_ns
         self._interval_ns = seconds_to_ns(port.scenario.traffic.interval_s)
         self._bounds_ns: list[tuple[TurnPlan, Mapping[int, int]]] = []
-        """The bound of each class (by priority) of the node's packets in each timetable; a missing class has none."""
+        """The bound of each priority class of the node's packets by each timetable; classes without a bound are
+        missing."""
         self._promised: dict[int, tuple[int, int]] = {}
-        """The packets that a bound was stated for and that still wait, by sequence number: when the flood of each is
-        over as long as the node keeps its turns, and when it must be."""
+        """The waiting packets for which a bound was stated, by sequence number: the instant at which the flood of each
+        is over if the node keeps its turns, and the latest instant that the bound allows."""
         self._ahead: tuple[TurnPlan, int] | None = None
-        """The timetable looked at last, and how long before its end that must be announced."""
+        """The timetable that was examined last, and how long before its end that end must be announced."""
         self.announced_ns = 0
-        """The instant of the leader's latest known announcement of the timetable that is followed."""
+        """The instant of the latest known announcement of the timetable that the node follows."""
 
     def start(self, now_ns: int) -> None:
-        """Begin: the node is up, and has no bound yet."""
+        """The node has started, and has no bound yet."""
         if self._admission is not None:
             self._admission.start(now_ns)
 
     # --- timetables -----------------------------------------------------------------------------------------------
 
     def follow(self, *, now_ns: int) -> None:
-        """Take in that the newest timetable is another one, or that there is none."""
+        """The newest timetable has changed, or there is none any more."""
         if self._plans.newest is None:
             self._bounds_ns = []
             self._admit(None, now_ns=now_ns)
@@ -77,7 +80,7 @@ class Promises:
             self._port.record(record)
 
     def own(self) -> OwnBound | None:
-        """The node's part of the newest timetable, if that gives its packets a bound: not if frames may be lost."""
+        """The node's share of the newest timetable; None if it states no bounds, as when frames may be lost."""
         plan = None if self._port.scenario.measures_links else self._plans.newest
         if plan is None or not plan.roots or not plan.whole or plan.table.uncovered[self._port.node]:
             return None
@@ -89,7 +92,7 @@ class Promises:
         return OwnBound(plan.turns, offsets, plan.table.spans[node], plan.together, around_ns)
 
     def class_bounds_ns(self, own: OwnBound | None) -> Mapping[int, int]:
-        """The bounds by priority; a class that is repaired after losses has none."""
+        """The bounds by priority; a class whose losses are repaired has none."""
         scenario = self._port.scenario
         if own is None or scenario.clusters.repair_s:
             return {}
@@ -101,16 +104,14 @@ class Promises:
         return found if bulk_ns is None else {**found, PRIORITY_BULK: bulk_ns}
 
     def notice_ns(self, now_ns: int) -> int:
-        """The time ahead at which another timetable must be announced, for every promise under those in force to be
-        kept.
-        """
+        """How long ahead another timetable must be announced, so that all promises by those in force can be kept."""
         in_force = self._plans.in_order[self._plans.superseded(now_ns) :]
         return max((self._ahead_ns(plan) for plan in in_force), default=0)
 
     def _ahead_ns(self, plan: TurnPlan) -> int:
-        """The time before the end of this timetable at which that end must be announced.
+        """How long before the end of this timetable that end must be announced.
 
-        All have heard of it after a superframe and a flood; what any node has promised until then must be through.
+        All nodes know of it after a superframe and a flood; until then they may promise what must be over by that end.
         """
         if self._ahead is None or self._ahead[0] is not plan:
             roots = {turn.root for turn in plan.table.roots()} if plan.whole else set()
@@ -124,12 +125,16 @@ class Promises:
     # --- packets --------------------------------------------------------------------------------------------------
 
     def admit(self, packet: Packet, *, due_ns: int) -> bool:
-        """Let in a packet of the application, unless it harms the deadline of those before it; False: it is refused."""
+        """Admission control of an own application's packet: False if it would harm the deadline of
+        packets before it.
+        """
         policed = self._admission if packet.header.priority == PRIORITY_BULK else None
         return policed is None or policed.admit(due_ns)
 
     def greatest_bound_ns(self, packet: Packet, *, now_ns: int) -> int | None:
-        """The greatest bound of packets of this class under the timetables in force; None: under one there is none."""
+        """The greatest bound of this packet's class by the timetables in force; None if one of them
+        gives it no bound.
+        """
         priority = packet.header.priority
         bounds = [bounds_ns.get(priority) for _, bounds_ns in self._bounds_ns[self._plans.superseded(now_ns) :]]
         known = [bound_ns for bound_ns in bounds if bound_ns is not None]
@@ -140,11 +145,12 @@ class Promises:
         return max(known)
 
     def state(self, packet: Packet, bound_ns: int | None, *, through_ns: int | None, now_ns: int) -> None:
-        """Record what is promised of a packet that was just accepted, and whose flood is over at `through_ns`."""
+        """Record the bound or likely delay of a packet that was just accepted, whose flood is over at `through_ns`."""
         newest = self._plans.newest
         if bound_ns is not None and through_ns is not None and newest is not None:
             had_ns = through_ns + receipt_ns(self._port.scenario)
-            known_ns = self.announced_ns + newest.turns.period_ns + self._ahead_ns(newest)  # until then none is newer
+            # every timetable that comes into force before this instant has been announced already
+            known_ns = self.announced_ns + newest.turns.period_ns + self._ahead_ns(newest)
             due_ns = packet.header.origin_us * US + bound_ns
             if had_ns <= min(due_ns, known_ns):
                 self._port.record(BoundStated(now_ns, self._port.node, packet.header.seq, bound_ns))
@@ -156,20 +162,18 @@ class Promises:
             self._port.record(record)
 
     def kept_until_ns(self, now_ns: int) -> int:
-        """The instant until which the node keeps its turns, for what it promised to go in them; 0: nothing promised
-        waits.
-        """
+        """The instant until which the node keeps its turns, because promised packets wait for them; 0 if none do."""
         self._forget_overdue(now_ns)
         return max((through_ns for through_ns, _ in self._promised.values()), default=0)
 
     def _forget_overdue(self, now_ns: int) -> None:
-        """Forget the oldest promises about packets that have expired, or had to go for others in a full queue."""
+        """Forget the oldest promises, whose packets have expired or were evicted from a full queue."""
         while self._promised and self._promised[oldest := next(iter(self._promised))][1] < now_ns:
             del self._promised[oldest]
 
     def keeps(self, packet: Packet, *, through_ns: int | None) -> bool:
-        """True if a packet that stops waiting comes in time, because its flood is over at an instant, or if nothing was
-        promised of it. None: the end of its flood is not known.
+        """True if no bound is broken by a packet that leaves the queue now, because its flood is over in time or
+        because no bound was stated for it. `through_ns` is the end of the flood; None if it is not known.
         """
         if packet.header.origin != self._port.node:
             return True
@@ -187,19 +191,23 @@ class Promises:
             self._port.record(lost)
 
     def bound_ns(self) -> int | None:
-        """The bound of the node's bulk, application to application, under the newest timetable; None: no bound."""
+        """The bound of the node's bulk packets by the newest timetable, from application to application; None if there
+        is none.
+        """
         if not self._bounds_ns or self._lease.leads or not self._in_step():
             return None
         return self._bounds_ns[-1][1].get(PRIORITY_BULK)
 
     def least_interval_ns(self, deadline_ns: int) -> int | None:
-        """The least interval between packets of the node that meets a deadline; None: there is none, or no bound."""
+        """The least interval between packets of the node that meets a deadline; None if none does, or if there is no
+        bound.
+        """
         own = self.own()
         return None if own is None or self.bound_ns() is None else least_interval_ns(own, deadline_ns=deadline_ns)
 
     def likely_ns(self) -> int | None:
-        """The time within which `LIKELY_SHARE` of the nodes have this node's newest packet, where links lose frames;
-        None: no such time is known.
+        """The time within which `LIKELY_SHARE` of the nodes have this node's newest packet over lossy links; None if it
+        is not known.
         """
         plan = self._plans.newest
         if plan is None or plan.odds is None or not plan.roots:
@@ -207,7 +215,7 @@ class Promises:
         if self._lease.leads or plan.table.uncovered[self._port.node] or not self._in_step():
             return None  # schedules go before the leader's own packets
         if len(plan.table.spans) < self._port.scenario.nodes.count:
-            return None  # a swarm in parts, or one that is not complete: some node is in no turn of this timetable
+            return None  # the swarm is separated or not complete: some node is in no turn of this timetable
         found_ns = likely_delay_ns(
             plan,
             self._port.node,
@@ -218,11 +226,11 @@ class Promises:
         return None if found_ns is None else found_ns + self._lead_ns + receipt_ns(self._port.scenario)
 
     def _in_step(self) -> bool:
-        """True if the turns' slack allows for what is known of the swarm's clocks."""
+        """True if the slack of turns is enough for the known errors of the swarm's clocks."""
         return clocks_fit(self._port.scenario, clock_error_ns=self._port.clock_error_ns)
 
     def report(self) -> Mapping[str, object]:
-        """The state, as JSON values."""
+        """The state and the counters, as JSON values."""
         bound_ns, likely_ns = self.bound_ns(), self.likely_ns()
         bounds_ns = self._bounds_ns[-1][1] if self._bounds_ns else {}
         return {

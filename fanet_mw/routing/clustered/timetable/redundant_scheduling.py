@@ -1,17 +1,18 @@
-"""Turns filled with floods over lossy links: a frame is repeated, by one relay or by several, until it is likely heard.
+"""Scheduling of floods over lossy links: frames are repeated, by one relay or by several, until they have likely
+arrived.
 
     dose of a node    sum of -ln(loss) over the copies of a packet that were meant for it
-    enough            -ln(epsilon): all those copies are lost with a probability of epsilon
-    holder            the root, and each node that has had its dose: it may relay, several times if others need it
-    call              one frame of a node to its neighbors, in a turn of its own: a hello, or the answer to one
+    enough            -ln(epsilon): then all those copies are lost with a probability of at most epsilon
+    holder            the root, and each node with enough: it may relay the packet, several times if others need it
+    call              a frame of a node to its neighbors only, in a turn of its own: a hello, or the answer to one
 
-Turns are filled one after the other as in `list_scheduling.py`, by the same rules but one: a neighbor of a sender that
-another sender in the turn disturbs is left out, and served later, as long as half of what the frame is worth remains; a
-call is for all neighbors. Whether a node disturbs a link depends on how strong that link is (`Network`).
+Turns are filled one after the other as in `list_scheduling.py`, with one difference: if another sender in the turn
+disturbs one of a frame's receivers, that receiver is left out and served later, provided that half of the worth of the
+frame remains. All neighbors count for a call. Whether a node disturbs a link depends on the strength of that link
+(`Network`).
 
-A node sends its repetitions in flight by `turn_access.py` (its own packets) and `relaying/scheduled.py` (relays).
-
-Not modeled: that a relay may lack the packet although it has had its dose (`planner/loss.py` reckons with it).
+In flight, `turn_access.py` repeats a node's own packets, and `relaying/scheduled.py` its relays. Not modeled: that a
+relay may lack the packet although it has had enough copies (`planner/loss.py` includes that).
 """
 
 import math
@@ -33,21 +34,23 @@ from fanet_mw.units import Enu, NodeId
 from fanet_mw.wire.links import NEPERS, Link
 
 _CHANCES: Final = (0.5, 0.25, 0.1)
-"""Shares of frames that arrive; links below the first are used only if a node were cut off without them, and so on."""
+"""The least share of frames that must arrive over a link for it to be used. The lower values are tried only if nodes
+would be cut off otherwise."""
 _SINR_DB: Final = 11
-"""A frame that is this much stronger than another in its turn survives it: 8 dB at 11 Mb/s, and 3 dB to be sure."""
+"""A frame survives another one in the same turn if it is stronger by this much: 8 dB at 11 Mb/s,
+and a margin of 3 dB."""
 _DECADE_DB: Final = 30
-"""The decibels by which power falls over a decade of distance."""
+"""The decrease of power over a decade of distance."""
 
 
 class Network:
-    """The quality of links, and the nodes that spoil each link, as bit sets over the nodes' row numbers."""
+    """The quality of each link, and the nodes that disturb it, as bit sets over the nodes' row numbers."""
 
     def __init__(
         self, positions: Sequence[tuple[NodeId, Enu]], geometry: Geometry, measured: Sequence[Link], *, margin_db: float
     ) -> None:
-        """`geometry.interference_m` is for pairs that do not hear each other at all, and for a link that is
-        `margin_db` above the weakest; more margin keeps them farther apart.
+        """`geometry.interference_m` holds for pairs that do not receive each other at all, and for a link that is
+        `margin_db` stronger than the weakest. A greater margin keeps senders of the same turn farther apart.
         """
         self.nodes = NodeRows(node for node, _ in positions)
         row = self.nodes.row
@@ -75,7 +78,9 @@ class Network:
         return found
 
     def _connected(self, known: Sequence[Link]) -> tuple[list[int], float]:
-        """The best links that keep connected what is connected, and the least share of frames that arrives on them."""
+        """The best links that keep the swarm as connected as it is, and the least share of frames that arrives over
+        them.
+        """
         choices = [(self._links(known, least=least), least) for least in _CHANCES]
         whole = [reach(choices[-1][0], row)[0] for row in range(len(self.nodes.ids))]
         for hears, least in choices:
@@ -84,7 +89,7 @@ class Network:
         raise AssertionError("the last choice is the whole")
 
     def _who_disturbs(self, at: Sequence[Enu], interference_m: float, margin_db: float) -> dict[tuple[int, int], int]:
-        """The rows whose frames spoil each link."""
+        """The rows whose frames disturb each link."""
         weakest = min((dbm for dbm in self._dbm.values()), default=0)
         apart = [[here.minus(there).norm() for there in at] for here in at]
         found = {}
@@ -104,23 +109,23 @@ class Network:
         return apart_m <= near_m if heard_dbm is None else heard_dbm > dbm - _SINR_DB
 
     def disturbing(self, sender: int, receiver: int) -> int:
-        """The rows whose frames spoil this link."""
+        """The rows whose frames disturb this link."""
         return self._disturbing[sender, receiver]
 
 
 class _Offer(NamedTuple):
-    """A holder of a packet around which some node lacks part of its dose."""
+    """A possible transmission: a holder of a packet with a neighbor that does not have enough copies yet."""
 
     ready: int
-    """The offset from which on the holder can send."""
+    """The offset from which on the holder can transmit."""
     worth: int
     row: int
     gains: tuple[tuple[int, int], ...]
-    """Each receiver, and what a copy is worth to it."""
+    """Each receiver, and the worth of one more copy for it."""
 
 
 class Wave:
-    """The flood of one packet over links that lose frames; a call is a wave that ends with its first frame."""
+    """The flood of one packet over lossy links; a call is a wave that ends with its first frame."""
 
     def __init__(self, network: Network, root: int, *, enough: int, call: bool = False) -> None:
         self.root = root
@@ -132,7 +137,7 @@ class Wave:
         self._enough = enough
         self._has = 1 << root
         self._missing: dict[int, int] = {}
-        """What is left of the dose of each row that has had part of it."""
+        """The dose that each row still lacks, for rows that have had part of it."""
         self._ready = {root: 0}
         self._offers: list[_Offer] | None = None
 
@@ -148,7 +153,7 @@ class Wave:
     def _look(self) -> list[_Offer]:
         network, has = self._network, self._has
         if not self.sent and self.goal == has:
-            return [_Offer(0, 0, self.root, ())]  # the only node in this part of the swarm; it speaks all the same
+            return [_Offer(0, 0, self.root, ())]  # the only node in this part of the swarm; it transmits nevertheless
         found = []
         for row, ready in self._ready.items():
             lacking = network.hears[row] & ~has
@@ -163,7 +168,7 @@ class Wave:
         return gain + (ONLY if network.hears[other] & self._has == 1 << row else 0)
 
     def send(self, offset: int, row: int, receivers: Sequence[int], *, hop_turns: int) -> None:
-        """Note that a row sends in a turn, and that these rows get a copy."""
+        """A row transmits in a turn, and these receivers get one more copy."""
         self.sent.append((offset, row))
         for other in receivers:
             missing = self._missing[other] = self._missing.get(other, self._enough) - self._network.dose[row, other]
@@ -174,7 +179,9 @@ class Wave:
 
 
 class _RepeatingTurn(NamedTuple):
-    """The content of a turn, as bit sets of the rows that send, must not send, and may be deaf for a while after it."""
+    """The content of a turn as bit sets: the rows that transmit, must not transmit, and may be deaf for a while after
+    it.
+    """
 
     sending: int = 0
     barred: int = 0
@@ -182,10 +189,10 @@ class _RepeatingTurn(NamedTuple):
 
 
 class RedundantPacking:
-    """Fills the turns of one superframe with transmissions of waves."""
+    """Assigns the turns of one superframe to the transmissions of waves."""
 
     def __init__(self, network: Network, geometry: Geometry, *, pace: float = 1.0) -> None:
-        """`pace`: waves begin within this share of the superframe."""
+        """`pace`: the share of the superframe within which waves begin."""
         self._network = network
         self._turns = geometry.turns
         self._hop_turns = geometry.hop_turns
@@ -193,7 +200,7 @@ class RedundantPacking:
         self._filled = [_RepeatingTurn()] * geometry.turns
 
     def place(self, waves: Sequence[Wave]) -> bool:
-        """Give every wave its turns; returns False when there are not enough turns."""
+        """Schedule all waves; returns False if there are not enough turns."""
         turns, count = self._turns, len(waves)
         for offset, begun, under_way in turn_by_turn(waves, turns=turns, window=WINDOW, pace=self._pace):
             unbegun = begun < count or any(not wave.sent for wave in under_way.values())
@@ -236,7 +243,7 @@ class RedundantPacking:
         self._filled[turn] = there._replace(deaf=self._deaf(there.sending))
 
     def _receivers(self, offer: _Offer, out: int, sending: int) -> tuple[list[int], int]:
-        """The waiting rows that get the frame undisturbed, and what that is worth."""
+        """The receivers that get the frame undisturbed, and the worth of that."""
         network = self._network
         found, worth = [], 0
         for other, gain in offer.gains:
@@ -246,7 +253,7 @@ class RedundantPacking:
         return found, worth
 
     def _deaf(self, sending: int) -> int:
-        """The rows that hear a frame which another one spoils; they wait for EIFS then (IEEE 802.11-2020, 10.3.7)."""
+        """The rows that receive a frame disturbed by another; they wait for EIFS then (IEEE 802.11-2020, 10.3.7)."""
         network, found = self._network, 0
         for row in rows(sending):
             for other in rows(network.senses[row] & ~sending & ~found):
@@ -258,5 +265,5 @@ class RedundantPacking:
 
 
 def enough_for(epsilon: float) -> int:
-    """The dose after which all copies are lost with this probability, in grades."""
+    """The dose with which all copies are lost with this probability, in grades."""
     return max(1, round(-NEPERS * math.log(epsilon)))

@@ -1,17 +1,18 @@
-"""Collision-free floods: which node sends which root's packet in which turn. A pure function of positions.
+"""A timetable of collision-free floods: which node transmits which root's packet in which turn. A pure function.
 
     superframe:  | contention window | turn 0 | turn 1 | ... | turn N-1 |
-    flood of h:    h in its root turn, then relays that reach everyone, each in a turn of its own, once
+    flood of h:    h transmits in its root turn, then each relay once in a turn of its own, until all nodes are reached
 
-Each frame is meant for some of its sender's neighbors: those that lack the packet. Two nodes share a turn only if they
-do not hear each other and none of the nodes that one is meant for is within interference range of the other (the
-protocol model of Gupta and Kumar, 2000). A node that is meant by neither may be deaf in that turn; it does not send in
-the next one, because a station waits for EIFS after a frame that it could not decode (IEEE 802.11-2020, 10.3.7).
+Each frame is meant for those neighbors of its sender that lack the packet. Two nodes share a turn only if they do not
+hear each other, and if none of the nodes that one frame is meant for is within interference range of the other sender
+(the protocol model of Gupta and Kumar, 2000). A node for which neither frame is meant may receive garbage in that turn;
+it does not transmit in the next one, because a station waits for EIFS after a frame that it could not decode (IEEE
+802.11-2020, 10.3.7).
 
-The turns are filled one after the other (`list_scheduling.py`), so that floods follow each other through the swarm
-like waves. That a packet crosses the whole swarm in one superframe comes from the order of turns, as in Djukic and
-Valaee (ToN 17(3), 2009). Every node computes the same table from the same positions; nothing else is agreed upon. Not
-modeled: links that positions do not tell (obstacles); use a shorter `link_m` for a margin.
+The turns are filled one after the other (`list_scheduling.py`), so floods follow each other through the swarm like
+waves. A packet can cross the whole swarm in one superframe because of the order of turns, as in Djukic and Valaee (ToN
+17(3), 2009). All nodes compute the same table from the same positions, and need not agree on anything else. Not
+modeled: links that are blocked by obstacles; a shorter `link_m` leaves a margin.
 """
 
 from collections import Counter
@@ -31,10 +32,11 @@ PLAIN = Effort()
 
 
 class Turn(NamedTuple):
-    """One transmission: `node` sends the packet that `root` let out as its `instance`-th of this superframe."""
+    """One transmission: `node` sends the packet number `instance` of `root` in this superframe."""
 
     offset: int
-    """Turns from the beginning of the root's superframe; may reach into the next one."""
+    """The number of turns from the beginning of the superframe in which the flood begins; it may
+    lie in the next one."""
     node: NodeId
     root: NodeId
     instance: int
@@ -45,23 +47,24 @@ class Timetable(NamedTuple):
 
     turns: tuple[Turn, ...]
     spans: Mapping[NodeId, int]
-    """For each root, the turns from its own until all nodes have its packet, the first and the last included."""
+    """For each root, the number of turns from its own turn until all nodes have its packet, both included."""
     uncovered: Mapping[NodeId, tuple[NodeId, ...]]
-    """For each root, the nodes that it cannot reach at all because the swarm is in parts."""
+    """For each root, the nodes that it cannot reach because the swarm is separated."""
     used: int
-    """Turns that are in use, of `geometry.turns`."""
+    """The number of turns in use, of `geometry.turns`."""
     calls: Mapping[NodeId, tuple[int, ...]] = MappingProxyType({})
-    """For each node, the turns in which it sends to its neighbors alone: a hello, or a packet that a neighbor lacks."""
+    """For each node, its calls: turns in which it transmits to its neighbors only, a hello or a
+    packet that one lacks."""
 
     def roots(self) -> list[Turn]:
-        """The turns in which packets are let out; a repetition lets out nothing new."""
+        """The turns in which roots transmit new packets; repetitions are not among them."""
         first: dict[tuple[NodeId, int], Turn] = {}
         for turn in sorted(self.turns):
             first.setdefault((turn.root, turn.instance), turn)
         return list(first.values())
 
     def offsets_of(self, root: NodeId) -> list[int]:
-        """The turns in which one root lets packets out, ascending."""
+        """The offsets of the turns in which one root transmits new packets, ascending."""
         return sorted(turn.offset for turn in self.turns if turn.node == turn.root == root)
 
 
@@ -74,11 +77,11 @@ def timetable(
     effort: Effort = PLAIN,
     blocks: int = 1,
 ) -> Timetable | None:
-    """The table, None when the turns do not suffice. `roots`: one entry per packet and block, in any order.
+    """The timetable; None if there are not enough turns. `roots` has one entry per packet and block, in any order.
 
-    `positions` [m] in ascending order of nodes. `heads`: (node, its head) of nodes that are none; the flood of such a
-    node goes to its head first, in turns on a shortest way, and on from there. The superframe is divided into so many
-    equal `blocks`, which saves time: one is computed, and floods that outlast it go on in the next.
+    `positions` [m] are in ascending order of ids. `heads` has (node, its head) for nodes that are no heads; the flood
+    of such a node goes to its head first, on a shortest way, and spreads from there. With several `blocks` the
+    superframe is divided into equal parts, of which only one is computed; floods that outlast it continue in the next.
     """
     whole, geometry = geometry.turns, geometry._replace(turns=geometry.turns // blocks)
     if not geometry.turns:
@@ -111,11 +114,11 @@ def redundant_timetable(
     margin_db: float,
     pace: float = 1.0,
 ) -> tuple[Timetable, Odds] | None:
-    """The table for lossy links, and what to expect of it; None when the turns do not suffice.
+    """The timetable for lossy links, and its odds; None if there are not enough turns.
 
-    Every node gets so many copies of each packet that it misses all of them with a probability of at most `epsilon`,
-    if their senders have it; and each node has so many `calls`, turns of its own in which all its neighbors hear it.
-    With a greater `margin_db` the nodes that send in the same turn are farther apart.
+    Each node gets as many copies of each packet as needed so that all of them are lost with a probability of at most
+    `epsilon`, provided that their senders have the packet. Each node has `calls` turns in which all its neighbors can
+    receive it. A greater `margin_db` keeps nodes that transmit in the same turn farther apart.
     """
     if not geometry.turns:
         return None
@@ -155,7 +158,7 @@ def _uncovered(
 
 
 def _interleaved(floods: Sequence[Wave], calls: Sequence[Wave]) -> list[Wave]:
-    """Both in their order, evenly mixed."""
+    """The floods and the calls, each in their order, evenly mixed."""
     places = [
         ((index + 0.5) / len(row), kind, index, wave)
         for kind, row in enumerate((floods, calls))
@@ -165,9 +168,9 @@ def _interleaved(floods: Sequence[Wave], calls: Sequence[Wave]) -> list[Wave]:
 
 
 def _in_order(roots: Sequence[NodeId], positions: Mapping[NodeId, Enu]) -> list[tuple[NodeId, int]]:
-    """(root, instance) in the order in which they let packets out: those of one root evenly spread.
+    """(root, instance) in the order in which the floods begin; the packets of each root are evenly spread.
 
-    Waves that start far from each other can be in the air together: roots by turns from the near and the far side.
+    Floods that begin far from each other can be under way together, so near and far roots take turns.
     """
     ordered = sorted(set(roots), key=lambda node: (positions[node].east, positions[node].north, node))
     half = (len(ordered) + 1) // 2
@@ -187,7 +190,9 @@ def _in_order(roots: Sequence[NodeId], positions: Mapping[NodeId, Enu]) -> list[
 def _repeated(
     block: Sequence[Turn], count: Mapping[NodeId, int], length: int, blocks: int, whole: int
 ) -> tuple[Turn, ...]:
-    """The superframe of `whole` turns; what outlasts the last block goes on at the beginning of the next superframe."""
+    """The superframe of `whole` turns, made of repeated blocks; what outlasts the last block continues in the next
+    superframe.
+    """
     rest = whole - length * blocks
     turns = [
         turn._replace(offset=turn.offset + index * length, instance=turn.instance + index * count[turn.root])
@@ -198,7 +203,7 @@ def _repeated(
 
 
 def _spans(turns: Sequence[Turn]) -> dict[NodeId, int]:
-    """The longest span of each root's floods; `turns` are in order."""
+    """The longest flood of each root, in turns; `turns` are in order."""
     begun: dict[tuple[NodeId, int], int] = {}
     spans: dict[NodeId, int] = {}
     for turn in turns:

@@ -1,9 +1,10 @@
-"""From a leader's announcements to a timetable: every node computes the same one from the same schedule and places.
+"""How nodes come to a timetable: all of them compute the same one from the schedule and the positions in it.
 
-    schedule parts, each with places  ->  all of one version  ->  timetable, in force from the schedule's start on
-    and the links, where they are measured  -'
+    parts of the schedule, with positions  ->  all parts of one version  ->  timetable, in force when that begins
+    the measured links, if there are any   -'
 
-The leader adds to each schedule part the places of its members, and floods the measured links after the last part.
+The leader adds to each part of a schedule the positions of its members, and floods the measured links after the last
+part.
 """
 
 from collections.abc import Mapping
@@ -26,36 +27,37 @@ from fanet_mw.wire.links import Link, Links, frames_of
 from fanet_mw.wire.places import Places, rounded
 
 _LINKS_PART: Final = 1 << 16
-"""Parts of the links are kept for neighbors behind those of the schedule."""
+"""Added to the number of a part of the links, so that it differs from those of the schedule in the store of parts that
+neighbors may lack."""
 
 
 class Timetabling(Protocol):
-    """The additions to a leader's schedule, and the timetable that a node makes of both."""
+    """What the leader adds to its schedule, and the timetable that nodes compute from both."""
 
     needs_every_link: bool
-    """True if a node that falls silent, or a link that is lost, cuts others off: the leader is told, and plans anew."""
+    """True if a silent node or a lost link cuts others off, so that the leader must be told and plan anew."""
 
     def addition(self, part: Schedule, leader: Leader) -> bytes:
-        """The inner frames that a part of the schedule is announced with."""
+        """The inner frames that the leader adds to a part of the schedule."""
 
     def links_after(self, part: Schedule, leader: Leader) -> list[bytes]:
-        """The inner frames of the packets of links that follow a part of the schedule."""
+        """The inner frames of the packets with links that follow a part of the schedule."""
 
     def read(self, packet: Packet, schedule: Schedule) -> Places | None:
-        """Read what came with a part of a schedule; raises MalformedFrameError."""
+        """The positions that came with a part of a schedule; raises MalformedFrameError."""
 
     def on_schedule(self, packet: Packet, schedule: Schedule, places: Places | None, *, now_ns: int) -> None:
-        """Take in what came with a part of a schedule that the roles have taken in."""
+        """A part of a schedule was received, and the roles have accepted it."""
 
     def on_links(self, packet: Packet, *, now_ns: int) -> None:
-        """Take in a packet of links that followed a schedule; raises MalformedFrameError."""
+        """A packet of links was received that belongs to a schedule; raises MalformedFrameError."""
 
     def notice_ns(self, now_ns: int) -> int:
-        """The time ahead at which the leader must announce another schedule."""
+        """How long ahead the leader must announce another schedule."""
 
 
 class NoTimetable:
-    """A schedule says nothing but which node heads which cluster, and when its slot is."""
+    """Schedules without a timetable: they only say who heads which cluster, and which slot it has."""
 
     needs_every_link = False
 
@@ -69,17 +71,17 @@ class NoTimetable:
         return None
 
     def on_schedule(self, packet: Packet, schedule: Schedule, places: Places | None, *, now_ns: int) -> None:
-        """Do nothing: the roles have taken in all there is."""
+        """Nothing is done: the roles use all that is in the schedule."""
 
     def on_links(self, packet: Packet, *, now_ns: int) -> None:
-        """Do nothing: links are of no use without a timetable."""
+        """Nothing is done: links are of no use without a timetable."""
 
     def notice_ns(self, now_ns: int) -> int:
         return 0
 
 
 class FromPlaces:
-    """Timetables from places, or from measured links, as the scenario says."""
+    """Timetables computed from positions or from measured links, as the scenario says."""
 
     needs_every_link = True
 
@@ -101,7 +103,7 @@ class FromPlaces:
         self._access = access
         self._schedules: dict[int, tuple[Schedule, Places]] = {}
         self._measured: dict[int, Links] = {}
-        """The links of the schedule's version, by part."""
+        """The links of this version of the schedule, by part."""
         self._version: Version | None = None
         self._planned: Version | None = None
         self._announced_ns: dict[Version, int] = {}
@@ -133,7 +135,7 @@ class FromPlaces:
         return decoded(packet.frame, Places.decode_frames) if schedule.members else None
 
     def on_schedule(self, packet: Packet, schedule: Schedule, places: Places | None, *, now_ns: int) -> None:
-        """Take in the places, and plan when all of an epoch have come."""
+        """Keep the positions, and compute the timetable when all parts of an epoch have arrived."""
         version = Version(Authority(schedule.term, schedule.leader), schedule.epoch)
         if version != self._membership.version or places is None or len(places.members) != len(schedule.members):
             return
@@ -149,7 +151,7 @@ class FromPlaces:
         self._plan_if_complete(now_ns)
 
     def on_links(self, packet: Packet, *, now_ns: int) -> None:
-        """Take in a part of the links of an assignment, which may come before the schedule does."""
+        """A part of the links of an assignment was received, which may arrive before its schedule."""
         told = decoded(packet.frame, Links.decode_frames)
         if told is None or told.node != packet.header.origin:
             raise MalformedFrameError(f"links of an assignment by {packet.header.origin}")
@@ -166,7 +168,7 @@ class FromPlaces:
         self._plan_if_complete(now_ns)
 
     def _plan_if_complete(self, now_ns: int) -> None:
-        """Plan once when all parts of the schedule's version have come, and all parts of its links."""
+        """Compute the timetable once, when all parts of this version and of its links have arrived."""
         version = self._version
         due = version is not None and version == self._membership.version and version != self._planned
         if due and self._is_complete():
@@ -179,7 +181,7 @@ class FromPlaces:
         return len(self._schedules) >= first.parts and self._has_links()
 
     def _has_links(self) -> bool:
-        """True if all parts of the links of the schedule's version have come, or links are not measured."""
+        """True if all parts of the links of this version have arrived, or if links are not measured."""
         if not self._port.scenario.measures_links:
             return True
         first = next(iter(self._measured.values()), None)
@@ -198,18 +200,20 @@ class FromPlaces:
                 if member.is_head:
                     heads[member.cluster] = NodeId(member.node)
         if not heads.keys() >= set(cluster_of.values()):
-            return  # a cluster without a head: no leader makes one
+            return  # a cluster without a head; no leader announces one
         measured = tuple(link for part in sorted(self._measured) for link in self._measured[part].links)
         head_of = {node: heads[cluster] for node, cluster in sorted(cluster_of.items())}
         found = self._fit(schedule, at, head_of, measured)
-        # None: not one packet of each head fits; `fanet plan` says so
+        # None if not even one packet of each head fits; `fanet plan` tells the user
         plan = None if found is None else TurnPlan.of(self._port.node, schedule.start_us * US, found)
         self._access.follow(plan, now_ns=now_ns)
 
     def _fit(
         self, schedule: Schedule, at: Mapping[NodeId, Enu], head_of: Mapping[NodeId, NodeId], measured: tuple[Link, ...]
     ) -> Fitted | None:
-        """The timetable; by places if links are not measured, or leave no room for the load."""
+        """The timetable; it is computed from positions if links are not measured, or if they leave no room for the
+        load.
+        """
         places, leader = tuple(sorted(at.items())), NodeId(schedule.leader)
         origin_ns, period_ns = schedule.start_us * US, schedule.period_us * US
         found = None

@@ -1,9 +1,9 @@
-"""Access by a timetable: a node lets its packets out in its own turns; relays find theirs (`relaying/scheduled.py`).
+"""Access by a timetable: a node transmits its own packets in its own turns; its relays are in `relaying/scheduled.py`.
 
-Until a timetable gives the node turns it brings packets to a head, as with slots. What has no turn contends in the
-window at the beginning of each superframe: hellos, joins, unicasts to a head, and what neighbors lack; over lossy
-links hellos and answers have turns of their own, the calls, and a frame is repeated in the later turns that
-`redundant_scheduling.py` has found for it.
+Until a timetable gives the node turns, it sends its packets to a head, as in the protocol with slots. Frames without a
+turn contend in the window at the beginning of each superframe: hellos, joins, unicasts to a head, and packets that
+neighbors have missed. Over lossy links, hellos and missed packets have turns of their own, the calls, and each frame is
+repeated in later turns that `redundant_scheduling.py` has chosen.
 """
 
 from collections.abc import Mapping, Sequence
@@ -25,11 +25,11 @@ from fanet_mw.units import US, earliest, seconds_to_ns
 from fanet_mw.wire import Kind
 
 _MOST_ANSWERS: Final = 2
-"""Answers that wait for turns; more than these contend."""
+"""The greatest number of missed packets that wait for calls; any further ones contend."""
 
 
 class TurnAccess:
-    """The turns of one node, and the slots of heads while it has none."""
+    """The turns of one node; the slots of heads while it has no turns."""
 
     def __init__(
         self,
@@ -60,8 +60,8 @@ class TurnAccess:
     # --- timetables and roles -------------------------------------------------------------------------------------
 
     def follow(self, plan: TurnPlan | None, *, now_ns: int) -> None:
-        """Take up a timetable that comes into force later, or holds already: that of another leader, which this node
-        follows only when what it promised under the one before has gone. None: there is none that fits.
+        """Follow a timetable that comes into force later, or that of another leader, which may be in force already. The
+        node changes to the latter only when what it promised under the former one has gone. None: no timetable fits.
         """
         if plan is not None:
             plan = plan._replace(valid_ns=max(plan.valid_ns, self._promises.kept_until_ns(now_ns)))
@@ -69,19 +69,20 @@ class TurnAccess:
         self._promises.follow(now_ns=now_ns)
         self.use_turns(now_ns)
         if plan is None:
-            self._calls.drain()  # what neighbors lack they will say again
+            self._calls.drain()  # neighbors will state again what they lack
         stranded = [] if self._roots.has_turn(now_ns=now_ns) else self._stranded(now_ns)
         for packet in [*stranded, *self._slots.drain()]:
             self.forward(packet, start_ns=now_ns + self._lead_ns, now_ns=now_ns)
 
     def _stranded(self, now_ns: int) -> list[Packet]:
-        """Take out the packets whose turns are gone, to go another way; those that a bound was stated for are dropped,
-        because any other way takes as long as it takes.
+        """Take out the packets whose turns are gone, which will go another way.
+
+        Packets with a stated bound are dropped instead, because any other way may take longer.
         """
         return self._kept(self._roots.drain(), through_ns=None, now_ns=now_ns)
 
     def _kept(self, packets: Sequence[Packet], *, through_ns: int | None, now_ns: int) -> list[Packet]:
-        """Of packets that no longer wait here, drop those whose stated bound would be broken; returns the others."""
+        """Drop those of some packets whose stated bound would be broken; returns the others."""
         kept = []
         for packet in packets:
             if self._promises.keeps(packet, through_ns=through_ns):
@@ -91,7 +92,7 @@ class TurnAccess:
         return kept
 
     def use_turns(self, now_ns: int) -> None:
-        """Let packets out in the turns of the timetables that are followed."""
+        """Use the turns of the timetables that are followed."""
         plans, node = self._plans.in_order, self._port.node
         roots = [(plan, plan.table.spans.get(node, 1)) for plan in plans]
         self._roots.follow(
@@ -107,7 +108,7 @@ class TurnAccess:
         for packet in self._slots.drain_uplink():
             if self._roots.has_turn(now_ns=now_ns):
                 self._let_out(packet, now_ns=now_ns)
-            else:  # the schedule has made the node head, its timetable is still to come
+            else:  # the schedule has made this node a head, and its timetable has yet to come
                 self._slots.enqueue(packet, now_ns=now_ns)
 
     def renew_slot(self) -> None:
@@ -132,7 +133,7 @@ class TurnAccess:
             self._slots.forward(packet, start_ns=start_ns, now_ns=now_ns, tries=tries)
 
     def _let_out(self, packet: Packet, *, last: bool = False, now_ns: int) -> None:
-        """Queue a packet for the turns of this node; `last`: behind everything that waits or is still to come."""
+        """Queue a packet for the turns of this node; with `last` it goes behind all others, including later ones."""
         newest = self._plans.newest
         assert newest is not None, "a node without a timetable has no turn"
         size = newest.frame_bytes
@@ -151,8 +152,8 @@ class TurnAccess:
         bound = plan is not None and plan.odds is None
         last = kind is Kind.JOIN and not urgent and bound
         if plan is None or not plan.roots or (last and (not patient or len(self._roots))):
-            # Turns are for what the bound is about: a join has those that nothing else needs, if it can wait for one,
-            # and any where there is no bound. An announcement does not wait for turns that are still to come.
+            # Turns serve packets with a bound. A join uses a turn that nothing else needs if it can wait for one, and
+            # any turn if there is no bound. An announcement does not wait for turns of a timetable yet to come.
             return self._floods.contend_control(kind, inner, now_ns=now_ns)
         packet = self._floods.control(kind, inner, now_ns=now_ns)
         for stale in self._roots.outdated(before_us=packet.header.origin_us) if kind is not Kind.JOIN else ():
@@ -161,10 +162,10 @@ class TurnAccess:
         return packet
 
     def answer(self, packet: Packet, *, now_ns: int) -> None:
-        """Send an answer to neighbors in a turn for them alone, if the node has one and the packet fits.
+        """Transmit a packet that a neighbor has missed in the node's next call, if it has calls and the packet fits.
 
-        What still waits for a turn to be flooded in is no answer: a node that hears a packet outside of its turns
-        relays neither that copy nor its flood afterwards, which would end there.
+        A packet that still waits for its own flood is not sent so: nodes that receive it outside of its turns would
+        relay neither this copy nor the flood afterwards.
         """
         key = key_of_packet(packet)
         if self._roots.holds(key):
@@ -204,13 +205,13 @@ class TurnAccess:
             if kept:
                 self._floods.begin(kept, start_ns=start_ns, again_ns=self._repetitions(start_ns))
         if len(self._roots) and not self._roots.has_turn(now_ns=now_ns):
-            for packet in self._stranded(now_ns):  # that was the node's last turn: the next timetable has none for it
+            for packet in self._stranded(now_ns):  # that was the node's last turn: the next timetable gives it none
                 self.forward(packet, start_ns=now_ns + self._lead_ns, now_ns=now_ns)
         for packets, start_ns in self._calls.due(now_ns=now_ns):
             self._floods.answer(packets, start_ns=start_ns)
 
     def _through_ns(self, start_ns: int) -> int | None:
-        """The end of the flood that begins in one of the node's turns; None: no timetable is in force."""
+        """The end of the flood that begins in one of the node's turns; None if no timetable is in force."""
         plan = self._plans.at(start_ns)
         turn = None if plan is None else plan.turns.turn_at(start_ns)
         if plan is None or turn is None:
@@ -218,7 +219,7 @@ class TurnAccess:
         return start_ns + plan.turns.flood_ns(turn, span=plan.table.spans.get(self._port.node, 1))
 
     def _repetitions(self, start_ns: int) -> list[int]:
-        """The instants at which a frame is repeated that is let out at an instant."""
+        """The instants at which a frame that is first transmitted at an instant is repeated."""
         plan = self._plans.at(start_ns)
         turn = None if plan is None else plan.turns.turn_at(start_ns)
         if plan is None or turn is None:

@@ -1,9 +1,9 @@
-"""What both schedulers of floods share: the geometry, the order in which floods begin, and how far a flood can go.
+"""Parts that both schedulers of floods share: the geometry, the order in which floods begin, and their reach.
 
-    list_scheduling.py         links that lose nothing: every node sends a packet at most once
-    redundant_scheduling.py    links that lose frames: a frame is repeated until it is likely heard
+    list_scheduling.py         for links without losses: every node sends a packet at most once
+    redundant_scheduling.py    for lossy links: a frame is repeated until it has likely arrived
 
-Sets of nodes are the bits of integers, by the nodes' row numbers.
+Sets of nodes are represented as the bits of integers, by the nodes' row numbers.
 """
 
 from collections.abc import Iterable, Iterator, Sequence
@@ -12,24 +12,25 @@ from typing import Final, NamedTuple, Protocol, TypeVar
 from fanet_mw.units import NodeId
 
 RECEIVER: Final = 100
-"""What it is worth that one more node gets a packet, or all the copies that it needs, in turns of its flood's age."""
+"""The worth of serving one more node, with all the copies that it needs, in units of turns of the flood's age."""
 ONLY: Final = 50
-"""What it is worth besides that no other holder of the packet could have served that node."""
+"""The additional worth if no other holder of the packet could serve that node."""
 WINDOW: Final = 24
-"""The number of floods that are under way at once. More of them cost computing time and gain little."""
+"""The greatest number of floods under way at once. More would cost computing time and gain little."""
 
 
 class Geometry(NamedTuple):
     """The geometry for which a timetable is computed."""
 
     link_m: float
-    """Nodes that are no farther apart hear each other."""
+    """The greatest distance at which nodes receive each other."""
     interference_m: float
-    """A transmitter that is no farther from a receiver destroys what the receiver hears."""
+    """The greatest distance at which a sender disturbs a receiver of another frame."""
     turns: int
-    """The number of turns of one superframe."""
+    """The number of turns in a superframe."""
     hop_turns: int
-    """The number of turns from the one that brings a packet to the first that can relay it; 1: the next turn can."""
+    """The number of turns from the one in which a packet arrives to the first that can relay it; 1
+    means the next turn."""
 
 
 class NodeRows:
@@ -39,7 +40,7 @@ class NodeRows:
         self.ids = tuple(nodes)
         self.row = {node: row for row, node in enumerate(self.ids)}
         self.everyone = (1 << len(self.ids)) - 1
-        """The rows of all of them, as a bit set."""
+        """The bit set of all rows."""
 
     def of(self, bits: int) -> tuple[NodeId, ...]:
         """The nodes of a bit set, in the order of their rows."""
@@ -47,14 +48,14 @@ class NodeRows:
 
 
 class Placed(Protocol):
-    """A flood, as far as a scheduler has placed it."""
+    """A flood, as far as a scheduler has scheduled it."""
 
     sent: list[tuple[int, int]]
     """The transmissions of this flood as (offset, row), in order."""
 
 
 def age(flood: Placed, offset: int) -> int:
-    """The number of turns since a flood began; 0 for one that has not begun."""
+    """The number of turns since a flood began; 0 if it has not begun."""
     return offset - flood.sent[0][0] if flood.sent else 0
 
 
@@ -64,10 +65,11 @@ AnyFlood = TypeVar("AnyFlood", bound=Placed)
 def turn_by_turn(
     floods: Sequence[AnyFlood], *, turns: int, window: int, pace: float
 ) -> Iterator[tuple[int, int, dict[int, AnyFlood]]]:
-    """Each turn until all floods have been placed: its offset, how many floods have begun, and those under way.
+    """Iterate over the turns until all floods are scheduled: the offset, the number of floods that have begun, and
+    those under way.
 
-    Who asks for the turns fills them, and takes the floods that are done out of those under way. Floods begin evenly
-    over this share (`pace`) of so many `turns`, and no more than a `window` of them are under way.
+    The caller fills each turn, and removes completed floods from those under way. Floods begin evenly over the first
+    share `pace` of the `turns`, with at most `window` of them under way.
     """
     count, begun, offset = len(floods), 0, 0
     under_way: dict[int, AnyFlood] = {}
@@ -80,7 +82,7 @@ def turn_by_turn(
 
 
 def reach(hears: Sequence[int], root: int) -> tuple[int, int]:
-    """The rows that a flood of this row can reach, itself included, and the number of hops that it takes."""
+    """The rows that a flood from this row can reach, itself included, and the number of hops to the farthest."""
     found = frontier = 1 << root
     hops = -1
     while frontier:

@@ -1,12 +1,13 @@
-"""The division of a superframe's turns: the packets of each root, and how many of them share a frame. Pure functions.
+"""Decides how the turns of a superframe are used: how many each root gets, and how many packets share a frame. Pure
+functions.
 
-    first     a little more turns than each node's load needs, so that a backlog drains
-    else      as many as it needs; with several of its packets in a frame if they fit: longer turns, fewer preambles
-    else      fewer; the node lets out what they carry, and has no bound
-    else      turns for heads only: members' packets contend on their way to them, and have no bound either
+    first choice  a few more turns than each node's load needs, so that queues can drain
+    then          as many as it needs; several packets of the node share a frame if they fit (fewer, longer turns)
+    then          fewer; the node transmits what they can carry, and has no bound
+    last          turns for heads only; packets of members contend on their way to them, and have no bound either
 
-A member's packet has turns of its own on a shortest way to its head, and the head passes it on at once: the head's turn
-lies right behind, so nothing waits there. Every node computes the same timetable from the same schedule and places.
+A member's packet has turns of its own on a shortest way to its head. The head passes it on in the turn right behind, so
+it never waits there. All nodes compute the same timetable from the same schedule and positions.
 """
 
 import math
@@ -31,65 +32,64 @@ from fanet_mw.wire.places import CAPACITY as PLACES_CAPACITY
 _SCHEDULE_BYTES: Final = SCHEDULE.layout.size + OVERHEAD
 _PLACES_BYTES: Final = PLACES.layout.size + OVERHEAD
 _FEWER: Final = 0.95
-"""The share of the load that is tried next when the turns do not suffice for it, and so on."""
+"""If the turns do not suffice, this share of the load is tried next, then this share of that, and so on."""
 _EASY: Final = (Effort(), Effort(pace=0.9))
 _HARD: Final = Effort(pace=0.8, tries=8)
-"""The packing for a load that does not fit otherwise."""
+"""The effort for a load that does not fit otherwise."""
 
 _REDUNDANCY: Final = ((9, 0.01), (7, 0.03), (5, 0.05), (4, 0.05), (3, 0.05), (3, 0.1), (3, 0.3))
-"""The redundancies to try with measured links, the best first: the margin against interference [dB], and the share of
-packets of which a node may lose all copies. Interference that positions do not tell costs more than frames that are
-sent once less."""
+"""The redundancies to try with measured links, the best first: the margin against interference [dB], and the
+probability that a node loses all copies of a packet. Unforeseen interference costs more than one repetition less."""
 _PACES: Final = (1.0, 0.9)
 _MOST_PERIODS: Final = 4
-"""The most flooding periods in a superframe with measured links."""
+"""The greatest length of a superframe with measured links, in flooding periods."""
 _LOAD: Final = 0.9
-"""The share of its root turns that a node's packets use with measured links: its other messages need turns, too."""
+"""The share of a node's root turns that its packets use with measured links; its other messages need the rest."""
 _CALLS_PER_S: Final = 3
 _MOST_DIGESTS: Final = 4
 _HELLO_BYTES: Final = 200
 """The size of a hello without its digest."""
 
 _BLOCK: Final = 300
-"""The fewest packets in a block: fewer are packed less densely, more take long to pack."""
+"""The least number of packets in a block: with fewer, turns are filled less densely; more take long to compute."""
 
 Places = tuple[tuple[NodeId, Enu], ...]
-"""The positions of the nodes [m], by ascending id."""
+"""The positions of the nodes [m], in ascending order of ids."""
 
 
 class Fitted(NamedTuple):
-    """A timetable, and the turns that it fills."""
+    """A timetable, and how its turns are used."""
 
     turns: Turns
     table: Timetable
     together: int
-    """The number of packets that a root lets out in one of its turns."""
+    """The greatest number of packets that a root transmits in one turn."""
     frame_bytes: int
-    """The bytes that one turn holds."""
+    """The number of bytes that one turn can carry."""
     whole: bool
-    """True if every node lets out its own packets; otherwise heads let out those of their members."""
+    """True if each node transmits its own packets; otherwise heads transmit those of their members."""
     enough: bool
-    """True if as many packets are let out as come."""
+    """True if the turns suffice for the load."""
     odds: Odds | None = None
-    """The odds of a timetable for lossy links; None: the timetable reckons with no loss."""
+    """The odds of a timetable for lossy links; None for a timetable that assumes no losses."""
 
 
 class TurnPlan(NamedTuple):
-    """A timetable in force from an instant on, as one node sees it."""
+    """A timetable that is in force from an instant on, as one node needs it."""
 
     valid_ns: int
     turns: Turns
     table: Timetable
     mine: Mapping[tuple[NodeId, int], tuple[int, ...]]
-    """The node's turns for each (root, instance) of other nodes."""
+    """The turns in which this node relays, for each (root, instance)."""
     heard: Mapping[tuple[int, NodeId], tuple[int, NodeId, int]]
-    """The (offset, root, instance) of the flood that is heard in each turn from each sender."""
+    """The flood that is received in each turn from each sender, as (offset, root, instance)."""
     roots: tuple[int, ...]
-    """The turns in which the node lets packets out."""
+    """The turns in which this node transmits new packets."""
     again: Mapping[int, tuple[int, ...]]
-    """The later turns in which the node repeats what it let out in each root turn."""
+    """The later turns in which this node repeats what it has transmitted in each of its root turns."""
     calls: tuple[int, ...]
-    """The turns in which the node sends what is for its neighbors alone."""
+    """The turns in which this node transmits frames that only its neighbors need."""
     together: int
     frame_bytes: int
     whole: bool
@@ -122,12 +122,12 @@ class TurnPlan(NamedTuple):
         )
 
     def has_turns(self, node: NodeId) -> bool:
-        """True if this node lets its packets out itself."""
+        """True if this node transmits its packets itself."""
         return node in self.table.spans
 
 
 class _Wish(NamedTuple):
-    """The turns for so many packets of each root, and how many packets share a turn."""
+    """One way to try: the number of packets of each root, and how many of them share a turn."""
 
     roots: tuple[NodeId, ...]
     together: int
@@ -138,20 +138,20 @@ class _Wish(NamedTuple):
 
 
 def largest_frame(scenario: Scenario, *, together: int = 1) -> int:
-    """The largest frame of a turn: packets of bulk and what is reserved, or a leader's announcement."""
+    """The largest frame of a turn: bulk packets and the reserved room, or a leader's announcement."""
     links_bytes = HEADER_BYTES + MESSAGES * (LINKS.layout.size + OVERHEAD) if scenario.measures_links else 0
     longest = max(together * scenario.traffic.payload_bytes, schedule_bytes(scenario), links_bytes)
     return longest + sum(reserved(scenario).values())
 
 
 def schedule_bytes(scenario: Scenario) -> int:
-    """The size of a part of a schedule with its places."""
+    """The size of a part of a schedule with its positions."""
     members = min(scenario.nodes.count, CAPACITY)
     return HEADER_BYTES + _SCHEDULE_BYTES + _PLACES_BYTES * -(-members // PLACES_CAPACITY)
 
 
 def superframe(scenario: Scenario, *, origin_ns: int = 0, period_ns: int | None = None, together: int = 1) -> Turns:
-    """The geometry of a scenario whose turns hold so many packets each."""
+    """The superframe of a scenario if each turn holds `together` packets."""
     turn = turn_ns(scenario, payload_bytes=largest_frame(scenario, together=together))
     whole_ns = scenario.clusters.period_ns if period_ns is None else period_ns
     contention_ns = round(scenario.clusters.contention_ms * MS)
@@ -180,9 +180,10 @@ def fit(
     period_ns: int | None = None,
     quick: bool = False,
 ) -> Fitted | None:
-    """The timetable of a swarm; None when not even one packet of each head fits. `head_of`: of all but the leader.
+    """The timetable of a swarm; None if not even one packet of each head fits. `head_of`: the head of each node but the
+    leader.
 
-    `quick`: None as well when the load does not fit without the effort that may take seconds.
+    With `quick` it is None, too, if the load only fits with an effort that may take seconds.
     """
     leads = leader or scenario.leader
     heads = tuple((node, head) for node, head in sorted(head_of.items()) if node != head)
@@ -200,8 +201,8 @@ def fit(
 
 
 def measured_period_ns(scenario: Scenario) -> int:
-    """The superframe with measured links: a little less than it takes for one packet of every source, so that repeated
-    frames find room; never shorter than the flooding period, and at most four times as long.
+    """The length of a superframe with measured links: a little less than one packet of each source takes, so that there
+    is room for repetitions; at least one flooding period, at most four.
     """
     one_each_ns = int(_LOAD * seconds_to_ns(scenario.traffic.interval_s))
     return max(scenario.clusters.period_ns, min(_MOST_PERIODS * scenario.clusters.period_ns, one_each_ns))
@@ -216,8 +217,8 @@ def fit_measured(
     origin_ns: int,
     link_parts: int,
 ) -> Fitted | None:
-    """The timetable of a swarm whose links have been measured: every node lets out its own packets, frames are
-    repeated as long as there are turns for it. None when the turns do not suffice for the load.
+    """The timetable of a swarm with measured links: each node transmits its own packets, and frames are repeated as
+    often as turns allow. None if the turns do not suffice for the load.
     """
     whole_ns = measured_period_ns(scenario)
     size = max(largest_frame(scenario), hello_bytes(scenario))
@@ -241,13 +242,13 @@ def fit_measured(
 
 
 def hello_bytes(scenario: Scenario) -> int:
-    """The largest hello that says what its sender holds."""
+    """The size of the largest hello with a digest."""
     digests = min(_MOST_DIGESTS, -(-scenario.nodes.count // DIGEST_CAPACITY))
     return HEADER_BYTES + _HELLO_BYTES + digests * (DIGEST.layout.size + OVERHEAD)
 
 
 def least_interval_ns(scenario: Scenario, places: Places, head_of: Mapping[NodeId, NodeId]) -> int | None:
-    """The traffic interval down to which as many packets as come fit the turns; looked for up to twice the load."""
+    """The least interval of traffic at which the load fits the turns; it is searched for up to twice the load."""
     period_ns = scenario.clusters.period_ns
     heads = tuple((node, head) for node, head in sorted(head_of.items()) if node != head)
     senders = [*sorted(head_of), *([scenario.leader] if leader_load(scenario) else [])]
@@ -275,7 +276,7 @@ def least_interval_ns(scenario: Scenario, places: Places, head_of: Mapping[NodeI
 
 
 def most_together(scenario: Scenario) -> int:
-    """The number of packets of bulk that a frame holds besides what is reserved."""
+    """The greatest number of bulk packets that fit into a frame besides the reserved room."""
     room = scenario.radio.max_frame_bytes - sum(reserved(scenario).values())
     return max(1, room // scenario.traffic.payload_bytes)
 
@@ -289,7 +290,9 @@ def _table(
     blocks: int,
     hard: bool,
 ) -> Timetable | None:
-    """The easy packing whose floods are over soonest; when there is none, and it is wished, the hard one."""
+    """The timetable whose floods are over soonest with little effort; if there is none, and `hard` is set, that with
+    more.
+    """
     if not geometry.turns:
         return None
     found = [(effort, timetable(places, roots, geometry, heads, effort, blocks)) for effort in _EASY]
@@ -336,7 +339,9 @@ def _wishes(scenario: Scenario, head_of: Mapping[NodeId, NodeId], leader: NodeId
 
 
 def _blocks(packets: int, senders: int) -> int:
-    """Parts of a superframe that are alike: as many as leave each long, and every sender as many turns as the next."""
+    """The number of equal blocks of a superframe: each remains long, and each sender has the same number of turns in
+    all.
+    """
     each, more = divmod(packets, max(1, senders))
     if more:
         return max(1, packets // _BLOCK)
@@ -349,7 +354,9 @@ def _for_heads(head_of: Mapping[NodeId, NodeId], control: tuple[NodeId, ...], le
 
 
 def leader_load(scenario: Scenario) -> int:
-    """The leader is in no cluster, but its own packets need turns too: 1 if the application may send from it."""
+    """The number of packets per period of the leader itself: 1 if its application may send, although it is in no
+    cluster.
+    """
     traffic = scenario.traffic
     if traffic.arrivals == "none" or traffic.destination == scenario.leader:
         return 0
@@ -360,5 +367,5 @@ def leader_load(scenario: Scenario) -> int:
 
 
 def schedule_parts(scenario: Scenario) -> int:
-    """The number of turns that the leader's schedules take of each superframe."""
+    """The number of turns that the leader's schedules take in each superframe."""
     return max(1, -(-(scenario.nodes.count - 1) // CAPACITY))

@@ -1,11 +1,11 @@
-"""The timetables that a node follows: one in force, perhaps others that come into force later."""
+"""The timetables that a node follows: the one in force, and perhaps others that come into force later."""
 
 from fanet_mw.routing.clustered.tdma.turns import Turns
 from fanet_mw.routing.clustered.timetable.turn_plan import TurnPlan
 
 
 class TurnPlans:
-    """Timetables of one node, by the instant from which each holds."""
+    """The timetables of one node, in the order in which they come into force."""
 
     def __init__(self) -> None:
         self.in_order: list[TurnPlan] = []
@@ -27,12 +27,14 @@ class TurnPlans:
         return None if plan is None else plan.turns
 
     def superseded(self, now_ns: int) -> int:
-        """The number of the timetables, the oldest first, that are no longer in force."""
+        """The number of timetables, the oldest first, that are no longer in force."""
         return sum(plan.valid_ns <= now_ns for plan in self.in_order[1:])
 
     def follow(self, plan: TurnPlan | None, *, now_ns: int) -> None:
-        """Take up a newer timetable, and forget those that no longer hold, or would hold from later on than it does:
-        those of a leader that another one prevails over. None: follow none.
+        """Follow a newer timetable; None: follow none.
+
+        Timetables are forgotten that are no longer in force, or that would come into force after it: they are those of
+        a leader over which another one prevails.
         """
         if plan is None:
             self.in_order = []

@@ -26,6 +26,9 @@ class Actor(ABC):
 
     name: str
     """The actor's name, unique in a swarm, used in reports, logs and messages (`agent-7`, `emulator`, `world`)."""
+    slack_ns = 0
+    """How much later than `next_wake_ns()` a host may wake the actor, so that several wake-ups become one. A process is
+    woken less often; in virtual time, where a wake-up costs nothing, the host does not make use of it."""
     hears_out = False
     """True for an actor that accounts for what others send: in real time it still receives, before `stop`, what was on
     its way at the end."""

@@ -82,6 +82,7 @@ class ClockedUav(Actor):
             reader=reader,
         )
         super().__init__(self._uav.name, self._uav.subscriptions)
+        self.slack_ns = self._uav.slack_ns
         self._node = node
         self._stamp_ns = scenario.clock.stamp_ns
         self._until_ns = scenario.duration_ns

@@ -2,8 +2,10 @@
 
     Zenoh's thread -> inbox -> wake-ups of the loop drain it -> actor -> outbox, one put per topic and wake-up
 
-The host never wakes an actor early. It measures and reports how late it wakes the actor, and for how long it could do
-nothing at all; the lateness of frames is counted by the medium. A wake-up that is requested for an instant in the past
+The host never wakes an actor early. An actor with slack is woken together with the next message that comes after the
+instant it asked for, at the latest when its slack is over: each wake-up of a process costs far more than what the actor
+does in it. The host measures and reports how late beyond that it wakes the actor, and for how long it could do nothing
+at all; the lateness of frames is counted by the medium. A wake-up that is requested for an instant in the past
 counts as late from the request on; how far past the instant was is reported separately. An actor that raises ends its
 host, and with it the process.
 """
@@ -46,7 +48,8 @@ class _WakeUp(NamedTuple):
 
     asked_ns: int
     due_ns: int
-    """The instant from which the wake-up counts as late: not before the call at which it was requested."""
+    """The instant from which the wake-up counts as late: the end of the slack, and not before the call at which it was
+    requested."""
     timer: asyncio.TimerHandle
 
 
@@ -223,7 +226,10 @@ class RealtimeHost:
 
     def _take_inbox(self) -> None:
         more = self._inbox.deliver(self._receive)
-        self._publish_and_arm()
+        if self._wake_up is not None and self._wake_up.asked_ns <= self.now_ns():
+            self._wake_actor()
+        else:
+            self._publish_and_arm()
         if more and not self._drain_asked:  # timers, the clock and reports may run before the rest
             self._drain_asked = True
             self._loop.call_soon(self._drain)
@@ -250,17 +256,20 @@ class RealtimeHost:
             return
         assert self._clock is not None, "the clock is running"
         self._figures.asked(wake_ns, call_ns=self._call_ns)
-        timer = self._loop.call_later(self._clock.wait_s(wake_ns), self._wake)
-        self._wake_up = _WakeUp(wake_ns, max(wake_ns, self._call_ns), timer)
+        due_ns = max(wake_ns + self._actor.slack_ns, self._call_ns)
+        timer = self._loop.call_later(self._clock.wait_s(due_ns), self._wake)
+        self._wake_up = _WakeUp(wake_ns, due_ns, timer)
 
     def _wake(self) -> None:
         self._guard(self._wake_actor)
 
     def _wake_actor(self) -> None:
         wake_up, now_ns = self._wake_up, self.now_ns()
+        if wake_up is not None:
+            wake_up.timer.cancel()
         self._wake_up = None
         if wake_up is not None and now_ns >= wake_up.asked_ns:  # else the loop's clock is a little fast: arm again
-            self._figures.woken(now_ns - wake_up.due_ns)
+            self._figures.woken(max(0, now_ns - wake_up.due_ns))
             self._call_ns = now_ns
             self._actor.wake(now_ns)
         self._publish_and_arm()

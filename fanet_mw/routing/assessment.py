@@ -45,11 +45,13 @@ class Assessment:
             heapq.heappop(due)  # this packet was decided meanwhile
         return due[0][0] if due else None
 
-    def decided(self, *, now_ns: int) -> list[Packet]:
-        """The packets whose assessment is over and that too few other nodes have relayed."""
+    def decided(self, *, now_ns: int) -> list[tuple[int, Packet]]:
+        """The packets whose assessment is over and that too few other nodes have relayed, each with the instant at
+        which its assessment was over."""
         relays, due = [], self._due
         while due and due[0][0] <= now_ns:
-            open_ = self.pending.pop(heapq.heappop(due)[1], None)
+            due_ns, key = heapq.heappop(due)
+            open_ = self.pending.pop(key, None)
             if open_ is not None:  # else this packet was decided meanwhile
-                relays.append(open_[1])
+                relays.append((due_ns, open_[1]))
         return relays

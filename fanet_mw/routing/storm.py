@@ -57,8 +57,8 @@ class CounterBased(FloodingProtocol):
         return self._assessment.next_wake_ns()
 
     def wake(self, now_ns: int) -> None:
-        for packet in self._assessment.decided(now_ns=now_ns):
-            self._port.relay(Relay(packet, now_ns + self._lead_ns))
+        for due_ns, packet in self._assessment.decided(now_ns=now_ns):
+            self._port.relay(Relay(packet, max(due_ns + self._lead_ns, now_ns)))
 
     def waiting(self) -> int:
         return len(self._assessment)

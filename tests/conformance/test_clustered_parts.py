@@ -66,9 +66,9 @@ def test_a_hello_goes_no_sooner_than_it_is_due(node: Node) -> None:
 
 def test_an_answer_to_a_neighbor_goes_once_and_never_beyond_the_hop_limit(node: Node) -> None:
     access = protocol_of(node).parts.access
-    access.answer(packet(1, hop_limit=1), now_ns=NOW_NS)
+    access.answer(packet(1, hop_limit=1), due_ns=NOW_NS, now_ns=NOW_NS)
     assert not node.requests
-    access.answer(packet(2, hop_limit=2), now_ns=NOW_NS)
+    access.answer(packet(2, hop_limit=2), due_ns=NOW_NS, now_ns=NOW_NS)
     assert len(node.requests) + access.waiting() == 1
 
 
@@ -90,7 +90,11 @@ def test_what_a_relaying_rule_leaves_open_is_decided_when_it_says(node: Node) ->
     open_before, decided = parts.contending.waiting(), []
     while (wake_ns := parts.contending.next_wake_ns()) is not None:
         assert wake_ns >= NOW_NS
-        decided += parts.contending.decided(wake_ns)
+        late_ns = wake_ns + 7 * MS
+        relays = parts.contending.decided(late_ns)
+        latest_ns = late_ns + node.scenario.radio.lead_ns
+        assert all(late_ns <= relay.start_ns < latest_ns for relay in relays), "lateness uses up the lead"
+        decided += relays
     assert len(decided) == open_before
     assert parts.contending.waiting() == 0
 

@@ -160,6 +160,28 @@ async def test_one_wake_up_is_one_put_per_topic_and_every_record_arrives_once() 
     assert host["uss_mb"] > 1
 
 
+class Patient(Ticker):
+    """May be woken up to an hour later than it asks for."""
+
+    slack_ns = 3600 * S
+
+
+async def test_an_actor_with_slack_is_woken_by_the_message_that_comes_after_its_instant() -> None:
+    actor = Patient(hears=(NAMES.pose,))
+    said = codecs.encode([Reception(b"now", NodeId(2), 0, -60.0)])
+    observer = await run(actor, until_ns=600 * MS, say=said)
+    assert len(actor.heard) == 1
+    assert actor.wakes == 2, "at the start, because it is due then, and with the message"
+    assert (await observer.last_report())["wake_lateness_ms"]["max"] == 0, "within its slack nothing is late"
+
+
+async def test_an_actor_with_slack_is_woken_when_that_is_over_although_no_message_comes() -> None:
+    actor = Ticker()
+    actor.slack_ns = 180 * MS
+    await run(actor, until_ns=1500 * MS)
+    assert 1 <= actor.wakes <= 1500 // 200 + 1, "every 20 ms and the slack, or later"
+
+
 class AsksForThePast(Ticker):
     """Asks for an instant ten seconds back, once."""
 

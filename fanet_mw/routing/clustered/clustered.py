@@ -197,8 +197,8 @@ class Clustered(RoutingProtocol):
         parts.roles.wake(now_ns)
         for relay in parts.contending.decided(now_ns):
             self._port.relay(relay)
-        for packet in parts.repair.due(now_ns=now_ns) if parts.repair else ():
-            parts.access.answer(packet, now_ns=now_ns)
+        for due_ns, packet in parts.repair.due(now_ns=now_ns) if parts.repair else ():
+            parts.access.answer(packet, due_ns=due_ns, now_ns=now_ns)
         parts.uplink.expire(now_ns=now_ns)
         parts.access.wake(now_ns)
 

@@ -98,8 +98,8 @@ class Access(Protocol):
         for anything else.
         """
 
-    def answer(self, packet: Packet, *, now_ns: int) -> None:
-        """Send a packet again that a neighbor has missed."""
+    def answer(self, packet: Packet, *, due_ns: int, now_ns: int) -> None:
+        """Send a packet again that a neighbor has missed, which was to be announced at `due_ns`."""
 
     def hello_start_ns(self, start_ns: int, *, size: int) -> int:
         """The earliest instant at which a hello of about `size` bytes, due at `start_ns`, may be transmitted."""

@@ -94,8 +94,8 @@ class ClaimedAccess:
     ) -> Packet:
         return self._floods.contend_control(kind, inner, now_ns=now_ns)
 
-    def answer(self, packet: Packet, *, now_ns: int) -> None:
-        self._floods.contend_again(packet, now_ns=now_ns)
+    def answer(self, packet: Packet, *, due_ns: int, now_ns: int) -> None:
+        self._floods.contend_again(packet, due_ns=due_ns, now_ns=now_ns)
 
     # --- hellos ---------------------------------------------------------------------------------------------------
 

@@ -44,13 +44,13 @@ class Floods:
     def contend_control(self, kind: Kind, inner: bytes, *, now_ns: int) -> Packet:
         """Make a control packet of this node, and transmit it in contention as soon as possible."""
         packet = self.control(kind, inner, now_ns=now_ns)
-        self._port.transmit(packet.frame, BROADCAST, start_ns=self._contention.start_ns(now_ns=now_ns))
+        self._port.transmit(packet.frame, BROADCAST, start_ns=self._contention.start_ns(due_ns=now_ns, now_ns=now_ns))
         return packet
 
-    def contend_again(self, packet: Packet, *, now_ns: int) -> None:
-        """Transmit a packet that a neighbor has missed, in contention as soon as possible."""
+    def contend_again(self, packet: Packet, *, due_ns: int, now_ns: int) -> None:
+        """Transmit a packet that a neighbor has missed, which was due at `due_ns`, in contention as soon as possible."""
         if self._goes_on(packet):  # a packet that goes no farther needs no instant
-            start_ns = self._contention.start_ns(now_ns=now_ns)
+            start_ns = self._contention.start_ns(due_ns=due_ns, now_ns=now_ns)
             self._port.transmit_together([packet], flags=FLAG_FLOOD, at_ns=(start_ns,))
 
     def begin(self, packets: Sequence[Packet], *, start_ns: int, again_ns: Sequence[int] = ()) -> None:

@@ -153,8 +153,8 @@ class Repair:
             heapq.heappop(due)  # the repair was cancelled
         return due[0][0] if due else None
 
-    def due(self, *, now_ns: int) -> Sequence[Packet]:
-        """The packets to flood again now."""
+    def due(self, *, now_ns: int) -> Sequence[tuple[int, Packet]]:
+        """The packets to flood again now, each with the instant at which that was due."""
         if not self._due or self._due[0][0] > now_ns:
             return ()
         packets = []
@@ -163,7 +163,7 @@ class Repair:
             del self.pending[key]
             kept = self._store.get(key)
             if kept is not None:
-                packets.append(kept.packet)
+                packets.append((due_ns, kept.packet))
                 self._put_off(key, now_ns)
         self.repaired += len(packets)
         return packets

@@ -45,11 +45,13 @@ class ContendingRelaying:
         return ()
 
     def decided(self, now_ns: int) -> Sequence[Relay]:
-        packets = self._rule.open_until.decided(now_ns=now_ns)
-        return [self._relay(packet, 0, now_ns) for packet in packets] if packets else ()
+        decided = self._rule.open_until.decided(now_ns=now_ns)
+        start_ns = self._contention.start_ns
+        return [Relay(packet, start_ns(due_ns=due_ns, now_ns=now_ns)) for due_ns, packet in decided] if decided else ()
 
     def _relay(self, packet: Packet, jitter_ns: int, now_ns: int) -> Relay:
-        return _new(Relay, (packet, self._contention.start_ns(now_ns=now_ns, jitter_ns=jitter_ns)))
+        start_ns = self._contention.start_ns(due_ns=now_ns, now_ns=now_ns, jitter_ns=jitter_ns)
+        return _new(Relay, (packet, start_ns))
 
     def waiting(self) -> int:
         return len(self._rule.open_until)

@@ -296,9 +296,9 @@ class AssignedRoles:
             notice_ns = self._timetabling.notice_ns(now_ns)
             for part in leader.wake(parts.joining.motion(now_ns), notice_ns=notice_ns, now_ns=now_ns):
                 self._announce(part, leader, now_ns=now_ns)
-        if parts.refresh.due_ns is not None:
+        if (due_ns := parts.refresh.due_ns) is not None:
             for packet in parts.refresh.due(now_ns=now_ns):
-                self._access.answer(packet, now_ns=now_ns)
+                self._access.answer(packet, due_ns=due_ns, now_ns=now_ns)
 
     def clusters(self) -> Mapping[NodeId, tuple[NodeId, ...]]:
         return self.parts.membership.clusters()

@@ -21,11 +21,15 @@ class Contention:
         self.most_jitter_ns: int | None = None
         """The longest jitter; None if there is no limit."""
 
-    def start_ns(self, *, now_ns: int, jitter_ns: int = 0) -> int:
-        """The earliest start of a frame that is ready now, with a jitter of up to `jitter_ns`."""
+    def start_ns(self, *, due_ns: int, now_ns: int, jitter_ns: int = 0) -> int:
+        """The earliest start of a frame that was to be announced at `due_ns`, with a jitter of up to `jitter_ns`.
+
+        A process that is woken late loses that much of the lead: the instants that nodes have drawn, so as not to send
+        at the same time, stay apart although the hosts of all of them may wake them together.
+        """
         if self.most_jitter_ns is not None:
             jitter_ns = min(jitter_ns, self.most_jitter_ns)
-        start_ns = now_ns + self._lead_ns + int(self._jitter() * jitter_ns)
+        start_ns = max(due_ns + self._lead_ns + int(self._jitter() * jitter_ns), now_ns)
         return start_ns if self.turns_at is None else self.not_before(start_ns)
 
     def not_before(self, start_ns: int) -> int:

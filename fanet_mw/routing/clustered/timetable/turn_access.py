@@ -161,7 +161,7 @@ class TurnAccess:
         self._let_out(packet, last=last, now_ns=now_ns)
         return packet
 
-    def answer(self, packet: Packet, *, now_ns: int) -> None:
+    def answer(self, packet: Packet, *, due_ns: int, now_ns: int) -> None:
         """Transmit a packet that a neighbor has missed in the node's next call, if it has calls and the packet fits.
 
         A packet that still waits for its own flood is not sent so: nodes that receive it outside of its turns would
@@ -173,7 +173,7 @@ class TurnAccess:
         plan = self._plans.at(now_ns)
         crowded = len(self._calls) >= _MOST_ANSWERS
         if plan is None or not plan.calls or crowded or len(packet.frame) > plan.frame_bytes:
-            self._floods.contend_again(packet, now_ns=now_ns)
+            self._floods.contend_again(packet, due_ns=due_ns, now_ns=now_ns)
         elif not self._calls.holds(key):
             self._calls.push(packet, now_ns=now_ns)
 

@@ -113,11 +113,11 @@ def test_a_packet_that_waits_for_its_turn_answers_nobody(node: Node) -> None:
     header = Header(now_ns // 1000, 1, US, BROADCAST, US, Kind.DATA, 9, 0, PRIORITY_BULK, 0)
     packet = Packet(header, header.encode() + filler(40))
     access.forward(packet, start_ns=now_ns, now_ns=now_ns)
-    access.answer(packet, now_ns=now_ns)
+    access.answer(packet, due_ns=now_ns, now_ns=now_ns)
     assert node.requests == []
     access.wake(1064 * MS)
     assert [request.start_ns for request in node.requests] == [1064 * MS], "the flood"
-    access.answer(packet, now_ns=1500 * MS)
+    access.answer(packet, due_ns=1500 * MS, now_ns=1500 * MS)
     assert len(node.requests) == 2
 
 

@@ -32,7 +32,7 @@ def holder(*seqs: int, capacity: int = 100) -> Repair:
 
 
 def sent(made: Repair, now_ns: int) -> list[int]:
-    return [p.header.seq for p in made.due(now_ns=now_ns)]
+    return [packet.header.seq for _, packet in made.due(now_ns=now_ns)]
 
 
 def test_what_a_neighbor_lacks_is_sent_after_the_assessment() -> None:

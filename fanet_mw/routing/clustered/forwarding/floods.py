@@ -48,7 +48,7 @@ class Floods:
         return packet
 
     def contend_again(self, packet: Packet, *, due_ns: int, now_ns: int) -> None:
-        """Transmit a packet that a neighbor has missed, which was due at `due_ns`, in contention as soon as possible."""
+        """Transmit a packet that a neighbor has missed, which was due at `due_ns`, as soon as it may contend."""
         if self._goes_on(packet):  # a packet that goes no farther needs no instant
             start_ns = self._contention.start_ns(due_ns=due_ns, now_ns=now_ns)
             self._port.transmit_together([packet], flags=FLAG_FLOOD, at_ns=(start_ns,))

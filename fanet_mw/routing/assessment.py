@@ -46,7 +46,7 @@ class Assessment:
         return due[0][0] if due else None
 
     def decided(self, *, now_ns: int) -> list[tuple[int, Packet]]:
-        """The packets that too few other nodes have relayed, each with the instant at which its assessment was over."""
+        """The packets that too few others have relayed, each with the instant at which its assessment was over."""
         relays, due = [], self._due
         while due and due[0][0] <= now_ns:
             due_ns, key = heapq.heappop(due)

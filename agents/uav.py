@@ -77,7 +77,7 @@ class Uav(Actor):
         """
         topics = Topics(swarm)
         super().__init__(f"agent-{node}", (topics.radio_rx(node), topics.sensors(node)))
-        self.slack_ns = min(scenario.radio.handover_ns, scenario.radio.lead_ns // 2)  # the rest of the lead is the bus's
+        self.slack_ns = min(scenario.radio.handover_ns, scenario.radio.lead_ns // 2)  # the rest is for the bus
         self._id = node
         self._topics = _OutTopics(topics.radio_tx(node), topics.setpoint(node), topics.mavlink(node))
         self._prompt_ns = scenario.radio.handover_ns + scenario.radio.lead_ns

@@ -2,7 +2,8 @@
 
 Scenario `clusters`, 30 s, seed 1: the channel and the world follow the scenario, some or all nodes are told another
 one. Phones: one in the field beside two lanes 150 m apart, heard every 30 m with 4 dB of shadowing, 40 draws; its
-power is another one than the receiver takes it to be.
+power is another one than the receiver takes it to be. Survivors who are confirmed before have such
+phones, too, 1 dB from each other, which one more UAV heard that circled about each of them.
 """
 
 import math
@@ -13,8 +14,9 @@ from typing import Any, Final, NamedTuple
 
 from agents.applications.traffic import sources_of
 from agents.clock.clocked_uav import make_uav
+from agents.mission.finding.calibration import common_offset, likelihood
 from agents.mission.finding.localization import Sighting, estimate
-from agents.mission.finding.phone_filter import REFERENCE_LOSS_DB, PhoneFilter, PhoneModel
+from agents.mission.finding.phone_filter import REFERENCE_LOSS_DB, Estimate, PhoneFilter, PhoneModel, PhoneOffset
 from emulator.medium import Medium
 from fanet_mw.application import Application, Data
 from fanet_mw.hosts.virtual import VirtualHost
@@ -137,32 +139,74 @@ _PHONE: Final = PhoneModel(
 )
 
 
-def phone_errors_m(offset_db: float, draw: int) -> tuple[float, float] | None:
-    """How far the filter of the planned search, and the least squares of the paper's rule, are from the phone."""
+_LANES: Final = tuple((lane, Enu(30.0 * step, 150.0 * lane, 50.0)) for lane in (0, 1) for step in range(-8, 9))
+_CONFIRMED_BEFORE: Final = (1, 3)
+_CIRCLE_M: Final = 40.0
+_PLACE_VARIANCE_M2: Final = 4.0
+
+
+def received_dbm(phone: Enu, here: Enu, offset_db: float, drawn: random.Random) -> float:
+    """The power at a place of a phone that is so much stronger than assumed, shadowing included."""
+    lost_db = REFERENCE_LOSS_DB + 10 * _PHONE.exponent * math.log10(here.minus(phone).norm())
+    return _PHONE.power_dbm + offset_db - lost_db + drawn.gauss(0.0, _PHONE.shadowing_db)
+
+
+def somewhere(drawn: random.Random) -> Enu:
+    """The place of a phone beside the lanes."""
+    return Enu(drawn.uniform(-40, 40), drawn.uniform(30, 90), 0.0)
+
+
+def offset_told(offset_db: float, draw: int, *, confirmed: int) -> PhoneOffset:
+    """What the phones of so many confirmed survivors tell of the offset that is common to all."""
+    phones = []
+    for before in range(confirmed):
+        drawn = random.Random(f"{draw}/confirmed/{before}")
+        phone, own_db = somewhere(drawn), drawn.gauss(0.0, _PHONE.offset_db)
+        turns = [turn * math.pi / 4 for turn in range(8)]
+        circle = [
+            Enu(phone.east + _CIRCLE_M * math.cos(turn), phone.north + _CIRCLE_M * math.sin(turn), 50.0)
+            for turn in turns
+        ]
+        places = [*(here for _, here in _LANES), *circle]
+        powers = [(here, received_dbm(phone, here, offset_db + own_db, drawn)) for here in places]
+        at = Estimate(phone.east, phone.north, _PLACE_VARIANCE_M2, 0.0, _PLACE_VARIANCE_M2)
+        phones.append(likelihood(at, [power for power in powers if power[1] >= _PHONE.threshold_dbm], _PHONE))
+    return common_offset(phones)
+
+
+def phone_errors_m(offset_db: float, draw: int) -> list[float] | None:
+    """How far from the phone the estimates are: the filter's of the planned search, also after some survivors have
+    been confirmed, and the least squares of the paper's rule.
+    """
     drawn = random.Random(draw)
-    phone = Enu(drawn.uniform(-40, 40), drawn.uniform(30, 90), 0.0)
-    search, heard = PhoneFilter(_PHONE), []
-    for lane in (0, 1):
-        for step in range(-8, 9):
-            here = Enu(30.0 * step, 150.0 * lane, 50.0)
-            lost_db = REFERENCE_LOSS_DB + 10 * _PHONE.exponent * math.log10(here.minus(phone).norm())
-            rssi_dbm = _PHONE.power_dbm + offset_db - lost_db + drawn.gauss(0.0, _PHONE.shadowing_db)
+    phone = somewhere(drawn)
+    told = [offset_told(offset_db, draw, confirmed=confirmed) for confirmed in (0, *_CONFIRMED_BEFORE)]
+    filters, heard = [PhoneFilter(_PHONE, offset) for offset in told], []
+    for lane, here in _LANES:
+        rssi_dbm = received_dbm(phone, here, offset_db, drawn)
+        if rssi_dbm >= _PHONE.threshold_dbm:
+            heard.append(Sighting(here, rssi_dbm))
+        for search in filters:
             if rssi_dbm < _PHONE.threshold_dbm:
                 search.on_silence(here)
-            elif search.on_rssi(lane, here, rssi_dbm):
-                heard.append(Sighting(here, rssi_dbm))
-    found = search.estimate()
-    if found is None or not heard:
+            else:
+                search.on_rssi(lane, here, rssi_dbm)
+    if not heard:
         return None
     fitted = estimate(heard, phone_power_dbm=_PHONE.power_dbm, exponent=_PHONE.exponent)
-    return found.distance_m(phone), math.hypot(fitted.east - phone.east, fitted.north - phone.north)
+    found = [search.estimate() for search in filters]
+    return [
+        *(place.distance_m(phone) for place in found if place is not None),
+        math.hypot(fitted.east - phone.east, fitted.north - phone.north),
+    ]
 
 
 def phones() -> list[list[str]]:
     """The table of phones, header first."""
-    rows = [
-        ["the phone's power against what is assumed", "filter: median error [m]", "least squares: median error [m]"]
-    ]
+    columns = [
+        "filter", *(f"filter after {confirmed} confirmed" for confirmed in _CONFIRMED_BEFORE), "least squares",
+    ]  # fmt: skip
+    rows = [["the phones' power against what is assumed", *(f"{column}: median error [m]" for column in columns)]]
     for offset_db in (0, -3, -6, 3, 6):
         errors = [found for draw in range(40) if (found := phone_errors_m(offset_db, draw)) is not None]
         medians = [statistics.median(error) for error in zip(*errors, strict=True)]

@@ -36,7 +36,7 @@ TABLES: Final[Mapping[str, Table]] = {
     "promises": Table("explanation/timetable.md", protocol.promises, Tolerance(absolute=0.02, relative=0.1)),
     "lossy": Table("explanation/lossy-links.md", protocol.lossy, Tolerance(absolute=0.02, relative=0.1)),
     "assumptions": Table("explanation/lossy-links.md", protocol.assumptions, Tolerance(absolute=0.02, relative=0.1)),
-    "phones": Table("explanation/lossy-links.md", protocol.phones, Tolerance(absolute=1, relative=0.1)),
+    "phones": Table("explanation/finding.md", protocol.phones, Tolerance(absolute=1, relative=0.1)),
     "warnings": Table("explanation/protocol.md", protocol.warnings, Tolerance(absolute=0.1, relative=0.3)),
     "goodput": Table("explanation/planning.md", protocol.goodput, Tolerance(absolute=0.02, relative=0.1)),
     "rivals": Table("results/rivals.md", protocol.rivals, Tolerance(absolute=0.02, relative=0.1)),

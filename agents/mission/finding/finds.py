@@ -5,13 +5,16 @@ confirmed, and heard since where it cannot be heard from the confirmed place    
 
 A confirmation and what refutes it are merged in any order to the same result: a refutation takes back the
 confirmations of the same place, and all estimates, that are not younger than it.
+
+What has been heard of the confirmed tells how strong phones are, and calibrates the filters of those that are open.
 """
 
 import math
 from dataclasses import dataclass, field
-from typing import Final, assert_never
+from typing import Final, NamedTuple, assert_never
 
-from agents.mission.finding.phone_filter import Estimate, PhoneFilter, PhoneModel
+from agents.mission.finding.calibration import common_offset, likelihood
+from agents.mission.finding.phone_filter import AS_ASSUMED, Estimate, PhoneFilter, PhoneModel, PhoneOffset
 from fanet_mw.units import US, Enu, S
 from fanet_mw.wire.inner import Survivor
 from fanet_mw.wire.search import Found, Standing
@@ -65,18 +68,30 @@ class Find:
         return told if own is None or told.sigma_m < own.sigma_m else own
 
 
+class PhoneLikelihood(NamedTuple):
+    """What one phone tells of the common offset, with the confirmation and the number of powers it was computed of."""
+
+    found: Found
+    readings: int
+    values: tuple[float, ...]
+
+
 class Finds:
     """All survivors that one UAV has heard of, by id."""
 
     def __init__(self, model: PhoneModel) -> None:
         self._model = model
         self.known: dict[int, Find] = {}
+        self._likelihoods: dict[int, PhoneLikelihood] = {}
+        """For each confirmed survivor, what has been heard of that phone says of the offset common to all phones."""
+        self.offset: PhoneOffset = AS_ASSUMED
+        """What the phones of confirmed survivors tell of the offset common to all phones."""
 
     def report(self, report: Survivor, *, now_ns: int) -> Find:
         """Take in a received power that this UAV or another node has measured."""
         find = self.known.get(report.survivor)
         if find is None:
-            find = self.known[report.survivor] = Find(PhoneFilter(self._model), first_ns=now_ns)
+            find = self._opened(report.survivor, now_ns)
         before = find.latest.get(report.reporter)
         if before is None or report.t_us > before.t_us:
             find.latest[report.reporter] = report
@@ -88,15 +103,19 @@ class Finds:
         """Take in what is told of a survivor; True if it strikes the survivor off, or opens it again."""
         find = self.known.get(found.survivor)
         if find is None:
-            find = self.known[found.survivor] = Find(PhoneFilter(self._model), first_ns=now_ns)
+            find = self._opened(found.survivor, now_ns)
         match found.standing:
             case Standing.CONFIRMED:
                 fresh = find.confirmed is None and not find.is_refuted(found)
                 if fresh:
                     find.confirmed = found
+                    self._calibrate()
                 return fresh
             case Standing.REFUTED:
-                return _refute(find, found)
+                reopened = _refute(find, found)
+                if reopened:
+                    self._calibrate()
+                return reopened
             case Standing.ESTIMATED:
                 outdated = any(found.t_us <= refuted.t_us for refuted in find.refuted)
                 if not outdated and (find.told is None or estimate_of(found).sigma_m < estimate_of(find.told).sigma_m):
@@ -124,6 +143,26 @@ class Finds:
         ]
         fresh.sort(key=lambda report: (-report.t_us, report.survivor, report.reporter))
         return fresh[:_PASSED_ON]
+
+    def _opened(self, survivor: int, now_ns: int) -> Find:
+        find = self.known[survivor] = Find(PhoneFilter(self._model, self.offset), first_ns=now_ns)
+        return find
+
+    def _calibrate(self) -> None:
+        """Estimate the common offset from those who are confirmed now, and tell the filters of all others."""
+        before, self._likelihoods = self._likelihoods, {}
+        for survivor, find in sorted(self.known.items()):
+            if find.confirmed is None:
+                continue
+            readings = find.filter.readings
+            known = before.get(survivor)
+            if known is None or known.found != find.confirmed or known.readings != len(readings):
+                values = likelihood(estimate_of(find.confirmed), readings, self._model)
+                known = PhoneLikelihood(find.confirmed, len(readings), values)
+            self._likelihoods[survivor] = known
+        self.offset = common_offset(phone.values for phone in self._likelihoods.values())
+        for survivor in self.open():
+            self.known[survivor].filter.calibrate(self.offset)
 
 
 def _refute(find: Find, refuted: Found) -> bool:

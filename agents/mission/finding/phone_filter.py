@@ -6,6 +6,7 @@
 The offset b (burial, antenna, battery) is integrated out in closed form, so a cell needs only the sums of the residuals
 and of their squares. A histogram filter as in Thrun, Burgard, Fox: Probabilistic Robotics, 2005, chapter 4: no starting
 point, and the mirror image that a straight flight leaves open stays in the posterior until a sample resolves it.
+What phones of known places have told of the offset that is common to all shifts and widens that of this one.
 Once the owner has been seen, the place is that of the sightings.
 """
 
@@ -27,7 +28,7 @@ _WIDTH: Final = 2 * _HALF_CELLS + 1
 _EVERY_CELL: Final = (True,) * (_WIDTH * _WIDTH)
 _OFF_CENTER_M: Final = 120.0
 """The grid is laid anew when the strongest sample is this far from its middle."""
-_DOUBT: Final = 1.5
+DOUBT: Final = 1.5
 """Samples near each other share shadowing, so that each counts for less than an independent one."""
 _SILENCE_M: Final = 450.0
 """Silence at a place farther than this from where a phone was heard tells nothing."""
@@ -78,12 +79,24 @@ class PhoneModel(NamedTuple):
     """No survivor is farther east, west, north or south of the middle than this."""
 
 
+class PhoneOffset(NamedTuple):
+    """What is known of the offset that is common to the phones of a swarm's search and to its receivers."""
+
+    mean_db: float
+    sigma_db: float
+    """The standard deviation that is left, beside that of each phone's own offset."""
+
+
+AS_ASSUMED: Final = PhoneOffset(0.0, 0.0)
+"""Phones are taken to be as the model says: nothing is known of them yet."""
+
+
 class PhoneFilter:
     """The posterior of one phone's place."""
 
-    def __init__(self, model: PhoneModel) -> None:
-        self._model = model
-        self._silence = _silence_scores(model)
+    def __init__(self, model: PhoneModel, offset: PhoneOffset = AS_ASSUMED) -> None:
+        """`offset`: what is known of the offset common to all phones."""
+        self._assumed, self._model = model, _calibrated(model, offset)
         self._middle: Enu | None = None
         self._silent_at: list[Enu] = []
         self._scores: list[float] = []
@@ -130,6 +143,12 @@ class PhoneFilter:
         """Take in where a camera shows the owner; None: no person in view is the owner."""
         self._seen = place
 
+    def calibrate(self, offset: PhoneOffset) -> None:
+        """Take in what is known now of the offset common to all phones; what was heard is reckoned with anew."""
+        model = _calibrated(self._assumed, offset)
+        if model != self._model:
+            self._model, self._sums = model, []
+
     @property
     def is_seen(self) -> bool:
         return self._seen is not None
@@ -144,6 +163,11 @@ class PhoneFilter:
         """The number of received powers that have been taken in."""
         return self._count
 
+    @property
+    def readings(self) -> list[tuple[Enu, float]]:
+        """The received powers with their places, in the order in which they came."""
+        return [(at, rssi_dbm) for at, rssi_dbm in (*self._samples, *self._pending) if rssi_dbm is not None]
+
     # --- the estimate ---------------------------------------------------------------------------------------------
 
     def estimate(self) -> Estimate | None:
@@ -157,7 +181,7 @@ class PhoneFilter:
 
     def _catch_up(self) -> None:
         """Take in what has been heard since the last time; lay the grid anew when its middle was a bad guess."""
-        if not self._pending:
+        if not self._pending and (self._sums or not self._samples):
             return
         assert self._middle is not None, "something was heard before anything is pending"
         self._samples += self._pending
@@ -206,7 +230,8 @@ class PhoneFilter:
     def _rule_out(self, position: Enu) -> None:
         """Make the cells less likely from which the phone would have been heard."""
         assert self._middle is not None, "the grid lies around the first sample"
-        table, most, sqrt = self._silence, len(self._silence) - 1, math.sqrt
+        table = _silence_scores(self._model)
+        most, sqrt = len(table) - 1, math.sqrt
         up2 = position.up * position.up
         steps = [int(sqrt(d2) / _STEP_M) for d2 in _squared_distances_m2(self._middle, position, up2)]
         if max(steps) > most:
@@ -227,7 +252,7 @@ class PhoneFilter:
     def _moments(self) -> Estimate:
         assert self._middle is not None, "only what was heard has moments"
         model = self._model
-        per = 1 / (_DOUBT * max(model.shadowing_db, 1.0) ** 2)
+        per = 1 / (DOUBT * max(model.shadowing_db, 1.0) ** 2)
         shrink = per * per / (per * self._count + 1 / max(model.offset_db, 0.1) ** 2)
         scores = [
             shrink * s * s - per * q + silence
@@ -274,7 +299,14 @@ def _squared_distances_m2(middle: Enu, position: Enu, up2: float) -> list[float]
     return [squared + rest for rest in [(south + j * _CELL_M) ** 2 + up2 for j in span] for squared in east2]
 
 
-@lru_cache(maxsize=8)
+def _calibrated(model: PhoneModel, offset: PhoneOffset) -> PhoneModel:
+    """The model of phones whose common offset is known so well."""
+    return model._replace(
+        power_dbm=model.power_dbm + offset.mean_db, offset_db=math.hypot(model.offset_db, offset.sigma_db)
+    )
+
+
+@lru_cache(maxsize=64)
 def _silence_scores(model: PhoneModel) -> tuple[float, ...]:
     """Twice the logarithm of the probability that a phone is not heard, for distances in steps."""
     sigma = math.hypot(max(model.shadowing_db, 1.0), model.offset_db)
@@ -283,5 +315,5 @@ def _silence_scores(model: PhoneModel) -> tuple[float, ...]:
         distance_m = max(1.0, (step + 0.5) * _STEP_M)
         margin = model.power_dbm - REFERENCE_LOSS_DB - 10 * model.exponent * math.log10(distance_m)
         chance = 0.5 * math.erfc((margin - model.threshold_dbm) / (sigma * math.sqrt(2)))
-        scores.append(2 / _DOUBT * math.log(max(chance, _NEVER)))
+        scores.append(2 / DOUBT * math.log(max(chance, _NEVER)))
     return tuple(scores)

@@ -1,7 +1,8 @@
-"""The console script: `fanet`, or `python -m fanet_mw`. Ctrl-C is quiet from the first moment on.
+"""The console script: `fanet`, or `python -m fanet_mw`. Ctrl-C ends it quietly from the first moment on.
 
-Importing the command line takes half a second, and a signal that comes meanwhile would show where Python was. The
-command line is imported by name, and only when this installation was found whole: this package knows nothing of it.
+Importing the command line takes half a second, and a signal in this time would normally print a traceback. The command
+line is imported by its name, and only after this installation was found complete, because this package must not depend
+on it.
 """
 
 import os
@@ -25,7 +26,7 @@ def main() -> None:
 
 
 def _leave(number: int, _frame: FrameType | None) -> NoReturn:
-    os._exit(128 + number)  # nothing has been started, nothing is to be written
+    os._exit(128 + number)  # nothing has been started yet, so nothing must be cleaned up
 
 
 if __name__ == "__main__":

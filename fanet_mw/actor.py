@@ -1,16 +1,16 @@
 """The actor contract: messages and instants go in; messages, trace records and the next wake-up come out.
 
-An actor never sleeps, reads a clock, opens a socket or starts a thread. A host owns time and transport:
+An actor never sleeps, reads a clock, opens a socket or starts a thread. A host owns time and transport, and calls:
 
     start(now)  once, before anything else
     receive(topic, message, now)  for every message on a subscribed topic
-    wake(now)   at or after the instant that `next_wake_ns()` named, whichever host runs it
-    nudge(now)  at any instant, when a program outside has given a part of it something to do
-    stop(now)   once, last; then `report()` says how it went
+    wake(now)   at or after the instant that `next_wake_ns()` has returned
+    nudge(now)  at any instant, when code outside of the actor has given one of its parts something to do
+    stop(now)   once, last; then `report()` gives the counters
 
-After every call, or after several at one instant, the host takes all of `outbox` and `records`, and asks
-`next_wake_ns()` again, unless `receive` has said that it need not. Instants never decrease. Both lists belong to the
-host, which may put its own in place before `start`; the actor only appends, during a call.
+After every call, or after several calls at the same instant, the host takes everything out of `outbox` and `records`,
+and calls `next_wake_ns()` again unless `receive` has returned True. Instants never decrease. The host may replace both
+lists by lists of its own before `start`; the actor only appends to them, and only during a call.
 """
 
 from abc import ABC, abstractmethod
@@ -30,8 +30,8 @@ class Actor(ABC):
     """How much later than `next_wake_ns()` a host may wake the actor, so that several wake-ups become one. A process is
     woken less often; in virtual time, where a wake-up costs nothing, the host does not make use of it."""
     hears_out = False
-    """True for an actor that accounts for what others send: in real time it still receives, before `stop`, what was on
-    its way at the end."""
+    """True for an actor that accounts for what others send. In real time it then still receives, before `stop`, the
+    messages that were on their way when the run ended."""
 
     def __init__(self, name: str, subscriptions: tuple[str, ...]) -> None:
         self.name = name
@@ -47,20 +47,20 @@ class Actor(ABC):
 
     @abstractmethod
     def receive(self, topic: str, message: Message, now_ns: int) -> bool | None:
-        """Take in a message. True means that the next wake-up has not moved, so that the host need not ask for it."""
+        """Handle a message. Returns True if the next wake-up has not changed, so that the host need not ask for it."""
 
     @abstractmethod
     def wake(self, now_ns: int) -> None: ...
 
     @abstractmethod
     def next_wake_ns(self) -> int | None:
-        """The instant of the next `wake` that is wanted, or None. An instant in the past means at once."""
+        """The instant of the next `wake`, or None if none is wanted. An instant in the past means at once."""
 
     def nudge(self, now_ns: int) -> None:  # noqa: B027  (most actors have no part that is used from outside)
-        """Code outside of the actor has given one of its parts something to do, and it should look now."""
+        """Code outside of the actor has given one of its parts something to do, which it should do now."""
 
     def stop(self, now_ns: int) -> None:  # noqa: B027  (most actors have nothing to do here)
-        """The run is over: count what is still in flight."""
+        """The run is over: count the frames that are still in flight."""
 
     def report(self) -> Mapping[str, Any]:
         """Counters as JSON values, cumulative since `start`. May be called at any time."""

@@ -14,10 +14,12 @@ from fanet_mw.scenario.radio import Radio, is_ofdm
 from fanet_mw.units import US
 
 OVERHEAD_BYTES: Final = 8 + 20 + 8 + 24 + 4
-"""UDP + IPv4 + LLC/SNAP + MAC header + FCS: the bytes around a frame of this project, which is the UDP payload."""
+"""The bytes that are sent around each frame of this project, which is the UDP payload: UDP, IPv4, LLC/SNAP, MAC header,
+FCS."""
 ACK_BYTES: Final = 14
 DETECT_NS: Final = 4 * US
-"""The time from a frame's first bit at a station until it is detected and the medium sensed busy (as in ns-3)."""
+"""The time from the first bit of a frame at a station until the station detects it and senses the medium busy (as in
+ns-3)."""
 OFDM_HEADER_NS: Final = 20 * US  # 17.3.2.4 and table 17-5: two training fields of 8 us, SIGNAL of 4 us
 SYMBOL_NS: Final = 4 * US  # table 17-5 (T_SYM)
 SIGNAL_EXTENSION_NS: Final = 6 * US  # table 18-5 (aSignalExtension), ERP-OFDM only
@@ -54,7 +56,7 @@ class Timing(NamedTuple):
     eifs_extra_ns: int
     header_ns: int
     extension_ns: int
-    """The end of a frame in which nothing is transmitted but the medium counts as busy."""
+    """The last part of a frame, in which nothing is transmitted but the medium counts as busy."""
 
     @classmethod
     def of(cls, radio: Radio) -> "Timing":

@@ -1,10 +1,13 @@
-"""Errors and reasons of drops, as types. What comes off the air raises none of them outside the actor it reaches."""
+"""The exceptions of this project, and the reasons for which frames and packets are dropped.
+
+Received bytes never raise an exception outside of the actor that receives them.
+"""
 
 from enum import StrEnum
 
 
 class FanetError(Exception):
-    """The root: its message is for a person, and has the name, the value and the bound."""
+    """The base class. Its message is written for a person, and has the name, the value and the bound."""
 
 
 class ConfigError(FanetError, ValueError):
@@ -12,7 +15,7 @@ class ConfigError(FanetError, ValueError):
 
 
 class ProtocolError(FanetError):
-    """The root of the errors that the sans-IO core raises."""
+    """The base class of the errors that the sans-IO core raises."""
 
 
 class LocalProtocolError(ProtocolError):
@@ -20,11 +23,11 @@ class LocalProtocolError(ProtocolError):
 
 
 class MalformedFrameError(ProtocolError):
-    """Bytes off the air are not a valid frame; caught in the node and counted, never seen by a host."""
+    """Received bytes are not a valid frame; the node catches and counts this error, so a host never sees it."""
 
 
 class HostError(FanetError):
-    """The root of the errors that hosts raise."""
+    """The base class of the errors that hosts raise."""
 
 
 class BusError(HostError, ConnectionError):

@@ -1,11 +1,11 @@
-"""Parts from other packages: a scenario names one, and every process that needs it imports it.
+"""Loads parts of other packages, such as routing protocols, that a scenario names.
 
     routing.protocol = "gossip3"              the name of an entry point, group `fanet_mw.routing`
     routing.protocol = "mypackage:Gossip3"    or a module and a name in it
     [routing.options]                         the part's own table, checked by its `Options`, a pydantic model
 
-A name of this package's own parts always means these. A named part is looked up when the scenario is read, so that no
-run begins with a part that is missing.
+The names of this project's own parts cannot be redefined. Each named part is looked up when the scenario is read, so
+that no run begins with a part that is missing.
 """
 
 import difflib
@@ -27,13 +27,15 @@ GROUPS: Final[Mapping[str, str]] = {
     "radio.channel": "fanet_mw.channels",
     "applications.use": "fanet_mw.applications",
 }
-"""The keys of a scenario that may name a part of another package, and the group of its entry points."""
+"""The keys of a scenario that may name a part of another package, and the group of entry points for each."""
 _NOT_EVERYWHERE: Final = ("numpy", "numba")
-"""Modules that a companion computer lacks. A part that needs one runs, and is checked, elsewhere."""
+"""Modules that a companion computer lacks. A part that needs one of them is checked where it runs."""
 
 
 class Options(dict[str, Any]):
-    """The options of a part. Like a whole scenario they are immutable, so that they can be part of a cache's key."""
+    """The options of a part. They are immutable and hashable, as a whole scenario is, so that they can be the key of a
+    cache.
+    """
 
     def __hash__(self) -> int:  # type: ignore[override]  # a dict has none, because a dict changes
         return hash(json.dumps(self, sort_keys=True, default=str))
@@ -46,15 +48,15 @@ class Options(dict[str, Any]):
 
 
 def installed(key: str) -> dict[str, EntryPoint]:
-    """The entry points that installed packages offer for a key."""
+    """The entry points that installed packages offer for a key of a scenario."""
     return {entry.name: entry for entry in sorted(entry_points(group=GROUPS[key]))}
 
 
 @lru_cache(maxsize=64)
 def load(key: str, name: str) -> Any:  # noqa: ANN401  (whatever the contract of the key asks for)
-    """The class that a scenario names; raises ValueError that says what is wrong with the name.
+    """The class that a scenario names; raises ValueError with a sentence if there is none.
 
-    Raises ModuleNotFoundError when the part needs what only machines with an emulator have.
+    Raises ModuleNotFoundError if the part needs modules that only machines with an emulator have.
     """
     entry = installed(key).get(name)
     text = entry.value if entry is not None else name
@@ -82,7 +84,7 @@ def load(key: str, name: str) -> Any:  # noqa: ANN401  (whatever the contract of
 
 
 class PartName:
-    """The annotation of a key that holds the name of a part: an own part, or one that can be loaded."""
+    """Annotates a key that holds the name of a part: one of this project, or one that can be loaded."""
 
     def __init__(self, key: str, ours: Sequence[str]) -> None:
         self._key = key
@@ -101,7 +103,7 @@ class PartName:
             try:
                 load(self._key, name)
             except ModuleNotFoundError:
-                return name  # this machine does not run it
+                return name  # the part does not run on this machine
             except ValueError as error:
                 close = difflib.get_close_matches(name, [*self.ours, *installed(self._key)], n=1)
                 hint = (
@@ -112,9 +114,10 @@ class PartName:
 
 
 class OptionsOf:
-    """The annotation of the table of options beside such a key.
+    """Annotates the table of options that belongs to such a key.
 
-    It is checked by the part's own `Options`, with its defaults written out; this package's own parts have no options.
+    The table is checked by the part's own `Options`, and its defaults are written out. This project's own parts have no
+    options.
     """
 
     def __init__(self, key: str, ours: Sequence[str]) -> None:
@@ -128,7 +131,7 @@ class OptionsOf:
         table, field = self._key.split(".")
         name = info.data.get(field)
         if name is None:
-            return Options(options)  # the name itself is wrong, which has been reported
+            return Options(options)  # the name itself is wrong, which was reported already
         model = None if name in self._ours else _model(self._key, name)
         if model is None:
             if options and name in self._ours:

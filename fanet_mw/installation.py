@@ -1,7 +1,7 @@
-"""Is this installation whole? A package may have been overwritten by another distribution, or an extra be missing.
+"""Checks that this installation is complete: no package overwritten by another distribution, no extra missing.
 
-The distribution fanet-mw has four packages at the top level, and other distributions have some of the same names
-(`openai-agents` has `agents`): installed into one environment, the later one overwrites files of the earlier one.
+The distribution fanet-mw has four top-level packages, and other distributions use some of the same names
+(`openai-agents` has `agents`). If both are installed, the later one overwrites files of the earlier one.
 """
 
 from importlib.util import find_spec
@@ -20,14 +20,14 @@ _EXTRAS: Final = {
     "distributed": "dask",
     "matplotlib": "figures",
 }
-"""The extra that installs a module."""
+"""The extra with which each module is installed."""
 _REMEDY: Final = (
     "install fanet-mw into an environment of its own: python3 -m venv fanet && fanet/bin/pip install 'fanet-mw[all]'"
 )
 
 
 def damage() -> str | None:
-    """What is wrong with this installation, and the remedy; None when it is whole. None of the packages is imported."""
+    """What is wrong with this installation, and how to repair it; None if it is complete. No package is imported."""
     for package in PACKAGES:
         spec = find_spec(package)
         if spec is None or spec.origin is None:
@@ -39,7 +39,7 @@ def damage() -> str | None:
 
 
 def missing_extra(error: ModuleNotFoundError, what: str = "this command") -> str | None:
-    """What to install for a missing module that `what` needs; None when no extra of this distribution has it."""
+    """How to install a missing module that `what` needs; None if no extra of this distribution has it."""
     extra = _EXTRAS.get((error.name or "").partition(".")[0])
     if extra is None:
         return None
@@ -47,8 +47,8 @@ def missing_extra(error: ModuleNotFoundError, what: str = "this command") -> str
 
 
 def _owner(package: str) -> str:
-    """The other distributions that claim to have installed a package of this name."""
-    from importlib.metadata import packages_distributions  # reads email parsers: only when there is something to say
+    """The other distributions that contain a package of this name."""
+    from importlib.metadata import packages_distributions  # imported only here, because it takes long
 
     others = sorted({name for name in packages_distributions().get(package, ()) if name != "fanet-mw"})
     return f": it was installed by {', '.join(others)}" if others else ""

@@ -19,7 +19,7 @@ from fanet_mw.errors import LocalProtocolError, MalformedFrameError
 from fanet_mw.units import MAX_NODES, MS, US, Enu, NodeId
 from fanet_mw.wire import COMPONENT, Packed, frames, inner_frames, system_id
 
-common.mavlink_map.update(fanet.mavlink_map)  # one parser for both dialects
+common.mavlink_map.update(fanet.mavlink_map)  # one parser decodes both dialects
 
 COLLISION_ID: Final = int(common.MAVLINK_MSG_ID_COLLISION)
 GLOBAL_POSITION_ID: Final = int(common.MAVLINK_MSG_ID_GLOBAL_POSITION_INT)
@@ -56,7 +56,9 @@ ORIGIN: Final = Geodetic(37.5665, 126.978, 0.0)
 
 
 class _Plane(NamedTuple):
-    """An origin in the earth-centered frame, and the sines and cosines that turn vectors into its east, north, up."""
+    """An origin in the earth-centered frame, with the sines and cosines that turn vectors into
+    east, north, up there.
+    """
 
     x: float
     y: float

@@ -1,8 +1,9 @@
-"""Worst-case delay: the paper's estimate, and bounds that hold. Pure functions of integer nanoseconds.
+"""Worst-case delays: the paper's estimate, and bounds that hold. Pure functions of integer nanoseconds.
 
-`paper` holds the paper's equations (2)-(4) to the letter, for comparison. `slot` is the service of one slot per
-superframe, `turn_gaps` that of single turns. `arrivals` and `network` are the parts of network calculus that bound a
-queue fed by bursts. `mac` holds the constants of the MAC, `guard` is the guard time of a slot.
+`paper` has the paper's equations (2)-(4) exactly as published, for comparison. `slot` is the service of one slot per
+superframe, `turn_gaps` that of single turns. `arrivals` and `network` have the parts of network calculus that bound the
+delay of a queue into which packets come in bursts. `mac` has the constants of the MAC, and `guard` the guard time of a
+slot.
 """
 
 from fanet_mw.bounds.arrivals import Arrivals, Periodic, Total

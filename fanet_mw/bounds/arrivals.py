@@ -1,11 +1,12 @@
-"""Arrival curves as least spans: `spans()` yields, for n = 1, 2, ..., the least time in which n packets can arrive.
+"""Arrival curves, represented by least spans: for n = 1, 2, ..., `spans()` yields the shortest time in which n packets
+can arrive.
 
-A span is the pseudo-inverse of an arrival curve (Le Boudec & Thiran, Network Calculus, ch. 1): span(n) <= t iff a
-closed window of length t can hold n packets. For whole packets it is exact where affine curves round up, and it stays
-in integer nanoseconds. span(1) = 0, and spans never decrease. The sum of several curves merges their spans; the least
-of several curves has the greatest of their spans.
+A span is the pseudo-inverse of an arrival curve (Le Boudec & Thiran, Network Calculus, ch. 1): span(n) <= t if and only
+if a closed window of length t can hold n packets. Spans are exact for whole packets, where affine curves round up, and
+they are integer nanoseconds. span(1) = 0, and spans never decrease. The spans of a sum of curves are those of all
+curves, merged; each span of the minimum of several curves is the greatest of theirs.
 
-`rate` [packets/ns] and `burst` [packets] give the token bucket around each curve: span(n) >= (n - burst) / rate.
+`rate` [packets/ns] and `burst` [packets] give the token bucket around a curve: span(n) >= (n - burst) / rate.
 """
 
 import heapq
@@ -19,31 +20,31 @@ from fanet_mw.errors import LocalProtocolError
 
 
 class Arrivals(Protocol):
-    """An arrival curve: what can arrive at a queue."""
+    """An arrival curve: the traffic that can arrive at a queue."""
 
     @property
     def rate(self) -> Fraction:
-        """Packets per nanosecond in the long run."""
+        """The number of packets per nanosecond in the long run."""
         ...
 
     @property
     def burst(self) -> Fraction:
-        """The most packets that can arrive beyond the rate."""
+        """The greatest number of packets that can arrive in addition to the rate."""
         ...
 
     def spans(self) -> Iterator[int]:
-        """The least spans [ns] of 1, 2, 3, ... packets, without end."""
+        """The least spans [ns] of 1, 2, 3, ... packets, without an end."""
         ...
 
     def repeat(self) -> tuple[int, int] | None:
-        """(onset, length) [ns]: beyond the onset the spans repeat with this length. None if that is not known."""
+        """(onset, length) [ns]: after the onset the spans repeat with this length. None if that is not known."""
         ...
 
 
 class Periodic(NamedTuple):
-    """One packet per interval, each of them late by at most `jitter_ns`.
+    """One packet per interval, each late by at most `jitter_ns`.
 
-    Jitter beyond the interval is a burst: up to 1 + jitter / interval packets at once.
+    If the jitter exceeds the interval, packets can come in bursts of up to 1 + jitter / interval.
     """
 
     interval_ns: int
@@ -71,7 +72,7 @@ class Periodic(NamedTuple):
 
 
 class Total(NamedTuple):
-    """The sum of several sources into one queue, in any phase to each other."""
+    """The sum of several sources that feed one queue, with any phases between them."""
 
     parts: tuple[Arrivals, ...]
 

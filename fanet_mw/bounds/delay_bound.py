@@ -1,4 +1,4 @@
-"""What a bound's function returns: a bound that holds, or a refusal with its reason; there is no optimistic third."""
+"""The result of a function that bounds a delay: either a bound that holds, or a refusal with the reason."""
 
 from typing import NamedTuple
 

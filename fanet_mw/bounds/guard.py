@@ -1,4 +1,4 @@
-"""The guard time of a slot: given by the scenario, or computed from clock error, propagation and overhang."""
+"""The guard time of a slot: set by the scenario, or computed from clock error, propagation and frame length."""
 
 from math import ceil
 from typing import Final

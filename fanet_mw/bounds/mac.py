@@ -1,4 +1,4 @@
-"""The constants of an 802.11 MAC that decide how long a frame contends for the medium."""
+"""The constants of an 802.11 MAC that decide how long a frame contends for the channel."""
 
 from typing import NamedTuple
 

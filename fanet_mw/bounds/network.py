@@ -1,12 +1,13 @@
-"""Delay and backlog of one head's queue: horizontal and vertical deviation of arrival and service curve.
+"""Delay and backlog of one head's queue: the horizontal and vertical deviation of its arrival and service curves.
 
-A busy period begins with a packet that finds the queue empty. Its q-th packet arrives span(q) later at the earliest and
-is completed completion(q) later at the latest, so its delay is at most completion(q) - span(q) (Le Boudec & Thiran,
-theorem 1.4.2, for staircases). The period ends with the first Q for which completion(Q) <= span(Q+1), because a further
-packet finds the queue empty. All q up to Q are examined, not only the first (Davis et al. 2007).
+A busy period begins with a packet that finds the queue empty. Its q-th packet arrives at the earliest span(q) after
+that, and is completed at the latest completion(q) after it, so its delay is at most completion(q) - span(q) (Le Boudec
+& Thiran, theorem 1.4.2, for staircases). The period ends with the first Q for which completion(Q) <= span(Q+1), because
+the next packet finds the queue empty. The worst packet may be any of the period, so all q up to Q are examined (Davis
+et al. 2007).
 
-At a load of exactly one the period may never end. Then the spans are examined until they repeat. Where it is not known
-when they repeat, or the period exceeds the limit, the affine bound T + burst / R is the answer: looser, but sound.
+At a load of exactly one, the period may never end. The spans are then examined until they repeat. If it is not known
+when they repeat, or if that takes too long, the result is the affine bound T + burst / R, which is looser but sound.
 """
 
 from fractions import Fraction
@@ -22,7 +23,9 @@ _PACKETS_EXAMINED: Final = 100_000
 
 
 def load(arrivals: Arrivals, server: Server) -> Fraction:
-    """Packets that arrive in one period, over packets that the slot of a period holds; stable up to 1."""
+    """The packets that arrive in one period, divided by those that the slot of a period can hold. The queue is stable
+    up to 1.
+    """
     return arrivals.rate * server.period_ns / server.frames
 
 
@@ -51,7 +54,9 @@ def delay_fifo(arrivals: Arrivals, server: Server) -> DelayBound:
 
 
 def backlog(arrivals: Arrivals, server: Server) -> int | Refused:
-    """The most packets in the queue at once, including the one on the air: the length that the queue must allow."""
+    """The greatest number of packets in the queue, including the one on the air: the length that
+    the queue must have.
+    """
     refused = refusal(arrivals, server)
     if refused is not None:
         return refused
@@ -93,7 +98,7 @@ def delay_any_order(flow: Periodic, cross: Arrivals, server: Server, *, blocking
 
 
 class _Counter:
-    """Counts how many packets a window can hold, for windows that only grow."""
+    """Counts how many packets a window can hold, for windows of growing length."""
 
     def __init__(self, arrivals: Arrivals) -> None:
         self._spans = arrivals.spans()
@@ -108,7 +113,7 @@ class _Counter:
 
 
 def _busy_period(arrivals: Arrivals, server: Server) -> list[int] | None:
-    """The spans of the longest busy period, or up to their repetition; None when that is too long to examine."""
+    """The spans of the longest busy period, or until they repeat; None if that is too long to examine."""
     horizon_ns = _horizon_ns(arrivals, server)
     if horizon_ns is None and load(arrivals, server) == 1:
         return None
@@ -125,7 +130,7 @@ def _busy_period(arrivals: Arrivals, server: Server) -> list[int] | None:
 
 
 def _horizon_ns(arrivals: Arrivals, server: Server) -> int | None:
-    """The span beyond which completion and arrivals both repeat, so that no new maximum can follow."""
+    """The span after which both completion and arrivals repeat, so that no greater delay can follow."""
     pattern = arrivals.repeat()
     if pattern is None:
         return None

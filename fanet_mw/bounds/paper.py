@@ -1,14 +1,14 @@
-"""Equations (1)-(4) of the paper, Section 3.3, to the letter: an estimate for comparison, not a bound.
+"""Equations (1)-(4) of the paper, Section 3.3, exactly as published: an estimate for comparison, not a bound.
 
-w(q) = ceil((q b/R) / S) p_c                              (4)    S = ((b/R)/p) p_c unless a slot is given
-WD_c = max over q = 1..Q of w(q) - (q-1) p                (2, 3) Q: the first integer with w(Q) <= Q p
-WD   = sum of WD_c over the clusters c on the path        (1)
+    w(q) = ceil((q b/R) / S) p_c                              (4)    S = ((b/R)/p) p_c unless a slot is given
+    WD_c = max over q = 1..Q of w(q) - (q-1) p                (2, 3) Q: the first integer with w(Q) <= Q p
+    WD   = sum of WD_c over the clusters c on the path        (1)
 
-Here C = b/R is `airtime_ns`, p `interval_ns`, p_c `period_ns`, S `slot_ns`. What (4) gets wrong: it lets a slot serve
-fractions of a packet, so slots that are no multiple of C look larger than they are; it counts from the beginning of a
-period, so a packet that has just missed its slot waits longer than w(1) says; and it takes arrivals at every hop as
-periodic. When C p_c > S p no Q exists: the equations give no number, so there is none here. With the paper's own S
-always C p_c = S p, so they accept any load, even a single packet that is longer than the period.
+Here C = b/R is `airtime_ns`, p `interval_ns`, p_c `period_ns`, S `slot_ns`. Equation (4) is wrong in three ways. It
+lets a slot serve fractions of a packet, so slots that are no multiple of C look larger than they are. It counts from
+the beginning of a period, so a packet that has just missed its slot waits longer than w(1). And it takes arrivals at
+every hop as periodic. If C p_c > S p, no Q exists, so the equations give no number. With the paper's own S always C p_c
+= S p, so they accept any load, even a single packet that is longer than the period.
 """
 
 from fractions import Fraction
@@ -19,7 +19,7 @@ from fanet_mw.bounds.delay_bound import Bounded, DelayBound, Refused
 from fanet_mw.errors import LocalProtocolError
 
 _SLOTS_EXAMINED: Final = 100_000
-"""A busy period of more slots than this is not followed to its end."""
+"""The estimate is refused for busy periods of more slots than this."""
 
 
 def paper_slot(*, airtime_ns: int, interval_ns: int, period_ns: int) -> Fraction:

@@ -1,14 +1,14 @@
-"""The service of a head that may send one packet in each of its turns, at known places of a repeating superframe.
+"""The service of a head that transmits one packet in each of its turns, at given places of a repeating superframe.
 
     |   t   t     t          |   t   t     t          |      the turns of this head; those of others are not shown
 
-A packet announced less than `lead_ns` before a turn misses it. From the worst instant, just too late for turn i, the
-n-th packet of a queue that never empties is completed at the end of the n-th turn from there:
+A packet that is announced less than `lead_ns` before a turn misses it. The worst instant is just too late for turn i:
+then the n-th packet of a queue that never empties is completed at the end of the n-th turn after it:
 
     completion(n) = lead + max over i of start(i+n) - start(i) + airtime
 
-Every turn takes one packet of any length that fits, so no room is lost at the end of a turn and no packet blocks
-another: an urgent packet takes the next turn for which it is announced.
+Each turn can take one packet of any length, so no time is lost at the end of a turn, and no packet blocks another: an
+urgent packet takes the next turn for which it can be announced.
 """
 
 from dataclasses import dataclass, field

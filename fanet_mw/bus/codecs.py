@@ -1,7 +1,8 @@
-"""The bytes of the messages on the bus. This is the only module that knows them, with `sensor_codecs.py`.
+"""The byte format of the messages on the bus; `sensor_codecs.py` has that of sensor readings, and no other file knows
+it.
 
-One put on the bus carries a batch: each message is one kind byte, a 32-bit length and its body, little endian.
-Decoding is total: any bytes give messages or MalformedFrameError, nothing else.
+One put on the bus carries a batch of messages. Each is one byte for its kind, a 32-bit length and its body, all little
+endian. Any bytes decode either to messages or to MalformedFrameError, and to no other exception.
 """
 
 import struct
@@ -244,12 +245,12 @@ HEADS: Final[dict[type[Any], tuple[struct.Struct, ...]]] = {
     Jam: (_JAM,), Cut: (_CUT,), Restore: (), LinkStats: (_LINKS,), Obstructions: (_OBSTRUCTIONS,),
     **sensor_codecs.HEADS,
 }  # fmt: skip
-"""The structs of each kind: that of its head, and that of each row where rows of one kind follow."""
+"""The structs of each kind: that of its head, and that of each row for kinds with rows."""
 CODES: Final = {kind: code for code, (kind, _, _) in _CODECS.items()}
 _CODE_OF: Final = {kind: (code, encode) for code, (kind, encode, _) in _CODECS.items()}
 _ITEM: Final = struct.Struct("<BI")
 MAX_ITEMS: Final = 16_384
-"""The most messages of one put: several times what the busiest medium hands over at once."""
+"""The greatest number of messages in one put: several times what the busiest medium sends at once."""
 
 
 def encode(messages: Iterable[Message]) -> bytes:
@@ -277,7 +278,7 @@ def codes_of(*kinds: type[Any]) -> frozenset[int]:
 
 
 def items(data: bytes) -> list[Item]:
-    """The messages of one put, undecoded; raises MalformedFrameError where they are cut off or over MAX_ITEMS."""
+    """The messages of one put, not decoded; raises MalformedFrameError if they are cut off, or more than MAX_ITEMS."""
     found: list[Item] = []
     at = 0
     while at < len(data):

@@ -1,6 +1,8 @@
-"""The byte layout of every message on the bus, for the reference page: names for the fields of the codecs' structs.
+"""The byte layout of every message on the bus, for the reference page: the fields of the codecs' structs with their
+names.
 
-The structs are those that encode and decode (`codecs.HEADS`); a struct of another length than its names is refused.
+The structs are those that encode and decode (`codecs.HEADS`). A struct whose number of fields differs from that of the
+names is an error.
 """
 
 import re
@@ -16,18 +18,18 @@ from fanet_mw.bus.radio_control import Cut, Degrade, Jam, Restore
 TYPES: Final = {
     "B": "uint8", "H": "uint16", "I": "uint32", "Q": "uint64", "q": "int64", "f": "float32", "d": "float64",
 }  # fmt: skip
-"""Names of the codes of `struct`."""
+"""A readable name for each format character of `struct`."""
 
 
 class Names(NamedTuple):
-    """What the codecs do not say: names of the fields, and what follows them."""
+    """The names of the fields of a kind of message, which its codec does not know."""
 
     topic: str
     fields: str
-    """The names of the fields of the head, in order."""
+    """The names of the fields of the head, in order; what follows the head is named, too."""
     rest: str = ""
     row: str = ""
-    """The names of the fields of each row, where rows follow the head."""
+    """The names of the fields of each row, for kinds with rows."""
 
 
 class Field(NamedTuple):

@@ -1,8 +1,8 @@
-"""What each directed link has carried in a span of time, as counted by the medium: columns, because links are many.
+"""Statistics of directed links over a span of time, as the medium counts them: one column per figure.
 
     copies on a link = received + lost by reason (LOSSES), counted when they end; ACKs are not included
 
-Not modeled: which frames they were (a capture tells that), and links that carried nothing.
+The statistics do not tell which frames were lost (a capture does), and leave out links without traffic.
 """
 
 from __future__ import annotations
@@ -23,7 +23,7 @@ LOSSES: Final = (
     DropReason.STATION_DOWN,
 )
 COUNTS: Final = 1 + len(LOSSES)
-"""Counts per link: copies received, then copies lost by reason."""
+"""The number of counters per link: copies received, and copies lost by each reason."""
 
 
 class LinkRow(NamedTuple):
@@ -33,9 +33,9 @@ class LinkRow(NamedTuple):
     dst: NodeId
     received: int
     lost: tuple[int, ...]
-    """Copies lost, in the order of LOSSES."""
+    """The number of lost copies for each reason, in the order of LOSSES."""
     rssi_sum_mdbm: int
-    """The sum over the copies received [1/1000 dBm]."""
+    """The sum of the RSSI over all received copies [1/1000 dBm]."""
 
     @property
     def copies(self) -> int:
@@ -43,7 +43,7 @@ class LinkRow(NamedTuple):
 
     @property
     def rssi_dbm(self) -> float | None:
-        """The mean over the copies received [dBm]; None when there were none."""
+        """The mean RSSI of the received copies [dBm]; None if there were none."""
         return self.rssi_sum_mdbm / self.received / 1000 if self.received else None
 
 

@@ -1,9 +1,9 @@
-"""Changes of the air while a swarm runs: a degraded link, a jammed area, a node cut off, and the end of each.
+"""Faults of the air that can be set while a swarm runs: a degraded link, a jammed area, a node that is cut off.
 
-A fault has a label; a new fault with the same label replaces it, and `Restore` ends one or all. A fault lasts `for_ns`
-from the instant at which the medium takes it, or until it is restored (0). These are the messages on
-`fanet/<s>/radio/control` and the entries of a scenario's `[[faults]]`; the medium checks each with `wrong`. Not
-modeled: faults of the bus itself, or of a node's processor.
+Each fault has a label. A new fault replaces one with the same label, and `Restore` ends one fault or all. A fault lasts
+for `for_ns` from the instant at which the medium receives it; 0 means until it is restored. The same types are the
+messages on `fanet/<s>/radio/control` and the entries of a scenario's `[[faults]]`; the medium checks each with `wrong`.
+Not modeled: faults of the bus, and of a node's processor.
 """
 
 import math
@@ -19,7 +19,7 @@ MAX_FOR_NS: Final = 1_000_000 * S
 
 
 EVERY: Final = NodeId(0)
-"""A degraded link with both ends of this id is every link there is."""
+"""A degraded link with this id at both ends means every link."""
 
 
 class Degrade(NamedTuple):
@@ -72,17 +72,17 @@ Control = Degrade | Jam | Cut | Restore
 
 
 def link_label(src: int, dst: int) -> str:
-    """The label of a degraded link, or of all links, that was given none."""
+    """The default label of a degraded link, or of all links."""
     return f"link-{src}-{dst}" if src or dst else "links"
 
 
 def node_label(node: int) -> str:
-    """The label of a cut that was given none."""
+    """The default label of a cut."""
     return f"node-{node}"
 
 
 JAM_LABEL: Final = "jam"
-"""The label of a jammed area that was given none."""
+"""The default label of a jammed area."""
 
 
 def nodes_of(fault: Fault) -> tuple[int, ...]:

@@ -1,6 +1,6 @@
-"""The bytes of sensor readings: one encoder and one decoder per kind, beside each other; `topics` knows their codes.
+"""The byte format of sensor readings: one encoder and one decoder for each kind.
 
-Decoding is total: what is no reading raises ValueError or struct.error, which `topics` turns into one error.
+Bytes that are no reading raise ValueError or struct.error, which `codecs.py` turns into MalformedFrameError.
 """
 
 import math
@@ -35,9 +35,10 @@ _ALTIMETER = struct.Struct("<q2d")
 _INERTIAL = struct.Struct("<q3d")
 _BATTERY = struct.Struct("<q3d")
 MAX_HEARD: Final = 10_000
-"""Phones of one scan, people of one image, voices: as many as a scenario may have survivors."""
+"""The greatest number of phones in a scan, people in an image, or voices: the most survivors that a
+scenario may have."""
 MAX_ECHOES: Final = 4_096
-"""Returns of one radar scan."""
+"""The greatest number of returns in a radar scan."""
 
 
 def encode_gps(m: Gps) -> bytes:
@@ -62,7 +63,7 @@ def decode_scan(body: bytes) -> WifiScan:
 
 
 def _finite(values: Iterable[float]) -> None:
-    """Raise ValueError for a reading that no sensor of this project gives."""
+    """Raise ValueError for values that no sensor can give: infinite ones and NaN."""
     if not all(map(math.isfinite, values)):
         raise ValueError("not finite")
 
@@ -72,7 +73,7 @@ def _encode_rows(t_ns: int, rows: Sequence[tuple[float, ...]], row: struct.Struc
 
 
 def _decode_rows(body: bytes, row: struct.Struct, *, most: int) -> tuple[int, list[tuple[float, ...]]]:
-    """The instant, and as many rows of finite numbers as the count in front of them says."""
+    """The instant of a reading, and its rows of finite numbers, as many as the count in front of them says."""
     t_ns, count = _SCAN.unpack_from(body)
     if len(body) != _SCAN.size + count * row.size or count > most:
         raise ValueError("length")

@@ -39,7 +39,7 @@ class Topics:
         self.all_reports = f"{self._base}/report/*"
         self.all_alive = f"{self._base}/alive/**"
         self.scenario = f"{self._base}/scenario"
-        """Asked, never put: the keeper of the clock answers with the scenario as JSON."""
+        """The topic of queries for the scenario; the keeper of the clock answers with the scenario as JSON."""
 
     def radio_tx(self, node: int | str) -> str:
         return f"{self._base}/radio/{node}/tx"
@@ -66,7 +66,9 @@ class Topics:
         return f"{self._base}/report/{name}"
 
     def alive(self, name: str, *, fingerprint: str = "", instance: str = "") -> str:
-        """The liveliness token of an actor's host: which scenario it runs, and which of several of that name it is."""
+        """The liveliness token of a process: its name, the scenario that it runs, and which of several processes of
+        that name it is.
+        """
         rest = f"/{fingerprint}/{instance}" if fingerprint else ""
         return f"{self._base}/alive/{name}{rest}"
 

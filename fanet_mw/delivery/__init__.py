@@ -1,10 +1,11 @@
-"""Messages of applications from end to end: in pieces, once, in order where that is asked for, and their fate is told.
+"""End-to-end delivery of application messages: in pieces, exactly once, in order if asked for, with reports to the
+sender.
 
-    application -> Sender    pieces of a message -> packets of the node -> any routing protocol
-    packets     -> Receiver  pieces put together -> in order of the flow -> application, and receipts to the sender
-    receipts    -> Sender    what is missing is sent again; acknowledged, or expired, is told to the application
+    application -> Sender    message -> pieces -> packets of the node -> any routing protocol
+    packets     -> Receiver  pieces -> message -> order of its flow -> application; receipts to the sender
+    receipts    -> Sender    missing pieces are sent again; the application is told when all is acknowledged, or expired
 
-Order: messages that are to be confirmed, of one sender to the same nodes, on one port and of one priority, are handed
-over in the order in which they were sent; one that its sender has given up is passed over. Others are handed over as
-they come. Memory has a bound on both sides. Sans-IO, as all of the core.
+A flow consists of the confirmed messages from one sender to the same nodes, on one port and of one priority. They are
+handed over in the order in which they were sent; one that the sender has given up is skipped. All other messages are
+handed over as they arrive. Memory is bounded on both sides. Like the rest of the core, this package is sans-IO.
 """

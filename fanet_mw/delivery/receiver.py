@@ -1,8 +1,8 @@
-"""The receiving side: pieces become messages, each is handed over once, and its sender is told.
+"""The receiving side of delivery: it puts pieces together, hands each message over once, and answers with receipts.
 
-A message that is to be confirmed waits for the one before it in its flow. What is kept is bounded in bytes, per sender
-and together, and in messages; what does not fit is not taken, and its sender, which hears nothing, sends it again.
-The caller counts pieces that contradict each other as malformed.
+A confirmed message waits for the message before it in its flow. The memory for incomplete and waiting messages is
+bounded, per sender and in all. What does not fit is not accepted; its sender gets no receipt, and sends it again. The
+caller counts pieces that contradict each other as malformed.
 """
 
 from collections.abc import Callable
@@ -15,35 +15,35 @@ from fanet_mw.units import MS, US, NodeId, earliest
 from fanet_mw.wire.message import DELIVERED, GIVEN_UP, MISSING, NO_LISTENER, Head, Piece, Receipt
 
 MOST_BYTES: Final = 4 << 20
-"""The most bytes of pieces that are kept, of all senders together."""
+"""The greatest number of bytes of pieces that are kept, of all senders together."""
 MOST_BYTES_EACH: Final = 1 << 20
-"""The most bytes of pieces that are kept of one sender."""
+"""The greatest number of bytes of pieces that are kept of one sender."""
 MOST_MESSAGES: Final = 4096
-"""The most messages, of all senders together, that are not whole or wait for one before them."""
+"""The greatest number of messages, of all senders together, that are incomplete or wait for one before them."""
 MOST_MESSAGES_EACH: Final = 512
-"""The most messages of one sender that are not whole or wait for one before them."""
+"""The greatest number of messages of one sender that are incomplete or wait for one before them."""
 RECEIPT_NS: Final = 20 * MS
-"""A receipt waits this long for others to the same node, and up to `_SPREAD_NS` longer: nodes that heard the same
-broadcast must not answer at the same instant."""
+"""A receipt waits this long for other receipts to the same node, and at random up to `_SPREAD_NS` longer, because nodes
+that have received the same broadcast must not all answer at the same instant."""
 _SPREAD_NS: Final = 80 * MS
 _MOST_DONE: Final = 8192
-"""Messages of which is remembered that they were handed over."""
+"""The number of messages that are remembered as handed over."""
 _MOST_FLOWS: Final = 4096
 
 
 class Whole(NamedTuple):
-    """A message to be handed over."""
+    """A complete message to hand over."""
 
     origin: NodeId
     head: Head
     data: bytes
     frame: bytes
-    """The packet with its last piece."""
+    """The packet that brought its last piece."""
 
 
 @dataclass
 class _Incoming:
-    """A message that is not whole, or waits."""
+    """A message that is incomplete, or that waits for one before it."""
 
     head: Head
     until_ns: int
@@ -64,39 +64,39 @@ class _Incoming:
 
 
 class Receiver:
-    """What other nodes' applications have sent to one node."""
+    """The messages from other nodes' applications to one node."""
 
     def __init__(self, node: NodeId, listens: Callable[[Piece], bool], *, random: Random) -> None:
-        """`listens` says whether an application listens to a message of which this is a piece."""
+        """`listens` tells from one piece whether any application of this node listens to its message."""
         self._node = node
         self._listens = listens
         self._random = random
         self._incoming: dict[tuple[NodeId, int], _Incoming] = {}
         self._bytes: dict[NodeId, int] = {}
-        """The bytes of the pieces that are kept, by sender."""
+        """The number of bytes of pieces that are kept, by sender."""
         self._counts: dict[NodeId, int] = {}
         """The number of messages in `_incoming`, by sender."""
         self._done: dict[tuple[NodeId, int], int] = {}
-        """The last receipt of each message whose sender may not have heard of it."""
+        """The last receipt of each message whose sender may not have received it."""
         self._last: dict[tuple[NodeId, int], int] = {}
-        """The number of the message that was handed over last, by flow."""
+        """The number of the last message that was handed over, by flow."""
         self._receipts: dict[NodeId, dict[int, tuple[Receipt, int]]] = {}
-        """The messages to be acknowledged and the priority of each, by the node to which the receipts are due."""
+        """The messages to acknowledge, each with its priority, by the node to which the receipts go."""
         self._receipts_ns: int | None = None
         self._sweep_ns: int | None = None
         self.arrived: list[Whole] = []
-        """Messages to hand over, in order, since this list was emptied last."""
+        """The messages to hand over, in order; the caller empties this list."""
         self.not_taken = 0
-        """Pieces for which there was no room."""
+        """The number of pieces for which there was no room."""
         self.expired = 0
-        """Messages that were not whole, or still waited, when their time was over."""
+        """The number of messages that expired while they were incomplete or waited."""
 
     @property
     def kept_bytes(self) -> int:
         return sum(self._bytes.values())
 
     def hear(self, origin: NodeId, piece: Piece, frame: bytes, *, priority: int, now_ns: int) -> None:
-        """One piece; raises MalformedFrameError when it contradicts another one of its message."""
+        """A piece has arrived; raises MalformedFrameError if it contradicts another piece of its message."""
         head = piece.head
         if piece.targets is not None and self._node not in piece.targets:
             return
@@ -111,7 +111,10 @@ class Receiver:
                 self._confirm((origin, number), DELIVERED, priority, now_ns)
 
     def _take(self, name: tuple[NodeId, int], piece: Piece, frame: bytes, now_ns: int, followers: list[int]) -> int:
-        """Keep a new piece; returns what is to be told of its message, and adds those handed over after it."""
+        """Keep a new piece; returns the result to put into the receipt.
+
+        The numbers of waiting messages that are handed over as a consequence are added to `followers`.
+        """
         head, (origin, number) = piece.head, name
         until_ns = min(head.born_us * US, now_ns) + head.lifetime_ms * MS
         late = head.confirm and number <= self._last.get((origin, head.flow), 0)
@@ -128,7 +131,7 @@ class Receiver:
         elif message.head._replace(piece=0, previous=0) != head._replace(piece=0, previous=0):
             raise MalformedFrameError(f"piece {head} of {message.head}")
         else:
-            message.head = head  # the message before it may have been given up
+            message.head = head  # the message before it may have been given up by the sender
         if head.piece not in message.pieces:
             kept, size = self._bytes.get(origin, 0), len(piece.data)
             if kept + size > MOST_BYTES_EACH or self.kept_bytes + size > MOST_BYTES:
@@ -145,7 +148,7 @@ class Receiver:
         return self._done.get(name, MISSING)
 
     def _hand_over(self, name: tuple[NodeId, int], message: _Incoming) -> list[int]:
-        """Hand a message over if it is whole and its turn, and then those that have waited for it; their numbers."""
+        """Hand over a complete message whose turn it is, and then those that waited for it; returns their numbers."""
         numbers: list[int] = []
         origin, flow = name[0], message.head.flow
         while message.whole and self._is_next(origin, message.head):
@@ -215,12 +218,12 @@ class Receiver:
         return found
 
     def _latest(self, origin: NodeId, receipt: Receipt) -> Receipt:
-        """A receipt as it is to be said now: the message may have been handed over since."""
+        """The receipt as it must be sent now, because the message may have been handed over since it was made."""
         outcome = self._done.get((origin, receipt.number))
         return receipt if outcome is None else Receipt(receipt.held, receipt.number, outcome)
 
     def _sweep(self, now_ns: int) -> None:
-        """Let go of what has expired."""
+        """Forget messages that have expired."""
         for name, message in list(self._incoming.items()):
             if message.until_ns <= now_ns:
                 self._forget(name, message)

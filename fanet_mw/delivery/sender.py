@@ -1,12 +1,12 @@
-"""The sending side: messages that are to be confirmed, which pieces each target lacks, and what to send next.
+"""The sending side of delivery: confirmed messages, which pieces each target lacks, and what to send next.
 
-    sent -> every target has it -> acknowledged
-         -> no word in time     -> the missing pieces again, and twice the patience
-         -> lifetime over       -> expired: the nodes that have not confirmed it are named
+    sent -> all targets have acknowledged it
+         -> no receipt in time -> the missing pieces are sent again, and the wait is doubled
+         -> its lifetime is over -> expired: the application is told which nodes have not confirmed it
 
-How long to wait for a receipt follows from those that came (RFC 6298). The pieces under way of all messages together
-are bounded by a window, which shrinks when something has to be repeated (half) and grows with each message that was
-confirmed (by one). What is kept has a bound too: the caller asks `full` first, and refuses a message that does not fit.
+The wait for a receipt follows from earlier round trips (RFC 6298). The pieces under way of all messages together are
+bounded by a window: it is halved when something must be sent again, and grows by one with each confirmed message.
+Memory is bounded, too: the caller asks `full` first, and refuses a message that does not fit.
 """
 
 import heapq
@@ -20,42 +20,42 @@ from fanet_mw.wire import message as wire_message
 from fanet_mw.wire.message import MAVLINK_PORT, MOST_PIECES, Head, Receipt
 
 MOST_BYTES: Final = 4 << 20
-"""What is kept of all messages together."""
+"""The greatest number of bytes that are kept, of all messages together."""
 MOST_MESSAGES: Final = 4096
 EXPIRED: Final = -1
-"""The outcome of a message whose lifetime is over, beside those of receipts."""
+"""The outcome of a message whose lifetime is over; all other outcomes are those of receipts."""
 _WINDOW: Final = 32
-"""Pieces under way, at most: ten kilobytes and more, and no flood of packets."""
+"""The greatest number of pieces under way: ten kilobytes and more, but no burst that fills all queues."""
 _LEAST_WINDOW: Final = 2
 _MOST_DOUBLINGS: Final = 3
 _MOST_FLOWS: Final = 1024
 _FEW: Final = 2
-"""Up to so many targets that still lack something are sent to one by one; more of them are sent to together."""
+"""Up to this number of targets, missing pieces are sent to each target; to more targets they are broadcast."""
 _NAMED: Final = 32
-"""A message for all nodes that is repeated names at most so many nodes that still lack something."""
+"""A message for all nodes that is broadcast again names at most this many nodes that still lack something."""
 
 
 class PieceToSend(NamedTuple):
-    """What the node is to send: one piece of a message."""
+    """A piece of a message that the node must send now."""
 
     number: int
     inner: bytes
     destination: NodeId
     priority: int
     first: bool
-    """True for the first packet of its message."""
+    """True for the first packet of the message."""
 
 
 class Told(NamedTuple):
-    """What became of a message: a target has confirmed or refused it, or its time was over."""
+    """The outcome of a message: a target has confirmed or refused it, or its lifetime is over."""
 
     number: int
     outcome: int
-    """The outcome as a receipt states it, or `EXPIRED`."""
+    """The outcome, as in a receipt, or `EXPIRED`."""
     targets: tuple[NodeId, ...]
-    """The targets that said so; of a message that expired, those that have not confirmed it."""
+    """The targets with this outcome; if the message has expired, those that have not confirmed it."""
     last: bool
-    """True when nothing more will be told of this message."""
+    """True if no further outcome of this message will follow."""
 
 
 @dataclass
@@ -64,12 +64,12 @@ class _Flow:
 
     number: int
     open: list[int] = field(default_factory=list)
-    """Numbers of those that have not been confirmed by all nor given up, ascending."""
+    """The numbers of the messages that are neither confirmed by all targets nor given up, ascending."""
 
 
 @dataclass
 class _OutgoingMessage:
-    """One message that is to be confirmed."""
+    """One confirmed message."""
 
     number: int
     flow: _Flow
@@ -81,11 +81,11 @@ class _OutgoingMessage:
     born_us: int
     lifetime_ms: int
     everyone: bool
-    """True for a message for everyone."""
+    """True if the message is for all nodes."""
     lacking: dict[NodeId, int]
-    """The pieces that each target has, as bits, for the targets that have not confirmed the message yet."""
+    """For each target that has not confirmed the message, the pieces that it has, as bits."""
     again_ns: int = 0
-    """The instant at which to send again what is lacking; 0: it waits for its turn to be sent."""
+    """The instant at which missing pieces are sent again; 0 while the message waits for room in the window."""
     sent_ns: int = 0
     rounds: int = 0
 
@@ -95,10 +95,12 @@ class _OutgoingMessage:
 
 
 class Sender:
-    """The messages of one node that are to be confirmed and are on their way."""
+    """The confirmed messages of one node that are under way."""
 
     def __init__(self, node: NodeId, everyone: Collection[int], *, most_bytes: int, wait_ns: int) -> None:
-        """`most_bytes`: inner frames of one packet; `wait_ns`: patience with a target of which no receipt has come."""
+        """`most_bytes`: the room for inner frames in one packet. `wait_ns`: how long to wait for a target of which no
+        receipt has come.
+        """
         self._node = node
         self._everyone = tuple(NodeId(other) for other in everyone if other != node)
         self._most_bytes = most_bytes
@@ -108,19 +110,19 @@ class Sender:
         self._next_flow = 0
         self._next_number = 1
         self._ready: list[tuple[int, int]] = []
-        """(priority, number) of messages of which something is to be sent as soon as the window has room: a heap."""
+        """A heap of (priority, number) of messages of which something is to be sent as soon as the window has room."""
         self._timers: list[tuple[int, int]] = []
-        """(instant, number): when a message is sent again, or expires; those that no longer hold are skipped."""
+        """A heap of (instant, number) at which a message is sent again or expires; outdated entries are skipped."""
         self._kept_bytes = 0
         self._under_way = 0
         self._window = _WINDOW
         self.told: list[Told] = []
-        """What has become of messages since this list was emptied last."""
+        """The outcomes of messages; the caller empties this list."""
         self.repeated = 0
-        """Pieces that were sent again."""
+        """The number of pieces that were sent again."""
 
     def start(self, first_number: int) -> None:
-        """Numbers go on from here; a node that starts again must not use its earlier ones again."""
+        """Begin to number messages; a node that starts again must not use the numbers of earlier messages."""
         self._next_number = first_number
         self._next_flow = first_number
 
@@ -131,7 +133,7 @@ class Sender:
         return self._kept_bytes >= MOST_BYTES or len(self._messages) >= MOST_MESSAGES
 
     def most_bytes(self, targets: int) -> int:
-        """The longest message on a port, if so many targets must be named."""
+        """The length of the longest message to a port, if `targets` nodes must be named."""
         return MOST_PIECES * self._stride(targets)
 
     def _stride(self, targets: int) -> int:
@@ -142,7 +144,7 @@ class Sender:
         self, data: bytes, *, port: int, destination: NodeId, targets: tuple[NodeId, ...], priority: int,
         born_us: int, lifetime_ms: int,
     ) -> tuple[int, Sequence[PieceToSend]]:  # fmt: skip
-        """A message that is not to be confirmed: its number, and all its packets."""
+        """The number and all packets of a message that is not confirmed."""
         number = self.take_number()
         stride, pieces = self._division(data, port, len(targets))
         packets = []
@@ -157,7 +159,7 @@ class Sender:
         self, data: bytes, *, port: int, targets: tuple[NodeId, ...] | None, priority: int, born_us: int,
         lifetime_ms: int,
     ) -> int:  # fmt: skip
-        """Take a message that its targets are to confirm (None: everyone); returns its number."""
+        """Accept a message that its targets are to confirm (None: all nodes); returns its number."""
         whom = self._everyone if targets is None else targets
         number = self.take_number()
         flow = self._flow(whom, port, priority)
@@ -179,7 +181,7 @@ class Sender:
         return self._next_number - 1
 
     def _division(self, data: bytes, port: int, named: int) -> tuple[int, int]:
-        """Bytes of each piece but the last, and how many pieces."""
+        """The number of bytes of each piece but the last, and the number of pieces."""
         if port == MAVLINK_PORT or not data:
             return len(data), 1
         stride = min(len(data), self._stride(named))
@@ -193,15 +195,15 @@ class Sender:
                 del self._flows[next(iter(self._flows))]
             flow = _Flow(self._next_flow & 0xFFFF)
             self._next_flow += 1
-        self._flows[key] = flow  # the one that was used last is the last to be forgotten
+        self._flows[key] = flow  # flows are forgotten in the order of their last use
         return flow
 
     def receipt(self, origin: NodeId, receipt: Receipt, now_ns: int) -> None:
-        """A target says what has come of a message."""
+        """A target's receipt has arrived."""
         message = self._messages.get(receipt.number)
         if message is None or origin not in message.lacking:
             return
-        if message.rounds == 1:  # else it is not known which copy the receipt answers
+        if message.rounds == 1:  # after a repetition it is not known which copy the receipt answers
             self._round_trips.measured(origin, now_ns - message.sent_ns)
         if receipt.outcome == wire_message.MISSING:
             message.lacking[origin] |= receipt.held & ((1 << message.pieces) - 1)
@@ -222,7 +224,7 @@ class Sender:
     # --- out ------------------------------------------------------------------------------------------------------
 
     def due(self, now_ns: int) -> list[PieceToSend]:
-        """What the node is to send now."""
+        """The pieces to send now."""
         while self._timers and self._timers[0][0] <= now_ns:
             _, number = heapq.heappop(self._timers)
             message = self._messages.get(number)
@@ -244,7 +246,9 @@ class Sender:
         return packets
 
     def _round(self, message: _OutgoingMessage, now_ns: int) -> list[PieceToSend]:
-        """Send what is lacking; a target that has every piece is asked again by the last one."""
+        """Send the missing pieces of a message; a target that has all of them is sent the last one again, to ask for
+        its receipt.
+        """
         whole, last = (1 << message.pieces) - 1, 1 << (message.pieces - 1)
         wanted = {target: (whole & ~held) or last for target, held in message.lacking.items()}
         packets: list[PieceToSend] = []
@@ -292,7 +296,7 @@ class Sender:
         return packets
 
     def next_wake_ns(self) -> int | None:
-        """The instant at which something is to be sent again, or expires."""
+        """The instant at which something must be sent again, or expires."""
         timers = self._timers
         while timers:
             t_ns, number = timers[0]

@@ -1,6 +1,7 @@
-"""The XML of the dialect beside the XML that it includes, for tools that read or generate from message definitions.
+"""Writes the XML of the MAVLink dialect together with the XML that it includes, for tools that read or generate from
+it.
 
-The included XML is that of the installed pymavlink, so it has the messages that this package's parser knows.
+The included XML is that of the installed pymavlink, so it matches the messages that this package's parser knows.
 """
 
 import re
@@ -16,9 +17,9 @@ _INCLUDE: Final = re.compile(r"<include>\s*(\S+?)\s*</include>")
 
 
 def write(folder: Path) -> Path:
-    """Write `v1.0/fanet.xml` and what it includes, as MAVLink's own repository has them; returns the path of fanet.xml.
+    """Write `v1.0/fanet.xml` and all that it includes into a folder, as in MAVLink's own repository; returns its path.
 
-    Raises ConfigError when they cannot be written, or pymavlink came without its definitions.
+    Raises ConfigError if the files cannot be written, or if pymavlink was installed without its definitions.
     """
     target = folder / "v1.0"
     ours, theirs = files("fanet_mw.dialect"), files("pymavlink.dialects.v20")
@@ -34,7 +35,7 @@ def write(folder: Path) -> Path:
 
 
 def _with_included(source: Traversable, theirs: Traversable) -> dict[str, str]:
-    """The texts of a definition and of all that it includes, by file name."""
+    """The texts of a definition and of all definitions that it includes, by file name."""
     found: dict[str, str] = {}
     wanted = [source]
     while wanted:

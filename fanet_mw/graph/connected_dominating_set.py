@@ -1,7 +1,7 @@
-"""A connected dominating set by local decisions: relays with which a flood reaches every node of a connected swarm.
+"""A connected dominating set by local decisions: if its nodes relay, a flood reaches all nodes of a connected swarm.
 
-Each node is in the set or hears a node of the set, and the set is connected. Without a spare relay a loss is final;
-redundancy takes more relays.
+Each node is in the set or hears a node of the set, and the set is connected. The set has no redundancy, so a frame that
+a relay loses may be lost to others, too.
 """
 
 from collections.abc import Mapping

@@ -10,7 +10,7 @@ from typing import Final
 from fanet_mw.units import Enu, NodeId
 
 Adjacency = Mapping[NodeId, tuple[NodeId, ...]]
-"""Every node is a key. Its neighbors are ascending, without the node itself, and each has it as a neighbor too."""
+"""The neighbors of each node, ascending. Every node is a key; if b is a neighbor of a, then a is a neighbor of b."""
 
 _MIN_CELL_M: Final = 1e-3
 
@@ -48,7 +48,7 @@ def within_range(positions: Mapping[NodeId, Enu], *, range_m: float) -> dict[Nod
 
 
 def two_hop(adjacency: Adjacency) -> dict[NodeId, tuple[NodeId, ...]]:
-    """The nodes within two hops of each node: a frame of theirs can collide with its frames at a common neighbor."""
+    """The nodes within two hops of each node: their frames can collide with its own at a common neighbor."""
     found = {}
     for node in sorted(adjacency):
         reach = set(adjacency[node])
@@ -60,7 +60,7 @@ def two_hop(adjacency: Adjacency) -> dict[NodeId, tuple[NodeId, ...]]:
 
 
 def levels(adjacency: Adjacency, root: NodeId) -> dict[NodeId, int]:
-    """The hops of each node from the root, breadth first; nodes that cannot be reached are missing."""
+    """The number of hops from the root to each node, breadth first; nodes that cannot be reached are missing."""
     hops = {root: 0}
     frontier = [root]
     while frontier:
@@ -75,7 +75,7 @@ def levels(adjacency: Adjacency, root: NodeId) -> dict[NodeId, int]:
 
 
 def components(adjacency: Adjacency) -> list[tuple[NodeId, ...]]:
-    """The parts of a swarm that are not connected with each other, each as its nodes, in order of their lowest ids."""
+    """The connected components of a swarm, each as its nodes, in the order of their lowest ids."""
     done: set[NodeId] = set()
     found = []
     for node in sorted(adjacency):

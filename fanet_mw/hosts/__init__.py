@@ -1,1 +1,1 @@
-"""Hosts, which run actors: in virtual time on one heap, or in real time on asyncio over Zenoh."""
+"""Hosts run actors: in virtual time, with one event heap for all, or in real time, with asyncio and Zenoh."""

@@ -1,8 +1,8 @@
-"""One Zenoh session with the settings that a swarm needs, as a context manager that always closes it.
+"""A Zenoh session with the settings that a swarm needs, as a context manager that always closes it.
 
-Scouting is off: which process connects to which is configured, never discovered. Frames, poses and sensor readings are
-best effort and dropped under congestion (to be late is worse than to be lost, and gaps are counted); traces and reports
-are reliable.
+Scouting is off: it is configured which process connects to which. Frames, poses and sensor readings are best effort and
+dropped under congestion, because late ones are worse than lost ones, and gaps are counted. Traces and reports are
+reliable.
 """
 
 import contextlib
@@ -19,17 +19,19 @@ import zenoh
 from fanet_mw.errors import BusError, ConfigError
 
 JOIN_PATIENCE_S: Final = 2.5
-"""The time for which a router is waited for by default; a user who has mistyped an endpoint learns of it soon."""
+"""How long a process waits for a router by default; it is short, so that a mistyped endpoint is soon reported."""
 MAX_PUT_BYTES: Final = 16 << 20
-"""A longer put is dropped where it first arrives: by default Zenoh would collect up to 1 GiB of one put in memory."""
+"""A longer put is dropped by the session that receives it first; Zenoh's default would collect up
+to 1 GiB of one put."""
 LOST_AFTER_S: Final = 2.0
-"""A router that has been away for this long is taken to be gone. Zenoh reconnects by itself to one that returns."""
+"""A router that does not answer for this long counts as gone. To one that returns earlier, Zenoh
+reconnects by itself."""
 OnSample = Callable[[str, bytes], None]
-"""A callback (topic, payload); it is called on a thread of Zenoh."""
+"""A callback with topic and payload; Zenoh calls it on a thread of its own."""
 
 
 class HostBus(Protocol):
-    """What a host needs of a bus: `Bus`, or a bus that keeps some topics to itself."""
+    """The part of the bus that a host needs; `Bus` has it, and so has a bus that keeps some topics to itself."""
 
     def subscribe(self, expression: str, on_sample: OnSample) -> None: ...
 
@@ -43,12 +45,12 @@ class HostBus(Protocol):
 
 
 def config_of(path: Path | None, name: str) -> Path | None:
-    """The configuration file of a participant: the given file, or NAME.json5 in the given folder."""
+    """The Zenoh configuration file of a process: `path` itself, or NAME.json5 in it if it is a folder."""
     return path / f"{name}.json5" if path is not None and path.is_dir() else path
 
 
 def exposure(endpoint: str, *, listens: bool) -> str | None:
-    """A warning about an endpoint that others can reach or forge; None for the loopback interface, TLS and QUIC."""
+    """A warning if others can reach or forge messages on an endpoint; None for the loopback interface, TLS and QUIC."""
     protocol, _, address = endpoint.partition("/")
     host = address.partition("#")[0].partition("?")[0].rpartition(":")[0].strip("[]")
     if protocol in ("tls", "quic", "unixsock-stream", "unixpipe") or host == "localhost":
@@ -81,7 +83,7 @@ def _config(
         # Some seconds after it was opened each session would map and zero 16 MB of shared memory, all at the same time:
         # 45 sessions stall two cores for half a second in the middle of a run. Frames are too small to gain from it.
         "transport/shared_memory/enabled": False,
-        # One wake-up of the medium makes one put per UAV, all at once: there is room for that, and time to write it.
+        # One wake-up of the medium makes one put for each UAV, all at once: there must be room and time for them.
         "transport/link/rx/max_message_size": MAX_PUT_BYTES,
         "transport/link/tx/queue/size/data": 16,
         "transport/link/tx/queue/congestion_control/drop/wait_before_drop": 5000,
@@ -174,11 +176,11 @@ class Bus:
         publisher.put(payload)
 
     def announce(self, topic: str) -> None:
-        """Declare a liveliness token, which others see until this session ends in whatever way."""
+        """Declare a liveliness token, which others see until this session ends for whatever reason."""
         self._tokens.append(self._session.liveliness().declare_token(topic))
 
     def watch(self, expression: str, on_change: Callable[[str, bool], None]) -> None:
-        """Report liveliness tokens, also those that exist already: (topic, alive)."""
+        """Report liveliness tokens that appear and go, and those that exist already: (topic, alive)."""
         self._session.liveliness().declare_subscriber(
             expression,
             lambda sample: on_change(str(sample.key_expr), sample.kind == zenoh.SampleKind.PUT),
@@ -186,7 +188,7 @@ class Bus:
         )
 
     def answer(self, topic: str, reply: Callable[[], bytes | None]) -> None:
-        """Answer queries on a topic with what `reply` returns; with None there is no answer."""
+        """Answer queries on a topic with what `reply` returns; if it returns None, no answer is sent."""
 
         def on_query(query: zenoh.Query) -> None:
             payload = reply()
@@ -210,7 +212,7 @@ class Bus:
         return not self._session.is_closed() and bool(self._session.info.routers_zid())
 
     def check(self) -> None:
-        """Raise BusError once the router has been away for LOST_AFTER_S; a client calls this now and then."""
+        """Raise BusError if the router has been away for LOST_AFTER_S; a client calls this regularly."""
         if self.connected():
             self._away_since_s = None
             return

@@ -24,12 +24,13 @@ from fanet_mw.scenario.identity import as_json, fingerprint
 from fanet_mw.units import MS, S
 
 _START_DELAY_NS: Final = 300 * MS
-"""The time from the moment at which all participants are present until swarm instant 0."""
+"""The time from the moment at which all processes are present to swarm instant 0."""
 _ASK_EVERY_S: Final = 0.5
 _ASK_AGAIN_S: Final = 0.05
-"""The least time between two questions to the keeper."""
+"""The least time between two queries to the keeper."""
 START_PATIENCE_S: Final = 3600.0
-"""A service that is started by hand waits so long for the others. A router that goes away is noticed in seconds."""
+"""How long a service that was started by hand waits for the others. It notices within seconds if
+the router goes away."""
 
 
 class SwarmClock:
@@ -56,7 +57,7 @@ class SwarmClock:
 
 
 class ClockKeeper:
-    """Starts the clock when all participants are present, answers those that come later, and stops it."""
+    """Starts the clock when all expected processes are present, answers those that come later, and stops it."""
 
     def __init__(
         self,
@@ -68,7 +69,7 @@ class ClockKeeper:
         scenario: Scenario | None = None,
         timebase: Timebase = THIS_MACHINE,
     ) -> None:
-        """With a `scenario`, participants that run another one do not count as present, and are told which it is."""
+        """With a `scenario`, a process that runs another scenario does not count as present, and is told this one."""
         self._timebase = timebase
         self._bus = bus
         self._names = names
@@ -86,7 +87,7 @@ class ClockKeeper:
             bus.answer(names.scenario, lambda: content)
 
         def on_change(topic: str, alive: bool) -> None:
-            with contextlib.suppress(RuntimeError):  # the loop has been closed, so nothing waits for this any more
+            with contextlib.suppress(RuntimeError):  # the loop may have been closed, and nobody waits any more
                 loop.call_soon_threadsafe(self._seen, topic, alive)
 
         bus.watch(names.all_alive, on_change)
@@ -102,11 +103,11 @@ class ClockKeeper:
             self._all_there.clear()
 
     def missing(self) -> list[str]:
-        """The participants that are not present yet."""
+        """The processes that are not present yet."""
         return self.presence.missing()
 
     async def start(self, *, timeout_s: float) -> ClockEpoch:
-        """Wait for all participants, then start; raises BusError naming those that did not come."""
+        """Wait for all processes, then start the clock; raises BusError with the names of those that did not come."""
         try:
             await asyncio.wait_for(self._all_there.wait(), timeout_s)
         except TimeoutError:
@@ -129,11 +130,11 @@ class ClockKeeper:
 
 
 class ClockListener:
-    """Follows the swarm clock, on the loop's thread.
+    """Follows the swarm clock, on the thread of the event loop.
 
-    Any process may put something on the clock's topic, so a put is a hint to ask the keeper, and only an answer counts:
-    a put that says the clock has stopped stops nothing. A forger that also answers in the keeper's place does; an
-    access list prevents that.
+    Any process on the bus can put something on the clock's topic. A put is therefore only a hint to ask the keeper, and
+    only the keeper's answer counts: a forged put cannot stop the run. An attacker that also answers queries in the
+    keeper's place can; an access list prevents that.
     """
 
     def __init__(self, bus: HostBus, names: Topics, timebase: Timebase = THIS_MACHINE) -> None:
@@ -158,7 +159,7 @@ class ClockListener:
             self._loop.call_soon_threadsafe(self._on_answer, payload)
 
     def _ask(self) -> None:
-        """Ask the keeper, at once or when the last question is old enough, so that many hints make one question."""
+        """Query the keeper, at once or when the last query is old enough, so that many hints lead to one query."""
         wait_s = self._asked_s + _ASK_AGAIN_S - self._loop.time()
         if wait_s <= 0:
             self._asked_s = self._loop.time()
@@ -184,7 +185,7 @@ class ClockListener:
                     self._running.set_result(message)
 
     async def running(self, *, timeout_s: float) -> SwarmClock:
-        """The clock once it has started; raises BusError when it is not started in time or the router is gone."""
+        """The clock, once it has started; raises BusError if it does not start in time, or if the router goes away."""
         waited_s = 0.0
         while waited_s < timeout_s:
             self._ask_now()

@@ -1,4 +1,4 @@
-"""What a real-time host tells in the reports of its actor: how late it was, and what it cost."""
+"""The figures of a real-time host in the report of its actor: how late it was, and what it cost."""
 
 import resource
 from pathlib import Path
@@ -15,40 +15,40 @@ class HostFigures:
         self.puts = 0
         """The number of puts on the bus."""
         self.unread = 0
-        """The number of receptions that came after the end."""
+        """The number of receptions that arrived after the end of the run."""
         self._lateness = Histogram()
         self._asked_past_ns = 0
         self._stall_ns = 0
 
     def asked(self, wake_ns: int, *, call_ns: int) -> None:
-        """The actor has asked for a wake-up, at a call that it was given this instant for."""
+        """The actor has asked for a wake-up at `wake_ns`, during a call for the instant `call_ns`."""
         self._asked_past_ns = max(self._asked_past_ns, call_ns - wake_ns)
 
     def woken(self, late_ns: int) -> None:
-        """The actor has been woken so long after it was due."""
+        """The actor was woken this long after it was due."""
         self._lateness.add(late_ns)
         self.stalled(late_ns)
 
     def stalled(self, for_ns: int) -> None:
-        """The loop did nothing for so long although it should have."""
+        """The event loop did nothing for this long although it should have."""
         self._stall_ns = max(self._stall_ns, for_ns)
 
     def summary(self, *, final: bool) -> dict[str, Any]:
-        """The figures by the names that a report gives them."""
+        """The figures, by their names in a report."""
         usage = resource.getrusage(resource.RUSAGE_SELF)
         return {
             "wake_lateness_ms": self._lateness.summary(),
             "asked_past_ms": round(self._asked_past_ns / MS, 3),
             "stall_ms": round(self._stall_ns / MS, 3),
             "cpu_s": round(usage.ru_utime + usage.ru_stime, 3),
-            "uss_mb": uss_mb() if final else None,  # reading it holds up the process for more than a millisecond
+            "uss_mb": uss_mb() if final else None,  # reading it delays the process by more than a millisecond
             "unread_receptions": self.unread,
             "puts": self.puts,
         }
 
 
 def uss_mb() -> float | None:
-    """The memory that this process shares with no other [MB]; None where /proc does not tell."""
+    """The memory that only this process uses [MB]; None if /proc does not tell."""
     try:
         text = Path("/proc/self/smaps_rollup").read_text(encoding="ascii")
     except OSError:

@@ -1,16 +1,16 @@
-"""Samples from the bus that wait for an actor: bounded, decoded in portions, and every put counted exactly once.
+"""The inbox of an actor: a bounded queue of puts from the bus, decoded in portions; each put is counted exactly once.
 
     samples = taken + malformed + oversized + overflowed + waiting
 
-A put carries any number of messages, so the queue is bounded by puts and by bytes, and a portion by messages and by
-bytes: a put of many messages is handed over in several portions. A put that finds its topic's quota or the whole inbox
-exhausted is dropped: the puts that wait are older and come first, and the next request of a node shows the gap. A quota
-is a quarter of the inbox, so that a sender that floods one topic does not silence the others. The bound is what an
-actor takes in within some tens of milliseconds: what waited longer would be too late for the air. If a put turns out
-malformed in the middle, the messages in front of that place have been handed over.
+A put may carry any number of messages. The queue is therefore bounded by puts and by bytes, and a portion by messages
+and by bytes, so a put with many messages is handed over in several portions. A put is dropped if the inbox, or the
+quota of its topic, is full: the waiting puts are older and come first, and a node's next request shows the gap. A quota
+is a quarter of the inbox, so that a sender that floods one topic cannot shut out the others. The inbox holds about what
+an actor can handle in some tens of milliseconds, because what waits longer would be too late for the air. If a put
+turns out to be malformed in the middle, the messages before that place have been handed over already.
 
-`offer` may be called on another thread than `deliver`: the two ends of a deque are safe, and each counter is written by
-one thread only. Not modeled: priorities among topics.
+`offer` and `deliver` may run on different threads: the two ends of a deque are safe, and each counter is written by
+only one thread. There are no priorities among topics.
 """
 
 from collections import deque
@@ -23,23 +23,25 @@ from fanet_mw.bus.messages import Message, Report, TraceBatch
 from fanet_mw.errors import MalformedFrameError
 
 BOUND: Final = 4096
-"""The number of puts that may wait."""
+"""The greatest number of waiting puts."""
 BOUND_BYTES: Final = 16 << 20
-"""The number of bytes that may wait."""
+"""The greatest number of waiting bytes."""
 MOST_PUT_BYTES: Final = BOUND_BYTES // 4
-"""The greatest length of a put: twice what a world of 1,000 nodes publishes about its lines of sight."""
+"""The greatest length of a put: twice that of the lines of sight that a world of 1,000 nodes publishes."""
 PORTION: Final = 256
-"""The messages of one portion, after which others may run: a flood of input must not keep an actor from its timers."""
+"""The number of messages in one portion, after which timers may run, so that a flood of input cannot hold them up."""
 PORTION_BYTES: Final = 1 << 18
-"""The bytes of one portion, not counting its last message."""
+"""The number of bytes in one portion, without its last message."""
 _MAX_TOPICS: Final = 8192
-"""The number of topics that have a quota of their own; all further topics share one."""
+"""The number of topics with a quota of their own; all further topics share one."""
 _FOR_COLLECTORS: Final = codecs.codes_of(TraceBatch, Report, LinkStats)
-"""The codes of messages that no actor receives: to decode their text would take an actor's time."""
+"""The codes of messages that no actor receives; an actor should not spend time on decoding their text."""
 
 
 class _Usage:
-    """What a topic uses of an inbox: taken in (written by one thread), and gone (written by the other)."""
+    """The use that a topic makes of the inbox: bytes accepted, written by one thread, and bytes gone, written by the
+    other.
+    """
 
     __slots__ = ("bytes_gone", "bytes_in", "puts_gone", "puts_in")
 
@@ -48,7 +50,7 @@ class _Usage:
 
 
 class _Put(NamedTuple):
-    """A put of which some messages are still to be handed over."""
+    """A put of which some messages have yet to be handed over."""
 
     topic: str
     payload: bytes
@@ -57,7 +59,7 @@ class _Put(NamedTuple):
 
 
 class Inbox:
-    """The bounded queue of (topic, bytes) of one actor."""
+    """The bounded queue of (topic, bytes) for one actor."""
 
     def __init__(self, *, bound: int = BOUND) -> None:
         self._waiting: deque[tuple[str, bytes, _Usage]] = deque()
@@ -101,21 +103,23 @@ class Inbox:
         return usage
 
     def deliver(self, receive: Callable[[str, Message], object], *, most: int = PORTION) -> bool:
-        """Hand at most `most` messages to `receive`, in order; returns True if more may be waiting."""
+        """Pass at most `most` messages to `receive`, in order; returns True if more may be waiting."""
         left_bytes = PORTION_BYTES
         while most > 0 and left_bytes > 0:
             if self._open is None:
                 if not self._waiting:
                     return False
                 self._open = self._opened(*self._waiting.popleft())
-            most -= 1  # a put without messages counts as one message, so that a portion ends whatever comes meanwhile
+            most -= 1  # a put without messages counts as one, so that a portion always ends
             put = self._open
             if put is not None:
                 left_bytes -= self._hand_over_one(put, receive)
         return self._open is not None or bool(self._waiting)
 
     def _hand_over_one(self, put: _Put, receive: Callable[[str, Message], object]) -> int:
-        """Hand over the next message of the open put, which is closed after its last; returns the message's bytes."""
+        """Pass on the next message of the open put, and close the put after its last one; returns
+        the message's bytes.
+        """
         item = put.items.popleft() if put.items else None
         if item is None:
             self._close(put)
@@ -131,7 +135,7 @@ class Inbox:
         return item.end - item.start
 
     def _opened(self, topic: str, payload: bytes, usage: _Usage) -> _Put | None:
-        """The put with its messages located but not decoded; None when it is malformed or not meant for an actor."""
+        """Open a put: its messages are located but not decoded. None if it is malformed, or not meant for an actor."""
         put = _Put(topic, payload, usage, deque())
         try:
             put.items.extend(codecs.items(payload))
@@ -144,7 +148,7 @@ class Inbox:
         return put
 
     def _close(self, put: _Put, *, malformed: bool = False) -> None:
-        """Count a put that has been dealt with, and free its room."""
+        """Count a put that is finished, and free its room."""
         self._open = None
         if malformed:
             self.malformed += 1

@@ -1,11 +1,12 @@
-"""SIGINT and SIGTERM, as the commands of this project handle them, and how a command leaves.
+"""How the commands of this project react to SIGINT and SIGTERM, and how a command exits.
 
 Python handles SIGINT only if it was not ignored when the process started, and a shell script starts `command &` with
-SIGINT ignored. Each entry point therefore calls `install`: from then on both signals raise KeyboardInterrupt with the
-signal's number; `hosts.loop.run` cancels its coroutine instead, so that nothing is interrupted half-way.
+SIGINT ignored. Each entry point therefore calls `install`, after which both signals raise KeyboardInterrupt with the
+signal's number. While `hosts.loop.run` runs, they cancel its coroutine instead, so that nothing is interrupted
+half-way.
 
-A signal that comes during an import may be lost: a library that tries an import, and carries on whatever happens, takes
-the KeyboardInterrupt for a failure of that import. What starts after the imports therefore calls `raise_again`.
+A KeyboardInterrupt during an import can get lost: some libraries try an import, and go on whatever exception it raises.
+The code that runs after the imports therefore calls `raise_again`.
 """
 
 import gc
@@ -26,20 +27,20 @@ def _raise(number: int, _frame: FrameType | None) -> NoReturn:
 
 
 def install() -> None:
-    """Handle both signals from here on, even if the process was started with them ignored."""
+    """Handle both signals from now on, even if the process was started with them ignored."""
     _raised.clear()
     for number in SIGNALS:
         signal.signal(number, _raise)
 
 
 def raise_again() -> None:
-    """Raise KeyboardInterrupt if one was raised since `install`: code that calls this has not heard of it."""
+    """Raise KeyboardInterrupt if one was raised since `install` and got lost."""
     if _raised:
         raise KeyboardInterrupt(_raised[0])
 
 
 def installed() -> bool:
-    """True if `install` is in force; it is not in a child of `fanet launch`, which leaves signals to the launcher."""
+    """True if `install` was called; it is not in children of `fanet launch`, whose launcher handles the signals."""
     return all(signal.getsignal(number) is _raise for number in SIGNALS)
 
 
@@ -66,7 +67,7 @@ def handed_to(on_signal: Callable[[int], None]) -> Iterator[None]:
 
 
 def exit_code(interrupt: KeyboardInterrupt) -> int:
-    """The exit code that a shell shows for a process ended by this signal."""
+    """The exit code that a shell shows for a process that was ended by this signal."""
     number: int = interrupt.args[0] if interrupt.args else signal.SIGINT
     return 128 + number
 

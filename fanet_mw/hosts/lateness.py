@@ -1,4 +1,4 @@
-"""How late wake-ups were, in logarithmic bins: constant memory, and percentiles with an error of up to a tenth."""
+"""A histogram of lateness with logarithmic bins: constant memory, and percentiles with an error of at most a tenth."""
 
 import math
 from typing import Final
@@ -24,7 +24,7 @@ class Histogram:
         self._bins[index] = self._bins.get(index, 0) + 1
 
     def percentile_ns(self, share: float) -> int:
-        """The upper edge of the bin in which this share of all durations is reached; 0 when there are none."""
+        """The upper edge of the bin at which this share of all durations is reached; 0 if there are none."""
         wanted, seen = share * self.count, 0
         for index in sorted(self._bins):
             seen += self._bins[index]

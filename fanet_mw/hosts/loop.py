@@ -1,7 +1,8 @@
-"""An event loop with timers that are good to some tens of microseconds, and an orderly end on a signal.
+"""An event loop whose timers are accurate to some tens of microseconds, and which ends in good order on a signal.
 
-asyncio's usual loop sleeps in epoll, which counts whole milliseconds and rounds up: every wake-up is half a millisecond
-late on average. select() counts microseconds; it looks at every descriptor, which costs nothing for the few there are.
+asyncio's usual loop sleeps in epoll, which counts whole milliseconds and rounds up, so each wake-up is half a
+millisecond late on average. select() counts microseconds. It examines all descriptors, which costs little because there
+are few.
 """
 
 import asyncio

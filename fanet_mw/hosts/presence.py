@@ -1,7 +1,7 @@
-"""The processes of a swarm that are present, by liveliness tokens, and what is wrong with them.
+"""The processes of a swarm that are present, as their liveliness tokens show, and which are missing or wrong.
 
-fanet/<swarm>/alive/<name>/<fingerprint>/<instance>    a process of fanet-mw: which scenario, and which of several
-fanet/<swarm>/alive/<name>                             a process of another program, taken at its word
+fanet/<swarm>/alive/<name>/<fingerprint>/<instance>    a process of this project, its scenario, and its instance
+fanet/<swarm>/alive/<name>                             a process of another program, whose scenario is not checked
 """
 
 from collections.abc import Iterable
@@ -12,23 +12,23 @@ _NAMED = 5
 
 
 def few(names: Iterable[str]) -> str:
-    """The first five of the names, and how many more there are."""
+    """The first five of the names, and the number of the others."""
     found = list(names)
     return ", ".join(found[:_NAMED]) + (f" and {len(found) - _NAMED} more" if len(found) > _NAMED else "")
 
 
 class Presence:
-    """The processes that are expected and those that are present; without a fingerprint any scenario is right."""
+    """The expected and the present processes. Without a fingerprint, any scenario is accepted."""
 
     def __init__(self, names: Topics, expected: Iterable[str], *, fingerprint: str | None = None) -> None:
         self._prefix = names.alive("")
         self._fingerprint = fingerprint
         self._expected = tuple(expected)
         self._tokens: dict[str, set[str]] = {}
-        """The rest of each token, by the name of the process."""
+        """The rest of each token, by the name of its process."""
 
     def on_token(self, topic: str, *, alive: bool) -> None:
-        """Take in that a token has appeared or gone."""
+        """A token has appeared (`alive`) or gone."""
         name, _, rest = topic.removeprefix(self._prefix).partition("/")
         tokens = self._tokens.setdefault(name, set())
         if alive:
@@ -37,7 +37,7 @@ class Presence:
             tokens.discard(rest)
 
     def missing(self) -> list[str]:
-        """The processes that are expected and not present with this scenario."""
+        """The expected processes that are not present with this scenario."""
         return sorted(name for name in self._expected if not self._right(name))
 
     def twice(self) -> list[str]:
@@ -49,7 +49,7 @@ class Presence:
         return sorted(name for name, tokens in self._tokens.items() if len(self._right(name)) < len(tokens))
 
     def unexpected(self) -> list[str]:
-        """The processes for which this scenario has no place."""
+        """The processes that this scenario does not have."""
         return sorted(name for name, tokens in self._tokens.items() if tokens and name not in self._expected)
 
     def complete(self) -> bool:
@@ -57,7 +57,7 @@ class Presence:
         return not self.missing() and not self.twice()
 
     def sentence(self) -> str:
-        """A sentence for people on what is wrong; empty when nothing is."""
+        """A sentence on what is wrong; empty if nothing is."""
         parts = {
             "missing": self.missing(),
             "there twice": self.twice(),
@@ -67,7 +67,7 @@ class Presence:
         return "; ".join(f"{what}: {few(names)}" for what, names in parts.items() if names)
 
     def _right(self, name: str) -> set[str]:
-        """The tokens of a name that state this scenario, or state none."""
+        """The tokens of a process that state this scenario, or no scenario."""
         tokens = self._tokens.get(name, set())
         if self._fingerprint is None:
             return tokens

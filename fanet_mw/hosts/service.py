@@ -36,7 +36,7 @@ def parser(program: str, description: str) -> argparse.ArgumentParser:
 
 
 def serve(given: argparse.Namespace, run: Callable[[Scenario, SwarmAddress], int]) -> int:
-    """Load the scenario and `run(scenario, address)`; a foreseen error becomes one message and an exit code."""
+    """Load the scenario and call `run(scenario, address)`; expected errors become one message and an exit code."""
     interrupts.install()
     try:
         scenario = config.load(given.scenario, given.set)

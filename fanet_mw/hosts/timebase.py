@@ -1,8 +1,8 @@
-"""The two clocks of a machine, and an identity of the machine, for everything that tells real time.
+"""The clocks of a machine, and an identity of the machine, for everything that measures real time.
 
 Unix time can be stepped by an operator or by NTP. The monotonic clock cannot, and all processes of one machine read the
-same one until the machine is booted again. What must survive a step is therefore stated in monotonic time to processes
-of the same machine, and in unix time only to others.
+same one until the machine is booted again. Instants that must survive a step are therefore told in monotonic time to
+processes of the same machine, and in unix time only to others.
 """
 
 import hashlib
@@ -14,16 +14,16 @@ from typing import Final, NamedTuple
 
 _BOOT: Final = Path("/proc/sys/kernel/random/boot_id")
 _TIME_NAMESPACE: Final = Path("/proc/self/ns/time")
-"""A container may have a monotonic clock of its own (time_namespaces(7))."""
+"""A container may have a monotonic clock of its own, which this file identifies (time_namespaces(7))."""
 
 
 class Timebase(NamedTuple):
-    """The clocks that a process reads."""
+    """The two clocks that a process reads."""
 
     unix_ns: Callable[[], int]
     mono_ns: Callable[[], int]
     machine: int
-    """A number that is equal for all processes that read the same monotonic clock; 0 when it is not known."""
+    """A number that is the same for all processes that read the same monotonic clock; 0 if it is not known."""
 
 
 def _machine() -> int:

@@ -1,7 +1,9 @@
-"""Virtual time: any number of actors on one `(t_ns, seq)` heap, deterministic, as fast as it goes.
+"""The host for virtual time: all actors share one heap of (t_ns, seq), so a run is deterministic and as fast as
+possible.
 
-A message put at t is received at t, first put first received, before time moves on. Ties between wake-ups are resolved
-in the order in which they were requested. Nothing here depends on a clock, a hash or the order of a set.
+A message that is put at t is received at t, before time moves on, in the order of the puts. Wake-ups at the same
+instant happen in the order in which they were requested. Nothing depends on a clock, on hashes, or on the order of a
+set.
 """
 
 import heapq
@@ -17,14 +19,14 @@ from fanet_mw.units import S
 Listener = Callable[[str, Message], None]
 Receive = Callable[[str, Message, int], bool | None]
 Route = tuple[int, Receive, list[tuple[int, Receive]]]
-"""Index and `receive` of the first receiver of a topic, then those of the others: nearly every topic has only one."""
+"""The index and the `receive` of a topic's first receiver, then those of the others; most topics have only one."""
 _NOBODY: Final = -1
-"""Stands for the index of an actor where the receiver is a listener, which has no wake-ups."""
+"""Takes the place of an actor's index for a receiver that is a listener, and so has no wake-ups."""
 _STALL_LIMIT: Final = 100_000
-"""The number of wake-ups at one instant, of one actor or of several in turn, above which actors count as stuck."""
+"""Actors count as stuck after this number of wake-ups at one instant, of one actor or of several."""
 
 _STALL_SHARE: Final = 1000
-"""The part of this limit that each actor of a large swarm adds, because many may act at the same instant."""
+"""In a large swarm the limit is this number for each actor, because many may act at the same instant."""
 
 
 def matches(expression: str, topic: str) -> bool:
@@ -46,7 +48,7 @@ def _discard(_topic: str, _message: Message, _now_ns: int) -> bool:
 
 
 class VirtualHost:
-    """Runs actors in virtual time. `listeners` receive topics without being actors (taps, recorders)."""
+    """Runs actors in virtual time. `listeners` receive topics without being actors, for example to record them."""
 
     def __init__(
         self,
@@ -64,10 +66,10 @@ class VirtualHost:
         self._armed: list[int | None] = [None] * len(self._actors)
         self._queue: list[tuple[str, Message]] = []
         self._records: list[Record] = []
-        for actor in self._actors:  # all actors append to the same lists, so that nothing has to be collected
+        for actor in self._actors:  # all of them append to the same lists, so the host need not collect anything
             actor.outbox, actor.records = self._queue, self._records
         self._receivers: dict[str, list[tuple[int, str, int, Receive]]] = {}
-        """(order, key expression, index, receive), by the beginning of the expression up to its first `*`."""
+        """(order, key expression, index, receive), by the beginning of the key expression up to its first `*`."""
         for index, actor in enumerate(self._actors):
             for expression in actor.subscriptions:
                 self._subscribe(expression, index, index, actor.receive)
@@ -75,7 +77,8 @@ class VirtualHost:
             self._subscribe(expression, order, _NOBODY, _without_time(listener))
         self._routes: dict[str, Route] = {}
         self._latest: tuple[int, int, int] | None = None
-        """The wake-up that was planned last; it is not in the heap, because most often it is also the next."""
+        """The wake-up that was requested last. It is kept out of the heap, because it is often the
+        next one to happen."""
         self._stalled = 0
         """The number of wake-ups since time last advanced."""
 
@@ -88,7 +91,7 @@ class VirtualHost:
         self._hand_over()
 
     def run(self, until_ns: int) -> None:
-        """Run every event up to and including `until_ns`; may be called again with a later instant."""
+        """Process all events up to and including `until_ns`; may be called again with a later instant."""
         heap, armed, wakes, flush = self._heap, self._armed, [actor.wake for actor in self._actors], self._flush
         now_ns = self.now_ns
         while self._latest or heap:
@@ -112,24 +115,24 @@ class VirtualHost:
         self._hand_over()
 
     def put(self, topic: str, message: Message) -> None:
-        """Publish a message from outside now; between two calls of `run`."""
+        """Publish a message from outside, between two calls of `run`."""
         self._queue.append((topic, message))
         self._flush({})
 
     def nudge(self, actor: Actor) -> None:
-        """Let an actor look now at what was given to it from outside; between two calls of `run`."""
+        """Let an actor act now on something it was given from outside, between two calls of `run`."""
         actor.nudge(self.now_ns)
         self._flush({self._actors.index(actor): None})
 
     def stop(self) -> None:
-        """Stop every actor, in order, and hand over its last records."""
+        """Stop all actors, in order, and take their last records."""
         for actor in self._actors:
             actor.stop(self.now_ns)
         self._flush({})
         self._hand_over()
 
     def _watch(self, index: int) -> None:
-        """Count wake-ups that do not advance time: some are allowed, an endless series is a bug of the actors."""
+        """Count wake-ups that do not advance time: a few are normal, an endless series is a bug in an actor."""
         self._stalled += 1
         if self._stalled > max(_STALL_LIMIT, _STALL_SHARE * len(self._actors)):
             raise LocalProtocolError(
@@ -138,15 +141,15 @@ class VirtualHost:
             )
 
     def _flush(self, awake: dict[int, None]) -> None:
-        """Deliver all messages of this instant, in order; then plan the wake-ups of `awake` and of their receivers."""
+        """Deliver all messages of this instant, in order; then plan the wake-ups of `awake` and of all receivers."""
         queue, routes, now_ns = self._queue, self._routes, self.now_ns
-        for topic, message in queue:  # the queue grows meanwhile
+        for topic, message in queue:  # deliveries may append further messages to the queue
             try:
                 index, receive, others = routes[topic]
             except KeyError:
                 index, receive, others = routes[topic] = self._resolve(topic)
             if not receive(topic, message, now_ns):
-                awake[index] = None  # keys of a dict: in order, and each once
+                awake[index] = None  # the keys of a dict keep their order, and each occurs once
             for index, receive in others:
                 if not receive(topic, message, now_ns):
                     awake[index] = None
@@ -170,19 +173,19 @@ class VirtualHost:
                 self._latest = wake_ns, self._seq, index
 
     def _hand_over(self) -> None:
-        """Hand over the records, once per call of the host, because each record states its own instant."""
+        """Pass on the trace records, once per call from outside; each record states its own instant."""
         if self._on_records is not None:
             self._on_records(self._records)
         self._records.clear()
 
     def _subscribe(self, expression: str, order: int, index: int, receive: Receive) -> None:
-        """Register a receiver; actors receive a topic in their order, then listeners in theirs."""
+        """Register a receiver. A topic is received by actors in their order, then by listeners in theirs."""
         beginning, star, _ = expression.partition("*")
         self._receivers.setdefault(beginning if star else expression, []).append((order, expression, index, receive))
 
     def _resolve(self, topic: str) -> Route:
-        """The receivers of a topic; the cost does not depend on the number of actors that do not receive it."""
-        found: dict[int, tuple[int, Receive]] = {}  # each receiver once, even if several of its expressions match
+        """The receivers of a topic; the cost does not depend on how many actors do not receive it."""
+        found: dict[int, tuple[int, Receive]] = {}  # each receiver once, even if several of its key expressions match
         chunks = topic.split("/")
         for beginning in (topic, *("/".join(chunks[:n]) + "/" for n in range(1, len(chunks))), ""):
             for order, expression, index, receive in self._receivers.get(beginning, ()):

@@ -1,7 +1,8 @@
-"""Analysis before take-off: is a scenario feasible, what delay is promised to each traffic class, and what would help?
+"""Analysis before take-off: whether a scenario is feasible, which delays its traffic classes get, and what would help.
 
-`plan` judges a scenario with the given positions and returns a `Plan`. `cheapest_change` finds what would make the
-scenario feasible, `optimum` what would meet a deadline with the least airtime; `describe` turns results into text.
+`plan` judges a scenario with given positions and returns a `Plan`. `cheapest_change` finds a change that makes a
+scenario feasible, `optimum` the configuration that meets a deadline with the least airtime. `describe` turns results
+into text.
 """
 
 from fanet_mw.planner.demand import ClassPlan, TrafficClass, demands

@@ -1,10 +1,11 @@
-"""The way from a member to its head, hop by hop over contended air: a bound, if the traffic is light enough for one.
+"""The delay bound of a member's packets on their way to the head, hop by hop in contention; none if there is too much
+traffic.
 
-Every node within two hops of a station can freeze its backoff, by its frames or by the acknowledgements to them:
-unicasts of its own and forwarded packets with all attempts, relays of floods, hellos. Their periods limit how many
-there are in a time w; the bound is the least w that holds them all, each at its cost by `bounds.mac`. Flows that
-wait gain jitter, so the bound of each hop enters that of the next; if it grows beyond the flooding period, there is no
-bound.
+The backoff of a station is frozen by every transmission within two hops of it, and by the acknowledgements to it:
+unicasts, own and forwarded, with all attempts, relays of floods, and hellos. Their periods limit how many of them fall
+into a time w. The bound of a hop is the least w that holds them all, each at its cost by `bounds.mac`. A packet that
+waits is delayed by a varying time, so the bound of each hop enters that of the next as jitter. If the bound exceeds the
+flooding period, there is none.
 """
 
 from collections.abc import Mapping, Sequence
@@ -18,21 +19,23 @@ from fanet_mw.scenario import Scenario
 from fanet_mw.units import NodeId, seconds_to_ns
 
 _HELLO_BYTES: Final = 700
-"""The longest hello: one with digests of 45 origins (docs/explanation/protocol.md, Repair)."""
+"""The length of the longest hello, one with digests of 45 origins (docs/explanation/protocol.md, Repair)."""
 _ROUNDS: Final = 200
 
 
 class Ways(NamedTuple):
-    """The ways to the heads: `hops` of each node to its head; `through[n]`, the packets per class that n sends on."""
+    """The routes to the heads: `hops` of each node to its head; `through[n]`, the packets per class that node n sends
+    on.
+    """
 
     hops: Mapping[NodeId, int]
     through: Mapping[NodeId, tuple[int, ...]]
     homeless: tuple[NodeId, ...]
-    """The nodes from which no head can be reached."""
+    """The nodes that cannot reach any head."""
 
 
 def ways(adjacency: Adjacency, head_of: Mapping[NodeId, NodeId], classes: Sequence[TrafficClass]) -> Ways:
-    """Shortest ways to each node's head; a node that has none, or cannot reach it, takes the nearest head."""
+    """Shortest routes to each node's head; a node that has none, or cannot reach it, takes the nearest head."""
     parents = {head: _tree(adjacency, (head,)) for head in sorted(set(head_of.values()))}
     nearest = _tree(adjacency, tuple(parents))
     hops: dict[NodeId, int] = {}
@@ -54,7 +57,7 @@ def ways(adjacency: Adjacency, head_of: Mapping[NodeId, NodeId], classes: Sequen
 
 
 def _tree(adjacency: Adjacency, roots: Sequence[NodeId]) -> dict[NodeId, NodeId]:
-    """The next hop of each node towards the nearest root, breadth first by id; the next hop of a root is itself."""
+    """The next hop of each node towards the nearest root, breadth first by id; a root is its own next hop."""
     parent = {root: root for root in sorted(roots)}
     frontier = list(parent)
     while frontier:
@@ -71,7 +74,9 @@ def _tree(adjacency: Adjacency, roots: Sequence[NodeId]) -> dict[NodeId, NodeId]
 def access_outcome(
     scenario: Scenario, adjacency: Adjacency, found: Ways, classes: Sequence[TrafficClass], *, spacing_ns: int | None
 ) -> DelayBound:
-    """The longest time from any member to its head over all hops; `spacing_ns` is the least between floods, if any."""
+    """The longest time from any member to its head over all hops. `spacing_ns` is the least time between floods, if
+    any.
+    """
     if not classes or not any(found.hops.values()):
         return Bounded(0)
     most_hops = max(found.hops.values())
@@ -88,10 +93,10 @@ def access_outcome(
 
 
 def _neighborhoods(adjacency: Adjacency, found: Ways) -> list[tuple[tuple[int, ...], tuple[int, ...]]]:
-    """What each sender contends with, without repetitions.
+    """The traffic with which each sender contends, without repetitions.
 
-    Each entry is (packets per class of all other nodes within two hops, then the number of these nodes; its own packets
-    per class).
+    Each entry is a pair. The first part has the packets per class of all other nodes within two hops, and then the
+    number of these nodes. The second part has the sender's own packets per class.
     """
     rivals = two_hop(adjacency)
     kinds: dict[tuple[tuple[int, ...], tuple[int, ...]], None] = {}
@@ -111,7 +116,9 @@ def _hop_ns(
     hops: int,
     spacing_ns: int | None,
 ) -> int | None:
-    """The least w that holds all that can be sent before a packet of this node ends; None without a fixed point."""
+    """The least w that holds all transmissions that may come before the end of a packet of this node; None if there is
+    none.
+    """
     radio, dcf = scenario.radio, Dcf.of(scenario.radio)
     *packets, stations = near
     hello_every_ns = max(1, seconds_to_ns(scenario.routing.hello_interval_s) or scenario.duration_ns)

@@ -1,15 +1,15 @@
-"""Claimed slots, judged before take-off: which turns each node will have, and whether its load fits them.
+"""Plans a swarm with claimed slots before take-off: which turns each node will have, and whether its load fits them.
 
-    positions -> adjacency -> the protocol's own claims, run without losses -> slots, superframes, turns by lot
-              -> the protocol's own rule of relays                           -> the load of each node
+    positions -> adjacency -> the protocol's own claims, run without losses -> slots, superframes, turns won by lot
+              -> the protocol's own rule of relaying                        -> the load of each node
 
-A relay sends its own packets and those of all others, any other node only its own; every second hello takes a turn too.
-Of the turns that no node within two hops claims, one that draws lots wins the share of its lots among all lots drawn
-within two hops, on average. The plan is feasible if each node's load fits the turns that it claims and wins. This is a
-statement about rates: nothing bounds a delay end to end when packets queue. A packet that meets no queue takes at most
-hops x hop_ns.
+A relay transmits its own packets and those of all others, any other node only its own; every second hello takes a turn,
+too. A turn that no node within two hops claims goes, on average, to each node that draws lots in proportion to its
+lots. The plan is feasible if the load of each node fits the turns that it claims and wins. This is a statement about
+rates: the end-to-end delay of packets that queue has no bound. A packet that meets no queue takes at most hops x
+hop_ns.
 
-The claims made in flight depend on the instants at which nodes start; their lengths and numbers hardly do.
+The claims that nodes make in flight depend on when they start, but the lengths and numbers of claims hardly do.
 """
 
 from collections.abc import Mapping, Sequence
@@ -29,25 +29,26 @@ from fanet_mw.units import NodeId, S, seconds_to_ns
 from fanet_mw.wire.claims import MOST_LOTS
 
 _ROUNDS: Final = 60
-"""Hello intervals in which claims converge; the law needs 2 d + 6, where d is the longest chain of rivals."""
+"""The number of hello intervals in which claims converge; 2 d + 6 are needed, with d the length of the longest chain of
+rivals."""
 _HELLOS_IN_TURNS: Final = 0.5
 _NARROW: Final = 0.001
 
 
 class NodeTurns(NamedTuple):
-    """One node's part of a period; the turns that it wins by lot are an expectation."""
+    """The turns of one node in a period; those that it wins by lot are an expectation."""
 
     node: NodeId
     relays: bool
     slot: int | None
-    """The slot that it claims; None when no slot is free for it."""
+    """The slot that the node claims; None if no slot is free for it."""
     superframe: int
     claimed: int
     won: float
     load: float
-    """The number of turns that its packets and hellos need."""
+    """The number of turns that the node's packets and hellos need."""
     hop_ns: int | None
-    """The longest time that a packet takes over this node when no other packet waits there."""
+    """The longest time that a packet waits at this node if no other packet does."""
 
     @property
     def utilization(self) -> float:
@@ -56,24 +57,24 @@ class NodeTurns(NamedTuple):
 
 
 class ClaimedPlan(NamedTuple):
-    """The plan of a swarm in claimed slots."""
+    """The plan of a swarm with claimed slots."""
 
     turns: Turns
     nodes: tuple[NodeTurns, ...]
     hops: int
-    """The number of hops of the longest flood, over relays only."""
+    """The number of hops of the longest flood over relays."""
     least_interval_ns: int | None = None
-    """The interval of the application's traffic at which the fullest node is full."""
+    """The interval of the application's traffic at which the busiest node has no turn to spare."""
 
     @property
     def hop_ns(self) -> int | None:
-        """The greatest `hop_ns` of all nodes; None when some node has no turn."""
+        """The greatest `hop_ns` of all nodes; None if some node has no turn."""
         own = [node.hop_ns for node in self.nodes]
         return None if None in own else max(hop_ns for hop_ns in own if hop_ns is not None)
 
     @property
     def lone_ns(self) -> int | None:
-        """The time within which a packet that meets no queue on its way has reached every node."""
+        """The time within which a packet that meets no queue reaches all nodes."""
         hop_ns = self.hop_ns
         return None if hop_ns is None else self.hops * hop_ns
 
@@ -83,7 +84,7 @@ class ClaimedPlan(NamedTuple):
 
 
 class Claimants:
-    """What positions alone decide in claimed slots: slots, relays, ways."""
+    """The slots, relays and routes of claimed slots, which follow from positions alone."""
 
     def __init__(self, scenario: Scenario, adjacency: Adjacency) -> None:
         self.turns = geometry(scenario, turn_bytes(scenario))
@@ -101,7 +102,7 @@ class Claimants:
         return sum(1 for turn in range(self.turns.per_frame) if not any(share.has(turn) for share in taken))
 
     def judge(self, scenario: Scenario, classes: Sequence[TrafficClass]) -> ClaimedPlan:
-        """Judge every node under a load."""
+        """Judge all nodes under a load."""
         claimed = {node: _turns(share, self.turns) for node, share in self._shares.items()}
         loads = self._loads(scenario, classes)
         announced, drawn = self._lots(scenario, loads, claimed)
@@ -124,7 +125,9 @@ class Claimants:
         return ClaimedPlan(self.turns, tuple(nodes), self._hops)
 
     def _loads(self, scenario: Scenario, classes: Sequence[TrafficClass]) -> dict[NodeId, float]:
-        """The turns per period that each node's packets need. With aggregation a turn takes as many packets as fit."""
+        """The number of turns per period that each node's packets need. With aggregation several
+        packets share a turn.
+        """
         period_ns = self.turns.period_ns
         most = turn_bytes(scenario)
         each = [
@@ -145,10 +148,10 @@ class Claimants:
     def _lots(
         self, scenario: Scenario, loads: Mapping[NodeId, float], claimed: Mapping[NodeId, Sequence[int]]
     ) -> tuple[dict[NodeId, float], dict[NodeId, int]]:
-        """How many lots each node announces on average, and how many it draws with.
+        """The number of lots that each node states on average, and the number with which it draws.
 
-        A node draws with the least number of its last hellos (`claimed.Load`). The number of packets in a hello
-        interval varies by one, and a node that only sometimes announces lots costs the others turns.
+        A node draws with the least number that it stated in its latest hellos (`claiming.ClaimedLoad`). The number of
+        packets in a hello interval varies by one, and a node that states lots only sometimes costs the others turns.
         """
         periods = seconds_to_ns(scenario.routing.hello_interval_s) / self.turns.period_ns
         announced, drawn = {}, {}
@@ -160,7 +163,7 @@ class Claimants:
         return announced, drawn
 
     def _hop_ns(self, length: int) -> int | None:
-        """The hop time that a node will report, in the worst slot of its superframe; one turn may go to a hello."""
+        """The hop time that a node will report for the worst slot of its superframe; one turn may go to a hello."""
         if length not in self._hops_ns:
             turns, found = self.turns, []
             for slot in range(min(length, turns.per_frame)):
@@ -170,7 +173,7 @@ class Claimants:
         return self._hops_ns[length]
 
     def least_interval_ns(self, scenario: Scenario, classes: Sequence[TrafficClass]) -> int | None:
-        """The shortest interval of the application at which everything fits, to a thousandth; None when none does."""
+        """The shortest interval of the application at which the load fits, to a thousandth; None if none does."""
         if not any(c.name == "application" for c in classes):
             return None
 
@@ -188,7 +191,9 @@ class Claimants:
 
 
 def converged_slots(scenario: Scenario, adjacency: Adjacency, turns: Turns) -> dict[NodeId, Share | None]:
-    """The slots of all nodes after the protocol's claims have converged, with hellos sent in turn and none lost."""
+    """The slots of all nodes after the protocol's claims have converged, if hellos are sent one after another and none
+    is lost.
+    """
     slots = scenario.clusters.slots
     sized = None if slots else longest_superframe(turns)
     claims = {
@@ -215,13 +220,15 @@ def _turns(share: Share | None, turns: Turns) -> tuple[int, ...]:
 
 
 def _lots(packets: float, turns: float) -> int:
-    """The rule of `claimed.Load`, for the packets and the turns of a hello interval when no packets wait."""
+    """The rule of `claiming.ClaimedLoad`, for the packets and the turns of a hello interval when no packets wait."""
     wanted = packets / turns if turns else 0.0
     return 0 if wanted < IDLE else min(MOST_LOTS, ceil(2 * wanted))
 
 
 def _depth(adjacency: Adjacency, root: NodeId, relays: Mapping[NodeId, bool]) -> int:
-    """The number of transmissions in sequence after which a flood over these relays has reached all it can reach."""
+    """The number of successive transmissions after which a flood over these relays has reached all nodes that it can
+    reach.
+    """
     hops = {root: 0}
     frontier = [root]
     while frontier:

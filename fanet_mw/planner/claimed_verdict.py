@@ -1,4 +1,4 @@
-"""The plan of a swarm in claimed slots. Its verdict is on rates; the only delay stated is that without queues."""
+"""The verdict on a swarm with claimed slots. It judges rates; the only delay that it states is that without queues."""
 
 from collections.abc import Iterator, Sequence
 
@@ -46,7 +46,7 @@ def evaluate_claims(site: Site, classes: Sequence[TrafficClass], *, deadline_ns:
 
 
 def _row(node: NodeTurns, claims: ClaimedPlan) -> ClusterPlan:
-    """A node, represented as the head of a cluster of its own."""
+    """A node as an entry of the plan: the head of a cluster of its own."""
     turn_ns = claims.turns.turn_ns
     usable_ns = round((node.claimed + node.won) * turn_ns)
     hop_ns = node.hop_ns or 0

@@ -1,8 +1,7 @@
-"""The contention window of a superframe, and if its hellos fit: nodes whose hellos are lost are taken for dead.
+"""Whether the hellos fit the contention window of a superframe; a node whose hellos are lost would be taken for failed.
 
-Everything except floods of data contends there, and hellos are nearly all of it. Two hellos destroy each other at a
-common neighbor, so the hellos of all nodes within two hops count, each with DIFS and a mean backoff. This is an
-estimate.
+Everything except floods of data contends there, most of it hellos. Two hellos destroy each other at a common neighbor,
+so the hellos of all nodes within two hops are added up, each with DIFS and a mean backoff. This is an estimate.
 """
 
 from collections.abc import Iterator
@@ -14,14 +13,14 @@ from fanet_mw.scenario import Scenario
 from fanet_mw.units import MS, seconds_to_ns
 
 MOST: Final = 0.75
-"""The share of the window that hellos may take. On the 9 x 5 grid, hellos that need all of the window reach 0.58 of the
-nodes that should receive them."""
+"""The greatest share of the window that hellos may need. On the 9 x 5 grid, hellos that need all of the window reach
+only 0.58 of the nodes that should receive them."""
 _HELLO_BYTES: Final = 137
 """The length of a hello: routing header, HEARTBEAT, GLOBAL_POSITION_INT and FANET_BEACON."""
 
 
 def hellos_ns(scenario: Scenario, adjacency: Adjacency) -> int:
-    """The airtime that the hellos of one superframe take where most nodes are within two hops of each other."""
+    """The airtime of the hellos of one superframe, where the most nodes are within two hops of each other."""
     every_ns = seconds_to_ns(scenario.routing.hello_interval_s)
     if not every_ns or not adjacency:
         return 0
@@ -30,7 +29,7 @@ def hellos_ns(scenario: Scenario, adjacency: Adjacency) -> int:
 
 
 def too_short(scenario: Scenario, adjacency: Adjacency) -> Iterator[str]:
-    """A sentence about a window that is too short for the hellos; nothing when it is not."""
+    """A sentence about a window that is too short for the hellos; nothing if it is long enough."""
     needed_ns, window_ns = hellos_ns(scenario, adjacency), round(scenario.clusters.contention_ms * MS)
     if needed_ns > MOST * window_ns:
         yield (

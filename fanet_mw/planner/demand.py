@@ -1,8 +1,8 @@
-"""What the swarm is to send: the traffic classes that follow from a scenario.
+"""The load of a swarm: the traffic classes that follow from a scenario.
 
-Each class is periodic per source. Warnings are counted as one conflict of every UAV at a time, survivor reports as one
-survivor detected by every UAV; a UAV that detects two at once reports twice as often. Saturated sources have no period
-and Poisson arrivals no least interval, so neither can be planned.
+Each class is periodic at each source. Warnings are counted as one conflict per UAV at a time, survivor reports as one
+detected survivor per UAV; a UAV that detects two at once reports twice as often. Saturated sources have no period, and
+Poisson arrivals no least interval, so neither can be planned.
 """
 
 from collections.abc import Sequence
@@ -30,7 +30,7 @@ class TrafficClass(NamedTuple):
 
 
 class ClassPlan(NamedTuple):
-    """The plan of a traffic class: its bound from the source to the last node, and from the head on."""
+    """The plan of a traffic class: its delay bound from the source to the last node, and from the head on."""
 
     name: str
     sources: int
@@ -72,7 +72,9 @@ def _all(scenario: Scenario) -> tuple[NodeId, ...]:
 
 
 def _eligible(scenario: Scenario, traffic: Traffic) -> tuple[NodeId, ...]:
-    """The nodes that may be sources; a number of them is taken as the lowest ids, whichever a seed would draw."""
+    """The nodes that may be sources. If only their number is given, the lowest ids are taken, whichever a seed would
+    draw.
+    """
     if isinstance(traffic.sources, tuple):
         return tuple(NodeId(n) for n in sorted(set(traffic.sources)))
     candidates = tuple(n for n in _all(scenario) if n != traffic.destination)

@@ -1,14 +1,13 @@
-"""One scenario judged: load, delay and backlog of each cluster's slot; for each class a bound from source to last node.
+"""Judges one scenario: the load, delay and backlog of each cluster's slot, and for each traffic class a delay bound.
 
     source --access--> head's queue --slot--> flood --> last node
            uplink_ns          slot_delays        FloodCost.duration
 
-A head's slot holds floods that are one spacing apart; under a timetable each of its turns holds one flood. Packets
-reach the head late by up to `uplink_ns`: its bound if there is one; otherwise one second (or a period) is assumed, and
-a note says so.
+In the slot of a head, floods follow each other at a spacing; in a timetable, each turn holds one flood. Packets reach
+the head late by up to `uplink_ns`. If that has no bound, one second (or a period) is assumed, and a note says so.
 
-A scenario is feasible if each slot is stable, every packet arrives before its lifetime and any deadline end, no queue
-overflows, and a flood reaches every node.
+A scenario is feasible if each slot is stable, each packet arrives before its lifetime and any deadline end, no queue
+overflows, and a flood reaches all nodes.
 """
 
 from collections.abc import Mapping, Sequence
@@ -45,20 +44,20 @@ class Plan(NamedTuple):
     access: DelayBound
     uplink_ns: int
     paper: DelayBound
-    """The estimate of the paper's equations (1)-(4) for the fullest cluster, for comparison only."""
+    """The estimate of the paper's equations (1)-(4) for the cluster with the greatest load, for comparison only."""
     superframe: TimetablePlan | None
-    """The timetable; None where relays are not scheduled."""
+    """The timetable; None if relays are not scheduled."""
     claims: ClaimedPlan | None
-    """The plan of claimed slots, where slots are claimed; then `clusters` holds one entry per node."""
+    """The plan of claimed slots, if slots are claimed; `clusters` then has one entry for each node."""
     cut_off: tuple[NodeId, ...]
-    """The nodes that floods of the leader's part of the swarm do not reach."""
+    """The nodes that floods from the leader's part of the swarm do not reach."""
     goodput: Goodput | None
-    """What no protocol can exceed; None when traffic is not for every node, or the swarm is in parts."""
+    """The goodput that no protocol can exceed; None if traffic is not for all nodes, or if the swarm is separated."""
     deadline_ns: int | None
     problems: tuple[str, ...]
-    """Why the scenario is not feasible; empty when it is."""
+    """The reasons why the scenario is not feasible; empty if it is."""
     notes: tuple[str, ...]
-    """What the bounds assume, or cannot promise."""
+    """The assumptions of the bounds, and what they do not include."""
 
     @property
     def feasible(self) -> bool:
@@ -66,15 +65,16 @@ class Plan(NamedTuple):
 
     @property
     def proven(self) -> bool:
-        """True if the bounds hold; False if some are estimates of what CSMA/CA does."""
+        """True if the bounds hold; False if some are estimates of contention."""
         return isinstance(self.access, Bounded) and all(cluster.flood.proven for cluster in self.clusters)
 
     @property
     def carried_per_second(self) -> float | None:
-        """Application packets per second, all sources together, that this configuration carries; None when unknown.
+        """The application packets per second, of all sources together, that this configuration can carry; None if
+        unknown.
 
-        It is exact for a timetable whose capacity was asked for. Where relays contend it is what would fill the fullest
-        slot, and in claimed slots what fills the fullest node on average.
+        With a timetable whose capacity was computed, it is exact. If relays contend, it is the load that would fill the
+        fullest slot; with claimed slots, the load that fills the busiest node on average.
         """
         application = next((c for c in self.classes if c.name == "application"), None)
         if application is None or not application.sources:
@@ -88,12 +88,12 @@ class Plan(NamedTuple):
 
     @property
     def bottleneck(self) -> ClusterPlan | None:
-        """The cluster whose slot is the fullest."""
+        """The cluster with the fullest slot."""
         return max(self.clusters, key=lambda c: (c.utilization, -c.head), default=None)
 
 
 class Site:
-    """A scenario and the positions of its nodes; what depends on positions alone is computed once for all variants."""
+    """A scenario and the positions of its nodes. What depends on positions alone is computed once for all variants."""
 
     def __init__(self, scenario: Scenario, positions: Mapping[NodeId, Enu], adjacency: Adjacency | None = None) -> None:
         self.scenario = scenario
@@ -103,7 +103,9 @@ class Site:
         self._claimants: dict[object, Claimants] = {}
 
     def of(self, scenario: Scenario) -> "Site":
-        """The same nodes under another scenario; costs of floods are shared when the rules of relaying are equal."""
+        """The same nodes with another scenario; the costs of floods are shared if the rules of
+        relaying are the same.
+        """
         other = Site(scenario, self.positions, self.adjacency)
         if scenario.clusters.relay == self.scenario.clusters.relay and scenario.radio == self.scenario.radio:
             other._floods = self._floods
@@ -111,7 +113,7 @@ class Site:
         return other
 
     def claimants(self) -> Claimants:
-        """The slots and relays of claimed slots, which follow from positions and the geometry of turns."""
+        """The slots and relays of claimed slots, which follow from the positions and the geometry of turns."""
         scenario = self.scenario
         key = geometry(scenario, turn_bytes(scenario)), scenario.clusters.slots, scenario.radio
         if key not in self._claimants:
@@ -137,7 +139,7 @@ class Site:
 
 
 class _Judged(NamedTuple):
-    """The judgement of all heads, under whichever way of relaying."""
+    """The judgement of all heads, for any kind of relaying."""
 
     clusters: tuple[ClusterPlan, ...]
     cut_off: tuple[NodeId, ...]
@@ -146,7 +148,9 @@ class _Judged(NamedTuple):
 
 
 def members_of(scenario: Scenario, positions: Mapping[NodeId, Enu]) -> list[Cluster]:
-    """The clusters that the leader will make. A leader with others is in none, but under a timetable it has turns."""
+    """The clusters that the leader will make. The leader belongs to none if there are other nodes; a timetable gives it
+    turns.
+    """
     others = {node: at for node, at in positions.items() if node != scenario.leader}
     clusters = balanced(others or positions, count=scenario.clusters.count)
     if scenario.clusters.relay == "scheduled" and others and scenario.leader in positions:
@@ -157,11 +161,13 @@ def members_of(scenario: Scenario, positions: Mapping[NodeId, Enu]) -> list[Clus
 def evaluate(
     site: Site, classes: Sequence[TrafficClass], *, deadline_ns: int | None = None, quick: bool = False
 ) -> Plan:
-    """Judge one scenario. With `quick`, no timetable is looked for that carries less than the load or takes seconds."""
+    """Judge one scenario. With `quick`, no timetable is computed that carries less than the load, or that takes
+    seconds.
+    """
     scenario = site.scenario
     fitted = _fitted(site, quick=quick) if site.timetable else None
     clusters = members_of(scenario, site.positions)
-    if isinstance(fitted, Fitted) and fitted.whole:  # each node's own turns include the way to its head
+    if isinstance(fitted, Fitted) and fitted.whole:  # a node with turns of its own does not send its packets to a head
         clusters = [Cluster(node, (node,)) for node in sorted(site.positions)]
     head_of = {member: cluster.head for cluster in clusters for member in cluster.members}
     heads = [cluster.head for cluster in clusters]
@@ -220,7 +226,9 @@ def goodput(site: Site, classes: Sequence[TrafficClass]) -> Goodput | None:
 def _loads(
     heads: Sequence[NodeId], head_of: Mapping[NodeId, NodeId], found: Ways, classes: Sequence[TrafficClass]
 ) -> list[list[int]]:
-    """The number of sources per class at each head. A node without a head is counted at the head with the lowest id."""
+    """The number of sources of each class at each head. A node without a head is counted at the head with the lowest
+    id.
+    """
     homeless = frozenset(found.homeless)
     rows = {head: [0] * len(classes) for head in heads}
     for index, c in enumerate(classes):
@@ -231,7 +239,7 @@ def _loads(
 
 
 def _shares(site: Site, head: NodeId, load: Sequence[int], classes: Sequence[TrafficClass]) -> list[ClassLoad]:
-    """The load of each class at a head. Under a timetable a turn is as long as the longest packet needs."""
+    """The load of each class at a head. In a timetable, the longest packet determines the length of a turn."""
     if site.timetable:
         turn_ns = superframe(site.scenario).turn_ns
         turn = FloodCost(turn_ns, turn_ns, 1, proven=True)
@@ -247,14 +255,16 @@ def _longest(shares: Sequence[ClassLoad]) -> FloodCost:
 
 
 def _assumed_ns(site: Site) -> int:
-    """The way to the head where it has no bound; under a timetable members can contend only once per period."""
+    """The assumed delay to the head if it has no bound; with a timetable members can contend only once per period."""
     return max(_ASSUMED_UPLINK_NS, site.scenario.clusters.period_ns) if site.timetable else _ASSUMED_UPLINK_NS
 
 
 def _access(
     site: Site, found: Ways, classes: Sequence[TrafficClass], shares: Sequence[Sequence[ClassLoad]]
 ) -> DelayBound:
-    """The way to the head. Under a timetable it shares no air with floods, but it has to fit the contention window."""
+    """The delay to the head. With a timetable, this traffic does not contend with floods, but it must fit the
+    contention window.
+    """
     if not site.timetable:
         spacing_ns = min((s.flood.spacing_ns for row in shares for s in row), default=S)
         return access_outcome(site.scenario, site.adjacency, found, classes, spacing_ns=spacing_ns)
@@ -271,7 +281,7 @@ def _access(
 
 
 def heads_of(scenario: Scenario, positions: Mapping[NodeId, Enu]) -> dict[NodeId, NodeId]:
-    """The head of each node except the leader, as the leader will assign them."""
+    """The head of each node except the leader, as the leader will assign it."""
     clusters = members_of(scenario, positions)
     found = {member: cluster.head for cluster in clusters for member in cluster.members}
     return {node: head for node, head in found.items() if node != scenario.leader}
@@ -283,7 +293,7 @@ def _fitted(site: Site, *, quick: bool) -> Fitted | Refused:
 
 
 def _in_turns(site: Site, found: Fitted | Refused, candidates: Sequence[Candidate], jitter_ns: int) -> _Judged:
-    """All roots under one timetable; when the turns do not suffice, each root is refused with that reason."""
+    """Judge all roots of one timetable; if the turns do not suffice, each root is refused for that reason."""
     scenario = site.scenario
     if isinstance(found, Refused):
         refused = tuple(_refused(candidate, found, scenario.clusters.period_ns) for candidate in candidates)
@@ -305,7 +315,7 @@ def _in_turns(site: Site, found: Fitted | Refused, candidates: Sequence[Candidat
 
 
 def _in_slots(site: Site, candidates: Sequence[Candidate], jitter_ns: int) -> _Judged:
-    """Equal slots, one head after the other, as the leader divides the period."""
+    """Judge equal slots, one for each head, as the leader divides the period."""
     period_ns = site.scenario.clusters.period_ns
     slot_ns = period_ns // max(1, len(candidates))
     judged = tuple(
@@ -371,7 +381,7 @@ def _class(index: int, c: TrafficClass, judged: _Judged, uplink_ns: int) -> Clas
 
 
 def _paper(clusters: Sequence[ClusterPlan], scenario: Scenario) -> DelayBound:
-    """The greatest estimate by equations (3) and (4) of any cluster, whose packets are taken as evenly spaced."""
+    """The greatest estimate of any cluster by equations (3) and (4), whose packets are taken to be evenly spaced."""
     worst_ns, period_ns = 0, scenario.clusters.period_ns
     for cluster in clusters:
         if not cluster.packets:

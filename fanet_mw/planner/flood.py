@@ -1,8 +1,9 @@
-"""What one flood costs where relays contend: how long until all nodes have it, and how soon the next may follow.
+"""The cost of one flood whose relays contend: how long until all nodes have it, and how soon the next one may follow.
 
-Around the busiest node every relay within two hops sends in turn on one channel, each taking airtime + DIFS + the mean
-backoff; floods closer than that accumulate. The duration is that time per hop, plus jitter, handover and lead. This is
-an estimate, because CSMA/CA bounds neither. Under a timetable both are exact; see `routing/clustered/tdma/turns.py`.
+Around the busiest node all relays within two hops transmit one after another on one channel, each for airtime + DIFS +
+the mean backoff. Floods that are closer together pile up. The duration is that time for each hop, plus jitter, handover
+and lead. This is an estimate, because CSMA/CA bounds neither. With a timetable both are exact
+(`routing/clustered/tdma/turns.py`).
 """
 
 from typing import NamedTuple
@@ -15,7 +16,9 @@ from fanet_mw.units import MS, NodeId
 
 
 class FloodCost(NamedTuple):
-    """`duration_ns` from the head's first bit to the last node's; `spacing_ns` to the next flood; the frames sent."""
+    """`duration_ns`: from the head's first bit to the last node's reception. `spacing_ns`: from one flood to the next.
+    And the number of frames.
+    """
 
     duration_ns: int
     spacing_ns: int
@@ -29,7 +32,7 @@ def frame_ns(radio: Radio, payload_bytes: int) -> int:
 
 
 def contended_ns(radio: Radio, payload_bytes: int) -> int:
-    """The airtime of such a frame, with DIFS and a mean backoff."""
+    """The airtime of such a frame, plus DIFS and a mean backoff."""
     dcf = Dcf.of(radio)
     return frame_ns(radio, payload_bytes) + dcf.sifs_ns + 2 * dcf.slot_ns + dcf.cw_min * dcf.slot_ns // 2
 
@@ -52,10 +55,9 @@ def relay_share(scenario: Scenario, adjacency: Adjacency) -> float:
     """The share of the nodes that relays a flood: all, or about `gossip_degree` or `counter` nodes of each
     neighborhood.
 
-    The rules `heads`, `cds`, `mpr` and `claimed` relay no more than all; how much less is not estimated.
-
-    With `counter` at most twice the threshold of each neighborhood relays, because nodes out of range of each other do
-    not receive each other's copies.
+    With the rules `heads`, `cds`, `mpr` and `claimed` fewer nodes relay; since it is not estimated how many, all are
+    counted. With `counter` at most twice the threshold of each neighborhood relays, because nodes out of range of each
+    other do not receive each other's copies.
     """
     clusters = scenario.clusters
     neighbors = sum(len(near) for near in adjacency.values()) / max(1, len(adjacency))

@@ -37,23 +37,25 @@ from fanet_mw.units import NodeId, S
 
 
 class Goodput(NamedTuple):
-    """An upper bound of the packets per second, all sources together, and what limits it."""
+    """An upper bound of the packets per second of all sources together, and what limits it."""
 
     per_second: float
     sources: int
     around: NodeId | None
-    """The node whose neighbors are the bottleneck; None when the swarm as a whole is."""
+    """The node whose neighborhood is the bottleneck; None if the swarm as a whole is."""
 
     @property
     def least_interval_ns(self) -> int:
-        """The interval below which no source can send if every packet is to arrive."""
+        """The least interval at which sources can send if every packet is to arrive."""
         return round(self.sources * S / self.per_second)
 
 
 def goodput_bound(
     adjacency: Adjacency, sources: Collection[NodeId], *, send_ns: int, receive_ns: int
 ) -> Goodput | None:
-    """The bound where a transmission takes its sender `send_ns` and each receiver `receive_ns`; None in parts."""
+    """The bound, if a transmission occupies its sender for `send_ns` and each receiver for `receive_ns`; None if the
+    swarm is separated.
+    """
     nodes, senders = len(adjacency), frozenset(sources)
     if nodes < 2 or not senders or len(components(adjacency)) > 1:
         return None
@@ -80,7 +82,9 @@ def fewest_transmissions(adjacency: Adjacency) -> int:
 
 
 def any_protocol(scenario: Scenario, adjacency: Adjacency, sources: Collection[NodeId]) -> Goodput | None:
-    """The bound for the application's packets over the scenario's MAC, with as many in a frame as it holds."""
+    """The bound for the application's packets with the scenario's MAC, and as many packets in a
+    frame as it can hold.
+    """
     together = most_together(scenario)
     frame = frame_ns(scenario.radio, together * scenario.traffic.payload_bytes)
     send_ns = (frame + Timing.of(scenario.radio).difs_ns) // together
@@ -88,7 +92,7 @@ def any_protocol(scenario: Scenario, adjacency: Adjacency, sources: Collection[N
 
 
 def in_turns(turns: Turns, adjacency: Adjacency, sources: Collection[NodeId], *, together: int = 1) -> Goodput | None:
-    """The bound for any timetable of such turns, each with one frame of `together` packets."""
+    """The bound for any timetable with such turns, each of which holds one frame of `together` packets."""
     if not turns.per_frame:
         return None
     each_ns = turns.period_ns // (turns.per_frame * together)

@@ -1,9 +1,9 @@
-"""One head's slot: how much of it the floods need, and how long packets wait for it.
+"""The slot of one head: how much of it the floods need, and how long packets wait for it.
 
-One class alone is served in FIFO order, with whole floods in the slot: its bound is exact. Several classes are counted
-in units of a quarter of the longest spacing, and one longest spacing is subtracted from the slot for the flood that no
-longer fits; the rest is work that a slot certainly does. More urgent classes go first, and a flood that has begun is
-not interrupted.
+A single class is served in FIFO order with whole floods in the slot, and its bound is exact. Several classes are
+counted in units of a quarter of the longest spacing. One longest spacing is subtracted from the slot for a flood that
+no longer fits at its end, so the rest is work that the slot certainly does. More urgent classes go first, and a flood
+that has begun is not interrupted.
 """
 
 from collections.abc import Sequence
@@ -25,7 +25,7 @@ from fanet_mw.bounds import (
 from fanet_mw.planner.flood import FloodCost
 
 _PARTS: Final = 4
-"""Units per longest spacing; more units give a tighter bound and take longer."""
+"""The number of units in the longest spacing; with more, bounds are tighter and take longer to compute."""
 
 
 class ClassLoad(NamedTuple):
@@ -35,11 +35,13 @@ class ClassLoad(NamedTuple):
     interval_ns: int
     flood: FloodCost
     urgent: bool = False
-    """True if the class is more urgent than bulk: under a timetable it has room of its own in each turn."""
+    """True if the class is more urgent than bulk; in a timetable it has room of its own in each turn."""
 
 
 class ClusterPlan(NamedTuple):
-    """One head's slot. Floods may begin in `usable_ns` of it; `work_ns` is what they take of it per flooding period."""
+    """The slot of one head. Floods may begin in `usable_ns` of it; `work_ns` is how much of it they take per flooding
+    period.
+    """
 
     head: int
     members: int
@@ -48,11 +50,11 @@ class ClusterPlan(NamedTuple):
     usable_ns: int
     work_ns: int
     packets: float
-    """Packets per flooding period."""
+    """The number of packets per flooding period."""
     flood: FloodCost
     """The cost of a flood of the longest packet."""
     delays: tuple[DelayBound, ...]
-    """For each class the time from the head's queue to the last node; 0 for a class without a source."""
+    """For each class, the time from the head's queue to the last node; 0 for a class without sources."""
     backlog: int | None
 
     @property
@@ -61,14 +63,14 @@ class ClusterPlan(NamedTuple):
 
 
 def work_ns(shares: Sequence[ClassLoad], *, period_ns: int) -> int:
-    """The part of one flooding period that all floods together take."""
+    """The part of a flooding period that all floods together take."""
     return ceil(sum(s.sources * s.flood.spacing_ns * period_ns / s.interval_ns for s in shares))
 
 
 def slot_delays(
     shares: Sequence[ClassLoad], *, usable_ns: int, period_ns: int, jitter_ns: int
 ) -> tuple[list[DelayBound], int | None]:
-    """For each class, most urgent first, the longest time from the head's queue to the last node; and the backlog.
+    """For each class, the most urgent first, the longest time from the head's queue to the last node; and the backlog.
 
     A class without sources is bounded by 0. Packets arrive late by up to `jitter_ns`.
     """
@@ -97,7 +99,9 @@ def slot_delays(
 def _by_priority(
     index: int, shares: Sequence[ClassLoad], units: Sequence[Sequence[Periodic]], server: SlotServer
 ) -> DelayBound:
-    """The bound of one class: all equally or more urgent packets go first, and one less urgent may have begun."""
+    """The bound of one class: all packets of the same or more urgent classes go first, and a less urgent one may have
+    begun.
+    """
     if not units[index]:
         return Bounded(0)
     before = [*chain.from_iterable(units[:index]), *units[index][1:]]

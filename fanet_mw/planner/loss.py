@@ -1,14 +1,15 @@
-"""The chance that a packet misses a node under a timetable: the other half of a bound, as (delay, probability).
+"""The probability that a packet with a delay bound does not reach a node because frames are lost (timetables only).
 
-The timetable says which nodes send in the same turn, so the probability of each copy is that of its link against those
-senders. A packet reaches a node at least when every frame on one way to it survives; frames are lost independently, so
+The timetable says which nodes transmit in the same turn, so the probability of each copy is that of its link with those
+as interferers. A packet reaches a node at least if all frames on one way to it arrive. Frames are lost independently,
+so
 
     P(reached) >= max over ways of the product of the probabilities of their frames
 
-The truth is better: other copies count too, and turns without a packet do not interfere. The bound holds for losses
-that are independent from frame to frame (error rates). It does not hold for shadowing, which spoils a link for long,
-nor for the way of a member to its head, where attempts that collide once tend to collide again. Frames of the
-contention window that reach into the turns are not counted.
+The true probability is greater, because copies on other ways count, too, and unused turns do not interfere. The bound
+holds for losses that are independent from frame to frame. It does not hold for shadowing, which weakens a link for
+long, nor for a member's way to its head, where attempts that collide once tend to collide again. Frames of the
+contention window that extend into the turns are not included.
 """
 
 from collections.abc import Callable, Sequence
@@ -19,7 +20,7 @@ from fanet_mw.routing.clustered.timetable.timetable import Timetable, Turn
 from fanet_mw.units import NodeId
 
 Chance = Callable[[NodeId, NodeId, tuple[NodeId, ...]], float]
-"""The probability that a receiver (second) gets a sender's (first) frame while others (third) send."""
+"""The probability that a receiver (second) gets a sender's (first) frame while other nodes (third) transmit."""
 
 
 class Loss(NamedTuple):
@@ -28,13 +29,15 @@ class Loss(NamedTuple):
     worst: float
     root: NodeId
     node: NodeId
-    """The root and the node with the worst loss."""
+    """The root and the node with the greatest probability of loss."""
     mean: float
-    """The mean over all roots and nodes: a bound of the share of copies that never arrive."""
+    """The mean over all roots and nodes, a bound of the share of copies that never arrive."""
 
 
 def loss(table: Timetable, adjacency: Adjacency, *, per_frame: int, hop_turns: int, chance: Chance) -> Loss:
-    """The loss of the floods of a timetable; `adjacency` holds the links that count, all others are taken as silent."""
+    """The loss of the floods of a timetable. `adjacency` has the links that count; all others are taken to carry
+    nothing.
+    """
     together: dict[int, list[NodeId]] = {}
     for turn in table.turns:
         together.setdefault(turn.offset % per_frame, []).append(turn.node)
@@ -61,7 +64,9 @@ def _send(
     hop_turns: int,
     chance: Chance,
 ) -> None:
-    """Let a relay send what has reached it in time, and note the probability with which its neighbors receive it."""
+    """Let a relay transmit what has reached it in time, and note the probability with which each
+    neighbor receives it.
+    """
     sent = _best([item for item in arrivals.get(turn.node, ()) if item[0] + hop_turns <= turn.offset])
     for node in adjacency[turn.node] if sent else ():
         arrivals.setdefault(node, []).append((turn.offset, sent * chance(turn.node, node, others)))

@@ -1,9 +1,10 @@
-"""A plan over links that lose frames (`clusters.links`): there is no bound, but a likely delay per source.
+"""Plans a swarm whose links lose frames (`clusters.links`): instead of a bound, each source gets a likely delay.
 
-    links as the channel makes them expect -> the timetable with repeated frames -> (delay, share) per source
+    expected links by the channel model -> timetable with repeated frames -> (delay, share) for each source
 
-No link has been measured before take-off, so the caller says what to expect of each: its mean over fading, and with
-shadowing, which is drawn once for a place, several swarms with other draws. The verdict is that of the worst of them.
+No link has been measured before take-off, so the caller gives the expected quality of each: its mean over fading.
+Shadowing is drawn once for a place, so with shadowing the caller gives several draws. The verdict is that of the worst
+one.
 """
 
 from collections.abc import Iterator, Mapping, Sequence
@@ -26,14 +27,15 @@ _NOTES: Final = (
 
 
 class Drawn(NamedTuple):
-    """One swarm, with one draw of the channel."""
+    """The plan for one draw of the channel."""
 
     links: int
-    """Pairs that hear each other at all."""
+    """The number of pairs of nodes that receive each other at all."""
     fitted: Fitted | None
-    """The timetable with repeated frames; None: none fits, and one by places flies, which states nothing."""
+    """The timetable with repeated frames; None if none fits. The swarm then flies with one from positions, without
+    stated delays."""
     likely_ns: Mapping[NodeId, int | None]
-    """The likely delay of each source; None: its packets miss too many nodes."""
+    """The likely delay of each source; None if its packets miss too many nodes."""
 
     @property
     def silent(self) -> list[NodeId]:
@@ -42,7 +44,7 @@ class Drawn(NamedTuple):
 
     @property
     def known_ns(self) -> list[int]:
-        """The delays that are stated, ascending."""
+        """The stated delays, ascending."""
         return sorted(delay_ns for delay_ns in self.likely_ns.values() if delay_ns is not None)
 
 
@@ -61,7 +63,7 @@ class LossyPlan(NamedTuple):
 
     @property
     def worst_ns(self) -> int | None:
-        """The longest delay of a source in any draw; None: some source states none."""
+        """The longest likely delay of any source in any draw; None if some source states none."""
         if any(drawn.silent for drawn in self.draws):
             return None
         return max((drawn.known_ns[-1] for drawn in self.draws if drawn.known_ns), default=None)
@@ -75,9 +77,9 @@ def plan_lossy(
     *,
     deadline_ns: int | None = None,
 ) -> LossyPlan:
-    """Judge a scenario whose links lose frames, for each of several draws of them.
+    """Judge a scenario with lossy links, for each of several draws of the links.
 
-    The leader states no delay of its own packets, because its announcements go before them.
+    The leader states no delay for its own packets, because its announcements go before them.
     """
     places = tuple(sorted(positions.items()))
     sources = [node for node in application.sources if node != scenario.leader]
@@ -95,7 +97,7 @@ def _drawn(scenario: Scenario, places: Places, links: tuple[Link, ...], sources:
 
 
 def _likely_ns(scenario: Scenario, fitted: Fitted, node: NodeId) -> int | None:
-    """What the node will state, application to application, of a packet that finds its queue empty."""
+    """The delay that the node will state, from application to application, for a packet that finds its queue empty."""
     plan = TurnPlan.of(node, 0, fitted)
     if not plan.roots or fitted.table.uncovered[node]:
         return None

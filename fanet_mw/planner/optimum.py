@@ -1,11 +1,13 @@
-"""The configuration that meets a deadline with the least airtime: number of clusters, heads and relays, the slots.
+"""Searches for the configuration that meets a deadline with the least airtime: clusters, heads and relays, slots,
+period.
 
     airtime per packet = way to the head + relays of its flood x its frame
-                       + what hellos and the leader's schedules take meanwhile
+                       + hellos and the leader's schedules in the same time
 
-Only timetables are searched, because only their bounds are proven. Turns hold what each head's load needs, so the slot
-lengths follow from the number of heads, the period and `radio.cw_min`. Schedules are sent once per flooding period: of
-two periods that meet the deadline the longer one takes less air, so each search begins with the longest period.
+Only timetables are searched, because only their bounds are proven. Turns hold what the load of each head needs, so the
+lengths of slots follow from the number of heads, the period and `radio.cw_min`. Schedules are sent once per flooding
+period. Of two periods that meet the deadline the longer one therefore takes less airtime, so each search begins with
+the longest period.
 """
 
 from collections.abc import Iterator, Mapping, Sequence
@@ -26,18 +28,18 @@ from fanet_mw.units import Enu, NodeId, S, seconds_to_ns
 _HELLO_BYTES: Final = 140
 """The length of a hello without digests."""
 _PERIOD_STEPS: Final = (1.0, 0.98, 0.95, 0.92, 0.88, 0.84, 0.8, 0.75, 0.7, 0.6, 0.5, 0.4, 0.3, 0.2)
-"""Periods to try, as shares of the deadline: a packet waits up to a period, and then crosses the swarm."""
+"""Periods to try, as shares of the deadline: a packet waits up to one period, and then crosses the swarm."""
 _LONGEST_S: Final = 10.0
-"""The longest period to try where there is no deadline."""
+"""The longest period to try if there is no deadline."""
 
 
 class Optimum(NamedTuple):
-    """The best configuration found: its settings, what it promises, and how much air it takes."""
+    """The best configuration found: its settings, its plan, and its airtime."""
 
     variant: Variant
     plan: Plan
     airtime_ns: int
-    """Airtime per application packet: all frames of all nodes, including control."""
+    """The airtime per application packet: all frames of all nodes, including control."""
     floods_ns: int
     """The part of it that goes to relays of the packet."""
     tried: int
@@ -50,7 +52,7 @@ def optimum(
     deadline_ns: int | None,
     sources: Sequence[NodeId] | None = None,
 ) -> Optimum | None:
-    """The configuration of least airtime whose bounds are proven and within the deadline; None when none was found."""
+    """The configuration of least airtime whose bounds are proven and within the deadline; None if none was found."""
     site = Site(scenario, positions)
     best: Optimum | None = None
     tried = 0
@@ -65,13 +67,13 @@ def optimum(
                 continue
             plan, classes = found
             if not plan.proven:
-                break  # with no period is there a bound for the way to the head
+                break  # no period gives the way to the head a bound
             if not plan.feasible:
                 continue
             cost = _airtime_ns(plan, classes, site)
             if best is None or (cost[0], variant.size) < (best.airtime_ns, best.variant.size):
                 best = Optimum(variant, plan, *cost, tried)
-            break  # a shorter period only takes more air
+            break  # a shorter period only takes more airtime
     return best._replace(tried=tried) if best else None
 
 
@@ -85,7 +87,9 @@ def _judge(
 
 
 def _families(scenario: Scenario) -> Iterator[dict[str, float | int | str]]:
-    """All settings except the period. Fewer heads need fewer turns, but then members have a way to their head."""
+    """All combinations of settings except the period. With fewer heads fewer turns are needed, but members send to
+    heads.
+    """
     most = scenario.nodes.count - 1
     windows = dict.fromkeys((scenario.radio.cw_min, *(w for w in WINDOWS if w < scenario.radio.cw_min)))
     for count in dict.fromkeys(max(1, round(most / share)) for share in (1, 2, 4, 10)):
@@ -100,12 +104,13 @@ def _periods(scenario: Scenario, deadline_ns: int | None) -> Iterator[float]:
 
 
 def _airtime_ns(plan: Plan, classes: Sequence[TrafficClass], site: Site) -> tuple[int, int]:
-    """The mean airtime per packet over a second: (in all, of which floods)."""
+    """The mean airtime per packet over one second, in all and for floods."""
     scenario = plan.scenario
     radio, timing = scenario.radio, Timing.of(scenario.radio)
     relays = {c.head: c.flood.transmissions for c in plan.clusters}
     head_of = {m: cluster.head for cluster in members_of(scenario, site.positions) for m in cluster.members}
-    head_of |= {node: node for node in head_of if node in relays}  # a node with turns of its own has no way to a head
+    # a node with turns of its own does not send to a head
+    head_of |= {node: node for node in head_of if node in relays}
     hops = ways(site.adjacency, head_of, classes).hops
     floods = uplinks = 0.0
     for c in classes:

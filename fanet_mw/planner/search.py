@@ -1,9 +1,10 @@
-"""Plan a scenario, and find the cheapest change that makes it feasible: fewest keys first, then least change of values.
+"""Plans a scenario, and finds the cheapest change that makes it feasible: the fewest keys, then the least change of
+values.
 
-What is searched: cluster count and flooding period. Under a timetable also the backoff that a turn has to hold
-(`radio.cw_min`), every node as a head, and at last everything together that makes turns short. Where relays contend, a
-timetable. In claimed slots the backoff, the number of slots, small packets together, or a timetable. The last resort is
-less application traffic, because a load that does not fit has to go.
+The search varies the number of clusters and the flooding period. With a timetable it also varies the backoff that a
+turn must allow for (`radio.cw_min`), makes every node a head, and at last combines everything that makes turns short.
+If relays contend, it tries a timetable. With claimed slots it varies the backoff and the number of slots, puts small
+packets together, or tries a timetable. Its last resort is less application traffic.
 """
 
 from collections.abc import Iterator, Mapping, Sequence
@@ -48,10 +49,10 @@ def plan(
     sources: Sequence[NodeId] | None = None,
     deadline_ns: int | None = None,
 ) -> Plan | Refused:
-    """Judge the scenario as it stands. Refused when its traffic cannot be planned at all.
+    """Judge the scenario as it stands; refused if its traffic cannot be planned at all.
 
-    `adjacency` says which nodes hear each other, by default those within `radio.range_m` (a timetable uses positions
-    only); `sources` are the nodes that send the application's traffic; each class has to meet the deadline.
+    `adjacency` says which nodes hear each other, by default those within `radio.range_m`; a timetable uses only
+    positions. `sources` are the nodes that send the application's traffic. Each class has to meet the deadline.
     """
     return _judge(Site(scenario, positions, adjacency), sources, deadline_ns)
 
@@ -68,7 +69,7 @@ def _judge(
 
 
 def with_capacity(found: Plan, positions: Mapping[NodeId, Enu]) -> Plan:
-    """The same plan, with the traffic interval down to which its slots carry everything; this takes a second."""
+    """The same plan with the least traffic interval at which its slots carry everything; this takes a second."""
     if found.superframe is None or not found.superframe.used or found.cut_off:
         return found
     least = least_interval_ns(found.scenario, tuple(sorted(positions.items())), heads_of(found.scenario, positions))
@@ -83,9 +84,9 @@ def cheapest_change(
     sources: Sequence[NodeId] | None = None,
     deadline_ns: int | None = None,
 ) -> ScenarioChange | None:
-    """The least change after which `plan` is feasible; None when none of those searched makes it so.
+    """The least change that makes `plan` feasible; None if none of those searched does.
 
-    For a swarm in parts nothing is searched, because it helps only if nodes come nearer.
+    Nothing is searched for a separated swarm, which is helped only if nodes come nearer to each other.
     """
     site = Site(scenario, positions, adjacency)
     found = _judge(site, sources, deadline_ns)
@@ -102,7 +103,7 @@ def cheapest_change(
 
 
 def hopeless(site: Site, sources: Sequence[NodeId] | None) -> bool:
-    """True if no timetable at all can carry the load in this scenario's turns, so that none need be made."""
+    """True if no timetable at all can carry the load in this scenario's turns, so that none need be computed."""
     classes = demands(site.scenario, sources)
     if not site.timetable or isinstance(classes, Refused) or site.scenario.traffic.destination != "all":
         return False
@@ -130,7 +131,7 @@ def _turn_options(scenario: Scenario) -> Iterator[dict[str, Value]]:
 
 
 def _clock_options(scenario: Scenario) -> list[dict[str, Value]]:
-    """What keeps turns apart when the clocks are too far apart for their slack: a time in hellos, or more slack."""
+    """Changes that help when clocks differ by more than the slack of turns: time beacons in hellos, or more slack."""
     needed_ns = verdict.unsynchronized_slack_ns(scenario)
     if needed_ns <= turn_slack_ns(scenario):
         return [{}]
@@ -138,7 +139,7 @@ def _clock_options(scenario: Scenario) -> list[dict[str, Value]]:
 
 
 def _tightest(scenario: Scenario) -> Iterator[Variant]:
-    """The most that turns can carry: short turns, long superframes, and so few hellos that they fit a short window."""
+    """The settings with which turns carry the most: short turns, long superframes, and few hellos in a short window."""
     if scenario.clusters.relay != "scheduled" or scenario.clock.modelled:
         return  # clocks that drift need slack
     settings: dict[str, Value] = {

@@ -1,4 +1,4 @@
-"""A plan as lines of text. Every figure has its unit, and what is not proven says so."""
+"""A plan as lines of text. Each figure has its unit, and the text says which figures are not proven."""
 
 import textwrap
 from collections.abc import Iterator
@@ -18,7 +18,7 @@ from fanet_mw.routing.clustered.timetable.likely_delay import LIKELY_SHARE
 from fanet_mw.units import MS, S
 
 _SHOWN: Final = 8
-"""At most so many heads are listed, the fullest first."""
+"""The greatest number of heads that are listed, the fullest first."""
 _WIDTH: Final = 100
 _LABEL: Final = 14
 
@@ -29,7 +29,7 @@ def describe(found: Plan | Refused) -> str:
 
 
 def describe_loss(found: Loss | None) -> str:
-    """A sentence on how likely a packet misses a node."""
+    """A sentence on the probability that a packet misses a node."""
     if found is None:
         return item("loss", "no probability: shadowing, fading and obstacles spoil links for longer than a frame")
     if not found.worst:
@@ -101,7 +101,7 @@ def describe_optimum(found: Optimum | None, *, deadline_ns: int | None) -> str:
 
 
 def item(label: str, text: str) -> str:
-    """A labelled paragraph; a line that is meant to be copied is not broken."""
+    """A labelled paragraph; a line that is meant to be copied is not wrapped."""
     first = f"  {label:{_LABEL}}"
     if "--set" in text:
         return first + text
@@ -187,7 +187,7 @@ def _nodes(claims: ClaimedPlan) -> Iterator[str]:
 
 
 def _capacity(found: Plan) -> Iterator[str]:
-    """What this configuration carries, and what no protocol can exceed."""
+    """What this configuration can carry, and what no protocol can exceed."""
     carried, most = found.carried_per_second, found.goodput
     application = next((c for c in found.classes if c.name == "application"), None)
     if carried is not None and application is not None:

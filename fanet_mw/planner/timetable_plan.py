@@ -1,7 +1,7 @@
-"""Heads under a timetable: the turns that the running protocol will give them, and the bound that follows.
+"""Plans heads with a timetable: the turns that the protocol will give them in flight, and the bounds that follow.
 
-The timetable is the one that `clusters.relay = "scheduled"` makes. Known turns give the longest wait for a turn; to it
-the duration of the flood is added, which does not depend on other floods in the swarm.
+The timetable is the one that `clusters.relay = "scheduled"` computes. The known turns give the longest wait for a turn.
+To that is added the duration of the flood, which does not depend on other floods in the swarm.
 """
 
 import math
@@ -32,13 +32,13 @@ from fanet_mw.units import US, NodeId
 
 _MOST_TURNS: Final = 20_000
 _LEAST_SLACK_US: Final = 20
-"""Less slack than this leaves nothing for flight and detection."""
+"""With less slack than this nothing would remain for propagation and detection."""
 _SPARE_TURNS: Final = (1.0, 1.05)
-"""The turns to try, as multiples of those needed when there is no end of them: the end of the superframe costs some."""
+"""Numbers of turns to try, as multiples of those needed in an endless superframe, because its end costs some turns."""
 
 
 class Candidate(NamedTuple):
-    """A cluster that has no turns yet: head, size, greatest number of hops to the head, and the load of each class."""
+    """A cluster without turns yet: its head and size, the most hops to the head, and the load of each class."""
 
     head: NodeId
     members: int
@@ -51,22 +51,22 @@ class TimetablePlan(NamedTuple):
 
     turns: Turns
     used: int
-    """The number of turns in which some node sends; 0 when there is no timetable."""
+    """The number of turns in which some node transmits; 0 without a timetable."""
     packets: int
-    """The number of root turns per superframe, each of which starts a flood."""
+    """The number of root turns per superframe, in each of which a flood begins."""
     table: Timetable | None
     together: int = 1
-    """The number of packets that a turn holds."""
+    """The number of packets in one turn."""
     least_interval_ns: int | None = None
-    """The shortest traffic interval at which everything arrives; None when it was not asked for."""
+    """The least traffic interval at which everything arrives; None if it was not asked for."""
 
 
 def table_for(
     scenario: Scenario, places: Places, head_of: Mapping[NodeId, NodeId], *, quick: bool = False
 ) -> Fitted | Refused:
-    """The running protocol's timetable for nodes with these heads; refused when one packet of each root does not fit.
+    """The timetable that nodes with these heads will compute; refused if one packet of each root does not fit.
 
-    With `quick` it is also refused when the load does not fit.
+    With `quick` it is also refused if the load does not fit.
     """
     found = fit(scenario, places, head_of, quick=quick)
     if found is not None:
@@ -85,7 +85,7 @@ def table_for(
 
 
 def _most_slack_us(scenario: Scenario, places: Places, head_of: Mapping[NodeId, NodeId], *, needed: int) -> int | None:
-    """The slack with which so many turns fit into a superframe, or a few more; None when less slack does not help."""
+    """The slack with which the needed turns, or a few more, fit into a superframe; None if less slack does not help."""
     turns = superframe(scenario)
     for spare in _SPARE_TURNS:
         longest_ns = (turns.period_ns - turns.contention_ns) // math.ceil(needed * spare)
@@ -101,7 +101,7 @@ def _most_slack_us(scenario: Scenario, places: Places, head_of: Mapping[NodeId, 
 def judge(
     found: Fitted, candidate: Candidate, *, lead_ns: int, receipt_ns: int, jitter_ns: int, control: int = 0
 ) -> ClusterPlan:
-    """Judge one root: its queue before its turns, the duration of the flood, and `receipt_ns` until applications have
+    """Judge one root: the wait for its turns, the duration of the flood, and `receipt_ns` until the applications have
     it.
 
     `control` is the number of announcements per period, which go before everything else.
@@ -146,7 +146,8 @@ class _Root(NamedTuple):
         """The bound of a class at this root.
 
         A class has room of its own in each turn, so a packet waits only for packets of its class; bulk also waits for
-        announcements. When the class has only one source, that source's own statement in flight (`Own`) is tighter.
+        announcements. If the class has only one source, the bound that this source states in flight (`OwnBound`) is
+        tighter.
         """
         if not share.sources:
             return Bounded(0)
@@ -174,7 +175,7 @@ class _Root(NamedTuple):
         return Bounded(queue.delay_ns + self.flood_ns - server.airtime_ns + self.own.around_ns - self.lead_ns)
 
     def backlog(self, shares: Sequence[ClassLoad]) -> int | None:
-        """The most packets that wait at the same time, all classes together."""
+        """The greatest number of packets that wait at the same time, of all classes together."""
         flows = [Periodic(s.interval_ns, self.jitter_ns) for s in shares for _ in range(s.sources)]
         if not flows:
             return None
@@ -189,9 +190,9 @@ class _Root(NamedTuple):
         return [Periodic(self.own.turns.period_ns, 0)] * (self.control * parts)
 
     def _server(self, parts: int) -> TurnServer:
-        """The service of turns that send k packets each: such a turn counts as k parts with one packet each.
+        """The service of turns in which k packets are sent: such a turn counts as k parts with one packet each.
 
-        A packet must be announced before the whole turn, which counts as a longer lead; and all packets of a turn are
+        A packet must be announced before the whole turn, so its lead counts as longer, and all packets of a turn are
         completed at its end.
         """
         turns = self.own.turns

@@ -1,6 +1,6 @@
-"""A scenario with some settings changed, and a measure of how great the change is.
+"""A scenario with some settings changed, and how great the change is.
 
-Settings are keys of the scenario, so that what the planner proposes can be used: `arguments` are arguments of `--set`.
+Settings are keys of the scenario, so the planner's proposals can be applied: `arguments` are arguments of `--set`.
 """
 
 import math
@@ -14,12 +14,12 @@ Value = float | int | str
 
 
 class Variant(NamedTuple):
-    """A valid scenario, and what was changed to obtain it."""
+    """A valid scenario, and the settings that were changed to obtain it."""
 
     scenario: Scenario
     settings: tuple[tuple[str, Value], ...]
     octaves: float
-    """The sum of the changes of numbers, each as |log2(new / old)|."""
+    """The sum over all changed numbers of |log2(new / old)|."""
 
     @property
     def arguments(self) -> tuple[str, ...]:
@@ -28,12 +28,14 @@ class Variant(NamedTuple):
 
     @property
     def size(self) -> tuple[int, float, tuple[str, ...]]:
-        """The order of changes: the number of keys, then octaves; the arguments only decide between equals."""
+        """The measure by which changes are compared: the number of keys, then octaves; then the arguments, to break
+        ties.
+        """
         return len(self.settings), self.octaves, self.arguments
 
 
 def vary(scenario: Scenario, settings: Mapping[str, Value]) -> Variant | None:
-    """The scenario with these settings; None when it is not valid, or when nothing differs."""
+    """The scenario with these settings; None if it is not valid, or if nothing differs."""
     tree = scenario.model_dump(exclude_none=True)
     changed: list[tuple[str, Value]] = []
     octaves = 0.0

@@ -1,4 +1,4 @@
-"""The sentences of a plan: why it is not feasible, what its bounds assume, and what they leave out."""
+"""The sentences of a plan: why it is not feasible, what its bounds assume, and what they do not include."""
 
 from collections.abc import Iterator, Sequence
 from typing import Final
@@ -22,7 +22,7 @@ def late(classes: Sequence[ClassPlan], deadline_ns: int) -> Iterator[str]:
 
 
 def expired(scenario: Scenario, c: ClassPlan, delay_ns: int) -> str | None:
-    """A sentence about a class whose packets may exceed their lifetime on the way; None when they do not."""
+    """A sentence about a class whose packets may exceed their lifetime on the way; None if they cannot."""
     lifetime_ns = scenario.routing.lifetime_ns(c.priority)
     if delay_ns <= lifetime_ns:
         return None
@@ -60,7 +60,7 @@ def problems(
 
 
 def clocks_apart(scenario: Scenario) -> Iterator[str]:
-    """A sentence about clocks that nothing synchronizes and that the slack of a turn does not hold."""
+    """A sentence about clocks that are not synchronized and that differ by more than the slack of a turn."""
     clock, slack_ns = scenario.clock, turn_slack_ns(scenario)
     needed_ns = unsynchronized_slack_ns(scenario)
     if needed_ns > slack_ns:
@@ -73,8 +73,8 @@ def clocks_apart(scenario: Scenario) -> Iterator[str]:
 
 
 def unsynchronized_slack_ns(scenario: Scenario) -> int:
-    """The slack that turns need at the end of the run when nothing synchronizes the clocks; 0 when something does, or
-    they are exact.
+    """The slack that turns need at the end of the run if nothing synchronizes the clocks; 0 if something does, or if
+    the clocks are exact.
     """
     clock = scenario.clock
     if clock.sync != "none" or not clock.modelled:

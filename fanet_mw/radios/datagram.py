@@ -1,4 +1,4 @@
-"""The datagram of the UDP radio: 12 bytes in front of a frame name sender and receiver, so that it can be acknowledged.
+"""The datagram of the UDP radio: a 12-byte header names sender and receiver, so that the frame can be acknowledged.
 
 "FN" | version | kind (frame, ack) | source | destination | sequence number of the request | frame
 """

@@ -1,8 +1,7 @@
-"""The bus of a UAV in the field: the radio topics of its node go to a real radio, all others to Zenoh if it has a
-router.
+"""The bus of a UAV in the field: its node's radio topics go to a real radio, all others to Zenoh if there is a router.
 
-Without a router there is no world and no launcher: swarm time starts at an epoch that all nodes were given, and traces,
-telemetry and reports stay with the node.
+Without a router there is neither a world nor a launcher: swarm time starts at an instant that all nodes were told, and
+traces, telemetry and reports stay with the node.
 """
 
 import contextlib
@@ -18,13 +17,13 @@ from fanet_mw.units import NodeId
 
 
 class RadioPort(Protocol):
-    """What a node needs of a radio."""
+    """The radio, as a node needs it."""
 
     def request(self, request: TxRequest) -> None: ...
 
 
 class FieldBus:
-    """A bus for a host, like `Bus`, which keeps the node's radio topics to itself."""
+    """A bus for a host, like `Bus`, except that the radio topics of its node go to a real radio."""
 
     def __init__(self, names: Topics, node: NodeId, *, inner: Bus | None, epoch_unix_ns: int | None) -> None:
         self._tx_topic = names.radio_tx(node)
@@ -36,13 +35,13 @@ class FieldBus:
         self._on_rx: OnSample | None = None
         self._radio: RadioPort | None = None
         self.reports: list[bytes] = []
-        """The last report, kept while there is no router that could receive it."""
+        """The last report, which is kept while there is no router to receive it."""
 
     def use(self, radio: RadioPort) -> None:
         self._radio = radio
 
     def on_radio(self, message: Reception | TxStatus) -> None:
-        """Pass a message of the radio to the node."""
+        """Pass a message from the radio to the node."""
         if self._on_rx is not None:
             self._on_rx(self._rx_topic, codecs.encode([message]))
 
@@ -80,13 +79,13 @@ class FieldBus:
 
 
 def _decoded(payload: bytes) -> list[Message]:
-    """The messages of the own node; one that cannot be decoded is a bug of this program, and raises."""
+    """The messages from the own node; bytes that cannot be decoded are a bug of this program, and raise."""
     return list(codecs.decode(payload))
 
 
 @contextlib.contextmanager
 def joined(endpoint: str | None, config: Path | None = None) -> Iterator[Bus | None]:
-    """A session with the router, if there is to be one; `config` is a configuration file of Zenoh."""
+    """A session with the router if an endpoint is given; `config` is a configuration file of Zenoh."""
     if endpoint is None:
         yield None
         return

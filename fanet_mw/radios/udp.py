@@ -1,11 +1,11 @@
-"""A radio on a real interface: frames as UDP datagrams, broadcasts to its network, unicasts with acknowledgement.
+"""A radio on a real network interface: frames are UDP datagrams; broadcasts, and unicasts with acknowledgement.
 
     request -> waits for its instant -> socket -> driver and air -> socket of the other node -> reception
 
-The interface is an ad hoc (IBSS or mesh) Wi-Fi interface with an address of its own; its driver does CSMA/CA. A unicast
-is acknowledged by the other radio and sent up to `ATTEMPTS` times, because no driver tells whether the MAC's own ACK
-came. What comes off the air never raises: it is counted. Not known here: the RSSI (a reception says 0), and the instant
-at which a frame really ended; `end_ns` is the instant at which it was taken from the socket.
+The interface is an ad hoc (IBSS or mesh) Wi-Fi interface with an address of its own, whose driver does CSMA/CA. The
+other radio acknowledges each unicast, and it is sent up to `ATTEMPTS` times, because drivers do not tell whether the
+MAC's own ACK came. Received datagrams never raise; bad ones are counted. The RSSI is not known, so receptions state 0.
+Nor is the true end of a frame: `end_ns` is the instant at which it was read from the socket.
 """
 
 import asyncio
@@ -26,20 +26,20 @@ _ACK_WAIT_S: Final = 0.03
 _RSSI_UNKNOWN_DBM: Final = 0.0
 _RECEIVED: Final = 1
 MOVED_NS: Final = 10 * S
-"""A node that has been silent at its address for this long may be accepted from another address."""
+"""A node may change its address when it has been silent at the former one for this long."""
 MOST_ADDRESSES: Final = 4096
 Address = tuple[str, int]
 
 
 class _KnownAddress(NamedTuple):
-    """The address from which a node is heard, and when it was heard last."""
+    """The address at which a node was heard, and when it was last heard there."""
 
     address: Address
     heard_ns: int
 
 
 class UdpRadio:
-    """The radio of one node. `on_message` receives its receptions and statuses, on the loop's thread."""
+    """The radio of one node. It passes receptions and statuses to `on_message`, on the thread of the event loop."""
 
     def __init__(
         self,
@@ -53,7 +53,7 @@ class UdpRadio:
         port: int = PORT,
         hears: Callable[[], bool] = lambda: True,
     ) -> None:
-        """`hears` is False while the node has no time yet, or none any more: then nothing that comes is taken in."""
+        """`hears` tells whether datagrams are accepted; they are not while the node has no swarm time."""
         self._node = node
         self._address = (address, port)
         self._broadcast = (broadcast, port)
@@ -63,9 +63,9 @@ class UdpRadio:
         self._hears = hears
         self._loop = asyncio.get_running_loop()
         self._addresses: dict[NodeId, _KnownAddress] = {}
-        """The address from which each node is heard."""
+        """The address of each node that was heard."""
         self._waiting: dict[tuple[NodeId, int], asyncio.Event] = {}
-        """The unicasts whose acknowledgement is awaited, by destination and sequence number."""
+        """The unicasts that wait for their acknowledgement, by destination and sequence number."""
         self._tasks: set[asyncio.Task[None]] = set()
         self._seen = DuplicateSet(capacity=8192)
         self._transport: asyncio.DatagramTransport | None = None
@@ -84,7 +84,7 @@ class UdpRadio:
     async def _bind(self, address: Address) -> asyncio.DatagramTransport:
         sock = socket.socket(socket.AF_INET, socket.SOCK_DGRAM)
         try:
-            sock.setsockopt(socket.SOL_SOCKET, socket.SO_REUSEADDR, 1)  # several radios on one machine get broadcasts
+            sock.setsockopt(socket.SOL_SOCKET, socket.SO_REUSEADDR, 1)  # for several radios
             sock.setsockopt(socket.SOL_SOCKET, socket.SO_BROADCAST, 1)
             sock.settimeout(0)
             sock.bind(address)
@@ -106,7 +106,7 @@ class UdpRadio:
     # --- transmit -------------------------------------------------------------------------------------------------
 
     def request(self, request: TxRequest) -> None:
-        """Send a frame at its instant; if that has passed, at once, and counted as late."""
+        """Send a frame at its instant; if that has passed, send it at once, and count it as late."""
         self.counts["sent"] += 1
         if not 0 < len(request.frame) <= self._max_frame_bytes:
             self._refuse(DropReason.TOO_LARGE if request.frame else DropReason.MALFORMED, request)
@@ -132,7 +132,7 @@ class UdpRadio:
         task.add_done_callback(self._tasks.discard)
 
     async def _unicast(self, request: TxRequest) -> None:
-        """Repeat a frame until it is acknowledged; to the broadcast address if the other node was never heard."""
+        """Send a frame until it is acknowledged; to the broadcast address if the other node was never heard."""
         datagram = Datagram(DatagramKind.FRAME, self._node, request.dst, request.seq, request.frame)
         name = request.dst, request.seq & SEQ_MASK
         acknowledged = self._waiting[name] = asyncio.Event()
@@ -163,7 +163,7 @@ class UdpRadio:
     # --- receive --------------------------------------------------------------------------------------------------
 
     def _on_datagram(self, data: bytes, address: Address) -> None:
-        """Take in one datagram, which any process may have sent."""
+        """Handle one datagram, which any process may have sent."""
         if not self._hears():
             self.counts["not_running"] += 1
             return
@@ -187,11 +187,11 @@ class UdpRadio:
         self._on_frame(datagram, address)
 
     def _take_address(self, node: NodeId, address: Address) -> bool:
-        """Take an address for that of a node, if it is heard there first; False if the node is known at another one.
+        """Accept an address as that of a node; False if the node is known at another address.
 
-        A node gets another address after it was silent at the old one for a while, as after a restart, so that a single
-        datagram redirects nothing. Frames are accepted from any address: otherwise the sender that comes first could
-        keep out the others.
+        A node gets another address only after it has been silent at the former one, as after a restart, so a single
+        datagram cannot redirect its traffic. Frames are accepted from any address; otherwise whoever sends first under
+        a node's id could lock that node out.
         """
         now_ns, known = self._now_ns(), self._addresses.get(node)
         if known is not None and known.address != address and now_ns - known.heard_ns < MOVED_NS:
@@ -216,7 +216,9 @@ class UdpRadio:
 
 
 class _Endpoint(asyncio.DatagramProtocol):
-    """Passes datagrams on. Errors that the network reports about datagrams sent (no receiver there) are ignored."""
+    """Passes received datagrams on. It ignores errors that the network reports about sent ones, such as a missing
+    receiver.
+    """
 
     def __init__(self, take: Callable[[bytes, Address], None]) -> None:
         self._on_datagram = take

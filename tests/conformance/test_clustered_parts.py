@@ -15,6 +15,7 @@ from fanet_mw.scenario import Scenario
 from fanet_mw.units import BROADCAST, MS, Enu, NodeId, S
 from fanet_mw.wire import FLAG_FLOOD, FLAG_TO_HEAD, PRIORITY_BULK, Header, Kind, filler
 from fanet_mw.wire.claims import Claims, SlotStatus
+from fanet_mw.wire.digest import Digest
 from fanet_mw.wire.inner import Beacon, Role
 
 OURS, THEIRS = NodeId(2), NodeId(3)
@@ -97,6 +98,21 @@ def test_what_a_relaying_rule_leaves_open_is_decided_when_it_says(node: Node) ->
         decided += relays
     assert len(decided) == open_before
     assert parts.contending.waiting() == 0
+
+
+def test_a_repair_of_a_process_that_was_woken_late_goes_no_later(make_scenario: Callable[..., Scenario]) -> None:
+    """Its nodes contend, so that nothing but the wake-up can move its start."""
+    made = Node(OURS, make_scenario(**{"nodes.count": 5, "clusters.repair_s": 5}), make_protocol,
+                position=Enu(0.0, 0.0, 50.0))  # fmt: skip
+    made.start(0)
+    repair = protocol_of(made).parts.repair
+    assert repair is not None
+    repair.hold(packet(1), flooded=True, expect_ns=0, now_ns=NOW_NS)
+    repair.on_digest(Digest((), complete=True), now_ns=NOW_NS + 1 * S)
+    due_ns = repair.next_wake_ns()
+    assert due_ns is not None
+    made.wake(due_ns + 7 * MS)
+    assert [r.start_ns for r in made.requests if r.frame[-40:] == filler(40)] == [due_ns + made.scenario.radio.lead_ns]
 
 
 def test_roles_name_the_node_itself_and_bear_the_word_of_others(node: Node) -> None:

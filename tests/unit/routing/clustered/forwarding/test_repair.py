@@ -45,6 +45,12 @@ def test_what_a_neighbor_lacks_is_sent_after_the_assessment() -> None:
     assert made.repaired == 1
 
 
+def test_a_repair_that_is_called_late_says_when_it_was_due() -> None:
+    made = holder(1)
+    made.on_digest(NOTHING, now_ns=LATER)
+    assert [due_ns for due_ns, _ in made.due(now_ns=LATER + 130 * MS)] == [LATER + 100 * MS]
+
+
 def test_a_flood_that_may_still_be_under_way_is_not_repaired() -> None:
     made = holder(1)
     made.on_digest(NOTHING, now_ns=400 * MS)

@@ -1,7 +1,7 @@
-"""The contract between a node and a routing protocol. Every protocol is one class behind it.
+"""The contract between a node and a routing protocol; each protocol is one class behind it.
 
-The node owns identity, sequence numbers, duplicate suppression, the header and the counters. The protocol decides
-what happens to a packet next, by calling its port. Both are sans-IO: instants are handed in.
+The node owns identity, sequence numbers, duplicate suppression, the header and the counters. The protocol decides what
+happens to a packet next, and sends through its port. Both are sans-IO: each instant is an argument.
 """
 
 from abc import ABC, abstractmethod
@@ -24,48 +24,50 @@ class Port(Protocol):
     node: NodeId
     scenario: Scenario
     position: Enu
-    """The position at which the node last knew itself to be."""
+    """The node's last known position."""
     clock_error_ns: int
-    """The greatest error of any clock in the swarm, as far as the node has heard; 0: they are exact."""
+    """The greatest error of any clock in the swarm, as far as this node knows; 0 if all clocks are exact."""
     velocity: Enu
-    """The velocity at which the node last knew itself to move [m/s]."""
+    """The node's last known velocity [m/s]."""
 
     def transmit(self, frame: bytes, dst: NodeId, *, start_ns: int, wants_status: bool = False) -> int:
-        """Announce a transmission; returns the request's sequence number."""
+        """Announce a transmission to the radio; returns the sequence number of the request."""
 
     def transmit_together(self, packets: Sequence[Packet], *, flags: int, at_ns: Sequence[int]) -> None:
-        """Begin a phase of several packets: broadcast them at each of the given instants, in as few frames as they
-        fit. Copies of them in that phase that come back are known.
+        """Begin a phase of several packets: broadcast them at each of these instants, in as few frames as possible.
+        Copies that come back in that phase count as duplicates.
         """
 
     def transmit_to(self, packet: Packet, dst: NodeId, *, flags: int, start_ns: int) -> int:
-        """Send a packet to one neighbor, in a phase that begins here; returns the request's number, whose status
-        comes. Copies of the packet in that phase that come back are known.
+        """Send a packet to one neighbor, in a phase that begins here; returns the number of the request, whose status
+        will be reported. Copies that come back in that phase count as duplicates.
         """
 
     def relay(self, relay: Relay) -> None:
-        """Pass a flooded packet on, one hop more, in a frame of its own."""
+        """Pass a flooded packet on in a frame of its own; its hop count grows by one."""
 
     def relay_together(self, relays: Sequence[Relay]) -> None:
-        """Pass flooded packets on, one hop more each, in as few frames as they fit; a frame goes at the first instant
-        of those in it.
+        """Pass flooded packets on in as few frames as possible; a frame is sent at the earliest instant of the packets
+        in it.
         """
 
     def announce(
         self, kind: Kind, inner: bytes, *, now_ns: int, flags: int, hop_limit: int, destination: NodeId = BROADCAST
     ) -> Packet:
-        """Make a control packet of this node, with its next sequence number, marked as handled here."""
+        """Make a control packet of this node, with its next sequence number; its copies count as duplicates here."""
 
     def forwarded(self, packet: Packet, *, flags: int) -> bytes:
-        """The bytes of a packet for its next hop: with one hop more, and this node as previous hop."""
+        """The bytes of a packet for its next hop: the hop count is one greater, and this node is the previous hop."""
 
     def drop(self, reason: DropReason, packet: Packet, *, now_ns: int) -> None: ...
 
     def mark(self, packet: Packet, *, flags: int) -> None:
-        """Know copies of a packet in the phase of these flags that come from now on."""
+        """From now on, treat copies of a packet in the phase of these flags as duplicates."""
 
     def forget(self, packet: Packet) -> None:
-        """Treat a later copy of a packet as new: this node was not to handle it yet, or its custody has passed on."""
+        """Treat a later copy of a packet as new, because this node was not to handle it yet, or has handed over its
+        custody.
+        """
 
     def record(self, record: Record) -> None: ...
 
@@ -76,55 +78,60 @@ class RoutingProtocol(ABC):
     """One routing protocol at one node."""
 
     origin_flags: ClassVar[int] = 0
-    """The flags with which the node makes this protocol's application packets."""
+    """The flags of the application packets that this node originates."""
 
     def __init__(self, port: Port) -> None:
         self._port = port
 
     def start(self, now_ns: int) -> None:  # noqa: B027  (stateless protocols have nothing to start)
-        """Begin: the node is up."""
+        """The node has started."""
 
     @abstractmethod
     def originate(self, packet: Packet, *, due_ns: int, now_ns: int) -> None:
-        """Take a packet of this node's application; its first frame may go from `due_ns`, one lead after its birth."""
+        """Handle a packet of an own application; its first frame may be sent from `due_ns`, one lead after its
+        generation.
+        """
 
     @abstractmethod
     def receive(self, packet: Packet, reception: Reception, *, now_ns: int) -> Sequence[Relay] | None:
-        """Take in the first copy of a packet in its phase. The node delivers it to the application.
+        """Handle the first copy of a packet in its phase; the node delivers it to the application itself.
 
-        Returns what is passed on because of it, if anything: the node sends that, together with what else came
-        in the same frame. A protocol sends anything else through its port.
+        Returns the relays of this packet, if any. The node sends them together with relays of other packets that came
+        in the same frame. Anything else a protocol sends through its port.
         """
 
     def hello_inner(self, room: int, *, now_ns: int) -> bytes:
-        """The inner frames that this protocol adds to the node's hello, in at most so many bytes."""
+        """The inner frames that this protocol adds to the node's hello, at most `room` bytes."""
         return b""
 
     def hello_share(self, *, now_ns: int) -> float:
-        """The part of the hello interval after which the next hello should go."""
+        """The share of the hello interval after which the next hello should be sent."""
         return 1.0
 
     def hello_start_ns(self, start_ns: int) -> int:
-        """The instant from which a hello may go that is due at `start_ns`."""
+        """The earliest instant at which a hello, due at `start_ns`, may be sent."""
         return start_ns
 
     def on_hello(self, packet: Packet, reception: Reception, *, now_ns: int) -> None:  # noqa: B027
-        """Take in a neighbor's hello."""
+        """A neighbor's hello was received."""
 
     def on_impersonation(self, packet: Packet, *, now_ns: int) -> None:  # noqa: B027
-        """Take in a packet that another node sent in the name of this one; it goes no further."""
+        """A packet was received that names this node as its origin, but that another node has made;
+        it goes no further.
+        """
 
     def on_copy(self, key: int, *, now_ns: int) -> None:  # noqa: B027
-        """Take in another copy, in the same phase, of a packet that was handled before (`duplicates.key_of`).
+        """Another copy of a packet (`duplicates.key_of`) was received, in a phase in which it was handled before.
 
-        It may call off what is planned; nothing may become due sooner, because the node does not ask again.
+        The protocol may cancel what it has planned. It must not plan anything sooner, because the node does not ask
+        again.
         """
 
     def on_status(self, status: TxStatus, *, now_ns: int) -> None:  # noqa: B027
-        """Take in how a transmission ended; only those that asked for it are told of."""
+        """The radio reports how a transmission ended; it does so only for those that asked for a status."""
 
     def wake(self, now_ns: int) -> None:  # noqa: B027
-        """Act at an instant that `next_wake_ns` has named."""
+        """The instant has come that `next_wake_ns` has named."""
 
     def next_wake_ns(self) -> int | None:
         return None
@@ -134,19 +141,21 @@ class RoutingProtocol(ABC):
         return 0
 
     def bound_ns(self) -> int | None:
-        """The delay within which all nodes have the next packet of this node; None: no bound is stated."""
+        """The delay within which all nodes have the next packet of this node; None if no bound is stated."""
         return None
 
     def clusters(self) -> Mapping[NodeId, tuple[NodeId, ...]]:
-        """The nodes of each cluster by head, the head first, as far as this node knows; empty: there are none."""
+        """The nodes of each cluster by its head, the head first, as far as this node knows; empty if there are no
+        clusters.
+        """
         return {}
 
     def least_interval_ns(self, deadline_ns: int) -> int | None:
-        """The least interval between packets of this node that meets this delay at all nodes; None: unknown,
-        or there is none.
+        """The least interval between packets of this node that meets this deadline at all nodes; None if it is unknown,
+        or if there is none.
         """
         return None
 
     def report(self) -> Mapping[str, object]:
-        """JSON-able state, for people."""
+        """The state and the counters, as JSON values."""
         return {}

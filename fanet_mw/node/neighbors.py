@@ -1,4 +1,4 @@
-"""The nodes that are heard directly, with the last hello of each. A neighbor expires when its hellos stop."""
+"""The neighbors of a node, each with its last hello. A neighbor expires when its hellos stop."""
 
 from typing import Final, NamedTuple
 
@@ -6,7 +6,8 @@ from fanet_mw.units import NodeId
 from fanet_mw.wire.inner import Beacon
 
 LIFETIME_HELLOS: Final = 3.5
-"""A neighbor is gone after this many silent hello intervals (OLSR's NEIGHB_HOLD_TIME is 3, RFC 3626 18.3)."""
+"""A neighbor expires after this number of hello intervals without a hello (3 in OLSR: NEIGHB_HOLD_TIME, RFC 3626,
+18.3)."""
 
 
 class Neighbor(NamedTuple):
@@ -29,7 +30,7 @@ class Neighbors:
         self._by_id[neighbor.node] = neighbor
 
     def forget(self, node: NodeId) -> None:
-        """Forget a neighbor whose link has failed, before its lifetime is over."""
+        """Forget a neighbor before its lifetime is over, because the link to it has failed."""
         self._by_id.pop(node, None)
 
     def count(self, *, now_ns: int) -> int:

@@ -1,7 +1,7 @@
-"""The packets that begin at one node: numbered without gaps, and known to the node before any copy comes back.
+"""The packets that a node originates: numbered without gaps, and in its duplicate set before any copy comes back.
 
-Data and control packets are numbered apart, so that a missing number of data shows a missing packet. A node that starts
-again must not reuse the names of its earlier packets: its numbers begin beyond all that time had room for.
+Data and control packets have sequence numbers of their own, so that a gap in the numbers of data shows a lost packet. A
+node that starts again must not use its earlier numbers: it begins above all numbers that it had time to use.
 """
 
 from typing import Final
@@ -26,20 +26,22 @@ class OwnPackets:
         self._node = node
         self._duplicates = duplicate_set
         self._most_bytes = most_bytes
-        """What a frame may be long (`radio.max_frame_bytes`)."""
+        """The greatest length of a frame (`radio.max_frame_bytes`)."""
         self._first_seq, self._next_seq = 0, {False: 0, True: CONTROL}
         self.held: set[bytes] = set()
-        """Names of data packets (`wire.NAME`) that were accepted, and of which no frame has been announced yet."""
+        """The names (`wire.NAME`) of data packets that were accepted, and of which no frame has been announced yet."""
 
     def start(self, now_ns: int) -> None:
-        """The node is up, for the first time or again."""
+        """The node has started, for the first time or again."""
         first = now_ns // RESTART_STEP_NS % CONTROL
         self._first_seq, self._next_seq = first, {False: first, True: CONTROL + first}
 
     def make(
         self, kind: Kind, inner: bytes, *, destination: NodeId, priority: int, flags: int, hop_limit: int, born_ns: int
     ) -> Packet:
-        """The next packet, marked as handled; raises LocalProtocolError when it is longer than a frame may be."""
+        """Make the next packet, and mark it as handled; raises LocalProtocolError if it is longer
+        than a frame may be.
+        """
         size = wire.HEADER_BYTES + len(inner)
         bound = self._most_bytes
         if size > bound:
@@ -56,5 +58,7 @@ class OwnPackets:
         return _new(Packet, (header, frame))
 
     def handed_on(self, origin: int, seq: int) -> bool:
-        """True if the node has given data this name since its start: custody of it has passed on, and may come back."""
+        """True if this is a data packet that the node has originated since its start and handed
+        over; it may come back.
+        """
         return origin == self._node and self._first_seq <= seq < self._next_seq[False]

@@ -1,6 +1,6 @@
-"""What a node offers to its protocol: frames go out here, control packets are made, drops are counted and recorded.
+"""The port of a node, through which its protocol sends frames, makes control packets, and drops packets.
 
-Nothing here calls the node or its protocol. What a protocol wants sent waits in `requests` until the actor takes it.
+The port calls neither the node nor the protocol. Transmissions wait in `requests` until the actor takes them.
 """
 
 from collections import Counter
@@ -40,9 +40,10 @@ class NodePort:
         self.frames_sent = 0
         self.dropped: Counter[str] = Counter()
         self.watched: set[int] = set()
-        """Sequence numbers of own packets whose fate is of interest."""
+        """The sequence numbers of own packets whose fate an application wants to know."""
         self.fates: list[tuple[int, int, DropReason | None]] = []
-        """What became of these: (number, instant, why it was dropped; None: it was let out)."""
+        """The fates of these: sequence number, instant, and the reason of the drop, or None if the
+        packet was released."""
         self._duplicates = duplicate_set
         self._own = own
         self._held = own.held
@@ -81,19 +82,21 @@ class NodePort:
     def forwarded(self, packet: Packet, *, flags: int) -> bytes:
         header = packet.header
         hops = header.hops
-        if hops < wire.MOST_HOPS:  # a hostile frame may come with all of them
+        if hops < wire.MOST_HOPS:  # a hostile frame may come with the greatest hop count
             hops += 1
         return wire.rewrite(packet.frame, self.node, header.hop_limit - 1, hops, flags)
 
     def _begun(self, packet: Packet, flags: int) -> bytes:
-        """The bytes of a packet whose phase begins here: of the node's own as it is, of another's one hop further."""
+        """The bytes of a packet whose phase begins here: an own packet as it is, another node's with one more hop."""
         header = packet.header
         if header.origin != self.node:
             return self.forwarded(packet, flags=flags)
         return wire.rewrite(packet.frame, self.node, header.hop_limit, header.hops, flags)
 
     def _share(self, frames: Sequence[tuple[int, bytes]]) -> None:
-        """Broadcast packets in as few frames as they fit; a frame goes at the first instant of those in it."""
+        """Broadcast packets in as few frames as possible; a frame is sent at the earliest instant
+        of the packets in it.
+        """
         chunk: list[bytes] = []
         first_ns, size, most = 0, 0, self.scenario.radio.max_frame_bytes
         for start_ns, frame in frames:
@@ -115,7 +118,7 @@ class NodePort:
         self.requests.append(_new(TxRequest, (seq, start_ns, frame, BROADCAST, False)))
 
     def _let_out(self, frame: bytes, start_ns: int) -> None:
-        """Record when the first frame of a packet of the node's application goes."""
+        """Record when the first frame of an own application's packet is sent."""
         name = frame[wire.NAME]
         if name in self._held:
             self._held.remove(name)

@@ -1,7 +1,8 @@
-"""The bounded priority queue of a node. Nothing leaves it without being transmitted or named in a drop.
+"""The bounded priority queue of a node. Each packet leaves it either to be transmitted, or to be dropped with a reason.
 
-Order: priority first (0 is the most urgent), then arrival. When full, the least important and youngest entry goes.
-Classes may expire sooner than the rest: what warns of a collision is worth nothing after a second.
+Packets are ordered by priority (0 is the most urgent), then by arrival. If the queue is full, the newest packet of the
+least important priority is evicted. Some classes expire sooner than others: a collision warning is worth nothing after
+a second.
 """
 
 from bisect import bisect_left, insort
@@ -19,13 +20,13 @@ _ALIKE: Final[Mapping[int, int]] = MappingProxyType({})
 
 
 def sooner_us(routing: Routing) -> Mapping[int, int]:
-    """The time by which a class expires sooner than `routing.lifetime_s`, by priority."""
+    """How much earlier than `routing.lifetime_s` each priority class expires, for the classes that do."""
     whole_ns = routing.lifetime_ns(-1)
     return {p: (whole_ns - routing.lifetime_ns(p)) // US for p in (PRIORITY_SAFETY, PRIORITY_REPORT)}
 
 
 class TxQueue:
-    """Packets waiting for a slot or a route."""
+    """Packets that wait for a slot or a route."""
 
     def __init__(self, *, capacity: int, sooner_us: Mapping[int, int] = _ALIKE) -> None:
         self._capacity = capacity
@@ -33,7 +34,7 @@ class TxQueue:
         self._entries: list[tuple[int, int, Packet]] = []
         self._order = 0
         self._fresh_us = 0
-        """No packet here expires as long as the horizon, before which packets are too old, is not after this."""
+        """No packet in the queue was generated before this instant [us], so none expires by an earlier horizon."""
 
     def __len__(self) -> int:
         return len(self._entries)
@@ -43,11 +44,11 @@ class TxQueue:
         return bool(self._entries) and any(key_of_packet(entry[2]) == key for entry in self._entries)
 
     def remove(self, key: int) -> None:
-        """Give up a packet, if it is queued."""
+        """Remove a packet if it is queued."""
         self._entries = [entry for entry in self._entries if key_of_packet(entry[2]) != key]
 
     def push(self, packet: Packet, *, rank: int | None = None) -> Packet | None:
-        """Add a packet; return the one that had to go for it (perhaps itself), or None.
+        """Add a packet; returns the packet that was evicted for it, which may be itself, or None.
 
         `rank` is the priority at which it waits here, by default its own.
         """
@@ -61,12 +62,12 @@ class TxQueue:
         return self._entries.pop()[2] if len(self._entries) > self._capacity else None
 
     def pop(self) -> Packet:
-        """Take the most urgent packet."""
+        """Remove the most urgent packet."""
         assert self._entries, "whoever pops has looked at the length"
         return self._entries.pop(0)[2]
 
     def pop_fitting(self, size: int) -> list[Packet]:
-        """Take the most urgent packets, in order, as long as they fit into so many bytes together."""
+        """Remove the most urgent packets, in order, as long as together they fit into `size` bytes."""
         taken = []
         while self._entries and len(self._entries[0][2].frame) <= size:
             taken.append(self.pop())
@@ -78,7 +79,7 @@ class TxQueue:
         return [packet for _, _, packet in self._of(rank)]
 
     def take(self, size: int, *, rank: int) -> list[Packet]:
-        """Take packets of one priority, in order, as long as they fit into so many bytes together."""
+        """Remove packets of one priority, in order, as long as together they fit into `size` bytes."""
         taken: list[Packet] = []
         begin = bisect_left(self._entries, (rank,))
         for _, _, packet in self._of(rank):
@@ -90,7 +91,7 @@ class TxQueue:
         return taken
 
     def take_older(self, *, before_us: int, rank: int) -> list[Packet]:
-        """Take out the packets of one priority that were generated before an instant [swarm us]."""
+        """Remove the packets of one priority that were generated before an instant [swarm us]."""
         older = [entry for entry in self._of(rank) if entry[2].header.origin_us < before_us]
         for entry in older:
             self._entries.remove(entry)
@@ -100,9 +101,11 @@ class TxQueue:
         return self._entries[bisect_left(self._entries, (rank,)) : bisect_left(self._entries, (rank + 1,))]
 
     def expire(self, *, before_us: int) -> list[Packet]:
-        """Take out every packet generated before an instant [swarm us], or that much later if its class is sooner."""
+        """Remove all packets that were generated before an instant [swarm us], or before a later one if their class
+        expires sooner.
+        """
         if not self._entries or before_us <= self._fresh_us:
-            return []  # else every wake-up would look at all of a long queue
+            return []  # otherwise each wake-up would examine the whole queue
         stale: list[tuple[int, int, Packet]] = []
         kept: list[tuple[int, int, Packet]] = []
         for entry in self._entries:
@@ -113,6 +116,6 @@ class TxQueue:
         return [entry[2] for entry in stale]
 
     def drain(self) -> list[Packet]:
-        """Take everything, most urgent first."""
+        """Remove all packets, the most urgent first."""
         entries, self._entries = self._entries, []
         return [entry[2] for entry in entries]

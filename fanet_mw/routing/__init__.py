@@ -1,6 +1,6 @@
-"""Routing protocols behind the contract of the core, by the name a scenario gives.
+"""The routing protocols, by the names that scenarios give them (`routing.protocol`).
 
-A protocol is imported when it is chosen: no node carries the others.
+A protocol is imported only when a scenario chooses it.
 """
 
 from collections.abc import Callable, Mapping
@@ -22,16 +22,16 @@ MAKERS: Final[Mapping[str, str]] = {
     "counter": "fanet_mw.routing.storm:CounterBased",
     "geographic": "fanet_mw.routing.geographic:Geographic",
 }
-"""What makes each of this package's own protocols (`scenario.routing.PROTOCOLS`), as MODULE:NAME."""
+"""The class or function that makes each protocol of this package (`scenario.routing.PROTOCOLS`), as MODULE:NAME."""
 
 
 def module_of(name: str) -> str:
-    """The module of the protocol of this name, which need not be imported yet."""
+    """The name of the module of a protocol; a protocol of this package is not imported for it."""
     return MAKERS[name].partition(":")[0] if name in MAKERS else str(maker_of(name).__module__)
 
 
 def maker_of(name: str) -> Maker:
-    """What makes the protocol of this name; it is imported now."""
+    """The class or function that makes the protocol of this name; it is imported now."""
     if name not in MAKERS:
         return load("routing.protocol", name)  # type: ignore[no-any-return]
     module, _, made = MAKERS[name].partition(":")
@@ -39,5 +39,5 @@ def maker_of(name: str) -> Maker:
 
 
 def make_protocol(port: Port) -> RoutingProtocol:
-    """The protocol that the port's scenario names."""
+    """The protocol that the scenario of this port names."""
     return maker_of(port.scenario.routing.protocol)(port)

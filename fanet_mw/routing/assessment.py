@@ -1,6 +1,7 @@
-"""Packets under random assessment: relayed unless enough copies are heard meanwhile (Ni et al., MobiCom 1999, 3.2).
+"""Random assessment delay: a packet is relayed unless enough copies of it are received in time (Ni et al., MobiCom
+1999, 3.2).
 
-first copy -> wait -> fewer than `enough` copies heard: it is relayed | enough copies heard: it is forgotten
+    first copy -> wait -> fewer than `enough` copies received: relayed | enough copies received: forgotten
 """
 
 import heapq
@@ -10,12 +11,12 @@ from fanet_mw.node.packet import Packet
 
 
 class Assessment:
-    """The packets of one node that wait for further copies."""
+    """The packets of one node that are being assessed."""
 
     def __init__(self, *, enough: int) -> None:
         self._enough = enough
         self.pending: dict[int, tuple[int, Packet]] = {}
-        """The number of copies heard and the packet, by key; a copy of another packet changes nothing here."""
+        """The packets by key, each with the number of copies received."""
         self._due: list[tuple[int, int]] = []
 
     def __len__(self) -> int:
@@ -29,7 +30,7 @@ class Assessment:
         heapq.heappush(self._due, (due_ns, key))
 
     def on_copy(self, key: int, *, now_ns: int) -> None:
-        """Count a copy that another node has relayed."""
+        """Another node has relayed a copy."""
         pending = self.pending.get(key)
         if pending is None:
             return
@@ -42,15 +43,15 @@ class Assessment:
     def next_wake_ns(self) -> int | None:
         due, pending = self._due, self.pending
         while due and due[0][1] not in pending:
-            heapq.heappop(due)  # this packet was decided meanwhile
+            heapq.heappop(due)  # it was decided already
         return due[0][0] if due else None
 
     def decided(self, *, now_ns: int) -> list[tuple[int, Packet]]:
-        """The packets that too few others have relayed, each with the instant at which its assessment was over."""
+        """The packets that too few other nodes have relayed, each with the instant at which its assessment ended."""
         relays, due = [], self._due
         while due and due[0][0] <= now_ns:
             due_ns, key = heapq.heappop(due)
             open_ = self.pending.pop(key, None)
-            if open_ is not None:  # else this packet was decided meanwhile
+            if open_ is not None:  # it was decided already
                 relays.append((due_ns, open_[1]))
         return relays

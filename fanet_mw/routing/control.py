@@ -1,8 +1,8 @@
-"""Control messages of rival protocols on the air: pieces of FANET_ROUTING in a packet of kind ROUTING.
+"""The control messages of the rival protocols on the air: FANET_ROUTING messages in a packet of kind ROUTING.
 
-A message is a type and bytes. The high half of the type names the protocol, so that no protocol decodes messages of
-another. All pieces of a message travel in one radio frame, so `capacity` bounds its length. Bodies are read by
-`BodyReader`, which raises MalformedFrameError for any byte that is missing.
+A control message has a type and a body. The high half of the type names the protocol, so no protocol decodes messages
+of another. All pieces of a message travel in one radio frame, so `capacity` bounds its length. `BodyReader` reads
+bodies, and raises MalformedFrameError if bytes are missing.
 """
 
 import struct
@@ -70,7 +70,7 @@ def decode(frame: bytes) -> tuple[int, bytes]:
 
 
 class BodyReader:
-    """Reads a body from its beginning; a request for more than there is raises MalformedFrameError."""
+    """Reads a body from its beginning; reading beyond its end raises MalformedFrameError."""
 
     def __init__(self, body: bytes) -> None:
         self._body = body

@@ -1,4 +1,4 @@
-"""No routing: one transmission, to the destination or to all nodes in range. It shows what the MAC alone can do."""
+"""No routing: each packet is transmitted once, to its destination or to all nodes in range. It shows the MAC alone."""
 
 from fanet_mw.bus.messages import Reception
 from fanet_mw.node.contract import RoutingProtocol
@@ -14,4 +14,4 @@ class Direct(RoutingProtocol):
         self._port.transmit(packet.frame, NodeId(packet.header.destination), start_ns=due_ns, wants_status=saturated)
 
     def receive(self, packet: Packet, reception: Reception, *, now_ns: int) -> None:
-        pass  # the node has delivered the packet, or the packet is for another node
+        pass  # the node has delivered the packet already, or it is for another node

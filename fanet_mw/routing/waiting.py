@@ -1,4 +1,4 @@
-"""Packets that wait for a route: a bounded FIFO that evicts the oldest; each packet also has an end."""
+"""A bounded FIFO of packets that wait for a route: when it is full, the oldest is evicted; each packet expires, too."""
 
 from typing import NamedTuple
 
@@ -7,7 +7,7 @@ from fanet_mw.units import NodeId
 
 
 class Held(NamedTuple):
-    """A packet, and the instant at which it is given up."""
+    """A packet, and the instant at which it expires."""
 
     packet: Packet
     ends_ns: int
@@ -41,7 +41,7 @@ class WaitingRoom:
         return taken
 
     def expire(self, *, now_ns: int) -> list[Packet]:
-        """Remove and return the packets that have reached their end."""
+        """Remove and return the packets that have expired."""
         over = [held.packet for held in self._held if held.ends_ns <= now_ns]
         if over:
             self._held = [held for held in self._held if held.ends_ns > now_ns]

@@ -1,6 +1,6 @@
-"""What each table of a scenario allows alone but the scenario as a whole does not.
+"""Checks that span several tables of a scenario; each table checks itself.
 
-Each problem is a sentence with the keys, their values and the bound; all of them are found, not only the first.
+Each problem is a sentence with the keys, their values and the bound. All problems are found, not only the first.
 """
 
 from __future__ import annotations  # `Scenario` imports this module: to it, the name is a type only
@@ -22,24 +22,24 @@ MESSAGE_BYTES: Final = {
 HEARTBEAT and GLOBAL_POSITION_INT, with which every hello begins. The air format itself is not known here: the emulator
 reads scenarios too, and to it frames are bytes."""
 _SCHEDULE_PLACES: Final = 2
-"""FANET_PLACES that go with one full FANET_SCHEDULE."""
+"""The number of FANET_PLACES messages that go with one full FANET_SCHEDULE."""
 _TAKEN: Final = frozenset(("report", "warning", "telemetry", "receipt", "joined", "formation"))
-"""What other applications are called in a trace."""
+"""The names that other applications have in a trace, which traffic classes may not use."""
 _RIVALS: Final = ("aodv", "olsr", "dsdv", "geographic")
 _MOST_CLUSTERS_ABREAST: Final = 7
-"""A circle around one head has room for six others that are no nearer to each other than to it."""
+"""The greatest number of clusters side by side: a circle around one head has room for six more heads."""
 _LINKS: Final = 36
-"""Links of one FANET_LINKS."""
+"""The number of links in one FANET_LINKS message."""
 _MOST_LINKS_MESSAGES: Final = 4
-"""FANET_LINKS of one frame."""
+"""The number of FANET_LINKS messages in one frame."""
 _TELLS_NEIGHBORS: Final = ("heads", "cds", "mpr", "claimed")
-"""Relay rules for which a hello says which nodes its sender hears."""
+"""The relay rules with which a hello states which nodes its sender hears."""
 _RIVAL_FRAME_BYTES: Final = 256
-"""Control messages of a fixed length must fit one frame; longer ones are divided."""
+"""Control messages of a fixed length must fit a frame of this length; longer ones are divided."""
 
 
 def disagreements(scenario: Scenario) -> Sequence[str]:
-    """One sentence for each problem; none: the tables agree."""
+    """One sentence for each problem; empty if the tables agree."""
     found = []
     count = scenario.nodes.count
     if scenario.warmup_s + scenario.drain_s >= scenario.duration_s:
@@ -85,7 +85,7 @@ def disagreements(scenario: Scenario) -> Sequence[str]:
 
 
 def _impossible_traffic(scenario: Scenario, traffic: Traffic) -> Iterator[str]:
-    """Nodes that there are not, packets that are too long, and what a timetable has no room for."""
+    """Nodes that do not exist, packets that are too long, and classes for which a timetable has no room."""
     count, most = scenario.nodes.count, scenario.radio.max_frame_bytes
     if traffic.destination != "all" and traffic.destination > count:
         yield f"traffic.destination = {traffic.destination} must be <= nodes.count = {count}"
@@ -107,7 +107,7 @@ def _impossible_traffic(scenario: Scenario, traffic: Traffic) -> Iterator[str]:
 
 
 def _too_small_frames(scenario: Scenario) -> Iterator[str]:
-    """Messages that have no parts to be divided into and must fit one frame."""
+    """Messages that cannot be divided and do not fit one frame."""
     most, relay = scenario.radio.max_frame_bytes, scenario.clusters.relay
     clustered = scenario.routing.protocol == "clustered"
     size, least = MESSAGE_BYTES, dict[str, int]()
@@ -136,7 +136,7 @@ def _too_small_frames(scenario: Scenario) -> Iterator[str]:
 
 
 def _impossible_formation(scenario: Scenario) -> Iterator[str]:
-    """What formation flight by clusters needs."""
+    """Missing preconditions of formation flight by clusters."""
     mission = scenario.mission
     if mission.formation == "none":
         return
@@ -152,7 +152,7 @@ def _impossible_formation(scenario: Scenario) -> Iterator[str]:
 
 
 def _wrong_for_rivals(scenario: Scenario) -> Sequence[str]:
-    """What a protocol that goes hop by hop needs, and what needs such a protocol."""
+    """Settings that a hop-by-hop protocol needs or excludes."""
     found = []
     if scenario.routing.protocol in _RIVALS and scenario.radio.max_frame_bytes < _RIVAL_FRAME_BYTES:
         found.append(
@@ -168,7 +168,7 @@ def _wrong_for_rivals(scenario: Scenario) -> Sequence[str]:
 
 
 def _unkept_deadline(scenario: Scenario) -> Sequence[str]:
-    """A deadline that no node could hold a bound against."""
+    """A deadline without a bound that could be compared with it."""
     deadline_s = scenario.traffic.deadline_s
     if deadline_s is None or (scenario.routing.protocol, scenario.clusters.relay) == ("clustered", "scheduled"):
         return ()
@@ -179,7 +179,7 @@ def _unkept_deadline(scenario: Scenario) -> Sequence[str]:
 
 
 def _blind_warnings(scenario: Scenario) -> Iterator[str]:
-    """Warnings of collisions without what they are computed from, or without room to avoid."""
+    """Collision warnings without the data from which they are computed, or without room to avoid."""
     mission = scenario.mission
     if not mission.collision_horizon_s:
         return
@@ -196,7 +196,7 @@ def _blind_warnings(scenario: Scenario) -> Iterator[str]:
 
 
 def _impossible_places(scenario: Scenario) -> Iterator[str]:
-    """Survivors outside the area, or in buildings that there are not."""
+    """Survivors outside the area, or in buildings that do not exist."""
     mission, world = scenario.mission, scenario.world
     for index, (east, north) in enumerate(mission.survivor_positions_m):
         if max(abs(east), abs(north)) > world.area_m / 2:
@@ -211,7 +211,7 @@ def _impossible_places(scenario: Scenario) -> Iterator[str]:
 
 
 def _impossible_faults(scenario: Scenario) -> Sequence[str]:
-    """Faults of nodes that there are not, and links that are none."""
+    """Faults of nodes that do not exist, and of links from a node to itself."""
     found = []
     count = scenario.nodes.count
     for index, (_, control) in enumerate(scenario.planned_faults):

@@ -1,6 +1,6 @@
-"""A scenario file for people: every key with its meaning, unit and bound in a comment above it.
+"""Writes a scenario file for people: a comment above each key has its meaning, unit and bound.
 
-A key that is set stands as it is; a key that has its default stands behind `#`, ready to be changed.
+Keys with their default values are commented out, ready to be changed.
 """
 
 import json
@@ -19,9 +19,9 @@ SCHEMA_NAME: Final = "fanet-scenario.schema.json"
 
 
 def commented(tree: Mapping[str, Any], *, every_key: bool = True, schema: bool = False) -> str:
-    """A scenario file that reads back as `tree`; without `every_key` it has only those keys that `tree` has.
+    """A scenario file that reads back as `tree`; without `every_key` it has only the keys of `tree`.
 
-    `schema`: its first line names the JSON schema beside it.
+    With `schema`, its first line names the JSON schema beside it.
     """
     lines = [f"#:schema ./{SCHEMA_NAME}"] if schema else []
     if every_key:
@@ -39,7 +39,7 @@ def commented(tree: Mapping[str, Any], *, every_key: bool = True, schema: bool =
 
 
 def _of_kind(kinds: list[KeyTable], given: Mapping[str, Any]) -> KeyTable:
-    """The table whose kind the given values name; the first when they name none."""
+    """The table of the kind that the given values name; the first one if they name none."""
     return next(
         (table for table in kinds if table.heading and table.heading == f'kind = "{given.get("kind")}"'), kinds[0]
     )
@@ -63,7 +63,7 @@ def _entries(path: str, given: list[Any] | tuple[Any, ...]) -> Iterator[str]:
 
 
 def _assignment(name: str, value: object) -> str:
-    """A key and its value, on lines that may stand in any table: a table within one is written inline."""
+    """A key and its value, on lines that fit any table; a nested table is written inline."""
     if isinstance(value, Mapping):
         inside = ", ".join(_assignment(str(key), inner) for key, inner in value.items())
         return f"{_bare_or_quoted(name)} = {{{inside}}}"
@@ -75,7 +75,7 @@ def _bare_or_quoted(name: str) -> str:
 
 
 def _outline(table: KeyTable) -> Iterator[str]:
-    """What an entry of an array of tables would be, all of it behind `#`."""
+    """An example entry of an array of tables, commented out."""
     yield from ("", *_comment(table.meaning), f"# [[{table.path}]]")
     for key in table.keys:
         value = table.heading.partition(" = ")[2] if key.name == "kind" else _default(key)

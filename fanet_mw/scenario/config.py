@@ -1,6 +1,7 @@
-"""From a TOML file and `KEY=VALUE` overrides to a frozen `Scenario`. Every mistake is reported at once.
+"""Reads a scenario: a TOML file and `KEY=VALUE` overrides become a frozen `Scenario`. All mistakes are reported at
+once.
 
-A message names the file, the key, the value and the bound, because the reader has only that line.
+Each message names the file, the key, the value and the bound, because the user may see nothing but that line.
 """
 
 import difflib
@@ -59,10 +60,11 @@ def build(tree: Mapping[str, Any], *, source: str = "scenario") -> Scenario:
 
 
 def departures(scenario: Scenario) -> dict[str, Any]:
-    """What a scenario has that is not the default: its tree of plain values, which builds the same scenario again.
+    """The values of a scenario that differ from the defaults, as a tree of plain values from which it can be built
+    again.
 
-    A default that follows from another key is none where that key has changed it: a rate of 11 Mb/s is the default, but
-    not of 802.11g.
+    If the default of a key depends on another key that was changed, the value is included: a rate of 11 Mb/s is the
+    default, but not for 802.11g.
     """
     whole = scenario.model_dump(mode="json", exclude_none=True)
     tree = scenario.model_dump(mode="json", exclude_none=True, exclude_defaults=True)
@@ -82,7 +84,7 @@ def departures(scenario: Scenario) -> dict[str, Any]:
 
 
 def _from_folder(tree: dict[str, Any], folder: Path) -> None:
-    """Make the paths of other files in a tree independent of the current folder."""
+    """Make the paths of other files in a tree absolute, taken from a folder."""
     traffic = tree.get("traffic")
     for number, table in enumerate(traffic if isinstance(traffic, list) else [traffic]):
         if isinstance(table, dict) and isinstance(table.get("packets_csv"), str) and table["packets_csv"]:
@@ -96,7 +98,7 @@ def _from_folder(tree: dict[str, Any], folder: Path) -> None:
 
 
 def _packets(path: Path, key: str) -> list[list[str]]:
-    """The packets of a file, `seconds,bytes` on each line; raises ConfigError with the line that is none."""
+    """The packets of a file with `seconds,bytes` on each line; raises ConfigError with the line that is wrong."""
     try:
         lines = path.read_text(encoding="utf-8").splitlines()
     except (OSError, UnicodeDecodeError) as error:
@@ -105,7 +107,7 @@ def _packets(path: Path, key: str) -> list[list[str]]:
     for number, line in enumerate(lines, start=1):
         cells = [cell.strip() for cell in line.split(",")]
         if not line.strip() or line.startswith("#") or (number == 1 and not _is_number(cells[0])):
-            continue  # a heading, or nothing
+            continue  # a heading or an empty line
         if len(cells) != 2 or not all(_is_number(cell) for cell in cells):
             raise ConfigError(f"{key} = {path}, line {number}: {line!r} must be seconds,bytes")
         found.append(cells)
@@ -117,7 +119,7 @@ def _is_number(text: str) -> bool:
 
 
 def _apply(tree: dict[str, Any], override: str) -> None:
-    """Set one dotted key; the value is TOML, or else taken as a string."""
+    """Set one dotted key; the value is TOML, or otherwise taken as a string."""
     key, equals, text = override.partition("=")
     key = key.strip()
     if not equals or not key:
@@ -144,7 +146,7 @@ def _entry(entries: list[Any], part: str, override: str) -> Any:  # noqa: ANN401
 
 
 def _plain(key: str, value: object, problems: list[str], path: str) -> object:
-    """A value without units; what is wrong with its unit goes to `problems`."""
+    """A value without its unit; what is wrong with the unit is added to `problems`."""
     if isinstance(value, Mapping):
         return {name: _plain(name, inner, problems, f"{path}.{name}") for name, inner in value.items()}
     if isinstance(value, list | tuple):
@@ -160,7 +162,7 @@ def _plain(key: str, value: object, problems: list[str], path: str) -> object:
 
 
 def one_value(text: str) -> object:
-    """The value of some TOML text; what is no TOML is a string, so that names need no quotes."""
+    """The value of some TOML text; text that is no TOML is a string, so that names need no quotes."""
     try:
         return tomllib.loads(f"value = {text}")["value"]
     except tomllib.TOMLDecodeError:
@@ -180,7 +182,7 @@ def _sentence(item: dict[str, Any]) -> str:
 
 
 def _is_branch(part: str) -> bool:
-    """Pydantic names the member of a union in the location; people did not write it."""
+    """True for a part of a location that names the member of a union; pydantic adds it, and users do not know it."""
     return "[" in part or part in {"int", "float", "constrained-int", "literal"}
 
 

@@ -1,4 +1,4 @@
-"""The identity of a scenario that two processes run: a fingerprint of every value, and which keys differ."""
+"""Compares the scenarios of two processes: a fingerprint of all values, and which keys differ."""
 
 import hashlib
 import json
@@ -12,12 +12,12 @@ DIGITS: Final = 16
 
 
 def as_json(scenario: Scenario) -> str:
-    """Every value of a scenario, the same text for the same values."""
+    """All values of a scenario as text, the same text for the same values."""
     return json.dumps(scenario.model_dump(mode="json"), sort_keys=True, separators=(",", ":"))
 
 
 def fingerprint(scenario: Scenario) -> str:
-    """Processes of one swarm must agree on it."""
+    """The fingerprint of a scenario, on which all processes of a swarm must agree."""
     return hashlib.sha256(as_json(scenario).encode()).hexdigest()[:DIGITS]
 
 

@@ -1,7 +1,7 @@
-"""Units of a scenario's keys: which one a key's name ends in, and values that are written with a unit of their own.
+"""Units of a scenario's keys: which unit each key has by its name, and values that are written with a unit.
 
-`duration_s = "2 min"` and `--set radio.lead_ms=0.06s` are understood, because the key says which unit it wants. A unit
-of another dimension, and a unit for a key that has none, are refused: a unit is never ignored.
+`duration_s = "2 min"` and `--set radio.lead_ms=0.06s` are accepted, because the unit is converted into that of the key.
+A unit of another dimension is refused, and so is a unit for a key that has none: no unit is ever ignored.
 """
 
 import re
@@ -42,20 +42,21 @@ _SUFFIXES: Final[Mapping[str, tuple[str, Mapping[str, str]]]] = {
     "_kg": ("kg", {"g": "1e-3", "kg": "1"}),
     "_c": ("°C", {"C": "1", "°C": "1"}),
 }
-"""The unit by the end of a key's name, the longest first, and what the units of the same dimension are worth."""
+"""The unit for each ending of a key's name, the longest ending first, and the factors of units of
+the same dimension."""
 _QUANTITY: Final = re.compile(r"([+-]?(?:\d+\.?\d*|\.\d+)(?:[eE][+-]?\d+)?)\s*([a-zA-Zµ°][a-zA-Zµ°/²0-9]*)")
 
 
 def unit_of(key: str) -> str:
-    """The unit that the name of a key ends in; empty when it ends in none."""
+    """The unit by the ending of a key's name; empty if the name has no such ending."""
     found = _entry(key)
     return found[0] if found else ""
 
 
 def in_unit_of(key: str, text: str) -> float | None:
-    """A number with a unit, in the unit of the key; None when the text is no number with a unit.
+    """A number with a unit, converted to the unit of the key; None if the text is no number with a unit.
 
-    Raises ValueError, with the units that the key understands, when the text has another one.
+    Raises ValueError with the accepted units if the unit is another one.
     """
     match = _QUANTITY.fullmatch(text.strip())
     if match is None:

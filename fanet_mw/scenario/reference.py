@@ -1,6 +1,6 @@
-"""What can be said of every key of a scenario: its table, unit, bound, default and meaning, read from the models.
+"""All that is known about the keys of a scenario, read from the models: table, unit, bound, default and meaning.
 
-One walk serves the reference page, the comments that `fanet init` writes, and the completion of keys.
+The reference page, the comments that `fanet init` writes, and the completion of keys all use it.
 """
 
 import json
@@ -14,7 +14,7 @@ from fanet_mw.scenario.quantities import unit_of
 Schema = Mapping[str, Any]
 _REFERENCE: Final = "#/$defs/"
 REQUIRED: Final = object()
-"""The default of a key that has none."""
+"""Stands for the default of a key without one."""
 
 
 class Key(NamedTuple):
@@ -31,9 +31,9 @@ class KeyTable(NamedTuple):
     """One table of a scenario file."""
 
     path: str
-    """The path as in the file, for example `radio`; empty for the keys above all tables."""
+    """The path as in the file, for example `radio`; empty for the keys before all tables."""
     heading: str
-    """What tells it from other tables of the same path, for example `kind = "jam"`."""
+    """The setting that distinguishes this table from others with the same path, for example `kind = "jam"`."""
     repeated: bool
     """True for an array of tables: `[[faults]]`."""
     meaning: str
@@ -41,7 +41,7 @@ class KeyTable(NamedTuple):
 
     @property
     def title(self) -> str:
-        """The title of a table as it is written in a file."""
+        """The title of a table as it stands in a file."""
         brackets = f"[[{self.path}]]" if self.repeated else f"[{self.path}]"
         return f"{brackets} {self.heading}".strip() if self.path else "Top level"
 
@@ -52,7 +52,7 @@ def json_schema() -> dict[str, Any]:
     assert isinstance(schema, dict), "the schema of a model is an object"
     del schema["description"]
     keys = schema["properties"]
-    one = keys.pop("further_traffic")["items"]  # how a file says it: the same table several times
+    one = keys.pop("further_traffic")["items"]  # in a file it is the same table several times
     keys["traffic"] = {"anyOf": [one, {"type": "array", "items": one}]}
     return {
         "$schema": "https://json-schema.org/draft/2020-12/schema",
@@ -62,13 +62,13 @@ def json_schema() -> dict[str, Any]:
 
 
 def tables() -> list[KeyTable]:
-    """Every table of a scenario file, the keys above all tables first."""
+    """All tables of a scenario file; the keys before all tables come first."""
     schema = json_schema()
     return list(_tables("", schema, schema["$defs"], meaning="One file is one scenario.", repeated=False))
 
 
 def dotted_keys() -> list[str]:
-    """Every key as `--set` takes it; those of arrays of tables are left out."""
+    """All keys that `--set` accepts, except those in arrays of tables."""
     return [f"{table.path}.{key.name}".lstrip(".") for table in tables() if not table.repeated for key in table.keys]
 
 
@@ -105,7 +105,7 @@ def _tables(
 
 
 def _references(schema: Schema, *, many: bool = False) -> Iterator[tuple[str, bool]]:
-    """(model, whether in an array) of the tables that a value may be."""
+    """(model, whether in an array) for each table that a value may be."""
     if "$ref" in schema:
         yield schema["$ref"].removeprefix(_REFERENCE), many
     for word in ("anyOf", "oneOf", "allOf"):
@@ -116,7 +116,7 @@ def _references(schema: Schema, *, many: bool = False) -> Iterator[tuple[str, bo
 
 
 def _unit(name: str, schema: Schema) -> str:
-    """The unit of a key that holds numbers: that in which its name ends, unless the model says another."""
+    """The unit of a key with numbers: by the ending of its name, unless the model states another."""
     unit = schema.get("unit", unit_of(name))
     return str(unit) if "number" in (types := set(_types(schema))) or "integer" in types else ""
 
@@ -131,7 +131,7 @@ def _types(schema: Schema) -> Iterator[str]:
 
 
 def bound(schema: Schema) -> str:
-    """The values that a schema allows, in words."""
+    """The values that a schema accepts, in words."""
     if "anyOf" in schema:
         return "; or ".join(bound(part) for part in schema["anyOf"] if part.get("type") != "null")
     if "const" in schema:
@@ -182,7 +182,7 @@ def _list(schema: Schema) -> str:
 
 
 def _single_lines(value: object) -> object:
-    """A schema whose descriptions are single lines: a docstring's lines end where the source's do."""
+    """A schema whose descriptions are single lines, because docstrings are wrapped as in the source."""
     if isinstance(value, dict):
         return {
             key: re.sub(r"\s+", " ", item) if key == "description" and isinstance(item, str) else _single_lines(item)

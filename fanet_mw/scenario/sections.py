@@ -1,8 +1,7 @@
-"""What all tables of a scenario file have in common: frozen, no unknown keys, every number within bounds.
+"""The base of all tables of a scenario file: frozen, no unknown keys, every number within bounds.
 
-A bound is there so that whatever a run computes from a number stays finite and ends: instants fit 64 bits of
-nanoseconds, intervals are long enough to be counted, powers are within what any radio or noise has. None is a limit
-that an experiment would meet.
+The bounds exist so that all that a run computes stays finite: instants fit 64 bits of nanoseconds, intervals are long
+enough to be counted, powers are those of some radio or noise. They are too wide to restrict any experiment.
 """
 
 from typing import Annotated, Final
@@ -17,20 +16,20 @@ MOST_S: Final = 1e6
 Duration = Annotated[float, Field(ge=0, le=MOST_S)]
 """Seconds."""
 SomeTime = Annotated[float, Field(ge=1e-3, le=MOST_S)]
-"""Seconds, at least a millisecond."""
+"""Seconds, at least one millisecond."""
 Interval = Annotated[float, Field(ge=0.01, le=MOST_S)]
-"""Seconds from one event to the next of its kind; at most a hundred of them are in a second."""
+"""Seconds between two events of the same kind, at least 10 ms."""
 Milliseconds = Annotated[float, Field(ge=0, le=1e6)]
 Rate = Annotated[float, Field(ge=0, le=1000)]
-"""Events a second."""
+"""Events per second."""
 Length = Annotated[float, Field(ge=0, le=1e6)]
 """Metres."""
 SomeLength = Annotated[float, Field(ge=1e-3, le=1e6)]
-"""Metres, at least a millimetre."""
+"""Metres, at least one millimetre."""
 Coordinate = Annotated[float, Field(ge=-1e6, le=1e6)]
 """Metres from the origin, along one axis."""
 Speed = Annotated[float, Field(ge=0, le=1000)]
-"""Metres a second."""
+"""Metres per second."""
 Decibels = Annotated[float, Field(ge=0, le=300)]
 """A loss or a ratio."""
 Level = Annotated[float, Field(ge=-300, le=300)]

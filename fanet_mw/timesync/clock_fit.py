@@ -1,12 +1,13 @@
-"""Swarm time as a line over a node's own clock, fitted to pairs (own instant, how far swarm time is ahead of it then).
+"""Fits swarm time as a line over a node's own clock: each data point (pair) states how far swarm time was ahead of the
+clock.
 
     swarm - own = offset + rate x (own - at)       weighted least squares over the last pairs (FTSP, Maroti et al. 2004)
 
-Each pair comes with a bound of its error; a pair that lies farther from the line than both errors allow is counted and
-left out. When more pairs of the window agree with each other against the line than support it, the line was wrong and
-is fitted anew to them; a single source cannot achieve that against others, however many pairs it states. The error that
-is stated is an estimate, not a proof: four standard deviations of the fit, in addition to the errors that the pairs
-state.
+Each pair states a bound of its error. A pair that lies farther from the line than both errors allow is counted as an
+outlier, and left out. If more pairs in the window agree with each other against the line than support it, the line was
+wrong, and is fitted anew to them. A single neighbor cannot achieve that against others, however many pairs it states.
+The stated error of the line is an estimate and not a proof: four standard deviations of the fit, plus the errors that
+the pairs state.
 """
 
 import math
@@ -21,7 +22,7 @@ WINDOW_NS: Final = 30 * S
 """Older pairs are dropped, because rates wander."""
 _SIGMAS: Final = 4.0
 _AGREEING: Final = 2
-"""The least number of agreeing pairs that replace a line."""
+"""At least this many agreeing pairs are needed to replace a line."""
 
 
 class Pair(NamedTuple):
@@ -31,9 +32,9 @@ class Pair(NamedTuple):
     offset_ns: int
     error_ns: int
     rate: float = 0.0
-    """The rate at which that error may have grown since, as the sender of the pair states it (parts)."""
+    """The rate at which that error may have grown since, as the sender of the pair has stated (parts)."""
     source: int = 0
-    """Which node stated the pair."""
+    """The node that has stated the pair."""
 
 
 class Oscillator(NamedTuple):
@@ -69,12 +70,12 @@ class Line(NamedTuple):
         return local_ns + self.offset_at(local_ns)
 
     def local_ns(self, swarm_ns: int) -> int:
-        """What the own clock shows at that swarm time."""
+        """The instant that the own clock shows at that swarm time."""
         beyond_ns = swarm_ns - self.at_ns - self.offset_ns
         return self.at_ns + beyond_ns - round(beyond_ns * (self.rate / (1 + self.rate)))
 
     def error_ns(self, local_ns: int, oscillator: Oscillator) -> int:
-        """A bound of the line's error at an instant, as it is stated to others."""
+        """The bound of the line's error at an instant, as the node states it to others."""
         far_ns = abs(local_ns - self.at_ns)
         drift_ns = min(oscillator.rate, _SIGMAS * self.rate_sd) * far_ns
         drift_ns += min(oscillator.rate, self.stated_rate) * abs(local_ns - self.last_ns)
@@ -84,19 +85,19 @@ class Line(NamedTuple):
         return math.ceil(self.stated_ns + _SIGMAS * self.offset_sd_ns + drift_ns + wander_ns)
 
     def rate_error(self, oscillator: Oscillator) -> float:
-        """A bound of the error of the rate (parts), as it is stated to others."""
+        """The bound of the rate's error (parts), as the node states it to others."""
         return min(oscillator.rate, self.stated_rate + _SIGMAS * self.rate_sd)
 
 
 def alike(one: Pair, other: Pair, oscillator: Oscillator) -> bool:
-    """True if both pairs may lie on one line."""
+    """True if both pairs may belong to the same line."""
     drift_ns = oscillator.rate * abs(one.local_ns - other.local_ns)
     margin_ns = one.error_ns + other.error_ns + 2 * oscillator.stamp_ns
     return abs(one.offset_ns - other.offset_ns) <= drift_ns + margin_ns
 
 
 def _is_one_against_others(against: list[Pair], for_it: list[Pair]) -> bool:
-    """True if a single source contradicts what others have stated."""
+    """True if a single source contradicts several others."""
     sources = {pair.source for pair in against}
     return len(sources) == 1 and any(pair.source not in sources for pair in for_it)
 
@@ -123,7 +124,7 @@ def fitted(pairs: list[Pair], oscillator: Oscillator) -> Line:
     residual = math.fsum(w * (y - rate * x) ** 2 for w, x, y in points) / whole
     free = count / (count - 2) if count > 2 else 1.0
     sigma_ns = max(floor_ns, math.sqrt(residual * free))
-    slope_ns = max(sigma_ns, stated_ns / count**2)  # with few pairs their stated errors may amount to a slope too
+    slope_ns = max(sigma_ns, stated_ns / count**2)  # with few pairs, their stated errors may also cause a slope
     effective = whole * whole / math.fsum(w * w for w in weights)
     middle_ns = at_ns + round(mean_x)
     return Line(
@@ -155,7 +156,7 @@ class ClockFit:
         return len(self._pairs)
 
     def add(self, pair: Pair) -> bool:
-        """Take in a pair; returns True if it is believed."""
+        """Add a pair; returns True if it is accepted."""
         horizon_ns = pair.local_ns - WINDOW_NS
         while self._against and self._against[0].local_ns < horizon_ns:
             self._against.popleft()
@@ -178,7 +179,7 @@ class ClockFit:
         self.line = fitted(list(self._pairs), self._oscillator)
 
     def agrees(self, pair: Pair) -> bool:
-        """True if the pair lies where the line may be, with both errors allowed for."""
+        """True if the pair is within both errors of the line."""
         assert self.line is not None, "only a line can be agreed with"
         apart_ns = abs(pair.offset_ns - self.line.offset_at(pair.local_ns))
         margin_ns = self.line.error_ns(pair.local_ns, self._oscillator) + pair.error_ns

@@ -1,11 +1,11 @@
-"""Which statement of swarm time a node believes while it has no time of its own.
+"""Decides which statement of swarm time a node accepts while it has no time of its own.
 
-    a neighbor states the time -> which others state the same? -> enough, and more than contradict -> believed
+    a neighbor states the time -> how many others state the same? -> enough, and more than contradict it -> accepted
 
-The leader's statement of its own time is believed at once. Any other statement needs a second neighbor that agrees, or
-a while in which no more neighbors contradict it than agree. So two honest neighbors outvote a liar that is the first to
-speak. Not detected: a liar that is the only neighbor, and liars that outnumber the honest neighbors. Both are believed
-until others contradict them (`clock_fit`).
+The leader's statement of its own time is accepted at once. Any other statement needs a second neighbor that agrees, or
+some time in which no more neighbors contradict it than agree with it. So two honest neighbors outvote a liar that
+speaks first. Not detected: a liar that is the only neighbor, and liars that outnumber the honest neighbors. Both are
+believed until others contradict them (`clock_fit`).
 """
 
 from typing import Final
@@ -18,20 +18,20 @@ _ENOUGH: Final = 2
 
 
 class FirstBelief:
-    """What the neighbors have stated while nothing was believed."""
+    """The statements of neighbors while none has been accepted."""
 
     def __init__(self, oscillator: Oscillator, *, leader: NodeId, wait_ns: int, memory_ns: int) -> None:
         self._oscillator = oscillator
         self._leader = leader
         self._wait_ns = wait_ns
-        """A single statement waits so long for a second one."""
+        """How long a single statement waits for a second one."""
         self._memory_ns = memory_ns
-        """A statement counts for so long."""
+        """How long a statement counts."""
         self._stated: dict[NodeId, tuple[int, Pair]] = {}
         self._since_ns: int | None = None
 
     def on_statement(self, src: NodeId, reference: int, pair: Pair, *, local_ns: int) -> bool:
-        """Take in a neighbor's statement; True if the node should follow this reference from now on, as stated."""
+        """A neighbor has stated the time; returns True if the node should follow this reference from now on."""
         if self._since_ns is None:
             self._since_ns = local_ns
         horizon_ns = pair.local_ns - self._memory_ns

@@ -1,17 +1,17 @@
-"""Swarm time over the air: hellos carry the time of one reference hop by hop, in two steps each, as in FTSP.
+"""Time synchronization over the air: hellos carry the time of one reference node from hop to hop, as in FTSP.
 
-    hello n ends                   its sender and all its receivers stamp that instant, each by its own clock
+    hello n ends                   its sender and all receivers stamp that instant, each by its own clock
     hello n+1 says "hello n ended at swarm time t"     -> a pair (own stamp, t) -> the fit of `clock_fit`
 
-So the delay of a hello by contention does no harm. The reference is the node with the lowest id: a node that has
-received no news of a reference for a while takes its own clock, and a node that learns of a lower reference follows it
-(root election by time-out, Maroti et al. 2004). A reference that comes later, or takes over, continues the time that
-the swarm has. Pairs are taken from the neighbors nearest to the reference; other neighbors can only contradict. A
-beacon is news if the reference's `round` has advanced.
+Because the time stamp of a hello is sent in the next one, it does not matter how long a hello contends for the channel.
+The reference is the node with the lowest id. A node that has had no news of a reference for a while becomes the
+reference, and a node that learns of a reference with a lower id follows that one (root election by time-out, Maroti et
+al. 2004). A node that becomes reference later continues the time that the swarm has. Pairs are taken from the neighbors
+nearest to the reference; other neighbors can only contradict. A beacon is news if the reference's `round` has advanced.
 
-Sans-IO: own instants and beacons go in; the line to swarm time, its error and the next beacon come out. Not provided:
-secrecy and proof of origin. A forged beacon that is plausible counts as one neighbor's statement, also if it is the
-first of all; it can be outvoted, but is not recognized.
+Sans-IO: instants of the own clock and beacons go in; the line to swarm time, its error and the next beacon come out.
+Not provided: secrecy and proof of origin. A plausible forged beacon counts as one neighbor's statement, even as the
+first one; it can be outvoted, but is not recognized.
 """
 
 import math
@@ -27,29 +27,29 @@ from fanet_mw.units import MS, NodeId, S
 from fanet_mw.wire.inner import TimeBeacon
 
 _LISTEN_HELLOS: Final = 2.5
-"""The leader listens so long at its start, because a swarm that already has a time keeps it."""
+"""How long the leader listens at its start, because a swarm that already has a time keeps it."""
 _SILENT_HELLOS: Final = 16
-"""A node that has had no news of a reference for this long becomes the reference; the lower its id, the sooner."""
+"""A node that has had no news of a reference for this long becomes the reference; nodes with lower ids do so sooner."""
 _FIRST_HELLOS: Final = 32
-"""The same for a node that has had no time yet: the leader's comes about two hello intervals later at each hop."""
+"""The same for a node that never had a time: the leader's time takes about two hello intervals for each hop."""
 _STAGGER_HELLOS: Final = 0.5
 _STAGGERED: Final = 32
 _FRESH_HELLOS: Final = 4.5
 """A neighbor whose round has not advanced for this long has lost the reference."""
 _SETTLED: Final = 8
-"""A node with a lower id collects so many pairs before it takes over from the reference."""
+"""The number of pairs that a node with a lower id collects before it takes over from the reference."""
 _PROVEN: Final = 2
-"""It takes so many pairs to follow another reference."""
+"""The number of pairs that it takes to follow another reference."""
 _HASTY: Final = 4
 """Pairs of one neighbor that are closer together than a hello interval divided by this are not counted."""
 _DOUBT_HELLOS: Final = 1.5
-"""A node without a time waits so long for a second neighbor to state the same; each states it once per hello."""
+"""How long a node without a time waits for a second neighbor to state the same; each states it once per hello."""
 _STAMPS: Final = 4
-"""The ends of so many hellos of each neighbor are remembered."""
+"""The number of hellos of each neighbor whose ends are remembered."""
 _NEIGHBORS: Final = 256
 MOST_STATED_NS: Final = 20 * MS
-"""Hellos state no greater error than this, whatever it is: more means a node without a time, or nonsense, and guard
-times do not allow for it."""
+"""The greatest error that hellos state. A greater one means a node without a time, or nonsense, and guard times do not
+allow for it."""
 _WORST_LIFE_NS: Final = 20 * S
 _PPB: Final = 1e9
 _U32: Final = 0xFFFF_FFFF
@@ -60,19 +60,21 @@ class Settings(NamedTuple):
 
     node: NodeId
     leads: bool
-    """True for the swarm's leader, which waits for no other reference."""
+    """True for the leader of the swarm, which waits for no other reference."""
     hello_ns: int
     oscillator: Oscillator
     flight_ns: int
     """The longest propagation delay to a neighbor."""
     limit_ns: int
-    """A swarm time that is farther than this from the own clock is not believed."""
+    """A swarm time that differs from the own clock by more than this is not accepted."""
     leader: NodeId
-    """The leader of the swarm; what it states of its own time needs no second statement."""
+    """The leader of the swarm; its statement of its own time needs no second statement."""
 
     @property
     def hop_ns(self) -> int:
-        """The error that a hop adds to that of a pair: half the flight time is assumed, two stamps are rounded."""
+        """The error that each hop adds to that of a pair: half the flight time is assumed, and two
+        stamps are rounded.
+        """
         return self.flight_ns // 2 + self.oscillator.stamp_ns
 
 
@@ -86,19 +88,19 @@ class _LastBeacon:
     hops: int = 0
     advanced_ns: int = 0
     trusted: bool = True
-    """True if its last pair was believed."""
+    """True if its last pair was accepted."""
     paired_ns: int | None = None
     stamps: dict[int, int] = field(default_factory=dict)
 
 
 class TimeSync:
-    """One node's synchronization to swarm time. All instants are of the node's own clock unless they say swarm."""
+    """The synchronization of one node. Instants are of the node's own clock unless they are said to be swarm time."""
 
     def __init__(self, own: Settings) -> None:
         self._own = own
         self._fit = ClockFit(own.oscillator)
         self._rival: tuple[int, ClockFit, int] | None = None
-        """Another reference that may be followed: its id, its pairs so far, and since when it has been considered."""
+        """Another reference that may be followed: its id, its pairs so far, and since when it is considered."""
         self._neighbors: dict[NodeId, _LastBeacon] = {}
         self._doubt_ns = int(_DOUBT_HELLOS * own.hello_ns)
         self._first = FirstBelief(
@@ -110,8 +112,8 @@ class TimeSync:
         self._sent: tuple[int, int] | None = None
         """The last hello that this node has sent: its number, and when it ended."""
         self.reference: int | None = None
-        """The reference whose time this node has; None when it has none. It is the node's own id without `is_reference`
-        after a restart, when the swarm still has the time of this node."""
+        """The reference whose time this node has; None if it has none. After a restart it may be the node's own id
+        without `is_reference`, because the swarm still has the time of this node."""
         self.is_reference = False
         self._round = 0
         self._news_ns = 0
@@ -160,18 +162,18 @@ class TimeSync:
     # --- sending --------------------------------------------------------------------------------------------------
 
     def start(self, local_ns: int) -> None:
-        """Take in that the node has started."""
+        """The node has started."""
         self._news_ns = local_ns
         self._arm(local_ns, hellos=_FIRST_HELLOS)
         if self._own.leads:
             self._claim_ns = local_ns + int(_LISTEN_HELLOS * self._own.hello_ns)
 
     def hello_sent(self, hello: int, *, ended_ns: int) -> None:
-        """Take in that a hello of this node has left the antenna."""
+        """A hello of this node has left the antenna."""
         self._sent = (hello, ended_ns)
 
     def beacon(self, local_ns: int) -> TimeBeacon | None:
-        """The beacon for the next hello, about the last one; None without a time or without a last hello."""
+        """The beacon for the next hello, about the previous one; None without a time, or without a previous hello."""
         self.pass_time(local_ns)
         hops = self.hops(local_ns)
         if self.reference is None or self._sent is None or hops is None:
@@ -194,7 +196,7 @@ class TimeSync:
         )
 
     def pass_time(self, local_ns: int) -> None:
-        """Become the reference, when there has been none for long enough or when it is time to take over."""
+        """Become the reference if there has been none for long enough, or if it is time to take over."""
         if self.is_reference:
             return
         needed = _PROVEN if self.reference == self._own.node else _SETTLED
@@ -215,7 +217,7 @@ class TimeSync:
     # --- receiving ------------------------------------------------------------------------------------------------
 
     def on_hello(self, src: NodeId, hello: int, beacon: TimeBeacon | None, *, ended_ns: int, local_ns: int) -> None:
-        """Take in a neighbor's hello, which ended at `ended_ns`, with the time beacon that it carries, if any."""
+        """A neighbor's hello was received, which ended at `ended_ns`, with the time beacon in it, if any."""
         neighbor = self._neighbor(src, local_ns)
         pair = None
         if beacon is not None:
@@ -237,7 +239,7 @@ class TimeSync:
         return found
 
     def _pair(self, neighbor: _LastBeacon, src: NodeId, beacon: TimeBeacon, local_ns: int) -> Pair | None:
-        """Take in the state of a neighbor; returns the pair that its beacon completes, if the pair is admissible."""
+        """Update what is known of a neighbor; returns the pair that its beacon completes, if it is admissible."""
         if beacon.node != src:
             self.counts["foreign"] += 1
             return None
@@ -250,7 +252,7 @@ class TimeSync:
         if ended_ns is None or self._is_stale(neighbor.advanced_ns, local_ns):
             return None
         if neighbor.paired_ns is not None and ended_ns - neighbor.paired_ns < self._own.hello_ns // _HASTY:
-            self.counts["hasty"] += 1  # a neighbor that speaks more often must not have more weight
+            self.counts["hasty"] += 1  # a neighbor that sends more often must not have more weight
             return None
         offset_ns = beacon.t_ns - ended_ns
         if abs(offset_ns) > self._own.limit_ns:
@@ -278,10 +280,10 @@ class TimeSync:
             self._consider(beacon.reference, pair, local_ns)
 
     def _follow(self, neighbor: _LastBeacon, pair: Pair, local_ns: int) -> None:
-        """Take in a pair from a neighbor that follows the same reference."""
+        """Use a pair from a neighbor that follows the same reference."""
         steps = self._fit.steps
         if self._fit.line is None:
-            self._fit.add(pair)  # `FirstBelief` has believed it
+            self._fit.add(pair)  # `FirstBelief` has accepted it
             return
         agrees = self._fit.agrees(pair)
         if not agrees:
@@ -295,7 +297,7 @@ class TimeSync:
             self._fit.add(pair)
 
     def _note_news(self, neighbor: _LastBeacon, local_ns: int) -> None:
-        """Note that the reference was alive a moment ago, if the neighbor is one whose time this node takes."""
+        """The reference was alive a moment ago, if this neighbor is one whose time this node uses."""
         if self.is_reference or neighbor.reference != self.reference or not neighbor.trusted:
             return
         if neighbor.hops + 1 == self.hops(local_ns):
@@ -309,7 +311,9 @@ class TimeSync:
             self._worst = (value_ns, stated_at_ns)
 
     def _consider(self, reference: int, pair: Pair, local_ns: int) -> None:
-        """Collect pairs of another reference (a lower id, or the own one is silent); follow it after `_PROVEN`."""
+        """Collect pairs of another reference, because its id is lower or the own reference is silent; after `_PROVEN`
+        follow it.
+        """
         rival = self._rival
         if rival is None or reference < rival[0] or self._is_stale(rival[2], local_ns):
             rival = self._rival = (reference, ClockFit(self._own.oscillator), local_ns)
@@ -319,7 +323,7 @@ class TimeSync:
         if len(rival[1]) < _PROVEN:
             return
         self.counts["step"] += self._fit.line is not None and not self._fit.agrees(pair)
-        self._fit = rival[1]  # what earlier pairs state of their error holds against the reference that they are of
+        self._fit = rival[1]  # earlier pairs and their errors refer to the former reference
         self.reference, self.is_reference, self._rival = reference, False, None
         self._news_ns = local_ns
         self._arm(local_ns)

@@ -1,8 +1,9 @@
-"""FANET_DIGEST: in a hello, which recent packets its sender holds, per origin. Sequence numbers as in RFC 1982.
+"""FANET_DIGEST: a part of a hello that states which recent packets of each origin the sender has.
 
-    newest = 107, held = 0b0101   holds 107, 106 and 104; lacks 105
+    newest = 107, held = 0b0101   has 107, 106 and 104; lacks 105
 
-Data packets of one origin are numbered without gaps, so a missing packet shows.
+The data packets of an origin are numbered without gaps, so a missing packet can be seen. Sequence numbers wrap as in
+RFC 1982.
 """
 
 from collections.abc import Mapping, Sequence
@@ -15,7 +16,7 @@ from fanet_mw.serial import newer
 from fanet_mw.wire import DIGEST, OVERHEAD, VERSION, Packed, decode_every, encode_inner
 
 WINDOW: Final = 33
-"""The packets of one origin that an entry covers: the newest and the 32 before it."""
+"""The number of packets of one origin that an entry covers: the newest and the 32 before it."""
 CAPACITY: Final = 24
 """Entries of one message."""
 MESSAGE_BYTES: Final = OVERHEAD + DIGEST.layout.size
@@ -25,21 +26,21 @@ _new: Final = tuple.__new__  # for what is made once per packet
 
 
 def capacity(room: int) -> int:
-    """The holdings that fit into so many bytes; there is always room for one message (checked with the scenario)."""
+    """The number of holdings that fit into so many bytes; at least those of one message (checked with the scenario)."""
     return max(1, room // MESSAGE_BYTES) * CAPACITY
 
 
 class Holding(NamedTuple):
-    """The packets of one origin that are held."""
+    """The packets of one origin that a node has."""
 
     origin: int
     newest: int
     held: int
 
     def beyond(self, other: "Holding | None") -> list[int]:
-        """The packets that this holding has and the other lacks, newest first.
+        """The packets that this holding has and the other lacks, the newest first.
 
-        Packets before the other's window are included, because the other may or may not have them.
+        Packets before the other's window are included, because it is not known whether the other has them.
         """
         mine = self.held << 1 | 1
         if other is not None:
@@ -51,7 +52,7 @@ class Holding(NamedTuple):
             elif behind < WINDOW:
                 mine &= ~(theirs >> behind) & ((1 << WINDOW - behind) - 1)
             elif not newer(self.newest, other.newest):
-                return []  # the other is so far ahead that its window says nothing about the packets held here
+                return []  # the other is so far ahead that its window says nothing about these packets
         missing = []
         while mine:
             lowest = mine & -mine
@@ -60,7 +61,7 @@ class Holding(NamedTuple):
         return missing
 
     def with_(self, seq: int) -> "Holding":
-        """The same holding with this packet added."""
+        """The holding with this packet added."""
         origin, newest, held = self
         ahead = (seq - newest) & _SEQ_MASK
         if 0 < ahead < _HALF:
@@ -76,11 +77,11 @@ class Digest:
 
     holdings: tuple[Holding, ...]
     complete: bool
-    """True if nothing is held of any origin without a holding."""
+    """True if the sender has no packets of the origins that are missing here."""
 
     @cached_property
     def by_origin(self) -> Mapping[int, Holding]:
-        """The holdings by origin; a digest that forty nodes hear is arranged once."""
+        """The holdings by origin, arranged once for all nodes that receive the hello."""
         return {holding.origin: holding for holding in self.holdings}
 
     def encode_frames(self, node: int) -> bytes:

@@ -1,7 +1,8 @@
-"""The inner messages of clusters, clocks and the mission: hello, schedule, join, survivor, time.
+"""The inner messages of clusters, clocks and the mission: beacon, schedule, join, survivor, time.
 
-Like all of this dialect (`fanet_mw.wire`) they are coded by struct; decoders are total, and refuse values that no
-sender of this project states. Digests, places, claims and links have files of their own.
+Like all messages of this dialect (`fanet_mw.wire`) they are coded by struct. Any bytes decode to a message or to
+MalformedFrameError; values that no node of this project would send are malformed. Digests, places, claims and links
+have files of their own.
 """
 
 from enum import IntEnum
@@ -25,11 +26,11 @@ from fanet_mw.wire import (
 )
 
 CAPACITY: Final = 56
-"""Entries of one part of a schedule."""
+"""The number of entries in one part of a schedule."""
 MOST_DBM: Final = 300.0
-"""The greatest received power, of either sign."""
+"""The greatest absolute value of a received power."""
 MOST_SURVIVORS: Final = 10_000
-"""The greatest id of a survivor, which limits how much is remembered of them."""
+"""The greatest id of a survivor, which bounds how much must be remembered."""
 
 
 class Role(IntEnum):
@@ -46,7 +47,7 @@ def _check(version: int, node: int, *, t_us: int = 0) -> None:
 
 
 class Beacon(NamedTuple):
-    """FANET_BEACON: the part of a hello for routing."""
+    """FANET_BEACON: the routing part of a hello."""
 
     node: int
     head: int
@@ -58,7 +59,7 @@ class Beacon(NamedTuple):
     hops_to_head: int
     term: int = 0
     leader: int = 0
-    """The leader that the sender follows, and (`term`) since when that node leads; 0 when it follows none."""
+    """The leader that the sender follows; 0 if it follows none. `term` states since when that node leads."""
 
     def encode_frame(self, node: int) -> bytes:
         return encode_inner(
@@ -87,7 +88,7 @@ _HEAD_BIT: Final = 0x8000
 
 
 class Schedule(NamedTuple):
-    """FANET_SCHEDULE: one part of the leader's assignment; epoch 0 without members is a call to join."""
+    """FANET_SCHEDULE: one part of the leader's assignment. Epoch 0 without members is a call to join."""
 
     start_us: int
     period_us: int
@@ -158,7 +159,8 @@ class Join(NamedTuple):
     velocity: Enu = STILL
     """The velocity [m/s]."""
     instead_of: int = 0
-    """The silent node that this one stands in for if it is that node's head; the node's own id: it objects; 0: none."""
+    """The silent node that the sender reports; if that is its head, the sender stands in for it. 0 means none, and the
+    sender's own id that the sender objects to a report."""
 
     def encode_frame(self, node: int) -> bytes:
         payload = JOIN.layout.pack(*self.position, *self.velocity, self.node, self.instead_of, VERSION)
@@ -196,7 +198,7 @@ class Survivor(NamedTuple):
         """The report of these fields; raises MalformedFrameError."""
         t_us, survivor, east, north, up, rssi_dbm, reporter, version = fields
         _check(version, reporter, t_us=t_us)
-        if not abs(rssi_dbm) <= MOST_DBM or not 0 < survivor <= MOST_SURVIVORS:  # true for what is not a number
+        if not abs(rssi_dbm) <= MOST_DBM or not 0 < survivor <= MOST_SURVIVORS:  # also true for NaN
             raise MalformedFrameError(f"rssi {rssi_dbm} of survivor {survivor}")
         return cls(t_us, survivor, reporter, _within(east, north, up, most=FARTHEST_M), rssi_dbm)
 

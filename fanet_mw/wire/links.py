@@ -1,9 +1,10 @@
-"""FANET_LINKS: how well nodes hear each other, as joins report it and as the leader announces it with an assignment.
+"""FANET_LINKS: the measured quality of links, as nodes report it in joins and as the leader announces it to all.
 
     join of a node       epoch 0; from_nodes: the neighbor, to_nodes: the sender of the join
     leader to all        the links of one assignment, both directions of a pair as one entry, in parts of one frame each
 
-A grade is the logarithm of the share of frames that a link loses, so that grades of independent copies add up.
+The grade of a link is the negative logarithm of the share of frames that it loses, so grades of independent copies add
+up.
 """
 
 import math
@@ -19,14 +20,14 @@ CAPACITY: Final = 36
 MESSAGES: Final = 4
 """Messages of one frame: 144 links, which take just under 1000 bytes."""
 NEPERS: Final = 25.0
-"""Steps of the grade per factor e of loss."""
+"""The number of steps of the grade for a loss that is smaller by the factor e."""
 _MOST_GRADE: Final = 230
 _LEAST_DBM: Final = -128
 _MOST_DBM: Final = 127
 
 
 class Link(NamedTuple):
-    """A measured link; from the leader it stands for both directions."""
+    """A measured link; if the leader announces it, it stands for both directions."""
 
     a: NodeId
     b: NodeId
@@ -45,7 +46,7 @@ def grade_of(chance: float) -> int:
 
 
 def power_of(rssi_dbm: float) -> int:
-    """A received power as it is sent, in whole dBm."""
+    """A received power in whole dBm, as it is sent."""
     return max(_LEAST_DBM, min(_MOST_DBM, round(rssi_dbm)))
 
 

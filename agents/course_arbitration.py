@@ -1,7 +1,7 @@
-"""The choice of the course that a UAV flies, of those that its applications command.
+"""Chooses the course that a UAV flies among those that its applications command.
 
-A course is flown if no other application objects, once all have had the same input; of several courses of one
-application the last counts.
+The last command of each application counts. A course is flown if no other application objects; they are asked after all
+of them have received the same input.
 """
 
 from collections.abc import Callable, Sequence
@@ -10,7 +10,7 @@ from fanet_mw.application import Application, Course
 
 
 class CourseArbitration:
-    """The courses that the applications of one UAV command, and the one that is flown."""
+    """The commanded courses of one UAV, and the choice among them."""
 
     def __init__(
         self,
@@ -18,7 +18,7 @@ class CourseArbitration:
         judges: Sequence[Application],
         fly: Callable[[Course, int], None],
     ) -> None:
-        """`applications` stand in the order in which their courses count; `judges` are those that may object."""
+        """`applications`, in the order in which their courses count. `judges`: the applications that may object."""
         self._applications = tuple(applications)
         self._judges = tuple(judges)
         self._fly = fly
@@ -29,7 +29,7 @@ class CourseArbitration:
         self._commanded[application.name] = course
 
     def settle(self, now_ns: int) -> None:
-        """Fly what was commanded since the last input."""
+        """Fly the course that was commanded since the last input and to which no application objects."""
         if not self._commanded:
             return
         commanded, self._commanded = self._commanded, {}

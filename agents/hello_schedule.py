@@ -1,4 +1,4 @@
-"""The instants at which a UAV says hello, and the neighbors that it has heard say hello lately."""
+"""Decides when a UAV sends hellos, and remembers which neighbors have recently sent one."""
 
 from typing import Final, Protocol
 
@@ -8,35 +8,36 @@ from fanet_mw.scenario import Scenario
 from fanet_mw.units import NodeId, seconds_to_ns
 
 _JITTER: Final = 0.1
-"""A hello varies by this share of its interval, so that neighbors in step do not stay so (RFC 3626, 3.4)."""
+"""Hello intervals vary by this share, so that neighbors that send at the same time do not continue to do so (RFC 3626,
+3.4)."""
 _LIFETIME_HELLOS: Final = 4
-"""The hello intervals without a word after which a node is no neighbor any more."""
+"""The number of hello intervals without a hello after which a node is no longer a neighbor."""
 
 
 class HelloTime(Protocol):
-    """What adds swarm time to the hellos of a node."""
+    """Adds time beacons to the hellos of a node."""
 
     def frames(self) -> bytes:
-        """The inner frames for the hello that is said now; empty while there is no time to tell."""
+        """The inner frames for the hello that is sent now; empty while the node has no time."""
 
     def announced(self, hello: AnnouncedHello) -> None:
-        """Take in that the hello was announced to the radio, which will tell when it has ended."""
+        """The hello was announced to the radio, which will report when it has ended."""
 
 
 class HelloSchedule:
-    """The hellos of one UAV, and those that it hears."""
+    """The hellos that one UAV sends and receives."""
 
     def __init__(self, scenario: Scenario, node: Node, time: HelloTime | None) -> None:
-        """`time` adds swarm time to the hellos; None: they say nothing of it."""
+        """`time` adds time beacons to the hellos; None if hellos carry no time."""
         self._node = node
         self._time = time
         self._lead_ns = scenario.radio.lead_ns
         self._interval_ns = seconds_to_ns(scenario.routing.hello_interval_s)
         self._random = stream(scenario.seed, "hello", node.node).random
         self._next_ns: int | None = None
-        """The instant of the next hello; None: the UAV says none."""
+        """The instant of the next hello; None if the UAV sends none."""
         self._heard_ns: dict[NodeId, int] = {}
-        """The instant at which a hello of each other node was heard last."""
+        """The instant at which the last hello of each other node was received."""
 
     def start(self, now_ns: int) -> None:
         """Choose the instant of the first hello, at random within the first interval."""
@@ -44,11 +45,11 @@ class HelloSchedule:
             self._next_ns = now_ns + self._lead_ns + int(self._random() * self._interval_ns)
 
     def due_ns(self) -> int | None:
-        """The instant at which the next hello has to be announced to the radio."""
+        """The instant at which the next hello must be announced to the radio."""
         return None if self._next_ns is None else self._next_ns - self._lead_ns
 
     def say(self, inner: bytes, now_ns: int) -> None:
-        """Say the hello that is due, with these frames before what the protocol and the clock add."""
+        """Send the hello that is due, with these frames before those of the protocol and the clock."""
         assert self._next_ns is not None, "a hello is said when it is due"
         start_ns, time = max(self._next_ns, now_ns), self._time
         if time is None:
@@ -60,11 +61,11 @@ class HelloSchedule:
         self._next_ns = max(self._next_ns + step_ns, now_ns)
 
     def on_hello(self, sender: NodeId, now_ns: int) -> None:
-        """Take in that a neighbor has said hello."""
+        """A neighbor's hello was received."""
         self._heard_ns[sender] = now_ns
 
     def neighbors(self, now_ns: int) -> tuple[NodeId, ...]:
-        """The nodes heard lately, by id."""
+        """The nodes whose hellos were received recently, by id."""
         lifetime_ns = _LIFETIME_HELLOS * self._interval_ns
         self._heard_ns = {node: t_ns for node, t_ns in self._heard_ns.items() if now_ns - t_ns <= lifetime_ns}
         return tuple(sorted(self._heard_ns))

@@ -1,4 +1,4 @@
-"""The applications on board that are called for each input, worked out once: those that would ignore it are not."""
+"""Finds out once which applications on board react to each kind of input, so that the others need not be called."""
 
 from collections.abc import Iterable, Sequence
 from typing import NamedTuple, Self
@@ -8,7 +8,7 @@ from fanet_mw.wire import CHUNK
 
 
 class Callbacks(NamedTuple):
-    """For each method of an application, the applications that have one of their own, in their order."""
+    """For each method of an application, the applications that implement it, in their order."""
 
     on_fix: tuple[Application, ...]
     on_sensor: tuple[Application, ...]
@@ -27,7 +27,7 @@ class Callbacks(NamedTuple):
 
 
 class Listeners:
-    """The applications on board that each message is for."""
+    """The applications on board, by the messages to which they listen."""
 
     def __init__(self, applications: Sequence[Application]) -> None:
         self._to_message: dict[int, list[Application]] = {}
@@ -41,7 +41,9 @@ class Listeners:
                 self._to_port.setdefault(port, []).append(application)
 
     def of_message(self, message_id: int) -> Sequence[Application]:
-        """The applications that listen to a MAVLink message; load is only for those that name its id."""
+        """The applications that listen to a MAVLink message; messages of pure load only go to applications that name
+        their id.
+        """
         named = self._to_message.get(message_id, [])
         return named if message_id == CHUNK.msgid else [*named, *self._to_every_message]
 
@@ -49,7 +51,9 @@ class Listeners:
         return [*self._to_port.get(port, ()), *self._to_every_port]
 
     def wanted(self, also: Iterable[int]) -> frozenset[bytes] | None:
-        """The ids that any application listens to, and those of `also`, as they stand in a frame; None: every id."""
+        """The ids of all messages that any application listens to and of those in `also`, as they stand in a frame;
+        None if that is every id.
+        """
         if self._to_every_message:
             return None
         return frozenset(message_id.to_bytes(3, "little") for message_id in (*self._to_message, *also))

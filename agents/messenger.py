@@ -1,9 +1,9 @@
-"""The messages of a node's applications: what they send goes into packets, what packets bring to the listeners.
+"""Carries the messages of a node's applications: what they send goes into packets, and what arrives goes to listeners.
 
-    plain MAVLink frames to one node or all         -> one packet, as it is
-    bytes, a set of nodes, or to be confirmed       -> pieces, receipts (`fanet_mw.delivery`)
+    plain MAVLink frames to one node or all          -> one packet, unchanged
+    bytes to a port, a set of nodes, or confirmed    -> pieces and receipts (`fanet_mw.delivery`)
 
-`statuses.py` tells the applications what becomes of their messages.
+`statuses.py` reports to the applications what becomes of their messages.
 """
 
 from collections import Counter
@@ -60,7 +60,7 @@ class Messenger:
     # --- out ------------------------------------------------------------------------------------------------------
 
     def send(self, application: Application, submission: Submission, *, now_ns: int) -> int:
-        """Send what an application has handed over; returns the handle that statuses name."""
+        """Send what an application has submitted; returns the handle of the message, which statuses will name."""
         port, data, to, targets, priority, confirm, lifetime_ns, deadline_ns, born_ns = submission
         plain = port == MAVLINK_PORT and not confirm and not targets and lifetime_ns is None
         if not plain:
@@ -97,17 +97,17 @@ class Messenger:
         return handle
 
     def _check(self, port: int, data: bytes, named: int) -> None:
-        """Raise LocalProtocolError for more bytes than a message can have."""
+        """Raise LocalProtocolError for more bytes than a message can carry."""
         one_piece = self._room - wire.OVERHEAD - wire.MESSAGE.layout.size - named * 3
         most = one_piece if port == MAVLINK_PORT else self._sender.most_bytes(named)
         if len(data) > most:
             raise LocalProtocolError(f"message of {len(data)} bytes must be <= {most} (radio.max_frame_bytes)")
 
     def _judge(self, deadline_ns: int, born_ns: int) -> tuple[bool, int | None]:
-        """True if a message can arrive in time, and the least interval between such messages, where that is known.
+        """Whether a message can arrive in time, and the least interval between such messages if that is known.
 
-        Where the network states no bound, every message is taken. Messages that are taken are at least the interval
-        apart, which is what the bound assumes.
+        If the network states no bound, every message is accepted. Accepted messages are at least the interval apart, as
+        the bound assumes.
         """
         if self._node.bound_ns() is None:
             return True, None
@@ -158,12 +158,12 @@ class Messenger:
     # --- in -------------------------------------------------------------------------------------------------------
 
     def piece(self, packet: Packet, now_ns: int) -> None:
-        """Take in a packet with a piece of a message; raises MalformedFrameError."""
+        """A packet with a piece of a message was received; raises MalformedFrameError."""
         piece = decode_piece(packet.frame)
         self._receiver.hear(packet.origin, piece, packet.frame, priority=packet.header.priority, now_ns=now_ns)
 
     def receipts(self, packet: Packet, now_ns: int) -> None:
-        """Take in a packet with receipts; raises MalformedFrameError."""
+        """A packet with receipts was received; raises MalformedFrameError."""
         for receipt in decode_receipts(packet.frame):
             self._sender.receipt(packet.origin, receipt, now_ns)
 
@@ -175,7 +175,7 @@ class Messenger:
         return self._listeners.of_message(_message_id(data)) if port == MAVLINK_PORT else self._listeners.of_port(port)
 
     def has_news(self) -> bool:
-        """True if there is something to hand over, or to tell of a message that was sent."""
+        """True if there is a message to hand over, or news of a message that was sent."""
         return bool(self._receiver.arrived or self._sender.told or self._statuses.waiting or self._node.fates)
 
     def arrived(self) -> list[tuple[Application, Received]]:
@@ -188,7 +188,7 @@ class Messenger:
         return [(a, message) for whole, message in arrived for a in self._of(whole.head.port, whole.data)]
 
     def statuses(self, now_ns: int) -> list[tuple[Application, Status]]:
-        """The statuses to be told now; what an application does about them is told later."""
+        """The statuses to report now; what applications then do is reported later."""
         return self._statuses.take(self._sender.told, now_ns)
 
     # --- time -----------------------------------------------------------------------------------------------------
@@ -210,7 +210,7 @@ class Messenger:
         return send_ns if receive_ns is None or (send_ns is not None and send_ns < receive_ns) else receive_ns
 
     def report(self) -> Mapping[str, Any]:
-        """The counters of messages, for people; empty when no application has sent or received any."""
+        """The counters of messages; empty if no application has sent or received any."""
         counts = self._counts + self._statuses.counts
         if not counts:
             return {}

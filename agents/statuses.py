@@ -1,10 +1,10 @@
-"""What became of the messages of a node's applications, and which application is to be told.
+"""Reports to the applications of a node what has become of their messages.
 
-    a packet is let out, or dropped in this node  ->  `Node.fates`, for packets that are watched
-    a message is acknowledged, or expires         ->  `Sender.told`
+    a packet is released, or dropped in this node    ->  `Node.fates`, for packets that are watched
+    a message is acknowledged, or has expired        ->  `Sender.told`
 
-Each application is told of the fates that its `follows` names, after the input that caused them has been handled, so
-that no application is called while it calls.
+Each application is told of the fates that it names in `follows`. It is told after the input that caused them was
+handled, so that no application is called while it is calling itself.
 """
 
 from collections import Counter, deque
@@ -19,34 +19,34 @@ from fanet_mw.units import seconds_to_ns
 from fanet_mw.wire.message import DELIVERED, NO_LISTENER
 
 _MOST_WATCHED: Final = 8192
-"""The number of packets whose application is remembered."""
+"""The greatest number of packets whose application is remembered."""
 _OUTCOMES: Final = {EXPIRED: Fate.EXPIRED, DELIVERED: Fate.ACKNOWLEDGED, NO_LISTENER: Fate.UNWANTED}
 _REASONS: Final = {DropReason.ADMISSION: Fate.REFUSED, DropReason.EXPIRED: Fate.EXPIRED}
-"""The fates of packets that were dropped for these reasons; for any other reason the fate is DROPPED."""
+"""The fates of packets that are dropped for these reasons; for all other reasons it is DROPPED."""
 
 
 class _Watched(NamedTuple):
-    """The application and the message that a packet belongs to."""
+    """The application and the message to which a packet belongs."""
 
     application: Application
     handle: int
     first: bool
     """True for the first packet of its message."""
     confirmed: bool
-    """True if it is a piece of a message that is to be confirmed: such a piece is sent again when it is dropped."""
+    """True for a piece of a confirmed message; if such a piece is dropped, it is sent again."""
 
 
 class Statuses:
-    """The statuses of one node's messages, until they are told."""
+    """The statuses of one node's messages that have yet to be reported."""
 
     def __init__(self, node: Node) -> None:
         self._node = node
         self._owners: dict[int, Application] = {}
-        """The application that sent each message that is to be confirmed and is not over, by the message's handle."""
+        """The application that has sent each unfinished confirmed message, by the message's handle."""
         self._watched: dict[int, _Watched] = {}
-        """The packets of which the application wants to hear, by sequence number."""
+        """The packets whose fate an application wants to know, by sequence number."""
         self.waiting: deque[tuple[Application, Status]] = deque()
-        """What is to be told."""
+        """The statuses to report."""
         self.counts: Counter[str] = Counter()
         """The numbers of messages in pieces, by their fates."""
 
@@ -57,15 +57,15 @@ class Statuses:
             self.waiting.append((application, status))
 
     def own(self, handle: int, application: Application) -> None:
-        """Note the application that has sent a message that is to be confirmed."""
+        """Remember which application has sent a confirmed message."""
         self._owners[handle] = application
 
     def owner(self, handle: int) -> Application | None:
-        """The application that sent a message that is to be confirmed; None when that message is over."""
+        """The application that has sent a confirmed message; None if the message is finished."""
         return self._owners.get(handle)
 
     def watch(self, seq: int, application: Application, handle: int, *, first: bool, confirmed: bool) -> None:
-        """Note which application's message a packet carries, whole or a piece of it."""
+        """Remember to which application's message a packet belongs, whether it carries all of it or a piece."""
         self._watched[seq] = _Watched(application, handle, first, confirmed)
         if len(self._watched) > _MOST_WATCHED:
             self._unwatch(next(iter(self._watched)))
@@ -75,7 +75,7 @@ class Statuses:
         self._node.watched.discard(seq)
 
     def take(self, told: list[Told], now_ns: int) -> list[tuple[Application, Status]]:
-        """The statuses to be told now; `told` is the news of the sender. Both lists of news are emptied."""
+        """The statuses to report now. `told` is the news of the sender; both lists of news are emptied."""
         if self._node.fates:
             for seq, t_ns, reason in self._node.fates:
                 self._packet_fate(seq, t_ns, reason)
@@ -94,7 +94,7 @@ class Statuses:
         return found
 
     def _packet_fate(self, seq: int, t_ns: int, reason: DropReason | None) -> None:
-        """Take in that the node let a packet out, or dropped it."""
+        """The node has released a packet, or dropped it."""
         watched = self._watched.get(seq)
         if watched is None:
             return
@@ -107,7 +107,7 @@ class Statuses:
             return
         self._unwatch(seq)
         if confirmed:
-            return  # it is sent again
+            return  # it will be sent again
         fate = _REASONS.get(reason, Fate.DROPPED)
         deadline_s = self._node.scenario.traffic.deadline_s
         refused = fate is Fate.REFUSED and deadline_s is not None

@@ -1,7 +1,7 @@
-"""What an application hands over to be sent, checked before anything is done with it.
+"""Checks what an application submits for sending, before anything is done with it.
 
-What can never be sent is a mistake of the program, whatever the network does: it is named with its value and its bound
-by a LocalProtocolError, in the call that made it.
+A submission that can never be sent is a mistake of the program, whatever the state of the network. It raises
+LocalProtocolError, with the name, the value and the bound, in the call that made it.
 """
 
 from collections.abc import Collection, Mapping
@@ -17,19 +17,19 @@ _MOST_PORT: Final = 0xFFFF
 _PRIORITIES: Final[Mapping[str | int, int]] = {
     key: number for name, number in wire.PRIORITIES.items() for key in (name, number)
 }
-"""The priorities that an application may name, by name and by number."""
+"""The priorities that an application may use, by name and by number."""
 
 
 class Submission(NamedTuple):
-    """A message that can be sent, if it is not too long."""
+    """A checked message; only its length remains to be checked."""
 
     port: int
-    """The numbered port; `MAVLINK_PORT`: `data` are MAVLink frames."""
+    """The number of the port; `MAVLINK_PORT` if `data` are MAVLink frames."""
     data: bytes
     to: NodeId
     """The destination of the packets."""
     targets: tuple[NodeId, ...]
-    """The nodes that are named one by one; empty for a message to one node or to all."""
+    """The nodes that are addressed one by one; empty for a message to one node or to all."""
     priority: int
     confirm: bool
     lifetime_ns: int | None
@@ -38,13 +38,13 @@ class Submission(NamedTuple):
 
 
 class Sending(NamedTuple):
-    """The node that sends, and the swarm that it sends to."""
+    """The node that sends, and the nodes of its swarm."""
 
     node: NodeId
     nodes: int
 
     def content(self, content: object) -> tuple[int, bytes]:
-        """The port and the bytes: of a message for a port, of MAVLink frames, or of a message of pymavlink."""
+        """The port and the bytes of a submission: data for a port, MAVLink frames, or a pymavlink message."""
         if isinstance(content, Data):
             port, data = content
             if not isinstance(port, int) or not 0 < port <= _MOST_PORT:
@@ -64,7 +64,7 @@ class Sending(NamedTuple):
         return MAVLINK_PORT, frames
 
     def whom(self, destination: Destination) -> tuple[NodeId, tuple[NodeId, ...]]:
-        """The destination of the packets, and the nodes that are named one by one."""
+        """The destination of the packets, and the nodes that are addressed one by one."""
         if destination == BROADCAST:
             return BROADCAST, ()
         nodes = (destination,) if isinstance(destination, int) else destination
@@ -78,7 +78,7 @@ class Sending(NamedTuple):
 
 
 def priority_of(priority: str | int) -> int:
-    """The number of a priority that an application may use, given by name or number."""
+    """The number of a priority, given by name or by number."""
     number = _PRIORITIES.get(priority)
     if number is None:
         names = ", ".join(f"{name} ({number})" for name, number in wire.PRIORITIES.items())
@@ -87,7 +87,7 @@ def priority_of(priority: str | int) -> int:
 
 
 def positive(name: str, duration_ns: int | None) -> int | None:
-    """A duration that leaves time for something."""
+    """A duration, which must be positive."""
     if duration_ns is not None and duration_ns <= 0:
         raise LocalProtocolError(f"{name} = {duration_ns} must be above 0")
     return duration_ns

@@ -1,1 +1,1 @@
-"""The applications that a UAV carries as its scenario asks: load, telemetry, and collision avoidance."""
+"""Applications that every UAV may carry: the traffic load, telemetry, and collision avoidance."""

@@ -1,7 +1,9 @@
-"""The flight controller of a UAV as seen over MAVLink: the last fix, and telemetry frames at their rates. Sans-IO.
+"""The flight controller of a UAV as MAVLink shows it: the last position fix, and telemetry frames at their rates.
+Sans-IO.
 
-Position and velocity are the receiver's. Attitude is inferred: a multirotor leans so that thrust and gravity add up to
-its acceleration, and faces where it flies. The battery is as its sensor reads it; without one nothing is known of it.
+Position and velocity are those of the receiver. The attitude is inferred: a multirotor tilts so that thrust and gravity
+add up to its acceleration, and it faces where it flies. The battery is as its sensor reads it; without a sensor nothing
+is known of it.
 """
 
 import math
@@ -15,7 +17,8 @@ from fanet_mw.units import STILL, Enu, NodeId, S
 
 GRAVITY_M_S2: Final = 9.80665
 MAX_TILT: Final = math.radians(35)
-"""The usual lean limit of a multirotor's position controller; noise in the velocity must not look like acrobatics."""
+"""The usual tilt limit of a multirotor's position controller; it keeps noise in the velocity from looking like
+acrobatics."""
 TURNING_M_S: Final = 0.5
 """Below this speed the course is noise, and the heading is kept."""
 
@@ -29,7 +32,7 @@ _RARELY_NS: Final = 10 * S
 
 @dataclass
 class _Stream:
-    """One kind of message, its interval, and the instant at which it is due next."""
+    """One kind of message, its interval, and the instant at which it is next due."""
 
     encode: Callable[[int], bytes]
     interval_ns: int
@@ -37,7 +40,7 @@ class _Stream:
 
 
 class Autopilot:
-    """The flight controller of one UAV, as seen over MAVLink."""
+    """The telemetry of one UAV."""
 
     def __init__(self, node: NodeId, *, position: Enu, telemetry_hz: float) -> None:
         self.position = position
@@ -45,21 +48,23 @@ class Autopilot:
         self._home = position
         self._acceleration = STILL
         self._yaw: float | None = None
-        """The heading; it is unknown until the UAV has flown. 0 would also shorten a hello: MAVLink drops trailing
-        zeros."""
+        """The heading; it is unknown until the UAV has flown. A heading of 0 would also shorten hellos, because MAVLink
+        drops trailing zeros."""
         self._fix_ns: int | None = None
         self._battery: BatteryState | None = None
         self._read_ns: int | None = None
         self._consumed_mah = 0.0
         self._encoder = Encoder(node, component=AUTOPILOT_COMPONENT)
         self._beacons = Encoder(node, component=AUTOPILOT_COMPONENT)
-        """The number of frames that went over the air; they are counted apart from telemetry, so that a gap is a
+        """The encoder of frames for the air. It counts them apart from telemetry, so that a gap in their numbers is a
         loss."""
         self._streams = self._plan(node, telemetry_hz) if telemetry_hz else []
         self._due_ns = min((stream.due_ns for stream in self._streams), default=None)
 
     def _plan(self, node: NodeId, telemetry_hz: float) -> list[_Stream]:
-        """The streams in the order of sending; nodes differ in phase by their id, so that the bus sees no bursts."""
+        """The streams in the order of sending. Their phases depend on the node's id, so that not all nodes send at
+        once.
+        """
         encoder = self._encoder
         base_ns = max(1, round(S / telemetry_hz))
         due_ns = node * 7_919_000 % base_ns
@@ -76,7 +81,7 @@ class Autopilot:
         return [_Stream(encode, max(interval_ns, base_ns), due_ns) for interval_ns, encode in wanted]
 
     def start(self, now_ns: int) -> None:
-        """Begin telemetry now, in the phase that it has."""
+        """Begin telemetry now, in this node's phase."""
         for stream in self._streams:
             stream.due_ns += max(0, -((stream.due_ns - now_ns) // stream.interval_ns)) * stream.interval_ns
         self._due_ns = min((stream.due_ns for stream in self._streams), default=None)
@@ -84,7 +89,9 @@ class Autopilot:
     # --- in -------------------------------------------------------------------------------------------------------
 
     def fix(self, gps: Gps) -> None:
-        """Take in a fix; the acceleration is the change of velocity since the last one. An older fix is ignored."""
+        """The receiver has given a fix; the acceleration is the change of velocity since the last one. An older fix is
+        ignored.
+        """
         if self._fix_ns is not None:
             if gps.t_ns <= self._fix_ns:
                 return
@@ -96,7 +103,7 @@ class Autopilot:
             self._yaw = math.atan2(gps.velocity.east, gps.velocity.north)
 
     def on_battery(self, reading: Battery) -> None:
-        """Take in what the sensor of the battery reads; what has been consumed is counted from its first reading."""
+        """The sensor of the battery has given a reading; consumption counts from the first reading."""
         if self._read_ns is not None:
             self._consumed_mah += max(0, reading.t_ns - self._read_ns) / _HOUR_NS * 1000 * reading.current_a
         self._read_ns = reading.t_ns
@@ -107,7 +114,7 @@ class Autopilot:
 
     @property
     def attitude(self) -> Attitude:
-        """The lean that the present acceleration needs, facing the direction of flight."""
+        """The tilt that the present acceleration needs, facing the direction of flight."""
         east, north, up = self._acceleration
         yaw = self._yaw or 0.0
         forward = east * math.sin(yaw) + north * math.cos(yaw)
@@ -121,11 +128,11 @@ class Autopilot:
         return Attitude(roll, pitch, yaw)
 
     def next_due_ns(self) -> int | None:
-        """The instant at which telemetry is due; None when there is no telemetry."""
+        """The instant at which the next telemetry is due; None if there is no telemetry."""
         return self._due_ns
 
     def telemetry(self, now_ns: int) -> bytes:
-        """The frames that are due now, one of each stream however late, because stale telemetry is of no use."""
+        """The frames that are due now: one of each stream, however late, because older telemetry is of no use."""
         if self._due_ns is None or now_ns < self._due_ns:
             return b""
         due = [stream for stream in self._streams if stream.due_ns <= now_ns]

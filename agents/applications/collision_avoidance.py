@@ -1,6 +1,6 @@
-"""Collision avoidance as an application: it feeds a conflict monitor, and sends the monitor's warnings to all nodes.
+"""The application that avoids collisions: it feeds a conflict monitor, and floods the warnings that the monitor gives.
 
-While it avoids another UAV, it objects to the courses of other applications.
+While the UAV avoids another one, the application objects to courses of other applications.
 """
 
 import math
@@ -19,7 +19,7 @@ from fanet_mw.units import NodeId
 
 
 class CollisionAvoidance(Application):
-    """Warns other UAVs of collisions, and avoids them."""
+    """Warns other UAVs of collisions with this one, and avoids them."""
 
     name: Final = "warning"
     listens = (mavlink.COLLISION_ID,)
@@ -28,16 +28,16 @@ class CollisionAvoidance(Application):
         self._monitor = ConflictMonitor(scenario, node)
         self._encoder = mavlink.Encoder(node)
         self._bad_positions = 0
-        """The number of hellos without a position that can be believed, or with one that is too old."""
+        """The number of hellos without a credible position, or with one that is too old."""
 
     def on_hello(self, frame: bytes, now_ns: int) -> None:
-        """Take in where a neighbor flies, from its hello."""
+        """A neighbor's hello was received, which states how the neighbor flies."""
         heard = motion_in(frame, own=self.port.node, now_ns=now_ns)
         if heard is None or not self._monitor.on_hello(*heard, now_ns=now_ns):
             self._bad_positions += 1
 
     def on_message(self, message: Received, now_ns: int) -> None:
-        """Take in a warning of another UAV, which may be for this one."""
+        """A warning of another UAV was received, which may concern this one."""
         warning = mavlink.collision_of(message.frame)
         self._monitor.on_warning(message.origin, warning, self._motion(now_ns), born_ns=message.born_ns, now_ns=now_ns)
         self.port.tap(message.frame)
@@ -58,7 +58,7 @@ class CollisionAvoidance(Application):
         return Motion(self.port.position, self.port.velocity, now_ns)
 
     def _hand_over(self, now_ns: int) -> None:
-        """Pass on what the monitor has put out: records, warnings, and a course."""
+        """Pass on the output of the monitor: records, warnings, and a course."""
         monitor, port = self._monitor, self.port
         _record(monitor, port)
         warnings, monitor.warnings = monitor.warnings, []

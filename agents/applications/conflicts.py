@@ -1,17 +1,16 @@
-"""Collision avoidance of one UAV: which UAVs it is in conflict with, which to warn, and how to fly until that is past.
+"""Detects with which UAVs one UAV is in conflict, whom to warn, and how to fly until the conflict is over. Sans-IO.
 
-    own fixes, others' hellos     -> closest approach too near and too soon -> warn the other, change height
-    a warning that names this UAV -> the same, even if the other UAV is not received
-    far enough, sideways          -> the course as before
+    own fixes, others' hellos     -> the closest approach is too near and soon -> warn the other UAV, change height
+    a warning that names this UAV -> the same, even if no hello of the other UAV is received
+    far enough apart, sideways    -> back to the course
 
-Heights need no agreement, only ids: for each other UAV a UAV goes one level up if its own id is the lower one, else one
-down. So two always part, of three in conflict with each other no two share a level, and a warning need not say which
-way its sender goes. A level is the distance to be kept. Sans-IO.
+No agreement about heights is needed, because the ids decide: of two UAVs the one with the lower id goes one level up
+for the other, the other one level down. So any two part, no two of three that are in conflict with each other share a
+level, and a warning need not state a direction. The height of a level is the distance to be kept.
 
-Both are assumed to fly on sideways as they did. Not modeled: turns that the other UAV has planned, and conflicts that
-the change of height itself causes until the next hello shows them.
-
-In a planned search UAVs keep clear of each other by their velocities instead: `agents/mission/flight/constraints.py`.
+Both UAVs are assumed to keep their horizontal velocity. Not modeled: turns that the other UAV has planned, and
+conflicts that the change of height itself causes, until the next hello shows them. In a planned search, UAVs avoid each
+other by their velocities instead (`agents/mission/flight/constraints.py`).
 """
 
 import math
@@ -28,17 +27,17 @@ from fanet_mw.trace import ConflictForeseen, ConflictOver, Record
 from fanet_mw.units import MS, Enu, NodeId, S, seconds_to_ns
 
 _CLEAR: Final = 1.5
-"""A conflict is over when the two will stay this many times farther apart sideways than they must."""
+"""A conflict is over when the two will pass each other sideways at this many times the distance to be kept."""
 _PAST_NS: Final = 3 * S
-"""The time after the closest approach to a UAV known only by its warning, after which the conflict is over."""
+"""If the other UAV is only known by its warning, the conflict is over this long after the closest approach."""
 _CLIMB_M_S: Final = 4.0
-"""The comfortable climb rate of a small multirotor."""
+"""A comfortable climb rate for a small multirotor."""
 _LEVELS: Final = 2
-"""The most levels up or down, for which `nodes.altitude_m` has room."""
+"""The greatest number of levels up or down, for which `nodes.altitude_m` must leave room."""
 _AHEAD_S: Final = 10.0
-"""Setpoints lie so far ahead: the farther, the less the error of a fix turns the course that others receive."""
+"""Setpoints lie this far ahead. The farther they are, the less does the error of a fix turn the course."""
 _SOON_S: Final = 2.0
-"""The time in which a height or a goal is approached when it is near."""
+"""The time within which a near height or goal is to be reached."""
 _LEAST_M_S: Final = 0.5
 _EVER_S: Final = 1e6
 
@@ -52,24 +51,24 @@ class Alert(NamedTuple):
 
 @dataclass
 class _Threat:
-    """One other UAV that this UAV avoids."""
+    """Another UAV that this UAV avoids."""
 
     until_ns: int
-    """The instant at which the conflict will be past, as far as is known without receiving the other UAV."""
+    """The instant at which the conflict will be over, if no hello of the other UAV is received any more."""
     warned_ns: int | None = None
     """The instant at which either of the two last warned the other."""
 
 
 @dataclass
 class _Avoidance:
-    """The height and velocity that the UAV flew when avoidance began."""
+    """The height and velocity at which the UAV flew when it began to avoid others."""
 
     up_m: float
     velocity: Enu
 
 
 class ConflictMonitor:
-    """Detects conflicts of one UAV with others, and avoids them."""
+    """Detects the conflicts of one UAV with others, and resolves them."""
 
     def __init__(self, scenario: Scenario, node: NodeId) -> None:
         mission = scenario.mission
@@ -82,24 +81,24 @@ class ConflictMonitor:
         self.records: list[Record] = []
         self.warnings: list[Alert] = []
         self.course: Course | None = None
-        """A new course to fly, to be taken by the host."""
+        """A new course to fly, until the caller takes it."""
         self._others: dict[NodeId, Motion] = {}
         self._threats: dict[NodeId, _Threat] = {}
         self._avoidance: _Avoidance | None = None
         self._wanted: Course | None = None
-        """The mission's course; None when the UAV flies in formation."""
+        """The mission's course; None if the UAV flies in formation."""
 
     # --- input ----------------------------------------------------------------------------------------------------
 
     def on_hello(self, node: NodeId, motion: Motion, *, now_ns: int) -> bool:
-        """Take in where another UAV flies, from its hello; False when that is too old to be used."""
+        """A hello states how another UAV flies; returns False if that is too old to be used."""
         if motion.at_ns < now_ns - self._lifetime_ns:
             return False
         self._others[node] = motion
         return True
 
     def on_warning(self, origin: NodeId, warning: Collision, own: Motion, *, born_ns: int, now_ns: int) -> None:
-        """Take in the warning of another UAV, and avoid that UAV if the warning names this one."""
+        """Another UAV has warned; this UAV avoids it if the warning names this UAV."""
         left_ns = born_ns + round(min(warning.closest_s, _EVER_S) * S) - now_ns
         if warning.other != self._node or origin == self._node or left_ns > seconds_to_ns(self._horizon_s):
             return
@@ -108,7 +107,7 @@ class ConflictMonitor:
         threat = self._threats.get(origin)
         if threat is None:
             if left_ns <= 0:
-                return  # the approach was past before the warning came
+                return  # the closest approach was over before the warning arrived
             threat = self._avoid(origin, own, now_ns + left_ns)
             distance_m = math.hypot(warning.altitude_m, warning.horizontal_m)
             self._record_conflict(origin, left_ns, distance_m, told=True, now_ns=now_ns)
@@ -117,7 +116,7 @@ class ConflictMonitor:
         self._fly(own)
 
     def on_fix(self, own: Motion) -> None:
-        """Take in a fix of this UAV, and examine all other UAVs."""
+        """A position fix of this UAV: examine all other UAVs."""
         now_ns = own.at_ns
         self._others = {n: m for n, m in self._others.items() if now_ns - m.at_ns <= self._lifetime_ns}
         for node in sorted(self._others):
@@ -129,22 +128,22 @@ class ConflictMonitor:
         self._fly(own)
 
     def on_course(self, course: Course) -> None:
-        """Note the course that the mission has chosen: it is flown when no UAV is to be avoided any more."""
+        """The mission has chosen a course, which the UAV flies when it avoids no other UAV any more."""
         self._wanted = None if course.speed_m_s == HOME else course
 
     @property
     def avoids(self) -> bool:
-        """True while this UAV flies out of the way of others, and nowhere else."""
+        """True while this UAV avoids others, and does nothing else."""
         return self._avoidance is not None
 
     # --- conflicts ------------------------------------------------------------------------------------------------
 
     def _examine(self, node: NodeId, own: Motion) -> None:
-        """Examine one other UAV: if it is in conflict with this one, avoid it, and warn it when a warning is due."""
+        """Examine another UAV: if it is in conflict with this one, avoid it, and warn it if a warning is due."""
         now_ns = own.at_ns
         threat = self._threats.get(node)
         approach = min((self._approach(node, course) for course in self._courses(own)), key=lambda a: a.distance_m)
-        if threat is not None:  # the conflict may be solved by height already
+        if threat is not None:  # the change of height may have resolved the conflict already
             if 0 < approach.closest_s < self._horizon_s and approach.distance_m < self._clear_m:
                 threat.until_ns = now_ns + round(approach.closest_s * S)
                 self._warn(node, threat, approach, now_ns)
@@ -160,7 +159,9 @@ class ConflictMonitor:
         return closest(apart, other.velocity.minus(own.velocity), within_s=self._horizon_s)
 
     def _courses(self, own: Motion) -> list[Motion]:
-        """The courses to examine: the own one; while avoiding, level flight at the present and at the former height."""
+        """The courses to examine: the present one; while the UAV avoids others, level flight at the present and the
+        former height.
+        """
         if self._avoidance is None:
             return [own]
         level = own._replace(velocity=_level(own.velocity))
@@ -172,7 +173,7 @@ class ConflictMonitor:
         self.records.append(record)
 
     def _warn(self, node: NodeId, threat: _Threat, approach: ClosestApproach, now_ns: int) -> None:
-        """Warn the other UAV, unless either of the two has warned a moment ago: both warnings would say the same."""
+        """Warn the other UAV, unless one of the two has just warned: both warnings would say the same."""
         if threat.warned_ns is None or now_ns - threat.warned_ns >= self._repeat_ns:
             threat.warned_ns = now_ns
             self.warnings.append(Alert(node, approach))
@@ -194,7 +195,7 @@ class ConflictMonitor:
         return threat
 
     def _fly(self, own: Motion) -> None:
-        """Choose the next setpoint: on as before at the height that keeps distance, or back to the course."""
+        """Choose the next setpoint: onwards at a height that keeps the distance, or back to the course."""
         before = self._avoidance
         if before is None:
             return
@@ -210,7 +211,7 @@ class ConflictMonitor:
         self.course = Course(ahead, max(_LEAST_M_S, velocity.norm()))
 
     def _sideways(self, here: Enu) -> Enu | None:
-        """The horizontal velocity towards the mission's goal; None without a goal."""
+        """The horizontal velocity towards the mission's goal; None if there is no goal."""
         if self._wanted is None:
             return None
         way = _level(self._wanted.position.minus(here))

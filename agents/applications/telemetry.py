@@ -1,4 +1,4 @@
-"""Telemetry as an application: what the flight controller says of itself, on the node's MAVLink tap."""
+"""The telemetry application: it shows the flight controller's messages on the node's MAVLink tap."""
 
 from typing import Final
 
@@ -8,7 +8,7 @@ from fanet_mw.bus.messages import Battery, SensorReading
 
 
 class Telemetry(Application):
-    """The telemetry frames of one UAV, at their rates."""
+    """Sends the telemetry frames of one UAV at their rates."""
 
     name: Final = "telemetry"
 

@@ -1,7 +1,7 @@
-"""The application load of one node: when it hands its node the next packet, and of what size.
+"""The traffic load of one node: when it sends the next packet, and how long that is.
 
-`TrafficGenerator` says when, `Load` is the application that sends. Birth instants are whole microseconds, because
-that is what the header carries.
+`TrafficGenerator` computes the instants, and `Load` is the application that sends. Packets are generated at whole
+microseconds, because the header states no more.
 """
 
 import math
@@ -17,11 +17,11 @@ from fanet_mw.units import BROADCAST, MS, US, NodeId, S, seconds_to_ns
 from fanet_mw.wire import PRIORITIES
 
 _REFUSED_NS: Final = MS
-"""After a packet that the radio refused, a saturated source offers the next one so much later, not at once."""
+"""A saturated source whose packet the radio has refused waits this long before it offers the next one."""
 
 
 def sources_of(scenario: Scenario, name: str | None = None) -> Sequence[int]:
-    """The ids of the nodes that generate a class of traffic, ascending; by default the first class."""
+    """The ids of the nodes that are sources of a traffic class, ascending; by default of the first class."""
     name, traffic = _class_of(scenario, name)
     eligible = [node for node in scenario.node_ids if node != traffic.destination]
     if traffic.arrivals == "none":
@@ -39,7 +39,7 @@ def sources_of(scenario: Scenario, name: str | None = None) -> Sequence[int]:
 
 
 def targets_of(scenario: Scenario, source: int, name: str | None = None) -> Sequence[int]:
-    """The ids of the nodes for which a packet of `source` is meant, of one class or of the first."""
+    """The ids of the nodes that are targets of the packets of `source`, of one class or of the first."""
     name, traffic = _class_of(scenario, name)
     if traffic.destination != "all":
         return [traffic.destination]
@@ -54,12 +54,12 @@ def _class_of(scenario: Scenario, name: str | None) -> tuple[str, Traffic]:
 
 
 def _use(scenario: Scenario, name: str, use: str) -> str:
-    """The name of a random stream; the first class, whatever it is called, has that of a single one."""
+    """The name of a random stream. The first class always has the name that a single class has."""
     return use if name == next(iter(scenario.traffic_classes)) else f"{use} {name}"
 
 
 class TrafficGenerator:
-    """The arrivals of one source of one class."""
+    """The instants and lengths of the packets of one class at one source."""
 
     def __init__(self, scenario: Scenario, node: NodeId, name: str | None = None) -> None:
         name, traffic = _class_of(scenario, name)
@@ -72,25 +72,27 @@ class TrafficGenerator:
         self._random: Random = stream(scenario.seed, _use(scenario, name, "traffic"), node)
         self._on_ns, self._off_ns = seconds_to_ns(traffic.on_s), seconds_to_ns(traffic.off_s)
         self._active_until_ns = 0
-        """The end of the period of activity, for arrivals `on_off`."""
+        """The end of the present active period, for arrivals `on_off`."""
         self._packets = sorted((start_ns + seconds_to_ns(at_s) // US * US, size) for at_s, size in traffic.packets)
-        """The packets that are still to come, for arrivals `trace`."""
+        """The packets yet to come, for arrivals `trace`."""
         self._bytes = traffic.payload_bytes
         self._next_ns: int | None = None
         self._owed = 1
-        """The number of packets that are born at `next_ns`."""
+        """The number of packets that are generated at `next_ns`."""
         if node in sources_of(scenario, name):
             self._next_ns = start_ns + self._first_gap_ns(start_ns)
             self._owed = self.depth if self.saturated else 1
 
     @property
     def next_bytes(self) -> int:
-        """The length of the packet that is born at `next_ns`."""
+        """The length of the packet that is generated at `next_ns`."""
         return self._packets[0][1] if self._packets else self._bytes
 
     @property
     def depth(self) -> int:
-        """The packets that a saturated source keeps outstanding: one in service, and those served within two leads."""
+        """The number of packets that a saturated source keeps queued: one in service, and those that are sent within
+        two leads.
+        """
         return 1 + 2 * self._lead_ms
 
     @property
@@ -113,11 +115,11 @@ class TrafficGenerator:
         return round(self._random.expovariate(1 / self._interval_ns)) // US * US
 
     def _period_ns(self, mean_ns: int) -> int:
-        """The length of a period of activity, or of a pause."""
+        """The length of an active period, or of a pause."""
         return round(self._random.expovariate(1 / mean_ns)) // US * US if mean_ns else 0
 
     def _following_ns(self, born_ns: int) -> int | None:
-        """The instant of the packet after the one that is born at an instant."""
+        """The instant of the packet after the one that is generated at an instant."""
         if self._kind == "trace":
             del self._packets[0]
             return self._packets[0][0] if self._packets else None
@@ -132,7 +134,7 @@ class TrafficGenerator:
         return born_ns + (self._interval_ns if self._kind == "cbr" else self._poisson_ns())
 
     def start(self, now_ns: int) -> None:
-        """Leave out what should have been born before now: the process has only just been started."""
+        """Skip the packets that were due before now, because the process has only just started."""
         if self._next_ns is None or now_ns <= self._next_ns:
             return
         if self.saturated:
@@ -143,27 +145,27 @@ class TrafficGenerator:
 
     @property
     def owed(self) -> int:
-        """The number of packets that are born at `next_ns`."""
+        """The number of packets that are generated at `next_ns`."""
         return self._owed
 
     def next_ns(self) -> int | None:
-        """The instant of the next packet; None when there will be none (or, for a saturated source, none by itself)."""
+        """The instant of the next packet; None if there is none, or if a saturated source waits for one to end."""
         if self._next_ns is None or self._next_ns >= self._end_ns:
             return None
         return self._next_ns
 
     def advance(self) -> None:
-        """Go on to the next packet: that of `next_ns` was sent."""
+        """The packet of `next_ns` was sent: go on to the next one."""
         assert self._next_ns is not None, "only a source that has a next packet can send it"
         if self.saturated:
-            self._next_ns, self._owed = None, 0  # from here on, one packet for each that ends
+            self._next_ns, self._owed = None, 0  # from now on, one packet for each one that ends
         else:
             self._next_ns = self._following_ns(self._next_ns)
 
     def on_ended(self, *, refused: bool, now_ns: int) -> bool:
-        """Take in that a packet of a saturated source has left, or was given up; True: the next one follows at once.
+        """A packet of a saturated source was transmitted or given up; returns True if the next one follows at once.
 
-        After one that the radio refused it comes a moment later, and is asked for by `next_ns`.
+        If the radio has refused it, the next one follows a moment later, at `next_ns`.
         """
         if now_ns >= self._end_ns:
             return False
@@ -175,7 +177,7 @@ class TrafficGenerator:
 
 
 class Load(Application):
-    """One node's source of packets of one class, whose content does not matter."""
+    """The application that sends the packets of one class at one node; their content does not matter."""
 
     def __init__(self, scenario: Scenario, node: NodeId, name: str) -> None:
         traffic = scenario.traffic_classes[name]
@@ -186,8 +188,8 @@ class Load(Application):
         self._priority = PRIORITIES[traffic.priority]
         first = name == next(iter(scenario.traffic_classes))
         self._deadline_ns = None if traffic.deadline_s is None or first else seconds_to_ns(traffic.deadline_s)
-        """The deadline of packets; that of the first class is policed by the protocol, which knows it from the
-        scenario."""
+        """The deadline of each packet. For the first class it is None, because the protocol's admission control
+        enforces it."""
         self.follows = (Fate.SENT, Fate.TURNED_AWAY) if self._traffic.saturated else ()
         self._generated = 0
 
@@ -207,7 +209,7 @@ class Load(Application):
         return self._traffic.next_ns()
 
     def on_status(self, status: Status, now_ns: int) -> None:
-        """A packet of a saturated source has left, or was given up."""
+        """A packet of a saturated source was transmitted or given up."""
         if self._traffic.on_ended(refused=status.fate is Fate.TURNED_AWAY, now_ns=now_ns):
             self._send(now_ns)
 

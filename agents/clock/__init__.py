@@ -1,1 +1,1 @@
-"""The clock of a UAV: its oscillator, how it finds swarm time, and the translation between the two."""
+"""The clock of a UAV: its oscillator, how it learns swarm time, and the conversion between the two."""

@@ -1,11 +1,11 @@
-"""A UAV with a clock of its own: every instant between it and its host is translated.
+"""A UAV with an inaccurate clock of its own: all instants between the UAV and its host are converted.
 
     host: true time  |  own clock (`local_clock`)  |  swarm time as this node believes it (`swarm_time`)  |  UAV
 
-The UAV lives in swarm time as it believes it; receptions and statuses reach it as stamped by its radio's own clock. Its
-requests leave in true time, and so do its trace records, because delays are measured across nodes. A clock that turns
-out to have been ahead stands still until swarm time has caught up. Until a node has swarm time no schedule reaches it:
-it owns no slot, and contends.
+The UAV knows only swarm time as it believes it. Receptions and statuses reach it with time stamps of its radio's own
+clock. Its requests leave in true time, and so do its trace records, because delays are measured between nodes. If its
+swarm time turns out to have been ahead, it stands still until true swarm time has caught up. Until a node has learned
+swarm time, it receives no schedules, so it has no slot, and contends.
 """
 
 from collections.abc import Callable, Mapping, Sequence
@@ -36,13 +36,13 @@ from fanet_mw.units import US, Enu, NodeId, S
 from fanet_mw.wire import Kind
 
 _SAMPLE_NS: Final = S
-"""The interval at which the true error is recorded."""
+"""The interval at which the true error of swarm time is recorded."""
 _ROUNDING_NS: Final = 2 * US
-"""An instant that has gone to the host and back may differ by this much; a wake-up within it counts as due."""
+"""Rounding may change an instant by this much on its way to the host and back; a wake-up within it counts as due."""
 
 
 class _TimeInHellos:
-    """Adds swarm time to the hellos of one UAV (`agents.hello_schedule.HelloTime`)."""
+    """Adds time beacons to the hellos of one UAV (`agents.hello_schedule.HelloTime`)."""
 
     def __init__(self, time: SwarmTime, local_now_ns: Callable[[], int]) -> None:
         self._time = time
@@ -56,7 +56,7 @@ class _TimeInHellos:
 
 
 class ClockedUav(Actor):
-    """One UAV behind a clock of its own."""
+    """A UAV that sees the world through a clock of its own."""
 
     def __init__(
         self,
@@ -89,10 +89,10 @@ class ClockedUav(Actor):
         self._input_ns = 0
         """The true instant of the input that is being handled."""
         self._shown_ns = 0
-        """Swarm time as it was last given to the UAV; it never goes back."""
+        """The swarm time that was last given to the UAV; it never goes back."""
         self._sample_ns = 0
         self._withheld = 0
-        """The number of schedules that came before there was swarm time."""
+        """The number of schedules that were received before the node had swarm time."""
 
     # --- the actor contract ---------------------------------------------------------------------------------------
 
@@ -130,7 +130,7 @@ class ClockedUav(Actor):
         self._hand_over(now_ns)
 
     def state(self, now_ns: int) -> NodeState:
-        """The network as the node knows it."""
+        """The state of the network, as the node knows it."""
         return self._uav.state(self._now(now_ns))
 
     def next_wake_ns(self) -> int | None:
@@ -158,16 +158,16 @@ class ClockedUav(Actor):
     # --- instants -------------------------------------------------------------------------------------------------
 
     def _begin(self, now_ns: int) -> None:
-        """Begin to handle an input that has come at this true instant."""
+        """Begin to handle an input at this true instant."""
         self._input_ns = now_ns
         self._clock.pass_time(now_ns, until_ns=self._until_ns)
 
     def _local_now_ns(self) -> int:
-        """The instant that the own clock shows while an input is being handled."""
+        """The instant on the own clock while an input is being handled."""
         return self._clock.local_ns(self._input_ns)
 
     def _now(self, now_ns: int) -> int:
-        """Swarm time now, as the UAV is given it."""
+        """The swarm time now, as it is given to the UAV."""
         swarm_ns = self._time.line.swarm_ns(self._clock.local_ns(now_ns))
         self._shown_ns = max(self._shown_ns, swarm_ns)
         return self._shown_ns
@@ -176,13 +176,13 @@ class ClockedUav(Actor):
         return self._clock.true_ns(self._time.line.local_ns(swarm_ns))
 
     def _stamped_ns(self, true_ns: int) -> int:
-        """The instant that the radio's clock shows at a true instant."""
+        """The instant on the radio's clock at a true instant."""
         return self._clock.local_ns(true_ns) // self._stamp_ns * self._stamp_ns
 
     # --- in -------------------------------------------------------------------------------------------------------
 
     def _translated(self, message: Message, now_ns: int) -> Message | None:
-        """A message as the UAV is to receive it; None when it is to receive nothing."""
+        """A message as the UAV is to receive it; None if it is not to receive it."""
         if isinstance(message, Reception):
             ended_ns = self._stamped_ns(message.end_ns)
             kind = wire.peek_kind(message.frame)
@@ -206,7 +206,7 @@ class ClockedUav(Actor):
     # --- out ------------------------------------------------------------------------------------------------------
 
     def _hand_over(self, now_ns: int, known: Mapping[int, int] | None = None) -> None:
-        """Take over what the UAV has put out; `known` maps instants given to the UAV to their true instants."""
+        """Pass on the output of the UAV; `known` maps instants given to the UAV to their true instants."""
         uav = self._uav
         for topic, message in uav.outbox:
             if type(message) is TxRequest:
@@ -232,7 +232,7 @@ class ClockedUav(Actor):
         return request._replace(start_ns=start_ns)
 
     def _sample(self, at_ns: int) -> None:
-        """Record the true error, and let the protocol know how wrong clocks may be."""
+        """Record the true error of swarm time, and tell the protocol how wrong clocks may be."""
         local_ns = self._clock.local_ns(at_ns)
         bound_ns = self._time.error_ns(local_ns)
         reference, hops = self._time.place(local_ns)
@@ -253,9 +253,9 @@ def make_uav(
     onboard_map: OnboardMap = NO_MAP,
     reader: Reader | None = None,
 ) -> Uav | ClockedUav:
-    """A UAV as the scenario has it, with its host's clock or one of its own, a user's applications, a map.
+    """Make a UAV by its scenario: with the host's clock or one of its own, a user's applications, and a map.
 
-    The nodes of one run share a `reader` of frames.
+    `reader`: the reader of frames that all nodes of a run share.
     """
     kind = ClockedUav if scenario.clock.modelled else Uav
     return kind(

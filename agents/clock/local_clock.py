@@ -1,9 +1,9 @@
-"""A UAV's oscillator: what its clock shows at a true instant, and the reverse. Known to the run, not to the node.
+"""The simulated oscillator of a UAV: the time that its clock shows at a true instant, and the reverse.
 
     local = true + offset + sum over seconds of rate x time,   the rate a bounded random walk, constant within a second
 
-Before the start and beyond the walk the first and the last rate hold on. Not modeled: temperature, voltage, aging, and
-jumps of the counter.
+Only the simulation knows it; the node itself does not. The first and the last rate of the walk continue before and
+after it. Not modeled: temperature, voltage, aging, and jumps of the counter.
 """
 
 from typing import Final, NamedTuple
@@ -14,11 +14,11 @@ from fanet_mw.units import NodeId, S
 
 _PPM: Final = 1e-6
 _AHEAD_NS: Final = 60 * S
-"""The walk is computed this far ahead; nothing is announced further ahead."""
+"""The walk is computed this far ahead of the present, and nothing is announced farther ahead."""
 
 
 class _Second(NamedTuple):
-    """From this true instant on the clock shows `local_ns` and runs fast by `rate`."""
+    """From this true instant on, the clock begins at `local_ns` and runs fast by `rate`."""
 
     true_ns: int
     local_ns: int
@@ -38,7 +38,7 @@ class LocalClock:
         self._walk = [_Second(0, self._offset_ns, rate)]
 
     def pass_time(self, true_ns: int, *, until_ns: int) -> None:
-        """Extend the walk over all instants that may be asked for from now on, up to `until_ns`."""
+        """Extend the walk over all instants that may be asked for from now on, at most up to `until_ns`."""
         if not self._wander:
             return
         while self._walk[-1].true_ns < min(true_ns, until_ns) + _AHEAD_NS:

@@ -1,6 +1,6 @@
-"""Search and rescue as applications: by the paper's rule, or by a plan.
+"""The two kinds of search and rescue as applications of a node: by the paper's rule, or by a plan.
 
-Each hands what its UAV senses and is told to the mission, and empties the mission's outbox into its port.
+Each application passes its inputs to the mission, and empties the mission's outbox into its port.
 """
 
 from typing import Final
@@ -23,7 +23,7 @@ from fanet_mw.wire.search import Found, Search, SearchStatus, Standing, Told, to
 
 
 class Rescue(Application):
-    """One UAV's part in a rescue by the paper's rule."""
+    """The rescue by the paper's rule, at one UAV."""
 
     name: Final = "report"
     listens = (SURVIVOR.msgid,)
@@ -58,17 +58,17 @@ class Rescue(Application):
 
 
 class PlannedSearch(Application):
-    """The planned search at one UAV: what it senses and hears goes to a searcher, what that decides goes out."""
+    """The planned search at one UAV: its inputs go to a searcher, and the searcher's decisions go out."""
 
     name: Final = "report"
     listens = (SURVIVOR.msgid, SEARCH.msgid, STATUS.msgid, BIDS.msgid, FOUND.msgid, COVERED.msgid)
 
     def __init__(self, scenario: Scenario, node: NodeId, *, position: Enu, onboard_map: OnboardMap = NO_MAP) -> None:
-        """`onboard_map` is the map that the UAV carries."""
+        """`onboard_map`: the map that the UAV carries."""
         self._outbox = Outbox()
         self._searcher = Searcher(scenario, node, position=position, outbox=self._outbox, onboard_map=onboard_map)
         self._bad_positions = 0
-        """The number of hellos without a position that can be believed."""
+        """The number of hellos without a credible position."""
 
     def start(self, port: AppPort, now_ns: int) -> None:
         super().start(port, now_ns)
@@ -83,7 +83,7 @@ class PlannedSearch(Application):
         self._settle()
 
     def on_hello(self, frame: bytes, now_ns: int) -> None:
-        """A neighbor's hello says where it flies, and passes on what it knows."""
+        """A neighbor's hello states how it flies, and passes on what it knows."""
         messages, heard = decoded(frame, told_in), motion_in(frame, own=self.port.node, now_ns=now_ns)
         if heard is None:
             self._bad_positions += 1
@@ -129,7 +129,7 @@ class PlannedSearch(Application):
         return {"bad_positions": self._bad_positions}
 
     def _settle(self) -> None:
-        """Bring what the searcher put out to where it goes."""
+        """Send, fly and record what the searcher has put into its outbox."""
         velocity = self._searcher.take_velocity()
         if velocity is not None:
             self._outbox.course = course_at(self.port.position, velocity)
@@ -137,7 +137,7 @@ class PlannedSearch(Application):
 
 
 def _speaker(told: Told) -> int | None:
-    """The only node that may flood this message; None: any node may pass it on."""
+    """The only node that may flood this message; None if any node may pass it on."""
     if isinstance(told, Survivor):
         return told.reporter
     if isinstance(told, Search):

@@ -1,4 +1,4 @@
-"""The course that flies on at a velocity."""
+"""Makes a course of a velocity."""
 
 from typing import Final
 
@@ -6,12 +6,12 @@ from fanet_mw.application import Course
 from fanet_mw.units import Enu
 
 _AHEAD_S: Final = 10.0
-"""A course leads to a point this far ahead: the farther that is, the less the error of a fix turns the course."""
+"""A course leads to a point this far ahead. The farther it is, the less does the error of a fix turn the course."""
 _LEAST_M_S: Final = 0.05
 
 
 def course_at(here: Enu, velocity: Enu) -> Course:
-    """The course that flies on at a velocity: its point lies far ahead."""
+    """The course that flies on at a velocity, to a point far ahead."""
     speed = velocity.norm()
     if speed < _LEAST_M_S:
         return Course(here, _LEAST_M_S)

@@ -8,13 +8,15 @@ from collections.abc import Sequence
 
 
 def assign(costs: Sequence[Sequence[float]]) -> list[int]:
-    """The column of each row. There must be at least as many columns as rows. Ties go to the lower column."""
+    """The column of each row. There must be at least as many columns as rows. Of equal assignments the one with lower
+    columns.
+    """
     rows = len(costs)
     columns = len(costs[0]) if rows else 0
     assert columns >= rows, "every row needs a column"
     row_price, column_price = [0.0] * (rows + 1), [0.0] * (columns + 1)
     row_of = [0] * (columns + 1)
-    """The row of each column, from 1; 0: none. Column 0 stands for the row that is being placed."""
+    """The row of each column, counted from 1; 0 for none. Column 0 stands for the row that is being placed."""
     came_from = [0] * (columns + 1)
     for row in range(1, rows + 1):
         row_of[0] = row

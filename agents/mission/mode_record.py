@@ -1,4 +1,4 @@
-"""What a searching UAV does at the moment, in one word, written into the trace whenever it changes."""
+"""Records what a searching UAV is doing, in one word, whenever it changes."""
 
 from agents.mission.flight.return_home import ReturnHome
 from agents.mission.formation.formation_place import FormationPlace
@@ -14,10 +14,10 @@ class ModeRecord:
         self._node = node
         self._place, self._return_home, self._outbox = place, return_home, outbox
         self._last: tuple[str, int] | None = None
-        """The mode that the trace has, and the survivor to whom the UAV then flew."""
+        """The mode that was recorded last, and the survivor to whom the UAV flew then."""
 
     def review(self, survivor: int | None, now_ns: int) -> None:
-        """Write a record if the mode has changed; `survivor` is the one to whom this UAV goes, if any."""
+        """Record the mode if it has changed; `survivor` is the one to whom this UAV flies, if any."""
         mode = self._mode(survivor, now_ns), survivor or 0
         if self._last != mode:
             self._last = mode

@@ -1,1 +1,1 @@
-"""The position of a UAV where GPS alone does not tell it: averaged fixes, and dead reckoning."""
+"""The position of a UAV when GPS is inaccurate or out: averaged fixes, and dead reckoning."""

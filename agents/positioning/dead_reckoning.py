@@ -1,8 +1,8 @@
-"""Where a UAV is while GPS is out: the last position, moved on by the velocity that needs no satellites.
+"""Dead reckoning while GPS is out: the last position, moved by a velocity that is measured without satellites.
 
-    position(t) = last estimate + velocity x time        (inertial sensors and optical flow drift: so does the estimate)
+    position(t) = last estimate + velocity x time        (inertial sensors and optical flow drift, so the estimate does)
 
-A short outage costs little: 0.1 m/s of drift is 6 m after a minute.
+A short outage matters little: 0.1 m/s of drift is 6 m after a minute.
 """
 
 from typing import Final
@@ -11,13 +11,13 @@ from fanet_mw.bus.messages import Gps, Inertial
 from fanet_mw.units import MS, Enu, S
 
 _OUT_NS: Final = 500 * MS
-"""GPS is taken to be out when its last fix is older than this."""
+"""GPS is taken to be out when the last fix is older than this."""
 _SETTLE: Final = 0.15
-"""The weight of a fix against dead reckoning: errors of fixes that are near in time are averaged."""
+"""The weight of a fix against dead reckoning, which averages the errors of successive fixes."""
 
 
 class DeadReckoning:
-    """The position of one UAV, from whatever tells of it."""
+    """The position of one UAV, with or without GPS."""
 
     def __init__(self) -> None:
         self._at: Enu | None = None
@@ -25,7 +25,7 @@ class DeadReckoning:
         self._fix_ns: int | None = None
 
     def fix(self, fix: Gps) -> None:
-        """Take in a position that GPS has told."""
+        """A position fix of GPS."""
         if self._at is None:
             self._at = fix.position
         else:
@@ -35,7 +35,9 @@ class DeadReckoning:
         self._t_ns = self._fix_ns = fix.t_ns
 
     def velocity(self, reading: Inertial) -> Gps | None:
-        """Take in a velocity measured without GPS; returns a fix in place of GPS's while GPS is out, else None."""
+        """A velocity measured without GPS; returns a fix that takes the place of GPS's while GPS is out, otherwise
+        None.
+        """
         if self._at is None or self._fix_ns is None or reading.t_ns - self._fix_ns <= _OUT_NS:
             return None
         self._at, self._t_ns = self._moved(reading.velocity, reading.t_ns), reading.t_ns

@@ -1,9 +1,10 @@
-"""A UAV's estimate of its position when GPS errs by much: the fixes, averaged along the track that its velocity gives.
+"""Averages inaccurate GPS fixes of a UAV along the track that its velocity gives.
 
     estimate += velocity x time;  estimate += max(gain, 1 / fixes so far) x (fix - estimate)
 
-With fixes whose errors are independent, the error of the estimate is sqrt(gain / (2 - gain)) of a fix's. A velocity is
-measured by Doppler shift, much more accurately than a position; its error shows as error x time between fixes / gain.
+If the errors of fixes are independent, the error of the estimate is sqrt(gain / (2 - gain)) times that of a fix.
+Velocities are measured by Doppler shift, much more accurately than positions; the error of the velocity appears as
+error x time between fixes / gain.
 """
 
 import math
@@ -13,9 +14,9 @@ from fanet_mw.bus.messages import Gps
 from fanet_mw.units import Enu, S
 
 _WANTED: Final = 0.01
-"""The share of the radio range that the estimate may err by: timetables by places tolerate that much."""
+"""The wanted error of the estimate, as a share of the radio range; timetables from positions tolerate that much."""
 _NEGLIGIBLE: Final = 0.02
-"""Fixes that err by less than this share of the radio range are used as they are."""
+"""Fixes with an error below this share of the radio range are used as they are."""
 
 
 class SteadyFix:
@@ -26,7 +27,7 @@ class SteadyFix:
         self._at: Enu | None = None
         self._t_ns = 0
         self._count = 1
-        """The number of fixes so far; the first fixes have equal weights."""
+        """The number of fixes so far; the first ones have equal weights."""
 
     def position(self, fix: Gps) -> Enu:
         """The estimate after another fix."""
@@ -46,7 +47,7 @@ class SteadyFix:
 
 
 def gain(*, sigma_m: float, range_m: float) -> float:
-    """The weight of a fix that gives the estimate an error of `_WANTED`; 1 for fixes that are good enough."""
+    """The weight of a fix with which the estimate has the wanted error; 1 for fixes that are accurate enough."""
     if sigma_m <= _NEGLIGIBLE * range_m:
         return 1.0
     share = _WANTED * range_m / sigma_m

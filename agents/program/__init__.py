@@ -1,1 +1,1 @@
-"""A node of a swarm inside a program of one's own: `fanet_mw.join`."""
+"""A node of a swarm inside a user's own program (`fanet_mw.join`)."""

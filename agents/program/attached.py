@@ -1,10 +1,10 @@
-"""How the node of a program takes part in a swarm: over the emulated radio, or on a real one.
+"""Connects the node of a user's program to a swarm: over the emulated radio, or over a real one.
 
     Emulated   Zenoh session -> host -> UAV
     OnAir      UDP socket, and a router that keeps the clock or an epoch -> host -> UAV
 
-The task that runs the host ends with the block; when the host ends first (the time is over, the router is gone, the UAV
-raised), every task that waits for the node is told.
+The host runs in a task, which ends with the `async with` block. If the host ends first, because the time is over, the
+router is gone or the UAV has raised, every task that waits for the node is told.
 """
 
 import asyncio
@@ -30,7 +30,8 @@ from fanet_mw.units import Enu, NodeId, S
 T = TypeVar("T")
 _POLL_S: Final = 0.01
 _PATIENCE_S: Final = 10.0
-"""A program waits longer than a person at a terminal: on a busy machine a handshake may take seconds."""
+"""A program waits longer for the router than a person at a terminal would; on a busy machine a handshake may take
+seconds."""
 _ORIGIN: Final = Enu(0.0, 0.0, 0.0)
 
 
@@ -39,7 +40,7 @@ class NodeClosedError(BusError):
 
 
 class Drive(Protocol):
-    """What moves the time of a joined node."""
+    """Drives the time of a joined node."""
 
     def nudge(self) -> None:
         """Let the UAV look at what has been handed to it."""
@@ -47,17 +48,17 @@ class Drive(Protocol):
     def now_ns(self) -> int: ...
 
     def state(self) -> NodeState:
-        """The network as the node knows it."""
+        """The state of the network, as the node knows it."""
 
     def report(self) -> Mapping[str, Any]:
         """The counters of the UAV."""
 
     async def wait(self, future: asyncio.Future[T]) -> T:
-        """Wait for something that the host brings about; raises when it cannot come any more."""
+        """Wait for something that the host brings about; raises if it cannot come any more."""
 
 
 class Attachment(Protocol):
-    """The way in which a node is joined to a swarm."""
+    """The way in which a node is connected to a swarm."""
 
     def attach(
         self, scenario: Scenario, node: NodeId, applications: Sequence[Application]
@@ -92,13 +93,13 @@ class _RealTime:
         finally:
             future.cancel()
         if not self._task.cancelled():
-            self._task.result()  # raises what ended the host
+            self._task.result()  # raises what has ended the host
         raise NodeClosedError("the swarm's time is over")
 
 
 @contextlib.asynccontextmanager
 async def _running(uav: Uav | ClockedUav, host: RealtimeHost, scenario: Scenario) -> AsyncIterator[Drive]:
-    """A host in a task; yields when its UAV has been started, and ends it whatever happens."""
+    """Run a host in a task; yields when its UAV has started, and ends the task whatever happens."""
     task = asyncio.ensure_future(
         host.run(until_ns=scenario.duration_ns, clock_timeout_s=START_PATIENCE_S, scenario=scenario)
     )

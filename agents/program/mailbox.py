@@ -1,6 +1,6 @@
-"""The application between a node and a program that has joined it: what is sent waits here, and so does what came.
+"""The application that connects a node with the user's program that has joined it: a mailbox in each direction.
 
-node.send(...)   ->  to_send  ->  port.send, when the host wakes the UAV  ->  what became of it, to the sender
+node.send(...)   ->  to_send  ->  port.send, when the host wakes the UAV  ->  the status, back to the sender
 a message        ->  got      ->  node.receive()
 """
 
@@ -62,7 +62,7 @@ class Message(NamedTuple):
 
 
 class Mailbox(Application):
-    """The application between a node and the program that has joined it."""
+    """The mailbox between a node and the program that has joined it."""
 
     name = "joined"
     ports = ANY
@@ -71,11 +71,11 @@ class Mailbox(Application):
     )  # fmt: skip
 
     def __init__(self, messages: Collection[int] = ()) -> None:
-        """`messages`: ids of the MAVLink messages that the program wants, or ANY."""
+        """`messages`: the ids of the MAVLink messages that the program wants, or ANY."""
         self.listens = messages
         self.to_send: deque[tuple[Callable[[], int], asyncio.Future[Sent], bool]] = deque()
-        """Messages that wait for the host: how to send each, the future for what becomes of it, and whether it is to be
-        confirmed."""
+        """The messages that wait for the host: a function that sends the message, the future for its status, and
+        whether it is confirmed."""
         self._open: dict[int, tuple[asyncio.Future[Sent], bool, list[int], list[int]]] = {}
         self.got: deque[Message] = deque(maxlen=_MOST_UNREAD)
         self.news = asyncio.Event()

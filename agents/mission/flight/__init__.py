@@ -1,1 +1,3 @@
-"""How a searching UAV flies: to its goal, clear of others and of obstacles, in reach of its neighbors, and home."""
+"""The flight of a searching UAV: to its goal, clear of others and of obstacles, within reach of its neighbors, and
+home.
+"""

@@ -1,8 +1,8 @@
-"""Which velocities keep a UAV clear of others, and which keep it in reach of those that it is tied to.
+"""Constraints on a UAV's velocity: it must stay clear of other UAVs, and within reach of those that it is tied to.
 
 Collision avoidance is ORCA (van den Berg, Guy, Lin, Manocha: Reciprocal n-Body Collision Avoidance, 2011): each of two
-takes half of the change that leads out of the velocity obstacle. What is known of the other is a received position and
-velocity; the older they are, the larger the clearance that is asked for, because the other may have turned since.
+UAVs makes half of the change that leads out of the velocity obstacle. A UAV knows another by a received position and
+velocity. The older they are, the larger is the required clearance, because the other may have turned since.
 """
 
 import math
@@ -12,27 +12,27 @@ from agents.mission.navigation.half_planes import HalfPlane, Velocity
 from fanet_mw.units import Enu
 
 _TURN_M_S2: Final = 1.0
-"""The acceleration that another UAV is assumed to have flown with, on average, since it was last heard."""
+"""The mean acceleration with which another UAV is assumed to have flown since it was last received."""
 _MOST_GROWTH_M: Final = 12.0
 
 
 def grown_m(age_s: float) -> float:
-    """How far from its extrapolated place another UAV may be after so long without a word from it [m]."""
+    """How far another UAV may be from its extrapolated place, if nothing of it was received for this long [m]."""
     return min(_MOST_GROWTH_M, 0.5 * _TURN_M_S2 * age_s * age_s)
 
 
 def avoiding(
     offset: Enu, velocity: Velocity, other_velocity: Velocity, *, clearance_m: float, horizon_s: float, share: float
 ) -> HalfPlane:
-    """The half-plane of velocities that avoid one other body within the horizon.
+    """The half-plane of velocities that avoid another body within the horizon.
 
-    `offset` leads from this UAV to the body. `share` is this UAV's share of the change: 0.5 if both avoid, else 1.
+    `offset` leads from this UAV to the body. `share` is this UAV's share of the change: 0.5 if both avoid, otherwise 1.
     """
     px, py = offset.east, offset.north
     vx, vy = velocity[0] - other_velocity[0], velocity[1] - other_velocity[1]
     distance2 = px * px + py * py
     radius2 = clearance_m * clearance_m
-    if distance2 <= radius2:  # too near already: part within a second
+    if distance2 <= radius2:  # already too near: part within a second
         distance = math.sqrt(distance2)
         nx, ny = (-px / distance, -py / distance) if distance > 1e-6 else (1.0, 0.0)
         away = clearance_m - distance  # [m] within one second
@@ -57,9 +57,9 @@ def avoiding(
 
 
 def staying_near(offset: Enu, other_velocity: Velocity, *, tether_m: float, within_s: float) -> HalfPlane | None:
-    """The half-plane of velocities that keep this UAV in reach of another for a time; None when that one is near.
+    """The half-plane of velocities that keep this UAV within reach of another for a time; None if the other is near.
 
-    Both UAVs may fly apart, so each of them may use half of what is left of the tether.
+    Either UAV may fly away from the other, so each of them may use half of the remaining length of the tether.
     """
     distance = math.hypot(offset.east, offset.north)
     if distance < 0.3 * tether_m:

@@ -1,6 +1,6 @@
-"""The endurance of a UAV: what the battery gives above the way home and a reserve.
+"""The endurance of a UAV: how much charge it may spend in addition to the way home and a reserve.
 
-rate      share of the charge that a second of flight takes, from the readings of the last while
+rate      share of the charge that one second of flight takes, from recent readings
 needed    rate x (way home / speed + height / sinking speed), and a fifth more for wind and waiting
 margin    charge - reserve - needed;  at 0 a UAV flies home, whatever it is doing
 """
@@ -18,7 +18,7 @@ _SINK_M_S: Final = 1.0
 
 
 class Endurance:
-    """The battery of one UAV, as its readings tell it."""
+    """The battery of one UAV, by its readings."""
 
     def __init__(self, home: Enu, *, speed_m_s: float, reserve: float) -> None:
         self._home = home
@@ -27,13 +27,15 @@ class Endurance:
         self._readings: deque[tuple[int, float]] = deque()
 
     def read(self, charge: float, *, now_ns: int) -> None:
-        """Take in a reading: the share of the capacity that is left."""
+        """A reading of the battery: the share of the capacity that is left."""
         self._readings.append((now_ns, charge))
         while now_ns - self._readings[0][0] > _WINDOW_NS:
             self._readings.popleft()
 
     def margin(self, here: Enu) -> float:
-        """The share of the capacity that may still be spent before the UAV flies home; 1 before the first reading."""
+        """The share of the capacity that may still be spent before the UAV must fly home; 1 before
+        the first reading.
+        """
         if not self._readings:
             return 1.0
         charge = self._readings[-1][1]

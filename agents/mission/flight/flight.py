@@ -1,4 +1,4 @@
-"""How a searching UAV flies on from one position fix to the next: to its goal or home, as constraints allow."""
+"""The flight of a searching UAV from one position fix to the next: to its goal or home, within its constraints."""
 
 from agents.mission.flight.goal import Goal
 from agents.mission.flight.return_home import ReturnHome
@@ -8,7 +8,7 @@ from fanet_mw.units import STILL, Enu
 
 
 class Flight:
-    """The velocity of one UAV."""
+    """Chooses the velocity of one UAV."""
 
     def __init__(
         self, navigation: Navigation, goal: Goal, velocity_choice: VelocityChoice, return_home: ReturnHome
@@ -16,14 +16,14 @@ class Flight:
         self._navigation, self._goal = navigation, goal
         self._velocity_choice, self._return_home = velocity_choice, return_home
         self.velocity: Enu | None = None
-        """A new velocity to fly, for the application to take; None: there is no new one."""
+        """A new velocity to fly, until the application takes it; None if there is no new one."""
 
     def altimeter(self, above_ground_m: float | None, *, now_ns: int) -> None:
-        """The rangefinder tells the height over whatever is below; None: nothing is within its range."""
+        """The rangefinder has measured the height over whatever is below; None if nothing is within its range."""
         self._navigation.altimeter(above_ground_m, now_ns=now_ns)
 
     def fix(self, position: Enu, velocity: Enu, survivor: int | None, *, now_ns: int) -> None:
-        """Choose a velocity at a position fix; `survivor` is the one to whom this UAV goes, if any."""
+        """A position fix: choose a velocity. `survivor` is the one to whom this UAV flies, if any."""
         self._navigation.fix(position, velocity, now_ns=now_ns)
         if not self._return_home.leaves:
             goal, feed = self._goal.at(survivor, now_ns)

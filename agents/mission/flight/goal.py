@@ -1,4 +1,4 @@
-"""The goal of a searching UAV: a survivor, as far as its place in the formation lets it, or its lane."""
+"""The goal of a searching UAV: a survivor, within the limits that its place in the formation sets, or its lane."""
 
 from typing import Final
 
@@ -11,11 +11,11 @@ from agents.mission.tasking.bidding import FAR_M, VAGUE_M
 from fanet_mw.units import STILL, Enu
 
 _SHARED_M: Final = 35.0
-"""An estimate so near to the border of two lanes belongs to both."""
+"""An estimate this near to the border of two lanes belongs to both."""
 
 
 class Goal:
-    """The place that one UAV flies to, from what it has found and its place in the formation."""
+    """The place to which one UAV flies, by what it has found and by its place in the formation."""
 
     def __init__(
         self,
@@ -25,13 +25,15 @@ class Goal:
         approach: Approach,
         gaps: Gaps | None,
     ) -> None:
-        """`gaps`: what the formation has left out, for UAVs that share what has been searched."""
+        """`gaps`: the cells that the formation has left unsearched; None if UAVs do not share what
+        they have searched.
+        """
         self._finds, self._navigation = finds, navigation
         self._formation, self._approach = formation, approach
         self._gaps = gaps
 
     def at(self, task: int | None, now_ns: int) -> tuple[Enu, Enu]:
-        """The place to fly to and how it moves; `task` is the survivor that this UAV has won, if any."""
+        """The place to fly to, and how it moves; `task` is the survivor that this UAV has won, if any."""
         formation = self._formation
         lane, moves = formation.lane(now_ns)
         survivor = task
@@ -47,14 +49,16 @@ class Goal:
         return formation.bounded(east, north, lane, moves)
 
     def _gap(self, now_ns: int) -> tuple[float, float] | None:
-        """What the formation has left out, for a UAV that is free to go there; None: nothing, or it has a place."""
+        """The nearest unsearched gap, for a UAV that is free to fly there; None if there is none, or if the UAV has a
+        place.
+        """
         formation = self._formation
         if self._gaps is None or not formation.is_free or formation.place is None:
             return None
         return self._gaps.nearest(self._navigation.position, now_ns)
 
     def _in_lane(self, lane: Enu, moves: Enu, now_ns: int) -> int | None:
-        """The nearest survivor that the lane of the UAV leads by: it looks at it as it passes, in formation."""
+        """The nearest survivor beside the UAV's lane, whom it examines in passing, without leaving the formation."""
         formation, here = self._formation, self._navigation.position
         pattern = formation.pattern
         if pattern is None or not formation.searches or not formation.is_taken_up(now_ns):

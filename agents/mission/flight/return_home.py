@@ -1,4 +1,4 @@
-"""When a UAV gives its part in the mission up, and how it comes home: above the others, then straight down."""
+"""The return of a UAV whose battery runs low: it flies home above all others, then lands straight down."""
 
 import math
 from typing import Final
@@ -10,27 +10,29 @@ from fanet_mw.application import Course
 from fanet_mw.units import Enu
 
 _HIGHER_M: Final = 18.0
-"""A UAV flies home so much above the lanes: relays and followers are below it."""
+"""A UAV flies home this far above the lanes; relays and followers fly below it."""
 _HOME_M: Final = 4.0
 _LAND_M_S: Final = 1.5
 
 
 class ReturnHome:
-    """The return of one UAV: when it leaves, and the way that it then flies."""
+    """The return of one UAV: when it leaves its mission, and how it flies home."""
 
     def __init__(
         self, home: Enu, navigation: Navigation, outbox: Outbox, *, speed_m_s: float, height_m: float, reserve: float
     ) -> None:
-        """`height_m` is that of the lanes over the ground; `reserve` is the share of the charge to land with."""
+        """`height_m`: the height of the lanes above ground. `reserve`: the share of the charge with which it is to
+        land.
+        """
         self._home = home._replace(up=height_m + _HIGHER_M)
         self._navigation, self._outbox = navigation, outbox
         self._endurance = Endurance(home, speed_m_s=speed_m_s, reserve=reserve)
         self.leaves = False
-        """True from when it flies home."""
+        """True from the moment at which it flies home."""
         self.lands = False
 
     def on_battery(self, charge: float, *, now_ns: int) -> bool:
-        """Take in a reading of the battery; True when it is time to leave."""
+        """A reading of the battery; returns True if the UAV must leave now."""
         self._endurance.read(charge, now_ns=now_ns)
         if self.leaves or self._endurance.margin(self._navigation.position) > 0.0:
             return False
@@ -39,8 +41,8 @@ class ReturnHome:
 
     @property
     def percent(self) -> int:
-        """The percentage of the battery that may still be spent, as a status tells it; 0 only for a UAV that flies
-        home.
+        """The percentage of the battery that the UAV may still spend, for its status; 0 only for a
+        UAV that flies home.
         """
         if self.leaves:
             return 0
@@ -52,9 +54,9 @@ class ReturnHome:
         return self._home
 
     def land_if_there(self) -> bool:
-        """Command the landing of a UAV that has come to its goal; True once it lands.
+        """Command the landing if the UAV has reached its goal; returns True once it lands.
 
-        A setpoint may be lost on its way to the flight controller: each call says it again.
+        Each call commands it again, because a setpoint may get lost on its way to the flight controller.
         """
         here = self._navigation.position
         if math.hypot(here.east - self._home.east, here.north - self._home.north) <= _HOME_M:

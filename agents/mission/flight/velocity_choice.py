@@ -1,7 +1,8 @@
-"""The velocity to fly from one position fix to the next: the wanted one, changed as little as constraints allow.
+"""Chooses the velocity to fly until the next position fix: the wanted velocity, changed as little as the constraints
+allow.
 
-Constraints are half-planes of velocities. Hard ones keep a UAV clear of others and are never given up; soft ones keep
-it in reach of those that hold the swarm together with it, and the last ones are given up when not all can be met.
+Constraints are half-planes of velocities. Hard ones keep a UAV clear of others, and always hold. Soft ones keep it
+within reach of the UAVs with which it holds the swarm together; if not all can hold, the least important are dropped.
 """
 
 import math
@@ -17,30 +18,31 @@ from fanet_mw.motion import Motion
 from fanet_mw.units import Enu, S
 
 _LANE_GAIN: Final = 0.4
-"""A deviation from the wanted place is made good at this rate [1/s]."""
+"""The rate at which a deviation from the wanted place is corrected [1/s]."""
 _CLIMB_M_S: Final = 2.5
 _LEAST_M_S: Final = 1.0
-"""A UAV flies around a corner no more slowly than this."""
+"""The least speed at which a UAV flies around a corner."""
 _LEVEL_M: Final = 4.0
-"""Heights farther apart than twice this are different levels: a UAV there is not in the way, once both keep theirs."""
+"""UAVs whose heights differ by more than twice this are on different levels, and not in each other's way once both keep
+their heights."""
 _CLEARANCE_M: Final = 10.0
 _HORIZON_S: Final = 6.0
 _WATCH_M: Final = 150.0
 _TETHER: Final = 0.95
-"""Share of the radio's reach at which a tether ends."""
+"""The length of a tether, as a share of the radio's reach."""
 _TETHER_S: Final = 4.0
 
 
 class Constraint(Protocol):
-    """Something that limits the velocities that a UAV may fly."""
+    """A limit on the velocities that a UAV may fly."""
 
     def planes(self, now_ns: int) -> list[HalfPlane]:
-        """The half-planes of the velocities that it allows now, the most important first."""
+        """The half-planes of velocities that are allowed now, the most important first."""
         ...
 
 
 class VelocityChoice:
-    """The choice of one UAV's velocity, under constraints that must hold and others that should."""
+    """Chooses the velocity of one UAV, under hard and soft constraints."""
 
     def __init__(
         self,
@@ -56,7 +58,7 @@ class VelocityChoice:
         self._hard, self._soft = hard, soft
 
     def velocity(self, goal: Enu, feed: Enu, now_ns: int) -> Enu:
-        """The velocity to fly to a place that moves itself."""
+        """The velocity to fly to a place `goal`, which moves at the velocity `feed`."""
         here, obstacles = self._navigation.position, self._obstacles
         off = goal.minus(here)
         wanted = feed.east + _LANE_GAIN * off.east, feed.north + _LANE_GAIN * off.north
@@ -76,7 +78,9 @@ class VelocityChoice:
         return velocity._replace(up=max(-_CLIMB_M_S, min(_CLIMB_M_S, 0.5 * climb_m)))
 
     def _towards(self, corner: Enu, *, speed_m_s: float) -> Velocity:
-        """The velocity to a place on the way around an obstacle; near it as slow as the goal itself would have it."""
+        """The velocity to a corner on the way around an obstacle; near the corner it is as slow as the goal itself
+        requires.
+        """
         off = corner.minus(self._navigation.position)
         distance = math.hypot(off.east, off.north)
         speed = min(self._most_m_s, max(speed_m_s, 0.5 * self._most_m_s), max(_LEAST_M_S, distance))
@@ -84,7 +88,7 @@ class VelocityChoice:
 
 
 class ClearOfObstacles:
-    """The constraints by walls, by areas that no UAV may enter, and by what the radar shows."""
+    """Constraints by walls, by no-fly areas, and by what the radar shows."""
 
     def __init__(self, navigation: Navigation, obstacles: KnownObstacles) -> None:
         self._navigation, self._obstacles = navigation, obstacles
@@ -94,8 +98,8 @@ class ClearOfObstacles:
 
 
 class ClearOfOthers:
-    """Collision avoidance: ORCA on the received positions of neighbors, with a clearance that grows with their age, and
-    on what the radar shows flying.
+    """Collision avoidance by ORCA: with neighbors at their received positions, with a clearance that grows with their
+    age, and with whatever the radar shows flying.
     """
 
     def __init__(self, navigation: Navigation, neighbors: NeighborMotions, obstacles: KnownObstacles) -> None:
@@ -125,7 +129,7 @@ class ClearOfOthers:
 
 
 class InReach:
-    """Coherence: a UAV in a line or in the chain stays in reach of its neighbors there, a follower of its line."""
+    """Coherence: a UAV of a line or of the chain stays within reach of its neighbors there, a follower of its line."""
 
     def __init__(
         self, navigation: Navigation, neighbors: NeighborMotions, formation: FormationPlace, *, reach_m: float
@@ -154,7 +158,7 @@ class InReach:
         return planes
 
     def _nearest(self, places: range, now_ns: int) -> tuple[int, ...]:
-        """The one of these places whose holder is nearest to this UAV; none when no holder was heard lately."""
+        """Of these places, the one whose holder is nearest to this UAV; empty if no holder was received recently."""
         plan = self._formation.plan
         assert plan is not None, "who has a place has a plan"
         near = [

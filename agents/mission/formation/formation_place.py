@@ -1,7 +1,7 @@
-"""A UAV's place in the formation: where the plan wants it at every instant, and how far from there it may go.
+"""A UAV's place in the formation: where the plan wants it at each instant, and how far it may go from there.
 
-A UAV of a line or of the chain holds the swarm together: it stays near its lane. A follower may go anywhere near its
-line. A UAV that has no place yet waits where it is.
+A UAV of a line or of the chain holds the swarm together, so it stays near its lane. A follower may fly anywhere near
+its line. A UAV that has no place yet waits where it is.
 """
 
 from typing import Final
@@ -14,18 +14,18 @@ from fanet_mw.units import MS, STILL, US, Enu, NodeId, S
 from fanet_mw.wire.search import Search
 
 _FREE_REACH: Final = 0.84
-"""The share of the reach within which a follower stays of its line, so that it is heard there wherever it goes."""
+"""A follower stays within this share of the reach from its line, so that the line receives it wherever it flies."""
 _ASIDE_M: Final = 70.0
-"""A survivor so far beyond the leash is still looked at from the end of the leash."""
+"""A survivor up to this far beyond the leash is examined from the end of the leash."""
 _AHEAD_M: Final = 250.0
 _LEASH_M: Final = 58.0
-"""A UAV of a line may leave its lane so far to the side."""
+"""How far a UAV of a line may leave its lane sideways."""
 _LAG_M: Final = 140.0
-"""A UAV may fall so far behind its line."""
+"""How far a UAV may fall behind its line."""
 
 
 class FormationPlace:
-    """The place of one UAV in the plan that it flies by."""
+    """The place of one UAV in the plan that it follows."""
 
     def __init__(self, node: NodeId, navigation: Navigation, *, reach_m: float) -> None:
         self._node = node
@@ -38,7 +38,7 @@ class FormationPlace:
         self._left_ns = 0
 
     def adopt(self, plan: Search, now_ns: int) -> None:
-        """Fly by a plan from now on."""
+        """Follow a plan from now on."""
         first = self.place is None
         self.plan, self.pattern = plan, pattern_of(plan)
         self.place = plan.nodes.index(self._node) if self._node in plan.nodes else None
@@ -46,19 +46,19 @@ class FormationPlace:
             self._left_from, self._left_ns = self._navigation.over_ground(now_ns), max(now_ns, plan.start_us * US)
 
     def leave(self) -> None:
-        """Hold no place any more, whatever the plan says yet."""
+        """Give up the place, even if the plan still has it."""
         self.place = None
 
     # --- where the plan wants the UAV ----------------------------------------------------------------------------
 
     @property
     def is_free(self) -> bool:
-        """True for a UAV that may go anywhere, because the swarm holds together without it."""
+        """True for a UAV that may fly anywhere, because the swarm holds together without it."""
         return self.pattern is None or self.place is None or self.pattern.kind(self.place) == "follower"
 
     @property
     def searches(self) -> bool:
-        """True for a UAV that has a lane of its own to search."""
+        """True for a UAV with a lane of its own to search."""
         return self.pattern is not None and self.place is not None and self.pattern.kind(self.place) == "line"
 
     def is_taken_up(self, now_ns: int) -> bool:
@@ -66,7 +66,7 @@ class FormationPlace:
         return self.plan is not None and now_ns >= _taken_up_ns(self.plan)
 
     def lane(self, now_ns: int) -> tuple[Enu, Enu]:
-        """The present place in the UAV's lane, at a height over the ground, and how that place moves."""
+        """The present place in the UAV's lane, at a height above ground, and how that place moves."""
         plan, pattern, place = self.plan, self.pattern, self.place
         if plan is None or pattern is None or place is None:
             return self._left_from or self._navigation.over_ground(now_ns), STILL
@@ -84,22 +84,22 @@ class FormationPlace:
             Enu(way.east * per_s, way.north * per_s, way.up * per_s),
         )
 
-    # --- how far from there it may go -----------------------------------------------------------------------------
+    # --- how far it may go from there -----------------------------------------------------------------------------
 
     def leads_by(self, estimate: Estimate | None, lane: Enu, moves: Enu) -> bool:
-        """True if a survivor is near enough to the lane to be looked at without leaving the formation."""
+        """True if a survivor is near enough to the lane to be examined without leaving the formation."""
         if estimate is None:
             return False
         ahead_m, aside_m = along(moves, estimate.east_m - lane.east, estimate.north_m - lane.north)
         return abs(aside_m) <= _LEASH_M + _ASIDE_M and -_LAG_M <= ahead_m <= _AHEAD_M
 
     def bounded(self, east: float, north: float, lane: Enu, moves: Enu) -> tuple[Enu, Enu]:
-        """The place nearest to a wanted one that the lane allows, and how it moves."""
+        """The permitted place nearest to a wanted one, and how it moves."""
         if self.is_free:
             return Enu(east, north, lane.up), STILL
         ahead_m, aside_m = along(moves, east - lane.east, north - lane.north)
         aside_m = max(-_LEASH_M, min(_LEASH_M, aside_m))
-        if ahead_m >= 0:  # still ahead: the line brings the UAV there
+        if ahead_m >= 0:  # still ahead: the line will bring the UAV there
             return _beside(lane, moves, 0.0, aside_m), moves
         if ahead_m < -_LAG_M:
             return _beside(lane, moves, -_LAG_M, aside_m), moves
@@ -107,11 +107,11 @@ class FormationPlace:
         return (beside._replace(east=east) if _leads_east_or_west(moves) else beside._replace(north=north)), STILL
 
     def holds_together(self, estimate: Estimate | None, now_ns: int, *, within_s: float) -> bool:
-        """True if a UAV at a survivor would be in reach of its line, for some seconds from that time on."""
+        """True if this UAV, at a survivor, would still be within reach of its line for some seconds from now on."""
         return estimate is not None and self.keeps_line(estimate.east_m, estimate.north_m, now_ns, within_s=within_s)
 
     def keeps_line(self, east_m: float, north_m: float, now_ns: int, *, within_s: float) -> bool:
-        """The same of a spot."""
+        """True if this UAV, at this place, would still be within reach of its line for some seconds from now on."""
         pattern, place, at_s = self.pattern, self.place, self.swept_s(now_ns)
         if pattern is None or place is None or at_s is None:
             return False
@@ -122,13 +122,13 @@ class FormationPlace:
         )
 
     def swept_s(self, now_ns: int) -> float | None:
-        """The time for which the formation has been sweeping; None before all UAVs have had time to take it up."""
+        """How long the formation has been sweeping; None before all UAVs have had time to take it up."""
         plan = self.plan
         return (now_ns - _taken_up_ns(plan)) / S if plan is not None and self.is_taken_up(now_ns) else None
 
 
 def along(moves: Enu, east_m: float, north_m: float) -> tuple[float, float]:
-    """The metres ahead and to the right of a lane by which an offset leads; a lane leads the way it moves, or north.
+    """An offset as metres ahead and metres to the right of a lane. A lane's direction is that of its motion, or north.
 
     Lanes lead along the axes, within a few degrees.
     """
@@ -142,7 +142,7 @@ def _leads_east_or_west(moves: Enu) -> bool:
 
 
 def _beside(lane: Enu, moves: Enu, ahead_m: float, aside_m: float) -> Enu:
-    """The place so far ahead and to the right of a lane."""
+    """The place this far ahead and to the right of a lane."""
     if _leads_east_or_west(moves):
         sign = 1 if moves.east > 0 else -1
         return Enu(lane.east + sign * ahead_m, lane.north - sign * aside_m, lane.up)

@@ -1,13 +1,14 @@
-"""The plan of the search: which UAV takes which place of the formation, made by one node and told over the air.
+"""Plans the search: one node decides which UAV takes which place of the formation, and floods the plan.
 
-    every node: says where it is, at once and then every STATUS_S
-    planner:    the lowest id that has been heard of lately; it plans once all have been heard of, or after _PATIENCE_NS
-    lost nodes: a UAV of a place that was not heard of for _LOST_NS is replaced, by a follower if its place is in a
-                line or in the chain, because those places hold the swarm together and sweep the area
-    leavers:    a node that says that its battery only just takes it home is replaced at once
+    every node: sends its status at once, and then every STATUS_S
+    planner:    the lowest id that was received recently; it plans when all nodes have been received, or after
+                _PATIENCE_NS
+    lost nodes: a UAV that was not received for _LOST_NS loses its place; a follower takes over a place in a line or in
+                the chain, because those places hold the swarm together and sweep the area
+    leavers:    a node whose status says that its battery is only enough for the way home is replaced at once
 
-The first assignment minimizes the sum of the squared distances flown. Ways on which everyone leaves and arrives at the
-same instants then do not cross, and UAVs that were near each other stay so.
+The first assignment minimizes the sum of the squared distances flown. If all UAVs leave and arrive at the same
+instants, their ways then do not cross, and UAVs that were near each other remain so.
 """
 
 from itertools import zip_longest
@@ -20,12 +21,13 @@ from fanet_mw.units import US, Enu, NodeId, S
 from fanet_mw.wire.search import Search, SearchStatus
 
 STATUS_S: Final = 12.0
-"""The interval at which a UAV says its status."""
+"""The interval at which a UAV sends its status."""
 _LOST_NS: Final = 70 * S
 _PATIENCE_NS: Final = 14 * S
-"""How long the first plan waits for UAVs that have not been heard of."""
+"""How long the first plan waits for UAVs that have not been received."""
 _NOTICE_NS: Final = 7 * S
-"""The time from the first telling of a plan to its beginning: a flood through the slots of all clusters."""
+"""The time from the first flood of a plan to its beginning, long enough for a flood through the
+slots of all clusters."""
 _REPEAT_NS: Final = 6 * S
 _REPEATS: Final = 3
 
@@ -35,11 +37,11 @@ class _HeardUav(NamedTuple):
     heard_ns: int
     revision: int
     leaves: bool
-    """True for a node that flies home: it holds no place any more, and plans no more."""
+    """True for a node that flies home: it has no place any more, and does not plan any more."""
 
 
 class FormationPlanner:
-    """One node's part in planning. Any node can be the planner; all but one only listen."""
+    """The planning at one node. Any node can be the planner; all others only listen."""
 
     def __init__(self, node: NodeId, *, expected: int, deploy_speed_m_s: float) -> None:
         self._node = node
@@ -49,14 +51,14 @@ class FormationPlanner:
         self._began_ns: int | None = None
         self.plan: Search | None = None
         self.to_tell: list[Search] = []
-        """The plans to be flooded, until they are taken."""
+        """The plans to be flooded, until the caller takes them."""
         self._told_ns: int | None = None
         self._tellings_left = 0
 
-    # --- what comes in --------------------------------------------------------------------------------------------
+    # --- input ----------------------------------------------------------------------------------------------------
 
     def status(self, status: SearchStatus, *, now_ns: int) -> None:
-        """Take in the status of a UAV, this one or another."""
+        """The status of a UAV, this one or another."""
         before = self._members.get(status.node)
         if before is None or status.t_us * US >= before.heard_ns - S:
             self._members[status.node] = _HeardUav(
@@ -64,13 +66,13 @@ class FormationPlanner:
             )
 
     def on_neighbor(self, node: int, position: Enu, *, now_ns: int) -> None:
-        """Take in that a neighbor was heard at a place."""
+        """A neighbor was received, and states its position."""
         before = self._members.get(node)
         revision, leaves = (before.revision, before.leaves) if before else (0, False)
         self._members[node] = _HeardUav(position, now_ns, revision, leaves=leaves)
 
     def on_plan(self, plan: Search) -> bool:
-        """Take in a plan that came over the air; True if it replaces the plan in force."""
+        """A plan was received; returns True if it replaces the plan in force."""
         mine = self.plan
         if mine is not None and (plan.revision, -plan.planner) <= (mine.revision, -mine.planner):
             return False
@@ -80,7 +82,9 @@ class FormationPlanner:
     # --- decisions ------------------------------------------------------------------------------------------------
 
     def review(self, pattern: Pattern | None, *, now_ns: int) -> bool:
-        """Make a plan, mend it, or tell it again, about once a second; True if there is a new one."""
+        """Make a plan, mend it, or flood it again, to be called about once a second; returns True if there is a new
+        one.
+        """
         if self._began_ns is None:
             self._began_ns = now_ns
         if self._leads(now_ns):
@@ -98,7 +102,7 @@ class FormationPlanner:
         return False
 
     def _leads(self, now_ns: int) -> bool:
-        """True if this node is to plan: of those that stay, none with a lower id was heard of lately."""
+        """True if this node is the planner: of the nodes that stay, none with a lower id was received recently."""
         me = self._members.get(self._node)
         return not (me is not None and me.leaves) and all(
             node >= self._node or member.leaves or now_ns - member.heard_ns > _LOST_NS
@@ -111,7 +115,7 @@ class FormationPlanner:
         self._told_ns, self._tellings_left = now_ns, _REPEATS
 
     def _tell_again(self, now_ns: int) -> None:
-        """Tell a plan several times, and after that to any node that says that it flies by an older one."""
+        """Flood a plan several times, and later again for any node whose status names an older one."""
         if self.plan is None or self._told_ns is None or now_ns - self._told_ns < _REPEAT_NS:
             return
         behind = any(
@@ -144,14 +148,14 @@ class FormationPlanner:
         )
 
     def _mended(self, plan: Search, now_ns: int) -> Search | None:
-        """The plan without the UAVs that are lost and with those that are new; None when nothing changed."""
+        """The plan without lost UAVs and with new ones; None if nothing has changed."""
         pattern = pattern_of(plan)
         alive = {
             node for node, member in self._members.items() if now_ns - member.heard_ns <= _LOST_NS and not member.leaves
         }
         alive.add(self._node)
         if 2 * len(alive) <= sum(1 for node in plan.nodes if node):
-            return None  # this is the smaller part of a swarm that has come apart, and it will meet the others again
+            return None  # this is the smaller part of a separated swarm, which will meet the others again
         holders = [node if node in alive else 0 for node in plan.nodes]
         newcomers = sorted(alive - set(holders))
         for place, holder in enumerate(holders):
@@ -164,7 +168,7 @@ class FormationPlanner:
 
 
 def plan_of(pattern: Pattern, nodes: tuple[int, ...], *, planner: int, start_us: int, deploy_ds: int) -> Search:
-    """The first plan that hands a formation out to these nodes, place by place."""
+    """The first plan, which assigns the places of a formation to these nodes, place by place."""
     made = pattern.dimensions
     return Search(
         start_us, made.half_width_m, made.first_m, made.last_m, made.height_m, made.speed_m_s, deploy_ds, 1, planner,
@@ -173,7 +177,7 @@ def plan_of(pattern: Pattern, nodes: tuple[int, ...], *, planner: int, start_us:
 
 
 def pattern_of(plan: Search) -> Pattern:
-    """The formation that a plan names."""
+    """The formation that a plan describes."""
     return Pattern(
         Dimensions(
             plan.lanes, plan.relays, plan.followers, plan.half_width_m, plan.first_m, plan.last_m, plan.height_m,
@@ -183,10 +187,10 @@ def pattern_of(plan: Search) -> Pattern:
 
 
 def _filled(holders: list[int], pattern: Pattern) -> list[int]:
-    """Give vacant places that sweep the area or hold the swarm together to the nearest followers.
+    """Fill vacant places that sweep the area or hold the swarm together with the nearest followers.
 
-    When there are no followers any more, those farther out in the line move up: it stays in one piece, and is shorter
-    at its end.
+    If there are no followers left, the UAVs farther out in the line move up, so that it stays in one piece and becomes
+    shorter.
     """
     filled = list(holders)
     for place in range(pattern.dimensions.fixed):

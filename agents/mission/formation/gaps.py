@@ -1,4 +1,6 @@
-"""What the formation has left out: cells that it has passed, by the plan, and that nobody is known to have searched."""
+"""The gaps of the search: cells that the formation has passed, by its plan, but that no UAV is
+known to have searched.
+"""
 
 import math
 from typing import Final
@@ -8,26 +10,28 @@ from agents.mission.formation.formation_place import FormationPlace
 from fanet_mw.units import Enu, S
 
 _EXPECT_NS: Final = 4 * S
-"""How often what the formation has passed is added up; no place flies farther than a cell or so meanwhile."""
+"""The interval at which the cells passed by the formation are added; a place moves about one cell in this time."""
 _LATE_S: Final = 18.0
-"""What was passed less than this ago may have been searched without the UAV having been told."""
+"""A cell that was passed less than this ago may have been searched without this UAV knowing it yet."""
 _LANE: Final = 0.5
-"""A lane is to have searched this share of the distance of two lanes to either side."""
+"""A UAV in a lane is expected to search this share of the distance of two lanes, to either side."""
 _NEAR_M: Final = 450.0
-"""Nobody flies farther than this to a gap: what is known of places farther away is older."""
+"""A UAV flies to a gap at most this far away, because its knowledge of farther places is older."""
 
 
 class Gaps:
-    """The gaps that one UAV knows of."""
+    """The gaps that one UAV knows."""
 
     def __init__(self, coverage: CoverageMap, formation: FormationPlace) -> None:
         self._coverage, self._formation = coverage, formation
         self._expected = 0
-        """The cells that the formation has passed."""
+        """The cells that the formation has passed, as bits."""
         self._expected_ns: int | None = None
 
     def nearest(self, here: Enu, now_ns: int) -> tuple[float, float] | None:
-        """East and north of the middle of the nearest gap from which the line of the UAV is in reach; None: none is."""
+        """East and north of the middle of the nearest gap from where the UAV's line is within reach; None if there is
+        none.
+        """
         self._expect(now_ns)
         coverage, formation = self._coverage, self._formation
         gaps = [
@@ -42,7 +46,7 @@ class Gaps:
         return math.fsum(gap[1] for gap in around) / len(around), math.fsum(gap[2] for gap in around) / len(around)
 
     def _expect(self, now_ns: int) -> None:
-        """Add what the formation has passed since the last time."""
+        """Add the cells that the formation has passed since the last time."""
         pattern, swept_s = self._formation.pattern, self._formation.swept_s(now_ns)
         if pattern is None or swept_s is None or swept_s < _LATE_S:
             return

@@ -1,13 +1,13 @@
-"""Two lines abreast that part from the middle of the area, a chain between them, and followers.
+"""The formation `lines`: two lines abreast that part from the middle of the area, a chain between them, and followers.
 
-            line 0   o--o--o--o--o--o--o        both lines start beside the middle of the area, as wide as the area,
+            line 0   o--o--o--o--o--o--o        both lines begin beside the middle of the area, as wide as the area,
                               |                 and sweep away from each other to its edges, then back, and again
             followers   x  x  |  x  x           followers fly behind their line and are free to leave it
                               |  chain          the chain between the lines stretches as they part
             line 1   o--o--o--o--o--o--o
 
-Every place moves on a straight line at constant speed between two turns, so the distance of two places is a convex
-function of time: a pair within reach at both turns is within reach all the time.
+Between two turns each place moves on a straight line at constant speed, so the distance of two places is a convex
+function of time: a pair that is within reach at both turns is within reach all the time.
 """
 
 import math
@@ -26,11 +26,11 @@ from fanet_mw.units import Enu
 
 _CHAIN_HIGHER_M: Final = 6.0
 _BUNCHED_M: Final = 280.0
-"""While the lines are near each other, the chain between them lies slantwise, and reaches this far to either side."""
+"""While the lines are near each other, the chain between them is slanted, and extends this far to either side."""
 _STRAIGHT_M: Final = 300.0
-"""The chain is straight when the lines have flown so far."""
+"""The chain is straight once the lines have flown this far."""
 _SIDE_M: Final = 65.0
-"""The outermost lanes are so near to the edge: they may be left sideways."""
+"""The outermost lanes are this near to the edge of the area; a UAV may leave them sideways."""
 _LEAST_LANES: Final = 2
 
 
@@ -87,7 +87,9 @@ class Lines:
         return range(place, first + lanes) if place - first >= lanes // 2 else range(place, first - 1, -1)
 
     def apart_m(self, team: int, east_m: float, north_m: float, swept_s: float) -> float:
-        """A line is as wide as the area: what is apart from it is so to the north or south."""
+        """The distance of a place from a line, which is its distance to the north or south, since a line is as wide as
+        the area.
+        """
         north = swept_m(self._formation, swept_s)
         return abs(north_m - (north if team == 0 else -north))
 
@@ -96,7 +98,7 @@ class Lines:
 
 
 def fitted(count: int, demands: Demands) -> Dimensions | None:
-    """The lines for so many UAVs that sweep a square area in one piece; None when they are too few for it."""
+    """The lines with which this number of UAVs can sweep a square area in one piece; None if they are too few."""
     half = demands.area_m / 2
     edge, side = min(EDGE_M, half / 2), min(_SIDE_M, half / 2)
     half_width = half - side

@@ -1,4 +1,4 @@
-"""The formation that a search is flown in: its dimensions and its shape together, and which one fits a scenario."""
+"""The formation of a search: its shape and its dimensions together, and which one suits a scenario."""
 
 from collections.abc import Callable, Mapping
 from typing import Final, assert_never
@@ -17,11 +17,11 @@ _SHAPES: Final[Mapping[ShapeName, Callable[[Dimensions], Shape]]] = {
     ShapeName.SECTORS: Sectors,
 }
 _STEP_S: Final = 0.05
-"""The time over which the velocity of a place is taken."""
+"""The time step over which the velocity of a place is computed."""
 
 
 class Pattern:
-    """A formation in numbers, and the positions of its places over time."""
+    """A formation, and the position of each of its places over time."""
 
     def __init__(self, dimensions: Dimensions) -> None:
         self.dimensions = dimensions
@@ -34,11 +34,11 @@ class Pattern:
 
     @property
     def followers(self) -> range:
-        """The places of the UAVs without which the swarm holds together."""
+        """The places without which the swarm still holds together."""
         return range(self.dimensions.fixed, self.dimensions.places)
 
     def line(self, place: int) -> range:
-        """The places of the line that a place belongs to."""
+        """The places of the line to which a place belongs."""
         return self.dimensions.line(self.dimensions.team_of(place))
 
     def kind(self, place: int) -> str:
@@ -48,11 +48,11 @@ class Pattern:
         return "relay" if place < self.dimensions.fixed else "follower"
 
     def at(self, place: int, swept_s: float) -> Enu:
-        """The position of a place when the sweep has lasted so long; before 0 it is where the sweep begins."""
+        """The position of a place after this time of sweeping; before 0, where the sweep begins."""
         return self.shape.at(place, swept_s)
 
     def velocity(self, place: int, swept_s: float) -> Enu:
-        """The velocity of a place then."""
+        """The velocity of a place after this time of sweeping."""
         if swept_s < 0:
             return STILL
         early = max(0.0, swept_s - _STEP_S)
@@ -63,8 +63,8 @@ class Pattern:
 def fitted(
     count: int, demands: Demands, *, shape: ShapeName = ShapeName.LINES, sectors_wanted: int = 1
 ) -> Pattern | None:
-    """The formation of a shape for so many UAVs; None when they are too few. UAVs beyond a message's room have no
-    place.
+    """The formation of a shape for this number of UAVs; None if they are too few. UAVs for whom a plan message has no
+    room get no place.
     """
     count = min(count, MOST_PLACES)
     match shape:

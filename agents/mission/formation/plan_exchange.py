@@ -1,4 +1,4 @@
-"""How the plan of a search comes to be: every UAV says where it is, one of them plans, all fly by the newest plan."""
+"""How all UAVs come to the same plan: each sends its status, one of them plans, and all follow the newest plan."""
 
 from collections.abc import Callable
 from typing import Final
@@ -13,7 +13,7 @@ from fanet_mw.units import US, Enu, NodeId, S
 from fanet_mw.wire.search import Search, SearchStatus
 
 _FIRST_STATUS_S: Final = 2
-"""A UAV says for the first time where it is at a random instant within this time after its start."""
+"""A UAV sends its first status at a random instant within this time after its start."""
 
 
 class PlanExchange:
@@ -30,7 +30,7 @@ class PlanExchange:
         pattern: Pattern | None,
         random: Callable[[], float],
     ) -> None:
-        """`pattern`: the formation to plan, for a UAV that has to; None: the UAVs are too few for one."""
+        """`pattern`: the formation to plan, if this UAV has to; None if the UAVs are too few for one."""
         self._node = node
         self._planner, self._place = planner, place
         self._navigation, self._outbox = navigation, outbox
@@ -38,14 +38,14 @@ class PlanExchange:
         self._random = random
         self._next_status_ns = 0
         self._flies_home = False
-        """True for a UAV that takes no place any more, whatever the plan says."""
+        """True if this UAV takes no place any more, whatever the plan says."""
 
     def start(self, now_ns: int) -> None:
-        """Choose when to say a status first."""
+        """Choose the instant of the first status."""
         self._next_status_ns = now_ns + round(self._random() * _FIRST_STATUS_S * S)
 
     def review(self, percent: int, now_ns: int) -> None:
-        """Say a status if one is due, plan if that is this UAV's to do, and hand new plans to the outbox."""
+        """Send a status if one is due, plan if this UAV is the planner, and put new plans into the outbox."""
         if now_ns >= self._next_status_ns:
             self.say_status(percent, now_ns)
         if self._planner.review(self._pattern, now_ns=now_ns):
@@ -54,7 +54,7 @@ class PlanExchange:
         self._outbox.packets += [OutgoingPacket(plan.encode_frame(self._node)) for plan in plans]
 
     def say_status(self, percent: int, now_ns: int) -> None:
-        """Say where this UAV is, which plan it has, and what percentage of its battery it may spend yet."""
+        """Send this UAV's status: its position, its plan, and the percentage of its battery that it may still spend."""
         plan = self._planner.plan
         status = SearchStatus(
             now_ns // US, self._navigation.position, self._node, plan.revision if plan else 0, percent
@@ -64,22 +64,22 @@ class PlanExchange:
         self._next_status_ns = now_ns + round((0.8 + 0.4 * self._random()) * STATUS_S * S)
 
     def leave(self) -> None:
-        """Give the place in the formation up for good."""
+        """Give up the place in the formation for good."""
         self._flies_home = True
         self._place.leave()
 
-    # --- what others say ------------------------------------------------------------------------------------------
+    # --- received messages ----------------------------------------------------------------------------------------
 
     def on_hello(self, node: int, position: Enu, *, now_ns: int) -> None:
-        """A neighbor's hello says where it is."""
+        """A neighbor's hello states its position."""
         self._planner.on_neighbor(node, position, now_ns=now_ns)
 
     def on_status(self, status: SearchStatus, *, now_ns: int) -> None:
-        """Another UAV says its status."""
+        """The status of another UAV was received."""
         self._planner.status(status, now_ns=now_ns)
 
     def on_plan(self, plan: Search, *, now_ns: int) -> None:
-        """Another UAV tells a plan: it is flown by if it is newer than the plan in force."""
+        """A plan was received; this UAV follows it if it is newer than the plan in force."""
         if self._planner.on_plan(plan):
             self._adopt(now_ns)
 

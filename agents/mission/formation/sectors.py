@@ -1,10 +1,10 @@
-"""The area in sectors, each swept by a team abreast from the side that is nearest to the middle.
+"""The formation `sectors`: each sector of the area is swept by a team abreast, from the side nearest to the middle.
 
 +-------+-------+     sectors lie in rows; a team spans its own and sweeps it outward and back
-| o-o-o | o-o-o |     teams of a row move in step, side by side, and stay one piece; the rows part from each other
+| o-o-o | o-o-o |     teams of a row move in step, side by side, and stay connected; the rows part from each other
 |  ^    |  ^    |     and meet again in the middle
 +-------+-------+
-|  v    |  v    |     no UAV is needed as a relay between the rows: those UAVs follow their teams, free for finds
+|  v    |  v    |     no UAV is used as a relay between the rows, so more UAVs follow their teams, free for survivors
 | o-o-o | o-o-o |
 +-------+-------+
 """
@@ -82,12 +82,14 @@ class Sectors:
 
 
 def rows_of(teams: int) -> int:
-    """The rows in which so many sectors lie: as many as columns, or the nearest fewer that leave no sector over."""
+    """The number of rows for this number of sectors: as many as columns, or the nearest lower
+    number that divides it.
+    """
     return next(rows for rows in range(math.isqrt(teams), 0, -1) if teams % rows == 0)
 
 
 def fitted(count: int, teams: int, demands: Demands) -> Dimensions | None:
-    """A team abreast for each of so many sectors of a square area; None when the UAVs are too few for that."""
+    """A team abreast for each of this number of sectors of a square area; None if the UAVs are too few for that."""
     rows = rows_of(teams)
     depth_m, width_m = demands.area_m / rows, demands.area_m * rows / teams
     lanes = math.ceil(width_m / demands.apart_m(demands.reach_m))

@@ -1,1 +1,1 @@
-"""Where a UAV is, where its neighbors are, the map that it carries, and the ways around what it knows of."""
+"""Navigation: the UAV's own motion, the motions of its neighbors, its map, and ways around known obstacles."""

@@ -1,10 +1,11 @@
-"""The velocity nearest to a wanted one under linear constraints and a speed limit, in two dimensions.
+"""Finds the velocity nearest to a wanted one under linear constraints and a speed limit, in two dimensions.
 
     minimize |v - wanted|   so that   v . normal >= least   for every half-plane, and   |v| <= limit
 
-The incremental linear program of de Berg et al., Computational Geometry, chapter 4, as van den Berg et al. use it for
-ORCA (Reciprocal n-Body Collision Avoidance, 2011). When no velocity obeys all, the constraints after the first `hard`
-ones are dropped from the end; when the hard ones cannot all be obeyed, the largest violation of one is made least.
+This is the incremental linear program of de Berg et al., Computational Geometry, chapter 4, as van den Berg et al. use
+it for ORCA (Reciprocal n-Body Collision Avoidance, 2011). If no velocity satisfies all constraints, those after the
+first `hard` ones are dropped, the last first. If the hard ones cannot all be satisfied, the largest violation is
+minimized.
 """
 
 import math
@@ -27,7 +28,9 @@ Velocity = tuple[float, float]
 
 
 def nearest(wanted: Velocity, planes: Sequence[HalfPlane], *, limit: float, hard: int) -> Velocity:
-    """The best velocity [m/s]. `planes` are in order of importance; the first `hard` ones are never dropped."""
+    """The best velocity [m/s]. `planes` are in the order of their importance; the first `hard` ones
+    are never dropped.
+    """
     kept = list(planes)
     while True:
         found = _solve(wanted, kept, limit)
@@ -39,7 +42,7 @@ def nearest(wanted: Velocity, planes: Sequence[HalfPlane], *, limit: float, hard
 
 
 def _solve(wanted: Velocity, planes: Sequence[HalfPlane], limit: float) -> Velocity | None:
-    """The optimum, or None when the half-planes and the disc have nothing in common."""
+    """The optimum; None if the half-planes and the disc have no velocity in common."""
     speed = math.hypot(*wanted)
     scale = min(1.0, limit / speed) if speed else 1.0
     v = wanted[0] * scale, wanted[1] * scale
@@ -54,7 +57,7 @@ def _solve(wanted: Velocity, planes: Sequence[HalfPlane], limit: float) -> Veloc
 
 
 def _along(wanted: Velocity, line: HalfPlane, planes: Sequence[HalfPlane], limit: float) -> Velocity | None:
-    """The optimum on the border of one half-plane within the others."""
+    """The optimum on the border of one half-plane, within all the others."""
     if abs(line.least) > limit:
         return None
     px, py = line.east * line.least, line.north * line.least
@@ -78,7 +81,9 @@ def _along(wanted: Velocity, line: HalfPlane, planes: Sequence[HalfPlane], limit
 
 
 def _least_violation(wanted: Velocity, planes: Sequence[HalfPlane], limit: float) -> Velocity:
-    """Every constraint is relaxed by the same amount, and that amount is made least by bisection."""
+    """The velocity for which all constraints hold when relaxed by the same least amount, which is
+    found by bisection.
+    """
     low, high = 0.0, 4 * limit + max((plane.least for plane in planes), default=0.0)
     best = (0.0, 0.0)
     for _ in range(_BISECTIONS):

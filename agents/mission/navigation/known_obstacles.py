@@ -1,11 +1,12 @@
-"""What stands in the way of one UAV, and how it flies around it: from the map that it carries, and from its radar.
+"""The obstacles that one UAV knows from its map and its radar, and how it flies around them.
 
-    map            buildings whose roofs are not well below the UAV; areas that no UAV may enter, at any height
+    map            buildings whose roofs are not well below the UAV; no-fly areas, at any height
     radar          echoes that neither the map nor a neighbor explains, kept for a while; what moves is a UAV
-    way            straight, while that is clear; else the next corner of the shortest way over a grid
-    half-planes    the nearer something is, the slower a UAV may fly towards it
+    way            straight, if that is clear; else the next corner of the shortest way over a grid
+    half-planes    the nearer an obstacle is, the slower a UAV may fly towards it
 
-The way brings a UAV on, the half-planes keep it clear. It flies over roofs below it and around everything else.
+The way leads the UAV on, and the half-planes keep it clear. It flies over roofs that are below it, and around
+everything else.
 """
 
 import math
@@ -19,37 +20,37 @@ from fanet_mw.bus.messages import Echo
 from fanet_mw.units import Enu, S, seconds_to_ns
 
 OVER_M: Final = 7.0
-"""A UAV flies over a roof that is at least so far below it, and climbs so far above one that it comes upon."""
+"""A UAV flies over a roof that is at least this far below it, and climbs this far above one in its way."""
 _CLEAR_M: Final = 6.0
 """A UAV chooses no velocity that brings it nearer to a wall than this."""
 _MARGIN_M: Final = 11.0
-"""Ways keep so far away from walls that the walls do not slow a UAV down."""
+"""Ways keep this distance from walls, at which walls do not slow a UAV down."""
 _APPROACH_S: Final = 2.5
-"""The distance that is left beyond the clearance is used up no faster than within this time."""
+"""A UAV approaches the clearance so slowly that the remaining distance would take at least this time."""
 _WATCH_M: Final = 35.0
-"""A wall farther away than this does not limit a UAV of 10 m/s."""
+"""Walls farther away than this do not limit a UAV that flies at 10 m/s."""
 _MOST_PLANES: Final = 6
 _LOCAL_M: Final = 150.0
-"""A way is looked for as far ahead as this."""
+"""The way is searched up to this distance."""
 _MOST_CELLS: Final = 3000
 _REPLAN_NS: Final = 1 * S
 _AHEAD_S: Final = 20
-"""A goal within a wall is awaited where it comes out, when that is within this time."""
+"""If the goal is inside a wall, the UAV waits where it will come out, if that is within this time."""
 _RINGS: Final = 16
 _EXPLAINED_M: Final = 4.0
-"""An echo so near to a wall on the map comes from that wall."""
+"""An echo this near to a wall on the map comes from that wall."""
 _NEIGHBOR_M: Final = 15.0
-"""An echo so near to the place that a neighbor states comes from that neighbor."""
+"""An echo this near to the stated place of a neighbor comes from that neighbor."""
 _MOVES_M_S: Final = 2.0
-"""An echo that moves along the ray faster than this is no wall."""
+"""An echo that moves along the ray faster than this is not a wall."""
 _ONCE_NS: Final = 3 * S
 _AGAIN_NS: Final = 15 * S
-"""How long an echo counts as solid: a first one might be noise, a second one next to it hardly is."""
+"""How long an echo counts as solid. A first echo may be noise; a second one beside it hardly is."""
 _MOVER_NS: Final = seconds_to_ns(1.2)
 
 
 class Mover(NamedTuple):
-    """Something that flies, as the radar shows it: of its velocity, only what lies along the ray is known."""
+    """Something that flies, as the radar shows it; only the part of its velocity along the ray is known."""
 
     position: Enu
     velocity: Enu
@@ -62,27 +63,27 @@ class _Echoed(NamedTuple):
 
 
 class KnownObstacles:
-    """The obstacles that one UAV knows of, and the way around them."""
+    """The known obstacles of one UAV, and the way around them."""
 
     def __init__(self, onboard_map: OnboardMap, no_fly_m: Sequence[tuple[float, float, float]] = ()) -> None:
-        """`no_fly_m` has areas as (east, north, radius)."""
+        """`no_fly_m`: no-fly areas as (east, north, radius)."""
         self._map = onboard_map
         self._index = indexed(onboard_map, margin_m=_MARGIN_M, watch_m=_WATCH_M)
         self._no_fly = tuple(no_fly_m)
         self._echoes: dict[Cell, _Echoed] = {}
-        """Cells in which the radar has seen something."""
+        """The cells in which the radar has seen something."""
         self._taken: dict[Cell, _Echoed] = {}
-        """The cells of echoes and those within the margin of them."""
+        """The cells with echoes, and those within the margin around them."""
         self._movers: list[Mover] = []
         self._corner: Place | None = None
-        """The next corner of the way around what is ahead."""
+        """The next corner of the way around the obstacles ahead."""
         self._planned_ns: int | None = None
         self._any = bool(onboard_map.buildings or no_fly_m)
 
-    # --- what comes in --------------------------------------------------------------------------------------------
+    # --- input ----------------------------------------------------------------------------------------------------
 
     def radar(self, echoes: Sequence[Echo], *, at: Enu, velocity: Enu, neighbors: Sequence[Enu], now_ns: int) -> None:
-        """Take in a scan of the radar; `neighbors` are the present places of those that are heard."""
+        """A scan of the radar; `neighbors` are the present places of the neighbors that are received."""
         self._movers = [mover for mover in self._movers if now_ns - mover.at_ns < _MOVER_NS // 2]
         for echo in echoes:
             flat, up = echo.range_m * math.cos(echo.elevation_rad), echo.range_m * math.sin(echo.elevation_rad)
@@ -100,7 +101,7 @@ class KnownObstacles:
                 self._keep(place, now_ns)
 
     def _explained(self, place: Enu) -> bool:
-        """True if the map has something at the place of an echo, or the echo is of the ground."""
+        """True if the echo comes from something on the map, or from the ground."""
         if place.up <= self.ground_m(place) + _EXPLAINED_M:
             return True
         near = self._index.near.get(cell_of(place.east, place.north, TILE_M), ())
@@ -124,18 +125,18 @@ class KnownObstacles:
                 if math.hypot(i, j) * CELL_M <= _MARGIN_M:
                     _put(self._taken, (column + i, row + j), fresh, now_ns)
 
-    # --- what it is asked -----------------------------------------------------------------------------------------
+    # --- queries --------------------------------------------------------------------------------------------------
 
     def ground_m(self, place: Enu) -> float:
         """The height of the ground at a place, by the map."""
         return self._map.ground_m(place.east, place.north) if self._map.heights_m else 0.0
 
     def roof_m(self, place: Enu) -> float | None:
-        """The roof below a place, by the map; None where there is none."""
+        """The height of the roof below a place, by the map; None if there is none."""
         return self._index.roofs_m.get(cell_of(place.east, place.north))
 
     def least_up_m(self, at: Enu, velocity: Enu) -> float:
-        """The least height on this course: that of the roofs that are flown over, and some clearance."""
+        """The least height on this course: above the roofs that are flown over, with some clearance."""
         if not self._index.roofs_m:
             return -math.inf
         ahead = [
@@ -145,7 +146,7 @@ class KnownObstacles:
         return max((roof for roof in ahead if roof + OVER_M <= at.up), default=-math.inf) + OVER_M
 
     def climb_m(self, at: Enu, velocity: Enu) -> float:
-        """How much higher than here the ground is within the next seconds of the flight; 0 where it is not."""
+        """By how much the ground rises within the next seconds of the flight; 0 if it does not."""
         if not self._map.heights_m:
             return 0.0
         here = self.ground_m(at)
@@ -158,7 +159,7 @@ class KnownObstacles:
         )
 
     def movers(self, now_ns: int) -> list[Mover]:
-        """The bodies that the radar has lately seen flying and that are no neighbor whose hellos are heard."""
+        """The flying bodies that the radar has recently seen, without neighbors whose hellos are received."""
         return [mover for mover in self._movers if now_ns - mover.at_ns <= _MOVER_NS]
 
     def planes(self, at: Enu, now_ns: int) -> list[HalfPlane]:
@@ -184,7 +185,7 @@ class KnownObstacles:
         return [HalfPlane(east, north, (_CLEAR_M - distance) / _APPROACH_S) for distance, east, north in near]
 
     def way_to(self, at: Enu, goal: Enu, moves: Enu, *, now_ns: int) -> Enu | None:
-        """The place to fly to now, in order to come to a goal that moves; None: straight to the goal."""
+        """The place to fly to now on the way to a goal that moves; None if the way to the goal is straight."""
         if not self._any and not self._taken:
             return None
 
@@ -214,7 +215,7 @@ class KnownObstacles:
         return corner is not None and math.hypot(corner[0] - here[0], corner[1] - here[1]) <= CELL_M
 
     def _reachable(self, goal: Enu, moves: Enu, up_m: float, now_ns: int) -> Place | None:
-        """The goal, or the place where a moving goal leaves an obstacle, or a free place next to it."""
+        """The goal; or the place where a moving goal leaves an obstacle; or a free place beside it."""
         for seconds in range(_AHEAD_S + 1):
             place = goal.east + seconds * moves.east, goal.north + seconds * moves.north
             if not self._is_taken(cell_of(*place), up_m, now_ns):
@@ -237,7 +238,7 @@ class KnownObstacles:
 
 
 def _put(cells: dict[Cell, _Echoed], cell: Cell, fresh: _Echoed, now_ns: int) -> None:
-    """Note an echo in a cell; one that is already there and higher or longer-lived is kept."""
+    """Note an echo in a cell, unless the cell has one that is higher or lasts longer."""
     before = cells.get(cell)
     if before is not None and before.until_ns > now_ns:
         fresh = _Echoed(max(before.top_m, fresh.top_m), max(before.until_ns, fresh.until_ns))

@@ -1,4 +1,4 @@
-"""Where a UAV is and how it flies, by its own receivers."""
+"""The position and velocity of a UAV, by its own receivers."""
 
 from typing import Final
 
@@ -9,11 +9,11 @@ from fanet_mw.units import STILL, Enu, S
 _FIX_GAIN: Final = 0.15
 """The weight of a position fix against dead reckoning by its velocity."""
 _RANGED_NS: Final = 1 * S
-"""How long a height that the rangefinder has told is used."""
+"""How long a height from the rangefinder is used."""
 
 
 class Navigation:
-    """A UAV's own motion: fixes smoothed by dead reckoning, and the height that a rangefinder and the map tell."""
+    """The motion of one UAV: fixes smoothed by dead reckoning, and the height by rangefinder and map."""
 
     def __init__(self, position: Enu, obstacles: KnownObstacles) -> None:
         self.position = position
@@ -23,7 +23,7 @@ class Navigation:
         self._above_ground: tuple[float, int] | None = None
 
     def fix(self, position: Enu, velocity: Enu, *, now_ns: int) -> None:
-        """Take in a position and a velocity that the receiver gives."""
+        """A position and a velocity from the receiver."""
         if self._fix_ns is None:
             self.position = position
         else:
@@ -34,16 +34,16 @@ class Navigation:
         self._fix_ns, self.velocity = now_ns, velocity
 
     def altimeter(self, above_ground_m: float | None, *, now_ns: int) -> None:
-        """Take in the height over whatever is below; None: nothing is within the rangefinder's range."""
+        """The height over whatever is below; None if nothing is within the rangefinder's range."""
         if above_ground_m is not None:
             self._above_ground = above_ground_m, now_ns
 
     def over_ground(self, now_ns: int) -> Enu:
-        """The position, with the height over the ground in place of that above 0."""
+        """The position, with the height above ground in place of the height above 0."""
         return self.position._replace(up=self.height_m(now_ns))
 
     def height_m(self, now_ns: int) -> float:
-        """The height over the ground: by the rangefinder if it told lately and no roof is below, else by the map."""
+        """The height above ground: by the rangefinder if it is recent and no roof is below, otherwise by the map."""
         ranged = self._above_ground is not None and now_ns - self._above_ground[1] <= _RANGED_NS
         if ranged and self._above_ground is not None and self._obstacles.roof_m(self.position) is None:
             return self._above_ground[0]

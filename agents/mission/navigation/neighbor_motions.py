@@ -1,4 +1,4 @@
-"""Where the neighbors of a UAV are and how they fly, by their hellos."""
+"""The positions and velocities of a UAV's neighbors, from their hellos."""
 
 from typing import Final
 
@@ -6,28 +6,28 @@ from fanet_mw.motion import Motion
 from fanet_mw.units import seconds_to_ns
 
 _HEARD_FOR_NS: Final = seconds_to_ns(6.0)
-"""How long after the last word of a neighbor its motion is still taken as known."""
+"""How long after a neighbor's last hello its motion counts as known."""
 
 
 class NeighborMotions:
-    """The motion of each neighbor, as its latest hello told it."""
+    """The motion of each neighbor by its latest hello."""
 
     def __init__(self) -> None:
         self._motions: dict[int, Motion] = {}
 
     def on_hello(self, node: int, motion: Motion) -> None:
-        """Take in how the sender of a hello flies."""
+        """A hello states how its sender flies."""
         self._motions[node] = motion
 
     def motion(self, node: int, *, now_ns: int) -> Motion | None:
-        """The last known motion of a neighbor; None when it was not heard lately."""
+        """The last known motion of a neighbor; None if its last hello is too old."""
         motion = self._motions.get(node)
         return None if motion is None or now_ns - motion.at_ns > _HEARD_FOR_NS else motion
 
     def all(self, *, now_ns: int) -> list[Motion]:
-        """The motions of the neighbors that were heard lately, in order of id."""
+        """The motions of the neighbors that were received recently, by id."""
         return [motion for _, motion in self.by_node(now_ns=now_ns)]
 
     def by_node(self, *, now_ns: int) -> list[tuple[int, Motion]]:
-        """The neighbors that were heard lately, and their motions."""
+        """The neighbors that were received recently, each with its motion."""
         return [item for item in sorted(self._motions.items()) if now_ns - item[1].at_ns <= _HEARD_FOR_NS]

@@ -1,7 +1,7 @@
 """The map that a UAV carries: heights of the ground, and the buildings that are known before the flight. ENU metres.
 
-Buildings are upright boxes that may be turned about the vertical; the ground is bilinear between the points of a
-square grid about the origin. What is not on the map, a UAV has to notice by itself.
+Buildings are upright boxes, which may be turned about the vertical. The ground is interpolated bilinearly between the
+points of a square grid about the origin. A UAV must notice by itself whatever is not on the map.
 """
 
 import math
@@ -10,13 +10,13 @@ from functools import lru_cache
 from typing import Final, NamedTuple
 
 Cell = tuple[int, int]
-"""Column to the east and row to the north of a grid."""
+"""A cell of a grid: its column, counted to the east, and its row, counted to the north."""
 CELL_M: Final = 5.0
 TILE_M: Final = 50.0
 
 
 class Building(NamedTuple):
-    """One building: its middle, its extents, its roof above 0, and its turn from east to north [rad]."""
+    """A building: its middle, its extents, its roof above 0, and its angle from east towards north [rad]."""
 
     east_m: float
     north_m: float
@@ -26,9 +26,10 @@ class Building(NamedTuple):
     yaw_rad: float = 0.0
 
     def outside(self, east_m: float, north_m: float) -> tuple[float, float, float]:
-        """The distance of a place from the nearest wall, and the direction (east, north) that leads away from it.
+        """The distance of a place from the nearest wall, and the direction (east, north) that leads away from that
+        wall.
 
-        The distance is negative within the walls.
+        The distance is negative inside the walls.
         """
         cos, sin = math.cos(self.yaw_rad), math.sin(self.yaw_rad)
         off_east, off_north = east_m - self.east_m, north_m - self.north_m
@@ -50,12 +51,12 @@ class OnboardMap(NamedTuple):
 
     buildings: tuple[Building, ...] = ()
     heights_m: tuple[tuple[float, ...], ...] = ()
-    """The heights of the ground, row by row to the north; empty: a plain at 0."""
+    """The heights of the ground, row by row to the north; empty if the ground is flat, at 0."""
     cell_m: float = 1.0
-    """The distance of two points of the heights."""
+    """The distance between two points of the grid of heights."""
 
     def ground_m(self, east_m: float, north_m: float) -> float:
-        """The height of the ground at a place; beyond the heights their edge goes on."""
+        """The height of the ground at a place; outside of the grid, that of its nearest edge."""
         rows = self.heights_m
         if not rows:
             return 0.0
@@ -83,17 +84,17 @@ def middle_of(cell: Cell) -> tuple[float, float]:
 
 
 class MapIndex(NamedTuple):
-    """A map made ready for quick answers; all UAVs that carry the same map share it."""
+    """A map prepared for quick queries; all UAVs that carry the same map share it."""
 
     roofs_m: Mapping[Cell, float]
     """The highest roof within the margin of the middle of each cell of `CELL_M`."""
     near: Mapping[Cell, tuple[Building, ...]]
-    """The buildings that a UAV in each cell of `TILE_M` has to watch."""
+    """The buildings near each cell of `TILE_M`, which a UAV there must watch."""
 
 
 @lru_cache(maxsize=4)
 def indexed(onboard_map: OnboardMap, *, margin_m: float, watch_m: float) -> MapIndex:
-    """The cells that the buildings of a map take up, with a margin, and the buildings to be watched from each tile."""
+    """The cells that each building covers, with a margin, and the buildings to be watched from each tile."""
     roofs: dict[Cell, float] = {}
     near: dict[Cell, list[Building]] = {}
     for building in onboard_map.buildings:
@@ -106,7 +107,7 @@ def indexed(onboard_map: OnboardMap, *, margin_m: float, watch_m: float) -> MapI
 
 
 def _cells_within(building: Building, margin_m: float, size_m: float) -> Iterator[Cell]:
-    """The cells of a square about a building."""
+    """The cells of a square around a building."""
     reach_m = math.hypot(building.width_m, building.depth_m) / 2 + margin_m
     first = cell_of(building.east_m - reach_m, building.north_m - reach_m, size_m)
     last = cell_of(building.east_m + reach_m, building.north_m + reach_m, size_m)

@@ -1,4 +1,4 @@
-"""The radar of a UAV beside the hellos of its neighbors: an echo where a neighbor says that it is tells nothing new."""
+"""Combines a UAV's radar with the hellos of its neighbors: an echo from a place that a neighbor states is no news."""
 
 from collections.abc import Sequence
 
@@ -9,7 +9,7 @@ from fanet_mw.bus.messages import Echo
 
 
 class RadarWatch:
-    """What the radar of one UAV shows, and which neighbors the UAV avoids where their hellos say that they are."""
+    """The radar of one UAV, and the neighbors that the UAV avoids by their hellos."""
 
     def __init__(
         self,
@@ -18,14 +18,14 @@ class RadarWatch:
         neighbors: NeighborMotions,
         avoid_by: Sequence[str],
     ) -> None:
-        """`avoid_by` names what the UAV avoids others by: `hellos`, `radar`, or both."""
+        """`avoid_by`: by what the UAV detects the UAVs to avoid: `hellos`, `radar`, or both."""
         self._navigation, self._obstacles = navigation, obstacles
         self._looks = "radar" in avoid_by
         self.avoided = neighbors if "hellos" in avoid_by else NeighborMotions()
-        """The neighbors that the UAV avoids by their hellos; none of them if hellos are not used."""
+        """The neighbors that the UAV avoids by their hellos; none if hellos are not used for that."""
 
     def scan(self, echoes: Sequence[Echo], *, now_ns: int) -> None:
-        """Take in the echoes of a scan."""
+        """A scan of the radar."""
         if self._looks:
             own = self._navigation
             others = [motion.position_at(now_ns) for motion in self.avoided.all(now_ns=now_ns)]

@@ -1,4 +1,4 @@
-"""The shortest way around what is in the way: A* over a grid of cells, of which some are taken.
+"""The shortest way around obstacles: A* over a grid of cells, some of which are occupied (`taken`).
 
 Hart, Nilsson and Raphael, "A Formal Basis for the Heuristic Determination of Minimum Cost Paths", 1968.
 """
@@ -14,17 +14,17 @@ _STEPS: Final = tuple(
     (east, north, math.hypot(east, north)) for east in (-1, 0, 1) for north in (-1, 0, 1) if east or north
 )
 _SAMPLE_M: Final = 0.8 * CELL_M
-"""The distance of the points at which a straight way is checked."""
+"""The distance between the points at which a straight way is checked."""
 _ESCAPE: Final = 4.0
-"""A taken cell next to the start costs so much more: a UAV that is too near to a wall may still leave."""
+"""The cost factor of an occupied cell next to the start, so that a UAV that is too near to a wall can still leave."""
 _ESCAPE_CELLS: Final = 4
 
 Place = tuple[float, float]
-"""East and north of a place [m]."""
+"""The east and north coordinates of a place [m]."""
 
 
 def is_clear(start: Place, goal: Place, taken: Callable[[Cell], bool]) -> bool:
-    """True if no cell on the straight way is taken."""
+    """True if no cell on the straight way is occupied."""
     east, north = goal[0] - start[0], goal[1] - start[1]
     steps = max(1, math.ceil(math.hypot(east, north) / _SAMPLE_M))
     before: Cell | None = None
@@ -38,7 +38,7 @@ def is_clear(start: Place, goal: Place, taken: Callable[[Cell], bool]) -> bool:
 
 
 def nearest_free(goal: Place, taken: Callable[[Cell], bool], *, within: int) -> Cell | None:
-    """The nearest cell to a place that is not taken; None: there is none within so many cells."""
+    """The nearest free cell to a place; None if there is none within this number of cells."""
     column, row = cell_of(*goal)
     for ring in range(within + 1):
         found = [
@@ -53,7 +53,7 @@ def nearest_free(goal: Place, taken: Callable[[Cell], bool], *, within: int) -> 
 
 
 def way_around(start: Place, goal: Cell, taken: Callable[[Cell], bool], *, most_cells: int) -> list[Cell]:
-    """The cells of the shortest way, the start's first; empty when there is none among so many cells."""
+    """The cells of the shortest way, that of the start first; empty if none is found within `most_cells` cells."""
     begin = cell_of(*start)
     costs: dict[Cell, float] = {begin: 0.0}
     came_from: dict[Cell, Cell] = {}
@@ -92,11 +92,11 @@ def _traced(came_from: dict[Cell, Cell], cell: Cell) -> list[Cell]:
 
 
 def first_corner(start: Place, way: list[Cell], taken: Callable[[Cell], bool]) -> Place | None:
-    """The farthest place of a way that is in sight of its start, or its next one."""
+    """The farthest place of the way to which the straight line from its start is clear, or else its next place."""
     if len(way) < 2:
         return None
     low, high = 1, len(way) - 1
-    while low < high:  # along a shortest way, what is out of sight stays out of sight: bisect
+    while low < high:  # along a shortest way, what is out of sight stays out of sight, so bisection finds the border
         middle = (low + high + 1) // 2
         if is_clear(start, middle_of(way[middle]), taken):
             low = middle

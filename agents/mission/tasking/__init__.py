@@ -1,1 +1,1 @@
-"""Which UAV goes to which survivor: the auction, the bids of one UAV, and its approach to the one it has won."""
+"""Task allocation: which UAV flies to which survivor (an auction), and how it approaches the one that it has won."""

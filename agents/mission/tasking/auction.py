@@ -1,11 +1,11 @@
-"""Which UAVs go: neighbors pass bids on with their hellos until all that are concerned agree on the same winners.
+"""The auction that decides which UAVs fly to a survivor: neighbors pass on bids in their hellos until all agree.
 
-    a task needs n UAVs; of the bids known for it, the n with the earliest times of arrival win, ties to the lower id
+    a task needs n UAVs: of all known bids, the n with the earliest times of arrival win; of equal ones the lower id
 
-Every node keeps of each bidder the bid with the highest serial number and merges what it hears, so any two nodes that
-have heard the same bids name the same winners, in whatever order the bids came: the consensus of CBBA (Choi, Brunet,
-How, IEEE Transactions on Robotics 25(4), 2009) for tasks that are bid for one by one. A winner that falls silent is
-forgotten after a while, and the task is open again.
+Each node keeps the newest bid of each bidder and merges the bids that it receives. Two nodes that have received the
+same bids therefore name the same winners, in whatever order the bids came. This is the consensus of CBBA (Choi, Brunet,
+How, IEEE Transactions on Robotics 25(4), 2009), for tasks that are auctioned one by one. A winner that falls silent is
+forgotten after a while, and its task is open again.
 """
 
 from collections.abc import Iterable
@@ -15,7 +15,7 @@ from fanet_mw.units import NodeId, S
 from fanet_mw.wire.search import MOST_BIDS, WITHDRAWN, Bid
 
 _FORGOTTEN_NS: Final = 15 * S
-"""How long a bid counts that its bidder does not confirm."""
+"""How long a bid counts if its bidder does not confirm it."""
 _OLDEST_S: Final = 255
 
 
@@ -26,7 +26,7 @@ class _KnownBid(NamedTuple):
 
 
 class Auction:
-    """The bids that one node knows, its own and those of others."""
+    """The bids that one node knows: its own, and those of others."""
 
     def __init__(self, node: NodeId) -> None:
         self._node = node
@@ -34,17 +34,17 @@ class Auction:
         self._serial = 0
 
     def bid(self, survivor: int, *, eta_s: float, now_ns: int) -> None:
-        """Make a bid of this node, in place of an earlier one."""
+        """Make a bid of this node, which replaces an earlier one."""
         self._place(survivor, max(0, min(WITHDRAWN - 1, round(10 * eta_s))), now_ns)
 
     def withdraw(self, survivor: int, *, now_ns: int) -> None:
-        """Take the bid of this node back, if there is one."""
+        """Withdraw the bid of this node, if there is one."""
         mine = self._bids.get(survivor, {}).get(self._node)
         if mine is not None and mine.eta_ds != WITHDRAWN:
             self._place(survivor, WITHDRAWN, now_ns)
 
     def merge(self, bids: Iterable[Bid], *, now_ns: int) -> None:
-        """Take in the bids that another node knows. A node knows its own best, unless it has started anew since."""
+        """Another node has passed on bids. A node ignores older ones of its own, unless it has restarted since."""
         for bid in bids:
             stood_ns = now_ns - bid.age_s * S
             if stood_ns < now_ns - _FORGOTTEN_NS:
@@ -57,7 +57,7 @@ class Auction:
                 of_task[bid.bidder] = _KnownBid(bid.eta_ds, bid.serial, stood_ns)
 
     def close(self, survivor: int) -> None:
-        """Forget the bids for a task that is done."""
+        """Forget the bids for a finished task."""
         self._bids.pop(survivor, None)
 
     def has_bid(self, survivor: int) -> bool:
@@ -66,7 +66,7 @@ class Auction:
         return mine is not None and mine.eta_ds != WITHDRAWN
 
     def winners(self, survivor: int, *, count: int, now_ns: int) -> list[int]:
-        """The best bidders, best first."""
+        """The best bidders, the best first."""
         standing = [
             (known.eta_ds, bidder)
             for bidder, known in self._bids.get(survivor, {}).items()
@@ -83,7 +83,7 @@ class Auction:
         return (round(10 * eta_s), self._node) < (self._bids[survivor][worst].eta_ds, worst)
 
     def bids_to_tell(self, tasks: Iterable[int], *, now_ns: int) -> list[Bid]:
-        """The bids to pass on: the node's own first, then the best of each open task, as many as one message holds."""
+        """The bids to pass on, as many as one message holds: the node's own first, then the best of each open task."""
         own: list[Bid] = []
         others: list[tuple[int, Bid]] = []
         for survivor in tasks:
@@ -104,5 +104,5 @@ class Auction:
         self._bids.setdefault(survivor, {})[self._node] = _KnownBid(eta_ds, self._serial, now_ns)
 
     def _counts(self, bidder: int, known: _KnownBid, now_ns: int) -> bool:
-        """True for a bid of this node, or one that its bidder has confirmed lately."""
+        """True for a bid of this node, and for one that its bidder has confirmed recently."""
         return bidder == self._node or now_ns - known.stood_ns <= _FORGOTTEN_NS

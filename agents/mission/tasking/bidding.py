@@ -1,8 +1,8 @@
-"""The survivor to whom one UAV goes: it bids where it would be among the best, and flies the task that it has won.
+"""Decides for which survivors one UAV bids, and to which of those that it has won it flies.
 
-enough reporters   an auction for as many responders as the scenario wants
-too few            an auction for one that has not reported, which fetches a further bearing
-not found          a responder takes its bid back after a while
+enough UAVs have reported the survivor   an auction for as many responders as the scenario wants
+too few have                             an auction for one more UAV that has not, to get another bearing
+a responder does not find the survivor   it withdraws its bid after a while
 """
 
 import math
@@ -21,22 +21,22 @@ from fanet_mw.units import NodeId, S
 from fanet_mw.wire.search import Bid
 
 VAGUE_M: Final = 50.0
-"""An estimate whose standard deviation is larger leads no UAV off its lane."""
+"""An estimate with a greater standard deviation makes no UAV leave its lane."""
 FAR_M: Final = 450.0
 """A UAV that is farther from a survivor than this leaves it to others."""
 _SCOUT_AFTER_NS: Final = 4 * S
-"""How long a survivor may be short of reporters before a UAV is sent to be another one."""
+"""How long a survivor may have too few reporters before another UAV is sent to report it."""
 _RETURN_AFTER_NS: Final = 45 * S
-"""How long a responder looks for a survivor in vain before it takes its bid back."""
+"""How long a responder searches for a survivor in vain before it withdraws its bid."""
 _AGAIN_NS: Final = 20 * S
-"""How long a UAV that has taken its bid back does not bid again."""
+"""How long a UAV that has withdrawn its bid does not bid again."""
 _LONG_AGO_NS: Final = -(10**18)
 _HANDOVER_S: Final = 15.0
-"""The time that a responder needs for its present survivor once it is there."""
+"""The time that a responder is assumed to need at its present survivor."""
 
 
 class Bidding:
-    """The bids of one UAV, and the task that it flies."""
+    """The bids of one UAV, and the survivor to whom it flies."""
 
     def __init__(
         self,
@@ -61,10 +61,10 @@ class Bidding:
         self._taken_back_ns: dict[int, int] = {}
         self._announced = False
         self.survivor: int | None = None
-        """The survivor to whom this UAV flies; None: it flies to none."""
+        """The survivor to whom this UAV flies; None if it flies to none."""
 
     def merge(self, bids: Iterable[Bid], *, now_ns: int) -> None:
-        """Take in bids that a neighbor has passed on."""
+        """A neighbor has passed on bids."""
         open_bids = (bid for bid in bids if not self._finds.is_confirmed(bid.survivor))
         self._auction.merge(open_bids, now_ns=now_ns)
 
@@ -80,17 +80,17 @@ class Bidding:
             self.choose(now_ns)
 
     def reopen(self, survivor: int) -> None:
-        """Take a survivor as one to whom nobody has been yet: its confirmation was taken back."""
+        """Treat a survivor as not visited yet, because its confirmation was taken back."""
         self._approach.forget(survivor)
 
     def hand_on(self, now_ns: int) -> None:
-        """Take all bids of this UAV back: the next best one goes instead."""
+        """Withdraw all bids of this UAV, so that the next best bidders fly instead."""
         for survivor in self._finds.open():
             self._auction.withdraw(survivor, now_ns=now_ns)
         self.survivor = None
 
     def bid(self, now_ns: int) -> None:
-        """Bid where this UAV would be among the best."""
+        """Bid for those survivors for whom this UAV would be among the best."""
         if self._formation.pattern is None:
             return
         for survivor in self._finds.open():
@@ -110,7 +110,7 @@ class Bidding:
                 self._auction.bid(survivor, eta_s=eta_s, now_ns=now_ns)
 
     def choose(self, now_ns: int) -> None:
-        """Fly the won task that can be done first; without one, fly back to the lane."""
+        """Fly to the won survivor that can be reached first; without one, fly back to the lane."""
         if self.survivor is not None:
             self._reconsider(self.survivor, now_ns)
         if self.survivor is None:
@@ -125,7 +125,9 @@ class Bidding:
             self._announce(self.survivor, now_ns)
 
     def _reconsider(self, survivor: int, now_ns: int) -> None:
-        """Give a task up that another does, at which none was found, or which would lose this UAV to the swarm."""
+        """Withdraw from a survivor whom another UAV has reached, who was not found, or for whom this UAV would lose the
+        swarm.
+        """
         find = self._finds.known[survivor]
         lost = not self._wins(survivor, find, now_ns)
         arrived_ns = self._approach.arrived_ns.get(survivor)
@@ -139,7 +141,7 @@ class Bidding:
             self.survivor = None
 
     def _announce(self, survivor: int, now_ns: int) -> None:
-        """Say in the trace that this UAV approaches, once a place is known and enough have reported."""
+        """Record that this UAV approaches a survivor, once a place is known and enough UAVs have reported it."""
         find = self._finds.known[survivor]
         place = find.place()
         if place is None or not self._is_reported(find):
@@ -163,7 +165,9 @@ class Bidding:
         return math.inf if place is None else place.distance_m(self._navigation.position)
 
     def _eta_s(self, survivor: int, now_ns: int) -> float | None:
-        """The time until this UAV would be at a survivor; None when its place in the formation forbids that."""
+        """The time in which this UAV could be at a survivor; None if its place in the formation
+        does not permit that.
+        """
         formation, here = self._formation, self._navigation.position
         place = self._finds.known[survivor].place()
         if place is None or (place.sigma_m > VAGUE_M and not formation.is_free):

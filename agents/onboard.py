@@ -31,8 +31,6 @@ _OF_MESSENGER: Final = {
     wire.RECEIPT.msgid: lambda messenger: messenger.receipts,
 }
 """The method of the messenger that takes a packet, by the id of the message with which the packet begins."""
-INNER_ID: Final = slice(wire.HEADER_BYTES + 7, wire.HEADER_BYTES + 10)
-"""The place of the message id of the first inner frame in a packet."""
 
 
 class Onboard:
@@ -61,9 +59,7 @@ class Onboard:
         self._applications = tuple(applications)
         self._callbacks = Callbacks.of(applications)
         self._listeners = Listeners(applications)
-        self.wanted = self._listeners.wanted(also=_OF_MESSENGER)
-        """The message ids, as in a frame, that any application wants; most packets have none of them. None: every
-        id."""
+        node.listened = self._listeners.wanted(also=_OF_MESSENGER)
         self._messenger = Messenger(node, self._listeners)
         self.arbitration = CourseArbitration(applications, self._callbacks.permits, fly)
         self._with_radio: dict[int, tuple[Application, int]] = {}
@@ -97,7 +93,7 @@ class Onboard:
     def deliver(self, packet: Packet, now_ns: int) -> None:
         """Give a packet for this node to the applications that listen to it; for most packets there are none."""
         frame = packet.frame
-        message_id = int.from_bytes(frame[INNER_ID], "little")
+        message_id = int.from_bytes(frame[wire.INNER_ID], "little")
         if message_id in _OF_MESSENGER:
             self._guard(_OF_MESSENGER[message_id](self._messenger), packet, now_ns)
             self._call(now_ns)

@@ -5,6 +5,7 @@ LocalProtocolError, with the name, the value and the bound, in the call that mad
 """
 
 from collections.abc import Collection, Mapping
+from functools import lru_cache
 from typing import Final, NamedTuple
 
 from fanet_mw import mavlink, wire
@@ -54,14 +55,7 @@ class Sending(NamedTuple):
             return port, bytes(data)
         if not isinstance(content, bytes | bytearray | memoryview):
             return MAVLINK_PORT, mavlink.packed(content, self.node)
-        frames = bytes(content)
-        try:
-            whole = sum(1 for _ in wire.frames(frames))
-        except MalformedFrameError as error:
-            raise LocalProtocolError(f"bytes without a port must be MAVLink 2 frames: {error}") from error
-        if not whole:
-            raise LocalProtocolError("bytes without a port must be MAVLink 2 frames, at least one")
-        return MAVLINK_PORT, frames
+        return MAVLINK_PORT, _as_frames(bytes(content))
 
     def whom(self, destination: Destination) -> tuple[NodeId, tuple[NodeId, ...]]:
         """The destination of the packets, and the nodes that are addressed one by one."""
@@ -75,6 +69,18 @@ class Sending(NamedTuple):
             known = f"BROADCAST, or ids in [1, {self.nodes}] (nodes.count) of nodes other than {self.node}"
             raise LocalProtocolError(f"destination = {destination!r} must be {known}")
         return (others[0], ()) if len(others) == 1 else (BROADCAST, tuple(others))
+
+
+@lru_cache(maxsize=64)
+def _as_frames(content: bytes) -> bytes:
+    """Bytes without a port, checked to be whole MAVLink 2 frames; once for a load that sends the same bytes again."""
+    try:
+        whole = sum(1 for _ in wire.frames(content))
+    except MalformedFrameError as error:
+        raise LocalProtocolError(f"bytes without a port must be MAVLink 2 frames: {error}") from error
+    if not whole:
+        raise LocalProtocolError("bytes without a port must be MAVLink 2 frames, at least one")
+    return content
 
 
 def priority_of(priority: str | int) -> int:

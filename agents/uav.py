@@ -15,7 +15,7 @@ from agents.hello_schedule import HelloSchedule, HelloTime
 from agents.mission.applications import PlannedSearch, Rescue
 from agents.mission.following.application import FormationFlight
 from agents.mission.navigation.onboard_map import NO_MAP, OnboardMap
-from agents.onboard import INNER_ID, Onboard
+from agents.onboard import Onboard
 from agents.positioning.dead_reckoning import DeadReckoning
 from agents.positioning.steady_fix import SteadyFix
 from fanet_mw.actor import Actor
@@ -209,10 +209,8 @@ class Uav(Actor):
         node, onboard = self._node, self._onboard
         if node.deliveries:
             deliveries, node.deliveries = node.deliveries, []
-            wanted = onboard.wanted
             for packet in deliveries:
-                if wanted is None or packet.frame[INNER_ID] in wanted:
-                    onboard.deliver(packet, now_ns)
+                onboard.deliver(packet, now_ns)
         called = onboard.called
         if called or node.fates:
             called = True

@@ -27,7 +27,6 @@ class Accounts:
     """What the medium counted per request, beside what the kernel counted per copy."""
 
     def __init__(self) -> None:
-        self.sent = 0
         self.delivered = 0
         self.delivered_bytes = 0
         self.dropped: Counter[str] = Counter()
@@ -56,11 +55,6 @@ class Accounts:
         """Count a frame that no node received, when nothing refers to it any more."""
         self.dropped[_REASON_OF[verdict]] += 1
 
-    def lost_on_bus(self, count: int) -> None:
-        """Count requests that were sent and never came, as a gap in their numbers shows."""
-        self.sent += count
-        self.dropped[DropReason.BUS] += count
-
     def copies(self, g: s.Ints) -> dict[str, Any]:
         """The ledger at receivers: the copies that went on the air in range of a receiver, and how each ended."""
         lost = {
@@ -77,19 +71,19 @@ class Accounts:
             "lost": {reason.value: count for reason, count in lost.items() if count},
         }
 
-    def lateness(self) -> dict[str, float]:
-        """The lateness of all requests; a request in time counts as 0 ms late."""
+    def lateness(self, requests: int) -> dict[str, float]:
+        """The lateness of so many requests, which are all; a request in time counts as 0 ms late."""
         return {
             "late_frames": self.late_frames,
-            "frames": self.sent,
-            "p50_ms": self._percentile(0.5),
-            "p99_ms": self._percentile(0.99),
+            "frames": requests,
+            "p50_ms": self._percentile(0.5, requests),
+            "p99_ms": self._percentile(0.99, requests),
             "max_ms": round(self._max_late_ns / MS, 3),
         }
 
-    def _percentile(self, share: float) -> float:
-        wanted = share * self.sent
-        seen = self.sent - self.late_frames
+    def _percentile(self, share: float, requests: int) -> float:
+        wanted = share * requests
+        seen = requests - self.late_frames
         if seen >= wanted:
             return 0.0
         for index, count in enumerate(self._lateness):

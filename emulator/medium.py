@@ -15,7 +15,7 @@ from emulator.faults import Faults
 from emulator.kernel import state as s
 from emulator.measurement import Measurement, Sample
 from emulator.pcap import Capture
-from emulator.requests import FrameSlots, RequestNumbers
+from emulator.requests import NUMBER_MASK, FrameSlots, RequestNumbers
 from fanet_mw.actor import Actor
 from fanet_mw.bus.messages import Message, Obstructions, Poses, Reception, TxOutcome, TxRequest, TxStatus
 from fanet_mw.bus.radio_control import Cut, Degrade, Jam, Restore
@@ -122,7 +122,7 @@ class Medium(Actor):
         return {
             "kind": "emulator",
             "frames": {
-                "sent": accounts.sent,
+                "sent": self._numbers.total,
                 "delivered": accounts.delivered,
                 "in_flight": self._slots.in_flight,
                 "dropped": {reason: accounts.dropped[reason] for reason in sorted(accounts.dropped)},
@@ -130,7 +130,7 @@ class Medium(Actor):
             "requests": self._numbers.report(),
             "copies": accounts.copies(arrays.g),
             "air": self._measurement.report(self._sample(), stations=self._count),
-            "late": accounts.lateness(),
+            "late": accounts.lateness(self._numbers.total),
             "poses": accounts.poses,
             "controls": accounts.controls,
             "refused": dict(sorted(accounts.refused.items())),
@@ -142,9 +142,11 @@ class Medium(Actor):
     def _request(self, station: int, request: TxRequest, now_ns: int) -> None:
         """Take in one request; what is wrong with a request is counted, never raised."""
         seq, start_ns, frame, dst, wants_status = request
-        self._accounts.sent += 1
-        if lost := self._numbers.take_in(station, seq):
-            self._accounts.lost_on_bus(lost)
+        numbers, slots = self._numbers, self._slots
+        if seq != numbers.expected[station] and (lost := numbers.lost_before(station, seq)):
+            self._accounts.dropped[DropReason.BUS] += lost
+        numbers.expected[station] = (seq + 1) & NUMBER_MASK
+        numbers.made[station] += 1
         size = len(frame)
         if (dst != BROADCAST and not 1 <= dst <= self._count) or not 0 < size <= self._max_bytes:
             self._refuse_shape(station, request, now_ns)
@@ -153,14 +155,15 @@ class Medium(Actor):
             if self._refuse_instant(station, request, now_ns):
                 return
             start_ns = now_ns
-        slots = self._slots
         if slots.held[station] >= slots.most_held:
             self._refuse(station, request, DropReason.BACKLOG, now_ns)
             return
         if not slots.free:
             self._air.grow()
             slots.add(self._air.slots() - len(slots.requests))
-        slot = slots.take(station, request)
+        slot = slots.free.pop()
+        slots.requests[slot], slots.sources[slot] = request, slots.nodes[station]
+        slots.held[station] += 1
         if start_ns < self._now_ns:
             start_ns = self._now_ns
         self._air.submit(slot, station, s.EVERYONE if dst == BROADCAST else dst - 1, size, start_ns, wants_status)
@@ -244,7 +247,7 @@ class Medium(Actor):
             rows = self._record(rows, self._capture)
         accounts, reception = self._accounts, _NO_RECEPTION
         slots, append, rx_topics = self._slots, self.outbox.append, self._rx_topics
-        requests, sources = slots.requests, slots.sources
+        requests, sources, held, free = slots.requests, slots.sources, slots.held, slots.free
         for kind, slot, station, t_ns, value, attempts in rows:
             request = requests[slot]
             assert request is not None, "the kernel speaks only of frames it was given"
@@ -258,7 +261,9 @@ class Medium(Actor):
                     accounts.delivered_bytes += len(request.frame)
                 else:
                     accounts.lost(value)
-                slots.release(slot, station)
+                requests[slot] = None
+                held[station] -= 1
+                free.append(slot)
             else:
                 append((rx_topics[station], TxStatus(request.seq, TxOutcome(value), t_ns, attempts)))
 

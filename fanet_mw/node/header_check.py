@@ -22,8 +22,11 @@ CONTROL: Final = 0x8000_0000
 """Control packets are numbered apart, from here on: then data packets have no gaps, and what is missing shows."""
 _AHEAD_NS: Final = 100 * MS
 """A birth may lie so far ahead where all clocks are exact: hosts take their time from each other over a bus."""
-_BURST: Final = 100_000
-"""Numbers that a node may be ahead of one per `RESTART_STEP_NS`: ten seconds of the densest traffic."""
+_BURST_NS: Final = 100_000 * RESTART_STEP_NS
+"""The time for which numbers may be ahead of one per `RESTART_STEP_NS`: ten seconds of the densest traffic."""
+_NUMBER: Final = CONTROL - 1
+"""The bits of a sequence number that count the packets of its kind."""
+_HELLO: Final = int(Kind.HELLO)
 
 
 class HeaderCheck:
@@ -36,23 +39,23 @@ class HeaderCheck:
         error_ns = clock.unsynchronized_error_ns(scenario.duration_ns)
         self._ahead_ns = _AHEAD_NS + (2 * error_ns + S if clock.modelled else 0)
 
-    def why_not(self, fields: Fields, *, known: bool, src: NodeId, end_ns: int) -> DropReason | None:
+    def why_not(self, fields: Fields, known: bool, src: NodeId, end_ns: int) -> DropReason | None:
         """The reason why the header of a frame that `src` sent until `end_ns` is not believed; None: it is believed.
 
         `known`: the packet was handled before, in another phase.
         """
         _, _, origin_us, seq, origin, destination, prev_hop, kind, hop_limit, hops, _, _, _, _ = fields
-        count = self._count
+        count, born_ns = self._count, origin_us * US
         if origin > count or prev_hop > count or not (destination <= count or destination == BROADCAST):
             return DropReason.UNKNOWN_NODE
         if origin == self._node and not known:
             return DropReason.OWN
         if (
             prev_hop != src
-            or (origin != prev_hop and (hops == 0 or kind == Kind.HELLO))
+            or (origin != prev_hop and (hops == 0 or kind == _HELLO))
             or hops + hop_limit > MOST_HOPS
-            or origin_us * US > end_ns + self._ahead_ns
-            or (seq & ~CONTROL) * RESTART_STEP_NS > origin_us * US + _BURST * RESTART_STEP_NS
+            or born_ns > end_ns + self._ahead_ns
+            or (seq & _NUMBER) * RESTART_STEP_NS > born_ns + _BURST_NS
         ):
             return DropReason.FORGED
         return None

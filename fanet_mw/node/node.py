@@ -7,7 +7,7 @@ the routing protocol behind it decides what happens next, and sends through the 
 """
 
 from collections import Counter
-from collections.abc import Callable, Mapping, Sequence
+from collections.abc import Callable, Collection, Mapping, Sequence
 from itertools import zip_longest
 from typing import Final, NamedTuple
 
@@ -61,7 +61,10 @@ class Node:
         self.node = node
         self.scenario = scenario
         self.deliveries: list[Packet] = []
-        """The packets for the applications of this node."""
+        """The packets for the applications of this node, of those to which one of them listens."""
+        self.listened: Collection[bytes] | None = None
+        """The ids of first inner messages to which the applications listen, as they stand in a frame; None: every id.
+        Other packets are delivered as well, but nobody takes them."""
         self.hellos: list[Packet] = []
         """The hellos of neighbors, in which the applications and the clock read more than routing does."""
         self.receptions = 0
@@ -264,7 +267,8 @@ class Node:
         packet_hash, bits = reader.hash, before | reader.phase
         _, _, origin_us, seq, origin, destination, _, kind, _, hops, priority, _, _, _ = reader.fields
         known = bool(before) or (origin == self.node and kind == _DATA and self._own.handed_on(origin, seq))
-        why = self._header_check.why_not(reader.fields, known=known, src=reception.src, end_ns=reception.end_ns)
+        end_ns = reception.end_ns
+        why = self._header_check.why_not(reader.fields, known, reception.src, end_ns)
         if why is not None:
             self._disbelieve(why, packet, now_ns)
             return _NONE
@@ -273,7 +277,6 @@ class Node:
             self._protocol.on_hello(packet, reception, now_ns=now_ns)
             self.hellos.append(packet)
             return _NONE
-        end_ns = reception.end_ns
         age_ns = end_ns - origin_us * US
         if age_ns > self._lifetimes_ns[priority]:
             self._duplicates.put(packet_hash, bits)
@@ -282,7 +285,8 @@ class Node:
         to_us = destination == BROADCAST or destination == self.node
         if kind == _DATA and to_us and not before & duplicates.DELIVERED:
             bits |= duplicates.DELIVERED
-            self.deliveries.append(packet)
+            if self.listened is None or packet.frame[wire.INNER_ID] in self.listened:
+                self.deliveries.append(packet)
             late_ns = now_ns - end_ns
             self.port.records.append(
                 _new(Delivered, (now_ns, self.node, origin, seq, age_ns + late_ns, hops + 1, late_ns))

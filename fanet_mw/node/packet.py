@@ -17,8 +17,5 @@ class Packet(NamedTuple):
         return NodeId(self.header.origin)
 
 
-class Relay(NamedTuple):
-    """A flooded packet of another node that is to be passed on, and when."""
-
-    packet: Packet
-    start_ns: int
+Relay = tuple[Packet, int]
+"""A flooded packet of another node that is to be passed on, and the instant from which it may go."""

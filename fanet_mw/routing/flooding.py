@@ -6,7 +6,7 @@
 
 from abc import abstractmethod
 from collections.abc import Sequence
-from typing import ClassVar, Final
+from typing import ClassVar
 
 from fanet_mw.bus.messages import Reception
 from fanet_mw.errors import DropReason
@@ -14,8 +14,6 @@ from fanet_mw.node.contract import Port, RoutingProtocol
 from fanet_mw.node.packet import Packet, Relay
 from fanet_mw.units import BROADCAST
 from fanet_mw.wire import FLAG_FLOOD
-
-_new: Final = tuple.__new__  # for what is made once per frame
 
 
 class FloodingProtocol(RoutingProtocol):
@@ -57,4 +55,4 @@ class Flooding(FloodingProtocol):
         self._jitter_ns = port.scenario.routing.jitter_ns
 
     def _consider(self, packet: Packet, *, now_ns: int) -> Sequence[Relay]:
-        return (_new(Relay, (packet, now_ns + self._lead_ns + int(self._random() * self._jitter_ns))),)
+        return ((packet, now_ns + self._lead_ns + int(self._random() * self._jitter_ns)),)

@@ -31,7 +31,7 @@ class Gossip(FloodingProtocol):
         """Relay within k hops, or with probability p; `hops` counts the transmissions before the one received."""
         draw, jitter = self._random(), self._random()
         if packet.header.hops + 1 <= self._k or draw < self._p:
-            return (Relay(packet, now_ns + self._lead_ns + int(jitter * self._jitter_ns)),)
+            return ((packet, now_ns + self._lead_ns + int(jitter * self._jitter_ns)),)
         return ()
 
 
@@ -58,7 +58,7 @@ class CounterBased(FloodingProtocol):
 
     def wake(self, now_ns: int) -> None:
         for due_ns, packet in self._assessment.decided(now_ns=now_ns):
-            self._port.relay(Relay(packet, max(due_ns + self._lead_ns, now_ns)))
+            self._port.relay((packet, max(due_ns + self._lead_ns, now_ns)))
 
     def waiting(self) -> int:
         return len(self._assessment)

@@ -119,6 +119,8 @@ NAME: Final = slice(18, 24)
 """The bytes of a header that name its packet: sequence number and origin."""
 SEQ: Final = slice(18, 22)
 """The bytes of a header that hold its packet's sequence number, the low byte first."""
+INNER_ID: Final = slice(HEADER_BYTES + 7, HEADER_BYTES + 10)
+"""The bytes of a packet that hold the message id of its first inner frame."""
 _PREV_HOP_AT: Final = 26
 _KIND_AT: Final = 28
 _PRIORITY_AT: Final = 31
@@ -188,13 +190,10 @@ def decode_header(frame: bytes) -> Header:
 
 def checked(frame: bytes, fields: Fields) -> Header:
     """The routing header of a frame with these fields; raises MalformedFrameError."""
-    (_, _, origin_us, seq, origin, destination, prev_hop, kind, hop_limit, hops, priority, flags,
-     version, crc) = fields  # fmt: skip
+    _, _, origin_us, _, origin, destination, prev_hop, kind, _, _, _, _, version, crc = fields
     if mcrf4xx(frame[1:_BODY_END] + _EXTRA) != crc:
         raise MalformedFrameError("CRC of the routing header")
-    header = _new(
-        Header, (origin_us, seq, origin, destination, prev_hop, kind, hop_limit, hops, priority, flags)
-    )  # fmt: skip
+    header = _new(Header, fields[2:12])  # all between the marks and the version
     if (
         version != VERSION
         or kind not in _KINDS

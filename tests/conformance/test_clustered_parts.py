@@ -80,8 +80,8 @@ def test_a_relay_is_never_in_the_past_nor_beyond_the_hop_limit(node: Node) -> No
     relays = [*relaying.on_flood(urgent, heard(urgent), at_once=True, now_ns=NOW_NS)]
     for seq in range(3, 20):
         relays += relaying.on_flood(packet(seq), heard(packet(seq)), at_once=False, now_ns=NOW_NS)
-    assert relays[0].packet is urgent, "every node passes on what goes at once"
-    assert min(relay.start_ns for relay in relays) >= NOW_NS
+    assert relays[0][0] is urgent, "every node passes on what goes at once"
+    assert min(start_ns for _, start_ns in relays) >= NOW_NS
 
 
 def test_what_a_relaying_rule_leaves_open_is_decided_when_it_says(node: Node) -> None:

@@ -26,7 +26,7 @@ def plausible(make_scenario: MakeScenario) -> HeaderCheck:
 def judged(plausible: HeaderCheck, header: Header, *, src: NodeId = NEIGHBOR, known: bool = False) -> DropReason | None:
     fields = wire.fields_of(header.encode())
     assert fields is not None
-    return plausible.why_not(fields, known=known, src=src, end_ns=NOW_NS)
+    return plausible.why_not(fields, known, src, NOW_NS)
 
 
 @pytest.mark.parametrize("header", [FIRST, RELAYED, RELAYED._replace(hops=200, hop_limit=55)], ids=str)

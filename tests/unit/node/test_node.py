@@ -7,7 +7,7 @@ from fanet_mw.bus.messages import Reception
 from fanet_mw.errors import DropReason, LocalProtocolError
 from fanet_mw.node.duplicates import DuplicateSet
 from fanet_mw.node.node import Node
-from fanet_mw.node.packet import Packet, Relay
+from fanet_mw.node.packet import Packet
 from fanet_mw.routing import make_protocol
 from fanet_mw.trace import Delivered, Dropped
 from fanet_mw.units import BROADCAST, MS, US, Enu, NodeId, S
@@ -125,7 +125,7 @@ def test_a_bundle_is_one_reception_of_several_packets(node: Node) -> None:
 
 @pytest.mark.parametrize("starts_ms", [(20, 30), (30, 20)])
 def test_packets_that_share_a_frame_go_at_the_first_instant_of_them(node: Node, starts_ms: tuple[int, int]) -> None:
-    node.port.relay_together([Relay(packet(seq=seq), start_ms * MS) for seq, start_ms in enumerate(starts_ms)])
+    node.port.relay_together([(packet(seq=seq), start_ms * MS) for seq, start_ms in enumerate(starts_ms)])
     assert [request.start_ns for request in node.requests] == [20 * MS]
 
 
@@ -133,7 +133,7 @@ def test_a_shared_frame_is_no_longer_than_frames_may_be(node: Node) -> None:
     """100 bytes and a little each: three fit 400 bytes, a fourth does not."""
     one = len(frame())
     fit = 400 // one
-    node.port.relay_together([Relay(packet(seq=seq), 1 * MS) for seq in range(2 * fit + 1)])
+    node.port.relay_together([(packet(seq=seq), 1 * MS) for seq in range(2 * fit + 1)])
     assert [len(request.frame) for request in node.requests] == [fit * one, fit * one, one]
 
 

@@ -12,7 +12,6 @@ from fanet_mw.routing.clustered.tdma.contention import Contention
 from fanet_mw.units import MS
 
 _CONTROL_JITTER_NS: Final = 100 * MS
-_new: Final = tuple.__new__  # for what is made once per frame
 _NOTHING: Final[Mapping[str, object]] = {}
 
 
@@ -47,11 +46,10 @@ class ContendingRelaying:
     def decided(self, now_ns: int) -> Sequence[Relay]:
         decided = self._rule.open_until.decided(now_ns=now_ns)
         start_ns = self._contention.start_ns
-        return [Relay(packet, start_ns(due_ns=due_ns, now_ns=now_ns)) for due_ns, packet in decided] if decided else ()
+        return [(packet, start_ns(due_ns=due_ns, now_ns=now_ns)) for due_ns, packet in decided] if decided else ()
 
     def _relay(self, packet: Packet, jitter_ns: int, now_ns: int) -> Relay:
-        start_ns = self._contention.start_ns(due_ns=now_ns, now_ns=now_ns, jitter_ns=jitter_ns)
-        return _new(Relay, (packet, start_ns))
+        return packet, self._contention.start_ns(due_ns=now_ns, now_ns=now_ns, jitter_ns=jitter_ns)
 
     def waiting(self) -> int:
         return len(self._rule.open_until)

@@ -72,7 +72,7 @@ class ScheduledRelaying:
             # that arrives may be one that was sent after the node's own turns.
             self._missed += 1
             self._port.drop(DropReason.MISSED_TURN, packet, now_ns=now_ns)
-        return [Relay(packet, start_ns) for start_ns in ahead_ns]
+        return [(packet, start_ns) for start_ns in ahead_ns]
 
     def report(self) -> Mapping[str, object]:
         return {"missed_turns": self._missed}

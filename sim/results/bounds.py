@@ -1,10 +1,9 @@
-"""The delays of a run against the bounds that were promised: each packet's origin states one when it accepts the
-packet.
+"""Compares delays with the bounds that were promised: each packet's origin states one when it accepts the packet.
 
     within_share = deliveries within the bound of their packet / (all packets x the nodes for which each was meant)
 
-A packet that never arrives, that comes too late, or for which its origin promised nothing lowers the share; only one
-that comes too late is a violation. The result is empty when no origin promised anything.
+The share is lowered by packets that never arrive, that arrive too late, or for which no bound was stated. Only a packet
+that arrives too late is a violation. The result is empty if no origin has stated any bound.
 """
 
 from collections.abc import Mapping
@@ -20,7 +19,7 @@ Column = npt.NDArray[np.int64]
 
 
 def against_bounds(applications: Mapping[str, AppPackets]) -> dict[str, Any]:
-    """`bound` of `summary.json`: everything together, and by application."""
+    """The table `bound` of `summary.json`: for all applications together, and for each."""
     promised = {name: app for name, app in applications.items() if _promises(app)}
     if not promised:
         return {}
@@ -31,11 +30,12 @@ def against_bounds(applications: Mapping[str, AppPackets]) -> dict[str, Any]:
 
 
 def likely(applications: Mapping[str, AppPackets]) -> dict[str, Any]:
-    """`likely` of `summary.json`: statements of (delay, share), compared with the copies of the packets they are about.
+    """The table `likely` of `summary.json`: compares stated delays and shares with the copies that arrived.
 
-    within_share = deliveries within the delay stated for their packet / (packets with a statement x their targets)
+        within_share = deliveries within the delay stated for their packet / (packets with a statement x their targets)
 
-    The result is empty when no origin stated any. The statement holds when `within_share` is at least `share`.
+    A statement holds if `within_share` is at least the stated `share`. The result is empty if no origin has stated any
+    delay.
     """
     stated = [
         (app, name, sent.likely) for app in applications.values() for name, sent in app.sent.items() if sent.likely
@@ -89,7 +89,7 @@ def delays_under_bound(app: AppPackets) -> tuple[Column, Column]:
 
 
 def _beside(app: AppPackets, of_packets: list[int]) -> tuple[Column, Column]:
-    """The delay of each delivery, and beside it the figure of its packet."""
+    """The delay of each delivery, and the value in `of_packets` of its packet."""
     figures = np.array(of_packets, dtype=np.int64)
     places = np.asarray(app.deliveries.packet, dtype=np.int64)
     return np.asarray(app.deliveries.delay_ns, dtype=np.int64), figures[places]

@@ -1,6 +1,7 @@
-"""The effect of clocks on a run: true delays for the trace, and how far swarm time was off.
+"""The effect of inaccurate clocks on a run: true delays for the trace, and the errors of swarm time.
 
-A node knows only its own estimate of swarm time; how long a packet took and how wrong a clock was is known to the run.
+A node knows only its own estimate of swarm time. The simulation also knows the true time, so it can correct the delays
+that nodes have measured, and tell how wrong each clock was.
 """
 
 from collections import defaultdict
@@ -18,7 +19,7 @@ from sim.run.outcome import Outcome
 
 
 def true_delays(records: TraceLog) -> Collection[Record]:
-    """The records with delays from the true instant of generation; a delay stays where that instant is not recorded."""
+    """The records with delays that count from the true instant of generation, where the trace has that instant."""
     born = {(record.node, record.seq): record.t_ns for record in records_of(records, Generated)}
     return records.changed(lambda record: _true_delay(record, born))
 
@@ -29,13 +30,13 @@ def _true_delay(record: Delivered, born: Mapping[tuple[int, int], int]) -> Deliv
 
 
 def errors_ns(samples: Sequence[ClockSampled]) -> list[tuple[ClockSampled, int]]:
-    """Each sample with its true error: against the clock of its reference at that instant, or against true time."""
+    """Each sample with its true error: against the reference's clock at that instant, or against true time."""
     ahead = {(sample.t_ns, sample.node): sample.ahead_ns for sample in samples}
     return [(sample, sample.ahead_ns - ahead.get((sample.t_ns, sample.reference), 0)) for sample in samples]
 
 
 def clock_errors(outcome: Outcome) -> dict[str, Any]:
-    """`clock` of `summary.json`; empty when clocks are exact."""
+    """The table `clock` of `summary.json`; empty if clocks are exact."""
     samples = [*records_of(outcome.records, ClockSampled)]
     if not samples:
         return {}
@@ -62,7 +63,7 @@ def _quantiles(values: npt.NDArray[np.float64]) -> dict[str, float]:
 
 
 def _synced_after_s(samples: Sequence[ClockSampled], nodes: int) -> float | None:
-    """The instant at which the last node first stated a bound; None when some node never did."""
+    """The instant at which the last node first stated a bound; None if some node never did."""
     first: dict[int, int] = defaultdict(lambda: -1)
     for sample in samples:
         if sample.bound_ns >= 0 and first[sample.node] < 0:

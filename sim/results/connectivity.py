@@ -1,6 +1,6 @@
-"""What geometry allows: which nodes a multi-hop path connects, on the ideal track of the mobility model.
+"""The connectivity that geometry allows: which nodes have a multi-hop path, on the ideal track of the mobility model.
 
-No protocol that delivers at once can exceed it; one that carries packets for a while can.
+No protocol that delivers packets at once can exceed it; one that carries packets for a while can.
 """
 
 import numpy as np
@@ -15,7 +15,7 @@ from sim.world.mobility.layout import positions
 
 
 def parts(places: Rows, range_m: float) -> npt.NDArray[np.int64]:
-    """The number of each node's connected part; nodes of equal numbers are connected over links of `range_m`."""
+    """The number of the connected component of each node, over links of up to `range_m`."""
     linked = np.linalg.norm(places[:, None] - places[None], axis=2) <= range_m
     part = np.arange(len(places))
     while True:

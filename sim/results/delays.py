@@ -1,6 +1,6 @@
-"""Delays of packets from application to application: their statistics, and the parts of which they consist.
+"""Delays of packets from application to application: statistics, and the parts of which a delay consists.
 
-hand-over ......... let out ......... end of the frame ......... receipt
+hand-over ......... release ......... end of the frame ......... receipt
 |  lead  |  queue  |      air, relays included      |  handover  |
 """
 
@@ -17,7 +17,7 @@ PARTS: Final = ("lead", "queue", "air", "handover")
 
 
 def summed_up(delays_ns: Sequence[int]) -> dict[str, float | None]:
-    """The mean, percentiles and maximum of some delays [ms]; None for each when there are no delays."""
+    """The mean, the percentiles and the maximum of some delays [ms]; None for each if there are no delays."""
     if not delays_ns:
         return dict.fromkeys(("mean", "p50", "p95", "p99", "max"))
     values = np.asarray(delays_ns, dtype=np.float64) / MS
@@ -27,7 +27,7 @@ def summed_up(delays_ns: Sequence[int]) -> dict[str, float | None]:
 
 
 def parts(app: AppPackets, *, lead_ns: int) -> dict[str, float | None]:
-    """The mean of each part [ms], over the deliveries of packets that are known to have left their origin."""
+    """The mean of each part [ms], over the deliveries of packets whose release is known."""
     waited = np.array([_waited_ns(sent) for sent in app.sent.values()], dtype=np.float64)
     deliveries = app.deliveries
     waited_ns = waited[np.asarray(deliveries.packet)] if len(deliveries) else waited[:0]
@@ -43,5 +43,5 @@ def parts(app: AppPackets, *, lead_ns: int) -> dict[str, float | None]:
 
 
 def _waited_ns(sent: SentPacket) -> float:
-    """The time from the hand-over of a packet until it was let out; not a number when that is not known."""
+    """The time from the hand-over of a packet to its release; NaN if it is not known."""
     return math.nan if sent.out_ns is None else float(sent.out_ns - sent.born_ns)

@@ -1,7 +1,8 @@
-"""The output folder of a run: resolved scenario, summary, trace, `.tlog`. The hash is that of the trace file's bytes.
+"""Writes the output folder of a run: resolved scenario, summary, trace, `.tlog`. The hash in the summary is that of the
+trace file.
 
-Each file is written separately, the smallest first. A file that cannot be written whole keeps what fits, is named in
-the summary's `unwritten` with the reason, and does not affect the others.
+Each file is written separately, the smallest first. If a file cannot be written completely, it keeps what fits, the
+summary's `unwritten` names it and the reason, and the other files are not affected.
 """
 
 import hashlib
@@ -23,9 +24,9 @@ from sim.run.outcome import Outcome
 
 
 def finish(outcome: Outcome, *, out: Path | None) -> dict[str, Any]:
-    """Summarize a run and, when a folder is given, write it.
+    """Summarize a run and, if a folder is given, write its files.
 
-    Raises ConfigError when the folder cannot be used at all. What was measured is written even if summarizing raises.
+    Raises ConfigError if the folder cannot be used at all. The trace is written even if summarizing raises.
     """
     if out is not None:
         try:
@@ -48,7 +49,7 @@ def finish(outcome: Outcome, *, out: Path | None) -> dict[str, Any]:
 
 
 def _write(outcome: Outcome, summary: dict[str, Any], out: Path) -> dict[str, str]:
-    """Write every file that can be written; returns by name what was wrong with the others."""
+    """Write all files that can be written; returns what was wrong with the others, by name."""
     resolved = outcome.scenario.model_dump(mode="json", exclude_none=True)
     links = ",\n".join(json.dumps(row) for row in described(outcome.links.rows()))  # one line per link
     writers: dict[str, Callable[[Path], object]] = {
@@ -68,7 +69,7 @@ def _json_lines(content: dict[str, Any]) -> list[bytes]:
 
 
 def _replace(path: Path, summary: dict[str, Any]) -> None:
-    """Write the summary anew beside the old one, which stays if that fails."""
+    """Write the summary again in a file beside the old one and rename it, so that the old one stays if that fails."""
     fresh = path.with_suffix(".new")
     try:
         write_items(fresh, _json_lines(summary))
@@ -78,7 +79,7 @@ def _replace(path: Path, summary: dict[str, Any]) -> None:
 
 
 def _try(write: Callable[[], object]) -> str | None:
-    """Why something could not be written; None when it was."""
+    """The reason why something could not be written; None if it was."""
     try:
         write()
     except OSError as error:

@@ -1,10 +1,10 @@
-"""The ledger: every frame of a run is counted twice, by the node that requested it and by the medium that had it.
+"""The ledger of frames: each frame is counted by the node that requests it and by the medium that transmits it.
 
     sent + unasked = delivered + dropped(reason) + in flight + unaccounted
 
-The ledger closes when nothing is unasked or unaccounted. Node by node, a request that the medium never had was lost on
-the bus (reason `bus`). In virtual time no bus can lose one, so there it is unaccounted for, and so is what an emulator
-that died took with it. `unasked` counts what the medium had of a node that never requested it.
+The ledger closes if nothing is unasked or unaccounted. A request of a node that did not reach the medium was lost on
+the bus (reason `bus`). In virtual time the bus loses nothing, so such a request is unaccounted; so are the frames that
+an emulator had when it died. `unasked` counts frames that the medium had of a node that never requested them.
 """
 
 from collections import Counter
@@ -18,7 +18,7 @@ _NO_FRAMES: Mapping[str, Any] = {"sent": 0, "delivered": 0, "in_flight": 0, "dro
 
 
 def frames(outcome: Outcome) -> dict[str, Any]:
-    """`frames` of `summary.json`."""
+    """The table `frames` of `summary.json`."""
     emulator = outcome.reports.get("emulator", {})
     counted = emulator.get("frames", _NO_FRAMES)
     missing, unasked = _differences(outcome, emulator.get("requests", {}))
@@ -44,14 +44,16 @@ def frames(outcome: Outcome) -> dict[str, Any]:
 
 
 def _differences(outcome: Outcome, requests: Mapping[str, Mapping[str, int]]) -> tuple[int, int]:
-    """Requests of nodes that the medium never had, and requests that the medium had and no node made."""
+    """The number of requests that did not reach the medium, and the number of those that the medium had and no node
+    made.
+    """
     missing = unasked = 0
     for node in outcome.scenario.node_ids:
         name = f"agent-{node}"
         counts = requests.get(str(node), {})
         had = counts.get("all", 0)
         made = outcome.reports.get(name, {}).get("frames_sent", 0)
-        if _cut_short(outcome, name):  # the node's count ends before the node did: the medium's count fills the gap
+        if _cut_short(outcome, name):  # the node's count ends before the node did, so the medium's count is used
             made = max(had, counts.get("before_restart", 0) + made)
         missing += max(0, made - had)
         unasked += max(0, had - made)
@@ -59,7 +61,7 @@ def _differences(outcome: Outcome, requests: Mapping[str, Mapping[str, int]]) ->
 
 
 def _cut_short(outcome: Outcome, name: str) -> bool:
-    """True if an actor's report does not cover all of its run."""
+    """True if the report of an actor does not cover all of its run."""
     report = outcome.reports.get(name)
     if report is None or any(ended == name for ended, _ in outcome.ended):
         return True
@@ -67,7 +69,7 @@ def _cut_short(outcome: Outcome, name: str) -> bool:
 
 
 def copies(outcome: Outcome) -> dict[str, Any]:
-    """`copies` of `summary.json`: the ledger at receivers, and how many copies handed to the bus reached the nodes."""
+    """The table `copies` of `summary.json`: the ledger at the receivers, and how many copies reached the nodes."""
     emulator = outcome.reports.get("emulator", {})
     if not emulator:
         return {}

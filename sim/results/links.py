@@ -1,4 +1,4 @@
-"""What links have carried over a whole run: the sums of the medium's reports, as rows for a file."""
+"""The traffic of each link over a whole run: sums of the medium's reports, as rows of `links.json`."""
 
 from collections.abc import Iterable
 from typing import Any, Final
@@ -9,11 +9,11 @@ from fanet_mw.bus.link_stats import COUNTS, LOSSES, LinkRow, LinkStats
 from fanet_mw.units import NodeId
 
 _PENDING: Final = 64
-"""Reports that wait to be summed together, so that memory does not grow with the length of a run."""
+"""The number of reports that are summed together, so that memory does not grow with the length of a run."""
 
 
 class LinkTotals:
-    """Sums per directed link. Memory depends on the number of links, not of reports."""
+    """The sums for each directed link. The memory depends on the number of links, not on that of reports."""
 
     def __init__(self) -> None:
         self._pending: list[LinkStats] = []
@@ -21,13 +21,13 @@ class LinkTotals:
         self._sums = np.zeros((0, 1 + COUNTS), np.int64)
 
     def add(self, stats: LinkStats) -> None:
-        """Take in one report."""
+        """Add a report."""
         self._pending.append(stats)
         if len(self._pending) >= _PENDING:
             self._merge()
 
     def rows(self) -> list[LinkRow]:
-        """All links, by source and destination."""
+        """All links, in the order of source and destination."""
         self._merge()
         return [
             LinkRow(NodeId(src), NodeId(dst), received, tuple(lost), rssi_sum)
@@ -48,7 +48,7 @@ class LinkTotals:
 
 
 def described(rows: Iterable[LinkRow]) -> list[dict[str, Any]]:
-    """The content of `links.json`: copies, received, lost by reason, and the mean RSSI [dBm] of those received."""
+    """The rows of `links.json`: copies, received, lost by reason, and the mean RSSI of the received ones [dBm]."""
     return [
         {
             "src": row.src,

@@ -1,7 +1,7 @@
-"""The summary of a run, computed from its outcome. docs/reference/results.md defines each figure.
+"""Computes the summary of a run from its outcome. docs/reference/results.md defines each figure.
 
-pdr      = unique deliveries of application packets at their targets / (packets generated x targets), never above 1
-repeated = further deliveries of a packet at a target that already had it, whose process was restarted
+pdr      = unique deliveries of application packets at their targets / (packets generated x targets), at most 1
+repeated = further deliveries of a packet at a target whose process was restarted, and so has forgotten the first
 delay    = from the hand-over by one application to the receipt by the other, per (packet, target)
 """
 
@@ -78,7 +78,7 @@ def summarize(outcome: Outcome, *, trace_sha256: str) -> dict[str, Any]:
 
 
 def _messages(outcome: Outcome) -> dict[str, int]:
-    """The fates of the messages of users' applications, all nodes together; empty when there were none."""
+    """The fates of the messages of users' applications, of all nodes together; empty if there were none."""
     total: Counter[str] = Counter()
     for report in outcome.reports.values():
         total.update(report.get("messages", {}))
@@ -86,7 +86,7 @@ def _messages(outcome: Outcome) -> dict[str, int]:
 
 
 def _packets(outcome: Outcome, packets: Mapping[str, AppPackets]) -> dict[str, dict[str, Any]]:
-    """Generated, delivered, PDR and delay of each application."""
+    """The number of packets generated and delivered, the PDR and the delays of each application."""
     lead_ns = outcome.scenario.radio.lead_ns
     result: dict[str, dict[str, Any]] = {
         name: {
@@ -113,7 +113,7 @@ def _packets(outcome: Outcome, packets: Mapping[str, AppPackets]) -> dict[str, d
 def _worst_nodes(
     per_source: Counter[int], targets: Mapping[int, frozenset[int]], received: Counter[int], most: int = 5
 ) -> list[dict[str, Any]]:
-    """The nodes that received the smallest share of what was meant for them, worst first."""
+    """The nodes that received the smallest share of the packets that were meant for them, the worst first."""
     wanted: Counter[int] = Counter()
     for source, packets in per_source.items():
         for node in targets[source]:
@@ -143,7 +143,9 @@ def _lateness(outcome: Outcome, emulator: Mapping[str, Any]) -> dict[str, Any]:
 
 
 def _admission(outcome: Outcome) -> dict[str, Any]:
-    """What nodes refused, and how often they met or lost the deadline; empty without `traffic.deadline_s`."""
+    """The number of packets refused by admission control, and how often nodes met or lost the deadline; empty without
+    `traffic.deadline_s`.
+    """
     deadline_s = outcome.scenario.traffic.deadline_s
     if deadline_s is None:
         return {}

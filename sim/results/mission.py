@@ -1,13 +1,13 @@
-"""The outcome of a mission, from the trace: survivors confirmed, area covered, coherence and nearness of the swarm.
+"""The outcome of a search mission, from the trace: survivors confirmed, area covered, coherence and separation of the
+swarm.
 
-    coverage    share of the area that came within the nominal range of a phone's receiver of a UAV, a cell at a time
-    connected   share of the time in which all UAVs of the search were one component at the radio's reach: those that
-                live, have not crashed, and do not fly home or stand there, because they hold no place any more
-    confirmed   survivors of whom a UAV said that it saw them at close range, and where they truly are: within 25 m; the
-                others are mistaken. What was taken back does not count. The error is that of the place it told first,
-                of both
-    reopened    confirmations that were taken back, because what was heard later contradicted them
-    nearest     of each living UAV once a second: how far the nearest other one is
+    coverage    share of the area that came within the nominal range of the phone receiver of a UAV, cell by cell
+    connected   share of the time in which all searching UAVs were one connected component at the radio's reach; UAVs
+                that have crashed, fly home or stand there do not count
+    confirmed   survivors whom a UAV announced within 25 m of their true place and did not take back; farther ones are
+                mistaken. The error is that of the first announced place, for both
+    reopened    confirmations that were taken back, because later receptions contradicted them
+    nearest     distance of each living UAV to the nearest other one, once a second
 
 Positions are the true ones, once a second (`Posed`).
 """
@@ -41,12 +41,13 @@ from sim.world.environment.survivors import place
 from sim.world.sensors.phone import REFERENCE_LOSS_DB
 
 _HOMEWARD: Final = frozenset({"return", "land"})
-"""What a UAV does that has left the search."""
+"""The mission modes of a UAV that has left the search."""
 _WRECKED: Final = "fallen"
 _CELL_M: Final = 25.0
 _NEARLY_ALL: Final = 0.95
 _MISTAKEN_M: Final = 25.0
-"""A UAV that announces a survivor farther than this from the true place has taken another person for that one."""
+"""A UAV that announces a survivor farther than this from the true place has mistaken another person
+for that survivor."""
 
 Rows = npt.NDArray[np.float64]
 Values = npt.NDArray[np.float64]
@@ -59,12 +60,12 @@ def mission(scenario: Scenario, records: Collection[Record]) -> dict[str, Any]:
     first: dict[int, int] = {}
     errors: list[float] = []
     announced: dict[int, list[Confirmed]] = {}
-    """For each survivor the confirmations that hold, in the order in which they were told."""
+    """For each survivor, the confirmations that hold, in the order of their announcement."""
     reopened = 0
     for record in records_of(records, Approaching, Confirmed, Refuted):
         if type(record) is Approaching:
             first.setdefault(record.node, record.t_ns)
-            if 1 <= record.survivor <= len(truth):  # else only the air has told of it
+            if 1 <= record.survivor <= len(truth):  # a survivor with another number exists only in a forged message
                 at = truth[record.survivor - 1]
                 errors.append(math.hypot(at.east - record.east_m, at.north - record.north_m))
         elif type(record) is Confirmed and 1 <= record.survivor <= len(truth):
@@ -97,7 +98,7 @@ def mission(scenario: Scenario, records: Collection[Record]) -> dict[str, Any]:
 
 
 def _takes_back(refuted: Refuted, confirmed: Confirmed) -> bool:
-    """True if the refutation is of this confirmation, or of another at the same place."""
+    """True if the refutation is about this confirmation, or about another one at the same place."""
     return math.hypot(refuted.east_m - confirmed.east_m, refuted.north_m - confirmed.north_m) <= SAME_PLACE_M
 
 
@@ -106,7 +107,7 @@ def _median(values: list[float]) -> float | None:
 
 
 def _flown(scenario: Scenario, records: Iterable[Record]) -> dict[str, Any]:
-    """Coverage and coherence; None where the trace has no positions."""
+    """Coverage and coherence; None if the trace has no positions."""
     covered = OverflownCells(scenario)
     together = instants = 0
     nearly_all_ns: int | None = None
@@ -130,13 +131,15 @@ def _flown(scenario: Scenario, records: Iterable[Record]) -> dict[str, Any]:
 
 
 def _spread(distances_m: Values) -> dict[str, float]:
-    """The least distance, that of the hundredth part, and the median."""
+    """The least distance, the first percentile, and the median."""
     least, hundredth, median = np.quantile(distances_m, (0.0, 0.01, 0.5)).tolist()
     return {"least": round(least, 2), "p1": round(hundredth, 2), "p50": round(median, 2)}
 
 
 def _instants(records: Iterable[Record]) -> Iterator[tuple[int, Rows, Flags]]:
-    """The instants of the trace that have positions, those of the UAVs that live then, and which of them search."""
+    """The instants with positions in the trace, the positions of the UAVs alive then, and which of
+    these UAVs search.
+    """
     dead: set[int] = set()
     wrecked: set[int] = set()
     homeward: set[int] = set()
@@ -163,7 +166,7 @@ def _instants(records: Iterable[Record]) -> Iterator[tuple[int, Rows, Flags]]:
 
 
 def _is_one(near: Flags) -> bool:
-    """True if all UAVs reach each other over hops, given which of them reach which; True without UAVs."""
+    """True if all UAVs are connected over hops, given which pairs reach each other; also True without any UAV."""
     if not len(near):
         return True
     reached = np.zeros(len(near), bool)
@@ -176,7 +179,7 @@ def _is_one(near: Flags) -> bool:
 
 
 class OverflownCells:
-    """The cells of the area that have been overflown."""
+    """The cells of the area that UAVs have flown over."""
 
     def __init__(self, scenario: Scenario) -> None:
         mission, half = scenario.mission, scenario.world.area_m / 2
@@ -191,7 +194,7 @@ class OverflownCells:
         return float(self._seen.mean())
 
     def add(self, at: Iterable[tuple[float, float, float]]) -> None:
-        """UAVs are at these places, or have been."""
+        """UAVs were at these places."""
         for east, north, up in at:
             ground2 = self._range_m**2 - up**2
             if ground2 <= 0:

@@ -1,9 +1,8 @@
-"""The packets that applications sent, and those that arrived where they were meant to: once per node and packet.
+"""The packets that applications sent, and their deliveries at the nodes for which they were meant.
 
-A packet is named by its origin and sequence number. A delivery counts if the packet was meant for the node. A second
-delivery at the same node is `repeated`: the node's process was restarted and has forgotten the first. A packet that no
-node sent, or none at the instant that its header states, is `unknown` and no delivery: it is forged, or its origin's
-record is lost.
+A packet is identified by origin and sequence number. Only the first delivery at each target counts. A second one at the
+same node is `repeated`: the node's process was restarted, and has forgotten the first. A delivered packet is `unknown`
+if no node sent it at the instant that its header states: it is forged, or its origin's record is lost.
 """
 
 from array import array
@@ -17,9 +16,9 @@ from sim.run.collecting.trace_reading import records_of
 from sim.run.outcome import Outcome
 
 OTHER_APPS: Final = ("report", "warning")
-"""The built-in applications beside the classes of traffic."""
+"""The built-in applications that send packets, in addition to the traffic classes."""
 Name = tuple[int, int]
-"""The name of a packet: (origin, sequence number)."""
+"""The identity of a packet: (origin, sequence number)."""
 
 
 @dataclass(frozen=True, slots=True)
@@ -28,19 +27,19 @@ class SentPacket:
 
     born_ns: int
     out_ns: int | None = None
-    """The instant at which the packet's first frame could contend; None when the packet never left its origin."""
+    """The instant at which the packet's first frame could contend; None if the packet never left its origin."""
     bound_ns: int | None = None
-    """The delay that the origin promised when it accepted the packet; None when it promised none."""
+    """The delay bound that the origin stated when it accepted the packet; None if it stated none."""
     likely: tuple[int, float] | None = None
-    """The delay within which, as the origin stated, at least this share of its copies arrive; None if it did not."""
+    """The likely delay, and the share of copies that the origin stated to arrive within it; None if it stated none."""
 
 
 @dataclass(slots=True)
 class Deliveries:
-    """Deliveries in columns of one length: an hour of a large swarm has millions of them."""
+    """The deliveries in columns of equal length, because an hour of a large swarm has millions of them."""
 
     packet: "array[int]" = field(default_factory=lambda: array("I"))
-    """The packet's place among those that its application sent."""
+    """The index of the packet among those that its application sent."""
     node: "array[int]" = field(default_factory=lambda: array("H"))
     delay_ns: "array[int]" = field(default_factory=lambda: array("q"))
     handover_ns: "array[int]" = field(default_factory=lambda: array("q"))
@@ -57,28 +56,29 @@ class Deliveries:
 
 @dataclass(slots=True)
 class AppPackets:
-    """The packets of one application and their deliveries, all nodes together."""
+    """The packets of one application and their deliveries, of all nodes together."""
 
     sent: dict[Name, SentPacket] = field(default_factory=dict)
-    """The packets by name, in the order in which they were generated."""
+    """The packets by their identity, in the order of their generation."""
     wanted: int = 0
-    """The number of packets times the nodes for which each was meant."""
+    """The sum over all packets of the number of nodes for which the packet was meant."""
     deliveries: Deliveries = field(default_factory=Deliveries)
     repeated: int = 0
     unknown: int = 0
-    """Deliveries of packets that no application is known to have sent, whatever they claimed: counted once, here with
-    the first application."""
+    """The number of deliveries of unknown packets, whatever application they claimed; it is only counted for the first
+    application."""
 
 
 def packets_of(outcome: Outcome) -> Mapping[str, AppPackets]:
-    """The packets by application: classes of traffic, those of `OTHER_APPS`, then those of users as they began to send.
+    """The packets by application: traffic classes, those of `OTHER_APPS`, then users' applications in the order of
+    their first packets.
 
-    To which nodes a packet of a user's application is meant to go is not in the trace: its `wanted` stays 0.
+    The trace does not tell for which nodes a user's packet is meant, so `wanted` is 0 for users' applications.
     """
     classes = [*outcome.scenario.traffic_classes]
     found = {app: AppPackets() for app in (*classes, *OTHER_APPS)}
-    app_of: dict[Name, tuple[AppPackets, int]] = {}  # and the packet's place there
-    meant_for: dict[Name, frozenset[int]] = {}  # the targets of packets of traffic
+    app_of: dict[Name, tuple[AppPackets, int]] = {}  # with the index of the packet there
+    meant_for: dict[Name, frozenset[int]] = {}  # the targets of each packet of the traffic
     targets = {name: targets_by_source(outcome, name) for name in classes}
     others = outcome.scenario.nodes.count - 1
     for born in records_of(outcome.records, Generated):
@@ -96,8 +96,8 @@ def packets_of(outcome: Outcome) -> Mapping[str, AppPackets]:
         if name in app_of:
             app, _ = app_of[name]
             app.sent[name] = _known(app.sent[name], known)
-    had: dict[Name, int] = {}  # a bit for each node: there are as many deliveries as records, and far fewer packets
-    exact = not outcome.scenario.clock.modelled  # else delays are true ones, whatever the header said
+    had: dict[Name, int] = {}  # one bit per node: there are far fewer packets than deliveries
+    exact = not outcome.scenario.clock.modelled  # otherwise the trace has true delays, whatever the header said
     for record in records_of(outcome.records, Delivered):
         name = record.origin, record.seq
         sender, place = app_of.get(name, (None, 0))
@@ -132,6 +132,6 @@ def _known(sent: SentPacket, record: LetOut | BoundStated | LikelyStated) -> Sen
 
 
 def targets_by_source(outcome: Outcome, name: str | None = None) -> Mapping[int, frozenset[int]]:
-    """For every node the nodes for which its traffic of a class is meant, by default of the first class."""
+    """For each node, the nodes for which its packets of a traffic class are meant; by default of the first class."""
     scenario = outcome.scenario
     return {node: frozenset(targets_of(scenario, node, name)) for node in scenario.node_ids}

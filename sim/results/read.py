@@ -47,7 +47,7 @@ def _read(folder: Path) -> "Table":
 
 
 def _row(folder: Path) -> dict[str, Any]:
-    """A single run as one row of the same columns."""
+    """A single run as one row with the same columns."""
     text = (folder / _RUN).read_text(encoding="utf-8")
     scenario = tomllib.loads((folder / "scenario.toml").read_text(encoding="utf-8"))
     row: dict[str, Any] = {"seed": scenario.get("seed"), "status": "ok", **flat(json.loads(text))}

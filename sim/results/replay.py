@@ -1,8 +1,8 @@
-"""A mission again, from the files of its run alone: where everyone was, what each did, what had been covered.
+"""Replays a mission from the files of its run: where each UAV was, what it did, and which area was covered.
 
 position      `posed`, once a second; in between on a straight line
-flight        `flight_mode_changed`: what the flight controller did; from `fallen` on it is a wreck
-mission       `mission_mode_changed`: what the UAV had decided to do, and for which survivor; `planned`: its place
+flight        `flight_mode_changed`: the mode of the flight controller; from `fallen` on the UAV is a wreck
+mission       `mission_mode_changed`: the UAV's decision, and for which survivor; `planned`: its place in the plan
 sensors       `detected`, `sighted`
 finds         `approaching`, `arrived`, `confirmed`
 """
@@ -24,24 +24,24 @@ R = TypeVar("R", FlightModeChanged, MissionModeChanged, Planned)
 
 
 class UavState(NamedTuple):
-    """One UAV at one instant."""
+    """The state of one UAV at one instant."""
 
     position: Enu
     flight: str
-    """The mode of its flight controller; empty: nothing was asked of it yet."""
+    """The mode of its flight controller; empty if it was not commanded yet."""
     mission: str
-    """What it had decided to do; empty: it takes no part in a planned search."""
+    """The mode of its mission; empty if it takes no part in a planned search."""
     survivor: int
-    """The survivor to whom it flew; 0 when it flew to none."""
+    """The survivor to whom it flew; 0 if there was none."""
     place: int
-    """Its place in the plan; -1: none."""
+    """Its place in the plan; -1 if it had none."""
 
 
 class Replay:
-    """A run that is over."""
+    """A finished run that can be looked at, at any instant."""
 
     def __init__(self, scenario: Scenario, records: Sequence[Record]) -> None:
-        """`records` in the order of the trace."""
+        """`records`: the trace records, in the order of the trace."""
         self.scenario, self.records = scenario, records
         self._posed: dict[int, list[Posed]] = defaultdict(list)
         self._flight: dict[int, list[FlightModeChanged]] = defaultdict(list)
@@ -59,7 +59,7 @@ class Replay:
 
     @classmethod
     def read(cls, folder: Path) -> Self:
-        """The replay of what `fanet simulate --out` or `fanet launch --out` has written; raises ConfigError."""
+        """Read what `fanet simulate --out` or `fanet launch --out` has written; raises ConfigError."""
         try:
             keys = tomllib.loads((folder / "scenario.toml").read_text(encoding="utf-8"))
             lines = (folder / "trace.jsonl").read_text(encoding="utf-8").splitlines()
@@ -68,7 +68,7 @@ class Replay:
         return cls(Scenario.model_validate(keys), [parse(line) for line in lines])
 
     def at(self, t_s: float) -> Mapping[NodeId, UavState]:
-        """Everyone at an instant; a UAV that was a wreck by then is where it was last seen flying."""
+        """The states of all UAVs at an instant. A wreck is where it was last seen flying."""
         t_ns = round(t_s * S)
         found = {}
         for node, posed in sorted(self._posed.items()):
@@ -85,7 +85,7 @@ class Replay:
         return found
 
     def coverage(self, t_s: float) -> float:
-        """The share of the area that had been covered by an instant."""
+        """The share of the area that was covered by an instant."""
         covered = OverflownCells(self.scenario)
         for record in self.records:
             if isinstance(record, Posed) and record.t_ns <= t_s * S:

@@ -1,4 +1,4 @@
-"""A summary for a person to read: the request, what the network did, and what the mission gained from it."""
+"""Prints a summary for a person: what was requested, what the network did, and what the mission achieved."""
 
 from collections.abc import Iterator, Mapping
 from typing import Any

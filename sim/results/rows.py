@@ -1,4 +1,4 @@
-"""The figures of a summary as one flat row: `delay_ms.p95` and the like."""
+"""Flattens a summary into one row of figures with names such as `delay_ms.p95`."""
 
 from collections.abc import Mapping
 from typing import Any
@@ -7,7 +7,9 @@ Cell = float | bool | str | list[float] | None
 
 
 def flat(summary: Mapping[str, Any], prefix: str = "") -> dict[str, Cell]:
-    """Every number, truth and text of a summary under its dotted name, and lists of numbers; no other lists."""
+    """All numbers, truth values and texts of a summary under their dotted names, and lists of
+    numbers; no other lists.
+    """
     row: dict[str, Cell] = {}
     for key, value in summary.items():
         name = f"{prefix}{key}"

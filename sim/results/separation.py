@@ -1,4 +1,4 @@
-"""`separation` of `summary.json`: how near UAVs came to each other, and what they knew of it beforehand."""
+"""The table `separation` of `summary.json`: how near UAVs came to each other, and what they knew of it beforehand."""
 
 from typing import Any
 
@@ -11,7 +11,7 @@ from sim.run.outcome import Outcome
 
 
 def separation(outcome: Outcome) -> dict[str, Any]:
-    """What the world saw, and what the UAVs foresaw; empty when nothing was watched."""
+    """The true separation, and the conflicts that UAVs foresaw; empty if separation was not watched."""
     seen = outcome.reports.get("world", {}).get("separation")
     if not seen:
         return {}

@@ -1,6 +1,6 @@
 """Runs for programs and notebooks: `simulate`, `launch`, and a swarm in virtual time that a program steers.
 
-What a scenario is: a `Scenario`, the name of a shipped one, or the path of a file.
+A scenario is given as a `Scenario`, as the name of a shipped one, or as the path of a file.
 """
 
 import asyncio
@@ -30,15 +30,15 @@ from sim.scenarios import catalog
 
 T = TypeVar("T")
 OfUser = Callable[[int], Sequence[Application]] | Mapping[int, Sequence[Application]]
-"""The applications of a user: by node, or what makes them for a node."""
+"""A user's applications: a list for each node, or a function that makes the list for a node."""
 _STEP_NS: Final = 10 * MS
-"""Virtual time advances so far between two looks at what the program wants."""
+"""Virtual time advances by this much before the program's tasks run again."""
 _TURNS: Final = 4
-"""So many turns of the event loop are enough for a chain of tasks that wait for each other."""
+"""This many turns of the event loop are enough for a chain of tasks that wait for each other."""
 
 
 def scenario_of(given: Scenario | str | Path, *, seed: int | None = None, overrides: Sequence[str] = ()) -> Scenario:
-    """A scenario as a program names it, with another seed and other values (`KEY=VALUE`); raises ConfigError."""
+    """The scenario that a program has named, with another seed and other values (`KEY=VALUE`); raises ConfigError."""
     if isinstance(overrides, str):
         raise ConfigError(f"overrides = {overrides!r}: must be a sequence of KEY=VALUE, not one text")
     if not isinstance(given, Scenario):
@@ -49,8 +49,9 @@ def scenario_of(given: Scenario | str | Path, *, seed: int | None = None, overri
 
 
 def _by_node(applications: object, scenario: Scenario) -> Callable[[int], Sequence[Application]]:
-    """What makes the applications of each node, as a user gave it; raises ConfigError for what is none, or is for a
-    node that there is not.
+    """A function that makes the applications of each node, from what a user has given.
+
+    Raises ConfigError for anything else, and for a node that does not exist.
     """
     if applications is None:
         return lambda _: ()
@@ -165,7 +166,7 @@ class _Time:
         return self.ended or self.now_ns() >= self.scenario.duration_ns
 
     def start(self) -> Observed:
-        """Build the actors, with all that has joined, and start them; once."""
+        """Build the actors, with all nodes that were joined, and start them; only the first call does it."""
         if self.observed is None:
             self.observed = Observed(
                 self.scenario, applications=lambda n: [*self._applications(n), *self.joined.get(n, ())]
@@ -178,14 +179,14 @@ class _Time:
         return next(a for a in actors if isinstance(a, Uav | ClockedUav) and a.name == f"agent-{node}")
 
     async def step(self, until_ns: int) -> None:
-        """Let a little time pass, and then the other tasks of the program do what they want to."""
+        """Let a little time pass, and then let the other tasks of the program run."""
         host = self.start().host
         host.run(min(host.now_ns + _STEP_NS, until_ns))
         await breathe()
 
 
 async def breathe() -> None:
-    """Let other tasks run: a task that has been told something may act before time goes on."""
+    """Let other tasks run, so that a task that was told something can act before time goes on."""
     for _ in range(_TURNS):
         await asyncio.sleep(0)
 

@@ -1,4 +1,4 @@
-"""One run of a sweep, in whatever process it is handed to: it returns what the run came to, and never raises."""
+"""Carries out one run of a sweep, in any process; it returns the result or the error, and never raises."""
 
 import asyncio
 import json
@@ -19,19 +19,19 @@ from sim.sweep.tasks import Task
 
 @dataclass(frozen=True, slots=True)
 class Finished:
-    """What one run came to. `wall_s` and `cpu_s` depend on the machine; nothing else does."""
+    """The result of one run. Only `wall_s` and `cpu_s` depend on the machine."""
 
     key: str
     code: str
     wall_s: float
     summary: str | None = None
-    """The summary as JSON, without what depends on the machine; None: the run failed."""
+    """The summary as JSON, without figures that depend on the machine; None if the run failed."""
     measured: str = "{}"
-    """What was measured besides, as JSON."""
+    """The additional measures, as JSON."""
     error: str | None = None
-    """Why there is no summary: the last line of the traceback, and below it the whole."""
+    """Why there is no summary: the last line of the traceback, and below it the whole traceback."""
     cpu_s: float = 0.0
-    """Processor time of the run, which a busy machine lengthens less than its wall time."""
+    """The processor time of the run, which a busy machine lengthens less than the wall time."""
 
     @property
     def failed(self) -> bool:
@@ -46,7 +46,7 @@ def _launched(scenario: Scenario) -> Outcome:
 
 
 def _cpu_s() -> float:
-    """Processor time of this process and of its children that have ended."""
+    """The processor time of this process and of its finished children."""
     return sum(os.times()[:4])
 
 

@@ -1,4 +1,6 @@
-"""What a run of a sweep can measure besides its summary. Each is a function of the outcome to a column's value."""
+"""Measures of a run that are not in its summary; a sweep file names those it wants. Each is a
+function of the outcome.
+"""
 
 import math
 from collections.abc import Callable, Iterable, Mapping
@@ -22,30 +24,33 @@ _DECADES: Final = 6
 DELAY_EDGES_S: Final = tuple(
     _LEAST_S * math.pow(10.0, step / _PER_DECADE) for step in range(_PER_DECADE * _DECADES + 1)
 )
-"""Upper edges of the classes of `delay_counts`: 40 a decade from 1 ms to 1,000 s; the first holds all that is less."""
+"""The upper edges of the classes of `delay_counts`: 40 per decade from 1 ms to 1,000 s; the first class has all shorter
+delays."""
 
 
 def delay_counts(outcome: Outcome) -> list[float]:
-    """Deliveries of application packets by delay: one count per edge of `DELAY_EDGES_S`, and one for all beyond."""
+    """The number of deliveries of application packets in each class of delay (`DELAY_EDGES_S`), and
+    of all longer ones.
+    """
     delays_s = np.asarray(first_class_of(outcome).deliveries.delay_ns, dtype=np.float64) / S
     counts = np.bincount(np.searchsorted(DELAY_EDGES_S, delays_s), minlength=len(DELAY_EDGES_S) + 1)
     return [float(count) for count in counts]
 
 
 def wanted(outcome: Outcome) -> float:
-    """Packets times the nodes that each was meant for: what `delay_counts` would sum up to if nothing were lost."""
+    """The number of packets times their targets: the sum of `delay_counts` if nothing were lost."""
     return float(first_class_of(outcome).wanted)
 
 
 def leader_pdr(outcome: Outcome) -> float | None:
-    """The share of the packets sent by others to the leader, or to everyone, that reached it."""
+    """The share of packets from other nodes to the leader, or to all nodes, that reached the leader."""
     leader, sent = outcome.scenario.leader, first_class_of(outcome).sent
     meant = sum(origin != leader for origin, _ in sent)
     return len(_at_leader_s(outcome)) / meant if meant else None
 
 
 def leader_delay_s(outcome: Outcome) -> float | None:
-    """The mean delay of what reached the leader [s]."""
+    """The mean delay of the packets that reached the leader [s]."""
     delays_s = _at_leader_s(outcome)
     return math.fsum(delays_s) / len(delays_s) if delays_s else None
 
@@ -56,10 +61,11 @@ def _at_leader_s(outcome: Outcome) -> list[float]:
 
 
 def age_s(outcome: Outcome) -> float:
-    """The mean age of information [s]: how long ago the newest packet was born that a node has of another one.
+    """The mean age of information [s]: the time since the generation of the newest packet that a node has of another
+    one.
 
-    The mean is over the window in which packets are born and over all pairs (source, node that it sends to); before
-    the first packet arrives the information is taken to be of the beginning of the window.
+    The mean is over the window in which packets are generated and over all pairs (source, target). Before the first
+    packet arrives, the information counts as generated at the beginning of the window.
     """
     start_ns, end_ns = outcome.scenario.traffic_window_ns
     heard = _heard_of(first_class_of(outcome))
@@ -72,10 +78,10 @@ def age_s(outcome: Outcome) -> float:
 
 
 def report_age_s(outcome: Outcome) -> float | None:
-    """The mean age of what UAVs know of the phones that others hear [s]; None when nobody reported twice.
+    """The mean age of the newest survivor report that a UAV has of another UAV [s]; None if no UAV has reported twice.
 
-    It is how long ago the newest report was born that a UAV has of another one, on average over all pairs and over the
-    time from a reporter's first report to its last; before the first arrives, the information is of that instant.
+    The mean is over all pairs of UAVs and over the time from a reporter's first report to its last. Before the first
+    report arrives, it counts as generated at the beginning of this time.
     """
     reports = packets_of(outcome)["report"]
     heard = _heard_of(reports)
@@ -93,7 +99,7 @@ def report_age_s(outcome: Outcome) -> float | None:
 
 
 def _heard_of(app: AppPackets) -> dict[tuple[int, int], list[tuple[int, int]]]:
-    """The pairs (arrival, birth) of what was delivered, by (origin, receiver), in the order of arrivals."""
+    """(arrival, generation) of each delivered packet by (origin, receiver), in the order of arrivals."""
     sent = [(origin, packet.born_ns) for (origin, _), packet in app.sent.items()]
     heard: dict[tuple[int, int], list[tuple[int, int]]] = {}
     for packet, node, delay_ns in zip(app.deliveries.packet, app.deliveries.node, app.deliveries.delay_ns, strict=True):
@@ -105,7 +111,7 @@ def _heard_of(app: AppPackets) -> dict[tuple[int, int], list[tuple[int, int]]]:
 
 
 def _age_area(arrivals: Iterable[tuple[int, int]], start_ns: int, end_ns: int) -> float:
-    """The integral of now minus the latest birth [ns^2], for pairs (arrival, birth) in the order of arrivals."""
+    """The integral of (now - latest generation) [ns^2], for pairs (arrival, generation) in the order of arrivals."""
     area, since_ns, latest_ns = 0.0, start_ns, start_ns
     for at_ns, born_ns in (*arrivals, (end_ns, end_ns)):
         until_ns = min(max(at_ns, start_ns), end_ns)
@@ -115,12 +121,12 @@ def _age_area(arrivals: Iterable[tuple[int, int]], start_ns: int, end_ns: int) -
 
 
 def connected(outcome: Outcome) -> float:
-    """The share of (source, target) pairs that a multi-hop path connected, on average over the measured window."""
+    """The share of (source, target) pairs with a multi-hop path, on average over the measured window."""
     return connectivity(outcome.scenario)
 
 
 def first_detected_s(outcome: Outcome) -> list[float]:
-    """The instants at which UAVs first heard a survivor's phone, for those that did [s]."""
+    """The instants at which UAVs first received a survivor's phone, for those that did [s]."""
     return _first_of_each(outcome, Detected)
 
 
@@ -130,7 +136,9 @@ def first_approach_s(outcome: Outcome) -> list[float]:
 
 
 def enough_heard_s(outcome: Outcome) -> float | None:
-    """The instant [s] by which enough UAVs for the mission's rule had heard the same phone; none turns before it."""
+    """The instant [s] from which enough UAVs had received the same phone for the mission's rule; no UAV turns before
+    it.
+    """
     enough = outcome.scenario.mission.reports_to_approach
     who: dict[int, set[int]] = {}
     for record in records_of(outcome.records, Detected):
@@ -163,7 +171,7 @@ MEASURES: Final[Mapping[str, Callable[[Outcome], Value]]] = {
 
 
 def check(names: Iterable[str]) -> None:
-    """Raise ConfigError for a measure that there is not."""
+    """Raise ConfigError for a measure that does not exist."""
     for name in names:
         if name not in MEASURES:
             raise ConfigError(f"measure = {name!r}: must be one of {', '.join(MEASURES)}")

@@ -1,7 +1,7 @@
-"""The processes of this machine that carry out runs, one run at a time each.
+"""Worker processes on this machine, each of which carries out one run at a time.
 
-A worker that dies takes its run with it: the run is handed to a new worker once more, and is a failed one when that
-dies too. Workers die with the process that started them, whatever kills it.
+If a worker dies, its run is given to another worker once; if that dies, too, the run has failed. Workers are killed
+when the process that started them ends, for whatever reason.
 """
 
 import multiprocessing
@@ -19,12 +19,14 @@ from sim.sweep.provenance import code
 from sim.sweep.tasks import Task
 
 _LIVES: Final = 2
-"""A run that has killed so many workers is not tried again."""
+"""A run that has killed this number of workers is not tried again."""
 
 
 def _work(tasks: Connection) -> None:
-    """The whole life of a worker: a task in, what it came to out, until the other end is closed."""
-    signal.signal(signal.SIGINT, signal.SIG_IGN)  # the sweep hears it, and ends its workers
+    """The work of a worker: it receives tasks and returns their results, until the other end of the connection is
+    closed.
+    """
+    signal.signal(signal.SIGINT, signal.SIG_IGN)  # the sweep receives the signal, and ends its workers
     signal.signal(signal.SIGTERM, signal.SIG_DFL)
     be_killed_with_parent()
     while True:
@@ -51,7 +53,7 @@ class Pool:
         self._running: list[_Worker] = []
 
     def carry_out(self, tasks: Sequence[Task]) -> Iterator[Finished]:
-        """What each task came to, in the order in which they end."""
+        """The result of each task, in the order in which they end."""
         waiting = deque(tasks)
         deaths: dict[str, int] = {}
         try:
@@ -76,7 +78,7 @@ class Pool:
             self.close()
 
     def _hand_out(self, waiting: deque[Task]) -> None:
-        """Give every idle worker a task, and start workers while there are too few."""
+        """Give a task to each idle worker, and start workers while there are too few."""
         while waiting:
             idle = next((worker for worker in self._running if worker.task is None), None)
             if idle is None:
@@ -85,7 +87,7 @@ class Pool:
                 idle = self._start()
             try:
                 idle.tasks.send(waiting[0])
-            except OSError:  # it died idle
+            except OSError:  # it died while it was idle
                 self._bury(idle)
                 continue
             idle.task = waiting.popleft()
@@ -100,19 +102,19 @@ class Pool:
         return worker
 
     def _ready(self) -> list[_Worker]:
-        """Workers that have something to say, or have died; waits for the first."""
+        """The workers that have a result or have died; waits for the first."""
         busy = {worker.tasks: worker for worker in self._running if worker.task is not None}
         return [busy[end] for end in wait(list(busy)) if isinstance(end, Connection)]
 
     def _bury(self, worker: _Worker) -> int:
-        """Forget a worker that is dead; returns its exit code."""
+        """Remove a dead worker; returns its exit code."""
         self._running.remove(worker)
         worker.tasks.close()
         worker.process.join()
         return worker.process.exitcode or 0
 
     def close(self) -> None:
-        """End every worker, whatever it is at."""
+        """End all workers, even in the middle of a run."""
         for worker in self._running:
             worker.process.terminate()
         for worker in list(self._running):

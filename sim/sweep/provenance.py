@@ -1,4 +1,6 @@
-"""Which code made a row: the version, and a digest of every source file that a run's result depends on."""
+"""Identifies the code that produced a row: the version, and a digest of all source files on which a run's result
+depends.
+"""
 
 import functools
 import hashlib
@@ -11,7 +13,7 @@ from fanet_mw import __version__
 _PACKAGES: Final = (
     "fanet_mw", "agents", "emulator", "sim.run", "sim.results", "sim.world",
 )  # fmt: skip
-"""The command line, sweeps and figures change no run."""
+"""Changes in the command line, in sweeps and in figures change no run, so the digest leaves them out."""
 
 
 @functools.cache

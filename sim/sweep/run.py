@@ -1,4 +1,4 @@
-"""Carrying a sweep out: what is finished already is not repeated, and what ends is kept at once."""
+"""Carries out a sweep: finished runs are not repeated, and each result is stored at once."""
 
 import time
 from collections.abc import Callable, Iterator, Sequence
@@ -14,11 +14,11 @@ from sim.sweep.store import Store
 from sim.sweep.tasks import Task
 
 _PUBLISH_S: Final = 15.0
-"""The table for people is written anew this often while runs end."""
+"""The interval at which the table is written again while runs end."""
 
 
 class Workers(Protocol):
-    """What carries out runs: processes of this machine, or a cluster."""
+    """Carries out runs, in processes of this machine or on a cluster."""
 
     workers: int
 
@@ -36,7 +36,7 @@ class Progress:
 
 
 class SweepPlan:
-    """The runs of a sweep, and which of them are still to do."""
+    """The runs of a sweep, and which of them remain to be done."""
 
     def __init__(self, tasks: Sequence[Task], store: Store, *, retry: bool = False) -> None:
         self.tasks = tasks
@@ -46,7 +46,7 @@ class SweepPlan:
         self.guesses_s = {task.key: _guess_s(task) for task in self.todo}
 
     def seconds(self, workers: int) -> float:
-        """The time that it will take, about."""
+        """The estimated time that they will take."""
         return TimeLeft(self.guesses_s.values(), workers=workers).seconds()
 
 
@@ -67,9 +67,9 @@ def run(
     *,
     on_progress: Callable[[Progress], None] = lambda _: None,
 ) -> pa.Table:
-    """Carry out what is to do, the longest runs first and those in real time last, and return the table.
+    """Carry out the remaining runs, the longest first and those in real time last; returns the table.
 
-    However it ends, the table has been written with what is finished.
+    However it ends, the table with the finished runs has been written.
     """
     left = TimeLeft(plan.guesses_s.values(), workers=workers.workers)
     todo = sorted(plan.todo, key=lambda task: -plan.guesses_s[task.key])
@@ -98,7 +98,7 @@ def run(
 
 
 def _ended(todo: Sequence[Task], workers: Workers) -> Iterator[Finished]:
-    """What each task came to; runs in real time have the machine for themselves, one after the other."""
+    """The result of each task. Runs in real time have the machine to themselves, one after the other."""
     virtual = [task for task in todo if not task.realtime]
     if virtual:
         yield from workers.carry_out(virtual)

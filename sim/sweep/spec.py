@@ -34,12 +34,12 @@ from fanet_mw.errors import ConfigError
 from sim.sweep.toml_values import toml_value
 
 MOST_RUNS: Final = 100_000
-"""More runs than this are taken for a mistake in the file."""
+"""A file with more runs than this is taken for a mistake."""
 _Tree = Mapping[str, Any]
 
 
 def flattened(tree: object) -> object:
-    """Nested tables as dotted keys; a table is never a value of a scenario key."""
+    """Nested tables as dotted keys; the value of a scenario key is never a table."""
     if not isinstance(tree, Mapping):
         return tree
     flat: dict[str, Any] = {}
@@ -54,9 +54,9 @@ def flattened(tree: object) -> object:
 
 
 Changes = Annotated[dict[str, Any], BeforeValidator(flattened)]
-"""Scenario keys and the value of each."""
+"""Scenario keys, each with its value."""
 Axes = Annotated[dict[str, Annotated[list[Any], Field(min_length=1)]], BeforeValidator(flattened)]
-"""Scenario keys and the values that each takes in turn."""
+"""Scenario keys, each with the values that it takes in turn."""
 Seeds = Annotated[int, Field(ge=1, le=10_000)] | Annotated[list[Annotated[int, Field(ge=0)]], Field(min_length=1)]
 
 
@@ -65,17 +65,19 @@ class _Table(BaseModel):
 
 
 class Case(_Table):
-    """Settings with a name: what is drawn as one line of a figure, mostly."""
+    """Settings with a name, which are mostly drawn as one line of a figure."""
 
     name: Annotated[str, Field(min_length=1, max_length=64)]
     set: Changes = {}
     grid: Axes = {}
     realtime: bool = False
-    """True for runs as processes in real time: on this machine, one at a time, after all others."""
+    """True for runs as real processes: on this machine, one at a time, after all others."""
 
 
 class SweepVariant(_Table):
-    """What a variant of the sweep replaces: the seeds, single keys of `set`, single axes of the grid, the cases."""
+    """The parts of a sweep that a variant replaces: the seeds, single keys of `set`, single axes of the grid, the
+    cases.
+    """
 
     like: Literal["quick"] | None = None
     """The variant of which this one replaces what it names itself."""
@@ -83,23 +85,23 @@ class SweepVariant(_Table):
     set: Changes = {}
     grid: Axes = {}
     cases: Annotated[tuple[str, ...] | None, Field(min_length=1)] = None
-    """The names of the cases that are run; by default all."""
+    """The names of the cases that are run; all of them by default."""
 
 
 class Setting(_Table):
-    """One point of a sweep: the case it belongs to and every scenario key that differs from the base."""
+    """One combination of settings: its case, and all scenario keys that differ from the base."""
 
     case: str
     changes: dict[str, Any]
     realtime: bool = False
 
     def overrides(self) -> list[str]:
-        """The changes as `--set` wants them."""
+        """The changes in the form of `--set`."""
         return [f"{key}={toml_value(value)}" for key, value in self.changes.items()]
 
 
 class Sweep(_Table):
-    """A sweep as its file has it."""
+    """A sweep, as its file describes it."""
 
     description: str = ""
     base: str
@@ -109,12 +111,12 @@ class Sweep(_Table):
     grid: Axes = {}
     case: tuple[Case, ...] = ()
     measure: tuple[str, ...] = ()
-    """What is measured besides the summary; see `sim/sweep/measures.py`."""
+    """The measures that are taken in addition to the summary (`sim/sweep/measures.py`)."""
     quick: SweepVariant | None = None
     full: SweepVariant | None = None
 
     def variant(self, name: str | None) -> "Sweep":
-        """The sweep with what the variant replaces; None: as it stands."""
+        """The sweep with the changes of a variant; None: without any."""
         if name is None:
             return self
         chosen = getattr(self, name, None) if name in VARIANTS else None
@@ -140,17 +142,17 @@ class Sweep(_Table):
         )
 
     def seed_list(self) -> Sequence[int]:
-        """The seeds in order, each once."""
+        """The seeds in order, without repetitions."""
         return range(1, self.seeds + 1) if isinstance(self.seeds, int) else list(dict.fromkeys(self.seeds))
 
     def varied(self) -> list[str]:
-        """Every scenario key that an axis or a case sets, in order: the columns that tell runs apart."""
+        """All scenario keys that an axis or a case sets, in order: the columns by which runs are told apart."""
         keys = [key for case in self.case for key in case.set]
         keys += [key for grid in (self.grid, *(case.grid for case in self.case)) for key in grid]
         return list(dict.fromkeys(keys))
 
     def settings(self) -> Iterator[Setting]:
-        """Every point of the sweep; the last axis changes fastest."""
+        """All combinations of settings; the last axis changes fastest."""
         for case in self.case or (Case(name="-"),):
             axes = {**self.grid, **case.grid}
             for values in itertools.product(*axes.values()):
@@ -174,7 +176,7 @@ def shipped() -> list[str]:
 
 
 def find(name: str) -> Sweep:
-    """The sweep of a file (anything with a slash or ending in .toml), else the shipped one of that name."""
+    """The sweep in a file, if the name has a slash or ends in .toml; otherwise the shipped sweep of that name."""
     if not (name.endswith(".toml") or "/" in name):
         if name not in shipped():
             raise ConfigError(f"unknown sweep {name!r}; shipped: {', '.join(shipped())}; or give a .toml file")
@@ -191,7 +193,7 @@ def find(name: str) -> Sweep:
 
 
 def is_sweep(name: str) -> bool:
-    """True for a shipped sweep and for a file that has a `base`; a scenario has none."""
+    """True for a shipped sweep, and for a file with the key `base`, which scenarios do not have."""
     if not (name.endswith(".toml") or "/" in name):
         return name in shipped()
     try:

@@ -1,11 +1,11 @@
-"""The folder of a sweep: what every finished run came to, kept so that a crash loses only what was running.
+"""The folder of a sweep: the result of each finished run is stored at once, so a crash loses only the runs under way.
 
     DIR/finished/*.parquet   one row per finished run, under its key; each file is written whole, then renamed
     DIR/runs.parquet         the table for people: a row per run of the sweep, in its order, with settings and figures
 
-A finished run is found again by its key, which is made of its resolved scenario: a sweep that has grown, or another
-one in the same folder, repeats nothing. `runs.parquet` holds nothing that depends on the machine or on the order of
-runs: the same sweep by the same code is the same table.
+The key of a run is computed from its resolved scenario. If a sweep is extended, or another sweep uses the same folder,
+finished runs are therefore found and not repeated. `runs.parquet` has nothing that depends on the machine or on the
+order of the runs: the same sweep with the same code gives the same table.
 """
 
 import contextlib
@@ -33,11 +33,11 @@ _SCHEMA: Final = pa.schema(
     ]
 )  # fmt: skip
 _MERGE_AT: Final = 200
-"""So many files of single runs are made one: a folder of thousands is slow to read."""
+"""The number of files with single runs that are merged into one, because a folder with thousands is slow to read."""
 
 
 class Store:
-    """The finished runs of one folder."""
+    """The finished runs in one folder."""
 
     def __init__(self, folder: Path) -> None:
         self.folder = folder
@@ -47,7 +47,7 @@ class Store:
         self._next = 0
 
     def read(self) -> None:
-        """Read what earlier sweeps have finished here; what is half written is removed."""
+        """Read what earlier sweeps have finished here; half-written files are removed."""
         try:
             self._parts.mkdir(parents=True, exist_ok=True)
             for left in self._parts.glob("*.tmp"):
@@ -66,11 +66,11 @@ class Store:
         return self._finished.get(key)
 
     def codes(self) -> set[str]:
-        """Every code that made one of the rows."""
+        """The versions of the code that have produced the rows."""
         return {done.code for done in self._finished.values()}
 
     def add(self, done: Finished) -> None:
-        """Keep one more run; it is on disk when this returns."""
+        """Store the result of a run; it is on disk when this method returns."""
         self._finished[done.key] = done
         self._files.append(self._write([done]))
         if len(self._files) >= _MERGE_AT:
@@ -79,7 +79,8 @@ class Store:
     def _merge(self) -> None:
         old = self._files
         self._files = [self._write(self._finished.values())]
-        for path in old:  # the new file holds them all; if the process dies here, both say the same
+        # the new file has all of them; if the process dies here, a run is stored twice, which does no harm
+        for path in old:
             path.unlink()
 
     def _write(self, rows: Iterable[Finished]) -> Path:
@@ -97,7 +98,7 @@ class Store:
 
     @contextlib.contextmanager
     def alone(self) -> Iterator[None]:
-        """Keep other processes from writing here meanwhile; raises ConfigError when one does so already."""
+        """Lock the folder against other processes; raises ConfigError if another one has locked it."""
         try:
             self.folder.mkdir(parents=True, exist_ok=True)
             lock = os.open(self.folder / ".lock", os.O_CREAT | os.O_RDWR)
@@ -113,7 +114,7 @@ class Store:
 
 
 def write_whole(path: Path, table: pa.Table) -> None:
-    """Write a table so that the file is the whole of it or is not there, whenever the process or the machine dies."""
+    """Write a table so that the file is either complete or missing, even if the process or the machine dies."""
     with tempfile.NamedTemporaryFile(dir=path.parent, suffix=".tmp", delete=False) as file:
         fresh = Path(file.name)
         pq.write_table(table, file, compression="zstd")

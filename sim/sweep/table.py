@@ -1,7 +1,7 @@
-"""The table of a sweep: one row per run, with the settings that tell runs apart and every figure of the summary.
+"""The table of a sweep: one row per run, with the settings that distinguish the runs and all figures of the summary.
 
-Numbers of the summary are columns of floats, `delay_ms.p95` and the like; lists of numbers are lists; everything
-else of it is in the column `summary`, as JSON, and the resolved scenario in `scenario`.
+Each number of the summary is a column of floats, with names such as `delay_ms.p95`; lists of numbers are columns of
+lists. The whole summary is in the column `summary` as JSON, and the resolved scenario in `scenario`.
 """
 
 import json
@@ -17,7 +17,7 @@ from sim.sweep.toml_values import toml_value
 
 
 def table_of(rows: Sequence[tuple[Task, Finished]], varied: Sequence[str]) -> pa.Table:
-    """One row per task; `varied` are the scenario keys that get a column each."""
+    """One row per task; each of the scenario keys `varied` gets a column."""
     names: dict[str, None] = {}
     figures: list[Mapping[str, Any]] = []
     for _, done in rows:
@@ -43,7 +43,7 @@ def table_of(rows: Sequence[tuple[Task, Finished]], varied: Sequence[str]) -> pa
 
 
 def _settings(values: list[object]) -> pa.Array:
-    """A column of one type: numbers, texts or truths as they are; anything else, and mixtures, as TOML."""
+    """A column of one type if all values are numbers, texts or truth values; otherwise their TOML text."""
     kinds = {type(value) for value in values if value is not None}
     if kinds <= {bool} or kinds <= {int} or kinds <= {str}:
         return pa.array(values, type=None if kinds else pa.string())
@@ -54,7 +54,7 @@ def _settings(values: list[object]) -> pa.Array:
 
 def _figures(values: list[object]) -> pa.Array:
     kinds = {type(value) for value in values if value is not None}
-    if not kinds:  # a type would be a guess, and wrong beside other tables
+    if not kinds:  # any type would be a guess that may not fit other tables
         return pa.nulls(len(values))
     if kinds <= {bool}:
         return pa.array(values, pa.bool_())

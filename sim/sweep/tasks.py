@@ -1,4 +1,4 @@
-"""One run of a sweep: what to simulate, by which name it is kept, and the command that repeats it alone."""
+"""One run of a sweep: its scenario, the key under which its result is stored, and the command that repeats it."""
 
 import hashlib
 import json
@@ -16,22 +16,22 @@ from sim.sweep.spec import MOST_RUNS, Setting, Sweep
 
 @dataclass(frozen=True, slots=True)
 class Task:
-    """One run, as plain values that any process on any machine can be handed."""
+    """One run as plain values, which can be sent to any process on any machine."""
 
     key: str
-    """A hash of the resolved scenario and the measures: equal keys are equal runs."""
+    """A hash of the resolved scenario and of the measures: runs with equal keys are equal."""
     case: str
     seed: int
     tree: Mapping[str, Any]
-    """The resolved scenario, every default written out."""
+    """The resolved scenario, with all defaults."""
     measure: tuple[str, ...]
     command: str
-    """Repeats this run alone."""
+    """The command that repeats this run alone."""
     realtime: bool = False
-    """True for a run as processes in real time, which needs the machine for itself."""
+    """True for a run as real processes, which needs the machine to itself."""
 
     def value(self, key: str) -> object:
-        """The resolved value of a dotted scenario key; None where the scenario leaves it unset."""
+        """The resolved value of a dotted scenario key; None if the scenario leaves it unset."""
         at: object = self.tree
         for part in key.split("."):
             at = at.get(part) if isinstance(at, Mapping) else None
@@ -39,7 +39,7 @@ class Task:
 
 
 def tasks_of(sweep: Sweep) -> list[Task]:
-    """Every run of a sweep, each validated; raises ConfigError with the mistakes of all settings."""
+    """All runs of a sweep, validated; raises ConfigError with the mistakes of all settings."""
     if sweep.count() > MOST_RUNS:
         raise ConfigError(f"the sweep has more than {MOST_RUNS} runs")
     measures.check(sweep.measure)
@@ -65,7 +65,7 @@ def tasks_of(sweep: Sweep) -> list[Task]:
 
 
 def _first_of(settings: Sequence[str]) -> str:
-    """The first setting that has a mistake, and how many others have it too."""
+    """The first setting with a mistake, and the number of others that have it, too."""
     others = len(settings) - 1
     return f"{settings[0]}{f'; and in {others} other settings' if others else ''}"
 

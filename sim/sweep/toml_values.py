@@ -1,4 +1,4 @@
-"""Values as TOML text and back, as `--set KEY=VALUE` has them. `toml_value` and `config.one_value` are inverse."""
+"""Converts values to TOML text and back, as in `--set KEY=VALUE`. `toml_value` and `config.one_value` are inverse."""
 
 import json
 from collections.abc import Iterator, Mapping
@@ -11,14 +11,15 @@ _CLOSING = "]}"
 
 
 def toml_value(value: object) -> str:
-    """One value in one line of TOML."""
+    """A value as one line of TOML."""
     match value:
         case bool():
             return "true" if value else "false"
         case int() | float():
             return repr(value)
         case str():
-            return json.dumps(value, ensure_ascii=False).replace("\x7f", "\\u007f")  # TOML wants DEL escaped, JSON not
+            # TOML requires DEL to be escaped, JSON does not
+            return json.dumps(value, ensure_ascii=False).replace("\x7f", "\\u007f")
         case list() | tuple():
             return f"[{', '.join(toml_value(item) for item in value)}]"
         case Mapping():

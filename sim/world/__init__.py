@@ -1,1 +1,3 @@
-"""The world around a swarm: engines, obstacles, sight, survivors, and the world as an actor and a process."""
+"""The simulated world: engines that move bodies, obstacles, lines of sight, survivors, sensors, and the world as an
+actor.
+"""

@@ -8,7 +8,7 @@ from sim.world.world import WorldActor
 
 
 def run(scenario: Scenario, address: SwarmAddress, *, flight: SwarmFlight | None = None) -> int:
-    """Run the world against a router until the scenario is over, on from `flight` if given; raises BusError."""
+    """Run the world against a router until the scenario is over, from the state `flight` if given; raises BusError."""
     service.live(WorldActor(scenario, address.swarm, flight=flight), scenario, address)
     return 0
 

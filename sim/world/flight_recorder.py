@@ -1,7 +1,7 @@
-"""The last known flight of a swarm, from which a world that starts again goes on.
+"""Remembers the last known flight of a swarm, from which a world that is started again continues.
 
-The poses and setpoints are on the bus anyway. The launcher keeps the newest of each and hands them to the next world;
-what is not plausible is not kept, so that a world starts again as it did the first time rather than not at all.
+Poses and setpoints are on the bus anyway. The launcher remembers the newest ones, and hands them to the next world.
+Implausible ones are ignored, because it is better that a world starts from the beginning than not at all.
 """
 
 import threading
@@ -20,20 +20,20 @@ from sim.world.engines.contract import Rows
 from sim.world.mobility.guidance import makes_sense
 
 _FARTHEST: Final = 1e6
-"""Magnitude of a coordinate [m] or a velocity [m/s] that a swarm may have."""
+"""The greatest coordinate [m] or velocity [m/s] that counts as plausible."""
 
 
 class SwarmFlight(NamedTuple):
-    """The state of all bodies, in the order of their ids, and where they were sent."""
+    """The state of all bodies, in the order of their ids, and their setpoints."""
 
     positions: Rows
     velocities: Rows
     setpoints: Mapping[int, Setpoint]
-    """The last one of each node that had any."""
+    """The last setpoint of each node that has had one."""
 
 
 class FlightRecorder:
-    """Hears the poses and setpoints of a swarm; keeps the newest of each."""
+    """Receives the poses and setpoints of a swarm, and keeps the newest."""
 
     def __init__(self, scenario: Scenario, subscribe: Callable[[str, OnSample], None], names: Topics) -> None:
         self._ids = list(scenario.node_ids)
@@ -54,14 +54,14 @@ class FlightRecorder:
                 self._setpoints[node] = payload
 
     def last(self) -> SwarmFlight | None:
-        """The flight as last heard; None before the first poses, and when they are none of this swarm's."""
+        """The last known flight; None before the first poses, and if they do not belong to this swarm."""
         with self._lock:
             poses, setpoints = self._poses, dict(self._setpoints)
         heard = [message for message in _decoded(poses) if isinstance(message, Poses)]
         if not heard or list(heard[-1].ids) != self._ids or len(heard[-1].states) != 6 * len(self._ids):
             return None
         states = np.array(heard[-1].states, dtype=np.float64).reshape(-1, 6)
-        if not (np.abs(states) <= _FARTHEST).all():  # false for what is not a number, too
+        if not (np.abs(states) <= _FARTHEST).all():  # also false for NaN
             return None
         sent: dict[int, Setpoint] = {}
         for node in sorted(setpoints):

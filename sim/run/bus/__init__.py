@@ -1,1 +1,1 @@
-"""The bus of a swarm as its operator meets it: router, certificates, rights, running swarms, changes of the air."""
+"""The bus for a swarm's operator: router, certificates, rights, running swarms, and changes of the air."""

@@ -1,7 +1,7 @@
-"""`fanet air`: change the air of a running swarm, and confirm that the emulator has carried the change out.
+"""`fanet air`: changes the air of a running swarm, and confirms that the emulator has made the change.
 
-A change is one message on `fanet/<swarm>/radio/control`. The emulator's trace shows that it was carried out; silence
-means that it was refused (the emulator's report counts why) or that no emulator serves that swarm.
+A change is one message on `fanet/<swarm>/radio/control`. The emulator's trace shows that it was made. Silence means
+that it was refused (the emulator's report counts why), or that no emulator serves that swarm.
 """
 
 import threading
@@ -19,9 +19,9 @@ from fanet_mw.hosts.bus import Bus, config_of
 from fanet_mw.trace import RadioFault
 
 OPERATOR: Final = "operator"
-"""The name under which access lists know the commands of a person."""
+"""The name that access lists give to an operator's commands."""
 CONFIRM_TIMEOUT_S: Final = 5.0
-"""A confirmation is waited for so long; emulators publish their trace twice a second."""
+"""How long a confirmation is waited for; emulators publish their trace twice a second."""
 _DISCOVER_S: Final = 1.0
 
 
@@ -45,9 +45,9 @@ def find_swarm(bus: Bus) -> str:
 
 
 def change(endpoint: str, swarm: str | None, control: Control, *, zenoh_config: Path | None = None) -> list[RadioFault]:
-    """Send one change; returns what the emulator did about it.
+    """Send one change; returns what the emulator has done.
 
-    Raises BusError without a router, FanetError without a swarm or when the emulator does not confirm within
+    Raises BusError without a router, and FanetError without a swarm or if the emulator does not confirm within
     CONFIRM_TIMEOUT_S.
     """
     with Bus.join(endpoint, config_of(zenoh_config, OPERATOR)) as bus:

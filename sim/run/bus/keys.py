@@ -1,8 +1,8 @@
-"""`fanet keys`: certificates for every participant of a swarm, and the router's access list.
+"""`fanet keys`: makes certificates for all participants of a swarm, and the router's access list.
 
-Each participant gets one file of Zenoh's configuration that holds its certificate, its private key and the authority's
-certificate, so that it can be carried to the machine for which it is meant. The authority's own key is made in a
-temporary folder and not kept: no further certificate can be made for the swarm, only new keys for all.
+Each participant gets one Zenoh configuration file with its certificate, its private key and the authority's
+certificate, which can be carried to its machine. The authority's own key is made in a temporary folder and not kept. So
+nobody can make another certificate for the swarm; whoever needs one makes new keys for all.
 """
 
 import base64
@@ -43,7 +43,7 @@ def make(scenario: Scenario, out: Path, *, swarm: str, hosts: Iterable[str] = ()
 
 
 def _subject(host: str) -> str:
-    """A host in the form in which certificates name it."""
+    """The name or address of a host in the form that certificates use."""
     try:
         return f"IP:{ip_address(host)}"
     except ValueError:
@@ -60,7 +60,7 @@ class _CertificateAuthority:
         self._make("ca", "fanet-authority", ours)
 
     def settings(self, name: str, hosts: str) -> dict[str, Any]:
-        """Zenoh's settings of a participant, with a new key."""
+        """The Zenoh settings of a participant, with a new key."""
         self._make(
             name,
             name,

@@ -1,4 +1,6 @@
-"""`fanet router`: the bus and the swarm clock for services that are started one by one, and what they did, if asked."""
+"""`fanet router`: the bus and the swarm clock for services that are started one by one; on request it collects their
+results.
+"""
 
 import asyncio
 import contextlib
@@ -17,16 +19,16 @@ from sim.run.bus.running_swarms import registered
 ROUTER: Final = "router"
 """The name of the router's configuration in a folder of configurations."""
 _STOP_HEARD_S: Final = 0.3
-"""The time between telling services to stop and closing the bus on which they receive it."""
+"""The time from telling services to stop until the bus is closed over which they are told."""
 WORD_EVERY_S: Final = 5.0
-"""The interval at which the router says which participants are missing or there twice."""
+"""The interval at which the router says which participants are missing or present twice."""
 _LAST_WORDS_S: Final = 3.0
-"""The router waits so long for last reports after the end of the swarm's time."""
+"""How long the router waits for last reports after the end of the swarm's time."""
 Tell = Callable[[str], None]
 
 
 def expected_names(scenario: Scenario) -> list[str]:
-    """Names of all actors of a swarm."""
+    """The names of all actors of a swarm."""
     return ["emulator", "world", *(f"agent-{node}" for node in scenario.node_ids)]
 
 
@@ -51,7 +53,7 @@ async def serve(
         collection = None
         if out is not None:
             from sim.run.collecting.collection import (
-                Collection,  # the figures of a result need numpy, a router does not
+                Collection,  # only imported here, because the figures of a result need numpy and a router does not
             )
 
             collection = held.enter_context(Collection(scenario, bus, names, out))
@@ -66,7 +68,7 @@ async def serve(
             await asyncio.sleep(clock.wait_s(scenario.duration_ns) + 1)
             if collection is not None:
                 await collection.last_words(_LAST_WORDS_S)
-        finally:  # interrupted or not, no service goes on running on a bus that ends
+        finally:  # no service may go on running on a bus that ends
             teller.cancel()
             keeper.stop()
             time.sleep(_STOP_HEARD_S)  # noqa: ASYNC251  (nothing else runs here, and a cancelled task cannot await)
@@ -76,7 +78,7 @@ async def serve(
 
 
 async def _say_who_is_missing(keeper: ClockKeeper, tell: Tell) -> None:
-    """Say every few seconds which services are missing or there twice, before the start and during the run."""
+    """Say every few seconds which services are missing or present twice, before the start and during the run."""
     while True:
         await asyncio.sleep(WORD_EVERY_S)
         with contextlib.suppress(BusError):

@@ -1,8 +1,8 @@
-"""The swarms that run on this machine, one file for each, so that a command finds a swarm on a random port.
+"""The swarms that run on this machine, each in a file, so that a command finds a swarm with a random port.
 
-The files are in a folder of this user: `$XDG_RUNTIME_DIR/fanet-mw`, or `fanet-mw-UID` among the temporary files. A
-process that serves or uses a router writes one and removes it at its end; a file whose process is gone is removed by
-the next reader.
+The files are in a folder of this user: `$XDG_RUNTIME_DIR/fanet-mw`, or `fanet-mw-UID` in the folder for temporary
+files. A process that serves or uses a router writes a file and removes it at its end. A file whose process is gone is
+removed by the next reader.
 """
 
 import json
@@ -17,7 +17,8 @@ from fanet_mw.errors import FanetError
 
 DEFAULT_ENDPOINT: Final = "tcp/127.0.0.1:7447"
 _START_TIME: Final = 22 - 3
-"""Field of /proc/PID/stat (proc_pid_stat(5)), counted from the field after the command's closing parenthesis."""
+"""The index of a field of /proc/PID/stat (proc_pid_stat(5)), counted from the field after the command's closing
+parenthesis."""
 
 
 class Running(NamedTuple):
@@ -38,7 +39,7 @@ def _folder() -> Path:
 
 
 def _ours(folder: Path) -> bool:
-    """True if a folder belongs to this user alone; where all users may write, another may have made it."""
+    """True if a folder belongs to this user alone; another user may have made one where all may write."""
     try:
         status = folder.lstat()
     except OSError:
@@ -105,9 +106,9 @@ def _read(path: Path) -> Running | None:
 
 
 def locate(connect: str | None, swarm: str | None) -> tuple[str, str | None]:
-    """The endpoint and the name of the swarm that is meant: by endpoint, by name, or because no other runs here.
+    """The endpoint and the name of a swarm: given by endpoint, by name, or because no other swarm runs here.
 
-    The name is None when only the router knows it. Raises FanetError when several swarms could be meant.
+    The name is None if only the router knows it. Raises FanetError if several swarms fit.
     """
     if connect is not None:
         return connect, swarm

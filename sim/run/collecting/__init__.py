@@ -1,1 +1,3 @@
-"""What a run in real time collects from the bus: checked where it arrives, kept on disk, read again at the end."""
+"""Collects what the processes of a run in real time send over the bus: checks it, stores it on disk, reads it at the
+end.
+"""

@@ -1,9 +1,10 @@
-"""Checks of what a run's collector receives: the border between the bus and the metrics.
+"""Checks what the collector of a run receives: the border between the bus and the metrics.
 
     sender -> the kinds it may send -> the nodes and survivors it names (they exist) -> the instant (within the run)
 
-Each check returns a word for what is wrong, or None. Reports have shapes: the keys that metrics read, with types. Not
-modeled: authentication, which is for the router's access list (docs/how-to/security.md).
+Each check returns a word for what is wrong, or None. The reports of actors must have the keys that metrics read, with
+the right types. Not checked: who really sent a message, which is the task of the router's access list
+(docs/how-to/security.md).
 """
 
 import json
@@ -31,9 +32,9 @@ from fanet_mw.trace import (
 from fanet_mw.units import S
 
 _SLACK_NS: Final = 10 * S
-"""An instant may lie so far outside the scenario's time: processes start before it and end after it."""
+"""How far an instant may lie outside the scenario's time, because processes start before it and end after it."""
 _DEEPEST: Final = 6
-"""The most levels of nesting in a report's JSON."""
+"""The greatest depth of nesting in a report's JSON."""
 _MOST_RSSI_MDBM: Final = 400_000
 """The greatest magnitude of the mean RSSI of a link [1/1000 dBm]."""
 _SPEAKERS: Final[dict[type[Any], str | None]] = {
@@ -43,9 +44,10 @@ _SPEAKERS: Final[dict[type[Any], str | None]] = {
     RadioFault: "emulator",
     ProcessEnded: None,
 }
-"""The only actor that may send a kind of record; None: no actor may. All other kinds are sent by the node they name."""
+"""The only actor that may send each of these kinds of records; None if no actor may. All other kinds are sent by the
+node that they name."""
 _ABOUT_NOBODY: Final = (MissionModeChanged, Sighted)
-"""The kinds of record in which survivor 0 stands for none."""
+"""The kinds of records in which survivor 0 means none."""
 _ABOUT_NODES: Final = ("origin", "other", "reference")
 """The fields of records that name a node, or 0."""
 
@@ -62,7 +64,7 @@ class _Host(BaseModel):
 
 
 class _Checked(BaseModel):
-    """The keys that are read must be present; whatever else a report holds is kept."""
+    """The keys that are read must be present; all other keys of a report are kept."""
 
     model_config = ConfigDict(extra="allow", strict=True)
     final: bool = False
@@ -158,10 +160,10 @@ class BusChecks:
         self._survivors = scenario.mission.survivors
         self._until_ns = scenario.duration_ns + _SLACK_NS
         self.node_of: Mapping[str, int] = {"emulator": 0, "world": 0, **{f"agent-{n}": n for n in scenario.node_ids}}
-        """The node of each actor of the swarm, by the actor's name; 0 for an actor that is not a node."""
+        """The node of each actor of the swarm, by the actor's name; 0 for an actor that is no node."""
 
     def record(self, name: str, record: Record) -> str | None:
-        """What is wrong with a trace record that came from the actor of this name."""
+        """What is wrong with a trace record from the actor of this name; None if nothing is."""
         kind = type(record)
         if kind in _SPEAKERS:
             if _SPEAKERS[kind] != name:
@@ -180,7 +182,7 @@ class BusChecks:
         return None
 
     def tap(self, tap: MavlinkTap) -> str | None:
-        """What is wrong with telemetry; a log can hold only whole frames, stamped within the run."""
+        """What is wrong with a tap; only whole frames with an instant within the run can be logged."""
         if not 0 <= tap.t_ns <= self._until_ns:
             return "instant"
         try:
@@ -191,7 +193,7 @@ class BusChecks:
         return None
 
     def links(self, stats: LinkStats) -> str | None:
-        """What is wrong with a report of links."""
+        """What is wrong with a report of links; None if nothing is."""
         if not -_SLACK_NS <= stats.t_ns <= self._until_ns:
             return "instant"
         if any(not 1 <= node <= self._nodes for node in stats.ends):
@@ -202,7 +204,7 @@ class BusChecks:
         return None
 
     def report(self, name: str, text: str) -> tuple[dict[str, Any], str | None]:
-        """The content of a report, and what is wrong with it; if something is, the content is empty."""
+        """The content of a report, and what is wrong with it; in that case the content is empty."""
         try:
             content = json.loads(text)
         except (ValueError, RecursionError):

@@ -1,4 +1,4 @@
-"""The result of a swarm whose services were started one by one: what the router heard of them, as files."""
+"""The result of a swarm whose services were started one by one, collected by the router."""
 
 import asyncio
 import time
@@ -14,7 +14,7 @@ from sim.run.collecting.collector import Collector
 
 
 class Collection:
-    """Collects while the swarm runs, writes in the end."""
+    """Collects while the swarm runs, and writes the result at the end."""
 
     def __init__(self, scenario: Scenario, bus: Bus, names: Topics, out: Path) -> None:
         self._out = out
@@ -31,13 +31,13 @@ class Collection:
         self._collector.close()
 
     async def last_words(self, patience_s: float) -> None:
-        """Wait until everyone has sent its last report, or patience ends."""
+        """Wait until all actors have sent their last reports, but no longer than `patience_s`."""
         end_s = time.monotonic() + patience_s
         while self._collector.unfinished() and time.monotonic() < end_s:  # noqa: ASYNC110  (other threads fill it)
             await asyncio.sleep(0.05)
 
     def finish(self, *, epoch_unix_ns: int, ready_s: float) -> int:
-        """Write the result; 0 when it may be used, else 1."""
+        """Write the result; returns exit code 0 if it may be used, otherwise 1."""
         wall_s = time.monotonic() - self._began_s - ready_s
         outcome = self._collector.outcome(wall_s=wall_s, ready_s=ready_s, epoch_unix_ns=epoch_unix_ns)
         self.summary = finish(outcome, out=self._out)

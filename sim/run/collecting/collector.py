@@ -1,11 +1,11 @@
-"""What a run in real time collects from the bus: traces, reports, telemetry and link counts of the swarm's own actors.
+"""The collector of a run in real time: it receives the traces, reports, taps and link statistics of the swarm's actors.
 
     put -> from a known actor? -> within its allowance? -> decoded -> each item valid? -> spool on disk, or last report
-                                  whatever fails is counted by what was wrong, and goes no further
+                                  items that fail a check are counted by what was wrong, and dropped
 
-Memory holds the last valid report of each actor and the sums of the links, independently of the length of the run:
-trace records and telemetry go to temporary files and are read from there when the run is over. Puts of one actor that
-exceed its allowance are counted as `excess` before they are decoded: a flood costs neither time nor disk space.
+Only the last report of each actor and the sums of the links are in memory, so memory does not grow with the run: trace
+records and taps go to temporary files, and are read when the run is over. Puts with which an actor exceeds its
+allowance are counted as `excess` before they are decoded, so a flood of puts costs neither time nor disk space.
 """
 
 import threading
@@ -31,9 +31,10 @@ from sim.run.collecting.taps import encoded_tap, taps_of
 from sim.run.outcome import Outcome
 
 BURST_BYTES: Final = 16 << 20
-"""The bytes that one actor may put at once; ten hours of a UAV's trace in `rescue`."""
+"""The number of bytes that one actor may put at once; ten hours of a UAV's trace in `rescue`."""
 BYTES_PER_S: Final = 1 << 20
-"""The bytes per second that one actor may put for long; two hundred times what a UAV of `rescue` puts."""
+"""The number of bytes per second that one actor may put in the long run; two hundred times those of
+a UAV in `rescue`."""
 _LONGEST_WHY: Final = 120
 Subscribe = Callable[[str, OnSample], None]
 
@@ -45,10 +46,10 @@ class Allowance:
         self._burst = burst
         self._per_s = per_s
         self._left: dict[str, tuple[int, int]] = {}
-        """The bytes left of each name, and when that was."""
+        """The bytes left for each name, and the instant of that state."""
 
     def take(self, name: str, size: int, *, now_ns: int) -> bool:
-        """True if so many bytes of this name may pass now."""
+        """True if this many bytes of this name may pass now."""
         left, then_ns = self._left.get(name, (self._burst, now_ns))
         left = min(self._burst, left + (now_ns - then_ns) * self._per_s // S)
         fits = size <= left
@@ -57,7 +58,7 @@ class Allowance:
 
 
 class Collector:
-    """Collects from a swarm; `now_ns` is a monotonic clock, `folder` the place of temporary files."""
+    """Collects from one swarm. `now_ns` is a monotonic clock, `folder` the folder for temporary files."""
 
     def __init__(
         self, scenario: Scenario, subscribe: Subscribe, names: Topics, *, now_ns: Callable[[], int], folder: Path | None
@@ -96,7 +97,7 @@ class Collector:
         return hear
 
     def _hear(self, what: str, topic: str, payload: bytes, take: Callable[[str, Message], str | None]) -> str | None:
-        """Take in one put; returns what was wrong with it, or with the last of its items that were wrong."""
+        """Handle one put; returns what was wrong with it, or with the last of its items that were wrong."""
         last = topic.rpartition("/")[2]
         name = {"telemetry": f"agent-{last}", "links": "emulator"}.get(what, last)
         if name not in self._checks.node_of:
@@ -167,7 +168,7 @@ class Collector:
     def outcome(
         self, further: Iterable[Record] = (), *, wall_s: float, ready_s: float = 0.0, epoch_unix_ns: int = 0
     ) -> Outcome:
-        """The result of the run as far as it was heard, with some further records."""
+        """The result of the run as far as it was received, with some further records."""
         return Outcome(
             scenario=self._scenario,
             mode="realtime",
@@ -183,9 +184,9 @@ class Collector:
         )
 
     def records(self, further: Iterable[Record] = ()) -> Collection[Record]:
-        """All trace records and some further ones, by instant, node and kind; with true delays where clocks drift.
+        """All trace records and some further ones, sorted by instant, node and kind; with true delays if clocks drift.
 
-        They stay on disk, and stay readable when the collector is closed.
+        They remain on disk, and can be read after the collector is closed.
         """
         with self._lock:
             self._keep(further)
@@ -202,29 +203,29 @@ class Collector:
             return {name for name in self._checks.node_of if not self._reports.get(name, {}).get("final")}
 
     def absent(self) -> dict[str, str]:
-        """Why there is no report, by the actor's name."""
+        """Why a report is missing, by the actor's name."""
         with self._lock:
             missing = [name for name in self._checks.node_of if name not in self._reports]
             return {name: self._why_no_report.get(name, "no report was heard") for name in missing}
 
     def links(self) -> LinkTotals:
-        """What each link has carried."""
+        """The statistics of all links."""
         with self._lock:
             return self._links
 
     def taps(self) -> Collection[tuple[int, bytes]]:
-        """The telemetry of all UAVs, by instant; it stays on disk, too."""
+        """The taps of all UAVs, sorted by instant; they remain on disk, too."""
         with self._lock:
             return taps_of(self._taps)
 
     def figures(self) -> dict[str, Any]:
-        """The number of puts received, and of items refused (records, reports, taps), by what was wrong."""
+        """The number of puts received, and the number of items refused (records, reports, taps), by what was wrong."""
         with self._lock:
             why = dict(sorted(self._refused.items()))
             return {"puts": self._puts, "malformed": sum(why.values()), "why": why}
 
     def disk_failure(self) -> str | None:
-        """Why trace or telemetry is incomplete; None when both are complete."""
+        """Why the trace or the taps are incomplete; None if both are complete."""
         return self._records.failure or self._taps.failure
 
     def close(self) -> None:

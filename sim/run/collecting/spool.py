@@ -1,9 +1,10 @@
-"""A temporary file without a name for what a run collects, so that memory does not grow with the run.
+"""A temporary file to which a run writes items of bytes, so that its memory does not grow with the length of the run.
 
     file = (length, bytes)*
 
-Items that are appended together are written whole or not at all. A full disk ends the spool and not the run: what the
-spool has stays readable. The file is gone when it is closed, or when nothing refers to the spool any more.
+The file has no name. Items that are appended together are written whole or not at all. If the disk is full, the spool
+accepts no more items, but the run goes on, and the stored items can be read. The file is gone when the spool is closed,
+or when nothing refers to it any more.
 """
 
 import heapq
@@ -22,11 +23,11 @@ from fanet_mw.whole_file import batches
 _LENGTH: Final = struct.Struct("<I")
 _BLOCK_BYTES: Final = 1 << 18
 _SORTED_BYTES: Final = 1 << 23
-"""The bytes of items that are sorted in memory at once."""
+"""The number of bytes of items that are sorted in memory at once."""
 
 
 class Spool:
-    """Items of bytes, written during a run and read after it; raises ConfigError when no file can be made."""
+    """A temporary file of items, written during a run and read after it; raises ConfigError if no file can be made."""
 
     def __init__(self, folder: Path | None = None) -> None:
         try:
@@ -38,7 +39,7 @@ class Spool:
         self._write = os.pwrite
         self.folder = folder
         self.size = 0
-        """The bytes of the file that belong to whole items."""
+        """The length of the file, up to the end of its last complete item."""
         self.count = 0
         """The number of items."""
         self.failure: str | None = None
@@ -64,9 +65,9 @@ class Spool:
         return True
 
     def items(self, start: int = 0, end: int | None = None) -> Iterator[bytes]:
-        """The items in the order in which they were appended, or those between two sizes that the spool once had.
+        """The items in the order of their appending, or only those between two sizes that the spool has had.
 
-        They may be read repeatedly, and by several readers in turns.
+        They may be read repeatedly, and by several readers at the same time.
         """
         end = self.size if end is None else end
         unread, at, block = start, 0, b""
@@ -93,9 +94,9 @@ class Spool:
 def in_order(
     source: Spool, key: Callable[[bytes], Any], *, change: Callable[[bytes], bytes] = lambda item: item
 ) -> Spool | None:
-    """A new spool with the items in the order of their keys, or of their appending where keys are equal, each changed.
+    """A new spool with the items sorted by their keys (a stable sort), and `change` applied to each.
 
-    At most some megabytes of them are in memory at once. Returns None when the disk has no room for it.
+    Only some megabytes of them are in memory at once. Returns None if the disk has no room for it.
     """
     runs, ends = Spool(source.folder), [0]
     for portion in batches(source.items(), least_bytes=_SORTED_BYTES):

@@ -1,1 +1,1 @@
-"""A swarm as processes: what is started, how it is watched, what died, and how everything ends."""
+"""A swarm of real processes: how they are started, watched, restarted and ended."""

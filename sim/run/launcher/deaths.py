@@ -1,4 +1,4 @@
-"""The processes of a swarm that ended before their time, and which of them may be started again."""
+"""The processes of a swarm that ended too early, and which of them may be started again."""
 
 from collections import Counter
 from typing import Final
@@ -7,9 +7,9 @@ from fanet_mw.hosts.service import BUS_EXIT_CODE
 from fanet_mw.trace import ProcessEnded
 
 _MAX_LATE_STARTS: Final = 3
-"""A process that has found no router is started again so often before the swarm's time begins."""
+"""How often a process that has found no router may be started again before the swarm's time begins."""
 _MAX_RESPAWNS: Final = 5
-"""A process of one name is started again so often: one that cannot live is not started for ever."""
+"""How often a process may be started again, so that one that cannot live is not started for ever."""
 
 
 class Deaths:
@@ -19,14 +19,14 @@ class Deaths:
         self.ended: list[tuple[str, int]] = []
         """Name and exit code of each process that died, in order."""
         self.records: list[ProcessEnded] = []
-        """The same for the trace."""
+        """The same as trace records."""
         self._respawn = respawn
         self._respawns: Counter[str] = Counter()
         self._late_starts: Counter[str] = Counter()
 
     def grant_late_start(self, name: str, exit_code: int) -> bool:
-        """Grant another start, before the swarm's time begins, to a process that only found no router. False if it has
-        had them all.
+        """True if a process that has found no router may be started again before the swarm's time begins; False if it
+        has used all its starts.
         """
         if exit_code != BUS_EXIT_CODE or self._late_starts[name] >= _MAX_LATE_STARTS:
             return False
@@ -34,11 +34,11 @@ class Deaths:
         return True
 
     def note(self, name: str, exit_code: int, *, node: int, now_ns: int) -> None:
-        """A process died; `node`: of which UAV, 0 if it was the emulator or the world."""
+        """A process has died; `node` is its UAV, or 0 for the emulator and the world."""
         self.ended.append((name, exit_code))
         self.records.append(ProcessEnded(now_ns, node, name, exit_code))
 
     def grant_respawn(self, name: str) -> bool:
-        """Grant a process that has died another start; False if it is to stay dead."""
+        """True if a process that has died may be started again."""
         self._respawns[name] += 1
         return self._respawn and self._respawns[name] <= _MAX_RESPAWNS

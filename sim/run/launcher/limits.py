@@ -1,6 +1,6 @@
-"""The limits of the machine that a run in real time needs, checked before anything is started.
+"""Checks the limits of the machine (ulimit) that a run in real time needs, before anything is started.
 
-A limit that is too low would otherwise show as a traceback in the middle of a run: of a pipe, a thread or a mapping.
+A limit that is too low would otherwise show as a traceback in the middle of a run, about a pipe, a thread or a mapping.
 """
 
 import resource
@@ -9,9 +9,9 @@ from typing import Final
 from fanet_mw.errors import ConfigError
 
 _FILES: Final = 48
-"""The files that the launcher has open besides those of its children (29 measured)."""
+"""The number of files that the launcher has open, without those for its children (29 were measured)."""
 _FILES_PER_PROCESS: Final = 3
-"""The files per child: a sentinel, a pipe and a connection of the bus."""
+"""The number of files that the launcher needs for each child: a sentinel, a pipe and a connection of the bus."""
 _ADDRESS_SPACE_MIB: Final = 2048
 """The address space of each process; the launcher of 47 processes takes 1,440, mostly untouched memory."""
 

@@ -40,7 +40,7 @@ class ChildRecipe(NamedTuple):
 
 
 def _child(recipe: ChildRecipe) -> None:
-    """Run a child: its preparations, its work, its exit code."""
+    """Prepare a child process, do its work, and exit with its code."""
     signal.signal(signal.SIGINT, signal.SIG_IGN)
     signal.pthread_sigmask(signal.SIG_UNBLOCK, _BLOCKED)  # the launcher's SIGTERM ends it
     be_killed_with_parent()
@@ -57,11 +57,11 @@ def _child(recipe: ChildRecipe) -> None:
 
 
 def _keep_no_server_alive() -> None:
-    """Close this child's hold on the server, so that the server ends with the launcher and takes every child with it.
+    """Close this child's copy of the pipe that keeps the fork server alive.
 
-    The server lives until nobody holds the pipe that the launcher keeps open, and it hands each child a copy, so that
-    a child may start children too. No child of a swarm does. With the copy open, a launcher that is killed would leave
-    behind the server and each child that does not notice by itself.
+    The server lives until nobody holds that pipe, and it gives each child a copy, so that children could start
+    children, too. Children of a swarm do not. Without the copies, the server ends when the launcher ends, even if the
+    launcher is killed, and all children end with the server.
     """
     kept = forkserver._forkserver._forkserver_alive_fd  # type: ignore[attr-defined]  # noqa: SLF001
     if kept is not None:
@@ -70,14 +70,14 @@ def _keep_no_server_alive() -> None:
 
 
 def _give_way() -> None:
-    """Let processes that do not give way go first, and let a process of one's own kind finish its step before waking.
+    """Let processes of higher priority go first, and let another child finish its step before this one wakes up.
 
-    When the world tells their positions, all UAVs of a swarm become ready at one instant. Under `SCHED_BATCH` the one
-    that wakes does not interrupt the one that runs, so each does its short step with a warm cache.
+    When the world publishes positions, all UAVs of a swarm become ready at once. With `SCHED_BATCH` the one that wakes
+    up does not interrupt the one that runs, so each does its short step with a warm cache.
     """
     os.nice(_NICENESS)
     if sys.platform == "linux":
-        with contextlib.suppress(OSError):  # a container may forbid the call; the niceness alone serves too
+        with contextlib.suppress(OSError):  # a container may forbid it; the niceness helps, too
             os.sched_setscheduler(0, os.SCHED_BATCH, os.sched_param(0))
 
 

@@ -1,1 +1,1 @@
-"""What moves the bodies: one module per value of `world.engine` behind `contract.py`, and batteries."""
+"""Engines that move the bodies, one module per value of `world.engine`, all behind `contract.py`; and batteries."""

@@ -1,4 +1,4 @@
-"""Which bodies touch each other, told once for each contact; the ground, walls and hillsides are body 0."""
+"""Detects which bodies touch each other, once for each contact. The ground, walls and hillsides count as body 0."""
 
 from typing import Final
 
@@ -8,7 +8,7 @@ from sim.world.engines.contract import Rows
 from sim.world.environment.solids import Solids
 
 _CROWD: Final = 400
-"""Contacts between more bodies than this are not looked for, because the search is quadratic."""
+"""With more bodies than this, contacts between bodies are not detected, because the effort is quadratic."""
 
 
 class Contacts:
@@ -24,7 +24,7 @@ class Contacts:
         self._touching, self._new = frozenset(), []
 
     def notice(self, at: Rows) -> None:
-        """Look at all bodies, at [nodes, 3]."""
+        """Examine all bodies at their places [nodes, 3]."""
         gap = at[:, 2] if self._solids is None else self._solids.gap_m(at)
         now = {(0, int(i) + 1) for i in np.flatnonzero(gap <= self._radius_m)}
         if len(at) <= _CROWD:

@@ -1,6 +1,7 @@
-"""The contract of a world engine: velocities wanted go in, time passes, positions come out. ENU metres, numpy rows.
+"""The contract of a world engine: wanted velocities go in, time passes, positions come out. ENU metres, one row per
+node.
 
-Row i is node i + 1. The same calls give the same numbers. Engines know nothing of missions, sensors or topics.
+Row i is node i + 1. The same calls give the same results. Engines know nothing of missions, sensors or topics.
 """
 
 from abc import ABC, abstractmethod
@@ -16,17 +17,17 @@ Flags = npt.NDArray[np.bool_]
 
 
 class Engine(ABC):
-    """What moves the bodies of a swarm, and says where they are."""
+    """Moves the bodies of a swarm."""
 
     name: str
 
     @abstractmethod
     def reset(self, positions: Rows, velocities: Rows | None = None) -> None:
-        """Put every body at its position: at rest, or in flight."""
+        """Put all bodies at their positions, at rest or in flight."""
 
     @abstractmethod
     def advance(self, dt_s: float, wanted_m_s: Rows) -> None:
-        """Let `dt_s` pass while every body tries to fly at its wanted velocity."""
+        """Let `dt_s` pass, while each body tries to fly at its wanted velocity."""
 
     @abstractmethod
     def positions(self) -> Rows: ...
@@ -36,19 +37,23 @@ class Engine(ABC):
 
     @abstractmethod
     def fall(self, row: int) -> None:
-        """The motors of a body are off for good: it falls, whatever velocity is wanted of it."""
+        """Switch the motors of a body off for good: it falls, whatever velocity is wanted."""
 
     @abstractmethod
     def contacts(self) -> list[tuple[int, int]]:
-        """Pairs of nodes that began to touch since the last call, smaller id first; the ground and obstacles are 0."""
+        """Pairs of nodes that have begun to touch since the last call, the smaller id first; 0 stands for the ground
+        and obstacles.
+        """
 
     def blocked(self, first: Rows, second: Rows) -> Flags:
-        """True where an obstacle stands between `first` and `second` [n, 3]; bodies and the plain do not count."""
+        """True where an obstacle stands between `first` and `second` [n, 3]; bodies and the flat
+        ground do not count.
+        """
         return np.zeros(len(first), bool)
 
     def power_w(self) -> Values | None:
-        """What each body's battery gives now; None for an engine that knows no rotors."""
+        """The power that each battery delivers now; None for an engine without rotors."""
         return None
 
     def close(self) -> None:  # noqa: B027  (only physics holds anything)
-        """Give back what the engine holds."""
+        """Release the resources of the engine."""

@@ -1,8 +1,8 @@
-"""The batteries of a swarm: drained by what flying takes, empty in the end.
+"""The batteries of a swarm, which flight drains.
 
-An engine that knows rotors says what they take. For the others it is what steady flight at that airspeed and climb
-would take (`rotors/power.py`), by a table over both; acceleration costs them nothing. A UAV on the ground needs
-the avionics.
+An engine with rotors computes their power. For the other engines it is the power of steady flight at the same airspeed
+and climb rate (`rotors/power.py`), from a table over both; acceleration costs nothing. A UAV on the ground needs power
+for its avionics only.
 """
 
 from typing import Final
@@ -33,7 +33,7 @@ class Energy:
         self._table = power_table(self._vehicle)
 
     def pass_time(self, seconds: float, engine: Engine, flies: Flags) -> list[int]:
-        """Drain the batteries; returns the rows of which the battery is now empty and was not."""
+        """Drain the batteries; returns the rows whose battery has become empty."""
         power = engine.power_w()
         if power is None:
             power = self._steady_w(engine.velocities())

@@ -1,7 +1,7 @@
-"""A cheap engine: point masses with limited acceleration. For protocol work, where only distances matter.
+"""A cheap engine: point masses with limited acceleration, for work on protocols, where only distances matter.
 
-Does not model: attitude, drag, and gravity but for wrecks. Bodies are spheres of `RADIUS_M` that notice contact but
-do not bounce.
+Not modeled: attitude and drag; gravity only acts on crashed UAVs. Bodies are spheres of `RADIUS_M` whose contacts are
+detected, but which do not bounce.
 """
 
 from typing import Final
@@ -18,7 +18,7 @@ RADIUS_M: Final = 0.25
 
 
 class Kinematic(Engine):
-    """Velocity follows the wish as fast as the acceleration allows."""
+    """The velocity follows the wanted one as fast as the greatest acceleration allows."""
 
     name = "kinematic"
 
@@ -69,7 +69,7 @@ class Kinematic(Engine):
         return self._contacts.take()
 
     def _stop_at_walls(self, came_from: Rows, solids: Solids) -> None:
-        """Put a body that would be within something solid back where it came from, or on the ground, at rest."""
+        """Put a body that has entered something solid back to where it came from, or on the ground, at rest."""
         inside = solids.gap_m(self._at) <= 0
         if inside.any():
             self._at[inside] = came_from[inside]

@@ -1,9 +1,9 @@
 """Rigid bodies in pybullet: mass, gravity, drag, limited thrust, collisions between bodies and with the ground.
 
-Each multirotor is one rigid body under a thrust vector: the attitude loop, ten times faster than the velocity loop, is
-taken as ideal within the tilt limit. Not modelled: rotor dynamics, wind, ground effect, downwash.
+Each multirotor is a rigid body under a thrust vector. The attitude loop, ten times faster than the velocity loop, is
+taken as ideal within the tilt limit. Not modeled: rotor dynamics, wind, ground effect, downwash.
 
-pybullet keeps an external force over the substeps of one step, so thrust is renewed at 60 Hz while contact and motion
+Pybullet keeps an external force over the substeps of one step, so the thrust is set at 60 Hz while contacts and motion
 are solved at `physics_hz`.
 """
 
@@ -23,12 +23,13 @@ _GRAVITY: Final = 9.81
 _MAX_THRUST_N: Final = 2.0 * MASS_KG * _GRAVITY
 _MAX_TILT: Final = math.radians(35)
 _DRAG_N_S_M: Final = 0.25
-"""Linear drag: 15 m/s costs a quarter of the weight, as for a small quadrotor."""
+"""Linear drag; at 15 m/s it is a quarter of the weight, as for a small quadrotor."""
 _GAIN: Final = 2.5
-"""Velocity loop [1/s]."""
+"""The gain of the velocity loop [1/s]."""
 _CONTROL_HZ: Final = 60
 _OBSTACLE_GROUP: Final = 64
-"""Collision group of hills and buildings: they meet bodies, not the plain nor each other; rays ask for them alone."""
+"""The collision group of hills and buildings: they collide with bodies, but not with the ground or each other. Rays
+only test this group."""
 _BODY_GROUP: Final = 1
 
 
@@ -81,7 +82,7 @@ class Physics(Engine):
         self._touching, self._new, self._wrecks, self._left_s = frozenset(), [], [], 0.0
 
     def _build(self) -> list[int]:
-        """Put hills and buildings where they belong; returns their bodies."""
+        """Place hills and buildings; returns their bodies."""
         if self._obstacles is None:
             return []
         client, bodies = self._client, []
@@ -101,7 +102,7 @@ class Physics(Engine):
         return bodies
 
     def _raise_hills(self, hills: Hills) -> int:
-        """A height field; pybullet centers it between its lowest and its highest point."""
+        """A height field, which pybullet centers between its lowest and its highest point."""
         side = hills.heights.shape[0]
         shape = pybullet.createCollisionShape(
             pybullet.GEOM_HEIGHTFIELD, meshScale=[hills.cell_m, hills.cell_m, 1.0],

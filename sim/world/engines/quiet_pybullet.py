@@ -1,4 +1,6 @@
-"""pybullet, imported in silence: it writes when it was built to standard error, in the middle of what others write."""
+"""Imports pybullet silently; it would otherwise print its build time on standard error, between the
+output of others.
+"""
 
 import os
 from collections.abc import Iterator
@@ -9,10 +11,10 @@ _STDERR = 2
 
 @contextmanager
 def _silence() -> Iterator[None]:
-    """Send what C code writes to standard error nowhere."""
+    """Discard what C code writes to standard error."""
     try:
         kept = os.dup(_STDERR)
-    except OSError:  # it is closed: nothing to silence
+    except OSError:  # standard error is closed
         yield
         return
     nowhere = os.open(os.devnull, os.O_WRONLY)

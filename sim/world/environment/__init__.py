@@ -1,1 +1,1 @@
-"""What stands in the world and blows through it: hills, buildings, rays against them, survivors, wind."""
+"""The surroundings of a swarm: hills, buildings, rays against them, survivors, and wind."""

@@ -1,9 +1,10 @@
 """Buildings from a GeoJSON file (RFC 7946), as OpenStreetMap tools export them.
 
-Each Polygon, and each part of a MultiPolygon, becomes an upright box: the smallest rectangle about its outer ring. Its
-height is the property `height` [m], or else `building:levels` (or `levels`) times 3 m, or else the middle of
-`world.building_height_m`. Longitude and latitude become east and north of `world.origin_deg`; unset, of the middle of
-all the buildings. Other geometries are not buildings. Not modeled: courtyards, roofs that are not flat.
+Each Polygon, and each part of a MultiPolygon, becomes an upright box: the smallest rectangle around its outer ring. Its
+height is the property `height` [m]; if that is missing, `building:levels` (or `levels`) times 3 m; if that is missing,
+too, the middle of `world.building_height_m`. Longitude and latitude are converted to east and north of
+`world.origin_deg`, or of the middle of all buildings if that is unset. Other geometries are ignored. Not modeled:
+courtyards, and roofs that are not flat.
 """
 
 import json
@@ -25,7 +26,7 @@ _HIGHEST_M: Final = 2000.0
 
 
 class Footprint(NamedTuple):
-    """One building: the middle of its rectangle, its sides, how it is turned, and its height above the ground."""
+    """One building: the middle of its rectangle, its sides, its rotation, and its height above ground."""
 
     east: float
     north: float
@@ -36,7 +37,7 @@ class Footprint(NamedTuple):
 
 
 def read(path: Path, *, origin_deg: tuple[float, float] | None, height_m: float) -> list[Footprint]:
-    """The buildings of a file; raises ConfigError by name."""
+    """The buildings in a file; raises ConfigError with the name of the file."""
     data = content(path, key="world.buildings_geojson")
     try:
         tree = json.loads(data.decode("utf-8"))
@@ -93,7 +94,9 @@ def _plane(ring: Rows, origin: Geodetic) -> Rows:
 
 
 def _rectangle(ring: Rows, height: float) -> Footprint:
-    """The smallest rectangle about a ring has a side along one of the ring's hull (Freeman and Shapira, 1975)."""
+    """The smallest rectangle around a ring; one of its sides lies along a side of the ring's hull (Freeman and Shapira,
+    1975).
+    """
     edges = np.diff(ring, axis=0)
     angles = np.unique(np.round(np.arctan2(edges[:, 1], edges[:, 0]) % (math.pi / 2), 9))
     best: tuple[float, Footprint] | None = None

@@ -1,9 +1,9 @@
-"""Heights of the ground from a file: an ASCII grid (`.asc`), or a grayscale picture (`.png`).
+"""Reads heights of the ground from a file: an ASCII grid (`.asc`), or a grayscale picture (`.png`).
 
-An ASCII grid (Esri; GDAL's AAIGrid) has a header of `ncols`, `nrows`, `cellsize` and others, then one line of
-heights in metres per row, the northernmost first. A picture is grayscale of 8 or 16 bits without interlace: black is
-0, white is `world.heightmap_white_m`, a pixel is `world.heightmap_pixel_m` wide. Whatever the file says of its place
-on earth, its middle is put at the origin and its lowest point at 0.
+An ASCII grid (Esri; GDAL's AAIGrid) has a header with `ncols`, `nrows`, `cellsize` and others, then one line of heights
+in metres for each row, the northernmost first. A picture is grayscale with 8 or 16 bits, without interlacing: black is
+0, white is `world.heightmap_white_m`, and a pixel is `world.heightmap_pixel_m` wide. Whatever the file says about its
+place on earth, its middle is put at the origin and its lowest point at height 0.
 """
 
 import struct
@@ -25,7 +25,9 @@ _HEADER: Final = ("ncols", "nrows", "xllcorner", "yllcorner", "xllcenter", "yllc
 
 
 def read(path: Path, *, white_m: float, pixel_m: float) -> tuple[Rows, float]:
-    """Heights, the southernmost row first, and the distance of neighboring points [m]; raises ConfigError by name."""
+    """Heights, the southernmost row first, and the distance of neighboring points [m]; raises ConfigError with the
+    file's name.
+    """
     data = content(path, key="world.heightmap")
     try:
         if data.startswith(_SIGNATURE):
@@ -42,7 +44,7 @@ def read(path: Path, *, white_m: float, pixel_m: float) -> tuple[Rows, float]:
 
 
 def sample(heights: Rows, cell_m: float, east: Values, north: Values) -> Values:
-    """Heights at places, by bilinear interpolation; the edge's beyond the edge."""
+    """Heights at some places by bilinear interpolation; outside of the grid those of its edge."""
     rows, columns = heights.shape
     x = np.clip(east / cell_m + (columns - 1) / 2, 0, columns - 1 - 1e-9)
     y = np.clip(north / cell_m + (rows - 1) / 2, 0, rows - 1 - 1e-9)
@@ -104,7 +106,7 @@ def _png(data: bytes) -> Rows:
 
 
 def _unfiltered(kind: int, line: Bytes, above: Bytes, step: int) -> Bytes:
-    """One line of bytes, its filter undone."""
+    """One line of bytes without its PNG filter."""
     if kind == 0:
         return line
     if kind == 2:

@@ -1,8 +1,8 @@
-"""Line of sight between nodes: which pairs that could hear each other have something solid between them.
+"""Finds out which pairs of nodes have something solid between them.
 
-Only pairs within the radio's reach are asked for, and only those of which one end is below the highest obstacle: above
-it nothing can stand in the way. Not modeled: diffraction over an edge, the Fresnel zone, how thick an obstacle is;
-survivors' phones, which are heard through walls.
+Only pairs within the radio's reach are examined, and only if one end is below the highest obstacle. Not modeled:
+diffraction over an edge, the Fresnel zone, and the thickness of an obstacle. Survivors' phones are not examined,
+because they can be received through walls.
 """
 
 from array import array
@@ -17,7 +17,7 @@ from sim.world.engines.contract import Engine, Rows
 
 
 class Sight:
-    """The lines of sight between bodies, as the engine sees them."""
+    """The lines of sight between bodies, by the rays of the engine."""
 
     def __init__(self, scenario: Scenario, engine: Engine, *, top_m: float) -> None:
         self._reach_m = reach_m(scenario.radio)

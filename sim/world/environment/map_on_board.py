@@ -1,4 +1,4 @@
-"""The map that UAVs carry in a scenario: its hills, and the share of its buildings that is known before the flight."""
+"""The map that UAVs carry: the hills of the scenario, and those buildings that are known before the flight."""
 
 import numpy as np
 
@@ -10,7 +10,7 @@ from sim.world.mobility.layout import positions
 
 
 def map_on_board(scenario: Scenario) -> OnboardMap:
-    """The map; which buildings are missing from it is drawn by the seed."""
+    """The map; the seed decides which buildings are missing from it."""
     if not scenario.world.has_obstacles:
         return NO_MAP
     hills, boxes = obstacles(scenario, np.array(positions(scenario), dtype=np.float64))

@@ -1,9 +1,9 @@
-"""What stands in the world: hills and buildings, from the scenario and its seed. ENU metres; no physics here.
+"""The hills and buildings of a world, from the scenario and its seed. ENU metres; no physics here.
 
-Seeded hills are a sum of a few cosine waves, scaled to [0, `terrain_m`]. Buildings are upright boxes from the plain
-at 0 to their height above the ground at their middle; seeded ones are aligned with the axes and keep clear of every
-start. Both may come from files instead (`heightmap.py`, `footprints.py`). Not modeled: streets, bridges, trees,
-anything with a hole.
+Random hills are a sum of a few cosine waves, scaled to [0, `terrain_m`]. Buildings are upright boxes, which extend from
+0 to their height above the ground at their middle. Random buildings are aligned with the axes, and keep clear of all
+starts. Hills and buildings may come from files instead (`heightmap.py`, `footprints.py`). Not modeled: streets,
+bridges, trees, and anything with a hole.
 """
 
 import math
@@ -21,12 +21,12 @@ from sim.world.engines.contract import Rows
 from sim.world.environment import footprints, heightmap
 
 _CLEAR_M: Final = 5.0
-"""Distance between a seeded building and a UAV at its start."""
+"""The least distance between a random building and a UAV at its start."""
 _TRIES: Final = 200
 _CELLS: Final = 96
-"""Grid cells of the hills per side, at most."""
+"""The greatest number of grid cells of the hills per side."""
 _FILE_CELLS: Final = 255
-"""The same for hills from a file: pybullet takes no more."""
+"""The same for hills from a file; pybullet accepts no more."""
 _WAVES: Final = 8
 
 
@@ -39,10 +39,10 @@ class Box(NamedTuple):
     depth: float
     roof: float
     yaw: float = 0.0
-    """Angle by which it is turned, from east to north [rad]."""
+    """The angle by which it is rotated, from east towards north [rad]."""
 
     def near(self, places: Rows, *, margin_m: float) -> bool:
-        """True if any place is within the box, or closer to it than the margin."""
+        """True if any of these places is inside the box, or closer to it than the margin."""
         east, north = places[:, 0] - self.east, places[:, 1] - self.north
         along = math.cos(self.yaw) * east + math.sin(self.yaw) * north
         across = math.cos(self.yaw) * north - math.sin(self.yaw) * east
@@ -69,20 +69,20 @@ class Hills(NamedTuple):
 
 
 class Obstacles(NamedTuple):
-    """Everything solid but the plain."""
+    """All obstacles; the flat ground is none."""
 
     hills: Hills | None
     boxes: tuple[Box, ...]
 
     @property
     def top_m(self) -> float:
-        """No obstacle reaches higher."""
+        """The height of the highest obstacle."""
         hill = float(self.hills.heights.max()) if self.hills else 0.0
         return max([hill, *(box.roof for box in self.boxes)])
 
 
 def terrain(scenario: Scenario) -> Hills | None:
-    """The hills of a scenario, from its file or its seed; None for a plain."""
+    """The hills of a scenario, from its file or its seed; None if the ground is flat."""
     world = scenario.world
     if world.heightmap:
         return _hills_of_file(scenario)
@@ -90,7 +90,7 @@ def terrain(scenario: Scenario) -> Hills | None:
 
 
 def obstacles(scenario: Scenario, starts: Rows) -> Obstacles:
-    """The obstacles of a scenario whose UAVs start at `starts` [nodes, 3]; ConfigError when one is in the way."""
+    """The obstacles of a scenario whose UAVs start at `starts` [nodes, 3]; raises ConfigError if one is in the way."""
     world = scenario.world
     hills = terrain(scenario)
     if hills is not None:
@@ -116,7 +116,7 @@ def obstacles(scenario: Scenario, starts: Rows) -> Obstacles:
 
 
 def _of_file(world: World, hills: Hills | None, starts: Rows) -> Iterator[Box]:
-    """Buildings of the scenario's GeoJSON file of which the middle lies in the area."""
+    """The buildings of the scenario's GeoJSON file whose middle lies in the area."""
     height_m = sum(world.building_height_m) / 2
     found = footprints.read(Path(world.buildings_geojson), origin_deg=world.origin_deg, height_m=height_m)
     inside = [b for b in found if max(abs(b.east), abs(b.north)) <= world.area_m / 2]
@@ -135,7 +135,7 @@ def _of_file(world: World, hills: Hills | None, starts: Rows) -> Iterator[Box]:
 
 
 def _hills_of_file(scenario: Scenario) -> Hills:
-    """The file's heights on a square grid over the area; beyond the file its edge goes on."""
+    """The heights of the file on a square grid over the area; outside of the file its edge continues."""
     world = scenario.world
     heights, cell_m = heightmap.read(
         Path(world.heightmap), white_m=world.heightmap_white_m, pixel_m=world.heightmap_pixel_m

@@ -1,7 +1,7 @@
-"""Rays against what stands in the world, in numpy: for sensors, and for engines that know no obstacles themselves.
+"""Rays against hills and buildings, in numpy: for sensors, and for engines that know no obstacles themselves.
 
-Buildings are upright boxes that may be turned about the vertical, hills a grid of heights with planes bent between
-its points (bilinear). The plain at height 0 is none of them and stops no ray.
+Buildings are upright boxes, which may be rotated about the vertical. Hills are a grid of heights with bilinear
+interpolation. The flat ground at height 0 is not among them and stops no ray.
 """
 
 import math
@@ -13,12 +13,12 @@ from sim.world.engines.contract import Flags, Rows, Values
 from sim.world.environment.obstacles import Obstacles
 
 _STEPS_PER_CELL: Final = 2
-"""Samples of a ray over hills for each cell of their grid that it crosses."""
+"""The number of samples of a ray over hills, for each cell of their grid that it crosses."""
 _MOST_STEPS: Final = 2000
 
 
 class Solids:
-    """The hills and buildings of a world, as bodies cannot pass them."""
+    """The hills and buildings of a world, as obstacles to bodies and rays."""
 
     def __init__(self, obstacles: Obstacles | None) -> None:
         boxes = obstacles.boxes if obstacles else ()
@@ -50,7 +50,9 @@ class Solids:
         return np.asarray(low * (1 - v) + high * v)
 
     def surface_m(self, at: Rows) -> Values:
-        """Height of what is straight below each place [n, 3]: a roof, or the ground; the roof's, too, from inside."""
+        """The height of the surface straight below each place [n, 3]: a roof or the ground. For a place inside a
+        building it is the roof.
+        """
         surface = self.ground_m(at)
         if len(self._middle):
             inside = (np.abs(self._local(at)[..., :2]) <= self._half[None, :, :2]).all(axis=2)
@@ -59,7 +61,9 @@ class Solids:
         return surface
 
     def gap_m(self, at: Rows) -> Values:
-        """Distance from each place [n, 3] to the nearest wall, roof, hillside or plain; negative in the ground."""
+        """The distance from each place [n, 3] to the nearest wall, roof, hillside or flat ground; negative below the
+        ground.
+        """
         gap: Values = at[:, 2] - self.ground_m(at)
         if len(self._middle):
             out = np.maximum(np.abs(self._local(at)) - self._half[None], 0.0)
@@ -74,7 +78,9 @@ class Solids:
         return np.asarray(self.first_hit_m(first, direction, length) < length)
 
     def first_hit_m(self, origin: Rows, direction: Rows, range_m: Values | float) -> Values:
-        """The distance at which each ray [n, 3] of unit direction meets something; inf: nothing within its range."""
+        """The distance at which each ray [n, 3] of unit direction hits something; infinite if nothing is within its
+        range.
+        """
         reach = np.broadcast_to(np.asarray(range_m, dtype=np.float64), (len(origin),))
         hit = np.full(len(origin), math.inf)
         if len(origin) == 0:
@@ -97,7 +103,9 @@ class Solids:
         return np.stack([along, across, vectors[..., 2]], axis=-1)
 
     def _boxes_hit_m(self, origin: Rows, direction: Rows, reach: Values) -> Values:
-        """Slab method: a ray is within a box where it is within all three pairs of planes (Kay and Kajiya, 1986)."""
+        """The slab method: a ray is inside a box where it is between the planes of all three pairs (Kay and Kajiya,
+        1986).
+        """
         middle = origin[:, :2] + direction[:, :2] * (reach / 2)[:, None]
         span = reach / 2 * np.linalg.norm(direction[:, :2], axis=1)
         apart = np.linalg.norm(middle[:, None] - self._middle[None, :, :2], axis=2)
@@ -122,7 +130,7 @@ class Solids:
         return hit
 
     def _hills_hit_m(self, origin: Rows, direction: Rows, reach: Values) -> Values:
-        """Samples along each ray; where one is below ground, the crossing is taken to lie on the line between two."""
+        """Sample each ray; where a sample is below ground, the hit is interpolated between it and the sample before."""
         assert self._hills is not None, "only hills are sampled"
         hit = np.full(len(origin), math.inf)
         lowest = np.minimum(origin[:, 2], origin[:, 2] + direction[:, 2] * reach)

@@ -18,7 +18,7 @@ _TRIES: Final = 200
 
 
 def place(scenario: Scenario) -> list[Enu]:
-    """The true positions, on the plain: as listed, uniform over the open area, or over the floors of its buildings."""
+    """The true positions, on flat ground: as listed, uniform over the open area, or over the floors of buildings."""
     mission = scenario.mission
     if mission.survivor_positions_m:
         return [Enu(east, north, 0.0) for east, north in mission.survivor_positions_m]
@@ -30,7 +30,7 @@ def place(scenario: Scenario) -> list[Enu]:
 
 
 def _in_the_open(random: Random, half_m: float, boxes: Sequence[Box]) -> Enu:
-    """A place that no building stands on; any place where buildings are everywhere."""
+    """A place outside of all buildings; any place if buildings are everywhere."""
     for _ in range(_TRIES):
         at = Enu(random.uniform(-half_m, half_m), random.uniform(-half_m, half_m), 0.0)
         if not any(box.near(np.array([at]), margin_m=0.0) for box in boxes):
@@ -43,7 +43,7 @@ def _boxes(scenario: Scenario) -> Sequence[Box]:
 
 
 def _in_buildings(scenario: Scenario, random: Random) -> list[Enu]:
-    """A building for each, larger ones more often, and a place within it."""
+    """A building for each survivor, larger ones with greater probability, and a place inside it."""
     boxes = _boxes(scenario)
     chosen = random.choices(boxes, weights=[box.width * box.depth for box in boxes], k=scenario.mission.survivors)
     places = []
@@ -60,10 +60,10 @@ class Survivors:
     places: Rows
     """Positions, on the ground."""
     buried: Flags
-    """The survivors under rubble: a phone and a voice come through it weakened, nothing is seen."""
+    """The survivors under rubble: their phones and voices are weaker outside, and cameras do not see them."""
 
     def __init__(self, scenario: Scenario, ground_m: Callable[[Rows], Values] | None = None) -> None:
-        """`ground_m`: heights of the ground at places [n, 3]; None: a plain at 0."""
+        """`ground_m` gives the height of the ground at places [n, 3]; None means flat ground at 0."""
         count = scenario.mission.survivors
         self.places = np.array(place(scenario), dtype=np.float64).reshape(-1, 3)
         if ground_m is not None and count:

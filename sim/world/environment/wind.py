@@ -1,14 +1,14 @@
-"""Wind: a mean that is the same everywhere, and gusts by the Dryden model, each UAV's its own.
+"""Wind: a mean that is the same everywhere, and gusts by the Dryden model, independent for each UAV.
 
     sigma_w = 0.1 W20        sigma_u = sigma_v = sigma_w / (0.177 + 0.000823 h)^0.4
     L_w = h                  L_u = L_v = h / (0.177 + 0.000823 h)^1.2                     h: height in feet, 10 to 1000
     u:    sigma sqrt(2 tau / pi) / (1 + tau s)                           tau = L / V, V: airspeed
     v, w: sigma sqrt(tau / pi) (1 + sqrt(3) tau s) / (1 + tau s)^2
 
-MIL-F-8785C (1980), 3.7.2, for low altitudes; W20 is the wind 20 feet above the ground. u is along the mean wind, w
-is upwards. Both filters are advanced exactly, whatever the step: u as an autoregression of first order, v and w as
-two states in line whose covariance over a step is known in closed form. Not modeled: gusts that one UAV meets after
-another, wind behind buildings and over hills, how the mean grows with height.
+The formulas are those of MIL-F-8785C (1980), 3.7.2, for low altitudes; W20 is the wind 20 feet above ground. u is along
+the mean wind, w is upwards. Both filters are advanced exactly for a step of any length: u is an autoregression of first
+order; v and w have two states each, whose covariance over a step is known in closed form. Not modeled: gusts that one
+UAV meets after another, wind behind buildings and over hills, and a mean that grows with height.
 """
 
 import math
@@ -43,7 +43,7 @@ def _feet(height_m: Values) -> Values:
 
 
 class Wind:
-    """The air's velocity at each UAV."""
+    """The velocity of the air at each UAV."""
 
     def __init__(
         self, random: np.random.Generator, count: int, *, mean_m_s: tuple[float, float], w20_m_s: float
@@ -60,7 +60,7 @@ class Wind:
         self._state[:, [2, 4]] = 0.5 * self._state[:, [1, 3]] + math.sqrt(0.125) * random.normal(0, 1, (count, 2))
 
     def advance(self, dt_s: float, at: Rows, velocity: Rows) -> Rows:
-        """The wind after `dt_s` at places `at`, for bodies that fly at `velocity` [n, 3]."""
+        """The wind after `dt_s` at the places `at`, for bodies that fly at `velocity` [n, 3]."""
         if not self._w20:
             return np.broadcast_to(self._mean, at.shape)
         airspeed = np.maximum(np.linalg.norm(velocity - self._mean, axis=1), _LEAST_AIRSPEED_M_S)

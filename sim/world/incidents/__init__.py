@@ -1,1 +1,3 @@
-"""What should not happen in flight and is counted: UAVs that come too near to each other, UAVs in no-fly areas."""
+"""Incidents of a flight, which are counted: contacts, UAVs that come too near to each other,
+entries into no-fly areas.
+"""

@@ -1,4 +1,4 @@
-"""What should not happen in flight and is counted: contacts, losses of separation, entries into no-fly areas."""
+"""Counts the incidents of a run: contacts, losses of separation, and entries into no-fly areas."""
 
 from fanet_mw.scenario import Scenario
 from sim.world.engines.contract import Rows
@@ -10,7 +10,7 @@ class Incidents:
     """The incidents of one run."""
 
     def __init__(self, scenario: Scenario, starts: Rows) -> None:
-        """Raises ConfigError when a UAV would start in a no-fly area."""
+        """Raises ConfigError if a UAV would start in a no-fly area."""
         self.collisions = 0
         self.no_fly = NoFly(scenario.world.no_fly_m, starts)
         self.separation = Separation(scenario.mission.collision_distance_m)

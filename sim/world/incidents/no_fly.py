@@ -1,4 +1,6 @@
-"""Counts how often UAVs enter areas that they may not enter. The UAVs themselves are to keep out of them."""
+"""Counts how often UAVs enter no-fly areas. The world does not keep them out; that is the task of
+the UAVs themselves.
+"""
 
 from collections.abc import Sequence
 
@@ -12,7 +14,7 @@ class NoFly:
     """Upright cylinders without a top."""
 
     def __init__(self, areas: Sequence[tuple[float, float, float]], starts: Rows) -> None:
-        """Areas as (east, north, radius) [m]; raises ConfigError when a UAV would start in one."""
+        """`areas`: (east, north, radius) [m]; raises ConfigError if a UAV would start in one."""
         self._areas = np.array(areas, dtype=np.float64).reshape(-1, 3)
         self._within = np.zeros((len(starts), len(self._areas)), bool)
         self.entries = 0
@@ -22,7 +24,7 @@ class NoFly:
             raise ConfigError(f"world.no_fly_m.{columns[0]}: node {rows[0] + 1} starts within it")
 
     def watch(self, at: Rows) -> None:
-        """One step of all UAVs, at [nodes, 3]."""
+        """Watch one step of all UAVs, at [nodes, 3]."""
         if not len(self._areas):
             return
         within = self._inside(at)

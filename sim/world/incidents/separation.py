@@ -1,6 +1,6 @@
-"""The true distances of UAVs, by which collision warnings are judged.
+"""The true distances between UAVs, by which collision warnings are judged.
 
-Between two steps of the engine bodies are taken to fly straight, so nothing passes between them unseen.
+Bodies are taken to fly straight between two steps of the engine, so the least distance within a step is known, too.
 """
 
 from collections.abc import Mapping
@@ -12,17 +12,17 @@ from sim.world.engines.contract import Rows
 
 
 class Separation:
-    """The least distance of any two, and how often two came nearer than they should."""
+    """The least distance between any two UAVs, and how often two came nearer than they should."""
 
     def __init__(self, distance_m: float) -> None:
-        """`distance_m`: the least distance that any two should keep; at 0 nothing is watched."""
+        """`distance_m`: the distance that any two UAVs should keep; with 0 nothing is watched."""
         self._distance_m = distance_m
         self._least_m: float | None = None
         self._near: frozenset[tuple[int, int]] = frozenset()
         self._losses = 0
 
     def watch(self, before: Rows, after: Rows) -> None:
-        """One step, positions [nodes, 3] in m. Pairs that stay near count once."""
+        """Watch one step between two positions [nodes, 3] in m. A pair that stays near counts once."""
         if not self._distance_m or len(before) < 2:
             return
         first, second = np.triu_indices(len(before), k=1)
@@ -39,7 +39,7 @@ class Separation:
         self._near = near
 
     def report(self) -> Mapping[str, Any]:
-        """`least_m` is None while nothing has moved; the report is empty when nothing is watched."""
+        """The report; `least_m` is None while nothing has moved. It is empty if nothing is watched."""
         if not self._distance_m:
             return {}
         return {"least_m": None if self._least_m is None else round(self._least_m, 2), "losses": self._losses}

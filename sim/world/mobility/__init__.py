@@ -1,1 +1,1 @@
-"""Where UAVs fly: their starts, one module per mobility model behind `contract.py`, and the guidance by it."""
+"""The flight of UAVs: their starts, one module per mobility model behind `contract.py`, and the flight controllers."""

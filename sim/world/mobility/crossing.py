@@ -1,4 +1,4 @@
-"""Mobility for tests of collision avoidance: the ways of all UAVs cross in the middle of the area."""
+"""A mobility model for tests of collision avoidance: the ways of all UAVs cross in the middle of the area."""
 
 import numpy as np
 
@@ -8,7 +8,7 @@ from sim.world.mobility.contract import Track
 
 
 class Crossing:
-    """Everyone flies straight through the middle to the point opposite its start, and back, again and again."""
+    """All UAVs fly straight through the middle to the point opposite their start, and back, again and again."""
 
     def __init__(self, starts: Rows, scenario: Scenario) -> None:
         self._starts = starts

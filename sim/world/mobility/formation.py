@@ -1,4 +1,4 @@
-"""Mobility by formation: the whole layout moves as one and keeps its shape."""
+"""The mobility model `formation`: the whole layout moves as one and keeps its shape."""
 
 import numpy as np
 import numpy.typing as npt
@@ -9,9 +9,9 @@ from sim.world.mobility.contract import Track
 
 
 class Formation:
-    """The whole layout moves as one: from the base to the middle of the area, once round it, then again.
+    """The whole layout moves from the base to the middle of the area, and then around it again and again.
 
-    The way is a rectangle on which the formation's edges touch the area's, so that every part of it is overflown when
+    Its way is a rectangle on which the edges of the formation touch those of the area. All of the area is overflown if
     the layout is at least half as large as the area.
     """
 
@@ -24,7 +24,7 @@ class Formation:
         ring = [(east, 0.0), (east, north), (-east, north), (-east, -north), (east, -north), (east, 0.0)]
         to_middle = [(0.0, 0.0)] if base.any() else []
         self._way = np.array([tuple(base), *to_middle, *ring]) - base
-        """Offsets from the start."""
+        """The corners of the way, as offsets from the start."""
         self._legs = np.linalg.norm(np.diff(self._way, axis=0), axis=1)
         self._approach_m = float(self._legs[: len(to_middle) + 1].sum())
         self._ring_m = float(self._legs[len(to_middle) + 1 :].sum())

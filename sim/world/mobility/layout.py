@@ -1,4 +1,4 @@
-"""The places of the nodes at the beginning. Node 1, the leader, is the first of each layout."""
+"""The places of the nodes at the start. Node 1, the leader, is the first of each layout."""
 
 import math
 from typing import Final
@@ -8,7 +8,7 @@ from fanet_mw.scenario import Scenario, grid_columns
 from fanet_mw.units import Enu
 
 ON_GROUND_M: Final = 0.1
-"""Height of a UAV's middle that stands on the ground."""
+"""The height of the middle of a UAV that stands on the ground."""
 
 
 def positions(scenario: Scenario) -> list[Enu]:
@@ -19,7 +19,8 @@ def positions(scenario: Scenario) -> list[Enu]:
         places = [Enu(at.east + east, at.north + north, at.up) for at in places]
     if not scenario.nodes.on_ground:
         return places
-    from sim.world.environment.obstacles import terrain  # brings numpy, which not every command needs
+    # imported here, because it brings numpy, which not every command needs
+    from sim.world.environment.obstacles import terrain
 
     ground = terrain(scenario)
     return [
@@ -36,7 +37,7 @@ def _with_leader(places: list[Enu], scenario: Scenario) -> list[Enu]:
 
 
 def _layout(scenario: Scenario) -> list[Enu]:
-    """Every node's place about the origin."""
+    """The places of all nodes around the origin."""
     nodes = scenario.nodes
     if nodes.layout == "grid":
         columns = nodes.columns or grid_columns(nodes.count)

@@ -1,4 +1,4 @@
-"""Mobility by random waypoints (Johnson and Maltz, 1996), without pauses: straight from one to the next."""
+"""The mobility model of random waypoints (Johnson and Maltz, 1996), without pauses."""
 
 import numpy as np
 
@@ -9,7 +9,7 @@ from sim.world.mobility.contract import Track
 
 
 class RandomWaypoint:
-    """Constant speed to uniform waypoints, without pause; the leader stays where it is."""
+    """Each UAV flies at constant speed from one uniformly drawn waypoint to the next; the leader stays where it is."""
 
     def __init__(self, starts: Rows, scenario: Scenario) -> None:
         self._speed = scenario.mobility.speed_m_s

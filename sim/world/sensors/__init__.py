@@ -1,1 +1,1 @@
-"""What UAVs sense of the world: one module per kind of sensor, each behind the contract of `contract.py`."""
+"""The sensors of UAVs: one module per kind, each behind the contract of `contract.py`."""

@@ -1,8 +1,8 @@
-"""Heights: by air pressure, and by a rangefinder that looks straight down.
+"""Height sensors: a barometer, and a rangefinder that looks straight down.
 
-The barometer's error is Gaussian noise for each reading and a Gauss-Markov drift of 300 s (weather, and the air that
-rotors move: a few decimetres within minutes for a MS5611 on a multirotor). The rangefinder (a Lightware SF11/C
-reaches 120 m, to 0.1 m) measures to the highest thing below, with Gaussian noise. Not modeled: tilt, water, glass.
+The error of the barometer is Gaussian noise for each reading and a Gauss-Markov drift of 300 s (weather, and the air
+that rotors move: a few decimetres within minutes for an MS5611 on a multirotor). The rangefinder measures to the
+highest thing below, with Gaussian noise (a Lightware SF11/C reaches 120 m, to 0.1 m). Not modeled: tilt, water, glass.
 """
 
 from collections.abc import Iterator, Sequence

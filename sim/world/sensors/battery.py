@@ -1,4 +1,4 @@
-"""The battery's state, as a power module and its coulomb counter tell it; their errors are negligible here."""
+"""The sensor of the battery: a power module with a coulomb counter, whose errors are negligible here."""
 
 from collections.abc import Iterator, Sequence
 

@@ -1,16 +1,16 @@
-"""A camera that looks straight down, and what finds people in its images.
+"""A camera that looks straight down, and a detector of people in its images, as one model.
 
     across a person     sqrt(1.7 m x 0.5 m) = 0.92 m, who lies on the ground
     ground per pixel    2 depth tan(fov / 2) / width
     pixels              0.92 m / ground per pixel;   line pairs N = pixels / 2
     P(recognized)       x^E / (1 + x^E),  x = N / N50,  E = 2.7 + 0.7 x
 
-Johnson, "Analysis of image forming systems", 1958, for the line pairs N50 at which half of the observers tell what
-they see; the curve around it is the target transfer probability function of the Night Vision Laboratory's static
-performance model (Ratches et al., ECOM-7043, 1975). Each image is a new trial. A person who is buried, or with
-anything solid on the line to the camera, is not seen. A gimbal keeps the image's width along east; angular errors
-are Gaussian. False alarms are a Poisson process, anywhere in the image. Not modeled: light, motion blur, that
-successive images are alike.
+N50 is the number of line pairs with which half of the observers recognize what they see (Johnson, "Analysis of image
+forming systems", 1958). The curve around it is the target transfer probability function of the Night Vision
+Laboratory's static performance model (Ratches et al., ECOM-7043, 1975). Each image is a new trial. A person who is
+buried, or hidden from the camera by anything solid, is not seen. A gimbal keeps the image's width along east; angular
+errors are Gaussian. False alarms are a Poisson process, anywhere in the image. Not modeled: light, motion blur, and
+that successive images are alike.
 """
 
 import math
@@ -30,11 +30,11 @@ from sim.world.sensors.contract import Sensor, Truth, angles, generator, shaken
 
 PERSON_M: Final = math.sqrt(1.7 * 0.5)
 _EYE_M: Final = 0.3
-"""Height over the ground of the part of a person that a ray must reach."""
+"""The height above ground of the part of a person that a ray must reach."""
 
 
 def recognized_share(pixels: Values, *, cycles_for_half: float) -> Values:
-    """Probability that a person of so many pixels is recognized, by the target transfer probability function."""
+    """The probability that a person of so many pixels is recognized, by the target transfer probability function."""
     x = np.maximum(pixels, 1e-9) / 2 / cycles_for_half
     odds = np.exp(np.minimum((2.7 + 0.7 * x) * np.log(x), 700.0))
     return np.asarray(odds / (1 + odds))
@@ -65,11 +65,11 @@ class CameraSensor(Sensor):
                 yield row, Camera(truth.now_ns, tuple(people))
 
     def pixels(self, depth_m: Values) -> Values:
-        """Across a person at a depth below the camera."""
+        """The number of pixels across a person at a depth below the camera."""
         return np.asarray(PERSON_M * self._width / (2 * np.maximum(depth_m, 0.1) * self._tan_half_fov))
 
     def _in_view(self, offset: Rows) -> npt.NDArray[np.intp]:
-        """The indices of the survivors, at `offset` [n, 3] from the camera, that the image covers."""
+        """The indices of the survivors, at `offset` [n, 3] from the camera, who are inside the image."""
         depth = -offset[:, 2]
         inside = (np.abs(offset[:, 0]) <= depth * self._tan_half_fov) & (
             np.abs(offset[:, 1]) <= depth * self._tan_half_fov_height

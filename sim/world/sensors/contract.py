@@ -1,7 +1,7 @@
-"""The contract of a sensor: the truth of one instant goes in, the readings of those UAVs that are due come out.
+"""The contract of a sensor: the true state at one instant goes in, the readings of those UAVs that are due come out.
 
-A sensor adds its own error to the truth, from random streams of its own, so that a sensor more or less on board
-changes no other one's readings. A UAV that gets a reading learns nothing else of the truth.
+A sensor adds its own errors to the truth, from random streams of its own, so that adding or removing a sensor does not
+change the readings of others. A UAV that gets a reading learns nothing else of the truth.
 """
 
 import math
@@ -18,7 +18,7 @@ from sim.world.engines.contract import Rows, Values
 
 
 class Truth(NamedTuple):
-    """The state of all bodies at one instant; row i is node i + 1."""
+    """The true state of all bodies at one instant; row i is node i + 1."""
 
     now_ns: int
     at: Rows
@@ -26,23 +26,23 @@ class Truth(NamedTuple):
 
 
 class Sensor(ABC):
-    """One kind of sensor, on every UAV."""
+    """One kind of sensor, on all UAVs."""
 
     kind: str
     """The last part of its topics."""
     period_ns: int
     spread = True
-    """True if the UAVs' instants are spread over the period, so that readings do not all come at once."""
+    """True if the UAVs' instants are spread over the period, so that not all readings come at once."""
 
     @abstractmethod
     def read(self, truth: Truth, rows: Sequence[int]) -> Iterator[tuple[int, Message]]:
-        """The readings of the UAVs `rows`, each with its row; a UAV whose sensor has nothing to tell gives none."""
+        """The readings of the UAVs `rows`, each with its row; a UAV whose sensor has detected nothing gives none."""
 
     def close(self) -> None:  # noqa: B027  (only what renders holds anything)
-        """Give back what the sensor holds of the machine; most hold nothing."""
+        """Release what the sensor holds; most sensors hold nothing."""
 
     def due(self, count: int, *, now_ns: int, before_ns: int) -> list[int]:
-        """The rows of which an instant lies in (before, now]."""
+        """The rows that have an instant in (before, now]."""
         period_ns = self.period_ns
         if not self.spread:
             return list(range(count)) if _due(now_ns, before_ns, period_ns, 0) else []
@@ -50,17 +50,19 @@ class Sensor(ABC):
 
 
 def _due(now_ns: int, before_ns: int, period_ns: int, phase_ns: int) -> bool:
-    """True if an instant of a period (shifted by a phase) lies in (before, now]."""
+    """True if a periodic instant, shifted by a phase, lies in (before, now]."""
     return (now_ns - phase_ns) // period_ns > (before_ns - phase_ns) // period_ns
 
 
 def generator(seed: int, *names: str) -> np.random.Generator:
-    """The random numbers of one named use."""
+    """The random number generator for one named use."""
     return np.random.Generator(np.random.PCG64(stream_seed(seed, *names)))
 
 
 class Drift:
-    """Slow errors: a Gauss-Markov process per UAV and axis, x' = -x / tau + noise, of a given standard deviation."""
+    """Slow errors: a Gauss-Markov process for each UAV and axis, x' = -x / tau + noise, with a given standard
+    deviation.
+    """
 
     def __init__(self, random: np.random.Generator, shape: tuple[int, ...], *, sigma: float, tau_s: float) -> None:
         self._random = random
@@ -69,7 +71,7 @@ class Drift:
         self._t_ns = 0
 
     def at(self, now_ns: int) -> Values:
-        """The errors of all at an instant, which must not lie before the last one."""
+        """The errors of all UAVs at an instant, which must not be before the last one."""
         elapsed_s = (now_ns - self._t_ns) / S
         if elapsed_s > 0:
             kept = math.exp(-elapsed_s / self._tau_s)

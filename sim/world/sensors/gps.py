@@ -1,8 +1,9 @@
-"""GPS: the true position and velocity, with noise that is new for each fix, a slow bias, and places without any.
+"""GPS: the true position and velocity, with noise that is new for each fix and a slow bias; in some areas there are no
+fixes.
 
-Noise and bias are Gaussian along each axis, of standard deviations `world.gps_sigma_m` and `sensors.gps_bias_m`; the
-bias is a Gauss-Markov process. A velocity, which a receiver takes from Doppler shifts, is told exactly. Not modeled:
-the geometry of satellites, reflections by walls.
+Noise and bias are Gaussian along each axis, with the standard deviations `world.gps_sigma_m` and `sensors.gps_bias_m`;
+the bias is a Gauss-Markov process. The velocity, which a receiver derives from Doppler shifts, is exact. Not modeled:
+the geometry of satellites, and reflections by walls.
 """
 
 from collections.abc import Iterator, Sequence
@@ -17,7 +18,7 @@ from sim.world.sensors.contract import Drift, Sensor, Truth, generator
 
 
 class GpsReceiver(Sensor):
-    """One receiver per UAV; all give their fixes at the same instants, as GPS time asks of them."""
+    """One receiver per UAV; all give their fixes at the same instants, as with GPS time."""
 
     kind = "gps"
     spread = False
@@ -46,7 +47,7 @@ class GpsReceiver(Sensor):
                 yield row, Gps(truth.now_ns, Enu(*noisy[row].tolist()), Enu(*truth.velocity[row].tolist()))
 
     def _out(self, truth: Truth) -> Flags:
-        """Which UAVs have no fix now."""
+        """The UAVs that get no fix now."""
         out = np.zeros(len(truth.at), bool)
         for place, radius_m, begin_ns, end_ns in self._outages:
             if begin_ns <= truth.now_ns < end_ns:

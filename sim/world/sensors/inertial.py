@@ -1,8 +1,8 @@
-"""Velocity without GPS: inertial sensors, held by optical flow.
+"""Velocity without GPS: inertial sensors, corrected by optical flow.
 
-The error along each axis is Gaussian noise for each reading and a Gauss-Markov drift of 100 s; PX4's optical flow on
-a PX4FLOW errs by about 0.1 m/s over textured ground (Honegger et al., ICRA 2013). Integrated, it gives a position
-that drifts: after a time t much longer than 100 s by about drift x sqrt(2 x 100 s x t).
+The error along each axis is Gaussian noise for each reading and a Gauss-Markov drift of 100 s. PX4's optical flow on a
+PX4FLOW has an error of about 0.1 m/s over textured ground (Honegger et al., ICRA 2013). Its integral is a position that
+drifts: after a time t much longer than 100 s by about drift x sqrt(2 x 100 s x t).
 """
 
 from collections.abc import Iterator, Sequence

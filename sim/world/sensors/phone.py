@@ -1,11 +1,11 @@
-"""The Wi-Fi receiver that hears survivors' phones.
+"""The Wi-Fi receiver that detects survivors' phones.
 
-    RSSI = power - 40.05 dB - 10 n log10(d / 1 m) + shadowing - (what rubble takes)     [dBm]
+    RSSI = power - 40.05 dB - 10 n log10(d / 1 m) + shadowing - loss through rubble     [dBm]
 
-Log-distance path loss with log-normal shadowing (Rappaport, 2002, ch. 4.9), above a detection threshold. What a
-collapsed building takes was measured from 50 MHz to 1.8 GHz by Holloway et al. (IEEE Antennas and Propagation
-Magazine 56(3), 2014: some 20 to 80 dB), and grows with the frequency, by 10 to 100 dB for each metre of reinforced
-concrete (Oestges, EMTS 2013). Not modeled: fading in time, the phone's own interval of probe requests.
+This is log-distance path loss with log-normal shadowing (Rappaport, 2002, ch. 4.9), above a detection threshold. The
+loss through a collapsed building was measured from 50 MHz to 1.8 GHz by Holloway et al. (IEEE Antennas and Propagation
+Magazine 56(3), 2014: some 20 to 80 dB). It grows with the frequency, by 10 to 100 dB for each metre of reinforced
+concrete (Oestges, EMTS 2013). Not modeled: fading in time, and the phone's own interval of probe requests.
 """
 
 import hashlib
@@ -26,9 +26,10 @@ from sim.world.sensors.contract import Sensor, Truth
 REFERENCE_LOSS_DB: Final = 40.05
 """Free-space loss at 1 m and 2.4 GHz."""
 KEPT_VALUES: Final = 8192
-"""Values of shadowing that are kept, about 1.5 MB: those of the places where UAVs are now."""
+"""The number of cached values of shadowing (about 1.5 MB), those of the places where UAVs are now."""
 _CELL_M: Final = 25.0
-"""Shadowing is one value per survivor and ground cell of this size: what a place hides, it hides every time."""
+"""Shadowing is one value per survivor and ground cell of this size, so it is the same each time a
+UAV comes to a place."""
 
 
 class PhoneSensor(Sensor):
@@ -54,7 +55,7 @@ class PhoneSensor(Sensor):
                 yield row, WifiScan(truth.now_ns, heard)
 
     def scan(self, at: npt.NDArray[np.float64]) -> tuple[tuple[int, float], ...]:
-        """(survivor, RSSI dBm) of each phone heard from a position, strongest first."""
+        """(survivor, RSSI dBm) of each phone that is received at a position, the strongest first."""
         mission = self._mission
         if not len(self._places):
             return ()
@@ -65,7 +66,7 @@ class PhoneSensor(Sensor):
         return tuple(sorted((h for h in heard if h[1] >= mission.detection_dbm), key=lambda h: (-h[1], h[0])))
 
     def _shadowing_db(self, survivor: int, at: npt.NDArray[np.float64]) -> float:
-        """The fixed shadowing of a survivor towards a ground cell."""
+        """The fixed shadowing between a survivor and a ground cell."""
         key = survivor, math.floor(at[0] / _CELL_M), math.floor(at[1] / _CELL_M)
         value = self._shadow.get(key)
         if value is None:
@@ -73,6 +74,6 @@ class PhoneSensor(Sensor):
             u, v = (int.from_bytes(digest[i : i + 6], "big") + 1 for i in (0, 6))
             gauss = math.sqrt(-2 * math.log(u / 2**48)) * math.cos(2 * math.pi * v / 2**48)  # Box and Muller, 1958
             if len(self._shadow) >= KEPT_VALUES:
-                self._shadow.clear()  # each is computed again, to the same value
+                self._shadow.clear()  # each value will be computed again, and be the same
             value = self._shadow[key] = max(-3.5, min(3.5, gauss)) * self._mission.shadowing_db
         return value

@@ -1,16 +1,16 @@
-"""A radar that looks all round for UAVs, walls and hillsides.
+"""A radar that scans all round for UAVs, walls and hillsides.
 
     SNR          Pt Gt Gr lambda^2 sigma T / ((4 pi)^3 R^4 k T0 F)          (the radar equation; Skolnik, 2008, ch. 1)
     P(detected)  Pfa^(1 / (1 + SNR))                                       (a Swerling 1 target, one look)
     errors       range: cell / sqrt(2 SNR);  angles: beam / (1.6 sqrt(2 SNR))
 
 The default SNR, 21.6 dB from 1 m2 at 100 m, is that of a 77 GHz single-chip radar: 12 dBm, 10.5 dBi each way, twelve
-virtual channels, 10 ms of integration, noise figure 15 dB (Texas Instruments AWR1843). A UAV's mean cross section at
-24 GHz is -8 to -19 dBsm (IEICE Communications Express 9(7), 2020: Phantom 3, 3DR Solo and others); 0.03 m2 is -15
-dBsm. What a target returns fluctuates from scan to scan (exponentially: Swerling 1), and so does each SNR that is
-told. Walls and hillsides are met by one ray for each beam, at -10, 0 and +10 degrees; the plain is gated out by the
-height above ground. Noise passes for an echo with probability Pfa in each cell: that is the clutter. Not modeled:
-multiple paths, sidelobes, interference among the swarm's radars, what is right behind a nearer target.
+virtual channels, 10 ms of integration, noise figure 15 dB (Texas Instruments AWR1843). A UAV's mean cross section at 24
+GHz is -8 to -19 dBsm (IEICE Communications Express 9(7), 2020: Phantom 3, 3DR Solo and others); 0.03 m2 is -15 dBsm.
+The return of a target fluctuates exponentially from scan to scan (Swerling 1), and so does the SNR of each reading. For
+walls and hillsides one ray is cast for each beam, at -10, 0 and +10 degrees; returns of the flat ground are removed by
+the height above ground. Noise is taken for an echo with probability Pfa in each cell: that is the clutter. Not modeled:
+multiple paths, sidelobes, interference among the swarm's radars, and targets right behind a nearer one.
 """
 
 import math
@@ -27,7 +27,7 @@ from sim.world.environment.solids import Solids
 from sim.world.sensors.contract import Sensor, Truth, angles, generator
 
 ELEVATION_RAD: Final = math.radians(20)
-"""The scan sees as far up and down as this."""
+"""The greatest angle up and down that a scan covers."""
 RAY_ELEVATIONS_DEG: Final = (-10.0, 0.0, 10.0)
 _BOLTZMANN: Final = 1.380649e-23
 _T0_K: Final = 290.0
@@ -36,7 +36,7 @@ _T0_K: Final = 290.0
 def radar_snr_db(
     *, power_dbm: float, gain_db: float, wavelength_m: float, seconds: float, noise_figure_db: float
 ) -> float:
-    """SNR of 1 m2 at 100 m by the radar equation; `gain_db`: both antennas and all channels together."""
+    """The SNR of 1 m2 at 100 m by the radar equation; `gain_db` is the sum for both antennas and all channels."""
     signal = power_dbm - 30 + gain_db + 20 * math.log10(wavelength_m) - 30 * math.log10(4 * math.pi) - 80
     return signal + 10 * math.log10(seconds) - 10 * math.log10(_BOLTZMANN * _T0_K) - noise_figure_db
 
@@ -98,7 +98,9 @@ class RadarSensor(Sensor):
         yield from self._echoes(distance[met], self._rays[met], closing, self._config.radar_wall_m2)
 
     def _echoes(self, distance: Values, direction: Values, closing: Values, area_m2: float) -> Iterator[Echo]:
-        """The returns of targets of one cross section that pass the threshold, with the errors of their SNR."""
+        """The returns of targets with one cross section that exceed the threshold, with the errors that follow from
+        their SNR.
+        """
         config, random = self._config, self._random
         mean_db = config.radar_snr_db + 10 * math.log10(area_m2) - 40 * np.log10(np.maximum(distance, 1.0) / 100)
         power = (1 + 10 ** (mean_db / 10)) * random.exponential(1.0, len(distance))

@@ -1,4 +1,4 @@
-"""Everything that UAVs carry in a scenario, read when it is due."""
+"""All sensors that UAVs carry in a scenario, each read when it is due."""
 
 from collections.abc import Iterator
 
@@ -30,10 +30,10 @@ def sensors_of(
     energy: Energy | None = None,
     obstacles: Obstacles | None = None,
 ) -> list[Sensor]:
-    """The sensors that a scenario asks for, in the order in which their readings go out.
+    """The sensors that a scenario asks for, in the order in which their readings are sent.
 
-    `energy` has the batteries; None: UAVs have none, and are told of none. `obstacles`: what `solids` are made of, for
-    images of them; None: a plain.
+    `energy`: the batteries; None if UAVs have none. `obstacles`: the same obstacles as in `solids`, for rendered
+    images; None if there are none.
     """
     config = scenario.sensors
     found: list[Sensor] = []
@@ -82,7 +82,7 @@ class Suite:
         self._count = scenario.nodes.count
 
     def readings(self, truth: Truth, alive: Flags, *, before_ns: int) -> Iterator[tuple[str, Message]]:
-        """Topics and readings of all instants in (before, now], for UAVs that are `alive`."""
+        """The topics and readings of all instants in (before, now], for UAVs that are `alive`."""
         for sensor, topics in self._sensors:
             rows = [row for row in sensor.due(self._count, now_ns=truth.now_ns, before_ns=before_ns) if alive[row]]
             if rows:
@@ -90,6 +90,6 @@ class Suite:
                     yield topics[row], reading
 
     def close(self) -> None:
-        """Close every sensor; a second time does nothing."""
+        """Close all sensors; a second call does nothing."""
         for sensor, _ in self._sensors:
             sensor.close()

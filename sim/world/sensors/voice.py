@@ -1,18 +1,17 @@
-"""A microphone array that makes out calls for help through the noise of its own rotors and of the wind.
+"""A microphone array that detects calls for help in the noise of its own rotors and of the wind.
 
-    level    L1 - 20 log10(d / 1 m) - a d - (what rubble or a wall takes)      a = 0.005 dB/m
+    level    L1 - 20 log10(d / 1 m) - a d - loss through rubble or a wall      a = 0.005 dB/m
     noise    power sum of the rotors' level at the array, and of the wind's
     SNR      level - noise + gain of the array
     wind     40 log10 V - 23 log10(f D / V) + 15   [dB]     f = 500 Hz, D = 0.1 m
 
-Spherical spreading; air takes 5 dB/km at 1 kHz, 20 degrees and 50 to 70 % humidity (ISO 9613-1). A shout is 82 dB at
-1 m with ANSI S3.5-1997, up to 90 dB for those who shout as loudly as they can. A wall in between takes 20 dB
-(Maekawa's limit for a single edge). Wind noise in a third-octave band behind a windscreen of diameter D at an
-airspeed V: Strasberg, J. Acoust. Soc. Am. 83(2), 1988. A call is made out when its SNR is above a threshold; the
-error of its direction is Gaussian along each of two axes and falls with the square root of the SNR, as the
-Cramer-Rao bound does. Arrays of 12 to 16 microphones on multirotors: Hoshiba et al., Sensors 17(11), 2017. A
-survivor calls in a share of the instants, drawn anew each time. Not modeled: echoes, and two calls that mask each
-other.
+The sound spreads spherically; air absorbs 5 dB/km at 1 kHz, 20 degrees and 50 to 70 % humidity (ISO 9613-1). A shout
+has 82 dB at 1 m by ANSI S3.5-1997, and up to 90 dB if it is as loud as possible. A wall in between takes 20 dB
+(Maekawa's limit for a single edge). Wind noise is that in a third-octave band behind a windscreen of diameter D at an
+airspeed V: Strasberg, J. Acoust. Soc. Am. 83(2), 1988. A call is detected if its SNR exceeds a threshold. The error of
+its direction is Gaussian along each of two axes, and falls with the square root of the SNR, as the Cramer-Rao bound
+does. Arrays of 12 to 16 microphones were flown on multirotors by Hoshiba et al., Sensors 17(11), 2017. A survivor calls
+in a share of the instants, drawn anew each time. Not modeled: echoes, and calls that mask each other.
 """
 
 import math
@@ -44,7 +43,7 @@ def level_db(distance_m: Values, *, at_1_m_db: float) -> Values:
 
 
 def wind_noise_db(airspeed_m_s: Values) -> Values:
-    """Level that an airflow makes behind the windscreen."""
+    """The level of the noise that an airflow makes behind the windscreen."""
     v = np.maximum(airspeed_m_s, _LEAST_WIND_M_S)
     return np.asarray(40 * np.log10(v) - 23 * np.log10(_BAND_HZ * _SCREEN_M / v) + 15)
 

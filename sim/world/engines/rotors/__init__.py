@@ -1,1 +1,1 @@
-"""Multirotors in full: vehicles with their parameters, rotors, motors, batteries and the control loops on board."""
+"""Detailed multirotors: vehicles with their parameters, rotors, motors, batteries and flight control loops."""

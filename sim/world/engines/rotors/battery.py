@@ -32,7 +32,7 @@ class Batteries:
         return np.asarray(self.charge <= 0.0)
 
     def drain(self, power_w: Values, seconds: float) -> None:
-        """Give a power for a while; a battery that cannot gives what it can."""
+        """Deliver power for some seconds; a battery that cannot delivers what it can."""
         open_v, r = self._open_v(), self._cell.resistance_ohm
         root = np.sqrt(np.maximum(open_v**2 - 4 * r * power_w, 0.0))
         self.current_a = np.where(self.charge > 0, (open_v - root) / (2 * r), 0.0)

@@ -1,11 +1,10 @@
-"""Multirotors as rigid bodies under four rotors each, all at once in numpy: the engine `rotors`.
+"""Multirotors as rigid bodies with four rotors each, all computed at once in numpy: the engine `rotors`.
 
     m v' = R (sum of thrusts) z - drag - m g z          J w' = torques - w x J w          q' = q (0, w) / 2
     motors: first-order lag towards the wanted speed, faster up than down; symplectic Euler at `STEP_HZ`
 
-The battery gives what the rotors take (`power.py`); one that is empty stops them. A body that reaches the ground or a
-wall is stopped there and stands upright. Not modeled: ground effect, downwash on others below, blade flapping, the
-bounce.
+The battery delivers the power that the rotors take (`power.py`); an empty one stops them. A body that reaches the
+ground or a wall stops there, upright. Not modeled: ground effect, downwash on UAVs below, blade flapping, bouncing.
 """
 
 from typing import Final
@@ -23,16 +22,16 @@ from sim.world.environment.wind import Wind
 STEP_HZ: Final = 200
 _DT_S: Final = 1 / STEP_HZ
 _LEAST_SHARE: Final = 0.1
-"""The least share of the greatest rotor speed: motors idle in flight, they do not stop."""
+"""The least rotor speed in flight, as a share of the greatest: motors idle, but do not stop."""
 _TUMBLE_PER_S: Final = 2.0
-"""The rate at which a body without power stops turning."""
+"""The rate at which a body without power stops rotating."""
 
 
 class Rotors(Engine):
     """A swarm of one type of vehicle.
 
-    Eight of its sixteen attributes are the state of all bodies, one array for each quantity with a column for a body,
-    because numpy is fast only with arrays of this kind.
+    Eight of its sixteen attributes are the state of all bodies: one array for each quantity, with a column for each
+    body, because numpy is fast only with such arrays.
     """
 
     name = "rotors"
@@ -139,7 +138,7 @@ class Rotors(Engine):
         self._attitude[:, inside] = [[1.0], [0.0], [0.0], [0.0]]
 
     def _electrical(self) -> Values:
-        """What the batteries give now; 20 times a second is often enough for them."""
+        """The power that the batteries deliver now, computed 20 times a second."""
         up, airflow, vehicle = body_up(self._attitude), self._velocity - self._air, self.vehicle
         through = (up * airflow).sum(axis=0)
         across = np.sqrt(((airflow - up * through) ** 2).sum(axis=0))

@@ -1,12 +1,12 @@
-"""The control loops on board, each inside the next: rates, attitude, velocity. `mobility/guidance.py` holds positions.
+"""The nested control loops on board: velocity, attitude, rates. Positions are held by `mobility/guidance.py`.
 
     velocity   a = k (wanted - v) + integral, within what the tilt limit gives; thrust direction and size from a + g
     attitude   rates = 2 k_q sign(q_w) q_xyz of the quaternion error (Brescianini, Hehn and D'Andrea, ETH, 2013)
     rates      torque = J k_r (wanted - rates) + rates x J rates
     mixer      thrust and torques to the thrust of each rotor, by the inverse of the allocation matrix
 
-Gains follow from the vehicle's rate gain, each loop three times as slow as the one inside it. The nose stays north
-of east by nothing: yaw 0. Arrays are [components, UAVs].
+All gains follow from the vehicle's rate gain: each loop is three times slower than the one inside it. The yaw angle is
+always 0, so the nose points east. Arrays are [components, UAVs].
 """
 
 import math
@@ -18,25 +18,25 @@ from sim.world.engines.contract import Values
 from sim.world.engines.rotors.vehicle import GRAVITY_M_S2, Vehicle
 
 _RATIO: Final = 3.0
-"""A loop is slower than the one inside it by this factor."""
+"""Each loop is slower than the one inside it by this factor."""
 _INTEGRAL_PER_S: Final = 0.3
 _MOST_INTEGRAL_M_S2: Final = 4.0
 _MOST_ERROR_M_S: Final = 0.5
-"""The integral is for winds and drag, not for steps: larger errors count as this."""
+"""Greater velocity errors count as this in the integral, which is meant for wind and drag and not for steps."""
 _MOST_RATE_RAD_S: Final = 6.0
 _LEAST_LIFT: Final = 0.2
-"""The share of the weight below which thrust never falls, so that the vehicle can always turn."""
+"""The thrust never falls below this share of the weight, so that the vehicle can always rotate."""
 _THRUST_RESERVE: Final = 0.9
 """The share of the greatest thrust that lift may take; the rest is for attitude."""
 _YAW_SHARE: Final = 0.3
-"""Yaw is slower: it has only the rotors' torques."""
+"""The yaw loop is slower by this factor, because yaw has only the torques of the rotors."""
 
 
 class FlightControl:
     """The controllers of all UAVs of one type."""
 
     def __init__(self, vehicle: Vehicle, trim_m_s2: Values) -> None:
-        """`trim_m_s2`: acceleration against the drag of the flight in which the control takes over [3, UAVs]."""
+        """`trim_m_s2`: the acceleration against drag at the moment in which the control takes over [3, UAVs]."""
         self._vehicle = vehicle
         self._inertia = np.array(vehicle.inertia_kg_m2)[:, None]
         rate = vehicle.rate_per_s
@@ -50,7 +50,7 @@ class FlightControl:
         self._tan_tilt = math.tan(math.radians(vehicle.tilt_deg))
 
     def thrust_vector(self, wanted: Values, velocity: Values, dt_s: float) -> Values:
-        """The force that the rotors are to give [N], east, north, up, within tilt and thrust."""
+        """The wanted total force of the rotors [N], in east, north, up, within the limits of tilt and thrust."""
         error = wanted - velocity
         mass, gravity = self._vehicle.mass_kg, GRAVITY_M_S2
         acceleration = self.velocity_per_s * error + self._integral
@@ -67,7 +67,7 @@ class FlightControl:
         return np.asarray(mass * np.stack([acceleration[0] * scale, acceleration[1] * scale, lift]))
 
     def rotor_thrusts(self, force: Values, attitude: Values, rates: Values) -> Values:
-        """The thrust wanted of each rotor [4, UAVs] for a force, at an attitude (quaternion w, x, y, z)."""
+        """The wanted thrust of each rotor [4, UAVs], for a force at an attitude (quaternion w, x, y, z)."""
         size = np.sqrt((force**2).sum(axis=0))
         wanted = level_attitude(force / size)
         error = times(conjugate(attitude), wanted)
@@ -87,7 +87,7 @@ def allocation(vehicle: Vehicle) -> Values:
 
 
 def level_attitude(up: Values) -> Values:
-    """The attitude whose body axis z is `up` (unit vectors) and that is turned from level by the shortest way."""
+    """The attitude whose body axis z is `up` (unit vectors), reached from level by the shortest rotation."""
     w = np.sqrt(np.maximum((1 + up[2]) / 2, 1e-9))
     return np.stack([w, -up[1] / (2 * w), up[0] / (2 * w), np.zeros_like(w)])
 

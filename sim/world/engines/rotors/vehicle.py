@@ -1,10 +1,11 @@
-"""The vehicles: what is known of each, with its source. Body axes: x ahead, y to the left, z up.
+"""The types of vehicles: their parameters, with the sources. Body axes: x ahead, y to the left, z up.
 
     thrust of a rotor    k_f w^2 - k_z w V_z          w: its speed, V_z: the air's velocity through it from above
     torque of a rotor    k_m (thrust)                 against its spin
     drag                 lambda (sum of w) V_xy + c |V| V
 
-Rotor drag, which grows with speed and rotor speed alike, is that of Martin and Salaun (ICRA 2010); c is the frame's.
+The rotor drag, which grows with airspeed and rotor speed, is that of Martin and Salaun (ICRA 2010); c is the drag of
+the frame.
 """
 
 from typing import Final, NamedTuple
@@ -31,7 +32,7 @@ class Vehicle(NamedTuple):
     rotors_m: tuple[tuple[float, float], ...]
     """x and y of each rotor."""
     spins: tuple[int, ...]
-    """+1: the rotor turns clockwise seen from above, so that its torque turns the body counterclockwise."""
+    """+1 if the rotor turns clockwise seen from above, so that its torque turns the body counterclockwise."""
     rotor_radius_m: float
     thrust_n_s2: float
     """k_f."""
@@ -55,11 +56,11 @@ class Vehicle(NamedTuple):
     avionics_w: float
     battery: Cell
     tilt_deg: float
-    """The control's limit."""
+    """The tilt limit of the flight control."""
     rate_per_s: float
-    """Gain of the rate loop; the loops outside it are slower by a factor of about three each."""
+    """The gain of the rate loop; each loop outside of it is about three times slower."""
     arm_m: float
-    """Radius of the sphere that touches things."""
+    """The radius of the sphere with which the vehicle touches things."""
 
 
 IRIS: Final = Vehicle(

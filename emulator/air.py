@@ -1,6 +1,6 @@
-"""The calls into the kernel, in terms of stations and frame slots.
+"""The interface between the medium and the kernel, in terms of stations and frame slots.
 
-Bytes, topics and node ids are known to the medium only.
+Only the medium knows bytes, topics and node ids.
 """
 
 import struct
@@ -34,7 +34,7 @@ class Air:
         self.book = LinkBook(stations)
         self._placement = Placement(scenario, stations=stations)
         self.arrays = arrays_of(scenario, self._placement.links(spare=0), stations=stations, capture=capture)
-        # These views are the same memory by the buffer protocol, which reads a few numbers faster than numpy does.
+        # These views share memory with numpy arrays; a few numbers are read faster through the buffer protocol.
         self._counts = self.arrays.g.data
         self._asked_bytes = self.arrays.asked.data.cast("B")
         out_bytes = self.arrays.out.data.cast("B")
@@ -46,16 +46,16 @@ class Air:
         self._entry = self.arrays.entry()
 
     def obstruct(self, pairs: npt.NDArray[np.int64]) -> None:
-        """Set the pairs of stations [n, 2] between which something stands; it counts from the next `place` on."""
+        """Set the pairs of stations [n, 2] with something solid between them; it takes effect at the next `place`."""
         self._placement.obstruct(pairs)
 
     def place(self, at: npt.NDArray[np.float64]) -> None:
-        """Take over new positions [m], one row per station; frames on the way are carried over to the new links."""
+        """Take over new positions [m], one row per station; frames in flight are carried over to the new links."""
         if self._placement.place(at):
             self.relink()
 
     def relink(self) -> None:
-        """Make the links anew, because stations have moved or faults have changed."""
+        """Compute the links anew, because stations have moved or faults have changed."""
         a = self.arrays
         self._take_in()
         self.book.take(a.lk)
@@ -74,7 +74,7 @@ class Air:
         self.next_output_ns = int(kernel.next_output(a.g, a.p, a.st, a.fr, a.hs))
 
     def links(self, now_ns: int) -> LinkStats | None:
-        """What the links have carried since the previous call; None when they have carried nothing."""
+        """The traffic of all links since the previous call; None if there was none."""
         self.book.take(self.arrays.lk)
         return self.book.close(now_ns)
 
@@ -105,7 +105,7 @@ class Air:
             self._take_in()
 
     def _take_in(self) -> None:
-        """Hand the requests that wait in `asked` to the kernel."""
+        """Pass the requests that wait in `asked` to the kernel."""
         counts, a = self._counts, self.arrays
         if counts[s.HS_N] + counts[s.ASKED_N] + 2 * kernel.MARGIN > len(a.hs):
             self._more_starts(len(a.hs))
@@ -126,6 +126,6 @@ class Air:
                 self._more_starts(len(self.arrays.hs))
 
     def _more_starts(self, rows: int) -> None:
-        """Make room for `rows` more planned starts."""
+        """Make room for `rows` more planned starts of frames."""
         self.arrays.hs = np.concatenate([self.arrays.hs, np.zeros((rows, 5), np.int64)])
         self._entry = self.arrays.entry()

@@ -1,4 +1,4 @@
-"""The kernel's arrays as a scenario wants them at its start: parameters, stations, and room for what will happen."""
+"""Makes the kernel's arrays for a scenario: parameters, stations, and room for frames and events."""
 
 from dataclasses import dataclass
 from functools import lru_cache
@@ -18,10 +18,10 @@ from fanet_mw.rng import stream_seed
 from fanet_mw.scenario import Radio, Scenario
 
 MOST_ASKED: Final = 256
-"""At most so many requests may wait to be handed to the kernel."""
+"""The greatest number of requests that wait to be passed to the kernel."""
 _SLOTS: Final = 1000
-"""The number of frame slots at first. It is no power of two: with a power of two the rows of one frame
-would compete for the same few lines of the processor's cache."""
+"""The initial number of frame slots. It is no power of two: with one, the rows of a frame would compete for the same
+few lines of the processor's cache."""
 
 
 @dataclass(slots=True)
@@ -44,14 +44,14 @@ class Arrays:
     err: s.Reals
 
     def entry(self) -> KernelEntry:
-        """The entry to `kernel.advance`; it is good until an array is replaced."""
+        """The entry to `kernel.advance`; it is valid until an array is replaced."""
         return KernelEntry(
             self.g, self.p, self.pf, self.st, self.sf, self.fr, self.lk, self.lp, self.ptr, self.hs, self.hr,
             self.asked, self.out, self.err,
         )  # fmt: skip
 
     def use(self, links: LinkTable) -> None:
-        """Take these links in place of the former ones."""
+        """Replace the links."""
         self.lk, self.lp, self.ptr = links.ints, links.reals, links.ptr
 
     def busy_ns(self, now_ns: int) -> int:
@@ -61,7 +61,7 @@ class Arrays:
 
 
 def arrays_of(scenario: Scenario, links: LinkTable, *, stations: int, capture: bool) -> Arrays:
-    """The arrays before anything has happened; `capture`: every start of a transmission is to be reported."""
+    """The arrays at the start; with `capture` each start of a transmission is reported."""
     radio = scenario.radio
     return Arrays(
         g=np.zeros(s.GLOBALS, np.int64),

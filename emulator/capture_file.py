@@ -1,6 +1,6 @@
-"""The file of a capture, opened and written on behalf of the entry points; the medium knows only `Capture`.
+"""Opens and writes the file of a capture; the medium itself only knows `Capture`.
 
-When the disk fails, the capture ends and the run goes on: one message says so, and the file keeps what it has.
+If the disk fails, the capture ends and the run goes on: one message says so, and the file keeps what it has.
 """
 
 import contextlib

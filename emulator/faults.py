@@ -1,13 +1,13 @@
-"""The faults that are in force on the air now, and those to come. They change links and noise, nothing else.
+"""The faults in force on the air, and the planned ones. They change only links and noise.
 
     degraded   power x 10^(-loss_db / 10); below the sensitivity the link is gone; a share of what is received is lost
     jammed     the noise at receivers inside is higher, or nothing is received there; a jammer is not sensed (the clear
                channel assessment of 802.11-2020, 16.3.8.5, mode 2 looks for signals, not for energy)
     cut        no power to or from the node
 
-A link that would be audible without its faults is marked with the gravest of them, so that what it loses as too weak is
-counted under that fault. Frames on the way keep the power with which they started. Not modeled: jammers that move or
-react.
+A link that would be audible without its faults is marked with the gravest of them, and frames that it loses because
+they are too weak count as lost to that fault. Frames in flight keep the power with which they started. Not modeled:
+jammers that move or react.
 """
 
 import heapq
@@ -25,7 +25,7 @@ from fanet_mw.scenario import Radio
 from fanet_mw.trace import RadioFault
 
 MAX_FAULTS: Final = 1024
-"""The number of faults that may be in force at the same time; a further one is refused."""
+"""The greatest number of faults in force at the same time; further ones are refused."""
 _KINDS: Final = {Degrade: "degrade", Jam: "jam", Cut: "cut"}
 
 
@@ -37,7 +37,7 @@ class _FaultInForce(NamedTuple):
 
 
 class Faults:
-    """The faults in force, by label, and the agenda of those that begin or end by themselves."""
+    """The faults in force by label, and the agenda of those that begin or end by themselves."""
 
     def __init__(self, radio: Radio, *, stations: int, planned: Iterable[tuple[int, Control]] = ()) -> None:
         self._radio = radio
@@ -45,7 +45,7 @@ class Faults:
         self._standing: dict[str, _FaultInForce] = {}
         self._number = 0
         self._agenda: list[tuple[int, int, Control | None, str, int]] = []
-        """A heap of (instant, order, what begins; or the label and number of what ends)."""
+        """A heap of (instant, order, the fault that begins, or the label and number of the one that ends)."""
         for at_ns, control in planned:
             self._push(at_ns, control)
         self.records: list[RadioFault] = []
@@ -55,11 +55,11 @@ class Faults:
         return frozenset(item.fault.node - 1 for item in self._standing.values() if isinstance(item.fault, Cut))
 
     def next_ns(self) -> int | None:
-        """The instant at which the next fault begins or ends by itself; None when there is none."""
+        """The instant at which the next fault begins or ends by itself; None if there is none."""
         return self._agenda[0][0] if self._agenda else None
 
     def pass_time(self, now_ns: int) -> list[str]:
-        """Begin and end what is due by `now_ns`; returns for each refused fault why it was refused."""
+        """Begin and end faults that are due by `now_ns`; returns for each refused one why it was refused."""
         refused = []
         while self._agenda and self._agenda[0][0] <= now_ns:
             at_ns, _, control, label, number = heapq.heappop(self._agenda)
@@ -71,7 +71,7 @@ class Faults:
         return refused
 
     def obey(self, control: Control, now_ns: int) -> str | None:
-        """Begin or end a fault now; returns why that was refused, None when it was done."""
+        """Begin or end a fault now; returns why that was refused, or None."""
         if isinstance(control, Restore):
             if control.label and control.label not in self._standing:
                 return "fault_unknown_label"
@@ -133,7 +133,7 @@ class Faults:
         return noise
 
     def _degrade(self, links: LinkTable, src: int, dst: int, fault: Degrade) -> None:
-        """Degrade the link between two stations; there is none when they are out of reach of each other."""
+        """Degrade the link between two stations, if they are within reach of each other."""
         first, end = links.ptr[src], links.ptr[src + 1]
         self._degrade_those(links, first + np.flatnonzero(links.ints[s.LINK_DST, first:end] == dst), fault)
 
@@ -150,7 +150,7 @@ class Faults:
         links.reals[s.SPARED, chosen[heard]] *= 1 - fault.loss_share
 
     def _jam(self, links: LinkTable, at: npt.NDArray[np.float64], fault: Jam) -> npt.NDArray[np.float64]:
-        """Mark the links into the jammed area; returns what is added to the noise at each station [mW]."""
+        """Mark the links into the jammed area; returns the additional noise at each station [mW]."""
         with np.errstate(invalid="ignore"):  # a station of unknown position is infinitely far away
             inside = np.hypot(at[:, 0] - fault.center.east, at[:, 1] - fault.center.north) <= fault.radius_m
         count = links.count

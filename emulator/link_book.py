@@ -1,7 +1,7 @@
-"""The counts of links, kept while links are made anew: the kernel counts on its links, and poses replace those.
+"""Keeps the counters of links when links are computed anew: the kernel counts on its links, which poses replace.
 
-`take` moves the counts of an array of links into the book and leaves zeros there; `close` sums what was taken since the
-last report. Both are a few vector operations, whatever the number of frames.
+`take` moves the counters of an array of links here and leaves zeros there; `close` sums what was taken since the last
+report. Both are a few vector operations, whatever the number of frames.
 """
 
 from array import array
@@ -14,11 +14,11 @@ from fanet_mw.bus.link_stats import COUNTS, LinkStats
 from fanet_mw.units import S
 
 _ROWS = slice(s.RSSI_SUM, s.N_CUT + 1)
-"""The rows of a link that are counts: the sum of RSSI, then one per name in COUNTS."""
+"""The rows of a link that are counters: the sum of RSSI, then one for each name in COUNTS."""
 
 
 class LinkBook:
-    """What the links have carried since the last report."""
+    """The traffic of all links since the last report."""
 
     def __init__(self, stations: int) -> None:
         self._stations = stations
@@ -26,10 +26,10 @@ class LinkBook:
         self._counts: list[Ints] = []
         self._since_ns = 0
         self.next_ns: int | None = None
-        """The instant of the next report; None while the air is silent."""
+        """The instant of the next report; None while nothing is transmitted."""
 
     def begin(self, now_ns: int) -> None:
-        """Start the time that the first report covers."""
+        """Begin the time that the first report covers."""
         self._since_ns = now_ns
 
     def plan(self, now_ns: int) -> None:
@@ -45,7 +45,7 @@ class LinkBook:
             lk[_ROWS, used] = 0
 
     def close(self, now_ns: int) -> LinkStats | None:
-        """The sums since the last report; None when nothing was carried."""
+        """The sums since the last report; None if there was no traffic."""
         if not self._keys:
             return None
         since_ns, self._since_ns = self._since_ns, now_ns

@@ -1,4 +1,4 @@
-"""Statistics of the air, taken from the end of the warm-up to the beginning of the drain."""
+"""Statistics of the air from the end of the warm-up to the beginning of the drain."""
 
 from typing import NamedTuple
 
@@ -9,7 +9,7 @@ from fanet_mw.units import S
 
 
 class Sample(NamedTuple):
-    """What had been counted on the air until an instant."""
+    """The counters of the air at an instant."""
 
     g: s.Ints
     """The kernel's globals, copied."""
@@ -34,14 +34,14 @@ class Measurement:
         return self._ends_ns if self._begins_ns is None else self._begins_ns
 
     def pass_time(self, due_ns: int, now: Sample) -> None:
-        """Begin and end what is due by this instant."""
+        """Take the samples that are due by this instant."""
         if self._begins_ns is not None and self._begins_ns <= due_ns:
             self._first, self._begins_ns = now, None
         if self._ends_ns is not None and self._ends_ns <= due_ns:
             self._last, self._ends_ns = now, None
 
     def report(self, now: Sample, *, stations: int) -> dict[str, float | None]:
-        """The statistics from the beginning to the end of the measurement, or until now while it has not ended."""
+        """The statistics from the beginning to the end of the measurement, or until now if it has not ended."""
         first, last = self._first, self._last or now
         d = (last.g - first.g).tolist()
         span_ns = max(1, last.now_ns - first.now_ns)

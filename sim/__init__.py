@@ -1,1 +1,3 @@
-"""Worlds and runs: what stands around the agents and the emulator of fanet-mw."""
+"""Everything around the agents and the emulator of fanet-mw: the simulated world, runs, results,
+sweeps and commands.
+"""

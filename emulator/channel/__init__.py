@@ -1,1 +1,1 @@
-"""What happens to a signal between two antennas: path loss, shadowing, fading, and the error rates that result."""
+"""The channel between two antennas: path loss, shadowing, fading, and the error rates that result."""

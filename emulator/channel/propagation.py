@@ -1,10 +1,11 @@
-"""Links: which station receives which other one, and how strongly, by their positions [m]. Powers in dBm and mW.
+"""Links: which station receives which other one, and with what mean power, by their positions [m]. Powers in dBm and
+mW.
 
     path loss of the channel (`path_loss.py`) -> shadowing (`shadowing.py`) -> obstruction -> links above the floor
 
-`range` is no law of physics: every frame within `range_m` is received at the transmit power, nothing beyond (ns-3's
-range model), and nothing through an obstruction. Fading is drawn per frame, in the kernel (`fading.py`). Not modeled:
-antenna patterns, Doppler, interference by links below `interference_floor_dbm`.
+The channel `range` is not physics: every frame within `range_m` is received at the transmit power, nothing farther away
+(ns-3's range model), and nothing through an obstruction. Fading is drawn for each frame in the kernel (`fading.py`).
+Not modeled: antenna patterns, Doppler shift, and interference over links below `interference_floor_dbm`.
 """
 
 import math
@@ -44,7 +45,7 @@ THERMAL_DBM_PER_HZ: Final = -174.0
 DSSS_BANDWIDTH_HZ: Final = 22e6
 OFDM_BANDWIDTH_HZ: Final = 20e6
 _ROUNDING_DB: Final = 1e-9
-"""A tolerance, so that rounding does not remove a link that is exactly as long as the reach."""
+"""A tolerance, so that rounding does not remove a link exactly as long as the reach."""
 
 
 def milliwatt(dbm: float) -> float:
@@ -58,11 +59,11 @@ def noise_mw(radio: Radio) -> float:
 
 
 _MOST_DECADES: Final = 12.0
-"""The greatest reach is 10^12 m: farther than any two nodes can be apart."""
+"""The greatest reach is 10^12 m, farther than any two nodes can be apart."""
 
 
 def reach_m(radio: Radio) -> float:
-    """The distance beyond which no station even interferes, by the most favorable law and 2 sigma of shadowing."""
+    """The distance beyond which no station can interfere, by the most favorable path loss and 2 sigma of shadowing."""
     if radio.channel == "range":
         return radio.range_m
     budget_db = radio.tx_power_dbm - radio.interference_floor_dbm + 2 * radio.shadowing_db
@@ -82,7 +83,9 @@ def reach_m(radio: Radio) -> float:
 
 
 def received_dbm(distance_m: Reals, from_m: Reals, to_m: Reals, radio: Radio) -> Reals:
-    """Mean power of each link without shadowing; `from_m` and `to_m` [n, 3] are its ends, heights above the ground."""
+    """The mean power of each link without shadowing; `from_m` and `to_m` [n, 3] are its ends, with heights above
+    ground.
+    """
     if radio.channel == "range":
         return np.full_like(distance_m, radio.tx_power_dbm)
     return np.asarray(radio.tx_power_dbm - _loss_db(distance_m, from_m, to_m, radio), dtype=np.float64)
@@ -112,17 +115,17 @@ def _loss_db(distance_m: Reals, from_m: Reals, to_m: Reals, radio: Radio) -> Rea
 
 
 class Channel(Protocol):
-    """The path loss of a channel that another package brings (`fanet_mw.extensions`): a class that takes `Radio`.
+    """The path loss of a channel from another package (`fanet_mw.extensions`): a class that takes `Radio`.
 
-    It is made anew whenever links are computed, and keeps nothing: the same places give the same losses.
+    It is made anew whenever links are computed, and has no state: the same places always give the same losses.
     """
 
     def loss_db(self, distance_m: Reals, from_m: Reals, to_m: Reals) -> Reals:
-        """What frames lose on each link [n] between its ends [n, 3]."""
+        """The loss of each link [n] between its ends [n, 3]."""
         ...
 
     def reach_m(self, budget_db: float) -> float:
-        """A distance beyond which no link loses less than the budget."""
+        """A distance beyond which each link loses more than the budget."""
         ...
 
 
@@ -137,7 +140,7 @@ class LinkTable:
     def __init__(
         self, at: Reals, radio: Radio, *, spare: int, shadowing: Shadowing | None = None, blocked: Ints | None = None
     ) -> None:
-        """`blocked`: the codes (see `pair_codes`), ascending, of the pairs between which something stands."""
+        """`blocked`: the codes of the obstructed pairs (`pair_codes`), ascending."""
         found, distance = neighbors(at, reach_m(radio))
         power_dbm = received_dbm(distance, at[found[:, 0]], at[found[:, 1]], radio)
         if shadowing is not None:
@@ -168,13 +171,16 @@ class LinkTable:
         self.ints[AUDIBLE, :count] = audible
         only_audible = radio.fading == "none" and "sums" not in radio.as_ns3
         self.longest_ns = int((self.ints[DELAY] * (self.ints[AUDIBLE] if only_audible else 1)).max())
-        """The delay of the longest link that matters: of an audible one; of any, if fading or sums can raise it."""
+        """The delay of the longest link that matters: of an audible one, or of any if fading or sums can make it
+        audible."""
         self.reals[LINK_POWER, :count] = np.power(10.0, power_dbm / 10)
         self.reals[SPARED, :count] = 1.0
         self.ptr = np.searchsorted(found[:, 0], np.arange(stations + 1)).astype(np.int64)
 
     def sort_dead_last(self) -> None:
-        """Sort the links without power behind the others of their transmitter; the others stay nearest first."""
+        """Sort the links without power behind the other links of their transmitter; those stay in the order of
+        distance.
+        """
         used = slice(self.count)
         dead = self.reals[LINK_POWER, used] == 0.0
         if dead.any():

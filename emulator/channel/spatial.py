@@ -1,6 +1,7 @@
-"""Which stations are within reach of each other, found in cells as wide as the reach: the cost follows the neighbors.
+"""Finds the pairs of stations within reach of each other by cells as wide as the reach, so the effort follows the
+neighbors.
 
-Distances are in metres and through space. The cells divide the ground: stations above each other share one.
+Distances are in metres and in three dimensions. Cells divide the ground, so stations above each other share one.
 """
 
 import math
@@ -18,9 +19,9 @@ def pairs(
 ) -> int:
     """Ordered pairs of stations within reach, by source then destination; returns how many there are.
 
-    `order` lists the stations by cell and `keys` the cells in that order: a neighbor is in the same cell or in one of
+    `order` lists the stations by cell, and `keys` the cells in that order. A neighbor is in the same cell or in one of
     the eight around it, and three cells of one column are adjacent. The call fills `found` (int64 [n, 2]) and
-    `distance` as far as they go; with too little room it is to be repeated with more.
+    `distance` as far as they have room; if there are more pairs, it must be repeated with more room.
     """
     n = 0
     for a in range(at.shape[0]):

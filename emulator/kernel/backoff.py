@@ -1,10 +1,10 @@
 """The backoff of a station (IEEE 802.11-2020, 10.3.3), as functions over the rows of its state.
 
-Slots count from BASE while the medium is idle; when it turns busy, the slots that have passed are subtracted and the
-rest is kept. A pending access is one event; the event is stale when SCHEDULED holds another instant.
+Slots are counted from BASE while the medium is idle. When it becomes busy, the slots that have passed are subtracted
+from the backoff. A pending access to the medium is one event, which is stale if SCHEDULED holds another instant.
 
-After a reception that failed, EIFS takes the place of DIFS (10.3.2.3.7). EIFS begins when the medium is idle after the
-bad frame, whatever else has kept it busy. If it is interrupted it begins again, until it has passed or until a frame is
+After a failed reception, EIFS takes the place of DIFS (10.3.2.3.7). EIFS begins when the medium is idle after the bad
+frame, whatever else has kept it busy. If it is interrupted it begins again, until it has passed or until a frame is
 received without error. In ns-3.44 the extension beyond DIFS begins at the end of the bad frame, and passes while the
 medium is busy.
 """
@@ -77,7 +77,7 @@ def slots_left(p: Ints, st: Ints, s: int, t: int) -> int:
 
 @jit
 def on_busy(p: Ints, st: Ints, s: int, t: int) -> None:
-    """Freeze the backoff of a station, because its medium turns busy."""
+    """Freeze the backoff of a station, because its medium becomes busy."""
     if st[BUSY_SINCE, s] < 0:
         st[BUSY_SINCE, s] = t
         if st[BAD_UNTIL, s] + p[DIFS_NS] <= t:
@@ -93,7 +93,7 @@ def on_busy(p: Ints, st: Ints, s: int, t: int) -> None:
 
 @jit
 def on_idle(g: Ints, p: Ints, st: Ints, hs: Ints, s: int, t: int) -> None:
-    """Resume the backoff of a station, because its medium turns idle."""
+    """Resume the backoff of a station, because its medium becomes idle."""
     if st[BUSY_SINCE, s] >= 0:
         st[BUSY_NS, s] += t - st[BUSY_SINCE, s]
         st[BUSY_SINCE, s] = -1

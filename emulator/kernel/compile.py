@@ -16,24 +16,24 @@ from fanet_mw.scenario import config
 from fanet_mw.units import BROADCAST, MS, US, NodeId
 
 COMPILING_NOTICE: Final = "compiling the emulator's kernel, once: about half a minute"
-"""What to tell the user before `warm_up` when `must_compile` is true."""
+"""The message to the user before `warm_up` if `must_compile` is true."""
 
 _MOVE_NS: Final = 50 * US
-"""The shortest frame takes longer than this."""
+"""An interval that is shorter than any frame."""
 _MOVES: Final = 60
 
 
 def must_compile() -> bool:
-    """True if `warm_up` will take half a minute, because the machine code of some function is not cached yet."""
+    """True if `warm_up` will take half a minute, because some function's machine code is not cached yet."""
     return COMPILED and not _marker().exists()
 
 
 def warm_up() -> bool:
-    """Run every compiled function once, the optional ones too; returns True if they run as machine code."""
+    """Call every compiled function once, including the optional ones; returns True if they run as machine code."""
     _run({})
     _run({"channel": "friis", "shadowing_db": 1.0, "fading": "rician", "capture": True})
     if must_compile():
-        with contextlib.suppress(OSError):  # without this mark the next process compiles again, which is only slow
+        with contextlib.suppress(OSError):  # without this mark the next process compiles again, which only takes time
             _marker().touch()
     return COMPILED
 
@@ -44,7 +44,7 @@ def _marker() -> Path:
 
 
 def _run(radio: Mapping[str, object]) -> None:
-    """Let two stations send a few frames, with new poses so often that some come while a frame is on the air."""
+    """Let two stations send a few frames, with new poses so often that some arrive while a frame is on the air."""
     scenario = config.build({"nodes": {"count": 2}, "clusters": {"count": 1}, "radio": radio})
     topics = Topics("warm-up")
     medium = Medium(scenario, "warm-up")

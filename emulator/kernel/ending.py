@@ -58,7 +58,9 @@ def release(g: Ints, fr: Ints, out: Ints, f: int, t: int) -> None:
 
 @jit
 def verdict(fr: Ints, f: int) -> int:
-    """The end of a frame for its receivers; of a broadcast that none received, the reason of most losses."""
+    """How a frame has ended for its receivers; for a broadcast that no station received, the most frequent cause of
+    loss.
+    """
     outcome = fr[OUTCOME, f]
     most = max(fr[LOST_COLLISION, f], fr[LOST_HALF_DUPLEX, f], fr[LOST_WEAK, f])
     if fr[RECEIVED, f] > 0:

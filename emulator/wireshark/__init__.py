@@ -1,1 +1,1 @@
-"""What Wireshark needs to read a capture: the dissector that scripts/generate_dissector.py makes."""
+"""Wireshark's dissector for captures, made by scripts/generate_dissector.py."""

@@ -1,7 +1,7 @@
-"""The `fanet` command: which commands there are, and what becomes of errors and signals.
+"""The `fanet` command: registers all commands, and turns errors and signals into messages and exit codes.
 
-Commands stand in the modules beside this one by subject. They are all registered before one of them is known to be
-wanted, so a module of commands imports at its top only what `--help` needs.
+The commands are in the modules beside this one, by subject. All of them are registered whichever command is called, so
+these modules import at their top only what `--help` needs.
 """
 
 import sys
@@ -20,7 +20,7 @@ app = App(
     name="fanet",
     help="Middleware for swarms of UAVs, and the network emulator it is developed and proven on.",
     version=__version__,
-    version_format="plaintext",  # as Markdown it would be rendered by a parser that takes long to import
+    version_format="plaintext",  # Markdown would be rendered by a parser that takes long to import
     console=Console(),
     suppress_keyboard_interrupt=False,
 )
@@ -31,9 +31,10 @@ app.register_install_completion_command()
 
 
 def changes_last(words: Sequence[str]) -> list[str]:
-    """The words of a command line with what is set at its end: there it takes no word that is none of it.
+    """The words of a command line, with `--set` and its values moved to the end, where no other word can be taken for a
+    value.
 
-    `--set` takes the word behind it and all further ones with `=`.
+    `--set` takes the word after it and all further ones that contain `=`.
     """
     changes: list[str] = []
     rest: list[str] = []
@@ -51,7 +52,7 @@ def changes_last(words: Sequence[str]) -> list[str]:
 
 
 def refused(why: str) -> int:
-    """Say why a request could not be met; returns the exit code for that."""
+    """Print why a request could not be met; returns the exit code for that."""
     from rich.markup import escape
 
     Console(stderr=True).print(f"[bold red]fanet:[/] {escape(why)}", highlight=False, soft_wrap=True)

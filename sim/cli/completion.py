@@ -1,4 +1,4 @@
-"""The words that the shell offers: scenarios by name, and keys of a scenario for `--set`."""
+"""The words that the shell completes: names of scenarios, and keys of a scenario for `--set`."""
 
 from typing import Annotated, TypeAlias
 
@@ -14,7 +14,7 @@ def scenario_names(context: CompletionContext) -> list[str]:
 
 
 def keys(context: CompletionContext) -> list[str]:
-    """Dotted keys of a scenario, each with its `=`."""
+    """The dotted keys of a scenario, each with its `=`."""
     from fanet_mw.scenario.reference import dotted_keys
 
     return [f"{key}=" for key in dotted_keys() if key.startswith(context.incomplete)]

@@ -1,6 +1,4 @@
-"""Printing for people, and the end of a command whose reader has gone: `fanet ... | head` ends as any Unix tool
-does.
-"""
+"""Prints for people, and ends a command quietly if its reader has gone, as in `fanet ... | head`."""
 
 import os
 import sys
@@ -13,7 +11,7 @@ CLOSED: Final = 128 + 13
 
 
 class Console(rich.console.Console):
-    """rich's, but a reader that is gone is an error like any other: `main` ends the command."""
+    """The console of rich, except that writing to a closed pipe raises an error; `main` then ends the command."""
 
     def on_broken_pipe(self) -> None:
         self.quiet = True
@@ -21,7 +19,9 @@ class Console(rich.console.Console):
 
 
 def nobody_reads() -> NoReturn:
-    """End the command without a word. The signal itself would also end a service whose peer has closed a socket."""
+    """End the command without a message. The default handling of SIGPIPE would also end a service whose peer closes a
+    socket.
+    """
     nowhere = os.open(os.devnull, os.O_WRONLY)
     for stream in (sys.stdout, sys.stderr):  # what is buffered would fail once more at exit
         os.dup2(nowhere, stream.fileno())

@@ -1,8 +1,9 @@
-"""What to expect of each link before take-off, by the emulator's own channel: power, and share of frames that arrive.
+"""The expected quality of each link before take-off, by the emulator's channel model: power, and share of received
+frames.
 
     mean power (path loss; shadowing of another seed than the run's) -> gains of fading -> mean success of a frame
 
-Frames are those of the application, and no other node sends: in turns none within reach does. Not in it: obstacles.
+The frames are those of the application, and no other node transmits, as in turns. Obstacles are not considered.
 """
 
 import math
@@ -19,11 +20,11 @@ from fanet_mw.wire.links import Link, grade_of, power_of
 
 _GAINS: Final = 400
 _LEAST: Final = 0.02
-"""Links below this share are heard too rarely to be known."""
+"""Links with a smaller share are received too rarely to be known."""
 
 
 def expected_links(scenario: Scenario, at: Mapping[NodeId, Enu], *, draw: int) -> tuple[Link, ...]:
-    """One entry per pair that hears each other; `draw` numbers the draws of shadowing."""
+    """One entry per pair of nodes that receive each other; `draw` is the number of the draw of shadowing."""
     import numpy as np
 
     from emulator.channel.error_rate import header_rates, log_success_per_bit
@@ -64,7 +65,7 @@ def expected_links(scenario: Scenario, at: Mapping[NodeId, Enu], *, draw: int) -
 
 
 def _gains(radio: Radio) -> list[float]:
-    """Gains of the scenario's fading, as `emulator/channel/fading.py` has it."""
+    """Power gains of the scenario's fading, by `emulator/channel/fading.py`."""
     random = stream(0, "plan", 0)
     if radio.fading == "nakagami":
         return [max(1e-12, random.gammavariate(radio.nakagami_m, 1 / radio.nakagami_m)) for _ in range(_GAINS)]

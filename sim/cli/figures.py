@@ -1,4 +1,6 @@
-"""`fanet figures` and `fanet report`: the paper's evaluation from shipped sweeps, with a verdict of each claim."""
+"""`fanet figures` and `fanet report`: recreate the paper's evaluation by shipped sweeps, with a
+verdict on each claim.
+"""
 
 from pathlib import Path
 from typing import Annotated

@@ -1,7 +1,7 @@
-"""The chance of a frame on a link against noise and other senders of its turn, by the emulator's own error rates.
+"""The probability that a frame is received against noise and other senders of its turn, by the emulator's error rates.
 
-Interference lasts for the whole frame, which is the worst case. Fading and shadowing have no chance per frame that is
-independent of the last one's (shadowing), or would have to be averaged over draws (fading): both are refused.
+Interference is assumed to last for the whole frame, which is the worst case. Fading and shadowing are refused: with
+shadowing the losses of successive frames are not independent, and fading would have to be averaged over draws.
 """
 
 import math
@@ -15,7 +15,7 @@ from fanet_mw.units import Enu, NodeId
 
 
 def chance_of(scenario: Scenario, at: Mapping[NodeId, Enu]) -> Chance | None:
-    """`Chance` of the application's frames; None with fading, shadowing or obstacles."""
+    """The `Chance` of the application's frames; None with fading, shadowing or obstacles."""
     radio = scenario.radio
     if radio.fading != "none" or radio.shadowing_db > 0 or scenario.world.has_obstacles:
         return None
@@ -25,9 +25,9 @@ def chance_of(scenario: Scenario, at: Mapping[NodeId, Enu]) -> Chance | None:
 
 
 def _by_error_rate(scenario: Scenario, at: Mapping[NodeId, Enu]) -> Chance:
-    """Channels with powers: the error rates at the signal to noise and interference ratio.
+    """For channels with powers: the error rates at the signal to interference and noise ratio.
 
-    What computes with numpy is imported here, so that a plan on the channel `range` needs no extra of the package.
+    Modules that need numpy are imported here, so that a plan on the channel `range` needs no extra of the package.
     """
     import numpy as np
 
@@ -63,6 +63,8 @@ def _by_error_rate(scenario: Scenario, at: Mapping[NodeId, Enu]) -> Chance:
 
 
 def _clear(at: Mapping[NodeId, Enu], receiver: NodeId, senders: tuple[NodeId, ...], range_m: float) -> float:
-    """Channel `range`: 1 if the receiver hears one sender only, and is none itself."""
+    """For the channel `range`: 1 if exactly one sender is within range of the receiver, and the receiver does not send
+    itself.
+    """
     heard = sum(at[receiver].minus(at[sender]).norm() <= range_m for sender in senders)
     return float(heard == 1 and receiver not in senders)

@@ -1,4 +1,4 @@
-"""`fanet links`: a table of the links of a swarm that runs, renewed with every report of its emulator."""
+"""`fanet links`: a table of the links of a running swarm, renewed with each report of its emulator."""
 
 import contextlib
 import queue
@@ -19,7 +19,7 @@ from fanet_mw.units import S
 from sim.run.bus.air_control import OPERATOR, find_swarm
 
 _LOOK_S: Final = 0.5
-"""The interval at which the router is looked for while nothing comes."""
+"""The interval at which the router is checked while nothing arrives."""
 
 
 def watch(
@@ -31,9 +31,9 @@ def watch(
     console: Console,
     zenoh_config: Path | None = None,
 ) -> int:
-    """Show links (those of one node, if given) until interrupted, or so many reports.
+    """Show the links, or those of one node, until interrupted, or until `reports` reports have come.
 
-    Raises BusError without a router or when it goes, FanetError without a swarm.
+    Raises BusError if there is no router or if it goes away, FanetError if there is no swarm.
     """
     with Bus.join(endpoint, config_of(zenoh_config, OPERATOR)) as bus:
         name = swarm or find_swarm(bus)
@@ -47,7 +47,7 @@ def watch(
 
 
 def _reports(bus: Bus, names: Topics) -> Iterator[LinkStats]:
-    """Link reports as they come, malformed ones left out; raises BusError when the router is gone."""
+    """Link reports as they arrive, without malformed ones; raises BusError when the router is gone."""
     heard: queue.SimpleQueue[bytes] = queue.SimpleQueue()
     bus.subscribe(names.radio_links, lambda _, payload: heard.put(payload))
     while True:

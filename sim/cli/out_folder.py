@@ -1,6 +1,6 @@
-"""The folder of `--out` before a run: it can be written, and nothing in it is of another run.
+"""Prepares the folder of `--out` before a run: it must be writable, and must not contain the result of another run.
 
-Looked at first, because a run may take an hour and its result has nowhere else to go.
+It is checked first, because a run may take an hour, and its result has nowhere else to go.
 """
 
 import contextlib
@@ -15,14 +15,14 @@ from fanet_mw.errors import ConfigError
 from sim.report import names
 
 FILES: Final = ("summary.json", "scenario.toml", "reports.json", "links.json", "trace.jsonl", "mavlink.tlog")
-"""What a run writes, besides captures and the files of its page."""
+"""The files that a run writes, besides captures and the files of its page."""
 _MOST_SAID: Final = 8
 
 
 def prepare(out: Path, *, force: bool) -> None:
-    """Make the folder; with `force` remove what an earlier run left in it, and nothing else.
+    """Make the folder; with `force`, remove what an earlier run has left in it, and nothing else.
 
-    Raises ConfigError when it cannot be written, or when there is something of an earlier run and no `force`.
+    Raises ConfigError if it cannot be written, or if it has files of an earlier run and `force` is not given.
     """
     try:
         out.mkdir(parents=True, exist_ok=True)
@@ -37,13 +37,13 @@ def prepare(out: Path, *, force: bool) -> None:
             )
         for path in used:
             path.unlink()
-        with contextlib.suppress(OSError):  # it is not there, or holds a file of another program
+        with contextlib.suppress(OSError):  # the file is missing, or belongs to another program
             (out / names.PICTURES).rmdir()
     except OSError as error:
         raise ConfigError(f"--out {out}: cannot be written: {error.strerror}") from error
 
 
 def _said(paths: Sequence[Path]) -> str:
-    """The names of some files, and how many others there are."""
+    """The names of some files, and the number of the others."""
     others = len(paths) - _MOST_SAID
     return ", ".join(path.name for path in paths[:_MOST_SAID]) + (f" and {others} more" if others > 0 else "")

@@ -44,15 +44,16 @@ from sim.cli.frame_chance import chance_of
 from sim.world.mobility.layout import positions
 
 _DRAWS: Final = 3
-"""Draws of shadowing for which a plan is made; each takes up to some seconds."""
+"""The number of draws of shadowing for which a plan is made; each takes up to some seconds."""
 
 
 def judge(
     scenario: Scenario, *, deadline_s: float | None = None, search: bool = False, change: bool = True
 ) -> tuple[str, dict[str, Any], bool]:
-    """(text, JSON, feasible) of a scenario where its nodes start.
+    """(text, JSON, feasible) for a scenario at its starting positions.
 
-    `change`: look for the cheapest change when it is not feasible; `search`: for what takes the least airtime.
+    `change`: search the cheapest change if it is not feasible. `search`: search the configuration with the least
+    airtime.
     """
     if scenario.routing.protocol != "clustered":
         raise ConfigError(f'routing.protocol = {scenario.routing.protocol}: only "clustered" can be planned')
@@ -87,7 +88,7 @@ def judge(
 def _judge_lossy(
     scenario: Scenario, at: dict[NodeId, Enu], sources: list[NodeId], *, deadline_ns: int | None
 ) -> tuple[str, dict[str, Any], bool]:
-    """Over links that lose frames. Nothing better is searched for: one such plan takes seconds."""
+    """Judge a scenario with lossy links. Nothing better is searched for, because one such plan takes seconds."""
     classes = demands(scenario, sources)
     if isinstance(classes, Refused):
         return describe(classes), {"feasible": False, "problems": [classes.reason]}, False
@@ -123,13 +124,13 @@ def _lossy_json(found: LossyPlan) -> dict[str, Any]:
 
 
 def _places(scenario: Scenario) -> dict[NodeId, Enu]:
-    """The places at which the nodes start, in whole metres, as the leader will tell them."""
+    """The starting positions of the nodes in whole metres, as the leader will announce them."""
     start = zip(scenario.node_ids, positions(scenario), strict=True)
     return {NodeId(node): rounded(place) if scenario.clusters.relay == "scheduled" else place for node, place in start}
 
 
 def _loss(scenario: Scenario, superframe: TimetablePlan, table: Timetable, at: dict[NodeId, Enu]) -> Loss | None:
-    """The loss of packets that have turns; a way to a head that contends is not in it."""
+    """The loss of packets that have turns; ways to a head in contention are not included."""
     chance = chance_of(scenario, at)
     if chance is None:
         return None
@@ -240,7 +241,7 @@ def _ms(outcome: DelayBound) -> float | None:
 
 
 def show(scenario: Scenario, *, deadline: float | None, search: bool, as_json: bool) -> int:
-    """Print the plan; 0: feasible, 1: not."""
+    """Print the plan; returns 0 if it is feasible, otherwise 1."""
     text, content, feasible = judge(scenario, deadline_s=deadline, search=search)
     print(json.dumps(content, indent=2) if as_json else text)
     return 0 if feasible else 1

@@ -1,6 +1,6 @@
-"""`fanet simulate`, `launch` and `plan`: a scenario in virtual time, in real time, and before either.
+"""`fanet simulate`, `launch` and `plan`: run a scenario in virtual time or in real time, or judge it beforehand.
 
-A command parses, shows progress and returns an exit code; what it does is a function elsewhere, imported by it alone.
+A command parses, shows progress and returns an exit code. It imports the function that does the work when it is called.
 """
 
 import sys
@@ -158,7 +158,7 @@ def plan(
 
 @contextmanager
 def _progress(scenario: "Scenario", *, quiet: bool) -> Iterator[Callable[[float], None]]:
-    """A bar of simulated seconds on standard error, only when a person watches."""
+    """A progress bar of simulated seconds on standard error, if a person is watching."""
     if quiet or not _err.is_terminal:
         yield lambda _seconds: None
         return
@@ -171,7 +171,7 @@ def _progress(scenario: "Scenario", *, quiet: bool) -> Iterator[Callable[[float]
 
 
 def _finish(outcome: "Outcome", output: OutputFlags) -> int:
-    """Write and show the result; 0 only when it may be used."""
+    """Write and show the result; returns 0 only if it may be used."""
     from json import dumps
 
     from sim.results import report

@@ -1,4 +1,4 @@
-"""`fanet sweep`: many runs, validated before the first, kept as they end."""
+"""`fanet sweep`: many runs, which are validated before the first one starts and stored as they end."""
 
 import contextlib
 import json as json_module
@@ -25,7 +25,7 @@ if TYPE_CHECKING:
 
 _err = Console(stderr=True)
 _SAY_S: Final = 20.0
-"""The interval at which progress is printed where no terminal shows a bar."""
+"""The interval at which progress is printed if there is no terminal for a progress bar."""
 
 
 def add_to(app: App) -> None:
@@ -92,7 +92,7 @@ def carry_out(
     dry_run: bool = False,
     json: bool = False,
 ) -> int:
-    """Plan a sweep, say what it will take, and carry it out."""
+    """Plan a sweep, print how long it will take, and carry it out."""
     from sim.sweep.run import SweepPlan, run
     from sim.sweep.store import TABLE, Store
     from sim.sweep.tasks import tasks_of
@@ -133,7 +133,7 @@ def carry_out(
 
 
 def asked(what: str, sets: tuple[str, ...], seeds: int | None, variant: str | None) -> "tuple[str, Sweep]":
-    """The sweep that is meant, and its name."""
+    """The sweep that the user means, and its name."""
     from sim.sweep import spec
     from sim.sweep.spec import Sweep
     from sim.sweep.toml_values import axis
@@ -188,7 +188,7 @@ def _warn_of_codes(store: "Store", plan: "SweepPlan") -> None:
 
 
 def _compile() -> None:
-    """Compile the kernel once, before workers do so each for itself."""
+    """Compile the kernel once, so that not every worker does so for itself."""
     from emulator.kernel.compile import COMPILING_NOTICE, must_compile, warm_up
 
     if must_compile():
@@ -211,7 +211,7 @@ def _say_failures(table: "Table") -> None:
 
 @contextlib.contextmanager
 def _progress(name: str, *, quiet: bool) -> "Iterator[Callable[[Progress], None]]":
-    """A bar when a person watches, else a line now and then."""
+    """A progress bar if a person is watching, otherwise a line from time to time."""
     from sim.sweep.cost import spoken
 
     if quiet:

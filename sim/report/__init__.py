@@ -1,1 +1,1 @@
-"""Pages for people: of the paper's evaluation with verdicts, and of a single run."""
+"""HTML pages for people: one of the paper's evaluation with verdicts, and one of a single run."""

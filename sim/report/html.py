@@ -1,4 +1,6 @@
-"""A page as a list of blocks, written as one HTML file that needs nothing else, and as Markdown beside its pictures."""
+"""A page as a list of blocks, which is written as one self-contained HTML file, and as Markdown with pictures beside
+it.
+"""
 
 import base64
 import html
@@ -63,7 +65,7 @@ _VERDICTS: Final = ("agrees", "partly", "differs")
 
 
 def as_html(title: str, blocks: Iterable[Block]) -> str:
-    """The page with its pictures inside: it can be mailed, and opened without a network."""
+    """The page with its pictures inside, so that it can be mailed and opened without a network."""
     body = "\n".join(_html(block) for block in blocks)
     return (
         f'<!doctype html>\n<html lang="en">\n<head>\n<meta charset="utf-8">\n<title>{html.escape(title)}</title>\n'
@@ -97,7 +99,7 @@ def _cell(text: str) -> str:
 
 
 def as_markdown(title: str, blocks: Iterable[Block], folder: Path) -> str:
-    """The page as Markdown for this folder: pictures are linked by their place relative to it."""
+    """The page as Markdown for this folder; pictures are linked by their paths relative to it."""
     return "\n\n".join([f"# {title}", *(_markdown(block, folder.resolve()) for block in blocks)]) + "\n"
 
 

@@ -1,4 +1,4 @@
-"""The names of the files that make a page, so that they can be told from anything else in a folder."""
+"""The names of the files of a page, so that they can be told from all others in a folder."""
 
 from pathlib import Path
 from typing import Final

@@ -1,4 +1,6 @@
-"""The page of an evaluation: settings beside the paper's, each figure with claims, findings and verdicts, commands."""
+"""The page of an evaluation: its settings beside the paper's, and each figure with claims, findings, verdicts and
+commands.
+"""
 
 import json
 from collections.abc import Mapping, Sequence
@@ -56,7 +58,7 @@ _SETTINGS: Final = Rows(
 )
 
 _COLUMNS: Final = ("claim", "findings", "verdict", "why")
-"""The columns of the table of a figure's claims; the last is left out where no claim needs a reason."""
+"""The columns of the table of claims; the last one is left out if no claim needs a reason."""
 
 
 def write(folders: Sequence[Path], out: Path) -> list[Path]:
@@ -99,7 +101,7 @@ def evaluation(folders: Sequence[Path]) -> list[Block]:
 
 
 class FigurePage(NamedTuple):
-    """What there is to say of one figure."""
+    """The blocks about one figure."""
 
     name: str
     title: str
@@ -117,7 +119,7 @@ def figure_pages(folders: Sequence[Path]) -> list[FigurePage]:
 
 
 def commands(folders: Sequence[Path]) -> list[Block]:
-    """The commands by which the figures were made."""
+    """The commands that made the figures."""
     return _commands(_all(folders))
 
 
@@ -126,7 +128,7 @@ def _all(folders: Sequence[Path]) -> list[tuple[Path, dict[str, Any]]]:
 
 
 def _figures(folder: Path) -> list[tuple[Path, dict[str, Any]]]:
-    """What `fanet figures` left in a folder, in the order of the paper."""
+    """The figures that `fanet figures` has left in a folder, in the order of the paper."""
     names = [name for name in _ORDER if (folder / f"{name}.json").exists() and (folder / f"{name}.png").exists()]
     return [(folder, json.loads((folder / f"{name}.json").read_text(encoding="utf-8"))) for name in names]
 
@@ -180,7 +182,7 @@ def _title(about: Mapping[str, Any]) -> str:
 
 
 def _reason(reason: Mapping[str, Any]) -> str:
-    """Why a verdict is what it is, with its experiment; what the runs do not show is said to be not shown."""
+    """The reason of a verdict, with the experiment that shows it; what the runs do not show is marked as not shown."""
     evidence = "; ".join(one["text"] for one in reason["statements"])
     doubt = "" if reason["shown"] else "Supposed, but not shown by these runs: "
     chosen = reason.get("set_afterwards")

@@ -1,4 +1,4 @@
-"""The page of one run, from the files of its folder: what arrived and when, over which links, in which slots."""
+"""The page of one run, from the files in its folder: what arrived and when, over which links, in which slots."""
 
 import json
 import tomllib
@@ -28,9 +28,10 @@ from sim.report.names import KINDS, PICTURES
 from sim.world.mobility.layout import positions
 
 _WINDOWS = 40
-"""Steps of the delivery ratio over time."""
+"""The number of steps of the delivery ratio over time."""
 _SHARES = ListedColormap([colormaps["viridis"](step / 255) for step in range(200)])
-"""From dark violet for links that lose all to green: the yellow end of the map would be lost on white."""
+"""Colors from dark violet, for links that lose everything, to green; the yellow end of the color map is invisible on
+white."""
 _BLUE, _RED, _GREEN, _PINK, _ORANGE = (look.color for look in SERIES)
 
 
@@ -41,7 +42,7 @@ def is_run(folder: Path) -> bool:
 
 @dataclass(slots=True)
 class _Story:
-    """What the trace tells, as the pictures need it."""
+    """The content of a trace, as the pictures need it."""
 
     scenario: Scenario
     sent: dict[tuple[int, int], int] = field(default_factory=dict)
@@ -131,7 +132,7 @@ def blocks_of_run(folder: Path, out: Path) -> list[Block]:
 
 
 def _figures_of(summary: Mapping[str, Any]) -> Rows:
-    """The summary's first figures, with what they count."""
+    """The first figures of the summary, each with what it counts."""
     bound, air = summary["bound"], summary["air"]
     rows = [
         ("delivered / (packets x targets)", _said(summary["pdr"])),

@@ -1,4 +1,4 @@
-"""The result of a run, whichever host ran it: the input of metrics and files."""
+"""The outcome of a run, in virtual or in real time: the input of metrics and files."""
 
 from collections.abc import Collection, Mapping
 from dataclasses import dataclass, field
@@ -11,35 +11,35 @@ from sim.results.links import LinkTotals
 
 @dataclass(slots=True)
 class Outcome:
-    """The result of one run, finished or cut short."""
+    """The outcome of one run, complete or partial."""
 
     scenario: Scenario
     mode: Literal["virtual", "realtime"]
     wall_s: float
     records: Collection[Record]
-    """The trace records by instant; within one instant as they were made (virtual) or by node (real time). They are on
-    disk and decoded anew each time they are read; in virtual time, those of the last while are in memory. `of` in
-    `collecting.trace_reading` reads those of some kinds."""
+    """The trace records by instant, within one instant in the order in which they were made (virtual time) or by node
+    (real time). They are on disk and decoded each time they are read; in virtual time the latest are in memory.
+    `collecting.trace_reading.records_of` reads those of some kinds."""
     reports: Mapping[str, Mapping[str, Any]]
     """The last report of each actor, by its name."""
     taps: Collection[tuple[int, bytes]] = ()
-    """Pairs (instant ns, MAVLink bytes) for the `.tlog`."""
+    """Pairs (instant ns, MAVLink bytes) for `mavlink.tlog`."""
     links: LinkTotals = field(default_factory=LinkTotals)
-    """What each link has carried."""
+    """The statistics of all links."""
     ended: list[tuple[str, int]] = field(default_factory=list)
-    """Pairs (name, exit code) of processes that ended before their time."""
+    """Name and exit code of each process that ended too early."""
     aborted: str | None = None
-    """Why the run is partial; None when it ran to its end."""
+    """Why the run is partial; None if it is complete."""
     ended_ns: int | None = None
-    """The swarm instant at which a partial run ended; None when it ran to its end."""
+    """The swarm instant at which a partial run ended; None if it is complete."""
     epoch_unix_ns: int = 0
     """The unix time of swarm instant 0; a fixed one in virtual time, so that the same run gives the same files."""
     ready_s: float = 0.0
-    """The time until all processes were up, in real time."""
+    """The time until all processes were present, in real time only."""
     heard: Mapping[str, Any] = field(default_factory=dict)
-    """The puts that the launcher received, and what of them was refused, by what was wrong; in real time only."""
+    """The number of puts that the launcher received, and of refused items by what was wrong; in real time only."""
     absent: Mapping[str, str] = field(default_factory=dict)
-    """The reason why there is no report of an actor, by the actor's name; in real time only."""
+    """Why the report of an actor is missing, by the actor's name; in real time only."""
     stall_ms: float = 0.0
     """The longest time for which the launcher, and with it the bus, could do nothing; in real time only."""
 

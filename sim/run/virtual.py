@@ -30,10 +30,10 @@ from sim.world.mobility.layout import positions
 from sim.world.world import WorldActor
 
 EPOCH_UNIX_NS: Final = 1_735_689_600 * S
-"""2025-01-01T00:00:00Z, the instant of swarm instant 0 in logs that want unix time. It is not the time of the run, so
-that the same scenario and seed give the same files; and it is not 1970, which some tools take for no time at all."""
+"""2025-01-01T00:00:00Z: the unix time of swarm instant 0 in logs. It is fixed, so that the same scenario and seed give
+the same files. It is not 1970, which some tools take for no time at all."""
 Applications = Callable[[int], Sequence[Application]]
-"""The applications of a user for each node."""
+"""A user's applications for each node."""
 
 
 def no_applications(_: int) -> Sequence[Application]:
@@ -41,7 +41,7 @@ def no_applications(_: int) -> Sequence[Application]:
 
 
 _STEP_NS: Final = 100 * MS
-"""The time between two checks for signals. How a run is divided into steps changes nothing in it."""
+"""The time between two checks for signals. The result of a run does not depend on it."""
 
 
 def actors_of(
@@ -51,7 +51,7 @@ def actors_of(
     capture: Capture | None = None,
     applications: Applications = no_applications,
 ) -> list[Actor]:
-    """Every actor of a swarm: the world first, so that poses stand before any node transmits."""
+    """All actors of a swarm: the world comes first, so that poses are known before any node transmits."""
     starts, onboard_map, reader = positions(scenario), map_on_board(scenario), Reader()
     uavs = [
         make_uav(
@@ -77,12 +77,13 @@ def simulate(
     applications: Applications = no_applications,
     spool_folder: Path | None = None,
 ) -> Outcome:
-    """Run a scenario to its end, or until `signals` holds a signal's number: then the outcome is what there is so far.
+    """Run a scenario to its end, or until `signals` holds the number of a signal; then the outcome is what there is so
+    far.
 
-    `applications` gives those of the user for each node, beside what the scenario asks for. `on_progress` is told the
-    simulated seconds that have passed. What a long run collects is kept in a file without a name in `spool_folder`, by
-    default the folder for temporary files. Raises KeyboardInterrupt with the signal's number when that comes before
-    anything has been simulated.
+    `applications` gives the user's applications for each node, in addition to those of the scenario. `on_progress` is
+    told how many seconds have been simulated. A long run keeps what it collects in a nameless file in `spool_folder`,
+    by default in the folder for temporary files. Raises KeyboardInterrupt with the signal's number if it comes before
+    anything was simulated.
     """
     observed = Observed(scenario, capture=capture, applications=applications, folder=spool_folder)
     began = time.perf_counter()
@@ -93,10 +94,10 @@ def simulate(
 
 
 class Observed:
-    """The actors of a scenario on their host, and what is heard of them.
+    """The actors of a scenario on their host, and what is collected from them.
 
-    The host holds what is collected, and not this object: so all of it goes, and its files are closed, as soon as
-    nobody holds the outcome any more. The garbage collector, which is off in a run, would find it late.
+    The host refers to all that is collected, and this object does not. So everything is freed, and the files are
+    closed, as soon as nobody refers to the outcome any more, without the garbage collector, which is off in a run.
     """
 
     def __init__(
@@ -107,7 +108,9 @@ class Observed:
         applications: Applications = no_applications,
         folder: Path | None = None,
     ) -> None:
-        """What is too long for memory is kept in a nameless file in `folder`, by default that for temporary files."""
+        """What is too long for memory is kept in a nameless file in `folder`, by default in the folder for temporary
+        files.
+        """
         self.scenario = scenario
         self.records = TraceLog(folder)
         self.names = Topics(scenario.name)
@@ -130,7 +133,7 @@ class Observed:
         )
 
     def outcome(self, *, wall_s: float, cut_short: str) -> Outcome:
-        """What there is, once the host has been stopped; `cut_short`: why, if that was before the scenario's end."""
+        """The outcome, once the host was stopped; `cut_short` says why if that was before the end of the scenario."""
         cut = self.host.now_ns < self.scenario.duration_ns
         return Outcome(
             scenario=self.scenario,
@@ -160,7 +163,9 @@ def _run(host: VirtualHost, scenario: Scenario, on_progress: Callable[[float], N
 
 @contextmanager
 def _no_collector() -> Iterator[None]:
-    """Switch the garbage collector off: a run makes millions of small tuples and no cycles; this saves a tenth."""
+    """Switch the garbage collector off: a run makes millions of small tuples and no cycles, so this saves a tenth of
+    the time.
+    """
     was_on = gc.isenabled()
     gc.disable()
     try:
@@ -169,4 +174,4 @@ def _no_collector() -> Iterator[None]:
         if was_on:
             gc.freeze()
             gc.enable()
-            gc.unfreeze()  # what the run has left counts as old, so that the collector does not walk through it at once
+            gc.unfreeze()  # all that the run has left counts as old, so that the collector does not examine it at once

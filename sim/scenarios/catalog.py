@@ -1,4 +1,4 @@
-"""Scenarios by name or path, read and checked."""
+"""Finds a scenario by name or path, reads and checks it."""
 
 from collections.abc import Iterable
 from pathlib import Path
@@ -12,9 +12,9 @@ __all__ = ["Entry", "find", "shipped", "text_of"]
 
 
 def find(name: str | Path, overrides: Iterable[str] = ()) -> Scenario:
-    """The scenario of a file (a Path, or text that has a slash or ends in .toml), else the shipped one of that name.
+    """The scenario in a file (a Path, or text with a slash or ending in .toml), or else the shipped one of that name.
 
-    `overrides` are `KEY=VALUE`. Raises ConfigError with every mistake.
+    `overrides` are `KEY=VALUE`. Raises ConfigError with all mistakes.
     """
     if isinstance(name, Path) or _is_file(name):
         return _searchable(config.load(Path(name), overrides), str(name))
@@ -23,7 +23,7 @@ def find(name: str | Path, overrides: Iterable[str] = ()) -> Scenario:
 
 
 def _searchable(scenario: Scenario, source: str) -> Scenario:
-    """A scenario whose UAVs are enough for the search that it asks for; raises ConfigError otherwise."""
+    """The scenario, if it has enough UAVs for the search that it asks for; raises ConfigError otherwise."""
     search = scenario.mission.search
     if search == "none":
         return scenario
@@ -41,7 +41,7 @@ def _searchable(scenario: Scenario, source: str) -> Scenario:
 
 
 def text_of(name: str) -> str:
-    """The text of a scenario that is right: of a file, or of the shipped one of that name."""
+    """The text of a valid scenario: that of a file, or that of the shipped scenario of this name."""
     find(name)
     return Path(name).read_text(encoding="utf-8") if _is_file(name) else entry(name).text
 

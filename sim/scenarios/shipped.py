@@ -9,7 +9,7 @@ from fanet_mw.errors import ConfigError
 
 
 class Entry(NamedTuple):
-    """One shipped scenario: its name and what it is."""
+    """One shipped scenario: its name and its description."""
 
     name: str
     description: str
@@ -27,7 +27,7 @@ def shipped() -> list[Entry]:
 
 
 def entry(name: str) -> Entry:
-    """The shipped scenario of a name; raises ConfigError when there is none."""
+    """The shipped scenario of a name; raises ConfigError if there is none."""
     entries = {entry.name: entry for entry in shipped()}
     if name not in entries:
         close = difflib.get_close_matches(name, entries, n=1)

@@ -1,1 +1,1 @@
-"""Sweeps: many runs in virtual time, each with its settings and seed, and one table of what came out of them."""
+"""Sweeps: many runs with different settings and seeds, and one table of their results."""

@@ -1,7 +1,7 @@
-"""The time that a run will take: a rough guess from what its scenario puts on the air.
+"""Estimates how long a run will take, from the frames that its scenario will put on the air.
 
-The time is that of the copies of frames at receivers, mostly. The guess is good to a factor of two or so; as runs of a
-sweep end, what is left is told from how much the guesses were off.
+Most of the time goes into the copies of frames at receivers. The estimate is right to a factor of about two. While runs
+of a sweep end, the estimate for the rest is corrected by how much the finished ones took.
 """
 
 import math
@@ -12,31 +12,31 @@ from agents.applications.traffic import sources_of
 from fanet_mw.scenario.model import Scenario
 
 _START_S: Final = 0.05
-"""Setting up and summing up."""
+"""The time to set up and to summarize a run."""
 _START_UP_S: Final = 3.0
-"""In real time: until the processes begin to start, and from their end to the summary."""
+"""In real time: the time until the processes begin to start, and from their end to the summary."""
 _PER_PROCESS_S: Final = 0.1
-"""In real time: start and end of one process."""
+"""In real time: the time to start and end one process."""
 _PER_HELLO_S: Final = 0.25e-3
-"""CPU seconds per hello, with what neighbors do about it."""
+"""CPU seconds per hello, including what neighbors do about it."""
 _PER_FLIGHT_S: Final = 0.6e-3
-"""CPU seconds per node that flies, and simulated second: guidance, fixes, links."""
+"""CPU seconds per simulated second for each flying node: guidance, fixes, links."""
 _PER_SEARCHER_S: Final = 3.3e-3
-"""The same for a node of a planned search."""
+"""The same for each node of a planned search."""
 _PER_BODY_S: Final = 3e-3
-"""The same for a body of the physics engine."""
+"""The same for each body of the physics engine."""
 _PER_FRAME_S: Final = 30e-6
 """CPU seconds per frame on the air, with its copies at some eight receivers."""
 _PER_HEADS_FRAME_S: Final = 60e-6
-"""The same where heads queue packets for their slots."""
+"""The same if heads queue packets for their slots."""
 _PER_TURN_S: Final = 85e-6
-"""CPU seconds per packet and node in a timetable: turns, room and bounds are computed for each."""
+"""CPU seconds per packet and node with a timetable, whose turns, room and bounds are computed for each."""
 _MOST_FRAMES: Final = 80
-"""Frames per node and second when the channel is full: 11 Mb/s, shared by some nine in reach."""
+"""The number of frames per node and second on a saturated channel: 11 Mb/s, shared by about nine nodes within reach."""
 
 
 def guess_s(scenario: Scenario) -> float:
-    """CPU seconds that one run will take on a present core."""
+    """The CPU seconds that one run will take on a present core."""
     count, clustered = scenario.nodes.count, scenario.routing.protocol == "clustered"
     by_timetable = clustered and scenario.clusters.relay == "scheduled"
     classes = scenario.traffic_classes
@@ -58,7 +58,7 @@ def guess_s(scenario: Scenario) -> float:
 
 
 def _packets(scenario: Scenario, name: str) -> float:
-    """Packets of a class per second."""
+    """The number of packets of a class per second."""
     traffic = scenario.traffic_classes[name]
     if traffic.arrivals == "saturated":
         return math.inf
@@ -66,12 +66,12 @@ def _packets(scenario: Scenario, name: str) -> float:
 
 
 def launch_s(scenario: Scenario) -> float:
-    """Seconds that one run in real time will take: its own, and those in which its processes start."""
+    """The seconds that one run in real time will take, including those in which its processes start."""
     return scenario.duration_s / scenario.time_scale + _START_UP_S + _PER_PROCESS_S * scenario.nodes.count
 
 
 class TimeLeft:
-    """What is left of a sweep, by guesses that are corrected by what the finished runs took."""
+    """The remaining time of a sweep, estimated and corrected by what the finished runs took."""
 
     def __init__(self, guesses_s: Iterable[float], *, workers: int) -> None:
         self._left_s = math.fsum(guesses_s)
@@ -79,19 +79,19 @@ class TimeLeft:
         self._guessed_s = self._took_s = 0.0
 
     def done(self, guess: float, took: float) -> None:
-        """A run has ended that was guessed to take so long."""
+        """A run has ended whose estimate was `guessed`."""
         self._left_s -= guess
         self._guessed_s += guess
         self._took_s += took
 
     def seconds(self) -> float:
-        """Wall seconds until the last run ends, about."""
+        """The estimated wall seconds until the last run ends."""
         off = self._took_s / self._guessed_s if self._guessed_s else 1.0
         return max(0.0, self._left_s * off / self._workers)
 
 
 def spoken(seconds: float) -> str:
-    """A length of time as people say it."""
+    """A duration in words."""
     if seconds < 90:
         return f"{math.ceil(seconds)} s"
     if seconds < 5400:

@@ -1,7 +1,6 @@
-"""The workers of a Dask cluster that exists: any number of machines, each with this version of fanet-mw.
+"""Carries out runs on an existing Dask cluster: any number of machines, each with this version of fanet-mw.
 
-A worker that dies takes nothing with it: the scheduler hands its runs to others. A run that kills one worker after the
-other is a failed one.
+If a worker dies, the scheduler gives its runs to others. A run that kills several workers has failed.
 """
 
 from collections.abc import Iterator, Sequence
@@ -15,7 +14,7 @@ from sim.sweep.tasks import Task
 
 
 class DaskCluster:
-    """The workers behind one scheduler."""
+    """The workers of one scheduler."""
 
     def __init__(self, address: str) -> None:
         self._address = address
@@ -30,7 +29,9 @@ class DaskCluster:
             raise
 
     def _checked(self) -> int:
-        """The number of workers; raises ConfigError for what would make rows differ."""
+        """The number of workers; raises ConfigError if their code or packages differ, because then
+        rows might differ.
+        """
         self._client.wait_for_workers(1, timeout=30)
         workers = self._client.scheduler_info(n_workers=-1)["workers"]
         for name, worker in workers.items():
@@ -45,7 +46,7 @@ class DaskCluster:
         return len(workers)
 
     def carry_out(self, tasks: Sequence[Task]) -> Iterator[Finished]:
-        """What each task came to, in the order in which they end."""
+        """The result of each task, in the order in which they end."""
         try:
             futures = {self._client.submit(carry_out, task, pure=False): task for task in tasks}
             for future in as_completed(list(futures), loop=self._client.loop):

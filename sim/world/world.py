@@ -1,7 +1,7 @@
 """The world as an actor: setpoints in, poses and sensor readings out, once per tick.
 
-t = 0            poses and fixes, so that links stand before any node transmits
-every tick       guidance -> engine -> obstructions, when anything can obstruct -> poses -> sensors that are due
+t = 0            poses and fixes, so that links exist before any node transmits
+every tick       guidance -> engine -> obstructions, if there are obstacles -> poses -> sensors that are due
 """
 
 from array import array
@@ -41,17 +41,17 @@ if TYPE_CHECKING:
 _TRACED_NS: Final = S
 """The interval at which positions go into the trace."""
 _STILL_NS: Final = S
-"""The interval at which a world in which nothing moves says so."""
+"""The interval at which a world in which nothing moves publishes its poses."""
 _WRECK_M: Final = 0.5
-"""The distance from the ground or a wall below which a UAV is not in flight."""
+"""A UAV that is nearer to the ground or a wall than this is not in flight."""
 _EMERGENCY_CHARGE: Final = 0.05
-"""At this share of its charge a flight controller lands where it is: PX4's BAT_EMERGEN_THR."""
+"""The share of its charge at which a flight controller lands where it is (PX4's BAT_EMERGEN_THR)."""
 _CONTROL_S: Final = 0.05
-"""Guidance runs at least this often within a tick."""
+"""The longest step of the guidance within a tick."""
 
 
 def make_engine(scenario: Scenario, solid: Obstacles | None = None) -> Engine:
-    """The engine that the scenario names, with what stands in its world."""
+    """The engine that the scenario names, with the obstacles of its world."""
     world = scenario.world
     if world.engine == "kinematic":
         return Kinematic(Solids(solid))
@@ -65,17 +65,17 @@ def make_engine(scenario: Scenario, solid: Obstacles | None = None) -> Engine:
 
 
 def _sight(scenario: Scenario, engine: Engine, solid: Obstacles) -> "Sight":
-    """Imported when wanted: it brings the emulator's geometry, and numba with it."""
+    """Imported only when needed, because it brings the emulator's geometry, and numba with it."""
     from sim.world.environment.line_of_sight import Sight
 
     return Sight(scenario, engine, top_m=solid.top_m)
 
 
 class WorldActor(Actor):
-    """Bodies, survivors and sensors of one swarm."""
+    """The bodies, survivors and sensors of one swarm."""
 
     def __init__(self, scenario: Scenario, swarm: str, *, flight: SwarmFlight | None = None) -> None:
-        """`flight`: how the swarm was flying when the world before this one ended; None: it starts."""
+        """`flight`: the state in which an earlier world has ended; None if this is the first."""
         topics = Topics(swarm)
         super().__init__("world", (topics.all_setpoints,))
         self._scenario = scenario
@@ -98,7 +98,7 @@ class WorldActor(Actor):
         survivors = Survivors(scenario, solids.ground_m)
         self._suite = Suite(scenario, sensors_of(scenario, survivors, solids, self._energy, solid), topics)
         self._flies = np.ones(len(self._ids), bool)
-        """Which UAVs have not crashed."""
+        """The UAVs that have not crashed."""
         if flight is not None and scenario.world.crash == "falls":
             self._find_wrecks(solids)
         self._ticks = Ticks()
@@ -184,7 +184,9 @@ class WorldActor(Actor):
         self.records += [FlightModeChanged(now_ns, node, mode.value) for node, mode in changes]
 
     def _find_wrecks(self, solids: Solids) -> None:
-        """Take for wrecks, in a world that goes on, the UAVs that lie on the ground and were not told to."""
+        """In a world that continues an earlier one: mark UAVs as crashed that lie on the ground without having been
+        told to land.
+        """
         at = self._engine.positions()
         for row in np.flatnonzero(solids.gap_m(at) <= _WRECK_M).tolist():
             if not self._guidance.may_touch_down(row + 1):
@@ -193,7 +195,7 @@ class WorldActor(Actor):
                 self._guidance.fell(row + 1)
 
     def _contact(self, first: int, second: int, now_ns: int) -> None:
-        """Two bodies touch, of which the ground and obstacles are 0: a landing, a wreck, or a collision."""
+        """Two bodies touch, where 0 stands for the ground and obstacles: this is a landing, a crash, or a collision."""
         touching = [node for node in (first, second) if node and self._flies[node - 1]]
         if not touching or (first == 0 and self._guidance.may_touch_down(second)):
             return
@@ -214,7 +216,7 @@ class WorldActor(Actor):
             self.outbox.append((self._topics.radio_control, Cut(f"crash-{node}", NodeId(node))))
 
     def _publish(self, now_ns: int, before_ns: int) -> None:
-        """Poses, and the sensors whose instant lies in (before, now]."""
+        """Publish the poses, and the readings of sensors that have an instant in (before, now]."""
         at, velocity = self._engine.positions(), self._engine.velocities()
         if self._sight is not None:  # before the poses, which bring it into force
             self.outbox.append((self._topics.obstruction, self._sight.obstructions(at, now_ns)))

@@ -23,20 +23,20 @@ from sim.run.launcher.process_title import entitle
 
 _PRELOAD: Final = ["agents.__main__", "emulator.__main__", "sim.world.__main__"]
 _NICENESS: Final = 10
-"""The niceness of a child that gives way, added to that of the launcher."""
+"""The niceness of a child that runs with lower priority, added to that of the launcher."""
 _BLOCKED: Final = (signal.SIGINT, signal.SIGTERM)
 Entry = Callable[..., int]
 
 
 class ChildRecipe(NamedTuple):
-    """The way to start a child: `entry(**arguments)`."""
+    """How to start a child: `entry(**arguments)`."""
 
     entry: Entry
     arguments: Mapping[str, Any]
     gives_way: bool
     name: str
     title: str
-    """What `ps` shows as the child's command line."""
+    """The command line that `ps` shows for the child."""
 
 
 def _child(recipe: ChildRecipe) -> None:
@@ -86,10 +86,10 @@ def _nothing() -> None:
 
 
 def _start_server() -> None:
-    """Start the server from which children are forked, with both signals blocked in it and its children.
+    """Start the server from which children are forked, with both signals blocked in it and in its children.
 
-    Ctrl-C, or the end of a service of the system, reaches all of them. A child ignores Ctrl-C only from `_child` on,
-    and the server only after its imports: until then each would end with a traceback of its own.
+    Ctrl-C, and the end of a system service, send a signal to all of them. The server ignores Ctrl-C only after its
+    imports, and a child only from `_child` on; without the block each would print a traceback until then.
     """
     resource_tracker.ensure_running()  # otherwise the server starts the tracker, which unblocks SIGINT
     before = signal.pthread_sigmask(signal.SIG_BLOCK, _BLOCKED)
@@ -100,19 +100,19 @@ def _start_server() -> None:
 
 
 def describe(exit_code: int) -> str:
-    """An exit code in words; a signal is given by its name."""
+    """An exit code in words; a signal by its name."""
     return f"signal {signal.Signals(-exit_code).name}" if exit_code < 0 else f"exit code {exit_code}"
 
 
 class Processes:
-    """Children by name, each of which can be started again."""
+    """The children by name; each of them can be started again."""
 
     def __init__(
         self, on_end: Callable[[str, int], None], *, title: str = "fanet", preload: Sequence[str] = ()
     ) -> None:
-        """`preload` names modules that every child needs beside those of the services."""
+        """`preload`: modules that all children need, in addition to those of the services."""
         self._title = title
-        """What `ps` shows as the command line of each child, in front of its name."""
+        """The beginning of each child's command line in `ps`, before its name."""
         self._context: ForkServerContext = multiprocessing.get_context("forkserver")
         self._context.set_forkserver_preload([*_PRELOAD, *preload])
         self._on_end = on_end
@@ -122,7 +122,9 @@ class Processes:
         self._empty = asyncio.Event()
 
     async def warm_up(self) -> None:
-        """Wait until the server has imported what children need; otherwise the first `start` would block the loop."""
+        """Wait until the server has imported what children need; otherwise the first `start` would block the event
+        loop.
+        """
         first = self._context.Process(target=_nothing)
 
         def run() -> None:
@@ -148,7 +150,7 @@ class Processes:
         self._loop.add_reader(process.sentinel, self._ended, name)
 
     def restart(self, name: str, **more: object) -> None:
-        """Start a child that has ended again, with its former arguments except for those in `more`."""
+        """Start a child again that has ended, with its former arguments, except for those in `more`."""
         recipe = self._recipes[name]
         self.start(name, recipe.entry, {**recipe.arguments, **more}, gives_way=recipe.gives_way)
 
@@ -171,7 +173,7 @@ class Processes:
         self._on_end(name, code)
 
     async def wait(self, timeout_s: float) -> bool:
-        """Wait until all children have ended by themselves; returns False when some have not in time."""
+        """Wait until all children have ended by themselves; returns False if some have not in time."""
         try:
             await asyncio.wait_for(self._empty.wait(), timeout_s)
         except TimeoutError:
@@ -189,9 +191,11 @@ class Processes:
 
 @atexit.register
 def end_servers() -> None:
-    """End multiprocessing's helper processes with this one; by themselves they end some tens of milliseconds later."""
+    """End multiprocessing's helper processes with this process; by themselves they would end some tens of milliseconds
+    later.
+    """
     if multiprocessing.parent_process() is not None:
-        return  # from Python 3.13 on, children come by here too; the helpers are their parent's
-    # There is no public way to do this; CPython's own tests use these calls.
+        return  # from Python 3.13 on, children come here, too; the helpers belong to their parent
+    # There is no public function for this; CPython's own tests use these calls.
     forkserver._forkserver._stop()  # type: ignore[attr-defined]  # noqa: SLF001
     resource_tracker._resource_tracker._stop()  # type: ignore[attr-defined]  # noqa: SLF001

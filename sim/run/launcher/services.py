@@ -1,4 +1,4 @@
-"""The processes of a swarm: which of them the launcher starts, and with what arguments."""
+"""The processes that the launcher starts for a swarm, and their arguments."""
 
 from collections.abc import Iterator, Mapping
 from typing import Any, NamedTuple
@@ -21,23 +21,23 @@ class Service(NamedTuple):
     entry: Entry
     arguments: Mapping[str, Any]
     gives_way: bool = False
-    """True for the UAVs: all of them wait for the emulator, which goes first when all cores are in use."""
+    """True for UAVs: they run with lower priority than the emulator, because all of them wait for it."""
 
 
 class Services(NamedTuple):
-    """What the launcher of one swarm starts."""
+    """The processes of one swarm."""
 
     scenario: Scenario
     address: SwarmAddress
     own_world: bool = True
-    """False when a foreign world tells where the UAVs are; no report of it is expected."""
+    """False if another program plays the world; it then sends no report."""
     leave_out: frozenset[int] = frozenset()
     """The nodes whose processes the user starts."""
     emulator_options: Mapping[str, Any] = {}
     """Additional arguments of the emulator's process."""
 
     def each(self) -> Iterator[Service]:
-        """The emulator, the world, and the UAVs by id."""
+        """The emulator, the world, and the UAVs in the order of their ids."""
         common = {"scenario": self.scenario, "address": self.address}
         yield Service("emulator", run_emulator, {**common, **self.emulator_options})
         if self.own_world:

@@ -1,9 +1,9 @@
-"""A swarm as real processes: router and clock here; the emulator, the world and every UAV in a process of its own.
+"""A swarm of real processes: router and clock in this one; the emulator, the world and each UAV in one of their own.
 
-    start all -> wait until all are up -> start the clock -> collect traces, reports and taps -> all end -> outcome
+    start all -> wait until all are present -> start the clock -> collect traces, reports and taps -> all end -> outcome
 
-When a UAV's process dies that is reported and the others carry on. A run needs the emulator and the world, so the end
-of either ends it; with `respawn` any of them is started again and finds its place by the clock.
+If the process of a UAV dies, that is reported and the others go on. A run needs the emulator and the world, so it ends
+if either of them dies. With `respawn`, any process is started again, and continues by the clock.
 """
 
 import asyncio
@@ -37,13 +37,15 @@ from sim.run.outcome import Outcome
 from sim.world.flight_recorder import FlightRecorder
 
 READY_TIMEOUT_S: Final = 300.0
-"""All must be up within this time: on a busy machine 47 processes take a minute, and a compilation comes on top."""
+"""How long the launcher waits until all processes are present: on a busy machine 47 processes take a minute, and a
+compilation may come on top."""
 WORD_EVERY_S: Final = 10.0
-"""The interval at which the processes that are being waited for are reported."""
+"""The interval at which the launcher says for which processes it is waiting."""
 _GRACE_S: Final = 5.0
-"""Last reports are waited for so long after the end of the swarm's time."""
+"""How long the launcher waits for last reports after the end of the swarm's time."""
 _LAST_WORDS_S: Final = 1.0
-"""What processes sent last is waited for so long after the end of all of them: it may still be on the bus."""
+"""How long the launcher waits for last messages after the end of all processes, because some may
+still be on the bus."""
 _PROGRESS_S: Final = 0.25
 Tell = Callable[[str], None]
 
@@ -78,11 +80,11 @@ class SwarmRun:
         self._ending = False
         self._aborted: str | None = None
         self._stall_s = 0.0
-        """The longest time for which this process did nothing although it should have."""
+        """The longest time for which this process could do nothing although it should have."""
         self._signal: int | None = None
 
     async def run(self, on_progress: Callable[[float], None]) -> Outcome:
-        """Start, run, collect. In any case no process and no temporary file is left."""
+        """Start, run and collect. Whatever happens, no process and no temporary file is left."""
         with contextlib.closing(self._collector):
             began = time.monotonic()
             try:
@@ -136,7 +138,7 @@ class SwarmRun:
         self._check_not_over()
         for name, entry, arguments, gives_way in self._services.each():
             self.processes.start(name, entry, arguments, gives_way=gives_way)
-            await asyncio.sleep(0)  # signals are handled between two of many processes
+            await asyncio.sleep(0)  # lets signals be handled between the starts of many processes
             self._check_not_over()
 
     def _check_not_over(self) -> None:
@@ -147,7 +149,7 @@ class SwarmRun:
             raise BusError(self._aborted or "ended before the swarm was up")
 
     async def _start_clock(self, began: float) -> float:
-        """Wait for all participants, then start the clock; returns how long that took [s]."""
+        """Wait for all processes, then start the clock; returns how long that took [s]."""
         start = asyncio.ensure_future(self._keeper.start(timeout_s=READY_TIMEOUT_S))
         over = asyncio.ensure_future(self._over.wait())
         while not await _any_done(start, over, timeout_s=WORD_EVERY_S):
@@ -173,7 +175,7 @@ class SwarmRun:
             self._stall_s = max(self._stall_s, time.monotonic() - began_s - _PROGRESS_S)
 
     async def _wind_up(self) -> None:
-        """End all processes, by the clock or by order, and wait for last reports."""
+        """End all processes, by the clock or by a signal, and wait for last reports."""
         self._over.set()
         await self._end_processes()
         dead = {name for name, _ in self._deaths.ended} | (set() if self._services.own_world else {"world"})
@@ -203,7 +205,7 @@ class SwarmRun:
         what = f"{name} ended with {describe(exit_code)} at {now_ns / S:.1f} s"
         if self._over.is_set():
             if exit_code == -(self._signal or 0):
-                return  # the signal that interrupted this process was meant for all
+                return  # the signal that interrupted this process was sent to all of them
             self._tell(f"{what}, while the swarm was ending")
             return
         if self._deaths.grant_respawn(name):
@@ -231,7 +233,9 @@ async def _any_done(*futures: asyncio.Future[Any], timeout_s: float) -> bool:
 
 
 def _bus(listen: str | None, connect: str | None, zenoh_config: Path | None) -> tuple[Bus, str]:
-    """The session of the launcher, and the endpoint to which its children connect: TLS by default with keys for all."""
+    """The launcher's session, and the endpoint to which its children connect; with keys for all of them it uses TLS by
+    default.
+    """
     config = config_of(zenoh_config, ROUTER)
     if connect is not None:
         return Bus.join(connect, config), connect

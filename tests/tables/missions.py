@@ -46,13 +46,14 @@ def degraded(scenario: Scenario, loss: float) -> Scenario:
     return Scenario.model_validate({**scenario.model_dump(), "faults": faults}) if loss else scenario
 
 
+_TWENTY: Final = tuple(range(1, 21))
 PLACES: Final[Mapping[str, Case]] = {
-    "`town`": Case("town", (), tuple(range(3, 11))),
+    "`town`": Case("town", (), _TWENTY),
 }
 COUNTRY: Final[Mapping[str, Case]] = {
-    "`rescue`": Case("rescue", (), tuple(range(1, 13))),
-    "`hills`": Case("hills", (), (1, 2)),
-    "`night`": Case("night", (), (1, 2)),
+    "`rescue`": Case("rescue", (), _TWENTY),
+    "`hills`": Case("hills", (), _TWENTY),
+    "`night`": Case("night", (), _TWENTY),
 }
 _SMALL: Final = (
     "nodes.count=20", "nodes.spacing_m=100", "nodes.telemetry_hz=0", "clusters.count=4", "traffic.interval_s=4",

@@ -55,8 +55,10 @@ class Accounts:
         """Count a frame that no node received, when nothing refers to it any more."""
         self.dropped[_REASON_OF[verdict]] += 1
 
-    def copies(self, g: s.Ints) -> dict[str, Any]:
-        """The ledger at receivers: the copies that went on the air in range of a receiver, and how each ended."""
+    def copies(self, g: s.Ints, *, in_flight: int) -> dict[str, Any]:
+        """The ledger at receivers: the copies that went on the air in range of a receiver, and how each ended;
+        `in_flight` have not.
+        """
         lost = {
             DropReason.COLLISION: int(g[s.COLLISION_COPIES]),
             DropReason.HALF_DUPLEX: int(g[s.HALF_DUPLEX_COPIES]),
@@ -69,6 +71,7 @@ class Accounts:
             "on_air": int(g[s.ON_AIR_COPIES]),
             "received": int(g[s.RECEIVED_COPIES]),
             "lost": {reason.value: count for reason, count in lost.items() if count},
+            "in_flight": in_flight,
         }
 
     def lateness(self, requests: int) -> dict[str, float]:

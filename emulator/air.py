@@ -78,6 +78,14 @@ class Air:
         self.book.take(self.arrays.lk)
         return self.book.close(now_ns)
 
+    def copies_under_way(self) -> int:
+        """The number of copies of data frames that have been counted as on the air and have not ended yet."""
+        a = self.arrays
+        frame, to = a.lk[s.LINK_FRAME], a.fr[s.DST, a.lk[s.LINK_FRAME]]
+        addressed = (to == s.EVERYONE) | (to == a.lk[s.LINK_DST])
+        copies = (a.lk[s.UNDERWAY] == 1) & (a.lk[s.LINK_KIND] == s.DATA) & (a.lk[s.COPY] == 1) & (frame >= 0)
+        return int((copies & addressed).sum())
+
     def slots(self) -> int:
         """The number of frame slots."""
         return int(self.arrays.fr.shape[1])

@@ -128,7 +128,7 @@ class Medium(Actor):
                 "dropped": {reason: accounts.dropped[reason] for reason in sorted(accounts.dropped)},
             },
             "requests": self._numbers.report(),
-            "copies": accounts.copies(arrays.g),
+            "copies": accounts.copies(arrays.g, in_flight=self._air.copies_under_way()),
             "air": self._measurement.report(self._sample(), stations=self._count),
             "late": accounts.lateness(self._numbers.total),
             "poses": accounts.poses,

@@ -1,6 +1,8 @@
-"""The ledger of frames: each frame is counted by the node that requests it and by the medium that transmits it.
+"""The ledger of frames: each frame is counted by the node that requests it and by the medium that transmits it, and each
+copy of a frame at each receiver in range.
 
-    sent + unasked = delivered + dropped(reason) + in flight + unaccounted
+    frames    sent + unasked = delivered + dropped(reason) + in flight + unaccounted
+    copies    on the air = received + lost(reason) + in flight;    in virtual time all handed over were heard
 
 The ledger closes if nothing is unasked or unaccounted. A request of a node that did not reach the medium was lost on
 the bus (reason `bus`). In virtual time the bus loses nothing, so such a request is unaccounted; so are the frames that
@@ -75,4 +77,7 @@ def copies(outcome: Outcome) -> dict[str, Any]:
         return {}
     agents = [report for report in outcome.reports.values() if report.get("kind") == "agent"]
     heard = sum(report["receptions"] for report in agents)
-    return {**emulator["copies"], "handed": sum(emulator["handed"].values()), "heard": heard}
+    counted, handed = emulator["copies"], sum(emulator["handed"].values())
+    ended = counted["received"] + sum(counted["lost"].values()) + counted["in_flight"]
+    closes = counted["on_air"] == ended and (outcome.mode == "realtime" or handed == heard)
+    return {**counted, "handed": handed, "heard": heard, "closes": closes}

@@ -33,9 +33,9 @@ def summarize(outcome: Outcome, *, trace_sha256: str) -> dict[str, Any]:
     classes = [*scenario.traffic_classes]
     packets = _packets(outcome, sent)
     emulator = outcome.reports.get("emulator", {})
-    frames, lateness = ledger.frames(outcome), _lateness(outcome, emulator)
+    frames, copies, lateness = ledger.frames(outcome), ledger.copies(outcome), _lateness(outcome, emulator)
     disturbance = validity.measures(outcome, frames=frames, late_share=lateness["share"])
-    reasons = validity.reasons(outcome, frames=frames, disturbance=disturbance)
+    reasons = validity.reasons(outcome, frames=frames, copies=copies, disturbance=disturbance)
     return {
         "valid": not reasons,
         "invalid_because": reasons,
@@ -54,7 +54,7 @@ def summarize(outcome: Outcome, *, trace_sha256: str) -> dict[str, Any]:
         "applications": {name: part for name, part in packets.items() if name not in (*classes, *OTHER_APPS)},
         "messages": _messages(outcome),
         "frames": frames,
-        "copies": ledger.copies(outcome),
+        "copies": copies,
         "air": emulator.get("air", {}),
         "lateness": lateness,
         "disturbance": {

@@ -91,12 +91,14 @@ def measures(outcome: Outcome, *, frames: Mapping[str, Any], late_share: float) 
     }
 
 
-def reasons(outcome: Outcome, *, frames: Mapping[str, Any], disturbance: Mapping[str, Measure]) -> list[str]:
+def reasons(
+    outcome: Outcome, *, frames: Mapping[str, Any], copies: Mapping[str, Any], disturbance: Mapping[str, Measure]
+) -> list[str]:
     """The reasons why the result may not be used, gravest first, one sentence each; empty if it may be used."""
     return [
         *_broken(outcome),
         *_incomplete(outcome),
-        *_unaccounted(frames),
+        *_unaccounted(frames, copies),
         *_disturbed(disturbance),
     ]
 
@@ -122,13 +124,15 @@ def _incomplete(outcome: Outcome) -> Iterator[str]:
             yield f"trace records or puts not kept ({why}): {count}, limit 0"
 
 
-def _unaccounted(frames: Mapping[str, Any]) -> Iterator[str]:
+def _unaccounted(frames: Mapping[str, Any], copies: Mapping[str, Any]) -> Iterator[str]:
     if frames["unaccounted"]:
         yield f"frames unaccounted for: {frames['unaccounted']} of {frames['sent']}, limit 0"
     if frames["unasked"]:
         yield f"frames that no node asked for: {frames['unasked']}, limit 0"
     if not frames["closes"] and not frames["unaccounted"] and not frames["unasked"]:
         yield f"the ledger of {frames['sent']} frames does not close"
+    if not copies.get("closes", True):
+        yield f"the ledger of {copies['on_air']} copies at receivers does not close"
 
 
 def _disturbed(disturbance: Mapping[str, Measure]) -> Iterator[str]:

@@ -60,6 +60,7 @@ def run(air: Medium, seed: int, *, count: int, frames: int, extra_wakes: int = 0
         drain(air, outputs, until_ns=t_ns - 1)
         if kind == 0:
             place(air, what, t_ns)
+            assert_copies_add_up(air)
         elif kind == 1:
             src, size, dst = what
             air.receive(NAMES.radio_tx(src), TxRequest(seq[src], t_ns, bytes(size), dst, wants_status=True), t_ns)
@@ -71,6 +72,12 @@ def run(air: Medium, seed: int, *, count: int, frames: int, extra_wakes: int = 0
     air.stop(10**12)
     assert not told(air), "all was told before"
     return outputs
+
+
+def assert_copies_add_up(air: Medium) -> None:
+    """Every copy is received, lost for one reason, or still on the air: also while stations jump around."""
+    copies = air.report()["copies"]
+    assert copies["on_air"] == copies["received"] + sum(copies["lost"].values()) + copies["in_flight"]
 
 
 def told(air: Medium) -> list[Output]:
@@ -112,6 +119,7 @@ def test_all_books_close_and_the_air_falls_silent(load: tuple[int, int, str, str
     assert frames["sent"] == 150
     assert frames["in_flight"] == 0
     assert frames["delivered"] + sum(frames["dropped"].values()) == 150
+    assert copies["in_flight"] == 0
     assert copies["on_air"] == copies["received"] + sum(copies["lost"].values())
     assert sum(report["handed"].values()) == sum(isinstance(message, Reception) for _, message in outputs)
     assert sum(isinstance(message, TxStatus) for _, message in outputs) == 150

@@ -80,7 +80,7 @@ def test_a_frame_queued_during_anothers_difs_collides_as_ns3_has_it(make_scenari
     assert receptions(air.run()) == []
     report = air.medium.report()
     assert report["frames"]["dropped"] == {"collision": 2}
-    assert report["copies"] == {"on_air": 4, "received": 0, "lost": {"collision": 2, "half_duplex": 2}}
+    assert report["copies"] == {"on_air": 4, "received": 0, "lost": {"collision": 2, "half_duplex": 2}, "in_flight": 0}
 
 
 def test_a_frame_queued_while_the_medium_is_busy_waits_for_it_difs_and_its_backoff(

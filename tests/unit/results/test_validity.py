@@ -42,7 +42,7 @@ def good(scenario: Scenario) -> Outcome:
         "kind": "emulator", "final": True, "host": {"stall_ms": 2.0},
         "frames": {"sent": total, "delivered": total, "in_flight": 0, "dropped": {}},
         "requests": {str(node): {"all": SENT, "before_restart": 0} for node in (1, 2)},
-        "copies": {"on_air": 2 * HEARD, "received": 2 * HEARD, "lost": {}},
+        "copies": {"on_air": 2 * HEARD, "received": 2 * HEARD, "lost": {}, "in_flight": 0},
         "late": {"frames": total, "late_frames": 0}, "handed": {"1": HEARD, "2": HEARD},
     }  # fmt: skip
     world = {"kind": "world", "final": True, "ticks": 1000, "skipped_ticks": 0, "host": {"stall_ms": 1.0}}
@@ -60,6 +60,14 @@ def reasons(outcome: Outcome) -> list[str]:
 
 def test_a_run_with_which_nothing_is_wrong_is_valid(scenario: Scenario) -> None:
     assert reasons(good(scenario)) == []
+
+
+@pytest.mark.parametrize(("fate", "off"), [("received", -1), ("on_air", 1), ("in_flight", 1)])
+def test_a_copy_without_a_fate_or_with_two_makes_a_run_invalid(scenario: Scenario, fate: str, off: int) -> None:
+    outcome = good(scenario)
+    outcome.reports["emulator"]["copies"][fate] += off
+    (reason,) = reasons(outcome)
+    assert "copies at receivers does not close" in reason
 
 
 def put(outcome: Outcome, name: str, *path: str, value: object) -> None:

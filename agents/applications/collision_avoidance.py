@@ -1,6 +1,7 @@
 """The application that avoids collisions: it feeds a conflict monitor, and floods the warnings that the monitor gives.
 
-While the UAV avoids another one, the application objects to courses of other applications.
+While the UAV avoids another one, by climbing or descending, the application objects to courses of other applications.
+The UAVs of a planned search avoid each other by their velocities instead (`agents/mission/flight/`).
 """
 
 import math

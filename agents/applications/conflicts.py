@@ -10,7 +10,7 @@ level, and a warning need not state a direction. The height of a level is the di
 
 Both UAVs are assumed to keep their horizontal velocity. Not modeled: turns that the other UAV has planned, and
 conflicts that the change of height itself causes, until the next hello shows them. In a planned search, UAVs avoid each
-other by their velocities instead (`agents/mission/flight/constraints.py`).
+other by their velocities instead (`agents/mission/flight/reciprocal_avoidance.py`).
 """
 
 import math

@@ -2,12 +2,21 @@
 
     queue -> access (DIFS or EIFS, backoff with freezing) -> frame -> ACK or timeout -> next attempt or done
 
-The countdown, and EIFS in place of DIFS after a failed reception, are in `backoff.py`; how frames end is counted in
-`ending.py`.
+When a station may transmit (DIFS or EIFS, contention window, backoff) is in `channel_access.py`; how frames end is
+counted in `ending.py`.
 """
 
 from emulator.channel.fading import gain
-from emulator.kernel.backoff import access_from, arm, draw, on_busy, on_idle, slots_left
+from emulator.kernel.channel_access import (
+    access_from,
+    arm,
+    draw,
+    on_busy,
+    on_idle,
+    reset_window,
+    slots_left,
+    widen_window,
+)
 from emulator.kernel.ending import done, lost, put, release
 from emulator.kernel.heap import push
 from emulator.kernel.jit import jit
@@ -33,9 +42,6 @@ from emulator.kernel.state import (
     CAPTURE,
     COPY,
     CS,
-    CW,
-    CW_MAX,
-    CW_MIN,
     DATA,
     DELAY,
     DETECT_NS,
@@ -50,7 +56,6 @@ from emulator.kernel.state import (
     ENDS,
     EVERYONE,
     FADING,
-    FAILURES,
     FATE,
     FATE_HALF_DUPLEX,
     FATE_OPEN,
@@ -319,23 +324,6 @@ def acknowledged(g: Ints, p: Ints, st: Ints, fr: Ints, out: Ints, s: int, t: int
     take_head(st, fr, s)
     draw(st, s)
     done(g, fr, out, f, DONE_ACKED, t)
-
-
-@jit
-def reset_window(p: Ints, st: Ints, s: int) -> None:
-    """Begin anew with the least window."""
-    st[CW, s] = p[CW_MIN]
-    st[FAILURES, s] = 0
-
-
-@jit
-def widen_window(p: Ints, st: Ints, s: int) -> None:
-    """Double the window after a failure; where it outlives frames, begin anew after so many failures in a row."""
-    if p[KEEPS_WINDOW] == 1 and st[FAILURES, s] == p[MAX_ATTEMPTS]:
-        reset_window(p, st, s)
-    else:
-        st[FAILURES, s] += 1
-        st[CW, s] = min(2 * st[CW, s] + 1, p[CW_MAX])
 
 
 @jit

@@ -4,7 +4,7 @@ One call of `advance` processes any number of events. It returns early only when
 room; the caller takes the rows, makes room and calls again.
 """
 
-from emulator.kernel.backoff import slots_left
+from emulator.kernel.channel_access import slots_left
 from emulator.kernel.dcf import access, ack_timeout, arrive, send_ack, tx_done
 from emulator.kernel.heap import pop, push
 from emulator.kernel.jit import jit

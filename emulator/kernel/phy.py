@@ -12,7 +12,7 @@ their frames meet at a receiver that hears both.
 import math
 
 from emulator.chance import MODULUS, uniform
-from emulator.kernel.backoff import on_busy, on_idle
+from emulator.kernel.channel_access import on_busy, on_idle
 from emulator.kernel.dcf import acknowledged
 from emulator.kernel.ending import lost, put, release
 from emulator.kernel.heap import push

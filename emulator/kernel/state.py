@@ -42,7 +42,7 @@ Reals = npt.NDArray[np.float64]
     SEEKING_UNTIL,  # end of the last detection window that a signal has opened
     CHANGED_AT,  # instant at which the power last changed
     IDLE_FROM,  # instant at which the medium last became idle
-    BAD_UNTIL,  # end of the EIFS extension after a failed reception, 0 none; see backoff.py
+    BAD_UNTIL,  # end of the EIFS extension after a failed reception, 0 none; see channel_access.py
     RESUME_FROM,  # end of the last ACK timeout: access counts from there
     NAV,  # network allocation vector: the medium is reserved until this instant
     WAITING,  # frame slot whose ACK is awaited, -1 none

@@ -5,6 +5,9 @@
     instant of birth                    not still to come
     sequence number                     not beyond those that the time since swarm instant 0 has room for
 
+Frames that cannot be decoded are counted as `malformed` by the node (`node.py`), a packet that was recorded and is sent
+again is a copy (`duplicates.py`) or has outlived its lifetime (`expired`, `node.py`).
+
 Not here: proof of origin. A relay may still invent a packet in the name of a node behind it; what it cannot do is keep
 out that node's own packets, because a packet is known by its content and not by its name alone (`reader.Reader`).
 """

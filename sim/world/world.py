@@ -18,8 +18,8 @@ from fanet_mw.rng import stream_seed
 from fanet_mw.scenario import Scenario
 from fanet_mw.trace import Collided, FlightModeChanged, Posed
 from fanet_mw.units import NodeId, S
+from sim.world.engines.battery_drain import Energy
 from sim.world.engines.contract import Engine
-from sim.world.engines.energy import Energy
 from sim.world.engines.kinematic import Kinematic
 from sim.world.engines.rotors.engine import Rotors
 from sim.world.engines.rotors.vehicle import VEHICLES

@@ -8,7 +8,7 @@ within reach of the UAVs with which it holds the swarm together; if not all can 
 import math
 from typing import Final, Protocol
 
-from agents.mission.flight.constraints import avoiding, grown_m, staying_near
+from agents.mission.flight.reciprocal_avoidance import avoiding, grown_m, staying_near
 from agents.mission.formation.formation_place import FormationPlace
 from agents.mission.navigation.half_planes import HalfPlane, Velocity, nearest
 from agents.mission.navigation.known_obstacles import KnownObstacles

@@ -5,7 +5,7 @@ from collections.abc import Iterator, Sequence
 from fanet_mw.bus.messages import Battery, Message
 from fanet_mw.scenario import Scenario
 from fanet_mw.units import S
-from sim.world.engines.energy import Energy
+from sim.world.engines.battery_drain import Energy
 from sim.world.sensors.contract import Sensor, Truth
 
 

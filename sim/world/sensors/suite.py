@@ -6,8 +6,8 @@ from fanet_mw.bus.messages import Message
 from fanet_mw.bus.topics import Topics
 from fanet_mw.scenario import Scenario
 from fanet_mw.scenario.routing import PROTOCOLS
+from sim.world.engines.battery_drain import Energy
 from sim.world.engines.contract import Flags
-from sim.world.engines.energy import Energy
 from sim.world.environment.obstacles import Obstacles
 from sim.world.environment.solids import Solids
 from sim.world.environment.survivors import Survivors

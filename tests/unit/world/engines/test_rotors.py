@@ -10,8 +10,8 @@ from fanet_mw.bus.messages import Battery
 from fanet_mw.errors import ConfigError
 from fanet_mw.scenario import Scenario
 from fanet_mw.units import S
+from sim.world.engines.battery_drain import Energy
 from sim.world.engines.contract import Rows
-from sim.world.engines.energy import Energy
 from sim.world.engines.kinematic import Kinematic
 from sim.world.engines.rotors.battery import Batteries
 from sim.world.engines.rotors.engine import Rotors

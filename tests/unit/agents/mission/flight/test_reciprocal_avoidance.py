@@ -5,7 +5,7 @@ import math
 from hypothesis import given, settings
 from hypothesis import strategies as st
 
-from agents.mission.flight.constraints import avoiding, staying_near
+from agents.mission.flight.reciprocal_avoidance import avoiding, staying_near
 from agents.mission.navigation.half_planes import HalfPlane, nearest
 from fanet_mw.units import Enu
 

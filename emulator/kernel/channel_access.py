@@ -1,4 +1,5 @@
-"""The backoff of a station (IEEE 802.11-2020, 10.3.3), as functions over the rows of its state.
+"""When a station may transmit: DIFS or EIFS, the contention window and the backoff (IEEE 802.11-2020, 10.3.3), as
+functions over the rows of its state.
 
 Slots are counted from BASE while the medium is idle. When it becomes busy, the slots that have passed are subtracted
 from the backoff. A pending access to the medium is one event, which is stale if SCHEDULED holds another instant.
@@ -22,14 +23,19 @@ from emulator.kernel.state import (
     BUSY_SINCE,
     CS,
     CW,
+    CW_MAX,
+    CW_MIN,
     DIFS_FIRST,
     DIFS_NS,
     EIFS_EXTRA_NS,
     EIFS_FROM_FRAME,
+    FAILURES,
     FRESH,
     HEAD,
     HS_N,
     IDLE_FROM,
+    KEEPS_WINDOW,
+    MAX_ATTEMPTS,
     NAV,
     NEVER,
     NOTHING,
@@ -47,6 +53,23 @@ from emulator.kernel.state import (
 def draw(st: Ints, s: int) -> None:
     """Draw a new backoff from [0, CW]."""
     st[BO, s] = uniform(st, RANDOM, s) * (st[CW, s] + 1) // MODULUS
+
+
+@jit
+def reset_window(p: Ints, st: Ints, s: int) -> None:
+    """Begin anew with the least window."""
+    st[CW, s] = p[CW_MIN]
+    st[FAILURES, s] = 0
+
+
+@jit
+def widen_window(p: Ints, st: Ints, s: int) -> None:
+    """Double the window after a failure; where it outlives frames, begin anew after so many failures in a row."""
+    if p[KEEPS_WINDOW] == 1 and st[FAILURES, s] == p[MAX_ATTEMPTS]:
+        reset_window(p, st, s)
+    else:
+        st[FAILURES, s] += 1
+        st[CW, s] = min(2 * st[CW, s] + 1, p[CW_MAX])
 
 
 @jit

@@ -1,5 +1,5 @@
-"""The ledger of frames: each frame is counted by the node that requests it and by the medium that transmits it, and each
-copy of a frame at each receiver in range.
+"""The ledger: each frame is counted by the node that requests it and by the medium that transmits it, and each copy of
+a frame at each receiver in range.
 
     frames    sent + unasked = delivered + dropped(reason) + in flight + unaccounted
     copies    on the air = received + lost(reason) + in flight;    in virtual time all handed over were heard

@@ -191,7 +191,7 @@ class Searcher:
         match message:
             case Survivor():
                 if message.reporter != self._node:
-                    self._finds.report(message, now_ns=now_ns)
+                    self._finds.take_report(message, now_ns=now_ns)
                     if self._place.place is not None:
                         self._announcing.reported(message, now_ns)
             case Search():
@@ -222,7 +222,7 @@ class Searcher:
 
     def hello_frames(self, now_ns: int) -> bytes:
         """Inner frames for the next hello: the latest reports, the best bids, what was found and searched lately."""
-        frames = b"".join(report.encode_frame(self._node) for report in self._finds.news(now_ns=now_ns))
+        frames = b"".join(report.encode_frame(self._node) for report in self._finds.recent_reports(now_ns=now_ns))
         bids = self._bidding.bids_to_tell(now_ns=now_ns)
         if bids:
             frames += encode_bids(bids, node=self._node)

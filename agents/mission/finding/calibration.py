@@ -1,18 +1,25 @@
-"""By how much phones are stronger or weaker than assumed, from the powers of phones whose owners have been seen.
+"""By how much all phones are stronger or weaker than assumed, estimated from the phones of confirmed survivors.
 
     RSSI_ij = P + B + b_j - L0 - 10 n log10(d_ij) + shadowing_ij
-    B common to all phones (their kind, the receivers' calibration),   b_j ~ N(0, s_b^2) that of one phone
 
-Once a survivor is confirmed, d_ij is known within metres, and the powers of that phone tell B + b_j. Many powers of one
-phone are one draw of b_j: what a phone tells of B is never narrower than s_b. A power below the threshold is not heard,
-so that the powers of a weak phone are those that shadowing raised: the likelihood is that of a normal distribution cut
-off there (Cohen, Annals of Mathematical Statistics 21(4), 1950).
+    RSSI_ij   power with which a receiver at place i receives phone j [dBm]
+    P, L0, n  assumed transmit power [dBm], path loss at 1 m [dB], path loss exponent
+    B         offset common to all phones, by their kind and by the calibration of the receivers [dB]
+    b_j       further offset of phone j alone, ~ N(0, s_b^2) [dB]
+    d_ij      distance of phone j from place i [m]
 
-One phone may be off by far (rubble lies over it, its owner was taken for another, its reports are forged). So the
-likelihood of a phone is nowhere less than a share of its greatest, and one phone never outweighs several others.
+Once survivor j is confirmed, d_ij is known within metres, and the powers of that phone tell the sum B + b_j. All of
+them share one draw of b_j, so they never tell B more exactly than with the standard deviation s_b. A receiver reports
+no power below its threshold, so the powers of a weak phone are those that shadowing has raised: the likelihood is that
+of a normal distribution truncated at the threshold (Cohen, Annals of Mathematical Statistics 21(4), 1950).
 
-Two models are compared by their evidence: phones are as assumed, or they are not. The filters stay as they are until
-the second is clearly more likely, so that a few powers of phones that are as assumed do not shift or widen anything.
+One phone may be far off: under rubble, because it was confirmed as another person's, or because its reports are forged.
+The likelihood of each phone therefore has a floor, a share of its maximum, so that no single phone changes the odds
+between two values of B by more than a factor of about 200.
+
+Two models are compared by their evidence: B is small (phones are as assumed), or B may be large. The filters assume
+B = 0 until the second model is `_EVIDENCE_RATIO` times as likely as the first, so that a few powers of phones that are
+as assumed neither shift nor widen their estimates.
 """
 
 import math
@@ -20,36 +27,45 @@ from collections.abc import Iterable, Sequence
 from functools import lru_cache
 from typing import Final
 
-from agents.mission.finding.phone_filter import AS_ASSUMED, DOUBT, REFERENCE_LOSS_DB, Estimate, PhoneModel, PhoneOffset
+from agents.mission.finding.phone_filter import (
+    AS_ASSUMED,
+    CORRELATION_FACTOR,
+    REFERENCE_LOSS_DB,
+    Estimate,
+    PhoneModel,
+    PhoneOffset,
+)
 from fanet_mw.units import Enu
 
 _STEP_DB: Final = 0.5
 _MOST_DB: Final = 12.0
-"""The greatest common offset, up or down."""
+"""The greatest common offset that is considered, up or down."""
 _COMMON: Final = tuple(_STEP_DB * i for i in range(round(-_MOST_DB / _STEP_DB), round(_MOST_DB / _STEP_DB) + 1))
-"""The common offsets that are weighed."""
+"""The values of the common offset B for which likelihoods are computed."""
 _SINGLE: Final = tuple(
     _STEP_DB * i for i in range(round(-1.5 * _MOST_DB / _STEP_DB), round(1.5 * _MOST_DB / _STEP_DB) + 1)
 )
-"""The offsets of one phone that are weighed: the common one and its own."""
+"""The values of one phone's offset B + b_j for which likelihoods are computed."""
 _AS_ASSUMED_DB: Final = 0.5
 _OTHERWISE_DB: Final = 5.0
-"""The standard deviations of the common offset by the model that phones are as assumed, and by the other."""
-_ODDS: Final = 3.0
-"""The other model is believed when it is so many times as likely: substantial evidence in the scale of Jeffreys
-(Theory of Probability, 1961, appendix B)."""
-_ODD: Final = 0.005
-"""The likelihood of a phone is nowhere less than this share of its greatest."""
+"""The standard deviations of B before any survivor is confirmed, in the model of phones as assumed and in the other."""
+_EVIDENCE_RATIO: Final = 3.0
+"""The common offset is used once the model with a large B is more than this many times as likely as the other:
+substantial evidence in the scale of Jeffreys (Theory of Probability, 1961, appendix B)."""
+_LIKELIHOOD_FLOOR: Final = 0.005
+"""This share of the maximum is added to the likelihood of each phone at all offsets."""
 _MOST_READINGS: Final = 40
-"""So many powers of one phone count, those from the nearest places: they are least often below the threshold."""
+"""The greatest number of powers of one phone that are used: those from the nearest places, which are least often
+below the threshold."""
 _RARELY_HEARD: Final = 1e-12
-"""The least probability of being heard that is reckoned with."""
+"""The least probability of reception in the computation."""
 _GRAIN_DB: Final = 0.25
-"""What the filters are told is rounded to this, so that they are not computed anew for less."""
+"""The common offset is rounded to a multiple of this, so that a smaller change does not make all filters compute
+anew."""
 
 
 def likelihood(place: Estimate, readings: Iterable[tuple[Enu, float]], model: PhoneModel) -> tuple[float, ...]:
-    """How likely the powers of one phone at a known place are, for each common offset; the greatest is about 1."""
+    """The likelihood of each common offset, given the powers of one phone at a known place; the maximum is about 1."""
     nearest = sorted(readings, key=lambda reading: (_slant_m(place, reading[0]), reading))[:_MOST_READINGS]
     sigma_db = max(model.shadowing_db, 1.0)
     logs = [0.0] * len(_SINGLE)
@@ -59,17 +75,20 @@ def likelihood(place: Estimate, readings: Iterable[tuple[Enu, float]], model: Ph
             mean_dbm = expected_dbm + offset_db
             heard = 0.5 * math.erfc((model.threshold_dbm - mean_dbm) / (sigma_db * math.sqrt(2)))
             off = (rssi_dbm - mean_dbm) / sigma_db
-            logs[at] -= (0.5 * off * off + math.log(max(heard, _RARELY_HEARD))) / DOUBT
+            logs[at] -= (0.5 * off * off + math.log(max(heard, _RARELY_HEARD))) / CORRELATION_FACTOR
     most = max(logs)
     single = [math.exp(log - most) for log in logs]
     spread = _spread(max(model.offset_db, _GRAIN_DB))
     common = [math.fsum(weight * value for weight, value in zip(row, single, strict=True)) for row in spread]
     greatest = max(common)
-    return tuple(value / greatest + _ODD for value in common)
+    return tuple(value / greatest + _LIKELIHOOD_FLOOR for value in common)
 
 
 def common_offset(phones: Iterable[Sequence[float]]) -> PhoneOffset:
-    """The common offset, given the likelihoods of phones: none while it is more likely that phones are as assumed."""
+    """The common offset, estimated from the likelihoods of several phones.
+
+    It is `AS_ASSUMED` until the model with a large offset is more than `_EVIDENCE_RATIO` times as likely as the other.
+    """
     as_assumed, otherwise = _prior(_AS_ASSUMED_DB), _prior(_OTHERWISE_DB)
     for phone in phones:
         as_assumed = [weight * value for weight, value in zip(as_assumed, phone, strict=True)]
@@ -78,7 +97,7 @@ def common_offset(phones: Iterable[Sequence[float]]) -> PhoneOffset:
         as_assumed = [weight / most for weight in as_assumed]
         otherwise = [weight / most for weight in otherwise]
     total = math.fsum(otherwise)
-    if total <= _ODDS * math.fsum(as_assumed):
+    if total <= _EVIDENCE_RATIO * math.fsum(as_assumed):
         return AS_ASSUMED
     mean_db = math.fsum(weight * offset_db for weight, offset_db in zip(otherwise, _COMMON, strict=True)) / total
     squared = math.fsum(w * (offset_db - mean_db) ** 2 for w, offset_db in zip(otherwise, _COMMON, strict=True)) / total
@@ -99,13 +118,13 @@ def _normal(value_db: float, sigma_db: float) -> float:
 
 @lru_cache(maxsize=4)
 def _spread(sigma_db: float) -> tuple[tuple[float, ...], ...]:
-    """For each common offset, the weights of the offsets of one phone."""
+    """For each common offset B, the weight of each offset B + b_j of one phone."""
     return tuple(tuple(_normal(single - common, sigma_db) for single in _SINGLE) for common in _COMMON)
 
 
 @lru_cache(maxsize=4)
 def _prior(sigma_db: float) -> list[float]:
-    """The weights of the common offsets, with a sum of 1, before any survivor is confirmed."""
+    """The probability of each common offset before any survivor is confirmed."""
     weights = [_normal(offset_db, sigma_db) for offset_db in _COMMON]
     total = math.fsum(weights)
     return [weight / total for weight in weights]

@@ -39,11 +39,11 @@ class Contradictions:
         if find.confirmed is None:
             self._judged.pop(survivor, None)
             return False
-        received = find.filter.samples + find.filter.pending
+        received = find.filter.included_powers + find.filter.pending_powers
         if received - self._judged.setdefault(survivor, received) < _FRESH:
             return False
         self._judged[survivor] = received
         margin = self._identities.against(find.confirmed)  # takes in what is pending
-        heard = find.filter.heard_from()
-        sure = heard is not None and heard.sigma_m <= _SURE_M and find.filter.samples >= _SAMPLES
+        heard = find.filter.estimate_by_power()
+        sure = heard is not None and heard.sigma_m <= _SURE_M and find.filter.included_powers >= _SAMPLES
         return sure and margin >= _MARGIN

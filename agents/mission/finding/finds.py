@@ -1,15 +1,18 @@
-"""What one UAV knows of the survivors: which nodes reported each, where each is, and which are confirmed.
+"""What one UAV knows of the survivors: which nodes reported each one, where each one is, and which are confirmed.
 
-heard by a phone's signal -> reported by enough different nodes -> seen at close range -> confirmed: struck off
-confirmed, and heard since where it cannot be heard from the confirmed place           -> refuted: open again
+    a phone is received -> reports by several nodes -> its owner is seen at close range -> confirmed
+    a survivor is confirmed, and later powers of that phone contradict the place        -> refuted, searched for again
 
-A confirmation and what refutes it are merged in any order to the same result: a refutation takes back the
-confirmations of the same place, and all estimates, that are not younger than it.
+A confirmation and its refutation may arrive in any order: a refutation takes back the confirmations of the same place
+that are not younger than itself, those that arrive later included. It also removes the best estimate that another node
+has announced, wherever that is, unless it is younger. Two rules depend on the order of arrival. Of two confirmations
+that nothing refutes, the first to arrive stays. Of the announced estimates only the best one is kept, so once a
+refutation has removed that one, a worse but younger one does not come back.
 
-What has been heard of the confirmed tells how strong phones are, and calibrates the filters of those that are open.
+The powers of the phones of confirmed survivors tell by how much all phones are stronger or weaker than assumed
+(`calibration.py`). The filters of the unconfirmed survivors' phones are calibrated by that.
 """
 
-import math
 from dataclasses import dataclass, field
 from typing import Final, NamedTuple, assert_never
 
@@ -20,13 +23,13 @@ from fanet_mw.wire.inner import Survivor
 from fanet_mw.wire.search import Found, Standing
 
 _PASSED_ON: Final = 5
-"""The most reports in one hello."""
+"""The greatest number of reports in one hello."""
 _FRESH_NS: Final = 8 * S
-"""A node that did not make a report itself passes it on while it is younger than this."""
+"""Hellos pass on reports that are not older than this, whoever made them."""
 SAME_PLACE_M: Final = 12.0
-"""Two sightings, or two confirmations, nearer to each other than this are of one place."""
+"""Two sightings, or two confirmations, at no more than this distance are of one place."""
 _MOST_REFUTED: Final = 4
-"""The most mistaken places of one survivor that are kept in mind, the youngest ones."""
+"""The greatest number of refutations of one survivor that are kept, the youngest ones."""
 
 
 @dataclass
@@ -34,45 +37,52 @@ class Find:
     """What one UAV knows of one survivor."""
 
     filter: PhoneFilter
+    """Estimates the phone's place, from this UAV's received powers and those in the reports of other nodes."""
     reporters: set[int] = field(default_factory=set)
+    """The nodes that have received the phone's signal."""
     latest: dict[int, Survivor] = field(default_factory=dict)
     """The newest report of each node."""
     first_ns: int = 0
-    told: Found | None = None
-    """The best estimate that another node has told."""
+    """The instant at which this UAV first heard of the survivor."""
+    announced: Found | None = None
+    """The most exact estimate that another node has announced."""
     confirmed: Found | None = None
     refuted: list[Found] = field(default_factory=list)
-    """The places at which it was confirmed by mistake, each with the instant of its refutation, oldest first."""
+    """The refutations of this survivor, each with the place that was confirmed by mistake, oldest first."""
 
     @property
     def verdict(self) -> Found | None:
-        """The confirmation that holds, or the latest refutation; None when nobody has announced anything."""
+        """The confirmation that holds, otherwise the latest refutation; None when nobody has announced either."""
         return self.confirmed or (self.refuted[-1] if self.refuted else None)
 
     def is_refuted(self, found: Found) -> bool:
-        """True for a confirmation that has been taken back."""
+        """True for a confirmation that a known refutation takes back."""
         return any(_refutes(refuted, found) for refuted in self.refuted)
 
-    def doubted(self, at: Enu) -> bool:
-        """True at a place at which the survivor was confirmed by mistake."""
+    def was_mistaken_at(self, at: Enu) -> bool:
+        """True if the survivor was confirmed by mistake at this place."""
         return any(estimate_of(refuted).distance_m(at) <= SAME_PLACE_M for refuted in self.refuted)
 
     def place(self) -> Estimate | None:
-        """The better one of the estimate from this UAV's samples and the best that another node has told."""
+        """The confirmed place; before the confirmation, the more exact one of the filter's estimate and the announced
+        one. None if there is neither.
+        """
         if self.confirmed is not None:
             return estimate_of(self.confirmed)
         own = self.filter.estimate()
-        if self.told is None:
+        if self.announced is None:
             return own
-        told = estimate_of(self.told)
-        return told if own is None or told.sigma_m < own.sigma_m else own
+        announced = estimate_of(self.announced)
+        return announced if own is None or announced.sigma_m < own.sigma_m else own
 
 
 class PhoneLikelihood(NamedTuple):
-    """What one phone tells of the common offset, with the confirmation and the number of powers it was computed of."""
+    """The likelihood of each common offset, given the powers of one confirmed survivor's phone."""
 
     found: Found
+    """The confirmation from which the likelihood was computed."""
     readings: int
+    """The number of received powers from which the likelihood was computed."""
     values: tuple[float, ...]
 
 
@@ -83,15 +93,15 @@ class Finds:
         self._model = model
         self.known: dict[int, Find] = {}
         self._likelihoods: dict[int, PhoneLikelihood] = {}
-        """For each confirmed survivor, what has been heard of that phone says of the offset common to all phones."""
+        """The likelihood of the common offset by each confirmed survivor's phone."""
         self.offset: PhoneOffset = AS_ASSUMED
-        """What the phones of confirmed survivors tell of the offset common to all phones."""
+        """The offset common to all phones, as estimated from the phones of all confirmed survivors."""
 
-    def report(self, report: Survivor, *, now_ns: int) -> Find:
-        """Take in a received power that this UAV or another node has measured."""
+    def take_report(self, report: Survivor, *, now_ns: int) -> Find:
+        """Take in a report, which holds the power with which this UAV or another node has received a phone."""
         find = self.known.get(report.survivor)
         if find is None:
-            find = self._opened(report.survivor, now_ns)
+            find = self._new_find(report.survivor, now_ns)
         before = find.latest.get(report.reporter)
         if before is None or report.t_us > before.t_us:
             find.latest[report.reporter] = report
@@ -100,10 +110,12 @@ class Finds:
         return find
 
     def on_found(self, found: Found, *, now_ns: int) -> bool:
-        """Take in what is told of a survivor; True if it strikes the survivor off, or opens it again."""
+        """Take in an announced estimate, confirmation or refutation; True if it confirms a survivor who was not
+        confirmed, or takes the present confirmation back.
+        """
         find = self.known.get(found.survivor)
         if find is None:
-            find = self._opened(found.survivor, now_ns)
+            find = self._new_find(found.survivor, now_ns)
         match found.standing:
             case Standing.CONFIRMED:
                 fresh = find.confirmed is None and not find.is_refuted(found)
@@ -118,38 +130,41 @@ class Finds:
                 return reopened
             case Standing.ESTIMATED:
                 outdated = any(found.t_us <= refuted.t_us for refuted in find.refuted)
-                if not outdated and (find.told is None or estimate_of(found).sigma_m < estimate_of(find.told).sigma_m):
-                    find.told = found
+                best = find.announced
+                if not outdated and (best is None or estimate_of(found).sigma_m < estimate_of(best).sigma_m):
+                    find.announced = found
                 return False
             case _:
                 assert_never(found.standing)
 
-    def open(self) -> list[int]:
-        """The survivors that wait to be confirmed, in order of id."""
+    def unconfirmed(self) -> list[int]:
+        """The survivors without a confirmation that holds, in order of id."""
         return sorted(survivor for survivor, find in self.known.items() if find.confirmed is None)
 
     def is_confirmed(self, survivor: int) -> bool:
-        """True if a node has confirmed the survivor."""
+        """True if the survivor has a confirmation that holds."""
         find = self.known.get(survivor)
         return find is not None and find.confirmed is not None
 
-    def news(self, *, now_ns: int) -> list[Survivor]:
-        """The latest reports to pass on to neighbors, newest first."""
+    def recent_reports(self, *, now_ns: int) -> list[Survivor]:
+        """The reports of unconfirmed survivors to pass on with the next hello, newest first."""
         fresh = [
             report
-            for survivor in self.open()
+            for survivor in self.unconfirmed()
             for report in self.known[survivor].latest.values()
             if now_ns - report.t_us * US <= _FRESH_NS
         ]
         fresh.sort(key=lambda report: (-report.t_us, report.survivor, report.reporter))
         return fresh[:_PASSED_ON]
 
-    def _opened(self, survivor: int, now_ns: int) -> Find:
+    def _new_find(self, survivor: int, now_ns: int) -> Find:
         find = self.known[survivor] = Find(PhoneFilter(self._model, self.offset), first_ns=now_ns)
         return find
 
     def _calibrate(self) -> None:
-        """Estimate the common offset from those who are confirmed now, and tell the filters of all others."""
+        """Estimate the common offset from the phones of the confirmed survivors, and calibrate the filters of all
+        other phones by it.
+        """
         before, self._likelihoods = self._likelihoods, {}
         for survivor, find in sorted(self.known.items()):
             if find.confirmed is None:
@@ -161,16 +176,16 @@ class Finds:
                 known = PhoneLikelihood(find.confirmed, len(readings), values)
             self._likelihoods[survivor] = known
         self.offset = common_offset(phone.values for phone in self._likelihoods.values())
-        for survivor in self.open():
+        for survivor in self.unconfirmed():
             self.known[survivor].filter.calibrate(self.offset)
 
 
 def _refute(find: Find, refuted: Found) -> bool:
-    """Take in a refutation; True if it opens the survivor again."""
+    """Take in a refutation; True if it takes the present confirmation back."""
     if not any(_refutes(known, refuted) for known in find.refuted):
         find.refuted = sorted([*find.refuted, refuted], key=lambda one: (one.t_us, one.node))[-_MOST_REFUTED:]
-    if find.told is not None and find.told.t_us <= refuted.t_us:
-        find.told = None
+    if find.announced is not None and find.announced.t_us <= refuted.t_us:
+        find.announced = None
     if find.confirmed is None or not _refutes(refuted, find.confirmed):
         return False
     find.confirmed = None
@@ -179,23 +194,13 @@ def _refute(find: Find, refuted: Found) -> bool:
 
 
 def _refutes(refuted: Found, found: Found) -> bool:
-    """True if a refutation takes back this confirmation, or holds as much as this refutation."""
+    """True if `refuted`, a refutation, is not older than `found` and concerns the same place. It then takes `found`
+    back if that is a confirmation; if `found` is a refutation itself, it adds nothing to `refuted`.
+    """
     at = estimate_of(found).at
     return found.t_us <= refuted.t_us and estimate_of(refuted).distance_m(at) <= SAME_PLACE_M
 
 
 def estimate_of(found: Found) -> Estimate:
-    """The place that is told of a survivor."""
+    """The place of a survivor, with its covariance, that a message contains."""
     return Estimate(found.east_m, found.north_m, found.east_variance_m2, found.covariance_m2, found.north_variance_m2)
-
-
-def ground_place(at: Enu, *, bearing_rad: float, elevation_rad: float) -> tuple[float, float, float] | None:
-    """East and north of the ground in the direction of a sensor, and the slant range; None above the horizon."""
-    if elevation_rad >= -0.05:
-        return None
-    along_m = at.up / math.tan(-elevation_rad)
-    return (
-        at.east + along_m * math.sin(bearing_rad),
-        at.north + along_m * math.cos(bearing_rad),
-        math.hypot(along_m, at.up),
-    )

@@ -114,7 +114,7 @@ class Identities:
     def review(self, now_ns: int) -> list[int]:
         """Assign phones to people anew; returns the survivors who may be confirmed now, in order of id."""
         self._people = [person for person in self._people if _is_remembered(person, now_ns)]
-        for survivor in self._finds.open():
+        for survivor in self._finds.unconfirmed():
             self._finds.known[survivor].filter.on_sighting(None)
         people = [person for person in self._people if self._may_be_named(person, now_ns)]
         phones = self._phones(people)
@@ -172,7 +172,7 @@ class Identities:
         )
         if taken and person.taken is None:
             person.taken, person.first_ns = person.sightings, now_ns
-        elif not taken and any(find.doubted(at) for find in self._finds.known.values()):
+        elif not taken and any(find.was_mistaken_at(at) for find in self._finds.known.values()):
             person.taken = None
         return person.taken is None or person.sightings - person.taken >= _TAKEN_SIGHTINGS
 
@@ -194,7 +194,7 @@ class Identities:
         """The open survivors whose phones were heard near one of these places."""
         return [
             survivor
-            for survivor in self._finds.open()
+            for survivor in self._finds.unconfirmed()
             if self._finds.known[survivor].reporters
             and any(self._finds.known[survivor].filter.near(place.at, within_m=_NEAR_M) for place in places)
         ]
@@ -209,12 +209,12 @@ class Identities:
 
     def _is_heard_within(self, sigma_m: float, survivor: int) -> bool:
         """True if received powers alone tell the place of a phone with at most this standard deviation."""
-        heard = self._finds.known[survivor].filter.heard_from()
+        heard = self._finds.known[survivor].filter.estimate_by_power()
         return heard is not None and heard.sigma_m <= sigma_m
 
     def _cost(self, place: Estimate, survivor: int) -> float:
         find, at = self._finds.known[survivor], place.at
-        doubt = _REFUTED_COST if find.doubted(at) else 0.0
+        doubt = _REFUTED_COST if find.was_mistaken_at(at) else 0.0
         return min(_IMPOSSIBLE, find.filter.deficit(at.east, at.north) + doubt)
 
     def _is_confirmable(self, person: PersonTrack, survivor: int) -> bool:
@@ -225,7 +225,7 @@ class Identities:
             person.close >= _SIGHTINGS
             and person.place.sigma_m <= _SURE_M
             and self._is_heard_within(_VAGUE_M if person.taken is None else _TAKEN_SIGMA_M, survivor)
-            and find.filter.samples >= enough
+            and find.filter.included_powers >= enough
         )
 
 

@@ -1,13 +1,20 @@
-"""Where a phone is: the posterior over a grid, given received powers, of a phone whose own power is not known either.
+"""Where a phone is: the posterior probability of each cell of a grid, given the powers received from the phone.
 
-    RSSI_i = P + b - L0 - 10 n log10(d_i) + shadowing_i,   b ~ N(0, s_b^2),   shadowing ~ N(0, s^2)
-    nothing heard at i:   P(RSSI_i < threshold)
+    RSSI_i = P + b - L0 - 10 n log10(d_i) + shadowing_i,   b ~ N(0, s_b^2),   shadowing_i ~ N(0, s^2)
 
-The offset b (burial, antenna, battery) is integrated out in closed form, so a cell needs only the sums of the residuals
-and of their squares. A histogram filter as in Thrun, Burgard, Fox: Probabilistic Robotics, 2005, chapter 4: no starting
-point, and the mirror image that a straight flight leaves open stays in the posterior until a sample resolves it.
-What phones of known places have told of the offset that is common to all shifts and widens that of this one.
-Once the owner has been seen, the place is that of the sightings.
+    RSSI_i    power that a UAV receives at place i [dBm]; if it receives nothing there, RSSI_i < threshold
+    P, L0, n  assumed transmit power [dBm], path loss at 1 m [dB], path loss exponent
+    b         offset of this phone's power, by burial, antenna and battery [dB]
+    d_i       distance of the phone from place i [m]
+
+The offset b is integrated out in closed form, so that the filter keeps only the sum of the residuals of each cell, the
+sum of their squares, and the likelihood of the places without reception. The filter is a histogram filter (Thrun,
+Burgard, Fox: Probabilistic Robotics, 2005, chapter 4). Unlike least squares it needs no initial estimate. If a UAV
+flies straight, the powers cannot tell on which side of its course the phone is; both places then stay probable until a
+power received elsewhere excludes one of them.
+
+`calibration.py` estimates an offset that is common to all phones. Its mean is added to P, and its variance to that of
+b. Once a person has been recognized as the phone's owner, the position of that person replaces the filter's estimate.
 """
 
 import math
@@ -23,24 +30,27 @@ REFERENCE_LOSS_DB: Final = 40.05
 """Free-space loss at 1 m and 2.4 GHz."""
 _CELL_M: Final = 20.0
 _HALF_CELLS: Final = 16
-"""The grid reaches this many cells to each side of the place from which the phone was first heard."""
+"""The grid reaches this many cells to each side of its middle, which is at most `_OFF_CENTER_M` away from the place of
+the strongest received power."""
 _WIDTH: Final = 2 * _HALF_CELLS + 1
 _EVERY_CELL: Final = (True,) * (_WIDTH * _WIDTH)
 _OFF_CENTER_M: Final = 120.0
-"""The grid is laid anew when the strongest sample is this far from its middle."""
-DOUBT: Final = 1.5
-"""Samples near each other share shadowing, so that each counts for less than an independent one."""
+"""A new grid is made when the strongest power was received farther than this from the middle of the present one."""
+CORRELATION_FACTOR: Final = 1.5
+"""Samples near each other share shadowing, so that this many of them count like one independent sample."""
 _SILENCE_M: Final = 450.0
-"""Silence at a place farther than this from where a phone was heard tells nothing."""
+"""A place without reception is ignored if it is farther than this from the middle of the grid."""
 _NEVER: Final = 0.02
-"""This share of phones is not heard however near: a receiver misses them, or rubble lies between."""
+"""The least probability with which a phone is not received, however near: the receiver misses it, or rubble lies
+between."""
 _STEP_M: Final = 5.0
+"""The step of distance in the table of probabilities without reception."""
 _SAME_PLACE_M: Final = 25.0
-"""Two samples of one node nearer than this share their shadowing, and count as one."""
+"""Two samples of one node nearer to each other than this share their shadowing; the later one is ignored."""
 
 
 class Estimate(NamedTuple):
-    """An estimated place on the ground, with its covariance."""
+    """An estimated position on the ground, with its covariance."""
 
     east_m: float
     north_m: float
@@ -57,70 +67,80 @@ class Estimate(NamedTuple):
 
     @property
     def at(self) -> Enu:
-        """The place itself."""
+        """The estimated position itself, at height 0."""
         return Enu(self.east_m, self.north_m, 0.0)
 
     def distance_m(self, place: Enu) -> float:
-        """The distance of a place from this one, along the ground."""
+        """The horizontal distance of a place from the estimated position."""
         return math.hypot(self.east_m - place.east, self.north_m - place.north)
 
 
 class PhoneModel(NamedTuple):
-    """What is known of all phones before any is heard."""
+    """The assumptions about all phones before any has been received."""
 
     power_dbm: float
     exponent: float
     shadowing_db: float
     offset_db: float
-    """Standard deviation of a phone's own offset."""
+    """The standard deviation of a phone's own offset."""
     threshold_dbm: float
-    """The least power that is heard."""
+    """The least power that a receiver detects."""
     half_m: float = math.inf
-    """No survivor is farther east, west, north or south of the middle than this."""
+    """Half the side of the square area, whose middle is the origin and in which all survivors lie."""
 
 
 class PhoneOffset(NamedTuple):
-    """What is known of the offset that is common to the phones of a swarm's search and to its receivers."""
+    """The normal distribution of the offset that all phones of a search have in common, the receivers' calibration
+    included.
+    """
 
     mean_db: float
     sigma_db: float
-    """The standard deviation that is left, beside that of each phone's own offset."""
+    """The standard deviation of the common offset; each phone's own offset (`PhoneModel.offset_db`) is not part of
+    it."""
 
 
 AS_ASSUMED: Final = PhoneOffset(0.0, 0.0)
-"""Phones are taken to be as the model says: nothing is known of them yet."""
+"""The common offset while phones are taken to be as the model says."""
 
 
 class PhoneFilter:
-    """The posterior of one phone's place."""
+    """The posterior of one phone's place, given samples: powers received at places, and places without reception."""
 
     def __init__(self, model: PhoneModel, offset: PhoneOffset = AS_ASSUMED) -> None:
-        """`offset`: what is known of the offset common to all phones."""
+        """`offset`: the offset common to all phones."""
         self._assumed, self._model = model, _calibrated(model, offset)
         self._middle: Enu | None = None
+        """The middle of the grid; before the first estimate, the place at which the phone was first received."""
         self._silent_at: list[Enu] = []
+        """The places without reception, those that wait in `_pending` included."""
         self._scores: list[float] = []
-        """For each cell, twice the logarithm of how likely the silence was."""
+        """For each cell, twice the logarithm of the likelihood of the places without reception."""
         self._totals: list[float] = []
         """For each cell, twice the logarithm of the posterior, up to a constant."""
         self._best = 0.0
-        """The greatest of these totals within the area."""
+        """The greatest of `_totals` within the area."""
         self._samples: list[tuple[Enu, float | None]] = []
-        """The places of samples with the received powers; None: nothing was heard there."""
+        """The samples that the cells include: each place with the power received there, or None for no reception."""
         self._pending: list[tuple[Enu, float | None]] = []
-        """The samples that the cells do not reckon with yet; they are taken in when an estimate is asked for."""
+        """The samples that the cells do not include yet; they are added when an estimate is asked for."""
         self._sums: list[float] = []
+        """For each cell, the sum of the residuals of the received powers."""
         self._squares: list[float] = []
+        """For each cell, the sum of the squared residuals."""
         self._count = 0
         self._taken: dict[int, list[Enu]] = {}
+        """For each node, the places at which it received the phone."""
         self._estimate: Estimate | None = None
         self._seen: Estimate | None = None
-        """The place at which the owner has been seen."""
+        """The position of the person who has been recognized as the phone's owner."""
 
     # --- measurements ---------------------------------------------------------------------------------------------
 
     def on_rssi(self, reporter: int, position: Enu, rssi_dbm: float) -> bool:
-        """Take in a power received at a place; False when it tells nothing new."""
+        """Take in a power received at a place; False if it is ignored, because the same node has received the phone
+        near that place before.
+        """
         taken = self._taken.setdefault(reporter, [])
         if any(_ground_m(p, position) < _SAME_PLACE_M for p in taken):
             return False
@@ -131,7 +151,9 @@ class PhoneFilter:
         return True
 
     def on_silence(self, position: Enu) -> None:
-        """Take in that the receiver of this UAV heard nothing at a place."""
+        """Take in that this UAV's receiver did not detect the phone at a place; it is ignored if that place is far from
+        the grid's middle, or near an earlier place without reception.
+        """
         if self._middle is None or not self.near(position, within_m=_SILENCE_M):
             return
         if any(_ground_m(p, position) < _SAME_PLACE_M for p in self._silent_at):
@@ -140,11 +162,11 @@ class PhoneFilter:
         self._pending.append((position, None))
 
     def on_sighting(self, place: Estimate | None) -> None:
-        """Take in where a camera shows the owner; None: no person in view is the owner."""
+        """Take in the position of the person who is the phone's owner; None: no person is recognized as the owner."""
         self._seen = place
 
     def calibrate(self, offset: PhoneOffset) -> None:
-        """Take in what is known now of the offset common to all phones; what was heard is reckoned with anew."""
+        """Assume a new offset common to all phones; if it changes the model, the cells are computed anew."""
         model = _calibrated(self._assumed, offset)
         if model != self._model:
             self._model, self._sums = model, []
@@ -154,36 +176,40 @@ class PhoneFilter:
         return self._seen is not None
 
     @property
-    def pending(self) -> int:
-        """The number of received powers that the estimate does not reckon with yet."""
+    def pending_powers(self) -> int:
+        """The number of received powers that the cells do not include yet."""
         return sum(1 for _, rssi_dbm in self._pending if rssi_dbm is not None)
 
     @property
-    def samples(self) -> int:
-        """The number of received powers that have been taken in."""
+    def included_powers(self) -> int:
+        """The number of received powers that the cells include."""
         return self._count
 
     @property
     def readings(self) -> list[tuple[Enu, float]]:
-        """The received powers with their places, in the order in which they came."""
+        """All received powers with their places, in the order of their arrival."""
         return [(at, rssi_dbm) for at, rssi_dbm in (*self._samples, *self._pending) if rssi_dbm is not None]
 
     # --- the estimate ---------------------------------------------------------------------------------------------
 
     def estimate(self) -> Estimate | None:
-        """The mean and the covariance of the place; None before anything was measured."""
-        return self._seen or self.heard_from()
+        """The position of the owner if one has been recognized, otherwise the estimate by power; None before the phone
+        was received.
+        """
+        return self._seen or self.estimate_by_power()
 
-    def heard_from(self) -> Estimate | None:
-        """The same estimate by received powers alone, without sightings."""
+    def estimate_by_power(self) -> Estimate | None:
+        """The mean and the covariance of the posterior, without sightings; None before the phone was received."""
         self._catch_up()
         return self._estimate
 
     def _catch_up(self) -> None:
-        """Take in what has been heard since the last time; lay the grid anew when its middle was a bad guess."""
+        """Add the pending samples to the cells; make a new grid if there is none, if the model has changed, or if the
+        strongest power was received far from the middle.
+        """
         if not self._pending and (self._sums or not self._samples):
             return
-        assert self._middle is not None, "something was heard before anything is pending"
+        assert self._middle is not None, "a place without reception is a sample only after the first reception"
         self._samples += self._pending
         fresh, self._pending = self._pending, []
         strongest = max((s for s in self._samples if s[1] is not None), key=lambda s: s[1] or 0.0)[0]
@@ -200,7 +226,9 @@ class PhoneFilter:
         self._estimate = self._moments()
 
     def deficit(self, east_m: float, north_m: float) -> float:
-        """How much less likely a place is than the best one: twice the difference of the logarithms."""
+        """How much less probable a place is than the most probable cell within the area: twice the difference of the
+        logarithms. It is 0 before the phone was received, and infinite outside the grid.
+        """
         self._catch_up()
         if self._middle is None or not self._totals:
             return 0.0
@@ -211,12 +239,16 @@ class PhoneFilter:
         return self._best - self._totals[j * _WIDTH + i]
 
     def near(self, place: Enu, *, within_m: float) -> bool:
-        """True if the phone was first heard within a distance of a place, or has only been seen; cheap to ask."""
+        """True if the middle of the grid is within a distance of a place, or if the phone was not received yet.
+
+        The answer needs no computation of cells, so callers ask this first, and for the estimate only if it is True.
+        """
         middle = self._middle
         return middle is None or _ground_m(middle, place) <= within_m
 
     def _update(self, position: Enu, rssi_dbm: float) -> None:
-        assert self._middle is not None, "the grid lies around the first sample"
+        """Add a received power to the sums of all cells."""
+        assert self._middle is not None, "the grid has a middle before samples are added"
         model = self._model
         expected_at_1_m = model.power_dbm - REFERENCE_LOSS_DB
         slope = 5 * model.exponent / math.log(10)  # per natural logarithm of the squared distance
@@ -228,8 +260,8 @@ class PhoneFilter:
         self._squares = list(map(add, self._squares, map(mul, residuals, residuals)))
 
     def _rule_out(self, position: Enu) -> None:
-        """Make the cells less likely from which the phone would have been heard."""
-        assert self._middle is not None, "the grid lies around the first sample"
+        """Multiply the likelihood of each cell by the probability that a phone there is not received at a place."""
+        assert self._middle is not None, "the grid has a middle before samples are added"
         table = _silence_scores(self._model)
         most, sqrt = len(table) - 1, math.sqrt
         up2 = position.up * position.up
@@ -239,8 +271,8 @@ class PhoneFilter:
         self._scores = list(map(add, self._scores, map(table.__getitem__, steps)))
 
     def _inside(self) -> Sequence[bool]:
-        """The cells that are in the area; all cells when none is."""
-        assert self._middle is not None, "the grid lies around a sample"
+        """For each cell, True if it lies in the area; all cells are taken if none does."""
+        assert self._middle is not None, "the grid has a middle before its cells are used"
         half = self._model.half_m + _CELL_M / 2
         if max(abs(self._middle.east), abs(self._middle.north)) + _HALF_CELLS * _CELL_M <= half:
             return _EVERY_CELL
@@ -250,9 +282,10 @@ class PhoneFilter:
         return found if any(found) else _EVERY_CELL
 
     def _moments(self) -> Estimate:
-        assert self._middle is not None, "only what was heard has moments"
+        """Compute the posterior of all cells; returns its mean and covariance within the area."""
+        assert self._middle is not None, "the grid has a middle before its cells are used"
         model = self._model
-        per = 1 / (DOUBT * max(model.shadowing_db, 1.0) ** 2)
+        per = 1 / (CORRELATION_FACTOR * max(model.shadowing_db, 1.0) ** 2)
         shrink = per * per / (per * self._count + 1 / max(model.offset_db, 0.1) ** 2)
         scores = [
             shrink * s * s - per * q + silence
@@ -291,7 +324,7 @@ def _ground_m(a: Enu, b: Enu) -> float:
 
 
 def _squared_distances_m2(middle: Enu, position: Enu, up2: float) -> list[float]:
-    """The squared distance of every cell of the grid around `middle` from a position; `up2` is that of its height."""
+    """The squared distance of every cell of the grid around `middle` from a position whose squared height is `up2`."""
     west = middle.east - _HALF_CELLS * _CELL_M - position.east
     south = middle.north - _HALF_CELLS * _CELL_M - position.north
     span = range(_WIDTH)
@@ -300,7 +333,7 @@ def _squared_distances_m2(middle: Enu, position: Enu, up2: float) -> list[float]
 
 
 def _calibrated(model: PhoneModel, offset: PhoneOffset) -> PhoneModel:
-    """The model of phones whose common offset is known so well."""
+    """The model of a phone when the offset common to all phones has this distribution."""
     return model._replace(
         power_dbm=model.power_dbm + offset.mean_db, offset_db=math.hypot(model.offset_db, offset.sigma_db)
     )
@@ -308,12 +341,14 @@ def _calibrated(model: PhoneModel, offset: PhoneOffset) -> PhoneModel:
 
 @lru_cache(maxsize=64)
 def _silence_scores(model: PhoneModel) -> tuple[float, ...]:
-    """Twice the logarithm of the probability that a phone is not heard, for distances in steps."""
+    """Twice the logarithm of the probability that a phone is not received, divided by `CORRELATION_FACTOR`, for
+    distances in steps of `_STEP_M`.
+    """
     sigma = math.hypot(max(model.shadowing_db, 1.0), model.offset_db)
     scores = []
     for step in range(200):
         distance_m = max(1.0, (step + 0.5) * _STEP_M)
         margin = model.power_dbm - REFERENCE_LOSS_DB - 10 * model.exponent * math.log10(distance_m)
         chance = 0.5 * math.erfc((margin - model.threshold_dbm) / (sigma * math.sqrt(2)))
-        scores.append(2 / DOUBT * math.log(max(chance, _NEVER)))
+        scores.append(2 / CORRELATION_FACTOR * math.log(max(chance, _NEVER)))
     return tuple(scores)

@@ -54,7 +54,7 @@ class PhoneReception:
         self._scan_ns = now_ns
         here = self._navigation.position
         in_reach = {survivor for survivor, _ in heard}
-        for survivor in self._finds.open():
+        for survivor in self._finds.unconfirmed():
             if survivor not in in_reach:
                 self._finds.known[survivor].filter.on_silence(here)
         for survivor, rssi_dbm in heard:
@@ -62,7 +62,7 @@ class PhoneReception:
             find = self._finds.known.get(survivor)
             if find is None or self._node not in find.reporters:
                 self._outbox.records.append(Detected(now_ns, self._node, survivor, round(rssi_dbm, 2)))
-            find = self._finds.report(report, now_ns=now_ns)
+            find = self._finds.take_report(report, now_ns=now_ns)
             last_ns = self._reported_ns.get(survivor)
             if find.confirmed is None and (last_ns is None or now_ns - last_ns >= self._report_every_ns):
                 self._reported_ns[survivor] = now_ns

@@ -64,7 +64,7 @@ class Goal:
         if pattern is None or not formation.searches or not formation.is_taken_up(now_ns):
             return None
         best: tuple[float, int] | None = None
-        for survivor in self._finds.open():
+        for survivor in self._finds.unconfirmed():
             find = self._finds.known[survivor]
             estimate = find.place() if find.filter.near(here, within_m=FAR_M) else None
             if estimate is None or estimate.sigma_m > VAGUE_M:

@@ -70,7 +70,7 @@ class Bidding:
 
     def bids_to_tell(self, *, now_ns: int) -> list[Bid]:
         """The bids to pass on."""
-        return self._auction.bids_to_tell(self._finds.open(), now_ns=now_ns)
+        return self._auction.bids_to_tell(self._finds.unconfirmed(), now_ns=now_ns)
 
     def close(self, survivor: int, *, now_ns: int) -> None:
         """Forget the bids for a survivor that needs no UAV any more."""
@@ -85,7 +85,7 @@ class Bidding:
 
     def hand_on(self, now_ns: int) -> None:
         """Withdraw all bids of this UAV, so that the next best bidders fly instead."""
-        for survivor in self._finds.open():
+        for survivor in self._finds.unconfirmed():
             self._auction.withdraw(survivor, now_ns=now_ns)
         self.survivor = None
 
@@ -93,7 +93,7 @@ class Bidding:
         """Bid for those survivors for whom this UAV would be among the best."""
         if self._formation.pattern is None:
             return
-        for survivor in self._finds.open():
+        for survivor in self._finds.unconfirmed():
             find = self._finds.known[survivor]
             if self._auction.has_bid(survivor) or not find.filter.near(self._navigation.position, within_m=FAR_M):
                 continue
@@ -116,7 +116,7 @@ class Bidding:
         if self.survivor is None:
             won = [
                 (self._distance_m(survivor), survivor)
-                for survivor in self._finds.open()
+                for survivor in self._finds.unconfirmed()
                 if self._wins(survivor, self._finds.known[survivor], now_ns)
             ]
             if won:

@@ -68,7 +68,7 @@ class Board:
                 at = Enu(truth.east + (40 if node % 2 else -60), truth.north + step + node, UP_M)
                 rssi_dbm = MODEL.power_dbm - REFERENCE_LOSS_DB - 30 * math.log10(at.minus(truth).norm())
                 report = Survivor(now_ns // US, survivor, node, at, rssi_dbm)
-                self.finds.report(report, now_ns=now_ns)
+                self.finds.take_report(report, now_ns=now_ns)
 
 
 def lane_of(node: int, at_ns: int) -> Enu:

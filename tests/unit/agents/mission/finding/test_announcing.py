@@ -23,7 +23,7 @@ def seen() -> Board:
         for east in (-60, 0, 60):
             at = Enu(east, 20.0 * node, UP_M)
             rssi_dbm = MODEL.power_dbm - REFERENCE_LOSS_DB - 30 * math.log10(at.norm())
-            board.finds.report(Survivor(0, 1, node, at, rssi_dbm), now_ns=0)
+            board.finds.take_report(Survivor(0, 1, node, at, rssi_dbm), now_ns=0)
     board.finds.known[1].filter.on_sighting(Estimate(1, 2, 4, 0, 4))
     return board
 

@@ -54,7 +54,7 @@ def swarm(confirmed: int, *, offset_db: float, drawn: random.Random) -> Finds:
     for survivor in range(1, confirmed + 1):
         phone, own_db = somewhere(drawn), drawn.gauss(0, MODEL.offset_db)
         for node, at, rssi_dbm in heard(phone, [*PASS, *circle(phone)], offset_db + own_db, drawn):
-            finds.report(Survivor(0, survivor, node, at, rssi_dbm), now_ns=0)
+            finds.take_report(Survivor(0, survivor, node, at, rssi_dbm), now_ns=0)
         confirm(finds, survivor, phone)
     return finds
 
@@ -65,7 +65,7 @@ def error_m(finds: Finds, *, offset_db: float, draw: int) -> float | None:
     phone = somewhere(drawn)
     powers = list(heard(phone, PASS, offset_db, drawn))
     for node, at, rssi_dbm in powers:
-        finds.report(Survivor(0, 99, node, at, rssi_dbm), now_ns=0)
+        finds.take_report(Survivor(0, 99, node, at, rssi_dbm), now_ns=0)
     if not powers:
         return None
     for _, at in PASS:
@@ -136,7 +136,7 @@ def test_the_order_in_which_survivors_are_confirmed_does_not_matter(order: list[
         phones = {survivor: somewhere(drawn) for survivor in range(1, 5)}
         for survivor, phone in phones.items():
             for node, at, rssi_dbm in heard(phone, circle(phone), -4, drawn):
-                finds.report(Survivor(0, survivor, node, at, rssi_dbm), now_ns=0)
+                finds.take_report(Survivor(0, survivor, node, at, rssi_dbm), now_ns=0)
         for survivor in told:
             confirm(finds, survivor, phones[survivor])
         offsets.add(finds.offset)
@@ -163,7 +163,7 @@ def test_no_powers_at_all_drive_it_beyond_its_bound(phones: list[list[tuple[int,
     finds = Finds(MODEL)
     for survivor, powers in enumerate(phones, start=1):
         for node, at, rssi_dbm in powers:
-            finds.report(Survivor(0, survivor, node, at, rssi_dbm), now_ns=0)
+            finds.take_report(Survivor(0, survivor, node, at, rssi_dbm), now_ns=0)
         confirm(finds, survivor, Enu(0, 0, 0))
     assert abs(finds.offset.mean_db) <= 12
     assert 0 <= finds.offset.sigma_db <= 12
@@ -177,6 +177,6 @@ def test_one_phone_whose_powers_are_forged_does_not_outweigh_four_that_are_true(
     finds = swarm(4, offset_db=0, drawn=random.Random(2))
     before = finds.offset.mean_db
     for node, at, rssi_dbm in [*powers, *((4, at, near_dbm) for _, at in circle(Enu(0, 0, 0)))]:
-        finds.report(Survivor(0, 50, node, at, rssi_dbm), now_ns=0)
+        finds.take_report(Survivor(0, 50, node, at, rssi_dbm), now_ns=0)
     confirm(finds, 50, Enu(0, 0, 0))
     assert abs(finds.offset.mean_db - before) <= 1.0

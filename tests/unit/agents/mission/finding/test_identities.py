@@ -37,7 +37,7 @@ class Uav:
         self.named: dict[int, Enu] = {}
 
     def hear(self, survivor: int, node: int, at: Enu, rssi_dbm: float, *, now_ns: int = 0) -> None:
-        self.finds.report(Survivor(now_ns // US, survivor, node, at, rssi_dbm), now_ns=now_ns)
+        self.finds.take_report(Survivor(now_ns // US, survivor, node, at, rssi_dbm), now_ns=now_ns)
 
     def see(self, *people: Enu, now_ns: int) -> list[int]:
         """An image from close by; who may be confirmed, is."""
@@ -77,7 +77,7 @@ class Pass:
 
     def _goal(self, line: float, step: int) -> Enu:
         finds = self.uav.finds
-        places = [finds.known[survivor].place() for survivor in finds.open()]
+        places = [finds.known[survivor].place() for survivor in finds.unconfirmed()]
         near = [
             place for place in places if place is not None and place.sigma_m < 50 and abs(place.north_m - line) < 140
         ]
@@ -95,7 +95,7 @@ class Pass:
                 rssi_dbm = mean_dbm(truth, at) + shadowing_db
                 if rssi_dbm >= MODEL.threshold_dbm:
                     self.uav.hear(survivor, node, at, rssi_dbm, now_ns=now_ns)
-                elif node == 1 and survivor in self.uav.finds.open():
+                elif node == 1 and survivor in self.uav.finds.unconfirmed():
                     self.uav.finds.known[survivor].filter.on_silence(at)
 
     def _image(self, here: Enu) -> Iterator[Enu]:
@@ -270,7 +270,7 @@ def test_confirmations_and_refutations_come_to_the_same_in_any_order(order: list
     finds = Finds(MODEL)
     for at in [*order, *order]:  # told twice, as floods and hellos do
         finds.on_found(words[at], now_ns=S)
-    confirmed, estimate = finds.known[1].confirmed, finds.known[1].told
+    confirmed, estimate = finds.known[1].confirmed, finds.known[1].announced
     assert confirmed is not None
     assert confirmed.node == 6, "the only one that was not taken back"
     assert estimate is not None

@@ -1,14 +1,20 @@
-"""Results for a notebook: `fanet_mw.results.read(DIR)` is the table of a sweep or of a single run.
+"""Results for a notebook: `read(DIR)` is the table of a sweep or of a single run, `records(DIR)` the events of a run.
 
-Needs the extra `sweep`. A companion computer, which has neither results nor numpy, never imports what this calls.
+`read` needs the extra `sweep`, `records` none. A companion computer, which has neither results nor numpy, never imports
+what these call.
 """
 
+from collections.abc import Iterator
 from importlib import import_module
 from pathlib import Path
-from typing import TYPE_CHECKING
+from typing import TYPE_CHECKING, TypeVar
+
+from fanet_mw.trace import Record
 
 if TYPE_CHECKING:
     from pyarrow import Table
+
+R = TypeVar("R", bound=Record)
 
 
 def read(*folders: str | Path) -> "Table":
@@ -19,3 +25,13 @@ def read(*folders: str | Path) -> "Table":
     """
     table: Table = import_module("sim.results.read").read(*folders)
     return table
+
+
+def records(folder: str | Path, *kinds: type[R]) -> Iterator[R]:
+    """The recorded events of one run (`fanet simulate --out`, `fanet launch --out`), in the order of its trace.
+
+    With `kinds` (classes of `fanet_mw.trace`) only those: `records(DIR, Delivered, Dropped)`. Raises ConfigError for a
+    folder without a trace, and at a line that is no record.
+    """
+    found: Iterator[R] = import_module("sim.results.trace_file").read_trace(Path(folder), *kinds)
+    return found

@@ -16,9 +16,10 @@ from typing import Any, NamedTuple, Self, TypeVar
 
 from fanet_mw.errors import ConfigError
 from fanet_mw.scenario import Scenario
-from fanet_mw.trace import FlightModeChanged, MissionModeChanged, Planned, Posed, Record, parse
+from fanet_mw.trace import FlightModeChanged, MissionModeChanged, Planned, Posed, Record
 from fanet_mw.units import Enu, NodeId, S
 from sim.results.mission import OverflownCells, mission
+from sim.results.trace_file import read_trace
 
 R = TypeVar("R", FlightModeChanged, MissionModeChanged, Planned)
 
@@ -62,10 +63,9 @@ class Replay:
         """Read what `fanet simulate --out` or `fanet launch --out` has written; raises ConfigError."""
         try:
             keys = tomllib.loads((folder / "scenario.toml").read_text(encoding="utf-8"))
-            lines = (folder / "trace.jsonl").read_text(encoding="utf-8").splitlines()
         except (OSError, ValueError) as error:
             raise ConfigError(f"{folder}: cannot be replayed: {error}") from error
-        return cls(Scenario.model_validate(keys), [parse(line) for line in lines])
+        return cls(Scenario.model_validate(keys), list(read_trace(folder)))
 
     def at(self, t_s: float) -> Mapping[NodeId, UavState]:
         """The states of all UAVs at an instant. A wreck is where it was last seen flying."""

@@ -1,6 +1,7 @@
-"""What the mission of one UAV wants done: records for the trace, packets to flood, and a course to fly.
+"""Collects the decisions of one UAV's mission: records for the trace, packets to flood, and a course to fly.
 
-The parts of a mission write into one outbox and know no port; the application empties it after each of its inputs.
+The parts of a mission write into one outbox and do not know the node's port; the application empties it after each
+input.
 """
 
 from dataclasses import dataclass, field
@@ -15,7 +16,7 @@ from fanet_mw.wire.inner import Survivor
 
 
 class OutgoingPacket(NamedTuple):
-    """Inner frames that are flooded to everyone."""
+    """Inner frames to be flooded to all nodes."""
 
     frames: bytes
     priority: int = PRIORITY_REPORT
@@ -23,15 +24,15 @@ class OutgoingPacket(NamedTuple):
 
 @dataclass
 class Outbox:
-    """Everything that the mission of one UAV has decided since the last input and that has not left it yet."""
+    """The decisions of one UAV's mission since the last input."""
 
     records: list[Record] = field(default_factory=list)
     packets: list[OutgoingPacket] = field(default_factory=list)
     course: Course | None = None
-    """A new course to fly; None when the old one holds."""
+    """A new course to fly; None if the old one holds."""
 
     def empty(self, port: AppPort) -> None:
-        """Hand the records, the packets and the course to the port."""
+        """Pass the records, the packets and the course to the port."""
         for record in self.records:
             port.record(record)
         self.records.clear()
@@ -44,7 +45,7 @@ class Outbox:
 
 
 class ReportFormat:
-    """The length and the priority of survivor reports, as the scenario says."""
+    """The length and the priority of survivor reports, by the scenario."""
 
     def __init__(self, scenario: Scenario, node: NodeId) -> None:
         self._node = node
@@ -52,7 +53,7 @@ class ReportFormat:
         self._priority = PRIORITIES[scenario.mission.report_priority]
 
     def packet(self, report: Survivor) -> OutgoingPacket:
-        """The packet of a report, filled up to its length."""
+        """The packet of a report, padded to its length."""
         frames = report.encode_frame(self._node)
         if self._bytes:
             frames += filler(self._bytes - HEADER_BYTES - len(frames), node=self._node)

@@ -1,7 +1,8 @@
-"""Search and rescue at one UAV: detect -> report -> on reports of one survivor by enough nodes, approach.
+"""The paper's rule of search and rescue at one UAV: detect, report, and approach a survivor that enough nodes have
+reported.
 
-The rule is the paper's (4.1): reports by three or more different nodes change the course. Sans-IO: scans, reports and
-positions go in; survivor reports to send, courses and trace records come out.
+In the paper (4.1), reports by three or more different nodes make a UAV change its course. Sans-IO: scans, reports and
+positions go in; survivor reports, courses and trace records come out.
 """
 
 import math
@@ -19,13 +20,14 @@ from fanet_mw.units import GOLDEN_ANGLE, US, Enu, NodeId, S, seconds_to_ns
 from fanet_mw.wire.inner import Survivor
 
 _RING_M: Final = 20.0
-"""UAVs hold on a ring about the survivor, each at an angle of its own, so that they see it from several sides."""
+"""UAVs hold on a circle of this radius around the survivor, each at an angle of its own, so that they see it from
+several sides."""
 _MOVED_M: Final = 10.0
-"""A better estimate changes the setpoint only when it moved this far."""
+"""A better estimate changes the setpoint only if it has moved this far."""
 
 
 class PaperRule:
-    """The reports and scans of one UAV, and the survivor that it has chosen to approach."""
+    """The scans and reports of one UAV, and the survivor that it has chosen to approach."""
 
     def __init__(self, scenario: Scenario, node: NodeId, outbox: Outbox) -> None:
         self._node = node
@@ -37,19 +39,19 @@ class PaperRule:
         self._outbox = outbox
         self._detected: set[int] = set()
         self._measured: dict[int, Survivor] = {}
-        """The latest received power of each phone that the receiver hears."""
+        """The latest received power of each phone that the receiver detects."""
         self._due_ns: dict[int, int] = {}
-        """The instant at which each of these phones is to be reported next."""
+        """The instant at which each of these phones must be reported next."""
         self._sightings: dict[int, dict[int, Sighting]] = {}
         self._visited: set[int] = set()
         self._target: int | None = None
         self._target_at = Enu(0, 0, 0)
         self._dwell_until_ns: int | None = None
 
-    # --- what comes in --------------------------------------------------------------------------------------------
+    # --- input ----------------------------------------------------------------------------------------------------
 
     def scan(self, heard: Sequence[tuple[int, float]], *, position: Enu, now_ns: int) -> None:
-        """Take in the phones that the receiver hears; each is reported, and again only after the interval."""
+        """The receiver detects these phones; each is reported now, and again after each interval."""
         before, self._measured = self._measured, {}
         for survivor, rssi_dbm in heard:
             if survivor not in self._detected:
@@ -61,26 +63,26 @@ class PaperRule:
         self.wake(now_ns)
 
     def next_wake_ns(self) -> int | None:
-        """The instant at which the next report is due."""
+        """The instant of the next report."""
         if not self._measured:
-            return None  # as for most nodes, most of the time
+            return None  # this is so for most nodes, most of the time
         return min((self._due_ns[survivor] for survivor in self._measured), default=None)
 
     def wake(self, now_ns: int) -> None:
-        """Make the reports that are due of phones that are still heard."""
+        """Make the due reports of phones that are still detected."""
         for survivor, measured in list(self._measured.items()):
             if now_ns - measured.t_us * US > self._heard_for_ns:
-                del self._measured[survivor]  # a receiver that hears no phone says nothing
+                del self._measured[survivor]  # a receiver that detects no phone says nothing
             elif now_ns >= self._due_ns[survivor]:
                 self._due_ns[survivor] = now_ns + seconds_to_ns(self._config.report_interval_s)
                 self._outbox.packets.append(self._format.packet(measured))
 
     def reported(self, report: Survivor, *, position: Enu, now_ns: int) -> None:
-        """Take in a report of another node."""
+        """Another node has reported a survivor."""
         sightings = self._sightings.setdefault(report.survivor, {})
         known = sightings.get(report.reporter)
         if known is not None and report.rssi_dbm <= known.rssi_dbm:
-            return  # the strongest is the nearest and the least shadowed
+            return  # the strongest one is the nearest and the least shadowed
         sightings[report.reporter] = Sighting(report.position, report.rssi_dbm)
         if self._target is None:
             self._choose(position, now_ns)
@@ -88,7 +90,7 @@ class PaperRule:
             self._refine()
 
     def moved(self, position: Enu, *, now_ns: int) -> None:
-        """Take in a position fix: it tells whether the UAV has arrived, and whether it has stayed long enough."""
+        """A position fix, by which the UAV finds out whether it has arrived and whether it has stayed long enough."""
         if self._target is None:
             return
         if self._dwell_until_ns is None:
@@ -106,7 +108,7 @@ class PaperRule:
     # --- decisions ------------------------------------------------------------------------------------------------
 
     def _choose(self, position: Enu, now_ns: int) -> None:
-        """Take the nearest survivor that enough different nodes have reported and that this UAV has not visited."""
+        """Choose the nearest survivor that enough different nodes have reported and that this UAV has not visited."""
         candidates = [
             (self._place(survivor), survivor)
             for survivor in sorted(self._sightings)

@@ -1,13 +1,14 @@
-"""One UAV's part in a planned search: it keeps its lane, reports, bids, responds, confirms, and keeps clear of others.
+"""The planned search at one UAV: it keeps its lane, reports phones, bids for survivors, responds, confirms, and avoids
+others.
 
-    plan over the air   -> a lane: where to be at every instant of swarm time                   formation
-    phones in reach     -> reports: flooded, and passed from neighbor to neighbor with hellos   finding.phone_reception
-    enough reporters    -> an auction; winners leave their lanes as far as the formation holds  tasking
-    too few reporters   -> the auction names one that has not reported, for a further bearing   tasking
-    seen at close range -> confirmed, announced, struck off; responders return to their lanes   finding.announcing
-    heard elsewhere     -> refuted, announced, open again for reports and bids                  finding.contradictions
+    plan received       -> a lane: its place at each instant of swarm time                      formation
+    phones in reach     -> reports: flooded, and passed from neighbor to neighbor in hellos     finding.phone_reception
+    enough reporters    -> an auction; winners leave their lanes as far as the formation allows tasking
+    too few reporters   -> the auction sends a UAV that has not reported, for another bearing   tasking
+    seen at close range -> confirmed, announced, closed; responders return to their lanes       finding.announcing
+    contradicted later  -> refuted, announced, open again for reports and bids                  finding.contradictions
 
-Everything that a UAV knows it has sensed or was told over the air. Each fix gives one velocity (flight).
+All that a UAV knows it has sensed itself or received over the air. At each position fix it chooses a velocity (flight).
 """
 
 import math
@@ -49,14 +50,14 @@ from fanet_mw.wire.inner import Survivor
 from fanet_mw.wire.search import MOST_PLACES, Bids, Covered, Found, Search, SearchStatus, Standing, Told, encode_bids
 
 _OFFSET_DB: Final = 1.0
-"""The standard deviation by which the power of one phone is taken to differ from that of another."""
+"""The standard deviation of the power of one phone against that of others."""
 _REVIEW_NS: Final = 1 * S
 _DEPLOY: Final = 0.9
-"""Share of its greatest speed at which the slowest UAV takes up its place."""
+"""The share of its greatest speed at which the slowest UAV flies to its first place."""
 
 
 class Searcher:
-    """The parts of one UAV's search, and the order in which they see what the UAV senses and hears."""
+    """The parts of one UAV's search, and the order in which they get its inputs."""
 
     def __init__(
         self, scenario: Scenario, node: NodeId, *, position: Enu, outbox: Outbox, onboard_map: OnboardMap
@@ -129,7 +130,7 @@ class Searcher:
 
     @property
     def velocity(self) -> Enu | None:
-        """The velocity to fly that has been chosen and not been taken yet; None: there is none."""
+        """The chosen velocity that has not been taken yet; None if there is none."""
         return self._flight.velocity
 
     def take_velocity(self) -> Enu | None:
@@ -140,11 +141,11 @@ class Searcher:
     # --- what its own sensors say ---------------------------------------------------------------------------------
 
     def fix(self, position: Enu, velocity: Enu, *, now_ns: int) -> None:
-        """The receiver gives a position and a velocity: the UAV chooses how to fly on."""
+        """A position and a velocity from the receiver: the UAV chooses its next velocity."""
         self._flight.fix(position, velocity, self._bidding.survivor, now_ns=now_ns)
 
     def on_battery(self, charge: float, *, now_ns: int) -> None:
-        """The battery says what is left; a UAV that has to leave hands its place and its task on at once."""
+        """A reading of the battery; a UAV that must leave gives up its place and its task at once."""
         if self._return_home.on_battery(charge, now_ns=now_ns):
             self._bidding.hand_on(now_ns)
             self._plans.leave()
@@ -152,11 +153,11 @@ class Searcher:
             self._mode.review(self._bidding.survivor, now_ns)
 
     def scan(self, heard: Sequence[tuple[int, float]], *, now_ns: int) -> None:
-        """The receiver hears these phones with these powers [dBm], and no others."""
+        """The receiver detects these phones with these powers [dBm], and no others."""
         self._reception.scan(heard, now_ns=now_ns)
 
     def altimeter(self, above_ground_m: float | None, *, now_ns: int) -> None:
-        """The rangefinder tells the height over whatever is below; None: nothing is within its range."""
+        """The rangefinder has measured the height over whatever is below; None if nothing is within its range."""
         self._flight.altimeter(above_ground_m, now_ns=now_ns)
 
     def radar(self, echoes: Sequence[Echo], *, now_ns: int) -> None:
@@ -169,25 +170,27 @@ class Searcher:
         self._identify(now_ns)
 
     def voice(self, calls: Sequence[tuple[float, float, float]], *, now_ns: int) -> None:
-        """The microphones make out calls at these bearings and elevations [rad], so far above noise [dB]."""
+        """The microphones detect calls at these bearings and elevations [rad], with these
+        signal-to-noise ratios [dB].
+        """
         self._sightings.voice(calls, now_ns=now_ns)
         self._identify(now_ns)
 
     def _identify(self, now_ns: int) -> None:
-        """Confirm the survivors whose phones are surely those of people that were seen."""
+        """Confirm the survivors for whom it is certain which person carries the phone."""
         for survivor in self._sightings.review(now_ns):
             self._announcing.confirm(survivor, now_ns)
             self._bidding.close(survivor, now_ns=now_ns)
 
-    # --- what others tell -----------------------------------------------------------------------------------------
+    # --- received messages ----------------------------------------------------------------------------------------
 
     def hello(self, origin: int, motion: Motion, *, now_ns: int) -> None:
-        """A neighbor's hello tells how it flies."""
+        """A neighbor's hello states how it flies."""
         self._neighbors.on_hello(origin, motion)
         self._plans.on_hello(origin, motion.position, now_ns=now_ns)
 
     def on_message(self, message: Told, *, now_ns: int) -> None:
-        """Another node tells something, to its neighbors or to all nodes."""
+        """A message of another node was received, sent to its neighbors or to all nodes."""
         match message:
             case Survivor():
                 if message.reporter != self._node:
@@ -208,7 +211,7 @@ class Searcher:
                 assert_never(message)
 
     def _on_found(self, found: Found, now_ns: int) -> None:
-        """Another node estimates the place of a survivor, confirms it there, or takes that back."""
+        """Another node states the place of a survivor: an estimate, a confirmation, or a refutation."""
         if self._finds.on_found(found, now_ns=now_ns):
             self._announcing.decided(found.survivor, now_ns)
             if found.standing is Standing.CONFIRMED:
@@ -218,10 +221,12 @@ class Searcher:
         elif found.standing is Standing.CONFIRMED and self._finds.known[found.survivor].is_refuted(found):
             self._announcing.outdated(found, now_ns)
 
-    # --- what it tells --------------------------------------------------------------------------------------------
+    # --- sent messages --------------------------------------------------------------------------------------------
 
     def hello_frames(self, now_ns: int) -> bytes:
-        """Inner frames for the next hello: the latest reports, the best bids, what was found and searched lately."""
+        """The inner frames for the next hello: the latest reports, the best bids, recent verdicts, and the map of
+        searched cells.
+        """
         frames = b"".join(report.encode_frame(self._node) for report in self._finds.recent_reports(now_ns=now_ns))
         bids = self._bidding.bids_to_tell(now_ns=now_ns)
         if bids:
@@ -230,7 +235,7 @@ class Searcher:
 
 
 def phone_model(scenario: Scenario) -> PhoneModel:
-    """The reception of the phones of a scenario."""
+    """The model of phones and receivers by which this scenario's survivors are located."""
     mission = scenario.mission
     return PhoneModel(
         mission.phone_power_dbm,
@@ -243,7 +248,7 @@ def phone_model(scenario: Scenario) -> PhoneModel:
 
 
 def formation(scenario: Scenario, count: int) -> Pattern | None:
-    """The formation in which so many UAVs search the area of a scenario; None when they are too few."""
+    """The formation in which this number of UAVs searches the area of a scenario; None if they are too few."""
     demands = Demands(
         area_m=scenario.world.area_m,
         seen_m=_ground_range_m(phone_model(scenario), scenario.nodes.altitude_m),
@@ -257,17 +262,17 @@ def formation(scenario: Scenario, count: int) -> Pattern | None:
 
 
 def coverage_map(scenario: Scenario) -> CoverageMap | None:
-    """An empty map of what has been searched; None: the UAVs of this scenario share none."""
+    """An empty map of searched cells; None if the UAVs of this scenario share none."""
     seen_m = _ground_range_m(phone_model(scenario), scenario.nodes.altitude_m)
     return CoverageMap(area_m=scenario.world.area_m, seen_m=seen_m) if scenario.mission.coverage_map else None
 
 
 def least_nodes(scenario: Scenario) -> int | None:
-    """The number of UAVs that a planned search needs in the area of a scenario; None when no plan can name so many."""
+    """The number of UAVs that a planned search needs in the area of a scenario; None if no plan can name so many."""
     return next((count for count in range(1, MOST_PLACES + 1) if formation(scenario, count) is not None), None)
 
 
 def _ground_range_m(model: PhoneModel, height_m: float) -> float:
-    """The distance to the side at which a phone on the ground is heard, without shadowing."""
+    """The greatest horizontal distance at which a phone on the ground is received, without shadowing."""
     slant = 10 ** ((model.power_dbm - REFERENCE_LOSS_DB - model.threshold_dbm) / (10 * model.exponent))
     return math.sqrt(max(1.0, slant * slant - height_m * height_m))

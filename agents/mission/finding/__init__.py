@@ -1,1 +1,3 @@
-"""Which phones were heard where, which people were seen, whose phone is whose, and who is confirmed."""
+"""Finding survivors: where phones were received, which people were seen, who carries which phone,
+and who is confirmed.
+"""

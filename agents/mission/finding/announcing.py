@@ -1,8 +1,8 @@
-"""What one UAV tells of finds: its estimates while it responds, and its verdicts until everyone has heard of them.
+"""What one UAV floods about survivors: estimates while it responds, and its verdicts until all nodes know them.
 
-seen often enough at close range, place sure   -> confirmed: told three times, and with the hellos of a while
-heard since where that place is impossible     -> refuted: told likewise, and the survivor is searched for again
-a UAV speaks as if it knew of no verdict       -> some of those that know it tell it again
+seen often enough at close range, place certain  -> confirmed: flooded three times, then in hellos for a while
+later receptions make that place impossible      -> refuted: flooded likewise, and the survivor is searched again
+another UAV does not seem to know of a verdict   -> some of those that know it flood it again
 """
 
 import math
@@ -18,45 +18,46 @@ from fanet_mw.wire.search import Found, Standing
 _TELLINGS: Final = 3
 _AGAIN_NS: Final = 7 * S
 _WORSE: Final = 0.8
-"""A UAV tells its estimate again when the standard deviation has shrunk to this share."""
+"""A UAV floods its estimate again when the standard deviation has decreased to this share."""
 _USEFUL_M: Final = 60.0
-"""An estimate whose standard deviation is larger is not worth telling."""
+"""An estimate with a greater standard deviation is not flooded."""
 _PASSED_ON_NS: Final = 12 * S
-"""How long hellos pass a verdict on."""
+"""How long hellos pass on a verdict."""
 _PASSED_ON: Final = 3
-"""The most verdicts in one hello."""
+"""The greatest number of verdicts in one hello."""
 _TELLERS: Final = 4
-"""When a UAV speaks as if it knew of no verdict, one in so many of the UAVs that know it tells it."""
+"""If a UAV does not seem to know of a verdict, one in this number of the UAVs that know it floods it again."""
 
 
 class Announcing:
-    """What one UAV tells of finds, and when."""
+    """Decides what one UAV floods about survivors, and when."""
 
     def __init__(self, node: NodeId, finds: Finds, outbox: Outbox) -> None:
         self._node = node
         self._finds, self._outbox = finds, outbox
         self._told_sigma_m: dict[int, float] = {}
         self._tellings: dict[int, tuple[int, int]] = {}
-        """For each survivor that this UAV has confirmed or refuted: how often that is still to be told, and when."""
+        """For each survivor that this UAV has confirmed or refuted: how often the verdict must still be flooded, and
+        when next."""
         self._heard_ns: dict[int, int] = {}
-        """When this UAV confirmed or refuted each survivor, or heard of that."""
+        """The instant at which each survivor was confirmed or refuted, as far as this UAV knows."""
 
     def confirm(self, survivor: int, now_ns: int) -> None:
-        """Tell all nodes that the owner of this phone has been seen and is surely the one."""
+        """The owner of this phone was seen and is certain: flood the confirmation."""
         place = self._finds.known[survivor].filter.estimate()
         assert place is not None, "who was seen has a place"
         found = Found(now_ns // US, survivor, *place, self._node, Standing.CONFIRMED)
         self._decide(found, Confirmed, now_ns)
 
     def refute(self, survivor: int, now_ns: int) -> None:
-        """Tell all nodes that a confirmed survivor cannot be where it was confirmed."""
+        """A confirmed survivor cannot be at the confirmed place: flood the refutation."""
         mistaken = self._finds.known[survivor].confirmed
         assert mistaken is not None, "only a confirmation is refuted"
         refuted = mistaken._replace(t_us=now_ns // US, node=self._node, standing=Standing.REFUTED)
         self._decide(refuted, Refuted, now_ns)
 
     def _decide(self, verdict: Found, record: type[Confirmed | Refuted], now_ns: int) -> None:
-        """Take in a verdict of this UAV, record it, and tell it from now on."""
+        """Record a verdict of this UAV, and flood it from now on."""
         survivor, east_m, north_m = verdict.survivor, round(verdict.east_m, 2), round(verdict.north_m, 2)
         self._finds.on_found(verdict, now_ns=now_ns)
         self._outbox.records.append(record(now_ns, self._node, survivor, east_m, north_m))
@@ -64,12 +65,12 @@ class Announcing:
         self.decided(survivor, now_ns)
 
     def decided(self, survivor: int, now_ns: int) -> None:
-        """Note that a survivor is confirmed or refuted, by this UAV or by another."""
+        """A survivor was confirmed or refuted, by this UAV or by another."""
         self._heard_ns[survivor] = now_ns
         self._told_sigma_m.pop(survivor, None)
 
     def tell(self, task: int | None, now_ns: int) -> None:
-        """Tell the verdicts that are due, and the estimate of the survivor to whom this UAV flies."""
+        """Flood the verdicts that are due, and the estimate of the survivor to whom this UAV flies."""
         for survivor, (left, next_ns) in sorted(self._tellings.items()):
             if now_ns < next_ns:
                 continue
@@ -84,16 +85,16 @@ class Announcing:
             self._tell_estimate(task, now_ns)
 
     def reported(self, report: Survivor, now_ns: int) -> None:
-        """Note that another node reports a survivor: it may not know yet that the survivor is confirmed."""
+        """Another node reports a survivor, so it may not know yet that the survivor is confirmed."""
         if self._finds.is_confirmed(report.survivor):
             self._remind(report.survivor, report.reporter, now_ns)
 
     def outdated(self, found: Found, now_ns: int) -> None:
-        """Note that another node tells a confirmation that has been taken back."""
+        """Another node floods a confirmation that was taken back."""
         self._remind(found.survivor, found.node, now_ns)
 
     def _remind(self, survivor: int, of_node: int, now_ns: int) -> None:
-        """Tell a verdict again, unless that was done lately or is up to others."""
+        """Flood a verdict again, unless that was done recently or other UAVs are to do it."""
         verdict = self._finds.known[survivor].verdict
         if verdict is None or now_ns - self._heard_ns.get(survivor, now_ns) <= _AGAIN_NS:
             return
@@ -102,7 +103,7 @@ class Announcing:
             self._flood(verdict)
 
     def hello_frames(self, now_ns: int) -> bytes:
-        """The inner frames that tell in the next hello what was confirmed or refuted lately."""
+        """The inner frames with recent verdicts for the next hello."""
         recent = [
             (heard_ns, survivor) for survivor, heard_ns in self._heard_ns.items() if now_ns - heard_ns < _PASSED_ON_NS
         ]
@@ -110,7 +111,7 @@ class Announcing:
         return b"".join(found.encode_frame(self._node) for found in latest if found is not None)
 
     def _tell_estimate(self, survivor: int, now_ns: int) -> None:
-        """Tell the estimate of a responder when it has become clearly better."""
+        """Flood the estimate of a responder if it has become clearly better."""
         place = self._finds.known[survivor].filter.estimate()
         before_m = self._told_sigma_m.get(survivor, math.inf)
         if place is None or place.sigma_m > _WORSE * before_m or place.sigma_m > _USEFUL_M:

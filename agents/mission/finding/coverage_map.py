@@ -1,10 +1,10 @@
-"""Which cells of the area have been searched, as far as one UAV knows.
+"""The map of the cells of the area that have been searched, as far as one UAV knows.
 
-    flown over        cells whose middles came within the range of its own receiver
-    told by others    with hellos, every `TELL_NS`; a cell that anyone has searched stays searched
+    by this UAV     cells whose middles came within the range of its own receiver
+    by others       their maps, in hellos every `TELL_NS`; a cell that any UAV has searched counts as searched
 
-Maps are merged by a bitwise or, which is idempotent, commutative and associative: they spread from neighbor to neighbor
-in any order, and copies do no harm.
+Maps are merged by bitwise or, which is idempotent, commutative and associative. So they spread from neighbor to
+neighbor in any order, and repetitions do no harm.
 """
 
 import math
@@ -24,27 +24,27 @@ class CoverageMap:
         self._half_m = area_m / 2
         self._cell_m = area_m / COVERED_SIDE
         self.seen_m = max(seen_m, self._cell_m)
-        """The distance to which a receiver searches."""
+        """The distance up to which a receiver searches."""
         self.cells = 0
         self._told_ns: int | None = None
 
     def fly_over(self, position: Enu) -> None:
-        """The UAV is at a place: its receiver searches what is around."""
+        """Mark what a receiver at a place searches."""
         self.cells |= self.around(position, self.seen_m)
 
     def merge(self, told: Covered) -> None:
-        """A neighbor tells what has been searched."""
+        """A neighbor has sent its map."""
         self.cells |= told.cells
 
     def news(self, now_ns: int) -> Covered | None:
-        """What to tell with a hello; None: it is not time yet."""
+        """The map for the next hello; None if it is not due."""
         if self._told_ns is not None and now_ns - self._told_ns < TELL_NS:
             return None
         self._told_ns = now_ns
         return Covered(self.cells)
 
     def around(self, position: Enu, within_m: float) -> int:
-        """The cells whose middles are within so many metres of a place."""
+        """The cells whose middles are within this distance of a place."""
         found = 0
         columns, rows = self._span(position.east, within_m), self._span(position.north, within_m)
         for row in rows:

@@ -1,14 +1,14 @@
 """Decides which person carries which phone: cameras and microphones show people, receivers identify phones.
 
     sightings near each other     are taken for one person, whose position a Kalman filter estimates
-    all people and all phones     are assigned to each other at once, so that all received powers together are most likely
+    all people and all phones     are assigned at once, so that all received powers together are most likely
     a person's phone is certain   when every other assignment of this person is far less likely
 
-A survivor is known by the id of the phone. The cost of a pair of person and phone tells how much less likely the phone's
-received powers are from the person's place than from the best place. It is twice a difference of log-likelihoods, so
-for the true pair it has a chi-square distribution with 2 degrees of freedom. If two people lie side by side, many powers
-are needed to tell their phones apart. A UAV that is not certain therefore waits and receives more, and after a while it
-is content with less certainty.
+A survivor is known by the id of the phone. The cost of a pair of person and phone tells how much less likely the
+phone's received powers are from the person's place than from the best place. It is twice a difference of
+log-likelihoods, so for the true pair it has a chi-square distribution with 2 degrees of freedom. If two people lie side
+by side, many powers are needed to tell their phones apart. A UAV that is not certain therefore waits and receives more,
+and after a while it is content with less certainty.
 """
 
 import math
@@ -25,8 +25,8 @@ from fanet_mw.wire.search import Found
 _SAME_SIGMAS: Final = 2.5
 """A sighting also belongs to a person within this number of its standard deviations; voices have wide ones."""
 _GATE: Final = 16.0
-"""A person for whom every phone costs more than this is taken to carry none of them. The value is above 11.8, the 99.7 %
-quantile of chi-square with 2 degrees of freedom, because the shadowing of neighboring samples is not independent."""
+"""A person for whom every phone costs more than this is taken to carry none of them. The value is above 11.8, the 99.7
+% quantile of chi-square with 2 degrees of freedom, because the shadowing of neighboring samples is not independent."""
 _VAGUE_M: Final = 80.0
 """If the place of a phone has a greater standard deviation than this, any person could carry it."""
 _NEAR_M: Final = 400.0
@@ -42,11 +42,11 @@ _SIGHTINGS: Final = 2
 _SURE_M: Final = 3.5
 """The greatest standard deviation of a confirmed place."""
 _SAMPLES: Final = 6
-"""The least number of received powers of a phone with which its owner is confirmed, if `_REPORTERS` nodes received it."""
+"""The least number of received powers of a phone for confirming its owner, if `_REPORTERS` nodes have received it."""
 _REPORTERS: Final = 2
 """With fewer nodes than this that have received a phone, `_SAMPLES_ALONE` powers are needed."""
 _SAMPLES_ALONE: Final = 8
-"""The least number of received powers if only one node has received the phone, as may happen at the edge of the area."""
+"""The least number of received powers if only one node has received the phone, as may be at the edge of the area."""
 _MARGIN: Final = 9.0
 """By how much the next best assignment must cost more, at first: it is then 90 times less likely."""
 _IMPOSSIBLE: Final = 1e6
@@ -58,7 +58,7 @@ _PATIENT_NS: Final = 15 * S
 _IMPATIENT_NS: Final = 50 * S
 """The time since the first sighting from which only the least margin is required; it decreases linearly in between."""
 _REFUTED_COST: Final = 9.0
-"""An additional cost for a place at which the same survivor was confirmed by mistake, because other UAVs know better."""
+"""An additional cost at a place where the same survivor was confirmed by mistake, because other UAVs know better."""
 _SECOND_SIGHTINGS: Final = 20
 """A second person at a place where a survivor is confirmed is believed after this number of further sightings."""
 _SECOND_GATE: Final = 6.0
@@ -267,7 +267,7 @@ def _required_margin(person: PersonTrack, now_ns: int) -> float:
 
 
 def _assigned(costs: Sequence[Sequence[float]], nobody: Sequence[float]) -> tuple[float, list[int | None]]:
-    """The least total cost, and the phone of each person; `nobody` has the cost that each person carries none of them."""
+    """The least total cost, and the phone of each person; `nobody` has the cost that a person carries none of them."""
     phones, people = len(costs[0]), len(costs)
     table = [[*row, *(nobody[i] if i == j else _IMPOSSIBLE for j in range(people))] for i, row in enumerate(costs)]
     chosen = assign(table)

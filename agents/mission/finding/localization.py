@@ -1,9 +1,10 @@
-"""Where is the phone? Least squares of received powers over the ground, by the log-distance law.
+"""Locates a phone by least squares over received powers, by the log-distance law (the simpler method of the paper's
+rule).
 
     RSSI_i = P - L0 - 10 n log10(d_i)   ->   minimize over (east, north) the sum of (RSSI_i - predicted_i)^2
 
-The classic RSS multilateration of Patwari et al., IEEE Signal Processing Magazine 22(4), 2005, with Gauss-Newton
-steps from the power-weighted centroid. Beyond the paper, which names triangulation without doing it.
+This is the classic RSS multilateration of Patwari et al., IEEE Signal Processing Magazine 22(4), 2005, with
+Gauss-Newton steps from the power-weighted centroid. The paper names triangulation, but does not carry it out.
 """
 
 import math
@@ -25,7 +26,7 @@ class Sighting(NamedTuple):
 
 
 def estimate(sightings: Sequence[Sighting], *, phone_power_dbm: float, exponent: float) -> Enu:
-    """The most likely place on the ground (up = 0) of a phone; at least one sighting is needed."""
+    """The most likely place of a phone on the ground (up = 0); at least one sighting is needed."""
     assert sightings, "nobody heard the phone"
     east, north = _centroid(sightings)
     if len(sightings) < 3:
@@ -38,7 +39,7 @@ def estimate(sightings: Sequence[Sighting], *, phone_power_dbm: float, exponent:
             dx, dy = east - position.east, north - position.north
             d2 = max(1.0, dx * dx + dy * dy + position.up * position.up)
             residual = rssi_dbm - (phone_power_dbm - REFERENCE_LOSS_DB - 0.5 * slope * math.log(d2))
-            jx, jy = slope * dx / d2, slope * dy / d2  # minus the derivative of the prediction
+            jx, jy = slope * dx / d2, slope * dy / d2  # the negative derivative of the prediction
             a, b, c = a + jx * jx, b + jx * jy, c + jy * jy
             p, q = p - jx * residual, q - jy * residual
         a, c = a + damping, c + damping

@@ -1,6 +1,6 @@
-"""The phones that a UAV's own receiver hears: each power goes into the filter of that phone, and out as a report.
+"""Handles the phones that a UAV's own receiver detects: each power goes into the phone's filter, and out as a report.
 
-A receiver that hears no phone says nothing. A review takes a while without a scan for a scan without phones.
+A receiver that detects no phone says nothing. If no scan has come for a while, a scan without phones is assumed.
 """
 
 from collections.abc import Sequence
@@ -17,11 +17,11 @@ from fanet_mw.wire.inner import Survivor
 from fanet_mw.wire.search import Covered
 
 MISSED_SCANS: Final = 1.5
-"""So many intervals of the scan without a word from the receiver mean that it hears no phone."""
+"""After this number of scan intervals without a scan, the receiver is taken to detect no phone."""
 
 
 class PhoneReception:
-    """What the receiver of one UAV hears of phones, and where it has listened."""
+    """The receptions of phones by one UAV, and where it has listened."""
 
     def __init__(
         self,
@@ -32,7 +32,7 @@ class PhoneReception:
         outbox: Outbox,
         coverage: CoverageMap | None,
     ) -> None:
-        """`coverage`: the map of what has been searched, for UAVs that share one."""
+        """`coverage`: the map of searched cells, for UAVs that share one."""
         self._node = node
         self._finds, self._navigation, self._outbox = finds, navigation, outbox
         self._format = ReportFormat(scenario, node)
@@ -43,14 +43,14 @@ class PhoneReception:
         self._reported_ns: dict[int, int] = {}
 
     def review(self, now_ns: int) -> None:
-        """Take a receiver that has said nothing for a while as one that hears no phone, and note where it is."""
+        """If there was no scan for a while, assume one without phones at the present place."""
         if self._coverage is not None:
             self._coverage.fly_over(self._navigation.position)
         if now_ns - self._scan_ns > self._silent_after_ns:
             self.scan((), now_ns=now_ns)
 
     def scan(self, heard: Sequence[tuple[int, float]], *, now_ns: int) -> None:
-        """The receiver hears these phones with these powers [dBm], and no others."""
+        """The receiver detects these phones with these powers [dBm], and no others."""
         self._scan_ns = now_ns
         here = self._navigation.position
         in_reach = {survivor for survivor, _ in heard}
@@ -69,11 +69,11 @@ class PhoneReception:
                 self._outbox.packets.append(self._format.packet(report))
 
     def on_covered(self, covered: Covered) -> None:
-        """A neighbor tells what has been searched."""
+        """A neighbor has sent its map of searched cells."""
         if self._coverage is not None:
             self._coverage.merge(covered)
 
     def hello_frames(self, now_ns: int) -> bytes:
-        """Inner frames for the next hello: what has been searched, when that is due."""
+        """The inner frames with the map of searched cells for the next hello, if it is due."""
         covered = None if self._coverage is None else self._coverage.news(now_ns)
         return b"" if covered is None else covered.encode_frame(self._node)

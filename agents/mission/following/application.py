@@ -1,4 +1,4 @@
-"""Formation flight by clusters as an application: it takes in received positions, and flies the UAV to its place."""
+"""The application of formation flight by clusters: it collects received positions, and flies the UAV to its place."""
 
 from typing import Final
 
@@ -20,17 +20,17 @@ from fanet_mw.units import Enu, NodeId, S, seconds_to_ns
 from fanet_mw.wire import PRIORITY_REPORT
 
 _TELL_NS: Final = S
-"""How often a head floods where it is and how it flies, for heads that do not hear its hellos."""
+"""How often a head floods its position and velocity, for heads that do not receive its hellos."""
 
 
 class FormationFlight(Application):
-    """One UAV's part in the formation."""
+    """The formation flight of one UAV."""
 
     name: Final = "formation"
     listens = (mavlink.GLOBAL_POSITION_ID,)
 
     def __init__(self, scenario: Scenario, node: NodeId, *, position: Enu, onboard_map: OnboardMap = NO_MAP) -> None:
-        """`onboard_map` is the map that the UAV carries."""
+        """`onboard_map`: the map that the UAV carries."""
         obstacles = KnownObstacles(onboard_map, scenario.world.no_fly_m)
         self._navigation = navigation = Navigation(position, obstacles)
         self._motions = motions = NeighborMotions()
@@ -50,16 +50,16 @@ class FormationFlight(Application):
         self._encoder = mavlink.Encoder(node)
         self._next_ns: int | None = None
         self._bad_positions = 0
-        """The number of hellos and floods without a position that can be believed."""
+        """The number of hellos and floods without a credible position."""
 
     def start(self, port: AppPort, now_ns: int) -> None:
         super().start(port, now_ns)
         self._next_ns = now_ns + round(port.stream("formation").random() * _TELL_NS)
 
-    # --- what it hears --------------------------------------------------------------------------------------------
+    # --- received messages ----------------------------------------------------------------------------------------
 
     def on_message(self, message: Received, now_ns: int) -> None:
-        """A head floods where it is."""
+        """A head has flooded its position."""
         self._on_motion(message.frame, now_ns)
         self.port.tap(message.frame)
 
@@ -80,10 +80,12 @@ class FormationFlight(Application):
         if isinstance(reading, Altimeter):
             self._navigation.altimeter(reading.above_ground_m, now_ns=now_ns)
 
-    # --- what it does ---------------------------------------------------------------------------------------------
+    # --- flight ---------------------------------------------------------------------------------------------------
 
     def on_fix(self, fix: Gps, now_ns: int) -> None:
-        """Fly on towards the place in the formation, clear of all others; hover until the formation is flown."""
+        """Choose a velocity towards the place in the formation, clear of all others; hover until formation flight
+        begins.
+        """
         self._navigation.fix(fix.position, fix.velocity, now_ns=now_ns)
         if now_ns < self._begins_ns:
             return

@@ -1,4 +1,4 @@
-"""The route of a swarm that flies in formation: way points that its leader passes one after the other."""
+"""The route of a swarm in formation flight: waypoints that its leader passes one after the other."""
 
 import math
 from collections.abc import Sequence
@@ -7,15 +7,15 @@ from typing import Final
 from fanet_mw.units import STILL, Enu
 
 _PASSED_M: Final = 30.0
-"""A leader that is this near to a way point flies on to the next one."""
+"""When the leader is this near to a waypoint, it flies on to the next one."""
 _BRAKING_S: Final = 4.0
-"""The last way point is approached no faster than so that it would be reached after this time."""
+"""The leader approaches the last waypoint so slowly that the rest of the way would take at least this time."""
 
 
 class Route:
-    """The way points, and how many of them the leader has passed.
+    """The waypoints, and how many of them the leader has passed.
 
-    Every head follows how far the leader has come, because it may have to lead in its place.
+    Every head keeps track of that, because it may have to become leader.
     """
 
     def __init__(self, points: Sequence[tuple[float, float]], *, speed_m_s: float) -> None:
@@ -24,12 +24,12 @@ class Route:
         self._passed = 0
 
     def led_at(self, leader: Enu) -> None:
-        """Take in where the leader is."""
+        """The leader is at this place."""
         if self._passed < len(self._points) and self._away_m(leader) <= _PASSED_M:
             self._passed = min(self._passed + 1, len(self._points) - 1)
 
     def velocity(self, here: Enu) -> Enu:
-        """The velocity at which the leader flies; still at the end, and without a route."""
+        """The velocity at which the leader must fly; zero at the end, and without a route."""
         if not self._points:
             return STILL
         east, north = self._points[self._passed]

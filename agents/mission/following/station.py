@@ -1,11 +1,12 @@
-"""Where one UAV of a formation of clusters is to be, and at which velocity that place moves.
+"""The place of one UAV in a formation of clusters, and the velocity at which that place moves.
 
-    the leader      the head with the lowest id flies the route
-    other heads     on a circle around the leader, so wide that the circles of the clusters do not touch
-    members         on a circle around their head; who is in no cluster, around the nearest head that it hears of
-    who hears none  hovers, the leader too: the others fly on without it
+    the leader                the head with the lowest id flies the route
+    other heads               on a circle around the leader, so wide that the circles of the clusters do not touch
+    members                   on a circle around their head
+    a UAV without a cluster   on a circle around the nearest head that it knows
+    a UAV that knows no head  hovers, even if it was the leader: the others fly on without it
 
-Places come from received positions only: those in the hellos of neighbors, and those that heads flood.
+Positions come only from received messages: the hellos of neighbors, and the floods of heads.
 """
 
 from collections.abc import Callable, Iterable, Iterator, Mapping
@@ -18,17 +19,17 @@ from fanet_mw.motion import Motion
 from fanet_mw.units import STILL, Enu, NodeId
 
 _APART: Final = 2.2
-"""The distance of two heads in radii of the circle around a head."""
+"""The distance of two heads, as a multiple of the radius of the circle around a head."""
 Clusters = Mapping[NodeId, tuple[NodeId, ...]]
 
 
 class Station:
-    """The place of one UAV."""
+    """Computes the place of one UAV."""
 
     def __init__(
         self, node: NodeId, motions: NeighborMotions, route: Route, *, radius_m: float, clusters: Callable[[], Clusters]
     ) -> None:
-        """`clusters` tells the clusters as the node knows them, by head."""
+        """`clusters` gives the clusters as the node knows them, by head."""
         self._node = node
         self._motions = motions
         self._route = route
@@ -61,7 +62,9 @@ class Station:
         return self._around(followed, sorted(others - {head, self._node}), radius_m, here, now_ns)
 
     def _head_of(self, node: int, place: Enu, clusters: Clusters, now_ns: int) -> int | None:
-        """The head of a UAV that is none: that of its cluster, else the nearest one that is heard; None: none is."""
+        """The head of a UAV that is none itself: that of its cluster, or the nearest known one; None if no head is
+        known.
+        """
         own = next((head for head, nodes in clusters.items() if node in nodes), None)
         if own is not None:
             return own
@@ -73,7 +76,7 @@ class Station:
         return min(heard)[1] if heard else None
 
     def _followers(self, head: int, clusters: Clusters, now_ns: int) -> Iterator[int]:
-        """The UAVs that fly around a head, as far as they are heard."""
+        """The UAVs that fly around a head, as far as they are received."""
         for node, motion in self._motions.by_node(now_ns=now_ns):
             if node not in clusters and self._head_of(node, motion.position_at(now_ns), clusters, now_ns) == head:
                 yield node

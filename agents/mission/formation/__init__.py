@@ -1,1 +1,1 @@
-"""The search pattern: where its places are, which UAV takes which, and where the place of one UAV is now."""
+"""The formation of a planned search: its shape, which UAV takes which place, and where a UAV's place is now."""

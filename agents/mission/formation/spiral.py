@@ -1,4 +1,4 @@
-"""Arms abreast that turn about the middle of the area on squares, one inside the other.
+"""The formation `spiral`: arms abreast turn about the middle of the area, their lanes on squares inside each other.
 
     +-----------------+     lane k flies the square of half-side (2 k + 1) x `first_m`; all lanes of an arm are on one
     | +-------------+ |     ray from the middle, so neighbors are at most a lane times the root of 2 apart, always
@@ -8,7 +8,7 @@
     | +-------------+ |     one arm that is shorter: it flies a first turn in the middle, and winds outward from there
     +-----------------+     until its last turn is along the edge; then the same way back
 
-The expanding square of IAMSAR, volume II, flown by many: what is near the middle is seen first, and any number of UAVs
+This is the expanding square of IAMSAR, volume II, flown by many UAVs: the middle is seen first, and any number of UAVs
 is enough. The outermost lane flies at the speed of the sweep, the others in proportion.
 """
 
@@ -19,7 +19,7 @@ from agents.mission.formation.shape import FOLLOWER_HIGHER_M, Demands, Dimension
 from fanet_mw.units import Enu
 
 _BEHIND_S: Final = 15.0
-"""How long ago its arm was where a follower is."""
+"""A follower is where its arm was this long ago."""
 _ARMS_M: Final = 60.0
 """The least distance of the innermost lanes of two arms, along their square."""
 
@@ -31,12 +31,12 @@ class Spiral:
         self._formation = formation
         lanes, first_m = formation.lanes, formation.first_m
         self._outer_m = first_m * (2 * lanes - 1)
-        """The half-side of the square of the outermost lane during the first turn."""
+        """The half-side of the square of the outermost lane in the first turn."""
         self._pitch_m = 2 * first_m * lanes
-        """Every lane is so much farther out after each turn that winds outward."""
+        """By how much each lane moves outward in each turn that winds outward."""
         rounds = (formation.last_m / first_m + 1) / (2 * lanes)
         self._winds = max(0, round(rounds) - 1)
-        """The number of turns that wind outward, between the first and the last, which do not."""
+        """The number of turns that wind outward; the first and the last turn do not."""
 
     @property
     def lane_m(self) -> float:
@@ -87,7 +87,7 @@ class Spiral:
         return min(max(0.0, turned - 1), self._winds)
 
     def _way_m(self, turned: float) -> float:
-        """No less than the outermost lane has flown after so many turns."""
+        """A lower bound of the way that the outermost lane has flown after this many turns."""
         wound = self._wound(turned)
         level = turned - wound
         first = min(level, 1.0)
@@ -95,7 +95,7 @@ class Spiral:
         return 8 * self._outer_m * first + outward + 8 * (self._outer_m + self._pitch_m * wound) * (level - first)
 
     def _turned(self, swept_s: float) -> float:
-        """The turns that have been flown; from the end of a spiral that winds outward they go back, and so on."""
+        """The number of turns flown; at its end, a spiral that winds outward goes back the same way, and so on."""
         way_m = swept_s * self._formation.speed_m_s
         if not self._winds:
             return way_m / (8 * self._outer_m)
@@ -113,7 +113,7 @@ class Spiral:
 
 
 def _on_square(turned: float) -> tuple[float, float]:
-    """East and north on the square of half-side 1 after so much of a turn, from the middle of its eastern side."""
+    """East and north on the square of half-side 1 after this part of a turn, from the middle of its eastern side."""
     along = 8 * (turned % 1.0)
     if along < 1:
         return 1.0, along
@@ -125,7 +125,9 @@ def _on_square(turned: float) -> tuple[float, float]:
 
 
 def fitted(count: int, demands: Demands) -> Dimensions:
-    """The spiral for so many UAVs: as many arms as reach from the middle to the edge, or a shorter one that winds."""
+    """The spiral for this number of UAVs: as many arms as reach from the middle to the edge, or a shorter one that
+    winds outward.
+    """
     half = demands.area_m / 2
     apart_m = demands.apart_m(demands.reach_m / math.sqrt(2))
     needed = math.ceil(half / apart_m)

@@ -139,7 +139,9 @@ class Identities:
         self._people = [person for person in self._people if _is_remembered(person, now_ns)]
         for person in self._people:
             confirmed = self._has_confirmed(person.place.at)
-            refuted = not confirmed and any(find.was_mistaken_at(person.place.at) for find in self._finds.known.values())
+            refuted = not confirmed and any(
+                find.was_mistaken_at(person.place.at) for find in self._finds.known.values()
+            )
             person.on_neighborhood(confirmed=confirmed, refuted=refuted, now_ns=now_ns)
         for survivor in self._finds.unconfirmed():
             self._finds.known[survivor].filter.on_sighting(None)

@@ -1,7 +1,7 @@
 """A UAV's place in the formation: where the plan wants it at each instant, and how far it may go from there.
 
-A UAV of a line or of the chain holds the swarm together, so it stays near its lane. A follower may fly anywhere near
-its line. A UAV that has no place yet waits where it is.
+The swarm is connected by the UAVs of teams and by relays, so these stay near their places. A follower may fly anywhere
+near its team. A UAV that has no place yet waits where it is. (`shape.py` explains place, lane, team, relay, follower.)
 """
 
 from typing import Final
@@ -14,14 +14,17 @@ from fanet_mw.units import MS, STILL, US, Enu, NodeId, S
 from fanet_mw.wire.search import Search
 
 _FREE_REACH: Final = 0.84
-"""A follower stays within this share of the reach from its line, so that the line receives it wherever it flies."""
+"""A follower stays within this share of the radio's reach from its team, so that the team receives it wherever it
+flies."""
 _ASIDE_M: Final = 70.0
-"""A survivor up to this far beyond the leash is examined from the end of the leash."""
+"""A UAV of a team examines a survivor who is at most this far to the side of the farthest point that `_LEASH_M`
+permits."""
 _AHEAD_M: Final = 250.0
+"""A UAV of a team examines a survivor who is at most this far ahead of its place."""
 _LEASH_M: Final = 58.0
-"""How far a UAV of a line may leave its lane sideways."""
+"""The greatest distance to the side at which a UAV of a team, or a relay, may be from its place."""
 _LAG_M: Final = 140.0
-"""How far a UAV may fall behind its line."""
+"""The greatest distance by which a UAV of a team, or a relay, may be behind its place."""
 
 
 class FormationPlace:
@@ -35,7 +38,9 @@ class FormationPlace:
         self.pattern: Pattern | None = None
         self.place: int | None = None
         self._left_from: Enu | None = None
+        """The position at which this UAV was when it received its first plan, and from which it flies to its place."""
         self._left_ns = 0
+        """The instant at which it leaves that position."""
 
     def adopt(self, plan: Search, now_ns: int) -> None:
         """Follow a plan from now on."""
@@ -53,20 +58,22 @@ class FormationPlace:
 
     @property
     def is_free(self) -> bool:
-        """True for a UAV that may fly anywhere, because the swarm holds together without it."""
+        """True for a follower and for a UAV without a place: the swarm stays connected without them."""
         return self.pattern is None or self.place is None or self.pattern.kind(self.place) == "follower"
 
     @property
     def searches(self) -> bool:
-        """True for a UAV with a lane of its own to search."""
+        """True for a UAV of a team, which has a lane to search."""
         return self.pattern is not None and self.place is not None and self.pattern.kind(self.place) == "line"
 
     def is_taken_up(self, now_ns: int) -> bool:
-        """True once all UAVs have had time to take up the formation."""
+        """True once all UAVs have had time to fly to their places: the sweep has begun."""
         return self.plan is not None and now_ns >= _taken_up_ns(self.plan)
 
     def lane(self, now_ns: int) -> tuple[Enu, Enu]:
-        """The present place in the UAV's lane, at a height above ground, and how that place moves."""
+        """The position that the plan has for the UAV now, with its height above ground, and the velocity of that
+        position. Before the sweep begins, it moves from where the UAV was to the UAV's place.
+        """
         plan, pattern, place = self.plan, self.pattern, self.place
         if plan is None or pattern is None or place is None:
             return self._left_from or self._navigation.over_ground(now_ns), STILL
@@ -87,14 +94,16 @@ class FormationPlace:
     # --- how far it may go from there -----------------------------------------------------------------------------
 
     def leads_by(self, estimate: Estimate | None, lane: Enu, moves: Enu) -> bool:
-        """True if a survivor is near enough to the lane to be examined without leaving the formation."""
+        """True if a survivor is near enough to be examined without leaving the formation; `lane` and `moves` are what
+        `lane()` returns.
+        """
         if estimate is None:
             return False
         ahead_m, aside_m = along(moves, estimate.east_m - lane.east, estimate.north_m - lane.north)
         return abs(aside_m) <= _LEASH_M + _ASIDE_M and -_LAG_M <= ahead_m <= _AHEAD_M
 
     def bounded(self, east: float, north: float, lane: Enu, moves: Enu) -> tuple[Enu, Enu]:
-        """The permitted place nearest to a wanted one, and how it moves."""
+        """The permitted position nearest to a wanted one, and its velocity."""
         if self.is_free:
             return Enu(east, north, lane.up), STILL
         ahead_m, aside_m = along(moves, east - lane.east, north - lane.north)
@@ -107,11 +116,13 @@ class FormationPlace:
         return (beside._replace(east=east) if _leads_east_or_west(moves) else beside._replace(north=north)), STILL
 
     def holds_together(self, estimate: Estimate | None, now_ns: int, *, within_s: float) -> bool:
-        """True if this UAV, at a survivor, would still be within reach of its line for some seconds from now on."""
+        """True if a UAV at a survivor would be within reach of this UAV's team `within_s` from now, and 5 s later."""
         return estimate is not None and self.keeps_line(estimate.east_m, estimate.north_m, now_ns, within_s=within_s)
 
     def keeps_line(self, east_m: float, north_m: float, now_ns: int, *, within_s: float) -> bool:
-        """True if this UAV, at this place, would still be within reach of its line for some seconds from now on."""
+        """True if a UAV at this position would be within reach of this UAV's team `within_s` from now, and 5 s later;
+        False before the sweep begins.
+        """
         pattern, place, at_s = self.pattern, self.place, self.swept_s(now_ns)
         if pattern is None or place is None or at_s is None:
             return False
@@ -128,9 +139,10 @@ class FormationPlace:
 
 
 def along(moves: Enu, east_m: float, north_m: float) -> tuple[float, float]:
-    """An offset as metres ahead and metres to the right of a lane. A lane's direction is that of its motion, or north.
+    """An offset as metres ahead and metres to the right of a place that moves with velocity `moves`.
 
-    Lanes lead along the axes, within a few degrees.
+    Ahead is the direction of the axis nearest to the velocity; north for a place that stands still. The lanes of lines
+    and sectors are parallel to an axis, those of a spiral nearly so; the inner lanes of a winding arm are not.
     """
     if _leads_east_or_west(moves):
         return (east_m, -north_m) if moves.east > 0 else (-east_m, north_m)
@@ -142,7 +154,7 @@ def _leads_east_or_west(moves: Enu) -> bool:
 
 
 def _beside(lane: Enu, moves: Enu, ahead_m: float, aside_m: float) -> Enu:
-    """The place this far ahead and to the right of a lane."""
+    """The position this far ahead and to the right of a place (`along`)."""
     if _leads_east_or_west(moves):
         sign = 1 if moves.east > 0 else -1
         return Enu(lane.east + sign * ahead_m, lane.north - sign * aside_m, lane.up)
@@ -151,4 +163,5 @@ def _beside(lane: Enu, moves: Enu, ahead_m: float, aside_m: float) -> Enu:
 
 
 def _taken_up_ns(plan: Search) -> int:
+    """The instant at which all UAVs have had time to fly to their places, and the sweep begins."""
     return plan.start_us * US + plan.deploy_ds * 100 * MS

@@ -3,12 +3,13 @@
     every node: sends its status at once, and then every STATUS_S
     planner:    the lowest id that was received recently; it plans when all nodes have been received, or after
                 _PATIENCE_NS
-    lost nodes: a UAV that was not received for _LOST_NS loses its place; a follower takes over a place in a line or in
-                the chain, because those places hold the swarm together and sweep the area
+    lost nodes: a UAV that was not received for _LOST_NS loses its place; a follower takes over a place of a team or of
+                a relay, because those places keep the swarm connected and sweep the area
     leavers:    a node whose status says that its battery is only enough for the way home is replaced at once
 
 The first assignment minimizes the sum of the squared distances flown. If all UAVs leave and arrive at the same
-instants, their ways then do not cross, and UAVs that were near each other remain so.
+instants, their ways then do not cross, and UAVs that were near each other remain so. The words place, team, relay and
+follower are explained in `shape.py`.
 """
 
 from itertools import zip_longest
@@ -23,13 +24,16 @@ from fanet_mw.wire.search import Search, SearchStatus
 STATUS_S: Final = 12.0
 """The interval at which a UAV sends its status."""
 _LOST_NS: Final = 70 * S
+"""A UAV from which nothing was received for this time is taken to be lost."""
 _PATIENCE_NS: Final = 14 * S
 """How long the first plan waits for UAVs that have not been received."""
 _NOTICE_NS: Final = 7 * S
 """The time from the first flood of a plan to its beginning, long enough for a flood through the
 slots of all clusters."""
 _REPEAT_NS: Final = 6 * S
+"""The interval at which a new plan is flooded again."""
 _REPEATS: Final = 3
+"""The number of times that a new plan is flooded again."""
 
 
 class _HeardUav(NamedTuple):
@@ -129,6 +133,7 @@ class FormationPlanner:
             self.to_tell.append(self.plan)
 
     def _first(self, pattern: Pattern, now_ns: int) -> Search:
+        """The first plan of the search, for all UAVs that were received and stay."""
         nodes = sorted(node for node, member in self._members.items() if not member.leaves)[: pattern.places]
         places = list(range(pattern.places))
         goals = [pattern.at(place, 0.0) for place in places]
@@ -187,10 +192,10 @@ def pattern_of(plan: Search) -> Pattern:
 
 
 def _filled(holders: list[int], pattern: Pattern) -> list[int]:
-    """Fill vacant places that sweep the area or hold the swarm together with the nearest followers.
+    """Fill the vacant places of teams and relays, each with the nearest follower.
 
-    If there are no followers left, the UAVs farther out in the line move up, so that it stays in one piece and becomes
-    shorter.
+    If there are no followers left, the UAVs farther out in the team move up, so that the team stays connected and
+    becomes shorter; in `sectors` the UAVs farther out in the whole row do so. The place of a relay then stays vacant.
     """
     filled = list(holders)
     for place in range(pattern.dimensions.fixed):

@@ -1,4 +1,4 @@
-"""The gaps of the search: cells that the formation has passed, by its plan, but that no UAV is
+"""The gaps of the search: cells of the coverage map that the formation has passed, by its plan, but that no UAV is
 known to have searched.
 """
 
@@ -12,9 +12,9 @@ from fanet_mw.units import Enu, S
 _EXPECT_NS: Final = 4 * S
 """The interval at which the cells passed by the formation are added; a place moves about one cell in this time."""
 _LATE_S: Final = 18.0
-"""A cell that was passed less than this ago may have been searched without this UAV knowing it yet."""
+"""If a cell was passed more recently than this, the UAV that searched it may not have told this UAV yet."""
 _LANE: Final = 0.5
-"""A UAV in a lane is expected to search this share of the distance of two lanes, to either side."""
+"""A UAV of a team is expected to search the cells up to this share of the distance of two lanes away from it."""
 _NEAR_M: Final = 450.0
 """A UAV flies to a gap at most this far away, because its knowledge of farther places is older."""
 
@@ -29,8 +29,8 @@ class Gaps:
         self._expected_ns: int | None = None
 
     def nearest(self, here: Enu, now_ns: int) -> tuple[float, float] | None:
-        """East and north of the middle of the nearest gap from where the UAV's line is within reach; None if there is
-        none.
+        """East and north of the gap to which the UAV may fly: the mean of the cells around the nearest one from which
+        the UAV's team is within radio reach. None if there is no such cell.
         """
         self._expect(now_ns)
         coverage, formation = self._coverage, self._formation

@@ -1,13 +1,18 @@
-"""The formation `lines`: two lines abreast that part from the middle of the area, a chain between them, and followers.
+"""The formation `lines`: two lines of UAVs that part from the middle of the area, a chain between them, and followers.
 
-            line 0   o--o--o--o--o--o--o        both lines begin beside the middle of the area, as wide as the area,
-                              |                 and sweep away from each other to its edges, then back, and again
+            line 0   o--o--o--o--o--o--o        both lines, nearly as wide as the area, begin near its middle and
+                              |                 sweep away from each other to its edges, then back, and again
             followers   x  x  |  x  x           followers fly behind their line and are free to leave it
-                              |  chain          the chain between the lines stretches as they part
+                              |  chain          the relays of the chain spread as the lines part
             line 1   o--o--o--o--o--o--o
 
-Between two turns each place moves on a straight line at constant speed, so the distance of two places is a convex
-function of time: a pair that is within reach at both turns is within reach all the time.
+The words place, lane, team, relay and follower are explained in `shape.py`; the teams of this formation are its lines.
+
+Between two turns each place of a line moves straight at constant speed. A relay does so, too, but changes its velocity
+once, when the lines have flown `_STRAIGHT_M`. The distance of two such places is therefore a convex function of time
+from a turn to that instant, and from that instant to the next turn: a pair that is within radio reach at these three
+instants is within reach all the time. Followers start later than their line, and need not stay within reach of any
+single place.
 """
 
 import math
@@ -25,17 +30,21 @@ from agents.mission.formation.shape import (
 from fanet_mw.units import Enu
 
 _CHAIN_HIGHER_M: Final = 6.0
+"""Relays fly this much higher than the lines."""
 _BUNCHED_M: Final = 280.0
-"""While the lines are near each other, the chain between them is slanted, and extends this far to either side."""
+"""While the lines are near each other, relays due north and south of each other would be too close together. They are
+therefore displaced to the east and the west as well, at first by up to this distance."""
 _STRAIGHT_M: Final = 300.0
-"""The chain is straight once the lines have flown this far."""
+"""Once the lines have flown this far, the relays are no longer displaced: the chain is a straight line to the north."""
 _SIDE_M: Final = 65.0
-"""The outermost lanes are this near to the edge of the area; a UAV may leave them sideways."""
+"""The distance of the outermost lanes from the edge of the area, at most a quarter of the area's side; a UAV there may
+still shift to either side."""
 _LEAST_LANES: Final = 2
+"""The least number of lanes of a line, which has one at each end."""
 
 
 class Lines:
-    """The lines and the chain of one search."""
+    """The positions of the places of two lines, their chain and their followers."""
 
     def __init__(self, formation: Dimensions) -> None:
         self._formation = formation
@@ -87,13 +96,12 @@ class Lines:
         return range(place, first + lanes) if place - first >= lanes // 2 else range(place, first - 1, -1)
 
     def apart_m(self, team: int, east_m: float, north_m: float, swept_s: float) -> float:
-        """The distance of a place from a line, which is its distance to the north or south, since a line is as wide as
-        the area.
-        """
+        """The distance of a point from a line to the north or south; a line is taken to be as wide as the area."""
         north = swept_m(self._formation, swept_s)
         return abs(north_m - (north if team == 0 else -north))
 
     def _lane(self, lane: int) -> float:
+        """East of a lane [m]."""
         return self._formation.half_width_m * (2 * lane / (self._formation.lanes - 1) - 1)
 
 

@@ -1,4 +1,7 @@
-"""The formation of a search: its shape and its dimensions together, and which one suits a scenario."""
+"""The formation of a search: its shape and its dimensions together, and the formation that fits a number of UAVs.
+
+The words place, team, lane, relay and follower are explained in `shape.py`.
+"""
 
 from collections.abc import Callable, Mapping
 from typing import Final, assert_never
@@ -34,15 +37,15 @@ class Pattern:
 
     @property
     def followers(self) -> range:
-        """The places without which the swarm still holds together."""
+        """The places without which the swarm stays connected."""
         return range(self.dimensions.fixed, self.dimensions.places)
 
     def line(self, place: int) -> range:
-        """The places of the line to which a place belongs."""
+        """The places of the team of a place, lane by lane."""
         return self.dimensions.line(self.dimensions.team_of(place))
 
     def kind(self, place: int) -> str:
-        """`line`, `relay` or `follower`."""
+        """The kind of a place: `line` for one of any team, `relay` or `follower`."""
         if place < self.dimensions.fixed - self.dimensions.relays:
             return "line"
         return "relay" if place < self.dimensions.fixed else "follower"

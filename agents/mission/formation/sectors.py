@@ -1,12 +1,17 @@
-"""The formation `sectors`: each sector of the area is swept by a team abreast, from the side nearest to the middle.
+"""The formation `sectors`: the area is divided into equal sectors, and each is swept by a team of UAVs abreast.
 
-+-------+-------+     sectors lie in rows; a team spans its own and sweeps it outward and back
-| o-o-o | o-o-o |     teams of a row move in step, side by side, and stay connected; the rows part from each other
-|  ^    |  ^    |     and meet again in the middle
-+-------+-------+
-|  v    |  v    |     no UAV is used as a relay between the rows, so more UAVs follow their teams, free for survivors
-| o-o-o | o-o-o |
-+-------+-------+
+    +-------+-------+     sectors lie in rows; a team is as wide as its sector, and sweeps it to the north or to the
+    | o-o-o | o-o-o |     south, and back
+    |  ^    |  ^    |
+    +-------+-------+     the teams of a row move in step, side by side, and stay within radio reach of each other
+    |  v    |  v    |
+    | o-o-o | o-o-o |     there are no relays between the rows, so more UAVs than in other formations are followers,
+    +-------+-------+     which are free to fly to survivors
+
+Rows in the south of the area are swept southward, rows in the north northward. Of an odd number of rows the middle one,
+or the only one, is swept northward. So two rows begin beside each other, lose contact as they part, and regain it on
+the way back; of more rows only the pair that begins beside each other does so, all other neighboring rows stay the
+depth of a sector apart. The words place, lane, team and follower are explained in `shape.py`.
 """
 
 import math
@@ -26,7 +31,7 @@ from fanet_mw.units import Enu
 
 
 class Sectors:
-    """The teams of one search by sectors."""
+    """The positions of the places of all teams and of their followers."""
 
     def __init__(self, formation: Dimensions) -> None:
         self._formation = formation
@@ -82,14 +87,16 @@ class Sectors:
 
 
 def rows_of(teams: int) -> int:
-    """The number of rows for this number of sectors: as many as columns, or the nearest lower
-    number that divides it.
+    """The number of rows for this number of sectors: as many as columns if possible, otherwise the greatest smaller
+    number that divides the number of sectors.
     """
     return next(rows for rows in range(math.isqrt(teams), 0, -1) if teams % rows == 0)
 
 
 def fitted(count: int, teams: int, demands: Demands) -> Dimensions | None:
-    """A team abreast for each of this number of sectors of a square area; None if the UAVs are too few for that."""
+    """The teams for `teams` sectors of a square area, with all UAVs that are left over as followers; None if the UAVs
+    are too few to span every sector.
+    """
     rows = rows_of(teams)
     depth_m, width_m = demands.area_m / rows, demands.area_m * rows / teams
     lanes = math.ceil(width_m / demands.apart_m(demands.reach_m))

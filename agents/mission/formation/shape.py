@@ -1,11 +1,18 @@
-"""The dimensions of a search formation, and the contract of the shapes in which it is flown.
+"""What a search formation is: its places and their kinds, and the contract of the three shapes in which it is flown.
 
-    lines      two lines abreast part from the middle of the area; a chain between them keeps the swarm connected
-    spiral     arms abreast turn about the middle, or one arm winds outward from it; any number of UAVs is enough
-    sectors    a team for each sector, abreast; more UAVs are free for survivors, but the swarm separates
+    place      the moving position that the plan assigns to one UAV, and its number
+    team       UAVs that sweep abreast: a line, an arm of a spiral, or the team of a sector
+    lane       the course of one place of a team, and its number within the team
+    relay      a place that only keeps two teams within radio reach of each other
+    follower   a place behind a team that nothing depends on, so that its UAV may leave it
 
-In all shapes the places of teams come first (team 0 lane by lane, team 1, ...), then relays, then followers. Each place
-moves in straight pieces without jumps. Pure geometry: metres, seconds.
+    lines      two lines abreast part from the middle of the area; a chain of relays keeps the swarm connected
+    spiral     arms turn about the middle, or one arm winds outward from it; any number of UAVs will do
+    sectors    one team sweeps each sector; more UAVs are free for survivors, but the swarm does not stay connected
+
+In all of them places of teams come first (team 0 lane by lane, team 1, ...), then relays, then followers. No place
+jumps. The sweep is the flight out to the edge of the area; it ends with a turn, and is repeated after the way back.
+Everything here is geometry, in metres and seconds.
 """
 
 import math
@@ -16,25 +23,28 @@ from typing import Final, NamedTuple, Protocol
 from fanet_mw.units import Enu
 
 FOLLOWER_HIGHER_M: Final = 12.0
-"""Followers fly this much higher than the lines, so that they can cross them."""
+"""Followers fly this much higher than teams, so that a follower may cross a team."""
 FOLLOW_M: Final = 110.0
-"""A follower flies this far behind its line."""
+"""The distance of a follower behind its team, in lines and sectors."""
 _WIDE: Final = 0.9
-"""The greatest distance of two places that must receive each other, as a share of the radio's reach."""
+"""Two places that must be within reach of each other are at most this share of the radio's reach apart."""
 _LANES: Final = 1.35
-"""The distance of two lanes, as a multiple of the range at which phones are received."""
+"""The distance of two lanes is at most this multiple of the distance to the side at which a phone is received."""
 EDGE_M: Final = 25.0
-"""Lines turn this near to the edge of the area, which is as far as a camera sees."""
+"""The distance from the edge of the area at which lines and sectors' teams turn; a camera sees from there to the
+edge. In a very small area it is less."""
 FIRST_M: Final = 16.0
-"""Lines begin this far from the middle, so that they are not in each other's way and leave nothing out."""
+"""The distance of each line from the middle, or of a sector's team from the side where its sweep begins, at the
+beginning: far enough for two teams not to be in each other's way, and near enough to receive what lies behind them."""
 _TURN_S: Final = 10.0
-"""How long lines stay where they turn, so that a UAV that has fallen behind reaches the edge of the area, too."""
+"""How long lines and sectors' teams wait at the edge of the area before they fly back, so that a UAV that has fallen
+behind gets there, too."""
 _BACK: Final = 1.2
-"""The way back is faster than the sweep by this factor, because the places of survivors are known by then."""
+"""The speed on the way back, as a multiple of the speed of the sweep; most phones have been received by then."""
 
 
 class ShapeName(IntEnum):
-    """The shapes, with the numbers that they have on the air; their names are the values of `mission.search`."""
+    """The numbers of the shapes in air messages; in lower case the names are values of the key `mission.search`."""
 
     LINES = 0
     SPIRAL = 1
@@ -42,39 +52,44 @@ class ShapeName(IntEnum):
 
 
 class Demands(NamedTuple):
-    """The requirements on a formation: to sweep a square area, with all UAVs within reach of each other."""
+    """The requirements that a formation is fitted to: the square area that it sweeps, and the reach of receivers."""
 
     area_m: float
+    """The side of the area."""
     seen_m: float
-    """The greatest horizontal distance at which a UAV in its lane finds a phone."""
+    """The distance to the side of a lane at which a phone on the ground is received, without shadowing."""
     reach_m: float
     """The reach of the radio."""
     height_m: float
     speed_m_s: float
+    """The speed of the sweep."""
 
     def apart_m(self, reach_m: float) -> float:
-        """The greatest distance of two lanes, if neighbors must be within this reach."""
+        """The greatest distance of two neighboring lanes, if their UAVs have to be within `reach_m` of each other."""
         return min(_WIDE * reach_m, _LANES * self.seen_m)
 
     @property
     def hop_m(self) -> float:
-        """The greatest distance of two places that relay for the swarm."""
+        """The greatest distance of two neighboring relays."""
         return _WIDE * self.reach_m
 
 
 class Dimensions(NamedTuple):
-    """The dimensions of a formation, as the plan message states them."""
+    """A formation in numbers, as the plan (`FANET_SEARCH`) states it."""
 
     lanes: int
     """The number of places of each team."""
     relays: int
+    """The number of relays."""
     followers: int
+    """The number of followers."""
     half_width_m: float
-    """For lines, the distance of the outermost lanes from the middle; for other shapes, half the width of the area."""
+    """Lines: how far east and west of the middle the outermost lanes are. Other shapes: half the side of the area."""
     first_m: float
-    """The initial distance of each line from the middle; for a spiral, the half-side of the innermost lane."""
+    """Lines: the distance of each line from the middle when a sweep begins. Sectors: the distance of each team from the
+    side where its sweep begins. Spiral: the half-side of the innermost square."""
     last_m: float
-    """The same distance when the sweep turns; for a spiral, that of the outermost lane."""
+    """Lines and sectors: the same distance at the turn. Spiral: the half-side of the outermost square."""
     height_m: float
     speed_m_s: float
     shape: ShapeName = ShapeName.LINES
@@ -82,7 +97,7 @@ class Dimensions(NamedTuple):
 
     @property
     def fixed(self) -> int:
-        """The number of places that sweep the area and hold the swarm together: all except the followers."""
+        """The number of places that sweep the area and hold the swarm together: all but the followers."""
         return self.teams * self.lanes + self.relays
 
     @property
@@ -94,7 +109,7 @@ class Dimensions(NamedTuple):
         return range(team * self.lanes, (team + 1) * self.lanes)
 
     def team_of(self, place: int) -> int:
-        """The team to which a place belongs; for a relay, the nearer one."""
+        """The team of a place; for a relay, the team that is nearer to it."""
         if place < self.teams * self.lanes:
             return place // self.lanes
         if place < self.fixed:
@@ -102,7 +117,9 @@ class Dimensions(NamedTuple):
         return self.follower(place)[0]
 
     def follower(self, place: int) -> tuple[int, float]:
-        """The team of a follower, and its position along the line, from 0 to 1; followers are spaced evenly."""
+        """The team of a follower, and its position along that team, from 0 to 1; the followers of a team are evenly
+        distributed along it.
+        """
         which = place - self.fixed
         team = which % self.teams
         of_team = (self.followers + self.teams - 1 - team) // self.teams
@@ -110,42 +127,52 @@ class Dimensions(NamedTuple):
 
 
 class Shape(Protocol):
-    """The positions of all places of one formation over time."""
+    """The contract of a shape: the positions of the places of one formation over time.
+
+    `swept_s` is the time since the first sweep began; before 0, all places are where they are at 0.
+    """
 
     @property
     def sweep_s(self) -> float:
-        """The time from the beginning of a sweep to its turn."""
+        """The time from the beginning of a sweep to its turn; for full arms of a spiral, the time in which the arms
+        together fly one turn.
+        """
         ...
 
     @property
     def lane_m(self) -> float:
-        """The distance of neighboring lanes."""
+        """The distance of two neighboring lanes; of a spiral, on the sides of the squares, not at the corners."""
         ...
 
     def at(self, place: int, swept_s: float) -> Enu:
-        """The position of a place after this time of sweeping; before 0, where the sweep begins."""
+        """The position of a place at an instant of the sweep."""
         ...
 
     def tethers(self, place: int) -> tuple[int, ...]:
-        """The places within whose reach this one must stay, so that the formation is connected; none for a follower."""
+        """The places that must stay within radio reach of this one to keep the swarm connected; none for a follower."""
         ...
 
     def outward(self, place: int) -> range:
-        """The places of its line from this one outward; a lost UAV is replaced by the next one in this order."""
+        """The places from this one outward along its team, or along its row of teams in `sectors`. If a UAV is lost and
+        there is no follower, the UAVs of these places move up one by one.
+        """
         ...
 
     def apart_m(self, team: int, east_m: float, north_m: float, swept_s: float) -> float:
-        """The distance of a place on the map from the line of a team after this time of sweeping."""
+        """The horizontal distance of a point from a team at an instant of the sweep."""
         ...
 
 
 def nearest_m(places: Iterable[Enu], east_m: float, north_m: float) -> float:
-    """The distance of a place from the nearest of some others, on the map."""
+    """The horizontal distance of a point from the nearest of some places."""
     return min(math.hypot(place.east - east_m, place.north - north_m) for place in places)
 
 
 def swept_m(formation: Dimensions, swept_s: float) -> float:
-    """How far a line has come from its beginning: outward at the speed of the sweep, back faster, again and again."""
+    """The distance of a line from the middle, or of a sector's team from the side where its sweep begins.
+
+    The team flies out at the speed of the sweep, waits, flies back faster, and begins again.
+    """
     if swept_s <= 0:
         return formation.first_m
     out_s = (formation.last_m - formation.first_m) / formation.speed_m_s

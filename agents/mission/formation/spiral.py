@@ -1,15 +1,21 @@
-"""The formation `spiral`: arms abreast turn about the middle of the area, their lanes on squares inside each other.
+"""The formation `spiral`: arms of UAVs that turn about the middle of the area, each lane on a square of its own.
 
-    +-----------------+     lane k flies the square of half-side (2 k + 1) x `first_m`; all lanes of an arm are on one
-    | +-------------+ |     ray from the middle, so neighbors are at most a lane times the root of 2 apart, always
-    | | +---------+ | |
-    | | |    o-o-o-o-o      several arms, as long as the area is wide: each sweeps its share of a turn, and they meet
-    | | +---------+ | |     in the middle
-    | +-------------+ |     one arm that is shorter: it flies a first turn in the middle, and winds outward from there
-    +-----------------+     until its last turn is along the edge; then the same way back
+    +-----------------+     lane k of an arm flies on the square of half-side (2 k + 1) x `first_m`; all lanes of an arm
+    | +-------------+ |     are on one ray from the middle, so the distance of two neighboring lanes is at least
+    | | +---------+ | |     2 x `first_m`, and at most the root of 2 times that
+    | | |    o-o-o-o-o
+    | | +---------+ | |     full arms reach from near the middle to the edge of the area: if there are several, each
+    | +-------------+ |     sweeps its share of a turn, and their innermost lanes stay within reach of each other
+    +-----------------+
 
-This is the expanding square of IAMSAR, volume II, flown by many UAVs: the middle is seen first, and any number of UAVs
-is enough. The outermost lane flies at the speed of the sweep, the others in proportion.
+UAVs that are too few for one full arm form a shorter one, which winds outward: it flies a first turn around the middle,
+is farther out after each further turn, flies the last turn along the edge, and returns on the same way. This is the
+expanding square search of IAMSAR, volume II, flown by several UAVs abreast. It searches the middle of the area first,
+and needs no least number of UAVs. The words place, lane, team and follower are explained in `shape.py`; the teams of a
+spiral are its arms.
+
+The outermost lane flies at the speed of the sweep, or a little slower while the arm winds outward; inner lanes are
+slower.
 """
 
 import math
@@ -19,24 +25,25 @@ from agents.mission.formation.shape import FOLLOWER_HIGHER_M, Demands, Dimension
 from fanet_mw.units import Enu
 
 _BEHIND_S: Final = 15.0
-"""A follower is where its arm was this long ago."""
+"""A follower flies where its arm was this time before."""
 _ARMS_M: Final = 60.0
-"""The least distance of the innermost lanes of two arms, along their square."""
+"""The least distance between the innermost lanes of two arms, measured along the square on which they fly."""
 
 
 class Spiral:
-    """The arms of one spiral."""
+    """The positions of the places of one spiral."""
 
     def __init__(self, formation: Dimensions) -> None:
         self._formation = formation
         lanes, first_m = formation.lanes, formation.first_m
         self._outer_m = first_m * (2 * lanes - 1)
-        """The half-side of the square of the outermost lane in the first turn."""
+        """The half-side of the square of the outermost lane during the first turn."""
         self._pitch_m = 2 * first_m * lanes
-        """By how much each lane moves outward in each turn that winds outward."""
+        """A winding arm increases the half-side of each lane's square by this much in each turn."""
         rounds = (formation.last_m / first_m + 1) / (2 * lanes)
         self._winds = max(0, round(rounds) - 1)
-        """The number of turns that wind outward; the first and the last turn do not."""
+        """The number of turns that wind outward, 0 for full arms. A winding arm flies one turn before them and one
+        after them on squares of constant size."""
 
     @property
     def lane_m(self) -> float:
@@ -87,7 +94,9 @@ class Spiral:
         return min(max(0.0, turned - 1), self._winds)
 
     def _way_m(self, turned: float) -> float:
-        """A lower bound of the way that the outermost lane has flown after this many turns."""
+        """An upper bound of the way that the outermost lane has flown after some turns; exact while squares have a
+        constant size.
+        """
         wound = self._wound(turned)
         level = turned - wound
         first = min(level, 1.0)
@@ -95,7 +104,9 @@ class Spiral:
         return 8 * self._outer_m * first + outward + 8 * (self._outer_m + self._pitch_m * wound) * (level - first)
 
     def _turned(self, swept_s: float) -> float:
-        """The number of turns flown; at its end, a spiral that winds outward goes back the same way, and so on."""
+        """The turns that have been flown after this time of sweeping. For a winding arm the number grows to the end of
+        its way, falls back to 0 on the way back, and so on.
+        """
         way_m = swept_s * self._formation.speed_m_s
         if not self._winds:
             return way_m / (8 * self._outer_m)
@@ -107,13 +118,15 @@ class Spiral:
             return way_m / first_m
         if way_m >= outward_m:
             return self._winds + 1 + (way_m - outward_m) / (8 * (self._outer_m + self._pitch_m * self._winds))
-        # 4 pitch w^2 + (8 outer + sqrt(2) pitch) w = way, for w turns that have wound outward
+        # w turns of winding outward take 4 pitch w^2 + (8 outer + sqrt(2) pitch) w = way_m - first_m (`_way_m`)
         square, linear, rest = 4 * self._pitch_m, first_m + math.sqrt(2) * self._pitch_m, way_m - first_m
         return 1 + 2 * rest / (linear + math.sqrt(linear * linear + 4 * square * rest))
 
 
 def _on_square(turned: float) -> tuple[float, float]:
-    """East and north on the square of half-side 1 after this part of a turn, from the middle of its eastern side."""
+    """East and north on the square of half-side 1 after some turns, counterclockwise from the middle of its eastern
+    side.
+    """
     along = 8 * (turned % 1.0)
     if along < 1:
         return 1.0, along
@@ -125,8 +138,8 @@ def _on_square(turned: float) -> tuple[float, float]:
 
 
 def fitted(count: int, demands: Demands) -> Dimensions:
-    """The spiral for this number of UAVs: as many arms as reach from the middle to the edge, or a shorter one that
-    winds outward.
+    """The spiral for a number of UAVs: as many full arms as there are UAVs for and as have room in the middle, or one
+    winding arm of all UAVs if they are too few for a full arm. UAVs that are left over become followers.
     """
     half = demands.area_m / 2
     apart_m = demands.apart_m(demands.reach_m / math.sqrt(2))

@@ -376,6 +376,7 @@ MAVLINK_MSG_ID_FANET_LINKS = 53011
 MAVLINK_MSG_ID_FANET_MESSAGE = 53012
 MAVLINK_MSG_ID_FANET_RECEIPT = 53013
 MAVLINK_MSG_ID_FANET_TARGETS = 53014
+MAVLINK_MSG_ID_FANET_LOADS = 53015
 MAVLINK_MSG_ID_FANET_SEARCH = 53020
 MAVLINK_MSG_ID_FANET_STATUS = 53021
 MAVLINK_MSG_ID_FANET_BIDS = 53022
@@ -1091,6 +1092,48 @@ class MAVLink_fanet_targets_message(MAVLink_message):
 setattr(MAVLink_fanet_targets_message, "name", mavlink_msg_deprecated_name_property())
 
 
+class MAVLink_fanet_loads_message(MAVLink_message):
+    """
+    The load of each member of the schedule part in the same packet,
+    as the leader has heard it, from which nodes compute the timetable
+    of floods.
+    """
+
+    id = MAVLINK_MSG_ID_FANET_LOADS
+    msgname = "FANET_LOADS"
+    fieldnames = ["loads", "count", "version"]
+    ordered_fieldnames = ["loads", "count", "version"]
+    fieldtypes = ["uint16_t", "uint8_t", "uint8_t"]
+    fielddisplays_by_name: Dict[str, str] = {}
+    fieldenums_by_name: Dict[str, str] = {}
+    fieldunits_by_name: Dict[str, str] = {}
+    native_format = bytearray(b"<HBB")
+    orders = [0, 1, 2]
+    lengths = [56, 1, 1]
+    array_lengths = [56, 0, 0]
+    crc_extra = 190
+    unpacker = struct.Struct("<56HBB")
+    instance_field = None
+    instance_offset = -1
+
+    def __init__(self, loads: Sequence[int], count: int, version: int):
+        MAVLink_message.__init__(self, MAVLink_fanet_loads_message.id, MAVLink_fanet_loads_message.msgname)
+        self._fieldnames = MAVLink_fanet_loads_message.fieldnames
+        self._instance_field = MAVLink_fanet_loads_message.instance_field
+        self._instance_offset = MAVLink_fanet_loads_message.instance_offset
+        self.loads = loads
+        self.count = count
+        self.version = version
+
+    def pack(self, mav: "MAVLink", force_mavlink1: bool = False) -> bytes:
+        return self._pack(mav, self.crc_extra, self.unpacker.pack(self.loads[0], self.loads[1], self.loads[2], self.loads[3], self.loads[4], self.loads[5], self.loads[6], self.loads[7], self.loads[8], self.loads[9], self.loads[10], self.loads[11], self.loads[12], self.loads[13], self.loads[14], self.loads[15], self.loads[16], self.loads[17], self.loads[18], self.loads[19], self.loads[20], self.loads[21], self.loads[22], self.loads[23], self.loads[24], self.loads[25], self.loads[26], self.loads[27], self.loads[28], self.loads[29], self.loads[30], self.loads[31], self.loads[32], self.loads[33], self.loads[34], self.loads[35], self.loads[36], self.loads[37], self.loads[38], self.loads[39], self.loads[40], self.loads[41], self.loads[42], self.loads[43], self.loads[44], self.loads[45], self.loads[46], self.loads[47], self.loads[48], self.loads[49], self.loads[50], self.loads[51], self.loads[52], self.loads[53], self.loads[54], self.loads[55], self.count, self.version), force_mavlink1=force_mavlink1)
+
+
+# Define name on the class for backwards compatibility (it is now msgname).
+# Done with setattr to hide the class variable from mypy.
+setattr(MAVLink_fanet_loads_message, "name", mavlink_msg_deprecated_name_property())
+
+
 class MAVLink_fanet_search_message(MAVLink_message):
     """
     The plan of a search: a formation, when it sweeps, and which node
@@ -1344,6 +1387,7 @@ mavlink_map: Dict[int, Type[MAVLink_message]] = {
     MAVLINK_MSG_ID_FANET_MESSAGE: MAVLink_fanet_message_message,
     MAVLINK_MSG_ID_FANET_RECEIPT: MAVLink_fanet_receipt_message,
     MAVLINK_MSG_ID_FANET_TARGETS: MAVLink_fanet_targets_message,
+    MAVLINK_MSG_ID_FANET_LOADS: MAVLink_fanet_loads_message,
     MAVLINK_MSG_ID_FANET_SEARCH: MAVLink_fanet_search_message,
     MAVLINK_MSG_ID_FANET_STATUS: MAVLink_fanet_status_message,
     MAVLINK_MSG_ID_FANET_BIDS: MAVLink_fanet_bids_message,
@@ -2290,6 +2334,32 @@ class MAVLink(object):
 
         """
         self.send(self.fanet_targets_encode(nodes, count, version), force_mavlink1=force_mavlink1)
+
+    def fanet_loads_encode(self, loads: Sequence[int], count: int, version: int) -> MAVLink_fanet_loads_message:
+        """
+        The load of each member of the schedule part in the same packet, as
+        the leader has heard it, from which nodes compute the
+        timetable of floods.
+
+        loads                     : Data packets of each member in 100 s; 65535: as its scenario says. (type:uint16_t)
+        count                     : How many entries are used. (type:uint8_t)
+        version                   : 1. (type:uint8_t)
+
+        """
+        return MAVLink_fanet_loads_message(loads, count, version)
+
+    def fanet_loads_send(self, loads: Sequence[int], count: int, version: int, force_mavlink1: bool = False) -> None:
+        """
+        The load of each member of the schedule part in the same packet, as
+        the leader has heard it, from which nodes compute the
+        timetable of floods.
+
+        loads                     : Data packets of each member in 100 s; 65535: as its scenario says. (type:uint16_t)
+        count                     : How many entries are used. (type:uint8_t)
+        version                   : 1. (type:uint8_t)
+
+        """
+        self.send(self.fanet_loads_encode(loads, count, version), force_mavlink1=force_mavlink1)
 
     def fanet_search_encode(self, start_us: int, half_width: float, first: float, last: float, height: float, speed: float, deploy_ds: int, revision: int, planner: int, nodes: Sequence[int], lanes: int, relays: int, followers: int, shape: int, teams: int, version: int) -> MAVLink_fanet_search_message:
         """

@@ -17,6 +17,7 @@ if TYPE_CHECKING:
 MESSAGE_BYTES: Final = {
     "FANET_ROUTE": 36, "positions": 61, "COLLISION": 31, "FANET_BEACON": 33, "FANET_SCHEDULE": 266,
     "FANET_SURVIVOR": 43, "FANET_DIGEST": 255, "FANET_PLACES": 189, "FANET_CLAIMS": 116, "FANET_LINKS": 240,
+    "FANET_LOADS": 126,
 }  # fmt: skip
 """The lengths of messages on the air, their MAVLink frame included (docs/reference/air-format.md); `positions` are
 HEARTBEAT and GLOBAL_POSITION_INT, with which every hello begins. The air format itself is not known here: the emulator
@@ -120,7 +121,8 @@ def _too_small_frames(scenario: Scenario) -> Iterator[str]:
         least["hellos"] = hello
     if clustered and relay != "claimed":
         places = _SCHEDULE_PLACES * size["FANET_PLACES"] if relay == "scheduled" else 0
-        least["schedules"] = size["FANET_SCHEDULE"] + places
+        loads = size["FANET_LOADS"] if scenario.hears_load else 0
+        least["schedules"] = size["FANET_SCHEDULE"] + places + loads
     if clustered and scenario.measures_links:
         pairs = scenario.nodes.count * (scenario.nodes.count - 1) // 2
         least["links of timetables"] = min(_MOST_LINKS_MESSAGES, -(-pairs // _LINKS)) * size["FANET_LINKS"]

@@ -46,6 +46,9 @@ class Clusters(Section):
     """`scheduled`: what the timetable takes for a link: every pair within `link_m` (`places`), or what hellos have
     shown (`measured`), with frames repeated according to the loss; `auto`: `measured` with shadowing or fading, else
     `places`."""
+    load: Literal["scenario", "heard"] = "scenario"
+    """`scheduled`: the load for which each node gets turns: what `[traffic]` says (`scenario`), or what the leader
+    hears of the node's packets (`heard`), with a new timetable when nodes send more, or much less."""
     link_m: Length = 0.0
     """`scheduled`: nodes no farther apart are taken to hear each other; 0: `radio.range_m`."""
     interference_m: Length = 0.0

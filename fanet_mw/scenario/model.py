@@ -107,6 +107,11 @@ class Scenario(Section):
         return wanted and self.clusters.relay == "scheduled" and self.routing.hello_interval_s > 0
 
     @property
+    def hears_load(self) -> bool:
+        """True if timetables are made for the load that is heard (`clusters.load`)."""
+        return self.clusters.load == "heard" and self.clusters.relay == "scheduled"
+
+    @property
     def repair_ns(self) -> int:
         """For how long packets are repaired; with measured links always, because frames do get lost."""
         return seconds_to_ns(self.clusters.repair_s or (_REPAIR_S if self.measures_links else 0.0))

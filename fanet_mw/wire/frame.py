@@ -333,7 +333,7 @@ def decode_first(spec: Spec, packed: Packed) -> tuple[Any, ...]:
     return found[0]
 
 
-# The codecs of these messages are in `inner`, `digest`, `places`, `claims`, `links`, `message`, `search` and
+# The codecs of these messages are in `inner`, `digest`, `places`, `loads`, `claims`, `links`, `message`, `search` and
 # `routing.control`.
 BEACON: Final = Spec(53001, 43, struct.Struct("<IHHHHHHHBBB"))
 SCHEDULE: Final = Spec(53002, 88, struct.Struct("<QIIIHHH56H56HBBBB"))
@@ -349,6 +349,7 @@ LINKS: Final = Spec(53011, 92, struct.Struct("<IHH36H36H36B36bBBBB"))
 MESSAGE: Final = Spec(53012, 170, struct.Struct("<QIIIIHHHBBBB"))
 RECEIPT: Final = Spec(53013, 26, struct.Struct("<QIBB"))
 TARGETS: Final = Spec(53014, 54, struct.Struct("<32HBB"))
+LOADS: Final = Spec(53015, 190, struct.Struct("<56HBB"))
 SEARCH: Final = Spec(53020, 44, struct.Struct("<QfffffHHH79HBBBBBB"))
 STATUS: Final = Spec(53021, 199, struct.Struct("<QfffHHBB"))
 BIDS: Final = Spec(53022, 212, struct.Struct("<12H12H12H12HH12BBB"))
@@ -356,7 +357,7 @@ FOUND: Final = Spec(53023, 195, struct.Struct("<QIfffffHBB"))
 COVERED: Final = Spec(53024, 57, struct.Struct("<128BB"))
 SPECS: Final = (
     ROUTE, BEACON, SCHEDULE, SURVIVOR, CHUNK, TIME, JOIN, DIGEST, PLACES, CLAIMS, ROUTING, LINKS,
-    MESSAGE, RECEIPT, TARGETS, SEARCH, STATUS, BIDS, FOUND,
+    MESSAGE, RECEIPT, TARGETS, LOADS, SEARCH, STATUS, BIDS, FOUND,
     COVERED,
 )  # fmt: skip
 _OURS: Final = {spec.msgid: spec for spec in SPECS}

@@ -59,7 +59,7 @@ SETTINGS: Final[dict[str, tuple[str, ...]]] = {
     "geographic": ("routing.protocol=geographic", "traffic.destination=9"),
     "all": ("clusters.relay=all", "clusters.repair_s=5", "clusters.reassign_s=1"),
     "relay-counter": ("clusters.relay=counter", "clock.sync=beacons", "clock.offset_ms=5", "clock.drift_ppm=20"),
-    "scheduled": ("clusters.relay=scheduled",),
+    "scheduled": ("clusters.relay=scheduled", "clusters.load=heard"),
     "measured": ("clusters.relay=scheduled", "clusters.links=measured", "clusters.repair_s=5"),
     "claimed": ("clusters.relay=claimed", "clusters.repair_s=5"),
     "cds": ("clusters.relay=cds", "mobility.model=crossing"),

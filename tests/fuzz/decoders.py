@@ -37,6 +37,7 @@ from fanet_mw.wire.claims import Claims
 from fanet_mw.wire.digest import Digest
 from fanet_mw.wire.inner import Beacon, Join, Schedule, Survivor, TimeBeacon
 from fanet_mw.wire.links import Links
+from fanet_mw.wire.loads import Loads
 from fanet_mw.wire.places import Places
 from fanet_mw.wire.search import Covered, Search, SearchStatus, checked_bids
 from fanet_mw.wire.search import Found as FoundMessage
@@ -107,6 +108,7 @@ def _of_the_air(found: Corpus) -> Iterator[Decoder]:
     ):
         yield Decoder(kind.__name__, _there_and_back(kind.decode_frame, _encode_frame), of(spec.msgid))
     yield Decoder("Bids", lambda data: checked_bids(wire.decode_first(wire.BIDS, data)), of(wire.BIDS.msgid))
+    yield Decoder("Loads", _there_and_back(Loads.decode_frames, lambda m: m.encode_frames(3)), of(wire.LOADS.msgid))
     yield Decoder("Places", Places.decode_frames, of(wire.PLACES.msgid))
     yield Decoder("position", mavlink.kinematics_of, of(mavlink.common.MAVLINK_MSG_ID_GLOBAL_POSITION_INT))
     yield Decoder("collision", mavlink.collision_of, of(mavlink.common.MAVLINK_MSG_ID_COLLISION))

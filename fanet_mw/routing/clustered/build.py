@@ -55,6 +55,7 @@ from fanet_mw.routing.clustered.tdma.root_release import RootRelease
 from fanet_mw.routing.clustered.tdma.slot_access import SlotAccess
 from fanet_mw.routing.clustered.tdma.slot_release import SlotRelease
 from fanet_mw.routing.clustered.tdma.urgent import reserved
+from fanet_mw.routing.clustered.timetable.heard_load import HeardLoads
 from fanet_mw.routing.clustered.timetable.link_quality import LinkQuality
 from fanet_mw.routing.clustered.timetable.promises import Promises
 from fanet_mw.routing.clustered.timetable.timetabling import FromPlaces, NoTimetable, Timetabling
@@ -219,10 +220,11 @@ def _by_timetable(ground: _Ground) -> Clustered:
     )
     contending = ContendingRelaying(port, RelayAll(), ground.contention)
     relaying = ScheduledRelaying(port, plans, contending)
+    heard = HeardLoads(interval_s=scenario.traffic.interval_s) if scenario.hears_load else None
     whole = Parts(
         neighbors=ground.neighbors, gradient=ground.gradient, uplink=ground.uplink, repair=ground.repair,
-        floods=ground.floods, roles=_roles(ground, parts, access, timetabling), access=access, relaying=relaying,
-        contending=contending, two_hops=None, promises=promises,
+        floods=ground.floods, roles=_roles(ground, parts, access, timetabling, heard), access=access, relaying=relaying,
+        contending=contending, two_hops=None, loads=heard, promises=promises,
     )  # fmt: skip
     return _protocol(ground, whole, parts.refresh, calls)
 
@@ -270,9 +272,19 @@ def _role_parts(ground: _Ground, membership: Membership, *, takes_slot: bool) ->
     )  # fmt: skip
 
 
-def _roles(ground: _Ground, parts: RoleParts, access: ScheduledAccess, timetabling: Timetabling) -> AssignedRoles:
+def _roles(
+    ground: _Ground,
+    parts: RoleParts,
+    access: ScheduledAccess,
+    timetabling: Timetabling,
+    heard: HeardLoads | None = None,
+) -> AssignedRoles:
     make_leader = partial(
-        Leader, scenario=ground.port.scenario, liveness=parts.liveness, needs_every_link=timetabling.needs_every_link
+        Leader,
+        scenario=ground.port.scenario,
+        liveness=parts.liveness,
+        needs_every_link=timetabling.needs_every_link,
+        heard=heard,
     )
     return AssignedRoles(
         ground.port, parts, gradient=ground.gradient, access=access, timetabling=timetabling, make_leader=make_leader

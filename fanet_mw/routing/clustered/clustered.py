@@ -25,6 +25,7 @@ from fanet_mw.routing.clustered.forwarding.gradient import Gradient
 from fanet_mw.routing.clustered.forwarding.repair import Repair
 from fanet_mw.routing.clustered.forwarding.uplink import MOST_TRIES, Uplink
 from fanet_mw.routing.clustered.relaying.contending import ContendingRelaying
+from fanet_mw.routing.clustered.timetable.heard_load import HeardLoads
 from fanet_mw.routing.clustered.timetable.promises import Promises
 from fanet_mw.units import BROADCAST, US, NodeId
 from fanet_mw.wire import FLAG_FLOOD, FLAG_TO_HEAD, HEADER_BYTES, Kind
@@ -53,6 +54,8 @@ class Parts(NamedTuple):
     those packets about which it does not decide."""
     two_hops: TwoHops | None
     """What hellos say of the neighbors' neighbors; None if hellos say nothing of them."""
+    loads: HeardLoads | None = None
+    """The loads of the nodes, as this node hears them; None if timetables are made for what the scenario says."""
     promises: Promises | None = None
     """The delay bounds and likely delays of the node's packets; None if this access states no bound."""
 
@@ -91,8 +94,10 @@ class Clustered(RoutingProtocol):
 
     def receive(self, packet: Packet, reception: Reception, *, now_ns: int) -> Sequence[Relay]:
         parts, header = self.parts, packet.header
-        origin_us, _, origin, _, _, kind, hop_limit, _, _, flags = header
+        origin_us, seq, origin, _, _, kind, hop_limit, _, _, flags = header
         parts.roles.on_sign_of_life(origin, born_ns=origin_us * US, now_ns=now_ns)
+        if parts.loads is not None and kind == _DATA:
+            parts.loads.on_packet(origin, seq, born_ns=origin_us * US, now_ns=now_ns)
         parts.floods.keep(packet, flooded=bool(flags & FLAG_FLOOD), now_ns=now_ns)
         if flags & FLAG_FLOOD:
             at_once = kind != _DATA and parts.roles.on_control(packet, reception.src, now_ns=now_ns)
@@ -215,4 +220,5 @@ class Clustered(RoutingProtocol):
             "repaired": parts.repair.repaired if parts.repair else 0,
             **parts.access.report(),
             **parts.relaying.report(),
+            **({} if parts.loads is None else {"loads_refused": parts.loads.refused}),
         }

@@ -96,9 +96,9 @@ def test_the_sizes_of_messages_that_a_scenario_is_checked_with_are_those_of_the_
     positions = Autopilot(node, position=Enu(1, 2, 3), telemetry_hz=0).beacon_frames(0)
     warning = Encoder(node).collision(NodeId(3), closest_s=1, altitude_m=1, horizontal_m=1)
     specs = (wire.ROUTE, wire.BEACON, wire.SCHEDULE, wire.SURVIVOR, wire.DIGEST, wire.PLACES, wire.CLAIMS,
-             wire.LINKS)  # fmt: skip
+             wire.LINKS, wire.LOADS)  # fmt: skip
     names = {53000: "ROUTE", 53001: "BEACON", 53002: "SCHEDULE", 53003: "SURVIVOR", 53007: "DIGEST", 53008: "PLACES",
-             53009: "CLAIMS", 53011: "LINKS"}  # fmt: skip
+             53009: "CLAIMS", 53011: "LINKS", 53015: "LOADS"}  # fmt: skip
     sizes = {f"FANET_{names[spec.msgid]}": wire.OVERHEAD + spec.layout.size for spec in specs}
     assert {**sizes, "positions": len(positions), "COLLISION": len(warning)} == MESSAGE_BYTES
 

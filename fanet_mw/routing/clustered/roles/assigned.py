@@ -133,7 +133,7 @@ class AssignedRoles:
     def _on_schedule(self, packet: Packet, *, now_ns: int) -> None:
         """Handle a leader's announcement, which may be that of this node itself."""
         schedule, parts = decoded(packet.frame, Schedule.decode_frame), self.parts
-        places = self._timetabling.read(packet, schedule)
+        details = self._timetabling.read(packet, schedule)
         if schedule.leader != packet.header.origin:
             raise MalformedFrameError(f"schedule of {schedule.leader} by {packet.header.origin}")
         before = parts.membership.version
@@ -151,7 +151,7 @@ class AssignedRoles:
         self._do(actions, now_ns)
         if parts.membership.is_head:
             self._access.renew_slot()
-        self._timetabling.on_schedule(packet, schedule, places, now_ns=now_ns)
+        self._timetabling.on_schedule(packet, schedule, details, now_ns=now_ns)
 
     def on_impersonation(self, packet: Packet, *, now_ns: int) -> None:
         """A schedule was received in the name of this node, which this node has not made: announce a later one.

@@ -2,6 +2,7 @@
 
     joins -> none for a moment -> clusters -> schedule, announced once per flooding period
     a node is new or gone, or the clusters have become too bad -> a new epoch, at most one in `clusters.reassign_s`
+    nodes send more than their turns carry, or much less        -> the same, with `clusters.load = "heard"`
 
 Joins come in bursts, so the leader waits until none has come for a moment. An elected leader knows no nodes at first:
 it calls all nodes to join, and divides them when all have had time to answer. Between joins, positions are extrapolated
@@ -20,12 +21,14 @@ from fanet_mw.routing.clustered.roles.lease import Authority
 from fanet_mw.routing.clustered.roles.liveness import Liveness
 from fanet_mw.routing.clustered.roles.position_updates import lost_ns
 from fanet_mw.routing.clustered.roles.roster import Roster, sure_m
+from fanet_mw.routing.clustered.timetable.heard_load import HeardLoads
 from fanet_mw.routing.clustered.timetable.link_state import LinkState, adjacency, worth_a_change
 from fanet_mw.routing.clustered.timetable.turn_plan import measured_period_ns
 from fanet_mw.scenario import Scenario
 from fanet_mw.units import MS, US, Enu, NodeId, S, seconds_to_ns
 from fanet_mw.wire.inner import CAPACITY, Join, Member, Schedule
 from fanet_mw.wire.links import Link
+from fanet_mw.wire.loads import AS_EXPECTED
 
 SETTLE_NS: Final = 700 * MS
 """The time without a join after which the clusters are computed."""
@@ -44,6 +47,8 @@ _ANNOUNCEMENTS: Final = 4
 """The number of announcements after which a schedule has reached all nodes over links that lose frames."""
 _MOST: Final = 0.9
 """The share of nodes that must have reported their links before measured links are used."""
+_RELOAD_NS: Final = 10 * S
+"""The least time between two timetables for different loads, if the scenario gives none for reassignments."""
 _DRIFT: Final = 0.03
 """The share of links that must have changed before a new timetable is made."""
 
@@ -58,10 +63,19 @@ class _Assigned(NamedTuple):
     parts: Sequence[Schedule] = ()
     measured: tuple[Link, ...] = ()
     """The links from which all nodes compute the timetable; empty if it is computed from positions."""
+    loads: Mapping[NodeId, int] = MappingProxyType({})
+    """The loads for which all nodes compute the timetable; empty if it is made for what the scenario says."""
 
     @property
     def nodes(self) -> list[NodeId]:
         return [node for cluster in self.clusters for node in cluster.members]
+
+
+class _Estimates(NamedTuple):
+    """What the leader knows of links and loads; None if the scenario says what they are."""
+
+    links: LinkState | None
+    loads: HeardLoads | None
 
 
 class Leader:
@@ -74,12 +88,13 @@ class Leader:
         scenario: Scenario,
         liveness: Liveness,
         needs_every_link: bool,
+        heard: HeardLoads | None = None,
         epoch: int,
         elected: bool,
         now_ns: int,
     ) -> None:
         """`needs_every_link`: nodes compute a timetable from the assignment, so a new one is also needed when links
-        change.
+        change; `heard`: the loads for which it is to be made, None: those of the scenario.
         """
         clusters = scenario.clusters
         self._authority = authority
@@ -97,7 +112,7 @@ class Leader:
             clusters.method, count=clusters.count, range_m=self._range_m, options=clusters.options
         )
         self._epoch = epoch
-        self._links = LinkState() if scenario.measures_links else None
+        self._estimates = _Estimates(LinkState() if scenario.measures_links else None, heard)
         self._measured_ns = measured_period_ns(scenario)
         """The interval of announcements with measured links: one superframe."""
         self._outbid = False
@@ -124,8 +139,8 @@ class Leader:
 
     def on_links(self, node: NodeId, links: Sequence[Link]) -> None:
         """A node, perhaps the leader itself, has reported how well it hears its neighbors."""
-        if self._links is not None:
-            self._links.on_report(node, links)
+        if self._estimates.links is not None:
+            self._estimates.links.on_report(node, links)
 
     def on_outbid(self, epoch: int, *, now_ns: int) -> None:
         """A schedule was received in this leader's name that it has not made: announce a later epoch soon."""
@@ -173,7 +188,9 @@ class Leader:
         changed = self._outbid or sorted(self._roster.nodes) != sorted(before.nodes)
         rests = not self._reassign_ns or self._roster.stand_ins or now_ns < before.start_ns + self._reassign_ns
         measured = self._measured()
-        if not changed and rests and not (measured and not before.measured):
+        loads = self._loads(now_ns)
+        loaded = self._is_loaded_otherwise(loads, now_ns)
+        if not changed and rests and not loaded and not (measured and not before.measured):
             return
         measured_ns = _ANNOUNCEMENTS * self._measured_ns if before.measured else 0
         notice_ns = max(HEARD_NS, notice_ns, measured_ns)
@@ -190,22 +207,36 @@ class Leader:
             moved = worth_a_change(before.measured, measured)
         else:
             moved = self._by_links and drift(before.links, links) > _DRIFT
-        if not changed and same and not moved:
+        if not changed and same and not moved and not loaded:
             return
         self._roster.forget_reports()
         ordered = [Cluster(cluster.head, succession(cluster, swarm)) for cluster in clusters]
         self._epoch, self._outbid = (self._epoch + 1) & 0xFFFF or 1, False
-        self._assigned = _Assigned(ordered, places, links, start_ns, self._parts(ordered, start_ns), measured)
+        self._assigned = _Assigned(ordered, places, links, start_ns, self._parts(ordered, start_ns), measured, loads)
+
+    def _loads(self, now_ns: int) -> Mapping[NodeId, int]:
+        """The loads of the nodes that have joined; empty if loads are not heard."""
+        heard = self._estimates.loads
+        return {} if heard is None else heard.loads(sorted(self._roster.nodes), now_ns=now_ns)
+
+    def _is_loaded_otherwise(self, loads: Mapping[NodeId, int], now_ns: int) -> bool:
+        """True if the present assignment is for other loads, and has been in force for some time."""
+        before, heard = self._assigned, self._estimates.loads
+        rest_ns = self._reassign_ns or _RELOAD_NS
+        if heard is None or not before.parts or now_ns < before.start_ns + rest_ns:
+            return False
+        period_ns = self._measured_ns if before.measured else self._period_ns
+        return heard.worth_a_change(before.loads, loads, period_ns=period_ns)
 
     def _measured(self) -> tuple[Link, ...]:
         """The measured links to plan with, or none until most nodes have reported; the others' links are known from
         neighbors.
         """
-        if self._links is None:
+        if self._estimates.links is None:
             return ()
         nodes = [*self._roster.nodes, NodeId(self._authority.leader)]
-        known = self._assigned.measured or self._links.known(nodes) >= _MOST * len(nodes)
-        return self._links.between(nodes) if known else ()
+        known = self._assigned.measured or self._estimates.links.known(nodes) >= _MOST * len(nodes)
+        return self._estimates.links.between(nodes) if known else ()
 
     def _places(self, here: Motion, start_ns: int) -> dict[NodeId, Enu]:
         """The positions of all nodes in the middle of the time for which the assignment is made."""
@@ -250,3 +281,7 @@ class Leader:
     def place(self, node: int) -> Enu:
         """The position that the present assignment assumes for a member, or for the leader itself."""
         return self._assigned.places[NodeId(node)]
+
+    def load(self, node: int) -> int:
+        """The load that the present assignment assumes for a member."""
+        return self._assigned.loads.get(NodeId(node), AS_EXPECTED)

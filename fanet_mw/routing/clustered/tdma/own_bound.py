@@ -13,6 +13,7 @@ finds more waiting has no bound.
 from typing import Final, NamedTuple
 
 from fanet_mw.routing.clustered.tdma.turns import Turns
+from fanet_mw.wire.loads import AS_EXPECTED
 
 BURST: Final = 3
 """In a class without a least interval, this many packets may wait at once, the last one included, and still have a
@@ -29,6 +30,8 @@ class OwnBound(NamedTuple):
     """The number of bulk packets that one turn transmits."""
     around_ns: int = 0
     """The time before a turn and after a flood: the lead, the handover of the reception, and the receipt."""
+    load: int = AS_EXPECTED
+    """The load for which the timetable was made, in packets in 100 s; by default what the scenario says."""
 
     def worst_ns(self, *, interval_ns: int) -> int | None:
         """The bound of bulk packets that come at least `interval_ns` apart; None if the turns cannot carry so many."""

@@ -27,7 +27,11 @@ from fanet_mw.routing.clustered.timetable.turn_plans import TurnPlans
 from fanet_mw.trace import BoundStated, LikelyStated
 from fanet_mw.units import MS, US, NodeId, seconds_to_ns
 from fanet_mw.wire import PRIORITY_BULK, PRIORITY_REPORT, PRIORITY_SAFETY
+from fanet_mw.wire.loads import AS_EXPECTED, PER_NS
 
+_SAME: Final = 0.95
+"""A node whose packets come at less than this share of the interval of its scenario sends others as well, about whose
+intervals nothing is known."""
 _CLASSES: Final = {PRIORITY_SAFETY: "warning", PRIORITY_REPORT: "report", PRIORITY_BULK: "bulk"}
 
 
@@ -89,7 +93,8 @@ class Promises:
     def _own_of(self, node: NodeId, plan: TurnPlan) -> OwnBound:
         offsets = plan.roots if node == self._port.node else tuple(plan.table.offsets_of(node))
         around_ns = self._lead_ns + receipt_ns(self._port.scenario)
-        return OwnBound(plan.turns, offsets, plan.table.spans[node], plan.together, around_ns)
+        load = plan.loads.get(node, AS_EXPECTED)
+        return OwnBound(plan.turns, offsets, plan.table.spans[node], plan.together, around_ns, load)
 
     def class_bounds_ns(self, own: OwnBound | None) -> Mapping[int, int]:
         """The bounds by priority; a class whose losses are repaired has none."""
@@ -100,7 +105,10 @@ class Promises:
         bulk_ns: int | None = own.burst_ns(per_turn=own.together)
         if scenario.traffic.arrivals == "cbr" and not scenario.further_traffic:
             interval_ns = self._admission.interval_ns if self._admission else self._interval_ns
-            bulk_ns = own.worst_ns(interval_ns=interval_ns)
+            if own.load != AS_EXPECTED and not self._admission:
+                interval_ns = PER_NS // own.load
+            if interval_ns >= _SAME * self._interval_ns or self._admission:
+                bulk_ns = own.worst_ns(interval_ns=interval_ns)
         return found if bulk_ns is None else {**found, PRIORITY_BULK: bulk_ns}
 
     def notice_ns(self, now_ns: int) -> int:
@@ -216,11 +224,12 @@ class Promises:
             return None  # schedules go before the leader's own packets
         if len(plan.table.spans) < self._port.scenario.nodes.count:
             return None  # the swarm is separated or not complete: some node is in no turn of this timetable
+        load = plan.loads.get(self._port.node, AS_EXPECTED)
         found_ns = likely_delay_ns(
             plan,
             self._port.node,
             waiting=len(self._roots),
-            interval_ns=self._interval_ns,
+            interval_ns=self._interval_ns if load == AS_EXPECTED else PER_NS // load,
             hello_ns=seconds_to_ns(self._port.scenario.routing.hello_interval_s),
         )
         return None if found_ns is None else found_ns + self._lead_ns + receipt_ns(self._port.scenario)

@@ -3,12 +3,12 @@
     parts of the schedule, with positions  ->  all parts of one version  ->  timetable, in force when that begins
     the measured links, if there are any   -'
 
-The leader adds to each part of a schedule the positions of its members, and floods the measured links after the last
-part.
+The leader adds to each part of a schedule the positions of its members, and their loads if it hears them
+(`clusters.load`), and floods the measured links after the last part.
 """
 
 from collections.abc import Mapping
-from typing import Final, Protocol
+from typing import Final, NamedTuple, Protocol
 
 from fanet_mw.errors import MalformedFrameError
 from fanet_mw.node.contract import Port
@@ -20,15 +20,23 @@ from fanet_mw.routing.clustered.roles.membership import Membership, Version
 from fanet_mw.routing.clustered.roles.schedule_refresh import ScheduleRefresh
 from fanet_mw.routing.clustered.timetable.promises import Promises
 from fanet_mw.routing.clustered.timetable.turn_access import TurnAccess
-from fanet_mw.routing.clustered.timetable.turn_plan import Fitted, TurnPlan, fit, fit_measured
+from fanet_mw.routing.clustered.timetable.turn_plan import NO_LOADS, Fitted, TurnPlan, fit, fit_measured
 from fanet_mw.units import US, Enu, NodeId
 from fanet_mw.wire.inner import Schedule
 from fanet_mw.wire.links import Link, Links, frames_of
+from fanet_mw.wire.loads import AS_EXPECTED, Loads
 from fanet_mw.wire.places import Places, rounded
 
 _LINKS_PART: Final = 1 << 16
 """Added to the number of a part of the links, so that it differs from those of the schedule in the store of parts that
 neighbors may lack."""
+
+
+class PartDetails(NamedTuple):
+    """What comes with a part of a schedule: the positions of its members, and their loads if the leader hears them."""
+
+    places: Places
+    loads: Loads | None = None
 
 
 class Timetabling(Protocol):
@@ -43,10 +51,10 @@ class Timetabling(Protocol):
     def links_after(self, part: Schedule, leader: Leader) -> list[bytes]:
         """The inner frames of the packets with links that follow a part of the schedule."""
 
-    def read(self, packet: Packet, schedule: Schedule) -> Places | None:
-        """The positions that came with a part of a schedule; raises MalformedFrameError."""
+    def read(self, packet: Packet, schedule: Schedule) -> PartDetails | None:
+        """The positions and loads that came with a part of a schedule; raises MalformedFrameError."""
 
-    def on_schedule(self, packet: Packet, schedule: Schedule, places: Places | None, *, now_ns: int) -> None:
+    def on_schedule(self, packet: Packet, schedule: Schedule, details: PartDetails | None, *, now_ns: int) -> None:
         """A part of a schedule was received, and the roles have accepted it."""
 
     def on_links(self, packet: Packet, *, now_ns: int) -> None:
@@ -67,10 +75,10 @@ class NoTimetable:
     def links_after(self, part: Schedule, leader: Leader) -> list[bytes]:
         return []
 
-    def read(self, packet: Packet, schedule: Schedule) -> Places | None:
+    def read(self, packet: Packet, schedule: Schedule) -> PartDetails | None:
         return None
 
-    def on_schedule(self, packet: Packet, schedule: Schedule, places: Places | None, *, now_ns: int) -> None:
+    def on_schedule(self, packet: Packet, schedule: Schedule, details: PartDetails | None, *, now_ns: int) -> None:
         """Nothing is done: the roles use all that is in the schedule."""
 
     def on_links(self, packet: Packet, *, now_ns: int) -> None:
@@ -101,7 +109,7 @@ class FromPlaces:
         self._refresh = refresh
         self._promises = promises
         self._access = access
-        self._schedules: dict[int, tuple[Schedule, Places]] = {}
+        self._schedules: dict[int, tuple[Schedule, PartDetails]] = {}
         self._measured: dict[int, Links] = {}
         """The links of this version of the schedule, by part."""
         self._version: Version | None = None
@@ -115,7 +123,10 @@ class FromPlaces:
         if not part.members:
             return b""
         places = tuple(rounded(leader.place(member.node)) for member in part.members)
-        return Places(places, rounded(leader.place(part.leader))).encode_frames(self._port.node)
+        frames = Places(places, rounded(leader.place(part.leader))).encode_frames(self._port.node)
+        if not self._port.scenario.hears_load:
+            return frames
+        return frames + Loads(tuple(leader.load(member.node) for member in part.members)).encode_frames(self._port.node)
 
     def links_after(self, part: Schedule, leader: Leader) -> list[bytes]:
         if not leader.links or not part.members or part.part + 1 < part.parts:
@@ -131,19 +142,24 @@ class FromPlaces:
 
     # --- at every node --------------------------------------------------------------------------------------------
 
-    def read(self, packet: Packet, schedule: Schedule) -> Places | None:
-        return decoded(packet.frame, Places.decode_frames) if schedule.members else None
+    def read(self, packet: Packet, schedule: Schedule) -> PartDetails | None:
+        if not schedule.members:
+            return None
+        loads = decoded(packet.frame, Loads.decode_frames) if self._port.scenario.hears_load else None
+        return PartDetails(decoded(packet.frame, Places.decode_frames), loads)
 
-    def on_schedule(self, packet: Packet, schedule: Schedule, places: Places | None, *, now_ns: int) -> None:
+    def on_schedule(self, packet: Packet, schedule: Schedule, details: PartDetails | None, *, now_ns: int) -> None:
         """Keep the positions, and compute the timetable when all parts of an epoch have arrived."""
         version = Version(Authority(schedule.term, schedule.leader), schedule.epoch)
-        if version != self._membership.version or places is None or len(places.members) != len(schedule.members):
+        if version != self._membership.version or details is None:
+            return
+        if any(len(told.members) != len(schedule.members) for told in details if told is not None):
             return
         if version != self._version:
             self._version, self._schedules = version, {}
             if self._measured and _version_of(next(iter(self._measured.values()))) != version:
                 self._measured = {}
-        self._schedules[schedule.part] = schedule, places
+        self._schedules[schedule.part] = schedule, details
         announced_ns = {version: packet.header.origin_us * US}
         if self._planned is not None and self._planned != version:
             announced_ns[self._planned] = self._announced_ns.get(self._planned, 0)
@@ -189,11 +205,15 @@ class FromPlaces:
 
     def _plan(self, now_ns: int) -> None:
         parts = [self._schedules[part] for part in sorted(self._schedules)]
-        schedule, places = parts[0]
-        at: dict[NodeId, Enu] = {NodeId(schedule.leader): places.leader}
+        schedule, details = parts[0]
+        at: dict[NodeId, Enu] = {NodeId(schedule.leader): details.places.leader}
+        loads: dict[NodeId, int] = {}
         cluster_of: dict[NodeId, int] = {}
         heads: dict[int, NodeId] = {}
-        for part, where in parts:
+        for part, (where, sent) in parts:
+            members = [NodeId(member.node) for member in part.members]
+            told = zip(members, sent.members, strict=True) if sent is not None else ()
+            loads |= {node: load for node, load in told if load != AS_EXPECTED}
             for member, place in zip(part.members, where.members, strict=True):
                 at[NodeId(member.node)] = place
                 cluster_of[NodeId(member.node)] = member.cluster
@@ -203,13 +223,18 @@ class FromPlaces:
             return  # a cluster without a head; no leader announces one
         measured = tuple(link for part in sorted(self._measured) for link in self._measured[part].links)
         head_of = {node: heads[cluster] for node, cluster in sorted(cluster_of.items())}
-        found = self._fit(schedule, at, head_of, measured)
+        found = self._fit(schedule, at, head_of, measured, loads or NO_LOADS)
         # None if not even one packet of each head fits; `fanet plan` tells the user
         plan = None if found is None else TurnPlan.of(self._port.node, schedule.start_us * US, found)
         self._access.follow(plan, now_ns=now_ns)
 
     def _fit(
-        self, schedule: Schedule, at: Mapping[NodeId, Enu], head_of: Mapping[NodeId, NodeId], measured: tuple[Link, ...]
+        self,
+        schedule: Schedule,
+        at: Mapping[NodeId, Enu],
+        head_of: Mapping[NodeId, NodeId],
+        measured: tuple[Link, ...],
+        loads: Mapping[NodeId, int],
     ) -> Fitted | None:
         """The timetable; it is computed from positions if links are not measured, or if they leave no room for the
         load.
@@ -225,9 +250,16 @@ class FromPlaces:
                 leader=leader,
                 origin_ns=origin_ns,
                 link_parts=len(self._measured),
+                loads=loads,
             )
         return found or fit(
-            self._port.scenario, places, head_of, leader=leader, origin_ns=origin_ns, period_ns=period_ns
+            self._port.scenario,
+            places,
+            head_of,
+            leader=leader,
+            origin_ns=origin_ns,
+            period_ns=period_ns,
+            loads=loads,
         )
 
 

@@ -11,22 +11,25 @@ it never waits there. All nodes compute the same timetable from the same schedul
 """
 
 import math
-from collections.abc import Iterator, Mapping
+from collections.abc import Iterable, Iterator, Mapping
 from itertools import islice
+from types import MappingProxyType
 from typing import Final, NamedTuple, Self
 
 from fanet_mw.routing.clustered.tdma.turns import Turns, turn_ns
 from fanet_mw.routing.clustered.tdma.urgent import reserved
 from fanet_mw.routing.clustered.timetable.delivery_odds import Odds
+from fanet_mw.routing.clustered.timetable.heard_load import packets
 from fanet_mw.routing.clustered.timetable.list_scheduling import Effort
 from fanet_mw.routing.clustered.timetable.timetable import Timetable, redundant_timetable, timetable
 from fanet_mw.routing.clustered.timetable.turn_filling import Geometry
 from fanet_mw.scenario import Scenario
 from fanet_mw.units import MS, Enu, NodeId, S, seconds_to_ns
-from fanet_mw.wire import DIGEST, HEADER_BYTES, LINKS, OVERHEAD, PLACES, SCHEDULE
+from fanet_mw.wire import DIGEST, HEADER_BYTES, LINKS, LOADS, OVERHEAD, PLACES, SCHEDULE
 from fanet_mw.wire.digest import CAPACITY as DIGEST_CAPACITY
 from fanet_mw.wire.inner import CAPACITY
 from fanet_mw.wire.links import MESSAGES, Link
+from fanet_mw.wire.loads import AS_EXPECTED
 from fanet_mw.wire.places import CAPACITY as PLACES_CAPACITY
 
 _SCHEDULE_BYTES: Final = SCHEDULE.layout.size + OVERHEAD
@@ -45,6 +48,9 @@ _MOST_PERIODS: Final = 4
 """The greatest length of a superframe with measured links, in flooding periods."""
 _LOAD: Final = 0.9
 """The share of a node's root turns that its packets use with measured links; its other messages need the rest."""
+_DRAINING: Final = 1.5
+"""Where turns are plenty, a node that sends more than expected gets turns for so many times its load, because packets
+have been waiting since it began to."""
 _CALLS_PER_S: Final = 3
 _MOST_DIGESTS: Final = 4
 _HELLO_BYTES: Final = 200
@@ -52,6 +58,9 @@ _HELLO_BYTES: Final = 200
 
 _BLOCK: Final = 300
 """The least number of packets in a block: with fewer, turns are filled less densely; more take long to compute."""
+
+NO_LOADS: Final[Mapping[NodeId, int]] = MappingProxyType({})
+"""All nodes send as the scenario says."""
 
 Places = tuple[tuple[NodeId, Enu], ...]
 """The positions of the nodes [m], in ascending order of ids."""
@@ -72,6 +81,8 @@ class Fitted(NamedTuple):
     """True if the turns suffice for the load."""
     odds: Odds | None = None
     """The odds of a timetable for lossy links; None for a timetable that assumes no losses."""
+    loads: Mapping[NodeId, int] = NO_LOADS
+    """The loads for which the timetable was made, of those nodes that do not send as the scenario says."""
 
 
 class TurnPlan(NamedTuple):
@@ -94,6 +105,7 @@ class TurnPlan(NamedTuple):
     frame_bytes: int
     whole: bool
     odds: Odds | None
+    loads: Mapping[NodeId, int] = NO_LOADS
 
     @classmethod
     def of(cls, node: NodeId, valid_ns: int, found: Fitted) -> Self:
@@ -119,6 +131,7 @@ class TurnPlan(NamedTuple):
             frame_bytes=found.frame_bytes,
             whole=found.whole,
             odds=found.odds,
+            loads=found.loads,
         )
 
     def has_turns(self, node: NodeId) -> bool:
@@ -147,7 +160,8 @@ def largest_frame(scenario: Scenario, *, together: int = 1) -> int:
 def schedule_bytes(scenario: Scenario) -> int:
     """The size of a part of a schedule with its positions."""
     members = min(scenario.nodes.count, CAPACITY)
-    return HEADER_BYTES + _SCHEDULE_BYTES + _PLACES_BYTES * -(-members // PLACES_CAPACITY)
+    loads_bytes = LOADS.layout.size + OVERHEAD if scenario.hears_load else 0
+    return HEADER_BYTES + _SCHEDULE_BYTES + _PLACES_BYTES * -(-members // PLACES_CAPACITY) + loads_bytes
 
 
 def superframe(scenario: Scenario, *, origin_ns: int = 0, period_ns: int | None = None, together: int = 1) -> Turns:
@@ -178,17 +192,19 @@ def fit(
     leader: NodeId | None = None,
     origin_ns: int = 0,
     period_ns: int | None = None,
+    loads: Mapping[NodeId, int] = NO_LOADS,
     quick: bool = False,
 ) -> Fitted | None:
     """The timetable of a swarm; None if not even one packet of each head fits. `head_of`: the head of each node but the
-    leader.
+    leader; `loads`: of those nodes that do not send as the scenario says.
 
     With `quick` it is None, too, if the load only fits with an effort that may take seconds.
     """
     leads = leader or scenario.leader
     heads = tuple((node, head) for node, head in sorted(head_of.items()) if node != head)
     whole_ns = scenario.clusters.period_ns if period_ns is None else period_ns
-    for wish in islice(_wishes(scenario, head_of, leads, whole_ns), int(quick), None):
+    wishes = _wishes_by_load(scenario, head_of, leads, whole_ns, loads) if loads else None
+    for wish in islice(wishes or _wishes(scenario, head_of, leads, whole_ns), int(quick), None):
         if quick and not wish.enough:
             return None
         turns = superframe(scenario, origin_ns=origin_ns, period_ns=whole_ns, together=wish.together)
@@ -196,7 +212,7 @@ def fit(
         table = _table(places, wish.roots, geometry, ways, blocks=wish.blocks, hard=wish.hard and not quick)
         if table is not None:
             frame_bytes = largest_frame(scenario, together=wish.together)
-            return Fitted(turns, table, wish.together, frame_bytes, wish.whole, wish.enough)
+            return Fitted(turns, table, wish.together, frame_bytes, wish.whole, wish.enough, loads=loads)
     return None
 
 
@@ -216,6 +232,7 @@ def fit_measured(
     leader: NodeId,
     origin_ns: int,
     link_parts: int,
+    loads: Mapping[NodeId, int] = NO_LOADS,
 ) -> Fitted | None:
     """The timetable of a swarm with measured links: each node transmits its own packets, and frames are repeated as
     often as turns allow. None if the turns do not suffice for the load.
@@ -227,8 +244,12 @@ def fit_measured(
     turns = Turns(origin_ns, whole_ns, contention_ns, turn, max(0, whole_ns - contention_ns) // turn)
     own = leader_load(scenario) if leader == scenario.leader else 1
     senders = [node for node, _ in places if node != leader or own]
-    each = max(1, math.ceil(whole_ns / seconds_to_ns(scenario.traffic.interval_s) / _LOAD - 1e-3))
-    roots = (*(leader,) * (schedule_parts(scenario) + link_parts), *(node for node in senders for _ in range(each)))
+    per_node = _per_node(scenario, senders, whole_ns, loads)
+    each = {node: max(1, math.ceil(per_node[node] / _LOAD - 1e-3)) for node in senders}
+    control = (leader,) * (schedule_parts(scenario) + link_parts)
+    roots = (*control, *(node for node in senders for _ in range(each[node])))
+    if len(roots) > turns.per_frame:
+        return None
     calls = max(1, round(_CALLS_PER_S * whole_ns / S))
     geometry = links(scenario, turns)
     for margin_db, epsilon in _REDUNDANCY:
@@ -237,7 +258,7 @@ def fit_measured(
                 places, measured, roots, geometry, calls=calls, epsilon=epsilon, margin_db=margin_db, pace=pace
             )
             if found is not None:
-                return Fitted(turns, found[0], 1, size, whole=True, enough=True, odds=found[1])
+                return Fitted(turns, found[0], 1, size, whole=True, enough=True, odds=found[1], loads=loads)
     return None
 
 
@@ -336,6 +357,55 @@ def _wishes(scenario: Scenario, head_of: Mapping[NodeId, NodeId], leader: NodeId
     if together > 1:
         yield wish(len(senders), 1, hard=True, enough=False)
     yield _for_heads(head_of, control, leader if own else None)
+
+
+def _wishes_by_load(
+    scenario: Scenario, head_of: Mapping[NodeId, NodeId], leader: NodeId, period_ns: int, loads: Mapping[NodeId, int]
+) -> Iterator[_Wish]:
+    """The same ways for nodes with loads of their own. Turns that a node does not need now are taken from it only if
+    they do not fit otherwise. If turns do not suffice, those who send most get fewer first, so that a node that sends
+    too much, or is said to, takes nothing from the others.
+    """
+    own = leader_load(scenario) if leader == scenario.leader else 1
+    control = (leader,) * schedule_parts(scenario)
+    senders = [*sorted(head_of), *([leader] if own else [])]
+    per_node = _per_node(scenario, senders, period_ns, loads)
+    most = most_together(scenario)
+
+    def needed(together: int) -> dict[NodeId, int]:
+        return {node: max(1, math.ceil(per_node[node] / together - 1e-9)) for node in senders}
+
+    def wishes(each: Mapping[NodeId, int], together: int, *, hard: bool, enough: bool = True) -> Iterator[_Wish]:
+        turns = superframe(scenario, period_ns=period_ns, together=together)
+        if len(control) + sum(each.values()) <= turns.per_frame:
+            roots = (*control, *(node for node in senders for _ in range(each[node])))
+            yield _Wish(roots, together, hard, enough=enough)
+
+    expected = _per_node(scenario, senders, period_ns, NO_LOADS)
+    ample = {n: _DRAINING * sent if sent > expected[n] else expected[n] for n, sent in per_node.items()}
+    yield from wishes({node: int(each) + 1 for node, each in ample.items()}, 1, hard=False)
+    yield from wishes({node: int(per_node[node]) + 1 for node in senders}, 1, hard=False)
+    fewest, before = needed(most), dict[NodeId, int]()
+    for together in range(1, most + 1):
+        each = needed(together)
+        if each != before:
+            yield from wishes(each, together, hard=each == fewest)
+        before = each
+    together = next(n for n in range(1, most + 1) if needed(n) == fewest)
+    for level in range(max(fewest.values(), default=1) - 1, 0, -1):
+        cut = {node: min(level, each) for node, each in fewest.items()}
+        yield from wishes(cut, together, hard=level == 1, enough=False)
+    if together > 1:
+        yield from wishes(dict.fromkeys(senders, 1), 1, hard=True, enough=False)
+    yield _for_heads(head_of, control, leader if own else None)
+
+
+def _per_node(
+    scenario: Scenario, senders: Iterable[NodeId], within_ns: int, loads: Mapping[NodeId, int]
+) -> dict[NodeId, float]:
+    """The packets of each sender within a duration."""
+    interval_s = scenario.traffic.interval_s
+    return {node: packets(loads.get(node, AS_EXPECTED), within_ns=within_ns, interval_s=interval_s) for node in senders}
 
 
 def _blocks(packets: int, senders: int) -> int:

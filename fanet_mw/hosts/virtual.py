@@ -93,9 +93,9 @@ class VirtualHost:
     def run(self, until_ns: int) -> None:
         """Process all events up to and including `until_ns`; may be called again with a later instant."""
         heap, armed, wakes, flush = self._heap, self._armed, [actor.wake for actor in self._actors], self._flush
-        now_ns = self.now_ns
+        push_and_pop, pop, now_ns = heapq.heappushpop, heapq.heappop, self.now_ns
         while self._latest or heap:
-            entry = heapq.heappushpop(heap, self._latest) if self._latest else heapq.heappop(heap)
+            entry = push_and_pop(heap, self._latest) if self._latest else pop(heap)
             self._latest = None
             t_ns, _, index = entry
             if t_ns > until_ns:
@@ -150,9 +150,10 @@ class VirtualHost:
                 index, receive, others = routes[topic] = self._resolve(topic)
             if not receive(topic, message, now_ns):
                 awake[index] = None  # the keys of a dict keep their order, and each occurs once
-            for index, receive in others:
-                if not receive(topic, message, now_ns):
-                    awake[index] = None
+            if others:  # seldom
+                for index, receive in others:
+                    if not receive(topic, message, now_ns):
+                        awake[index] = None
         queue.clear()
         asks, armed = self._asks, self._armed
         for index in awake:

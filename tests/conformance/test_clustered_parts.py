@@ -94,7 +94,7 @@ def test_what_a_relaying_rule_leaves_open_is_decided_when_it_says(node: Node) ->
         late_ns = wake_ns + 7 * MS
         relays = parts.contending.decided(late_ns)
         latest_ns = late_ns + node.scenario.radio.lead_ns
-        assert all(late_ns <= relay.start_ns < latest_ns for relay in relays), "lateness uses up the lead"
+        assert all(late_ns <= start_ns < latest_ns for _, start_ns in relays), "lateness uses up the lead"
         decided += relays
     assert len(decided) == open_before
     assert parts.contending.waiting() == 0

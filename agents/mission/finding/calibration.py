@@ -68,12 +68,14 @@ def likelihood(place: Estimate, readings: Iterable[tuple[Enu, float]], model: Ph
     """The likelihood of each common offset, given the powers of one phone at a known place; the maximum is about 1."""
     nearest = sorted(readings, key=lambda reading: (_slant_m(place, reading[0]), reading))[:_MOST_READINGS]
     sigma_db = max(model.shadowing_db, 1.0)
+    spread_db = sigma_db * math.sqrt(2)
     logs = [0.0] * len(_SINGLE)
+    threshold_dbm = model.threshold_dbm
     for position, rssi_dbm in nearest:
         expected_dbm = model.power_dbm - REFERENCE_LOSS_DB - 10 * model.exponent * math.log10(_slant_m(place, position))
         for at, offset_db in enumerate(_SINGLE):
             mean_dbm = expected_dbm + offset_db
-            heard = 0.5 * math.erfc((model.threshold_dbm - mean_dbm) / (sigma_db * math.sqrt(2)))
+            heard = 0.5 * math.erfc((threshold_dbm - mean_dbm) / spread_db)
             off = (rssi_dbm - mean_dbm) / sigma_db
             logs[at] -= (0.5 * off * off + math.log(max(heard, _RARELY_HEARD))) / CORRELATION_FACTOR
     most = max(logs)

@@ -249,13 +249,7 @@ class PhoneFilter:
     def _update(self, position: Enu, rssi_dbm: float) -> None:
         """Add a received power to the sums of all cells."""
         assert self._middle is not None, "the grid has a middle before samples are added"
-        model = self._model
-        expected_at_1_m = model.power_dbm - REFERENCE_LOSS_DB
-        slope = 5 * model.exponent / math.log(10)  # per natural logarithm of the squared distance
-        residual_at_1_m = rssi_dbm - expected_at_1_m
-        up2 = max(1.0, position.up * position.up)
-        log, distances2 = math.log, _squared_distances_m2(self._middle, position, up2)
-        residuals = [residual_at_1_m + slope * log(distance2) for distance2 in distances2]
+        residuals = _residuals_db(self._middle, position, rssi_dbm, self._model)
         self._sums = list(map(add, self._sums, residuals))
         self._squares = list(map(add, self._squares, map(mul, residuals, residuals)))
 
@@ -337,6 +331,18 @@ def _calibrated(model: PhoneModel, offset: PhoneOffset) -> PhoneModel:
     return model._replace(
         power_dbm=model.power_dbm + offset.mean_db, offset_db=math.hypot(model.offset_db, offset.sigma_db)
     )
+
+
+@lru_cache(maxsize=16)
+def _residuals_db(middle: Enu, position: Enu, rssi_dbm: float, model: PhoneModel) -> Sequence[float]:
+    """For each cell of the grid around `middle`, the received power less the one that is expected from a phone there.
+
+    A report that several UAVs of one process receive is computed once: most of their grids have the same middle.
+    """
+    residual_at_1_m = rssi_dbm - (model.power_dbm - REFERENCE_LOSS_DB)
+    slope = 5 * model.exponent / math.log(10)  # per natural logarithm of the squared distance
+    distances2 = _squared_distances_m2(middle, position, max(1.0, position.up * position.up))
+    return [residual_at_1_m + slope * logarithm for logarithm in map(math.log, distances2)]
 
 
 @lru_cache(maxsize=64)

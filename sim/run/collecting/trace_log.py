@@ -11,6 +11,7 @@ other kinds only does not decode the deliveries; one that asks for deliveries an
 import pickle
 import struct
 from collections.abc import Callable, Collection, Iterable, Iterator, Sequence
+from itertools import starmap
 from pathlib import Path
 from typing import Any, Final
 
@@ -87,8 +88,8 @@ class TraceLog(Collection[Record]):
 
 
 def _packed(records: Sequence[Record]) -> tuple[bytes, bytes, bytes]:
-    codes = bytes(CODES[type(record)] for record in records)
-    rows = b"".join(_ROW.pack(*record) for record in records if type(record) is Delivered)
+    codes = bytes(map(CODES.__getitem__, map(type, records)))
+    rows = b"".join(starmap(_ROW.pack, [record for record in records if type(record) is Delivered]))
     return codes, rows, pickle.dumps([tuple(record) for record in records if type(record) is not Delivered])
 
 

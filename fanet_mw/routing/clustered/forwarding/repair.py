@@ -56,9 +56,9 @@ class Repair:
         self._holdings: dict[int, Holding] = {}
         self._store: dict[int, _Kept] = {}
         """The stored packets by key."""
-        self._order: deque[tuple[int, int]] = deque()
+        self._order: deque[tuple[int, int, int]] = deque()
         """The keys in the order in which their packets came, each with the instant of the packet's generation [swarm
-        us]."""
+        us] and its origin, so that a packet need not be looked at when it is dropped."""
         self._stored: dict[int, int] = {}
         """The number of stored packets by origin."""
         self.pending: dict[int, int] = {}
@@ -82,7 +82,7 @@ class Repair:
             store[key] = _Kept(packet, min(ripe_ns, known.ripe_ns))
             return
         store[key] = _new(_Kept, (packet, ripe_ns))
-        order.append((key, header.origin_us))
+        order.append((key, header.origin_us, origin))
         self._stored[origin] = self._stored.get(origin, 0) + 1
         if len(store) > self._capacity or order[0][1] < (now_ns - self._window_ns) // US:
             self._forget(now_ns)
@@ -90,16 +90,17 @@ class Repair:
     def _forget(self, now_ns: int) -> None:
         """Drop packets that are too old to be repaired, and the oldest ones beyond the capacity."""
         horizon_us = (now_ns - self._window_ns) // US
-        order, store = self._order, self._store
+        order, store, stored = self._order, self._store, self._stored
         while order:
-            key, born_us = order[0]
+            key, born_us, origin = order[0]
             if len(store) <= self._capacity and born_us >= horizon_us:
                 return
             order.popleft()
-            origin = store.pop(key).packet.header.origin
-            self._stored[origin] -= 1
-            if not self._stored[origin]:
-                del self._stored[origin]
+            del store[key]
+            if stored[origin] > 1:
+                stored[origin] -= 1
+            else:
+                del stored[origin]
 
     def digest(self, *, now_ns: int, most: int = _MOST_ORIGINS) -> Digest:
         """The digest for this node's hello: of all origins, or of the next `most` of them."""

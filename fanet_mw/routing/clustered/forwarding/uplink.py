@@ -75,6 +75,8 @@ class Uplink:
 
     def expire(self, *, now_ns: int) -> None:
         """Drop held packets whose lifetime is over."""
+        if not len(self._held):
+            return  # as at most wake-ups
         for packet in self._held.expire(before_us=(now_ns - self._lifetime_ns) // US):
             self._port.drop(DropReason.EXPIRED, packet, now_ns=now_ns)
 

@@ -26,6 +26,7 @@ _AGAIN_HELLOS: Final = 2.0
 """The number of hello intervals after which a stand-in announces itself again, until a schedule confirms it or the head
 objects."""
 _OBJECT_NS: Final = 500 * MS
+_LEADING: Final = State.LEADING  # members of an enumeration are looked up slowly, and this is asked at every wake-up
 
 
 class Failover:
@@ -143,13 +144,13 @@ class Failover:
     # --- time -----------------------------------------------------------------------------------------------------
 
     def next_wake_ns(self) -> int | None:
-        if self.state is State.LEADING:
+        if self.state is _LEADING:
             return None
         stand_ns = self._lease.stand_ns
         return stand_ns if self._watch_ns is None or stand_ns < self._watch_ns else self._watch_ns
 
     def wake(self, now_ns: int) -> list[Action]:
-        if self.state is State.LEADING:
+        if self.state is _LEADING:
             return []
         if now_ns >= self._lease.stand_ns and self._lease.review(now_ns):
             self._lease.take_office(now_ns)

@@ -99,6 +99,8 @@ class SlotAccess:
     # --- time -----------------------------------------------------------------------------------------------------
 
     def wake(self, now_ns: int) -> None:
+        if self._release.next_wake_ns() is None:
+            return  # nothing is queued
         horizon_us = now_ns // US - self._lifetime_us
         for packet in self._release.expire(before_us=horizon_us):
             self._port.drop(DropReason.EXPIRED, packet, now_ns=now_ns)

@@ -99,7 +99,7 @@ class Claimants:
     def _unclaimed(self, node: NodeId) -> int:
         known = (self._shares[n] for n in (node, *self._near[node]))
         taken = {share for share in known if share is not None}
-        return sum(1 for turn in range(self.turns.per_frame) if not any(share.has(turn) for share in taken))
+        return sum(1 for turn in range(self.turns.per_superframe) if not any(share.has(turn) for share in taken))
 
     def judge(self, scenario: Scenario, classes: Sequence[TrafficClass]) -> ClaimedPlan:
         """Judge all nodes under a load."""
@@ -166,10 +166,12 @@ class Claimants:
         """The hop time that a node will report for the worst slot of its superframe; one turn may go to a hello."""
         if length not in self._hops_ns:
             turns, found = self.turns, []
-            for slot in range(min(length, turns.per_frame)):
-                starts = tuple(turns.start_ns(turn, frame_start_ns=0) for turn in _turns(Share(slot, length), turns))
+            for slot in range(min(length, turns.per_superframe)):
+                starts = tuple(
+                    turns.start_ns(turn, superframe_start_ns=0) for turn in _turns(Share(slot, length), turns)
+                )
                 found.append(TurnServer(turns.turn_ns, turns.period_ns, starts, self._ahead_ns).completion_ns(2))
-            self._hops_ns[length] = max(found, default=None) if length <= turns.per_frame else None
+            self._hops_ns[length] = max(found, default=None) if length <= turns.per_superframe else None
         return self._hops_ns[length]
 
     def least_interval_ns(self, scenario: Scenario, classes: Sequence[TrafficClass]) -> int | None:
@@ -216,7 +218,7 @@ def converged_slots(scenario: Scenario, adjacency: Adjacency, turns: Turns) -> d
 
 
 def _turns(share: Share | None, turns: Turns) -> tuple[int, ...]:
-    return () if share is None else tuple(range(share.slot, turns.per_frame, share.length))
+    return () if share is None else tuple(range(share.slot, turns.per_superframe, share.length))
 
 
 def _lots(packets: float, turns: float) -> int:

@@ -72,7 +72,7 @@ def _problems(
         longest = max(node.superframe for node in claims.nodes) or scenario.clusters.slots
         yield (
             f"{len(without)} nodes have no turn, the first is node {without[0].node}: superframes of up to {longest} "
-            f"slots, a period has {claims.turns.per_frame} turns"
+            f"slots, a period has {claims.turns.per_superframe} turns"
         )
         return
     full = [node for node in claims.nodes if node.utilization > 1]

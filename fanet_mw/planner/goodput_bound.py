@@ -93,7 +93,7 @@ def any_protocol(scenario: Scenario, adjacency: Adjacency, sources: Collection[N
 
 def in_turns(turns: Turns, adjacency: Adjacency, sources: Collection[NodeId], *, together: int = 1) -> Goodput | None:
     """The bound for any timetable with such turns, each of which holds one frame of `together` packets."""
-    if not turns.per_frame:
+    if not turns.per_superframe:
         return None
-    each_ns = turns.period_ns // (turns.per_frame * together)
+    each_ns = turns.period_ns // (turns.per_superframe * together)
     return goodput_bound(adjacency, sources, send_ns=each_ns, receive_ns=each_ns)

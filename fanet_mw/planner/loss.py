@@ -34,13 +34,13 @@ class Loss(NamedTuple):
     """The mean over all roots and nodes, a bound of the share of copies that never arrive."""
 
 
-def loss(table: Timetable, adjacency: Adjacency, *, per_frame: int, hop_turns: int, chance: Chance) -> Loss:
+def loss(table: Timetable, adjacency: Adjacency, *, per_superframe: int, hop_turns: int, chance: Chance) -> Loss:
     """The loss of the floods of a timetable. `adjacency` has the links that count; all others are taken to carry
     nothing.
     """
     together: dict[int, list[NodeId]] = {}
     for turn in table.turns:
-        together.setdefault(turn.offset % per_frame, []).append(turn.node)
+        together.setdefault(turn.offset % per_superframe, []).append(turn.node)
     floods: dict[tuple[NodeId, int], list[Turn]] = {}
     for turn in sorted(table.turns):
         floods.setdefault((turn.root, turn.instance), []).append(turn)
@@ -48,7 +48,7 @@ def loss(table: Timetable, adjacency: Adjacency, *, per_frame: int, hop_turns: i
     for (root, _), turns in sorted(floods.items()):
         arrivals: dict[NodeId, list[tuple[int, float]]] = {root: [(turns[0].offset - hop_turns, 1.0)]}
         for turn in turns:
-            others = tuple(node for node in together[turn.offset % per_frame] if node != turn.node)
+            others = tuple(node for node in together[turn.offset % per_superframe] if node != turn.node)
             _send(turn, others, arrivals, adjacency, hop_turns=hop_turns, chance=chance)
         missed += [(1 - _best(arrivals.get(node, ())), root, node) for node in adjacency if node != root]
     worst, root, node = max(missed, key=lambda item: (item[0], -item[1], -item[2]))

@@ -152,10 +152,10 @@ def _superframe(superframe: TimetablePlan) -> Iterator[str]:
     turns = superframe.turns
     yield item(
         "superframe",
-        f"{turns.contention_ns / MS:g} ms of contention + {turns.per_frame} turns of {turns.turn_ns / MS:.3f} ms",
+        f"{turns.contention_ns / MS:g} ms of contention + {turns.per_superframe} turns of {turns.turn_ns / MS:.3f} ms",
     )
     if superframe.used:
-        share = 100 * superframe.used / turns.per_frame
+        share = 100 * superframe.used / turns.per_superframe
         floods = "packets" if superframe.together == 1 else f"frames of {superframe.together} packets"
         yield item("turns in use", f"{superframe.used} ({share:.0f} %) for {superframe.packets} {floods} a period")
 
@@ -164,7 +164,7 @@ def _claims(claims: ClaimedPlan) -> Iterator[str]:
     turns, nodes = claims.turns, claims.nodes
     yield item(
         "period",
-        f"{turns.period_ns / MS:g} ms: {turns.contention_ns / MS:g} ms of contention + {turns.per_frame} turns of "
+        f"{turns.period_ns / MS:g} ms: {turns.contention_ns / MS:g} ms of contention + {turns.per_superframe} turns of "
         f"{turns.turn_ns / MS:.3f} ms",
     )
     lengths = sorted({node.superframe for node in nodes if node.slot is not None})

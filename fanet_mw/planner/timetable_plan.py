@@ -80,7 +80,7 @@ def table_for(
     slack = "" if most_us is None else f"; with clusters.turn_slack_us of at most {most_us} it has enough"
     return Refused(
         f"one packet of each of {len(roots)} roots needs {needed} turns of {turns.turn_ns / 1e6:.3f} ms, "
-        f"a superframe has {turns.per_frame}{slack}"
+        f"a superframe has {turns.per_superframe}{slack}"
     )
 
 
@@ -197,6 +197,6 @@ class _Root(NamedTuple):
         """
         turns = self.own.turns
         part_ns = turns.turn_ns // parts
-        starts = (turns.start_ns(offset, frame_start_ns=0) for offset in self.own.roots)
+        starts = (turns.start_ns(offset, superframe_start_ns=0) for offset in self.own.roots)
         parts_ns = tuple(start_ns + part * part_ns for start_ns in starts for part in range(parts))
         return TurnServer(part_ns, turns.period_ns, parts_ns, self.lead_ns + turns.turn_ns - part_ns)

@@ -137,7 +137,7 @@ def _loss(scenario: Scenario, superframe: TimetablePlan, table: Timetable, at: d
     turns = superframe.turns
     geometry = links(scenario, turns)
     adjacency = within_range(at, range_m=geometry.link_m)
-    return loss(table, adjacency, per_frame=turns.per_frame, hop_turns=geometry.hop_turns, chance=chance)
+    return loss(table, adjacency, per_superframe=turns.per_superframe, hop_turns=geometry.hop_turns, chance=chance)
 
 
 def _json(found: Plan) -> dict[str, Any]:
@@ -153,7 +153,7 @@ def _json(found: Plan) -> dict[str, Any]:
             "period_ms": superframe.turns.period_ns / MS,
             "contention_ms": superframe.turns.contention_ns / MS,
             "turn_ms": superframe.turns.turn_ns / MS,
-            "turns": superframe.turns.per_frame,
+            "turns": superframe.turns.per_superframe,
             "used": superframe.used,
             "packets": superframe.packets,
             "together": superframe.together,
@@ -188,7 +188,7 @@ def _claims_json(claims: ClaimedPlan) -> dict[str, Any]:
         "period_ms": claims.turns.period_ns / MS,
         "contention_ms": claims.turns.contention_ns / MS,
         "turn_ms": claims.turns.turn_ns / MS,
-        "turns": claims.turns.per_frame,
+        "turns": claims.turns.per_superframe,
         "hops": claims.hops,
         "hop_ms": None if claims.hop_ns is None else claims.hop_ns / MS,
         "lone_ms": None if claims.lone_ns is None else claims.lone_ns / MS,

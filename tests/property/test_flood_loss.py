@@ -25,7 +25,7 @@ def planned(places, root):
 
 def test_on_a_line_it_is_the_product_of_the_hops() -> None:
     table, adjacency = planned(swarm([(200 * i, 0) for i in range(4)]), NodeId(1))
-    found = loss(table, adjacency, per_frame=100, hop_turns=1, chance=lambda *_: 0.9)
+    found = loss(table, adjacency, per_superframe=100, hop_turns=1, chance=lambda *_: 0.9)
     assert found.worst == pytest.approx(1 - 0.9**3)
     assert found.node == 4
     assert found.mean == pytest.approx(1 - (0.9 + 0.9**2 + 0.9**3) / 3)
@@ -42,7 +42,7 @@ def test_no_node_is_missed_more_often_than_stated(at, p) -> None:
     table, adjacency = planned(places, NodeId(1))
     if len(components(adjacency)) > 1:
         return
-    found = loss(table, adjacency, per_frame=100, hop_turns=1, chance=lambda *_: p)
+    found = loss(table, adjacency, per_superframe=100, hop_turns=1, chance=lambda *_: p)
     turns = sorted(table.turns)
     copies = [(turn.offset, turn.node, n) for turn in turns for n in adjacency[turn.node] if n != 1]
     if len(copies) > 9:
@@ -71,6 +71,6 @@ def test_who_sends_in_the_same_turn_counts_as_interference() -> None:
         asked.add(others)
         return 1.0
 
-    found = loss(table, within_range(places, range_m=250), per_frame=12, hop_turns=1, chance=chance)
+    found = loss(table, within_range(places, range_m=250), per_superframe=12, hop_turns=1, chance=chance)
     assert found.worst == 0
     assert any(others for others in asked)

@@ -30,7 +30,7 @@ def test_no_timetable_exceeds_the_bound(at, packets) -> None:
         return
     turns = Turns(0, S, 0, 1_000_000, 1000)
     roots = tuple(node for node in places for _ in range(packets))
-    table = timetable(tuple(sorted(places.items())), roots, Geometry(250, 250, turns.per_frame, 1))
+    table = timetable(tuple(sorted(places.items())), roots, Geometry(250, 250, turns.per_superframe, 1))
     assert table is not None
     most = goodput_bound(adjacency, places, send_ns=turns.turn_ns, receive_ns=turns.turn_ns)
     assert len(roots) / (table.used * turns.turn_ns) * S <= most.per_second * (1 + 1e-9)

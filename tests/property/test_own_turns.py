@@ -11,7 +11,7 @@ from fanet_mw.routing.clustered.claimed.own_turns import OwnTurns, Share, draws
 from fanet_mw.routing.clustered.tdma.turns import Turns
 from fanet_mw.units import MS, NodeId
 
-TURNS = Turns(origin_ns=0, period_ns=500 * MS, contention_ns=40 * MS, turn_ns=2 * MS, per_frame=230)
+TURNS = Turns(origin_ns=0, period_ns=500 * MS, contention_ns=40 * MS, turn_ns=2 * MS, per_superframe=230)
 LENGTH = 32
 
 
@@ -45,14 +45,14 @@ def test_no_two_within_two_hops_have_a_turn_in_common(adjacency, seed) -> None:
     rivals = two_hop(adjacency)
     assert not any(turns[a] & turns[b] for a in rivals for b in rivals[a])
     for node, share in dsatur(adjacency).items():
-        claimed = {TURNS.start_ns(t, frame_start_ns=0) for t in range(share, TURNS.per_frame, LENGTH)}
+        claimed = {TURNS.start_ns(t, superframe_start_ns=0) for t in range(share, TURNS.per_superframe, LENGTH)}
         assert claimed <= turns[node]
 
 
 def test_where_everyone_hears_everyone_no_turn_is_left_and_who_has_more_lots_wins_more() -> None:
     mesh = {NodeId(n): tuple(NodeId(m) for m in range(1, 5) if m != n) for n in range(1, 5)}
     turns = {n: turns_of(own) for n, own in own_turns(mesh, {1: 0, 2: 1, 3: 1, 4: 3}).items()}
-    assert sum(map(len, turns.values())) == 2 * TURNS.per_frame
+    assert sum(map(len, turns.values())) == 2 * TURNS.per_superframe
     assert len(turns[NodeId(1)]) == 2 * len(range(0, 230, LENGTH)), "no lots, no more than its claim"
     assert len(turns[NodeId(4)]) > 1.5 * len(turns[NodeId(3)])
 

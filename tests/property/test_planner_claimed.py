@@ -85,7 +85,7 @@ def test_nodes_that_find_no_slot_or_no_turn_in_it_are_the_one_problem(make_scena
     (problem,) = found.problems
     assert "have no turn" in problem
     assert found.claims.lone_ns is None
-    assert f"a period has {found.claims.turns.per_frame} turns" in problem
+    assert f"a period has {found.claims.turns.per_superframe} turns" in problem
 
 
 def test_small_packets_together_are_the_cheapest_change_of_a_claimed_swarm(make_scenario) -> None:

@@ -32,9 +32,9 @@ class Case(NamedTuple):
 
 @st.composite
 def followings(draw: st.DrawFn, valid_ns: int) -> TurnsInForce:
-    per_frame = draw(st.integers(6, 40))
-    turns = Turns(valid_ns, (40 + 2 * per_frame + draw(st.integers(0, 9))) * MS, 40 * MS, 2 * MS, per_frame)
-    offsets = draw(st.sets(st.integers(0, per_frame - 1), min_size=1, max_size=3))
+    per_superframe = draw(st.integers(6, 40))
+    turns = Turns(valid_ns, (40 + 2 * per_superframe + draw(st.integers(0, 9))) * MS, 40 * MS, 2 * MS, per_superframe)
+    offsets = draw(st.sets(st.integers(0, per_superframe - 1), min_size=1, max_size=3))
     together = draw(st.integers(1, 3))
     return TurnsInForce(
         valid_ns, turns, tuple(sorted(offsets)), together * BULK_BYTES + sum(ROOMS.values()), draw(st.integers(1, 30))

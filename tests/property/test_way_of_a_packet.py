@@ -106,7 +106,7 @@ def scheduled() -> dict[str, Way]:
         "traffic": {"interval_s": 1},
     }
     node, us, root = node_of(2, config.build(tree)), NodeId(2), NodeId(3)
-    turns = Turns(origin_ns=0, period_ns=100 * MS, contention_ns=40 * MS, turn_ns=2 * MS, per_frame=29)
+    turns = Turns(origin_ns=0, period_ns=100 * MS, contention_ns=40 * MS, turn_ns=2 * MS, per_superframe=29)
     floods = (Turn(5, root, root, 0), Turn(8, us, root, 0), Turn(12, us, us, 0), Turn(14, root, us, 0))
     table = Timetable(floods, {root: 5, us: 3}, {root: (), us: ()}, len(floods))
     protocol = node._protocol
@@ -118,7 +118,7 @@ def scheduled() -> dict[str, Way]:
     )
     over = way(lambda: send(node, 0))
     out = way(lambda: node.wake(64 * MS - 2 * MS))
-    heard = way(lambda: hear(node, turns.start_ns(5, frame_start_ns=1000 * MS) + MS, origin=3))
+    heard = way(lambda: hear(node, turns.start_ns(5, superframe_start_ns=1000 * MS) + MS, origin=3))
     return {"handed over": over, "let out": out, "heard": heard}
 
 

@@ -150,7 +150,7 @@ class ClaimedAccess:
         scenario = self._port.scenario
         if not claimed or not clocks_fit(scenario, clock_error_ns=self._port.clock_error_ns):
             return None
-        starts = tuple(turns.start_ns(turn, frame_start_ns=0) for turn in claimed)
+        starts = tuple(turns.start_ns(turn, superframe_start_ns=0) for turn in claimed)
         ahead_ns = self._lead_ns + scenario.radio.handover_ns
         return TurnServer(turns.turn_ns, turns.period_ns, starts, ahead_ns).completion_ns(2)
 

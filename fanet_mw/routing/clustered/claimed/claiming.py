@@ -196,7 +196,7 @@ def turn_bytes(scenario: Scenario) -> int:
 
 def longest_superframe(turns: Turns) -> int:
     """The number of slots of the longest superframe: a power of two that fits a period."""
-    return 1 << (min(_LONGEST, max(1, turns.per_frame)).bit_length() - 1)
+    return 1 << (min(_LONGEST, max(1, turns.per_superframe)).bit_length() - 1)
 
 
 def geometry(scenario: Scenario, frame_bytes: int) -> Turns:

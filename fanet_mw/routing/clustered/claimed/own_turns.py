@@ -75,28 +75,28 @@ class OwnTurns:
 
     def next_start_ns(self, *, not_before_ns: int) -> int | None:
         """The start of this node's first turn at or after an instant; None without a claim."""
-        if self.share is None or self.share.slot >= self.turns.per_frame:
+        if self.share is None or self.share.slot >= self.turns.per_superframe:
             return None
         turns = self.turns
-        frame_ns = turns.frame_start_ns(not_before_ns)
-        behind_ns = not_before_ns - frame_ns - turns.contention_ns
+        superframe_ns = turns.superframe_start_ns(not_before_ns)
+        behind_ns = not_before_ns - superframe_ns - turns.contention_ns
         turn = max(0, -(-behind_ns // turns.turn_ns))
         while True:
-            if turn >= turns.per_frame:
-                frame_ns, turn = frame_ns + turns.period_ns, 0
-            start_ns = turns.start_ns(turn, frame_start_ns=frame_ns)
-            if start_ns != self._reserved_ns and self._is_ours(turn, frame_ns):
+            if turn >= turns.per_superframe:
+                superframe_ns, turn = superframe_ns + turns.period_ns, 0
+            start_ns = turns.start_ns(turn, superframe_start_ns=superframe_ns)
+            if start_ns != self._reserved_ns and self._is_ours(turn, superframe_ns):
                 return start_ns
             turn += 1
 
-    def _is_ours(self, turn: int, frame_ns: int) -> bool:
+    def _is_ours(self, turn: int, superframe_ns: int) -> bool:
         assert self.share is not None, "whoever asks holds a claim"
         if self.share.has(turn):
             return True
         if self.draws is None or not self.draws.lots:
             return False
-        period = (frame_ns - self.turns.origin_ns) // self.turns.period_ns
-        return self.draws.wins(turn, period * self.turns.per_frame + turn)
+        period = (superframe_ns - self.turns.origin_ns) // self.turns.period_ns
+        return self.draws.wins(turn, period * self.turns.per_superframe + turn)
 
     def reserve(self, *, not_before_ns: int) -> int | None:
         """Reserve the node's next turn, which `next_start_ns` then skips; only one turn is reserved at a time."""
@@ -108,4 +108,4 @@ class OwnTurns:
 
     def claimed(self) -> tuple[int, ...]:
         """The turns of each period that the claim gives to this node."""
-        return () if self.share is None else tuple(range(self.share.slot, self.turns.per_frame, self.share.length))
+        return () if self.share is None else tuple(range(self.share.slot, self.turns.per_superframe, self.share.length))

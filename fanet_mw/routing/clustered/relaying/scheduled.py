@@ -64,8 +64,10 @@ class ScheduledRelaying:
         own = plan.mine.get((root, instance), ())
         if not own or packet.header.hop_limit <= 1:
             return ()
-        frame_ns = plan.turns.frame_start_ns(heard_ns) - offset // plan.turns.per_frame * plan.turns.period_ns
-        starts_ns = [plan.turns.start_ns(turn, frame_start_ns=frame_ns) for turn in own]
+        superframe_ns = (
+            plan.turns.superframe_start_ns(heard_ns) - offset // plan.turns.per_superframe * plan.turns.period_ns
+        )
+        starts_ns = [plan.turns.start_ns(turn, superframe_start_ns=superframe_ns) for turn in own]
         ahead_ns = [start_ns for start_ns in starts_ns if start_ns >= now_ns]
         if not ahead_ns and (plan.odds is None or own[-1] > offset):
             # A reception that came late has used up some of the lead, or all of it. Over lossy links the first copy

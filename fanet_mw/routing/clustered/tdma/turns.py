@@ -1,12 +1,16 @@
-"""The geometry of a superframe with collision-free floods: a contention window, then equal turns. Pure functions of
-time.
+"""The geometry of a superframe with collision-free floods: a contention window, then turns of equal length. Pure
+functions of time.
 
     origin                                            origin + period
     | contention window | turn 0 | turn 1 | ... | rest | contention window | ...
 
-A turn has room for one frame, the DIFS before it, and the longest backoff that an earlier frame may have left behind,
-so any 802.11 MAC can start the frame when its turn begins. Everything else (hellos, joins, unicasts to a head, repairs)
-contends in the window.
+A turn has room for one frame of the largest size, the DIFS before it, the longest backoff that an earlier frame may
+have left behind, and a slack, so a frame handed to any 802.11 MAC at the start of the turn ends within the turn. Frames
+without a turn contend in the window: unicasts to a head, most joins, and hellos and repairs, unless the timetable is
+made for lossy links and has turns for these (*calls*).
+
+The *root* of a flood is the node at which it begins, in a turn of its own. The *span* of a root's floods is the number
+of turns from that turn until all nodes have the packet, the first and the last one included.
 """
 
 from collections.abc import Callable, Sequence
@@ -20,7 +24,8 @@ from fanet_mw.units import MS, US
 _FLIGHT_NS: Final = 20 * US
 """The propagation delay over 6 km; this part of the slack is not available for clock errors."""
 _TAIL_NS: Final = 5 * MS
-"""In this last part of the contention window no frame may start, because it must be over when the turns begin."""
+"""In this last part of the contention window no frame becomes due, so that contending frames are over when the turns
+begin."""
 
 
 class Turns(NamedTuple):
@@ -30,58 +35,65 @@ class Turns(NamedTuple):
     period_ns: int
     contention_ns: int
     turn_ns: int
-    per_frame: int
+    per_superframe: int
+    """The number of turns in a superframe."""
 
-    def frame_start_ns(self, t_ns: int) -> int:
+    def superframe_start_ns(self, t_ns: int) -> int:
         """The beginning of the superframe in which an instant lies."""
         return t_ns - (t_ns - self.origin_ns) % self.period_ns
 
-    def start_ns(self, offset: int, *, frame_start_ns: int) -> int:
+    def start_ns(self, offset: int, *, superframe_start_ns: int) -> int:
         """The start of turn number `offset`, counted from the beginning of a superframe; it may lie in a later
         superframe.
         """
-        later, turn = divmod(offset, self.per_frame)
-        return frame_start_ns + later * self.period_ns + self.contention_ns + turn * self.turn_ns
+        later, turn = divmod(offset, self.per_superframe)
+        return superframe_start_ns + later * self.period_ns + self.contention_ns + turn * self.turn_ns
 
     def turn_at(self, t_ns: int) -> int | None:
         """The turn in which an instant lies; None in the contention window and in the rest."""
         phase_ns = (t_ns - self.origin_ns) % self.period_ns - self.contention_ns
         turn = phase_ns // self.turn_ns
-        return turn if phase_ns >= 0 and turn < self.per_frame else None
+        return turn if phase_ns >= 0 and turn < self.per_superframe else None
 
     def next_start_ns(self, offsets: Sequence[int], *, not_before_ns: int) -> int:
         """The first start, at or after an instant, of a turn with one of these offsets (ascending, in every
         superframe).
         """
-        frame_ns = self.frame_start_ns(not_before_ns)
-        for frame_start_ns in (frame_ns, frame_ns + self.period_ns):
+        first_ns = self.superframe_start_ns(not_before_ns)
+        for superframe_start_ns in (first_ns, first_ns + self.period_ns):
             for offset in offsets:
-                start_ns = self.start_ns(offset, frame_start_ns=frame_start_ns)
+                start_ns = self.start_ns(offset, superframe_start_ns=superframe_start_ns)
                 if start_ns >= not_before_ns:
                     return start_ns
         raise AssertionError("offsets are turns of one superframe, so one of the next lies ahead")
 
     def contending_ns(self, start_ns: int, random: Callable[[], float]) -> int:
-        """The instant from which a frame that is due at `start_ns` may contend: at once if a window is open, otherwise
-        at a random instant of the next one.
+        """The instant from which a frame that is due at `start_ns` may contend: `start_ns` itself if that lies in a
+        contention window, but not in its last part, otherwise a random instant of the next window.
         """
         open_ns = max(1, self.contention_ns - _TAIL_NS)
-        frame_ns = self.frame_start_ns(start_ns)
-        if start_ns - frame_ns < open_ns:
+        superframe_ns = self.superframe_start_ns(start_ns)
+        if start_ns - superframe_ns < open_ns:
             return start_ns
-        return frame_ns + self.period_ns + int(random() * open_ns)
+        return superframe_ns + self.period_ns + int(random() * open_ns)
 
     def worst_ns(self, roots: Sequence[int], *, span: int, interval_ns: int, together: int = 1) -> int | None:
-        """A sound bound of the delay of packets that come at least `interval_ns` apart, from their generation to all
-        nodes.
+        """A bound of the delay of one node's packets, from their generation until all nodes have them.
 
-        Each root turn lets out as many waiting packets as there are, up to `together`. The q-th packet of a busy period
-        that begins just after a root turn is let out in the ceil(q / together)-th turn after it, because a turn that
-        lets out fewer ends the period; `flood_ns` later all nodes have it. The bound is the maximum over all q of the
-        busy period, and over all turns after which it may begin (Davis et al., 2007); of packets that are let out
-        together, the first has waited longest. None if more packets come than are let out. The bound holds as long as
-        the swarm stays as it was when the timetable was made, no frame is lost, and nothing of higher priority uses the
-        same root turns.
+        `roots` are the turns in which the node transmits its own packets, up to `together` of them in each; its packets
+        are generated at least `interval_ns` apart. None if more packets are generated than the turns can carry.
+
+        A busy period is a time in which packets wait. It is longest if it begins just after a turn, and lasts until a
+        turn carries fewer than `together` packets. Up to then the n-th turn carries the packets from number
+        (n - 1) x `together` + 1 on. The first of these has waited longest: it was generated at least
+        (n - 1) x `together` intervals after the beginning of the period, and all nodes have it `done_ns` after that
+        beginning. The bound is the maximum of the difference over all turns after which the busy period may begin, and
+        over all n of one superframe: after a whole superframe the difference repeats or has become smaller. This is
+        the method of Davis, Burns, Bril, Lukkien: Controller Area Network (CAN) schedulability analysis: Refuted,
+        revisited and revised, Real-Time Systems 35, 2007.
+
+        The bound holds while the swarm stays as it was when the timetable was made, no frame is lost, and nothing of
+        higher priority takes the room of these packets in the turns.
         """
         if together * len(roots) * interval_ns < self.period_ns:
             return None
@@ -89,12 +101,10 @@ class Turns(NamedTuple):
         return max(done - later * together * interval_ns for later, done in enumerate(done_ns))
 
     def done_ns(self, roots: Sequence[int], *, span: int) -> list[int]:
-        """The longest time from just after one of these turns until all nodes have what the q-th turn after it lets
-        out.
-
-        It is given for each q from 1 to the number of turns in a superframe.
+        """For n = 1 up to the number of `roots`: the longest time from just after any of these turns until all nodes
+        have the packets that the n-th of these turns after it carries.
         """
-        starts = [self.start_ns(offset, frame_start_ns=0) for offset in roots]
+        starts = [self.start_ns(offset, superframe_start_ns=0) for offset in roots]
         floods = [self.flood_ns(offset, span=span) for offset in roots]
         horizon = [later * self.period_ns + start for later in range(3) for start in starts]
         count = len(starts)
@@ -105,35 +115,40 @@ class Turns(NamedTuple):
 
     def flood_ns(self, offset: int, *, span: int) -> int:
         """The duration of a flood of `span` turns from turn `offset` on, including contention windows in between."""
-        return (
-            self.start_ns(offset + span - 1, frame_start_ns=0) + self.turn_ns - self.start_ns(offset, frame_start_ns=0)
-        )
+        last_ns = self.start_ns(offset + span - 1, superframe_start_ns=0)
+        return last_ns + self.turn_ns - self.start_ns(offset, superframe_start_ns=0)
 
 
 def turn_slack_ns(scenario: Scenario) -> int:
-    """The time by which a turn is longer than its largest frame; it also bounds how far two clocks may be apart."""
+    """The part of a turn that is left after DIFS, the longest backoff and the largest frame; it also limits how far two
+    clocks may be apart.
+    """
     return round(scenario.clusters.turn_slack_us * US)
 
 
 def turn_ns(scenario: Scenario, *, payload_bytes: int) -> int:
-    """The length of a turn for frames of this size. The slack covers propagation, detection and clock errors."""
+    """The length of a turn whose largest frame has this size. The slack is for propagation, detection and errors of
+    clocks.
+    """
     radio = scenario.radio
     timing = Timing.of(radio)
-    frame_ns = airtime_ns(payload_bytes + OVERHEAD_BYTES, radio, rate_mbps=radio.rate_mbps)
-    return frame_ns + timing.difs_ns + radio.cw_min * timing.slot_ns + turn_slack_ns(scenario)
+    longest_ns = airtime_ns(payload_bytes + OVERHEAD_BYTES, radio, rate_mbps=radio.rate_mbps)
+    return longest_ns + timing.difs_ns + radio.cw_min * timing.slot_ns + turn_slack_ns(scenario)
 
 
 def receipt_ns(scenario: Scenario) -> int:
-    """The longest time from the end of a frame until the application has it: the handover of the reception, and one
-    lead, because a process may be woken up to one lead late.
+    """The longest time from the end of a frame until the application has it: the handover of the reception to the
+    process, and one lead, because the process may wake up to one lead late.
     """
     return scenario.radio.handover_ns + scenario.radio.lead_ns
 
 
 def clocks_fit(scenario: Scenario, *, clock_error_ns: int) -> bool:
-    """True if turns stay apart when each clock is within this error of swarm time.
+    """True if turns of different nodes do not overlap while each clock is within this error of swarm time.
 
-    If clocks are not exact, an error of 0 means that the node has not heard of any error yet, so the answer is False.
+    If the scenario models clocks, an error of 0 means that the node does not know any error yet, so the answer is
+    False. If nodes get the time by beacons, it is also False for the largest error that a beacon can state, because the
+    true one may be larger.
     """
     if not clock_error_ns:
         return not scenario.clock.modelled
@@ -143,5 +158,5 @@ def clocks_fit(scenario: Scenario, *, clock_error_ns: int) -> bool:
 
 
 def least_slack_ns(clock_error_ns: int) -> int:
-    """The slack that keeps turns apart when each clock is within this error of swarm time."""
+    """The slack that keeps turns of different nodes apart if each clock is within this error of swarm time."""
     return 2 * clock_error_ns + _FLIGHT_NS

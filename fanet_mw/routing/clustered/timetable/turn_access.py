@@ -224,8 +224,8 @@ class TurnAccess:
         turn = None if plan is None else plan.turns.turn_at(start_ns)
         if plan is None or turn is None:
             return []
-        frame_ns = plan.turns.frame_start_ns(start_ns)
-        return [plan.turns.start_ns(later, frame_start_ns=frame_ns) for later in plan.again.get(turn, ())]
+        superframe_ns = plan.turns.superframe_start_ns(start_ns)
+        return [plan.turns.start_ns(later, superframe_start_ns=superframe_ns) for later in plan.again.get(turn, ())]
 
     # --- for people -----------------------------------------------------------------------------------------------
 

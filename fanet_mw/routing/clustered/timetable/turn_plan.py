@@ -121,7 +121,7 @@ class TurnPlan(NamedTuple):
             table=table,
             mine={flood: tuple(offsets) for flood, offsets in sends.items() if flood[0] != node},
             heard={
-                (turn.offset % turns.per_frame, turn.node): (turn.offset, turn.root, turn.instance)
+                (turn.offset % turns.per_superframe, turn.node): (turn.offset, turn.root, turn.instance)
                 for turn in table.turns
             },
             roots=tuple(sorted(offsets[0] for offsets in own)),
@@ -179,7 +179,7 @@ def links(scenario: Scenario, turns: Turns) -> Geometry:
     return Geometry(
         link_m=clusters.link_m or radio.range_m,
         interference_m=clusters.interference_m or radio.range_m * (1 if radio.channel == "range" else 2),
-        turns=turns.per_frame,
+        turns=turns.per_superframe,
         hop_turns=1 + -(-wait_ns // turns.turn_ns),
     )
 
@@ -248,7 +248,7 @@ def fit_measured(
     each = {node: max(1, math.ceil(per_node[node] / _LOAD - 1e-3)) for node in senders}
     control = (leader,) * (schedule_parts(scenario) + link_parts)
     roots = (*control, *(node for node in senders for _ in range(each[node])))
-    if len(roots) > turns.per_frame:
+    if len(roots) > turns.per_superframe:
         return None
     calls = max(1, round(_CALLS_PER_S * whole_ns / S))
     geometry = links(scenario, turns)
@@ -285,7 +285,7 @@ def least_interval_ns(scenario: Scenario, places: Places, head_of: Mapping[NodeI
             roots = (*control, *(node for node in senders for _ in range(packets // blocks)))
             return _table(places, roots, geometry, heads, blocks=blocks, hard=hard) is not None
 
-        most = min(turns.per_frame // max(1, len(senders)), math.ceil(enough / together))
+        most = min(turns.per_superframe // max(1, len(senders)), math.ceil(enough / together))
         low, high = best // together, most
         while low < high:
             middle = (low + high + 1) // 2
@@ -377,7 +377,7 @@ def _wishes_by_load(
 
     def wishes(each: Mapping[NodeId, int], together: int, *, hard: bool, enough: bool = True) -> Iterator[_Wish]:
         turns = superframe(scenario, period_ns=period_ns, together=together)
-        if len(control) + sum(each.values()) <= turns.per_frame:
+        if len(control) + sum(each.values()) <= turns.per_superframe:
             roots = (*control, *(node for node in senders for _ in range(each[node])))
             yield _Wish(roots, together, hard, enough=enough)
 

@@ -25,7 +25,7 @@ from fanet_mw.units import BROADCAST, MS, Enu, NodeId
 from fanet_mw.wire import FLAG_FLOOD, PRIORITY_BULK, Header, Kind, filler
 
 US, ROOT, BEFORE, AFTER = NodeId(2), NodeId(3), NodeId(4), NodeId(5)
-TURNS = Turns(origin_ns=0, period_ns=100 * MS, contention_ns=40 * MS, turn_ns=2 * MS, per_frame=29)
+TURNS = Turns(origin_ns=0, period_ns=100 * MS, contention_ns=40 * MS, turn_ns=2 * MS, per_superframe=29)
 FLOODS = (
     Turn(5, ROOT, ROOT, 0),
     Turn(8, US, ROOT, 0),
@@ -64,7 +64,7 @@ def hear_in_turn(
     node: Node, sender: NodeId, turn: int, *, superframe: int = 10, told_ns: int = 0, hop_limit: int = 9
 ) -> None:
     """A packet of the root, of one millisecond, in a turn; the application has it `told_ns` after its end."""
-    end_ns = TURNS.start_ns(turn, frame_start_ns=superframe * 100 * MS) + MS
+    end_ns = TURNS.start_ns(turn, superframe_start_ns=superframe * 100 * MS) + MS
     seq = 1000 * superframe + turn
     hops = 0 if sender == ROOT else 1
     header = Header(end_ns // 1000 - 5000, seq, ROOT, BROADCAST, sender, Kind.DATA, hop_limit, hops, 3, FLAG_FLOOD)
@@ -96,7 +96,7 @@ def test_a_flood_of_the_superframe_before_is_relayed_in_this_one(node: Node) -> 
 
 def test_what_comes_together_goes_on_together_in_each_of_our_turns_of_it(node: Node) -> None:
     access_of(node)._plans.in_order = [planned((Turn(5, ROOT, ROOT, 0), Turn(8, US, ROOT, 0), Turn(10, US, ROOT, 0)))]
-    end_ns = TURNS.start_ns(5, frame_start_ns=1000 * MS) + MS
+    end_ns = TURNS.start_ns(5, superframe_start_ns=1000 * MS) + MS
     frames = [
         Header(end_ns // 1000, seq, ROOT, BROADCAST, ROOT, Kind.DATA, 9, 0, 3, FLAG_FLOOD).encode() + filler(40)
         for seq in (1, 2)
@@ -184,7 +184,7 @@ def test_by_a_clock_that_is_behind_a_frame_ends_before_its_turn_and_is_relayed_w
 ) -> None:
     """The frame of the fifth turn ends in the fourth, empty or with another flood of its sender."""
     access_of(node)._plans.in_order = [planned((*turn_before, *FLOODS))]
-    end_ns = TURNS.start_ns(5, frame_start_ns=1000 * MS) - early_us * 1000
+    end_ns = TURNS.start_ns(5, superframe_start_ns=1000 * MS) - early_us * 1000
     header = Header(end_ns // 1000 - 5000, 1, ROOT, BROADCAST, ROOT, Kind.DATA, 9, 0, 3, FLAG_FLOOD)
     node.hear(Reception(header.encode() + filler(40), ROOT, end_ns, -60.0), end_ns)
     assert relays(node) == [1056.0] * is_relayed
@@ -361,7 +361,7 @@ def test_what_is_repaired_after_it_was_lost_has_no_bound(make_scenario: MakeScen
 
 def test_a_flood_of_whoever_follows_another_timetable_is_not_relayed(node: Node) -> None:
     """In this turn the node expects a packet of the root, and hears one of another node that has turns too."""
-    end_ns = TURNS.start_ns(5, frame_start_ns=1000 * MS) + MS
+    end_ns = TURNS.start_ns(5, superframe_start_ns=1000 * MS) + MS
     for seq, origin in ((1, US), (2, ROOT)):
         header = Header(end_ns // 1000 - 5000, seq, origin, BROADCAST, ROOT, Kind.DATA, 9, 0, 3, FLAG_FLOOD)
         node.hear(Reception(header.encode() + filler(40), ROOT, end_ns, -60.0), end_ns)

@@ -18,7 +18,7 @@ PACKET = Packet(Header(0, 7, 3, 0xFFFF, 3, 0, 32, 0, 3, 0), b"")
 
 @pytest.fixture
 def release() -> ClaimedRelease:
-    own = OwnTurns(Turns(origin_ns=0, period_ns=500 * MS, contention_ns=40 * MS, turn_ns=2 * MS, per_frame=16))
+    own = OwnTurns(Turns(origin_ns=0, period_ns=500 * MS, contention_ns=40 * MS, turn_ns=2 * MS, per_superframe=16))
     own.share = Share(slot=3, length=8)
     made = ClaimedRelease(TxQueue(capacity=4), own, lead_ns=LEAD_NS, frame_bytes=0)
     made.push(PACKET, now_ns=0)

@@ -15,10 +15,10 @@ EXPECTED_NS = 8 * S
 
 @st.composite
 def owns(draw) -> OwnBound:
-    per_frame = draw(st.integers(4, 60))
-    turns = Turns(0, (40 + 2 * per_frame) * MS, 40 * MS, 2 * MS, per_frame)
-    roots = draw(st.sets(st.integers(0, per_frame - 1), min_size=1, max_size=6))
-    return OwnBound(turns, tuple(sorted(roots)), draw(st.integers(1, per_frame)))
+    per_superframe = draw(st.integers(4, 60))
+    turns = Turns(0, (40 + 2 * per_superframe) * MS, 40 * MS, 2 * MS, per_superframe)
+    roots = draw(st.sets(st.integers(0, per_superframe - 1), min_size=1, max_size=6))
+    return OwnBound(turns, tuple(sorted(roots)), draw(st.integers(1, per_superframe)))
 
 
 @given(owns(), st.integers(1 * MS, 600 * MS))

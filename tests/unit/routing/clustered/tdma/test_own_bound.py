@@ -6,7 +6,7 @@ from fanet_mw.routing.clustered.tdma.own_bound import BURST, OwnBound
 from fanet_mw.routing.clustered.tdma.turns import Turns
 from fanet_mw.units import MS
 
-TURNS = Turns(origin_ns=0, period_ns=100 * MS, contention_ns=40 * MS, turn_ns=2 * MS, per_frame=29)
+TURNS = Turns(origin_ns=0, period_ns=100 * MS, contention_ns=40 * MS, turn_ns=2 * MS, per_superframe=29)
 AROUND_NS = 7 * MS
 
 

@@ -11,7 +11,7 @@ from fanet_mw.wire import PRIORITY_BULK, PRIORITY_CONTROL, PRIORITY_REPORT, PRIO
 
 ME = NodeId(9)
 LEAD_NS = 5 * MS
-TURNS = Turns(origin_ns=0, period_ns=100 * MS, contention_ns=40 * MS, turn_ns=2 * MS, per_frame=29)
+TURNS = Turns(origin_ns=0, period_ns=100 * MS, contention_ns=40 * MS, turn_ns=2 * MS, per_superframe=29)
 
 
 def packet(seq: int, size: int = 100, *, priority: int = PRIORITY_BULK, kind: Kind = Kind.DATA) -> Packet:

@@ -7,7 +7,7 @@ from hypothesis import strategies as st
 from fanet_mw.routing.clustered.tdma.turns import Turns
 from fanet_mw.units import MS
 
-TURNS = Turns(origin_ns=7 * MS, period_ns=100 * MS, contention_ns=40 * MS, turn_ns=2 * MS, per_frame=29)
+TURNS = Turns(origin_ns=7 * MS, period_ns=100 * MS, contention_ns=40 * MS, turn_ns=2 * MS, per_superframe=29)
 
 
 @pytest.mark.parametrize(
@@ -19,9 +19,9 @@ def test_an_instant_belongs_to_a_turn_or_to_none(at_ms: float, turn: int | None)
 
 
 def test_offsets_reach_into_later_superframes() -> None:
-    assert TURNS.start_ns(0, frame_start_ns=7 * MS) == 47 * MS
-    assert TURNS.start_ns(28, frame_start_ns=7 * MS) == 103 * MS
-    assert TURNS.start_ns(29, frame_start_ns=7 * MS) == 147 * MS
+    assert TURNS.start_ns(0, superframe_start_ns=7 * MS) == 47 * MS
+    assert TURNS.start_ns(28, superframe_start_ns=7 * MS) == 103 * MS
+    assert TURNS.start_ns(29, superframe_start_ns=7 * MS) == 147 * MS
 
 
 def test_the_next_of_some_turns_is_found_over_the_end_of_the_superframe() -> None:

@@ -22,7 +22,7 @@ from fanet_mw.bounds import (
 from fanet_mw.planner.flood import FloodCost
 from fanet_mw.planner.head_slot import ClassLoad, ClusterPlan
 from fanet_mw.planner.variant import vary
-from fanet_mw.routing.clustered.tdma.own_bound import OwnBound
+from fanet_mw.routing.clustered.tdma.own_bound import RootTurns
 from fanet_mw.routing.clustered.tdma.turns import Turns, turn_slack_ns
 from fanet_mw.routing.clustered.timetable.list_scheduling import Effort
 from fanet_mw.routing.clustered.timetable.timetable import Timetable, timetable
@@ -109,7 +109,7 @@ def judge(
     table, turns = found.table, found.turns
     offsets = tuple(table.offsets_of(NodeId(candidate.head)))
     span = table.spans.get(candidate.head, 1)
-    root = _Root(OwnBound(turns, offsets, span, found.together, lead_ns + receipt_ns), lead_ns, jitter_ns, control)
+    root = _Root(RootTurns(turns, offsets, span, found.together, lead_ns + receipt_ns), lead_ns, jitter_ns, control)
     relays = sum(1 for turn in table.turns if turn.root == candidate.head and turn.instance == 0)
     packets = sum(s.sources * turns.period_ns / s.interval_ns for s in candidate.shares)
     packets += control if packets else 0
@@ -130,7 +130,7 @@ def judge(
 class _Root(NamedTuple):
     """One root of a timetable, and the arrivals at its queue."""
 
-    own: OwnBound
+    own: RootTurns
     lead_ns: int
     jitter_ns: int
     """The time by which a packet may reach the root late."""
@@ -146,7 +146,7 @@ class _Root(NamedTuple):
         """The bound of a class at this root.
 
         A class has room of its own in each turn, so a packet waits only for packets of its class; bulk also waits for
-        announcements. If the class has only one source, the bound that this source states in flight (`OwnBound`) is
+        announcements. If the class has only one source, the bound that this source states in flight (`RootTurns`) is
         tighter.
         """
         if not share.sources:

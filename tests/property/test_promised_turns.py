@@ -10,7 +10,7 @@ from hypothesis import strategies as st
 
 from fanet_mw.node.packet import Packet
 from fanet_mw.node.queue import TxQueue
-from fanet_mw.routing.clustered.tdma.own_bound import BURST, OwnBound
+from fanet_mw.routing.clustered.tdma.own_bound import BURST, RootTurns
 from fanet_mw.routing.clustered.tdma.root_release import RootRelease, TurnsInForce
 from fanet_mw.routing.clustered.tdma.turns import Turns
 from fanet_mw.units import MS, NodeId
@@ -122,7 +122,7 @@ def test_who_finds_fewer_than_a_burst_of_its_class_waiting_keeps_the_bound_of_a_
     reports = [(n * gap_ns // BURST * BURST, PRIORITY_REPORT) for n in range(12)]
     bulk = [(n * 3 * MS, PRIORITY_BULK) for n in range(50)]
     run = drive(single._replace(arrivals=sorted(reports + bulk)))
-    bound_ns = OwnBound(plan.turns, plan.offsets, plan.span, 1, case.lead_ns).burst_ns(per_turn=1)
+    bound_ns = RootTurns(plan.turns, plan.offsets, plan.span, 1, case.lead_ns).burst_ns(per_turn=1)
     classes = [priority for _, priority in sorted(reports + bulk)]
     delays = [run.through_ns[s] - run.born_ns[s] for s, priority in enumerate(classes) if priority == PRIORITY_REPORT]
     assert max(delays) <= bound_ns

@@ -14,7 +14,7 @@ are always accepted.
 
 from typing import Final
 
-from fanet_mw.routing.clustered.tdma.own_bound import OwnBound
+from fanet_mw.routing.clustered.tdma.own_bound import RootTurns
 from fanet_mw.trace import DeadlineLost, DeadlineMet
 from fanet_mw.units import US, NodeId
 
@@ -59,7 +59,7 @@ class Admission:
         """The least interval between accepted packets."""
         return max(self._interval_ns, self._least_ns)
 
-    def follow(self, own: OwnBound | None, *, now_ns: int) -> DeadlineMet | DeadlineLost | None:
+    def follow(self, own: RootTurns | None, *, now_ns: int) -> DeadlineMet | DeadlineLost | None:
         """Take over the bound of a new timetable; None if it gives this node no bound. Returns a record if the answer
         has changed.
         """
@@ -86,12 +86,12 @@ class Admission:
         return True
 
 
-def carried_interval_ns(own: OwnBound) -> int:
+def carried_interval_ns(own: RootTurns) -> int:
     """The shortest interval between packets that the turns can carry."""
     return -(-own.turns.period_ns // (own.together * len(own.roots)))
 
 
-def least_interval_ns(own: OwnBound, *, deadline_ns: int) -> int | None:
+def least_interval_ns(own: RootTurns, *, deadline_ns: int) -> int | None:
     """The shortest interval at which all nodes have each packet within the deadline; None if there is none.
 
     In a busy period, the packets that the q-th turn lets out came at least (q - 1) `together` intervals after its start

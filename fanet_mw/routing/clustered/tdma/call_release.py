@@ -1,6 +1,8 @@
-"""The queue for a node's calls: turns that over lossy links serve hellos, and packets that neighbors have missed.
+"""The queue of frames for a node's calls.
 
-A call reaches only the node's neighbors; nobody relays it.
+A *call* is a turn in which a node sends one frame to its neighbors alone: a hello, or packets that neighbors have
+missed. No node relays the frame. Timetables for lossy links give calls to nodes (`redundant_scheduling.py`); other
+timetables have none.
 """
 
 from collections.abc import Sequence
@@ -14,6 +16,7 @@ class CallRelease(TurnRelease):
     """The queue of packets that neighbors have missed, and the node's next call."""
 
     _plans: Sequence[TurnsInForce] = ()
+    """The node's calls by each timetable that is in force or announced."""
 
     def follow(self, plans: Sequence[TurnsInForce], *, now_ns: int) -> None:
         """Take over the calls of new timetables, in the order in which they come into force."""
@@ -21,7 +24,9 @@ class CallRelease(TurnRelease):
         self._arm(now_ns)
 
     def claim(self, *, not_before_ns: int, now_ns: int) -> int | None:
-        """Reserve the next call for a frame that is not queued, such as a hello; None if there is none."""
+        """Reserve the next call for a frame that is not queued, such as a hello; returns its start, None if the node
+        has no call.
+        """
         turn = self._turn(max(not_before_ns, self._free_ns))
         if turn is None:
             return None
@@ -31,7 +36,7 @@ class CallRelease(TurnRelease):
 
     @property
     def pending(self) -> TxQueue:
-        """The packets that are cancelled when another node sends a copy."""
+        """The queued packets; each is removed when another node sends a copy of it (`on_copy`)."""
         return self._queue
 
     def on_copy(self, key: int, *, now_ns: int) -> None:

@@ -1,13 +1,22 @@
 """The delay bounds that a timetable gives to a node's own packets, by priority class, from application to application.
 
-    hand-over -- lead -- wait for a turn -- flood -- handover, receipt --> the other application
-                         | up to `done_ns` of the turn that lets the packet out |
+    the application sends | lead | wait for a turn of this node, flood | handover | lead | all applications have it
+                                 |----------- `Turns.done_ns` ---------|
+    `around_ns` is the sum of the other three parts: a lead, the handover, and a second lead
 
-Each class has room of its own in each turn (`root_release.py`), so no class waits for another, and no later packet
-overtakes an earlier one of its class. For a class that sends at intervals, the bound is the worst case over its busy
-period (`Turns.worst_ns`). For any other class, the bound holds for a packet that finds fewer than `BURST` packets of
-its class waiting; a token bucket of that depth, with the rate of the turns, would accept all of those. A packet that
-finds more waiting has no bound.
+The first lead is the time by which a frame is announced to the radio before its turn. The handover is the time in which
+a reception gets from the radio to its node's process (`radio.handover_ms`), and the second lead is the time by which
+that process may wake up too late.
+
+Each class has room of its own in each turn (`root_release.py`), so a class does not wait for another one. There are two
+exceptions. A packet that is larger than the room of its class waits as bulk does. A leader's announcements take the
+room of bulk, so a leader's bulk packets have no bound (`promises.py`). Within a class no later packet delays an earlier
+one.
+
+There are two kinds of bounds. Bulk that comes at regular intervals has the worst case over its busy period
+(`Turns.worst_ns`). For all other classes the bound holds for a packet that finds fewer than `BURST` packets of its
+class waiting. A source never exceeds that number if it conforms to a token bucket of depth `BURST` that is filled at
+the rate of the turns. A packet that finds more packets waiting has no bound.
 """
 
 from typing import Final, NamedTuple
@@ -20,16 +29,18 @@ BURST: Final = 3
 bound."""
 
 
-class OwnBound(NamedTuple):
-    """A node's share of a timetable: its turns, and the duration of its floods."""
+class RootTurns(NamedTuple):
+    """The turns of one node's own packets in a timetable: those in which the node is the root of a flood."""
 
     turns: Turns
     roots: tuple[int, ...]
+    """The offsets of these turns, ascending."""
     span: int
+    """The duration of each flood, in turns: from one of these turns until all nodes have the packet."""
     together: int = 1
     """The number of bulk packets that one turn transmits."""
     around_ns: int = 0
-    """The time before a turn and after a flood: the lead, the handover of the reception, and the receipt."""
+    """The time before a turn and after a flood: a lead, the handover of the reception, and a second lead."""
     load: int = AS_EXPECTED
     """The load for which the timetable was made, in packets in 100 s; by default what the scenario says."""
 

@@ -1,7 +1,8 @@
-"""Access by the slots of heads, as in the paper (3.3): members send packets to a head, which floods them in its own
-slot.
+"""Access by the slots of heads: members send packets to their cluster head, which floods them in its own slot.
 
-Everything else contends at any time: hellos, control packets, relays, and unicasts on the way to a head.
+This is the protocol of section 3.3 of the paper that fanet-mw follows ("Reliable Flying IoT Networks for UAV Disaster
+Rescue Operations"). All other frames contend for the channel at any time: hellos, control packets, relays, and unicasts
+on the way to a head.
 """
 
 from collections.abc import Mapping
@@ -35,7 +36,7 @@ class SlotAccess:
         self._floods = floods
         self._lifetime_us = round(port.scenario.routing.lifetime_s * 1_000_000)
         self._tenure: Tenure | None = None
-        """The slot of this node, or the one that it had when it last was head."""
+        """The slot of this node, or the one that it had when it last was head; None if it has never been head."""
 
     def start(self, now_ns: int) -> None:
         """The node has started, and nothing waits."""
@@ -54,7 +55,7 @@ class SlotAccess:
 
     def enqueue(self, packet: Packet, *, now_ns: int) -> None:
         """Queue a packet for the slot of this head."""
-        assert self._tenure is not None, "a node that queues is head, or was"
+        assert self._tenure is not None, "a node queues packets only once it has become head"
         evicted = self._release.push(packet, self._tenure, now_ns=now_ns)
         if evicted is not None:
             self._port.drop(DropReason.QUEUE_FULL, evicted, now_ns=now_ns)
@@ -78,7 +79,7 @@ class SlotAccess:
             self.enqueue(packet, now_ns=now_ns)
 
     def arm(self, now_ns: int) -> None:
-        """Plan the release of what waits here, in the slot that the schedule gives to this head."""
+        """Plan the release of the queued packets in the slot that the schedule gives to this head."""
         self.renew_slot()
         assert self._tenure is not None, "the slot was renewed just now"
         self._release.arm(self._tenure, now_ns=now_ns)
@@ -93,7 +94,7 @@ class SlotAccess:
         return self._uplink.drain()
 
     def drain(self) -> list[Packet]:
-        """Take out all packets that wait here, or for a route to a head, because they will go another way."""
+        """Take out all packets that wait for the slot, or for a route to a head, because they will go another way."""
         return [*self._release.drain(), *self.drain_uplink()]
 
     # --- time -----------------------------------------------------------------------------------------------------

@@ -18,7 +18,7 @@ class Slot(NamedTuple):
 
 
 class Superframe(NamedTuple):
-    """A repeating frame of equal slots."""
+    """A period that repeats, divided into slots of equal length; what remains after the last slot is its rest."""
 
     origin_ns: int
     period_ns: int
@@ -40,13 +40,13 @@ class Superframe(NamedTuple):
         """The present occurrence of a slot if `not_before_ns` lies in its usable part, otherwise the next one."""
         offset_ns = self.origin_ns + slot * self.slot_ns
         usable_ns = self.slot_ns - self.guard_ns
-        turns = (not_before_ns - offset_ns) // self.period_ns
-        start_ns = offset_ns + turns * self.period_ns
+        periods = (not_before_ns - offset_ns) // self.period_ns
+        start_ns = offset_ns + periods * self.period_ns
         if not_before_ns >= start_ns + usable_ns:
             start_ns += self.period_ns
         return Slot(start_ns, start_ns + usable_ns)
 
-    def owner(self, t_ns: int) -> int | None:
+    def slot_at(self, t_ns: int) -> int | None:
         """The slot in whose usable part an instant lies; None in a guard time, or in the rest of the superframe."""
-        turns, rest = divmod((t_ns - self.origin_ns) % self.period_ns, self.slot_ns)
-        return turns if turns < self.slots and rest < self.slot_ns - self.guard_ns else None
+        slot, rest = divmod((t_ns - self.origin_ns) % self.period_ns, self.slot_ns)
+        return slot if slot < self.slots and rest < self.slot_ns - self.guard_ns else None

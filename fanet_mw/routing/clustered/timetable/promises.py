@@ -18,7 +18,7 @@ from fanet_mw.node.packet import Packet
 from fanet_mw.routing.clustered.roles.leader import HEARD_NS
 from fanet_mw.routing.clustered.roles.lease import Lease
 from fanet_mw.routing.clustered.tdma.admission import Admission, least_interval_ns
-from fanet_mw.routing.clustered.tdma.own_bound import OwnBound
+from fanet_mw.routing.clustered.tdma.own_bound import RootTurns
 from fanet_mw.routing.clustered.tdma.root_release import RootRelease
 from fanet_mw.routing.clustered.tdma.turns import clocks_fit, receipt_ns
 from fanet_mw.routing.clustered.timetable.likely_delay import LIKELY_SHARE, likely_delay_ns
@@ -78,25 +78,25 @@ class Promises:
         kept = [(plan, bounds_ns) for plan, bounds_ns in self._bounds_ns if any(plan is other for other in before)]
         self._bounds_ns = [*kept, (newest, self.class_bounds_ns(own))]
 
-    def _admit(self, own: OwnBound | None, *, now_ns: int) -> None:
+    def _admit(self, own: RootTurns | None, *, now_ns: int) -> None:
         record = None if self._admission is None else self._admission.follow(own, now_ns=now_ns)
         if record is not None:
             self._port.record(record)
 
-    def own(self) -> OwnBound | None:
+    def own(self) -> RootTurns | None:
         """The node's share of the newest timetable; None if it states no bounds, as when frames may be lost."""
         plan = None if self._port.scenario.measures_links else self._plans.newest
         if plan is None or not plan.roots or not plan.whole or plan.table.uncovered[self._port.node]:
             return None
         return self._own_of(self._port.node, plan)
 
-    def _own_of(self, node: NodeId, plan: TurnPlan) -> OwnBound:
+    def _own_of(self, node: NodeId, plan: TurnPlan) -> RootTurns:
         offsets = plan.roots if node == self._port.node else tuple(plan.table.offsets_of(node))
         around_ns = self._lead_ns + receipt_ns(self._port.scenario)
         load = plan.loads.get(node, AS_EXPECTED)
-        return OwnBound(plan.turns, offsets, plan.table.spans[node], plan.together, around_ns, load)
+        return RootTurns(plan.turns, offsets, plan.table.spans[node], plan.together, around_ns, load)
 
-    def class_bounds_ns(self, own: OwnBound | None) -> Mapping[int, int]:
+    def class_bounds_ns(self, own: RootTurns | None) -> Mapping[int, int]:
         """The bounds by priority; a class whose losses are repaired has none."""
         scenario = self._port.scenario
         if own is None or scenario.clusters.repair_s:

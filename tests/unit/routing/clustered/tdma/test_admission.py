@@ -4,7 +4,7 @@ from hypothesis import given
 from hypothesis import strategies as st
 
 from fanet_mw.routing.clustered.tdma.admission import Admission, least_interval_ns
-from fanet_mw.routing.clustered.tdma.own_bound import OwnBound
+from fanet_mw.routing.clustered.tdma.own_bound import RootTurns
 from fanet_mw.routing.clustered.tdma.turns import Turns
 from fanet_mw.trace import DeadlineLost, DeadlineMet
 from fanet_mw.units import MS, NodeId, S
@@ -14,15 +14,15 @@ EXPECTED_NS = 8 * S
 
 
 @st.composite
-def owns(draw) -> OwnBound:
+def owns(draw) -> RootTurns:
     per_superframe = draw(st.integers(4, 60))
     turns = Turns(0, (40 + 2 * per_superframe) * MS, 40 * MS, 2 * MS, per_superframe)
     roots = draw(st.sets(st.integers(0, per_superframe - 1), min_size=1, max_size=6))
-    return OwnBound(turns, tuple(sorted(roots)), draw(st.integers(1, per_superframe)))
+    return RootTurns(turns, tuple(sorted(roots)), draw(st.integers(1, per_superframe)))
 
 
 @given(owns(), st.integers(1 * MS, 600 * MS))
-def test_the_least_interval_meets_the_deadline_and_nothing_shorter_does(own: OwnBound, deadline_ns: int) -> None:
+def test_the_least_interval_meets_the_deadline_and_nothing_shorter_does(own: RootTurns, deadline_ns: int) -> None:
     least = least_interval_ns(own, deadline_ns=deadline_ns)
     if least is None:
         assert own.turns.worst_ns(own.roots, span=own.span, interval_ns=10 * S) > deadline_ns
@@ -33,7 +33,7 @@ def test_the_least_interval_meets_the_deadline_and_nothing_shorter_does(own: Own
 
 
 def test_packets_that_come_too_soon_are_refused_and_do_not_count() -> None:
-    own = OwnBound(Turns(0, 500 * MS, 40 * MS, 2 * MS, 230), (0,), 10)
+    own = RootTurns(Turns(0, 500 * MS, 40 * MS, 2 * MS, 230), (0,), 10)
     admission = Admission(ME, deadline_ns=600 * MS, interval_ns=1 * S, expected_ns=EXPECTED_NS)
     assert admission.admit(0), "until a timetable is in force everyone may send"
     assert admission.follow(own, now_ns=0) == DeadlineMet(0, ME, 520 * MS, 600 * MS, 1 * S)
@@ -43,7 +43,7 @@ def test_packets_that_come_too_soon_are_refused_and_do_not_count() -> None:
 
 def test_packets_that_each_come_a_little_too_soon_do_not_add_up() -> None:
     """Half a microsecond is rounding, again and again it is a higher rate."""
-    own = OwnBound(Turns(0, 500 * MS, 40 * MS, 2 * MS, 230), (0,), 10)
+    own = RootTurns(Turns(0, 500 * MS, 40 * MS, 2 * MS, 230), (0,), 10)
     admission = Admission(ME, deadline_ns=600 * MS, interval_ns=500 * MS, expected_ns=EXPECTED_NS)
     admission.follow(own, now_ns=0)
     admitted = [admission.admit(number * (500 * MS - 500)) for number in range(10)]
@@ -52,7 +52,7 @@ def test_packets_that_each_come_a_little_too_soon_do_not_add_up() -> None:
 
 
 def test_a_deadline_is_lost_and_met_again_with_the_timetable_and_said_once_each() -> None:
-    near, far = (OwnBound(Turns(0, 500 * MS, 40 * MS, 2 * MS, 230), (0,), span) for span in (10, 60))
+    near, far = (RootTurns(Turns(0, 500 * MS, 40 * MS, 2 * MS, 230), (0,), span) for span in (10, 60))
     admission = Admission(ME, deadline_ns=600 * MS, interval_ns=1 * S, expected_ns=EXPECTED_NS)
     said = [admission.follow(own, now_ns=t) for t, own in enumerate((near, near, far, far, None, near))]
     assert [type(record) for record in said if record] == [DeadlineMet, DeadlineLost, DeadlineMet]
@@ -62,7 +62,7 @@ def test_a_deadline_is_lost_and_met_again_with_the_timetable_and_said_once_each(
 
 def test_where_no_rate_meets_the_deadline_what_the_turns_carry_is_let_in() -> None:
     admission = Admission(ME, deadline_ns=100 * MS, interval_ns=1 * S, expected_ns=EXPECTED_NS)
-    lost = admission.follow(OwnBound(Turns(0, 500 * MS, 40 * MS, 2 * MS, 230), (0, 100), 10), now_ns=0)
+    lost = admission.follow(RootTurns(Turns(0, 500 * MS, 40 * MS, 2 * MS, 230), (0, 100), 10), now_ns=0)
     assert isinstance(lost, DeadlineLost)
     assert [t for t in range(0, 1001 * MS, 50 * MS) if admission.admit(t)] == [0, 250 * MS, 500 * MS, 750 * MS, S]
 
@@ -77,7 +77,7 @@ def test_before_there_should_be_a_bound_its_absence_is_not_said_and_then_once() 
     assert admission.wake(due_ns) == DeadlineLost(due_ns, ME, 0, 600 * MS, 1 * S)
     assert admission.next_wake_ns() is None
     assert admission.follow(None, now_ns=due_ns + S) is None
-    own = OwnBound(Turns(0, 500 * MS, 40 * MS, 2 * MS, 230), (0,), 10)
+    own = RootTurns(Turns(0, 500 * MS, 40 * MS, 2 * MS, 230), (0,), 10)
     assert isinstance(admission.follow(own, now_ns=due_ns + 2 * S), DeadlineMet)
     assert isinstance(admission.follow(None, now_ns=due_ns + 3 * S), DeadlineLost)
 
@@ -85,7 +85,7 @@ def test_before_there_should_be_a_bound_its_absence_is_not_said_and_then_once() 
 def test_who_had_a_bound_says_at_once_that_it_is_gone() -> None:
     admission = Admission(ME, deadline_ns=600 * MS, interval_ns=1 * S, expected_ns=EXPECTED_NS)
     admission.start(0)
-    own = OwnBound(Turns(0, 500 * MS, 40 * MS, 2 * MS, 230), (0,), 10)
+    own = RootTurns(Turns(0, 500 * MS, 40 * MS, 2 * MS, 230), (0,), 10)
     assert isinstance(admission.follow(own, now_ns=4 * S), DeadlineMet)
     assert admission.next_wake_ns() is None
     assert isinstance(admission.follow(None, now_ns=5 * S), DeadlineLost)

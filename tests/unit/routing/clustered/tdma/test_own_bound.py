@@ -2,7 +2,7 @@
 
 import pytest
 
-from fanet_mw.routing.clustered.tdma.own_bound import BURST, OwnBound
+from fanet_mw.routing.clustered.tdma.own_bound import BURST, RootTurns
 from fanet_mw.routing.clustered.tdma.turns import Turns
 from fanet_mw.units import MS
 
@@ -11,7 +11,7 @@ AROUND_NS = 7 * MS
 
 
 def test_bulk_waits_for_a_turn_and_its_flood_between_lead_and_receipt() -> None:
-    own = OwnBound(TURNS, (5,), span=4, around_ns=AROUND_NS)
+    own = RootTurns(TURNS, (5,), span=4, around_ns=AROUND_NS)
     assert own.worst_ns(interval_ns=100 * MS) == (100 + 4 * 2 + 7) * MS
     assert own.worst_ns(interval_ns=99 * MS) is None, "more comes than is let out"
 
@@ -28,5 +28,5 @@ def test_bulk_waits_for_a_turn_and_its_flood_between_lead_and_receipt() -> None:
 def test_a_burst_is_through_with_the_turn_that_lets_out_its_last(
     roots: tuple[int, ...], per_turn: int, worst_ms: int
 ) -> None:
-    own = OwnBound(TURNS, roots, span=4, around_ns=AROUND_NS)
+    own = RootTurns(TURNS, roots, span=4, around_ns=AROUND_NS)
     assert own.burst_ns(per_turn=per_turn) == worst_ms * MS + AROUND_NS

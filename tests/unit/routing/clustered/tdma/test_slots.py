@@ -24,8 +24,8 @@ def test_a_slot_asked_for_before_it_is_still_to_come() -> None:
 
 
 def test_the_guard_time_belongs_to_nobody() -> None:
-    assert FRAME.owner(24 * MS) is None
-    assert FRAME.owner(25 * MS) == 1
+    assert FRAME.slot_at(24 * MS) is None
+    assert FRAME.slot_at(25 * MS) == 1
 
 
 @pytest.mark.parametrize("guard_ns", [-1, 25 * MS])
@@ -49,7 +49,7 @@ def test_an_occurrence_belongs_to_its_slot_and_is_the_first_that_does(
     slot = data.draw(st.integers(0, slots - 1))
     asked_ns = data.draw(st.integers(-(10**13), 10**13))
     found = frame.occurrence(slot, not_before_ns=asked_ns)
-    assert frame.owner(found.start_ns) == slot
-    assert frame.owner(found.end_ns - 1) == slot
+    assert frame.slot_at(found.start_ns) == slot
+    assert frame.slot_at(found.end_ns - 1) == slot
     assert found.end_ns > asked_ns
     assert found.end_ns - frame.period_ns <= asked_ns, "an earlier occurrence was still open"

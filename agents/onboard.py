@@ -1,8 +1,9 @@
-"""The applications of one node: which of them is given what comes in, and where what they put out goes.
+"""Connects the applications on board with the node and the vehicle: which application gets an input, where its output
+goes.
 
-a message, a reading, a hello  ->  those that listen to it, in the order of the applications (`listeners.py`)
-what one sends                 ->  the node, at once (`messenger.py`)
-a course that one commands     ->  the vehicle, when all have had the same input (`course_arbitration.py`)
+    a message, a reading, a hello  ->  the applications that listen to it, in their order (`listeners.py`)
+    a message that one sends       ->  the node, at once (`messenger.py`)
+    a course that one commands     ->  the vehicle, once all have had the same input (`course_arbitration.py`)
 """
 
 from collections.abc import Callable, Iterable, Mapping, Sequence
@@ -30,11 +31,11 @@ _OF_MESSENGER: Final = {
     wire.TARGETS.msgid: lambda messenger: messenger.piece,
     wire.RECEIPT.msgid: lambda messenger: messenger.receipts,
 }
-"""The method of the messenger that takes a packet, by the id of the message with which the packet begins."""
+"""The messenger's method for a packet, by the id of the message with which the packet begins."""
 
 
 class Onboard:
-    """The applications of one node, their inputs and what they put out."""
+    """The applications of one node, with their inputs and outputs."""
 
     def __init__(
         self,
@@ -45,7 +46,7 @@ class Onboard:
         fly: Callable[[Course, int], None],
         tap: Callable[[bytes, int], None],
     ) -> None:
-        """`vehicle` tells position and velocity; `fly` and `tap` take a course or frames, and an instant."""
+        """`vehicle` gives position and velocity; `fly` and `tap` take a course or frames, and an instant."""
         names = [application.name for application in applications]
         if len(set(names)) < len(names):
             raise LocalProtocolError(f"applications {names} of node {node.node}: each name must be there once")
@@ -55,7 +56,7 @@ class Onboard:
         self.now_ns = 0
         """The instant of the input that is being handled."""
         self.called = False
-        """True once an application has been called: it may have commanded a course, or want another wake-up."""
+        """True once an application was called, because it may have commanded a course or may want another wake-up."""
         self._applications = tuple(applications)
         self._callbacks = Callbacks.of(applications)
         self._listeners = Listeners(applications)
@@ -63,7 +64,8 @@ class Onboard:
         self._messenger = Messenger(node, self._listeners)
         self.arbitration = CourseArbitration(applications, self._callbacks.permits, fly)
         self._with_radio: dict[int, tuple[Application, int]] = {}
-        """For the transmit request of a packet's first frame, the application that sent the packet and its handle."""
+        """The application that has sent a packet, and its handle, by the transmit request of the
+        packet's first frame."""
 
     @property
     def hears_hellos(self) -> bool:
@@ -76,22 +78,22 @@ class Onboard:
             application.start(_ApplicationPort(self, application), now_ns)
 
     def messages(self) -> Mapping[str, Any]:
-        """The counters of messages in pieces; empty when there were none."""
+        """The counters of messages in pieces; empty if there were none."""
         return self._messenger.report()
 
     def report(self, names: Iterable[str]) -> Mapping[str, Any]:
-        """The reports of these applications by their names, without those that are empty."""
+        """The reports of these applications by name, without empty ones."""
         wanted = set(names)
         found = {a.name: dict(a.report()) for a in self._applications if a.name in wanted}
         return {name: report for name, report in found.items() if report}
 
-    # --- in -------------------------------------------------------------------------------------------------------
+    # --- input ----------------------------------------------------------------------------------------------------
 
     def _call(self, now_ns: int) -> None:
         self.now_ns, self.called = now_ns, True
 
     def deliver(self, packet: Packet, now_ns: int) -> None:
-        """Give a packet for this node to the applications that listen to it; for most packets there are none."""
+        """Pass a packet for this node to the applications that listen to it, mostly none."""
         frame = packet.frame
         message_id = int.from_bytes(frame[wire.INNER_ID], "little")
         if message_id in _OF_MESSENGER:
@@ -111,7 +113,7 @@ class Onboard:
             self._guard(application.on_message, message, now_ns)
 
     def on_hello(self, frame: bytes, now_ns: int) -> None:
-        """Give a neighbor's hello to the applications that listen to hellos."""
+        """Pass a neighbor's hello to the applications that listen to hellos."""
         self._call(now_ns)
         for application in self._callbacks.on_hello:
             self._guard(application.on_hello, frame, now_ns)
@@ -133,7 +135,7 @@ class Onboard:
             application.on_sensor(reading, now_ns)
 
     def radio_done(self, status: TxStatus, now_ns: int) -> None:
-        """Tell the application that sent a packet how the transmit request of its first frame ended."""
+        """The radio has finished with the first frame of a packet: tell the application that has sent it."""
         found = self._with_radio.pop(status.seq, None)
         if found is None:
             return
@@ -144,7 +146,7 @@ class Onboard:
             application.on_status(Status(handle, fate, now_ns), now_ns)
 
     def hello_frames(self, now_ns: int) -> bytes:
-        """The inner frames that applications add to the hello that goes out now."""
+        """The inner frames that applications add to the next hello."""
         return b"".join(application.hello_frames(now_ns) for application in self._callbacks.hello_frames)
 
     # --- time -----------------------------------------------------------------------------------------------------
@@ -168,7 +170,7 @@ class Onboard:
                 first_ns = wake_ns
         return first_ns
 
-    # --- out ------------------------------------------------------------------------------------------------------
+    # --- output ---------------------------------------------------------------------------------------------------
 
     def send(self, application: Application, submission: Submission) -> int:
         requests = self.node.frames_sent
@@ -178,7 +180,7 @@ class Onboard:
         return handle
 
     def settle(self, now_ns: int) -> None:
-        """Hand over messages that have become whole, tell of those that were sent, and fly as was commanded."""
+        """Hand over complete messages, report on sent ones, and fly the commanded course."""
         if self._messenger.has_news():  # most inputs bring none
             for application, message in self._messenger.arrived():
                 self._guard(application.on_message, message, now_ns)
@@ -188,7 +190,7 @@ class Onboard:
 
 
 class _ApplicationPort:
-    """What one application is handed (`fanet_mw.application.AppPort`)."""
+    """The port of one application (`fanet_mw.application.AppPort`)."""
 
     def __init__(self, onboard: Onboard, application: Application) -> None:
         self._onboard = onboard

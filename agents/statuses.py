@@ -100,9 +100,8 @@ class Statuses:
             return
         application, handle, first, confirmed = watched
         if reason is None:
-            if first and (
-                not confirmed or handle in self._owners
-            ):  # else it is over: no application waits to hear of it
+            # a confirmed message without an owner is finished, and no application waits for its status
+            if first and (not confirmed or handle in self._owners):
                 self.tell(application, Status(handle, Fate.LET_OUT, t_ns))
             return
         self._unwatch(seq)

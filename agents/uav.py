@@ -1,7 +1,7 @@
-"""The UAV as an actor: the node of one id and the applications on board, wired to topics.
+"""The UAV as an actor: connects the node of one id and the applications on board with the topics of the bus.
 
-Inputs are receptions, transmit statuses and sensor readings; outputs are transmit requests, setpoints and a MAVLink
-tap. Everything that decides is in the parts; this file only says what goes where. Hellos are the UAV's own.
+Inputs are receptions, transmit statuses and sensor readings; outputs are transmit requests, setpoints and MAVLink taps.
+The parts make all decisions; this file only passes inputs and outputs to their places, and sends the UAV's hellos.
 """
 
 from collections.abc import Mapping, Sequence
@@ -41,16 +41,16 @@ from fanet_mw.units import Enu, NodeId, earliest
 
 
 class NodeState(NamedTuple):
-    """What a node knows of the network it is in."""
+    """The state of the network, as a node knows it."""
 
     neighbors: tuple[NodeId, ...]
     bound_ns: int | None
     clusters: Mapping[NodeId, tuple[NodeId, ...]]
-    """The nodes of each cluster as far as the node knows, by head; the head is the first of them."""
+    """The nodes of each cluster by its head, the head first, as far as the node knows."""
 
 
 class _OutTopics(NamedTuple):
-    """The topics of the messages that a UAV receives and sends."""
+    """The topics to which a UAV sends."""
 
     transmit: str
     setpoint: str
@@ -58,7 +58,7 @@ class _OutTopics(NamedTuple):
 
 
 class Uav(Actor):
-    """The node and the applications of one UAV as an actor."""
+    """The actor that consists of the node and the applications of one UAV."""
 
     def __init__(
         self,
@@ -72,8 +72,9 @@ class Uav(Actor):
         hello_time: HelloTime | None = None,
         reader: Reader | None = None,
     ) -> None:
-        """`applications` are those of its user, beside what the scenario asks for; `onboard_map`: the map on board;
-        `hello_time`: what its hellos say of the time; `reader`: that of all nodes of a run.
+        """`applications`: the user's applications, in addition to those of the scenario. `onboard_map`: the map that
+        the UAV carries. `hello_time`: adds time beacons to hellos. `reader`: the reader of frames that all nodes of a
+        run share.
         """
         topics = Topics(swarm)
         super().__init__(f"agent-{node}", (topics.radio_rx(node), topics.sensors(node)))
@@ -81,15 +82,15 @@ class Uav(Actor):
         self._id = node
         self._topics = _OutTopics(topics.radio_tx(node), topics.setpoint(node), topics.mavlink(node))
         self._prompt_ns = scenario.radio.handover_ns + scenario.radio.lead_ns
-        """A reception later than this after its frame's end is too late for what has to follow a lead after the
-        frame."""
+        """The greatest delay of a reception after the end of its frame: a relay must still be
+        announced one lead ahead."""
         self._node = Node(node, scenario, make_protocol, position=position, reader=reader)
         self._autopilot = Autopilot(node, position=position, telemetry_hz=scenario.nodes.telemetry_hz)
         self._reckoning = DeadReckoning()
         self._fixes = SteadyFix(sigma_m=scenario.world.gps_sigma_m, range_m=scenario.radio.range_m)
         asked_for = _asked_for(scenario, node, self._autopilot, position, onboard_map)
         self._built_in = tuple(application.name for application in asked_for)
-        """The applications whose counters stand among the UAV's own in its report."""
+        """The applications whose counters are among those of the UAV itself in its report."""
         carried = (*_foreign(scenario, node), *applications)
         self._own = tuple(application.name for application in carried)
         self._onboard = Onboard(
@@ -101,10 +102,10 @@ class Uav(Actor):
         )
         self._hellos = HelloSchedule(scenario, self._node, hello_time)
         self._own_wake_ns: int | None = None
-        """The instant at which an application or a hello is due; it changes when an application has been called."""
+        """The instant at which an application or a hello is due; it may change whenever an application is called."""
         self._malformed = 0
         self._heard_late = 0
-        """The number of receptions that were handed over too late."""
+        """The number of receptions that arrived too late."""
 
     # --- the actor contract ---------------------------------------------------------------------------------------
 
@@ -122,7 +123,7 @@ class Uav(Actor):
             if now_ns - message.end_ns > self._prompt_ns:
                 self._heard_late += 1
             if node.hear(message, now_ns):
-                return True  # a copy, and nothing came of it, as of most
+                return True  # a copy that changes nothing, as most receptions are
             if node.hellos:
                 self._on_hellos(now_ns)
             return not self._settle(now_ns) and node.timeless
@@ -143,7 +144,7 @@ class Uav(Actor):
         return False
 
     def _fix(self, fix: Gps, now_ns: int) -> None:
-        """Take in a position of this UAV, from GPS or from what stands in for it."""
+        """A position of this UAV, from GPS or from dead reckoning."""
         self._autopilot.fix(fix)
         self._node.moved(self._fixes.position(fix), fix.velocity)
         self._onboard.fix(fix, now_ns)
@@ -164,11 +165,11 @@ class Uav(Actor):
         return own_ns if node_ns is None or (own_ns is not None and own_ns < node_ns) else node_ns
 
     def state(self, now_ns: int) -> NodeState:
-        """The network as the node knows it."""
+        """The state of the network, as the node knows it."""
         return NodeState(self._hellos.neighbors(now_ns), self._node.bound_ns(), self._node.clusters())
 
     def know_clock_error(self, error_ns: int) -> None:
-        """The greatest error of any clock in the swarm, as far as this node has heard; 0: they are exact."""
+        """The greatest error of any clock in the swarm, as far as this node knows; 0 if all clocks are exact."""
         self._node.know_clock_error(error_ns)
 
     def report(self) -> Mapping[str, Any]:
@@ -205,7 +206,7 @@ class Uav(Actor):
     # --- after every input ----------------------------------------------------------------------------------------
 
     def _settle(self, now_ns: int) -> bool:
-        """Bring what the node and the applications put out to where it goes; True when an application was called."""
+        """Pass on the output of the node and the applications; returns True if an application was called."""
         node, onboard = self._node, self._onboard
         if node.deliveries:
             deliveries, node.deliveries = node.deliveries, []
@@ -219,7 +220,7 @@ class Uav(Actor):
             self._own_wake_ns = self._next_own_ns()
         if node.requests:
             outbox, topic = self.outbox, self._topics.transmit
-            for request in node.requests:  # mostly one
+            for request in node.requests:  # mostly there is one
                 outbox.append((topic, request))
             node.requests.clear()
         return called
@@ -242,7 +243,7 @@ class Uav(Actor):
 def _asked_for(
     scenario: Scenario, node: NodeId, autopilot: Autopilot, position: Enu, onboard_map: OnboardMap
 ) -> Sequence[Application]:
-    """The applications that a scenario asks for, in the order in which they have their turn."""
+    """The applications that a scenario asks for, in the order in which they are called."""
     mission = scenario.mission
     applications: list[Application]
     loads = [Load(scenario, node, name) for name in scenario.traffic_classes]

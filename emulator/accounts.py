@@ -1,4 +1,4 @@
-"""The medium's counters: requests, copies, late frames. What is counted here is counted nowhere else."""
+"""The counters of the medium: requests, copies of frames, late frames. Each thing is counted only once, here."""
 
 from collections import Counter
 from typing import Any, Final
@@ -20,22 +20,22 @@ _REASON_OF: Final = {
     s.CUT_OFF: DropReason.STATION_DOWN,
 }
 _LATENESS_STEPS: Final = (0.1, 0.2, 0.5, 1, 2, 5, 10, 20, 50, 100, 200, 500, 1000)
-"""Upper edges of the bins of the lateness histogram [ms]; a percentile is given as the upper edge of its bin."""
+"""The upper edges of the bins of the lateness histogram [ms]; a percentile is stated as the upper edge of its bin."""
 
 
 class Accounts:
-    """What the medium counted per request, beside what the kernel counted per copy."""
+    """The counters of requests by the medium, and those of copies by the kernel."""
 
     def __init__(self) -> None:
         self.delivered = 0
         self.delivered_bytes = 0
         self.dropped: Counter[str] = Counter()
         self.refused: Counter[str] = Counter()
-        """Input that was hostile or misdirected, by its kind; none of it became a frame."""
+        """The number of hostile or misdirected inputs, by kind; none of them became a frame."""
         self.poses = 0
         """The number of sets of positions that were accepted."""
         self.controls = 0
-        """The number of changes of the air that were carried out."""
+        """The number of changes of the air that were made."""
         self.late_frames = 0
         self._max_late_ns = 0
         self._lateness = [0] * (len(_LATENESS_STEPS) + 1)
@@ -44,7 +44,7 @@ class Accounts:
         self.dropped[reason] += 1
 
     def late(self, by_ns: int) -> None:
-        """A request came `by_ns` after the instant it asked for."""
+        """A request came `by_ns` after the instant at which its frame was to start."""
         self.late_frames += 1
         self._max_late_ns = max(self._max_late_ns, by_ns)
         late_ms = by_ns / MS
@@ -52,12 +52,12 @@ class Accounts:
         self._lateness[index] += 1
 
     def lost(self, verdict: int) -> None:
-        """Count a frame that no node received, when nothing refers to it any more."""
+        """Count a frame that no node has received, when nothing refers to it any more."""
         self.dropped[_REASON_OF[verdict]] += 1
 
     def copies(self, g: s.Ints, *, in_flight: int) -> dict[str, Any]:
-        """The ledger at receivers: the copies that went on the air in range of a receiver, and how each ended;
-        `in_flight` have not.
+        """The ledger at the receivers: the number of copies that were transmitted in range of a receiver, and how each
+        ended. `in_flight` of them have not ended.
         """
         lost = {
             DropReason.COLLISION: int(g[s.COLLISION_COPIES]),
@@ -75,7 +75,7 @@ class Accounts:
         }
 
     def lateness(self, requests: int) -> dict[str, float]:
-        """The lateness of so many requests, which are all; a request in time counts as 0 ms late."""
+        """The lateness of all requests; one that was in time counts as 0 ms."""
         return {
             "late_frames": self.late_frames,
             "frames": requests,

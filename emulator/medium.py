@@ -1,7 +1,8 @@
 """The link emulator as an actor: transmit requests and poses in, receptions and transmit statuses out.
 
-Frames are only bytes here, and a station is a node id minus one. Requests are announced ahead and wait in the kernel
-for their instant. A request that comes after its instant is counted, and dropped when it is over `TOO_LATE_NS` late.
+It never looks into a frame, and a station is a node id minus one. Requests are announced ahead of time, and wait in the
+kernel for their instant. A request that comes after its instant is counted as late, and dropped if it is more than
+`TOO_LATE_NS` late.
 """
 
 from collections.abc import Mapping
@@ -25,9 +26,9 @@ from fanet_mw.scenario import Scenario
 from fanet_mw.units import BROADCAST, FARTHEST_M, MS, NodeId, earliest
 
 TOO_LATE_NS: Final = 50 * MS
-"""A request later than this is dropped, because by then its slot belongs to another node."""
+"""A request that is later than this is dropped, because its slot belongs to another node by then."""
 ANNOUNCED: Final = 1024
-"""So many requests of one node may wait for their instant, beyond what its MAC queue holds."""
+"""The greatest number of a node's requests that may wait for their instant, in addition to those in its MAC queue."""
 _new: Final = tuple.__new__
 _RECEPTION, _FREE, _DELIVERED, _NEVER = s.OUT_RECEPTION, s.OUT_FREE, s.DELIVERED, s.NEVER
 _OUTCOME_OF: Final[Mapping[DropReason, TxOutcome]] = {
@@ -37,15 +38,15 @@ _OUTCOME_OF: Final[Mapping[DropReason, TxOutcome]] = {
     DropReason.TOO_LARGE: TxOutcome.REFUSED,
     DropReason.NO_RECEIVER: TxOutcome.REFUSED,
 }
-"""The status of a request that is not taken in, by the reason of its drop."""
+"""The status of a refused request, by the reason of its drop."""
 _NO_RECEPTION: Final = Reception(b"", NodeId(0), 0, 0.0)
-"""The greatest coordinate; larger ones would overflow the cells in which neighbors are looked for."""
+"""The initial value of a variable that holds the latest reception while rows are read."""
 _HORIZON_NS: Final = 60_000 * MS
-"""A request further ahead than this is refused: no node plans so far, and the request would only occupy memory."""
+"""A request further ahead than this is refused: no node plans so far ahead, and it would only occupy memory."""
 
 
 class Medium(Actor):
-    """The air between the nodes of one swarm."""
+    """The radio channel between the nodes of one swarm."""
 
     hears_out = True
 
@@ -96,7 +97,7 @@ class Medium(Actor):
             self._accounts.refused["message_type"] += 1
 
     def wake(self, now_ns: int) -> None:
-        """Advance the air to `now_ns` and hand out what has resulted."""
+        """Advance the air to `now_ns`, and send receptions and statuses."""
         while self._due_ns is not None and self._due_ns <= now_ns:
             self._pass_due(self._due_ns)
         rows = self._air.advance(now_ns)
@@ -140,7 +141,7 @@ class Medium(Actor):
     # --- requests -------------------------------------------------------------------------------------------------
 
     def _request(self, station: int, request: TxRequest, now_ns: int) -> None:
-        """Take in one request; what is wrong with a request is counted, never raised."""
+        """Handle one request; whatever is wrong with it is counted and not raised."""
         seq, start_ns, frame, dst, wants_status = request
         numbers, slots = self._numbers, self._slots
         if seq != numbers.expected[station] and (lost := numbers.lost_before(station, seq)):
@@ -172,7 +173,7 @@ class Medium(Actor):
             self._due_ns = self._next_due_ns()
 
     def _refuse_shape(self, station: int, request: TxRequest, now_ns: int) -> None:
-        """Refuse a request whose destination does not exist or whose frame is empty or too long."""
+        """Refuse a request whose destination does not exist, or whose frame is empty or too long."""
         size = len(request.frame)
         if request.dst != BROADCAST and not 1 <= request.dst <= self._count:
             reason = DropReason.NO_RECEIVER
@@ -181,7 +182,9 @@ class Medium(Actor):
         self._refuse(station, request, reason, now_ns)
 
     def _refuse_instant(self, station: int, request: TxRequest, now_ns: int) -> bool:
-        """Refuse a request whose instant is absurd or too long past; a late one is counted. True if it was refused."""
+        """Refuse a request whose instant is absurd or too long ago; a late one is counted. Returns True if it was
+        refused.
+        """
         late_ns = now_ns - request.start_ns
         if not -_HORIZON_NS < late_ns < _HORIZON_NS:
             self._refuse(station, request, DropReason.MALFORMED, now_ns)
@@ -200,7 +203,7 @@ class Medium(Actor):
     # --- time -----------------------------------------------------------------------------------------------------
 
     def _pass_due(self, due_ns: int) -> None:
-        """Process what falls due at this instant: measurement begins or ends, faults change, links are reported."""
+        """Process what is due at this instant: the measurement begins or ends, faults change, links are reported."""
         self._hand_out(self._air.advance(max(due_ns, self._now_ns)))
         self._now_ns = max(self._now_ns, due_ns)
         sample_ns = self._measurement.next_ns()
@@ -225,14 +228,16 @@ class Medium(Actor):
         return Sample(arrays.g.copy(), arrays.busy_ns(now_ns), self._accounts.delivered_bytes, now_ns)
 
     def _report_links(self, now_ns: int) -> bool:
-        """Report what the links have carried; returns False when it was nothing."""
+        """Publish the statistics of links; returns False if there was no traffic."""
         stats = self._air.links(now_ns)
         if stats is not None:
             self.outbox.append((self._topics.radio_links, stats))
         return stats is not None
 
     def _take_in_faults(self, *refused: str | None) -> None:
-        """Take in changes of faults, and count each refused one by what was wrong with it."""
+        """Compute links and noise anew after faults have changed, and count each refused change by what was wrong with
+        it.
+        """
         for why in refused:
             if why is not None:
                 self._accounts.refused[why] += 1
@@ -268,7 +273,7 @@ class Medium(Actor):
                 append((rx_topics[station], TxStatus(request.seq, TxOutcome(value), t_ns, attempts)))
 
     def _record(self, rows: Rows, capture: Capture) -> Rows:
-        """Pass the rows of a capture to it; returns the rows that are meant for nodes."""
+        """Pass the rows that belong in a capture to it; returns the rows that are meant for nodes."""
         for kind, slot, station, t_ns, value, attempts in rows:
             request, node, src = self._slots.requests[slot], station + 1, self._slots.sources[slot]
             assert request is not None, "the kernel speaks only of frames it was given"
@@ -283,7 +288,7 @@ class Medium(Actor):
     # --- positions ------------------------------------------------------------------------------------------------
 
     def _obstruct(self, obstructions: Obstructions) -> None:
-        """Take in what stands between nodes; it counts from the next poses on, which are of the same instant."""
+        """Obstructions have changed; they take effect with the next poses, which are of the same instant."""
         pairs = np.frombuffer(obstructions.pairs, np.uint16).astype(np.int64)
         if len(pairs) % 2 or (len(pairs) and not 1 <= pairs.min() <= pairs.max() <= self._count):
             self._accounts.refused["obstructions"] += 1
@@ -297,7 +302,7 @@ class Medium(Actor):
             return
         states = np.frombuffer(poses.states, np.float64).reshape(-1, 6)
         known = (ids >= 1) & (ids <= self._count)
-        if not known.all() or not (np.abs(states[:, :3]) <= FARTHEST_M).all():  # false for a NaN too
+        if not known.all() or not (np.abs(states[:, :3]) <= FARTHEST_M).all():  # also false for NaN
             self._accounts.refused["poses"] += 1
             return
         self._accounts.poses += 1

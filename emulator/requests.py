@@ -1,7 +1,7 @@
-"""Transmit requests as the medium keeps them: how many each node made, and which of them the kernel holds.
+"""Transmit requests in the medium: how many each node has made, and which of them the kernel holds.
 
-The medium reads and writes the lists here by itself at every frame, because a call for each would cost as much as the
-kernel; what happens seldom is a method.
+The medium reads and writes the lists here directly for each frame, because a call for each would take as long as the
+kernel does. Only rare operations are methods.
 """
 
 from collections.abc import Mapping, Sequence
@@ -11,28 +11,30 @@ from fanet_mw.bus.messages import TxRequest
 from fanet_mw.units import NodeId
 
 NUMBER_MASK: Final = 0xFFFF_FFFF
-"""The numbers of requests are those of 32 bits, and begin again at 0."""
+"""The numbers of requests have 32 bits, and begin again at 0."""
 _LONGEST_GAP: Final = 1 << 20
-"""The greatest gap in request numbers that is taken for requests that were lost; a longer one is taken for nonsense."""
+"""The greatest gap in request numbers that counts as lost requests; a longer one is nonsense."""
 
 
 class RequestNumbers:
-    """What the numbers of each node's requests tell: how many it made, and how many of them the bus has lost."""
+    """Counts by the numbers of each node's requests how many it has made, and how many of them the bus has lost."""
 
     def __init__(self, stations: int) -> None:
         self.expected: list[int | None] = [None] * stations
-        """The number that the next request of each node should have; None before its first request."""
+        """The expected number of each node's next request; None before its first one."""
         self.made = [0] * stations
-        """The number of requests that each node has made, with those that a gap in its numbers shows to be lost."""
+        """The number of requests that each node has made, including those that a gap in the numbers
+        shows to be lost."""
         self._before = [0] * stations
         """The number of requests that each node had made before its process was restarted."""
 
     def lost_before(self, station: int, seq: int) -> int:
-        """Count the requests that the bus has lost before one that has not the expected number; returns how many."""
+        """Count the requests that were lost before one with an unexpected number; returns how many there are."""
         expected = self.expected[station]
-        if expected is None:  # the emulator has restarted, or the first requests were lost: the run's ledger finds that
+        # the emulator was restarted, or the first requests were lost; the run's ledger will show that
+        if expected is None:
             return 0
-        if seq == 0:  # the node has been restarted
+        if seq == 0:  # the node was restarted
             self._before[station] = self.made[station]
             return 0
         gap = (seq - expected) & NUMBER_MASK
@@ -43,7 +45,7 @@ class RequestNumbers:
 
     @property
     def total(self) -> int:
-        """The number of requests that all nodes have made."""
+        """The number of requests of all nodes."""
         return sum(self.made)
 
     def report(self) -> dict[str, Mapping[str, int]]:
@@ -58,25 +60,25 @@ class FrameSlots:
     """The requests that the kernel holds, by frame slot."""
 
     def __init__(self, slots: int, nodes: Sequence[NodeId], *, most_held: int) -> None:
-        """`most_held`: how many requests of one node may be held at the same time."""
+        """`most_held`: the greatest number of requests of one node that may be held at the same time."""
         self.nodes = list(nodes)
         """The node of each station."""
         self.requests: list[TxRequest | None] = [None] * slots
         self.sources = [self.nodes[0]] * slots
         """The sender of the request in each slot."""
         self.free = list(range(slots - 1, -1, -1))
-        """The slots without a request; the last one is used first."""
+        """The slots without a request; the last one is used next."""
         self.held = [0] * len(self.nodes)
-        """The number of requests of each station that have not ended."""
+        """The number of unfinished requests of each station."""
         self.most_held = most_held
 
     @property
     def in_flight(self) -> int:
-        """The number of requests that have not ended."""
+        """The number of unfinished requests."""
         return len(self.requests) - len(self.free)
 
     def add(self, slots: int) -> None:
-        """Add this many free slots, when none is free."""
+        """Add this many free slots."""
         assert not self.free, "slots are added when all are in use"
         before = len(self.requests)
         self.requests += [None] * slots

@@ -1,15 +1,17 @@
-"""What a routing header cannot truly say, whichever node sent it: the check of every first copy, before it has effects.
+"""Rejects routing headers that cannot be true, whichever node has sent them. Each first copy is checked before it has
+any effect.
 
-    origin, transmitter, destination    nodes that there are; the transmitter is the one that the radio names
-    hops                                0 at the origin alone; with those still allowed, no more than 255
-    instant of birth                    not still to come
-    sequence number                     not beyond those that the time since swarm instant 0 has room for
+    origin, transmitter, destination    nodes that exist; the transmitter is the one that the radio names
+    hops                                0 only at the origin; together with the remaining ones at most 255
+    instant of generation               not in the future
+    sequence number                     not above those for which there was time since swarm instant 0
 
-Frames that cannot be decoded are counted as `malformed` by the node (`node.py`), a packet that was recorded and is sent
-again is a copy (`duplicates.py`) or has outlived its lifetime (`expired`, `node.py`).
+Frames that cannot be decoded are counted as `malformed` by the node (`node.py`). A packet that was recorded and is sent
+again is a copy (`duplicates.py`), or has outlived its lifetime (`expired`, `node.py`).
 
-Not here: proof of origin. A relay may still invent a packet in the name of a node behind it; what it cannot do is keep
-out that node's own packets, because a packet is known by its content and not by its name alone (`reader.Reader`).
+Origins are not proved: a relay may still invent a packet in the name of another node. But it cannot keep out that
+node's own packets, because duplicates are found by a hash of the whole packet, and not by origin and sequence number
+(`reader.Reader`).
 """
 
 from typing import Final
@@ -20,20 +22,22 @@ from fanet_mw.units import BROADCAST, MS, US, NodeId, S
 from fanet_mw.wire import MOST_HOPS, Fields, Kind
 
 RESTART_STEP_NS: Final = 100 * US
-"""A node sends fewer packets than one per 0.1 ms, so a later start begins beyond all earlier sequence numbers."""
+"""A node sends fewer packets than one in this time, so after a restart it begins above all its earlier sequence
+numbers."""
 CONTROL: Final = 0x8000_0000
-"""Control packets are numbered apart, from here on: then data packets have no gaps, and what is missing shows."""
+"""The sequence numbers of control packets begin here. They are separate, so that data packets have no gaps and a lost
+one is noticed."""
 _AHEAD_NS: Final = 100 * MS
-"""A birth may lie so far ahead where all clocks are exact: hosts take their time from each other over a bus."""
+"""How far ahead an instant of generation may be if all clocks are exact, because hosts get their time over a bus."""
 _BURST_NS: Final = 100_000 * RESTART_STEP_NS
-"""The time for which numbers may be ahead of one per `RESTART_STEP_NS`: ten seconds of the densest traffic."""
+"""How far ahead sequence numbers may be of one per `RESTART_STEP_NS`: ten seconds of the densest traffic."""
 _NUMBER: Final = CONTROL - 1
 """The bits of a sequence number that count the packets of its kind."""
 _HELLO: Final = int(Kind.HELLO)
 
 
 class HeaderCheck:
-    """The check of headers at one node."""
+    """The header check at one node."""
 
     def __init__(self, node: NodeId, scenario: Scenario) -> None:
         clock = scenario.clock
@@ -43,7 +47,7 @@ class HeaderCheck:
         self._ahead_ns = _AHEAD_NS + (2 * error_ns + S if clock.modelled else 0)
 
     def why_not(self, fields: Fields, known: bool, src: NodeId, end_ns: int) -> DropReason | None:
-        """The reason why the header of a frame that `src` sent until `end_ns` is not believed; None: it is believed.
+        """The reason why the header of a frame, which `src` sent until `end_ns`, is rejected; None if it is accepted.
 
         `known`: the packet was handled before, in another phase.
         """

@@ -1,4 +1,4 @@
-"""A routed packet as a node holds it, and the decision to pass one on."""
+"""A routed packet inside a node, and the decision to relay one."""
 
 from typing import NamedTuple
 
@@ -7,7 +7,7 @@ from fanet_mw.wire import Header
 
 
 class Packet(NamedTuple):
-    """A routed packet: its header, decoded, and its bytes."""
+    """A routed packet: its decoded header, and its bytes."""
 
     header: Header
     frame: bytes
@@ -18,4 +18,4 @@ class Packet(NamedTuple):
 
 
 Relay = tuple[Packet, int]
-"""A flooded packet of another node that is to be passed on, and the instant from which it may go."""
+"""A flooded packet of another node that is to be relayed, and the instant from which it may be transmitted."""

@@ -1,7 +1,7 @@
 """Plain flooding: every node re-broadcasts each new packet once, after a random jitter (paper, Figure 9).
 
-`FloodingProtocol` is the common base of the protocols that flood everything, unicast included: `flooding` here,
-`gossip` and `counter` in `storm`.
+`FloodingProtocol` is the common base of the protocols that flood everything, even packets for one node: `flooding`
+here, `gossip` and `counter` in `storm.py`.
 """
 
 from abc import abstractmethod
@@ -17,7 +17,7 @@ from fanet_mw.wire import FLAG_FLOOD
 
 
 class FloodingProtocol(RoutingProtocol):
-    """Sends everything as a flood, and asks its subclass about each first copy; the node suppresses duplicates."""
+    """Floods everything; a subclass decides about each first copy. The node suppresses duplicates."""
 
     origin_flags: ClassVar[int] = FLAG_FLOOD
     stream_name: ClassVar[str]
@@ -42,7 +42,7 @@ class FloodingProtocol(RoutingProtocol):
 
     @abstractmethod
     def _consider(self, packet: Packet, *, now_ns: int) -> Sequence[Relay]:
-        """Decide about the first copy of a packet that may be relayed; returned is when it is, if that is decided."""
+        """Decide about the first copy of a packet that may be relayed; returns the relay if that is decided already."""
 
 
 class Flooding(FloodingProtocol):

@@ -71,7 +71,7 @@ class Resolver:
         """The instant at which the first of the waiting entries is due."""
 
     def knowledge(self, neighbor: NodeId, *, now_ns: int) -> Knowledge | None:
-        """The state of a neighbor's address; None when nothing is known."""
+        """The state of a neighbor's address; None if nothing is known."""
         entry = self._entries.get(neighbor)
         if entry is None:
             return None
@@ -79,7 +79,9 @@ class Resolver:
         return None if now_ns > ends_ns.get(entry.knowledge, now_ns) else entry.knowledge
 
     def hold(self, out: Outgoing, *, start_ns: int, now_ns: int) -> Outgoing | None:
-        """Keep a frame until its next hop is known, and ask; returns the frame that is given up for it, if any."""
+        """Keep a frame until the address of its next hop is known, and request it; returns the frame that is given up
+        for it, if any.
+        """
         entry = self._entries.get(out.next_hop)
         if entry is None or entry.knowledge is not Knowledge.WAITING:
             entry = self._wait(out.next_hop, now_ns=now_ns)

@@ -1,10 +1,11 @@
-"""Two answers to the broadcast storm: flooding in which not every node relays. Everything is flooded, unicast included.
+"""Two answers to the broadcast storm: flooding in which not every node relays. Everything is flooded, even packets for
+one node.
 
-`gossip`   GOSSIP1(p, k): relay with probability p, always within the first k hops  (Haas, Halpern, Li, ToN 14(3), 2006)
-`counter`  wait U(0, assess); do not relay if C copies are heard meanwhile          (Ni et al., MobiCom 1999, 3.2)
+    gossip   GOSSIP1(p, k): relay with probability p, always within the first k hops (Haas, Halpern, Li, ToN, 2006)
+    counter  wait U(0, assess); do not relay if C copies are received in that time    (Ni et al., MobiCom 1999, 3.2)
 
-Probabilities and bounds are `routing.gossip_p`, `gossip_k`, `counter`, `assess_ms`. Not modeled: GOSSIP2 to GOSSIP4 of
-the first paper (neighbor counts, second chances, zones), the distance- and location-based schemes of the second.
+The parameters are `routing.gossip_p`, `gossip_k`, `counter` and `assess_ms`. Not modeled: GOSSIP2 to GOSSIP4 of the
+first paper (neighbor counts, second chances, zones), and the distance- and location-based schemes of the second.
 """
 
 from collections.abc import Mapping, Sequence
@@ -18,7 +19,7 @@ from fanet_mw.units import MS
 
 
 class Gossip(FloodingProtocol):
-    """Flooding in which each node relays with a probability."""
+    """Flooding in which each node relays with a certain probability."""
 
     stream_name: ClassVar[str] = "storm"
 
@@ -36,7 +37,7 @@ class Gossip(FloodingProtocol):
 
 
 class CounterBased(FloodingProtocol):
-    """Relays a packet that few other nodes relay."""
+    """Flooding in which a node relays a packet unless enough other nodes have done so."""
 
     stream_name: ClassVar[str] = "storm"
 

@@ -40,7 +40,7 @@ class ContractRun(NamedTuple):
 
 
 class RoutingContract:
-    """Subclass it in a test module, and say which protocol."""
+    """A test suite: subclass it in a test module, and name the protocol."""
 
     protocol: ClassVar[str]
     """The protocol as `routing.protocol` names it: an entry point, or MODULE:CLASS."""
@@ -49,7 +49,7 @@ class RoutingContract:
     least_delivered: ClassVar[float] = 0.9
     """Share of the packets that must arrive in a connected swarm at rest."""
     hello_interval_s: ClassVar[float] = 1.0
-    """0 when the protocol needs no hellos."""
+    """The hello interval; 0 if the protocol needs no hellos."""
 
     def scenario(self, destination: Destination, *, moving: bool) -> Scenario:
         """Nine nodes, each with a packet a second for one node or for all."""
@@ -67,7 +67,7 @@ class RoutingContract:
         )  # fmt: skip
 
     def run(self, destination: Destination, *, moving: bool) -> ContractRun:
-        """One run, remembered."""
+        """One run, cached."""
         return _run(json.dumps(self.scenario(destination, moving=moving).model_dump(mode="json")))
 
     # --- over the real medium -------------------------------------------------------------------------------------
@@ -100,7 +100,9 @@ class RoutingContract:
     # --- one node, driven by hand ---------------------------------------------------------------------------------
 
     def test_what_the_air_brings_never_raises(self) -> None:
-        """Frames come whole, cut, and with bits turned over; from neighbors and from unknown nodes."""
+        """Received frames are complete, cut off, or have flipped bits; they come from neighbors and
+        from unknown nodes.
+        """
         random = Random(1)
         bench = _Bench(self.scenario(3, moving=False))
         for frame in _hostile(random, 400):
@@ -109,7 +111,7 @@ class RoutingContract:
         assert bench.node.receptions >= 400
 
     def test_a_wake_up_that_has_come_is_done(self) -> None:
-        """`next_wake_ns` after `wake` lies in the future, else a host would never come to an end."""
+        """`next_wake_ns` after `wake` is in the future; otherwise a host would never advance."""
         random = Random(2)
         bench = _Bench(self.scenario("all", moving=False))
         for _ in range(40):
@@ -142,18 +144,18 @@ def _run(scenario_json: str) -> ContractRun:
 
 
 def _fresh_run(scenario: Scenario) -> ContractRun:
-    """Simulated by the layers above this one, which are imported by name."""
+    """A run by the simulation layers, which are imported by name because this layer must not depend on them."""
     outcome = import_module("sim.run.virtual").simulate(scenario)
     return ContractRun(outcome, import_module("sim.results.files").finish(outcome, out=None))
 
 
 class _Bench:
-    """One node, and an air on which everything that it sends arrives nowhere after a millisecond."""
+    """One node, and a channel on which each frame is finished after one millisecond and received by nobody."""
 
     def __init__(self, scenario: Scenario) -> None:
         self.now_ns = 0
         self.requests: list[tuple[int, TxRequest]] = []
-        """Each with the instant at which it was announced."""
+        """The requests, each with the instant at which it was announced."""
         self.node = Node(NodeId(1), scenario, make_protocol, position=Enu(0.0, 0.0, 50.0))
         self.node.start(0)
         self._collect()

@@ -79,9 +79,8 @@ class Line(NamedTuple):
         far_ns = abs(local_ns - self.at_ns)
         drift_ns = min(oscillator.rate, _SIGMAS * self.rate_sd) * far_ns
         drift_ns += min(oscillator.rate, self.stated_rate) * abs(local_ns - self.last_ns)
-        wander_ns = (
-            _SIGMAS * oscillator.wander * math.sqrt(2 / S) * math.pow(far_ns, 1.5)
-        )  # of both clocks, a random walk
+        # the rates of both clocks are random walks
+        wander_ns = _SIGMAS * oscillator.wander * math.sqrt(2 / S) * math.pow(far_ns, 1.5)
         return math.ceil(self.stated_ns + _SIGMAS * self.offset_sd_ns + drift_ns + wander_ns)
 
     def rate_error(self, oscillator: Oscillator) -> float:

@@ -13,7 +13,7 @@ from fanet_mw.units import MAX_NODES, NodeId
 from fanet_mw.wire import CLAIMS, OVERHEAD, VERSION, Packed, decode_every, encode_inner
 
 CAPACITY: Final = 16
-"""Entries of one message; more neighbors need a further message."""
+"""The number of entries in one message; more neighbors need further messages."""
 MESSAGE_BYTES: Final = OVERHEAD + CLAIMS.layout.size
 NO_SLOT: Final = 255
 MOST_LOTS: Final = 3
@@ -41,7 +41,7 @@ class HeardNeighbor(NamedTuple):
     node: NodeId
     standing: SlotStatus
     hears_us: bool
-    """True if the link works both ways: the neighbor names the sender of this hello among its own neighbors."""
+    """True if the link works both ways: the neighbor's own hello names the sender of this hello."""
     relay: bool = False
     """True if the sender has chosen the neighbor as one of its multipoint relays."""
 
@@ -54,7 +54,7 @@ class Claims(NamedTuple):
     heard: tuple[HeardNeighbor, ...]
 
     def encode_frames(self, room: int | None = None) -> bytes:
-        """One message per `CAPACITY` neighbors, at least one; neighbors for which there is no room are left out."""
+        """One message for each `CAPACITY` neighbors, at least one; neighbors for whom there is no room are left out."""
         most = len(self.heard) if room is None else max(1, room // MESSAGE_BYTES) * CAPACITY
         heard = self.heard[:most]
         starts = range(0, max(1, len(heard)), CAPACITY)

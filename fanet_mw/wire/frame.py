@@ -1,8 +1,9 @@
-"""One radio frame: MAVLink 2 frames, concatenated. First FANET_ROUTE, rewritten per hop; then inner frames, unchanged.
+"""The format of a radio frame: MAVLink 2 frames one after another, first FANET_ROUTE, then inner frames.
 
-The header, and the frame around every message of this project's dialect, are coded by struct and a Rust CRC, because
-every reception passes here; in the tests pymavlink is their oracle. Every decoder is total: any bytes give a value or
-MalformedFrameError. Layouts: docs/reference/air-format.md.
+Each hop rewrites FANET_ROUTE, the routing header, and leaves the inner frames unchanged. The header, and the frame
+around each message of this project's dialect, are coded by struct and a Rust CRC, because every reception passes here;
+tests compare them with pymavlink. Any bytes decode either to a value or to MalformedFrameError. The layouts are in
+docs/reference/air-format.md.
 """
 
 import struct
@@ -31,26 +32,26 @@ FLAG_TO_HEAD: Final = 2
 """The packet is on its unicast way to a cluster head."""
 PHASE_MASK: Final = FLAG_FLOOD | FLAG_TO_HEAD
 FLAG_MORE: Final = 4
-"""Another packet, header first, follows in the same radio frame."""
+"""Another packet with its own header follows in the same radio frame."""
 
 PRIORITY_CONTROL: Final = 0
 PRIORITY_SAFETY: Final = 1
 PRIORITY_REPORT: Final = 2
 PRIORITY_BULK: Final = 3
 PRIORITIES: Final = MappingProxyType({"safety": PRIORITY_SAFETY, "report": PRIORITY_REPORT, "bulk": PRIORITY_BULK})
-"""The priorities of applications' packets, by the names that people give them."""
+"""The priorities of applications' packets, by their names."""
 
 OVERHEAD: Final = 12
-"""The bytes of a MAVLink 2 frame around its payload: 10 in front, 2 of CRC behind."""
+"""The length of a MAVLink 2 frame without its payload: 10 bytes in front, and 2 of CRC behind."""
 _PREFIX: Final = struct.Struct("<BBBBBBBHB")
 _CRC: Final = struct.Struct("<H")
 _SIGNED: Final = 1
 """The only incompatibility flag that MAVLink 2 defines; a frame with another flag must not be read."""
 _SIGNATURE: Final = 13
 MOST_HOPS: Final = 255
-"""The most hops that the routing header can say."""
+"""The greatest number of hops that the routing header can state."""
 LATEST_US: Final = (1 << 63) // US - 1
-"""The latest instant that a message may name: in nanoseconds it still fits the 64 bits of bus and kernel."""
+"""The latest instant that a message may state; in nanoseconds it still fits the 64 bits of bus and kernel."""
 
 
 class Kind(IntEnum):
@@ -76,7 +77,7 @@ def system_id(node: int) -> int:
 
 
 class Spec(NamedTuple):
-    """What MAVLink needs to know of a message: id, CRC_EXTRA, payload layout."""
+    """The definition of a message, as MAVLink needs it: id, CRC_EXTRA, payload layout."""
 
     msgid: int
     crc_extra: int
@@ -106,9 +107,9 @@ _ROUTE_BEFORE: Final = _ROUTE_MARK + b"\0"
 _ROUTE_SENDER: Final = bytes((COMPONENT,)) + _ROUTE_ID
 _EXTRA: Final = bytes((ROUTE.crc_extra,))
 ANY_NODE: Final = 0xFFFF
-"""A value that is the id of no node."""
+"""An id that no node has."""
 
-# These layouts are of whole headers, with MAVLink's ten bytes: one call of struct is most of what a header costs.
+# These layouts cover whole headers, including MAVLink's ten bytes, because the calls of struct take the most time.
 _PACKED: Final = struct.Struct("<4sBB4s" + ROUTE.layout.format[1:])
 _CHECKED: Final = struct.Struct("<3s4x3s" + ROUTE.layout.format[1:] + "H")
 _BODY_END: Final = HEADER_BYTES - 2
@@ -154,17 +155,18 @@ class Header(NamedTuple):
 
 
 _new: Final = tuple.__new__
-"""Makes a named tuple three times as fast as its class does; used for what is made once per frame."""
+"""Makes a named tuple three times as fast as its class does, for objects that are made once per frame."""
 
 
 Fields = tuple[bytes, bytes, int, int, int, int, int, int, int, int, int, int, int, int]
-"""The fields at the fixed offsets of a header, unchecked: two marks, the header, version, CRC."""
+"""The values at the fixed offsets of a header, unchecked: two marks, the fields of the header, version, CRC."""
 NO_FIELDS: Final[Fields] = (b"", b"", 0, 0, 0, 0, 0, 0, 0, 0, 0, PHASE_MASK, 0, 0)
-"""Stands for the fields of bytes that cannot begin with a routing header: in both phases at once, as no packet is."""
+"""Stands for the fields of bytes that cannot begin with a routing header: it is in both phases at once, as no packet
+is."""
 
 
 def fields_of(frame: bytes) -> Fields | None:
-    """The fields at the offsets of a header; None when these bytes cannot begin with a routing header.
+    """The values at the offsets of a header; None if these bytes cannot begin with a routing header.
 
     Origin, sequence number and flags suffice to recognize a duplicate; any further use needs `checked`.
     """
@@ -175,7 +177,7 @@ def fields_of(frame: bytes) -> Fields | None:
 
 
 def peek_kind(frame: bytes) -> int | None:
-    """The kind of a packet, unchecked; None when these bytes cannot begin with a routing header."""
+    """The kind of a packet, unchecked; None if these bytes cannot begin with a routing header."""
     whole = len(frame) >= HEADER_BYTES and frame[:3] == _ROUTE_MARK and frame[7:10] == _ROUTE_ID
     return frame[_KIND_AT] if whole else None
 
@@ -217,7 +219,7 @@ def rewrite(frame: bytes, prev_hop: int, hop_limit: int, hops: int, flags: int) 
 
 
 def bundle(packets: Sequence[bytes]) -> bytes:
-    """One radio frame that holds several packets, each with its header; the packets must have been decoded."""
+    """One radio frame with several packets, each with its own header; the packets must have been decoded."""
     return b"".join((*(_with_more(packet) for packet in packets[:-1]), packets[-1]))
 
 
@@ -228,7 +230,7 @@ def _with_more(packet: bytes) -> bytes:
 
 
 def unbundle(frame: bytes) -> list[bytes]:
-    """The packets of a radio frame, each as it would come alone except for its flag; raises MalformedFrameError."""
+    """The packets in a radio frame, each as if it had come alone except for its flag; raises MalformedFrameError."""
     starts, at = [], 0
     for inner in frames(frame):
         if _message_id(inner) == ROUTE.msgid:
@@ -243,7 +245,9 @@ def unbundle(frame: bytes) -> list[bytes]:
 
 
 def frames(data: bytes, *, start: int = 0) -> Iterator[bytes]:
-    """Each MAVLink 2 frame of a run of frames, found by lengths alone; raises MalformedFrameError at a broken one."""
+    """Each of several successive MAVLink 2 frames, found by their lengths alone; raises MalformedFrameError at a broken
+    one.
+    """
     at = start
     while at < len(data):
         if len(data) - at < OVERHEAD or data[at] != MAGIC or data[at + 2] & ~_SIGNED:
@@ -271,19 +275,19 @@ def renumbered(frame: bytes, seq: int) -> bytes:
 
 
 class Content(NamedTuple):
-    """The inner frames of a packet, found and checked: decoders take it in place of the packet."""
+    """The inner frames of a packet, found and checked; decoders accept it in place of the packet."""
 
     inner: tuple[tuple[int, bytes], ...]
     """(message id, whole MAVLink frame) of each, in order."""
 
     @classmethod
     def of(cls, frame: bytes) -> "Content":
-        """The content of a packet, routing header first; raises MalformedFrameError unless all of it is sound."""
+        """The content of a packet, routing header first; raises MalformedFrameError unless all of it is valid."""
         return cls(tuple(_found_in(frame)))
 
 
 Packed = bytes | Content
-"""A packet, routing header first, or what has been found in it already."""
+"""A packet, routing header first, or its content if that was found already."""
 
 
 def inner_frames(packed: Packed) -> Iterable[tuple[int, bytes]]:
@@ -365,9 +369,9 @@ _OURS: Final = {spec.msgid: spec for spec in SPECS}
 # --- application data ---------------------------------------------------------------------------------------------
 
 CHUNK_HEAD: Final = struct.Struct("<HBB")
-"""The front of the payload of a FANET_CHUNK: the length of its data, its number, and how many there are."""
+"""The beginning of the payload of a FANET_CHUNK: the length of its data, its number, and the number of chunks."""
 CHUNK_DATA: Final = 240
-"""The most bytes of data in one FANET_CHUNK."""
+"""The greatest number of bytes of data in one FANET_CHUNK."""
 _LEAST_CHUNK: Final = OVERHEAD + CHUNK_HEAD.size + 1
 _WHOLE_CHUNK: Final = OVERHEAD + CHUNK_HEAD.size + CHUNK_DATA
 _MOST: Final = 255 * _WHOLE_CHUNK
@@ -386,7 +390,8 @@ def filler(size: int, *, node: int = 1) -> bytes:
         raise LocalProtocolError(f"filler size = {size} must be 0 or in [{_LEAST_CHUNK}, {_MOST}]")
     lengths = [_WHOLE_CHUNK] * (size // _WHOLE_CHUNK)
     rest = size % _WHOLE_CHUNK
-    if 0 < rest < _LEAST_CHUNK:  # too short for a frame of its own: the previous frame gives up some bytes
+    # it would be too short for a frame of its own, so the previous frame gives up some bytes
+    if 0 < rest < _LEAST_CHUNK:
         lengths[-1] -= _LEAST_CHUNK - rest
         rest = _LEAST_CHUNK
     if rest:

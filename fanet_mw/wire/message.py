@@ -4,8 +4,8 @@
                            [FANET_TARGETS ...]  FANET_MESSAGE  MAVLink messages         port 0, always one piece
     packet of receipts     FANET_RECEIPT ...
 
-Every decode is total: any bytes give a value or MalformedFrameError, and no value asks for more memory than the packet
-that brought it.
+Any bytes decode either to a value or to MalformedFrameError. No value needs more memory than the packet that brought
+it.
 """
 
 import struct
@@ -29,9 +29,9 @@ from fanet_mw.wire.frame import (
 )
 
 MOST_PIECES: Final = 64
-"""The most pieces of a message: a receipt has so many bits."""
+"""The greatest number of pieces of a message, which is the number of bits in a receipt."""
 MAVLINK_PORT: Final = 0
-"""The port of messages that are MAVLink messages themselves."""
+"""The port of messages that consist of MAVLink messages."""
 MOST_LIFETIME_MS: Final = 3_600_000
 HEAD_BYTES: Final = OVERHEAD + MESSAGE.layout.size
 RECEIPT_BYTES: Final = OVERHEAD + RECEIPT.layout.size
@@ -39,11 +39,11 @@ _TARGETS_BYTES: Final = OVERHEAD + TARGETS.layout.size
 _TARGETS_EACH: Final = 32
 _CHUNK_OVERHEAD: Final = OVERHEAD + CHUNK_HEAD.size
 _PAYLOAD_AT: Final = 10
-"""The place of the payload in a MAVLink 2 frame."""
+"""The offset of the payload in a MAVLink 2 frame."""
 
 
 class Head(NamedTuple):
-    """FANET_MESSAGE: which piece of which message this is, and which message goes before it (0: none)."""
+    """FANET_MESSAGE: identifies a piece of a message, and the message before it in its flow (0: none)."""
 
     born_us: int
     number: int
@@ -81,12 +81,12 @@ class Head(NamedTuple):
 
     @property
     def length(self) -> int:
-        """Bytes of data in this piece."""
+        """The number of bytes of data in this piece."""
         return self.stride if self.piece < self.pieces - 1 else self.size - self.piece * self.stride
 
 
 class Receipt(NamedTuple):
-    """FANET_RECEIPT: what a target has of a message."""
+    """FANET_RECEIPT: the pieces of a message that a target has received, and the outcome."""
 
     held: int
     number: int
@@ -103,27 +103,27 @@ GIVEN_UP: Final = 3
 
 
 class Piece(NamedTuple):
-    """What one packet brings of a message."""
+    """A piece of a message, as one packet brings it."""
 
     head: Head
     targets: frozenset[int] | None
-    """The nodes that are meant to have it; None: those that the packet's destination names."""
+    """The nodes for which it is meant; None if these are the packet's destination."""
     data: bytes
 
 
 def targets_bytes(count: int) -> int:
-    """Length of the frames that name so many targets."""
+    """The length of the frames that name this number of targets."""
     return -(-count // _TARGETS_EACH) * _TARGETS_BYTES
 
 
 def room_for_data(size: int) -> int:
-    """The bytes of data that fit into chunks of so many bytes together."""
+    """The number of bytes of data that fit into chunks of `size` bytes together."""
     whole, rest = divmod(size, _CHUNK_OVERHEAD + CHUNK_DATA)
     return max(0, whole * CHUNK_DATA + max(0, rest - _CHUNK_OVERHEAD))
 
 
 def encode_piece(head: Head, data: bytes, *, node: int, targets: Collection[int] = ()) -> bytes:
-    """The inner frames of a packet; `data` of port 0 are MAVLink frames."""
+    """The inner frames of a packet; on port 0, `data` are MAVLink frames."""
     parts = [_targets(chunk, node) for chunk in _split(sorted(targets))]
     parts.append(head.encode_frame(node))
     parts += [data] if head.port == MAVLINK_PORT else _chunks(data, node)

@@ -1,4 +1,5 @@
-"""FANET_PLACES: where the members of a schedule part are, in whole meters, so that all nodes compute one timetable.
+"""FANET_PLACES: the positions of the members in a part of a schedule, in whole metres, so that all nodes compute the
+same timetable.
 
 The message follows its FANET_SCHEDULE in the same packet; entry i belongs to member `first + i` of that part.
 """
@@ -11,7 +12,7 @@ from fanet_mw.units import Enu
 from fanet_mw.wire import PLACES, VERSION, Packed, decode_every, encode_inner
 
 CAPACITY: Final = 28
-"""Entries of one message; two messages hold the members of one schedule part."""
+"""The number of entries in one message; two messages hold the members of one part of a schedule."""
 _MOST_M: Final = 32767
 
 
@@ -22,7 +23,7 @@ def rounded(place: Enu) -> Enu:
 
 
 class Places(NamedTuple):
-    """The places of one schedule part, and of the leader, which is in no cluster."""
+    """The positions of one part of a schedule, and that of the leader, who is in no cluster."""
 
     members: tuple[Enu, ...]
     leader: Enu

@@ -1,6 +1,7 @@
-"""The inner messages of a planned search: the plan, how each UAV is, bids for tasks, and where survivors are.
+"""The inner messages of a planned search: the plan, statuses of UAVs, bids for tasks, and the places of survivors.
 
-Like the rest of this dialect they are coded by struct; decoders are total, and refuse what no sender would say.
+Like the rest of this dialect they are coded by struct. Any bytes decode to a message or to MalformedFrameError; values
+that no node of this project would send are malformed.
 """
 
 import math
@@ -28,20 +29,20 @@ from fanet_mw.wire.frame import (
 from fanet_mw.wire.inner import MOST_SURVIVORS, Survivor
 
 MOST_PLACES: Final = 79
-"""Places of a formation that one message can hand out."""
+"""The number of places of a formation that one message can assign."""
 MOST_BIDS: Final = 12
-"""Bids of one message."""
+"""The number of bids in one message."""
 COVERED_SIDE: Final = 32
-"""Rows and columns of cells in which the area is searched."""
+"""The number of rows and columns of cells into which the area is divided for the map of searched cells."""
 _COVERED_BYTES: Final = COVERED_SIDE * COVERED_SIDE // 8
 WITHDRAWN: Final = 0xFFFF
-"""The time of arrival of a bid that is taken back."""
+"""The time of arrival that marks a withdrawn bid."""
 _MOST_VARIANCE_M2: Final = 1e10
 _LINES: Final = 0
 _SPIRAL: Final = 1
 _LAST_SHAPE: Final = 2
 _LEAST_M: Final = 1.0
-"""Lengths of a formation that may not vanish are at least this."""
+"""The least value of those lengths of a formation that must not be 0."""
 _FASTEST_M_S: Final = 1000.0
 
 
@@ -63,7 +64,7 @@ class Search(NamedTuple):
     revision: int
     planner: int
     nodes: tuple[int, ...]
-    """The node of each place; 0: vacant."""
+    """The node at each place; 0 if the place is vacant."""
     lanes: int
     relays: int
     followers: int
@@ -116,14 +117,15 @@ class Search(NamedTuple):
 
 
 class SearchStatus(NamedTuple):
-    """FANET_STATUS: where a UAV is and how it is."""
+    """FANET_STATUS: the position and the state of a UAV."""
 
     t_us: int
     position: Enu
     node: int
     revision: int
     charge: int
-    """Percent of the battery that may be spent yet, above the way home and a reserve; 0: the UAV flies home."""
+    """The percentage of the battery that may still be spent, above the way home and a reserve; 0:
+    the UAV flies home."""
 
     def encode_frame(self, node: int) -> bytes:
         payload = STATUS.layout.pack(self.t_us, *self.position, *self[2:], VERSION)
@@ -151,14 +153,14 @@ class SearchStatus(NamedTuple):
 
 
 class Bid(NamedTuple):
-    """One entry of FANET_BIDS: `bidder` would be with `survivor` within `eta_ds` tenths of a second."""
+    """One entry of FANET_BIDS: `bidder` can be at `survivor` within `eta_ds` tenths of a second."""
 
     survivor: int
     bidder: int
     eta_ds: int
     serial: int
     age_s: int = 0
-    """The time since the bidder last confirmed it."""
+    """The time since the bidder last confirmed the bid."""
 
 
 def encode_bids(bids: Sequence[Bid], *, node: int) -> bytes:
@@ -186,24 +188,22 @@ def checked_bids(fields: tuple[Any, ...]) -> "Bids":
 
 
 class Bids(NamedTuple):
-    """What one message FANET_BIDS holds."""
+    """The content of one FANET_BIDS message."""
 
     bids: tuple[Bid, ...]
 
 
 class Standing(IntEnum):
-    """What a FANET_FOUND says of the place that it names."""
+    """The meaning of a FANET_FOUND for the place that it names."""
 
     ESTIMATED = 0
     CONFIRMED = 1
     REFUTED = 2
-    """Confirmations there are taken back: what has been heard since contradicts them."""
+    """Confirmations at this place are taken back, because later receptions contradict them."""
 
 
 class Found(NamedTuple):
-    """FANET_FOUND: where a survivor is estimated to be, that it is confirmed there, or that it is not there after
-    all.
-    """
+    """FANET_FOUND: the estimated place of a survivor, a confirmation at that place, or its refutation."""
 
     t_us: int
     survivor: int
@@ -220,7 +220,7 @@ class Found(NamedTuple):
 
     @classmethod
     def decode_frame(cls, packed: Packed) -> Self:
-        """The first FANET_FOUND in a frame; raises MalformedFrameError, for what is no covariance too."""
+        """The first FANET_FOUND in a frame; raises MalformedFrameError, also for an impossible covariance."""
         return cls.checked(decode_first(FOUND, packed))
 
     @classmethod
@@ -269,7 +269,7 @@ class Covered(NamedTuple):
 
 
 Told = Survivor | Search | SearchStatus | Bids | Found | Covered
-"""What searching UAVs tell each other."""
+"""The messages that searching UAVs send each other."""
 _CHECKED: Final[Mapping[int, Callable[[tuple[Any, ...]], Told]]] = {
     SURVIVOR.msgid: Survivor.checked,
     SEARCH.msgid: Search.checked,

@@ -1,1 +1,1 @@
-"""The paper's evaluation, recreated: each figure from a shipped sweep, and a verdict of each claim, by code."""
+"""The paper's evaluation, recreated: figures from shipped sweeps, and verdicts on claims, both by code."""

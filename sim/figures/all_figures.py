@@ -1,4 +1,4 @@
-"""Every figure, by the name that people call it."""
+"""All figures, by the names that `fanet figures` accepts."""
 
 from collections.abc import Mapping, Sequence
 from typing import Final
@@ -22,11 +22,11 @@ FIGURES: Final[Mapping[str, Recipe]] = {
     "mission": rescue.MISSION,
     "realtime": realtime.REALTIME,
 }
-"""`all` are these, in this order."""
+"""The figures of `all`, in this order."""
 
 
 def chosen(names: Sequence[str]) -> list[Recipe]:
-    """The figures of these names, each once; raises ConfigError for one that there is not."""
+    """The figures of these names, each once; raises ConfigError for a name that does not exist."""
     wanted = [name for given in names or ("all",) for name in (FIGURES if given == "all" else (given,))]
     for name in wanted:
         if name not in FIGURES:

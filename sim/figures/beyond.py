@@ -1,4 +1,4 @@
-"""Beyond the paper: load, size, clocks and age of information, and what each mechanism adds."""
+"""Figures beyond the paper: load, swarm size, clock errors, age of information, and an ablation of the mechanisms."""
 
 import math
 from collections.abc import Sequence
@@ -21,13 +21,13 @@ _ABLATION_PANELS: Final[Sequence[tuple[str, Sequence[str], float]]] = (
     ("95th percentile of the delay [s]", ("delay_ms.p95", _URGENT_P95), 1e-3),
     ("share of time the air is busy", ("air.busy",), 1.0),
 )
-"""The label of each panel, its quantities (of the load; of urgent packets), and the factor for its unit."""
+"""The label of each panel, its quantities (for the load, for urgent packets), and the factor for its unit."""
 _RIVALS: Final = ("paper", "flooding", "gossip", "counter")
 _ALL: Final = 0.99
 
 
 def _ms_per_delivery(row: Row) -> float | None:
-    """Time that the air is busy at a mean station, per packet delivered to it [ms]."""
+    """The busy time of the channel at a mean station, per packet delivered to it [ms]."""
     per_node = row["delivered"] / row["nodes"]
     return row["air.busy"] * row["duration_s"] * 1e3 / per_node if per_node else None
 
@@ -92,7 +92,7 @@ def claims_clocks(runs: Runs) -> list[Claim]:
 
 def claims_age(runs: Runs) -> list[Claim]:
     def youngest(case: str) -> dict[int, float]:
-        """The least age over all intervals, seed by seed."""
+        """The least age over all intervals, for each seed."""
         levels = runs.levels("traffic.interval_s")
         negative = [runs.per_seed(lambda row: -row["age_s"], case=case, traffic__interval_s=at) for at in levels]
         return {seed: -age for seed, age in best(*negative).items()}

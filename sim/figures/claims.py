@@ -1,12 +1,12 @@
-"""What the paper claims of a figure, and the verdict: both are code over the table of a sweep.
+"""The claims of the paper about a figure, and verdicts on them; both are code over the table of a sweep.
 
-A claim is one or more statements. A statement is a quantity with one value per seed, and the side of a threshold on
-which the claim has it. It holds when the whole 95 % interval of its mean is on that side, fails when the whole interval
-is on the other, and is open when the threshold lies within. A claim agrees when all its statements hold, differs when
-all fail, and is partly so otherwise.
+A claim consists of statements. A statement is a quantity with one value per seed, and the side of a threshold on which
+the claim expects it. It holds if the whole 95 % interval of the mean is on that side, fails if the whole interval is on
+the other side, and is open if the threshold lies within. A claim agrees if all its statements hold, differs if all
+fail, and is otherwise partly so.
 
-A reason says why a verdict is what it is, and is judged in the same way: it rests on statements over the same runs, an
-experiment that would come out otherwise if the reason were wrong. It counts as shown when all of them hold.
+A reason explains a verdict, and is judged in the same way: it has statements over the same runs, an experiment that
+would come out differently if the reason were wrong. It counts as shown if all of them hold.
 """
 
 from collections.abc import Mapping, Sequence
@@ -17,7 +17,7 @@ from typing import Any, Final, Literal
 from sim.figures.statistics import Interval, interval
 
 BEYOND: Final = "(Beyond the paper) "
-"""What people are shown before a claim that is not the paper's; its figure is 0."""
+"""The text before a claim that is not the paper's."""
 Values = Sequence[float] | Mapping[int, float]
 """One value per seed, or the value of each seed."""
 
@@ -40,7 +40,7 @@ class Finding(StrEnum):
 
 @dataclass(frozen=True, slots=True)
 class Statement:
-    """A quantity, one value per seed, and where the claim has it."""
+    """A quantity with one value per seed, and the side of a threshold on which a claim expects it."""
 
     what: str
     values: Sequence[float]
@@ -61,7 +61,7 @@ class Statement:
         return Finding.HOLDS if above == (self.side == "above") else Finding.FAILS
 
     def text(self, verb: str = "claimed") -> str:
-        """For people, with the figures; the verb says whose threshold it is."""
+        """The statement as text, with the figures; the verb says whose threshold it is."""
         bound = f"{self.side} {self.threshold:g}{f' {self.unit}' if self.unit else ''}"
         return f"{self.what}: {self.interval.text(self.unit)}, {verb} {bound}: {self.finding}"
 
@@ -98,16 +98,16 @@ def _listed(values: Values) -> Sequence[float]:
 
 @dataclass(frozen=True, slots=True)
 class Reason:
-    """Why a verdict is what it is, and the experiment that shows so."""
+    """The explanation of a verdict, and the experiment that shows it."""
 
     text: str
     statements: Sequence[Statement]
     set_afterwards: str = ""
-    """What of it was chosen after such runs had been seen, so that they are no test of that."""
+    """Which part of it was chosen after such runs had been seen, and is therefore not tested by them."""
 
     @property
     def shown(self) -> bool:
-        """True when every statement holds; a reason without statements is shown by nothing."""
+        """True if all statements hold; a reason without statements is not shown."""
         return {statement.finding for statement in self.statements} == {Finding.HOLDS}
 
     def plain(self) -> dict[str, Any]:
@@ -122,7 +122,7 @@ class Reason:
 
 @dataclass(frozen=True, slots=True)
 class Claim:
-    """One sentence of the paper, and what decides over it."""
+    """One sentence of the paper, and the statements that decide about it."""
 
     figure: int
     claim: str

@@ -1,4 +1,4 @@
-"""Figures that are panels of quantities over one setting, a line for each case of the sweep."""
+"""Figures with panels that show quantities over one setting, with a line for each case of the sweep."""
 
 import math
 from collections.abc import Callable, Sequence
@@ -9,7 +9,7 @@ from sim.figures.runs import Quantity, Runs
 from sim.figures.style import LOOKS, SERIES, Look, beside, canvas, legend_above, line, plain_log, ticks_at
 
 _APART: Final = 0.025
-"""The marks of two lines at one value stand so far apart: as a share of it, or of the way to the next value."""
+"""The distance of the marks of two lines at the same value: a share of that value, or of the step to the next one."""
 
 
 class Panel(NamedTuple):
@@ -20,13 +20,13 @@ class Panel(NamedTuple):
     """The label of the vertical axis, with its unit."""
     log: bool = False
     factor: float = 1.0
-    """What the quantity is multiplied by for its unit on the axis."""
+    """The factor that converts the quantity into the unit of its axis."""
     share: bool = False
-    """True for what lies between 0 and 1."""
+    """True if the quantity lies between 0 and 1."""
     least: float = 0.0
-    """Where a linear axis begins."""
+    """The beginning of a linear axis."""
     most: float = math.inf
-    """The greatest value that there can be, if it is no share."""
+    """The greatest possible value, if the quantity is not a share."""
 
 
 def curves(
@@ -37,7 +37,8 @@ def curves(
     value: Callable[[Any], float] = float,
     even: bool = False,
 ) -> Callable[[Runs], Drawing]:
-    """How to draw the panels over a setting; `value` says what number on the horizontal axis one of its values is.
+    """A function that draws the panels over a setting; `value` converts a value of the setting into a number on the
+    horizontal axis.
 
     The axis is logarithmic, or `even`: then neighboring values are equally far apart, whatever they are.
     """
@@ -74,5 +75,5 @@ def curves(
 
 
 def _look(case: str, number: int) -> Look:
-    """A protocol has its look in all figures; other cases have theirs by their order."""
+    """The look of a line: that of a protocol is the same in all figures; other cases get theirs by their order."""
     return LOOKS[case] if case in LOOKS else SERIES[number % len(SERIES)]._replace(label=case)

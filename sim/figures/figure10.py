@@ -1,4 +1,4 @@
-"""Figure 10: the paper's method against clusters and flooding period. Claims: what is best, what is too often."""
+"""Figure 10: the paper's method with different numbers of clusters and flooding periods."""
 
 from collections.abc import Mapping, Sequence
 from typing import Final
@@ -12,7 +12,7 @@ _MANY: Final = 22
 _SELDOM_S: Final = 1.0
 _LOW: Final = 0.05
 _APART: Final = 0.04
-"""The marks of two lines at one number of clusters stand so far apart, as a share of it."""
+"""The distance of the marks of two lines at the same number of clusters, as a share of it."""
 _PACES: Final = {"burst": "at once (the paper)", "spread": "over the slot (default)"}
 
 
@@ -67,23 +67,23 @@ def _intervals(runs: Runs) -> list[float]:
 
 
 def _few(runs: Runs) -> list[int]:
-    """The numbers of clusters that the claim has to be worse."""
+    """The numbers of clusters that are worse by the claim."""
     return [count for count in runs.levels("clusters.count") if count < _MANY]
 
 
 def _many(runs: Runs) -> list[int]:
-    """The numbers of clusters that the claim has to be best."""
+    """The numbers of clusters that are best by the claim."""
     return [count for count in runs.levels("clusters.count") if count >= _MANY]
 
 
 def _over_periods(runs: Runs, case: str, clusters: int, interval_s: float) -> Mapping[int, float]:
-    """The PDR of each seed, its mean over all flooding periods."""
+    """The PDR of each seed, as the mean over all flooding periods."""
     periods = runs.levels("clusters.flooding_period_s")
     return pooled(*(_pdr(runs, case, clusters, period_s, interval_s) for period_s in periods))
 
 
 def _lead_of_many(runs: Runs, case: str, interval_s: float) -> dict[int, float]:
-    """The best PDR of many clusters minus the best of few, seed by seed."""
+    """The best PDR with many clusters minus the best with few, for each seed."""
     many, few = (
         best(*(_over_periods(runs, case, count, interval_s) for count in counts))
         for counts in (_many(runs), _few(runs))
@@ -92,7 +92,7 @@ def _lead_of_many(runs: Runs, case: str, interval_s: float) -> dict[int, float]:
 
 
 def _gain_of_spreading(runs: Runs, counts: Sequence[int], interval_s: float) -> list[float]:
-    """The PDR when packets are let out over the slot minus that when they are at once, seed by seed."""
+    """The PDR if packets are spread over the slot minus the PDR if they are sent at once, for each seed."""
     spread, burst = (
         pooled(*(_over_periods(runs, case, count, interval_s) for count in counts)) for case in ("spread", "burst")
     )
@@ -100,7 +100,7 @@ def _gain_of_spreading(runs: Runs, counts: Sequence[int], interval_s: float) -> 
 
 
 def _gain_of_flooding_seldom(runs: Runs, case: str, counts: Sequence[int], interval_s: float) -> dict[int, float]:
-    """The PDR with periods of a second and more minus that with shorter ones, seed by seed."""
+    """The PDR with periods of a second and more minus that with shorter ones, for each seed."""
     periods = runs.levels("clusters.flooding_period_s")
     seldom, often = (
         pooled(*(_pdr(runs, case, count, period_s, interval_s) for count in counts for period_s in chosen))

@@ -1,4 +1,6 @@
-"""Figure 11: delays of flooding, of the paper's method, and of the timetable. Claims: means, tails and the 0.5 s."""
+"""Figure 11: the delays of flooding, of the paper's method, and of the timetable: means, tails, and
+the limit of 0.5 s.
+"""
 
 import math
 from collections.abc import Callable
@@ -27,11 +29,11 @@ _INTERVAL_S: Final = 0.1
 _SOURCES: Final = 44
 _CLUSTERS: Final = 8
 _CLASSES: Final = 4
-"""Classes of `delay_counts` that are drawn as one bar of the histogram."""
+"""The number of classes of `delay_counts` that form one bar of the histogram."""
 
 
 def paper_bound_s() -> float | None:
-    """The paper's worst case for one cluster with the slot of its equations; None where they give no number."""
+    """The paper's worst case for one cluster with the slot of its equations; None if they give no number."""
     found = cluster_estimate(
         airtime_ns=1,  # it does not matter with that slot
         slot_ns=None,
@@ -42,7 +44,7 @@ def paper_bound_s() -> float | None:
 
 
 def _share_within(limit_s: float, *, of_all: bool) -> Callable[[Row], float]:
-    """Deliveries within a limit, of all packets x targets or of the deliveries."""
+    """The share of deliveries within a limit: of all packets x targets, or of the deliveries."""
     last = next(number for number, edge in enumerate(DELAY_EDGES_S) if edge >= limit_s * 0.999)
 
     def share(row: Row) -> float:
@@ -59,7 +61,7 @@ _OF_DELIVERIES: Final = _share_within(_WITHIN_S, of_all=False)
 
 def _kept(row: Row) -> float | None:
     """The share that arrived within its bound, of packets x targets for which a bound was stated."""
-    stated = row.get("bound.stated_share")  # a table has no such column when no run stated a bound
+    stated = row.get("bound.stated_share")  # a table has no such column if no run stated a bound
     return float(row["bound.within_share"] / stated) if stated else None
 
 
@@ -110,7 +112,7 @@ def _seen(runs: Runs, quantity: Quantity, case: str) -> dict[int, float]:
 
 def _flooding_is_faster_on_average(runs: Runs) -> Claim:
     def longer(quantity: str) -> list[float]:
-        """The paper's method minus flooding, seed by seed."""
+        """The paper's method minus flooding, for each seed."""
         return differences(_seen(runs, quantity, "paper"), _seen(runs, quantity, "flooding"))
 
     slots = Reason(

@@ -1,6 +1,4 @@
-"""Figure 12: how soon UAVs turn towards survivors, by network and load. Claims: which is first, which hardly
-changes.
-"""
+"""Figure 12: how soon UAVs turn towards survivors, by network and load."""
 
 import math
 from collections.abc import Callable, Mapping, Sequence
@@ -27,14 +25,14 @@ _WINDOW_S: Final = (50.0, 70.0)
 _MOST: Final = 0.5
 _HARDLY_S: Final = 5.0
 _AT_ONCE_S: Final = 1.0
-"""One period of a report, where the instants themselves are tens of seconds."""
+"""One period of reports; the instants of turning are tens of seconds."""
 _LIMIT_SET_AFTERWARDS: Final = "the limit of 1 s. It was 0.1 s, which three seeds kept; ten leave that open."
 _SECONDS_S: Final = 5.0
 _FREE: Final = 0.5
 _SINCE_S: Final = tuple(math.pow(10.0, step / 10) for step in range(-30, 19))
 """The edges of the classes of time, from a millisecond to more than a minute."""
 _STEP_S: Final = 0.5
-"""The distance of instants at which turned UAVs are counted for the mean."""
+"""The distance of the instants at which turned UAVs are counted for the mean."""
 
 
 def _times(row: Row) -> list[float]:
@@ -53,23 +51,25 @@ def _at_end(row: Row) -> float:
 
 
 def _at_end_if_any(row: Row) -> float | None:
-    """The number of UAVs that have changed course when the run ends; None: nobody has, three never heard one phone."""
+    """The number of UAVs that have changed course when the run ends; None if none has, because three never received the
+    same phone.
+    """
     return _at_end(row) or None
 
 
 def _heard(row: Row) -> float:
-    """The number of UAVs that have heard a phone."""
+    """The number of UAVs that have received a phone."""
     return float(len(row["first_detected_s"] or ()))
 
 
 def _half_s(row: Row) -> float | None:
-    """The instant by which half of the swarm has changed course; None: it never has."""
+    """The instant by which half of the swarm has changed course; None if it never has."""
     times, half = sorted(_times(row)), int(row["nodes"]) // 2
     return times[half - 1] if len(times) >= half else None
 
 
 def _wait_s(row: Row) -> float | None:
-    """The time from when enough UAVs have heard the same phone until half of the swarm has turned."""
+    """The time from when enough UAVs have received the same phone until half of the swarm has turned."""
     half_s, heard_s = _half_s(row), row["enough_heard_s"]
     return None if half_s is None or heard_s is None else half_s - heard_s
 
@@ -80,12 +80,14 @@ def _in_window(row: Row) -> float | None:
 
 
 def _after(limit_s: float) -> Callable[[Row], float]:
-    """The number of UAVs that have changed course so long after enough had heard a phone; 0 if that never was."""
+    """The number of UAVs that have changed course this long after enough had received a phone; 0 if that never
+    happened.
+    """
     return lambda row: _by((row["enough_heard_s"] or 0.0) + limit_s)(row)
 
 
 def _draw_since_start(axes: Axes, look: Look, rows: Sequence[Row]) -> list[Mapping[str, Any]]:
-    """The number of UAVs that have turned by each instant: the mean as a line, each seed as a thin one."""
+    """The number of UAVs that have turned by each instant: the mean as a line, and each seed as a thin line."""
     longest_s = max(row["duration_s"] for row in rows)
     for row in rows:
         times = sorted(_times(row))
@@ -100,7 +102,7 @@ def _draw_since_start(axes: Axes, look: Look, rows: Sequence[Row]) -> list[Mappi
 
 
 def _draw_since_heard(axes: Axes, look: Look, rows: Sequence[Row]) -> list[Mapping[str, Any]]:
-    """The same over the time since enough UAVs had heard the same phone, with the interval of the mean as a band."""
+    """The same over the time since enough UAVs received the same phone, with the interval of the mean as a band."""
     counts = [interval([_after(at)(row) for row in rows]) for at in _SINCE_S]
     axes.plot(_SINCE_S, [one.mean for one in counts], color=look.color, linestyle=look.dash, label=look.label)
     band(axes, look, _SINCE_S, counts, most=rows[0]["nodes"])
@@ -235,7 +237,7 @@ def _most_turn_in_the_window(runs: Runs) -> Claim:
 
 
 def _point_masses_do(flown: Mapping[int, float], simple: Mapping[int, float]) -> Claim:
-    """The claim about half of the swarm's time, by the physics engine and as point masses."""
+    """The claim about the time until half of the swarm has turned, with the physics engine and with point masses."""
     change = [abs(value) for value in differences(flown, simple)]
     return Claim(
         0,
@@ -251,7 +253,7 @@ _CLAIMS: Final = (
 
 
 def claims(runs: Runs) -> list[Claim]:
-    """The paper's claims, and where both were run, whether the fast model of flight changes anything."""
+    """The paper's claims and, if both engines were run, whether the fast model of flight changes anything."""
     found = [claim(runs) for claim in _CLAIMS]
     flown = _seen(runs, _half_s, _FLOWN, _SLOW_S)
     return [*found, _point_masses_do(flown, _seen(runs, _half_s, "paper", _SLOW_S))] if flown else found

@@ -1,4 +1,4 @@
-"""Figure 8: routing protocols of the field against speed. Claims of the paper: 4, on AODV and OLSR."""
+"""Figure 8: routing protocols at different speeds, with four claims of the paper about AODV and OLSR."""
 
 import math
 from collections.abc import Mapping
@@ -14,26 +14,26 @@ from sim.figures.style import LOOKS, Look, beside, canvas, legend_above, line, p
 _SPEED: Final = "mobility.speed_m_s"
 _AT: Final = "mobility__speed_m_s"
 _SHARP: Final = 0.1
-"""A fall of the PDR by less than this is not called sharp."""
+"""A smaller decrease of the PDR than this is not called sharp."""
 _LOW: Final = 0.9
-"""A PDR below this is low: one packet in ten is lost."""
+"""A PDR below this is called low, because one packet in ten is lost."""
 _HIGH: Final = 0.95
 _IDLE: Final = 0.2
-"""A busy share of the air below this leaves room for everyone."""
+"""A channel that is busy for a smaller share than this has room for all."""
 _HARDLY_MS: Final = 5.0
 _APART_M_S: Final = 0.3
-"""The marks of two lines at one speed stand so far apart."""
+"""The distance of the marks of two lines at the same speed."""
 _NAMES: Final = {case: LOOKS[case].label for case in ("aodv", "olsr")}
 """The paper's protocols."""
 
 
 def _below_limit(row: Row) -> float | None:
-    """The difference of the share of pairs that any path connects and the PDR."""
+    """The share of pairs that any path connects, minus the PDR."""
     return None if row["pdr"] is None else float(row["connected"] - row["pdr"])
 
 
 class _Curve(NamedTuple):
-    """One line of a panel: a quantity of one case over the speeds at which the case was run."""
+    """One line of a panel: a quantity of one case over the speeds at which it was run."""
 
     quantity: Quantity
     case: str
@@ -43,7 +43,7 @@ class _Curve(NamedTuple):
     """The unit of the quantity; a quantity without one is a share."""
 
     def draw(self, runs: Runs, axes: Axes, *, number: int, of: int) -> list[Mapping[str, Any]]:
-        """Draw it as one of several lines; returns the numbers in it."""
+        """Draw it as one of several lines; returns its numbers."""
         speeds = runs.levels(_SPEED, case=self.case)
         found = [runs.of(self.quantity, case=self.case, **{_AT: speed}) for speed in speeds]
         places = [beside(speed, number, of, log=False, apart=_APART_M_S) for speed in speeds]
@@ -101,17 +101,17 @@ def _fast(runs: Runs, quantity: Quantity, case: str) -> dict[int, float]:
 
 
 def _fall(runs: Runs, quantity: Quantity, case: str) -> list[float]:
-    """The quantity when all are slow minus that when all are fast, seed by seed."""
+    """The quantity at the lowest speed minus that at the highest, for each seed."""
     return differences(_slow(runs, quantity, case), _fast(runs, quantity, case))
 
 
 def _rise(runs: Runs, quantity: Quantity, case: str) -> list[float]:
-    """The quantity when all are fast minus that when all are slow, seed by seed."""
+    """The quantity at the highest speed minus that at the lowest, for each seed."""
     return differences(_fast(runs, quantity, case), _slow(runs, quantity, case))
 
 
 def _span(runs: Runs) -> str:
-    """The lowest and the highest speed, for people."""
+    """The lowest and the highest speed as text."""
     speeds = runs.levels(_SPEED)
     return f"from {speeds[0]:g} to {speeds[-1]:g} m/s"
 

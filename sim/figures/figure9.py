@@ -1,4 +1,6 @@
-"""Figure 9: plain flooding against the number of sources. Claim of the paper: it falls, because frames collide."""
+"""Figure 9: plain flooding with different numbers of sources. The paper claims that the PDR falls because frames
+collide.
+"""
 
 from typing import Final
 

@@ -1,4 +1,4 @@
-"""Beyond the paper: the delays of a swarm of processes, laid over those of the same swarm in virtual time."""
+"""Beyond the paper: the delays of a swarm of real processes, over those of the same swarm in virtual time."""
 
 from typing import Final
 

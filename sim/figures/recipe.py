@@ -1,4 +1,4 @@
-"""A figure: the sweep it is made of, how it is drawn, and what the paper claims of it."""
+"""The description of a figure: its sweep, how it is drawn, and the paper's claims about it."""
 
 from collections.abc import Callable, Mapping, Sequence
 from dataclasses import dataclass
@@ -12,7 +12,7 @@ from sim.figures.statistics import Interval
 
 
 class Drawing(NamedTuple):
-    """A picture and the numbers in it."""
+    """A picture and its numbers."""
 
     figure: Figure
     data: Sequence[Mapping[str, Any]]
@@ -28,11 +28,11 @@ class Recipe:
     sweep: str
     """The shipped sweep that it is made of."""
     caption: str
-    """What is drawn, how it was run, and what to see."""
+    """The caption: what is drawn, how it was run, and what can be seen."""
     draw: Callable[[Runs], Drawing]
     claims: Callable[[Runs], list[Claim]] = lambda _: []
 
 
 def point(found: Interval, **where: object) -> dict[str, Any]:
-    """One row of the data beside a picture."""
+    """One row of the data file beside a picture."""
     return {**where, "mean": found.mean, "low": found.low, "high": found.high, "seeds": found.runs}

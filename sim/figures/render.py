@@ -1,4 +1,4 @@
-"""From the table of a sweep to the files of a figure: PNG, SVG, the numbers beside them, and the verdicts."""
+"""Makes the files of a figure from the table of a sweep: PNG, SVG, the numbers, and the verdicts."""
 
 import json
 from pathlib import Path
@@ -13,7 +13,7 @@ from sim.figures.style import applied, save, save_data
 
 
 def render(recipe: Recipe, table: Table, folder: Path, *, variant: str = "quick") -> list[Claim]:
-    """Draw a figure from the runs of a variant of its sweep and judge its claims; returns them."""
+    """Draw a figure from the runs of a variant of its sweep, and judge its claims; returns them."""
     runs = Runs(table)
     if not runs.rows:
         raise ConfigError(f"{recipe.name}: the sweep has no run that ended well")

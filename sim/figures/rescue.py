@@ -1,4 +1,4 @@
-"""Beyond the paper: how old survivor reports are, and how long a search takes as the network gets worse."""
+"""Beyond the paper: the age of survivor reports, and how long a search takes when the network gets worse."""
 
 import re
 from typing import Final
@@ -15,17 +15,19 @@ _HALF: Final = 0.5
 _MOST: Final = 0.8
 _HARDLY_S: Final = 5.0
 _END_S: Final = 80.0
-"""The length of a run, at which a search counts as ended."""
+"""The length of a run, which stands for the time of a search that did not end."""
 
 
 def loss_share(faults: str) -> float:
-    """The share of frames that every link loses, from the scenario's faults as TOML."""
+    """The share of frames that each link loses, by the scenario's faults as TOML."""
     found = _LOSS.search(faults)
     return float(found[1]) if found else 0.0
 
 
 def confirmed_s(row: Row, share: float) -> float:
-    """When this share of the survivors had been confirmed; the end of the run, if they never were [s]."""
+    """The instant at which this share of the survivors was confirmed, or the end of the run if that
+    never happened [s].
+    """
     times = sorted(row["mission.time_to_confirm_s"] or ())
     wanted = max(1, round(share * row["mission.survivors"]))
     return float(times[wanted - 1] if len(times) >= wanted else row["duration_s"])

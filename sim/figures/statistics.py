@@ -1,4 +1,4 @@
-"""Means over seeds with 95 % intervals (Student's t), and differences of pairs that share their seed."""
+"""Means over seeds with 95 % intervals (Student's t), and differences of pairs with the same seed."""
 
 import math
 import statistics
@@ -15,7 +15,7 @@ _IN_FULL: Final = 999.5
 
 
 class Interval(NamedTuple):
-    """A mean over independent runs and where its true value lies, with 95 % confidence."""
+    """A mean over independent runs, and the interval in which the true mean lies with 95 % confidence."""
 
     mean: float
     low: float
@@ -23,11 +23,11 @@ class Interval(NamedTuple):
     runs: int
 
     def scaled(self, factor: float) -> "Interval":
-        """In another unit."""
+        """The interval in another unit."""
         return Interval(self.mean * factor, self.low * factor, self.high * factor, self.runs)
 
     def text(self, unit: str = "") -> str:
-        """For people, for example `0.91 s [0.88, 0.94]`."""
+        """The interval as text, for example `0.91 s [0.88, 0.94]`."""
         unit = f" {unit}" if unit else ""
         if math.isinf(self.low):
             return f"{_said(self.mean)}{unit} [one run]"
@@ -35,13 +35,13 @@ class Interval(NamedTuple):
 
 
 def _said(value: float) -> str:
-    """Three digits, and no power of ten for what people say in full."""
+    """A number with three digits; usual numbers are written without a power of ten."""
     return f"{value:.0f}" if _IN_FULL <= abs(value) < math.inf else f"{value:.3g}"
 
 
 def quantile_975(freedom: int) -> float:
-    """The quantile of Student's t; beyond 30 degrees of freedom between the table's last and the normal's, by
-    1/freedom.
+    """The quantile of Student's t. Beyond 30 degrees of freedom it is interpolated between the table's last value and
+    the normal quantile, by 1/freedom.
     """
     if freedom <= len(_T_975):
         return _T_975[freedom - 1]
@@ -50,7 +50,7 @@ def quantile_975(freedom: int) -> float:
 
 
 def interval(values: Sequence[float]) -> Interval:
-    """The mean of one value per run; of a single run the interval is everything, of none the mean is no number."""
+    """The interval of one value per run; for a single run it is infinite, and without runs the mean is NaN."""
     if not values:
         return Interval(math.nan, -math.inf, math.inf, 0)
     mean = math.fsum(values) / len(values)

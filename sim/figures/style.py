@@ -1,6 +1,7 @@
-"""One style for all figures: sizes, lines and colors that stay apart for the color-blind and in print.
+"""The common style of all figures: sizes, lines and colors that can be distinguished by the color-blind and in print.
 
-Colors are those of Okabe and Ito (2008). No line is told by its color alone: each has a marker and a dash of its own.
+The colors are those of Okabe and Ito (2008). No line differs from others by its color alone: each has a marker and a
+dash pattern of its own.
 """
 
 import csv
@@ -21,7 +22,7 @@ from sim.figures.statistics import Interval
 
 
 class Look(NamedTuple):
-    """The look of one line, in every figure in which it is drawn."""
+    """The look of one line, in all figures that have it."""
 
     label: str
     color: str
@@ -47,10 +48,10 @@ SERIES: Final = (
     Look("", "#CC79A7", "D", (0, (5, 1))),
     Look("", "#E69F00", "v", (0, (3, 1, 1, 1))),
 )
-"""For lines that are levels of a setting, in their order."""
+"""The looks of lines for the values of a setting, in their order."""
 
 _LONG_AXIS: Final = 2_000.0
-"""An axis whose ends are farther apart than this, as a ratio, is labelled by decades."""
+"""The labels of an axis whose ends differ by a greater factor than this are decades."""
 _PARAMETERS: Final[Mapping[str, Any]] = {
     "figure.dpi": 110,
     "savefig.dpi": 150,
@@ -74,14 +75,16 @@ _PARAMETERS: Final[Mapping[str, Any]] = {
 
 
 def applied() -> AbstractContextManager[None]:
-    """The style holds for what is drawn and saved within; matplotlib's own settings are as before afterwards."""
+    """The style applies to all that is drawn and saved within the context; matplotlib's settings are restored
+    afterwards.
+    """
     return mpl.rc_context(dict(_PARAMETERS))
 
 
 def canvas(
     columns: int = 1, rows: int = 1, *, width: float = 4.2, height: float = 3.2, share_y: bool = False
 ) -> tuple[Figure, list[Axes]]:
-    """A figure with so many panels, in reading order."""
+    """A figure with this number of panels, in reading order."""
     figure = Figure(figsize=(width * columns, height * rows), layout=ConstrainedLayoutEngine(w_pad=0.12))
     panels = figure.subplots(rows, columns, squeeze=False, sharey=share_y)
     return figure, list(panels.flat)
@@ -96,7 +99,7 @@ def line(
     least: float = 0.0,
     most: float = math.inf,
 ) -> None:
-    """Means with their intervals, as one line; a bar ends at the least and the greatest value that there can be."""
+    """Means with their intervals, as one line; bars end at the least and the greatest possible value."""
     axes.errorbar(
         xs, [item.mean for item in intervals], yerr=reaches(intervals, least=least, most=most), label=look.label,
         color=look.color, marker=look.marker or None, linestyle=look.dash, elinewidth=1.0,
@@ -106,30 +109,32 @@ def line(
 def reaches(
     intervals: Sequence[Interval], *, least: float = 0.0, most: float = math.inf
 ) -> tuple[list[float], list[float]]:
-    """How far the bars of these means reach down and up, within what there can be; of one run there is no bar."""
+    """How far the bars of these means reach down and up, within possible values; a single run has no bar."""
     down = [0.0 if item.runs < 2 else item.mean - max(least, item.low) for item in intervals]
     up = [0.0 if item.runs < 2 else min(most, item.high) - item.mean for item in intervals]
     return down, up
 
 
 def beside(place: float, number: int, of: int, *, log: bool, apart: float) -> float:
-    """Where the marks of one of several lines stand, so that their bars do not cover each other.
+    """The position of the marks of one of several lines, so that their bars do not cover each other.
 
-    `apart` is the distance to the next line: a difference, or on a logarithmic axis a share.
+    `apart` is the distance to the next line: a difference, or a share on a logarithmic axis.
     """
     steps = number - (of - 1) / 2
     return place * math.pow(1 + apart, steps) if log else place + apart * steps
 
 
 def ticks_at(axis: Axis, places: Mapping[float, str]) -> None:
-    """Ticks where something was measured, and nowhere else."""
+    """Put ticks where something was measured, and nowhere else."""
     axis.set_major_locator(FixedLocator(list(places)))
     axis.set_major_formatter(FuncFormatter(lambda at, _: places[min(places, key=lambda place: abs(place - at))]))
     axis.set_minor_locator(NullLocator())
 
 
 def spaced(places: Sequence[float], *, least: float = 0.04) -> list[float]:
-    """The places whose labels have room on a linear axis: each at least this share of its length from the last."""
+    """The positions whose labels have room on a linear axis, each at least this share of its length from the one
+    before.
+    """
     kept = list(places[:1])
     for place in places[1:]:
         if place - kept[-1] >= least * (places[-1] - places[0]):
@@ -138,7 +143,7 @@ def spaced(places: Sequence[float], *, least: float = 0.04) -> list[float]:
 
 
 def plain_log(axis: Axis) -> None:
-    """A logarithmic axis with its numbers written out: 1, 2, 5, 10, 20 and so on, or only decades if it is long."""
+    """A logarithmic axis with plain numbers: 1, 2, 5, 10, 20 and so on, or only decades if it is long."""
     low, high = axis.get_view_interval()
     subs = (1.0, 2.0, 5.0) if high / low < _LONG_AXIS else (1.0,)
     axis.set_major_locator(LogLocator(subs=subs))
@@ -147,7 +152,7 @@ def plain_log(axis: Axis) -> None:
 
 
 def legend_above(figure: Figure, axes: Axes) -> None:
-    """One legend for all panels, above them: it covers nothing."""
+    """One legend for all panels, above them, where it covers nothing."""
     handles, labels = axes.get_legend_handles_labels()
     figure.legend(handles, labels, loc="outside upper center", ncols=len(labels))
 
@@ -161,14 +166,14 @@ def band(
     least: float = 0.0,
     most: float = math.inf,
 ) -> None:
-    """The intervals about a line as a band, within what there can be; nothing where a mean is of one run."""
+    """The intervals of a line as a band, within possible values; there is none where a mean is of one run."""
     if all(item.runs > 1 for item in intervals):
         low, high = [max(least, item.low) for item in intervals], [min(most, item.high) for item in intervals]
         axes.fill_between(xs, low, high, color=look.color, alpha=0.15, linewidth=0)
 
 
 def save(figure: Figure, folder: Path, name: str) -> list[Path]:
-    """Write PNG and SVG; the same figure gives the same bytes."""
+    """Write PNG and SVG; the same figure always gives the same bytes."""
     paths = [folder / f"{name}.png", folder / f"{name}.svg"]
     figure.savefig(paths[0], metadata={"Software": None})
     figure.savefig(paths[1], metadata={"Date": None})
@@ -176,7 +181,7 @@ def save(figure: Figure, folder: Path, name: str) -> list[Path]:
 
 
 def save_data(rows: Iterable[Mapping[str, Any]], path: Path) -> None:
-    """What is drawn, as a table of text beside the picture, in seven digits."""
+    """Write the drawn numbers as a text table beside the picture, with seven digits."""
     rows = [
         {name: float(f"{value:.7g}") if isinstance(value, float) else value for name, value in row.items()}
         for row in rows

@@ -59,9 +59,8 @@ def trimmed_w(vehicle: Vehicle, airspeed_m_s: Values, climb_m_s: Values) -> Valu
     lean = np.zeros_like(speed)
     for _ in range(_ROUNDS):
         frame_n = vehicle.frame_drag_kg_m * speed**2
-        rotors_n = (
-            4 * vehicle.rotor_drag_n_s2_m * rotor * speed * np.cos(lean)
-        )  # across the body, so that it lifts, too
+        # the drag of the rotors acts across the leaning body, so that it lifts, too
+        rotors_n = 4 * vehicle.rotor_drag_n_s2_m * rotor * speed * np.cos(lean)
         lean = np.arcsin(np.minimum((rotors_n + frame_n * np.cos(lean)) / weight_n, 0.95))
         thrust_n = (weight_n * np.cos(lean) + frame_n * np.sin(lean)) / 4
         inflow = vehicle.inflow_n_s2_m * (speed * np.sin(lean) + climb_m_s * np.cos(lean))

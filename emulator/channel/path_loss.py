@@ -7,9 +7,9 @@
     air_to_ground  friis + P eta_LoS + (1 - P) eta_NLoS, P from the elevation angle (Al-Hourani et al. 2014)
     uma_av         P L_LoS + (1 - P) L_NLoS, P from height and distance (3GPP TR 36.777, annex B)
 
-Distances and heights in metres, frequencies in MHz, losses in dB between isotropic antennas. Below 1 m the loss is that
-at 1 m. Not modeled: antenna patterns and airframes, weather, the curvature of the earth, the oscillation of two rays
-before the crossover. The ranges of validity are in docs/explanation/emulator.md.
+Distances and heights are in metres, frequencies in MHz, losses in dB between isotropic antennas. Below 1 m the loss is
+that at 1 m. Not modeled: antenna patterns and airframes, weather, the curvature of the earth, and the oscillation of
+two rays before the crossover. The ranges of validity are in docs/explanation/channel.md.
 """
 
 import math

@@ -1,4 +1,4 @@
-"""The entries of a scenario's `[[applications]]`: what UAVs carry besides what fanet-mw brings."""
+"""The entries of a scenario's `[[applications]]`: applications of other packages that UAVs carry."""
 
 from typing import Annotated, Any, Literal
 
@@ -9,14 +9,14 @@ from fanet_mw.scenario.sections import Id, Section
 
 
 class ForeignApplication(Section):
-    """An application of another package (`docs/how-to/extend.md`), on board of some or all UAVs."""
+    """An application of another package (`docs/how-to/extend.md`), on board some or all UAVs."""
 
     use: Annotated[str, PartName("applications.use", ())]
     """The application: an entry point, or module and class."""
     nodes: Literal["all"] | tuple[Id, ...] = "all"
     """Ids of the nodes that carry it, or `all`."""
     options: Annotated[dict[str, Any], OptionsOf("applications.use", ())] = Field(default_factory=dict)
-    """The table of the application, as its package documents it."""
+    """The application's own table, as its package documents it."""
 
     def on(self, node: int) -> bool:
         """True if a node carries it."""

@@ -1,4 +1,4 @@
-"""The entries of a scenario's `[[faults]]`: controls of the air at an instant, in people's units."""
+"""The entries of a scenario's `[[faults]]`: changes of the air at an instant of the run."""
 
 import math
 from typing import Annotated, Literal, Self
@@ -25,14 +25,15 @@ from fanet_mw.units import Enu, NodeId, seconds_to_ns
 
 
 class FaultSection(Section):
-    """The base of the entries of `[[faults]]`: what happens to the air at an instant of the run."""
+    """The base of the entries of `[[faults]]`: a change of the air at an instant of the run."""
 
     at_s: Duration
-    """When it begins, in swarm time."""
+    """The swarm time at which it begins."""
     for_s: Annotated[float, Field(ge=0, le=1e6)] = 0.0
     """How long it lasts; 0: until it is restored."""
     label: Annotated[str, Field(max_length=MAX_LABEL, pattern=r"^[ -~]*$")] = ""
-    """What `restore` calls it; by default made from its kind and nodes. A new fault ends an old one of its label."""
+    """The name by which `restore` ends it; by default made from its kind and nodes. A new fault ends an old one with
+    the same label."""
 
     @property
     def for_ns(self) -> int:
@@ -49,11 +50,11 @@ class DegradeFault(FaultSection):
     dst: Id | None = None
     """Node id of the other end."""
     both: bool = True
-    """The fault is on the other direction too."""
+    """Whether the other direction of the link is degraded, too."""
     loss_db: Annotated[float, Field(ge=0, le=MAX_LOSS_DB)] = 0.0
-    """Added to the path loss."""
+    """Loss that is added to the path loss."""
     loss_share: Annotated[float, Field(ge=0, le=1)] = 0.0
-    """Share that is lost of the frames that would have been received."""
+    """Share of frames that are lost, among those that would have been received."""
 
     @model_validator(mode="after")
     def _ends_are_two_or_none(self) -> Self:
@@ -77,7 +78,7 @@ class JamFault(FaultSection):
     radius_m: Annotated[float, Field(gt=0, le=MAX_RADIUS_M)]
     """Radius of the circle, at any height."""
     noise_dbm: Annotated[float, Field(ge=-MAX_LOSS_DB, le=MAX_NOISE_DBM)] | None = None
-    """Noise at each receiver inside; by default nothing is received there."""
+    """Noise at each receiver inside; by default nothing can be received there."""
 
     def control(self) -> Control:
         noise_dbm = math.inf if self.noise_dbm is None else self.noise_dbm
@@ -97,14 +98,14 @@ class CutFault(FaultSection):
 
 
 class RestoreFault(Section):
-    """The end of a fault, or of all (no label)."""
+    """The end of a fault, or of all faults (without a label)."""
 
     kind: Literal["restore"]
     """`restore`: the end of a fault."""
     at_s: Duration
-    """When the fault ends, in swarm time."""
+    """The swarm time at which the fault ends."""
     label: str = ""
-    """Label of that fault; all of them by default."""
+    """Label of that fault; by default all faults end."""
 
     def control(self) -> Control:
         return Restore(self.label)

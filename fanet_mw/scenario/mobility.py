@@ -1,4 +1,4 @@
-"""`[mobility]`: how UAVs move of which the mission asks nothing."""
+"""The `[mobility]` table: how UAVs move as long as the mission does not decide it."""
 
 from typing import Annotated, Any, Final
 
@@ -15,15 +15,16 @@ MOBILITY_MODELS: Final = ("static", "formation", "random_waypoint", "crossing", 
 
 
 class Mobility(Section):
-    """What a UAV does when the mission asks nothing of it."""
+    """How a UAV moves as long as the mission does not decide it."""
 
     model: Annotated[str, PartName("mobility.model", MOBILITY_MODELS)] = "static"
-    """`formation` sweeps the area keeping the layout; `random_waypoint` is the statistical model, without pause;
-    `crossing` flies each UAV through the middle of the area to the point opposite its start, and back.
-    `onboard`: the world decides nothing, keeps no UAV clear of others, and flies what each UAV's computer asks for."""
+    """`static` UAVs stay where they are; in `formation` they sweep the area and keep their layout; with
+    `random_waypoint` they fly from one random waypoint to the next without pauses; with `crossing` each flies through
+    the middle of the area to the point opposite its start, and back. With `onboard` the world only carries out what
+    each UAV's computer commands, and keeps no UAV clear of others."""
     options: Annotated[dict[str, Any], OptionsOf("mobility.model", MOBILITY_MODELS)] = Field(default_factory=Options)
-    """The table of a model that another package brings, as that package documents it."""
+    """The options of a model from another package, as that package documents them."""
     speed_m_s: Speed = 7.5
     """Cruising speed."""
     see_m: Length = 50.0
-    """UAVs nearer than this see each other without radio and keep clear; 0: they are blind."""
+    """Within this distance the world keeps UAVs clear of each other, without any radio; 0: it does not."""

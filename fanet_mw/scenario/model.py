@@ -1,7 +1,7 @@
-"""The scenario: one frozen model of everything a run depends on. Keys are people's units, with the unit in the key.
+"""The scenario: one frozen model of all that a run depends on. Keys have units that people use, named in the key.
 
-A key is a contract with users: renaming one breaks their files and sweeps. Derived values are properties, in `int` ns.
-Each table has a file of its name and checks itself; what the tables ask of each other is in `checks.py`.
+A key is a contract with users, because renaming it breaks their files and sweeps. Derived values are properties, in
+integer nanoseconds. Each table has a file of its name and checks itself; `checks.py` checks what spans several tables.
 """
 
 from collections.abc import Mapping
@@ -27,28 +27,28 @@ from fanet_mw.scenario.world import World
 from fanet_mw.units import MS, NodeId, seconds_to_ns
 
 _REPAIR_S: Final = 10.0
-"""The time for which packets are repaired that floods over measured links leave out."""
+"""The time for which packets are repaired that floods over measured links have not delivered."""
 _LIFETIME_MS: Final = 500.0
 _FOREVER_MS: Final = 1e6
 
 
 class Scenario(Section):
-    """One file; one execution of it with one seed is a run."""
+    """A scenario file; one execution of it with one seed is a run."""
 
     name: Annotated[str, Field(pattern=r"^[A-Za-z0-9_-]{1,64}$")] = "unnamed"
-    """Name of the scenario, and of its swarm on the bus; by default the file's name."""
+    """Name of the scenario, and of its swarm on the bus; by default the name of the file."""
     description: str = ""
-    """One sentence for `fanet scenarios`."""
+    """One sentence for the list of `fanet scenarios`."""
     duration_s: SomeTime = 100.0
-    """Length of a run in swarm time."""
+    """Length of a run, in swarm time."""
     warmup_s: Duration = 0.0
-    """Application traffic begins here; nothing before it is measured."""
+    """The instant at which application traffic, and the measurement, begin."""
     drain_s: Duration = 0.0
-    """Application traffic ends this long before the end, so that what is under way can arrive."""
+    """How long before the end application traffic ends, so that packets under way can still arrive."""
     seed: Annotated[int, Field(ge=0, lt=2**63)] = 1
-    """Seed of every random stream: the same scenario and seed give the same trace, byte by byte."""
+    """Seed of all random streams: the same scenario and seed give the same trace, byte by byte."""
     time_scale: Annotated[float, Field(ge=1e-3, le=100)] = 1.0
-    """Real time only: swarm seconds per wall second."""
+    """Real time only: swarm seconds per wall-clock second."""
     nodes: Nodes = Nodes()
     traffic: Traffic = Traffic()
     routing: Routing = Routing()
@@ -60,16 +60,16 @@ class Scenario(Section):
     mission: Mission = Mission()
     sensors: Sensors = Sensors()
     applications: tuple[ForeignApplication, ...] = ()
-    """They run in the order in which they stand, after those of fanet-mw."""
+    """Applications of other packages, called in this order, after those of fanet-mw."""
     faults: tuple[AnyFault, ...] = ()
-    """What happens to the air, and when; by message too (`fanet air`)."""
+    """Changes of the air at given instants; `fanet air` makes them by message."""
     further_traffic: tuple[Traffic, ...] = ()
-    """Classes of traffic beside the first one: in a file, the second and every later `[[traffic]]`."""
+    """Further traffic classes: in a file, the second and all later `[[traffic]]`."""
 
     @model_validator(mode="before")
     @classmethod
     def _several_classes(cls, tree: object) -> object:
-        """`[[traffic]]`: the first is the traffic, the others go with it."""
+        """Several `[[traffic]]` in a file: the first one is `traffic`, the others are `further_traffic`."""
         if not isinstance(tree, Mapping) or not isinstance(tree.get("traffic"), list | tuple):
             return tree
         first, *others = tree["traffic"] or [{"arrivals": "none"}]
@@ -113,12 +113,12 @@ class Scenario(Section):
 
     @property
     def repair_ns(self) -> int:
-        """For how long packets are repaired; with measured links always, because frames do get lost."""
+        """How long packets are repaired; with measured links they always are, because frames get lost."""
         return seconds_to_ns(self.clusters.repair_s or (_REPAIR_S if self.measures_links else 0.0))
 
     @property
     def saturated(self) -> bool:
-        """True if a class of traffic always has one more packet to send."""
+        """True if some traffic class is saturated."""
         return any(traffic.arrivals == "saturated" for traffic in self.traffic_classes.values())
 
     @property

@@ -1,4 +1,4 @@
-"""`[nodes]`: how many nodes there are, and where they start."""
+"""The `[nodes]` table: how many nodes there are, and where they start."""
 
 import math
 from typing import Annotated, Literal, Self
@@ -22,24 +22,26 @@ class Nodes(Section):
     count: Annotated[int, Field(ge=1, le=MAX_NODES)] = 45
     """Number of nodes; their ids are 1 to `count`."""
     layout: Literal["grid", "disc", "line", "explicit"] = "grid"
-    """Where the nodes start: in a `grid`, at random places in a `disc`, in a `line`, or as `positions_m` says."""
+    """Where the nodes start: on a `grid`, at random places in a `disc`, on a `line`, or as `positions_m` states
+    (`explicit`)."""
     spacing_m: SomeLength = 200.0
-    """`grid` and `line`: distance from one node to the next."""
+    """`grid` and `line`: distance between neighboring nodes."""
     radius_m: SomeLength = 100.0
     """`disc`: its radius."""
     columns: Count | None = None
-    """Grid columns; by default the widest near-square factorisation in the manner of 9 x 5."""
+    """`grid`: number of columns; by default the two factors of `count` that are nearest to the ratio of 9 x 5."""
     leader_at: Literal["first", "middle"] = "first"
-    """Layouts `grid` and `line`: node 1, the leader, stands at the first place, or at the one nearest to the middle;
-    the others take the remaining places in order."""
+    """`grid` and `line`: whether node 1, the leader, starts at the first place or at the one nearest to the middle; the
+    others take the remaining places in order."""
     altitude_m: Length = 50.0
-    """Height at which the nodes start and fly; every layout but `explicit` uses it."""
+    """Height at which the nodes start and fly, with every layout but `explicit`."""
     on_ground: bool = False
-    """UAVs stand on the ground at the start and take off when told to; else they start at `altitude_m`."""
+    """Whether UAVs stand on the ground at the start, and take off when told to; otherwise they
+    start at `altitude_m`."""
     telemetry_hz: Rate = 1.0
-    """Native MAVLink telemetry of each node on its tap; 0 sends none."""
+    """Rate of each node's MAVLink telemetry on its tap; 0 sends none."""
     positions_m: tuple[tuple[Coordinate, Coordinate, Coordinate], ...] = ()
-    """Layout `explicit`: one [east, north, up] per node."""
+    """`explicit`: [east, north, up] of each node."""
 
     @model_validator(mode="after")
     def _explicit_has_positions(self) -> Self:
@@ -52,7 +54,7 @@ class Nodes(Section):
 
 
 def grid_columns(count: int) -> int:
-    """Columns of the default grid: the factorisation nearest to 9:5, else the square root rounded up."""
+    """The number of columns of the default grid: the factors nearest to 9:5, otherwise the square root, rounded up."""
     wanted = math.sqrt(count * 9 / 5)
     divisors = [d for d in range(1, count + 1) if count % d == 0 and d * d >= count]
     best = min(divisors, key=lambda d: abs(d - wanted))

@@ -1,7 +1,7 @@
 """The `[radio]` table of a scenario: PHY, MAC and channel, and which of its keys fit together.
 
-Keys are people's units. Some defaults follow `radio.standard`; they are filled in before validation, so that a
-resolved scenario names every value it ran with.
+Some defaults depend on `radio.standard`. They are filled in before validation, so that a resolved scenario states every
+value.
 """
 
 from collections.abc import Iterator, Mapping
@@ -32,23 +32,25 @@ class Radio(Section):
     """The radio, its MAC and the channel. Defaults are the reference set-up: 802.11b, DSSS 11 Mb/s, long preamble."""
 
     channel: Annotated[str, PartName("radio.channel", CHANNELS)] = "range"
-    """The path loss model: see docs/explanation/emulator.md for equations, sources and ranges of validity."""
+    """The path loss model; docs/explanation/channel.md has the equations, sources and ranges of validity."""
     options: Annotated[dict[str, Any], OptionsOf("radio.channel", CHANNELS)] = Field(default_factory=Options)
-    """The table of a channel that another package brings, as that package documents it."""
+    """The options of a channel from another package, as that package documents them."""
     range_m: SomeLength = 250.0
-    """`range`: decode and carrier-sense limit; frames are equally strong within it, silent beyond."""
+    """`range`: the greatest distance at which frames are received and sensed; within it all frames
+    are equally strong."""
     standard: Literal["b", "g", "a"] = "b"
-    """`b`: DSSS; `g`: DSSS or OFDM at 2.4 GHz; `a`: OFDM at 5 GHz. Fixes the rates, the slot, SIFS and their kin."""
+    """`b`: DSSS; `g`: DSSS or OFDM at 2.4 GHz; `a`: OFDM at 5 GHz. It determines the possible rates, the slot time and
+    SIFS."""
     rate_mbps: Annotated[float, Field(gt=0, le=54)] = 11.0
-    """Bit rate of data frames, one of the standard's. By default 11 (`b`) or 54 (`g`, `a`)."""
+    """Bit rate of data frames, one of the standard's; by default 11 (`b`) or 54 (`g`, `a`)."""
     ack_rate_mbps: Annotated[float, Field(gt=0, le=54)] = 11.0
-    """Bit rate of acknowledgments. By default 11 (`b`), else the highest mandatory rate that is not above `rate_mbps`
+    """Bit rate of acknowledgments; by default 11 (`b`), else the highest mandatory rate that is not above `rate_mbps`
     (6, 12, 24; or DSSS)."""
     preamble: Literal["long", "short"] = "long"
-    """Preamble of DSSS frames: 192 or 96 us."""
+    """Preamble of DSSS frames: 192 us (`long`) or 96 us (`short`)."""
     slot: Literal["long", "short"] = "long"
-    """Slot time; `g` only: 20 or 9 us. The standard wants the long one in an ad hoc network; many drivers take the
-    short one."""
+    """`g`: slot time of 20 us (`long`) or 9 us (`short`). The standard requires the long one in an ad hoc network; many
+    drivers use the short one."""
     tx_power_dbm: Level = 30.0
     """Transmit power; all channels but `range`."""
     exponent: Annotated[float, Field(gt=0, le=10)] = 3.0
@@ -59,55 +61,55 @@ class Radio(Section):
     """Carrier frequency; all channels but `range` and `log_distance`. By default 2412 (channel 1), and 5180 (channel
     36) with `a`."""
     environment: Literal["suburban", "urban", "dense_urban", "highrise"] = "suburban"
-    """`air_to_ground`: what stands around the node on the ground."""
+    """`air_to_ground`: the surroundings of the node on the ground."""
     airborne_m: Length = 10.0
-    """`air_to_ground` and `uma_av`: two nodes at or above this height see each other as `air_to_air`. By default 10,
-    and 26 with `uma_av`, whose ground antenna is at 25 m."""
+    """`air_to_ground` and `uma_av`: two nodes at or above this height have the path loss of `air_to_air`; by default
+    10, and 26 with `uma_av`, whose ground antenna is at 25 m."""
     shadowing_db: Annotated[float, Field(ge=0, le=30)] = 0.0
     """Standard deviation of log-normal shadowing; 0: none."""
     shadowing_corr_m: SomeLength = 50.0
-    """Distance over which its correlation falls to 1/e."""
+    """Distance over which the correlation of shadowing falls to 1/e."""
     fading: Literal["none", "nakagami", "rician"] = "none"
     """Small-scale fading: a power gain of mean 1 per frame and receiver."""
     nakagami_m: Annotated[float, Field(ge=0.5, le=1000, json_schema_extra={"unit": ""})] = 3.0
-    """`nakagami`: the shape m; 1 is Rayleigh; more is steadier."""
+    """`nakagami`: the shape m; 1 is Rayleigh fading, greater values vary less."""
     rician_k_db: Annotated[float, Field(ge=-20, le=40)] = 10.0
-    """`rician`: power of the line of sight over that of all scattered paths."""
+    """`rician`: ratio of the power of the line of sight to that of all scattered paths."""
     obstruction_loss_db: Decibels = 20.0
-    """What a link loses when the world says that something stands in its way; with `range` it is cut."""
+    """Loss of a link that the world reports as obstructed; with `range` such a link is cut."""
     sensitivity_dbm: Level = -82.0
-    """All channels but `range`: decode and carrier-sense limit; weaker frames only interfere."""
+    """All channels but `range`: the weakest frame that is received and sensed; weaker frames only interfere."""
     interference_floor_dbm: Level = -101.0
-    """All channels but `range`: weaker frames are nothing. In free space it is reached after tens of kilometres."""
+    """All channels but `range`: the weakest frame that interferes; weaker ones are ignored. In free space a frame falls
+    below it after tens of kilometres."""
     preamble_snr_db: Level = 4.0
-    """All channels but `range`: a receiver locks on to a frame whose preamble is this far above noise and
-    interference."""
+    """All channels but `range`: by how much a frame's preamble must exceed noise and interference to be detected."""
     noise_figure_db: Decibels = 7.0
-    """All channels but `range`: what the receiver adds to thermal noise."""
+    """All channels but `range`: noise figure of the receiver, in addition to thermal noise."""
     capture: bool = False
-    """Whether a later frame that is `capture_db` stronger than the one being received takes the receiver over."""
+    """Whether a later frame that is `capture_db` stronger than the one being received takes over the receiver."""
     capture_db: Decibels = 10.0
     """`capture`: how much stronger the later frame must be."""
     access: Literal["standard", "ns3"] | tuple[Ns3Point, ...] = "standard"
-    """`standard`: as IEEE 802.11 has it; `ns3`: as ns-3.44 does in every point in which it differs; or a list of such
-    points: `difs`, `eifs`, `sums`, `onset`, `window` (docs/explanation/emulator.md)."""
+    """`standard`: as in IEEE 802.11; `ns3`: as in ns-3.44 in all points in which it differs; or a list of those points
+    in which it is as in ns-3: `difs`, `eifs`, `sums`, `onset`, `window` (docs/explanation/emulator.md)."""
     cw_min: Annotated[int, Field(ge=1, le=1023)] = 31
     """The first contention window, in slots. By default 31, and 15 with OFDM rates."""
     cw_max: Annotated[int, Field(ge=1, le=32767)] = 1023
-    """The contention window is doubled after a failed unicast up to this many slots."""
+    """The greatest contention window, in slots; the window is doubled after each failed unicast."""
     max_attempts: Annotated[int, Field(ge=1, le=255)] = 7
-    """So often a unicast is sent until it is given up."""
+    """How often a unicast is sent before it is given up."""
     queue_frames: Annotated[int, Field(ge=1, le=100_000)] = 500
-    """Frames that wait in the MAC queue at most."""
+    """The greatest number of frames in the MAC queue."""
     lifetime_ms: Annotated[float, Field(ge=1e-3, le=1e6)] | None = None
     """How long a frame may wait in the MAC queue; unset: 500 ms, or as long as it takes if arrivals are saturated."""
     max_frame_bytes: Annotated[int, Field(ge=64, le=2304)] = 2304
-    """The longest frame that the radio takes."""
+    """The longest frame that the radio accepts."""
     lead_ms: Annotated[float, Field(ge=0, le=1000)] = 20.0
     """How long before its instant a node announces a transmission to the radio."""
     handover_ms: Annotated[float, Field(ge=0, le=10_000)] = 0.0
-    """Receptions are handed to nodes at multiples of this, as a driver with interrupt coalescing does; 0: at once.
-    Fewer, larger wake-ups let more processes live on one machine; instants on the air stay exact."""
+    """Receptions are handed to nodes at multiples of this interval, as a driver with interrupt coalescing does; 0: at
+    once. Fewer and larger wake-ups let more processes run on one machine; instants on the air remain exact."""
     late_limit: Annotated[float, Field(ge=0, le=1)] = 0.01
     """The share of late frames above which a real-time run is invalid."""
 
@@ -140,7 +142,7 @@ class Radio(Section):
 
 
 def _with_standard_defaults(given: Mapping[str, Any]) -> dict[str, Any]:
-    """Fill in what the standard, the rate and the channel imply and the file does not say; wrong values stay."""
+    """Fill in the defaults that follow from standard, rate and channel; wrong values are left for the validation."""
     keys = dict(given)
     standard = keys.get("standard", "b")
     if standard == "a":
@@ -161,7 +163,7 @@ def _with_standard_defaults(given: Mapping[str, Any]) -> dict[str, Any]:
 
 
 def _disagreements(radio: Radio) -> Iterator[str]:
-    """What each key allows alone but the table does not."""
+    """Combinations of keys that do not fit together."""
     if radio.cw_max < radio.cw_min:
         yield f"radio.cw_max = {radio.cw_max} must be >= radio.cw_min = {radio.cw_min}"
     rates = RATES_MBPS[radio.standard]

@@ -1,4 +1,4 @@
-"""`[routing]`: the protocol, and what every node does under any of them."""
+"""The `[routing]` table: the protocol, and settings that all protocols share."""
 
 from typing import Annotated, Any, Final, Literal
 
@@ -31,42 +31,43 @@ PROTOCOLS: Final = (
 
 
 class Routing(Section):
-    """The protocol above the radio."""
+    """The routing protocol, and settings that all protocols share."""
 
     protocol: Annotated[str, PartName("routing.protocol", PROTOCOLS)] = "clustered"
-    """How packets find their way: one hop only (`direct`), a relay by every node (`flooding`), with a probability
-    (`gossip`) or by those that heard few copies (`counter`), the time-divided floods of cluster heads (`clustered`), or
-    a route found on demand, by link states, by distance vectors or by positions; or as another package does it."""
+    """How packets find their way: `direct` transmits them one hop only; `flooding` lets every node relay, `gossip` with
+    a probability, `counter` if few copies were received; `clustered` floods from cluster heads, time-divided; `aodv`,
+    `olsr`, `dsdv` and `geographic` find routes on demand, by link states, by distance vectors and by positions. A
+    protocol of another package may be named, too."""
     options: Annotated[dict[str, Any], OptionsOf("routing.protocol", PROTOCOLS)] = Field(default_factory=Options)
-    """The table of a protocol that another package brings, as that package documents it."""
+    """The options of a protocol from another package, as that package documents them."""
     address_resolution: Literal["none", "rfc826", "ns3"] = "none"
-    """`aodv`, `olsr`, `dsdv`, `geographic`: a node asks for a neighbor's address before its first unicast to it, as IP
-    does, by the rules of RFC 826 or by ns-3's. `none`: a node id is an address, and no node needs to ask."""
+    """`aodv`, `olsr`, `dsdv`, `geographic`: whether a node must ask for a neighbor's address before its first unicast
+    to it, as with IP, by the rules of RFC 826 or of ns-3. `none`: the node id is the address."""
     jitter_ms: Milliseconds = 10.0
     """A relay waits U(0, jitter) after a reception."""
     hop_limit: Annotated[int, Field(ge=1, le=255)] = 32
-    """A packet is not relayed farther than so many hops."""
+    """The greatest number of hops of a packet."""
     queue_frames: Count = 512
-    """Bound of a node's own queue; the least important packet is evicted, with a reason."""
+    """The greatest number of packets in a node's queue; if it is full, the least important packet is evicted."""
     lifetime_s: SomeTime = 30.0
-    """A packet older than this is dropped where it waits."""
+    """A packet that waits in a node is dropped when it is older than this."""
     safety_lifetime_s: Duration = 1.0
-    """The same for warnings (priority 1): a position that old warns of nothing; 0: as `lifetime_s`."""
+    """The same for warnings (priority 1), which are useless when they are old; 0: as `lifetime_s`."""
     report_lifetime_s: Duration = 0.0
     """The same for survivor reports (priority 2); 0: as `lifetime_s`."""
     aggregate: bool = False
-    """`clustered`: packets that are released together share frames of up to `radio.max_frame_bytes`, and so do their
-    relays. `clusters.relay = "scheduled"` decides that by the load instead."""
+    """`clustered`: whether packets that are released together share frames of up to `radio.max_frame_bytes`, and so do
+    their relays. With `clusters.relay = "scheduled"` the load decides that instead."""
     hello_interval_s: HelloInterval = 1.0
-    """Position beacon and hello, one hop; 0 sends none (`clustered` needs them)."""
+    """Interval of hellos, which also carry the position, to all neighbors; 0 sends none (`clustered` needs them)."""
     gossip_p: Annotated[float, Field(ge=0, le=1)] = 0.65
-    """Protocol `gossip`: probability with which a node relays a flooded packet."""
+    """`gossip`: probability with which a node relays a flooded packet."""
     gossip_k: Annotated[int, Field(ge=0, le=255)] = 1
-    """Protocol `gossip`: within so many hops of the origin everyone relays."""
+    """`gossip`: within this number of hops from the origin every node relays."""
     counter: Annotated[int, Field(ge=2, le=1_000_000)] = 3
-    """Protocol `counter`: a node that has heard so many copies does not relay."""
+    """`counter`: a node that has received this many copies does not relay."""
     assess_ms: Milliseconds = 20.0
-    """Protocol `counter`: copies are counted for U(0, assess_ms)."""
+    """`counter`: copies are counted for U(0, assess_ms)."""
 
     @property
     def jitter_ns(self) -> int:

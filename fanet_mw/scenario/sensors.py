@@ -1,6 +1,6 @@
-"""The `[sensors]` table: what each UAV carries besides GPS and a Wi-Fi receiver, and how good it is.
+"""The `[sensors]` table: which sensors UAVs carry besides GPS and a Wi-Fi receiver, and how accurate they are.
 
-A sensor of which the rate is 0 is not on board. The models, their units and sources are in docs/reference/sensors.md.
+A sensor with a rate of 0 is not on board. The models, their units and sources are in docs/reference/sensors.md.
 """
 
 from typing import Annotated, Self
@@ -26,10 +26,10 @@ Outage = tuple[Coordinate, Coordinate, SomeLength, Duration, Duration]
 
 
 class Sensors(Section):
-    """Rates and errors of the sensors on board, the same for every UAV."""
+    """Rates and errors of the sensors on board, the same for all UAVs."""
 
     camera_hz: Rate = 0.0
-    """Images a second in which people are looked for; the camera looks straight down."""
+    """Images per second in which people are searched for; the camera looks straight down."""
     camera_fov_deg: Annotated[float, Field(ge=1, le=170)] = 70.0
     """Field of view across the width of the image."""
     camera_pixels: tuple[Annotated[int, Field(ge=16, le=100_000)], Annotated[int, Field(ge=16, le=100_000)]] = (
@@ -38,39 +38,39 @@ class Sensors(Section):
     )
     """Width and height of an image."""
     camera_cycles: Annotated[float, Field(ge=0.1, le=100)] = 4.0
-    """Line pairs across a person at which half of the people are recognized (Johnson's criteria: 1.0 to notice that
-    something is there, 4.0 to tell a person from a car, 6.4 to tell a man from a woman)."""
+    """The number of line pairs across a person with which half of the people are recognized (Johnson's criteria: 1.0 to
+    notice that something is there, 4.0 to distinguish a person from a car, 6.4 a man from a woman)."""
     camera_sigma_deg: Angle = 1.0
-    """Error of a direction, along each of two axes."""
+    """Standard deviation of a direction, along each of two axes."""
     camera_false_per_hour: Annotated[float, Field(ge=0, le=1e6)] = 0.0
-    """People that one camera sees where there are none."""
+    """Rate of false alarms of one camera: people that it sees where there are none."""
     image_hz: Rate = 0.0
-    """Images a second that are rendered for the applications of a user, with the camera's field of view; pybullet
-    renders them. Each takes tens of milliseconds of the world's time, so that only few UAVs have them in real time."""
+    """Rate of rendered images for a user's applications, with the camera's field of view; needs pybullet. Each image
+    takes tens of milliseconds of the world's time, so in real time only few UAVs can have them."""
     image_pixels: tuple[Annotated[int, Field(ge=16, le=640)], Annotated[int, Field(ge=16, le=640)]] = (320, 240)
-    """Width and height of an image that is rendered."""
+    """Width and height of a rendered image."""
     image_nodes: tuple[Id, ...] = ()
-    """The UAVs for which images are rendered; none named: all."""
+    """The UAVs for which images are rendered; empty: all."""
     voice_hz: Rate = 0.0
-    """How often a microphone array looks for voices."""
+    """Rate at which a microphone array listens for voices."""
     voice_level_db: Level = 88.0
     """Sound pressure level of a call at 1 m [dB re 20 uPa]."""
     voice_share: Annotated[float, Field(ge=0, le=1)] = 0.5
     """Share of the time in which a survivor calls."""
     voice_rotor_db: Level = 80.0
-    """Level of the UAV's own rotors at its array, in the band of voices."""
+    """Sound level of the UAV's own rotors at its array, in the band of voices."""
     voice_gain_db: Decibels = 15.0
-    """What the array's processing gains over noise from other directions."""
+    """Gain of the array's processing over noise from other directions."""
     voice_snr_db: Level = 0.0
-    """A voice is made out from this ratio up, after the processing."""
+    """The least signal-to-noise ratio, after processing, with which a voice is detected."""
     voice_sigma_deg: Angle = 5.0
-    """Error of a direction at a ratio of 0 dB; it falls with the square root of the ratio."""
+    """Standard deviation of a direction at a ratio of 0 dB; it falls with the square root of the ratio."""
     radar_hz: Rate = 0.0
-    """Scans a second, all round."""
+    """Scans per second, each all round."""
     radar_range_m: SomeLength = 120.0
-    """Farthest echo that is told."""
+    """The greatest distance of an echo."""
     radar_beam_deg: Annotated[float, Field(ge=1, le=90)] = 10.0
-    """Width of a beam to the side; the scan sees as far as 20 degrees up and down."""
+    """Horizontal width of a beam; a scan covers 20 degrees up and down."""
     radar_resolution_m: SomeLength = 0.5
     """Length of a range cell, the speed of light over twice the bandwidth."""
     radar_snr_db: Level = 21.6
@@ -78,39 +78,39 @@ class Sensors(Section):
     radar_uav_m2: Annotated[float, Field(gt=0, le=1e6)] = 0.03
     """Radar cross section of a UAV."""
     radar_wall_m2: Annotated[float, Field(gt=0, le=1e6)] = 10.0
-    """Radar cross section of what one beam meets of a wall or a hillside."""
+    """Radar cross section of the part of a wall or a hillside in one beam."""
     radar_false_alarm: Annotated[float, Field(gt=0, lt=0.1)] = 1e-6
-    """Probability that noise passes for an echo, in each cell of a scan."""
+    """Probability that noise is taken for an echo, in each cell of a scan."""
     altimeter_hz: Rate = 0.0
-    """Readings a second of the barometer and of the rangefinder that looks down."""
+    """Readings per second of the barometer and of the rangefinder that looks down."""
     barometer_sigma_m: Length = 0.3
     """Standard deviation of the barometer's noise."""
     barometer_drift_m: Length = 1.0
-    """Standard deviation of the barometer's slow error, whose correlation time is 300 s."""
+    """Standard deviation of the barometer's slow error, with a correlation time of 300 s."""
     rangefinder_m: SomeLength = 120.0
     """Range of the rangefinder that looks down."""
     rangefinder_sigma_m: Length = 0.1
     """Standard deviation of its noise."""
     inertial_hz: Rate = 0.0
-    """Velocities a second that inertial sensors and optical flow give, without GPS."""
+    """Readings per second of the velocity by inertial sensors and optical flow, which need no GPS."""
     inertial_sigma_m_s: Length = 0.1
     """Standard deviation of their noise along each axis."""
     inertial_drift_m_s: Length = 0.05
-    """Standard deviation of the slow error along each axis, whose correlation time is 100 s."""
+    """Standard deviation of the slow error along each axis, with a correlation time of 100 s."""
     battery_hz: Rate = 0.0
-    """Readings a second of the battery's voltage, current and charge."""
+    """Readings per second of the battery's voltage, current and charge."""
     map_share: Annotated[float, Field(ge=0, le=1)] = 1.0
-    """Share of the buildings that are on the map which each UAV of a planned search carries; the map has all hills."""
+    """Share of the buildings on the map that each UAV of a planned search carries; the map has all hills."""
     gps_bias_m: Length = 0.0
     """Standard deviation of a receiver's slow error along each axis."""
     gps_bias_time_s: SomeTime = 300.0
     """Correlation time of that error."""
     gps_outages: tuple[Outage, ...] = ()
-    """Places without GPS, each as [east, north, radius, from, until] in metres and seconds."""
+    """Areas and times without GPS, each as [east, north, radius, from, until] in metres and seconds."""
     burial_phone_db: Decibels = 20.0
-    """What rubble takes of the phone of a buried survivor."""
+    """Loss through rubble of the phone signal of a buried survivor."""
     burial_voice_db: Decibels = 20.0
-    """What rubble takes of the voice of a buried survivor."""
+    """Loss through rubble of the voice of a buried survivor."""
 
     @model_validator(mode="after")
     def _outages_begin_before_they_end(self) -> Self:

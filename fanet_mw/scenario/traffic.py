@@ -1,4 +1,4 @@
-"""`[traffic]`: what the applications of load send."""
+"""The `[traffic]` table: the application load."""
 
 from typing import Annotated, Literal, Self
 
@@ -15,40 +15,43 @@ from fanet_mw.units import MAX_NODES
 
 
 class Traffic(Section):
-    """The application load: which nodes send how much, how often, to which. Several classes: `[[traffic]]` for each."""
+    """The application load: which nodes send how much, how often, and to whom. With several classes: one `[[traffic]]`
+    each.
+    """
 
     name: Annotated[str, Field(pattern=r"^[A-Za-z0-9_-]{0,64}$")] = ""
-    """What results call a class of traffic; empty: `traffic` for the first one, `traffic_2` and so on."""
+    """Name of the traffic class in results; empty: `traffic` for the first class, then `traffic_2` and so on."""
     payload_bytes: Annotated[int, Field(ge=64, le=2304)] = 1024
-    """UDP payload on the air, the routing header included."""
+    """UDP payload on the air, including the routing header."""
     interval_s: Annotated[float, Field(ge=1e-4, le=MOST_S)] = 1.0
-    """From one packet of a source to its next. At least 0.1 ms: packets are named by numbers of which a node has one
-    for each 0.1 ms."""
+    """Time between two packets of a source, at least 0.1 ms, because a node has one sequence number for each 0.1 ms."""
     arrivals: Literal["cbr", "poisson", "saturated", "on_off", "trace", "none"] = "cbr"
-    """When a source offers packets: one per interval, with exponential gaps of that mean, always one more as soon as
-    the last has ended, one per interval in periods of activity (`on_s`, `off_s`), as `packets` says, or never."""
+    """When a source sends packets. `cbr`: one per interval; `poisson`: with exponential gaps of that mean; `saturated`:
+    the next one as soon as one has ended; `on_off`: one per interval in periods of activity (`on_s`, `off_s`); `trace`:
+    as `packets` states; `none`: never."""
     on_s: SomeTime = 1.0
-    """Arrivals `on_off`: mean of the exponential periods in which a source is active."""
+    """`on_off`: mean of the exponential periods in which a source is active."""
     off_s: Duration = 1.0
-    """Arrivals `on_off`: mean of the exponential pauses between these."""
+    """`on_off`: mean of the exponential pauses in between."""
     packets: tuple[tuple[Duration, Annotated[int, Field(ge=64, le=2304)]], ...] = ()
-    """Arrivals `trace`: each packet of a source as [seconds after `start_s`, bytes as in `payload_bytes`]."""
+    """`trace`: each packet of a source as [seconds after `start_s`, bytes as in `payload_bytes`]."""
     packets_csv: str = ""
-    """Arrivals `trace`: a file with a line `seconds,bytes` for each packet, read when the scenario is."""
+    """`trace`: a file with a line `seconds,bytes` for each packet, which is read with the scenario."""
     start_s: Duration | None = None
-    """When a class begins; unset: with the measured part of the run (`warmup_s`)."""
+    """The instant at which the class begins; unset: with the measured part of the run (`warmup_s`)."""
     priority: Literal["safety", "report", "bulk"] = "bulk"
-    """Which packets go first where several wait, and after which time they expire (`routing`)."""
+    """Priority of the packets, which decides which packets go first, and after which time they expire (`routing`)."""
     sources: Literal["all"] | Annotated[int, Field(ge=0, le=MAX_NODES)] | tuple[Id, ...] = "all"
-    """A number of sources (drawn by seed among the nodes that are neither leader nor destination), a list of node
-    ids, or every node but the destination."""
+    """The nodes that send: a number of them (drawn by the seed among the nodes that are neither leader nor
+    destination), a list of ids, or all except the destination."""
     destination: Literal["all"] | Id = "all"
-    """One node's id, or `all`: packets are flooded."""
+    """The id of one node, or `all`: packets are flooded."""
     deadline_s: SomeTime | None = None
-    """`clusters.relay = "scheduled"`: nodes refuse packets that would break this, and record whether their bound meets
-    it; unset: every packet is taken. Each class has its own; what nodes record is about the first one's."""
+    """`clusters.relay = "scheduled"`: nodes refuse packets that would break this deadline, and record whether their
+    bound meets it; unset: all packets are accepted. Each class has a deadline of its own; the records are about that of
+    the first class."""
     targets: tuple[Id, ...] = ()
-    """Nodes at which delivery counts when the destination is `all`; empty: every other node."""
+    """The nodes at which deliveries count if the destination is `all`; empty: all other nodes."""
 
     @model_validator(mode="after")
     def _trace_has_packets(self) -> Self:

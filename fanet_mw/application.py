@@ -1,16 +1,16 @@
-"""The application contract: what a UAV does beside the network itself is done by applications, several on one node.
+"""The application contract: what a UAV does besides the network itself is done by applications, several on one node.
 
     start(port, now)       once, first; through the port it sends, flies and records from then on
     on_message(message, now)   a message for this node of a kind that the application listens to
-    on_status(status, now)     what became of a message that it has sent
+    on_status(status, now)     what has become of a message that it has sent
     on_fix, on_sensor, on_hello    readings of the vehicle's receivers, hellos of neighbors
-    wake(now)              at or after the instant that `next_wake_ns()` named
+    wake(now)              at or after the instant that `next_wake_ns()` has returned
     report()               counters, at any time
 
 An application is sans-IO, as an actor is: it never sleeps, reads a clock, opens a socket or starts a thread, and
-instants never decrease. So the same object runs in virtual time, over Zenoh and on a real radio. `next_wake_ns()` is
-asked after each of these calls. `MalformedFrameError` raised in `on_message` and `on_hello` is counted as input that
-makes no sense; anything else that is raised ends the node.
+instants never decrease. The same object therefore runs in virtual time, over Zenoh and on a real radio.
+`next_wake_ns()` is called after each of these calls. If `on_message` or `on_hello` raises `MalformedFrameError`, the
+input is counted as malformed; any other exception ends the node.
 """
 
 from collections.abc import Collection, Mapping
@@ -26,26 +26,27 @@ from fanet_mw.units import BROADCAST, Enu, NodeId
 from fanet_mw.wire import HEADER_BYTES, PRIORITY_BULK
 
 ANY: Final[Collection[int]] = (-1,)
-"""Stands for all ids or ports, except those of load whose content does not matter."""
+"""Stands for all ids or ports, except those of pure load, whose content does not matter."""
 HOME: Final = 0.0
-"""The speed of a course that sends a UAV back to its formation."""
+"""The speed of a course that sends a UAV back to its place in the formation."""
 
 
 class Course(NamedTuple):
-    """A command to the flight controller: fly there and hold; a speed of 0 means back to the formation."""
+    """A command to the flight controller: fly to a place and hold it; a speed of 0 means back to the formation."""
 
     position: Enu
     """The place to fly to [m]."""
     speed_m_s: float
     """The speed on the way there."""
     velocity: Enu | None = None
-    """If given, the UAV flies at this velocity until the next command; the position is where that leads."""
+    """If given, the UAV flies at this velocity until the next command; `position` is then a point on that way."""
     land: bool = False
-    """True: it sinks straight down where it is, at the speed of the course, and stops its motors on the ground."""
+    """True: the UAV sinks straight down from where it is, at the speed of the course, and stops its motors on the
+    ground."""
 
 
 class Received(NamedTuple):
-    """One message as the application of another node sent it."""
+    """One message from the application of another node."""
 
     origin: NodeId
     """The node whose application has sent it."""
@@ -54,11 +55,11 @@ class Received(NamedTuple):
     priority: int
     """1: safety, 2: report, 3: bulk; 0 is control traffic."""
     born_ns: int
-    """The instant at which the application handed it over, by the origin's clock; never later than now."""
+    """The instant at which the application sent it, by the origin's clock; never later than now."""
     hops: int
-    """The number of transmissions that it took to get here."""
+    """The number of transmissions on its way to this node."""
     frame: bytes
-    """The packet as the radio delivered it, routing header first; of several packets the one that came last."""
+    """The packet as the radio delivered it, routing header first; for a message in several packets, the last one."""
     port: int = 0
     """The numbered port to which bytes were sent; 0 for MAVLink frames."""
     content: bytes | None = None
@@ -66,15 +67,16 @@ class Received(NamedTuple):
 
     @property
     def data(self) -> bytes:
-        """What was sent: the bytes, or the MAVLink frames."""
+        """The content: bytes, or MAVLink frames."""
         return self.frame[HEADER_BYTES:] if self.content is None else self.content
 
     def mavlink(self) -> list[Any]:
-        """Its MAVLink messages, as objects of pymavlink; none if it was sent to a port.
+        """The MAVLink messages in it, as objects of pymavlink; none if it was sent to a port.
 
-        Raises MalformedFrameError, which `on_message` may let pass.
+        Raises MalformedFrameError, which `on_message` need not catch.
         """
-        from fanet_mw.mavlink import decode  # pymavlink takes its time, and most messages are read without it
+        # imported only here, because pymavlink takes long to load and most messages are read without it
+        from fanet_mw.mavlink import decode
 
         return decode(self.data) if self.content is None else []
 
@@ -85,49 +87,49 @@ class Data(NamedTuple):
     port: int
     """The port, 1 to 65535."""
     data: bytes
-    """The bytes, which arrive as they are; they are sent in pieces when they are long."""
+    """The bytes, which arrive unchanged; long ones are sent in several pieces."""
 
 
 class Fate(StrEnum):
-    """What has become of a message at its sender."""
+    """What has become of a message, as its sender is told."""
 
     ADMITTED = "admitted"
     """The node has accepted the message."""
     REFUSED = "refused"
-    """The node has not accepted it: the deadline cannot be kept, or too many messages wait (`Status.reason`)."""
+    """The node has refused the message: its deadline cannot be met, or too many messages wait (`Status.reason`)."""
     LET_OUT = "let_out"
     """Its first frame was announced to the radio."""
     SENT = "sent"
     """The radio has finished with its first frame."""
     TURNED_AWAY = "turned_away"
-    """The radio did not try to send its first frame: its queue was full, or the frame came too late."""
+    """The radio did not try to send its first frame: the radio's queue was full, or the frame came too late."""
     ACKNOWLEDGED = "acknowledged"
     """The application of a node (`Status.nodes`) has received it; reported once per node."""
     UNWANTED = "unwanted"
     """No application of that node listens to it."""
     EXPIRED = "expired"
-    """Its lifetime is over; `Status.nodes` are the nodes that have not acknowledged it, if that was asked for."""
+    """Its lifetime is over; `Status.nodes` are the nodes that have not acknowledged it, if it was to be confirmed."""
     DROPPED = "dropped"
     """It ended in this node; `Status.reason` says why."""
 
 
 class Status(NamedTuple):
-    """What became of the message with this handle."""
+    """What has become of the message with this handle."""
 
     handle: int
-    """What `AppPort.send` returned."""
+    """The handle that `AppPort.send` has returned."""
     fate: Fate
     """What has become of it."""
     t_ns: int
-    """When it became so."""
+    """The instant of this fate."""
     reason: DropReason | None = None
     """Why it was refused or dropped."""
     nodes: tuple[NodeId, ...] = ()
-    """The nodes of which the fate is told."""
+    """The nodes to which the fate applies."""
     last: bool = False
-    """True if this is the last status of the message."""
+    """True if no further status of the message will follow."""
     interval_ns: int | None = None
-    """The least interval between messages that the network can serve in time; None when it is unknown."""
+    """The least interval between messages that the network can deliver in time; None if it is unknown."""
 
 
 Destination = NodeId | Collection[NodeId]
@@ -135,7 +137,7 @@ Destination = NodeId | Collection[NodeId]
 
 
 class AppPort(Protocol):
-    """What a node offers to one of its applications."""
+    """The services of a node for one of its applications."""
 
     @property
     def node(self) -> NodeId:
@@ -143,7 +145,7 @@ class AppPort(Protocol):
 
     @property
     def scenario(self) -> Scenario:
-        """The scenario that this run follows."""
+        """The scenario of this run."""
 
     @property
     def position(self) -> Enu:
@@ -154,8 +156,8 @@ class AppPort(Protocol):
         """The velocity of the last fix [m/s]."""
 
     def clusters(self) -> Mapping[NodeId, tuple[NodeId, ...]]:
-        """The nodes of each cluster as far as this node knows, by head, which is the first of them; empty where the
-        routing protocol makes no clusters.
+        """The nodes of each cluster by its head, the head first, as far as this node knows; empty if the routing
+        protocol makes no clusters.
         """
 
     def send(
@@ -169,23 +171,26 @@ class AppPort(Protocol):
         deadline_ns: int | None = None,
         born_ns: int | None = None,
     ) -> int:
-        """Send a message of pymavlink, whole MAVLink frames as bytes, or `Data`, which are bytes to a port.
+        """Send a pymavlink message, whole MAVLink frames as bytes, or `Data` (bytes to a port).
 
-        Returned is the handle that statuses name. The priority is "safety", "report" or "bulk" (or 1 to 3).
-        A message that is to be confirmed is sent again until each of its targets has it, and messages to the same
-        targets, on one port and of one priority, are then handed over in order. Its lifetime is by default that of its
-        priority in the scenario. A message with a deadline is refused if the network states that it cannot be kept.
-        `born_ns` is when the application meant to send, by default now. Of plain MAVLink frames the handle is the
-        packet's sequence number. Raises LocalProtocolError when it cannot be sent at all: content that is none of the
-        three, frames that do not fit one packet, more bytes than 64 packets hold, a destination that is not another
-        node of the scenario.
+        Returns the handle that statuses name; for plain MAVLink frames it is the packet's sequence number. The priority
+        is "safety", "report" or "bulk" (or 1 to 3).
+
+        With `confirm` the message is sent again until all its targets have it, or its lifetime is over. Confirmed
+        messages to the same targets, on one port and of one priority, are handed over in the order of sending. The
+        lifetime is by default that of the priority in the scenario. A message with a deadline is refused if the network
+        states that the deadline cannot be met. `born_ns` is the instant at which the application meant to send, by
+        default now.
+
+        Raises LocalProtocolError for a message that can never be sent: other content, frames that do not fit one
+        packet, more bytes than 64 packets hold, or a destination that is not another node of the scenario.
         """
 
     def fly(self, course: Course) -> None:
-        """Command the vehicle. Of several commands during one call the last counts, and others may object to it."""
+        """Command the vehicle. The last command in a call counts, and other applications may object to it."""
 
     def tap(self, frames: bytes) -> None:
-        """Show MAVLink frames to the inspectors of this node."""
+        """Show MAVLink frames on the tap of this node, to ground stations and inspectors."""
 
     def record(self, record: Record) -> None:
         """Write a record into the trace of the run."""
@@ -200,48 +205,49 @@ class Application:
     name: str = "application"
     """A name that is unique at its node; the trace uses it for the application's packets."""
     listens: Collection[int] = ()
-    """Ids of the MAVLink messages that it receives; the first inner frame decides what a packet counts as."""
+    """The ids of the MAVLink messages that it receives; the first inner frame decides the id of a packet."""
     ports: Collection[int] = ()
-    """Ports whose messages it receives."""
+    """The ports whose messages it receives."""
     follows: Collection[Fate] = ()
     """The fates of its messages that are reported to it."""
     port: AppPort
-    """What the node offers, from `start` on."""
+    """The node's services, available from `start` on."""
 
     def start(self, port: AppPort, now_ns: int) -> None:
         """The node has started."""
         self.port = port
 
     def on_message(self, message: Received, now_ns: int) -> None:
-        """Take in a message for this node."""
+        """A message for this node was received."""
 
     def on_status(self, status: Status, now_ns: int) -> None:
-        """Take in what became of a message; only fates in `follows` are reported."""
+        """A message of this application has come to one of the fates in `follows`."""
 
     def on_fix(self, fix: Gps, now_ns: int) -> None:
-        """Take in a position fix of the vehicle's receiver."""
+        """The vehicle's receiver has given a position fix."""
 
     def on_sensor(self, reading: SensorReading, now_ns: int) -> None:
-        """Take in a reading of any other sensor that the scenario puts on board."""
+        """Any other sensor on board has given a reading."""
 
     def on_hello(self, frame: bytes, now_ns: int) -> None:
-        """Take in a neighbor's hello, routing header first; it says where that neighbor flies."""
+        """A neighbor's hello was received, routing header first; it states the neighbor's position and velocity."""
 
     def hello_frames(self, now_ns: int) -> bytes:
-        """MAVLink frames to add to the hello that is sent now; it reaches neighbors sooner than any flood."""
+        """MAVLink frames to add to the hello that is sent now; a hello reaches neighbors sooner than a flood."""
         return b""
 
     def permits(self, course: Course, now_ns: int) -> bool:
-        """True if a course that another application has commanded may be flown now. Who objects is asked about the next
-        course too, and so knows what is wanted.
+        """True if this application does not object to a course that another one has commanded.
+
+        An application that objects is asked about the next course, too, and so learns which one is wanted.
         """
         return True
 
     def wake(self, now_ns: int) -> None:
-        """Act at an instant that `next_wake_ns` has named."""
+        """The instant has come that `next_wake_ns` has returned."""
 
     def next_wake_ns(self) -> int | None:
-        """The instant of the next wake-up that is wanted; None when none is."""
+        """The instant of the next wake-up; None if none is wanted."""
         return None
 
     def report(self) -> Mapping[str, Any]:

@@ -29,10 +29,11 @@ app = App(name="air", help="Change the air of a swarm that runs: degrade a link,
 @Parameter(name="*")
 @dataclass(frozen=True)
 class Life:
-    """What the fault is called, and how long it stands."""
+    """The label of the fault, and how long it lasts."""
 
     label: str | None = None
-    """What `restore` calls it; by default made from its kind and nodes. A new fault ends an old one of its label."""
+    """Label by which `restore` ends it; by default made from its kind and nodes. A fault ends an older one of
+    its label."""
     for_s: Annotated[float, Parameter(name="--for")] = 0.0
     """How long the fault lasts [swarm s]; 0: until `fanet air restore`."""
 
@@ -63,7 +64,7 @@ def degrade(
     loss_db
         Added to the path loss [dB].
     loss_share
-        Share of the frames lost of those that would have been received.
+        Share of frames lost, among those that would have been received.
     one_way
         Only from src to dst.
 
@@ -93,7 +94,7 @@ def jam(
     radius_m
         Radius [m].
     noise_dbm
-        Noise that each receiver inside hears [dBm]; by default nothing is received there.
+        Noise at each receiver inside [dBm]; by default nothing can be received there.
 
     """
     center = Enu(east_m, north_m, 0.0)
@@ -121,7 +122,7 @@ def restore(label: str = "", *, where: SwarmFlags = SwarmFlags()) -> int:
     Parameters
     ----------
     label
-        Label of the fault that ends: the one given with it, or link-SRC-DST, node-ID, jam. Without it all end.
+        Label of the fault: the one given with it, or link-SRC-DST, node-ID, jam. Without a label, all faults end.
 
     """
     return _do(Restore(label), where)

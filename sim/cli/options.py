@@ -1,6 +1,6 @@
-"""What commands of `fanet` have in common: options that several of them take, and what follows from them.
+"""Options that several commands of `fanet` share, and what follows from them.
 
-Field names are the flags, their docstrings the help; the command line reads both at run time.
+The names of the fields are the flags and their docstrings the help text; the command line reads both at run time.
 """
 
 from collections.abc import Sequence
@@ -22,7 +22,8 @@ if TYPE_CHECKING:
 
 _err = Console(stderr=True)
 _LEAD_MS: Final = 40
-"""What a scenario without a lead is given in real time: asyncio's timers and the bus are late by some milliseconds."""
+"""The lead in real time of a scenario without one, because asyncio's timers and the bus are late by
+some milliseconds."""
 
 
 def _seconds(_type: object, tokens: Sequence[Token]) -> float:
@@ -37,7 +38,7 @@ def _seconds(_type: object, tokens: Sequence[Token]) -> float:
 @Parameter(name="*")
 @dataclass(frozen=True)
 class ScenarioFlags:
-    """What to run: a scenario and what to change in it."""
+    """The scenario to run, and the changes to it."""
 
     set: Annotated[
         tuple[str, ...],
@@ -49,7 +50,7 @@ class ScenarioFlags:
             help="Change scenario keys, KEY=VALUE ..., for example --set nodes.count=20 duration_s=2min.",
         ),
     ] = ()
-    """Repeatable; each may be followed by several."""
+    """Repeatable; each --set may be followed by several KEY=VALUE."""
     seed: int | None = None
     """Seed of every random stream of the run."""
     duration: Annotated[float | None, Parameter(converter=_seconds)] = None
@@ -67,7 +68,7 @@ class ScenarioFlags:
         return catalog.find(name, overrides)
 
     def realtime_scenario(self, name: str) -> "Scenario":
-        """The same for real processes, which can announce nothing without a lead: where it is 0, one that they need."""
+        """The scenario for real processes. They cannot announce frames without a lead, so a lead of 0 is replaced."""
         chosen = self.scenario(name)
         if chosen.radio.lead_ms:
             return chosen
@@ -78,7 +79,7 @@ class ScenarioFlags:
 @Parameter(name="*")
 @dataclass(frozen=True)
 class OutputFlags:
-    """The options for the result of a run: where it goes, and in what form."""
+    """Where the result of a run is written, and in what form."""
 
     out: Path | None = None
     """Folder for scenario.toml, summary.json, reports.json, links.json, trace.jsonl and mavlink.tlog."""
@@ -95,7 +96,7 @@ class OutputFlags:
     """Write a page of the run with pictures into that folder, report.html and report.md."""
 
     def prepare(self) -> None:
-        """See, before a run, that its result can be written; raises ConfigError."""
+        """Check before a run that its result can be written; raises ConfigError."""
         if self.out is None and self.report:
             raise ConfigError("--report: needs --out DIR, the folder that report.html goes to")
         if self.report:
@@ -118,7 +119,7 @@ class OutputFlags:
 @Parameter(name="*")
 @dataclass(frozen=True)
 class ServiceFlags:
-    """The options by which a single service finds its swarm."""
+    """How a single service finds its swarm."""
 
     connect: str = DEFAULT_ENDPOINT
     """Zenoh endpoint of the swarm's router."""
@@ -128,7 +129,7 @@ class ServiceFlags:
     """Zenoh's own configuration, JSON5 (TLS and the like): a file, or a folder of `fanet keys`."""
 
     def address(self, scenario: "Scenario") -> "SwarmAddress":
-        """The same for the service itself; says what others can do at the endpoint."""
+        """The address for the service itself; warns if others can reach the endpoint."""
         from fanet_mw.hosts.realtime import SwarmAddress
 
         warn_of(self.connect, listens=False)
@@ -138,23 +139,23 @@ class ServiceFlags:
 @Parameter(name="*")
 @dataclass(frozen=True)
 class SwarmFlags:
-    """Which of the swarms that run."""
+    """Which of the running swarms is meant."""
 
     connect: str | None = None
-    """Zenoh endpoint of the swarm's router; by default that of a swarm that runs on this machine."""
+    """Zenoh endpoint of the swarm's router; by default that of a swarm running on this machine."""
     swarm: str | None = None
-    """Name of the swarm; by default the only one there."""
+    """Name of the swarm; by default the only one running."""
     zenoh_config: Path | None = None
     """Zenoh's own configuration, JSON5 (TLS and the like): a file, or a folder of `fanet keys`."""
 
     def located(self) -> tuple[str, str | None]:
-        """The endpoint and, where it is known, the name of the swarm; says what others can do at the endpoint."""
+        """The endpoint and, if it is known, the name of the swarm; warns if others can reach the endpoint."""
         warn_of(self.connect, listens=False)
         return locate(self.connect, self.swarm)
 
 
 def with_engine(scenario: "Scenario") -> "Scenario":
-    """The scenario with a world engine that is installed: where pybullet is not, `kinematic` serves, and says so."""
+    """The scenario with an installed world engine: without pybullet it is `kinematic`, which a message says."""
     world = scenario.world
     if world.engine != "pybullet" or find_spec("pybullet") is not None:
         return scenario
@@ -172,7 +173,7 @@ def with_engine(scenario: "Scenario") -> "Scenario":
 
 
 def warn_of(endpoint: str | None, *, listens: bool) -> None:
-    """Say what others can do at an endpoint that they can reach."""
+    """Warn if others can reach an endpoint, or forge messages on it."""
     if endpoint is None:
         return
     from fanet_mw.hosts.bus import exposure

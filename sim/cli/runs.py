@@ -144,7 +144,7 @@ def plan(
     scenario
         A shipped scenario's name (see `fanet scenarios`) or a .toml file.
     deadline
-        Every packet must be with everyone within this time [s]; by default traffic.deadline_s, if that is set.
+        Every packet must reach all nodes within this time [s]; by default traffic.deadline_s, if that is set.
     search
         Find the cluster count, flooding period and slots that meet the deadline with the least airtime per packet.
     json

@@ -32,7 +32,7 @@ def links(
     node
         Only links from and to this node.
     reports
-        End after so many; by default when interrupted.
+        End after this many reports; by default when interrupted.
 
     """
     from sim.cli.links import watch

@@ -57,7 +57,7 @@ def sweep(
     set
         Scenario key and its value, or its values in turn: KEY=A,B,C ...; repeatable. Every combination is run.
     seeds
-        Run every setting with seeds 1 to so many.
+        Run every setting with this number of seeds, from 1 on.
     variant
         `quick` or `full`, where the sweep has it.
     out

@@ -41,7 +41,7 @@ class Measure(NamedTuple):
     """One measure of how the machine disturbed the run, as a share or in milliseconds."""
 
     what: str
-    """What is measured, as the subject of a sentence."""
+    """The measured quantity, as the subject of a sentence."""
     value: float
     limit: float
     unit: str = ""

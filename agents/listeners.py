@@ -1,4 +1,6 @@
-"""Finds out once which applications on board react to each kind of input, so that the others need not be called."""
+"""Which applications on board are called for each kind of input: those that implement the method for it, or that have
+asked for the message or port. This is found out once, so that no application is called that would do nothing.
+"""
 
 from collections.abc import Iterable, Sequence
 from typing import NamedTuple, Self
@@ -8,7 +10,7 @@ from fanet_mw.wire import CHUNK
 
 
 class Callbacks(NamedTuple):
-    """For each method of an application, the applications that implement it, in their order."""
+    """For each method that an application may implement, the applications that do, in the order on board."""
 
     on_fix: tuple[Application, ...]
     on_sensor: tuple[Application, ...]
@@ -19,6 +21,8 @@ class Callbacks(NamedTuple):
 
     @classmethod
     def of(cls, applications: Sequence[Application]) -> Self:
+        """Find the methods that the class of each application overrides."""
+
         def overriding(method: str) -> tuple[Application, ...]:
             inherited = getattr(Application, method)
             return tuple(a for a in applications if getattr(type(a), method) is not inherited)
@@ -41,18 +45,20 @@ class Listeners:
                 self._to_port.setdefault(port, []).append(application)
 
     def of_message(self, message_id: int) -> Sequence[Application]:
-        """The applications that listen to a MAVLink message; messages of pure load only go to applications that name
-        their id.
+        """The applications that listen to a MAVLink message. FANET_CHUNK is an exception: most of these messages are
+        filler of generated traffic, so they only go to applications that name the id, not to those that listen to all
+        messages.
         """
         named = self._to_message.get(message_id, [])
         return named if message_id == CHUNK.msgid else [*named, *self._to_every_message]
 
     def of_port(self, port: int) -> Sequence[Application]:
+        """The applications that listen to a port: those that name it, then those that listen to all ports."""
         return [*self._to_port.get(port, ()), *self._to_every_port]
 
     def wanted(self, also: Iterable[int]) -> frozenset[bytes] | None:
-        """The ids of all messages that any application listens to and of those in `also`, as they stand in a frame;
-        None if that is every id.
+        """The ids of the messages that any application listens to, and those in `also`, each as the three bytes that it
+        has in a MAVLink frame; None if an application listens to all messages.
         """
         if self._to_every_message:
             return None

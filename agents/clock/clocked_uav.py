@@ -2,10 +2,14 @@
 
     host: true time  |  own clock (`local_clock`)  |  swarm time as this node believes it (`swarm_time`)  |  UAV
 
-The UAV knows only swarm time as it believes it. Receptions and statuses reach it with time stamps of its radio's own
-clock. Its requests leave in true time, and so do its trace records, because delays are measured between nodes. If its
-swarm time turns out to have been ahead, it stands still until true swarm time has caught up. Until a node has learned
-swarm time, it receives no schedules, so it has no slot, and contends.
+The UAV acts by this swarm time alone. The stamps of messages from the host (the end of a reception or transmission, the
+instant of a fix or reading) are first read on the node's own clock, to the resolution of its stamps, and then converted
+to swarm time. The UAV's transmit requests and trace records are converted back to true time, so that delays between two
+nodes can be computed from their traces.
+
+The swarm time that the UAV is given never decreases: if the node learns that it was ahead, the UAV is given the same
+instant until the corrected swarm time has reached it. Until a node has learned swarm time, it receives no schedules, so
+it has no slot, and contends for the channel.
 """
 
 from collections.abc import Callable, Mapping, Sequence
@@ -101,14 +105,14 @@ class ClockedUav(Actor):
         self._sample_ns = -(-now_ns // _SAMPLE_NS) * _SAMPLE_NS
         self._begin(now_ns)
         self._time.start(self._clock.local_ns(now_ns))
-        self._uav.start(self._now(now_ns))
+        self._uav.start(self._advance_to(now_ns))
         self._hand_over(now_ns)
 
     def receive(self, topic: str, message: Message, now_ns: int) -> None:
         self._begin(now_ns)
         translated = self._translated(message, now_ns)
         if translated is not None:
-            self._uav.receive(topic, translated, self._now(now_ns))
+            self._uav.receive(topic, translated, self._advance_to(now_ns))
         known = {translated.end_ns: message.end_ns} if isinstance(translated, Reception) else {}  # type: ignore[union-attr]
         self._hand_over(now_ns, known)
 
@@ -118,7 +122,7 @@ class ClockedUav(Actor):
         while self._sample_ns <= now_ns:
             self._sample(self._sample_ns)
             self._sample_ns += _SAMPLE_NS
-        wanted_ns, shown_ns = self._uav.next_wake_ns(), self._now(now_ns)
+        wanted_ns, shown_ns = self._uav.next_wake_ns(), self._advance_to(now_ns)
         if wanted_ns is not None and wanted_ns <= shown_ns + _ROUNDING_NS:
             self._shown_ns = max(shown_ns, wanted_ns)
             self._uav.wake(self._shown_ns)
@@ -126,12 +130,12 @@ class ClockedUav(Actor):
 
     def nudge(self, now_ns: int) -> None:
         self._begin(now_ns)
-        self._uav.nudge(self._now(now_ns))
+        self._uav.nudge(self._advance_to(now_ns))
         self._hand_over(now_ns)
 
     def state(self, now_ns: int) -> NodeState:
         """The state of the network, as the node knows it."""
-        return self._uav.state(self._now(now_ns))
+        return self._uav.state(self._advance_to(now_ns))
 
     def next_wake_ns(self) -> int | None:
         wanted_ns = self._uav.next_wake_ns()
@@ -140,7 +144,7 @@ class ClockedUav(Actor):
         return min(self._sample_ns, self._true_ns(wanted_ns))
 
     def stop(self, now_ns: int) -> None:
-        self._uav.stop(self._now(now_ns))
+        self._uav.stop(self._advance_to(now_ns))
         self._hand_over(now_ns)
 
     def report(self) -> Mapping[str, Any]:
@@ -163,20 +167,21 @@ class ClockedUav(Actor):
         self._clock.pass_time(now_ns, until_ns=self._until_ns)
 
     def _local_now_ns(self) -> int:
-        """The instant on the own clock while an input is being handled."""
+        """The instant of the present input on the node's own clock."""
         return self._clock.local_ns(self._input_ns)
 
-    def _now(self, now_ns: int) -> int:
-        """The swarm time now, as it is given to the UAV."""
+    def _advance_to(self, now_ns: int) -> int:
+        """Advance the swarm time that the UAV is given to this true instant; returns that swarm time."""
         swarm_ns = self._time.line.swarm_ns(self._clock.local_ns(now_ns))
         self._shown_ns = max(self._shown_ns, swarm_ns)
         return self._shown_ns
 
     def _true_ns(self, swarm_ns: int) -> int:
+        """The true instant at which the node believes it to be this swarm time."""
         return self._clock.true_ns(self._time.line.local_ns(swarm_ns))
 
     def _stamped_ns(self, true_ns: int) -> int:
-        """The instant on the radio's clock at a true instant."""
+        """The stamp that the node's own clock gives to a true instant, rounded down to the resolution of stamps."""
         return self._clock.local_ns(true_ns) // self._stamp_ns * self._stamp_ns
 
     # --- in -------------------------------------------------------------------------------------------------------
@@ -232,10 +237,12 @@ class ClockedUav(Actor):
         return request._replace(start_ns=start_ns)
 
     def _sample(self, at_ns: int) -> None:
-        """Record the true error of swarm time, and tell the protocol how wrong clocks may be."""
+        """Record the true error of the node's swarm time, and give the protocol the greatest error that any clock in
+        the swarm may have, as far as this node knows.
+        """
         local_ns = self._clock.local_ns(at_ns)
         bound_ns = self._time.error_ns(local_ns)
-        reference, hops = self._time.place(local_ns)
+        reference, hops = self._time.reference_and_hops(local_ns)
         ahead_ns = self._time.line.swarm_ns(local_ns) - at_ns
         self.records.append(
             ClockSampled(at_ns, self._node, ahead_ns, -1 if bound_ns is None else bound_ns, reference, hops)

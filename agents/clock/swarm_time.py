@@ -1,8 +1,10 @@
-"""Three ways in which a node learns swarm time: none at all, its neighbors' time beacons, or GPS (`clock.sync`).
+"""How a node knows swarm time, by the key `clock.sync`: from its own clock alone, from the time beacons of its
+neighbors, or from GPS.
 
-Each takes in instants of the node's own clock, and gives the line that converts such an instant into swarm time. The
-simulated GPS adds independent normal noise to the true time of each fix; multipath, and errors that last over several
-fixes, are not modeled. An outage of GPS is the world's: it then sends no fixes.
+Each of the three classes is given instants that the node has read on its own clock, and computes a line: the linear
+function that converts such an instant to swarm time. The simulated GPS adds independent normal noise to the true time
+of each fix; multipath, and errors that last over several fixes, are not modeled. During an outage of GPS the world
+sends no fixes.
 """
 
 import math
@@ -29,7 +31,7 @@ _PPM: Final = 1e-6
 
 
 class SwarmTime(ABC):
-    """A way in which a node learns swarm time; until it has learned anything, its own clock is used as it is."""
+    """A way in which a node knows swarm time; until the node has learned it, its own clock is taken for swarm time."""
 
     in_hellos: bool = False
     """True if hellos carry swarm time."""
@@ -42,7 +44,7 @@ class SwarmTime(ABC):
     @property
     @abstractmethod
     def synced(self) -> bool:
-        """True if the line is known, or if none is needed."""
+        """True if the node has learned swarm time, or if its own clock is to be used as it is."""
 
     @abstractmethod
     def error_ns(self, local_ns: int) -> int | None:
@@ -55,8 +57,10 @@ class SwarmTime(ABC):
         """
         return self.error_ns(local_ns) or 0
 
-    def place(self, local_ns: int) -> tuple[int, int]:
-        """The reference node, whose clock this node follows, and the hops to it; 0 and 0 if it follows no node."""
+    def reference_and_hops(self, local_ns: int) -> tuple[int, int]:
+        """The reference node, whose clock this node follows, and the number of hops to it; 0 and 0 if this node follows
+        no node.
+        """
         return 0, 0
 
     def start(self, local_ns: int) -> None:  # noqa: B027
@@ -79,7 +83,9 @@ class SwarmTime(ABC):
         """A hello of this node was handed to the radio."""
 
     def on_status(self, status: TxStatus, *, ended_ns: int) -> bool:
-        """The radio reports that a transmission has ended; returns True if it was a hello that was waited for."""
+        """The radio reports that a transmission has ended; returns True if that was a hello announced before
+        (`announced`).
+        """
         return False
 
     def report(self) -> Mapping[str, object]:
@@ -108,7 +114,9 @@ class OwnTime(SwarmTime):
 
 
 class GpsTime(SwarmTime):
-    """`clock.sync = "gps"`: a line through the latest fixes, by which the node also goes between and after them."""
+    """`clock.sync = "gps"`: the line is fitted to the latest fixes. It also gives swarm time between fixes and during
+    an outage, with an error bound that grows.
+    """
 
     def __init__(self, clock: Clock, *, seed: int, node: NodeId) -> None:
         self._sigma_ns = clock.gps_sigma_ns
@@ -142,7 +150,9 @@ class GpsTime(SwarmTime):
 
 
 class BeaconTime(SwarmTime):
-    """`clock.sync = "beacons"`: the algorithm is `TimeSync`; this class brings its beacons into hellos and back."""
+    """`clock.sync = "beacons"`: `TimeSync` estimates the line; this class passes it the time beacons in neighbors'
+    hellos, and puts its beacons into the hellos of this node.
+    """
 
     in_hellos = True
 
@@ -161,7 +171,8 @@ class BeaconTime(SwarmTime):
             )
         )
         self._announced: dict[int, int] = {}
-        """The sequence number of each own hello whose end the radio has not reported, by its transmit request."""
+        """The sequence numbers of the hellos of this node whose end the radio has not reported yet, by the number of
+        their transmit requests."""
         self._malformed = 0
 
     @property
@@ -178,7 +189,7 @@ class BeaconTime(SwarmTime):
     def worst_ns(self, local_ns: int) -> int:
         return self._sync.worst_ns(local_ns)
 
-    def place(self, local_ns: int) -> tuple[int, int]:
+    def reference_and_hops(self, local_ns: int) -> tuple[int, int]:
         return self._sync.reference or 0, self._sync.hops(local_ns) or 0
 
     def start(self, local_ns: int) -> None:
@@ -229,7 +240,7 @@ def oscillator(clock: Clock, *, others: int) -> Oscillator:
 
 
 def swarm_time(scenario: Scenario, node: NodeId) -> SwarmTime:
-    """The way to learn swarm time that the scenario has chosen, for one node."""
+    """The way in which one node knows swarm time, by the scenario's `clock.sync`."""
     if scenario.clock.sync == "beacons":
         return BeaconTime(scenario, node)
     if scenario.clock.sync == "gps":

@@ -1,6 +1,8 @@
-"""The two kinds of search and rescue as applications of a node: by the paper's rule, or by a plan.
+"""Search and rescue as an application of a node, in two kinds of which a node runs one: by the rule of the paper
+("Reliable Flying IoT Networks for UAV Disaster Rescue Operations", section 4.1), or as a search planned in the air.
 
-Each application passes its inputs to the mission, and empties the mission's outbox into its port.
+Each application passes its inputs to the mission, and empties the mission's outbox into its port. Both have the name
+`report`, by which results count the reports of survivors, whichever of the two has sent them.
 """
 
 from typing import Final
@@ -76,8 +78,8 @@ class PlannedSearch(Application):
 
     def on_message(self, message: Received, now_ns: int) -> None:
         for told in told_in(message.frame):
-            if _speaker(told) not in (None, message.origin):
-                raise MalformedFrameError(f"{type(told).__name__} of {_speaker(told)} by {message.origin}")
+            if _sole_origin(told) not in (None, message.origin):
+                raise MalformedFrameError(f"{type(told).__name__} of {_sole_origin(told)} by {message.origin}")
             self._searcher.on_message(told, now_ns=now_ns)
         self.port.tap(message.frame)
         self._settle()
@@ -129,15 +131,17 @@ class PlannedSearch(Application):
         return {"bad_positions": self._bad_positions}
 
     def _settle(self) -> None:
-        """Send, fly and record what the searcher has put into its outbox."""
+        """Pass on what the searcher has decided: the velocity to fly, packets to send, and trace records."""
         velocity = self._searcher.take_velocity()
         if velocity is not None:
             self._outbox.course = course_at(self.port.position, velocity)
         self._outbox.empty(self.port)
 
 
-def _speaker(told: Told) -> int | None:
-    """The only node that may flood this message; None if any node may pass it on."""
+def _sole_origin(told: Told) -> int | None:
+    """The only node from which a flood of this message may come. None for confirmations, refutations, bids and maps of
+    what has been searched: any node may repeat them.
+    """
     if isinstance(told, Survivor):
         return told.reporter
     if isinstance(told, Search):

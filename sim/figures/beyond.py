@@ -7,7 +7,7 @@ from typing import Final
 from sim.figures.claims import Claim, Reason, Statement, above, below
 from sim.figures.curves import Panel, curves
 from sim.figures.recipe import Drawing, Recipe, point
-from sim.figures.runs import Quantity, Row, Runs, best, differences
+from sim.figures.runs import Quantity, Row, Runs, differences, max_per_seed
 from sim.figures.style import SERIES, Look, canvas, legend_above, reaches
 
 _URGENT_P95: Final = "classes.urgent.delay_ms.p95"
@@ -47,7 +47,7 @@ def claims_load(runs: Runs) -> list[Claim]:
             f"every {at:g} s: PDR of fanet-mw minus the best rival's",
             differences(
                 runs.per_seed("pdr", case="ours", traffic__interval_s=at),
-                best(*(runs.per_seed("pdr", case=case, traffic__interval_s=at) for case in _RIVALS)),
+                max_per_seed(*(runs.per_seed("pdr", case=case, traffic__interval_s=at) for case in _RIVALS)),
             ),
             0.0,
         )
@@ -95,7 +95,7 @@ def claims_age(runs: Runs) -> list[Claim]:
         """The least age over all intervals, for each seed."""
         levels = runs.levels("traffic.interval_s")
         negative = [runs.per_seed(lambda row: -row["age_s"], case=case, traffic__interval_s=at) for at in levels]
-        return {seed: -age for seed, age in best(*negative).items()}
+        return {seed: -age for seed, age in max_per_seed(*negative).items()}
 
     return [
         Claim(

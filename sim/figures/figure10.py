@@ -5,7 +5,7 @@ from typing import Final
 
 from sim.figures.claims import Claim, Reason, above
 from sim.figures.recipe import Drawing, Recipe, point
-from sim.figures.runs import Runs, best, differences, pooled
+from sim.figures.runs import Runs, differences, max_per_seed, mean_per_seed
 from sim.figures.style import SERIES, beside, canvas, legend_above, line, ticks_at
 
 _MANY: Final = 22
@@ -79,13 +79,13 @@ def _many(runs: Runs) -> list[int]:
 def _over_periods(runs: Runs, case: str, clusters: int, interval_s: float) -> Mapping[int, float]:
     """The PDR of each seed, as the mean over all flooding periods."""
     periods = runs.levels("clusters.flooding_period_s")
-    return pooled(*(_pdr(runs, case, clusters, period_s, interval_s) for period_s in periods))
+    return mean_per_seed(*(_pdr(runs, case, clusters, period_s, interval_s) for period_s in periods))
 
 
 def _lead_of_many(runs: Runs, case: str, interval_s: float) -> dict[int, float]:
     """The best PDR with many clusters minus the best with few, for each seed."""
     many, few = (
-        best(*(_over_periods(runs, case, count, interval_s) for count in counts))
+        max_per_seed(*(_over_periods(runs, case, count, interval_s) for count in counts))
         for counts in (_many(runs), _few(runs))
     )
     return {seed: many[seed] - few[seed] for seed in many}
@@ -94,7 +94,8 @@ def _lead_of_many(runs: Runs, case: str, interval_s: float) -> dict[int, float]:
 def _gain_of_spreading(runs: Runs, counts: Sequence[int], interval_s: float) -> list[float]:
     """The PDR if packets are spread over the slot minus the PDR if they are sent at once, for each seed."""
     spread, burst = (
-        pooled(*(_over_periods(runs, case, count, interval_s) for count in counts)) for case in ("spread", "burst")
+        mean_per_seed(*(_over_periods(runs, case, count, interval_s) for count in counts))
+        for case in ("spread", "burst")
     )
     return differences(spread, burst)
 
@@ -103,7 +104,7 @@ def _gain_of_flooding_seldom(runs: Runs, case: str, counts: Sequence[int], inter
     """The PDR with periods of a second and more minus that with shorter ones, for each seed."""
     periods = runs.levels("clusters.flooding_period_s")
     seldom, often = (
-        pooled(*(_pdr(runs, case, count, period_s, interval_s) for count in counts for period_s in chosen))
+        mean_per_seed(*(_pdr(runs, case, count, period_s, interval_s) for count in counts for period_s in chosen))
         for chosen in (
             [period_s for period_s in periods if period_s >= _SELDOM_S],
             [period_s for period_s in periods if period_s < _SELDOM_S],

@@ -8,7 +8,7 @@ from matplotlib.axes import Axes
 
 from sim.figures.claims import Claim, Reason, above, below
 from sim.figures.recipe import Drawing, Recipe, point
-from sim.figures.runs import Quantity, Row, Runs, differences, pooled
+from sim.figures.runs import Quantity, Row, Runs, differences, mean_per_seed
 from sim.figures.style import LOOKS, Look, beside, canvas, legend_above, line, plain_log, ticks_at
 
 _SPEED: Final = "mobility.speed_m_s"
@@ -182,7 +182,7 @@ def _is_low_when_slow(runs: Runs) -> Claim:
 
 def _aodv_above_olsr(runs: Runs) -> Claim:
     speeds = runs.levels(_SPEED, case="aodv")
-    aodv, olsr = (pooled(*(_seen(runs, "pdr", case, at) for at in speeds)) for case in ("aodv", "olsr"))
+    aodv, olsr = (mean_per_seed(*(_seen(runs, "pdr", case, at) for at in speeds)) for case in ("aodv", "olsr"))
     return Claim(8, "AODV's PDR is above OLSR's.", [above("AODV minus OLSR, all speeds", differences(aodv, olsr), 0.0)])
 
 

@@ -1,4 +1,9 @@
-"""Looks up the finished runs of a sweep by case and settings: one value per seed, in the order of the seeds."""
+"""The finished runs of a sweep, looked up by case and settings, and functions that combine their values seed by seed.
+
+A sweep runs the same scenario with several seeds, and each case of it with the same seeds. A dictionary from seed to
+value, ascending by seed, holds one quantity of such runs. Values are always combined within a seed, because runs of one
+seed have random numbers in common and are not independent of each other; seeds are.
+"""
 
 from collections.abc import Callable, Mapping
 from itertools import accumulate
@@ -11,11 +16,11 @@ from sim.sweep.measures import DELAY_EDGES_S
 
 Row = Mapping[str, Any]
 Quantity = str | Callable[[Row], float | None]
-"""A column, or a function of a row."""
+"""A quantity of a run: the name of a column, or a function of the row; None where it is undefined."""
 
 
 class Runs:
-    """The rows of a table, without failed runs."""
+    """The rows of a sweep's table, one per run; failed runs are counted and left out of everything else."""
 
     def __init__(self, table: Table) -> None:
         rows = table.drop_columns([name for name in ("scenario", "summary") if name in table.column_names]).to_pylist()
@@ -23,12 +28,16 @@ class Runs:
         self.failed = len(rows) - len(self.rows)
 
     def where(self, **settings: object) -> list[Row]:
-        """The rows with these settings; `case` is one of them, and a dot in a key is written `__`."""
+        """The rows with these settings. A setting is a column of the table: `case`, or a scenario key in which each dot
+        is written as `__`.
+        """
         wanted = {key.replace("__", "."): value for key, value in settings.items()}
         return [row for row in self.rows if all(row.get(key) == value for key, value in wanted.items())]
 
     def per_seed(self, quantity: Quantity, **settings: object) -> dict[int, float]:
-        """The quantity for each seed, in their order, without runs in which it is undefined."""
+        """The quantity by seed, ascending, of the rows with these settings, of which each seed has one; runs in which
+        the quantity is undefined are left out.
+        """
         found: dict[int, float] = {}
         for row in sorted(self.where(**settings), key=lambda row: row["seed"]):
             value = row.get(quantity) if isinstance(quantity, str) else quantity(row)
@@ -37,32 +46,36 @@ class Runs:
         return found
 
     def of(self, quantity: Quantity, **settings: object) -> Interval:
-        """The mean and its interval over the seeds."""
+        """The mean of the quantity over the seeds, with its confidence interval."""
         return interval(list(self.per_seed(quantity, **settings).values()))
 
     def levels(self, key: str, **settings: object) -> list[Any]:
-        """The values of a setting that occur, ascending."""
+        """All values of one setting among the rows with the other settings, ascending."""
         return sorted({row[key] for row in self.where(**settings) if row[key] is not None})
 
 
 def arrived(runs: Runs, case: str) -> list[Interval]:
-    """The share of packets x targets that had arrived by each edge of the classes of delay."""
+    """The cumulative distribution of delay in one case: for each upper edge of the delay classes (`DELAY_EDGES_S`), the
+    share of all pairs of packet and target that were delivered within that delay, as a mean over the seeds.
+    """
     sums = [[had / row["wanted"] for had in accumulate(row["delay_counts"])] for row in runs.where(case=case)]
     return [interval(column) for column in zip(*sums, strict=True)][: len(DELAY_EDGES_S)]
 
 
 def differences(left: Mapping[int, float], right: Mapping[int, float]) -> list[float]:
-    """Left minus right for each seed that both have; common random numbers make them differences of pairs."""
+    """The differences left minus right, one for each seed that both have. The two runs of a seed have random numbers in
+    common, so statistics of paired samples apply.
+    """
     return [left[seed] - right[seed] for seed in left if seed in right]
 
 
-def pooled(*many: Mapping[int, float]) -> dict[int, float]:
-    """The mean of several quantities for each seed, so that seeds remain the independent units."""
+def mean_per_seed(*many: Mapping[int, float]) -> dict[int, float]:
+    """For each seed that all of these quantities have, their mean."""
     seeds = [seed for seed in many[0] if all(seed in other for other in many)] if many else []
     return {seed: sum(one[seed] for one in many) / len(many) for seed in seeds}
 
 
-def best(*many: Mapping[int, float]) -> dict[int, float]:
-    """The greatest of several quantities for each seed."""
+def max_per_seed(*many: Mapping[int, float]) -> dict[int, float]:
+    """For each seed that all of these quantities have, the greatest one of them."""
     seeds = [seed for seed in many[0] if all(seed in other for other in many)] if many else []
     return {seed: max(one[seed] for one in many) for seed in seeds}

@@ -15,7 +15,7 @@ from sim.figures.all_figures import FIGURES, chosen
 from sim.figures.claims import Claim, Finding, Reason, Statement, Verdict, above, below
 from sim.figures.render import render
 from sim.figures.rescue import confirmed_s, loss_share
-from sim.figures.runs import Runs, best, differences, pooled
+from sim.figures.runs import Runs, differences, max_per_seed, mean_per_seed
 from sim.figures.statistics import interval, quantile_975
 from sim.figures.style import beside, reaches, spaced
 from sim.report.page import write
@@ -102,8 +102,8 @@ def test_a_page_says_of_a_reason_what_shows_it_or_that_nothing_does(nine, tmp_pa
 
 def test_differences_are_taken_seed_by_seed() -> None:
     assert differences({1: 5.0, 2: 7.0, 3: 1.0}, {2: 1.0, 1: 2.0}) == [3.0, 6.0]
-    assert pooled({1: 1.0, 2: 3.0}, {1: 3.0}) == {1: 2.0}
-    assert best({1: 1.0, 2: 3.0}, {1: 3.0, 2: 0.0}) == {1: 3.0, 2: 3.0}
+    assert mean_per_seed({1: 1.0, 2: 3.0}, {1: 3.0}) == {1: 2.0}
+    assert max_per_seed({1: 1.0, 2: 3.0}, {1: 3.0, 2: 0.0}) == {1: 3.0, 2: 3.0}
 
 
 def test_a_bar_ends_at_what_there_can_be_and_one_run_has_none() -> None:

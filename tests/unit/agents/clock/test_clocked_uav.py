@@ -50,9 +50,9 @@ def test_stamps_are_as_coarse_as_the_radio_s_clock(make_scenario: MakeScenario) 
 def test_swarm_time_as_a_node_is_told_it_never_goes_back(make_scenario: MakeScenario) -> None:
     """Its clock is found to be ahead when a reference with another time is followed."""
     made = clocked(make_scenario)
-    shown = [made._now(1 * S)]
+    shown = [made._advance_to(1 * S)]
     made._time._sync._fit.replace(made._time.line._replace(offset_ns=-20 * MS))  # type: ignore[attr-defined]
-    shown += [made._now(1 * S + step * MS) for step in range(0, 60, 5)]
+    shown += [made._advance_to(1 * S + step * MS) for step in range(0, 60, 5)]
     assert shown == sorted(shown)
     assert len(set(shown[:4])) == 1, "it stands still until swarm time has come up with it"
     assert shown[-1] > shown[0]

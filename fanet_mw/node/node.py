@@ -44,7 +44,7 @@ class AnnouncedHello(NamedTuple):
 class Node:
     """One protocol instance: it suppresses duplicates, checks headers, delivers, and asks its routing protocol.
 
-    Most receptions are copies, so `hear` must be quick with them. Five of the eighteen attributes exist only for that:
+    Most receptions are copies, so `hear` must be quick with them. Five of the nineteen attributes exist only for that:
     they are methods, lists and facts of this node's parts, which `hear` would otherwise reach through two objects.
     """
 
@@ -266,7 +266,7 @@ class Node:
         reader = self._reader
         packet_hash, bits = reader.hash, before | reader.phase
         _, _, origin_us, seq, origin, destination, _, kind, _, hops, priority, _, _, _ = reader.fields
-        known = bool(before) or (origin == self.node and kind == _DATA and self._own.handed_on(origin, seq))
+        known = before != 0 or (origin == self.node and kind == _DATA and self._own.handed_on(origin, seq))
         end_ns = reception.end_ns
         why = self._header_check.why_not(reader.fields, known, reception.src, end_ns)
         if why is not None:

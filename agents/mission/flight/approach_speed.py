@@ -1,4 +1,4 @@
-"""The speed at which a UAV flies to a survivor."""
+"""The greatest speed of a UAV in its mission, which differs from UAV to UAV (`mission.approach_speeds_m_s`)."""
 
 from fanet_mw.rng import stream
 from fanet_mw.scenario import Scenario
@@ -6,6 +6,6 @@ from fanet_mw.units import NodeId
 
 
 def approach_speed_m_s(scenario: Scenario, node: NodeId) -> float:
-    """The speed of one UAV: uniform between the bounds of the scenario, drawn by its seed."""
+    """The greatest speed of one UAV, drawn by the seed, uniformly between the bounds of the scenario."""
     least, most = scenario.mission.approach_speeds_m_s
     return least if least == most else stream(scenario.seed, "approach speed", node).uniform(least, most)

@@ -1,8 +1,8 @@
 """The endurance of a UAV: how much charge it may spend in addition to the way home and a reserve.
 
-rate      share of the charge that one second of flight takes, from recent readings
-needed    rate x (way home / speed + height / sinking speed), and a fifth more for wind and waiting
-margin    charge - reserve - needed;  at 0 a UAV flies home, whatever it is doing
+rate      share of the capacity that one second of flight takes, from the readings of the last `_WINDOW_NS`
+needed    rate x (way home / speed + height / sinking speed) x `_DETOUR`
+margin    charge - reserve - needed; at 0 the UAV flies home, whatever it is doing
 """
 
 import math
@@ -13,8 +13,11 @@ from fanet_mw.units import Enu, S
 
 _WINDOW_NS: Final = 20 * S
 _LEAST_WINDOW_NS: Final = 5 * S
+"""While the readings span less time than this, the rate is taken to be 0."""
 _DETOUR: Final = 1.2
+"""The factor by which the way home may take longer, because of wind and waiting."""
 _SINK_M_S: Final = 1.0
+"""The speed of sinking that is assumed for the landing."""
 
 
 class Endurance:

@@ -49,9 +49,7 @@ class Goal:
         return formation.bounded(east, north, lane, moves)
 
     def _gap(self, now_ns: int) -> tuple[float, float] | None:
-        """The nearest unsearched gap, for a UAV that is free to fly there; None if there is none, or if the UAV has a
-        place.
-        """
+        """The nearest unsearched gap, if this UAV is a follower; None for all other UAVs, or if there is no gap."""
         formation = self._formation
         if self._gaps is None or not formation.is_free or formation.place is None:
             return None

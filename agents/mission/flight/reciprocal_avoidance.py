@@ -13,12 +13,13 @@ from fanet_mw.units import Enu
 
 _TURN_M_S2: Final = 1.0
 """The mean acceleration with which another UAV is assumed to have flown since it was last received."""
-_MOST_GROWTH_M: Final = 12.0
+_MOST_ERROR_M: Final = 12.0
+"""The greatest error of an extrapolated position that is allowed for."""
 
 
-def grown_m(age_s: float) -> float:
-    """How far another UAV may be from its extrapolated place, if nothing of it was received for this long [m]."""
-    return min(_MOST_GROWTH_M, 0.5 * _TURN_M_S2 * age_s * age_s)
+def position_error_m(age_s: float) -> float:
+    """The greatest distance of another UAV from its extrapolated position, `age_s` after its last message."""
+    return min(_MOST_ERROR_M, 0.5 * _TURN_M_S2 * age_s * age_s)
 
 
 def avoiding(
@@ -36,8 +37,8 @@ def avoiding(
         distance = math.sqrt(distance2)
         nx, ny = (-px / distance, -py / distance) if distance > 1e-6 else (1.0, 0.0)
         away = clearance_m - distance  # [m] within one second
-        ux_dot = away - (vx * nx + vy * ny)
-        return HalfPlane(nx, ny, velocity[0] * nx + velocity[1] * ny + share * ux_dot)
+        change = away - (vx * nx + vy * ny)
+        return HalfPlane(nx, ny, velocity[0] * nx + velocity[1] * ny + share * change)
     wx, wy = vx - px / horizon_s, vy - py / horizon_s
     w_length2 = wx * wx + wy * wy
     dot = wx * px + wy * py
@@ -57,9 +58,11 @@ def avoiding(
 
 
 def staying_near(offset: Enu, other_velocity: Velocity, *, tether_m: float, within_s: float) -> HalfPlane | None:
-    """The half-plane of velocities that keep this UAV within reach of another for a time; None if the other is near.
+    """The half-plane of velocities that keep this UAV within `tether_m` of another for `within_s`; None if the other is
+    so near that no limit is needed.
 
-    Either UAV may fly away from the other, so each of them may use half of the remaining length of the tether.
+    Both UAVs may fly apart, so each of them may use half of the distance that is left. If none is left, this UAV alone
+    makes up for what is missing.
     """
     distance = math.hypot(offset.east, offset.north)
     if distance < 0.3 * tether_m:

@@ -1,4 +1,4 @@
-"""The return of a UAV whose battery runs low: it flies home above all others, then lands straight down."""
+"""The return of a UAV whose battery runs low: it flies home above all UAVs that search, then lands straight down."""
 
 import math
 from typing import Final
@@ -12,7 +12,9 @@ from fanet_mw.units import Enu
 _HIGHER_M: Final = 18.0
 """A UAV flies home this far above the lanes; relays and followers fly below it."""
 _HOME_M: Final = 4.0
+"""The UAV lands once it is within this horizontal distance of its base."""
 _LAND_M_S: Final = 1.5
+"""The speed of the landing."""
 
 
 class ReturnHome:
@@ -30,6 +32,7 @@ class ReturnHome:
         self.leaves = False
         """True from the moment at which it flies home."""
         self.lands = False
+        """True from the moment at which it has reached its base and lands."""
 
     def on_battery(self, charge: float, *, now_ns: int) -> bool:
         """A reading of the battery; returns True if the UAV must leave now."""

@@ -1,14 +1,16 @@
 """Chooses the velocity to fly until the next position fix: the wanted velocity, changed as little as the constraints
 allow.
 
-Constraints are half-planes of velocities. Hard ones keep a UAV clear of others, and always hold. Soft ones keep it
-within reach of the UAVs with which it holds the swarm together; if not all can hold, the least important are dropped.
+Constraints are half-planes of velocities. Hard ones keep a UAV clear of obstacles and other UAVs. Soft ones keep it
+within radio reach of those UAVs with which it keeps the swarm connected. If no velocity satisfies all of them, soft
+constraints are dropped, the least important first. If the hard ones alone contradict each other, the velocity with the
+least violation is flown (`half_planes.py`).
 """
 
 import math
 from typing import Final, Protocol
 
-from agents.mission.flight.reciprocal_avoidance import avoiding, grown_m, staying_near
+from agents.mission.flight.reciprocal_avoidance import avoiding, position_error_m, staying_near
 from agents.mission.formation.formation_place import FormationPlace
 from agents.mission.navigation.half_planes import HalfPlane, Velocity, nearest
 from agents.mission.navigation.known_obstacles import KnownObstacles
@@ -20,17 +22,22 @@ from fanet_mw.units import Enu, S
 _LANE_GAIN: Final = 0.4
 """The rate at which a deviation from the wanted place is corrected [1/s]."""
 _CLIMB_M_S: Final = 2.5
+"""The greatest speed of climbing and sinking."""
 _LEAST_M_S: Final = 1.0
 """The least speed at which a UAV flies around a corner."""
 _LEVEL_M: Final = 4.0
 """UAVs whose heights differ by more than twice this are on different levels, and not in each other's way once both keep
 their heights."""
 _CLEARANCE_M: Final = 10.0
+"""The distance that is kept from other UAVs, in addition to the error of their positions."""
 _HORIZON_S: Final = 6.0
+"""A collision is avoided if it would happen within this time."""
 _WATCH_M: Final = 150.0
+"""UAVs farther away than this are not considered."""
 _TETHER: Final = 0.95
-"""The length of a tether, as a share of the radio's reach."""
+"""The greatest distance of two UAVs that must stay connected, as a share of the radio's reach."""
 _TETHER_S: Final = 4.0
+"""A UAV may use up the rest of that distance in this time at the earliest."""
 
 
 class Constraint(Protocol):
@@ -98,8 +105,8 @@ class ClearOfObstacles:
 
 
 class ClearOfOthers:
-    """Collision avoidance by ORCA: with neighbors at their received positions, with a clearance that grows with their
-    age, and with whatever the radar shows flying.
+    """Collision avoidance by ORCA, with neighbors at their received positions and with flying bodies that the radar
+    shows. The clearance grows with the age of the position.
     """
 
     def __init__(self, navigation: Navigation, neighbors: NeighborMotions, obstacles: KnownObstacles) -> None:
@@ -120,7 +127,7 @@ class ClearOfOthers:
                 offset,
                 (flown.east, flown.north),
                 (motion.velocity.east, motion.velocity.north),
-                clearance_m=_CLEARANCE_M + grown_m((now_ns - motion.at_ns) / S),
+                clearance_m=_CLEARANCE_M + position_error_m((now_ns - motion.at_ns) / S),
                 horizon_s=_HORIZON_S,
                 share=0.5,
             )
@@ -129,7 +136,9 @@ class ClearOfOthers:
 
 
 class InReach:
-    """Coherence: a UAV of a line or of the chain stays within reach of its neighbors there, a follower of its line."""
+    """Keeps a UAV of a team, or a relay, within radio reach of the places to which it is tied (`Shape.tethers`), and a
+    follower within reach of the nearest UAV of its team.
+    """
 
     def __init__(
         self, navigation: Navigation, neighbors: NeighborMotions, formation: FormationPlace, *, reach_m: float

@@ -15,16 +15,17 @@ _BRAKING_S: Final = 4.0
 class Route:
     """The waypoints, and how many of them the leader has passed.
 
-    Every head keeps track of that, because it may have to become leader.
+    Every UAV that receives the leader keeps track of that, because any head may have to become leader.
     """
 
     def __init__(self, points: Sequence[tuple[float, float]], *, speed_m_s: float) -> None:
         self._points = points
         self._speed_m_s = speed_m_s
         self._passed = 0
+        """The index of the waypoint to which the leader flies; it stays at the last one."""
 
     def led_at(self, leader: Enu) -> None:
-        """The leader is at this place."""
+        """The leader is at this position: count the waypoint as passed if it is near."""
         if self._passed < len(self._points) and self._away_m(leader) <= _PASSED_M:
             self._passed = min(self._passed + 1, len(self._points) - 1)
 

@@ -1,12 +1,14 @@
 """The place of one UAV in a formation of clusters, and the velocity at which that place moves.
 
-    the leader                the head with the lowest id flies the route
-    other heads               on a circle around the leader, so wide that the circles of the clusters do not touch
-    members                   on a circle around their head
-    a UAV without a cluster   on a circle around the nearest head that it knows
-    a UAV that knows no head  hovers, even if it was the leader: the others fly on without it
+    the leader                  the head with the lowest id flies the route
+    other heads                 on a circle around the leader (`_APART`)
+    members                     on a circle around their head
+    a UAV without a cluster     on a circle around the nearest head that it receives
+    a UAV whose head is lost    flies parallel to the leader if it receives the leader, otherwise it hovers
+    a UAV that receives nobody  hovers, even if it was the leader: the others fly on without it
 
-Positions come only from received messages: the hellos of neighbors, and the floods of heads.
+The leader of the formation need not be the leader of the network, which assigns the clusters. Positions come only from
+received messages: the hellos of neighbors, and the floods of heads. A UAV is lost when its newest message is too old.
 """
 
 from collections.abc import Callable, Iterable, Iterator, Mapping
@@ -19,7 +21,8 @@ from fanet_mw.motion import Motion
 from fanet_mw.units import STILL, Enu, NodeId
 
 _APART: Final = 2.2
-"""The distance of two heads, as a multiple of the radius of the circle around a head."""
+"""The distance of the other heads from the leader, as a multiple of the radius of the circle around a head. The circles
+of the clusters then do not touch, as long as no more than six other heads are spread evenly around the leader."""
 Clusters = Mapping[NodeId, tuple[NodeId, ...]]
 
 

@@ -30,13 +30,17 @@ _APPROACH_S: Final = 2.5
 _WATCH_M: Final = 35.0
 """Walls farther away than this do not limit a UAV that flies at 10 m/s."""
 _MOST_PLANES: Final = 6
+"""The number of obstacles, the nearest ones, that limit the velocity."""
 _LOCAL_M: Final = 150.0
 """The way is searched up to this distance."""
 _MOST_CELLS: Final = 3000
+"""The greatest number of cells that a search for a way examines."""
 _REPLAN_NS: Final = 1 * S
+"""The interval at which a way is searched anew."""
 _AHEAD_S: Final = 20
 """If the goal is inside a wall, the UAV waits where it will come out, if that is within this time."""
 _RINGS: Final = 16
+"""The greatest distance in cells between a goal inside an obstacle and the free place to fly to instead."""
 _EXPLAINED_M: Final = 4.0
 """An echo this near to a wall on the map comes from that wall."""
 _NEIGHBOR_M: Final = 15.0
@@ -47,6 +51,7 @@ _ONCE_NS: Final = 3 * S
 _AGAIN_NS: Final = 15 * S
 """How long an echo counts as solid. A first echo may be noise; a second one beside it hardly is."""
 _MOVER_NS: Final = seconds_to_ns(1.2)
+"""How long a flying body that the radar has shown is avoided."""
 
 
 class Mover(NamedTuple):
@@ -185,7 +190,9 @@ class KnownObstacles:
         return [HalfPlane(east, north, (_CLEAR_M - distance) / _APPROACH_S) for distance, east, north in near]
 
     def way_to(self, at: Enu, goal: Enu, moves: Enu, *, now_ns: int) -> Enu | None:
-        """The place to fly to now on the way to a goal that moves; None if the way to the goal is straight."""
+        """The place to fly to now on the way to a goal that moves; None if the straight way to the goal is clear, or if
+        no way around the obstacles was found.
+        """
         if not self._any and not self._taken:
             return None
 

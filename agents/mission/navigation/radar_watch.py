@@ -1,4 +1,4 @@
-"""Combines a UAV's radar with the hellos of its neighbors: an echo from a place that a neighbor states is no news."""
+"""Combines a UAV's radar with the hellos of its neighbors: echoes near neighbors' stated positions are ignored."""
 
 from collections.abc import Sequence
 

@@ -1,6 +1,7 @@
-"""The approach to a survivor: straight to the estimated place, then on a spiral around it until a person is seen.
+"""The approach to a survivor: straight to the estimated place, then on a spiral around it.
 
-Once a camera sees a person there, the UAV flies on a circle around the place, until the survivor is confirmed.
+Once a sensor of this UAV has detected a person who seems to own the survivor's phone, the estimated place is that of
+the person. The UAV then flies on a circle around it, until the survivor is confirmed.
 """
 
 import math
@@ -14,7 +15,7 @@ from fanet_mw.trace import Arrived
 from fanet_mw.units import GOLDEN_ANGLE, NodeId, S
 
 _GROWTH_M_S: Final = 1.5
-"""The speed at which the radius of the spiral grows while no person is seen."""
+"""The speed at which the radius of spiral and circle grows, that of the circle up to `_IN_VIEW_M`."""
 _TURN_PER_S: Final = 0.25
 """The greatest angular speed on spiral and circle [rad/s]."""
 _SPEED_SHARE: Final = 0.8

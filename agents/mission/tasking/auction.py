@@ -17,12 +17,16 @@ from fanet_mw.wire.search import MOST_BIDS, WITHDRAWN, Bid
 _FORGOTTEN_NS: Final = 15 * S
 """How long a bid counts if its bidder does not confirm it."""
 _OLDEST_S: Final = 255
+"""The greatest age of a bid that a message can state."""
 
 
 class _KnownBid(NamedTuple):
     eta_ds: int
+    """The time in which the bidder could arrive, in tenths of a second; `WITHDRAWN` if the bid was withdrawn."""
     serial: int
+    """The number of the bid among those of its bidder."""
     stood_ns: int
+    """The latest instant at which the bidder is known to have stated the bid."""
 
 
 class Auction:
@@ -44,7 +48,9 @@ class Auction:
             self._place(survivor, WITHDRAWN, now_ns)
 
     def merge(self, bids: Iterable[Bid], *, now_ns: int) -> None:
-        """Another node has passed on bids. A node ignores older ones of its own, unless it has restarted since."""
+        """A neighbor has passed on bids. Of its own bids a node only learns their serial numbers, so that its next bid
+        is newer even if the node has restarted since.
+        """
         for bid in bids:
             stood_ns = now_ns - bid.age_s * S
             if stood_ns < now_ns - _FORGOTTEN_NS:
@@ -66,7 +72,7 @@ class Auction:
         return mine is not None and mine.eta_ds != WITHDRAWN
 
     def winners(self, survivor: int, *, count: int, now_ns: int) -> list[int]:
-        """The best bidders, the best first."""
+        """The `count` bidders with the earliest times of arrival, the earliest first."""
         standing = [
             (known.eta_ds, bidder)
             for bidder, known in self._bids.get(survivor, {}).items()
@@ -75,7 +81,7 @@ class Auction:
         return [bidder for _, bidder in sorted(standing)[:count]]
 
     def would_win(self, survivor: int, *, eta_s: float, count: int, now_ns: int) -> bool:
-        """True if a bid of this node would be among the best."""
+        """True if a bid of this node with this time of arrival would be among the `count` best."""
         before = self.winners(survivor, count=count, now_ns=now_ns)
         if len(before) < count:
             return True
@@ -83,7 +89,9 @@ class Auction:
         return (round(10 * eta_s), self._node) < (self._bids[survivor][worst].eta_ds, worst)
 
     def bids_to_tell(self, tasks: Iterable[int], *, now_ns: int) -> list[Bid]:
-        """The bids to pass on, as many as one message holds: the node's own first, then the best of each open task."""
+        """The bids for these tasks to pass on, as many as one message holds: the node's own first, then those of others
+        by their times of arrival.
+        """
         own: list[Bid] = []
         others: list[tuple[int, Bid]] = []
         for survivor in tasks:
@@ -104,5 +112,5 @@ class Auction:
         self._bids.setdefault(survivor, {})[self._node] = _KnownBid(eta_ds, self._serial, now_ns)
 
     def _counts(self, bidder: int, known: _KnownBid, now_ns: int) -> bool:
-        """True for a bid of this node, and for one that its bidder has confirmed recently."""
+        """True for a bid of this node, and for one that its bidder has stated recently."""
         return bidder == self._node or now_ns - known.stood_ns <= _FORGOTTEN_NS

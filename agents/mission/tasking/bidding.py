@@ -21,9 +21,9 @@ from fanet_mw.units import NodeId, S
 from fanet_mw.wire.search import Bid
 
 VAGUE_M: Final = 50.0
-"""An estimate with a greater standard deviation makes no UAV leave its lane."""
+"""An estimate with a greater standard deviation makes no UAV leave its place in a team; a follower may go there."""
 FAR_M: Final = 450.0
-"""A UAV that is farther from a survivor than this leaves it to others."""
+"""A UAV does not bid for a survivor whose phone was received farther away than this."""
 _SCOUT_AFTER_NS: Final = 4 * S
 """How long a survivor may have too few reporters before another UAV is sent to report it."""
 _RETURN_AFTER_NS: Final = 45 * S
@@ -59,7 +59,9 @@ class Bidding:
         self._speed_m_s = speed_m_s
         self._auction = Auction(node)
         self._taken_back_ns: dict[int, int] = {}
+        """The instant at which this UAV last withdrew its bid for each survivor by its own decision."""
         self._announced = False
+        """True if the trace contains that this UAV approaches the present survivor."""
         self.survivor: int | None = None
         """The survivor to whom this UAV flies; None if it flies to none."""
 
@@ -69,7 +71,7 @@ class Bidding:
         self._auction.merge(open_bids, now_ns=now_ns)
 
     def bids_to_tell(self, *, now_ns: int) -> list[Bid]:
-        """The bids to pass on."""
+        """The bids to put into the next hello."""
         return self._auction.bids_to_tell(self._finds.unconfirmed(), now_ns=now_ns)
 
     def close(self, survivor: int, *, now_ns: int) -> None:
@@ -90,7 +92,7 @@ class Bidding:
         self.survivor = None
 
     def bid(self, now_ns: int) -> None:
-        """Bid for those survivors for whom this UAV would be among the best."""
+        """Bid for each survivor for whom this UAV would be among the winners, if its place in the formation permits."""
         if self._formation.pattern is None:
             return
         for survivor in self._finds.unconfirmed():
@@ -110,7 +112,9 @@ class Bidding:
                 self._auction.bid(survivor, eta_s=eta_s, now_ns=now_ns)
 
     def choose(self, now_ns: int) -> None:
-        """Fly to the won survivor that can be reached first; without one, fly back to the lane."""
+        """Choose the survivor to fly to: the present one if it is not given up, otherwise the nearest one whose auction
+        this UAV has won; None if it has won none.
+        """
         if self.survivor is not None:
             self._reconsider(self.survivor, now_ns)
         if self.survivor is None:
@@ -125,8 +129,8 @@ class Bidding:
             self._announce(self.survivor, now_ns)
 
     def _reconsider(self, survivor: int, now_ns: int) -> None:
-        """Withdraw from a survivor whom another UAV has reached, who was not found, or for whom this UAV would lose the
-        swarm.
+        """Give up the present survivor if this UAV has lost the auction, has searched there in vain for too long, or,
+        as a follower, would be out of reach of its team there. In the last two cases its bid is withdrawn.
         """
         find = self._finds.known[survivor]
         lost = not self._wins(survivor, find, now_ns)
@@ -151,6 +155,7 @@ class Bidding:
         self._outbox.records.append(Approaching(now_ns, self._node, survivor, len(find.reporters), east_m, north_m))
 
     def _is_reported(self, find: Find) -> bool:
+        """True if enough different nodes have reported a survivor (`mission.reports_to_approach`)."""
         return len(find.reporters) >= self._config.reports_to_approach
 
     def _wanted(self, find: Find) -> int:

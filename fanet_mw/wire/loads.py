@@ -15,9 +15,9 @@ CAPACITY: Final = 56
 PER_NS: Final = 100 * S
 """A load is the number of packets in this time."""
 AS_EXPECTED: Final = 0xFFFF
-"""The load of a node that is taken to send as the scenario says."""
+"""The load of a node that is assumed to send as the scenario states."""
 MOST_LOAD: Final = 20_000
-"""The greatest load that is announced: 200 packets a second, of one node."""
+"""The greatest load that can be announced: 200 packets a second of one node."""
 
 
 class Loads(NamedTuple):

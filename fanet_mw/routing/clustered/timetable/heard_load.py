@@ -1,12 +1,16 @@
-"""How much each node of the swarm sends, as one node hears it: from the sequence numbers and births of data packets.
+"""Estimates how many packets each node of the swarm sends, from the sequence numbers and birth times of those that one
+node receives.
 
-    marks, at least 2 s apart   ->  packets per second between them: mean + twice its standard error  ->  load
-    too few marks               ->  as the scenario says
-    nothing heard for long      ->  what the silence allows
+A node numbers its data packets without gaps. So two received packets tell how many the origin has made between them,
+including those that were lost and those that the origin dropped because its turns did not suffice. Some packets of
+each node, at least 2 s apart, are kept as marks, and the load follows from them:
 
-A node numbers its data packets without gaps, so two packets that are received tell how many there were between them,
-also of those that were lost, or that their origin dropped because its turns did not suffice. What a packet states may
-be forged: more than the greatest load, or a birth in the future, is refused and counted.
+    enough marks                the mean rate between the marks, plus twice its standard error
+    nothing heard for long      at most the mean rate from the first mark until now, with one packet in the silence
+    too few marks               the load that the scenario states
+
+The fields of a packet may be forged. A packet that is born in the future, or that implies more than the greatest
+load, is not used but counted.
 """
 
 import math
@@ -20,32 +24,33 @@ from fanet_mw.wire.loads import AS_EXPECTED, MOST_LOAD, PER_NS
 _APART_NS: Final = 2 * S
 """The least time between two marks of a node."""
 _KEPT: Final = 7
-"""The marks that are kept of a node: those of 12 s, or of its last 7 packets if it sends less."""
+"""The greatest number of marks that are kept of a node. That many span at least 12 s."""
 _ENOUGH: Final = 3
-"""With fewer marks, a node is taken to send as the scenario says."""
+"""With fewer marks, a node is assumed to send as the scenario states."""
 _ERRORS: Final = 2.0
-"""So many standard errors are added to the mean."""
+"""The number of standard errors that are added to the mean rate."""
 _QUIET_NS: Final = 10 * S
-"""A node of which nothing new was heard for so long, and three times its interval, sends less than it did."""
+"""A node is taken to send less than before if nothing new was heard of it for this time and for three of its packet
+intervals."""
 _GROWN: Final = 1.2
-"""A timetable is replaced when a node's load has grown by this factor and needs more turns,"""
+"""A timetable is replaced if the load of a node has grown by more than this factor and needs more turns."""
 _SHRUNK: Final = 0.75
-"""or when all nodes together need at most this share of the turns that they have."""
+"""A timetable is also replaced if all nodes together need at most this share of the turns that they have."""
 
 
 class HeardLoads:
-    """The loads of all nodes, as one node hears them."""
+    """The loads of all nodes, as one node estimates them."""
 
     def __init__(self, *, interval_s: float) -> None:
-        """`interval_s`: that of the packets of a node that sends as the scenario says."""
+        """`interval_s`: the packet interval that the scenario states."""
         self._interval_s = interval_s
         self._marks: dict[int, list[tuple[int, int]]] = {}
         """Of each origin, the births [ns] and sequence numbers of some packets, oldest first."""
         self.refused = 0
-        """The number of packets that state what cannot be."""
+        """The number of packets that were not used because their fields are impossible."""
 
     def on_packet(self, origin: int, seq: int, *, born_ns: int, now_ns: int) -> None:
-        """A data packet was received for the first time, or begins at this node."""
+        """Called for each data packet that is received for the first time or made by this node."""
         if born_ns > now_ns + MS:
             self.refused += 1
             return
@@ -61,7 +66,7 @@ class HeardLoads:
         del marks[:-_KEPT]
 
     def load(self, node: int, *, now_ns: int) -> int:
-        """The number of packets of a node in 100 s, rounded up; `AS_EXPECTED` if too little was heard."""
+        """The number of packets that a node sends in 100 s, rounded up; `AS_EXPECTED` with too few marks."""
         marks = self._marks.get(node, ())
         if len(marks) < _ENOUGH:
             return AS_EXPECTED
@@ -75,12 +80,13 @@ class HeardLoads:
         return max(1, min(MOST_LOAD, math.ceil(load - 1e-6)))
 
     def loads(self, nodes: Iterable[NodeId], *, now_ns: int) -> dict[NodeId, int]:
-        """The loads of these nodes."""
+        """The load of each of these nodes."""
         return {node: self.load(node, now_ns=now_ns) for node in nodes}
 
     def worth_a_change(self, before: Mapping[NodeId, int], now: Mapping[NodeId, int], *, period_ns: int) -> bool:
-        """True if loads have changed so much that the timetable made for the earlier ones should be replaced;
-        `period_ns`: the length of a superframe.
+        """True if loads have changed so much that a timetable made for `before` should be replaced.
+
+        `period_ns` is the length of a superframe.
         """
         had, need = (
             {node: packets(load, within_ns=period_ns, interval_s=self._interval_s) for node, load in loads.items()}
@@ -94,5 +100,8 @@ class HeardLoads:
 
 
 def packets(load: int, *, within_ns: int, interval_s: float) -> float:
-    """The packets of a node with this load within a duration; `interval_s`: what the scenario says."""
+    """The number of packets that a node with this load sends within a duration.
+
+    `interval_s` is the packet interval of the scenario, which applies if the load is `AS_EXPECTED`.
+    """
     return within_ns / seconds_to_ns(interval_s) if load == AS_EXPECTED else load * within_ns / PER_NS

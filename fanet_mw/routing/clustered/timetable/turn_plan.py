@@ -1,13 +1,15 @@
-"""Decides how the turns of a superframe are used: how many each root gets, and how many packets share a frame. Pure
-functions.
+"""Decides how the turns of a superframe are used: how many turns each root gets, and how many packets share a frame.
 
-    first choice  a few more turns than each node's load needs, so that queues can drain
-    then          as many as it needs; several packets of the node share a frame if they fit (fewer, longer turns)
-    then          fewer; the node transmits what they can carry, and has no bound
-    last          turns for heads only; packets of members contend on their way to them, and have no bound either
+These uses are tried one after the other until a timetable is found:
 
-A member's packet has turns of its own on a shortest way to its head. The head passes it on in the turn right behind, so
-it never waits there. All nodes compute the same timetable from the same schedule and positions.
+    1  Each node gets a few more turns than its load needs, so that queues can drain.
+    2  Each node gets as many turns as it needs. Several of its packets share a frame if they fit, which takes fewer
+       but longer turns.
+    3  Nodes get fewer turns than they need. A node sends what its turns can carry, and has no delay bound.
+    4  Only heads get turns. Members send their packets to the heads by contention, and have no delay bound either.
+
+In 1 to 3 the packet of a member has turns of its own on a shortest way to its head, and the head relays it in the next
+turn, so the packet never waits there. All nodes compute the same timetable from the same schedule and positions.
 """
 
 import math
@@ -38,7 +40,7 @@ _FEWER: Final = 0.95
 """If the turns do not suffice, this share of the load is tried next, then this share of that, and so on."""
 _EASY: Final = (Effort(), Effort(pace=0.9))
 _HARD: Final = Effort(pace=0.8, tries=8)
-"""The effort for a load that does not fit otherwise."""
+"""The search effort for a load that does not fit with the ordinary one."""
 
 _REDUNDANCY: Final = ((9, 0.01), (7, 0.03), (5, 0.05), (4, 0.05), (3, 0.05), (3, 0.1), (3, 0.3))
 """The redundancies to try with measured links, the best first: the margin against interference [dB], and the
@@ -49,8 +51,8 @@ _MOST_PERIODS: Final = 4
 _LOAD: Final = 0.9
 """The share of a node's root turns that its packets use with measured links; its other messages need the rest."""
 _DRAINING: Final = 1.5
-"""Where turns are plenty, a node that sends more than expected gets turns for so many times its load, because packets
-have been waiting since it began to."""
+"""If there are turns enough, a node that sends more than the scenario states gets turns for this multiple of its load,
+so that the packets that wait already are sent, too."""
 _CALLS_PER_S: Final = 3
 _MOST_DIGESTS: Final = 4
 _HELLO_BYTES: Final = 200
@@ -60,7 +62,7 @@ _BLOCK: Final = 300
 """The least number of packets in a block: with fewer, turns are filled less densely; more take long to compute."""
 
 NO_LOADS: Final[Mapping[NodeId, int]] = MappingProxyType({})
-"""All nodes send as the scenario says."""
+"""All nodes send as the scenario states."""
 
 Places = tuple[tuple[NodeId, Enu], ...]
 """The positions of the nodes [m], in ascending order of ids."""
@@ -82,7 +84,7 @@ class Fitted(NamedTuple):
     odds: Odds | None = None
     """The odds of a timetable for lossy links; None for a timetable that assumes no losses."""
     loads: Mapping[NodeId, int] = NO_LOADS
-    """The loads for which the timetable was made, of those nodes that do not send as the scenario says."""
+    """The loads for which the timetable was made, of the nodes that do not send as the scenario states."""
 
 
 class TurnPlan(NamedTuple):
@@ -311,8 +313,8 @@ def _table(
     blocks: int,
     hard: bool,
 ) -> Timetable | None:
-    """The timetable whose floods are over soonest with little effort; if there is none, and `hard` is set, that with
-    more.
+    """Of the timetables found with little effort, the one whose floods end soonest. If none is found and `hard` is set,
+    the search is repeated with more effort.
     """
     if not geometry.turns:
         return None
@@ -328,7 +330,7 @@ def _lasts(table: Timetable) -> int:
 
 
 def _wishes(scenario: Scenario, head_of: Mapping[NodeId, NodeId], leader: NodeId, period_ns: int) -> Iterator[_Wish]:
-    """The ways to try, the best first."""
+    """The uses of the turns to try, the best first."""
     own = leader_load(scenario) if leader == scenario.leader else 1
     control = (leader,) * schedule_parts(scenario)
     senders = [*sorted(head_of), *([leader] if own else [])]
@@ -362,9 +364,11 @@ def _wishes(scenario: Scenario, head_of: Mapping[NodeId, NodeId], leader: NodeId
 def _wishes_by_load(
     scenario: Scenario, head_of: Mapping[NodeId, NodeId], leader: NodeId, period_ns: int, loads: Mapping[NodeId, int]
 ) -> Iterator[_Wish]:
-    """The same ways for nodes with loads of their own. Turns that a node does not need now are taken from it only if
-    they do not fit otherwise. If turns do not suffice, those who send most get fewer first, so that a node that sends
-    too much, or is said to, takes nothing from the others.
+    """The uses of the turns to try if loads differ between nodes, the best first.
+
+    A node keeps turns that it does not need now as long as all nodes fit. If the turns do not suffice, the nodes that
+    send most get fewer turns first. So a node that sends too much, or is falsely reported to, takes nothing from the
+    others.
     """
     own = leader_load(scenario) if leader == scenario.leader else 1
     control = (leader,) * schedule_parts(scenario)
@@ -403,14 +407,16 @@ def _wishes_by_load(
 def _per_node(
     scenario: Scenario, senders: Iterable[NodeId], within_ns: int, loads: Mapping[NodeId, int]
 ) -> dict[NodeId, float]:
-    """The packets of each sender within a duration."""
+    """The number of packets that each sender makes within a duration."""
     interval_s = scenario.traffic.interval_s
     return {node: packets(loads.get(node, AS_EXPECTED), within_ns=within_ns, interval_s=interval_s) for node in senders}
 
 
 def _blocks(packets: int, senders: int) -> int:
-    """The number of equal blocks of a superframe: each remains long, and each sender has the same number of turns in
-    all.
+    """The number of equal blocks into which a superframe is divided.
+
+    If there are several blocks, each holds at least `_BLOCK` packets. Where the packets divide evenly, each sender has
+    as many turns in one block as in any other.
     """
     each, more = divmod(packets, max(1, senders))
     if more:

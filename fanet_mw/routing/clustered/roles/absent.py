@@ -1,4 +1,4 @@
-"""Roles in a swarm without a leader: there are none, and every node floods its own packets."""
+"""The part for roles in a swarm without a leader: no node has a role, and every node floods its own packets."""
 
 from collections.abc import Mapping
 

@@ -4,8 +4,13 @@
 
 A head counts as silent when for four hello intervals no packet that it generated has arrived, and no newer sequence
 number of it in hellos. Two intervals are enough once the MAC has failed to reach it. Then the first member of the
-succession stands in for it, and each further member half an interval later if none before it has. Only members that
-have had news of the head judge it, because others may never have been near it.
+succession (the order in which a schedule lists the members of a cluster) stands in for it, and each further member half
+an interval later if none before it has. Only members that have had news of the head judge it, because others may never
+have been near it.
+
+A stand-in floods a join that names the silent node. Without a timetable it also uses the slot of the head from then on.
+With a timetable there is no slot to take over: the stand-in only informs the leader, and any silent neighbor is
+reported in the same way (`failure_detector.py`).
 """
 
 from typing import Final
@@ -21,11 +26,14 @@ from fanet_mw.wire.inner import Join, Schedule
 SILENT_HELLOS: Final = 4.0
 """The number of hello intervals after which a head is silent; with a timetable, any neighbor."""
 _GIVEN_UP_HELLOS: Final = 2.0
+"""The same for a head that the MAC has failed to reach."""
 _TURN_HELLOS: Final = 0.5
+"""The number of hello intervals that each member of the succession leaves to the one before it."""
 _AGAIN_HELLOS: Final = 2.0
 """The number of hello intervals after which a stand-in announces itself again, until a schedule confirms it or the head
 objects."""
 _OBJECT_NS: Final = 500 * MS
+"""The shortest time between two objections of a node, because each is a flood."""
 _LEADING: Final = State.LEADING  # members of an enumeration are looked up slowly, and this is asked at every wake-up
 
 
@@ -57,9 +65,13 @@ class Failover:
         self._since_ns = 0
         """The instant at which this node began to follow its present head."""
         self._named = NodeId(0)
+        """The head that the last schedule named for this node's cluster."""
         self._unreachable_ns = -1
+        """The instant at which the MAC last failed to reach the head."""
         self._object_ns = 0
+        """The instant from which this node may object again."""
         self._watch_ns: int | None = None
+        """The instant at which this node next judges the head, or announces itself again as its stand-in."""
 
     def start(self, now_ns: int, *, leads: bool) -> None:
         self._lease.start(now_ns)

@@ -1,9 +1,11 @@
 """Decides when a node joins: it floods a packet that states where it is, and asks the leader for a place.
 
-the node has no place yet             at a random instant, and again until a schedule names the node
-it is not where the leader believes   with the next hello, a little spread over the nodes (`position_updates.py`)
-its links are measured                the same, as soon as there is an estimate, and when a link has changed; again
-                                      until the leader announces links, because any flood may be lost
+    the node has no place in a cluster    at a random instant, and again until a schedule names the node
+    it is not where the leader believes   soon after the next hello, spread over the nodes (`position_updates.py`)
+    its links are measured                likewise, as soon as there is an estimate, and when a link has changed; again
+                                          until the leader announces links, because any flood may be lost
+
+A node also floods a join when it reports another node as silent, or objects to such a report (`failover.py`).
 """
 
 from collections.abc import Callable
@@ -18,10 +20,12 @@ from fanet_mw.wire.inner import Join
 from fanet_mw.wire.links import Links
 
 _FIRST_NS: Final = 500 * MS
+"""The least time between the start of a node and its first join."""
 _WINDOW_NS: Final = 3 * S
 """Joins are spread over this time at random, because all nodes of a swarm may start together, and each join is a
 flood."""
 _REJOIN_NS: Final = 2 * S
+"""The least time between two joins of a node that has no place."""
 
 
 class Joining:
@@ -35,6 +39,7 @@ class Joining:
         self._links = links
         self._random = random
         self._has_told_links = False
+        """True once a join of this node has stated its links."""
         self._links_are_announced = False
         """True if the leader has announced measured links, which it does when it knows those of most nodes."""
         self.due_ns: int | None = None

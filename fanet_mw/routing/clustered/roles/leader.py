@@ -1,12 +1,18 @@
 """The leader's work: it learns from joins where nodes are, divides them into clusters, and announces the schedule.
 
     joins -> none for a moment -> clusters -> schedule, announced once per flooding period
-    a node is new or gone, or the clusters have become too bad -> a new epoch, at most one in `clusters.reassign_s`
-    nodes send more than their turns carry, or much less        -> the same, with `clusters.load = "heard"`
+
+An *epoch* is one assignment of nodes to clusters. The leader begins a new one when
+
+    a node is new, or has gone                 at the next announcement; one that is reported silent may object first
+    a schedule is forged in the leader's name  at the next announcement
+    the links of most nodes are measured       at the next announcement, for the first time
+    the clusters or links have become too bad  `clusters.reassign_s` after the present epoch began; never if that is 0
+    the load of nodes has changed              likewise, with `clusters.load = "heard"`; after `_RELOAD_NS` if that is 0
 
 Joins come in bursts, so the leader waits until none has come for a moment. An elected leader knows no nodes at first:
-it calls all nodes to join, and divides them when all have had time to answer. Between joins, positions are extrapolated
-by dead reckoning.
+it calls all nodes to join, and divides them into clusters when all have had time to answer. Between joins, positions
+are extrapolated by dead reckoning.
 """
 
 from collections.abc import Mapping, Sequence
@@ -120,8 +126,10 @@ class Leader:
         it."""
         self._assigned = _Assigned()
         self._due_ns = now_ns if elected else now_ns + _FIRST_CALL_NS
+        """The instant of the next announcement."""
         self._announced_ns = now_ns
         self._not_before_ns = now_ns + ANSWER_NS if elected else now_ns
+        """No assignment is made before this instant, at which all nodes have had time to answer the call."""
 
     def on_join(self, join: Join, *, born_ns: int, now_ns: int) -> None:
         """A node has joined, or stands in for a head. The leader itself is in no cluster (paper, 4.1)."""
@@ -183,7 +191,7 @@ class Leader:
         return Schedule(now_ns // US, period_us, period_us, 0, leader, 1, 0, 1, (), term)
 
     def _renew(self, here: Motion, notice_ns: int, now_ns: int) -> None:
-        """Begin a new epoch if there is a reason to."""
+        """Begin a new epoch if one of the reasons holds that are listed at the top of this file."""
         before = self._assigned
         changed = self._outbid or sorted(self._roster.nodes) != sorted(before.nodes)
         rests = not self._reassign_ns or self._roster.stand_ins or now_ns < before.start_ns + self._reassign_ns

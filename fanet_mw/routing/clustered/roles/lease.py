@@ -1,6 +1,7 @@
 """The lease of a leader: a node follows a leader as long as its announcements keep coming, and else elects a new one.
 
-    announced -> ... silent for `silence_ns` -> the lowest live id takes office at once, others up to 3 s later -> call
+    a leader announces itself -> it is silent for `silence_ns` -> of the nodes that are alive the one with the lowest id
+    takes office at once, others up to 3 s later if it does not -> the new leader calls all nodes to join
 
 Leaders are ordered: the one with the lower term prevails, which is the second of swarm time in which it took office; of
 equal terms the lower id. When two separated parts of a swarm meet, the leader that has been in office longer stays,
@@ -14,17 +15,21 @@ from fanet_mw.routing.clustered.roles.liveness import Liveness
 from fanet_mw.units import NodeId, S
 
 _PERIODS: Final = 4
+"""The number of flooding periods without an announcement after which a leader is given up."""
 _LEAST_NS: Final = 4 * S
+"""The least time without an announcement after which a leader is given up."""
 _FIRST_NS: Final = 8 * S
 """The time for which a node waits for a leader after its start: joins take 3 s, and the assignment another 2 s."""
 _TURN_NS: Final = 1 * S
 """The time for which a node lets each live node with a lower id take office first."""
 _TURNS: Final = 3
+"""The greatest number of nodes that are let take office first."""
 _FOREVER_NS: Final = 1 << 62
+"""The end of a leader's own lease, which never comes."""
 
 
 def silence_ns(period_ns: int) -> int:
-    """The age of the newest announcement at which a leader is given up: four superframes, and at least 4 s."""
+    """The age of the newest announcement at which a leader is given up: four flooding periods, and at least 4 s."""
     return max(_PERIODS * period_ns, _LEAST_NS)
 
 
@@ -44,6 +49,7 @@ class Lease:
         self._liveness = liveness
         self.authority: Authority | None = None
         self._until_ns = 0
+        """The end of the lease, unless another announcement arrives."""
         self.stand_ns = 0
         """The instant at which the node next checks whether it must take office."""
 
@@ -67,7 +73,7 @@ class Lease:
         return self.authority is not None and now_ns <= self._until_ns - self._silence_ns // 2
 
     def accept(self, authority: Authority, *, born_ns: int, now_ns: int) -> bool:
-        """Consider an announcement made at `born_ns`; returns True if the node follows its leader from now on."""
+        """Consider an announcement made at `born_ns`; returns True if the node follows that leader from now on."""
         until_ns = born_ns + self._silence_ns
         if until_ns < now_ns:
             return False  # the announcement is so old that its leader may have failed

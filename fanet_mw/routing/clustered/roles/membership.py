@@ -37,13 +37,16 @@ _NOWHERE = ClusterPlace()
 
 
 class Membership:
-    """What one node knows of the newest schedule."""
+    """The newest schedule as one node knows it, and the node's place in it."""
 
     def __init__(self, node: NodeId) -> None:
         self._node = node
         self.version: Version | None = None
+        """The schedule of which parts have arrived; None before the first one."""
         self.standing = _NOWHERE
+        """The place of the node at present, which a failover may change before the next schedule does."""
         self.superframe: Superframe | None = None
+        """The superframe with the slots of all clusters; None until a schedule has told this node's place."""
         self.succession: tuple[NodeId, ...] = ()
         """The members of this node's cluster: the head, then the other nodes in the order in which they stand in for
         it."""
@@ -151,7 +154,7 @@ class Membership:
 
     def obey(self) -> None:
         """Take the place that the schedule gives to this node."""
-        assert self._named is not None, "only who has been named has a role to take"
+        assert self._named is not None, "only a node that a schedule names has a role to take"
         self.standing = self._named
 
     def follow(self, head: NodeId) -> None:

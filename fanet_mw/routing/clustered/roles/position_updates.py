@@ -17,12 +17,14 @@ _SHARE: Final = 0.1
 _LEAST_NS: Final = 5 * S
 """The shortest time between two updates, because each is a flood."""
 _QUIET_NS: Final = 20 * S
+"""The time without a flood of its own after which a node sends an update as a sign of life."""
 UPDATE_NS: Final = 100 * MS
 """Updates are spread over this time for each node, so that there are at most ten floods a second when all must
 update."""
 _HELLO_VARIES: Final = 1.1
 """Updates are sent with hellos, whose interval varies by a tenth."""
 _A_LITTLE_NS: Final = 2 * S
+"""The margin of the time after which the leader forgets a node."""
 
 
 def lost_ns(scenario: Scenario) -> int:
@@ -42,7 +44,9 @@ class PositionUpdates:
     def __init__(self, *, range_m: float) -> None:
         self._off_m = _SHARE * range_m
         self._told: Motion | None = None
+        """The motion that the node's last join has stated; None before the first one."""
         self._flooded_ns = 0
+        """The instant of the node's latest flood."""
 
     def on_update(self, motion: Motion) -> None:
         """The node has sent a join that states this motion."""
@@ -58,7 +62,7 @@ class PositionUpdates:
         return self._told is None or now_ns - self._told.at_ns >= _LEAST_NS
 
     def outdated(self, position: Enu, *, now_ns: int) -> bool:
-        """True if an update is needed now."""
+        """True if the node must and may send an update now; never before its first join."""
         if self._told is None or not self.may_update(now_ns):
             return False
         off_m = position.minus(self._told.position_at(now_ns)).norm()

@@ -1,7 +1,8 @@
 """The nodes that the leader knows: their motions, from joins, and which of them are reported silent.
 
-    a node joins              -> known, until it has given no sign of life for so long that two updates must have failed
-    it is reported silent     -> it may object for some time -> forgotten
+    a node joins              -> it is known until it has given no sign of life for `lost_ns`, in which it should have
+                                 sent two position updates
+    it is reported silent     -> it may object for `objection_ns` -> it is forgotten unless it has objected
 
 Any packet that the node has generated after the report counts as its objection.
 """

@@ -1,8 +1,9 @@
-"""Anti-entropy for schedules: a node that hears a neighbor follow an older schedule floods the newest one again.
+"""Anti-entropy for schedules: a node whose neighbor follows an older schedule, or none, sends the newest one again.
 
 The leader floods its schedule once per flooding period. The refresh reaches nodes that these floods miss: nodes that
 come back to the swarm and, with a timetable, nodes that still use an older one. Duplicates of a refresh are suppressed
-as in Trickle (RFC 6206). While all nodes follow the same schedule, nothing is sent.
+as in Trickle (RFC 6206). While all nodes follow the same schedule, nothing is sent. A node
+refreshes only while it has heard of its leader recently (`Lease.fresh`).
 """
 
 from collections.abc import Callable
@@ -15,7 +16,7 @@ from fanet_mw.wire.inner import Beacon
 
 
 class ScheduleRefresh:
-    """The newest schedule at one node, and when to flood it again."""
+    """The newest schedule at one node, and when to send it again."""
 
     def __init__(self, random: Callable[[], float]) -> None:
         self._random = random
@@ -23,10 +24,11 @@ class ScheduleRefresh:
         self._packets: dict[int, Packet] = {}
         """The packets of the schedule, by part."""
         self._kept_ns = 0
+        """No refresh is planned until `FLOOD_OVER_NS` after this instant."""
         self.due_ns: int | None = None
-        """The instant at which they are flooded again; None if no refresh is planned."""
+        """The instant at which the packets are sent again; None if no refresh is planned."""
         self.pending: set[int] = set()
-        """The keys of the packets that are to be flooded again."""
+        """The keys of the packets that are to be sent again."""
 
     def keep(self, packet: Packet, part: int, authority: Authority, epoch: int, *, now_ns: int) -> None:
         """Keep a packet of the schedule that this node follows, or announces itself."""

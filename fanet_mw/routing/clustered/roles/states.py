@@ -1,4 +1,5 @@
-"""The state machine of a node's role, as a table: (state, event) -> (state, action). No other code changes a state.
+"""The state machine of a node's role, as a table: (state, event) -> (state, action). After the start of a node no other
+code changes its state.
 
 `failover.py` finds the events and asks for a row. A combination without a row cannot happen, and would raise. The
 diagram in docs/explanation/roles.md is generated from the table by `scripts/generate_state_diagram.py`.
@@ -18,7 +19,8 @@ class State(StrEnum):
     HEAD = "head"
     """The node is the head that the schedule names."""
     ACTING = "acting"
-    """The node is a member that stands in for its silent head, and uses the head's slot."""
+    """The node is a member that stands in for its silent head. It uses the head's slot, except with a timetable, where
+    it only informs the leader."""
     LEADING = "leading"
     """The node is the leader; it belongs to no cluster once it has announced a schedule."""
 

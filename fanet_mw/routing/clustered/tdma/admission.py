@@ -7,9 +7,9 @@
                                still joining have gaps, and tell nothing about the final one
 
 Accepted packets are at least that interval apart, as the bound assumes (`Turns.worst_ns`), so a growing load cannot
-break the deadline of earlier packets. If no interval meets the deadline, the application is told, and packets are
-accepted at the rate that the turns can carry, because late packets are better than none. More urgent packets than bulk
-are always accepted.
+break the deadline of earlier packets. If no interval meets the deadline, that is recorded in the trace, and packets are
+accepted at the rate that the turns can carry, because late packets are better than none. Without a timetable all
+packets are accepted. Packets more urgent than bulk are always accepted (`Promises.admit`).
 """
 
 from typing import Final
@@ -31,11 +31,15 @@ class Admission:
         self._interval_ns = interval_ns
         """The interval between packets that the application has stated."""
         self._met: bool | None = None
+        """True if the deadline is met by the last answer that was recorded; None before the first one."""
         self._least_ns = 0
+        """The least interval between accepted packets by the present timetable; 0 without one."""
         self._next_ns: int | None = None
+        """The instant from which the next packet is accepted; None before the first packet."""
         self._expected_after_ns = expected_ns
         """The time after its start at which the node should have a bound."""
         self._expected_ns: int | None = None
+        """The same as an instant; None once there is an answer, or its absence was recorded."""
 
     def start(self, now_ns: int) -> None:
         """The node has started, and has no bound yet."""

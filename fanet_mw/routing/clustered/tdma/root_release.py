@@ -3,8 +3,10 @@
     a turn:  | one warning | one report | bulk, in order, as many as fit              | the rest, most urgent first |
                                         | or, in its place, a leader's announcements |
 
-Each class has room of its own in a turn, so the wait of a bulk packet depends on nothing that comes later, such as
-reports or warnings. A turn is used only if its flood is over before the next timetable comes into force.
+Each class of packets in use (`urgent.reserved`) has room of its own in a turn, so the wait of a bulk packet depends on
+nothing that comes later, such as reports or warnings. Only a leader's announcements delay its bulk. A packet that is
+larger than the room of its class waits like bulk. A turn is used only if its flood is over before the next timetable
+comes into force. `turns.py` explains root, turn and span.
 """
 
 from collections.abc import Iterator, Mapping, Sequence
@@ -18,7 +20,7 @@ from fanet_mw.units import NodeId
 from fanet_mw.wire import PRIORITY_BULK, PRIORITY_CONTROL, Kind
 
 _LAST: Final = PRIORITY_BULK + 1
-"""The rank of packets that only use what all classes leave free."""
+"""The rank of packets that only use the room that all classes leave free."""
 
 
 class TurnsInForce(NamedTuple):
@@ -35,7 +37,7 @@ class TurnsInForce(NamedTuple):
 
 
 class RootRelease(TurnRelease):
-    """The transmit queue of one node, and its own turns."""
+    """The transmit queue of one node, and the turns in which the node is the root of a flood."""
 
     def __init__(self, node: NodeId, queue: TxQueue, *, reserved: Mapping[int, int], lead_ns: int) -> None:
         super().__init__(queue, lead_ns=lead_ns)
@@ -101,6 +103,9 @@ class RootRelease(TurnRelease):
         return header.priority if fits else PRIORITY_BULK
 
     def _fill(self, size: int) -> list[Packet]:
+        """Take out the packets for one turn that can carry `size` bytes, as shown at the top of this file; always at
+        least one packet.
+        """
         queue = self._queue
         taken = queue.take(size - sum(self.reserved.values()), rank=PRIORITY_CONTROL)
         announces = bool(taken)

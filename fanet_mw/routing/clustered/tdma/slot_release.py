@@ -1,7 +1,8 @@
 """The transmit queue of a cluster head: packets are released only in its own slot, each announced one lead ahead.
 
-`burst` releases them with the least gap. `spread` divides the slot evenly among the packets that wait when it begins,
-so that one flood has moved on before the next one starts. Packets that do not fit wait for the next occurrence of the
+By `clusters.pacing = "burst"` they follow each other with the least gap (`clusters.release_gap_ms`). By `"spread"` the
+slot is divided evenly among the packets that wait when it begins, so that one flood has moved on before the next one
+starts; the gap is then between the least one and 40 ms. Packets that do not fit wait for the next occurrence of the
 slot. A head that loses its role releases its remaining packets in its old slot, because sending them to the new head
 would cost more than flooding them.
 """
@@ -20,7 +21,7 @@ add delay."""
 
 
 class Tenure(NamedTuple):
-    """The slot, in a superframe, that a head has, or had when it last was head."""
+    """The slot that a node has as head, or had when it last was head, and the superframe of that slot."""
 
     superframe: Superframe
     slot: int
@@ -37,7 +38,9 @@ class SlotRelease:
         self._least_gap_ns = max(1, round(clusters.release_gap_ms * MS))
         self._lead_ns = lead_ns
         self._slot: Slot | None = None
+        """The occurrence of the slot in which the next packet is released."""
         self._gap_ns = self._least_gap_ns
+        """The time between two releases in that occurrence."""
         self._free_ns = 0
         """No packet is released before this instant, which is one gap after the last release."""
         self._next_ns: int | None = None

@@ -16,9 +16,11 @@ from fanet_mw.wire.inner import Survivor
 from fanet_mw.wire.search import Found, Standing
 
 _TELLINGS: Final = 3
+"""The number of times that a UAV floods a verdict of its own."""
 _AGAIN_NS: Final = 7 * S
-_WORSE: Final = 0.8
-"""A UAV floods its estimate again when the standard deviation has decreased to this share."""
+"""The time between two of these floods, and the least time between a verdict and its repetition for another UAV."""
+_IMPROVEMENT: Final = 0.8
+"""A UAV floods its estimate again when the standard deviation has decreased to at most this share."""
 _USEFUL_M: Final = 60.0
 """An estimate with a greater standard deviation is not flooded."""
 _PASSED_ON_NS: Final = 12 * S
@@ -40,7 +42,8 @@ class Announcing:
         """For each survivor that this UAV has confirmed or refuted: how often the verdict must still be flooded, and
         when next."""
         self._heard_ns: dict[int, int] = {}
-        """The instant at which each survivor was confirmed or refuted, as far as this UAV knows."""
+        """The instant at which this UAV learned or made the verdict on each survivor, or was last reminded of it by a
+        UAV that did not seem to know it."""
 
     def confirm(self, survivor: int, now_ns: int) -> None:
         """The owner of this phone was seen and is certain: flood the confirmation."""
@@ -114,7 +117,7 @@ class Announcing:
         """Flood the estimate of a responder if it has become clearly better."""
         place = self._finds.known[survivor].filter.estimate()
         before_m = self._told_sigma_m.get(survivor, math.inf)
-        if place is None or place.sigma_m > _WORSE * before_m or place.sigma_m > _USEFUL_M:
+        if place is None or place.sigma_m > _IMPROVEMENT * before_m or place.sigma_m > _USEFUL_M:
             return
         self._told_sigma_m[survivor] = place.sigma_m
         self._flood(Found(now_ns // US, survivor, *place, self._node, Standing.ESTIMATED))

@@ -1,8 +1,10 @@
-"""Which confirmations are contradicted by what one UAV has heard and seen since: somebody else lies where they were.
+"""Finds the confirmations that are contradicted by powers and sightings that came later: a person was confirmed who
+does not carry that phone.
 
-Whose phone a person carries is told by received powers, and few powers may tell it wrongly where two people lie near
-each other. The powers that are heard after a confirmation go into the filter of the phone all the same. Once another
-assignment of phones to people is far more likely than any with the confirmed pair, the confirmation is taken back.
+Received powers decide which person carries which phone, and where two people lie near each other, few powers may decide
+wrongly. Powers that are received after a confirmation therefore go into the phone's filter, too. Once another
+assignment of phones to people is far more likely than any with the confirmed pair of person and phone, the confirmation
+is taken back.
 """
 
 from typing import Final
@@ -11,26 +13,28 @@ from agents.mission.finding.finds import Find, Finds
 from agents.mission.finding.identities import Identities
 
 _FRESH: Final = 4
-"""A confirmation is judged each time that so many further powers have been received."""
+"""A confirmation is judged each time that this number of further powers of the phone has been received."""
 _SAMPLES: Final = 12
-"""The fewest powers that refute."""
+"""A confirmation is not refuted by fewer powers of the phone than this."""
 _SURE_M: Final = 45.0
-"""The largest standard deviation of the place of a phone, by received powers alone, that refutes."""
+"""A confirmation is not refuted while the place of the phone, by received powers alone, has a greater standard
+deviation than this."""
 _MARGIN: Final = 6.0
-"""Twice the difference of the logarithms of likelihoods that refutes: the confirmed pair is 20 times less likely. Of
-577 simulated pairs of people 35 to 100 m apart who were confirmed rightly, none came to more than 1."""
+"""The least difference of costs (`Identities.against`) that refutes: the confirmed pair is then 20 times less likely.
+Of 577 simulated pairs of people 35 to 100 m apart who were confirmed rightly, none came to more than 1."""
 
 
 class Contradictions:
-    """The confirmations that one UAV judges, by its own filters and by the people whom it has seen."""
+    """Judges confirmations at one UAV, by its filters and by the people whom it has seen."""
 
     def __init__(self, finds: Finds, identities: Identities) -> None:
         self._finds, self._identities = finds, identities
         self._judged: dict[int, int] = {}
-        """For each confirmed survivor, how many powers had been received when it was judged last."""
+        """For each confirmed survivor, the number of received powers when the confirmation was judged last, or first
+        noticed here."""
 
     def review(self) -> list[int]:
-        """The confirmed survivors who cannot be where they were confirmed, in order of id."""
+        """The survivors whose confirmations are contradicted, in order of id."""
         return [
             survivor for survivor, find in sorted(self._finds.known.items()) if self._is_contradicted(survivor, find)
         ]
@@ -43,7 +47,7 @@ class Contradictions:
         if received - self._judged.setdefault(survivor, received) < _FRESH:
             return False
         self._judged[survivor] = received
-        margin = self._identities.against(find.confirmed)  # takes in what is pending
+        margin = self._identities.against(find.confirmed)  # this also makes the filter include all pending powers
         heard = find.filter.estimate_by_power()
         sure = heard is not None and heard.sigma_m <= _SURE_M and find.filter.included_powers >= _SAMPLES
         return sure and margin >= _MARGIN

@@ -25,14 +25,15 @@ from fanet_mw.wire.search import Found
 _SAME_SIGMAS: Final = 2.5
 """A sighting also belongs to a person within this number of its standard deviations; voices have wide ones."""
 _GATE: Final = 16.0
-"""A person for whom every phone costs more than this is taken to carry none of them. The value is above 11.8, the 99.7
-% quantile of chi-square with 2 degrees of freedom, because the shadowing of neighboring samples is not independent."""
+"""The cost of assigning no phone to a person, so that a phone of a greater cost is never assigned. The value is above
+11.8, the 99.7 % quantile of chi-square with 2 degrees of freedom, because the shadowing of neighboring samples is not
+independent."""
 _VAGUE_M: Final = 80.0
-"""If the place of a phone has a greater standard deviation than this, any person could carry it."""
+"""No owner is confirmed for a phone whose place, by received powers, has a greater standard deviation than this."""
 _NEAR_M: Final = 400.0
-"""A person does not carry a phone that was first received farther away than this."""
+"""A person does not carry a phone if the middle of its filter's grid, near the strongest power, is farther away."""
 _BESIDE_M: Final = 150.0
-"""Two people can only be mistaken for each other within this distance."""
+"""A confirmed survivor can only have been mistaken for people within this distance."""
 _FORGOTTEN_NS: Final = 60 * S
 """A person of whom there was no further sighting for this long is forgotten."""
 _FALSE_ALARM_NS: Final = 10 * S
@@ -62,7 +63,7 @@ _REFUTED_COST: Final = 9.0
 _SECOND_SIGHTINGS: Final = 20
 """A second person at a place where a survivor is confirmed is believed after this number of further sightings."""
 _SECOND_GATE: Final = 6.0
-"""A second person for whom every phone costs more than this is taken to carry none, and so not to be a second one."""
+"""The cost of assigning no phone to a second person, who is then not taken for a second one."""
 _SECOND_SIGMA_M: Final = 30.0
 """A second person can only carry a phone whose place is known from received powers with this standard deviation."""
 
@@ -184,7 +185,7 @@ class Identities:
             if all(place.distance_m(person.place.at) > SAME_PLACE_M for place in named.values())
         ]
         people = [*named.values(), *seen]
-        phones = [*named, *self._open_near(people)]
+        phones = [*named, *self._unconfirmed_near(people)]
         costs = [[self._cost(place, phone) for phone in phones] for place in people]
         nobody = [_GATE] * len(people)
         least, _ = _assigned(costs, nobody)
@@ -214,11 +215,11 @@ class Identities:
         return _assigned(others, bound)[0]
 
     def _phones(self, people: Sequence[PersonTrack]) -> list[int]:
-        """The open survivors whose phones one of these people may carry."""
-        return self._open_near([person.place for person in people])
+        """The unconfirmed survivors whose phones one of these people may carry."""
+        return self._unconfirmed_near([person.place for person in people])
 
-    def _open_near(self, places: Sequence[Estimate]) -> list[int]:
-        """The open survivors whose phones were received near one of these places."""
+    def _unconfirmed_near(self, places: Sequence[Estimate]) -> list[int]:
+        """The unconfirmed survivors whose phones were received near one of these places."""
         return [
             survivor
             for survivor in self._finds.unconfirmed()
@@ -242,6 +243,7 @@ class Identities:
         return heard is not None and heard.sigma_m <= sigma_m
 
     def _cost(self, place: Estimate, survivor: int) -> float:
+        """The cost of one pair by received powers, and by earlier refutations."""
         find, at = self._finds.known[survivor], place.at
         doubt = _REFUTED_COST if find.was_mistaken_at(at) else 0.0
         return min(_IMPOSSIBLE, find.filter.deficit(at.east, at.north) + doubt)
@@ -259,6 +261,7 @@ class Identities:
 
 
 def _is_remembered(person: PersonTrack, now_ns: int) -> bool:
+    """True while a person has been seen recently enough; a single sighting is forgotten sooner."""
     return now_ns - person.last_ns <= (_FORGOTTEN_NS if person.sightings > 1 else _FALSE_ALARM_NS)
 
 

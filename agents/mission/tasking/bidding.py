@@ -23,7 +23,7 @@ from fanet_mw.wire.search import Bid
 VAGUE_M: Final = 50.0
 """An estimate with a greater standard deviation makes no UAV leave its place in a team; a follower may go there."""
 FAR_M: Final = 450.0
-"""A UAV does not bid for a survivor whose phone was received farther away than this."""
+"""A UAV does not bid for a survivor if the middle of the phone filter's grid is farther away than this."""
 _SCOUT_AFTER_NS: Final = 4 * S
 """How long a survivor may have too few reporters before another UAV is sent to report it."""
 _RETURN_AFTER_NS: Final = 45 * S

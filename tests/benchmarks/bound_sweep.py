@@ -1,4 +1,4 @@
-"""The delay bound of scheduled floods against whole swarms: `bound_sweep.py RESULTS.jsonl [DELIVERIES [MINUTES]]`.
+"""The delay bound of scheduled floods against whole swarms: `bound_sweep.py FILE [DELIVERIES [MINUTES [heard]]]`.
 
 Random connected swarms of 5 to 100 nodes over both channels, every node a head or some, at a load that `fanet plan`
 calls feasible, for half of them the greatest that it does. Half are `calm`: at rest or in formation, periodic traffic.
@@ -9,6 +9,9 @@ fading or shadowing: no bound is stated there, but a likely delay, which is judg
 Every packet is held against the bound (b) that its origin stated for it, and against equation (4) of the paper (a): one
 flooding period, as every node's slot just holds its packets of a period. A delivery is counted from application to
 application. A line per swarm is appended to the file; what it holds already is not flown again.
+
+With `heard`, nodes are told an interval of the traffic four times as long as the true one, the true one, or a quarter
+of it, and make their timetables for what they hear; swarms fly shorter, and no node starts again.
 """
 
 import json
@@ -22,8 +25,9 @@ from itertools import pairwise
 from pathlib import Path
 from typing import Any, Final, NamedTuple
 
-from agents.applications.traffic import sources_of
+from agents.applications.traffic import Load, sources_of
 from agents.clock.clocked_uav import make_uav
+from emulator.medium import Medium
 from fanet_mw.actor import Actor
 from fanet_mw.bus.messages import Message
 from fanet_mw.errors import DropReason
@@ -39,12 +43,17 @@ from sim.run.collecting.trace_reading import records_of
 from sim.run.outcome import Outcome
 from sim.run.virtual import actors_of
 from sim.world.mobility.layout import positions
+from sim.world.world import WorldActor
 
 _INTERVALS_S: Final = (0.05, 0.1, 0.2, 0.5, 1.0, 2.0)
 _MOST: Final = 400_000
 """Deliveries of one swarm, about; so long it flies."""
 
 
+_TOLD: Final = (0.25, 1.0, 4.0)
+"""The intervals that nodes are told, as multiples of the true one."""
+_BRIEF_S: Final = 60
+"""The longest flight of a swarm whose loads are heard."""
 _MOST_PER_S: Final = 250
 """Packets per second, of all nodes together: more never fit, and take long to plan."""
 
@@ -187,13 +196,39 @@ def flown(scenario: Scenario, restarts: Sequence[tuple[int, int]]) -> Outcome:
     return Outcome(scenario=scenario, mode="virtual", wall_s=0.0, records=records, reports={})
 
 
-def measure(seed: int) -> Result:
+def flown_by_ear(true: Scenario) -> Outcome:
+    """A run in which nodes hear what is sent, and are told another interval than the true one."""
+    factor = random.Random(f"{true.seed}/told").choice(_TOLD)
+    duration_s = min(true.duration_s, _BRIEF_S)
+    first = true.traffic.model_copy(update={"name": "first"})
+    scenario = true.model_copy(update={"traffic": first, "duration_s": duration_s})
+    silent = true.traffic.model_copy(update={"interval_s": factor * first.interval_s, "start_s": 2 * duration_s})
+    told = scenario.model_copy(
+        update={"traffic": silent, "clusters": true.clusters.model_copy(update={"load": "heard"})}
+    )
+    starts = positions(scenario)
+    uavs = [
+        make_uav(told, node, scenario.name, position=start, applications=[Load(scenario, node, "first")])
+        for node, start in zip(map(NodeId, scenario.node_ids), starts, strict=True)
+    ]
+    records: list[Record] = []
+    host = VirtualHost(
+        [WorldActor(scenario, scenario.name), Medium(scenario, scenario.name), *uavs], on_records=records.extend
+    )
+    host.start()
+    host.run(scenario.duration_ns)
+    host.stop()
+    return Outcome(scenario=scenario, mode="virtual", wall_s=0.0, records=records, reports={})
+
+
+def measure(seed: int, *, heard: bool = False) -> Result:
     begun_s = time.process_time()
     drawn = swarm(seed)
     if drawn is None:
         return Result(seed, None, {}, cpu_s=time.process_time() - begun_s)
     kind, scenario, restarts = drawn
-    outcome = flown(scenario, restarts)
+    outcome = flown_by_ear(scenario) if heard else flown(scenario, restarts)
+    scenario = outcome.scenario
     found = packets_of(outcome)
     classes = {name: class_of(*delays_under_bound(app)) for name, app in found.items()}
     classes = {name: of for name, of in classes.items() if of.deliveries}
@@ -223,13 +258,13 @@ def class_of(delays_ns: Column, bounds_ns: Column) -> Class:
     return Class(len(delays_ns), broken, float((bounds_ns / delays_ns).min(initial=math.inf)))
 
 
-def main(kept: Path, wanted: int, minutes: float) -> None:
+def main(kept: Path, wanted: int, minutes: float, *, heard: bool) -> None:
     found = read(kept)
     end_s = time.monotonic() + 60 * minutes
     for seed in counted(1 + max((result.seed for result in found), default=-1)):
         if sum(result.deliveries for result in found) >= wanted or time.monotonic() > end_s:
             break
-        found.append(measure(seed))
+        found.append(measure(seed, heard=heard))
         with kept.open("a") as file:
             file.write(json.dumps(found[-1]._asdict()) + "\n")
     print(f"{len(found)} seeds, {sum(result.cpu_s for result in found):.0f} s of CPU")
@@ -274,5 +309,10 @@ def tightness(name: str, found: Sequence[Class]) -> None:
 
 if __name__ == "__main__":
     kept, *limits = sys.argv[1:]
-    given = [float(limit) for limit in limits]
-    main(Path(kept), int(given[0]) if given else 10_000_000, given[1] if given[1:] else 1e6)
+    given = [float(limit) for limit in limits[:2]]
+    main(
+        Path(kept),
+        int(given[0]) if given else 10_000_000,
+        given[1] if given[1:] else 1e6,
+        heard=limits[2:] == ["heard"],
+    )

@@ -234,7 +234,7 @@ class Leader:
         if heard is None or not before.parts or now_ns < before.start_ns + rest_ns:
             return False
         period_ns = self._measured_ns if before.measured else self._period_ns
-        return heard.worth_a_change(before.loads, loads, period_ns=period_ns)
+        return heard.worth_a_change(before.loads, loads, period_ns=period_ns, now_ns=now_ns)
 
     def _measured(self) -> tuple[Link, ...]:
         """The measured links to plan with, or none until most nodes have reported; the others' links are known from

@@ -3,7 +3,7 @@ node receives.
 
 A node numbers its data packets without gaps. So two received packets tell how many the origin has made between them,
 including those that were lost and those that the origin dropped because its turns did not suffice. Some packets of
-each node, at least 2 s apart, are kept as marks, and the load follows from them:
+each node, at least 1 s apart, are kept as marks, and the load follows from them:
 
     enough marks                the mean rate between the marks, plus twice its standard error
     nothing heard for long      at most the mean rate from the first mark until now, with one packet in the silence
@@ -21,17 +21,20 @@ from typing import Final
 from fanet_mw.units import MS, NodeId, S, seconds_to_ns
 from fanet_mw.wire.loads import AS_EXPECTED, MOST_LOAD, PER_NS
 
-_APART_NS: Final = 2 * S
+_APART_NS: Final = 1 * S
 """The least time between two marks of a node."""
-_KEPT: Final = 7
+_KEPT: Final = 13
 """The greatest number of marks that are kept of a node. That many span at least 12 s."""
-_ENOUGH: Final = 3
+_ENOUGH: Final = 4
 """With fewer marks, a node is assumed to send as the scenario states."""
 _ERRORS: Final = 2.0
 """The number of standard errors that are added to the mean rate."""
 _QUIET_NS: Final = 10 * S
-"""A node is taken to send less than before if nothing new was heard of it for this time and for three of its packet
-intervals."""
+"""A node is taken to send less than before if it was not heard for this time and for three of its packet intervals. A
+packet that is heard late because it has waited for turns ends such a silence too."""
+_SETTLE_NS: Final = 3 * S
+"""The time for which loads must ask for another timetable before it is made, because nodes that begin to send more at
+the same time are not all heard at the same time."""
 _GROWN: Final = 1.2
 """A timetable is replaced if the load of a node has grown by more than this factor and needs more turns."""
 _SHRUNK: Final = 0.75
@@ -46,6 +49,10 @@ class HeardLoads:
         self._interval_s = interval_s
         self._marks: dict[int, list[tuple[int, int]]] = {}
         """Of each origin, the births [ns] and sequence numbers of some packets, oldest first."""
+        self._heard_ns: dict[int, int] = {}
+        """The instant at which a packet of each origin was last received."""
+        self._asked_ns: int | None = None
+        """The instant since which loads have asked for another timetable; None if they do not."""
         self.refused = 0
         """The number of packets that were not used because their fields are impossible."""
 
@@ -54,6 +61,7 @@ class HeardLoads:
         if born_ns > now_ns + MS:
             self.refused += 1
             return
+        self._heard_ns[origin] = now_ns
         marks = self._marks.setdefault(origin, [(born_ns, seq)])
         last_ns, last_seq = marks[-1]
         if born_ns - last_ns < _APART_NS:
@@ -75,7 +83,7 @@ class HeardLoads:
         parts = [(b - a) * PER_NS / (to_ns - from_ns) for (from_ns, a), (to_ns, b) in pairwise(marks)]
         variance = math.fsum((part - mean) ** 2 for part in parts) / (len(parts) - 1)
         load = mean + _ERRORS * math.sqrt(variance / len(parts))
-        if now_ns - last_ns > max(_QUIET_NS, 3 * PER_NS / mean):
+        if now_ns - self._heard_ns[node] > max(_QUIET_NS, 3 * PER_NS / mean):
             load = min(load, (last - first + 1) * PER_NS / (now_ns - first_ns))
         return max(1, min(MOST_LOAD, math.ceil(load - 1e-6)))
 
@@ -83,11 +91,20 @@ class HeardLoads:
         """The load of each of these nodes."""
         return {node: self.load(node, now_ns=now_ns) for node in nodes}
 
-    def worth_a_change(self, before: Mapping[NodeId, int], now: Mapping[NodeId, int], *, period_ns: int) -> bool:
-        """True if loads have changed so much that a timetable made for `before` should be replaced.
+    def worth_a_change(
+        self, before: Mapping[NodeId, int], now: Mapping[NodeId, int], *, period_ns: int, now_ns: int
+    ) -> bool:
+        """True if loads have differed for some time so much that a timetable made for `before` should be replaced.
 
         `period_ns` is the length of a superframe.
         """
+        if not self._differ(before, now, period_ns):
+            self._asked_ns = None
+            return False
+        self._asked_ns = now_ns if self._asked_ns is None else self._asked_ns
+        return now_ns - self._asked_ns >= _SETTLE_NS
+
+    def _differ(self, before: Mapping[NodeId, int], now: Mapping[NodeId, int], period_ns: int) -> bool:
         had, need = (
             {node: packets(load, within_ns=period_ns, interval_s=self._interval_s) for node, load in loads.items()}
             for loads in (before, now)

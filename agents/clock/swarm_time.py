@@ -24,7 +24,7 @@ from fanet_mw.units import LIGHT_M_PER_S, NodeId, S, seconds_to_ns
 from fanet_mw.wire.inner import TimeBeacon
 
 _SIGMAS: Final = 4
-"""A fix of GPS is taken to be wrong by at most so many standard deviations."""
+"""The error bound of a GPS fix, in standard deviations."""
 _HELLOS: Final = 8
 """The greatest number of announced hellos that are remembered until the radio reports when they ended."""
 _PPM: Final = 1e-6

@@ -5,8 +5,8 @@ others.
     phones in reach     -> reports: flooded, and passed from neighbor to neighbor in hellos     finding.phone_reception
     enough reporters    -> an auction; winners leave their lanes as far as the formation allows tasking
     too few reporters   -> the auction sends a UAV that has not reported, for another bearing   tasking
-    seen at close range -> confirmed, announced, closed; responders return to their lanes       finding.announcing
-    contradicted later  -> refuted, announced, open again for reports and bids                  finding.contradictions
+    seen at close range -> confirmed, announced; responders return to their lanes               finding.announcing
+    contradicted later  -> refuted, announced; reported and bid for as before the confirmation  finding.contradictions
 
 All that a UAV knows it has sensed itself or received over the air. At each position fix it chooses a velocity (flight).
 """
@@ -50,7 +50,7 @@ from fanet_mw.wire.inner import Survivor
 from fanet_mw.wire.search import MOST_PLACES, Bids, Covered, Found, Search, SearchStatus, Standing, Told, encode_bids
 
 _OFFSET_DB: Final = 1.0
-"""The standard deviation of the power of one phone against that of others."""
+"""The standard deviation that is assumed for the difference between one phone's power and the mean of all phones."""
 _REVIEW_NS: Final = 1 * S
 _DEPLOY: Final = 0.9
 """The share of its greatest speed at which the slowest UAV flies to its first place."""
@@ -268,7 +268,7 @@ def coverage_map(scenario: Scenario) -> CoverageMap | None:
 
 
 def least_nodes(scenario: Scenario) -> int | None:
-    """The number of UAVs that a planned search needs in the area of a scenario; None if no plan can name so many."""
+    """The number of UAVs that a planned search needs in a scenario's area; None if it is more than a plan can name."""
     return next((count for count in range(1, MOST_PLACES + 1) if formation(scenario, count) is not None), None)
 
 

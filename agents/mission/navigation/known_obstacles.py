@@ -168,7 +168,7 @@ class KnownObstacles:
         return [mover for mover in self._movers if now_ns - mover.at_ns <= _MOVER_NS]
 
     def planes(self, at: Enu, now_ns: int) -> list[HalfPlane]:
-        """The constraints on the velocity, that of the nearest obstacle first."""
+        """The constraints on the velocity, one for each of the nearest obstacles, the nearest first."""
         found = [
             building.outside(at.east, at.north)
             for building in self._index.near.get(cell_of(at.east, at.north, TILE_M), ())

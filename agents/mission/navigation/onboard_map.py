@@ -56,7 +56,7 @@ class OnboardMap(NamedTuple):
     """The distance between two points of the grid of heights."""
 
     def ground_m(self, east_m: float, north_m: float) -> float:
-        """The height of the ground at a place; outside of the grid, that of its nearest edge."""
+        """The height of the ground at a place; outside of the grid, the height at its nearest edge."""
         rows = self.heights_m
         if not rows:
             return 0.0

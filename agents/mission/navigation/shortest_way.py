@@ -53,7 +53,9 @@ def nearest_free(goal: Place, taken: Callable[[Cell], bool], *, within: int) -> 
 
 
 def way_around(start: Place, goal: Cell, taken: Callable[[Cell], bool], *, most_cells: int) -> list[Cell]:
-    """The cells of the shortest way, that of the start first; empty if none is found within `most_cells` cells."""
+    """The cells of the shortest way, from the cell of the start to the goal; empty if no way is found by examining
+    `most_cells` cells.
+    """
     begin = cell_of(*start)
     costs: dict[Cell, float] = {begin: 0.0}
     came_from: dict[Cell, Cell] = {}

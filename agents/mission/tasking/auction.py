@@ -24,13 +24,13 @@ class _KnownBid(NamedTuple):
     eta_ds: int
     """The time in which the bidder could arrive, in tenths of a second; `WITHDRAWN` if the bid was withdrawn."""
     serial: int
-    """The number of the bid among those of its bidder."""
+    """The serial number of the bid; each new bid of a bidder has the next one (16 bits)."""
     stood_ns: int
     """The latest instant at which the bidder is known to have stated the bid."""
 
 
 class Auction:
-    """The bids that one node knows: its own, and those of others."""
+    """The bids that one node knows: its own, and the newest bid of each other bidder."""
 
     def __init__(self, node: NodeId) -> None:
         self._node = node

@@ -131,7 +131,7 @@ class AssignedRoles:
             self._gradient.on_flood_of_head(NodeId(join.node), parent=src, hops=header.hops + 1, now_ns=now_ns)
 
     def _on_schedule(self, packet: Packet, *, now_ns: int) -> None:
-        """Handle a leader's announcement, which may be that of this node itself."""
+        """Handle a leader's announcement, whether received or made by this node."""
         schedule, parts = decoded(packet.frame, Schedule.decode_frame), self.parts
         details = self._timetabling.read(packet, schedule)
         if schedule.leader != packet.header.origin:

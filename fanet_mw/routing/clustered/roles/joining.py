@@ -41,7 +41,7 @@ class Joining:
         self._has_told_links = False
         """True once a join of this node has stated its links."""
         self._links_are_announced = False
-        """True if the leader has announced measured links, which it does when it knows those of most nodes."""
+        """True if the leader has announced measured links, which it does when it knows the links of most nodes."""
         self.due_ns: int | None = None
         """The instant of the node's next join; None if it has no reason to join."""
 
@@ -56,7 +56,7 @@ class Joining:
             self.due_ns = now_ns + int(self._random() * _WINDOW_NS)
 
     def on_links_announced(self) -> None:
-        """The leader makes timetables from measured links, so it has received those of most nodes."""
+        """The leader makes timetables from measured links, so it has received the links of most nodes."""
         self._links_are_announced = True
 
     def rest(self) -> None:

@@ -100,7 +100,8 @@ class Leader:
         now_ns: int,
     ) -> None:
         """`needs_every_link`: nodes compute a timetable from the assignment, so a new one is also needed when links
-        change; `heard`: the loads for which it is to be made, None: those of the scenario.
+        change; `heard`: the measured loads for which the timetable is made; None if it is made
+        for the loads that the scenario states.
         """
         clusters = scenario.clusters
         self._authority = authority

@@ -45,7 +45,7 @@ class RootTurns(NamedTuple):
     """The load for which the timetable was made, in packets in 100 s; by default what the scenario says."""
 
     def worst_ns(self, *, interval_ns: int) -> int | None:
-        """The bound of bulk packets that come at least `interval_ns` apart; None if the turns cannot carry so many."""
+        """The bound of bulk packets that come at least `interval_ns` apart; None if the turns cannot carry them."""
         worst_ns = self.turns.worst_ns(self.roots, span=self.span, interval_ns=interval_ns, together=self.together)
         return None if worst_ns is None else worst_ns + self.around_ns
 

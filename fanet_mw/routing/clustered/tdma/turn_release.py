@@ -64,7 +64,7 @@ class TurnRelease(ABC):
         return None if self._next is None else self._next.start_ns - self._lead_ns
 
     def due(self, *, now_ns: int) -> list[tuple[list[Packet], int]]:
-        """Take out the packets to announce now: those of one frame together, with the instant of the frame."""
+        """Take out the packets to announce now: for each frame its packets, and the instant of the frame."""
         self._look_again(now_ns)
         released = []
         while self._next is not None and self._next.start_ns - self._lead_ns <= now_ns and len(self._queue):

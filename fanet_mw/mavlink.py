@@ -17,7 +17,7 @@ from pymavlink.dialects.v20 import common
 from fanet_mw.dialect import fanet
 from fanet_mw.errors import LocalProtocolError, MalformedFrameError
 from fanet_mw.units import MAX_NODES, MS, US, Enu, NodeId
-from fanet_mw.wire import COMPONENT, Packed, frames, inner_frames, system_id
+from fanet_mw.wire import COMPONENT, Packed, frames, inner_frames, renumbered, system_id
 
 common.mavlink_map.update(fanet.mavlink_map)  # one parser decodes both dialects
 
@@ -184,20 +184,32 @@ class Encoder:
     def __init__(self, node: NodeId, *, component: int = COMPONENT, origin: Geodetic = ORIGIN) -> None:
         self._mav = common.MAVLink(None, srcSystem=system_id(node), srcComponent=component)
         self._origin = origin
+        mode = common.MAV_MODE_FLAG_SAFETY_ARMED | common.MAV_MODE_FLAG_AUTO_ENABLED
+        heartbeat = common.MAVLink_heartbeat_message(
+            common.MAV_TYPE_QUADROTOR, common.MAV_AUTOPILOT_GENERIC, mode, 0, common.MAV_STATE_ACTIVE, 3
+        )
+        in_the_air = common.MAVLink_extended_sys_state_message(
+            common.MAV_VTOL_STATE_UNDEFINED, common.MAV_LANDED_STATE_IN_AIR
+        )
+        self._heartbeat, self._in_the_air = bytes(heartbeat.pack(self._mav)), bytes(in_the_air.pack(self._mav))
 
     def _pack(self, message: Any) -> bytes:  # noqa: ANN401  (pymavlink has no types)
         data = bytes(message.pack(self._mav))
-        self._mav.seq = (self._mav.seq + 1) % 256  # `pack` leaves this to `send`, which needs a file
+        self._count()
         return data
+
+    def _renumber(self, frame: bytes) -> bytes:
+        """A frame whose message never changes, with the next sequence number: to pack it each time takes far longer."""
+        data = renumbered(frame, self._mav.seq)
+        self._count()
+        return data
+
+    def _count(self) -> None:
+        self._mav.seq = (self._mav.seq + 1) % 256  # `pack` leaves this to `send`, which needs a file
 
     def heartbeat(self) -> bytes:
         """HEARTBEAT: armed and autonomous. GENERIC, because INVALID would mean that there is no flight controller."""
-        mode = common.MAV_MODE_FLAG_SAFETY_ARMED | common.MAV_MODE_FLAG_AUTO_ENABLED
-        return self._pack(
-            common.MAVLink_heartbeat_message(
-                common.MAV_TYPE_QUADROTOR, common.MAV_AUTOPILOT_GENERIC, mode, 0, common.MAV_STATE_ACTIVE, 3
-            )
-        )
+        return self._renumber(self._heartbeat)
 
     def global_position(self, position: Enu, velocity: Enu, *, yaw: float | None, now_ns: int) -> bytes:
         """GLOBAL_POSITION_INT; the relative altitude is that over the origin."""
@@ -269,9 +281,7 @@ class Encoder:
 
     def extended_sys_state(self) -> bytes:
         """EXTENDED_SYS_STATE: in the air, and not a VTOL."""
-        return self._pack(
-            common.MAVLink_extended_sys_state_message(common.MAV_VTOL_STATE_UNDEFINED, common.MAV_LANDED_STATE_IN_AIR)
-        )
+        return self._renumber(self._in_the_air)
 
     def collision(self, other: NodeId, *, closest_s: float, altitude_m: float, horizontal_m: float) -> bytes:
         """COLLISION with another node: both know of it by positions over the air, and avoid it by height.

@@ -152,6 +152,13 @@ def test_home_is_given_on_earth_and_in_ned() -> None:
     assert home["altitude"] == pytest.approx(30_000, abs=1)
 
 
+def test_messages_that_never_change_are_numbered_with_the_others_and_stay_whole() -> None:
+    encoder, made = Encoder(NODE), []
+    for _ in range(100):
+        made += [encoder.heartbeat(), encoder.extended_sys_state(), encoder.sys_status(None)]
+    assert [mavlink.decode(frame)[0].get_seq() for frame in made] == [number % 256 for number in range(300)]
+
+
 def test_a_vehicle_in_the_air_says_so() -> None:
     assert one(Encoder(NODE).extended_sys_state())["landed_state"] == 2
 

@@ -20,7 +20,7 @@ from collections.abc import Mapping
 from dataclasses import dataclass, field
 from typing import Final, NamedTuple
 
-from fanet_mw.serial import newer
+from fanet_mw.serial import following, newer
 from fanet_mw.timesync.clock_fit import EXACT, ClockFit, Line, Oscillator, Pair
 from fanet_mw.timesync.first_belief import FirstBelief
 from fanet_mw.units import MS, NodeId, S
@@ -186,7 +186,7 @@ class TimeSync:
         if t_ns < 0 or error_ns > _U32:
             return None
         if hops == 0:
-            self._round = (self._round + 1) & 0xFFFF
+            self._round = following(self._round, bits=16)
         self._learn_worst(error_ns, stated_at_ns=local_ns)
         worst_ns, stated_at_ns = self._worst
         age_s = min(255, math.ceil((local_ns - stated_at_ns) / S))

@@ -11,11 +11,13 @@ forgotten after a while, and its task is open again.
 from collections.abc import Iterable
 from typing import Final, NamedTuple
 
+from fanet_mw.serial import following, later, newer
 from fanet_mw.units import NodeId, S
 from fanet_mw.wire.search import MOST_BIDS, WITHDRAWN, Bid
 
 _FORGOTTEN_NS: Final = 15 * S
 """How long a bid counts if its bidder does not confirm it."""
+_SERIAL_BITS: Final = 16
 _OLDEST_S: Final = 255
 """The greatest age of a bid that a message can state."""
 
@@ -58,8 +60,8 @@ class Auction:
             of_task = self._bids.setdefault(bid.survivor, {})
             known = of_task.get(bid.bidder)
             if bid.bidder == self._node:
-                self._serial = max(self._serial, bid.serial)
-            elif known is None or (bid.serial, stood_ns) > (known.serial, known.stood_ns):
+                self._serial = later(bid.serial, self._serial, bits=_SERIAL_BITS)
+            elif known is None or _replaces(bid.serial, stood_ns, known):
                 of_task[bid.bidder] = _KnownBid(bid.eta_ds, bid.serial, stood_ns)
 
     def close(self, survivor: int) -> None:
@@ -108,9 +110,16 @@ class Auction:
         return [*own, *(bid for _, bid in others)][:MOST_BIDS]
 
     def _place(self, survivor: int, eta_ds: int, now_ns: int) -> None:
-        self._serial = (self._serial + 1) & 0xFFFF
+        self._serial = following(self._serial, bits=_SERIAL_BITS)
         self._bids.setdefault(survivor, {})[self._node] = _KnownBid(eta_ds, self._serial, now_ns)
 
     def _counts(self, bidder: int, known: _KnownBid, now_ns: int) -> bool:
         """True for a bid of this node, and for one that its bidder has stated recently."""
         return bidder == self._node or now_ns - known.stood_ns <= _FORGOTTEN_NS
+
+
+def _replaces(serial: int, stood_ns: int, known: _KnownBid) -> bool:
+    """True for a newer bid of the same bidder, and for the known one if it was stated later."""
+    if serial == known.serial:
+        return stood_ns > known.stood_ns
+    return newer(serial, known.serial, bits=_SERIAL_BITS)

@@ -8,10 +8,12 @@ to its own head, takes a neighbor's route to another head, so that its packets r
 from typing import Final, NamedTuple
 
 from fanet_mw.node.neighbors import Neighbor, Neighbors
+from fanet_mw.serial import following, newer
 from fanet_mw.units import NodeId
 
 UNREACHABLE: Final = 255
 NO_HEAD: Final = NodeId(0)
+_SEQ_BITS: Final = 16
 _STALE: Final = 4
 """A route is given up after this number of hello intervals without a new sequence number of its head."""
 _FORGET: Final = 4
@@ -28,11 +30,6 @@ class RouteToHead(NamedTuple):
     parent: NodeId
     fresh_ns: int
     """The instant at which the sequence number of the head last advanced."""
-
-
-def newer(a: int, b: int) -> bool:
-    """True if 16-bit sequence `a` comes after `b` (RFC 1982 serial numbers)."""
-    return 0 < ((a - b) & 0xFFFF) < 0x8000
 
 
 class Gradient:
@@ -61,7 +58,7 @@ class Gradient:
     def advance(self, now_ns: int) -> None:
         """Advance the head's own sequence number, once per hello."""
         if self._own_head == self._node:
-            self._seq = (self._seq + 1) & 0xFFFF
+            self._seq = following(self._seq, bits=_SEQ_BITS)
             self._route = RouteToHead(self._node, self._seq, 0, self._node, now_ns)
 
     def on_hello(self, neighbor: Neighbor, *, now_ns: int) -> None:
@@ -88,7 +85,7 @@ class Gradient:
         """
         known = self._news.get(head)
         forgotten = known is None or known[1] + _FORGET * self._stale_ns < now_ns
-        if known is None or forgotten or newer(seq, known[0]):
+        if known is None or forgotten or newer(seq, known[0], bits=_SEQ_BITS):
             self._news[head] = seq, now_ns
             return now_ns
         return known[1]
@@ -96,9 +93,9 @@ class Gradient:
     def _better(self, offered: RouteToHead, route: RouteToHead) -> bool:
         if offered.head != route.head:
             return offered.head == self._own_head
-        if newer(offered.head_seq, route.head_seq):
+        if newer(offered.head_seq, route.head_seq, bits=_SEQ_BITS):
             # The parent may only be late to state the new number: that is no reason to switch to a longer route.
-            one_step = (offered.head_seq - route.head_seq) & 0xFFFF == 1
+            one_step = offered.head_seq == following(route.head_seq, bits=_SEQ_BITS)
             return offered.parent == route.parent or offered.hops <= route.hops or not one_step
         return offered.head_seq == route.head_seq and offered.hops < route.hops
 

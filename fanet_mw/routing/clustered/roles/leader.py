@@ -31,6 +31,7 @@ from fanet_mw.routing.clustered.timetable.heard_load import HeardLoads
 from fanet_mw.routing.clustered.timetable.link_state import LinkState, adjacency, worth_a_change
 from fanet_mw.routing.clustered.timetable.turn_plan import measured_period_ns
 from fanet_mw.scenario import Scenario
+from fanet_mw.serial import following, newer
 from fanet_mw.units import MS, US, Enu, NodeId, S, seconds_to_ns
 from fanet_mw.wire.inner import CAPACITY, Join, Member, Schedule
 from fanet_mw.wire.links import Link
@@ -153,7 +154,7 @@ class Leader:
 
     def on_outbid(self, epoch: int, *, now_ns: int) -> None:
         """A schedule was received in this leader's name that it has not made: announce a later epoch soon."""
-        if 0 < ((epoch - self._epoch) & 0xFFFF) < 0x8000 and self._assigned.parts:
+        if newer(epoch, self._epoch, bits=16) and self._assigned.parts:
             self._epoch, self._outbid = epoch, True
             self._due_ns = min(self._due_ns, now_ns + SETTLE_NS)
 
@@ -220,7 +221,7 @@ class Leader:
             return
         self._roster.forget_reports()
         ordered = [Cluster(cluster.head, succession(cluster, swarm)) for cluster in clusters]
-        self._epoch, self._outbid = (self._epoch + 1) & 0xFFFF or 1, False
+        self._epoch, self._outbid = following(self._epoch, bits=16) or 1, False
         self._assigned = _Assigned(ordered, places, links, start_ns, self._parts(ordered, start_ns), measured, loads)
 
     def _loads(self, now_ns: int) -> Mapping[NodeId, int]:

@@ -44,3 +44,22 @@ def test_a_bid_that_is_taken_back_no_longer_wins() -> None:
     auction.withdraw(1, now_ns=0)
     assert auction.winners(1, count=1, now_ns=0) == []
     assert [bid.eta_ds for bid in auction.bids_to_tell([1], now_ns=0)] == [WITHDRAWN]
+
+
+def test_after_the_last_serial_number_the_next_bid_is_still_newer() -> None:
+    auction = Auction(NodeId(5))
+    auction.merge([Bid(1, 2, 10, 0xFFFF)], now_ns=0)
+    auction.merge([Bid(1, 2, 90, 0)], now_ns=S)
+    auction.merge([Bid(1, 2, 10, 0xFFFF)], now_ns=S)
+    auction.merge([Bid(1, 3, 40, 1)], now_ns=S)
+    assert auction.winners(1, count=2, now_ns=S) == [3, 2]
+
+
+def test_the_first_bid_of_a_node_that_has_restarted_is_newer_than_all_of_its_earlier_ones() -> None:
+    for earlier in (0, 1, 20_000, 0x7FFF, 0x8000, 40_000, 0xFFFF):
+        other, restarted = Auction(NodeId(6)), Auction(NodeId(5))
+        other.merge([Bid(1, 5, 10, earlier)], now_ns=0)
+        restarted.merge(other.bids_to_tell([1], now_ns=0), now_ns=0)
+        restarted.bid(1, eta_s=30.0, now_ns=S)
+        other.merge(restarted.bids_to_tell([1], now_ns=S), now_ns=S)
+        assert [bid.eta_ds for bid in other.bids_to_tell([1], now_ns=S)] == [300]

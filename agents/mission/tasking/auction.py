@@ -11,7 +11,7 @@ forgotten after a while, and its task is open again.
 from collections.abc import Iterable
 from typing import Final, NamedTuple
 
-from fanet_mw.serial import following, later, newer
+from fanet_mw.serial import following, newer
 from fanet_mw.units import NodeId, S
 from fanet_mw.wire.search import MOST_BIDS, WITHDRAWN, Bid
 
@@ -60,7 +60,8 @@ class Auction:
             of_task = self._bids.setdefault(bid.survivor, {})
             known = of_task.get(bid.bidder)
             if bid.bidder == self._node:
-                self._serial = later(bid.serial, self._serial, bits=_SERIAL_BITS)
+                if not newer(following(self._serial, bits=_SERIAL_BITS), bid.serial, bits=_SERIAL_BITS):
+                    self._serial = bid.serial
             elif known is None or _replaces(bid.serial, stood_ns, known):
                 of_task[bid.bidder] = _KnownBid(bid.eta_ds, bid.serial, stood_ns)
 

@@ -52,8 +52,8 @@ PLACES: Final[Mapping[str, Case]] = {
 }
 COUNTRY: Final[Mapping[str, Case]] = {
     "`rescue`": Case("rescue", (), _TWENTY),
-    "`hills`": Case("hills", (), _TWENTY),
-    "`night`": Case("night", (), _TWENTY),
+    "`hills`": Case("hills", (), _TWENTY[:14]),
+    "`night`": Case("night", (), _TWENTY[:14]),
 }
 _SMALL: Final = (
     "nodes.count=20", "nodes.spacing_m=100", "nodes.telemetry_hz=0", "clusters.count=4", "traffic.interval_s=4",

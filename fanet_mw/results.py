@@ -23,7 +23,7 @@ def read(*folders: str | Path) -> "Table":
     `.to_pandas()` makes a pandas table of it, `polars.from_arrow(...)` one of polars. Raises ConfigError for a folder
     that holds no results.
     """
-    table: Table = import_module("sim.results.read").read(*folders)
+    table: Table = import_module("sim.results.run_table").read(*folders)
     return table
 
 

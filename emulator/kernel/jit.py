@@ -2,13 +2,9 @@
 
 FANET_NO_NUMBA=1 in the environment leaves functions uncompiled. The variable is read here, once, and nowhere else.
 
-numba caches machine code per function and looks only at that function's own file: after a change to `dcf.py` it would
-go on running the old code inlined into `kernel.py`. So each state of all compiled sources has a cache directory of its
-own.
-
-Functions that make no arrays, which are all but those of `entry.py`, are compiled without numba's reference counts of
-arrays (`_nrt`). These counts are atomic, a pair per array and call that is not inlined, and took half of the kernel's
-time. A third of the rest was spent on calls that pass a dozen arrays, each in nine parts: so all calls are inlined.
+numba caches machine code per function and looks only at that function's own file: after a change to
+`frame_exchange.py` it would go on running the old code inlined into `kernel.py`. So each state of all compiled sources
+has a cache directory of its own.
 """
 
 import contextlib

@@ -5,7 +5,7 @@ room; the caller takes the rows, makes room and calls again.
 """
 
 from emulator.kernel.channel_access import slots_left
-from emulator.kernel.dcf import access, ack_timeout, arrive, send_ack, tx_done
+from emulator.kernel.frame_exchange import access, ack_timeout, arrive, send_ack, tx_done
 from emulator.kernel.heap import pop, push
 from emulator.kernel.jit import jit
 from emulator.kernel.phy import rx_detect, rx_end, rx_start

@@ -57,7 +57,7 @@ def figures(
     from sim.figures.all_figures import chosen
     from sim.figures.claims import BEYOND
     from sim.figures.render import render
-    from sim.results.read import read
+    from sim.results.run_table import read
     from sim.sweep import spec
 
     if quick and full:

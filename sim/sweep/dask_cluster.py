@@ -8,7 +8,7 @@ from collections.abc import Iterator, Sequence
 from distributed import Client, KilledWorker, as_completed
 
 from fanet_mw.errors import ConfigError, HostError
-from sim.sweep.execution import Finished, carry_out
+from sim.sweep.one_run import Finished, carry_out
 from sim.sweep.provenance import code
 from sim.sweep.tasks import Task
 

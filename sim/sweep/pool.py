@@ -14,7 +14,7 @@ from multiprocessing.context import SpawnProcess
 from typing import Final
 
 from sim.run.launcher.parent_death import be_killed_with_parent
-from sim.sweep.execution import Finished, carry_out
+from sim.sweep.one_run import Finished, carry_out
 from sim.sweep.provenance import code
 from sim.sweep.tasks import Task
 

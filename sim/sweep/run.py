@@ -9,7 +9,7 @@ import pyarrow as pa
 
 from fanet_mw.scenario import config
 from sim.sweep.cost import TimeLeft, guess_s, launch_s
-from sim.sweep.execution import Finished, carry_out
+from sim.sweep.one_run import Finished, carry_out
 from sim.sweep.store import Store
 from sim.sweep.tasks import Task
 

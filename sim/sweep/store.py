@@ -21,7 +21,7 @@ import pyarrow as pa
 import pyarrow.parquet as pq
 
 from fanet_mw.errors import ConfigError
-from sim.sweep.execution import Finished
+from sim.sweep.one_run import Finished
 from sim.sweep.table import table_of
 from sim.sweep.tasks import Task
 

@@ -6,7 +6,7 @@ from typing import Any, Final
 
 from fanet_mw.results import read
 from sim.sweep import spec
-from sim.sweep.execution import Finished, carry_out
+from sim.sweep.one_run import Finished, carry_out
 from sim.sweep.run import SweepPlan, run
 from sim.sweep.store import Store
 from sim.sweep.tasks import Task, tasks_of

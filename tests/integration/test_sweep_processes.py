@@ -14,7 +14,7 @@ from distributed import Client
 
 from fanet_mw.results import read
 from sim.sweep import spec
-from sim.sweep.execution import carry_out
+from sim.sweep.one_run import carry_out
 from sim.sweep.pool import Pool
 from sim.sweep.store import TABLE
 from sim.sweep.tasks import tasks_of

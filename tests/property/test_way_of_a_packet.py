@@ -15,7 +15,7 @@ from claims_radio import GraphRadio
 
 from fanet_mw.bus.messages import Reception
 from fanet_mw.node.node import Node
-from fanet_mw.node.packet import Packet, Relay
+from fanet_mw.node.packet import Packet
 from fanet_mw.routing import make_protocol
 from fanet_mw.routing.clustered.clustered import Clustered
 from fanet_mw.routing.clustered.tdma.turns import Turns
@@ -37,7 +37,7 @@ def carries(value: Any, depth: int = 2) -> bool:
     """Whether an argument is the packet, or has it in it."""
     if isinstance(value, bytes):
         return INNER in value
-    if isinstance(value, Packet | Relay | Reception):
+    if isinstance(value, Packet | Reception):
         return any(carries(part) for part in value)
     return depth > 0 and type(value) in (list, tuple) and any(carries(part, depth - 1) for part in value)
 

@@ -87,6 +87,7 @@ class _Copies(_Checked):
     on_air: Count
     received: Count
     lost: Reasons
+    in_flight: Count
 
 
 class _AirReport(_Checked):

@@ -170,7 +170,7 @@ def fingerprint() -> str:
 
 def test_a_change_in_any_compiled_source_changes_where_its_machine_code_is_kept(tmp_path: Path) -> None:
     for name, source in (
-        ("dcf.py", "from emulator.kernel.jit import jit\n"),
+        ("frame_exchange.py", "from emulator.kernel.jit import jit\n"),
         ("state.py", "A = 1\n"),
         ("medium.py", "\n"),
     ):
@@ -178,7 +178,7 @@ def test_a_change_in_any_compiled_source_changes_where_its_machine_code_is_kept(
     before = jit._fingerprint(tmp_path)
     (tmp_path / "medium.py").write_text("# not compiled\n")
     assert jit._fingerprint(tmp_path) == before
-    (tmp_path / "dcf.py").write_text("from emulator.kernel.jit import jit\n# changed\n")
+    (tmp_path / "frame_exchange.py").write_text("from emulator.kernel.jit import jit\n# changed\n")
     assert jit._fingerprint(tmp_path) != before
 
 

@@ -23,7 +23,7 @@ from sim.results.files import finish
 from sim.run.virtual import simulate
 from sim.scenarios import catalog
 from sim.sweep import spec
-from sim.sweep.execution import carry_out
+from sim.sweep.one_run import carry_out
 from sim.sweep.provenance import code
 from sim.sweep.table import table_of
 from sim.sweep.tasks import tasks_of

@@ -10,7 +10,7 @@ from fanet_mw.errors import ConfigError
 from fanet_mw.results import read
 from sim.results.rows import flat
 from sim.sweep import spec
-from sim.sweep.execution import Finished, carry_out
+from sim.sweep.one_run import Finished, carry_out
 from sim.sweep.run import Progress, SweepPlan, run
 from sim.sweep.store import TABLE, Store
 from sim.sweep.tasks import Task, tasks_of
@@ -133,13 +133,13 @@ def test_settings_that_share_a_seed_draw_the_same_births(sweep, whole) -> None:
 
 
 def test_a_run_that_fails_is_a_row_with_its_error_and_is_repeated_only_when_asked(sweep, tmp_path, monkeypatch) -> None:
-    from sim.sweep import execution
+    from sim.sweep import one_run
 
     def broken(_: object) -> None:
         raise RuntimeError("the medium is on fire")
 
     with monkeypatch.context() as patched:
-        patched.setattr(execution, "simulate", broken)
+        patched.setattr(one_run, "simulate", broken)
         told = go(tmp_path, sweep, OneByOne())
     assert told[-1].failed == 4
     row = read(tmp_path).to_pylist()[0]

@@ -1,4 +1,4 @@
-"""The MAC of a station: the distributed coordination function (IEEE 802.11-2020, 10.3), as functions over its state.
+"""The exchange of frames of a station: the distributed coordination function (IEEE 802.11-2020, 10.3), over its state.
 
     queue -> access (DIFS or EIFS, backoff with freezing) -> frame -> ACK or timeout -> next attempt or done
 

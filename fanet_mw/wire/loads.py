@@ -20,6 +20,14 @@ MOST_LOAD: Final = 20_000
 """The greatest load that can be announced: 200 packets a second of one node."""
 
 
+def interval_ns_of(load: int, *, expected_ns: int) -> int:
+    """The mean interval between the packets of a node with this load; `expected_ns` is that of the scenario.
+
+    A load of 0, which only a forged announcement has, counts as the least load.
+    """
+    return expected_ns if load == AS_EXPECTED else PER_NS // max(1, load)
+
+
 class Loads(NamedTuple):
     """The loads of the members of one schedule part."""
 

@@ -27,15 +27,13 @@ from typing import Any, Final, NamedTuple
 
 from agents.applications.traffic import Load, sources_of
 from agents.clock.clocked_uav import make_uav
-from emulator.medium import Medium
 from fanet_mw.actor import Actor
 from fanet_mw.bus.messages import Message
 from fanet_mw.errors import DropReason
 from fanet_mw.graph.topology import components, within_range
-from fanet_mw.hosts.virtual import VirtualHost
 from fanet_mw.planner import Plan, plan
 from fanet_mw.scenario import Scenario, config
-from fanet_mw.trace import Dropped, Record
+from fanet_mw.trace import Dropped
 from fanet_mw.units import Enu, NodeId, S
 from sim.results.bounds import Column, delays_under_bound, likely
 from sim.results.packets import packets_of
@@ -43,7 +41,7 @@ from sim.run.collecting.trace_reading import records_of
 from sim.run.outcome import Outcome
 from sim.run.virtual import actors_of
 from sim.world.mobility.layout import positions
-from sim.world.world import WorldActor
+from tests.benchmarks.told_swarm import run_of, run_with
 
 _INTERVALS_S: Final = (0.05, 0.1, 0.2, 0.5, 1.0, 2.0)
 _MOST: Final = 400_000
@@ -188,12 +186,7 @@ def flown(scenario: Scenario, restarts: Sequence[tuple[int, int]]) -> Outcome:
     actors = actors_of(scenario, scenario.name)
     for node, at_ns in restarts:
         actors[node + 1] = Restarting(actors[node + 1], scenario, NodeId(node), scenario.name, at_ns=at_ns)
-    records: list[Record] = []
-    host = VirtualHost(actors, on_records=records.extend)
-    host.start()
-    host.run(scenario.duration_ns)
-    host.stop()
-    return Outcome(scenario=scenario, mode="virtual", wall_s=0.0, records=records, reports={})
+    return run_of(scenario, actors)
 
 
 def flown_by_ear(true: Scenario) -> Outcome:
@@ -211,14 +204,7 @@ def flown_by_ear(true: Scenario) -> Outcome:
         make_uav(told, node, scenario.name, position=start, applications=[Load(scenario, node, "first")])
         for node, start in zip(map(NodeId, scenario.node_ids), starts, strict=True)
     ]
-    records: list[Record] = []
-    host = VirtualHost(
-        [WorldActor(scenario, scenario.name), Medium(scenario, scenario.name), *uavs], on_records=records.extend
-    )
-    host.start()
-    host.run(scenario.duration_ns)
-    host.stop()
-    return Outcome(scenario=scenario, mode="virtual", wall_s=0.0, records=records, reports={})
+    return run_with(scenario, uavs)
 
 
 def measure(seed: int, *, heard: bool = False) -> Result:

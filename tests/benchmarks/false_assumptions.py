@@ -17,10 +17,8 @@ from agents.clock.clocked_uav import make_uav
 from agents.mission.finding.calibration import common_offset, likelihood
 from agents.mission.finding.localization import Sighting, estimate
 from agents.mission.finding.phone_filter import REFERENCE_LOSS_DB, Estimate, PhoneFilter, PhoneModel, PhoneOffset
-from emulator.medium import Medium
-from fanet_mw.hosts.virtual import VirtualHost
 from fanet_mw.scenario import Traffic
-from fanet_mw.trace import BoundStated, Record
+from fanet_mw.trace import BoundStated
 from fanet_mw.units import MS, Enu, NodeId
 from sim.results.bounds import against_bounds
 from sim.results.packets import packets_of
@@ -28,7 +26,7 @@ from sim.run.collecting.trace_reading import records_of
 from sim.run.outcome import Outcome
 from sim.scenarios import catalog
 from sim.world.mobility.layout import positions
-from sim.world.world import WorldActor
+from tests.benchmarks.told_swarm import run_with
 
 _SEEDS: Final = (1,)
 _HALF: Final = ("traffic.interval_s=0.5",)
@@ -97,14 +95,7 @@ def flown(case: Case, *, seed: int) -> Outcome:
         )
         for n in scenario.node_ids
     ]
-    records: list[Record] = []
-    host = VirtualHost(
-        [WorldActor(scenario, scenario.name), Medium(scenario, scenario.name), *uavs], on_records=records.extend
-    )
-    host.start()
-    host.run(scenario.duration_ns)
-    host.stop()
-    return Outcome(scenario=scenario, mode="virtual", wall_s=0.0, records=records, reports={})
+    return run_with(scenario, uavs)
 
 
 def swarm_row(name: str, case: Case) -> list[str]:

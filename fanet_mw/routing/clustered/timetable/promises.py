@@ -27,7 +27,7 @@ from fanet_mw.routing.clustered.timetable.turn_plans import TurnPlans
 from fanet_mw.trace import BoundStated, LikelyStated
 from fanet_mw.units import MS, US, NodeId, seconds_to_ns
 from fanet_mw.wire import PRIORITY_BULK, PRIORITY_REPORT, PRIORITY_SAFETY
-from fanet_mw.wire.loads import AS_EXPECTED, PER_NS
+from fanet_mw.wire.loads import AS_EXPECTED, interval_ns_of
 
 _SAME: Final = 0.95
 """A node whose packets come at less than this share of the interval of its scenario sends others as well, about whose
@@ -104,9 +104,8 @@ class Promises:
         found = dict.fromkeys(self._roots.reserved, own.burst_ns(per_turn=1))
         bulk_ns: int | None = own.burst_ns(per_turn=own.together)
         if scenario.traffic.arrivals == "cbr" and not scenario.further_traffic:
-            interval_ns = self._admission.interval_ns if self._admission else self._interval_ns
-            if own.load != AS_EXPECTED and not self._admission:
-                interval_ns = PER_NS // own.load
+            heard_ns = interval_ns_of(own.load, expected_ns=self._interval_ns)
+            interval_ns = self._admission.interval_ns if self._admission else heard_ns
             if interval_ns >= _SAME * self._interval_ns or self._admission:
                 bulk_ns = own.worst_ns(interval_ns=interval_ns)
         return found if bulk_ns is None else {**found, PRIORITY_BULK: bulk_ns}
@@ -229,7 +228,7 @@ class Promises:
             plan,
             self._port.node,
             waiting=len(self._roots),
-            interval_ns=self._interval_ns if load == AS_EXPECTED else PER_NS // load,
+            interval_ns=interval_ns_of(load, expected_ns=self._interval_ns),
             hello_ns=seconds_to_ns(self._port.scenario.routing.hello_interval_s),
         )
         return None if found_ns is None else found_ns + self._lead_ns + receipt_ns(self._port.scenario)

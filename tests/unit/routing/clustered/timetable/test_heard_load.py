@@ -15,7 +15,7 @@ from fanet_mw.routing.clustered.timetable.turn_plan import NO_LOADS, Fitted, fit
 from fanet_mw.scenario import Scenario
 from fanet_mw.units import Enu, NodeId, S
 from fanet_mw.wire import HEADER_BYTES
-from fanet_mw.wire.loads import AS_EXPECTED, MOST_LOAD, Loads
+from fanet_mw.wire.loads import AS_EXPECTED, MOST_LOAD, PER_NS, Loads, interval_ns_of
 
 MakeScenario = Callable[..., Scenario]
 NODE = NodeId(7)
@@ -196,3 +196,7 @@ def test_who_sends_far_too_much_takes_nothing_from_the_others(make_scenario: Mak
     assert not greedy.enough
     assert all(has[node] * greedy.together >= 6 for node in loads), "as many as their loads need"
     assert has[NODE] > had[NODE]
+
+
+def test_a_forged_load_of_nothing_has_an_interval_too() -> None:
+    assert [interval_ns_of(load, expected_ns=7) for load in (0, 1, 4, AS_EXPECTED)] == [PER_NS, PER_NS, PER_NS // 4, 7]

@@ -1,8 +1,8 @@
 """The duplicate set: which packets a node has handled already, and in which of their phases.
 
 It maps the key of a packet to a set of bits, one for each phase. A node's keys are hashes of all that the packet's
-origin wrote (`reader.hash_of`), so a forged packet with the same origin and sequence number is not taken for the
-genuine one. Queues, and radios for their datagrams, use `key_of` instead, which is origin and sequence number.
+origin wrote (`hash_of`), so a forged packet with the same origin and sequence number is not taken for the genuine
+one. Queues, and radios for their datagrams, use `key_of` instead, which is origin and sequence number.
 
 Memory is bounded: the keys are kept in two generations, and a key is forgotten after at least `capacity` newer ones.
 A packet that comes back later than that would be handled again, but its lifetime has ended long before.
@@ -10,6 +10,7 @@ A packet that comes back later than that would be handled again, but its lifetim
 
 from typing import Final
 
+from fanet_mw import wire
 from fanet_mw.node.packet import Packet
 
 DELIVERED: Final = 1
@@ -18,12 +19,25 @@ FLOODED: Final = 2
 """The packet was received or sent while it is flooded; a node relays it at most once."""
 CARRIED: Final = 4
 """The packet was forwarded as unicast towards a head; a node does so at most once, so that none goes in circles."""
-
+PHASES: Final = {0: DELIVERED, wire.FLAG_FLOOD: FLOODED, wire.FLAG_TO_HEAD: CARRIED}
+"""The bit of the duplicate set that belongs to the phase flags of a frame. A node handles a packet at most once per
+phase: while it is flooded, while members carry it to their head, and in any other frame."""
 
 _SPREAD: Final = (1 << 32) + 40_503
 """The factor by which `key_of` multiplies the origin. It is above 2^32, so that no two pairs of origin and sequence
 number have the same key. It is not 2^32 itself, because a dict finds a number by its low bits, and packets that all
 origins send at about the same time have about the same sequence number."""
+
+
+def hash_of(frame: bytes) -> int:
+    """A hash that identifies the packet in a frame, the same at every hop.
+
+    It covers everything that the packet's origin wrote, and not only origin and sequence number: a forged packet with
+    the number of a genuine one gets another hash, so nodes do not take the genuine one for a duplicate. Python keys
+    its hash anew for each process (SipHash), so nobody can forge a packet with a given hash. The hash is only ever
+    compared for equality, so a run does not depend on the key.
+    """
+    return hash(frame[wire.END_TO_END] + frame[wire.HEADER_BYTES :])
 
 
 def key_of(origin: int, seq: int) -> int:

@@ -11,7 +11,7 @@ again is a copy (`duplicates.py`), or has outlived its lifetime (`expired`, `nod
 
 Origins are not proved: a relay may still invent a packet in the name of another node. But it cannot keep out that
 node's own packets, because duplicates are found by a hash of the whole packet, and not by origin and sequence number
-(`reader.Reader`).
+(`duplicates.hash_of`).
 """
 
 from typing import Final

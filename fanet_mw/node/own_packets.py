@@ -9,10 +9,9 @@ from typing import Final
 from fanet_mw import wire
 from fanet_mw.errors import LocalProtocolError
 from fanet_mw.node import duplicates
-from fanet_mw.node.duplicates import DuplicateSet
+from fanet_mw.node.duplicates import PHASES, DuplicateSet, hash_of
 from fanet_mw.node.header_check import CONTROL, RESTART_STEP_NS
 from fanet_mw.node.packet import Packet
-from fanet_mw.node.reader import PHASES, hash_of
 from fanet_mw.units import US, NodeId
 from fanet_mw.wire import Header, Kind
 

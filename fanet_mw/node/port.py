@@ -11,10 +11,9 @@ from typing import Final
 from fanet_mw import wire
 from fanet_mw.bus.messages import TxRequest
 from fanet_mw.errors import DropReason
-from fanet_mw.node.duplicates import DuplicateSet
+from fanet_mw.node.duplicates import PHASES, DuplicateSet, hash_of
 from fanet_mw.node.own_packets import OwnPackets
 from fanet_mw.node.packet import Packet, Relay
-from fanet_mw.node.reader import PHASES, hash_of
 from fanet_mw.rng import stream
 from fanet_mw.scenario import Scenario
 from fanet_mw.trace import Dropped, LetOut, Record

@@ -13,13 +13,10 @@ from typing import Any, Final, TypeVar
 
 from fanet_mw import wire
 from fanet_mw.errors import MalformedFrameError
-from fanet_mw.node import duplicates
+from fanet_mw.node.duplicates import PHASES, hash_of, key_of
 from fanet_mw.node.packet import Packet
 from fanet_mw.wire import Content, Kind
 
-PHASES: Final = {0: duplicates.DELIVERED, wire.FLAG_FLOOD: duplicates.FLOODED, wire.FLAG_TO_HEAD: duplicates.CARRIED}
-"""The bit of the duplicate set that belongs to the phase flags of a frame. A node handles a packet at most once per
-phase: while it is flooded, while members carry it to their head, and in any other frame."""
 _new: Final = tuple.__new__  # faster than the constructor, for objects that are made once per frame
 _HELLO: Final = int(Kind.HELLO)
 _KIND: Final = 7
@@ -31,17 +28,6 @@ _LATEST: Final = 64
 """The number of packets whose decoded content is cached: more than the hellos that a radio hands over at once."""
 
 
-def hash_of(frame: bytes) -> int:
-    """A hash that identifies the packet in a frame, the same at every hop.
-
-    It covers everything that the packet's origin wrote, and not only origin and sequence number: a forged packet with
-    the number of a genuine one gets another hash, so nodes do not take the genuine one for a duplicate. Python keys
-    its hash anew for each process (SipHash), so nobody can forge a packet with a given hash. The hash is only ever
-    compared for equality, so a run does not depend on the key.
-    """
-    return hash(frame[wire.END_TO_END] + frame[wire.HEADER_BYTES :])
-
-
 class Reader:
     """The frame that was looked at last, and what has been read of it so far.
 
@@ -51,12 +37,14 @@ class Reader:
     def __init__(self) -> None:
         self.frame = b""
         self.hash = 0
-        """The hash of the frame's packet (`hash_of`), by which duplicates are found; 0 if it holds several packets."""
+        """The hash of the frame's packet (`duplicates.hash_of`), by which duplicates are found; 0 if the frame holds
+        several packets."""
         self.key = 0
         """The packet's origin and sequence number as one number (`duplicates.key_of`), by which queues find a packet
         that was heard again; 0 if the frame holds no packet, or several."""
         self.phase = 0
-        """The bit of the packet's phase (`PHASES`); 0 if the phase flags are invalid; BUNDLE for several packets."""
+        """The bit of the packet's phase (`duplicates.PHASES`); 0 if the phase flags are invalid; BUNDLE if the frame
+        holds several packets."""
         self.packet: Packet | None = None
         """The packet in the frame; None until `read` has been called."""
         self.fields = wire.NO_FIELDS
@@ -75,7 +63,7 @@ class Reader:
             self.hash, self.key, self.phase = 0, 0, BUNDLE
         else:
             self.hash = hash_of(frame)
-            self.key, self.phase = duplicates.key_of(origin, seq), PHASES.get(flags & wire.PHASE_MASK, 0)
+            self.key, self.phase = key_of(origin, seq), PHASES.get(flags & wire.PHASE_MASK, 0)
 
     def read(self) -> Packet:
         """Check the header and return the packet in the frame; raises MalformedFrameError if the check fails."""

@@ -22,10 +22,12 @@ from agents.mission.finding.phone_filter import REFERENCE_LOSS_DB, PhoneModel
 from agents.mission.finding.phone_reception import PhoneReception
 from agents.mission.finding.sightings import Sightings
 from agents.mission.flight.approach_speed import approach_speed_m_s
+from agents.mission.flight.connectivity_maintenance import ConnectivityMaintenance
 from agents.mission.flight.flight import Flight
 from agents.mission.flight.goal import Goal
+from agents.mission.flight.reciprocal_avoidance import ReciprocalAvoidance
 from agents.mission.flight.return_home import ReturnHome
-from agents.mission.flight.velocity_choice import ClearOfObstacles, ClearOfOthers, InReach, VelocityChoice
+from agents.mission.flight.velocity_choice import VelocityChoice
 from agents.mission.formation.formation_place import FormationPlace
 from agents.mission.formation.formation_planner import FormationPlanner
 from agents.mission.formation.gaps import Gaps
@@ -93,8 +95,8 @@ class Searcher:
             navigation,
             obstacles,
             most_m_s=speed_m_s,
-            hard=[ClearOfObstacles(navigation, obstacles), ClearOfOthers(navigation, self._radar.avoided, obstacles)],
-            soft=[InReach(navigation, neighbors, place, reach_m=reach_m)],
+            hard=[ReciprocalAvoidance(navigation, self._radar.avoided, obstacles)],
+            soft=[ConnectivityMaintenance(navigation, neighbors, place, reach_m=reach_m)],
         )
         gaps = None if coverage is None else Gaps(coverage, place)
         goal = Goal(finds, navigation, place, approach, gaps)

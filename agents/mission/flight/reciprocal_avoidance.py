@@ -1,6 +1,6 @@
-"""Constraints on a UAV's velocity: it must stay clear of other UAVs, and within reach of those that it is tied to.
+"""Collision avoidance in a search: half-planes of velocities that keep a UAV clear of other UAVs.
 
-Collision avoidance is ORCA (van den Berg, Guy, Lin, Manocha: Reciprocal n-Body Collision Avoidance, 2011): each of two
+The method is ORCA (van den Berg, Guy, Lin, Manocha: Reciprocal n-Body Collision Avoidance, 2011): each of two
 UAVs makes half of the change that leads out of the velocity obstacle. A UAV knows another by a received position and
 velocity. The older they are, the larger is the required clearance, because the other may have turned since.
 """
@@ -9,12 +9,56 @@ import math
 from typing import Final
 
 from agents.mission.navigation.half_planes import HalfPlane, Velocity
-from fanet_mw.units import Enu
+from agents.mission.navigation.known_obstacles import KnownObstacles
+from agents.mission.navigation.navigation import Navigation
+from agents.mission.navigation.neighbor_motions import NeighborMotions
+from fanet_mw.motion import Motion
+from fanet_mw.units import Enu, S
 
+_LEVEL_M: Final = 4.0
+"""UAVs whose heights differ by more than twice this are on different levels, and not in each other's way once both keep
+their heights."""
+_CLEARANCE_M: Final = 10.0
+"""The distance that is kept from other UAVs, in addition to the error of their positions."""
+_HORIZON_S: Final = 6.0
+"""A collision is avoided if it would happen within this time."""
+_WATCH_M: Final = 150.0
+"""UAVs farther away than this are not considered."""
 _TURN_M_S2: Final = 1.0
 """The mean acceleration with which another UAV is assumed to have flown since it was last received."""
 _MOST_ERROR_M: Final = 12.0
 """The greatest error of an extrapolated position that is allowed for."""
+
+
+class ReciprocalAvoidance:
+    """Constraints by neighbors at their received positions, and by flying bodies that the radar shows. The clearance
+    grows with the age of the position.
+    """
+
+    def __init__(self, navigation: Navigation, neighbors: NeighborMotions, obstacles: KnownObstacles) -> None:
+        self._navigation, self._neighbors, self._obstacles = navigation, neighbors, obstacles
+
+    def planes(self, now_ns: int) -> list[HalfPlane]:
+        here, flown = self._navigation.position, self._navigation.velocity
+        planes: list[tuple[float, HalfPlane]] = []
+        seen = [Motion(*mover) for mover in self._obstacles.movers(now_ns)]
+        for motion in (*self._neighbors.all(now_ns=now_ns), *seen):
+            offset = motion.position_at(now_ns).minus(here)
+            distance = math.hypot(offset.east, offset.north)
+            climb = flown.up - motion.velocity.up
+            apart_soon = abs(offset.up - climb * 3.0)
+            if distance > _WATCH_M or (abs(offset.up) > 2 * _LEVEL_M and apart_soon > _LEVEL_M):
+                continue
+            plane = avoidance_plane(
+                offset,
+                (flown.east, flown.north),
+                (motion.velocity.east, motion.velocity.north),
+                clearance_m=_CLEARANCE_M + position_error_m((now_ns - motion.at_ns) / S),
+                horizon_s=_HORIZON_S,
+                share=0.5,
+            )
+            planes.append((distance, plane))
+        return [plane for _, plane in sorted(planes)]
 
 
 def position_error_m(age_s: float) -> float:
@@ -22,7 +66,7 @@ def position_error_m(age_s: float) -> float:
     return min(_MOST_ERROR_M, 0.5 * _TURN_M_S2 * age_s * age_s)
 
 
-def avoiding(
+def avoidance_plane(
     offset: Enu, velocity: Velocity, other_velocity: Velocity, *, clearance_m: float, horizon_s: float, share: float
 ) -> HalfPlane:
     """The half-plane of velocities that avoid another body within the horizon.
@@ -55,19 +99,3 @@ def avoiding(
         nx, ny = -dy, dx
         change = -(vx * nx + vy * ny)
     return HalfPlane(nx, ny, velocity[0] * nx + velocity[1] * ny + share * change)
-
-
-def staying_near(offset: Enu, other_velocity: Velocity, *, tether_m: float, within_s: float) -> HalfPlane | None:
-    """The half-plane of velocities that keep this UAV within `tether_m` of another for `within_s`; None if the other is
-    so near that no limit is needed.
-
-    Both UAVs may fly apart, so each of them may use half of the distance that is left. If none is left, this UAV alone
-    makes up for what is missing.
-    """
-    distance = math.hypot(offset.east, offset.north)
-    if distance < 0.3 * tether_m:
-        return None
-    nx, ny = offset.east / distance, offset.north / distance
-    slack_m = tether_m - distance
-    parting = (slack_m / within_s) * (0.5 if slack_m > 0 else 1.0)
-    return HalfPlane(nx, ny, other_velocity[0] * nx + other_velocity[1] * ny - parting)

@@ -4,7 +4,8 @@ from typing import Final
 
 from agents.mission.courses import course_at
 from agents.mission.flight.approach_speed import approach_speed_m_s
-from agents.mission.flight.velocity_choice import ClearOfObstacles, ClearOfOthers, VelocityChoice
+from agents.mission.flight.reciprocal_avoidance import ReciprocalAvoidance
+from agents.mission.flight.velocity_choice import VelocityChoice
 from agents.mission.following.route import Route
 from agents.mission.following.station import Station
 from agents.mission.navigation.known_obstacles import KnownObstacles
@@ -39,7 +40,7 @@ class FormationFlight(Application):
             navigation,
             obstacles,
             most_m_s=approach_speed_m_s(scenario, node),
-            hard=[ClearOfObstacles(navigation, obstacles), ClearOfOthers(navigation, motions, obstacles)],
+            hard=[ReciprocalAvoidance(navigation, motions, obstacles)],
             soft=[],
         )
         route = Route(scenario.mission.route_m, speed_m_s=scenario.mobility.speed_m_s)

@@ -1,13 +1,17 @@
-"""Half-planes of velocities: what obeys them, and what keeps UAVs clear of others and in reach."""
+"""Half-planes of velocities: what obeys them, and what keeps UAVs clear of others."""
 
 import math
 
 from hypothesis import given, settings
 from hypothesis import strategies as st
+from search_board import OPEN, UP_M
 
-from agents.mission.flight.reciprocal_avoidance import avoiding, staying_near
+from agents.mission.flight.reciprocal_avoidance import ReciprocalAvoidance, avoidance_plane
 from agents.mission.navigation.half_planes import HalfPlane, nearest
-from fanet_mw.units import Enu
+from agents.mission.navigation.navigation import Navigation
+from agents.mission.navigation.neighbor_motions import NeighborMotions
+from fanet_mw.motion import Motion
+from fanet_mw.units import Enu, S
 
 speeds = st.tuples(st.floats(-10, 10), st.floats(-10, 10))
 planes = st.lists(
@@ -40,7 +44,7 @@ def test_two_that_both_avoid_never_come_nearer_than_the_clearance(aside_m: float
         fresh = []
         for own, other in ((0, 1), (1, 0)):
             offset = Enu(at[other][0] - at[own][0], at[other][1] - at[own][1], 0)
-            plane = avoiding(offset, flown[own], flown[other], clearance_m=10, horizon_s=6, share=0.5)
+            plane = avoidance_plane(offset, flown[own], flown[other], clearance_m=10, horizon_s=6, share=0.5)
             fresh.append(nearest(wanted[own], [plane], limit=10, hard=1))
         flown = fresh
         for own in (0, 1):
@@ -49,10 +53,11 @@ def test_two_that_both_avoid_never_come_nearer_than_the_clearance(aside_m: float
         assert math.dist(*at) >= 9.5
 
 
-def test_who_is_tied_does_not_fly_out_of_reach() -> None:
-    east, other = 0.0, Enu(-100, 0, 0)
-    for _ in range(400):
-        plane = staying_near(Enu(other.east - east, 0, 0), (0.0, 0.0), tether_m=237, within_s=4)
-        velocity = nearest((9.0, 0.0), [] if plane is None else [plane], limit=10, hard=0)
-        east += 0.1 * velocity[0]
-    assert 130 < east <= 137.5
+def test_neighbors_are_avoided_while_they_are_heard_at_their_level() -> None:
+    navigation, neighbors = Navigation(Enu(0, 0, UP_M), OPEN), NeighborMotions()
+    navigation.fix(Enu(0, 0, UP_M), Enu(5, 0, 0), now_ns=0)
+    clear = ReciprocalAvoidance(navigation, neighbors, OPEN)
+    neighbors.on_hello(2, Motion(Enu(60, 0, UP_M), Enu(-5, 0, 0), 0))
+    neighbors.on_hello(3, Motion(Enu(60, 0, UP_M + 12), Enu(0, 0, 0), 0))
+    assert len(clear.planes(S)) == 1
+    assert clear.planes(7 * S) == []

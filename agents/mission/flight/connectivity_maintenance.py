@@ -1,0 +1,76 @@
+"""Connectivity maintenance: half-planes of velocities that keep a UAV within radio reach of those it is tied to, so
+that the swarm stays one network while it searches.
+"""
+
+import math
+from typing import Final
+
+from agents.mission.formation.formation_place import FormationPlace
+from agents.mission.navigation.half_planes import HalfPlane, Velocity
+from agents.mission.navigation.navigation import Navigation
+from agents.mission.navigation.neighbor_motions import NeighborMotions
+from fanet_mw.units import Enu
+
+_TETHER: Final = 0.95
+"""The greatest distance of two UAVs that must stay connected, as a share of the radio's reach."""
+_TETHER_S: Final = 4.0
+"""A UAV may use up the rest of that distance in this time at the earliest."""
+
+
+class ConnectivityMaintenance:
+    """Constraints that keep a UAV of a team, or a relay, within radio reach of the places to which it is tied
+    (`Shape.tethers`), and a follower within reach of the nearest UAV of its team.
+    """
+
+    def __init__(
+        self, navigation: Navigation, neighbors: NeighborMotions, formation: FormationPlace, *, reach_m: float
+    ) -> None:
+        self._navigation, self._neighbors = navigation, neighbors
+        self._formation = formation
+        self._tether_m = _TETHER * reach_m
+
+    def planes(self, now_ns: int) -> list[HalfPlane]:
+        plan, pattern, place = self._formation.plan, self._formation.pattern, self._formation.place
+        if plan is None or pattern is None or place is None or not self._formation.is_taken_up(now_ns):
+            return []
+        planes = []
+        for other in pattern.shape.tethers(place) or self._nearest(pattern.line(place), now_ns):
+            motion = self._neighbors.motion(plan.nodes[other], now_ns=now_ns)
+            if motion is None:
+                continue
+            plane = tether_plane(
+                motion.position_at(now_ns).minus(self._navigation.position),
+                (motion.velocity.east, motion.velocity.north),
+                tether_m=self._tether_m,
+                within_s=_TETHER_S,
+            )
+            if plane is not None:
+                planes.append(plane)
+        return planes
+
+    def _nearest(self, places: range, now_ns: int) -> tuple[int, ...]:
+        """Of these places, the one whose holder is nearest to this UAV; empty if no holder was received recently."""
+        plan = self._formation.plan
+        assert plan is not None, "who has a place has a plan"
+        near = [
+            (motion.position_at(now_ns).minus(self._navigation.position).norm(), other)
+            for other in places
+            if (motion := self._neighbors.motion(plan.nodes[other], now_ns=now_ns)) is not None
+        ]
+        return (min(near)[1],) if near else ()
+
+
+def tether_plane(offset: Enu, other_velocity: Velocity, *, tether_m: float, within_s: float) -> HalfPlane | None:
+    """The half-plane of velocities that keep this UAV within `tether_m` of another for `within_s`; None if the other is
+    so near that no limit is needed.
+
+    Both UAVs may fly apart, so each of them may use half of the distance that is left. If none is left, this UAV alone
+    makes up for what is missing.
+    """
+    distance = math.hypot(offset.east, offset.north)
+    if distance < 0.3 * tether_m:
+        return None
+    nx, ny = offset.east / distance, offset.north / distance
+    slack_m = tether_m - distance
+    parting = (slack_m / within_s) * (0.5 if slack_m > 0 else 1.0)
+    return HalfPlane(nx, ny, other_velocity[0] * nx + other_velocity[1] * ny - parting)

@@ -1,0 +1,28 @@
+"""A UAV stays within radio reach of those it is tied to."""
+
+from search_board import COUNT, FOLLOWER, LINE, REACH_M, TAKEN_UP_NS, Board, lane_of
+
+from agents.mission.flight.connectivity_maintenance import ConnectivityMaintenance, tether_plane
+from agents.mission.navigation.half_planes import nearest
+from fanet_mw.motion import Motion
+from fanet_mw.units import Enu, S
+
+
+def test_who_is_tied_does_not_fly_out_of_reach() -> None:
+    east, other = 0.0, Enu(-100, 0, 0)
+    for _ in range(400):
+        plane = tether_plane(Enu(other.east - east, 0, 0), (0.0, 0.0), tether_m=237, within_s=4)
+        velocity = nearest((9.0, 0.0), [] if plane is None else [plane], limit=10, hard=0)
+        east += 0.1 * velocity[0]
+    assert 130 < east <= 137.5
+
+
+def test_a_uav_of_a_line_is_tied_to_those_beside_it_and_a_follower_to_the_nearest_of_its_line() -> None:
+    now_ns = TAKEN_UP_NS + 20 * S
+    for node, ties in ((LINE, 2), (FOLLOWER, 1)):
+        board = Board(node, lane_of(node, now_ns))
+        for other in range(1, COUNT + 1):
+            if other != node:
+                board.neighbors.on_hello(other, Motion(lane_of(other, now_ns), Enu(0, 0, 0), now_ns))
+        tied = ConnectivityMaintenance(board.navigation, board.neighbors, board.place, reach_m=REACH_M)
+        assert len(tied.planes(now_ns)) == ties

@@ -68,7 +68,7 @@ class Messenger:
         if confirm and self._sender.full:
             return self._refused(application, DropReason.QUEUE_FULL, now_ns)
         if deadline_ns is not None:
-            in_time, interval_ns = self._judge(deadline_ns, born_ns)
+            in_time, interval_ns = self._admission(deadline_ns, born_ns)
             if not in_time:
                 return self._refused(application, DropReason.ADMISSION, now_ns, interval_ns=interval_ns)
         if plain:
@@ -103,7 +103,7 @@ class Messenger:
         if len(data) > most:
             raise LocalProtocolError(f"message of {len(data)} bytes must be <= {most} (radio.max_frame_bytes)")
 
-    def _judge(self, deadline_ns: int, born_ns: int) -> tuple[bool, int | None]:
+    def _admission(self, deadline_ns: int, born_ns: int) -> tuple[bool, int | None]:
         """Whether a message can arrive in time, and the least interval between such messages if that is known.
 
         If the network states no bound, every message is accepted. Accepted messages are at least the interval apart, as

@@ -7,7 +7,7 @@ slot.
 """
 
 from fanet_mw.bounds.arrivals import Arrivals, Periodic, Total
-from fanet_mw.bounds.delay_bound import Bounded, DelayBound, Refused
+from fanet_mw.bounds.bounded_or_refused import Bounded, DelayBound, Refused
 from fanet_mw.bounds.guard import guard_ns
 from fanet_mw.bounds.mac import Dcf
 from fanet_mw.bounds.network import backlog, delay_any_order, delay_fifo

@@ -1,4 +1,8 @@
-"""The guard time of a slot: set by the scenario, or computed from clock error, propagation and frame length."""
+"""The guard time of a slot: set by the scenario, or computed from clock error, propagation and frame length.
+
+The guard time is the silent end of a slot. It is kept where slots are laid out: no frame starts in it (`Superframe` in
+`fanet_mw/routing/clustered/tdma/slots.py`).
+"""
 
 from math import ceil
 from typing import Final

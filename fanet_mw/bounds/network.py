@@ -16,7 +16,7 @@ from math import ceil, lcm
 from typing import Final
 
 from fanet_mw.bounds.arrivals import Arrivals, Periodic
-from fanet_mw.bounds.delay_bound import Bounded, DelayBound, Refused
+from fanet_mw.bounds.bounded_or_refused import Bounded, DelayBound, Refused
 from fanet_mw.bounds.slot import Server
 
 _PACKETS_EXAMINED: Final = 100_000

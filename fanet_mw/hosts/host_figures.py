@@ -4,7 +4,7 @@ import resource
 from pathlib import Path
 from typing import Any
 
-from fanet_mw.hosts.lateness import Histogram
+from fanet_mw.hosts.duration_histogram import DurationHistogram
 from fanet_mw.units import MS
 
 
@@ -16,7 +16,7 @@ class HostFigures:
         """The number of puts on the bus."""
         self.unread = 0
         """The number of receptions that arrived after the end of the run."""
-        self._lateness = Histogram()
+        self._lateness = DurationHistogram()
         self._asked_past_ns = 0
         self._stall_ns = 0
 

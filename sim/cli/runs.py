@@ -174,7 +174,7 @@ def _finish(outcome: "Outcome", output: OutputFlags) -> int:
     """Write and show the result; returns 0 only if it may be used."""
     from json import dumps
 
-    from sim.results import report
+    from sim.results import printed_summary
     from sim.results.files import finish
 
     summary: dict[str, Any] = finish(outcome, out=output.out)
@@ -186,7 +186,7 @@ def _finish(outcome: "Outcome", output: OutputFlags) -> int:
         sys.stdout.write(dumps(summary, indent=2) + "\n")
     else:
         console = Console()
-        report.show(summary, console)
+        printed_summary.show(summary, console)
         if output.out is not None:
             console.print(f"written to {output.out}")
     for name, why in summary["unwritten"].items():

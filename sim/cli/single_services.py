@@ -69,9 +69,9 @@ def router(
     if out is not None:
         import json
 
-        from sim.results import report
+        from sim.results import printed_summary
 
-        report.show(json.loads((out / "summary.json").read_text(encoding="utf-8")), Console())
+        printed_summary.show(json.loads((out / "summary.json").read_text(encoding="utf-8")), Console())
     return code
 
 

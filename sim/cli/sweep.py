@@ -19,7 +19,8 @@ from sim.cli.console import Console
 if TYPE_CHECKING:
     from pyarrow import Table
 
-    from sim.sweep.run import Progress, SweepPlan, Workers
+    from sim.sweep.remaining_runs import RemainingRuns
+    from sim.sweep.run import Progress, Workers
     from sim.sweep.spec import Sweep
     from sim.sweep.store import Store
 
@@ -93,7 +94,8 @@ def carry_out(
     json: bool = False,
 ) -> int:
     """Plan a sweep, print how long it will take, and carry it out."""
-    from sim.sweep.run import SweepPlan, run
+    from sim.sweep.remaining_runs import RemainingRuns
+    from sim.sweep.run import run
     from sim.sweep.store import TABLE, Store
     from sim.sweep.tasks import tasks_of
 
@@ -101,7 +103,7 @@ def carry_out(
     store = Store(out)
     with store.alone():
         store.read()
-        plan = SweepPlan(tasks, store, retry=retry)
+        plan = RemainingRuns(tasks, store, retry=retry)
         workers = _workers(jobs, scheduler, plan, dry_run=dry_run)
         _say(_announcement(name, wanted, plan, workers.workers))
         _warn_of_codes(store, plan)
@@ -153,7 +155,7 @@ def asked(what: str, sets: tuple[str, ...], seeds: int | None, variant: str | No
     return name, found if seeds is None else found.model_copy(update={"seeds": seeds})
 
 
-def _workers(jobs: int | None, scheduler: str | None, plan: "SweepPlan", *, dry_run: bool) -> "Workers":
+def _workers(jobs: int | None, scheduler: str | None, plan: "RemainingRuns", *, dry_run: bool) -> "Workers":
     if scheduler is None or dry_run:
         from sim.sweep.pool import Pool
 
@@ -164,7 +166,7 @@ def _workers(jobs: int | None, scheduler: str | None, plan: "SweepPlan", *, dry_
     return DaskCluster(scheduler)
 
 
-def _announcement(name: str, wanted: "Sweep", plan: "SweepPlan", workers: int) -> str:
+def _announcement(name: str, wanted: "Sweep", plan: "RemainingRuns", workers: int) -> str:
     settings = plan.total // max(1, len(wanted.seed_list()))
     text = f"{name}: {plan.total} runs ({settings} settings x {len(wanted.seed_list())} seeds)"
     if len(plan.todo) < plan.total:
@@ -176,7 +178,7 @@ def _announcement(name: str, wanted: "Sweep", plan: "SweepPlan", workers: int) -
     return f"{text}; about {spoken(plan.seconds(workers))} with {workers} process{'' if workers == 1 else 'es'}"
 
 
-def _warn_of_codes(store: "Store", plan: "SweepPlan") -> None:
+def _warn_of_codes(store: "Store", plan: "RemainingRuns") -> None:
     from sim.sweep.provenance import code
 
     others = {done.code for task in plan.tasks if (done := store.get(task.key)) is not None} - {code()}

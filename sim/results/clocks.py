@@ -13,8 +13,8 @@ import numpy.typing as npt
 
 from fanet_mw.trace import ClockSampled, Delivered, Generated, Record
 from fanet_mw.units import US, S
+from sim.run.collecting.record_kinds import records_of
 from sim.run.collecting.trace_log import TraceLog
-from sim.run.collecting.trace_reading import records_of
 from sim.run.outcome import Outcome
 
 

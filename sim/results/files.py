@@ -19,7 +19,7 @@ from fanet_mw.errors import ConfigError
 from fanet_mw.whole_file import write_items
 from sim.results.links import described
 from sim.results.metrics import summarize
-from sim.run.collecting.trace_reading import lines
+from sim.run.collecting.record_kinds import lines
 from sim.run.outcome import Outcome
 
 

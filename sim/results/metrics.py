@@ -22,7 +22,7 @@ from sim.results.clocks import clock_errors
 from sim.results.mission import mission
 from sim.results.packets import OTHER_APPS, AppPackets, packets_of, targets_by_source
 from sim.results.separation import separation
-from sim.run.collecting.trace_reading import records_of
+from sim.run.collecting.record_kinds import records_of
 from sim.run.outcome import Outcome
 
 

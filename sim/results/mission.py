@@ -36,7 +36,7 @@ from fanet_mw.trace import (
     Refuted,
 )
 from fanet_mw.units import S
-from sim.run.collecting.trace_reading import records_of
+from sim.run.collecting.record_kinds import records_of
 from sim.world.environment.survivors import place
 from sim.world.sensors.phone import REFERENCE_LOSS_DB
 

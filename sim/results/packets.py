@@ -12,7 +12,7 @@ from typing import Final
 
 from agents.applications.traffic import targets_of
 from fanet_mw.trace import BoundStated, Delivered, Generated, LetOut, LikelyStated
-from sim.run.collecting.trace_reading import records_of
+from sim.run.collecting.record_kinds import records_of
 from sim.run.outcome import Outcome
 
 OTHER_APPS: Final = ("report", "warning")

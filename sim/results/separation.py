@@ -6,7 +6,7 @@ import numpy as np
 
 from fanet_mw.trace import ConflictForeseen, Delivered, Warned
 from fanet_mw.units import MS
-from sim.run.collecting.trace_reading import records_of
+from sim.run.collecting.record_kinds import records_of
 from sim.run.outcome import Outcome
 
 

@@ -19,7 +19,7 @@ class Outcome:
     records: Collection[Record]
     """The trace records by instant, within one instant in the order in which they were made (virtual time) or by node
     (real time). They are on disk and decoded each time they are read; in virtual time the latest are in memory.
-    `collecting.trace_reading.records_of` reads those of some kinds."""
+    `collecting.record_kinds.records_of` reads those of some kinds."""
     reports: Mapping[str, Mapping[str, Any]]
     """The last report of each actor, by its name."""
     taps: Collection[tuple[int, bytes]] = ()

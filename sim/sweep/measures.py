@@ -14,7 +14,7 @@ from fanet_mw.trace import Approaching, Detected
 from fanet_mw.units import S
 from sim.results.connectivity import connectivity
 from sim.results.packets import AppPackets, first_class_of, packets_of
-from sim.run.collecting.trace_reading import records_of
+from sim.run.collecting.record_kinds import records_of
 from sim.run.outcome import Outcome
 
 Value = float | list[float] | None

@@ -1,4 +1,4 @@
-"""Carries out a sweep: finished runs are not repeated, and each result is stored at once."""
+"""Carries out the remaining runs of a sweep (`remaining_runs.py`), and stores each result at once."""
 
 import time
 from collections.abc import Callable, Iterator, Sequence
@@ -7,9 +7,9 @@ from typing import Final, Protocol
 
 import pyarrow as pa
 
-from fanet_mw.scenario import config
-from sim.sweep.cost import TimeLeft, guess_s, launch_s
+from sim.sweep.cost import TimeLeft
 from sim.sweep.one_run import Finished, carry_out
+from sim.sweep.remaining_runs import RemainingRuns
 from sim.sweep.store import Store
 from sim.sweep.tasks import Task
 
@@ -35,32 +35,8 @@ class Progress:
     left_s: float
 
 
-class SweepPlan:
-    """The runs of a sweep, and which of them remain to be done."""
-
-    def __init__(self, tasks: Sequence[Task], store: Store, *, retry: bool = False) -> None:
-        self.tasks = tasks
-        distinct = {task.key: task for task in tasks}
-        self.total = len(distinct)
-        self.todo = [task for key, task in distinct.items() if _wanted(store.get(key), retry=retry)]
-        self.guesses_s = {task.key: _guess_s(task) for task in self.todo}
-
-    def seconds(self, workers: int) -> float:
-        """The estimated time that they will take."""
-        return TimeLeft(self.guesses_s.values(), workers=workers).seconds()
-
-
-def _guess_s(task: Task) -> float:
-    scenario = config.build(task.tree)
-    return launch_s(scenario) if task.realtime else guess_s(scenario)
-
-
-def _wanted(done: Finished | None, *, retry: bool) -> bool:
-    return done is None or (retry and done.failed)
-
-
 def run(
-    plan: SweepPlan,
+    plan: RemainingRuns,
     store: Store,
     workers: Workers,
     varied: Sequence[str],

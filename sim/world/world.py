@@ -18,7 +18,7 @@ from fanet_mw.rng import stream_seed
 from fanet_mw.scenario import Scenario
 from fanet_mw.trace import Collided, FlightModeChanged, Posed
 from fanet_mw.units import NodeId, S
-from sim.world.engines.battery_drain import Energy
+from sim.world.engines.battery_drain import BatteryDrain
 from sim.world.engines.contract import Engine
 from sim.world.engines.kinematic import Kinematic
 from sim.world.engines.rotors.engine import Rotors
@@ -94,9 +94,9 @@ class WorldActor(Actor):
         for node, sent in sorted(flight.setpoints.items()) if flight else ():
             self._guidance.obey(node, sent, at=self._engine.positions()[node - 1], t_s=sent.t_ns / S)
         drained = scenario.sensors.battery_hz > 0 or scenario.world.engine == "rotors"
-        self._energy = Energy(scenario) if drained else None
+        self._drain = BatteryDrain(scenario) if drained else None
         survivors = Survivors(scenario, solids.ground_m)
-        self._suite = Suite(scenario, sensors_of(scenario, survivors, solids, self._energy, solid), topics)
+        self._suite = Suite(scenario, sensors_of(scenario, survivors, solids, self._drain, solid), topics)
         self._flies = np.ones(len(self._ids), bool)
         """The UAVs that have not crashed."""
         if flight is not None and scenario.world.crash == "falls":
@@ -147,7 +147,7 @@ class WorldActor(Actor):
             "collisions": self._incidents.collisions,
             "crashed": int((~self._flies).sum()),
             "no_fly_entries": self._incidents.no_fly.entries,
-            "least_charge": None if self._energy is None else round(float(self._energy.batteries.charge.min()), 4),
+            "least_charge": None if self._drain is None else round(float(self._drain.batteries.charge.min()), 4),
             "separation": self._incidents.separation.report(),
             "malformed": self._malformed,
         }
@@ -169,11 +169,11 @@ class WorldActor(Actor):
             engine.advance(elapsed_s / steps, self._guidance.wanted(t_s, before, engine.velocities()))
             self._incidents.separation.watch(before, engine.positions())
         self._incidents.no_fly.watch(engine.positions())
-        if self._energy is not None:
+        if self._drain is not None:
             motors = self._flies & ~self._guidance.grounded(engine.positions())
-            for row in self._energy.pass_time(elapsed_s, engine, motors):
+            for row in self._drain.pass_time(elapsed_s, engine, motors):
                 self._crash(row + 1, radio_dies=True)
-            for row in np.flatnonzero(motors & (self._energy.batteries.charge <= _EMERGENCY_CHARGE)).tolist():
+            for row in np.flatnonzero(motors & (self._drain.batteries.charge <= _EMERGENCY_CHARGE)).tolist():
                 self._guidance.land_at_once(row + 1)
         self._record_modes(now_ns)
         for first, second in engine.contacts():

@@ -37,7 +37,7 @@ from fanet_mw.trace import Dropped
 from fanet_mw.units import Enu, NodeId, S
 from sim.results.bounds import Column, delays_under_bound, likely
 from sim.results.packets import packets_of
-from sim.run.collecting.trace_reading import records_of
+from sim.run.collecting.record_kinds import records_of
 from sim.run.outcome import Outcome
 from sim.run.virtual import actors_of
 from sim.world.mobility.layout import positions

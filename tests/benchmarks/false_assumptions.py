@@ -22,7 +22,7 @@ from fanet_mw.trace import BoundStated
 from fanet_mw.units import MS, Enu, NodeId
 from sim.results.bounds import against_bounds
 from sim.results.packets import packets_of
-from sim.run.collecting.trace_reading import records_of
+from sim.run.collecting.record_kinds import records_of
 from sim.run.outcome import Outcome
 from sim.scenarios import catalog
 from sim.world.mobility.layout import positions

@@ -17,7 +17,7 @@ from fanet_mw.bus.messages import MavlinkTap, Message
 from fanet_mw.bus.topics import Topics
 from fanet_mw.hosts.bus import Bus
 from fanet_mw.hosts.clock import ClockKeeper
-from fanet_mw.hosts.lateness import Histogram
+from fanet_mw.hosts.duration_histogram import DurationHistogram
 from fanet_mw.hosts.realtime import SwarmAddress, run_actor
 from fanet_mw.units import S
 from sim.run.launcher.processes import Processes
@@ -38,7 +38,7 @@ class Talker(Actor):
         self._every_ns = round(S / rate_hz) if rate_hz else None
         self._next_ns = 0
         self._count = 0
-        self._delay = Histogram()
+        self._delay = DurationHistogram()
 
     def start(self, now_ns: int) -> None:
         self._next_ns = now_ns + (self._every_ns or 0) * self._node // AGENTS

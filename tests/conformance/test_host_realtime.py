@@ -23,7 +23,7 @@ from fanet_mw.bus.topics import Topics
 from fanet_mw.errors import BusError
 from fanet_mw.hosts.bus import Bus
 from fanet_mw.hosts.clock import ClockKeeper, ClockListener, SwarmClock
-from fanet_mw.hosts.lateness import Histogram
+from fanet_mw.hosts.duration_histogram import DurationHistogram
 from fanet_mw.hosts.realtime import SwarmAddress, run_actor
 from fanet_mw.hosts.timebase import THIS_MACHINE, Timebase
 from fanet_mw.trace import ProcessEnded
@@ -455,7 +455,7 @@ async def test_a_swarm_that_is_not_complete_is_not_started_and_names_who_is_miss
 
 @given(st.lists(st.integers(0, 10 * S), min_size=1), st.floats(0.01, 1))
 def test_a_percentile_is_never_too_low_and_at_most_a_tenth_too_high(durations: list[int], share: float) -> None:
-    histogram = Histogram()
+    histogram = DurationHistogram()
     for duration in durations:
         histogram.add(duration)
     true_ns = sorted(durations)[math.ceil(share * len(durations)) - 1]

@@ -17,7 +17,7 @@ from fanet_mw.routing.clustered.tdma.turns import clocks_fit
 from fanet_mw.trace import Delivered, Generated
 from fanet_mw.units import MS, US, Enu, NodeId
 from sim.results.files import finish
-from sim.run.collecting.trace_reading import lines
+from sim.run.collecting.record_kinds import lines
 from sim.run.outcome import Outcome
 from sim.run.virtual import simulate
 from sim.scenarios import catalog

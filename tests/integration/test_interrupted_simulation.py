@@ -12,9 +12,9 @@ from pathlib import Path
 import pytest
 from rich.console import Console
 
-from sim.results import report
+from sim.results import printed_summary
 from sim.results.files import finish
-from sim.run.collecting.trace_reading import lines
+from sim.run.collecting.record_kinds import lines
 from sim.run.virtual import simulate
 from sim.scenarios import catalog
 
@@ -84,7 +84,7 @@ def test_a_signal_ends_a_run_at_its_next_tenth_of_a_second_and_before_the_first_
     summary = finish(part, out=None)
     assert (summary["simulated_s"], summary["valid"]) == (6.1, False)
     console = Console(file=io.StringIO(), width=200)
-    report.show({**summary, "wall_s": 2.0}, console)
+    printed_summary.show({**summary, "wall_s": 2.0}, console)
     assert "partial, 6.1 of 20 s in 2.0 s (3.0 x real time)" in console.file.getvalue()  # type: ignore[attr-defined]
     with pytest.raises(KeyboardInterrupt) as caught:
         simulate(chosen, signals=[signal.SIGINT])

@@ -7,7 +7,8 @@ from typing import Any, Final
 from fanet_mw.results import read
 from sim.sweep import spec
 from sim.sweep.one_run import Finished, carry_out
-from sim.sweep.run import SweepPlan, run
+from sim.sweep.remaining_runs import RemainingRuns
+from sim.sweep.run import run
 from sim.sweep.store import Store
 from sim.sweep.tasks import Task, tasks_of
 
@@ -44,7 +45,7 @@ def swept(folder: Path) -> tuple[list[int], list[str], list[dict[str, Any]]]:
     with store.alone():
         for _ in range(2):
             store.read()
-            plan = SweepPlan(tasks_of(sweep), store)
+            plan = RemainingRuns(tasks_of(sweep), store)
             run(plan, store, workers, sweep.varied())
             counts.append(len(plan.todo))
     return counts, workers.ran, read(folder).to_pylist()

@@ -17,7 +17,7 @@ from typing import Any, Final
 
 from fanet_mw.trace import Delivered, Record
 from sim.run.collecting.disk_backed_log import MOST_IN_MEMORY, DiskBackedLog
-from sim.run.collecting.trace_reading import CODES, KINDS
+from sim.run.collecting.record_kinds import CODES, KINDS
 
 _DELIVERED: Final = CODES[Delivered]
 _ROW: Final = struct.Struct("<qHHIqHq")

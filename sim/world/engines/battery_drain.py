@@ -21,8 +21,8 @@ _CELLS: Final = 61
 _CLIMBS_M_S: Final = np.array([0.0, 2.0, 5.0, 10.0])
 
 
-class Energy:
-    """Batteries and what empties them."""
+class BatteryDrain:
+    """The batteries of all UAVs, and the power that empties them."""
 
     def __init__(self, scenario: Scenario) -> None:
         world = scenario.world

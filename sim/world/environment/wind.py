@@ -9,6 +9,8 @@ The formulas are those of MIL-F-8785C (1980), 3.7.2, for low altitudes; W20 is t
 the mean wind, w is upwards. Both filters are advanced exactly for a step of any length: u is an autoregression of first
 order; v and w have two states each, whose covariance over a step is known in closed form. Not modeled: gusts that one
 UAV meets after another, wind behind buildings and over hills, and a mean that grows with height.
+
+The wind acts on bodies with rotors only: that engine moves them through this air (`engines/rotors/engine.py`).
 """
 
 import math

@@ -5,7 +5,7 @@ from collections.abc import Iterator, Sequence
 from fanet_mw.bus.messages import Battery, Message
 from fanet_mw.scenario import Scenario
 from fanet_mw.units import S
-from sim.world.engines.battery_drain import Energy
+from sim.world.engines.battery_drain import BatteryDrain
 from sim.world.sensors.contract import Sensor, Truth
 
 
@@ -14,9 +14,9 @@ class BatterySensor(Sensor):
 
     kind = "battery"
 
-    def __init__(self, scenario: Scenario, energy: Energy) -> None:
+    def __init__(self, scenario: Scenario, drain: BatteryDrain) -> None:
         self.period_ns = round(S / scenario.sensors.battery_hz)
-        self._batteries = energy.batteries
+        self._batteries = drain.batteries
 
     def read(self, truth: Truth, rows: Sequence[int]) -> Iterator[tuple[int, Message]]:
         batteries = self._batteries

@@ -6,7 +6,7 @@ from fanet_mw.bus.messages import Message
 from fanet_mw.bus.topics import Topics
 from fanet_mw.scenario import Scenario
 from fanet_mw.scenario.routing import PROTOCOLS
-from sim.world.engines.battery_drain import Energy
+from sim.world.engines.battery_drain import BatteryDrain
 from sim.world.engines.contract import Flags
 from sim.world.environment.obstacles import Obstacles
 from sim.world.environment.solids import Solids
@@ -27,12 +27,12 @@ def sensors_of(
     scenario: Scenario,
     survivors: Survivors,
     solids: Solids,
-    energy: Energy | None = None,
+    drain: BatteryDrain | None = None,
     obstacles: Obstacles | None = None,
 ) -> list[Sensor]:
     """The sensors that a scenario asks for, in the order in which their readings are sent.
 
-    `energy`: the batteries; None if UAVs have none. `obstacles`: the same obstacles as in `solids`, for rendered
+    `drain`: the batteries; None if UAVs have none. `obstacles`: the same obstacles as in `solids`, for rendered
     images; None if there are none.
     """
     config = scenario.sensors
@@ -53,8 +53,8 @@ def sensors_of(
         found.append(AltimeterSensor(scenario, solids))
     if config.inertial_hz:
         found.append(InertialSensor(scenario))
-    if config.battery_hz and energy is not None:
-        found.append(BatterySensor(scenario, energy))
+    if config.battery_hz and drain is not None:
+        found.append(BatterySensor(scenario, drain))
     return found
 
 

@@ -12,7 +12,7 @@ from fanet_mw.scenario import Scenario
 from fanet_mw.units import MS, Enu, NodeId, S
 from sim.results import validity
 from sim.results.metrics import summarize
-from sim.results.report import show
+from sim.results.printed_summary import show
 from sim.run.outcome import Outcome
 from sim.world.world import WorldActor
 

@@ -11,7 +11,8 @@ from fanet_mw.results import read
 from sim.results.rows import flat
 from sim.sweep import spec
 from sim.sweep.one_run import Finished, carry_out
-from sim.sweep.run import Progress, SweepPlan, run
+from sim.sweep.remaining_runs import RemainingRuns
+from sim.sweep.run import Progress, run
 from sim.sweep.store import TABLE, Store
 from sim.sweep.tasks import Task, tasks_of
 
@@ -51,7 +52,7 @@ def go(folder: Path, sweep: spec.Sweep, workers: OneByOne, *, retry: bool = Fals
     store, told = Store(folder), []
     with store.alone():
         store.read()
-        plan = SweepPlan(tasks_of(sweep), store, retry=retry)
+        plan = RemainingRuns(tasks_of(sweep), store, retry=retry)
         run(plan, store, workers, sweep.varied(), on_progress=told.append)
     return told
 

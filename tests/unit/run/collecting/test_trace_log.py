@@ -7,8 +7,8 @@ import pytest
 
 from fanet_mw.errors import DropReason
 from fanet_mw.trace import Delivered, Dropped, Generated, Posed, Record, line
+from sim.run.collecting.record_kinds import lines, records_of
 from sim.run.collecting.trace_log import TraceLog
-from sim.run.collecting.trace_reading import lines, records_of
 
 MOST = 7
 """So few records are kept in memory here."""

@@ -10,7 +10,7 @@ from fanet_mw.bus.messages import Battery
 from fanet_mw.errors import ConfigError
 from fanet_mw.scenario import Scenario
 from fanet_mw.units import S
-from sim.world.engines.battery_drain import Energy
+from sim.world.engines.battery_drain import BatteryDrain
 from sim.world.engines.contract import Rows
 from sim.world.engines.kinematic import Kinematic
 from sim.world.engines.rotors.battery import Batteries
@@ -244,7 +244,7 @@ def test_the_fast_engines_batteries_are_drained_as_the_full_ones(make_scenario: 
     """15 s at 8 m/s: the table of steady flight against the rotors' own power."""
     left = {}
     for engine in (Kinematic(), Rotors(CRAZYFLIE)):
-        energy = Energy(make_scenario(**{"nodes.count": 1, "world.vehicle": "crazyflie"}))
+        energy = BatteryDrain(make_scenario(**{"nodes.count": 1, "world.vehicle": "crazyflie"}))
         engine.reset(np.array([[0.0, 0, 50]]))
         for _ in range(300):
             engine.advance(STEP_S, np.array([[8.0, 0, 0]]))

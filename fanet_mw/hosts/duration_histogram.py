@@ -1,4 +1,7 @@
-"""A histogram of lateness with logarithmic bins: constant memory, and percentiles with an error of at most a tenth."""
+"""A histogram of durations with logarithmic bins: constant memory, and percentiles with an error of at most a tenth.
+
+Real-time hosts keep their lateness in one (`host_figures.py`).
+"""
 
 import math
 from typing import Final
@@ -9,8 +12,8 @@ _PER_DECADE: Final = 24
 _LEAST_NS: Final = 1_000
 
 
-class Histogram:
-    """A histogram of durations."""
+class DurationHistogram:
+    """A histogram of durations [ns]."""
 
     def __init__(self) -> None:
         self._bins: dict[int, int] = {}

@@ -1,0 +1,37 @@
+"""Which runs of a sweep remain to be done, so that an interrupted or extended sweep goes on where it stopped.
+
+A run remains if the folder of the sweep (`store.py`) has no result under its key. A run that has failed is repeated
+only if that is asked for (`fanet sweep --retry`).
+"""
+
+from collections.abc import Sequence
+
+from fanet_mw.scenario import config
+from sim.sweep.cost import TimeLeft, guess_s, launch_s
+from sim.sweep.one_run import Finished
+from sim.sweep.store import Store
+from sim.sweep.tasks import Task
+
+
+class RemainingRuns:
+    """The runs of a sweep, and which of them remain to be done."""
+
+    def __init__(self, tasks: Sequence[Task], store: Store, *, retry: bool = False) -> None:
+        self.tasks = tasks
+        distinct = {task.key: task for task in tasks}
+        self.total = len(distinct)
+        self.todo = [task for key, task in distinct.items() if _remains(store.get(key), retry=retry)]
+        self.guesses_s = {task.key: _guess_s(task) for task in self.todo}
+
+    def seconds(self, workers: int) -> float:
+        """The estimated time that the remaining runs will take."""
+        return TimeLeft(self.guesses_s.values(), workers=workers).seconds()
+
+
+def _remains(done: Finished | None, *, retry: bool) -> bool:
+    return done is None or (retry and done.failed)
+
+
+def _guess_s(task: Task) -> float:
+    scenario = config.build(task.tree)
+    return launch_s(scenario) if task.realtime else guess_s(scenario)

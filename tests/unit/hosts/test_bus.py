@@ -1,0 +1,39 @@
+"""All work of a client's Zenoh session is done by the threads of one runtime, or by those that the user asks for."""
+
+import os
+import subprocess
+import sys
+from collections.abc import Mapping
+from pathlib import Path
+
+import pytest
+
+from fanet_mw.hosts.bus import Bus
+from sim.run.launcher.swarm import free_endpoint
+
+CLIENT = """
+import sys
+from pathlib import Path
+from fanet_mw.hosts.bus import Bus
+with Bus.join(sys.argv[1], patience_s=20) as bus:
+    names = {(task / "comm").read_text().strip().rpartition("-")[0] for task in Path("/proc/self/task").iterdir()}
+print(*sorted(names & {"app", "rx", "tx", "net", "acc"}))
+"""
+pytestmark = pytest.mark.skipif(not Path("/proc/self/task").is_dir(), reason="only Linux tells the names of threads")
+
+
+@pytest.mark.parametrize(
+    ("environment", "runtimes"),
+    [({}, "app"), ({"ZENOH_RUNTIME": "(tx: (handover: app), net: (handover: app))"}, "app rx")],
+)
+def test_a_client_does_not_switch_between_threads_unless_the_user_asks_for_it(
+    environment: Mapping[str, str], runtimes: str
+) -> None:
+    endpoint = free_endpoint()
+    others = {key: value for key, value in os.environ.items() if key != "ZENOH_RUNTIME"}
+    with Bus.serve(endpoint):
+        client = subprocess.run(
+            [sys.executable, "-c", CLIENT, endpoint],
+            env=others | environment, capture_output=True, text=True, timeout=60, check=True,
+        )  # fmt: skip
+    assert client.stdout.strip() == runtimes

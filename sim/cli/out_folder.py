@@ -13,9 +13,8 @@ from emulator.capture_file import NAME as CAPTURE
 from emulator.capture_file import captures
 from fanet_mw.errors import ConfigError
 from sim.report import names
+from sim.results.file_names import RUN_FILES
 
-FILES: Final = ("summary.json", "scenario.toml", "reports.json", "links.json", "trace.jsonl", "mavlink.tlog")
-"""The files that a run writes, besides captures and the files of its page."""
 _MOST_SAID: Final = 8
 
 
@@ -28,7 +27,7 @@ def prepare(out: Path, *, force: bool) -> None:
         out.mkdir(parents=True, exist_ok=True)
         with tempfile.TemporaryFile(dir=out) as file:
             file.write(b"a run would be lost")
-        named = (out / name for name in (*FILES, *names.PAGES))
+        named = (out / name for name in (*RUN_FILES, *names.PAGES))
         used = [path for path in (*named, *captures(out / CAPTURE), *names.pictures(out)) if path.exists()]
         if used and not force:
             raise ConfigError(

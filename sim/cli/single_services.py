@@ -70,8 +70,9 @@ def router(
         import json
 
         from sim.results import printed_summary
+        from sim.results.file_names import SUMMARY_FILE
 
-        printed_summary.show(json.loads((out / "summary.json").read_text(encoding="utf-8")), Console())
+        printed_summary.show(json.loads((out / SUMMARY_FILE).read_text(encoding="utf-8")), Console())
     return code
 
 

@@ -16,15 +16,25 @@ from matplotlib.colors import ListedColormap
 from matplotlib.ticker import MaxNLocator
 
 from agents.applications.traffic import targets_of
-from fanet_mw import trace
-from fanet_mw.errors import ConfigError
 from fanet_mw.scenario import config
 from fanet_mw.scenario.model import Scenario
-from fanet_mw.trace import Approaching, Arrived, BoundStated, Delivered, Detected, Generated, LetOut, RoleChanged
+from fanet_mw.trace import (
+    Approaching,
+    Arrived,
+    BoundStated,
+    Delivered,
+    Detected,
+    Generated,
+    LetOut,
+    Record,
+    RoleChanged,
+)
 from fanet_mw.units import MS, S
 from sim.figures.style import SERIES, applied, canvas, legend_above, save
 from sim.report.html import Block, Commands, Heading, Picture, Rows, Text
 from sim.report.names import KINDS, PICTURES
+from sim.results.file_names import LINKS_FILE, SCENARIO_FILE, SUMMARY_FILE, TRACE_FILE
+from sim.results.trace_file import read_trace
 from sim.world.mobility.layout import positions
 
 _WINDOWS = 40
@@ -32,12 +42,14 @@ _WINDOWS = 40
 _SHARES = ListedColormap([colormaps["viridis"](step / 255) for step in range(200)])
 """Colors from dark violet, for links that lose everything, to green; the yellow end of the color map is invisible on
 white."""
+_SHOWN = (Generated, Delivered, BoundStated, LetOut, RoleChanged, Detected, Approaching, Arrived)
+"""The kinds of records that the pictures are drawn from."""
 _BLUE, _RED, _GREEN, _PINK, _ORANGE = (look.color for look in SERIES)
 
 
 def is_run(folder: Path) -> bool:
     """True for a folder of `fanet simulate --out` or `fanet launch --out`."""
-    return all((folder / name).exists() for name in ("summary.json", "scenario.toml", "trace.jsonl"))
+    return all((folder / name).exists() for name in (SUMMARY_FILE, SCENARIO_FILE, TRACE_FILE))
 
 
 @dataclass(slots=True)
@@ -54,9 +66,9 @@ class _Story:
     """The last head of each node."""
     mission: list[Detected | Approaching | Arrived] = field(default_factory=list)
 
-    def read(self, lines: Iterable[str]) -> None:
+    def read(self, records: Iterable[Record]) -> None:
         had: set[tuple[int, int, int]] = set()
-        for record in map(trace.parse, lines):
+        for record in records:
             match record:
                 case Generated() if record.app == "traffic":
                     self.sent[record.node, record.seq] = record.t_ns
@@ -82,15 +94,12 @@ class _Story:
 
 def blocks_of_run(folder: Path, out: Path) -> list[Block]:
     """The page of one run; its pictures go to a folder beside the page."""
-    summary = json.loads((folder / "summary.json").read_text(encoding="utf-8"))
-    tree = tomllib.loads((folder / "scenario.toml").read_text(encoding="utf-8"))
-    story = _Story(config.build(tree, source=str(folder / "scenario.toml")))
-    try:
-        with (folder / "trace.jsonl").open(encoding="utf-8") as file:
-            story.read(file)
-    except ValueError as error:
-        raise ConfigError(f"{folder / 'trace.jsonl'}: {error}") from error
-    links = json.loads((folder / "links.json").read_text(encoding="utf-8")) if (folder / "links.json").exists() else []
+    summary = json.loads((folder / SUMMARY_FILE).read_text(encoding="utf-8"))
+    tree = tomllib.loads((folder / SCENARIO_FILE).read_text(encoding="utf-8"))
+    story = _Story(config.build(tree, source=str(folder / SCENARIO_FILE)))
+    story.read(read_trace(folder, *_SHOWN))
+    links_file = folder / LINKS_FILE
+    links = json.loads(links_file.read_text(encoding="utf-8")) if links_file.exists() else []
     pictures = out / PICTURES
     pictures.mkdir(parents=True, exist_ok=True)
     name = f"{summary['scenario']}-{summary['seed']}"

@@ -17,6 +17,7 @@ import tomli_w
 from fanet_mw import tlog
 from fanet_mw.errors import ConfigError
 from fanet_mw.whole_file import write_items
+from sim.results.file_names import LINKS_FILE, REPORTS_FILE, SCENARIO_FILE, SUMMARY_FILE, TLOG_FILE, TRACE_FILE
 from sim.results.links import described
 from sim.results.metrics import summarize
 from sim.run.collecting.record_kinds import lines
@@ -44,7 +45,7 @@ def finish(outcome: Outcome, *, out: Path | None) -> dict[str, Any]:
             unwritten = _write(outcome, summary, out)
             if unwritten:
                 summary["unwritten"] = unwritten
-                _try(partial(_replace, out / "summary.json", summary))
+                _try(partial(_replace, out / SUMMARY_FILE, summary))
     return summary
 
 
@@ -53,12 +54,12 @@ def _write(outcome: Outcome, summary: dict[str, Any], out: Path) -> dict[str, st
     resolved = outcome.scenario.model_dump(mode="json", exclude_none=True)
     links = ",\n".join(json.dumps(row) for row in described(outcome.links.rows()))  # one line per link
     writers: dict[str, Callable[[Path], object]] = {
-        "summary.json": lambda path: write_items(path, _json_lines(summary)),
-        "scenario.toml": lambda path: write_items(path, [tomli_w.dumps(resolved).encode()]),
-        "reports.json": lambda path: write_items(path, _json_lines(dict(outcome.reports))),
-        "links.json": lambda path: write_items(path, f"[\n{links}\n]\n".encode().splitlines(keepends=True)),
-        "trace.jsonl": lambda path: write_items(path, lines(outcome.records)),
-        "mavlink.tlog": lambda path: tlog.write(path, outcome.taps, epoch_us=outcome.epoch_unix_ns // 1000),
+        SUMMARY_FILE: lambda path: write_items(path, _json_lines(summary)),
+        SCENARIO_FILE: lambda path: write_items(path, [tomli_w.dumps(resolved).encode()]),
+        REPORTS_FILE: lambda path: write_items(path, _json_lines(dict(outcome.reports))),
+        LINKS_FILE: lambda path: write_items(path, f"[\n{links}\n]\n".encode().splitlines(keepends=True)),
+        TRACE_FILE: lambda path: write_items(path, lines(outcome.records)),
+        TLOG_FILE: lambda path: tlog.write(path, outcome.taps, epoch_us=outcome.epoch_unix_ns // 1000),
     }
     failed = {name: _try(partial(write, out / name)) for name, write in writers.items()}
     return {name: why for name, why in failed.items() if why is not None}

@@ -18,6 +18,7 @@ from fanet_mw.errors import ConfigError
 from fanet_mw.scenario import Scenario
 from fanet_mw.trace import FlightModeChanged, MissionModeChanged, Planned, Posed, Record
 from fanet_mw.units import Enu, NodeId, S
+from sim.results.file_names import SCENARIO_FILE
 from sim.results.mission import OverflownCells, mission
 from sim.results.trace_file import read_trace
 
@@ -62,7 +63,7 @@ class Replay:
     def read(cls, folder: Path) -> Self:
         """Read what `fanet simulate --out` or `fanet launch --out` has written; raises ConfigError."""
         try:
-            keys = tomllib.loads((folder / "scenario.toml").read_text(encoding="utf-8"))
+            keys = tomllib.loads((folder / SCENARIO_FILE).read_text(encoding="utf-8"))
         except (OSError, ValueError) as error:
             raise ConfigError(f"{folder}: cannot be replayed: {error}") from error
         return cls(Scenario.model_validate(keys), list(read_trace(folder)))

@@ -6,13 +6,13 @@ from pathlib import Path
 from typing import TYPE_CHECKING, Any
 
 from fanet_mw.errors import ConfigError
+from sim.results.file_names import SCENARIO_FILE, SUMMARY_FILE
 from sim.results.rows import flat
 
 if TYPE_CHECKING:
     from pyarrow import Table
 
 _SWEEP = "runs.parquet"
-_RUN = "summary.json"
 
 
 def read(*folders: str | Path) -> "Table":
@@ -39,16 +39,16 @@ def _read(folder: Path) -> "Table":
     try:
         if path.exists():
             return pq.read_table(path)
-        if (folder / _RUN).exists():
+        if (folder / SUMMARY_FILE).exists():
             return pa.Table.from_pylist([_row(folder)])
     except (OSError, ValueError, pa.ArrowException) as error:
         raise ConfigError(f"{path}: cannot be read: {error}") from error
-    raise ConfigError(f"{folder}: holds neither {_SWEEP} (of a sweep) nor {_RUN} (of a run)")
+    raise ConfigError(f"{folder}: holds neither {_SWEEP} (of a sweep) nor {SUMMARY_FILE} (of a run)")
 
 
 def _row(folder: Path) -> dict[str, Any]:
     """A single run as one row with the same columns."""
-    text = (folder / _RUN).read_text(encoding="utf-8")
-    scenario = tomllib.loads((folder / "scenario.toml").read_text(encoding="utf-8"))
+    text = (folder / SUMMARY_FILE).read_text(encoding="utf-8")
+    scenario = tomllib.loads((folder / SCENARIO_FILE).read_text(encoding="utf-8"))
     row: dict[str, Any] = {"seed": scenario.get("seed"), "status": "ok", **flat(json.loads(text))}
     return {**row, "scenario": json.dumps(scenario), "summary": text}

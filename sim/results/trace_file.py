@@ -11,8 +11,7 @@ from typing import Any
 
 from fanet_mw.errors import ConfigError, MalformedFrameError
 from fanet_mw.trace import Record, name_of, parse
-
-TRACE_FILE = "trace.jsonl"
+from sim.results.file_names import TRACE_FILE
 
 
 def read_trace(folder: Path, *kinds: type[Any]) -> Iterator[Record]:

@@ -10,8 +10,9 @@ import pytest
 from fanet_mw import tlog
 from fanet_mw.errors import ConfigError
 from sim.cli.app import app
-from sim.cli.out_folder import FILES, prepare
+from sim.cli.out_folder import prepare
 from sim.report.names import PAGES
+from sim.results.file_names import RUN_FILES
 
 SHORT = ("--set", "duration_s=1", "--set", "warmup_s=0", "--set", "drain_s=0", "--json")
 
@@ -48,7 +49,7 @@ def test_a_used_folder_is_refused_and_replaced_whole_with_force(
 ) -> None:
     out = tmp_path / "deep" / "out"
     assert fanet("simulate", "quick", "--seed", "1", "--pcap", "--out", str(out)) == 0
-    assert {path.name for path in out.iterdir()} == {*FILES, "air.pcap"}, "FILES names all that a run writes"
+    assert {path.name for path in out.iterdir()} == {*RUN_FILES, "air.pcap"}, "RUN_FILES names all that a run writes"
     assert {stamp // 10**9 for stamp, _ in tlog.read(out / "mavlink.tlog")} == {1_735_689}, "the first of 2025"
     (seconds,) = struct.unpack_from("<I", (out / "air.pcap").read_bytes(), 24)  # of the first record
     assert seconds // 1000 == 1_735_689
@@ -60,11 +61,11 @@ def test_a_used_folder_is_refused_and_replaced_whole_with_force(
     capsys.readouterr()
     assert fanet("simulate", str(out / "scenario.toml"), "--seed", "2", "--out", str(out), "--force") == 0
     assert json.loads((out / "summary.json").read_text()) == json.loads(capsys.readouterr().out)
-    assert {path.name for path in out.iterdir()} == {*FILES, "notes.txt"}, "the capture was of the other run"
+    assert {path.name for path in out.iterdir()} == {*RUN_FILES, "notes.txt"}, "the capture was of the other run"
     assert (out / "notes.txt").read_text() == "mine"
 
 
-@pytest.mark.parametrize("name", [*FILES, *PAGES, "air.pcap", "air-2.pcap"])
+@pytest.mark.parametrize("name", [*RUN_FILES, *PAGES, "air.pcap", "air-2.pcap"])
 def test_one_file_of_another_run_is_enough_to_refuse(tmp_path: Path, name: str) -> None:
     (tmp_path / name).touch()
     with pytest.raises(ConfigError, match=name):

@@ -13,10 +13,10 @@ turn, so the packet never waits there. All nodes compute the same timetable from
 """
 
 import math
-from collections.abc import Iterable, Iterator, Mapping
+from collections.abc import Callable, Iterable, Iterator, Mapping
 from itertools import islice
 from types import MappingProxyType
-from typing import Final, NamedTuple, Self
+from typing import Final, NamedTuple, Self, TypeVar
 
 from fanet_mw.routing.clustered.tdma.turns import Turns, turn_ns
 from fanet_mw.routing.clustered.tdma.urgent import reserved
@@ -60,6 +60,8 @@ _HELLO_BYTES: Final = 200
 
 _BLOCK: Final = 300
 """The least number of packets in a block: with fewer, turns are filled less densely; more take long to compute."""
+
+T = TypeVar("T")
 
 NO_LOADS: Final[Mapping[NodeId, int]] = MappingProxyType({})
 """All nodes send as the scenario states."""
@@ -244,7 +246,7 @@ def fit_measured(
     turn = turn_ns(scenario, payload_bytes=size)
     contention_ns = round(scenario.clusters.contention_ms * MS * whole_ns / scenario.clusters.period_ns)
     turns = Turns(origin_ns, whole_ns, contention_ns, turn, max(0, whole_ns - contention_ns) // turn)
-    own = leader_load(scenario) if leader == scenario.leader else 1
+    own = _sending_leader(scenario, leader)
     senders = [node for node, _ in places if node != leader or own]
     per_node = _per_node(scenario, senders, whole_ns, loads)
     each = {node: max(1, math.ceil(per_node[node] / _LOAD - 1e-3)) for node in senders}
@@ -274,8 +276,7 @@ def least_interval_ns(scenario: Scenario, places: Places, head_of: Mapping[NodeI
     """The least interval of traffic at which the load fits the turns; it is searched for up to twice the load."""
     period_ns = scenario.clusters.period_ns
     heads = tuple((node, head) for node, head in sorted(head_of.items()) if node != head)
-    senders = [*sorted(head_of), *([scenario.leader] if leader_load(scenario) else [])]
-    control = (scenario.leader,) * schedule_parts(scenario)
+    control, senders = _control(scenario, scenario.leader), _senders(scenario, head_of, scenario.leader)
     enough = 2 * period_ns / seconds_to_ns(scenario.traffic.interval_s)
     best = 0
     for together in range(1, most_together(scenario) + 1):
@@ -331,9 +332,7 @@ def _lasts(table: Timetable) -> int:
 
 def _wishes(scenario: Scenario, head_of: Mapping[NodeId, NodeId], leader: NodeId, period_ns: int) -> Iterator[_Wish]:
     """The uses of the turns to try, the best first."""
-    own = leader_load(scenario) if leader == scenario.leader else 1
-    control = (leader,) * schedule_parts(scenario)
-    senders = [*sorted(head_of), *([leader] if own else [])]
+    control, senders = _control(scenario, leader), _senders(scenario, head_of, leader)
     per_node = period_ns / seconds_to_ns(scenario.traffic.interval_s)
     most = most_together(scenario)
 
@@ -344,13 +343,9 @@ def _wishes(scenario: Scenario, head_of: Mapping[NodeId, NodeId], leader: NodeId
         return _Wish((*control, *turns), together, hard, blocks, enough=enough)
 
     yield wish((int(per_node) + 1) * len(senders), 1, hard=False)
-    fewest = max(1, math.ceil(per_node / most - 1e-9))
-    before = 0
-    for together in range(1, most + 1):
-        needed = max(1, math.ceil(per_node / together - 1e-9))
-        if needed != before:
-            yield wish(needed * len(senders), together, hard=needed == fewest)
-        before = needed
+    fewest = _turns_for(per_node, together=most)
+    for together, needed in _sharing(lambda together: _turns_for(per_node, together=together), most):
+        yield wish(needed * len(senders), together, hard=needed == fewest)
     together = next(n for n in range(1, most + 1) if per_node / n <= fewest + 1e-9)
     packets = fewest * len(senders)
     while packets > len(senders):
@@ -358,7 +353,7 @@ def _wishes(scenario: Scenario, head_of: Mapping[NodeId, NodeId], leader: NodeId
         yield wish(packets, together, hard=packets == len(senders), enough=False)
     if together > 1:
         yield wish(len(senders), 1, hard=True, enough=False)
-    yield _for_heads(head_of, control, leader if own else None)
+    yield _for_heads(scenario, head_of, leader)
 
 
 def _wishes_by_load(
@@ -370,14 +365,12 @@ def _wishes_by_load(
     send most get fewer turns first. So a node that sends too much, or is falsely reported to, takes nothing from the
     others.
     """
-    own = leader_load(scenario) if leader == scenario.leader else 1
-    control = (leader,) * schedule_parts(scenario)
-    senders = [*sorted(head_of), *([leader] if own else [])]
+    control, senders = _control(scenario, leader), _senders(scenario, head_of, leader)
     per_node = _per_node(scenario, senders, period_ns, loads)
     most = most_together(scenario)
 
     def needed(together: int) -> dict[NodeId, int]:
-        return {node: max(1, math.ceil(per_node[node] / together - 1e-9)) for node in senders}
+        return {node: _turns_for(per_node[node], together=together) for node in senders}
 
     def wishes(each: Mapping[NodeId, int], together: int, *, hard: bool, enough: bool = True) -> Iterator[_Wish]:
         turns = superframe(scenario, period_ns=period_ns, together=together)
@@ -389,19 +382,16 @@ def _wishes_by_load(
     ample = {n: _DRAINING * sent if sent > expected[n] else expected[n] for n, sent in per_node.items()}
     yield from wishes({node: int(each) + 1 for node, each in ample.items()}, 1, hard=False)
     yield from wishes({node: int(per_node[node]) + 1 for node in senders}, 1, hard=False)
-    fewest, before = needed(most), dict[NodeId, int]()
-    for together in range(1, most + 1):
-        each = needed(together)
-        if each != before:
-            yield from wishes(each, together, hard=each == fewest)
-        before = each
+    fewest = needed(most)
+    for together, each in _sharing(needed, most):
+        yield from wishes(each, together, hard=each == fewest)
     together = next(n for n in range(1, most + 1) if needed(n) == fewest)
     for level in range(max(fewest.values(), default=1) - 1, 0, -1):
         cut = {node: min(level, each) for node, each in fewest.items()}
         yield from wishes(cut, together, hard=level == 1, enough=False)
     if together > 1:
         yield from wishes(dict.fromkeys(senders, 1), 1, hard=True, enough=False)
-    yield _for_heads(head_of, control, leader if own else None)
+    yield _for_heads(scenario, head_of, leader)
 
 
 def _per_node(
@@ -424,9 +414,44 @@ def _blocks(packets: int, senders: int) -> int:
     return max(n for n in range(1, each + 1) if n == 1 or (each % n == 0 and packets // n >= _BLOCK))
 
 
-def _for_heads(head_of: Mapping[NodeId, NodeId], control: tuple[NodeId, ...], leader: NodeId | None) -> _Wish:
-    heads = sorted(set(head_of.values()))
-    return _Wish((*control, *heads, *((leader,) if leader else ())), 1, hard=True, whole=False, enough=False)
+def _for_heads(scenario: Scenario, head_of: Mapping[NodeId, NodeId], leader: NodeId) -> _Wish:
+    """One turn for each head, and for the leader if it sends packets of its own."""
+    roots = (*sorted(set(head_of.values())), *_sending_leader(scenario, leader))
+    return _Wish((*_control(scenario, leader), *roots), 1, hard=True, whole=False, enough=False)
+
+
+def _turns_for(packets: float, *, together: int) -> int:
+    """The number of turns that a node needs for its packets if `together` of them share a turn; at least one."""
+    return max(1, math.ceil(packets / together - 1e-9))
+
+
+def _sharing(needed: Callable[[int], T], most: int) -> Iterator[tuple[int, T]]:
+    """The numbers of packets that may share a turn, up to `most`, each with the turns that are then needed. A number
+    that needs as many turns as the one before it is left out.
+    """
+    before: T | None = None
+    for together in range(1, most + 1):
+        turns = needed(together)
+        if turns != before:
+            yield together, turns
+        before = turns
+
+
+def _control(scenario: Scenario, leader: NodeId) -> tuple[NodeId, ...]:
+    """The roots of the turns for the leader's schedules."""
+    return (leader,) * schedule_parts(scenario)
+
+
+def _senders(scenario: Scenario, head_of: Mapping[NodeId, NodeId], leader: NodeId) -> list[NodeId]:
+    """The nodes with packets of their own."""
+    return [*sorted(head_of), *_sending_leader(scenario, leader)]
+
+
+def _sending_leader(scenario: Scenario, leader: NodeId) -> tuple[NodeId, ...]:
+    """The leader if it sends packets of its own, otherwise none. A node that has taken over from the scenario's leader
+    goes on with the load that it had.
+    """
+    return (leader,) if leader != scenario.leader or leader_load(scenario) else ()
 
 
 def leader_load(scenario: Scenario) -> int:

@@ -1,4 +1,4 @@
-"""The closed registry of trace records: what happened, for metrics, figures and views. Logs for people are elsewhere.
+"""The closed registry of trace records: the events of a run, from which metrics, figures and views are made.
 
 A record is a NamedTuple whose first two fields are the instant and the node (0: no node). One record is one line of
 JSON in the trace file; `line` and `parse` are inverse. A new kind of record is a new class in `Record` below. `parse`
@@ -33,7 +33,7 @@ class LetOut(NamedTuple):
 
 
 class BoundStated(NamedTuple):
-    """The origin promised, when it accepted a packet, that no copy in turn is delivered later than this delay."""
+    """The origin promised, when it accepted a packet, that no copy of its flood is delivered later than this."""
 
     t_ns: int
     node: int
@@ -142,7 +142,7 @@ class Refuted(NamedTuple):
 
 
 class Planned(NamedTuple):
-    """A UAV took over a plan of the search, and its place in it; place -1: it has none."""
+    """A UAV took over a plan of the search, and its place in it; the place is -1 if it has none."""
 
     t_ns: int
     node: int
@@ -151,7 +151,7 @@ class Planned(NamedTuple):
 
 
 class Posed(NamedTuple):
-    """A UAV truly was at this place."""
+    """The true position of a UAV."""
 
     t_ns: int
     node: int
@@ -161,7 +161,7 @@ class Posed(NamedTuple):
 
 
 class FlightModeChanged(NamedTuple):
-    """The flight controller of a UAV began to do something else: `goto`, `velocity`, `hold`, `land`, `failsafe`..."""
+    """The flight controller of a UAV entered another mode (`FlightMode` in `sim/world/mobility/guidance.py`)."""
 
     t_ns: int
     node: int
@@ -169,17 +169,17 @@ class FlightModeChanged(NamedTuple):
 
 
 class MissionModeChanged(NamedTuple):
-    """A UAV of a planned search decided to do something else: `search`, `respond`, `return` or `land`."""
+    """A UAV of a planned search decided to do something else (the modes in `agents/mission/mode_record.py`)."""
 
     t_ns: int
     node: int
     mode: str
     survivor: int = 0
-    """The survivor that it responds to; 0: none."""
+    """The survivor to whom it responds; 0 for none."""
 
 
 class Sighted(NamedTuple):
-    """A camera or a microphone array noticed a person; `survivor` is the one it was taken for, 0: none known."""
+    """A camera or a microphone array noticed a person; `survivor` is the one that it was taken for, 0 for none."""
 
     t_ns: int
     node: int
@@ -239,7 +239,7 @@ class ProcessEnded(NamedTuple):
 
 
 class ClockSampled(NamedTuple):
-    """A node's swarm time was off by so much at a true instant."""
+    """The error of a node's swarm time at a true instant."""
 
     t_ns: int
     node: int
@@ -253,7 +253,9 @@ class ClockSampled(NamedTuple):
 
 
 class RadioFault(NamedTuple):
-    """A fault on the air began (`active`) or ended; node and other are the cut node or the ends of the link, else 0."""
+    """A fault on the air began (`active`) or ended. `node` is the node that is cut off, or `node` and `other` are the
+    ends of a link; both are 0 for a fault that lies on an area or on all links.
+    """
 
     t_ns: int
     node: int

@@ -222,7 +222,7 @@ def spread(
 ) -> None:  # fmt: skip
     """Handle one moment of a frame (`kind`) at its receivers on the links `link` to `end` - 1.
 
-    The receivers that the moment reaches at `t` are handled now; an event is planned for the next one.
+    Up to `AT_ONCE` receivers that the moment reaches at `t` are handled now; an event is planned for the next one.
     """
     until = min(end, link + AT_ONCE)
     while link < until and moment(p, lk, kind, link) == t:

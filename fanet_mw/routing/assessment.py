@@ -1,7 +1,7 @@
 """Random assessment delay: a packet is relayed unless enough copies of it are received in time (Ni et al., MobiCom
 1999, 3.2).
 
-    first copy -> wait -> fewer than `enough` copies received: relayed | enough copies received: forgotten
+    first copy -> wait -> fewer than `enough` copies received: relayed | as soon as there are enough: forgotten
 """
 
 import heapq
@@ -52,6 +52,6 @@ class Assessment:
         while due and due[0][0] <= now_ns:
             due_ns, key = heapq.heappop(due)
             open_ = self.pending.pop(key, None)
-            if open_ is not None:  # it was decided already
+            if open_ is not None:  # otherwise enough copies of it were received meanwhile
                 relays.append((due_ns, open_[1]))
         return relays

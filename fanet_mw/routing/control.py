@@ -15,10 +15,13 @@ from fanet_mw.errors import MalformedFrameError
 from fanet_mw.wire import OVERHEAD, ROUTING, encode_inner
 
 _HEAD: Final = struct.Struct("<BBBB")
+"""The beginning of a piece: its length, the type of the message, the number of the piece, the number of pieces."""
 _PIECE: Final = 239
+"""The most bytes of a body in one piece."""
 _AT: Final = OVERHEAD - 2
 """The offset of the payload in a MAVLink 2 frame."""
 _END: Final = bytes((wire.VERSION,))
+"""The end of a piece. It is not 0, because MAVLink 2 cuts zeros off the end of a payload."""
 
 
 class Family(IntEnum):

@@ -1,4 +1,6 @@
-"""The configuration of AODV (RFC 3561, 10). Where the RFC leaves a choice it is ns-3's; sources name sections."""
+"""The configuration of AODV (RFC 3561, 10). Where the RFC leaves a choice, the value is that of ns-3. Numbers in
+parentheses are sections of the RFC.
+"""
 
 from typing import Final
 

@@ -56,7 +56,7 @@ class Aodv(Routed):
         self._rreq_limit = RateLimit(p.RREQ_RATELIMIT)
         self._rerr_limit = RateLimit(p.RERR_RATELIMIT)
         self._blacklist: dict[NodeId, int] = {}
-        """Neighbors that could not be reached with a RREP, and until when their RREQs are ignored (6.8)."""
+        """Neighbors that have not acknowledged a unicast RREP or RERR, and until when their RREQs are ignored (6.8)."""
         self._most_unreachable = most_unreachable(control.capacity(port.scenario.radio.max_frame_bytes))
         self._seq = 0
         self._rreq_id = 0

@@ -3,7 +3,8 @@
     every 15 s  -> full dump, own number + 2
     changes     -> an incremental update within a second: new destinations and broken routes at once, another metric
                    when it has settled
-    link breaks -> (unicast not acknowledged, or no update for three periods) infinite metric, odd number
+    link breaks -> infinite metric, odd number; a link has broken when a unicast is not acknowledged, or when at a full
+                   dump no update has renewed the route for three periods
 
 As in ns-3 a packet without a route waits at its origin, an infinite metric counts only from the next hop, and the
 periods are the same. Broadcast data is flooded. Not modeled: the base-station extension and layer-2 addresses

@@ -1,4 +1,6 @@
-"""Where other nodes are: neighbors by their beacons, any node by the location service; and which neighbor is nearer."""
+"""The positions of other nodes, of neighbors by their beacons and of any node by the location service; and the neighbor
+to which a packet is handed next.
+"""
 
 from typing import Final
 
@@ -7,9 +9,10 @@ from fanet_mw.units import Enu, NodeId, S
 
 HELLO_INTERVAL_NS: Final = 1 * S
 NEIGHBOR_LIFETIME_NS: Final = 5 * HELLO_INTERVAL_NS // 2
-"""Two beacons in a row may be lost, but not three."""
+"""One beacon may be lost, but not two in a row."""
 MIN_PROGRESS_M: Final = 10.0
-"""A neighbor must be nearer by at least this to be worth a hop; it is several times the error of a position fix."""
+"""A packet is handed over only to a neighbor that is nearer to the destination by at least this, which is several times
+the error of a position fix."""
 _FUTURE_US: Final = 1_000_000
 """A location from further in the future than this is not believed, because it would never be replaced."""
 

@@ -22,7 +22,8 @@ def routing_table(
 ) -> dict[NodeId, OlsrRoute]:
     """The shortest known routes (10): to neighbors, to 2-hop neighbors, then over the topology set hop by hop.
 
-    `topology` holds pairs (last hop, destination). Of equally short routes the one over the lowest ids is taken.
+    `topology` holds pairs (last hop, destination). Of equally short routes the one whose last hop has the lowest id is
+    taken.
     """
     routes = {neighbor: OlsrRoute(neighbor, 1) for neighbor in sorted(neighbors)}
     for neighbor in sorted(neighbors):

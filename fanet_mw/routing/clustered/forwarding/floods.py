@@ -17,8 +17,8 @@ from fanet_mw.wire import FLAG_FLOOD, Kind
 
 _DATA: Final = int(Kind.DATA)
 _UPLINK_NS: Final = 1 * S
-"""The time that a packet may take to its head. A packet that has not been flooded one flooding period and this time
-after its generation may be repaired."""
+"""The time that a packet may take to its head. If a node has heard no flood of a packet one flooding period and this
+time after the packet came to it, the packet may be repaired."""
 
 
 class Floods:

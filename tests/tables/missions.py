@@ -20,6 +20,7 @@ from sim.results.files import finish
 from sim.results.mission import OverflownCells
 from sim.run.virtual import simulate
 from sim.scenarios import catalog
+from sim.sweep.measures import enough_heard_s
 from tests.tables.kept import KEPT, Kept, Run
 from tests.tables.markdown import Rows
 
@@ -52,8 +53,8 @@ PLACES: Final[Mapping[str, Case]] = {
 }
 COUNTRY: Final[Mapping[str, Case]] = {
     "`rescue`": Case("rescue", (), _TWENTY),
-    "`hills`": Case("hills", (), _TWENTY[:14]),
-    "`night`": Case("night", (), _TWENTY[:14]),
+    "`hills`": Case("hills", (), _TWENTY),
+    "`night`": Case("night", (), _TWENTY),
 }
 _SMALL: Final = (
     "nodes.count=20", "nodes.spacing_m=100", "nodes.telemetry_hz=0", "clusters.count=4", "traffic.interval_s=4",
@@ -93,6 +94,7 @@ def fly(scenario: Scenario) -> Run:
         "landed": len({r.node for r in records if type(r) is FlightModeChanged and r.mode == "land"}),
         "fell": len({r.node for r in records if type(r) is FlightModeChanged and r.mode == "fallen"}),
         "covered_50_s": _half_covered_s(scenario, records),
+        "enough_heard_s": enough_heard_s(outcome),
         "simulated_s": summary["simulated_s"],
         "cpu_s": time.process_time() - began_s,
     }
